@@ -1,0 +1,184 @@
+//! The public traits: what a model, a curve, a monitor and an observer must be able to do.
+//!
+//! **Idea.** Everything else in the crate is written against these few object-safe traits, so a model may be text, traced
+//! code or native Rust, and a curve may be an equilibrium, a cycle or a problem nobody has thought of yet.
+
+use crate::diagram::{Branch, Ending, Kind, Mesh, Point, SpecialPoint, Trust};
+use num_complex::Complex64;
+
+/// The parameters of a batch: one set for all lanes, or one set per lane.
+#[derive(Clone, Copy, Debug)]
+pub enum Parameters<'a> {
+    /// `[parameter]`: every lane uses the same values.
+    Shared(&'a [f64]),
+    /// `[parameter × lanes]`, component-major: lane `l` of parameter `k` at `k * lanes + l`.
+    PerLane(&'a [f64]),
+}
+
+/// Points at which a vector field is evaluated together, component-major (structure of arrays).
+#[derive(Clone, Copy, Debug)]
+pub struct Batch<'a> {
+    /// How many points.
+    pub lanes: usize,
+    /// `[dim × lanes]`: component `i` of lane `l` at `i * lanes + l`.
+    pub states: &'a [f64],
+    /// Parameter values.
+    pub parameters: Parameters<'a>,
+}
+
+/// A vector field x' = f(x, p), x ∈ ℝⁿ, p ∈ ℝᵏ, with exact derivatives, evaluated for a batch of points at once.
+///
+/// All arrays are component-major over the lanes of the batch: a quantity with components `c` stores lane `l` at
+/// `c * lanes + l`.
+pub trait VectorField: Send + Sync {
+    /// n, the number of state components.
+    fn dim(&self) -> usize;
+
+    /// k, the number of parameters.
+    fn parameter_count(&self) -> usize;
+
+    /// f: writes `[n × lanes]`.
+    fn evaluate(&self, at: Batch, f: &mut [f64]);
+
+    /// f and its first derivatives: `f` is `[n × lanes]`, `fx` is `[n·n × lanes]` (entry ∂fᵢ/∂xⱼ is component `i * n + j`),
+    /// `fp` is `[n·q × lanes]` with q = `free.len()` (entry ∂fᵢ/∂p_{free[c]} is component `i * q + c`).
+    fn linearise(&self, at: Batch, free: &[usize], f: &mut [f64], fx: &mut [f64], fp: &mut [f64]);
+
+    /// The multilinear derivative Dᵏf[d₁, …, dₖ] in states and parameters, k = `directions.len()` ≥ 1: each direction is
+    /// `[(n + k_p) × lanes]` (state part first, then all parameters); writes `[n × lanes]`.
+    fn directional(&self, at: Batch, directions: &[&[f64]], out: &mut [f64]);
+
+    /// How many scalar outputs the model defines besides its states.
+    fn output_count(&self) -> usize {
+        0
+    }
+
+    /// The outputs: writes `[output_count × lanes]`.
+    fn outputs(&self, _at: Batch, _out: &mut [f64]) {}
+}
+
+/// The matrix of a Newton step could not be factorised.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Singular;
+
+/// What a curve knows about the stability of one of its points, and how far that can be trusted.
+#[derive(Clone, Debug, Default)]
+pub struct Examination {
+    /// Eigenvalues of an equilibrium; Floquet multipliers of a cycle, the trivial one first.
+    pub spectrum: Vec<Complex64>,
+    /// How many of them are unstable (the trivial one never counts).
+    pub unstable: usize,
+    /// Smallest and largest value of every state, then of every output.
+    pub ranges: Vec<[f64; 2]>,
+    /// Accuracy of the point.
+    pub trust: Trust,
+}
+
+/// A curve F(u) = 0, F: ℝⁿ⁺¹ → ℝⁿ. The last component of `u` is the continuation parameter.
+///
+/// The problem may be discretised on a mesh that changes along the curve; vectors always belong to the current mesh.
+pub trait ZeroProblem {
+    /// n + 1 on the current mesh.
+    fn unknowns(&self) -> usize;
+
+    /// Takes `u` as the reference for phase conditions and scales until the next call.
+    fn anchor(&mut self, u: &[f64]);
+
+    /// F(u): writes n values (the last of the n + 1 slots is left alone). Returns false if f is not finite there.
+    fn residual(&mut self, u: &[f64], r: &mut [f64]) -> bool;
+
+    /// Factorises the matrix [F_u(u); `row`·]: `row` acts through [`ZeroProblem::dot`].
+    fn factorise(&mut self, u: &[f64], row: &[f64]) -> Result<(), Singular>;
+
+    /// Solves with the last factorisation. `rhs` and `x` have n + 1 components, the last of `rhs` being that of the row.
+    fn solve(&mut self, rhs: &[f64], x: &mut [f64]);
+
+    /// Inner product in scaled variables, in which lengths along the curve are measured.
+    fn dot(&self, a: &[f64], b: &[f64]) -> f64;
+
+    /// Size of an update relative to the scale of each component: max |Δuᵢ| / (scaleᵢ + max |uᵢ|).
+    fn relative_size(&self, du: &[f64], u: &[f64]) -> f64;
+
+    /// The current mesh; empty for problems that have none.
+    fn mesh(&self) -> Mesh;
+
+    /// Moves the problem to another mesh.
+    fn set_mesh(&mut self, mesh: &Mesh);
+
+    /// Carries a vector from one mesh to another.
+    fn transfer(&self, v: &[f64], from: &Mesh, to: &Mesh) -> Vec<f64>;
+
+    /// The mesh on which `u` would meet `tolerance`, or `None` where the current one serves.
+    fn better_mesh(&self, u: &[f64], tolerance: f64) -> Option<Mesh>;
+
+    /// A mesh with every interval halved; `None` for problems that have none.
+    fn finer_mesh(&self) -> Option<Mesh>;
+
+    /// Stability and trust at `u`, for which [`ZeroProblem::factorise`] was called last.
+    fn examine(&mut self, u: &[f64]) -> Examination;
+
+    /// `u` as plain data.
+    fn point(&self, u: &[f64], tangent: &[f64], examination: Examination) -> Point;
+
+    /// The unknowns of a point, the mesh being that of the point.
+    fn unknowns_of(&mut self, point: &Point) -> Vec<f64>;
+}
+
+/// A scalar along the branch whose sign change between two points is a special point.
+pub trait Monitor: Send + Sync {
+    /// What is found where the sign changes.
+    fn kind(&self) -> Kind;
+
+    /// The value at `at`; `reference` is the accepted point from which the step under inspection starts.
+    fn value(&self, reference: &Point, at: &Point) -> f64;
+
+    /// Whether the sign change between two neighbouring points is an event of this kind (and not, say, a neutral saddle).
+    fn confirms(&self, before: &Point, after: &Point) -> bool;
+}
+
+/// The extra unknowns and equations that hold a special point; a problem with one of them held is a two-parameter curve.
+pub trait Condition: Send + Sync {
+    /// What is held.
+    fn kind(&self) -> Kind;
+}
+
+/// What happens while a diagram grows.
+#[derive(Clone, Copy, Debug)]
+pub enum Event<'a> {
+    /// A branch begins; it has no points yet, or those of an earlier run that is being resumed.
+    Begin(&'a Branch),
+    /// A point was accepted; [`Point::position`] says where on the branch it belongs.
+    Point(&'a Branch, &'a Point),
+    /// A special point was located between two accepted points.
+    Special(&'a Branch, &'a SpecialPoint),
+    /// One side of the branch ended; side 0 is backward, 1 forward.
+    SideEnded(&'a Branch, usize, &'a Ending),
+    /// The branch is complete.
+    End(&'a Branch),
+    /// A remark about a branch: a switch that led to a branch already known, a seed that was not found.
+    Note(&'a str, &'a str),
+}
+
+/// What an observer wants.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Verdict {
+    /// Go on.
+    Continue,
+    /// End the branch at this point, keeping everything.
+    Stop,
+}
+
+/// Receives everything as it happens: progress, storage and live plots hang here.
+pub trait Observer: Sync {
+    /// Called once per event, from the thread that follows the branch.
+    fn observe(&self, event: Event) -> Verdict;
+}
+
+/// An observer that lets everything pass.
+pub struct Unobserved;
+
+impl Observer for Unobserved {
+    fn observe(&self, _event: Event) -> Verdict {
+        Verdict::Continue
+    }
+}

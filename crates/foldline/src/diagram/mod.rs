@@ -1,0 +1,345 @@
+//! What comes out: points, special points, branches, diagrams. Plain data.
+
+mod cycle;
+
+pub use cycle::Cycle;
+
+use num_complex::Complex64;
+use std::fmt;
+use std::sync::Arc;
+
+/// Boundaries of mesh intervals in normalised time, from 0 to 1; empty where there is no mesh.
+pub type Mesh = Arc<[f64]>;
+
+/// A solution of the model.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Solution {
+    /// f(x, p) = 0: the state `[n]`.
+    Equilibrium(Vec<f64>),
+    /// A periodic orbit.
+    Cycle(Cycle),
+}
+
+impl Solution {
+    /// The period of a cycle.
+    pub fn period(&self) -> Option<f64> {
+        match self {
+            Solution::Equilibrium(_) => None,
+            Solution::Cycle(cycle) => Some(cycle.period),
+        }
+    }
+}
+
+/// How far a point can be trusted.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Trust {
+    /// Estimated discretisation error of the profile, relative to scale + max |component|; 0 for equilibria.
+    pub discretisation: f64,
+    /// max |F(u)| after the last Newton step, relative.
+    pub residual: f64,
+    /// |μ₁ - 1| of the trivial multiplier; 0 for equilibria.
+    pub trivial_defect: f64,
+    /// |log ∏μ - ∫ tr J dt|; 0 for equilibria.
+    pub liouville_defect: f64,
+}
+
+/// What a point cost.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Cost {
+    /// Newton iterations, rejected attempts included.
+    pub newton: usize,
+    /// Matrices factorised.
+    pub factorisations: usize,
+    /// Steps tried and rejected before this point was accepted.
+    pub rejected: usize,
+}
+
+impl std::ops::AddAssign for Cost {
+    fn add_assign(&mut self, other: Cost) {
+        self.newton += other.newton;
+        self.factorisations += other.factorisations;
+        self.rejected += other.rejected;
+    }
+}
+
+/// A computed point of a branch.
+#[derive(Clone, Debug)]
+pub struct Point {
+    /// Place on the branch: 0 at the start, counting up forwards and down backwards.
+    pub position: i64,
+    /// Every parameter of the model.
+    pub parameters: Vec<f64>,
+    /// The solution itself.
+    pub solution: Solution,
+    /// Unit tangent of the branch (increasing position), in the layout of the unknowns; the last component is the parameter.
+    pub tangent: Vec<f64>,
+    /// Arclength step with which the next point towards larger |position| will be tried.
+    pub step: f64,
+    /// Eigenvalues (equilibrium) or Floquet multipliers (cycle, trivial one first).
+    pub spectrum: Vec<Complex64>,
+    /// How many eigenvalues or multipliers are unstable.
+    pub unstable: usize,
+    /// Smallest and largest value of every state, then of every output.
+    pub ranges: Vec<[f64; 2]>,
+    /// Accuracy.
+    pub trust: Trust,
+    /// Work done since the previous point.
+    pub cost: Cost,
+}
+
+impl Point {
+    /// The non-trivial part of the spectrum: all eigenvalues, or the multipliers after the trivial one.
+    pub fn free_spectrum(&self) -> &[Complex64] {
+        match self.solution {
+            Solution::Equilibrium(_) => &self.spectrum,
+            Solution::Cycle(_) => self.spectrum.get(1..).unwrap_or(&[]),
+        }
+    }
+
+    /// Component of the tangent along the continuation parameter.
+    pub fn parameter_slope(&self) -> f64 {
+        self.tangent.last().copied().unwrap_or(0.0)
+    }
+}
+
+/// What happens at a special point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Kind {
+    /// The branch turns back in its parameter (limit point, saddle-node).
+    Fold,
+    /// Another branch of the same type crosses.
+    BranchPoint,
+    /// A pair of eigenvalues crosses the imaginary axis.
+    Hopf,
+    /// A multiplier passes -1.
+    PeriodDoubling,
+    /// A complex pair of multipliers crosses the unit circle (Neimark–Sacker).
+    Torus,
+    /// A stability change that no located special point explains.
+    Unexplained,
+}
+
+impl Kind {
+    /// Every kind, in the order in which tables list them.
+    pub const ALL: [Kind; 6] =
+        [Kind::Fold, Kind::BranchPoint, Kind::Hopf, Kind::PeriodDoubling, Kind::Torus, Kind::Unexplained];
+
+    /// The name used in files and tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Kind::Fold => "fold",
+            Kind::BranchPoint => "branch-point",
+            Kind::Hopf => "hopf",
+            Kind::PeriodDoubling => "period-doubling",
+            Kind::Torus => "torus",
+            Kind::Unexplained => "unexplained",
+        }
+    }
+
+    /// The kind of that name.
+    pub fn from_name(name: &str) -> Option<Kind> {
+        Kind::ALL.into_iter().find(|kind| kind.name() == name)
+    }
+}
+
+impl fmt::Display for Kind {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+/// A located special point.
+#[derive(Clone, Debug)]
+pub struct SpecialPoint {
+    /// What happens there.
+    pub kind: Kind,
+    /// The point itself; its `position` is that of the accepted point just before it (towards smaller positions).
+    pub point: Point,
+    /// Unstable multipliers (eigenvalues) on the side of smaller positions.
+    pub unstable_before: usize,
+    /// Unstable multipliers (eigenvalues) on the side of larger positions.
+    pub unstable_after: usize,
+    /// Bound on the error of the parameter, the period and the ranges, relative to 1 + |value|.
+    pub error: f64,
+}
+
+/// What kind of solution a branch is made of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Family {
+    /// Equilibria.
+    Equilibrium,
+    /// Cycles.
+    Cycle,
+}
+
+impl Family {
+    /// The name used in files and tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Family::Equilibrium => "equilibrium",
+            Family::Cycle => "cycle",
+        }
+    }
+}
+
+/// Why one side of a branch ended.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Ending {
+    /// The parameter reached this bound of its range, or the stated target.
+    Bound(f64),
+    /// The branch came back to its start.
+    Closed,
+    /// The branch met the one from which (or from whose kind) it branches: a cycle shrank to an equilibrium, or became a
+    /// cycle of half the period. The parameter value is given.
+    Joined {
+        /// `Hopf` (cycle became an equilibrium), `PeriodDoubling` (half the period) or `BranchPoint`.
+        at: Kind,
+        /// Value of the continuation parameter there.
+        parameter: f64,
+    },
+    /// The step length fell below its limit; the sentence says what was tried and what the likely cause is.
+    StepTooSmall(String),
+    /// The mesh would need more intervals than allowed.
+    MeshTooLarge(String),
+    /// The period grew beyond its limit: the cycle probably approaches a homoclinic or heteroclinic orbit.
+    PeriodUnbounded(f64),
+    /// The limit on the number of points was reached.
+    PointLimit(usize),
+    /// f is not finite at the start of the branch or beyond its last point.
+    NotFinite(String),
+    /// The start did not converge.
+    NoStart(String),
+    /// The observer asked to stop.
+    Stopped,
+}
+
+impl Ending {
+    /// A one-word code for files and tables.
+    pub fn code(&self) -> &'static str {
+        match self {
+            Ending::Bound(_) => "bound",
+            Ending::Closed => "closed",
+            Ending::Joined { .. } => "joined",
+            Ending::StepTooSmall(_) => "step-too-small",
+            Ending::MeshTooLarge(_) => "mesh-too-large",
+            Ending::PeriodUnbounded(_) => "period-unbounded",
+            Ending::PointLimit(_) => "point-limit",
+            Ending::NotFinite(_) => "not-finite",
+            Ending::NoStart(_) => "no-start",
+            Ending::Stopped => "stopped",
+        }
+    }
+
+    /// Whether the branch ended where it should: at a bound, closed, or joined to another branch.
+    pub fn complete(&self) -> bool {
+        matches!(self, Ending::Bound(_) | Ending::Closed | Ending::Joined { .. })
+    }
+}
+
+impl fmt::Display for Ending {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            Ending::Bound(value) => write!(f, "reached {value}"),
+            Ending::Closed => write!(f, "closed on itself"),
+            Ending::Joined { at: Kind::Hopf, parameter } => write!(f, "shrank to an equilibrium at {parameter:.6}"),
+            Ending::Joined { at: Kind::PeriodDoubling, parameter } => {
+                write!(f, "became a cycle of half the period at {parameter:.6}")
+            }
+            Ending::Joined { at, parameter } => write!(f, "joined another branch at {at} {parameter:.6}"),
+            Ending::StepTooSmall(why) => write!(f, "step too small: {why}"),
+            Ending::MeshTooLarge(why) => write!(f, "mesh too large: {why}"),
+            Ending::PeriodUnbounded(period) => {
+                write!(f, "period grew to {period:.4}: probably close to a homoclinic or heteroclinic orbit")
+            }
+            Ending::PointLimit(points) => write!(f, "stopped at the limit of {points} points"),
+            Ending::NotFinite(why) => write!(f, "not finite: {why}"),
+            Ending::NoStart(why) => write!(f, "no start: {why}"),
+            Ending::Stopped => write!(f, "stopped on request"),
+        }
+    }
+}
+
+/// Where a branch comes from.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Origin {
+    /// A seed of the study, by name.
+    Seed(String),
+    /// The end of another branch.
+    EndOf(String),
+    /// A special point of another branch: its name, the kind, and the value of the parameter there.
+    Switch {
+        /// Name of the parent branch.
+        parent: String,
+        /// Kind of the special point.
+        kind: Kind,
+        /// Value of the continuation parameter there.
+        parameter: f64,
+    },
+}
+
+/// A branch: one curve of solutions in one parameter.
+#[derive(Clone, Debug)]
+pub struct Branch {
+    /// Unique within a diagram.
+    pub name: String,
+    /// Equilibria or cycles.
+    pub family: Family,
+    /// Index of the continuation parameter among the model's parameters.
+    pub free: usize,
+    /// Where it comes from.
+    pub origin: Origin,
+    /// Points by increasing position.
+    pub points: Vec<Point>,
+    /// Special points by increasing position.
+    pub special: Vec<SpecialPoint>,
+    /// Why the backward and the forward side ended; `None` while growing.
+    pub ends: [Option<Ending>; 2],
+}
+
+impl Branch {
+    /// An empty branch.
+    pub fn new(name: impl Into<String>, family: Family, free: usize, origin: Origin) -> Branch {
+        Branch {
+            name: name.into(),
+            family,
+            free,
+            origin,
+            points: Vec::new(),
+            special: Vec::new(),
+            ends: [None, None],
+        }
+    }
+
+    /// Inserts an accepted point at its position.
+    pub fn insert(&mut self, point: Point) {
+        let at = self.points.partition_point(|p| p.position < point.position);
+        self.points.insert(at, point);
+    }
+
+    /// Inserts a special point at its position.
+    pub fn insert_special(&mut self, special: SpecialPoint) {
+        let at = self.special.partition_point(|s| s.point.position <= special.point.position);
+        self.special.insert(at, special);
+    }
+
+    /// The total work.
+    pub fn cost(&self) -> Cost {
+        let mut total = Cost::default();
+        self.points.iter().for_each(|p| total += p.cost);
+        total
+    }
+}
+
+/// All branches of a study, in the order in which they were begun.
+#[derive(Clone, Debug, Default)]
+pub struct Diagram {
+    /// The branches.
+    pub branches: Vec<Branch>,
+}
+
+impl Diagram {
+    /// The branch of that name.
+    pub fn branch(&self, name: &str) -> Option<&Branch> {
+        self.branches.iter().find(|branch| branch.name == name)
+    }
+}

@@ -1,0 +1,94 @@
+//! What a study asks for, in terms of the model.
+
+use crate::diagram::Kind;
+
+/// Which attractor a seed means.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum AttractorKey {
+    /// The equilibrium of smallest norm.
+    Equilibrium,
+    /// The cycle that was reached most often.
+    Cycle,
+    /// The cycle with this spectral ratio, such as 2:1.
+    Ratio(u32, u32),
+}
+
+/// Where a first solution comes from.
+#[derive(Clone, Debug, PartialEq)]
+pub enum SeedSource {
+    /// Found by sampling initial states.
+    Attractor(AttractorKey),
+    /// Settled (or polished) from this state `[n]`.
+    State(Vec<f64>),
+}
+
+/// A first solution.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SeedPlan {
+    /// Unique name.
+    pub name: String,
+    /// Where it comes from.
+    pub source: SeedSource,
+    /// Every parameter value `[k]` at the seed.
+    pub parameters: Vec<f64>,
+    /// How many initial states to sample.
+    pub samples: usize,
+    /// Seed of the random numbers.
+    pub random: u64,
+}
+
+/// Where a branch starts.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Start {
+    /// At the seed of that index.
+    Seed(usize),
+    /// At the end of the branch of that index (its `until`, or its forward bound).
+    EndOf(usize),
+}
+
+/// At which special points to branch off, and how deep.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Switching {
+    /// Depth for each kind; a kind that is not listed is not switched at. A depth of 2 at period doublings follows the
+    /// period-doubled branches and the branches that double there again.
+    pub depth: Vec<(Kind, usize)>,
+}
+
+impl Switching {
+    /// The depth for a kind.
+    pub fn at(&self, kind: Kind) -> usize {
+        self.depth.iter().find(|(k, _)| *k == kind).map_or(0, |(_, d)| *d)
+    }
+}
+
+/// A branch to follow.
+#[derive(Clone, Debug, PartialEq)]
+pub struct BranchPlan {
+    /// Unique name.
+    pub name: String,
+    /// Where it starts.
+    pub start: Start,
+    /// Index of the continuation parameter.
+    pub free: usize,
+    /// Smallest and largest value of the parameter.
+    pub range: [f64; 2],
+    /// Follow only towards this value and stop there (a homotopy run); it lies in `range`.
+    pub until: Option<f64>,
+    /// Where to branch off.
+    pub switching: Switching,
+    /// Limit on the number of points per side.
+    pub max_points: usize,
+}
+
+/// Everything a study asks for.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plan {
+    /// The one tolerance.
+    pub tolerance: f64,
+    /// Degree of the collocation polynomials.
+    pub degree: usize,
+    /// First solutions.
+    pub seeds: Vec<SeedPlan>,
+    /// Branches, in the order in which they were written.
+    pub branches: Vec<BranchPlan>,
+}

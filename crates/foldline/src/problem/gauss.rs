@@ -1,0 +1,123 @@
+//! Collocation at Gauss points on one interval.
+//!
+//! **Idea.** A polynomial of degree m on [0, 1] is held by its values at 0 and at the m Gauss–Legendre points c₁…c_m. Its
+//! derivative at the Gauss points and its value at 1 are fixed linear combinations of those values.
+//!
+//! **Equations.** With nodes c₀ = 0, c₁, …, c_m and Lagrange polynomials ℓ_k:
+//!
+//!   (1)  p'(c_i) = Σ_k D_ik p(c_k),   D_ik = ℓ_k'(c_i),  i = 1…m, k = 0…m
+//!   (2)  p(1)    = Σ_k e_k p(c_k),    e_k  = ℓ_k(1)
+//!   (3)  ∫₀¹ p   ≈ Σ_i b_i p(c_i),    exact to degree 2m - 1
+//!
+//! **Source.** ascher1995, §5; hairer1996, §II.7.
+
+/// Nodes and weights for one degree.
+#[derive(Clone, Debug)]
+pub struct Scheme {
+    /// m.
+    pub degree: usize,
+    /// `[m + 1]` nodes: 0, then the Gauss points.
+    pub nodes: Vec<f64>,
+    /// `[m]` quadrature weights b.
+    pub weights: Vec<f64>,
+    /// `[m × (m + 1)]` derivative matrix D, row-major.
+    pub derivative: Vec<f64>,
+    /// `[m + 1]` extrapolation to 1, e.
+    pub end: Vec<f64>,
+    barycentric: Vec<f64>,
+}
+
+impl Scheme {
+    /// The scheme of degree m, 1 ≤ m ≤ 12.
+    pub fn new(degree: usize) -> Scheme {
+        let m = degree.max(1);
+        let (gauss, weights) = gauss_legendre(m);
+        let mut nodes = vec![0.0];
+        nodes.extend(gauss);
+        let barycentric: Vec<f64> = (0..=m)
+            .map(|k| 1.0 / (0..=m).filter(|&l| l != k).map(|l| nodes[k] - nodes[l]).product::<f64>())
+            .collect();
+        let mut derivative = vec![0.0; m * (m + 1)];
+        for i in 1..=m {
+            let row = &mut derivative[(i - 1) * (m + 1)..i * (m + 1)];
+            let mut diagonal = 0.0;
+            for k in (0..=m).filter(|&k| k != i) {
+                row[k] = barycentric[k] / barycentric[i] / (nodes[i] - nodes[k]);
+                diagonal -= row[k];
+            }
+            row[i] = diagonal;
+        }
+        let mut scheme = Scheme { degree: m, nodes, weights, derivative, end: Vec::new(), barycentric };
+        scheme.end = scheme.interpolation(1.0);
+        scheme
+    }
+
+    /// Weights `[m + 1]` that give p(s) from the values at the nodes.
+    pub fn interpolation(&self, s: f64) -> Vec<f64> {
+        if let Some(k) = self.nodes.iter().position(|&c| c == s) {
+            let mut unit = vec![0.0; self.degree + 1];
+            unit[k] = 1.0;
+            return unit;
+        }
+        let node_polynomial: f64 = self.nodes.iter().map(|c| s - c).product();
+        self.nodes.iter().zip(&self.barycentric).map(|(c, w)| node_polynomial * w / (s - c)).collect()
+    }
+}
+
+/// Gauss–Legendre points and weights on [0, 1], by Newton's method on the Legendre recurrence.
+fn gauss_legendre(m: usize) -> (Vec<f64>, Vec<f64>) {
+    let mut points = vec![0.0; m];
+    let mut weights = vec![0.0; m];
+    for i in 0..m {
+        let mut x = (std::f64::consts::PI * (i as f64 + 0.75) / (m as f64 + 0.5)).cos();
+        let mut slope = 1.0;
+        for _ in 0..100 {
+            let (mut p, mut q) = (1.0, 0.0);
+            for k in 0..m {
+                (p, q) = (((2 * k + 1) as f64 * x * p - k as f64 * q) / (k + 1) as f64, p);
+            }
+            slope = m as f64 * (x * p - q) / (x * x - 1.0);
+            let step = p / slope;
+            x -= step;
+            if step.abs() < 1e-16 {
+                break;
+            }
+        }
+        points[m - 1 - i] = 0.5 * (1.0 + x);
+        weights[m - 1 - i] = 1.0 / ((1.0 - x * x) * slope * slope);
+    }
+    (points, weights)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_derivative_matrix_and_the_extrapolation_are_exact_for_degree_m() {
+        for m in 1..=7 {
+            let scheme = Scheme::new(m);
+            for power in 0..=m as i32 {
+                let values: Vec<f64> = scheme.nodes.iter().map(|c| c.powi(power)).collect();
+                for i in 0..m {
+                    let d: f64 = (0..=m).map(|k| scheme.derivative[i * (m + 1) + k] * values[k]).sum();
+                    let exact = if power == 0 { 0.0 } else { power as f64 * scheme.nodes[i + 1].powi(power - 1) };
+                    assert!((d - exact).abs() < 1e-11, "degree {m}, power {power}: {d} against {exact}");
+                }
+                let end: f64 = scheme.end.iter().zip(&values).map(|(e, v)| e * v).sum();
+                assert!((end - 1.0).abs() < 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn the_quadrature_is_exact_to_degree_two_m_minus_one() {
+        for m in 1..=7 {
+            let scheme = Scheme::new(m);
+            for power in 0..2 * m as i32 {
+                let sum: f64 = (0..m).map(|i| scheme.weights[i] * scheme.nodes[i + 1].powi(power)).sum();
+                assert!((sum - 1.0 / (power + 1) as f64).abs() < 1e-14);
+            }
+        }
+    }
+}

@@ -1,0 +1,3 @@
+//! What is the curve? Equilibria and cycles as zero problems.
+
+pub mod gauss;

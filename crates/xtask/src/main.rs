@@ -1,0 +1,2 @@
+//! `cargo xtask test | check | bench | docs`.
+fn main() {}
