@@ -299,15 +299,7 @@ pub struct Branch {
 impl Branch {
     /// An empty branch.
     pub fn new(name: impl Into<String>, family: Family, free: usize, origin: Origin) -> Branch {
-        Branch {
-            name: name.into(),
-            family,
-            free,
-            origin,
-            points: Vec::new(),
-            special: Vec::new(),
-            ends: [None, None],
-        }
+        Branch { name: name.into(), family, free, origin, points: Vec::new(), special: Vec::new(), ends: [None, None] }
     }
 
     /// Inserts an accepted point at its position.

@@ -34,9 +34,8 @@ impl Scheme {
         let (gauss, weights) = gauss_legendre(m);
         let mut nodes = vec![0.0];
         nodes.extend(gauss);
-        let barycentric: Vec<f64> = (0..=m)
-            .map(|k| 1.0 / (0..=m).filter(|&l| l != k).map(|l| nodes[k] - nodes[l]).product::<f64>())
-            .collect();
+        let barycentric: Vec<f64> =
+            (0..=m).map(|k| 1.0 / (0..=m).filter(|&l| l != k).map(|l| nodes[k] - nodes[l]).product::<f64>()).collect();
         let mut derivative = vec![0.0; m * (m + 1)];
         for i in 1..=m {
             let row = &mut derivative[(i - 1) * (m + 1)..i * (m + 1)];
