@@ -37,6 +37,7 @@ pub struct Ensemble<'a> {
     end: f64,
     sign: f64,
     step_limit: usize,
+    longest: f64,
     lanes: Vec<Lane>,
     /// `[n × lanes]`.
     x: Vec<f64>,
@@ -96,6 +97,7 @@ impl<'a> Ensemble<'a> {
             end: span[1],
             sign: if span[1] < span[0] { -1.0 } else { 1.0 },
             step_limit: usize::MAX,
+            longest: f64::INFINITY,
             lanes,
             next: vec![0.0; n * count],
             stage: vec![0.0; n * count],
@@ -110,6 +112,13 @@ impl<'a> Ensemble<'a> {
     /// Ends a trajectory after this many accepted and rejected steps.
     pub fn with_step_limit(mut self, limit: usize) -> Ensemble<'a> {
         self.step_limit = limit;
+        self
+    }
+
+    /// No step is longer than this time, which is positive.
+    pub fn with_longest_step(mut self, longest: f64) -> Ensemble<'a> {
+        self.longest = longest;
+        self.lanes.iter_mut().for_each(|lane| lane.step = lane.step.max(-longest).min(longest));
         self
     }
 
@@ -270,8 +279,9 @@ impl<'a> Ensemble<'a> {
         let growth = growth.clamp(0.2, if lane.just_rejected { 1.0 } else { 10.0 });
         lane.previous_error = error.max(1e-4);
         lane.just_rejected = false;
-        lane.step *= growth;
+        lane.step = (lane.step * growth).max(-self.longest).min(self.longest);
         let remaining = self.end - end_time;
+        // A last step a little longer than planned saves a tiny one.
         if lane.step.abs() * 1.01 >= remaining.abs() {
             lane.step = remaining;
         }

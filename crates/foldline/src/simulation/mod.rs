@@ -15,6 +15,8 @@ mod root;
 mod section;
 mod step;
 mod tableau;
+#[cfg(test)]
+mod tests;
 mod trajectory;
 
 pub use ensemble::Ensemble;

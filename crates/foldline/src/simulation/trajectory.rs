@@ -12,6 +12,7 @@ pub struct Integrator<'a> {
     parameters: &'a [f64],
     tolerance: Tolerance,
     step_limit: usize,
+    longest: f64,
 }
 
 /// What an observer of a trajectory sees, in the order in which it happens.
@@ -26,12 +27,18 @@ pub enum Passage<'a> {
 impl<'a> Integrator<'a> {
     /// An integrator without a limit on the number of steps.
     pub fn new(field: &'a dyn VectorField, parameters: &'a [f64], tolerance: Tolerance) -> Integrator<'a> {
-        Integrator { field, parameters, tolerance, step_limit: usize::MAX }
+        Integrator { field, parameters, tolerance, step_limit: usize::MAX, longest: f64::INFINITY }
     }
 
     /// Ends a trajectory after this many accepted and rejected steps.
     pub fn with_step_limit(mut self, limit: usize) -> Integrator<'a> {
         self.step_limit = limit;
+        self
+    }
+
+    /// No step is longer than this time, which is positive.
+    pub fn with_longest_step(mut self, longest: f64) -> Integrator<'a> {
+        self.longest = longest;
         self
     }
 
@@ -47,7 +54,8 @@ impl<'a> Integrator<'a> {
         let mut stopped_at = None;
         let mut stages = Stages::new(self.field, self.parameters);
         let ensemble = Ensemble::new(self.field, self.parameters, self.tolerance.clone(), start, span)
-            .with_step_limit(self.step_limit);
+            .with_step_limit(self.step_limit)
+            .with_longest_step(self.longest);
         let arrivals = ensemble.run(&mut |step| {
             if !sections.is_empty() {
                 for crossing in crossings(step, sections, |theta, x| stages.state_into(step, theta, x)) {
