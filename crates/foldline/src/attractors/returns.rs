@@ -26,7 +26,7 @@ const MOST_TERMS: usize = 8;
 /// Returns that are kept.
 const KEPT: usize = MOST_CROSSINGS * 6;
 /// Largest last difference, relative to the extent, from which a limit is predicted.
-const NEAR: f64 = 0.15;
+const NEAR: f64 = 0.5;
 
 /// A plane, and where and when a trajectory came through it.
 #[derive(Clone, Debug, Default)]

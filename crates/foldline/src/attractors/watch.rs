@@ -54,19 +54,18 @@ impl Context<'_> {
 
     /// A stable solution near the candidate, as an orbit.
     fn polished(&self, candidate: &Candidate) -> Option<Orbit> {
-        let point = (self.polish)(candidate).filter(|point| point.unstable == 0)?;
-        let point = match &point.solution {
-            Solution::Cycle(cycle) => match primitive(cycle) {
-                Some(candidate) => (self.polish)(&candidate).filter(|point| point.unstable == 0)?,
-                None => point,
-            },
-            Solution::Equilibrium(_) => point,
+        let polished = |candidate| (self.polish)(candidate).filter(|point| point.unstable == 0);
+        let point = polished(candidate)?;
+        let once = match &point.solution {
+            Solution::Cycle(cycle) => primitive(cycle).and_then(|candidate| polished(&candidate)),
+            Solution::Equilibrium(_) => None,
         };
-        Some(Orbit::new(point, &self.sampling.scales))
+        Some(Orbit::new(once.unwrap_or(point), &self.sampling.scales))
     }
 }
 
-/// One turn of a cycle that runs several times around another, as a candidate.
+/// One turn of a cycle that runs several times around nearly the same loop, as a candidate: the cycle may be another one
+/// several times over, or have just doubled its period.
 fn primitive(cycle: &Cycle) -> Option<Candidate> {
     const COUNT: usize = 240;
     const PROBES: usize = 24;
@@ -81,7 +80,7 @@ fn primitive(cycle: &Cycle) -> Option<Candidate> {
     let repeats = |turns: usize| {
         (0..PROBES).map(|k| k as f64 / PROBES as f64).all(|t| {
             let (here, there) = (cycle.state(t), cycle.state(t + 1.0 / turns as f64));
-            (0..n).all(|i| (here[i] - there[i]).abs() <= 1e-4 * extent[i])
+            (0..n).all(|i| (here[i] - there[i]).abs() <= 0.01 * extent[i])
         })
     };
     let turns = (2..=MOST_CROSSINGS).rev().find(|&turns| repeats(turns))?;
