@@ -13,10 +13,10 @@
 //!
 //! **Source.** sidi2017, §1 (reduced rank extrapolation).
 //!
-//! **Fails when** the map is far from linear over the returns used. In few dimensions (1) has no remainder that would show it:
-//! a prediction is a guess, to be checked by following it for a period.
+//! **Fails when** the map is far from linear over the returns used. In few dimensions (1) has no remainder that would show it;
+//! the limit predicted one return earlier does, and following the prediction for a period.
 
-use crate::linalg::lu;
+use crate::linalg::{lu, max_abs};
 use crate::simulation::Step;
 
 /// Largest number of crossings per period that is looked for.
@@ -24,9 +24,13 @@ pub(super) const MOST_CROSSINGS: usize = 16;
 /// Largest m of (1).
 const MOST_TERMS: usize = 8;
 /// Returns that are kept.
-const KEPT: usize = MOST_CROSSINGS * 6;
+const KEPT: usize = MOST_CROSSINGS * 6 + 1;
 /// Largest last difference, relative to the extent, from which a limit is predicted.
 const NEAR: f64 = 0.5;
+/// Largest difference between the limits predicted from successive returns, relative to the last difference of returns.
+const STEADY: f64 = 0.3;
+/// Largest distance of a predicted limit from the last return, relative to the extent.
+const REACH: f64 = 0.5;
 
 /// A plane, and where and when a trajectory came through it.
 #[derive(Clone, Debug, Default)]
@@ -50,6 +54,8 @@ pub(super) struct Prediction {
     pub(super) state: Vec<f64>,
     /// Time between the last returns that were compared.
     pub(super) period: f64,
+    /// The last difference, relative to the extent.
+    pub(super) size: f64,
 }
 
 impl Returns {
@@ -110,38 +116,36 @@ impl Returns {
         true
     }
 
-    /// The limit of every q-th return, 1 ≤ q ≤ [`MOST_CROSSINGS`], if there are enough of them and they are close together.
+    /// The limit of every q-th return, 1 ≤ q ≤ [`MOST_CROSSINGS`], if the last of them are close together and the limit was the
+    /// same one return earlier.
     pub(super) fn predict(&self, q: usize, extent: &[f64]) -> Option<Prediction> {
         let n = self.anchor.len();
-        let available = self.times.len().checked_sub(1)? / q;
-        let terms = MOST_TERMS.min(n.saturating_sub(1)).min(available.checked_sub(1)?);
-        let wanted = MOST_TERMS.min(n.saturating_sub(1)).min(KEPT / q - 2);
-        if terms < wanted {
+        let newest = self.times.len().checked_sub(1)?;
+        let terms = MOST_TERMS.min(n.saturating_sub(1)).min(KEPT / q - 3);
+        // m + 1 differences, of one return more for the comparison.
+        if newest < (terms + 2) * q {
             return None;
         }
-        let newest = self.times.len() - 1;
         // y(0) is the newest return.
         let y = |back: usize| &self.states[(newest - back * q) * n..][..n];
-        let difference = |back: usize| -> Vec<f64> {
-            (0..n).map(|i| (y(back)[i] - y(back + 1)[i]) / extent[i]).collect()
-        };
-        let u: Vec<Vec<f64>> = (0..=terms).map(difference).collect();
-        let size = crate::linalg::max_abs(&u[0]);
+        let scaled = |a: &[f64], b: &[f64]| -> Vec<f64> { (0..n).map(|i| (a[i] - b[i]) / extent[i]).collect() };
+        let u: Vec<Vec<f64>> = (0..terms + 2).map(|back| scaled(y(back), y(back + 1))).collect();
+        let size = max_abs(&u[0]);
         if !(size <= NEAR) {
             return None;
         }
         let period = self.times[newest] - self.times[newest - q];
         // Differences that small are dominated by the error of the integration.
         if size < 1e-6 {
-            return Some(Prediction { state: y(0).to_vec(), period });
+            return Some(Prediction { state: y(0).to_vec(), period, size });
         }
-        let gamma = weights(&u)?;
-        let remainder = (0..n).fold(0.0, |m: f64, i| {
-            m.max(gamma.iter().zip(&u).map(|(g, u)| g * u[i]).sum::<f64>().abs())
-        });
-        let state: Vec<f64> = (0..n).map(|i| gamma.iter().enumerate().map(|(j, g)| g * y(j)[i]).sum()).collect();
-        let jump = (0..n).fold(0.0, |m: f64, i| m.max((state[i] - y(0)[i]).abs() / extent[i]));
-        (remainder <= 0.2 * size && jump <= 0.5).then_some(Prediction { state, period })
+        let limit = |from: usize| -> Option<Vec<f64>> {
+            let gamma = weights(&u[from..=from + terms])?;
+            Some((0..n).map(|i| gamma.iter().enumerate().map(|(j, g)| g * y(from + j)[i]).sum()).collect())
+        };
+        let (state, earlier) = (limit(0)?, limit(1)?);
+        let steady = max_abs(&scaled(&state, &earlier)) <= STEADY * size;
+        (steady && max_abs(&scaled(&state, y(0))) <= REACH).then_some(Prediction { state, period, size })
     }
 }
 

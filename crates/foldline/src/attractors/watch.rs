@@ -34,8 +34,10 @@ const NEIGHBOURHOOD: f64 = 0.3;
 const HIT: f64 = 0.1;
 /// How far from the candidate a polished solution may lie.
 const FAITHFUL: f64 = 0.1;
-/// How well a predicted limit must return to itself to be tried.
-const RECURRENT: f64 = 0.03;
+/// How well a predicted limit must return to itself to be tried: relative to the extent, and to the last returns.
+const RECURRENT: [f64; 2] = [0.03, 0.1];
+/// Extent of a candidate relative to that of the trajectory, below which it is not the cycle looked for.
+const MOVING: f64 = 0.2;
 
 /// What all trajectories of a survey share.
 #[derive(Clone, Copy)]
@@ -186,12 +188,15 @@ impl Watch {
     }
 
     fn try_equilibrium(&mut self, x: Vec<f64>, extent: &[f64], known: &mut Vec<Orbit>, context: &Context) {
+        let scales = &context.sampling.scales;
+        let near = |rest: &[f64]| (0..x.len()).all(|i| (rest[i] - x[i]).abs() <= 2.0 * extent[i] + 1e-6 * scales[i]);
+        if known.iter().any(|k| matches!(&k.point.solution, Solution::Equilibrium(rest) if near(rest))) {
+            return;
+        }
         let candidate = Candidate::Equilibrium(x.clone());
         let Some(orbit) = context.polished(&candidate) else { return };
         let Solution::Equilibrium(rest) = &orbit.point.solution else { return };
-        let scales = &context.sampling.scales;
-        let near = (0..x.len()).all(|i| (rest[i] - x[i]).abs() <= 2.0 * extent[i] + 1e-6 * scales[i]);
-        if near && !known.iter().any(|k| k.same(&orbit, context.sampling.tolerance)) {
+        if near(rest) {
             known.push(orbit);
         }
     }
@@ -243,6 +248,7 @@ impl Watch {
     fn follow(&self, prediction: &Prediction, extent: &[f64], context: &Context) -> Option<Candidate> {
         const PARTS: usize = 4;
         let n = extent.len();
+        let limit = RECURRENT[0].min(RECURRENT[1] * prediction.size + 1e-5);
         let value = |_: f64, x: &[f64]| self.returns.value(x);
         let sections = [Section { value: &value, direction: Direction::Rising }];
         let integrator = Integrator::new(context.field, context.parameters, context.tolerance()).with_step_limit(20_000);
@@ -272,12 +278,18 @@ impl Watch {
             }
             Verdict::Continue
         });
-        let (_, period, end) = back.filter(|(distance, ..)| *distance <= RECURRENT)?;
+        let (_, period, end) = back.filter(|(distance, ..)| *distance <= limit)?;
         let kept = times.partition_point(|t| *t < period);
         times.truncate(kept);
         states.truncate(kept * n);
         times.push(period);
         states.extend(end);
+        let moves = |i: usize| {
+            let component = states.iter().skip(i).step_by(n);
+            let [low, high] = component.fold([f64::MAX, f64::MIN], |[low, high], x| [x.min(low), x.max(high)]);
+            high - low >= MOVING * extent[i]
+        };
+        (0..n).any(moves).then_some(())?;
         Some(Candidate::Cycle { period, times, states })
     }
 }
