@@ -35,7 +35,7 @@ const HIT: f64 = 0.1;
 /// How far from the candidate a polished solution may lie.
 const FAITHFUL: f64 = 0.1;
 /// How well a predicted limit must return to itself to be tried: relative to the extent, and to the last returns.
-const RECURRENT: [f64; 2] = [0.03, 0.1];
+const RECURRENT: [f64; 2] = [0.003, 0.1];
 /// Extent of a candidate relative to that of the trajectory, below which it is not the cycle looked for.
 const MOVING: f64 = 0.2;
 
