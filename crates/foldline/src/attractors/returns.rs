@@ -56,6 +56,8 @@ pub(super) struct Prediction {
     pub(super) period: f64,
     /// The last difference, relative to the extent.
     pub(super) size: f64,
+    /// How much the prediction changed with the last return, relative to the extent.
+    pub(super) doubt: f64,
 }
 
 impl Returns {
@@ -118,7 +120,7 @@ impl Returns {
 
     /// The limit of every q-th return, 1 ≤ q ≤ [`MOST_CROSSINGS`], if the last of them are close together and the limit was the
     /// same one return earlier.
-    pub(super) fn predict(&self, q: usize, extent: &[f64]) -> Option<Prediction> {
+    fn predict(&self, q: usize, extent: &[f64]) -> Option<Prediction> {
         let n = self.anchor.len();
         let newest = self.times.len().checked_sub(1)?;
         let terms = MOST_TERMS.min(n.saturating_sub(1)).min(KEPT / q - 3);
@@ -137,15 +139,26 @@ impl Returns {
         let period = self.times[newest] - self.times[newest - q];
         // Differences that small are dominated by the error of the integration.
         if size < 1e-6 {
-            return Some(Prediction { state: y(0).to_vec(), period, size });
+            return Some(Prediction { state: y(0).to_vec(), period, size, doubt: size });
         }
         let limit = |from: usize| -> Option<Vec<f64>> {
             let gamma = weights(&u[from..=from + terms])?;
             Some((0..n).map(|i| gamma.iter().enumerate().map(|(j, g)| g * y(from + j)[i]).sum()).collect())
         };
         let (state, earlier) = (limit(0)?, limit(1)?);
-        let steady = max_abs(&scaled(&state, &earlier)) <= STEADY * size;
-        (steady && max_abs(&scaled(&state, y(0))) <= REACH).then_some(Prediction { state, period, size })
+        let doubt = max_abs(&scaled(&state, &earlier));
+        let near = max_abs(&scaled(&state, y(0))) <= REACH;
+        (near && doubt <= STEADY * size).then_some(Prediction { state, period, size, doubt })
+    }
+
+    /// The `count` predictions that deserve to be tried: those that changed least, the fewest crossings per period first.
+    pub(super) fn predictions(&self, count: usize, extent: &[f64]) -> Vec<Prediction> {
+        let mut found: Vec<Prediction> = (1..=MOST_CROSSINGS).filter_map(|q| self.predict(q, extent)).collect();
+        let least = found.iter().fold(f64::INFINITY, |m, p| m.min(p.doubt));
+        // A cycle seen over several turns is predicted as well as over one.
+        found.retain(|p| p.doubt <= 3.0 * least + 1e-4);
+        found.truncate(count);
+        found
     }
 }
 

@@ -34,10 +34,10 @@ const NEIGHBOURHOOD: f64 = 0.3;
 const HIT: f64 = 0.1;
 /// How far from the candidate a polished solution may lie.
 const FAITHFUL: f64 = 0.1;
-/// How well a predicted limit must return to itself to be tried: relative to the extent, and to the last returns.
-const RECURRENT: [f64; 2] = [0.003, 0.1];
-/// Extent of a candidate relative to that of the trajectory, below which it is not the cycle looked for.
-const MOVING: f64 = 0.2;
+/// How well a predicted limit must return to itself to be tried, relative to the extent of its motion …
+const RECURRENT: f64 = 0.003;
+/// … and relative to the last returns of the trajectory.
+const BETTER: f64 = 0.1;
 
 /// What all trajectories of a survey share.
 #[derive(Clone, Copy)]
@@ -207,29 +207,23 @@ impl Watch {
             return;
         }
         let Some(extent) = self.extent.clone() else { return };
-        let mut polishings = 0;
-        for q in 1..=MOST_CROSSINGS {
-            let Some(prediction) = self.returns.predict(q, &extent) else { continue };
+        for prediction in self.returns.predictions(2, &extent) {
             self.settled = self.predicted(&prediction.state, known);
             if self.settled.is_some() {
                 return;
             }
             if known.iter().any(|k| k.distance(&prediction.state) <= FAITHFUL) {
                 // The limit may lie on that solution, but the trajectory is not close enough to be sure.
-                self.next_attempt = self.returns.total() + q;
+                self.next_attempt = self.returns.total() + 1;
                 return;
             }
-            self.next_attempt = self.returns.total() + (self.returns.total() / 4).max(q);
+            self.next_attempt = self.returns.total() + self.returns.total() / 2;
             let Some(candidate) = self.follow(&prediction, &extent, context) else { continue };
-            polishings += 1;
             if let Some(orbit) = context.polished(&candidate)
                 && orbit.distance(&prediction.state) <= FAITHFUL
             {
                 known.push(orbit);
                 self.settled = self.predicted(&prediction.state, known);
-                return;
-            }
-            if polishings == 2 {
                 return;
             }
         }
@@ -248,7 +242,6 @@ impl Watch {
     fn follow(&self, prediction: &Prediction, extent: &[f64], context: &Context) -> Option<Candidate> {
         const PARTS: usize = 4;
         let n = extent.len();
-        let limit = RECURRENT[0].min(RECURRENT[1] * prediction.size + 1e-5);
         let value = |_: f64, x: &[f64]| self.returns.value(x);
         let sections = [Section { value: &value, direction: Direction::Rising }];
         let integrator = Integrator::new(context.field, context.parameters, context.tolerance()).with_step_limit(20_000);
@@ -278,18 +271,23 @@ impl Watch {
             }
             Verdict::Continue
         });
-        let (_, period, end) = back.filter(|(distance, ..)| *distance <= limit)?;
+        let (distance, period, end) = back?;
+        if distance > BETTER * prediction.size + 1e-5 {
+            return None;
+        }
         let kept = times.partition_point(|t| *t < period);
         times.truncate(kept);
         states.truncate(kept * n);
         times.push(period);
         states.extend(end);
-        let moves = |i: usize| {
+        let moved = (0..n).map(|i| {
             let component = states.iter().skip(i).step_by(n);
             let [low, high] = component.fold([f64::MAX, f64::MIN], |[low, high], x| [x.min(low), x.max(high)]);
-            high - low >= MOVING * extent[i]
-        };
-        (0..n).any(moves).then_some(())?;
+            (high - low) / extent[i]
+        });
+        if distance > RECURRENT * moved.fold(0.0, f64::max) {
+            return None;
+        }
         Some(Candidate::Cycle { period, times, states })
     }
 }
