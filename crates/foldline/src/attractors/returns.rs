@@ -79,9 +79,15 @@ impl Returns {
         self.total
     }
 
-    /// The last return `[n]`.
-    pub(super) fn last(&self) -> Option<&[f64]> {
-        self.states.rchunks_exact(self.anchor.len().max(1)).next()
+    /// The last return: when, and where `[n]`.
+    pub(super) fn last(&self) -> Option<(f64, &[f64])> {
+        Some((*self.times.last()?, self.states.rchunks_exact(self.anchor.len().max(1)).next()?))
+    }
+
+    /// The same plane without returns, for a trajectory that starts on it.
+    pub(super) fn again_from(&self, start: &[f64]) -> Returns {
+        let (anchor, normal) = (start.to_vec(), self.normal.clone());
+        Returns { anchor, normal, ..Returns::default() }
     }
 
     /// Records a crossing in the direction of the normal within the step; says whether there was one.
@@ -133,7 +139,7 @@ impl Returns {
         let scaled = |a: &[f64], b: &[f64]| -> Vec<f64> { (0..n).map(|i| (a[i] - b[i]) / extent[i]).collect() };
         let u: Vec<Vec<f64>> = (0..terms + 2).map(|back| scaled(y(back), y(back + 1))).collect();
         let size = max_abs(&u[0]);
-        if !(size <= NEAR) {
+        if size.is_nan() || size > NEAR {
             return None;
         }
         let period = self.times[newest] - self.times[newest - q];

@@ -26,17 +26,18 @@ fn rotor_sampling(samples: usize, jobs: usize) -> Sampling {
 }
 
 fn survey_of(field: &Field, parameters: &[f64], sampling: &Sampling) -> Census {
-    let t=std::time::Instant::now();
-    let polishing = std::sync::Mutex::new((0,0,0.0));
-    let r=survey(field, parameters, sampling, &|candidate| {
-    let t=std::time::Instant::now();
-    let r=shooting::polish(field, parameters, candidate);
-    let mut c=polishing.lock().unwrap();
-    c.0+=1;
-    c.1+=r.is_some() as usize;
-    c.2+=t.elapsed().as_secs_f64();
-    r});
-    println!("{:?} of {}",polishing.lock().unwrap(), t.elapsed().as_secs_f64());
+    let t = std::time::Instant::now();
+    let polishing = std::sync::Mutex::new((0, 0, 0.0));
+    let r = survey(field, parameters, sampling, &|candidate| {
+        let t = std::time::Instant::now();
+        let r = shooting::polish(field, parameters, candidate);
+        let mut c = polishing.lock().unwrap();
+        c.0 += 1;
+        c.1 += r.is_some() as usize;
+        c.2 += t.elapsed().as_secs_f64();
+        r
+    });
+    println!("{:?} of {}", polishing.lock().unwrap(), t.elapsed().as_secs_f64());
     for a in &r.attractors {
         println!("{:?} {:?} {:?} {} {:?}", a.point.solution.period(), a.ratio, a.point.ranges, a.hits, a.example);
     }
