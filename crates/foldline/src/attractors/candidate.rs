@@ -15,7 +15,7 @@ const INTEGRATION: f64 = 1e-6;
 /// Steps after which a predicted limit is given up.
 const FOLLOWED: usize = 20_000;
 /// How well a predicted limit must return to itself to be tried, relative to the extent of its motion …
-const RECURRENT: f64 = 0.003;
+const RECURRENT: f64 = 0.001;
 /// … and relative to the last returns of the trajectory.
 const BETTER: f64 = 0.1;
 
