@@ -116,3 +116,41 @@ fn primitive(cycle: &Cycle) -> Option<Candidate> {
     let states = (0..=COUNT).flat_map(|k| cycle.state(k as f64 / (COUNT * turns) as f64)).collect();
     Some(Candidate::Cycle { period, times, states })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::problem::gauss::Scheme;
+
+    /// The ellipse (cos τ, 2 sin τ), run through `turns` times in time 6, the turns differing by `difference`.
+    fn ellipse(turns: usize, difference: f64) -> Cycle {
+        let intervals = 20 * turns;
+        let mut profile = Vec::new();
+        for j in 0..intervals {
+            for c in &Scheme::new(4).nodes {
+                let t = (j as f64 + c) / intervals as f64;
+                let (slow, fast) = (std::f64::consts::TAU * t, std::f64::consts::TAU * t * turns as f64);
+                profile.extend([fast.cos() + difference * slow.cos(), 2.0 * fast.sin()]);
+            }
+        }
+        let mesh: Vec<f64> = (0..=intervals).map(|j| j as f64 / intervals as f64).collect();
+        Cycle { period: 6.0, mesh: mesh.into(), degree: 4, profile }
+    }
+
+    #[test]
+    fn a_cycle_run_through_several_times_is_reduced_to_one_turn() {
+        for turns in [2, 3, 7] {
+            let Some(Candidate::Cycle { period, times, states }) = primitive(&ellipse(turns, 0.0)) else {
+                panic!("{turns} turns not seen")
+            };
+            assert_eq!((period, times.last()), (6.0 / turns as f64, Some(&period)));
+            // Degree 4 on 20 intervals: 1e-6.
+            for (t, x) in times.iter().zip(states.chunks(2)) {
+                let angle = std::f64::consts::TAU * t / period;
+                assert!((x[0] - angle.cos()).abs() < 1e-5 && (x[1] - 2.0 * angle.sin()).abs() < 1e-5);
+            }
+        }
+        assert!(primitive(&ellipse(1, 0.0)).is_none());
+        assert!(primitive(&ellipse(2, 0.1)).is_none(), "a cycle of twice the period is not its half");
+    }
+}

@@ -186,3 +186,47 @@ fn weights(u: &[Vec<f64>]) -> Option<Vec<f64>> {
     let sum: f64 = c.iter().sum();
     (sum.is_finite() && sum != 0.0).then(|| c.iter().map(|c| c / sum).collect())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Returns of a map with multipliers 0.9 e^{±i φ} and 0.5 to the fixed point (0.1, 0.2, 0.3, 0.4), which lies in the plane.
+    fn returns(count: usize, angle: f64) -> Returns {
+        let mut returns = Returns::across(vec![0.1, 0.2, 0.3, 0.4], &[0.0, 0.0, 0.0, 1.0], &[1.0; 4]);
+        for k in 0..count {
+            let (decay, phase) = (0.01 * 0.9f64.powi(k as i32), angle * k as f64);
+            let (a, b, c) = (decay * phase.cos(), decay * phase.sin(), 0.02 * 0.5f64.powi(k as i32));
+            returns.states.extend([0.1 + a + c, 0.2 + b, 0.3 - c + b, 0.4]);
+            returns.times.push(2.0 * k as f64);
+            returns.total += 1;
+        }
+        returns
+    }
+
+    #[test]
+    fn the_limit_of_a_linear_map_is_predicted_from_its_first_iterates() {
+        let predictions = returns(6, 0.7).predictions(3, &[1.0; 4]);
+        assert_eq!(predictions.len(), 1);
+        let error =
+            predictions[0].state.iter().zip([0.1, 0.2, 0.3, 0.4]).fold(0.0, |m: f64, (a, b)| m.max((a - b).abs()));
+        // The returns are still 1e-2 away; the regularisation of the normal equations costs the last digits.
+        assert!(error < 1e-6, "{error}");
+        assert_eq!(predictions[0].period, 2.0);
+    }
+
+    #[test]
+    fn fewer_crossings_per_period_come_first_although_more_return_closer() {
+        // After 9 turns of 0.7 rad the trajectory is back after almost one revolution, closer than after one turn.
+        let predictions = returns(60, 0.7).predictions(3, &[1.0; 4]);
+        assert!(predictions.len() > 1 && predictions[0].period == 2.0);
+    }
+
+    #[test]
+    fn nothing_is_predicted_from_too_few_returns_or_from_scattered_ones() {
+        assert!(returns(5, 0.7).predictions(3, &[1.0; 4]).is_empty());
+        let mut scattered = returns(30, 0.7);
+        scattered.states.iter_mut().enumerate().for_each(|(k, x)| *x += ((k * k) as f64 * 0.7).sin());
+        assert!(scattered.predictions(3, &[1.0; 4]).is_empty());
+    }
+}

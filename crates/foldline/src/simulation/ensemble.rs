@@ -27,6 +27,9 @@ const ALPHA: f64 = 0.2 - 0.75 * BETA;
 /// Beyond this multiple of 1 + |start| in any component a trajectory is taken to run to infinity.
 const BOUND: f64 = 1e12;
 
+/// At rest the step grows without end; beyond this length the arithmetic would overflow.
+const LONGEST: f64 = 1e100;
+
 /// A batch of trajectories under way.
 pub struct Ensemble<'a> {
     field: &'a dyn VectorField,
@@ -97,7 +100,7 @@ impl<'a> Ensemble<'a> {
             end: span[1],
             sign: if span[1] < span[0] { -1.0 } else { 1.0 },
             step_limit: usize::MAX,
-            longest: f64::INFINITY,
+            longest: LONGEST,
             lanes,
             next: vec![0.0; n * count],
             stage: vec![0.0; n * count],
@@ -117,8 +120,8 @@ impl<'a> Ensemble<'a> {
 
     /// No step is longer than this time, which is positive.
     pub fn with_longest_step(mut self, longest: f64) -> Ensemble<'a> {
-        self.longest = longest;
-        self.lanes.iter_mut().for_each(|lane| lane.step = lane.step.max(-longest).min(longest));
+        self.longest = longest.min(LONGEST);
+        self.lanes.iter_mut().for_each(|lane| lane.step = lane.step.max(-self.longest).min(self.longest));
         self
     }
 
