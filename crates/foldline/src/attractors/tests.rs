@@ -70,7 +70,7 @@ fn every_sample_of_the_contact_rotor_is_counted_where_a_long_integration_ends() 
     assert!((single.point.solution.period().unwrap() - 1.9910645451).abs() < 1e-9);
     let [low, high] = radii(&single.point.solution);
     assert!((low - 0.530563).abs() < 1e-5 && (high - 1.341756).abs() < 1e-5, "{low} {high}");
-    // e^(-ζ 1000) = 5e-5 of any difference to the attractor is left; the same accuracy gives the same trajectories, which
+    // e^(-ζ 1000) = 5e-5 of a small difference to the attractor is left. The same accuracy gives the same trajectories, which
     // matters for those that start near a basin boundary.
     let tolerance = Tolerance::uniform(1e-6, 4);
     let starts = sampling.starts();
@@ -84,7 +84,8 @@ fn every_sample_of_the_contact_rotor_is_counted_where_a_long_integration_ends() 
     });
     for attractor in &census.attractors {
         let r = radii(&attractor.point.solution)[1];
-        let there = largest.iter().filter(|l| (*l - r).abs() < 0.05 * r).count();
+        // The radii 0.39, 1.34 and 2.45 lie far enough apart for a wide net; the last to arrive are still 0.1 away.
+        let there = largest.iter().filter(|l| (*l - r).abs() < 0.2).count();
         assert_eq!(there, attractor.hits, "{:?} of largest radius {r}, {largest:?}", attractor.ratio);
     }
     assert_eq!((census.unsettled, census.escaped), (0, 0));
@@ -152,8 +153,8 @@ fn trajectories_that_run_away_are_counted() {
 #[test]
 fn where_nothing_attracts_nothing_settles() {
     // A centre: every orbit is closed, none is isolated.
-    let census = survey_of(&CENTRE, &[], &sampling(&[[0.5, 2.0], [0.5, 2.0]], 4, 1));
-    assert_eq!((census.attractors.len(), census.unsettled, census.escaped), (0, 4, 0));
+    let census = survey_of(&CENTRE, &[], &sampling(&[[0.5, 2.0], [0.5, 2.0]], 2, 1));
+    assert_eq!((census.attractors.len(), census.unsettled, census.escaped), (0, 2, 0));
 }
 
 /// The cycle with z = Σ c_k e^{j k 2π t/T}, T = 3, on a mesh fine enough that interpolation errors are below 1e-9.
