@@ -132,8 +132,11 @@ pub trait Monitor: Send + Sync {
     /// The value at `at`; `reference` is the accepted point from which the step under inspection starts.
     fn value(&self, reference: &Point, at: &Point) -> f64;
 
-    /// Whether the sign change between two neighbouring points is an event of this kind (and not, say, a neutral saddle).
-    fn confirms(&self, before: &Point, after: &Point) -> bool;
+    /// Whether the located zero is an event of this kind (and not, say, a neutral saddle).
+    fn confirms(&self, at: &Point) -> bool;
+
+    /// By how much an event of this kind changes the number of unstable eigenvalues or multipliers.
+    fn jump(&self) -> usize;
 }
 
 /// The extra unknowns and equations that hold a special point; a problem with one of them held is a two-parameter curve.
