@@ -108,7 +108,8 @@ pub trait ZeroProblem {
     /// Carries a vector from one mesh to another.
     fn transfer(&self, v: &[f64], from: &Mesh, to: &Mesh) -> Vec<f64>;
 
-    /// The mesh on which `u` would meet `tolerance`, or `None` where the current one serves.
+    /// The mesh on which `u` would meet `tolerance`, or `None` where the current one serves. The last factorisation must be
+    /// one near `u` on the current mesh.
     fn better_mesh(&self, u: &[f64], tolerance: f64) -> Option<Mesh>;
 
     /// A mesh with every interval halved; `None` for problems that have none.

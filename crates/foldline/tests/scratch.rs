@@ -52,8 +52,14 @@ fn tol() -> f64 { std::env::var("TOL").ok().and_then(|t| t.parse().ok()).unwrap_
 #[test] fn contact_sl() {
     // settle by brute force first
     let mut p = REFERENCE.to_vec(); p[1] = 1.0;
-    let mut x = vec![0.0, 1.3, 5.0, 0.0];
-    for _ in 0..400 { x = shoot(&p, &x, 1.9910645451, 60, &[0.0, 0.5]) .rchunks(4).next().unwrap().to_vec(); }
+    let mut x = vec![0.0; 4];
+    'o: for a in 0..12 { for b in 1..6 {
+      x = vec![0.0, 1.0, a as f64, -(b as f64)*0.5];
+      for _ in 0..300 { x = shoot(&p, &x, 1.9910645451, 60, &[0.0, 0.5]) .rchunks(4).next().unwrap().to_vec(); }
+      let y = shoot(&p, &x, 1.9910645451, 60, &[0.0, 0.5, 1.0]) .rchunks(4).next().unwrap().to_vec();
+      let d = x.iter().zip(&y).map(|(a,b)| (a-b).abs()).fold(0.0, f64::max);
+      if d < 0.2 && x[0].hypot(x[1]) > 0.42 { println!("{a} {b} {d}"); break 'o; }
+    } }
     println!("{x:?}");
     cycle(1.0, [x[0], x[1], x[2], x[3]], 1.9910645451, tol());
 }

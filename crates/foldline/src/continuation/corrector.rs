@@ -48,6 +48,8 @@ pub struct Station {
     pub tangent: Vec<f64>,
     /// The mesh of all three.
     pub mesh: Mesh,
+    /// A mesh with room for the next step, where `mesh` has none left.
+    pub roomier: Option<Mesh>,
 }
 
 impl Station {
@@ -135,7 +137,7 @@ pub fn station(problem: &mut dyn ZeroProblem, u: Vec<f64>, along: &[f64], direct
     let examination = problem.examine(&u);
     let stored: Vec<f64> = tangent.iter().map(|t| direction * t).collect();
     let point = problem.point(&u, &stored, examination);
-    Ok(Station { point, u, tangent, mesh: problem.mesh() })
+    Ok(Station { point, u, tangent, mesh: problem.mesh(), roomier: None })
 }
 
 /// Corrects `u` in `plane` and adapts the mesh until the error estimate meets the tolerance. The problem is left on the
@@ -164,7 +166,8 @@ pub fn settle(
         plane.distance = 0.0;
         correct(problem, settings, &plane, &mut u, cost)?;
     }
-    let station = station(problem, u, &plane.row, direction, cost)?;
+    let mut station = station(problem, u, &plane.row, direction, cost)?;
+    station.roomier = problem.better_mesh(&station.u, 0.5 * settings.tolerance);
     let error = station.point.trust.discretisation;
     if error > 1.5 * settings.tolerance {
         return Err(Failure::Mesh(error));

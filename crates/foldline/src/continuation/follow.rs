@@ -153,8 +153,7 @@ impl Follow<'_> {
     /// Moves the working copy of a station to a mesh with room for the next step, where its own has none left. The stored
     /// point stays as it is.
     fn refresh(&mut self, station: &mut Station) {
-        self.place(station);
-        if let Some(better) = self.problem.better_mesh(&station.u, 0.5 * self.settings.tolerance) {
+        if let Some(better) = station.roomier.take() {
             station.u = self.problem.transfer(&station.u, &station.mesh, &better);
             station.tangent = self.problem.transfer(&station.tangent, &station.mesh, &better);
             station.mesh = better;

@@ -111,17 +111,36 @@ pub fn locate(
 ) -> Result<Located, Failure> {
     let reference = &stretch.left.point;
     let mut evaluate = |s: f64| stretch.at(problem, settings, s, cost).map(|found| (monitor.value(reference, &found.point), found));
-    let (distance, coarse) = chandrupatla(&mut evaluate, [0.0, stretch.length], values)?;
+    let resolution = if stretch.left.mesh.is_empty() { 1e-9 } else { 1e-3 };
+    let (distance, mut coarse) = chandrupatla(&mut evaluate, [0.0, stretch.length], values, resolution)?;
     let floor = 10.0 * settings.newton_tolerance();
-    let Some(finer) = ({
+    let (mut tolerance, mut reach) = (0.3 * settings.tolerance, 1e-2 * stretch.length.abs());
+    // First a mesh that resolves this place, then one with every interval halved; if the two disagree by more than the
+    // tolerance, the finer one is the starting point for another round.
+    let mut known: Option<(Station, f64)> = None;
+    for _ in 0..4 {
+        for _ in 0..4 {
+            let Some(better) = coarse.better(problem, tolerance) else { break };
+            coarse = relocate(problem, settings, stretch, monitor, &coarse, &better, reach, cost)?;
+            reach = 1e-4 * stretch.length.abs();
+        }
         problem.set_mesh(&coarse.mesh);
-        problem.finer_mesh()
-    }) else {
-        return Ok(Located { distance, station: coarse, error: floor });
-    };
-    let fine = relocate(problem, settings, stretch, monitor, &coarse, &finer, cost)?;
-    let error = floor + discrepancy(&coarse.point, &fine.point, coarse.parameter() - fine.parameter(), fine.parameter());
-    Ok(Located { distance, station: fine, error })
+        let Some(finer) = problem.finer_mesh() else {
+            return Ok(Located { distance, station: coarse, error: floor });
+        };
+        let fine = relocate(problem, settings, stretch, monitor, &coarse, &finer, reach, cost)?;
+        let error = floor + discrepancy(&coarse.point, &fine.point, coarse.parameter() - fine.parameter(), fine.parameter());
+        let improved = known.as_ref().is_none_or(|(_, e)| error < *e);
+        if improved {
+            known = Some((fine.clone(), error));
+        }
+        if error <= settings.tolerance || !improved {
+            break;
+        }
+        coarse = fine;
+        tolerance *= 0.1;
+    }
+    known.map(|(station, error)| Located { distance, station, error }).ok_or(Failure::NotFinite)
 }
 
 /// Largest difference of parameter, period and ranges, each relative to 1 + |value|.
@@ -136,6 +155,14 @@ fn discrepancy(a: &Point, b: &Point, gap: f64, parameter: f64) -> f64 {
     largest
 }
 
+impl Station {
+    /// A mesh on which this point would meet the tolerance, if its own does not. Belongs right after the station was made,
+    /// while its factorisation is the last one.
+    fn better(&self, problem: &mut dyn ZeroProblem, tolerance: f64) -> Option<crate::diagram::Mesh> {
+        (self.point.trust.discretisation > tolerance).then(|| problem.better_mesh(&self.u, tolerance)).flatten()
+    }
+}
+
 /// The zero again on a finer mesh, by the secant method from the coarse one.
 fn relocate(
     problem: &mut dyn ZeroProblem,
@@ -144,6 +171,7 @@ fn relocate(
     monitor: &dyn Monitor,
     coarse: &Station,
     finer: &crate::diagram::Mesh,
+    reach: f64,
     cost: &mut Cost,
 ) -> Result<Station, Failure> {
     problem.set_mesh(finer);
@@ -156,7 +184,7 @@ fn relocate(
         let found = station(problem, u, &row, stretch.direction, cost)?;
         Ok((monitor.value(&stretch.left.point, &found.point), found))
     };
-    let (mut a, mut b) = (0.0, 1e-3 * stretch.length.abs());
+    let (mut a, mut b) = (0.0, reach);
     let (mut ga, mut best) = at(a)?;
     let (mut gb, mut other) = at(b)?;
     for _ in 0..8 {
@@ -180,8 +208,9 @@ fn chandrupatla<T>(
     evaluate: &mut dyn FnMut(f64) -> Result<(f64, T), Failure>,
     [mut a, mut b]: [f64; 2],
     [mut fa, mut fb]: [f64; 2],
+    resolution: f64,
 ) -> Result<(f64, T), Failure> {
-    let (mut c, mut fc) = (a, fa);
+    let (mut c, mut fc);
     let width = (b - a).abs();
     let mut t = (fa / (fa - fb)).clamp(0.02, 0.98);
     let mut best: Option<(f64, f64, T)> = None;
@@ -200,7 +229,7 @@ fn chandrupatla<T>(
             (c, b, fc, fb) = (b, a, fb, fa);
         }
         (a, fa) = (x, fx);
-        if (b - a).abs() < 1e-8 * width {
+        if (b - a).abs() < resolution * width {
             break;
         }
         let (xi, phi) = ((a - b) / (c - b), (fa - fb) / (fc - fb));
@@ -209,8 +238,8 @@ fn chandrupatla<T>(
         } else {
             0.5
         };
-        let margin = 1e-9 * width / (b - a).abs();
-        t = if t.is_finite() { t.clamp(margin, 1.0 - margin) } else { 0.5 };
+        let margin = 0.1 * resolution * width / (b - a).abs();
+        t = if t.is_finite() && margin < 0.5 { t.clamp(margin, 1.0 - margin) } else { 0.5 };
         // Two neighbouring trials that both sit on the zero to rounding: done.
         if fx.abs() < 1e-14 {
             break;
@@ -231,7 +260,7 @@ mod tests {
                 count += 1;
                 Ok((f(x), x))
             };
-            let (x, _) = chandrupatla(&mut evaluate, [-1.0, 2.0], [f(-1.0), f(2.0)]).unwrap();
+            let (x, _) = chandrupatla(&mut evaluate, [-1.0, 2.0], [f(-1.0), f(2.0)], 1e-9).unwrap();
             assert!((x - root).abs() < 1e-4 && count < 45, "{x} after {count}");
         }
     }

@@ -20,6 +20,7 @@
 //! without bound; the continuation recognises both.
 
 use super::gauss::Scheme;
+use super::defect::{self, Defect};
 use super::{Setting, extremes, mesh};
 use crate::contract::{Batch, Examination, Parameters, Singular, ZeroProblem};
 use crate::diagram::{Cycle, Mesh, Point, Solution, Trust};
@@ -31,6 +32,7 @@ use crate::stability::floquet;
 pub struct CycleProblem<'a> {
     setting: Setting<'a>,
     scheme: Scheme,
+    sampling: defect::Sampling,
     mesh: Mesh,
     n: usize,
     /// X̃' / s² at the Gauss points, `[N][m][n]`, normalised to unit length, and ⟨X̃, X̃'⟩ in that weight.
@@ -55,6 +57,7 @@ impl<'a> CycleProblem<'a> {
             system: Condensed::new(n, &scheme.end, 2),
             scale: setting.scales.to_vec(),
             setting,
+            sampling: defect::Sampling::new(&scheme),
             scheme,
             mesh: mesh.clone(),
             n,
@@ -189,6 +192,28 @@ impl<'a> CycleProblem<'a> {
 
     fn relative_scale(&self, u: &[f64]) -> Vec<f64> {
         self.sizes(u).iter().zip(self.setting.scales).map(|(size, scale)| size + scale).collect()
+    }
+
+    /// Estimated error on every interval, relative; uses the last factorisation, which must belong to the current mesh.
+    fn errors(&self, u: &[f64]) -> Vec<f64> {
+        let size = self.profile_size();
+        let scale = self.relative_scale(u);
+        let parameters = self.setting.at(u[size + 1]);
+        let Defect { local, ends } =
+            defect::measure(self.setting.field, &parameters, &u[..size], u[size], &self.mesh, &self.scheme, &self.sampling, &scale);
+        let block = (self.scheme.degree + 1) * self.n;
+        let mut rhs = vec![0.0; size + 2];
+        for (j, end) in ends.chunks_exact(self.n).enumerate() {
+            rhs[j * block..j * block + self.n].copy_from_slice(end);
+        }
+        let mut shift = vec![0.0; size + 2];
+        self.system.solve(&rhs, &mut shift);
+        let response = self.relative_size(&shift, u);
+        let sizes: Vec<f64> =
+            ends.chunks_exact(self.n).map(|e| e.iter().zip(&scale).map(|(v, s)| (v / s).abs()).fold(0.0, f64::max)).collect();
+        let largest = sizes.iter().fold(f64::MIN_POSITIVE, |m: f64, s| m.max(*s));
+        let gain = if response.is_finite() { response / largest } else { 1.0 };
+        local.iter().zip(&sizes).map(|(l, s)| l + gain * s).collect()
     }
 
     fn flow_at_nodes(&self, u: &[f64]) -> Vec<f64> {
@@ -347,7 +372,7 @@ impl ZeroProblem for CycleProblem<'_> {
     }
 
     fn better_mesh(&self, u: &[f64], tolerance: f64) -> Option<Mesh> {
-        let errors = mesh::errors(&u[..self.profile_size()], &self.mesh, &self.scheme, &self.relative_scale(u));
+        let errors = self.errors(u);
         let worst = errors.iter().fold(0.0, |m: f64, e| m.max(*e));
         let better = mesh::equidistributed(&errors, &self.mesh, self.scheme.degree, 0.25 * tolerance)?;
         (worst > tolerance || 2 * better.len() < self.mesh.len()).then_some(better)
@@ -371,7 +396,7 @@ impl ZeroProblem for CycleProblem<'_> {
         }
         let found = floquet::multipliers(&transitions, &self.flow_at_nodes(u), n);
         let scale = self.relative_scale(u);
-        let errors = mesh::errors(&u[..size], &self.mesh, &self.scheme, &scale);
+        let errors = self.errors(u);
         let mut r = vec![0.0; size + 2];
         self.residual(u, &mut r);
         let residual = r[..size].iter().enumerate().map(|(k, v)| (v / scale[k % n]).abs()).fold(r[size].abs(), f64::max);

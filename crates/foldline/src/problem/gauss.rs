@@ -24,10 +24,7 @@ pub struct Scheme {
     pub derivative: Vec<f64>,
     /// `[m + 1]` extrapolation to 1, e.
     pub end: Vec<f64>,
-    /// `[m + 1]` weights with which the values give the m-th divided difference (the leading coefficient).
-    pub leading: Vec<f64>,
-    /// max over s of |∫₀ˢ ∏(τ - c_i) dτ| / m!: the local error is this times h^{m+1} |u^{(m+1)}| to leading order.
-    pub error_constant: f64,
+    barycentric: Vec<f64>,
 }
 
 impl Scheme {
@@ -37,33 +34,21 @@ impl Scheme {
         let (gauss, weights) = gauss_legendre(m);
         let mut nodes = vec![0.0];
         nodes.extend(gauss);
-        let leading: Vec<f64> =
+        let barycentric: Vec<f64> =
             (0..=m).map(|k| 1.0 / (0..=m).filter(|&l| l != k).map(|l| nodes[k] - nodes[l]).product::<f64>()).collect();
         let mut derivative = vec![0.0; m * (m + 1)];
         for i in 1..=m {
             let row = &mut derivative[(i - 1) * (m + 1)..i * (m + 1)];
             let mut diagonal = 0.0;
             for k in (0..=m).filter(|&k| k != i) {
-                row[k] = leading[k] / leading[i] / (nodes[i] - nodes[k]);
+                row[k] = barycentric[k] / barycentric[i] / (nodes[i] - nodes[k]);
                 diagonal -= row[k];
             }
             row[i] = diagonal;
         }
-        let mut scheme = Scheme { degree: m, nodes, weights, derivative, end: Vec::new(), leading, error_constant: 0.0 };
+        let mut scheme = Scheme { degree: m, nodes, weights, derivative, end: Vec::new(), barycentric };
         scheme.end = scheme.interpolation(1.0);
-        scheme.error_constant = scheme.local_error();
         scheme
-    }
-
-    fn local_error(&self) -> f64 {
-        let m = self.degree;
-        let factorial: f64 = (1..=m).map(|k| k as f64).product();
-        let integral = |s: f64| -> f64 {
-            (0..m)
-                .map(|i| s * self.weights[i] * self.nodes[1..].iter().map(|c| s * self.nodes[i + 1] - c).product::<f64>())
-                .sum()
-        };
-        (1..=200).map(|k| (integral(k as f64 / 200.0) / factorial).abs()).fold(0.0, f64::max)
     }
 
     /// Weights `[m + 1]` that give p(s) from the values at the nodes.
@@ -74,12 +59,12 @@ impl Scheme {
             return unit;
         }
         let node_polynomial: f64 = self.nodes.iter().map(|c| s - c).product();
-        self.nodes.iter().zip(&self.leading).map(|(c, w)| node_polynomial * w / (s - c)).collect()
+        self.nodes.iter().zip(&self.barycentric).map(|(c, w)| node_polynomial * w / (s - c)).collect()
     }
 }
 
 /// Gauss–Legendre points and weights on [0, 1], by Newton's method on the Legendre recurrence.
-fn gauss_legendre(m: usize) -> (Vec<f64>, Vec<f64>) {
+pub(super) fn gauss_legendre(m: usize) -> (Vec<f64>, Vec<f64>) {
     let mut points = vec![0.0; m];
     let mut weights = vec![0.0; m];
     for i in 0..m {

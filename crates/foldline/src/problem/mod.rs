@@ -6,6 +6,7 @@
 //! | cycles | profile at mesh nodes and Gauss points, T, λ | [`cycle`] |
 
 pub mod cycle;
+pub mod defect;
 pub mod equilibrium;
 pub mod extremes;
 pub mod gauss;
