@@ -140,8 +140,8 @@ pub fn station(problem: &mut dyn ZeroProblem, u: Vec<f64>, along: &[f64], direct
     Ok(Station { point, u, tangent, mesh: problem.mesh(), roomier: None })
 }
 
-/// Corrects `u` in `plane` and adapts the mesh until the error estimate meets the tolerance. The problem is left on the
-/// mesh of the result and anchored there.
+/// Corrects `u` in `plane` and adapts the mesh until the error estimate meets the tolerance, and both defects of the
+/// multipliers five times that. The problem is left on the mesh of the result and anchored there.
 ///
 /// # Errors
 /// See [`Failure`].
@@ -154,25 +154,34 @@ pub fn settle(
     cost: &mut Cost,
 ) -> Result<Station, Failure> {
     correct(problem, settings, &plane, &mut u, cost)?;
-    for _ in 0..6 {
-        let Some(better) = problem.better_mesh(&u, settings.tolerance) else { break };
-        let from = problem.mesh();
-        // The hyperplane through the point itself, so that remeshing does not move it along the curve.
-        u = problem.transfer(&u, &from, &better);
-        plane.row = problem.transfer(&plane.row, &from, &better);
-        problem.set_mesh(&better);
-        problem.anchor(&u);
-        plane.base = u.clone();
-        plane.distance = 0.0;
-        correct(problem, settings, &plane, &mut u, cost)?;
+    let mut tolerance = settings.tolerance;
+    for round in 0..4 {
+        for _ in 0..6 {
+            let Some(better) = problem.better_mesh(&u, tolerance) else { break };
+            let from = problem.mesh();
+            // The hyperplane through the point itself, so that remeshing does not move it along the curve.
+            u = problem.transfer(&u, &from, &better);
+            plane.row = problem.transfer(&plane.row, &from, &better);
+            problem.set_mesh(&better);
+            problem.anchor(&u);
+            plane.base = u.clone();
+            plane.distance = 0.0;
+            correct(problem, settings, &plane, &mut u, cost)?;
+        }
+        let mut found = station(problem, u, &plane.row, direction, cost)?;
+        let trust = found.point.trust;
+        // Multipliers can need a finer mesh than the profile. Where they do not get better with it, the defects say so.
+        if trust.trivial_defect.max(trust.liouville_defect) <= 5.0 * settings.tolerance || round == 3 {
+            if trust.discretisation > 1.5 * settings.tolerance {
+                return Err(Failure::Mesh(trust.discretisation));
+            }
+            found.roomier = problem.better_mesh(&found.u, 0.5 * tolerance);
+            return Ok(found);
+        }
+        u = found.u;
+        tolerance *= 0.25;
     }
-    let mut station = station(problem, u, &plane.row, direction, cost)?;
-    station.roomier = problem.better_mesh(&station.u, 0.5 * settings.tolerance);
-    let error = station.point.trust.discretisation;
-    if error > 1.5 * settings.tolerance {
-        return Err(Failure::Mesh(error));
-    }
-    Ok(station)
+    Err(Failure::NotFinite)
 }
 
 /// The row that fixes the continuation parameter.

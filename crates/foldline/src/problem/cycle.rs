@@ -138,7 +138,7 @@ impl<'a> CycleProblem<'a> {
         self.gather(u);
         let parameters = self.setting.at(u[size + 1]);
         let batch = Batch { lanes, states: &self.states, parameters: Parameters::Shared(&parameters) };
-        self.setting.field.linearise(batch, &[self.setting.free], &mut self.f, &mut self.fx, &mut self.fp);
+        self.setting.field.linearise(batch, self.setting.free_ones(), &mut self.f, &mut self.fx, &mut self.fp);
         self.trace = 0.0;
         self.system.interior.fill(0.0);
         self.system.coupling.fill(0.0);
@@ -433,7 +433,7 @@ impl ZeroProblem for CycleProblem<'_> {
     }
 
     fn unknowns_of(&mut self, point: &Point) -> Vec<f64> {
-        let parameter = point.parameters[self.setting.free];
+        let parameter = point.parameters.get(self.setting.free).copied().unwrap_or(0.0);
         match &point.solution {
             Solution::Cycle(cycle) => {
                 let mut u = cycle.profile.clone();

@@ -43,7 +43,7 @@ impl<'a> EquilibriumProblem<'a> {
         let n = self.n();
         let parameters = self.setting.at(u[n]);
         let batch = Batch { lanes: 1, states: &u[..n], parameters: Parameters::Shared(&parameters) };
-        self.setting.field.linearise(batch, &[self.setting.free], &mut self.f, &mut self.fx, &mut self.fp);
+        self.setting.field.linearise(batch, self.setting.free_ones(), &mut self.f, &mut self.fx, &mut self.fp);
     }
 }
 
@@ -145,7 +145,7 @@ impl ZeroProblem for EquilibriumProblem<'_> {
             Solution::Equilibrium(x) => x.clone(),
             Solution::Cycle(cycle) => cycle.state(0.0),
         };
-        u.push(point.parameters[self.setting.free]);
+        u.push(point.parameters.get(self.setting.free).copied().unwrap_or(0.0));
         u
     }
 }
