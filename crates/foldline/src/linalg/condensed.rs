@@ -108,7 +108,11 @@ impl Condensed {
             for i in 0..n {
                 step[i * width + i] = self.end[0];
                 for k in 0..m {
-                    axpy(-self.end[k + 1], &w[(k * n + i) * width..(k * n + i + 1) * width], &mut step[i * width..(i + 1) * width]);
+                    axpy(
+                        -self.end[k + 1],
+                        &w[(k * n + i) * width..(k * n + i + 1) * width],
+                        &mut step[i * width..(i + 1) * width],
+                    );
                 }
             }
         }
@@ -262,7 +266,9 @@ impl Condensed {
                 let upper = &self.upper[j * n * full..(j + 1) * n * full];
                 for i in (0..n).rev() {
                     let line = &upper[i * full..(i + 1) * full];
-                    let known = dot(&line[n..2 * n], &right) + dot(&line[2 * n..], &tail) + dot(&line[i + 1..n], &left[i + 1..]);
+                    let known = dot(&line[n..2 * n], &right)
+                        + dot(&line[2 * n..], &tail)
+                        + dot(&line[i + 1..n], &left[i + 1..]);
                     left[i] = (h[j * n + i] - known) / line[i];
                 }
             }
@@ -348,7 +354,12 @@ mod tests {
             let mut x = vec![0.0; size];
             c.solve(&rhs, &mut x);
             for i in 0..size {
-                assert!((x[i] - reference[(i, 0)]).abs() < 1e-10, "{intervals} intervals: {} against {}", x[i], reference[(i, 0)]);
+                assert!(
+                    (x[i] - reference[(i, 0)]).abs() < 1e-10,
+                    "{intervals} intervals: {} against {}",
+                    x[i],
+                    reference[(i, 0)]
+                );
             }
         }
     }

@@ -268,7 +268,13 @@ impl Cycle {
         let root = (half * half + p12 * p21).sqrt();
         let (up, down) = (half + root, half - root);
         // Of the two eigenvalues p22 + half ± root the one closer to p22, computed without cancellation.
-        let shift = if up.norm() > down.norm() { p22 - p12 * p21 / up } else if down.norm() > 0.0 { p22 - p12 * p21 / down } else { p22 };
+        let shift = if up.norm() > down.norm() {
+            p22 - p12 * p21 / up
+        } else if down.norm() > 0.0 {
+            p22 - p12 * p21 / down
+        } else {
+            p22
+        };
         let relative = shift / leading.0 * (log - leading.1).exp();
         if relative.re.is_finite() && relative.im.is_finite() { relative } else { C::ZERO }
     }
@@ -293,7 +299,8 @@ fn wrap(angle: f64) -> f64 {
 /// The spectrum of a real product is closed under conjugation: each eigenvalue is averaged with the conjugate of its
 /// partner, or made real where it is its own partner. Sorted by decreasing modulus.
 fn conjugate_pairs(mut found: Vec<Eigenvalue>) -> Vec<Eigenvalue> {
-    let distance = |a: Eigenvalue, b: Eigenvalue| (a.log_modulus - b.log_modulus).abs() + wrap(a.argument + b.argument).abs();
+    let distance =
+        |a: Eigenvalue, b: Eigenvalue| (a.log_modulus - b.log_modulus).abs() + wrap(a.argument + b.argument).abs();
     let mut out = Vec::with_capacity(found.len());
     found.sort_by(|a, b| b.log_modulus.total_cmp(&a.log_modulus));
     while !found.is_empty() {
@@ -309,7 +316,8 @@ fn conjugate_pairs(mut found: Vec<Eigenvalue>) -> Vec<Eigenvalue> {
                 out.push(Eigenvalue { log_modulus, argument: -argument });
             }
             _ => {
-                let argument = if first.argument.abs() > std::f64::consts::FRAC_PI_2 { std::f64::consts::PI } else { 0.0 };
+                let argument =
+                    if first.argument.abs() > std::f64::consts::FRAC_PI_2 { std::f64::consts::PI } else { 0.0 };
                 out.push(Eigenvalue { argument, ..first });
             }
         }
