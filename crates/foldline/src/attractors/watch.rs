@@ -54,7 +54,7 @@ impl Context<'_> {
 
     /// A stable solution near the candidate, as an orbit.
     fn polished(&self, candidate: &Candidate) -> Option<Orbit> {
-        let polished = |candidate| (self.polish)(candidate).filter(|point| point.unstable == 0);
+        let polished = |candidate: &Candidate| (self.polish)(candidate).filter(|point| point.unstable == 0);
         let point = polished(candidate)?;
         let once = match &point.solution {
             Solution::Cycle(cycle) => primitive(cycle).and_then(|candidate| polished(&candidate)),
