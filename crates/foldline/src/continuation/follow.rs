@@ -6,10 +6,10 @@
 
 use super::corrector::{Failure, Plane, Station, parameter_row, settle};
 use super::inspect::{Found, History};
-use super::locate::{Stretch, locate};
+use super::locate::Stretch;
 use super::Settings;
 use crate::contract::{Monitor, Verdict, ZeroProblem};
-use crate::diagram::{Cost, Ending, Kind, Mesh, Point, SpecialPoint};
+use crate::diagram::{Cost, Ending, Mesh, Point, SpecialPoint};
 
 /// What a run emits, in the order of travel.
 pub enum Item {
@@ -37,10 +37,10 @@ pub struct Follow<'w> {
     pub home: Option<&'w Point>,
 }
 
-/// An accepted step; with an end, and perhaps one more point that lies exactly there.
+/// An accepted step, perhaps the last one.
 struct Step {
     right: Station,
-    end: Option<(Ending, Option<Point>)>,
+    end: Option<Ending>,
 }
 
 /// What the point before the current one contributes: its tangent for the predictor, its monitors for the inspection.
@@ -111,10 +111,7 @@ pub fn follow(walk: &mut Follow, start: Station, previous: Option<Station>, mut 
         if sink(Item::Point(point)) == Verdict::Stop {
             return Ending::Stopped;
         }
-        if let Some((ending, last)) = end {
-            if let Some(last) = last {
-                sink(Item::Point(Point { position: position + walk.direction as i64, ..last }));
-            }
+        if let Some(ending) = end {
             return ending;
         }
         if let (Some(first), Some(now)) = (first_period, right.point.solution.period())
@@ -196,10 +193,10 @@ impl Follow<'_> {
         let mut end = None;
         if let Some(bound) = bound {
             right = self.at_parameter(left, &right, bound, cost)?;
-            end = Some((Ending::Bound(bound), None));
+            end = Some(Ending::Bound(bound));
         }
         if let Some(home) = self.closes(left, &right, emitted, cost) {
-            return Ok(Step { right: home, end: Some((Ending::Closed, None)) });
+            return Ok(Step { right: home, end: Some(Ending::Closed) });
         }
         Ok(Step { right, end })
     }
@@ -219,8 +216,9 @@ impl Follow<'_> {
         Ok(found)
     }
 
-    /// Whether the step passes the place where the branch meets simpler solutions. If so the step ends just before it,
-    /// and the place itself follows as a last point.
+    /// Whether the step passes the place where the branch meets simpler solutions. If so the step ends a little before it.
+    /// The place itself is not solved for: it is a branch point, and the deviation from the simpler solution grows like the
+    /// square root of the distance in the parameter, which gives the parameter there well enough to recognise it.
     fn collapsed(&mut self, left: &Station, right: &Station, cost: &mut Cost) -> Result<Option<Step>, Failure> {
         for monitor in self.collapses {
             let values = [monitor.value(&left.point, &left.point), monitor.value(&left.point, &right.point)];
@@ -228,11 +226,11 @@ impl Follow<'_> {
                 continue;
             }
             let stretch = Stretch::new(self.problem, left, right, self.direction);
-            let found = locate(self.problem, self.settings, &stretch, &**monitor, values, cost)?;
-            let near = stretch.at(self.problem, self.settings, 0.97 * found.distance, cost)?;
-            let at = Ending::Joined { at: monitor.kind(), parameter: found.station.parameter() };
-            let last = (monitor.kind() != Kind::Hopf).then(|| Point { unstable: near.point.unstable, ..found.station.point });
-            return Ok(Some(Step { right: near, end: Some((at, last)) }));
+            let distance = stretch.length * values[0] / (values[0] - values[1]);
+            let near = self.cut(left, &stretch, 0.9 * distance, cost).ok_or(Failure::Singular)?;
+            let share = (monitor.value(&left.point, &near.point) / values[0]).powi(2);
+            let parameter = (near.parameter() - share * left.parameter()) / (1.0 - share);
+            return Ok(Some(Step { right: near, end: Some(Ending::Joined { at: monitor.kind(), parameter }) }));
         }
         Ok(None)
     }

@@ -97,7 +97,7 @@ impl Follow<'_> {
     }
 
     /// A full station at distance s of the stretch.
-    fn cut(&mut self, left: &Station, stretch: &Stretch, s: f64, cost: &mut Cost) -> Option<Station> {
+    pub(super) fn cut(&mut self, left: &Station, stretch: &Stretch, s: f64, cost: &mut Cost) -> Option<Station> {
         let start = stretch.at(self.problem, self.settings, s, cost).ok()?;
         self.problem.set_mesh(&left.mesh);
         self.problem.anchor(&left.u);

@@ -4,8 +4,9 @@ use super::growth::{self, Beginning, Growth};
 use super::plan::{BranchPlan, Plan, Start, Switching};
 use super::seeds::Seeds;
 use super::{System, known, switch};
+use crate::continuation::Settings;
 use crate::contract::{Event, Observer, Verdict};
-use crate::diagram::{Branch, Diagram, Ending, Family, Kind, Origin, Point, Solution};
+use crate::diagram::{Branch, Diagram, Ending, Family, Kind, Origin, Point, Solution, SpecialPoint};
 
 /// Indices of the branches that start at a seed.
 pub fn roots(plan: &Plan) -> Vec<usize> {
@@ -58,7 +59,7 @@ impl Work<'_> {
         followers.into_iter().all(|i| self.planned(i, Origin::EndOf(plan.name.clone()), ended.clone()))
     }
 
-    fn growth_settings(&self, plan: &BranchPlan, start: &Point) -> (crate::continuation::Settings, [bool; 2]) {
+    fn growth_settings(&self, plan: &BranchPlan, start: &Point) -> (Settings, [bool; 2]) {
         let value = start.parameters.get(plan.free).copied().unwrap_or(0.0);
         let (range, sides) = match plan.until {
             Some(target) if target >= value => ([plan.range[0].min(value), target], [false, true]),
@@ -73,7 +74,7 @@ impl Work<'_> {
         let known = self.earlier.branch(&plan.name).filter(|b| !b.points.is_empty());
         if let Some(earlier) = known {
             let (settings, sides) = self.growth_settings(plan, earlier.points.iter().find(|p| p.position == 0)?);
-            let growth = self.growth(&settings, sides);
+            let growth = self.growth(&settings, sides, &[]);
             let mut branch = earlier.clone();
             let going = growth.resume(&mut branch);
             return Some((branch, going));
@@ -88,12 +89,12 @@ impl Work<'_> {
             let name = format!("the start {value} lies outside the range {:?}", plan.range);
             let inside = plan.until.is_some() || (plan.range[0] <= value && value <= plan.range[1]);
             let (settings, sides) = self.growth_settings(plan, &point);
-            let mut problem = growth::problem_of(self.system, plan.free, self.plan.degree, &point);
+            let mut problem = growth::problem_of(self.system, plan.free, self.plan.degree, &point, false);
             let station = growth::polished(&mut *problem, &settings, &point).map_err(|why| why.to_string())?;
             if inside { Ok((settings, sides, station)) } else { Err(name) }
         });
         let going = match begun {
-            Ok((settings, sides, station)) => self.growth(&settings, sides).begin(&mut branch, Beginning::Inside(station)),
+            Ok((settings, sides, station)) => self.growth(&settings, sides, &[]).begin(&mut branch, Beginning::Inside(station)),
             Err(why) => self.without_start(&mut branch, why),
         };
         Some((branch, going))
@@ -109,8 +110,8 @@ impl Work<'_> {
         going & self.tell(Event::End(branch))
     }
 
-    fn growth<'s>(&'s self, settings: &'s crate::continuation::Settings, sides: [bool; 2]) -> Growth<'s> {
-        Growth { system: self.system, settings, degree: self.plan.degree, sides, observer: self.observer }
+    fn growth<'s>(&'s self, settings: &'s Settings, sides: [bool; 2], parents: &'s [SpecialPoint]) -> Growth<'s> {
+        Growth { system: self.system, settings, degree: self.plan.degree, sides, parents, observer: self.observer }
     }
 
     fn tell(&self, event: Event) -> bool {
@@ -135,7 +136,7 @@ impl Work<'_> {
             let origin = Origin::Switch { parent: parent.name.clone(), kind: special.kind, parameter };
             if let Some(earlier) = self.earlier.branch(&name).filter(|b| !b.points.is_empty()) {
                 let mut branch = earlier.clone();
-                let going = self.growth(&settings, [true, true]).resume(&mut branch);
+                let going = self.growth(&settings, [true, true], &parent.special).resume(&mut branch);
                 self.branches.push(branch);
                 more.push(Pending { branch: self.branches.len() - 1, switching: pending.switching.below(special.kind) });
                 if !going {
@@ -163,7 +164,7 @@ impl Work<'_> {
                 continue;
             }
             let mut branch = Branch::new(name, family, parent.free, origin);
-            let going = self.growth(&settings, [true, true]).begin(&mut branch, beginning);
+            let going = self.growth(&settings, [true, true], &parent.special).begin(&mut branch, beginning);
             self.branches.push(branch);
             more.push(Pending { branch: self.branches.len() - 1, switching: pending.switching.below(special.kind) });
             if !going {

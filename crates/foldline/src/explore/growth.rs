@@ -4,15 +4,19 @@ use super::System;
 use crate::continuation::corrector::{Plane, parameter_row, settle, station};
 use crate::continuation::{Failure, Follow, Item, Settings, Station, follow};
 use crate::contract::{Event, Monitor, Observer, Verdict, ZeroProblem};
-use crate::diagram::{Branch, Cost, Ending, Family, Kind, Origin, Point, Solution};
+use crate::diagram::{Branch, Cost, Ending, Family, Kind, Origin, Point, Solution, SpecialPoint};
 use crate::problem::{Setting, cycle::CycleProblem, equilibrium::EquilibriumProblem, mesh};
 use crate::special::{self, collapse};
 
-/// The problem on whose curve `point` lies, on the mesh of the point.
-pub fn problem_of<'a>(system: &'a System, free: usize, degree: usize, point: &Point) -> Box<dyn ZeroProblem + 'a> {
+/// The problem on whose curve `point` lies, on the mesh of the point. `doubled` says that its branch was born by period
+/// doubling.
+pub fn problem_of<'a>(system: &'a System, free: usize, degree: usize, point: &Point, doubled: bool) -> Box<dyn ZeroProblem + 'a> {
     let setting = setting(system, free, &point.parameters);
     match &point.solution {
         Solution::Equilibrium(_) => Box::new(EquilibriumProblem::new(setting)),
+        Solution::Cycle(cycle) if doubled && cycle.intervals() > 0 => {
+            Box::new(CycleProblem::new(setting, cycle.degree, &cycle.mesh).with_equal_halves())
+        }
         Solution::Cycle(cycle) if cycle.intervals() > 0 => Box::new(CycleProblem::new(setting, cycle.degree, &cycle.mesh)),
         Solution::Cycle(_) => Box::new(CycleProblem::new(setting, degree, &mesh::uniform(20))),
     }
@@ -81,6 +85,8 @@ pub struct Growth<'g> {
     pub degree: usize,
     /// Which sides to follow: backward, forward.
     pub sides: [bool; 2],
+    /// Special points of the branch that this one was switched from; it may end at another of them.
+    pub parents: &'g [SpecialPoint],
     /// Who watches.
     pub observer: &'g dyn Observer,
 }
@@ -133,6 +139,7 @@ impl Growth<'_> {
                 if ending == Ending::Stopped {
                     break;
                 }
+                let ending = self.recognised(branch, side, ending);
                 let closed = ending == Ending::Closed;
                 going &= self.end(branch, side, ending);
                 if closed && branch.ends[1 - side].is_none() {
@@ -157,7 +164,7 @@ impl Growth<'_> {
         let last = last.clone();
         let before = own.get(1).map(|p| (*p).clone());
         let emitted = last.position.unsigned_abs() as usize;
-        let mut problem = problem_of(self.system, branch.free, self.degree, &last);
+        let mut problem = problem_of(self.system, branch.free, self.degree, &last, is_doubled(branch));
         let revive = |problem: &mut dyn ZeroProblem, point: &Point| revived(problem, self.settings, point, direction);
         // The special point at which a branch begins is no predecessor: the matrix is singular there.
         let before = before.filter(|p| p.position != 0 || matches!(branch.origin, Origin::Seed(_) | Origin::EndOf(_)));
@@ -193,6 +200,30 @@ impl Growth<'_> {
         })
     }
 
+    /// An end at a special point of the parent gets the accurate parameter of that point; where the special point, as a
+    /// doubled cycle, is a point of this branch, it becomes the last one.
+    fn recognised(&self, branch: &mut Branch, side: usize, ending: Ending) -> Ending {
+        let Ending::Joined { at, parameter } = ending else { return ending };
+        let free = branch.free;
+        let value = |s: &SpecialPoint| s.point.parameters.get(free).copied().unwrap_or(0.0);
+        let Some(last) = (if side == 1 { branch.points.last() } else { branch.points.first() }) else { return ending };
+        let fits = |s: &&SpecialPoint| {
+            let periods = (last.solution.period(), s.point.solution.period());
+            let right_period = match periods {
+                (Some(long), Some(short)) if at == Kind::PeriodDoubling => (0.5 * long / short - 1.0).abs() < 0.02,
+                _ => true,
+            };
+            s.kind == at && right_period && (value(s) - parameter).abs() < 1e-2 * (1.0 + parameter.abs())
+        };
+        let gap = |s: &SpecialPoint| (value(s) - parameter).abs();
+        let Some(parent) = self.parents.iter().filter(fits).min_by(|a, b| gap(a).total_cmp(&gap(b))) else { return ending };
+        if at == Kind::PeriodDoubling && let Some(edge) = super::switch::doubled_edge(self.system, branch.free, parent, last) {
+            let position = last.position + if side == 1 { 1 } else { -1 };
+            self.accept(branch, Point { position, ..edge });
+        }
+        Ending::Joined { at, parameter: value(parent) }
+    }
+
     fn tell(&self, event: Event) -> bool {
         self.observer.observe(event) == Verdict::Continue
     }
@@ -208,11 +239,16 @@ impl Growth<'_> {
     }
 }
 
+/// Whether a branch was born by period doubling.
+pub fn is_doubled(branch: &Branch) -> bool {
+    matches!(branch.origin, Origin::Switch { kind: Kind::PeriodDoubling, .. })
+}
+
 /// What a branch can collapse to: every cycle to an equilibrium, a doubled one to its parent as well.
 fn collapses(branch: &Branch) -> Vec<Box<dyn Monitor>> {
     let mut all: Vec<Box<dyn Monitor>> = Vec::new();
     if branch.family == Family::Cycle {
-        if matches!(branch.origin, Origin::Switch { kind: Kind::PeriodDoubling, .. }) {
+        if is_doubled(branch) {
             all.push(Box::new(collapse::Halves));
         }
         all.push(Box::new(collapse::Shrinks));

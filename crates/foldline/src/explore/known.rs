@@ -26,7 +26,7 @@ pub fn branch_of<'b>(system: &System, settings: &Settings, free: usize, degree: 
             if !close(nearest, 1e-3 + 1.5 * apart) {
                 return false;
             }
-            let mut problem = problem_of(system, free, degree, nearest);
+            let mut problem = problem_of(system, free, degree, nearest, false);
             let mut guess = nearest.clone();
             guess.parameters[free] = value;
             polished(&mut *problem, settings, &guess).is_ok_and(|same| close(&same.point, 30.0 * settings.tolerance))

@@ -82,7 +82,7 @@ fn polish(system: &System, parameters: &[f64], tolerance: f64, candidate: &Candi
         Candidate::Cycle { period, times, states } => Solution::Cycle(first_profile(system.field.dim(), *period, times, states)),
     };
     let guess = bare(parameters, solution);
-    let mut problem = problem_of(system, free, 4, &guess);
+    let mut problem = problem_of(system, free, 4, &guess, false);
     polished(&mut *problem, &settings, &guess).ok().map(|found| found.point)
 }
 

@@ -15,7 +15,7 @@ use crate::problem::{gauss::Scheme, mesh};
 use crate::special::{branch_point, hopf, period_doubling};
 
 /// Distances along the direction that are tried, in scaled variables.
-const DISTANCES: [f64; 5] = [0.02, 0.05, 0.01, 0.1, 0.003];
+const DISTANCES: [f64; 5] = [0.002, 0.005, 0.01, 0.02, 0.05];
 
 /// The beginning of the branch that leaves `at`, and its family; `None` for kinds at which no branch of equilibria or
 /// cycles leaves.
@@ -66,33 +66,37 @@ fn step_off(problem: &mut dyn ZeroProblem, settings: &Settings, base: &[f64], di
 }
 
 fn doubled(system: &System, settings: &Settings, free: usize, at: &SpecialPoint, cycle: &Cycle) -> Result<Beginning, String> {
+    let (mut problem, base, direction) = double(system, free, at, cycle).ok_or("no vector of period doubling was found")?;
+    let first = step_off(&mut problem, settings, &base, &direction, 1.0).map_err(|why| why.to_string())?;
+    let before = doubled_edge(system, free, at, &first.point).into_iter().collect();
+    Ok(Beginning::Edge { before, first, joined: joined(at, free) })
+}
+
+/// The problem of doubled cycles at a period doubling, the cycle run through twice, and the direction of the new branch.
+fn double<'a>(system: &'a System, free: usize, at: &SpecialPoint, cycle: &Cycle) -> Option<(CycleProblem<'a>, Vec<f64>, Vec<f64>)> {
     let mut single = CycleProblem::new(setting(system, free, &at.point.parameters), cycle.degree, &cycle.mesh);
     let u = single.unknowns_of(&at.point);
     single.anchor(&u);
-    let vector = single.antiperiodic_direction(&u).ok_or("no vector of period doubling was found")?;
+    let vector = single.antiperiodic_direction(&u)?;
     let (twice, mut direction) = period_doubling::doubled(cycle, &vector);
     direction.extend([0.0, 0.0]);
-    let mut problem = CycleProblem::new(setting(system, free, &at.point.parameters), twice.degree, &twice.mesh);
+    let mut problem = CycleProblem::new(setting(system, free, &at.point.parameters), twice.degree, &twice.mesh).with_equal_halves();
     let base = problem.unknowns_of(&Point { solution: Solution::Cycle(twice), ..at.point.clone() });
-    let first = step_off(&mut problem, settings, &base, &direction, 1.0).map_err(|why| why.to_string())?;
-    let before = edge(&mut problem, &base, &direction, &first);
-    Ok(Beginning::Edge { before: vec![before], first, joined: joined(at, free) })
+    Some((problem, base, direction))
 }
 
-/// The special point as a point of the branch that begins there; its stability is that of the first point after it.
-fn edge(problem: &mut dyn ZeroProblem, base: &[f64], direction: &[f64], first: &Station) -> Point {
-    // On the mesh of the special point, not that of the first point.
-    let size = base.len();
-    if problem.unknowns() != size {
-        return first.point.clone();
-    }
-    problem.anchor(base);
-    let norm = problem.dot(direction, direction).sqrt();
+/// A period doubling as a point of the doubled branch that begins or ends there; its stability is that of `next`, the
+/// point of the branch beside it.
+pub fn doubled_edge(system: &System, free: usize, at: &SpecialPoint, next: &Point) -> Option<Point> {
+    let Solution::Cycle(cycle) = &at.point.solution else { return None };
+    let (mut problem, base, direction) = double(system, free, at, cycle)?;
+    problem.anchor(&base);
+    let norm = problem.dot(&direction, &direction).sqrt();
     let tangent: Vec<f64> = direction.iter().map(|d| d / norm).collect();
     // The matrix may be singular here; what the examination needs of it does not depend on that.
-    let _ = problem.factorise(base, &tangent);
-    let examination = problem.examine(base);
-    Point { unstable: first.point.unstable, ..problem.point(base, &tangent, examination) }
+    let _ = problem.factorise(&base, &tangent);
+    let examination = problem.examine(&base);
+    Some(Point { unstable: next.unstable, ..problem.point(&base, &tangent, examination) })
 }
 
 fn born(system: &System, settings: &Settings, free: usize, degree: usize, at: &SpecialPoint) -> Result<Beginning, String> {
@@ -110,7 +114,7 @@ fn born(system: &System, settings: &Settings, free: usize, degree: usize, at: &S
 }
 
 fn crossing(system: &System, settings: &Settings, free: usize, degree: usize, at: &SpecialPoint) -> Result<Beginning, String> {
-    let mut problem = problem_of(system, free, degree, &at.point);
+    let mut problem = problem_of(system, free, degree, &at.point, false);
     let problem = &mut *problem;
     let u = problem.unknowns_of(&at.point);
     problem.anchor(&u);

@@ -35,6 +35,7 @@ pub struct CycleProblem<'a> {
     sampling: defect::Sampling,
     mesh: Mesh,
     n: usize,
+    halves: bool,
     /// X̃' / s² at the Gauss points, `[N][m][n]`, normalised to unit length, and ⟨X̃, X̃'⟩ in that weight.
     phase: Vec<f64>,
     phase_offset: f64,
@@ -61,6 +62,7 @@ impl<'a> CycleProblem<'a> {
             scheme,
             mesh: mesh.clone(),
             n,
+            halves: false,
             phase: Vec::new(),
             phase_offset: 0.0,
             period_scale: 1.0,
@@ -72,6 +74,13 @@ impl<'a> CycleProblem<'a> {
         };
         problem.set_mesh(mesh);
         problem
+    }
+
+    /// Keeps the second half of every new mesh a copy of the first. A doubled cycle meets its parent at a pitchfork that is
+    /// perfect only if the discretisation does not tell the two halves apart; the mesh must have this form already.
+    pub fn with_equal_halves(mut self) -> Self {
+        self.halves = true;
+        self
     }
 
     /// The scheme of the polynomials.
@@ -374,7 +383,12 @@ impl ZeroProblem for CycleProblem<'_> {
     fn better_mesh(&self, u: &[f64], tolerance: f64) -> Option<Mesh> {
         let errors = self.errors(u);
         let worst = errors.iter().fold(0.0, |m: f64, e| m.max(*e));
-        let better = mesh::equidistributed(&errors, &self.mesh, self.scheme.degree, 0.25 * tolerance)?;
+        let degree = self.scheme.degree;
+        let better = if self.halves {
+            mesh::equidistributed_in_halves(&errors, &self.mesh, degree, 0.25 * tolerance)?
+        } else {
+            mesh::equidistributed(&errors, &self.mesh, degree, 0.25 * tolerance)?
+        };
         (worst > tolerance || 2 * better.len() < self.mesh.len()).then_some(better)
     }
 

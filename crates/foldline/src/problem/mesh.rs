@@ -59,6 +59,16 @@ pub fn equidistributed(errors: &[f64], mesh: &Mesh, degree: usize, target: f64) 
     Some(out.into())
 }
 
+/// Like [`equidistributed`] for a mesh whose second half is a copy of the first; so is that of the result.
+pub fn equidistributed_in_halves(errors: &[f64], mesh: &Mesh, degree: usize, target: f64) -> Option<Mesh> {
+    let half = errors.len() / 2;
+    let worse: Vec<f64> = (0..half).map(|j| errors[j].max(errors[j + half])).collect();
+    let stretched: Mesh = mesh[..=half].iter().map(|t| 2.0 * t).collect();
+    // Lengths relative to the half are twice those relative to the whole; the errors know nothing of that.
+    let first = equidistributed(&worse, &stretched, degree, target)?;
+    Some(first.iter().map(|t| 0.5 * t).chain(first[1..].iter().map(|t| 0.5 + 0.5 * t)).collect())
+}
+
 /// A periodic profile carried to another mesh by evaluating its polynomials.
 pub fn transferred(profile: &[f64], n: usize, scheme: &Scheme, from: &Mesh, to: &Mesh) -> Vec<f64> {
     let m = scheme.degree;
