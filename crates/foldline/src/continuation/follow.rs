@@ -50,6 +50,9 @@ struct Trail {
     history: History,
 }
 
+/// Share of the deviation from simpler solutions below which a step counts as having landed on them.
+const NOTHING: f64 = 0.05;
+
 /// Follows one side from `start`, which has been emitted already, and of which `previous` is the predecessor on the same
 /// side if there is one. `emitted` counts the points of this side so far.
 pub fn follow(walk: &mut Follow, start: Station, previous: Option<Station>, mut emitted: usize, sink: &mut dyn FnMut(Item) -> Verdict) -> Ending {
@@ -253,6 +256,10 @@ impl Follow<'_> {
     fn collapsed(&mut self, left: &Station, right: &Station, cost: &mut Cost) -> Result<Option<Step>, Failure> {
         for monitor in self.collapses {
             let values = [monitor.value(&left.point, &left.point), monitor.value(&left.point, &right.point)];
+            // Next to nothing left of the deviation: the step has landed on the simpler solutions themselves.
+            if values[1].abs() < NOTHING * values[0] {
+                return Err(Failure::Singular);
+            }
             if !(values[0] > 0.0 && values[1] <= 0.0) {
                 continue;
             }
@@ -264,8 +271,8 @@ impl Follow<'_> {
                 let s = 0.6 * zero + 0.4 * low.0;
                 let found = self.cut(left, &stretch, s, cost).ok_or(Failure::Singular)?;
                 let value = monitor.value(&left.point, &found.point);
-                if value <= 0.0 {
-                    high = (s, value);
+                if value < NOTHING * values[0] {
+                    high = (s, value.min(-NOTHING * values[0]));
                     continue;
                 }
                 low = (s, value);
