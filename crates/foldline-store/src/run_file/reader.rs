@@ -36,6 +36,8 @@ pub fn load(folder: &Path) -> Result<Recorded, RunFileError> {
         Open::Empty => return Err(RunFileError::Damaged(path, "it is empty".to_string())),
     };
     let failed = |e| RunFileError::Database(path.clone(), e);
+    // One transaction, so that a run that is still growing is seen at one instant.
+    connection.execute_batch("BEGIN").map_err(failed)?;
     let text = |key: &str| {
         connection.query_row("SELECT value FROM meta WHERE key = ?", [key], |row| row.get(0)).map_err(failed)
     };
