@@ -5,6 +5,7 @@
 //! a text is said with its place ([`diagnostic`]).
 
 pub mod diagnostic;
+pub mod finite;
 pub mod model_file;
 pub mod nearest;
 pub mod run_file;

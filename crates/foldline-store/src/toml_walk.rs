@@ -58,7 +58,11 @@ impl<'t> Walk<'t> {
         match text.replace('_', "").parse::<f64>() {
             Ok(number) if number.is_finite() => Some(number),
             _ => {
-                self.report(value.span(), format!("{what} is not a finite number"), "write a number such as 1.5 or 1e-6");
+                self.report(
+                    value.span(),
+                    format!("{what} is not a finite number"),
+                    "write a number such as 1.5 or 1e-6",
+                );
                 None
             }
         }
@@ -112,12 +116,18 @@ impl<'t> Walk<'t> {
     pub(crate) fn tables<'v, 'x>(&mut self, root: &'v DeTable<'x>, what: &str) -> Vec<(Range<usize>, &'v DeTable<'x>)> {
         let Some(value) = root.get(what) else { return Vec::new() };
         let tables = value.get_ref().as_array().map(|list| {
-            list.iter().map(|item| item.get_ref().as_table().map(|table| (item.span(), table))).collect::<Option<Vec<_>>>()
+            list.iter()
+                .map(|item| item.get_ref().as_table().map(|table| (item.span(), table)))
+                .collect::<Option<Vec<_>>>()
         });
         match tables {
             Some(Some(tables)) => tables,
             _ => {
-                self.report(value.span(), format!("`{what}` is not a list of tables"), format!("begin each with `[[{what}]]`"));
+                self.report(
+                    value.span(),
+                    format!("`{what}` is not a list of tables"),
+                    format!("begin each with `[[{what}]]`"),
+                );
                 Vec::new()
             }
         }

@@ -70,9 +70,8 @@ pub(super) fn open(path: &Path, write: bool) -> Result<Open, RunFileError> {
     let failed = |e| RunFileError::Database(path.to_path_buf(), e);
     let foreign = || RunFileError::Foreign(path.to_path_buf());
     let access = if write { OpenFlags::SQLITE_OPEN_READ_WRITE } else { OpenFlags::SQLITE_OPEN_READ_ONLY };
-    let number = |connection: &Connection, name: &str| {
-        connection.pragma_query_value(None, name, |row| row.get::<_, i64>(0))
-    };
+    let number =
+        |connection: &Connection, name: &str| connection.pragma_query_value(None, name, |row| row.get::<_, i64>(0));
     let plain = Connection::open_with_flags(path, access | OpenFlags::SQLITE_OPEN_NO_MUTEX).map_err(failed)?;
     let connection = match number(&plain, "application_id") {
         Ok(_) => plain,
@@ -112,7 +111,8 @@ pub(super) fn load_diagram(connection: &Connection, path: &Path) -> Result<Diagr
         let of_branch = |table: &str, order: &str| format!("SELECT * FROM {table} WHERE branch = ?1 ORDER BY {order}");
         branch.points =
             read(connection, path, &of_branch("points", "position"), &[number], |row| Ok(point_in(row)?.0))?;
-        branch.special = read(connection, path, &of_branch("special_points", "position, rowid"), &[number], special_in)?;
+        branch.special =
+            read(connection, path, &of_branch("special_points", "position, rowid"), &[number], special_in)?;
         let ends = read(connection, path, &of_branch("ends", "side"), &[number], |row| {
             let side: i64 = row.get("side").map_err(|e| e.to_string())?;
             Ok((side, ending_in(row)?))

@@ -50,7 +50,8 @@ pub(super) fn values_of(point: &Point, extra: &[f64]) -> Vec<Value> {
 /// The point in a row, and the extra numbers kept with its scalars; the error is the column that makes no sense.
 pub(super) fn point_in(row: &Row) -> Result<(Point, Vec<f64>), String> {
     let blob = |name: &str| row.get::<_, Vec<u8>>(name).map_err(|e| e.to_string());
-    let numbers = |name: &str| unpack(&blob(name)?).ok_or_else(|| format!("{name} has a length that is no multiple of 8"));
+    let numbers =
+        |name: &str| unpack(&blob(name)?).ok_or_else(|| format!("{name} has a length that is no multiple of 8"));
     let count = |name: &str| {
         row.get::<_, i64>(name).ok().and_then(|n| usize::try_from(n).ok()).ok_or_else(|| format!("{name} is no count"))
     };
@@ -86,11 +87,7 @@ pub(super) fn point_in(row: &Row) -> Result<(Point, Vec<f64>), String> {
             trivial_defect: *trivial_defect,
             liouville_defect: *liouville_defect,
         },
-        cost: Cost {
-            newton: count("newton")?,
-            factorisations: count("factorisations")?,
-            rejected: count("rejected")?,
-        },
+        cost: Cost { newton: count("newton")?, factorisations: count("factorisations")?, rejected: count("rejected")? },
     };
     Ok((point, extra.to_vec()))
 }

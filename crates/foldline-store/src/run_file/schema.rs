@@ -38,16 +38,52 @@ impl Columns {
 
 /// Column names that are taken whatever the model.
 const FIXED: [&str; 25] = [
-    "branch", "position", "period", "unstable", "discretisation", "residual", "trivial_defect", "liouville_defect", "newton",
-    "factorisations", "rejected", "degree", "parameter_bytes", "solution_bytes", "mesh_bytes", "tangent_bytes",
-    "spectrum_bytes", "range_bytes", "scalar_bytes", "kind", "key", "unstable_before", "unstable_after", "error", "rowid",
+    "branch",
+    "position",
+    "period",
+    "unstable",
+    "discretisation",
+    "residual",
+    "trivial_defect",
+    "liouville_defect",
+    "newton",
+    "factorisations",
+    "rejected",
+    "degree",
+    "parameter_bytes",
+    "solution_bytes",
+    "mesh_bytes",
+    "tangent_bytes",
+    "spectrum_bytes",
+    "range_bytes",
+    "scalar_bytes",
+    "kind",
+    "key",
+    "unstable_before",
+    "unstable_after",
+    "error",
+    "rowid",
 ];
 
 /// The columns that a point has in both tables of points: first those to read, then those to load.
 pub(super) const POINT_COLUMNS: [&str; 17] = [
-    "period", "unstable", "discretisation", "residual", "trivial_defect", "liouville_defect", "newton", "factorisations",
-    "rejected", "degree", "parameter_bytes", "solution_bytes", "mesh_bytes", "tangent_bytes", "spectrum_bytes",
-    "range_bytes", "scalar_bytes",
+    "period",
+    "unstable",
+    "discretisation",
+    "residual",
+    "trivial_defect",
+    "liouville_defect",
+    "newton",
+    "factorisations",
+    "rejected",
+    "degree",
+    "parameter_bytes",
+    "solution_bytes",
+    "mesh_bytes",
+    "tangent_bytes",
+    "spectrum_bytes",
+    "range_bytes",
+    "scalar_bytes",
 ];
 
 const POINT_TYPES: &str = "

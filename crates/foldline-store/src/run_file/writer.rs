@@ -42,6 +42,26 @@ impl Recorder {
         Recorder::begin(path, study)
     }
 
+    /// Removes the run in `folder`, if there is one; any other file of that name stays and is an error.
+    pub fn discard(folder: &Path) -> Result<(), RunFileError> {
+        let path = path_in(folder);
+        if !path.exists() {
+            return Ok(());
+        }
+        drop(open(&path, false)?);
+        for end in ["", "-wal", "-shm"] {
+            let mut file = path.clone().into_os_string();
+            file.push(end);
+            match std::fs::remove_file(file) {
+                Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                    return Err(RunFileError::Folder(folder.to_path_buf(), error));
+                }
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+
     /// Goes on with the run in `folder`: the recorder, and what the run has found already. Sides that ended only because the
     /// run was stopped are open again. Where there is no run yet, one begins.
     pub fn resume(folder: &Path, study: &Study) -> Result<(Recorder, Diagram), RunFileError> {
@@ -82,7 +102,10 @@ impl Recorder {
         }
         for (class, number, name, unit, description) in variables(study) {
             transaction
-                .execute("INSERT INTO variables VALUES (?, ?, ?, ?, ?)", params![class, number, name, unit, description])
+                .execute(
+                    "INSERT INTO variables VALUES (?, ?, ?, ?, ?)",
+                    params![class, number, name, unit, description],
+                )
                 .map_err(failed)?;
         }
         // Written last in the same transaction: a file with a version is a complete one.

@@ -43,7 +43,8 @@ pub(super) fn read(
         let max_points = max_points.map_or(MAX_POINTS, |n| n as usize);
         let start_value = origin.as_ref().zip(free).and_then(|((_, at), free)| at[free]);
         let bounds = bounds(walk, table, span, start_value, free.map(|f| model.parameters[f].name.as_str()));
-        let (Some(name), Some((start, mut end)), Some(free), Some((range, until))) = (name, origin, free, bounds) else {
+        let (Some(name), Some((start, mut end)), Some(free), Some((range, until))) = (name, origin, free, bounds)
+        else {
             continue;
         };
         end[free] = until;
@@ -62,7 +63,11 @@ fn origin(
     all: &[(Range<usize>, &DeTable)],
 ) -> Option<(Start, Vec<Option<f64>>)> {
     let Some(value) = table.get("from") else {
-        walk.report(span.clone(), "this branch does not say where it starts", "add `from = \"name of a seed or branch\"`");
+        walk.report(
+            span.clone(),
+            "this branch does not say where it starts",
+            "add `from = \"name of a seed or branch\"`",
+        );
         return None;
     };
     let from = walk.string(value, "`from`")?;
@@ -75,7 +80,9 @@ fn origin(
     let written = |table: &DeTable| table.get("name").and_then(|n| n.get_ref().as_str()) == Some(from.as_str());
     if all.iter().any(|(_, other)| written(other)) {
         // Either it stands further down, or something is wrong with it and has been said already.
-        if all.iter().position(|(_, other)| written(other)) >= all.iter().position(|(_, other)| std::ptr::eq(*other, table)) {
+        if all.iter().position(|(_, other)| written(other))
+            >= all.iter().position(|(_, other)| std::ptr::eq(*other, table))
+        {
             let message = format!("the branch \"{from}\" is not known yet at this place");
             walk.report(value.span(), message, "a branch starts from a seed, or from a branch written above it");
         }
@@ -90,7 +97,11 @@ fn origin(
 fn free(walk: &mut Walk, table: &DeTable, span: &Range<usize>, model: &Model) -> Option<usize> {
     let Some(value) = table.get("free") else {
         let example = model.parameters.first().map_or("mu", |p| p.name.as_str());
-        walk.report(span.clone(), "this branch has no free parameter", format!("add a line such as `free = \"{example}\"`"));
+        walk.report(
+            span.clone(),
+            "this branch has no free parameter",
+            format!("add a line such as `free = \"{example}\"`"),
+        );
         return None;
     };
     let name = walk.string(value, "`free`")?;
@@ -151,7 +162,11 @@ fn range(walk: &mut Walk, value: &Value) -> Option<[f64; 2]> {
     let ends: Vec<f64> = list.iter().filter_map(|end| walk.number(end, "an end of the range")).collect();
     let [low, high] = ends[..] else { return None };
     if low > high {
-        walk.report(value.span(), format!("the range from {low} to {high} is the wrong way round"), format!("write [{high}, {low}]"));
+        walk.report(
+            value.span(),
+            format!("the range from {low} to {high} is the wrong way round"),
+            format!("write [{high}, {low}]"),
+        );
         return None;
     }
     if low == high {

@@ -5,10 +5,10 @@
 //! with its place, what is wrong, and what would be right. The format is described in docs/book/study-files.md.
 
 mod branches;
-mod finite;
 mod seeds;
 
 use crate::diagnostic::Diagnostic;
+use crate::finite::check_seeds;
 use crate::model_file::{parse_model, read_model};
 use crate::nearest::suggest;
 use crate::toml_walk::{Value, Walk, unreadable};
@@ -78,6 +78,12 @@ pub fn parse_study(text: &str, file: &str, model_text: &str, model_file: &str) -
     })
 }
 
+/// Whether a text says what to compute rather than how a system moves: it names a model, a seed or a branch.
+pub fn is_study(text: &str) -> bool {
+    let (root, _) = DeTable::parse_recoverable(text);
+    ["model", "seed", "branch"].iter().any(|key| root.get_ref().contains_key(*key))
+}
+
 fn parse(
     text: &str,
     file: &str,
@@ -96,7 +102,7 @@ fn parse(
     let seeds = seeds::read(&mut walk, &root, &model, &defaults);
     let branches = branches::read(&mut walk, &root, &model, &seeds);
     if walk.found.is_empty() {
-        finite::check(&mut walk, &seeds, &model, &model_text, &model_file);
+        check_seeds(&mut walk, &seeds, &model, &model_text, &model_file);
     }
     if !walk.found.is_empty() {
         return Err(walk.found);

@@ -44,7 +44,8 @@ fn source(walk: &mut Walk, table: &DeTable, span: &Range<usize>, model: &Model) 
             None
         }
         (None, None) => {
-            let hint = "add `attractor = \"equilibrium\"`, `\"cycle\"` or a ratio such as `\"2:1\"`, or `state = { … }`";
+            let hint =
+                "add `attractor = \"equilibrium\"`, `\"cycle\"` or a ratio such as `\"2:1\"`, or `state = { … }`";
             walk.report(span.clone(), "this seed does not say which solution it means", hint);
             None
         }
@@ -68,7 +69,11 @@ fn attractor(walk: &mut Walk, value: &Value, model: &Model) -> Option<AttractorK
         }
         _ => {
             let message = format!("\"{text}\" is no attractor");
-            walk.report(value.span(), message, "\"equilibrium\", \"cycle\", or a ratio of whole numbers such as \"2:1\"");
+            walk.report(
+                value.span(),
+                message,
+                "\"equilibrium\", \"cycle\", or a ratio of whole numbers such as \"2:1\"",
+            );
             None
         }
     }
