@@ -171,7 +171,7 @@ impl Frame {
         let bottom = page_height - MARGIN - 2.4 * LINE;
         let labelled = |places: Vec<f64>| places.iter().copied().zip(labels(&places)).collect::<Vec<_>>();
         let widest = |ticks: &[(f64, String)]| ticks.iter().map(|(_, text)| width(text, SIZE)).fold(0.0, f64::max);
-        let y_ticks = labelled(ticks(y0, y1, ((bottom - top) / 70.0) as usize));
+        let y_ticks = labelled(ticks(y0, y1, ((bottom - top) / 50.0) as usize));
         let left = MARGIN + LINE + widest(&y_ticks) + 10.0;
         let right = (page_width - 2.0 * MARGIN - legend.width()).max(left + 50.0);
         // Fewer ticks until the labels stand apart.
@@ -260,8 +260,11 @@ impl Legend {
         };
         let visible: Vec<&Branch> = diagram.branches.iter().filter(|b| seen(b)).collect();
         let from = |top: &Branch| visible.iter().any(|b| root(diagram, b).0.name == top.name);
-        let branches = roots(diagram).into_iter().filter(|b| from(b)).map(|b| (b.name.clone(), colour(diagram, b)));
-        let branches: Vec<_> = branches.collect();
+        let all: Vec<&Branch> = roots(diagram).into_iter().filter(|b| from(b)).collect();
+        let mut branches: Vec<_> = all.iter().take(MOST).map(|b| (shortened(&b.name), colour(diagram, b))).collect();
+        if all.len() > MOST {
+            branches.push((format!("and {} more", all.len() - MOST), "none"));
+        }
         let descendants = visible.iter().any(|b| depth(diagram, b) > 0);
         let occurs = |kind: Kind| {
             visible.iter().any(|b| marks(b, x, y).iter().any(|(k, place)| *k == kind && inside(*place, window)))
@@ -308,6 +311,18 @@ impl Legend {
         }
     }
 }
+
+/// A name that leaves room for the diagram.
+fn shortened(name: &str) -> String {
+    const LONGEST: usize = 32;
+    match name.char_indices().nth(LONGEST) {
+        Some((end, _)) => format!("{}…", &name[..end]),
+        None => name.to_string(),
+    }
+}
+
+/// As many branches as the legend has room for.
+const MOST: usize = 14;
 
 /// What the legend calls branches that come from a special point of another.
 const LIGHTER: &str = "branching off";
