@@ -141,9 +141,9 @@ fn unknown_origin_and_an_origin_further_down() {
         &desk.study("\"rest\"\nfree", "\"test\"\nfree"),
         &["study.toml:10:8", "no seed or branch \"test\"", "did you mean `rest`"],
     );
-    let more = "range = [-1, 2]\n[[branch]]\nname = \"late\"\nfrom = \"main\"\nfree = \"kappa\"\nrange = [0, 2]\n";
-    let message = desk.study("range = [-1, 2]\n", &format!("range = [-1, 2]\n{more}").replace("\"main\"", "\"later\""));
-    says(&message, &["no seed or branch \"later\""]);
+    let above = "[[branch]]\nname = \"early\"\nfrom = \"main\"\nfree = \"kappa\"\nrange = [0, 2]\n";
+    let message = desk.study("[[branch]]\n", &format!("{above}[[branch]]\n"));
+    says(&message, &["study.toml:10:8", "\"main\" is not known yet", "written above it"]);
     let own = desk.study("\"rest\"\nfree", "\"main\"\nfree");
     says(&own, &["\"main\" is not known yet", "written above it"]);
 }
@@ -180,7 +180,7 @@ fn seeds_that_say_too_little_or_too_much() {
     let desk = Desk::new();
     says(&desk.study("state = { x = 0.7, y = 0 }", ""), &["study.toml:4:1", "which solution it means", "attractor = "]);
     says(&desk.study(", y = 0 }", " }"), &["study.toml:6:9", "lacks y", "x, y"]);
-    says(&desk.study("y = 0 }", "y = 0, z = 1 }"), &["study.toml:6:28", "no state `z`"]);
+    says(&desk.study("y = 0 }", "y = 0, z = 1 }"), &["study.toml:6:27", "no state `z`"]);
     says(
         &desk.study("state = {", "attractor = \"2:1\"\nstate = {"),
         &["both an `attractor` and a `state`", "keep one"],
@@ -225,8 +225,12 @@ fn models_with_mistakes_are_refused_at_the_place_in_the_model() {
 
 #[test]
 fn a_model_that_is_not_a_number_at_the_start() {
-    let message = Desk::new().model("mu*x - kappa*x^3 - y", "log(-1 - x^2)");
-    says(&message, &["pendulum.toml:14:12", "`y`", "not finite", "log or sqrt"]);
+    let desk = Desk::new();
+    desk.write("pendulum.toml", &MODEL.replace("mu*x - kappa*x^3 - y", "log(-1 - x^2)"));
+    let pieces = ["pendulum.toml:14:12", "`y` is not finite at x = ", "mu = 0.5", "log or sqrt"];
+    says(&desk.refused(&["check", "pendulum.toml"]), &pieces);
+    says(&desk.refused(&["attractors", "pendulum.toml"]), &pieces);
+    says(&desk.refused(&["run", "study.toml"]), &["study.toml:4:1", "\"rest\" cannot start", "pendulum.toml:14:12"]);
 }
 
 #[test]

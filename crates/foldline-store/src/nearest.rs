@@ -2,7 +2,11 @@
 
 /// The candidate closest to `word` by edit distance, if it is close enough to be what was meant.
 pub fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    let allowed = (word.chars().count() / 3).max(1);
+    // Any letter is one replacement away from any other: that is no likeness.
+    let allowed = match word.chars().count() {
+        0 | 1 => 0,
+        length => (length / 3).max(1),
+    };
     candidates
         .into_iter()
         .map(|candidate| (distance(&word.to_lowercase(), &candidate.to_lowercase()), candidate))
@@ -49,6 +53,8 @@ mod tests {
     fn slips_of_the_pen_are_recognised_and_other_words_are_not() {
         assert_eq!(nearest("Omgea", ["kappa", "Omega"]), Some("Omega"));
         assert_eq!(nearest("omega", ["kappa", "Omega"]), Some("Omega"));
+        assert_eq!(nearest("k", ["x", "K"]), Some("K"));
+        assert_eq!(nearest("z", ["x", "y"]), None);
         assert_eq!(nearest("torque", ["kappa", "Omega"]), None);
     }
 }
