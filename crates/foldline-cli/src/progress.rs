@@ -88,6 +88,12 @@ impl Progress {
         ));
     }
 
+    /// Takes the living lines away.
+    pub fn finish(&self) {
+        let mut live = self.live.lock().unwrap_or_else(PoisonError::into_inner);
+        live.drain().for_each(|(_, line)| line.bar.finish_and_clear());
+    }
+
     /// A line that stays.
     fn say(&self, line: &str) {
         // Progress that cannot be shown is no reason to stop computing.

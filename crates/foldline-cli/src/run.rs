@@ -64,6 +64,7 @@ fn run(
 ) -> Result<(Diagram, Outcome), Failure> {
     let watch = Watch { recorder, progress: Progress::new(&study.model), stop: stop_on_interrupt() };
     let diagram = explore::run(&study.model, &study.plan, jobs, earlier, &watch);
+    watch.progress.finish();
     watch.recorder.finish()?;
 
     let names: Vec<&str> = study.plan.branches.iter().map(|b| b.name.as_str()).collect();

@@ -151,6 +151,24 @@ fn a_killed_run_resumes_with_everything_it_had_accepted_and_repetition_changes_n
 }
 
 #[test]
+fn what_a_resumed_branch_does_not_go_on_from_is_forgotten_so_that_it_is_not_found_twice() {
+    let folder = tempfile::tempdir().unwrap();
+    let recorder = Recorder::create(folder.path(), &study()).unwrap();
+    record(&diagram(), &recorder);
+    // The special points of the last step are located once more, with other rounding errors.
+    let mut main = diagram().branches.remove(0);
+    main.points.retain(|p| p.position <= 2);
+    main.special.truncate(1);
+    recorder.observe(Event::Begin(&main));
+    recorder.observe(Event::Special(&main, &special(Kind::Hopf, 1, 0.16 + 1e-15, false)));
+    recorder.finish().unwrap();
+    let back = load(folder.path()).unwrap().diagram;
+    let parameters: Vec<f64> = back.branches[0].special.iter().map(|s| s.point.parameters[0]).collect();
+    assert_eq!(parameters, [0.15, 0.16 + 1e-15]);
+    assert_eq!(back.branches[0].points.iter().map(|p| p.position).collect::<Vec<_>>(), [-2, -1, 0, 1, 2]);
+}
+
+#[test]
 fn a_run_killed_before_its_first_transaction_resumes_as_a_new_one() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(path_in(folder.path()), "").unwrap();

@@ -179,7 +179,7 @@ impl State {
             Value::Integer(branch.free as i64),
         ];
         let transaction = self.connection.transaction()?;
-        // A branch that is there already, from an earlier part of the run, keeps its points and its number.
+        // A branch that is there already, from an earlier part of the run, keeps its number.
         transaction.execute(
             "INSERT INTO branches (name, family, free, origin, origin_name, origin_kind, origin_parameter, origin_bytes)
              VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)
@@ -191,6 +191,27 @@ impl State {
             transaction.query_row("SELECT branch FROM branches WHERE name = ?", [&branch.name], |row| row.get(0))?;
         for (side, _) in branch.ends.iter().enumerate().filter(|(_, end)| end.is_none()) {
             transaction.execute("DELETE FROM ends WHERE branch = ? AND side = ?", params![number, side as i64])?;
+        }
+        // What an earlier part of the run had stored and this one does not go on from will be found again.
+        let reach = branch.points.first().zip(branch.points.last()).map_or((0, -1), |(a, b)| (a.position, b.position));
+        transaction.execute(
+            "DELETE FROM points WHERE branch = ? AND NOT position BETWEEN ? AND ?",
+            params![number, reach.0, reach.1],
+        )?;
+        let kept: Vec<(&str, i64, [u8; 8])> = branch.special.iter().map(|special| key_of(branch, special)).collect();
+        let stored = {
+            let mut statement =
+                transaction.prepare("SELECT kind, position, key FROM special_points WHERE branch = ?")?;
+            let rows = statement.query_map([number], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))?;
+            rows.collect::<rusqlite::Result<Vec<(String, i64, Vec<u8>)>>>()?
+        };
+        for (kind, position, key) in stored {
+            if !kept.iter().any(|(k, p, bytes)| *k == kind && *p == position && bytes[..] == key) {
+                transaction.execute(
+                    "DELETE FROM special_points WHERE branch = ? AND kind = ? AND position = ? AND key = ?",
+                    params![number, kind, position, key],
+                )?;
+            }
         }
         transaction.commit()?;
         self.numbers.insert(branch.name.clone(), number);
@@ -214,12 +235,12 @@ impl State {
 
     fn special(&mut self, sql: &str, branch: &Branch, special: &SpecialPoint) -> rusqlite::Result<()> {
         let number = self.number(branch)?;
-        let parameter = special.point.parameters.get(branch.free).copied().unwrap_or(0.0);
+        let (kind, position, key) = key_of(branch, special);
         let first = [
             Value::Integer(number),
-            Value::Text(special.kind.name().to_string()),
-            Value::Integer(special.point.position),
-            Value::Blob(parameter.to_le_bytes().to_vec()),
+            Value::Text(kind.to_string()),
+            Value::Integer(position),
+            Value::Blob(key.to_vec()),
             Value::Integer(special.unstable_before as i64),
             Value::Integer(special.unstable_after as i64),
             Value::Real(special.error),
@@ -240,6 +261,13 @@ impl State {
         let sql = "INSERT OR REPLACE INTO ends VALUES (?, ?, ?, ?, ?, ?, ?, ?)";
         self.connection.prepare_cached(sql)?.execute(params_from_iter(values)).map(|_| ())
     }
+}
+
+/// What tells special points of a branch apart: kind, position, and the bits of the parameter, since two of one kind can lie
+/// between the same two points.
+fn key_of(branch: &Branch, special: &SpecialPoint) -> (&'static str, i64, [u8; 8]) {
+    let parameter = special.point.parameters.get(branch.free).copied().unwrap_or(0.0);
+    (special.kind.name(), special.point.position, parameter.to_le_bytes())
 }
 
 /// What is written down about the run as a whole.
