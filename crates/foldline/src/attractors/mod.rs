@@ -1,1 +1,75 @@
-//! To be written.
+//! Where do first solutions come from? Attractors found by sampling initial states.
+//!
+//! **Idea.** Initial states are drawn from a box and integrated together. Each trajectory is watched until one can say where
+//! it goes; what it goes to is then computed by Newton's method instead of by waiting, and the trajectory is counted once
+//! it has been seen to converge there.
+//!
+//! 1. draw `samples` states, stratified in every component and the same for the same seed (`sampling`);
+//! 2. integrate them in blocks of fixed size, each trajectory with a step of its own (`crate::simulation`);
+//! 3. watch the extent of each trajectory: where it shrinks, an equilibrium is tried (`watch`);
+//! 4. watch its returns to a section: where they contract regularly, their limit is predicted and a cycle tried (`returns`);
+//! 5. `polish` turns a candidate into a solution with its stability; only stable ones are kept (`watch`);
+//! 6. a trajectory has settled when its distance to a solution found so far falls steadily, or when the predicted limit of
+//!    its returns lies on that solution (`orbit`, `watch`);
+//! 7. the same solution found in several blocks is one attractor, named by its spectral ratio (`census`, `spectrum`).
+//!
+//! **Fails when** an attractor is neither an equilibrium nor a cycle (its trajectories count as unsettled), or attracts so
+//! slowly that the returns do not contract measurably within the limit on the number of steps.
+
+mod census;
+mod orbit;
+mod returns;
+mod sampling;
+mod spectrum;
+#[cfg(test)]
+mod tests;
+mod watch;
+
+pub use census::{settle, survey};
+pub use sampling::Sampling;
+pub use spectrum::{signed_spectrum, spectral_ratio};
+
+use crate::diagram::Point;
+
+/// A stable equilibrium or cycle, and how often it was reached.
+#[derive(Clone, Debug)]
+pub struct Attractor {
+    /// The solution as polished.
+    pub point: Point,
+    /// Spectral ratio of a cycle such as 2:1, where a whirl plane was named; see [`spectral_ratio`].
+    pub ratio: Option<(u32, u32)>,
+    /// How many trajectories went there.
+    pub hits: usize,
+    /// `[n]` initial state of the first of them.
+    pub example: Vec<f64>,
+}
+
+/// What became of all samples.
+#[derive(Clone, Debug, Default)]
+pub struct Census {
+    /// Equilibria, then cycles, each by falling number of hits; ties by growing norm or period.
+    pub attractors: Vec<Attractor>,
+    /// Trajectories about which nothing could be said within the limit on the number of steps.
+    pub unsettled: usize,
+    /// Trajectories that ran to infinity or to where f is not defined.
+    pub escaped: usize,
+}
+
+/// An approximate solution, to be computed exactly.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Candidate {
+    /// Near an equilibrium: the state `[n]`.
+    Equilibrium(Vec<f64>),
+    /// Near a cycle.
+    Cycle {
+        /// Its period, approximately.
+        period: f64,
+        /// From 0 to `period`, dense where the motion is fast.
+        times: Vec<f64>,
+        /// `[time][n]`: the first is the start, the last the end, which nearly agrees with it.
+        states: Vec<f64>,
+    },
+}
+
+/// Computes a candidate exactly; `None` where that does not converge.
+pub type Polish<'a> = &'a (dyn Fn(&Candidate) -> Option<Point> + Sync);

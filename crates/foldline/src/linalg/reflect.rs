@@ -38,18 +38,26 @@ pub fn apply(v: &[f64], rows: usize, columns: usize, b: &mut [f64], width: usize
     }
 }
 
+/// Applies 1 - v vᵀ to the columns `from..width`, sixteen at a time so that the sums stay in registers.
 fn apply_one(reflector: &[f64], first: usize, a: &mut [f64], width: usize, from: usize) {
     let rows = reflector.len();
-    for c in from..width {
-        let mut s = 0.0;
+    let mut c = from;
+    while c < width {
+        let count = (width - c).min(16);
+        let mut sums = [0.0; 16];
         for i in first..rows {
-            s += reflector[i] * a[i * width + c];
-        }
-        if s != 0.0 {
-            for i in first..rows {
-                a[i * width + c] -= s * reflector[i];
+            let v = reflector[i];
+            for (s, x) in sums.iter_mut().zip(&a[i * width + c..i * width + c + count]) {
+                *s += v * x;
             }
         }
+        for i in first..rows {
+            let v = reflector[i];
+            for (s, x) in sums.iter().zip(&mut a[i * width + c..i * width + c + count]) {
+                *x -= v * s;
+            }
+        }
+        c += count;
     }
 }
 

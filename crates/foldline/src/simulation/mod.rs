@@ -1,1 +1,71 @@
-//! To be written.
+//! How does a trajectory run? Integration of one trajectory or of many together, and the crossings on the way.
+//!
+//! **Idea.** Trajectories are integrated as a batch: in every sweep each of them advances by one step of its own length, and
+//! the vector field is evaluated once per stage for all. A single trajectory is a batch of one.
+//!
+//! | question | file |
+//! |---|---|
+//! | one trajectory, with its crossings? | [`Integrator`] |
+//! | many trajectories? | [`Ensemble`] |
+//! | what is known between the ends of a step? | [`Step`] |
+//! | where does a function of the state change sign? | [`Section`] |
+
+mod ensemble;
+mod root;
+mod section;
+mod step;
+mod tableau;
+#[cfg(test)]
+mod tests;
+mod trajectory;
+
+pub use ensemble::Ensemble;
+pub use section::{Crossing, Direction, Section};
+pub use step::Step;
+pub use trajectory::{Integrator, Passage};
+
+/// How accurate every step must be: |errorᵢ| ≤ absoluteᵢ + relative |xᵢ|, in the root mean square over the components.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tolerance {
+    /// Error relative to the component.
+    pub relative: f64,
+    /// `[n]` error that is accepted even where the component vanishes, in its unit.
+    pub absolute: Vec<f64>,
+}
+
+impl Tolerance {
+    /// The same tolerance for `n` components that are of order one.
+    pub fn uniform(tolerance: f64, n: usize) -> Tolerance {
+        Tolerance { relative: tolerance, absolute: vec![tolerance; n] }
+    }
+}
+
+/// Why a trajectory ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// The end of the time span was reached.
+    Reached,
+    /// The observer said stop.
+    Stopped,
+    /// The state, or f, ceased to be finite, or the state left every reasonable bound in finite time.
+    Escaped,
+    /// The step fell below the resolution of the time: f is discontinuous or the problem is too stiff here.
+    StepTooSmall,
+    /// The limit on the number of steps was reached.
+    StepLimit,
+}
+
+/// Where a trajectory ended, and what it cost.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Arrival {
+    /// Time reached.
+    pub time: f64,
+    /// `[n]` state there.
+    pub state: Vec<f64>,
+    /// Why there.
+    pub outcome: Outcome,
+    /// Steps accepted.
+    pub steps: usize,
+    /// Steps tried and rejected.
+    pub rejected: usize,
+}

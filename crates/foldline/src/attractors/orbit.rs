@@ -1,0 +1,103 @@
+//! A known attractor as a set of states, and the distance to it.
+//!
+//! **Equations.** With sᵢ = half the range of component i over a cycle, and the given scale of the state for an equilibrium:
+//!
+//!   (1)  d(x) = min over the orbit of maxᵢ |xᵢ - pᵢ| / sᵢ
+//!
+//! the orbit of a cycle being the polygon through its samples.
+
+use crate::diagram::{Point, Solution};
+
+/// Samples of a cycle; the polygon through them misses the k-th harmonic by (πk / SAMPLES)² / 2 of its amplitude.
+const SAMPLES: usize = 256;
+/// The nearest sample is first sought among every STRIDE-th.
+const STRIDE: usize = 4;
+/// A component that hardly moves on a cycle is measured against this fraction of its scale.
+const FLOOR: f64 = 1e-3;
+
+/// An attractor that distances can be measured to.
+#[derive(Clone, Debug)]
+pub(super) struct Orbit {
+    pub(super) point: Point,
+    /// `[n]` s of (1).
+    scale: Vec<f64>,
+    /// `[sample][n]`; one sample for an equilibrium.
+    states: Vec<f64>,
+}
+
+impl Orbit {
+    pub(super) fn new(point: Point, scales: &[f64]) -> Orbit {
+        let (states, scale) = match &point.solution {
+            Solution::Equilibrium(x) => (x.clone(), scales.to_vec()),
+            Solution::Cycle(cycle) => {
+                let states = cycle.uniform(SAMPLES);
+                let scale = scales.iter().enumerate().map(|(i, scale)| {
+                    let component = states.iter().skip(i).step_by(scales.len());
+                    let [low, high] =
+                        component.fold([f64::MAX, f64::MIN], |[low, high], x| [x.min(low), x.max(high)]);
+                    (0.5 * (high - low)).max(FLOOR * scale)
+                });
+                let scale = scale.collect();
+                (states, scale)
+            }
+        };
+        Orbit { point, scale, states }
+    }
+
+    /// (1); the samples between which the nearest point lies are searched around the nearest coarse sample only.
+    pub(super) fn distance(&self, x: &[f64]) -> f64 {
+        let n = self.scale.len();
+        let count = self.states.len() / n.max(1);
+        if count < 2 {
+            return self.between(x, 0, 0, 0.0);
+        }
+        let square = |k: usize| -> f64 {
+            (0..n).map(|i| ((x[i] - self.states[k * n + i]) / self.scale[i]).powi(2)).sum()
+        };
+        let nearest = |candidates: &mut dyn Iterator<Item = usize>| {
+            candidates.map(|k| (k, square(k))).min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(k, _)| k)
+        };
+        let coarse = nearest(&mut (0..count).step_by(STRIDE));
+        let fine = nearest(&mut (0..2 * STRIDE - 1).map(|k| (coarse + count + k + 1 - STRIDE) % count));
+        let neighbours = [(fine + count - 1) % count, (fine + 1) % count];
+        let onto = |other: usize| {
+            let (mut along, mut length) = (0.0, 0.0);
+            for i in 0..n {
+                let chord = (self.states[other * n + i] - self.states[fine * n + i]) / self.scale[i];
+                along += chord * (x[i] - self.states[fine * n + i]) / self.scale[i];
+                length += chord * chord;
+            }
+            self.between(x, fine, other, if length > 0.0 { (along / length).clamp(0.0, 1.0) } else { 0.0 })
+        };
+        onto(neighbours[0]).min(onto(neighbours[1]))
+    }
+
+    /// Distance from `x` to the point a fraction `s` of the way from one sample to another.
+    fn between(&self, x: &[f64], from: usize, to: usize, s: f64) -> f64 {
+        let n = self.scale.len();
+        (0..n).fold(0.0, |m: f64, i| {
+            let p = (1.0 - s) * self.states[from * n + i] + s * self.states[to * n + i];
+            m.max((x[i] - p).abs() / self.scale[i])
+        })
+    }
+
+    /// Whether two orbits are the same solution, computed to `tolerance` relative.
+    pub(super) fn same(&self, other: &Orbit, tolerance: f64) -> bool {
+        let n = self.scale.len();
+        match (self.point.solution.period(), other.point.solution.period()) {
+            (None, None) => self.distance(&other.states) <= 100.0 * tolerance,
+            (Some(a), Some(b)) => {
+                // The period is known to the tolerance; the distance only to the sag of the polygon.
+                (a - b).abs() <= 100.0 * tolerance * a
+                    && other.states.chunks_exact(n).step_by(STRIDE).all(|x| self.distance(x) < 0.01)
+                    && self.states.chunks_exact(n).step_by(STRIDE).all(|x| other.distance(x) < 0.01)
+            }
+            _ => false,
+        }
+    }
+
+    /// Norm of the first sample, by which equilibria are ordered.
+    pub(super) fn norm(&self) -> f64 {
+        self.states.iter().take(self.scale.len()).map(|x| x * x).sum::<f64>().sqrt()
+    }
+}

@@ -1,0 +1,67 @@
+//! Vector fields written by hand; only f is needed.
+
+use super::*;
+
+/// A vector field as a function of one point.
+pub struct Field {
+    pub dim: usize,
+    pub f: fn(&[f64], &[f64], &mut [f64]),
+}
+
+impl VectorField for Field {
+    fn dim(&self) -> usize {
+        self.dim
+    }
+
+    fn parameter_count(&self) -> usize {
+        0
+    }
+
+    fn evaluate(&self, at: Batch, f: &mut [f64]) {
+        let Parameters::Shared(parameters) = at.parameters else { return f.fill(f64::NAN) };
+        let (mut x, mut y) = ([0.0; 4], [0.0; 4]);
+        let n = self.dim;
+        for l in 0..at.lanes {
+            (0..n).for_each(|i| x[i] = at.states[i * at.lanes + l]);
+            (self.f)(&x[..n], parameters, &mut y[..n]);
+            (0..n).for_each(|i| f[i * at.lanes + l] = y[i]);
+        }
+    }
+
+    fn linearise(&self, _: Batch, _: &[usize], _: &mut [f64], _: &mut [f64], _: &mut [f64]) {
+        unreachable!("sampling needs f only")
+    }
+
+    fn directional(&self, _: Batch, _: &[&[f64]], _: &mut [f64]) {
+        unreachable!("sampling needs f only")
+    }
+}
+
+/// x'' = μ (1 - x²) x' - x, parameter μ.
+pub const VAN_DER_POL: Field = Field {
+    dim: 2,
+    f: |x, p, f| {
+        f[0] = x[1];
+        f[1] = p[0] * (1.0 - x[0] * x[0]) * x[1] - x[0];
+    },
+};
+
+/// The overhung rotor of akay, equations of motion in the rotating frame; parameters Ω and κ, the others at their reference
+/// values.
+pub const ROTOR: Field = Field {
+    dim: 4,
+    f: |x, p, f| {
+        let (zeta, jp, m, epsilon, gamma, beta, k) = (0.01, 0.143, 0.9, 0.353, 0.25, 10.0, 150.0);
+        let [u, v, du, dv] = [x[0], x[1], x[2], x[3]];
+        let [omega, kappa] = [p[0], p[1]];
+        let r = u.hypot(v);
+        let gyroscopic = -omega * (jp - 2.0);
+        let contact = 0.5 * ((k * (r - 1.0)).tanh() + 1.0) * beta * (1.0 - 1.0 / r.max(1e-300));
+        let stiffness = omega * omega * (jp - 1.0) + 1.0 + (1.0 - kappa) * gamma * r * r + kappa * contact;
+        let circulatory = 2.0 * zeta * omega;
+        f[0] = du;
+        f[1] = dv;
+        f[2] = gyroscopic * dv - 2.0 * zeta * du - stiffness * u + circulatory * v + m * epsilon * omega * omega;
+        f[3] = -gyroscopic * du - 2.0 * zeta * dv - stiffness * v - circulatory * u;
+    },
+};

@@ -1,0 +1,347 @@
+//! Watching one trajectory until one can say where it goes.
+//!
+//! **Idea.** Three things are watched. The extent of the motion over a window of steps: where it shrinks, an equilibrium may be
+//! near. The returns to a section: their predicted limit may lie on a cycle. The distance to every solution found so far: where
+//! its largest value per window falls steadily, the trajectory has settled there.
+
+use super::orbit::Orbit;
+use super::returns::{MOST_CROSSINGS, Prediction, Returns};
+use super::{Candidate, Polish, Sampling};
+use crate::contract::{VectorField, Verdict};
+use crate::diagram::{Cycle, Solution};
+use crate::simulation::{Direction, Integrator, Passage, Section, Step, Tolerance};
+
+/// Steps per window: a few periods of a cycle, some time constants of an equilibrium.
+const WINDOW: usize = 128;
+/// Steps between measurements of the distance to known solutions.
+const PULSE: usize = 16;
+/// Steps after which a first section that saw no cycle is replaced; each later one lives twice as long.
+const FIRST_SECTION: usize = 1024;
+/// Accuracy of the integration, relative. It only decides where a trajectory goes; solutions are polished.
+const INTEGRATION: f64 = 1e-6;
+
+/// Shrinking of the extent after which an equilibrium is tried again.
+const SHRUNK: f64 = 0.7;
+/// Distance, relative to the size of the solution, below which a steady approach counts …
+const CLOSE: f64 = 0.05;
+/// … once the distance has fallen to this fraction of what it was when the approach began.
+const APPROACHED: f64 = 0.5;
+/// Distance at which a trajectory that stays that close is on the solution: the sag of the polygon that stands for it.
+const ARRIVED: f64 = 3e-3;
+/// A predicted limit settles a trajectory no farther away than this …
+const NEIGHBOURHOOD: f64 = 0.3;
+/// … if it is this much closer to the solution than the trajectory is.
+const HIT: f64 = 0.1;
+/// How far from the candidate a polished solution may lie.
+const FAITHFUL: f64 = 0.1;
+/// How well a predicted limit must return to itself to be tried.
+const RECURRENT: f64 = 0.03;
+
+/// What all trajectories of a survey share.
+#[derive(Clone, Copy)]
+pub(super) struct Context<'a> {
+    pub(super) field: &'a dyn VectorField,
+    pub(super) parameters: &'a [f64],
+    pub(super) sampling: &'a Sampling,
+    pub(super) polish: Polish<'a>,
+}
+
+impl Context<'_> {
+    pub(super) fn tolerance(&self) -> Tolerance {
+        let absolute = self.sampling.scales.iter().map(|s| INTEGRATION * s).collect();
+        Tolerance { relative: INTEGRATION, absolute }
+    }
+
+    /// A stable solution near the candidate, as an orbit.
+    fn polished(&self, candidate: &Candidate) -> Option<Orbit> {
+        let polished = |candidate: &Candidate| (self.polish)(candidate).filter(|point| point.unstable == 0);
+        let point = polished(candidate)?;
+        let once = match &point.solution {
+            Solution::Cycle(cycle) => primitive(cycle).and_then(|candidate| polished(&candidate)),
+            Solution::Equilibrium(_) => None,
+        };
+        Some(Orbit::new(once.unwrap_or(point), &self.sampling.scales))
+    }
+}
+
+/// One turn of a cycle that runs several times around nearly the same loop, as a candidate: the cycle may be another one
+/// several times over, or have just doubled its period.
+fn primitive(cycle: &Cycle) -> Option<Candidate> {
+    const COUNT: usize = 240;
+    const PROBES: usize = 24;
+    let n = cycle.dim();
+    let states = cycle.uniform(COUNT);
+    let extent = |i: usize| {
+        let component = states.iter().skip(i).step_by(n);
+        let [low, high] = component.fold([f64::MAX, f64::MIN], |[low, high], x| [x.min(low), x.max(high)]);
+        high - low
+    };
+    let extent: Vec<f64> = (0..n).map(extent).collect();
+    let repeats = |turns: usize| {
+        (0..PROBES).map(|k| k as f64 / PROBES as f64).all(|t| {
+            let (here, there) = (cycle.state(t), cycle.state(t + 1.0 / turns as f64));
+            (0..n).all(|i| (here[i] - there[i]).abs() <= 0.01 * extent[i])
+        })
+    };
+    let turns = (2..=MOST_CROSSINGS).rev().find(|&turns| repeats(turns))?;
+    let period = cycle.period / turns as f64;
+    let times = (0..=COUNT).map(|k| period * k as f64 / COUNT as f64).collect();
+    let states = (0..=COUNT).flat_map(|k| cycle.state(k as f64 / (COUNT * turns) as f64)).collect();
+    Some(Candidate::Cycle { period, times, states })
+}
+
+/// The watch over one trajectory.
+#[derive(Clone, Debug)]
+pub(super) struct Watch {
+    /// Index of the solution to which the trajectory was seen to go.
+    pub(super) settled: Option<usize>,
+    steps: usize,
+    x: Vec<f64>,
+    window: Window,
+    /// `[n]` extent over the last complete window.
+    extent: Option<Vec<f64>>,
+    /// Largest scaled extent at which the next equilibrium is tried.
+    try_equilibrium_below: f64,
+    returns: Returns,
+    section_ends: usize,
+    section_life: usize,
+    next_attempt: usize,
+    approach: Approach,
+}
+
+impl Watch {
+    pub(super) fn new(n: usize) -> Watch {
+        Watch {
+            settled: None,
+            steps: 0,
+            x: vec![0.0; n],
+            window: Window::new(n),
+            extent: None,
+            try_equilibrium_below: f64::INFINITY,
+            returns: Returns::default(),
+            section_ends: 0,
+            section_life: FIRST_SECTION,
+            next_attempt: 0,
+            approach: Approach::default(),
+        }
+    }
+
+    /// Takes note of a step; `known` holds the solutions found so far and grows by those found here.
+    pub(super) fn observe(&mut self, step: &Step, known: &mut Vec<Orbit>, context: &Context) -> Verdict {
+        let mut x = std::mem::take(&mut self.x);
+        step.end_into(&mut x);
+        self.steps += 1;
+        self.window.add(&x, step.end_time() - step.start_time());
+        if self.steps.is_multiple_of(PULSE) {
+            self.settled = self.approach.measure(&x, known);
+        }
+        if self.extent.is_some() && self.settled.is_none() && self.returns.follow(step, &x) {
+            self.try_cycle(known, context);
+        }
+        if self.steps.is_multiple_of(WINDOW) && self.settled.is_none() {
+            self.close_window(step, &x, known, context);
+        }
+        self.x = x;
+        if self.settled.is_some() { Verdict::Stop } else { Verdict::Continue }
+    }
+
+    /// Evaluates a window of steps: tries an equilibrium where the motion shrinks, and renews the section.
+    fn close_window(&mut self, step: &Step, x: &[f64], known: &mut Vec<Orbit>, context: &Context) {
+        let scales = &context.sampling.scales;
+        let window = std::mem::replace(&mut self.window, Window::new(x.len()));
+        let extent: Vec<f64> = (0..x.len()).map(|i| window.high[i] - window.low[i]).collect();
+        let size = (0..x.len()).fold(0.0, |m: f64, i| m.max(extent[i] / scales[i]));
+        // The first window is the transient.
+        if self.extent.is_none() {
+            self.try_equilibrium_below = SHRUNK * size;
+        } else if size <= self.try_equilibrium_below {
+            self.try_equilibrium_below = SHRUNK * size;
+            let mean: Vec<f64> = window.integral.iter().map(|s| s / window.time).collect();
+            let candidate = self.closer_to_rest(mean, step, x, context);
+            self.try_equilibrium(candidate, &extent, known, context);
+        }
+        // A component that does not move is measured against a small part of its scale.
+        self.extent = Some((0..x.len()).map(|i| extent[i].max(1e-6 * scales[i])).collect());
+        if self.steps >= self.section_ends
+            && let Some(extent) = &self.extent
+        {
+            let velocity: Vec<f64> = (0..x.len()).map(|i| step.end_slope(i)).collect();
+            self.returns = Returns::across(x.to_vec(), &velocity, extent);
+            self.section_ends = self.steps + self.section_life;
+            self.section_life *= 2;
+            self.next_attempt = 0;
+        }
+    }
+
+    /// The mean of a window or its last state, whichever has the smaller f: a mean suits a spiral, the last state a node.
+    fn closer_to_rest(&self, mean: Vec<f64>, step: &Step, x: &[f64], context: &Context) -> Vec<f64> {
+        let mut f = vec![0.0; x.len()];
+        let parameters = crate::contract::Parameters::Shared(context.parameters);
+        context.field.evaluate(crate::contract::Batch { lanes: 1, states: &mean, parameters }, &mut f);
+        let speed = |component: &dyn Fn(usize) -> f64| {
+            (0..x.len()).map(|i| (component(i) / context.sampling.scales[i]).abs()).fold(0.0, f64::max)
+        };
+        let of_mean = speed(&|i| f[i]);
+        if of_mean <= speed(&|i| step.end_slope(i)) { mean } else { x.to_vec() }
+    }
+
+    fn try_equilibrium(&mut self, x: Vec<f64>, extent: &[f64], known: &mut Vec<Orbit>, context: &Context) {
+        let candidate = Candidate::Equilibrium(x.clone());
+        let Some(orbit) = context.polished(&candidate) else { return };
+        let Solution::Equilibrium(rest) = &orbit.point.solution else { return };
+        let scales = &context.sampling.scales;
+        let near = (0..x.len()).all(|i| (rest[i] - x[i]).abs() <= 2.0 * extent[i] + 1e-6 * scales[i]);
+        if near && !known.iter().any(|k| k.same(&orbit, context.sampling.tolerance)) {
+            known.push(orbit);
+        }
+    }
+
+    /// Looks for a limit of the returns, at every return at first and more and more rarely while none is found.
+    fn try_cycle(&mut self, known: &mut Vec<Orbit>, context: &Context) {
+        if self.returns.total() < self.next_attempt {
+            return;
+        }
+        let Some(extent) = self.extent.clone() else { return };
+        let mut polishings = 0;
+        for q in 1..=MOST_CROSSINGS {
+            let Some(prediction) = self.returns.predict(q, &extent) else { continue };
+            self.settled = self.predicted(&prediction.state, known);
+            if self.settled.is_some() {
+                return;
+            }
+            if known.iter().any(|k| k.distance(&prediction.state) <= FAITHFUL) {
+                // The limit may lie on that solution, but the trajectory is not close enough to be sure.
+                self.next_attempt = self.returns.total() + q;
+                return;
+            }
+            self.next_attempt = self.returns.total() + (self.returns.total() / 4).max(q);
+            let Some(candidate) = self.follow(&prediction, &extent, context) else { continue };
+            polishings += 1;
+            if let Some(orbit) = context.polished(&candidate)
+                && orbit.distance(&prediction.state) <= FAITHFUL
+            {
+                known.push(orbit);
+                self.settled = self.predicted(&prediction.state, known);
+                return;
+            }
+            if polishings == 2 {
+                return;
+            }
+        }
+    }
+
+    /// The solution on which a predicted limit lies.
+    fn predicted(&self, limit: &[f64], known: &[Orbit]) -> Option<usize> {
+        let last = self.returns.last()?;
+        known.iter().position(|orbit| {
+            let here = orbit.distance(last);
+            here <= NEIGHBOURHOOD && orbit.distance(limit) <= HIT * here + ARRIVED
+        })
+    }
+
+    /// The trajectory from a predicted limit over one period, if it comes back.
+    fn follow(&self, prediction: &Prediction, extent: &[f64], context: &Context) -> Option<Candidate> {
+        const PARTS: usize = 4;
+        let n = extent.len();
+        let value = |_: f64, x: &[f64]| self.returns.value(x);
+        let sections = [Section { value: &value, direction: Direction::Rising }];
+        let integrator = Integrator::new(context.field, context.parameters, context.tolerance()).with_step_limit(20_000);
+        let (mut times, mut states) = (vec![0.0], prediction.state.clone());
+        // The crossing that comes closest to the start, around the expected time.
+        let mut back: Option<(f64, f64, Vec<f64>)> = None;
+        let mut x = vec![0.0; n];
+        integrator.trajectory(&prediction.state, [0.0, 1.3 * prediction.period], &sections, &mut |passage| {
+            match passage {
+                Passage::Crossing(crossing) if crossing.time > 0.7 * prediction.period => {
+                    let distance = (0..n).fold(0.0, |m: f64, i| {
+                        m.max((crossing.state[i] - prediction.state[i]).abs() / extent[i])
+                    });
+                    if back.as_ref().is_none_or(|(best, ..)| distance < *best) {
+                        back = Some((distance, crossing.time, crossing.state.clone()));
+                    }
+                }
+                Passage::Crossing(_) => {}
+                Passage::Step(step) => {
+                    for part in 1..=PARTS {
+                        let theta = part as f64 / PARTS as f64;
+                        step.state_into(theta, &mut x);
+                        times.push(step.time_at(theta));
+                        states.extend_from_slice(&x);
+                    }
+                }
+            }
+            Verdict::Continue
+        });
+        let (_, period, end) = back.filter(|(distance, ..)| *distance <= RECURRENT)?;
+        let kept = times.partition_point(|t| *t < period);
+        times.truncate(kept);
+        states.truncate(kept * n);
+        times.push(period);
+        states.extend(end);
+        Some(Candidate::Cycle { period, times, states })
+    }
+}
+
+/// Extent and time integral of the state over some steps.
+#[derive(Clone, Debug)]
+struct Window {
+    low: Vec<f64>,
+    high: Vec<f64>,
+    integral: Vec<f64>,
+    time: f64,
+}
+
+impl Window {
+    fn new(n: usize) -> Window {
+        Window { low: vec![f64::MAX; n], high: vec![f64::MIN; n], integral: vec![0.0; n], time: 0.0 }
+    }
+
+    fn add(&mut self, x: &[f64], duration: f64) {
+        self.time += duration;
+        for i in 0..x.len() {
+            self.low[i] = self.low[i].min(x[i]);
+            self.high[i] = self.high[i].max(x[i]);
+            self.integral[i] += duration * x[i];
+        }
+    }
+}
+
+/// The distance to the nearest known solution, as its largest value over windows of measurements.
+#[derive(Clone, Debug, Default)]
+struct Approach {
+    nearest: usize,
+    measurements: usize,
+    largest: f64,
+    /// Largest value of the first and of the last window of a steady approach, and how many windows it lasted.
+    first: f64,
+    last: f64,
+    windows: usize,
+}
+
+impl Approach {
+    /// Adds a measurement; the index of the solution once the trajectory has settled there.
+    fn measure(&mut self, x: &[f64], known: &[Orbit]) -> Option<usize> {
+        const MEASUREMENTS: usize = 8;
+        const WINDOWS: usize = 3;
+        let distances = known.iter().map(|orbit| orbit.distance(x)).enumerate();
+        let (nearest, distance) = distances.min_by(|a, b| a.1.total_cmp(&b.1))?;
+        if nearest != self.nearest || self.measurements == 0 {
+            *self = Approach { nearest, ..Approach::default() };
+        }
+        self.measurements += 1;
+        self.largest = self.largest.max(distance);
+        if !self.measurements.is_multiple_of(MEASUREMENTS) {
+            return None;
+        }
+        let largest = std::mem::take(&mut self.largest);
+        if self.windows > 0 && (largest < self.last || largest <= ARRIVED) {
+            self.windows += 1;
+        } else {
+            (self.first, self.windows) = (largest, 1);
+        }
+        self.last = largest;
+        let steady = self.windows >= WINDOWS;
+        let close = largest <= ARRIVED || (largest <= CLOSE && largest <= APPROACHED * self.first);
+        (steady && close).then_some(nearest)
+    }
+}

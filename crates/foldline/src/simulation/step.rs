@@ -1,0 +1,89 @@
+//! One accepted step, and the state anywhere on it.
+
+use super::tableau::{DENSE, STAGES};
+
+/// An accepted step of one trajectory, with a continuous solution of order 4 between its ends.
+#[derive(Clone, Copy, Debug)]
+pub struct Step<'a> {
+    pub(super) trajectory: usize,
+    /// Column of the batch in which the trajectory lies, and the number of columns.
+    pub(super) column: usize,
+    pub(super) lanes: usize,
+    pub(super) time: f64,
+    pub(super) length: f64,
+    pub(super) end_time: f64,
+    /// `[n × lanes]` states at the start and at the end.
+    pub(super) from: &'a [f64],
+    pub(super) to: &'a [f64],
+    /// `[STAGES][n × lanes]`.
+    pub(super) slopes: &'a [Vec<f64>; STAGES],
+}
+
+impl Step<'_> {
+    /// Index of the trajectory within its ensemble.
+    pub fn trajectory(&self) -> usize {
+        self.trajectory
+    }
+
+    /// n.
+    pub fn dim(&self) -> usize {
+        self.from.len() / self.lanes
+    }
+
+    /// Time at the start of the step.
+    pub fn start_time(&self) -> f64 {
+        self.time
+    }
+
+    /// Time at the end of the step.
+    pub fn end_time(&self) -> f64 {
+        self.end_time
+    }
+
+    /// The time a fraction `theta` into the step.
+    pub fn time_at(&self, theta: f64) -> f64 {
+        if theta == 1.0 { self.end_time } else { self.time + theta * self.length }
+    }
+
+    /// Component `i` at the start.
+    pub fn start(&self, i: usize) -> f64 {
+        self.from[i * self.lanes + self.column]
+    }
+
+    /// Component `i` at the end.
+    pub fn end(&self, i: usize) -> f64 {
+        self.to[i * self.lanes + self.column]
+    }
+
+    /// Component `i` of f at the end.
+    pub fn end_slope(&self, i: usize) -> f64 {
+        self.slopes[STAGES - 1][i * self.lanes + self.column]
+    }
+
+    /// Writes the state `[n]` at the start.
+    pub fn start_into(&self, x: &mut [f64]) {
+        (0..x.len()).for_each(|i| x[i] = self.start(i));
+    }
+
+    /// Writes the state `[n]` at the end.
+    pub fn end_into(&self, x: &mut [f64]) {
+        (0..x.len()).for_each(|i| x[i] = self.end(i));
+    }
+
+    /// Writes the state `[n]` a fraction `theta` ∈ [0, 1] into the step, (3) of the tableau.
+    pub fn state_into(&self, theta: f64, x: &mut [f64]) {
+        if theta == 1.0 {
+            return self.end_into(x);
+        }
+        let h = self.length;
+        let rest = 1.0 - theta;
+        for (i, x) in x.iter_mut().enumerate() {
+            let at = i * self.lanes + self.column;
+            let change = self.to[at] - self.from[at];
+            let b = h * self.slopes[0][at] - change;
+            let c = change - h * self.slopes[STAGES - 1][at] - b;
+            let d = h * DENSE.iter().zip(self.slopes).map(|(d, k)| d * k[at]).sum::<f64>();
+            *x = self.from[at] + theta * (change + rest * (b + theta * (c + rest * d)));
+        }
+    }
+}

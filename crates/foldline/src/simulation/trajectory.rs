@@ -1,0 +1,122 @@
+//! One trajectory, with its crossings.
+
+use super::section::{Crossing, Section, crossings};
+use super::tableau::A;
+use super::{Arrival, Ensemble, Outcome, Step, Tolerance};
+use crate::contract::{Batch, Parameters, VectorField, Verdict};
+
+/// Integrates single trajectories of one vector field at fixed parameters.
+#[derive(Clone)]
+pub struct Integrator<'a> {
+    field: &'a dyn VectorField,
+    parameters: &'a [f64],
+    tolerance: Tolerance,
+    step_limit: usize,
+    longest: f64,
+}
+
+/// What an observer of a trajectory sees, in the order in which it happens.
+#[derive(Clone, Copy, Debug)]
+pub enum Passage<'a> {
+    /// A section was crossed.
+    Crossing(&'a Crossing),
+    /// A step was accepted; its crossings have been reported.
+    Step(&'a Step<'a>),
+}
+
+impl<'a> Integrator<'a> {
+    /// An integrator without a limit on the number of steps.
+    pub fn new(field: &'a dyn VectorField, parameters: &'a [f64], tolerance: Tolerance) -> Integrator<'a> {
+        Integrator { field, parameters, tolerance, step_limit: usize::MAX, longest: f64::INFINITY }
+    }
+
+    /// Ends a trajectory after this many accepted and rejected steps.
+    pub fn with_step_limit(mut self, limit: usize) -> Integrator<'a> {
+        self.step_limit = limit;
+        self
+    }
+
+    /// No step is longer than this time, which is positive.
+    pub fn with_longest_step(mut self, longest: f64) -> Integrator<'a> {
+        self.longest = longest;
+        self
+    }
+
+    /// The trajectory from `start` `[n]` over the time span, which may run backwards. `observe` may stop it, at a crossing or
+    /// at the end of a step. A start on a section is not a crossing.
+    pub fn trajectory(
+        &self,
+        start: &[f64],
+        span: [f64; 2],
+        sections: &[Section],
+        observe: &mut dyn FnMut(Passage) -> Verdict,
+    ) -> Arrival {
+        let mut stopped_at = None;
+        let mut stages = Stages::new(self.field, self.parameters);
+        let ensemble = Ensemble::new(self.field, self.parameters, self.tolerance.clone(), start, span)
+            .with_step_limit(self.step_limit)
+            .with_longest_step(self.longest);
+        let arrivals = ensemble.run(&mut |step| {
+            if !sections.is_empty() {
+                for crossing in crossings(step, sections, |theta, x| stages.state_into(step, theta, x)) {
+                    if observe(Passage::Crossing(&crossing)) == Verdict::Stop {
+                        stopped_at = Some(crossing);
+                        return Verdict::Stop;
+                    }
+                }
+            }
+            observe(Passage::Step(step))
+        });
+        let mut arrival = arrivals.into_iter().next().unwrap_or(Arrival {
+            time: span[0],
+            state: start.to_vec(),
+            outcome: Outcome::Escaped,
+            steps: 0,
+            rejected: 0,
+        });
+        if let Some(crossing) = stopped_at {
+            (arrival.time, arrival.state) = (crossing.time, crossing.state);
+        }
+        arrival
+    }
+
+    /// The state at the end of the time span, or `None` if the trajectory does not get there.
+    pub fn state_after(&self, start: &[f64], span: [f64; 2]) -> Option<Vec<f64>> {
+        let arrival = self.trajectory(start, span, &[], &mut |_| Verdict::Continue);
+        (arrival.outcome == Outcome::Reached).then_some(arrival.state)
+    }
+}
+
+/// Recomputes part of a step with the full order.
+struct Stages<'a> {
+    field: &'a dyn VectorField,
+    parameters: &'a [f64],
+    slopes: Vec<Vec<f64>>,
+    start: Vec<f64>,
+}
+
+impl<'a> Stages<'a> {
+    fn new(field: &'a dyn VectorField, parameters: &'a [f64]) -> Stages<'a> {
+        let n = field.dim();
+        Stages { field, parameters, slopes: vec![vec![0.0; n]; A.len()], start: vec![0.0; n] }
+    }
+
+    /// Writes the state a fraction `theta` into the step, by a step of that length.
+    fn state_into(&mut self, step: &Step, theta: f64, x: &mut [f64]) {
+        step.start_into(&mut self.start);
+        let h = theta * step.length;
+        for i in 0..x.len() {
+            self.slopes[0][i] = step.slopes[0][i * step.lanes + step.column];
+        }
+        for (s, row) in A.iter().enumerate() {
+            for i in 0..x.len() {
+                let change: f64 = row.iter().zip(&self.slopes).map(|(a, k)| a * k[i]).sum();
+                x[i] = self.start[i] + h * change;
+            }
+            if let Some(slope) = self.slopes.get_mut(s + 1) {
+                let batch = Batch { lanes: 1, states: x, parameters: Parameters::Shared(self.parameters) };
+                self.field.evaluate(batch, slope);
+            }
+        }
+    }
+}
