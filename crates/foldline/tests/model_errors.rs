@@ -173,11 +173,7 @@ fn all_mistakes_are_said_at_once() {
         found.iter().map(|e| e.item).collect::<Vec<_>>(),
         [Item::Equation(0), Item::Equation(1), Item::Output(0)]
     );
-    assert_eq!(
-        found[0].to_string(),
-        "the equation of `u`, byte 5: unknown name `w` (one of: K, Omega, pi, r, u, v)"
-            .replace("one of: K, Omega, pi, r, u, v", &found[0].hint)
-    );
+    assert!(found[0].to_string().starts_with("the equation of `u`, byte 5: unknown name `w` ("), "{}", found[0]);
 }
 
 #[test]
