@@ -1,2 +1,36 @@
-//! The command `foldline`.
-fn main() {}
+//! The command `foldline`: what was typed → what is planned → run → table.
+
+mod arguments;
+mod attractors;
+mod check;
+mod failure;
+mod order;
+mod plot;
+mod progress;
+mod run;
+mod system;
+mod table;
+
+use arguments::{Arguments, Command};
+use clap::Parser;
+use failure::{Failure, Outcome};
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    match answer(Arguments::parse()) {
+        Ok(Outcome::Done) => ExitCode::SUCCESS,
+        Ok(Outcome::Short) => ExitCode::from(3),
+        Err(failure) => failure.report(),
+    }
+}
+
+fn answer(arguments: Arguments) -> Result<Outcome, Failure> {
+    match arguments.command {
+        None => run::reference_study(),
+        Some(Command::Run(typed)) => run::study(&typed),
+        Some(Command::Table(typed)) => table::print(&typed),
+        Some(Command::Plot(typed)) => plot::write(&typed),
+        Some(Command::Attractors(typed)) => attractors::print(&typed),
+        Some(Command::Check(typed)) => check::print(&typed),
+    }
+}

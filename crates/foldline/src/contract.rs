@@ -108,7 +108,8 @@ pub trait ZeroProblem {
     /// Carries a vector from one mesh to another.
     fn transfer(&self, v: &[f64], from: &Mesh, to: &Mesh) -> Vec<f64>;
 
-    /// The mesh on which `u` would meet `tolerance`, or `None` where the current one serves.
+    /// The mesh on which `u` would meet `tolerance`, or `None` where the current one serves. The last factorisation must be
+    /// one near `u` on the current mesh.
     fn better_mesh(&self, u: &[f64], tolerance: f64) -> Option<Mesh>;
 
     /// A mesh with every interval halved; `None` for problems that have none.
@@ -132,8 +133,11 @@ pub trait Monitor: Send + Sync {
     /// The value at `at`; `reference` is the accepted point from which the step under inspection starts.
     fn value(&self, reference: &Point, at: &Point) -> f64;
 
-    /// Whether the sign change between two neighbouring points is an event of this kind (and not, say, a neutral saddle).
-    fn confirms(&self, before: &Point, after: &Point) -> bool;
+    /// Whether the located zero is an event of this kind (and not, say, a neutral saddle).
+    fn confirms(&self, at: &Point) -> bool;
+
+    /// By how much an event of this kind changes the number of unstable eigenvalues or multipliers.
+    fn jump(&self) -> usize;
 }
 
 /// The extra unknowns and equations that hold a special point; a problem with one of them held is a two-parameter curve.

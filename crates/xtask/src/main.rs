@@ -1,2 +1,114 @@
-//! `cargo xtask test | check | bench | docs`.
-fn main() {}
+//! Development tasks: `cargo xtask test | check | bench | docs`. What continuous integration runs, and nothing else.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode};
+use std::time::Instant;
+
+const USAGE: &str = "cargo xtask TASK
+  test    format, clippy without warnings, references, every test of the workspace
+  check   the same without the tests
+  bench   the reference study in a release build on one thread: time, and work of each branch
+  docs    the documentation of the source, without warnings";
+
+fn main() -> ExitCode {
+    let task = std::env::args().nth(1).unwrap_or_default();
+    let done = match task.as_str() {
+        "test" => check() && cargo(&["test", "--workspace", "--quiet"]),
+        "check" => check(),
+        "bench" => bench(),
+        "docs" => docs(),
+        _ => {
+            eprintln!("{USAGE}");
+            false
+        }
+    };
+    if done { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+}
+
+fn check() -> bool {
+    cargo(&["fmt", "--all", "--check"])
+        && cargo(&["clippy", "--workspace", "--all-targets", "--quiet", "--", "-D", "warnings"])
+        && references()
+}
+
+fn docs() -> bool {
+    run(Command::new(cargo_path()).args(["doc", "--workspace", "--no-deps"]).env("RUSTDOCFLAGS", "-D warnings"))
+}
+
+/// Whether every key that a line `**Source.**` cites is in docs/references.bib.
+fn references() -> bool {
+    let root = root();
+    let bibliography = std::fs::read_to_string(root.join("docs/references.bib")).unwrap_or_default();
+    let mut files = Vec::new();
+    for folder in ["crates", "models", "studies"] {
+        collect(&root.join(folder), &mut files);
+    }
+    let mut complete = true;
+    for file in files {
+        let text = std::fs::read_to_string(&file).unwrap_or_default();
+        for line in text.lines().filter(|l| l.contains("**Source.**") || l.starts_with("source = ")) {
+            for key in line.split(|c: char| !c.is_ascii_alphanumeric()).filter(|word| is_key(word)) {
+                if !bibliography.contains(&format!("{{{key},")) {
+                    eprintln!("{}: {key} is not in docs/references.bib", file.display());
+                    complete = false;
+                }
+            }
+        }
+    }
+    complete
+}
+
+/// A name followed by a year.
+fn is_key(word: &str) -> bool {
+    let name = word.trim_end_matches(|c: char| c.is_ascii_digit());
+    name.len() > 2 && word.len() == name.len() + 4 && name.chars().all(|c| c.is_ascii_lowercase())
+}
+
+fn collect(folder: &Path, files: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        let path = entry.path();
+        if path.is_dir() {
+            collect(&path, files);
+        } else if path.extension().is_some_and(|e| e == "rs" || e == "toml") {
+            files.push(path);
+        }
+    }
+}
+
+fn bench() -> bool {
+    if !cargo(&["build", "--release", "--quiet", "--package", "foldline-cli"]) {
+        return false;
+    }
+    let program = root().join("target/release/foldline");
+    let out = root().join("target/bench");
+    // The folder of an earlier benchmark, if there is one.
+    let _ = std::fs::remove_dir_all(&out);
+    let study = root().join("studies/overhung-rotor/bouncing.toml");
+    let start = Instant::now();
+    let ran = run(Command::new(&program).arg("run").arg(study).args(["--jobs", "1", "--out"]).arg(&out));
+    eprintln!("{:.3} s", start.elapsed().as_secs_f64());
+    ran && run(Command::new(&program).arg("table").arg(&out).arg("--branches"))
+}
+
+fn cargo(arguments: &[&str]) -> bool {
+    eprintln!("cargo {}", arguments.join(" "));
+    run(Command::new(cargo_path()).args(arguments))
+}
+
+fn cargo_path() -> String {
+    std::env::var("CARGO").unwrap_or_else(|_| "cargo".to_string())
+}
+
+fn run(command: &mut Command) -> bool {
+    match command.current_dir(root()).status() {
+        Ok(status) => status.success(),
+        Err(error) => {
+            eprintln!("{command:?}: {error}");
+            false
+        }
+    }
+}
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}

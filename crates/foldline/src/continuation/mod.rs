@@ -1,1 +1,76 @@
-//! To be written.
+//! How a curve is walked.
+//!
+//! **Idea.** Predict along the tangent, correct in the hyperplane across it, accept, look back at the step for special
+//! points, choose the next step. Nothing here knows what an equilibrium or a cycle is.
+//!
+//! | step | file |
+//! |---|---|
+//! | Newton's method in a hyperplane; tangent | [`corrector`] |
+//! | from one accepted point to the next; why a side ends | [`follow`] |
+//! | what lies between two accepted points | [`inspect`] |
+//! | zero of a monitor along the curve | [`locate`] |
+//!
+//! **Source.** keller1977 (pseudo-arclength); allgower1990 (step length by angle and contraction).
+
+pub mod corrector;
+pub mod follow;
+pub mod inspect;
+pub mod locate;
+
+pub use corrector::{Failure, Station};
+pub use follow::{Follow, Item, follow};
+
+/// Everything that governs a continuation run. The user states `tolerance`, the range and the limit on points; the rest
+/// follows from them and never needs touching.
+#[derive(Clone, Debug)]
+pub struct Settings {
+    /// Relative accuracy of the points.
+    pub tolerance: f64,
+    /// Smallest and largest value of the continuation parameter.
+    pub range: [f64; 2],
+    /// Limit on the points of one side.
+    pub max_points: usize,
+    /// Largest angle between the tangents of neighbouring points; a larger one rejects the step.
+    pub max_angle: f64,
+    /// Angle for which the step length aims.
+    pub target_angle: f64,
+    /// Largest step, in scaled arclength.
+    pub max_step: f64,
+    /// First step.
+    pub first_step: f64,
+    /// Step below which the side ends.
+    pub min_step: f64,
+    /// Growth of the period, against that at the start, at which the side ends as unbounded.
+    pub period_growth: f64,
+    /// Newton iterations before a step counts as failed.
+    pub max_newton: usize,
+    /// Coordinate reflections under which the model is equivariant, the identity first; see [`crate::diagram::Point::difference`].
+    pub reflections: Vec<Vec<bool>>,
+    /// `[n]` characteristic sizes of the states.
+    pub scales: Vec<f64>,
+}
+
+impl Settings {
+    /// Settings for a tolerance and a parameter range.
+    pub fn new(tolerance: f64, range: [f64; 2], scales: &[f64]) -> Settings {
+        Settings {
+            tolerance,
+            range,
+            max_points: 10_000,
+            max_angle: 0.45,
+            target_angle: 0.2,
+            max_step: 0.2,
+            first_step: 0.02,
+            min_step: 1e-9,
+            period_growth: 1e3,
+            max_newton: 8,
+            reflections: vec![vec![false; scales.len()]],
+            scales: scales.to_vec(),
+        }
+    }
+
+    /// Size of the last Newton update, relative: far enough below the tolerance that iteration errors do not show.
+    pub fn newton_tolerance(&self) -> f64 {
+        (1e-3 * self.tolerance).max(1e-11)
+    }
+}

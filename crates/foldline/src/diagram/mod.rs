@@ -96,6 +96,24 @@ impl Point {
         }
     }
 
+    /// Largest difference of period and ranges between two points, each relative to its scale (`scales` for the states;
+    /// outputs and period by their own size). `reflection[i]` says that the other point is seen with state i negated.
+    /// Infinite if one is an equilibrium and the other a cycle.
+    pub fn difference(&self, other: &Point, scales: &[f64], reflection: &[bool]) -> f64 {
+        let mut largest: f64 = match (self.solution.period(), other.solution.period()) {
+            (Some(a), Some(b)) => ((a - b) / a.abs().max(b.abs())).abs(),
+            (None, None) => 0.0,
+            _ => return f64::INFINITY,
+        };
+        for (i, (a, b)) in self.ranges.iter().zip(&other.ranges).enumerate() {
+            let b = if reflection.get(i).copied().unwrap_or(false) { [-b[1], -b[0]] } else { *b };
+            let size = a[0].abs().max(a[1].abs()).max(b[0].abs()).max(b[1].abs());
+            let scale = scales.get(i).copied().unwrap_or(f64::MIN_POSITIVE) + size;
+            largest = largest.max((a[0] - b[0]).abs() / scale).max((a[1] - b[1]).abs() / scale);
+        }
+        largest
+    }
+
     /// Component of the tangent along the continuation parameter.
     pub fn parameter_slope(&self) -> f64 {
         self.tangent.last().copied().unwrap_or(0.0)

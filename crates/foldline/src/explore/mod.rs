@@ -1,5 +1,56 @@
 //! From a plan to a diagram: follow → locate → switch → follow.
+//!
+//! **Idea.** A *family* is a branch of the plan with everything that grows from it: the branches that start at its end and
+//! those that are switched to at its special points. Families do not depend on each other, so they are followed in
+//! parallel, and the result is the same for any number of threads.
+//!
+//! | question | file |
+//! |---|---|
+//! | what is asked for? | [`plan`] |
+//! | which vector field, which scales, which symmetries? | [`system`] |
+//! | where do first solutions come from? | [`seeds`] |
+//! | how is one branch followed to both sides, or resumed? | [`growth`] |
+//! | what follows from a finished branch? | [`family`] |
+//! | how does one leave a special point on the other branch? | [`switch`] |
+//! | is this branch known already? | [`known`] |
 
+pub mod family;
+pub mod growth;
+pub mod known;
 pub mod plan;
+pub mod seeds;
+pub mod switch;
+pub mod system;
 
 pub use plan::{AttractorKey, BranchPlan, Plan, SeedPlan, SeedSource, Start, Switching};
+pub use seeds::attractors;
+pub use system::System;
+
+use crate::contract::Observer;
+use crate::diagram::{Branch, Diagram};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// Carries out a plan with that many threads. `earlier` is what an interrupted run of the same plan has already: finished
+/// sides are kept, unfinished ones are continued from their last point.
+pub fn run(system: &System, plan: &Plan, jobs: usize, earlier: Diagram, observer: &dyn Observer) -> Diagram {
+    let seeds = seeds::find(system, plan, jobs, &earlier, observer);
+    let families = family::roots(plan);
+    let next = AtomicUsize::new(0);
+    let done: Vec<Mutex<Vec<Branch>>> = families.iter().map(|_| Mutex::new(Vec::new())).collect();
+    std::thread::scope(|scope| {
+        for _ in 0..jobs.clamp(1, families.len().max(1)) {
+            scope.spawn(|| {
+                loop {
+                    let index = next.fetch_add(1, Ordering::Relaxed);
+                    let Some(&root) = families.get(index) else { break };
+                    let branches = family::grow(system, plan, root, &seeds, &earlier, observer);
+                    if let Ok(mut slot) = done[index].lock() {
+                        *slot = branches;
+                    }
+                }
+            });
+        }
+    });
+    Diagram { branches: done.into_iter().flat_map(|slot| slot.into_inner().unwrap_or_default()).collect() }
+}

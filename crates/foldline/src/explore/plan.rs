@@ -59,6 +59,11 @@ impl Switching {
     pub fn at(&self, kind: Kind) -> usize {
         self.depth.iter().find(|(k, _)| *k == kind).map_or(0, |(_, d)| *d)
     }
+
+    /// What remains for a branch that was reached by switching at a point of that kind.
+    pub fn below(&self, kind: Kind) -> Switching {
+        Switching { depth: self.depth.iter().map(|(k, d)| (*k, if *k == kind { d.saturating_sub(1) } else { *d })).collect() }
+    }
 }
 
 /// A branch to follow.

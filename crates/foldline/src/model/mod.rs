@@ -1,1 +1,204 @@
-//! To be written.
+//! How is a model written, evaluated, differentiated?
+//!
+//! **Idea.** A model is a set of expressions. They become a graph in which equal subexpressions are one node ([`graph`]),
+//! are differentiated on that graph to any order ([`derive`]), and become tapes ([`tape`]) that run over all lanes of a batch
+//! ([`run`]) about as fast as code written by hand, without a compiler.
+//!
+//! Text takes the way [`lexer`] → [`parser`] → [`compile`]; whatever is wrong with it comes back as a list of [`ModelError`],
+//! each with its place.
+
+mod compile;
+mod derive;
+mod error;
+mod function;
+mod graph;
+mod kernels;
+mod lexer;
+mod nearest;
+mod parser;
+mod run;
+mod source;
+mod tape;
+
+pub use error::{Field, Item, ModelError};
+pub use nearest::{nearest, suggest};
+pub use source::{Definition, ModelSource, Output, Parameter, State};
+
+use crate::contract::{Batch, VectorField};
+use compile::{Compiled, compile};
+use graph::Leaf;
+use std::collections::HashMap;
+use std::ops::Deref;
+use std::sync::{Arc, PoisonError, RwLock};
+use tape::Tape;
+
+/// A model: a vector field with names, units and outputs. Clones share everything.
+///
+/// ```
+/// use foldline::model::{Definition, Model, ModelSource, Parameter, State};
+/// let source = ModelSource {
+///     name: "van der Pol".into(),
+///     parameters: vec![Parameter::new("mu", 1.5)],
+///     states: vec![State::new("x"), State::new("y")],
+///     equations: vec![Definition::new("x", "y"), Definition::new("y", "mu*(1 - x^2)*y - x")],
+///     ..ModelSource::default()
+/// };
+/// let model = Model::compile(source)?;
+/// assert_eq!(model.parameters[0].value, 1.5);
+/// # Ok::<(), Vec<foldline::model::ModelError>>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Model {
+    inner: Arc<Inner>,
+}
+
+/// What a model is about; read through [`Model`].
+#[derive(Clone, Debug)]
+pub struct About {
+    /// Its name.
+    pub name: String,
+    /// What it describes.
+    pub description: String,
+    /// Where it comes from.
+    pub source: String,
+    /// States, numbered as in the vector field.
+    pub states: Vec<State>,
+    /// Parameters, numbered as in the vector field.
+    pub parameters: Vec<Parameter>,
+    /// Outputs, numbered as in the vector field.
+    pub outputs: Vec<Output>,
+    /// The two states u, v that form the complex signal u + j v.
+    pub whirl: Option<[usize; 2]>,
+}
+
+#[derive(Debug)]
+struct Inner {
+    about: About,
+    compiled: Compiled,
+    field: Tape,
+    outputs: Tape,
+    linear: RwLock<HashMap<Vec<usize>, Arc<Tape>>>,
+    directional: RwLock<HashMap<(usize, bool), Arc<Tape>>>,
+}
+
+impl Deref for Model {
+    type Target = About;
+
+    fn deref(&self) -> &About {
+        &self.inner.about
+    }
+}
+
+impl Model {
+    /// The model that `source` describes, or everything that is wrong with it.
+    pub fn compile(source: ModelSource) -> Result<Model, Vec<ModelError>> {
+        let compiled = compile(&source)?;
+        let field = Tape::new(&compiled.graph, &[&compiled.field]);
+        let outputs = Tape::new(&compiled.graph, &[&compiled.outputs]);
+        let ModelSource { name, description, source, parameters, states, outputs: output_list, .. } = source;
+        let whirl = compiled.whirl;
+        let about = About { name, description, source, states, parameters, outputs: output_list, whirl };
+        let (linear, directional) = (RwLock::default(), RwLock::default());
+        Ok(Model { inner: Arc::new(Inner { about, compiled, field, outputs, linear, directional }) })
+    }
+
+    /// Position of the parameter of that name.
+    pub fn parameter_index(&self, name: &str) -> Option<usize> {
+        self.parameters.iter().position(|p| p.name == name)
+    }
+
+    /// Position of the state of that name.
+    pub fn state_index(&self, name: &str) -> Option<usize> {
+        self.states.iter().position(|s| s.name == name)
+    }
+
+    /// Position of the output of that name.
+    pub fn output_index(&self, name: &str) -> Option<usize> {
+        self.outputs.iter().position(|o| o.name == name)
+    }
+
+    /// The value of every parameter.
+    pub fn defaults(&self) -> Vec<f64> {
+        self.parameters.iter().map(|p| p.value).collect()
+    }
+
+    /// Characteristic size of every state.
+    pub fn scales(&self) -> Vec<f64> {
+        self.states.iter().map(|s| s.scale).collect()
+    }
+
+    /// f, then fx row by row, then fp row by row, as [`VectorField::linearise`] orders them.
+    fn linear_tape(&self, free: &[usize]) -> Arc<Tape> {
+        let cached = self.inner.linear.read().unwrap_or_else(PoisonError::into_inner).get(free).cloned();
+        cached.unwrap_or_else(|| {
+            let Compiled { graph, field, .. } = &self.inner.compiled;
+            let mut graph = graph.clone();
+            let states = (0..self.states.len()).map(|j| Leaf::State(j as u32));
+            let parameters = free.iter().map(|&k| Leaf::Parameter(k as u32));
+            let mut column =
+                |moving: Leaf| graph.derivative(field, |graph, leaf| (leaf == moving).then(|| graph.constant(1.0)));
+            let fx: Vec<Vec<graph::Id>> = states.map(&mut column).collect();
+            let fp: Vec<Vec<graph::Id>> = parameters.map(&mut column).collect();
+            let rows = |columns: &[Vec<graph::Id>]| -> Vec<graph::Id> {
+                (0..field.len()).flat_map(|i| columns.iter().map(move |column| column[i])).collect()
+            };
+            let tape = Arc::new(Tape::new(&graph, &[field, &rows(&fx), &rows(&fp)]));
+            let mut cache = self.inner.linear.write().unwrap_or_else(PoisonError::into_inner);
+            cache.entry(free.to_vec()).or_insert(tape).clone()
+        })
+    }
+
+    /// The multilinear derivative of that order; without parameter parts of the directions where these are all zero.
+    fn directional_tape(&self, order: usize, with_parameters: bool) -> Arc<Tape> {
+        let key = (order, with_parameters);
+        let cached = self.inner.directional.read().unwrap_or_else(PoisonError::into_inner).get(&key).cloned();
+        cached.unwrap_or_else(|| {
+            let Compiled { graph, field, .. } = &self.inner.compiled;
+            let mut graph = graph.clone();
+            let states = self.states.len() as u32;
+            let mut derivative = field.clone();
+            for d in 0..order as u32 {
+                derivative = graph.derivative(&derivative, |graph, leaf| match leaf {
+                    Leaf::State(j) => Some(graph.leaf(Leaf::Direction(d, j))),
+                    Leaf::Parameter(k) if with_parameters => Some(graph.leaf(Leaf::Direction(d, states + k))),
+                    _ => None,
+                });
+            }
+            let tape = Arc::new(Tape::new(&graph, &[&derivative]));
+            let mut cache = self.inner.directional.write().unwrap_or_else(PoisonError::into_inner);
+            cache.entry(key).or_insert(tape).clone()
+        })
+    }
+}
+
+impl VectorField for Model {
+    fn dim(&self) -> usize {
+        self.states.len()
+    }
+
+    fn parameter_count(&self) -> usize {
+        self.parameters.len()
+    }
+
+    fn evaluate(&self, at: Batch, f: &mut [f64]) {
+        self.inner.field.run(at, &[], &mut [f]);
+    }
+
+    fn linearise(&self, at: Batch, free: &[usize], f: &mut [f64], fx: &mut [f64], fp: &mut [f64]) {
+        self.linear_tape(free).run(at, &[], &mut [f, fx, fp]);
+    }
+
+    fn directional(&self, at: Batch, directions: &[&[f64]], out: &mut [f64]) {
+        let states = self.dim() * at.lanes;
+        let with_parameters = directions.iter().any(|d| d[states..].iter().any(|&x| x != 0.0));
+        self.directional_tape(directions.len(), with_parameters).run(at, directions, &mut [out]);
+    }
+
+    fn output_count(&self) -> usize {
+        self.outputs.len()
+    }
+
+    fn outputs(&self, at: Batch, out: &mut [f64]) {
+        self.inner.outputs.run(at, &[], &mut [out]);
+    }
+}

@@ -64,7 +64,7 @@ impl Scheme {
 }
 
 /// Gauss–Legendre points and weights on [0, 1], by Newton's method on the Legendre recurrence.
-fn gauss_legendre(m: usize) -> (Vec<f64>, Vec<f64>) {
+pub(super) fn gauss_legendre(m: usize) -> (Vec<f64>, Vec<f64>) {
     let mut points = vec![0.0; m];
     let mut weights = vec![0.0; m];
     for i in 0..m {

@@ -1,0 +1,128 @@
+//! What can be typed.
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+use std::path::PathBuf;
+
+/// Numerical continuation and bifurcation analysis.
+///
+/// Without a command the reference study is run: the bouncing cycles of an overhung rotor.
+#[derive(Debug, Parser)]
+#[command(name = "foldline", version, after_help = EXIT_CODES, max_term_width = 110)]
+pub struct Arguments {
+    #[command(subcommand)]
+    pub command: Option<Command>,
+}
+
+const EXIT_CODES: &str = "Exit codes:
+  0  done
+  1  something outside failed, such as a full disk
+  2  a mistake in what was typed or in a file; the message says where, what and how to put it right
+  3  done, but some branch ended short of what was asked (or the run was stopped; `--resume` goes on)";
+
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Run a study and print its special points
+    #[command(after_help = EXIT_CODES)]
+    Run(Run),
+    /// Print what a run has found
+    Table(Table),
+    /// Draw the bifurcation diagram of a run
+    Plot(Plot),
+    /// Sample initial states of a model and list where they settle
+    Attractors(Attractors),
+    /// Say whether a model or study file is right, and if not where and why
+    Check(Check),
+}
+
+#[derive(Debug, Args)]
+pub struct Run {
+    /// Study file
+    #[arg(value_name = "STUDY.toml")]
+    pub study: PathBuf,
+    /// Folder for the run [default: runs/NAME OF THE STUDY]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// How many branches are followed at a time [default: number of processors]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub jobs: Option<u16>,
+    /// Go on with a run that was stopped or killed
+    #[arg(long)]
+    pub resume: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct Table {
+    /// Folder of the run
+    #[arg(value_name = "DIR")]
+    pub folder: PathBuf,
+    /// Special points (the default)
+    #[arg(long, group = "what")]
+    pub special: bool,
+    /// Every accepted point, with multipliers and accuracy
+    #[arg(long, group = "what")]
+    pub points: bool,
+    /// One line for each branch, with how it ended
+    #[arg(long, group = "what")]
+    pub branches: bool,
+    /// Only this branch
+    #[arg(long, value_name = "NAME")]
+    pub branch: Option<String>,
+    /// How the table is written
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    pub format: Format,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Format {
+    /// Aligned columns; parameters that do not change are left out
+    Text,
+    /// Comma-separated, every digit
+    Csv,
+    /// A list of objects, every digit
+    Json,
+}
+
+#[derive(Debug, Args)]
+pub struct Plot {
+    /// Folder of the run
+    #[arg(value_name = "DIR")]
+    pub folder: PathBuf,
+    /// Horizontal axis: a parameter, `period`, NAME_max or NAME_min of a state or output [default: the free parameter]
+    #[arg(long, value_name = "NAME")]
+    pub x: Option<String>,
+    /// Vertical axis [default: the largest value of the first output]
+    #[arg(long, value_name = "NAME")]
+    pub y: Option<String>,
+    /// Part of the diagram to show
+    #[arg(long, value_name = "x0,x1,y0,y1", allow_hyphen_values = true)]
+    pub window: Option<String>,
+    /// Title above the axes
+    #[arg(long, value_name = "TEXT")]
+    pub title: Option<String>,
+    /// Picture to write; the ending says which kind
+    #[arg(short, long = "output", value_name = "FILE.svg|png|pdf")]
+    pub output: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub struct Attractors {
+    /// Model file
+    #[arg(value_name = "MODEL.toml")]
+    pub model: PathBuf,
+    /// Change a parameter
+    #[arg(long = "set", value_name = "NAME=VALUE")]
+    pub set: Vec<String>,
+    /// How many initial states
+    #[arg(long, value_name = "N", default_value_t = 128, value_parser = clap::value_parser!(u32).range(1..))]
+    pub samples: u32,
+    /// Seed of the random numbers; the same seed gives the same table
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+}
+
+#[derive(Debug, Args)]
+pub struct Check {
+    /// Model or study file
+    #[arg(value_name = "FILE")]
+    pub file: PathBuf,
+}

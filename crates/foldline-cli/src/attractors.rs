@@ -1,0 +1,72 @@
+//! `foldline attractors`: where sampled initial states settle.
+
+use crate::arguments::Attractors as Typed;
+use crate::failure::{Failure, Outcome};
+use crate::run::processors;
+use crate::system::system;
+use foldline::attractors::Attractor;
+use foldline::diagram::Solution;
+use foldline::explore::attractors;
+use foldline::model::Model;
+use foldline_store::finite::never_finite;
+use foldline_store::model_file::read_model;
+use foldline_store::nearest::suggest;
+use std::io::{Write, stdout};
+
+const TOLERANCE: f64 = 1e-6;
+
+/// Prints the attractors of a model and how often each was reached.
+pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
+    let (model, text) = read_model(&typed.model)?;
+    let mut parameters: Vec<f64> = model.parameters.iter().map(|p| p.value).collect();
+    typed.set.iter().try_for_each(|assignment| assign(assignment, &model, &mut parameters))?;
+    if let Some(found) = never_finite(&model, &parameters, &text, &typed.model.display().to_string()) {
+        return Err(vec![found].into());
+    }
+    let census = attractors(&system(&model, &parameters), &parameters, typed.samples as usize, typed.seed, processors(), TOLERANCE);
+
+    let mut out = stdout().lock();
+    let names = model.states.iter().map(|s| &s.name).chain(model.outputs.iter().map(|o| &o.name));
+    let heads: String = names.map(|name| format!("  {:>24}", format!("{name} from … to"))).collect();
+    writeln!(out, "{:<12} {:>6} {:>6} {:>14}{heads}", "attractor", "ratio", "hits", "period")?;
+    for attractor in &census.attractors {
+        writeln!(out, "{}", line(attractor))?;
+    }
+    let samples = typed.samples;
+    writeln!(out, "{samples} samples, {} escaped, {} not settled", census.escaped, census.unsettled)?;
+    Ok(Outcome::Done)
+}
+
+fn line(attractor: &Attractor) -> String {
+    let point = &attractor.point;
+    let (kind, period) = match &point.solution {
+        Solution::Equilibrium(_) => ("equilibrium", "·".to_string()),
+        Solution::Cycle(cycle) => ("cycle", format!("{:.9}", cycle.period)),
+    };
+    let ratio = attractor.ratio.map_or("·".to_string(), |(a, b)| format!("{a}:{b}"));
+    let range = |r: &[f64; 2]| match r[0] == r[1] {
+        true => format!("{:.6}", r[0]),
+        false => format!("{:.6} … {:.6}", r[0], r[1]),
+    };
+    let ranges: String = point.ranges.iter().map(|r| format!("  {:>24}", range(r))).collect();
+    format!("{kind:<12} {ratio:>6} {:>6} {period:>14}{ranges}", attractor.hits)
+}
+
+/// Carries out `NAME=VALUE`.
+fn assign(assignment: &str, model: &Model, parameters: &mut [f64]) -> Result<(), Failure> {
+    let said = |message: String, cure: &str| Failure::typed(format!("--set {assignment}: {message}"), cure);
+    let Some((name, value)) = assignment.split_once('=') else {
+        return Err(said("there is no `=`".into(), "write --set NAME=VALUE, for example --set Omega=5"));
+    };
+    let (name, value) = (name.trim(), value.trim());
+    let Some(index) = model.parameter_index(name) else {
+        let known: Vec<&str> = model.parameters.iter().map(|p| p.name.as_str()).collect();
+        let message = format!("the model `{}` has no parameter `{name}`", model.name);
+        return Err(said(message, &suggest(name, &known)));
+    };
+    match value.parse::<f64>() {
+        Ok(number) if number.is_finite() => parameters[index] = number,
+        _ => return Err(said(format!("`{value}` is not a finite number"), "a number such as 5, 0.25 or 1e-6")),
+    }
+    Ok(())
+}

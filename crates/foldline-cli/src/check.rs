@@ -1,0 +1,43 @@
+//! `foldline check`: is a model or study right?
+
+use crate::arguments::Check as Typed;
+use crate::failure::{Failure, Outcome};
+use foldline::model::Model;
+use foldline_store::finite::never_finite;
+use foldline_store::model_file::read_model;
+use foldline_store::study_file::{is_study, read_study};
+use std::io::{Write, stdout};
+
+/// Says that a file is right, or fails with everything that is wrong with it.
+pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
+    let file = &typed.file;
+    // A file that cannot be read is answered by the reader of models, which says why.
+    let text = std::fs::read_to_string(file).unwrap_or_default();
+    let verdict = if is_study(&text) {
+        let study = read_study(file)?;
+        let (seeds, branches) = (study.plan.seeds.len(), study.plan.branches.len());
+        format!("a study of {} with {}, {}", study.model.name, many(seeds, "seed"), many(branches, "branch"))
+    } else {
+        let (model, text) = read_model(file)?;
+        let parameters: Vec<f64> = model.parameters.iter().map(|p| p.value).collect();
+        if let Some(found) = never_finite(&model, &parameters, &text, &file.display().to_string()) {
+            return Err(vec![found].into());
+        }
+        described(&model)
+    };
+    writeln!(stdout(), "{} is right: {verdict}", file.display())?;
+    Ok(Outcome::Done)
+}
+
+fn described(model: &Model) -> String {
+    let (states, parameters) = (many(model.states.len(), "state"), many(model.parameters.len(), "parameter"));
+    format!("the model {} with {states}, {parameters}, {}", model.name, many(model.outputs.len(), "output"))
+}
+
+fn many(count: usize, noun: &str) -> String {
+    match (count, noun.ends_with('h')) {
+        (1, _) => format!("1 {noun}"),
+        (_, true) => format!("{count} {noun}es"),
+        (_, false) => format!("{count} {noun}s"),
+    }
+}

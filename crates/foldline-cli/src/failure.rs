@@ -1,0 +1,76 @@
+//! How a command can end.
+
+use foldline_store::diagnostic::Diagnostic;
+use foldline_store::run_file::RunFileError;
+use std::fmt::Display;
+use std::io::{ErrorKind, Write};
+use std::process::ExitCode;
+
+/// A command that did what was asked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// All of it.
+    Done,
+    /// Except that some branch ended short.
+    Short,
+}
+
+/// A command that could not.
+#[derive(Debug)]
+pub enum Failure {
+    /// Mistakes in files, each with its place.
+    Files(Vec<Diagnostic>),
+    /// A mistake in what was typed, or in the state of a folder; the message says the cure.
+    Typed(String),
+    /// Something outside failed.
+    Outside(String),
+    /// The reader of the output has gone.
+    NoReader,
+}
+
+impl Failure {
+    /// A mistake, and what would be right.
+    pub fn typed(message: impl Display, cure: impl Display) -> Failure {
+        Failure::Typed(format!("{message}\n  help: {cure}"))
+    }
+
+    /// Says what is wrong on standard error.
+    pub fn report(self) -> ExitCode {
+        let (text, code) = match self {
+            Failure::Files(found) => {
+                let texts: Vec<String> = found.iter().map(|d| d.to_string().trim_end().to_string()).collect();
+                (texts.join("\n\n"), 2)
+            }
+            Failure::Typed(message) => (format!("error: {message}"), 2),
+            Failure::Outside(message) => (format!("error: {message}"), 1),
+            Failure::NoReader => return ExitCode::SUCCESS,
+        };
+        // If standard error is gone too, the exit code alone has to say it.
+        let _ = writeln!(std::io::stderr(), "{text}");
+        ExitCode::from(code)
+    }
+}
+
+impl From<Vec<Diagnostic>> for Failure {
+    fn from(found: Vec<Diagnostic>) -> Failure {
+        Failure::Files(found)
+    }
+}
+
+impl From<RunFileError> for Failure {
+    fn from(error: RunFileError) -> Failure {
+        match error {
+            RunFileError::Database(..) => Failure::Outside(error.to_string()),
+            _ => Failure::Typed(error.to_string()),
+        }
+    }
+}
+
+impl From<std::io::Error> for Failure {
+    fn from(error: std::io::Error) -> Failure {
+        match error.kind() {
+            ErrorKind::BrokenPipe => Failure::NoReader,
+            _ => Failure::Outside(format!("the output cannot be written: {error}")),
+        }
+    }
+}

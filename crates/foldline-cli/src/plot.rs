@@ -1,0 +1,70 @@
+//! `foldline plot`: the diagram of a run as a picture.
+
+use crate::arguments::Plot as Typed;
+use crate::failure::{Failure, Outcome};
+use crate::table::read;
+use foldline::diagram::Diagram;
+use foldline::model::Model;
+use foldline_plot::{Picture, Quantity, pdf, png, svg};
+use std::path::Path;
+
+/// Pixels for each unit of the SVG.
+const SCALE: f32 = 2.0;
+
+/// Writes a picture of a run.
+pub fn write(typed: &Typed) -> Result<Outcome, Failure> {
+    let (model, diagram) = read(&typed.folder)?;
+    let axis = |option: &str, name: &Option<String>| {
+        let quantity = name.as_ref().map(|name| {
+            let unknown = |choices| Failure::typed(format!("--{option}: there is no quantity \"{name}\""), choices);
+            Quantity::named(name, &model).map_err(unknown)
+        });
+        quantity.transpose()
+    };
+    let picture = Picture {
+        x: axis("x", &typed.x)?,
+        y: axis("y", &typed.y)?,
+        window: typed.window.as_deref().map(window).transpose()?,
+        title: typed.title.clone(),
+        ..Picture::default()
+    };
+    draw(&diagram, &model, &picture, &typed.output)?;
+    Ok(Outcome::Done)
+}
+
+/// Writes a picture; the ending of the file says which kind.
+pub fn draw(diagram: &Diagram, model: &Model, picture: &Picture, output: &Path) -> Result<(), Failure> {
+    let render =
+        |result: Result<Vec<u8>, foldline_plot::RenderError>| result.map_err(|e| Failure::Outside(e.to_string()));
+    let drawn = || svg(diagram, model, picture);
+    let ending = output.extension().and_then(|e| e.to_str()).unwrap_or("").to_lowercase();
+    let bytes = match ending.as_str() {
+        "svg" => drawn().into_bytes(),
+        "png" => render(png(&drawn(), SCALE))?,
+        "pdf" => render(pdf(&drawn()))?,
+        _ => {
+            let message = format!("{}: this kind of picture is not known", output.display());
+            return Err(Failure::typed(message, "a file name that ends in .svg, .png or .pdf"));
+        }
+    };
+    std::fs::write(output, bytes).map_err(|error| {
+        Failure::typed(
+            format!("{} cannot be written: {error}", output.display()),
+            "a file in a folder you may write to",
+        )
+    })
+}
+
+fn window(text: &str) -> Result<[f64; 4], Failure> {
+    let cure = "four numbers such as --window 0.5,12,0,10: x from 0.5 to 12, y from 0 to 10";
+    let numbers: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse::<f64>()).collect();
+    match numbers.as_deref() {
+        Ok([x0, x1, y0, y1]) if [x0, x1, y0, y1].iter().all(|v| v.is_finite()) => {
+            if x0 >= x1 || y0 >= y1 {
+                return Err(Failure::typed(format!("--window {text}: the wrong way round, or empty"), cure));
+            }
+            Ok([*x0, *x1, *y0, *y1])
+        }
+        _ => Err(Failure::typed(format!("--window {text}: this is not a window"), cure)),
+    }
+}

@@ -1,0 +1,102 @@
+//! What is seen while a run goes on.
+
+use foldline::contract::Event;
+use foldline::diagram::{Branch, Ending, Point};
+use foldline::model::Model;
+use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::collections::HashMap;
+use std::io::{IsTerminal, Write, stderr};
+use std::sync::{Mutex, PoisonError};
+
+/// One living line for each branch that is being followed; where there is no terminal, one line for each that is done.
+pub struct Progress {
+    lines: MultiProgress,
+    terminal: bool,
+    parameters: Vec<String>,
+    live: Mutex<HashMap<String, Live>>,
+}
+
+struct Live {
+    bar: ProgressBar,
+    points: usize,
+    special: usize,
+    ends: Vec<Ending>,
+}
+
+impl Progress {
+    pub fn new(model: &Model) -> Progress {
+        let terminal = stderr().is_terminal();
+        let target = if terminal { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+        Progress {
+            lines: MultiProgress::with_draw_target(target),
+            terminal,
+            parameters: model.parameters.iter().map(|p| p.name.clone()).collect(),
+            live: Mutex::new(HashMap::new()),
+        }
+    }
+
+    pub fn show(&self, event: Event) {
+        match event {
+            Event::Begin(branch) => self.begin(branch),
+            Event::Point(branch, point) => self.with(branch, |live| {
+                live.points += 1;
+                live.bar.set_message(self.place(branch, point, live));
+                live.bar.tick();
+            }),
+            Event::Special(branch, _) => self.with(branch, |live| live.special += 1),
+            Event::SideEnded(branch, _, ending) => self.with(branch, |live| live.ends.push(ending.clone())),
+            Event::End(branch) => self.end(branch),
+            Event::Note(branch, note) => self.say(&format!("{branch}: {note}")),
+        }
+    }
+
+    fn begin(&self, branch: &Branch) {
+        let bar = self.lines.add(ProgressBar::new_spinner());
+        if let Ok(style) = ProgressStyle::with_template("{spinner} {prefix:28!} {wide_msg}") {
+            bar.set_style(style);
+        }
+        bar.set_prefix(branch.name.clone());
+        let live = Live { bar, points: branch.points.len(), special: branch.special.len(), ends: Vec::new() };
+        self.live.lock().unwrap_or_else(PoisonError::into_inner).insert(branch.name.clone(), live);
+    }
+
+    fn with(&self, branch: &Branch, change: impl FnOnce(&mut Live)) {
+        if let Some(live) = self.live.lock().unwrap_or_else(PoisonError::into_inner).get_mut(&branch.name) {
+            change(live);
+        }
+    }
+
+    fn place(&self, branch: &Branch, point: &Point, live: &Live) -> String {
+        let name = self.parameters.get(branch.free).map_or("", String::as_str);
+        let value = point.parameters.get(branch.free).copied().unwrap_or(f64::NAN);
+        let special = if live.special > 0 { format!(", {} special", live.special) } else { String::new() };
+        format!("{:>5} points{special}   {name} = {value:<10.6} step {:.1e}", live.points, point.step)
+    }
+
+    fn end(&self, branch: &Branch) {
+        let live = self.live.lock().unwrap_or_else(PoisonError::into_inner).remove(&branch.name);
+        let Some(live) = live else { return };
+        live.bar.finish_and_clear();
+        let mut ends: Vec<String> = live.ends.iter().map(Ending::to_string).collect();
+        ends.dedup();
+        self.say(&format!(
+            "{:<28} {:>5} points, {} special: {}",
+            branch.name,
+            live.points,
+            live.special,
+            ends.join("; ")
+        ));
+    }
+
+    /// Takes the living lines away.
+    pub fn finish(&self) {
+        let mut live = self.live.lock().unwrap_or_else(PoisonError::into_inner);
+        live.drain().for_each(|(_, line)| line.bar.finish_and_clear());
+    }
+
+    /// A line that stays.
+    fn say(&self, line: &str) {
+        // Progress that cannot be shown is no reason to stop computing.
+        let _ = if self.terminal { self.lines.println(line) } else { writeln!(stderr(), "{line}") };
+    }
+}

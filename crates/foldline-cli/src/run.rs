@@ -1,0 +1,126 @@
+//! `foldline run`: a study from its file to its table.
+
+use crate::arguments::Run as Typed;
+use crate::failure::{Failure, Outcome};
+use crate::order::ordered;
+use crate::plot::draw;
+use crate::progress::Progress;
+use crate::system::system;
+use crate::table::print_special;
+use foldline::contract::{Event, Observer, Verdict};
+use foldline::diagram::Diagram;
+use foldline::explore;
+use foldline_plot::Picture;
+use foldline_store::run_file::Recorder;
+use foldline_store::study_file::{Study, parse_study, read_study};
+use std::io::{Write, stderr};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+const STUDY: &str = include_str!("../../../studies/overhung-rotor/bouncing.toml");
+const MODEL: &str = include_str!("../../../models/overhung-rotor.toml");
+
+/// Runs a study file.
+pub fn study(typed: &Typed) -> Result<Outcome, Failure> {
+    let study = read_study(&typed.study)?;
+    let folder = typed.out.clone().unwrap_or_else(|| {
+        let stem = typed.study.file_stem().unwrap_or("study".as_ref());
+        PathBuf::from("runs").join(stem)
+    });
+    let jobs = typed.jobs.map_or_else(processors, usize::from);
+    let (recorder, earlier) = match typed.resume {
+        true => Recorder::resume(&folder, &study)?,
+        false => (Recorder::create(&folder, &study)?, Diagram::default()),
+    };
+    run(&study, jobs, recorder, earlier, &folder).map(|(_, outcome)| outcome)
+}
+
+/// Runs the study that is built in, over an earlier run of it, and draws it.
+pub fn reference_study() -> Result<Outcome, Failure> {
+    let folder = Path::new("runs").join("bouncing");
+    let study = parse_study(STUDY, "overhung-rotor/bouncing.toml", MODEL, "overhung-rotor.toml")?;
+    Recorder::discard(&folder)?;
+    let recorder = Recorder::create(&folder, &study)?;
+    let (diagram, outcome) = run(&study, processors(), recorder, Diagram::default(), &folder)?;
+    for name in ["diagram.svg", "diagram.png"] {
+        let file = folder.join(name);
+        draw(&diagram, &study.model, &Picture::default(), &file)?;
+        writeln!(stderr(), "picture: {}", file.display())?;
+    }
+    Ok(outcome)
+}
+
+/// As many branches at a time as there are processors.
+pub fn processors() -> usize {
+    std::thread::available_parallelism().map_or(1, |n| n.get())
+}
+
+fn run(
+    study: &Study,
+    jobs: usize,
+    recorder: Recorder,
+    earlier: Diagram,
+    folder: &Path,
+) -> Result<(Diagram, Outcome), Failure> {
+    let watch = Watch { recorder, progress: Progress::new(&study.model), stop: stop_on_interrupt() };
+    let parameters: Vec<f64> = study.model.parameters.iter().map(|p| p.value).collect();
+    let diagram = explore::run(&system(&study.model, &parameters), &study.plan, jobs, earlier, &watch);
+    watch.progress.finish();
+    watch.recorder.finish()?;
+
+    let names: Vec<&str> = study.plan.branches.iter().map(|b| b.name.as_str()).collect();
+    let diagram = ordered(diagram, &names);
+    print_special(&diagram, &study.model)?;
+    let short = fell_short(&diagram, &names);
+    let mut err = stderr().lock();
+    short.iter().try_for_each(|line| writeln!(err, "ended short: {line}"))?;
+    if watch.stop.load(Ordering::Relaxed) {
+        writeln!(err, "stopped; go on with --resume --out {}", folder.display())?;
+    }
+    writeln!(err, "run: {}", folder.display())?;
+    Ok((diagram, if short.is_empty() { Outcome::Done } else { Outcome::Short }))
+}
+
+/// What of the study was not reached, a line each.
+fn fell_short(diagram: &Diagram, asked: &[&str]) -> Vec<String> {
+    let absent =
+        asked.iter().filter(|name| diagram.branch(name).is_none()).map(|name| format!("{name}: it never began"));
+    let ended = diagram.branches.iter().flat_map(|branch| {
+        let short = branch.ends.iter().flatten().filter(|end| !end.complete());
+        let unfinished =
+            branch.ends.iter().all(Option::is_none).then(|| format!("{}: it is not finished", branch.name));
+        short.map(|end| format!("{}: {end}", branch.name)).chain(unfinished).collect::<Vec<_>>()
+    });
+    absent.chain(ended).collect()
+}
+
+/// Records, shows, and stops when asked to.
+struct Watch {
+    recorder: Recorder,
+    progress: Progress,
+    stop: Arc<AtomicBool>,
+}
+
+impl Observer for Watch {
+    fn observe(&self, event: Event) -> Verdict {
+        let verdict = self.recorder.observe(event);
+        self.progress.show(event);
+        if self.stop.load(Ordering::Relaxed) { Verdict::Stop } else { verdict }
+    }
+}
+
+/// Set by the first Ctrl-C, after which every branch ends at its next point; the second ends the program, which loses
+/// nothing that was accepted.
+fn stop_on_interrupt() -> Arc<AtomicBool> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let asked = Arc::clone(&stop);
+    let handler = move || {
+        if asked.swap(true, Ordering::Relaxed) {
+            std::process::exit(130);
+        }
+    };
+    // Without a handler Ctrl-C ends the program at once, and --resume goes on all the same.
+    let _ = ctrlc::set_handler(handler);
+    stop
+}

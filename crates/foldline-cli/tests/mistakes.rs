@@ -1,0 +1,311 @@
+//! Every mistake of the input is answered with its place, what is wrong and what would be right, and exit code 2.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+const MODEL: &str = r#"name = "pendulum"
+description = "A driven pendulum in a rotating frame"
+
+[parameters]
+mu = 0.5
+kappa = { value = 1.0, description = "stiffness" }
+
+[states.x]
+equation = "y"
+range = [-2, 2]
+
+[states.y]
+equation = "mu*x - kappa*x^3 - y"
+range = [-2, 2]
+
+[outputs]
+r = "hypot(x, y)"
+"#;
+
+const STUDY: &str = r#"model = "pendulum.toml"
+tolerance = 1e-6
+
+[[seed]]
+name = "rest"
+state = { x = 0.7, y = 0 }
+
+[[branch]]
+name = "main"
+from = "rest"
+free = "mu"
+range = [-1, 2]
+"#;
+
+struct Desk {
+    folder: tempfile::TempDir,
+}
+
+impl Desk {
+    /// A folder with a model and a study in which nothing is wrong.
+    fn new() -> Desk {
+        let desk = Desk { folder: tempfile::tempdir().unwrap() };
+        desk.write("pendulum.toml", MODEL);
+        desk.write("study.toml", STUDY);
+        desk
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn write(&self, name: &str, text: &str) {
+        std::fs::write(self.path(name), text).unwrap();
+    }
+
+    fn foldline(&self, arguments: &[&str]) -> Output {
+        Command::new(env!("CARGO_BIN_EXE_foldline")).args(arguments).current_dir(self.folder.path()).output().unwrap()
+    }
+
+    /// The message of a command that must fail with exit code 2.
+    fn refused(&self, arguments: &[&str]) -> String {
+        let output = self.foldline(arguments);
+        let message = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{arguments:?}: {message}");
+        assert!(!message.contains("panicked"), "{message}");
+        message
+    }
+
+    /// As above, for the study with one piece of it replaced.
+    fn study(&self, piece: &str, by: &str) -> String {
+        self.refuse_changed("study.toml", STUDY, piece, by)
+    }
+
+    /// As above, for the model.
+    fn model(&self, piece: &str, by: &str) -> String {
+        self.refuse_changed("pendulum.toml", MODEL, piece, by)
+    }
+
+    fn refuse_changed(&self, file: &str, text: &str, piece: &str, by: &str) -> String {
+        assert_eq!(text.matches(piece).count(), 1, "{piece:?} must stand once in {file}");
+        self.write(file, &text.replace(piece, by));
+        let checked = self.refused(&["check", file]);
+        let run = self.refused(&["run", "study.toml"]);
+        assert!(!self.path("runs").exists(), "nothing is written before the input is right");
+        self.write(file, text);
+        assert!(run.contains(first_line(&checked)), "run says the same as check:\n{run}\n{checked}");
+        checked
+    }
+}
+
+fn first_line(message: &str) -> &str {
+    message.lines().next().unwrap_or("")
+}
+
+/// Asserts that a message contains all of the given pieces.
+#[track_caller]
+fn says(message: &str, pieces: &[&str]) {
+    for piece in pieces {
+        assert!(message.contains(piece), "\"{piece}\" is missing in:\n{message}");
+    }
+}
+
+#[test]
+fn the_files_that_the_others_spoil_are_right() {
+    let desk = Desk::new();
+    for file in ["pendulum.toml", "study.toml"] {
+        let output = desk.foldline(&["check", file]);
+        assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+        says(&String::from_utf8_lossy(&output.stdout), &[file, "is right", "pendulum"]);
+    }
+}
+
+#[test]
+fn unknown_parameter() {
+    let desk = Desk::new();
+    says(&desk.study("free = \"mu\"", "free = \"nu\""), &["study.toml:11:8", "no parameter `nu`", "did you mean `mu`"]);
+    let overrides = desk.study("tolerance = 1e-6", "parameters = { kapa = 3 }");
+    says(&overrides, &["study.toml:2:16", "no parameter `kapa`", "did you mean `kappa`"]);
+}
+
+#[test]
+fn range_the_wrong_way_round() {
+    let message = Desk::new().study("[-1, 2]", "[2, -1]");
+    says(&message, &["study.toml:12:9", "wrong way round", "write [-1, 2]"]);
+}
+
+#[test]
+fn range_that_does_not_contain_the_start() {
+    let message = Desk::new().study("[-1, 2]", "[1, 2]");
+    says(&message, &["study.toml:12:9", "starts at mu = 0.5, outside its range", "a range that contains 0.5"]);
+}
+
+#[test]
+fn unknown_origin_and_an_origin_further_down() {
+    let desk = Desk::new();
+    says(
+        &desk.study("\"rest\"\nfree", "\"test\"\nfree"),
+        &["study.toml:10:8", "no seed or branch \"test\"", "did you mean `rest`"],
+    );
+    let above = "[[branch]]\nname = \"early\"\nfrom = \"main\"\nfree = \"kappa\"\nrange = [0, 2]\n";
+    let message = desk.study("[[branch]]\n", &format!("{above}[[branch]]\n"));
+    says(&message, &["study.toml:10:8", "\"main\" is not known yet", "written above it"]);
+    let own = desk.study("\"rest\"\nfree", "\"main\"\nfree");
+    says(&own, &["\"main\" is not known yet", "written above it"]);
+}
+
+#[test]
+fn names_used_twice() {
+    let message = Desk::new().study("name = \"main\"", "name = \"rest\"");
+    says(&message, &["study.toml:9:8", "\"rest\" is used twice", "a name of its own"]);
+}
+
+#[test]
+fn tolerance_out_of_bounds_or_no_number() {
+    let desk = Desk::new();
+    says(&desk.study("1e-6", "0.5"), &["study.toml:2:13", "5e-1 is out of bounds", "from 1e-12 to 1e-2"]);
+    says(&desk.study("1e-6", "\"small\""), &["study.toml:2:13", "not a number", "write a number"]);
+    says(&desk.study("1e-6", "nan"), &["study.toml:2:13", "not a finite number"]);
+}
+
+#[test]
+fn keys_and_kinds_that_do_not_exist() {
+    let desk = Desk::new();
+    says(
+        &desk.study("tolerance =", "tolerence ="),
+        &["study.toml:2:1", "unknown key `tolerence`", "did you mean `tolerance`"],
+    );
+    let switch = desk.study("range = [-1, 2]", "range = [-1, 2]\nswitch = { period-dubling = 2 }");
+    says(&switch, &["study.toml:13:12", "\"period-dubling\"", "did you mean `period-doubling`"]);
+    let fold = desk.study("range = [-1, 2]", "range = [-1, 2]\nswitch = { fold = 1 }");
+    says(&fold, &["no branch of equilibria or cycles begins at a fold", "hopf"]);
+}
+
+#[test]
+fn seeds_that_say_too_little_or_too_much() {
+    let desk = Desk::new();
+    says(&desk.study("state = { x = 0.7, y = 0 }", ""), &["study.toml:4:1", "which solution it means", "attractor = "]);
+    says(&desk.study(", y = 0 }", " }"), &["study.toml:6:9", "lacks y", "x, y"]);
+    says(&desk.study("y = 0 }", "y = 0, z = 1 }"), &["study.toml:6:27", "no state `z`"]);
+    says(
+        &desk.study("state = {", "attractor = \"2:1\"\nstate = {"),
+        &["both an `attractor` and a `state`", "keep one"],
+    );
+    says(&desk.study("state = { x = 0.7, y = 0 }", "attractor = \"2;1\""), &["study.toml:6:13", "\"2:1\""]);
+    says(&desk.study("state = { x = 0.7, y = 0 }", "attractor = \"2:1\""), &["does not name", "whirl ="]);
+}
+
+#[test]
+fn several_mistakes_are_said_at_once() {
+    let desk = Desk::new();
+    desk.write("study.toml", &STUDY.replace("1e-6", "1").replace("[-1, 2]", "[2, -1]").replace("\"mu\"", "\"nu\""));
+    let message = desk.refused(&["check", "study.toml"]);
+    says(&message, &["out of bounds", "wrong way round", "no parameter `nu`"]);
+}
+
+#[test]
+fn files_that_are_not_there_or_not_toml() {
+    let desk = Desk::new();
+    says(&desk.refused(&["run", "nowhere.toml"]), &["nowhere.toml", "cannot be read", "path"]);
+    says(&desk.refused(&["check", "nowhere.toml"]), &["nowhere.toml", "cannot be read"]);
+    says(&desk.refused(&["attractors", "nowhere.toml"]), &["nowhere.toml", "cannot be read"]);
+    says(
+        &desk.study("\"pendulum.toml\"", "\"pendel.toml\""),
+        &["study.toml:1:9", "pendel.toml", "relative to the folder"],
+    );
+    says(&desk.study("[-1, 2]", "[-1, 2"), &["study.toml:12:"]);
+    desk.write("bytes.toml", "");
+    std::fs::write(desk.path("bytes.toml"), [0xff, 0xfe, 0x00]).unwrap();
+    says(&desk.refused(&["run", "bytes.toml"]), &["bytes.toml", "UTF-8"]);
+}
+
+#[test]
+fn models_with_mistakes_are_refused_at_the_place_in_the_model() {
+    let desk = Desk::new();
+    let at = "pendulum.toml:14:";
+    says(&desk.model("mu*x", "nu*x"), &[at, "nu", "mu"]);
+    says(&desk.model("mu*x", "hypott(x, y)"), &[at, "hypott", "hypot"]);
+    says(&desk.model("kappa*x^3 - y", "kappa*(x^3 - y"), &[at, "("]);
+    says(&desk.model("[states.y]", "[states.z]"), &["pendulum.toml", "y"]);
+}
+
+#[test]
+fn a_model_that_is_not_a_number_at_the_start() {
+    let desk = Desk::new();
+    desk.write("pendulum.toml", &MODEL.replace("mu*x - kappa*x^3 - y", "log(-1 - x^2)"));
+    let pieces = ["pendulum.toml:14:12", "`y` is not finite at x = ", "mu = 0.5", "log or sqrt"];
+    says(&desk.refused(&["check", "pendulum.toml"]), &pieces);
+    says(&desk.refused(&["attractors", "pendulum.toml"]), &pieces);
+    says(&desk.refused(&["run", "study.toml"]), &["study.toml:4:1", "\"rest\" cannot start", "pendulum.toml:14:12"]);
+}
+
+#[test]
+fn a_state_at_which_the_model_is_not_a_number() {
+    let desk = Desk::new();
+    desk.write("pendulum.toml", &MODEL.replace("mu*x - kappa*x^3 - y", "sqrt(1 - x) - y"));
+    desk.write("study.toml", &STUDY.replace("x = 0.7", "x = 1.5"));
+    let message = desk.refused(&["run", "study.toml"]);
+    says(&message, &["study.toml:4:1", "\"rest\" cannot start", "x = 1.5", "pendulum.toml:14:12"]);
+}
+
+#[test]
+fn a_folder_that_cannot_be_written_to() {
+    let desk = Desk::new();
+    desk.write("occupied", "a file, not a folder");
+    for out in ["occupied", "occupied/below"] {
+        says(&desk.refused(&["run", "study.toml", "--out", out]), &["occupied", "--out DIR"]);
+    }
+}
+
+#[test]
+fn a_folder_with_a_run_in_it_is_not_overwritten() {
+    let desk = Desk::new();
+    std::fs::create_dir(desk.path("run")).unwrap();
+    desk.write("run/run.sqlite", "precious");
+    says(
+        &desk.refused(&["run", "study.toml", "--out", "run"]),
+        &["run.sqlite exists already", "--resume", "--out DIR"],
+    );
+    says(&desk.refused(&["run", "study.toml", "--out", "run", "--resume"]), &["not a run file"]);
+    assert_eq!(std::fs::read_to_string(desk.path("run/run.sqlite")).unwrap(), "precious");
+}
+
+#[test]
+fn tables_and_plots_of_what_is_not_there() {
+    let desk = Desk::new();
+    says(&desk.refused(&["table", "nowhere"]), &["there is no run file nowhere/run.sqlite", "foldline run"]);
+    says(&desk.refused(&["plot", "nowhere", "-o", "a.svg"]), &["there is no run file"]);
+}
+
+#[test]
+fn settings_of_attractors() {
+    let desk = Desk::new();
+    let set = |assignment: &str| desk.refused(&["attractors", "pendulum.toml", "--set", assignment]);
+    says(&set("kapa=1"), &["--set kapa=1", "no parameter `kapa`", "did you mean `kappa`"]);
+    says(&set("kappa"), &["--set kappa", "no `=`", "NAME=VALUE"]);
+    says(&set("kappa=much"), &["`much` is not a finite number", "a number such as"]);
+    desk.refused(&["attractors", "pendulum.toml", "--samples", "0"]);
+}
+
+#[test]
+fn words_that_are_not_commands() {
+    let desk = Desk::new();
+    says(&desk.refused(&["rum", "study.toml"]), &["run"]);
+    desk.refused(&["run"]);
+    desk.refused(&["table", "x", "--format", "yaml"]);
+    desk.refused(&["table", "x", "--points", "--branches"]);
+}
+
+#[test]
+fn help_says_the_exit_codes() {
+    let output = Desk::new().foldline(&["--help"]);
+    assert_eq!(output.status.code(), Some(0));
+    says(
+        &String::from_utf8_lossy(&output.stdout),
+        &["Exit codes", "2  a mistake", "3  done, but some branch ended short"],
+    );
+}
+
+#[test]
+fn the_studies_of_this_repository_are_right() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    for study in ["bouncing", "homotopy"] {
+        let file = root.join(format!("studies/overhung-rotor/{study}.toml"));
+        let output = Desk::new().foldline(&["check", &file.display().to_string()]);
+        assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    }
+}

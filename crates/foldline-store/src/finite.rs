@@ -1,0 +1,95 @@
+//! A model that is not finite where it is to start is a mistake of the input, said before any computation.
+
+use crate::diagnostic::Diagnostic;
+use crate::toml_walk::{Walk, diagnose};
+use foldline::contract::{Batch, Parameters, VectorField};
+use foldline::explore::{SeedPlan, SeedSource};
+use foldline::model::Model;
+use std::ops::Range;
+use toml::de::DeTable;
+
+const CURE: &str = "look for a division by zero, or a log or sqrt of something negative; or change the parameters or the \
+                    sampling `range` of the states";
+
+/// A complaint, placed at the equation, if f is finite nowhere in the sampling range of the states.
+pub fn never_finite(model: &Model, parameters: &[f64], model_text: &str, model_file: &str) -> Option<Diagnostic> {
+    let (component, state) = failing_everywhere(model, parameters)?;
+    let message = complaint(model, component, &state, parameters);
+    Some(at_equation(model, component, message, model_text, model_file))
+}
+
+/// Reports the first seed at which f is not finite: at its state, or, for one that is searched for, anywhere in the sampling
+/// range. The others mostly fail for the same reason.
+pub(crate) fn check_seeds(
+    walk: &mut Walk,
+    seeds: &[(Range<usize>, SeedPlan)],
+    model: &Model,
+    model_text: &str,
+    model_file: &str,
+) {
+    for (span, seed) in seeds {
+        let failing = match &seed.source {
+            SeedSource::State(state) => not_finite(model, state, &seed.parameters).map(|c| (c, state.clone())),
+            SeedSource::Attractor(_) => failing_everywhere(model, &seed.parameters),
+        };
+        let Some((component, state)) = failing else { continue };
+        let message = complaint(model, component, &state, &seed.parameters);
+        walk.report(span.clone(), format!("the seed \"{}\" cannot start: {message}", seed.name), CURE);
+        let message = format!("this equation is not finite at the seed \"{}\"", seed.name);
+        walk.found.push(at_equation(model, component, message, model_text, model_file));
+        return;
+    }
+}
+
+fn at_equation(model: &Model, component: usize, message: String, model_text: &str, model_file: &str) -> Diagnostic {
+    let place = equation_span(model_text, &model.states[component].name).unwrap_or(0..0);
+    diagnose(model_file, model_text, place, message, CURE.to_string())
+}
+
+/// The first component of f that is not finite at a state.
+fn not_finite(model: &Model, state: &[f64], parameters: &[f64]) -> Option<usize> {
+    let mut f = vec![0.0; model.dim()];
+    model.evaluate(Batch { lanes: 1, states: state, parameters: Parameters::Shared(parameters) }, &mut f);
+    f.iter().position(|v| !v.is_finite())
+}
+
+/// The last of the probes and the component of f that is not finite there, if f is finite at none of them.
+fn failing_everywhere(model: &Model, parameters: &[f64]) -> Option<(usize, Vec<f64>)> {
+    let mut last = None;
+    for state in probes(model) {
+        last = Some((not_finite(model, &state, parameters)?, state));
+    }
+    last
+}
+
+/// Places spread over the sampling range: its middle last, before it a lattice that avoids round numbers.
+fn probes(model: &Model) -> Vec<Vec<f64>> {
+    const COUNT: usize = 16;
+    let golden = 0.618_033_988_749_895;
+    let place = |sample: usize| {
+        let share = |i: usize| if sample == COUNT { 0.5 } else { (golden * (1 + sample * (i + 1)) as f64).fract() };
+        model.states.iter().enumerate().map(|(i, s)| s.range[0] + share(i) * (s.range[1] - s.range[0])).collect()
+    };
+    (0..=COUNT).map(place).collect()
+}
+
+fn complaint(model: &Model, component: usize, state: &[f64], parameters: &[f64]) -> String {
+    let list = |names: Vec<&str>, values: &[f64]| {
+        let pairs: Vec<String> = names.iter().zip(values).map(|(name, value)| format!("{name} = {value}")).collect();
+        pairs.join(", ")
+    };
+    format!(
+        "the equation of `{}` is not finite at {} with {}",
+        model.states[component].name,
+        list(model.states.iter().map(|s| s.name.as_str()).collect(), state),
+        list(model.parameters.iter().map(|p| p.name.as_str()).collect(), parameters),
+    )
+}
+
+/// Where the equation of a state stands in a model text.
+fn equation_span(model_text: &str, state: &str) -> Option<Range<usize>> {
+    let root = DeTable::parse(model_text).ok()?.into_inner();
+    let entry = root.get("states")?.get_ref().as_table()?.get(state)?;
+    let equation = entry.get_ref().as_table().and_then(|table| table.get("equation"));
+    Some(equation.map_or(entry.span(), |e| e.span()))
+}

@@ -1,0 +1,258 @@
+//! A model file becomes a model.
+//!
+//! **Idea.** The file is TOML; its expressions are compiled by [`foldline::model`]. A mistake inside an expression is
+//! carried back to its line and column in the file. The format is described in docs/book/model-files.md.
+
+use crate::diagnostic::Diagnostic;
+use crate::toml_walk::{Value, Walk, unreadable};
+use foldline::model::{Definition, Field, Item, Model, ModelError, ModelSource, Output, Parameter, State};
+use std::collections::HashMap;
+use std::ops::Range;
+use std::path::Path;
+use toml::de::{DeTable, DeValue};
+
+const ROOT_KEYS: [&str; 9] =
+    ["name", "description", "source", "parameters", "definitions", "states", "equations", "outputs", "whirl"];
+
+/// Reads a model file: the model and the text, verbatim. Every mistake found is returned.
+pub fn read_model(path: &Path) -> Result<(Model, String), Vec<Diagnostic>> {
+    let file = path.display().to_string();
+    let text = std::fs::read_to_string(path).map_err(|error| vec![unreadable(&file, "the model file", &error)])?;
+    Ok((parse_model(&text, &file)?, text))
+}
+
+/// Reads a model text; `file` is its name in messages. Every mistake found is returned.
+pub fn parse_model(text: &str, file: &str) -> Result<Model, Vec<Diagnostic>> {
+    let (walk, root) = Walk::parse(text, file)?;
+    let mut reader = Reader { walk, text, places: HashMap::new() };
+    let source = reader.source(&root, file);
+    match Model::compile(source) {
+        Ok(model) if reader.walk.found.is_empty() => Ok(model),
+        Ok(_) => Err(reader.walk.found),
+        Err(errors) => {
+            errors.into_iter().for_each(|error| reader.report(error));
+            let mut found = reader.walk.found;
+            found.sort_by_key(|diagnostic| (diagnostic.line, diagnostic.column));
+            Err(found)
+        }
+    }
+}
+
+/// Reads the tables and remembers where everything stands.
+struct Reader<'t> {
+    walk: Walk<'t>,
+    text: &'t str,
+    places: HashMap<(Item, Field), Range<usize>>,
+}
+
+/// The entries of a table in the order of the file.
+type Entries<'v, 't> = Vec<(String, Range<usize>, &'v Value<'t>)>;
+
+impl Reader<'_> {
+    fn source(&mut self, root: &DeTable, file: &str) -> ModelSource {
+        self.walk.only(root, &ROOT_KEYS, "the model");
+        let stem = Path::new(file).file_stem().map_or_else(String::new, |stem| stem.to_string_lossy().into_owned());
+        let mut source = ModelSource {
+            name: root.get("name").and_then(|v| self.walk.string(v, "`name`")).unwrap_or(stem),
+            description: self.prose(root, "description"),
+            source: self.prose(root, "source"),
+            ..ModelSource::default()
+        };
+        for (i, (name, place, value)) in self.entries(root, "parameters").into_iter().enumerate() {
+            self.places.insert((Item::Parameter(i), Field::Name), place);
+            source.parameters.push(self.parameter(i, name, value));
+        }
+        for (i, (name, place, value)) in self.entries(root, "definitions").into_iter().enumerate() {
+            let expression = self.expression(Item::Definition(i), place, value, &format!("the definition `{name}`"));
+            source.definitions.push(Definition { name, expression });
+        }
+        for (i, (name, place, value)) in self.entries(root, "states").into_iter().enumerate() {
+            self.places.insert((Item::State(i), Field::Name), place);
+            let state = self.state(i, name, value, &mut source.equations);
+            source.states.push(state);
+        }
+        for (name, place, value) in self.entries(root, "equations") {
+            let item = Item::Equation(source.equations.len());
+            let expression = self.expression(item, place, value, &format!("the equation of `{name}`"));
+            source.equations.push(Definition { name, expression });
+        }
+        for (i, (name, place, value)) in self.entries(root, "outputs").into_iter().enumerate() {
+            source.outputs.push(self.output(i, name, place, value));
+        }
+        source.whirl = root.get("whirl").and_then(|value| self.whirl(value));
+        source
+    }
+
+    fn entries<'v, 't>(&mut self, root: &'v DeTable<'t>, key: &str) -> Entries<'v, 't> {
+        let table = root.get(key).and_then(|value| self.walk.table(value, &format!("`{key}`")));
+        let mut entries: Entries =
+            table.into_iter().flat_map(|t| t.iter()).map(|(k, v)| (k.get_ref().to_string(), k.span(), v)).collect();
+        entries.sort_by_key(|(_, place, _)| place.start);
+        entries
+    }
+
+    /// A text that may be empty or absent.
+    fn prose(&mut self, table: &DeTable, key: &str) -> String {
+        match table.get(key).map(|value| (value, value.get_ref().as_str())) {
+            None => String::new(),
+            Some((_, Some(text))) => text.trim().to_string(),
+            Some((value, None)) => self.walk.string(value, &format!("`{key}`")).unwrap_or_default(),
+        }
+    }
+
+    /// Unit and description.
+    fn labels(&mut self, table: &DeTable) -> (String, String) {
+        let unit = table.get("unit").and_then(|value| self.walk.string(value, "`unit`"));
+        (unit.unwrap_or_else(|| "1".into()), self.prose(table, "description"))
+    }
+
+    fn parameter(&mut self, i: usize, name: String, value: &Value) -> Parameter {
+        let what = format!("the parameter `{name}`");
+        let mut parameter = Parameter::new(&name, 0.0);
+        let before = self.walk.found.len();
+        let number = match value.get_ref() {
+            DeValue::Table(table) => {
+                self.walk.only(table, &["value", "unit", "description"], &what);
+                (parameter.unit, parameter.description) = self.labels(table);
+                table.get("value")
+            }
+            _ => Some(value),
+        };
+        match number {
+            Some(number) => {
+                self.places.insert((Item::Parameter(i), Field::Value), number.span());
+                parameter.value = self.walk.number(number, &what).unwrap_or(0.0);
+            }
+            // A misspelt key has been reported, and is probably the missing one.
+            None if self.walk.found.len() > before => {}
+            None => {
+                let place = self.place(Item::Parameter(i), Field::Name);
+                self.walk.report(place, format!("{what} has no value"), format!("write `{name} = {{ value = 1.0 }}`"));
+            }
+        }
+        parameter
+    }
+
+    fn state(&mut self, i: usize, name: String, value: &Value, equations: &mut Vec<Definition>) -> State {
+        let what = format!("the equation of `{name}`");
+        let mut state = State::new(&name);
+        let item = Item::Equation(equations.len());
+        let place = self.place(Item::State(i), Field::Name);
+        let DeValue::Table(table) = value.get_ref() else {
+            let expression = self.expression(item, place, value, &what);
+            equations.push(Definition { name, expression });
+            return state;
+        };
+        let before = self.walk.found.len();
+        self.walk.only(table, &["equation", "unit", "description", "scale", "range"], &format!("the state `{name}`"));
+        let misspelt = self.walk.found.len() > before;
+        (state.unit, state.description) = self.labels(table);
+        if let Some(equation) = table.get("equation") {
+            let expression = self.expression(item, place, equation, &what);
+            equations.push(Definition { name: name.clone(), expression });
+        } else if misspelt {
+            equations.push(Definition { name: name.clone(), expression: "0".into() });
+        }
+        if let Some(value) = table.get("scale") {
+            self.places.insert((Item::State(i), Field::Scale), value.span());
+            state.scale = self.walk.number(value, &format!("the scale of `{name}`")).unwrap_or(1.0);
+        }
+        state.range = [-2.0 * state.scale.abs(), 2.0 * state.scale.abs()];
+        if let Some(value) = table.get("range") {
+            self.places.insert((Item::State(i), Field::Range), value.span());
+            state.range = self.pair(value, &format!("the range of `{name}`")).unwrap_or(state.range);
+        }
+        if !(state.scale > 0.0) && !table.contains_key("range") {
+            state.range = [-1.0, 1.0]; // the scale alone is to blame
+        }
+        state
+    }
+
+    /// `[low, high]`.
+    fn pair(&mut self, value: &Value, what: &str) -> Option<[f64; 2]> {
+        match value.get_ref().as_array().map(|list| (list.first(), list.get(1), list.len())) {
+            Some((Some(low), Some(high), 2)) => Some([self.walk.number(low, what)?, self.walk.number(high, what)?]),
+            _ => {
+                self.walk.report(value.span(), format!("{what} is not a pair of numbers"), "write `[-1.0, 1.0]`");
+                None
+            }
+        }
+    }
+
+    fn output(&mut self, i: usize, name: String, place: Range<usize>, value: &Value) -> Output {
+        let what = format!("the output `{name}`");
+        let item = Item::Output(i);
+        let mut output = Output::new(&name, "0");
+        let DeValue::Table(table) = value.get_ref() else {
+            output.expression = self.expression(item, place, value, &what);
+            return output;
+        };
+        let before = self.walk.found.len();
+        self.walk.only(table, &["expression", "unit", "description"], &what);
+        let misspelt = self.walk.found.len() > before;
+        (output.unit, output.description) = self.labels(table);
+        match table.get("expression") {
+            Some(value) => output.expression = self.expression(item, place, value, &what),
+            None if misspelt => {}
+            None => {
+                let hint = format!("write `{name} = \"…\"` or give the table a key `expression`");
+                self.walk.report(place, format!("{what} has no expression"), hint);
+            }
+        }
+        output
+    }
+
+    /// The text of an expression; one that is no text is reported, and replaced so as not to be reported again.
+    fn expression(&mut self, item: Item, name: Range<usize>, value: &Value, what: &str) -> String {
+        self.places.insert((item, Field::Name), name);
+        self.places.insert((item, Field::Expression), value.span());
+        match value.get_ref() {
+            // A plain number is an expression too.
+            DeValue::Integer(_) | DeValue::Float(_) => {
+                self.walk.number(value, what).map_or_else(|| "0".into(), |number| format!("{number:?}"))
+            }
+            _ => self.walk.string(value, what).unwrap_or_else(|| "0".into()),
+        }
+    }
+
+    fn whirl(&mut self, value: &Value) -> Option<[String; 2]> {
+        self.places.insert((Item::Whirl, Field::Name), value.span());
+        match value.get_ref().as_array().map(|list| (list.first(), list.get(1), list.len())) {
+            Some((Some(u), Some(v), 2)) => {
+                Some([self.walk.string(u, "the first of `whirl`")?, self.walk.string(v, "the second of `whirl`")?])
+            }
+            _ => {
+                let hint = "name the two states of the complex signal, as in `whirl = [\"u\", \"v\"]`";
+                self.walk.report(value.span(), "`whirl` is not a pair of states", hint);
+                None
+            }
+        }
+    }
+
+    fn place(&self, item: Item, field: Field) -> Range<usize> {
+        let known = |field| self.places.get(&(item, field)).cloned();
+        known(field).or_else(|| known(Field::Name)).unwrap_or(0..0)
+    }
+
+    fn report(&mut self, error: ModelError) {
+        let place = self.place(error.item, error.field);
+        let place = error.span.and_then(|span| inside(self.text, &place, &span)).unwrap_or(place);
+        self.walk.report(place, error.message, error.hint);
+    }
+}
+
+/// The place in the file of a part of a string that stands at `string` in it; `None` where escapes shift the text.
+fn inside(text: &str, string: &Range<usize>, part: &Range<usize>) -> Option<Range<usize>> {
+    let raw = text.get(string.clone())?;
+    let quote = ["\"\"\"", "'''", "\"", "'"].into_iter().find(|quote| raw.starts_with(quote))?;
+    let content = &raw[quote.len()..];
+    if quote.starts_with('"') && content.contains('\\') {
+        return None;
+    }
+    let skipped = match quote.len() {
+        3 => ["\r\n", "\n"].into_iter().find(|end| content.starts_with(end)).map_or(0, str::len),
+        _ => 0,
+    };
+    let start = string.start + quote.len() + skipped;
+    Some(start + part.start..start + part.end)
+}

@@ -1,0 +1,3 @@
+//! "Did you mean …?"
+
+pub use foldline::model::{nearest, suggest};

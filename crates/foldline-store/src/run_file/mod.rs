@@ -1,0 +1,102 @@
+//! The run file: everything a run has found, in one SQLite database that survives being killed.
+//!
+//! **Idea.** `DIR/run.sqlite` holds the study and the model verbatim, the settings, and every accepted point, special point
+//! and ending at the moment it is accepted. Each is one statement, hence one transaction: after a kill at any instant the
+//! file holds a prefix of the run, and [`Recorder::resume`] goes on from it.
+//!
+//! * Write-ahead log, so that others can read while the run goes on; `synchronous = NORMAL`, which loses nothing when the
+//!   process is killed and at most the last points, never the consistency, when the power fails.
+//! * Each number stands there twice: as REAL in a column that Python, R or a shell can read, and as little-endian bytes in a
+//!   BLOB, from which the round trip is exact to the bit (REAL columns lose NaN and the sign of zero).
+//! * The tables are described in docs/book/run-file.md. `PRAGMA user_version` is [`FORMAT_VERSION`].
+
+mod bytes;
+mod reader;
+mod rows;
+mod schema;
+mod writer;
+
+pub use reader::{Recorded, load};
+pub use writer::Recorder;
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+/// The version of the format written here. A file of a newer version is refused; a change that older readers would
+/// misunderstand raises it.
+pub const FORMAT_VERSION: i64 = 1;
+
+/// Marks an SQLite file as a run file ("fold" in ASCII).
+pub const APPLICATION_ID: i64 = 0x666f_6c64;
+
+/// The path of the run file in a folder.
+pub fn path_in(folder: &Path) -> PathBuf {
+    folder.join("run.sqlite")
+}
+
+/// Why a run file could not be made, read or continued. The message says what to do about it.
+#[derive(Debug)]
+pub enum RunFileError {
+    /// There is no run file in this folder.
+    Missing(PathBuf),
+    /// There is one already.
+    Exists(PathBuf),
+    /// The folder cannot be made or written to.
+    Folder(PathBuf, std::io::Error),
+    /// The file is something else.
+    Foreign(PathBuf),
+    /// The file was written by a newer version.
+    Newer(PathBuf, i64),
+    /// A run cannot be resumed because its study or model (named here) has changed.
+    Changed(PathBuf, &'static str),
+    /// The file contradicts itself; the sentence says where.
+    Damaged(PathBuf, String),
+    /// The database refused.
+    Database(PathBuf, rusqlite::Error),
+}
+
+impl fmt::Display for RunFileError {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            RunFileError::Missing(path) => {
+                write!(f, "there is no run file {}\n  help: give the folder that `foldline run` wrote", path.display())
+            }
+            RunFileError::Exists(path) => write!(
+                f,
+                "{} exists already\n  help: `--resume` goes on with it, `--out DIR` writes elsewhere",
+                path.display()
+            ),
+            RunFileError::Folder(path, error) => write!(
+                f,
+                "the folder {} cannot be written to: {error}\n  help: choose a folder you may write to with `--out DIR`",
+                path.display()
+            ),
+            RunFileError::Foreign(path) => write!(
+                f,
+                "{} is not a run file of foldline\n  help: move it away, or write elsewhere with `--out DIR`",
+                path.display()
+            ),
+            RunFileError::Newer(path, version) => write!(
+                f,
+                "{} has format {version}, newer than the format {FORMAT_VERSION} known here\n  help: use a newer foldline",
+                path.display()
+            ),
+            RunFileError::Changed(path, what) => write!(
+                f,
+                "the {what} has changed since the run in {} began\n  help: start a new run with `--out DIR`, or restore the \
+                 {what} (the old text is in the table `meta`)",
+                path.display()
+            ),
+            RunFileError::Damaged(path, what) => {
+                write!(f, "{} is damaged: {what}\n  help: start a new run with `--out DIR`", path.display())
+            }
+            RunFileError::Database(path, error) => write!(
+                f,
+                "{}: {error}\n  help: check free space and permissions, and that no other run writes there",
+                path.display()
+            ),
+        }
+    }
+}
+
+impl std::error::Error for RunFileError {}

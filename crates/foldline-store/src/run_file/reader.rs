@@ -1,0 +1,170 @@
+//! Reading a run back.
+
+use super::rows::{ending_in, kind_named, origin_in, point_in};
+use super::{APPLICATION_ID, FORMAT_VERSION, RunFileError, path_in};
+use foldline::diagram::{Branch, Diagram, Family, SpecialPoint};
+use rusqlite::{Connection, OpenFlags, Row};
+use std::path::{Path, PathBuf};
+
+/// A run as its file has it.
+#[derive(Clone, Debug)]
+pub struct Recorded {
+    /// The file.
+    pub path: PathBuf,
+    /// Name of the study file.
+    pub study_file: String,
+    /// The study, verbatim.
+    pub study_text: String,
+    /// Name of the model file.
+    pub model_file: String,
+    /// The model, verbatim.
+    pub model_text: String,
+    /// Everything found, branches in the order in which they were begun.
+    pub diagram: Diagram,
+    /// Remarks: the branch they are about, and what was noticed.
+    pub notes: Vec<(String, String)>,
+}
+
+/// Reads the run in `folder`, which may still be growing.
+pub fn load(folder: &Path) -> Result<Recorded, RunFileError> {
+    let path = path_in(folder);
+    if !path.exists() {
+        return Err(RunFileError::Missing(path));
+    }
+    let connection = match open(&path, false)? {
+        Open::Run(connection) => connection,
+        Open::Empty => return Err(RunFileError::Damaged(path, "it is empty".to_string())),
+    };
+    let failed = |e| RunFileError::Database(path.clone(), e);
+    // One transaction, so that a run that is still growing is seen at one instant.
+    connection.execute_batch("BEGIN").map_err(failed)?;
+    let text = |key: &str| {
+        connection.query_row("SELECT value FROM meta WHERE key = ?", [key], |row| row.get(0)).map_err(failed)
+    };
+    let notes = {
+        let mut statement = connection.prepare("SELECT branch, note FROM notes ORDER BY rowid").map_err(failed)?;
+        let rows = statement.query_map([], |row| Ok((row.get(0)?, row.get(1)?))).map_err(failed)?;
+        rows.collect::<Result<_, _>>().map_err(failed)?
+    };
+    Ok(Recorded {
+        study_file: text("study_file")?,
+        study_text: text("study")?,
+        model_file: text("model_file")?,
+        model_text: text("model")?,
+        diagram: load_diagram(&connection, &path)?,
+        notes,
+        path: path.clone(),
+    })
+}
+
+/// A file that was opened.
+pub(super) enum Open {
+    /// It has nothing in it yet: the run was killed before its first transaction.
+    Empty,
+    /// A run.
+    Run(Connection),
+}
+
+/// Opens a run file after making sure that it is one, of a version known here.
+pub(super) fn open(path: &Path, write: bool) -> Result<Open, RunFileError> {
+    let failed = |e| RunFileError::Database(path.to_path_buf(), e);
+    let foreign = || RunFileError::Foreign(path.to_path_buf());
+    let access = if write { OpenFlags::SQLITE_OPEN_READ_WRITE } else { OpenFlags::SQLITE_OPEN_READ_ONLY };
+    let number =
+        |connection: &Connection, name: &str| connection.pragma_query_value(None, name, |row| row.get::<_, i64>(0));
+    let plain = Connection::open_with_flags(path, access | OpenFlags::SQLITE_OPEN_NO_MUTEX).map_err(failed)?;
+    let connection = match number(&plain, "application_id") {
+        Ok(_) => plain,
+        Err(error) if error.sqlite_error_code() == Some(rusqlite::ErrorCode::NotADatabase) => return Err(foreign()),
+        // In a folder where nothing can be written the log cannot be opened; the file alone can.
+        Err(error) if write => return Err(failed(error)),
+        Err(error) => immutable(path).ok_or_else(|| failed(error))?,
+    };
+    let version = number(&connection, "user_version").map_err(failed)?;
+    match number(&connection, "application_id").map_err(failed)? {
+        APPLICATION_ID if version > FORMAT_VERSION => Err(RunFileError::Newer(path.to_path_buf(), version)),
+        APPLICATION_ID => Ok(Open::Run(connection)),
+        _ if is_empty(&connection).map_err(failed)? => Ok(Open::Empty),
+        _ => Err(foreign()),
+    }
+}
+
+fn immutable(path: &Path) -> Option<Connection> {
+    let escaped = path.to_str()?.replace('%', "%25").replace('?', "%3f").replace('#', "%23");
+    let flags = OpenFlags::SQLITE_OPEN_READ_ONLY | OpenFlags::SQLITE_OPEN_URI;
+    let connection = Connection::open_with_flags(format!("file:{escaped}?immutable=1"), flags).ok()?;
+    connection.pragma_query_value(None, "application_id", |_| Ok(())).ok().map(|()| connection)
+}
+
+fn is_empty(connection: &Connection) -> rusqlite::Result<bool> {
+    connection.query_row("SELECT count(*) = 0 FROM sqlite_master", [], |row| row.get(0))
+}
+
+/// All branches with their points, special points and endings.
+pub(super) fn load_diagram(connection: &Connection, path: &Path) -> Result<Diagram, RunFileError> {
+    let mut diagram = Diagram::default();
+    let branches = read(connection, path, "SELECT * FROM branches ORDER BY branch", &[], |row| {
+        let number: i64 = row.get("branch").map_err(|e| e.to_string())?;
+        Ok((number, branch_in(row)?))
+    })?;
+    for (number, mut branch) in branches {
+        let of_branch = |table: &str, order: &str| format!("SELECT * FROM {table} WHERE branch = ?1 ORDER BY {order}");
+        branch.points =
+            read(connection, path, &of_branch("points", "position"), &[number], |row| Ok(point_in(row)?.0))?;
+        branch.special =
+            read(connection, path, &of_branch("special_points", "position, rowid"), &[number], special_in)?;
+        let ends = read(connection, path, &of_branch("ends", "side"), &[number], |row| {
+            let side: i64 = row.get("side").map_err(|e| e.to_string())?;
+            Ok((side, ending_in(row)?))
+        })?;
+        for (side, ending) in ends {
+            let slot = usize::try_from(side).ok().and_then(|s| branch.ends.get_mut(s));
+            let damaged = || RunFileError::Damaged(path.to_path_buf(), format!("ends: there is no side {side}"));
+            *slot.ok_or_else(damaged)? = Some(ending);
+        }
+        diagram.branches.push(branch);
+    }
+    Ok(diagram)
+}
+
+fn branch_in(row: &Row) -> Result<Branch, String> {
+    let family = match row.get::<_, String>("family").map_err(|e| e.to_string())?.as_str() {
+        "equilibrium" => Family::Equilibrium,
+        "cycle" => Family::Cycle,
+        other => return Err(format!("unknown family \"{other}\"")),
+    };
+    let name: String = row.get("name").map_err(|e| e.to_string())?;
+    let free: i64 = row.get("free").map_err(|e| e.to_string())?;
+    Ok(Branch::new(name, family, usize::try_from(free).map_err(|e| e.to_string())?, origin_in(row)?))
+}
+
+fn special_in(row: &Row) -> Result<SpecialPoint, String> {
+    let (point, extra) = point_in(row)?;
+    let count = |name: &str| {
+        row.get::<_, i64>(name).ok().and_then(|n| usize::try_from(n).ok()).ok_or_else(|| format!("{name} is no count"))
+    };
+    Ok(SpecialPoint {
+        kind: kind_named(&row.get::<_, String>("kind").map_err(|e| e.to_string())?)?,
+        point,
+        unstable_before: count("unstable_before")?,
+        unstable_after: count("unstable_after")?,
+        error: *extra.first().ok_or("scalar_bytes lacks the error")?,
+    })
+}
+
+fn read<T>(
+    connection: &Connection,
+    path: &Path,
+    sql: &str,
+    parameters: &[i64],
+    mut convert: impl FnMut(&Row) -> Result<T, String>,
+) -> Result<Vec<T>, RunFileError> {
+    let failed = |e| RunFileError::Database(path.to_path_buf(), e);
+    let mut statement = connection.prepare_cached(sql).map_err(failed)?;
+    let mut rows = statement.query(rusqlite::params_from_iter(parameters)).map_err(failed)?;
+    let mut found = Vec::new();
+    while let Some(row) = rows.next().map_err(failed)? {
+        found.push(convert(row).map_err(|what| RunFileError::Damaged(path.to_path_buf(), what))?);
+    }
+    Ok(found)
+}

@@ -1,0 +1,174 @@
+//! A point as a row, and back.
+
+use super::bytes::{pack, pack_complex, pack_pairs, unpack, unpack_complex, unpack_pairs};
+use foldline::diagram::{Cost, Cycle, Ending, Kind, Origin, Point, Solution, Trust};
+use rusqlite::Row;
+use rusqlite::types::Value;
+
+/// The shown columns and the columns of a point, in the order of the insertion. `extra` numbers are kept with the scalars.
+pub(super) fn values_of(point: &Point, extra: &[f64]) -> Vec<Value> {
+    let count = |n: usize| Value::Integer(i64::try_from(n).unwrap_or(i64::MAX));
+    let (degree, mesh, profile) = match &point.solution {
+        Solution::Equilibrium(state) => (Value::Null, Value::Null, state),
+        Solution::Cycle(cycle) => (count(cycle.degree), Value::Blob(pack(&cycle.mesh)), &cycle.profile),
+    };
+    let trust = &point.trust;
+    let shown = point.parameters.iter().chain(point.ranges.as_flattened());
+    let mut values: Vec<Value> = shown.map(|v| Value::Real(*v)).collect();
+    let period = point.solution.period();
+    let mut scalars = vec![
+        period.unwrap_or(0.0),
+        point.step,
+        trust.discretisation,
+        trust.residual,
+        trust.trivial_defect,
+        trust.liouville_defect,
+    ];
+    scalars.extend_from_slice(extra);
+    values.extend([
+        period.map_or(Value::Null, Value::Real),
+        count(point.unstable),
+        Value::Real(trust.discretisation),
+        Value::Real(trust.residual),
+        Value::Real(trust.trivial_defect),
+        Value::Real(trust.liouville_defect),
+        count(point.cost.newton),
+        count(point.cost.factorisations),
+        count(point.cost.rejected),
+        degree,
+        Value::Blob(pack(&point.parameters)),
+        Value::Blob(pack(profile)),
+        mesh,
+        Value::Blob(pack(&point.tangent)),
+        Value::Blob(pack_complex(&point.spectrum)),
+        Value::Blob(pack_pairs(&point.ranges)),
+        Value::Blob(pack(&scalars)),
+    ]);
+    values
+}
+
+/// The point in a row, and the extra numbers kept with its scalars; the error is the column that makes no sense.
+pub(super) fn point_in(row: &Row) -> Result<(Point, Vec<f64>), String> {
+    let blob = |name: &str| row.get::<_, Vec<u8>>(name).map_err(|e| e.to_string());
+    let numbers =
+        |name: &str| unpack(&blob(name)?).ok_or_else(|| format!("{name} has a length that is no multiple of 8"));
+    let count = |name: &str| {
+        row.get::<_, i64>(name).ok().and_then(|n| usize::try_from(n).ok()).ok_or_else(|| format!("{name} is no count"))
+    };
+    let scalars = numbers("scalar_bytes")?;
+    let [period, step, discretisation, residual, trivial_defect, liouville_defect, extra @ ..] = &scalars[..] else {
+        return Err("scalar_bytes is too short".to_string());
+    };
+    let profile = numbers("solution_bytes")?;
+    let solution = match row.get::<_, Option<i64>>("degree").map_err(|e| e.to_string())? {
+        None => Solution::Equilibrium(profile),
+        Some(_) => {
+            let mesh = numbers("mesh_bytes")?;
+            let degree = count("degree")?;
+            let nodes = mesh.len().saturating_sub(1) * (degree + 1);
+            if nodes == 0 || profile.len() % nodes != 0 {
+                return Err("solution_bytes and mesh_bytes do not belong together".to_string());
+            }
+            Solution::Cycle(Cycle { period: *period, mesh: mesh.into(), degree, profile })
+        }
+    };
+    let point = Point {
+        position: row.get("position").map_err(|e| e.to_string())?,
+        parameters: numbers("parameter_bytes")?,
+        solution,
+        tangent: numbers("tangent_bytes")?,
+        step: *step,
+        spectrum: unpack_complex(&blob("spectrum_bytes")?).ok_or("spectrum_bytes is no list of pairs")?,
+        unstable: count("unstable")?,
+        ranges: unpack_pairs(&blob("range_bytes")?).ok_or("range_bytes is no list of pairs")?,
+        trust: Trust {
+            discretisation: *discretisation,
+            residual: *residual,
+            trivial_defect: *trivial_defect,
+            liouville_defect: *liouville_defect,
+        },
+        cost: Cost { newton: count("newton")?, factorisations: count("factorisations")?, rejected: count("rejected")? },
+    };
+    Ok((point, extra.to_vec()))
+}
+
+/// `detail, kind, count, value_bytes` of an ending; its code and sentence come from the ending itself.
+pub(super) fn ending_values(ending: &Ending) -> [Value; 4] {
+    let (detail, kind, count, value) = match ending {
+        Ending::Bound(value) | Ending::PeriodUnbounded(value) => (None, None, None, Some(*value)),
+        Ending::Joined { at, parameter } => (None, Some(*at), None, Some(*parameter)),
+        Ending::StepTooSmall(why) | Ending::MeshTooLarge(why) | Ending::NotFinite(why) | Ending::NoStart(why) => {
+            (Some(why.clone()), None, None, None)
+        }
+        Ending::PointLimit(points) => (None, None, Some(*points), None),
+        Ending::Closed | Ending::Stopped => (None, None, None, None),
+    };
+    [
+        detail.map_or(Value::Null, Value::Text),
+        kind.map_or(Value::Null, |k| Value::Text(k.name().to_string())),
+        count.map_or(Value::Null, |n| Value::Integer(i64::try_from(n).unwrap_or(i64::MAX))),
+        value.map_or(Value::Null, |v| Value::Blob(pack(&[v]))),
+    ]
+}
+
+/// The ending in a row of `ends`.
+pub(super) fn ending_in(row: &Row) -> Result<Ending, String> {
+    let text = |name: &str| row.get::<_, Option<String>>(name).map_err(|e| e.to_string());
+    let detail = || Ok::<_, String>(text("detail")?.unwrap_or_default());
+    let value = || single(row, "value_bytes");
+    Ok(match text("code")?.unwrap_or_default().as_str() {
+        "bound" => Ending::Bound(value()?),
+        "closed" => Ending::Closed,
+        "joined" => Ending::Joined { at: kind_named(&text("kind")?.unwrap_or_default())?, parameter: value()? },
+        "step-too-small" => Ending::StepTooSmall(detail()?),
+        "mesh-too-large" => Ending::MeshTooLarge(detail()?),
+        "period-unbounded" => Ending::PeriodUnbounded(value()?),
+        "point-limit" => {
+            let count: i64 = row.get("count").map_err(|e| e.to_string())?;
+            Ending::PointLimit(usize::try_from(count).map_err(|e| e.to_string())?)
+        }
+        "not-finite" => Ending::NotFinite(detail()?),
+        "no-start" => Ending::NoStart(detail()?),
+        "stopped" => Ending::Stopped,
+        other => return Err(format!("unknown ending \"{other}\"")),
+    })
+}
+
+/// `origin, origin_name, origin_kind, origin_parameter, origin_bytes`.
+pub(super) fn origin_values(origin: &Origin) -> [Value; 5] {
+    let (code, name, kind, parameter) = match origin {
+        Origin::Seed(name) => ("seed", name, None, None),
+        Origin::EndOf(name) => ("end-of", name, None, None),
+        Origin::Switch { parent, kind, parameter } => ("switch", parent, Some(*kind), Some(*parameter)),
+    };
+    [
+        Value::Text(code.to_string()),
+        Value::Text(name.clone()),
+        kind.map_or(Value::Null, |k| Value::Text(k.name().to_string())),
+        parameter.map_or(Value::Null, Value::Real),
+        parameter.map_or(Value::Null, |v| Value::Blob(pack(&[v]))),
+    ]
+}
+
+/// The origin in a row of `branches`.
+pub(super) fn origin_in(row: &Row) -> Result<Origin, String> {
+    let name: String = row.get("origin_name").map_err(|e| e.to_string())?;
+    match row.get::<_, String>("origin").map_err(|e| e.to_string())?.as_str() {
+        "seed" => Ok(Origin::Seed(name)),
+        "end-of" => Ok(Origin::EndOf(name)),
+        "switch" => {
+            let kind = kind_named(&row.get::<_, String>("origin_kind").map_err(|e| e.to_string())?)?;
+            Ok(Origin::Switch { parent: name, kind, parameter: single(row, "origin_bytes")? })
+        }
+        other => Err(format!("unknown origin \"{other}\"")),
+    }
+}
+
+pub(super) fn kind_named(name: &str) -> Result<Kind, String> {
+    Kind::from_name(name).ok_or_else(|| format!("unknown kind \"{name}\""))
+}
+
+fn single(row: &Row, name: &str) -> Result<f64, String> {
+    let bytes: Vec<u8> = row.get(name).map_err(|e| e.to_string())?;
+    unpack(&bytes).and_then(|v| v.first().copied()).ok_or_else(|| format!("{name} is empty"))
+}

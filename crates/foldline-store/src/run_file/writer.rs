@@ -1,0 +1,313 @@
+//! Writing a run as it happens.
+
+use super::reader::{Open, load_diagram, open};
+use super::rows::{ending_values, origin_values, values_of};
+use super::schema::{Columns, create, insert};
+use super::{APPLICATION_ID, FORMAT_VERSION, RunFileError, path_in};
+use crate::study_file::Study;
+use foldline::contract::{Event, Observer, Verdict};
+use foldline::diagram::{Branch, Diagram, Ending, Point, SpecialPoint};
+use rusqlite::types::Value;
+use rusqlite::{Connection, params, params_from_iter};
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// An observer that writes everything it sees to the run file.
+///
+/// If writing fails (the disk is full, say) it asks every branch to stop; [`Recorder::finish`] then returns the reason.
+pub struct Recorder {
+    path: PathBuf,
+    insert_point: String,
+    insert_special: String,
+    state: Mutex<State>,
+}
+
+struct State {
+    connection: Connection,
+    numbers: HashMap<String, i64>,
+    failure: Option<rusqlite::Error>,
+}
+
+impl Recorder {
+    /// Begins a run in `folder`, which is made if it is not there. A run file that exists already is an error.
+    pub fn create(folder: &Path, study: &Study) -> Result<Recorder, RunFileError> {
+        let path = path_in(folder);
+        if path.exists() {
+            return Err(RunFileError::Exists(path));
+        }
+        std::fs::create_dir_all(folder).map_err(|e| RunFileError::Folder(folder.to_path_buf(), e))?;
+        // SQLite's own words for a folder without write permission name neither the folder nor the reason.
+        std::fs::File::create_new(&path).map_err(|e| RunFileError::Folder(folder.to_path_buf(), e))?;
+        Recorder::begin(path, study)
+    }
+
+    /// Removes the run in `folder`, if there is one; any other file of that name stays and is an error.
+    pub fn discard(folder: &Path) -> Result<(), RunFileError> {
+        let path = path_in(folder);
+        if !path.exists() {
+            return Ok(());
+        }
+        drop(open(&path, false)?);
+        for end in ["", "-wal", "-shm"] {
+            let mut file = path.clone().into_os_string();
+            file.push(end);
+            match std::fs::remove_file(file) {
+                Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                    return Err(RunFileError::Folder(folder.to_path_buf(), error));
+                }
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+
+    /// Goes on with the run in `folder`: the recorder, and what the run has found already. Sides that ended only because the
+    /// run was stopped are open again. Where there is no run yet, one begins.
+    pub fn resume(folder: &Path, study: &Study) -> Result<(Recorder, Diagram), RunFileError> {
+        let path = path_in(folder);
+        if !path.exists() {
+            return Ok((Recorder::create(folder, study)?, Diagram::default()));
+        }
+        let connection = match open(&path, true)? {
+            Open::Empty => return Ok((Recorder::begin(path, study)?, Diagram::default())),
+            Open::Run(connection) => connection,
+        };
+        let text = |key: &str| {
+            connection
+                .query_row("SELECT value FROM meta WHERE key = ?", [key], |row| row.get::<_, String>(0))
+                .map_err(|e| RunFileError::Database(path.clone(), e))
+        };
+        if text("model")? != study.model_text {
+            return Err(RunFileError::Changed(path, "model"));
+        }
+        if text("study")? != study.text {
+            return Err(RunFileError::Changed(path, "study"));
+        }
+        let mut diagram = load_diagram(&connection, &path)?;
+        let stopped = |end: &mut Option<Ending>| *end = end.take().filter(|ending| *ending != Ending::Stopped);
+        diagram.branches.iter_mut().flat_map(|branch| &mut branch.ends).for_each(stopped);
+        let recorder = Recorder::over(path, connection, study)?;
+        Ok((recorder, diagram))
+    }
+
+    fn begin(path: PathBuf, study: &Study) -> Result<Recorder, RunFileError> {
+        let failed = |e| RunFileError::Database(path.clone(), e);
+        let mut connection = Connection::open(&path).map_err(failed)?;
+        connection.pragma_update(None, "journal_mode", "WAL").map_err(failed)?;
+        let transaction = connection.transaction().map_err(failed)?;
+        transaction.execute_batch(&create(&Columns::new(&study.model))).map_err(failed)?;
+        for (key, value) in description(study) {
+            transaction.execute("INSERT INTO meta VALUES (?, ?)", params![key, value]).map_err(failed)?;
+        }
+        for (class, number, name, unit, description) in variables(study) {
+            transaction
+                .execute(
+                    "INSERT INTO variables VALUES (?, ?, ?, ?, ?)",
+                    params![class, number, name, unit, description],
+                )
+                .map_err(failed)?;
+        }
+        // Written last in the same transaction: a file with a version is a complete one.
+        transaction.pragma_update(None, "application_id", APPLICATION_ID).map_err(failed)?;
+        transaction.pragma_update(None, "user_version", FORMAT_VERSION).map_err(failed)?;
+        transaction.commit().map_err(failed)?;
+        Recorder::over(path, connection, study)
+    }
+
+    fn over(path: PathBuf, connection: Connection, study: &Study) -> Result<Recorder, RunFileError> {
+        let failed = |e| RunFileError::Database(path.clone(), e);
+        connection.pragma_update(None, "synchronous", "NORMAL").map_err(failed)?;
+        connection.busy_timeout(std::time::Duration::from_secs(10)).map_err(failed)?;
+        let numbers = {
+            let mut statement = connection.prepare("SELECT name, branch FROM branches").map_err(failed)?;
+            let rows = statement.query_map([], |row| Ok((row.get(0)?, row.get(1)?))).map_err(failed)?;
+            rows.collect::<Result<HashMap<String, i64>, _>>().map_err(failed)?
+        };
+        let columns = Columns::new(&study.model);
+        let special = ["branch", "kind", "position", "key", "unstable_before", "unstable_after", "error"];
+        Ok(Recorder {
+            insert_point: insert("points", &["branch", "position"], &columns),
+            insert_special: insert("special_points", &special, &columns),
+            state: Mutex::new(State { connection, numbers, failure: None }),
+            path,
+        })
+    }
+
+    /// Closes the file. The error is the first one met while recording.
+    pub fn finish(self) -> Result<(), RunFileError> {
+        let state = self.state.into_inner().unwrap_or_else(PoisonError::into_inner);
+        match state.failure {
+            Some(error) => Err(RunFileError::Database(self.path, error)),
+            None => state.connection.close().map_err(|(_, error)| RunFileError::Database(self.path, error)),
+        }
+    }
+
+    fn locked(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn record(&self, state: &mut State, event: Event) -> rusqlite::Result<()> {
+        match event {
+            Event::Begin(branch) => state.begin_branch(branch),
+            Event::Point(branch, point) => state.point(&self.insert_point, branch, point),
+            Event::Special(branch, special) => state.special(&self.insert_special, branch, special),
+            Event::SideEnded(branch, side, ending) => state.side_ended(branch, side, ending),
+            Event::End(_) => Ok(()),
+            Event::Note(branch, note) => {
+                state.connection.execute("INSERT OR IGNORE INTO notes VALUES (?, ?)", [branch, note]).map(|_| ())
+            }
+        }
+    }
+}
+
+impl Observer for Recorder {
+    fn observe(&self, event: Event) -> Verdict {
+        let mut state = self.locked();
+        if state.failure.is_none() {
+            state.failure = self.record(&mut state, event).err();
+        }
+        if state.failure.is_some() { Verdict::Stop } else { Verdict::Continue }
+    }
+}
+
+impl State {
+    fn begin_branch(&mut self, branch: &Branch) -> rusqlite::Result<()> {
+        let first = [
+            Value::Text(branch.name.clone()),
+            Value::Text(branch.family.name().to_string()),
+            Value::Integer(branch.free as i64),
+        ];
+        let transaction = self.connection.transaction()?;
+        // A branch that is there already, from an earlier part of the run, keeps its number.
+        transaction.execute(
+            "INSERT INTO branches (name, family, free, origin, origin_name, origin_kind, origin_parameter, origin_bytes)
+             VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)
+             ON CONFLICT (name) DO UPDATE SET family = ?2, free = ?3, origin = ?4, origin_name = ?5, origin_kind = ?6,
+                 origin_parameter = ?7, origin_bytes = ?8",
+            params_from_iter(first.into_iter().chain(origin_values(&branch.origin))),
+        )?;
+        let number: i64 =
+            transaction.query_row("SELECT branch FROM branches WHERE name = ?", [&branch.name], |row| row.get(0))?;
+        for (side, _) in branch.ends.iter().enumerate().filter(|(_, end)| end.is_none()) {
+            transaction.execute("DELETE FROM ends WHERE branch = ? AND side = ?", params![number, side as i64])?;
+        }
+        // What an earlier part of the run had stored and this one does not go on from will be found again.
+        let reach = branch.points.first().zip(branch.points.last()).map_or((0, -1), |(a, b)| (a.position, b.position));
+        transaction.execute(
+            "DELETE FROM points WHERE branch = ? AND NOT position BETWEEN ? AND ?",
+            params![number, reach.0, reach.1],
+        )?;
+        let kept: Vec<(&str, i64, [u8; 8])> = branch.special.iter().map(|special| key_of(branch, special)).collect();
+        let stored = {
+            let mut statement =
+                transaction.prepare("SELECT kind, position, key FROM special_points WHERE branch = ?")?;
+            let rows = statement.query_map([number], |row| Ok((row.get(0)?, row.get(1)?, row.get(2)?)))?;
+            rows.collect::<rusqlite::Result<Vec<(String, i64, Vec<u8>)>>>()?
+        };
+        for (kind, position, key) in stored {
+            if !kept.iter().any(|(k, p, bytes)| *k == kind && *p == position && bytes[..] == key) {
+                transaction.execute(
+                    "DELETE FROM special_points WHERE branch = ? AND kind = ? AND position = ? AND key = ?",
+                    params![number, kind, position, key],
+                )?;
+            }
+        }
+        transaction.commit()?;
+        self.numbers.insert(branch.name.clone(), number);
+        Ok(())
+    }
+
+    /// The number of a branch; one that was never begun begins here.
+    fn number(&mut self, branch: &Branch) -> rusqlite::Result<i64> {
+        if !self.numbers.contains_key(&branch.name) {
+            self.begin_branch(branch)?;
+        }
+        Ok(self.numbers[&branch.name])
+    }
+
+    fn point(&mut self, sql: &str, branch: &Branch, point: &Point) -> rusqlite::Result<()> {
+        let number = self.number(branch)?;
+        let first = [Value::Integer(number), Value::Integer(point.position)];
+        let values = first.into_iter().chain(values_of(point, &[]));
+        self.connection.prepare_cached(sql)?.execute(params_from_iter(values)).map(|_| ())
+    }
+
+    fn special(&mut self, sql: &str, branch: &Branch, special: &SpecialPoint) -> rusqlite::Result<()> {
+        let number = self.number(branch)?;
+        let (kind, position, key) = key_of(branch, special);
+        let first = [
+            Value::Integer(number),
+            Value::Text(kind.to_string()),
+            Value::Integer(position),
+            Value::Blob(key.to_vec()),
+            Value::Integer(special.unstable_before as i64),
+            Value::Integer(special.unstable_after as i64),
+            Value::Real(special.error),
+        ];
+        let values = first.into_iter().chain(values_of(&special.point, &[special.error]));
+        self.connection.prepare_cached(sql)?.execute(params_from_iter(values)).map(|_| ())
+    }
+
+    fn side_ended(&mut self, branch: &Branch, side: usize, ending: &Ending) -> rusqlite::Result<()> {
+        let number = self.number(branch)?;
+        let first = [
+            Value::Integer(number),
+            Value::Integer(side as i64),
+            Value::Text(ending.code().to_string()),
+            Value::Text(ending.to_string()),
+        ];
+        let values = first.into_iter().chain(ending_values(ending));
+        let sql = "INSERT OR REPLACE INTO ends VALUES (?, ?, ?, ?, ?, ?, ?, ?)";
+        self.connection.prepare_cached(sql)?.execute(params_from_iter(values)).map(|_| ())
+    }
+}
+
+/// What tells special points of a branch apart: kind, position, and the bits of the parameter, since two of one kind can lie
+/// between the same two points.
+fn key_of(branch: &Branch, special: &SpecialPoint) -> (&'static str, i64, [u8; 8]) {
+    let parameter = special.point.parameters.get(branch.free).copied().unwrap_or(0.0);
+    (special.kind.name(), special.point.position, parameter.to_le_bytes())
+}
+
+/// What is written down about the run as a whole.
+fn description(study: &Study) -> Vec<(&'static str, String)> {
+    let seeds: Vec<serde_json::Value> = study
+        .plan
+        .seeds
+        .iter()
+        .map(|s| serde_json::json!({ "name": s.name, "samples": s.samples, "random": s.random, "parameters": s.parameters }))
+        .collect();
+    let settings =
+        serde_json::json!({ "tolerance": study.plan.tolerance, "degree": study.plan.degree, "seeds": seeds });
+    vec![
+        ("foldline", env!("CARGO_PKG_VERSION").to_string()),
+        ("sqlite", rusqlite::version().to_string()),
+        ("platform", format!("{} {}", std::env::consts::OS, std::env::consts::ARCH)),
+        ("settings", settings.to_string()),
+        ("study_file", study.file.clone()),
+        ("study", study.text.clone()),
+        ("model_file", study.model_file.clone()),
+        ("model", study.model_text.clone()),
+    ]
+}
+
+type Variable<'a> = (&'static str, i64, &'a str, &'a str, &'a str);
+
+fn variables(study: &Study) -> Vec<Variable<'_>> {
+    let model = &study.model;
+    let parameters = model.parameters.iter().map(|p| ("parameter", &p.name, &p.unit, &p.description));
+    let states = model.states.iter().map(|s| ("state", &s.name, &s.unit, &s.description));
+    let outputs = model.outputs.iter().map(|o| ("output", &o.name, &o.unit, &o.description));
+    let mut count = HashMap::new();
+    let mut numbered = |class| {
+        let next: &mut i64 = count.entry(class).or_insert(-1);
+        *next += 1;
+        *next
+    };
+    parameters
+        .chain(states)
+        .chain(outputs)
+        .map(|(class, name, unit, text)| (class, numbered(class), name.as_str(), unit.as_str(), text.as_str()))
+        .collect()
+}

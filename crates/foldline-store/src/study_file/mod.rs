@@ -1,0 +1,193 @@
+//! A study file becomes a plan.
+//!
+//! **Idea.** A study says in TOML what to compute with a model: parameter overrides, first solutions (`[[seed]]`) and
+//! branches (`[[branch]]`). The whole text is read before anything is refused, so that all mistakes are said at once, each
+//! with its place, what is wrong, and what would be right. The format is described in docs/book/study-files.md.
+
+mod branches;
+mod seeds;
+
+use crate::diagnostic::Diagnostic;
+use crate::finite::check_seeds;
+use crate::model_file::{parse_model, read_model};
+use crate::nearest::suggest;
+use crate::toml_walk::{Value, Walk, unreadable};
+use foldline::explore::Plan;
+use foldline::model::Model;
+use std::path::{Path, PathBuf};
+use toml::de::DeTable;
+
+/// A study: what to compute, and the texts it was read from.
+#[derive(Clone, Debug)]
+pub struct Study {
+    /// The study file's name, as given.
+    pub file: String,
+    /// The study text, verbatim.
+    pub text: String,
+    /// The model file's name, as resolved from the study's place.
+    pub model_file: String,
+    /// The model text, verbatim.
+    pub model_text: String,
+    /// The model; its parameter values are those of the model file.
+    pub model: Model,
+    /// What to compute.
+    pub plan: Plan,
+}
+
+const ROOT_KEYS: [&str; 9] =
+    ["model", "title", "description", "source", "tolerance", "degree", "parameters", "seed", "branch"];
+
+/// Reads a study file and the model that it names. Every mistake found is returned.
+pub fn read_study(path: &Path) -> Result<Study, Vec<Diagnostic>> {
+    let file = path.display().to_string();
+    let text = std::fs::read_to_string(path).map_err(|error| vec![unreadable(&file, "the study file", &error)])?;
+    let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
+    parse(&text, &file, |walk, root| {
+        let value = model_key(walk, root)?;
+        let named = walk.string(value, "`model`")?;
+        let model_path = simplified(&folder.join(named));
+        if let Err(error) = std::fs::metadata(&model_path) {
+            walk.report(
+                value.span(),
+                format!("the model file {} cannot be read: {error}", model_path.display()),
+                "give the path of a model file, relative to the folder of the study",
+            );
+            return None;
+        }
+        match read_model(&model_path) {
+            Ok((model, model_text)) => Some((model_path.display().to_string(), model_text, model)),
+            Err(mut found) => {
+                walk.found.append(&mut found);
+                None
+            }
+        }
+    })
+}
+
+/// Reads a study text whose model text is given, whatever file the study names as its model.
+pub fn parse_study(text: &str, file: &str, model_text: &str, model_file: &str) -> Result<Study, Vec<Diagnostic>> {
+    parse(text, file, |walk, root| {
+        model_key(walk, root)?;
+        match parse_model(model_text, model_file) {
+            Ok(model) => Some((model_file.to_string(), model_text.to_string(), model)),
+            Err(mut found) => {
+                walk.found.append(&mut found);
+                None
+            }
+        }
+    })
+}
+
+/// Whether a text says what to compute rather than how a system moves: it names a model, a seed or a branch.
+pub fn is_study(text: &str) -> bool {
+    let (root, _) = DeTable::parse_recoverable(text);
+    ["model", "seed", "branch"].iter().any(|key| root.get_ref().contains_key(*key))
+}
+
+fn parse(
+    text: &str,
+    file: &str,
+    load: impl FnOnce(&mut Walk, &DeTable) -> Option<(String, String, Model)>,
+) -> Result<Study, Vec<Diagnostic>> {
+    let (mut walk, root) = Walk::parse(text, file)?;
+    walk.only(&root, &ROOT_KEYS, "the study");
+    let Some((model_file, model_text, model)) = load(&mut walk, &root) else { return Err(walk.found) };
+
+    let tolerance = tolerance(&mut walk, &root);
+    let degree = root.get("degree").and_then(|v| walk.integer(v, "`degree`", 2..=7)).unwrap_or(4) as usize;
+    let mut defaults: Vec<f64> = model.parameters.iter().map(|p| p.value).collect();
+    if let Some(value) = root.get("parameters") {
+        override_parameters(&mut walk, value, &model, &mut defaults);
+    }
+    let seeds = seeds::read(&mut walk, &root, &model, &defaults);
+    let branches = branches::read(&mut walk, &root, &model, &seeds);
+    if walk.found.is_empty() {
+        check_seeds(&mut walk, &seeds, &model, &model_text, &model_file);
+    }
+    if !walk.found.is_empty() {
+        return Err(walk.found);
+    }
+    let seeds = seeds.into_iter().map(|(_, seed)| seed).collect();
+    let plan = Plan { tolerance, degree, seeds, branches };
+    Ok(Study { file: file.to_string(), text: text.to_string(), model_file, model_text, model, plan })
+}
+
+fn model_key<'v, 't>(walk: &mut Walk, root: &'v DeTable<'t>) -> Option<&'v Value<'t>> {
+    let value = root.get("model");
+    if value.is_none() {
+        walk.report(0..0, "the study names no model", "add a line such as `model = \"../models/lorenz.toml\"`");
+    }
+    value
+}
+
+/// The one tolerance: relative, from 1e-12 to 1e-2, by default 1e-6.
+fn tolerance(walk: &mut Walk, root: &DeTable) -> f64 {
+    const DEFAULT: f64 = 1e-6;
+    let Some(value) = root.get("tolerance") else { return DEFAULT };
+    let Some(tolerance) = walk.number(value, "`tolerance`") else { return DEFAULT };
+    if !(1e-12..=1e-2).contains(&tolerance) {
+        let message = format!("the tolerance {tolerance:e} is out of bounds");
+        walk.report(value.span(), message, "a number from 1e-12 to 1e-2; 1e-6 is the default");
+    }
+    tolerance
+}
+
+/// Replaces the values that a table `{ name = number, … }` names.
+fn override_parameters(walk: &mut Walk, value: &Value, model: &Model, values: &mut [f64]) {
+    let Some(table) = walk.table(value, "`parameters`") else { return };
+    for (key, value) in table.iter() {
+        let name: &str = key.get_ref();
+        match model.parameter_index(name) {
+            Some(index) => {
+                if let Some(number) = walk.number(value, &format!("the parameter `{name}`")) {
+                    values[index] = number;
+                }
+            }
+            None => unknown_parameter(walk, key.span(), name, model),
+        }
+    }
+}
+
+fn unknown_parameter(walk: &mut Walk, span: std::ops::Range<usize>, name: &str, model: &Model) {
+    let known: Vec<&str> = model.parameters.iter().map(|p| p.name.as_str()).collect();
+    walk.report(span, format!("the model `{}` has no parameter `{name}`", model.name), suggest(name, &known));
+}
+
+/// The name of an item; an absent one is a mistake, and so is one used before.
+fn unique_name(
+    walk: &mut Walk,
+    item: &DeTable,
+    span: &std::ops::Range<usize>,
+    what: &str,
+    taken: &[&str],
+) -> Option<String> {
+    let Some(value) = item.get("name") else {
+        walk.report(span.clone(), format!("this {what} has no name"), "add a line such as `name = \"upper\"`");
+        return None;
+    };
+    let name = walk.string(value, "`name`")?;
+    if taken.contains(&name.as_str()) {
+        walk.report(
+            value.span(),
+            format!("the name \"{name}\" is used twice"),
+            "give every seed and every branch a name of its own",
+        );
+    }
+    Some(name)
+}
+
+/// The path without `x/..` in its middle, for messages.
+fn simplified(path: &Path) -> PathBuf {
+    use std::path::Component::{Normal, ParentDir};
+    let mut parts: Vec<std::path::Component> = Vec::new();
+    for part in path.components() {
+        match (part, parts.last()) {
+            // Only where the folder left is not a link does `x/..` mean the folder itself.
+            (ParentDir, Some(Normal(_))) if !parts.iter().collect::<PathBuf>().is_symlink() => {
+                parts.pop();
+            }
+            _ => parts.push(part),
+        }
+    }
+    parts.iter().collect()
+}

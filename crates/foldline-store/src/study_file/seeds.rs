@@ -1,0 +1,99 @@
+//! `[[seed]]`: first solutions.
+
+use super::{override_parameters, unique_name};
+use crate::nearest::suggest;
+use crate::toml_walk::{Value, Walk};
+use foldline::explore::{AttractorKey, SeedPlan, SeedSource};
+use foldline::model::Model;
+use std::ops::Range;
+use toml::de::DeTable;
+
+const KEYS: [&str; 7] = ["name", "description", "attractor", "state", "parameters", "samples", "random"];
+const SAMPLES: usize = 128;
+const RANDOM: u64 = 1;
+
+/// Every seed with its place in the text. A seed in which something is wrong is kept as far as it goes, so that branches
+/// that start from it are not complained about a second time.
+pub(super) fn read(walk: &mut Walk, root: &DeTable, model: &Model, defaults: &[f64]) -> Vec<(Range<usize>, SeedPlan)> {
+    let mut seeds: Vec<(Range<usize>, SeedPlan)> = Vec::new();
+    for (span, table) in walk.tables(root, "seed") {
+        walk.only(table, &KEYS, "a seed");
+        let taken: Vec<&str> = seeds.iter().map(|(_, seed)| seed.name.as_str()).collect();
+        let Some(name) = unique_name(walk, table, &span, "seed", &taken) else { continue };
+        let mut parameters = defaults.to_vec();
+        if let Some(value) = table.get("parameters") {
+            override_parameters(walk, value, model, &mut parameters);
+        }
+        let source = source(walk, table, &span, model);
+        let samples = table.get("samples").and_then(|v| walk.integer(v, "`samples`", 1..=1_000_000));
+        let random = table.get("random").and_then(|v| walk.integer(v, "`random`", 0..=u64::MAX));
+        let samples = samples.map_or(SAMPLES, |n| n as usize);
+        seeds.push((span, SeedPlan { name, source, parameters, samples, random: random.unwrap_or(RANDOM) }));
+    }
+    seeds
+}
+
+fn source(walk: &mut Walk, table: &DeTable, span: &Range<usize>, model: &Model) -> SeedSource {
+    let fallback = SeedSource::Attractor(AttractorKey::Equilibrium);
+    let found = match (table.get("attractor"), table.get("state")) {
+        (Some(value), None) => attractor(walk, value, model).map(SeedSource::Attractor),
+        (None, Some(value)) => state(walk, value, model).map(SeedSource::State),
+        (Some(value), Some(_)) => {
+            let message = "this seed has both an `attractor` and a `state`";
+            walk.report(value.span(), message, "keep one: an attractor is searched for, a state is settled from");
+            None
+        }
+        (None, None) => {
+            let hint =
+                "add `attractor = \"equilibrium\"`, `\"cycle\"` or a ratio such as `\"2:1\"`, or `state = { … }`";
+            walk.report(span.clone(), "this seed does not say which solution it means", hint);
+            None
+        }
+    };
+    found.unwrap_or(fallback)
+}
+
+fn attractor(walk: &mut Walk, value: &Value, model: &Model) -> Option<AttractorKey> {
+    let text = walk.string(value, "`attractor`")?;
+    let ratio = text.split_once(':').and_then(|(a, b)| Some((a.trim().parse().ok()?, b.trim().parse().ok()?)));
+    match (text.as_str(), ratio) {
+        ("equilibrium", _) => Some(AttractorKey::Equilibrium),
+        ("cycle", _) => Some(AttractorKey::Cycle),
+        (_, Some((a, b))) if a > 0 && b > 0 => {
+            if model.whirl.is_none() {
+                let message = format!("the ratio \"{text}\" needs a whirling motion, which this model does not name");
+                let hint = "add `whirl = [\"u\", \"v\"]` to the model file, or use `attractor = \"cycle\"`";
+                walk.report(value.span(), message, hint);
+            }
+            Some(AttractorKey::Ratio(a, b))
+        }
+        _ => {
+            let message = format!("\"{text}\" is no attractor");
+            walk.report(
+                value.span(),
+                message,
+                "\"equilibrium\", \"cycle\", or a ratio of whole numbers such as \"2:1\"",
+            );
+            None
+        }
+    }
+}
+
+fn state(walk: &mut Walk, value: &Value, model: &Model) -> Option<Vec<f64>> {
+    let table = walk.table(value, "`state`")?;
+    let known: Vec<&str> = model.states.iter().map(|s| s.name.as_str()).collect();
+    for key in table.keys() {
+        let name: &str = key.get_ref();
+        if !known.contains(&name) {
+            let message = format!("the model `{}` has no state `{name}`", model.name);
+            walk.report(key.span(), message, suggest(name, &known));
+        }
+    }
+    let missing: Vec<&str> = known.iter().copied().filter(|name| table.get(*name).is_none()).collect();
+    if !missing.is_empty() {
+        let message = format!("the state lacks {}", missing.join(", "));
+        walk.report(value.span(), message, format!("give a number for each of {}", known.join(", ")));
+        return None;
+    }
+    known.iter().map(|name| walk.number(table.get(*name)?, &format!("the state `{name}`"))).collect()
+}

@@ -1,0 +1,167 @@
+//! Walking a TOML text while collecting everything that is wrong with it, each with its place.
+
+use crate::diagnostic::Diagnostic;
+use crate::nearest::suggest;
+use std::ops::Range;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+/// A value with its place in the text.
+pub(crate) type Value<'t> = Spanned<DeValue<'t>>;
+
+/// A text being read, and what was found wrong with it so far.
+pub(crate) struct Walk<'t> {
+    file: &'t str,
+    text: &'t str,
+    pub(crate) found: Vec<Diagnostic>,
+}
+
+impl<'t> Walk<'t> {
+    /// The text and its root table; a text that is not TOML is answered with the parser's own complaint and place.
+    pub(crate) fn parse(text: &'t str, file: &'t str) -> Result<(Walk<'t>, DeTable<'t>), Vec<Diagnostic>> {
+        let mut walk = Walk { file, text, found: Vec::new() };
+        match DeTable::parse(text) {
+            Ok(table) => Ok((walk, table.into_inner())),
+            Err(error) => {
+                let span = error.span().unwrap_or(0..0);
+                walk.report(span, error.message(), "the file must be TOML: `key = value`, `[table]`, `[[list]]`");
+                Err(walk.found)
+            }
+        }
+    }
+
+    /// Notes a mistake.
+    pub(crate) fn report(&mut self, span: Range<usize>, message: impl Into<String>, hint: impl Into<String>) {
+        self.found.push(diagnose(self.file, self.text, span, message.into(), hint.into()));
+    }
+
+    /// Reports every key of `table` that is not among `known`.
+    pub(crate) fn only(&mut self, table: &DeTable, known: &[&str], whose: &str) {
+        for key in table.keys() {
+            let name: &str = key.get_ref();
+            if !known.contains(&name) {
+                self.report(key.span(), format!("unknown key `{name}` in {whose}"), suggest(name, known));
+            }
+        }
+    }
+
+    /// A finite number, integer or decimal.
+    pub(crate) fn number(&mut self, value: &Value, what: &str) -> Option<f64> {
+        let text = match value.get_ref() {
+            DeValue::Integer(integer) if integer.radix() == 10 => integer.as_str(),
+            DeValue::Float(float) => float.as_str(),
+            other => {
+                self.wrong_type(value, other.type_str(), what, "a number");
+                return None;
+            }
+        };
+        match text.replace('_', "").parse::<f64>() {
+            Ok(number) if number.is_finite() => Some(number),
+            _ => {
+                self.report(
+                    value.span(),
+                    format!("{what} is not a finite number"),
+                    "write a number such as 1.5 or 1e-6",
+                );
+                None
+            }
+        }
+    }
+
+    /// An integer within `allowed`.
+    pub(crate) fn integer(&mut self, value: &Value, what: &str, allowed: std::ops::RangeInclusive<u64>) -> Option<u64> {
+        let DeValue::Integer(integer) = value.get_ref() else {
+            self.wrong_type(value, value.get_ref().type_str(), what, "an integer");
+            return None;
+        };
+        match u64::from_str_radix(&integer.as_str().replace('_', ""), integer.radix()) {
+            Ok(number) if allowed.contains(&number) => Some(number),
+            _ => {
+                let message = format!("{what} is {}, out of bounds", integer.as_str());
+                let hint = match *allowed.end() {
+                    u64::MAX => format!("an integer from {} upwards", allowed.start()),
+                    end => format!("an integer from {} to {end}", allowed.start()),
+                };
+                self.report(value.span(), message, hint);
+                None
+            }
+        }
+    }
+
+    /// A text that is not empty.
+    pub(crate) fn string(&mut self, value: &Value, what: &str) -> Option<String> {
+        match value.get_ref().as_str() {
+            Some("") => {
+                self.report(value.span(), format!("{what} is empty"), "write something between the quotes");
+                None
+            }
+            Some(text) => Some(text.to_string()),
+            None => {
+                self.wrong_type(value, value.get_ref().type_str(), what, "a text in quotes");
+                None
+            }
+        }
+    }
+
+    /// A table, `None` with a complaint if it is something else.
+    pub(crate) fn table<'v, 'x>(&mut self, value: &'v Value<'x>, what: &str) -> Option<&'v DeTable<'x>> {
+        let table = value.get_ref().as_table();
+        if table.is_none() {
+            self.wrong_type(value, value.get_ref().type_str(), what, "a table of `name = value`");
+        }
+        table
+    }
+
+    /// The tables of a list `[[what]]`; an absent list is empty.
+    pub(crate) fn tables<'v, 'x>(&mut self, root: &'v DeTable<'x>, what: &str) -> Vec<(Range<usize>, &'v DeTable<'x>)> {
+        let Some(value) = root.get(what) else { return Vec::new() };
+        let tables = value.get_ref().as_array().map(|list| {
+            list.iter()
+                .map(|item| item.get_ref().as_table().map(|table| (item.span(), table)))
+                .collect::<Option<Vec<_>>>()
+        });
+        match tables {
+            Some(Some(tables)) => tables,
+            _ => {
+                self.report(
+                    value.span(),
+                    format!("`{what}` is not a list of tables"),
+                    format!("begin each with `[[{what}]]`"),
+                );
+                Vec::new()
+            }
+        }
+    }
+
+    fn wrong_type(&mut self, value: &Value, found: &str, what: &str, wanted: &str) {
+        self.report(value.span(), format!("{what} is a {found}, not {wanted}"), format!("write {wanted}"));
+    }
+}
+
+/// A diagnostic for a byte range of a text.
+pub(crate) fn diagnose(file: &str, text: &str, span: Range<usize>, message: String, hint: String) -> Diagnostic {
+    let start = (0..=span.start.min(text.len())).rev().find(|&at| text.is_char_boundary(at)).unwrap_or(0);
+    let line_start = text[..start].rfind('\n').map_or(0, |at| at + 1);
+    let line_end = text[start..].find('\n').map_or(text.len(), |at| start + at);
+    let end = (start..=span.end.clamp(start, line_end)).rev().find(|&at| text.is_char_boundary(at)).unwrap_or(start);
+    Diagnostic {
+        file: file.to_string(),
+        line: text[..start].matches('\n').count() + 1,
+        column: text[line_start..start].chars().count() + 1,
+        snippet: text[line_start..line_end].trim_end().to_string(),
+        length: text[start..end].chars().count().max(1),
+        message,
+        hint: Some(hint),
+    }
+}
+
+/// A diagnostic about a whole file that could not be read.
+pub(crate) fn unreadable(file: &str, what: &str, error: &std::io::Error) -> Diagnostic {
+    let hint = match error.kind() {
+        std::io::ErrorKind::NotFound => "check the spelling of the path; relative paths start at the current folder",
+        std::io::ErrorKind::PermissionDenied => "make the file readable, or run as a user who may read it",
+        std::io::ErrorKind::InvalidData => "save the file as UTF-8 text",
+        _ => "check that the path names a readable text file",
+    };
+    diagnose(file, "", 0..0, format!("{what} cannot be read: {error}"), hint.to_string())
+}

@@ -1,0 +1,239 @@
+//! The run file: what goes in comes out to the bit, a kill loses nothing, and other files are told apart.
+
+use foldline::contract::{Event, Observer, Verdict};
+use foldline::diagram::{
+    Branch, Cost, Cycle, Diagram, Ending, Family, Kind, Origin, Point, Solution, SpecialPoint, Trust,
+};
+use foldline_store::run_file::{Recorder, RunFileError, load, path_in};
+use foldline_store::study_file::{Study, parse_study};
+use num_complex::Complex64;
+use std::path::Path;
+
+// K and k: SQLite does not tell them apart in column names.
+const MODEL: &str = "name = \"pitchfork\"\n[parameters]\nmu = 1.0\nK = 2.0\nk = 0.0\n\
+    [states.x]\nequation = \"mu*x - K*x^3 + k\"\n[outputs]\nr = \"abs(x)\"\n";
+const STUDY: &str = "model = \"pitchfork.toml\"\n[[seed]]\nname = \"start\"\nstate = { x = 0.1 }\n\
+    [[branch]]\nname = \"main\"\nfrom = \"start\"\nfree = \"mu\"\nrange = [-1, 2]\n";
+
+fn study() -> Study {
+    parse_study(STUDY, "study.toml", MODEL, "pitchfork.toml").expect("the study is right")
+}
+
+/// Numbers that a decimal or an SQLite REAL column would not keep: NaN, -0, infinities, subnormals, 1/3.
+fn awkward(k: usize) -> f64 {
+    [f64::NAN, -0.0, f64::INFINITY, f64::NEG_INFINITY, 5e-324, 1.0 / 3.0, -1.0e300, 0.1 + 0.2][k % 8]
+}
+
+fn point(position: i64, cycle: bool) -> Point {
+    let list = |n: usize, from: usize| (0..n).map(|k| awkward(k + from)).collect::<Vec<f64>>();
+    let solution = if cycle {
+        let mesh: Vec<f64> = vec![0.0, 1.0 / 3.0, 1.0];
+        Solution::Cycle(Cycle { period: awkward(5), mesh: mesh.into(), degree: 4, profile: list(2 * 5, 3) })
+    } else {
+        Solution::Equilibrium(list(1, 5))
+    };
+    Point {
+        position,
+        parameters: vec![position as f64 / 7.0, -0.0, f64::NAN],
+        solution,
+        tangent: list(5, 1),
+        step: awkward(7),
+        spectrum: vec![Complex64::new(awkward(0), awkward(1)), Complex64::new(awkward(5), awkward(4))],
+        unstable: 1,
+        ranges: vec![[awkward(1), awkward(5)], [awkward(0), awkward(2)]],
+        trust: Trust { discretisation: 1e-9, residual: -0.0, trivial_defect: f64::NAN, liouville_defect: 1.0 / 3.0 },
+        cost: Cost { newton: 3, factorisations: 4, rejected: 1 },
+    }
+}
+
+fn special(kind: Kind, position: i64, parameter: f64, cycle: bool) -> SpecialPoint {
+    let mut point = point(position, cycle);
+    point.parameters[0] = parameter;
+    SpecialPoint { kind, point, unstable_before: 0, unstable_after: 2, error: awkward(5) }
+}
+
+fn diagram() -> Diagram {
+    let mut main = Branch::new("main", Family::Equilibrium, 0, Origin::Seed("start".into()));
+    (-2..=3).for_each(|k| main.insert(point(k, false)));
+    // Two of one kind between the same two points are two.
+    main.insert_special(special(Kind::Hopf, 1, 0.15, false));
+    main.insert_special(special(Kind::Hopf, 1, 0.16, false));
+    main.ends = [Some(Ending::Bound(-1.0)), Some(Ending::Stopped)];
+    let origin = Origin::Switch { parent: "main".into(), kind: Kind::Hopf, parameter: 0.15 };
+    let mut cycles = Branch::new("main/hopf", Family::Cycle, 0, origin);
+    (0..=2).for_each(|k| cycles.insert(point(k, true)));
+    cycles.insert_special(special(Kind::Unexplained, 0, -0.0, true));
+    cycles.ends = [
+        Some(Ending::Joined { at: Kind::Hopf, parameter: 0.15 }),
+        Some(Ending::StepTooSmall("Newton left its region 7 times".into())),
+    ];
+    let mut third = Branch::new("third", Family::Cycle, 2, Origin::EndOf("main".into()));
+    third.ends = [Some(Ending::PointLimit(17)), Some(Ending::PeriodUnbounded(1.0 / 3.0))];
+    Diagram { branches: vec![main, cycles, third] }
+}
+
+fn record(diagram: &Diagram, observer: &dyn Observer) {
+    for branch in &diagram.branches {
+        let mut bare = branch.clone();
+        (bare.points, bare.special, bare.ends) = (Vec::new(), Vec::new(), [None, None]);
+        observer.observe(Event::Begin(&bare));
+        branch.points.iter().for_each(|p| assert_eq!(observer.observe(Event::Point(branch, p)), Verdict::Continue));
+        branch.special.iter().for_each(|s| assert_eq!(observer.observe(Event::Special(branch, s)), Verdict::Continue));
+        for (side, ending) in branch.ends.iter().enumerate().filter_map(|(s, e)| Some((s, e.as_ref()?))) {
+            observer.observe(Event::SideEnded(branch, side, ending));
+        }
+        observer.observe(Event::Note(&branch.name, "a remark"));
+        observer.observe(Event::End(branch));
+    }
+}
+
+/// A text in which every number stands with its bits, so that NaN equals NaN and 0 differs from -0.
+fn exactly(diagram: &Diagram) -> String {
+    fn bits(values: &[f64]) -> Vec<u64> {
+        values.iter().map(|v| v.to_bits()).collect()
+    }
+    fn of_point(p: &Point) -> String {
+        let solution = match &p.solution {
+            Solution::Equilibrium(x) => format!("{:?}", bits(x)),
+            Solution::Cycle(c) => {
+                format!("{} {:?} {} {:?}", c.period.to_bits(), bits(&c.mesh), c.degree, bits(&c.profile))
+            }
+        };
+        let spectrum: Vec<f64> = p.spectrum.iter().flat_map(|z| [z.re, z.im]).collect();
+        let t = p.trust;
+        let trust = [t.discretisation, t.residual, t.trivial_defect, t.liouville_defect, p.step];
+        let lists = [&p.parameters[..], &p.tangent, &spectrum, p.ranges.as_flattened(), &trust].map(bits);
+        format!("{} {solution} {lists:?} {} {:?}\n", p.position, p.unstable, p.cost)
+    }
+    let mut text = String::new();
+    for b in &diagram.branches {
+        text += &format!("{} {:?} {} {:?} {:?}\n", b.name, b.family, b.free, b.origin, b.ends);
+        b.points.iter().for_each(|p| text += &of_point(p));
+        for s in &b.special {
+            text += &format!("{} {} {} {} ", s.kind, s.unstable_before, s.unstable_after, s.error.to_bits());
+            text += &of_point(&s.point);
+        }
+    }
+    text
+}
+
+#[test]
+fn a_diagram_comes_back_to_the_bit_and_so_do_the_texts() {
+    let folder = tempfile::tempdir().unwrap();
+    let recorder = Recorder::create(&folder.path().join("new"), &study()).unwrap();
+    record(&diagram(), &recorder);
+    recorder.finish().unwrap();
+    let back = load(&folder.path().join("new")).unwrap();
+    assert_eq!(exactly(&back.diagram), exactly(&diagram()));
+    assert_eq!((back.study_text.as_str(), back.model_text.as_str()), (STUDY, MODEL));
+    assert_eq!(back.notes.len(), 3);
+}
+
+#[test]
+fn a_killed_run_resumes_with_everything_it_had_accepted_and_repetition_changes_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let recorder = Recorder::create(folder.path(), &study()).unwrap();
+    record(&diagram(), &recorder);
+    // A killed process closes nothing: its log stays beside the file, as it does for this copy.
+    let copy = tempfile::tempdir().unwrap();
+    for file in std::fs::read_dir(folder.path()).unwrap() {
+        let file = file.unwrap();
+        std::fs::copy(file.path(), copy.path().join(file.file_name())).unwrap();
+    }
+    let (resumed, earlier) = Recorder::resume(copy.path(), &study()).unwrap();
+    let mut expected = diagram();
+    expected.branches[0].ends[1] = None; // it had been stopped on request
+    assert_eq!(exactly(&earlier), exactly(&expected));
+
+    record(&diagram(), &resumed);
+    resumed.finish().unwrap();
+    assert_eq!(exactly(&load(copy.path()).unwrap().diagram), exactly(&diagram()));
+}
+
+#[test]
+fn what_a_resumed_branch_does_not_go_on_from_is_forgotten_so_that_it_is_not_found_twice() {
+    let folder = tempfile::tempdir().unwrap();
+    let recorder = Recorder::create(folder.path(), &study()).unwrap();
+    record(&diagram(), &recorder);
+    // The special points of the last step are located once more, with other rounding errors.
+    let mut main = diagram().branches.remove(0);
+    main.points.retain(|p| p.position <= 2);
+    main.special.truncate(1);
+    recorder.observe(Event::Begin(&main));
+    recorder.observe(Event::Special(&main, &special(Kind::Hopf, 1, 0.16 + 1e-15, false)));
+    recorder.finish().unwrap();
+    let back = load(folder.path()).unwrap().diagram;
+    let parameters: Vec<f64> = back.branches[0].special.iter().map(|s| s.point.parameters[0]).collect();
+    assert_eq!(parameters, [0.15, 0.16 + 1e-15]);
+    assert_eq!(back.branches[0].points.iter().map(|p| p.position).collect::<Vec<_>>(), [-2, -1, 0, 1, 2]);
+}
+
+#[test]
+fn a_run_killed_before_its_first_transaction_resumes_as_a_new_one() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(path_in(folder.path()), "").unwrap();
+    let (recorder, earlier) = Recorder::resume(folder.path(), &study()).unwrap();
+    assert!(earlier.branches.is_empty());
+    record(&diagram(), &recorder);
+    recorder.finish().unwrap();
+    assert_eq!(load(folder.path()).unwrap().diagram.branches.len(), 3);
+}
+
+#[test]
+fn an_open_run_can_be_read_by_others() {
+    let folder = tempfile::tempdir().unwrap();
+    let recorder = Recorder::create(folder.path(), &study()).unwrap();
+    let diagram = diagram();
+    recorder.observe(Event::Begin(&diagram.branches[0]));
+    recorder.observe(Event::Point(&diagram.branches[0], &point(0, false)));
+    assert_eq!(load(folder.path()).unwrap().diagram.branches[0].points.len(), 1);
+    recorder.observe(Event::Point(&diagram.branches[0], &point(1, false)));
+    assert_eq!(load(folder.path()).unwrap().diagram.branches[0].points.len(), 2);
+    recorder.finish().unwrap();
+}
+
+#[test]
+fn numbers_can_be_read_by_name_without_this_program() {
+    let folder = tempfile::tempdir().unwrap();
+    let recorder = Recorder::create(folder.path(), &study()).unwrap();
+    record(&diagram(), &recorder);
+    recorder.finish().unwrap();
+    let connection = rusqlite::Connection::open(path_in(folder.path())).unwrap();
+    let sql = "SELECT mu, K, x_max, unstable FROM points JOIN branches USING (branch)
+               WHERE name = 'main' AND position = 3";
+    let row = connection
+        .query_row(sql, [], |row| {
+            Ok((row.get::<_, f64>(0)?, row.get::<_, f64>(1)?, row.get::<_, f64>(2)?, row.get::<_, i64>(3)?))
+        })
+        .unwrap();
+    assert_eq!(row, (3.0 / 7.0, 0.0, 1.0 / 3.0, 1));
+}
+
+fn refusal(result: Result<impl Sized, RunFileError>) -> String {
+    result.err().map(|e| e.to_string()).unwrap_or_default()
+}
+
+#[test]
+fn what_cannot_be_continued_is_refused_with_the_reason_and_the_cure() {
+    let folder = tempfile::tempdir().unwrap();
+    Recorder::create(folder.path(), &study()).unwrap().finish().unwrap();
+    let exists = refusal(Recorder::create(folder.path(), &study()));
+    assert!(exists.contains("exists already") && exists.contains("--resume"), "{exists}");
+
+    let other = Study { text: STUDY.replace("2]", "3]"), ..study() };
+    let changed = refusal(Recorder::resume(folder.path(), &other));
+    assert!(changed.contains("the study has changed") && changed.contains("--out"), "{changed}");
+    let other = Study { model_text: MODEL.replace("2.0", "3.0"), ..study() };
+    let changed = refusal(Recorder::resume(folder.path(), &other));
+    assert!(changed.contains("the model has changed"), "{changed}");
+
+    let connection = rusqlite::Connection::open(path_in(folder.path())).unwrap();
+    connection.pragma_update(None, "user_version", 99).unwrap();
+    drop(connection);
+    let newer = refusal(load(folder.path()));
+    assert!(newer.contains("format 99") && newer.contains("newer foldline"), "{newer}");
+
+    std::fs::write(path_in(folder.path()), "not a database, but long enough to be taken for one").unwrap();
+    assert!(refusal(load(folder.path())).contains("is not a run file"));
+    assert!(refusal(load(Path::new("/nowhere/at/all"))).contains("there is no run file"));
+}

@@ -1,0 +1,311 @@
+//! From one accepted point to the next; why a side ends.
+//!
+//! **Idea.** One loop: predict with the tangent and its change, correct, judge the step by the angle between tangents,
+//! clip at the bounds, see whether the branch has come to an end, look for special points in between, emit, choose the
+//! next step.
+
+use super::corrector::{Failure, Plane, Station, parameter_row, settle};
+use super::inspect::{Found, History};
+use super::locate::Stretch;
+use super::Settings;
+use crate::contract::{Monitor, Verdict, ZeroProblem};
+use crate::diagram::{Cost, Ending, Mesh, Point, SpecialPoint};
+
+/// What a run emits, in the order of travel.
+pub enum Item {
+    /// A special point; it lies between the last point and the next.
+    Special(SpecialPoint),
+    /// An accepted point.
+    Point(Point),
+}
+
+/// One side of a branch being followed.
+pub struct Follow<'w> {
+    /// The curve.
+    pub problem: &'w mut dyn ZeroProblem,
+    /// What governs the run.
+    pub settings: &'w Settings,
+    /// What to look for.
+    pub monitors: &'w [Box<dyn Monitor>],
+    /// Sign changes that end the branch: it has met the branch of simpler solutions that it comes from.
+    pub collapses: &'w [Box<dyn Monitor>],
+    /// +1 towards larger positions, -1 towards smaller.
+    pub direction: f64,
+    /// Index of the continuation parameter among the parameters of a point.
+    pub free: usize,
+    /// The point whose return ends the run as closed; `None` where the branch cannot close.
+    pub home: Option<&'w Point>,
+}
+
+/// An accepted step, perhaps the last one.
+struct Step {
+    right: Station,
+    end: Option<Ending>,
+}
+
+/// What the point before the current one contributes: its tangent for the predictor, its monitors for the inspection.
+struct Trail {
+    tangent: Vec<f64>,
+    mesh: Mesh,
+    history: History,
+}
+
+/// Share of the deviation from simpler solutions below which a step counts as having landed on them.
+const NOTHING: f64 = 0.05;
+
+/// Follows one side from `start`, which has been emitted already, and of which `previous` is the predecessor on the same
+/// side if there is one. `emitted` counts the points of this side so far.
+pub fn follow(walk: &mut Follow, start: Station, previous: Option<Station>, mut emitted: usize, sink: &mut dyn FnMut(Item) -> Verdict) -> Ending {
+    let mut left = start;
+    let mut step = if left.point.step > 0.0 { left.point.step } else { walk.settings.first_step };
+    let mut position = left.point.position;
+    let mut trail = previous.map(|p| walk.trail(&p, &left));
+    let first_period = walk.home.unwrap_or(&left.point).solution.period();
+    loop {
+        let outward = |bound: f64| (left.parameter() - bound).abs() <= 1e-12 * (1.0 + bound.abs());
+        let [low, high] = walk.settings.range;
+        if (outward(low) && left.slope() < 0.0) || (outward(high) && left.slope() > 0.0) {
+            return Ending::Bound(left.parameter());
+        }
+        if emitted >= walk.settings.max_points {
+            return Ending::PointLimit(emitted);
+        }
+        walk.refresh(&mut left);
+        let mut cost = Cost::default();
+        let Step { mut right, end } = loop {
+            match walk.attempt(&left, trail.as_ref(), step, emitted, &mut cost) {
+                Ok(accepted) => break accepted,
+                Err(why) => {
+                    cost.rejected += 1;
+                    step *= 0.5;
+                    if step < walk.settings.min_step {
+                        return ended_by(why, left.parameter());
+                    }
+                }
+            }
+        };
+        let history = trail.as_ref().map(|t| t.history.clone());
+        let found = walk.inspect(&left, &right, history.as_ref(), 0, &mut cost);
+        let found = match end {
+            Some(Ending::Joined { parameter, .. }) => walk.up_to(parameter, found, left.point.unstable, &mut right),
+            _ => found,
+        };
+        let (angle, length) = walk.angle(&left, &right);
+        let factor = (walk.settings.target_angle / angle.max(1e-12)).clamp(0.3, 2.0);
+        step = (length * factor).clamp(walk.settings.min_step, walk.settings.max_step);
+        let sideways = if walk.direction > 0.0 { 0 } else { -1 };
+        for item in found {
+            let verdict = match item {
+                Found::Special(mut special) => {
+                    special.point.position = position + sideways;
+                    sink(Item::Special(special))
+                }
+                Found::Inserted(station, rest) => {
+                    position += walk.direction as i64;
+                    emitted += 1;
+                    let point = Point { position, step: rest, ..station.point };
+                    sink(Item::Point(point))
+                }
+            };
+            if verdict == Verdict::Stop {
+                return Ending::Stopped;
+            }
+        }
+        position += walk.direction as i64;
+        emitted += 1;
+        let mut point = right.point.clone();
+        (point.position, point.step, point.cost) = (position, step, cost);
+        if sink(Item::Point(point)) == Verdict::Stop {
+            return Ending::Stopped;
+        }
+        if let Some(ending) = end {
+            return ending;
+        }
+        if let (Some(first), Some(now)) = (first_period, right.point.solution.period())
+            && now > walk.settings.period_growth * first
+        {
+            return Ending::PeriodUnbounded(now);
+        }
+        trail = Some(walk.trail(&left, &right));
+        left = right;
+    }
+}
+
+fn ended_by(why: Failure, parameter: f64) -> Ending {
+    match why {
+        Failure::NotFinite => Ending::NotFinite(format!("the vector field is not finite next to {parameter}")),
+        Failure::Mesh(_) => Ending::MeshTooLarge(why.to_string()),
+        Failure::Singular | Failure::NoConvergence(_) => Ending::StepTooSmall(format!("{why} next to {parameter}")),
+    }
+}
+
+impl Follow<'_> {
+    fn place(&mut self, station: &Station) {
+        self.problem.set_mesh(&station.mesh);
+        self.problem.anchor(&station.u);
+    }
+
+    fn trail(&mut self, before: &Station, now: &Station) -> Trail {
+        self.place(before);
+        let u = self.problem.transfer(&now.u, &now.mesh, &before.mesh);
+        let gap: Vec<f64> = u.iter().zip(&before.u).map(|(a, b)| a - b).collect();
+        let distance = self.problem.dot(&before.tangent, &gap).abs().max(f64::MIN_POSITIVE);
+        let history = History { distance, values: self.monitored(before) };
+        Trail { tangent: before.tangent.clone(), mesh: before.mesh.clone(), history }
+    }
+
+    /// Moves the working copy of a station to a mesh with room for the next step, where its own has none left. The stored
+    /// point stays as it is.
+    fn refresh(&mut self, station: &mut Station) {
+        if let Some(better) = station.roomier.take() {
+            station.u = self.problem.transfer(&station.u, &station.mesh, &better);
+            station.tangent = self.problem.transfer(&station.tangent, &station.mesh, &better);
+            station.mesh = better;
+        }
+    }
+
+    /// Angle between the tangents, and distance along the left one.
+    fn angle(&mut self, left: &Station, right: &Station) -> (f64, f64) {
+        self.place(left);
+        let tangent = self.problem.transfer(&right.tangent, &right.mesh, &left.mesh);
+        let u = self.problem.transfer(&right.u, &right.mesh, &left.mesh);
+        let gap: Vec<f64> = u.iter().zip(&left.u).map(|(a, b)| a - b).collect();
+        let sizes = (self.problem.dot(&tangent, &tangent) * self.problem.dot(&left.tangent, &left.tangent)).sqrt();
+        let cosine = self.problem.dot(&left.tangent, &tangent) / sizes;
+        (cosine.clamp(-1.0, 1.0).acos(), self.problem.dot(&left.tangent, &gap))
+    }
+
+    fn attempt(&mut self, left: &Station, trail: Option<&Trail>, step: f64, emitted: usize, cost: &mut Cost) -> Result<Step, Failure> {
+        self.place(left);
+        let mut guess: Vec<f64> = left.u.iter().zip(&left.tangent).map(|(u, t)| u + step * t).collect();
+        if let Some(trail) = trail {
+            let before = self.problem.transfer(&trail.tangent, &trail.mesh, &left.mesh);
+            let bend = 0.5 * step * step / trail.history.distance.max(0.2 * step);
+            guess.iter_mut().zip(left.tangent.iter().zip(&before)).for_each(|(g, (now, then))| *g += bend * (now - then));
+        }
+        let plane = Plane { row: left.tangent.clone(), base: left.u.clone(), distance: step };
+        let mut right = settle(self.problem, self.settings, plane, guess.clone(), self.direction, cost)?;
+        let (angle, _) = self.angle(left, &right);
+        let landed = self.problem.transfer(&right.u, &right.mesh, &left.mesh);
+        let miss: Vec<f64> = landed.iter().zip(&guess).map(|(a, b)| a - b).collect();
+        let miss = self.problem.dot(&miss, &miss).sqrt();
+        if angle > self.settings.max_angle || miss > 0.4 * step {
+            return Err(Failure::NoConvergence(vec![angle, miss / step]));
+        }
+        if let Some(ended) = self.collapsed(left, &right, cost)? {
+            return Ok(ended);
+        }
+        let [low, high] = self.settings.range;
+        let bound = if right.parameter() < low { Some(low) } else { (right.parameter() > high).then_some(high) };
+        let mut end = None;
+        if let Some(bound) = bound {
+            right = self.at_parameter(left, &right, bound, cost)?;
+            end = Some(Ending::Bound(bound));
+        }
+        if let Some(home) = self.closes(left, &right, emitted, cost) {
+            return Ok(Step { right: home, end: Some(Ending::Closed) });
+        }
+        Ok(Step { right, end })
+    }
+
+    fn at_parameter(&mut self, left: &Station, right: &Station, value: f64, cost: &mut Cost) -> Result<Station, Failure> {
+        let stretch = Stretch::new(self.problem, left, right, self.direction);
+        let near = stretch.at_parameter(self.problem, self.settings, value, cost)?;
+        self.place(left);
+        let plane = Plane { row: parameter_row(near.u.len()), base: near.u.clone(), distance: 0.0 };
+        let slope = near.slope();
+        let mut found = settle(self.problem, self.settings, plane, near.u, self.direction, cost)?;
+        // Travel goes on the way it came, also where the parameter row has turned the tangent round.
+        if found.slope() * slope < 0.0 {
+            found.tangent.iter_mut().for_each(|t| *t = -*t);
+            found.point.tangent.iter_mut().for_each(|t| *t = -*t);
+        }
+        Ok(found)
+    }
+
+    /// What was found in the last step before a branch meets simpler solutions, without what cannot be told from the
+    /// meeting itself: there the parameter is stationary and a multiplier is 1 anyway.
+    fn up_to(&self, meeting: f64, found: Vec<Found>, unstable: usize, right: &mut Station) -> Vec<Found> {
+        let near = 20.0 * self.settings.tolerance * (1.0 + meeting.abs());
+        let apart = |value: f64| (value - meeting).abs() > near;
+        let mut count = unstable;
+        let mut kept = Vec::new();
+        for item in found {
+            let (value, after) = match &item {
+                Found::Special(s) => {
+                    let after = if self.direction > 0.0 { s.unstable_after } else { s.unstable_before };
+                    (s.point.parameters.get(self.free).copied().unwrap_or(0.0), after)
+                }
+                Found::Inserted(s, _) => (s.parameter(), s.point.unstable),
+            };
+            if !apart(value) {
+                break;
+            }
+            count = after;
+            kept.push(item);
+        }
+        if !apart(right.parameter()) {
+            right.point.unstable = count;
+        }
+        kept
+    }
+
+    /// Whether the step passes the place where the branch meets simpler solutions. If so the step ends a little before it.
+    /// The place itself is not solved for: it is a branch point, and the deviation from the simpler solution grows like the
+    /// square root of the distance in the parameter, which gives the parameter there well enough to recognise it.
+    fn collapsed(&mut self, left: &Station, right: &Station, cost: &mut Cost) -> Result<Option<Step>, Failure> {
+        for monitor in self.collapses {
+            let values = [monitor.value(&left.point, &left.point), monitor.value(&left.point, &right.point)];
+            // Next to nothing left of the deviation: the step has landed on the simpler solutions themselves.
+            if values[1].abs() < NOTHING * values[0] {
+                return Err(Failure::Singular);
+            }
+            if !(values[0] > 0.0 && values[1] <= 0.0) {
+                continue;
+            }
+            let stretch = Stretch::new(self.problem, left, right, self.direction);
+            let (mut low, mut high) = ((0.0, values[0]), (stretch.length, values[1]));
+            let mut near = None;
+            for _ in 0..12 {
+                let zero = low.0 + (high.0 - low.0) * low.1 / (low.1 - high.1);
+                let s = 0.6 * zero + 0.4 * low.0;
+                let found = self.cut(left, &stretch, s, cost).ok_or(Failure::Singular)?;
+                let value = monitor.value(&left.point, &found.point);
+                if value < NOTHING * values[0] {
+                    high = (s, value.min(-NOTHING * values[0]));
+                    continue;
+                }
+                low = (s, value);
+                near = Some(found);
+                if value < 0.6 * values[0] {
+                    break;
+                }
+            }
+            let near = near.ok_or(Failure::Singular)?;
+            let share = (monitor.value(&left.point, &near.point) / values[0]).powi(2);
+            let parameter = (near.parameter() - share * left.parameter()) / (1.0 - share);
+            return Ok(Some(Step { right: near, end: Some(Ending::Joined { at: monitor.kind(), parameter }) }));
+        }
+        Ok(None)
+    }
+
+    /// The start again, if this step passes it.
+    fn closes(&mut self, left: &Station, right: &Station, emitted: usize, cost: &mut Cost) -> Option<Station> {
+        let home = self.home?;
+        let value = home.parameters[self.free];
+        let between = (left.parameter() - value) * (right.parameter() - value) <= 0.0;
+        let same_way = home.parameter_slope() * self.direction * (right.slope() + left.slope()) > 0.0;
+        if emitted < 3 || !between || !same_way {
+            return None;
+        }
+        let near = |point: &Point, tolerance: f64| {
+            self.settings.reflections.iter().any(|r| point.difference(home, &self.settings.scales, r) < tolerance)
+        };
+        if !near(&right.point, 0.5) {
+            return None;
+        }
+        let back = self.at_parameter(left, right, value, cost).ok()?;
+        let near = self.settings.reflections.iter().any(|r| back.point.difference(home, &self.settings.scales, r) < 30.0 * self.settings.tolerance);
+        near.then_some(back)
+    }
+}

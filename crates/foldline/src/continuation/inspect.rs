@@ -1,0 +1,153 @@
+//! What lies between two accepted points.
+//!
+//! **Idea.** Every monitor whose sign differs at the two ends is located. The step is cut in two, and each half looked at
+//! in turn, while more than one special point is found in it, while the number of unstable multipliers changes by something
+//! that the special point found does not explain, or while a monitor bends so much that it may have touched zero and come
+//! back. What stays unexplained at the end of that is recorded as such: no silent change of stability.
+
+use super::corrector::{Plane, Station, settle};
+use super::follow::Follow;
+use super::locate::{Located, Stretch, locate};
+use crate::diagram::{Cost, Kind, SpecialPoint};
+
+/// What was found on the way, in the order of travel.
+pub enum Found {
+    /// A special point.
+    Special(SpecialPoint),
+    /// A point that was inserted, with the step to what follows it.
+    Inserted(Box<Station>, f64),
+}
+
+/// Halvings of one step before what is left is recorded as it is.
+const DEEPEST: usize = 14;
+
+/// Values of all monitors at the left end of a stretch and before it, for the test on bending.
+#[derive(Clone, Debug)]
+pub struct History {
+    /// Distance back from the left end.
+    pub distance: f64,
+    /// Values there, one per monitor.
+    pub values: Vec<f64>,
+}
+
+impl Follow<'_> {
+    /// Values of all monitors at a station.
+    pub fn monitored(&self, station: &Station) -> Vec<f64> {
+        self.monitors.iter().map(|m| m.value(&station.point, &station.point)).collect()
+    }
+
+    /// Everything special between two stations.
+    pub fn inspect(&mut self, left: &Station, right: &Station, history: Option<&History>, depth: usize, cost: &mut Cost) -> Vec<Found> {
+        let stretch = Stretch::new(self.problem, left, right, self.direction);
+        let (at_left, at_right) = (self.monitored(left), self.monitored(right));
+        let mut located: Vec<(usize, Located)> = Vec::new();
+        for k in 0..self.monitors.len() {
+            let values = [at_left[k], at_right[k]];
+            if (values[0] > 0.0) == (values[1] > 0.0) || values.iter().any(|v| v.is_nan()) {
+                continue;
+            }
+            let monitor = &*self.monitors[k];
+            if let Ok(found) = locate(self.problem, self.settings, &stretch, monitor, values, cost)
+                && monitor.confirms(&found.station.point)
+            {
+                located.push((k, found));
+            }
+        }
+        located.sort_by(|a, b| a.1.distance.total_cmp(&b.1.distance));
+        let jumps: Vec<usize> = located.iter().map(|(k, _)| self.monitors[*k].jump()).collect();
+        let change = left.point.unstable.abs_diff(right.point.unstable);
+        let explained = explains(&jumps, left.point.unstable as i64, right.point.unstable as i64);
+        let suspicious = depth < 3 && history.is_some_and(|h| self.may_touch(h, &at_left, &at_right, stretch.length));
+        if depth < DEEPEST && (jumps.len() > 1 || !explained || (suspicious && jumps.is_empty())) && stretch.length.abs() > self.settings.min_step {
+            let cut = match &located[..] {
+                [a, .., b] => 0.5 * (a.1.distance + b.1.distance),
+                _ => 0.5 * stretch.length,
+            };
+            // Neighbouring special points that cannot be told apart any more stay together.
+            let apart = located.len() < 2 || located[located.len() - 1].1.distance - located[0].1.distance > 1e-7 * (1.0 + stretch.length);
+            if apart && let Some(middle) = self.cut(left, &stretch, cut, cost) {
+                let rest = stretch.length - cut;
+                let before = self.inspect(left, &middle, history, depth + 1, cost);
+                let next = History { distance: cut, values: at_left.clone() };
+                let after = self.inspect(&middle, right, Some(&next), depth + 1, cost);
+                let inserted = Found::Inserted(Box::new(middle), rest);
+                return before.into_iter().chain([inserted]).chain(after).collect();
+            }
+        }
+        let mut count = left.point.unstable as i64;
+        let mut out = Vec::new();
+        let total = located.len();
+        for (index, (k, found)) in located.into_iter().enumerate() {
+            let next = if index + 1 == total { right.point.unstable as i64 } else { step_towards(count, right.point.unstable as i64, jumps[index]) };
+            out.push(Found::Special(self.special(self.monitors[k].kind(), found.station, count, next, found.error)));
+            count = next;
+        }
+        if !explained {
+            let width = (left.parameter() - right.parameter()).abs() / (1.0 + right.parameter().abs());
+            if change > 0 || total > 0 {
+                out.push(Found::Special(self.special(Kind::Unexplained, right.clone(), count, right.point.unstable as i64, width)));
+            }
+        }
+        out
+    }
+
+    fn special(&self, kind: Kind, station: Station, before: i64, after: i64, error: f64) -> SpecialPoint {
+        let (before, after) = if self.direction > 0.0 { (before, after) } else { (after, before) };
+        SpecialPoint { kind, point: station.point, unstable_before: before.max(0) as usize, unstable_after: after.max(0) as usize, error }
+    }
+
+    /// A full station at distance s of the stretch.
+    pub(super) fn cut(&mut self, left: &Station, stretch: &Stretch, s: f64, cost: &mut Cost) -> Option<Station> {
+        let start = stretch.at(self.problem, self.settings, s, cost).ok()?;
+        self.problem.set_mesh(&left.mesh);
+        self.problem.anchor(&left.u);
+        let plane = Plane { row: left.tangent.clone(), base: left.u.clone(), distance: s };
+        settle(self.problem, self.settings, plane, start.u, self.direction, cost).ok()
+    }
+
+    /// Whether the parabola through three values of some monitor comes close to zero between the last two without the
+    /// values showing it.
+    fn may_touch(&self, history: &History, left: &[f64], right: &[f64], length: f64) -> bool {
+        (0..left.len()).any(|k| {
+            let (a, b, c) = (history.values[k], left[k], right[k]);
+            if self.monitors[k].kind() == Kind::BranchPoint || a * b <= 0.0 || b * c <= 0.0 {
+                return false;
+            }
+            let (before, after) = ((b - a) / history.distance, (c - b) / length);
+            let bend = (after - before) / (history.distance + length);
+            let slope = after - bend * length;
+            let at = -slope / (2.0 * bend);
+            let value = b + at * (slope + bend * at);
+            bend * b > 0.0 && at > 0.0 && at < length && value / b < 0.1
+        })
+    }
+}
+
+/// Whether jumps of these sizes, each with either sign, lead from one count to the other.
+fn explains(jumps: &[usize], from: i64, to: i64) -> bool {
+    let mut reachable = vec![from];
+    for &jump in jumps {
+        reachable = reachable.iter().flat_map(|r| [r - jump as i64, r + jump as i64]).filter(|r| *r >= 0).collect();
+        reachable.sort_unstable();
+        reachable.dedup();
+    }
+    reachable.contains(&to)
+}
+
+fn step_towards(count: i64, target: i64, jump: usize) -> i64 {
+    if target > count || count < jump as i64 { count + jump as i64 } else { count - jump as i64 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn changes_are_explained_by_sums_of_jumps_only() {
+        assert!(explains(&[], 2, 2));
+        assert!(!explains(&[], 1, 2));
+        assert!(explains(&[1], 1, 2) && explains(&[1], 1, 0) && !explains(&[1], 1, 1));
+        assert!(explains(&[2], 0, 2) && !explains(&[2], 1, 2) && !explains(&[2], 1, 0));
+        assert!(explains(&[1, 2], 0, 1) && explains(&[1, 1], 1, 1));
+    }
+}

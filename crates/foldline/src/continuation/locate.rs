@@ -1,0 +1,267 @@
+//! The zero of a monitor along the curve.
+//!
+//! **Idea.** Between two accepted points the curve is parametrised by the distance s along the tangent of the first; a
+//! bracketing method finds the zero in s, each trial point being a full solution of the problem. The zero is then found
+//! again on a mesh with every interval halved, and the difference is the stated error.
+//!
+//! **Source.** chandrupatla1997 (bracketing with inverse quadratic interpolation and bisection).
+
+use super::corrector::{Plane, Station, correct, station};
+use super::{Failure, Settings};
+use crate::contract::{Monitor, ZeroProblem};
+use crate::diagram::{Cost, Point};
+
+/// A located zero.
+#[derive(Clone, Debug)]
+pub struct Located {
+    /// Distance from the left station along its tangent.
+    pub distance: f64,
+    /// The point, on the finer mesh where there is one.
+    pub station: Station,
+    /// Bound on its error; see [`crate::diagram::SpecialPoint::error`].
+    pub error: f64,
+}
+
+/// The stretch of curve between two stations, in the metric and on the mesh of the left one.
+pub struct Stretch<'s> {
+    /// Where it begins.
+    pub left: &'s Station,
+    /// Unknowns of the right station, carried to the mesh of the left.
+    right: Vec<f64>,
+    slope: Vec<f64>,
+    /// Distance of the right station along the tangent of the left.
+    pub length: f64,
+    direction: f64,
+}
+
+impl<'s> Stretch<'s> {
+    /// The stretch from `left` to `right`; puts the problem on the mesh of `left`.
+    pub fn new(problem: &mut dyn ZeroProblem, left: &'s Station, right: &Station, direction: f64) -> Stretch<'s> {
+        problem.set_mesh(&left.mesh);
+        problem.anchor(&left.u);
+        let u = problem.transfer(&right.u, &right.mesh, &left.mesh);
+        let mut slope = problem.transfer(&right.tangent, &right.mesh, &left.mesh);
+        let gap: Vec<f64> = u.iter().zip(&left.u).map(|(a, b)| a - b).collect();
+        let length = problem.dot(&left.tangent, &gap);
+        let forward = problem.dot(&left.tangent, &slope);
+        slope.iter_mut().for_each(|t| *t /= forward.abs().max(0.1));
+        Stretch { left, right: u, slope, length, direction }
+    }
+
+    /// The point at distance s on the mesh of the left station.
+    ///
+    /// # Errors
+    /// See [`Failure`].
+    pub fn at(&self, problem: &mut dyn ZeroProblem, settings: &Settings, s: f64, cost: &mut Cost) -> Result<Station, Failure> {
+        problem.set_mesh(&self.left.mesh);
+        problem.anchor(&self.left.u);
+        let mut u = self.hermite(s);
+        let plane = Plane { row: self.left.tangent.clone(), base: self.left.u.clone(), distance: s };
+        correct(problem, settings, &plane, &mut u, cost)?;
+        station(problem, u, &self.left.tangent, self.direction, cost)
+    }
+
+    /// Where the continuation parameter has the given value, which lies between those of the ends.
+    ///
+    /// # Errors
+    /// See [`Failure`].
+    pub fn at_parameter(&self, problem: &mut dyn ZeroProblem, settings: &Settings, value: f64, cost: &mut Cost) -> Result<Station, Failure> {
+        let last = self.left.u.len() - 1;
+        let (mut low, mut high) = (0.0, self.length);
+        let rising = self.right[last] > self.left.u[last];
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            if (self.hermite_component(middle, last) < value) == rising { low = middle } else { high = middle }
+        }
+        let mut u = self.hermite(0.5 * (low + high));
+        u[last] = value;
+        problem.set_mesh(&self.left.mesh);
+        problem.anchor(&self.left.u);
+        let plane = Plane { row: super::corrector::parameter_row(u.len()), base: u.clone(), distance: 0.0 };
+        correct(problem, settings, &plane, &mut u, cost)?;
+        u[last] = value;
+        station(problem, u, &self.left.tangent, self.direction, cost)
+    }
+
+    fn hermite(&self, s: f64) -> Vec<f64> {
+        (0..self.right.len()).map(|i| self.hermite_component(s, i)).collect()
+    }
+
+    /// Cubic through both ends with both tangents.
+    fn hermite_component(&self, s: f64, i: usize) -> f64 {
+        let (l, x) = (self.length, s / self.length);
+        let (a, b) = (self.left.u[i], self.right[i]);
+        let (p, q) = (l * self.left.tangent[i], l * self.slope[i]);
+        let c = b - a;
+        a + x * (p + x * ((3.0 * c - 2.0 * p - q) + x * (p + q - 2.0 * c)))
+    }
+}
+
+/// Finds the zero of `monitor` in `stretch`, whose ends have values of opposite sign.
+///
+/// # Errors
+/// See [`Failure`].
+pub fn locate(
+    problem: &mut dyn ZeroProblem,
+    settings: &Settings,
+    stretch: &Stretch,
+    monitor: &dyn Monitor,
+    values: [f64; 2],
+    cost: &mut Cost,
+) -> Result<Located, Failure> {
+    let reference = &stretch.left.point;
+    let mut evaluate = |s: f64| stretch.at(problem, settings, s, cost).map(|found| (monitor.value(reference, &found.point), found));
+    let resolution = if stretch.left.mesh.is_empty() { 1e-9 } else { 1e-3 };
+    let (distance, mut coarse) = chandrupatla(&mut evaluate, [0.0, stretch.length], values, resolution)?;
+    let floor = 10.0 * settings.newton_tolerance();
+    let (mut tolerance, mut reach) = (0.3 * settings.tolerance, 1e-2 * stretch.length.abs());
+    // First a mesh that resolves this place, then one with every interval halved; if the two disagree by more than the
+    // tolerance, the finer one is the starting point for another round.
+    let mut known: Option<(Station, f64)> = None;
+    for _ in 0..4 {
+        for _ in 0..4 {
+            let Some(better) = coarse.better(problem, tolerance) else { break };
+            coarse = relocate(problem, settings, stretch, monitor, &coarse, &better, reach, cost)?;
+            reach = 1e-4 * stretch.length.abs();
+        }
+        problem.set_mesh(&coarse.mesh);
+        let Some(finer) = problem.finer_mesh() else {
+            return Ok(Located { distance, station: coarse, error: floor });
+        };
+        let fine = relocate(problem, settings, stretch, monitor, &coarse, &finer, reach, cost)?;
+        let error = floor + discrepancy(&coarse.point, &fine.point, coarse.parameter() - fine.parameter(), fine.parameter());
+        let improved = known.as_ref().is_none_or(|(_, e)| error < *e);
+        if improved {
+            known = Some((fine.clone(), error));
+        }
+        if error <= settings.tolerance || !improved {
+            break;
+        }
+        coarse = fine;
+        tolerance *= 0.1;
+    }
+    known.map(|(station, error)| Located { distance, station, error }).ok_or(Failure::NotFinite)
+}
+
+/// Largest difference of parameter, period and ranges, each relative to 1 + |value|.
+fn discrepancy(a: &Point, b: &Point, gap: f64, parameter: f64) -> f64 {
+    let mut largest = gap.abs() / (1.0 + parameter.abs());
+    if let (Some(x), Some(y)) = (a.solution.period(), b.solution.period()) {
+        largest = largest.max((x - y).abs() / (1.0 + y.abs()));
+    }
+    for (x, y) in a.ranges.iter().flatten().zip(b.ranges.iter().flatten()) {
+        largest = largest.max((x - y).abs() / (1.0 + y.abs()));
+    }
+    largest
+}
+
+impl Station {
+    /// A mesh on which this point would meet the tolerance, if its own does not. Belongs right after the station was made,
+    /// while its factorisation is the last one.
+    fn better(&self, problem: &mut dyn ZeroProblem, tolerance: f64) -> Option<crate::diagram::Mesh> {
+        (self.point.trust.discretisation > tolerance).then(|| problem.better_mesh(&self.u, tolerance)).flatten()
+    }
+}
+
+/// The zero again on a finer mesh, by the secant method from the coarse one.
+fn relocate(
+    problem: &mut dyn ZeroProblem,
+    settings: &Settings,
+    stretch: &Stretch,
+    monitor: &dyn Monitor,
+    coarse: &Station,
+    finer: &crate::diagram::Mesh,
+    reach: f64,
+    cost: &mut Cost,
+) -> Result<Station, Failure> {
+    problem.set_mesh(finer);
+    let base = problem.transfer(&coarse.u, &coarse.mesh, finer);
+    let row = problem.transfer(&coarse.tangent, &coarse.mesh, finer);
+    let mut at = |s: f64| -> Result<(f64, Station), Failure> {
+        problem.anchor(&base);
+        let mut u: Vec<f64> = base.iter().zip(&row).map(|(b, t)| b + s * t).collect();
+        correct(problem, settings, &Plane { row: row.clone(), base: base.clone(), distance: s }, &mut u, cost)?;
+        let found = station(problem, u, &row, stretch.direction, cost)?;
+        Ok((monitor.value(&stretch.left.point, &found.point), found))
+    };
+    let (mut a, mut b) = (0.0, reach);
+    let (mut ga, mut best) = at(a)?;
+    let (mut gb, mut other) = at(b)?;
+    for _ in 0..8 {
+        let next = b - gb * (b - a) / (gb - ga);
+        if !next.is_finite() || next.abs() > stretch.length.abs() {
+            break;
+        }
+        (a, ga) = (b, gb);
+        best = other;
+        b = next;
+        (gb, other) = at(b)?;
+        if (b - a).abs() < 1e-9 * stretch.length.abs() || gb == 0.0 {
+            break;
+        }
+    }
+    Ok(if gb.abs() <= ga.abs() { other } else { best })
+}
+
+/// Bracketing root finder; returns the place and what was found there.
+fn chandrupatla<T>(
+    evaluate: &mut dyn FnMut(f64) -> Result<(f64, T), Failure>,
+    [mut a, mut b]: [f64; 2],
+    [mut fa, mut fb]: [f64; 2],
+    resolution: f64,
+) -> Result<(f64, T), Failure> {
+    let (mut c, mut fc);
+    let width = (b - a).abs();
+    let mut t = (fa / (fa - fb)).clamp(0.02, 0.98);
+    let mut best: Option<(f64, f64, T)> = None;
+    for _ in 0..60 {
+        let x = a + t * (b - a);
+        let (fx, found) = evaluate(x)?;
+        if best.as_ref().is_none_or(|(_, f, _)| fx.abs() <= *f) {
+            best = Some((x, fx.abs(), found));
+        }
+        if fx == 0.0 || !fx.is_finite() {
+            break;
+        }
+        if (fx > 0.0) == (fa > 0.0) {
+            (c, fc) = (a, fa);
+        } else {
+            (c, b, fc, fb) = (b, a, fb, fa);
+        }
+        (a, fa) = (x, fx);
+        if (b - a).abs() < resolution * width {
+            break;
+        }
+        let (xi, phi) = ((a - b) / (c - b), (fa - fb) / (fc - fb));
+        t = if phi * phi < xi && (1.0 - phi) * (1.0 - phi) < 1.0 - xi {
+            fa / (fb - fa) * fc / (fb - fc) + (c - a) / (b - a) * fa / (fc - fa) * fb / (fc - fb)
+        } else {
+            0.5
+        };
+        let margin = 0.1 * resolution * width / (b - a).abs();
+        t = if t.is_finite() && margin < 0.5 { t.clamp(margin, 1.0 - margin) } else { 0.5 };
+        // Two neighbouring trials that both sit on the zero to rounding: done.
+        if fx.abs() < 1e-14 {
+            break;
+        }
+    }
+    best.map(|(x, _, found)| (x, found)).ok_or(Failure::NotFinite)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_root_finder_handles_simple_and_triple_zeros() {
+        for (f, root) in [((|x: f64| x.exp() - 2.0) as fn(f64) -> f64, 2f64.ln()), (|x| (x - 0.3).powi(3), 0.3), (|x| x.atan() - 1.0, 1f64.tan())] {
+            let mut count = 0;
+            let mut evaluate = |x: f64| {
+                count += 1;
+                Ok((f(x), x))
+            };
+            let (x, _) = chandrupatla(&mut evaluate, [-1.0, 2.0], [f(-1.0), f(2.0)], 1e-9).unwrap();
+            assert!((x - root).abs() < 1e-4 && count < 45, "{x} after {count}");
+        }
+    }
+}

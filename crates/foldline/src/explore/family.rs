@@ -1,0 +1,208 @@
+//! A branch of the plan with everything that grows from it.
+
+use super::growth::{self, Beginning, Growth};
+use super::plan::{BranchPlan, Plan, Start, Switching};
+use super::seeds::Seeds;
+use super::{System, known, switch};
+use crate::continuation::Settings;
+use crate::contract::{Event, Observer, Verdict};
+use crate::diagram::{Branch, Diagram, Ending, Family, Kind, Origin, Point, Solution, SpecialPoint};
+
+/// Indices of the branches that start at a seed.
+pub fn roots(plan: &Plan) -> Vec<usize> {
+    (0..plan.branches.len()).filter(|&i| matches!(plan.branches[i].start, Start::Seed(_))).collect()
+}
+
+/// Everything that grows from the branch of that index, in the order in which it was begun.
+pub fn grow(system: &System, plan: &Plan, root: usize, seeds: &Seeds, earlier: &Diagram, observer: &dyn Observer) -> Vec<Branch> {
+    let mut work = Work { system, plan, earlier, observer, branches: Vec::new() };
+    let Start::Seed(seed) = plan.branches[root].start else { return Vec::new() };
+    let origin = Origin::Seed(plan.seeds[seed].name.clone());
+    let start = seeds.point(seed);
+    work.planned(root, origin, start);
+    work.branches
+}
+
+struct Work<'w> {
+    system: &'w System<'w>,
+    plan: &'w Plan,
+    earlier: &'w Diagram,
+    observer: &'w dyn Observer,
+    branches: Vec<Branch>,
+}
+
+/// A branch still to be switched from: its index, and how deep.
+struct Pending {
+    branch: usize,
+    switching: Switching,
+}
+
+impl Work<'_> {
+    /// Follows a branch of the plan, what is switched to from it, and the branches that start at its end.
+    fn planned(&mut self, index: usize, origin: Origin, start: Result<Point, String>) -> bool {
+        let plan = &self.plan.branches[index];
+        let Some((branch, going)) = self.root(plan, origin, start) else { return true };
+        let ended = end_of(&branch, plan);
+        self.branches.push(branch);
+        if !going {
+            return false;
+        }
+        let mut queue = vec![Pending { branch: self.branches.len() - 1, switching: plan.switching.clone() }];
+        while !queue.is_empty() {
+            let pending = queue.remove(0);
+            match self.switched(plan, &pending) {
+                Some(more) => queue.extend(more),
+                None => return false,
+            }
+        }
+        let followers: Vec<usize> = (0..self.plan.branches.len()).filter(|&i| self.plan.branches[i].start == Start::EndOf(index)).collect();
+        followers.into_iter().all(|i| self.planned(i, Origin::EndOf(plan.name.clone()), ended.clone()))
+    }
+
+    fn growth_settings(&self, plan: &BranchPlan, start: &Point) -> (Settings, [bool; 2]) {
+        let value = start.parameters.get(plan.free).copied().unwrap_or(0.0);
+        let (range, sides) = match plan.until {
+            Some(target) if target >= value => ([plan.range[0].min(value), target], [false, true]),
+            Some(target) => ([target, plan.range[1].max(value)], [true, false]),
+            None => (plan.range, [true, true]),
+        };
+        (growth::settings(self.system, self.plan.tolerance, range, plan.max_points), sides)
+    }
+
+    /// A branch of the plan itself; resumed if an earlier run has it.
+    fn root(&self, plan: &BranchPlan, origin: Origin, start: Result<Point, String>) -> Option<(Branch, bool)> {
+        let known = self.earlier.branch(&plan.name).filter(|b| !b.points.is_empty());
+        if let Some(earlier) = known {
+            let (settings, sides) = self.growth_settings(plan, earlier.points.iter().find(|p| p.position == 0)?);
+            let growth = self.growth(&settings, sides, &[]);
+            let mut branch = earlier.clone();
+            let going = growth.resume(&mut branch);
+            return Some((branch, going));
+        }
+        let family = match &start {
+            Ok(point) if matches!(point.solution, Solution::Equilibrium(_)) => Family::Equilibrium,
+            _ => Family::Cycle,
+        };
+        let mut branch = Branch::new(&plan.name, family, plan.free, origin);
+        let begun = start.and_then(|point| {
+            let value = point.parameters.get(plan.free).copied().unwrap_or(0.0);
+            let name = format!("the start {value} lies outside the range {:?}", plan.range);
+            let inside = plan.until.is_some() || (plan.range[0] <= value && value <= plan.range[1]);
+            let (settings, sides) = self.growth_settings(plan, &point);
+            let mut problem = growth::problem_of(self.system, plan.free, self.plan.degree, &point, false);
+            let station = growth::polished(&mut *problem, &settings, &point).map_err(|why| why.to_string())?;
+            if inside { Ok((settings, sides, station)) } else { Err(name) }
+        });
+        let going = match begun {
+            Ok((settings, sides, station)) => self.growth(&settings, sides, &[]).begin(&mut branch, Beginning::Inside(station)),
+            Err(why) => self.without_start(&mut branch, why),
+        };
+        Some((branch, going))
+    }
+
+    fn without_start(&self, branch: &mut Branch, why: String) -> bool {
+        let mut going = self.tell(Event::Begin(branch));
+        for side in [1, 0] {
+            let ending = Ending::NoStart(why.clone());
+            branch.ends[side] = Some(ending.clone());
+            going &= self.tell(Event::SideEnded(branch, side, &ending));
+        }
+        going & self.tell(Event::End(branch))
+    }
+
+    fn growth<'s>(&'s self, settings: &'s Settings, sides: [bool; 2], parents: &'s [SpecialPoint]) -> Growth<'s> {
+        Growth { system: self.system, settings, degree: self.plan.degree, sides, parents, observer: self.observer }
+    }
+
+    fn tell(&self, event: Event) -> bool {
+        self.observer.observe(event) == Verdict::Continue
+    }
+
+    /// Follows every branch that leaves the special points of one branch; `None` if the observer wants to stop.
+    fn switched(&mut self, plan: &BranchPlan, pending: &Pending) -> Option<Vec<Pending>> {
+        let parent = self.branches[pending.branch].clone();
+        let settings = growth::settings(self.system, self.plan.tolerance, plan.range, plan.max_points);
+        let mut counts = [0usize; Kind::ALL.len()];
+        let mut more = Vec::new();
+        for special in &parent.special {
+            let slot = Kind::ALL.iter().position(|k| *k == special.kind)?;
+            counts[slot] += 1;
+            if pending.switching.at(special.kind) == 0 {
+                continue;
+            }
+            let parameter = special.point.parameters[parent.free];
+            let label = format!("{} {parameter:.6} of {}", special.kind, parent.name);
+            let name = format!("{}/{}-{}", parent.name, special.kind, counts[slot]);
+            let origin = Origin::Switch { parent: parent.name.clone(), kind: special.kind, parameter };
+            if let Some(earlier) = self.earlier.branch(&name).filter(|b| !b.points.is_empty()) {
+                let mut branch = earlier.clone();
+                let going = self.growth(&settings, [true, true], &parent.special).resume(&mut branch);
+                self.branches.push(branch);
+                more.push(Pending { branch: self.branches.len() - 1, switching: pending.switching.below(special.kind) });
+                if !going {
+                    return None;
+                }
+                continue;
+            }
+            if let Some(already) = self.arrives(&parent, special.kind, &special.point) {
+                self.tell(Event::Note(&parent.name, &format!("{label}: the branch there is {already}, which ends here")));
+                continue;
+            }
+            let (family, beginning) = match switch::beginning(self.system, &settings, parent.free, self.plan.degree, special) {
+                None => continue,
+                Some(Ok(found)) => found,
+                Some(Err(why)) => {
+                    self.tell(Event::Note(&parent.name, &format!("{label}: no branch found to switch to: {why}")));
+                    continue;
+                }
+            };
+            let first = match &beginning {
+                Beginning::Inside(station) | Beginning::Edge { first: station, .. } => &station.point,
+            };
+            if let Some(already) = known::branch_of(self.system, &settings, parent.free, self.plan.degree, first, &self.branches) {
+                self.tell(Event::Note(&parent.name, &format!("{label}: leads to {already}, which is known already")));
+                continue;
+            }
+            let mut branch = Branch::new(name, family, parent.free, origin);
+            let going = self.growth(&settings, [true, true], &parent.special).begin(&mut branch, beginning);
+            self.branches.push(branch);
+            more.push(Pending { branch: self.branches.len() - 1, switching: pending.switching.below(special.kind) });
+            if !going {
+                return None;
+            }
+        }
+        Some(more)
+    }
+
+    /// The branch that ends at this special point of `parent`, having come from another one of the same kind.
+    fn arrives(&self, parent: &Branch, kind: Kind, at: &Point) -> Option<&str> {
+        let value = at.parameters[parent.free];
+        let ends_here = |branch: &&Branch| {
+            let from_parent = matches!(&branch.origin, Origin::Switch { parent: p, .. } if *p == parent.name);
+            let here = branch.ends.iter().flatten().skip(1).any(|end| {
+                matches!(end, Ending::Joined { at, parameter } if *at == kind
+                    && (parameter - value).abs() < 1e3 * self.plan.tolerance * (1.0 + value.abs()))
+            });
+            let period = branch.points.last().and_then(|p| p.solution.period());
+            let fits = match (period, at.solution.period()) {
+                (Some(long), Some(short)) => (long / short - 2.0).abs() < 0.05 || kind != Kind::PeriodDoubling,
+                _ => true,
+            };
+            from_parent && here && fits
+        };
+        self.branches.iter().find(ends_here).map(|b| b.name.as_str())
+    }
+}
+
+/// The end at which a planned branch hands over: its target, or its forward bound.
+fn end_of(branch: &Branch, plan: &BranchPlan) -> Result<Point, String> {
+    let start = branch.points.iter().find(|p| p.position == 0).map(|p| p.parameters[plan.free]);
+    let backward = matches!((plan.until, start), (Some(target), Some(value)) if target < value);
+    let side = if backward { 0 } else { 1 };
+    let point = if backward { branch.points.first() } else { branch.points.last() };
+    match (&branch.ends[side], point) {
+        (Some(Ending::Bound(_)), Some(point)) => Ok(point.clone()),
+        (Some(other), _) => Err(format!("branch {} did not get to its end: {other}", plan.name)),
+        _ => Err(format!("branch {} was not finished", plan.name)),
+    }
+}

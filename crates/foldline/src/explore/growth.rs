@@ -1,0 +1,257 @@
+//! One branch, followed to both sides, from its start or from where an earlier run left it.
+
+use super::System;
+use crate::continuation::corrector::{Plane, parameter_row, settle, station};
+use crate::continuation::{Failure, Follow, Item, Settings, Station, follow};
+use crate::contract::{Event, Monitor, Observer, Verdict, ZeroProblem};
+use crate::diagram::{Branch, Cost, Ending, Family, Kind, Origin, Point, Solution, SpecialPoint};
+use crate::problem::{Setting, cycle::CycleProblem, equilibrium::EquilibriumProblem, mesh};
+use crate::special::{self, collapse};
+
+/// The problem on whose curve `point` lies, on the mesh of the point. `doubled` says that its branch was born by period
+/// doubling.
+pub fn problem_of<'a>(system: &'a System, free: usize, degree: usize, point: &Point, doubled: bool) -> Box<dyn ZeroProblem + 'a> {
+    let setting = setting(system, free, &point.parameters);
+    match &point.solution {
+        Solution::Equilibrium(_) => Box::new(EquilibriumProblem::new(setting)),
+        Solution::Cycle(cycle) if doubled && cycle.intervals() > 0 => {
+            Box::new(CycleProblem::new(setting, cycle.degree, &cycle.mesh).with_equal_halves())
+        }
+        Solution::Cycle(cycle) if cycle.intervals() > 0 => Box::new(CycleProblem::new(setting, cycle.degree, &cycle.mesh)),
+        Solution::Cycle(_) => Box::new(CycleProblem::new(setting, degree, &mesh::uniform(20))),
+    }
+}
+
+/// The setting of a system at given parameters.
+pub fn setting<'a>(system: &'a System, free: usize, parameters: &[f64]) -> Setting<'a> {
+    let parameter_scale = system.parameter_scales.get(free).copied().unwrap_or(1.0);
+    Setting { field: system.field, scales: &system.scales, parameters: parameters.to_vec(), free, parameter_scale }
+}
+
+/// The settings of a branch.
+pub fn settings(system: &System, tolerance: f64, range: [f64; 2], max_points: usize) -> Settings {
+    Settings { reflections: system.reflections.clone(), max_points, ..Settings::new(tolerance, range, &system.scales) }
+}
+
+/// A solution made accurate at fixed parameters, as a station whose tangent points towards larger parameter values.
+///
+/// # Errors
+/// See [`Failure`].
+pub fn polished(problem: &mut dyn ZeroProblem, settings: &Settings, point: &Point) -> Result<Station, Failure> {
+    let u = problem.unknowns_of(point);
+    problem.anchor(&u);
+    let row = parameter_row(u.len());
+    let plane = Plane { row, base: u.clone(), distance: 0.0 };
+    settle(problem, settings, plane, u, 1.0, &mut Cost::default())
+}
+
+/// A stored point as a station again.
+fn revived(problem: &mut dyn ZeroProblem, settings: &Settings, point: &Point, direction: f64) -> Result<Station, Failure> {
+    if let Solution::Cycle(cycle) = &point.solution {
+        problem.set_mesh(&cycle.mesh);
+    }
+    let u = problem.unknowns_of(point);
+    let tangent: Vec<f64> = point.tangent.iter().map(|t| direction * t).collect();
+    problem.anchor(&u);
+    let mut found = station(problem, u, &tangent, direction, &mut Cost::default())?;
+    found.roomier = problem.better_mesh(&found.u, 0.5 * settings.tolerance);
+    found.point = point.clone();
+    found.tangent = tangent;
+    Ok(found)
+}
+
+/// What a branch begins with.
+pub enum Beginning {
+    /// One point inside the branch; both sides are followed.
+    Inside(Station),
+    /// The first points of a branch that starts at a special point; only the forward side is followed.
+    Edge {
+        /// Points before `first`, by position: the special point itself, where it is a point of this branch.
+        before: Vec<Point>,
+        /// The first point off the special point.
+        first: Station,
+        /// Where it starts.
+        joined: Ending,
+    },
+}
+
+/// Everything about a branch that does not change while it grows.
+pub struct Growth<'g> {
+    /// The system.
+    pub system: &'g System<'g>,
+    /// What governs the run.
+    pub settings: &'g Settings,
+    /// Degree of collocation polynomials.
+    pub degree: usize,
+    /// Which sides to follow: backward, forward.
+    pub sides: [bool; 2],
+    /// Special points of the branch that this one was switched from; it may end at another of them.
+    pub parents: &'g [SpecialPoint],
+    /// Who watches.
+    pub observer: &'g dyn Observer,
+}
+
+impl Growth<'_> {
+    /// Follows a new branch. Returns false if the observer wants to stop.
+    pub fn begin(&self, branch: &mut Branch, beginning: Beginning) -> bool {
+        let mut going = self.tell(Event::Begin(branch));
+        match beginning {
+            Beginning::Inside(start) => {
+                let point = Point { position: 0, step: self.settings.first_step, ..start.point };
+                going &= self.accept(branch, point);
+            }
+            Beginning::Edge { before, first, joined } => {
+                let count = before.len() as i64;
+                for (position, point) in before.into_iter().enumerate() {
+                    going &= self.accept(branch, Point { position: position as i64, ..point });
+                }
+                going &= self.accept(branch, Point { position: count, step: self.settings.first_step, ..first.point });
+                going &= self.end(branch, 0, joined);
+            }
+        }
+        self.finish(branch, going)
+    }
+
+    /// Continues a branch of an earlier run. Returns false if the observer wants to stop.
+    pub fn resume(&self, branch: &mut Branch) -> bool {
+        let (low, high) = match (branch.points.first(), branch.points.last()) {
+            (Some(a), Some(b)) => (a.position, b.position),
+            _ => return true,
+        };
+        // A special point found in a step whose far end was not stored will be found again.
+        branch.special.retain(|s| s.point.position >= low && s.point.position < high);
+        let going = self.tell(Event::Begin(branch));
+        self.finish(branch, going)
+    }
+
+    fn finish(&self, branch: &mut Branch, mut going: bool) -> bool {
+        for side in [1, 0] {
+            if !going {
+                break;
+            }
+            if !self.sides[side] && branch.ends[side].is_none() {
+                let at = branch.points.first().map_or(f64::NAN, |p| p.parameters.get(branch.free).copied().unwrap_or(0.0));
+                going &= self.end(branch, side, Ending::Bound(at));
+            }
+            if branch.ends[side].is_none() {
+                let ending = self.side(branch, side);
+                going &= ending != Ending::Stopped;
+                if ending == Ending::Stopped {
+                    break;
+                }
+                let ending = self.recognised(branch, side, ending);
+                let closed = ending == Ending::Closed;
+                going &= self.end(branch, side, ending);
+                if closed && branch.ends[1 - side].is_none() {
+                    going &= self.end(branch, 1 - side, Ending::Closed);
+                }
+            }
+        }
+        if branch.ends.iter().all(Option::is_some) {
+            going &= self.tell(Event::End(branch));
+        }
+        going
+    }
+
+    fn side(&self, branch: &mut Branch, side: usize) -> Ending {
+        let direction = if side == 1 { 1.0 } else { -1.0 };
+        let own: Vec<&Point> = if side == 1 {
+            branch.points.iter().rev().take_while(|p| p.position >= 0).take(2).collect()
+        } else {
+            branch.points.iter().take_while(|p| p.position <= 0).take(2).collect()
+        };
+        let Some(&last) = own.first() else { return Ending::NoStart("the branch has no point to start from".into()) };
+        let last = last.clone();
+        let before = own.get(1).map(|p| (*p).clone());
+        let emitted = last.position.unsigned_abs() as usize;
+        let mut problem = problem_of(self.system, branch.free, self.degree, &last, is_doubled(branch));
+        let revive = |problem: &mut dyn ZeroProblem, point: &Point| revived(problem, self.settings, point, direction);
+        // The special point at which a branch begins is no predecessor: the matrix is singular there.
+        let before = before.filter(|p| p.position != 0 || matches!(branch.origin, Origin::Seed(_) | Origin::EndOf(_)));
+        let previous = before.and_then(|p| revive(&mut *problem, &p).ok());
+        let mut start = match revive(&mut *problem, &last) {
+            Ok(start) => start,
+            Err(why) => return Ending::NoStart(why.to_string()),
+        };
+        if emitted == 0 {
+            start.point.step = self.settings.first_step;
+        }
+        let monitors = special::monitors(branch.family);
+        let collapses = collapses(branch);
+        let home = branch.points.iter().find(|p| p.position == 0).filter(|_| branch.ends[0].is_none()).cloned();
+        let mut walk = Follow {
+            problem: &mut *problem,
+            settings: self.settings,
+            monitors: &monitors,
+            collapses: &collapses,
+            direction,
+            free: branch.free,
+            home: home.as_ref(),
+        };
+        follow(&mut walk, start, previous, emitted, &mut |item| {
+            let going = match item {
+                Item::Special(special) => {
+                    branch.insert_special(special.clone());
+                    self.tell(Event::Special(branch, &special))
+                }
+                Item::Point(point) => self.accept(branch, point),
+            };
+            if going { Verdict::Continue } else { Verdict::Stop }
+        })
+    }
+
+    /// An end at a special point of the parent gets the accurate parameter of that point; where the special point, as a
+    /// doubled cycle, is a point of this branch, it becomes the last one.
+    fn recognised(&self, branch: &mut Branch, side: usize, ending: Ending) -> Ending {
+        let Ending::Joined { at, parameter } = ending else { return ending };
+        let free = branch.free;
+        let value = |s: &SpecialPoint| s.point.parameters.get(free).copied().unwrap_or(0.0);
+        let Some(last) = (if side == 1 { branch.points.last() } else { branch.points.first() }) else { return ending };
+        let fits = |s: &&SpecialPoint| {
+            let periods = (last.solution.period(), s.point.solution.period());
+            let right_period = match periods {
+                (Some(long), Some(short)) if at == Kind::PeriodDoubling => (0.5 * long / short - 1.0).abs() < 0.02,
+                _ => true,
+            };
+            s.kind == at && right_period && (value(s) - parameter).abs() < 1e-2 * (1.0 + parameter.abs())
+        };
+        let gap = |s: &SpecialPoint| (value(s) - parameter).abs();
+        let Some(parent) = self.parents.iter().filter(fits).min_by(|a, b| gap(a).total_cmp(&gap(b))) else { return ending };
+        if at == Kind::PeriodDoubling && let Some(edge) = super::switch::doubled_edge(self.system, branch.free, parent, last) {
+            let position = last.position + if side == 1 { 1 } else { -1 };
+            self.accept(branch, Point { position, ..edge });
+        }
+        Ending::Joined { at, parameter: value(parent) }
+    }
+
+    fn tell(&self, event: Event) -> bool {
+        self.observer.observe(event) == Verdict::Continue
+    }
+
+    fn accept(&self, branch: &mut Branch, point: Point) -> bool {
+        branch.insert(point.clone());
+        self.tell(Event::Point(branch, &point))
+    }
+
+    fn end(&self, branch: &mut Branch, side: usize, ending: Ending) -> bool {
+        branch.ends[side] = Some(ending.clone());
+        self.tell(Event::SideEnded(branch, side, &ending))
+    }
+}
+
+/// Whether a branch was born by period doubling.
+pub fn is_doubled(branch: &Branch) -> bool {
+    matches!(branch.origin, Origin::Switch { kind: Kind::PeriodDoubling, .. })
+}
+
+/// What a branch can collapse to: every cycle to an equilibrium, a doubled one to its parent as well.
+fn collapses(branch: &Branch) -> Vec<Box<dyn Monitor>> {
+    let mut all: Vec<Box<dyn Monitor>> = Vec::new();
+    if branch.family == Family::Cycle {
+        if is_doubled(branch) {
+            all.push(Box::new(collapse::Halves));
+        }
+        all.push(Box::new(collapse::Shrinks));
+    }
+    all
+}

@@ -1,0 +1,251 @@
+//! Where first solutions come from.
+//!
+//! **Idea.** Attractors are found by sampling initial states ([`crate::attractors`]) and made accurate by the same
+//! collocation that follows them later. Seeds with the same parameters share one census.
+
+use super::System;
+use super::growth::{polished, problem_of, setting, settings};
+use super::plan::{AttractorKey, Plan, SeedPlan, SeedSource, Start};
+use crate::attractors::{self, Attractor, Candidate, Census, Sampling};
+use crate::continuation::Settings;
+use crate::continuation::corrector::{Plane, correct, parameter_row};
+use crate::contract::{Event, Examination, Observer};
+use crate::diagram::{Cost, Cycle, Diagram, Point, Solution};
+use crate::linalg::max_abs;
+use crate::problem::equilibrium::EquilibriumProblem;
+use crate::problem::gauss::Scheme;
+
+/// The first solutions of a plan: one per seed, or why there is none.
+pub struct Seeds {
+    points: Vec<Result<Point, String>>,
+}
+
+impl Seeds {
+    /// The first solution of that seed.
+    ///
+    /// # Errors
+    /// A sentence that says why there is none.
+    pub fn point(&self, seed: usize) -> Result<Point, String> {
+        self.points.get(seed).cloned().unwrap_or_else(|| Err("no such seed".into()))
+    }
+}
+
+/// Finds every seed that a branch without points in `earlier` starts from.
+pub fn find(system: &System, plan: &Plan, jobs: usize, earlier: &Diagram, observer: &dyn Observer) -> Seeds {
+    let needed = |seed: usize| {
+        plan.branches.iter().any(|b| b.start == Start::Seed(seed) && earlier.branch(&b.name).is_none_or(|known| known.points.is_empty()))
+    };
+    let mut censuses: Vec<(&SeedPlan, Census)> = Vec::new();
+    let mut points = Vec::new();
+    for (index, seed) in plan.seeds.iter().enumerate() {
+        if !needed(index) {
+            points.push(Err("not needed".into()));
+            continue;
+        }
+        points.push(match &seed.source {
+            SeedSource::State(state) => from_state(system, seed, plan, state, jobs).map(|p| with_degree(p, plan.degree)),
+            SeedSource::Attractor(key) => {
+                let same = |other: &SeedPlan| {
+                    other.parameters == seed.parameters && other.samples == seed.samples && other.random == seed.random
+                };
+                if !censuses.iter().any(|(other, _)| same(other)) {
+                    let census = attractors(system, &seed.parameters, seed.samples, seed.random, jobs, plan.tolerance);
+                    observer.observe(Event::Note(&seed.name, &summary(&census)));
+                    censuses.push((seed, census));
+                }
+                match censuses.iter().find(|(other, _)| same(other)) {
+                    Some((_, census)) => chosen(census, key).map(|p| with_degree(p, plan.degree)).ok_or_else(|| missing(census, key)),
+                    None => Err("no census".into()),
+                }
+            }
+        });
+    }
+    Seeds { points }
+}
+
+/// Samples initial states, follows each to its attractor, and computes the attractors accurately.
+///
+/// `parameters` `[k]`; `samples` initial states from the ranges of the system; `seed` makes the sample reproducible.
+pub fn attractors(system: &System, parameters: &[f64], samples: usize, seed: u64, jobs: usize, tolerance: f64) -> Census {
+    let sampling = sampling(system, samples, seed, jobs, tolerance);
+    attractors::survey(system.field, parameters, &sampling, &|candidate| polish(system, parameters, tolerance, candidate))
+}
+
+fn sampling(system: &System, samples: usize, seed: u64, jobs: usize, tolerance: f64) -> Sampling {
+    Sampling { ranges: system.ranges.clone(), scales: system.scales.clone(), whirl: system.whirl, samples, seed, jobs, tolerance }
+}
+
+/// Newton's method at fixed parameters.
+fn polish(system: &System, parameters: &[f64], tolerance: f64, candidate: &Candidate) -> Option<Point> {
+    let settings = settings(system, tolerance, [f64::NEG_INFINITY, f64::INFINITY], 0);
+    let free = 0;
+    let solution = match candidate {
+        Candidate::Equilibrium(x) => Solution::Equilibrium(x.clone()),
+        Candidate::Cycle { period, times, states } => Solution::Cycle(first_profile(system.field.dim(), *period, times, states)),
+    };
+    let mut guess = bare(parameters, solution);
+    let mut problem = problem_of(system, free, 4, &guess, false);
+    // Coarsely first, on the mesh as it is: a candidate that is not close to a solution is not worth a finer one.
+    let coarse = Settings { tolerance: 1e-2, max_newton: 6, ..settings.clone() };
+    let mut u = problem.unknowns_of(&guess);
+    problem.anchor(&u);
+    let plane = Plane { row: parameter_row(u.len()), base: u.clone(), distance: 0.0 };
+    correct(&mut *problem, &coarse, &plane, &mut u, &mut Cost::default()).ok()?;
+    guess.solution = problem.point(&u, &[], Examination::default()).solution;
+    polished(&mut *problem, &settings, &guess).ok().map(|found| found.point)
+}
+
+/// A point about which nothing but the solution is known.
+fn bare(parameters: &[f64], solution: Solution) -> Point {
+    Point {
+        position: 0,
+        parameters: parameters.to_vec(),
+        solution,
+        tangent: Vec::new(),
+        step: 0.0,
+        spectrum: Vec::new(),
+        unstable: 0,
+        ranges: Vec::new(),
+        trust: Default::default(),
+        cost: Default::default(),
+    }
+}
+
+/// A trajectory over one period as a profile on a mesh with equal arclength per interval.
+fn first_profile(n: usize, period: f64, times: &[f64], states: &[f64]) -> Cycle {
+    let intervals = 60;
+    let scheme = Scheme::new(4);
+    let size: Vec<f64> = (0..n).map(|i| states.iter().skip(i).step_by(n).fold(1e-300, |m: f64, v| m.max(v.abs()))).collect();
+    // Arclength in scaled states, plus time, so that no interval becomes empty.
+    let mut length = vec![0.0];
+    for k in 1..times.len() {
+        let moved: f64 = (0..n).map(|i| ((states[k * n + i] - states[(k - 1) * n + i]) / size[i]).powi(2)).sum();
+        length.push(length[k - 1] + moved.sqrt() + (times[k] - times[k - 1]) / period);
+    }
+    let total = length.last().copied().unwrap_or(1.0);
+    let place = |grid: &[f64], values: &[f64], at: f64| -> f64 {
+        let k = grid.partition_point(|g| *g <= at).clamp(1, grid.len().max(2) - 1);
+        let share = (at - grid[k - 1]) / (grid[k] - grid[k - 1]).max(f64::MIN_POSITIVE);
+        values[k - 1] + share * (values[k] - values[k - 1])
+    };
+    let mesh: Vec<f64> = (0..=intervals)
+        .map(|j| match j {
+            0 => 0.0,
+            _ if j == intervals => 1.0,
+            _ => (place(&length, times, total * j as f64 / intervals as f64) / period).clamp(0.0, 1.0),
+        })
+        .collect();
+    // The ends of a trajectory over one period do not quite agree: the gap is spread over the period.
+    let count = times.len();
+    let gap: Vec<f64> = (0..n).map(|i| states[(count - 1) * n + i] - states[i]).collect();
+    let mut profile = Vec::with_capacity(intervals * 5 * n);
+    for pair in mesh.windows(2) {
+        for c in &scheme.nodes {
+            let t = pair[0] + (pair[1] - pair[0]) * c;
+            for i in 0..n {
+                let component: f64 = {
+                    let k = times.partition_point(|g| *g <= t * period).clamp(1, count.max(2) - 1);
+                    cubic(times, states, n, i, k, t * period)
+                };
+                profile.push(component - t * gap[i]);
+            }
+        }
+    }
+    Cycle { period, mesh: mesh.into(), degree: 4, profile }
+}
+
+/// Cubic interpolation of component i through the four samples around interval k-1…k.
+fn cubic(times: &[f64], states: &[f64], n: usize, i: usize, k: usize, t: f64) -> f64 {
+    let first = (k.max(2) - 2).min(times.len().saturating_sub(4));
+    let nodes: Vec<usize> = (first..times.len().min(first + 4)).collect();
+    nodes
+        .iter()
+        .map(|&a| {
+            let weight: f64 =
+                nodes.iter().filter(|&&b| b != a).map(|&b| (t - times[b]) / (times[a] - times[b]).abs().max(f64::MIN_POSITIVE).copysign(times[a] - times[b])).product();
+            weight * states[a * n + i]
+        })
+        .sum()
+}
+
+/// The same solution in polynomials of another degree, to be polished again.
+fn with_degree(mut point: Point, degree: usize) -> Point {
+    if let Solution::Cycle(cycle) = &mut point.solution
+        && cycle.degree != degree
+    {
+        let (old, new) = (Scheme::new(cycle.degree), Scheme::new(degree));
+        let n = cycle.dim();
+        let mut profile = Vec::with_capacity(cycle.intervals() * (degree + 1) * n);
+        for interval in cycle.profile.chunks_exact((cycle.degree + 1) * n) {
+            for &c in &new.nodes {
+                let weights = old.interpolation(c);
+                profile.extend((0..n).map(|i| weights.iter().enumerate().map(|(k, w)| w * interval[k * n + i]).sum::<f64>()));
+            }
+        }
+        (cycle.degree, cycle.profile) = (degree, profile);
+    }
+    point
+}
+
+/// A given state: an equilibrium if Newton's method finds one next to it, else what the trajectory from it settles to.
+fn from_state(system: &System, seed: &SeedPlan, plan: &Plan, state: &[f64], jobs: usize) -> Result<Point, String> {
+    let settings = settings(system, plan.tolerance, [f64::NEG_INFINITY, f64::INFINITY], 0);
+    let mut problem = EquilibriumProblem::new(setting(system, 0, &seed.parameters));
+    if let Ok(found) = polished(&mut problem, &settings, &bare(&seed.parameters, Solution::Equilibrium(state.to_vec()))) {
+        let moved: Vec<f64> = found.u.iter().zip(state).zip(&system.scales).map(|((a, b), s)| (a - b) / (s + b.abs())).collect();
+        if max_abs(&moved) < 1e-2 {
+            return Ok(found.point);
+        }
+    }
+    let sampling = sampling(system, 1, seed.random, jobs, plan.tolerance);
+    let polish = |candidate: &Candidate| polish(system, &seed.parameters, plan.tolerance, candidate);
+    attractors::settle(system.field, &seed.parameters, &sampling, state, &polish).ok_or_else(|| {
+        "the trajectory from the given state settles neither to an equilibrium nor to a cycle; try another state or other parameters"
+            .to_string()
+    })
+}
+
+fn chosen(census: &Census, key: &AttractorKey) -> Option<Point> {
+    let is_cycle = |a: &&Attractor| matches!(a.point.solution, Solution::Cycle(_));
+    let size = |a: &&Attractor| match &a.point.solution {
+        Solution::Equilibrium(x) => crate::linalg::dot(x, x),
+        Solution::Cycle(_) => f64::INFINITY,
+    };
+    let found = match key {
+        AttractorKey::Equilibrium => {
+            census.attractors.iter().filter(|a| !is_cycle(a)).min_by(|a, b| size(a).total_cmp(&size(b)))
+        }
+        AttractorKey::Cycle => census.attractors.iter().filter(is_cycle).max_by_key(|a| a.hits),
+        AttractorKey::Ratio(p, q) => census.attractors.iter().filter(|a| a.ratio == Some((*p, *q))).max_by_key(|a| a.hits),
+    };
+    found.map(|a| a.point.clone())
+}
+
+fn described(attractor: &Attractor) -> String {
+    let what = match (&attractor.point.solution, attractor.ratio) {
+        (Solution::Equilibrium(_), _) => "equilibrium".to_string(),
+        (Solution::Cycle(cycle), Some((p, q))) => format!("{p}:{q} cycle of period {:.6}", cycle.period),
+        (Solution::Cycle(cycle), None) => format!("cycle of period {:.6}", cycle.period),
+    };
+    format!("{what} ({})", attractor.hits)
+}
+
+fn summary(census: &Census) -> String {
+    let mut parts: Vec<String> = census.attractors.iter().map(described).collect();
+    if census.unsettled > 0 {
+        parts.push(format!("unsettled ({})", census.unsettled));
+    }
+    if census.escaped > 0 {
+        parts.push(format!("escaped ({})", census.escaped));
+    }
+    format!("attractors (samples that went there): {}", parts.join(", "))
+}
+
+fn missing(census: &Census, key: &AttractorKey) -> String {
+    let wanted = match key {
+        AttractorKey::Equilibrium => "no stable equilibrium".to_string(),
+        AttractorKey::Cycle => "no stable cycle".to_string(),
+        AttractorKey::Ratio(p, q) => format!("no stable {p}:{q} cycle"),
+    };
+    format!("{wanted} was found; {}; try more samples, other parameters, or give a state", summary(census))
+}

@@ -1,0 +1,156 @@
+//! Leaving a special point on the other branch.
+//!
+//! **Idea.** At the special point the direction of the other branch is known: the period-doubling vector, the null vector
+//! across the tangent, the Hopf eigenvector. A first point is found by Newton's method in the hyperplane a small step along
+//! that direction, across which the branch one comes from cannot be.
+
+use super::System;
+use super::growth::{Beginning, problem_of, setting};
+use crate::continuation::corrector::{Plane, Station, settle};
+use crate::continuation::{Failure, Settings};
+use crate::contract::ZeroProblem;
+use crate::diagram::{Cost, Cycle, Ending, Family, Kind, Point, Solution, SpecialPoint};
+use crate::problem::cycle::CycleProblem;
+use crate::problem::{gauss::Scheme, mesh};
+use crate::special::{branch_point, hopf, period_doubling};
+
+/// Distances along the direction that are tried, in scaled variables. The shorter ones are for branches on which something
+/// else happens next to their beginning, as with contact, where a branch keeps its first shape only until it grazes.
+const DISTANCES: [f64; 7] = [2e-3, 5e-4, 1e-4, 2e-5, 5e-3, 1e-2, 5e-2];
+
+/// The beginning of the branch that leaves `at`, and its family; `None` for kinds at which no branch of equilibria or
+/// cycles leaves.
+///
+/// # Errors
+/// A sentence that says why no point of the other branch was found.
+pub fn beginning(system: &System, settings: &Settings, free: usize, degree: usize, at: &SpecialPoint) -> Option<Result<(Family, Beginning), String>> {
+    let found = match (at.kind, &at.point.solution) {
+        (Kind::PeriodDoubling, Solution::Cycle(cycle)) => doubled(system, settings, free, at, cycle).map(|b| (Family::Cycle, b)),
+        (Kind::Hopf, Solution::Equilibrium(_)) => born(system, settings, free, degree, at).map(|b| (Family::Cycle, b)),
+        (Kind::BranchPoint, solution) => {
+            let family = if matches!(solution, Solution::Cycle(_)) { Family::Cycle } else { Family::Equilibrium };
+            crossing(system, settings, free, degree, at).map(|b| (family, b))
+        }
+        _ => return None,
+    };
+    Some(found)
+}
+
+fn joined(at: &SpecialPoint, free: usize) -> Ending {
+    Ending::Joined { at: at.kind, parameter: at.point.parameters[free] }
+}
+
+/// The first point at one of the [`DISTANCES`] along `direction` (not normalised) from `base`.
+fn step_off(
+    problem: &mut dyn ZeroProblem,
+    settings: &Settings,
+    base: &[f64],
+    direction: &[f64],
+    sign: f64,
+    expected: &dyn Fn(&Station) -> bool,
+) -> Result<Station, Failure> {
+    let mesh = problem.mesh();
+    let (mut failure, mut second_best) = (Failure::Singular, None);
+    for distance in DISTANCES {
+        if !mesh.is_empty() {
+            problem.set_mesh(&mesh);
+        }
+        let along = |s: f64| -> Vec<f64> { base.iter().zip(direction).map(|(b, d)| b + s * d).collect() };
+        // The reference for the phase lies on the new branch: the base may have no phase at all (a Hopf point).
+        problem.anchor(&along(1.0));
+        let norm = problem.dot(direction, direction).sqrt();
+        problem.anchor(&along(sign * distance / norm));
+        let row: Vec<f64> = direction.iter().map(|d| sign * d / norm).collect();
+        let scale = problem.dot(&row, &row).sqrt();
+        let row: Vec<f64> = row.iter().map(|r| r / scale).collect();
+        let guess: Vec<f64> = base.iter().zip(&row).map(|(b, r)| b + distance * r).collect();
+        let plane = Plane { row, base: base.to_vec(), distance };
+        match settle(problem, settings, plane, guess, 1.0, &mut Cost::default()) {
+            Ok(found) if expected(&found) => return Ok(found),
+            Ok(found) => second_best = second_best.or(Some(found)),
+            Err(why) => failure = why,
+        }
+    }
+    second_best.ok_or(failure)
+}
+
+/// Exchange of stability: a branch born on the side where its parent has more unstable multipliers has the smaller number
+/// of them, one born on the other side has one more than that. True if `found` is like that.
+fn exchanges_stability(at: &SpecialPoint, free: usize, found: &Station) -> bool {
+    let rising = at.point.parameter_slope() > 0.0;
+    let (below, above) = if rising { (at.unstable_before, at.unstable_after) } else { (at.unstable_after, at.unstable_before) };
+    let own = if found.parameter() > at.point.parameters[free] { above } else { below };
+    let fewer = below.min(above);
+    found.point.unstable == if own > fewer { fewer } else { fewer + 1 }
+}
+
+fn doubled(system: &System, settings: &Settings, free: usize, at: &SpecialPoint, cycle: &Cycle) -> Result<Beginning, String> {
+    let (mut problem, base, direction) = double(system, free, at, cycle).ok_or("no vector of period doubling was found")?;
+    let first = step_off(&mut problem, settings, &base, &direction, 1.0, &|found| exchanges_stability(at, free, found)).map_err(|why| why.to_string())?;
+    let before = doubled_edge(system, free, at, &first.point).into_iter().collect();
+    Ok(Beginning::Edge { before, first, joined: joined(at, free) })
+}
+
+/// The problem of doubled cycles at a period doubling, the cycle run through twice, and the direction of the new branch.
+fn double<'a>(system: &'a System, free: usize, at: &SpecialPoint, cycle: &Cycle) -> Option<(CycleProblem<'a>, Vec<f64>, Vec<f64>)> {
+    let mut single = CycleProblem::new(setting(system, free, &at.point.parameters), cycle.degree, &cycle.mesh);
+    let u = single.unknowns_of(&at.point);
+    single.anchor(&u);
+    let vector = single.antiperiodic_direction(&u)?;
+    let (twice, mut direction) = period_doubling::doubled(cycle, &vector);
+    direction.extend([0.0, 0.0]);
+    let mut problem = CycleProblem::new(setting(system, free, &at.point.parameters), twice.degree, &twice.mesh).with_equal_halves();
+    let base = problem.unknowns_of(&Point { solution: Solution::Cycle(twice), ..at.point.clone() });
+    Some((problem, base, direction))
+}
+
+/// A period doubling as a point of the doubled branch that begins or ends there; its stability is that of `next`, the
+/// point of the branch beside it.
+pub fn doubled_edge(system: &System, free: usize, at: &SpecialPoint, next: &Point) -> Option<Point> {
+    let Solution::Cycle(cycle) = &at.point.solution else { return None };
+    let (mut problem, base, direction) = double(system, free, at, cycle)?;
+    problem.anchor(&base);
+    let norm = problem.dot(&direction, &direction).sqrt();
+    let tangent: Vec<f64> = direction.iter().map(|d| d / norm).collect();
+    // The matrix may be singular here; what the examination needs of it does not depend on that.
+    let _ = problem.factorise(&base, &tangent);
+    let mut examination = problem.examine(&base);
+    // The error estimate does need the solution of the linear system; the cycle is that of the special point, twice.
+    examination.trust.discretisation = at.point.trust.discretisation;
+    Some(Point { unstable: next.unstable, ..problem.point(&base, &tangent, examination) })
+}
+
+fn born(system: &System, settings: &Settings, free: usize, degree: usize, at: &SpecialPoint) -> Result<Beginning, String> {
+    let mesh = mesh::uniform(20);
+    let scheme = Scheme::new(degree);
+    let (mut direction, period) =
+        hopf::direction(system.field, &at.point, &system.scales, &scheme, &mesh).ok_or("no oscillating eigenvector was found")?;
+    direction.extend([0.0, 0.0]);
+    let mut problem = CycleProblem::new(setting(system, free, &at.point.parameters), degree, &mesh);
+    let mut base = problem.unknowns_of(&at.point);
+    let size = base.len();
+    base[size - 2] = period;
+    let first = step_off(&mut problem, settings, &base, &direction, 1.0, &|found| exchanges_stability(at, free, found)).map_err(|why| why.to_string())?;
+    Ok(Beginning::Edge { before: Vec::new(), first, joined: joined(at, free) })
+}
+
+fn crossing(system: &System, settings: &Settings, free: usize, degree: usize, at: &SpecialPoint) -> Result<Beginning, String> {
+    let mut problem = problem_of(system, free, degree, &at.point, false);
+    let problem = &mut *problem;
+    let u = problem.unknowns_of(&at.point);
+    problem.anchor(&u);
+    let vector = branch_point::direction(problem, &u, &at.point.tangent).ok_or("the tangent of the other branch was not found")?;
+    let mesh = problem.mesh();
+    let one = step_off(problem, settings, &u, &vector, 1.0, &|_| true).map_err(|why| why.to_string())?;
+    problem.set_mesh(&mesh);
+    let symmetric = step_off(problem, settings, &u, &vector, -1.0, &|_| true).is_ok_and(|other| {
+        let images = system.reflections.iter().filter(|r| r.contains(&true));
+        let gap = (one.parameter() - other.parameter()).abs();
+        gap < 1e-6 * (1.0 + one.parameter().abs()) && images.into_iter().any(|r| one.point.difference(&other.point, &system.scales, r) < 30.0 * settings.tolerance)
+    });
+    if symmetric {
+        // The other arm is the mirror image of this one.
+        return Ok(Beginning::Edge { before: Vec::new(), first: one, joined: joined(at, free) });
+    }
+    Ok(Beginning::Inside(one))
+}

@@ -1,0 +1,64 @@
+//! A vector field together with what exploring it needs to know.
+
+use crate::contract::{Batch, Parameters, VectorField};
+
+/// A vector field, its scales, and where to look for attractors.
+#[derive(Clone)]
+pub struct System<'a> {
+    /// The vector field.
+    pub field: &'a dyn VectorField,
+    /// `[n]` characteristic size of each state.
+    pub scales: Vec<f64>,
+    /// `[k]` characteristic size of each parameter: a length along a branch counts changes of a parameter relative to it.
+    pub parameter_scales: Vec<f64>,
+    /// `[n]` box from which initial states are sampled.
+    pub ranges: Vec<[f64; 2]>,
+    /// The two states that form the complex whirl signal, if the model has one.
+    pub whirl: Option<[usize; 2]>,
+    /// Coordinate reflections under which the field is equivariant, the identity first.
+    pub reflections: Vec<Vec<bool>>,
+}
+
+impl<'a> System<'a> {
+    /// A system whose scales are all 1 and whose initial states come from [-2, 2]ⁿ.
+    pub fn new(field: &'a dyn VectorField) -> System<'a> {
+        let n = field.dim();
+        System {
+            field,
+            scales: vec![1.0; n],
+            parameter_scales: vec![1.0; field.parameter_count()],
+            ranges: vec![[-2.0, 2.0]; n],
+            whirl: None,
+            reflections: vec![vec![false; n]],
+        }
+    }
+
+    /// Finds the reflections R = diag(±1), n ≤ 10, with f(R x) = R f(x), by trial at a few points and the parameter values
+    /// `parameters`.
+    pub fn find_reflections(&mut self, parameters: &[f64]) {
+        let n = self.field.dim();
+        self.reflections = vec![vec![false; n]];
+        if n > 10 {
+            return;
+        }
+        let points: Vec<Vec<f64>> = (0..5)
+            .map(|k| (0..n).map(|i| self.scales[i] * ((3 * k + 1) as f64 * 0.71 + (i * i + 1) as f64 * 1.37).sin()).collect())
+            .collect();
+        let value = |x: &[f64]| {
+            let mut f = vec![0.0; n];
+            self.field.evaluate(Batch { lanes: 1, states: x, parameters: Parameters::Shared(parameters) }, &mut f);
+            f
+        };
+        for bits in 1..1usize << n {
+            let reflection: Vec<bool> = (0..n).map(|i| bits >> i & 1 == 1).collect();
+            let reflect = |x: &[f64]| -> Vec<f64> { x.iter().zip(&reflection).map(|(v, r)| if *r { -v } else { *v }).collect() };
+            let equivariant = points.iter().all(|x| {
+                let (a, b) = (value(&reflect(x)), reflect(&value(x)));
+                a.iter().zip(&b).all(|(p, q)| p.is_finite() && (p - q).abs() <= 1e-10 * (p.abs() + q.abs()))
+            });
+            if equivariant {
+                self.reflections.push(reflection);
+            }
+        }
+    }
+}

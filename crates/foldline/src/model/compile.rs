@@ -1,0 +1,352 @@
+//! From a written model to a graph: names resolved, definitions put in order, every mistake reported.
+
+use super::error::{Complaint, Field, Item, ModelError};
+use super::function::{CONSTANTS, function};
+use super::graph::{Graph, Id, Leaf};
+use super::nearest::suggest;
+use super::parser::{Expression, Term};
+use super::source::ModelSource;
+use std::collections::{HashMap, HashSet};
+
+/// The expressions of a model as nodes.
+#[derive(Debug)]
+pub(super) struct Compiled {
+    pub graph: Graph,
+    /// f, one node per state.
+    pub field: Vec<Id>,
+    /// One node per output.
+    pub outputs: Vec<Id>,
+    /// The states that form the complex signal.
+    pub whirl: Option<[usize; 2]>,
+}
+
+/// What a name stands for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Symbol {
+    State(usize),
+    Parameter(usize),
+    Definition(usize),
+    Number(f64),
+}
+
+impl Symbol {
+    fn article(self) -> &'static str {
+        match self {
+            Symbol::State(_) => "a state",
+            Symbol::Parameter(_) => "a parameter",
+            Symbol::Definition(_) => "a definition",
+            Symbol::Number(_) => "a constant",
+        }
+    }
+}
+
+/// Compiles `source`, or returns everything that is wrong with it.
+pub(super) fn compile(source: &ModelSource) -> Result<Compiled, Vec<ModelError>> {
+    let mut check = Check { source, symbols: HashMap::new(), errors: Vec::new() };
+    check.names();
+    check.numbers();
+    let equation_of = check.equations();
+    let whirl = check.whirl();
+
+    let definitions: Vec<Option<Expression>> =
+        source.definitions.iter().enumerate().map(|(i, d)| check.parse(Item::Definition(i), &d.expression)).collect();
+    let equations: Vec<Option<Expression>> =
+        source.equations.iter().enumerate().map(|(i, d)| check.parse(Item::Equation(i), &d.expression)).collect();
+    let outputs: Vec<Option<Expression>> =
+        source.outputs.iter().enumerate().map(|(i, o)| check.parse(Item::Output(i), &o.expression)).collect();
+    let order = check.order(&definitions);
+    if !check.errors.is_empty() {
+        return Err(check.errors);
+    }
+
+    let mut lowering = Lowering { graph: Graph::default(), symbols: &check.symbols, definitions: HashMap::new() };
+    for i in order {
+        let id = lowering.lower(definitions[i].as_ref());
+        lowering.definitions.insert(i, id);
+    }
+    let field = equation_of.iter().map(|e| lowering.lower(e.and_then(|e| equations[e].as_ref()))).collect();
+    let outputs = outputs.iter().map(|o| lowering.lower(o.as_ref())).collect();
+    Ok(Compiled { graph: lowering.graph, field, outputs, whirl })
+}
+
+struct Check<'a> {
+    source: &'a ModelSource,
+    symbols: HashMap<&'a str, Symbol>,
+    errors: Vec<ModelError>,
+}
+
+impl<'a> Check<'a> {
+    fn report(&mut self, item: Item, field: Field, message: impl Into<String>, hint: impl Into<String>) {
+        let name = name_of(self.source, item).to_string();
+        self.errors.push(ModelError { item, field, name, span: None, message: message.into(), hint: hint.into() });
+    }
+
+    fn complain(&mut self, item: Item, complaint: Complaint) {
+        let Complaint { span, message, mut hint, function } = complaint;
+        if let Some((name, symbol)) = function.and_then(|f| Some((f.clone(), *self.symbols.get(f.as_str())?))) {
+            hint = format!("`{name}` is {}; write a product with a star: `{name}*(…)`", symbol.article());
+        }
+        let name = name_of(self.source, item).to_string();
+        self.errors.push(ModelError { item, field: Field::Expression, name, span: Some(span), message, hint });
+    }
+
+    /// Fills the table of names.
+    fn names(&mut self) {
+        let source = self.source;
+        for (name, value) in CONSTANTS {
+            self.symbols.insert(name, Symbol::Number(value));
+        }
+        let parameters = source.parameters.iter().enumerate();
+        let states = source.states.iter().enumerate();
+        let definitions = source.definitions.iter().enumerate();
+        let declared = parameters
+            .map(|(i, p)| (p.name.as_str(), Item::Parameter(i), Symbol::Parameter(i)))
+            .chain(states.map(|(i, s)| (s.name.as_str(), Item::State(i), Symbol::State(i))))
+            .chain(definitions.map(|(i, d)| (d.name.as_str(), Item::Definition(i), Symbol::Definition(i))));
+        for (name, item, symbol) in declared {
+            self.identifier(name, item);
+            match self.symbols.get(name) {
+                Some(Symbol::Number(_)) => {
+                    self.report(item, Field::Name, format!("`{name}` is a constant"), "choose another name")
+                }
+                Some(earlier) => {
+                    let message = format!("the name `{name}` is used twice: it is {} already", earlier.article());
+                    self.report(item, Field::Name, message, "parameters, states and definitions need different names");
+                }
+                None => {
+                    self.symbols.insert(name, symbol);
+                }
+            }
+        }
+        let mut seen = HashSet::new();
+        for (i, output) in source.outputs.iter().enumerate() {
+            let (item, name) = (Item::Output(i), output.name.as_str());
+            self.identifier(name, item);
+            match self.symbols.get(name) {
+                Some(symbol @ (Symbol::State(_) | Symbol::Parameter(_))) => {
+                    let message = format!("the output `{name}` has the name of {}", symbol.article());
+                    self.report(item, Field::Name, message, "choose another name; states are recorded anyway");
+                }
+                _ if !seen.insert(name) => {
+                    self.report(item, Field::Name, format!("the output `{name}` exists twice"), "remove one of the two")
+                }
+                _ => {}
+            }
+        }
+        if source.states.is_empty() {
+            self.report(Item::Model, Field::Name, "the model has no state", "declare at least one state");
+        }
+    }
+
+    fn identifier(&mut self, name: &str, item: Item) {
+        let well_formed = name.starts_with(|c: char| c.is_alphabetic() || c == '_')
+            && name.chars().all(|c| c.is_alphanumeric() || c == '_');
+        if !well_formed {
+            let hint = "a name begins with a letter and goes on with letters, digits and underscores";
+            self.report(item, Field::Name, format!("`{name}` is not a name"), hint);
+        } else if function(name).is_some() {
+            self.report(item, Field::Name, format!("`{name}` is the name of a function"), "choose another name");
+        }
+    }
+
+    fn numbers(&mut self) {
+        for (i, parameter) in self.source.parameters.iter().enumerate() {
+            if !parameter.value.is_finite() {
+                self.report(Item::Parameter(i), Field::Value, "the value is not a finite number", "write a number");
+            }
+        }
+        for (i, state) in self.source.states.iter().enumerate() {
+            if !(state.scale > 0.0 && state.scale.is_finite()) {
+                let hint = "write the characteristic size of this state, a positive number";
+                self.report(Item::State(i), Field::Scale, format!("the scale {} is not positive", state.scale), hint);
+            }
+            let [low, high] = state.range;
+            if !(low.is_finite() && high.is_finite()) {
+                self.report(Item::State(i), Field::Range, "the range is not finite", "write two numbers");
+            } else if low >= high {
+                let message = format!("the range [{low}, {high}] is the wrong way round");
+                self.report(
+                    Item::State(i),
+                    Field::Range,
+                    message,
+                    format!("write [{high}, {low}], smaller value first"),
+                );
+            }
+        }
+    }
+
+    /// Which equation belongs to each state.
+    fn equations(&mut self) -> Vec<Option<usize>> {
+        let source = self.source;
+        let mut equation_of = vec![None; source.states.len()];
+        let states: Vec<&str> = source.states.iter().map(|s| s.name.as_str()).collect();
+        for (i, equation) in source.equations.iter().enumerate() {
+            match states.iter().position(|&name| name == equation.name) {
+                None => {
+                    let message = format!("an equation for `{}`, which is not a declared state", equation.name);
+                    self.report(Item::Equation(i), Field::Name, message, suggest(&equation.name, &states));
+                }
+                Some(state) if equation_of[state].is_some() => {
+                    let message = format!("a second equation for the state `{}`", equation.name);
+                    self.report(Item::Equation(i), Field::Name, message, "keep one of the two");
+                }
+                Some(state) => equation_of[state] = Some(i),
+            }
+        }
+        for (i, name) in states.iter().enumerate().filter(|(i, _)| equation_of[*i].is_none()) {
+            let hint = format!("say how it changes in time: the right-hand side of d{name}/dt");
+            self.report(Item::State(i), Field::Expression, format!("the state `{name}` has no equation"), hint);
+        }
+        equation_of
+    }
+
+    fn whirl(&mut self) -> Option<[usize; 2]> {
+        let [u, v] = self.source.whirl.as_ref()?;
+        let states: Vec<&str> = self.source.states.iter().map(|s| s.name.as_str()).collect();
+        let found = [u, v].map(|name| states.iter().position(|s| s == name));
+        for (name, _) in [u, v].into_iter().zip(found).filter(|(_, place)| place.is_none()) {
+            let message = format!("`{name}` is not a state");
+            self.report(Item::Whirl, Field::Name, message, suggest(name, &states));
+        }
+        match found {
+            [Some(a), Some(b)] if a == b => {
+                self.report(Item::Whirl, Field::Name, "both parts of the signal are the same state", "name two states");
+                None
+            }
+            [Some(a), Some(b)] => Some([a, b]),
+            _ => None,
+        }
+    }
+
+    /// Parses an expression and checks its names.
+    fn parse(&mut self, item: Item, text: &str) -> Option<Expression> {
+        let expression = match Expression::parse(text) {
+            Ok(expression) => expression,
+            Err(complaint) => {
+                self.complain(item, complaint);
+                return None;
+            }
+        };
+        for (name, span) in expression.names().filter(|(name, _)| !self.symbols.contains_key(name)).collect::<Vec<_>>()
+        {
+            let hint = match function(name) {
+                Some(function) => format!("`{name}` is a function: write `{}`", function.signature),
+                None if name == "t" || name == "time" => {
+                    "models do not depend on time; write a forcing as two states of an oscillator of unit amplitude"
+                        .into()
+                }
+                None => {
+                    let mut known: Vec<&str> = self.symbols.keys().copied().collect();
+                    known.sort();
+                    suggest(name, &known)
+                }
+            };
+            let outputs = self.source.outputs.iter().any(|output| output.name == name);
+            let message = match outputs {
+                true => format!("`{name}` is an output, which cannot be used in an expression"),
+                false => format!("unknown name `{name}`"),
+            };
+            let hint = if outputs { "give the expression a name in the definitions and use that".into() } else { hint };
+            self.complain(item, Complaint::new(span, message, hint));
+        }
+        Some(expression)
+    }
+
+    /// The definitions in an order in which each uses only earlier ones.
+    fn order(&mut self, definitions: &[Option<Expression>]) -> Vec<usize> {
+        let uses: Vec<Vec<(usize, std::ops::Range<usize>)>> = definitions
+            .iter()
+            .map(|expression| {
+                let names = expression.iter().flat_map(|e| e.names());
+                names
+                    .filter_map(|(name, span)| match self.symbols.get(name) {
+                        Some(Symbol::Definition(j)) => Some((*j, span)),
+                        _ => None,
+                    })
+                    .collect()
+            })
+            .collect();
+        let mut open: Vec<usize> = (0..definitions.len()).collect();
+        let mut order = Vec::with_capacity(open.len());
+        let mut settled = vec![false; open.len()];
+        loop {
+            let (ready, rest): (Vec<usize>, Vec<usize>) =
+                open.iter().partition(|&&i| uses[i].iter().all(|(j, _)| settled[*j]));
+            if ready.is_empty() {
+                break;
+            }
+            ready.iter().for_each(|&i| settled[i] = true);
+            order.extend(ready);
+            open = rest;
+        }
+        if let Some(&start) = open.first() {
+            self.cycle(start, &uses, &settled);
+        }
+        order
+    }
+
+    /// Reports the cycle that is reached from `start` along definitions that are not settled.
+    fn cycle(&mut self, start: usize, uses: &[Vec<(usize, std::ops::Range<usize>)>], settled: &[bool]) {
+        let mut path = vec![start];
+        while let Some((next, span)) = uses[path[path.len() - 1]].iter().find(|(j, _)| !settled[*j]) {
+            if let Some(at) = path.iter().position(|i| i == next) {
+                let mut names: Vec<&str> =
+                    path[at..].iter().map(|&i| self.source.definitions[i].name.as_str()).collect();
+                names.push(names[0]);
+                let chain = names.join(" → ");
+                let last = Item::Definition(path[path.len() - 1]);
+                let message = format!("definitions that need each other: {chain}");
+                self.complain(
+                    last,
+                    Complaint::new(span.clone(), message, "break the circle; only a state may depend on itself"),
+                );
+                return;
+            }
+            path.push(*next);
+        }
+    }
+}
+
+fn name_of(source: &ModelSource, item: Item) -> &str {
+    match item {
+        Item::Model => &source.name,
+        Item::Parameter(i) => &source.parameters[i].name,
+        Item::Definition(i) => &source.definitions[i].name,
+        Item::State(i) => &source.states[i].name,
+        Item::Equation(i) => &source.equations[i].name,
+        Item::Output(i) => &source.outputs[i].name,
+        Item::Whirl => "",
+    }
+}
+
+/// Turns terms into nodes.
+struct Lowering<'a> {
+    graph: Graph,
+    symbols: &'a HashMap<&'a str, Symbol>,
+    definitions: HashMap<usize, Id>,
+}
+
+impl Lowering<'_> {
+    /// The node of an expression that was checked; 0 for one that is missing, which the checks exclude.
+    fn lower(&mut self, expression: Option<&Expression>) -> Id {
+        let zero = self.graph.constant(0.0);
+        let mut ids: Vec<Id> = Vec::new();
+        for term in expression.iter().flat_map(|e| &e.terms) {
+            let id = match term {
+                Term::Number(value) => self.graph.constant(*value),
+                Term::Name(name) => match self.symbols.get(name.as_str()) {
+                    Some(Symbol::Number(value)) => self.graph.constant(*value),
+                    Some(Symbol::State(i)) => self.graph.leaf(Leaf::State(*i as u32)),
+                    Some(Symbol::Parameter(k)) => self.graph.leaf(Leaf::Parameter(*k as u32)),
+                    Some(Symbol::Definition(j)) => self.definitions.get(j).copied().unwrap_or(zero),
+                    None => zero,
+                },
+                Term::Unary(op, a) => self.graph.unary(*op, ids[*a]),
+                Term::Binary(op, a, b) => self.graph.binary(*op, ids[*a], ids[*b]),
+                Term::Call(function, [a, b, c]) => function.apply(&mut self.graph, [ids[*a], ids[*b], ids[*c]]),
+            };
+            ids.push(id);
+        }
+        ids.last().copied().unwrap_or(zero)
+    }
+}

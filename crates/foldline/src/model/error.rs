@@ -1,0 +1,105 @@
+//! What can be wrong with a model, said so that it can be put right.
+
+use super::function::{FUNCTIONS, known_elsewhere_as};
+use super::nearest::suggest;
+use std::fmt;
+use std::ops::Range;
+
+/// Which part of a [`super::ModelSource`] is meant; numbers are positions in its lists.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Item {
+    /// The model as a whole.
+    Model,
+    /// A parameter.
+    Parameter(usize),
+    /// A named intermediate expression.
+    Definition(usize),
+    /// A state.
+    State(usize),
+    /// The equation of a state.
+    Equation(usize),
+    /// An output.
+    Output(usize),
+    /// The pair of states that forms the complex signal.
+    Whirl,
+}
+
+/// Which field of an item is wrong.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Field {
+    /// Its name.
+    Name,
+    /// Its expression.
+    Expression,
+    /// The value of a parameter.
+    Value,
+    /// The characteristic size of a state.
+    Scale,
+    /// The sampling range of a state.
+    Range,
+}
+
+/// Something wrong with a model.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ModelError {
+    /// The part.
+    pub item: Item,
+    /// The field of that part.
+    pub field: Field,
+    /// The name of the part, for messages without a file.
+    pub name: String,
+    /// Bytes within the expression, where the mistake has a place there.
+    pub span: Option<Range<usize>>,
+    /// What is wrong.
+    pub message: String,
+    /// What would be right.
+    pub hint: String,
+}
+
+impl fmt::Display for ModelError {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let part = match self.item {
+            Item::Model => "the model",
+            Item::Parameter(_) => "the parameter",
+            Item::Definition(_) => "the definition",
+            Item::State(_) => "the state",
+            Item::Equation(_) => "the equation of",
+            Item::Output(_) => "the output",
+            Item::Whirl => "whirl",
+        };
+        write!(f, "{part}")?;
+        if !self.name.is_empty() {
+            write!(f, " `{}`", self.name)?;
+        }
+        if let Some(span) = &self.span {
+            write!(f, ", byte {}", span.start + 1)?;
+        }
+        write!(f, ": {} ({})", self.message, self.hint)
+    }
+}
+
+impl std::error::Error for ModelError {}
+
+/// Something wrong within an expression.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Complaint {
+    pub span: Range<usize>,
+    pub message: String,
+    pub hint: String,
+    /// The function name that is not known; the hint can be improved once all names are.
+    pub function: Option<String>,
+}
+
+impl Complaint {
+    pub fn new(span: Range<usize>, message: impl Into<String>, hint: impl Into<String>) -> Complaint {
+        Complaint { span, message: message.into(), hint: hint.into(), function: None }
+    }
+
+    pub fn unknown_function(name: String, span: Range<usize>) -> Complaint {
+        let hint = match known_elsewhere_as(&name) {
+            Some(advice) => advice.to_string(),
+            None => suggest(&name, &FUNCTIONS.each_ref().map(|f| f.name)),
+        };
+        Complaint { span, message: format!("there is no function `{name}`"), hint, function: Some(name) }
+    }
+}

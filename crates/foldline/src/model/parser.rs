@@ -1,0 +1,275 @@
+//! From words to a list of terms.
+//!
+//! **Equations.** Grammar, loosest binding first:
+//!
+//! 1. comparison = sum [ ( < | <= | > | >= | == | != ) sum ]
+//! 2. sum = product { ( + | - ) product }
+//! 3. product = signed { ( * | / ) signed }
+//! 4. signed = ( + | - ) signed | power
+//! 5. power = atom [ ^ signed ], so -x^2 = -(x^2), x^y^z = x^(y^z), and 2^-1 is allowed
+//! 6. atom = number | name | name ( comparison { , comparison } ) | ( comparison )
+
+use super::error::Complaint;
+use super::function::{Function, function};
+use super::graph::{Binary, Unary};
+use super::lexer::{Token, words};
+use std::ops::Range;
+
+/// Deepest nesting of brackets, signs and powers.
+const DEEPEST: usize = 200;
+
+/// What a term is; operands are indices of earlier terms.
+#[derive(Clone, Debug)]
+pub(super) enum Term {
+    Number(f64),
+    Name(String),
+    Unary(Unary, usize),
+    Binary(Binary, usize, usize),
+    /// Unused places repeat the first argument.
+    Call(&'static Function, [usize; 3]),
+}
+
+/// A parsed expression: terms, operands before their users; the last one is the whole.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Expression {
+    pub terms: Vec<Term>,
+    pub spans: Vec<Range<usize>>,
+}
+
+impl Expression {
+    /// Parses `text`.
+    pub fn parse(text: &str) -> Result<Expression, Complaint> {
+        let words = words(text)?;
+        if words.is_empty() {
+            return Err(Complaint::new(
+                0..text.len(),
+                "the expression is empty",
+                "write a formula such as `a*x - x^3`",
+            ));
+        }
+        let mut parser = Parser { words, at: 0, end: text.len(), depth: 0, out: Expression::default() };
+        parser.comparison()?;
+        match parser.words.get(parser.at) {
+            None => Ok(parser.out),
+            Some((token, span)) => Err(parser.unexpected(token.clone(), span.clone())),
+        }
+    }
+
+    /// The names it mentions.
+    pub fn names(&self) -> impl Iterator<Item = (&str, Range<usize>)> {
+        self.terms.iter().zip(&self.spans).filter_map(|(term, span)| match term {
+            Term::Name(name) => Some((name.as_str(), span.clone())),
+            _ => None,
+        })
+    }
+}
+
+struct Parser {
+    words: Vec<(Token, Range<usize>)>,
+    at: usize,
+    end: usize,
+    depth: usize,
+    out: Expression,
+}
+
+type Parsed = Result<usize, Complaint>;
+
+impl Parser {
+    /// The next word if it is one of these symbols; it is consumed.
+    fn take(&mut self, symbols: &[&str]) -> Option<(&'static str, Range<usize>)> {
+        match self.words.get(self.at) {
+            Some((Token::Symbol(symbol), span)) if symbols.contains(symbol) => {
+                self.at += 1;
+                Some((symbol, span.clone()))
+            }
+            _ => None,
+        }
+    }
+
+    fn push(&mut self, term: Term, span: Range<usize>) -> usize {
+        self.out.terms.push(term);
+        self.out.spans.push(span);
+        self.out.terms.len() - 1
+    }
+
+    fn binary(&mut self, op: Binary, a: usize, b: usize) -> usize {
+        let span = self.out.spans[a].start..self.out.spans[b].end;
+        self.push(Term::Binary(op, a, b), span)
+    }
+
+    fn comparison(&mut self) -> Parsed {
+        const SYMBOLS: [&str; 6] = ["<", "<=", ">", ">=", "==", "!="];
+        let a = self.sum()?;
+        let Some((symbol, _)) = self.take(&SYMBOLS) else { return Ok(a) };
+        let b = self.sum()?;
+        if let Some((_, span)) = self.take(&SYMBOLS) {
+            return Err(Complaint::new(
+                span,
+                "comparisons cannot be chained",
+                "write the two comparisons as a product: `(a < b)*(b < c)`",
+            ));
+        }
+        Ok(match symbol {
+            "<" => self.binary(Binary::Less, a, b),
+            "<=" => self.binary(Binary::LessOrEqual, a, b),
+            ">" => self.binary(Binary::Less, b, a),
+            ">=" => self.binary(Binary::LessOrEqual, b, a),
+            "==" => self.binary(Binary::Equal, a, b),
+            _ => self.binary(Binary::NotEqual, a, b),
+        })
+    }
+
+    fn sum(&mut self) -> Parsed {
+        let mut a = self.product()?;
+        while let Some((symbol, _)) = self.take(&["+", "-"]) {
+            let b = self.product()?;
+            a = self.binary(if symbol == "+" { Binary::Add } else { Binary::Subtract }, a, b);
+        }
+        Ok(a)
+    }
+
+    fn product(&mut self) -> Parsed {
+        let mut a = self.signed()?;
+        while let Some((symbol, _)) = self.take(&["*", "/"]) {
+            let b = self.signed()?;
+            a = self.binary(if symbol == "*" { Binary::Multiply } else { Binary::Divide }, a, b);
+        }
+        Ok(a)
+    }
+
+    fn signed(&mut self) -> Parsed {
+        self.depth += 1;
+        if self.depth > DEEPEST {
+            let span = self.words.get(self.at).map_or(self.end..self.end, |word| word.1.clone());
+            return Err(Complaint::new(
+                span,
+                format!("the expression is nested more than {DEEPEST} deep"),
+                "give inner parts a name in the definitions",
+            ));
+        }
+        let parsed = match self.take(&["+", "-"]) {
+            Some(("-", span)) => {
+                let a = self.signed()?;
+                let span = span.start..self.out.spans[a].end;
+                self.push(Term::Unary(Unary::Negate, a), span)
+            }
+            Some(_) => self.signed()?,
+            None => self.power()?,
+        };
+        self.depth -= 1;
+        Ok(parsed)
+    }
+
+    fn power(&mut self) -> Parsed {
+        let a = self.atom()?;
+        if self.take(&["^"]).is_none() {
+            return Ok(a);
+        }
+        let b = self.signed()?;
+        Ok(self.binary(Binary::Power, a, b))
+    }
+
+    fn atom(&mut self) -> Parsed {
+        let Some((token, span)) = self.words.get(self.at).cloned() else {
+            return Err(Complaint::new(
+                self.end..self.end,
+                "the expression ends where a value is expected",
+                "write a number, a name or a bracket here",
+            ));
+        };
+        self.at += 1;
+        match token {
+            Token::Number(value) => Ok(self.push(Term::Number(value), span)),
+            Token::Name(name) => match self.take(&["("]) {
+                Some((_, open)) => self.call(name, span, open),
+                None => Ok(self.push(Term::Name(name), span)),
+            },
+            Token::Symbol("(") => {
+                let inner = self.comparison()?;
+                let close = self.close(&span)?;
+                self.out.spans[inner] = span.start..close.end;
+                Ok(inner)
+            }
+            Token::Symbol(_) => {
+                self.at -= 1;
+                Err(self.unexpected(token, span))
+            }
+        }
+    }
+
+    fn call(&mut self, name: String, span: Range<usize>, open: Range<usize>) -> Parsed {
+        let mut arguments = Vec::new();
+        let close = match self.take(&[")"]) {
+            Some((_, close)) => close,
+            None => loop {
+                arguments.push(self.comparison()?);
+                if self.take(&[","]).is_none() {
+                    break self.close(&open)?;
+                }
+            },
+        };
+        let whole = span.start..close.end;
+        let Some(function) = function(&name) else { return Err(Complaint::unknown_function(name, span)) };
+        if arguments.len() != function.arity() {
+            let plural = if function.arity() == 1 { "" } else { "s" };
+            return Err(Complaint::new(
+                whole,
+                format!("`{name}` takes {} argument{plural}, {} given", function.arity(), arguments.len()),
+                format!("write `{}`", function.signature),
+            ));
+        }
+        let first = arguments[0];
+        let place = |i: usize| arguments.get(i).copied().unwrap_or(first);
+        Ok(self.push(Term::Call(function, [first, place(1), place(2)]), whole))
+    }
+
+    /// The bracket that closes the one at `open`.
+    fn close(&mut self, open: &Range<usize>) -> Result<Range<usize>, Complaint> {
+        if let Some((_, close)) = self.take(&[")"]) {
+            return Ok(close);
+        }
+        match self.words.get(self.at) {
+            None => Err(Complaint::new(
+                open.clone(),
+                "this bracket is never closed",
+                "add the missing `)`, at the latest at the end of the expression",
+            )),
+            Some((Token::Symbol(","), span)) => Err(Complaint::new(
+                span.clone(),
+                "a comma outside the arguments of a function",
+                "close the bracket before the comma, or write a decimal point instead of a comma",
+            )),
+            Some((token, span)) => Err(self.unexpected(token.clone(), span.clone())),
+        }
+    }
+
+    /// A word that cannot stand where it stands.
+    fn unexpected(&self, token: Token, span: Range<usize>) -> Complaint {
+        let after_value = self.at > 0
+            && match &self.words[self.at - 1].0 {
+                Token::Number(_) | Token::Name(_) => true,
+                Token::Symbol(symbol) => *symbol == ")",
+            };
+        match token {
+            Token::Symbol(")") if after_value => {
+                Complaint::new(span, "this bracket closes nothing", "remove it, or add the missing `(`")
+            }
+            Token::Symbol(",") if after_value => Complaint::new(
+                span,
+                "a comma outside the arguments of a function",
+                "write a decimal point instead of a comma",
+            ),
+            Token::Number(_) | Token::Name(_) | Token::Symbol("(") if after_value => {
+                Complaint::new(span, "an operator is missing before this", "write `*` for a product")
+            }
+            Token::Symbol(symbol) => Complaint::new(
+                span,
+                format!("unexpected `{symbol}`"),
+                "a value is expected here: a number, a name or a bracket",
+            ),
+            Token::Number(_) | Token::Name(_) => {
+                Complaint::new(span, "unexpected value", "write an operator before it")
+            }
+        }
+    }
+}

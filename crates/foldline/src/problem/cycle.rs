@@ -1,0 +1,464 @@
+//! Cycles by orthogonal collocation.
+//!
+//! **Idea.** In normalised time the profile is a polynomial of degree m on each mesh interval, held by its values at the
+//! left end and at the Gauss points, where it satisfies the differential equation. An integral phase condition fixes the
+//! shift in time.
+//!
+//! **Equations.** u = (profile, T, λ), N(m+1)n + 2 unknowns; D, e, b, c from [`Scheme`]; h_j interval lengths:
+//!
+//! ```text
+//!   (1)  Σ_k D_ik X_{j,k} - h_j T f(X_{j,i}, λ) = 0                     i = 1…m, j = 0…N-1
+//!   (2)  x_{j+1} - Σ_k e_k X_{j,k} = 0,   x_N = x_0                     X_{j,0} = x_j
+//!   (3)  Σ_j h_j Σ_i b_i ⟨X_{j,i} - X̃_{j,i}, X̃'_{j,i}⟩ = 0              phase, with reference X̃
+//! ```
+//!
+//! Inner products of states divide component c by s_c = (model scale) + max |X̃_c|.
+//!
+//! **Source.** ascher1995, §5; doedel1991 (integral phase condition).
+//!
+//! **Fails when** the cycle shrinks to an equilibrium (the phase condition loses its meaning there) or its period grows
+//! without bound; the continuation recognises both.
+
+use super::gauss::Scheme;
+use super::defect::{self, Defect};
+use super::{Setting, extremes, mesh};
+use crate::contract::{Batch, Examination, Parameters, Singular, ZeroProblem};
+use crate::diagram::{Cycle, Mesh, Point, Solution, Trust};
+use crate::linalg::condensed::Condensed;
+use crate::linalg::{axpy, max_abs};
+use crate::stability::floquet;
+
+/// The curve of cycles in one parameter.
+pub struct CycleProblem<'a> {
+    setting: Setting<'a>,
+    scheme: Scheme,
+    sampling: defect::Sampling,
+    mesh: Mesh,
+    n: usize,
+    halves: bool,
+    /// X̃' / s² at the Gauss points, `[N][m][n]`, normalised to unit length, and ⟨X̃, X̃'⟩ in that weight.
+    phase: Vec<f64>,
+    phase_offset: f64,
+    scale: Vec<f64>,
+    period_scale: f64,
+    system: Condensed,
+    states: Vec<f64>,
+    f: Vec<f64>,
+    fx: Vec<f64>,
+    fp: Vec<f64>,
+    trace: f64,
+}
+
+impl<'a> CycleProblem<'a> {
+    /// Polynomials of degree `degree` on `mesh`.
+    pub fn new(setting: Setting<'a>, degree: usize, mesh: &Mesh) -> CycleProblem<'a> {
+        let scheme = Scheme::new(degree);
+        let n = setting.field.dim();
+        let mut problem = CycleProblem {
+            system: Condensed::new(n, &scheme.end, 2),
+            scale: setting.scales.to_vec(),
+            setting,
+            sampling: defect::Sampling::new(&scheme),
+            scheme,
+            mesh: mesh.clone(),
+            n,
+            halves: false,
+            phase: Vec::new(),
+            phase_offset: 0.0,
+            period_scale: 1.0,
+            states: Vec::new(),
+            f: Vec::new(),
+            fx: Vec::new(),
+            fp: Vec::new(),
+            trace: 0.0,
+        };
+        problem.set_mesh(mesh);
+        problem
+    }
+
+    /// Keeps the second half of every new mesh a copy of the first. A doubled cycle meets its parent at a pitchfork that is
+    /// perfect only if the discretisation does not tell the two halves apart; the mesh must have this form already.
+    pub fn with_equal_halves(mut self) -> Self {
+        self.halves = true;
+        self
+    }
+
+    /// The scheme of the polynomials.
+    pub fn scheme(&self) -> &Scheme {
+        &self.scheme
+    }
+
+    /// Profile of an antiperiodic null vector of the variational equation at `u` (it changes sign after one period), if
+    /// there is one: the direction of period doubling. Layout of the profile.
+    pub fn antiperiodic_direction(&mut self, u: &[f64]) -> Option<Vec<f64>> {
+        let row = vec![0.0; u.len()];
+        self.fill(u, &row);
+        // The scalars are frozen by a unit corner, so only the profile moves.
+        self.system.border.fill(0.0);
+        self.system.corner.copy_from_slice(&[1.0, 0.0, 0.0, 1.0]);
+        self.system.condense().ok()?;
+        self.system.eliminate(-1.0).ok()?;
+        let size = self.profile_size();
+        let mut v: Vec<f64> = (0..size + 2).map(|k| ((k * k) as f64 * 0.7 + 0.3).sin()).collect();
+        let mut next = v.clone();
+        for _ in 0..4 {
+            (v[size], v[size + 1]) = (0.0, 0.0);
+            self.system.solve(&v, &mut next);
+            let norm = max_abs(&next);
+            if !norm.is_finite() || norm == 0.0 {
+                return None;
+            }
+            v.iter_mut().zip(&next).for_each(|(a, b)| *a = b / norm);
+        }
+        v.truncate(size);
+        Some(v)
+    }
+
+    fn intervals(&self) -> usize {
+        self.mesh.len() - 1
+    }
+
+    fn profile_size(&self) -> usize {
+        self.intervals() * (self.scheme.degree + 1) * self.n
+    }
+
+    fn h(&self, j: usize) -> f64 {
+        self.mesh[j + 1] - self.mesh[j]
+    }
+
+    /// Gathers the Gauss points, component-major.
+    fn gather(&mut self, u: &[f64]) {
+        let (n, m, lanes) = (self.n, self.scheme.degree, self.intervals() * self.scheme.degree);
+        for j in 0..self.intervals() {
+            for k in 0..m {
+                let x = &u[(j * (m + 1) + k + 1) * n..(j * (m + 1) + k + 2) * n];
+                for i in 0..n {
+                    self.states[i * lanes + j * m + k] = x[i];
+                }
+            }
+        }
+    }
+
+    /// Linearises at `u` and fills the blocks; `row` acts through [`ZeroProblem::dot`].
+    fn fill(&mut self, u: &[f64], row: &[f64]) {
+        let (n, m, count) = (self.n, self.scheme.degree, self.intervals());
+        let (lanes, size, inner, block) = (count * m, self.profile_size(), m * n, (m + 1) * n);
+        let period = u[size];
+        self.gather(u);
+        let parameters = self.setting.at(u[size + 1]);
+        let batch = Batch { lanes, states: &self.states, parameters: Parameters::Shared(&parameters) };
+        self.setting.field.linearise(batch, self.setting.free_ones(), &mut self.f, &mut self.fx, &mut self.fp);
+        self.trace = 0.0;
+        self.system.interior.fill(0.0);
+        self.system.coupling.fill(0.0);
+        self.system.border.fill(0.0);
+        let width = n + 2;
+        for j in 0..count {
+            let h = self.mesh[j + 1] - self.mesh[j];
+            let ht = h * period;
+            let a = &mut self.system.interior[j * inner * inner..(j + 1) * inner * inner];
+            let b = &mut self.system.coupling[j * inner * width..(j + 1) * inner * width];
+            for i in 0..m {
+                let lane = j * m + i;
+                for c in 0..n {
+                    let line = &mut a[(i * n + c) * inner..(i * n + c + 1) * inner];
+                    for k in 0..m {
+                        line[k * n + c] = self.scheme.derivative[i * (m + 1) + k + 1];
+                    }
+                    for d in 0..n {
+                        line[i * n + d] -= ht * self.fx[(c * n + d) * lanes + lane];
+                    }
+                    self.trace += ht * self.scheme.weights[i] * self.fx[(c * n + c) * lanes + lane];
+                    let right = &mut b[(i * n + c) * width..(i * n + c + 1) * width];
+                    right[c] = self.scheme.derivative[i * (m + 1)];
+                    right[n] = -h * self.f[c * lanes + lane];
+                    right[n + 1] = -ht * self.fp[c * lanes + lane];
+                }
+                for c in 0..n {
+                    let at = j * block + (i + 1) * n + c;
+                    let weight = h * self.scheme.weights[i];
+                    self.system.border[at] = weight * self.phase[(j * m + i) * n + c];
+                    self.system.border[size + at] = weight * row[at] / (self.scale[c] * self.scale[c] * n as f64);
+                }
+            }
+        }
+        self.system.corner[0] = 0.0;
+        self.system.corner[1] = 0.0;
+        self.system.corner[2] = row[size] / (self.period_scale * self.period_scale);
+        self.system.corner[3] = row[size + 1] / (self.setting.parameter_scale * self.setting.parameter_scale);
+    }
+
+    /// Largest |component| over the profile.
+    fn sizes(&self, u: &[f64]) -> Vec<f64> {
+        let mut sizes = vec![0.0f64; self.n];
+        for x in u[..self.profile_size()].chunks_exact(self.n) {
+            for (s, v) in sizes.iter_mut().zip(x) {
+                *s = s.max(v.abs());
+            }
+        }
+        sizes
+    }
+
+    fn relative_scale(&self, u: &[f64]) -> Vec<f64> {
+        self.sizes(u).iter().zip(self.setting.scales).map(|(size, scale)| size + scale).collect()
+    }
+
+    /// Estimated error on every interval, relative; uses the last factorisation, which must belong to the current mesh.
+    fn errors(&self, u: &[f64]) -> Vec<f64> {
+        let size = self.profile_size();
+        let scale = self.relative_scale(u);
+        let parameters = self.setting.at(u[size + 1]);
+        let Defect { local, ends } =
+            defect::measure(self.setting.field, &parameters, &u[..size], u[size], &self.mesh, &self.scheme, &self.sampling, &scale);
+        let block = (self.scheme.degree + 1) * self.n;
+        let mut rhs = vec![0.0; size + 2];
+        for (j, end) in ends.chunks_exact(self.n).enumerate() {
+            rhs[j * block..j * block + self.n].copy_from_slice(end);
+        }
+        let mut shift = vec![0.0; size + 2];
+        self.system.solve(&rhs, &mut shift);
+        let response = self.relative_size(&shift, u);
+        let sizes: Vec<f64> =
+            ends.chunks_exact(self.n).map(|e| e.iter().zip(&scale).map(|(v, s)| (v / s).abs()).fold(0.0, f64::max)).collect();
+        let largest = sizes.iter().fold(f64::MIN_POSITIVE, |m: f64, s| m.max(*s));
+        let gain = if response.is_finite() { response / largest } else { 1.0 };
+        local.iter().zip(&sizes).map(|(l, s)| l + gain * s).collect()
+    }
+
+    fn flow_at_nodes(&self, u: &[f64]) -> Vec<f64> {
+        let (n, count, block) = (self.n, self.intervals(), (self.scheme.degree + 1) * self.n);
+        let mut states = vec![0.0; n * count];
+        for j in 0..count {
+            for i in 0..n {
+                states[i * count + j] = u[j * block + i];
+            }
+        }
+        let mut f = vec![0.0; n * count];
+        let parameters = self.setting.at(u[u.len() - 1]);
+        let batch = Batch { lanes: count, states: &states, parameters: Parameters::Shared(&parameters) };
+        self.setting.field.evaluate(batch, &mut f);
+        let mut flow = vec![0.0; n * count];
+        for j in 0..count {
+            for i in 0..n {
+                flow[j * n + i] = f[i * count + j] / self.scale[i];
+            }
+        }
+        flow
+    }
+}
+
+impl ZeroProblem for CycleProblem<'_> {
+    fn unknowns(&self) -> usize {
+        self.profile_size() + 2
+    }
+
+    fn anchor(&mut self, u: &[f64]) {
+        let (n, m, size) = (self.n, self.scheme.degree, self.profile_size());
+        self.scale = self.relative_scale(u);
+        self.period_scale = u[size].abs().max(f64::MIN_POSITIVE);
+        self.phase.fill(0.0);
+        let (mut length, mut offset) = (0.0, 0.0);
+        for j in 0..self.intervals() {
+            let h = self.h(j);
+            for i in 0..m {
+                let slope = &mut self.phase[(j * m + i) * n..(j * m + i + 1) * n];
+                for k in 0..=m {
+                    let node = &u[(j * (m + 1) + k) * n..(j * (m + 1) + k + 1) * n];
+                    axpy(self.scheme.derivative[i * (m + 1) + k] / h, node, slope);
+                }
+                let x = &u[(j * (m + 1) + i + 1) * n..(j * (m + 1) + i + 2) * n];
+                for c in 0..n {
+                    let plain = slope[c];
+                    slope[c] /= self.scale[c] * self.scale[c];
+                    length += h * self.scheme.weights[i] * plain * slope[c];
+                    offset += h * self.scheme.weights[i] * x[c] * slope[c];
+                }
+            }
+        }
+        let norm = length.sqrt().max(f64::MIN_POSITIVE);
+        self.phase.iter_mut().for_each(|p| *p /= norm);
+        self.phase_offset = offset / norm;
+    }
+
+    fn residual(&mut self, u: &[f64], r: &mut [f64]) -> bool {
+        let (n, m, count) = (self.n, self.scheme.degree, self.intervals());
+        let (lanes, size, block) = (count * m, self.profile_size(), (m + 1) * n);
+        let period = u[size];
+        self.gather(u);
+        let parameters = self.setting.at(u[size + 1]);
+        let batch = Batch { lanes, states: &self.states, parameters: Parameters::Shared(&parameters) };
+        self.setting.field.evaluate(batch, &mut self.f);
+        let mut phase = -self.phase_offset;
+        r[..size].fill(0.0);
+        for j in 0..count {
+            let h = self.h(j);
+            let own = &u[j * block..(j + 1) * block];
+            let next = (j + 1) % count * block;
+            let rows = &mut r[j * block..(j + 1) * block];
+            rows[..n].copy_from_slice(&u[next..next + n]);
+            for k in 0..=m {
+                axpy(-self.scheme.end[k], &own[k * n..(k + 1) * n], &mut rows[..n]);
+            }
+            for i in 0..m {
+                let target = &mut rows[(i + 1) * n..(i + 2) * n];
+                for k in 0..=m {
+                    axpy(self.scheme.derivative[i * (m + 1) + k], &own[k * n..(k + 1) * n], target);
+                }
+                for c in 0..n {
+                    target[c] -= h * period * self.f[c * lanes + j * m + i];
+                    phase += h * self.scheme.weights[i] * self.phase[(j * m + i) * n + c] * own[(i + 1) * n + c];
+                }
+            }
+        }
+        r[size] = phase;
+        max_abs(&r[..=size]).is_finite() && period > 0.0
+    }
+
+    fn factorise(&mut self, u: &[f64], row: &[f64]) -> Result<(), Singular> {
+        self.fill(u, row);
+        self.system.condense()?;
+        self.system.eliminate(1.0)
+    }
+
+    fn solve(&mut self, rhs: &[f64], x: &mut [f64]) {
+        self.system.solve(rhs, x);
+    }
+
+    fn dot(&self, a: &[f64], b: &[f64]) -> f64 {
+        let (n, m, size) = (self.n, self.scheme.degree, self.profile_size());
+        let mut total = 0.0;
+        for j in 0..self.intervals() {
+            for i in 0..m {
+                let at = (j * (m + 1) + i + 1) * n;
+                let local: f64 = (0..n).map(|c| a[at + c] * b[at + c] / (self.scale[c] * self.scale[c])).sum();
+                total += self.h(j) * self.scheme.weights[i] * local;
+            }
+        }
+        total / n as f64
+            + a[size] * b[size] / (self.period_scale * self.period_scale)
+            + a[size + 1] * b[size + 1] / (self.setting.parameter_scale * self.setting.parameter_scale)
+    }
+
+    fn relative_size(&self, du: &[f64], u: &[f64]) -> f64 {
+        let size = self.profile_size();
+        let scale = self.relative_scale(u);
+        let mut largest = (du[size] / u[size]).abs().max((du[size + 1] / (self.setting.parameter_scale + u[size + 1].abs())).abs());
+        for x in du[..size].chunks_exact(self.n) {
+            for (v, s) in x.iter().zip(&scale) {
+                let relative = (v / s).abs();
+                if relative > largest || relative.is_nan() {
+                    largest = relative;
+                }
+            }
+        }
+        largest
+    }
+
+    fn mesh(&self) -> Mesh {
+        self.mesh.clone()
+    }
+
+    fn set_mesh(&mut self, mesh: &Mesh) {
+        self.mesh = mesh.clone();
+        let (n, count) = (self.n, mesh.len() - 1);
+        let lanes = count * self.scheme.degree;
+        self.system.resize(count);
+        self.phase.resize(lanes * n, 0.0);
+        self.states.resize(lanes * n, 0.0);
+        self.f.resize(lanes * n, 0.0);
+        self.fx.resize(lanes * n * n, 0.0);
+        self.fp.resize(lanes * n, 0.0);
+    }
+
+    fn transfer(&self, v: &[f64], from: &Mesh, to: &Mesh) -> Vec<f64> {
+        if from == to {
+            return v.to_vec();
+        }
+        let size = v.len() - 2;
+        let mut out = mesh::transferred(&v[..size], self.n, &self.scheme, from, to);
+        out.extend_from_slice(&v[size..]);
+        out
+    }
+
+    fn better_mesh(&self, u: &[f64], tolerance: f64) -> Option<Mesh> {
+        let errors = self.errors(u);
+        let worst = errors.iter().fold(0.0, |m: f64, e| m.max(*e));
+        let degree = self.scheme.degree;
+        let better = if self.halves {
+            mesh::equidistributed_in_halves(&errors, &self.mesh, degree, 0.25 * tolerance)?
+        } else {
+            mesh::equidistributed(&errors, &self.mesh, degree, 0.25 * tolerance)?
+        };
+        (worst > tolerance || 2 * better.len() < self.mesh.len()).then_some(better)
+    }
+
+    fn finer_mesh(&self) -> Option<Mesh> {
+        Some(mesh::divided(&self.mesh, 2))
+    }
+
+    fn examine(&mut self, u: &[f64]) -> Examination {
+        let (n, count, size) = (self.n, self.intervals(), self.profile_size());
+        let width = n + 2;
+        let mut transitions = vec![0.0; count * n * n];
+        for j in 0..count {
+            let step = self.system.transition(j);
+            for i in 0..n {
+                for c in 0..n {
+                    transitions[(j * n + i) * n + c] = step[i * width + c] * self.scale[c] / self.scale[i];
+                }
+            }
+        }
+        let found = floquet::multipliers(&transitions, &self.flow_at_nodes(u), n);
+        let scale = self.relative_scale(u);
+        let errors = self.errors(u);
+        let mut r = vec![0.0; size + 2];
+        self.residual(u, &mut r);
+        let residual = r[..size].iter().enumerate().map(|(k, v)| (v / scale[k % n]).abs()).fold(r[size].abs(), f64::max);
+        let parameters = self.setting.at(u[size + 1]);
+        let ranges = extremes::of_profile(self.setting.field, &parameters, &u[..size], &self.mesh, &self.scheme);
+        let trust = Trust {
+            discretisation: errors.iter().fold(0.0, |m: f64, e| m.max(*e)),
+            residual,
+            trivial_defect: (found.multipliers[0].re - 1.0).abs(),
+            liouville_defect: (found.log_product - self.trace).abs(),
+        };
+        Examination { spectrum: found.multipliers, unstable: found.unstable, ranges, trust }
+    }
+
+    fn point(&self, u: &[f64], tangent: &[f64], examination: Examination) -> Point {
+        let size = self.profile_size();
+        Point {
+            position: 0,
+            parameters: self.setting.at(u[size + 1]),
+            solution: Solution::Cycle(Cycle {
+                period: u[size],
+                mesh: self.mesh.clone(),
+                degree: self.scheme.degree,
+                profile: u[..size].to_vec(),
+            }),
+            tangent: tangent.to_vec(),
+            step: 0.0,
+            spectrum: examination.spectrum,
+            unstable: examination.unstable,
+            ranges: examination.ranges,
+            trust: examination.trust,
+            cost: Default::default(),
+        }
+    }
+
+    fn unknowns_of(&mut self, point: &Point) -> Vec<f64> {
+        let parameter = point.parameters.get(self.setting.free).copied().unwrap_or(0.0);
+        match &point.solution {
+            Solution::Cycle(cycle) => {
+                let mut u = cycle.profile.clone();
+                u.extend([cycle.period, parameter]);
+                u
+            }
+            Solution::Equilibrium(x) => {
+                let mut u: Vec<f64> = x.iter().copied().cycle().take(self.profile_size()).collect();
+                u.extend([1.0, parameter]);
+                u
+            }
+        }
+    }
+}

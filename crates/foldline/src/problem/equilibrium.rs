@@ -1,0 +1,151 @@
+//! Equilibria.
+//!
+//! **Equations.** u = (x, λ):  f(x, λ) = 0, n equations.
+
+use super::Setting;
+use crate::contract::{Batch, Examination, Parameters, Singular, ZeroProblem};
+use crate::diagram::{Mesh, Point, Solution, Trust};
+use crate::linalg::{lu, max_abs};
+use crate::problem::extremes;
+use crate::stability::eigenvalues;
+
+/// The curve of equilibria in one parameter.
+pub struct EquilibriumProblem<'a> {
+    setting: Setting<'a>,
+    scale: Vec<f64>,
+    f: Vec<f64>,
+    fx: Vec<f64>,
+    fp: Vec<f64>,
+    matrix: Vec<f64>,
+    pivots: Vec<usize>,
+}
+
+impl<'a> EquilibriumProblem<'a> {
+    /// The problem in that setting.
+    pub fn new(setting: Setting<'a>) -> EquilibriumProblem<'a> {
+        let n = setting.field.dim();
+        EquilibriumProblem {
+            scale: setting.scales.to_vec(),
+            f: vec![0.0; n],
+            fx: vec![0.0; n * n],
+            fp: vec![0.0; n],
+            matrix: vec![0.0; (n + 1) * (n + 1)],
+            pivots: vec![0; n + 1],
+            setting,
+        }
+    }
+
+    fn n(&self) -> usize {
+        self.scale.len()
+    }
+
+    fn linearise(&mut self, u: &[f64]) {
+        let n = self.n();
+        let parameters = self.setting.at(u[n]);
+        let batch = Batch { lanes: 1, states: &u[..n], parameters: Parameters::Shared(&parameters) };
+        self.setting.field.linearise(batch, self.setting.free_ones(), &mut self.f, &mut self.fx, &mut self.fp);
+    }
+}
+
+impl ZeroProblem for EquilibriumProblem<'_> {
+    fn unknowns(&self) -> usize {
+        self.n() + 1
+    }
+
+    fn anchor(&mut self, u: &[f64]) {
+        for (scale, (own, x)) in self.scale.iter_mut().zip(self.setting.scales.iter().zip(u)) {
+            *scale = own + x.abs();
+        }
+    }
+
+    fn residual(&mut self, u: &[f64], r: &mut [f64]) -> bool {
+        let n = self.n();
+        let parameters = self.setting.at(u[n]);
+        let batch = Batch { lanes: 1, states: &u[..n], parameters: Parameters::Shared(&parameters) };
+        self.setting.field.evaluate(batch, &mut r[..n]);
+        max_abs(&r[..n]).is_finite()
+    }
+
+    fn factorise(&mut self, u: &[f64], row: &[f64]) -> Result<(), Singular> {
+        let n = self.n();
+        self.linearise(u);
+        for i in 0..n {
+            self.matrix[i * (n + 1)..i * (n + 1) + n].copy_from_slice(&self.fx[i * n..(i + 1) * n]);
+            self.matrix[i * (n + 1) + n] = self.fp[i];
+            self.matrix[n * (n + 1) + i] = row[i] / (self.scale[i] * self.scale[i] * n as f64);
+        }
+        self.matrix[n * (n + 1) + n] = row[n] / (self.setting.parameter_scale * self.setting.parameter_scale);
+        lu::factorise(&mut self.matrix, n + 1, &mut self.pivots)
+    }
+
+    fn solve(&mut self, rhs: &[f64], x: &mut [f64]) {
+        x.copy_from_slice(rhs);
+        lu::solve(&self.matrix, self.n() + 1, &self.pivots, x, 1);
+    }
+
+    fn dot(&self, a: &[f64], b: &[f64]) -> f64 {
+        let n = self.n();
+        let profile: f64 = (0..n).map(|i| a[i] * b[i] / (self.scale[i] * self.scale[i])).sum();
+        profile / n as f64 + a[n] * b[n] / (self.setting.parameter_scale * self.setting.parameter_scale)
+    }
+
+    fn relative_size(&self, du: &[f64], u: &[f64]) -> f64 {
+        let n = self.n();
+        let states = (0..n).map(|i| (du[i] / (self.setting.scales[i] + u[i].abs())).abs());
+        states.fold((du[n] / (self.setting.parameter_scale + u[n].abs())).abs(), |m, x| if x > m || x.is_nan() { x } else { m })
+    }
+
+    fn mesh(&self) -> Mesh {
+        Mesh::from([])
+    }
+
+    fn set_mesh(&mut self, _mesh: &Mesh) {}
+
+    fn transfer(&self, v: &[f64], _from: &Mesh, _to: &Mesh) -> Vec<f64> {
+        v.to_vec()
+    }
+
+    fn better_mesh(&self, _u: &[f64], _tolerance: f64) -> Option<Mesh> {
+        None
+    }
+
+    fn finer_mesh(&self) -> Option<Mesh> {
+        None
+    }
+
+    fn examine(&mut self, u: &[f64]) -> Examination {
+        let n = self.n();
+        self.linearise(u);
+        let spectrum = eigenvalues(&self.fx, n, self.setting.scales);
+        let unstable = spectrum.iter().filter(|z| z.re > 0.0).count();
+        let rate = max_abs(&self.fx).max(f64::MIN_POSITIVE);
+        let residual = (0..n).map(|i| (self.f[i] / (rate * self.scale[i])).abs()).fold(0.0, f64::max);
+        let ranges = extremes::of_state(self.setting.field, &self.setting.at(u[n]), &u[..n]);
+        Examination { spectrum, unstable, ranges, trust: Trust { residual, ..Trust::default() } }
+    }
+
+    fn point(&self, u: &[f64], tangent: &[f64], examination: Examination) -> Point {
+        let n = self.n();
+        Point {
+            position: 0,
+            parameters: self.setting.at(u[n]),
+            solution: Solution::Equilibrium(u[..n].to_vec()),
+            tangent: tangent.to_vec(),
+            step: 0.0,
+            spectrum: examination.spectrum,
+            unstable: examination.unstable,
+            ranges: examination.ranges,
+            trust: examination.trust,
+            cost: Default::default(),
+        }
+    }
+
+    fn unknowns_of(&mut self, point: &Point) -> Vec<f64> {
+        let mut u = match &point.solution {
+            Solution::Equilibrium(x) => x.clone(),
+            Solution::Cycle(cycle) => cycle.state(0.0),
+        };
+        u.push(point.parameters.get(self.setting.free).copied().unwrap_or(0.0));
+        u
+    }
+}

@@ -1,0 +1,125 @@
+//! Meshes: redistribution and transfer.
+//!
+//! **Equations.** With e_j the estimated error on interval j (see [`super::defect`]), which behaves like h_j^{m+1} where
+//! the solution is smooth:
+//!
+//!   (1)  N = Σ_j e_j^{1/(m+1)} / ε^{1/(m+1)}             intervals that make all e_j equal to ε
+//!
+//! **Source.** deboor1973; ascher1995, §9.
+
+use super::gauss::Scheme;
+use crate::diagram::Mesh;
+
+/// The largest mesh that is tried.
+pub const LARGEST: usize = 4000;
+const SMALLEST: usize = 6;
+
+/// N equal intervals.
+pub fn uniform(intervals: usize) -> Mesh {
+    (0..=intervals).map(|j| j as f64 / intervals as f64).collect()
+}
+
+/// Every interval cut into `parts`.
+pub fn divided(mesh: &Mesh, parts: usize) -> Mesh {
+    let mut out = Vec::with_capacity(parts * mesh.len());
+    for pair in mesh.windows(2) {
+        out.extend((0..parts).map(|k| pair[0] + (pair[1] - pair[0]) * k as f64 / parts as f64));
+    }
+    out.push(1.0);
+    out.into()
+}
+
+/// A mesh on which every interval would carry about `target`, or `None` if more than [`LARGEST`] intervals were needed.
+pub fn equidistributed(errors: &[f64], mesh: &Mesh, degree: usize, target: f64) -> Option<Mesh> {
+    let count = errors.len();
+    let power = 1.0 / (degree as f64 + 1.0);
+    let raw: Vec<f64> = (0..count).map(|j| (errors[j] / target).powf(power) / (mesh[j + 1] - mesh[j])).collect();
+    let mean: f64 = (0..count).map(|j| raw[j] * (mesh[j + 1] - mesh[j])).sum();
+    // A floor and a look at the neighbours keep the mesh from tearing where the estimate happens to vanish.
+    let density: Vec<f64> = (0..count)
+        .map(|j| raw[j].max(0.6 * raw[(j + 1) % count]).max(0.6 * raw[(j + count - 1) % count]).max(0.1 * mean))
+        .collect();
+    let total: f64 = (0..count).map(|j| density[j] * (mesh[j + 1] - mesh[j])).sum();
+    if !(total.is_finite() && total <= LARGEST as f64) {
+        return None;
+    }
+    let wanted = (total.ceil() as usize).max(SMALLEST);
+    let mut out = Vec::with_capacity(wanted + 1);
+    out.push(0.0);
+    let (mut j, mut before) = (0, 0.0);
+    for k in 1..wanted {
+        let level = total * k as f64 / wanted as f64;
+        while j + 1 < count && before + density[j] * (mesh[j + 1] - mesh[j]) < level {
+            before += density[j] * (mesh[j + 1] - mesh[j]);
+            j += 1;
+        }
+        out.push((mesh[j] + (level - before) / density[j]).min(1.0));
+    }
+    out.push(1.0);
+    Some(out.into())
+}
+
+/// Like [`equidistributed`] for a mesh whose second half is a copy of the first; so is that of the result.
+pub fn equidistributed_in_halves(errors: &[f64], mesh: &Mesh, degree: usize, target: f64) -> Option<Mesh> {
+    let half = errors.len() / 2;
+    let worse: Vec<f64> = (0..half).map(|j| errors[j].max(errors[j + half])).collect();
+    let stretched: Mesh = mesh[..=half].iter().map(|t| 2.0 * t).collect();
+    // Lengths relative to the half are twice those relative to the whole; the errors know nothing of that.
+    let first = equidistributed(&worse, &stretched, degree, target)?;
+    Some(first.iter().map(|t| 0.5 * t).chain(first[1..].iter().map(|t| 0.5 + 0.5 * t)).collect())
+}
+
+/// A periodic profile carried to another mesh by evaluating its polynomials.
+pub fn transferred(profile: &[f64], n: usize, scheme: &Scheme, from: &Mesh, to: &Mesh) -> Vec<f64> {
+    let m = scheme.degree;
+    let mut out = vec![0.0; (to.len() - 1) * (m + 1) * n];
+    let mut j = 0;
+    for (l, pair) in to.windows(2).enumerate() {
+        for (k, c) in scheme.nodes.iter().enumerate() {
+            let t = pair[0] + (pair[1] - pair[0]) * c;
+            while j + 2 < from.len() && from[j + 1] <= t {
+                j += 1;
+            }
+            let weights = scheme.interpolation((t - from[j]) / (from[j + 1] - from[j]));
+            let x = &mut out[(l * (m + 1) + k) * n..(l * (m + 1) + k + 1) * n];
+            for (i, w) in weights.iter().enumerate() {
+                crate::linalg::axpy(*w, &profile[(j * (m + 1) + i) * n..(j * (m + 1) + i + 1) * n], x);
+            }
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::TAU;
+
+    fn sampled(mesh: &Mesh, scheme: &Scheme, f: impl Fn(f64) -> f64) -> Vec<f64> {
+        mesh.windows(2).flat_map(|p| scheme.nodes.iter().map(|c| f(p[0] + (p[1] - p[0]) * c)).collect::<Vec<_>>()).collect()
+    }
+
+    #[test]
+    fn equidistribution_meets_its_target_where_the_error_has_a_layer() {
+        // e_j = h^5 |density(t)|^5 with a sharp peak at t = 0.3.
+        let density = |t: f64| 20.0 + 400.0 / (1.0 + (100.0 * (t - 0.3)).powi(2));
+        let error = |mesh: &Mesh| -> Vec<f64> { mesh.windows(2).map(|p| ((p[1] - p[0]) * density(0.5 * (p[0] + p[1]))).powi(5)).collect() };
+        let mut mesh = uniform(20);
+        for _ in 0..8 {
+            mesh = equidistributed(&error(&mesh), &mesh, 4, 1e-3).unwrap();
+        }
+        let worst = error(&mesh).iter().fold(0.0, |m: f64, x| m.max(*x));
+        assert!(worst < 2e-3, "{worst}");
+        assert!(mesh.len() < 300, "{}", mesh.len());
+    }
+
+    #[test]
+    fn transfer_reproduces_polynomials_exactly_and_smooth_profiles_to_the_order() {
+        let scheme = Scheme::new(4);
+        let (a, b) = (uniform(30), divided(&uniform(23), 2));
+        let there = transferred(&sampled(&a, &scheme, |t| (TAU * t).sin()), 1, &scheme, &a, &b);
+        for (x, y) in there.iter().zip(sampled(&b, &scheme, |t| (TAU * t).sin())) {
+            assert!((x - y).abs() < 1e-6);
+        }
+    }
+}

@@ -1,0 +1,57 @@
+//! Branch points: another branch of the same type crosses.
+//!
+//! **Equations.** With τ the parameter component of the tangent and z the eigenvalues (z = λ) or multipliers (z = μ - 1):
+//!
+//!   (1)  τ ∏ z = 0, where folds (both factors change sign) leave no sign change
+//!   (2)  F_u φ = 0, φ ⊥ tangent:  direction into the plane that both branches span
+
+use crate::contract::{Monitor, ZeroProblem};
+use crate::diagram::{Kind, Point, Solution};
+
+/// An eigenvalue 0 (a multiplier 1) without a fold.
+pub struct BranchPoint;
+
+impl Monitor for BranchPoint {
+    fn kind(&self) -> Kind {
+        Kind::BranchPoint
+    }
+
+    fn value(&self, _reference: &Point, at: &Point) -> f64 {
+        let centre = if matches!(at.solution, Solution::Cycle(_)) { 1.0 } else { 0.0 };
+        at.parameter_slope() * super::distance_product(at.free_spectrum(), centre)
+    }
+
+    fn confirms(&self, at: &Point) -> bool {
+        // At a fold, too, the product vanishes; there the tangent has no parameter component.
+        let centre = if matches!(at.solution, Solution::Cycle(_)) { 1.0 } else { 0.0 };
+        let largest = at.spectrum.iter().map(|z| z.norm()).fold(1e-300, f64::max).min(1.0);
+        let closest = at.free_spectrum().iter().map(|z| (z - centre).norm()).fold(f64::INFINITY, f64::min);
+        closest < 1e-2 * largest && at.parameter_slope().abs() > 1e-6
+    }
+
+    fn jump(&self) -> usize {
+        1
+    }
+}
+
+/// The null vector of F_u orthogonal to the tangent at a branch point, of unit length; the problem must be on the mesh of
+/// `u` and anchored there. `None` if there is none.
+pub fn direction(problem: &mut dyn ZeroProblem, u: &[f64], tangent: &[f64]) -> Option<Vec<f64>> {
+    let size = problem.unknowns();
+    problem.factorise(u, tangent).ok()?;
+    let mut v: Vec<f64> = (0..size).map(|k| ((k * k) as f64 * 0.37 + 0.2).sin()).collect();
+    let mut next = vec![0.0; size];
+    for _ in 0..4 {
+        v[size - 1] = 0.0;
+        problem.solve(&v, &mut next);
+        let norm = problem.dot(&next, &next).sqrt();
+        if !(norm.is_finite() && norm > 0.0) {
+            return None;
+        }
+        v.iter_mut().zip(&next).for_each(|(a, b)| *a = b / norm);
+    }
+    let along = problem.dot(&v, tangent);
+    v.iter_mut().zip(tangent).for_each(|(a, t)| *a -= along * t);
+    let norm = problem.dot(&v, &v).sqrt();
+    (norm > 0.5).then(|| v.iter().map(|a| a / norm).collect())
+}

@@ -1,0 +1,25 @@
+//! Folds (limit points, saddle-nodes): the branch turns back in its parameter.
+
+use crate::contract::Monitor;
+use crate::diagram::{Kind, Point};
+
+/// The parameter component of the tangent.
+pub struct Fold;
+
+impl Monitor for Fold {
+    fn kind(&self) -> Kind {
+        Kind::Fold
+    }
+
+    fn value(&self, _reference: &Point, at: &Point) -> f64 {
+        at.parameter_slope()
+    }
+
+    fn confirms(&self, _at: &Point) -> bool {
+        true
+    }
+
+    fn jump(&self) -> usize {
+        1
+    }
+}

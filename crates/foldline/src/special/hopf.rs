@@ -1,0 +1,86 @@
+//! Hopf points: a pair of eigenvalues crosses the imaginary axis and a cycle is born.
+//!
+//! **Equations.**
+//!
+//!   (1)  ∏_{i<j} (λ_i + λ_j) = 0
+//!   (2)  (J - iω) q = 0;   cycle x = x₀ + s Re(q e^{2πit}), T = 2π/ω,  for small s
+//!
+//! **Source.** kuznetsov2004, §10.2 and §10.3.
+
+use crate::contract::{Monitor, VectorField};
+use crate::contract::{Batch, Parameters};
+use crate::diagram::{Kind, Mesh, Point, Solution};
+use crate::linalg::{lu, max_abs};
+use crate::problem::gauss::Scheme;
+
+/// Sum of two eigenvalues.
+pub struct Hopf;
+
+impl Monitor for Hopf {
+    fn kind(&self) -> Kind {
+        Kind::Hopf
+    }
+
+    fn value(&self, _reference: &Point, at: &Point) -> f64 {
+        let z = &at.spectrum;
+        let pairs = (0..z.len()).flat_map(|i| (i + 1..z.len()).map(move |j| (i, j)));
+        pairs.map(|(i, j)| (z[i] + z[j]) / (1e-300 + z[i].norm() + z[j].norm())).product::<num_complex::Complex64>().re
+    }
+
+    fn confirms(&self, at: &Point) -> bool {
+        frequency(at).is_some()
+    }
+
+    fn jump(&self) -> usize {
+        2
+    }
+}
+
+/// ω of the pair closest to the imaginary axis, if it is there.
+fn frequency(at: &Point) -> Option<f64> {
+    let closest = at.spectrum.iter().filter(|z| z.im > 0.0).min_by(|a, b| (a.re / a.im).abs().total_cmp(&(b.re / b.im).abs()))?;
+    (closest.re.abs() < 1e-4 * closest.im).then_some(closest.im)
+}
+
+/// Direction of the cycles born at a Hopf point: the profile `[N(m+1)n]` of Re(q e^{2πit}) with max |q_i|/s_i = 1, and the
+/// period 2π/ω. `None` if the point is not a Hopf point.
+pub fn direction(field: &dyn VectorField, at: &Point, scales: &[f64], scheme: &Scheme, mesh: &Mesh) -> Option<(Vec<f64>, f64)> {
+    let Solution::Equilibrium(x) = &at.solution else { return None };
+    let n = x.len();
+    let omega = frequency(at)?;
+    let (mut f, mut fx) = (vec![0.0; n], vec![0.0; n * n]);
+    field.linearise(Batch { lanes: 1, states: x, parameters: Parameters::Shared(&at.parameters) }, &[], &mut f, &mut fx, &mut []);
+    // (J - iω)(a + ib) = 0 as a real system, by inverse iteration.
+    let size = 2 * n;
+    let mut matrix = vec![0.0; size * size];
+    for i in 0..n {
+        for j in 0..n {
+            let balanced = fx[i * n + j] * scales[j] / scales[i];
+            matrix[i * size + j] = balanced;
+            matrix[(n + i) * size + n + j] = balanced;
+        }
+        matrix[i * size + n + i] = omega;
+        matrix[(n + i) * size + i] = -omega;
+    }
+    let size_of = max_abs(&matrix);
+    (0..size).for_each(|i| matrix[i * size + i] += 1e-14 * size_of);
+    let mut pivots = vec![0; size];
+    lu::factorise(&mut matrix, size, &mut pivots).ok()?;
+    let mut q: Vec<f64> = (0..size).map(|k| (1.0 + k as f64).sin()).collect();
+    for _ in 0..4 {
+        lu::solve(&matrix, size, &pivots, &mut q, 1);
+        let norm = max_abs(&q);
+        if !(norm.is_finite() && norm > 0.0) {
+            return None;
+        }
+        q.iter_mut().for_each(|v| *v /= norm);
+    }
+    let mut profile = Vec::with_capacity((mesh.len() - 1) * (scheme.degree + 1) * n);
+    for pair in mesh.windows(2) {
+        for c in &scheme.nodes {
+            let (sin, cos) = (std::f64::consts::TAU * (pair[0] + (pair[1] - pair[0]) * c)).sin_cos();
+            profile.extend((0..n).map(|i| scales[i] * (q[i] * cos - q[n + i] * sin)));
+        }
+    }
+    Some((profile, std::f64::consts::TAU / omega))
+}

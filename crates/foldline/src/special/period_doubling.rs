@@ -1,0 +1,39 @@
+//! Period doublings: a multiplier passes -1, and a cycle of twice the period is born.
+//!
+//! **Equations.**
+//!
+//!   (1)  ∏_i (μ_i + 1) = 0
+//!   (2)  v(t + T) = -v(t) solves the variational equation;  doubled cycle x(t) + s v(t), period 2T, for small s
+
+use crate::contract::Monitor;
+use crate::diagram::{Cycle, Kind, Mesh, Point};
+
+/// A multiplier of -1.
+pub struct PeriodDoubling;
+
+impl Monitor for PeriodDoubling {
+    fn kind(&self) -> Kind {
+        Kind::PeriodDoubling
+    }
+
+    fn value(&self, _reference: &Point, at: &Point) -> f64 {
+        super::distance_product(at.free_spectrum(), -1.0)
+    }
+
+    fn confirms(&self, at: &Point) -> bool {
+        at.free_spectrum().iter().any(|z| (z + 1.0).norm() < 1e-2)
+    }
+
+    fn jump(&self) -> usize {
+        1
+    }
+}
+
+/// The cycle run through twice, and a perturbation on one period continued antiperiodically to two.
+pub fn doubled(cycle: &Cycle, direction: &[f64]) -> (Cycle, Vec<f64>) {
+    let half: Vec<f64> = cycle.mesh.iter().map(|t| 0.5 * t).collect();
+    let mesh: Mesh = half.iter().copied().chain(half[1..].iter().map(|t| 0.5 + t)).collect();
+    let profile = [&cycle.profile[..], &cycle.profile[..]].concat();
+    let perturbation = direction.iter().copied().chain(direction.iter().map(|v| -v)).collect();
+    (Cycle { period: 2.0 * cycle.period, mesh, degree: cycle.degree, profile }, perturbation)
+}

@@ -1,0 +1,109 @@
+//! Floquet multipliers of a cycle.
+//!
+//! **Idea.** The flow direction is carried round the cycle exactly, so it is split off: what remains are (n-1)×(n-1)
+//! blocks whose product has the non-trivial multipliers. The product is never formed.
+//!
+//! **Equations.** With G_j the transition over interval j and Q_j orthogonal, its first column along x'(t_j):
+//!
+//! ```text
+//!   (1)  Q_{j+1}ᵀ G_j Q_j = [ g_j  *  ]        ∏ g_j = 1 up to the discretisation: the trivial multiplier
+//!                           [  0  S_j ]        multipliers of S_N ⋯ S_1: the others
+//!   (2)  log ∏ |μ| = ∫₀ᵀ tr f_x dt             Liouville
+//! ```
+//!
+//! **Source.** lust2001; (2) is Liouville's formula.
+
+use crate::linalg::{axpy, dot, lu, periodic_schur};
+use num_complex::Complex64;
+
+/// Multipliers and how far they can be trusted.
+#[derive(Clone, Debug, Default)]
+pub struct Floquet {
+    /// The trivial multiplier first, then the others by decreasing modulus.
+    pub multipliers: Vec<Complex64>,
+    /// How many of the others lie outside the unit circle.
+    pub unstable: usize,
+    /// log of the product of all moduli.
+    pub log_product: f64,
+}
+
+/// `transitions`: G_j row-major n×n one after the other, in scaled components; `flow`: `[N][n]` x' at the left ends.
+pub fn multipliers(transitions: &[f64], flow: &[f64], n: usize) -> Floquet {
+    let count = flow.len() / n.max(1);
+    let mut log_trivial = 0.0;
+    let mut sign = 1.0;
+    let mut factors = Vec::with_capacity(count * (n - 1) * (n - 1));
+    let mut log_others = 0.0;
+    let mut pivots = vec![0; n];
+    let mut frame = Frame::new(&flow[..n]);
+    let first = frame.clone();
+    for j in 0..count {
+        let next = if j + 1 == count { first.clone() } else { Frame::new(&flow[(j + 1) * n..(j + 2) * n]) };
+        let mut g = transitions[j * n * n..(j + 1) * n * n].to_vec();
+        frame.columns(&mut g, n);
+        next.rows(&mut g, n);
+        sign *= g[0].signum();
+        log_trivial += g[0].abs().ln();
+        let start = factors.len();
+        for i in 1..n {
+            factors.extend_from_slice(&g[i * n + 1..(i + 1) * n]);
+        }
+        let mut block = factors[start..].to_vec();
+        log_others += match lu::factorise(&mut block, n - 1, &mut pivots) {
+            Ok(()) => lu::determinant(&block, n - 1, &pivots).1,
+            Err(_) => f64::NEG_INFINITY,
+        };
+        frame = next;
+    }
+    let grouped = periodic_schur::group(&factors, n - 1);
+    let others = periodic_schur::eigenvalues(&grouped, n - 1);
+    let unstable = others.iter().flatten().filter(|e| e.log_modulus > 0.0).count();
+    let mut multipliers = vec![Complex64::new(sign * log_trivial.exp(), 0.0)];
+    match others {
+        Some(found) => multipliers.extend(found.into_iter().map(|e| e.value())),
+        None => multipliers.extend(vec![Complex64::new(f64::NAN, f64::NAN); n - 1]),
+    }
+    Floquet { multipliers, unstable, log_product: log_trivial + log_others }
+}
+
+/// The reflection 1 - v vᵀ, times a sign on its first column, whose first column is a given direction.
+#[derive(Clone)]
+struct Frame {
+    v: Vec<f64>,
+    sign: f64,
+}
+
+impl Frame {
+    fn new(direction: &[f64]) -> Frame {
+        let norm = dot(direction, direction).sqrt();
+        let mut v: Vec<f64> = direction.iter().map(|x| if norm > 0.0 { x / norm } else { 0.0 }).collect();
+        // The reflection takes e_1 to ∓ the direction; the sign that avoids cancellation, undone by `sign`.
+        let sign = if v[0] > 0.0 { -1.0 } else { 1.0 };
+        v[0] -= sign;
+        let size = dot(&v, &v);
+        let scale = if size > 0.0 { (2.0 / size).sqrt() } else { 0.0 };
+        v.iter_mut().for_each(|x| *x *= scale);
+        Frame { v, sign }
+    }
+
+    /// g Q.
+    fn columns(&self, g: &mut [f64], n: usize) {
+        for row in g.chunks_exact_mut(n) {
+            let s = dot(row, &self.v);
+            axpy(-s, &self.v, row);
+            row[0] *= self.sign;
+        }
+    }
+
+    /// Qᵀ g.
+    fn rows(&self, g: &mut [f64], n: usize) {
+        let mut s = vec![0.0; n];
+        for (row, v) in g.chunks_exact(n).zip(&self.v) {
+            axpy(*v, row, &mut s);
+        }
+        for (row, v) in g.chunks_exact_mut(n).zip(&self.v) {
+            axpy(-v, &s, row);
+        }
+        g[..n].iter_mut().for_each(|x| *x *= self.sign);
+    }
+}
