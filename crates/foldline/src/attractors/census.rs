@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Trajectories that are integrated together and share what they find. Fixed, so that the result does not depend on the
 /// number of threads.
-const BLOCK: usize = 32;
+const BLOCK: usize = 128;
 /// Steps after which a trajectory counts as unsettled: some thousand periods.
 const STEP_LIMIT: usize = 60_000;
 
