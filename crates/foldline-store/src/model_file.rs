@@ -109,6 +109,7 @@ impl Reader<'_> {
     fn parameter(&mut self, i: usize, name: String, value: &Value) -> Parameter {
         let what = format!("the parameter `{name}`");
         let mut parameter = Parameter::new(&name, 0.0);
+        let before = self.walk.found.len();
         let number = match value.get_ref() {
             DeValue::Table(table) => {
                 self.walk.only(table, &["value", "unit", "description"], &what);
@@ -122,6 +123,8 @@ impl Reader<'_> {
                 self.places.insert((Item::Parameter(i), Field::Value), number.span());
                 parameter.value = self.walk.number(number, &what).unwrap_or(0.0);
             }
+            // A misspelt key has been reported, and is probably the missing one.
+            None if self.walk.found.len() > before => {}
             None => {
                 let place = self.place(Item::Parameter(i), Field::Name);
                 self.walk.report(place, format!("{what} has no value"), format!("write `{name} = {{ value = 1.0 }}`"));
@@ -140,11 +143,15 @@ impl Reader<'_> {
             equations.push(Definition { name, expression });
             return state;
         };
+        let before = self.walk.found.len();
         self.walk.only(table, &["equation", "unit", "description", "scale", "range"], &format!("the state `{name}`"));
+        let misspelt = self.walk.found.len() > before;
         (state.unit, state.description) = self.labels(table);
         if let Some(equation) = table.get("equation") {
             let expression = self.expression(item, place, equation, &what);
             equations.push(Definition { name: name.clone(), expression });
+        } else if misspelt {
+            equations.push(Definition { name: name.clone(), expression: "0".into() });
         }
         if let Some(value) = table.get("scale") {
             self.places.insert((Item::State(i), Field::Scale), value.span());
@@ -180,10 +187,13 @@ impl Reader<'_> {
             output.expression = self.expression(item, place, value, &what);
             return output;
         };
+        let before = self.walk.found.len();
         self.walk.only(table, &["expression", "unit", "description"], &what);
+        let misspelt = self.walk.found.len() > before;
         (output.unit, output.description) = self.labels(table);
         match table.get("expression") {
             Some(value) => output.expression = self.expression(item, place, value, &what),
+            None if misspelt => {}
             None => {
                 let hint = format!("write `{name} = \"…\"` or give the table a key `expression`");
                 self.walk.report(place, format!("{what} has no expression"), hint);

@@ -50,7 +50,7 @@ fn quick(k: f64, n: &str, key: AttractorKey) -> SeedSource {
             let n = b.special.iter().filter(|s| s.point.position == w[0].position).count();
             if w[0].unstable != w[1].unstable && n == 0 { println!("SILENT {} {}", b.name, w[0].position); } }
         let worst = b.points.iter().map(|p| p.trust.trivial_defect.max(p.trust.liouville_defect)).fold(0.0, f64::max);
-        println!("   worst defect {worst:.1e}");
+        if std::env::var("VV").map_or(false, |v| v == b.name) { for p in &b.points { println!("{} {:.7} r {:.6} u {} slope {:.2e} step {:.1e} N {} {:?} {:?}", p.position, p.parameters[0], p.ranges[4][1], p.unstable, p.parameter_slope(), p.step, if let Solution::Cycle(c) = &p.solution {c.intervals()} else {0}, p.trust, &p.spectrum[1..]); } } println!("   worst defect {worst:.1e}");
     }
 }
 #[test] fn census() {

@@ -114,7 +114,9 @@ pub fn doubled_edge(system: &System, free: usize, at: &SpecialPoint, next: &Poin
     let tangent: Vec<f64> = direction.iter().map(|d| d / norm).collect();
     // The matrix may be singular here; what the examination needs of it does not depend on that.
     let _ = problem.factorise(&base, &tangent);
-    let examination = problem.examine(&base);
+    let mut examination = problem.examine(&base);
+    // The error estimate does need the solution of the linear system; the cycle is that of the special point, twice.
+    examination.trust.discretisation = at.point.trust.discretisation;
     Some(Point { unstable: next.unstable, ..problem.point(&base, &tangent, examination) })
 }
 

@@ -124,7 +124,7 @@ impl<'a> Check<'a> {
             self.identifier(name, item);
             match self.symbols.get(name) {
                 Some(symbol @ (Symbol::State(_) | Symbol::Parameter(_))) => {
-                    let message = format!("the output `{name}` has the name of {}", &symbol.article()[2..]);
+                    let message = format!("the output `{name}` has the name of {}", symbol.article());
                     self.report(item, Field::Name, message, "choose another name; states are recorded anyway");
                 }
                 _ if !seen.insert(name) => {

@@ -1,13 +1,14 @@
 //! "Did you mean …?"
 
-/// The candidate closest to `word` by edit distance, if it is close enough to be what was meant.
+/// The candidate closest to `word` by edit distance, if it is close enough to be what was meant; among equals the one whose
+/// length differs least, so that swapped letters come before missing ones.
 pub fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let allowed = (word.chars().count() / 3).max(1);
     candidates
         .into_iter()
         .map(|candidate| (distance(&word.to_lowercase(), &candidate.to_lowercase()), candidate))
         .filter(|(d, _)| *d <= allowed)
-        .min_by_key(|(d, _)| *d)
+        .min_by_key(|(d, candidate)| (*d, candidate.chars().count().abs_diff(word.chars().count())))
         .map(|(_, candidate)| candidate)
 }
 
@@ -49,6 +50,7 @@ mod tests {
     fn slips_of_the_pen_are_recognised_and_other_words_are_not() {
         assert_eq!(nearest("Omgea", ["kappa", "Omega"]), Some("Omega"));
         assert_eq!(nearest("omega", ["kappa", "Omega"]), Some("Omega"));
+        assert_eq!(nearest("tahn", ["tan", "tanh"]), Some("tanh"));
         assert_eq!(nearest("torque", ["kappa", "Omega"]), None);
     }
 }

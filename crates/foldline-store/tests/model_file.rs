@@ -1,0 +1,165 @@
+//! Model files: the published ones compile and are finite where they start, and mistakes are pointed at in the file.
+
+use foldline::contract::{Batch, Parameters, VectorField};
+use foldline_store::diagnostic::Diagnostic;
+use foldline_store::model_file::{parse_model, read_model};
+use std::path::Path;
+
+fn mistakes(text: &str) -> Vec<Diagnostic> {
+    match parse_model(text, "model.toml") {
+        Ok(_) => Vec::new(),
+        Err(found) => found,
+    }
+}
+
+/// The only mistake: its line and column, the words it points at, and the whole message.
+fn only(text: &str) -> ((usize, usize), String, String) {
+    let found = mistakes(text);
+    assert_eq!(found.len(), 1, "{found:?}");
+    let words = found[0].snippet.chars().skip(found[0].column - 1).take(found[0].length).collect();
+    ((found[0].line, found[0].column), words, found[0].to_string())
+}
+
+#[test]
+fn every_published_model_compiles_and_is_finite() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models");
+    let mut seen = 0;
+    for entry in std::fs::read_dir(&folder).expect("the folder of models is there") {
+        let path = entry.expect("it can be listed").path();
+        if path.extension().is_none_or(|extension| extension != "toml") {
+            continue;
+        }
+        let (model, text) = read_model(&path).unwrap_or_else(|found| panic!("{}: {}", path.display(), found[0]));
+        assert_eq!(std::fs::read_to_string(&path).ok(), Some(text));
+        assert!(!model.source.is_empty() && !model.description.is_empty(), "{}: no source", path.display());
+        let p = model.defaults();
+        // Both ends and the middle of the sampling ranges.
+        for share in [0.0, 0.5, 1.0] {
+            let x: Vec<f64> = model.states.iter().map(|s| s.range[0] + share * (s.range[1] - s.range[0])).collect();
+            let at = Batch { lanes: 1, states: &x, parameters: Parameters::Shared(&p) };
+            let (mut f, mut outputs) = (vec![0.0; model.dim()], vec![0.0; model.output_count()]);
+            model.evaluate(at, &mut f);
+            model.outputs(at, &mut outputs);
+            assert!(f.iter().chain(&outputs).all(|v| v.is_finite()), "{}: {f:?} {outputs:?}", path.display());
+        }
+        seen += 1;
+    }
+    assert!(seen >= 7, "{seen} models");
+}
+
+const OSCILLATOR: &str = r#"name = "oscillator"
+whirl = ["x", "y"]
+
+[parameters]
+mu = { value = 1.5, unit = "1/s", description = "damping" }
+k = 2
+
+[definitions]
+spring = "k*x"
+
+[states.y]
+equation = "mu*(1 - x^2)*y - spring"
+scale = 3.0
+
+[states.x]
+equation = "y"
+range = [-1, 2.5]
+unit = "m"
+
+[outputs]
+r = "hypot(x, y)"
+power = { expression = "spring*y", unit = "W", description = "of the spring" }
+"#;
+
+#[test]
+fn a_model_is_read_in_the_order_of_the_file() {
+    let model = parse_model(OSCILLATOR, "oscillator.toml").unwrap_or_else(|found| panic!("{}", found[0]));
+    assert_eq!(model.name, "oscillator");
+    assert_eq!(model.defaults(), [1.5, 2.0]);
+    assert_eq!(model.states.iter().map(|s| s.name.as_str()).collect::<Vec<_>>(), ["y", "x"]);
+    assert_eq!((model.states[0].scale, model.states[0].range), (3.0, [-6.0, 6.0]));
+    assert_eq!((model.states[1].scale, model.states[1].range), (1.0, [-1.0, 2.5]));
+    assert_eq!(model.states[1].unit, "m");
+    assert_eq!(model.outputs[1].unit, "W");
+    assert_eq!(model.whirl, Some([1, 0]));
+}
+
+#[test]
+fn short_forms() {
+    let text = "[states]\nx = 'y'\ny = '''\n  -x\n  - y'''\n";
+    let model = parse_model(text, "some/folder/pendulum.toml").unwrap_or_else(|found| panic!("{}", found[0]));
+    assert_eq!(model.name, "pendulum");
+    let mut f = [0.0; 2];
+    model.evaluate(Batch { lanes: 1, states: &[1.0, 2.0], parameters: Parameters::Shared(&[]) }, &mut f);
+    assert_eq!(f, [2.0, -3.0]);
+
+    let text = "[states.x]\nrange = [0, 1]\n[equations]\nx = -1\n";
+    assert!(mistakes(text).is_empty());
+}
+
+#[test]
+fn a_mistake_in_an_expression_is_shown_at_its_column() {
+    let text = OSCILLATOR.replace("mu*(1 - x^2)*y - spring", "mu*(1 - x^2)*tahn(y) - spring");
+    let (place, words, message) = only(&text);
+    assert_eq!((place, words.as_str()), ((12, 26), "tahn"));
+    assert_eq!(
+        message,
+        "error: there is no function `tahn`\n  --> model.toml:12:26\n   |\n12 | equation = \"mu*(1 - x^2)*tahn(y) - spring\"\n   \
+         |                          ^^^^\n   = help: did you mean `tanh`?"
+    );
+
+    let (place, words, message) = only(&OSCILLATOR.replace("hypot(x, y)", "hypot(x, y"));
+    assert_eq!((place, words.as_str()), ((21, 11), "("));
+    assert!(message.contains("never closed"));
+
+    // In a text of several lines, and after characters of more than one byte.
+    let text = "[states]\nx = '''\n\n  1 +\n  größe'''\n";
+    assert_eq!(only(text).0, (5, 3));
+    let text = "[parameters]\n\"ψ\" = 1\n[states]\nx = \"ψ*ψ*q\"\n";
+    assert_eq!((only(text).0, only(text).1), ((4, 10), "q".to_string()));
+    // Where escapes shift the text, the whole string is meant.
+    let text = "[states]\nx = \"1 + \\u0071\"\n";
+    assert_eq!((only(text).0, only(text).1), ((2, 5), "\"1 + \\u0071\"".to_string()));
+}
+
+#[test]
+fn mistakes_outside_expressions_are_shown_too() {
+    let cases = [
+        // what is replaced, by what, place, words, part of the message
+        ("value = 1.5", "valeu = 1.5", (5, 8), "valeu", "did you mean `value`?"),
+        ("scale = 3.0", "scale = -3.0", (13, 9), "-3.0", "is not positive"),
+        ("[-1, 2.5]", "[2.5, -1]", (17, 9), "[2.5, -1]", "wrong way round"),
+        ("[-1, 2.5]", "[2.5]", (17, 9), "[2.5]", "not a pair of numbers"),
+        ("k = 2", "k = \"2\"", (6, 5), "\"2\"", "not a number"),
+        ("k = 2", "k = inf", (6, 5), "inf", "not a finite number"),
+        ("[outputs]", "[outputs]\nx = \"1\"", (21, 1), "x", "the name of a state"),
+        ("[definitions]", "[definitions]\nmu = \"1\"", (9, 1), "mu", "used twice"),
+        ("[outputs]", "[equations]\nw = \"1\"\n[outputs]", (21, 1), "w", "not a declared state"),
+        ("[outputs]", "[outpust]", (20, 2), "outpust", "did you mean `outputs`?"),
+        ("whirl = [\"x\", \"y\"]", "whirl = [\"x\", \"z\"]", (2, 9), "[\"x\", \"z\"]", "`z` is not a state"),
+        ("equation = \"y\"", "", (15, 9), "x", "has no equation"),
+        ("equation = \"y\"", "equation = 'y", (16, 14), "", "error"),
+    ];
+    for (from, to, place, words, message) in cases {
+        let found = only(&OSCILLATOR.replacen(from, to, 1));
+        assert_eq!(found.0, place, "{to}: {}", found.2);
+        if !words.is_empty() {
+            assert_eq!(found.1, words, "{to}: {}", found.2);
+        }
+        assert!(found.2.contains(message), "{to}: {}", found.2);
+    }
+}
+
+#[test]
+fn all_mistakes_are_said_in_the_order_of_the_file() {
+    let text =
+        OSCILLATOR.replace("k*x", "k*xx").replace("hypot(x, y)", "hypto(x, y)").replace("unit = \"m\"", "uint = \"m\"");
+    let lines: Vec<usize> = mistakes(&text).iter().map(|d| d.line).collect();
+    assert_eq!(lines, [9, 18, 21]);
+}
+
+#[test]
+fn a_file_that_is_not_there_is_named() {
+    let Err(found) = read_model(Path::new("no/such/model.toml")) else { panic!("there is no such file") };
+    assert!(found[0].message.contains("cannot be read") && found[0].file.contains("model.toml"), "{}", found[0]);
+}
