@@ -5,7 +5,7 @@ use crate::failure::{Failure, Outcome};
 use crate::order::ordered;
 use crate::plot::draw;
 use crate::progress::Progress;
-use crate::system::system;
+use crate::system::system_of;
 use crate::table::print_special;
 use foldline::contract::{Event, Observer, Verdict};
 use foldline::diagram::Diagram;
@@ -64,8 +64,8 @@ fn run(
     folder: &Path,
 ) -> Result<(Diagram, Outcome), Failure> {
     let watch = Watch { recorder, progress: Progress::new(&study.model), stop: stop_on_interrupt() };
-    let parameters: Vec<f64> = study.model.parameters.iter().map(|p| p.value).collect();
-    let diagram = explore::run(&system(&study.model, &parameters), &study.plan, jobs, earlier, &watch);
+    let system = system_of(&study.model, &study.plan);
+    let diagram = explore::run(&system, &study.plan, jobs, earlier, &watch);
     watch.progress.finish();
     watch.recorder.finish()?;
 
