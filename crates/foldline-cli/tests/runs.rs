@@ -36,7 +36,7 @@ fn desk(document: &str) -> tempfile::TempDir {
 }
 
 /// The rows of a CSV table as (column, cell) lookups.
-fn rows(csv: &str) -> Vec<impl Fn(&str) -> String> {
+fn rows(csv: &str) -> Vec<impl Fn(&str) -> String + use<>> {
     let mut lines = csv.lines().map(|line| line.split(',').map(str::to_string).collect::<Vec<_>>());
     let heads = lines.next().unwrap();
     lines
