@@ -147,7 +147,8 @@ mod tests {
 
     #[test]
     fn a_rounded_circle_is_rounder_than_its_polygon() {
-        let corners: Vec<[f64; 2]> = (0..=12).map(|k| (k as f64 * std::f64::consts::TAU / 12.0).sin_cos().into()).collect();
+        let corners: Vec<[f64; 2]> =
+            (0..=12).map(|k| (k as f64 * std::f64::consts::TAU / 12.0).sin_cos().into()).collect();
         let inner = rounded(&corners, [2.0, 2.0]);
         let error = inner[1..11].iter().flatten().map(|[x, y]| (x.hypot(*y) - 1.0).abs()).fold(0.0, f64::max);
         // The polygon is off by 1 - cos(15°) = 0.034; the slopes of parabolas are accurate to the square of the chord.

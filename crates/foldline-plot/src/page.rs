@@ -260,7 +260,8 @@ impl Legend {
     /// What is seen in the window.
     fn of(diagram: &Diagram, x: Quantity, y: Quantity, window: [f64; 4]) -> Legend {
         let seen = |branch: &Branch| {
-            let drawn = pieces(branch, x, y, span(window)).iter().any(|piece| !clipped(&piece.vertices, window).is_empty());
+            let drawn =
+                pieces(branch, x, y, span(window)).iter().any(|piece| !clipped(&piece.vertices, window).is_empty());
             drawn || marks(branch, x, y).iter().any(|(_, place)| inside(*place, window))
         };
         let visible: Vec<&Branch> = diagram.branches.iter().filter(|b| seen(b)).collect();

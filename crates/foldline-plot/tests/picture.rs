@@ -125,7 +125,8 @@ fn the_curve_is_cut_exactly_at_the_special_points() {
 
 #[test]
 fn a_closed_branch_is_drawn_closed() {
-    let pieces = curve::pieces(&isola("contact SL", [6.0, 4.0]), Quantity::Parameter(0), Quantity::Largest(2), [12.0, 6.0]);
+    let pieces =
+        curve::pieces(&isola("contact SL", [6.0, 4.0]), Quantity::Parameter(0), Quantity::Largest(2), [12.0, 6.0]);
     assert_eq!(pieces[0].vertices.first(), pieces.last().unwrap().vertices.last());
 }
 
