@@ -58,20 +58,39 @@ fn stretches(branch: &Branch, x: Quantity, y: Quantity) -> Vec<Vec<Vertex>> {
 }
 
 /// For each pair of neighbours the vertices in between that make the polyline a smooth curve through all given vertices:
-/// cubic Hermite pieces over the chord length, with the slopes of parabolas through three neighbours.
+/// cubic Hermite pieces over the chord length, with the slopes of parabolas through three vertices. A polyline that ends
+/// where it began is smooth there too.
 pub fn rounded(vertices: &[[f64; 2]], scale: [f64; 2]) -> Vec<Vec<[f64; 2]>> {
     const SHORTEST: f64 = 0.004;
+    // The direction between two places closer than this, a pixel, may be rounding error.
+    const NEAR: f64 = 0.001;
     let chord = |a: [f64; 2], b: [f64; 2]| ((b[0] - a[0]) / scale[0]).hypot((b[1] - a[1]) / scale[1]);
     let chords: Vec<f64> = vertices.windows(2).map(|w| chord(w[0], w[1])).collect();
-    let divided = |k: usize, i: usize| (vertices[k + 1][i] - vertices[k][i]) / chords[k].max(f64::MIN_POSITIVE);
-    let slope = |k: usize, i: usize| match (k.checked_sub(1), chords.get(k)) {
-        (Some(before), Some(after)) => {
-            let (p, q) = (chords[before], *after);
-            (q * divided(before, i) + p * divided(k, i)) / (p + q).max(f64::MIN_POSITIVE)
-        }
-        (Some(before), None) => divided(before, i),
-        (None, _) => divided(k, i),
+    let count = vertices.len();
+    let closed = count > 2 && chord(vertices[0], vertices[count - 1]) < NEAR;
+    let neighbour = |k: usize, forward: bool| {
+        let steps = if closed {
+            count
+        } else if forward {
+            count - k
+        } else {
+            k + 1
+        };
+        let others = (1..steps).map(|step| vertices[if forward { k + step } else { k + count - step } % count]);
+        others.into_iter().find(|other| chord(vertices[k], *other) > NEAR)
     };
+    let divided = |a: [f64; 2], b: [f64; 2]| [0, 1].map(|i| (b[i] - a[i]) / chord(a, b));
+    let slope = |k: usize| match (neighbour(k, false), neighbour(k, true)) {
+        (Some(before), Some(after)) => {
+            let (p, q) = (chord(before, vertices[k]), chord(vertices[k], after));
+            let (a, b) = (divided(before, vertices[k]), divided(vertices[k], after));
+            [0, 1].map(|i| (q * a[i] + p * b[i]) / (p + q))
+        }
+        (Some(before), None) => divided(before, vertices[k]),
+        (None, Some(after)) => divided(vertices[k], after),
+        (None, None) => [0.0, 0.0],
+    };
+    let slopes: Vec<[f64; 2]> = (0..count).map(slope).collect();
     let piece = |k: usize| {
         let h = chords[k];
         let (a, b) = (vertices[k], vertices[k + 1]);
@@ -80,7 +99,7 @@ pub fn rounded(vertices: &[[f64; 2]], scale: [f64; 2]) -> Vec<Vec<[f64; 2]>> {
         let inner = (1..parts).map(|s| {
             let t = s as f64 / parts as f64;
             [0, 1].map(|i| {
-                let (da, db) = (h * slope(k, i), h * slope(k + 1, i));
+                let (da, db) = (h * slopes[k][i], h * slopes[k + 1][i]);
                 let (u, t2) = (1.0 - t, t * t);
                 a[i] * (1.0 + 2.0 * t) * u * u + da * t * u * u + b[i] * t2 * (3.0 - 2.0 * t) - db * t2 * u
             })
@@ -151,8 +170,23 @@ mod tests {
             (0..=12).map(|k| (k as f64 * std::f64::consts::TAU / 12.0).sin_cos().into()).collect();
         let inner = rounded(&corners, [2.0, 2.0]);
         let error = inner[1..11].iter().flatten().map(|[x, y]| (x.hypot(*y) - 1.0).abs()).fold(0.0, f64::max);
+        let error_at_the_seam = inner[0].iter().map(|[x, y]| (x.hypot(*y) - 1.0).abs()).fold(0.0, f64::max);
+        assert!(error_at_the_seam < 0.003, "{error_at_the_seam}");
         // The polygon is off by 1 - cos(15°) = 0.034; the slopes of parabolas are accurate to the square of the chord.
         assert!(error < 0.003, "{error}");
+    }
+
+    #[test]
+    fn a_vertex_that_is_there_twice_but_for_rounding_makes_no_kink() {
+        let at = |t: f64| [t, t * t];
+        let once: Vec<[f64; 2]> = (0..=8).map(|k| at(k as f64 / 8.0)).collect();
+        let mut twice = once.clone();
+        twice.insert(5, [once[4][0] - 1e-9, once[4][1] + 1e-9]);
+        let (a, mut b) = (rounded(&once, [1.0, 1.0]), rounded(&twice, [1.0, 1.0]));
+        b.remove(4);
+        for (p, q) in a.iter().flatten().zip(b.iter().flatten()) {
+            assert!((p[0] - q[0]).abs() < 1e-7 && (p[1] - q[1]).abs() < 1e-7, "{p:?} {q:?}");
+        }
     }
 
     #[test]
