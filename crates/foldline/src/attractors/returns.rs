@@ -29,6 +29,8 @@ const KEPT: usize = MOST_CROSSINGS * 6 + 1;
 const NEAR: f64 = 0.5;
 /// Largest difference between the limits predicted from successive returns, relative to the last difference of returns.
 const STEADY: f64 = 0.3;
+/// Last difference below which, and doubt below which, a prediction is worth following for a period.
+const WORTHWHILE: [f64; 2] = [0.1, 5e-3];
 /// Largest distance of a predicted limit from the last return, relative to the extent.
 const REACH: f64 = 0.5;
 
@@ -58,6 +60,13 @@ pub(super) struct Prediction {
     pub(super) size: f64,
     /// How much the prediction changed with the last return, relative to the extent.
     pub(super) doubt: f64,
+}
+
+impl Prediction {
+    /// Whether following it for a period is likely enough to show a cycle; that costs more than waiting for a few returns.
+    pub(super) fn worthwhile(&self) -> bool {
+        self.size <= WORTHWHILE[0] && self.doubt <= WORTHWHILE[1]
+    }
 }
 
 impl Returns {

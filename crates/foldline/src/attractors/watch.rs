@@ -158,6 +158,9 @@ impl Watch {
                 self.next_attempt = self.returns.total() + 1;
                 return;
             }
+            if !prediction.worthwhile() {
+                continue;
+            }
             self.next_attempt = self.returns.total() + self.returns.total() / 2;
             let Some(candidate) = context.follow(&self.returns, &prediction, &extent) else { continue };
             if let Some(orbit) = context.polished(&candidate)
