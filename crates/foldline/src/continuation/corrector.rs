@@ -79,7 +79,13 @@ pub struct Plane {
 ///
 /// # Errors
 /// See [`Failure`].
-pub fn correct(problem: &mut dyn ZeroProblem, settings: &Settings, plane: &Plane, u: &mut [f64], cost: &mut Cost) -> Result<f64, Failure> {
+pub fn correct(
+    problem: &mut dyn ZeroProblem,
+    settings: &Settings,
+    plane: &Plane,
+    u: &mut [f64],
+    cost: &mut Cost,
+) -> Result<f64, Failure> {
     let size = problem.unknowns();
     let (mut r, mut du, mut gap) = (vec![0.0; size], vec![0.0; size], vec![0.0; size]);
     let mut sizes: Vec<f64> = Vec::new();
@@ -124,7 +130,13 @@ pub fn correct(problem: &mut dyn ZeroProblem, settings: &Settings, plane: &Plane
 ///
 /// # Errors
 /// See [`Failure`].
-pub fn station(problem: &mut dyn ZeroProblem, u: Vec<f64>, along: &[f64], direction: f64, cost: &mut Cost) -> Result<Station, Failure> {
+pub fn station(
+    problem: &mut dyn ZeroProblem,
+    u: Vec<f64>,
+    along: &[f64],
+    direction: f64,
+    cost: &mut Cost,
+) -> Result<Station, Failure> {
     let size = problem.unknowns();
     problem.anchor(&u);
     problem.factorise(&u, along).map_err(|_| Failure::Singular)?;

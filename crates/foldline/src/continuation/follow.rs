@@ -4,10 +4,10 @@
 //! clip at the bounds, see whether the branch has come to an end, look for special points in between, emit, choose the
 //! next step.
 
+use super::Settings;
 use super::corrector::{Failure, Plane, Station, parameter_row, settle};
 use super::inspect::{Found, History};
 use super::locate::Stretch;
-use super::Settings;
 use crate::contract::{Monitor, Verdict, ZeroProblem};
 use crate::diagram::{Cost, Ending, Mesh, Point, SpecialPoint};
 
@@ -55,7 +55,13 @@ const NOTHING: f64 = 0.05;
 
 /// Follows one side from `start`, which has been emitted already, and of which `previous` is the predecessor on the same
 /// side if there is one. `emitted` counts the points of this side so far.
-pub fn follow(walk: &mut Follow, start: Station, previous: Option<Station>, mut emitted: usize, sink: &mut dyn FnMut(Item) -> Verdict) -> Ending {
+pub fn follow(
+    walk: &mut Follow,
+    start: Station,
+    previous: Option<Station>,
+    mut emitted: usize,
+    sink: &mut dyn FnMut(Item) -> Verdict,
+) -> Ending {
     let mut left = start;
     let mut step = if left.point.step > 0.0 { left.point.step } else { walk.settings.first_step };
     let mut position = left.point.position;
@@ -175,13 +181,23 @@ impl Follow<'_> {
         (cosine.clamp(-1.0, 1.0).acos(), self.problem.dot(&left.tangent, &gap))
     }
 
-    fn attempt(&mut self, left: &Station, trail: Option<&Trail>, step: f64, emitted: usize, cost: &mut Cost) -> Result<Step, Failure> {
+    fn attempt(
+        &mut self,
+        left: &Station,
+        trail: Option<&Trail>,
+        step: f64,
+        emitted: usize,
+        cost: &mut Cost,
+    ) -> Result<Step, Failure> {
         self.place(left);
         let mut guess: Vec<f64> = left.u.iter().zip(&left.tangent).map(|(u, t)| u + step * t).collect();
         if let Some(trail) = trail {
             let before = self.problem.transfer(&trail.tangent, &trail.mesh, &left.mesh);
             let bend = 0.5 * step * step / trail.history.distance.max(0.2 * step);
-            guess.iter_mut().zip(left.tangent.iter().zip(&before)).for_each(|(g, (now, then))| *g += bend * (now - then));
+            guess
+                .iter_mut()
+                .zip(left.tangent.iter().zip(&before))
+                .for_each(|(g, (now, then))| *g += bend * (now - then));
         }
         let plane = Plane { row: left.tangent.clone(), base: left.u.clone(), distance: step };
         let mut right = settle(self.problem, self.settings, plane, guess.clone(), self.direction, cost)?;
@@ -208,7 +224,13 @@ impl Follow<'_> {
         Ok(Step { right, end })
     }
 
-    fn at_parameter(&mut self, left: &Station, right: &Station, value: f64, cost: &mut Cost) -> Result<Station, Failure> {
+    fn at_parameter(
+        &mut self,
+        left: &Station,
+        right: &Station,
+        value: f64,
+        cost: &mut Cost,
+    ) -> Result<Station, Failure> {
         let stretch = Stretch::new(self.problem, left, right, self.direction);
         let near = stretch.at_parameter(self.problem, self.settings, value, cost)?;
         self.place(left);
@@ -305,7 +327,11 @@ impl Follow<'_> {
             return None;
         }
         let back = self.at_parameter(left, right, value, cost).ok()?;
-        let near = self.settings.reflections.iter().any(|r| back.point.difference(home, &self.settings.scales, r) < 30.0 * self.settings.tolerance);
+        let near = self
+            .settings
+            .reflections
+            .iter()
+            .any(|r| back.point.difference(home, &self.settings.scales, r) < 30.0 * self.settings.tolerance);
         near.then_some(back)
     }
 }

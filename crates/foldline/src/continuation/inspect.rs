@@ -37,7 +37,14 @@ impl Follow<'_> {
     }
 
     /// Everything special between two stations.
-    pub fn inspect(&mut self, left: &Station, right: &Station, history: Option<&History>, depth: usize, cost: &mut Cost) -> Vec<Found> {
+    pub fn inspect(
+        &mut self,
+        left: &Station,
+        right: &Station,
+        history: Option<&History>,
+        depth: usize,
+        cost: &mut Cost,
+    ) -> Vec<Found> {
         let stretch = Stretch::new(self.problem, left, right, self.direction);
         let (at_left, at_right) = (self.monitored(left), self.monitored(right));
         let mut located: Vec<(usize, Located)> = Vec::new();
@@ -58,13 +65,17 @@ impl Follow<'_> {
         let change = left.point.unstable.abs_diff(right.point.unstable);
         let explained = explains(&jumps, left.point.unstable as i64, right.point.unstable as i64);
         let suspicious = depth < 3 && history.is_some_and(|h| self.may_touch(h, &at_left, &at_right, stretch.length));
-        if depth < DEEPEST && (jumps.len() > 1 || !explained || (suspicious && jumps.is_empty())) && stretch.length.abs() > self.settings.min_step {
+        if depth < DEEPEST
+            && (jumps.len() > 1 || !explained || (suspicious && jumps.is_empty()))
+            && stretch.length.abs() > self.settings.min_step
+        {
             let cut = match &located[..] {
                 [a, .., b] => 0.5 * (a.1.distance + b.1.distance),
                 _ => 0.5 * stretch.length,
             };
             // Neighbouring special points that cannot be told apart any more stay together.
-            let apart = located.len() < 2 || located[located.len() - 1].1.distance - located[0].1.distance > 1e-7 * (1.0 + stretch.length);
+            let apart = located.len() < 2
+                || located[located.len() - 1].1.distance - located[0].1.distance > 1e-7 * (1.0 + stretch.length);
             if apart && let Some(middle) = self.cut(left, &stretch, cut, cost) {
                 let rest = stretch.length - cut;
                 let before = self.inspect(left, &middle, history, depth + 1, cost);
@@ -78,14 +89,24 @@ impl Follow<'_> {
         let mut out = Vec::new();
         let total = located.len();
         for (index, (k, found)) in located.into_iter().enumerate() {
-            let next = if index + 1 == total { right.point.unstable as i64 } else { step_towards(count, right.point.unstable as i64, jumps[index]) };
+            let next = if index + 1 == total {
+                right.point.unstable as i64
+            } else {
+                step_towards(count, right.point.unstable as i64, jumps[index])
+            };
             out.push(Found::Special(self.special(self.monitors[k].kind(), found.station, count, next, found.error)));
             count = next;
         }
         if !explained {
             let width = (left.parameter() - right.parameter()).abs() / (1.0 + right.parameter().abs());
             if change > 0 || total > 0 {
-                out.push(Found::Special(self.special(Kind::Unexplained, right.clone(), count, right.point.unstable as i64, width)));
+                out.push(Found::Special(self.special(
+                    Kind::Unexplained,
+                    right.clone(),
+                    count,
+                    right.point.unstable as i64,
+                    width,
+                )));
             }
         }
         out
@@ -93,7 +114,13 @@ impl Follow<'_> {
 
     fn special(&self, kind: Kind, station: Station, before: i64, after: i64, error: f64) -> SpecialPoint {
         let (before, after) = if self.direction > 0.0 { (before, after) } else { (after, before) };
-        SpecialPoint { kind, point: station.point, unstable_before: before.max(0) as usize, unstable_after: after.max(0) as usize, error }
+        SpecialPoint {
+            kind,
+            point: station.point,
+            unstable_before: before.max(0) as usize,
+            unstable_after: after.max(0) as usize,
+            error,
+        }
     }
 
     /// A full station at distance s of the stretch.

@@ -52,7 +52,13 @@ impl<'s> Stretch<'s> {
     ///
     /// # Errors
     /// See [`Failure`].
-    pub fn at(&self, problem: &mut dyn ZeroProblem, settings: &Settings, s: f64, cost: &mut Cost) -> Result<Station, Failure> {
+    pub fn at(
+        &self,
+        problem: &mut dyn ZeroProblem,
+        settings: &Settings,
+        s: f64,
+        cost: &mut Cost,
+    ) -> Result<Station, Failure> {
         problem.set_mesh(&self.left.mesh);
         problem.anchor(&self.left.u);
         let mut u = self.hermite(s);
@@ -65,7 +71,13 @@ impl<'s> Stretch<'s> {
     ///
     /// # Errors
     /// See [`Failure`].
-    pub fn at_parameter(&self, problem: &mut dyn ZeroProblem, settings: &Settings, value: f64, cost: &mut Cost) -> Result<Station, Failure> {
+    pub fn at_parameter(
+        &self,
+        problem: &mut dyn ZeroProblem,
+        settings: &Settings,
+        value: f64,
+        cost: &mut Cost,
+    ) -> Result<Station, Failure> {
         let last = self.left.u.len() - 1;
         let (mut low, mut high) = (0.0, self.length);
         let rising = self.right[last] > self.left.u[last];
@@ -110,7 +122,8 @@ pub fn locate(
     cost: &mut Cost,
 ) -> Result<Located, Failure> {
     let reference = &stretch.left.point;
-    let mut evaluate = |s: f64| stretch.at(problem, settings, s, cost).map(|found| (monitor.value(reference, &found.point), found));
+    let mut evaluate =
+        |s: f64| stretch.at(problem, settings, s, cost).map(|found| (monitor.value(reference, &found.point), found));
     let resolution = if stretch.left.mesh.is_empty() { 1e-9 } else { 1e-3 };
     let (distance, mut coarse) = chandrupatla(&mut evaluate, [0.0, stretch.length], values, resolution)?;
     let floor = 10.0 * settings.newton_tolerance();
@@ -129,7 +142,8 @@ pub fn locate(
             return Ok(Located { distance, station: coarse, error: floor });
         };
         let fine = relocate(problem, settings, stretch, monitor, &coarse, &finer, reach, cost)?;
-        let error = floor + discrepancy(&coarse.point, &fine.point, coarse.parameter() - fine.parameter(), fine.parameter());
+        let error =
+            floor + discrepancy(&coarse.point, &fine.point, coarse.parameter() - fine.parameter(), fine.parameter());
         let improved = known.as_ref().is_none_or(|(_, e)| error < *e);
         if improved {
             known = Some((fine.clone(), error));
@@ -254,7 +268,11 @@ mod tests {
 
     #[test]
     fn the_root_finder_handles_simple_and_triple_zeros() {
-        for (f, root) in [((|x: f64| x.exp() - 2.0) as fn(f64) -> f64, 2f64.ln()), (|x| (x - 0.3).powi(3), 0.3), (|x| x.atan() - 1.0, 1f64.tan())] {
+        for (f, root) in [
+            ((|x: f64| x.exp() - 2.0) as fn(f64) -> f64, 2f64.ln()),
+            (|x| (x - 0.3).powi(3), 0.3),
+            (|x| x.atan() - 1.0, 1f64.tan()),
+        ] {
             let mut count = 0;
             let mut evaluate = |x: f64| {
                 count += 1;

@@ -14,7 +14,14 @@ pub fn roots(plan: &Plan) -> Vec<usize> {
 }
 
 /// Everything that grows from the branch of that index, in the order in which it was begun.
-pub fn grow(system: &System, plan: &Plan, root: usize, seeds: &Seeds, earlier: &Diagram, observer: &dyn Observer) -> Vec<Branch> {
+pub fn grow(
+    system: &System,
+    plan: &Plan,
+    root: usize,
+    seeds: &Seeds,
+    earlier: &Diagram,
+    observer: &dyn Observer,
+) -> Vec<Branch> {
     let mut work = Work { system, plan, earlier, observer, branches: Vec::new() };
     let Start::Seed(seed) = plan.branches[root].start else { return Vec::new() };
     let origin = Origin::Seed(plan.seeds[seed].name.clone());
@@ -55,7 +62,8 @@ impl Work<'_> {
                 None => return false,
             }
         }
-        let followers: Vec<usize> = (0..self.plan.branches.len()).filter(|&i| self.plan.branches[i].start == Start::EndOf(index)).collect();
+        let followers: Vec<usize> =
+            (0..self.plan.branches.len()).filter(|&i| self.plan.branches[i].start == Start::EndOf(index)).collect();
         followers.into_iter().all(|i| self.planned(i, Origin::EndOf(plan.name.clone()), ended.clone()))
     }
 
@@ -94,7 +102,9 @@ impl Work<'_> {
             if inside { Ok((settings, sides, station)) } else { Err(name) }
         });
         let going = match begun {
-            Ok((settings, sides, station)) => self.growth(&settings, sides, &[]).begin(&mut branch, Beginning::Inside(station)),
+            Ok((settings, sides, station)) => {
+                self.growth(&settings, sides, &[]).begin(&mut branch, Beginning::Inside(station))
+            }
             Err(why) => self.without_start(&mut branch, why),
         };
         Some((branch, going))
@@ -138,28 +148,37 @@ impl Work<'_> {
                 let mut branch = earlier.clone();
                 let going = self.growth(&settings, [true, true], &parent.special).resume(&mut branch);
                 self.branches.push(branch);
-                more.push(Pending { branch: self.branches.len() - 1, switching: pending.switching.below(special.kind) });
+                more.push(Pending {
+                    branch: self.branches.len() - 1,
+                    switching: pending.switching.below(special.kind),
+                });
                 if !going {
                     return None;
                 }
                 continue;
             }
             if let Some(already) = self.arrives(&parent, special.kind, &special.point) {
-                self.tell(Event::Note(&parent.name, &format!("{label}: the branch there is {already}, which ends here")));
+                self.tell(Event::Note(
+                    &parent.name,
+                    &format!("{label}: the branch there is {already}, which ends here"),
+                ));
                 continue;
             }
-            let (family, beginning) = match switch::beginning(self.system, &settings, parent.free, self.plan.degree, special) {
-                None => continue,
-                Some(Ok(found)) => found,
-                Some(Err(why)) => {
-                    self.tell(Event::Note(&parent.name, &format!("{label}: no branch found to switch to: {why}")));
-                    continue;
-                }
-            };
+            let (family, beginning) =
+                match switch::beginning(self.system, &settings, parent.free, self.plan.degree, special) {
+                    None => continue,
+                    Some(Ok(found)) => found,
+                    Some(Err(why)) => {
+                        self.tell(Event::Note(&parent.name, &format!("{label}: no branch found to switch to: {why}")));
+                        continue;
+                    }
+                };
             let first = match &beginning {
                 Beginning::Inside(station) | Beginning::Edge { first: station, .. } => &station.point,
             };
-            if let Some(already) = known::branch_of(self.system, &settings, parent.free, self.plan.degree, first, &self.branches) {
+            if let Some(already) =
+                known::branch_of(self.system, &settings, parent.free, self.plan.degree, first, &self.branches)
+            {
                 self.tell(Event::Note(&parent.name, &format!("{label}: leads to {already}, which is known already")));
                 continue;
             }

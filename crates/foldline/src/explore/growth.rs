@@ -10,14 +10,22 @@ use crate::special::{self, collapse};
 
 /// The problem on whose curve `point` lies, on the mesh of the point. `doubled` says that its branch was born by period
 /// doubling.
-pub fn problem_of<'a>(system: &'a System, free: usize, degree: usize, point: &Point, doubled: bool) -> Box<dyn ZeroProblem + 'a> {
+pub fn problem_of<'a>(
+    system: &'a System,
+    free: usize,
+    degree: usize,
+    point: &Point,
+    doubled: bool,
+) -> Box<dyn ZeroProblem + 'a> {
     let setting = setting(system, free, &point.parameters);
     match &point.solution {
         Solution::Equilibrium(_) => Box::new(EquilibriumProblem::new(setting)),
         Solution::Cycle(cycle) if doubled && cycle.intervals() > 0 => {
             Box::new(CycleProblem::new(setting, cycle.degree, &cycle.mesh).with_equal_halves())
         }
-        Solution::Cycle(cycle) if cycle.intervals() > 0 => Box::new(CycleProblem::new(setting, cycle.degree, &cycle.mesh)),
+        Solution::Cycle(cycle) if cycle.intervals() > 0 => {
+            Box::new(CycleProblem::new(setting, cycle.degree, &cycle.mesh))
+        }
         Solution::Cycle(_) => Box::new(CycleProblem::new(setting, degree, &mesh::uniform(20))),
     }
 }
@@ -46,7 +54,12 @@ pub fn polished(problem: &mut dyn ZeroProblem, settings: &Settings, point: &Poin
 }
 
 /// A stored point as a station again.
-fn revived(problem: &mut dyn ZeroProblem, settings: &Settings, point: &Point, direction: f64) -> Result<Station, Failure> {
+fn revived(
+    problem: &mut dyn ZeroProblem,
+    settings: &Settings,
+    point: &Point,
+    direction: f64,
+) -> Result<Station, Failure> {
     if let Solution::Cycle(cycle) = &point.solution {
         problem.set_mesh(&cycle.mesh);
     }
@@ -130,7 +143,8 @@ impl Growth<'_> {
                 break;
             }
             if !self.sides[side] && branch.ends[side].is_none() {
-                let at = branch.points.first().map_or(f64::NAN, |p| p.parameters.get(branch.free).copied().unwrap_or(0.0));
+                let at =
+                    branch.points.first().map_or(f64::NAN, |p| p.parameters.get(branch.free).copied().unwrap_or(0.0));
                 going &= self.end(branch, side, Ending::Bound(at));
             }
             if branch.ends[side].is_none() {
@@ -216,8 +230,12 @@ impl Growth<'_> {
             s.kind == at && right_period && (value(s) - parameter).abs() < 1e-2 * (1.0 + parameter.abs())
         };
         let gap = |s: &SpecialPoint| (value(s) - parameter).abs();
-        let Some(parent) = self.parents.iter().filter(fits).min_by(|a, b| gap(a).total_cmp(&gap(b))) else { return ending };
-        if at == Kind::PeriodDoubling && let Some(edge) = super::switch::doubled_edge(self.system, branch.free, parent, last) {
+        let Some(parent) = self.parents.iter().filter(fits).min_by(|a, b| gap(a).total_cmp(&gap(b))) else {
+            return ending;
+        };
+        if at == Kind::PeriodDoubling
+            && let Some(edge) = super::switch::doubled_edge(self.system, branch.free, parent, last)
+        {
             let position = last.position + if side == 1 { 1 } else { -1 };
             self.accept(branch, Point { position, ..edge });
         }

@@ -10,7 +10,14 @@ use crate::continuation::Settings;
 use crate::diagram::{Branch, Point};
 
 /// The name of the branch on which `point` lies.
-pub fn branch_of<'b>(system: &System, settings: &Settings, free: usize, degree: usize, point: &Point, branches: &'b [Branch]) -> Option<&'b str> {
+pub fn branch_of<'b>(
+    system: &System,
+    settings: &Settings,
+    free: usize,
+    degree: usize,
+    point: &Point,
+    branches: &'b [Branch],
+) -> Option<&'b str> {
     let value = *point.parameters.get(free)?;
     let found = branches.iter().filter(|b| b.free == free).find(|branch| {
         branch.points.windows(2).any(|pair| {

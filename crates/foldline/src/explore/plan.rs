@@ -62,7 +62,9 @@ impl Switching {
 
     /// What remains for a branch that was reached by switching at a point of that kind.
     pub fn below(&self, kind: Kind) -> Switching {
-        Switching { depth: self.depth.iter().map(|(k, d)| (*k, if *k == kind { d.saturating_sub(1) } else { *d })).collect() }
+        Switching {
+            depth: self.depth.iter().map(|(k, d)| (*k, if *k == kind { d.saturating_sub(1) } else { *d })).collect(),
+        }
     }
 }
 

@@ -33,7 +33,9 @@ impl Seeds {
 /// Finds every seed that a branch without points in `earlier` starts from.
 pub fn find(system: &System, plan: &Plan, jobs: usize, earlier: &Diagram, observer: &dyn Observer) -> Seeds {
     let needed = |seed: usize| {
-        plan.branches.iter().any(|b| b.start == Start::Seed(seed) && earlier.branch(&b.name).is_none_or(|known| known.points.is_empty()))
+        plan.branches.iter().any(|b| {
+            b.start == Start::Seed(seed) && earlier.branch(&b.name).is_none_or(|known| known.points.is_empty())
+        })
     };
     let mut censuses: Vec<(&SeedPlan, Census)> = Vec::new();
     let mut points = Vec::new();
@@ -43,7 +45,9 @@ pub fn find(system: &System, plan: &Plan, jobs: usize, earlier: &Diagram, observ
             continue;
         }
         points.push(match &seed.source {
-            SeedSource::State(state) => from_state(system, seed, plan, state, jobs).map(|p| with_degree(p, plan.degree)),
+            SeedSource::State(state) => {
+                from_state(system, seed, plan, state, jobs).map(|p| with_degree(p, plan.degree))
+            }
             SeedSource::Attractor(key) => {
                 let same = |other: &SeedPlan| {
                     other.parameters == seed.parameters && other.samples == seed.samples && other.random == seed.random
@@ -54,7 +58,9 @@ pub fn find(system: &System, plan: &Plan, jobs: usize, earlier: &Diagram, observ
                     censuses.push((seed, census));
                 }
                 match censuses.iter().find(|(other, _)| same(other)) {
-                    Some((_, census)) => chosen(census, key).map(|p| with_degree(p, plan.degree)).ok_or_else(|| missing(census, key)),
+                    Some((_, census)) => {
+                        chosen(census, key).map(|p| with_degree(p, plan.degree)).ok_or_else(|| missing(census, key))
+                    }
                     None => Err("no census".into()),
                 }
             }
@@ -66,13 +72,30 @@ pub fn find(system: &System, plan: &Plan, jobs: usize, earlier: &Diagram, observ
 /// Samples initial states, follows each to its attractor, and computes the attractors accurately.
 ///
 /// `parameters` `[k]`; `samples` initial states from the ranges of the system; `seed` makes the sample reproducible.
-pub fn attractors(system: &System, parameters: &[f64], samples: usize, seed: u64, jobs: usize, tolerance: f64) -> Census {
+pub fn attractors(
+    system: &System,
+    parameters: &[f64],
+    samples: usize,
+    seed: u64,
+    jobs: usize,
+    tolerance: f64,
+) -> Census {
     let sampling = sampling(system, samples, seed, jobs, tolerance);
-    attractors::survey(system.field, parameters, &sampling, &|candidate| polish(system, parameters, tolerance, candidate))
+    attractors::survey(system.field, parameters, &sampling, &|candidate| {
+        polish(system, parameters, tolerance, candidate)
+    })
 }
 
 fn sampling(system: &System, samples: usize, seed: u64, jobs: usize, tolerance: f64) -> Sampling {
-    Sampling { ranges: system.ranges.clone(), scales: system.scales.clone(), whirl: system.whirl, samples, seed, jobs, tolerance }
+    Sampling {
+        ranges: system.ranges.clone(),
+        scales: system.scales.clone(),
+        whirl: system.whirl,
+        samples,
+        seed,
+        jobs,
+        tolerance,
+    }
 }
 
 /// Newton's method at fixed parameters.
@@ -81,7 +104,9 @@ fn polish(system: &System, parameters: &[f64], tolerance: f64, candidate: &Candi
     let free = 0;
     let solution = match candidate {
         Candidate::Equilibrium(x) => Solution::Equilibrium(x.clone()),
-        Candidate::Cycle { period, times, states } => Solution::Cycle(first_profile(system.field.dim(), *period, times, states)),
+        Candidate::Cycle { period, times, states } => {
+            Solution::Cycle(first_profile(system.field.dim(), *period, times, states))
+        }
     };
     let mut guess = bare(parameters, solution);
     let mut problem = problem_of(system, free, 4, &guess, false);
@@ -115,7 +140,8 @@ fn bare(parameters: &[f64], solution: Solution) -> Point {
 fn first_profile(n: usize, period: f64, times: &[f64], states: &[f64]) -> Cycle {
     let intervals = 60;
     let scheme = Scheme::new(4);
-    let size: Vec<f64> = (0..n).map(|i| states.iter().skip(i).step_by(n).fold(1e-300, |m: f64, v| m.max(v.abs()))).collect();
+    let size: Vec<f64> =
+        (0..n).map(|i| states.iter().skip(i).step_by(n).fold(1e-300, |m: f64, v| m.max(v.abs()))).collect();
     // Arclength in scaled states, plus time, so that no interval becomes empty.
     let mut length = vec![0.0];
     for k in 1..times.len() {
@@ -161,8 +187,13 @@ fn cubic(times: &[f64], states: &[f64], n: usize, i: usize, k: usize, t: f64) ->
     nodes
         .iter()
         .map(|&a| {
-            let weight: f64 =
-                nodes.iter().filter(|&&b| b != a).map(|&b| (t - times[b]) / (times[a] - times[b]).abs().max(f64::MIN_POSITIVE).copysign(times[a] - times[b])).product();
+            let weight: f64 = nodes
+                .iter()
+                .filter(|&&b| b != a)
+                .map(|&b| {
+                    (t - times[b]) / (times[a] - times[b]).abs().max(f64::MIN_POSITIVE).copysign(times[a] - times[b])
+                })
+                .product();
             weight * states[a * n + i]
         })
         .sum()
@@ -179,7 +210,9 @@ fn with_degree(mut point: Point, degree: usize) -> Point {
         for interval in cycle.profile.chunks_exact((cycle.degree + 1) * n) {
             for &c in &new.nodes {
                 let weights = old.interpolation(c);
-                profile.extend((0..n).map(|i| weights.iter().enumerate().map(|(k, w)| w * interval[k * n + i]).sum::<f64>()));
+                profile.extend(
+                    (0..n).map(|i| weights.iter().enumerate().map(|(k, w)| w * interval[k * n + i]).sum::<f64>()),
+                );
             }
         }
         (cycle.degree, cycle.profile) = (degree, profile);
@@ -191,8 +224,10 @@ fn with_degree(mut point: Point, degree: usize) -> Point {
 fn from_state(system: &System, seed: &SeedPlan, plan: &Plan, state: &[f64], jobs: usize) -> Result<Point, String> {
     let settings = settings(system, plan.tolerance, [f64::NEG_INFINITY, f64::INFINITY], 0);
     let mut problem = EquilibriumProblem::new(setting(system, 0, &seed.parameters));
-    if let Ok(found) = polished(&mut problem, &settings, &bare(&seed.parameters, Solution::Equilibrium(state.to_vec()))) {
-        let moved: Vec<f64> = found.u.iter().zip(state).zip(&system.scales).map(|((a, b), s)| (a - b) / (s + b.abs())).collect();
+    if let Ok(found) = polished(&mut problem, &settings, &bare(&seed.parameters, Solution::Equilibrium(state.to_vec())))
+    {
+        let moved: Vec<f64> =
+            found.u.iter().zip(state).zip(&system.scales).map(|((a, b), s)| (a - b) / (s + b.abs())).collect();
         if max_abs(&moved) < 1e-2 {
             return Ok(found.point);
         }
@@ -216,7 +251,9 @@ fn chosen(census: &Census, key: &AttractorKey) -> Option<Point> {
             census.attractors.iter().filter(|a| !is_cycle(a)).min_by(|a, b| size(a).total_cmp(&size(b)))
         }
         AttractorKey::Cycle => census.attractors.iter().filter(is_cycle).max_by_key(|a| a.hits),
-        AttractorKey::Ratio(p, q) => census.attractors.iter().filter(|a| a.ratio == Some((*p, *q))).max_by_key(|a| a.hits),
+        AttractorKey::Ratio(p, q) => {
+            census.attractors.iter().filter(|a| a.ratio == Some((*p, *q))).max_by_key(|a| a.hits)
+        }
     };
     found.map(|a| a.point.clone())
 }

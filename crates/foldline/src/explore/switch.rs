@@ -23,9 +23,17 @@ const DISTANCES: [f64; 7] = [2e-3, 5e-4, 1e-4, 2e-5, 5e-3, 1e-2, 5e-2];
 ///
 /// # Errors
 /// A sentence that says why no point of the other branch was found.
-pub fn beginning(system: &System, settings: &Settings, free: usize, degree: usize, at: &SpecialPoint) -> Option<Result<(Family, Beginning), String>> {
+pub fn beginning(
+    system: &System,
+    settings: &Settings,
+    free: usize,
+    degree: usize,
+    at: &SpecialPoint,
+) -> Option<Result<(Family, Beginning), String>> {
     let found = match (at.kind, &at.point.solution) {
-        (Kind::PeriodDoubling, Solution::Cycle(cycle)) => doubled(system, settings, free, at, cycle).map(|b| (Family::Cycle, b)),
+        (Kind::PeriodDoubling, Solution::Cycle(cycle)) => {
+            doubled(system, settings, free, at, cycle).map(|b| (Family::Cycle, b))
+        }
         (Kind::Hopf, Solution::Equilibrium(_)) => born(system, settings, free, degree, at).map(|b| (Family::Cycle, b)),
         (Kind::BranchPoint, solution) => {
             let family = if matches!(solution, Solution::Cycle(_)) { Family::Cycle } else { Family::Equilibrium };
@@ -78,28 +86,43 @@ fn step_off(
 /// of them, one born on the other side has one more than that. True if `found` is like that.
 fn exchanges_stability(at: &SpecialPoint, free: usize, found: &Station) -> bool {
     let rising = at.point.parameter_slope() > 0.0;
-    let (below, above) = if rising { (at.unstable_before, at.unstable_after) } else { (at.unstable_after, at.unstable_before) };
+    let (below, above) =
+        if rising { (at.unstable_before, at.unstable_after) } else { (at.unstable_after, at.unstable_before) };
     let own = if found.parameter() > at.point.parameters[free] { above } else { below };
     let fewer = below.min(above);
     found.point.unstable == if own > fewer { fewer } else { fewer + 1 }
 }
 
-fn doubled(system: &System, settings: &Settings, free: usize, at: &SpecialPoint, cycle: &Cycle) -> Result<Beginning, String> {
-    let (mut problem, base, direction) = double(system, free, at, cycle).ok_or("no vector of period doubling was found")?;
-    let first = step_off(&mut problem, settings, &base, &direction, 1.0, &|found| exchanges_stability(at, free, found)).map_err(|why| why.to_string())?;
+fn doubled(
+    system: &System,
+    settings: &Settings,
+    free: usize,
+    at: &SpecialPoint,
+    cycle: &Cycle,
+) -> Result<Beginning, String> {
+    let (mut problem, base, direction) =
+        double(system, free, at, cycle).ok_or("no vector of period doubling was found")?;
+    let first = step_off(&mut problem, settings, &base, &direction, 1.0, &|found| exchanges_stability(at, free, found))
+        .map_err(|why| why.to_string())?;
     let before = doubled_edge(system, free, at, &first.point).into_iter().collect();
     Ok(Beginning::Edge { before, first, joined: joined(at, free) })
 }
 
 /// The problem of doubled cycles at a period doubling, the cycle run through twice, and the direction of the new branch.
-fn double<'a>(system: &'a System, free: usize, at: &SpecialPoint, cycle: &Cycle) -> Option<(CycleProblem<'a>, Vec<f64>, Vec<f64>)> {
+fn double<'a>(
+    system: &'a System,
+    free: usize,
+    at: &SpecialPoint,
+    cycle: &Cycle,
+) -> Option<(CycleProblem<'a>, Vec<f64>, Vec<f64>)> {
     let mut single = CycleProblem::new(setting(system, free, &at.point.parameters), cycle.degree, &cycle.mesh);
     let u = single.unknowns_of(&at.point);
     single.anchor(&u);
     let vector = single.antiperiodic_direction(&u)?;
     let (twice, mut direction) = period_doubling::doubled(cycle, &vector);
     direction.extend([0.0, 0.0]);
-    let mut problem = CycleProblem::new(setting(system, free, &at.point.parameters), twice.degree, &twice.mesh).with_equal_halves();
+    let mut problem =
+        CycleProblem::new(setting(system, free, &at.point.parameters), twice.degree, &twice.mesh).with_equal_halves();
     let base = problem.unknowns_of(&Point { solution: Solution::Cycle(twice), ..at.point.clone() });
     Some((problem, base, direction))
 }
@@ -120,33 +143,50 @@ pub fn doubled_edge(system: &System, free: usize, at: &SpecialPoint, next: &Poin
     Some(Point { unstable: next.unstable, ..problem.point(&base, &tangent, examination) })
 }
 
-fn born(system: &System, settings: &Settings, free: usize, degree: usize, at: &SpecialPoint) -> Result<Beginning, String> {
+fn born(
+    system: &System,
+    settings: &Settings,
+    free: usize,
+    degree: usize,
+    at: &SpecialPoint,
+) -> Result<Beginning, String> {
     let mesh = mesh::uniform(20);
     let scheme = Scheme::new(degree);
-    let (mut direction, period) =
-        hopf::direction(system.field, &at.point, &system.scales, &scheme, &mesh).ok_or("no oscillating eigenvector was found")?;
+    let (mut direction, period) = hopf::direction(system.field, &at.point, &system.scales, &scheme, &mesh)
+        .ok_or("no oscillating eigenvector was found")?;
     direction.extend([0.0, 0.0]);
     let mut problem = CycleProblem::new(setting(system, free, &at.point.parameters), degree, &mesh);
     let mut base = problem.unknowns_of(&at.point);
     let size = base.len();
     base[size - 2] = period;
-    let first = step_off(&mut problem, settings, &base, &direction, 1.0, &|found| exchanges_stability(at, free, found)).map_err(|why| why.to_string())?;
+    let first = step_off(&mut problem, settings, &base, &direction, 1.0, &|found| exchanges_stability(at, free, found))
+        .map_err(|why| why.to_string())?;
     Ok(Beginning::Edge { before: Vec::new(), first, joined: joined(at, free) })
 }
 
-fn crossing(system: &System, settings: &Settings, free: usize, degree: usize, at: &SpecialPoint) -> Result<Beginning, String> {
+fn crossing(
+    system: &System,
+    settings: &Settings,
+    free: usize,
+    degree: usize,
+    at: &SpecialPoint,
+) -> Result<Beginning, String> {
     let mut problem = problem_of(system, free, degree, &at.point, false);
     let problem = &mut *problem;
     let u = problem.unknowns_of(&at.point);
     problem.anchor(&u);
-    let vector = branch_point::direction(problem, &u, &at.point.tangent).ok_or("the tangent of the other branch was not found")?;
+    let vector = branch_point::direction(problem, &u, &at.point.tangent)
+        .ok_or("the tangent of the other branch was not found")?;
     let mesh = problem.mesh();
     let one = step_off(problem, settings, &u, &vector, 1.0, &|_| true).map_err(|why| why.to_string())?;
     problem.set_mesh(&mesh);
     let symmetric = step_off(problem, settings, &u, &vector, -1.0, &|_| true).is_ok_and(|other| {
         let images = system.reflections.iter().filter(|r| r.contains(&true));
         let gap = (one.parameter() - other.parameter()).abs();
-        gap < 1e-6 * (1.0 + one.parameter().abs()) && images.into_iter().any(|r| one.point.difference(&other.point, &system.scales, r) < 30.0 * settings.tolerance)
+        gap < 1e-6 * (1.0 + one.parameter().abs())
+            && images
+                .into_iter()
+                .any(|r| one.point.difference(&other.point, &system.scales, r) < 30.0 * settings.tolerance)
     });
     if symmetric {
         // The other arm is the mirror image of this one.

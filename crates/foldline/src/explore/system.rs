@@ -42,7 +42,9 @@ impl<'a> System<'a> {
             return;
         }
         let points: Vec<Vec<f64>> = (0..5)
-            .map(|k| (0..n).map(|i| self.scales[i] * ((3 * k + 1) as f64 * 0.71 + (i * i + 1) as f64 * 1.37).sin()).collect())
+            .map(|k| {
+                (0..n).map(|i| self.scales[i] * ((3 * k + 1) as f64 * 0.71 + (i * i + 1) as f64 * 1.37).sin()).collect()
+            })
             .collect();
         let value = |x: &[f64]| {
             let mut f = vec![0.0; n];
@@ -51,7 +53,8 @@ impl<'a> System<'a> {
         };
         for bits in 1..1usize << n {
             let reflection: Vec<bool> = (0..n).map(|i| bits >> i & 1 == 1).collect();
-            let reflect = |x: &[f64]| -> Vec<f64> { x.iter().zip(&reflection).map(|(v, r)| if *r { -v } else { *v }).collect() };
+            let reflect =
+                |x: &[f64]| -> Vec<f64> { x.iter().zip(&reflection).map(|(v, r)| if *r { -v } else { *v }).collect() };
             let equivariant = points.iter().all(|x| {
                 let (a, b) = (value(&reflect(x)), reflect(&value(x)));
                 a.iter().zip(&b).all(|(p, q)| p.is_finite() && (p - q).abs() <= 1e-10 * (p.abs() + q.abs()))

@@ -142,7 +142,8 @@ mod tests {
             }
         }
         // The same two columns among eleven.
-        let mut wide: Vec<f64> = (0..n * 11).map(|k| if k % 11 < 2 { ((k / 11 * 2 + k % 11) as f64).cos() } else { k as f64 }).collect();
+        let mut wide: Vec<f64> =
+            (0..n * 11).map(|k| if k % 11 < 2 { ((k / 11 * 2 + k % 11) as f64).cos() } else { k as f64 }).collect();
         solve(&a, n, &pivots, &mut wide, 11);
         for i in 0..n {
             assert_eq!(wide[i * 11..i * 11 + 2], b[i * 2..i * 2 + 2]);

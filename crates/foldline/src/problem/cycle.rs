@@ -19,8 +19,8 @@
 //! **Fails when** the cycle shrinks to an equilibrium (the phase condition loses its meaning there) or its period grows
 //! without bound; the continuation recognises both.
 
-use super::gauss::Scheme;
 use super::defect::{self, Defect};
+use super::gauss::Scheme;
 use super::{Setting, extremes, mesh};
 use crate::contract::{Batch, Examination, Parameters, Singular, ZeroProblem};
 use crate::diagram::{Cycle, Mesh, Point, Solution, Trust};
@@ -208,8 +208,16 @@ impl<'a> CycleProblem<'a> {
         let size = self.profile_size();
         let scale = self.relative_scale(u);
         let parameters = self.setting.at(u[size + 1]);
-        let Defect { local, ends } =
-            defect::measure(self.setting.field, &parameters, &u[..size], u[size], &self.mesh, &self.scheme, &self.sampling, &scale);
+        let Defect { local, ends } = defect::measure(
+            self.setting.field,
+            &parameters,
+            &u[..size],
+            u[size],
+            &self.mesh,
+            &self.scheme,
+            &self.sampling,
+            &scale,
+        );
         let block = (self.scheme.degree + 1) * self.n;
         let mut rhs = vec![0.0; size + 2];
         for (j, end) in ends.chunks_exact(self.n).enumerate() {
@@ -218,8 +226,10 @@ impl<'a> CycleProblem<'a> {
         let mut shift = vec![0.0; size + 2];
         self.system.solve(&rhs, &mut shift);
         let response = self.relative_size(&shift, u);
-        let sizes: Vec<f64> =
-            ends.chunks_exact(self.n).map(|e| e.iter().zip(&scale).map(|(v, s)| (v / s).abs()).fold(0.0, f64::max)).collect();
+        let sizes: Vec<f64> = ends
+            .chunks_exact(self.n)
+            .map(|e| e.iter().zip(&scale).map(|(v, s)| (v / s).abs()).fold(0.0, f64::max))
+            .collect();
         let largest = sizes.iter().fold(f64::MIN_POSITIVE, |m: f64, s| m.max(*s));
         let gain = if response.is_finite() { response / largest } else { 1.0 };
         local.iter().zip(&sizes).map(|(l, s)| l + gain * s).collect()
@@ -342,7 +352,8 @@ impl ZeroProblem for CycleProblem<'_> {
     fn relative_size(&self, du: &[f64], u: &[f64]) -> f64 {
         let size = self.profile_size();
         let scale = self.relative_scale(u);
-        let mut largest = (du[size] / u[size]).abs().max((du[size + 1] / (self.setting.parameter_scale + u[size + 1].abs())).abs());
+        let mut largest =
+            (du[size] / u[size]).abs().max((du[size + 1] / (self.setting.parameter_scale + u[size + 1].abs())).abs());
         for x in du[..size].chunks_exact(self.n) {
             for (v, s) in x.iter().zip(&scale) {
                 let relative = (v / s).abs();
@@ -413,7 +424,8 @@ impl ZeroProblem for CycleProblem<'_> {
         let errors = self.errors(u);
         let mut r = vec![0.0; size + 2];
         self.residual(u, &mut r);
-        let residual = r[..size].iter().enumerate().map(|(k, v)| (v / scale[k % n]).abs()).fold(r[size].abs(), f64::max);
+        let residual =
+            r[..size].iter().enumerate().map(|(k, v)| (v / scale[k % n]).abs()).fold(r[size].abs(), f64::max);
         let parameters = self.setting.at(u[size + 1]);
         let ranges = extremes::of_profile(self.setting.field, &parameters, &u[..size], &self.mesh, &self.scheme);
         let trust = Trust {

@@ -47,14 +47,20 @@ impl Sampling {
             .map(|&s| {
                 let mut line = vec![0.0; m + 1];
                 for i in 0..m {
-                    axpy(through(&scheme.nodes[1..], i, s), &scheme.derivative[i * (m + 1)..(i + 1) * (m + 1)], &mut line);
+                    axpy(
+                        through(&scheme.nodes[1..], i, s),
+                        &scheme.derivative[i * (m + 1)..(i + 1) * (m + 1)],
+                        &mut line,
+                    );
                 }
                 line
             })
             .collect();
         let integrals = scheme.nodes[1..]
             .iter()
-            .map(|&c| (0..=m).map(|k| (0..=m).map(|g| c * weights[g] * through(&points, k, c * points[g])).sum()).collect())
+            .map(|&c| {
+                (0..=m).map(|k| (0..=m).map(|g| c * weights[g] * through(&points, k, c * points[g])).sum()).collect()
+            })
             .collect();
         Sampling { values, slopes, integrals, weights }
     }
@@ -147,7 +153,9 @@ mod tests {
             // The exact solution interpolated: its defect is that of the collocation solution to leading order.
             let profile: Vec<f64> = mesh
                 .windows(2)
-                .flat_map(|p| scheme.nodes.iter().map(|c| std::f64::consts::TAU * (p[0] + (p[1] - p[0]) * c)).collect::<Vec<_>>())
+                .flat_map(|p| {
+                    scheme.nodes.iter().map(|c| std::f64::consts::TAU * (p[0] + (p[1] - p[0]) * c)).collect::<Vec<_>>()
+                })
                 .flat_map(|t| [t.sin(), t.cos()])
                 .collect();
             let d = measure(&Rotation, &[], &profile, std::f64::consts::TAU, &mesh, &scheme, &sampling, &[1.0, 1.0]);

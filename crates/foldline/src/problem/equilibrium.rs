@@ -92,7 +92,9 @@ impl ZeroProblem for EquilibriumProblem<'_> {
     fn relative_size(&self, du: &[f64], u: &[f64]) -> f64 {
         let n = self.n();
         let states = (0..n).map(|i| (du[i] / (self.setting.scales[i] + u[i].abs())).abs());
-        states.fold((du[n] / (self.setting.parameter_scale + u[n].abs())).abs(), |m, x| if x > m || x.is_nan() { x } else { m })
+        states.fold((du[n] / (self.setting.parameter_scale + u[n].abs())).abs(), |m, x| {
+            if x > m || x.is_nan() { x } else { m }
+        })
     }
 
     fn mesh(&self) -> Mesh {

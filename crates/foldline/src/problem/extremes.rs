@@ -14,12 +14,19 @@ pub fn of_state(field: &dyn VectorField, parameters: &[f64], x: &[f64]) -> Vec<[
 }
 
 /// Over a periodic profile `[interval][node][component]`.
-pub fn of_profile(field: &dyn VectorField, parameters: &[f64], profile: &[f64], mesh: &Mesh, scheme: &Scheme) -> Vec<[f64; 2]> {
+pub fn of_profile(
+    field: &dyn VectorField,
+    parameters: &[f64],
+    profile: &[f64],
+    mesh: &Mesh,
+    scheme: &Scheme,
+) -> Vec<[f64; 2]> {
     let (n, outputs, m, count) = (field.dim(), field.output_count(), scheme.degree, mesh.len() - 1);
     let channels = n + outputs;
     let per_interval = 2 * m;
     let lanes = count * per_interval;
-    let inner: Vec<Vec<f64>> = (0..per_interval).map(|s| scheme.interpolation(s as f64 / per_interval as f64)).collect();
+    let inner: Vec<Vec<f64>> =
+        (0..per_interval).map(|s| scheme.interpolation(s as f64 / per_interval as f64)).collect();
     let mut states = vec![0.0; n * lanes];
     for j in 0..count {
         for (s, weights) in inner.iter().enumerate() {

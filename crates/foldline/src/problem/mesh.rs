@@ -96,14 +96,18 @@ mod tests {
     use std::f64::consts::TAU;
 
     fn sampled(mesh: &Mesh, scheme: &Scheme, f: impl Fn(f64) -> f64) -> Vec<f64> {
-        mesh.windows(2).flat_map(|p| scheme.nodes.iter().map(|c| f(p[0] + (p[1] - p[0]) * c)).collect::<Vec<_>>()).collect()
+        mesh.windows(2)
+            .flat_map(|p| scheme.nodes.iter().map(|c| f(p[0] + (p[1] - p[0]) * c)).collect::<Vec<_>>())
+            .collect()
     }
 
     #[test]
     fn equidistribution_meets_its_target_where_the_error_has_a_layer() {
         // e_j = h^5 |density(t)|^5 with a sharp peak at t = 0.3.
         let density = |t: f64| 20.0 + 400.0 / (1.0 + (100.0 * (t - 0.3)).powi(2));
-        let error = |mesh: &Mesh| -> Vec<f64> { mesh.windows(2).map(|p| ((p[1] - p[0]) * density(0.5 * (p[0] + p[1]))).powi(5)).collect() };
+        let error = |mesh: &Mesh| -> Vec<f64> {
+            mesh.windows(2).map(|p| ((p[1] - p[0]) * density(0.5 * (p[0] + p[1]))).powi(5)).collect()
+        };
         let mut mesh = uniform(20);
         for _ in 0..8 {
             mesh = equidistributed(&error(&mesh), &mesh, 4, 1e-3).unwrap();

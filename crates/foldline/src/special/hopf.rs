@@ -7,8 +7,8 @@
 //!
 //! **Source.** kuznetsov2004, §10.2 and §10.3.
 
-use crate::contract::{Monitor, VectorField};
 use crate::contract::{Batch, Parameters};
+use crate::contract::{Monitor, VectorField};
 use crate::diagram::{Kind, Mesh, Point, Solution};
 use crate::linalg::{lu, max_abs};
 use crate::problem::gauss::Scheme;
@@ -38,18 +38,31 @@ impl Monitor for Hopf {
 
 /// ω of the pair closest to the imaginary axis, if it is there.
 fn frequency(at: &Point) -> Option<f64> {
-    let closest = at.spectrum.iter().filter(|z| z.im > 0.0).min_by(|a, b| (a.re / a.im).abs().total_cmp(&(b.re / b.im).abs()))?;
+    let closest =
+        at.spectrum.iter().filter(|z| z.im > 0.0).min_by(|a, b| (a.re / a.im).abs().total_cmp(&(b.re / b.im).abs()))?;
     (closest.re.abs() < 1e-4 * closest.im).then_some(closest.im)
 }
 
 /// Direction of the cycles born at a Hopf point: the profile `[N(m+1)n]` of Re(q e^{2πit}) with max |q_i|/s_i = 1, and the
 /// period 2π/ω. `None` if the point is not a Hopf point.
-pub fn direction(field: &dyn VectorField, at: &Point, scales: &[f64], scheme: &Scheme, mesh: &Mesh) -> Option<(Vec<f64>, f64)> {
+pub fn direction(
+    field: &dyn VectorField,
+    at: &Point,
+    scales: &[f64],
+    scheme: &Scheme,
+    mesh: &Mesh,
+) -> Option<(Vec<f64>, f64)> {
     let Solution::Equilibrium(x) = &at.solution else { return None };
     let n = x.len();
     let omega = frequency(at)?;
     let (mut f, mut fx) = (vec![0.0; n], vec![0.0; n * n]);
-    field.linearise(Batch { lanes: 1, states: x, parameters: Parameters::Shared(&at.parameters) }, &[], &mut f, &mut fx, &mut []);
+    field.linearise(
+        Batch { lanes: 1, states: x, parameters: Parameters::Shared(&at.parameters) },
+        &[],
+        &mut f,
+        &mut fx,
+        &mut [],
+    );
     // (J - iω)(a + ib) = 0 as a real system, by inverse iteration.
     let size = 2 * n;
     let mut matrix = vec![0.0; size * size];
