@@ -40,7 +40,7 @@ fn scattered(from: usize, count: usize) -> Vec<f64> {
 /// States at radii around contact, so that every part of the contact law is met.
 fn states(lanes: usize) -> Vec<f64> {
     let s = scattered(1, 4 * lanes);
-    let radius = |l: usize| if l % 2 == 0 { 1.0 + 0.02 * s[l] } else { 2.0 * s[l].abs() };
+    let radius = |l: usize| if l.is_multiple_of(2) { 1.0 + 0.02 * s[l] } else { 2.0 * s[l].abs() };
     let angle = |l: usize| std::f64::consts::PI * s[lanes + l];
     let mut states = vec![0.0; 4 * lanes];
     for l in 0..lanes {

@@ -280,7 +280,7 @@ impl Graph {
             Binary::Multiply => self.product(a, b),
             Binary::Divide => self.quotient(a, b),
             Binary::Power => match self.value(b) {
-                Some(y) if y == 0.5 => self.unary(Unary::Sqrt, a),
+                Some(0.5) => self.unary(Unary::Sqrt, a),
                 Some(y) => match integer(y) {
                     Some(n) => self.integer(a, n),
                     None => self.intern(Node::Binary(op, a, b)),
