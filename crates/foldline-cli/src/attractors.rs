@@ -3,6 +3,7 @@
 use crate::arguments::Attractors as Typed;
 use crate::failure::{Failure, Outcome};
 use crate::run::processors;
+use crate::system::system;
 use foldline::attractors::Attractor;
 use foldline::diagram::Solution;
 use foldline::explore::attractors;
@@ -22,7 +23,14 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
     if let Some(found) = never_finite(&model, &parameters, &text, &typed.model.display().to_string()) {
         return Err(vec![found].into());
     }
-    let census = attractors(&model, &parameters, typed.samples as usize, typed.seed, processors(), TOLERANCE);
+    let census = attractors(
+        &system(&model, &parameters),
+        &parameters,
+        typed.samples as usize,
+        typed.seed,
+        processors(),
+        TOLERANCE,
+    );
 
     let mut out = stdout().lock();
     let names = model.states.iter().map(|s| &s.name).chain(model.outputs.iter().map(|o| &o.name));

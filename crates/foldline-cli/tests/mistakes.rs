@@ -216,7 +216,7 @@ fn files_that_are_not_there_or_not_toml() {
 #[test]
 fn models_with_mistakes_are_refused_at_the_place_in_the_model() {
     let desk = Desk::new();
-    let at = "pendulum.toml:14:";
+    let at = "pendulum.toml:13:";
     says(&desk.model("mu*x", "nu*x"), &[at, "nu", "mu"]);
     says(&desk.model("mu*x", "hypott(x, y)"), &[at, "hypott", "hypot"]);
     says(&desk.model("kappa*x^3 - y", "kappa*(x^3 - y"), &[at, "("]);
@@ -227,10 +227,10 @@ fn models_with_mistakes_are_refused_at_the_place_in_the_model() {
 fn a_model_that_is_not_a_number_at_the_start() {
     let desk = Desk::new();
     desk.write("pendulum.toml", &MODEL.replace("mu*x - kappa*x^3 - y", "log(-1 - x^2)"));
-    let pieces = ["pendulum.toml:14:12", "`y` is not finite at x = ", "mu = 0.5", "log or sqrt"];
+    let pieces = ["pendulum.toml:13:12", "`y` is not finite at x = ", "mu = 0.5", "log or sqrt"];
     says(&desk.refused(&["check", "pendulum.toml"]), &pieces);
     says(&desk.refused(&["attractors", "pendulum.toml"]), &pieces);
-    says(&desk.refused(&["run", "study.toml"]), &["study.toml:4:1", "\"rest\" cannot start", "pendulum.toml:14:12"]);
+    says(&desk.refused(&["run", "study.toml"]), &["study.toml:4:1", "\"rest\" cannot start", "pendulum.toml:13:12"]);
 }
 
 #[test]
@@ -239,7 +239,7 @@ fn a_state_at_which_the_model_is_not_a_number() {
     desk.write("pendulum.toml", &MODEL.replace("mu*x - kappa*x^3 - y", "sqrt(1 - x) - y"));
     desk.write("study.toml", &STUDY.replace("x = 0.7", "x = 1.5"));
     let message = desk.refused(&["run", "study.toml"]);
-    says(&message, &["study.toml:4:1", "\"rest\" cannot start", "x = 1.5", "pendulum.toml:14:12"]);
+    says(&message, &["study.toml:4:1", "\"rest\" cannot start", "x = 1.5", "pendulum.toml:13:12"]);
 }
 
 #[test]

@@ -13,36 +13,100 @@ pub struct Piece {
 }
 
 /// The pieces of a branch, cut exactly where a special point changes the stability. A point without a value (the period
-/// of an equilibrium, say) interrupts the curve.
-pub fn pieces(branch: &Branch, x: Quantity, y: Quantity) -> Vec<Piece> {
+/// of an equilibrium, say) interrupts the curve. Between its vertices the curve is rounded (see [`rounded`]), lengths being
+/// measured in `scale`, the sizes of the axes.
+pub fn pieces(branch: &Branch, x: Quantity, y: Quantity, scale: [f64; 2]) -> Vec<Piece> {
     let mut pieces: Vec<Piece> = Vec::new();
-    let mut last: Option<[f64; 2]> = None;
+    for curve in stretches(branch, x, y) {
+        let vertices: Vec<[f64; 2]> = curve.iter().map(|(vertex, _)| *vertex).collect();
+        for (k, between) in rounded(&vertices, scale).into_iter().enumerate() {
+            let stable = curve[k + 1].1;
+            let line = between.into_iter().chain([vertices[k + 1]]);
+            match pieces.last_mut().filter(|p| p.stable == stable && p.vertices.last() == Some(&vertices[k])) {
+                Some(piece) => piece.vertices.extend(line),
+                None => pieces.push(Piece { stable, vertices: [vertices[k]].into_iter().chain(line).collect() }),
+            }
+        }
+    }
+    pieces
+}
+
+/// A vertex, and whether the stretch that leads to it is stable.
+type Vertex = ([f64; 2], bool);
+
+/// The vertices of a branch, points and special points in their order, interrupted where a point has no value.
+fn stretches(branch: &Branch, x: Quantity, y: Quantity) -> Vec<Vec<Vertex>> {
+    let mut vertices: Vec<Option<Vertex>> = Vec::new();
     // Stability of the stretch that leads to the next vertex.
     let mut stable = true;
     let mut specials = branch.special.iter().peekable();
-    let mut connect = |last: &mut Option<[f64; 2]>, to: Option<[f64; 2]>, stable: bool| {
-        if let (Some(from), Some(to)) = (*last, to) {
-            match pieces.last_mut().filter(|p| p.stable == stable && p.vertices.last() == Some(&from)) {
-                Some(piece) => piece.vertices.push(to),
-                None => pieces.push(Piece { stable, vertices: vec![from, to] }),
-            }
-        }
-        *last = to;
-    };
     for point in &branch.points {
-        // Without a special point between them, a stretch with an unstable end is drawn unstable.
-        connect(&mut last, place(point, x, y), stable && (point.unstable == 0 || branch.special.is_empty()));
+        // Where no special point says more, a stretch with an unstable end is drawn unstable.
+        let silent = branch.special.is_empty() && point.unstable > 0;
+        vertices.push(place(point, x, y).map(|at| (at, stable && !silent)));
         stable = point.unstable == 0;
         while let Some(special) = specials.next_if(|s| s.point.position <= point.position) {
-            connect(&mut last, place(&special.point, x, y), special.unstable_before == 0);
+            vertices.push(place(&special.point, x, y).map(|at| (at, special.unstable_before == 0)));
             stable = special.unstable_after == 0;
         }
     }
     let closed = branch.ends.iter().flatten().any(|end| *end == Ending::Closed);
     if let (true, Some(first)) = (closed, branch.points.first()) {
-        connect(&mut last, place(first, x, y), stable);
+        vertices.push(place(first, x, y).map(|at| (at, stable)));
     }
-    pieces
+    vertices.split(Option::is_none).map(|stretch| stretch.iter().flatten().copied().collect()).collect()
+}
+
+/// For each pair of neighbours the vertices in between that make the polyline a smooth curve through all given vertices:
+/// cubic Hermite pieces over the chord length, with the slopes of parabolas through three vertices. A polyline that ends
+/// where it began is smooth there too.
+pub fn rounded(vertices: &[[f64; 2]], scale: [f64; 2]) -> Vec<Vec<[f64; 2]>> {
+    const SHORTEST: f64 = 0.004;
+    // The direction between two places closer than this, a pixel, may be rounding error.
+    const NEAR: f64 = 0.001;
+    let chord = |a: [f64; 2], b: [f64; 2]| ((b[0] - a[0]) / scale[0]).hypot((b[1] - a[1]) / scale[1]);
+    let chords: Vec<f64> = vertices.windows(2).map(|w| chord(w[0], w[1])).collect();
+    let count = vertices.len();
+    let closed = count > 2 && chord(vertices[0], vertices[count - 1]) < NEAR;
+    let neighbour = |k: usize, forward: bool| {
+        let steps = if closed {
+            count
+        } else if forward {
+            count - k
+        } else {
+            k + 1
+        };
+        let others = (1..steps).map(|step| vertices[if forward { k + step } else { k + count - step } % count]);
+        others.into_iter().find(|other| chord(vertices[k], *other) > NEAR)
+    };
+    let divided = |a: [f64; 2], b: [f64; 2]| [0, 1].map(|i| (b[i] - a[i]) / chord(a, b));
+    let slope = |k: usize| match (neighbour(k, false), neighbour(k, true)) {
+        (Some(before), Some(after)) => {
+            let (p, q) = (chord(before, vertices[k]), chord(vertices[k], after));
+            let (a, b) = (divided(before, vertices[k]), divided(vertices[k], after));
+            [0, 1].map(|i| (q * a[i] + p * b[i]) / (p + q))
+        }
+        (Some(before), None) => divided(before, vertices[k]),
+        (None, Some(after)) => divided(vertices[k], after),
+        (None, None) => [0.0, 0.0],
+    };
+    let slopes: Vec<[f64; 2]> = (0..count).map(slope).collect();
+    let piece = |k: usize| {
+        let h = chords[k];
+        let (a, b) = (vertices[k], vertices[k + 1]);
+        // A chord that is short on the page, or no number, stays straight.
+        let parts = if h.is_finite() { (h / SHORTEST).ceil().clamp(1.0, 24.0) as usize } else { 1 };
+        let inner = (1..parts).map(|s| {
+            let t = s as f64 / parts as f64;
+            [0, 1].map(|i| {
+                let (da, db) = (h * slopes[k][i], h * slopes[k + 1][i]);
+                let (u, t2) = (1.0 - t, t * t);
+                a[i] * (1.0 + 2.0 * t) * u * u + da * t * u * u + b[i] * t2 * (3.0 - 2.0 * t) - db * t2 * u
+            })
+        });
+        inner.collect()
+    };
+    (0..chords.len()).map(piece).collect()
 }
 
 /// The special points of a branch that can be drawn.
@@ -98,6 +162,31 @@ mod tests {
         let line = [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]];
         let parts = clipped(&line, [-1.0, 1.0, -1.0, 2.0]);
         assert_eq!(parts, vec![vec![[0.0, 0.0], [1.0, 0.0]], vec![[1.0, 1.0], [0.0, 1.0]]]);
+    }
+
+    #[test]
+    fn a_rounded_circle_is_rounder_than_its_polygon() {
+        let corners: Vec<[f64; 2]> =
+            (0..=12).map(|k| (k as f64 * std::f64::consts::TAU / 12.0).sin_cos().into()).collect();
+        let inner = rounded(&corners, [2.0, 2.0]);
+        let error = inner[1..11].iter().flatten().map(|[x, y]| (x.hypot(*y) - 1.0).abs()).fold(0.0, f64::max);
+        let error_at_the_seam = inner[0].iter().map(|[x, y]| (x.hypot(*y) - 1.0).abs()).fold(0.0, f64::max);
+        assert!(error_at_the_seam < 0.003, "{error_at_the_seam}");
+        // The polygon is off by 1 - cos(15°) = 0.034; the slopes of parabolas are accurate to the square of the chord.
+        assert!(error < 0.003, "{error}");
+    }
+
+    #[test]
+    fn a_vertex_that_is_there_twice_but_for_rounding_makes_no_kink() {
+        let at = |t: f64| [t, t * t];
+        let once: Vec<[f64; 2]> = (0..=8).map(|k| at(k as f64 / 8.0)).collect();
+        let mut twice = once.clone();
+        twice.insert(5, [once[4][0] - 1e-9, once[4][1] + 1e-9]);
+        let (a, mut b) = (rounded(&once, [1.0, 1.0]), rounded(&twice, [1.0, 1.0]));
+        b.remove(4);
+        for (p, q) in a.iter().flatten().zip(b.iter().flatten()) {
+            assert!((p[0] - q[0]).abs() < 1e-7 && (p[1] - q[1]).abs() < 1e-7, "{p:?} {q:?}");
+        }
     }
 
     #[test]

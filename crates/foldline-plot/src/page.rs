@@ -90,7 +90,7 @@ fn curves(out: &mut String, diagram: &Diagram, x: Quantity, y: Quantity, frame: 
              stroke-linejoin=\"round\"><title>{}</title>",
             escaped(&branch.name)
         );
-        for piece in pieces(branch, x, y) {
+        for piece in pieces(branch, x, y, span(frame.window)) {
             let dashes = if piece.stable { String::new() } else { format!(" stroke-dasharray=\"{DASHES}\"") };
             for part in clipped(&piece.vertices, frame.window) {
                 let _ = writeln!(out, "<path{dashes} d=\"{}\"/>", frame.path(&part));
@@ -103,6 +103,11 @@ fn curves(out: &mut String, diagram: &Diagram, x: Quantity, y: Quantity, frame: 
         }
     }
     out.push_str(&on_top);
+}
+
+/// The sizes of the axes.
+fn span([x0, x1, y0, y1]: [f64; 4]) -> [f64; 2] {
+    [x1 - x0, y1 - y0]
 }
 
 fn inside([x, y]: [f64; 2], [x0, x1, y0, y1]: [f64; 4]) -> bool {
@@ -255,7 +260,8 @@ impl Legend {
     /// What is seen in the window.
     fn of(diagram: &Diagram, x: Quantity, y: Quantity, window: [f64; 4]) -> Legend {
         let seen = |branch: &Branch| {
-            let drawn = pieces(branch, x, y).iter().any(|piece| !clipped(&piece.vertices, window).is_empty());
+            let drawn =
+                pieces(branch, x, y, span(window)).iter().any(|piece| !clipped(&piece.vertices, window).is_empty());
             drawn || marks(branch, x, y).iter().any(|(_, place)| inside(*place, window))
         };
         let visible: Vec<&Branch> = diagram.branches.iter().filter(|b| seen(b)).collect();

@@ -114,7 +114,7 @@ fn diagram() -> Diagram {
 fn the_curve_is_cut_exactly_at_the_special_points() {
     let (x, y) = (Quantity::Parameter(0), Quantity::Largest(2));
     let branch = peak("cubic S", 1.0);
-    let pieces = curve::pieces(&branch, x, y);
+    let pieces = curve::pieces(&branch, x, y, [12.0, 6.0]);
     assert_eq!(pieces.iter().map(|p| p.stable).collect::<Vec<_>>(), [true, false, true]);
     for (k, special) in branch.special.iter().enumerate() {
         let place = [x.of(&special.point).unwrap(), y.of(&special.point).unwrap()];
@@ -125,13 +125,14 @@ fn the_curve_is_cut_exactly_at_the_special_points() {
 
 #[test]
 fn a_closed_branch_is_drawn_closed() {
-    let pieces = curve::pieces(&isola("contact SL", [6.0, 4.0]), Quantity::Parameter(0), Quantity::Largest(2));
+    let pieces =
+        curve::pieces(&isola("contact SL", [6.0, 4.0]), Quantity::Parameter(0), Quantity::Largest(2), [12.0, 6.0]);
     assert_eq!(pieces[0].vertices.first(), pieces.last().unwrap().vertices.last());
 }
 
 #[test]
 fn equilibria_have_no_place_on_an_axis_of_periods() {
-    assert!(curve::pieces(&peak("cubic S", 1.0), Quantity::Parameter(0), Quantity::Period).is_empty());
+    assert!(curve::pieces(&peak("cubic S", 1.0), Quantity::Parameter(0), Quantity::Period, [12.0, 6.0]).is_empty());
 }
 
 #[test]

@@ -9,7 +9,7 @@ use foldline::model::Model;
 use std::ops::Range;
 use toml::de::DeTable;
 
-const KEYS: [&str; 8] = ["name", "description", "from", "free", "range", "until", "switch", "max-points"];
+pub(super) const KEYS: [&str; 8] = ["name", "description", "from", "free", "range", "until", "switch", "max-points"];
 const MAX_POINTS: usize = 5000;
 const SWITCHABLE: [Kind; 3] = [Kind::PeriodDoubling, Kind::BranchPoint, Kind::Hopf];
 

@@ -191,3 +191,26 @@ fn simplified(path: &Path) -> PathBuf {
     }
     parts.iter().collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_published_schema_has_the_keys_that_are_read() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/schema/study.schema.json");
+        let schema: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
+        let keys = |place: &str| {
+            let properties = schema.pointer(place).and_then(|p| p.as_object()).unwrap();
+            properties.keys().cloned().collect::<Vec<String>>()
+        };
+        let sorted = |known: &[&str]| {
+            let mut known: Vec<String> = known.iter().map(|key| key.to_string()).collect();
+            known.sort();
+            known
+        };
+        assert_eq!(keys("/properties"), sorted(&ROOT_KEYS));
+        assert_eq!(keys("/$defs/seed/properties"), sorted(&seeds::KEYS));
+        assert_eq!(keys("/$defs/branch/properties"), sorted(&branches::KEYS));
+    }
+}

@@ -8,7 +8,7 @@ use foldline::model::Model;
 use std::ops::Range;
 use toml::de::DeTable;
 
-const KEYS: [&str; 7] = ["name", "description", "attractor", "state", "parameters", "samples", "random"];
+pub(super) const KEYS: [&str; 7] = ["name", "description", "attractor", "state", "parameters", "samples", "random"];
 const SAMPLES: usize = 128;
 const RANDOM: u64 = 1;
 

@@ -1,7 +1,8 @@
 //! From samples to attractors.
 
+use super::candidate::Context;
 use super::orbit::Orbit;
-use super::watch::{Context, Watch};
+use super::watch::Watch;
 use super::{Attractor, Census, Polish, Sampling, spectral_ratio};
 use crate::contract::VectorField;
 use crate::diagram::{Point, Solution};
@@ -10,7 +11,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Trajectories that are integrated together and share what they find. Fixed, so that the result does not depend on the
 /// number of threads.
-const BLOCK: usize = 32;
+const BLOCK: usize = 128;
 /// Steps after which a trajectory counts as unsettled: some thousand periods.
 const STEP_LIMIT: usize = 60_000;
 
@@ -132,9 +133,8 @@ fn watch_block(context: &Context, starts: &[f64]) -> (Vec<Orbit>, Vec<Fate>) {
     let n = context.field.dim();
     let mut known = Vec::new();
     let mut watches = vec![Watch::new(n); starts.len().checked_div(n).unwrap_or(0)];
-    let ensemble =
-        Ensemble::new(context.field, context.parameters, context.tolerance(), starts, [0.0, f64::INFINITY])
-            .with_step_limit(STEP_LIMIT);
+    let ensemble = Ensemble::new(context.field, context.parameters, context.tolerance(), starts, [0.0, f64::INFINITY])
+        .with_step_limit(STEP_LIMIT);
     let arrivals = ensemble.run(&mut |step| watches[step.trajectory()].observe(step, &mut known, context));
     let fates = arrivals.iter().zip(&watches).map(|(arrival, watch)| match (watch.settled, arrival.outcome) {
         (Some(index), _) => Fate::Settled(index),

@@ -7,8 +7,8 @@
 //! 1. draw `samples` states, stratified in every component and the same for the same seed (`sampling`);
 //! 2. integrate them in blocks of fixed size, each trajectory with a step of its own (`crate::simulation`);
 //! 3. watch the extent of each trajectory: where it shrinks, an equilibrium is tried (`watch`);
-//! 4. watch its returns to a section: where they contract regularly, their limit is predicted and a cycle tried (`returns`);
-//! 5. `polish` turns a candidate into a solution with its stability; only stable ones are kept (`watch`);
+//! 4. watch its returns to a section: where they contract regularly, their limit is predicted and a cycle tried (`returns`, `candidate`);
+//! 5. `polish` turns a candidate into a solution with its stability; only stable ones are kept (`candidate`);
 //! 6. a trajectory has settled when its distance to a solution found so far falls steadily, or when the predicted limit of
 //!    its returns lies on that solution (`orbit`, `watch`);
 //! 7. the same solution found in several blocks is one attractor, named by its spectral ratio (`census`, `spectrum`).
@@ -16,6 +16,7 @@
 //! **Fails when** an attractor is neither an equilibrium nor a cycle (its trajectories count as unsettled), or attracts so
 //! slowly that the returns do not contract measurably within the limit on the number of steps.
 
+mod candidate;
 mod census;
 mod orbit;
 mod returns;

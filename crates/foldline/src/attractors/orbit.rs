@@ -33,8 +33,7 @@ impl Orbit {
                 let states = cycle.uniform(SAMPLES);
                 let scale = scales.iter().enumerate().map(|(i, scale)| {
                     let component = states.iter().skip(i).step_by(scales.len());
-                    let [low, high] =
-                        component.fold([f64::MAX, f64::MIN], |[low, high], x| [x.min(low), x.max(high)]);
+                    let [low, high] = component.fold([f64::MAX, f64::MIN], |[low, high], x| [x.min(low), x.max(high)]);
                     (0.5 * (high - low)).max(FLOOR * scale)
                 });
                 let scale = scale.collect();
@@ -51,9 +50,8 @@ impl Orbit {
         if count < 2 {
             return self.between(x, 0, 0, 0.0);
         }
-        let square = |k: usize| -> f64 {
-            (0..n).map(|i| ((x[i] - self.states[k * n + i]) / self.scale[i]).powi(2)).sum()
-        };
+        let square =
+            |k: usize| -> f64 { (0..n).map(|i| ((x[i] - self.states[k * n + i]) / self.scale[i]).powi(2)).sum() };
         let nearest = |candidates: &mut dyn Iterator<Item = usize>| {
             candidates.map(|k| (k, square(k))).min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(k, _)| k)
         };

@@ -13,10 +13,10 @@
 //!
 //! **Source.** sidi2017, §1 (reduced rank extrapolation).
 //!
-//! **Fails when** the map is far from linear over the returns used. In few dimensions (1) has no remainder that would show it:
-//! a prediction is a guess, to be checked by following it for a period.
+//! **Fails when** the map is far from linear over the returns used. In few dimensions (1) has no remainder that would show it;
+//! the limit predicted one return earlier does, and following the prediction for a period.
 
-use crate::linalg::lu;
+use crate::linalg::{lu, max_abs};
 use crate::simulation::Step;
 
 /// Largest number of crossings per period that is looked for.
@@ -24,9 +24,13 @@ pub(super) const MOST_CROSSINGS: usize = 16;
 /// Largest m of (1).
 const MOST_TERMS: usize = 8;
 /// Returns that are kept.
-const KEPT: usize = MOST_CROSSINGS * 6;
+const KEPT: usize = MOST_CROSSINGS * 6 + 1;
 /// Largest last difference, relative to the extent, from which a limit is predicted.
 const NEAR: f64 = 0.5;
+/// Largest difference between the limits predicted from successive returns, relative to the last difference of returns.
+const STEADY: f64 = 0.3;
+/// Largest distance of a predicted limit from the last return, relative to the extent.
+const REACH: f64 = 0.5;
 
 /// A plane, and where and when a trajectory came through it.
 #[derive(Clone, Debug, Default)]
@@ -50,6 +54,10 @@ pub(super) struct Prediction {
     pub(super) state: Vec<f64>,
     /// Time between the last returns that were compared.
     pub(super) period: f64,
+    /// The last difference, relative to the extent.
+    pub(super) size: f64,
+    /// How much the prediction changed with the last return, relative to the extent.
+    pub(super) doubt: f64,
 }
 
 impl Returns {
@@ -71,9 +79,15 @@ impl Returns {
         self.total
     }
 
-    /// The last return `[n]`.
-    pub(super) fn last(&self) -> Option<&[f64]> {
-        self.states.rchunks_exact(self.anchor.len().max(1)).next()
+    /// The last return: when, and where `[n]`.
+    pub(super) fn last(&self) -> Option<(f64, &[f64])> {
+        Some((*self.times.last()?, self.states.rchunks_exact(self.anchor.len().max(1)).next()?))
+    }
+
+    /// The same plane without returns, for a trajectory that starts on it.
+    pub(super) fn again_from(&self, start: &[f64]) -> Returns {
+        let (anchor, normal) = (start.to_vec(), self.normal.clone());
+        Returns { anchor, normal, ..Returns::default() }
     }
 
     /// Records a crossing in the direction of the normal within the step; says whether there was one.
@@ -110,38 +124,47 @@ impl Returns {
         true
     }
 
-    /// The limit of every q-th return, 1 ≤ q ≤ [`MOST_CROSSINGS`], if there are enough of them and they are close together.
-    pub(super) fn predict(&self, q: usize, extent: &[f64]) -> Option<Prediction> {
+    /// The limit of every q-th return, 1 ≤ q ≤ [`MOST_CROSSINGS`], if the last of them are close together and the limit was the
+    /// same one return earlier.
+    fn predict(&self, q: usize, extent: &[f64]) -> Option<Prediction> {
         let n = self.anchor.len();
-        let available = self.times.len().checked_sub(1)? / q;
-        let terms = MOST_TERMS.min(n.saturating_sub(1)).min(available.checked_sub(1)?);
-        let wanted = MOST_TERMS.min(n.saturating_sub(1)).min(KEPT / q - 2);
-        if terms < wanted {
+        let newest = self.times.len().checked_sub(1)?;
+        let terms = MOST_TERMS.min(n.saturating_sub(1)).min(KEPT / q - 3);
+        // m + 1 differences, of one return more for the comparison.
+        if newest < (terms + 2) * q {
             return None;
         }
-        let newest = self.times.len() - 1;
         // y(0) is the newest return.
         let y = |back: usize| &self.states[(newest - back * q) * n..][..n];
-        let difference = |back: usize| -> Vec<f64> {
-            (0..n).map(|i| (y(back)[i] - y(back + 1)[i]) / extent[i]).collect()
-        };
-        let u: Vec<Vec<f64>> = (0..=terms).map(difference).collect();
-        let size = crate::linalg::max_abs(&u[0]);
-        if !(size <= NEAR) {
+        let scaled = |a: &[f64], b: &[f64]| -> Vec<f64> { (0..n).map(|i| (a[i] - b[i]) / extent[i]).collect() };
+        let u: Vec<Vec<f64>> = (0..terms + 2).map(|back| scaled(y(back), y(back + 1))).collect();
+        let size = max_abs(&u[0]);
+        if size.is_nan() || size > NEAR {
             return None;
         }
         let period = self.times[newest] - self.times[newest - q];
         // Differences that small are dominated by the error of the integration.
         if size < 1e-6 {
-            return Some(Prediction { state: y(0).to_vec(), period });
+            return Some(Prediction { state: y(0).to_vec(), period, size, doubt: size });
         }
-        let gamma = weights(&u)?;
-        let remainder = (0..n).fold(0.0, |m: f64, i| {
-            m.max(gamma.iter().zip(&u).map(|(g, u)| g * u[i]).sum::<f64>().abs())
-        });
-        let state: Vec<f64> = (0..n).map(|i| gamma.iter().enumerate().map(|(j, g)| g * y(j)[i]).sum()).collect();
-        let jump = (0..n).fold(0.0, |m: f64, i| m.max((state[i] - y(0)[i]).abs() / extent[i]));
-        (remainder <= 0.2 * size && jump <= 0.5).then_some(Prediction { state, period })
+        let limit = |from: usize| -> Option<Vec<f64>> {
+            let gamma = weights(&u[from..=from + terms])?;
+            Some((0..n).map(|i| gamma.iter().enumerate().map(|(j, g)| g * y(from + j)[i]).sum()).collect())
+        };
+        let (state, earlier) = (limit(0)?, limit(1)?);
+        let doubt = max_abs(&scaled(&state, &earlier));
+        let near = max_abs(&scaled(&state, y(0))) <= REACH;
+        (near && doubt <= STEADY * size).then_some(Prediction { state, period, size, doubt })
+    }
+
+    /// The `count` predictions that deserve to be tried: those that changed least, the fewest crossings per period first.
+    pub(super) fn predictions(&self, count: usize, extent: &[f64]) -> Vec<Prediction> {
+        let mut found: Vec<Prediction> = (1..=MOST_CROSSINGS).filter_map(|q| self.predict(q, extent)).collect();
+        let least = found.iter().fold(f64::INFINITY, |m, p| m.min(p.doubt));
+        // A cycle seen over several turns is predicted as well as over one.
+        found.retain(|p| p.doubt <= 3.0 * least + 1e-4);
+        found.truncate(count);
+        found
     }
 }
 
@@ -162,4 +185,48 @@ fn weights(u: &[Vec<f64>]) -> Option<Vec<f64>> {
     lu::solve(&gram, m, &pivots, &mut c, 1);
     let sum: f64 = c.iter().sum();
     (sum.is_finite() && sum != 0.0).then(|| c.iter().map(|c| c / sum).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Returns of a map with multipliers 0.9 e^{±i φ} and 0.5 to the fixed point (0.1, 0.2, 0.3, 0.4), which lies in the plane.
+    fn returns(count: usize, angle: f64) -> Returns {
+        let mut returns = Returns::across(vec![0.1, 0.2, 0.3, 0.4], &[0.0, 0.0, 0.0, 1.0], &[1.0; 4]);
+        for k in 0..count {
+            let (decay, phase) = (0.01 * 0.9f64.powi(k as i32), angle * k as f64);
+            let (a, b, c) = (decay * phase.cos(), decay * phase.sin(), 0.02 * 0.5f64.powi(k as i32));
+            returns.states.extend([0.1 + a + c, 0.2 + b, 0.3 - c + b, 0.4]);
+            returns.times.push(2.0 * k as f64);
+            returns.total += 1;
+        }
+        returns
+    }
+
+    #[test]
+    fn the_limit_of_a_linear_map_is_predicted_from_its_first_iterates() {
+        let predictions = returns(6, 0.7).predictions(3, &[1.0; 4]);
+        assert_eq!(predictions.len(), 1);
+        let error =
+            predictions[0].state.iter().zip([0.1, 0.2, 0.3, 0.4]).fold(0.0, |m: f64, (a, b)| m.max((a - b).abs()));
+        // The returns are still 1e-2 away; the regularisation of the normal equations costs the last digits.
+        assert!(error < 1e-6, "{error}");
+        assert_eq!(predictions[0].period, 2.0);
+    }
+
+    #[test]
+    fn fewer_crossings_per_period_come_first_although_more_return_closer() {
+        // After 9 turns of 0.7 rad the trajectory is back after almost one revolution, closer than after one turn.
+        let predictions = returns(60, 0.7).predictions(3, &[1.0; 4]);
+        assert!(predictions.len() > 1 && predictions[0].period == 2.0);
+    }
+
+    #[test]
+    fn nothing_is_predicted_from_too_few_returns_or_from_scattered_ones() {
+        assert!(returns(5, 0.7).predictions(3, &[1.0; 4]).is_empty());
+        let mut scattered = returns(30, 0.7);
+        scattered.states.iter_mut().enumerate().for_each(|(k, x)| *x += ((k * k) as f64 * 0.7).sin());
+        assert!(scattered.predictions(3, &[1.0; 4]).is_empty());
+    }
 }

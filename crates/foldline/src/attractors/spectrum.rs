@@ -45,7 +45,8 @@ pub fn spectral_ratio(cycle: &Cycle, whirl: [usize; 2]) -> Option<(u32, u32)> {
     let mut lines: Vec<usize> = (1..power.len()).collect();
     lines.sort_by(|&a, &b| power[b].total_cmp(&power[a]));
     let (&first, &second) = (lines.first()?, lines.get(1)?);
-    if !(power[second] > FAINT * FAINT * power[first]) {
+    // An empty spectrum has no lines at all.
+    if spectrum.is_empty() || power[second] <= FAINT * FAINT * power[first] {
         return None;
     }
     let divisor = greatest_common_divisor(first, second);

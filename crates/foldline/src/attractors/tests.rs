@@ -4,53 +4,190 @@ use super::*;
 use crate::contract::{Batch, Parameters, VectorField, Verdict};
 use crate::diagram::{Cost, Cycle, Solution, Trust};
 use crate::problem::gauss::Scheme;
-use crate::simulation::{Integrator, Tolerance};
+use crate::simulation::{Ensemble, Integrator, Tolerance};
 use num_complex::Complex64;
 
 mod fields;
 mod shooting;
 
-use fields::{Field, ROTOR, VAN_DER_POL};
+use fields::{BISTABLE, CENTRE, ESCAPING, Field, ROTOR, VAN_DER_POL};
 
-/// Reference constants and initial box of the overhung rotor; κ = 0 is cubic, 1 contact.
+fn sampling(ranges: &[[f64; 2]], samples: usize, jobs: usize) -> Sampling {
+    let scales = vec![1.0; ranges.len()];
+    Sampling { ranges: ranges.to_vec(), scales, whirl: None, samples, seed: 2, jobs, tolerance: 1e-6 }
+}
+
+/// A box that holds every attractor of the overhung rotor at Ω = 5 (akay, reference constants).
 fn rotor_sampling(samples: usize, jobs: usize) -> Sampling {
-    Sampling {
-        ranges: vec![[-6.0, 6.0], [-6.0, 6.0], [-15.0, 15.0], [-15.0, 15.0]],
-        scales: vec![1.0; 4],
-        whirl: Some([0, 1]),
-        samples,
-        seed: 1,
-        jobs,
-        tolerance: 1e-6,
-    }
+    let ranges = [[-6.0, 6.0], [-6.0, 6.0], [-15.0, 15.0], [-15.0, 15.0]];
+    Sampling { whirl: Some([0, 1]), ..sampling(&ranges, samples, jobs) }
 }
 
 fn survey_of(field: &Field, parameters: &[f64], sampling: &Sampling) -> Census {
-    let t=std::time::Instant::now();
-    let polishing = std::sync::Mutex::new((0,0,0.0));
-    let r=survey(field, parameters, sampling, &|candidate| {
-    let t=std::time::Instant::now();
-    let r=shooting::polish(field, parameters, candidate);
-    let mut c=polishing.lock().unwrap();
-    c.0+=1;
-    c.1+=r.is_some() as usize;
-    c.2+=t.elapsed().as_secs_f64();
-    r});
-    println!("{:?} of {}",polishing.lock().unwrap(), t.elapsed().as_secs_f64());
-    for a in &r.attractors {
-        println!("{:?} {:?} {:?} {} {:?}", a.point.solution.period(), a.ratio, a.point.ranges, a.hits, a.example);
-    }
-    println!("unsettled {} escaped {}", r.unsettled, r.escaped);
-    r
+    survey(field, parameters, sampling, &|candidate| shooting::polish(field, parameters, candidate))
+}
+
+/// Smallest and largest √(u² + v²).
+fn radii(solution: &Solution) -> [f64; 2] {
+    let states = match solution {
+        Solution::Equilibrium(x) => x.clone(),
+        Solution::Cycle(cycle) => cycle.uniform(4000),
+    };
+    let radius = states.chunks_exact(4).map(|x| x[0].hypot(x[1]));
+    radius.fold([f64::MAX, f64::MIN], |[low, high], r| [r.min(low), r.max(high)])
 }
 
 #[test]
-fn the_cubic_rotor_has_one_equilibrium_a_single_and_a_double_loop_in_reach() {
-    let census = survey_of(&ROTOR, &[5.0, 0.0], &rotor_sampling(128, 1));
-    panic!();
+fn the_cubic_rotor_goes_to_two_equilibria_a_single_or_a_double_loop() {
+    let census = survey_of(&ROTOR, &[5.0, 0.0], &rotor_sampling(128, 2));
+    assert_eq!((census.unsettled, census.escaped), (0, 0));
+    assert_eq!(census.attractors.iter().map(|a| a.hits).sum::<usize>(), 128);
+    let of_ratio = |ratio| census.attractors.iter().find(|a| a.ratio == Some(ratio)).unwrap();
+    // Closed form of the synchronous response: r² ((a + γ r²)² + (2ζΩ)²) = (m ε Ω²)², the middle root being a saddle.
+    let mut rest: Vec<f64> =
+        census.attractors.iter().filter(|a| a.ratio.is_none()).map(|a| radii(&a.point.solution)[0]).collect();
+    rest.sort_by(f64::total_cmp);
+    assert_eq!(rest.len(), 2);
+    assert!((rest[0] - 0.38958073).abs() < 1e-8 && (rest[1] - 9.22606067).abs() < 1e-8, "{rest:?}");
+    // Single and double loop: period and radii of an independent continuation code, to the digits given there; radii are
+    // read off 4000 samples, which miss an extremum by 1e-6 of it.
+    let loops = [((2, 1), 2.0147198658, [0.587895, 2.48233521]), ((3, 1), 2.6261014808, [0.904902, 5.121533])];
+    for (ratio, period, expected) in loops {
+        let found = &of_ratio(ratio).point.solution;
+        assert!((found.period().unwrap() - period).abs() < 1e-9, "{ratio:?}: {:?}", found.period());
+        let radii = radii(found);
+        assert!((radii[0] - expected[0]).abs() < 1e-5 && (radii[1] - expected[1]).abs() < 1e-5, "{ratio:?}: {radii:?}");
+    }
+    assert_eq!(census.attractors.len(), 4);
 }
+
 #[test]
-fn contact() {
-    let census = survey_of(&ROTOR, &[5.0, 1.0], &rotor_sampling(128, 1));
-    panic!();
+fn every_sample_of_the_contact_rotor_is_counted_where_a_long_integration_ends() {
+    let sampling = rotor_sampling(32, 2);
+    let census = survey_of(&ROTOR, &[5.0, 1.0], &sampling);
+    let single = census.attractors.iter().find(|a| a.ratio == Some((2, 1))).unwrap();
+    // Period and radii of an independent continuation code.
+    assert!((single.point.solution.period().unwrap() - 1.9910645451).abs() < 1e-9);
+    let [low, high] = radii(&single.point.solution);
+    assert!((low - 0.530563).abs() < 1e-5 && (high - 1.341756).abs() < 1e-5, "{low} {high}");
+    // e^(-ζ 1000) = 5e-5 of a small difference to the attractor is left. The same accuracy gives the same trajectories, which
+    // matters for those that start near a basin boundary.
+    let tolerance = Tolerance::uniform(1e-6, 4);
+    let starts = sampling.starts();
+    let mut largest = vec![0.0; 32];
+    Ensemble::new(&ROTOR, &[5.0, 1.0], tolerance, &starts, [0.0, 1000.0]).run(&mut |step| {
+        if step.end_time() > 990.0 {
+            let r: &mut f64 = &mut largest[step.trajectory()];
+            *r = r.max(step.end(0).hypot(step.end(1)));
+        }
+        Verdict::Continue
+    });
+    for attractor in &census.attractors {
+        let r = radii(&attractor.point.solution)[1];
+        // The radii 0.39, 1.34 and 2.45 lie far enough apart for a wide net; the last to arrive are still 0.1 away.
+        let there = largest.iter().filter(|l| (*l - r).abs() < 0.2).count();
+        assert_eq!(there, attractor.hits, "{:?} of largest radius {r}, {largest:?}", attractor.ratio);
+    }
+    assert_eq!((census.unsettled, census.escaped), (0, 0));
+}
+
+#[test]
+fn the_census_does_not_depend_on_the_number_of_threads() {
+    let run = |jobs| {
+        let census = survey_of(&ROTOR, &[5.0, 0.0], &rotor_sampling(72, jobs));
+        let attractors = census.attractors.into_iter();
+        (attractors.map(|a| (a.point.solution, a.ratio, a.hits, a.example)).collect::<Vec<_>>(), census.unsettled)
+    };
+    let one = run(1);
+    assert!(one.0.len() >= 3);
+    assert_eq!(one, run(2));
+    assert_eq!(one, run(5));
+}
+
+#[test]
+fn every_start_but_the_origin_leads_to_the_van_der_pol_cycle() {
+    // μ = 1: period 6.66328686 and amplitude 2.00861986 (published to these digits).
+    let sampling = sampling(&[[-4.0, 4.0], [-4.0, 4.0]], 40, 1);
+    let census = survey_of(&VAN_DER_POL, &[1.0], &sampling);
+    assert_eq!(census.attractors.len(), 1);
+    let found = &census.attractors[0];
+    assert_eq!(found.hits, 40);
+    assert!((found.point.solution.period().unwrap() - 6.66328686).abs() < 1e-8);
+    // 400 samples miss the maximum by (2π/400)² / 8 of it.
+    assert!((found.point.ranges[0][1] - 2.00861986).abs() < 1e-4);
+    let polish = |candidate: &Candidate| shooting::polish(&VAN_DER_POL, &[1.0], candidate);
+    let settled = settle(&VAN_DER_POL, &[1.0], &sampling, &[0.01, 0.0], &polish).unwrap();
+    assert!((settled.solution.period().unwrap() - 6.66328686).abs() < 1e-8);
+    assert!(settle(&VAN_DER_POL, &[1.0], &sampling, &[0.0, 0.0], &polish).is_none(), "the origin is not stable");
+}
+
+#[test]
+fn nodes_share_the_line_between_them() {
+    // x' = x - x³: every positive start goes to 1, every negative one to -1.
+    let sampling = sampling(&[[-2.0, 3.0]], 60, 2);
+    let census = survey_of(&BISTABLE, &[], &sampling);
+    let positive = sampling.starts().iter().filter(|x| **x > 0.0).count();
+    assert_eq!((census.attractors.len(), census.unsettled, census.escaped), (2, 0, 0));
+    for attractor in census.attractors {
+        let Solution::Equilibrium(x) = attractor.point.solution else { panic!("a cycle on a line") };
+        assert!((x[0].abs() - 1.0).abs() < 1e-9);
+        assert_eq!(attractor.hits, if x[0] > 0.0 { positive } else { 60 - positive });
+        assert_eq!(attractor.example[0] > 0.0, x[0] > 0.0);
+    }
+    let polish = |candidate: &Candidate| shooting::polish(&BISTABLE, &[], candidate);
+    let at_rest = settle(&BISTABLE, &[], &sampling, &[1.0], &polish);
+    assert!(at_rest.is_some(), "a start at rest has settled");
+}
+
+#[test]
+fn trajectories_that_run_away_are_counted() {
+    // x'' + x'/5 + x - x³ = 0: starts outside of the saddles' basin boundary run to infinity in finite time.
+    let census = survey_of(&ESCAPING, &[], &sampling(&[[-2.0, 2.0], [-2.0, 2.0]], 60, 1));
+    assert_eq!(census.attractors.len(), 1);
+    assert_eq!(census.unsettled, 0);
+    assert_eq!(census.attractors[0].hits + census.escaped, 60);
+    assert!(census.escaped > 10 && census.attractors[0].hits > 10);
+    assert!(census.attractors[0].example.iter().all(|x| x.abs() < 2.0));
+}
+
+#[test]
+fn where_nothing_attracts_nothing_settles() {
+    // A centre: every orbit is closed, none is isolated.
+    let census = survey_of(&CENTRE, &[], &sampling(&[[0.5, 2.0], [0.5, 2.0]], 2, 1));
+    assert_eq!((census.attractors.len(), census.unsettled, census.escaped), (0, 2, 0));
+}
+
+/// The cycle with z = Σ c_k e^{j k 2π t/T}, T = 3, on a mesh fine enough that interpolation errors are below 1e-9.
+fn whirling(lines: &[(i32, f64)]) -> Cycle {
+    let scheme = Scheme::new(6);
+    let mesh: Vec<f64> = (0..=80).map(|j| (j as f64 / 80.0).powf(1.2)).collect();
+    let mut profile = Vec::new();
+    for interval in mesh.windows(2) {
+        for c in &scheme.nodes {
+            let t = interval[0] + c * (interval[1] - interval[0]);
+            let z: Complex64 =
+                lines.iter().map(|&(k, c)| c * Complex64::from_polar(1.0, std::f64::consts::TAU * k as f64 * t)).sum();
+            profile.extend([0.0, z.re, z.im]);
+        }
+    }
+    Cycle { period: 3.0, mesh: mesh.into(), degree: 6, profile }
+}
+
+#[test]
+fn the_spectrum_is_signed_and_names_the_resonance() {
+    let single = whirling(&[(0, 0.3), (-1, 1.1), (-2, -0.8), (1, 0.05), (-3, 0.1)]);
+    let spectrum = signed_spectrum(&single, [1, 2], 31);
+    assert_eq!(spectrum.len(), 32);
+    assert!((spectrum[0].0 + 16.0 / 3.0).abs() < 1e-15);
+    for (k, expected) in [(0, 0.3), (-1, 1.1), (-2, -0.8), (1, 0.05), (2, 0.0)] {
+        let (frequency, amplitude) = spectrum[(k + 16) as usize];
+        assert!((frequency - k as f64 / 3.0).abs() < 1e-15);
+        assert!((amplitude - expected).norm() < 1e-8, "line {k}: {amplitude}");
+    }
+    assert_eq!(spectral_ratio(&single, [1, 2]), Some((2, 1)));
+    assert_eq!(spectral_ratio(&whirling(&[(-1, 0.7), (-3, 1.0), (0, 5.0)]), [1, 2]), Some((3, 1)));
+    // After a period doubling the same lines are multiples of half the frequency.
+    assert_eq!(spectral_ratio(&whirling(&[(-2, 1.0), (-4, 0.8), (-1, 0.1), (-3, 0.2)]), [1, 2]), Some((2, 1)));
+    assert_eq!(spectral_ratio(&whirling(&[(-1, 1.0), (1, 0.4)]), [1, 2]), None);
+    assert_eq!(spectral_ratio(&single, [1, 7]), None);
 }

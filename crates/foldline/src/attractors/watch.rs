@@ -4,12 +4,13 @@
 //! near. The returns to a section: their predicted limit may lie on a cycle. The distance to every solution found so far: where
 //! its largest value per window falls steadily, the trajectory has settled there.
 
+use super::Candidate;
+use super::candidate::Context;
 use super::orbit::Orbit;
-use super::returns::{MOST_CROSSINGS, Prediction, Returns};
-use super::{Candidate, Polish, Sampling};
-use crate::contract::{VectorField, Verdict};
-use crate::diagram::{Cycle, Solution};
-use crate::simulation::{Direction, Integrator, Passage, Section, Step, Tolerance};
+use super::returns::Returns;
+use crate::contract::{Batch, Parameters, Verdict};
+use crate::diagram::Solution;
+use crate::simulation::Step;
 
 /// Steps per window: a few periods of a cycle, some time constants of an equilibrium.
 const WINDOW: usize = 128;
@@ -17,8 +18,6 @@ const WINDOW: usize = 128;
 const PULSE: usize = 16;
 /// Steps after which a first section that saw no cycle is replaced; each later one lives twice as long.
 const FIRST_SECTION: usize = 1024;
-/// Accuracy of the integration, relative. It only decides where a trajectory goes; solutions are polished.
-const INTEGRATION: f64 = 1e-6;
 
 /// Shrinking of the extent after which an equilibrium is tried again.
 const SHRUNK: f64 = 0.7;
@@ -29,66 +28,11 @@ const APPROACHED: f64 = 0.5;
 /// Distance at which a trajectory that stays that close is on the solution: the sag of the polygon that stands for it.
 const ARRIVED: f64 = 3e-3;
 /// A predicted limit settles a trajectory no farther away than this …
-const NEIGHBOURHOOD: f64 = 0.3;
+const NEIGHBOURHOOD: f64 = 0.1;
 /// … if it is this much closer to the solution than the trajectory is.
 const HIT: f64 = 0.1;
 /// How far from the candidate a polished solution may lie.
 const FAITHFUL: f64 = 0.1;
-/// How well a predicted limit must return to itself to be tried.
-const RECURRENT: f64 = 0.03;
-
-/// What all trajectories of a survey share.
-#[derive(Clone, Copy)]
-pub(super) struct Context<'a> {
-    pub(super) field: &'a dyn VectorField,
-    pub(super) parameters: &'a [f64],
-    pub(super) sampling: &'a Sampling,
-    pub(super) polish: Polish<'a>,
-}
-
-impl Context<'_> {
-    pub(super) fn tolerance(&self) -> Tolerance {
-        let absolute = self.sampling.scales.iter().map(|s| INTEGRATION * s).collect();
-        Tolerance { relative: INTEGRATION, absolute }
-    }
-
-    /// A stable solution near the candidate, as an orbit.
-    fn polished(&self, candidate: &Candidate) -> Option<Orbit> {
-        let polished = |candidate: &Candidate| (self.polish)(candidate).filter(|point| point.unstable == 0);
-        let point = polished(candidate)?;
-        let once = match &point.solution {
-            Solution::Cycle(cycle) => primitive(cycle).and_then(|candidate| polished(&candidate)),
-            Solution::Equilibrium(_) => None,
-        };
-        Some(Orbit::new(once.unwrap_or(point), &self.sampling.scales))
-    }
-}
-
-/// One turn of a cycle that runs several times around nearly the same loop, as a candidate: the cycle may be another one
-/// several times over, or have just doubled its period.
-fn primitive(cycle: &Cycle) -> Option<Candidate> {
-    const COUNT: usize = 240;
-    const PROBES: usize = 24;
-    let n = cycle.dim();
-    let states = cycle.uniform(COUNT);
-    let extent = |i: usize| {
-        let component = states.iter().skip(i).step_by(n);
-        let [low, high] = component.fold([f64::MAX, f64::MIN], |[low, high], x| [x.min(low), x.max(high)]);
-        high - low
-    };
-    let extent: Vec<f64> = (0..n).map(extent).collect();
-    let repeats = |turns: usize| {
-        (0..PROBES).map(|k| k as f64 / PROBES as f64).all(|t| {
-            let (here, there) = (cycle.state(t), cycle.state(t + 1.0 / turns as f64));
-            (0..n).all(|i| (here[i] - there[i]).abs() <= 0.01 * extent[i])
-        })
-    };
-    let turns = (2..=MOST_CROSSINGS).rev().find(|&turns| repeats(turns))?;
-    let period = cycle.period / turns as f64;
-    let times = (0..=COUNT).map(|k| period * k as f64 / COUNT as f64).collect();
-    let states = (0..=COUNT).flat_map(|k| cycle.state(k as f64 / (COUNT * turns) as f64)).collect();
-    Some(Candidate::Cycle { period, times, states })
-}
 
 /// The watch over one trajectory.
 #[derive(Clone, Debug)]
@@ -176,8 +120,8 @@ impl Watch {
     /// The mean of a window or its last state, whichever has the smaller f: a mean suits a spiral, the last state a node.
     fn closer_to_rest(&self, mean: Vec<f64>, step: &Step, x: &[f64], context: &Context) -> Vec<f64> {
         let mut f = vec![0.0; x.len()];
-        let parameters = crate::contract::Parameters::Shared(context.parameters);
-        context.field.evaluate(crate::contract::Batch { lanes: 1, states: &mean, parameters }, &mut f);
+        let parameters = Parameters::Shared(context.parameters);
+        context.field.evaluate(Batch { lanes: 1, states: &mean, parameters }, &mut f);
         let speed = |component: &dyn Fn(usize) -> f64| {
             (0..x.len()).map(|i| (component(i) / context.sampling.scales[i]).abs()).fold(0.0, f64::max)
         };
@@ -186,12 +130,14 @@ impl Watch {
     }
 
     fn try_equilibrium(&mut self, x: Vec<f64>, extent: &[f64], known: &mut Vec<Orbit>, context: &Context) {
+        let scales = &context.sampling.scales;
+        let near = |rest: &[f64]| (0..x.len()).all(|i| (rest[i] - x[i]).abs() <= 2.0 * extent[i] + 1e-6 * scales[i]);
+        if known.iter().any(|k| matches!(&k.point.solution, Solution::Equilibrium(rest) if near(rest))) {
+            return;
+        }
         let candidate = Candidate::Equilibrium(x.clone());
         let Some(orbit) = context.polished(&candidate) else { return };
-        let Solution::Equilibrium(rest) = &orbit.point.solution else { return };
-        let scales = &context.sampling.scales;
-        let near = (0..x.len()).all(|i| (rest[i] - x[i]).abs() <= 2.0 * extent[i] + 1e-6 * scales[i]);
-        if near && !known.iter().any(|k| k.same(&orbit, context.sampling.tolerance)) {
+        if matches!(&orbit.point.solution, Solution::Equilibrium(rest) if near(rest)) {
             known.push(orbit);
         }
     }
@@ -202,21 +148,18 @@ impl Watch {
             return;
         }
         let Some(extent) = self.extent.clone() else { return };
-        let mut polishings = 0;
-        for q in 1..=MOST_CROSSINGS {
-            let Some(prediction) = self.returns.predict(q, &extent) else { continue };
+        for prediction in self.returns.predictions(2, &extent) {
             self.settled = self.predicted(&prediction.state, known);
             if self.settled.is_some() {
                 return;
             }
             if known.iter().any(|k| k.distance(&prediction.state) <= FAITHFUL) {
                 // The limit may lie on that solution, but the trajectory is not close enough to be sure.
-                self.next_attempt = self.returns.total() + q;
+                self.next_attempt = self.returns.total() + 1;
                 return;
             }
-            self.next_attempt = self.returns.total() + (self.returns.total() / 4).max(q);
-            let Some(candidate) = self.follow(&prediction, &extent, context) else { continue };
-            polishings += 1;
+            self.next_attempt = self.returns.total() + self.returns.total() / 2;
+            let Some(candidate) = context.follow(&self.returns, &prediction, &extent) else { continue };
             if let Some(orbit) = context.polished(&candidate)
                 && orbit.distance(&prediction.state) <= FAITHFUL
             {
@@ -224,61 +167,16 @@ impl Watch {
                 self.settled = self.predicted(&prediction.state, known);
                 return;
             }
-            if polishings == 2 {
-                return;
-            }
         }
     }
 
     /// The solution on which a predicted limit lies.
     fn predicted(&self, limit: &[f64], known: &[Orbit]) -> Option<usize> {
-        let last = self.returns.last()?;
+        let (_, last) = self.returns.last()?;
         known.iter().position(|orbit| {
             let here = orbit.distance(last);
             here <= NEIGHBOURHOOD && orbit.distance(limit) <= HIT * here + ARRIVED
         })
-    }
-
-    /// The trajectory from a predicted limit over one period, if it comes back.
-    fn follow(&self, prediction: &Prediction, extent: &[f64], context: &Context) -> Option<Candidate> {
-        const PARTS: usize = 4;
-        let n = extent.len();
-        let value = |_: f64, x: &[f64]| self.returns.value(x);
-        let sections = [Section { value: &value, direction: Direction::Rising }];
-        let integrator = Integrator::new(context.field, context.parameters, context.tolerance()).with_step_limit(20_000);
-        let (mut times, mut states) = (vec![0.0], prediction.state.clone());
-        // The crossing that comes closest to the start, around the expected time.
-        let mut back: Option<(f64, f64, Vec<f64>)> = None;
-        let mut x = vec![0.0; n];
-        integrator.trajectory(&prediction.state, [0.0, 1.3 * prediction.period], &sections, &mut |passage| {
-            match passage {
-                Passage::Crossing(crossing) if crossing.time > 0.7 * prediction.period => {
-                    let distance = (0..n).fold(0.0, |m: f64, i| {
-                        m.max((crossing.state[i] - prediction.state[i]).abs() / extent[i])
-                    });
-                    if back.as_ref().is_none_or(|(best, ..)| distance < *best) {
-                        back = Some((distance, crossing.time, crossing.state.clone()));
-                    }
-                }
-                Passage::Crossing(_) => {}
-                Passage::Step(step) => {
-                    for part in 1..=PARTS {
-                        let theta = part as f64 / PARTS as f64;
-                        step.state_into(theta, &mut x);
-                        times.push(step.time_at(theta));
-                        states.extend_from_slice(&x);
-                    }
-                }
-            }
-            Verdict::Continue
-        });
-        let (_, period, end) = back.filter(|(distance, ..)| *distance <= RECURRENT)?;
-        let kept = times.partition_point(|t| *t < period);
-        times.truncate(kept);
-        states.truncate(kept * n);
-        times.push(period);
-        states.extend(end);
-        Some(Candidate::Cycle { period, times, states })
     }
 }
 

@@ -50,6 +50,9 @@ struct Trail {
     history: History,
 }
 
+/// Share of the deviation from simpler solutions below which a step counts as having landed on them.
+const NOTHING: f64 = 0.05;
+
 /// Follows one side from `start`, which has been emitted already, and of which `previous` is the predecessor on the same
 /// side if there is one. `emitted` counts the points of this side so far.
 pub fn follow(walk: &mut Follow, start: Station, previous: Option<Station>, mut emitted: usize, sink: &mut dyn FnMut(Item) -> Verdict) -> Ending {
@@ -69,7 +72,7 @@ pub fn follow(walk: &mut Follow, start: Station, previous: Option<Station>, mut 
         }
         walk.refresh(&mut left);
         let mut cost = Cost::default();
-        let Step { right, end } = loop {
+        let Step { mut right, end } = loop {
             match walk.attempt(&left, trail.as_ref(), step, emitted, &mut cost) {
                 Ok(accepted) => break accepted,
                 Err(why) => {
@@ -83,6 +86,10 @@ pub fn follow(walk: &mut Follow, start: Station, previous: Option<Station>, mut 
         };
         let history = trail.as_ref().map(|t| t.history.clone());
         let found = walk.inspect(&left, &right, history.as_ref(), 0, &mut cost);
+        let found = match end {
+            Some(Ending::Joined { parameter, .. }) => walk.up_to(parameter, found, left.point.unstable, &mut right),
+            _ => found,
+        };
         let (angle, length) = walk.angle(&left, &right);
         let factor = (walk.settings.target_angle / angle.max(1e-12)).clamp(0.3, 2.0);
         step = (length * factor).clamp(walk.settings.min_step, walk.settings.max_step);
@@ -216,18 +223,65 @@ impl Follow<'_> {
         Ok(found)
     }
 
+    /// What was found in the last step before a branch meets simpler solutions, without what cannot be told from the
+    /// meeting itself: there the parameter is stationary and a multiplier is 1 anyway.
+    fn up_to(&self, meeting: f64, found: Vec<Found>, unstable: usize, right: &mut Station) -> Vec<Found> {
+        let near = 20.0 * self.settings.tolerance * (1.0 + meeting.abs());
+        let apart = |value: f64| (value - meeting).abs() > near;
+        let mut count = unstable;
+        let mut kept = Vec::new();
+        for item in found {
+            let (value, after) = match &item {
+                Found::Special(s) => {
+                    let after = if self.direction > 0.0 { s.unstable_after } else { s.unstable_before };
+                    (s.point.parameters.get(self.free).copied().unwrap_or(0.0), after)
+                }
+                Found::Inserted(s, _) => (s.parameter(), s.point.unstable),
+            };
+            if !apart(value) {
+                break;
+            }
+            count = after;
+            kept.push(item);
+        }
+        if !apart(right.parameter()) {
+            right.point.unstable = count;
+        }
+        kept
+    }
+
     /// Whether the step passes the place where the branch meets simpler solutions. If so the step ends a little before it.
     /// The place itself is not solved for: it is a branch point, and the deviation from the simpler solution grows like the
     /// square root of the distance in the parameter, which gives the parameter there well enough to recognise it.
     fn collapsed(&mut self, left: &Station, right: &Station, cost: &mut Cost) -> Result<Option<Step>, Failure> {
         for monitor in self.collapses {
             let values = [monitor.value(&left.point, &left.point), monitor.value(&left.point, &right.point)];
+            // Next to nothing left of the deviation: the step has landed on the simpler solutions themselves.
+            if values[1].abs() < NOTHING * values[0] {
+                return Err(Failure::Singular);
+            }
             if !(values[0] > 0.0 && values[1] <= 0.0) {
                 continue;
             }
             let stretch = Stretch::new(self.problem, left, right, self.direction);
-            let distance = stretch.length * values[0] / (values[0] - values[1]);
-            let near = self.cut(left, &stretch, 0.9 * distance, cost).ok_or(Failure::Singular)?;
+            let (mut low, mut high) = ((0.0, values[0]), (stretch.length, values[1]));
+            let mut near = None;
+            for _ in 0..12 {
+                let zero = low.0 + (high.0 - low.0) * low.1 / (low.1 - high.1);
+                let s = 0.6 * zero + 0.4 * low.0;
+                let found = self.cut(left, &stretch, s, cost).ok_or(Failure::Singular)?;
+                let value = monitor.value(&left.point, &found.point);
+                if value < NOTHING * values[0] {
+                    high = (s, value.min(-NOTHING * values[0]));
+                    continue;
+                }
+                low = (s, value);
+                near = Some(found);
+                if value < 0.6 * values[0] {
+                    break;
+                }
+            }
+            let near = near.ok_or(Failure::Singular)?;
             let share = (monitor.value(&left.point, &near.point) / values[0]).powi(2);
             let parameter = (near.parameter() - share * left.parameter()) / (1.0 - share);
             return Ok(Some(Step { right: near, end: Some(Ending::Joined { at: monitor.kind(), parameter }) }));

@@ -7,8 +7,10 @@ use super::System;
 use super::growth::{polished, problem_of, setting, settings};
 use super::plan::{AttractorKey, Plan, SeedPlan, SeedSource, Start};
 use crate::attractors::{self, Attractor, Candidate, Census, Sampling};
-use crate::contract::{Event, Observer};
-use crate::diagram::{Cycle, Diagram, Point, Solution};
+use crate::continuation::Settings;
+use crate::continuation::corrector::{Plane, correct, parameter_row};
+use crate::contract::{Event, Examination, Observer};
+use crate::diagram::{Cost, Cycle, Diagram, Point, Solution};
 use crate::linalg::max_abs;
 use crate::problem::equilibrium::EquilibriumProblem;
 use crate::problem::gauss::Scheme;
@@ -81,8 +83,15 @@ fn polish(system: &System, parameters: &[f64], tolerance: f64, candidate: &Candi
         Candidate::Equilibrium(x) => Solution::Equilibrium(x.clone()),
         Candidate::Cycle { period, times, states } => Solution::Cycle(first_profile(system.field.dim(), *period, times, states)),
     };
-    let guess = bare(parameters, solution);
+    let mut guess = bare(parameters, solution);
     let mut problem = problem_of(system, free, 4, &guess, false);
+    // Coarsely first, on the mesh as it is: a candidate that is not close to a solution is not worth a finer one.
+    let coarse = Settings { tolerance: 1e-2, max_newton: 6, ..settings.clone() };
+    let mut u = problem.unknowns_of(&guess);
+    problem.anchor(&u);
+    let plane = Plane { row: parameter_row(u.len()), base: u.clone(), distance: 0.0 };
+    correct(&mut *problem, &coarse, &plane, &mut u, &mut Cost::default()).ok()?;
+    guess.solution = problem.point(&u, &[], Examination::default()).solution;
     polished(&mut *problem, &settings, &guess).ok().map(|found| found.point)
 }
 

@@ -14,8 +14,9 @@ use crate::problem::cycle::CycleProblem;
 use crate::problem::{gauss::Scheme, mesh};
 use crate::special::{branch_point, hopf, period_doubling};
 
-/// Distances along the direction that are tried, in scaled variables.
-const DISTANCES: [f64; 5] = [0.002, 0.005, 0.01, 0.02, 0.05];
+/// Distances along the direction that are tried, in scaled variables. The shorter ones are for branches on which something
+/// else happens next to their beginning, as with contact, where a branch keeps its first shape only until it grazes.
+const DISTANCES: [f64; 7] = [2e-3, 5e-4, 1e-4, 2e-5, 5e-3, 1e-2, 5e-2];
 
 /// The beginning of the branch that leaves `at`, and its family; `None` for kinds at which no branch of equilibria or
 /// cycles leaves.
@@ -40,9 +41,16 @@ fn joined(at: &SpecialPoint, free: usize) -> Ending {
 }
 
 /// The first point at one of the [`DISTANCES`] along `direction` (not normalised) from `base`.
-fn step_off(problem: &mut dyn ZeroProblem, settings: &Settings, base: &[f64], direction: &[f64], sign: f64) -> Result<Station, Failure> {
+fn step_off(
+    problem: &mut dyn ZeroProblem,
+    settings: &Settings,
+    base: &[f64],
+    direction: &[f64],
+    sign: f64,
+    expected: &dyn Fn(&Station) -> bool,
+) -> Result<Station, Failure> {
     let mesh = problem.mesh();
-    let mut failure = Failure::Singular;
+    let (mut failure, mut second_best) = (Failure::Singular, None);
     for distance in DISTANCES {
         if !mesh.is_empty() {
             problem.set_mesh(&mesh);
@@ -58,16 +66,27 @@ fn step_off(problem: &mut dyn ZeroProblem, settings: &Settings, base: &[f64], di
         let guess: Vec<f64> = base.iter().zip(&row).map(|(b, r)| b + distance * r).collect();
         let plane = Plane { row, base: base.to_vec(), distance };
         match settle(problem, settings, plane, guess, 1.0, &mut Cost::default()) {
-            Ok(found) => return Ok(found),
+            Ok(found) if expected(&found) => return Ok(found),
+            Ok(found) => second_best = second_best.or(Some(found)),
             Err(why) => failure = why,
         }
     }
-    Err(failure)
+    second_best.ok_or(failure)
+}
+
+/// Exchange of stability: a branch born on the side where its parent has more unstable multipliers has the smaller number
+/// of them, one born on the other side has one more than that. True if `found` is like that.
+fn exchanges_stability(at: &SpecialPoint, free: usize, found: &Station) -> bool {
+    let rising = at.point.parameter_slope() > 0.0;
+    let (below, above) = if rising { (at.unstable_before, at.unstable_after) } else { (at.unstable_after, at.unstable_before) };
+    let own = if found.parameter() > at.point.parameters[free] { above } else { below };
+    let fewer = below.min(above);
+    found.point.unstable == if own > fewer { fewer } else { fewer + 1 }
 }
 
 fn doubled(system: &System, settings: &Settings, free: usize, at: &SpecialPoint, cycle: &Cycle) -> Result<Beginning, String> {
     let (mut problem, base, direction) = double(system, free, at, cycle).ok_or("no vector of period doubling was found")?;
-    let first = step_off(&mut problem, settings, &base, &direction, 1.0).map_err(|why| why.to_string())?;
+    let first = step_off(&mut problem, settings, &base, &direction, 1.0, &|found| exchanges_stability(at, free, found)).map_err(|why| why.to_string())?;
     let before = doubled_edge(system, free, at, &first.point).into_iter().collect();
     Ok(Beginning::Edge { before, first, joined: joined(at, free) })
 }
@@ -95,7 +114,9 @@ pub fn doubled_edge(system: &System, free: usize, at: &SpecialPoint, next: &Poin
     let tangent: Vec<f64> = direction.iter().map(|d| d / norm).collect();
     // The matrix may be singular here; what the examination needs of it does not depend on that.
     let _ = problem.factorise(&base, &tangent);
-    let examination = problem.examine(&base);
+    let mut examination = problem.examine(&base);
+    // The error estimate does need the solution of the linear system; the cycle is that of the special point, twice.
+    examination.trust.discretisation = at.point.trust.discretisation;
     Some(Point { unstable: next.unstable, ..problem.point(&base, &tangent, examination) })
 }
 
@@ -109,7 +130,7 @@ fn born(system: &System, settings: &Settings, free: usize, degree: usize, at: &S
     let mut base = problem.unknowns_of(&at.point);
     let size = base.len();
     base[size - 2] = period;
-    let first = step_off(&mut problem, settings, &base, &direction, 1.0).map_err(|why| why.to_string())?;
+    let first = step_off(&mut problem, settings, &base, &direction, 1.0, &|found| exchanges_stability(at, free, found)).map_err(|why| why.to_string())?;
     Ok(Beginning::Edge { before: Vec::new(), first, joined: joined(at, free) })
 }
 
@@ -120,9 +141,9 @@ fn crossing(system: &System, settings: &Settings, free: usize, degree: usize, at
     problem.anchor(&u);
     let vector = branch_point::direction(problem, &u, &at.point.tangent).ok_or("the tangent of the other branch was not found")?;
     let mesh = problem.mesh();
-    let one = step_off(problem, settings, &u, &vector, 1.0).map_err(|why| why.to_string())?;
+    let one = step_off(problem, settings, &u, &vector, 1.0, &|_| true).map_err(|why| why.to_string())?;
     problem.set_mesh(&mesh);
-    let symmetric = step_off(problem, settings, &u, &vector, -1.0).is_ok_and(|other| {
+    let symmetric = step_off(problem, settings, &u, &vector, -1.0, &|_| true).is_ok_and(|other| {
         let images = system.reflections.iter().filter(|r| r.contains(&true));
         let gap = (one.parameter() - other.parameter()).abs();
         gap < 1e-6 * (1.0 + one.parameter().abs()) && images.into_iter().any(|r| one.point.difference(&other.point, &system.scales, r) < 30.0 * settings.tolerance)

@@ -46,33 +46,60 @@ pub fn factorise(a: &mut [f64], n: usize, pivots: &mut [usize]) -> Result<(), Si
 
 /// Solves for `columns` right-hand sides at once; `b` is row-major `[n × columns]`, overwritten by the solution.
 pub fn solve(a: &[f64], n: usize, pivots: &[usize], b: &mut [f64], columns: usize) {
-    for k in 0..n {
-        let p = pivots[k];
-        if p != k {
-            for c in 0..columns {
-                b.swap(k * columns + c, p * columns + c);
+    // Whole groups of columns are kept in registers; most calls have one column, or a few.
+    match columns {
+        0 => {}
+        1 => solve_group::<1>(a, n, pivots, b),
+        2 => solve_group::<2>(a, n, pivots, b),
+        3 => solve_group::<3>(a, n, pivots, b),
+        4 => solve_group::<4>(a, n, pivots, b),
+        5 => solve_group::<5>(a, n, pivots, b),
+        6 => solve_group::<6>(a, n, pivots, b),
+        7 => solve_group::<7>(a, n, pivots, b),
+        8 => solve_group::<8>(a, n, pivots, b),
+        _ => {
+            let mut part = Vec::new();
+            for first in (0..columns).step_by(8) {
+                let count = (columns - first).min(8);
+                part.clear();
+                part.extend(b.chunks_exact(columns).flat_map(|row| &row[first..first + count]));
+                solve(a, n, pivots, &mut part, count);
+                for (row, solved) in b.chunks_exact_mut(columns).zip(part.chunks_exact(count)) {
+                    row[first..first + count].copy_from_slice(solved);
+                }
             }
+        }
+    }
+}
+
+fn solve_group<const C: usize>(a: &[f64], n: usize, pivots: &[usize], b: &mut [f64]) {
+    let (rows, _) = b.as_chunks_mut::<C>();
+    let rows = &mut rows[..n];
+    for (k, &p) in pivots[..n].iter().enumerate() {
+        if p != k {
+            rows.swap(k, p);
         }
     }
     for k in 1..n {
-        let (done, rest) = b.split_at_mut(k * columns);
-        let target = &mut rest[..columns];
-        for (l, row) in a[k * n..k * n + k].iter().zip(done.chunks_exact(columns)) {
-            for (x, y) in target.iter_mut().zip(row) {
-                *x -= l * y;
+        let (done, rest) = rows.split_at_mut(k);
+        let mut sum = rest[0];
+        for (l, row) in a[k * n..k * n + k].iter().zip(done.iter()) {
+            for c in 0..C {
+                sum[c] -= l * row[c];
             }
         }
+        rest[0] = sum;
     }
     for k in (0..n).rev() {
-        let (head, tail) = b.split_at_mut((k + 1) * columns);
-        let target = &mut head[k * columns..];
-        for (u, row) in a[k * n + k + 1..(k + 1) * n].iter().zip(tail.chunks_exact(columns)) {
-            for (x, y) in target.iter_mut().zip(row) {
-                *x -= u * y;
+        let (head, done) = rows.split_at_mut(k + 1);
+        let mut sum = head[k];
+        for (u, row) in a[k * n + k + 1..(k + 1) * n].iter().zip(done.iter()) {
+            for c in 0..C {
+                sum[c] -= u * row[c];
             }
         }
         let inverse = 1.0 / a[k * n + k];
-        target.iter_mut().for_each(|x| *x *= inverse);
+        head[k] = sum.map(|x| x * inverse);
     }
 }
 
@@ -113,6 +140,12 @@ mod tests {
             for j in 0..2 {
                 assert!((b[i * 2 + j] - reference[(i, j)]).abs() < 1e-11);
             }
+        }
+        // The same two columns among eleven.
+        let mut wide: Vec<f64> = (0..n * 11).map(|k| if k % 11 < 2 { ((k / 11 * 2 + k % 11) as f64).cos() } else { k as f64 }).collect();
+        solve(&a, n, &pivots, &mut wide, 11);
+        for i in 0..n {
+            assert_eq!(wide[i * 11..i * 11 + 2], b[i * 2..i * 2 + 2]);
         }
     }
 

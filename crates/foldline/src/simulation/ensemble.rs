@@ -27,6 +27,9 @@ const ALPHA: f64 = 0.2 - 0.75 * BETA;
 /// Beyond this multiple of 1 + |start| in any component a trajectory is taken to run to infinity.
 const BOUND: f64 = 1e12;
 
+/// At rest the step grows without end; beyond this length the arithmetic would overflow.
+const LONGEST: f64 = 1e100;
+
 /// A batch of trajectories under way.
 pub struct Ensemble<'a> {
     field: &'a dyn VectorField,
@@ -97,7 +100,7 @@ impl<'a> Ensemble<'a> {
             end: span[1],
             sign: if span[1] < span[0] { -1.0 } else { 1.0 },
             step_limit: usize::MAX,
-            longest: f64::INFINITY,
+            longest: LONGEST,
             lanes,
             next: vec![0.0; n * count],
             stage: vec![0.0; n * count],
@@ -117,8 +120,8 @@ impl<'a> Ensemble<'a> {
 
     /// No step is longer than this time, which is positive.
     pub fn with_longest_step(mut self, longest: f64) -> Ensemble<'a> {
-        self.longest = longest;
-        self.lanes.iter_mut().for_each(|lane| lane.step = lane.step.max(-longest).min(longest));
+        self.longest = longest.min(LONGEST);
+        self.lanes.iter_mut().for_each(|lane| lane.step = lane.step.max(-self.longest).min(self.longest));
         self
     }
 
@@ -128,8 +131,8 @@ impl<'a> Ensemble<'a> {
         self.remove_finished();
         while !self.lanes.is_empty() {
             self.advance_stages();
-            for l in 0..self.lanes.len() {
-                self.judge(l, observe);
+            for (l, error) in self.errors().into_iter().enumerate() {
+                self.judge(l, error, observe);
             }
             self.remove_finished();
         }
@@ -203,16 +206,12 @@ impl<'a> Ensemble<'a> {
         let h: Vec<f64> = self.lanes.iter().map(|lane| lane.step).collect();
         for (s, row) in A.iter().enumerate() {
             let target = if s + 2 == STAGES { &mut self.next } else { &mut self.stage };
-            for i in 0..self.n {
-                let span = i * lanes..(i + 1) * lanes;
-                let target = &mut target[span.clone()];
-                target.fill(0.0);
-                for (a, k) in row.iter().zip(&self.slopes) {
-                    if *a != 0.0 {
-                        target.iter_mut().zip(&k[span.clone()]).for_each(|(t, k)| *t += a * k);
-                    }
-                }
-                for ((t, x), h) in target.iter_mut().zip(&self.x[span]).zip(&h) {
+            target.fill(0.0);
+            for (a, k) in row.iter().zip(&self.slopes).filter(|(a, _)| **a != 0.0) {
+                target.iter_mut().zip(k).for_each(|(t, k)| *t += a * k);
+            }
+            for (target, x) in target.chunks_exact_mut(lanes).zip(self.x.chunks_exact(lanes)) {
+                for ((t, x), h) in target.iter_mut().zip(x).zip(&h) {
                     *t = x + h * *t;
                 }
             }
@@ -220,23 +219,30 @@ impl<'a> Ensemble<'a> {
         }
     }
 
-    /// The error of the step that lane `l` tried, in units of the tolerance; NaN if anything is not finite.
-    fn error(&self, l: usize) -> f64 {
+    /// The error of the step that every lane tried, in units of the tolerance; NaN if anything is not finite.
+    fn errors(&self) -> Vec<f64> {
         let lanes = self.lanes.len();
-        let mut sum = 0.0;
-        for i in 0..self.n {
-            let at = i * lanes + l;
-            let e: f64 = ERROR.iter().zip(&self.slopes).map(|(e, k)| e * k[at]).sum();
-            let size = self.x[at].abs().max(self.next[at].abs());
-            sum += (e / (self.tolerance.absolute[i] + self.tolerance.relative * size)).powi(2);
+        let mut e = vec![0.0; self.n * lanes];
+        for (weight, k) in ERROR.iter().zip(&self.slopes).filter(|(weight, _)| **weight != 0.0) {
+            e.iter_mut().zip(k).for_each(|(e, k)| *e += weight * k);
         }
-        self.lanes[l].step.abs() * (sum / self.n as f64).sqrt()
+        let mut sum = vec![0.0; lanes];
+        for (i, e) in e.chunks_exact(lanes).enumerate() {
+            let (absolute, relative) = (self.tolerance.absolute[i], self.tolerance.relative);
+            let span = i * lanes..(i + 1) * lanes;
+            let ends = self.x[span.clone()].iter().zip(&self.next[span]);
+            for ((sum, e), (x, next)) in sum.iter_mut().zip(e).zip(ends) {
+                let scaled = e / (absolute + relative * x.abs().max(next.abs()));
+                *sum += scaled * scaled;
+            }
+        }
+        let mean = 1.0 / self.n as f64;
+        self.lanes.iter().zip(&sum).map(|(lane, sum)| lane.step.abs() * (sum * mean).sqrt()).collect()
     }
 
     /// Accepts or rejects the step of lane `l`.
-    fn judge(&mut self, l: usize, observe: &mut dyn FnMut(&Step) -> Verdict) {
+    fn judge(&mut self, l: usize, error: f64, observe: &mut dyn FnMut(&Step) -> Verdict) {
         let (n, lanes) = (self.n, self.lanes.len());
-        let error = self.error(l);
         let tried = self.lanes[l].step;
         if !error.is_finite() || error > 1.0 {
             let factor = if error.is_finite() { (SAFETY * error.powf(-ALPHA)).clamp(0.2, 1.0) } else { 0.2 };

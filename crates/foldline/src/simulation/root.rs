@@ -72,7 +72,8 @@ mod tests {
 
     #[test]
     fn roots_are_found_to_the_width_and_never_much_slower_than_by_bisection() {
-        let cases: [(fn(f64) -> f64, f64); 4] = [
+        type Case = (fn(f64) -> f64, f64);
+        let cases: [Case; 4] = [
             (|x| x * x - 0.5, 0.5f64.sqrt()),
             (|x| (20.0 * (x - 0.9)).tanh(), 0.9),
             (|x| (x - 0.3).powi(9), 0.3),

@@ -155,8 +155,8 @@ fn both_sides_of_a_near_tangency_are_found_wherever_it_falls_in_a_step() {
         Section { value: &above, direction: Direction::Either },
         Section { value: &missed, direction: Direction::Either },
     ];
-    for phase in 0..100 {
-        let start = -0.8 + 0.002 * phase as f64;
+    for phase in 0..40 {
+        let start = -0.8 + 0.005 * phase as f64;
         let mut times = vec![];
         integrator.trajectory(&[start.sin(), start.cos()], [0.0, 3.0], &sections, &mut |passage| {
             if let Passage::Crossing(crossing) = passage {

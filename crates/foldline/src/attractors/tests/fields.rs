@@ -65,3 +65,24 @@ pub const ROTOR: Field = Field {
         f[3] = -gyroscopic * du - 2.0 * zeta * dv - stiffness * v - circulatory * u;
     },
 };
+
+/// x' = x - x³.
+pub const BISTABLE: Field = Field { dim: 1, f: |x, _, f| f[0] = x[0] - x[0].powi(3) };
+
+/// x'' + x'/5 + x - x³ = 0.
+pub const ESCAPING: Field = Field {
+    dim: 2,
+    f: |x, _, f| {
+        f[0] = x[1];
+        f[1] = -0.2 * x[1] - x[0] + x[0].powi(3);
+    },
+};
+
+/// x'' + x = 0.
+pub const CENTRE: Field = Field {
+    dim: 2,
+    f: |x, _, f| {
+        f[0] = x[1];
+        f[1] = -x[0];
+    },
+};

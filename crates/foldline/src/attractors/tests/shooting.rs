@@ -79,7 +79,7 @@ fn cycle(field: &Field, parameters: &[f64], period: f64, start: &[f64]) -> Optio
         let d = solved(&bordered, &residual);
         x.iter_mut().zip(&d).for_each(|(x, d)| *x -= d);
         period -= d[n];
-        if !(period > 1e-3) || d.iter().any(|d| !d.is_finite() || d.abs() > 1e3) {
+        if period.is_nan() || period <= 1e-3 || d.iter().any(|d| !d.is_finite() || d.abs() > 1e3) {
             return None;
         }
         if d.iter().all(|d| d.abs() < 1e-8) {

@@ -1,0 +1,242 @@
+//! Whole runs through the command, of models whose bifurcations are known in closed form, and the examples of the book.
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+fn foldline(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_foldline")).args(arguments).current_dir(folder).output().unwrap()
+}
+
+/// Standard output of a command that ends with that code.
+#[track_caller]
+fn printed(folder: &Path, arguments: &[&str], code: i32) -> String {
+    let output = foldline(folder, arguments);
+    assert_eq!(output.status.code(), Some(code), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// The code blocks of a kind in a document.
+fn blocks(document: &str, kind: &str) -> Vec<String> {
+    let text = std::fs::read_to_string(root().join(document)).unwrap();
+    let fence = format!("```{kind}\n");
+    text.split(&fence).skip(1).filter_map(|rest| Some(rest.split_once("```")?.0.to_string())).collect()
+}
+
+/// A folder with the model and the study of a document.
+fn desk(document: &str) -> tempfile::TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    let [model, study] = &blocks(document, "toml")[..] else { panic!("{document} has a model and a study") };
+    std::fs::write(folder.path().join("brusselator.toml"), model).unwrap();
+    std::fs::write(folder.path().join("study.toml"), study).unwrap();
+    folder
+}
+
+/// The rows of a CSV table as (column, cell) lookups.
+fn rows(csv: &str) -> Vec<impl Fn(&str) -> String + use<>> {
+    let mut lines = csv.lines().map(|line| line.split(',').map(str::to_string).collect::<Vec<_>>());
+    let heads = lines.next().unwrap();
+    lines
+        .map(|cells| {
+            let heads = heads.clone();
+            move |name: &str| {
+                cells[heads.iter().position(|h| h == name).unwrap_or_else(|| panic!("no column {name}"))].clone()
+            }
+        })
+        .collect()
+}
+
+#[test]
+fn the_first_models_of_readme_and_book_show_their_hopf_point() {
+    for document in ["README.md", "docs/book/first-model.md"] {
+        let desk = desk(document);
+        printed(desk.path(), &["check", "brusselator.toml"], 0);
+        let text = printed(desk.path(), &["run", "study.toml", "--jobs", "1"], 0);
+        assert!(text.contains("hopf"), "{text}");
+        let csv = printed(desk.path(), &["table", "runs/study", "--format", "csv"], 0);
+        let heads = "branch,kind,A,B,period,unstable_before,unstable_after,error";
+        assert_eq!(csv.lines().next(), Some(heads), "{document}");
+        let hopf = rows(&csv).into_iter().find(|row| row("kind") == "hopf").unwrap();
+        // B = 1 + A² = 2; tolerance 1e-6 relative to 1 + |B|.
+        assert!((hopf("B").parse::<f64>().unwrap() - 2.0).abs() < 3e-6, "{}", hopf("B"));
+        assert!(hopf("error").parse::<f64>().unwrap() <= 1e-6);
+        let branches = printed(desk.path(), &["table", "runs/study", "--branches", "--format", "json"], 0);
+        let branches: serde_json::Value = serde_json::from_str(&branches).unwrap();
+        let families: Vec<&str> = branches.as_array().unwrap().iter().filter_map(|b| b["family"].as_str()).collect();
+        assert_eq!(families, ["equilibrium", "cycle"], "{document}");
+        for ending in ["svg", "png", "pdf"] {
+            let file = format!("picture.{ending}");
+            printed(desk.path(), &["plot", "runs/study", "-o", &file], 0);
+            assert!(std::fs::metadata(desk.path().join(file)).unwrap().len() > 1000);
+        }
+    }
+}
+
+#[test]
+fn points_come_with_multipliers_and_their_accuracy() {
+    let desk = desk("README.md");
+    printed(desk.path(), &["run", "study.toml"], 0);
+    let arguments = ["table", "runs/study", "--points", "--branch", "steady", "--format", "json"];
+    let points: serde_json::Value = serde_json::from_str(&printed(desk.path(), &arguments, 0)).unwrap();
+    let points = points.as_array().unwrap();
+    assert!(points.len() > 5);
+    for point in points {
+        let b = point["B"].as_f64().unwrap();
+        // The Jacobian at the equilibrium (1, B) has the trace B - 2.
+        let eigenvalues = point["multipliers"].as_array().unwrap();
+        let trace: f64 = eigenvalues.iter().map(|pair| pair[0].as_f64().unwrap()).sum();
+        assert!((trace - (b - 2.0)).abs() < 1e-6 * (1.0 + b), "{trace} at B = {b}");
+        assert_eq!(point["unstable"] == 0, b < 2.0, "at B = {b}");
+        assert_eq!(point["trivial_defect"], 0.0);
+    }
+    let csv = printed(desk.path(), &["table", "runs/study", "--points", "--format", "csv"], 0);
+    let cycles: Vec<_> = rows(&csv).into_iter().filter(|row| row("branch") != "steady").collect();
+    assert!(cycles.len() > 5);
+    for row in cycles {
+        // The first multiplier is the trivial one; the defects are what is left of exact arithmetic.
+        let first = row("multipliers").split(' ').next().unwrap().trim_end_matches("+0.0j").parse::<f64>().unwrap();
+        assert!((first - 1.0).abs() < 1e-4, "{first}");
+        assert!(row("discretisation").parse::<f64>().unwrap() < 1e-5);
+        assert!(row("liouville_defect").parse::<f64>().unwrap() < 1e-4);
+    }
+}
+
+#[test]
+fn a_branch_that_ends_short_is_exit_code_3_and_said() {
+    let desk = desk("README.md");
+    let study = std::fs::read_to_string(desk.path().join("study.toml")).unwrap();
+    std::fs::write(desk.path().join("short.toml"), study.replace("range", "max-points = 2, range")).unwrap();
+    let output = foldline(desk.path(), &["run", "short.toml"]);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(3), "{said}");
+    assert!(said.contains("ended short: steady: stopped at the limit of 2 points"), "{said}");
+}
+
+#[test]
+fn a_seed_that_is_not_found_is_exit_code_3_and_said() {
+    let desk = desk("README.md");
+    let study = std::fs::read_to_string(desk.path().join("study.toml")).unwrap();
+    // At B = 1.5 the equilibrium attracts everything.
+    std::fs::write(desk.path().join("none.toml"), study.replace("\"equilibrium\"", "\"cycle\"")).unwrap();
+    let output = foldline(desk.path(), &["run", "none.toml"]);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(3), "{said}");
+    assert!(said.contains("ended short: steady"), "{said}");
+}
+
+#[test]
+fn the_same_study_gives_the_same_table_for_any_number_of_threads() {
+    let desk = desk("README.md");
+    for jobs in ["1", "3"] {
+        printed(desk.path(), &["run", "study.toml", "--jobs", jobs, "--out", jobs], 0);
+    }
+    let table = |out: &str| printed(desk.path(), &["table", out, "--points", "--format", "csv"], 0);
+    assert_eq!(table("1"), table("3"));
+}
+
+#[test]
+fn a_run_cut_off_between_transactions_resumes_without_losing_a_point() {
+    let desk = desk("README.md");
+    printed(desk.path(), &["run", "study.toml", "--jobs", "1", "--out", "whole"], 0);
+    let table = |out: &str, what: &str| printed(desk.path(), &["table", out, what, "--format", "csv"], 0);
+    let special = |out: &str| -> Vec<(String, String, f64)> {
+        let rows = rows(&table(out, "--special"));
+        rows.iter().map(|row| (row("branch"), row("kind"), row("B").parse().unwrap())).collect()
+    };
+    let whole = rusqlite::Connection::open(desk.path().join("whole/run.sqlite")).unwrap();
+    let count: i64 = whole.query_row("SELECT count(*) FROM points", [], |row| row.get(0)).unwrap();
+    for kept in [0, 1, 2, count / 4, count / 2, count - 3] {
+        let out = format!("cut{kept}");
+        std::fs::create_dir(desk.path().join(&out)).unwrap();
+        let file = desk.path().join(&out).join("run.sqlite");
+        std::fs::copy(desk.path().join("whole/run.sqlite"), &file).unwrap();
+        // Rows are written in the order in which they were accepted: cutting the later ones off is what a kill does. A special
+        // point lies between its position and the next, of which the one further from the start was accepted after it.
+        let cut = rusqlite::Connection::open(&file).unwrap();
+        cut.execute_batch(&format!(
+            "CREATE TEMP TABLE lost AS SELECT rowid AS r, branch, position FROM points ORDER BY rowid LIMIT -1 OFFSET {kept};
+             DELETE FROM special_points WHERE EXISTS (SELECT 1 FROM lost WHERE lost.branch = special_points.branch
+                 AND lost.position = special_points.position + (special_points.position >= 0));
+             DELETE FROM points WHERE rowid IN (SELECT r FROM lost);
+             DELETE FROM ends WHERE branch IN (SELECT branch FROM lost);
+             DELETE FROM branches WHERE branch NOT IN (SELECT branch FROM points);"
+        ))
+        .unwrap();
+        drop(cut);
+        let before = table(&out, "--points");
+        printed(desk.path(), &["run", "study.toml", "--jobs", "1", "--out", &out, "--resume"], 0);
+        let after = table(&out, "--points");
+        let lost: Vec<&str> = before.lines().filter(|line| !after.lines().any(|other| other == *line)).collect();
+        assert!(lost.is_empty(), "accepted points lost after {kept} of {count}: {lost:?}");
+        // The step after a resumption need not be the one that would have been taken: equal to the tolerance, 1e-6 relative.
+        let (found, expected) = (special(&out), special("whole"));
+        assert_eq!(found.len(), expected.len(), "{found:?} after {kept} of {count}");
+        for (a, b) in found.iter().zip(&expected) {
+            assert!((&a.0, &a.1) == (&b.0, &b.1) && (a.2 - b.2).abs() < 1e-6 * (1.0 + b.2), "{a:?} {b:?} after {kept}");
+        }
+    }
+}
+
+#[test]
+fn a_finished_run_resumes_without_doing_anything() {
+    let desk = desk("README.md");
+    let first = printed(desk.path(), &["run", "study.toml"], 0);
+    assert_eq!(printed(desk.path(), &["run", "study.toml", "--resume"], 0), first);
+}
+
+#[test]
+fn attractors_are_listed_with_their_hits() {
+    let desk = desk("README.md");
+    let rest = printed(desk.path(), &["attractors", "brusselator.toml", "--samples", "16"], 0);
+    assert!(rest.contains("equilibrium") && rest.contains("16 samples"), "{rest}");
+    let cycle = printed(desk.path(), &["attractors", "brusselator.toml", "--samples", "16", "--set", "B=3"], 0);
+    // The period at A = 1, B = 3 is 7.1569199 by the classical Runge–Kutta method with step 5e-4.
+    assert!(cycle.lines().any(|line| line.starts_with("cycle") && line.contains(" 7.156919")), "{cycle}");
+    let again = printed(desk.path(), &["attractors", "brusselator.toml", "--samples", "16", "--set", "B=3"], 0);
+    assert_eq!(cycle, again);
+}
+
+#[test]
+fn a_reader_that_leaves_early_is_no_error() {
+    let desk = desk("README.md");
+    printed(desk.path(), &["run", "study.toml"], 0);
+    let mut child = Command::new(env!("CARGO_BIN_EXE_foldline"))
+        .args(["table", "runs/study", "--points", "--format", "json"])
+        .current_dir(desk.path())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(child.stdout.take());
+    let output = child.wait_with_output().unwrap();
+    assert!(!String::from_utf8_lossy(&output.stderr).contains("panicked"));
+    assert_eq!(output.status.code(), Some(0));
+}
+
+#[test]
+fn names_that_a_run_does_not_have() {
+    let desk = desk("README.md");
+    printed(desk.path(), &["run", "study.toml"], 0);
+    let refused = |arguments: &[&str], pieces: &[&str]| {
+        let output = foldline(desk.path(), arguments);
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{said}");
+        pieces.iter().for_each(|piece| assert!(said.contains(piece), "\"{piece}\" is missing in:\n{said}"));
+    };
+    refused(&["table", "runs/study", "--branch", "stedy"], &["no branch \"stedy\"", "did you mean `steady`"]);
+    refused(
+        &["plot", "runs/study", "--y", "z", "-o", "a.svg"],
+        &["--y: there is no quantity \"z\"", "x_max", "period"],
+    );
+    refused(&["plot", "runs/study", "-o", "a.jpg"], &["a.jpg", ".svg, .png or .pdf"]);
+    refused(&["plot", "runs/study", "-o", "no/such/a.svg"], &["no/such/a.svg cannot be written"]);
+    refused(&["plot", "runs/study", "--window", "2,1,0,1", "-o", "a.svg"], &["--window 2,1,0,1", "wrong way round"]);
+    refused(&["plot", "runs/study", "--window", "1,2", "-o", "a.svg"], &["not a window", "four numbers"]);
+    refused(&["run", "study.toml"], &["exists already", "--resume"]);
+    let study = std::fs::read_to_string(desk.path().join("study.toml")).unwrap();
+    std::fs::write(desk.path().join("study.toml"), study.replace("4]", "5]")).unwrap();
+    refused(&["run", "study.toml", "--resume"], &["the study has changed", "--out DIR"]);
+}
