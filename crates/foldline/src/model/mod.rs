@@ -12,6 +12,7 @@ mod derive;
 mod error;
 mod function;
 mod graph;
+mod identities;
 mod kernels;
 mod lexer;
 mod nearest;
