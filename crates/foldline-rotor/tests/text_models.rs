@@ -40,7 +40,7 @@ fn scattered(from: usize, count: usize) -> Vec<f64> {
 /// States at radii around contact, so that every part of the contact law is met.
 fn states(lanes: usize) -> Vec<f64> {
     let s = scattered(1, 4 * lanes);
-    let radius = |l: usize| if l % 2 == 0 { 1.0 + 0.02 * s[l] } else { 2.0 * s[l].abs() };
+    let radius = |l: usize| if l.is_multiple_of(2) { 1.0 + 0.02 * s[l] } else { 2.0 * s[l].abs() };
     let angle = |l: usize| std::f64::consts::PI * s[lanes + l];
     let mut states = vec![0.0; 4 * lanes];
     for l in 0..lanes {
@@ -194,5 +194,37 @@ fn synchronous_response_in_closed_form() {
         model.evaluate(Batch { lanes: 1, states: &state, parameters: Parameters::Shared(&q) }, &mut f);
         assert!((state[0].hypot(state[1]) - r).abs() < 1e-5, "{r}: {state:?}");
         assert!(f.iter().all(|x| x.abs() < 1e-3), "{r}: {f:?}");
+    }
+}
+
+/// Two stable cycles of the reference study at Ω = 5, computed with another code (a point to eight decimals, and the period):
+/// the flow brings each point back to itself. The classical Runge–Kutta method with 4000 steps errs by less than 1e-8 here, and
+/// both cycles attract, so the decimals of the point are the limit.
+#[test]
+fn known_cycles_return_to_their_start() {
+    let (model, p) = (text("overhung-rotor.toml"), Nondimensional::REFERENCE.parameters());
+    let field = |x: [f64; 4]| {
+        let mut f = [0.0; 4];
+        model.evaluate(Batch { lanes: 1, states: &x, parameters: Parameters::Shared(&p) }, &mut f);
+        f
+    };
+    let along = |x: [f64; 4], h: f64, k: [f64; 4]| std::array::from_fn(|i| x[i] + h * k[i]);
+    let cycles = [
+        ("2:1", 2.0147198658, [0.15353773, 2.35231575, 11.1670571, -0.46452523]),
+        ("3:1", 2.6261014808, [-1.28510156, -3.66161685, -12.31731823, 10.80656247]),
+    ];
+    for (name, period, start) in cycles {
+        let h = period / 4000.0;
+        let mut x = start;
+        for _ in 0..4000 {
+            let k1 = field(x);
+            let k2 = field(along(x, 0.5 * h, k1));
+            let k3 = field(along(x, 0.5 * h, k2));
+            let k4 = field(along(x, h, k3));
+            x = std::array::from_fn(|i| x[i] + h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]));
+        }
+        for i in 0..4 {
+            assert!((x[i] - start[i]).abs() < 1e-6, "{name}: {x:?} {start:?}");
+        }
     }
 }

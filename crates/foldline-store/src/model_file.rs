@@ -157,13 +157,12 @@ impl Reader<'_> {
             self.places.insert((Item::State(i), Field::Scale), value.span());
             state.scale = self.walk.number(value, &format!("the scale of `{name}`")).unwrap_or(1.0);
         }
-        state.range = [-2.0 * state.scale.abs(), 2.0 * state.scale.abs()];
+        // A scale that is not positive is reported as such; the range should not be blamed for it.
+        let reach = if state.scale > 0.0 { 2.0 * state.scale } else { 2.0 };
+        state.range = [-reach, reach];
         if let Some(value) = table.get("range") {
             self.places.insert((Item::State(i), Field::Range), value.span());
             state.range = self.pair(value, &format!("the range of `{name}`")).unwrap_or(state.range);
-        }
-        if !(state.scale > 0.0) && !table.contains_key("range") {
-            state.range = [-1.0, 1.0]; // the scale alone is to blame
         }
         state
     }

@@ -163,3 +163,21 @@ fn a_file_that_is_not_there_is_named() {
     let Err(found) = read_model(Path::new("no/such/model.toml")) else { panic!("there is no such file") };
     assert!(found[0].message.contains("cannot be read") && found[0].file.contains("model.toml"), "{}", found[0]);
 }
+
+/// The forced oscillator of the book: its forcing circles at unit amplitude and frequency omega, so on the circle (c, s)
+/// turns without changing its length.
+#[test]
+fn the_first_model_of_the_book_is_right() {
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/book/model-files.md");
+    let page = std::fs::read_to_string(page).expect("the page is there");
+    let text = page.split("```").nth(1).and_then(|block| block.strip_prefix("toml\n")).expect("it has a model");
+    assert!(text.lines().count() <= 21, "twenty lines are promised");
+    let model = parse_model(text, "first.toml").unwrap_or_else(|found| panic!("{}", found[0]));
+    let (mut f, p) = ([0.0; 4], model.defaults());
+    let at = Batch { lanes: 1, states: &[0.5, 0.25, 0.6, 0.8], parameters: Parameters::Shared(&p) };
+    model.evaluate(at, &mut f);
+    let expected = [0.25, 0.06 * 0.6 - 2.0 * 0.02 * 0.25 - 0.625, -1.2 * 0.8, 1.2 * 0.6];
+    for (found, expected) in f.iter().zip(expected) {
+        assert!((found - expected).abs() < 1e-15, "{f:?}");
+    }
+}

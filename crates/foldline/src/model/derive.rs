@@ -6,7 +6,7 @@
 //! **Departures.** At points where a function has no derivative a finite value is taken so that it cannot spoil a whole
 //! Jacobian: `abs`, `sign`, `heaviside` and comparisons contribute sign(x), 0, 0 and 0; `hypot` contributes 0 at the origin,
 //! and `sqrt` contributes 0 where its argument and the derivative of its argument both vanish. Squares of a radius are
-//! rewritten as sums of squares beforehand (see [`super::graph`]), so smooth functions of a radius are not affected.
+//! rewritten as sums of squares beforehand (see `identities`), so smooth functions of a radius are not affected.
 //! A choice (`if`, `min`, `max`) has the derivative of the branch that is taken, whatever the other one gives.
 
 use super::graph::{Binary, Graph, Id, Leaf, Node, Unary};

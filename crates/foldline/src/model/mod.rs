@@ -1,17 +1,18 @@
 //! How is a model written, evaluated, differentiated?
 //!
-//! **Idea.** A model is a set of expressions. They become a graph in which equal subexpressions are one node ([`graph`]),
-//! are differentiated on that graph to any order ([`derive`]), and become tapes ([`tape`]) that run over all lanes of a batch
-//! ([`run`]) about as fast as code written by hand, without a compiler.
+//! **Idea.** A model is a set of expressions. They become a graph in which equal subexpressions are one node (`graph`),
+//! are differentiated on that graph to any order (`derive`), and become tapes (`tape`) that run over all lanes of a batch
+//! (`run`) about as fast as code written by hand, without a compiler.
 //!
-//! Text takes the way [`lexer`] → [`parser`] → [`compile`]; whatever is wrong with it comes back as a list of [`ModelError`],
-//! each with its place.
+//! Text takes the way `lexer` → `parser` → `compile`; whatever is wrong with it comes back as a list of [`ModelError`], each
+//! with its place.
 
 mod compile;
 mod derive;
 mod error;
 mod function;
 mod graph;
+mod identities;
 mod kernels;
 mod lexer;
 mod nearest;

@@ -62,18 +62,28 @@ impl pulp::NullaryFnOnce for Run<'_, '_, '_> {
 
     #[inline(always)]
     fn call(self) {
+        // A few lanes need only the first block of each register; two narrow blocks cost less than a wide one that is half empty.
+        match self.at.lanes {
+            0 => {}
+            1..=16 => self.run::<1>(),
+            _ => self.run::<WIDE>(),
+        }
+    }
+}
+
+impl Run<'_, '_, '_> {
+    /// Runs the tape in blocks of 8 W lanes, and a short rest in blocks of 8.
+    #[inline(always)]
+    fn run<const W: usize>(self) {
         let Run { tape, at, directions, arrays, registers } = self;
         let lanes = at.lanes;
         let inputs = |first: usize, width: usize| Inputs { at, directions, first, live: width.min(lanes - first) };
-        if lanes == 0 {
-            return;
-        }
         for &(register, value) in &tape.constants {
-            registers[register as usize] = [Eight([value; 8]); WIDE];
+            registers[register as usize][..W].fill(Eight([value; 8]));
         }
         let shared = matches!(at.parameters, Parameters::Shared(_));
         if shared {
-            section::<WIDE>(&tape.prologue, registers, inputs(0, 8 * WIDE), arrays);
+            section::<W>(&tape.prologue, registers, inputs(0, 8 * W), arrays);
             for &(register, place) in &tape.uniform {
                 let value = registers[register as usize][0].0[0];
                 component(arrays, place, lanes).fill(value);
@@ -81,24 +91,21 @@ impl pulp::NullaryFnOnce for Run<'_, '_, '_> {
         }
         let mut first = 0;
         while first < lanes {
-            // Two narrow blocks cost less than one wide block with sixteen lanes of it unused.
             let wide = lanes - first > 16;
-            let width = if wide { 8 * WIDE } else { 8 };
+            let width = if wide { 8 * W } else { 8 };
             let inputs = inputs(first, width);
             if !shared {
-                if wide {
-                    section::<WIDE>(&tape.prologue, registers, inputs, arrays);
-                } else {
-                    section::<1>(&tape.prologue, registers, inputs, arrays);
+                match wide {
+                    true => section::<W>(&tape.prologue, registers, inputs, arrays),
+                    false => section::<1>(&tape.prologue, registers, inputs, arrays),
                 }
                 for &(register, place) in &tape.uniform {
                     store(&registers[register as usize], place, inputs, arrays);
                 }
             }
-            if wide {
-                section::<WIDE>(&tape.body, registers, inputs, arrays);
-            } else {
-                section::<1>(&tape.body, registers, inputs, arrays);
+            match wide {
+                true => section::<W>(&tape.body, registers, inputs, arrays),
+                false => section::<1>(&tape.body, registers, inputs, arrays),
             }
             first += width;
         }
@@ -195,7 +202,7 @@ fn section<const W: usize>(
                     (Leaf::State(i), _) => load::<W>(to, inputs.at.states, i, inputs),
                     (Leaf::Direction(d, i), _) => load::<W>(to, inputs.directions[d as usize], i, inputs),
                     (Leaf::Parameter(k), Parameters::PerLane(values)) => load::<W>(to, values, k, inputs),
-                    (Leaf::Parameter(k), Parameters::Shared(values)) => *to = [Eight([values[k as usize]; 8]); WIDE],
+                    (Leaf::Parameter(k), Parameters::Shared(values)) => to[..W].fill(Eight([values[k as usize]; 8])),
                 }
             }
             Instruction::Unary { op, to, a } => {

@@ -2,7 +2,7 @@
 //!
 //! **Idea.** The nodes that the results depend on are put in order, results first come first served, and each gets a
 //! register; a register is used again once its value is no longer needed. What depends on parameters alone goes to a prologue,
-//! which runs once per batch where all lanes share their parameters. Running the tape is in [`super::run`].
+//! which runs once per batch where all lanes share their parameters. Running the tape is in `run`.
 
 use super::graph::{Binary, Graph, Id, Leaf, Node, Unary};
 use std::collections::{HashMap, HashSet};
