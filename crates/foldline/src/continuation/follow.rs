@@ -104,7 +104,7 @@ pub fn follow(
             let verdict = match item {
                 Found::Special(mut special) => {
                     special.point.position = position + sideways;
-                    sink(Item::Special(special))
+                    sink(Item::Special(*special))
                 }
                 Found::Inserted(station, rest) => {
                     position += walk.direction as i64;

@@ -13,7 +13,7 @@ use crate::diagram::{Cost, Kind, SpecialPoint};
 /// What was found on the way, in the order of travel.
 pub enum Found {
     /// A special point.
-    Special(SpecialPoint),
+    Special(Box<SpecialPoint>),
     /// A point that was inserted, with the step to what follows it.
     Inserted(Box<Station>, f64),
 }
@@ -112,15 +112,15 @@ impl Follow<'_> {
         out
     }
 
-    fn special(&self, kind: Kind, station: Station, before: i64, after: i64, error: f64) -> SpecialPoint {
+    fn special(&self, kind: Kind, station: Station, before: i64, after: i64, error: f64) -> Box<SpecialPoint> {
         let (before, after) = if self.direction > 0.0 { (before, after) } else { (after, before) };
-        SpecialPoint {
+        Box::new(SpecialPoint {
             kind,
             point: station.point,
             unstable_before: before.max(0) as usize,
             unstable_after: after.max(0) as usize,
             error,
-        }
+        })
     }
 
     /// A full station at distance s of the stretch.

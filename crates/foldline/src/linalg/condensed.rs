@@ -179,7 +179,7 @@ impl Condensed {
             let upper = &mut self.upper[j * n * full..(j + 1) * n * full];
             upper.copy_from_slice(&stack[..n * full]);
             for i in 0..n {
-                if !(upper[i * full + i].abs() > 1e-300) {
+                if upper[i * full + i].abs().partial_cmp(&1e-300) != Some(std::cmp::Ordering::Greater) {
                     return Err(Singular);
                 }
                 let line = &mut relation[i * (2 * n + q)..(i + 1) * (2 * n + q)];

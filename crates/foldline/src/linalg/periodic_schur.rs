@@ -56,7 +56,7 @@ pub fn eigenvalues(factors: &[f64], p: usize) -> Option<Vec<Eigenvalue>> {
         return None;
     }
     let mut cycle = Cycle::new(factors, p);
-    cycle.to_hessenberg();
+    cycle.reduce_to_hessenberg();
     cycle.iterate()?;
     let found = (0..p).map(|i| cycle.eigenvalue(i)).collect();
     Some(conjugate_pairs(found))
@@ -182,7 +182,7 @@ impl Cycle {
         g.columns(&mut self.hessenberg, p, i, rows_of_h);
     }
 
-    fn to_hessenberg(&mut self) {
+    fn reduce_to_hessenberg(&mut self) {
         let p = self.p;
         for col in 0..p.saturating_sub(2) {
             for i in (col + 1..p - 1).rev() {
