@@ -3,7 +3,7 @@
 use crate::arguments::Attractors as Typed;
 use crate::failure::{Failure, Outcome};
 use crate::run::processors;
-use crate::system::system;
+use foldline::explore::System;
 use foldline::attractors::Attractor;
 use foldline::diagram::Solution;
 use foldline::explore::attractors;
@@ -24,7 +24,7 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
         return Err(vec![found].into());
     }
     let census = attractors(
-        &system(&model, &parameters),
+        &System::of(&model, &parameters),
         &parameters,
         typed.samples as usize,
         typed.seed,

@@ -8,7 +8,6 @@ mod order;
 mod plot;
 mod progress;
 mod run;
-mod system;
 mod table;
 
 use arguments::{Arguments, Command};

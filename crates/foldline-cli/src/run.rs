@@ -5,7 +5,6 @@ use crate::failure::{Failure, Outcome};
 use crate::order::ordered;
 use crate::plot::draw;
 use crate::progress::Progress;
-use crate::system::system_of;
 use crate::table::print_special;
 use foldline::contract::{Event, Observer, Verdict};
 use foldline::diagram::Diagram;
@@ -66,7 +65,7 @@ fn run(
     folder: &Path,
 ) -> Result<(Diagram, Outcome), Failure> {
     let watch = Watch { recorder, progress: Progress::new(&study.model), stop: stop_on_interrupt() };
-    let system = system_of(&study.model, &study.plan);
+    let system = explore::System::of_plan(&study.model, &study.plan);
     let diagram = explore::run(&system, &study.plan, jobs, earlier, &watch);
     watch.progress.finish();
     watch.recorder.finish()?;

@@ -54,7 +54,7 @@ pub fn polished(problem: &mut dyn ZeroProblem, settings: &Settings, point: &Poin
 }
 
 /// A stored point as a station again.
-fn revived(
+pub(super) fn revived(
     problem: &mut dyn ZeroProblem,
     settings: &Settings,
     point: &Point,

@@ -5,9 +5,30 @@
 //! the parameter value in question: interpolated first, and where that is close, by Newton's method.
 
 use super::System;
-use super::growth::{polished, problem_of};
+use super::growth::{polished, problem_of, revived};
 use crate::continuation::Settings;
-use crate::diagram::{Branch, Point};
+use crate::continuation::locate::Stretch;
+use crate::diagram::{Branch, Cost, Point};
+
+/// Every solution of a branch at a value of its parameter, by increasing position: one for each time that the branch
+/// passes it.
+pub fn solutions_at(system: &System, settings: &Settings, branch: &Branch, value: f64) -> Vec<Point> {
+    let passes = branch.points.windows(2).filter(|pair| {
+        let [a, b] = [0, 1].map(|k| pair[k].parameters[branch.free] - value);
+        a * b < 0.0 || a == 0.0
+    });
+    passes
+        .filter_map(|pair| {
+            let mut problem = problem_of(system, branch.free, 4, &pair[0], false);
+            let left = revived(&mut *problem, settings, &pair[0], 1.0).ok()?;
+            let right = revived(&mut *problem, settings, &pair[1], 1.0).ok()?;
+            let stretch = Stretch::new(&mut *problem, &left, &right, 1.0);
+            let near = stretch.at_parameter(&mut *problem, settings, value, &mut Cost::default()).ok()?;
+            problem.set_mesh(&near.mesh);
+            polished(&mut *problem, settings, &near.point).ok().map(|station| station.point)
+        })
+        .collect()
+}
 
 /// The name of the branch on which `point` lies.
 pub fn branch_of<'b>(

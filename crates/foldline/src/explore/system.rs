@@ -1,6 +1,8 @@
 //! A vector field together with what exploring it needs to know.
 
+use super::plan::Plan;
 use crate::contract::{Batch, Parameters, VectorField};
+use crate::model::Model;
 
 /// A vector field, its scales, and where to look for attractors.
 #[derive(Clone)]
@@ -31,6 +33,42 @@ impl<'a> System<'a> {
             whirl: None,
             reflections: vec![vec![false; n]],
         }
+    }
+
+    /// The system of a model at given parameters, with the scales and ranges of its states and the symmetries that it has
+    /// there.
+    pub fn of(model: &'a Model, parameters: &[f64]) -> System<'a> {
+        let mut system = System {
+            scales: model.states.iter().map(|s| s.scale).collect(),
+            // A parameter that is zero says nothing about its size.
+            parameter_scales: model.parameters.iter().map(|p| if p.value == 0.0 { 1.0 } else { p.value.abs() }).collect(),
+            ranges: model.states.iter().map(|s| s.range).collect(),
+            whirl: model.whirl,
+            ..System::new(model)
+        };
+        system.find_reflections(parameters);
+        system
+    }
+
+    /// The system of a plan. Only a symmetry that holds wherever the plan goes counts: at every seed, and with the free
+    /// parameters away from values, such as zero, at which a model may be more symmetric than elsewhere.
+    pub fn of_plan(model: &'a Model, plan: &Plan) -> System<'a> {
+        const AWAY: f64 = 0.617;
+        let mut places: Vec<Vec<f64>> = plan.seeds.iter().map(|seed| seed.parameters.clone()).collect();
+        for seed in &plan.seeds {
+            let mut place = seed.parameters.clone();
+            for branch in &plan.branches {
+                let [low, high] = branch.range;
+                place[branch.free] = low + AWAY * (high - low);
+            }
+            places.push(place);
+        }
+        let mut systems = places.iter().map(|place| System::of(model, place));
+        let Some(mut common) = systems.next() else { return System::new(model) };
+        for other in systems {
+            common.reflections.retain(|reflection| other.reflections.contains(reflection));
+        }
+        common
     }
 
     /// Finds the reflections R = diag(±1), n ≤ 10, with f(R x) = R f(x), by trial at a few points and the parameter values
