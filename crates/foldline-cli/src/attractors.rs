@@ -3,9 +3,9 @@
 use crate::arguments::Attractors as Typed;
 use crate::failure::{Failure, Outcome};
 use crate::run::processors;
-use foldline::explore::System;
 use foldline::attractors::Attractor;
 use foldline::diagram::Solution;
+use foldline::explore::System;
 use foldline::explore::attractors;
 use foldline::model::Model;
 use foldline_store::finite::never_finite;

@@ -71,7 +71,11 @@ fn every_reference_special_point_is_found() {
         let name = format!("{} {}", row[0], row[1]).replace(" period-doubled", "/period-doubling-1");
         let branch = diagram().branch(&name).unwrap_or_else(|| panic!("no branch {name}"));
         let number = |k: usize| row[k].parse::<f64>().ok();
-        assert!(has(branch, &row[2], number(3).unwrap(), number(4), number(5).unwrap()), "{row:?}: {:?}", table(branch));
+        assert!(
+            has(branch, &row[2], number(3).unwrap(), number(4), number(5).unwrap()),
+            "{row:?}: {:?}",
+            table(branch)
+        );
         checked += 1;
     }
     assert_eq!(checked, 7);
@@ -114,7 +118,8 @@ fn the_other_direction_gives_the_same_special_points() {
         for special in &known.special {
             let omega = special.point.parameters[OMEGA];
             let again = branch.special.iter().filter(|s| s.kind == special.kind);
-            let same = again.map(|s| (s.point.parameters[OMEGA] - omega).abs() / (1.0 + omega)).fold(f64::INFINITY, f64::min);
+            let same =
+                again.map(|s| (s.point.parameters[OMEGA] - omega).abs() / (1.0 + omega)).fold(f64::INFINITY, f64::min);
             assert!(same < 1e-6, "{name}: {} {omega} is {same} away", special.kind);
         }
     }
@@ -159,7 +164,8 @@ fn synchronous_responses_satisfy_their_closed_form() {
             let force = m * epsilon * w * w;
             let left = r * ((1.0 - (1.0 - j_p) * w * w + g).powi(2) + (2.0 * zeta * w).powi(2)).sqrt();
             // Newton leaves 1e-9 in r; next to contact K = 150 makes the force that much steeper.
-            let steep = 1.0 + r * (beta + gamma * r * r) + 0.5 * beta * k * kappa * (1.0 - (k * (r - 1.0)).tanh().powi(2));
+            let steep =
+                1.0 + r * (beta + gamma * r * r) + 0.5 * beta * k * kappa * (1.0 - (k * (r - 1.0)).tanh().powi(2));
             assert!((left - force).abs() < 1e-8 * (force + steep), "{name} at {w}, r = {r}: {left} against {force}");
         }
     }
@@ -278,7 +284,14 @@ fn the_list_of_special_points_does_not_depend_on_the_tolerance() {
         assert_eq!(diagram.branches.len(), tight().branches.len());
         for branch in &tight().branches {
             let other = diagram.branch(&branch.name).unwrap_or_else(|| panic!("no branch {}", branch.name));
-            assert_eq!(other.special.len(), branch.special.len(), "{}: {:?} {:?}", branch.name, table(other), table(branch));
+            assert_eq!(
+                other.special.len(),
+                branch.special.len(),
+                "{}: {:?} {:?}",
+                branch.name,
+                table(other),
+                table(branch)
+            );
             for exact in &branch.special {
                 let value = exact.point.parameters[OMEGA];
                 let found = other.special.iter().filter(|s| s.kind == exact.kind);
@@ -286,7 +299,10 @@ fn the_list_of_special_points_does_not_depend_on_the_tolerance() {
                 let nearest = found.min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap();
                 let allowed = (nearest.error + exact.error) * (1.0 + value);
                 assert!(distance(&nearest) <= allowed, "{} {} {value}: {:?}", branch.name, exact.kind, table(other));
-                assert_eq!((nearest.unstable_before, nearest.unstable_after), (exact.unstable_before, exact.unstable_after));
+                assert_eq!(
+                    (nearest.unstable_before, nearest.unstable_after),
+                    (exact.unstable_before, exact.unstable_after)
+                );
             }
         }
     }
@@ -295,7 +311,8 @@ fn the_list_of_special_points_does_not_depend_on_the_tolerance() {
 #[test]
 fn the_result_does_not_depend_on_the_number_of_threads() {
     let study = study(1e-6);
-    let alone = explore::run(&System::of_plan(&study.model, &study.plan), &study.plan, 1, Diagram::default(), &Unobserved);
+    let alone =
+        explore::run(&System::of_plan(&study.model, &study.plan), &study.plan, 1, Diagram::default(), &Unobserved);
     assert_eq!(alone.branches.len(), diagram().branches.len());
     for (a, b) in alone.branches.iter().zip(&diagram().branches) {
         assert_eq!((&a.name, table(a)), (&b.name, table(b)));
@@ -322,7 +339,8 @@ fn a_run_that_is_stopped_anywhere_goes_on_to_the_same_diagram() {
     let system = System::of_plan(&study.model, &study.plan);
     let whole = explore::run(&system, &study.plan, 1, Diagram::default(), &Unobserved);
     for points in [1, 17, 40, 69, 75, 95] {
-        let mut earlier = explore::run(&system, &study.plan, 1, Diagram::default(), &Impatient(AtomicUsize::new(points)));
+        let mut earlier =
+            explore::run(&system, &study.plan, 1, Diagram::default(), &Impatient(AtomicUsize::new(points)));
         // A run that was killed knows of no ending.
         for branch in &mut earlier.branches {
             branch.ends.iter_mut().for_each(|end| *end = end.take().filter(|e| *e != Ending::Stopped));
@@ -332,7 +350,14 @@ fn a_run_that_is_stopped_anywhere_goes_on_to_the_same_diagram() {
         assert!(resumed.branches.iter().map(|b| b.points.len()).sum::<usize>() > kept);
         assert_eq!(resumed.branches.len(), whole.branches.len(), "after {points} points");
         for (a, b) in resumed.branches.iter().zip(&whole.branches) {
-            assert_eq!(a.special.len(), b.special.len(), "{} after {points} points: {:?} {:?}", a.name, table(a), table(b));
+            assert_eq!(
+                a.special.len(),
+                b.special.len(),
+                "{} after {points} points: {:?} {:?}",
+                a.name,
+                table(a),
+                table(b)
+            );
             for (s, t) in a.special.iter().zip(&b.special) {
                 assert!((s.point.parameters[OMEGA] - t.point.parameters[OMEGA]).abs() < 1e-6, "{} {}", a.name, s.kind);
             }
@@ -349,10 +374,15 @@ fn a_homotopy_reaches_the_lightly_damped_rotor() {
         [[branch]]\nname = \"less damping\"\nfrom = \"s\"\nfree = \"zeta\"\nuntil = 1e-5\n\
         [[branch]]\nname = \"SL\"\nfrom = \"less damping\"\nfree = \"Omega\"\nrange = [3, 10]\n";
     let study = parse_study(text, "study", MODEL, "model").unwrap();
-    let diagram = explore::run(&System::of_plan(&study.model, &study.plan), &study.plan, 1, Diagram::default(), &Unobserved);
+    let diagram =
+        explore::run(&System::of_plan(&study.model, &study.plan), &study.plan, 1, Diagram::default(), &Unobserved);
     let branch = diagram.branch("SL").unwrap();
     let row = reference("overhung_rotor_special_points.csv").pop().unwrap();
     let number = |k: usize| row[k].parse::<f64>().unwrap();
-    assert!(row[0].contains("zeta=1e-5") && has(branch, &row[2], number(3), Some(number(4)), number(5)), "{:?}", table(branch));
+    assert!(
+        row[0].contains("zeta=1e-5") && has(branch, &row[2], number(3), Some(number(4)), number(5)),
+        "{:?}",
+        table(branch)
+    );
     assert_eq!(table(branch).len(), 1);
 }

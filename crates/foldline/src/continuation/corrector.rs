@@ -18,6 +18,14 @@ pub enum Failure {
     NotFinite,
     /// The iteration did not contract; sizes of the updates.
     NoConvergence(Vec<f64>),
+    /// The point that was found does not continue the branch: the tangent turns by `angle`, the prediction was off by the
+    /// share `miss` of the step.
+    Elsewhere {
+        /// In radians.
+        angle: f64,
+        /// Relative to the step.
+        miss: f64,
+    },
     /// No mesh of the permitted size meets the tolerance.
     Mesh(f64),
 }
@@ -31,6 +39,9 @@ impl std::fmt::Display for Failure {
                 write!(f, "Newton's method did not converge (relative updates")?;
                 sizes.iter().try_for_each(|s| write!(f, " {s:.1e}"))?;
                 write!(f, ")")
+            }
+            Failure::Elsewhere { angle, miss } => {
+                write!(f, "the branch turns too sharply (by {angle:.2} rad, {miss:.2} of a step off the prediction)")
             }
             Failure::Mesh(error) => write!(f, "the error estimate stays at {error:.1e} on the largest mesh"),
         }

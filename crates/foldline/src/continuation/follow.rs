@@ -50,8 +50,15 @@ struct Trail {
     history: History,
 }
 
-/// Share of the deviation from simpler solutions below which a step counts as having landed on them.
+/// Share of the deviation from simpler solutions below which a step is not accepted: it may have landed on them, and it
+/// could not be told on which side of the meeting it is.
+const LITTLE: f64 = 0.25;
+/// Share below which a point close to the meeting counts as beyond it.
 const NOTHING: f64 = 0.05;
+/// Angles of the chord with both tangents: their sum may exceed the angle between the tangents by this factor …
+const CHORD_FACTOR: f64 = 1.5;
+/// … and this much. On an arc the two are equal; on a jump to another branch the chord points elsewhere.
+const CHORD_SLACK: f64 = 0.08;
 
 /// Follows one side from `start`, which has been emitted already, and of which `previous` is the predecessor on the same
 /// side if there is one. `emitted` counts the points of this side so far.
@@ -141,7 +148,9 @@ fn ended_by(why: Failure, parameter: f64) -> Ending {
     match why {
         Failure::NotFinite => Ending::NotFinite(format!("the vector field is not finite next to {parameter}")),
         Failure::Mesh(_) => Ending::MeshTooLarge(why.to_string()),
-        Failure::Singular | Failure::NoConvergence(_) => Ending::StepTooSmall(format!("{why} next to {parameter}")),
+        Failure::Singular | Failure::NoConvergence(_) | Failure::Elsewhere { .. } => {
+            Ending::StepTooSmall(format!("{why} next to {parameter}"))
+        }
     }
 }
 
@@ -201,13 +210,7 @@ impl Follow<'_> {
         }
         let plane = Plane { row: left.tangent.clone(), base: left.u.clone(), distance: step };
         let mut right = settle(self.problem, self.settings, plane, guess.clone(), self.direction, cost)?;
-        let (angle, _) = self.angle(left, &right);
-        let landed = self.problem.transfer(&right.u, &right.mesh, &left.mesh);
-        let miss: Vec<f64> = landed.iter().zip(&guess).map(|(a, b)| a - b).collect();
-        let miss = self.problem.dot(&miss, &miss).sqrt();
-        if angle > self.settings.max_angle || miss > 0.4 * step {
-            return Err(Failure::NoConvergence(vec![angle, miss / step]));
-        }
+        self.continues(left, &right, &guess)?;
         if let Some(ended) = self.collapsed(left, &right, cost)? {
             return Ok(ended);
         }
@@ -222,6 +225,23 @@ impl Follow<'_> {
             return Ok(Step { right: home, end: Some(Ending::Closed) });
         }
         Ok(Step { right, end })
+    }
+
+    /// Whether `right`, predicted as `guess`, continues the branch at `left`, and neither turns too far nor lies on another
+    /// one.
+    fn continues(&mut self, left: &Station, right: &Station, guess: &[f64]) -> Result<(), Failure> {
+        let (angle, length) = self.angle(left, right);
+        let landed = self.problem.transfer(&right.u, &right.mesh, &left.mesh);
+        let tangent = self.problem.transfer(&right.tangent, &right.mesh, &left.mesh);
+        let miss: Vec<f64> = landed.iter().zip(guess).map(|(a, b)| a - b).collect();
+        let chord: Vec<f64> = landed.iter().zip(&left.u).map(|(a, b)| a - b).collect();
+        let size = |v: &[f64]| self.problem.dot(v, v).sqrt();
+        let against = |t: &[f64]| (self.problem.dot(t, &chord) / (size(t) * size(&chord))).clamp(-1.0, 1.0).acos();
+        let (miss, bent) = (size(&miss), against(&left.tangent) + against(&tangent));
+        if angle > self.settings.max_angle || miss > 0.3 * length || bent > CHORD_FACTOR * angle + CHORD_SLACK {
+            return Err(Failure::Elsewhere { angle, miss: miss / length });
+        }
+        Ok(())
     }
 
     fn at_parameter(
@@ -279,7 +299,7 @@ impl Follow<'_> {
         for monitor in self.collapses {
             let values = [monitor.value(&left.point, &left.point), monitor.value(&left.point, &right.point)];
             // Next to nothing left of the deviation: the step has landed on the simpler solutions themselves.
-            if values[1].abs() < NOTHING * values[0] {
+            if values[1].abs() < LITTLE * values[0] {
                 return Err(Failure::Singular);
             }
             if !(values[0] > 0.0 && values[1] <= 0.0) {

@@ -79,6 +79,18 @@ impl<'s> Stretch<'s> {
         cost: &mut Cost,
     ) -> Result<Station, Failure> {
         let last = self.left.u.len() - 1;
+        let mut u = self.guess_at_parameter(value);
+        problem.set_mesh(&self.left.mesh);
+        problem.anchor(&self.left.u);
+        let plane = Plane { row: super::corrector::parameter_row(u.len()), base: u.clone(), distance: 0.0 };
+        correct(problem, settings, &plane, &mut u, cost)?;
+        u[last] = value;
+        station(problem, u, &self.left.tangent, self.direction, cost)
+    }
+
+    /// Where the cubic between the two stations has that value of the continuation parameter.
+    pub fn guess_at_parameter(&self, value: f64) -> Vec<f64> {
+        let last = self.left.u.len() - 1;
         let (mut low, mut high) = (0.0, self.length);
         let rising = self.right[last] > self.left.u[last];
         for _ in 0..60 {
@@ -87,12 +99,7 @@ impl<'s> Stretch<'s> {
         }
         let mut u = self.hermite(0.5 * (low + high));
         u[last] = value;
-        problem.set_mesh(&self.left.mesh);
-        problem.anchor(&self.left.u);
-        let plane = Plane { row: super::corrector::parameter_row(u.len()), base: u.clone(), distance: 0.0 };
-        correct(problem, settings, &plane, &mut u, cost)?;
-        u[last] = value;
-        station(problem, u, &self.left.tangent, self.direction, cost)
+        u
     }
 
     fn hermite(&self, s: f64) -> Vec<f64> {

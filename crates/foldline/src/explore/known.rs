@@ -8,7 +8,7 @@ use super::System;
 use super::growth::{polished, problem_of, revived};
 use crate::continuation::Settings;
 use crate::continuation::locate::Stretch;
-use crate::diagram::{Branch, Cost, Point};
+use crate::diagram::{Branch, Point};
 
 /// Every solution of a branch at a value of its parameter, by increasing position: one for each time that the branch
 /// passes it.
@@ -23,9 +23,9 @@ pub fn solutions_at(system: &System, settings: &Settings, branch: &Branch, value
             let left = revived(&mut *problem, settings, &pair[0], 1.0).ok()?;
             let right = revived(&mut *problem, settings, &pair[1], 1.0).ok()?;
             let stretch = Stretch::new(&mut *problem, &left, &right, 1.0);
-            let near = stretch.at_parameter(&mut *problem, settings, value, &mut Cost::default()).ok()?;
-            problem.set_mesh(&near.mesh);
-            polished(&mut *problem, settings, &near.point).ok().map(|station| station.point)
+            let guess = stretch.guess_at_parameter(value);
+            let point = problem.point(&guess, &guess, Default::default());
+            polished(&mut *problem, settings, &point).ok().map(|station| station.point)
         })
         .collect()
 }

@@ -41,7 +41,11 @@ impl<'a> System<'a> {
         let mut system = System {
             scales: model.states.iter().map(|s| s.scale).collect(),
             // A parameter that is zero says nothing about its size.
-            parameter_scales: model.parameters.iter().map(|p| if p.value == 0.0 { 1.0 } else { p.value.abs() }).collect(),
+            parameter_scales: model
+                .parameters
+                .iter()
+                .map(|p| if p.value == 0.0 { 1.0 } else { p.value.abs() })
+                .collect(),
             ranges: model.states.iter().map(|s| s.range).collect(),
             whirl: model.whirl,
             ..System::new(model)
