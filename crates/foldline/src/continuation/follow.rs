@@ -5,9 +5,9 @@
 //! next step.
 
 use super::Settings;
-use super::corrector::{Failure, Plane, Station, parameter_row, settle};
+use super::corrector::{Failure, Plane, Station, correct, settle, station};
 use super::inspect::{Found, History};
-use super::locate::Stretch;
+use super::locate::{Stretch, passing};
 use crate::contract::{Monitor, Verdict, ZeroProblem};
 use crate::diagram::{Cost, Ending, Mesh, Point, SpecialPoint};
 
@@ -50,6 +50,8 @@ struct Trail {
     history: History,
 }
 
+/// Steps shorter than this many tolerances begin and end on the same mesh: two meshes agree to the tolerance only.
+const SHORT: f64 = 200.0;
 /// Share of the deviation from simpler solutions below which a step is not accepted: it may have landed on them, and it
 /// could not be told on which side of the meeting it is.
 const LITTLE: f64 = 0.25;
@@ -83,11 +85,16 @@ pub fn follow(
         if emitted >= walk.settings.max_points {
             return Ending::PointLimit(emitted);
         }
-        walk.refresh(&mut left);
-        let mut cost = Cost::default();
+        walk.refresh(&mut left, step);
+        let (mut cost, mut remeshed) = (Cost::default(), 0);
         let Step { mut right, end } = loop {
             match walk.attempt(&left, trail.as_ref(), step, emitted, &mut cost) {
                 Ok(accepted) => break accepted,
+                Err(Failure::Remeshed(mesh)) if remeshed < 3 => {
+                    remeshed += 1;
+                    left.roomier = Some(mesh);
+                    walk.refresh(&mut left, step);
+                }
                 Err(why) => {
                     cost.rejected += 1;
                     step *= 0.5;
@@ -148,7 +155,7 @@ fn ended_by(why: Failure, parameter: f64) -> Ending {
     match why {
         Failure::NotFinite => Ending::NotFinite(format!("the vector field is not finite next to {parameter}")),
         Failure::Mesh(_) => Ending::MeshTooLarge(why.to_string()),
-        Failure::Singular | Failure::NoConvergence(_) | Failure::Elsewhere { .. } => {
+        Failure::Singular | Failure::NoConvergence(_) | Failure::Elsewhere { .. } | Failure::Remeshed(_) => {
             Ending::StepTooSmall(format!("{why} next to {parameter}"))
         }
     }
@@ -170,12 +177,21 @@ impl Follow<'_> {
     }
 
     /// Moves the working copy of a station to a mesh with room for the next step, where its own has none left. The stored
-    /// point stays as it is.
-    fn refresh(&mut self, station: &mut Station) {
-        if let Some(better) = station.roomier.take() {
-            station.u = self.problem.transfer(&station.u, &station.mesh, &better);
-            station.tangent = self.problem.transfer(&station.tangent, &station.mesh, &better);
-            station.mesh = better;
+    /// point stays as it is. If the step is so short that the change of mesh would show in it, the copy is corrected there.
+    fn refresh(&mut self, left: &mut Station, step: f64) {
+        let Some(better) = left.roomier.take() else { return };
+        left.u = self.problem.transfer(&left.u, &left.mesh, &better);
+        left.tangent = self.problem.transfer(&left.tangent, &left.mesh, &better);
+        left.mesh = better;
+        if step < SHORT * self.settings.tolerance {
+            self.place(left);
+            let plane = Plane { row: left.tangent.clone(), base: left.u.clone(), distance: 0.0 };
+            let (mut u, mut cost) = (left.u.clone(), Cost::default());
+            let corrected = correct(self.problem, self.settings, &plane, &mut u, &mut cost)
+                .and_then(|_| station(self.problem, u, &plane.row, self.direction, &mut cost));
+            if let Ok(found) = corrected {
+                (left.u, left.tangent) = (found.u, found.tangent);
+            }
         }
     }
 
@@ -210,6 +226,9 @@ impl Follow<'_> {
         }
         let plane = Plane { row: left.tangent.clone(), base: left.u.clone(), distance: step };
         let mut right = settle(self.problem, self.settings, plane, guess.clone(), self.direction, cost)?;
+        if right.mesh != left.mesh && step < SHORT * self.settings.tolerance {
+            return Err(Failure::Remeshed(right.mesh));
+        }
         self.continues(left, &right, &guess)?;
         if let Some(ended) = self.collapsed(left, &right, cost)? {
             return Ok(ended);
@@ -221,7 +240,7 @@ impl Follow<'_> {
             right = self.at_parameter(left, &right, bound, cost)?;
             end = Some(Ending::Bound(bound));
         }
-        if let Some(home) = self.closes(left, &right, emitted, cost) {
+        if let Some(home) = self.closes(left, &right, emitted, cost)? {
             return Ok(Step { right: home, end: Some(Ending::Closed) });
         }
         Ok(Step { right, end })
@@ -251,18 +270,7 @@ impl Follow<'_> {
         value: f64,
         cost: &mut Cost,
     ) -> Result<Station, Failure> {
-        let stretch = Stretch::new(self.problem, left, right, self.direction);
-        let near = stretch.at_parameter(self.problem, self.settings, value, cost)?;
-        self.place(left);
-        let plane = Plane { row: parameter_row(near.u.len()), base: near.u.clone(), distance: 0.0 };
-        let slope = near.slope();
-        let mut found = settle(self.problem, self.settings, plane, near.u, self.direction, cost)?;
-        // Travel goes on the way it came, also where the parameter row has turned the tangent round.
-        if found.slope() * slope < 0.0 {
-            found.tangent.iter_mut().for_each(|t| *t = -*t);
-            found.point.tangent.iter_mut().for_each(|t| *t = -*t);
-        }
-        Ok(found)
+        passing(self.problem, self.settings, [left, right], value, self.direction, cost)
     }
 
     /// What was found in the last step before a branch meets simpler solutions, without what cannot be told from the
@@ -332,26 +340,32 @@ impl Follow<'_> {
     }
 
     /// The start again, if this step passes it.
-    fn closes(&mut self, left: &Station, right: &Station, emitted: usize, cost: &mut Cost) -> Option<Station> {
-        let home = self.home?;
+    fn closes(
+        &mut self,
+        left: &Station,
+        right: &Station,
+        emitted: usize,
+        cost: &mut Cost,
+    ) -> Result<Option<Station>, Failure> {
+        let Some(home) = self.home else { return Ok(None) };
         let value = home.parameters[self.free];
         let between = (left.parameter() - value) * (right.parameter() - value) <= 0.0;
         let same_way = home.parameter_slope() * self.direction * (right.slope() + left.slope()) > 0.0;
         if emitted < 3 || !between || !same_way {
-            return None;
+            return Ok(None);
         }
         let near = |point: &Point, tolerance: f64| {
             self.settings.reflections.iter().any(|r| point.difference(home, &self.settings.scales, r) < tolerance)
         };
         if !near(&right.point, 0.5) {
-            return None;
+            return Ok(None);
         }
-        let back = self.at_parameter(left, right, value, cost).ok()?;
+        let back = self.at_parameter(left, right, value, cost)?;
         let near = self
             .settings
             .reflections
             .iter()
             .any(|r| back.point.difference(home, &self.settings.scales, r) < 30.0 * self.settings.tolerance);
-        near.then_some(back)
+        Ok(near.then_some(back))
     }
 }

@@ -6,7 +6,7 @@
 //!
 //! **Source.** chandrupatla1997 (bracketing with inverse quadratic interpolation and bisection).
 
-use super::corrector::{Plane, Station, correct, station};
+use super::corrector::{Plane, Station, correct, parameter_row, settle, station};
 use super::{Failure, Settings};
 use crate::contract::{Monitor, ZeroProblem};
 use crate::diagram::{Cost, Point};
@@ -67,29 +67,8 @@ impl<'s> Stretch<'s> {
         station(problem, u, &self.left.tangent, self.direction, cost)
     }
 
-    /// Where the continuation parameter has the given value, which lies between those of the ends.
-    ///
-    /// # Errors
-    /// See [`Failure`].
-    pub fn at_parameter(
-        &self,
-        problem: &mut dyn ZeroProblem,
-        settings: &Settings,
-        value: f64,
-        cost: &mut Cost,
-    ) -> Result<Station, Failure> {
-        let last = self.left.u.len() - 1;
-        let mut u = self.guess_at_parameter(value);
-        problem.set_mesh(&self.left.mesh);
-        problem.anchor(&self.left.u);
-        let plane = Plane { row: super::corrector::parameter_row(u.len()), base: u.clone(), distance: 0.0 };
-        correct(problem, settings, &plane, &mut u, cost)?;
-        u[last] = value;
-        station(problem, u, &self.left.tangent, self.direction, cost)
-    }
-
-    /// Where the cubic between the two stations has that value of the continuation parameter.
-    pub fn guess_at_parameter(&self, value: f64) -> Vec<f64> {
+    /// The distance at which the cubic between the two stations has that value of the continuation parameter.
+    fn distance_to(&self, value: f64) -> f64 {
         let last = self.left.u.len() - 1;
         let (mut low, mut high) = (0.0, self.length);
         let rising = self.right[last] > self.left.u[last];
@@ -97,9 +76,7 @@ impl<'s> Stretch<'s> {
             let middle = 0.5 * (low + high);
             if (self.hermite_component(middle, last) < value) == rising { low = middle } else { high = middle }
         }
-        let mut u = self.hermite(0.5 * (low + high));
-        u[last] = value;
-        u
+        0.5 * (low + high)
     }
 
     fn hermite(&self, s: f64) -> Vec<f64> {
@@ -114,6 +91,61 @@ impl<'s> Stretch<'s> {
         let c = b - a;
         a + x * (p + x * ((3.0 * c - 2.0 * p - q) + x * (p + q - 2.0 * c)))
     }
+}
+
+/// The point between two stations at which the continuation parameter has the given value, which lies between theirs.
+///
+/// Next to a fold fixing the parameter is a bad way to find a point. So points across the tangent of the left station come
+/// first, closer and closer to the value; only the last correction fixes the parameter.
+///
+/// # Errors
+/// See [`Failure`].
+pub fn passing(
+    problem: &mut dyn ZeroProblem,
+    settings: &Settings,
+    [left, right]: [&Station; 2],
+    value: f64,
+    direction: f64,
+    cost: &mut Cost,
+) -> Result<Station, Failure> {
+    let stretch = Stretch::new(problem, left, right, direction);
+    let mut s = stretch.distance_to(value);
+    let [mut low, mut high] = [(0.0, left.parameter()), (stretch.length, right.parameter())];
+    let mut near = None;
+    for _ in 0..5 {
+        problem.set_mesh(&left.mesh);
+        problem.anchor(&left.u);
+        let plane = Plane { row: left.tangent.clone(), base: left.u.clone(), distance: s };
+        let found = settle(problem, settings, plane, stretch.hermite(s), direction, cost)?;
+        let gap = found.parameter() - value;
+        if ((low.1 - value) > 0.0) == (gap > 0.0) {
+            low = (s, found.parameter())
+        } else {
+            high = (s, found.parameter())
+        }
+        let done = gap.abs() < 1e-4 * (low.1 - high.1).abs().max(1e-9 * (1.0 + value.abs()));
+        near = Some(found);
+        if done || high.1 == low.1 {
+            break;
+        }
+        let secant = low.0 + (high.0 - low.0) * (value - low.1) / (high.1 - low.1);
+        s = secant;
+    }
+    let near = near.ok_or(Failure::NotFinite)?;
+    let slope = near.slope();
+    let mut u = near.u;
+    let last = u.len() - 1;
+    problem.set_mesh(&near.mesh);
+    problem.anchor(&u);
+    u[last] = value;
+    let plane = Plane { row: parameter_row(u.len()), base: u.clone(), distance: 0.0 };
+    let mut found = settle(problem, settings, plane, u, direction, cost)?;
+    // Travel goes on the way it came, also where the parameter row has turned the tangent round.
+    if found.slope() * slope < 0.0 {
+        found.tangent.iter_mut().for_each(|t| *t = -*t);
+        found.point.tangent.iter_mut().for_each(|t| *t = -*t);
+    }
+    Ok(found)
 }
 
 /// Finds the zero of `monitor` in `stretch`, whose ends have values of opposite sign.

@@ -7,25 +7,29 @@
 use super::System;
 use super::growth::{polished, problem_of, revived};
 use crate::continuation::Settings;
-use crate::continuation::locate::Stretch;
-use crate::diagram::{Branch, Point};
+use crate::continuation::locate::passing;
+use crate::diagram::{Branch, Cost, Kind, Point};
 
 /// Every solution of a branch at a value of its parameter, by increasing position: one for each time that the branch
 /// passes it.
 pub fn solutions_at(system: &System, settings: &Settings, branch: &Branch, value: f64) -> Vec<Point> {
-    let passes = branch.points.windows(2).filter(|pair| {
+    // Between two points the parameter is monotonous, except where a fold lies between them.
+    let mut track: Vec<&Point> = branch.points.iter().collect();
+    for fold in branch.special.iter().filter(|s| s.kind == Kind::Fold) {
+        let after = track.partition_point(|p| p.position <= fold.point.position);
+        track.insert(after, &fold.point);
+    }
+    let passes = track.windows(2).filter(|pair| {
         let [a, b] = [0, 1].map(|k| pair[k].parameters[branch.free] - value);
         a * b < 0.0 || a == 0.0
     });
     passes
         .filter_map(|pair| {
-            let mut problem = problem_of(system, branch.free, 4, &pair[0], false);
-            let left = revived(&mut *problem, settings, &pair[0], 1.0).ok()?;
-            let right = revived(&mut *problem, settings, &pair[1], 1.0).ok()?;
-            let stretch = Stretch::new(&mut *problem, &left, &right, 1.0);
-            let guess = stretch.guess_at_parameter(value);
-            let point = problem.point(&guess, &guess, Default::default());
-            polished(&mut *problem, settings, &point).ok().map(|station| station.point)
+            let mut problem = problem_of(system, branch.free, 4, pair[0], false);
+            let left = revived(&mut *problem, settings, pair[0], 1.0).ok()?;
+            let right = revived(&mut *problem, settings, pair[1], 1.0).ok()?;
+            let found = passing(&mut *problem, settings, [&left, &right], value, 1.0, &mut Cost::default());
+            found.ok().map(|station| station.point)
         })
         .collect()
 }
