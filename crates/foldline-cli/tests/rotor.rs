@@ -136,6 +136,10 @@ fn the_reference_tables_of_whole_branches_are_matched() {
         assert!(rows.len() > 250);
         for row in &rows {
             let [omega, period, r, unstable] = [0, 1, 2, 3].map(|k| row[k].parse::<f64>().unwrap());
+            // The study ends there, the table goes on.
+            if omega > 12.0 {
+                continue;
+            }
             let found = known::solutions_at(&system, &settings, branch, omega);
             let matched = found.iter().any(|p| {
                 // Next to a fold the period changes with the square root of Omega, whose last digit in the table counts.

@@ -186,8 +186,10 @@ pub fn settle(
     correct(problem, settings, &plane, &mut u, cost)?;
     let mut tolerance = settings.tolerance;
     for round in 0..4 {
-        for _ in 0..6 {
-            let Some(better) = problem.better_mesh(&u, tolerance) else { break };
+        for attempt in 0..10 {
+            // A layer that lies differently between the nodes of every new mesh needs some more of them than one expects.
+            let wanted = tolerance * 0.7f64.powi((attempt - 2).max(0));
+            let Some(better) = problem.better_mesh(&u, wanted) else { break };
             let from = problem.mesh();
             // The hyperplane through the point itself, so that remeshing does not move it along the curve.
             u = problem.transfer(&u, &from, &better);

@@ -6,7 +6,7 @@
 
 use super::System;
 use super::growth::{Beginning, problem_of, setting};
-use crate::continuation::corrector::{Plane, Station, settle};
+use crate::continuation::corrector::{Plane, Station, correct, settle, station};
 use crate::continuation::{Failure, Settings};
 use crate::contract::ZeroProblem;
 use crate::diagram::{Cost, Cycle, Ending, Family, Kind, Point, Solution, SpecialPoint};
@@ -73,13 +73,33 @@ fn step_off(
         let row: Vec<f64> = row.iter().map(|r| r / scale).collect();
         let guess: Vec<f64> = base.iter().zip(&row).map(|(b, r)| b + distance * r).collect();
         let plane = Plane { row, base: base.to_vec(), distance };
-        match settle(problem, settings, plane, guess, 1.0, &mut Cost::default()) {
+        match first_point(problem, settings, plane, guess) {
             Ok(found) if expected(&found) => return Ok(found),
             Ok(found) => second_best = second_best.or(Some(found)),
             Err(why) => failure = why,
         }
     }
     second_best.ok_or(failure)
+}
+
+/// The solution in the plane, on the mesh of the special point where that serves: so close to the special point the change
+/// of mesh would otherwise be larger than the distance from it.
+fn first_point(
+    problem: &mut dyn ZeroProblem,
+    settings: &Settings,
+    plane: Plane,
+    guess: Vec<f64>,
+) -> Result<Station, Failure> {
+    let (mut u, mut cost) = (guess.clone(), Cost::default());
+    correct(problem, settings, &plane, &mut u, &mut cost)?;
+    let found = station(problem, u, &plane.row, 1.0, &mut cost)?;
+    let trust = found.point.trust;
+    let defect = trust.trivial_defect.max(trust.liouville_defect);
+    if trust.discretisation <= settings.tolerance && defect <= 5.0 * settings.tolerance {
+        return Ok(found);
+    }
+    problem.anchor(&guess);
+    settle(problem, settings, plane, guess, 1.0, &mut cost)
 }
 
 /// Exchange of stability: a branch born on the side where its parent has more unstable multipliers has the smaller number
