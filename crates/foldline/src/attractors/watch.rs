@@ -159,6 +159,7 @@ impl Watch {
                 return;
             }
             if !prediction.worthwhile() {
+                self.next_attempt = self.returns.total() + 2;
                 continue;
             }
             self.next_attempt = self.returns.total() + self.returns.total() / 2;

@@ -166,21 +166,20 @@ pub fn locate(
     let resolution = if stretch.left.mesh.is_empty() { 1e-9 } else { 1e-3 };
     let (distance, mut coarse) = chandrupatla(&mut evaluate, [0.0, stretch.length], values, resolution)?;
     let floor = 10.0 * settings.newton_tolerance();
-    let (mut tolerance, mut reach) = (0.3 * settings.tolerance, 1e-2 * stretch.length.abs());
+    let (mut tolerance, mut slope) = (0.3 * settings.tolerance, None);
     // First a mesh that resolves this place, then one with every interval halved; if the two disagree by more than the
     // tolerance, the finer one is the starting point for another round.
     let mut known: Option<(Station, f64)> = None;
     for _ in 0..4 {
         for _ in 0..4 {
             let Some(better) = coarse.better(problem, tolerance) else { break };
-            coarse = relocate(problem, settings, stretch, monitor, &coarse, &better, reach, cost)?;
-            reach = 1e-4 * stretch.length.abs();
+            coarse = relocate(problem, settings, stretch, monitor, &coarse, &better, &mut slope, cost)?;
         }
         problem.set_mesh(&coarse.mesh);
         let Some(finer) = problem.finer_mesh() else {
             return Ok(Located { distance, station: coarse, error: floor });
         };
-        let fine = relocate(problem, settings, stretch, monitor, &coarse, &finer, reach, cost)?;
+        let fine = relocate(problem, settings, stretch, monitor, &coarse, &finer, &mut slope, cost)?;
         let error =
             floor + discrepancy(&coarse.point, &fine.point, coarse.parameter() - fine.parameter(), fine.parameter());
         let improved = known.as_ref().is_none_or(|(_, e)| error < *e);
@@ -216,7 +215,8 @@ impl Station {
     }
 }
 
-/// The zero again on a finer mesh, by the secant method from the coarse one.
+/// The zero again on a finer mesh, by the secant method from the coarse one; `slope` is that of the monitor, if it is known
+/// already.
 fn relocate(
     problem: &mut dyn ZeroProblem,
     settings: &Settings,
@@ -224,7 +224,7 @@ fn relocate(
     monitor: &dyn Monitor,
     coarse: &Station,
     finer: &crate::diagram::Mesh,
-    reach: f64,
+    slope: &mut Option<f64>,
     cost: &mut Cost,
 ) -> Result<Station, Failure> {
     problem.set_mesh(finer);
@@ -237,23 +237,25 @@ fn relocate(
         let found = station(problem, u, &row, stretch.direction, cost)?;
         Ok((monitor.value(&stretch.left.point, &found.point), found))
     };
-    let (mut a, mut b) = (0.0, reach);
-    let (mut ga, mut best) = at(a)?;
-    let (mut gb, mut other) = at(b)?;
+    // Far enough below the tolerance that the error of the iteration does not show.
+    let enough = 1e-3 * settings.tolerance;
+    let (mut a, (mut ga, mut found)) = (0.0, at(0.0)?);
+    let mut step = match *slope {
+        Some(slope) if (ga / slope).abs() < stretch.length.abs() => -ga / slope,
+        _ => 1e-2 * stretch.length.abs(),
+    };
     for _ in 0..8 {
-        let next = b - gb * (b - a) / (gb - ga);
-        if !next.is_finite() || next.abs() > stretch.length.abs() {
+        if step.abs() < enough || !step.is_finite() || (a + step).abs() > stretch.length.abs() {
             break;
         }
-        (a, ga) = (b, gb);
-        best = other;
-        b = next;
-        (gb, other) = at(b)?;
-        if (b - a).abs() < 1e-9 * stretch.length.abs() || gb == 0.0 {
-            break;
-        }
+        let b = a + step;
+        let (gb, next) = at(b)?;
+        let rise = (gb - ga) / (b - a);
+        *slope = Some(rise);
+        step = -gb / rise;
+        (a, ga, found) = (b, gb, next);
     }
-    Ok(if gb.abs() <= ga.abs() { other } else { best })
+    Ok(found)
 }
 
 /// Bracketing root finder; returns the place and what was found there.

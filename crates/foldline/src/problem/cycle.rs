@@ -47,6 +47,8 @@ pub struct CycleProblem<'a> {
     fx: Vec<f64>,
     fp: Vec<f64>,
     trace: f64,
+    /// Errors found by the last examination, while its factorisation is the last one.
+    errors: Option<Vec<f64>>,
 }
 
 impl<'a> CycleProblem<'a> {
@@ -71,6 +73,7 @@ impl<'a> CycleProblem<'a> {
             fx: Vec::new(),
             fp: Vec::new(),
             trace: 0.0,
+            errors: None,
         };
         problem.set_mesh(mesh);
         problem
@@ -204,7 +207,7 @@ impl<'a> CycleProblem<'a> {
     }
 
     /// Estimated error on every interval, relative; uses the last factorisation, which must belong to the current mesh.
-    fn errors(&self, u: &[f64]) -> Vec<f64> {
+    fn measured_errors(&self, u: &[f64]) -> Vec<f64> {
         let size = self.profile_size();
         let scale = self.relative_scale(u);
         let parameters = self.setting.at(u[size + 1]);
@@ -325,6 +328,7 @@ impl ZeroProblem for CycleProblem<'_> {
     }
 
     fn factorise(&mut self, u: &[f64], row: &[f64]) -> Result<(), Singular> {
+        self.errors = None;
         self.fill(u, row);
         self.system.condense()?;
         self.system.eliminate(1.0)
@@ -371,6 +375,7 @@ impl ZeroProblem for CycleProblem<'_> {
 
     fn set_mesh(&mut self, mesh: &Mesh) {
         self.mesh = mesh.clone();
+        self.errors = None;
         let (n, count) = (self.n, mesh.len() - 1);
         let lanes = count * self.scheme.degree;
         self.system.resize(count);
@@ -392,7 +397,7 @@ impl ZeroProblem for CycleProblem<'_> {
     }
 
     fn better_mesh(&self, u: &[f64], tolerance: f64) -> Option<Mesh> {
-        let errors = self.errors(u);
+        let errors = self.errors.clone().unwrap_or_else(|| self.measured_errors(u));
         let worst = errors.iter().fold(0.0, |m: f64, e| m.max(*e));
         let degree = self.scheme.degree;
         let better = if self.halves {
@@ -421,7 +426,7 @@ impl ZeroProblem for CycleProblem<'_> {
         }
         let found = floquet::multipliers(&transitions, &self.flow_at_nodes(u), n);
         let scale = self.relative_scale(u);
-        let errors = self.errors(u);
+        let errors = self.measured_errors(u);
         let mut r = vec![0.0; size + 2];
         self.residual(u, &mut r);
         let residual =
@@ -434,6 +439,7 @@ impl ZeroProblem for CycleProblem<'_> {
             trivial_defect: (found.multipliers[0].re - 1.0).abs(),
             liouville_defect: (found.log_product - self.trace).abs(),
         };
+        self.errors = Some(errors);
         Examination { spectrum: found.multipliers, unstable: found.unstable, ranges, trust }
     }
 
