@@ -62,6 +62,9 @@ const CHORD_FACTOR: f64 = 1.5;
 /// … and this much. On an arc the two are equal; on a jump to another branch the chord points elsewhere.
 const CHORD_SLACK: f64 = 0.08;
 
+/// Growth of the period from which on a parameter that stands still means that the period has no bound.
+const LONG: f64 = 3.0;
+
 /// Follows one side from `start`, which has been emitted already, and of which `previous` is the predecessor on the same
 /// side if there is one. `emitted` counts the points of this side so far.
 pub fn follow(
@@ -76,7 +79,9 @@ pub fn follow(
     let mut position = left.point.position;
     let mut trail = previous.map(|p| walk.trail(&p, &left));
     let first_period = walk.home.unwrap_or(&left.point).solution.period();
+    let mut moved = false;
     loop {
+        moved |= walk.moves(&left);
         let outward = |bound: f64| (left.parameter() - bound).abs() <= 1e-12 * (1.0 + bound.abs());
         let [low, high] = walk.settings.range;
         if (outward(low) && left.slope() < 0.0) || (outward(high) && left.slope() > 0.0) {
@@ -141,10 +146,12 @@ pub fn follow(
         if let Some(ending) = end {
             return ending;
         }
-        if let (Some(first), Some(now)) = (first_period, right.point.solution.period())
-            && now > walk.settings.period_growth * first
-        {
-            return Ending::PeriodUnbounded(now);
+        if let (Some(first), Some(now)) = (first_period, right.point.solution.period()) {
+            let settled = moved && !walk.moves(&left) && !walk.moves(&right);
+            let growing = left.point.solution.period().is_some_and(|before| now > before);
+            if growing && (now > walk.settings.period_growth * first || (settled && now > LONG * first)) {
+                return Ending::PeriodUnbounded(now);
+            }
         }
         trail = Some(walk.trail(&left, &right));
         left = right;
@@ -153,10 +160,10 @@ pub fn follow(
 
 fn ended_by(why: Failure, parameter: f64) -> Ending {
     match why {
-        Failure::NotFinite => Ending::NotFinite(format!("the vector field is not finite next to {parameter}")),
+        Failure::NotFinite => Ending::NotFinite(format!("the vector field is not finite next to {parameter:?}")),
         Failure::Mesh(_) => Ending::MeshTooLarge(why.to_string()),
         Failure::Singular | Failure::NoConvergence(_) | Failure::Elsewhere { .. } | Failure::Remeshed(_) => {
-            Ending::StepTooSmall(format!("{why} next to {parameter}"))
+            Ending::StepTooSmall(format!("{why} next to {parameter:?}"))
         }
     }
 }
@@ -165,6 +172,14 @@ impl Follow<'_> {
     fn place(&mut self, station: &Station) {
         self.problem.set_mesh(&station.mesh);
         self.problem.anchor(&station.u);
+    }
+
+    /// Whether the parameter still moves where the period grows: dλ/d ln T, which tends to zero with the distance from an
+    /// orbit of infinite period, exceeds the tolerance.
+    fn moves(&self, station: &Station) -> bool {
+        let Some(period) = station.point.solution.period() else { return true };
+        let growth = station.tangent[station.tangent.len() - 2] / period;
+        station.slope().abs() > 0.1 * self.settings.tolerance * (1.0 + station.parameter().abs()) * growth.abs()
     }
 
     fn trail(&mut self, before: &Station, now: &Station) -> Trail {
@@ -332,6 +347,10 @@ impl Follow<'_> {
                 }
             }
             let near = near.ok_or(Failure::Singular)?;
+            // A deviation that has turned instead of shrunk, as that of a narrow pulse that has moved, is none that vanishes.
+            if monitor.value(&near.point, &left.point) < 1.1 {
+                continue;
+            }
             let share = (monitor.value(&left.point, &near.point) / values[0]).powi(2);
             let parameter = (near.parameter() - share * left.parameter()) / (1.0 - share);
             return Ok(Some(Step { right: near, end: Some(Ending::Joined { at: monitor.kind(), parameter }) }));

@@ -47,9 +47,14 @@ impl Follow<'_> {
     ) -> Vec<Found> {
         let stretch = Stretch::new(self.problem, left, right, self.direction);
         let (at_left, at_right) = (self.monitored(left), self.monitored(right));
+        let standing = stands(left) && stands(right);
         let mut located: Vec<(usize, Located)> = Vec::new();
         for k in 0..self.monitors.len() {
             let values = [at_left[k], at_right[k]];
+            let kind = self.monitors[k].kind();
+            if standing && matches!(kind, Kind::Fold | Kind::BranchPoint) {
+                continue;
+            }
             if (values[0] > 0.0) == (values[1] > 0.0) || values.iter().any(|v| v.is_nan()) {
                 continue;
             }
@@ -63,7 +68,8 @@ impl Follow<'_> {
         located.sort_by(|a, b| a.1.distance.total_cmp(&b.1.distance));
         let jumps: Vec<usize> = located.iter().map(|(k, _)| self.monitors[*k].jump()).collect();
         let change = left.point.unstable.abs_diff(right.point.unstable);
-        let explained = explains(&jumps, left.point.unstable as i64, right.point.unstable as i64);
+        let explained = explains(&jumps, left.point.unstable as i64, right.point.unstable as i64)
+            || (standing && jumps.is_empty() && change == 1);
         let suspicious = depth < 3 && history.is_some_and(|h| self.may_touch(h, &at_left, &at_right, stretch.length));
         if depth < DEEPEST
             && (jumps.len() > 1 || !explained || (suspicious && jumps.is_empty()))
@@ -148,6 +154,12 @@ impl Follow<'_> {
             bend * b > 0.0 && at > 0.0 && at < length && value / b < 0.1
         })
     }
+}
+
+/// Whether the parameter does not change along the branch, but for rounding. Then every solution of the family has an
+/// eigenvalue 0 (a second multiplier 1), and neither the sign of that nor of the change of the parameter means anything.
+fn stands(station: &Station) -> bool {
+    station.slope().abs() < 1e-9
 }
 
 /// Whether jumps of these sizes, each with either sign, lead from one count to the other.

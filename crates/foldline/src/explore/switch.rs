@@ -55,7 +55,7 @@ fn step_off(
     base: &[f64],
     direction: &[f64],
     sign: f64,
-    expected: &dyn Fn(&Station) -> bool,
+    expected: &dyn Fn(&dyn ZeroProblem, &Station) -> bool,
 ) -> Result<Station, Failure> {
     let mesh = problem.mesh();
     let (mut failure, mut second_best) = (Failure::Singular, None);
@@ -74,7 +74,7 @@ fn step_off(
         let guess: Vec<f64> = base.iter().zip(&row).map(|(b, r)| b + distance * r).collect();
         let plane = Plane { row, base: base.to_vec(), distance };
         match first_point(problem, settings, plane, guess) {
-            Ok(found) if expected(&found) => return Ok(found),
+            Ok(found) if expected(&*problem, &found) => return Ok(found),
             Ok(found) => second_best = second_best.or(Some(found)),
             Err(why) => failure = why,
         }
@@ -122,8 +122,9 @@ fn doubled(
 ) -> Result<Beginning, String> {
     let (mut problem, base, direction) =
         double(system, free, at, cycle).ok_or("no vector of period doubling was found")?;
-    let first = step_off(&mut problem, settings, &base, &direction, 1.0, &|found| exchanges_stability(at, free, found))
-        .map_err(|why| why.to_string())?;
+    let first =
+        step_off(&mut problem, settings, &base, &direction, 1.0, &|_, found| exchanges_stability(at, free, found))
+            .map_err(|why| why.to_string())?;
     let before = doubled_edge(system, free, at, &first.point).into_iter().collect();
     Ok(Beginning::Edge { before, first, joined: joined(at, free) })
 }
@@ -179,8 +180,9 @@ fn born(
     let mut base = problem.unknowns_of(&at.point);
     let size = base.len();
     base[size - 2] = period;
-    let first = step_off(&mut problem, settings, &base, &direction, 1.0, &|found| exchanges_stability(at, free, found))
-        .map_err(|why| why.to_string())?;
+    let first =
+        step_off(&mut problem, settings, &base, &direction, 1.0, &|_, found| exchanges_stability(at, free, found))
+            .map_err(|why| why.to_string())?;
     Ok(Beginning::Edge { before: Vec::new(), first, joined: joined(at, free) })
 }
 
@@ -198,9 +200,16 @@ fn crossing(
     let vector = branch_point::direction(problem, &u, &at.point.tangent)
         .ok_or("the tangent of the other branch was not found")?;
     let mesh = problem.mesh();
-    let one = step_off(problem, settings, &u, &vector, 1.0, &|_| true).map_err(|why| why.to_string())?;
+    // Where the branch one comes from bends, it may meet the hyperplane too; its direction is still nearly that at the point.
+    let (own, own_mesh) = (&at.point.tangent, mesh.clone());
+    let leaves = |problem: &dyn ZeroProblem, found: &Station| {
+        let tangent = problem.transfer(&found.tangent, &found.mesh, &own_mesh);
+        let lengths = |a: &[f64]| problem.dot(a, a).sqrt();
+        problem.dot(&tangent, own).abs() < 0.95 * lengths(&tangent) * lengths(own)
+    };
+    let one = step_off(problem, settings, &u, &vector, 1.0, &leaves).map_err(|why| why.to_string())?;
     problem.set_mesh(&mesh);
-    let symmetric = step_off(problem, settings, &u, &vector, -1.0, &|_| true).is_ok_and(|other| {
+    let symmetric = step_off(problem, settings, &u, &vector, -1.0, &|_, _| true).is_ok_and(|other| {
         let images = system.reflections.iter().filter(|r| r.contains(&true));
         let gap = (one.parameter() - other.parameter()).abs();
         gap < 1e-6 * (1.0 + one.parameter().abs())
