@@ -170,6 +170,11 @@ pub fn station(
     Ok(Station { point, u, tangent, mesh: problem.mesh(), roomier: None })
 }
 
+/// A multiplier closer to the unit circle than this many defects might lie on its other side …
+const CERTAIN: f64 = 20.0;
+/// … and is computed once more with the tolerance multiplied by this.
+const TIGHTER: f64 = 0.05;
+
 /// Corrects `u` in `plane` and adapts the mesh until the error estimate meets the tolerance, and both defects of the
 /// multipliers five times that. The problem is left on the mesh of the result and anchored there.
 ///
@@ -184,7 +189,7 @@ pub fn settle(
     cost: &mut Cost,
 ) -> Result<Station, Failure> {
     correct(problem, settings, &plane, &mut u, cost)?;
-    let mut tolerance = settings.tolerance;
+    let (mut tolerance, mut tightened) = (settings.tolerance, false);
     for round in 0..4 {
         for attempt in 0..10 {
             // A layer that lies differently between the nodes of every new mesh needs some more of them than one expects.
@@ -202,16 +207,23 @@ pub fn settle(
         }
         let mut found = station(problem, u, &plane.row, direction, cost)?;
         let trust = found.point.trust;
+        let defect = trust.trivial_defect.max(trust.liouville_defect);
         // Multipliers can need a finer mesh than the profile. Where they do not get better with it, the defects say so.
-        if trust.trivial_defect.max(trust.liouville_defect) <= 5.0 * settings.tolerance || round == 3 {
+        let accurate = defect <= 5.0 * settings.tolerance || round == 3;
+        // Whether a multiplier lies inside or outside the unit circle must not be a matter of its error.
+        let close = |z: &num_complex::Complex64| z.norm().ln().abs() < CERTAIN * defect;
+        let certain = tightened || round == 3 || !found.point.free_spectrum().iter().any(close);
+        if accurate && certain {
             if trust.discretisation > 1.5 * settings.tolerance {
                 return Err(Failure::Mesh(trust.discretisation));
             }
-            found.roomier = problem.better_mesh(&found.u, 0.5 * tolerance);
+            let usual = if tightened { tolerance / TIGHTER } else { tolerance };
+            found.roomier = problem.better_mesh(&found.u, 0.5 * usual);
             return Ok(found);
         }
         u = found.u;
-        tolerance *= 0.25;
+        tightened |= accurate;
+        tolerance *= if accurate { TIGHTER } else { 0.25 };
     }
     Err(Failure::NotFinite)
 }
