@@ -120,14 +120,14 @@ fn model_key<'v, 't>(walk: &mut Walk, root: &'v DeTable<'t>) -> Option<&'v Value
     value
 }
 
-/// The one tolerance: relative, from 1e-12 to 1e-2, by default 1e-6.
+/// The one tolerance: relative, from 1e-10 to 1e-4, by default 1e-6.
 fn tolerance(walk: &mut Walk, root: &DeTable) -> f64 {
     const DEFAULT: f64 = 1e-6;
     let Some(value) = root.get("tolerance") else { return DEFAULT };
     let Some(tolerance) = walk.number(value, "`tolerance`") else { return DEFAULT };
-    if !(1e-12..=1e-2).contains(&tolerance) {
+    if !(1e-10..=1e-4).contains(&tolerance) {
         let message = format!("the tolerance {tolerance:e} is out of bounds");
-        walk.report(value.span(), message, "a number from 1e-12 to 1e-2; 1e-6 is the default");
+        walk.report(value.span(), message, "a number from 1e-10 to 1e-4; 1e-6 is the default");
     }
     tolerance
 }
