@@ -157,7 +157,7 @@ fn names_used_twice() {
 #[test]
 fn tolerance_out_of_bounds_or_no_number() {
     let desk = Desk::new();
-    says(&desk.study("1e-6", "0.5"), &["study.toml:2:13", "5e-1 is out of bounds", "from 1e-12 to 1e-2"]);
+    says(&desk.study("1e-6", "0.5"), &["study.toml:2:13", "5e-1 is out of bounds", "from 1e-10 to 1e-4"]);
     says(&desk.study("1e-6", "\"small\""), &["study.toml:2:13", "not a number", "write a number"]);
     says(&desk.study("1e-6", "nan"), &["study.toml:2:13", "not a finite number"]);
 }
