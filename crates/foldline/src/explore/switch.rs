@@ -102,8 +102,9 @@ fn doubled(
 ) -> Result<Beginning, String> {
     let (mut problem, base, direction) =
         double(system, free, at, cycle).ok_or("no vector of period doubling was found")?;
-    let first = step_off(&mut problem, settings, &base, &direction, 1.0, &|_, found| exchanges_stability(at, free, found))
-        .map_err(|why| why.to_string())?;
+    let first =
+        step_off(&mut problem, settings, &base, &direction, 1.0, &|_, found| exchanges_stability(at, free, found))
+            .map_err(|why| why.to_string())?;
     let before = doubled_edge(system, free, at, &first.point).into_iter().collect();
     Ok(Beginning::Edge { before, first, joined: joined(at, free) })
 }
@@ -159,8 +160,9 @@ fn born(
     let mut base = problem.unknowns_of(&at.point);
     let size = base.len();
     base[size - 2] = period;
-    let first = step_off(&mut problem, settings, &base, &direction, 1.0, &|_, found| exchanges_stability(at, free, found))
-        .map_err(|why| why.to_string())?;
+    let first =
+        step_off(&mut problem, settings, &base, &direction, 1.0, &|_, found| exchanges_stability(at, free, found))
+            .map_err(|why| why.to_string())?;
     Ok(Beginning::Edge { before: Vec::new(), first, joined: joined(at, free) })
 }
 

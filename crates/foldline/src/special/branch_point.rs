@@ -38,7 +38,11 @@ impl Monitor for BranchPoint {
 /// `u` and anchored there. `None` if there is none.
 pub fn direction(problem: &mut dyn ZeroProblem, u: &[f64], tangent: &[f64]) -> Option<Vec<f64>> {
     let size = problem.unknowns();
-    problem.factorise(u, tangent).ok()?;
+    // Exactly at the point there may be nothing to factorise; a little beside it the null vector is nearly the same.
+    if problem.factorise(u, tangent).is_err() {
+        let beside: Vec<f64> = u.iter().zip(tangent).map(|(x, t)| x + 1e-8 * t).collect();
+        problem.factorise(&beside, tangent).ok()?;
+    }
     let mut v: Vec<f64> = (0..size).map(|k| ((k * k) as f64 * 0.37 + 0.2).sin()).collect();
     let mut next = vec![0.0; size];
     for _ in 0..4 {
