@@ -26,7 +26,8 @@ impl Monitor for BranchPoint {
         let centre = if matches!(at.solution, Solution::Cycle(_)) { 1.0 } else { 0.0 };
         let largest = at.spectrum.iter().map(|z| z.norm()).fold(1e-300, f64::max).min(1.0);
         let closest = at.free_spectrum().iter().map(|z| (z - centre).norm()).fold(f64::INFINITY, f64::min);
-        closest < 1e-2 * largest && at.parameter_slope().abs() > 1e-6
+        // A single eigenvalue has none to be compared with.
+        (closest < 1e-2 * largest || at.spectrum.len() == 1) && at.parameter_slope().abs() > 1e-6
     }
 
     fn jump(&self) -> usize {
