@@ -1,7 +1,7 @@
 //! Classical problems whose special points are known: in closed form, or from another continuation code at fine settings.
 
 use foldline::contract::Unobserved;
-use foldline::diagram::{Branch, Diagram, Ending, Kind, SpecialPoint};
+use foldline::diagram::{Branch, Diagram, Ending, Kind, Solution, SpecialPoint};
 use foldline::explore::{self, System};
 use foldline_store::study_file::parse_study;
 
@@ -220,7 +220,7 @@ fn fitzhugh_nagumo_cycles_span_from_one_hopf_point_to_the_other() {
     let hopf = 0.422817629424;
     let rest = branch(&diagram, "b");
     let found = has(rest, &[(Kind::Hopf, -hopf), (Kind::Hopf, hopf)], 1e-8);
-    let foldline::diagram::Solution::Equilibrium(x) = &found[1].point.solution else { panic!("an equilibrium") };
+    let Solution::Equilibrium(x) = &found[1].point.solution else { panic!("an equilibrium") };
     assert!(near(x[0], 0.954521404218, 1e-8) && near(x[1], -0.664629718493, 1e-8), "{x:?}");
     let cycle = branch(&diagram, "b/hopf-1");
     // Born and lost subcritically; two runs of the same branch from either end would meet the same fold mirrored.
@@ -229,4 +229,165 @@ fn fitzhugh_nagumo_cycles_span_from_one_hopf_point_to_the_other() {
     joined(cycle, 0, Kind::Hopf, -hopf, 1e-8);
     joined(cycle, 1, Kind::Hopf, hopf, 1e-8);
     assert_eq!(diagram.branches.len(), 2, "the second Hopf point leads to the branch that is known already");
+}
+
+#[test]
+fn lorenz_rolls_leave_rest_at_a_pitchfork_and_oscillate_up_to_a_homoclinic_orbit() {
+    let diagram = explored(
+        LORENZ,
+        "state = { x = 0, y = 0, z = 0 }\nparameters = { rho = 0.5 }",
+        "free = \"rho\"\nrange = [0.2, 40]\nswitch = { branch-point = 1, hopf = 1 }",
+    );
+    // Closed form: pitchfork at 1, Hopf at σ(σ + b + 3)/(σ - b - 1).
+    let (sigma, b) = (10.0, 8.0 / 3.0);
+    let hopf = sigma * (sigma + b + 3.0) / (sigma - b - 1.0);
+    let found = has(branch(&diagram, "b"), &[(Kind::BranchPoint, 1.0)], 1e-8);
+    assert_eq!((found[0].unstable_before, found[0].unstable_after), (0, 1));
+    // One arm; the other one is its mirror image.
+    assert_eq!(diagram.branches.len(), 3);
+    let arm = branch(&diagram, "b/branch-point-1");
+    joined(arm, 0, Kind::BranchPoint, 1.0, 1e-8);
+    for point in &arm.points {
+        let rho = point.parameters[arm.free];
+        assert!(near(point.ranges[0][0].abs(), (b * (rho - 1.0)).sqrt(), 1e-8));
+    }
+    let found = has(arm, &[(Kind::Hopf, hopf)], 1e-8);
+    let Solution::Equilibrium(x) = &found[0].point.solution else { panic!("an equilibrium") };
+    assert!(near(x[0].abs(), 7.9560197, 1e-7) && near(x[2], 23.7368437, 1e-6), "{x:?}");
+    // Subcritical: unstable cycles below. Period at the Hopf point in closed form; the homoclinic orbit from other
+    // continuation code, to the digits given.
+    let cycle = branch(&diagram, "b/branch-point-1/hopf-1");
+    period_is(cycle.points[0].solution.period(), 0.65283033, 1e-4);
+    assert!(cycle.points.iter().all(|p| p.parameters[cycle.free] < hopf && p.unstable == 1));
+    ends(cycle, ["joined", "period-unbounded"]);
+    assert!(cycle.special.is_empty());
+    assert!(near(cycle.points[cycle.points.len() - 1].parameters[cycle.free], 13.926, 5e-5));
+}
+
+#[test]
+fn a_symmetric_lorenz_cycle_loses_its_symmetry_at_a_branch_point() {
+    let along = |seed: &str, range: &str| {
+        let seed = format!("attractor = \"cycle\"\nparameters = {{ rho = {seed} }}");
+        explored(LORENZ, &seed, &format!("free = \"rho\"\nrange = {range}\nswitch = {{ branch-point = 1 }}"))
+    };
+    // From the symmetric side, where it is stable. The digits are this program's own, for want of others; that both sides
+    // give the same place is the check.
+    let diagram = along("330", "[300, 340]");
+    let found = has(branch(&diagram, "b"), &[(Kind::BranchPoint, 312.97353)], 1e-7);
+    assert_eq!((found[0].unstable_before, found[0].unstable_after), (1, 0));
+    assert_eq!(diagram.branches.len(), 2);
+    let arm = branch(&diagram, "b/branch-point-1");
+    ends(arm, ["joined", "bound"]);
+    assert!(arm.special.is_empty() && arm.points.iter().all(|p| p.unstable == 0));
+    // From the other side: the arm goes on as its mirror image, and the symmetric cycle is found at the same place.
+    let other = along("305", "[300, 340]");
+    let place = |branch: &Branch| branch.special[0].point.parameters[branch.free];
+    assert!(near(place(branch(&other, "b")), place(branch(&diagram, "b")), 3e-5));
+    let symmetric = branch(&other, "b/branch-point-1");
+    has(symmetric, &[(Kind::BranchPoint, 312.97353)], 1e-7);
+    ends(symmetric, ["bound", "bound"]);
+}
+
+#[test]
+fn predator_and_prey_branch_twice_and_turn_and_oscillate() {
+    let model = "name = \"Predator and prey\"\n[parameters]\np = 0.1\n[states]\nu = \"3*u*(1 - u) - u*v - p*(1 - exp(-5*u))\"\nv = \"-v + 3*u*v\"\n";
+    let diagram = explored(
+        model,
+        "state = { u = 0, v = 0 }",
+        "free = \"p\"\nrange = [0.1, 1]\nswitch = { branch-point = 2, hopf = 1 }",
+    );
+    // Closed form, and Newton's method on the defining equations.
+    let second = 2.0 / 3.0 / (1.0 - (-5f64 / 3.0).exp());
+    has(branch(&diagram, "b"), &[(Kind::BranchPoint, 0.6)], 1e-8);
+    let prey = branch(&diagram, "b/branch-point-1");
+    let found = has(prey, &[(Kind::BranchPoint, 0.6), (Kind::BranchPoint, second), (Kind::Fold, 0.832929322234)], 1e-8);
+    assert!(near(found[2].point.ranges[0][0], 0.411161560751, 1e-6));
+    let both = diagram.branches.iter().find(|b| b.special.iter().any(|s| s.kind == Kind::Hopf)).unwrap();
+    let found = has(both, &[(Kind::Hopf, 0.671593847479), (Kind::BranchPoint, second)], 1e-8);
+    let Solution::Equilibrium(x) = &found[0].point.solution else { panic!("an equilibrium") };
+    assert!(near(x[0], 1.0 / 3.0, 1e-8) && near(x[1], 0.36576154, 1e-8), "{x:?}");
+    let omega = found[0].point.spectrum.iter().map(|z| z.im).fold(0.0, f64::max);
+    assert!(near(omega, 0.60478222, 1e-7), "{omega}");
+    // Cycles up to a heteroclinic orbit, without anything else on the way.
+    let cycle = branch(&diagram, &format!("{}/hopf-1", both.name));
+    ends(cycle, ["joined", "period-unbounded"]);
+    assert!(cycle.special.is_empty());
+    assert_eq!(diagram.branches.len(), 4, "the branch points are met again from the other side, and lead nowhere new");
+}
+
+#[test]
+fn the_ab_reaction_turns_twice_and_its_cycles_end_at_a_homoclinic_orbit() {
+    let model = "name = \"AB\"\n[parameters]\np = 0.05\n[states]\nu = \"-u + p*(1 - u)*exp(v)\"\nv = \"-v + 14*p*(1 - u)*exp(v) - 2*v\"\n";
+    let diagram =
+        explored(model, "state = { u = 0.05, v = 0.3 }", "free = \"p\"\nrange = [0.01, 0.2]\nswitch = { hopf = 1 }");
+    // Other continuation code, 6 to 7 digits; the end of the cycles likewise.
+    has(branch(&diagram, "b"), &[(Kind::Fold, 0.08893185), (Kind::Fold, 0.1057390), (Kind::Hopf, 0.1308998)], 3e-7);
+    let cycle = branch(&diagram, "b/hopf-1");
+    ends(cycle, ["joined", "period-unbounded"]);
+    assert!(cycle.special.is_empty());
+    assert!(near(cycle.points[cycle.points.len() - 1].parameters[cycle.free], 0.1055071, 1e-7));
+}
+
+#[test]
+fn a_cycle_of_the_langford_system_becomes_a_torus() {
+    let model = "name = \"Langford\"\n[parameters]\nlambda = 0.5\n[states]\nx = \"(z - 0.7)*x - 3.5*y\"\ny = \"3.5*x + (z - 0.7)*y\"\nz = \"0.6 + lambda*z - z^3/3 - (x^2 + y^2)*(1 + 0.25*z)\"\n";
+    let diagram = explored(model, "attractor = \"cycle\"", "free = \"lambda\"\nrange = [0.1, 1.5]");
+    let cycle = branch(&diagram, "b");
+    // Closed form. With r² = x² + y² the cycle is the equilibrium z = 0.7 of r' = (z - 0.7) r, z' = g(r, z); the torus is
+    // its Hopf point, where ∂g/∂z = lambda - z² - r²/4 = 0 and ω² = 2.35 r².
+    let z: f64 = 0.7;
+    let share = 1.0 + 0.25 * z;
+    let lambda = (z * z + 0.25 * (0.6 - z.powi(3) / 3.0) / share) / (1.0 - 0.25 * z / share);
+    let omega = (2.0 * share * 4.0 * (lambda - z * z)).sqrt();
+    let found = has(cycle, &[(Kind::Torus, lambda)], TOLERANCE);
+    assert_eq!((found[0].unstable_before, found[0].unstable_after), (0, 2));
+    let period = std::f64::consts::TAU / 3.5;
+    period_is(found[0].point.solution.period(), period, TOLERANCE);
+    // The pair itself: exp(±iωT).
+    let pair = &found[0].point.spectrum[1..];
+    for multiplier in pair {
+        assert!((multiplier.norm() - 1.0).abs() < 1e-5, "{pair:?}");
+        assert!((multiplier.re - (omega * period).cos()).abs() < 1e-5, "{pair:?}");
+    }
+    // Second route: the modulus crosses 1 between the accepted points on either side.
+    for point in &cycle.points {
+        let inside = point.parameters[cycle.free] < lambda;
+        assert_eq!(point.spectrum[1].norm() < 1.0, inside, "{:?}", point.spectrum);
+    }
+}
+
+#[test]
+fn van_der_pol_cycle_crosses_the_circles_of_the_harmonic_oscillator() {
+    let diagram = explored(VAN_DER_POL, "attractor = \"cycle\"", "free = \"mu\"\nrange = [-1, 1]");
+    // At mu = 0 every circle is a cycle; that of amplitude 2 continues to either side, and mu -> -mu reverses time.
+    let cycle = branch(&diagram, "b");
+    let found = has(cycle, &[(Kind::BranchPoint, 0.0)], TOLERANCE);
+    assert!(near(found[0].point.ranges[0][1], 2.0, TOLERANCE));
+    let (first, last) = (&cycle.points[0], &cycle.points[cycle.points.len() - 1]);
+    period_is(first.solution.period(), 6.66328686, TOLERANCE);
+    period_is(last.solution.period(), 6.66328686, TOLERANCE);
+    assert!((first.spectrum[1] * last.spectrum[1] - 1.0).norm() < 1e-4);
+}
+
+#[test]
+fn an_arm_between_two_pitchforks_joins_both() {
+    // Closed form: z² = mu (1 - mu) between the pitchforks at 0 and 1; once for equilibria, once beside an oscillation.
+    let rest = "name = \"Arc\"\n[parameters]\nmu = -0.5\n[states]\nz = \"mu*(1 - mu)*z - z^3\"\n";
+    let cycle = "name = \"Arc\"\n[parameters]\nmu = -0.5\n[states]\nz = \"mu*(1 - mu)*z - z^3\"\nx = \"x - y - x*(x^2 + y^2)\"\ny = \"x + y - y*(x^2 + y^2)\"\n";
+    for (model, seed) in [(rest, "state = { z = 0 }"), (cycle, "attractor = \"cycle\"")] {
+        let diagram = explored(model, seed, "free = \"mu\"\nrange = [-0.5, 1.5]\nswitch = { branch-point = 1 }");
+        has(branch(&diagram, "b"), &[(Kind::BranchPoint, 0.0), (Kind::BranchPoint, 1.0)], 1e-6);
+        let arm = branch(&diagram, "b/branch-point-1");
+        joined(arm, 0, Kind::BranchPoint, 0.0, 1e-6);
+        joined(arm, 1, Kind::BranchPoint, 1.0, 1e-6);
+        // The slope of the parameter changes sign nowhere: the arm is a graph over mu, and it is stable.
+        assert!(arm.special.is_empty(), "{:?}", arm.special.iter().map(|s| s.kind).collect::<Vec<_>>());
+        for point in &arm.points {
+            let mu = point.parameters[arm.free];
+            let z = point.ranges[0].iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+            assert!(near(z, (mu * (1.0 - mu)).sqrt(), TOLERANCE), "{mu}: {z}");
+            assert_eq!(point.unstable, 0);
+        }
+        assert_eq!(diagram.branches.len(), 2, "the second pitchfork is the other end of the same arm");
+    }
 }

@@ -348,7 +348,7 @@ impl Follow<'_> {
             }
             let near = near.ok_or(Failure::Singular)?;
             // A deviation that has turned instead of shrunk, as that of a narrow pulse that has moved, is none that vanishes.
-            if monitor.value(&near.point, &left.point) < 1.1 {
+            if monitor.value(&near.point, &left.point) < 1.1 * values[0] {
                 continue;
             }
             let share = (monitor.value(&left.point, &near.point) / values[0]).powi(2);

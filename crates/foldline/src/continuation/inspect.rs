@@ -8,6 +8,7 @@
 use super::corrector::{Plane, Station, settle};
 use super::follow::Follow;
 use super::locate::{Located, Stretch, locate};
+use super::straddle::straddle;
 use crate::diagram::{Cost, Kind, SpecialPoint};
 
 /// What was found on the way, in the order of travel.
@@ -48,40 +49,56 @@ impl Follow<'_> {
         let stretch = Stretch::new(self.problem, left, right, self.direction);
         let (at_left, at_right) = (self.monitored(left), self.monitored(right));
         let standing = stands(left) && stands(right);
-        let mut located: Vec<(usize, Located)> = Vec::new();
+        let mut located: Vec<(Kind, usize, Located)> = Vec::new();
+        let mut lost = false;
         for k in 0..self.monitors.len() {
             let values = [at_left[k], at_right[k]];
-            let kind = self.monitors[k].kind();
-            if standing && matches!(kind, Kind::Fold | Kind::BranchPoint) {
+            let mut kind = self.monitors[k].kind();
+            let pitchfork = kind == Kind::BranchPoint && located.iter().any(|(_, jump, _)| *jump == 0);
+            if pitchfork || (standing && matches!(kind, Kind::Fold | Kind::BranchPoint)) {
                 continue;
             }
             if (values[0] > 0.0) == (values[1] > 0.0) || values.iter().any(|v| v.is_nan()) {
                 continue;
             }
             let monitor = &*self.monitors[k];
-            if let Ok(found) = locate(self.problem, self.settings, &stretch, monitor, values, cost)
-                && monitor.confirms(&found.station.point)
-            {
-                located.push((k, found));
+            let mut jump = monitor.jump();
+            let mut found = locate(self.problem, self.settings, &stretch, monitor, values, cost);
+            if found.is_err() && matches!(kind, Kind::Fold | Kind::BranchPoint) {
+                found = straddle(self.problem, self.settings, &stretch, monitor, values, cost);
+                // A fold with a singular matrix at which stability stays: this branch is the one that leaves another at a
+                // pitchfork, and goes on as its own mirror image.
+                if kind == Kind::Fold && left.point.unstable == right.point.unstable {
+                    (kind, jump) = (Kind::BranchPoint, 0);
+                }
+            }
+            match found {
+                Ok(found) if jump == 0 || monitor.confirms(&found.station.point) => {
+                    located.push((kind, jump, found));
+                }
+                Ok(_) => {}
+                Err(_) => lost = true,
             }
         }
-        located.sort_by(|a, b| a.1.distance.total_cmp(&b.1.distance));
-        let jumps: Vec<usize> = located.iter().map(|(k, _)| self.monitors[*k].jump()).collect();
+        located.sort_by(|a, b| a.2.distance.total_cmp(&b.2.distance));
+        let jumps: Vec<usize> = located.iter().map(|(_, jump, _)| *jump).collect();
         let change = left.point.unstable.abs_diff(right.point.unstable);
-        let explained = explains(&jumps, left.point.unstable as i64, right.point.unstable as i64)
+        let accounted = explains(&jumps, left.point.unstable as i64, right.point.unstable as i64)
             || (standing && jumps.is_empty() && change == 1);
+        // A change of sign that could not be located is not passed over either.
+        let explained = accounted && !(lost && jumps.is_empty());
         let suspicious = depth < 3 && history.is_some_and(|h| self.may_touch(h, &at_left, &at_right, stretch.length));
         if depth < DEEPEST
             && (jumps.len() > 1 || !explained || (suspicious && jumps.is_empty()))
             && stretch.length.abs() > self.settings.min_step
         {
             let cut = match &located[..] {
-                [a, .., b] => 0.5 * (a.1.distance + b.1.distance),
+                [a, .., b] => 0.5 * (a.2.distance + b.2.distance),
                 _ => 0.5 * stretch.length,
             };
             // Neighbouring special points that cannot be told apart any more stay together.
             let apart = located.len() < 2
-                || located[located.len() - 1].1.distance - located[0].1.distance > 1e-7 * (1.0 + stretch.length);
+                || located[located.len() - 1].2.distance - located[0].2.distance > 1e-7 * (1.0 + stretch.length);
             if apart && let Some(middle) = self.cut(left, &stretch, cut, cost) {
                 let rest = stretch.length - cut;
                 let before = self.inspect(left, &middle, history, depth + 1, cost);
@@ -94,18 +111,18 @@ impl Follow<'_> {
         let mut count = left.point.unstable as i64;
         let mut out = Vec::new();
         let total = located.len();
-        for (index, (k, found)) in located.into_iter().enumerate() {
+        for (index, (kind, _, found)) in located.into_iter().enumerate() {
             let next = if index + 1 == total {
                 right.point.unstable as i64
             } else {
                 step_towards(count, right.point.unstable as i64, jumps[index])
             };
-            out.push(Found::Special(self.special(self.monitors[k].kind(), found.station, count, next, found.error)));
+            out.push(Found::Special(self.special(kind, found.station, count, next, found.error)));
             count = next;
         }
         if !explained {
             let width = (left.parameter() - right.parameter()).abs() / (1.0 + right.parameter().abs());
-            if change > 0 || total > 0 {
+            if change > 0 || total > 0 || lost {
                 out.push(Found::Special(self.special(
                     Kind::Unexplained,
                     right.clone(),

@@ -31,7 +31,8 @@ pub struct Stretch<'s> {
     slope: Vec<f64>,
     /// Distance of the right station along the tangent of the left.
     pub length: f64,
-    direction: f64,
+    /// +1 towards larger positions, -1 towards smaller.
+    pub(super) direction: f64,
 }
 
 impl<'s> Stretch<'s> {
@@ -196,7 +197,7 @@ pub fn locate(
 }
 
 /// Largest difference of parameter, period and ranges, each relative to 1 + |value|.
-fn discrepancy(a: &Point, b: &Point, gap: f64, parameter: f64) -> f64 {
+pub(super) fn discrepancy(a: &Point, b: &Point, gap: f64, parameter: f64) -> f64 {
     let mut largest = gap.abs() / (1.0 + parameter.abs());
     if let (Some(x), Some(y)) = (a.solution.period(), b.solution.period()) {
         largest = largest.max((x - y).abs() / (1.0 + y.abs()));

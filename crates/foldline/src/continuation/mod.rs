@@ -9,6 +9,7 @@
 //! | from one accepted point to the next; why a side ends | [`follow`] |
 //! | what lies between two accepted points | [`inspect`] |
 //! | zero of a monitor along the curve | [`locate`] |
+//! | the same where branches cross | [`straddle`] |
 //!
 //! **Source.** keller1977 (pseudo-arclength); allgower1990 (step length by angle and contraction).
 
@@ -16,6 +17,7 @@ pub mod corrector;
 pub mod follow;
 pub mod inspect;
 pub mod locate;
+pub mod straddle;
 
 pub use corrector::{Failure, Station};
 pub use follow::{Follow, Item, follow};

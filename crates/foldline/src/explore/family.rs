@@ -157,6 +157,15 @@ impl Work<'_> {
                 }
                 continue;
             }
+            // Where a branch that crosses another one started, the other one is its parent.
+            if let Origin::Switch { parent: from, kind: Kind::BranchPoint, parameter: there } = &parent.origin
+                && special.kind == Kind::BranchPoint
+                && special.point.position.abs() <= 2
+                && (there - parameter).abs() < 1e3 * self.plan.tolerance * (1.0 + there.abs())
+            {
+                self.tell(Event::Note(&parent.name, &format!("{label}: the branch there is {from}, the parent")));
+                continue;
+            }
             if let Some(already) = self.arrives(&parent, special.kind, &special.point) {
                 self.tell(Event::Note(
                     &parent.name,

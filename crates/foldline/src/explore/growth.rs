@@ -191,7 +191,7 @@ impl Growth<'_> {
             start.point.step = self.settings.first_step;
         }
         let monitors = special::monitors(branch.family);
-        let collapses = collapses(branch);
+        let collapses = collapses(branch, self.system);
         let home = branch.points.iter().find(|p| p.position == 0).filter(|_| branch.ends[0].is_none()).cloned();
         let mut walk = Follow {
             problem: &mut *problem,
@@ -262,9 +262,21 @@ pub fn is_doubled(branch: &Branch) -> bool {
     matches!(branch.origin, Origin::Switch { kind: Kind::PeriodDoubling, .. })
 }
 
-/// What a branch can collapse to: every cycle to an equilibrium, a doubled one to its parent as well.
-fn collapses(branch: &Branch) -> Vec<Box<dyn Monitor>> {
+/// What a branch can collapse to: every cycle to an equilibrium, a doubled one to its parent as well, and one that was born
+/// at a branch point to more symmetric solutions.
+fn collapses(branch: &Branch, system: &System) -> Vec<Box<dyn Monitor>> {
     let mut all: Vec<Box<dyn Monitor>> = Vec::new();
+    if matches!(branch.origin, Origin::Switch { kind: Kind::BranchPoint, .. }) {
+        for reflection in system.reflections.iter().filter(|r| r.contains(&true)) {
+            for half in [false, true].into_iter().take(if branch.family == Family::Cycle { 2 } else { 1 }) {
+                all.push(Box::new(collapse::Mirrors {
+                    reflection: reflection.clone(),
+                    scales: system.scales.clone(),
+                    half,
+                }));
+            }
+        }
+    }
     if branch.family == Family::Cycle {
         if is_doubled(branch) {
             all.push(Box::new(collapse::Halves));

@@ -26,7 +26,8 @@ impl Monitor for BranchPoint {
         let centre = if matches!(at.solution, Solution::Cycle(_)) { 1.0 } else { 0.0 };
         let largest = at.spectrum.iter().map(|z| z.norm()).fold(1e-300, f64::max).min(1.0);
         let closest = at.free_spectrum().iter().map(|z| (z - centre).norm()).fold(f64::INFINITY, f64::min);
-        closest < 1e-2 * largest && at.parameter_slope().abs() > 1e-6
+        // A single eigenvalue has none to be compared with.
+        (closest < 1e-2 * largest || at.spectrum.len() == 1) && at.parameter_slope().abs() > 1e-6
     }
 
     fn jump(&self) -> usize {
@@ -38,7 +39,11 @@ impl Monitor for BranchPoint {
 /// `u` and anchored there. `None` if there is none.
 pub fn direction(problem: &mut dyn ZeroProblem, u: &[f64], tangent: &[f64]) -> Option<Vec<f64>> {
     let size = problem.unknowns();
-    problem.factorise(u, tangent).ok()?;
+    // Exactly at the point there may be nothing to factorise; a little beside it the null vector is nearly the same.
+    if problem.factorise(u, tangent).is_err() {
+        let beside: Vec<f64> = u.iter().zip(tangent).map(|(x, t)| x + 1e-8 * t).collect();
+        problem.factorise(&beside, tangent).ok()?;
+    }
     let mut v: Vec<f64> = (0..size).map(|k| ((k * k) as f64 * 0.37 + 0.2).sin()).collect();
     let mut next = vec![0.0; size];
     for _ in 0..4 {

@@ -37,6 +37,64 @@ impl Monitor for Shrinks {
     }
 }
 
+/// Difference between a solution and its mirror image, seen half a period later if it is a cycle and `half` says so: vanishes
+/// where it becomes symmetric.
+pub struct Mirrors {
+    /// Which components change sign.
+    pub reflection: Vec<bool>,
+    /// `[n]` characteristic sizes of the states.
+    pub scales: Vec<f64>,
+    /// Whether the symmetric cycle goes over into itself after half a period.
+    pub half: bool,
+}
+
+/// Asymmetry, relative to the size of the solution, that is taken for none.
+const SYMMETRIC: f64 = 1e-5;
+
+impl Mirrors {
+    /// Samples of a solution, and of what is left of it after subtracting its mirror image.
+    fn parts(&self, point: &Point) -> (Vec<f64>, Vec<f64>) {
+        let (x, n) = match &point.solution {
+            Solution::Equilibrium(x) => (x.clone(), x.len()),
+            Solution::Cycle(cycle) => (cycle.uniform(SAMPLES), cycle.dim()),
+        };
+        let shift = if self.half && x.len() > n { x.len() / 2 } else { 0 };
+        let image = |k: usize| if self.reflection[k % n] { -x[k] } else { x[k] };
+        let left = (0..x.len()).map(|k| x[(k + shift) % x.len()] - image(k)).collect();
+        (x, left)
+    }
+}
+
+impl Monitor for Mirrors {
+    fn kind(&self) -> Kind {
+        Kind::BranchPoint
+    }
+
+    fn value(&self, reference: &Point, at: &Point) -> f64 {
+        let n = self.reflection.len();
+        let ((x, own), (_, other)) = (self.parts(reference), self.parts(at));
+        if own.len() != other.len() {
+            return 1.0;
+        }
+        let square = |v: &[f64], c: usize| v.iter().skip(c).step_by(n).map(|a| a * a).sum::<f64>();
+        let (mut total, mut size) = (0.0, 0.0);
+        for c in 0..n {
+            let weight = square(&x, c) + (x.len() / n) as f64 * self.scales[c] * self.scales[c];
+            size += square(&own, c) / weight;
+            total += (c..own.len()).step_by(n).map(|k| own[k] * other[k]).sum::<f64>() / weight;
+        }
+        if size < SYMMETRIC * SYMMETRIC { 1.0 } else { total / size }
+    }
+
+    fn confirms(&self, _at: &Point) -> bool {
+        true
+    }
+
+    fn jump(&self) -> usize {
+        0
+    }
+}
+
 impl Monitor for Halves {
     fn kind(&self) -> Kind {
         Kind::PeriodDoubling

@@ -1,0 +1,123 @@
+//! Places at which the Newton matrix is singular, located from both sides.
+//!
+//! **Idea.** Where two branches cross, Newton's method loses as many digits as the place is close. On a fine mesh nothing is
+//! left before the bracket is narrow enough. But the branch goes smoothly through the place, so solutions at four distances
+//! around it, none of them close, determine it: monitor and unknowns are interpolated.
+//!
+//! **Equations.** With nodes s₁…s₄ and Lagrange polynomials ℓ_i:
+//!
+//!   (1)  Σ_i ℓ_i(s) g(s_i) = 0,   then u = Σ_i ℓ_i(s) u(s_i)
+
+use super::corrector::{Plane, Station, correct, station};
+use super::locate::{Located, Stretch, discrepancy};
+use super::{Failure, Settings};
+use crate::contract::{Monitor, ZeroProblem};
+use crate::diagram::Cost;
+
+/// Distances between nodes, as shares of the stretch, in the order in which they are tried.
+const SPACINGS: [f64; 3] = [0.25, 0.1, 0.04];
+
+/// Interpolates the zero of `monitor` in `stretch`, whose ends have values of opposite sign.
+///
+/// # Errors
+/// See [`Failure`].
+pub fn straddle(
+    problem: &mut dyn ZeroProblem,
+    settings: &Settings,
+    stretch: &Stretch,
+    monitor: &dyn Monitor,
+    values: [f64; 2],
+    cost: &mut Cost,
+) -> Result<Located, Failure> {
+    let reference = &stretch.left.point;
+    let value = |found: &Station| monitor.value(reference, &found.point);
+    let mut root = stretch.length * values[0] / (values[0] - values[1]);
+    let (mut nodes, mut stations) = ([0.0; 4], Vec::new());
+    let mut moved = 0.0;
+    for spacing in SPACINGS {
+        nodes = [-1.5, -0.5, 0.5, 1.5].map(|k| root + k * spacing * stretch.length);
+        stations.clear();
+        for s in nodes {
+            stations.push(stretch.at(problem, settings, s, cost)?);
+        }
+        let next = zero(&nodes, &stations.iter().map(value).collect::<Vec<_>>())?;
+        moved = (next - root).abs();
+        root = next;
+    }
+    let mut coarse = blend(problem, &nodes, &stations, root, stretch.left, stretch.direction);
+    let floor =
+        10.0 * settings.newton_tolerance() + 0.02 * moved * coarse.slope().abs() / (1.0 + coarse.parameter().abs());
+    let mut error = floor;
+    for _ in 0..3 {
+        problem.set_mesh(&coarse.mesh);
+        let Some(finer) = problem.finer_mesh() else { break };
+        let mut refined = Vec::with_capacity(stations.len());
+        for from in &stations {
+            problem.set_mesh(&finer);
+            let mut u = problem.transfer(&from.u, &from.mesh, &finer);
+            let row = problem.transfer(&stretch.left.tangent, &stretch.left.mesh, &finer);
+            problem.anchor(&u);
+            let plane = Plane { row: row.clone(), base: u.clone(), distance: 0.0 };
+            correct(problem, settings, &plane, &mut u, cost)?;
+            refined.push(station(problem, u, &row, stretch.direction, cost)?);
+        }
+        root = zero(&nodes, &refined.iter().map(value).collect::<Vec<_>>())?;
+        stations = refined;
+        let fine = blend(problem, &nodes, &stations, root, stretch.left, stretch.direction);
+        let gap = coarse.parameter() - fine.parameter();
+        error = floor + discrepancy(&coarse.point, &fine.point, gap, fine.parameter());
+        coarse = fine;
+        if error <= settings.tolerance {
+            break;
+        }
+    }
+    Ok(Located { distance: root, station: coarse, error })
+}
+
+/// Values at `s` of the Lagrange polynomials of the nodes.
+fn weights(nodes: &[f64; 4], s: f64) -> [f64; 4] {
+    std::array::from_fn(|i| (0..4).filter(|&k| k != i).map(|k| (s - nodes[k]) / (nodes[i] - nodes[k])).product())
+}
+
+/// The zero (1) between the outer nodes, by bisection.
+fn zero(nodes: &[f64; 4], values: &[f64]) -> Result<f64, Failure> {
+    let at = |s: f64| crate::linalg::dot(&weights(nodes, s), values);
+    let (mut low, mut high) = (nodes[0], nodes[3]);
+    if !(values[0] * values[3] < 0.0) {
+        return Err(Failure::Singular);
+    }
+    for _ in 0..80 {
+        let middle = 0.5 * (low + high);
+        if (at(middle) > 0.0) == (values[0] > 0.0) { low = middle } else { high = middle }
+    }
+    Ok(0.5 * (low + high))
+}
+
+/// The station at `s` between stations that share a mesh.
+fn blend(
+    problem: &mut dyn ZeroProblem,
+    nodes: &[f64; 4],
+    stations: &[Station],
+    s: f64,
+    left: &Station,
+    direction: f64,
+) -> Station {
+    let mesh = stations.first().map_or_else(|| left.mesh.clone(), |own| own.mesh.clone());
+    let mix = |part: &dyn Fn(&Station) -> &[f64]| -> Vec<f64> {
+        let mut sum = vec![0.0; part(&stations[0]).len()];
+        weights(nodes, s).iter().zip(stations).for_each(|(w, own)| crate::linalg::axpy(*w, part(own), &mut sum));
+        sum
+    };
+    let (u, mut tangent) = (mix(&|own| &own.u), mix(&|own| &own.tangent));
+    problem.set_mesh(&mesh);
+    problem.anchor(&u);
+    let norm = problem.dot(&tangent, &tangent).sqrt();
+    tangent.iter_mut().for_each(|t| *t /= norm);
+    // The matrix may be singular here; the multipliers do not depend on that, but the error estimate does.
+    let _ = problem.factorise(&u, &tangent);
+    let mut examination = problem.examine(&u);
+    examination.trust.discretisation = stations.iter().map(|own| own.point.trust.discretisation).fold(0.0, f64::max);
+    let stored: Vec<f64> = tangent.iter().map(|t| direction * t).collect();
+    let point = problem.point(&u, &stored, examination);
+    Station { point, u, tangent, mesh, roomier: None }
+}
