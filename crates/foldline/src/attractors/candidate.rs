@@ -103,7 +103,9 @@ fn primitive(cycle: &Cycle) -> Option<Candidate> {
     const PROBES: usize = 24;
     let n = cycle.dim();
     let states = cycle.uniform(COUNT);
-    let extent = extents(&states, n);
+    // A component that hardly moves is compared to a part of its size: what it does move is the error of the solution.
+    let size = |i: usize| states.iter().skip(i).step_by(n).fold(0.0, |m: f64, x| m.max(x.abs()));
+    let extent: Vec<f64> = extents(&states, n).iter().enumerate().map(|(i, e)| e.max(0.01 * size(i))).collect();
     let repeats = |turns: usize| {
         (0..PROBES).map(|k| k as f64 / PROBES as f64).all(|t| {
             let (here, there) = (cycle.state(t), cycle.state(t + 1.0 / turns as f64));

@@ -158,9 +158,10 @@ impl Watch {
                 self.next_attempt = self.returns.total() + 1;
                 return;
             }
+            // The fewest crossings per period come first: while their limit is in doubt, one over more of them is no better.
             if !prediction.worthwhile() {
                 self.next_attempt = self.returns.total() + 2;
-                continue;
+                return;
             }
             self.next_attempt = self.returns.total() + self.returns.total() / 2;
             let Some(candidate) = context.follow(&self.returns, &prediction, &extent) else { continue };

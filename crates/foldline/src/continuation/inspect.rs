@@ -204,6 +204,6 @@ mod tests {
         assert!(!explains(&[], 1, 2));
         assert!(explains(&[1], 1, 2) && explains(&[1], 1, 0) && !explains(&[1], 1, 1));
         assert!(explains(&[2], 0, 2) && !explains(&[2], 1, 2) && !explains(&[2], 1, 0));
-        assert!(explains(&[1, 2], 0, 1) && explains(&[1, 1], 1, 1));
+        assert!(explains(&[1, 2], 0, 3) && !explains(&[1, 2], 0, 1) && explains(&[1, 1], 1, 1));
     }
 }
