@@ -83,7 +83,8 @@ fn weights(nodes: &[f64; 4], s: f64) -> [f64; 4] {
 fn zero(nodes: &[f64; 4], values: &[f64]) -> Result<f64, Failure> {
     let at = |s: f64| crate::linalg::dot(&weights(nodes, s), values);
     let (mut low, mut high) = (nodes[0], nodes[3]);
-    if !(values[0] * values[3] < 0.0) {
+    let product = values[0] * values[3];
+    if product.is_nan() || product >= 0.0 {
         return Err(Failure::Singular);
     }
     for _ in 0..80 {
