@@ -108,7 +108,7 @@ fn parse(
         return Err(walk.found);
     }
     let seeds = seeds.into_iter().map(|(_, seed)| seed).collect();
-    let plan = Plan { tolerance, degree, seeds, branches };
+    let plan = Plan { tolerance, degree, seeds, branches, curves: Vec::new(), homotopies: Vec::new() };
     Ok(Study { file: file.to_string(), text: text.to_string(), model_file, model_text, model, plan })
 }
 

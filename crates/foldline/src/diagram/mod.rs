@@ -295,7 +295,7 @@ pub enum Origin {
     },
 }
 
-/// A branch: one curve of solutions in one parameter.
+/// A branch: one curve of solutions in one parameter, or in two with something held.
 #[derive(Clone, Debug)]
 pub struct Branch {
     /// Unique within a diagram.
@@ -304,6 +304,8 @@ pub struct Branch {
     pub family: Family,
     /// Index of the continuation parameter among the model's parameters.
     pub free: usize,
+    /// For a curve in two parameters: what is held along it, and the index of the parameter that follows from it.
+    pub held: Option<(Kind, usize)>,
     /// Where it comes from.
     pub origin: Origin,
     /// Points by increasing position.
@@ -317,7 +319,16 @@ pub struct Branch {
 impl Branch {
     /// An empty branch.
     pub fn new(name: impl Into<String>, family: Family, free: usize, origin: Origin) -> Branch {
-        Branch { name: name.into(), family, free, origin, points: Vec::new(), special: Vec::new(), ends: [None, None] }
+        Branch {
+            name: name.into(),
+            family,
+            free,
+            held: None,
+            origin,
+            points: Vec::new(),
+            special: Vec::new(),
+            ends: [None, None],
+        }
     }
 
     /// Inserts an accepted point at its position.

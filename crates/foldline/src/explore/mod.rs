@@ -22,7 +22,7 @@ pub mod seeds;
 pub mod switch;
 pub mod system;
 
-pub use plan::{AttractorKey, BranchPlan, Plan, SeedPlan, SeedSource, Start, Switching};
+pub use plan::{AttractorKey, BranchPlan, CurvePlan, HomotopyPlan, Plan, SeedPlan, SeedSource, Start, Switching};
 pub use seeds::attractors;
 pub use system::System;
 

@@ -44,6 +44,10 @@ pub enum Start {
     Seed(usize),
     /// At the end of the branch of that index (its `until`, or its forward bound).
     EndOf(usize),
+    /// At the end of the curve of that index.
+    EndOfCurve(usize),
+    /// Where the homotopy of that index arrived.
+    EndOfHomotopy(usize),
 }
 
 /// At which special points to branch off, and how deep.
@@ -87,6 +91,44 @@ pub struct BranchPlan {
     pub max_points: usize,
 }
 
+/// A curve in two parameters along which a special point is held.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CurvePlan {
+    /// Unique name.
+    pub name: String,
+    /// What is held: a fold, Hopf, period doubling or torus point.
+    pub hold: Kind,
+    /// Name of the branch on which the special point lies: one of the plan, or one switched to from it.
+    pub of: String,
+    /// The special point is the one of that kind nearest to this value of the branch's parameter; the first one if `None`.
+    pub near: Option<f64>,
+    /// Index of the second parameter; the first is that of the branch.
+    pub free: usize,
+    /// Smallest and largest value of the branch's parameter, then of the second parameter.
+    pub ranges: [[f64; 2]; 2],
+    /// Follow only towards this value of the second parameter and stop there; it lies in its range.
+    pub until: Option<f64>,
+    /// Limit on the number of points per side.
+    pub max_points: usize,
+}
+
+/// A family brought from one set of parameter values to another, by whatever route gets through.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HomotopyPlan {
+    /// Unique name.
+    pub name: String,
+    /// Where it starts.
+    pub start: Start,
+    /// Parameters that change together, with their values at the goal.
+    pub targets: Vec<(usize, f64)>,
+    /// Index of the parameter in which the family may be moved on the way, and its range.
+    pub via: usize,
+    /// Smallest and largest value of that parameter.
+    pub range: [f64; 2],
+    /// Limit on the number of points of each run.
+    pub max_points: usize,
+}
+
 /// Everything a study asks for.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
@@ -98,4 +140,8 @@ pub struct Plan {
     pub seeds: Vec<SeedPlan>,
     /// Branches, in the order in which they were written.
     pub branches: Vec<BranchPlan>,
+    /// Curves in two parameters.
+    pub curves: Vec<CurvePlan>,
+    /// Homotopies.
+    pub homotopies: Vec<HomotopyPlan>,
 }
