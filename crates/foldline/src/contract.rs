@@ -74,23 +74,24 @@ pub struct Examination {
     pub trust: Trust,
 }
 
-/// A curve F(u) = 0, F: ℝⁿ⁺¹ → ℝⁿ. The last component of `u` is the continuation parameter.
+/// A curve F(u) = 0, F: ℝⁿ⁺ᵏ → ℝⁿ, k = 1. The last k components of `u` are free parameters, the very last is that of the
+/// continuation. With k > 1 it is a surface, on which something else must be held to make it a curve.
 ///
 /// The problem may be discretised on a mesh that changes along the curve; vectors always belong to the current mesh.
 pub trait ZeroProblem {
-    /// n + 1 on the current mesh.
+    /// n + k on the current mesh.
     fn unknowns(&self) -> usize;
 
     /// Takes `u` as the reference for phase conditions and scales until the next call.
     fn anchor(&mut self, u: &[f64]);
 
-    /// F(u): writes n values (the last of the n + 1 slots is left alone). Returns false if f is not finite there.
+    /// F(u): writes n values (the last k of the n + k slots are left alone). Returns false if f is not finite there.
     fn residual(&mut self, u: &[f64], r: &mut [f64]) -> bool;
 
-    /// Factorises the matrix [F_u(u); `row`·]: `row` acts through [`ZeroProblem::dot`].
-    fn factorise(&mut self, u: &[f64], row: &[f64]) -> Result<(), Singular>;
+    /// Factorises the matrix [F_u(u); rows]: `rows` is `[k][n + k]`, each row acts through [`ZeroProblem::dot`].
+    fn factorise(&mut self, u: &[f64], rows: &[f64]) -> Result<(), Singular>;
 
-    /// Solves with the last factorisation. `rhs` and `x` have n + 1 components, the last of `rhs` being that of the row.
+    /// Solves with the last factorisation. `rhs` and `x` have n + k components, the last k of `rhs` being those of the rows.
     fn solve(&mut self, rhs: &[f64], x: &mut [f64]);
 
     /// Inner product in scaled variables, in which lengths along the curve are measured.

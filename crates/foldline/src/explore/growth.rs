@@ -5,7 +5,7 @@ use crate::continuation::corrector::{Plane, parameter_row, settle, station};
 use crate::continuation::{Failure, Follow, Item, Settings, Station, follow};
 use crate::contract::{Event, Monitor, Observer, Verdict, ZeroProblem};
 use crate::diagram::{Branch, Cost, Ending, Family, Kind, Origin, Point, Solution, SpecialPoint};
-use crate::problem::{Setting, cycle::CycleProblem, equilibrium::EquilibriumProblem, mesh};
+use crate::problem::{Axis, Setting, cycle::CycleProblem, equilibrium::EquilibriumProblem, mesh};
 use crate::special::{self, collapse};
 
 /// The problem on whose curve `point` lies, on the mesh of the point. `doubled` says that its branch was born by period
@@ -33,7 +33,12 @@ pub fn problem_of<'a>(
 /// The setting of a system at given parameters.
 pub fn setting<'a>(system: &'a System, free: usize, parameters: &[f64]) -> Setting<'a> {
     let parameter_scale = system.parameter_scales.get(free).copied().unwrap_or(1.0);
-    Setting { field: system.field, scales: &system.scales, parameters: parameters.to_vec(), free, parameter_scale }
+    Setting {
+        field: system.field,
+        scales: &system.scales,
+        parameters: parameters.to_vec(),
+        axes: vec![Axis::new(free, parameter_scale)],
+    }
 }
 
 /// The settings of a branch.
