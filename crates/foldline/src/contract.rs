@@ -141,10 +141,37 @@ pub trait Monitor: Send + Sync {
     fn jump(&self) -> usize;
 }
 
-/// The extra unknowns and equations that hold a special point; a problem with one of them held is a two-parameter curve.
-pub trait Condition: Send + Sync {
+/// The extra unknowns and equations that hold a special point: e unknowns (such as a frequency) and e + 1 scalar equations
+/// g = 0. A surface of solutions with one of them held is a two-parameter curve.
+///
+/// Vectors `u` are those of the surface, a [`ZeroProblem`] with two free parameters.
+pub trait Condition {
     /// What is held.
     fn kind(&self) -> Kind;
+
+    /// e.
+    fn extra(&self) -> usize;
+
+    /// First values `[e]` of the extra unknowns, from the spectrum of a point close to the special one.
+    fn guess(&self, point: &Point) -> Vec<f64>;
+
+    /// Takes the null vectors of the last evaluation as reference until the next call.
+    fn anchor(&mut self);
+
+    /// Moves to another mesh.
+    fn set_mesh(&mut self, mesh: &Mesh);
+
+    /// g: writes e + 1 values. Returns false if they are not finite there.
+    fn evaluate(&mut self, u: &[f64], extra: &[f64], g: &mut [f64]) -> bool;
+
+    /// The derivative of g along (`du`, `extra`) at the place of the last evaluation: writes e + 1 values.
+    fn derivative(&mut self, du: &[f64], extra: &[f64], dg: &mut [f64]);
+
+    /// How many of the eigenvalues or multipliers are held.
+    fn held(&self) -> usize;
+
+    /// How far an eigenvalue or multiplier is from where one is held.
+    fn distance(&self, z: Complex64) -> f64;
 }
 
 /// What happens while a diagram grows.

@@ -3,10 +3,11 @@
 use super::growth::{self, Beginning, Growth};
 use super::plan::{BranchPlan, Plan, Start, Switching};
 use super::seeds::Seeds;
-use super::{System, known, switch};
+use super::{System, curves, known, switch};
 use crate::continuation::Settings;
 use crate::contract::{Event, Observer, Verdict};
 use crate::diagram::{Branch, Diagram, Ending, Family, Kind, Origin, Point, Solution, SpecialPoint};
+use std::ops::Range;
 
 /// Indices of the branches that start at a seed.
 pub fn roots(plan: &Plan) -> Vec<usize> {
@@ -50,6 +51,7 @@ impl Work<'_> {
         let plan = &self.plan.branches[index];
         let Some((branch, going)) = self.root(plan, origin, start) else { return true };
         let ended = end_of(&branch, plan);
+        let first = self.branches.len();
         self.branches.push(branch);
         if !going {
             return false;
@@ -62,9 +64,31 @@ impl Work<'_> {
                 None => return false,
             }
         }
-        let followers: Vec<usize> =
-            (0..self.plan.branches.len()).filter(|&i| self.plan.branches[i].start == Start::EndOf(index)).collect();
-        followers.into_iter().all(|i| self.planned(i, Origin::EndOf(plan.name.clone()), ended.clone()))
+        self.curves(first..self.branches.len()) && self.after(Start::EndOf(index), &plan.name, ended)
+    }
+
+    /// The branches and homotopies that start there.
+    fn after(&mut self, start: Start, name: &str, point: Result<Point, String>) -> bool {
+        let branches: Vec<usize> =
+            (0..self.plan.branches.len()).filter(|&i| self.plan.branches[i].start == start).collect();
+        branches.into_iter().all(|i| self.planned(i, Origin::EndOf(name.to_string()), point.clone()))
+    }
+
+    /// The curves that start from those branches, and what starts at their ends.
+    fn curves(&mut self, parents: Range<usize>) -> bool {
+        for (index, curve) in self.plan.curves.iter().enumerate() {
+            let Some(parent) = self.branches[parents.clone()].iter().find(|b| b.name == curve.of).cloned() else {
+                continue;
+            };
+            let earlier = self.earlier.branch(&curve.name);
+            let (branch, going) = curves::follow(self.system, self.plan, curve, &parent, earlier, self.observer);
+            let ended = curves::end_of(self.system, self.plan, curve, &branch);
+            self.branches.push(branch);
+            if !going || !self.after(Start::EndOfCurve(index), &curve.name, ended) {
+                return false;
+            }
+        }
+        true
     }
 
     fn growth_settings(&self, plan: &BranchPlan, start: &Point) -> (Settings, [bool; 2]) {
@@ -105,23 +129,21 @@ impl Work<'_> {
             Ok((settings, sides, station)) => {
                 self.growth(&settings, sides, &[]).begin(&mut branch, Beginning::Inside(station))
             }
-            Err(why) => self.without_start(&mut branch, why),
+            Err(why) => without_start(self.observer, &mut branch, why),
         };
         Some((branch, going))
     }
 
-    fn without_start(&self, branch: &mut Branch, why: String) -> bool {
-        let mut going = self.tell(Event::Begin(branch));
-        for side in [1, 0] {
-            let ending = Ending::NoStart(why.clone());
-            branch.ends[side] = Some(ending.clone());
-            going &= self.tell(Event::SideEnded(branch, side, &ending));
-        }
-        going & self.tell(Event::End(branch))
-    }
-
     fn growth<'s>(&'s self, settings: &'s Settings, sides: [bool; 2], parents: &'s [SpecialPoint]) -> Growth<'s> {
-        Growth { system: self.system, settings, degree: self.plan.degree, sides, parents, observer: self.observer }
+        Growth {
+            system: self.system,
+            settings,
+            degree: self.plan.degree,
+            ties: Vec::new(),
+            sides,
+            parents,
+            observer: self.observer,
+        }
     }
 
     fn tell(&self, event: Event) -> bool {
@@ -220,6 +242,18 @@ impl Work<'_> {
         };
         self.branches.iter().find(ends_here).map(|b| b.name.as_str())
     }
+}
+
+/// A branch that could not begin. Returns false if the observer wants to stop.
+pub(super) fn without_start(observer: &dyn Observer, branch: &mut Branch, why: String) -> bool {
+    let tell = |event: Event| observer.observe(event) == Verdict::Continue;
+    let mut going = tell(Event::Begin(branch));
+    for side in [1, 0] {
+        let ending = Ending::NoStart(why.clone());
+        branch.ends[side] = Some(ending.clone());
+        going &= tell(Event::SideEnded(branch, side, &ending));
+    }
+    going & tell(Event::End(branch))
 }
 
 /// The end at which a planned branch hands over: its target, or its forward bound.

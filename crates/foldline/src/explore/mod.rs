@@ -13,7 +13,9 @@
 //! | what follows from a finished branch? | [`family`] |
 //! | how does one leave a special point on the other branch? | [`switch`] |
 //! | is this branch known already? | [`known`] |
+//! | where does a special point go when a second parameter changes? | [`curves`] |
 
+pub mod curves;
 pub mod family;
 pub mod growth;
 pub mod known;
