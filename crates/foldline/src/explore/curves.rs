@@ -10,6 +10,9 @@ use crate::continuation::Settings;
 use crate::contract::Observer;
 use crate::diagram::{Branch, Ending, Origin, Point, SpecialPoint};
 
+/// A special point moves along the branch by more than the error of the solutions; against the tolerance of the plan.
+const SHARPER: f64 = 0.2;
+
 /// The special point of `branch` from which a curve of the plan starts.
 ///
 /// # Errors
@@ -36,7 +39,7 @@ fn settings(system: &System, plan: &Plan, curve: &CurvePlan, first: usize, value
         Some(target) => ([target, second[1].max(value)], [true, false]),
         None => (second, [true, true]),
     };
-    let usual = growth::settings(system, plan.tolerance, range, curve.max_points);
+    let usual = growth::settings(system, SHARPER * plan.tolerance, range, curve.max_points);
     (Settings { bounds: vec![(first, own)], stability: false, ..usual }, sides)
 }
 
