@@ -3,31 +3,49 @@
 use super::growth::{self, Beginning, Growth};
 use super::plan::{BranchPlan, Plan, Start, Switching};
 use super::seeds::Seeds;
-use super::{System, curves, known, switch};
+use super::{System, curves, homotopy, known, switch};
 use crate::continuation::Settings;
 use crate::contract::{Event, Observer, Verdict};
 use crate::diagram::{Branch, Diagram, Ending, Family, Kind, Origin, Point, Solution, SpecialPoint};
 use std::ops::Range;
 
-/// Indices of the branches that start at a seed.
-pub fn roots(plan: &Plan) -> Vec<usize> {
-    (0..plan.branches.len()).filter(|&i| matches!(plan.branches[i].start, Start::Seed(_))).collect()
+/// What starts at a seed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Root {
+    /// The branch of that index.
+    Branch(usize),
+    /// The homotopy of that index.
+    Homotopy(usize),
 }
 
-/// Everything that grows from the branch of that index, in the order in which it was begun.
+/// Everything that starts at a seed.
+pub fn roots(plan: &Plan) -> Vec<Root> {
+    let seeded = |start: &Start| matches!(start, Start::Seed(_));
+    let branches = (0..plan.branches.len()).filter(|&i| seeded(&plan.branches[i].start)).map(Root::Branch);
+    let homotopies = (0..plan.homotopies.len()).filter(|&i| seeded(&plan.homotopies[i].start)).map(Root::Homotopy);
+    branches.chain(homotopies).collect()
+}
+
+/// Everything that grows from there, in the order in which it was begun.
 pub fn grow(
     system: &System,
     plan: &Plan,
-    root: usize,
+    root: Root,
     seeds: &Seeds,
     earlier: &Diagram,
     observer: &dyn Observer,
 ) -> Vec<Branch> {
     let mut work = Work { system, plan, earlier, observer, branches: Vec::new() };
-    let Start::Seed(seed) = plan.branches[root].start else { return Vec::new() };
+    let start = match root {
+        Root::Branch(index) => &plan.branches[index].start,
+        Root::Homotopy(index) => &plan.homotopies[index].start,
+    };
+    let Start::Seed(seed) = *start else { return Vec::new() };
     let origin = Origin::Seed(plan.seeds[seed].name.clone());
-    let start = seeds.point(seed);
-    work.planned(root, origin, start);
+    match root {
+        Root::Branch(index) => work.planned(index, origin, seeds.point(seed)),
+        Root::Homotopy(index) => work.brought(index, origin, seeds.point(seed)),
+    };
     work.branches
 }
 
@@ -69,9 +87,20 @@ impl Work<'_> {
 
     /// The branches and homotopies that start there.
     fn after(&mut self, start: Start, name: &str, point: Result<Point, String>) -> bool {
-        let branches: Vec<usize> =
-            (0..self.plan.branches.len()).filter(|&i| self.plan.branches[i].start == start).collect();
-        branches.into_iter().all(|i| self.planned(i, Origin::EndOf(name.to_string()), point.clone()))
+        let plan = self.plan;
+        let origin = || Origin::EndOf(name.to_string());
+        let branches = (0..plan.branches.len()).filter(|&i| plan.branches[i].start == start);
+        let homotopies = (0..plan.homotopies.len()).filter(|&i| plan.homotopies[i].start == start);
+        branches.into_iter().all(|i| self.planned(i, origin(), point.clone()))
+            && homotopies.into_iter().all(|i| self.brought(i, origin(), point.clone()))
+    }
+
+    /// A homotopy, and what starts where it arrives.
+    fn brought(&mut self, index: usize, origin: Origin, start: Result<Point, String>) -> bool {
+        let homotopy = &self.plan.homotopies[index];
+        let route = homotopy::find(self.system, self.plan, homotopy, origin, start, self.earlier, self.observer);
+        self.branches.extend(route.legs);
+        route.going && self.after(Start::EndOfHomotopy(index), &homotopy.name, route.arrived)
     }
 
     /// The curves that start from those branches, and what starts at their ends.
