@@ -107,7 +107,7 @@ pub fn polished(problem: &mut dyn ZeroProblem, settings: &Settings, point: &Poin
 /// # Errors
 /// See [`Failure`].
 pub fn beside(problem: &mut dyn ZeroProblem, settings: &Settings, point: &Point) -> Result<Point, Failure> {
-    const ASIDE: f64 = 0.05;
+    const DISTANCES: [f64; 4] = [0.05, 0.01, 2e-3, 4e-4];
     let u = problem.unknowns_of(point);
     problem.anchor(&u);
     // Any row will do for the first tangent unless it is orthogonal to it.
@@ -124,9 +124,18 @@ pub fn beside(problem: &mut dyn ZeroProblem, settings: &Settings, point: &Point)
     let mut cost = Cost::default();
     let plane = Plane { row, base: u.clone(), distance: 0.0 };
     let there = settle(problem, settings, plane, u, 1.0, &mut cost)?;
-    let guess = there.u.iter().zip(&there.tangent).map(|(u, t)| u + ASIDE * t).collect();
-    let plane = Plane { row: there.tangent, base: there.u, distance: ASIDE };
-    settle(problem, settings, plane, guess, 1.0, &mut cost).map(|found| found.point)
+    let mut failure = Failure::Singular;
+    for distance in DISTANCES {
+        problem.set_mesh(&there.mesh);
+        problem.anchor(&there.u);
+        let guess = there.u.iter().zip(&there.tangent).map(|(u, t)| u + distance * t).collect();
+        let plane = Plane { row: there.tangent.clone(), base: there.u.clone(), distance };
+        match settle(problem, settings, plane, guess, 1.0, &mut cost) {
+            Ok(found) => return Ok(found.point),
+            Err(why) => failure = why,
+        }
+    }
+    Err(failure)
 }
 
 /// A stored point as a station again.

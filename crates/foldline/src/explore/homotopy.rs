@@ -51,13 +51,28 @@ pub fn find(
     earlier: &Diagram,
     observer: &dyn Observer,
 ) -> Route {
-    let mut planner =
-        Planner { system, plan, homotopy, earlier, observer, legs: Vec::new(), going: true, origin, farthest: None };
+    let mut planner = Planner {
+        system,
+        plan,
+        homotopy,
+        earlier,
+        observer,
+        legs: Vec::new(),
+        going: true,
+        origin,
+        farthest: None,
+        open: false,
+    };
     let arrived = start.and_then(|start| planner.plan_route(start));
     if let Err(why) = &arrived
         && planner.going
     {
-        planner.note(&format!("the goal was not reached: {why}"));
+        let verdict = if planner.open {
+            "a fold left the range or was lost, so there may be a way outside"
+        } else {
+            "every fold of the family turns back before the goal: it is not connected to it"
+        };
+        planner.note(&format!("the goal was not reached: {why}; {verdict}"));
     }
     Route { legs: planner.legs, arrived, going: planner.going }
 }
@@ -71,8 +86,10 @@ struct Planner<'p> {
     legs: Vec<Branch>,
     going: bool,
     origin: Origin,
-    /// The point closest to the goal on any run, and the share of the way that it has covered.
-    farthest: Option<(f64, Point)>,
+    /// The point closest to the goal on any run, the share of the way that it has covered, and whether it is a fold.
+    farthest: Option<(f64, Point, bool)>,
+    /// Whether some fold left the range or ended otherwise before it turned back, so that there may be more beyond.
+    open: bool,
 }
 
 /// Parameters that change together towards the goal.
@@ -143,16 +160,28 @@ impl Planner<'_> {
                 return Err("stopped on request".into());
             }
             // The share is one of what is left; the ground gained counts against the whole way.
-            let Some((share, point)) = self.farthest.take() else { break };
+            let Some((share, point, is_fold)) = self.farthest.take() else { break };
             let gained = share * (1.0 - covered);
             if gained < GAIN || round + 1 == ROUNDS {
                 break;
             }
             covered += gained;
+            let point = if is_fold { self.beside(&point) } else { Ok(point) };
+            let [low, high] = self.homotopy.range;
+            let inside = |point: &Point| (low..=high).contains(&point.parameters[self.homotopy.via]);
+            let Some(point) = point.ok().filter(inside) else { break };
             self.note(&format!("{:.0} % of the way are covered; on from there", 100.0 * covered));
             here = point;
         }
-        Err(tried.join("; "))
+        Err(tried.join("; then "))
+    }
+
+    /// A solution beside a fold of the family in `via`.
+    fn beside(&self, fold: &Point) -> Result<Point, String> {
+        let settings = growth::settings(self.system, self.plan.tolerance, [f64::NEG_INFINITY, f64::INFINITY], 0);
+        let mut problem = growth::problem_of(self.system, self.homotopy.via, self.plan.degree, fold, false);
+        growth::beside(&mut *problem, &settings, fold)
+            .map_err(|why| format!("no solution was found beside the fold: {why}"))
     }
 
     fn from_here(&mut self, here: &Point, course: &Course) -> Result<Point, String> {
@@ -193,7 +222,8 @@ impl Planner<'_> {
                 return Err("stopped on request".into());
             }
         }
-        tried.push(format!("neither do direct runs after moving in between {:?}", self.homotopy.range));
+        let [low, high] = self.homotopy.range;
+        tried.push(format!("direct runs from other places between {low} and {high} do not arrive either"));
         for fold in family.special.iter().filter(|s| s.kind == Kind::Fold) {
             match self.along(fold, &family.name, course) {
                 Ok(point) => return Ok(point),
@@ -236,14 +266,16 @@ impl Planner<'_> {
         self.measure(&curve, course);
         let end = [curve.points.first(), curve.points.last()].into_iter().flatten().find(|p| course.arrives(p));
         let Some(end) = end else {
-            let best = curve.points.iter().map(|p| course.share(p)).fold(0.0, f64::max);
-            let why = format!("the fold at {place:.6} goes {:.1} % of the way and no further", 100.0 * best);
+            let best = 100.0 * curve.points.iter().map(|p| course.share(p)).fold(0.0, f64::max);
+            let bound = |end: &Ending| matches!(end, Ending::Bound(value) if (value - course.from).abs() < 1e-9);
+            let turned = curve.ends.iter().flatten().all(|end| bound(end) || *end == Ending::Closed);
+            self.open |= !turned;
+            let how = if turned { "turns back".into() } else { format!("ends short ({})", ending(&curve)) };
+            let why = format!("the fold at {place:.6} {how} after {best:.1} % of the way");
             self.note(&why);
             return Err(why);
         };
-        let settings = growth::settings(self.system, self.plan.tolerance, [f64::NEG_INFINITY, f64::INFINITY], 0);
-        let mut problem = growth::problem_of(self.system, via, self.plan.degree, end, false);
-        let point = growth::beside(&mut *problem, &settings, end).map_err(|why| why.to_string())?;
+        let point = self.beside(end).inspect_err(|why| self.note(why))?;
         self.note(&format!("arrived along the fold, from {place:.6} to {:.6}", end.parameters[via]));
         Ok(point)
     }
@@ -253,14 +285,13 @@ impl Planner<'_> {
         end.filter(|point| course.arrives(point)).cloned()
     }
 
-    /// Remembers the point of a run that is closest to the goal. A fold itself is no place to start from: the point before
-    /// it is taken.
+    /// Remembers the point of a run that is closest to the goal.
     fn measure(&mut self, run: &Branch, course: &Course) {
         let best = run.points.iter().max_by(|a, b| course.share(a).total_cmp(&course.share(b)));
         if let Some(point) = best {
             let share = course.share(point);
-            if self.farthest.as_ref().is_none_or(|(known, _)| share > *known) {
-                self.farthest = Some((share, point.clone()));
+            if self.farthest.as_ref().is_none_or(|(known, ..)| share > *known) {
+                self.farthest = Some((share, point.clone(), run.held.is_some()));
             }
         }
     }
@@ -321,9 +352,9 @@ impl Planner<'_> {
 }
 
 fn ending(run: &Branch) -> String {
-    let ends: Vec<String> =
-        run.ends.iter().flatten().filter(|e| !matches!(e, Ending::Bound(_))).map(|e| e.to_string()).collect();
-    if ends.is_empty() { "at a bound".into() } else { ends.join(", ") }
+    let mut ends: Vec<String> = run.ends.iter().flatten().map(|e| e.to_string()).collect();
+    ends.dedup();
+    ends.join(", ")
 }
 
 /// Points spread along a family, the nearest first.
