@@ -119,6 +119,10 @@ pub trait ZeroProblem {
     /// Stability and trust at `u`, for which [`ZeroProblem::factorise`] was called last.
     fn examine(&mut self, u: &[f64]) -> Examination;
 
+    /// How far a point is from one at which F_x is singular, in terms of its spectrum: small where another branch may be
+    /// close by.
+    fn margin(&self, at: &Point) -> f64;
+
     /// `u` as plain data.
     fn point(&self, u: &[f64], tangent: &[f64], examination: Examination) -> Point;
 

@@ -359,8 +359,8 @@ pub fn is_doubled(branch: &Branch) -> bool {
 
 /// What a branch can collapse to: every cycle to an equilibrium, a doubled one to its parent as well, and one that was born
 /// at a branch point to more symmetric solutions.
-fn collapses(branch: &Branch, system: &System) -> Vec<Box<dyn Monitor>> {
-    let mut all: Vec<Box<dyn Monitor>> = Vec::new();
+fn collapses<'a>(branch: &Branch, system: &'a System) -> Vec<Box<dyn Monitor + 'a>> {
+    let mut all: Vec<Box<dyn Monitor + 'a>> = Vec::new();
     if matches!(branch.origin, Origin::Switch { kind: Kind::BranchPoint, .. }) {
         for reflection in system.reflections.iter().filter(|r| r.contains(&true)) {
             for half in [false, true].into_iter().take(if branch.family == Family::Cycle { 2 } else { 1 }) {
@@ -376,7 +376,7 @@ fn collapses(branch: &Branch, system: &System) -> Vec<Box<dyn Monitor>> {
         if is_doubled(branch) {
             all.push(Box::new(collapse::Halves));
         }
-        all.push(Box::new(collapse::Shrinks));
+        all.push(Box::new(collapse::Shrinks { field: system.field, free: branch.free, scales: &system.scales }));
     }
     all
 }

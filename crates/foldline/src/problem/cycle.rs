@@ -453,6 +453,10 @@ impl ZeroProblem for CycleProblem<'_> {
         Examination { spectrum: found.multipliers, unstable: found.unstable, ranges, trust }
     }
 
+    fn margin(&self, at: &Point) -> f64 {
+        at.free_spectrum().iter().map(|z| (z - 1.0).norm()).fold(f64::INFINITY, f64::min)
+    }
+
     fn point(&self, u: &[f64], tangent: &[f64], examination: Examination) -> Point {
         let size = self.profile_size();
         Point {

@@ -131,6 +131,11 @@ impl ZeroProblem for EquilibriumProblem<'_> {
         Examination { spectrum, unstable, ranges, trust: Trust { residual, ..Trust::default() } }
     }
 
+    fn margin(&self, at: &Point) -> f64 {
+        let sizes = at.spectrum.iter().map(|z| z.norm());
+        sizes.clone().fold(f64::INFINITY, f64::min) / sizes.fold(f64::MIN_POSITIVE, f64::max)
+    }
+
     fn point(&self, u: &[f64], tangent: &[f64], examination: Examination) -> Point {
         let n = self.n();
         Point {

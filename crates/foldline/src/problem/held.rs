@@ -19,7 +19,7 @@
 //! **Fails when** the surface itself is singular (two curves of special points cross).
 
 use crate::contract::{Condition, Examination, Singular, ZeroProblem};
-use crate::diagram::{Mesh, Point};
+use crate::diagram::{Kind, Mesh, Point};
 use crate::linalg::lu;
 
 /// A surface with a condition held.
@@ -254,6 +254,16 @@ impl ZeroProblem for Held<'_> {
         };
         found.unstable = order.iter().skip(self.condition.held()).filter(outside).count();
         found
+    }
+
+    fn margin(&self, at: &Point) -> f64 {
+        // One multiplier may lie there all the way; what counts is a second one.
+        let held = if self.condition.kind() == Kind::Fold { 1 } else { 0 };
+        let mut others = at.clone();
+        let first = at.spectrum.len() - at.free_spectrum().len();
+        others.spectrum[first..].sort_by(|a, b| self.condition.distance(*a).total_cmp(&self.condition.distance(*b)));
+        others.spectrum.drain(first..(first + held).min(at.spectrum.len()));
+        self.surface.margin(&others)
     }
 
     fn point(&self, u: &[f64], tangent: &[f64], examination: Examination) -> Point {
