@@ -139,7 +139,7 @@ fn unknown_origin_and_an_origin_further_down() {
     let desk = Desk::new();
     says(
         &desk.study("\"rest\"\nfree", "\"test\"\nfree"),
-        &["study.toml:10:8", "no seed or branch \"test\"", "did you mean `rest`"],
+        &["study.toml:10:8", "no seed, branch, curve or homotopy \"test\"", "did you mean `rest`"],
     );
     let above = "[[branch]]\nname = \"early\"\nfrom = \"main\"\nfree = \"kappa\"\nrange = [0, 2]\n";
     let message = desk.study("[[branch]]\n", &format!("{above}[[branch]]\n"));
