@@ -5,9 +5,11 @@ mod attractors;
 mod check;
 mod failure;
 mod order;
+mod plane;
 mod plot;
 mod progress;
 mod run;
+mod short;
 mod table;
 
 use arguments::{Arguments, Command};
