@@ -1,209 +1,128 @@
-//! Tables and pictures of a made-up run with curves in two parameters and a homotopy.
+//! Two-parameter curves: against closed forms, and through the special points of one-parameter runs.
 
-use foldline::contract::{Event, Observer};
-use foldline::diagram::{Branch, Cost, Ending, Family, Kind, Origin, Point, Solution, SpecialPoint, Trust};
-use foldline_store::run_file::Recorder;
-use foldline_store::study_file::parse_study;
-use std::path::Path;
-use std::process::{Command, Output};
+use foldline::contract::Unobserved;
+use foldline::diagram::{Branch, Diagram, Kind};
+use foldline::explore::{CurvePlan, System, run};
+use foldline_store::study_file::{Study, parse_study};
 
-const MODEL: &str = "name = \"made up\"\n[parameters]\nOmega = 1\nkappa = 0\nzeta = 0.1\n[states]\nx = \"-x\"\n[outputs]\nr = \"abs(x)\"\n";
-const STUDY: &str = r#"model = "made-up.toml"
-[[seed]]
-name = "start"
-state = { x = 0 }
-[[branch]]
-name = "main"
-from = "start"
-free = "Omega"
-range = [0, 4]
-[[curve]]
-name = "folds"
-hold = "fold"
-of = "main"
-free = "kappa"
-range = [0, 1]
-[[homotopy]]
-name = "way"
-from = "start"
-to = { kappa = 1 }
-via = "Omega"
-range = [0, 4]
-"#;
+const ROTOR: &str = include_str!("../../../models/overhung-rotor.toml");
+/// The tolerance of a study that does not state one.
+const TOLERANCE: f64 = 1e-6;
 
-fn point(position: i64, [omega, kappa]: [f64; 2], r: f64) -> Point {
-    Point {
-        position,
-        parameters: vec![omega, kappa, 0.1],
-        solution: Solution::Equilibrium(vec![r]),
-        tangent: vec![0.0, 1.0],
-        step: 0.1,
-        spectrum: Vec::new(),
-        unstable: 0,
-        ranges: vec![[r, r], [r, r]],
-        trust: Trust::default(),
-        cost: Cost::default(),
-    }
+fn study(model: &str, rest: &str) -> Study {
+    parse_study(&format!("model = \"m\"\n{rest}"), "study", model, "model")
+        .unwrap_or_else(|found| panic!("{}", found[0]))
 }
 
-/// A branch with points at these parameter values.
-fn branch(name: &str, free: usize, held: Option<(Kind, usize)>, origin: Origin, at: &[[f64; 2]]) -> Branch {
-    let mut branch = Branch { held, ..Branch::new(name, Family::Equilibrium, free, origin) };
-    for (position, at) in at.iter().enumerate() {
-        branch.insert(point(position as i64, *at, 1.0 + at[0]));
-    }
-    branch.ends = [Some(Ending::Bound(0.0)), Some(Ending::Bound(1.0))];
-    branch
-}
-
-/// The folder of a run in which the fold of `main` at Omega = 2 is held while kappa goes to 1. `free` says which of the two
-/// parameters the curve is written down with as the free one.
-fn run(free: usize) -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    let study = parse_study(STUDY, "study.toml", MODEL, "made-up.toml").unwrap();
-    let recorder = Recorder::create(&folder.path().join("run"), &study).unwrap();
-    let fold = |position, at: [f64; 2]| SpecialPoint {
-        kind: Kind::Fold,
-        point: point(position, at, 3.0),
-        unstable_before: 0,
-        unstable_after: 1,
-        error: 1e-9,
+/// The study with one curve more: what is held of the branch "b", next to which value, and the second parameter.
+fn with_curve(mut study: Study, hold: Kind, near: f64, second: &str, range: [f64; 2], until: Option<f64>) -> Diagram {
+    let curve = CurvePlan {
+        name: "curve".into(),
+        hold,
+        of: "b".into(),
+        near: Some(near),
+        free: study.model.parameter_index(second).unwrap(),
+        ranges: [study.plan.branches[0].range, range],
+        until,
+        max_points: 500,
     };
-    let mut main = branch("main", 0, None, Origin::Seed("start".into()), &[[0.0, 0.0], [2.0, 0.0], [0.5, 0.0]]);
-    main.insert_special(fold(1, [2.0, 0.0]));
-    let origin = Origin::Switch { parent: "main".into(), kind: Kind::Fold, parameter: 2.0 };
-    let mut folds = branch("folds", free, Some((Kind::Fold, 1 - free)), origin, &[[2.0, 0.0], [2.5, 0.5], [2.25, 1.0]]);
-    folds.insert_special(fold(1, [2.5, 0.5]));
-    let first = branch("way/1", 1, None, Origin::Seed("start".into()), &[[1.0, 0.0], [1.0, 0.75], [1.0, 0.25]]);
-    let second = branch("way/2", 1, None, Origin::EndOf("way/1".into()), &[[3.0, 0.0], [3.0, 1.0]]);
-    // In an order in which they might have been finished.
-    for branch in [&first, &folds, &second, &main] {
-        let bare = Branch { points: Vec::new(), special: Vec::new(), ends: [None, None], ..branch.clone() };
-        recorder.observe(Event::Begin(&bare));
-        for point in &branch.points {
-            recorder.observe(Event::Point(branch, point));
-        }
-        for special in &branch.special {
-            recorder.observe(Event::Special(branch, special));
-        }
-        for (side, end) in branch.ends.iter().enumerate().filter_map(|(side, end)| Some((side, end.as_ref()?))) {
-            recorder.observe(Event::SideEnded(branch, side, end));
-        }
+    study.plan.curves.push(curve);
+    grown(&study)
+}
+
+fn grown(study: &Study) -> Diagram {
+    run(&System::of_plan(&study.model, &study.plan), &study.plan, 1, Diagram::default(), &Unobserved)
+}
+
+fn complete(branch: &Branch) {
+    for end in &branch.ends {
+        assert!(end.as_ref().is_some_and(|e| e.complete()), "{}: {end:?}", branch.name);
     }
-    recorder.observe(Event::Note("way", "at Omega = 1 the run in kappa turns back at 0.75"));
-    recorder.observe(Event::Note("start", "1 equilibrium"));
-    recorder.observe(Event::Note("way", "at Omega = 3 it gets through"));
-    recorder.finish().unwrap();
-    folder
 }
 
-fn foldline(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_foldline")).args(arguments).current_dir(folder).output().unwrap()
-}
-
-#[track_caller]
-fn printed(folder: &Path, arguments: &[&str]) -> String {
-    let output = foldline(folder, arguments);
-    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8(output.stdout).unwrap()
-}
-
-#[test]
-fn special_points_of_a_curve_have_both_parameters() {
-    let folder = run(1);
-    let text = printed(folder.path(), &["table", "run"]);
-    let expected = "branch  kind        Omega        kappa        r_max  unstable_before  unstable_after   error\n\
-                    main    fold  2.000000000  0.000000000  3.000000000                0               1  1.0e-9\n\
-                    folds   fold  2.500000000  0.500000000  3.000000000                0               1  1.0e-9\n";
-    assert_eq!(text, expected);
-    // Also where the curve is the only thing shown, and of a branch in Omega only Omega.
-    let only = |name: &str| printed(folder.path(), &["table", "run", "--branch", name]);
-    assert_eq!(
-        words(&only("folds"))[..7],
-        ["branch", "kind", "Omega", "kappa", "r_max", "unstable_before", "unstable_after"]
-    );
-    assert_eq!(words(&only("main"))[..4], ["branch", "kind", "Omega", "r_max"]);
-    let points = printed(folder.path(), &["table", "run", "--points", "--branch", "folds", "--format", "csv"]);
-    let lines: Vec<&str> = points.lines().collect();
-    assert!(lines[0].starts_with("branch,position,Omega,kappa,zeta,"), "{points}");
-    assert!(lines[2].starts_with("folds,1,2.5,0.5,0.1,"), "{points}");
-}
-
-fn words(text: &str) -> Vec<&str> {
-    text.split_whitespace().collect()
-}
-
-#[test]
-fn branches_are_listed_behind_what_they_come_from_and_curves_with_both_parameters() {
-    // Whichever of the two parameters is the free one, the first is that of the branch.
-    for free in [0, 1] {
-        let folder = run(free);
-        let rows: serde_json::Value =
-            serde_json::from_str(&printed(folder.path(), &["table", "run", "--branches", "--format", "json"])).unwrap();
-        let names: Vec<&str> = rows.as_array().unwrap().iter().filter_map(|row| row["branch"].as_str()).collect();
-        assert_eq!(names, ["main", "folds", "way/1", "way/2"]);
-        let (main, folds) = (&rows[0], &rows[1]);
-        let cells = ["held", "free", "second", "from", "to", "second_from", "second_to"];
-        assert_eq!(
-            cells.map(|key| folds[key].clone()),
-            serde_json::json!(["fold", "Omega", "kappa", 2.0, 2.5, 0.0, 1.0]).as_array().unwrap()[..]
-        );
-        assert_eq!(
-            cells.map(|key| main[key].clone()),
-            serde_json::json!([null, "Omega", null, 0.0, 2.0, null, null]).as_array().unwrap()[..]
-        );
-        assert_eq!(folds["origin"], "fold of main at 2.000000");
+/// Every point of the curve satisfies `defect` = 0, a function of the branch's parameter and the second one, to
+/// the tolerance.
+fn satisfies(diagram: &Diagram, points: usize, defect: impl Fn(f64, f64) -> f64) {
+    let curve = diagram.branch("curve").unwrap();
+    complete(curve);
+    assert!(curve.points.len() >= points, "{} points", curve.points.len());
+    let (_, first) = curve.held.unwrap();
+    for point in &curve.points {
+        let at = (point.parameters[first], point.parameters[curve.free]);
+        assert!(defect(at.0, at.1).abs() < TOLERANCE, "{at:?}: {:.1e}", defect(at.0, at.1));
     }
-    let folder = run(1);
-    let legs = printed(folder.path(), &["table", "run", "--branches", "--branch", "way"]);
-    assert!(legs.contains("way/1") && legs.contains("way/2") && !legs.contains("main"), "{legs}");
-    // Without a curve there is nothing to say about a second parameter.
-    assert!(!legs.contains("held") && !legs.contains("second"), "{legs}");
 }
 
 #[test]
-fn the_route_of_a_homotopy_is_told_in_its_order() {
-    let folder = run(1);
-    let notes = printed(folder.path(), &["table", "run", "--notes", "--format", "csv"]);
-    let expected = "about,note\nstart,1 equilibrium\nway,at Omega = 1 the run in kappa turns back at 0.75\n\
-                    way,at Omega = 3 it gets through\n";
-    assert_eq!(notes, expected);
-    let of_way = printed(folder.path(), &["table", "run", "--notes", "--branch", "way"]);
-    assert_eq!(of_way.lines().count(), 3, "{of_way}");
-}
-
-/// The titles of the groups of a picture: the names of what is drawn.
-fn drawn(folder: &Path, arguments: &[&str]) -> (Vec<String>, String) {
-    printed(folder, &[&["plot", "run", "-o", "a.svg"], arguments].concat());
-    let svg = std::fs::read_to_string(folder.join("a.svg")).unwrap();
-    let names = ["main", "folds", "way/1", "way/2"].into_iter().map(String::from);
-    (names.filter(|name| svg.contains(&format!("<title>{name}</title>"))).collect(), svg)
+fn folds_of_equilibria_go_round_the_cusp() {
+    let model = "name = \"Cusp\"\n[parameters]\nmu = -1\nlambda = 1\n[states]\nx = \"mu + lambda*x - x^3\"\n";
+    let branch = "[[seed]]\nname = \"s\"\nstate = { x = -1.3247 }\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"mu\"\nrange = [-2, 2]\n";
+    let diagram = with_curve(study(model, branch), Kind::Fold, 0.4, "lambda", [-1.0, 2.0], None);
+    satisfies(&diagram, 10, |mu, lambda| 27.0 * mu * mu - 4.0 * lambda.powi(3));
+    // Both arms of the cusp belong to the same curve: it turns back in lambda, at the cusp.
+    let curve = diagram.branch("curve").unwrap();
+    assert_eq!(curve.special.len(), 1);
+    let cusp = &curve.special[0].point.parameters;
+    assert!(cusp[0].abs() < TOLERANCE && cusp[1].abs() < TOLERANCE, "{cusp:?}");
+    let mu = |p: Option<&foldline::diagram::Point>| p.unwrap().parameters[0];
+    assert!(mu(curve.points.first()) * mu(curve.points.last()) < 0.0);
 }
 
 #[test]
-fn pictures_show_the_branches_or_the_curves_in_their_plane() {
-    let folder = run(1);
-    let (names, svg) = drawn(folder.path(), &[]);
-    assert_eq!(names, ["main", "way/1", "way/2"]);
-    assert!(svg.contains("max r"));
-    let (names, svg) = drawn(folder.path(), &["--curves"]);
-    assert_eq!(names, ["folds"]);
-    let (across, up) = (svg.find(">Ω<").unwrap(), svg.find(">κ<").unwrap());
-    assert!(across < up && !svg.contains("max r"), "{svg}");
-    let (names, _) = drawn(folder.path(), &["--x", "Omega", "--y", "kappa"]);
-    assert_eq!(names.len(), 4);
-    let (names, svg) = drawn(folder.path(), &["--curves", "--y", "r"]);
-    assert_eq!(names, ["folds"]);
-    assert!(svg.contains("max r"));
+fn hopf_points_of_the_brusselator_lie_on_a_parabola() {
+    let model = include_str!("../../../models/brusselator.toml");
+    let branch = "[[seed]]\nname = \"s\"\nstate = { x = 1, y = 1 }\nparameters = { A = 1, B = 1 }\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"B\"\nrange = [0.5, 12]\n";
+    let diagram = with_curve(study(model, branch), Kind::Hopf, 2.0, "A", [0.3, 3.0], None);
+    satisfies(&diagram, 5, |b, a| b - 1.0 - a * a);
 }
 
 #[test]
-fn curves_that_a_run_does_not_have_cannot_be_drawn() {
-    let folder = tempfile::tempdir().unwrap();
-    let study = parse_study(STUDY, "study.toml", MODEL, "made-up.toml").unwrap();
-    Recorder::create(&folder.path().join("run"), &study).unwrap().finish().unwrap();
-    let output = foldline(folder.path(), &["plot", "run", "--curves", "-o", "a.svg"]);
-    let said = String::from_utf8_lossy(&output.stderr);
-    assert_eq!(output.status.code(), Some(2), "{said}");
-    assert!(said.contains("no curve in two parameters") && said.contains("leave --curves out"), "{said}");
+fn torus_points_of_the_langford_system_lie_on_a_line() {
+    let model = "name = \"Langford\"\n[parameters]\nlambda = 0.5\na = 0.6\n[states]\nx = \"(z - 0.7)*x - 3.5*y\"\ny = \"3.5*x + (z - 0.7)*y\"\nz = \"a + lambda*z - z^3/3 - (x^2 + y^2)*(1 + 0.25*z)\"\n";
+    let branch = "[[seed]]\nname = \"s\"\nattractor = \"cycle\"\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"lambda\"\nrange = [0.1, 1.5]\n";
+    let diagram = with_curve(study(model, branch), Kind::Torus, 0.7, "a", [0.3, 1.2], None);
+    // As for the torus point in the tests of classical problems, with a in place of 0.6.
+    let z: f64 = 0.7;
+    let share = 1.0 + 0.25 * z;
+    let rest = 1.0 - 0.25 * z / share;
+    satisfies(&diagram, 4, |lambda, a| lambda * rest - z * z - 0.25 * (a - z.powi(3) / 3.0) / share);
+}
+
+#[test]
+fn the_fold_of_the_single_loop_leads_from_the_cubic_spring_to_contact() {
+    let branch = "[[seed]]\nname = \"s\"\nattractor = \"2:1\"\nparameters = { Omega = 5, kappa = 0 }\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"Omega\"\nrange = [0.5, 12]\n";
+    let mut cubic = study(ROTOR, branch);
+    let flow = with_curve(cubic.clone(), Kind::Fold, 3.4, "kappa", [0.0, 1.0], Some(1.0));
+    let curve = flow.branch("curve").unwrap();
+    complete(curve);
+    // It begins at the fold of the run in Omega and ends at that of the contact branch.
+    let fold = |diagram: &Diagram| {
+        let special = &diagram.branch("b").unwrap().special;
+        special.iter().filter(|s| s.kind == Kind::Fold).map(|s| s.point.parameters[0]).reduce(f64::min).unwrap()
+    };
+    assert!((curve.points[0].parameters[0] - fold(&flow)).abs() < TOLERANCE);
+    let arrived = curve.points.last().unwrap();
+    assert_eq!(arrived.parameters[1], 1.0);
+    cubic.plan.seeds[0].parameters[1] = 1.0;
+    let contact = grown(&cubic);
+    let gap = arrived.parameters[0] - fold(&contact);
+    assert!(gap.abs() < TOLERANCE, "{gap:.1e}");
+    assert!(curve.points.iter().all(|p| p.trust.discretisation < TOLERANCE));
+}
+
+#[test]
+fn period_doublings_over_the_damping_pass_those_of_another_damping() {
+    let at = |zeta: f64| {
+        format!(
+            "[[seed]]\nname = \"s\"\nattractor = \"2:1\"\nsamples = 48\nparameters = {{ Omega = 5, kappa = 1, zeta = {zeta} }}\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"Omega\"\nrange = [3, 6]\n"
+        )
+    };
+    let flow = with_curve(study(ROTOR, &at(0.01)), Kind::PeriodDoubling, 3.4, "zeta", [1e-3, 0.011], Some(0.011));
+    let arrived = flow.branch("curve").unwrap().points.last().unwrap();
+    complete(flow.branch("curve").unwrap());
+    assert_eq!(arrived.parameters[2], 0.011);
+    let other = grown(&study(ROTOR, &at(0.011)));
+    let gaps = other.branch("b").unwrap().special.iter().filter(|s| s.kind == Kind::PeriodDoubling);
+    let gap = gaps.map(|s| (s.point.parameters[0] - arrived.parameters[0]).abs()).fold(f64::INFINITY, f64::min);
+    assert!(gap < TOLERANCE, "{gap:.1e} from {:?}", arrived.parameters);
 }

@@ -212,7 +212,7 @@ pub fn settle(
         let accurate = defect <= 5.0 * settings.tolerance || round == 3;
         // Whether a multiplier lies inside or outside the unit circle must not be a matter of its error.
         let close = |z: &num_complex::Complex64| z.norm().ln().abs() < CERTAIN * defect;
-        let certain = tightened || round == 3 || !found.point.free_spectrum().iter().any(close);
+        let certain = !settings.stability || tightened || round == 3 || !found.point.free_spectrum().iter().any(close);
         if accurate && certain {
             if trust.discretisation > 1.5 * settings.tolerance {
                 return Err(Failure::Mesh(trust.discretisation));

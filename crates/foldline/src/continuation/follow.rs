@@ -79,13 +79,12 @@ pub fn follow(
     let mut position = left.point.position;
     let mut trail = previous.map(|p| walk.trail(&p, &left));
     let first_period = walk.home.unwrap_or(&left.point).solution.period();
-    let mut moved = false;
+    let (mut ever_moved, mut moved) = (false, true);
     loop {
-        moved |= walk.moves(&left);
         let outward = |bound: f64| (left.parameter() - bound).abs() <= 1e-12 * (1.0 + bound.abs());
         let [low, high] = walk.settings.range;
         if (outward(low) && left.slope() < 0.0) || (outward(high) && left.slope() > 0.0) {
-            return Ending::Bound(left.parameter());
+            return Ending::Bound(if left.slope() < 0.0 { low } else { high });
         }
         if emitted >= walk.settings.max_points {
             return Ending::PointLimit(emitted);
@@ -146,10 +145,13 @@ pub fn follow(
         if let Some(ending) = end {
             return ending;
         }
-        if let (Some(first), Some(now)) = (first_period, right.point.solution.period()) {
-            let settled = moved && !walk.moves(&left) && !walk.moves(&right);
-            let growing = left.point.solution.period().is_some_and(|before| now > before);
-            if growing && (now > walk.settings.period_growth * first || (settled && now > LONG * first)) {
+        if let (Some(first), Some(before), Some(now)) =
+            (first_period, left.point.solution.period(), right.point.solution.period())
+        {
+            let moves = walk.moves(&left, &right, [before, now]);
+            let settled = ever_moved && !moved && !moves;
+            (ever_moved, moved) = (ever_moved || moves, moves);
+            if now > before && (now > walk.settings.period_growth * first || (settled && now > LONG * first)) {
                 return Ending::PeriodUnbounded(now);
             }
         }
@@ -176,10 +178,9 @@ impl Follow<'_> {
 
     /// Whether the parameter still moves where the period grows: dλ/d ln T, which tends to zero with the distance from an
     /// orbit of infinite period, exceeds the tolerance.
-    fn moves(&self, station: &Station) -> bool {
-        let Some(period) = station.point.solution.period() else { return true };
-        let growth = station.tangent[station.tangent.len() - 2] / period;
-        station.slope().abs() > 0.1 * self.settings.tolerance * (1.0 + station.parameter().abs()) * growth.abs()
+    fn moves(&self, left: &Station, right: &Station, [before, now]: [f64; 2]) -> bool {
+        let change = (right.parameter() - left.parameter()).abs();
+        change > 0.1 * self.settings.tolerance * (1.0 + right.parameter().abs()) * (now / before).ln().abs()
     }
 
     fn trail(&mut self, before: &Station, now: &Station) -> Trail {
@@ -255,10 +256,43 @@ impl Follow<'_> {
             right = self.at_parameter(left, &right, bound, cost)?;
             end = Some(Ending::Bound(bound));
         }
+        if let Some((value, there)) = self.beyond(left, &right, cost) {
+            return Ok(Step { right: there, end: Some(Ending::Bound(value)) });
+        }
         if let Some(home) = self.closes(left, &right, emitted, cost)? {
             return Ok(Step { right: home, end: Some(Ending::Closed) });
         }
         Ok(Step { right, end })
+    }
+
+    /// The bound of a further parameter that this step passes, and the point there.
+    fn beyond(&mut self, left: &Station, right: &Station, cost: &mut Cost) -> Option<(f64, Station)> {
+        let (index, value) = self.settings.bounds.iter().find_map(|(index, [low, high])| {
+            let now = *right.point.parameters.get(*index)?;
+            if now < *low { Some((*index, *low)) } else { (now > *high).then_some((*index, *high)) }
+        })?;
+        let gap = |station: &Station| station.point.parameters[index] - value;
+        if (gap(left) > 0.0) == (gap(right) > 0.0) {
+            return None;
+        }
+        let stretch = Stretch::new(self.problem, left, right, self.direction);
+        let (mut inner, mut outer) = ((0.0, gap(left)), (stretch.length, gap(right)));
+        let mut found = None;
+        for _ in 0..8 {
+            let s = inner.0 + (outer.0 - inner.0) * inner.1 / (inner.1 - outer.1);
+            let there = self.cut(left, &stretch, s, cost)?;
+            let miss = gap(&there);
+            if (miss > 0.0) == (outer.1 > 0.0) {
+                outer = (s, miss)
+            } else {
+                inner = (s, miss)
+            }
+            found = Some(there);
+            if miss.abs() < self.settings.tolerance * (1.0 + value.abs()) {
+                break;
+            }
+        }
+        found.map(|there| (value, there))
     }
 
     /// Whether `right`, predicted as `guess`, continues the branch at `left`, and neither turns too far nor lies on another
