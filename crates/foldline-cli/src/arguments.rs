@@ -116,7 +116,7 @@ pub struct Plot {
     /// Vertical axis [default: the largest value of the first output]
     #[arg(long, value_name = "NAME")]
     pub y: Option<String>,
-    /// Draw the curves in two parameters, the second against the first, instead of the branches
+    /// Draw the curves in two parameters, in their plane, instead of the branches
     #[arg(long)]
     pub curves: bool,
     /// Part of the diagram to show

@@ -5,7 +5,6 @@ mod attractors;
 mod check;
 mod failure;
 mod order;
-mod plane;
 mod plot;
 mod progress;
 mod run;

@@ -41,17 +41,22 @@ pub fn leg(name: &str, homotopy: &str) -> Option<usize> {
 
 /// The branches of a diagram in an order that does not depend on how the work was shared out: those of the study in the
 /// order of its [`names`], each followed by the branches that come from it, by the parameter at which they do, and by the
-/// curves in two parameters that begin on it.
+/// curves in two parameters that begin on it; the legs of a homotopy as they were tried.
 pub fn ordered(mut diagram: Diagram, study: &[String]) -> Diagram {
+    let legs =
+        |branch: &Branch| study.iter().enumerate().find_map(|(place, name)| Some((place, leg(&branch.name, name)?)));
+    let parent = |branch: &Branch| match &branch.origin {
+        Origin::Switch { parent, .. } if legs(branch).is_none() => Some(parent.clone()),
+        _ => None,
+    };
     let rank = |branch: &Branch| {
         let own = study.iter().position(|name| *name == branch.name).map(|place| (place, 0));
-        let legs = || study.iter().enumerate().find_map(|(place, name)| Some((place, leg(&branch.name, name)?)));
         let (behind, parameter) = match branch.origin {
-            Origin::Switch { .. } if branch.held.is_some() => (true, f64::NEG_INFINITY),
+            Origin::Switch { .. } if branch.held.is_some() && legs(branch).is_none() => (true, f64::NEG_INFINITY),
             Origin::Switch { parameter, .. } => (false, parameter),
             _ => (false, f64::NEG_INFINITY),
         };
-        (behind, own.or_else(legs).unwrap_or((usize::MAX, 0)), parameter)
+        (behind, own.or_else(|| legs(branch)).unwrap_or((usize::MAX, 0)), parameter)
     };
     let mut waiting = std::mem::take(&mut diagram.branches);
     waiting.sort_by(|a, b| {
@@ -61,7 +66,7 @@ pub fn ordered(mut diagram: Diagram, study: &[String]) -> Diagram {
     // A branch is listed once its parent is; what is left over at last has no parent in the diagram.
     while !waiting.is_empty() {
         let (mut children, others): (Vec<Branch>, Vec<Branch>) = match diagram.branches.last() {
-            Some(_) => waiting.into_iter().partition(|b| parent(b).is_some_and(|p| diagram.branch(p).is_some())),
+            Some(_) => waiting.into_iter().partition(|b| parent(b).is_some_and(|p| diagram.branch(&p).is_some())),
             None => (Vec::new(), waiting),
         };
         waiting = others;
@@ -72,18 +77,11 @@ pub fn ordered(mut diagram: Diagram, study: &[String]) -> Diagram {
         }
         // Siblings stand in order behind their parent, each before what comes from it.
         for child in children.drain(..).rev() {
-            let at = diagram.branches.iter().position(|b| Some(b.name.as_str()) == parent(&child));
+            let at = diagram.branches.iter().position(|b| Some(&b.name) == parent(&child).as_ref());
             diagram.branches.insert(at.map_or(diagram.branches.len(), |at| at + 1), child);
         }
     }
     diagram
-}
-
-fn parent(branch: &Branch) -> Option<&str> {
-    match &branch.origin {
-        Origin::Switch { parent, .. } => Some(parent),
-        _ => None,
-    }
 }
 
 #[cfg(test)]
@@ -128,8 +126,8 @@ mod tests {
             curve("a", "folds"),
             root("way/1"),
             end_of("way/1", "way/2"),
-            curve("way/2", "way/3"),
-            Branch { held: Some((Kind::Fold, 1)), ..end_of("way/3", "way/4") },
+            end_of("way/2", "way/3"),
+            curve("way/1", "way/4"),
             end_of("way/9", "way/10"),
             end_of("way", "b"),
         ];

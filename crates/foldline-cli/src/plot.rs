@@ -2,9 +2,8 @@
 
 use crate::arguments::Plot as Typed;
 use crate::failure::{Failure, Outcome};
-use crate::plane;
 use crate::table::{Run, read};
-use foldline::diagram::Diagram;
+use foldline::diagram::{Branch, Diagram};
 use foldline::model::Model;
 use foldline_plot::{Picture, Quantity, pdf, png, svg};
 use std::path::Path;
@@ -48,8 +47,7 @@ fn shown(
         }
         return Ok((diagram, None));
     }
-    // Before the branches go: which parameter is the first is known from the branch on which a curve begins.
-    let planes: Vec<[usize; 2]> = diagram.branches.iter().filter_map(|branch| plane::of(&diagram, branch)).collect();
+    let planes: Vec<[usize; 2]> = diagram.branches.iter().filter_map(Branch::plane).collect();
     let Some(first) = planes.first().copied() else {
         return Err(Failure::typed("--curves: the run has no curve in two parameters", "leave --curves out"));
     };

@@ -72,7 +72,7 @@ impl Progress {
             format!("{name} = {:<10.6}", point.parameters.get(index).copied().unwrap_or(f64::NAN))
         };
         let places: Vec<String> =
-            [Some(branch.free), branch.held.map(|(_, second)| second)].into_iter().flatten().map(at).collect();
+            [Some(branch.free), branch.held.map(|(_, follows)| follows)].into_iter().flatten().map(at).collect();
         let special = if live.special > 0 { format!(", {} special", live.special) } else { String::new() };
         format!("{:>5} points{special}   {} step {:.1e}", live.points, places.join(" "), point.step)
     }

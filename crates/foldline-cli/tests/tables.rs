@@ -56,9 +56,8 @@ fn branch(name: &str, free: usize, held: Option<(Kind, usize)>, origin: Origin, 
     branch
 }
 
-/// The folder of a run in which the fold of `main` at Omega = 2 is held while kappa goes to 1. `free` says which of the two
-/// parameters the curve is written down with as the free one.
-fn run(free: usize) -> tempfile::TempDir {
+/// The folder of a run in which the fold of `main` at Omega = 2 is held while kappa goes to 1.
+fn run() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let study = parse_study(STUDY, "study.toml", MODEL, "made-up.toml").unwrap();
     let recorder = Recorder::create(&folder.path().join("run"), &study).unwrap();
@@ -72,7 +71,7 @@ fn run(free: usize) -> tempfile::TempDir {
     let mut main = branch("main", 0, None, Origin::Seed("start".into()), &[[0.0, 0.0], [2.0, 0.0], [0.5, 0.0]]);
     main.insert_special(fold(1, [2.0, 0.0]));
     let origin = Origin::Switch { parent: "main".into(), kind: Kind::Fold, parameter: 2.0 };
-    let mut folds = branch("folds", free, Some((Kind::Fold, 1 - free)), origin, &[[2.0, 0.0], [2.5, 0.5], [2.25, 1.0]]);
+    let mut folds = branch("folds", 1, Some((Kind::Fold, 0)), origin, &[[2.0, 0.0], [2.5, 0.5], [2.25, 1.0]]);
     folds.insert_special(fold(1, [2.5, 0.5]));
     let first = branch("way/1", 1, None, Origin::Seed("start".into()), &[[1.0, 0.0], [1.0, 0.75], [1.0, 0.25]]);
     let second = branch("way/2", 1, None, Origin::EndOf("way/1".into()), &[[3.0, 0.0], [3.0, 1.0]]);
@@ -110,7 +109,7 @@ fn printed(folder: &Path, arguments: &[&str]) -> String {
 
 #[test]
 fn special_points_of_a_curve_have_both_parameters() {
-    let folder = run(1);
+    let folder = run();
     let text = printed(folder.path(), &["table", "run"]);
     let expected = "branch  kind        Omega        kappa        r_max  unstable_before  unstable_after   error\n\
                     main    fold  2.000000000  0.000000000  3.000000000                0               1  1.0e-9\n\
@@ -135,35 +134,25 @@ fn words(text: &str) -> Vec<&str> {
 
 #[test]
 fn branches_are_listed_behind_what_they_come_from_and_curves_with_both_parameters() {
-    // Whichever of the two parameters is the free one, the first is that of the branch.
-    for free in [0, 1] {
-        let folder = run(free);
-        let rows: serde_json::Value =
-            serde_json::from_str(&printed(folder.path(), &["table", "run", "--branches", "--format", "json"])).unwrap();
-        let names: Vec<&str> = rows.as_array().unwrap().iter().filter_map(|row| row["branch"].as_str()).collect();
-        assert_eq!(names, ["main", "folds", "way/1", "way/2"]);
-        let (main, folds) = (&rows[0], &rows[1]);
-        let cells = ["held", "free", "second", "from", "to", "second_from", "second_to"];
-        assert_eq!(
-            cells.map(|key| folds[key].clone()),
-            serde_json::json!(["fold", "Omega", "kappa", 2.0, 2.5, 0.0, 1.0]).as_array().unwrap()[..]
-        );
-        assert_eq!(
-            cells.map(|key| main[key].clone()),
-            serde_json::json!([null, "Omega", null, 0.0, 2.0, null, null]).as_array().unwrap()[..]
-        );
-        assert_eq!(folds["origin"], "fold of main at 2.000000");
-    }
-    let folder = run(1);
+    let folder = run();
+    let rows: serde_json::Value =
+        serde_json::from_str(&printed(folder.path(), &["table", "run", "--branches", "--format", "json"])).unwrap();
+    let names: Vec<&str> = rows.as_array().unwrap().iter().filter_map(|row| row["branch"].as_str()).collect();
+    assert_eq!(names, ["main", "folds", "way/1", "way/2"]);
+    let keys = ["held", "free", "from", "to", "follows", "follows_from", "follows_to"];
+    let cells = |row: usize| serde_json::Value::from(keys.map(|key| rows[row][key].clone()).to_vec());
+    assert_eq!(cells(0), serde_json::json!([null, "Omega", 0.0, 2.0, null, null, null]));
+    assert_eq!(cells(1), serde_json::json!(["fold", "kappa", 0.0, 1.0, "Omega", 2.0, 2.5]));
+    assert_eq!(rows[1]["origin"], "fold of main at 2.000000");
     let legs = printed(folder.path(), &["table", "run", "--branches", "--branch", "way"]);
     assert!(legs.contains("way/1") && legs.contains("way/2") && !legs.contains("main"), "{legs}");
     // Without a curve there is nothing to say about a second parameter.
-    assert!(!legs.contains("held") && !legs.contains("second"), "{legs}");
+    assert!(!legs.contains("held") && !legs.contains("follows"), "{legs}");
 }
 
 #[test]
 fn the_route_of_a_homotopy_is_told_in_its_order() {
-    let folder = run(1);
+    let folder = run();
     let notes = printed(folder.path(), &["table", "run", "--notes", "--format", "csv"]);
     let expected = "about,note\nstart,1 equilibrium\nway,at Omega = 1 the run in kappa turns back at 0.75\n\
                     way,at Omega = 3 it gets through\n";
@@ -182,7 +171,7 @@ fn drawn(folder: &Path, arguments: &[&str]) -> (Vec<String>, String) {
 
 #[test]
 fn pictures_show_the_branches_or_the_curves_in_their_plane() {
-    let folder = run(1);
+    let folder = run();
     let (names, svg) = drawn(folder.path(), &[]);
     assert_eq!(names, ["main", "way/1", "way/2"]);
     assert!(svg.contains("max r"));

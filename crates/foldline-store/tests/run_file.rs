@@ -223,7 +223,7 @@ fn a_file_of_the_first_version_is_read_and_resumed() {
     recorder.finish().unwrap();
     let connection = rusqlite::Connection::open(path_in(folder.path())).unwrap();
     let back =
-        "ALTER TABLE branches DROP COLUMN held; ALTER TABLE branches DROP COLUMN second; PRAGMA user_version = 1;";
+        "ALTER TABLE branches DROP COLUMN held; ALTER TABLE branches DROP COLUMN follows; PRAGMA user_version = 1;";
     connection.execute_batch(back).unwrap();
     drop(connection);
     assert_eq!(exactly(&load(folder.path()).unwrap().diagram), exactly(&older));

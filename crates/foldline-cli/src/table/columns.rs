@@ -1,7 +1,6 @@
 //! Which columns the tables have.
 
 use super::{Cell, Column, Style, Table};
-use crate::plane;
 use foldline::diagram::{Branch, Diagram, Origin, Point};
 use foldline::model::Model;
 
@@ -59,18 +58,15 @@ pub fn points(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) -> bool) 
 }
 
 /// One row for each branch: where it comes from, how far it reaches, how its two sides ended, what it cost. Of a curve in
-/// two parameters, what is held along it, and how far it reaches in the second one too.
+/// two parameters, what is held along it, and how far it reaches in the parameter that follows too.
 pub fn branches(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) -> bool) -> Table {
-    let words = ["branch", "family", "held", "free", "second", "origin"].map(|name| column(name, Style::Word));
+    let words = ["branch", "family", "held", "free", "follows", "origin"].map(|name| column(name, Style::Word));
     let work = ["points", "special", "newton", "factorisations", "rejected"];
-    let numbers = ["from", "to", "second_from", "second_to"].into_iter().chain(work);
+    let numbers = ["from", "to", "follows_from", "follows_to"].into_iter().chain(work);
     let ends = ["backward_end", "forward_end"].map(|name| column(name, Style::Word));
     let columns = words.into_iter().chain(numbers.map(|name| column(name, Style::Number))).chain(ends).collect();
     let row = |branch: &Branch| {
-        let [first, second] = match plane::of(diagram, branch) {
-            Some([first, second]) => [Some(first), Some(second)],
-            None => [Some(branch.free), None],
-        };
+        let moving = [Some(branch.free), branch.held.map(|(_, follows)| follows)];
         let name = |index: Option<usize>| {
             index.and_then(|k| model.parameters.get(k)).map_or(Cell::Empty, |p| Cell::Word(p.name.clone()))
         };
@@ -79,11 +75,11 @@ pub fn branches(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) -> bool
             Cell::Word(branch.name.clone()),
             Cell::Word(branch.family.name().into()),
             branch.held.map_or(Cell::Empty, |(kind, _)| Cell::Word(kind.name().into())),
-            name(first),
-            name(second),
+            name(moving[0]),
+            name(moving[1]),
             Cell::Word(origin(&branch.origin)),
         ];
-        row.extend([first, second].into_iter().flat_map(|index| reach(branch, index)));
+        row.extend(moving.into_iter().flat_map(|index| reach(branch, index)));
         let counts = [branch.points.len(), branch.special.len(), cost.newton, cost.factorisations, cost.rejected];
         row.extend(counts.map(count));
         row.extend(branch.ends.iter().map(|end| end.as_ref().map_or(Cell::Empty, |e| Cell::Word(e.to_string()))));
@@ -118,7 +114,7 @@ fn origin(origin: &Origin) -> String {
 /// Those of the parameters that vary along a branch are shown even where there is one row only.
 fn parameter_columns(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) -> bool) -> Vec<Column> {
     let shown = || diagram.branches.iter().filter(|b| kept(b));
-    let varies = |index: usize| shown().any(|b| b.free == index || b.held.is_some_and(|(_, second)| second == index));
+    let varies = |index: usize| shown().any(|b| b.free == index || b.held.is_some_and(|(_, follows)| follows == index));
     let style = |index: usize| if varies(index) { Style::Number } else { Style::Varying };
     model.parameters.iter().enumerate().map(|(index, p)| column(&p.name, style(index))).collect()
 }

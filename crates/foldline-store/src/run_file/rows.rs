@@ -150,11 +150,11 @@ pub(super) fn origin_values(origin: &Origin) -> [Value; 5] {
     ]
 }
 
-/// `held, second`: what is held along a curve in two parameters, and the number of the parameter that follows from it.
+/// `held, follows`: what is held along a curve in two parameters, and the number of the parameter that follows from it.
 pub(super) fn held_values(held: Option<(Kind, usize)>) -> [Value; 2] {
     let kind = held.map(|(kind, _)| Value::Text(kind.name().to_string()));
-    let second = held.map(|(_, second)| Value::Integer(i64::try_from(second).unwrap_or(i64::MAX)));
-    [kind.unwrap_or(Value::Null), second.unwrap_or(Value::Null)]
+    let follows = held.map(|(_, follows)| Value::Integer(i64::try_from(follows).unwrap_or(i64::MAX)));
+    [kind.unwrap_or(Value::Null), follows.unwrap_or(Value::Null)]
 }
 
 /// What is held, in a row of `branches`. Version 1 had no such columns, nor anything held.
@@ -164,8 +164,8 @@ pub(super) fn held_in(row: &Row) -> Result<Option<(Kind, usize)>, String> {
         Ok(Some(name)) => kind_named(&name)?,
         Err(error) => return Err(error.to_string()),
     };
-    let second: i64 = row.get("second").map_err(|e| e.to_string())?;
-    Ok(Some((kind, usize::try_from(second).map_err(|e| e.to_string())?)))
+    let follows: i64 = row.get("follows").map_err(|e| e.to_string())?;
+    Ok(Some((kind, usize::try_from(follows).map_err(|e| e.to_string())?)))
 }
 
 /// The origin in a row of `branches`.

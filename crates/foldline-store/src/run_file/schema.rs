@@ -71,7 +71,7 @@ pub(super) fn create(columns: &Columns) -> String {
              description TEXT NOT NULL, PRIMARY KEY (class, number));
          CREATE TABLE branches (branch INTEGER PRIMARY KEY, name TEXT NOT NULL UNIQUE, family TEXT NOT NULL,
              free INTEGER NOT NULL, origin TEXT NOT NULL, origin_name TEXT NOT NULL, origin_kind TEXT,
-             origin_parameter REAL, origin_bytes BLOB, held TEXT, second INTEGER);
+             origin_parameter REAL, origin_bytes BLOB, held TEXT, follows INTEGER);
          CREATE TABLE ends (branch INTEGER NOT NULL REFERENCES branches, side INTEGER NOT NULL, code TEXT NOT NULL,
              sentence TEXT NOT NULL, detail TEXT, kind TEXT, count INTEGER, value_bytes BLOB, PRIMARY KEY (branch, side));
          CREATE TABLE points (branch INTEGER NOT NULL REFERENCES branches, position INTEGER NOT NULL, {shown}
@@ -89,7 +89,7 @@ pub(super) fn create(columns: &Columns) -> String {
 /// Version 1 had no curves in two parameters.
 pub(super) fn upgrade(version: i64) -> &'static str {
     match version {
-        1 => "ALTER TABLE branches ADD COLUMN held TEXT; ALTER TABLE branches ADD COLUMN second INTEGER;",
+        1 => "ALTER TABLE branches ADD COLUMN held TEXT; ALTER TABLE branches ADD COLUMN follows INTEGER;",
         _ => "",
     }
 }

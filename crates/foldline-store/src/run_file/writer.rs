@@ -183,10 +183,10 @@ impl State {
         // A branch that is there already, from an earlier part of the run, keeps its number.
         transaction.execute(
             "INSERT INTO branches (name, family, free, origin, origin_name, origin_kind, origin_parameter, origin_bytes,
-                 held, second)
+                 held, follows)
              VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10)
              ON CONFLICT (name) DO UPDATE SET family = ?2, free = ?3, origin = ?4, origin_name = ?5, origin_kind = ?6,
-                 origin_parameter = ?7, origin_bytes = ?8, held = ?9, second = ?10",
+                 origin_parameter = ?7, origin_bytes = ?8, held = ?9, follows = ?10",
             params_from_iter(first.into_iter().chain(origin_values(&branch.origin)).chain(held_values(branch.held))),
         )?;
         let number: i64 =
