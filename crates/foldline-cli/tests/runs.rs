@@ -188,6 +188,30 @@ fn a_finished_run_resumes_without_doing_anything() {
 }
 
 #[test]
+fn a_finished_homotopy_and_curve_resume_without_doing_anything() {
+    let desk = desk("README.md");
+    let study = "model = \"brusselator.toml\"\n[[seed]]\nname = \"rest\"\nattractor = \"equilibrium\"\n\
+                 [[branch]]\nname = \"steady\"\nfrom = \"rest\"\nfree = \"B\"\nrange = [0.5, 4]\n\
+                 [[curve]]\nname = \"onset\"\nhold = \"hopf\"\nof = \"steady\"\nfree = \"A\"\nuntil = 1.25\n\
+                 [[homotopy]]\nname = \"way\"\nfrom = \"rest\"\nto = { A = 2 }\nvia = \"B\"\nrange = [1, 6]\n\
+                 [[branch]]\nname = \"at two\"\nfrom = \"way\"\nfree = \"B\"\nrange = [1, 6]\n";
+    std::fs::write(desk.path().join("study.toml"), study).unwrap();
+    let first = printed(desk.path(), &["run", "study.toml"], 0);
+    let table = |what: &str| printed(desk.path(), &["table", "runs/study", what, "--format", "csv"], 0);
+    let before = ["--points", "--branches", "--notes"].map(table);
+    assert!(before[2].contains("way,arrived"), "{}", before[2]);
+    // On the curve and on the branch at the goal, B = 1 + A²; tolerance 1e-6 relative to 1 + B.
+    for point in rows(&table("--points")).iter().filter(|row| row("branch") == "onset") {
+        let [a, b] = ["A", "B"].map(|name| point(name).parse::<f64>().unwrap());
+        assert!((b - 1.0 - a * a).abs() < 1e-6 * (1.0 + b), "{a} {b}");
+    }
+    let hopf = rows(&table("--special")).into_iter().find(|row| row("branch") == "at two").unwrap();
+    assert!((hopf("B").parse::<f64>().unwrap() - 5.0).abs() < 6e-6, "{}", hopf("B"));
+    assert_eq!(printed(desk.path(), &["run", "study.toml", "--resume"], 0), first);
+    assert_eq!(["--points", "--branches", "--notes"].map(table), before);
+}
+
+#[test]
 fn attractors_are_listed_with_their_hits() {
     let desk = desk("README.md");
     let rest = printed(desk.path(), &["attractors", "brusselator.toml", "--samples", "16"], 0);
