@@ -116,6 +116,23 @@ fn a_branch_that_ends_short_is_exit_code_3_and_said() {
 }
 
 #[test]
+fn a_branch_that_turns_round_before_its_target_is_short_and_nothing_starts_at_its_end() {
+    let folder = tempfile::tempdir().unwrap();
+    // x = ±sqrt(mu): the way to mu = -1 leads over the fold at 0 back to mu = 2.
+    let model = "name = \"fold\"\n[parameters]\nmu = 1\nh = 0\n[states.x]\nequation = \"mu - x^2 + h\"\n";
+    let study = "model = \"model.toml\"\n[[seed]]\nname = \"start\"\nstate = { x = 1 }\n\
+                 [[branch]]\nname = \"down\"\nfrom = \"start\"\nfree = \"mu\"\nrange = [-1, 2]\nuntil = -1\n\
+                 [[branch]]\nname = \"on\"\nfrom = \"down\"\nfree = \"h\"\nrange = [0, 1]\n";
+    std::fs::write(folder.path().join("model.toml"), model).unwrap();
+    std::fs::write(folder.path().join("study.toml"), study).unwrap();
+    let output = foldline(folder.path(), &["run", "study.toml"]);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(3), "{said}");
+    assert!(said.contains("ended short: down: it did not arrive at mu = -1; reached 2"), "{said}");
+    assert!(said.contains("ended short: on: no start: branch down did not get to its end"), "{said}");
+}
+
+#[test]
 fn a_seed_that_is_not_found_is_exit_code_3_and_said() {
     let desk = desk("README.md");
     let study = std::fs::read_to_string(desk.path().join("study.toml")).unwrap();
