@@ -291,8 +291,10 @@ fn end_of(branch: &Branch, plan: &BranchPlan) -> Result<Point, String> {
     let backward = matches!((plan.until, start), (Some(target), Some(value)) if target < value);
     let side = if backward { 0 } else { 1 };
     let point = if backward { branch.points.first() } else { branch.points.last() };
+    // A branch that turned round may have left its range where it began.
+    let arrived = |value: f64| plan.until.is_none_or(|target| (value - target).abs() <= 1e-9 * (1.0 + target.abs()));
     match (&branch.ends[side], point) {
-        (Some(Ending::Bound(_)), Some(point)) => Ok(point.clone()),
+        (Some(Ending::Bound(value)), Some(point)) if arrived(*value) => Ok(point.clone()),
         (Some(other), _) => Err(format!("branch {} did not get to its end: {other}", plan.name)),
         _ => Err(format!("branch {} was not finished", plan.name)),
     }

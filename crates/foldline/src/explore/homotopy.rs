@@ -63,7 +63,17 @@ pub fn find(
         farthest: None,
         open: false,
     };
-    let arrived = start.and_then(|start| planner.plan_route(start));
+    // The seed of a resumed run is not searched for again; the first leg has what it led to.
+    let first =
+        earlier.branch(&format!("{}/1", homotopy.name)).and_then(|leg| leg.points.iter().find(|p| p.position == 0));
+    let start = match first.cloned().map_or(start, Ok) {
+        Ok(start) => start,
+        Err(why) => {
+            planner.note(&format!("there is nothing to start from: {why}"));
+            return Route { legs: Vec::new(), arrived: Err(why), going: planner.going };
+        }
+    };
+    let arrived = planner.plan_route(start);
     if let Err(why) = &arrived
         && planner.going
     {
