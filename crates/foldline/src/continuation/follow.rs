@@ -267,6 +267,12 @@ impl Follow<'_> {
         let mut end = None;
         if let Some(bound) = bound {
             right = self.at_parameter(left, &right, bound, cost)?;
+            // To the last bit, whatever rounding Newton's method left.
+            let last = right.u.len() - 1;
+            right.u[last] = bound;
+            if let Some(own) = right.point.parameters.get_mut(self.free) {
+                *own = bound;
+            }
             end = Some(Ending::Bound(bound));
         }
         if let Some((value, there)) = self.beyond(left, &right, cost) {

@@ -96,9 +96,18 @@ pub fn settings(system: &System, tolerance: f64, range: [f64; 2], max_points: us
 pub fn polished(problem: &mut dyn ZeroProblem, settings: &Settings, point: &Point) -> Result<Station, Failure> {
     let u = problem.unknowns_of(point);
     problem.anchor(&u);
-    let row = parameter_row(u.len());
+    let (row, value) = (parameter_row(u.len()), u[u.len() - 1]);
     let plane = Plane { row, base: u.clone(), distance: 0.0 };
-    settle(problem, settings, plane, u, 1.0, &mut Cost::default())
+    let mut found = settle(problem, settings, plane, u, 1.0, &mut Cost::default())?;
+    // To the last bit, whatever rounding Newton's method left.
+    for (now, given) in found.point.parameters.iter_mut().zip(&point.parameters) {
+        if (*now - given).abs() <= 1e-12 * (1.0 + given.abs()) {
+            *now = *given;
+        }
+    }
+    let last = found.u.len() - 1;
+    found.u[last] = value;
+    Ok(found)
 }
 
 /// A solution a little beside `point` on the curve, which may be a fold: from a fold itself a branch could not be told

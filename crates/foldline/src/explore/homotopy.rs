@@ -61,6 +61,7 @@ pub fn find(
         going: true,
         origin,
         farthest: None,
+        turned: 0,
         open: false,
     };
     // The seed of a resumed run is not searched for again; the first leg has what it led to.
@@ -77,8 +78,8 @@ pub fn find(
     if let Err(why) = &arrived
         && planner.going
     {
-        let verdict = if planner.open {
-            "a fold left the range or was lost, so there may be a way outside"
+        let verdict = if planner.open || planner.turned == 0 {
+            "some run left the range or was lost, so there may be a way outside"
         } else {
             "every fold of the family turns back before the goal: it is not connected to it"
         };
@@ -98,7 +99,9 @@ struct Planner<'p> {
     origin: Origin,
     /// The point closest to the goal on any run, the share of the way that it has covered, and whether it is a fold.
     farthest: Option<(f64, Point, bool)>,
-    /// Whether some fold left the range or ended otherwise before it turned back, so that there may be more beyond.
+    /// Folds that were followed and turned back before the goal.
+    turned: usize,
+    /// Whether some run left the range or ended otherwise, so that there may be more beyond.
     open: bool,
 }
 
@@ -162,7 +165,7 @@ impl Planner<'_> {
         self.farthest = None;
         for round in 0..ROUNDS {
             let Some(course) = Course::new(&here, targets) else { return Ok(here) };
-            match self.from_here(&here, &course) {
+            match self.steps_from(&here, &course) {
                 Ok(arrived) => return Ok(arrived),
                 Err(why) => tried.push(why),
             }
@@ -194,7 +197,7 @@ impl Planner<'_> {
             .map_err(|why| format!("no solution was found beside the fold: {why}"))
     }
 
-    fn from_here(&mut self, here: &Point, course: &Course) -> Result<Point, String> {
+    fn steps_from(&mut self, here: &Point, course: &Course) -> Result<Point, String> {
         let via = self.homotopy.via;
         let place = here.parameters[via];
         let direct = self.direct(here, course);
@@ -211,6 +214,7 @@ impl Planner<'_> {
             None => vec![format!("the direct run at {place} ends: {}", ending(&direct))],
         };
         self.note(&tried[0].clone());
+        let turned_none = turned.is_none();
         if let Some(fold) = turned {
             match self.along(&fold, &direct.name, course) {
                 Ok(point) => return Ok(point),
@@ -221,6 +225,7 @@ impl Planner<'_> {
             return Err("stopped on request".into());
         }
         let family = self.moved(here);
+        self.open |= turned_none || family.ends.iter().flatten().any(|end| *end != Ending::Closed);
         for point in places(&family, via, place) {
             let at = point.parameters[via];
             let run = self.direct(&point, course);
@@ -280,6 +285,7 @@ impl Planner<'_> {
             let bound = |end: &Ending| matches!(end, Ending::Bound(value) if (value - course.from).abs() < 1e-9);
             let turned = curve.ends.iter().flatten().all(|end| bound(end) || *end == Ending::Closed);
             self.open |= !turned;
+            self.turned += usize::from(turned);
             let how = if turned { "turns back".into() } else { format!("ends short ({})", ending(&curve)) };
             let why = format!("the fold at {place:.6} {how} after {best:.1} % of the way");
             self.note(&why);
