@@ -12,11 +12,18 @@
 //!
 //! **Departures.** Length is measured in the clearance *at the disc*, U = V/(c a/b), and γ = k₃c²/k_r; the print has c and b².
 
+mod campbell;
 mod contact;
 mod field;
+mod given;
 mod jet;
 mod quantities;
+mod spectrum;
+mod units;
 
+pub use campbell::{Modes, Ratio, campbell, modes, resonances, undamped_modes};
 pub use contact::{ContactLaw, Stiffness};
 pub use field::OverhungRotor;
-pub use quantities::{Nondimensional, Si};
+pub use quantities::{Nondimensional, Scale, Si};
+pub use spectrum::{Frame, Line, Spectrum, Whirl, mean_square};
+pub use units::{Dimension, Mistake, Unit, quantity};
