@@ -12,6 +12,7 @@
 //!
 //! **Departures.** Length is measured in the clearance *at the disc*, U = V/(c a/b), and γ = k₃c²/k_r; the print has c and b².
 
+mod backbone;
 mod campbell;
 mod contact;
 mod field;
@@ -21,6 +22,7 @@ mod quantities;
 mod spectrum;
 mod units;
 
+pub use backbone::{Backbone, BackbonePoint, BackboneProblem, Reach, backbone};
 pub use campbell::{Modes, Ratio, campbell, modes, resonances, undamped_modes};
 pub use contact::{ContactLaw, Stiffness};
 pub use field::OverhungRotor;
