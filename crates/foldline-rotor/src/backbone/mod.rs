@@ -17,7 +17,7 @@
 //! point of a lightly damped branch tends to the backbone, not only its folds or its ridge. Equation 4 then fixes how the orbit
 //! stands to the unbalance. For d = 1 (SL) there are two angles, α and π - α, so the two sheets of a forced branch lie on the same
 //! backbone; they meet in folds where sin α = ±1, and beyond a fold the backbone has no forced cycle: it is followed only where
-//! ζ/ε ≤ [`BackbonePoint::damping_limit`]. For d > 1 (DL: d = 2) the orbit is its own image under a turn by 2π/d, so c₀ vanishes and
+//! ζ/ε ≤ [`BackbonePoint::damping_limit`] (for contact SL this is so between two speeds only: the branch is closed). For d > 1 (DL: d = 2) the orbit is its own image under a turn by 2π/d, so c₀ vanishes and
 //! the mean torque arises at order (mεΩ²)^d only: branches reach the backbone only for ζ of order ε^d or below.
 //!
 //! If ζ = 0 from the start, equation 3 is void and E stays free: for every Ω there is a one-parameter family of cycles for each
@@ -68,9 +68,9 @@ pub struct BackbonePoint {
     pub r_min: f64,
     /// T = d T_r.
     pub period: f64,
-    /// c₀, real as the orbit is stored: it starts at a turning point on the real axis. 0 for d > 1, and until the orbit feels
-    /// a nonlinear force.
-    pub mean: f64,
+    /// c₀, real as the orbit is stored: it starts at a turning point on the real axis. 0 as long as the orbit feels no nonlinear
+    /// force; `None` for d > 1, where it vanishes by symmetry.
+    pub mean: Option<f64>,
     /// Σ (k w + Ω) |c_k|², what the unbalance has to keep up against damping.
     pub swirl: f64,
     /// m of the rotor.
@@ -93,19 +93,21 @@ pub struct Backbone {
 }
 
 impl BackbonePoint {
-    /// The largest ζ/ε at which a lightly damped branch of a ratio n:(n - 1) passes here, to first order: m Ω² |c₀|/(2 |swirl|).
-    pub fn damping_limit(&self) -> f64 {
-        0.5 * self.mass * self.speed * self.speed * self.mean.abs() / self.swirl.abs()
+    /// The largest ζ/ε at which a lightly damped branch passes here, to first order: m Ω² |c₀|/(2 |swirl|). `None` for d > 1, where
+    /// no ratio of the first powers decides.
+    pub fn damping_limit(&self) -> Option<f64> {
+        Some(0.5 * self.mass * self.speed * self.speed * self.mean?.abs() / self.swirl.abs())
     }
 
-    /// The two angles by which the stored orbit must be turned to be the limit of forced cycles with that ε and ζ, of a ratio
-    /// n:(n - 1): equation 4 of the module. `None` beyond the damping limit.
+    /// The two angles by which the stored orbit must be turned to be the limit of forced cycles with that ζ/ε: equation 4 of the
+    /// module. `None` beyond the damping limit, and for d > 1.
     pub fn phases(&self, epsilon: f64, zeta: f64) -> Option<[f64; 2]> {
-        let sine = -2.0 * zeta * self.swirl / (self.mass * epsilon * self.speed * self.speed * self.mean);
+        let sine = -2.0 * zeta * self.swirl / (self.mass * epsilon * self.speed * self.speed * self.mean?);
         (sine.abs() <= 1.0).then(|| [sine.asin(), std::f64::consts::PI - sine.asin()])
     }
 
-    /// The orbit turned by `angle`, as a point with that ε and ζ: where to start Newton's method for a forced cycle.
+    /// The orbit turned by `angle`, as a point with that ε and ζ. It is the limit of forced cycles, but no start for Newton's method:
+    /// the balance of torque has a derivative by the angle only once the orbit has answered to the unbalance at first order.
     pub fn turned(&self, angle: f64, epsilon: f64, zeta: f64) -> Point {
         let mut point = self.point.clone();
         let (sin, cos) = angle.sin_cos();
@@ -120,16 +122,27 @@ impl BackbonePoint {
     }
 }
 
+impl Backbone {
+    /// Where lightly damped branches with that ζ/ε turn back, to first order: points [Ω, r_max] at which the damping limit is
+    /// passed, by growing distance from the root, interpolated between neighbouring points. Empty for d > 1.
+    pub fn turning_points(&self, zeta_over_epsilon: f64) -> Vec<[f64; 2]> {
+        let excess = |p: &BackbonePoint| p.damping_limit().map(|limit| (limit / zeta_over_epsilon).ln());
+        let between = |pair: &[BackbonePoint]| {
+            let (a, b) = (excess(&pair[0])?, excess(&pair[1])?);
+            let share = a / (a - b);
+            let mix = |x: f64, y: f64| x + share * (y - x);
+            (a * b <= 0.0 && share.is_finite())
+                .then(|| [mix(pair[0].speed, pair[1].speed), mix(pair[0].r_max, pair[1].r_max)])
+        };
+        self.points.windows(2).filter_map(between).collect()
+    }
+}
+
 /// The backbone of a ratio n:m at these constants, of which ζ, ε and Ω are ignored.
 ///
 /// # Errors
 /// A [`Mistake`] if there is no such backbone, or the reach does not contain its root.
-pub fn backbone(
-    constants: &Nondimensional,
-    law: ContactLaw,
-    ratio: Ratio,
-    reach: &Reach,
-) -> Result<Backbone, Mistake> {
+pub fn backbone(constants: &Nondimensional, law: ContactLaw, ratio: Ratio, reach: &Reach) -> Result<Backbone, Mistake> {
     let place = format!("ratio {}:{}", ratio.backward, ratio.forward);
     let root = root(constants, ratio, reach, &place)?;
     let tolerance = reach.tolerance.clamp(1e-10, 1e-3);
@@ -146,7 +159,7 @@ pub fn backbone(
         cause: format!("the linear orbit at Omega = {root} is not the root: {why}"),
         cure: "give finite constants with a smooth spring".into(),
     })?;
-    let mut points = vec![described(begun.point.clone(), constants)];
+    let mut points = vec![described(begun.point.clone(), constants, ratio)];
     let mut walk = Follow {
         problem: &mut problem,
         settings: &settings,
@@ -158,7 +171,7 @@ pub fn backbone(
     };
     let ending = follow(&mut walk, begun, None, 0, &mut |item| {
         if let Item::Point(point) = item {
-            points.push(described(point, constants));
+            points.push(described(point, constants, ratio));
         }
         if points.last().is_some_and(|p| p.r_max >= reach.radius) { Verdict::Stop } else { Verdict::Continue }
     });
@@ -195,9 +208,10 @@ fn linear_orbit(speed: f64, polar: f64, radius: f64) -> [f64; 4] {
     [radius, across, half, speed]
 }
 
-fn described(point: Point, constants: &Nondimensional) -> BackbonePoint {
+fn described(point: Point, constants: &Nondimensional, ratio: Ratio) -> BackbonePoint {
     let speed = point.parameters[0];
     let [r_min, r_max] = point.ranges.last().copied().unwrap_or([f64::NAN; 2]);
+    let symmetric = i64::from(ratio.backward) - i64::from(ratio.forward) > 1;
     let (period, mean, swirl) = match &point.solution {
         Solution::Cycle(cycle) => {
             let spectrum = Spectrum::of(cycle, speed);
@@ -205,5 +219,6 @@ fn described(point: Point, constants: &Nondimensional) -> BackbonePoint {
         }
         Solution::Equilibrium(_) => (f64::NAN, f64::NAN, f64::NAN),
     };
+    let mean = (!symmetric).then_some(mean);
     BackbonePoint { speed, r_max, r_min, period, mean, swirl, mass: constants.mass, point }
 }
