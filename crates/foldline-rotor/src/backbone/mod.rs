@@ -18,10 +18,12 @@
 //! stands to the unbalance. For d = 1 (SL) there are two angles, α and π - α, so the two sheets of a forced branch lie on the same
 //! backbone; they meet in folds where sin α = ±1, and beyond a fold the backbone has no forced cycle: it is followed only where
 //! ζ/ε ≤ [`BackbonePoint::damping_limit`] (for contact SL this is so between two speeds only: the branch is closed). For d > 1 (DL: d = 2) the orbit is its own image under a turn by 2π/d, so c₀ vanishes and
-//! the mean torque arises at order (mεΩ²)^d only: branches reach the backbone only for ζ of order ε^d or below.
+//! the mean torque, as a function of α, has the period 2π/d: it arises at order (mεΩ²)^d only, and branches reach the backbone
+//! only for ζ of order ε^d or below.
 //!
 //! If ζ = 0 from the start, equation 3 is void and E stays free: for every Ω there is a one-parameter family of cycles for each
-//! of the angles that make the torque vanish. The limits do not commute, ζ → 0 comes last or together with ε → 0.
+//! of the angles that make the torque vanish. The limits do not commute: ζ → 0 first, or together with ε → 0 within the bounds above,
+//! leads to the backbone; ε → 0 first, at fixed ζ, loses every cycle in a fold.
 //!
 //! The root is linear: lines at λ± (see [`Ratio`]) with λ₊(λ₊ + Ω)|c₊|² + λ₋(λ₋ + Ω)|c₋|² = 0, at Ω_{n:m}, for r_max → 0 with
 //! a cubic spring and for any r_max ≤ 1 with contact. It exists for m ≥ 1, both lines backward: else both terms are positive.
