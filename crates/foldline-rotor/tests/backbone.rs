@@ -63,15 +63,20 @@ fn contact_backbones_fill_the_contact_interval() {
     }
 }
 
-/// The pull of the tanh law just below contact softens the rotor: DL leaves the contact interval at its lower end.
+/// The pull of the tanh law just below contact softens the rotor: its backbones leave the contact interval at the lower end, the less the
+/// sharper the switch.
 #[test]
 fn the_pull_of_the_tanh_law_leads_out_of_the_contact_interval() {
-    let lowest = |law| {
-        let found = computed(&CONTACT, law, Ratio::DOUBLE_LOOP, 3.0, 1.2);
+    let lowest = |law, ratio, sharpness| {
+        let found = computed(&Nondimensional { sharpness, ..CONTACT }, law, ratio, 4.0, 1.1);
         found.points.iter().map(|p| p.speed - found.root).fold(f64::INFINITY, f64::min)
     };
-    assert!(lowest(ContactLaw::Tanh) < -5e-4, "{}", lowest(ContactLaw::Tanh));
-    assert!(lowest(ContactLaw::Piecewise) > -1e-8);
+    for ratio in RATIOS {
+        let [soft, sharp] = [30.0, 150.0].map(|k| lowest(ContactLaw::Tanh, ratio, k));
+        assert!(soft < 5.0 * sharp && sharp < -1.4e-3, "{soft} {sharp}");
+        assert!(lowest(ContactLaw::Softplus, ratio, 30.0) > -1e-8);
+        assert!(lowest(ContactLaw::Piecewise, ratio, 150.0) > -1e-8);
+    }
 }
 
 #[test]
@@ -281,6 +286,7 @@ fn what_has_no_backbone_is_refused() {
     };
     assert!(refused(&CUBIC, 2, -1, &reach).contains("power"));
     assert!(refused(&CUBIC, 1, 0, &reach).contains("power"));
+    assert!(refused(&CUBIC, 4, 2, &reach).contains("lowest terms"));
     assert!(refused(&CUBIC, 7, 6, &reach).contains("no speed"));
     assert!(refused(&CUBIC, 2, 1, &Reach { speeds: [4.0, 10.0], ..reach }).contains("not inside"));
     assert!(refused(&CUBIC, 2, 1, &Reach { radius: f64::NAN, ..reach }).contains("positive"));

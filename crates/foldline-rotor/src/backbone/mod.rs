@@ -12,14 +12,15 @@
 //! 3. power: ∮ |z′|² + Ω Im(z̄ z′) dτ = Σ k w (k w + Ω) |c_k|² = 0 (times T)
 //! 4. torque: m ε Ω² |c₀| sin α = -2ζ Σ (k w + Ω) |c_k|², where α is the angle of c₀ to the unbalance
 //!
-//! A forced cycle with ζ > 0 satisfies 3 exactly whatever ε and ζ are, since a constant force does no work along a closed path.
-//! So wherever forced cycles converge as ε, ζ → 0, their limit satisfies 1, 2 and 3: two equations for (E, L) at each Ω. Every
-//! point of a lightly damped branch tends to the backbone, not only its folds or its ridge. Equation 4 then fixes how the orbit
-//! stands to the unbalance. For d = 1 (SL) there are two angles, α and π - α, so the two sheets of a forced branch lie on the same
-//! backbone; they meet in folds where sin α = ±1, and beyond a fold the backbone has no forced cycle: it is followed only where
-//! ζ/ε ≤ [`BackbonePoint::damping_limit`] (for contact SL this is so between two speeds only: the branch is closed). For d > 1 (DL: d = 2) the orbit is its own image under a turn by 2π/d, so c₀ vanishes and
-//! the mean torque, as a function of α, has the period 2π/d: it arises at order (mεΩ²)^d only, and branches reach the backbone
-//! only for ζ of order ε^d or below.
+//! A forced cycle with ζ > 0 satisfies 3 exactly whatever ε and ζ are, since a constant force does no work along a closed
+//! path. So wherever forced cycles converge as ε, ζ → 0, their limit satisfies 1, 2 and 3: two equations for (E, L) at each
+//! Ω. Every point of a lightly damped branch tends to the backbone, not only its folds or its ridge. Equation 4 then fixes
+//! how the orbit stands to the unbalance. For d = 1 (SL) there are two angles, α and π - α, so the two sheets of a forced
+//! branch lie on the same backbone; they meet in folds where sin α = ±1, and beyond a fold the backbone has no forced cycle:
+//! it is followed only where ζ/ε ≤ [`BackbonePoint::damping_limit`] (for contact SL this is so between two speeds only: the
+//! branch is closed). For d > 1 (DL: d = 2) the orbit is its own image under a turn by 2π/d, so c₀ vanishes and the mean
+//! torque, as a function of α, has the period 2π/d: it arises at order (mεΩ²)^d only, and branches reach the backbone only
+//! for ζ of order ε^d or below.
 //!
 //! If ζ = 0 from the start, equation 3 is void and E stays free: for every Ω there is a one-parameter family of cycles for each
 //! of the angles that make the torque vanish. The limits do not commute: ζ → 0 first, or together with ε → 0 within the bounds above,
@@ -47,6 +48,10 @@ use foldline::continuation::corrector::{Plane, settle};
 use foldline::continuation::{Follow, Item, Settings, follow};
 use foldline::contract::{Verdict, ZeroProblem};
 use foldline::diagram::{Cost, Ending, Point, Solution};
+
+/// A backbone that covers five orders of magnitude in radius has some hundred points. One that creeps towards an orbit of infinite
+/// period, as with a softening spring, is ended here.
+const MOST_POINTS: usize = 1000;
 
 /// How far to follow a backbone, and how accurately.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -149,7 +154,7 @@ pub fn backbone(constants: &Nondimensional, law: ContactLaw, ratio: Ratio, reach
     let root = root(constants, ratio, reach, &place)?;
     let tolerance = reach.tolerance.clamp(1e-10, 1e-3);
     let mut problem = BackboneProblem::new(OverhungRotor { law }, *constants, ratio, 1e-3 * tolerance);
-    let settings = Settings::new(tolerance, reach.speeds, &[1.0; 4]);
+    let settings = Settings { max_points: MOST_POINTS, ..Settings::new(tolerance, reach.speeds, &[1.0; 4]) };
     // Contact is not felt below r = 1; a cubic spring is at any radius, least at the smallest.
     let first: f64 = if constants.kappa < 1.0 { 1e-3 } else { 0.5 };
     let start = linear_orbit(root, constants.polar, first.min(0.5 * reach.radius));
@@ -186,6 +191,11 @@ fn root(constants: &Nondimensional, ratio: Ratio, reach: &Reach, place: &str) ->
     if ratio.forward < 1 {
         let cause = "damping takes power from both lines or none".to_string();
         return Err(mistake(cause, "give n:m with 1 ≤ m < n, such as 2:1".to_string()));
+    }
+    let forward = ratio.forward.unsigned_abs();
+    if let Some(divisor) = (2..=forward).rev().find(|d| forward % d == 0 && ratio.backward % d == 0) {
+        let cure = format!("give {}:{}", ratio.backward / divisor, forward / divisor);
+        return Err(mistake("it is not in lowest terms".to_string(), cure));
     }
     let root = ratio.speed(constants.polar, 1.0).ok_or_else(|| {
         let limit = ratio.polar_limit();

@@ -24,6 +24,8 @@ use foldline::simulation::{Integrator, Outcome, Passage, Tolerance};
 const SIZE: usize = 4;
 /// Degree of the profile of a stored orbit: that of the integrator, whose steps are its mesh.
 const DEGREE: usize = 5;
+/// Relative change of the speed that is as long a step as the whole of the radius.
+const SPEED_SHARE: f64 = 0.1;
 /// Tolerance of the mesh against that of the values on it.
 const LOOSER: f64 = 1e2;
 
@@ -124,8 +126,9 @@ impl ZeroProblem for BackboneProblem {
     }
 
     fn anchor(&mut self, u: &[f64]) {
-        // Relative in everything: a backbone may cover several orders of magnitude in radius.
-        self.scale = [u[0], u[1].abs() + u[0], u[2], 1.0 + u[3].abs()];
+        // Relative in everything: a backbone may cover several orders of magnitude in radius. The speed counts for more, or steps would
+        // pass over what the onset of contact does to it within a radius of 1/K.
+        self.scale = [u[0], u[1].abs() + u[0], u[2], SPEED_SHARE * (1.0 + u[3].abs())];
     }
 
     fn residual(&mut self, u: &[f64], r: &mut [f64]) -> bool {
