@@ -14,7 +14,7 @@ const CONTACT: Nondimensional = Nondimensional { kappa: 1.0, ..Nondimensional::R
 const RATIOS: [Ratio; 2] = [Ratio::SINGLE_LOOP, Ratio::DOUBLE_LOOP];
 
 fn computed(constants: &Nondimensional, law: ContactLaw, ratio: Ratio, largest: f64, radius: f64) -> Backbone {
-    backbone(constants, law, ratio, &Reach { speeds: [0.5, largest], radius, tolerance: 1e-8 }).unwrap()
+    backbone(constants, law, ratio, &Reach { speeds: [0.5, largest], radius, tolerance: 1e-7 }).unwrap()
 }
 
 fn spectrum(point: &BackbonePoint) -> Spectrum {
@@ -33,7 +33,7 @@ fn cubic_backbones_are_rooted_at_the_linear_resonance() {
         let near = &found.points[0];
         assert!(near.r_max < 1.1e-3 && (near.speed - found.root).abs() < 1e-6);
         let further = found.points.iter().find(|p| p.r_max > 0.02).unwrap();
-        // The next term is of order r² ~ 1e-3, relative; the speeds are good to 1e-8 · 1e-3 by their small difference.
+        // The next term is of order r² ~ 1e-3, relative; the speeds are good to 1e-10, a part in 1e4 of their difference from the root.
         assert!((rate(further) / rate(near) - 1.0).abs() < 1e-2, "{} {}", rate(near), rate(further));
         assert_eq!(spectrum(further).name(), format!("{}:1", ratio.backward));
     }
@@ -46,7 +46,7 @@ fn contact_backbones_fill_the_contact_interval() {
     for ratio in RATIOS {
         let [low, high] = ratio.contact_interval(CONTACT.polar, CONTACT.beta).unwrap();
         for law in [ContactLaw::Piecewise, ContactLaw::Softplus] {
-            let found = computed(&CONTACT, law, ratio, 60.0, 900.0);
+            let found = computed(&CONTACT, law, ratio, 60.0, 300.0);
             for p in &found.points {
                 if p.r_max < 0.9 {
                     assert!((p.speed - low).abs() < 1e-8, "{}: {}", p.r_max, p.speed);
@@ -58,7 +58,7 @@ fn contact_backbones_fill_the_contact_interval() {
                 let p = found.points.iter().find(|p| p.r_max > r).unwrap();
                 (high - p.speed) * p.r_max
             };
-            assert!((gap(400.0) / gap(800.0) - 1.0).abs() < 5e-3, "{} {}", gap(400.0), gap(800.0));
+            assert!((gap(140.0) / gap(280.0) - 1.0).abs() < 1e-2, "{} {}", gap(140.0), gap(280.0));
         }
     }
 }
@@ -86,7 +86,7 @@ fn orbits_balance_power_and_close() {
         assert!(found.points.len() > 15);
         for p in found.points.iter().step_by(5) {
             let Solution::Cycle(cycle) = &p.point.solution else { panic!() };
-            // The profile is a polynomial of degree 5 on each step of an integration to 1e-9.
+            // The profile is a polynomial of degree 5 on each step of an integration to 1e-8.
             assert!(spectrum(p).power_defect().abs() < 1e-9, "{}: {}", p.speed, spectrum(p).power_defect());
             let integrator = Integrator::new(
                 &OverhungRotor { law: ContactLaw::Softplus },
@@ -95,7 +95,7 @@ fn orbits_balance_power_and_close() {
             );
             let start = cycle.state(0.0);
             let end = integrator.state_after(&start, [0.0, p.period]).unwrap();
-            // A tolerance of 1e-8 for the half turn, of which there are up to four.
+            // A tolerance of 1e-7 for the half turn, of which there are up to four.
             assert!(end.iter().zip(&start).all(|(a, b)| (a - b).abs() < 1e-6 * p.r_max), "{start:?} {end:?}");
         }
     }

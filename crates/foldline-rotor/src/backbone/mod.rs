@@ -193,7 +193,8 @@ fn root(constants: &Nondimensional, ratio: Ratio, reach: &Reach, place: &str) ->
         return Err(mistake(cause, "give n:m with 1 ≤ m < n, such as 2:1".to_string()));
     }
     let forward = ratio.forward.unsigned_abs();
-    if let Some(divisor) = (2..=forward).rev().find(|d| forward % d == 0 && ratio.backward % d == 0) {
+    if let Some(divisor) = (2..=forward).rev().find(|d| forward.is_multiple_of(*d) && ratio.backward.is_multiple_of(*d))
+    {
         let cure = format!("give {}:{}", ratio.backward / divisor, forward / divisor);
         return Err(mistake("it is not in lowest terms".to_string(), cure));
     }
