@@ -8,6 +8,7 @@ mod order;
 mod plot;
 mod progress;
 mod run;
+mod short;
 mod table;
 
 use arguments::{Arguments, Command};

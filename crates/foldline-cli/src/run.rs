@@ -2,9 +2,10 @@
 
 use crate::arguments::Run as Typed;
 use crate::failure::{Failure, Outcome};
-use crate::order::ordered;
+use crate::order::{names, ordered};
 use crate::plot::draw;
 use crate::progress::Progress;
+use crate::short;
 use crate::table::print_special;
 use foldline::contract::{Event, Observer, Verdict};
 use foldline::diagram::Diagram;
@@ -70,30 +71,19 @@ fn run(
     watch.progress.finish();
     watch.recorder.finish()?;
 
-    let names: Vec<&str> = study.plan.branches.iter().map(|b| b.name.as_str()).collect();
-    let diagram = ordered(diagram, &names);
+    let diagram = ordered(diagram, &names(&study.plan));
     print_special(&diagram, &study.model)?;
-    let short = fell_short(&diagram, &names);
+    let short = short::lines(&diagram, &study.plan, &study.model);
     let mut err = stderr().lock();
     short.iter().try_for_each(|line| writeln!(err, "ended short: {line}"))?;
+    if !study.plan.homotopies.is_empty() {
+        writeln!(err, "routes: foldline table {} --notes", folder.display())?;
+    }
     if watch.stop.load(Ordering::Relaxed) {
         writeln!(err, "stopped; go on with --resume --out {}", folder.display())?;
     }
     writeln!(err, "run: {}", folder.display())?;
     Ok((diagram, if short.is_empty() { Outcome::Done } else { Outcome::Short }))
-}
-
-/// What of the study was not reached, a line each.
-fn fell_short(diagram: &Diagram, asked: &[&str]) -> Vec<String> {
-    let absent =
-        asked.iter().filter(|name| diagram.branch(name).is_none()).map(|name| format!("{name}: it never began"));
-    let ended = diagram.branches.iter().flat_map(|branch| {
-        let short = branch.ends.iter().flatten().filter(|end| !end.complete());
-        let unfinished =
-            branch.ends.iter().all(Option::is_none).then(|| format!("{}: it is not finished", branch.name));
-        short.map(|end| format!("{}: {end}", branch.name)).chain(unfinished).collect::<Vec<_>>()
-    });
-    absent.chain(ended).collect()
 }
 
 /// Records, shows, and stops when asked to.
