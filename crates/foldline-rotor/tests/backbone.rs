@@ -184,7 +184,15 @@ fn followed(rotor: &OverhungRotor, point: &Point, free: usize, range: [f64; 2]) 
     let station = growth::polished(&mut *problem, &settings, point).unwrap();
     let mut branch = Branch::new("forced", Family::Cycle, free, Origin::Seed("reference".into()));
     let (system, settings) = (&system, &settings);
-    let growth = growth::Growth { system, settings, degree: 4, sides: [true; 2], parents: &[], observer: &Unobserved };
+    let growth = growth::Growth {
+        system,
+        settings,
+        degree: 4,
+        sides: [true; 2],
+        parents: &[],
+        ties: Vec::new(),
+        observer: &Unobserved,
+    };
     growth.begin(&mut branch, growth::Beginning::Inside(station));
     branch
 }

@@ -198,6 +198,11 @@ impl ZeroProblem for BackboneProblem {
         Examination { ranges, trust: Trust { residual, ..Trust::default() }, ..Examination::default() }
     }
 
+    /// There is no spectrum to tell it from, and no other backbone close by but at a root.
+    fn margin(&self, _at: &Point) -> f64 {
+        f64::INFINITY
+    }
+
     fn point(&self, u: &[f64], tangent: &[f64], examination: Examination) -> Point {
         let cycle = match &self.drawn {
             Some((of, cycle)) if of == u => cycle.clone(),
