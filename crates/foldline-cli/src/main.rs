@@ -4,9 +4,9 @@ mod arguments;
 mod attractors;
 mod check;
 mod failure;
-mod order;
 mod plot;
 mod progress;
+mod reproduce;
 mod run;
 mod table;
 
@@ -31,5 +31,6 @@ fn answer(arguments: Arguments) -> Result<Outcome, Failure> {
         Some(Command::Plot(typed)) => plot::write(&typed),
         Some(Command::Attractors(typed)) => attractors::print(&typed),
         Some(Command::Check(typed)) => check::print(&typed),
+        Some(Command::Reproduce(typed)) => reproduce::publication(&typed),
     }
 }

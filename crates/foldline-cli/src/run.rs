@@ -2,7 +2,6 @@
 
 use crate::arguments::Run as Typed;
 use crate::failure::{Failure, Outcome};
-use crate::order::ordered;
 use crate::plot::draw;
 use crate::progress::Progress;
 use crate::table::print_special;
@@ -10,6 +9,7 @@ use foldline::contract::{Event, Observer, Verdict};
 use foldline::diagram::Diagram;
 use foldline::explore;
 use foldline_plot::Picture;
+use foldline_store::order::{fell_short, ordered};
 use foldline_store::run_file::Recorder;
 use foldline_store::study_file::{Study, parse_study, read_study};
 use std::io::{Write, stderr};
@@ -83,19 +83,6 @@ fn run(
     Ok((diagram, if short.is_empty() { Outcome::Done } else { Outcome::Short }))
 }
 
-/// What of the study was not reached, a line each.
-fn fell_short(diagram: &Diagram, asked: &[&str]) -> Vec<String> {
-    let absent =
-        asked.iter().filter(|name| diagram.branch(name).is_none()).map(|name| format!("{name}: it never began"));
-    let ended = diagram.branches.iter().flat_map(|branch| {
-        let short = branch.ends.iter().flatten().filter(|end| !end.complete());
-        let unfinished =
-            branch.ends.iter().all(Option::is_none).then(|| format!("{}: it is not finished", branch.name));
-        short.map(|end| format!("{}: {end}", branch.name)).chain(unfinished).collect::<Vec<_>>()
-    });
-    absent.chain(ended).collect()
-}
-
 /// Records, shows, and stops when asked to.
 struct Watch {
     recorder: Recorder,
@@ -113,7 +100,7 @@ impl Observer for Watch {
 
 /// Set by the first Ctrl-C, after which every branch ends at its next point; the second ends the program, which loses
 /// nothing that was accepted.
-fn stop_on_interrupt() -> Arc<AtomicBool> {
+pub fn stop_on_interrupt() -> Arc<AtomicBool> {
     let stop = Arc::new(AtomicBool::new(false));
     let asked = Arc::clone(&stop);
     let handler = move || {

@@ -5,10 +5,10 @@ mod format;
 
 use crate::arguments::{Format, Table as Typed};
 use crate::failure::{Failure, Outcome};
-use crate::order::ordered;
 use foldline::diagram::Diagram;
 use foldline::model::Model;
 use foldline_store::nearest::suggest;
+use foldline_store::order::ordered;
 use foldline_store::run_file::load;
 use foldline_store::study_file::parse_study;
 use std::io::{Write, stdout};

@@ -1,4 +1,4 @@
-//! The order in which branches are listed.
+//! The order in which branches are listed, and what of a study was not reached.
 
 use foldline::diagram::{Branch, Diagram, Origin};
 
@@ -37,6 +37,19 @@ pub fn ordered(mut diagram: Diagram, study: &[&str]) -> Diagram {
         }
     }
     diagram
+}
+
+/// What of a study was not reached, a line each; `asked` are its branches.
+pub fn fell_short(diagram: &Diagram, asked: &[&str]) -> Vec<String> {
+    let absent =
+        asked.iter().filter(|name| diagram.branch(name).is_none()).map(|name| format!("{name}: it never began"));
+    let ended = diagram.branches.iter().flat_map(|branch| {
+        let short = branch.ends.iter().flatten().filter(|end| !end.complete());
+        let unfinished =
+            branch.ends.iter().all(Option::is_none).then(|| format!("{}: it is not finished", branch.name));
+        short.map(|end| format!("{}: {end}", branch.name)).chain(unfinished).collect::<Vec<_>>()
+    });
+    absent.chain(ended).collect()
 }
 
 fn parent(branch: &Branch) -> Option<&str> {
