@@ -37,7 +37,7 @@ impl Frame {
         }
         self.divide_y(h);
         // Fewer ticks until the labels stand apart.
-        let mut wanted = (w / 75.0).max(1.0) as usize;
+        let mut wanted = (w / 52.0).max(1.0) as usize;
         self.x.divide(wanted);
         while wanted > 1
             && (self.x.widest() + 16.0) * self.x.ticks.iter().filter(|t| !t.1.is_empty()).count() as f64 > w

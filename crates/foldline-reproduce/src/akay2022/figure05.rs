@@ -20,7 +20,7 @@ fn make(runs: &Runs) -> Result<Made, String> {
         let cycle = cycle(&point)?;
         let colour = colour(&name);
         orbits.push(orbit_panel(label[0], title, 2.4).with(orbit(cycle, colour).named(family)));
-        let axis = Axis::new("angular frequency in the rotating frame (negative: backward)").from(-13.0, 7.0);
+        let axis = Axis::new("angular frequency (negative: backward whirl)").from(-13.5, 8.0);
         let panel =
             Panel::new(label[1], format!("spectrum of {family}"), axis, Axis::new("amplitude").from(1e-4, 4.0).log());
         spectra.push(panel.with(spectrum(cycle, colour, 1e-4, 6)));

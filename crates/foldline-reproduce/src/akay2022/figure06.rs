@@ -15,19 +15,22 @@ pub const PLAN: FigurePlan =
 fn make(runs: &Runs) -> Result<Made, String> {
     let run = runs.run("diagrams")?;
     let (mut panels, mut claims) = (Vec::new(), Vec::new());
-    for (family, label, title, loops) in [("SL", "(a)", "single loop", 1), ("DL", "(b)", "double loop", 2)] {
-        let mut panel = orbit_panel(label, title, 5.0);
+    for (family, label, title, loops, reach) in
+        [("SL", "(a)", "single loop", 1, 2.8), ("DL", "(b)", "double loop", 2, 5.3)]
+    {
+        let mut panel = orbit_panel(label, title, reach);
         let (mut holds, mut found) = (Vec::new(), Vec::new());
         for (law, colour) in [("cubic", BLUE), ("contact", VERMILION)] {
             let point = stable_at(run, &format!("{law} {family}"), 5.0)?;
             let cycle = cycle(&point)?;
             panel = panel.with(orbit(cycle, colour).named(law));
-            let touches = entries(cycle);
-            holds.push(touches == loops && min_r(&point) < 1.0 && max_r(&point) > 1.0);
-            found.push(format!("{law}: {touches}, r from {:.5} to {:.5}", min_r(&point), max_r(&point)));
+            let found_loops = crossings(cycle);
+            holds.push(found_loops == loops && min_r(&point) < 1.0 && max_r(&point) > 1.0);
+            found.push(format!("{law}: {found_loops}, r from {:.5} to {:.5}", min_r(&point), max_r(&point)));
         }
         panels.push(panel);
-        let statement = format!("How often {family} leaves the contact circle outwards in a period, cubic and contact");
+        let statement =
+            format!("How many loops {family} makes in a period, partly inside the contact circle and partly outside");
         claims.push(Claim::decided("6", statement, loops.to_string(), Ok(Finding::cases(&holds, found.join("; ")))));
     }
     Ok(Made {
@@ -39,8 +42,18 @@ fn make(runs: &Runs) -> Result<Made, String> {
     })
 }
 
-/// How often the orbit crosses r = 1 outwards.
-fn entries(cycle: &Cycle) -> usize {
-    let radii: Vec<f64> = cycle.uniform(2048).chunks_exact(cycle.dim().max(2)).map(|x| x[0].hypot(x[1])).collect();
-    (0..radii.len()).filter(|&k| radii[k] <= 1.0 && radii[(k + 1) % radii.len()] > 1.0).count()
+/// How often the orbit crosses itself in a period: a polygon's sides that are no neighbours are compared in pairs.
+fn crossings(cycle: &Cycle) -> usize {
+    const SIDES: usize = 600;
+    let n = cycle.dim().max(2);
+    let corners: Vec<[f64; 2]> = cycle.uniform(SIDES).chunks_exact(n).map(|x| [x[0], x[1]]).collect();
+    let side = |k: usize| (corners[k % SIDES], corners[(k + 1) % SIDES]);
+    let turn =
+        |a: [f64; 2], b: [f64; 2], c: [f64; 2]| (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) > 0.0;
+    let crossed = |i: usize, j: usize| {
+        let ((a, b), (c, d)) = (side(i), side(j));
+        turn(a, b, c) != turn(a, b, d) && turn(c, d, a) != turn(c, d, b)
+    };
+    let pairs = (0..SIDES).flat_map(|i| (i + 2..SIDES).map(move |j| (i, j)));
+    pairs.filter(|(i, j)| !(*i == 0 && *j == SIDES - 1) && crossed(*i, *j)).count()
 }

@@ -6,6 +6,7 @@ use crate::claims::{Claim, Finding, digits};
 use crate::publication::{FigurePlan, Made};
 use crate::runs::{Run, Runs};
 use foldline::diagram::{Branch, Ending, Kind};
+use foldline_plot::figure::Shape;
 use foldline_plot::{Axis, Figure, Layer, Panel, branch_curve};
 
 pub const PLAN: FigurePlan = FigurePlan { name: "7", title: "bifurcation diagrams", runs: &["diagrams", "far"], make };
@@ -27,7 +28,7 @@ fn make(runs: &Runs) -> Result<Made, String> {
         Axis::new("Ω").from(0.5, 12.0),
         Axis::new("max r").from(0.1, 100.0).log(),
     )
-    .with_all(layers(run, "contact").into_iter().map(|layer| Layer { name: layer.name, ..layer }));
+    .with_all(layers(run, "contact"));
     let wide = Panel::new("(d)", "cubic, up to Ω = 100", Axis::new("Ω").from(0.0, 100.0), Axis::new("max r"))
         .with_all(layers(far, "cubic"));
     let mut claims = vec![window(run)];
@@ -56,8 +57,7 @@ fn layers(run: &Run, law: &str) -> Vec<Layer> {
         }
     }
     // Curves first, marks on top; the thin ones are named last.
-    layers
-        .sort_by_key(|layer| (matches!(layer.shape, foldline_plot::figure::Shape::Scatter { .. }), layer.width < 1.1));
+    layers.sort_by_key(|layer| (matches!(layer.shape, Shape::Scatter { .. }), layer.width < 1.1));
     layers
 }
 

@@ -1,6 +1,6 @@
 //! Figure 8: the lowest part of SL on the way from cubic to contact stiffness.
 
-use super::rotor::{MAX_R, OMEGA, SPEED, max_r, smallest};
+use super::rotor::{MAX_R, SPEED, max_r, parameters, smallest};
 use crate::claims::{Claim, Finding, digits};
 use crate::publication::{FigurePlan, Made};
 use crate::runs::Runs;
@@ -23,7 +23,7 @@ fn make(runs: &Runs) -> Result<Made, String> {
             Ok(branch) => {
                 panel = panel.with(branch_curve(branch, SPEED, MAX_R, nth(k)).named(format!("κ = {kappa}")));
                 let [r, _] = smallest(branch, max_r);
-                lowest.push([branch.points[0].parameters[OMEGA + 1], r]);
+                lowest.push([parameters(&branch.points[0])[1], r]);
             }
             Err(why) => missing.push(why),
         }

@@ -5,6 +5,7 @@ use crate::claims::{Claim, Finding, digits};
 use crate::publication::{FigurePlan, Made};
 use crate::runs::{Run, Runs};
 use foldline::diagram::{Ending, Kind};
+use foldline_plot::figure::Shape;
 use foldline_plot::palette::{BLACK, PURPLE};
 use foldline_plot::{Axis, Figure, Layer, Panel, branch_layers};
 
@@ -14,7 +15,7 @@ pub const PLAN: FigurePlan =
 fn make(runs: &Runs) -> Result<Made, String> {
     let run = runs.run("diagrams")?;
     let panels =
-        vec![panel(run, "(a)", "SL", [3.2, 5.2], [0.95, 1.75])?, panel(run, "(b)", "DL", [2.55, 4.6], [1.2, 2.6])?];
+        vec![panel(run, "(a)", "SL", [3.2, 5.2], [0.97, 1.5])?, panel(run, "(b)", "DL", [2.55, 4.6], [1.2, 2.2])?];
     let mut claims = Vec::new();
     for family in ["SL", "DL"] {
         claims.extend(cascade(run, family));
@@ -42,7 +43,7 @@ fn panel(run: &Run, label: &str, family: &str, x: [f64; 2], y: [f64; 2]) -> Resu
         }
         layers.extend(next);
     }
-    layers.sort_by_key(|layer| matches!(layer.shape, foldline_plot::figure::Shape::Scatter { .. }));
+    layers.sort_by_key(|layer| matches!(layer.shape, Shape::Scatter { .. }));
     debug_assert_eq!(colour(&root.name), layers[0].colour);
     Ok(Panel { height: 400.0, ..Panel::new(label, family, axes.0, axes.1) }
         .with_all(layers)

@@ -1,20 +1,21 @@
 //! Figures 10 and 11: next to no damping.
 
-use super::rotor::{FAMILIES, MAX_R, colour, max_r, over_speed, smallest};
+use super::rotor::{FAMILIES, MAX_R, max_r, over_speed, smallest};
 use crate::claims::{Claim, Finding, digits};
 use crate::publication::{FigurePlan, Made};
 use crate::runs::{Run, Runs};
+use foldline_plot::figure::Shape;
 use foldline_plot::{Axis, Figure, Layer, Panel};
 
 pub const CUBIC: FigurePlan =
-    FigurePlan { name: "10", title: "ζ = 1e-5, cubic", runs: &["light-damping"], make: cubic };
+    FigurePlan { name: "10", title: "ζ = 10⁻⁵, cubic", runs: &["light-damping"], make: cubic };
 pub const CONTACT: FigurePlan =
-    FigurePlan { name: "11", title: "ζ = 1e-5, contact", runs: &["light-damping"], make: contact };
+    FigurePlan { name: "11", title: "ζ = 10⁻⁵, contact", runs: &["light-damping"], make: contact };
 
 fn cubic(runs: &Runs) -> Result<Made, String> {
     let run = runs.run("light-damping")?;
-    let zoom = [2.0, 5.0, 0.3, 2.0];
-    let figure = diagrams(run, "cubic", "Cubic spring, ζ = 1e-5", [0.5, 15.0, 0.0, 20.0], zoom);
+    let parts = [("the smallest cycles", [2.0, 5.0, 0.3, 2.0])];
+    let figure = diagrams(run, "cubic", "Cubic spring, ζ = 10⁻⁵", [0.5, 15.0, 0.0, 20.0], &parts);
     let mut claims = Vec::new();
     for family in ["SL", "DL"] {
         let finding = lowest(run, &format!("cubic {family}"), |r| r < 1.0, Finding::fact);
@@ -29,8 +30,9 @@ fn cubic(runs: &Runs) -> Result<Made, String> {
 
 fn contact(runs: &Runs) -> Result<Made, String> {
     let run = runs.run("light-damping")?;
-    let zoom = [2.0, 4.2, 0.9, 1.5];
-    let figure = diagrams(run, "contact", "Contact, ζ = 1e-5", [0.5, 15.0, 0.0, 20.0], zoom);
+    let parts =
+        [("the smallest double loops", [2.1, 4.0, 0.95, 1.5]), ("the smallest single loops", [3.2, 4.2, 0.97, 1.2])];
+    let figure = diagrams(run, "contact", "Contact, ζ = 10⁻⁵", [0.5, 15.0, 0.0, 20.0], &parts);
     let mut claims = Vec::new();
     for family in ["SL", "DL"] {
         let width = run.branch(&format!("contact {family}")).map_or(0.0, |b| 1.0 / b.points[0].parameters[6]);
@@ -47,25 +49,30 @@ fn contact(runs: &Runs) -> Result<Made, String> {
     Ok(Made { figure, caption: "S, SL and DL with contact, whole and where the cycles are smallest.".into(), claims })
 }
 
-/// The whole diagram of one law and a part of it, `[x0, x1, y0, y1]`.
-pub fn diagrams(run: &Run, law: &str, title: &str, whole: [f64; 4], part: [f64; 4]) -> Figure {
-    let panel = |label: &str, text: &str, [x0, x1, y0, y1]: [f64; 4]| {
-        let axes = (Axis::new("Ω").from(x0, x1), Axis::new("max r").from(y0, y1));
-        let mut layers = Vec::new();
-        for (family, _) in FAMILIES {
-            if let Ok(branch) = run.branch(&format!("{law} {family}")) {
-                layers.extend(over_speed(branch, family, MAX_R));
-            }
+/// The whole diagram of one law and parts of it; windows are `[x0, x1, y0, y1]`.
+pub fn diagrams(run: &Run, law: &str, title: &str, whole: [f64; 4], parts: &[(&str, [f64; 4])]) -> Figure {
+    let labels = ["(b)", "(c)", "(d)"];
+    let mut first = panel(run, law, "(a)", law, whole);
+    first.span = if parts.len() == 1 { 1 } else { 2 };
+    let mut panels = Vec::new();
+    for ((text, window), label) in parts.iter().zip(labels) {
+        first = first.zooming(*window, label);
+        panels.push(panel(run, law, label, text, *window));
+    }
+    panels.insert(0, first);
+    Figure::grid(title, 2, panels)
+}
+
+fn panel(run: &Run, law: &str, label: &str, text: &str, [x0, x1, y0, y1]: [f64; 4]) -> Panel {
+    let axes = (Axis::new("Ω").from(x0, x1), Axis::new("max r").from(y0, y1));
+    let mut layers = Vec::new();
+    for (family, name) in FAMILIES.map(|(family, _)| (family, format!("{law} {family}"))) {
+        for branch in [run.branch(&name), run.branch(&format!("{name} resonant"))].into_iter().flatten() {
+            layers.extend(over_speed(branch, family, MAX_R));
         }
-        layers.sort_by_key(|layer| matches!(layer.shape, foldline_plot::figure::Shape::Scatter { .. }));
-        let note = Layer::note([x1 - 0.02 * (x1 - x0), 1.0], "contact").coloured(colour("S"));
-        let panel = Panel { height: 380.0, ..Panel::new(label, text, axes.0, axes.1) }
-            .with_all(layers)
-            .with(Layer::horizontal(1.0));
-        if label == "(b)" && law == "contact" { panel.with(note) } else { panel }
-    };
-    let first = panel("(a)", law, whole).zooming(part, "(b)");
-    Figure::grid(title, 2, vec![first, panel("(b)", "the smallest cycles", part)])
+    }
+    layers.sort_by_key(|layer| matches!(layer.shape, Shape::Scatter { .. }));
+    Panel { height: 380.0, ..Panel::new(label, text, axes.0, axes.1) }.with_all(layers).with(Layer::horizontal(1.0))
 }
 
 fn lowest(

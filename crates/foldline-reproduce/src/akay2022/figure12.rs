@@ -9,21 +9,28 @@ use foldline::diagram::{Branch, Kind};
 
 const RUN: &str = "light-damping-large-unbalance";
 
-pub const CUBIC: FigurePlan = FigurePlan { name: "12", title: "ζ = 1e-5, ε = 1.5, cubic", runs: &[RUN], make: cubic };
+pub const CUBIC: FigurePlan =
+    FigurePlan { name: "12", title: "ζ = 10⁻⁵, ε = 1.5, cubic", runs: &[RUN], make: cubic };
 pub const CONTACT: FigurePlan =
-    FigurePlan { name: "13", title: "ζ = 1e-5, ε = 1.5, contact", runs: &[RUN], make: contact };
+    FigurePlan { name: "13", title: "ζ = 10⁻⁵, ε = 1.5, contact", runs: &[RUN], make: contact };
 
 fn cubic(runs: &Runs) -> Result<Made, String> {
     let run = runs.run(RUN)?;
-    let figure =
-        diagrams(run, "cubic", "Cubic spring, ζ = 1e-5, ε = 1.5", [0.5, 15.0, 0.0, 20.0], [2.5, 7.5, 1.0, 4.5]);
+    let figure = diagrams(
+        run,
+        "cubic",
+        "Cubic spring, ζ = 10⁻⁵, ε = 1.5",
+        [0.5, 15.0, 0.0, 20.0],
+        &[("where SL meets S", [2.5, 7.5, 1.0, 4.5])],
+    );
     let claims = vec![straight(run), connects("12", run, "cubic SL")];
     Ok(Made { figure, caption: "S, SL and DL without contact; SL comes next to S.".into(), claims })
 }
 
 fn contact(runs: &Runs) -> Result<Made, String> {
     let run = runs.run(RUN)?;
-    let figure = diagrams(run, "contact", "Contact, ζ = 1e-5, ε = 1.5", [0.3, 15.0, 0.0, 20.0], [5.8, 7.3, 2.0, 6.5]);
+    let parts = [("double loop", [5.9, 6.7, 1.5, 6.0]), ("single loop", [8.3, 10.3, 1.3, 5.0])];
+    let figure = diagrams(run, "contact", "Contact, ζ = 10⁻⁵, ε = 1.5", [0.3, 15.0, 0.0, 20.0], &parts);
     let claims = vec![connects("13", run, "contact SL"), second_zone(run)];
     Ok(Made {
         figure,

@@ -17,7 +17,7 @@ fn make(runs: &Runs) -> Result<Made, String> {
     let mut s = Panel::new("(a)", "S, β = 6", Axis::new("Ω").from(0.88, 0.94), Axis::new("max r").from(0.86, 1.06));
     let mut light = Panel::new(
         "(b)",
-        "SL, β = 6, ζ = 1e-5, ε = 0.8",
+        "SL, β = 6, ζ = 10⁻⁵, ε = 0.8",
         Axis::new("Ω").from(2.7, 3.7),
         Axis::new("max r").from(0.9, 1.12),
     );

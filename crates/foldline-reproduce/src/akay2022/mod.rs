@@ -3,6 +3,7 @@
 //! **Source.** akay2024.
 
 mod figure03;
+mod figure04;
 mod figure05;
 mod figure06;
 mod figure07;
@@ -36,14 +37,16 @@ macro_rules! study {
 const STUDIES: &[StudyPlan] = &[
     study!("diagrams", 1.7),
     study!("far", 1.0),
-    study!("lowest-part", 1.0),
-    study!("light-damping", 1.5),
-    study!("light-damping-large-unbalance", 1.0),
+    study!("lowest-part", 1.5),
+    study!("flows", 1.5),
+    study!("light-damping", 4.0),
+    study!("light-damping-large-unbalance", 4.0),
     study!("blunt-contact", 0.5),
 ];
 
 const FIGURES: &[FigurePlan] = &[
     figure03::PLAN,
+    figure04::PLAN,
     figure05::PLAN,
     figure06::PLAN,
     figure07::PLAN,
