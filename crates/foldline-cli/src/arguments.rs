@@ -32,6 +32,9 @@ pub enum Command {
     Attractors(Attractors),
     /// Say whether a model or study file is right, and if not where and why
     Check(Check),
+    /// Compute the figures and claims of a publication again
+    #[command(after_help = EXIT_CODES)]
+    Reproduce(Reproduce),
 }
 
 #[derive(Debug, Args)]
@@ -151,4 +154,20 @@ pub struct Check {
     /// Model or study file
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub struct Reproduce {
+    /// Which publication
+    #[arg(value_name = "PUBLICATION")]
+    pub publication: String,
+    /// Only this figure; may be given several times [default: all of them]
+    #[arg(long, value_name = "N")]
+    pub figure: Vec<String>,
+    /// Folder for the runs, the figures and the report [default: reproduced/PUBLICATION]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// How many branches are followed at a time [default: number of processors]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub jobs: Option<u16>,
 }

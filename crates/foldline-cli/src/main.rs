@@ -4,11 +4,10 @@ mod arguments;
 mod attractors;
 mod check;
 mod failure;
-mod order;
 mod plot;
 mod progress;
+mod reproduce;
 mod run;
-mod short;
 mod table;
 
 use arguments::{Arguments, Command};
@@ -32,5 +31,6 @@ fn answer(arguments: Arguments) -> Result<Outcome, Failure> {
         Some(Command::Plot(typed)) => plot::write(&typed),
         Some(Command::Attractors(typed)) => attractors::print(&typed),
         Some(Command::Check(typed)) => check::print(&typed),
+        Some(Command::Reproduce(typed)) => reproduce::publication(&typed),
     }
 }

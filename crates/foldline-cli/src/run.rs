@@ -2,16 +2,16 @@
 
 use crate::arguments::Run as Typed;
 use crate::failure::{Failure, Outcome};
-use crate::order::{names, ordered};
 use crate::plot::draw;
 use crate::progress::Progress;
-use crate::short;
 use crate::table::print_special;
 use foldline::contract::{Event, Observer, Verdict};
 use foldline::diagram::Diagram;
 use foldline::explore;
 use foldline_plot::Picture;
+use foldline_store::order::{names, ordered};
 use foldline_store::run_file::Recorder;
+use foldline_store::short;
 use foldline_store::study_file::{Study, parse_study, read_study};
 use std::io::{Write, stderr};
 use std::path::{Path, PathBuf};
@@ -103,7 +103,7 @@ impl Observer for Watch {
 
 /// Set by the first Ctrl-C, after which every branch ends at its next point; the second ends the program, which loses
 /// nothing that was accepted.
-fn stop_on_interrupt() -> Arc<AtomicBool> {
+pub fn stop_on_interrupt() -> Arc<AtomicBool> {
     let stop = Arc::new(AtomicBool::new(false));
     let asked = Arc::clone(&stop);
     let handler = move || {

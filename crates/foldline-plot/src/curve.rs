@@ -1,5 +1,6 @@
 //! From a branch to polylines of one stability each, and marks.
 
+use crate::figure::Vertex;
 use crate::quantity::Quantity;
 use foldline::diagram::{Branch, Ending, Kind, Point};
 
@@ -16,26 +17,35 @@ pub struct Piece {
 /// of an equilibrium, say) interrupts the curve. Between its vertices the curve is rounded (see [`rounded`]), lengths being
 /// measured in `scale`, the sizes of the axes.
 pub fn pieces(branch: &Branch, x: Quantity, y: Quantity, scale: [f64; 2]) -> Vec<Piece> {
+    cut(&stretches(branch, x, y), Some(scale))
+}
+
+/// The pieces of one style each of curves given by their vertices, rounded where a scale is given.
+pub fn cut(stretches: &[Vec<Vertex>], scale: Option<[f64; 2]>) -> Vec<Piece> {
     let mut pieces: Vec<Piece> = Vec::new();
-    for curve in stretches(branch, x, y) {
+    for curve in stretches {
         let vertices: Vec<[f64; 2]> = curve.iter().map(|(vertex, _)| *vertex).collect();
-        for (k, between) in rounded(&vertices, scale).into_iter().enumerate() {
+        let between = match scale {
+            Some(scale) => rounded(&vertices, scale),
+            None => vec![Vec::new(); vertices.len().saturating_sub(1)],
+        };
+        let mut fresh = true;
+        for (k, between) in between.into_iter().enumerate() {
             let stable = curve[k + 1].1;
             let line = between.into_iter().chain([vertices[k + 1]]);
-            match pieces.last_mut().filter(|p| p.stable == stable && p.vertices.last() == Some(&vertices[k])) {
+            match pieces.last_mut().filter(|piece| !fresh && piece.stable == stable) {
                 Some(piece) => piece.vertices.extend(line),
                 None => pieces.push(Piece { stable, vertices: [vertices[k]].into_iter().chain(line).collect() }),
             }
+            fresh = false;
         }
     }
     pieces
 }
 
-/// A vertex, and whether the stretch that leads to it is stable.
-type Vertex = ([f64; 2], bool);
-
-/// The vertices of a branch, points and special points in their order, interrupted where a point has no value.
-fn stretches(branch: &Branch, x: Quantity, y: Quantity) -> Vec<Vec<Vertex>> {
+/// The vertices of a branch, points and special points in their order, interrupted where a point has no value; each with
+/// whether the stretch that leads to it is stable.
+pub fn stretches(branch: &Branch, x: Quantity, y: Quantity) -> Vec<Vec<Vertex>> {
     let mut vertices: Vec<Option<Vertex>> = Vec::new();
     // Stability of the stretch that leads to the next vertex.
     let mut stable = true;
@@ -54,7 +64,8 @@ fn stretches(branch: &Branch, x: Quantity, y: Quantity) -> Vec<Vec<Vertex>> {
     if let (true, Some(first)) = (closed, branch.points.first()) {
         vertices.push(place(first, x, y).map(|at| (at, stable)));
     }
-    vertices.split(Option::is_none).map(|stretch| stretch.iter().flatten().copied().collect()).collect()
+    let parts = vertices.split(Option::is_none);
+    parts.map(|stretch| stretch.iter().flatten().copied().collect()).filter(|s: &Vec<Vertex>| !s.is_empty()).collect()
 }
 
 /// For each pair of neighbours the vertices in between that make the polyline a smooth curve through all given vertices:

@@ -1,19 +1,31 @@
-//! Bifurcation diagrams as SVG, PNG and PDF.
+//! Bifurcation diagrams and other figures as SVG, PNG and PDF.
 //!
-//! **Idea.** A picture is made in three steps: what the axes show ([`quantity`]), which polylines and marks that gives
-//! ([`curve`]), and where everything stands on the page ([`page`]). The page is SVG; PNG and PDF are made from it with the
-//! embedded font, so they look alike everywhere.
+//! **Idea.** A figure is plain data: panels with axes and layers ([`figure`]). Branches become layers ([`branches`],
+//! [`curve`]) once it is known what the axes show ([`quantity`]); then everything gets its place on the page
+//! ([`figure_svg`]). The page is SVG; PNG and PDF are made from it with the embedded font, so they look alike everywhere.
 //!
 //! Stable pieces are solid, unstable ones dashed, and the change lies exactly at the special point. A branch that comes
 //! from a special point of another has its colour, lighter.
 
+pub mod branches;
+mod compose;
 pub mod curve;
+pub mod figure;
 pub mod font;
+mod frame;
+mod legend;
 pub mod page;
+mod paint;
+pub mod palette;
 pub mod quantity;
 mod render;
+mod scale;
+mod texts;
 pub mod ticks;
 
+pub use branches::{branch_curve, branch_layers, diagram_layers, special_layers};
+pub use compose::figure_svg;
+pub use figure::{Axis, Figure, Layer, LegendPlace, Marker, Panel};
 pub use page::{Picture, svg};
 pub use quantity::Quantity;
 pub use render::{RenderError, pdf, png};

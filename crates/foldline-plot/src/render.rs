@@ -19,6 +19,7 @@ impl std::error::Error for RenderError {}
 fn tree(svg: &str) -> Result<usvg::Tree, RenderError> {
     let mut fonts = usvg::fontdb::Database::new();
     fonts.load_font_data(dejavu::sans::regular().to_vec());
+    fonts.load_font_data(dejavu::sans::bold().to_vec());
     let options = usvg::Options { fontdb: Arc::new(fonts), ..usvg::Options::default() };
     usvg::Tree::from_str(svg, &options).map_err(|e| RenderError(e.to_string()))
 }

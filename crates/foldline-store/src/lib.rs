@@ -8,6 +8,8 @@ pub mod diagnostic;
 pub mod finite;
 pub mod model_file;
 pub mod nearest;
+pub mod order;
 pub mod run_file;
+pub mod short;
 pub mod study_file;
 mod toml_walk;

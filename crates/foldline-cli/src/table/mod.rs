@@ -5,10 +5,10 @@ mod format;
 
 use crate::arguments::{Format, Table as Typed, What};
 use crate::failure::{Failure, Outcome};
-use crate::order::{leg, names, ordered};
 use foldline::diagram::{Branch, Diagram};
 use foldline::model::Model;
 use foldline_store::nearest::suggest;
+use foldline_store::order::{leg, names, ordered};
 use foldline_store::run_file::load;
 use foldline_store::study_file::parse_study;
 use std::io::{Write, stdout};

@@ -63,8 +63,8 @@ fn place(targets: &[(usize, f64)], model: &Model) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::study_file::{Study, parse_study};
     use foldline::diagram::{Cost, Ending, Family, Kind, Origin, Solution, Trust};
-    use foldline_store::study_file::{Study, parse_study};
 
     const MODEL: &str = "name = \"m\"\n[parameters]\nOmega = 1\nkappa = 0\n[states]\nx = \"-x\"\n";
     const STUDY: &str = "model = \"m\"\n[[seed]]\nname = \"s\"\nstate = { x = 0 }\n\

@@ -1,0 +1,78 @@
+//! Branches of a diagram as layers.
+
+use crate::curve::{marks, stretches};
+use crate::figure::{Layer, Marker, Shape};
+use crate::palette::nth;
+use crate::quantity::Quantity;
+use foldline::diagram::{Branch, Diagram, Kind, Origin};
+
+/// A branch in one colour: solid where it is stable, dashed where not, and its special points, hollow and named by their
+/// kind. The curve comes first.
+pub fn branch_layers(branch: &Branch, x: Quantity, y: Quantity, colour: &'static str) -> Vec<Layer> {
+    let mut layers = vec![branch_curve(branch, x, y, colour)];
+    layers.extend(special_layers(branch, x, y, colour));
+    layers
+}
+
+/// A branch without its special points.
+pub fn branch_curve(branch: &Branch, x: Quantity, y: Quantity, colour: &'static str) -> Layer {
+    let shape = Shape::Curve { stretches: stretches(branch, x, y), rounded: true, stability: true };
+    Layer { shape, ..Layer::curve(&[], colour) }
+}
+
+/// The special points of a branch, a layer for each kind.
+pub fn special_layers(branch: &Branch, x: Quantity, y: Quantity, colour: &'static str) -> Vec<Layer> {
+    let all = marks(branch, x, y);
+    let of = |kind: Kind| all.iter().filter(|(k, _)| *k == kind).map(|(_, place)| *place).collect::<Vec<_>>();
+    let kinds = Kind::ALL.into_iter().map(|kind| (kind, of(kind))).filter(|(_, places)| !places.is_empty());
+    kinds.map(|(kind, places)| Layer::scatter(places, Marker::of(kind), colour).hollow().named(kind.name())).collect()
+}
+
+/// All branches: a colour for each that was not switched to, the others in the colour of the one they come from, thinner
+/// and lighter. Curves first, marks on top of them.
+pub fn diagram_layers(diagram: &Diagram, x: Quantity, y: Quantity) -> Vec<Layer> {
+    let roots: Vec<&Branch> = diagram.branches.iter().filter(|branch| root(diagram, branch).1 == 0).collect();
+    let (mut curves, mut specials) = (Vec::new(), Vec::new());
+    for branch in &diagram.branches {
+        let (root, depth) = root(diagram, branch);
+        let index = roots.iter().position(|b| b.name == root.name).unwrap_or(0);
+        let mut curve = branch_curve(branch, x, y, nth(index));
+        curve = match depth {
+            0 if index < MOST => curve.named(shortened(&branch.name)).wide(2.0),
+            0 => curve.wide(2.0),
+            _ => curve.named(LIGHTER).wide(1.4).faint(0.65),
+        };
+        curves.push(curve);
+        specials.extend(special_layers(branch, x, y, nth(index)));
+    }
+    // What branches off is named last.
+    curves.sort_by_key(|layer| layer.name.as_deref() == Some(LIGHTER));
+    curves.into_iter().chain(specials).collect()
+}
+
+/// What the legend calls branches that come from a special point of another.
+const LIGHTER: &str = "branching off";
+
+/// As many branches as the legend has room for.
+const MOST: usize = 14;
+
+/// A name that leaves room for the diagram.
+fn shortened(name: &str) -> String {
+    const LONGEST: usize = 32;
+    match name.char_indices().nth(LONGEST) {
+        Some((end, _)) => format!("{}…", &name[..end]),
+        None => name.to_string(),
+    }
+}
+
+/// The branch at the root of this one, and how many switches lie between them.
+pub fn root<'d>(diagram: &'d Diagram, branch: &'d Branch) -> (&'d Branch, usize) {
+    let mut at = branch;
+    // Names are unique, so a chain longer than the list of branches would go round in circles.
+    for depth in 0..diagram.branches.len() {
+        let Origin::Switch { parent, .. } = &at.origin else { return (at, depth) };
+        let Some(parent) = diagram.branch(parent) else { return (at, depth) };
+        at = parent;
+    }
+    (at, 0)
+}

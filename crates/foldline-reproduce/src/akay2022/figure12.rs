@@ -1,0 +1,118 @@
+//! Figures 12 and 13: next to no damping and a large unbalance.
+
+use super::figure10::diagrams;
+use super::rotor::{OMEGA, max_r, min_r, smallest};
+use crate::claims::{Claim, Finding, digits};
+use crate::publication::{FigurePlan, Made};
+use crate::runs::{Run, Runs};
+use foldline::diagram::{Branch, Kind};
+
+const RUN: &str = "light-damping-large-unbalance";
+
+pub const CUBIC: FigurePlan =
+    FigurePlan { name: "12", title: "ζ = 10⁻⁵, ε = 1.5, cubic", runs: &[RUN], make: cubic };
+pub const CONTACT: FigurePlan =
+    FigurePlan { name: "13", title: "ζ = 10⁻⁵, ε = 1.5, contact", runs: &[RUN], make: contact };
+
+fn cubic(runs: &Runs) -> Result<Made, String> {
+    let run = runs.run(RUN)?;
+    let figure = diagrams(
+        run,
+        "cubic",
+        "Cubic spring, ζ = 10⁻⁵, ε = 1.5",
+        [0.5, 15.0, 0.0, 20.0],
+        &[("where SL meets S", [2.5, 7.5, 1.0, 4.5])],
+    );
+    let claims = vec![straight(run), connects("12", run, "cubic SL")];
+    Ok(Made { figure, caption: "S, SL and DL without contact; SL comes next to S.".into(), claims })
+}
+
+fn contact(runs: &Runs) -> Result<Made, String> {
+    let run = runs.run(RUN)?;
+    let parts = [("double loop", [5.9, 6.7, 1.5, 6.0]), ("single loop", [8.3, 10.3, 1.3, 5.0])];
+    let figure = diagrams(run, "contact", "Contact, ζ = 10⁻⁵, ε = 1.5", [0.3, 15.0, 0.0, 20.0], &parts);
+    let claims = vec![connects("13", run, "contact SL"), second_zone(run)];
+    Ok(Made {
+        figure,
+        caption: "S, SL and DL with contact; the double loop has a second stable zone below the main one.".into(),
+        claims,
+    })
+}
+
+/// The run in ε alone turns back.
+fn straight(run: &Run) -> Claim {
+    let finding = || {
+        let folds = run.special("cubic SL straight", Kind::Fold)?;
+        let fold = folds.first().ok_or("the run in ε has no fold")?;
+        let epsilon = run.parameter("epsilon");
+        let value = fold.point.parameters[epsilon];
+        Ok(Finding::number(value, fold.error * (1.0 + value), 1.465, 2e-3).noting("at ζ = 0.01, before ζ runs down"))
+    };
+    Claim::decided("12", "At Ω = 5 the cubic SL, run in ε alone, turns back before 1.5", "1.465", finding())
+}
+
+/// How close a family of cycles comes to S, measured by how much the radius varies along the cycle.
+fn connects(figure: &'static str, run: &Run, name: &str) -> Claim {
+    let finding = || {
+        let branch = run.branch(name)?;
+        let [variation, omega] = smallest(branch, |p| (max_r(p) - min_r(p)) / max_r(p));
+        let ends: Vec<String> = branch.ends.iter().flatten().map(ToString::to_string).collect();
+        let ours = format!("radius varies by {:.1} % at Ω = {omega:.4}", 100.0 * variation);
+        Ok(Finding::qualified(variation < 0.1, ours).noting(format!("branch: {}", ends.join("; "))))
+    };
+    Claim::decided(figure, "S and SL connect, or nearly so", "yes", finding())
+}
+
+/// A stable stretch of DL at smaller radii than the main one, at the same speeds.
+fn second_zone(run: &Run) -> Claim {
+    let finding = || {
+        let zones = stable_zones(run.branch("contact DL")?);
+        let top = zones.iter().max_by(|a, b| a.radius[1].total_cmp(&b.radius[1])).ok_or("DL is nowhere stable")?;
+        let below = zones.iter().filter(|z| z.radius[1] < top.radius[0].min(5.0));
+        let second = below.max_by(|a, b| (a.speed[1] - a.speed[0]).total_cmp(&(b.speed[1] - b.speed[0])));
+        Ok(match second {
+            Some(zone) => {
+                let [a, b] = zone.speed.map(|w| digits(w, 1e-6));
+                let ours = format!("Ω = {a} to {b}, max r = {:.4} to {:.4}", zone.radius[0], zone.radius[1]);
+                Finding::qualified(true, ours).within(1e-6)
+            }
+            None => Finding::fact(false, format!("{} stable zones, none below the main one", zones.len())),
+        })
+    };
+    Claim::decided("13", "DL has a second stable zone below the main one", "yes", finding())
+}
+
+/// A stable stretch of a branch.
+struct Zone {
+    /// Smallest and largest Ω.
+    speed: [f64; 2],
+    /// Smallest and largest max r.
+    radius: [f64; 2],
+}
+
+/// The stable stretches of a branch, from one change of stability to the next.
+fn stable_zones(branch: &Branch) -> Vec<Zone> {
+    let mut marks: Vec<(i64, bool, f64, f64, bool)> = Vec::new();
+    for p in &branch.points {
+        marks.push((p.position, false, p.parameters[OMEGA], max_r(p), p.unstable == 0));
+    }
+    for s in &branch.special {
+        marks.push((s.point.position, true, s.point.parameters[OMEGA], max_r(&s.point), s.unstable_after == 0));
+    }
+    // A special point lies behind the point of its position.
+    marks.sort_by_key(|m| (m.0, m.1));
+    let mut zones: Vec<Zone> = Vec::new();
+    let mut open = false;
+    for (_, _, w, r, stable) in marks {
+        match (open, stable, zones.last_mut()) {
+            (true, _, Some(zone)) => {
+                zone.speed = [zone.speed[0].min(w), zone.speed[1].max(w)];
+                zone.radius = [zone.radius[0].min(r), zone.radius[1].max(r)];
+            }
+            (_, true, _) => zones.push(Zone { speed: [w, w], radius: [r, r] }),
+            _ => {}
+        }
+        open = stable;
+    }
+    zones
+}

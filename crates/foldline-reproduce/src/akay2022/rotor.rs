@@ -1,0 +1,83 @@
+//! The rotor of the study: which parameter is which, its families, their colours, and what is measured on a point.
+
+use crate::runs::Run;
+use foldline::diagram::{Branch, Ending, Point, SpecialPoint};
+use foldline_plot::palette::{BLUE, GREEN, VERMILION};
+use foldline_plot::{Layer, Quantity, branch_layers};
+
+/// Index of the shaft speed.
+pub const OMEGA: usize = 0;
+/// max r: the output r comes after the four states.
+pub const MAX_R: Quantity = Quantity::Largest(4);
+/// Ω.
+pub const SPEED: Quantity = Quantity::Parameter(OMEGA);
+
+/// The three families, with their colours: S, SL, DL.
+pub const FAMILIES: [(&str, &str); 3] = [("S", BLUE), ("SL", VERMILION), ("DL", GREEN)];
+
+/// The colour of the family of a branch, by the last word of its name before any switching.
+pub fn colour(branch: &str) -> &'static str {
+    let root = branch.split('/').next().unwrap_or(branch);
+    let has = |word: &str| root.split(' ').any(|part| part == word);
+    FAMILIES.iter().rev().find(|(name, _)| has(name)).map_or(BLUE, |(_, colour)| colour)
+}
+
+/// A branch over the shaft speed under the name of its family.
+pub fn over_speed(branch: &Branch, name: &str, y: Quantity) -> Vec<Layer> {
+    let mut layers = branch_layers(branch, SPEED, y, colour(&branch.name));
+    if let Some(curve) = layers.first_mut() {
+        curve.name = Some(name.to_string());
+    }
+    layers
+}
+
+/// Largest radius.
+pub fn max_r(point: &Point) -> f64 {
+    point.ranges.get(4).map_or(f64::NAN, |r| r[1])
+}
+
+/// Smallest radius.
+pub fn min_r(point: &Point) -> f64 {
+    point.ranges.get(4).map_or(f64::NAN, |r| r[0])
+}
+
+/// A parameter by its place in the model file: Ω, κ, ζ, ε, γ, β, K, J_p, m.
+pub fn parameters(point: &Point) -> [f64; 9] {
+    std::array::from_fn(|k| point.parameters.get(k).copied().unwrap_or(f64::NAN))
+}
+
+/// The solution of largest radius.
+pub fn highest(points: Vec<Point>) -> Option<Point> {
+    points.into_iter().max_by(|a, b| max_r(a).total_cmp(&max_r(b)))
+}
+
+/// The stable solution of a branch at a shaft speed; of several the one of largest radius.
+///
+/// # Errors
+/// There is no such branch, or nothing stable on it there.
+pub fn stable_at(run: &Run, branch: &str, omega: f64) -> Result<Point, String> {
+    let stable = run.at(branch, omega)?.into_iter().filter(|p| p.unstable == 0).collect();
+    highest(stable).ok_or_else(|| format!("{branch} is not stable at Ω = {omega}"))
+}
+
+/// Values of Ω, each with the error of the special point there.
+pub fn speeds(special: &[&SpecialPoint]) -> Vec<[f64; 2]> {
+    special.iter().map(|s| [s.point.parameters[OMEGA], s.error * (1.0 + s.point.parameters[OMEGA].abs())]).collect()
+}
+
+/// The special point that lies at the largest Ω.
+pub fn last<'s>(special: &[&'s SpecialPoint]) -> Option<&'s SpecialPoint> {
+    special.iter().copied().max_by(|a, b| a.point.parameters[OMEGA].total_cmp(&b.point.parameters[OMEGA]))
+}
+
+/// The smallest of a measure on the points and special points of a branch, and the Ω there.
+pub fn smallest(branch: &Branch, measure: impl Fn(&Point) -> f64) -> [f64; 2] {
+    let points = branch.points.iter().chain(branch.special.iter().map(|s| &s.point));
+    let values = points.map(|p| [measure(p), p.parameters[OMEGA]]);
+    values.min_by(|a, b| a[0].total_cmp(&b[0])).unwrap_or([f64::NAN; 2])
+}
+
+/// Whether a branch closes on itself.
+pub fn is_closed(branch: &Branch) -> bool {
+    branch.ends.contains(&Some(Ending::Closed))
+}

@@ -1,0 +1,127 @@
+//! Published studies computed again, figure by figure and claim by claim.
+//!
+//! **Idea.** A [`Publication`] lists figures; each says which studies it needs and how it is made from their runs, and decides
+//! claims. [`reproduce`] runs what is needed, reusing what is there ([`runs`]), draws, compares ([`claims`]) and writes a report
+//! ([`report`]). Numbers of the publication appear only where a claim is compared with them: nothing computed depends on them.
+//!
+//! | question | file |
+//! |---|---|
+//! | what belongs to a publication? | [`publication`] |
+//! | how does a study become a run, once for all figures? | [`runs`] |
+//! | does the publication say the same? | [`claims`] |
+//! | what is written in the end? | [`report`] |
+//! | how is figure N made? | `akay2022/figureNN.rs` |
+
+pub mod akay2022;
+pub mod claims;
+pub mod publication;
+pub mod report;
+pub mod runs;
+
+pub use claims::{Claim, Finding, Verdict};
+pub use publication::{FigurePlan, Made, Publication, StudyPlan};
+pub use runs::{Run, Runs};
+
+use foldline_plot::{figure_svg, png};
+use std::io;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+/// Every publication that can be reproduced.
+pub const PUBLICATIONS: &[Publication] = &[akay2022::PUBLICATION];
+
+/// What is asked for.
+pub struct Request<'r> {
+    /// Which publication.
+    pub publication: &'static Publication,
+    /// Which of its figures.
+    pub figures: Vec<&'static FigurePlan>,
+    /// Folder for runs, figures and report.
+    pub out: PathBuf,
+    /// How many branches are followed at a time.
+    pub jobs: usize,
+    /// Set from outside to end early; what is computed until then is kept.
+    pub stop: &'r AtomicBool,
+    /// Receives progress, a line at a time.
+    pub say: &'r (dyn Fn(&str) + Sync),
+}
+
+/// What came of it.
+pub struct Reproduced {
+    /// The report.
+    pub report: PathBuf,
+    /// Every claim that was decided, or could not be.
+    pub claims: Vec<Claim>,
+    /// What failed, a line each.
+    pub failures: Vec<String>,
+    /// Whether it was ended from outside.
+    pub stopped: bool,
+}
+
+impl Reproduced {
+    /// How many claims have which verdict, in a line.
+    pub fn summary(&self) -> String {
+        let count = |verdict: Verdict| self.claims.iter().filter(|c| c.verdict == verdict).count();
+        let counts = Verdict::ALL.map(|v| format!("{} {}", count(v), v.name()));
+        format!("{} claims: {}", self.claims.len(), counts.join(", "))
+    }
+}
+
+/// A figure of the report.
+pub struct Drawn {
+    /// Which.
+    pub plan: &'static FigurePlan,
+    /// The figure as SVG, the text below it, and its claims; or why there is none.
+    pub made: Result<(String, Made), String>,
+}
+
+/// Computes figures and claims, and writes `figure-NN.svg`, `figure-NN.png` and `report.html`. A figure that fails does not
+/// keep the others from being made.
+///
+/// # Errors
+/// The folder cannot be written to.
+pub fn reproduce(request: &Request) -> io::Result<Reproduced> {
+    let start = Instant::now();
+    std::fs::create_dir_all(&request.out)?;
+    let mut runs = Runs::new(request);
+    let mut figures = Vec::new();
+    for plan in &request.figures {
+        for run in plan.runs {
+            runs.compute(run);
+        }
+        if request.stop.load(Ordering::Relaxed) {
+            break;
+        }
+        let made = (plan.make)(&runs).map(|made| (figure_svg(&made.figure), made));
+        let made = match made {
+            Ok((svg, made)) => write_pictures(request, plan, &svg)?.map(|()| (svg, made)),
+            Err(why) => Err(why),
+        };
+        match &made {
+            Ok(_) => (request.say)(&format!("figure {} is drawn", plan.name)),
+            Err(why) => (request.say)(&format!("figure {}: {why}", plan.name)),
+        }
+        figures.push(Drawn { plan, made });
+    }
+    let mut failures: Vec<String> = runs.failures();
+    failures.extend(figures.iter().filter_map(|f| Some(format!("figure {}: {}", f.plan.name, f.made.as_ref().err()?))));
+    let stopped = request.stop.load(Ordering::Relaxed);
+    let seconds = start.elapsed().as_secs_f64();
+    let page = report::html(request.publication, &figures, &runs, &failures, seconds);
+    let report = request.out.join("report.html");
+    std::fs::write(&report, page)?;
+    let claims = figures.into_iter().filter_map(|f| f.made.ok()).flat_map(|(_, made)| made.claims).collect();
+    Ok(Reproduced { report, claims, failures, stopped })
+}
+
+/// Writes the SVG and the PNG; the inner error says why the PNG could not be made.
+fn write_pictures(request: &Request, plan: &FigurePlan, svg: &str) -> io::Result<Result<(), String>> {
+    const SCALE: f32 = 2.0;
+    let file = |ending: &str| request.out.join(format!("{}.{ending}", plan.file_stem()));
+    std::fs::write(file("svg"), svg)?;
+    match png(svg, SCALE) {
+        Ok(bytes) => std::fs::write(file("png"), bytes).map(Ok),
+        Err(error) => Ok(Err(error.to_string())),
+    }
+}

@@ -1,0 +1,78 @@
+//! What belongs to a publication: studies, and figures made from their runs.
+
+use crate::claims::Claim;
+use crate::runs::Runs;
+use foldline_plot::Figure;
+
+/// A publication.
+pub struct Publication {
+    /// Its key in docs/references.bib, or the name by which it is asked for.
+    pub name: &'static str,
+    /// Authors and title.
+    pub title: &'static str,
+    /// Every study that a figure may need.
+    pub studies: &'static [StudyPlan],
+    /// Its figures, in their order.
+    pub figures: &'static [FigurePlan],
+}
+
+impl Publication {
+    /// The figure of that name; leading zeros do not count.
+    pub fn figure(&self, name: &str) -> Option<&'static FigurePlan> {
+        let plain = name.trim_start_matches('0');
+        self.figures.iter().find(|figure| figure.name == plain)
+    }
+
+    /// The study of that name.
+    pub fn study(&self, name: &str) -> Option<&'static StudyPlan> {
+        self.studies.iter().find(|study| study.name == name)
+    }
+}
+
+/// A study that is built in.
+pub struct StudyPlan {
+    /// Name of its folder among the runs.
+    pub name: &'static str,
+    /// Name of its file.
+    pub file: &'static str,
+    /// Its text.
+    pub text: &'static str,
+    /// Name of the file of its model.
+    pub model_file: &'static str,
+    /// The text of its model.
+    pub model: &'static str,
+    /// Nominal computing time in seconds, for the estimate of what remains; the measured speed scales it.
+    pub weight: f64,
+}
+
+/// A figure.
+pub struct FigurePlan {
+    /// `7`
+    pub name: &'static str,
+    /// What it shows.
+    pub title: &'static str,
+    /// Names of the studies it needs.
+    pub runs: &'static [&'static str],
+    /// Makes it; the error says why it cannot be made.
+    pub make: fn(&Runs) -> Result<Made, String>,
+}
+
+impl FigurePlan {
+    /// `figure-07`, or the name of a figure without a number.
+    pub fn file_stem(&self) -> String {
+        match self.name.parse::<u32>() {
+            Ok(number) => format!("figure-{number:02}"),
+            Err(_) => format!("figure-{}", self.name),
+        }
+    }
+}
+
+/// A figure that was made.
+pub struct Made {
+    /// The picture as plain data.
+    pub figure: Figure,
+    /// What is to be seen, in a few sentences.
+    pub caption: String,
+    /// The claims that its numbers decide.
+    pub claims: Vec<Claim>,
+}

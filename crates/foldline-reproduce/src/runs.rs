@@ -1,0 +1,239 @@
+//! Studies become runs: each once, recorded, reused by every figure and by later calls.
+//!
+//! **Idea.** The run of a study lies in `OUT/runs/NAME`, as `foldline run` records it. Beside it `finished` says which program
+//! version computed it and how long that took. A run of the same study text, model text and version that is finished is read
+//! back; one that is not is resumed; any other is thrown away and computed again.
+
+use crate::Request;
+use crate::publication::{Publication, StudyPlan};
+use foldline::contract::{Event, Observer, Verdict};
+use foldline::diagram::{Branch, Diagram, Kind, Point, SpecialPoint};
+use foldline::explore::{self, System, growth, known};
+use foldline_store::order::{names, ordered};
+use foldline_store::run_file::{Recorder, RunFileError, load};
+use foldline_store::short;
+use foldline_store::study_file::{Study, parse_study};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
+
+/// The version of this program.
+pub const VERSION: &str = env!("CARGO_PKG_VERSION");
+
+/// A study that was run.
+pub struct Run {
+    /// The study with its model and plan.
+    pub study: Study,
+    /// Everything found.
+    pub diagram: Diagram,
+    /// Computing time in seconds, in this call or an earlier one.
+    pub seconds: f64,
+    /// Whether it was there already.
+    pub reused: bool,
+    /// What of the study was not reached, a line each.
+    pub short: Vec<String>,
+}
+
+impl Run {
+    /// The branch of that name.
+    ///
+    /// # Errors
+    /// It is not there, or has no points; the sentence says why.
+    pub fn branch(&self, name: &str) -> Result<&Branch, String> {
+        let branch =
+            self.diagram.branch(name).ok_or_else(|| format!("{}: there is no branch {name}", self.study.file))?;
+        if branch.points.is_empty() {
+            let why = branch.ends.iter().flatten().next().map_or("no reason is known".into(), ToString::to_string);
+            return Err(format!("{}: the branch {name} has no points: {why}", self.study.file));
+        }
+        Ok(branch)
+    }
+
+    /// Index of a parameter; the first one if the model has none of that name.
+    pub fn parameter(&self, name: &str) -> usize {
+        self.study.model.parameter_index(name).unwrap_or(0)
+    }
+
+    /// Every solution of a branch at a value of its parameter, corrected there, by increasing position.
+    ///
+    /// # Errors
+    /// There is no such branch, or it has no solution there.
+    pub fn at(&self, name: &str, value: f64) -> Result<Vec<Point>, String> {
+        let branch = self.branch(name)?;
+        let system = System::of_plan(&self.study.model, &self.study.plan);
+        let everywhere = [f64::NEG_INFINITY, f64::INFINITY];
+        let settings = growth::settings(&system, self.study.plan.tolerance, everywhere, 0);
+        let found = known::solutions_at(&system, &settings, branch, value);
+        if found.is_empty() { Err(format!("the branch {name} has no solution at {value}")) } else { Ok(found) }
+    }
+
+    /// The special points of that kind on a branch.
+    ///
+    /// # Errors
+    /// There is no such branch.
+    pub fn special(&self, name: &str, kind: Kind) -> Result<Vec<&SpecialPoint>, String> {
+        Ok(self.branch(name)?.special.iter().filter(|s| s.kind == kind).collect())
+    }
+}
+
+/// The runs of a publication, computed when they are first asked for.
+pub struct Runs<'r> {
+    publication: &'static Publication,
+    folder: PathBuf,
+    jobs: usize,
+    stop: &'r AtomicBool,
+    say: &'r (dyn Fn(&str) + Sync),
+    /// Weights of what is still to be run.
+    ahead: BTreeMap<&'static str, f64>,
+    /// Nominal and measured seconds of what was computed.
+    pace: [f64; 2],
+    done: BTreeMap<&'static str, Result<Run, String>>,
+}
+
+impl<'r> Runs<'r> {
+    /// For what is asked, nothing computed yet.
+    pub fn new(request: &Request<'r>) -> Runs<'r> {
+        let publication = request.publication;
+        let needed = |study: &&StudyPlan| request.figures.iter().any(|figure| figure.runs.contains(&study.name));
+        let ahead = publication.studies.iter().filter(needed).map(|study| (study.name, study.weight)).collect();
+        Runs {
+            publication,
+            folder: request.out.join("runs"),
+            jobs: request.jobs,
+            stop: request.stop,
+            say: request.say,
+            ahead,
+            pace: [0.0; 2],
+            done: BTreeMap::new(),
+        }
+    }
+
+    /// The run of that name.
+    ///
+    /// # Errors
+    /// It failed; the sentence says why.
+    pub fn run(&self, name: &str) -> Result<&Run, String> {
+        match self.done.get(name) {
+            Some(Ok(run)) => Ok(run),
+            Some(Err(why)) => Err(format!("the run {name} failed: {why}")),
+            None => Err(format!("the run {name} was not asked for")),
+        }
+    }
+
+    /// All runs by name, failed ones with the reason.
+    pub fn all(&self) -> impl Iterator<Item = (&'static str, &Result<Run, String>)> {
+        self.done.iter().map(|(name, run)| (*name, run))
+    }
+
+    /// What failed, or ended short, a line each.
+    pub fn failures(&self) -> Vec<String> {
+        let lines = |(name, run): (&str, &Result<Run, String>)| match run {
+            Ok(run) => run.short.iter().map(|line| format!("run {name}: {line}")).collect(),
+            Err(why) => vec![format!("run {name}: {why}")],
+        };
+        self.all().flat_map(lines).collect()
+    }
+
+    /// Makes sure that a run is there, or known to have failed.
+    pub fn compute(&mut self, name: &'static str) {
+        if self.done.contains_key(name) || self.stop.load(Ordering::Relaxed) {
+            return;
+        }
+        let Some(plan) = self.publication.study(name) else {
+            self.done.insert(name, Err("there is no such study".into()));
+            return;
+        };
+        (self.say)(&format!("run {name}{}", self.estimate()));
+        let run = self.carried_out(plan);
+        self.ahead.remove(name);
+        if let Ok(run) = &run
+            && !run.reused
+        {
+            self.pace = [self.pace[0] + plan.weight, self.pace[1] + run.seconds];
+        }
+        self.done.insert(name, run);
+    }
+
+    /// How long what is ahead will take, at the pace of what was computed.
+    fn estimate(&self) -> String {
+        let speed = if self.pace[0] > 0.0 { self.pace[1] / self.pace[0] } else { 1.0 };
+        let seconds = speed * self.ahead.values().sum::<f64>();
+        let time = match seconds {
+            s if s < 1.5 => "a second".to_string(),
+            s if s < 90.0 => format!("{s:.0} s"),
+            s => format!("{:.0} min", s / 60.0),
+        };
+        format!(" (runs to go: {}, about {time})", self.ahead.len())
+    }
+
+    fn carried_out(&self, plan: &StudyPlan) -> Result<Run, String> {
+        let parsed = parse_study(plan.text, plan.file, plan.model, plan.model_file);
+        let study = parsed.map_err(|found| found.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))?;
+        let folder = self.folder.join(plan.name);
+        if let Some((diagram, seconds)) = finished(&folder, &study) {
+            return Ok(whole(study, diagram, seconds, true));
+        }
+        let start = Instant::now();
+        let (recorder, earlier) = opened(&folder, &study).map_err(|error| error.to_string())?;
+        let watch = Watch { recorder, stop: self.stop };
+        let system = System::of_plan(&study.model, &study.plan);
+        let diagram = explore::run(&system, &study.plan, self.jobs, earlier, &watch);
+        watch.recorder.finish().map_err(|error| error.to_string())?;
+        let seconds = start.elapsed().as_secs_f64();
+        if self.stop.load(Ordering::Relaxed) {
+            return Err("it was stopped; the same command goes on".into());
+        }
+        let mark = format!("{VERSION}\n{seconds}\n");
+        std::fs::write(folder.join(FINISHED), mark).map_err(|error| format!("{}: {error}", folder.display()))?;
+        Ok(whole(study, diagram, seconds, false))
+    }
+}
+
+const FINISHED: &str = "finished";
+
+fn whole(study: Study, diagram: Diagram, seconds: f64, reused: bool) -> Run {
+    let short = short::lines(&diagram, &study.plan, &study.model);
+    let diagram = ordered(diagram, &names(&study.plan));
+    Run { study, diagram, seconds, reused, short }
+}
+
+/// A finished run of the same texts by the same version, and how long it took.
+fn finished(folder: &Path, study: &Study) -> Option<(Diagram, f64)> {
+    let mark = std::fs::read_to_string(folder.join(FINISHED)).ok()?;
+    let (version, seconds) = mark.split_once('\n')?;
+    let recorded = load(folder).ok()?;
+    let same = version == VERSION && recorded.study_text == study.text && recorded.model_text == study.model_text;
+    same.then_some((recorded.diagram, seconds.trim().parse().ok()?))
+}
+
+/// A recorder over an unfinished run of the same texts, or over a new one.
+fn opened(folder: &Path, study: &Study) -> Result<(Recorder, Diagram), RunFileError> {
+    let marked = folder.join(FINISHED);
+    if !marked.exists() {
+        match Recorder::resume(folder, study) {
+            Ok(opened) => return Ok(opened),
+            // Another study, another model, or nothing at all: a new run.
+            Err(RunFileError::Missing(_) | RunFileError::Changed(..) | RunFileError::Damaged(..)) => {}
+            Err(error) => return Err(error),
+        }
+    }
+    Recorder::discard(folder)?;
+    match std::fs::remove_file(&marked) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(RunFileError::Folder(marked, error)),
+        _ => Ok((Recorder::create(folder, study)?, Diagram::default())),
+    }
+}
+
+/// Records, and stops when asked to.
+struct Watch<'w> {
+    recorder: Recorder,
+    stop: &'w AtomicBool,
+}
+
+impl Observer for Watch<'_> {
+    fn observe(&self, event: Event) -> Verdict {
+        let verdict = self.recorder.observe(event);
+        if self.stop.load(Ordering::Relaxed) { Verdict::Stop } else { verdict }
+    }
+}
