@@ -180,7 +180,7 @@ fn pictures_show_the_branches_or_the_curves_in_their_plane() {
     let (across, up) = (svg.find(">Ω<").unwrap(), svg.find(">κ<").unwrap());
     assert!(across < up && !svg.contains("max r"), "{svg}");
     let (names, _) = drawn(folder.path(), &["--x", "Omega", "--y", "kappa"]);
-    assert_eq!(names.len(), 4);
+    assert_eq!(names, ["main", "folds", "way/1", "way/2"]);
     let (names, svg) = drawn(folder.path(), &["--curves", "--y", "r"]);
     assert_eq!(names, ["folds"]);
     assert!(svg.contains("max r"));
