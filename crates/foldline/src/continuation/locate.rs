@@ -248,23 +248,42 @@ fn relocate(
     };
     // Far enough below the tolerance that the error of the iteration does not show.
     let enough = 1e-3 * settings.tolerance;
+    let reach = stretch.length.abs();
     let (mut a, (mut ga, mut found)) = (0.0, at(0.0)?);
     let mut step = match *slope {
-        Some(slope) if (ga / slope).abs() < stretch.length.abs() => -ga / slope,
-        _ => 1e-2 * stretch.length.abs(),
+        Some(slope) if (ga / slope).abs() < reach => -ga / slope,
+        _ => 1e-2 * reach,
     };
-    for _ in 0..8 {
-        if step.abs() < enough || !step.is_finite() || (a + step).abs() > stretch.length.abs() {
-            break;
+    // The closest known place with the other sign: a monitor that bends sharply throws secant steps off, and past such a
+    // place they are replaced by halves.
+    let mut other: Option<f64> = None;
+    for round in 0..40 {
+        if step.abs() < enough || !step.is_finite() {
+            return Ok(found);
         }
-        let b = a + step;
+        let mut b = a + step;
+        match other {
+            Some(o) if (b - a) * (b - o) >= 0.0 => b = 0.5 * (a + o),
+            None if b.abs() > reach || round > 7 => {
+                // Nothing found yet: outwards on both sides in turn, farther every time.
+                let sign = if round % 2 == 0 { 1.0 } else { -1.0 };
+                b = sign * 1e-3 * reach * f64::from(1 << (round / 2).min(9));
+            }
+            _ => {}
+        }
         let (gb, next) = at(b)?;
         let rise = (gb - ga) / (b - a);
-        *slope = Some(rise);
         step = -gb / rise;
+        *slope = Some(rise);
+        if (gb > 0.0) != (ga > 0.0) {
+            other = Some(a);
+        }
         (a, ga, found) = (b, gb, next);
+        if other.is_some_and(|o| (o - a).abs() < enough) {
+            return Ok(found);
+        }
     }
-    Ok(found)
+    Err(Failure::NoConvergence(vec![step.abs()]))
 }
 
 /// Bracketing root finder; returns the place and what was found there.
