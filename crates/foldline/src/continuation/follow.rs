@@ -113,6 +113,7 @@ pub fn follow(
                 }
                 Err(why) => {
                     cost.rejected += 1;
+                    remeshed = 0;
                     step *= if why == Failure::Unexplained { 0.25 } else { 0.5 };
                     if step < walk.settings.min_step {
                         return ended_by(why, left.parameter());
