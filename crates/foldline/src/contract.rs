@@ -55,6 +55,20 @@ pub trait VectorField: Send + Sync {
 
     /// The outputs: writes `[output_count × lanes]`.
     fn outputs(&self, _at: Batch, _out: &mut [f64]) {}
+
+    /// How many switches the field has: scalars at whose zeros f or one of its derivatives jumps. 0 where it is smooth.
+    fn switch_count(&self) -> usize {
+        0
+    }
+
+    /// The switches: writes `[switch_count × lanes]`.
+    fn switches(&self, _at: Batch, _out: &mut [f64]) {}
+
+    /// f as it is where the switches have the given signs (±1, `[switch_count × lanes]`), continued smoothly beyond their
+    /// zeros: writes `[n × lanes]`.
+    fn evaluate_switched(&self, at: Batch, _signs: &[f64], f: &mut [f64]) {
+        self.evaluate(at, f);
+    }
 }
 
 /// The matrix of a Newton step could not be factorised.
