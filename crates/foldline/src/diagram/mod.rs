@@ -1,8 +1,10 @@
 //! What comes out: points, special points, branches, diagrams. Plain data.
 
 mod cycle;
+mod response;
 
 pub use cycle::Cycle;
+pub use response::{Motion, Response, Responses, Search};
 
 use num_complex::Complex64;
 use std::fmt;
@@ -356,6 +358,8 @@ impl Branch {
 pub struct Diagram {
     /// The branches.
     pub branches: Vec<Branch>,
+    /// What surveys and sweeps saw.
+    pub responses: Vec<Responses>,
 }
 
 impl Diagram {

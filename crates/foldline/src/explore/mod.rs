@@ -52,5 +52,6 @@ pub fn run(system: &System, plan: &Plan, jobs: usize, earlier: Diagram, observer
             });
         }
     });
-    Diagram { branches: done.into_iter().flat_map(|slot| slot.into_inner().unwrap_or_default()).collect() }
+    let branches = done.into_iter().flat_map(|slot| slot.into_inner().unwrap_or_default()).collect();
+    Diagram { branches, ..Diagram::default() }
 }

@@ -1,0 +1,373 @@
+//! From a start to a settled motion, by simulation alone.
+//!
+//! **Idea.** A trajectory runs in rounds. In each it is watched until it is seen to contract: its returns to a plane, or its
+//! speed, come down steadily. Their limit is then predicted, and the next round starts close to it: at a small part of the
+//! distance, in the direction from which the trajectory came, so that what does not attract shows in that round. The
+//! trajectory has settled when it repeats itself; no equation is solved for the motion.
+//!
+//! **Equations.** With the limit y* of the returns y_j, (2) of `returns`, and d its doubt relative to the last difference:
+//!
+//!   (1)  next start = y* + s (y_j - y*),   s = clamp(5 d, 1/1000, 1/10)
+//!
+//! An equilibrium is the limit of states at equal distances of time, in the same way.
+//!
+//! **Source.** sidi2017, §1 (reduced rank extrapolation).
+//!
+//! **Fails when** a motion is neither at rest nor periodic, or contracts by less than a thirtieth over some thousand periods.
+
+use super::returns::{Prediction, Returns, limit_of};
+use crate::contract::{Batch, Parameters, VectorField, Verdict};
+use crate::diagram::Motion;
+use crate::simulation::{Ensemble, Outcome, Step, Tolerance};
+
+/// Accuracy of the integration, relative, in the first round and in those after it.
+const INTEGRATION: [f64; 2] = [1e-6, 1e-9];
+/// Steps per window.
+const WINDOW: usize = 128;
+/// Last difference of returns, relative to the extent, at which a cycle has settled.
+const SETTLED: f64 = 1e-7;
+/// Extent of a window, relative to scale and size, at which a trajectory rests.
+const RESTS: f64 = 1e-6;
+/// Extent of a window, relative to scale and size, below which a motion that shrinks may be close to rest.
+const SMALL: f64 = 0.1;
+/// Extent, relative to the scale, below which a motion is no cycle.
+const MOVES: f64 = 1e-4;
+/// Windows over which the extent of a motion is taken.
+const WINDOWS: usize = 4;
+/// Steps for which the first plane is watched; each later one of a round is watched twice as long.
+const PLANE: usize = 2048;
+/// Steps after which the first round ends in any case.
+const ROUGH: usize = 6144;
+/// Predicted limits that are tried; after those the trajectory is left to itself.
+const JUMPS: usize = 8;
+/// Steps of all rounds after which a motion counts as neither at rest nor periodic.
+const STEPS: usize = 200_000;
+/// Predictions from which contraction can be told.
+const SEEN: usize = 12;
+/// Contraction over the predictions of a round: for few of them, and for many.
+const CONTRACTED: [f64; 2] = [0.9, 0.97];
+
+/// A vector field, and what its motions are measured by.
+#[derive(Clone, Copy)]
+pub struct Trial<'a> {
+    /// The vector field.
+    pub field: &'a dyn VectorField,
+    /// `[n]` characteristic size of each state.
+    pub scales: &'a [f64],
+    /// The two states that make up the whirl plane, by which cycles are named.
+    pub whirl: Option<[usize; 2]>,
+    /// Threads; no result depends on it.
+    pub jobs: usize,
+}
+
+/// Where a trajectory got to.
+#[derive(Clone, Debug)]
+pub(super) struct Settled {
+    pub(super) motion: Motion,
+    pub(super) state: Vec<f64>,
+    /// 0 unless it is a cycle.
+    pub(super) period: f64,
+    /// `[n]` extent of the motion, with a floor.
+    pub(super) extent: Vec<f64>,
+    pub(super) time: f64,
+    pub(super) error: f64,
+}
+
+/// Follows trajectories together, each at parameters of its own: `parameters` `[count][k]`, `starts` `[count][n]`.
+pub(super) fn settle_together(trial: &Trial, parameters: &[f64], starts: &[f64]) -> Vec<Settled> {
+    let (n, k) = (trial.field.dim(), trial.field.parameter_count());
+    let mut runners: Vec<Runner> = starts.chunks_exact(n).map(|start| Runner::new(trial, start)).collect();
+    for round in 0..JUMPS + 2 {
+        let open: Vec<usize> = (0..runners.len()).filter(|&r| runners[r].found.is_none()).collect();
+        if open.is_empty() {
+            break;
+        }
+        let from: Vec<f64> = open.iter().flat_map(|&r| runners[r].start.clone()).collect();
+        let own: Vec<f64> = open.iter().flat_map(|&r| parameters[r * k..(r + 1) * k].to_vec()).collect();
+        let relative = INTEGRATION[round.min(1)];
+        let tolerance = Tolerance { relative, absolute: trial.scales.iter().map(|s| relative * s).collect() };
+        let left = |r: usize| STEPS.saturating_sub(runners[r].steps);
+        let limit = open.iter().map(|&r| left(r)).max().unwrap_or(0).max(1);
+        open.iter().for_each(|&r| runners[r].begin(parameters[r * k..(r + 1) * k].to_vec()));
+        let ensemble = match k {
+            0 => Ensemble::new(trial.field, &[], tolerance, &from, [0.0, f64::INFINITY]),
+            _ => Ensemble::with_own_parameters(trial.field, &own, tolerance, &from, [0.0, f64::INFINITY]),
+        };
+        let arrivals =
+            ensemble.with_step_limit(limit).run(&mut |step| runners[open[step.trajectory()]].observe(step, trial));
+        for (r, arrival) in open.into_iter().zip(arrivals) {
+            runners[r].end(arrival.time, arrival.state, arrival.outcome);
+        }
+    }
+    let unsettled = |runner: Runner| Settled {
+        motion: Motion::Other,
+        state: runner.start,
+        period: 0.0,
+        extent: runner.extent,
+        time: runner.time,
+        error: f64::NAN,
+    };
+    runners.into_iter().map(|mut runner| runner.found.take().unwrap_or_else(|| unsettled(runner))).collect()
+}
+
+/// One trajectory.
+struct Runner {
+    start: Vec<f64>,
+    parameters: Vec<f64>,
+    found: Option<Settled>,
+    /// Of all rounds.
+    steps: usize,
+    time: f64,
+    extent: Vec<f64>,
+    /// Whether that extent is more than what is left of a motion that comes to rest.
+    moves: bool,
+    /// How often a round began at a predicted limit.
+    jumps: usize,
+    /// Of this round.
+    round_steps: usize,
+    /// When, in steps of this round, another plane is tried, and how long that lives.
+    plane_ends: usize,
+    plane_life: usize,
+    window: Window,
+    /// Smallest and largest state of each of the last windows.
+    boxes: Vec<[Vec<f64>; 2]>,
+    returns: Option<Returns>,
+    /// The prediction of every return, as its period and last difference.
+    seen: Vec<(f64, f64)>,
+    /// Mean speed of every window.
+    speeds: Vec<f64>,
+    next: Option<Vec<f64>>,
+    x: Vec<f64>,
+}
+
+impl Runner {
+    fn new(trial: &Trial, start: &[f64]) -> Runner {
+        let n = start.len();
+        Runner {
+            start: start.to_vec(),
+            parameters: Vec::new(),
+            found: None,
+            steps: 0,
+            time: 0.0,
+            extent: trial.scales.to_vec(),
+            moves: true,
+            jumps: 0,
+            round_steps: 0,
+            plane_ends: 0,
+            plane_life: PLANE,
+            window: Window::new(n),
+            boxes: Vec::new(),
+            returns: None,
+            seen: Vec::new(),
+            speeds: Vec::new(),
+            next: None,
+            x: vec![0.0; n],
+        }
+    }
+
+    fn begin(&mut self, parameters: Vec<f64>) {
+        self.parameters = parameters;
+        (self.round_steps, self.window) = (0, Window::new(self.start.len()));
+        self.seen.clear();
+        self.boxes.clear();
+        self.speeds.clear();
+        self.next = None;
+        // The plane of the round before goes through the new start.
+        self.returns = self.returns.take().map(|returns| returns.again_from(&self.start));
+        (self.plane_life, self.plane_ends) = (PLANE, if self.returns.is_some() { PLANE } else { 0 });
+    }
+
+    fn observe(&mut self, step: &Step, trial: &Trial) -> Verdict {
+        let mut x = std::mem::take(&mut self.x);
+        step.end_into(&mut x);
+        self.steps += 1;
+        self.round_steps += 1;
+        self.window.add(&x, step);
+        if self.returns.as_mut().is_some_and(|returns| returns.follow(step, &x)) {
+            self.at_return(step);
+        }
+        if self.round_steps.is_multiple_of(WINDOW) && self.found.is_none() && self.next.is_none() {
+            self.close_window(step, &x, trial);
+        }
+        self.x = x;
+        // At its low accuracy the first round does not see small motions contract.
+        let rough = self.steps == self.round_steps && self.steps >= ROUGH;
+        let over = self.found.is_some() || self.next.is_some() || self.steps >= STEPS || rough;
+        if over { Verdict::Stop } else { Verdict::Continue }
+    }
+
+    /// What the returns so far say.
+    fn at_return(&mut self, step: &Step) {
+        let Some(returns) = &self.returns else { return };
+        // The longer a round lasts the less a single return says.
+        if returns.total() > 200 && !returns.total().is_multiple_of(returns.total() / 100) {
+            return;
+        }
+        let Some(prediction) = returns.closest(&self.extent) else { return };
+        let Prediction { state, period, size, doubt } = prediction;
+        // Another number of crossings per period begins anew.
+        if self.seen.last().is_some_and(|(known, _)| (period - known).abs() > 0.02 * known) {
+            self.seen.clear();
+        }
+        self.seen.push((period, size));
+        let Some((_, last)) = returns.last() else { return };
+        let latest = |count: usize| self.seen.iter().rev().take(count).fold(0.0, |m: f64, (_, size)| m.max(*size));
+        let few = self.seen.len() < SEEN;
+        // What no longer comes down, close to the accuracy of the integration, has settled too.
+        let settled = (self.seen.len() >= 4 && latest(4) <= SETTLED)
+            || (self.seen.len() >= 5 * SEEN && latest(2 * SEEN) <= 20.0 * SETTLED && !contracts(&self.seen));
+        if settled && self.moves {
+            self.found = Some(Settled {
+                motion: Motion::Cycle,
+                state: last.to_vec(),
+                period,
+                extent: self.extent.clone(),
+                time: self.time + step.end_time(),
+                error: latest(4),
+            });
+        } else if !few && self.moves && self.jumps < JUMPS && contracts(&self.seen) {
+            self.jumps += 1;
+            let share = (5.0 * doubt / size).clamp(1e-3, 0.1);
+            self.next = Some(state.iter().zip(last).map(|(limit, y)| limit + share * (y - limit)).collect());
+        }
+    }
+
+    /// What the last window says: whether the trajectory comes to rest, and how far its motion extends.
+    fn close_window(&mut self, step: &Step, x: &[f64], trial: &Trial) {
+        let window = std::mem::replace(&mut self.window, Window::new(x.len()));
+        let extent: Vec<f64> = (0..x.len()).map(|i| window.high[i] - window.low[i]).collect();
+        let size = (0..x.len()).fold(0.0, |m: f64, i| m.max(extent[i] / (trial.scales[i] + x[i].abs())));
+        if size <= RESTS {
+            let time = self.time + step.end_time();
+            let extent = trial.scales.to_vec();
+            // Half way between the extremes of what is left of the motion.
+            let state = (0..x.len()).map(|i| 0.5 * (window.high[i] + window.low[i])).collect();
+            self.found = Some(Settled { motion: Motion::Equilibrium, state, period: 0.0, extent, time, error: size });
+            return;
+        }
+        self.speeds.push(size);
+        self.try_rest(&window, x, trial);
+        self.renew_extent(&window, trial);
+        // The first windows of the first round are the transient; a plane through it may be no plane across the motion.
+        if self.round_steps >= self.plane_ends && self.steps >= 2 * WINDOW {
+            let velocity: Vec<f64> = (0..x.len()).map(|i| step.end_slope(i)).collect();
+            self.returns = Some(Returns::across(x.to_vec(), &velocity, &self.extent));
+            self.seen.clear();
+            self.plane_ends = self.round_steps + self.plane_life;
+            self.plane_life *= 2;
+        }
+    }
+
+    /// The extent over the last windows; a cycle may take longer than one.
+    fn renew_extent(&mut self, window: &Window, trial: &Trial) {
+        if self.boxes.len() == WINDOWS {
+            self.boxes.remove(0);
+        }
+        self.boxes.push([window.low.clone(), window.high.clone()]);
+        let span = |i: usize| {
+            let low = self.boxes.iter().map(|[low, _]| low[i]).fold(f64::MAX, f64::min);
+            self.boxes.iter().map(|[_, high]| high[i]).fold(f64::MIN, f64::max) - low
+        };
+        let extent: Vec<f64> = (0..window.low.len()).map(|i| span(i).max(1e-6 * trial.scales[i])).collect();
+        self.moves = extent.iter().zip(trial.scales).any(|(e, s)| *e > MOVES * s);
+        self.extent = extent;
+    }
+
+    /// The limit of the states of a window, where its motion is small, has been shrinking, and f is much smaller there.
+    fn try_rest(&mut self, window: &Window, x: &[f64], trial: &Trial) {
+        let [.., a, b, c] = self.speeds[..] else { return };
+        if !(b < a && c < b && c < SMALL) {
+            return;
+        }
+        let Some(limit) = window.limit(trial.scales) else { return };
+        let speed = |x: &[f64]| {
+            let mut f = vec![0.0; x.len()];
+            let at = Batch { lanes: 1, states: x, parameters: Parameters::Shared(&self.parameters) };
+            trial.field.evaluate(at, &mut f);
+            f.iter().zip(trial.scales).fold(0.0, |m: f64, (f, s)| m.max((f / s).abs()))
+        };
+        let doubt = speed(&limit) / window.speed(trial.scales);
+        if doubt < 0.1 && self.jumps < JUMPS {
+            self.jumps += 1;
+            let share = (5.0 * doubt).clamp(1e-3, 0.5);
+            self.next = Some(limit.iter().zip(x).map(|(limit, x)| limit + share * (x - limit)).collect());
+        }
+    }
+
+    /// The round is over.
+    fn end(&mut self, time: f64, state: Vec<f64>, outcome: Outcome) {
+        self.time += time;
+        let extent = self.extent.clone();
+        let gone = matches!(outcome, Outcome::Escaped | Outcome::StepTooSmall);
+        if self.found.is_none() && (gone || self.steps >= STEPS) {
+            let motion = if gone { Motion::Escaped } else { Motion::Other };
+            self.found =
+                Some(Settled { motion, state: state.clone(), period: 0.0, extent, time: self.time, error: f64::NAN });
+        }
+        self.start = self.next.take().unwrap_or(state);
+    }
+}
+
+/// Whether the differences of the returns come down: the largest of each third is smaller than that of the third before.
+fn contracts(seen: &[(f64, f64)]) -> bool {
+    let third = seen.len() / 3;
+    let largest = |part: &[(f64, f64)]| part.iter().fold(0.0, |m: f64, (_, size)| m.max(*size));
+    let [a, b, c] = [&seen[..third], &seen[third..2 * third], &seen[2 * third..]].map(largest);
+    let needed = if seen.len() < 100 { CONTRACTED[0] } else { CONTRACTED[1] };
+    b < a && c < b && c <= needed * a
+}
+
+/// Extent of the state over some steps, and some of the states at equal distances of time.
+struct Window {
+    low: Vec<f64>,
+    high: Vec<f64>,
+    /// Time, state and f at the end of every step.
+    steps: Vec<(f64, Vec<f64>, Vec<f64>)>,
+}
+
+impl Window {
+    fn new(n: usize) -> Window {
+        Window { low: vec![f64::MAX; n], high: vec![f64::MIN; n], steps: Vec::new() }
+    }
+
+    fn add(&mut self, x: &[f64], step: &Step) {
+        for i in 0..x.len() {
+            self.low[i] = self.low[i].min(x[i]);
+            self.high[i] = self.high[i].max(x[i]);
+        }
+        self.steps.push((step.end_time(), x.to_vec(), (0..x.len()).map(|i| step.end_slope(i)).collect()));
+    }
+
+    /// The limit of states at equal distances of time.
+    fn limit(&self, scales: &[f64]) -> Option<Vec<f64>> {
+        let n = scales.len();
+        let (start, end) = (self.steps.first()?.0, self.steps.last()?.0);
+        let terms = n.min(8);
+        // Over an odd part of the window, so that no motion has a period of this length.
+        let spacing = 0.619 * (end - start) / (terms + 1) as f64;
+        let states: Vec<Vec<f64>> = (0..terms + 2).map(|k| self.at(end - k as f64 * spacing)).collect();
+        let states: Vec<&[f64]> = states.iter().map(Vec::as_slice).collect();
+        limit_of(&states, scales)
+    }
+
+    /// The state at a time, by the cubic through two steps and their slopes.
+    fn at(&self, time: f64) -> Vec<f64> {
+        let k = self.steps.partition_point(|(t, ..)| *t < time).clamp(1, self.steps.len() - 1);
+        let ((t0, a, f), (t1, b, g)) = (&self.steps[k - 1], &self.steps[k]);
+        let (h, s) = (t1 - t0, (time - t0) / (t1 - t0));
+        let cubic = |i: usize| {
+            let change = b[i] - a[i];
+            a[i] + s * (change + (1.0 - s) * ((1.0 - s) * (h * f[i] - change) + s * (change - h * g[i])))
+        };
+        (0..a.len()).map(cubic).collect()
+    }
+
+    /// Mean speed, scaled.
+    fn speed(&self, scales: &[f64]) -> f64 {
+        let way = |pair: &[(f64, Vec<f64>, Vec<f64>)]| {
+            pair[0].1.iter().zip(&pair[1].1).zip(scales).fold(0.0, |m: f64, ((a, b), s)| m.max(((a - b) / s).abs()))
+        };
+        let (start, end) = (self.steps[0].0, self.steps[self.steps.len() - 1].0);
+        self.steps.windows(2).map(way).sum::<f64>() / (end - start)
+    }
+}
