@@ -64,6 +64,9 @@ pub struct Table {
     /// One line for each branch, with how it ended
     #[arg(long, group = "what")]
     pub branches: bool,
+    /// What surveys and sweeps saw
+    #[arg(long, group = "what")]
+    pub responses: bool,
     /// Only this branch
     #[arg(long, value_name = "NAME")]
     pub branch: Option<String>,

@@ -15,8 +15,12 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
     let text = std::fs::read_to_string(file).unwrap_or_default();
     let verdict = if is_study(&text) {
         let study = read_study(file)?;
-        let (seeds, branches) = (study.plan.seeds.len(), study.plan.branches.len());
-        format!("a study of {} with {}, {}", study.model.name, many(seeds, "seed"), many(branches, "branch"))
+        let plan = &study.plan;
+        let (seeds, branches) = (many(plan.seeds.len(), "seed"), many(plan.branches.len(), "branch"));
+        let simulated = [(plan.surveys.len(), "survey"), (plan.sweeps.len(), "sweep")];
+        let simulated = simulated.iter().filter(|(count, _)| *count > 0);
+        let simulated: String = simulated.map(|(count, noun)| format!(", {}", many(*count, noun))).collect();
+        format!("a study of {} with {seeds}, {branches}{simulated}", study.model.name)
     } else {
         let (model, text) = read_model(file)?;
         let parameters: Vec<f64> = model.parameters.iter().map(|p| p.value).collect();

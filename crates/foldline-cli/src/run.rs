@@ -73,7 +73,9 @@ fn run(
     let names: Vec<&str> = study.plan.branches.iter().map(|b| b.name.as_str()).collect();
     let diagram = ordered(diagram, &names);
     print_special(&diagram, &study.model)?;
-    let short = fell_short(&diagram, &names);
+    let surveys = study.plan.surveys.iter().map(|s| s.name.as_str());
+    let simulated: Vec<&str> = surveys.chain(study.plan.sweeps.iter().map(|s| s.name.as_str())).collect();
+    let short = fell_short(&diagram, &names, &simulated);
     let mut err = stderr().lock();
     short.iter().try_for_each(|line| writeln!(err, "ended short: {line}"))?;
     if watch.stop.load(Ordering::Relaxed) {
@@ -84,7 +86,9 @@ fn run(
 }
 
 /// What of the study was not reached, a line each.
-fn fell_short(diagram: &Diagram, asked: &[&str]) -> Vec<String> {
+fn fell_short(diagram: &Diagram, asked: &[&str], simulated: &[&str]) -> Vec<String> {
+    let unsimulated = simulated.iter().filter(|name| diagram.response_set(name).is_none());
+    let unsimulated = unsimulated.map(|name| format!("{name}: it is not complete"));
     let absent =
         asked.iter().filter(|name| diagram.branch(name).is_none()).map(|name| format!("{name}: it never began"));
     let ended = diagram.branches.iter().flat_map(|branch| {
@@ -93,7 +97,7 @@ fn fell_short(diagram: &Diagram, asked: &[&str]) -> Vec<String> {
             branch.ends.iter().all(Option::is_none).then(|| format!("{}: it is not finished", branch.name));
         short.map(|end| format!("{}: {end}", branch.name)).chain(unfinished).collect::<Vec<_>>()
     });
-    absent.chain(ended).collect()
+    absent.chain(ended).chain(unsimulated).collect()
 }
 
 /// Records, shows, and stops when asked to.

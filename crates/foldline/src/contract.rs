@@ -3,7 +3,7 @@
 //! **Idea.** Everything else in the crate is written against these few object-safe traits, so a model may be text, traced
 //! code or native Rust, and a curve may be an equilibrium, a cycle or a problem nobody has thought of yet.
 
-use crate::diagram::{Branch, Ending, Kind, Mesh, Point, SpecialPoint, Trust};
+use crate::diagram::{Branch, Ending, Kind, Mesh, Point, Responses, SpecialPoint, Trust};
 use num_complex::Complex64;
 
 /// The parameters of a batch: one set for all lanes, or one set per lane.
@@ -175,6 +175,10 @@ pub enum Event<'a> {
     End(&'a Branch),
     /// A remark about a branch: a switch that led to a branch already known, a seed that was not found.
     Note(&'a str, &'a str),
+    /// A survey or sweep (its name) has settled at one more value of its parameter: the value, how many are done, of how many.
+    Visited(&'a str, f64, usize, usize),
+    /// A survey or sweep is complete.
+    Responses(&'a Responses),
 }
 
 /// What an observer wants.

@@ -2,6 +2,7 @@
 
 mod columns;
 mod format;
+mod responses;
 
 use crate::arguments::{Format, Table as Typed};
 use crate::failure::{Failure, Outcome};
@@ -54,9 +55,10 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
     if let Some(name) = &typed.branch {
         only(&mut diagram, name)?;
     }
-    let table = match (typed.points, typed.branches) {
-        (true, _) => columns::points(&diagram, &model),
-        (_, true) => columns::branches(&diagram, &model),
+    let table = match (typed.points, typed.branches, typed.responses) {
+        (true, ..) => columns::points(&diagram, &model),
+        (_, true, _) => columns::branches(&diagram, &model),
+        (.., true) => responses::responses(&diagram, &model),
         _ => columns::special(&diagram, &model),
     };
     let mut out = std::io::BufWriter::new(stdout().lock());
@@ -69,10 +71,15 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
     Ok(Outcome::Done)
 }
 
-/// Prints the special points as text.
+/// Prints the special points as text, and a line for what each survey and sweep saw.
 pub fn print_special(diagram: &Diagram, model: &Model) -> Result<(), Failure> {
     let mut out = std::io::BufWriter::new(stdout().lock());
-    format::text(&columns::special(diagram, model), &mut out)?;
+    if diagram.responses.is_empty() || !diagram.branches.is_empty() {
+        format::text(&columns::special(diagram, model), &mut out)?;
+    }
+    if !diagram.responses.is_empty() {
+        format::text(&responses::summary(diagram, model), &mut out)?;
+    }
     Ok(out.flush()?)
 }
 

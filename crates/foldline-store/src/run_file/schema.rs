@@ -12,7 +12,12 @@ pub(super) struct Columns {
 
 impl Columns {
     pub(super) fn new(model: &Model) -> Columns {
-        let mut taken: Vec<String> = FIXED.iter().map(|s| s.to_string()).collect();
+        Columns::beside(model, &FIXED)
+    }
+
+    /// The columns of a model in a table that has the columns `fixed` besides.
+    pub(super) fn beside(model: &Model, fixed: &[&str]) -> Columns {
+        let mut taken: Vec<String> = fixed.iter().map(|s| s.to_string()).collect();
         // SQLite does not tell capitals from small letters in column names: of K and k the later becomes k_2.
         let mut unique = |name: String| {
             let mut candidate = name.clone();
@@ -127,6 +132,6 @@ pub(super) fn insert(table: &str, first: &[&str], columns: &Columns) -> String {
     format!("INSERT OR REPLACE INTO {table} ({}) VALUES ({marks})", names.join(", "))
 }
 
-fn quoted(name: &str) -> String {
+pub(super) fn quoted(name: &str) -> String {
     format!("\"{}\"", name.replace('"', "\"\""))
 }

@@ -28,7 +28,8 @@ pub(super) fn read(
 ) -> Vec<BranchPlan> {
     let mut known: Vec<Known> = Vec::new();
     let tables = walk.tables(root, "branch");
-    if tables.is_empty() && root.get("branch").is_none() {
+    let others = ["survey", "sweep"].iter().any(|key| root.contains_key(*key));
+    if tables.is_empty() && root.get("branch").is_none() && !others {
         walk.report(0..0, "the study has no branch", "add `[[branch]]` with name, from, free and range");
     }
     for (span, table) in &tables {
@@ -37,7 +38,7 @@ pub(super) fn read(
         let taken: Vec<&str> = seed_names.chain(known.iter().map(|k| k.plan.name.as_str())).collect();
         let name = unique_name(walk, table, span, "branch", &taken);
         let origin = origin(walk, table, span, seeds, &known, &tables);
-        let free = free(walk, table, span, model);
+        let free = free(walk, table, span, model, "branch");
         let switching = table.get("switch").map(|value| switching(walk, value)).unwrap_or_default();
         let max_points = table.get("max-points").and_then(|v| walk.integer(v, "`max-points`", 1..=100_000_000));
         let max_points = max_points.map_or(MAX_POINTS, |n| n as usize);
@@ -94,12 +95,12 @@ fn origin(
     None
 }
 
-fn free(walk: &mut Walk, table: &DeTable, span: &Range<usize>, model: &Model) -> Option<usize> {
+pub(super) fn free(walk: &mut Walk, table: &DeTable, span: &Range<usize>, model: &Model, what: &str) -> Option<usize> {
     let Some(value) = table.get("free") else {
         let example = model.parameters.first().map_or("mu", |p| p.name.as_str());
         walk.report(
             span.clone(),
-            "this branch has no free parameter",
+            format!("this {what} has no free parameter"),
             format!("add a line such as `free = \"{example}\"`"),
         );
         return None;

@@ -5,6 +5,7 @@
 //! with its place, what is wrong, and what would be right. The format is described in docs/book/study-files.md.
 
 mod branches;
+mod responses;
 mod seeds;
 
 use crate::diagnostic::Diagnostic;
@@ -34,8 +35,19 @@ pub struct Study {
     pub plan: Plan,
 }
 
-const ROOT_KEYS: [&str; 9] =
-    ["model", "title", "description", "source", "tolerance", "degree", "parameters", "seed", "branch"];
+const ROOT_KEYS: [&str; 11] = [
+    "model",
+    "title",
+    "description",
+    "source",
+    "tolerance",
+    "degree",
+    "parameters",
+    "seed",
+    "branch",
+    "survey",
+    "sweep",
+];
 
 /// Reads a study file and the model that it names. Every mistake found is returned.
 pub fn read_study(path: &Path) -> Result<Study, Vec<Diagnostic>> {
@@ -81,7 +93,7 @@ pub fn parse_study(text: &str, file: &str, model_text: &str, model_file: &str) -
 /// Whether a text says what to compute rather than how a system moves: it names a model, a seed or a branch.
 pub fn is_study(text: &str) -> bool {
     let (root, _) = DeTable::parse_recoverable(text);
-    ["model", "seed", "branch"].iter().any(|key| root.get_ref().contains_key(*key))
+    ["model", "seed", "branch", "survey", "sweep"].iter().any(|key| root.get_ref().contains_key(*key))
 }
 
 fn parse(
@@ -101,6 +113,11 @@ fn parse(
     }
     let seeds = seeds::read(&mut walk, &root, &model, &defaults);
     let branches = branches::read(&mut walk, &root, &model, &seeds);
+    let taken: Vec<&str> =
+        seeds.iter().map(|(_, s)| s.name.as_str()).chain(branches.iter().map(|b| b.name.as_str())).collect();
+    let surveys = responses::surveys(&mut walk, &root, &model, &defaults, &taken);
+    let taken: Vec<&str> = taken.into_iter().chain(surveys.iter().map(|s| s.name.as_str())).collect();
+    let sweeps = responses::sweeps(&mut walk, &root, &model, &seeds, &taken);
     if walk.found.is_empty() {
         check_seeds(&mut walk, &seeds, &model, &model_text, &model_file);
     }
@@ -108,7 +125,7 @@ fn parse(
         return Err(walk.found);
     }
     let seeds = seeds.into_iter().map(|(_, seed)| seed).collect();
-    let plan = Plan { tolerance, degree, seeds, branches, curves: Vec::new(), homotopies: Vec::new() };
+    let plan = Plan { tolerance, degree, seeds, branches, curves: Vec::new(), homotopies: Vec::new(), surveys, sweeps };
     Ok(Study { file: file.to_string(), text: text.to_string(), model_file, model_text, model, plan })
 }
 
@@ -170,7 +187,7 @@ fn unique_name(
         walk.report(
             value.span(),
             format!("the name \"{name}\" is used twice"),
-            "give every seed and every branch a name of its own",
+            "give every seed, branch, survey and sweep a name of its own",
         );
     }
     Some(name)
@@ -212,5 +229,7 @@ mod tests {
         assert_eq!(keys("/properties"), sorted(&ROOT_KEYS));
         assert_eq!(keys("/$defs/seed/properties"), sorted(&seeds::KEYS));
         assert_eq!(keys("/$defs/branch/properties"), sorted(&branches::KEYS));
+        assert_eq!(keys("/$defs/survey/properties"), sorted(&responses::SURVEY_KEYS));
+        assert_eq!(keys("/$defs/sweep/properties"), sorted(&responses::SWEEP_KEYS));
     }
 }

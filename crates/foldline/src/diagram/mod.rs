@@ -367,4 +367,9 @@ impl Diagram {
     pub fn branch(&self, name: &str) -> Option<&Branch> {
         self.branches.iter().find(|branch| branch.name == name)
     }
+
+    /// The responses of the survey or sweep of that name.
+    pub fn response_set(&self, name: &str) -> Option<&Responses> {
+        self.responses.iter().find(|set| set.name == name)
+    }
 }

@@ -13,16 +13,21 @@
 //! | what follows from a finished branch? | [`family`] |
 //! | how does one leave a special point on the other branch? | [`switch`] |
 //! | is this branch known already? | [`known`] |
+//! | what does simulation see? | [`responses`] |
 
 pub mod family;
 pub mod growth;
 pub mod known;
 pub mod plan;
+pub mod responses;
 pub mod seeds;
 pub mod switch;
 pub mod system;
 
-pub use plan::{AttractorKey, BranchPlan, CurvePlan, HomotopyPlan, Plan, SeedPlan, SeedSource, Start, Switching};
+pub use plan::{
+    AttractorKey, BranchPlan, CurvePlan, HomotopyPlan, Plan, SeedPlan, SeedSource, Start, SurveyPlan, SweepPlan,
+    Switching,
+};
 pub use seeds::attractors;
 pub use system::System;
 
@@ -53,5 +58,6 @@ pub fn run(system: &System, plan: &Plan, jobs: usize, earlier: Diagram, observer
         }
     });
     let branches = done.into_iter().flat_map(|slot| slot.into_inner().unwrap_or_default()).collect();
-    Diagram { branches, ..Diagram::default() }
+    let responses = responses::simulate(system, plan, &seeds, jobs, &earlier, observer);
+    Diagram { branches, responses }
 }

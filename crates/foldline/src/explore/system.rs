@@ -59,6 +59,7 @@ impl<'a> System<'a> {
     pub fn of_plan(model: &'a Model, plan: &Plan) -> System<'a> {
         const AWAY: f64 = 0.617;
         let mut places: Vec<Vec<f64>> = plan.seeds.iter().map(|seed| seed.parameters.clone()).collect();
+        places.extend(plan.surveys.iter().map(|survey| survey.parameters.clone()));
         for seed in &plan.seeds {
             let mut place = seed.parameters.clone();
             for branch in &plan.branches {
