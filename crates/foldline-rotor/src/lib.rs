@@ -16,7 +16,9 @@ mod contact;
 mod field;
 mod jet;
 mod quantities;
+mod sharpness;
 
 pub use contact::{ContactLaw, Stiffness};
 pub use field::OverhungRotor;
 pub use quantities::{Nondimensional, Si};
+pub use sharpness::{SmoothingError, exact_motion, smallest_sharpness, smoothing_errors};

@@ -26,6 +26,8 @@ const INTEGRATION: [f64; 2] = [1e-6, 1e-9];
 const WINDOW: usize = 128;
 /// Last difference of returns, relative to the extent, at which a cycle has settled.
 const SETTLED: f64 = 1e-7;
+/// The same when no more steps are left.
+const NEARLY: f64 = 1e-4;
 /// Extent of a window, relative to scale and size, at which a trajectory rests.
 const RESTS: f64 = 1e-6;
 /// Extent of a window, relative to scale and size, below which a motion that shrinks may be close to rest.
@@ -294,11 +296,24 @@ impl Runner {
         }
     }
 
+    /// A cycle that repeats itself less accurately than it should, when no more steps are left.
+    fn nearly(&self) -> Option<Settled> {
+        let (_, state) = self.returns.as_ref()?.last()?;
+        let (period, _) = *self.seen.last()?;
+        let error = self.seen.iter().rev().take(2 * SEEN).fold(0.0, |m: f64, (_, size)| m.max(*size));
+        let repeats = self.moves && self.seen.len() >= 2 * SEEN && error <= NEARLY;
+        let (state, extent, time) = (state.to_vec(), self.extent.clone(), self.time);
+        repeats.then_some(Settled { motion: Motion::Cycle, state, period, extent, time, error })
+    }
+
     /// The round is over.
     fn end(&mut self, time: f64, state: Vec<f64>, outcome: Outcome) {
         self.time += time;
         let extent = self.extent.clone();
         let gone = matches!(outcome, Outcome::Escaped | Outcome::StepTooSmall);
+        if self.found.is_none() && !gone && self.steps >= STEPS {
+            self.found = self.nearly();
+        }
         if self.found.is_none() && (gone || self.steps >= STEPS) {
             let motion = if gone { Motion::Escaped } else { Motion::Other };
             self.found =

@@ -101,12 +101,17 @@ impl Responses {
     /// Indices of the responses of a sweep that differ from the one before by more than a small step of the parameter can
     /// explain: another motion, ratio or multiplicity, or a change of the largest range beyond `factor` times the median.
     pub fn jumps(&self, factor: f64) -> Vec<usize> {
+        // Each quantity relative to its largest value in the sweep.
+        let count = self.responses.iter().map(|r| r.ranges.len()).max().unwrap_or(0);
+        let largest = |k: usize| {
+            let ranges = self.responses.iter().filter_map(|r| r.ranges.get(k));
+            ranges.fold(f64::MIN_POSITIVE, |m, [low, high]| m.max(low.abs()).max(high.abs()))
+        };
+        let sizes: Vec<f64> = (0..count).map(largest).collect();
         let change = |pair: &[Response]| {
-            let sizes = pair[0].ranges.iter().zip(&pair[1].ranges).map(|(a, b)| {
-                let size = a[0].abs().max(a[1].abs()).max(b[0].abs()).max(b[1].abs()).max(f64::MIN_POSITIVE);
-                (a[0] - b[0]).abs().max((a[1] - b[1]).abs()) / size
-            });
-            sizes.fold(0.0, f64::max)
+            let pairs = pair[0].ranges.iter().zip(&pair[1].ranges).zip(&sizes);
+            let changes = pairs.map(|((a, b), size)| (a[0] - b[0]).abs().max((a[1] - b[1]).abs()) / size);
+            changes.fold(0.0, f64::max)
         };
         let changes: Vec<f64> = self.responses.windows(2).map(change).collect();
         let mut sorted = changes.clone();

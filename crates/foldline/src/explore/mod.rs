@@ -13,17 +13,20 @@
 //! | what follows from a finished branch? | [`family`] |
 //! | how does one leave a special point on the other branch? | [`switch`] |
 //! | is this branch known already? | [`known`] |
+//! | does a solution depend on a parameter that should not matter? | [`persistence`] |
 //! | what does simulation see? | [`responses`] |
 
 pub mod family;
 pub mod growth;
 pub mod known;
+pub mod persistence;
 pub mod plan;
 pub mod responses;
 pub mod seeds;
 pub mod switch;
 pub mod system;
 
+pub use persistence::{Persistence, persistence};
 pub use plan::{
     AttractorKey, BranchPlan, CurvePlan, HomotopyPlan, Plan, SeedPlan, SeedSource, Start, SurveyPlan, SweepPlan,
     Switching,
