@@ -45,64 +45,65 @@ fn the_false_unstable_piece_below_contact_is_recognised() {
     let system = System::new(&field);
     let diagram = explore::run(&system, &plan, 1, Diagram::default(), &Unobserved);
     let branch = &diagram.branches[0];
-    for special in &branch.special {
-        eprintln!("{} at {:.6} r {:?}", special.kind, special.point.parameters[0], special.point.ranges[4]);
-    }
-    for point in branch.points.iter().filter(|p| p.ranges[4][1] < 1.05) {
+    // Small sharpness makes S fold twice below contact, with an unstable piece in between; the law has nothing there.
+    let folds: Vec<f64> = branch.special.iter().map(|s| s.point.ranges[4][1]).collect();
+    assert!(folds.len() == 2 && folds.iter().all(|r| (0.9..1.0).contains(r)), "{folds:?}");
+    let mut unstable = 0;
+    for point in &branch.points {
+        let r = point.ranges[4][1];
         let fate = persistence(&system, 1e-6, 4, point, SHARPNESS, 90.0, 2000);
-        let text = match &fate {
-            Persistence::Survives(at) => format!("survives r {:.5}", at.ranges[4][1]),
-            Persistence::Changes(at) => format!("changes r {:.5} unstable {}", at.ranges[4][1], at.unstable),
-            Persistence::Vanishes { fold } => format!("vanishes at K {fold:.3}"),
-            Persistence::Undecided(why) => format!("undecided: {why}"),
-        };
-        eprintln!("{:.5} r {:.5} unstable {} {text}", point.parameters[0], point.ranges[4][1], point.unstable);
+        match fate {
+            Persistence::Vanishes { fold } => assert!(fold > 30.0 && fold < 90.0 && r > 0.9 && r < 1.0, "{r} {fold}"),
+            // What survives below contact is the free motion at K = 90 to the pull of the tanh law, 0.14 β/K = 0.01 at most
+            // over a stiffness of 0.3 there.
+            Persistence::Survives(at) => assert!(point.unstable == 0 && (at.ranges[4][1] - r).abs() < 0.1, "{r}"),
+            other => panic!("{r}: {other:?}"),
+        }
+        unstable += usize::from(point.unstable > 0);
     }
+    assert!(unstable >= 3, "{unstable}");
+    let fate = |r: f64| {
+        let nearest =
+            branch.points.iter().min_by(|a, b| (a.ranges[4][1] - r).abs().total_cmp(&(b.ranges[4][1] - r).abs()));
+        persistence(&system, 1e-6, 4, nearest.unwrap(), SHARPNESS, 90.0, 2000).is_artefact()
+    };
+    assert_eq!([0.5, 0.96, 1.02].map(fate), [false, true, false]);
 }
 
-/// The 2:1 and 3:1 motions of the piecewise law at Ω = 5.
+/// The 2:1 and 3:1 motions of the piecewise law at Ω = 5 that the starts lead to.
 fn motions(constants: &Nondimensional) -> Vec<Response> {
     let field = OverhungRotor { law: ContactLaw::Piecewise };
     let scales = [1.0; 4];
-    let trial = Trial { field: &field, scales: &scales, whirl: Some([0, 1]), jobs: 2 };
+    let whirl = Some([0, 1]);
+    let trial = Trial { field: &field, scales: &scales, whirl, jobs: 2 };
     let ranges = vec![[-5.0, 5.0], [-5.0, 5.0], [-15.0, 15.0], [-15.0, 15.0]];
-    let sampling = Sampling {
-        ranges,
-        scales: scales.to_vec(),
-        whirl: Some([0, 1]),
-        samples: 24,
-        seed: 1,
-        jobs: 2,
-        tolerance: 1e-6,
-    };
-    let parameters = constants.parameters();
-    let found = survey_by_simulation(&trial, &sampling, &parameters, 0, &[5.0], &|_| Verdict::Continue);
-    for r in &found {
-        eprintln!("{:?} {:?} x{} {:?} {:?} {}", r.motion, r.ratio, r.multiplicity, r.period, r.ranges[4], r.error);
-    }
-    [(2, 1), (3, 1)]
-        .map(|ratio| found.iter().find(|r| r.ratio == Some(ratio) && r.multiplicity == 1).unwrap().clone())
-        .to_vec()
+    let sampling = Sampling { ranges, scales: scales.to_vec(), whirl, samples: 24, seed: 1, jobs: 2, tolerance: 1e-6 };
+    let found = survey_by_simulation(&trial, &sampling, &constants.parameters(), 0, &[5.0], &|_| Verdict::Continue);
+    let named = |r: &Response| [(2, 1), (3, 1)].contains(&r.ratio.unwrap_or_default()) && r.multiplicity == 1;
+    found.into_iter().filter(named).collect()
 }
 
 #[test]
 fn the_error_of_smoothing_falls_with_the_square_of_the_sharpness() {
-    for beta in [10.0, 6.0] {
+    let mut published = Vec::new();
+    for (beta, expected) in [(10.0, 2), (6.0, 1)] {
         let constants = Nondimensional { kappa: 1.0, beta, ..Nondimensional::REFERENCE };
-        let begun = std::time::Instant::now();
         let motions = motions(&constants);
-        eprintln!("{:?}", begun.elapsed());
+        assert_eq!(motions.len(), expected);
         for motion in &motions {
             let exact = exact_motion(&constants, motion.state.clone().try_into().unwrap()).unwrap();
-            eprintln!("again {:?} {:?}", exact.period, exact.ranges[4]);
-            for error in smoothing_errors(&constants, &exact, &[1.0, 3.0, 6.0, 9.0, 15.0, 30.0, 60.0].map(|f| f * beta))
-            {
-                eprintln!("{:?} {error:?}", motion.ratio);
-            }
+            let errors = smoothing_errors(&constants, &exact, &[6.0, 15.0, 30.0].map(|times| times * beta));
+            eprintln!("beta {beta} {:?} {errors:?}", motion.ratio);
+            // Five times sharper: 25 times more exact. The motions are settled to some 1e-7.
+            let gain = errors[0].largest() / errors[2].largest();
+            assert!((15.0..40.0).contains(&gain), "{gain} {errors:?}");
+            published.push(errors[1].largest());
         }
-        for acceptable in [1e-2, 1e-3, 1e-4] {
-            eprintln!("beta {beta} {acceptable}: {:?}", smallest_sharpness(&constants, &motions, acceptable));
-        }
-        eprintln!("{:?}", begun.elapsed());
+        let (sharpness, error) = smallest_sharpness(&constants, &motions, 1e-3).unwrap();
+        eprintln!("beta {beta}: {sharpness} {error}");
+        // Found by bisection to a hundredth; the error goes with the square.
+        assert!(error <= 1e-3 && error > 0.95e-3, "K = {sharpness}: {error}");
     }
+    // K = 15 β, the choice of akay2024, makes no error that a picture would show.
+    assert!(published.iter().all(|e| *e < 1e-4), "{published:?}");
 }

@@ -4,7 +4,7 @@
 //! exists. The solution is followed in that parameter alone, all others fixed: it reaches the value, or the curve turns
 //! back before, and then the solution exists only because the parameter is what it is.
 //!
-//! **Source.** akay, §4, where branches that a small sharpness made up are told by repeating the run with a larger one.
+//! **Source.** akay2024, where branches that a small sharpness makes up are shown, and avoided by a larger one.
 //!
 //! **Fails when** the curve leaves through something other than a fold, as a cycle that shrinks to an equilibrium; the answer
 //! is then how it ended.
