@@ -89,9 +89,11 @@ fn values(walk: &mut Walk, table: &DeTable, span: &Range<usize>, what: &str, ris
             let ends = pair(walk, range, rising);
             let count = walk.integer(count, "`count`", 2..=MOST);
             let ([from, to], count) = (ends?, count?);
-            let share = |k: u64| k as f64 / (count - 1) as f64;
+            let last = count - 1;
+            let between = |k: u64| (from * (last - k) as f64 + to * k as f64) / last as f64;
             // Both ends exactly as they were written.
-            Some((0..count).map(|k| from * (1.0 - share(k)) + to * share(k)).collect())
+            let value = |k: u64| if k == 0 { from } else if k == last { to } else { between(k) };
+            Some((0..count).map(value).collect())
         }
         (None, Some(range), None) => {
             let message = format!("this {what} does not say how many values of its range it visits");

@@ -14,7 +14,7 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 /// Trajectories that are integrated together.
 const BLOCK: usize = 64;
-/// Motions that agree to this in their period, and in their ranges relative to scale and size, are one.
+/// Motions that agree to this in their period, and in the ranges of their states relative to scale and size, are one.
 const SAME: f64 = 1e-4;
 
 /// Receives the responses at one value as soon as they are known.
@@ -86,9 +86,10 @@ fn agree(trial: &Trial, a: &Response, b: &Response) -> bool {
     if a.motion != b.motion {
         return false;
     }
+    // Outputs follow from the states, and nothing is known about their scale.
     let close = |tolerance: f64| {
-        a.ranges.iter().zip(&b.ranges).enumerate().all(|(i, (p, q))| {
-            let size = trial.scales.get(i).copied().unwrap_or(0.0).max(p[0].abs()).max(p[1].abs());
+        a.ranges.iter().zip(&b.ranges).zip(trial.scales).all(|((p, q), scale)| {
+            let size = scale.max(p[0].abs()).max(p[1].abs());
             (p[0] - q[0]).abs() <= tolerance * size && (p[1] - q[1]).abs() <= tolerance * size
         })
     };

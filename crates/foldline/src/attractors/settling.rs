@@ -138,6 +138,8 @@ struct Runner {
     seen: Vec<(f64, f64)>,
     /// Mean speed of every window.
     speeds: Vec<f64>,
+    /// A cycle, if the window that is open confirms that there still is a motion.
+    repeats: Option<Settled>,
     next: Option<Vec<f64>>,
     x: Vec<f64>,
 }
@@ -162,6 +164,7 @@ impl Runner {
             returns: None,
             seen: Vec::new(),
             speeds: Vec::new(),
+            repeats: None,
             next: None,
             x: vec![0.0; n],
         }
@@ -173,7 +176,7 @@ impl Runner {
         self.seen.clear();
         self.boxes.clear();
         self.speeds.clear();
-        self.next = None;
+        (self.next, self.repeats) = (None, None);
         // The plane of the round before goes through the new start.
         self.returns = self.returns.take().map(|returns| returns.again_from(&self.start));
         (self.plane_life, self.plane_ends) = (PLANE, if self.returns.is_some() { PLANE } else { 0 });
@@ -193,9 +196,13 @@ impl Runner {
         }
         self.x = x;
         // At its low accuracy the first round does not see small motions contract.
-        let rough = self.steps == self.round_steps && self.steps >= ROUGH;
+        let rough = self.is_first_round() && self.steps >= ROUGH;
         let over = self.found.is_some() || self.next.is_some() || self.steps >= STEPS || rough;
         if over { Verdict::Stop } else { Verdict::Continue }
+    }
+
+    fn is_first_round(&self) -> bool {
+        self.steps == self.round_steps
     }
 
     /// What the returns so far say.
@@ -219,7 +226,7 @@ impl Runner {
         let settled = (self.seen.len() >= 4 && latest(4) <= SETTLED)
             || (self.seen.len() >= 5 * SEEN && latest(2 * SEEN) <= 20.0 * SETTLED && !contracts(&self.seen));
         if settled && self.moves {
-            self.found = Some(Settled {
+            self.repeats = Some(Settled {
                 motion: Motion::Cycle,
                 state: last.to_vec(),
                 period,
@@ -227,7 +234,7 @@ impl Runner {
                 time: self.time + step.end_time(),
                 error: latest(4),
             });
-        } else if !few && self.moves && self.jumps < JUMPS && contracts(&self.seen) {
+        } else if !few && self.moves && self.repeats.is_none() && self.jumps < JUMPS && contracts(&self.seen) {
             self.jumps += 1;
             let share = (5.0 * doubt / size).clamp(1e-3, 0.1);
             self.next = Some(state.iter().zip(last).map(|(limit, y)| limit + share * (y - limit)).collect());
@@ -250,6 +257,14 @@ impl Runner {
         self.speeds.push(size);
         self.try_rest(&window, x, trial);
         self.renew_extent(&window, trial);
+        if let Some(repeats) = self.repeats.take().filter(|_| self.moves) {
+            // The first round is not accurate enough to be the last.
+            match self.is_first_round() {
+                true => self.next = Some(repeats.state),
+                false => self.found = Some(repeats),
+            }
+            return;
+        }
         // The first windows of the first round are the transient; a plane through it may be no plane across the motion.
         if self.round_steps >= self.plane_ends && self.steps >= 2 * WINDOW {
             let velocity: Vec<f64> = (0..x.len()).map(|i| step.end_slope(i)).collect();
@@ -271,7 +286,9 @@ impl Runner {
             self.boxes.iter().map(|[_, high]| high[i]).fold(f64::MIN, f64::max) - low
         };
         let extent: Vec<f64> = (0..window.low.len()).map(|i| span(i).max(1e-6 * trial.scales[i])).collect();
-        self.moves = extent.iter().zip(trial.scales).any(|(e, s)| *e > MOVES * s);
+        // The last window alone: what comes to rest fast was large a few windows ago.
+        let own = |i: usize| window.high[i] - window.low[i];
+        self.moves = (0..extent.len()).any(|i| own(i) > (0.2 * extent[i]).max(MOVES * trial.scales[i]));
         self.extent = extent;
     }
 
