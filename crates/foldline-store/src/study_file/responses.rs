@@ -92,7 +92,15 @@ fn values(walk: &mut Walk, table: &DeTable, span: &Range<usize>, what: &str, ris
             let last = count - 1;
             let between = |k: u64| (from * (last - k) as f64 + to * k as f64) / last as f64;
             // Both ends exactly as they were written.
-            let value = |k: u64| if k == 0 { from } else if k == last { to } else { between(k) };
+            let value = |k: u64| {
+                if k == 0 {
+                    from
+                } else if k == last {
+                    to
+                } else {
+                    between(k)
+                }
+            };
             Some((0..count).map(value).collect())
         }
         (None, Some(range), None) => {

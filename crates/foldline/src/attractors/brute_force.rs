@@ -78,7 +78,7 @@ fn grouped(trial: &Trial, all: Vec<Response>) -> Vec<Response> {
             None => found.push(response),
         }
     }
-    found.sort_by(|a, b| b.hits.cmp(&a.hits));
+    found.sort_by_key(|response| std::cmp::Reverse(response.hits));
     found
 }
 

@@ -13,7 +13,7 @@
 //!    its returns lies on that solution (`orbit`, `watch`);
 //! 7. the same solution found in several blocks is one attractor, named by its spectral ratio (`census`, `spectrum`).
 //!
-//! Beside this stands simulation that solves no equation for the motions it finds (`brute_force`, `settling`, `measure`), to be
+//! Beside this stands simulation that solves no equation for the motions it finds (`brute_force`, `settling`, `runner`, `measure`), to be
 //! compared with branches.
 //!
 //! **Fails when** an attractor is neither an equilibrium nor a cycle (its trajectories count as unsettled), or attracts so
@@ -25,12 +25,14 @@ mod census;
 mod measure;
 mod orbit;
 mod returns;
+mod runner;
 mod sampling;
 mod settling;
 mod spectrum;
 #[cfg(test)]
 mod tests;
 mod watch;
+mod window;
 
 pub use brute_force::{Report, stepped_sweep, survey_by_simulation};
 pub use census::{settle, survey};

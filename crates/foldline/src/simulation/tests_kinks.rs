@@ -6,8 +6,8 @@ use crate::model::{Definition, Model, ModelSource, State};
 
 fn model(equations: &[(&str, &str)]) -> Model {
     let source = ModelSource {
-        states: equations.iter().map(|(name, _)| State::new(*name)).collect(),
-        equations: equations.iter().map(|(name, text)| Definition::new(*name, *text)).collect(),
+        states: equations.iter().map(|(name, _)| State::new(name)).collect(),
+        equations: equations.iter().map(|(name, text)| Definition::new(name, text)).collect(),
         ..ModelSource::default()
     };
     Model::compile(source).unwrap()
