@@ -93,14 +93,12 @@ fn the_error_of_smoothing_falls_with_the_square_of_the_sharpness() {
         for motion in &motions {
             let exact = exact_motion(&constants, motion.state.clone().try_into().unwrap()).unwrap();
             let errors = smoothing_errors(&constants, &exact, &[6.0, 15.0, 30.0].map(|times| times * beta));
-            eprintln!("beta {beta} {:?} {errors:?}", motion.ratio);
             // Five times sharper: 25 times more exact. The motions are settled to some 1e-7.
             let gain = errors[0].largest() / errors[2].largest();
             assert!((15.0..40.0).contains(&gain), "{gain} {errors:?}");
             published.push(errors[1].largest());
         }
         let (sharpness, error) = smallest_sharpness(&constants, &motions, 1e-3).unwrap();
-        eprintln!("beta {beta}: {sharpness} {error}");
         // Found by bisection to a hundredth; the error goes with the square.
         assert!(error <= 1e-3 && error > 0.95e-3, "K = {sharpness}: {error}");
     }

@@ -106,7 +106,6 @@ fn the_error_of_the_piecewise_rotor_is_proportional_to_the_tolerance() {
         let errors =
             states.iter().zip(&exact).map(|(a, b)| a.iter().zip(b).fold(0.0, |m: f64, (a, b)| m.max((a - b).abs())));
         let worst = errors.fold(0.0, f64::max);
-        eprintln!("{tolerance:e}: {worst:e}, {located}");
         assert!(worst < 1000.0 * tolerance, "{worst} at {tolerance}");
     }
 }

@@ -72,10 +72,11 @@ fn a_kink_costs_neither_accuracy_nor_many_steps() {
     for tolerance in [1e-5, 1e-7, 1e-9, 1e-11] {
         let (located, steps) = error(&bouncing, 0.6, tolerance);
         let (plain, plain_steps) = error(&Plain(&bouncing), 0.6, tolerance);
-        eprintln!("{tolerance:e}: {located:e} in {steps}, plain {plain:e} in {plain_steps}");
         // The errors of a few hundred steps add up, and so do the phases they leave behind over seven periods.
         assert!(located < 300.0 * tolerance, "{located} at {tolerance}");
-        assert!(plain_steps as f64 > 1.1 * steps as f64 || plain > 2.0 * located, "{plain} {plain_steps}");
+        assert!(plain_steps > steps, "{plain_steps} against {steps} steps");
+        // The error of a step across a kink is of second order in its length only.
+        assert!(tolerance > 1e-6 || plain > 4.0 * located, "{plain} against {located} at {tolerance}");
     }
 }
 
@@ -89,7 +90,6 @@ fn grazing_is_neither_missed_nor_invented() {
         for tolerance in [1e-8, 1e-10] {
             worst = worst.max(error(&grazing, a, tolerance).0 / tolerance);
         }
-        eprintln!("depth {depth:e}: {worst}");
         // Near tangency an error e of the state changes the time of contact, 2 √(2 depth), by e / √(2 depth); the impulse, which
         // goes with depth^1.5, changes by 9 · 2 √(2 depth) e only.
         assert!(worst < 100.0, "{worst} at depth {depth}");

@@ -1,9 +1,9 @@
 //! Trajectories of piecewise-smooth fields: the signs of the switches, and what happens where one changes.
 
+use super::super::Outcome;
 use super::super::kink::{self, Kink, PLACES};
 use super::super::shortened::Shortened;
 use super::super::tableau::STAGES;
-use super::super::Outcome;
 use super::{Ensemble, shared_or_own};
 use crate::contract::Batch;
 
