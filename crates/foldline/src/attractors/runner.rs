@@ -19,8 +19,10 @@ const SETTLED: f64 = 1e-7;
 const NEARLY: f64 = 1e-4;
 /// Extent of a window, relative to scale and size, at which a trajectory rests.
 const RESTS: f64 = 1e-6;
-/// Extent of a window, relative to scale and size, below which a motion that shrinks may be close to rest.
+/// Extent of a window, relative to scale and size, below which a motion that shrinks is likely to come to rest.
 const SMALL: f64 = 0.1;
+/// Shrinking over the windows of a round after which the limit is predicted.
+const SHRUNK: f64 = 0.8;
 /// Extent, relative to the scale, below which a motion is no cycle.
 const MOVES: f64 = 1e-4;
 /// Windows over which the extent of a motion is taken.
@@ -62,8 +64,8 @@ pub(super) struct Runner {
     returns: Option<Returns>,
     /// The prediction of every return, as its period and last difference.
     seen: Vec<(f64, f64)>,
-    /// Mean speed of every window.
-    speeds: Vec<f64>,
+    /// Extent of every window of the round, relative to scale and size.
+    sizes: Vec<f64>,
     /// A cycle, if the window that is open confirms that there still is a motion.
     repeats: Option<Settled>,
     next: Option<Vec<f64>>,
@@ -89,7 +91,7 @@ impl Runner {
             boxes: Vec::new(),
             returns: None,
             seen: Vec::new(),
-            speeds: Vec::new(),
+            sizes: Vec::new(),
             repeats: None,
             next: None,
             x: vec![0.0; n],
@@ -101,7 +103,7 @@ impl Runner {
         (self.round_steps, self.window) = (0, Window::new(self.start.len()));
         self.seen.clear();
         self.boxes.clear();
-        self.speeds.clear();
+        self.sizes.clear();
         (self.next, self.repeats) = (None, None);
         // The plane of the round before goes through the new start.
         self.returns = self.returns.take().map(|returns| returns.again_from(&self.start));
@@ -180,7 +182,7 @@ impl Runner {
             self.found = Some(Settled { motion: Motion::Equilibrium, state, period: 0.0, extent, time, error: size });
             return;
         }
-        self.speeds.push(size);
+        self.sizes.push(size);
         self.try_rest(&window, x, trial);
         self.renew_extent(&window, trial);
         if let Some(repeats) = self.repeats.take().filter(|_| self.moves) {
@@ -218,10 +220,16 @@ impl Runner {
         self.extent = extent;
     }
 
-    /// The limit of the states of a window, where its motion is small, has been shrinking, and f is much smaller there.
+    /// The limit of the states of a window, where its motion has been shrinking and f is much smaller there.
     fn try_rest(&mut self, window: &Window, x: &[f64], trial: &Trial) {
-        let [.., a, b, c] = self.speeds[..] else { return };
-        if !(b < a && c < b && c < SMALL) {
+        let third = self.sizes.len() / 3;
+        if third < 3 {
+            return;
+        }
+        let largest = |part: &[f64]| part.iter().copied().fold(0.0, f64::max);
+        let [a, b, c] = [&self.sizes[..third], &self.sizes[third..2 * third], &self.sizes[2 * third..]].map(largest);
+        // A motion that shrinks to a cycle does so ever more slowly; to rest it shrinks by the same factor again and again.
+        if !(c < SMALL && c <= SHRUNK * a && c * a <= 1.05 * b * b) {
             return;
         }
         let Some(limit) = window.limit(trial.scales) else { return };
