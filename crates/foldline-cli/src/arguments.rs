@@ -70,6 +70,9 @@ pub struct Table {
     /// Remarks: what was found for each seed, which routes the homotopies took, which switches led to known branches
     #[arg(long, group = "what")]
     pub notes: bool,
+    /// What surveys and sweeps saw
+    #[arg(long, group = "what")]
+    pub responses: bool,
     /// Only this branch, or the legs of this homotopy
     #[arg(long, value_name = "NAME")]
     pub branch: Option<String>,
@@ -84,17 +87,19 @@ pub enum What {
     Special,
     Points,
     Branches,
+    Responses,
     Notes,
 }
 
 impl Table {
     pub fn what(&self) -> What {
-        match (self.points, self.branches, self.notes) {
-            (true, ..) => What::Points,
-            (_, true, _) => What::Branches,
-            (.., true) => What::Notes,
-            _ => What::Special,
-        }
+        let asked = [
+            (self.points, What::Points),
+            (self.branches, What::Branches),
+            (self.responses, What::Responses),
+            (self.notes, What::Notes),
+        ];
+        asked.into_iter().find(|(asked, _)| *asked).map_or(What::Special, |(_, what)| what)
     }
 }
 

@@ -17,7 +17,12 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
         let study = read_study(file)?;
         let plan = &study.plan;
         let mut parts = vec![many(plan.seeds.len(), "seed"), many(plan.branches.len(), "branch")];
-        let others = [(plan.curves.len(), "curve"), (plan.homotopies.len(), "homotopy")];
+        let others = [
+            (plan.curves.len(), "curve"),
+            (plan.homotopies.len(), "homotopy"),
+            (plan.surveys.len(), "survey"),
+            (plan.sweeps.len(), "sweep"),
+        ];
         parts.extend(others.into_iter().filter(|(count, _)| *count > 0).map(|(count, noun)| many(count, noun)));
         format!("a study of {} with {}", study.model.name, parts.join(", "))
     } else {

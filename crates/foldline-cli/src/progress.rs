@@ -1,7 +1,7 @@
 //! What is seen while a run goes on.
 
 use foldline::contract::Event;
-use foldline::diagram::{Branch, Ending, Point};
+use foldline::diagram::{Branch, Ending, Point, Responses};
 use foldline::model::Model;
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::collections::HashMap;
@@ -47,17 +47,38 @@ impl Progress {
             Event::SideEnded(branch, _, ending) => self.with(branch, |live| live.ends.push(ending.clone())),
             Event::End(branch) => self.end(branch),
             Event::Note(branch, note) => self.say(&format!("{branch}: {note}")),
+            Event::Visited(name, value, done, of) => self.visited(name, value, done, of),
+            Event::Responses(set) => self.responses(set),
         }
     }
 
     fn begin(&self, branch: &Branch) {
+        let live = self.line(&branch.name, branch.points.len(), branch.special.len());
+        self.live.lock().unwrap_or_else(PoisonError::into_inner).insert(branch.name.clone(), live);
+    }
+
+    fn line(&self, name: &str, points: usize, special: usize) -> Live {
         let bar = self.lines.add(ProgressBar::new_spinner());
         if let Ok(style) = ProgressStyle::with_template("{spinner} {prefix:28!} {wide_msg}") {
             bar.set_style(style);
         }
-        bar.set_prefix(branch.name.clone());
-        let live = Live { bar, points: branch.points.len(), special: branch.special.len(), ends: Vec::new() };
-        self.live.lock().unwrap_or_else(PoisonError::into_inner).insert(branch.name.clone(), live);
+        bar.set_prefix(name.to_string());
+        Live { bar, points, special, ends: Vec::new() }
+    }
+
+    /// The living line of a survey or sweep begins at its first value.
+    fn visited(&self, name: &str, value: f64, done: usize, of: usize) {
+        let mut live = self.live.lock().unwrap_or_else(PoisonError::into_inner);
+        let line = live.entry(name.to_string()).or_insert_with(|| self.line(name, 0, 0));
+        line.bar.set_message(format!("{done:>5} of {of} values   at {value:.6}"));
+        line.bar.tick();
+    }
+
+    fn responses(&self, set: &Responses) {
+        if let Some(live) = self.live.lock().unwrap_or_else(PoisonError::into_inner).remove(&set.name) {
+            live.bar.finish_and_clear();
+        }
+        self.say(&format!("{:<28} {:>5} motions met by the {}", set.name, set.responses.len(), set.search.name()));
     }
 
     fn with(&self, branch: &Branch, change: impl FnOnce(&mut Live)) {

@@ -107,7 +107,7 @@ fn diagram() -> Diagram {
         doubled,
         isola("contact DL", [8.5, 5.5]),
     ];
-    Diagram { branches }
+    Diagram { branches, ..Diagram::default() }
 }
 
 #[test]

@@ -41,6 +41,11 @@ pub struct Stiffness {
 impl ContactLaw {
     /// h and its derivatives at radius `r`, stiffness `beta` and sharpness `k`; all 0 at r = 0, where the switch is closed.
     pub fn stiffness(self, r: f64, beta: f64, k: f64) -> Stiffness {
+        self.stiffness_touching(r, beta, k, r > 1.0)
+    }
+
+    /// The same with the contact of [`ContactLaw::Piecewise`] closed or open as `touching` says, whatever the radius.
+    pub(crate) fn stiffness_touching(self, r: f64, beta: f64, k: f64, touching: bool) -> Stiffness {
         if r <= 0.0 {
             return Stiffness::default();
         }
@@ -58,7 +63,7 @@ impl ContactLaw {
                 let logistic = 1.0 / (1.0 + (-x).exp());
                 (log / (2.0 * k), logistic, logistic * gap / k - log / (2.0 * k * k))
             }
-            ContactLaw::Piecewise if gap > 0.0 => (gap, 1.0, 0.0),
+            ContactLaw::Piecewise if touching => (gap, 1.0, 0.0),
             ContactLaw::Piecewise => (0.0, 0.0, 0.0),
         };
         Stiffness {

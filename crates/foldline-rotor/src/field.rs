@@ -18,8 +18,13 @@ const PARAMETERS: usize = 9;
 impl OverhungRotor {
     /// f at one point.
     pub fn field(&self, x: [f64; 4], p: &Nondimensional) -> [f64; 4] {
+        self.field_touching(x, p, x[0] * x[0] + x[1] * x[1] > 1.0)
+    }
+
+    /// f with the contact of the piecewise law closed or open as `touching` says.
+    fn field_touching(&self, x: [f64; 4], p: &Nondimensional, touching: bool) -> [f64; 4] {
         let [u, v, du, dv] = x;
-        let stiffness = self.stiffness(u, v, p);
+        let stiffness = self.stiffness(u, v, p, touching);
         let gyroscopic = (2.0 - p.polar) * p.omega;
         let circulatory = 2.0 * p.zeta * p.omega;
         let forcing = p.mass * p.epsilon * p.omega * p.omega;
@@ -32,17 +37,17 @@ impl OverhungRotor {
     }
 
     /// Total returning force over displacement, in the rotating frame.
-    fn stiffness(&self, u: f64, v: f64, p: &Nondimensional) -> f64 {
+    fn stiffness(&self, u: f64, v: f64, p: &Nondimensional, touching: bool) -> f64 {
         let square = u * u + v * v;
-        let contact = self.law.stiffness(square.sqrt(), p.beta, p.sharpness).value;
+        let contact = self.law.stiffness_touching(square.sqrt(), p.beta, p.sharpness, touching).value;
         1.0 - (1.0 - p.polar) * p.omega * p.omega + (1.0 - p.kappa) * p.gamma * square + p.kappa * contact
     }
 
     /// ∂fᵢ/∂xⱼ at one point.
     pub fn state_jacobian(&self, x: [f64; 4], p: &Nondimensional) -> [[f64; 4]; 4] {
         let [u, v, ..] = x;
-        let s = self.stiffness(u, v, p);
         let r = u.hypot(v);
+        let s = self.stiffness(u, v, p, r > 1.0);
         let contact = self.law.stiffness(r, p.beta, p.sharpness).by_radius;
         // (∂s/∂r)/r, so that ∂s/∂u = curl u and ∂s/∂v = curl v.
         let curl = 2.0 * (1.0 - p.kappa) * p.gamma + if r > 0.0 { p.kappa * contact / r } else { 0.0 };
@@ -169,6 +174,26 @@ impl VectorField for OverhungRotor {
         for l in 0..at.lanes {
             let (x, _) = lane(&at, l);
             out[l] = x[0].hypot(x[1]);
+        }
+    }
+
+    fn switch_count(&self) -> usize {
+        usize::from(self.law == ContactLaw::Piecewise)
+    }
+
+    fn switches(&self, at: Batch, out: &mut [f64]) {
+        for l in 0..at.lanes * self.switch_count() {
+            let ([u, v, ..], _) = lane(&at, l);
+            out[l] = (u * u + v * v).sqrt() - 1.0;
+        }
+    }
+
+    fn evaluate_switched(&self, at: Batch, signs: &[f64], f: &mut [f64]) {
+        for l in 0..at.lanes {
+            let (x, p) = lane(&at, l);
+            let touching = signs.get(l).is_some_and(|sign| *sign > 0.0);
+            let value = self.field_touching(x, &Nondimensional::from_parameters(p), touching);
+            (0..STATES).for_each(|i| f[i * at.lanes + l] = value[i]);
         }
     }
 }

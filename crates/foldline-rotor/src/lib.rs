@@ -38,6 +38,7 @@ mod field;
 mod given;
 mod jet;
 mod quantities;
+mod sharpness;
 mod spectrum;
 mod units;
 
@@ -46,5 +47,6 @@ pub use campbell::{Modes, Ratio, campbell, modes, resonances, undamped_modes};
 pub use contact::{ContactLaw, Stiffness};
 pub use field::OverhungRotor;
 pub use quantities::{Nondimensional, Scale, Si};
+pub use sharpness::{SmoothingError, exact_motion, smallest_sharpness, smoothing_errors};
 pub use spectrum::{Frame, Line, Spectrum, Whirl, mean_square};
 pub use units::{Dimension, Mistake, Unit, quantity};

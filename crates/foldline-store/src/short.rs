@@ -15,6 +15,9 @@ pub fn lines(diagram: &Diagram, plan: &Plan, model: &Model) -> Vec<String> {
     let asked: Vec<(&String, Option<(usize, f64)>)> = branches.chain(curves).collect();
     let never = asked.iter().filter(|(name, _)| diagram.branch(name).is_none());
     lines.extend(never.map(|(name, _)| format!("{name}: it never began")));
+    let simulated = plan.surveys.iter().map(|s| &s.name).chain(plan.sweeps.iter().map(|s| &s.name));
+    let missing = simulated.filter(|name| diagram.response_set(name).is_none());
+    lines.extend(missing.map(|name| format!("{name}: it is not complete")));
     for homotopy in &plan.homotopies {
         let legs: Vec<&Branch> = diagram.branches.iter().filter(|b| leg(&b.name, &homotopy.name).is_some()).collect();
         if legs.is_empty() {

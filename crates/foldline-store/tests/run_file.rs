@@ -2,7 +2,8 @@
 
 use foldline::contract::{Event, Observer, Verdict};
 use foldline::diagram::{
-    Branch, Cost, Cycle, Diagram, Ending, Family, Kind, Origin, Point, Solution, SpecialPoint, Trust,
+    Branch, Cost, Cycle, Diagram, Ending, Family, Kind, Motion, Origin, Point, Response, Responses, Search, Solution,
+    SpecialPoint, Trust,
 };
 use foldline_store::run_file::{Recorder, RunFileError, load, path_in};
 use foldline_store::study_file::{Study, parse_study};
@@ -73,10 +74,38 @@ fn diagram() -> Diagram {
     let mut curve = Branch::new("curve", Family::Cycle, 0, origin);
     curve.held = Some((Kind::PeriodDoubling, 2));
     curve.insert(point(0, true));
-    Diagram { branches: vec![main, cycles, third, curve] }
+    let response = |motion: Motion, ratio: Option<(u32, u32)>| Response {
+        value: awkward(5),
+        parameters: vec![awkward(5), awkward(1), awkward(0)],
+        motion,
+        period: ratio.map(|_| awkward(7)),
+        ratio,
+        multiplicity: 2,
+        // Nothing is known about the ranges of a motion that escaped.
+        ranges: if motion == Motion::Escaped {
+            Vec::new()
+        } else {
+            vec![[awkward(1), awkward(5)], [awkward(0), awkward(2)]]
+        },
+        hits: 7,
+        state: vec![awkward(4)],
+        settled_after: awkward(5),
+        error: awkward(0),
+    };
+    let motions = [Motion::Cycle, Motion::Equilibrium, Motion::Other, Motion::Escaped];
+    let responses = motions.map(|m| response(m, (m == Motion::Cycle).then_some((2, 1)))).to_vec();
+    let sets = [("what attracts", Search::Survey), ("down", Search::Sweep)];
+    let sets =
+        sets.map(|(name, search)| Responses { name: name.into(), search, free: 2, responses: responses.clone() });
+    Diagram { branches: vec![main, cycles, third, curve], responses: sets.to_vec() }
 }
 
 fn record(diagram: &Diagram, observer: &dyn Observer) {
+    // A set that is written again replaces itself.
+    diagram.responses.iter().chain(&diagram.responses).for_each(|set| {
+        assert_eq!(observer.observe(Event::Visited(&set.name, 0.5, 1, 4)), Verdict::Continue);
+        assert_eq!(observer.observe(Event::Responses(set)), Verdict::Continue);
+    });
     for branch in &diagram.branches {
         let mut bare = branch.clone();
         (bare.points, bare.special, bare.ends) = (Vec::new(), Vec::new(), [None, None]);
@@ -118,6 +147,7 @@ fn exactly(diagram: &Diagram) -> String {
             text += &of_point(&s.point);
         }
     }
+    text += &format!("{:?}", diagram.responses);
     text
 }
 
@@ -232,6 +262,33 @@ fn a_file_of_the_first_version_is_read_and_resumed() {
     record(&diagram(), &resumed);
     resumed.finish().unwrap();
     assert_eq!(exactly(&load(folder.path()).unwrap().diagram), exactly(&diagram()));
+}
+
+#[test]
+fn what_simulation_saw_can_be_read_by_name_and_a_file_without_it_is_read_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let recorder = Recorder::create(folder.path(), &study()).unwrap();
+    record(&diagram(), &recorder);
+    recorder.finish().unwrap();
+    let connection = rusqlite::Connection::open(path_in(folder.path())).unwrap();
+    let sql =
+        "SELECT count(*), max(x_max), max(mu), sum(ratio_first) FROM responses JOIN response_sets USING (response_set)
+               WHERE name = 'down'";
+    let row = connection
+        .query_row(sql, [], |r| {
+            Ok((r.get::<_, i64>(0)?, r.get::<_, f64>(1)?, r.get::<_, f64>(2)?, r.get::<_, i64>(3)?))
+        })
+        .unwrap();
+    assert_eq!(row, (4, 1.0 / 3.0, 1.0 / 3.0, 2));
+    // As an earlier program left it.
+    connection.execute_batch("DROP TABLE responses; DROP TABLE response_sets").unwrap();
+    drop(connection);
+    let back = load(folder.path()).unwrap().diagram;
+    assert_eq!((back.branches.len(), back.responses.len()), (4, 0));
+    let (recorder, _) = Recorder::resume(folder.path(), &study()).unwrap();
+    record(&diagram(), &recorder);
+    recorder.finish().unwrap();
+    assert_eq!(load(folder.path()).unwrap().diagram.responses.len(), 2);
 }
 
 fn refusal(result: Result<impl Sized, RunFileError>) -> String {

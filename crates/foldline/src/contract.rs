@@ -3,7 +3,7 @@
 //! **Idea.** Everything else in the crate is written against these few object-safe traits, so a model may be text, traced
 //! code or native Rust, and a curve may be an equilibrium, a cycle or a problem nobody has thought of yet.
 
-use crate::diagram::{Branch, Ending, Kind, Mesh, Point, SpecialPoint, Trust};
+use crate::diagram::{Branch, Ending, Kind, Mesh, Point, Responses, SpecialPoint, Trust};
 use num_complex::Complex64;
 
 /// The parameters of a batch: one set for all lanes, or one set per lane.
@@ -55,6 +55,20 @@ pub trait VectorField: Send + Sync {
 
     /// The outputs: writes `[output_count × lanes]`.
     fn outputs(&self, _at: Batch, _out: &mut [f64]) {}
+
+    /// How many switches the field has: scalars at whose zeros f or one of its derivatives jumps. 0 where it is smooth.
+    fn switch_count(&self) -> usize {
+        0
+    }
+
+    /// The switches: writes `[switch_count × lanes]`.
+    fn switches(&self, _at: Batch, _out: &mut [f64]) {}
+
+    /// f as it is where the switches have the given signs (±1, `[switch_count × lanes]`), continued smoothly beyond their
+    /// zeros: writes `[n × lanes]`.
+    fn evaluate_switched(&self, at: Batch, _signs: &[f64], f: &mut [f64]) {
+        self.evaluate(at, f);
+    }
 }
 
 /// The matrix of a Newton step could not be factorised.
@@ -193,6 +207,10 @@ pub enum Event<'a> {
     End(&'a Branch),
     /// A remark about a branch: a switch that led to a branch already known, a seed that was not found.
     Note(&'a str, &'a str),
+    /// A survey or sweep (its name) has settled at one more value of its parameter: the value, how many are done, of how many.
+    Visited(&'a str, f64, usize, usize),
+    /// A survey or sweep is complete.
+    Responses(&'a Responses),
 }
 
 /// What an observer wants.

@@ -2,6 +2,7 @@
 
 mod columns;
 mod format;
+mod responses;
 
 use crate::arguments::{Format, Table as Typed, What};
 use crate::failure::{Failure, Outcome};
@@ -60,6 +61,7 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
         What::Points => columns::points(&run.diagram, &run.model, &kept),
         What::Branches => columns::branches(&run.diagram, &run.model, &kept),
         What::Special => columns::special(&run.diagram, &run.model, &kept),
+        What::Responses => responses::responses(&run.diagram, &run.model),
         What::Notes => columns::notes(&run.notes, typed.branch.as_deref()),
     };
     let mut out = std::io::BufWriter::new(stdout().lock());
@@ -72,10 +74,15 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
     Ok(Outcome::Done)
 }
 
-/// Prints the special points as text.
+/// Prints the special points as text, and a line for what each survey and sweep saw.
 pub fn print_special(diagram: &Diagram, model: &Model) -> Result<(), Failure> {
     let mut out = std::io::BufWriter::new(stdout().lock());
-    format::text(&columns::special(diagram, model, &|_| true), &mut out)?;
+    if diagram.responses.is_empty() || !diagram.branches.is_empty() {
+        format::text(&columns::special(diagram, model, &|_| true), &mut out)?;
+    }
+    if !diagram.responses.is_empty() {
+        format::text(&responses::summary(diagram, model), &mut out)?;
+    }
     Ok(out.flush()?)
 }
 

@@ -12,6 +12,7 @@
 
 mod bytes;
 mod reader;
+mod responses;
 mod rows;
 mod schema;
 mod writer;

@@ -124,6 +124,7 @@ pub(super) fn load_diagram(connection: &Connection, path: &Path) -> Result<Diagr
         }
         diagram.branches.push(branch);
     }
+    diagram.responses = super::responses::load(connection, path)?;
     Ok(diagram)
 }
 

@@ -12,8 +12,13 @@ pub(super) struct Columns {
 
 impl Columns {
     pub(super) fn new(model: &Model) -> Columns {
-        let own = POINT_COLUMNS.iter().map(|(name, _)| name).chain(&OTHERS);
-        let mut taken: Vec<String> = own.map(|name| name.to_string()).collect();
+        let own: Vec<&str> = POINT_COLUMNS.iter().map(|(name, _)| *name).chain(OTHERS).collect();
+        Columns::beside(model, &own)
+    }
+
+    /// The columns of a model in a table that has the columns `fixed` besides.
+    pub(super) fn beside(model: &Model, fixed: &[&str]) -> Columns {
+        let mut taken: Vec<String> = fixed.iter().map(|s| s.to_string()).collect();
         // SQLite does not tell capitals from small letters in column names: of K and k the later becomes k_2.
         let mut unique = |name: String| {
             let mut candidate = name.clone();
@@ -106,6 +111,6 @@ pub(super) fn insert(table: &str, first: &[&str], columns: &Columns) -> String {
     format!("INSERT OR REPLACE INTO {table} ({}) VALUES ({marks})", names.join(", "))
 }
 
-fn quoted(name: &str) -> String {
+pub(super) fn quoted(name: &str) -> String {
     format!("\"{}\"", name.replace('"', "\"\""))
 }

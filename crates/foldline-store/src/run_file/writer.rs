@@ -3,7 +3,7 @@
 use super::reader::{Open, load_diagram, open};
 use super::rows::{ending_values, held_values, origin_values, values_of};
 use super::schema::{Columns, create, insert, upgrade};
-use super::{APPLICATION_ID, FORMAT_VERSION, RunFileError, path_in};
+use super::{APPLICATION_ID, FORMAT_VERSION, RunFileError, path_in, responses};
 use crate::study_file::Study;
 use foldline::contract::{Event, Observer, Verdict};
 use foldline::diagram::{Branch, Diagram, Ending, Point, SpecialPoint};
@@ -20,6 +20,9 @@ pub struct Recorder {
     path: PathBuf,
     insert_point: String,
     insert_special: String,
+    insert_response: String,
+    /// How many parameters and extremes the tables show by name.
+    shown: usize,
     state: Mutex<State>,
 }
 
@@ -126,10 +129,13 @@ impl Recorder {
             rows.collect::<Result<HashMap<String, i64>, _>>().map_err(failed)?
         };
         let columns = Columns::new(&study.model);
+        connection.execute_batch(&responses::create(&study.model)).map_err(failed)?;
         let special = ["branch", "kind", "position", "key", "unstable_before", "unstable_after", "error"];
         Ok(Recorder {
             insert_point: insert("points", &["branch", "position"], &columns),
             insert_special: insert("special_points", &special, &columns),
+            insert_response: responses::insert(&study.model),
+            shown: columns.names().count(),
             state: Mutex::new(State { connection, numbers, failure: None }),
             path,
         })
@@ -154,7 +160,8 @@ impl Recorder {
             Event::Point(branch, point) => state.point(&self.insert_point, branch, point),
             Event::Special(branch, special) => state.special(&self.insert_special, branch, special),
             Event::SideEnded(branch, side, ending) => state.side_ended(branch, side, ending),
-            Event::End(_) => Ok(()),
+            Event::End(_) | Event::Visited(..) => Ok(()),
+            Event::Responses(set) => responses::write(&mut state.connection, &self.insert_response, set, self.shown),
             Event::Note(branch, note) => {
                 state.connection.execute("INSERT OR IGNORE INTO notes VALUES (?, ?)", [branch, note]).map(|_| ())
             }

@@ -8,6 +8,7 @@ mod branches;
 mod curves;
 mod homotopies;
 mod items;
+mod responses;
 mod seeds;
 
 use crate::diagnostic::Diagnostic;
@@ -38,7 +39,7 @@ pub struct Study {
     pub plan: Plan,
 }
 
-const ROOT_KEYS: [&str; 11] = [
+const ROOT_KEYS: [&str; 13] = [
     "model",
     "title",
     "description",
@@ -50,6 +51,8 @@ const ROOT_KEYS: [&str; 11] = [
     "branch",
     "curve",
     "homotopy",
+    "survey",
+    "sweep",
 ];
 
 /// Reads a study file and the model that it names. Every mistake found is returned.
@@ -97,7 +100,8 @@ pub fn parse_study(text: &str, file: &str, model_text: &str, model_file: &str) -
 /// something to compute.
 pub fn is_study(text: &str) -> bool {
     let (root, _) = DeTable::parse_recoverable(text);
-    ["model", "seed", "branch", "curve", "homotopy"].iter().any(|key| root.get_ref().contains_key(*key))
+    let keys = ["model", "seed", "branch", "curve", "homotopy", "survey", "sweep"];
+    keys.iter().any(|key| root.get_ref().contains_key(*key))
 }
 
 fn parse(
@@ -117,6 +121,12 @@ fn parse(
     }
     let seeds = seeds::read(&mut walk, &root, &model, &defaults);
     let Items { branches, curves, homotopies } = items::read(&mut walk, &root, &model, &seeds);
+    let items = branches.iter().map(|b| &b.name).chain(curves.iter().map(|c| &c.name));
+    let items = items.chain(homotopies.iter().map(|h| &h.name)).map(String::as_str);
+    let taken: Vec<&str> = seeds.iter().map(|(_, s)| s.name.as_str()).chain(items).collect();
+    let surveys = responses::surveys(&mut walk, &root, &model, &defaults, &taken);
+    let taken: Vec<&str> = taken.into_iter().chain(surveys.iter().map(|s| s.name.as_str())).collect();
+    let sweeps = responses::sweeps(&mut walk, &root, &model, &seeds, &taken);
     if walk.found.is_empty() {
         check_seeds(&mut walk, &seeds, &model, &model_text, &model_file);
     }
@@ -124,7 +134,7 @@ fn parse(
         return Err(walk.found);
     }
     let seeds = seeds.into_iter().map(|(_, seed)| seed).collect();
-    let plan = Plan { tolerance, degree, seeds, branches, curves, homotopies };
+    let plan = Plan { tolerance, degree, seeds, branches, curves, homotopies, surveys, sweeps };
     Ok(Study { file: file.to_string(), text: text.to_string(), model_file, model_text, model, plan })
 }
 
@@ -186,7 +196,7 @@ fn unique_name(
         walk.report(
             value.span(),
             format!("the name \"{name}\" is used twice"),
-            "give every seed, branch, curve and homotopy a name of its own",
+            "give every seed, branch, curve, homotopy, survey and sweep a name of its own",
         );
     }
     Some(name)
@@ -230,5 +240,7 @@ mod tests {
         assert_eq!(keys("/$defs/branch/properties"), sorted(&branches::KEYS));
         assert_eq!(keys("/$defs/curve/properties"), sorted(&curves::KEYS));
         assert_eq!(keys("/$defs/homotopy/properties"), sorted(&homotopies::KEYS));
+        assert_eq!(keys("/$defs/survey/properties"), sorted(&responses::SURVEY_KEYS));
+        assert_eq!(keys("/$defs/sweep/properties"), sorted(&responses::SWEEP_KEYS));
     }
 }

@@ -13,21 +13,31 @@
 //!    its returns lies on that solution (`orbit`, `watch`);
 //! 7. the same solution found in several blocks is one attractor, named by its spectral ratio (`census`, `spectrum`).
 //!
+//! Beside this stands simulation that solves no equation for the motions it finds (`brute_force`, `settling`, `runner`, `measure`), to be
+//! compared with branches.
+//!
 //! **Fails when** an attractor is neither an equilibrium nor a cycle (its trajectories count as unsettled), or attracts so
 //! slowly that the returns do not contract measurably within the limit on the number of steps.
 
+mod brute_force;
 mod candidate;
 mod census;
+mod measure;
 mod orbit;
 mod returns;
+mod runner;
 mod sampling;
+mod settling;
 mod spectrum;
 #[cfg(test)]
 mod tests;
 mod watch;
+mod window;
 
+pub use brute_force::{Report, stepped_sweep, survey_by_simulation};
 pub use census::{settle, survey};
 pub use sampling::Sampling;
+pub use settling::Trial;
 pub use spectrum::{signed_spectrum, spectral_ratio};
 
 use crate::diagram::Point;

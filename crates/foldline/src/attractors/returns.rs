@@ -175,6 +175,23 @@ impl Returns {
         found.truncate(count);
         found
     }
+
+    /// The prediction over that number of crossings per period after which the trajectory itself comes closest, the fewest
+    /// of several that do. (A mean over the crossings of a period is a steady prediction too, and no state of the motion.)
+    pub(super) fn closest(&self, extent: &[f64]) -> Option<Prediction> {
+        let mut found: Vec<Prediction> = (1..=MOST_CROSSINGS).filter_map(|q| self.predict(q, extent)).collect();
+        let least = found.iter().fold(f64::INFINITY, |m, p| m.min(p.size));
+        found.retain(|p| p.size <= 10.0 * least + 1e-7);
+        found.into_iter().next()
+    }
+}
+
+/// (2) from m + 2 iterates, the newest first; differences are measured in `scale`.
+pub(super) fn limit_of(y: &[&[f64]], scale: &[f64]) -> Option<Vec<f64>> {
+    let difference = |pair: &[&[f64]]| (0..scale.len()).map(|i| (pair[0][i] - pair[1][i]) / scale[i]).collect();
+    let u: Vec<Vec<f64>> = y.windows(2).map(difference).collect();
+    let gamma = weights(&u)?;
+    Some((0..scale.len()).map(|i| gamma.iter().zip(y).map(|(g, y)| g * y[i]).sum()).collect())
 }
 
 /// γ of (1), from the normal equations G c = 1, γ = c / Σ c, slightly regularised.

@@ -37,20 +37,30 @@ pub fn signed_spectrum(cycle: &Cycle, whirl: [usize; 2], count: usize) -> Vec<(f
 /// -2 times the base frequency, and also at -2 and -4 times it, as after a period doubling. Lines at k and -k belong to the same
 /// frequency and count together; `None` where there is only one frequency.
 pub fn spectral_ratio(cycle: &Cycle, whirl: [usize; 2]) -> Option<(u32, u32)> {
-    let spectrum = signed_spectrum(cycle, whirl, COUNT);
-    let mut power = vec![0.0; COUNT / 2 + 1];
-    for (k, (_, amplitude)) in spectrum.iter().enumerate() {
-        power[k.abs_diff(COUNT / 2)] += amplitude.norm_sqr();
+    let n = cycle.dim();
+    if whirl.iter().any(|&i| i >= n) {
+        return None;
+    }
+    let states = cycle.uniform(COUNT);
+    lines(states.chunks_exact(n).map(|x| Complex64::new(x[whirl[0]], x[whirl[1]])).collect()).map(|(ratio, _)| ratio)
+}
+
+/// The ratio, and over how many periods of the lines the motion closes, from uniform samples over one period.
+pub(super) fn lines(mut z: Vec<Complex64>) -> Option<((u32, u32), u32)> {
+    let count = z.len();
+    FftPlanner::new().plan_fft_forward(count).process(&mut z);
+    let mut power = vec![0.0; count / 2 + 1];
+    for (k, amplitude) in z.iter().enumerate() {
+        power[k.min(count - k)] += amplitude.norm_sqr();
     }
     let mut lines: Vec<usize> = (1..power.len()).collect();
     lines.sort_by(|&a, &b| power[b].total_cmp(&power[a]));
     let (&first, &second) = (lines.first()?, lines.get(1)?);
-    // An empty spectrum has no lines at all.
-    if spectrum.is_empty() || power[second] <= FAINT * FAINT * power[first] {
+    if power[second] <= FAINT * FAINT * power[first] {
         return None;
     }
     let divisor = greatest_common_divisor(first, second);
-    Some(((first.max(second) / divisor) as u32, (first.min(second) / divisor) as u32))
+    Some((((first.max(second) / divisor) as u32, (first.min(second) / divisor) as u32), divisor as u32))
 }
 
 fn greatest_common_divisor(a: usize, b: usize) -> usize {

@@ -1,8 +1,10 @@
 //! What comes out: points, special points, branches, diagrams. Plain data.
 
 mod cycle;
+mod response;
 
 pub use cycle::Cycle;
+pub use response::{Motion, Response, Responses, Search};
 
 use num_complex::Complex64;
 use std::fmt;
@@ -362,11 +364,18 @@ impl Branch {
 pub struct Diagram {
     /// The branches.
     pub branches: Vec<Branch>,
+    /// What surveys and sweeps saw.
+    pub responses: Vec<Responses>,
 }
 
 impl Diagram {
     /// The branch of that name.
     pub fn branch(&self, name: &str) -> Option<&Branch> {
         self.branches.iter().find(|branch| branch.name == name)
+    }
+
+    /// The responses of the survey or sweep of that name.
+    pub fn response_set(&self, name: &str) -> Option<&Responses> {
+        self.responses.iter().find(|set| set.name == name)
     }
 }

@@ -15,18 +15,26 @@
 //! | is this branch known already? | [`known`] |
 //! | where does a special point go when a second parameter changes? | [`curves`] |
 //! | how does a family get to other parameter values? | [`homotopy`] |
+//! | does a solution depend on a parameter that should not matter? | [`persistence`] |
+//! | what does simulation see? | [`responses`] |
 
 pub mod curves;
 pub mod family;
 pub mod growth;
 pub mod homotopy;
 pub mod known;
+pub mod persistence;
 pub mod plan;
+pub mod responses;
 pub mod seeds;
 pub mod switch;
 pub mod system;
 
-pub use plan::{AttractorKey, BranchPlan, CurvePlan, HomotopyPlan, Plan, SeedPlan, SeedSource, Start, Switching};
+pub use persistence::{Persistence, persistence};
+pub use plan::{
+    AttractorKey, BranchPlan, CurvePlan, HomotopyPlan, Plan, SeedPlan, SeedSource, Start, SurveyPlan, SweepPlan,
+    Switching,
+};
 pub use seeds::attractors;
 pub use system::System;
 
@@ -56,5 +64,7 @@ pub fn run(system: &System, plan: &Plan, jobs: usize, earlier: Diagram, observer
             });
         }
     });
-    Diagram { branches: done.into_iter().flat_map(|slot| slot.into_inner().unwrap_or_default()).collect() }
+    let branches = done.into_iter().flat_map(|slot| slot.into_inner().unwrap_or_default()).collect();
+    let responses = responses::simulate(system, plan, &seeds, jobs, &earlier, observer);
+    Diagram { branches, responses }
 }

@@ -129,6 +129,36 @@ pub struct HomotopyPlan {
     pub max_points: usize,
 }
 
+/// Simulation from many starts at many values of a parameter.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SurveyPlan {
+    /// Unique name.
+    pub name: String,
+    /// Every parameter value `[k]`; that of the free parameter does not count.
+    pub parameters: Vec<f64>,
+    /// Index of the parameter that varies.
+    pub free: usize,
+    /// Its values.
+    pub values: Vec<f64>,
+    /// How many starts at each value.
+    pub starts: usize,
+    /// Seed of the random numbers.
+    pub random: u64,
+}
+
+/// Simulation from value to value of a parameter, each from the last state of the one before.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SweepPlan {
+    /// Unique name.
+    pub name: String,
+    /// Index of the seed it starts at.
+    pub seed: usize,
+    /// Index of the parameter that varies.
+    pub free: usize,
+    /// Its values, in the order in which they are visited.
+    pub values: Vec<f64>,
+}
+
 /// Everything a study asks for.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
@@ -144,4 +174,8 @@ pub struct Plan {
     pub curves: Vec<CurvePlan>,
     /// Homotopies.
     pub homotopies: Vec<HomotopyPlan>,
+    /// Surveys by simulation.
+    pub surveys: Vec<SurveyPlan>,
+    /// Stepped sweeps by simulation.
+    pub sweeps: Vec<SweepPlan>,
 }

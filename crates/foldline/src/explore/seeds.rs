@@ -30,13 +30,14 @@ impl Seeds {
     }
 }
 
-/// Finds every seed that a branch without points in `earlier` starts from.
+/// Finds every seed that a branch without points in `earlier`, or a sweep that is not there, starts from.
 pub fn find(system: &System, plan: &Plan, jobs: usize, earlier: &Diagram, observer: &dyn Observer) -> Seeds {
     let needed = |seed: usize| {
         let start = Start::Seed(seed);
         let branches = plan.branches.iter().filter(|b| b.start == start).map(|b| b.name.clone());
         let first_legs = plan.homotopies.iter().filter(|h| h.start == start).map(|h| format!("{}/1", h.name));
         branches.chain(first_legs).any(|name| earlier.branch(&name).is_none_or(|known| known.points.is_empty()))
+            || plan.sweeps.iter().any(|sweep| sweep.seed == seed && earlier.response_set(&sweep.name).is_none())
     };
     let mut censuses: Vec<(&SeedPlan, Census)> = Vec::new();
     let mut points = Vec::new();
@@ -87,7 +88,7 @@ pub fn attractors(
     })
 }
 
-fn sampling(system: &System, samples: usize, seed: u64, jobs: usize, tolerance: f64) -> Sampling {
+pub(super) fn sampling(system: &System, samples: usize, seed: u64, jobs: usize, tolerance: f64) -> Sampling {
     Sampling {
         ranges: system.ranges.clone(),
         scales: system.scales.clone(),

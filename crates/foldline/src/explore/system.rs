@@ -60,6 +60,7 @@ impl<'a> System<'a> {
     pub fn of_plan(model: &'a Model, plan: &Plan) -> System<'a> {
         let mut places: Vec<Vec<f64>> = plan.seeds.iter().map(|seed| seed.parameters.clone()).collect();
         places.extend(plan.seeds.iter().map(|seed| away(plan, &seed.parameters)));
+        places.extend(plan.surveys.iter().map(|survey| survey.parameters.clone()));
         let mut systems = places.iter().map(|place| System::of(model, place));
         let Some(mut common) = systems.next() else { return System::new(model) };
         for other in systems {

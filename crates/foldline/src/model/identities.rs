@@ -20,7 +20,7 @@ impl Graph {
     }
 
     /// Whether the value cannot be negative, by the form of the expression.
-    fn nonnegative(&self, id: Id) -> bool {
+    pub fn nonnegative(&self, id: Id) -> bool {
         match self.node(id) {
             Node::Constant(bits) => f64::from_bits(bits) >= 0.0,
             Node::Integer(_, n) => n % 2 == 0,

@@ -19,6 +19,7 @@ mod nearest;
 mod parser;
 mod run;
 mod source;
+mod switches;
 mod tape;
 
 pub use error::{Field, Item, ModelError};
@@ -31,6 +32,7 @@ use graph::Leaf;
 use std::collections::HashMap;
 use std::ops::Deref;
 use std::sync::{Arc, PoisonError, RwLock};
+use switches::Switches;
 use tape::Tape;
 
 /// A model: a vector field with names, units and outputs. Clones share everything.
@@ -78,6 +80,7 @@ struct Inner {
     compiled: Compiled,
     field: Tape,
     outputs: Tape,
+    switches: Switches,
     linear: RwLock<HashMap<Vec<usize>, Arc<Tape>>>,
     directional: RwLock<HashMap<(usize, bool), Arc<Tape>>>,
 }
@@ -96,11 +99,12 @@ impl Model {
         let compiled = compile(&source)?;
         let field = Tape::new(&compiled.graph, &[&compiled.field]);
         let outputs = Tape::new(&compiled.graph, &[&compiled.outputs]);
+        let switches = Switches::new(&compiled.graph, &compiled.field);
         let ModelSource { name, description, source, parameters, states, outputs: output_list, .. } = source;
         let whirl = compiled.whirl;
         let about = About { name, description, source, states, parameters, outputs: output_list, whirl };
         let (linear, directional) = (RwLock::default(), RwLock::default());
-        Ok(Model { inner: Arc::new(Inner { about, compiled, field, outputs, linear, directional }) })
+        Ok(Model { inner: Arc::new(Inner { about, compiled, field, outputs, switches, linear, directional }) })
     }
 
     /// Position of the parameter of that name.
@@ -201,5 +205,16 @@ impl VectorField for Model {
 
     fn outputs(&self, at: Batch, out: &mut [f64]) {
         self.inner.outputs.run(at, &[], &mut [out]);
+    }
+    fn switch_count(&self) -> usize {
+        self.inner.switches.count
+    }
+
+    fn switches(&self, at: Batch, out: &mut [f64]) {
+        self.inner.switches.values.run(at, &[], &mut [out]);
+    }
+
+    fn evaluate_switched(&self, at: Batch, signs: &[f64], f: &mut [f64]) {
+        self.inner.switches.given.run(at, &[signs], &mut [f]);
     }
 }

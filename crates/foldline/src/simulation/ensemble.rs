@@ -15,8 +15,13 @@
 //! **Departures.** A lane is computed from its own numbers only, so its result depends neither on the other lanes nor on
 //! how many there are, provided the vector field keeps its lanes apart too.
 //!
-//! **Fails when** f is discontinuous: the step shrinks there and the order is lost.
+//! **Fails when** f or a derivative jumps where the field names no switch: the step shrinks there and the order is lost. A
+//! trajectory that slides along a switch ends there.
 
+mod switching;
+
+use super::kink::PLACES;
+use super::shortened::Shortened;
 use super::tableau::{A, ERROR, STAGES};
 use super::{Arrival, Outcome, Step, Tolerance};
 use crate::contract::{Batch, Parameters, VectorField, Verdict};
@@ -34,6 +39,8 @@ const LONGEST: f64 = 1e100;
 pub struct Ensemble<'a> {
     field: &'a dyn VectorField,
     parameters: &'a [f64],
+    /// `[k × lanes]` where every trajectory has parameters of its own, else empty.
+    own: Vec<f64>,
     tolerance: Tolerance,
     n: usize,
     /// End of the time span, and the sign of the direction in which it lies.
@@ -47,6 +54,11 @@ pub struct Ensemble<'a> {
     next: Vec<f64>,
     stage: Vec<f64>,
     slopes: [Vec<f64>; STAGES],
+    /// `[switches × lanes]`: the sign of each, and its value at the start of the step, 0 where it has just changed sign.
+    signs: Vec<f64>,
+    switches: Vec<f64>,
+    /// `[switches × lanes]` values at each of [`PLACES`].
+    ahead: [Vec<f64>; PLACES.len()],
     arrivals: Vec<Option<Arrival>>,
 }
 
@@ -62,6 +74,8 @@ struct Lane {
     steps: usize,
     rejected: usize,
     bound: f64,
+    /// How often in succession a switch changed sign without getting on.
+    stuck: usize,
     done: Option<Outcome>,
 }
 
@@ -70,6 +84,31 @@ impl<'a> Ensemble<'a> {
     pub fn new(
         field: &'a dyn VectorField,
         parameters: &'a [f64],
+        tolerance: Tolerance,
+        starts: &[f64],
+        span: [f64; 2],
+    ) -> Ensemble<'a> {
+        Ensemble::begun(field, parameters, Vec::new(), tolerance, starts, span)
+    }
+
+    /// The same with parameters of its own for every trajectory: `parameters` `[count][k]`.
+    pub fn with_own_parameters(
+        field: &'a dyn VectorField,
+        parameters: &[f64],
+        tolerance: Tolerance,
+        starts: &[f64],
+        span: [f64; 2],
+    ) -> Ensemble<'a> {
+        let count = starts.len().checked_div(field.dim()).unwrap_or(0);
+        let k = field.parameter_count();
+        let own = (0..k).flat_map(|p| (0..count).map(move |l| parameters[l * k + p])).collect();
+        Ensemble::begun(field, &[], own, tolerance, starts, span)
+    }
+
+    fn begun(
+        field: &'a dyn VectorField,
+        parameters: &'a [f64],
+        own: Vec<f64>,
         tolerance: Tolerance,
         starts: &[f64],
         span: [f64; 2],
@@ -89,12 +128,15 @@ impl<'a> Ensemble<'a> {
                 steps: 0,
                 rejected: 0,
                 bound: BOUND * (1.0 + crate::linalg::max_abs(start)),
+                stuck: 0,
                 done: None,
             });
         }
+        let switches = vec![0.0; field.switch_count() * count];
         let mut ensemble = Ensemble {
             field,
             parameters,
+            own,
             tolerance,
             n,
             end: span[1],
@@ -106,6 +148,9 @@ impl<'a> Ensemble<'a> {
             stage: vec![0.0; n * count],
             slopes: std::array::from_fn(|_| vec![0.0; n * count]),
             x,
+            signs: vec![1.0; switches.len()],
+            ahead: std::array::from_fn(|_| switches.clone()),
+            switches,
             arrivals: vec![None; count],
         };
         ensemble.begin();
@@ -128,11 +173,13 @@ impl<'a> Ensemble<'a> {
     /// Integrates until every trajectory has ended; `observe` sees every accepted step and may stop its trajectory there.
     /// Returns the arrivals in the order of the starts.
     pub fn run(mut self, observe: &mut dyn FnMut(&Step) -> Verdict) -> Vec<Arrival> {
+        let mut again = Shortened::new(self.field);
         self.remove_finished();
         while !self.lanes.is_empty() {
             self.advance_stages();
+            self.look_ahead();
             for (l, error) in self.errors().into_iter().enumerate() {
-                self.judge(l, error, observe);
+                self.judge(l, error, &mut again, observe);
             }
             self.remove_finished();
         }
@@ -145,8 +192,30 @@ impl<'a> Ensemble<'a> {
             Source::Stage => &self.stage,
             Source::End => &self.next,
         };
-        let batch = Batch { lanes: self.lanes.len(), states, parameters: Parameters::Shared(self.parameters) };
-        self.field.evaluate(batch, &mut self.slopes[k]);
+        let batch = Batch { lanes: self.lanes.len(), states, parameters: shared_or_own(self.parameters, &self.own) };
+        match self.signs.is_empty() {
+            true => self.field.evaluate(batch, &mut self.slopes[k]),
+            false => self.field.evaluate_switched(batch, &self.signs, &mut self.slopes[k]),
+        }
+    }
+
+    /// The step that lane `l` tries.
+    fn step_of(&self, l: usize) -> Step<'_> {
+        let lane = &self.lanes[l];
+        let last = (self.end - lane.time - lane.step) * self.sign <= 0.0;
+        Step {
+            trajectory: lane.trajectory,
+            column: l,
+            lanes: self.lanes.len(),
+            time: lane.time,
+            length: lane.step,
+            end_time: if last { self.end } else { lane.time + lane.step },
+            from: &self.x,
+            to: &self.next,
+            slopes: &self.slopes,
+            parameters: shared_or_own(self.parameters, &self.own),
+            signs: &self.signs,
+        }
     }
 
     /// First slopes and first step lengths.
@@ -155,6 +224,7 @@ impl<'a> Ensemble<'a> {
             return;
         }
         let (n, lanes) = (self.n, self.lanes.len());
+        self.first_signs();
         self.evaluate(0, Source::Start);
         let mut size = vec![[0.0; 2]; lanes];
         for i in 0..n {
@@ -240,44 +310,42 @@ impl<'a> Ensemble<'a> {
         self.lanes.iter().zip(&sum).map(|(lane, sum)| lane.step.abs() * (sum * mean).sqrt()).collect()
     }
 
-    /// Accepts or rejects the step of lane `l`.
-    fn judge(&mut self, l: usize, error: f64, observe: &mut dyn FnMut(&Step) -> Verdict) {
-        let (n, lanes) = (self.n, self.lanes.len());
-        let tried = self.lanes[l].step;
-        if !error.is_finite() || error > 1.0 {
-            let factor = if error.is_finite() { (SAFETY * error.powf(-ALPHA)).clamp(0.2, 1.0) } else { 0.2 };
-            let lane = &mut self.lanes[l];
-            lane.rejected += 1;
-            lane.just_rejected = true;
-            lane.step *= factor;
-            if lane.step.abs() <= 4.0 * f64::EPSILON * lane.time.abs() || lane.step.abs() < 1e-300 {
-                lane.done = Some(if error.is_finite() { Outcome::StepTooSmall } else { Outcome::Escaped });
-            } else if lane.steps + lane.rejected >= self.step_limit {
-                lane.done = Some(Outcome::StepLimit);
-            }
-            return;
-        }
-        let last = (self.end - self.lanes[l].time - tried) * self.sign <= 0.0;
-        let end_time = if last { self.end } else { self.lanes[l].time + tried };
-        let verdict = observe(&Step {
-            trajectory: self.lanes[l].trajectory,
-            column: l,
-            lanes,
-            time: self.lanes[l].time,
-            length: tried,
-            end_time,
-            from: &self.x,
-            to: &self.next,
-            slopes: &self.slopes,
-        });
+    /// Makes the step of lane `l` shorter after an error that is too large.
+    fn reject(&mut self, l: usize, error: f64) {
+        let factor = if error.is_finite() { (SAFETY * error.powf(-ALPHA)).clamp(0.2, 1.0) } else { 0.2 };
         let lane = &mut self.lanes[l];
+        lane.rejected += 1;
+        lane.just_rejected = true;
+        lane.step *= factor;
+        if lane.step.abs() <= 4.0 * f64::EPSILON * lane.time.abs() || lane.step.abs() < 1e-300 {
+            lane.done = Some(if error.is_finite() { Outcome::StepTooSmall } else { Outcome::Escaped });
+        } else if lane.steps + lane.rejected >= self.step_limit {
+            lane.done = Some(Outcome::StepLimit);
+        }
+    }
+
+    /// Accepts or rejects the step of lane `l`.
+    fn judge(&mut self, l: usize, error: f64, again: &mut Shortened, observe: &mut dyn FnMut(&Step) -> Verdict) {
+        let (n, lanes) = (self.n, self.lanes.len());
+        if !error.is_finite() || error > 1.0 {
+            return self.reject(l, error);
+        }
+        let tried = self.lanes[l].step;
+        let kink = self.shortened(l, again);
+        let step = self.step_of(l);
+        let (end_time, last) = (step.end_time, step.end_time == self.end);
+        let nowhere = kink.as_ref().is_some_and(|kink| kink.theta == 0.0);
+        let verdict = if nowhere { Verdict::Continue } else { observe(&step) };
         let mut inside = true;
         for i in 0..n {
             let at = i * lanes + l;
-            inside &= self.next[at].abs() <= lane.bound;
+            inside &= self.next[at].abs() <= self.lanes[l].bound;
             self.x[at] = self.next[at];
             self.slopes[0][at] = self.slopes[STAGES - 1][at];
         }
+        let end = &self.ahead[PLACES.len() - 1];
+        self.switches.iter_mut().zip(end).skip(l).step_by(lanes).for_each(|(value, end)| *value = *end);
+        let lane = &mut self.lanes[l];
         lane.time = end_time;
         lane.steps += 1;
         // (1)
@@ -285,7 +353,7 @@ impl<'a> Ensemble<'a> {
         let growth = growth.clamp(0.2, if lane.just_rejected { 1.0 } else { 10.0 });
         lane.previous_error = error.max(1e-4);
         lane.just_rejected = false;
-        lane.step = (lane.step * growth).max(-self.longest).min(self.longest);
+        lane.step = (tried * growth).max(-self.longest).min(self.longest);
         let remaining = self.end - end_time;
         // A last step a little longer than planned saves a tiny one.
         if lane.step.abs() * 1.01 >= remaining.abs() {
@@ -302,6 +370,10 @@ impl<'a> Ensemble<'a> {
         } else {
             None
         };
+        if let Some(kink) = kink.filter(|_| self.lanes[l].done.is_none()) {
+            self.renew_switches(l, again);
+            self.pass(l, &kink, again);
+        }
     }
 
     /// Takes the lanes that are done out of the batch.
@@ -322,15 +394,18 @@ impl<'a> Ensemble<'a> {
             }
         }
         let kept: Vec<usize> = (0..lanes).filter(|&l| self.lanes[l].done.is_none()).collect();
-        for array in [&mut self.x, &mut self.slopes[0]] {
+        let of_lanes = [&mut self.x, &mut self.slopes[0], &mut self.own, &mut self.signs, &mut self.switches];
+        for array in of_lanes {
             let mut to = 0;
-            for i in 0..self.n {
+            for from in (0..array.len()).step_by(lanes) {
                 for &l in &kept {
-                    array[to] = array[i * lanes + l];
+                    array[to] = array[from + l];
                     to += 1;
                 }
             }
+            array.truncate(to);
         }
+        self.ahead.iter_mut().for_each(|values| values.truncate(self.signs.len()));
         let size = self.n * kept.len();
         self.slopes.iter_mut().for_each(|k| k.truncate(size));
         [&mut self.x, &mut self.next, &mut self.stage].into_iter().for_each(|v| v.truncate(size));
@@ -343,4 +418,8 @@ enum Source {
     Start,
     Stage,
     End,
+}
+
+fn shared_or_own<'p>(shared: &'p [f64], own: &'p [f64]) -> Parameters<'p> {
+    if own.is_empty() { Parameters::Shared(shared) } else { Parameters::PerLane(own) }
 }

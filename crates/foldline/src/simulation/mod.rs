@@ -1,7 +1,8 @@
 //! How does a trajectory run? Integration of one trajectory or of many together, and the crossings on the way.
 //!
 //! **Idea.** Trajectories are integrated as a batch: in every sweep each of them advances by one step of its own length, and
-//! the vector field is evaluated once per stage for all. A single trajectory is a batch of one.
+//! the vector field is evaluated once per stage for all. A single trajectory is a batch of one. Where the field names
+//! switches ([`crate::contract::VectorField::switches`]), every step ends at the first of them that changes sign.
 //!
 //! | question | file |
 //! |---|---|
@@ -11,12 +12,16 @@
 //! | where does a function of the state change sign? | [`Section`] |
 
 mod ensemble;
+mod kink;
 mod root;
 mod section;
+mod shortened;
 mod step;
 mod tableau;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod tests_kinks;
 mod trajectory;
 
 pub use ensemble::Ensemble;
@@ -49,7 +54,8 @@ pub enum Outcome {
     Stopped,
     /// The state, or f, ceased to be finite, or the state left every reasonable bound in finite time.
     Escaped,
-    /// The step fell below the resolution of the time: f is discontinuous or the problem is too stiff here.
+    /// The step fell below the resolution of the time: f jumps where the field names no switch, the trajectory slides along
+    /// a switch, or the problem is too stiff here.
     StepTooSmall,
     /// The limit on the number of steps was reached.
     StepLimit,

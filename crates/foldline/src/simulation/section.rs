@@ -102,7 +102,7 @@ pub(super) fn crossings(step: &Step, sections: &[Section], mut exact: impl FnMut
 }
 
 /// Adds the extrema that lie beyond zero between samples of the same sign.
-fn insert_extrema(samples: &mut Vec<[f64; 2]>, mut value: impl FnMut(f64) -> f64) {
+pub(super) fn insert_extrema(samples: &mut Vec<[f64; 2]>, mut value: impl FnMut(f64) -> f64) {
     let largest = samples.iter().fold(0.0, |m: f64, [_, g]| m.max(g.abs()));
     let mut extrema = Vec::new();
     for c in 0..samples.len() {

@@ -1,6 +1,7 @@
 //! One accepted step, and the state anywhere on it.
 
 use super::tableau::{DENSE, STAGES};
+use crate::contract::Parameters;
 
 /// An accepted step of one trajectory, with a continuous solution of order 4 between its ends.
 #[derive(Clone, Copy, Debug)]
@@ -17,6 +18,9 @@ pub struct Step<'a> {
     pub(super) to: &'a [f64],
     /// `[STAGES][n × lanes]`.
     pub(super) slopes: &'a [Vec<f64>; STAGES],
+    pub(super) parameters: Parameters<'a>,
+    /// `[switches × lanes]` signs of the switches along the step.
+    pub(super) signs: &'a [f64],
 }
 
 impl Step<'_> {

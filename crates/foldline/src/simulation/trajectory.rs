@@ -1,9 +1,9 @@
 //! One trajectory, with its crossings.
 
 use super::section::{Crossing, Section, crossings};
-use super::tableau::A;
+use super::shortened::Shortened;
 use super::{Arrival, Ensemble, Outcome, Step, Tolerance};
-use crate::contract::{Batch, Parameters, VectorField, Verdict};
+use crate::contract::{VectorField, Verdict};
 
 /// Integrates single trajectories of one vector field at fixed parameters.
 #[derive(Clone)]
@@ -52,13 +52,14 @@ impl<'a> Integrator<'a> {
         observe: &mut dyn FnMut(Passage) -> Verdict,
     ) -> Arrival {
         let mut stopped_at = None;
-        let mut stages = Stages::new(self.field, self.parameters);
+        let mut again = Shortened::new(self.field);
         let ensemble = Ensemble::new(self.field, self.parameters, self.tolerance.clone(), start, span)
             .with_step_limit(self.step_limit)
             .with_longest_step(self.longest);
         let arrivals = ensemble.run(&mut |step| {
             if !sections.is_empty() {
-                for crossing in crossings(step, sections, |theta, x| stages.state_into(step, theta, x)) {
+                again.of(step);
+                for crossing in crossings(step, sections, |theta, x| again.state_into(theta * step.length, x)) {
                     if observe(Passage::Crossing(&crossing)) == Verdict::Stop {
                         stopped_at = Some(crossing);
                         return Verdict::Stop;
@@ -84,39 +85,5 @@ impl<'a> Integrator<'a> {
     pub fn state_after(&self, start: &[f64], span: [f64; 2]) -> Option<Vec<f64>> {
         let arrival = self.trajectory(start, span, &[], &mut |_| Verdict::Continue);
         (arrival.outcome == Outcome::Reached).then_some(arrival.state)
-    }
-}
-
-/// Recomputes part of a step with the full order.
-struct Stages<'a> {
-    field: &'a dyn VectorField,
-    parameters: &'a [f64],
-    slopes: Vec<Vec<f64>>,
-    start: Vec<f64>,
-}
-
-impl<'a> Stages<'a> {
-    fn new(field: &'a dyn VectorField, parameters: &'a [f64]) -> Stages<'a> {
-        let n = field.dim();
-        Stages { field, parameters, slopes: vec![vec![0.0; n]; A.len()], start: vec![0.0; n] }
-    }
-
-    /// Writes the state a fraction `theta` into the step, by a step of that length.
-    fn state_into(&mut self, step: &Step, theta: f64, x: &mut [f64]) {
-        step.start_into(&mut self.start);
-        let h = theta * step.length;
-        for i in 0..x.len() {
-            self.slopes[0][i] = step.slopes[0][i * step.lanes + step.column];
-        }
-        for (s, row) in A.iter().enumerate() {
-            for i in 0..x.len() {
-                let change: f64 = row.iter().zip(&self.slopes).map(|(a, k)| a * k[i]).sum();
-                x[i] = self.start[i] + h * change;
-            }
-            if let Some(slope) = self.slopes.get_mut(s + 1) {
-                let batch = Batch { lanes: 1, states: x, parameters: Parameters::Shared(self.parameters) };
-                self.field.evaluate(batch, slope);
-            }
-        }
     }
 }

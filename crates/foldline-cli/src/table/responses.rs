@@ -1,0 +1,79 @@
+//! The tables of what surveys and sweeps saw.
+
+use super::{Cell, Column, Style, Table};
+use foldline::diagram::{Diagram, Motion, Response, Responses};
+use foldline::model::Model;
+
+/// One row for each response: set, search, every parameter, motion, ratio, multiplicity, period, the extremes of the outputs,
+/// hits, time until settled, error, and whether a sweep jumped there.
+pub fn responses(diagram: &Diagram, model: &Model) -> Table {
+    let mut columns = words(&["set", "search"]);
+    columns.extend(model.parameters.iter().map(|p| column(&p.name, Style::Varying)));
+    columns.extend(words(&["motion", "ratio"]));
+    columns.extend([column("multiplicity", Style::Number), column("period", Style::Number)]);
+    let extremes = |name: &str| [format!("{name}_min"), format!("{name}_max")];
+    columns.extend(model.outputs.iter().flat_map(|o| extremes(&o.name)).map(|name| column(&name, Style::Number)));
+    columns.extend([column("hits", Style::Number), column("settled_after", Style::Size)]);
+    columns.extend([column("error", Style::Size), column("jump", Style::Word)]);
+    let row = |set: &Responses, response: &Response, jumped: bool| {
+        let mut row = vec![Cell::Word(set.name.clone()), Cell::Word(set.search.name().into())];
+        let parameter = |k: usize| response.parameters.get(k).map_or(Cell::Empty, |v| Cell::Number(*v));
+        row.extend((0..model.parameters.len()).map(parameter));
+        row.push(Cell::Word(response.motion.name().into()));
+        row.push(Cell::Word(response.ratio.map_or_else(String::new, |(a, b)| format!("{a}:{b}"))));
+        row.push(Cell::Count(response.multiplicity.into()));
+        row.push(response.period.map_or(Cell::Empty, Cell::Number));
+        let n = model.states.len();
+        let range = |k: usize| response.ranges.get(k).map_or([Cell::Empty, Cell::Empty], |r| r.map(Cell::Number));
+        row.extend((n..n + model.outputs.len()).flat_map(range));
+        row.push(count(response.hits));
+        row.push(Cell::Number(response.settled_after));
+        row.push(if response.error.is_nan() { Cell::Empty } else { Cell::Number(response.error) });
+        row.push(Cell::Word(if jumped { "jump".into() } else { String::new() }));
+        row
+    };
+    let rows = diagram.responses.iter().flat_map(|set| {
+        let jumps = jumps(set);
+        set.responses.iter().enumerate().map(move |(k, r)| row(set, r, jumps.contains(&k))).collect::<Vec<_>>()
+    });
+    Table { columns, rows: rows.collect() }
+}
+
+/// One row for each set: what it varied, how many values it visited, what it met, where it jumped.
+pub fn summary(diagram: &Diagram, model: &Model) -> Table {
+    let mut columns = words(&["set", "search", "free"]);
+    columns.extend(["from", "to", "values"].map(|name| column(name, Style::Number)));
+    columns.extend(Motion::ALL.map(|motion| column(motion.name(), Style::Number)));
+    columns.push(column("jumps_at", Style::Word));
+    let row = |set: &Responses| {
+        let mut values: Vec<f64> = set.responses.iter().map(|r| r.value).collect();
+        values.dedup();
+        let bound = |value: Option<&f64>| value.map_or(Cell::Empty, |v| Cell::Number(*v));
+        let free = model.parameters.get(set.free).map_or_else(String::new, |p| p.name.clone());
+        let mut row = vec![Cell::Word(set.name.clone()), Cell::Word(set.search.name().into()), Cell::Word(free)];
+        row.extend([bound(values.first()), bound(values.last()), count(values.len())]);
+        row.extend(Motion::ALL.map(|motion| count(set.responses.iter().filter(|r| r.motion == motion).count())));
+        let places: Vec<String> = jumps(set).iter().map(|k| format!("{:.6}", set.responses[*k].value)).collect();
+        row.push(Cell::Word(places.join(" ")));
+        row
+    };
+    Table { columns, rows: diagram.responses.iter().map(row).collect() }
+}
+
+/// A survey starts anew at every value and does not jump.
+fn jumps(set: &Responses) -> Vec<usize> {
+    const FACTOR: f64 = 10.0;
+    if set.search == foldline::diagram::Search::Sweep { set.jumps(FACTOR) } else { Vec::new() }
+}
+
+fn words(names: &[&str]) -> Vec<Column> {
+    names.iter().map(|name| column(name, Style::Word)).collect()
+}
+
+fn column(name: &str, style: Style) -> Column {
+    Column { name: name.to_string(), style }
+}
+
+fn count(value: usize) -> Cell {
+    Cell::Count(i64::try_from(value).unwrap_or(i64::MAX))
+}

@@ -1,0 +1,104 @@
+//! A study that only simulates, through the command.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+const MODEL: &str = r#"name = "jumping cycle"
+description = "Radial: mu R + R^3 - R^5, a subcritical Hopf point at mu = 0 and a fold of cycles at mu = -1/4."
+whirl = ["x", "y"]
+[parameters]
+mu = 0.5
+[definitions]
+R = "hypot(x, y)"
+growth = "mu + R^2 - R^4"
+[states.x]
+equation = "growth*x - 2*y"
+[states.y]
+equation = "growth*y + 2*x"
+[outputs]
+R = { expression = "R" }
+"#;
+
+const STUDY: &str = r#"model = "model.toml"
+[[seed]]
+name = "cycle"
+attractor = "cycle"
+parameters = { mu = 0.5 }
+samples = 8
+[[survey]]
+name = "what attracts"
+free = "mu"
+values = [-0.5, -0.1, 0.4]
+starts = 12
+[[sweep]]
+name = "down"
+from = "cycle"
+free = "mu"
+range = [0.5, -0.46]
+count = 25
+"#;
+
+fn foldline(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_foldline")).args(arguments).current_dir(folder).output().unwrap()
+}
+
+fn printed(folder: &Path, arguments: &[&str]) -> String {
+    let output = foldline(folder, arguments);
+    assert!(output.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&output.stderr));
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// R of the stable cycle: R² = (1 + √(1 + 4 mu))/2.
+fn radius(mu: f64) -> f64 {
+    (0.5 * (1.0 + (1.0 + 4.0 * mu).sqrt())).sqrt()
+}
+
+#[test]
+fn surveys_and_sweeps_are_run_listed_and_not_repeated() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("model.toml"), MODEL).unwrap();
+    std::fs::write(folder.path().join("study.toml"), STUDY).unwrap();
+    assert!(printed(folder.path(), &["check", "study.toml"]).contains("0 branches, 1 survey, 1 sweep"));
+    let summary = printed(folder.path(), &["run", "study.toml"]);
+    assert!(summary.contains("what attracts") && summary.contains("down"), "{summary}");
+
+    let csv = printed(folder.path(), &["table", "runs/study", "--responses", "--format", "csv"]);
+    let mut lines = csv.lines().map(|line| line.split(',').collect::<Vec<_>>());
+    let heads = lines.next().unwrap();
+    let cell = |row: &[&str], name: &str| row[heads.iter().position(|h| *h == name).unwrap()].to_string();
+    let number = |row: &[&str], name: &str| cell(row, name).parse::<f64>().unwrap();
+    let rows: Vec<Vec<&str>> = lines.collect();
+    let of = |set: &'static str| rows.iter().filter(move |row| row[0] == set);
+
+    // Below the fold rest alone attracts, above the Hopf point the cycle alone, both in between.
+    let met: Vec<(String, String)> = of("what attracts").map(|row| (cell(row, "mu"), cell(row, "motion"))).collect();
+    let mut expected = [("-0.5", "equilibrium"), ("-0.1", "equilibrium"), ("-0.1", "cycle"), ("0.4", "cycle")]
+        .map(|(a, b)| (a.to_string(), b.to_string()))
+        .to_vec();
+    let sorted = |mut list: Vec<(String, String)>| {
+        list.sort();
+        list
+    };
+    expected.sort();
+    assert_eq!(sorted(met), expected);
+    let hits: f64 = of("what attracts").map(|row| number(row, "hits")).sum();
+    assert_eq!(hits, 36.0);
+    for row in rows.iter().filter(|row| cell(row, "motion") == "cycle") {
+        // The cycle settles until its returns agree to 1e-7, and attracts at least like e^(-0.1 t).
+        assert!((number(row, "R_max") - radius(number(row, "mu"))).abs() < 1e-5, "{row:?}");
+        assert!((number(row, "period") - std::f64::consts::PI).abs() < 1e-6, "{row:?}");
+    }
+    // The sweep stays on the cycle down to its fold and falls to rest there.
+    for row in of("down") {
+        let on_the_cycle = number(row, "mu") > -0.25;
+        assert_eq!(cell(row, "motion") == "cycle", on_the_cycle, "{row:?}");
+    }
+    let jumps: Vec<f64> = of("down").filter(|row| cell(row, "jump") == "jump").map(|row| number(row, "mu")).collect();
+    assert!(jumps.len() == 1 && (jumps[0] + 0.26).abs() < 1e-9, "{jumps:?}");
+
+    let again = foldline(folder.path(), &["run", "study.toml", "--resume"]);
+    assert!(again.status.success());
+    let said = String::from_utf8(again.stderr).unwrap();
+    assert!(!said.contains("motions met"), "what is done is repeated: {said}");
+    assert_eq!(printed(folder.path(), &["table", "runs/study", "--responses", "--format", "csv"]), csv);
+}

@@ -1,0 +1,168 @@
+//! What surveys and sweeps saw, as rows, and back.
+//!
+//! **Idea.** A set is written when it is complete, in one transaction. Files of earlier programs lack the tables; they are made
+//! when such a run goes on, and a reader that finds none reads no responses.
+
+use super::RunFileError;
+use super::bytes::{pack, pack_pairs, unpack, unpack_pairs};
+use super::schema::{Columns, quoted};
+use foldline::diagram::{Motion, Response, Responses, Search};
+use foldline::model::Model;
+use rusqlite::types::Value;
+use rusqlite::{Connection, Row, params, params_from_iter};
+use std::path::Path;
+
+const FIRST: [&str; 12] = [
+    "response_set",
+    "number",
+    "value",
+    "motion",
+    "period",
+    "ratio_first",
+    "ratio_second",
+    "multiplicity",
+    "hits",
+    "settled_after",
+    "error",
+    "rowid",
+];
+const LAST: [&str; 4] = ["parameter_bytes", "state_bytes", "range_bytes", "scalar_bytes"];
+
+fn columns(model: &Model) -> Columns {
+    Columns::beside(model, &FIRST.into_iter().chain(LAST).collect::<Vec<_>>())
+}
+
+/// The statements that make the tables where they are missing.
+pub(super) fn create(model: &Model) -> String {
+    let shown: String = columns(model).names().map(|name| format!("{} REAL, ", quoted(name))).collect();
+    format!(
+        "CREATE TABLE IF NOT EXISTS response_sets (response_set INTEGER PRIMARY KEY, name TEXT NOT NULL UNIQUE,
+             search TEXT NOT NULL, free INTEGER NOT NULL);
+         CREATE TABLE IF NOT EXISTS responses (response_set INTEGER NOT NULL REFERENCES response_sets,
+             number INTEGER NOT NULL, value REAL, motion TEXT NOT NULL, period REAL, ratio_first INTEGER,
+             ratio_second INTEGER, multiplicity INTEGER NOT NULL, hits INTEGER NOT NULL, settled_after REAL, error REAL,
+             {shown}
+             parameter_bytes BLOB NOT NULL, state_bytes BLOB NOT NULL, range_bytes BLOB NOT NULL,
+             scalar_bytes BLOB NOT NULL, PRIMARY KEY (response_set, number));"
+    )
+}
+
+/// The statement that inserts a response.
+pub(super) fn insert(model: &Model) -> String {
+    let columns = columns(model);
+    let shown: Vec<String> = columns.names().map(|name| quoted(name)).collect();
+    let fixed = |names: &[&str]| names.iter().map(|s| s.to_string()).collect::<Vec<_>>();
+    let names = [fixed(&FIRST[..FIRST.len() - 1]), shown, fixed(&LAST)].concat();
+    let marks = vec!["?"; names.len()].join(", ");
+    format!("INSERT OR REPLACE INTO responses ({}) VALUES ({marks})", names.join(", "))
+}
+
+/// Writes a complete set.
+pub(super) fn write(connection: &mut Connection, sql: &str, set: &Responses, shown: usize) -> rusqlite::Result<()> {
+    let transaction = connection.transaction()?;
+    transaction.execute(
+        "INSERT INTO response_sets (name, search, free) VALUES (?1, ?2, ?3)
+         ON CONFLICT (name) DO UPDATE SET search = ?2, free = ?3",
+        params![set.name, set.search.name(), set.free as i64],
+    )?;
+    let query = "SELECT response_set FROM response_sets WHERE name = ?";
+    let number: i64 = transaction.query_row(query, [&set.name], |row| row.get(0))?;
+    transaction.execute("DELETE FROM responses WHERE response_set = ?", [number])?;
+    for (k, response) in set.responses.iter().enumerate() {
+        let first = [Value::Integer(number), Value::Integer(k as i64)];
+        let values = first.into_iter().chain(values_of(response, shown));
+        transaction.prepare_cached(sql)?.execute(params_from_iter(values))?;
+    }
+    transaction.commit()
+}
+
+/// `shown` is how many parameters and extremes have columns of their own; where the motion has none they stay empty.
+fn values_of(response: &Response, shown: usize) -> Vec<Value> {
+    let (first, second) = response.ratio.unzip();
+    let integer = |value: Option<u32>| value.map_or(Value::Null, |v| Value::Integer(v.into()));
+    let mut values = vec![
+        Value::Real(response.value),
+        Value::Text(response.motion.name().to_string()),
+        response.period.map_or(Value::Null, Value::Real),
+        integer(first),
+        integer(second),
+        integer(Some(response.multiplicity)),
+        Value::Integer(i64::try_from(response.hits).unwrap_or(i64::MAX)),
+        Value::Real(response.settled_after),
+        Value::Real(response.error),
+    ];
+    let numbers = response.parameters.iter().chain(response.ranges.as_flattened()).map(|v| Value::Real(*v));
+    values.extend(numbers.chain(std::iter::repeat(Value::Null)).take(shown));
+    let scalars = [response.value, response.period.unwrap_or(0.0), response.settled_after, response.error];
+    values.extend([
+        Value::Blob(pack(&response.parameters)),
+        Value::Blob(pack(&response.state)),
+        Value::Blob(pack_pairs(&response.ranges)),
+        Value::Blob(pack(&scalars)),
+    ]);
+    values
+}
+
+/// All sets, in the order in which they were completed.
+pub(super) fn load(connection: &Connection, path: &Path) -> Result<Vec<Responses>, RunFileError> {
+    let failed = |e| RunFileError::Database(path.to_path_buf(), e);
+    let damaged = |what: String| RunFileError::Damaged(path.to_path_buf(), what);
+    let there = "SELECT count(*) > 0 FROM sqlite_master WHERE type = 'table' AND name = 'responses'";
+    if !connection.query_row(there, [], |row| row.get::<_, bool>(0)).map_err(failed)? {
+        return Ok(Vec::new());
+    }
+    let mut statement = connection.prepare("SELECT * FROM response_sets ORDER BY response_set").map_err(failed)?;
+    let mut rows = statement.query([]).map_err(failed)?;
+    let mut sets = Vec::new();
+    while let Some(row) = rows.next().map_err(failed)? {
+        let (number, mut set) = set_in(row).map_err(&damaged)?;
+        let mut statement = connection
+            .prepare_cached("SELECT * FROM responses WHERE response_set = ? ORDER BY number")
+            .map_err(failed)?;
+        let mut rows = statement.query([number]).map_err(failed)?;
+        while let Some(row) = rows.next().map_err(failed)? {
+            set.responses.push(response_in(row).map_err(&damaged)?);
+        }
+        sets.push(set);
+    }
+    Ok(sets)
+}
+
+fn set_in(row: &Row) -> Result<(i64, Responses), String> {
+    let text = |name: &str| row.get::<_, String>(name).map_err(|e| e.to_string());
+    let search = text("search")?;
+    let free: i64 = row.get("free").map_err(|e| e.to_string())?;
+    let set = Responses {
+        name: text("name")?,
+        search: Search::from_name(&search).ok_or_else(|| format!("unknown search \"{search}\""))?,
+        free: usize::try_from(free).map_err(|e| e.to_string())?,
+        responses: Vec::new(),
+    };
+    Ok((row.get("response_set").map_err(|e| e.to_string())?, set))
+}
+
+fn response_in(row: &Row) -> Result<Response, String> {
+    let blob = |name: &str| row.get::<_, Vec<u8>>(name).map_err(|e| e.to_string());
+    let numbers =
+        |name: &str| unpack(&blob(name)?).ok_or_else(|| format!("{name} has a length that is no multiple of 8"));
+    let count = |name: &str| row.get::<_, Option<u32>>(name).map_err(|e| e.to_string());
+    let motion: String = row.get("motion").map_err(|e| e.to_string())?;
+    let [value, period, settled_after, error] = numbers("scalar_bytes")?[..] else {
+        return Err("scalar_bytes of a response does not have four numbers".to_string());
+    };
+    let motion = Motion::from_name(&motion).ok_or_else(|| format!("unknown motion \"{motion}\""))?;
+    let has_period = row.get::<_, Option<f64>>("period").map_err(|e| e.to_string())?.is_some();
+    Ok(Response {
+        value,
+        parameters: numbers("parameter_bytes")?,
+        motion,
+        period: has_period.then_some(period),
+        ratio: count("ratio_first")?.zip(count("ratio_second")?),
+        multiplicity: count("multiplicity")?.unwrap_or(1),
+        ranges: unpack_pairs(&blob("range_bytes")?).ok_or("range_bytes is no list of pairs")?,
+        hits: row.get::<_, i64>("hits").ok().and_then(|n| usize::try_from(n).ok()).ok_or("hits is no count")?,
+        state: numbers("state_bytes")?,
+        settled_after,
+        error,
+    })
+}

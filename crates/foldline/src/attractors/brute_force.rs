@@ -1,0 +1,129 @@
+//! What simulation alone sees: brute force over starts and parameter values, and stepped sweeps.
+//!
+//! **Idea.** A survey lets many starts settle at every value of a parameter and counts motions that agree as one. A stepped
+//! sweep lets one trajectory settle at the first value and starts at each next one from the last state before. Neither
+//! knows of branches: a motion is recorded as the trajectory shows it (`settling`, `measure`).
+
+use super::Sampling;
+use super::measure::response;
+use super::settling::{Settled, Trial, settle_together};
+use crate::contract::Verdict;
+use crate::diagram::{Motion, Response};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+
+/// Trajectories that are integrated together.
+const BLOCK: usize = 64;
+/// Motions that agree to this in their period, and in the ranges of their states relative to scale and size, are one.
+const SAME: f64 = 1e-4;
+
+/// Receives the responses at one value as soon as they are known.
+pub type Report<'a> = &'a (dyn Fn(&[Response]) -> Verdict + Sync);
+
+/// The motions at every one of `values` of the parameter `free`, the others as in `parameters` `[k]`, from the starts of
+/// `sampling`. Values are reported in the order in which they are finished and returned in their own order; of one value the
+/// motion reached most often comes first. A report that says stop ends the survey after the values under way.
+pub fn survey_by_simulation(
+    trial: &Trial,
+    sampling: &Sampling,
+    parameters: &[f64],
+    free: usize,
+    values: &[f64],
+    report: Report,
+) -> Vec<Response> {
+    let starts = sampling.starts();
+    let n = trial.field.dim();
+    let (next, stop) = (AtomicUsize::new(0), AtomicBool::new(false));
+    let done: Mutex<Vec<(usize, Vec<Response>)>> = Mutex::new(Vec::new());
+    let work = || {
+        while !stop.load(Ordering::Relaxed) {
+            let index = next.fetch_add(1, Ordering::Relaxed);
+            let Some(&value) = values.get(index) else { return };
+            let mut own = parameters.to_vec();
+            own[free] = value;
+            let settled: Vec<Settled> = starts
+                .chunks((BLOCK * n).max(1))
+                .flat_map(|block| settle_together(trial, &own.repeat(block.len() / n), block))
+                .collect();
+            let found = grouped(trial, settled.iter().map(|settled| response(trial, &own, free, settled)).collect());
+            if report(&found) == Verdict::Stop {
+                stop.store(true, Ordering::Relaxed);
+            }
+            if let Ok(mut done) = done.lock() {
+                done.push((index, found));
+            }
+        }
+    };
+    std::thread::scope(|scope| (0..trial.jobs.clamp(1, values.len().max(1))).for_each(|_| drop(scope.spawn(work))));
+    let mut done = done.into_inner().unwrap_or_default();
+    done.sort_by_key(|(index, _)| *index);
+    done.into_iter().flat_map(|(_, found)| found).collect()
+}
+
+/// One response for all that agree, by falling number of hits.
+fn grouped(trial: &Trial, all: Vec<Response>) -> Vec<Response> {
+    let mut found: Vec<Response> = Vec::new();
+    for response in all {
+        match found.iter_mut().find(|known| agree(trial, known, &response)) {
+            Some(known) => {
+                known.hits += 1;
+                known.settled_after = known.settled_after.max(response.settled_after);
+                // Of a motion without a period each stretch sees a part.
+                if known.motion == Motion::Other {
+                    for (a, b) in known.ranges.iter_mut().zip(&response.ranges) {
+                        *a = [a[0].min(b[0]), a[1].max(b[1])];
+                    }
+                }
+            }
+            None => found.push(response),
+        }
+    }
+    found.sort_by_key(|response| std::cmp::Reverse(response.hits));
+    found
+}
+
+fn agree(trial: &Trial, a: &Response, b: &Response) -> bool {
+    if a.motion != b.motion {
+        return false;
+    }
+    // Outputs follow from the states, and nothing is known about their scale.
+    let close = |tolerance: f64| {
+        a.ranges.iter().zip(&b.ranges).zip(trial.scales).all(|((p, q), scale)| {
+            let size = scale.max(p[0].abs()).max(p[1].abs());
+            (p[0] - q[0]).abs() <= tolerance * size && (p[1] - q[1]).abs() <= tolerance * size
+        })
+    };
+    match (a.period, b.period) {
+        (Some(p), Some(q)) => (p - q).abs() <= SAME * p && close(SAME),
+        // Stretches of chaos agree roughly.
+        (None, None) if a.motion == Motion::Other => close(0.2),
+        (None, None) => close(SAME),
+        _ => false,
+    }
+}
+
+/// A stepped sweep: the motion to which the trajectory from `start` `[n]` settles at the first of `values`, then at each next
+/// value the one to which it settles from its last state. It ends early where the trajectory escapes, or a report says stop.
+pub fn stepped_sweep(
+    trial: &Trial,
+    parameters: &[f64],
+    free: usize,
+    values: &[f64],
+    start: &[f64],
+    report: Report,
+) -> Vec<Response> {
+    let mut found: Vec<Response> = Vec::new();
+    let (mut own, mut state) = (parameters.to_vec(), start.to_vec());
+    for &value in values {
+        own[free] = value;
+        let Some(settled) = settle_together(trial, &own, &state).pop() else { break };
+        let response = response(trial, &own, free, &settled);
+        state.clone_from(&response.state);
+        let over = response.motion == Motion::Escaped || report(std::slice::from_ref(&response)) == Verdict::Stop;
+        found.push(response);
+        if over {
+            break;
+        }
+    }
+    found
+}

@@ -1,0 +1,163 @@
+//! A settled motion, measured on one more stretch of its trajectory.
+//!
+//! **Idea.** From a state of the motion the trajectory is integrated more accurately than before: a cycle over its period,
+//! which is where it returns to the plane across its start; anything else over a number of steps. The stretch is sampled
+//! uniformly in time; extremes are those of parabolas through three samples.
+
+use super::settling::{Settled, Trial};
+use super::spectrum::lines;
+use crate::contract::{Batch, Parameters, Verdict};
+use crate::diagram::{Motion, Response};
+use crate::simulation::{Ensemble, Step, Tolerance};
+use num_complex::Complex64;
+
+/// Accuracy of the integration, relative.
+const INTEGRATION: f64 = 1e-10;
+/// Samples over one period: a parabola through three of them misses the maximum of the k-th harmonic by (2πk/SAMPLES)⁴/128.
+const SAMPLES: usize = 2048;
+/// Steps over which a motion that is neither at rest nor periodic is watched.
+const WATCHED: usize = 20_000;
+
+/// The response to which a trajectory settled, at the parameter values `parameters`, with one hit.
+pub(super) fn response(trial: &Trial, parameters: &[f64], free: usize, settled: &Settled) -> Response {
+    let mut response = Response {
+        value: parameters.get(free).copied().unwrap_or(0.0),
+        parameters: parameters.to_vec(),
+        motion: settled.motion,
+        period: None,
+        ratio: None,
+        multiplicity: 1,
+        ranges: Vec::new(),
+        hits: 1,
+        state: settled.state.clone(),
+        settled_after: settled.time,
+        error: settled.error,
+    };
+    match settled.motion {
+        Motion::Escaped => {}
+        Motion::Equilibrium => response.ranges = ranges(trial, parameters, &settled.state),
+        Motion::Cycle => cycle(trial, parameters, settled, &mut response),
+        Motion::Other => other(trial, parameters, &mut response),
+    }
+    response
+}
+
+fn tolerance(trial: &Trial) -> Tolerance {
+    Tolerance { relative: INTEGRATION, absolute: trial.scales.iter().map(|s| INTEGRATION * s).collect() }
+}
+
+/// One period, from the start to where the trajectory comes back through the plane across its velocity there.
+fn cycle(trial: &Trial, parameters: &[f64], settled: &Settled, response: &mut Response) {
+    let n = trial.field.dim();
+    let start = &settled.state;
+    let mut normal = vec![0.0; n];
+    let at = Batch { lanes: 1, states: start, parameters: Parameters::Shared(parameters) };
+    trial.field.evaluate(at, &mut normal);
+    normal.iter_mut().zip(&settled.extent).for_each(|(f, e)| *f /= e * e);
+    let side = |x: &[f64]| -> f64 { (0..n).map(|i| normal[i] * (x[i] - start[i])).sum() };
+    let (mut states, mut back) = (Vec::with_capacity(SAMPLES * n), None);
+    let (mut x, mut before) = (vec![0.0; n], 0.0);
+    let spacing = settled.period / SAMPLES as f64;
+    // Long enough for the period to be a little larger than expected.
+    let span = [0.0, 1.02 * settled.period];
+    let run = Ensemble::new(trial.field, parameters, tolerance(trial), start, span);
+    run.run(&mut |step| {
+        sample(step, spacing, &mut states, n);
+        step.end_into(&mut x);
+        let here = side(&x);
+        if before < 0.0 && here >= 0.0 && step.end_time() > 0.98 * settled.period {
+            let theta = crossing(step, &side, &mut x);
+            step.state_into(theta, &mut x);
+            back = Some((step.time_at(theta), x.clone()));
+            return Verdict::Stop;
+        }
+        before = here;
+        Verdict::Continue
+    });
+    states.truncate(SAMPLES * n);
+    response.ranges = ranges(trial, parameters, &states);
+    if let Some((period, state)) = back {
+        let gap = |i: usize| (state[i] - start[i]).abs() / settled.extent[i];
+        response.error = (0..n).map(gap).fold(response.error, f64::max);
+        response.period = Some(period);
+        response.state = state;
+    } else {
+        // It does not come back: what looked settled is not.
+        response.motion = Motion::Other;
+        return;
+    }
+    if let Some([u, v]) = trial.whirl {
+        let z: Vec<Complex64> = states.chunks_exact(n).map(|x| Complex64::new(x[u], x[v])).collect();
+        if let Some((ratio, multiplicity)) = lines(z) {
+            (response.ratio, response.multiplicity) = (Some(ratio), multiplicity);
+        }
+    }
+}
+
+/// The fraction of the step at which `side` changes sign.
+fn crossing(step: &Step, side: &dyn Fn(&[f64]) -> f64, x: &mut [f64]) -> f64 {
+    let (mut a, mut b) = (0.0, 1.0);
+    for _ in 0..60 {
+        let middle = 0.5 * (a + b);
+        step.state_into(middle, x);
+        if side(x) < 0.0 { a = middle } else { b = middle }
+    }
+    0.5 * (a + b)
+}
+
+/// Appends the states at the multiples of `spacing` that lie in the step.
+fn sample(step: &Step, spacing: f64, states: &mut Vec<f64>, n: usize) {
+    let mut x = vec![0.0; n];
+    loop {
+        let time = (states.len() / n) as f64 * spacing;
+        if time > step.end_time() {
+            return;
+        }
+        step.state_into((time - step.start_time()) / (step.end_time() - step.start_time()), &mut x);
+        states.extend_from_slice(&x);
+    }
+}
+
+/// The motion goes on for a while, and its extremes are kept.
+fn other(trial: &Trial, parameters: &[f64], response: &mut Response) {
+    const PARTS: usize = 4;
+    let n = trial.field.dim();
+    let (mut states, mut x) = (Vec::new(), vec![0.0; n]);
+    let run = Ensemble::new(trial.field, parameters, tolerance(trial), &response.state, [0.0, f64::INFINITY]);
+    let arrivals = run.with_step_limit(WATCHED).run(&mut |step| {
+        for part in 1..=PARTS {
+            step.state_into(part as f64 / PARTS as f64, &mut x);
+            states.extend_from_slice(&x);
+        }
+        Verdict::Continue
+    });
+    response.ranges = ranges(trial, parameters, &states);
+    if let Some(arrival) = arrivals.into_iter().next() {
+        response.state = arrival.state;
+    }
+}
+
+/// Smallest and largest value of every state, then of every output, over `states` `[sample][n]`.
+fn ranges(trial: &Trial, parameters: &[f64], states: &[f64]) -> Vec<[f64; 2]> {
+    let n = trial.field.dim();
+    let count = states.len() / n;
+    let major: Vec<f64> = (0..n).flat_map(|i| (0..count).map(move |s| states[s * n + i])).collect();
+    let mut outputs = vec![0.0; trial.field.output_count() * count];
+    let at = Batch { lanes: count, states: &major, parameters: Parameters::Shared(parameters) };
+    trial.field.outputs(at, &mut outputs);
+    major.chunks_exact(count).chain(outputs.chunks_exact(count)).map(extremes).collect()
+}
+
+/// Smallest and largest value, between the samples too.
+fn extremes(values: &[f64]) -> [f64; 2] {
+    let mut found = values.iter().fold([f64::MAX, f64::MIN], |[low, high], v| [low.min(*v), high.max(*v)]);
+    for w in values.windows(3) {
+        let (slope, curvature) = (0.5 * (w[2] - w[0]), w[0] - 2.0 * w[1] + w[2]);
+        // The summit of the parabola, where it lies between the neighbours.
+        if slope.abs() < curvature.abs() {
+            let summit = w[1] - 0.5 * slope * slope / curvature;
+            found = [found[0].min(summit), found[1].max(summit)];
+        }
+    }
+    found
+}

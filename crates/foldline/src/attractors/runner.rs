@@ -1,0 +1,284 @@
+//! One trajectory on its way to a settled motion.
+//!
+//! **Idea.** At every return to a plane the limit of the returns is predicted; at the end of every window of steps the extent
+//! of the motion is taken, and its limit predicted if it is shrinking. Each round has one of three ends: the motion repeats
+//! itself or rests, it has been seen to contract and goes on close to the predicted limit, or its steps are used up.
+
+use super::returns::{Prediction, Returns};
+use super::settling::{Settled, Trial};
+use super::window::Window;
+use crate::contract::{Batch, Parameters, Verdict};
+use crate::diagram::Motion;
+use crate::simulation::{Outcome, Step};
+
+/// Steps per window.
+const WINDOW: usize = 128;
+/// Last difference of returns, relative to the extent, at which a cycle has settled.
+const SETTLED: f64 = 1e-7;
+/// The same when no more steps are left.
+const NEARLY: f64 = 1e-4;
+/// Extent of a window, relative to scale and size, at which a trajectory rests.
+const RESTS: f64 = 1e-6;
+/// Extent of a window, relative to scale and size, below which a motion that shrinks is likely to come to rest.
+const SMALL: f64 = 0.1;
+/// Shrinking over the windows of a round after which the limit is predicted.
+const SHRUNK: f64 = 0.8;
+/// Extent, relative to the scale, below which a motion is no cycle.
+const MOVES: f64 = 1e-4;
+/// Windows over which the extent of a motion is taken.
+const WINDOWS: usize = 4;
+/// Steps for which the first plane is watched; each later one of a round is watched twice as long.
+const PLANE: usize = 2048;
+/// Steps after which the first round ends in any case.
+const ROUGH: usize = 6144;
+/// Predicted limits that are tried; after those the trajectory is left to itself.
+pub(super) const JUMPS: usize = 8;
+/// Steps of all rounds after which a motion counts as neither at rest nor periodic.
+pub(super) const STEPS: usize = 200_000;
+/// Predictions from which contraction can be told.
+const SEEN: usize = 12;
+/// Contraction over the predictions of a round: for few of them, and for many.
+const CONTRACTED: [f64; 2] = [0.9, 0.97];
+
+/// One trajectory.
+pub(super) struct Runner {
+    pub(super) start: Vec<f64>,
+    parameters: Vec<f64>,
+    pub(super) found: Option<Settled>,
+    /// Of all rounds.
+    pub(super) steps: usize,
+    pub(super) time: f64,
+    pub(super) extent: Vec<f64>,
+    /// Whether that extent is more than what is left of a motion that comes to rest.
+    moves: bool,
+    /// How often a round began at a predicted limit.
+    jumps: usize,
+    /// Of this round.
+    round_steps: usize,
+    /// When, in steps of this round, another plane is tried, and how long that lives.
+    plane_ends: usize,
+    plane_life: usize,
+    window: Window,
+    /// Smallest and largest state of each of the last windows.
+    boxes: Vec<[Vec<f64>; 2]>,
+    returns: Option<Returns>,
+    /// The prediction of every return, as its period and last difference.
+    seen: Vec<(f64, f64)>,
+    /// Extent of every window of the round, relative to scale and size.
+    sizes: Vec<f64>,
+    /// A cycle, if the window that is open confirms that there still is a motion.
+    repeats: Option<Settled>,
+    next: Option<Vec<f64>>,
+    x: Vec<f64>,
+}
+
+impl Runner {
+    pub(super) fn new(trial: &Trial, start: &[f64]) -> Runner {
+        let n = start.len();
+        Runner {
+            start: start.to_vec(),
+            parameters: Vec::new(),
+            found: None,
+            steps: 0,
+            time: 0.0,
+            extent: trial.scales.to_vec(),
+            moves: true,
+            jumps: 0,
+            round_steps: 0,
+            plane_ends: 0,
+            plane_life: PLANE,
+            window: Window::new(n),
+            boxes: Vec::new(),
+            returns: None,
+            seen: Vec::new(),
+            sizes: Vec::new(),
+            repeats: None,
+            next: None,
+            x: vec![0.0; n],
+        }
+    }
+
+    pub(super) fn begin(&mut self, parameters: Vec<f64>) {
+        self.parameters = parameters;
+        (self.round_steps, self.window) = (0, Window::new(self.start.len()));
+        self.seen.clear();
+        self.boxes.clear();
+        self.sizes.clear();
+        (self.next, self.repeats) = (None, None);
+        // The plane of the round before goes through the new start.
+        self.returns = self.returns.take().map(|returns| returns.again_from(&self.start));
+        (self.plane_life, self.plane_ends) = (PLANE, if self.returns.is_some() { PLANE } else { 0 });
+    }
+
+    pub(super) fn observe(&mut self, step: &Step, trial: &Trial) -> Verdict {
+        let mut x = std::mem::take(&mut self.x);
+        step.end_into(&mut x);
+        self.steps += 1;
+        self.round_steps += 1;
+        self.window.add(&x, step);
+        if self.returns.as_mut().is_some_and(|returns| returns.follow(step, &x)) {
+            self.at_return(step);
+        }
+        if self.round_steps.is_multiple_of(WINDOW) && self.found.is_none() && self.next.is_none() {
+            self.close_window(step, &x, trial);
+        }
+        self.x = x;
+        // At its low accuracy the first round does not see small motions contract.
+        let rough = self.is_first_round() && self.steps >= ROUGH;
+        let over = self.found.is_some() || self.next.is_some() || self.steps >= STEPS || rough;
+        if over { Verdict::Stop } else { Verdict::Continue }
+    }
+
+    fn is_first_round(&self) -> bool {
+        self.steps == self.round_steps
+    }
+
+    /// What the returns so far say.
+    fn at_return(&mut self, step: &Step) {
+        let Some(returns) = &self.returns else { return };
+        // The longer a round lasts the less a single return says.
+        if returns.total() > 200 && !returns.total().is_multiple_of(returns.total() / 100) {
+            return;
+        }
+        let Some(prediction) = returns.closest(&self.extent) else { return };
+        let Prediction { state, period, size, doubt } = prediction;
+        // Another number of crossings per period begins anew.
+        if self.seen.last().is_some_and(|(known, _)| (period - known).abs() > 0.02 * known) {
+            self.seen.clear();
+        }
+        self.seen.push((period, size));
+        let Some((_, last)) = returns.last() else { return };
+        let latest = |count: usize| self.seen.iter().rev().take(count).fold(0.0, |m: f64, (_, size)| m.max(*size));
+        let few = self.seen.len() < SEEN;
+        // What no longer comes down, close to the accuracy of the integration, has settled too.
+        let settled = (self.seen.len() >= 4 && latest(4) <= SETTLED)
+            || (self.seen.len() >= 5 * SEEN && latest(2 * SEEN) <= 20.0 * SETTLED && !contracts(&self.seen));
+        if settled && self.moves {
+            self.repeats = Some(Settled {
+                motion: Motion::Cycle,
+                state: last.to_vec(),
+                period,
+                extent: self.extent.clone(),
+                time: self.time + step.end_time(),
+                error: latest(4),
+            });
+        } else if !few && self.moves && self.repeats.is_none() && self.jumps < JUMPS && contracts(&self.seen) {
+            self.jumps += 1;
+            let share = (5.0 * doubt / size).clamp(1e-3, 0.1);
+            self.next = Some(state.iter().zip(last).map(|(limit, y)| limit + share * (y - limit)).collect());
+        }
+    }
+
+    /// What the last window says: whether the trajectory comes to rest, and how far its motion extends.
+    fn close_window(&mut self, step: &Step, x: &[f64], trial: &Trial) {
+        let window = std::mem::replace(&mut self.window, Window::new(x.len()));
+        let extent: Vec<f64> = (0..x.len()).map(|i| window.high[i] - window.low[i]).collect();
+        let size = (0..x.len()).fold(0.0, |m: f64, i| m.max(extent[i] / (trial.scales[i] + x[i].abs())));
+        if size <= RESTS {
+            let time = self.time + step.end_time();
+            let extent = trial.scales.to_vec();
+            // Half way between the extremes of what is left of the motion.
+            let state = (0..x.len()).map(|i| 0.5 * (window.high[i] + window.low[i])).collect();
+            self.found = Some(Settled { motion: Motion::Equilibrium, state, period: 0.0, extent, time, error: size });
+            return;
+        }
+        self.sizes.push(size);
+        self.try_rest(&window, x, trial);
+        self.renew_extent(&window, trial);
+        if let Some(repeats) = self.repeats.take().filter(|_| self.moves) {
+            // The first round is not accurate enough to be the last.
+            match self.is_first_round() {
+                true => self.next = Some(repeats.state),
+                false => self.found = Some(repeats),
+            }
+            return;
+        }
+        // The first windows of the first round are the transient; a plane through it may be no plane across the motion.
+        if self.round_steps >= self.plane_ends && self.steps >= 2 * WINDOW {
+            let velocity: Vec<f64> = (0..x.len()).map(|i| step.end_slope(i)).collect();
+            self.returns = Some(Returns::across(x.to_vec(), &velocity, &self.extent));
+            self.seen.clear();
+            self.plane_ends = self.round_steps + self.plane_life;
+            self.plane_life *= 2;
+        }
+    }
+
+    /// The extent over the last windows; a cycle may take longer than one.
+    fn renew_extent(&mut self, window: &Window, trial: &Trial) {
+        if self.boxes.len() == WINDOWS {
+            self.boxes.remove(0);
+        }
+        self.boxes.push([window.low.clone(), window.high.clone()]);
+        let span = |i: usize| {
+            let low = self.boxes.iter().map(|[low, _]| low[i]).fold(f64::MAX, f64::min);
+            self.boxes.iter().map(|[_, high]| high[i]).fold(f64::MIN, f64::max) - low
+        };
+        let extent: Vec<f64> = (0..window.low.len()).map(|i| span(i).max(1e-6 * trial.scales[i])).collect();
+        // The last window alone: what comes to rest fast was large a few windows ago.
+        let own = |i: usize| window.high[i] - window.low[i];
+        self.moves = (0..extent.len()).any(|i| own(i) > (0.2 * extent[i]).max(MOVES * trial.scales[i]));
+        self.extent = extent;
+    }
+
+    /// The limit of the states of a window, where its motion has been shrinking and f is much smaller there.
+    fn try_rest(&mut self, window: &Window, x: &[f64], trial: &Trial) {
+        let third = self.sizes.len() / 3;
+        if third < 3 {
+            return;
+        }
+        let largest = |part: &[f64]| part.iter().copied().fold(0.0, f64::max);
+        let [a, b, c] = [&self.sizes[..third], &self.sizes[third..2 * third], &self.sizes[2 * third..]].map(largest);
+        // A motion that shrinks to a cycle does so ever more slowly; to rest it shrinks by the same factor again and again.
+        if !(c < SMALL && c <= SHRUNK * a && c * a <= 1.05 * b * b) {
+            return;
+        }
+        let Some(limit) = window.limit(trial.scales) else { return };
+        let speed = |x: &[f64]| {
+            let mut f = vec![0.0; x.len()];
+            let at = Batch { lanes: 1, states: x, parameters: Parameters::Shared(&self.parameters) };
+            trial.field.evaluate(at, &mut f);
+            f.iter().zip(trial.scales).fold(0.0, |m: f64, (f, s)| m.max((f / s).abs()))
+        };
+        let doubt = speed(&limit) / window.speed(trial.scales);
+        if doubt < 0.1 && self.jumps < JUMPS {
+            self.jumps += 1;
+            let share = (5.0 * doubt).clamp(1e-3, 0.5);
+            self.next = Some(limit.iter().zip(x).map(|(limit, x)| limit + share * (x - limit)).collect());
+        }
+    }
+
+    /// A cycle that repeats itself less accurately than it should, when no more steps are left.
+    fn nearly(&self) -> Option<Settled> {
+        let (_, state) = self.returns.as_ref()?.last()?;
+        let (period, _) = *self.seen.last()?;
+        let error = self.seen.iter().rev().take(2 * SEEN).fold(0.0, |m: f64, (_, size)| m.max(*size));
+        let repeats = self.moves && self.seen.len() >= 2 * SEEN && error <= NEARLY;
+        let (state, extent, time) = (state.to_vec(), self.extent.clone(), self.time);
+        repeats.then_some(Settled { motion: Motion::Cycle, state, period, extent, time, error })
+    }
+
+    /// The round is over.
+    pub(super) fn end(&mut self, time: f64, state: Vec<f64>, outcome: Outcome) {
+        self.time += time;
+        let extent = self.extent.clone();
+        let gone = matches!(outcome, Outcome::Escaped | Outcome::StepTooSmall);
+        if self.found.is_none() && !gone && self.steps >= STEPS {
+            self.found = self.nearly();
+        }
+        if self.found.is_none() && (gone || self.steps >= STEPS) {
+            let motion = if gone { Motion::Escaped } else { Motion::Other };
+            self.found =
+                Some(Settled { motion, state: state.clone(), period: 0.0, extent, time: self.time, error: f64::NAN });
+        }
+        self.start = self.next.take().unwrap_or(state);
+    }
+}
+
+/// Whether the differences of the returns come down: the largest of each third is smaller than that of the third before.
+fn contracts(seen: &[(f64, f64)]) -> bool {
+    let third = seen.len() / 3;
+    let largest = |part: &[(f64, f64)]| part.iter().fold(0.0, |m: f64, (_, size)| m.max(*size));
+    let [a, b, c] = [&seen[..third], &seen[third..2 * third], &seen[2 * third..]].map(largest);
+    let needed = if seen.len() < 100 { CONTRACTED[0] } else { CONTRACTED[1] };
+    b < a && c < b && c <= needed * a
+}

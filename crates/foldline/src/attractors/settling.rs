@@ -1,0 +1,87 @@
+//! From a start to a settled motion, by simulation alone.
+//!
+//! **Idea.** A trajectory runs in rounds. In each it is watched until it is seen to contract: its returns to a plane, or its
+//! speed, come down steadily. Their limit is then predicted, and the next round starts close to it: at a small part of the
+//! distance, in the direction from which the trajectory came, so that what does not attract shows in that round. The
+//! trajectory has settled when it repeats itself; no equation is solved for the motion.
+//!
+//! **Equations.** With the limit y* of the returns y_j, (2) of `returns`, and d its doubt relative to the last difference:
+//!
+//!   (1)  next start = y* + s (y_j - y*),   s = clamp(5 d, 1/1000, 1/10)
+//!
+//! An equilibrium is the limit of states at equal distances of time, in the same way.
+//!
+//! **Source.** sidi2017, §1 (reduced rank extrapolation).
+//!
+//! **Fails when** a motion is neither at rest nor periodic, or contracts by less than a thirtieth over some thousand periods.
+
+use super::runner::{JUMPS, Runner, STEPS};
+use crate::contract::VectorField;
+use crate::diagram::Motion;
+use crate::simulation::{Ensemble, Tolerance};
+
+/// Accuracy of the integration, relative, in the first round and in those after it.
+const INTEGRATION: [f64; 2] = [1e-6, 1e-9];
+
+/// A vector field, and what its motions are measured by.
+#[derive(Clone, Copy)]
+pub struct Trial<'a> {
+    /// The vector field.
+    pub field: &'a dyn VectorField,
+    /// `[n]` characteristic size of each state.
+    pub scales: &'a [f64],
+    /// The two states that make up the whirl plane, by which cycles are named.
+    pub whirl: Option<[usize; 2]>,
+    /// Threads; no result depends on it.
+    pub jobs: usize,
+}
+
+/// Where a trajectory got to.
+#[derive(Clone, Debug)]
+pub(super) struct Settled {
+    pub(super) motion: Motion,
+    pub(super) state: Vec<f64>,
+    /// 0 unless it is a cycle.
+    pub(super) period: f64,
+    /// `[n]` extent of the motion, with a floor.
+    pub(super) extent: Vec<f64>,
+    pub(super) time: f64,
+    pub(super) error: f64,
+}
+
+/// Follows trajectories together, each at parameters of its own: `parameters` `[count][k]`, `starts` `[count][n]`.
+pub(super) fn settle_together(trial: &Trial, parameters: &[f64], starts: &[f64]) -> Vec<Settled> {
+    let (n, k) = (trial.field.dim(), trial.field.parameter_count());
+    let mut runners: Vec<Runner> = starts.chunks_exact(n).map(|start| Runner::new(trial, start)).collect();
+    for round in 0..JUMPS + 2 {
+        let open: Vec<usize> = (0..runners.len()).filter(|&r| runners[r].found.is_none()).collect();
+        if open.is_empty() {
+            break;
+        }
+        let from: Vec<f64> = open.iter().flat_map(|&r| runners[r].start.clone()).collect();
+        let own: Vec<f64> = open.iter().flat_map(|&r| parameters[r * k..(r + 1) * k].to_vec()).collect();
+        let relative = INTEGRATION[round.min(1)];
+        let tolerance = Tolerance { relative, absolute: trial.scales.iter().map(|s| relative * s).collect() };
+        let left = |r: usize| STEPS.saturating_sub(runners[r].steps);
+        let limit = open.iter().map(|&r| left(r)).max().unwrap_or(0).max(1);
+        open.iter().for_each(|&r| runners[r].begin(parameters[r * k..(r + 1) * k].to_vec()));
+        let ensemble = match k {
+            0 => Ensemble::new(trial.field, &[], tolerance, &from, [0.0, f64::INFINITY]),
+            _ => Ensemble::with_own_parameters(trial.field, &own, tolerance, &from, [0.0, f64::INFINITY]),
+        };
+        let arrivals =
+            ensemble.with_step_limit(limit).run(&mut |step| runners[open[step.trajectory()]].observe(step, trial));
+        for (r, arrival) in open.into_iter().zip(arrivals) {
+            runners[r].end(arrival.time, arrival.state, arrival.outcome);
+        }
+    }
+    let unsettled = |runner: Runner| Settled {
+        motion: Motion::Other,
+        state: runner.start,
+        period: 0.0,
+        extent: runner.extent,
+        time: runner.time,
+        error: f64::NAN,
+    };
+    runners.into_iter().map(|mut runner| runner.found.take().unwrap_or_else(|| unsettled(runner))).collect()
+}

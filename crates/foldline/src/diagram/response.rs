@@ -1,0 +1,127 @@
+//! What simulation saw: settled motions, without a branch to lie on.
+
+/// What a trajectory settled to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Motion {
+    /// It came to rest.
+    Equilibrium,
+    /// It repeats itself.
+    Cycle,
+    /// Neither within the limit on the number of steps: chaos, a torus, or an approach too slow to tell.
+    Other,
+    /// It ran to infinity, or to where f is not defined.
+    Escaped,
+}
+
+impl Motion {
+    /// Every one.
+    pub const ALL: [Motion; 4] = [Motion::Equilibrium, Motion::Cycle, Motion::Other, Motion::Escaped];
+
+    /// The name used in files and tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Motion::Equilibrium => "equilibrium",
+            Motion::Cycle => "cycle",
+            Motion::Other => "other",
+            Motion::Escaped => "escaped",
+        }
+    }
+
+    /// The one of that name.
+    pub fn from_name(name: &str) -> Option<Motion> {
+        Motion::ALL.into_iter().find(|motion| motion.name() == name)
+    }
+}
+
+/// A settled motion at one value of a parameter. Every number comes from the trajectory itself.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Response {
+    /// Value of the parameter that varies.
+    pub value: f64,
+    /// Every parameter of the model.
+    pub parameters: Vec<f64>,
+    /// What it is.
+    pub motion: Motion,
+    /// Of a cycle, from the returns of the trajectory.
+    pub period: Option<f64>,
+    /// Spectral ratio of a cycle, such as 2:1, where the model has a whirl plane.
+    pub ratio: Option<(u32, u32)>,
+    /// Over how many turns of its two strongest lines a cycle closes: 2 after a period doubling. 1 if there is no telling.
+    pub multiplicity: u32,
+    /// Smallest and largest value of every state, then of every output: over one period, or over the motion watched.
+    pub ranges: Vec<[f64; 2]>,
+    /// How many starts went there.
+    pub hits: usize,
+    /// `[n]` a state of the motion: the last one, from which a sweep goes on.
+    pub state: Vec<f64>,
+    /// Time until it had settled, that saved by extrapolation not counted.
+    pub settled_after: f64,
+    /// By how much the motion fails to repeat itself, relative to its extent.
+    pub error: f64,
+}
+
+/// How responses were looked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Search {
+    /// From many starts at every value.
+    Survey,
+    /// From value to value, each from the last state of the one before.
+    Sweep,
+}
+
+impl Search {
+    /// The name used in files and tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Search::Survey => "survey",
+            Search::Sweep => "sweep",
+        }
+    }
+
+    /// The one of that name.
+    pub fn from_name(name: &str) -> Option<Search> {
+        [Search::Survey, Search::Sweep].into_iter().find(|search| search.name() == name)
+    }
+}
+
+/// The responses of a survey or of a sweep.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Responses {
+    /// Unique within a diagram.
+    pub name: String,
+    /// How they were looked for.
+    pub search: Search,
+    /// Index of the parameter that varies.
+    pub free: usize,
+    /// In the order in which the values were visited; of one value the most frequent first.
+    pub responses: Vec<Response>,
+}
+
+impl Responses {
+    /// Indices of the responses of a sweep that differ from the one before by more than a small step of the parameter can
+    /// explain: another motion, ratio or multiplicity, or a change of the largest range beyond `factor` times the median.
+    pub fn jumps(&self, factor: f64) -> Vec<usize> {
+        // Each quantity relative to its largest value in the sweep.
+        let count = self.responses.iter().map(|r| r.ranges.len()).max().unwrap_or(0);
+        let largest = |k: usize| {
+            let ranges = self.responses.iter().filter_map(|r| r.ranges.get(k));
+            ranges.fold(f64::MIN_POSITIVE, |m, [low, high]| m.max(low.abs()).max(high.abs()))
+        };
+        let sizes: Vec<f64> = (0..count).map(largest).collect();
+        let change = |pair: &[Response]| {
+            let pairs = pair[0].ranges.iter().zip(&pair[1].ranges).zip(&sizes);
+            let changes = pairs.map(|((a, b), size)| (a[0] - b[0]).abs().max((a[1] - b[1]).abs()) / size);
+            changes.fold(0.0, f64::max)
+        };
+        let changes: Vec<f64> = self.responses.windows(2).map(change).collect();
+        let mut sorted = changes.clone();
+        sorted.sort_by(f64::total_cmp);
+        let median = sorted.get(sorted.len() / 2).copied().unwrap_or(0.0);
+        let named = |r: &Response| (r.motion, r.ratio, r.multiplicity);
+        let pairs = self.responses.windows(2).zip(changes).enumerate();
+        pairs
+            .filter(|(_, (pair, change))| named(&pair[0]) != named(&pair[1]) || *change > factor * median)
+            .map(|(k, _)| k + 1)
+            .collect()
+    }
+}

@@ -1,0 +1,94 @@
+//! Whether a solution survives when a parameter goes to another value.
+//!
+//! **Idea.** A parameter that stands for an idealisation, such as the sharpness of a smoothed contact, should not decide what
+//! exists. The solution is followed in that parameter alone, all others fixed: it reaches the value, or the curve turns
+//! back before, and then the solution exists only because the parameter is what it is.
+//!
+//! **Source.** akay2024, where branches that a small sharpness makes up are shown, and avoided by a larger one.
+//!
+//! **Fails when** the curve leaves through something other than a fold, as a cycle that shrinks to an equilibrium; the answer
+//! is then how it ended.
+
+use super::System;
+use super::growth::{Beginning, Growth, polished, problem_of, settings};
+use crate::contract::Unobserved;
+use crate::diagram::{Branch, Ending, Family, Kind, Origin, Point, Solution};
+
+/// What becomes of a solution.
+#[derive(Clone, Debug)]
+pub enum Persistence {
+    /// It reaches the value with as many unstable eigenvalues or multipliers as before.
+    Survives(Box<Point>),
+    /// It reaches the value with another number of them.
+    Changes(Box<Point>),
+    /// The curve turns back at this value of the parameter, the farthest it gets to.
+    Vanishes {
+        /// Where it turns back.
+        fold: f64,
+    },
+    /// The curve ended in another way before it was decided.
+    Undecided(Ending),
+}
+
+impl Persistence {
+    /// Whether the solution, with its stability, owes itself to the parameter.
+    pub fn is_artefact(&self) -> bool {
+        matches!(self, Persistence::Vanishes { .. } | Persistence::Changes(_))
+    }
+}
+
+/// What becomes of the solution at `point` when the parameter of index `free` goes to `value`, all others fixed.
+///
+/// `tolerance` and `degree` as in a plan; `max_points` limits the points of the curve.
+pub fn persistence(
+    system: &System,
+    tolerance: f64,
+    degree: usize,
+    point: &Point,
+    free: usize,
+    value: f64,
+    max_points: usize,
+) -> Persistence {
+    let own = point.parameters.get(free).copied().unwrap_or(value);
+    if own == value {
+        return Persistence::Survives(Box::new(point.clone()));
+    }
+    let forward = value > own;
+    let range = [own.min(value), own.max(value)];
+    let settings = settings(system, tolerance, range, max_points);
+    let family = match point.solution {
+        Solution::Equilibrium(_) => Family::Equilibrium,
+        Solution::Cycle(_) => Family::Cycle,
+    };
+    let mut problem = problem_of(system, free, degree, point, false);
+    let start = match polished(&mut *problem, &settings, point) {
+        Ok(start) => start,
+        Err(why) => return Persistence::Undecided(Ending::NoStart(why.to_string())),
+    };
+    let unstable = start.point.unstable;
+    let mut branch = Branch::new("persistence", family, free, Origin::Seed(String::new()));
+    let sides = [!forward, forward];
+    let growth =
+        Growth { system, settings: &settings, degree, ties: Vec::new(), sides, parents: &[], observer: &Unobserved };
+    growth.begin(&mut branch, Beginning::Inside(start));
+    decided(&branch, value, forward, unstable)
+}
+
+fn decided(branch: &Branch, value: f64, forward: bool, unstable: usize) -> Persistence {
+    let end = if forward { branch.points.last() } else { branch.points.first() };
+    let ending = branch.ends[usize::from(forward)].clone().unwrap_or(Ending::Stopped);
+    let arrived = |bound: f64| (bound - value).abs() <= 1e-9 * (1.0 + value.abs());
+    if let (Ending::Bound(bound), Some(end)) = (&ending, end)
+        && arrived(*bound)
+    {
+        let at = Box::new(end.clone());
+        return if at.unstable == unstable { Persistence::Survives(at) } else { Persistence::Changes(at) };
+    }
+    // It came back, or ended on the way back: the farthest fold is where it vanishes.
+    let folds = branch.special.iter().filter(|s| s.kind == Kind::Fold).map(|s| s.point.parameters[branch.free]);
+    let farthest = if forward { folds.reduce(f64::max) } else { folds.reduce(f64::min) };
+    match (farthest, &ending) {
+        (Some(fold), Ending::Bound(_) | Ending::Closed) => Persistence::Vanishes { fold },
+        _ => Persistence::Undecided(ending),
+    }
+}

@@ -1,0 +1,134 @@
+//! The surveys and sweeps of a plan.
+//!
+//! **Idea.** A survey shares its values among the threads; sweeps, in which each value waits for the one before, are shared
+//! as a whole. What an earlier run has completed is not repeated.
+
+use super::System;
+use super::plan::{Plan, SurveyPlan, SweepPlan};
+use super::seeds::{Seeds, sampling};
+use crate::attractors::{Trial, stepped_sweep, survey_by_simulation};
+use crate::contract::{Event, Observer, Verdict};
+use crate::diagram::{Diagram, Response, Responses, Search, Solution};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// The responses of every survey and sweep of the plan that came to its end, in the order of the plan.
+pub fn simulate(
+    system: &System,
+    plan: &Plan,
+    seeds: &Seeds,
+    jobs: usize,
+    earlier: &Diagram,
+    observer: &dyn Observer,
+) -> Vec<Responses> {
+    let mut found: Vec<Responses> = Vec::new();
+    for survey in &plan.surveys {
+        let known = earlier.response_set(&survey.name).cloned();
+        let set = known.or_else(|| one_survey(system, plan, survey, jobs, observer));
+        found.extend(set);
+    }
+    let next = AtomicUsize::new(0);
+    let swept: Vec<Mutex<Option<Responses>>> = plan.sweeps.iter().map(|_| Mutex::new(None)).collect();
+    std::thread::scope(|scope| {
+        for _ in 0..jobs.min(plan.sweeps.len()) {
+            scope.spawn(|| {
+                while let Some((sweep, slot)) = {
+                    let index = next.fetch_add(1, Ordering::Relaxed);
+                    plan.sweeps.get(index).zip(swept.get(index))
+                } {
+                    let known = earlier.response_set(&sweep.name).cloned();
+                    let set = known.or_else(|| one_sweep(system, plan, sweep, seeds, observer));
+                    if let Ok(mut slot) = slot.lock() {
+                        *slot = set;
+                    }
+                }
+            });
+        }
+    });
+    found.extend(swept.into_iter().filter_map(|slot| slot.into_inner().ok().flatten()));
+    found
+}
+
+fn trial<'a>(system: &'a System, jobs: usize) -> Trial<'a> {
+    Trial { field: system.field, scales: &system.scales, whirl: system.whirl, jobs }
+}
+
+/// Reports one value after the other as done.
+struct Count<'o> {
+    name: &'o str,
+    of: usize,
+    done: AtomicUsize,
+    observer: &'o dyn Observer,
+}
+
+impl Count<'_> {
+    fn visited(&self, responses: &[Response]) -> Verdict {
+        let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
+        let value = responses.first().map_or(f64::NAN, |r| r.value);
+        self.observer.observe(Event::Visited(self.name, value, done, self.of))
+    }
+}
+
+fn one_survey(
+    system: &System,
+    plan: &Plan,
+    survey: &SurveyPlan,
+    jobs: usize,
+    observer: &dyn Observer,
+) -> Option<Responses> {
+    let SurveyPlan { name, parameters, free, values, starts, random } = survey;
+    let sampling = sampling(system, *starts, *random, jobs, plan.tolerance);
+    let count = Count { name, of: values.len(), done: AtomicUsize::new(0), observer };
+    let report = |found: &[Response]| count.visited(found);
+    let responses = survey_by_simulation(&trial(system, jobs), &sampling, parameters, *free, values, &report);
+    finished(name, Search::Survey, *free, responses, values.len(), &count)
+}
+
+fn one_sweep(
+    system: &System,
+    plan: &Plan,
+    sweep: &SweepPlan,
+    seeds: &Seeds,
+    observer: &dyn Observer,
+) -> Option<Responses> {
+    let SweepPlan { name, seed, free, values } = sweep;
+    let point = match seeds.point(*seed) {
+        Ok(point) => point,
+        Err(why) => {
+            observer.observe(Event::Note(name, &format!("no start: {why}")));
+            return None;
+        }
+    };
+    let start = match &point.solution {
+        Solution::Equilibrium(x) => x.clone(),
+        Solution::Cycle(cycle) => cycle.state(0.0),
+    };
+    let parameters = plan.seeds.get(*seed).map_or(&point.parameters, |seed| &seed.parameters);
+    let count = Count { name, of: values.len(), done: AtomicUsize::new(0), observer };
+    let report = |found: &[Response]| count.visited(found);
+    let responses = stepped_sweep(&trial(system, 1), parameters, *free, values, &start, &report);
+    let visited = responses.len();
+    if visited < values.len() && count.done.load(Ordering::Relaxed) < visited {
+        let value = responses.last().map_or(f64::NAN, |r| r.value);
+        observer.observe(Event::Note(name, &format!("the trajectory escaped at the value {value}")));
+        return finished(name, Search::Sweep, *free, responses, 0, &count);
+    }
+    finished(name, Search::Sweep, *free, responses, values.len(), &count)
+}
+
+/// The set, if all `wanted` values were visited; what was stopped on the way is not kept.
+fn finished(
+    name: &str,
+    search: Search,
+    free: usize,
+    responses: Vec<Response>,
+    wanted: usize,
+    count: &Count,
+) -> Option<Responses> {
+    if count.done.load(Ordering::Relaxed) < wanted {
+        return None;
+    }
+    let set = Responses { name: name.to_string(), search, free, responses };
+    count.observer.observe(Event::Responses(&set));
+    Some(set)
+}

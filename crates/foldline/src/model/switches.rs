@@ -1,0 +1,180 @@
+//! Where the expressions of a model are not smooth.
+//!
+//! **Idea.** A comparison, a minimum, an absolute value or a step changes its branch where one number, its *switch*,
+//! changes sign. With the signs of all switches given, instead of taken from the state, every branch is fixed and the
+//! expressions are smooth: they continue beyond the zero of a switch as if it had not been passed.
+//!
+//! **Equations.** With σ the given sign (±1) of the switch s:
+//!
+//! 1. a < b, a ≤ b: s = a - b, true where σ < 0;   min(a, b), max(a, b): s = a - b, the operand that σ selects
+//! 2. |a|: s = a, σ a;   sign(a): s = a, σ;   heaviside(a): s = a, (1 + σ)/2
+//!
+//! **Departures.** A switch that cannot change sign (a radius that is compared with 0) or that depends on parameters only
+//! is none. A comparison for equality holds at isolated instants, where it changes nothing.
+
+use super::graph::{Binary, Graph, Id, Leaf, Node, Unary};
+use super::tape::Tape;
+
+/// The switches of a list of expressions.
+#[derive(Debug)]
+pub(super) struct Switches {
+    /// How many.
+    pub count: usize,
+    /// The switches themselves.
+    pub values: Tape,
+    /// The expressions, with the signs of the switches in the components of the first direction.
+    pub given: Tape,
+}
+
+impl Switches {
+    /// The switches that `roots` depend on.
+    pub fn new(graph: &Graph, roots: &[Id]) -> Switches {
+        let mut graph = graph.clone();
+        let reached = graph.reachable(roots);
+        let varying = depends_on_state(&graph);
+        let (mut switches, mut own) = (Vec::new(), vec![None; reached.len()]);
+        for i in (0..reached.len()).filter(|&i| reached[i]) {
+            let switch = match graph.node(Id(i as u32)) {
+                Node::Unary(Unary::Abs | Unary::Sign | Unary::Heaviside, a) => Some((a, false)),
+                Node::Binary(Binary::Less | Binary::LessOrEqual | Binary::Min | Binary::Max, a, b)
+                    if varying[a.at()] || varying[b.at()] =>
+                {
+                    // a < b and b < a have one switch.
+                    let (difference, reverse) = (graph.subtract(a, b), graph.subtract(b, a));
+                    Some(if switches.contains(&reverse) { (reverse, true) } else { (difference, false) })
+                }
+                _ => None,
+            };
+            let Some((id, reversed)) = switch else { continue };
+            if changes_sign(&graph, id) && (id.at() >= varying.len() || varying[id.at()]) {
+                let place = switches.iter().position(|s| *s == id).unwrap_or_else(|| {
+                    switches.push(id);
+                    switches.len() - 1
+                });
+                own[i] = Some((place as u32, reversed));
+            }
+        }
+        let given = with_given_signs(&mut graph, roots, &reached, &own);
+        Switches { count: switches.len(), values: Tape::new(&graph, &[&switches]), given: Tape::new(&graph, &[&given]) }
+    }
+}
+
+/// Which nodes depend on the state.
+fn depends_on_state(graph: &Graph) -> Vec<bool> {
+    let mut depends: Vec<bool> = Vec::with_capacity(graph.len());
+    for i in 0..graph.len() {
+        let node = graph.node(Id(i as u32));
+        let own = matches!(node, Node::Leaf(Leaf::State(_)));
+        depends.push(own || node.operands().any(|a| depends[a.at()]));
+    }
+    depends
+}
+
+/// Whether a switch can have both signs, as far as that can be seen.
+fn changes_sign(graph: &Graph, id: Id) -> bool {
+    let opposite = match graph.node(id) {
+        Node::Unary(Unary::Negate, a) => Some(a),
+        _ => None,
+    };
+    !(graph.nonnegative(id) || opposite.is_some_and(|a| graph.nonnegative(a)))
+}
+
+/// The roots rebuilt with every switch in `own` decided by its given sign.
+fn with_given_signs(graph: &mut Graph, roots: &[Id], reached: &[bool], own: &[Option<(u32, bool)>]) -> Vec<Id> {
+    let mut new: Vec<Id> = (0..reached.len()).map(|i| Id(i as u32)).collect();
+    for i in (0..reached.len()).filter(|&i| reached[i]) {
+        let at = |id: Id| new[id.at()];
+        let node = graph.node(Id(i as u32));
+        let rebuilt = match (node, own[i]) {
+            (Node::Constant(_) | Node::Leaf(_), _) => Id(i as u32),
+            (Node::Unary(op, a), Some((switch, _))) => {
+                let sign = graph.leaf(Leaf::Direction(0, switch));
+                match op {
+                    Unary::Abs => graph.multiply(sign, at(a)),
+                    Unary::Heaviside => graph.unary(op, sign),
+                    _ => sign,
+                }
+            }
+            (Node::Binary(op, a, b), Some((switch, reversed))) => {
+                let (sign, zero) = (graph.leaf(Leaf::Direction(0, switch)), graph.constant(0.0));
+                let (low, high) = if reversed { (zero, sign) } else { (sign, zero) };
+                let first_is_less = graph.binary(Binary::Less, low, high);
+                match op {
+                    Binary::Min => graph.select(first_is_less, at(a), at(b)),
+                    Binary::Max => graph.select(first_is_less, at(b), at(a)),
+                    _ => first_is_less,
+                }
+            }
+            (Node::Unary(op, a), None) => graph.unary(op, at(a)),
+            (Node::Binary(op, a, b), None) => graph.binary(op, at(a), at(b)),
+            (Node::Integer(a, n), _) => graph.integer(at(a), n),
+            (Node::Select(c, a, b), _) => graph.select(at(c), at(a), at(b)),
+        };
+        new[i] = rebuilt;
+    }
+    roots.iter().map(|root| new[root.at()]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::contract::{Batch, Parameters, VectorField};
+    use crate::model::{Definition, Model, ModelSource, Parameter, State};
+
+    fn model(equation: &str) -> Model {
+        let source = ModelSource {
+            parameters: vec![Parameter::new("p", 0.5)],
+            states: vec![State::new("x"), State::new("y")],
+            equations: vec![Definition::new("x", equation), Definition::new("y", "-x")],
+            ..ModelSource::default()
+        };
+        Model::compile(source).unwrap()
+    }
+
+    #[test]
+    fn what_cannot_switch_is_no_switch() {
+        for smooth in ["x*y", "if(p > 0, x, y)", "if(hypot(x, y) > 0, x, y)", "abs(x^2) + sqrt(x)", "if(x == y, 1, y)"]
+        {
+            assert_eq!(model(smooth).switch_count(), 0, "{smooth}");
+        }
+        for (kinked, count) in [
+            ("max(x - p, 0)", 1),
+            ("if(x > y, x, 0) + if(y > x, y, 0)", 1),
+            ("abs(x) + sign(y)", 2),
+            ("min(x, p*y)*heaviside(x)", 2),
+        ] {
+            assert_eq!(model(kinked).switch_count(), count, "{kinked}");
+        }
+    }
+
+    #[test]
+    fn given_signs_decide_and_the_actual_ones_change_nothing() {
+        let cases = [
+            "max(x - p, 0)",
+            "min(x, y)",
+            "abs(x) + 2*sign(y)*x",
+            "heaviside(x - y)*y",
+            "if(x > y, x^2, y) + if(y > x, 3, 4)",
+        ];
+        for text in cases {
+            let model = model(text);
+            let value = |x: [f64; 2], signs: Option<&[f64]>| {
+                let at = Batch { lanes: 1, states: &x, parameters: Parameters::Shared(&[0.5]) };
+                let mut f = [0.0; 2];
+                match signs {
+                    None => model.evaluate(at, &mut f),
+                    Some(signs) => model.evaluate_switched(at, signs, &mut f),
+                }
+                f[0]
+            };
+            for x in [[0.7, 0.2], [-0.3, 0.1], [-0.4, -0.9]] {
+                let mut switches = vec![0.0; model.switch_count()];
+                let at = Batch { lanes: 1, states: &x, parameters: Parameters::Shared(&[0.5]) };
+                model.switches(at, &mut switches);
+                let actual: Vec<f64> = switches.iter().map(|s| s.signum()).collect();
+                assert_eq!(value(x, Some(&actual)), value(x, None), "{text} at {x:?}");
+                let other: Vec<f64> = actual.iter().map(|s| -s).collect();
+                assert_ne!(value(x, Some(&other)), value(x, None), "{text} at {x:?} with the signs reversed");
+            }
+        }
+    }
+}

@@ -1,0 +1,88 @@
+//! Where the first switch of a piecewise-smooth field changes sign within a step.
+//!
+//! **Idea.** A step is computed with the signs that the switches have at its start, so f is smooth along all of it. The
+//! switches are sampled on the continuous solution; where one leaves its sign, or an extremum between two samples does,
+//! the zero is located on the trajectory itself, and the step is taken anew to end there.
+//!
+//! **Source.** hairer1993, §II.6 (discontinuities located on the dense output).
+//!
+//! **Fails when** a switch changes sign and back several times within a quarter of a step.
+
+use super::Step;
+use super::root::{lowest, root};
+use super::section::insert_extrema;
+use super::shortened::Shortened;
+
+/// Places within a step at which the switches are looked at, besides its start.
+pub(super) const PLACES: [f64; 4] = [0.25, 0.5, 0.75, 1.0];
+
+/// The first zero: which switch, and the fraction of the step at which.
+pub(super) struct Kink {
+    pub(super) switch: usize,
+    pub(super) theta: f64,
+}
+
+/// The first zero of a switch along `step`. `samples(switch)` holds its values at the start, 0 where it has just changed
+/// sign, and at [`PLACES`], each times the sign that it has in this step.
+pub(super) fn first(step: &Step, again: &mut Shortened, samples: impl Fn(usize) -> [f64; 5]) -> Option<Kink> {
+    let count = step.signs.len() / step.lanes;
+    let mut found: Option<Kink> = None;
+    for switch in 0..count {
+        let values = samples(switch);
+        if clear(&values) {
+            continue;
+        }
+        let sign = step.signs[switch * step.lanes + step.column];
+        if let Some(theta) = zero(step, again, switch, sign, values)
+            && found.as_ref().is_none_or(|known| theta < known.theta)
+        {
+            found = Some(Kink { switch, theta });
+        }
+    }
+    found
+}
+
+/// Whether a parabola through values like these cannot come near zero.
+fn clear(values: &[f64; 5]) -> bool {
+    let [low, high] = values.iter().fold([f64::MAX, 0.0], |[low, high]: [f64; 2], v| [low.min(*v), high.max(*v)]);
+    low > 0.5 * high
+}
+
+fn zero(step: &Step, again: &mut Shortened, switch: usize, sign: f64, values: [f64; 5]) -> Option<f64> {
+    let mut x = vec![0.0; step.dim()];
+    let mut all = vec![0.0; step.signs.len() / step.lanes];
+    again.of(step);
+    let mut value = |theta: f64, exactly: bool| {
+        if exactly && theta < 1.0 {
+            again.state_into(theta * step.length, &mut x);
+        } else {
+            step.state_into(theta, &mut x);
+        }
+        again.switches_into(&x, &mut all);
+        sign * all[switch]
+    };
+    let mut samples: Vec<[f64; 2]> =
+        std::iter::once(0.0).chain(PLACES).zip(values).map(|(theta, value)| [theta, value]).collect();
+    insert_extrema(&mut samples, |theta| value(theta, false));
+    for pair in samples.windows(2) {
+        let ([mut a, ga], [b, gb]) = (pair[0], pair[1]);
+        if gb >= 0.0 {
+            continue;
+        }
+        if ga <= 0.0 {
+            // It has just got its sign: the zero wanted is the next one, behind the summit between, if there is one.
+            let (summit, depth) = lowest(|theta| -value(theta, false), [a, b]);
+            if depth >= 0.0 {
+                return Some(a);
+            }
+            a = summit;
+        }
+        let ends = [if a == 0.0 { ga } else { value(a, true) }, value(b, true)];
+        // Where the interpolant leaves the sign and the trajectory does not, by less than the tolerance, nothing happens.
+        if ends[1] >= 0.0 {
+            continue;
+        }
+        return Some(if ends[0] <= 0.0 { a } else { root(|theta| value(theta, true), [a, b], ends, 1e-15) });
+    }
+    None
+}

@@ -1,0 +1,74 @@
+//! A part of an accepted step, with the full order.
+
+use super::Step;
+use super::tableau::{A, STAGES};
+use crate::contract::{Batch, Parameters, VectorField};
+
+/// Recomputes a step of one trajectory from its start, up to a fraction of its length.
+pub(super) struct Shortened<'a> {
+    field: &'a dyn VectorField,
+    /// `[STAGES][n]` of the last step that was computed.
+    pub(super) slopes: [Vec<f64>; STAGES],
+    start: Vec<f64>,
+    parameters: Vec<f64>,
+    signs: Vec<f64>,
+}
+
+impl<'a> Shortened<'a> {
+    pub(super) fn new(field: &'a dyn VectorField) -> Shortened<'a> {
+        let n = field.dim();
+        let slopes = std::array::from_fn(|_| vec![0.0; n]);
+        Shortened { field, slopes, start: vec![0.0; n], parameters: Vec::new(), signs: Vec::new() }
+    }
+
+    /// Takes the start, parameters and signs of switches from a step.
+    pub(super) fn of(&mut self, step: &Step) {
+        step.start_into(&mut self.start);
+        (0..self.start.len()).for_each(|i| self.slopes[0][i] = step.slopes[0][i * step.lanes + step.column]);
+        let own = |values: &[f64], to: &mut Vec<f64>| {
+            to.clear();
+            to.extend(values.iter().skip(step.column).step_by(step.lanes));
+        };
+        own(step.signs, &mut self.signs);
+        match step.parameters {
+            Parameters::Shared(values) => {
+                self.parameters.clear();
+                self.parameters.extend_from_slice(values);
+            }
+            Parameters::PerLane(values) => own(values, &mut self.parameters),
+        }
+    }
+
+    /// Writes the state a time `h` after the start, by a step of that length; its slopes stay in `slopes` but for the last.
+    pub(super) fn state_into(&mut self, h: f64, x: &mut [f64]) {
+        for (s, row) in A.iter().enumerate() {
+            for i in 0..x.len() {
+                let change: f64 = row.iter().zip(&self.slopes).map(|(a, k)| a * k[i]).sum();
+                x[i] = self.start[i] + h * change;
+            }
+            if s + 2 < STAGES {
+                self.slope_at(x, s + 1);
+            }
+        }
+    }
+
+    /// f at `x`, as slope number `k`.
+    pub(super) fn slope_at(&mut self, x: &[f64], k: usize) {
+        let at = Batch { lanes: 1, states: x, parameters: Parameters::Shared(&self.parameters) };
+        match self.signs.is_empty() {
+            true => self.field.evaluate(at, &mut self.slopes[k]),
+            false => self.field.evaluate_switched(at, &self.signs, &mut self.slopes[k]),
+        }
+    }
+
+    /// The values of all switches at `x`.
+    pub(super) fn switches_into(&self, x: &[f64], values: &mut [f64]) {
+        let at = Batch { lanes: 1, states: x, parameters: Parameters::Shared(&self.parameters) };
+        self.field.switches(at, values);
+    }
+
+    /// From now on with the other sign of a switch.
+    pub(super) fn flip(&mut self, switch: usize) {
+        self.signs[switch] = -self.signs[switch];
+    }
+}

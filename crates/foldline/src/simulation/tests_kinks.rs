@@ -1,0 +1,141 @@
+//! Piecewise-smooth fields with known answers.
+
+use super::*;
+use crate::contract::{Batch, VectorField, Verdict};
+use crate::model::{Definition, Model, ModelSource, State};
+
+fn model(equations: &[(&str, &str)]) -> Model {
+    let source = ModelSource {
+        states: equations.iter().map(|(name, _)| State::new(name)).collect(),
+        equations: equations.iter().map(|(name, text)| Definition::new(name, text)).collect(),
+        ..ModelSource::default()
+    };
+    Model::compile(source).unwrap()
+}
+
+/// The same field without its switches being known.
+struct Plain<'a>(&'a Model);
+
+impl VectorField for Plain<'_> {
+    fn dim(&self) -> usize {
+        self.0.dim()
+    }
+
+    fn parameter_count(&self) -> usize {
+        self.0.parameter_count()
+    }
+
+    fn evaluate(&self, at: Batch, f: &mut [f64]) {
+        self.0.evaluate(at, f);
+    }
+
+    fn linearise(&self, _: Batch, _: &[usize], _: &mut [f64], _: &mut [f64], _: &mut [f64]) {
+        unreachable!("integration needs f only")
+    }
+
+    fn directional(&self, _: Batch, _: &[&[f64]], _: &mut [f64]) {
+        unreachable!("integration needs f only")
+    }
+}
+
+/// x'' + x + 9 max(x - a, 0) = 0 as two harmonic motions: the state after `time`, from x = 0, x' = 1. Contact lasts from
+/// a sin-arc of radius 1 to the mirror of its entry, with frequency ω = √10 around the centre 0.9 a.
+fn bouncer(a: f64, time: f64) -> [f64; 2] {
+    let (mut t, mut x, mut v, mut outside): (f64, f64, f64, bool) = (0.0, 0.0, 1.0, true);
+    loop {
+        let (omega, centre) = if outside { (1.0, 0.0) } else { (10f64.sqrt(), 0.9 * a) };
+        let (radius, phase) = ((x - centre).hypot(v / omega), (x - centre).atan2(v / omega));
+        // x = centre + radius sin(ω τ + phase) meets a at ω τ + phase = asin, rising, or π - asin, falling.
+        let angle = ((a - centre) / radius).min(1.0).asin();
+        let goal = if outside { angle } else { std::f64::consts::PI - angle };
+        let wait = (goal - phase).rem_euclid(std::f64::consts::TAU) / omega;
+        let misses = outside && a > radius;
+        if misses || t + wait >= time {
+            let s = omega * (time - t) + phase;
+            return [centre + radius * s.sin(), radius * omega * s.cos()];
+        }
+        (t, x, v, outside) = (t + wait, a, radius * omega * goal.cos(), !outside);
+    }
+}
+
+fn error(field: &dyn VectorField, a: f64, tolerance: f64) -> (f64, usize) {
+    let integrator = Integrator::new(field, &[], Tolerance::uniform(tolerance, 2));
+    let arrival = integrator.trajectory(&[0.0, 1.0], [0.0, 40.0], &[], &mut |_| Verdict::Continue);
+    assert_eq!(arrival.outcome, Outcome::Reached);
+    let exact = bouncer(a, 40.0);
+    ((arrival.state[0] - exact[0]).hypot(arrival.state[1] - exact[1]), arrival.steps + arrival.rejected)
+}
+
+#[test]
+fn a_kink_costs_neither_accuracy_nor_many_steps() {
+    let bouncing = model(&[("x", "v"), ("v", "-x - 9*max(x - 0.6, 0)")]);
+    for tolerance in [1e-5, 1e-7, 1e-9, 1e-11] {
+        let (located, steps) = error(&bouncing, 0.6, tolerance);
+        let (plain, plain_steps) = error(&Plain(&bouncing), 0.6, tolerance);
+        // The errors of a few hundred steps add up, and so do the phases they leave behind over seven periods.
+        assert!(located < 300.0 * tolerance, "{located} at {tolerance}");
+        assert!(plain_steps > steps, "{plain_steps} against {steps} steps");
+        // The error of a step across a kink is of second order in its length only.
+        assert!(tolerance > 1e-6 || plain > 4.0 * located, "{plain} against {located} at {tolerance}");
+    }
+}
+
+#[test]
+fn grazing_is_neither_missed_nor_invented() {
+    // The first arc has amplitude 1: contact a little below it lasts 2 acos(a), a small part of a step.
+    for depth in [1e-3, 1e-5, 1e-7, -1e-7] {
+        let a = 1.0 - depth;
+        let grazing = model(&[("x", "v"), ("v", &format!("-x - 9*max(x - {a}, 0)"))]);
+        let mut worst: f64 = 0.0;
+        for tolerance in [1e-8, 1e-10] {
+            worst = worst.max(error(&grazing, a, tolerance).0 / tolerance);
+        }
+        // Near tangency an error e of the state changes the time of contact, 2 √(2 depth), by e / √(2 depth); the impulse, which
+        // goes with depth^1.5, changes by 9 · 2 √(2 depth) e only.
+        assert!(worst < 100.0, "{worst} at depth {depth}");
+    }
+}
+
+#[test]
+fn f_may_jump() {
+    // x'' = -sign(x): arcs x = v τ - τ²/2 of duration 2 v; the motion from x = 0, v = 1 has the period 4.
+    let jumping = model(&[("x", "v"), ("v", "-sign(x)")]);
+    let integrator = Integrator::new(&jumping, &[], Tolerance::uniform(1e-8, 2));
+    let arrival = integrator.trajectory(&[0.0, 1.0], [0.0, 401.0], &[], &mut |_| Verdict::Continue);
+    assert_eq!(arrival.outcome, Outcome::Reached);
+    // The arcs are polynomials of degree two, which the method follows exactly; what is left is rounding.
+    assert!((arrival.state[0] - 0.5).abs() < 1e-10 && arrival.state[1].abs() < 1e-10, "{:?}", arrival.state);
+    assert!(arrival.steps < 2000, "{}", arrival.steps);
+}
+
+#[test]
+fn sliding_is_answered() {
+    let sliding = model(&[("x", "-sign(x)"), ("y", "1")]);
+    let integrator = Integrator::new(&sliding, &[], Tolerance::uniform(1e-8, 2));
+    let arrival = integrator.trajectory(&[1.0, 0.0], [0.0, 10.0], &[], &mut |_| Verdict::Continue);
+    assert_eq!(arrival.outcome, Outcome::StepTooSmall);
+    assert!((arrival.time - 1.0).abs() < 1e-12);
+}
+
+#[test]
+fn every_lane_has_its_own_parameters_and_kinks() {
+    let source = ModelSource {
+        parameters: vec![crate::model::Parameter::new("a", 0.6)],
+        states: ["x", "v"].map(State::new).to_vec(),
+        equations: vec![Definition::new("x", "v"), Definition::new("v", "-x - 9*max(x - a, 0)")],
+        ..ModelSource::default()
+    };
+    let model = Model::compile(source).unwrap();
+    let gaps: Vec<f64> = (0..20).map(|k| 0.03 + 0.049 * k as f64).collect();
+    let starts = [0.0, 1.0].repeat(gaps.len());
+    let tolerance = Tolerance::uniform(1e-9, 2);
+    let together = Ensemble::with_own_parameters(&model, &gaps, tolerance.clone(), &starts, [0.0, 30.0])
+        .run(&mut |_| Verdict::Continue);
+    for (arrival, a) in together.iter().zip(&gaps) {
+        let alone =
+            Ensemble::new(&model, &[*a], tolerance.clone(), &[0.0, 1.0], [0.0, 30.0]).run(&mut |_| Verdict::Continue);
+        assert_eq!(*arrival, alone[0], "a = {a}");
+        let exact = bouncer(*a, 30.0);
+        assert!((arrival.state[0] - exact[0]).abs() < 1e-7, "a = {a}: {} {}", arrival.state[0], exact[0]);
+    }
+}
