@@ -81,6 +81,7 @@ pub struct Runs<'r> {
     publication: &'static Publication,
     folder: PathBuf,
     jobs: usize,
+    tolerance: Option<f64>,
     stop: &'r AtomicBool,
     say: &'r (dyn Fn(&str) + Sync),
     /// Weights of what is still to be run.
@@ -100,6 +101,7 @@ impl<'r> Runs<'r> {
             publication,
             folder: request.out.join("runs"),
             jobs: request.jobs,
+            tolerance: request.tolerance,
             stop: request.stop,
             say: request.say,
             ahead,
@@ -168,9 +170,11 @@ impl<'r> Runs<'r> {
 
     fn carried_out(&self, plan: &StudyPlan) -> Result<Run, String> {
         let parsed = parse_study(plan.text, plan.file, plan.model, plan.model_file);
-        let study = parsed.map_err(|found| found.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))?;
+        let mut study = parsed.map_err(|found| found.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))?;
+        study.plan.tolerance = self.tolerance.unwrap_or(study.plan.tolerance);
         let folder = self.folder.join(plan.name);
-        if let Some((diagram, seconds)) = finished(&folder, &study) {
+        let name = format!("{VERSION}, tolerance {:e}", study.plan.tolerance);
+        if let Some((diagram, seconds)) = finished(&folder, &study, &name) {
             return Ok(whole(study, diagram, seconds, true));
         }
         let start = Instant::now();
@@ -183,7 +187,7 @@ impl<'r> Runs<'r> {
         if self.stop.load(Ordering::Relaxed) {
             return Err("it was stopped; the same command goes on".into());
         }
-        let mark = format!("{VERSION}\n{seconds}\n");
+        let mark = format!("{name}\n{seconds}\n");
         std::fs::write(folder.join(FINISHED), mark).map_err(|error| format!("{}: {error}", folder.display()))?;
         Ok(whole(study, diagram, seconds, false))
     }
@@ -198,12 +202,12 @@ fn whole(study: Study, diagram: Diagram, seconds: f64, reused: bool) -> Run {
     Run { study, diagram, seconds, reused, short }
 }
 
-/// A finished run of the same texts by the same version, and how long it took.
-fn finished(folder: &Path, study: &Study) -> Option<(Diagram, f64)> {
+/// A finished run of the same texts under that name, which holds version and tolerance, and how long it took.
+fn finished(folder: &Path, study: &Study, name: &str) -> Option<(Diagram, f64)> {
     let mark = std::fs::read_to_string(folder.join(FINISHED)).ok()?;
-    let (version, seconds) = mark.split_once('\n')?;
+    let (of, seconds) = mark.split_once('\n')?;
     let recorded = load(folder).ok()?;
-    let same = version == VERSION && recorded.study_text == study.text && recorded.model_text == study.model_text;
+    let same = of == name && recorded.study_text == study.text && recorded.model_text == study.model_text;
     same.then_some((recorded.diagram, seconds.trim().parse().ok()?))
 }
 

@@ -8,12 +8,12 @@ use foldline_plot::figure::Shape;
 use foldline_plot::{Axis, Figure, Layer, Panel};
 
 pub const CUBIC: FigurePlan =
-    FigurePlan { name: "10", title: "ζ = 10⁻⁵, cubic", runs: &["light-damping"], make: cubic };
+    FigurePlan { name: "10", title: "ζ = 10⁻⁵, cubic", runs: &["light-damping-cubic"], make: cubic };
 pub const CONTACT: FigurePlan =
-    FigurePlan { name: "11", title: "ζ = 10⁻⁵, contact", runs: &["light-damping"], make: contact };
+    FigurePlan { name: "11", title: "ζ = 10⁻⁵, contact", runs: &["light-damping-contact"], make: contact };
 
 fn cubic(runs: &Runs) -> Result<Made, String> {
-    let run = runs.run("light-damping")?;
+    let run = runs.run("light-damping-cubic")?;
     let parts = [("the smallest cycles", [2.0, 5.0, 0.3, 2.0])];
     let figure = diagrams(run, "cubic", "Cubic spring, ζ = 10⁻⁵", [0.5, 15.0, 0.0, 20.0], &parts);
     let mut claims = Vec::new();
@@ -29,7 +29,7 @@ fn cubic(runs: &Runs) -> Result<Made, String> {
 }
 
 fn contact(runs: &Runs) -> Result<Made, String> {
-    let run = runs.run("light-damping")?;
+    let run = runs.run("light-damping-contact")?;
     let parts =
         [("the smallest double loops", [2.1, 4.0, 0.95, 1.5]), ("the smallest single loops", [3.2, 4.2, 0.97, 1.2])];
     let figure = diagrams(run, "contact", "Contact, ζ = 10⁻⁵", [0.5, 15.0, 0.0, 20.0], &parts);

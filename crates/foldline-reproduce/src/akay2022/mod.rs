@@ -39,8 +39,10 @@ const STUDIES: &[StudyPlan] = &[
     study!("far", 1.0),
     study!("lowest-part", 1.5),
     study!("flows", 1.5),
-    study!("light-damping", 4.0),
-    study!("light-damping-large-unbalance", 4.0),
+    study!("light-damping-cubic", 0.3),
+    study!("light-damping-contact", 4.0),
+    study!("light-damping-large-unbalance-cubic", 0.3),
+    study!("light-damping-large-unbalance-contact", 2.0),
     study!("blunt-contact", 0.5),
 ];
 
