@@ -67,12 +67,35 @@ pub struct Table {
     /// One line for each branch, with how it ended
     #[arg(long, group = "what")]
     pub branches: bool,
-    /// Only this branch
+    /// Remarks: what was found for each seed, which routes the homotopies took, which switches led to known branches
+    #[arg(long, group = "what")]
+    pub notes: bool,
+    /// Only this branch, or the legs of this homotopy
     #[arg(long, value_name = "NAME")]
     pub branch: Option<String>,
     /// How the table is written
     #[arg(long, value_enum, default_value_t = Format::Text)]
     pub format: Format,
+}
+
+/// Which table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum What {
+    Special,
+    Points,
+    Branches,
+    Notes,
+}
+
+impl Table {
+    pub fn what(&self) -> What {
+        match (self.points, self.branches, self.notes) {
+            (true, ..) => What::Points,
+            (_, true, _) => What::Branches,
+            (.., true) => What::Notes,
+            _ => What::Special,
+        }
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -96,6 +119,9 @@ pub struct Plot {
     /// Vertical axis [default: the largest value of the first output]
     #[arg(long, value_name = "NAME")]
     pub y: Option<String>,
+    /// Draw the curves in two parameters, in their plane, instead of the branches
+    #[arg(long)]
+    pub curves: bool,
     /// Part of the diagram to show
     #[arg(long, value_name = "x0,x1,y0,y1", allow_hyphen_values = true)]
     pub window: Option<String>,

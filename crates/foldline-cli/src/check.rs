@@ -15,8 +15,11 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
     let text = std::fs::read_to_string(file).unwrap_or_default();
     let verdict = if is_study(&text) {
         let study = read_study(file)?;
-        let (seeds, branches) = (study.plan.seeds.len(), study.plan.branches.len());
-        format!("a study of {} with {}, {}", study.model.name, many(seeds, "seed"), many(branches, "branch"))
+        let plan = &study.plan;
+        let mut parts = vec![many(plan.seeds.len(), "seed"), many(plan.branches.len(), "branch")];
+        let others = [(plan.curves.len(), "curve"), (plan.homotopies.len(), "homotopy")];
+        parts.extend(others.into_iter().filter(|(count, _)| *count > 0).map(|(count, noun)| many(count, noun)));
+        format!("a study of {} with {}", study.model.name, parts.join(", "))
     } else {
         let (model, text) = read_model(file)?;
         let parameters: Vec<f64> = model.parameters.iter().map(|p| p.value).collect();
@@ -35,9 +38,10 @@ fn described(model: &Model) -> String {
 }
 
 fn many(count: usize, noun: &str) -> String {
-    match (count, noun.ends_with('h')) {
+    match (count, noun.strip_suffix('y')) {
         (1, _) => format!("1 {noun}"),
-        (_, true) => format!("{count} {noun}es"),
-        (_, false) => format!("{count} {noun}s"),
+        (_, Some(stem)) => format!("{count} {stem}ies"),
+        _ if noun.ends_with('h') => format!("{count} {noun}es"),
+        _ => format!("{count} {noun}s"),
     }
 }

@@ -2,8 +2,8 @@
 
 use crate::arguments::Plot as Typed;
 use crate::failure::{Failure, Outcome};
-use crate::table::read;
-use foldline::diagram::Diagram;
+use crate::table::{Run, read};
+use foldline::diagram::{Branch, Diagram};
 use foldline::model::Model;
 use foldline_plot::{Picture, Quantity, pdf, png, svg};
 use std::path::Path;
@@ -13,7 +13,7 @@ const SCALE: f32 = 2.0;
 
 /// Writes a picture of a run.
 pub fn write(typed: &Typed) -> Result<Outcome, Failure> {
-    let (model, diagram) = read(&typed.folder)?;
+    let Run { model, diagram, .. } = read(&typed.folder)?;
     let axis = |option: &str, name: &Option<String>| {
         let quantity = name.as_ref().map(|name| {
             let unknown = |choices| Failure::typed(format!("--{option}: there is no quantity \"{name}\""), choices);
@@ -21,15 +21,42 @@ pub fn write(typed: &Typed) -> Result<Outcome, Failure> {
         });
         quantity.transpose()
     };
+    let (x, y) = (axis("x", &typed.x)?, axis("y", &typed.y)?);
+    let (diagram, plane) = shown(diagram, typed.curves, [x, y])?;
     let picture = Picture {
-        x: axis("x", &typed.x)?,
-        y: axis("y", &typed.y)?,
+        x: x.or(plane.map(|[first, _]| Quantity::Parameter(first))),
+        y: y.or(plane.map(|[_, second]| Quantity::Parameter(second))),
         window: typed.window.as_deref().map(window).transpose()?,
         title: typed.title.clone(),
         ..Picture::default()
     };
     draw(&diagram, &model, &picture, &typed.output)?;
     Ok(Outcome::Done)
+}
+
+/// What is drawn: the branches, or the curves in two parameters if they are asked for; where both axes are parameters, both.
+/// And the parameters of the plane of the curves, if they are asked for.
+fn shown(
+    mut diagram: Diagram,
+    curves: bool,
+    axes: [Option<Quantity>; 2],
+) -> Result<(Diagram, Option<[usize; 2]>), Failure> {
+    if !curves {
+        if !axes.iter().all(|axis| matches!(axis, Some(Quantity::Parameter(_)))) {
+            diagram.branches.retain(|branch| branch.held.is_none());
+        }
+        return Ok((diagram, None));
+    }
+    let planes: Vec<[usize; 2]> = diagram.branches.iter().filter_map(Branch::plane).collect();
+    let Some(first) = planes.first().copied() else {
+        return Err(Failure::typed("--curves: the run has no curve in two parameters", "leave --curves out"));
+    };
+    if axes.iter().any(Option::is_none) && planes.iter().any(|plane| *plane != first) {
+        let cure = "say with --x and --y which ones to draw";
+        return Err(Failure::typed("--curves: the curves of the run do not have the same two parameters", cure));
+    }
+    diagram.branches.retain(|branch| branch.held.is_some());
+    Ok((diagram, Some(first)))
 }
 
 /// Writes a picture; the ending of the file says which kind.

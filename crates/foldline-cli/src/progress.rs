@@ -67,10 +67,14 @@ impl Progress {
     }
 
     fn place(&self, branch: &Branch, point: &Point, live: &Live) -> String {
-        let name = self.parameters.get(branch.free).map_or("", String::as_str);
-        let value = point.parameters.get(branch.free).copied().unwrap_or(f64::NAN);
+        let at = |index: usize| {
+            let name = self.parameters.get(index).map_or("", String::as_str);
+            format!("{name} = {:<10.6}", point.parameters.get(index).copied().unwrap_or(f64::NAN))
+        };
+        let places: Vec<String> =
+            [Some(branch.free), branch.held.map(|(_, follows)| follows)].into_iter().flatten().map(at).collect();
         let special = if live.special > 0 { format!(", {} special", live.special) } else { String::new() };
-        format!("{:>5} points{special}   {name} = {value:<10.6} step {:.1e}", live.points, point.step)
+        format!("{:>5} points{special}   {} step {:.1e}", live.points, places.join(" "), point.step)
     }
 
     fn end(&self, branch: &Branch) {

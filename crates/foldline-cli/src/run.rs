@@ -9,8 +9,9 @@ use foldline::contract::{Event, Observer, Verdict};
 use foldline::diagram::Diagram;
 use foldline::explore;
 use foldline_plot::Picture;
-use foldline_store::order::{fell_short, ordered};
+use foldline_store::order::{names, ordered};
 use foldline_store::run_file::Recorder;
+use foldline_store::short;
 use foldline_store::study_file::{Study, parse_study, read_study};
 use std::io::{Write, stderr};
 use std::path::{Path, PathBuf};
@@ -70,12 +71,14 @@ fn run(
     watch.progress.finish();
     watch.recorder.finish()?;
 
-    let names: Vec<&str> = study.plan.branches.iter().map(|b| b.name.as_str()).collect();
-    let diagram = ordered(diagram, &names);
+    let diagram = ordered(diagram, &names(&study.plan));
     print_special(&diagram, &study.model)?;
-    let short = fell_short(&diagram, &names);
+    let short = short::lines(&diagram, &study.plan, &study.model);
     let mut err = stderr().lock();
     short.iter().try_for_each(|line| writeln!(err, "ended short: {line}"))?;
+    if !study.plan.homotopies.is_empty() {
+        writeln!(err, "routes: foldline table {} --notes", folder.display())?;
+    }
     if watch.stop.load(Ordering::Relaxed) {
         writeln!(err, "stopped; go on with --resume --out {}", folder.display())?;
     }

@@ -21,19 +21,7 @@ fn explored(model: &str, seed: &str, branch: &str) -> Diagram {
         "model = \"m\"\ntolerance = {TOLERANCE}\n[[seed]]\nname = \"s\"\n{seed}\n[[branch]]\nname = \"b\"\nfrom = \"s\"\n{branch}\n"
     );
     let study = parse_study(&text, "study", model, "model").unwrap_or_else(|found| panic!("{found:?}"));
-    let states = &study.model.states;
-    let mut system = System {
-        scales: states.iter().map(|s| s.scale).collect(),
-        parameter_scales: study
-            .model
-            .parameters
-            .iter()
-            .map(|p| if p.value == 0.0 { 1.0 } else { p.value.abs() })
-            .collect(),
-        ranges: states.iter().map(|s| s.range).collect(),
-        ..System::new(&study.model)
-    };
-    system.find_reflections(&study.plan.seeds[0].parameters);
+    let system = System::of(&study.model, &study.plan.seeds[0].parameters);
     explore::run(&system, &study.plan, 1, Diagram::default(), &Unobserved)
 }
 

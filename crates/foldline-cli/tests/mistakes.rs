@@ -139,7 +139,7 @@ fn unknown_origin_and_an_origin_further_down() {
     let desk = Desk::new();
     says(
         &desk.study("\"rest\"\nfree", "\"test\"\nfree"),
-        &["study.toml:10:8", "no seed or branch \"test\"", "did you mean `rest`"],
+        &["study.toml:10:8", "no seed, branch, curve or homotopy \"test\"", "did you mean `rest`"],
     );
     let above = "[[branch]]\nname = \"early\"\nfrom = \"main\"\nfree = \"kappa\"\nrange = [0, 2]\n";
     let message = desk.study("[[branch]]\n", &format!("{above}[[branch]]\n"));
@@ -195,6 +195,24 @@ fn several_mistakes_are_said_at_once() {
     desk.write("study.toml", &STUDY.replace("1e-6", "1").replace("[-1, 2]", "[2, -1]").replace("\"mu\"", "\"nu\""));
     let message = desk.refused(&["check", "study.toml"]);
     says(&message, &["out of bounds", "wrong way round", "no parameter `nu`"]);
+}
+
+#[test]
+fn curves_and_homotopies_in_which_something_is_wrong() {
+    let desk = Desk::new();
+    let added = "range = [-1, 2]\n\n[[curve]]\nname = \"folds\"\nhold = \"fold\"\nof = \"main\"\nfree = \"kappa\"\nuntil = 2\n\n\
+                 [[homotopy]]\nname = \"way\"\nfrom = \"rest\"\nto = { kappa = 3 }\nvia = \"mu\"\nrange = [-1, 2]\n";
+    desk.write("more.toml", &STUDY.replace("range = [-1, 2]\n", added));
+    let output = desk.foldline(&["check", "more.toml"]);
+    says(&String::from_utf8_lossy(&output.stdout), &["is right", "1 seed, 1 branch, 1 curve, 1 homotopy"]);
+
+    let spoilt = |piece: &str, by: &str| desk.study("range = [-1, 2]\n", &added.replacen(piece, by, 1));
+    says(&spoilt("\"fold\"", "\"fld\""), &["study.toml:16:8", "\"fld\"", "did you mean `fold`"]);
+    says(&spoilt("\"main\"", "\"rest\""), &["study.toml:17:6", "\"rest\" is a seed", "lies on a branch"]);
+    says(&spoilt("free = \"kappa\"", "free = \"mu\""), &["study.toml:18:8", "already", "such as `kappa`"]);
+    says(&spoilt("via = \"mu\"", "via = \"kappa\""), &["study.toml:25:7", "part of the goal", "leave kappa out"]);
+    let both = spoilt("kappa = 3 }\nvia = \"mu\"", "kapa = 3 }\nvia = \"nu\"");
+    says(&both, &["study.toml:24:8", "did you mean `kappa`", "study.toml:25:7", "no parameter `nu`"]);
 }
 
 #[test]
@@ -308,4 +326,22 @@ fn the_studies_of_this_repository_are_right() {
         let output = Desk::new().foldline(&["check", &file.display().to_string()]);
         assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
     }
+}
+
+#[test]
+fn the_curves_and_homotopies_of_the_book_are_right() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let page = std::fs::read_to_string(root.join("docs/book/study-files.md")).unwrap();
+    let blocks: Vec<&str> = page.split("```toml\n").skip(1).filter_map(|rest| rest.split("```").next()).collect();
+    let with = |table: &str| blocks.iter().find(|block| block.starts_with(table)).expect("the page has such a block");
+    let study = blocks[0].replace("../../models/overhung-rotor.toml", "rotor.toml");
+    let cubic = "[[branch]]\nname = \"cubic SL\"\nfrom = \"cubic SL at 5\"\nfree = \"Omega\"\nrange = [0.5, 12]\n";
+    let curve = with("[[curve]]").replace("\"contact SL\"", "\"contact SL from the fold\"");
+    let homotopy = with("[[homotopy]]").replace("\"contact SL\"", "\"contact SL by homotopy\"");
+    let desk = Desk::new();
+    std::fs::copy(root.join("models/overhung-rotor.toml"), desk.path("rotor.toml")).unwrap();
+    desk.write("book.toml", &[&study[..], cubic, &curve, &homotopy].join("\n"));
+    let output = desk.foldline(&["check", "book.toml"]);
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    says(&String::from_utf8_lossy(&output.stdout), &["5 branches, 1 curve, 1 homotopy"]);
 }

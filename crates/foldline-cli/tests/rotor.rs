@@ -103,6 +103,7 @@ fn the_other_direction_gives_the_same_special_points() {
             system: &system,
             settings: &settings,
             degree: 4,
+            ties: Vec::new(),
             sides: [closed || known.points[0].parameter_slope() < 0.0, true],
             parents: &[],
             observer: &Unobserved,

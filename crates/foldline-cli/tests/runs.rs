@@ -116,6 +116,23 @@ fn a_branch_that_ends_short_is_exit_code_3_and_said() {
 }
 
 #[test]
+fn a_branch_that_turns_round_before_its_target_is_short_and_nothing_starts_at_its_end() {
+    let folder = tempfile::tempdir().unwrap();
+    // x = ±sqrt(mu): the way to mu = -1 leads over the fold at 0 back to mu = 2.
+    let model = "name = \"fold\"\n[parameters]\nmu = 1\nh = 0\n[states.x]\nequation = \"mu - x^2 + h\"\n";
+    let study = "model = \"model.toml\"\n[[seed]]\nname = \"start\"\nstate = { x = 1 }\n\
+                 [[branch]]\nname = \"down\"\nfrom = \"start\"\nfree = \"mu\"\nrange = [-1, 2]\nuntil = -1\n\
+                 [[branch]]\nname = \"on\"\nfrom = \"down\"\nfree = \"h\"\nrange = [0, 1]\n";
+    std::fs::write(folder.path().join("model.toml"), model).unwrap();
+    std::fs::write(folder.path().join("study.toml"), study).unwrap();
+    let output = foldline(folder.path(), &["run", "study.toml"]);
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(3), "{said}");
+    assert!(said.contains("ended short: down: it did not arrive at mu = -1; reached 2"), "{said}");
+    assert!(said.contains("ended short: on: no start: branch down did not get to its end"), "{said}");
+}
+
+#[test]
 fn a_seed_that_is_not_found_is_exit_code_3_and_said() {
     let desk = desk("README.md");
     let study = std::fs::read_to_string(desk.path().join("study.toml")).unwrap();
@@ -185,6 +202,30 @@ fn a_finished_run_resumes_without_doing_anything() {
     let desk = desk("README.md");
     let first = printed(desk.path(), &["run", "study.toml"], 0);
     assert_eq!(printed(desk.path(), &["run", "study.toml", "--resume"], 0), first);
+}
+
+#[test]
+fn a_finished_homotopy_and_curve_resume_without_doing_anything() {
+    let desk = desk("README.md");
+    let study = "model = \"brusselator.toml\"\n[[seed]]\nname = \"rest\"\nattractor = \"equilibrium\"\n\
+                 [[branch]]\nname = \"steady\"\nfrom = \"rest\"\nfree = \"B\"\nrange = [0.5, 4]\n\
+                 [[curve]]\nname = \"onset\"\nhold = \"hopf\"\nof = \"steady\"\nfree = \"A\"\nuntil = 1.25\n\
+                 [[homotopy]]\nname = \"way\"\nfrom = \"rest\"\nto = { A = 2 }\nvia = \"B\"\nrange = [1, 6]\n\
+                 [[branch]]\nname = \"at two\"\nfrom = \"way\"\nfree = \"B\"\nrange = [1, 6]\n";
+    std::fs::write(desk.path().join("study.toml"), study).unwrap();
+    let first = printed(desk.path(), &["run", "study.toml"], 0);
+    let table = |what: &str| printed(desk.path(), &["table", "runs/study", what, "--format", "csv"], 0);
+    let before = ["--points", "--branches", "--notes"].map(table);
+    assert!(before[2].contains("way,arrived"), "{}", before[2]);
+    // On the curve and on the branch at the goal, B = 1 + A²; tolerance 1e-6 relative to 1 + B.
+    for point in rows(&table("--points")).iter().filter(|row| row("branch") == "onset") {
+        let [a, b] = ["A", "B"].map(|name| point(name).parse::<f64>().unwrap());
+        assert!((b - 1.0 - a * a).abs() < 1e-6 * (1.0 + b), "{a} {b}");
+    }
+    let hopf = rows(&table("--special")).into_iter().find(|row| row("branch") == "at two").unwrap();
+    assert!((hopf("B").parse::<f64>().unwrap() - 5.0).abs() < 6e-6, "{}", hopf("B"));
+    assert_eq!(printed(desk.path(), &["run", "study.toml", "--resume"], 0), first);
+    assert_eq!(["--points", "--branches", "--notes"].map(table), before);
 }
 
 #[test]

@@ -71,6 +71,10 @@ pub fn root<'d>(diagram: &'d Diagram, branch: &'d Branch) -> (&'d Branch, usize)
     // Names are unique, so a chain longer than the list of branches would go round in circles.
     for depth in 0..diagram.branches.len() {
         let Origin::Switch { parent, .. } = &at.origin else { return (at, depth) };
+        // A curve in two parameters is nobody's side branch.
+        if at.held.is_some() {
+            return (at, depth);
+        }
         let Some(parent) = diagram.branch(parent) else { return (at, depth) };
         at = parent;
     }

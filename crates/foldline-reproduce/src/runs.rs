@@ -9,8 +9,9 @@ use crate::publication::{Publication, StudyPlan};
 use foldline::contract::{Event, Observer, Verdict};
 use foldline::diagram::{Branch, Diagram, Kind, Point, SpecialPoint};
 use foldline::explore::{self, System, growth, known};
-use foldline_store::order::{fell_short, ordered};
+use foldline_store::order::{names, ordered};
 use foldline_store::run_file::{Recorder, RunFileError, load};
+use foldline_store::short;
 use foldline_store::study_file::{Study, parse_study};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -196,9 +197,8 @@ impl<'r> Runs<'r> {
 const FINISHED: &str = "finished";
 
 fn whole(study: Study, diagram: Diagram, seconds: f64, reused: bool) -> Run {
-    let names: Vec<&str> = study.plan.branches.iter().map(|b| b.name.as_str()).collect();
-    let short = fell_short(&diagram, &names);
-    let diagram = ordered(diagram, &names);
+    let short = short::lines(&diagram, &study.plan, &study.model);
+    let diagram = ordered(diagram, &names(&study.plan));
     Run { study, diagram, seconds, reused, short }
 }
 

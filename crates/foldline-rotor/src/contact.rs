@@ -10,6 +10,9 @@
 
 use crate::jet::Jet;
 
+/// The x > 0 at which ½ (tanh(-x) + 1) (-x) is smallest: 2x = 1 + e^{-2x}.
+const DEEPEST: f64 = 0.639_232_271_380_537;
+
 /// How the ring takes up force.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum ContactLaw {
@@ -71,6 +74,39 @@ impl ContactLaw {
         r * self.stiffness(r, beta, k).value
     }
 
+    /// The switch of the law, and its limit for K → ∞: the share of the ring's stiffness that is in force at radius `r`, that is
+    /// ½ (tanh(K g) + 1) or the logistic function of 2K g (which are equal), or 0 and 1.
+    pub fn switch(self, r: f64, k: f64) -> f64 {
+        match self {
+            ContactLaw::Tanh | ContactLaw::Softplus => 0.5 * ((k * (r - 1.0)).tanh() + 1.0),
+            ContactLaw::Piecewise => f64::from(r > 1.0),
+        }
+    }
+
+    /// The deepest pull of the law below contact, as radius and (negative) force; `None` where it never pulls.
+    pub fn pull(self, beta: f64, k: f64) -> Option<[f64; 2]> {
+        match self {
+            ContactLaw::Tanh => Some([1.0 - DEEPEST / k, -DEEPEST * (1.0 - DEEPEST.tanh()) * 0.5 * beta / k]),
+            ContactLaw::Softplus | ContactLaw::Piecewise => None,
+        }
+    }
+
+    /// The switch and the force against the radius, `count` points from `range[0]` to `range[1]`: radius, switch, force.
+    pub fn curve(self, beta: f64, k: f64, range: [f64; 2], count: usize) -> Vec<[f64; 3]> {
+        let spacing = (range[1] - range[0]) / (count.max(2) - 1) as f64;
+        let radius = |i: usize| range[0] + i as f64 * spacing;
+        (0..count).map(radius).map(|r| [r, self.switch(r, k), self.force(r, beta, k)]).collect()
+    }
+
+    /// The model file, in models/, that has this law.
+    pub fn model_file(self) -> &'static str {
+        match self {
+            ContactLaw::Tanh => "overhung-rotor.toml",
+            ContactLaw::Softplus => "overhung-rotor-softplus.toml",
+            ContactLaw::Piecewise => "overhung-rotor-piecewise.toml",
+        }
+    }
+
     /// h for jets.
     pub(crate) fn jet(self, r: &Jet, beta: &Jet, k: &Jet) -> Jet {
         let gap = r.plus(-1.0);
@@ -102,6 +138,30 @@ mod tests {
         assert!((lowest.0 + 0.139232 * beta / k).abs() < 1e-6 * beta / k, "{lowest:?}");
         // The scan has a step of 2e-5/K, and near a minimum the value says little about the place.
         assert!((lowest.1 - (1.0 - 0.639232 / k)).abs() < 3e-5 / k, "{lowest:?}");
+        let [r, force] = ContactLaw::Tanh.pull(beta, k).unwrap();
+        assert!((r - lowest.1).abs() < 3e-5 / k && (force - lowest.0).abs() < 1e-9 * beta / k, "{r} {force}");
+        // There the force r h(r) is stationary: h + r h′ = 0, but for the rounding of 1 - r, which K multiplies.
+        let h = ContactLaw::Tanh.stiffness(r, beta, k);
+        assert!((h.value + r * h.by_radius).abs() < 1e-15 * beta * k, "{h:?}");
+        assert_eq!(ContactLaw::Softplus.pull(beta, k), None);
+    }
+
+    #[test]
+    fn the_curve_of_a_law_has_its_switch_and_its_force() {
+        for law in [ContactLaw::Tanh, ContactLaw::Softplus, ContactLaw::Piecewise] {
+            let curve = law.curve(6.0, 90.0, [0.9, 1.1], 201);
+            assert_eq!((curve.len(), curve[0][0]), (201, 0.9));
+            assert!((curve[200][0] - 1.1).abs() < 1e-15);
+            assert!(curve[0][1] < 1e-7 && curve[200][1] > 1.0 - 1e-7, "{law:?}");
+            assert!(curve.windows(2).all(|pair| pair[1][1] >= pair[0][1]));
+            assert!((curve[200][2] - 0.6).abs() < 1e-7, "{law:?}: β g at g = 0.1, {:?}", curve[200]);
+        }
+        // Softplus is the integral of the switch: the slope of the force over β.
+        let slope = |r: f64| {
+            let h = ContactLaw::Softplus.stiffness(r, 6.0, 90.0);
+            (h.value + r * h.by_radius) / 6.0
+        };
+        assert!([0.98, 1.0, 1.01].iter().all(|&r| (slope(r) - ContactLaw::Softplus.switch(r, 90.0)).abs() < 1e-14));
     }
 
     #[test]

@@ -1,4 +1,15 @@
-//! The constants of the rotor, with dimensions and without.
+//! The constants of the rotor, with dimensions and without, and the way from one to the other.
+//!
+//! **Equations.** With I = I_d + m_d a², ω_n² = k_r b²/I, c̄ = c a/b:
+//!
+//! 1. Ω = ω/ω_n, J_p = I_p/I, m = m_d a²/I, ζ = c_r b²/(2 I ω_n), β = k_s/k_r, γ = k_3 c²/k_r, ε = e/c̄
+//! 2. displacements over c̄, times by 1/ω_n, velocities over c̄ ω_n
+//! 3. The way back needs what the numbers without dimensions do not say, the [`Scale`] a, b, c, I, ω_n:
+//!    k_r = I ω_n²/b², m_d = m I/a², I_d = (1 - m) I, and the others from 1.
+//!
+//! **Source.** akay2024, section 2.
+
+use crate::units::Mistake;
 
 /// Constants in SI units.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,6 +42,39 @@ pub struct Si {
     pub cubic_stiffness: f64,
     /// k_s, stiffness of the ring, N/m.
     pub ring_stiffness: f64,
+}
+
+/// The units in which the constants without dimensions are numbers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scale {
+    /// a, pivot to disc, m.
+    pub disc_distance: f64,
+    /// b, pivot to spring, damper and ring, m.
+    pub spring_distance: f64,
+    /// c, radial clearance of the ring, m.
+    pub clearance: f64,
+    /// I = I_d + m_d a², diametral moment of inertia about the pivot, kg m².
+    pub pivot_inertia: f64,
+    /// ω_n, rad/s.
+    pub pivot_frequency: f64,
+}
+
+impl Scale {
+    /// c̄ = c a/b, m: the unit of displacement of the disc.
+    pub fn length(&self) -> f64 {
+        self.clearance * self.disc_distance / self.spring_distance
+    }
+
+    /// 1/ω_n, s: the unit of time.
+    pub fn time(&self) -> f64 {
+        1.0 / self.pivot_frequency
+    }
+
+    /// The units of a state u, v, u′, v′: m, m, m/s, m/s.
+    pub fn state(&self) -> [f64; 4] {
+        let velocity = self.length() * self.pivot_frequency;
+        [self.length(), self.length(), velocity, velocity]
+    }
 }
 
 /// Constants without dimensions.
@@ -70,6 +114,39 @@ impl Si {
     /// c a/b, m: the clearance at the disc, the unit of length.
     pub fn disc_clearance(&self) -> f64 {
         self.clearance * self.disc_distance / self.spring_distance
+    }
+
+    /// Everything that the constants without dimensions leave open.
+    pub fn scale(&self) -> Scale {
+        Scale {
+            disc_distance: self.disc_distance,
+            spring_distance: self.spring_distance,
+            clearance: self.clearance,
+            pivot_inertia: self.pivot_inertia(),
+            pivot_frequency: self.pivot_frequency(),
+        }
+    }
+
+    /// The constants from values in the order of models/overhung-rotor-si.toml.
+    pub fn from_parameters(p: [f64; 14]) -> Si {
+        let [speed, kappa, sharpness, mass, eccentricity, disc_distance, spring_distance, ..] = p;
+        let [.., clearance, diametral_inertia, polar_inertia, stiffness, damping, cubic_stiffness, ring_stiffness] = p;
+        Si {
+            speed,
+            kappa,
+            sharpness,
+            mass,
+            eccentricity,
+            disc_distance,
+            spring_distance,
+            clearance,
+            diametral_inertia,
+            polar_inertia,
+            stiffness,
+            damping,
+            cubic_stiffness,
+            ring_stiffness,
+        }
     }
 
     /// The values in the order of models/overhung-rotor-si.toml.
@@ -133,5 +210,42 @@ impl Nondimensional {
     pub fn from_parameters(p: [f64; 9]) -> Nondimensional {
         let [omega, kappa, zeta, epsilon, gamma, beta, sharpness, polar, mass] = p;
         Nondimensional { omega, kappa, zeta, epsilon, gamma, beta, sharpness, polar, mass }
+    }
+
+    /// The rotor in SI units that has these constants at this scale.
+    ///
+    /// # Errors
+    /// Every mistake, if no rotor has these constants or the scale is not positive and finite.
+    pub fn to_si(&self, scale: &Scale) -> Result<Si, Vec<Mistake>> {
+        self.check()?;
+        let Scale { disc_distance: a, spring_distance: b, clearance: c, pivot_inertia, pivot_frequency } = *scale;
+        let measures = [("a", a), ("b", b), ("c", c), ("I", pivot_inertia), ("omega_n", pivot_frequency)];
+        let wrong =
+            measures.iter().filter(|(_, value)| !(*value > 0.0 && value.is_finite())).map(|(name, value)| Mistake {
+                place: format!("{name} = {value}"),
+                cause: "no rotor has such a measure".into(),
+                cure: format!("{name} is greater than 0"),
+            });
+        let wrong: Vec<Mistake> = wrong.collect();
+        if !wrong.is_empty() {
+            return Err(wrong);
+        }
+        let stiffness = pivot_inertia * (pivot_frequency / b).powi(2);
+        Ok(Si {
+            speed: self.omega * pivot_frequency,
+            kappa: self.kappa,
+            sharpness: self.sharpness,
+            mass: self.mass * pivot_inertia / (a * a),
+            eccentricity: self.epsilon * scale.length(),
+            disc_distance: a,
+            spring_distance: b,
+            clearance: c,
+            diametral_inertia: (1.0 - self.mass) * pivot_inertia,
+            polar_inertia: self.polar * pivot_inertia,
+            stiffness,
+            damping: 2.0 * self.zeta * pivot_inertia * pivot_frequency / (b * b),
+            cubic_stiffness: self.gamma * stiffness / (c * c),
+            ring_stiffness: self.beta * stiffness,
+        })
     }
 }

@@ -96,6 +96,40 @@ fn text_and_hand_agree_in_values_and_derivatives() {
     }
 }
 
+/// The other contact laws, each as text and by hand, around contact and at a sharpness where exponentials would overflow.
+#[test]
+fn the_contact_laws_as_text_are_those_by_hand() {
+    const LANES: usize = 53;
+    let x = states(LANES);
+    let free: Vec<usize> = (0..9).collect();
+    for law in [ContactLaw::Softplus, ContactLaw::Piecewise] {
+        let (model, native) = (text(law.model_file()), OverhungRotor { law });
+        assert_eq!(model.defaults(), Nondimensional::REFERENCE.parameters(), "{law:?}");
+        for (kappa, sharpness) in [(1.0, 150.0), (0.6, 2000.0)] {
+            let p = Nondimensional { kappa, sharpness, ..Nondimensional::REFERENCE }.parameters();
+            let at = Batch { lanes: LANES, states: &x, parameters: Parameters::Shared(&p) };
+            let arrays = || (vec![0.0; 4 * LANES], vec![0.0; 16 * LANES], vec![0.0; 36 * LANES]);
+            let ((mut f, mut fx, mut fp), (mut f_native, mut fx_native, mut fp_native)) = (arrays(), arrays());
+            model.linearise(at, &free, &mut f, &mut fx, &mut fp);
+            native.linearise(at, &free, &mut f_native, &mut fx_native, &mut fp_native);
+            let what = format!("{law:?} K = {sharpness}");
+            // K multiplies the rounding of r - 1.
+            let tolerance = 1e-15 * sharpness;
+            assert_close(&f, &f_native, tolerance, &what);
+            assert_close(&fx, &fx_native, tolerance, &what);
+            assert_close(&fp, &fp_native, tolerance, &what);
+            for order in 1..=2 {
+                let directions: Vec<Vec<f64>> = (0..order).map(|d| scattered(1000 * d, 13 * LANES)).collect();
+                let directions: Vec<&[f64]> = directions.iter().map(|d| d.as_slice()).collect();
+                let (mut found, mut expected) = (vec![0.0; 4 * LANES], vec![0.0; 4 * LANES]);
+                model.directional(at, &directions, &mut found);
+                native.directional(at, &directions, &mut expected);
+                assert_close(&found, &expected, 1e-15 * sharpness, &format!("{what}, order {order}"));
+            }
+        }
+    }
+}
+
 /// The hand-written Jacobian against the jets, for every contact law.
 #[test]
 fn jacobian_and_jets_agree_for_every_law() {
@@ -158,7 +192,12 @@ fn the_model_with_dimensions_is_the_model_without() {
 /// At rest and without a circle to touch, everything is finite, first derivatives included.
 #[test]
 fn the_centre_is_an_ordinary_point() {
-    for name in ["overhung-rotor.toml", "overhung-rotor-si.toml"] {
+    for name in [
+        "overhung-rotor.toml",
+        "overhung-rotor-si.toml",
+        "overhung-rotor-softplus.toml",
+        "overhung-rotor-piecewise.toml",
+    ] {
         let model = text(name);
         let mut p = model.defaults();
         let Some(kappa) = model.parameter_index("kappa") else { panic!("kappa") };

@@ -10,5 +10,6 @@ pub mod model_file;
 pub mod nearest;
 pub mod order;
 pub mod run_file;
+pub mod short;
 pub mod study_file;
 mod toml_walk;

@@ -1,27 +1,72 @@
-//! The order in which branches are listed, and what of a study was not reached.
+//! The order in which branches are listed.
 
 use foldline::diagram::{Branch, Diagram, Origin};
+use foldline::explore::{Plan, Start};
 
-/// The branches of a diagram in an order that does not depend on how the work was shared out: those of the study as it
-/// names them, each followed by the branches that come from it, by the parameter at which they do.
-pub fn ordered(mut diagram: Diagram, study: &[&str]) -> Diagram {
-    let rank = |branch: &Branch| {
-        let place = study.iter().position(|name| *name == branch.name).unwrap_or(usize::MAX);
-        let parameter = match branch.origin {
-            Origin::Switch { parameter, .. } => parameter,
-            _ => f64::NEG_INFINITY,
+/// The names of what a study asks for: branches, curves and homotopies as it lists them, each behind what it starts from.
+pub fn names(plan: &Plan) -> Vec<String> {
+    let mut names = Names { plan, found: Vec::new() };
+    (0..plan.branches.len()).for_each(|index| names.add(&Start::EndOf(index)));
+    (0..plan.curves.len()).for_each(|index| names.add(&Start::EndOfCurve(index)));
+    (0..plan.homotopies.len()).for_each(|index| names.add(&Start::EndOfHomotopy(index)));
+    names.found
+}
+
+struct Names<'p> {
+    plan: &'p Plan,
+    found: Vec<String>,
+}
+
+impl Names<'_> {
+    /// Adds what stands at that place of the plan, behind what it starts from. Nothing starts from what comes later.
+    fn add(&mut self, what: &Start) {
+        let plan = self.plan;
+        let (name, from) = match what {
+            Start::Seed(_) => return,
+            Start::EndOf(index) => (&plan.branches[*index].name, Some(&plan.branches[*index].start)),
+            Start::EndOfCurve(index) => (&plan.curves[*index].name, None),
+            Start::EndOfHomotopy(index) => (&plan.homotopies[*index].name, Some(&plan.homotopies[*index].start)),
         };
-        (place, parameter)
+        if !self.found.contains(name) {
+            from.into_iter().for_each(|from| self.add(from));
+            self.found.push(name.clone());
+        }
+    }
+}
+
+/// The number of a leg of that homotopy, if the name is that of one: `NAME/3` is the third.
+pub fn leg(name: &str, homotopy: &str) -> Option<usize> {
+    name.strip_prefix(homotopy)?.strip_prefix('/')?.parse().ok()
+}
+
+/// The branches of a diagram in an order that does not depend on how the work was shared out: those of the study in the
+/// order of its [`names`], each followed by the branches that come from it, by the parameter at which they do, and by the
+/// curves in two parameters that begin on it; the legs of a homotopy as they were tried.
+pub fn ordered(mut diagram: Diagram, study: &[String]) -> Diagram {
+    let legs =
+        |branch: &Branch| study.iter().enumerate().find_map(|(place, name)| Some((place, leg(&branch.name, name)?)));
+    let parent = |branch: &Branch| match &branch.origin {
+        Origin::Switch { parent, .. } if legs(branch).is_none() => Some(parent.clone()),
+        _ => None,
+    };
+    let rank = |branch: &Branch| {
+        let own = study.iter().position(|name| *name == branch.name).map(|place| (place, 0));
+        let (behind, parameter) = match branch.origin {
+            Origin::Switch { .. } if branch.held.is_some() && legs(branch).is_none() => (true, f64::NEG_INFINITY),
+            Origin::Switch { parameter, .. } => (false, parameter),
+            _ => (false, f64::NEG_INFINITY),
+        };
+        (behind, own.or_else(|| legs(branch)).unwrap_or((usize::MAX, 0)), parameter)
     };
     let mut waiting = std::mem::take(&mut diagram.branches);
     waiting.sort_by(|a, b| {
-        let ((p, x), (q, y)) = (rank(a), rank(b));
-        p.cmp(&q).then(x.total_cmp(&y)).then_with(|| a.name.cmp(&b.name))
+        let ((c, p, x), (d, q, y)) = (rank(a), rank(b));
+        (c, p).cmp(&(d, q)).then(x.total_cmp(&y)).then_with(|| a.name.cmp(&b.name))
     });
     // A branch is listed once its parent is; what is left over at last has no parent in the diagram.
     while !waiting.is_empty() {
         let (mut children, others): (Vec<Branch>, Vec<Branch>) = match diagram.branches.last() {
-            Some(_) => waiting.into_iter().partition(|b| parent(b).is_some_and(|p| diagram.branch(p).is_some())),
+            Some(_) => waiting.into_iter().partition(|b| parent(b).is_some_and(|p| diagram.branch(&p).is_some())),
             None => (Vec::new(), waiting),
         };
         waiting = others;
@@ -32,31 +77,11 @@ pub fn ordered(mut diagram: Diagram, study: &[&str]) -> Diagram {
         }
         // Siblings stand in order behind their parent, each before what comes from it.
         for child in children.drain(..).rev() {
-            let at = diagram.branches.iter().position(|b| Some(b.name.as_str()) == parent(&child));
+            let at = diagram.branches.iter().position(|b| Some(&b.name) == parent(&child).as_ref());
             diagram.branches.insert(at.map_or(diagram.branches.len(), |at| at + 1), child);
         }
     }
     diagram
-}
-
-/// What of a study was not reached, a line each; `asked` are its branches.
-pub fn fell_short(diagram: &Diagram, asked: &[&str]) -> Vec<String> {
-    let absent =
-        asked.iter().filter(|name| diagram.branch(name).is_none()).map(|name| format!("{name}: it never began"));
-    let ended = diagram.branches.iter().flat_map(|branch| {
-        let short = branch.ends.iter().flatten().filter(|end| !end.complete());
-        let unfinished =
-            branch.ends.iter().all(Option::is_none).then(|| format!("{}: it is not finished", branch.name));
-        short.map(|end| format!("{}: {end}", branch.name)).chain(unfinished).collect::<Vec<_>>()
-    });
-    absent.chain(ended).collect()
-}
-
-fn parent(branch: &Branch) -> Option<&str> {
-    match &branch.origin {
-        Origin::Switch { parent, .. } => Some(parent),
-        _ => None,
-    }
 }
 
 #[cfg(test)]
@@ -85,8 +110,35 @@ mod tests {
             let mut shuffled = branches.to_vec();
             shuffled.rotate_left(shift);
             shuffled.swap(0, 3);
-            let sorted = ordered(Diagram { branches: shuffled }, &["a", "b"]);
+            let sorted = ordered(Diagram { branches: shuffled }, &["a".into(), "b".into()]);
             assert_eq!(sorted.branches.iter().map(|b| b.name.as_str()).collect::<Vec<_>>(), expected);
+        }
+    }
+
+    #[test]
+    fn curves_and_the_legs_of_a_homotopy_follow_what_they_come_from() {
+        let curve = |parent: &str, name: &str| Branch { held: Some((Kind::Fold, 1)), ..from(parent, name, 3.0) };
+        let end_of = |parent: &str, name: &str| Branch::new(name, Family::Cycle, 0, Origin::EndOf(parent.into()));
+        let root = |name: &str| Branch::new(name, Family::Cycle, 0, Origin::Seed(String::new()));
+        let branches = [
+            root("a"),
+            from("a", "a/period-doubling-1", 2.0),
+            curve("a", "folds"),
+            root("way/1"),
+            end_of("way/1", "way/2"),
+            end_of("way/2", "way/3"),
+            curve("way/1", "way/4"),
+            end_of("way/9", "way/10"),
+            end_of("way", "b"),
+        ];
+        let study = ["a", "way", "b", "folds"].map(String::from);
+        for shift in 0..branches.len() {
+            let mut shuffled = branches.to_vec();
+            shuffled.rotate_left(shift);
+            shuffled.swap(1, 4);
+            let sorted = ordered(Diagram { branches: shuffled }, &study);
+            let names: Vec<&str> = sorted.branches.iter().map(|b| b.name.as_str()).collect();
+            assert_eq!(names, branches.each_ref().map(|b| b.name.as_str()));
         }
     }
 

@@ -69,7 +69,11 @@ fn diagram() -> Diagram {
     ];
     let mut third = Branch::new("third", Family::Cycle, 2, Origin::EndOf("main".into()));
     third.ends = [Some(Ending::PointLimit(17)), Some(Ending::PeriodUnbounded(1.0 / 3.0))];
-    Diagram { branches: vec![main, cycles, third] }
+    let origin = Origin::Switch { parent: "third".into(), kind: Kind::PeriodDoubling, parameter: -0.0 };
+    let mut curve = Branch::new("curve", Family::Cycle, 0, origin);
+    curve.held = Some((Kind::PeriodDoubling, 2));
+    curve.insert(point(0, true));
+    Diagram { branches: vec![main, cycles, third, curve] }
 }
 
 fn record(diagram: &Diagram, observer: &dyn Observer) {
@@ -107,7 +111,7 @@ fn exactly(diagram: &Diagram) -> String {
     }
     let mut text = String::new();
     for b in &diagram.branches {
-        text += &format!("{} {:?} {} {:?} {:?}\n", b.name, b.family, b.free, b.origin, b.ends);
+        text += &format!("{} {:?} {} {:?} {:?} {:?}\n", b.name, b.family, b.free, b.held, b.origin, b.ends);
         b.points.iter().for_each(|p| text += &of_point(p));
         for s in &b.special {
             text += &format!("{} {} {} {} ", s.kind, s.unstable_before, s.unstable_after, s.error.to_bits());
@@ -126,7 +130,7 @@ fn a_diagram_comes_back_to_the_bit_and_so_do_the_texts() {
     let back = load(&folder.path().join("new")).unwrap();
     assert_eq!(exactly(&back.diagram), exactly(&diagram()));
     assert_eq!((back.study_text.as_str(), back.model_text.as_str()), (STUDY, MODEL));
-    assert_eq!(back.notes.len(), 3);
+    assert_eq!(back.notes.len(), 4);
 }
 
 #[test]
@@ -176,7 +180,7 @@ fn a_run_killed_before_its_first_transaction_resumes_as_a_new_one() {
     assert!(earlier.branches.is_empty());
     record(&diagram(), &recorder);
     recorder.finish().unwrap();
-    assert_eq!(load(folder.path()).unwrap().diagram.branches.len(), 3);
+    assert_eq!(load(folder.path()).unwrap().diagram.branches.len(), 4);
 }
 
 #[test]
@@ -207,6 +211,27 @@ fn numbers_can_be_read_by_name_without_this_program() {
         })
         .unwrap();
     assert_eq!(row, (3.0 / 7.0, 0.0, 1.0 / 3.0, 1));
+}
+
+#[test]
+fn a_file_of_the_first_version_is_read_and_resumed() {
+    let folder = tempfile::tempdir().unwrap();
+    let recorder = Recorder::create(folder.path(), &study()).unwrap();
+    let mut older = diagram();
+    older.branches.truncate(3);
+    record(&older, &recorder);
+    recorder.finish().unwrap();
+    let connection = rusqlite::Connection::open(path_in(folder.path())).unwrap();
+    let back =
+        "ALTER TABLE branches DROP COLUMN held; ALTER TABLE branches DROP COLUMN follows; PRAGMA user_version = 1;";
+    connection.execute_batch(back).unwrap();
+    drop(connection);
+    assert_eq!(exactly(&load(folder.path()).unwrap().diagram), exactly(&older));
+
+    let (resumed, _) = Recorder::resume(folder.path(), &study()).unwrap();
+    record(&diagram(), &resumed);
+    resumed.finish().unwrap();
+    assert_eq!(exactly(&load(folder.path()).unwrap().diagram), exactly(&diagram()));
 }
 
 fn refusal(result: Result<impl Sized, RunFileError>) -> String {

@@ -16,3 +16,13 @@ fn a_symmetry_that_the_free_parameter_breaks_is_none() {
     assert_eq!(reflections("free = \"mu\"\nrange = [-1, 2]\n"), 2);
     assert_eq!(reflections("free = \"h\"\nrange = [-1, 1]\n"), 1);
 }
+
+#[test]
+fn nor_is_one_that_a_curve_or_a_homotopy_breaks() {
+    let branch = "free = \"mu\"\nrange = [-1, 2]\n";
+    let curve = "[[curve]]\nname = \"c\"\nhold = \"fold\"\nof = \"b\"\n";
+    assert_eq!(reflections(&format!("{branch}{curve}free = \"h\"\nrange = [-1, 1]\n")), 1);
+    let homotopy = "[[homotopy]]\nname = \"h\"\nfrom = \"s\"\n";
+    assert_eq!(reflections(&format!("{branch}{homotopy}to = {{ h = 1 }}\nvia = \"mu\"\nrange = [-1, 2]\n")), 1);
+    assert_eq!(reflections(&format!("{branch}{homotopy}to = {{ mu = 2 }}\nvia = \"h\"\nrange = [-1, 1]\n")), 1);
+}

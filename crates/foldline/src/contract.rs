@@ -74,23 +74,24 @@ pub struct Examination {
     pub trust: Trust,
 }
 
-/// A curve F(u) = 0, F: ℝⁿ⁺¹ → ℝⁿ. The last component of `u` is the continuation parameter.
+/// A curve F(u) = 0, F: ℝⁿ⁺ᵏ → ℝⁿ, k = 1. The last k components of `u` are free parameters, the very last is that of the
+/// continuation. With k > 1 it is a surface, on which something else must be held to make it a curve.
 ///
 /// The problem may be discretised on a mesh that changes along the curve; vectors always belong to the current mesh.
 pub trait ZeroProblem {
-    /// n + 1 on the current mesh.
+    /// n + k on the current mesh.
     fn unknowns(&self) -> usize;
 
     /// Takes `u` as the reference for phase conditions and scales until the next call.
     fn anchor(&mut self, u: &[f64]);
 
-    /// F(u): writes n values (the last of the n + 1 slots is left alone). Returns false if f is not finite there.
+    /// F(u): writes n values (the last k of the n + k slots are left alone). Returns false if f is not finite there.
     fn residual(&mut self, u: &[f64], r: &mut [f64]) -> bool;
 
-    /// Factorises the matrix [F_u(u); `row`·]: `row` acts through [`ZeroProblem::dot`].
-    fn factorise(&mut self, u: &[f64], row: &[f64]) -> Result<(), Singular>;
+    /// Factorises the matrix [F_u(u); rows]: `rows` is `[k][n + k]`, each row acts through [`ZeroProblem::dot`].
+    fn factorise(&mut self, u: &[f64], rows: &[f64]) -> Result<(), Singular>;
 
-    /// Solves with the last factorisation. `rhs` and `x` have n + 1 components, the last of `rhs` being that of the row.
+    /// Solves with the last factorisation. `rhs` and `x` have n + k components, the last k of `rhs` being those of the rows.
     fn solve(&mut self, rhs: &[f64], x: &mut [f64]);
 
     /// Inner product in scaled variables, in which lengths along the curve are measured.
@@ -118,6 +119,10 @@ pub trait ZeroProblem {
     /// Stability and trust at `u`, for which [`ZeroProblem::factorise`] was called last.
     fn examine(&mut self, u: &[f64]) -> Examination;
 
+    /// How far a point is from one at which F_x is singular, in terms of its spectrum: small where another branch may be
+    /// close by.
+    fn margin(&self, at: &Point) -> f64;
+
     /// `u` as plain data.
     fn point(&self, u: &[f64], tangent: &[f64], examination: Examination) -> Point;
 
@@ -140,10 +145,37 @@ pub trait Monitor: Send + Sync {
     fn jump(&self) -> usize;
 }
 
-/// The extra unknowns and equations that hold a special point; a problem with one of them held is a two-parameter curve.
-pub trait Condition: Send + Sync {
+/// The extra unknowns and equations that hold a special point: e unknowns (such as a frequency) and e + 1 scalar equations
+/// g = 0. A surface of solutions with one of them held is a two-parameter curve.
+///
+/// Vectors `u` are those of the surface, a [`ZeroProblem`] with two free parameters.
+pub trait Condition {
     /// What is held.
     fn kind(&self) -> Kind;
+
+    /// e.
+    fn extra(&self) -> usize;
+
+    /// First values `[e]` of the extra unknowns, from the spectrum of a point close to the special one.
+    fn guess(&self, point: &Point) -> Vec<f64>;
+
+    /// Takes the null vectors of the last evaluation as reference until the next call.
+    fn anchor(&mut self);
+
+    /// Moves to another mesh.
+    fn set_mesh(&mut self, mesh: &Mesh);
+
+    /// g: writes e + 1 values. Returns false if they are not finite there.
+    fn evaluate(&mut self, u: &[f64], extra: &[f64], g: &mut [f64]) -> bool;
+
+    /// The derivative of g along (`du`, `extra`) at the place of the last evaluation: writes e + 1 values.
+    fn derivative(&mut self, du: &[f64], extra: &[f64], dg: &mut [f64]);
+
+    /// How many of the eigenvalues or multipliers are held.
+    fn held(&self) -> usize;
+
+    /// How far an eigenvalue or multiplier is from where one is held.
+    fn distance(&self, z: Complex64) -> f64;
 }
 
 /// What happens while a diagram grows.

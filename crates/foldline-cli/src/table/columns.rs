@@ -5,9 +5,9 @@ use foldline::diagram::{Branch, Diagram, Origin, Point};
 use foldline::model::Model;
 
 /// branch, kind, every parameter, period, NAME_max of every output, unstable_before, unstable_after, error.
-pub fn special(diagram: &Diagram, model: &Model) -> Table {
+pub fn special(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) -> bool) -> Table {
     let mut columns = vec![column("branch", Style::Word), column("kind", Style::Word)];
-    columns.extend(parameter_columns(model));
+    columns.extend(parameter_columns(diagram, model, kept));
     columns.push(column("period", Style::Number));
     columns.extend(output_columns(model));
     columns.extend([column("unstable_before", Style::Number), column("unstable_after", Style::Number)]);
@@ -19,14 +19,15 @@ pub fn special(diagram: &Diagram, model: &Model) -> Table {
         row.extend([count(special.unstable_before), count(special.unstable_after), Cell::Number(special.error)]);
         row
     };
-    let rows = diagram.branches.iter().flat_map(|b| (0..b.special.len()).map(move |k| row(b, k))).collect();
+    let shown = diagram.branches.iter().filter(|b| kept(b));
+    let rows = shown.flat_map(|b| (0..b.special.len()).map(move |k| row(b, k))).collect();
     Table { columns, rows }
 }
 
 /// As above for every accepted point, and position, the extremes of the states, multipliers (eigenvalues), accuracy, work.
-pub fn points(diagram: &Diagram, model: &Model) -> Table {
+pub fn points(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) -> bool) -> Table {
     let mut columns = vec![column("branch", Style::Word), column("position", Style::Number)];
-    columns.extend(parameter_columns(model));
+    columns.extend(parameter_columns(diagram, model, kept));
     columns.push(column("period", Style::Number));
     columns.extend(output_columns(model));
     columns.extend(model.outputs.iter().map(|o| column(&format!("{}_min", o.name), Style::Number)));
@@ -51,34 +52,55 @@ pub fn points(diagram: &Diagram, model: &Model) -> Table {
         row.push(Cell::Spectrum(point.spectrum.clone()));
         row
     };
-    let rows = diagram.branches.iter().flat_map(|b| b.points.iter().map(move |p| row(b, p))).collect();
+    let shown = diagram.branches.iter().filter(|b| kept(b));
+    let rows = shown.flat_map(|b| b.points.iter().map(move |p| row(b, p))).collect();
     Table { columns, rows }
 }
 
-/// One row for each branch: where it comes from, how far it reaches, how its two sides ended, what it cost.
-pub fn branches(diagram: &Diagram, model: &Model) -> Table {
-    let words = ["branch", "family", "free", "origin"].map(|name| column(name, Style::Word));
-    let numbers = ["from", "to", "points", "special", "newton", "factorisations", "rejected"];
+/// One row for each branch: where it comes from, how far it reaches, how its two sides ended, what it cost. Of a curve in
+/// two parameters, what is held along it, and how far it reaches in the parameter that follows too.
+pub fn branches(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) -> bool) -> Table {
+    let words = ["branch", "family", "held", "free", "follows", "origin"].map(|name| column(name, Style::Word));
+    let work = ["points", "special", "newton", "factorisations", "rejected"];
+    let numbers = ["from", "to", "follows_from", "follows_to"].into_iter().chain(work);
     let ends = ["backward_end", "forward_end"].map(|name| column(name, Style::Word));
     let columns = words.into_iter().chain(numbers.map(|name| column(name, Style::Number))).chain(ends).collect();
     let row = |branch: &Branch| {
-        let values = || branch.points.iter().filter_map(|p| p.parameters.get(branch.free).copied());
-        let bound = |value: f64| if branch.points.is_empty() { Cell::Empty } else { Cell::Number(value) };
+        let moving = [Some(branch.free), branch.held.map(|(_, follows)| follows)];
+        let name = |index: Option<usize>| {
+            index.and_then(|k| model.parameters.get(k)).map_or(Cell::Empty, |p| Cell::Word(p.name.clone()))
+        };
         let cost = branch.cost();
         let mut row = vec![
             Cell::Word(branch.name.clone()),
             Cell::Word(branch.family.name().into()),
-            Cell::Word(model.parameters.get(branch.free).map_or_else(String::new, |p| p.name.clone())),
+            branch.held.map_or(Cell::Empty, |(kind, _)| Cell::Word(kind.name().into())),
+            name(moving[0]),
+            name(moving[1]),
             Cell::Word(origin(&branch.origin)),
-            bound(values().fold(f64::INFINITY, f64::min)),
-            bound(values().fold(f64::NEG_INFINITY, f64::max)),
         ];
+        row.extend(moving.into_iter().flat_map(|index| reach(branch, index)));
         let counts = [branch.points.len(), branch.special.len(), cost.newton, cost.factorisations, cost.rejected];
         row.extend(counts.map(count));
         row.extend(branch.ends.iter().map(|end| end.as_ref().map_or(Cell::Empty, |e| Cell::Word(e.to_string()))));
         row
     };
-    Table { columns, rows: diagram.branches.iter().map(row).collect() }
+    Table { columns, rows: diagram.branches.iter().filter(|b| kept(b)).map(row).collect() }
+}
+
+/// The smallest and the largest value of a parameter along a branch.
+fn reach(branch: &Branch, parameter: Option<usize>) -> [Cell; 2] {
+    let values = || parameter.into_iter().flat_map(|k| branch.points.iter().filter_map(move |p| p.parameters.get(k)));
+    let bounds = [values().copied().reduce(f64::min), values().copied().reduce(f64::max)];
+    bounds.map(|bound| bound.map_or(Cell::Empty, Cell::Number))
+}
+
+/// What each remark is about, and the remark; only those about `name` if there is one.
+pub fn notes(notes: &[(String, String)], name: Option<&str>) -> Table {
+    let columns = ["about", "note"].map(|name| column(name, Style::Word)).into();
+    let shown = notes.iter().filter(|(about, _)| name.is_none_or(|name| name == about));
+    let rows = shown.map(|(about, note)| vec![Cell::Word(about.clone()), Cell::Word(note.clone())]).collect();
+    Table { columns, rows }
 }
 
 fn origin(origin: &Origin) -> String {
@@ -89,8 +111,12 @@ fn origin(origin: &Origin) -> String {
     }
 }
 
-fn parameter_columns(model: &Model) -> impl Iterator<Item = Column> {
-    model.parameters.iter().map(|p| column(&p.name, Style::Varying))
+/// Those of the parameters that vary along a branch are shown even where there is one row only.
+fn parameter_columns(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) -> bool) -> Vec<Column> {
+    let shown = || diagram.branches.iter().filter(|b| kept(b));
+    let varies = |index: usize| shown().any(|b| b.free == index || b.held.is_some_and(|(_, follows)| follows == index));
+    let style = |index: usize| if varies(index) { Style::Number } else { Style::Varying };
+    model.parameters.iter().enumerate().map(|(index, p)| column(&p.name, style(index))).collect()
 }
 
 fn output_columns(model: &Model) -> impl Iterator<Item = Column> {

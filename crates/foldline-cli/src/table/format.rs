@@ -6,7 +6,7 @@ use std::io::{Result, Write};
 
 const DIGITS: i32 = 10;
 
-/// Aligned columns under their names.
+/// Aligned columns under their names; one with nothing in it is left out.
 pub fn text(table: &Table, out: &mut impl Write) -> Result<()> {
     if table.rows.is_empty() {
         return writeln!(out, "none");
@@ -14,7 +14,8 @@ pub fn text(table: &Table, out: &mut impl Write) -> Result<()> {
     let mut lines = vec![String::new(); table.rows.len() + 1];
     for (index, column) in table.columns.iter().enumerate() {
         let cells: Vec<&Cell> = table.rows.iter().map(|row| &row[index]).collect();
-        if column.style == Style::Varying && constant(&cells) {
+        let empty = cells.iter().all(|cell| matches!(cell, Cell::Empty));
+        if empty || column.style == Style::Varying && constant(&cells) {
             continue;
         }
         let decimals = decimals(&cells);

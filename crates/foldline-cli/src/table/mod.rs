@@ -3,12 +3,12 @@
 mod columns;
 mod format;
 
-use crate::arguments::{Format, Table as Typed};
+use crate::arguments::{Format, Table as Typed, What};
 use crate::failure::{Failure, Outcome};
-use foldline::diagram::Diagram;
+use foldline::diagram::{Branch, Diagram};
 use foldline::model::Model;
 use foldline_store::nearest::suggest;
-use foldline_store::order::ordered;
+use foldline_store::order::{leg, names, ordered};
 use foldline_store::run_file::load;
 use foldline_store::study_file::parse_study;
 use std::io::{Write, stdout};
@@ -50,14 +50,17 @@ pub enum Cell {
 
 /// Prints a table of a run to standard output.
 pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
-    let (model, mut diagram) = read(&typed.folder)?;
-    if let Some(name) = &typed.branch {
-        only(&mut diagram, name)?;
+    let run = read(&typed.folder)?;
+    let kept = |branch: &Branch| typed.branch.as_ref().is_none_or(|name| of_name(&branch.name, name));
+    if let Some(name) = typed.branch.as_ref().filter(|_| !run.diagram.branches.iter().any(kept)) {
+        let names: Vec<&str> = run.diagram.branches.iter().map(|b| b.name.as_str()).collect();
+        return Err(Failure::typed(format!("--branch: the run has no branch \"{name}\""), suggest(name, &names)));
     }
-    let table = match (typed.points, typed.branches) {
-        (true, _) => columns::points(&diagram, &model),
-        (_, true) => columns::branches(&diagram, &model),
-        _ => columns::special(&diagram, &model),
+    let table = match typed.what() {
+        What::Points => columns::points(&run.diagram, &run.model, &kept),
+        What::Branches => columns::branches(&run.diagram, &run.model, &kept),
+        What::Special => columns::special(&run.diagram, &run.model, &kept),
+        What::Notes => columns::notes(&run.notes, typed.branch.as_deref()),
     };
     let mut out = std::io::BufWriter::new(stdout().lock());
     match typed.format {
@@ -72,23 +75,32 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
 /// Prints the special points as text.
 pub fn print_special(diagram: &Diagram, model: &Model) -> Result<(), Failure> {
     let mut out = std::io::BufWriter::new(stdout().lock());
-    format::text(&columns::special(diagram, model), &mut out)?;
+    format::text(&columns::special(diagram, model, &|_| true), &mut out)?;
     Ok(out.flush()?)
 }
 
-/// The model and the diagram of the run in a folder.
-pub fn read(folder: &Path) -> Result<(Model, Diagram), Failure> {
-    let run = load(folder)?;
-    let study = parse_study(&run.study_text, &run.study_file, &run.model_text, &run.model_file)?;
-    let names: Vec<&str> = study.plan.branches.iter().map(|b| b.name.as_str()).collect();
-    Ok((study.model, ordered(run.diagram, &names)))
+/// A run, in the order in which it is shown.
+pub struct Run {
+    pub model: Model,
+    pub diagram: Diagram,
+    /// What each remark is about, and the remark.
+    pub notes: Vec<(String, String)>,
 }
 
-fn only(diagram: &mut Diagram, name: &str) -> Result<(), Failure> {
-    if diagram.branch(name).is_none() {
-        let names: Vec<&str> = diagram.branches.iter().map(|b| b.name.as_str()).collect();
-        return Err(Failure::typed(format!("--branch: the run has no branch \"{name}\""), suggest(name, &names)));
-    }
-    diagram.branches.retain(|branch| branch.name == name);
-    Ok(())
+/// The run in a folder.
+pub fn read(folder: &Path) -> Result<Run, Failure> {
+    let run = load(folder)?;
+    let study = parse_study(&run.study_text, &run.study_file, &run.model_text, &run.model_file)?;
+    let diagram = ordered(run.diagram, &names(&study.plan));
+    let seeds = study.plan.seeds.iter().map(|seed| &seed.name);
+    let shown: Vec<&String> = seeds.chain(diagram.branches.iter().map(|b| &b.name)).collect();
+    let mut notes = run.notes;
+    // Remarks about one thing stay in the order in which they were made.
+    notes.sort_by_key(|(about, _)| shown.iter().position(|name| of_name(name, about)).unwrap_or(usize::MAX));
+    Ok(Run { model: study.model, diagram, notes })
+}
+
+/// Whether a branch goes by that name: its own, or that of the homotopy of which it is a leg.
+fn of_name(branch: &str, name: &str) -> bool {
+    branch == name || leg(branch, name).is_some()
 }

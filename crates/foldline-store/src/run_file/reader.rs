@@ -1,6 +1,6 @@
 //! Reading a run back.
 
-use super::rows::{ending_in, kind_named, origin_in, point_in};
+use super::rows::{ending_in, held_in, kind_named, origin_in, point_in};
 use super::{APPLICATION_ID, FORMAT_VERSION, RunFileError, path_in};
 use foldline::diagram::{Branch, Diagram, Family, SpecialPoint};
 use rusqlite::{Connection, OpenFlags, Row};
@@ -135,7 +135,8 @@ fn branch_in(row: &Row) -> Result<Branch, String> {
     };
     let name: String = row.get("name").map_err(|e| e.to_string())?;
     let free: i64 = row.get("free").map_err(|e| e.to_string())?;
-    Ok(Branch::new(name, family, usize::try_from(free).map_err(|e| e.to_string())?, origin_in(row)?))
+    let free = usize::try_from(free).map_err(|e| e.to_string())?;
+    Ok(Branch { held: held_in(row)?, ..Branch::new(name, family, free, origin_in(row)?) })
 }
 
 fn special_in(row: &Row) -> Result<SpecialPoint, String> {

@@ -150,6 +150,24 @@ pub(super) fn origin_values(origin: &Origin) -> [Value; 5] {
     ]
 }
 
+/// `held, follows`: what is held along a curve in two parameters, and the number of the parameter that follows from it.
+pub(super) fn held_values(held: Option<(Kind, usize)>) -> [Value; 2] {
+    let kind = held.map(|(kind, _)| Value::Text(kind.name().to_string()));
+    let follows = held.map(|(_, follows)| Value::Integer(i64::try_from(follows).unwrap_or(i64::MAX)));
+    [kind.unwrap_or(Value::Null), follows.unwrap_or(Value::Null)]
+}
+
+/// What is held, in a row of `branches`. Version 1 had no such columns, nor anything held.
+pub(super) fn held_in(row: &Row) -> Result<Option<(Kind, usize)>, String> {
+    let kind = match row.get::<_, Option<String>>("held") {
+        Err(rusqlite::Error::InvalidColumnName(_)) | Ok(None) => return Ok(None),
+        Ok(Some(name)) => kind_named(&name)?,
+        Err(error) => return Err(error.to_string()),
+    };
+    let follows: i64 = row.get("follows").map_err(|e| e.to_string())?;
+    Ok(Some((kind, usize::try_from(follows).map_err(|e| e.to_string())?)))
+}
+
 /// The origin in a row of `branches`.
 pub(super) fn origin_in(row: &Row) -> Result<Origin, String> {
     let name: String = row.get("origin_name").map_err(|e| e.to_string())?;

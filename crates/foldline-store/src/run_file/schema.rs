@@ -12,7 +12,8 @@ pub(super) struct Columns {
 
 impl Columns {
     pub(super) fn new(model: &Model) -> Columns {
-        let mut taken: Vec<String> = FIXED.iter().map(|s| s.to_string()).collect();
+        let own = POINT_COLUMNS.iter().map(|(name, _)| name).chain(&OTHERS);
+        let mut taken: Vec<String> = own.map(|name| name.to_string()).collect();
         // SQLite does not tell capitals from small letters in column names: of K and k the later becomes k_2.
         let mut unique = |name: String| {
             let mut candidate = name.clone();
@@ -36,83 +37,61 @@ impl Columns {
     }
 }
 
-/// Column names that are taken whatever the model.
-const FIXED: [&str; 25] = [
-    "branch",
-    "position",
-    "period",
-    "unstable",
-    "discretisation",
-    "residual",
-    "trivial_defect",
-    "liouville_defect",
-    "newton",
-    "factorisations",
-    "rejected",
-    "degree",
-    "parameter_bytes",
-    "solution_bytes",
-    "mesh_bytes",
-    "tangent_bytes",
-    "spectrum_bytes",
-    "range_bytes",
-    "scalar_bytes",
-    "kind",
-    "key",
-    "unstable_before",
-    "unstable_after",
-    "error",
-    "rowid",
-];
+/// Names that the two tables of points have besides those of [`POINT_COLUMNS`], and one that SQLite has in every table.
+const OTHERS: [&str; 8] = ["branch", "position", "kind", "key", "unstable_before", "unstable_after", "error", "rowid"];
 
-/// The columns that a point has in both tables of points: first those to read, then those to load.
-pub(super) const POINT_COLUMNS: [&str; 17] = [
-    "period",
-    "unstable",
-    "discretisation",
-    "residual",
-    "trivial_defect",
-    "liouville_defect",
-    "newton",
-    "factorisations",
-    "rejected",
-    "degree",
-    "parameter_bytes",
-    "solution_bytes",
-    "mesh_bytes",
-    "tangent_bytes",
-    "spectrum_bytes",
-    "range_bytes",
-    "scalar_bytes",
+/// The columns that a point has in both tables of points, with their types: first those to read, then those to load.
+const POINT_COLUMNS: [(&str, &str); 17] = [
+    ("period", "REAL"),
+    ("unstable", "INTEGER NOT NULL"),
+    ("discretisation", "REAL"),
+    ("residual", "REAL"),
+    ("trivial_defect", "REAL"),
+    ("liouville_defect", "REAL"),
+    ("newton", "INTEGER NOT NULL"),
+    ("factorisations", "INTEGER NOT NULL"),
+    ("rejected", "INTEGER NOT NULL"),
+    ("degree", "INTEGER"),
+    ("parameter_bytes", "BLOB NOT NULL"),
+    ("solution_bytes", "BLOB NOT NULL"),
+    ("mesh_bytes", "BLOB"),
+    ("tangent_bytes", "BLOB NOT NULL"),
+    ("spectrum_bytes", "BLOB NOT NULL"),
+    ("range_bytes", "BLOB NOT NULL"),
+    ("scalar_bytes", "BLOB NOT NULL"),
 ];
-
-const POINT_TYPES: &str = "
-    period REAL, unstable INTEGER NOT NULL,
-    discretisation REAL, residual REAL, trivial_defect REAL, liouville_defect REAL,
-    newton INTEGER NOT NULL, factorisations INTEGER NOT NULL, rejected INTEGER NOT NULL,
-    degree INTEGER, parameter_bytes BLOB NOT NULL, solution_bytes BLOB NOT NULL, mesh_bytes BLOB,
-    tangent_bytes BLOB NOT NULL, spectrum_bytes BLOB NOT NULL, range_bytes BLOB NOT NULL, scalar_bytes BLOB NOT NULL";
 
 /// The statements that make all tables.
 pub(super) fn create(columns: &Columns) -> String {
     let shown: String = columns.names().map(|name| format!("{} REAL, ", quoted(name))).collect();
+    let of_points = POINT_COLUMNS.map(|(name, kind)| format!("{name} {kind}")).join(", ");
     format!(
         "CREATE TABLE meta (key TEXT PRIMARY KEY, value TEXT NOT NULL);
          CREATE TABLE variables (class TEXT NOT NULL, number INTEGER NOT NULL, name TEXT NOT NULL, unit TEXT NOT NULL,
              description TEXT NOT NULL, PRIMARY KEY (class, number));
          CREATE TABLE branches (branch INTEGER PRIMARY KEY, name TEXT NOT NULL UNIQUE, family TEXT NOT NULL,
              free INTEGER NOT NULL, origin TEXT NOT NULL, origin_name TEXT NOT NULL, origin_kind TEXT,
-             origin_parameter REAL, origin_bytes BLOB);
+             origin_parameter REAL, origin_bytes BLOB, held TEXT, follows INTEGER);
          CREATE TABLE ends (branch INTEGER NOT NULL REFERENCES branches, side INTEGER NOT NULL, code TEXT NOT NULL,
              sentence TEXT NOT NULL, detail TEXT, kind TEXT, count INTEGER, value_bytes BLOB, PRIMARY KEY (branch, side));
          CREATE TABLE points (branch INTEGER NOT NULL REFERENCES branches, position INTEGER NOT NULL, {shown}
-             {POINT_TYPES}, PRIMARY KEY (branch, position));
+             {of_points}, PRIMARY KEY (branch, position));
          CREATE TABLE special_points (branch INTEGER NOT NULL REFERENCES branches, kind TEXT NOT NULL,
              position INTEGER NOT NULL, key BLOB NOT NULL, unstable_before INTEGER NOT NULL,
              unstable_after INTEGER NOT NULL, error REAL, {shown}
-             {POINT_TYPES}, PRIMARY KEY (branch, kind, position, key));
+             {of_points}, PRIMARY KEY (branch, kind, position, key));
          CREATE TABLE notes (branch TEXT NOT NULL, note TEXT NOT NULL, UNIQUE (branch, note));"
     )
+}
+
+/// The statements that bring a file of an older version to the present one.
+///
+/// Version 1 had no curves in two parameters.
+pub(super) fn upgrade(version: i64) -> &'static str {
+    match version {
+        1 => "ALTER TABLE branches ADD COLUMN held TEXT; ALTER TABLE branches ADD COLUMN follows INTEGER;",
+        _ => "",
+    }
 }
 
 /// `INSERT OR REPLACE` with `first` before the shown columns and the columns of a point after them.
@@ -121,7 +100,7 @@ pub(super) fn insert(table: &str, first: &[&str], columns: &Columns) -> String {
         .iter()
         .map(|s| s.to_string())
         .chain(columns.names().map(|name| quoted(name)))
-        .chain(POINT_COLUMNS.iter().map(|s| s.to_string()))
+        .chain(POINT_COLUMNS.iter().map(|(name, _)| name.to_string()))
         .collect();
     let marks = vec!["?"; names.len()].join(", ");
     format!("INSERT OR REPLACE INTO {table} ({}) VALUES ({marks})", names.join(", "))

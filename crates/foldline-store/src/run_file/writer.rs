@@ -1,8 +1,8 @@
 //! Writing a run as it happens.
 
 use super::reader::{Open, load_diagram, open};
-use super::rows::{ending_values, origin_values, values_of};
-use super::schema::{Columns, create, insert};
+use super::rows::{ending_values, held_values, origin_values, values_of};
+use super::schema::{Columns, create, insert, upgrade};
 use super::{APPLICATION_ID, FORMAT_VERSION, RunFileError, path_in};
 use crate::study_file::Study;
 use foldline::contract::{Event, Observer, Verdict};
@@ -69,7 +69,7 @@ impl Recorder {
         if !path.exists() {
             return Ok((Recorder::create(folder, study)?, Diagram::default()));
         }
-        let connection = match open(&path, true)? {
+        let mut connection = match open(&path, true)? {
             Open::Empty => return Ok((Recorder::begin(path, study)?, Diagram::default())),
             Open::Run(connection) => connection,
         };
@@ -84,6 +84,7 @@ impl Recorder {
         if text("study")? != study.text {
             return Err(RunFileError::Changed(path, "study"));
         }
+        modernise(&mut connection).map_err(|e| RunFileError::Database(path.clone(), e))?;
         let mut diagram = load_diagram(&connection, &path)?;
         let stopped = |end: &mut Option<Ending>| *end = end.take().filter(|ending| *ending != Ending::Stopped);
         diagram.branches.iter_mut().flat_map(|branch| &mut branch.ends).for_each(stopped);
@@ -181,11 +182,12 @@ impl State {
         let transaction = self.connection.transaction()?;
         // A branch that is there already, from an earlier part of the run, keeps its number.
         transaction.execute(
-            "INSERT INTO branches (name, family, free, origin, origin_name, origin_kind, origin_parameter, origin_bytes)
-             VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)
+            "INSERT INTO branches (name, family, free, origin, origin_name, origin_kind, origin_parameter, origin_bytes,
+                 held, follows)
+             VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10)
              ON CONFLICT (name) DO UPDATE SET family = ?2, free = ?3, origin = ?4, origin_name = ?5, origin_kind = ?6,
-                 origin_parameter = ?7, origin_bytes = ?8",
-            params_from_iter(first.into_iter().chain(origin_values(&branch.origin))),
+                 origin_parameter = ?7, origin_bytes = ?8, held = ?9, follows = ?10",
+            params_from_iter(first.into_iter().chain(origin_values(&branch.origin)).chain(held_values(branch.held))),
         )?;
         let number: i64 =
             transaction.query_row("SELECT branch FROM branches WHERE name = ?", [&branch.name], |row| row.get(0))?;
@@ -261,6 +263,17 @@ impl State {
         let sql = "INSERT OR REPLACE INTO ends VALUES (?, ?, ?, ?, ?, ?, ?, ?)";
         self.connection.prepare_cached(sql)?.execute(params_from_iter(values)).map(|_| ())
     }
+}
+
+/// Brings a file of an older version to the present one, in one transaction.
+fn modernise(connection: &mut Connection) -> rusqlite::Result<()> {
+    let version: i64 = connection.pragma_query_value(None, "user_version", |row| row.get(0))?;
+    let transaction = connection.transaction()?;
+    for older in version..FORMAT_VERSION {
+        transaction.execute_batch(upgrade(older))?;
+    }
+    transaction.pragma_update(None, "user_version", FORMAT_VERSION)?;
+    transaction.commit()
 }
 
 /// What tells special points of a branch apart: kind, position, and the bits of the parameter, since two of one kind can lie

@@ -1,10 +1,13 @@
 //! A study file becomes a plan.
 //!
-//! **Idea.** A study says in TOML what to compute with a model: parameter overrides, first solutions (`[[seed]]`) and
-//! branches (`[[branch]]`). The whole text is read before anything is refused, so that all mistakes are said at once, each
+//! **Idea.** A study says in TOML what to compute with a model: parameter overrides, first solutions (`[[seed]]`), branches
+//! (`[[branch]]`), two-parameter curves (`[[curve]]`) and homotopies (`[[homotopy]]`). The whole text is read before anything is refused, so that all mistakes are said at once, each
 //! with its place, what is wrong, and what would be right. The format is described in docs/book/study-files.md.
 
 mod branches;
+mod curves;
+mod homotopies;
+mod items;
 mod seeds;
 
 use crate::diagnostic::Diagnostic;
@@ -14,6 +17,7 @@ use crate::nearest::suggest;
 use crate::toml_walk::{Value, Walk, unreadable};
 use foldline::explore::Plan;
 use foldline::model::Model;
+use items::Items;
 use std::path::{Path, PathBuf};
 use toml::de::DeTable;
 
@@ -34,8 +38,19 @@ pub struct Study {
     pub plan: Plan,
 }
 
-const ROOT_KEYS: [&str; 9] =
-    ["model", "title", "description", "source", "tolerance", "degree", "parameters", "seed", "branch"];
+const ROOT_KEYS: [&str; 11] = [
+    "model",
+    "title",
+    "description",
+    "source",
+    "tolerance",
+    "degree",
+    "parameters",
+    "seed",
+    "branch",
+    "curve",
+    "homotopy",
+];
 
 /// Reads a study file and the model that it names. Every mistake found is returned.
 pub fn read_study(path: &Path) -> Result<Study, Vec<Diagnostic>> {
@@ -78,10 +93,11 @@ pub fn parse_study(text: &str, file: &str, model_text: &str, model_file: &str) -
     })
 }
 
-/// Whether a text says what to compute rather than how a system moves: it names a model, a seed or a branch.
+/// Whether a text says what to compute rather than how a system moves: it names a model, or
+/// something to compute.
 pub fn is_study(text: &str) -> bool {
     let (root, _) = DeTable::parse_recoverable(text);
-    ["model", "seed", "branch"].iter().any(|key| root.get_ref().contains_key(*key))
+    ["model", "seed", "branch", "curve", "homotopy"].iter().any(|key| root.get_ref().contains_key(*key))
 }
 
 fn parse(
@@ -100,7 +116,7 @@ fn parse(
         override_parameters(&mut walk, value, &model, &mut defaults);
     }
     let seeds = seeds::read(&mut walk, &root, &model, &defaults);
-    let branches = branches::read(&mut walk, &root, &model, &seeds);
+    let Items { branches, curves, homotopies } = items::read(&mut walk, &root, &model, &seeds);
     if walk.found.is_empty() {
         check_seeds(&mut walk, &seeds, &model, &model_text, &model_file);
     }
@@ -108,7 +124,7 @@ fn parse(
         return Err(walk.found);
     }
     let seeds = seeds.into_iter().map(|(_, seed)| seed).collect();
-    let plan = Plan { tolerance, degree, seeds, branches, curves: Vec::new(), homotopies: Vec::new() };
+    let plan = Plan { tolerance, degree, seeds, branches, curves, homotopies };
     Ok(Study { file: file.to_string(), text: text.to_string(), model_file, model_text, model, plan })
 }
 
@@ -170,7 +186,7 @@ fn unique_name(
         walk.report(
             value.span(),
             format!("the name \"{name}\" is used twice"),
-            "give every seed and every branch a name of its own",
+            "give every seed, branch, curve and homotopy a name of its own",
         );
     }
     Some(name)
@@ -212,5 +228,7 @@ mod tests {
         assert_eq!(keys("/properties"), sorted(&ROOT_KEYS));
         assert_eq!(keys("/$defs/seed/properties"), sorted(&seeds::KEYS));
         assert_eq!(keys("/$defs/branch/properties"), sorted(&branches::KEYS));
+        assert_eq!(keys("/$defs/curve/properties"), sorted(&curves::KEYS));
+        assert_eq!(keys("/$defs/homotopy/properties"), sorted(&homotopies::KEYS));
     }
 }

@@ -26,6 +26,8 @@ pub enum Failure {
         /// Relative to the step.
         miss: f64,
     },
+    /// Stability changes on the way in a manner that nothing located explains: the step has probably ended on another branch.
+    Unexplained,
     /// The point needs this mesh, and the step is too short to end on another mesh than it began on.
     Remeshed(Mesh),
     /// No mesh of the permitted size meets the tolerance.
@@ -45,6 +47,7 @@ impl std::fmt::Display for Failure {
             Failure::Elsewhere { angle, miss } => {
                 write!(f, "the branch turns too sharply (by {angle:.2} rad, {miss:.2} of a step off the prediction)")
             }
+            Failure::Unexplained => write!(f, "stability changes without a special point that explains it"),
             Failure::Remeshed(mesh) => write!(f, "the mesh keeps changing ({} intervals)", mesh.len().max(1) - 1),
             Failure::Mesh(error) => write!(f, "the error estimate stays at {error:.1e} on the largest mesh"),
         }
@@ -212,7 +215,7 @@ pub fn settle(
         let accurate = defect <= 5.0 * settings.tolerance || round == 3;
         // Whether a multiplier lies inside or outside the unit circle must not be a matter of its error.
         let close = |z: &num_complex::Complex64| z.norm().ln().abs() < CERTAIN * defect;
-        let certain = tightened || round == 3 || !found.point.free_spectrum().iter().any(close);
+        let certain = !settings.stability || tightened || round == 3 || !found.point.free_spectrum().iter().any(close);
         if accurate && certain {
             if trust.discretisation > 1.5 * settings.tolerance {
                 return Err(Failure::Mesh(trust.discretisation));

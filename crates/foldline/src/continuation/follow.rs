@@ -9,7 +9,7 @@ use super::corrector::{Failure, Plane, Station, correct, settle, station};
 use super::inspect::{Found, History};
 use super::locate::{Stretch, passing};
 use crate::contract::{Monitor, Verdict, ZeroProblem};
-use crate::diagram::{Cost, Ending, Mesh, Point, SpecialPoint};
+use crate::diagram::{Cost, Ending, Kind, Mesh, Point, SpecialPoint};
 
 /// What a run emits, in the order of travel.
 pub enum Item {
@@ -28,7 +28,7 @@ pub struct Follow<'w> {
     /// What to look for.
     pub monitors: &'w [Box<dyn Monitor>],
     /// Sign changes that end the branch: it has met the branch of simpler solutions that it comes from.
-    pub collapses: &'w [Box<dyn Monitor>],
+    pub collapses: &'w [Box<dyn Monitor + 'w>],
     /// +1 towards larger positions, -1 towards smaller.
     pub direction: f64,
     /// Index of the continuation parameter among the parameters of a point.
@@ -57,6 +57,12 @@ const SHORT: f64 = 200.0;
 const LITTLE: f64 = 0.25;
 /// Share below which a point close to the meeting counts as beyond it.
 const NOTHING: f64 = 0.05;
+/// Margin from a singular matrix below which a step must also lead back to where it came from.
+const CROWDED: f64 = 0.02;
+/// How many tolerances off a step may lead back; more is another branch.
+const BACK: f64 = 100.0;
+/// Step down to which a change of stability without explanation is taken for a jump to another branch.
+const SURE: f64 = 1e-4;
 /// Angles of the chord with both tangents: their sum may exceed the angle between the tangents by this factor …
 const CHORD_FACTOR: f64 = 1.5;
 /// … and this much. On an arc the two are equal; on a jump to another branch the chord points elsewhere.
@@ -79,21 +85,26 @@ pub fn follow(
     let mut position = left.point.position;
     let mut trail = previous.map(|p| walk.trail(&p, &left));
     let first_period = walk.home.unwrap_or(&left.point).solution.period();
-    let mut moved = false;
+    let (mut ever_moved, mut moved) = (false, true);
     loop {
-        moved |= walk.moves(&left);
         let outward = |bound: f64| (left.parameter() - bound).abs() <= 1e-12 * (1.0 + bound.abs());
         let [low, high] = walk.settings.range;
         if (outward(low) && left.slope() < 0.0) || (outward(high) && left.slope() > 0.0) {
-            return Ending::Bound(left.parameter());
+            return Ending::Bound(if left.slope() < 0.0 { low } else { high });
         }
         if emitted >= walk.settings.max_points {
             return Ending::PointLimit(emitted);
         }
         walk.refresh(&mut left, step);
         let (mut cost, mut remeshed) = (Cost::default(), 0);
-        let Step { mut right, end } = loop {
-            match walk.attempt(&left, trail.as_ref(), step, emitted, &mut cost) {
+        let history = trail.as_ref().map(|t| t.history.clone());
+        let (Step { mut right, end }, found) = loop {
+            let attempt = walk.attempt(&left, trail.as_ref(), step, emitted, &mut cost).and_then(|tried| {
+                let found = walk.inspect(&left, &tried.right, history.as_ref(), 0, &mut cost);
+                let unexplained = found.iter().any(|f| matches!(f, Found::Special(s) if s.kind == Kind::Unexplained));
+                if unexplained && step > SURE { Err(Failure::Unexplained) } else { Ok((tried, found)) }
+            });
+            match attempt {
                 Ok(accepted) => break accepted,
                 Err(Failure::Remeshed(mesh)) if remeshed < 3 => {
                     remeshed += 1;
@@ -102,15 +113,13 @@ pub fn follow(
                 }
                 Err(why) => {
                     cost.rejected += 1;
-                    step *= 0.5;
+                    step *= if why == Failure::Unexplained { 0.25 } else { 0.5 };
                     if step < walk.settings.min_step {
                         return ended_by(why, left.parameter());
                     }
                 }
             }
         };
-        let history = trail.as_ref().map(|t| t.history.clone());
-        let found = walk.inspect(&left, &right, history.as_ref(), 0, &mut cost);
         let found = match end {
             Some(Ending::Joined { parameter, .. }) => walk.up_to(parameter, found, left.point.unstable, &mut right),
             _ => found,
@@ -146,10 +155,13 @@ pub fn follow(
         if let Some(ending) = end {
             return ending;
         }
-        if let (Some(first), Some(now)) = (first_period, right.point.solution.period()) {
-            let settled = moved && !walk.moves(&left) && !walk.moves(&right);
-            let growing = left.point.solution.period().is_some_and(|before| now > before);
-            if growing && (now > walk.settings.period_growth * first || (settled && now > LONG * first)) {
+        if let (Some(first), Some(before), Some(now)) =
+            (first_period, left.point.solution.period(), right.point.solution.period())
+        {
+            let moves = walk.moves(&left, &right, [before, now]);
+            let settled = ever_moved && !moved && !moves;
+            (ever_moved, moved) = (ever_moved || moves, moves);
+            if now > before && (now > walk.settings.period_growth * first || (settled && now > LONG * first)) {
                 return Ending::PeriodUnbounded(now);
             }
         }
@@ -162,9 +174,11 @@ fn ended_by(why: Failure, parameter: f64) -> Ending {
     match why {
         Failure::NotFinite => Ending::NotFinite(format!("the vector field is not finite next to {parameter:?}")),
         Failure::Mesh(_) => Ending::MeshTooLarge(why.to_string()),
-        Failure::Singular | Failure::NoConvergence(_) | Failure::Elsewhere { .. } | Failure::Remeshed(_) => {
-            Ending::StepTooSmall(format!("{why} next to {parameter:?}"))
-        }
+        Failure::Singular
+        | Failure::NoConvergence(_)
+        | Failure::Elsewhere { .. }
+        | Failure::Remeshed(_)
+        | Failure::Unexplained => Ending::StepTooSmall(format!("{why} next to {parameter:?}")),
     }
 }
 
@@ -176,10 +190,9 @@ impl Follow<'_> {
 
     /// Whether the parameter still moves where the period grows: dλ/d ln T, which tends to zero with the distance from an
     /// orbit of infinite period, exceeds the tolerance.
-    fn moves(&self, station: &Station) -> bool {
-        let Some(period) = station.point.solution.period() else { return true };
-        let growth = station.tangent[station.tangent.len() - 2] / period;
-        station.slope().abs() > 0.1 * self.settings.tolerance * (1.0 + station.parameter().abs()) * growth.abs()
+    fn moves(&self, left: &Station, right: &Station, [before, now]: [f64; 2]) -> bool {
+        let change = (right.parameter() - left.parameter()).abs();
+        change > 0.1 * self.settings.tolerance * (1.0 + right.parameter().abs()) * (now / before).ln().abs()
     }
 
     fn trail(&mut self, before: &Station, now: &Station) -> Trail {
@@ -245,6 +258,7 @@ impl Follow<'_> {
             return Err(Failure::Remeshed(right.mesh));
         }
         self.continues(left, &right, &guess)?;
+        self.leads_back(left, &right, cost)?;
         if let Some(ended) = self.collapsed(left, &right, cost)? {
             return Ok(ended);
         }
@@ -253,12 +267,51 @@ impl Follow<'_> {
         let mut end = None;
         if let Some(bound) = bound {
             right = self.at_parameter(left, &right, bound, cost)?;
+            // To the last bit, whatever rounding Newton's method left.
+            let last = right.u.len() - 1;
+            right.u[last] = bound;
+            if let Some(own) = right.point.parameters.get_mut(self.free) {
+                *own = bound;
+            }
             end = Some(Ending::Bound(bound));
+        }
+        if let Some((value, there)) = self.beyond(left, &right, cost) {
+            return Ok(Step { right: there, end: Some(Ending::Bound(value)) });
         }
         if let Some(home) = self.closes(left, &right, emitted, cost)? {
             return Ok(Step { right: home, end: Some(Ending::Closed) });
         }
         Ok(Step { right, end })
+    }
+
+    /// The bound of a further parameter that this step passes, and the point there.
+    fn beyond(&mut self, left: &Station, right: &Station, cost: &mut Cost) -> Option<(f64, Station)> {
+        let (index, value) = self.settings.bounds.iter().find_map(|(index, [low, high])| {
+            let now = *right.point.parameters.get(*index)?;
+            if now < *low { Some((*index, *low)) } else { (now > *high).then_some((*index, *high)) }
+        })?;
+        let gap = |station: &Station| station.point.parameters[index] - value;
+        if (gap(left) > 0.0) == (gap(right) > 0.0) {
+            return None;
+        }
+        let stretch = Stretch::new(self.problem, left, right, self.direction);
+        let (mut inner, mut outer) = ((0.0, gap(left)), (stretch.length, gap(right)));
+        let mut found = None;
+        for _ in 0..8 {
+            let s = inner.0 + (outer.0 - inner.0) * inner.1 / (inner.1 - outer.1);
+            let there = self.cut(left, &stretch, s, cost)?;
+            let miss = gap(&there);
+            if (miss > 0.0) == (outer.1 > 0.0) {
+                outer = (s, miss)
+            } else {
+                inner = (s, miss)
+            }
+            found = Some(there);
+            if miss.abs() < self.settings.tolerance * (1.0 + value.abs()) {
+                break;
+            }
+        }
+        found.map(|there| (value, there))
     }
 
     /// Whether `right`, predicted as `guess`, continues the branch at `left`, and neither turns too far nor lies on another
@@ -274,6 +327,32 @@ impl Follow<'_> {
         let (miss, bent) = (size(&miss), against(&left.tangent) + against(&tangent));
         if angle > self.settings.max_angle || miss > 0.3 * length || bent > CHORD_FACTOR * angle + CHORD_SLACK {
             return Err(Failure::Elsewhere { angle, miss: miss / length });
+        }
+        Ok(())
+    }
+
+    /// Where another branch may be close: whether the same step backwards from `right` leads to `left` again.
+    fn leads_back(&mut self, left: &Station, right: &Station, cost: &mut Cost) -> Result<(), Failure> {
+        if self.problem.margin(&left.point).min(self.problem.margin(&right.point)) > CROWDED {
+            return Ok(());
+        }
+        self.place(right);
+        let home = self.problem.transfer(&left.u, &left.mesh, &right.mesh);
+        let before = self.problem.transfer(&left.tangent, &left.mesh, &right.mesh);
+        let gap: Vec<f64> = home.iter().zip(&right.u).map(|(a, b)| a - b).collect();
+        let distance = self.problem.dot(&right.tangent, &gap);
+        let mut back: Vec<f64> = (0..home.len())
+            .map(|i| {
+                let bend = 0.5 * distance * (before[i] - right.tangent[i]);
+                right.u[i] + distance * right.tangent[i] + bend
+            })
+            .collect();
+        let plane = Plane { row: right.tangent.clone(), base: right.u.clone(), distance };
+        correct(self.problem, self.settings, &plane, &mut back, cost)?;
+        let miss: Vec<f64> = back.iter().zip(&home).map(|(a, b)| a - b).collect();
+        let miss = self.problem.relative_size(&miss, &home);
+        if miss > BACK * self.settings.tolerance {
+            return Err(Failure::Elsewhere { angle: 0.0, miss: miss / distance.abs() });
         }
         Ok(())
     }
@@ -350,6 +429,10 @@ impl Follow<'_> {
             // A deviation that has turned instead of shrunk, as that of a narrow pulse that has moved, is none that vanishes.
             if monitor.value(&near.point, &left.point) < 1.1 * values[0] {
                 continue;
+            }
+            // A branch that only passes the simpler solutions closely is followed on, in steps that do not skip the passage.
+            if !monitor.confirms(&near.point) {
+                return Err(Failure::Singular);
             }
             let share = (monitor.value(&left.point, &near.point) / values[0]).powi(2);
             let parameter = (near.parameter() - share * left.parameter()) / (1.0 - share);

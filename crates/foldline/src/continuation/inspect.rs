@@ -83,10 +83,11 @@ impl Follow<'_> {
         located.sort_by(|a, b| a.2.distance.total_cmp(&b.2.distance));
         let jumps: Vec<usize> = located.iter().map(|(_, jump, _)| *jump).collect();
         let change = left.point.unstable.abs_diff(right.point.unstable);
-        let accounted = explains(&jumps, left.point.unstable as i64, right.point.unstable as i64)
+        let accounted = !self.settings.stability
+            || explains(&jumps, left.point.unstable as i64, right.point.unstable as i64)
             || (standing && jumps.is_empty() && change == 1);
         // A change of sign that could not be located is not passed over either.
-        let explained = accounted && !(lost && jumps.is_empty());
+        let explained = accounted && !(lost && jumps.is_empty() && self.settings.stability);
         let suspicious = depth < 3 && history.is_some_and(|h| self.may_touch(h, &at_left, &at_right, stretch.length));
         if depth < DEEPEST
             && (jumps.len() > 1 || !explained || (suspicious && jumps.is_empty()))

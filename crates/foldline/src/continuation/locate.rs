@@ -11,6 +11,9 @@ use super::{Failure, Settings};
 use crate::contract::{Monitor, ZeroProblem};
 use crate::diagram::{Cost, Point};
 
+/// Share of the larger value at the ends that a monitor keeps at a change of sign if it jumps there instead of vanishing.
+const JUMP: f64 = 0.05;
+
 /// A located zero.
 #[derive(Clone, Debug)]
 pub struct Located {
@@ -166,6 +169,11 @@ pub fn locate(
         |s: f64| stretch.at(problem, settings, s, cost).map(|found| (monitor.value(reference, &found.point), found));
     let resolution = if stretch.left.mesh.is_empty() { 1e-9 } else { 1e-3 };
     let (distance, mut coarse) = chandrupatla(&mut evaluate, [0.0, stretch.length], values, resolution)?;
+    // A change of sign without a zero: the two ends lie on different branches.
+    let smallest = monitor.value(reference, &coarse.point).abs();
+    if smallest > JUMP * values[0].abs().max(values[1].abs()) {
+        return Err(Failure::Unexplained);
+    }
     let floor = 10.0 * settings.newton_tolerance();
     let (mut tolerance, mut slope) = (0.3 * settings.tolerance, None);
     // First a mesh that resolves this place, then one with every interval halved; if the two disagree by more than the

@@ -30,6 +30,11 @@ pub struct Settings {
     pub tolerance: f64,
     /// Smallest and largest value of the continuation parameter.
     pub range: [f64; 2],
+    /// Bounds of further parameters, by their index; the side ends where one is reached.
+    pub bounds: Vec<(usize, [f64; 2])>,
+    /// Whether changes of stability along the curve are accounted for. Not so where a special point is held: there some
+    /// multiplier lies on the unit circle all the way.
+    pub stability: bool,
     /// Limit on the points of one side.
     pub max_points: usize,
     /// Largest angle between the tangents of neighbouring points; a larger one rejects the step.
@@ -58,6 +63,8 @@ impl Settings {
         Settings {
             tolerance,
             range,
+            bounds: Vec::new(),
+            stability: true,
             max_points: 10_000,
             max_angle: 0.45,
             target_angle: 0.2,

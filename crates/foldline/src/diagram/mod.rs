@@ -331,6 +331,12 @@ impl Branch {
         }
     }
 
+    /// Both parameters of a curve in two parameters: that of the branch on which it begins, then the second. `None` for a
+    /// branch in one parameter.
+    pub fn plane(&self) -> Option<[usize; 2]> {
+        self.held.map(|(_, first)| [first, self.free])
+    }
+
     /// Inserts an accepted point at its position.
     pub fn insert(&mut self, point: Point) {
         let at = self.points.partition_point(|p| p.position < point.position);

@@ -3,30 +3,49 @@
 use super::growth::{self, Beginning, Growth};
 use super::plan::{BranchPlan, Plan, Start, Switching};
 use super::seeds::Seeds;
-use super::{System, known, switch};
+use super::{System, curves, homotopy, known, switch};
 use crate::continuation::Settings;
 use crate::contract::{Event, Observer, Verdict};
 use crate::diagram::{Branch, Diagram, Ending, Family, Kind, Origin, Point, Solution, SpecialPoint};
+use std::ops::Range;
 
-/// Indices of the branches that start at a seed.
-pub fn roots(plan: &Plan) -> Vec<usize> {
-    (0..plan.branches.len()).filter(|&i| matches!(plan.branches[i].start, Start::Seed(_))).collect()
+/// What starts at a seed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Root {
+    /// The branch of that index.
+    Branch(usize),
+    /// The homotopy of that index.
+    Homotopy(usize),
 }
 
-/// Everything that grows from the branch of that index, in the order in which it was begun.
+/// Everything that starts at a seed.
+pub fn roots(plan: &Plan) -> Vec<Root> {
+    let seeded = |start: &Start| matches!(start, Start::Seed(_));
+    let branches = (0..plan.branches.len()).filter(|&i| seeded(&plan.branches[i].start)).map(Root::Branch);
+    let homotopies = (0..plan.homotopies.len()).filter(|&i| seeded(&plan.homotopies[i].start)).map(Root::Homotopy);
+    branches.chain(homotopies).collect()
+}
+
+/// Everything that grows from there, in the order in which it was begun.
 pub fn grow(
     system: &System,
     plan: &Plan,
-    root: usize,
+    root: Root,
     seeds: &Seeds,
     earlier: &Diagram,
     observer: &dyn Observer,
 ) -> Vec<Branch> {
     let mut work = Work { system, plan, earlier, observer, branches: Vec::new() };
-    let Start::Seed(seed) = plan.branches[root].start else { return Vec::new() };
+    let start = match root {
+        Root::Branch(index) => &plan.branches[index].start,
+        Root::Homotopy(index) => &plan.homotopies[index].start,
+    };
+    let Start::Seed(seed) = *start else { return Vec::new() };
     let origin = Origin::Seed(plan.seeds[seed].name.clone());
-    let start = seeds.point(seed);
-    work.planned(root, origin, start);
+    match root {
+        Root::Branch(index) => work.planned(index, origin, seeds.point(seed)),
+        Root::Homotopy(index) => work.brought(index, origin, seeds.point(seed)),
+    };
     work.branches
 }
 
@@ -50,6 +69,7 @@ impl Work<'_> {
         let plan = &self.plan.branches[index];
         let Some((branch, going)) = self.root(plan, origin, start) else { return true };
         let ended = end_of(&branch, plan);
+        let first = self.branches.len();
         self.branches.push(branch);
         if !going {
             return false;
@@ -62,9 +82,42 @@ impl Work<'_> {
                 None => return false,
             }
         }
-        let followers: Vec<usize> =
-            (0..self.plan.branches.len()).filter(|&i| self.plan.branches[i].start == Start::EndOf(index)).collect();
-        followers.into_iter().all(|i| self.planned(i, Origin::EndOf(plan.name.clone()), ended.clone()))
+        self.curves(first..self.branches.len()) && self.after(Start::EndOf(index), &plan.name, ended)
+    }
+
+    /// The branches and homotopies that start there.
+    fn after(&mut self, start: Start, name: &str, point: Result<Point, String>) -> bool {
+        let plan = self.plan;
+        let origin = || Origin::EndOf(name.to_string());
+        let branches = (0..plan.branches.len()).filter(|&i| plan.branches[i].start == start);
+        let homotopies = (0..plan.homotopies.len()).filter(|&i| plan.homotopies[i].start == start);
+        branches.into_iter().all(|i| self.planned(i, origin(), point.clone()))
+            && homotopies.into_iter().all(|i| self.brought(i, origin(), point.clone()))
+    }
+
+    /// A homotopy, and what starts where it arrives.
+    fn brought(&mut self, index: usize, origin: Origin, start: Result<Point, String>) -> bool {
+        let homotopy = &self.plan.homotopies[index];
+        let route = homotopy::find(self.system, self.plan, homotopy, origin, start, self.earlier, self.observer);
+        self.branches.extend(route.legs);
+        route.going && self.after(Start::EndOfHomotopy(index), &homotopy.name, route.arrived)
+    }
+
+    /// The curves that start from those branches, and what starts at their ends.
+    fn curves(&mut self, parents: Range<usize>) -> bool {
+        for (index, curve) in self.plan.curves.iter().enumerate() {
+            let Some(parent) = self.branches[parents.clone()].iter().find(|b| b.name == curve.of).cloned() else {
+                continue;
+            };
+            let earlier = self.earlier.branch(&curve.name);
+            let (branch, going) = curves::follow(self.system, self.plan, curve, &parent, earlier, self.observer);
+            let ended = curves::end_of(self.system, self.plan, curve, &branch);
+            self.branches.push(branch);
+            if !going || !self.after(Start::EndOfCurve(index), &curve.name, ended) {
+                return false;
+            }
+        }
+        true
     }
 
     fn growth_settings(&self, plan: &BranchPlan, start: &Point) -> (Settings, [bool; 2]) {
@@ -105,23 +158,21 @@ impl Work<'_> {
             Ok((settings, sides, station)) => {
                 self.growth(&settings, sides, &[]).begin(&mut branch, Beginning::Inside(station))
             }
-            Err(why) => self.without_start(&mut branch, why),
+            Err(why) => without_start(self.observer, &mut branch, why),
         };
         Some((branch, going))
     }
 
-    fn without_start(&self, branch: &mut Branch, why: String) -> bool {
-        let mut going = self.tell(Event::Begin(branch));
-        for side in [1, 0] {
-            let ending = Ending::NoStart(why.clone());
-            branch.ends[side] = Some(ending.clone());
-            going &= self.tell(Event::SideEnded(branch, side, &ending));
-        }
-        going & self.tell(Event::End(branch))
-    }
-
     fn growth<'s>(&'s self, settings: &'s Settings, sides: [bool; 2], parents: &'s [SpecialPoint]) -> Growth<'s> {
-        Growth { system: self.system, settings, degree: self.plan.degree, sides, parents, observer: self.observer }
+        Growth {
+            system: self.system,
+            settings,
+            degree: self.plan.degree,
+            ties: Vec::new(),
+            sides,
+            parents,
+            observer: self.observer,
+        }
     }
 
     fn tell(&self, event: Event) -> bool {
@@ -222,14 +273,28 @@ impl Work<'_> {
     }
 }
 
+/// A branch that could not begin. Returns false if the observer wants to stop.
+pub(super) fn without_start(observer: &dyn Observer, branch: &mut Branch, why: String) -> bool {
+    let tell = |event: Event| observer.observe(event) == Verdict::Continue;
+    let mut going = tell(Event::Begin(branch));
+    for side in [1, 0] {
+        let ending = Ending::NoStart(why.clone());
+        branch.ends[side] = Some(ending.clone());
+        going &= tell(Event::SideEnded(branch, side, &ending));
+    }
+    going & tell(Event::End(branch))
+}
+
 /// The end at which a planned branch hands over: its target, or its forward bound.
 fn end_of(branch: &Branch, plan: &BranchPlan) -> Result<Point, String> {
     let start = branch.points.iter().find(|p| p.position == 0).map(|p| p.parameters[plan.free]);
     let backward = matches!((plan.until, start), (Some(target), Some(value)) if target < value);
     let side = if backward { 0 } else { 1 };
     let point = if backward { branch.points.first() } else { branch.points.last() };
+    // A branch that turned round may have left its range where it began.
+    let arrived = |value: f64| plan.until.is_none_or(|target| (value - target).abs() <= 1e-9 * (1.0 + target.abs()));
     match (&branch.ends[side], point) {
-        (Some(Ending::Bound(_)), Some(point)) => Ok(point.clone()),
+        (Some(Ending::Bound(value)), Some(point)) if arrived(*value) => Ok(point.clone()),
         (Some(other), _) => Err(format!("branch {} did not get to its end: {other}", plan.name)),
         _ => Err(format!("branch {} was not finished", plan.name)),
     }

@@ -5,11 +5,64 @@ use crate::continuation::corrector::{Plane, parameter_row, settle, station};
 use crate::continuation::{Failure, Follow, Item, Settings, Station, follow};
 use crate::contract::{Event, Monitor, Observer, Verdict, ZeroProblem};
 use crate::diagram::{Branch, Cost, Ending, Family, Kind, Origin, Point, Solution, SpecialPoint};
-use crate::problem::{Setting, cycle::CycleProblem, equilibrium::EquilibriumProblem, mesh};
+use crate::problem::{Axis, Setting, Tie, cycle::CycleProblem, equilibrium::EquilibriumProblem, held::Held, mesh};
 use crate::special::{self, collapse};
 
-/// The problem on whose curve `point` lies, on the mesh of the point. `doubled` says that its branch was born by period
-/// doubling.
+/// Which curve through a point is meant.
+#[derive(Clone, Debug, Default)]
+pub struct Line {
+    /// Index of the continuation parameter.
+    pub free: usize,
+    /// Parameters that change with it.
+    pub ties: Vec<Tie>,
+    /// What is held, and the index of the parameter that follows from it.
+    pub held: Option<(Kind, usize)>,
+    /// Whether the branch was born by period doubling.
+    pub doubled: bool,
+}
+
+impl Line {
+    /// The curve in one parameter.
+    pub fn new(free: usize) -> Line {
+        Line { free, ..Line::default() }
+    }
+
+    fn axis(&self, system: &System, index: usize) -> Axis {
+        let scale = system.parameter_scales.get(index).copied().unwrap_or(1.0);
+        Axis { ties: if index == self.free { self.ties.clone() } else { Vec::new() }, ..Axis::new(index, scale) }
+    }
+
+    /// The problem of this curve, on the mesh of `point`, through which it goes.
+    pub fn problem<'a>(&self, system: &'a System, degree: usize, point: &Point) -> Box<dyn ZeroProblem + 'a> {
+        let both: Vec<usize> = self.held.map(|(_, first)| first).into_iter().chain([self.free]).collect();
+        let setting = Setting {
+            field: system.field,
+            scales: &system.scales,
+            parameters: point.parameters.clone(),
+            axes: both.into_iter().map(|index| self.axis(system, index)).collect(),
+        };
+        let condition = self
+            .held
+            .and_then(|(kind, _)| special::condition::condition(kind, setting.clone(), degree, &point.solution));
+        let surface: Box<dyn ZeroProblem + 'a> = match &point.solution {
+            Solution::Equilibrium(_) => Box::new(EquilibriumProblem::new(setting)),
+            Solution::Cycle(cycle) if self.doubled && cycle.intervals() > 0 => {
+                Box::new(CycleProblem::new(setting, cycle.degree, &cycle.mesh).with_equal_halves())
+            }
+            Solution::Cycle(cycle) if cycle.intervals() > 0 => {
+                Box::new(CycleProblem::new(setting, cycle.degree, &cycle.mesh))
+            }
+            Solution::Cycle(_) => Box::new(CycleProblem::new(setting, degree, &mesh::uniform(20))),
+        };
+        match condition {
+            Some(condition) => Box::new(Held::new(surface, condition)),
+            None => surface,
+        }
+    }
+}
+
+/// The problem of the curve in one parameter through `point`, on the mesh of the point. `doubled` says that its branch was
+/// born by period doubling.
 pub fn problem_of<'a>(
     system: &'a System,
     free: usize,
@@ -17,23 +70,18 @@ pub fn problem_of<'a>(
     point: &Point,
     doubled: bool,
 ) -> Box<dyn ZeroProblem + 'a> {
-    let setting = setting(system, free, &point.parameters);
-    match &point.solution {
-        Solution::Equilibrium(_) => Box::new(EquilibriumProblem::new(setting)),
-        Solution::Cycle(cycle) if doubled && cycle.intervals() > 0 => {
-            Box::new(CycleProblem::new(setting, cycle.degree, &cycle.mesh).with_equal_halves())
-        }
-        Solution::Cycle(cycle) if cycle.intervals() > 0 => {
-            Box::new(CycleProblem::new(setting, cycle.degree, &cycle.mesh))
-        }
-        Solution::Cycle(_) => Box::new(CycleProblem::new(setting, degree, &mesh::uniform(20))),
-    }
+    Line { doubled, ..Line::new(free) }.problem(system, degree, point)
 }
 
 /// The setting of a system at given parameters.
 pub fn setting<'a>(system: &'a System, free: usize, parameters: &[f64]) -> Setting<'a> {
     let parameter_scale = system.parameter_scales.get(free).copied().unwrap_or(1.0);
-    Setting { field: system.field, scales: &system.scales, parameters: parameters.to_vec(), free, parameter_scale }
+    Setting {
+        field: system.field,
+        scales: &system.scales,
+        parameters: parameters.to_vec(),
+        axes: vec![Axis::new(free, parameter_scale)],
+    }
 }
 
 /// The settings of a branch.
@@ -48,9 +96,55 @@ pub fn settings(system: &System, tolerance: f64, range: [f64; 2], max_points: us
 pub fn polished(problem: &mut dyn ZeroProblem, settings: &Settings, point: &Point) -> Result<Station, Failure> {
     let u = problem.unknowns_of(point);
     problem.anchor(&u);
-    let row = parameter_row(u.len());
+    let (row, value) = (parameter_row(u.len()), u[u.len() - 1]);
     let plane = Plane { row, base: u.clone(), distance: 0.0 };
-    settle(problem, settings, plane, u, 1.0, &mut Cost::default())
+    let mut found = settle(problem, settings, plane, u, 1.0, &mut Cost::default())?;
+    // To the last bit, whatever rounding Newton's method left.
+    for (now, given) in found.point.parameters.iter_mut().zip(&point.parameters) {
+        if (*now - given).abs() <= 1e-12 * (1.0 + given.abs()) {
+            *now = *given;
+        }
+    }
+    let last = found.u.len() - 1;
+    found.u[last] = value;
+    Ok(found)
+}
+
+/// A solution a little beside `point` on the curve, which may be a fold: from a fold itself a branch could not be told
+/// from the other side when it comes back.
+///
+/// # Errors
+/// See [`Failure`].
+pub fn beside(problem: &mut dyn ZeroProblem, settings: &Settings, point: &Point) -> Result<Point, Failure> {
+    const DISTANCES: [f64; 4] = [0.05, 0.01, 2e-3, 4e-4];
+    let u = problem.unknowns_of(point);
+    problem.anchor(&u);
+    // Any row will do for the first tangent unless it is orthogonal to it.
+    let mut row: Vec<f64> = (0..u.len()).map(|k| 0.6 + (k as f64 * 0.0113).sin() + (k as f64 * 1.37).cos()).collect();
+    let mut last = vec![0.0; u.len()];
+    last[u.len() - 1] = 1.0;
+    for _ in 0..2 {
+        problem.factorise(&u, &row).map_err(|_| Failure::Singular)?;
+        let mut tangent = vec![0.0; u.len()];
+        problem.solve(&last, &mut tangent);
+        let norm = problem.dot(&tangent, &tangent).sqrt();
+        row = tangent.iter().map(|t| t / norm).collect();
+    }
+    let mut cost = Cost::default();
+    let plane = Plane { row, base: u.clone(), distance: 0.0 };
+    let there = settle(problem, settings, plane, u, 1.0, &mut cost)?;
+    let mut failure = Failure::Singular;
+    for distance in DISTANCES {
+        problem.set_mesh(&there.mesh);
+        problem.anchor(&there.u);
+        let guess = there.u.iter().zip(&there.tangent).map(|(u, t)| u + distance * t).collect();
+        let plane = Plane { row: there.tangent.clone(), base: there.u.clone(), distance };
+        match settle(problem, settings, plane, guess, 1.0, &mut cost) {
+            Ok(found) => return Ok(found.point),
+            Err(why) => failure = why,
+        }
+    }
+    Err(failure)
 }
 
 /// A stored point as a station again.
@@ -96,6 +190,8 @@ pub struct Growth<'g> {
     pub settings: &'g Settings,
     /// Degree of collocation polynomials.
     pub degree: usize,
+    /// Parameters that change with the continuation parameter.
+    pub ties: Vec<Tie>,
     /// Which sides to follow: backward, forward.
     pub sides: [bool; 2],
     /// Special points of the branch that this one was switched from; it may end at another of them.
@@ -178,10 +274,11 @@ impl Growth<'_> {
         let last = last.clone();
         let before = own.get(1).map(|p| (*p).clone());
         let emitted = last.position.unsigned_abs() as usize;
-        let mut problem = problem_of(self.system, branch.free, self.degree, &last, is_doubled(branch));
+        let mut problem = self.line(branch).problem(self.system, self.degree, &last);
         let revive = |problem: &mut dyn ZeroProblem, point: &Point| revived(problem, self.settings, point, direction);
         // The special point at which a branch begins is no predecessor: the matrix is singular there.
-        let before = before.filter(|p| p.position != 0 || matches!(branch.origin, Origin::Seed(_) | Origin::EndOf(_)));
+        let inside = branch.held.is_some() || matches!(branch.origin, Origin::Seed(_) | Origin::EndOf(_));
+        let before = before.filter(|p| p.position != 0 || inside);
         let previous = before.and_then(|p| revive(&mut *problem, &p).ok());
         let mut start = match revive(&mut *problem, &last) {
             Ok(start) => start,
@@ -190,8 +287,10 @@ impl Growth<'_> {
         if emitted == 0 {
             start.point.step = self.settings.first_step;
         }
-        let monitors = special::monitors(branch.family);
-        let collapses = collapses(branch, self.system);
+        let (monitors, collapses) = match branch.held {
+            None => (special::monitors(branch.family), collapses(branch, self.system)),
+            Some(_) => (special::monitors_where_held(), Vec::new()),
+        };
         let home = branch.points.iter().find(|p| p.position == 0).filter(|_| branch.ends[0].is_none()).cloned();
         let mut walk = Follow {
             problem: &mut *problem,
@@ -242,6 +341,11 @@ impl Growth<'_> {
         Ending::Joined { at, parameter: value(parent) }
     }
 
+    /// The curve of a branch.
+    pub fn line(&self, branch: &Branch) -> Line {
+        Line { free: branch.free, ties: self.ties.clone(), held: branch.held, doubled: is_doubled(branch) }
+    }
+
     fn tell(&self, event: Event) -> bool {
         self.observer.observe(event) == Verdict::Continue
     }
@@ -259,13 +363,13 @@ impl Growth<'_> {
 
 /// Whether a branch was born by period doubling.
 pub fn is_doubled(branch: &Branch) -> bool {
-    matches!(branch.origin, Origin::Switch { kind: Kind::PeriodDoubling, .. })
+    branch.held.is_none() && matches!(branch.origin, Origin::Switch { kind: Kind::PeriodDoubling, .. })
 }
 
 /// What a branch can collapse to: every cycle to an equilibrium, a doubled one to its parent as well, and one that was born
 /// at a branch point to more symmetric solutions.
-fn collapses(branch: &Branch, system: &System) -> Vec<Box<dyn Monitor>> {
-    let mut all: Vec<Box<dyn Monitor>> = Vec::new();
+fn collapses<'a>(branch: &Branch, system: &'a System) -> Vec<Box<dyn Monitor + 'a>> {
+    let mut all: Vec<Box<dyn Monitor + 'a>> = Vec::new();
     if matches!(branch.origin, Origin::Switch { kind: Kind::BranchPoint, .. }) {
         for reflection in system.reflections.iter().filter(|r| r.contains(&true)) {
             for half in [false, true].into_iter().take(if branch.family == Family::Cycle { 2 } else { 1 }) {
@@ -281,7 +385,7 @@ fn collapses(branch: &Branch, system: &System) -> Vec<Box<dyn Monitor>> {
         if is_doubled(branch) {
             all.push(Box::new(collapse::Halves));
         }
-        all.push(Box::new(collapse::Shrinks));
+        all.push(Box::new(collapse::Shrinks { field: system.field, free: branch.free, scales: &system.scales }));
     }
     all
 }

@@ -13,9 +13,13 @@
 //! | what follows from a finished branch? | [`family`] |
 //! | how does one leave a special point on the other branch? | [`switch`] |
 //! | is this branch known already? | [`known`] |
+//! | where does a special point go when a second parameter changes? | [`curves`] |
+//! | how does a family get to other parameter values? | [`homotopy`] |
 
+pub mod curves;
 pub mod family;
 pub mod growth;
+pub mod homotopy;
 pub mod known;
 pub mod plan;
 pub mod seeds;

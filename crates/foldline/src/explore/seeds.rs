@@ -33,9 +33,10 @@ impl Seeds {
 /// Finds every seed that a branch without points in `earlier` starts from.
 pub fn find(system: &System, plan: &Plan, jobs: usize, earlier: &Diagram, observer: &dyn Observer) -> Seeds {
     let needed = |seed: usize| {
-        plan.branches.iter().any(|b| {
-            b.start == Start::Seed(seed) && earlier.branch(&b.name).is_none_or(|known| known.points.is_empty())
-        })
+        let start = Start::Seed(seed);
+        let branches = plan.branches.iter().filter(|b| b.start == start).map(|b| b.name.clone());
+        let first_legs = plan.homotopies.iter().filter(|h| h.start == start).map(|h| format!("{}/1", h.name));
+        branches.chain(first_legs).any(|name| earlier.branch(&name).is_none_or(|known| known.points.is_empty()))
     };
     let mut censuses: Vec<(&SeedPlan, Census)> = Vec::new();
     let mut points = Vec::new();

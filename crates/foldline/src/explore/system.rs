@@ -54,19 +54,12 @@ impl<'a> System<'a> {
         system
     }
 
-    /// The system of a plan. Only a symmetry that holds wherever the plan goes counts: at every seed, and with the free
-    /// parameters away from values, such as zero, at which a model may be more symmetric than elsewhere.
+    /// The system of a plan. Only a symmetry that holds wherever the plan goes counts: at every seed, and with the
+    /// parameters that branches, curves and homotopies change away from values, such as zero, at which a model may be more
+    /// symmetric than elsewhere.
     pub fn of_plan(model: &'a Model, plan: &Plan) -> System<'a> {
-        const AWAY: f64 = 0.617;
         let mut places: Vec<Vec<f64>> = plan.seeds.iter().map(|seed| seed.parameters.clone()).collect();
-        for seed in &plan.seeds {
-            let mut place = seed.parameters.clone();
-            for branch in &plan.branches {
-                let [low, high] = branch.range;
-                place[branch.free] = low + AWAY * (high - low);
-            }
-            places.push(place);
-        }
+        places.extend(plan.seeds.iter().map(|seed| away(plan, &seed.parameters)));
         let mut systems = places.iter().map(|place| System::of(model, place));
         let Some(mut common) = systems.next() else { return System::new(model) };
         for other in systems {
@@ -106,4 +99,20 @@ impl<'a> System<'a> {
             }
         }
     }
+}
+
+/// The parameters of a seed, those that the plan changes replaced by values between those that they reach.
+fn away(plan: &Plan, seed: &[f64]) -> Vec<f64> {
+    const SHARE: f64 = 0.617;
+    let between = |[low, high]: [f64; 2]| low + SHARE * (high - low);
+    let mut place = seed.to_vec();
+    for homotopy in &plan.homotopies {
+        place[homotopy.via] = between(homotopy.range);
+        // A later one that leads back to the value of the seed takes nothing back.
+        let changed = homotopy.targets.iter().filter(|(target, goal)| seed[*target] != *goal);
+        changed.for_each(|(target, goal)| place[*target] = between([seed[*target], *goal]));
+    }
+    plan.curves.iter().for_each(|curve| place[curve.free] = between(curve.ranges[1]));
+    plan.branches.iter().for_each(|branch| place[branch.free] = between(branch.range));
+    place
 }

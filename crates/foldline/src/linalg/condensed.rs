@@ -281,6 +281,79 @@ impl Condensed {
         }
         x[count * block..].copy_from_slice(&tail[n..]);
     }
+
+    /// Solves the transposed system: `z` has the layout of the unknowns (x_j, X_j per interval, then σ), `y` that of the
+    /// equations (c_j, r_j per interval, then s).
+    pub fn solve_transposed(&self, z: &[f64], y: &mut [f64]) {
+        let (n, m, q, inner) = (self.n, self.m, self.q, self.m * self.n);
+        let (width, full, count, block) = (n + q, 3 * n + q, self.intervals, self.m * self.n + self.n);
+        // Interior columns first: what they leave for the interval ends and the scalars.
+        let mut ends = vec![0.0; count * n];
+        let mut tail = vec![0.0; width];
+        tail[n..].copy_from_slice(&z[count * block..]);
+        for j in 0..count {
+            let own = &z[j * block..(j + 1) * block];
+            let end = &mut ends[j * n..(j + 1) * n];
+            end.copy_from_slice(&own[..n]);
+            let w = &self.coupling[j * inner * width..(j + 1) * inner * width];
+            for (v, line) in own[n..].iter().zip(w.chunks_exact(width)) {
+                axpy(-v, &line[..n], end);
+                axpy(-v, &line[n..], &mut tail[n..]);
+            }
+        }
+        tail[..n].copy_from_slice(&ends[..n]);
+        // The triangular factor, from the left.
+        for j in 1..count {
+            let (before, own) = ends.split_at_mut(j * n);
+            let own = &mut own[..n];
+            if j > 1 {
+                let last = &self.upper[(j - 1) * n * full..j * n * full];
+                for (i, v) in before[(j - 1) * n..].iter().enumerate() {
+                    axpy(-v, &last[i * full + n..i * full + 2 * n], own);
+                }
+            }
+            let upper = &self.upper[j * n * full..(j + 1) * n * full];
+            for i in 0..n {
+                own[i] /= upper[i * full + i];
+                let v = own[i];
+                axpy(-v, &upper[i * full + i + 1..i * full + n], &mut own[i + 1..]);
+                axpy(-v, &upper[i * full + 2 * n..(i + 1) * full], &mut tail);
+                if j + 1 == count {
+                    axpy(-v * self.closure, &upper[i * full + n..i * full + 2 * n], &mut tail[..n]);
+                }
+            }
+        }
+        lu::solve_transposed(&self.last, width, &self.last_pivots, &mut tail);
+        let (mut carry, border) = (tail[..n].to_vec(), &tail[n..]);
+        // The orthogonal factor, from the right.
+        let mut pair = vec![0.0; 2 * n];
+        for j in (1..count).rev() {
+            pair[..n].copy_from_slice(&ends[j * n..(j + 1) * n]);
+            for c in 0..q {
+                axpy(-border[c], &self.multipliers[(j * q + c) * n..(j * q + c + 1) * n], &mut pair[..n]);
+            }
+            pair[n..].copy_from_slice(&carry);
+            reflect::apply_reversed(&self.reflectors[j * n * 2 * n..(j + 1) * n * 2 * n], 2 * n, n, &mut pair, 1);
+            carry.copy_from_slice(&pair[..n]);
+            ends[j * n..(j + 1) * n].copy_from_slice(&pair[n..]);
+        }
+        ends[..n].copy_from_slice(&carry);
+        for j in 0..count {
+            let own = &mut y[j * block..(j + 1) * block];
+            own[..n].copy_from_slice(&ends[j * n..(j + 1) * n]);
+            own[n..].copy_from_slice(&z[j * block + n..(j + 1) * block]);
+            for k in 0..m {
+                axpy(self.end[k + 1], &ends[j * n..(j + 1) * n], &mut own[(k + 1) * n..(k + 2) * n]);
+            }
+            for c in 0..q {
+                let row = &self.border[(c * count + j) * block + n..(c * count + j + 1) * block];
+                axpy(-border[c], row, &mut own[n..]);
+            }
+            let a = &self.interior[j * inner * inner..(j + 1) * inner * inner];
+            lu::solve_transposed(a, inner, &self.pivots[j * inner..(j + 1) * inner], &mut own[n..]);
+        }
+        y[count * block..].copy_from_slice(border);
+    }
 }
 
 #[cfg(test)]
@@ -353,6 +426,13 @@ mod tests {
             c.eliminate(closure).unwrap();
             let mut x = vec![0.0; size];
             c.solve(&rhs, &mut x);
+            let transposed = matrix.transpose().to_owned();
+            let second = transposed.partial_piv_lu().solve(&faer::Mat::from_fn(size, 1, |i, _| rhs[i]));
+            let mut y = vec![0.0; size];
+            c.solve_transposed(&rhs, &mut y);
+            for i in 0..size {
+                assert!((y[i] - second[(i, 0)]).abs() < 1e-10, "{intervals} intervals, transposed, {i}");
+            }
             for i in 0..size {
                 assert!(
                     (x[i] - reference[(i, 0)]).abs() < 1e-10,

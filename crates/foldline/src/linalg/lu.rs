@@ -103,6 +103,22 @@ fn solve_group<const C: usize>(a: &[f64], n: usize, pivots: &[usize], b: &mut [f
     }
 }
 
+/// Solves aᵀ x = b for one right-hand side `[n]` in place.
+pub fn solve_transposed(a: &[f64], n: usize, pivots: &[usize], b: &mut [f64]) {
+    for k in 0..n {
+        b[k] /= a[k * n + k];
+        let x = b[k];
+        b[k + 1..n].iter_mut().zip(&a[k * n + k + 1..(k + 1) * n]).for_each(|(b, u)| *b -= u * x);
+    }
+    for k in (0..n).rev() {
+        let x = b[k];
+        b[..k].iter_mut().zip(&a[k * n..k * n + k]).for_each(|(b, l)| *b -= l * x);
+    }
+    for k in (0..n).rev() {
+        b.swap(k, pivots[k]);
+    }
+}
+
 /// Sign of the determinant and logarithm of its modulus, from a factorisation.
 pub fn determinant(a: &[f64], n: usize, pivots: &[usize]) -> (f64, f64) {
     let mut sign = 1.0;
@@ -140,6 +156,12 @@ mod tests {
             for j in 0..2 {
                 assert!((b[i * 2 + j] - reference[(i, j)]).abs() < 1e-11);
             }
+        }
+        let transposed = faer::Mat::from_fn(n, n, |i, j| entry(j, i)).partial_piv_lu().solve(&rhs);
+        let mut x: Vec<f64> = (0..n).map(|i| rhs[(i, 1)]).collect();
+        solve_transposed(&a, n, &pivots, &mut x);
+        for i in 0..n {
+            assert!((x[i] - transposed[(i, 1)]).abs() < 1e-11);
         }
         // The same two columns among eleven.
         let mut wide: Vec<f64> =

@@ -38,6 +38,13 @@ pub fn apply(v: &[f64], rows: usize, columns: usize, b: &mut [f64], width: usize
     }
 }
 
+/// Applies the stored reflections in the opposite order: the inverse, and the transpose, of [`apply`].
+pub fn apply_reversed(v: &[f64], rows: usize, columns: usize, b: &mut [f64], width: usize) {
+    for k in (0..columns.min(rows)).rev() {
+        apply_one(&v[k * rows..(k + 1) * rows], k, b, width, 0);
+    }
+}
+
 /// Applies 1 - v vᵀ to the columns `from..width`, sixteen at a time so that the sums stay in registers.
 fn apply_one(reflector: &[f64], first: usize, a: &mut [f64], width: usize, from: usize) {
     let rows = reflector.len();
@@ -85,6 +92,10 @@ mod tests {
         let mut again = original.clone();
         apply(&v, rows, columns, &mut again, width);
         for (x, y) in again.iter().zip(&a) {
+            assert!((x - y).abs() < 1e-14);
+        }
+        apply_reversed(&v, rows, columns, &mut again, width);
+        for (x, y) in again.iter().zip(&original) {
             assert!((x - y).abs() < 1e-14);
         }
     }

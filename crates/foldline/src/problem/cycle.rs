@@ -4,7 +4,7 @@
 //! left end and at the Gauss points, where it satisfies the differential equation. An integral phase condition fixes the
 //! shift in time.
 //!
-//! **Equations.** u = (profile, T, λ), N(m+1)n + 2 unknowns; D, e, b, c from [`Scheme`]; h_j interval lengths:
+//! **Equations.** u = (profile, T, λ₁ … λ_k), N(m+1)n + 1 + k unknowns, k = 1 for a curve; D, e, b, c from [`Scheme`]; h_j interval lengths:
 //!
 //! ```text
 //!   (1)  Σ_k D_ik X_{j,k} - h_j T f(X_{j,i}, λ) = 0                     i = 1…m, j = 0…N-1
@@ -28,7 +28,7 @@ use crate::linalg::condensed::Condensed;
 use crate::linalg::{axpy, max_abs};
 use crate::stability::floquet;
 
-/// The curve of cycles in one parameter.
+/// Cycles in one free parameter (a curve) or several.
 pub struct CycleProblem<'a> {
     setting: Setting<'a>,
     scheme: Scheme,
@@ -57,7 +57,7 @@ impl<'a> CycleProblem<'a> {
         let scheme = Scheme::new(degree);
         let n = setting.field.dim();
         let mut problem = CycleProblem {
-            system: Condensed::new(n, &scheme.end, 2),
+            system: Condensed::new(n, &scheme.end, 1 + setting.freedom()),
             scale: setting.scales.to_vec(),
             setting,
             sampling: defect::Sampling::new(&scheme),
@@ -94,18 +94,19 @@ impl<'a> CycleProblem<'a> {
     /// Profile of an antiperiodic null vector of the variational equation at `u` (it changes sign after one period), if
     /// there is one: the direction of period doubling. Layout of the profile.
     pub fn antiperiodic_direction(&mut self, u: &[f64]) -> Option<Vec<f64>> {
-        let row = vec![0.0; u.len()];
+        let row = vec![0.0; self.setting.freedom() * u.len()];
         self.fill(u, &row);
+        let q = 1 + self.setting.freedom();
         // The scalars are frozen by a unit corner, so only the profile moves.
         self.system.border.fill(0.0);
-        self.system.corner.copy_from_slice(&[1.0, 0.0, 0.0, 1.0]);
+        (0..q * q).for_each(|k| self.system.corner[k] = if k % (q + 1) == 0 { 1.0 } else { 0.0 });
         self.system.condense().ok()?;
         self.system.eliminate(-1.0).ok()?;
         let size = self.profile_size();
-        let mut v: Vec<f64> = (0..size + 2).map(|k| ((k * k) as f64 * 0.7 + 0.3).sin()).collect();
+        let mut v: Vec<f64> = (0..size + q).map(|k| ((k * k) as f64 * 0.7 + 0.3).sin()).collect();
         let mut next = v.clone();
         for _ in 0..4 {
-            (v[size], v[size + 1]) = (0.0, 0.0);
+            v[size..].fill(0.0);
             self.system.solve(&v, &mut next);
             let norm = max_abs(&next);
             if !norm.is_finite() || norm == 0.0 {
@@ -142,20 +143,20 @@ impl<'a> CycleProblem<'a> {
         }
     }
 
-    /// Linearises at `u` and fills the blocks; `row` acts through [`ZeroProblem::dot`].
-    fn fill(&mut self, u: &[f64], row: &[f64]) {
+    /// Linearises at `u` and fills the blocks; the `rows` act through [`ZeroProblem::dot`].
+    fn fill(&mut self, u: &[f64], rows: &[f64]) {
         let (n, m, count) = (self.n, self.scheme.degree, self.intervals());
         let (lanes, size, inner, block) = (count * m, self.profile_size(), m * n, (m + 1) * n);
-        let period = u[size];
+        let (period, k_free) = (u[size], self.setting.freedom());
         self.gather(u);
-        let parameters = self.setting.at(u[size + 1]);
+        let parameters = self.setting.at(&u[size + 1..]);
         let batch = Batch { lanes, states: &self.states, parameters: Parameters::Shared(&parameters) };
-        self.setting.field.linearise(batch, self.setting.free_ones(), &mut self.f, &mut self.fx, &mut self.fp);
+        self.setting.linearise(batch, &mut self.f, &mut self.fx, &mut self.fp);
         self.trace = 0.0;
         self.system.interior.fill(0.0);
         self.system.coupling.fill(0.0);
         self.system.border.fill(0.0);
-        let width = n + 2;
+        let width = n + 1 + k_free;
         for j in 0..count {
             let h = self.mesh[j + 1] - self.mesh[j];
             let ht = h * period;
@@ -175,20 +176,30 @@ impl<'a> CycleProblem<'a> {
                     let right = &mut b[(i * n + c) * width..(i * n + c + 1) * width];
                     right[c] = self.scheme.derivative[i * (m + 1)];
                     right[n] = -h * self.f[c * lanes + lane];
-                    right[n + 1] = -ht * self.fp[c * lanes + lane];
+                    for a in 0..k_free {
+                        right[n + 1 + a] = -ht * self.fp[(c * k_free + a) * lanes + lane];
+                    }
                 }
                 for c in 0..n {
                     let at = j * block + (i + 1) * n + c;
                     let weight = h * self.scheme.weights[i];
                     self.system.border[at] = weight * self.phase[(j * m + i) * n + c];
-                    self.system.border[size + at] = weight * row[at] / (self.scale[c] * self.scale[c] * n as f64);
+                    for (r, row) in rows.chunks_exact(u.len()).enumerate() {
+                        self.system.border[(1 + r) * size + at] =
+                            weight * row[at] / (self.scale[c] * self.scale[c] * n as f64);
+                    }
                 }
             }
         }
-        self.system.corner[0] = 0.0;
-        self.system.corner[1] = 0.0;
-        self.system.corner[2] = row[size] / (self.period_scale * self.period_scale);
-        self.system.corner[3] = row[size + 1] / (self.setting.parameter_scale * self.setting.parameter_scale);
+        let q = 1 + k_free;
+        self.system.corner[..q].fill(0.0);
+        for (r, row) in rows.chunks_exact(u.len()).enumerate() {
+            let corner = &mut self.system.corner[(1 + r) * q..(2 + r) * q];
+            corner[0] = row[size] / (self.period_scale * self.period_scale);
+            for (a, axis) in self.setting.axes.iter().enumerate() {
+                corner[1 + a] = row[size + 1 + a] / (axis.scale * axis.scale);
+            }
+        }
     }
 
     /// Largest |component| over the profile.
@@ -210,7 +221,7 @@ impl<'a> CycleProblem<'a> {
     fn measured_errors(&self, u: &[f64]) -> Vec<f64> {
         let size = self.profile_size();
         let scale = self.relative_scale(u);
-        let parameters = self.setting.at(u[size + 1]);
+        let parameters = self.setting.at(&u[size + 1..]);
         let Defect { local, ends } = defect::measure(
             self.setting.field,
             &parameters,
@@ -222,11 +233,11 @@ impl<'a> CycleProblem<'a> {
             &scale,
         );
         let block = (self.scheme.degree + 1) * self.n;
-        let mut rhs = vec![0.0; size + 2];
+        let mut rhs = vec![0.0; u.len()];
         for (j, end) in ends.chunks_exact(self.n).enumerate() {
             rhs[j * block..j * block + self.n].copy_from_slice(end);
         }
-        let mut shift = vec![0.0; size + 2];
+        let mut shift = vec![0.0; u.len()];
         self.system.solve(&rhs, &mut shift);
         let response = self.relative_size(&shift, u);
         let sizes: Vec<f64> = ends
@@ -247,7 +258,7 @@ impl<'a> CycleProblem<'a> {
             }
         }
         let mut f = vec![0.0; n * count];
-        let parameters = self.setting.at(u[u.len() - 1]);
+        let parameters = self.setting.at(&u[self.profile_size() + 1..]);
         let batch = Batch { lanes: count, states: &states, parameters: Parameters::Shared(&parameters) };
         self.setting.field.evaluate(batch, &mut f);
         let mut flow = vec![0.0; n * count];
@@ -262,7 +273,7 @@ impl<'a> CycleProblem<'a> {
 
 impl ZeroProblem for CycleProblem<'_> {
     fn unknowns(&self) -> usize {
-        self.profile_size() + 2
+        self.profile_size() + 1 + self.setting.freedom()
     }
 
     fn anchor(&mut self, u: &[f64]) {
@@ -298,7 +309,7 @@ impl ZeroProblem for CycleProblem<'_> {
         let (lanes, size, block) = (count * m, self.profile_size(), (m + 1) * n);
         let period = u[size];
         self.gather(u);
-        let parameters = self.setting.at(u[size + 1]);
+        let parameters = self.setting.at(&u[size + 1..]);
         let batch = Batch { lanes, states: &self.states, parameters: Parameters::Shared(&parameters) };
         self.setting.field.evaluate(batch, &mut self.f);
         let mut phase = -self.phase_offset;
@@ -327,9 +338,9 @@ impl ZeroProblem for CycleProblem<'_> {
         max_abs(&r[..=size]).is_finite() && period > 0.0
     }
 
-    fn factorise(&mut self, u: &[f64], row: &[f64]) -> Result<(), Singular> {
+    fn factorise(&mut self, u: &[f64], rows: &[f64]) -> Result<(), Singular> {
         self.errors = None;
-        self.fill(u, row);
+        self.fill(u, rows);
         self.system.condense()?;
         self.system.eliminate(1.0)
     }
@@ -350,14 +361,13 @@ impl ZeroProblem for CycleProblem<'_> {
         }
         total / n as f64
             + a[size] * b[size] / (self.period_scale * self.period_scale)
-            + a[size + 1] * b[size + 1] / (self.setting.parameter_scale * self.setting.parameter_scale)
+            + self.setting.dot(&a[size + 1..], &b[size + 1..])
     }
 
     fn relative_size(&self, du: &[f64], u: &[f64]) -> f64 {
         let size = self.profile_size();
         let scale = self.relative_scale(u);
-        let mut largest =
-            (du[size] / u[size]).abs().max((du[size + 1] / (self.setting.parameter_scale + u[size + 1].abs())).abs());
+        let mut largest = (du[size] / u[size]).abs().max(self.setting.relative_size(&du[size + 1..], &u[size + 1..]));
         for x in du[..size].chunks_exact(self.n) {
             for (v, s) in x.iter().zip(&scale) {
                 let relative = (v / s).abs();
@@ -383,14 +393,14 @@ impl ZeroProblem for CycleProblem<'_> {
         self.states.resize(lanes * n, 0.0);
         self.f.resize(lanes * n, 0.0);
         self.fx.resize(lanes * n * n, 0.0);
-        self.fp.resize(lanes * n, 0.0);
+        self.fp.resize(lanes * n * self.setting.freedom(), 0.0);
     }
 
     fn transfer(&self, v: &[f64], from: &Mesh, to: &Mesh) -> Vec<f64> {
         if from == to {
             return v.to_vec();
         }
-        let size = v.len() - 2;
+        let size = v.len() - 1 - self.setting.freedom();
         let mut out = mesh::transferred(&v[..size], self.n, &self.scheme, from, to);
         out.extend_from_slice(&v[size..]);
         out
@@ -414,7 +424,7 @@ impl ZeroProblem for CycleProblem<'_> {
 
     fn examine(&mut self, u: &[f64]) -> Examination {
         let (n, count, size) = (self.n, self.intervals(), self.profile_size());
-        let width = n + 2;
+        let width = n + 1 + self.setting.freedom();
         let mut transitions = vec![0.0; count * n * n];
         for j in 0..count {
             let step = self.system.transition(j);
@@ -427,11 +437,11 @@ impl ZeroProblem for CycleProblem<'_> {
         let found = floquet::multipliers(&transitions, &self.flow_at_nodes(u), n);
         let scale = self.relative_scale(u);
         let errors = self.measured_errors(u);
-        let mut r = vec![0.0; size + 2];
+        let mut r = vec![0.0; u.len()];
         self.residual(u, &mut r);
         let residual =
             r[..size].iter().enumerate().map(|(k, v)| (v / scale[k % n]).abs()).fold(r[size].abs(), f64::max);
-        let parameters = self.setting.at(u[size + 1]);
+        let parameters = self.setting.at(&u[size + 1..]);
         let ranges = extremes::of_profile(self.setting.field, &parameters, &u[..size], &self.mesh, &self.scheme);
         let trust = Trust {
             discretisation: errors.iter().fold(0.0, |m: f64, e| m.max(*e)),
@@ -443,11 +453,15 @@ impl ZeroProblem for CycleProblem<'_> {
         Examination { spectrum: found.multipliers, unstable: found.unstable, ranges, trust }
     }
 
+    fn margin(&self, at: &Point) -> f64 {
+        at.free_spectrum().iter().map(|z| (z - 1.0).norm()).fold(f64::INFINITY, f64::min)
+    }
+
     fn point(&self, u: &[f64], tangent: &[f64], examination: Examination) -> Point {
         let size = self.profile_size();
         Point {
             position: 0,
-            parameters: self.setting.at(u[size + 1]),
+            parameters: self.setting.at(&u[size + 1..]),
             solution: Solution::Cycle(Cycle {
                 period: u[size],
                 mesh: self.mesh.clone(),
@@ -465,18 +479,12 @@ impl ZeroProblem for CycleProblem<'_> {
     }
 
     fn unknowns_of(&mut self, point: &Point) -> Vec<f64> {
-        let parameter = point.parameters.get(self.setting.free).copied().unwrap_or(0.0);
-        match &point.solution {
-            Solution::Cycle(cycle) => {
-                let mut u = cycle.profile.clone();
-                u.extend([cycle.period, parameter]);
-                u
-            }
-            Solution::Equilibrium(x) => {
-                let mut u: Vec<f64> = x.iter().copied().cycle().take(self.profile_size()).collect();
-                u.extend([1.0, parameter]);
-                u
-            }
-        }
+        let (mut u, period) = match &point.solution {
+            Solution::Cycle(cycle) => (cycle.profile.clone(), cycle.period),
+            Solution::Equilibrium(x) => (x.iter().copied().cycle().take(self.profile_size()).collect(), 1.0),
+        };
+        u.push(period);
+        u.extend(self.setting.values_of(point));
+        u
     }
 }

@@ -1,6 +1,6 @@
 //! Equilibria.
 //!
-//! **Equations.** u = (x, λ):  f(x, λ) = 0, n equations.
+//! **Equations.** u = (x, λ₁ … λ_k):  f(x, λ) = 0, n equations; k = 1 for a curve.
 
 use super::Setting;
 use crate::contract::{Batch, Examination, Parameters, Singular, ZeroProblem};
@@ -9,7 +9,7 @@ use crate::linalg::{lu, max_abs};
 use crate::problem::extremes;
 use crate::stability::eigenvalues;
 
-/// The curve of equilibria in one parameter.
+/// Equilibria in one free parameter (a curve) or several.
 pub struct EquilibriumProblem<'a> {
     setting: Setting<'a>,
     scale: Vec<f64>,
@@ -23,14 +23,14 @@ pub struct EquilibriumProblem<'a> {
 impl<'a> EquilibriumProblem<'a> {
     /// The problem in that setting.
     pub fn new(setting: Setting<'a>) -> EquilibriumProblem<'a> {
-        let n = setting.field.dim();
+        let (n, k) = (setting.field.dim(), setting.freedom());
         EquilibriumProblem {
             scale: setting.scales.to_vec(),
             f: vec![0.0; n],
             fx: vec![0.0; n * n],
-            fp: vec![0.0; n],
-            matrix: vec![0.0; (n + 1) * (n + 1)],
-            pivots: vec![0; n + 1],
+            fp: vec![0.0; n * k],
+            matrix: vec![0.0; (n + k) * (n + k)],
+            pivots: vec![0; n + k],
             setting,
         }
     }
@@ -41,15 +41,15 @@ impl<'a> EquilibriumProblem<'a> {
 
     fn linearise(&mut self, u: &[f64]) {
         let n = self.n();
-        let parameters = self.setting.at(u[n]);
+        let parameters = self.setting.at(&u[n..]);
         let batch = Batch { lanes: 1, states: &u[..n], parameters: Parameters::Shared(&parameters) };
-        self.setting.field.linearise(batch, self.setting.free_ones(), &mut self.f, &mut self.fx, &mut self.fp);
+        self.setting.linearise(batch, &mut self.f, &mut self.fx, &mut self.fp);
     }
 }
 
 impl ZeroProblem for EquilibriumProblem<'_> {
     fn unknowns(&self) -> usize {
-        self.n() + 1
+        self.n() + self.setting.freedom()
     }
 
     fn anchor(&mut self, u: &[f64]) {
@@ -60,41 +60,46 @@ impl ZeroProblem for EquilibriumProblem<'_> {
 
     fn residual(&mut self, u: &[f64], r: &mut [f64]) -> bool {
         let n = self.n();
-        let parameters = self.setting.at(u[n]);
+        let parameters = self.setting.at(&u[n..]);
         let batch = Batch { lanes: 1, states: &u[..n], parameters: Parameters::Shared(&parameters) };
         self.setting.field.evaluate(batch, &mut r[..n]);
         max_abs(&r[..n]).is_finite()
     }
 
-    fn factorise(&mut self, u: &[f64], row: &[f64]) -> Result<(), Singular> {
-        let n = self.n();
+    fn factorise(&mut self, u: &[f64], rows: &[f64]) -> Result<(), Singular> {
+        let (n, k) = (self.n(), self.setting.freedom());
+        let size = n + k;
         self.linearise(u);
         for i in 0..n {
-            self.matrix[i * (n + 1)..i * (n + 1) + n].copy_from_slice(&self.fx[i * n..(i + 1) * n]);
-            self.matrix[i * (n + 1) + n] = self.fp[i];
-            self.matrix[n * (n + 1) + i] = row[i] / (self.scale[i] * self.scale[i] * n as f64);
+            self.matrix[i * size..i * size + n].copy_from_slice(&self.fx[i * n..(i + 1) * n]);
+            self.matrix[i * size + n..(i + 1) * size].copy_from_slice(&self.fp[i * k..(i + 1) * k]);
         }
-        self.matrix[n * (n + 1) + n] = row[n] / (self.setting.parameter_scale * self.setting.parameter_scale);
-        lu::factorise(&mut self.matrix, n + 1, &mut self.pivots)
+        for (line, row) in self.matrix[n * size..].chunks_exact_mut(size).zip(rows.chunks_exact(size)) {
+            for i in 0..n {
+                line[i] = row[i] / (self.scale[i] * self.scale[i] * n as f64);
+            }
+            for (a, axis) in self.setting.axes.iter().enumerate() {
+                line[n + a] = row[n + a] / (axis.scale * axis.scale);
+            }
+        }
+        lu::factorise(&mut self.matrix, size, &mut self.pivots)
     }
 
     fn solve(&mut self, rhs: &[f64], x: &mut [f64]) {
         x.copy_from_slice(rhs);
-        lu::solve(&self.matrix, self.n() + 1, &self.pivots, x, 1);
+        lu::solve(&self.matrix, self.unknowns(), &self.pivots, x, 1);
     }
 
     fn dot(&self, a: &[f64], b: &[f64]) -> f64 {
         let n = self.n();
         let profile: f64 = (0..n).map(|i| a[i] * b[i] / (self.scale[i] * self.scale[i])).sum();
-        profile / n as f64 + a[n] * b[n] / (self.setting.parameter_scale * self.setting.parameter_scale)
+        profile / n as f64 + self.setting.dot(&a[n..], &b[n..])
     }
 
     fn relative_size(&self, du: &[f64], u: &[f64]) -> f64 {
         let n = self.n();
         let states = (0..n).map(|i| (du[i] / (self.setting.scales[i] + u[i].abs())).abs());
-        states.fold((du[n] / (self.setting.parameter_scale + u[n].abs())).abs(), |m, x| {
-            if x > m || x.is_nan() { x } else { m }
-        })
+        states.fold(self.setting.relative_size(&du[n..], &u[n..]), |m, x| if x > m || x.is_nan() { x } else { m })
     }
 
     fn mesh(&self) -> Mesh {
@@ -122,15 +127,20 @@ impl ZeroProblem for EquilibriumProblem<'_> {
         let unstable = spectrum.iter().filter(|z| z.re > 0.0).count();
         let rate = max_abs(&self.fx).max(f64::MIN_POSITIVE);
         let residual = (0..n).map(|i| (self.f[i] / (rate * self.scale[i])).abs()).fold(0.0, f64::max);
-        let ranges = extremes::of_state(self.setting.field, &self.setting.at(u[n]), &u[..n]);
+        let ranges = extremes::of_state(self.setting.field, &self.setting.at(&u[n..]), &u[..n]);
         Examination { spectrum, unstable, ranges, trust: Trust { residual, ..Trust::default() } }
+    }
+
+    fn margin(&self, at: &Point) -> f64 {
+        let sizes = at.spectrum.iter().map(|z| z.norm());
+        sizes.clone().fold(f64::INFINITY, f64::min) / sizes.fold(f64::MIN_POSITIVE, f64::max)
     }
 
     fn point(&self, u: &[f64], tangent: &[f64], examination: Examination) -> Point {
         let n = self.n();
         Point {
             position: 0,
-            parameters: self.setting.at(u[n]),
+            parameters: self.setting.at(&u[n..]),
             solution: Solution::Equilibrium(u[..n].to_vec()),
             tangent: tangent.to_vec(),
             step: 0.0,
@@ -147,7 +157,7 @@ impl ZeroProblem for EquilibriumProblem<'_> {
             Solution::Equilibrium(x) => x.clone(),
             Solution::Cycle(cycle) => cycle.state(0.0),
         };
-        u.push(point.parameters.get(self.setting.free).copied().unwrap_or(0.0));
+        u.extend(self.setting.values_of(point));
         u
     }
 }

@@ -4,32 +4,51 @@
 //! a doubled cycle does the same when its two halves become equal. The deviation from the simpler solution, multiplied with
 //! that at a reference point, changes sign there.
 
-use crate::contract::Monitor;
+use super::hopf;
+use crate::contract::{Monitor, VectorField};
 use crate::diagram::{Cycle, Kind, Point, Solution};
+use std::f64::consts::TAU;
 
 const SAMPLES: usize = 128;
 
-/// Amplitude of a cycle: vanishes where it becomes an equilibrium.
-pub struct Shrinks;
+/// Amplitude of a cycle: vanishes where it becomes an equilibrium. With little damping a branch also passes an equilibrium
+/// closely and goes on; only where there is a Hopf point does it end.
+pub struct Shrinks<'a> {
+    /// The vector field.
+    pub field: &'a dyn VectorField,
+    /// Index of the continuation parameter.
+    pub free: usize,
+    /// `[n]` characteristic sizes of the states.
+    pub scales: &'a [f64],
+}
+
+impl Shrinks<'_> {
+    fn mean(x: &[f64], n: usize) -> Vec<f64> {
+        let mut mean = vec![0.0; n];
+        x.chunks_exact(n).for_each(|s| crate::linalg::axpy(n as f64 / x.len() as f64, s, &mut mean));
+        mean
+    }
+}
 
 /// Difference between the halves of a cycle: vanishes where it becomes a cycle of half the period.
 pub struct Halves;
 
-impl Monitor for Shrinks {
+impl Monitor for Shrinks<'_> {
     fn kind(&self) -> Kind {
         Kind::Hopf
     }
 
     fn value(&self, reference: &Point, at: &Point) -> f64 {
         compare(reference, at, |x, n| {
-            let mut mean = vec![0.0; n];
-            x.chunks_exact(n).for_each(|s| crate::linalg::axpy(1.0 / SAMPLES as f64, s, &mut mean));
+            let mean = Shrinks::mean(x, n);
             x.iter().enumerate().map(|(k, v)| v - mean[k % n]).collect()
         })
     }
 
-    fn confirms(&self, _at: &Point) -> bool {
-        true
+    fn confirms(&self, at: &Point) -> bool {
+        let Solution::Cycle(cycle) = &at.solution else { return false };
+        let mean = Shrinks::mean(&cycle.uniform(SAMPLES), cycle.dim());
+        hopf::lies_near(self.field, &at.parameters, self.free, self.scales, &mean, TAU / cycle.period)
     }
 
     fn jump(&self) -> usize {

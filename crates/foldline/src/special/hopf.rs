@@ -12,6 +12,7 @@ use crate::contract::{Monitor, VectorField};
 use crate::diagram::{Kind, Mesh, Point, Solution};
 use crate::linalg::{lu, max_abs};
 use crate::problem::gauss::Scheme;
+use crate::stability::eigenvalues;
 
 /// Sum of two eigenvalues.
 pub struct Hopf;
@@ -41,6 +42,68 @@ fn frequency(at: &Point) -> Option<f64> {
     let closest =
         at.spectrum.iter().filter(|z| z.im > 0.0).min_by(|a, b| (a.re / a.im).abs().total_cmp(&(b.re / b.im).abs()))?;
     (closest.re.abs() < 1e-4 * closest.im).then_some(closest.im)
+}
+
+/// How far from a small cycle its Hopf point is looked for, relative to 1 + |parameter|.
+const REACH: f64 = 1e-2;
+
+/// Whether the equilibrium next to `state` has a Hopf point near these parameter values, with a frequency close to `omega`:
+/// whether the growth rate of that pair vanishes there.
+pub fn lies_near(
+    field: &dyn VectorField,
+    parameters: &[f64],
+    free: usize,
+    scales: &[f64],
+    state: &[f64],
+    omega: f64,
+) -> bool {
+    let Some(&value) = parameters.get(free) else { return false };
+    let mut x = state.to_vec();
+    let mut growth = |at: f64| {
+        let mut there = parameters.to_vec();
+        there[free] = at;
+        growth_rate(field, &there, scales, &mut x, omega)
+    };
+    // Secant steps along the parameter: the rate is smooth, and all that counts is whether its zero is close.
+    let reach = REACH * (1.0 + value.abs());
+    let (mut a, mut b) = (value, value + 1e-2 * reach);
+    let (Some(mut at_a), Some(mut at_b)) = (growth(a), growth(b)) else { return false };
+    for _ in 0..20 {
+        if at_b == 0.0 || (b - a).abs() < 1e-9 * reach {
+            return (b - value).abs() < reach;
+        }
+        let next = b - at_b * (b - a) / (at_b - at_a);
+        if !next.is_finite() || (next - value).abs() > 10.0 * reach {
+            return false;
+        }
+        let Some(rate) = growth(next) else { return false };
+        (a, at_a, b, at_b) = (b, at_b, next, rate);
+    }
+    (b - value).abs() < reach && (b - a).abs() < 1e-3 * reach
+}
+
+/// Real part of the eigenvalue of frequency closest to `omega` at the equilibrium next to `x`, which is moved there.
+fn growth_rate(field: &dyn VectorField, parameters: &[f64], scales: &[f64], x: &mut [f64], omega: f64) -> Option<f64> {
+    let n = x.len();
+    let (mut f, mut fx, mut pivots) = (vec![0.0; n], vec![0.0; n * n], vec![0; n]);
+    for _ in 0..20 {
+        let batch = Batch { lanes: 1, states: x, parameters: Parameters::Shared(parameters) };
+        field.linearise(batch, &[], &mut f, &mut fx, &mut []);
+        let jacobian = fx.clone();
+        lu::factorise(&mut fx, n, &mut pivots).ok()?;
+        lu::solve(&fx, n, &pivots, &mut f, 1);
+        x.iter_mut().zip(&f).for_each(|(x, d)| *x -= d);
+        let size = f.iter().zip(scales).map(|(d, s)| (d / s).abs()).fold(0.0, f64::max);
+        if !size.is_finite() {
+            return None;
+        }
+        if size < 1e-12 {
+            let spectrum = eigenvalues(&jacobian, n, scales);
+            let closest = spectrum.iter().min_by(|a, b| (a.im - omega).abs().total_cmp(&(b.im - omega).abs()))?;
+            return Some(closest.re);
+        }
+    }
+    None
 }
 
 /// Direction of the cycles born at a Hopf point: the profile `[N(m+1)n]` of Re(q e^{2πit}) with max |q_i|/s_i = 1, and the

@@ -15,8 +15,11 @@
 
 pub mod branch_point;
 pub mod collapse;
+pub mod condition;
 pub mod fold;
 pub mod hopf;
+pub mod on_cycles;
+pub mod on_equilibria;
 pub mod period_doubling;
 pub mod torus;
 
@@ -34,6 +37,11 @@ pub fn monitors(family: Family) -> Vec<Box<dyn Monitor>> {
             .chain([Box::new(period_doubling::PeriodDoubling) as Box<dyn Monitor>, Box::new(torus::Torus)])
             .collect(),
     }
+}
+
+/// What to look for where a special point is held along the curve: where it turns back in the second parameter.
+pub fn monitors_where_held() -> Vec<Box<dyn Monitor>> {
+    vec![Box::new(fold::Fold)]
 }
 
 /// Product over all of (z - at) / (1 + |z|): real for a spectrum closed under conjugation and a real `at`.

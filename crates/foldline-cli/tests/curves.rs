@@ -1,0 +1,128 @@
+//! Two-parameter curves: against closed forms, and through the special points of one-parameter runs.
+
+use foldline::contract::Unobserved;
+use foldline::diagram::{Branch, Diagram, Kind};
+use foldline::explore::{CurvePlan, System, run};
+use foldline_store::study_file::{Study, parse_study};
+
+const ROTOR: &str = include_str!("../../../models/overhung-rotor.toml");
+/// The tolerance of a study that does not state one.
+const TOLERANCE: f64 = 1e-6;
+
+fn study(model: &str, rest: &str) -> Study {
+    parse_study(&format!("model = \"m\"\n{rest}"), "study", model, "model")
+        .unwrap_or_else(|found| panic!("{}", found[0]))
+}
+
+/// The study with one curve more: what is held of the branch "b", next to which value, and the second parameter.
+fn with_curve(mut study: Study, hold: Kind, near: f64, second: &str, range: [f64; 2], until: Option<f64>) -> Diagram {
+    let curve = CurvePlan {
+        name: "curve".into(),
+        hold,
+        of: "b".into(),
+        near: Some(near),
+        free: study.model.parameter_index(second).unwrap(),
+        ranges: [study.plan.branches[0].range, range],
+        until,
+        max_points: 500,
+    };
+    study.plan.curves.push(curve);
+    grown(&study)
+}
+
+fn grown(study: &Study) -> Diagram {
+    run(&System::of_plan(&study.model, &study.plan), &study.plan, 1, Diagram::default(), &Unobserved)
+}
+
+fn complete(branch: &Branch) {
+    for end in &branch.ends {
+        assert!(end.as_ref().is_some_and(|e| e.complete()), "{}: {end:?}", branch.name);
+    }
+}
+
+/// Every point of the curve satisfies `defect` = 0, a function of the branch's parameter and the second one, to
+/// the tolerance.
+fn satisfies(diagram: &Diagram, points: usize, defect: impl Fn(f64, f64) -> f64) {
+    let curve = diagram.branch("curve").unwrap();
+    complete(curve);
+    assert!(curve.points.len() >= points, "{} points", curve.points.len());
+    let (_, first) = curve.held.unwrap();
+    for point in &curve.points {
+        let at = (point.parameters[first], point.parameters[curve.free]);
+        assert!(defect(at.0, at.1).abs() < TOLERANCE, "{at:?}: {:.1e}", defect(at.0, at.1));
+    }
+}
+
+#[test]
+fn folds_of_equilibria_go_round_the_cusp() {
+    let model = "name = \"Cusp\"\n[parameters]\nmu = -1\nlambda = 1\n[states]\nx = \"mu + lambda*x - x^3\"\n";
+    let branch = "[[seed]]\nname = \"s\"\nstate = { x = -1.3247 }\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"mu\"\nrange = [-2, 2]\n";
+    let diagram = with_curve(study(model, branch), Kind::Fold, 0.4, "lambda", [-1.0, 2.0], None);
+    satisfies(&diagram, 10, |mu, lambda| 27.0 * mu * mu - 4.0 * lambda.powi(3));
+    // Both arms of the cusp belong to the same curve: it turns back in lambda, at the cusp.
+    let curve = diagram.branch("curve").unwrap();
+    assert_eq!(curve.special.len(), 1);
+    let cusp = &curve.special[0].point.parameters;
+    assert!(cusp[0].abs() < TOLERANCE && cusp[1].abs() < TOLERANCE, "{cusp:?}");
+    let mu = |p: Option<&foldline::diagram::Point>| p.unwrap().parameters[0];
+    assert!(mu(curve.points.first()) * mu(curve.points.last()) < 0.0);
+}
+
+#[test]
+fn hopf_points_of_the_brusselator_lie_on_a_parabola() {
+    let model = include_str!("../../../models/brusselator.toml");
+    let branch = "[[seed]]\nname = \"s\"\nstate = { x = 1, y = 1 }\nparameters = { A = 1, B = 1 }\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"B\"\nrange = [0.5, 12]\n";
+    let diagram = with_curve(study(model, branch), Kind::Hopf, 2.0, "A", [0.3, 3.0], None);
+    satisfies(&diagram, 5, |b, a| b - 1.0 - a * a);
+}
+
+#[test]
+fn torus_points_of_the_langford_system_lie_on_a_line() {
+    let model = "name = \"Langford\"\n[parameters]\nlambda = 0.5\na = 0.6\n[states]\nx = \"(z - 0.7)*x - 3.5*y\"\ny = \"3.5*x + (z - 0.7)*y\"\nz = \"a + lambda*z - z^3/3 - (x^2 + y^2)*(1 + 0.25*z)\"\n";
+    let branch = "[[seed]]\nname = \"s\"\nattractor = \"cycle\"\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"lambda\"\nrange = [0.1, 1.5]\n";
+    let diagram = with_curve(study(model, branch), Kind::Torus, 0.7, "a", [0.3, 1.2], None);
+    // As for the torus point in the tests of classical problems, with a in place of 0.6.
+    let z: f64 = 0.7;
+    let share = 1.0 + 0.25 * z;
+    let rest = 1.0 - 0.25 * z / share;
+    satisfies(&diagram, 4, |lambda, a| lambda * rest - z * z - 0.25 * (a - z.powi(3) / 3.0) / share);
+}
+
+#[test]
+fn the_fold_of_the_single_loop_leads_from_the_cubic_spring_to_contact() {
+    let branch = "[[seed]]\nname = \"s\"\nattractor = \"2:1\"\nparameters = { Omega = 5, kappa = 0 }\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"Omega\"\nrange = [0.5, 12]\n";
+    let mut cubic = study(ROTOR, branch);
+    let flow = with_curve(cubic.clone(), Kind::Fold, 3.4, "kappa", [0.0, 1.0], Some(1.0));
+    let curve = flow.branch("curve").unwrap();
+    complete(curve);
+    // It begins at the fold of the run in Omega and ends at that of the contact branch.
+    let fold = |diagram: &Diagram| {
+        let special = &diagram.branch("b").unwrap().special;
+        special.iter().filter(|s| s.kind == Kind::Fold).map(|s| s.point.parameters[0]).reduce(f64::min).unwrap()
+    };
+    assert!((curve.points[0].parameters[0] - fold(&flow)).abs() < TOLERANCE);
+    let arrived = curve.points.last().unwrap();
+    assert_eq!(arrived.parameters[1], 1.0);
+    cubic.plan.seeds[0].parameters[1] = 1.0;
+    let contact = grown(&cubic);
+    let gap = arrived.parameters[0] - fold(&contact);
+    assert!(gap.abs() < TOLERANCE, "{gap:.1e}");
+    assert!(curve.points.iter().all(|p| p.trust.discretisation < TOLERANCE));
+}
+
+#[test]
+fn period_doublings_over_the_damping_pass_those_of_another_damping() {
+    let at = |zeta: f64| {
+        format!(
+            "[[seed]]\nname = \"s\"\nattractor = \"2:1\"\nsamples = 48\nparameters = {{ Omega = 5, kappa = 1, zeta = {zeta} }}\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"Omega\"\nrange = [3, 6]\n"
+        )
+    };
+    let flow = with_curve(study(ROTOR, &at(0.01)), Kind::PeriodDoubling, 3.4, "zeta", [1e-3, 0.011], Some(0.011));
+    let arrived = flow.branch("curve").unwrap().points.last().unwrap();
+    complete(flow.branch("curve").unwrap());
+    assert_eq!(arrived.parameters[2], 0.011);
+    let other = grown(&study(ROTOR, &at(0.011)));
+    let gaps = other.branch("b").unwrap().special.iter().filter(|s| s.kind == Kind::PeriodDoubling);
+    let gap = gaps.map(|s| (s.point.parameters[0] - arrived.parameters[0]).abs()).fold(f64::INFINITY, f64::min);
+    assert!(gap < TOLERANCE, "{gap:.1e} from {:?}", arrived.parameters);
+}

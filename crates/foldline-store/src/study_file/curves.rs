@@ -1,0 +1,212 @@
+//! `[[curve]]`: special points held along a curve in two parameters.
+
+use super::branches::{bounds, free, range, switch_step};
+use super::items::{Ground, Item, Known, max_points, noun, said_or_further_down, written};
+use crate::nearest::suggest;
+use crate::toml_walk::{Value, Walk};
+use foldline::diagram::{Family, Kind};
+use foldline::explore::{BranchPlan, CurvePlan, Start};
+
+pub(super) const KEYS: [&str; 10] =
+    ["name", "description", "hold", "of", "near", "free", "range", "branch-range", "until", "max-points"];
+const HELD: [Kind; 4] = [Kind::Fold, Kind::Hopf, Kind::PeriodDoubling, Kind::Torus];
+
+/// The branch on which the special point lies.
+struct Base {
+    /// As the plan names it.
+    name: String,
+    /// The branch of the plan: this one, or the one from which it is switched to.
+    plan: BranchPlan,
+    beginning: Vec<Option<f64>>,
+    /// Equilibria or cycles, if that is known.
+    family: Option<Family>,
+}
+
+/// A curve; its plan goes to the items read so far.
+pub(super) fn read(
+    walk: &mut Walk,
+    item: &Item,
+    name: Option<String>,
+    ground: &mut Ground,
+    all: &[Item],
+) -> Option<Known> {
+    let table = item.table;
+    walk.only(table, &KEYS, "a curve");
+    let base = base(walk, item, ground, all);
+    let hold = hold(walk, item, base.as_ref().and_then(|base| base.family));
+    let first = base.as_ref().map(|base| ground.model.parameters[base.plan.free].name.clone());
+    let branch_range = branch_range(walk, item, base.as_ref(), first.as_deref());
+    let near = near(walk, item, branch_range, first.as_deref());
+    let second = second(walk, item, ground, base.as_ref());
+    let max_points = max_points(walk, item);
+    let start = base.as_ref().zip(second).and_then(|(base, second)| base.beginning[second]);
+    let second_name = second.map(|index| ground.model.parameters[index].name.as_str());
+    // Where the curve starts must be known for a target alone to make a range; of a branch with mistakes it never is.
+    let placed = start.is_some() || base.is_none() || second.is_none();
+    if let (true, None, false) = (table.get("until").is_some(), table.get("range"), placed) {
+        let message = format!("at which {} the curve starts is not known beforehand", second_name.unwrap_or("value"));
+        walk.report(item.span.clone(), message, "add the `range` of this parameter");
+    }
+    let bounds = bounds(walk, item, start, second_name);
+    let (name, base, hold, branch_range) = (name?, base?, hold?, branch_range?);
+    let (free, (range, until)) = (second?, bounds?);
+    let mut end = base.beginning.clone();
+    (end[free], end[base.plan.free]) = (until, None);
+    let index = ground.items.curves.len();
+    ground.items.curves.push(CurvePlan {
+        name: name.clone(),
+        hold,
+        of: base.name,
+        near: near.flatten(),
+        free,
+        ranges: [branch_range, range],
+        until,
+        max_points,
+    });
+    let family = match hold {
+        Kind::Hopf => Some(Family::Equilibrium),
+        Kind::PeriodDoubling | Kind::Torus => Some(Family::Cycle),
+        _ => base.family,
+    };
+    let end = until.map(|_| end);
+    Some(Known { name, start: Start::EndOfCurve(index), beginning: base.beginning, end, family })
+}
+
+fn base(walk: &mut Walk, item: &Item, ground: &Ground, all: &[Item]) -> Option<Base> {
+    let Some(value) = item.table.get("of") else {
+        let message = "this curve does not say on which branch its special point lies";
+        walk.report(item.span.clone(), message, "add a line such as `of = \"name of a branch\"`");
+        return None;
+    };
+    let name = walk.string(value, "`of`")?;
+    // A branch that is switched to has the name of the one it leaves, and a step for each special point.
+    let ends = || std::iter::once(name.len()).chain(name.rmatch_indices('/').map(|(end, _)| end));
+    if let Some((known, rest)) = ends().find_map(|end| Some((ground.known(&name[..end])?, &name[end..]))) {
+        return match known.start {
+            Start::EndOf(index) => switched(walk, value, of_branch(ground, known, index), known, rest),
+            _ => {
+                let (short, noun) = (&known.name, noun(&known.start));
+                let message = format!("\"{short}\" is a {noun}, and the special point of a curve lies on a branch");
+                walk.report(
+                    value.span(),
+                    message,
+                    format!("a branch, for example one that starts `from = \"{short}\"`"),
+                );
+                None
+            }
+        };
+    }
+    if let Some((other, short)) = ends().find_map(|end| Some((written(all, &name[..end])?, &name[..end]))) {
+        said_or_further_down(walk, value.span(), item, other, short);
+        return None;
+    }
+    let branches = ground.known.iter().filter(|known| matches!(known.start, Start::EndOf(_)));
+    let names: Vec<&str> = branches.map(|known| known.name.as_str()).collect();
+    walk.report(value.span(), format!("there is no branch \"{name}\""), suggest(&name, &names));
+    None
+}
+
+fn of_branch(ground: &Ground, known: &Known, index: usize) -> Base {
+    let plan = ground.items.branches[index].clone();
+    Base { name: known.name.clone(), plan, beginning: known.beginning.clone(), family: known.family }
+}
+
+/// The branch itself, or one that is switched to from it, once for each of the steps `/kind-number`.
+fn switched(walk: &mut Walk, value: &Value, mut base: Base, known: &Known, steps: &str) -> Option<Base> {
+    let (from, name) = (&known.name, format!("{}{steps}", known.name));
+    let mut depth = [0; Kind::ALL.len()];
+    for step in steps.split('/').skip(1) {
+        let Some((kind, _)) = switch_step(step) else {
+            let message = format!("no branch that leaves \"{from}\" is called \"{name}\"");
+            walk.report(value.span(), message, format!("a name such as \"{from}/period-doubling-1\""));
+            return None;
+        };
+        depth[kind as usize] += 1;
+        if base.plan.switching.at(kind) < depth[kind as usize] {
+            let message =
+                format!("\"{name}\" will not be followed: \"{from}\" does not switch that far at {kind} points");
+            let right = format!("give the branch \"{from}\" a line `switch = {{ {kind} = {} }}`", depth[kind as usize]);
+            walk.report(value.span(), message, right);
+            return None;
+        }
+        if kind != Kind::BranchPoint {
+            base.family = Some(Family::Cycle);
+        }
+    }
+    base.name = name;
+    Some(base)
+}
+
+/// What is held; it must be something that happens to solutions of that family.
+fn hold(walk: &mut Walk, item: &Item, family: Option<Family>) -> Option<Kind> {
+    let Some(value) = item.table.get("hold") else {
+        let names = HELD.map(|kind| format!("\"{kind}\""));
+        let message = "this curve does not say what is held along it";
+        walk.report(item.span.clone(), message, format!("add `hold = …` with one of {}", names.join(", ")));
+        return None;
+    };
+    let name = walk.string(value, "`hold`")?;
+    let Some(kind) = Kind::from_name(&name).filter(|kind| HELD.contains(kind)) else {
+        let message = match Kind::from_name(&name) {
+            Some(_) => format!("a point of the kind {name} cannot be held along a curve"),
+            None => format!("\"{name}\" is no kind of special point that can be held"),
+        };
+        walk.report(value.span(), message, suggest(&name, &HELD.map(Kind::name)));
+        return None;
+    };
+    let wrong = match (kind, family) {
+        (Kind::Hopf, Some(Family::Cycle)) => Some(("cycles have no Hopf points", "fold, period-doubling or torus")),
+        (Kind::PeriodDoubling | Kind::Torus, Some(Family::Equilibrium)) => {
+            Some(("equilibria have only folds and Hopf points", "fold or hopf, or a branch of cycles"))
+        }
+        _ => None,
+    };
+    if let Some((message, right)) = wrong {
+        walk.report(value.span(), message, right);
+    }
+    Some(kind)
+}
+
+/// The part of the branch's parameter in which the curve is followed.
+fn branch_range(walk: &mut Walk, item: &Item, base: Option<&Base>, first: Option<&str>) -> Option<[f64; 2]> {
+    let whole = base.map(|base| base.plan.range);
+    let Some(value) = item.table.get("branch-range") else { return whole };
+    let narrow = range(walk, value)?;
+    if let Some([low, high]) = whole.filter(|[low, high]| narrow[1] < *low || narrow[0] > *high) {
+        let first = first.unwrap_or("its parameter");
+        let message =
+            format!("the branch is followed in {first} from {low} to {high} only, so no curve starts in this range");
+        walk.report(value.span(), message, format!("a range that overlaps [{low}, {high}]"));
+    }
+    Some(narrow)
+}
+
+/// The value near which the special point lies; `None` inside if it was not said.
+fn near(walk: &mut Walk, item: &Item, range: Option<[f64; 2]>, first: Option<&str>) -> Option<Option<f64>> {
+    let Some(value) = item.table.get("near") else { return Some(None) };
+    let near = walk.number(value, "`near`")?;
+    if let Some([low, high]) = range.filter(|[low, high]| near < *low || near > *high) {
+        let first = first.unwrap_or("the parameter of the branch");
+        let message =
+            format!("near {first} = {near} there is no point of the curve: it stays between {low} and {high}");
+        walk.report(value.span(), message, "a value within the range, or a wider `branch-range`");
+    }
+    Some(Some(near))
+}
+
+/// The second parameter, another one than that of the branch.
+fn second(walk: &mut Walk, item: &Item, ground: &Ground, base: Option<&Base>) -> Option<usize> {
+    let second = free(walk, item, ground.model)?;
+    if let Some((base, value)) = base.zip(item.table.get("free")).filter(|(base, _)| base.plan.free == second) {
+        let name = &ground.model.parameters[second].name;
+        let message = format!("{name} is the parameter of the branch \"{}\" already", base.name);
+        let other = ground.model.parameters.iter().find(|parameter| parameter.name != *name);
+        let right = match other {
+            Some(other) => format!("a second parameter of the model, such as `{}`", other.name),
+            None => "a curve needs a model with two parameters".to_string(),
+        };
+        walk.report(value.span(), message, right);
+        return None;
+    }
+    Some(second)
+}

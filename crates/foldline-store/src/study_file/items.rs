@@ -1,0 +1,187 @@
+//! `[[branch]]`, `[[curve]]` and `[[homotopy]]`: read together in the order of the text, since each starts from what stands
+//! above it.
+
+use super::{branches, curves, homotopies, unique_name};
+use crate::nearest::suggest;
+use crate::toml_walk::Walk;
+use foldline::diagram::Family;
+use foldline::explore::{AttractorKey, BranchPlan, CurvePlan, HomotopyPlan, SeedPlan, SeedSource, Start};
+use foldline::model::Model;
+use std::ops::Range;
+use toml::de::DeTable;
+
+/// What a study asks for besides its seeds.
+#[derive(Default)]
+pub(super) struct Items {
+    pub(super) branches: Vec<BranchPlan>,
+    pub(super) curves: Vec<CurvePlan>,
+    pub(super) homotopies: Vec<HomotopyPlan>,
+}
+
+/// One table of the text.
+pub(super) struct Item<'v, 't> {
+    /// "branch", "curve" or "homotopy".
+    pub(super) what: &'static str,
+    pub(super) span: Range<usize>,
+    pub(super) table: &'v DeTable<'t>,
+}
+
+impl Item<'_, '_> {
+    fn written_name(&self) -> Option<&str> {
+        self.table.get("name").and_then(|name| name.get_ref().as_str())
+    }
+}
+
+/// Something that others can start from, and what is known about it before anything is computed.
+pub(super) struct Known {
+    pub(super) name: String,
+    /// How a plan that starts from it says so.
+    pub(super) start: Start,
+    /// Every parameter where it begins; `None` for a value that is not known beforehand.
+    pub(super) beginning: Vec<Option<f64>>,
+    /// Every parameter where one that starts from it begins; `None` as a whole if it has no one end.
+    pub(super) end: Option<Vec<Option<f64>>>,
+    /// Equilibria or cycles, if that is known.
+    pub(super) family: Option<Family>,
+}
+
+/// What has been read so far.
+pub(super) struct Ground<'g> {
+    pub(super) model: &'g Model,
+    pub(super) known: Vec<Known>,
+    pub(super) items: Items,
+}
+
+impl Ground<'_> {
+    /// What of that name has been read.
+    pub(super) fn known(&self, name: &str) -> Option<&Known> {
+        self.known.iter().find(|known| known.name == name)
+    }
+}
+
+/// Every branch, curve and homotopy of the study.
+pub(super) fn read(walk: &mut Walk, root: &DeTable, model: &Model, seeds: &[(Range<usize>, SeedPlan)]) -> Items {
+    let mut all = Vec::new();
+    for what in ["branch", "curve", "homotopy"] {
+        all.extend(walk.tables(root, what).into_iter().map(|(span, table)| Item { what, span, table }));
+    }
+    all.sort_by_key(|item| item.span.start);
+    if ["branch", "homotopy"]
+        .iter()
+        .all(|what| root.get(*what).is_none_or(|v| v.get_ref().as_array().is_some_and(|list| list.is_empty())))
+    {
+        walk.report(0..0, "the study has no branch", "add `[[branch]]` with name, from, free and range");
+    }
+    let known = seeds.iter().enumerate().map(|(index, (_, seed))| known_seed(index, seed)).collect();
+    let mut ground = Ground { model, known, items: Items::default() };
+    let mut taken: Vec<String> = seeds.iter().map(|(_, seed)| seed.name.clone()).collect();
+    for item in &all {
+        let names: Vec<&str> = taken.iter().map(String::as_str).collect();
+        let name = unique_name(walk, item.table, &item.span, item.what, &names);
+        taken.extend(name.clone());
+        let known = match item.what {
+            "branch" => branches::read(walk, item, name, &mut ground, &all),
+            "curve" => curves::read(walk, item, name, &mut ground, &all),
+            _ => homotopies::read(walk, item, name, &mut ground, &all),
+        };
+        ground.known.extend(known);
+    }
+    refuse_names_of_others(walk, &all);
+    ground.items
+}
+
+fn known_seed(index: usize, seed: &SeedPlan) -> Known {
+    let at: Vec<Option<f64>> = seed.parameters.iter().map(|v| Some(*v)).collect();
+    let family = match &seed.source {
+        SeedSource::Attractor(AttractorKey::Equilibrium) => Some(Family::Equilibrium),
+        SeedSource::Attractor(AttractorKey::Cycle | AttractorKey::Ratio(..)) => Some(Family::Cycle),
+        SeedSource::State(_) => None,
+    };
+    Known { name: seed.name.clone(), start: Start::Seed(index), beginning: at.clone(), end: Some(at), family }
+}
+
+/// What a plan is called that others start from.
+pub(super) fn noun(start: &Start) -> &'static str {
+    match start {
+        Start::Seed(_) => "seed",
+        Start::EndOf(_) => "branch",
+        Start::EndOfCurve(_) => "curve",
+        Start::EndOfHomotopy(_) => "homotopy",
+    }
+}
+
+/// Where an item starts: how its plan says so, every parameter there as far as it is known, and equilibria or cycles.
+pub(super) fn origin(
+    walk: &mut Walk,
+    item: &Item,
+    ground: &Ground,
+    all: &[Item],
+) -> Option<(Start, Vec<Option<f64>>, Option<Family>)> {
+    let what = item.what;
+    let Some(value) = item.table.get("from") else {
+        let message = format!("this {what} does not say where it starts");
+        walk.report(item.span.clone(), message, "add `from = \"name of a seed, branch, curve or homotopy\"`");
+        return None;
+    };
+    let from = walk.string(value, "`from`")?;
+    if let Some(known) = ground.known(&from) {
+        if known.end.is_none() {
+            let message = format!("the curve \"{from}\" has no `until`, so nothing can start at its end");
+            walk.report(value.span(), message, "add to the curve a value of its second parameter to run `until`");
+        }
+        return known.end.clone().map(|end| (known.start.clone(), end, known.family));
+    }
+    if let Some(other) = written(all, &from) {
+        said_or_further_down(walk, value.span(), item, other, &from);
+        return None;
+    }
+    let names: Vec<&str> = ground.known.iter().map(|known| known.name.as_str()).collect();
+    let message = format!("there is no seed, branch, curve or homotopy \"{from}\"");
+    walk.report(value.span(), message, suggest(&from, &names));
+    None
+}
+
+/// Reports a reference to an item that stands further down. Of one further up something is wrong, which has been said.
+pub(super) fn said_or_further_down(walk: &mut Walk, at: Range<usize>, item: &Item, other: &Item, name: &str) {
+    if other.span.start >= item.span.start {
+        let message = format!("the {} \"{name}\" is not known yet at this place", other.what);
+        let right = match item.what {
+            "curve" => "a curve stands below the branch on which its special point lies; move it below it".to_string(),
+            what => format!("a {what} starts from a seed, or from something written above it"),
+        };
+        walk.report(at, message, right);
+    }
+}
+
+/// The item of that name, wherever it stands.
+pub(super) fn written<'a, 'v, 't>(all: &'a [Item<'v, 't>], name: &str) -> Option<&'a Item<'v, 't>> {
+    all.iter().find(|other| other.written_name() == Some(name))
+}
+
+/// Names that the parts of another item will be given cannot be given to something else.
+fn refuse_names_of_others(walk: &mut Walk, all: &[Item]) {
+    for item in all {
+        let Some((name, value)) = item.written_name().zip(item.table.get("name")) else { continue };
+        for other in all {
+            let rest = other.written_name().and_then(|short| name.strip_prefix(short)?.strip_prefix('/'));
+            let Some(rest) = rest else { continue };
+            let taken = match other.what {
+                "branch" => rest.split('/').all(|step| branches::switch_step(step).is_some()),
+                "homotopy" => rest.parse::<usize>().is_ok(),
+                _ => false,
+            };
+            if taken {
+                let whose = &name[..name.len() - rest.len() - 1];
+                let message = format!("\"{name}\" is what a part of the {} \"{whose}\" will be called", other.what);
+                walk.report(value.span(), message, "give this one another name");
+            }
+        }
+    }
+}
+
+/// The limit on the number of points.
+pub(super) fn max_points(walk: &mut Walk, item: &Item) -> usize {
+    const DEFAULT: usize = 5000;
+    let limit = item.table.get("max-points").and_then(|v| walk.integer(v, "`max-points`", 1..=100_000_000));
+    limit.map_or(DEFAULT, |points| points as usize)
+}

@@ -1,0 +1,110 @@
+//! A special point held along a curve in two parameters.
+//!
+//! **Idea.** The special point of a finished branch, corrected with the condition that holds it, is the first point of a
+//! curve in the branch's parameter and a second one. It is followed like any other branch.
+
+use super::System;
+use super::growth::{self, Beginning, Growth, Line};
+use super::plan::{CurvePlan, Plan};
+use crate::continuation::Settings;
+use crate::contract::Observer;
+use crate::diagram::{Branch, Ending, Origin, Point, SpecialPoint};
+
+/// A special point moves along the branch by more than the error of the solutions; against the tolerance of the plan.
+const SHARPER: f64 = 0.2;
+
+/// The special point of `branch` from which a curve of the plan starts.
+///
+/// # Errors
+/// A sentence that says which there are, if none fits.
+pub fn start<'b>(plan: &CurvePlan, branch: &'b Branch) -> Result<&'b SpecialPoint, String> {
+    let value = |special: &SpecialPoint| special.point.parameters.get(branch.free).copied().unwrap_or(0.0);
+    let fitting = branch.special.iter().filter(|special| special.kind == plan.hold);
+    let found = match plan.near {
+        Some(near) => fitting.min_by(|a, b| (value(a) - near).abs().total_cmp(&(value(b) - near).abs())),
+        None => fitting.min_by_key(|special| special.point.position),
+    };
+    found.ok_or_else(|| {
+        let others: Vec<String> = branch.special.iter().map(|s| format!("{} {:.6}", s.kind, value(s))).collect();
+        let there = if others.is_empty() { "none at all".into() } else { others.join(", ") };
+        format!("{} has no {} point (special points: {there})", branch.name, plan.hold)
+    })
+}
+
+/// What governs a curve, and which sides are followed.
+fn settings(system: &System, plan: &Plan, curve: &CurvePlan, first: usize, value: f64) -> (Settings, [bool; 2]) {
+    let [own, second] = curve.ranges;
+    let (range, sides) = match curve.until {
+        Some(target) if target >= value => ([second[0].min(value), target], [false, true]),
+        Some(target) => ([target, second[1].max(value)], [true, false]),
+        None => (second, [true, true]),
+    };
+    let usual = growth::settings(system, SHARPER * plan.tolerance, range, curve.max_points);
+    (Settings { bounds: vec![(first, own)], stability: false, ..usual }, sides)
+}
+
+/// Follows a curve of the plan, or what is missing of it; `parent` is the branch that it starts from. Returns the curve and
+/// whether the observer wants to go on.
+pub fn follow(
+    system: &System,
+    plan: &Plan,
+    curve: &CurvePlan,
+    parent: &Branch,
+    earlier: Option<&Branch>,
+    observer: &dyn Observer,
+) -> (Branch, bool) {
+    let growth = |settings: &Settings, sides: [bool; 2], branch: &mut Branch, beginning: Option<Beginning>| {
+        let growth = Growth { system, settings, degree: plan.degree, ties: Vec::new(), sides, parents: &[], observer };
+        match beginning {
+            Some(beginning) => growth.begin(branch, beginning),
+            None => growth.resume(branch),
+        }
+    };
+    if let Some(known) = earlier.filter(|branch| !branch.points.is_empty()) {
+        let mut branch = known.clone();
+        let at = branch.points.iter().find(|p| p.position == 0).map_or(f64::NAN, |p| p.parameters[curve.free]);
+        let (settings, sides) = settings(system, plan, curve, parent.free, at);
+        let going = growth(&settings, sides, &mut branch, None);
+        return (branch, going);
+    }
+    let special = start(curve, parent);
+    let parameter = special.as_ref().map_or(f64::NAN, |s| s.point.parameters[parent.free]);
+    let origin = Origin::Switch { parent: parent.name.clone(), kind: curve.hold, parameter };
+    let mut branch = Branch::new(&curve.name, parent.family, curve.free, origin);
+    branch.held = Some((curve.hold, parent.free));
+    let begun = special.and_then(|special| {
+        let at = special.point.parameters[curve.free];
+        let (settings, sides) = settings(system, plan, curve, parent.free, at);
+        let line = Line { held: branch.held, ..Line::new(curve.free) };
+        let mut problem = line.problem(system, plan.degree, &special.point);
+        let station = growth::polished(&mut *problem, &settings, &special.point).map_err(|why| why.to_string())?;
+        Ok((settings, sides, station))
+    });
+    let going = match begun {
+        Ok((settings, sides, station)) => growth(&settings, sides, &mut branch, Some(Beginning::Inside(station))),
+        Err(why) => super::family::without_start(observer, &mut branch, why),
+    };
+    (branch, going)
+}
+
+/// The solution at the end of a curve as a start for a branch in the parent's parameter.
+///
+/// # Errors
+/// Why there is none.
+pub fn end_of(system: &System, plan: &Plan, curve: &CurvePlan, branch: &Branch) -> Result<Point, String> {
+    let start = branch.points.iter().find(|p| p.position == 0).map(|p| p.parameters[curve.free]);
+    let backward = matches!((curve.until, start), (Some(target), Some(value)) if target < value);
+    let (ending, point) =
+        if backward { (&branch.ends[0], branch.points.first()) } else { (&branch.ends[1], branch.points.last()) };
+    let arrived = |value: f64| curve.until.is_none_or(|target| (value - target).abs() <= 1e-9 * (1.0 + target.abs()));
+    match (ending, point) {
+        (Some(Ending::Bound(_)), Some(point)) if arrived(point.parameters[curve.free]) => {
+            let first = branch.held.map_or(curve.free, |(_, first)| first);
+            let settings = growth::settings(system, plan.tolerance, [f64::NEG_INFINITY, f64::INFINITY], 0);
+            let mut problem = growth::problem_of(system, first, plan.degree, point, false);
+            growth::beside(&mut *problem, &settings, point).map_err(|why| why.to_string())
+        }
+        (Some(other), _) => Err(format!("the curve {} did not get to its end: {other}", curve.name)),
+        _ => Err(format!("the curve {} was not finished", curve.name)),
+    }
+}

@@ -1,0 +1,278 @@
+//! A special point held along a curve in two parameters.
+//!
+//! **Idea.** Solutions with two free parameters form a surface; the condition that holds the special point cuts a curve out
+//! of it. The surface keeps its own block solver: two solutions span its tangent plane, and what is left is a system of a
+//! few scalar equations.
+//!
+//! **Equations.** u = (σ, w): extra unknowns σ `[e]` of the condition, then w of the surface with both parameters last;
+//! the second of them is that of the continuation.
+//!
+//! ```text
+//!   (1)  F(w) = 0,   g(w, σ) = 0                                e + 1 equations more than the surface has
+//!   (2)  F_w τ_i = 0, i = 1, 2:   w = w_p + a₁ τ₁ + a₂ τ₂      w_p solves F_w w_p = r_F
+//!   (3)  [ g_w τ₁   g_w τ₂   g_σ ] [ a ]     [ r_g - g_w w_p  ]
+//!        [ ⟨c, τ₁⟩  ⟨c, τ₂⟩  c_σ ] [ σ ]  =  [ r_c - ⟨c, w_p⟩ ]
+//! ```
+//!
+//! **Source.** govaerts2000, §4 (bordered extended systems); the elimination (2), (3) is ours.
+//!
+//! **Fails when** the surface itself is singular (two curves of special points cross).
+
+use crate::contract::{Condition, Examination, Singular, ZeroProblem};
+use crate::diagram::{Kind, Mesh, Point};
+use crate::linalg::lu;
+
+/// A surface with a condition held.
+pub struct Held<'a> {
+    surface: Box<dyn ZeroProblem + 'a>,
+    condition: Box<dyn Condition + 'a>,
+    /// Two rows that fix the place on the surface, and the tangents τ found with them, each `[2][surface unknowns]`.
+    rows: Vec<f64>,
+    tangents: Vec<f64>,
+    /// Size of the extra unknowns.
+    scale: Vec<f64>,
+    /// c of the last factorisation, and (3).
+    row: Vec<f64>,
+    small: Vec<f64>,
+    pivots: Vec<usize>,
+    /// Where g was evaluated last, and g; nothing where the borders have changed since.
+    known: Option<(Vec<f64>, Vec<f64>)>,
+    adapted: bool,
+}
+
+impl<'a> Held<'a> {
+    /// `surface` has two free parameters; both are on the same mesh.
+    pub fn new(surface: Box<dyn ZeroProblem + 'a>, condition: Box<dyn Condition + 'a>) -> Held<'a> {
+        let (scale, rows) = (vec![1.0; condition.extra()], generic(2 * surface.unknowns()));
+        Held {
+            surface,
+            condition,
+            rows,
+            tangents: Vec::new(),
+            scale,
+            row: Vec::new(),
+            small: Vec::new(),
+            pivots: Vec::new(),
+            known: None,
+            adapted: false,
+        }
+    }
+
+    /// Makes rows and borders fit the place: the first ones are arbitrary, and every round replaces them by the vectors they
+    /// should be.
+    fn adapt(&mut self, u: &[f64]) {
+        const ROUNDS: usize = 4;
+        if std::mem::replace(&mut self.adapted, true) {
+            return;
+        }
+        let e = self.extra();
+        let mut g = vec![0.0; e + 1];
+        for _ in 0..ROUNDS {
+            if self.surface.factorise(&u[e..], &self.rows).is_ok() {
+                self.span();
+                self.follow_plane();
+            }
+            if self.condition.evaluate(&u[e..], &u[..e], &mut g) {
+                self.condition.anchor();
+            }
+        }
+    }
+
+    /// τ₁ and τ₂ from the last factorisation of the surface.
+    fn span(&mut self) {
+        let size = self.surface.unknowns();
+        self.tangents = vec![0.0; 2 * size];
+        for (i, tangent) in self.tangents.chunks_exact_mut(size).enumerate() {
+            let mut one = vec![0.0; size];
+            one[size - 2 + i] = 1.0;
+            self.surface.solve(&one, tangent);
+        }
+    }
+
+    /// g at `u`.
+    fn condition_at(&mut self, u: &[f64], g: &mut [f64]) -> bool {
+        self.adapt(u);
+        if let Some((at, value)) = &self.known
+            && at == u
+        {
+            g.copy_from_slice(value);
+            return true;
+        }
+        let e = self.extra();
+        let finite = self.condition.evaluate(&u[e..], &u[..e], g);
+        self.known = finite.then(|| (u.to_vec(), g.to_vec()));
+        finite
+    }
+
+    fn extra(&self) -> usize {
+        self.condition.extra()
+    }
+
+    /// Two orthonormal vectors in place of the rows: those that span the tangent plane found last.
+    fn follow_plane(&mut self) {
+        let size = self.surface.unknowns();
+        if self.tangents.len() != 2 * size {
+            return;
+        }
+        let mut rows = self.tangents.clone();
+        let (a, b) = rows.split_at_mut(size);
+        let norm = self.surface.dot(a, a).sqrt();
+        a.iter_mut().for_each(|x| *x /= norm);
+        let along = self.surface.dot(a, b);
+        b.iter_mut().zip(a.iter()).for_each(|(y, x)| *y -= along * x);
+        let norm = self.surface.dot(b, b).sqrt();
+        b.iter_mut().for_each(|x| *x /= norm);
+        if rows.iter().all(|x| x.is_finite()) {
+            self.rows = rows;
+        }
+    }
+}
+
+/// Numbers without any structure, smooth along a profile.
+fn generic(count: usize) -> Vec<f64> {
+    (0..count).map(|k| 0.6 + (k as f64 * 0.0113).sin() + 0.7 * (k as f64 * 1.37).cos()).collect()
+}
+
+impl ZeroProblem for Held<'_> {
+    fn unknowns(&self) -> usize {
+        self.extra() + self.surface.unknowns()
+    }
+
+    fn anchor(&mut self, u: &[f64]) {
+        let e = self.extra();
+        self.surface.anchor(&u[e..]);
+        self.condition.anchor();
+        self.known = None;
+        self.follow_plane();
+        self.scale.iter_mut().zip(u).for_each(|(s, v)| *s = 1.0 + v.abs());
+    }
+
+    fn residual(&mut self, u: &[f64], r: &mut [f64]) -> bool {
+        let (e, size) = (self.extra(), self.surface.unknowns());
+        self.surface.residual(&u[e..], &mut r[..size]) && self.condition_at(u, &mut r[size - 2..size - 1 + e])
+    }
+
+    fn factorise(&mut self, u: &[f64], row: &[f64]) -> Result<(), Singular> {
+        let (e, size) = (self.extra(), self.surface.unknowns());
+        let mut g = vec![0.0; e + 1];
+        if !self.condition_at(u, &mut g) {
+            return Err(Singular);
+        }
+        self.surface.factorise(&u[e..], &self.rows)?;
+        self.span();
+        let width = e + 2;
+        self.small = vec![0.0; width * width];
+        for (i, tangent) in self.tangents.chunks_exact(size).enumerate() {
+            self.condition.derivative(tangent, &vec![0.0; e], &mut g);
+            (0..=e).for_each(|k| self.small[k * width + i] = g[k]);
+            self.small[(e + 1) * width + i] = self.surface.dot(&row[e..], tangent);
+        }
+        for i in 0..e {
+            let mut turn = vec![0.0; e];
+            turn[i] = 1.0;
+            self.condition.derivative(&vec![0.0; size], &turn, &mut g);
+            (0..=e).for_each(|k| self.small[k * width + 2 + i] = g[k]);
+            self.small[(e + 1) * width + 2 + i] = row[i] / (self.scale[i] * self.scale[i]);
+        }
+        self.row = row.to_vec();
+        self.pivots = vec![0; width];
+        lu::factorise(&mut self.small, width, &mut self.pivots)
+    }
+
+    fn solve(&mut self, rhs: &[f64], x: &mut [f64]) {
+        let (e, size) = (self.extra(), self.surface.unknowns());
+        let mut own = rhs[..size].to_vec();
+        own[size - 2..].fill(0.0);
+        let mut particular = vec![0.0; size];
+        self.surface.solve(&own, &mut particular);
+        let mut tail = vec![0.0; e + 2];
+        self.condition.derivative(&particular, &vec![0.0; e], &mut tail[..=e]);
+        (0..=e).for_each(|k| tail[k] = rhs[size - 2 + k] - tail[k]);
+        tail[e + 1] = rhs[size + e - 1] - self.surface.dot(&self.row[e..], &particular);
+        lu::solve(&self.small, e + 2, &self.pivots, &mut tail, 1);
+        x[..e].copy_from_slice(&tail[2..]);
+        x[e..].copy_from_slice(&particular);
+        for (a, tangent) in tail[..2].iter().zip(self.tangents.chunks_exact(size)) {
+            x[e..].iter_mut().zip(tangent).for_each(|(x, t)| *x += a * t);
+        }
+    }
+
+    fn dot(&self, a: &[f64], b: &[f64]) -> f64 {
+        let e = self.extra();
+        let extra: f64 = (0..e).map(|i| a[i] * b[i] / (self.scale[i] * self.scale[i])).sum();
+        extra + self.surface.dot(&a[e..], &b[e..])
+    }
+
+    fn relative_size(&self, du: &[f64], u: &[f64]) -> f64 {
+        let e = self.extra();
+        let extra = (0..e).map(|i| (du[i] / (1.0 + u[i].abs())).abs());
+        extra.fold(self.surface.relative_size(&du[e..], &u[e..]), |m, x| if x > m || x.is_nan() { x } else { m })
+    }
+
+    fn mesh(&self) -> Mesh {
+        self.surface.mesh()
+    }
+
+    fn set_mesh(&mut self, mesh: &Mesh) {
+        let from = self.surface.mesh();
+        if from == *mesh {
+            return;
+        }
+        let size = self.surface.unknowns();
+        let carried: Vec<f64> =
+            self.rows.chunks_exact(size).flat_map(|row| self.surface.transfer(row, &from, mesh)).collect();
+        self.rows = carried;
+        self.tangents.clear();
+        self.known = None;
+        self.surface.set_mesh(mesh);
+        self.condition.set_mesh(mesh);
+    }
+
+    fn transfer(&self, v: &[f64], from: &Mesh, to: &Mesh) -> Vec<f64> {
+        let e = self.extra();
+        [&v[..e], &self.surface.transfer(&v[e..], from, to)].concat()
+    }
+
+    fn better_mesh(&self, u: &[f64], tolerance: f64) -> Option<Mesh> {
+        self.surface.better_mesh(&u[self.extra()..], tolerance)
+    }
+
+    fn finer_mesh(&self) -> Option<Mesh> {
+        self.surface.finer_mesh()
+    }
+
+    fn examine(&mut self, u: &[f64]) -> Examination {
+        let mut found = self.surface.examine(&u[self.extra()..]);
+        // The eigenvalues that are held count as neither stable nor unstable.
+        let first = usize::from(!self.surface.mesh().is_empty());
+        let mut order: Vec<usize> = (first..found.spectrum.len()).collect();
+        let distance = |k: &usize| self.condition.distance(found.spectrum[*k]);
+        order.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
+        let outside = |k: &&usize| {
+            let z = found.spectrum[**k];
+            if first == 0 { z.re > 0.0 } else { z.norm() > 1.0 }
+        };
+        found.unstable = order.iter().skip(self.condition.held()).filter(outside).count();
+        found
+    }
+
+    fn margin(&self, at: &Point) -> f64 {
+        // One multiplier may lie there all the way; what counts is a second one.
+        let held = if self.condition.kind() == Kind::Fold { 1 } else { 0 };
+        let mut others = at.clone();
+        let first = at.spectrum.len() - at.free_spectrum().len();
+        others.spectrum[first..].sort_by(|a, b| self.condition.distance(*a).total_cmp(&self.condition.distance(*b)));
+        others.spectrum.drain(first..(first + held).min(at.spectrum.len()));
+        self.surface.margin(&others)
+    }
+
+    fn point(&self, u: &[f64], tangent: &[f64], examination: Examination) -> Point {
+        self.surface.point(&u[self.extra()..], tangent, examination)
+    }
+
+    fn unknowns_of(&mut self, point: &Point) -> Vec<f64> {
+        let mut u = self.condition.guess(point);
+        u.extend(self.surface.unknowns_of(point));
+        u
+    }
+}

@@ -1,0 +1,24 @@
+//! Which condition holds which special point.
+
+use super::on_cycles::OnCycles;
+use super::on_equilibria::OnEquilibria;
+use crate::contract::Condition;
+use crate::diagram::{Kind, Solution};
+use crate::problem::{Setting, mesh};
+
+/// The condition that holds a special point of that kind along solutions like `at`, on the mesh of that; `None` for a kind
+/// that cannot be held there. The setting has two free parameters.
+pub fn condition<'a>(
+    kind: Kind,
+    setting: Setting<'a>,
+    degree: usize,
+    at: &Solution,
+) -> Option<Box<dyn Condition + 'a>> {
+    match at {
+        Solution::Equilibrium(_) => Some(Box::new(OnEquilibria::new(kind, setting)?)),
+        Solution::Cycle(cycle) if cycle.intervals() > 0 => {
+            Some(Box::new(OnCycles::new(kind, setting, cycle.degree, &cycle.mesh)?))
+        }
+        Solution::Cycle(_) => Some(Box::new(OnCycles::new(kind, setting, degree, &mesh::uniform(20))?)),
+    }
+}

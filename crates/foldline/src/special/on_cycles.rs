@@ -1,0 +1,381 @@
+//! Conditions on cycles: a fold, a period doubling or a torus point is held.
+//!
+//! **Idea.** At each of these points a linear operator L, the variational equation with a closure that fits, has a null
+//! vector. L is bordered by approximate null vectors, which makes it regular, and the size g of what the border has to add
+//! is the scalar (or complex number) that is held at zero. Its derivative needs one solution with the transposed operator.
+//!
+//! **Equations.** In normalised time, v the null vector, f_x along the cycle:
+//!
+//! ```text
+//!   fold              (1)  v' - T f_x v - T₁ f = 0,   v(1) =  v(0),   ∫⟨f, v⟩ = 0      unknown (v, T₁)
+//!   period doubling   (2)  v' - T f_x v        = 0,   v(1) = -v(0)
+//!   torus             (3)  v' - T f_x v + iθ v = 0,   v(1) =  v(0)                      v complex, multiplier e^{iθ}
+//!
+//!   (4)  [ L   b ] [ v ]   [ 0 ]
+//!        [ c*  0 ] [ g ] = [ 1 ],      dg = -w* (dL) v   with   L* w + c g* = 0,  b* w = 1
+//! ```
+//!
+//! **Source.** govaerts2000, §3 and §7 (bordered test functions); doedel2003 (cycles).
+//!
+//! **Departures.** b and c are taken anew from w and v at every accepted point, so that no fixed choice can become
+//! orthogonal to the null vectors on the way.
+
+use crate::contract::{Batch, Condition, Parameters};
+use crate::diagram::{Kind, Mesh, Point};
+use crate::linalg::condensed::Condensed;
+use crate::linalg::{dot, max_abs};
+use crate::problem::gauss::Scheme;
+use crate::problem::{Setting, mesh};
+use num_complex::Complex64;
+
+/// A fold, period doubling or torus point held on cycles.
+pub struct OnCycles<'a> {
+    setting: Setting<'a>,
+    scheme: Scheme,
+    kind: Kind,
+    mesh: Mesh,
+    n: usize,
+    /// Components of v: n, or 2n where it is complex (real parts, then imaginary ones).
+    parts: usize,
+    /// Scalars of the bordered system: T₁ where there is one, then the parts of g.
+    system: Condensed,
+    /// ⟨f, ·⟩ of the phase condition in (1), at the Gauss points.
+    phase: Vec<f64>,
+    /// b and c as profiles `[N][m+1][parts]`, and their components in the phase row and along T₁.
+    left: Vec<f64>,
+    left_phase: f64,
+    right: Vec<f64>,
+    right_period: f64,
+    /// The last solutions: v with its scalars, w for each part of g.
+    null: Vec<f64>,
+    adjoint: Vec<Vec<f64>>,
+    /// What was evaluated last: T, the parameters, f_x v at the Gauss points.
+    period: f64,
+    parameters: Vec<f64>,
+    states: Vec<f64>,
+    f: Vec<f64>,
+    fx: Vec<f64>,
+}
+
+impl<'a> OnCycles<'a> {
+    /// The condition of that kind for cycles on `mesh`; `None` for a kind that cycles do not have.
+    pub fn new(kind: Kind, setting: Setting<'a>, degree: usize, mesh: &Mesh) -> Option<OnCycles<'a>> {
+        let (scheme, n) = (Scheme::new(degree), setting.field.dim());
+        let (parts, scalars) = match kind {
+            Kind::Fold => (n, 2),
+            Kind::PeriodDoubling => (n, 1),
+            Kind::Torus => (2 * n, 2),
+            _ => return None,
+        };
+        let mut condition = OnCycles {
+            system: Condensed::new(parts, &scheme.end, scalars),
+            setting,
+            scheme,
+            kind,
+            mesh: mesh.clone(),
+            n,
+            parts,
+            phase: Vec::new(),
+            left: Vec::new(),
+            left_phase: 0.3,
+            right: Vec::new(),
+            right_period: 0.3,
+            null: Vec::new(),
+            adjoint: Vec::new(),
+            period: 1.0,
+            parameters: Vec::new(),
+            states: Vec::new(),
+            f: Vec::new(),
+            fx: Vec::new(),
+        };
+        condition.resize();
+        // Any border will do for the first evaluation unless it is orthogonal to a null vector.
+        let size = condition.profile_size();
+        condition.left = (0..size).map(|k| 0.4 + (k as f64 * 0.013).sin()).collect();
+        condition.right = (0..size).map(|k| 0.5 + (k as f64 * 0.017).cos()).collect();
+        Some(condition)
+    }
+
+    fn intervals(&self) -> usize {
+        self.mesh.len() - 1
+    }
+
+    fn profile_size(&self) -> usize {
+        self.intervals() * (self.scheme.degree + 1) * self.parts
+    }
+
+    fn lanes(&self) -> usize {
+        self.intervals() * self.scheme.degree
+    }
+
+    /// Parts of g: one, or two where it is complex.
+    fn width(&self) -> usize {
+        self.parts / self.n
+    }
+
+    fn is_fold(&self) -> bool {
+        self.kind == Kind::Fold
+    }
+
+    fn resize(&mut self) {
+        let lanes = self.lanes();
+        self.system.resize(self.intervals());
+        self.states.resize(lanes * self.n, 0.0);
+        self.f.resize(lanes * self.n, 0.0);
+        self.fx.resize(lanes * self.n * self.n, 0.0);
+        self.phase.clear();
+    }
+
+    /// The Gauss points of a profile with `parts` components, of which `n` from `first` on, component-major.
+    fn gather(&self, profile: &[f64], parts: usize, first: usize) -> Vec<f64> {
+        let (n, m, lanes) = (self.n, self.scheme.degree, self.lanes());
+        let mut out = vec![0.0; n * lanes];
+        for lane in 0..lanes {
+            let at = (lane / m * (m + 1) + lane % m + 1) * parts + first;
+            (0..n).for_each(|i| out[i * lanes + lane] = profile[at + i]);
+        }
+        out
+    }
+
+    fn linearise(&mut self, u: &[f64]) {
+        let size = self.intervals() * (self.scheme.degree + 1) * self.n;
+        self.states = self.gather(&u[..size], self.n, 0);
+        self.period = u[size];
+        self.parameters = self.setting.at(&u[size + 1..]);
+        let batch =
+            Batch { lanes: self.lanes(), states: &self.states, parameters: Parameters::Shared(&self.parameters) };
+        self.setting.field.linearise(batch, &[], &mut self.f, &mut self.fx, &mut []);
+        if self.phase.is_empty() {
+            let (m, lanes) = (self.scheme.degree, self.lanes());
+            let mut norm = 0.0;
+            self.phase = vec![0.0; lanes * self.n];
+            for lane in 0..lanes {
+                let weight = (self.mesh[lane / m + 1] - self.mesh[lane / m]) * self.scheme.weights[lane % m];
+                for i in 0..self.n {
+                    let value = self.f[i * lanes + lane];
+                    self.phase[lane * self.n + i] = value / self.setting.scales[i].powi(2);
+                    norm += weight * value * value / self.setting.scales[i].powi(2);
+                }
+            }
+            let scale = 1.0 / norm.sqrt().max(f64::MIN_POSITIVE);
+            self.phase.iter_mut().for_each(|p| *p *= scale);
+        }
+    }
+
+    /// Fills the bordered operator (4).
+    fn fill(&mut self, angle: f64) {
+        let (n, m, parts, lanes) = (self.n, self.scheme.degree, self.parts, self.lanes());
+        let (inner, scalars, size) = (m * parts, self.width() + usize::from(self.is_fold()), self.profile_size());
+        let (is_fold, first) = (self.is_fold(), usize::from(self.is_fold()));
+        let width = parts + scalars;
+        self.system.interior.fill(0.0);
+        self.system.coupling.fill(0.0);
+        self.system.border.fill(0.0);
+        self.system.corner.fill(0.0);
+        for lane in 0..lanes {
+            let (j, i) = (lane / m, lane % m);
+            let h = self.mesh[j + 1] - self.mesh[j];
+            let node = (j * (m + 1) + i + 1) * parts;
+            for c in 0..parts {
+                let (block, own) = (c / n * n, c % n);
+                let line = &mut self.system.interior[(j * inner + i * parts + c) * inner..][..inner];
+                for k in 0..m {
+                    line[k * parts + c] = self.scheme.derivative[i * (m + 1) + k + 1];
+                }
+                for d in 0..n {
+                    line[i * parts + block + d] -= h * self.period * self.fx[(own * n + d) * lanes + lane];
+                }
+                if parts > n {
+                    // + iθ v: the real part loses θ times the imaginary one.
+                    let (other, sign) = if c < n { (c + n, -1.0) } else { (c - n, 1.0) };
+                    line[i * parts + other] += sign * h * angle;
+                }
+                let right = &mut self.system.coupling[(j * inner + i * parts + c) * width..][..width];
+                right[c] = self.scheme.derivative[i * (m + 1)];
+                if is_fold {
+                    right[parts] = -h * self.f[c * lanes + lane];
+                }
+                right[parts + first] = h * self.left[node + c];
+                let weight = h * self.scheme.weights[i];
+                self.system.border[first * size + node + c] = weight * self.right[node + c];
+                if is_fold {
+                    self.system.border[node + c] = weight * self.phase[lane * n + c];
+                }
+                if parts > n {
+                    // The second border is i times the first.
+                    let (other, sign) = if c < n { (c + n, -1.0) } else { (c - n, 1.0) };
+                    right[parts + 1] = sign * h * self.left[node + other];
+                    self.system.border[size + node + c] = weight * sign * self.right[node + other];
+                }
+            }
+        }
+        if is_fold {
+            self.system.corner[1] = self.left_phase;
+            self.system.corner[2] = self.right_period;
+        }
+    }
+
+    /// w as a profile: left ends from the continuity rows, Gauss points from the collocation rows over their weights.
+    fn adjoint_profile(&self) -> Vec<f64> {
+        let (m, parts, count) = (self.scheme.degree, self.parts, self.intervals());
+        let (w, block) = (&self.adjoint[0], (m + 1) * parts);
+        let closure = self.closure();
+        let mut profile = vec![0.0; count * block];
+        for j in 0..count {
+            let (before, factor) = if j == 0 { (count - 1, closure) } else { (j - 1, 1.0) };
+            for c in 0..parts {
+                profile[j * block + c] = factor * w[before * block + c];
+                for i in 0..m {
+                    profile[j * block + (i + 1) * parts + c] =
+                        w[j * block + (i + 1) * parts + c] / self.scheme.weights[i];
+                }
+            }
+        }
+        profile
+    }
+
+    fn closure(&self) -> f64 {
+        if self.kind == Kind::PeriodDoubling { -1.0 } else { 1.0 }
+    }
+
+    fn evaluated(&mut self, u: &[f64], extra: &[f64], g: &mut [f64]) -> Option<()> {
+        self.linearise(u);
+        self.fill(extra.first().copied().unwrap_or(0.0));
+        self.system.condense().ok()?;
+        self.system.eliminate(self.closure()).ok()?;
+        let (size, first) = (self.profile_size(), usize::from(self.is_fold()));
+        let total = size + first + self.width();
+        let mut one = vec![0.0; total];
+        one[size + first] = 1.0;
+        self.null = vec![0.0; total];
+        self.system.solve(&one, &mut self.null);
+        self.adjoint = (0..self.width())
+            .map(|part| {
+                let (mut one, mut w) = (vec![0.0; total], vec![0.0; total]);
+                one[size + first + part] = 1.0;
+                self.system.solve_transposed(&one, &mut w);
+                w
+            })
+            .collect();
+        g.copy_from_slice(&self.null[size + first..]);
+        (max_abs(&self.null).is_finite() && self.adjoint.iter().all(|w| max_abs(w).is_finite())).then_some(())
+    }
+}
+
+impl Condition for OnCycles<'_> {
+    fn kind(&self) -> Kind {
+        self.kind
+    }
+
+    fn extra(&self) -> usize {
+        self.width() - 1
+    }
+
+    fn guess(&self, point: &Point) -> Vec<f64> {
+        let complex = point.free_spectrum().iter().filter(|z| z.im > 0.0);
+        let nearest = complex.min_by(|a, b| a.norm().ln().abs().total_cmp(&b.norm().ln().abs()));
+        (0..self.extra()).map(|_| nearest.map_or(1.0, |z| z.arg())).collect()
+    }
+
+    fn anchor(&mut self) {
+        if self.null.is_empty() {
+            return;
+        }
+        let (m, parts, size) = (self.scheme.degree, self.parts, self.profile_size());
+        let left = self.adjoint_profile();
+        let (mut v, mut w) = (0.0, 0.0);
+        for lane in 0..self.lanes() {
+            let weight = (self.mesh[lane / m + 1] - self.mesh[lane / m]) * self.scheme.weights[lane % m];
+            let node = (lane / m * (m + 1) + lane % m + 1) * parts;
+            for c in 0..parts {
+                let scale = self.setting.scales[c % self.n].powi(2);
+                v += weight * self.null[node + c].powi(2) / scale;
+                w += weight * left[node + c].powi(2) * scale;
+            }
+        }
+        let period = if self.is_fold() { self.null[size] / self.period } else { 0.0 };
+        let phase = if self.is_fold() { self.adjoint[0][size] } else { 0.0 };
+        (v, w) = (v + period * period, (w + phase * phase).sqrt());
+        if !(v.is_finite() && v > 0.0 && w.is_finite() && w > 0.0) {
+            return;
+        }
+        let scales = self.setting.scales;
+        self.right = (0..size).map(|k| self.null[k] / (scales[k % parts % self.n].powi(2) * v)).collect();
+        self.right_period = period / (self.period * v);
+        self.left = left.iter().map(|x| x / w).collect();
+        self.left_phase = phase / w;
+        self.phase.clear();
+    }
+
+    fn set_mesh(&mut self, mesh: &Mesh) {
+        if *mesh == self.mesh {
+            return;
+        }
+        let from = std::mem::replace(&mut self.mesh, mesh.clone());
+        self.resize();
+        self.left = mesh::transferred(&self.left, self.parts, &self.scheme, &from, mesh);
+        self.right = mesh::transferred(&self.right, self.parts, &self.scheme, &from, mesh);
+        // Null vectors of another mesh.
+        self.null.clear();
+    }
+
+    fn evaluate(&mut self, u: &[f64], extra: &[f64], g: &mut [f64]) -> bool {
+        if self.evaluated(u, extra, g).is_none() {
+            self.null.clear();
+            return false;
+        }
+        true
+    }
+
+    fn derivative(&mut self, du: &[f64], extra: &[f64], dg: &mut [f64]) {
+        let (n, m, parts, lanes) = (self.n, self.scheme.degree, self.parts, self.lanes());
+        let (size, states) = (self.profile_size(), self.intervals() * (m + 1) * n);
+        let known = self.setting.parameters.len();
+        let batch = Batch { lanes, states: &self.states, parameters: Parameters::Shared(&self.parameters) };
+        let mut direction = self.gather(&du[..states], n, 0);
+        direction.extend(self.setting.spread(&du[states + 1..]).iter().flat_map(|p| std::iter::repeat_n(*p, lanes)));
+        let turn = extra.first().copied().unwrap_or(0.0);
+        let mut change = vec![0.0; size];
+        let (mut bent, mut moved) = (vec![0.0; n * lanes], vec![0.0; n * lanes]);
+        if self.is_fold() {
+            self.setting.field.directional(batch, &[&direction], &mut moved);
+        }
+        for part in 0..self.width() {
+            let mut v = self.gather(&self.null[..size], parts, part * n);
+            v.resize((n + known) * lanes, 0.0);
+            self.setting.field.directional(batch, &[&v, &direction], &mut bent);
+            for lane in 0..lanes {
+                let h = self.mesh[lane / m + 1] - self.mesh[lane / m];
+                let node = (lane / m * (m + 1) + lane % m + 1) * parts;
+                for c in 0..n {
+                    let along: f64 = (0..n).map(|d| self.fx[(c * n + d) * lanes + lane] * v[d * lanes + lane]).sum();
+                    let mut rate = du[states] * along + self.period * bent[c * lanes + lane];
+                    if self.is_fold() {
+                        rate += self.null[size] * moved[c * lanes + lane];
+                    }
+                    change[node + part * n + c] -= h * rate;
+                    if parts > n {
+                        let (other, sign) = if part == 0 { (c + n, 1.0) } else { (c, -1.0) };
+                        change[node + part * n + c] -= sign * h * turn * self.null[node + other];
+                    }
+                }
+            }
+        }
+        for (value, w) in dg.iter_mut().zip(&self.adjoint) {
+            *value = -dot(&w[..size], &change);
+        }
+    }
+
+    fn held(&self) -> usize {
+        self.width()
+    }
+
+    fn distance(&self, z: Complex64) -> f64 {
+        match self.kind {
+            Kind::Fold => (z - 1.0).norm(),
+            Kind::PeriodDoubling => (z + 1.0).norm(),
+            _ if z.im == 0.0 => f64::INFINITY,
+            _ => z.norm().ln().abs(),
+        }
+    }
+}
