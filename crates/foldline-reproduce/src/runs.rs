@@ -10,7 +10,7 @@ use foldline::contract::{Event, Observer, Verdict};
 use foldline::diagram::{Branch, Diagram, Kind, Point, SpecialPoint};
 use foldline::explore::{self, System, growth, known};
 use foldline_store::order::{names, ordered};
-use foldline_store::run_file::{Recorder, RunFileError, load};
+use foldline_store::run_file::{Recorded, Recorder, RunFileError, load};
 use foldline_store::short;
 use foldline_store::study_file::{Study, parse_study};
 use std::collections::BTreeMap;
@@ -33,6 +33,8 @@ pub struct Run {
     pub reused: bool,
     /// What of the study was not reached, a line each.
     pub short: Vec<String>,
+    /// Remarks: what they are about, and what was noticed.
+    pub notes: Vec<(String, String)>,
 }
 
 impl Run {
@@ -175,8 +177,8 @@ impl<'r> Runs<'r> {
         study.plan.tolerance = self.tolerance.unwrap_or(study.plan.tolerance);
         let folder = self.folder.join(plan.name);
         let name = format!("{VERSION}, tolerance {:e}", study.plan.tolerance);
-        if let Some((diagram, seconds)) = finished(&folder, &study, &name) {
-            return Ok(whole(study, diagram, seconds, true));
+        if let Some((recorded, seconds)) = finished(&folder, &study, &name) {
+            return Ok(whole(study, recorded.diagram, recorded.notes, seconds, true));
         }
         let start = Instant::now();
         let (recorder, earlier) = opened(&folder, &study).map_err(|error| error.to_string())?;
@@ -190,25 +192,26 @@ impl<'r> Runs<'r> {
         }
         let mark = format!("{name}\n{seconds}\n");
         std::fs::write(folder.join(FINISHED), mark).map_err(|error| format!("{}: {error}", folder.display()))?;
-        Ok(whole(study, diagram, seconds, false))
+        let notes = load(&folder).map_err(|error| error.to_string())?.notes;
+        Ok(whole(study, diagram, notes, seconds, false))
     }
 }
 
 const FINISHED: &str = "finished";
 
-fn whole(study: Study, diagram: Diagram, seconds: f64, reused: bool) -> Run {
+fn whole(study: Study, diagram: Diagram, notes: Vec<(String, String)>, seconds: f64, reused: bool) -> Run {
     let short = short::lines(&diagram, &study.plan, &study.model);
     let diagram = ordered(diagram, &names(&study.plan));
-    Run { study, diagram, seconds, reused, short }
+    Run { study, diagram, seconds, reused, short, notes }
 }
 
 /// A finished run of the same texts under that name, which holds version and tolerance, and how long it took.
-fn finished(folder: &Path, study: &Study, name: &str) -> Option<(Diagram, f64)> {
+fn finished(folder: &Path, study: &Study, name: &str) -> Option<(Recorded, f64)> {
     let mark = std::fs::read_to_string(folder.join(FINISHED)).ok()?;
     let (of, seconds) = mark.split_once('\n')?;
     let recorded = load(folder).ok()?;
     let same = of == name && recorded.study_text == study.text && recorded.model_text == study.model_text;
-    same.then_some((recorded.diagram, seconds.trim().parse().ok()?))
+    same.then_some((recorded, seconds.trim().parse().ok()?))
 }
 
 /// A recorder over an unfinished run of the same texts, or over a new one.

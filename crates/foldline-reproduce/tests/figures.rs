@@ -55,7 +55,7 @@ fn figure_3_the_smoothed_ring_pulls_as_much_as_its_formula_says() {
 fn figure_4_both_flows_reach_the_sampled_branch() {
     let (made, _folder) = figures(&["4"]);
     for family in ["SL", "DL"] {
-        assert_eq!(claim(&made, &format!("same contact {family}")).verdict, Verdict::Agrees, "{family}");
+        assert_eq!(claim(&made, &format!("reaches contact {family}")).verdict, Verdict::Agrees, "{family}");
     }
 }
 
@@ -109,7 +109,7 @@ fn figure_10_cycles_of_the_cubic_rotor_reach_below_contact() {
 fn figures_12_and_13_the_run_in_epsilon_turns_back_and_there_is_a_second_stable_zone() {
     let (made, _folder) = figures(&["12", "13"]);
     let fold = claim(&made, "turns back");
-    assert!(near(numbers(fold)[0], 1.464149, 1e-4), "{fold:?}");
+    assert!(near(numbers(fold)[0], 1.465178, 1e-5), "{fold:?}");
     for family in ["SL", "DL"] {
         assert_eq!(claim(&made, &format!("S and {family} connect")).verdict, Verdict::Refined);
     }

@@ -67,7 +67,9 @@ fn panel(run: &Run, law: &str, label: &str, text: &str, [x0, x1, y0, y1]: [f64; 
     let axes = (Axis::new("Ω").from(x0, x1), Axis::new("max r").from(y0, y1));
     let mut layers = Vec::new();
     for (family, name) in FAMILIES.map(|(family, _)| (family, format!("{law} {family}"))) {
-        for branch in [run.branch(&name), run.branch(&format!("{name} resonant"))].into_iter().flatten() {
+        for branch in
+            ["", " resonant", " lower"].into_iter().filter_map(|part| run.branch(&format!("{name}{part}")).ok())
+        {
             layers.extend(over_speed(branch, family, MAX_R));
         }
     }
@@ -81,7 +83,9 @@ fn lowest(
     holds: impl Fn(f64) -> bool,
     finding: fn(bool, String) -> Finding,
 ) -> Result<Finding, String> {
-    let [r, omega] = smallest(run.branch(name)?, max_r);
+    let sheets = [run.branch(name)?].into_iter().chain(run.branch(&format!("{name} lower")).ok());
+    let lowest = sheets.map(|branch| smallest(branch, max_r)).min_by(|a, b| a[0].total_cmp(&b[0]));
+    let [r, omega] = lowest.unwrap_or([f64::NAN; 2]);
     let error = 1e-5;
     Ok(finding(holds(r), format!("max r = {} at Ω = {omega:.5}", digits(r, error))).within(error))
 }
