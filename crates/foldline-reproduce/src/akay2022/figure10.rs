@@ -1,5 +1,6 @@
 //! Figures 10 and 11: next to no damping.
 
+use super::figure04::chosen;
 use super::rotor::{FAMILIES, MAX_R, max_r, over_speed, smallest};
 use crate::claims::{Claim, Finding, digits};
 use crate::publication::{FigurePlan, Made};
@@ -9,8 +10,12 @@ use foldline_plot::{Axis, Figure, Layer, Panel};
 
 pub const CUBIC: FigurePlan =
     FigurePlan { name: "10", title: "ζ = 10⁻⁵, cubic", runs: &["light-damping-cubic"], make: cubic };
-pub const CONTACT: FigurePlan =
-    FigurePlan { name: "11", title: "ζ = 10⁻⁵, contact", runs: &["light-damping-contact"], make: contact };
+pub const CONTACT: FigurePlan = FigurePlan {
+    name: "11",
+    title: "ζ = 10⁻⁵, contact",
+    runs: &["light-damping-contact", "flows-light-damping"],
+    make: contact,
+};
 
 fn cubic(runs: &Runs) -> Result<Made, String> {
     let run = runs.run("light-damping-cubic")?;
@@ -46,6 +51,8 @@ fn contact(runs: &Runs) -> Result<Made, String> {
         );
         claims.push(claim.noting("Where it is below 1, the smoothed law pulls there, over a width of about 1/K"));
     }
+    let flows = runs.run("flows-light-damping")?;
+    claims.extend(["SL", "DL"].map(|family| chosen("11", flows, "light", family, run)));
     Ok(Made { figure, caption: "S, SL and DL with contact, whole and where the cycles are smallest.".into(), claims })
 }
 

@@ -1,5 +1,6 @@
 //! Figures 12 and 13: next to no damping and a large unbalance.
 
+use super::figure04::chosen;
 use super::figure10::diagrams;
 use super::rotor::{OMEGA, max_r, min_r, smallest};
 use crate::claims::{Claim, Finding, digits};
@@ -12,8 +13,12 @@ const CONTACT_RUN: &str = "light-damping-large-unbalance-contact";
 
 pub const CUBIC: FigurePlan =
     FigurePlan { name: "12", title: "ζ = 10⁻⁵, ε = 1.5, cubic", runs: &[CUBIC_RUN], make: cubic };
-pub const CONTACT: FigurePlan =
-    FigurePlan { name: "13", title: "ζ = 10⁻⁵, ε = 1.5, contact", runs: &[CONTACT_RUN], make: contact };
+pub const CONTACT: FigurePlan = FigurePlan {
+    name: "13",
+    title: "ζ = 10⁻⁵, ε = 1.5, contact",
+    runs: &[CONTACT_RUN, "flows-large-unbalance"],
+    make: contact,
+};
 
 fn cubic(runs: &Runs) -> Result<Made, String> {
     let run = runs.run(CUBIC_RUN)?;
@@ -32,7 +37,9 @@ fn contact(runs: &Runs) -> Result<Made, String> {
     let run = runs.run(CONTACT_RUN)?;
     let parts = [("double loop", [5.9, 6.7, 1.5, 6.0]), ("single loop", [8.3, 10.3, 1.3, 5.0])];
     let figure = diagrams(run, "contact", "Contact, ζ = 10⁻⁵, ε = 1.5", [0.3, 15.0, 0.0, 20.0], &parts);
-    let claims = vec![connects("13", run, "contact", "SL"), connects("13", run, "contact", "DL"), second_zone(run)];
+    let mut claims = vec![connects("13", run, "contact", "SL"), connects("13", run, "contact", "DL"), second_zone(run)];
+    let flows = runs.run("flows-large-unbalance")?;
+    claims.extend(["SL", "DL"].map(|family| chosen("13", flows, "large", family, run)));
     Ok(Made {
         figure,
         caption: "S, SL and DL with contact; the double loop has a second stable zone below the main one.".into(),

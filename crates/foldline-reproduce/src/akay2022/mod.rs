@@ -39,11 +39,12 @@ const STUDIES: &[StudyPlan] = &[
     study!("far", 1.0),
     study!("lowest-part", 1.5),
     study!("flows", 2.5),
-    study!("flows-light-damping", 6.0),
+    study!("flows-light-damping", 4.0),
+    study!("flows-large-unbalance", 4.0),
     study!("light-damping-cubic", 0.3),
-    study!("light-damping-contact", 4.0),
+    study!("light-damping-contact", 5.0),
     study!("light-damping-large-unbalance-cubic", 0.3),
-    study!("light-damping-large-unbalance-contact", 2.0),
+    study!("light-damping-large-unbalance-contact", 3.0),
     study!("blunt-contact", 0.5),
 ];
 
