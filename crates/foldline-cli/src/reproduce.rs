@@ -22,6 +22,7 @@ pub fn publication(typed: &Typed) -> Result<Outcome, Failure> {
         figures: chosen(publication, &typed.figure)?,
         out: typed.out.clone().unwrap_or_else(|| Path::new("reproduced").join(publication.name)),
         jobs: typed.jobs.map_or_else(processors, usize::from),
+        tolerance: None,
         stop: &stop,
         // Progress that cannot be shown is no reason to stop computing.
         say: &|line| {

@@ -41,6 +41,8 @@ pub struct Request<'r> {
     pub out: PathBuf,
     /// How many branches are followed at a time.
     pub jobs: usize,
+    /// Another tolerance than the studies state: a coarse one for a quick look.
+    pub tolerance: Option<f64>,
     /// Set from outside to end early; what is computed until then is kept.
     pub stop: &'r AtomicBool,
     /// Receives progress, a line at a time.

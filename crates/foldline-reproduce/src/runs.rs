@@ -10,7 +10,7 @@ use foldline::contract::{Event, Observer, Verdict};
 use foldline::diagram::{Branch, Diagram, Kind, Point, SpecialPoint};
 use foldline::explore::{self, System, growth, known};
 use foldline_store::order::{names, ordered};
-use foldline_store::run_file::{Recorder, RunFileError, load};
+use foldline_store::run_file::{Recorded, Recorder, RunFileError, load};
 use foldline_store::short;
 use foldline_store::study_file::{Study, parse_study};
 use std::collections::BTreeMap;
@@ -33,6 +33,8 @@ pub struct Run {
     pub reused: bool,
     /// What of the study was not reached, a line each.
     pub short: Vec<String>,
+    /// Remarks: what they are about, and what was noticed.
+    pub notes: Vec<(String, String)>,
 }
 
 impl Run {
@@ -82,6 +84,7 @@ pub struct Runs<'r> {
     publication: &'static Publication,
     folder: PathBuf,
     jobs: usize,
+    tolerance: Option<f64>,
     stop: &'r AtomicBool,
     say: &'r (dyn Fn(&str) + Sync),
     /// Weights of what is still to be run.
@@ -101,6 +104,7 @@ impl<'r> Runs<'r> {
             publication,
             folder: request.out.join("runs"),
             jobs: request.jobs,
+            tolerance: request.tolerance,
             stop: request.stop,
             say: request.say,
             ahead,
@@ -169,10 +173,12 @@ impl<'r> Runs<'r> {
 
     fn carried_out(&self, plan: &StudyPlan) -> Result<Run, String> {
         let parsed = parse_study(plan.text, plan.file, plan.model, plan.model_file);
-        let study = parsed.map_err(|found| found.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))?;
+        let mut study = parsed.map_err(|found| found.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))?;
+        study.plan.tolerance = self.tolerance.unwrap_or(study.plan.tolerance);
         let folder = self.folder.join(plan.name);
-        if let Some((diagram, seconds)) = finished(&folder, &study) {
-            return Ok(whole(study, diagram, seconds, true));
+        let name = format!("{VERSION}, tolerance {:e}", study.plan.tolerance);
+        if let Some((recorded, seconds)) = finished(&folder, &study, &name) {
+            return Ok(whole(study, recorded.diagram, recorded.notes, seconds, true));
         }
         let start = Instant::now();
         let (recorder, earlier) = opened(&folder, &study).map_err(|error| error.to_string())?;
@@ -184,27 +190,28 @@ impl<'r> Runs<'r> {
         if self.stop.load(Ordering::Relaxed) {
             return Err("it was stopped; the same command goes on".into());
         }
-        let mark = format!("{VERSION}\n{seconds}\n");
+        let mark = format!("{name}\n{seconds}\n");
         std::fs::write(folder.join(FINISHED), mark).map_err(|error| format!("{}: {error}", folder.display()))?;
-        Ok(whole(study, diagram, seconds, false))
+        let notes = load(&folder).map_err(|error| error.to_string())?.notes;
+        Ok(whole(study, diagram, notes, seconds, false))
     }
 }
 
 const FINISHED: &str = "finished";
 
-fn whole(study: Study, diagram: Diagram, seconds: f64, reused: bool) -> Run {
+fn whole(study: Study, diagram: Diagram, notes: Vec<(String, String)>, seconds: f64, reused: bool) -> Run {
     let short = short::lines(&diagram, &study.plan, &study.model);
     let diagram = ordered(diagram, &names(&study.plan));
-    Run { study, diagram, seconds, reused, short }
+    Run { study, diagram, seconds, reused, short, notes }
 }
 
-/// A finished run of the same texts by the same version, and how long it took.
-fn finished(folder: &Path, study: &Study) -> Option<(Diagram, f64)> {
+/// A finished run of the same texts under that name, which holds version and tolerance, and how long it took.
+fn finished(folder: &Path, study: &Study, name: &str) -> Option<(Recorded, f64)> {
     let mark = std::fs::read_to_string(folder.join(FINISHED)).ok()?;
-    let (version, seconds) = mark.split_once('\n')?;
+    let (of, seconds) = mark.split_once('\n')?;
     let recorded = load(folder).ok()?;
-    let same = version == VERSION && recorded.study_text == study.text && recorded.model_text == study.model_text;
-    same.then_some((recorded.diagram, seconds.trim().parse().ok()?))
+    let same = of == name && recorded.study_text == study.text && recorded.model_text == study.model_text;
+    same.then_some((recorded, seconds.trim().parse().ok()?))
 }
 
 /// A recorder over an unfinished run of the same texts, or over a new one.

@@ -1,14 +1,15 @@
-//! Development tasks: `cargo xtask test | check | bench | docs`. What continuous integration runs, and nothing else.
+//! Development tasks: `cargo xtask test | check | bench | reproduce | docs`. What continuous integration runs, and nothing else.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 use std::time::Instant;
 
 const USAGE: &str = "cargo xtask TASK
-  test    format, clippy without warnings, references, every test of the workspace
-  check   the same without the tests
-  bench   the reference study in a release build on one thread: time, and work of each branch
-  docs    the documentation of the source, without warnings";
+  test        format, clippy without warnings, references, every test of the workspace
+  check       the same without the tests
+  bench       the reference study in a release build on one thread: time, and work of each branch
+  reproduce   every figure and claim of the reference publication in a release build, from nothing
+  docs        the documentation of the source, without warnings";
 
 fn main() -> ExitCode {
     let task = std::env::args().nth(1).unwrap_or_default();
@@ -16,6 +17,7 @@ fn main() -> ExitCode {
         "test" => check() && cargo(&["test", "--workspace", "--quiet"]),
         "check" => check(),
         "bench" => bench(),
+        "reproduce" => reproduce(),
         "docs" => docs(),
         _ => {
             eprintln!("{USAGE}");
@@ -88,6 +90,21 @@ fn bench() -> bool {
     let ran = run(Command::new(&program).arg("run").arg(study).args(["--jobs", "1", "--out"]).arg(&out));
     eprintln!("{:.3} s", start.elapsed().as_secs_f64());
     ran && run(Command::new(&program).arg("table").arg(&out).arg("--branches"))
+}
+
+/// Everything from nothing; a figure that fails or a branch that ends short is a failure.
+fn reproduce() -> bool {
+    if !cargo(&["build", "--release", "--quiet", "--package", "foldline-cli"]) {
+        return false;
+    }
+    let out = root().join("target/reproduced");
+    // The folder of an earlier call, if there is one.
+    let _ = std::fs::remove_dir_all(&out);
+    let start = Instant::now();
+    let program = root().join("target/release/foldline");
+    let made = run(Command::new(program).args(["reproduce", "akay2022", "--out"]).arg(&out));
+    eprintln!("{:.1} s", start.elapsed().as_secs_f64());
+    made
 }
 
 fn cargo(arguments: &[&str]) -> bool {

@@ -1,11 +1,11 @@
 //! Figure 4: ways from the cubic to the contact rotor.
 
 use super::rotor::{MAX_R, OMEGA, SPEED, max_r, parameters, speeds};
-use crate::claims::{Claim, Finding};
+use crate::claims::{Claim, Finding, digits};
 use crate::publication::{FigurePlan, Made};
 use crate::runs::{Run, Runs};
-use foldline::diagram::Kind;
-use foldline_plot::palette::{BLUE, GREEN, GREY, ORANGE, VERMILION};
+use foldline::diagram::{Kind, Point};
+use foldline_plot::palette::{BLUE, GREEN, GREY, ORANGE, SKY, VERMILION};
 use foldline_plot::{Axis, Figure, Layer, Marker, Panel, Quantity, branch_curve};
 
 pub const PLAN: FigurePlan = FigurePlan {
@@ -19,21 +19,25 @@ const KAPPA: Quantity = Quantity::Parameter(1);
 
 fn make(runs: &Runs) -> Result<Made, String> {
     let (flows, steps, sampled) = (runs.run("flows")?, runs.run("lowest-part")?, runs.run("diagrams")?);
+    let mut claims = Vec::new();
+    for family in ["SL", "DL"] {
+        claims.extend(["a", "b", "c"].map(|name| flow(name, flows, sampled, family)));
+        claims.push(through(flows, sampled, family));
+    }
     let figure = Figure::grid(
         "From cubic to contact stiffness",
         2,
         vec![
             over_kappa(flows)?,
-            folds(steps),
+            folds(flows, steps)?,
             reached(flows, sampled, "(c)", "SL", [3.0, 11.0, 0.8, 11.0])?,
             reached(flows, sampled, "(d)", "DL", [2.5, 6.5, 1.0, 5.0])?,
         ],
     );
-    let claims = ["SL", "DL"].map(|family| same(flows, sampled, family)).to_vec();
     Ok(Made {
         figure,
-        caption: "Flow (a) runs κ to 1 at Ω = 5; flow (b) moves to another speed half-way. Both end on the contact branches that \
-                  sampling finds. The fold of SL goes from that of the cubic to that of the contact rotor."
+        caption: "Flow (a) runs κ to 1 at Ω = 5; flow (b) moves to another speed half-way. flow (c) \
+                  follows the lower fold in Ω and κ. All end on the contact branches that sampling finds."
             .into(),
         claims,
     })
@@ -54,59 +58,102 @@ fn over_kappa(flows: &Run) -> Result<Panel, String> {
     Ok(panel)
 }
 
-/// The first fold of SL for each κ at which it was followed.
-fn folds(steps: &Run) -> Panel {
-    let first = |name: &str| {
-        let folds = steps.special(name, Kind::Fold).ok()?;
-        let first = folds.into_iter().min_by(|a, b| a.point.parameters[OMEGA].total_cmp(&b.point.parameters[OMEGA]))?;
-        let [omega, kappa, ..] = parameters(&first.point);
-        Some([kappa, omega])
-    };
+/// The lower folds as curves in both parameters, and where runs in Ω alone find that of SL.
+fn folds(flows: &Run, steps: &Run) -> Result<Panel, String> {
     let names = steps.study.plan.branches.iter().map(|b| b.name.clone()).filter(|name| name.starts_with("SL "));
-    let places: Vec<[f64; 2]> = names.filter_map(|name| first(&name)).collect();
+    let places: Vec<[f64; 2]> = names.filter_map(|name| first_fold(steps, &name)).map(|[w, k, _]| [k, w]).collect();
     let axes = (Axis::new("κ").from(-0.03, 1.03), Axis::new("Ω"));
-    Panel::new("(b)", "the first fold of SL", axes.0, axes.1)
-        .with(Layer::scatter(places, Marker::Circle, GREY).named("folds of runs in Ω"))
+    let mut panel = Panel::new("(b)", "the lower folds, flow (c)", axes.0, axes.1);
+    for (family, colour) in [("SL", VERMILION), ("DL", GREEN)] {
+        let curve = flows.branch(&format!("{family} fold"))?;
+        let places: Vec<[f64; 2]> = curve.points.iter().map(|p| [p.parameters[1], p.parameters[OMEGA]]).collect();
+        panel = panel.with(Layer::curve(&places, colour).smooth().named(format!("fold of {family}, flow (c)")));
+    }
+    Ok(panel.with(Layer::scatter(places, Marker::Circle, GREY).hollow().named("folds of runs in Ω")))
+}
+
+/// The fold at the lowest Ω: Ω, κ and the error of Ω.
+fn first_fold(run: &Run, branch: &str) -> Option<[f64; 3]> {
+    let folds = run.special(branch, Kind::Fold).ok()?;
+    let first = folds.into_iter().min_by(|a, b| a.point.parameters[OMEGA].total_cmp(&b.point.parameters[OMEGA]))?;
+    let [omega, kappa, ..] = parameters(&first.point);
+    Some([omega, kappa, first.error * (1.0 + omega)])
+}
+
+/// Whether the fold curve ends on the fold that the contact branch has.
+fn through(flows: &Run, sampled: &Run, family: &str) -> Claim {
+    let finding = || {
+        let curve = flows.branch(&format!("{family} fold"))?;
+        let at_contact = |p: &&Point| (p.parameters[1] - 1.0).abs() < 1e-9;
+        let end = curve.points.iter().find(at_contact).ok_or("the fold curve does not reach κ = 1")?;
+        let [omega, _, error] =
+            first_fold(sampled, &format!("contact {family}")).ok_or("the contact branch has no fold")?;
+        let apart = (end.parameters[OMEGA] - omega).abs();
+        Ok(Finding::vanishing(apart, 1e-6 + error)
+            .noting(format!("Ω = {} on the curve", digits(end.parameters[OMEGA], 1e-7))))
+    };
+    Claim::decided(
+        "4",
+        format!("The fold of cubic {family}, followed in Ω and κ, becomes that of contact {family}"),
+        "0 apart",
+        finding(),
+    )
 }
 
 fn reached(flows: &Run, sampled: &Run, label: &str, family: &str, [x0, x1, y0, y1]: [f64; 4]) -> Result<Panel, String> {
     let axes = (Axis::new("Ω").from(x0, x1), Axis::new("max r").from(y0, y1));
     let mut panel = Panel::new(label, format!("contact {family}"), axes.0, axes.1);
     let colours = if family == "SL" { [VERMILION, ORANGE] } else { [GREEN, BLUE] };
-    for (flow, colour, width) in [("b", colours[1], 3.4), ("a", colours[0], 1.4)] {
+    for (flow, colour, width) in [("b", colours[1], 4.2), ("c", SKY, 2.6), ("a", colours[0], 1.2)] {
         let branch = flows.branch(&format!("{family} by flow {flow}"))?;
-        panel = panel
-            .with(branch_curve(branch, SPEED, MAX_R, colour).wide(width).named(format!("{family}, flow ({flow})")));
+        panel = panel.with(branch_curve(branch, SPEED, MAX_R, colour).wide(width).named(if flow == "c" {
+            "flow (c)".to_string()
+        } else {
+            format!("{family}, flow ({flow})")
+        }));
     }
     let points = &sampled.branch(&format!("contact {family}"))?.points;
     let places = points.iter().map(|p| [p.parameters[OMEGA], max_r(p)]).collect();
     Ok(panel.with(Layer::scatter(places, Marker::Dot, GREY).wide(2.0).named("sampled")))
 }
 
-/// Whether both flows and sampling end on one branch: it has the same special points.
-fn same(flows: &Run, sampled: &Run, family: &str) -> Claim {
-    let finding = || {
-        let mut worst = [0.0_f64, 0.0];
-        let mut count = 0;
-        for flow in ["a", "b"] {
-            for kind in [Kind::Fold, Kind::PeriodDoubling] {
-                let ours = speeds(&flows.special(&format!("{family} by flow {flow}"), kind)?);
-                let theirs = speeds(&sampled.special(&format!("contact {family}"), kind)?);
-                if ours.len() != theirs.len() {
-                    let ours = format!("{} and {} {kind} points", ours.len(), theirs.len());
-                    return Ok(Finding::fact(false, ours));
-                }
-                for [at, error] in ours {
-                    let apart = |other: &&[f64; 2]| (other[0] - at).abs();
-                    let nearest = theirs.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)));
-                    let Some(nearest) = nearest else { continue };
-                    worst = [worst[0].max(apart(&nearest)), worst[1].max(error + nearest[1])];
-                    count += 1;
-                }
-            }
+/// Whether a flow ends on the branch that another run has: it has the same special points.
+fn same(flows: &Run, flow: &str, others: &Run, branch: &str) -> Result<Finding, String> {
+    for branch in [flows.branch(flow)?, others.branch(branch)?] {
+        if let Some(short) = branch.ends.iter().flatten().find(|end| !end.complete()) {
+            return Err(format!("{} ended short: {short}", branch.name));
         }
-        let ours = format!("{count} special points agree within {:.0e}", worst[0]);
-        Ok(Finding::fact(count > 0 && worst[0] <= worst[1], ours).within(worst[1]))
-    };
-    Claim::decided("4", format!("The flows reach the same contact {family}"), "yes", finding())
+    }
+    let mut worst = [0.0_f64, 0.0];
+    let mut count = 0;
+    for kind in [Kind::Fold, Kind::PeriodDoubling] {
+        let ours = speeds(&flows.special(flow, kind)?);
+        let theirs = speeds(&others.special(branch, kind)?);
+        if ours.len() != theirs.len() {
+            return Ok(Finding::fact(false, format!("{} and {} {kind} points", ours.len(), theirs.len())));
+        }
+        for [at, error] in ours {
+            let apart = |other: &&[f64; 2]| (other[0] - at).abs();
+            let Some(nearest) = theirs.iter().min_by(|a, b| apart(a).total_cmp(&apart(b))) else { continue };
+            worst = [worst[0].max(apart(&nearest)), worst[1].max(error + nearest[1])];
+            count += 1;
+        }
+    }
+    let ours = format!("{count} special points agree within {:.0e}", worst[0]);
+    Ok(Finding::fact(count > 0 && worst[0] <= worst[1], ours).within(worst[1]))
+}
+
+fn flow(name: &str, flows: &Run, sampled: &Run, family: &str) -> Claim {
+    let finding = same(flows, &format!("{family} by flow {name}"), sampled, &format!("contact {family}"));
+    Claim::decided("4", format!("Flow ({name}) reaches contact {family}"), "yes", finding)
+}
+
+/// A homotopy whose route the program chose.
+pub fn chosen(figure: &'static str, flows: &Run, set: &str, family: &str, others: &Run) -> Claim {
+    let homotopy = format!("{set} {family} to contact");
+    let about = flows.notes.iter().filter(|(about, _)| *about == homotopy);
+    let route: Vec<&str> = about.map(|(_, note)| note.as_str()).collect();
+    let finding = same(flows, &format!("{set} {family}"), others, &format!("contact {family}"));
+    let statement = format!("Cubic {family} is brought to contact {family}");
+    Claim::decided(figure, statement, "yes", finding).noting(&route.join("; "))
 }

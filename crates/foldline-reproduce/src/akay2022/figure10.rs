@@ -1,5 +1,6 @@
 //! Figures 10 and 11: next to no damping.
 
+use super::figure04::chosen;
 use super::rotor::{FAMILIES, MAX_R, max_r, over_speed, smallest};
 use crate::claims::{Claim, Finding, digits};
 use crate::publication::{FigurePlan, Made};
@@ -8,12 +9,16 @@ use foldline_plot::figure::Shape;
 use foldline_plot::{Axis, Figure, Layer, Panel};
 
 pub const CUBIC: FigurePlan =
-    FigurePlan { name: "10", title: "ζ = 10⁻⁵, cubic", runs: &["light-damping"], make: cubic };
-pub const CONTACT: FigurePlan =
-    FigurePlan { name: "11", title: "ζ = 10⁻⁵, contact", runs: &["light-damping"], make: contact };
+    FigurePlan { name: "10", title: "ζ = 10⁻⁵, cubic", runs: &["light-damping-cubic"], make: cubic };
+pub const CONTACT: FigurePlan = FigurePlan {
+    name: "11",
+    title: "ζ = 10⁻⁵, contact",
+    runs: &["light-damping-contact", "flows-light-damping"],
+    make: contact,
+};
 
 fn cubic(runs: &Runs) -> Result<Made, String> {
-    let run = runs.run("light-damping")?;
+    let run = runs.run("light-damping-cubic")?;
     let parts = [("the smallest cycles", [2.0, 5.0, 0.3, 2.0])];
     let figure = diagrams(run, "cubic", "Cubic spring, ζ = 10⁻⁵", [0.5, 15.0, 0.0, 20.0], &parts);
     let mut claims = Vec::new();
@@ -29,7 +34,7 @@ fn cubic(runs: &Runs) -> Result<Made, String> {
 }
 
 fn contact(runs: &Runs) -> Result<Made, String> {
-    let run = runs.run("light-damping")?;
+    let run = runs.run("light-damping-contact")?;
     let parts =
         [("the smallest double loops", [2.1, 4.0, 0.95, 1.5]), ("the smallest single loops", [3.2, 4.2, 0.97, 1.2])];
     let figure = diagrams(run, "contact", "Contact, ζ = 10⁻⁵", [0.5, 15.0, 0.0, 20.0], &parts);
@@ -46,6 +51,8 @@ fn contact(runs: &Runs) -> Result<Made, String> {
         );
         claims.push(claim.noting("Where it is below 1, the smoothed law pulls there, over a width of about 1/K"));
     }
+    let flows = runs.run("flows-light-damping")?;
+    claims.extend(["SL", "DL"].map(|family| chosen("11", flows, "light", family, run)));
     Ok(Made { figure, caption: "S, SL and DL with contact, whole and where the cycles are smallest.".into(), claims })
 }
 
@@ -67,7 +74,9 @@ fn panel(run: &Run, law: &str, label: &str, text: &str, [x0, x1, y0, y1]: [f64; 
     let axes = (Axis::new("Ω").from(x0, x1), Axis::new("max r").from(y0, y1));
     let mut layers = Vec::new();
     for (family, name) in FAMILIES.map(|(family, _)| (family, format!("{law} {family}"))) {
-        for branch in [run.branch(&name), run.branch(&format!("{name} resonant"))].into_iter().flatten() {
+        for branch in
+            ["", " resonant", " lower"].into_iter().filter_map(|part| run.branch(&format!("{name}{part}")).ok())
+        {
             layers.extend(over_speed(branch, family, MAX_R));
         }
     }
@@ -81,7 +90,9 @@ fn lowest(
     holds: impl Fn(f64) -> bool,
     finding: fn(bool, String) -> Finding,
 ) -> Result<Finding, String> {
-    let [r, omega] = smallest(run.branch(name)?, max_r);
+    let sheets = [run.branch(name)?].into_iter().chain(run.branch(&format!("{name} lower")).ok());
+    let lowest = sheets.map(|branch| smallest(branch, max_r)).min_by(|a, b| a[0].total_cmp(&b[0]));
+    let [r, omega] = lowest.unwrap_or([f64::NAN; 2]);
     let error = 1e-5;
     Ok(finding(holds(r), format!("max r = {} at Ω = {omega:.5}", digits(r, error))).within(error))
 }

@@ -1,5 +1,6 @@
 //! Figures 12 and 13: next to no damping and a large unbalance.
 
+use super::figure04::chosen;
 use super::figure10::diagrams;
 use super::rotor::{OMEGA, max_r, min_r, smallest};
 use crate::claims::{Claim, Finding, digits};
@@ -7,15 +8,20 @@ use crate::publication::{FigurePlan, Made};
 use crate::runs::{Run, Runs};
 use foldline::diagram::{Branch, Kind};
 
-const RUN: &str = "light-damping-large-unbalance";
+const CUBIC_RUN: &str = "light-damping-large-unbalance-cubic";
+const CONTACT_RUN: &str = "light-damping-large-unbalance-contact";
 
 pub const CUBIC: FigurePlan =
-    FigurePlan { name: "12", title: "ζ = 10⁻⁵, ε = 1.5, cubic", runs: &[RUN], make: cubic };
-pub const CONTACT: FigurePlan =
-    FigurePlan { name: "13", title: "ζ = 10⁻⁵, ε = 1.5, contact", runs: &[RUN], make: contact };
+    FigurePlan { name: "12", title: "ζ = 10⁻⁵, ε = 1.5, cubic", runs: &[CUBIC_RUN], make: cubic };
+pub const CONTACT: FigurePlan = FigurePlan {
+    name: "13",
+    title: "ζ = 10⁻⁵, ε = 1.5, contact",
+    runs: &[CONTACT_RUN, "flows-large-unbalance"],
+    make: contact,
+};
 
 fn cubic(runs: &Runs) -> Result<Made, String> {
-    let run = runs.run(RUN)?;
+    let run = runs.run(CUBIC_RUN)?;
     let figure = diagrams(
         run,
         "cubic",
@@ -23,15 +29,17 @@ fn cubic(runs: &Runs) -> Result<Made, String> {
         [0.5, 15.0, 0.0, 20.0],
         &[("where SL meets S", [2.5, 7.5, 1.0, 4.5])],
     );
-    let claims = vec![straight(run), connects("12", run, "cubic SL")];
+    let claims = vec![straight(run), connects("12", run, "cubic", "SL"), connects("12", run, "cubic", "DL")];
     Ok(Made { figure, caption: "S, SL and DL without contact; SL comes next to S.".into(), claims })
 }
 
 fn contact(runs: &Runs) -> Result<Made, String> {
-    let run = runs.run(RUN)?;
+    let run = runs.run(CONTACT_RUN)?;
     let parts = [("double loop", [5.9, 6.7, 1.5, 6.0]), ("single loop", [8.3, 10.3, 1.3, 5.0])];
     let figure = diagrams(run, "contact", "Contact, ζ = 10⁻⁵, ε = 1.5", [0.3, 15.0, 0.0, 20.0], &parts);
-    let claims = vec![connects("13", run, "contact SL"), second_zone(run)];
+    let mut claims = vec![connects("13", run, "contact", "SL"), connects("13", run, "contact", "DL"), second_zone(run)];
+    let flows = runs.run("flows-large-unbalance")?;
+    claims.extend(["SL", "DL"].map(|family| chosen("13", flows, "large", family, run)));
     Ok(Made {
         figure,
         caption: "S, SL and DL with contact; the double loop has a second stable zone below the main one.".into(),
@@ -39,28 +47,34 @@ fn contact(runs: &Runs) -> Result<Made, String> {
     })
 }
 
-/// The run in ε alone turns back.
+/// The straight run turns back; of ε and ζ, which change together, only ε matters there.
 fn straight(run: &Run) -> Claim {
     let finding = || {
-        let folds = run.special("cubic SL straight", Kind::Fold)?;
-        let fold = folds.first().ok_or("the run in ε has no fold")?;
-        let epsilon = run.parameter("epsilon");
-        let value = fold.point.parameters[epsilon];
-        Ok(Finding::number(value, fold.error * (1.0 + value), 1.465, 2e-3).noting("at ζ = 0.01, before ζ runs down"))
+        let folds = run.special("cubic SL to 1.5/1", Kind::Fold)?;
+        let fold = folds.first().ok_or("the straight run has no fold")?;
+        let value = fold.point.parameters[run.parameter("epsilon")];
+        let route: Vec<&str> =
+            run.notes.iter().filter(|(about, _)| about == "cubic SL to 1.5").map(|(_, note)| note.as_str()).collect();
+        Ok(Finding::number(value, fold.error * (1.0 + value), 1.465, 2e-3).noting(route.join("; ")))
     };
-    Claim::decided("12", "At Ω = 5 the cubic SL, run in ε alone, turns back before 1.5", "1.465", finding())
+    Claim::decided("12", "At Ω = 5 the cubic SL turns back before ε = 1.5", "1.465", finding())
 }
 
-/// How close a family of cycles comes to S, measured by how much the radius varies along the cycle.
-fn connects(figure: &'static str, run: &Run, name: &str) -> Claim {
+/// How close a family of cycles comes to S, measured by how much the radius varies along the cycle. Only at a Hopf point can
+/// cycles end on S: everywhere else a neighbourhood of S, however small, has none.
+fn connects(figure: &'static str, run: &Run, law: &str, family: &str) -> Claim {
     let finding = || {
-        let branch = run.branch(name)?;
-        let [variation, omega] = smallest(branch, |p| (max_r(p) - min_r(p)) / max_r(p));
-        let ends: Vec<String> = branch.ends.iter().flatten().map(ToString::to_string).collect();
-        let ours = format!("radius varies by {:.1} % at Ω = {omega:.4}", 100.0 * variation);
-        Ok(Finding::qualified(variation < 0.1, ours).noting(format!("branch: {}", ends.join("; "))))
+        let [variation, omega] =
+            smallest(run.branch(&format!("{law} {family}"))?, |p| (max_r(p) - min_r(p)) / max_r(p));
+        let hopf = run.special(&format!("{law} S"), Kind::Hopf)?.len();
+        let ours = format!("radius varies by {:.2} % at Ω = {omega:.5}", 100.0 * variation);
+        let note = match hopf {
+            0 => "nearly: S has no Hopf point, so the cycles pass by at a distance".to_string(),
+            n => format!("S has {n} Hopf points"),
+        };
+        Ok(Finding::qualified(variation < 0.1, ours).noting(note))
     };
-    Claim::decided(figure, "S and SL connect, or nearly so", "yes", finding())
+    Claim::decided(figure, format!("S and {family} connect, or nearly so"), "yes", finding())
 }
 
 /// A stable stretch of DL at smaller radii than the main one, at the same speeds.

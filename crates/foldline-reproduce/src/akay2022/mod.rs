@@ -38,9 +38,13 @@ const STUDIES: &[StudyPlan] = &[
     study!("diagrams", 1.7),
     study!("far", 1.0),
     study!("lowest-part", 1.5),
-    study!("flows", 1.5),
-    study!("light-damping", 4.0),
-    study!("light-damping-large-unbalance", 4.0),
+    study!("flows", 2.5),
+    study!("flows-light-damping", 4.0),
+    study!("flows-large-unbalance", 4.0),
+    study!("light-damping-cubic", 0.3),
+    study!("light-damping-contact", 5.0),
+    study!("light-damping-large-unbalance-cubic", 0.3),
+    study!("light-damping-large-unbalance-contact", 3.0),
     study!("blunt-contact", 0.5),
 ];
 
