@@ -110,7 +110,7 @@ mod tests {
             let mut shuffled = branches.to_vec();
             shuffled.rotate_left(shift);
             shuffled.swap(0, 3);
-            let sorted = ordered(Diagram { branches: shuffled }, &["a".into(), "b".into()]);
+            let sorted = ordered(Diagram { branches: shuffled, ..Diagram::default() }, &["a".into(), "b".into()]);
             assert_eq!(sorted.branches.iter().map(|b| b.name.as_str()).collect::<Vec<_>>(), expected);
         }
     }
@@ -136,7 +136,7 @@ mod tests {
             let mut shuffled = branches.to_vec();
             shuffled.rotate_left(shift);
             shuffled.swap(1, 4);
-            let sorted = ordered(Diagram { branches: shuffled }, &study);
+            let sorted = ordered(Diagram { branches: shuffled, ..Diagram::default() }, &study);
             let names: Vec<&str> = sorted.branches.iter().map(|b| b.name.as_str()).collect();
             assert_eq!(names, branches.each_ref().map(|b| b.name.as_str()));
         }
@@ -144,7 +144,7 @@ mod tests {
 
     #[test]
     fn a_circle_of_parents_is_listed_too() {
-        let diagram = Diagram { branches: vec![from("b", "a", 0.0), from("a", "b", 0.0)] };
+        let diagram = Diagram { branches: vec![from("b", "a", 0.0), from("a", "b", 0.0)], ..Diagram::default() };
         assert_eq!(ordered(diagram, &[]).branches.len(), 2);
     }
 }

@@ -100,7 +100,7 @@ mod tests {
 
     fn said(branches: Vec<Branch>) -> Vec<String> {
         let study = study();
-        lines(&Diagram { branches }, &study.plan, &study.model)
+        lines(&Diagram { branches, ..Diagram::default() }, &study.plan, &study.model)
     }
 
     #[test]
