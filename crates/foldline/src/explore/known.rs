@@ -5,9 +5,9 @@
 //! the parameter value in question: interpolated first, and where that is close, by Newton's method.
 
 use super::System;
-use super::growth::{polished, problem_of, revived};
+use super::growth::{Line, polished, problem_of, revived};
 use crate::continuation::Settings;
-use crate::continuation::locate::passing;
+use crate::continuation::locate::{Stretch, passing};
 use crate::diagram::{Branch, Cost, Kind, Point};
 
 /// Every solution of a branch at a value of its parameter, by increasing position: one for each time that the branch
@@ -32,6 +32,65 @@ pub fn solutions_at(system: &System, settings: &Settings, branch: &Branch, value
             found.ok().map(|station| station.point)
         })
         .collect()
+}
+
+/// The solution on a branch at which a quantity is least, which lies between accepted points as a rule, and a bound on the
+/// error of the quantity there: what the discretisation allows, plus what is left of the search. `None` for a branch
+/// without points.
+pub fn least(
+    system: &System,
+    settings: &Settings,
+    branch: &Branch,
+    quantity: &dyn Fn(&Point) -> f64,
+) -> Option<(Point, f64)> {
+    let lowest = (0..branch.points.len())
+        .min_by(|&a, &b| quantity(&branch.points[a]).total_cmp(&quantity(&branch.points[b])))?;
+    let mut best = branch.points[lowest].clone();
+    let mut left_over = 0.0;
+    for first in [lowest.checked_sub(1), Some(lowest)].into_iter().flatten() {
+        let Some(pair) = branch.points.get(first..first + 2) else { continue };
+        if let Some((point, rest)) = least_between(system, settings, branch, pair, quantity)
+            && quantity(&point) <= quantity(&best)
+        {
+            (best, left_over) = (point, rest);
+        }
+    }
+    let size = 1.0 + quantity(&best).abs();
+    let error = best.trust.discretisation.max(settings.newton_tolerance()) * size + left_over;
+    Some((best, error))
+}
+
+/// Golden sections along the curve between two accepted points.
+fn least_between(
+    system: &System,
+    settings: &Settings,
+    branch: &Branch,
+    pair: &[Point],
+    quantity: &dyn Fn(&Point) -> f64,
+) -> Option<(Point, f64)> {
+    const SHARE: f64 = 0.618_033_988_749_894_9;
+    let line = Line { held: branch.held, ..Line::new(branch.free) };
+    let mut problem = line.problem(system, 4, &pair[0]);
+    let left = revived(&mut *problem, settings, &pair[0], 1.0).ok()?;
+    let right = revived(&mut *problem, settings, &pair[1], 1.0).ok()?;
+    let stretch = Stretch::new(&mut *problem, &left, &right, 1.0);
+    let mut at = |s: f64| {
+        let found = stretch.at(&mut *problem, settings, s, &mut Cost::default()).ok()?;
+        Some((s, quantity(&found.point), found.point))
+    };
+    let (mut low, mut high) = (0.0, stretch.length);
+    let (mut a, mut b) = (at(high - SHARE * (high - low))?, at(low + SHARE * (high - low))?);
+    while (high - low).abs() > 1e-4 * stretch.length.abs() {
+        if a.1 < b.1 {
+            (high, b) = (b.0, a);
+            a = at(high - SHARE * (high - low))?;
+        } else {
+            (low, a) = (a.0, b);
+            b = at(low + SHARE * (high - low))?;
+        }
+    }
+    let rest = (a.1 - b.1).abs();
+    Some(if a.1 < b.1 { (a.2, rest) } else { (b.2, rest) })
 }
 
 /// The name of the branch on which `point` lies.
