@@ -13,6 +13,7 @@ mod figure10;
 mod figure12;
 mod figure14;
 mod identities;
+mod limits;
 mod orbits;
 mod rotor;
 
@@ -42,6 +43,7 @@ const STUDIES: &[StudyPlan] = &[
     study!("light-damping", 4.0),
     study!("light-damping-large-unbalance", 4.0),
     study!("blunt-contact", 0.5),
+    study!("limits", 4.0),
 ];
 
 const FIGURES: &[FigurePlan] = &[
@@ -57,6 +59,7 @@ const FIGURES: &[FigurePlan] = &[
     figure12::CUBIC,
     figure12::CONTACT,
     figure14::PLAN,
+    limits::PLAN,
 ];
 
 /// The publication.
