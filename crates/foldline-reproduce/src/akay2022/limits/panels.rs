@@ -1,9 +1,9 @@
 //! The panels: Campbell diagrams, forced branches with their backbones, distances, and the limit of damping.
 
-use super::claims::{AT, distances};
+use super::claims::{distances, order};
 use super::{Family, Level};
 use crate::akay2022::rotor::{FAMILIES, MAX_R, OMEGA, SPEED, colour};
-use foldline_plot::palette::{BLACK, BLUE, GREY, ORANGE, PALE, SKY, VERMILION};
+use foldline_plot::palette::{BLACK, BLUE, GREY, ORANGE, PALE, PURPLE, SKY, VERMILION};
 use foldline_plot::{Axis, Layer, LegendPlace, Marker, Panel, branch_curve};
 use foldline_rotor::{Ratio, undamped_modes};
 
@@ -14,7 +14,7 @@ const LEVELS: [&str; 4] = [ORANGE, SKY, BLUE, BLACK];
 pub fn all(families: &[Family]) -> Result<Vec<Panel>, String> {
     let reference = &families[0].constants;
     let mut panels = vec![rotating(reference.polar, reference.beta), inertial(reference.polar, reference.beta)];
-    let windows = [[3.1, 6.0, 0.05, 10.0], [2.0, 7.0, 0.05, 10.0], [3.0, 11.5, 0.8, 50.0], [2.0, 7.5, 0.8, 50.0]];
+    let windows = [[3.2, 4.8, 0.05, 5.0], [2.0, 7.0, 0.3, 10.0], [3.0, 11.5, 0.8, 40.0], [2.0, 7.5, 0.8, 20.0]];
     for ((family, window), label) in families.iter().zip(windows).zip(["(c)", "(d)", "(e)", "(f)"]) {
         panels.push(branches(family, label, window));
     }
@@ -38,7 +38,7 @@ fn over_speeds(polar: f64, stiffness: f64, of: impl Fn([f64; 2], [f64; 2]) -> f6
 
 /// Stiffness, what it means, and its colour.
 fn springs(beta: f64) -> [(f64, &'static str, &'static str); 2] {
-    [(1.0, "ring never touched", BLUE), (1.0 + beta, "ring always touched", VERMILION)]
+    [(1.0, "ring never touched", BLACK), (1.0 + beta, "ring always touched", PURPLE)]
 }
 
 fn rotating(polar: f64, beta: f64) -> Panel {
@@ -58,13 +58,15 @@ fn rotating(polar: f64, beta: f64) -> Panel {
         let fast = over_speeds(polar, stiffness, |[_, backward], _| -backward);
         panel = panel.with(Layer::curve(&slow, colour).named(name)).with(Layer::curve(&fast, colour));
     }
-    for (stiffness, _, _) in springs(beta) {
-        for (ratio, (family, colour)) in [(Ratio::SINGLE_LOOP, FAMILIES[1]), (Ratio::DOUBLE_LOOP, FAMILIES[2])] {
-            let Some(speed) = ratio.speed(polar, stiffness) else { continue };
-            let at = [speed, -undamped_modes(speed, polar, stiffness).rotating[1]];
-            panel = panel.with(Layer::scatter(vec![at], Marker::Circle, colour).wide(5.0));
-            panel = panel.with(Layer::note(at, format!("{family} {speed:.6}")));
-        }
+    for (ratio, (family, colour)) in [(Ratio::SINGLE_LOOP, FAMILIES[1]), (Ratio::DOUBLE_LOOP, FAMILIES[2])] {
+        let n = ratio.backward;
+        let speeds: Vec<f64> = springs(beta).iter().filter_map(|(s, ..)| ratio.speed(polar, *s)).collect();
+        let height = |(w, (s, ..)): (&f64, &(f64, _, _))| [*w, -undamped_modes(*w, polar, *s).rotating[1]];
+        let crossings: Vec<[f64; 2]> = speeds.iter().zip(&springs(beta)).map(height).collect();
+        let text: Vec<String> = speeds.iter().map(|w| format!("{w:.6}")).collect();
+        let name = format!("{n}:1 ({family}) at Ω = {}", text.join(", "));
+        panel = panel.with_all(crossings.iter().map(|at| Layer::note(*at, format!("{n}:1"))));
+        panel = panel.with(Layer::scatter(crossings, Marker::Circle, colour).wide(5.0).named(name));
     }
     panel.with(Layer::curve(&[], GREY).wide(0.9).dashed().named("2 and 3 times the slower"))
 }
@@ -80,7 +82,7 @@ fn inertial(polar: f64, beta: f64) -> Panel {
     for (stiffness, name, colour) in springs(beta) {
         for k in 0..2 {
             let frequency = over_speeds(polar, stiffness, |_, inertial| inertial[k]);
-            panel = panel.with(Layer::curve(&frequency, colour).named(name));
+            panel = panel.with(Layer::curve(&frequency, colour).named(name).wide(1.2));
         }
     }
     panel
@@ -117,16 +119,21 @@ fn named(level: &Level) -> String {
 
 /// Distances from the backbone over ε.
 fn nearness(families: &[Family], law: &str, label: &str) -> Result<Panel, String> {
-    let axes = (Axis::new("ε").from(0.03, 0.5).log(), Axis::new("relative distance").from(1e-6, 1.0).log());
-    let mut panel = Panel::new(label, format!("{law}, Ω = {AT}"), axes.0, axes.1);
+    let axes = (Axis::new("ε").from(0.03, 1.0).log(), Axis::new("relative distance").from(1e-6, 1.0).log());
+    let members: Vec<&Family> = families.iter().filter(|f| f.law == law).collect();
+    let mut speeds: Vec<String> = members.iter().map(|f| format!("{} at Ω = {}", f.name, f.compared)).collect();
+    speeds.insert(0, law.to_string());
+    let mut panel = Panel::new(label, speeds.join(", "), axes.0, axes.1);
     panel.legend = LegendPlace::Inside;
-    for family in families.iter().filter(|f| f.law == law) {
+    for family in members {
         let found = distances(family)?;
         let tint = colour(family.name);
+        let powers = order(&found).unwrap_or([f64::NAN; 2]);
         for (k, quantity, marker) in [(0, "max r", Marker::Circle), (1, "period", Marker::Square)] {
             let line: Vec<[f64; 2]> = found.iter().map(|d| [d.epsilon, d.relative[k]]).collect();
+            let power = line.last().map(|at| Layer::note(*at, format!("{:.2}", powers[k])));
             let marks = Layer::scatter(line.clone(), marker, tint).named(format!("{}, {quantity}", family.name));
-            panel = panel.with(Layer::curve(&line, tint).wide(1.0)).with(marks);
+            panel = panel.with(Layer::curve(&line, tint).wide(1.0)).with(marks).with_all(power);
         }
     }
     Ok(panel)
