@@ -1,6 +1,6 @@
 //! What the numbers say about the limit.
 
-use super::{Family, rooted};
+use super::{Family, rooted, within};
 use crate::akay2022::rotor::{max_r, speeds};
 use crate::claims::{Claim, Finding, digits};
 use foldline::diagram::Point;
@@ -179,9 +179,14 @@ fn exists(name: &str, ratio: Ratio) -> Claim {
 /// Where SL turns back: the damping limit of the backbone against the folds of the forced branches.
 fn turns(family: &Family) -> Claim {
     let finding = || {
+        // Next to the root the pull of the tanh law bends the backbone within a small part of a clearance.
+        let last = 1.02 * family.backbone.root;
+        let near = within(&family.constants, ContactLaw::Tanh, family.ratio, [0.99 * family.backbone.root, last])?;
         let (mut lines, mut off, mut error) = (Vec::new(), vec![Vec::new(); 2], 0.0_f64);
         for level in &family.levels {
-            let predicted = turning(&family.backbone.points, level.zeta / level.epsilon);
+            let mut predicted = turning(&near.points, level.zeta / level.epsilon);
+            let further = turning(&family.backbone.points, level.zeta / level.epsilon);
+            predicted.extend(further.into_iter().filter(|[speed, _]| *speed > last));
             let folds = speeds(&level.folds());
             if predicted.is_empty() || predicted.len() != folds.len() {
                 return Err(format!("{} predicted, {} folds at ε = {}", predicted.len(), folds.len(), level.epsilon));

@@ -108,10 +108,10 @@ fn branches(family: &Family, label: &str, [x0, x1, y0, y1]: [f64; 4]) -> Panel {
     panel
 }
 
-/// `ε = 0.353, ζ = 0.01`
+/// `ε = 0.1765, ζ = 0.0025`
 fn named(level: &Level) -> String {
     let short = |x: f64| {
-        let decimals = (2 - x.log10().floor() as i32).clamp(0, 9) as usize;
+        let decimals = (3 - x.log10().floor() as i32).clamp(0, 9) as usize;
         format!("{x:.decimals$}").trim_end_matches('0').to_string()
     };
     format!("ε = {}, ζ = {}", short(level.epsilon), short(level.zeta))
@@ -119,7 +119,7 @@ fn named(level: &Level) -> String {
 
 /// Distances from the backbone over ε.
 fn nearness(families: &[Family], law: &str, label: &str) -> Result<Panel, String> {
-    let axes = (Axis::new("ε").from(0.03, 1.0).log(), Axis::new("relative distance").from(1e-6, 1.0).log());
+    let axes = (Axis::new("ε").from(0.03, 1.0).log(), Axis::new("relative distance").from(1e-7, 1.0).log());
     let members: Vec<&Family> = families.iter().filter(|f| f.law == law).collect();
     let mut speeds: Vec<String> = members.iter().map(|f| format!("{} at Ω = {}", f.name, f.compared)).collect();
     speeds.insert(0, law.to_string());
