@@ -6,6 +6,7 @@
 
 mod claims;
 mod panels;
+mod turning;
 
 use super::rotor::{OMEGA, parameters};
 use crate::publication::{FigurePlan, Made};
@@ -83,12 +84,7 @@ impl<'r> Level<'r> {
 
 /// The backbone as far as a forced branch of the figure reaches.
 fn rooted(constants: &Nondimensional, law: ContactLaw, ratio: Ratio) -> Result<Backbone, String> {
-    within(constants, law, ratio, [0.5, 12.0])
-}
-
-/// The backbone between two speeds; the closer they are the denser are its points.
-fn within(constants: &Nondimensional, law: ContactLaw, ratio: Ratio, speeds: [f64; 2]) -> Result<Backbone, String> {
-    let reach = Reach { speeds, radius: 60.0, tolerance: 1e-8 };
+    let reach = Reach { speeds: [0.5, 12.0], radius: 60.0, tolerance: 1e-8 };
     backbone(constants, law, ratio, &reach).map_err(|mistake| mistake.to_string())
 }
 

@@ -1,6 +1,6 @@
 //! What the numbers say about the limit.
 
-use super::{Family, rooted, within};
+use super::{Family, rooted, turning};
 use crate::akay2022::rotor::{max_r, speeds};
 use crate::claims::{Claim, Finding, digits};
 use foldline::diagram::Point;
@@ -69,48 +69,17 @@ fn interval(family: &Family) -> Claim {
     )
 }
 
-/// Neighbours between which a place on a backbone is interpolated.
-const NEIGHBOURS: usize = 6;
-
-/// `y` at `x` on the polynomial through `count` points around the k-th and the next one.
-fn between(
-    points: &[BackbonePoint],
-    [k, count]: [usize; 2],
-    of: fn(&BackbonePoint) -> f64,
-    x: f64,
-    y: impl Fn(&BackbonePoint) -> f64,
-) -> f64 {
-    let count = count.min(points.len());
+/// Largest radius and period of the backbone at a speed, on the polynomials through its six nearest points.
+fn at(points: &[BackbonePoint], speed: f64) -> Option<[f64; 2]> {
+    let k = points.windows(2).position(|w| (w[0].speed - speed) * (w[1].speed - speed) <= 0.0)?;
+    let count = points.len().min(6);
     let near = &points[(k + 1).saturating_sub(count / 2).min(points.len() - count)..][..count];
     let weight = |i: usize| -> f64 {
         let others = (0..count).filter(|j| *j != i);
-        others.map(|j| (x - of(&near[j])) / (of(&near[i]) - of(&near[j]))).product()
+        others.map(|j| (speed - near[j].speed) / (near[i].speed - near[j].speed)).product()
     };
-    (0..count).map(|i| weight(i) * y(&near[i])).sum()
-}
-
-/// Largest radius and period of the backbone at a speed.
-fn at(points: &[BackbonePoint], speed: f64) -> Option<[f64; 2]> {
-    let k = points.windows(2).position(|w| (w[0].speed - speed) * (w[1].speed - speed) <= 0.0)?;
-    let value = |y: fn(&BackbonePoint) -> f64| between(points, [k, NEIGHBOURS], |p| p.speed, speed, y);
+    let value = |of: fn(&BackbonePoint) -> f64| (0..count).map(|i| weight(i) * of(&near[i])).sum();
     Some([value(|p| p.r_max), value(|p| p.period)])
-}
-
-/// Speeds at which the damping limit of a backbone passes `ratio` = ζ/ε, each with the error of the interpolation.
-fn turning(points: &[BackbonePoint], ratio: f64) -> Vec<[f64; 2]> {
-    let excess = |p: &BackbonePoint| p.damping_limit().map_or(f64::NAN, |limit| (limit / ratio).ln());
-    let r = |p: &BackbonePoint| p.r_max;
-    let found = |k: usize, count: usize| {
-        let sign = excess(&points[k]).signum();
-        let (mut a, mut b) = (points[k].r_max, points[k + 1].r_max);
-        for _ in 0..60 {
-            let middle = 0.5 * (a + b);
-            *(if between(points, [k, count], r, middle, excess) * sign > 0.0 { &mut a } else { &mut b }) = middle;
-        }
-        between(points, [k, count], r, 0.5 * (a + b), |p| p.speed)
-    };
-    let passes = (0..points.len().saturating_sub(1)).filter(|k| excess(&points[*k]) * excess(&points[k + 1]) < 0.0);
-    passes.map(|k| (found(k, NEIGHBOURS), found(k, NEIGHBOURS - 2))).map(|(w, other)| [w, (w - other).abs()]).collect()
 }
 
 /// Distances by falling ε.
@@ -179,14 +148,9 @@ fn exists(name: &str, ratio: Ratio) -> Claim {
 /// Where SL turns back: the damping limit of the backbone against the folds of the forced branches.
 fn turns(family: &Family) -> Claim {
     let finding = || {
-        // Next to the root the pull of the tanh law bends the backbone within a small part of a clearance.
-        let last = 1.02 * family.backbone.root;
-        let near = within(&family.constants, ContactLaw::Tanh, family.ratio, [0.99 * family.backbone.root, last])?;
         let (mut lines, mut off, mut error) = (Vec::new(), vec![Vec::new(); 2], 0.0_f64);
         for level in &family.levels {
-            let mut predicted = turning(&near.points, level.zeta / level.epsilon);
-            let further = turning(&family.backbone.points, level.zeta / level.epsilon);
-            predicted.extend(further.into_iter().filter(|[speed, _]| *speed > last));
+            let predicted = turning::speeds(family, level.zeta / level.epsilon)?;
             let folds = speeds(&level.folds());
             if predicted.is_empty() || predicted.len() != folds.len() {
                 return Err(format!("{} predicted, {} folds at ε = {}", predicted.len(), folds.len(), level.epsilon));
