@@ -13,6 +13,7 @@ mod figure10;
 mod figure12;
 mod figure14;
 mod identities;
+mod limits;
 mod orbits;
 mod rotor;
 
@@ -46,6 +47,7 @@ const STUDIES: &[StudyPlan] = &[
     study!("light-damping-large-unbalance-cubic", 0.3),
     study!("light-damping-large-unbalance-contact", 3.0),
     study!("blunt-contact", 0.5),
+    study!("limits", 4.0),
 ];
 
 const FIGURES: &[FigurePlan] = &[
@@ -61,6 +63,7 @@ const FIGURES: &[FigurePlan] = &[
     figure12::CUBIC,
     figure12::CONTACT,
     figure14::PLAN,
+    limits::PLAN,
 ];
 
 /// The publication.
