@@ -22,6 +22,9 @@ pub enum Found {
 /// Halvings of one step before what is left is recorded as it is.
 const DEEPEST: usize = 14;
 
+/// Halvings after which the ends of a stretch show what lies between them.
+const CLOSE: usize = 6;
+
 /// Values of all monitors at the left end of a stretch and before it, for the test on bending.
 #[derive(Clone, Debug)]
 pub struct History {
@@ -77,6 +80,9 @@ impl Follow<'_> {
                     located.push((kind, jump, found));
                 }
                 Ok(_) => {}
+                // So close by there would be something to see of an event of this kind; without it there is none, as where
+                // two real multipliers have the product 1.
+                Err(_) if depth >= CLOSE && jump > 0 && !self.either_confirms(k, left, right) => {}
                 Err(_) => lost = true,
             }
         }
@@ -134,6 +140,10 @@ impl Follow<'_> {
             }
         }
         out
+    }
+
+    fn either_confirms(&self, monitor: usize, left: &Station, right: &Station) -> bool {
+        self.monitors[monitor].confirms(&left.point) || self.monitors[monitor].confirms(&right.point)
     }
 
     fn special(&self, kind: Kind, station: Station, before: i64, after: i64, error: f64) -> Box<SpecialPoint> {
