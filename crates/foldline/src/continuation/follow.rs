@@ -7,7 +7,6 @@
 use super::Settings;
 use super::corrector::{Failure, Plane, Station, correct, settle, station};
 use super::inspect::{Found, History};
-use super::locate::{Stretch, passing};
 use crate::contract::{Monitor, Verdict, ZeroProblem};
 use crate::diagram::{Cost, Ending, Kind, Mesh, Point, SpecialPoint};
 
@@ -38,9 +37,9 @@ pub struct Follow<'w> {
 }
 
 /// An accepted step, perhaps the last one.
-struct Step {
-    right: Station,
-    end: Option<Ending>,
+pub(super) struct Step {
+    pub(super) right: Station,
+    pub(super) end: Option<Ending>,
 }
 
 /// What the point before the current one contributes: its tangent for the predictor, its monitors for the inspection.
@@ -52,21 +51,8 @@ struct Trail {
 
 /// Steps shorter than this many tolerances begin and end on the same mesh: two meshes agree to the tolerance only.
 const SHORT: f64 = 200.0;
-/// Share of the deviation from simpler solutions below which a step is not accepted: it may have landed on them, and it
-/// could not be told on which side of the meeting it is.
-const LITTLE: f64 = 0.25;
-/// Share below which a point close to the meeting counts as beyond it.
-const NOTHING: f64 = 0.05;
-/// Margin from a singular matrix below which a step must also lead back to where it came from.
-const CROWDED: f64 = 0.02;
-/// How many tolerances off a step may lead back; more is another branch.
-const BACK: f64 = 100.0;
 /// Step down to which a change of stability without explanation is taken for a jump to another branch.
 const SURE: f64 = 1e-4;
-/// Angles of the chord with both tangents: their sum may exceed the angle between the tangents by this factor …
-const CHORD_FACTOR: f64 = 1.5;
-/// … and this much. On an arc the two are equal; on a jump to another branch the chord points elsewhere.
-const CHORD_SLACK: f64 = 0.08;
 
 /// Growth of the period from which on a parameter that stands still means that the period has no bound.
 const LONG: f64 = 3.0;
@@ -184,7 +170,7 @@ fn ended_by(why: Failure, parameter: f64) -> Ending {
 }
 
 impl Follow<'_> {
-    fn place(&mut self, station: &Station) {
+    pub(super) fn place(&mut self, station: &Station) {
         self.problem.set_mesh(&station.mesh);
         self.problem.anchor(&station.u);
     }
@@ -225,7 +211,7 @@ impl Follow<'_> {
     }
 
     /// Angle between the tangents, and distance along the left one.
-    fn angle(&mut self, left: &Station, right: &Station) -> (f64, f64) {
+    pub(super) fn angle(&mut self, left: &Station, right: &Station) -> (f64, f64) {
         self.place(left);
         let tangent = self.problem.transfer(&right.tangent, &right.mesh, &left.mesh);
         let u = self.problem.transfer(&right.u, &right.mesh, &left.mesh);
@@ -283,192 +269,5 @@ impl Follow<'_> {
             return Ok(Step { right: home, end: Some(Ending::Closed) });
         }
         Ok(Step { right, end })
-    }
-
-    /// The bound of a further parameter that this step passes, and the point there.
-    fn beyond(&mut self, left: &Station, right: &Station, cost: &mut Cost) -> Option<(f64, Station)> {
-        let (index, value) = self.settings.bounds.iter().find_map(|(index, [low, high])| {
-            let now = *right.point.parameters.get(*index)?;
-            if now < *low { Some((*index, *low)) } else { (now > *high).then_some((*index, *high)) }
-        })?;
-        let gap = |station: &Station| station.point.parameters[index] - value;
-        if (gap(left) > 0.0) == (gap(right) > 0.0) {
-            return None;
-        }
-        let stretch = Stretch::new(self.problem, left, right, self.direction);
-        let (mut inner, mut outer) = ((0.0, gap(left)), (stretch.length, gap(right)));
-        let mut found = None;
-        for _ in 0..8 {
-            let s = inner.0 + (outer.0 - inner.0) * inner.1 / (inner.1 - outer.1);
-            let there = self.cut(left, &stretch, s, cost)?;
-            let miss = gap(&there);
-            if (miss > 0.0) == (outer.1 > 0.0) {
-                outer = (s, miss)
-            } else {
-                inner = (s, miss)
-            }
-            found = Some(there);
-            if miss.abs() < self.settings.tolerance * (1.0 + value.abs()) {
-                break;
-            }
-        }
-        found.map(|there| (value, there))
-    }
-
-    /// Whether `right`, predicted as `guess`, continues the branch at `left`, and neither turns too far nor lies on another
-    /// one.
-    fn continues(&mut self, left: &Station, right: &Station, guess: &[f64]) -> Result<(), Failure> {
-        let (angle, length) = self.angle(left, right);
-        let landed = self.problem.transfer(&right.u, &right.mesh, &left.mesh);
-        let tangent = self.problem.transfer(&right.tangent, &right.mesh, &left.mesh);
-        let miss: Vec<f64> = landed.iter().zip(guess).map(|(a, b)| a - b).collect();
-        let chord: Vec<f64> = landed.iter().zip(&left.u).map(|(a, b)| a - b).collect();
-        let size = |v: &[f64]| self.problem.dot(v, v).sqrt();
-        let against = |t: &[f64]| (self.problem.dot(t, &chord) / (size(t) * size(&chord))).clamp(-1.0, 1.0).acos();
-        let (miss, bent) = (size(&miss), against(&left.tangent) + against(&tangent));
-        if angle > self.settings.max_angle || miss > 0.3 * length || bent > CHORD_FACTOR * angle + CHORD_SLACK {
-            return Err(Failure::Elsewhere { angle, miss: miss / length });
-        }
-        Ok(())
-    }
-
-    /// Where another branch may be close: whether the same step backwards from `right` leads to `left` again.
-    fn leads_back(&mut self, left: &Station, right: &Station, cost: &mut Cost) -> Result<(), Failure> {
-        if self.problem.margin(&left.point).min(self.problem.margin(&right.point)) > CROWDED {
-            return Ok(());
-        }
-        self.place(right);
-        let home = self.problem.transfer(&left.u, &left.mesh, &right.mesh);
-        let before = self.problem.transfer(&left.tangent, &left.mesh, &right.mesh);
-        let gap: Vec<f64> = home.iter().zip(&right.u).map(|(a, b)| a - b).collect();
-        let distance = self.problem.dot(&right.tangent, &gap);
-        let mut back: Vec<f64> = (0..home.len())
-            .map(|i| {
-                let bend = 0.5 * distance * (before[i] - right.tangent[i]);
-                right.u[i] + distance * right.tangent[i] + bend
-            })
-            .collect();
-        let plane = Plane { row: right.tangent.clone(), base: right.u.clone(), distance };
-        correct(self.problem, self.settings, &plane, &mut back, cost)?;
-        let miss: Vec<f64> = back.iter().zip(&home).map(|(a, b)| a - b).collect();
-        let miss = self.problem.relative_size(&miss, &home);
-        if miss > BACK * self.settings.tolerance {
-            return Err(Failure::Elsewhere { angle: 0.0, miss: miss / distance.abs() });
-        }
-        Ok(())
-    }
-
-    fn at_parameter(
-        &mut self,
-        left: &Station,
-        right: &Station,
-        value: f64,
-        cost: &mut Cost,
-    ) -> Result<Station, Failure> {
-        passing(self.problem, self.settings, [left, right], value, self.direction, cost)
-    }
-
-    /// What was found in the last step before a branch meets simpler solutions, without what cannot be told from the
-    /// meeting itself: there the parameter is stationary and a multiplier is 1 anyway.
-    fn up_to(&self, meeting: f64, found: Vec<Found>, unstable: usize, right: &mut Station) -> Vec<Found> {
-        let near = 20.0 * self.settings.tolerance * (1.0 + meeting.abs());
-        let apart = |value: f64| (value - meeting).abs() > near;
-        let mut count = unstable;
-        let mut kept = Vec::new();
-        for item in found {
-            let (value, after) = match &item {
-                Found::Special(s) => {
-                    let after = if self.direction > 0.0 { s.unstable_after } else { s.unstable_before };
-                    (s.point.parameters.get(self.free).copied().unwrap_or(0.0), after)
-                }
-                Found::Inserted(s, _) => (s.parameter(), s.point.unstable),
-            };
-            if !apart(value) {
-                break;
-            }
-            count = after;
-            kept.push(item);
-        }
-        if !apart(right.parameter()) {
-            right.point.unstable = count;
-        }
-        kept
-    }
-
-    /// Whether the step passes the place where the branch meets simpler solutions. If so the step ends a little before it.
-    /// The place itself is not solved for: it is a branch point, and the deviation from the simpler solution grows like the
-    /// square root of the distance in the parameter, which gives the parameter there well enough to recognise it.
-    fn collapsed(&mut self, left: &Station, right: &Station, cost: &mut Cost) -> Result<Option<Step>, Failure> {
-        for monitor in self.collapses {
-            let values = [monitor.value(&left.point, &left.point), monitor.value(&left.point, &right.point)];
-            // Next to nothing left of the deviation: the step has landed on the simpler solutions themselves.
-            if values[1].abs() < LITTLE * values[0] {
-                return Err(Failure::Singular);
-            }
-            if !(values[0] > 0.0 && values[1] <= 0.0) {
-                continue;
-            }
-            let stretch = Stretch::new(self.problem, left, right, self.direction);
-            let (mut low, mut high) = ((0.0, values[0]), (stretch.length, values[1]));
-            let mut near = None;
-            for _ in 0..12 {
-                let zero = low.0 + (high.0 - low.0) * low.1 / (low.1 - high.1);
-                let s = 0.6 * zero + 0.4 * low.0;
-                let found = self.cut(left, &stretch, s, cost).ok_or(Failure::Singular)?;
-                let value = monitor.value(&left.point, &found.point);
-                if value < NOTHING * values[0] {
-                    high = (s, value.min(-NOTHING * values[0]));
-                    continue;
-                }
-                low = (s, value);
-                near = Some(found);
-                if value < 0.6 * values[0] {
-                    break;
-                }
-            }
-            let near = near.ok_or(Failure::Singular)?;
-            // A deviation that has turned instead of shrunk, as that of a narrow pulse that has moved, is none that vanishes.
-            if monitor.value(&near.point, &left.point) < 1.1 * values[0] {
-                continue;
-            }
-            // A branch that only passes the simpler solutions closely is followed on, in steps that do not skip the passage.
-            if !monitor.confirms(&near.point) {
-                return Err(Failure::Singular);
-            }
-            let share = (monitor.value(&left.point, &near.point) / values[0]).powi(2);
-            let parameter = (near.parameter() - share * left.parameter()) / (1.0 - share);
-            return Ok(Some(Step { right: near, end: Some(Ending::Joined { at: monitor.kind(), parameter }) }));
-        }
-        Ok(None)
-    }
-
-    /// The start again, if this step passes it.
-    fn closes(
-        &mut self,
-        left: &Station,
-        right: &Station,
-        emitted: usize,
-        cost: &mut Cost,
-    ) -> Result<Option<Station>, Failure> {
-        let Some(home) = self.home else { return Ok(None) };
-        let value = home.parameters[self.free];
-        let between = (left.parameter() - value) * (right.parameter() - value) <= 0.0;
-        let same_way = home.parameter_slope() * self.direction * (right.slope() + left.slope()) > 0.0;
-        if emitted < 3 || !between || !same_way {
-            return Ok(None);
-        }
-        let near = |point: &Point, tolerance: f64| {
-            self.settings.reflections.iter().any(|r| point.difference(home, &self.settings.scales, r) < tolerance)
-        };
-        if !near(&right.point, 0.5) {
-            return Ok(None);
-        }
-        let back = self.at_parameter(left, right, value, cost)?;
-        let near = self
-            .settings
-            .reflections
-            .iter()
-            .any(|r| back.point.difference(home, &self.settings.scales, r) < 30.0 * self.settings.tolerance);
-        Ok(near.then_some(back))
     }
 }

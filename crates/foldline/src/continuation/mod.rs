@@ -6,7 +6,9 @@
 //! | step | file |
 //! |---|---|
 //! | Newton's method in a hyperplane; tangent | [`corrector`] |
-//! | from one accepted point to the next; why a side ends | [`follow`] |
+//! | from one accepted point to the next | [`follow`] |
+//! | whether a step may be accepted | `judge` |
+//! | why a side ends | `ends` |
 //! | what lies between two accepted points | [`inspect`] |
 //! | zero of a monitor along the curve | [`locate`] |
 //! | the same where branches cross | [`straddle`] |
@@ -14,8 +16,10 @@
 //! **Source.** keller1977 (pseudo-arclength); allgower1990 (step length by angle and contraction).
 
 pub mod corrector;
+mod ends;
 pub mod follow;
 pub mod inspect;
+mod judge;
 pub mod locate;
 pub mod straddle;
 
