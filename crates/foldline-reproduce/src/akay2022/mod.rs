@@ -2,6 +2,7 @@
 //!
 //! **Source.** akay2024.
 
+mod artefacts;
 mod figure03;
 mod figure04;
 mod figure05;
@@ -15,6 +16,7 @@ mod figure14;
 mod identities;
 mod orbits;
 mod rotor;
+mod sharpness;
 
 use crate::publication::{FigurePlan, Publication, StudyPlan};
 
