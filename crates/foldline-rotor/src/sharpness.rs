@@ -105,7 +105,8 @@ fn lines(law: ContactLaw, constants: &Nondimensional, motion: &Response) -> Vec<
     let (field, parameters) = (OverhungRotor { law }, constants.parameters());
     let time = |k: usize| k as f64 / SAMPLES as f64;
     let (mut z, mut x) = (Vec::with_capacity(SAMPLES), [0.0; 4]);
-    let integrator = Integrator::new(&field, &parameters, Tolerance::uniform(1e-10, 4)).with_longest_step(period / 64.0);
+    let integrator =
+        Integrator::new(&field, &parameters, Tolerance::uniform(1e-10, 4)).with_longest_step(period / 64.0);
     integrator.trajectory(&motion.state, [0.0, period], &[], &mut |passage| {
         let Passage::Step(step) = passage else { return Verdict::Continue };
         let [from, to] = [step.start_time(), step.end_time()];

@@ -66,7 +66,10 @@ impl Fates {
         }
         let words = |s: &Stretch| {
             let ([a, b], [low, high]) = (s.range(0), s.range(1));
-            format!("Ω = {a:.5} to {b:.5} (max r {low:.4} to {high:.4}, up to K = {:.0} to {:.0})", s.until[0], s.until[1])
+            format!(
+                "Ω = {a:.5} to {b:.5} (max r {low:.4} to {high:.4}, up to K = {:.0} to {:.0})",
+                s.until[0], s.until[1]
+            )
         };
         self.stretches.iter().map(words).collect::<Vec<_>>().join("; ")
     }
@@ -88,7 +91,8 @@ impl Fates {
 pub fn fates(runs: &Runs, run: &Run, name: &str, to: f64) -> Result<Fates, String> {
     let branch = run.branch(name)?;
     let of = format!("{name} {to} {} {}", run.study.text, run.study.model_text);
-    let table = runs.table(&format!("fates of {name}"), &of, || Ok(table(&Search::new(run, branch, to), runs.jobs())))?;
+    let table =
+        runs.table(&format!("fates of {name}"), &of, || Ok(table(&Search::new(run, branch, to), runs.jobs())))?;
     Ok(read(&table))
 }
 

@@ -5,7 +5,9 @@ use super::rotor::stable_at;
 use crate::runs::{Run, Runs, Table, in_parallel};
 use foldline::diagram::{Point, Response};
 use foldline::explore::{Persistence, System, persistence};
-use foldline_rotor::{Nondimensional, SmoothingError, exact_motion, fitted_power, smallest_sharpness, smoothing_errors};
+use foldline_rotor::{
+    Nondimensional, SmoothingError, exact_motion, fitted_power, smallest_sharpness, smoothing_errors,
+};
 
 /// The speed at which motions are compared.
 pub const SPEED: f64 = 5.0;
@@ -121,7 +123,8 @@ fn compared(run: &Run, family: usize, beta: f64) -> Result<(Table, Option<Respon
         return Err(format!("at β = {beta} the piecewise rotor leaves {name} for {:?}", motion.ratio));
     }
     let errors = smoothing_errors(&constants(beta), &motion, &TIMES.map(|times| times * beta));
-    let row = |e: &SmoothingError| vec![0.0, beta, family as f64, e.sharpness, e.radius, e.period, e.lines, motion.error];
+    let row =
+        |e: &SmoothingError| vec![0.0, beta, family as f64, e.sharpness, e.radius, e.period, e.lines, motion.error];
     Ok((errors.iter().map(row).collect(), Some(motion)))
 }
 
