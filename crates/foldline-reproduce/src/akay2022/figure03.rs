@@ -5,7 +5,7 @@ use super::sharpness::{Choice, Comparison, PUBLISHED, choice};
 use crate::claims::{Claim, Finding, digits};
 use crate::publication::{FigurePlan, Made};
 use crate::runs::Runs;
-use foldline_plot::palette::{BLUE, GREEN, GREY, VERMILION};
+use foldline_plot::palette::{BLUE, GREY, ORANGE, PURPLE};
 use foldline_plot::{Axis, Figure, Layer, Marker, Panel};
 use foldline_rotor::ContactLaw;
 use std::fmt::Write;
@@ -14,7 +14,7 @@ pub const PLAN: FigurePlan =
     FigurePlan { name: "3", title: "the smoothed contact law and the choice of K", runs: &["diagrams"], make };
 
 /// β and K: the reference, the softer ring as validated, and the softer ring with a switch that is too blunt.
-const LAWS: [(f64, f64, &str); 3] = [(10.0, 150.0, BLUE), (6.0, 90.0, GREEN), (6.0, 30.0, VERMILION)];
+const LAWS: [(f64, f64, &str); 3] = [(10.0, 150.0, BLUE), (6.0, 90.0, PURPLE), (6.0, 30.0, ORANGE)];
 
 fn make(runs: &Runs) -> Result<Made, String> {
     let choice = choice(runs, runs.run("diagrams")?)?;
@@ -54,7 +54,7 @@ fn law() -> [Panel; 2] {
 
 /// The error of every motion over K.
 fn errors(choice: &Choice, label: &str, beta: f64, published: f64) -> Panel {
-    let axes = (Axis::new("K").from(10.0, 2000.0).log(), Axis::new("relative error").from(3e-7, 0.1).log());
+    let axes = (Axis::new("K").from(10.0, 2000.0).log(), Axis::new("relative error").from(1e-7, 0.01).log());
     let mut panel = Panel::new(label, format!("error of smoothing, β = {beta}, Ω = 5"), axes.0, axes.1);
     for comparison in choice.comparisons.iter().filter(|c| c.beta == beta) {
         let colour = FAMILIES.iter().find(|(name, _)| *name == comparison.family).map_or(GREY, |(_, colour)| colour);
@@ -65,7 +65,7 @@ fn errors(choice: &Choice, label: &str, beta: f64, published: f64) -> Panel {
             colour,
         ));
     }
-    panel.with(Layer::vertical(published)).with(Layer::note([published, 0.03], format!("K = {published}")))
+    panel.with(Layer::vertical(published)).with(Layer::note([published, 4e-3], format!("K = {published}")))
 }
 
 fn caption(choice: &Choice) -> String {
