@@ -104,7 +104,7 @@ fn caption(all: &[&(String, Fates)]) -> String {
     let mut text = format!(
         "With K = 30 S bends back below contact and is unstable there, and SL goes on far below contact where no ring is felt. \
          Every point was followed in K alone, to K = {} (β = 6) or {} (β = 10); where K turns back before, the point exists only \
-         because K is small, and the branch is marked. At K = 150 the same loop of S is left, five times smaller; a fold that moves \
+         because K is small, and the branch is marked. At K = 150 a smaller loop of S is left of the same kind; a fold that moves \
          with K leaves a short piece next to it.",
         SHARP[0], SHARP[1]
     );
