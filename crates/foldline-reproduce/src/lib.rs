@@ -78,7 +78,7 @@ pub struct Drawn {
     pub made: Result<(String, Made), String>,
 }
 
-/// Computes figures and claims, and writes `figure-NN.svg`, `figure-NN.png` and `report.html`. A figure that fails does not
+/// Computes figures and claims, and writes `figure-NN.svg`, `figure-NN.png`, `report.html` and `verdicts.txt`. A figure that fails does not
 /// keep the others from being made.
 ///
 /// # Errors
@@ -113,8 +113,16 @@ pub fn reproduce(request: &Request) -> io::Result<Reproduced> {
     let page = report::html(request.publication, &figures, &runs, &failures, seconds);
     let report = request.out.join("report.html");
     std::fs::write(&report, page)?;
-    let claims = figures.into_iter().filter_map(|f| f.made.ok()).flat_map(|(_, made)| made.claims).collect();
+    let claims: Vec<Claim> =
+        figures.into_iter().filter_map(|f| f.made.ok()).flat_map(|(_, made)| made.claims).collect();
+    std::fs::write(request.out.join("verdicts.txt"), verdicts(&claims))?;
     Ok(Reproduced { report, claims, failures, stopped })
+}
+
+/// A line for each claim: figure, verdict, statement, separated by tabs. Numbers change from machine to machine in their last
+/// digits; these lines should not.
+pub fn verdicts(claims: &[Claim]) -> String {
+    claims.iter().map(|claim| format!("{}\t{}\t{}\n", claim.figure, claim.verdict, claim.statement)).collect()
 }
 
 /// Writes the SVG and the PNG; the inner error says why the PNG could not be made.

@@ -71,7 +71,8 @@ impl FigurePlan {
 pub struct Made {
     /// The picture as plain data.
     pub figure: Figure,
-    /// What is to be seen, in a few sentences.
+    /// What is to be seen, in a few sentences. An empty line ends a paragraph; a paragraph of lines with cells separated by tabs is
+    /// a table, its first line the head.
     pub caption: String,
     /// The claims that its numbers decide.
     pub claims: Vec<Claim>,

@@ -44,7 +44,7 @@ pub fn html(publication: &Publication, figures: &[Drawn], runs: &Runs, failures:
         let _ = writeln!(out, "<h2 id=\"figure-{name}\">Figure {name}: {title}</h2>");
         match &figure.made {
             Ok((svg, made)) => {
-                let caption = escaped(&made.caption);
+                let caption = caption(&made.caption);
                 let _ = writeln!(out, "<figure>\n{svg}<figcaption>{caption}</figcaption></figure>");
             }
             Err(why) => {
@@ -55,6 +55,24 @@ pub fn html(publication: &Publication, figures: &[Drawn], runs: &Runs, failures:
     table_of_runs(&mut out, runs);
     out.push_str("</body></html>\n");
     out
+}
+
+/// Paragraphs, of which those with tabs are tables.
+fn caption(text: &str) -> String {
+    let part = |part: &str| {
+        if !part.contains('\t') {
+            return format!("<p>{}</p>\n", escaped(part));
+        }
+        let row = |(k, line): (usize, &str)| {
+            let tag = if k == 0 { "th" } else { "td class=\"n\"" };
+            let end = if k == 0 { "th" } else { "td" };
+            let cells: String = line.split('\t').map(|cell| format!("<{tag}>{}</{end}>", escaped(cell))).collect();
+            format!("<tr>{cells}</tr>\n")
+        };
+        let rows: String = part.lines().enumerate().map(row).collect();
+        format!("<table>\n{rows}</table>\n")
+    };
+    text.split("\n\n").map(part).collect()
 }
 
 fn summary(out: &mut String, claims: &[&Claim], runs: &Runs, seconds: f64) {

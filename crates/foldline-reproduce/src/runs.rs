@@ -4,6 +4,10 @@
 //! version computed it and how long that took. A run of the same study text, model text and version that is finished is read
 //! back; one that is not is resumed; any other is thrown away and computed again.
 
+mod tables;
+
+pub use tables::{Table, in_parallel};
+
 use crate::Request;
 use crate::publication::{Publication, StudyPlan};
 use foldline::contract::{Event, Observer, Verdict};
@@ -68,6 +72,18 @@ impl Run {
         let settings = growth::settings(&system, self.study.plan.tolerance, everywhere, 0);
         let found = known::solutions_at(&system, &settings, branch, value);
         if found.is_empty() { Err(format!("the branch {name} has no solution at {value}")) } else { Ok(found) }
+    }
+
+    /// The solution of a branch at which a quantity is least, and a bound on the error of the quantity.
+    ///
+    /// # Errors
+    /// There is no such branch.
+    pub fn least(&self, name: &str, quantity: &dyn Fn(&Point) -> f64) -> Result<(Point, f64), String> {
+        let branch = self.branch(name)?;
+        let system = System::of_plan(&self.study.model, &self.study.plan);
+        let everywhere = [f64::NEG_INFINITY, f64::INFINITY];
+        let settings = growth::settings(&system, self.study.plan.tolerance, everywhere, 0);
+        known::least(&system, &settings, branch, quantity).ok_or_else(|| format!("the branch {name} has no points"))
     }
 
     /// The special points of that kind on a branch.

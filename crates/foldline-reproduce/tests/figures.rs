@@ -48,6 +48,16 @@ fn figure_3_the_smoothed_ring_pulls_as_much_as_its_formula_says() {
     let found = numbers(claim(&made, "β = 10, K = 150"));
     // -0.139232 β/K at 1 - 0.639232/K, of which six decimals are printed.
     assert!(near(found[0], -0.139232 / 15.0, 1e-6) && near(found[1], 1.0 - 0.639232 / 150.0, 1e-6), "{found:?}");
+    // The error falls with K² and K = 15 β makes less than 1e-4 of it; the double loop with β = 6 is not there.
+    let errors = claim(&made, "sharp enough");
+    assert!(errors.verdict == Verdict::Refined && errors.ours.matches("e-").count() == 3, "{errors:?}");
+    let enough = numbers(claim(&made, "as exact for SL"));
+    assert!(near(enough[0], 56.8, 3.0), "{enough:?}");
+    // A second call reads the table.
+    let table = folder.path().join("runs/sharpness.table");
+    let written = std::fs::metadata(&table).unwrap().modified().unwrap();
+    again(&["3"], &folder, 1e-5);
+    assert_eq!(std::fs::metadata(&table).unwrap().modified().unwrap(), written);
     assert!(folder.path().join("figure-03.svg").exists() && folder.path().join("figure-03.png").exists());
 }
 
@@ -65,6 +75,8 @@ fn figures_5_6_7_and_9_from_one_run() {
     for family in ["SL", "DL"] {
         assert_eq!(claim(&made, &format!("lines of {family}")).verdict, Verdict::Agrees);
         assert_eq!(claim(&made, &format!("loops {family} makes")).verdict, Verdict::Agrees);
+        let standing = claim(&made, &format!("In the inertial frame {family}"));
+        assert!(standing.verdict == Verdict::Refined && standing.ours.contains("forward; "), "{standing:?}");
     }
     // Period doublings from an independent code: shooting at 1e-12.
     let window = claim(&made, "window");
@@ -139,7 +151,12 @@ fn figure_13_there_is_a_second_stable_zone_of_the_double_loop() {
 #[test]
 fn figure_14_what_is_false_shrinks_with_the_switch() {
     let (made, _folder) = figures(&["14"]);
-    for words in ["false unstable piece", "fictitious family"] {
+    // Stretches that vanish as K grows: on S they begin at its folds, at the widths that the folds themselves have.
+    let found = numbers(claim(&made, "S at β = 6, K = 30 has points"));
+    assert!(near(found[0], 0.90675, 1e-5) && near(found[1], 0.9224, 1e-3), "{found:?}");
+    let sharp = claim(&made, "No point of contact S in figure 7");
+    assert!(sharp.verdict == Verdict::Contradicted && near(numbers(sharp)[0], 0.918069, 1e-5), "{sharp:?}");
+    for words in ["false unstable piece", "fictitious family", "So has SL", "removes them from S"] {
         let claim = claim(&made, words);
         assert_eq!(claim.verdict, Verdict::Refined, "{claim:?}");
     }

@@ -47,6 +47,6 @@ pub use campbell::{Modes, Ratio, campbell, modes, resonances, undamped_modes};
 pub use contact::{ContactLaw, Stiffness};
 pub use field::OverhungRotor;
 pub use quantities::{Nondimensional, Scale, Si};
-pub use sharpness::{SmoothingError, exact_motion, smallest_sharpness, smoothing_errors};
+pub use sharpness::{SmoothingError, exact_motion, fitted_power, smallest_sharpness, smoothing_errors};
 pub use spectrum::{Frame, Line, Spectrum, Whirl, mean_square};
 pub use units::{Dimension, Mistake, Unit, quantity};

@@ -6,7 +6,9 @@ use foldline::diagram::{Diagram, Response};
 use foldline::explore::{
     self, BranchPlan, Persistence, Plan, SeedPlan, SeedSource, Start, Switching, System, persistence,
 };
-use foldline_rotor::{ContactLaw, Nondimensional, OverhungRotor, exact_motion, smallest_sharpness, smoothing_errors};
+use foldline_rotor::{
+    ContactLaw, Nondimensional, OverhungRotor, exact_motion, fitted_power, smallest_sharpness, smoothing_errors,
+};
 
 const SHARPNESS: usize = 6;
 
@@ -96,6 +98,9 @@ fn the_error_of_smoothing_falls_with_the_square_of_the_sharpness() {
             // Five times sharper: 25 times more exact. The motions are settled to some 1e-7.
             let gain = errors[0].largest() / errors[2].largest();
             assert!((15.0..40.0).contains(&gain), "{gain} {errors:?}");
+            assert!(errors.iter().all(|e| e.lines > 0.0 && e.lines < 1e-3 && e.period < e.lines), "{errors:?}");
+            let (power, first) = fitted_power(&errors, 1e-6).unwrap();
+            assert!((power - 2.0).abs() < 0.25 && first > 0.0, "{power} {first}");
             published.push(errors[1].largest());
         }
         let (sharpness, error) = smallest_sharpness(&constants, &motions, 1e-3).unwrap();

@@ -8,7 +8,8 @@ const USAGE: &str = "cargo xtask TASK
   test        format, clippy without warnings, references, every test of the workspace
   check       the same without the tests
   bench       the reference study in a release build on one thread: time, and work of each branch
-  reproduce   every figure and claim of the reference publication in a release build, from nothing
+  reproduce   every figure and claim of the reference publication in a release build, from nothing; fails where a verdict is
+              not the one in crates/foldline-reproduce/verdicts.txt, which `reproduce --write` renews
   docs        the documentation of the source, without warnings";
 
 fn main() -> ExitCode {
@@ -17,7 +18,7 @@ fn main() -> ExitCode {
         "test" => check() && cargo(&["test", "--workspace", "--quiet"]),
         "check" => check(),
         "bench" => bench(),
-        "reproduce" => reproduce(),
+        "reproduce" => reproduce(std::env::args().nth(2).as_deref() == Some("--write")),
         "docs" => docs(),
         _ => {
             eprintln!("{USAGE}");
@@ -92,8 +93,8 @@ fn bench() -> bool {
     ran && run(Command::new(&program).arg("table").arg(&out).arg("--branches"))
 }
 
-/// Everything from nothing; a figure that fails or a branch that ends short is a failure.
-fn reproduce() -> bool {
+/// Everything from nothing; a figure that fails, a branch that ends short or a verdict that has changed is a failure.
+fn reproduce(write: bool) -> bool {
     if !cargo(&["build", "--release", "--quiet", "--package", "foldline-cli"]) {
         return false;
     }
@@ -104,7 +105,23 @@ fn reproduce() -> bool {
     let program = root().join("target/release/foldline");
     let made = run(Command::new(program).args(["reproduce", "akay2022", "--out"]).arg(&out));
     eprintln!("{:.1} s", start.elapsed().as_secs_f64());
-    made
+    made && verdicts(&out.join("verdicts.txt"), write)
+}
+
+/// Whether the verdicts are those known; with `write` they become the known ones.
+fn verdicts(found: &Path, write: bool) -> bool {
+    let known = root().join("crates/foldline-reproduce/verdicts.txt");
+    if write {
+        return std::fs::copy(found, &known).inspect_err(|error| eprintln!("{}: {error}", known.display())).is_ok();
+    }
+    let [now, before] = [found, &known].map(|file| std::fs::read_to_string(file).unwrap_or_default());
+    let only = |sign: &str, here: &str, there: &str| {
+        let lines = here.lines().filter(|line| !there.lines().any(|other| other == *line));
+        lines.inspect(|line| eprintln!("{sign} {line}")).count()
+    };
+    let gone = only("was:", &before, &now);
+    let new = only("now:", &now, &before);
+    gone + new == 0
 }
 
 fn cargo(arguments: &[&str]) -> bool {

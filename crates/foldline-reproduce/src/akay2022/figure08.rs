@@ -1,6 +1,6 @@
 //! Figure 8: the lowest part of SL on the way from cubic to contact stiffness.
 
-use super::rotor::{MAX_R, SPEED, max_r, parameters, smallest};
+use super::rotor::{MAX_R, SPEED, least_radius, parameters};
 use crate::claims::{Claim, Finding, digits};
 use crate::publication::{FigurePlan, Made};
 use crate::runs::Runs;
@@ -18,12 +18,14 @@ fn make(runs: &Runs) -> Result<Made, String> {
         Panel::new("(a)", "SL near its first fold", Axis::new("Ω").from(3.2, 5.0), Axis::new("max r").from(0.55, 1.9));
     let mut lowest = Vec::new();
     let mut missing = Vec::new();
+    let mut error = 0.0_f64;
     for (k, kappa) in STEPS.iter().enumerate() {
         match run.branch(&format!("SL {kappa}")) {
             Ok(branch) => {
                 panel = panel.with(branch_curve(branch, SPEED, MAX_R, nth(k)).named(format!("κ = {kappa}")));
-                let [r, _] = smallest(branch, max_r);
+                let [r, _, off] = least_radius(run, &branch.name)?;
                 lowest.push([parameters(&branch.points[0])[1], r]);
+                error = error.max(off);
             }
             Err(why) => missing.push(why),
         }
@@ -37,7 +39,6 @@ fn make(runs: &Runs) -> Result<Made, String> {
     let finding = || {
         let at = |kappa: f64| lowest.iter().find(|[k, _]| (k - kappa).abs() < 1e-9).map(|[_, r]| *r);
         let (Some(cubic), Some(contact)) = (at(0.0), at(1.0)) else { return Err(missing.join("; ")) };
-        let error = 1e-5;
         let ours = format!("{} and {}", digits(cubic, error), digits(contact, error));
         let crossing = lowest.windows(2).find(|w| (w[0][1] < 1.0) != (w[1][1] < 1.0));
         let note = crossing.map_or(String::new(), |w| format!("it passes 1 between κ = {} and {}", w[0][0], w[1][0]));

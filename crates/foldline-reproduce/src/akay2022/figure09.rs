@@ -74,7 +74,12 @@ fn cascade(run: &Run, family: &str) -> Vec<Claim> {
             })
             .collect();
         let list: Vec<String> = ends.iter().map(|at| format!("{at:.6}")).collect();
-        Ok(Finding::fact(ends.len() == 2, list.join(", ")).within(1e-6))
+        // The farther of the ends from the period doubling that it should be.
+        let doublings = speeds(&run.special(&format!("contact {family}"), Kind::PeriodDoubling)?);
+        let apart =
+            |end: &f64| doublings.iter().map(|[at, error]| (at - end).abs() + error).fold(f64::INFINITY, f64::min);
+        let error = ends.iter().map(apart).fold(0.0, f64::max);
+        Ok(Finding::fact(ends.len() == 2, list.join(", ")).within(error))
     };
     vec![
         Claim::decided(

@@ -1,7 +1,7 @@
 //! Figures 10 and 11: next to no damping.
 
 use super::figure04::chosen;
-use super::rotor::{FAMILIES, MAX_R, max_r, over_speed, smallest};
+use super::rotor::{FAMILIES, MAX_R, least_radius, over_speed};
 use crate::claims::{Claim, Finding, digits};
 use crate::publication::{FigurePlan, Made};
 use crate::runs::{Run, Runs};
@@ -90,9 +90,9 @@ fn lowest(
     holds: impl Fn(f64) -> bool,
     finding: fn(bool, String) -> Finding,
 ) -> Result<Finding, String> {
-    let sheets = [run.branch(name)?].into_iter().chain(run.branch(&format!("{name} lower")).ok());
-    let lowest = sheets.map(|branch| smallest(branch, max_r)).min_by(|a, b| a[0].total_cmp(&b[0]));
-    let [r, omega] = lowest.unwrap_or([f64::NAN; 2]);
-    let error = 1e-5;
+    let sheets = [name.to_string(), format!("{name} lower")].into_iter().filter(|name| run.branch(name).is_ok());
+    let lowest = sheets.map(|name| least_radius(run, &name)).collect::<Result<Vec<_>, _>>()?;
+    let least = lowest.into_iter().min_by(|a, b| a[0].total_cmp(&b[0]));
+    let [r, omega, error] = least.ok_or_else(|| format!("there is no branch {name}"))?;
     Ok(finding(holds(r), format!("max r = {} at Ω = {omega:.5}", digits(r, error))).within(error))
 }

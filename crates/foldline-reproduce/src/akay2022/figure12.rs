@@ -86,9 +86,9 @@ fn second_zone(run: &Run) -> Claim {
         let second = below.max_by(|a, b| (a.speed[1] - a.speed[0]).total_cmp(&(b.speed[1] - b.speed[0])));
         Ok(match second {
             Some(zone) => {
-                let [a, b] = zone.speed.map(|w| digits(w, 1e-6));
+                let [a, b] = zone.speed.map(|w| digits(w, zone.error));
                 let ours = format!("Ω = {a} to {b}, max r = {:.4} to {:.4}", zone.radius[0], zone.radius[1]);
-                Finding::qualified(true, ours).within(1e-6)
+                Finding::qualified(true, ours).within(zone.error)
             }
             None => Finding::fact(false, format!("{} stable zones, none below the main one", zones.len())),
         })
@@ -102,28 +102,33 @@ struct Zone {
     speed: [f64; 2],
     /// Smallest and largest max r.
     radius: [f64; 2],
+    /// The error of the special points at its ends, in Ω.
+    error: f64,
 }
 
 /// The stable stretches of a branch, from one change of stability to the next.
 fn stable_zones(branch: &Branch) -> Vec<Zone> {
-    let mut marks: Vec<(i64, bool, f64, f64, bool)> = Vec::new();
+    let mut marks: Vec<(i64, bool, f64, f64, bool, f64)> = Vec::new();
     for p in &branch.points {
-        marks.push((p.position, false, p.parameters[OMEGA], max_r(p), p.unstable == 0));
+        marks.push((p.position, false, p.parameters[OMEGA], max_r(p), p.unstable == 0, 0.0));
     }
     for s in &branch.special {
-        marks.push((s.point.position, true, s.point.parameters[OMEGA], max_r(&s.point), s.unstable_after == 0));
+        let omega = s.point.parameters[OMEGA];
+        let error = s.error * (1.0 + omega.abs());
+        marks.push((s.point.position, true, omega, max_r(&s.point), s.unstable_after == 0, error));
     }
     // A special point lies behind the point of its position.
     marks.sort_by_key(|m| (m.0, m.1));
     let mut zones: Vec<Zone> = Vec::new();
     let mut open = false;
-    for (_, _, w, r, stable) in marks {
+    for (_, _, w, r, stable, error) in marks {
         match (open, stable, zones.last_mut()) {
             (true, _, Some(zone)) => {
                 zone.speed = [zone.speed[0].min(w), zone.speed[1].max(w)];
                 zone.radius = [zone.radius[0].min(r), zone.radius[1].max(r)];
+                zone.error = zone.error.max(error);
             }
-            (_, true, _) => zones.push(Zone { speed: [w, w], radius: [r, r] }),
+            (_, true, _) => zones.push(Zone { speed: [w, w], radius: [r, r], error }),
             _ => {}
         }
         open = stable;

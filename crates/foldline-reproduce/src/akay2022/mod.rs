@@ -2,6 +2,7 @@
 //!
 //! **Source.** akay2024.
 
+mod artefacts;
 mod figure03;
 mod figure04;
 mod figure05;
@@ -16,6 +17,7 @@ mod identities;
 mod limits;
 mod orbits;
 mod rotor;
+mod sharpness;
 
 use crate::publication::{FigurePlan, Publication, StudyPlan};
 

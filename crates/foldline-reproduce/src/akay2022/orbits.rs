@@ -1,9 +1,9 @@
 //! Orbits in the rotating frame, and their signed spectra.
 
-use foldline::attractors::signed_spectrum;
 use foldline::diagram::{Cycle, Point, Solution};
 use foldline_plot::palette::GREY;
 use foldline_plot::{Axis, Layer, Panel};
+use foldline_rotor::Line;
 
 /// The states u and v.
 pub const WHIRL: [usize; 2] = [0, 1];
@@ -43,31 +43,6 @@ pub fn orbit_panel(label: &str, title: &str, reach: f64) -> Panel {
     Panel { height: 420.0, ..panel.with(contact_circle()) }
 }
 
-/// A line of a spectrum: its multiple of the base frequency 2π/T, angular frequency and amplitude.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Line {
-    /// k.
-    pub multiple: i64,
-    /// 2πk/T.
-    pub frequency: f64,
-    /// |c_k|.
-    pub amplitude: f64,
-}
-
-/// The lines of u + jv, strongest first.
-pub fn lines(cycle: &Cycle) -> Vec<Line> {
-    let spectrum = signed_spectrum(cycle, WHIRL, SAMPLES);
-    let half = SAMPLES as i64 / 2;
-    let line = |(k, (f, c)): (usize, &(f64, num_complex::Complex64))| Line {
-        multiple: k as i64 - half,
-        frequency: std::f64::consts::TAU * f,
-        amplitude: c.norm(),
-    };
-    let mut lines: Vec<Line> = spectrum.iter().enumerate().map(line).collect();
-    lines.sort_by(|a, b| b.amplitude.total_cmp(&a.amplitude));
-    lines
-}
-
 /// `−2w`.
 pub fn multiple(k: i64) -> String {
     match k {
@@ -79,10 +54,9 @@ pub fn multiple(k: i64) -> String {
     }
 }
 
-/// The signed spectrum as stems over the angular frequency, the strongest lines labelled with their multiple.
-pub fn spectrum(cycle: &Cycle, colour: &'static str, weakest: f64, labelled: usize) -> Layer {
-    let shown: Vec<Line> = lines(cycle).into_iter().filter(|line| line.amplitude >= weakest).collect();
-    let label = |(k, line): (usize, &Line)| if k < labelled { multiple(line.multiple) } else { String::new() };
-    let labels = shown.iter().enumerate().map(label).collect();
-    Layer::stems(shown.iter().map(|line| [line.frequency, line.amplitude]).collect(), labels, colour)
+/// Lines of a spectrum as stems over the angular frequency, the first ones labelled with their multiple.
+pub fn stems(lines: &[Line], colour: &'static str, labelled: usize) -> Layer {
+    let label = |(k, line): (usize, &Line)| if k < labelled { multiple(line.order) } else { String::new() };
+    let labels = lines.iter().enumerate().map(label).collect();
+    Layer::stems(lines.iter().map(|line| [line.frequency, line.amplitude.norm()]).collect(), labels, colour)
 }

@@ -77,6 +77,15 @@ pub fn smallest(branch: &Branch, measure: impl Fn(&Point) -> f64) -> [f64; 2] {
     values.min_by(|a, b| a[0].total_cmp(&b[0])).unwrap_or([f64::NAN; 2])
 }
 
+/// The least of max r along a branch, the Ω there, and the error of that radius.
+///
+/// # Errors
+/// There is no such branch.
+pub fn least_radius(run: &Run, branch: &str) -> Result<[f64; 3], String> {
+    let (point, error) = run.least(branch, &max_r)?;
+    Ok([max_r(&point), point.parameters[OMEGA], error])
+}
+
 /// Whether a branch closes on itself.
 pub fn is_closed(branch: &Branch) -> bool {
     branch.ends.contains(&Some(Ending::Closed))

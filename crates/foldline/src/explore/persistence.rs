@@ -2,7 +2,8 @@
 //!
 //! **Idea.** A parameter that stands for an idealisation, such as the sharpness of a smoothed contact, should not decide what
 //! exists. The solution is followed in that parameter alone, all others fixed: it reaches the value, or the curve turns
-//! back before, and then the solution exists only because the parameter is what it is.
+//! back before, and then the solution exists only because the parameter is what it is. That the curve may turn once more
+//! and get to the value as another solution changes nothing.
 //!
 //! **Source.** akay2024, where branches that a small sharpness makes up are shown, and avoided by a larger one.
 //!
@@ -11,7 +12,7 @@
 
 use super::System;
 use super::growth::{Beginning, Growth, polished, problem_of, settings};
-use crate::contract::Unobserved;
+use crate::contract::{Event, Observer, Verdict};
 use crate::diagram::{Branch, Ending, Family, Kind, Origin, Point, Solution};
 
 /// What becomes of a solution.
@@ -21,7 +22,7 @@ pub enum Persistence {
     Survives(Box<Point>),
     /// It reaches the value with another number of them.
     Changes(Box<Point>),
-    /// The curve turns back at this value of the parameter, the farthest it gets to.
+    /// The curve turns back at this value of the parameter, up to which the solution exists.
     Vanishes {
         /// Where it turns back.
         fold: f64,
@@ -69,7 +70,7 @@ pub fn persistence(
     let mut branch = Branch::new("persistence", family, free, Origin::Seed(String::new()));
     let sides = [!forward, forward];
     let growth =
-        Growth { system, settings: &settings, degree, ties: Vec::new(), sides, parents: &[], observer: &Unobserved };
+        Growth { system, settings: &settings, degree, ties: Vec::new(), sides, parents: &[], observer: &UntilFold };
     growth.begin(&mut branch, Beginning::Inside(start));
     decided(&branch, value, forward, unstable)
 }
@@ -77,18 +78,29 @@ pub fn persistence(
 fn decided(branch: &Branch, value: f64, forward: bool, unstable: usize) -> Persistence {
     let end = if forward { branch.points.last() } else { branch.points.first() };
     let ending = branch.ends[usize::from(forward)].clone().unwrap_or(Ending::Stopped);
-    let arrived = |bound: f64| (bound - value).abs() <= 1e-9 * (1.0 + value.abs());
-    if let (Ending::Bound(bound), Some(end)) = (&ending, end)
-        && arrived(*bound)
-    {
-        let at = Box::new(end.clone());
-        return if at.unstable == unstable { Persistence::Survives(at) } else { Persistence::Changes(at) };
+    // Beyond the first fold there is another solution, wherever that gets to.
+    let mut folds = branch.special.iter().filter(|s| s.kind == Kind::Fold);
+    if let Some(fold) = if forward { folds.next() } else { folds.next_back() } {
+        return Persistence::Vanishes { fold: fold.point.parameters[branch.free] };
     }
-    // It came back, or ended on the way back: the farthest fold is where it vanishes.
-    let folds = branch.special.iter().filter(|s| s.kind == Kind::Fold).map(|s| s.point.parameters[branch.free]);
-    let farthest = if forward { folds.reduce(f64::max) } else { folds.reduce(f64::min) };
-    match (farthest, &ending) {
-        (Some(fold), Ending::Bound(_) | Ending::Closed) => Persistence::Vanishes { fold },
+    let arrived = |bound: f64| (bound - value).abs() <= 1e-9 * (1.0 + value.abs());
+    match (&ending, end) {
+        (Ending::Bound(bound), Some(end)) if arrived(*bound) => {
+            let at = Box::new(end.clone());
+            if at.unstable == unstable { Persistence::Survives(at) } else { Persistence::Changes(at) }
+        }
         _ => Persistence::Undecided(ending),
+    }
+}
+
+/// Ends a curve where it turns back.
+struct UntilFold;
+
+impl Observer for UntilFold {
+    fn observe(&self, event: Event) -> Verdict {
+        match event {
+            Event::Special(_, special) if special.kind == Kind::Fold => Verdict::Stop,
+            _ => Verdict::Continue,
+        }
     }
 }
