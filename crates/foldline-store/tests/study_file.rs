@@ -235,7 +235,13 @@ fn mistakes_about_homotopies() {
 #[test]
 fn mistakes_about_names_and_about_what_a_branch_starts_from() {
     all_are_said(&[
-        ("name = \"goal\"", "name = \"folds\"", "\"folds\"", "\"folds\" is used twice", "curve and homotopy"),
+        (
+            "name = \"goal\"",
+            "name = \"folds\"",
+            "\"folds\"",
+            "\"folds\" is used twice",
+            "curve, homotopy, survey and sweep",
+        ),
         (
             "name = \"doublings\"",
             "name = \"cycles/period-doubling-3\"",

@@ -5,7 +5,7 @@
 //! that the special point found does not explain, or while a monitor bends so much that it may have touched zero and come
 //! back. What stays unexplained at the end of that is recorded as such: no silent change of stability.
 
-use super::corrector::{Plane, Station, settle};
+use super::corrector::{Failure, Plane, Station, settle};
 use super::follow::Follow;
 use super::locate::{Located, Stretch, locate};
 use super::straddle::straddle;
@@ -70,9 +70,13 @@ impl Follow<'_> {
             if found.is_err() && matches!(kind, Kind::Fold | Kind::BranchPoint) {
                 found = straddle(self.problem, self.settings, &stretch, monitor, values, cost);
                 // A fold with a singular matrix at which stability stays: this branch is the one that leaves another at a
-                // pitchfork, and goes on as its own mirror image.
+                // pitchfork, and goes on as its own mirror image. Without a mirror the step has cut across to another branch.
                 if kind == Kind::Fold && left.point.unstable == right.point.unstable {
-                    (kind, jump) = (Kind::BranchPoint, 0);
+                    if self.settings.reflections.len() > 1 {
+                        (kind, jump) = (Kind::BranchPoint, 0);
+                    } else {
+                        found = Err(Failure::Unexplained);
+                    }
                 }
             }
             match found {

@@ -1,10 +1,14 @@
 //! Smallest and largest values of states and outputs.
 //!
-//! **Idea.** Sample densely, then refine each extreme by parabolas through three points of the polynomial profile.
+//! **Idea.** Sample densely, then refine by parabolas through three points of the polynomial profile. Between samples a peak may
+//! rise above a higher sample, so the best few peaks are refined, not only the best one.
 
 use super::gauss::Scheme;
 use crate::contract::{Batch, Parameters, VectorField};
 use crate::diagram::Mesh;
+
+/// Peaks of one channel that are refined.
+const PEAKS: usize = 3;
 
 /// At one state: every range is a single value.
 pub fn of_state(field: &dyn VectorField, parameters: &[f64], x: &[f64]) -> Vec<[f64; 2]> {
@@ -43,29 +47,39 @@ pub fn of_profile(
     let batch = Batch { lanes, states: &states, parameters: Parameters::Shared(parameters) };
     field.outputs(batch, &mut values[n * lanes..]);
 
-    // For every channel and both signs: a place (in units of samples) and a spacing.
-    let mut places = Vec::with_capacity(2 * channels);
-    let mut best = Vec::with_capacity(2 * channels);
+    // For every channel and both signs the best few peaks: (channel and sign, place in units of samples).
+    let mut places: Vec<(usize, f64)> = Vec::with_capacity(2 * PEAKS * channels);
+    let mut best = vec![f64::NEG_INFINITY; 2 * channels];
     for c in 0..channels {
         let line = &values[c * lanes..(c + 1) * lanes];
-        for sign in [-1.0, 1.0] {
-            let at = (0..lanes).fold(0, |b, l| if sign * line[l] > sign * line[b] { l } else { b });
-            places.push(at as f64);
-            best.push(sign * line[at]);
+        for (q, sign) in [(2 * c, -1.0), (2 * c + 1, 1.0)] {
+            let (mut peaks, mut top) = (Vec::new(), 0);
+            for l in 0..lanes {
+                let [a, b, d] = [(l + lanes - 1) % lanes, l, (l + 1) % lanes].map(|k| sign * line[k]);
+                if b >= a && b >= d {
+                    // How far the parabola rises above the sample.
+                    let rise = if a + d < 2.0 * b { (d - a) * (d - a) / (8.0 * (2.0 * b - a - d)) } else { 0.0 };
+                    peaks.push((b + rise, l));
+                }
+                top = if b > sign * line[top] { l } else { top };
+            }
+            best[q] = sign * line[top];
+            peaks.sort_by(|x, y| y.0.total_cmp(&x.0));
+            places.extend(peaks.iter().take(PEAKS).map(|(_, l)| (q, *l as f64)));
         }
     }
     let mut spacing = 1.0;
     for _ in 0..4 {
         let probes = 3 * places.len();
         let mut states = vec![0.0; n * probes];
-        for (q, place) in places.iter().enumerate() {
+        for (probe, (_, place)) in places.iter().enumerate() {
             for (k, offset) in [-spacing, 0.0, spacing].iter().enumerate() {
                 let position = (place + offset).rem_euclid(lanes as f64) / per_interval as f64;
                 let j = (position.floor() as usize).min(count - 1);
                 let weights = scheme.interpolation(position - j as f64);
                 for (node, w) in weights.iter().enumerate() {
                     for i in 0..n {
-                        states[i * probes + 3 * q + k] += w * profile[(j * (m + 1) + node) * n + i];
+                        states[i * probes + 3 * probe + k] += w * profile[(j * (m + 1) + node) * n + i];
                     }
                 }
             }
@@ -74,9 +88,10 @@ pub fn of_profile(
         values.resize(channels * probes, 0.0);
         let batch = Batch { lanes: probes, states: &states, parameters: Parameters::Shared(parameters) };
         field.outputs(batch, &mut values[n * probes..]);
-        for (q, place) in places.iter_mut().enumerate() {
+        for (probe, (q, place)) in places.iter_mut().enumerate() {
+            let q = *q;
             let sign = if q % 2 == 0 { -1.0 } else { 1.0 };
-            let at = (q / 2) * probes + 3 * q;
+            let at = (q / 2) * probes + 3 * probe;
             let (a, b, c) = (sign * values[at], sign * values[at + 1], sign * values[at + 2]);
             best[q] = best[q].max(a).max(b).max(c);
             let bend = a - 2.0 * b + c;
