@@ -9,9 +9,11 @@
 //! | what belongs to a publication? | [`publication`] |
 //! | how does a study become a run, once for all figures? | [`runs`] |
 //! | does the publication say the same? | [`claims`] |
+//! | do simulation and continuation say the same? | [`agreement`] |
 //! | what is written in the end? | [`report`] |
 //! | how is figure N made? | `akay2022/figureNN.rs` |
 
+pub mod agreement;
 pub mod akay2022;
 pub mod claims;
 pub mod publication;
