@@ -15,6 +15,7 @@ mod figure14;
 mod identities;
 mod orbits;
 mod rotor;
+mod simulation;
 
 use crate::publication::{FigurePlan, Publication, StudyPlan};
 
@@ -46,6 +47,8 @@ const STUDIES: &[StudyPlan] = &[
     study!("light-damping-large-unbalance-cubic", 0.3),
     study!("light-damping-large-unbalance-contact", 3.0),
     study!("blunt-contact", 0.5),
+    study!("simulation", 100.0),
+    study!("other-cycles", 6.0),
 ];
 
 const FIGURES: &[FigurePlan] = &[
