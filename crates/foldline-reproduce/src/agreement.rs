@@ -33,6 +33,8 @@ const INTEGRATION: f64 = 1e-7;
 const LARGEST: f64 = 1e-3;
 /// Turns of a branch's cycle that a trajectory may take to repeat itself: close to a period doubling it is two for long.
 const TURNS: i32 = 4;
+/// A motion that is farther from every solution, in units of what (1) allows, is not said to be near one.
+const NEARLY: f64 = 30.0;
 
 /// What a survey and branches say about each other.
 #[derive(Clone, Debug, Default)]
@@ -50,8 +52,20 @@ pub struct Met {
     pub motion: Response,
     /// How often it was followed on.
     pub followed: usize,
+    /// The closest solution of its kind.
+    pub nearest: Option<Place>,
+}
+
+impl Met {
     /// The solution that it is.
-    pub on: Option<Place>,
+    pub fn on(&self) -> Option<&Place> {
+        self.nearest.as_ref().filter(|place| place.apart <= 1.0)
+    }
+
+    /// Whether it lies on a stable part of a branch.
+    pub fn is_explained(&self) -> bool {
+        self.on().is_some_and(|place| place.stable)
+    }
 }
 
 /// A solution on a branch.
@@ -138,8 +152,15 @@ impl Context<'_> {
     /// The motions of one value; `both` says that the stable solutions are asked for too.
     fn at_value(&self, group: &[Response], both: bool) -> Agreement {
         let Some(first) = group.first() else { return Agreement::default() };
-        let known = self.solutions(first);
-        let met: Vec<Met> = group.iter().map(|response| self.explained(response, &known)).collect();
+        let known = self.solutions(first, false);
+        let mut met: Vec<Met> = group.iter().map(|response| self.explained(response, &known)).collect();
+        if met.iter().any(|m| !m.is_explained()) {
+            // On an unstable part, then?
+            let all = self.solutions(first, true);
+            for m in met.iter_mut().filter(|m| !m.is_explained()) {
+                m.nearest = self.nearest(&m.motion, &all);
+            }
+        }
         let stable = known.iter().filter(|k| both && k.point.unstable == 0);
         let stable = stable.map(|k| Stable {
             branch: k.branch.name.clone(),
@@ -150,8 +171,9 @@ impl Context<'_> {
         Agreement { stable: stable.collect(), met }
     }
 
-    /// Every solution of every branch at the parameters of a response.
-    fn solutions(&self, response: &Response) -> Vec<Known<'_>> {
+    /// The solutions of every branch at the parameters of a response, without the parts that are certainly unstable unless asked
+    /// for.
+    fn solutions(&self, response: &Response, unstable: bool) -> Vec<Known<'_>> {
         let same = |point: &Point| {
             let pairs = point.parameters.iter().zip(&response.parameters).enumerate();
             pairs.filter(|(k, _)| *k != self.free).all(|(_, (a, b))| a == b)
@@ -161,8 +183,11 @@ impl Context<'_> {
             let tolerance = run.study.plan.tolerance;
             let settings: Settings = growth::settings(self.system, tolerance, [f64::NEG_INFINITY, f64::INFINITY], 0);
             for branch in run.diagram.branches.iter().filter(|b| b.held.is_none() && b.free == self.free) {
-                if branch.points.first().is_some_and(same) {
-                    let points = known::solutions_at(self.system, &settings, branch, response.value);
+                if !branch.points.first().is_some_and(same) {
+                    continue;
+                }
+                for part in passing(branch, response.value, unstable) {
+                    let points = known::solutions_at(self.system, &settings, &part, response.value);
                     found.extend(points.into_iter().map(|point| Known { branch, point, tolerance }));
                 }
             }
@@ -179,8 +204,8 @@ impl Context<'_> {
             let Some(next) = self.settled(&motion.parameters, motion.value, &motion.state) else { break };
             motion = Response { hits: response.hits, ..next };
         }
-        let on = self.place(&motion, known);
-        Met { motion, followed, on }
+        let nearest = self.nearest(&motion, known);
+        Met { motion, followed, nearest }
     }
 
     /// Where a trajectory settles.
@@ -205,10 +230,10 @@ impl Context<'_> {
         }
     }
 
-    /// The closest solution within the errors.
-    fn place(&self, motion: &Response, known: &[Known]) -> Option<Place> {
+    /// The closest solution.
+    fn nearest(&self, motion: &Response, known: &[Known]) -> Option<Place> {
         let near = known.iter().filter_map(|k| self.apart(motion, k).map(|(turns, apart)| (k, turns, apart)));
-        let (k, turns, apart) = near.min_by(|a, b| a.2.total_cmp(&b.2)).filter(|(.., apart)| *apart <= 1.0)?;
+        let (k, turns, apart) = near.min_by(|a, b| a.2.total_cmp(&b.2))?;
         Some(Place { branch: k.branch.name.clone(), stable: k.point.unstable == 0, turns, apart })
     }
 
@@ -236,13 +261,40 @@ impl Context<'_> {
     }
 }
 
+/// The parts of a branch, two neighbouring points each, that pass a value; without those whose ends are both unstable unless asked
+/// for, and unless a special point lies between them.
+fn passing(branch: &Branch, value: f64, unstable: bool) -> Vec<Branch> {
+    let pairs = branch.points.windows(2).map(|pair| {
+        let between =
+            branch.special.iter().filter(|s| (pair[0].position..pair[1].position).contains(&s.point.position));
+        let mut part = Branch::new(branch.name.clone(), branch.family, branch.free, branch.origin.clone());
+        part.points = pair.to_vec();
+        part.special = between.cloned().collect();
+        part
+    });
+    let wanted = |part: &Branch| {
+        let all = || part.points.iter().chain(part.special.iter().map(|s| &s.point));
+        let side = |p: &Point| p.parameters[branch.free] - value;
+        let (low, high) = (all().map(side).fold(f64::MAX, f64::min), all().map(side).fold(f64::MIN, f64::max));
+        low <= 0.0
+            && high >= 0.0
+            && (unstable || !part.special.is_empty() || part.points.iter().any(|p| p.unstable == 0))
+    };
+    pairs.filter(wanted).collect()
+}
+
 impl Agreement {
     /// The motions on no branch, or on an unstable part of one, alike ones together: what they are, at how many values from where to
     /// where, and how many starts went there.
     pub fn unexplained(&self) -> Vec<String> {
         let mut groups: Vec<(String, Vec<&Response>)> = Vec::new();
-        for met in self.met.iter().filter(|m| m.on.as_ref().is_none_or(|place| !place.stable)) {
-            let name = described(&met.motion);
+        for met in self.met.iter().filter(|m| !m.is_explained()) {
+            let near = met.nearest.as_ref().filter(|place| place.apart < NEARLY);
+            let aside = near.map(|place| match place.apart <= 1.0 {
+                true => format!(" (unstable on {})", place.branch),
+                false => format!(" ({:.1} times the errors from {})", place.apart, place.branch),
+            });
+            let name = format!("{}{}", described(&met.motion), aside.unwrap_or_default());
             match groups.iter_mut().find(|(known, _)| *known == name) {
                 Some((_, all)) => all.push(&met.motion),
                 None => groups.push((name, vec![&met.motion])),

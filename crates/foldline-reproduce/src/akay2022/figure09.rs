@@ -89,7 +89,7 @@ fn survey(simulated: &Simulated) -> [Layer; 2] {
     let dot = |points: Vec<[f64; 2]>, name: &str| Layer::scatter(points, Marker::Circle, GREY).wide(2.6).named(name);
     let met = simulated.survey.met.iter().map(|met| place(&met.motion)).collect();
     let missed = simulated.missed().map(|stable| [stable.value, max_r(&stable.point)]).collect();
-    [dot(met, "met from many starts"), dot(missed, "met from beside it").hollow()]
+    [dot(met, "met from many starts"), dot(missed, "met only from beside it").hollow()]
 }
 
 fn place(motion: &Response) -> [f64; 2] {
@@ -105,7 +105,8 @@ fn swept(run: &Run, simulated: &Simulated) -> Result<Panel, String> {
         [(&simulated.up, Marker::Triangle, ORANGE, "sweep up"), (&simulated.down, Marker::Nabla, SKY, "sweep down")]
     {
         let places: Vec<[f64; 2]> = set.met.iter().map(|met| place(&met.motion)).collect();
-        panel = panel.with(Layer::scatter(places, marker, shade).wide(2.8).named(name));
+        panel = panel.with(Layer::curve(&places, shade).wide(0.8));
+        panel = panel.with(Layer::scatter(places, marker, shade).wide(3.0).named(name));
     }
     Ok(panel)
 }

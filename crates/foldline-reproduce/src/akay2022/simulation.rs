@@ -4,9 +4,15 @@ use super::rotor::{OMEGA, speeds};
 use crate::agreement::{Agreement, Met, Seen, Stable, compare};
 use crate::claims::{Claim, Finding};
 use crate::runs::Run;
-use foldline::diagram::{Kind, Motion};
+use foldline::diagram::{Kind, Motion, Responses, Search};
 
 const FIGURE: &str = "9";
+const DL: &str = "contact DL";
+
+/// Whether a motion lies on DL or on what comes from it by period doubling.
+fn on_dl(met: &Met) -> bool {
+    met.on().is_some_and(|place| place.branch.starts_with(DL))
+}
 
 /// The survey and the sweeps, compared with the branches.
 pub struct Simulated {
@@ -16,6 +22,8 @@ pub struct Simulated {
     pub up: Agreement,
     /// DL swept down.
     pub down: Agreement,
+    /// DL at the first speed at which each sweep is no longer on it, up and down: whether it still attracts there.
+    pub left: [Vec<Stable>; 2],
     /// Starts at each speed of the survey.
     pub starts: usize,
     /// Speeds of the survey.
@@ -23,17 +31,26 @@ pub struct Simulated {
 }
 
 impl Simulated {
-    /// Compares the simulations of `run` with the branches of `followed`.
+    /// Compares the simulations of `run` with the branches of `followed`; the first of them holds S, SL and DL.
     ///
     /// # Errors
     /// A simulation is not there.
     pub fn of(run: &Run, followed: &[&Run], jobs: usize) -> Result<Simulated, String> {
-        let compared = |name: &str| Ok::<_, String>(compare(run, run.responses(name)?, followed, jobs));
+        let first = followed.get(..1).unwrap_or_default();
+        let swept = |name: &str| Ok::<_, String>(compare(run, run.responses(name)?, first, jobs));
+        let (up, down) = (swept("DL up")?, swept("DL down")?);
+        let left = [&up, &down].map(|sweep| {
+            let responses = sweep.met.iter().find(|m| !on_dl(m)).map(|m| m.motion.clone()).into_iter().collect();
+            let set = Responses { name: String::new(), search: Search::Survey, free: OMEGA, responses };
+            let stable = compare(run, &set, first, jobs).stable.into_iter();
+            stable.filter(|s| s.branch.starts_with(DL)).collect()
+        });
         let plan = run.study.plan.surveys.first();
         Ok(Simulated {
-            survey: compared("what attracts")?,
-            up: compared("DL up")?,
-            down: compared("DL down")?,
+            survey: compare(run, run.responses("what attracts")?, followed, jobs),
+            up,
+            down,
+            left,
             starts: plan.map_or(0, |plan| plan.starts),
             speeds: plan.map_or(0, |plan| plan.values.len()),
         })
@@ -54,19 +71,19 @@ pub fn claims(run: &Run, simulated: &Simulated) -> Vec<Claim> {
         Ok(places.iter().map(|[at, _]| *at).fold(f64::NAN, f64::max))
     };
     let deepest = "contact DL/period-doubling-1/period-doubling-1";
-    claims.push(fall("up", &simulated.up.met, "the fold of DL", end(Kind::Fold, "contact DL")));
+    let [up, down] = &simulated.left;
+    claims.push(fall("up", &simulated.up.met, up, "the fold of DL", end(Kind::Fold, DL)));
     let doubling = "the period doubling of its cycles of four times the period";
-    claims.push(fall("down", &simulated.down.met, doubling, end(Kind::PeriodDoubling, deepest)));
+    claims.push(fall("down", &simulated.down.met, down, doubling, end(Kind::PeriodDoubling, deepest)));
     claims
 }
 
 /// Whether every motion that was met lies on a stable part of a branch.
 fn explained(simulated: &Simulated) -> Claim {
     let met = &simulated.survey.met;
-    let stable = |met: &Met| met.on.as_ref().is_some_and(|place| place.stable);
-    let holds: Vec<bool> = met.iter().map(stable).collect();
+    let holds: Vec<bool> = met.iter().map(Met::is_explained).collect();
     let count = holds.iter().filter(|h| **h).count();
-    let farthest = met.iter().filter(|m| stable(m)).filter_map(|m| Some(m.on.as_ref()?.apart)).fold(0.0, f64::max);
+    let farthest = met.iter().filter(|m| m.is_explained()).filter_map(|m| Some(m.on()?.apart)).fold(0.0, f64::max);
     let late = met.iter().filter(|m| m.followed > 0).count();
     let unsettled = met.iter().filter(|m| m.motion.motion == Motion::Other).count();
     let mut note = format!(
@@ -116,23 +133,30 @@ fn parts(survey: &Agreement) -> Vec<Claim> {
     names.into_iter().map(claim).collect()
 }
 
-/// Where a sweep leaves DL, against where DL ends.
-fn fall(direction: &str, met: &[Met], what: &str, end: Result<f64, String>) -> Claim {
+/// Where a sweep leaves DL, against where DL ends. It may leave earlier: a step of the speed can throw it out of a basin that gets
+/// narrower, which shows where DL at the new speed attracts what starts beside it. It cannot stay longer.
+fn fall(direction: &str, met: &[Met], left: &[Stable], what: &str, end: Result<f64, String>) -> Claim {
     let finding = || {
         let end = end?;
-        let on = |met: &Met| met.on.as_ref().is_some_and(|place| place.branch.starts_with("contact DL"));
-        let last = met.iter().take_while(|m| on(m)).last().ok_or("the sweep does not begin on DL")?;
-        let first = met.iter().find(|m| !on(m)).ok_or("the sweep does not leave DL")?;
-        let speed = |met: &Met| met.motion.parameters[OMEGA];
-        let [low, high] = [speed(last).min(speed(first)), speed(last).max(speed(first))];
-        let to = first.on.as_ref().map_or("no branch".to_string(), |place| place.branch.replace("contact ", ""));
-        let ours = format!("between Ω = {low:.4} and {high:.4}, to {to}");
-        let note = format!("{what} lies at {end:.5}");
-        Ok(Finding::qualified((low..=high).contains(&end), ours).within(high - low).noting(note))
+        let last = met.iter().take_while(|m| on_dl(m)).last().ok_or("the sweep does not begin on DL")?;
+        let first = met.iter().find(|m| !on_dl(m)).ok_or("the sweep does not leave DL")?;
+        let [from, to] = [last, first].map(|m| m.motion.parameters[OMEGA]);
+        let passes = (from - end) * (to - end) <= 0.0;
+        let thrown = !left.is_empty() && left.iter().all(|s| s.seen == Seen::FromNearby);
+        let early = (end - to) * (to - from) > 0.0 && (end - to).abs() <= 2.0 * (to - from).abs() && thrown;
+        let where_to = first.on().map_or("no branch".to_string(), |place| place.branch.replace("contact ", ""));
+        let ours = format!("between Ω = {from:.4} and {to:.4}, to {where_to}");
+        let mut note = format!("{what} lies at {end:.5}");
+        if early {
+            note.push_str(
+                "; the last step of the speed leads out of the basin, as DL still attracts what starts beside it",
+            );
+        }
+        Ok(Finding::qualified(passes || early, ours).within((to - from).abs()).noting(note))
     };
     Claim::decided(
         FIGURE,
-        format!("A sweep {direction} follows DL until its stable part ends, and jumps"),
+        format!("A sweep {direction} follows DL to the end of its stable part, and jumps"),
         "yes",
         finding(),
     )
