@@ -24,8 +24,8 @@ use foldline::explore::{System, growth, known};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// By how much a start is moved away from a solution, relative to scale and size. The trajectory has to come a hundred times closer to
-/// count as settled.
+/// By how much a start is moved away from a solution, relative to scale and size; if it does not come back, a tenth of that. To
+/// count as settled the trajectory has to come a hundred times closer.
 pub const ASIDE: f64 = 1e-4;
 /// How often a motion that has not settled is followed on.
 const FOLLOWED: usize = 6;
@@ -219,15 +219,17 @@ impl Context<'_> {
         if hits > 0 {
             return Seen::Sampled(hits);
         }
-        let mut start = match &known.point.solution {
+        let solution = match &known.point.solution {
             Solution::Equilibrium(x) => x.clone(),
             Solution::Cycle(cycle) => cycle.state(0.0),
         };
-        start.iter_mut().zip(&self.system.scales).for_each(|(x, scale)| *x += ASIDE * (scale + x.abs()));
-        match self.settled(&at.parameters, at.value, &start) {
-            Some(motion) if here(&motion) => Seen::FromNearby,
-            _ => Seen::Never,
-        }
+        let comes_back = |aside: f64| {
+            let start = solution.iter().zip(&self.system.scales).map(|(x, scale)| x + aside * (scale + x.abs()));
+            let start: Vec<f64> = start.collect();
+            self.settled(&at.parameters, at.value, &start).is_some_and(|motion| here(&motion))
+        };
+        // Close to where a cycle begins or doubles its period its basin is very narrow.
+        if [ASIDE, 0.1 * ASIDE].into_iter().any(comes_back) { Seen::FromNearby } else { Seen::Never }
     }
 
     /// The closest solution.
