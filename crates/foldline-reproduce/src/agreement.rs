@@ -101,6 +101,8 @@ pub enum Seen {
     Sampled(usize),
     /// No start of the survey did, a trajectory that began close to it did.
     FromNearby,
+    /// A trajectory that began close to it neither rests nor is seen to repeat itself; long cycles may not be recognised.
+    Unsettled,
     /// Not at all: the trajectory that began close to it went somewhere else.
     Never,
 }
@@ -197,15 +199,20 @@ impl Context<'_> {
 
     /// A motion with the solution that it is.
     fn explained(&self, response: &Response, known: &[Known]) -> Met {
-        let mut motion = response.clone();
+        let (motion, followed) = self.followed_on(response.clone());
+        let nearest = self.nearest(&motion, known);
+        Met { motion, followed, nearest }
+    }
+
+    /// What becomes of a motion that has not settled, and how often it had to be followed on.
+    fn followed_on(&self, mut motion: Response) -> (Response, usize) {
         let mut followed = 0;
         while motion.motion == Motion::Other && followed < FOLLOWED {
             followed += 1;
             let Some(next) = self.settled(&motion.parameters, motion.value, &motion.state) else { break };
-            motion = Response { hits: response.hits, ..next };
+            motion = Response { hits: motion.hits, ..next };
         }
-        let nearest = self.nearest(&motion, known);
-        Met { motion, followed, nearest }
+        (motion, followed)
     }
 
     /// Where a trajectory settles.
@@ -223,13 +230,21 @@ impl Context<'_> {
             Solution::Equilibrium(x) => x.clone(),
             Solution::Cycle(cycle) => cycle.state(0.0),
         };
-        let comes_back = |aside: f64| {
+        let mut seen = Seen::Never;
+        // Close to where a cycle begins or doubles its period its basin is very narrow.
+        for aside in [ASIDE, 0.1 * ASIDE] {
             let start = solution.iter().zip(&self.system.scales).map(|(x, scale)| x + aside * (scale + x.abs()));
             let start: Vec<f64> = start.collect();
-            self.settled(&at.parameters, at.value, &start).is_some_and(|motion| here(&motion))
-        };
-        // Close to where a cycle begins or doubles its period its basin is very narrow.
-        if [ASIDE, 0.1 * ASIDE].into_iter().any(comes_back) { Seen::FromNearby } else { Seen::Never }
+            let Some(motion) = self.settled(&at.parameters, at.value, &start) else { continue };
+            let (motion, _) = self.followed_on(motion);
+            if here(&motion) {
+                return Seen::FromNearby;
+            }
+            if motion.motion == Motion::Other {
+                seen = Seen::Unsettled;
+            }
+        }
+        seen
     }
 
     /// The closest solution.

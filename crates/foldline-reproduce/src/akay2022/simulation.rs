@@ -112,7 +112,8 @@ fn parts(survey: &Agreement) -> Vec<Claim> {
     names.dedup();
     let claim = |name: &str| {
         let own: Vec<&Stable> = survey.stable.iter().filter(|s| s.branch == name).collect();
-        let holds: Vec<bool> = own.iter().map(|s| s.seen != Seen::Never).collect();
+        let decided = own.iter().filter(|s| s.seen != Seen::Unsettled);
+        let holds: Vec<bool> = decided.map(|s| s.seen != Seen::Never).collect();
         let hits = own.iter().map(|s| if let Seen::Sampled(hits) = s.seen { hits } else { 0 });
         let (sampled, beside) = (
             own.iter().filter(|s| matches!(s.seen, Seen::Sampled(_))).count(),
@@ -124,9 +125,19 @@ fn parts(survey: &Agreement) -> Vec<Claim> {
             own.len(),
             hits.sum::<usize>()
         );
-        let never: Vec<String> =
-            own.iter().filter(|s| s.seen == Seen::Never).map(|s| format!("{:.2}", s.value)).collect();
-        let note = if never.is_empty() { String::new() } else { format!("not met at Ω = {}", never.join(", ")) };
+        let speeds = |seen: Seen| {
+            let at = own.iter().filter(|s| s.seen == seen).map(|s| format!("{:.2}", s.value));
+            at.collect::<Vec<String>>().join(", ")
+        };
+        let (never, open) = (speeds(Seen::Never), speeds(Seen::Unsettled));
+        let mut notes = Vec::new();
+        if !never.is_empty() {
+            notes.push(format!("what starts beside it goes elsewhere at Ω = {never}"));
+        }
+        if !open.is_empty() {
+            notes.push(format!("what starts beside it was not seen to repeat itself at Ω = {open}"));
+        }
+        let note = notes.join("; ");
         let statement = format!("Simulation meets the stable part of {name} at every speed sampled");
         Claim::decided(FIGURE, statement, "yes", Ok(Finding::cases(&holds, ours).noting(note)))
     };
