@@ -56,9 +56,21 @@ pub struct Claim {
     pub verdict: Verdict,
     /// What should be known about it.
     pub note: String,
+    /// Whether it is ours, a check or an extension, rather than the publication's.
+    pub check: bool,
 }
 
 impl Claim {
+    /// Something that the publication does not claim: a check of ours, or what goes beyond; `expected` is what should come out.
+    pub fn check(
+        figure: &'static str,
+        statement: impl Into<String>,
+        expected: impl Into<String>,
+        finding: Result<Finding, String>,
+    ) -> Claim {
+        Claim { check: true, ..Claim::decided(figure, statement, expected, finding) }
+    }
+
     /// A claim decided by what was found; an error is the reason why nothing was.
     pub fn decided(
         figure: &'static str,
@@ -80,6 +92,7 @@ impl Claim {
             error: finding.error,
             verdict: finding.verdict,
             note: finding.note,
+            check: false,
         }
     }
 
@@ -143,14 +156,12 @@ impl Finding {
         Finding { ours, error: None, verdict, note: String::new() }
     }
 
-    /// A fact that may hold for some of several cases only.
+    /// A fact that is claimed of several cases: one in which it does not hold contradicts it.
     pub fn cases(holds: &[bool], ours: String) -> Finding {
-        let count = holds.iter().filter(|h| **h).count();
-        let verdict = match (holds.len(), count) {
-            (0, _) => Verdict::NotDecided,
-            (all, some) if all == some => Verdict::Agrees,
-            (_, 0) => Verdict::Contradicted,
-            _ => Verdict::Refined,
+        let verdict = match (holds.is_empty(), holds.iter().all(|h| *h)) {
+            (true, _) => Verdict::NotDecided,
+            (_, true) => Verdict::Agrees,
+            (_, false) => Verdict::Contradicted,
         };
         Finding { ours, error: None, verdict, note: String::new() }
     }
@@ -186,7 +197,7 @@ mod tests {
         assert_eq!(verdict(4.30, 1e-8, 4.4, 0.05), Verdict::Contradicted);
         assert_eq!(verdict(4.38, 0.1, 4.4, 0.05), Verdict::NotDecided);
         assert_eq!(verdict(f64::NAN, 0.1, 4.4, 0.05), Verdict::NotDecided);
-        assert_eq!(Finding::cases(&[true, false], String::new()).verdict, Verdict::Refined);
+        assert_eq!(Finding::cases(&[true, false], String::new()).verdict, Verdict::Contradicted);
         assert_eq!(Finding::cases(&[], String::new()).verdict, Verdict::NotDecided);
         assert_eq!(Finding::vanishing(2e-6, 1e-6).verdict, Verdict::Contradicted);
     }

@@ -9,9 +9,11 @@
 //! | what belongs to a publication? | [`publication`] |
 //! | how does a study become a run, once for all figures? | [`runs`] |
 //! | does the publication say the same? | [`claims`] |
+//! | do simulation and continuation say the same? | [`agreement`] |
 //! | what is written in the end? | [`report`] |
 //! | how is figure N made? | `akay2022/figureNN.rs` |
 
+pub mod agreement;
 pub mod akay2022;
 pub mod claims;
 pub mod publication;
@@ -64,9 +66,13 @@ pub struct Reproduced {
 impl Reproduced {
     /// How many claims have which verdict, in a line.
     pub fn summary(&self) -> String {
-        let count = |verdict: Verdict| self.claims.iter().filter(|c| c.verdict == verdict).count();
-        let counts = Verdict::ALL.map(|v| format!("{} {}", count(v), v.name()));
-        format!("{} claims: {}", self.claims.len(), counts.join(", "))
+        let counted = |check: bool| {
+            let of = |verdict: Verdict| self.claims.iter().filter(|c| c.check == check && c.verdict == verdict).count();
+            let counts = Verdict::ALL.map(|v| format!("{} {}", of(v), v.name()));
+            (self.claims.iter().filter(|c| c.check == check).count(), counts.join(", "))
+        };
+        let ((claims, theirs), (checks, ours)) = (counted(false), counted(true));
+        format!("{claims} claims of the study: {theirs}; {checks} checks of ours: {ours}")
     }
 }
 
@@ -111,7 +117,11 @@ pub fn reproduce(request: &Request) -> io::Result<Reproduced> {
     let stopped = request.stop.load(Ordering::Relaxed);
     let seconds = start.elapsed().as_secs_f64();
     let page = report::html(request.publication, &figures, &runs, &failures, seconds);
-    let report = request.out.join("report.html");
+    // A report on some of the figures does not replace that on all of them.
+    let some: Vec<&str> = request.figures.iter().map(|figure| figure.name).collect();
+    let whole = some.len() == request.publication.figures.len();
+    let name = if whole { "report.html".into() } else { format!("report-figure-{}.html", some.join("-")) };
+    let report = request.out.join(name);
     std::fs::write(&report, page)?;
     let claims: Vec<Claim> =
         figures.into_iter().filter_map(|f| f.made.ok()).flat_map(|(_, made)| made.claims).collect();

@@ -38,7 +38,9 @@ pub fn html(publication: &Publication, figures: &[Drawn], runs: &Runs, failures:
         }
         out.push_str("</ul>\n");
     }
-    table_of_claims(&mut out, &claims);
+    let (own, theirs): (Vec<&Claim>, Vec<&Claim>) = claims.iter().copied().partition(|claim| claim.check);
+    table_of_claims(&mut out, "Claims of the study", "Study", &theirs);
+    table_of_claims(&mut out, "Checks of ours, and what goes beyond the study", "Expected", &own);
     for figure in figures {
         let (name, title) = (escaped(figure.plan.name), escaped(figure.plan.title));
         let _ = writeln!(out, "<h2 id=\"figure-{name}\">Figure {name}: {title}</h2>");
@@ -82,25 +84,31 @@ fn summary(out: &mut String, claims: &[&Claim], runs: &Runs, seconds: f64) {
     tolerances.sort_by(f64::total_cmp);
     tolerances.dedup();
     let tolerances: Vec<String> = tolerances.iter().map(|t| format!("{t:e}")).collect();
-    let counts: Vec<String> = Verdict::ALL
-        .iter()
-        .map(|verdict| (verdict, claims.iter().filter(|c| c.verdict == *verdict).count()))
-        .filter(|(_, count)| *count > 0)
-        .map(|(verdict, count)| format!("{count} <span class=\"v {}\">{verdict}</span>", class(*verdict)))
-        .collect();
+    let counted = |check: bool| {
+        let count = |verdict: Verdict| claims.iter().filter(|c| c.check == check && c.verdict == verdict).count();
+        let all = Verdict::ALL.iter().map(|verdict| (verdict, count(*verdict))).filter(|(_, count)| *count > 0);
+        let all = all.map(|(verdict, count)| format!("{count} <span class=\"v {}\">{verdict}</span>", class(*verdict)));
+        let all: Vec<String> = all.collect();
+        if all.is_empty() { "none".into() } else { all.join(", ") }
+    };
     let _ = writeln!(
         out,
         "<p>foldline {VERSION}; relative tolerance {}; runs {computing:.1} s, this report {seconds:.1} s. \
-         Claims: {}.</p>",
+         Claims of the study: {}. Checks of ours: {}.</p>",
         if tolerances.is_empty() { "·".into() } else { tolerances.join(", ") },
-        if counts.is_empty() { "none".into() } else { counts.join(", ") }
+        counted(false),
+        counted(true)
     );
 }
 
-fn table_of_claims(out: &mut String, claims: &[&Claim]) {
-    out.push_str(
-        "<h2>Claims</h2>\n<table><thead><tr><th>Figure</th><th>Claim</th><th>Study</th><th>Computed</th><th>Error</th>\
-         <th>Verdict</th></tr></thead><tbody>\n",
+fn table_of_claims(out: &mut String, title: &str, against: &str, claims: &[&Claim]) {
+    if claims.is_empty() {
+        return;
+    }
+    let _ = writeln!(
+        out,
+        "<h2>{title}</h2>\n<table><thead><tr><th>Figure</th><th>Claim</th><th>{against}</th><th>Computed</th><th>Error</th>\
+         <th>Verdict</th></tr></thead><tbody>"
     );
     for claim in claims {
         let note =

@@ -11,19 +11,33 @@ pub use tables::{Table, in_parallel};
 use crate::Request;
 use crate::publication::{Publication, StudyPlan};
 use foldline::contract::{Event, Observer, Verdict};
-use foldline::diagram::{Branch, Diagram, Kind, Point, SpecialPoint};
-use foldline::explore::{self, System, growth, known};
+use foldline::diagram::{Branch, Diagram, Kind, Point, Responses, SpecialPoint};
+use foldline::explore::{self, Plan, System, growth, known};
 use foldline_store::order::{names, ordered};
 use foldline_store::run_file::{Recorded, Recorder, RunFileError, load};
 use foldline_store::short;
 use foldline_store::study_file::{Study, parse_study};
 use std::collections::BTreeMap;
+use std::hash::{DefaultHasher, Hasher};
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant;
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 /// The version of this program.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
+
+/// The version and a fingerprint of the program file: another build may compute other numbers.
+pub(crate) fn build() -> &'static str {
+    static BUILD: OnceLock<String> = OnceLock::new();
+    BUILD.get_or_init(|| {
+        let mut hasher = DefaultHasher::new();
+        let program = std::env::current_exe().and_then(std::fs::read).unwrap_or_default();
+        hasher.write(&program);
+        format!("{VERSION} {:016x}", hasher.finish())
+    })
+}
 
 /// A study that was run.
 pub struct Run {
@@ -86,6 +100,15 @@ impl Run {
         known::least(&system, &settings, branch, quantity).ok_or_else(|| format!("the branch {name} has no points"))
     }
 
+    /// The survey or sweep of that name.
+    ///
+    /// # Errors
+    /// It is not there.
+    pub fn responses(&self, name: &str) -> Result<&Responses, String> {
+        let found = self.diagram.response_set(name);
+        found.ok_or_else(|| format!("{}: the simulation {name} is not complete", self.study.file))
+    }
+
     /// The special points of that kind on a branch.
     ///
     /// # Errors
@@ -141,6 +164,11 @@ impl<'r> Runs<'r> {
         }
     }
 
+    /// How many threads may be used.
+    pub fn jobs(&self) -> usize {
+        self.jobs
+    }
+
     /// All runs by name, failed ones with the reason.
     pub fn all(&self) -> impl Iterator<Item = (&'static str, &Result<Run, String>)> {
         self.done.iter().map(|(name, run)| (*name, run))
@@ -190,15 +218,17 @@ impl<'r> Runs<'r> {
     fn carried_out(&self, plan: &StudyPlan) -> Result<Run, String> {
         let parsed = parse_study(plan.text, plan.file, plan.model, plan.model_file);
         let mut study = parsed.map_err(|found| found.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))?;
-        study.plan.tolerance = self.tolerance.unwrap_or(study.plan.tolerance);
+        if let Some(tolerance) = self.tolerance {
+            quick(&mut study.plan, tolerance);
+        }
         let folder = self.folder.join(plan.name);
-        let name = format!("{VERSION}, tolerance {:e}", study.plan.tolerance);
+        let name = format!("{}, tolerance {:e}", build(), study.plan.tolerance);
         if let Some((recorded, seconds)) = finished(&folder, &study, &name) {
             return Ok(whole(study, recorded.diagram, recorded.notes, seconds, true));
         }
         let start = Instant::now();
         let (recorder, earlier) = opened(&folder, &study).map_err(|error| error.to_string())?;
-        let watch = Watch { recorder, stop: self.stop };
+        let watch = Watch { recorder, stop: self.stop, say: self.say, pace: Mutex::default() };
         let system = System::of_plan(&study.model, &study.plan);
         let diagram = explore::run(&system, &study.plan, self.jobs, earlier, &watch);
         watch.recorder.finish().map_err(|error| error.to_string())?;
@@ -248,14 +278,48 @@ fn opened(folder: &Path, study: &Study) -> Result<(Recorder, Diagram), RunFileEr
     }
 }
 
-/// Records, and stops when asked to.
+/// Another tolerance; a coarser one asks for a quick look, for which surveys visit every twelfth value from fewer starts.
+fn quick(plan: &mut Plan, tolerance: f64) {
+    if tolerance > plan.tolerance {
+        for survey in &mut plan.surveys {
+            survey.values = survey.values.iter().copied().step_by(12).collect();
+            survey.starts = survey.starts.div_ceil(4);
+        }
+    }
+    plan.tolerance = tolerance;
+}
+
+/// Records, tells how a simulation gets on, and stops when asked to.
 struct Watch<'w> {
     recorder: Recorder,
     stop: &'w AtomicBool,
+    say: &'w (dyn Fn(&str) + Sync),
+    /// Of every survey and sweep: when it began, and when it was last told of.
+    pace: Mutex<BTreeMap<String, [Instant; 2]>>,
+}
+
+impl Watch<'_> {
+    /// A line every few seconds.
+    fn visited(&self, name: &str, done: usize, of: usize) {
+        const BETWEEN: Duration = Duration::from_secs(3);
+        let mut pace = self.pace.lock().unwrap_or_else(PoisonError::into_inner);
+        let now = Instant::now();
+        let [begun, told] = pace.entry(name.to_string()).or_insert([now; 2]);
+        if now.duration_since(*told) < BETWEEN || done >= of {
+            return;
+        }
+        *told = now;
+        // The time began with the first value.
+        let left = now.duration_since(*begun).as_secs_f64() * (of - done) as f64 / done.max(2).saturating_sub(1) as f64;
+        (self.say)(&format!("  {name}: {done} of {of} values, about {left:.0} s to go"));
+    }
 }
 
 impl Observer for Watch<'_> {
     fn observe(&self, event: Event) -> Verdict {
+        if let Event::Visited(name, _, done, of) = event {
+            self.visited(name, done, of);
+        }
         let verdict = self.recorder.observe(event);
         if self.stop.load(Ordering::Relaxed) { Verdict::Stop } else { verdict }
     }

@@ -70,8 +70,8 @@ fn figure_4_both_flows_reach_the_sampled_branch() {
 }
 
 #[test]
-fn figures_5_6_7_and_9_from_one_run() {
-    let (made, folder) = figures(&["5", "6", "7", "9"]);
+fn figures_5_6_and_7_from_one_run() {
+    let (made, folder) = figures(&["5", "6", "7"]);
     for family in ["SL", "DL"] {
         assert_eq!(claim(&made, &format!("lines of {family}")).verdict, Verdict::Agrees);
         assert_eq!(claim(&made, &format!("loops {family} makes")).verdict, Verdict::Agrees);
@@ -89,15 +89,12 @@ fn figures_5_6_7_and_9_from_one_run() {
     assert_eq!(fold.verdict, Verdict::Contradicted);
     assert!(near(numbers(fold)[0], 3.556166, 1e-5), "{fold:?}");
     assert_eq!(claim(&made, "cubic spring S stays").verdict, Verdict::Agrees);
-    assert!(made.claims.iter().filter(|c| c.statement.starts_with("Check")).all(|c| c.verdict == Verdict::Agrees));
-    assert!(near(numbers(claim(&made, "branch of SL doubles again"))[1], 4.628842, 1e-4));
-    assert!(near(numbers(claim(&made, "branch of DL doubles again"))[1], 4.199325, 1e-4));
+    assert!(made.claims.iter().filter(|c| c.check && c.figure == "7").all(|c| c.verdict == Verdict::Agrees));
     // A second call computes nothing again.
-    let report = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
+    let report = std::fs::read_to_string(&made.report).unwrap();
     assert!(!report.contains("(earlier)") && report.contains("contradicted"));
     assert!(!report.contains("src=") && !report.contains("href=\"http"), "the report needs nothing else");
-    again(&["5"], &folder, 1e-5);
-    let report = std::fs::read_to_string(folder.path().join("report.html")).unwrap();
+    let report = std::fs::read_to_string(again(&["5"], &folder, 1e-5).report).unwrap();
     assert!(report.contains("(earlier)"));
 }
 

@@ -2,7 +2,7 @@
 //!
 //! **Equations.** The ring pushes back with the force r h(r) along -U/r. With g = r - 1:
 //!
-//! 1. tanh: r h = ½ (tanh(K g) + 1) β g; pulls inwards just below contact, at most 0.139232 β/K at g = -0.639232/K
+//! 1. tanh: r h = ½ (tanh(K g) + 1) β g; attracts the rotor to the ring (outwards) just below contact, at most 0.139232 β/K at g = -0.639232/K
 //! 2. softplus: r h = (β/2K) ln(1 + e^{2K g}); never negative
 //! 3. piecewise: r h = β max(g, 0), the limit of both for K → ∞
 //!

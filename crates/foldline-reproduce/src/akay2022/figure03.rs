@@ -48,7 +48,7 @@ fn law() -> [Panel; 2] {
         let sharp = Layer { dashed: true, ..Layer::curve(&sharp, GREY).dashed().wide(1.0) };
         force = force.with(sharp.named("piecewise-linear"));
     }
-    let force = force.with(Layer::horizontal(0.0)).with(Layer::note([0.976, -0.0275], "pulls inwards"));
+    let force = force.with(Layer::horizontal(0.0)).with(Layer::note([0.976, -0.0275], "attracts"));
     [switch, force.with(Layer::vertical(1.0))]
 }
 
@@ -70,7 +70,7 @@ fn errors(choice: &Choice, label: &str, beta: f64, published: f64) -> Panel {
 
 fn caption(choice: &Choice) -> String {
     let mut text = "The hyperbolic tangent switches the ring on over a width of about 1/K. Because it is not yet off below contact, \
-                    where the spring would pull, the smoothed ring pulls inwards there; the sharper the switch, the less. \
+                    where its spring is stretched, the smoothed ring attracts the rotor there, outwards; the sharper the switch, the less. \
                     Below, settled motions of the smoothed ring are compared with those of the piecewise-linear one, whose \
                     simulation ends a step wherever contact begins or ends: the largest of the errors of max r, of the period and \
                     of the amplitudes of the spectral lines (relative to the strongest)."
@@ -157,7 +157,7 @@ fn pull(beta: f64, k: f64) -> Claim {
     let finding = Finding::qualified(force(r) < 0.0, ours).within(1e-9).noting(depends);
     Claim::decided(
         "3",
-        format!("With β = {beta}, K = {k} the smoothed ring pulls inwards just below contact"),
+        format!("With β = {beta}, K = {k} the smoothed ring exerts a fictitious pull just below contact"),
         "yes",
         Ok(finding),
     )

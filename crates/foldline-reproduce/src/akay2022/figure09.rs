@@ -1,37 +1,61 @@
-//! Figure 9: period-doubled branches of the contact rotor.
+//! Figure 9: period-doubled branches of the contact rotor, and what simulation meets of them.
 
-use super::rotor::{MAX_R, SPEED, colour, over_speed, speeds};
+use super::rotor::{MAX_R, SPEED, max_r, over_speed, speeds};
+use super::simulation::{self, Simulated};
 use crate::claims::{Claim, Finding, digits};
 use crate::publication::{FigurePlan, Made};
 use crate::runs::{Run, Runs};
-use foldline::diagram::{Ending, Kind};
-use foldline_plot::figure::Shape;
-use foldline_plot::palette::{BLACK, PURPLE};
-use foldline_plot::{Axis, Figure, Layer, Panel, branch_layers};
+use foldline::diagram::{Ending, Kind, Response};
+use foldline_plot::figure::{Marker, Shape};
+use foldline_plot::palette::{BLACK, BLUE, GREY, ORANGE, PALE, PURPLE, SKY};
+use foldline_plot::{Axis, Figure, Layer, Panel, branch_curve, branch_layers};
 
-pub const PLAN: FigurePlan =
-    FigurePlan { name: "9", title: "period-doubled branches with contact", runs: &["diagrams"], make };
+pub const PLAN: FigurePlan = FigurePlan {
+    name: "9",
+    title: "period-doubled branches with contact",
+    runs: &["diagrams", "other-cycles", "simulation"],
+    make,
+};
+
+const SL: [f64; 4] = [3.2, 5.2, 0.97, 1.5];
+const DL: [f64; 4] = [2.55, 4.6, 1.2, 2.2];
 
 fn make(runs: &Runs) -> Result<Made, String> {
-    let run = runs.run("diagrams")?;
-    let panels =
-        vec![panel(run, "(a)", "SL", [3.2, 5.2], [0.97, 1.5])?, panel(run, "(b)", "DL", [2.55, 4.6], [1.2, 2.2])?];
+    let (run, other) = (runs.run("diagrams")?, runs.run("other-cycles")?);
+    let simulated = Simulated::of(runs.run("simulation")?, &[run, other], runs.jobs())?;
+    let panels = vec![
+        doubled(run, "(a)", "SL", SL)?,
+        doubled(run, "(b)", "DL", DL)?,
+        sampled(run, &simulated)?,
+        swept(run, &simulated)?,
+        everything(run, other, &simulated)?,
+    ];
     let mut claims = Vec::new();
     for family in ["SL", "DL"] {
         claims.extend(cascade(run, family));
     }
-    Ok(Made {
-        figure: Figure::grid("Contact: period doubling", 2, panels),
-        caption: "The branches of twice and four times the period join the single ones at both ends; each loses its stability \
-                  in a further period doubling."
-            .into(),
-        claims,
-    })
+    claims.extend(simulation::claims(run, &simulated));
+    let caption = format!(
+        "(a), (b) The branches of twice and four times the period join the single ones at both ends; each loses its stability in a \
+         further period doubling. (c), (e) The largest radius of every motion to which one of {} starts at each of {} speeds settled, \
+         without a look at the branches; rings are stable solutions that no start reached, simulated from {:.0e} beside them. \
+         (d) Stepped sweeps: each speed starts from the last state at the speed before. In (e) the other cycles are branches of \
+         their own: 4:1, 5:1, 6:1, and cycles that close after several turns.",
+        simulated.starts,
+        simulated.speeds,
+        crate::agreement::ASIDE
+    );
+    Ok(Made { figure: Figure::grid("Contact: period doubling", 2, panels), caption, claims })
 }
 
-fn panel(run: &Run, label: &str, family: &str, x: [f64; 2], y: [f64; 2]) -> Result<Panel, String> {
+fn empty(label: &str, title: &str, [x0, x1, y0, y1]: [f64; 4]) -> Panel {
+    let axes = (Axis::new("Ω").from(x0, x1), Axis::new("max r").from(y0, y1));
+    Panel { height: 400.0, ..Panel::new(label, title, axes.0, axes.1) }
+}
+
+/// A family with the branches of twice and four times its period, marks last.
+fn family(run: &Run, family: &str, marks: bool) -> Result<Vec<Layer>, String> {
     let root = run.branch(&format!("contact {family}"))?;
-    let axes = (Axis::new("Ω").from(x[0], x[1]), Axis::new("max r").from(y[0], y[1]));
     let mut layers = over_speed(root, family, MAX_R);
     for branch in run.diagram.branches.iter().filter(|b| b.name.starts_with(&format!("{}/", root.name))) {
         let depth = branch.name.matches('/').count();
@@ -43,11 +67,62 @@ fn panel(run: &Run, label: &str, family: &str, x: [f64; 2], y: [f64; 2]) -> Resu
         }
         layers.extend(next);
     }
+    layers.retain(|layer| marks || !matches!(layer.shape, Shape::Scatter { .. }));
     layers.sort_by_key(|layer| matches!(layer.shape, Shape::Scatter { .. }));
-    debug_assert_eq!(colour(&root.name), layers[0].colour);
-    Ok(Panel { height: 400.0, ..Panel::new(label, family, axes.0, axes.1) }
-        .with_all(layers)
-        .with(Layer::horizontal(1.0)))
+    Ok(layers)
+}
+
+/// (a), (b): the branches alone.
+fn doubled(run: &Run, label: &str, name: &str, window: [f64; 4]) -> Result<Panel, String> {
+    Ok(empty(label, name, window).with_all(family(run, name, true)?).with(Layer::horizontal(1.0)))
+}
+
+/// (c): SL as simulation from many starts sees it.
+fn sampled(run: &Run, simulated: &Simulated) -> Result<Panel, String> {
+    let panel = empty("(c)", "SL, simulated from many starts", SL).with_all(family(run, "SL", true)?);
+    let [met, missed] = survey(simulated);
+    Ok(panel.with(Layer::horizontal(1.0)).with(missed).with(met))
+}
+
+/// What the survey met, and what only a start beside it did.
+fn survey(simulated: &Simulated) -> [Layer; 2] {
+    let dot = |points: Vec<[f64; 2]>, name: &str| Layer::scatter(points, Marker::Circle, GREY).wide(2.6).named(name);
+    let met = simulated.survey.met.iter().map(|met| place(&met.motion)).collect();
+    let missed = simulated.missed().map(|stable| [stable.value, max_r(&stable.point)]).collect();
+    [dot(met, "met from many starts"), dot(missed, "met only from beside it").hollow()]
+}
+
+fn place(motion: &Response) -> [f64; 2] {
+    [motion.value, motion.ranges.get(4).map_or(f64::NAN, |r| r[1])]
+}
+
+/// (d): DL swept up and down, with the branches to which the sweeps jump.
+fn swept(run: &Run, simulated: &Simulated) -> Result<Panel, String> {
+    let mut panel = empty("(d)", "DL, stepped sweeps", [4.0, 6.5, 0.0, 5.0]);
+    let s = branch_curve(run.branch("contact S")?, SPEED, MAX_R, BLUE).named("S");
+    panel = panel.with(s).with_all(family(run, "SL", false)?).with_all(family(run, "DL", true)?);
+    for (set, marker, shade, name) in
+        [(&simulated.up, Marker::Triangle, ORANGE, "sweep up"), (&simulated.down, Marker::Nabla, SKY, "sweep down")]
+    {
+        let places: Vec<[f64; 2]> = set.met.iter().map(|met| place(&met.motion)).collect();
+        panel = panel.with(Layer::curve(&places, shade).wide(0.8));
+        panel = panel.with(Layer::scatter(places, marker, shade).wide(3.0).named(name));
+    }
+    Ok(panel)
+}
+
+/// (e): everything that simulation met, over everything that was followed.
+fn everything(run: &Run, other: &Run, simulated: &Simulated) -> Result<Panel, String> {
+    let mut panel = empty("(e)", "everything that attracts in that window", [3.2, 5.2, 0.2, 3.6]);
+    panel.span = 2;
+    panel = panel.zooming(SL, "(c)");
+    for branch in other.diagram.branches.iter().filter(|b| !b.points.is_empty()) {
+        panel = panel.with(branch_curve(branch, SPEED, MAX_R, PALE).wide(1.2).named("other cycles"));
+    }
+    panel = panel.with(branch_curve(run.branch("contact S")?, SPEED, MAX_R, BLUE).named("S"));
+    panel = panel.with_all(family(run, "SL", false)?).with_all(family(run, "DL", false)?);
+    let [met, missed] = survey(simulated);
+    Ok(panel.with(missed.wide(2.2)).with(met.wide(2.2)))
 }
 
 fn cascade(run: &Run, family: &str) -> Vec<Claim> {

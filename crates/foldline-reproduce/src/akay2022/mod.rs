@@ -18,6 +18,7 @@ mod limits;
 mod orbits;
 mod rotor;
 mod sharpness;
+mod simulation;
 
 use crate::publication::{FigurePlan, Publication, StudyPlan};
 
@@ -50,6 +51,8 @@ const STUDIES: &[StudyPlan] = &[
     study!("light-damping-large-unbalance-contact", 3.0),
     study!("blunt-contact", 0.5),
     study!("limits", 4.0),
+    study!("simulation", 100.0),
+    study!("other-cycles", 6.0),
 ];
 
 const FIGURES: &[FigurePlan] = &[

@@ -4,7 +4,7 @@
 //! the rest. A table whose first line is the same is read back, any other is computed again. Numbers are written so that
 //! they are read back exactly.
 
-use super::{Runs, VERSION};
+use super::{Runs, build};
 use std::fmt::Write;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
@@ -26,7 +26,7 @@ impl Runs<'_> {
         let mut hasher = DefaultHasher::new();
         of.hash(&mut hasher);
         let tolerance = self.tolerance.map_or("as stated".to_string(), |t| format!("{t:e}"));
-        let head = format!("{VERSION}, tolerance {tolerance}, {:016x}", hasher.finish());
+        let head = format!("{}, tolerance {tolerance}, {:016x}", build(), hasher.finish());
         let file = self.folder.join(format!("{name}.table"));
         if let Some(known) = std::fs::read_to_string(&file).ok().and_then(|text| parsed(&text, &head)) {
             return Ok(known);
@@ -37,11 +37,6 @@ impl Runs<'_> {
         std::fs::create_dir_all(&self.folder).map_err(unwritable)?;
         std::fs::write(&file, written(&table, &head)).map_err(unwritable)?;
         Ok(table)
-    }
-
-    /// How many threads a figure may use.
-    pub fn jobs(&self) -> usize {
-        self.jobs
     }
 }
 

@@ -40,7 +40,7 @@ fn root(family: &Family) -> Claim {
     let closed = family.ratio.speed(family.constants.polar, 1.0).map_or("·".into(), |w| digits(w, 1e-8));
     let statement =
         format!("Root of the backbone of {}, against the {}:1 crossing", family.title(), family.ratio.backward);
-    Claim::decided(FIGURE, statement, closed, finding())
+    Claim::check(FIGURE, statement, closed, finding())
 }
 
 /// Between which speeds a backbone with contact lies, with the piecewise-linear law and with the tanh law.
@@ -61,7 +61,7 @@ fn interval(family: &Family) -> Claim {
         Ok(Finding::qualified(holds, format!("{a:.6} to {b:.6}")).within(error).noting(note))
     };
     let study = bounds.map_or("·".into(), |[a, b]| format!("{a:.6} to {b:.6}"));
-    Claim::decided(
+    Claim::check(
         FIGURE,
         format!("The backbone of {} lies between the crossings without and with the ring", family.title()),
         study,
@@ -121,7 +121,7 @@ fn approach(family: &Family) -> Claim {
     };
     let statement =
         format!("With ε, and ζ as its square, {} tends to its backbone, with these powers of ε", family.title());
-    Claim::decided(FIGURE, statement, format!("{}, {}", expected[0], expected[1]), finding())
+    Claim::check(FIGURE, statement, format!("{}, {}", expected[0], expected[1]), finding())
 }
 
 /// Up to which J_p the crossing exists: where it goes off to infinite speed.
@@ -141,7 +141,7 @@ fn exists(name: &str, ratio: Ratio) -> Claim {
     let limit = ratio.polar_limit();
     let finding = Finding::number(yes, 1e-8, limit, 1e-6);
     let statement = format!("{name} has a root where J_p is below a limit");
-    Claim::decided(FIGURE, statement, format!("(n-1)/n = {limit:.6}"), Ok(finding))
+    Claim::check(FIGURE, statement, format!("(n-1)/n = {limit:.6}"), Ok(finding))
         .noting("the frequencies at a high speed, against the closed form")
 }
 
@@ -171,6 +171,6 @@ fn turns(family: &Family) -> Claim {
         Ok(Finding::cases(&closer, format!("off by {}", ours.join("; "))).within(error).noting(note))
     };
     let statement = format!("The backbone foretells the folds of {}, the better the smaller ε is", family.title());
-    Claim::decided(FIGURE, statement, "closer as ε falls", finding())
+    Claim::check(FIGURE, statement, "closer as ε falls", finding())
         .noting("A difference that changes its sign can be small by chance")
 }
