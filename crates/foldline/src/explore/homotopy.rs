@@ -10,8 +10,8 @@
 //! 5. *halfway*: the same from the farthest place that a run has come to, as long as that gains ground;
 //! 6. *one by one*: the parameters change one after the other.
 //!
-//! Every run is a branch of the diagram, every decision a note. Where nothing arrives the note says how far each way came:
-//! if all folds of a family turn back before the goal, it shrinks to a point there and is not connected to anything beyond.
+//! Every run is a branch of the diagram, every decision a note. Where nothing arrives the note says how far each way came: if
+//! two folds of a closed family meet before the goal, it shrinks to a point there and is not connected to anything beyond.
 //!
 //! **Source.** The three flows (direct, with runs in the speed, along the fold) are those of akay2024; choosing among them is
 //! ours.
@@ -61,7 +61,7 @@ pub fn find(
         going: true,
         origin,
         farthest: None,
-        turned: 0,
+        shrinks: false,
         open: false,
     };
     // The seed of a resumed run is not searched for again; the first leg has what it led to.
@@ -78,10 +78,12 @@ pub fn find(
     if let Err(why) = &arrived
         && planner.going
     {
-        let verdict = if planner.open || planner.turned == 0 {
-            "some run left the range or was lost, so there may be a way outside"
-        } else {
-            "every fold of the family turns back before the goal: it is not connected to it"
+        let verdict = match (planner.open, planner.shrinks) {
+            (true, _) => "some run left the range or was lost, so there may be a way outside",
+            (false, true) => {
+                "the folds of the family meet on the way, where it shrinks to a point: it is not connected to it"
+            }
+            (false, false) => "no way was found in these parameters",
         };
         planner.note(&format!("the goal was not reached: {why}; {verdict}"));
     }
@@ -99,8 +101,8 @@ struct Planner<'p> {
     origin: Origin,
     /// The point closest to the goal on any run, the share of the way that it has covered, and whether it is a fold.
     farthest: Option<(f64, Point, bool)>,
-    /// Folds that were followed and turned back before the goal.
-    turned: usize,
+    /// Whether two folds of the family were seen to meet before the goal, so that it shrinks to a point there.
+    shrinks: bool,
     /// Whether some run left the range or ended otherwise, so that there may be more beyond.
     open: bool,
 }
@@ -216,7 +218,7 @@ impl Planner<'_> {
         self.note(&tried[0].clone());
         let turned_none = turned.is_none();
         if let Some(fold) = turned {
-            match self.along(&fold, &direct.name, course) {
+            match self.along(&fold, &direct.name, course, None) {
                 Ok(point) => return Ok(point),
                 Err(why) => tried.push(why),
             }
@@ -240,7 +242,7 @@ impl Planner<'_> {
         let [low, high] = self.homotopy.range;
         tried.push(format!("direct runs from other places between {low} and {high} do not arrive either"));
         for fold in family.special.iter().filter(|s| s.kind == Kind::Fold) {
-            match self.along(fold, &family.name, course) {
+            match self.along(fold, &family.name, course, Some(&family)) {
                 Ok(point) => return Ok(point),
                 Err(why) => tried.push(why),
             }
@@ -270,7 +272,13 @@ impl Planner<'_> {
     }
 
     /// Steps 2 and 4: a fold held on the way to the goal.
-    fn along(&mut self, fold: &SpecialPoint, parent: &str, course: &Course) -> Result<Point, String> {
+    fn along(
+        &mut self,
+        fold: &SpecialPoint,
+        parent: &str,
+        course: &Course,
+        family: Option<&Branch>,
+    ) -> Result<Point, String> {
         let via = self.homotopy.via;
         let place = fold.point.parameters[via];
         let line = Line { held: Some((Kind::Fold, via)), ties: course.ties.clone(), ..Line::new(course.free) };
@@ -285,7 +293,13 @@ impl Planner<'_> {
             let bound = |end: &Ending| matches!(end, Ending::Bound(value) if (value - course.from).abs() < 1e-9);
             let turned = curve.ends.iter().flatten().all(|end| bound(end) || *end == Ending::Closed);
             self.open |= !turned;
-            self.turned += usize::from(turned);
+            let meets = |end: &Point| {
+                let place = end.parameters[via];
+                let here = |s: &SpecialPoint| (s.point.parameters[via] - place).abs() < 1e-4 * (1.0 + place.abs());
+                family.is_some_and(|f| f.special.iter().any(|s| s.kind == Kind::Fold && here(s)))
+            };
+            let ends = [curve.points.first(), curve.points.last()];
+            self.shrinks |= turned && ends.into_iter().flatten().all(meets);
             let how = if turned { "turns back".into() } else { format!("ends short ({})", ending(&curve)) };
             let why = format!("the fold at {place:.6} {how} after {best:.1} % of the way");
             self.note(&why);
