@@ -38,7 +38,8 @@ fn make(runs: &Runs) -> Result<Made, String> {
     Ok(Made {
         figure: Figure::grid("Largest radius over the rotor speed", 2, vec![cubic, contact, beyond, wide]),
         caption: "Synchronous response S, single loop SL and double loop DL. Period-doubled branches are thinner; figure 9 shows \
-                  them closer. With contact S has its fold at a large radius and SL closes; with the cubic spring both stay open."
+                  them closer. With contact S has its fold at a large radius and SL closes; with the cubic spring both stay open. \
+                  Contact S has folds just below contact too; they belong to the smoothing of the switch (figure 14 (c))."
             .into(),
         claims,
     })
