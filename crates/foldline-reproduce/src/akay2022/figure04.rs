@@ -36,7 +36,7 @@ fn make(runs: &Runs) -> Result<Made, String> {
     );
     Ok(Made {
         figure,
-        caption: "Flow (a) runs κ to 1 at Ω = 5; flow (b) moves to another speed half-way. flow (c) \
+        caption: "Flow (a) runs κ to 1 at Ω = 5; flow (b) moves to another speed half-way. Flow (c) \
                   follows the lower fold in Ω and κ. All end on the contact branches that sampling finds."
             .into(),
         claims,

@@ -36,8 +36,8 @@ fn make(runs: &Runs) -> Result<Made, String> {
     }
     claims.extend(simulation::claims(run, &simulated));
     let caption = format!(
-        "(a), (b) The branches of twice the period join the single ones at both ends, those of four times the period these; each loses its stability in a \
-         further period doubling. (c), (e) The largest radius of every motion to which one of {} starts at each of {} speeds settled, \
+        "(a), (b) The branches of twice the period join the single ones at both ends, those of four times the period \
+         these; each loses its stability in a further period doubling. (c), (e) The largest radius of every motion to which one of {} starts at each of {} speeds settled, \
          without a look at the branches; rings are stable solutions that no start reached, simulated from {:.0e} beside them. \
          (d) Stepped sweeps: each speed starts from the last state at the speed before. In (e) the other cycles are branches of \
          their own: 4:1, 5:1, 6:1, and cycles that close after several turns.",
