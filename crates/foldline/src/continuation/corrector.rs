@@ -130,12 +130,12 @@ pub fn correct(
         }
         let ratio = if iteration > 0 { length / sizes[iteration - 1] } else { 1.0 };
         // Next to a branch point the matrix is nearly singular, and rounding ends the descent a little earlier.
-        let converged = sizes.iter().all(|size| *size < 0.1 * settings.tolerance);
-        if (fresh || converged) && iteration > 0 && ratio > 0.3 && length < 0.1 * settings.tolerance {
+        if fresh && iteration > 1 && ratio > 0.3 && length < 0.1 * settings.tolerance {
             return Ok(length);
         }
         // A matrix that was kept may be at fault; with a new one there is no excuse.
-        if fresh && ((iteration > 1 && ratio > 0.9) || (iteration > 0 && ratio > 4.0)) || length > 10.0 {
+        let worse = (iteration > 1 && ratio > 0.9) || (iteration > 0 && ratio > 4.0);
+        if fresh && worse && length > settings.tolerance || length > 10.0 {
             return Err(Failure::NoConvergence(sizes));
         }
         // The matrix is kept while it still gains well over a digit per iteration.
