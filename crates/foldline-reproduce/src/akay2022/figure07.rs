@@ -1,7 +1,7 @@
 //! Figure 7: bifurcation diagrams with the cubic spring and with contact, and whether the branches close.
 
 use super::identities;
-use super::rotor::{MAX_R, OMEGA, colour, is_closed, last, max_r, over_speed};
+use super::rotor::{MAX_R, OMEGA, colour, is_closed, last, max_r, over_speed, parameters};
 use crate::claims::{Claim, Finding, digits};
 use crate::publication::{FigurePlan, Made};
 use crate::runs::{Run, Runs};
@@ -140,12 +140,13 @@ fn closing(run: &Run, far: &Run) -> Vec<Claim> {
         Ok(Finding::fact(open, ours).within(error))
     };
     let resonant = || {
-        let both =
-            far.branch("cubic S")?.ends.iter().flatten().chain(far.branch("cubic S resonant")?.ends.iter().flatten());
+        let upper = far.branch("cubic S")?;
+        let both = upper.ends.iter().flatten().chain(far.branch("cubic S resonant")?.ends.iter().flatten());
         let at_100 = both.filter(|e| **e == Ending::Bound(100.0)).count();
         let ours = format!("{at_100} of 3 arms of S reach Ω = 100");
         // S exists with three radii at every speed beyond its fold as long as ζ < (mε/2) sqrt(γ/(1-J_p)).
-        let limit = 0.5 * 0.9 * 0.353 * (0.25_f64 / (1.0 - 0.143)).sqrt();
+        let [_, _, _, epsilon, gamma, _, _, j_p, m] = parameters(&upper.points[0]);
+        let limit = 0.5 * m * epsilon * (gamma / (1.0 - j_p)).sqrt();
         Ok(Finding::fact(at_100 == 3, ours).noting(format!("in closed form: open for ζ < {limit:.6}")))
     };
     vec![

@@ -55,7 +55,7 @@ fn straight(run: &Run) -> Claim {
         let value = fold.point.parameters[run.parameter("epsilon")];
         let route: Vec<&str> =
             run.notes.iter().filter(|(about, _)| about == "cubic SL to 1.5").map(|(_, note)| note.as_str()).collect();
-        Ok(Finding::number(value, fold.error * (1.0 + value), 1.465, 2e-3).noting(route.join("; ")))
+        Ok(Finding::number(value, fold.error * (1.0 + value), 1.465, 5e-4).noting(route.join("; ")))
     };
     Claim::decided("12", "At Ω = 5 the cubic SL turns back before ε = 1.5", "1.465", finding())
 }
