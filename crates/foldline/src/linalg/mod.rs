@@ -3,10 +3,14 @@
 //! Matrices are row-major slices. The kernels serve blocks of up to about forty rows, where calling a general library
 //! costs more than the arithmetic.
 
+pub mod block;
+pub mod chain;
 pub mod condensed;
+pub mod lane;
 pub mod lu;
 pub mod periodic_schur;
 pub mod reflect;
+pub mod system;
 
 /// Largest absolute value; NaN if any entry is NaN.
 pub fn max_abs(v: &[f64]) -> f64 {

@@ -4,17 +4,19 @@
 //! left end and at the Gauss points, where it satisfies the differential equation. An integral phase condition fixes the
 //! shift in time.
 //!
-//! **Equations.** u = (profile, T, λ₁ … λ_k), N(m+1)n + 1 + k unknowns, k = 1 for a curve; D, e, b, c from [`Scheme`]; h_j interval lengths:
+//! **Equations.** u = (profile, T, λ₁ … λ_k), N(m+1)n + 1 + k unknowns, k = 1 for a curve; A, e, b from [`Scheme`]; h_j interval lengths:
 //!
 //! ```text
-//!   (1)  Σ_k D_ik X_{j,k} - h_j T f(X_{j,i}, λ) = 0                     i = 1…m, j = 0…N-1
+//!   (1)  X_{j,i} - x_j - h_j T Σ_k a_ik f(X_{j,k}, λ) = 0               i = 1…m, j = 0…N-1
 //!   (2)  x_{j+1} - Σ_k e_k X_{j,k} = 0,   x_N = x_0                     X_{j,0} = x_j
 //!   (3)  Σ_j h_j Σ_i b_i ⟨X_{j,i} - X̃_{j,i}, X̃'_{j,i}⟩ = 0              phase, with reference X̃
 //! ```
 //!
+//! (1) is the Runge–Kutta form of collocation: its matrix is close to the identity where intervals are short.
+//!
 //! Inner products of states divide component c by s_c = (model scale) + max |X̃_c|.
 //!
-//! **Source.** ascher1995, §5; doedel1991 (integral phase condition).
+//! **Source.** ascher1995, §5; hairer1996, §IV.8; doedel1991 (integral phase condition).
 //!
 //! **Fails when** the cycle shrinks to an equilibrium (the phase condition loses its meaning there) or its period grows
 //! without bound; the continuation recognises both.
@@ -27,7 +29,7 @@ use super::gauss::Scheme;
 use super::{Setting, extremes, mesh};
 use crate::contract::{Batch, Examination, Parameters, Singular, ZeroProblem};
 use crate::diagram::{Cycle, Mesh, Point, Solution, Trust};
-use crate::linalg::condensed::Condensed;
+use crate::linalg::system::System;
 use crate::linalg::{axpy, max_abs};
 use crate::stability::floquet;
 
@@ -39,12 +41,17 @@ pub struct CycleProblem<'a> {
     mesh: Mesh,
     n: usize,
     halves: bool,
-    /// X̃' / s² at the Gauss points, `[N][m][n]`, normalised to unit length, and ⟨X̃, X̃'⟩ in that weight.
+    /// X̃' / s² at the Gauss points, `[L][m][n][W]`, normalised to unit length, and ⟨X̃, X̃'⟩ in that weight.
     phase: Vec<f64>,
     phase_offset: f64,
     scale: Vec<f64>,
     period_scale: f64,
-    system: Condensed,
+    system: System,
+    /// Places and lanes of the solver; see [`System`].
+    length: usize,
+    width: usize,
+    /// `[L][W]`: h_j where the solver has interval j, zero beyond the last one.
+    lengths: Vec<f64>,
     states: Vec<f64>,
     f: Vec<f64>,
     fx: Vec<f64>,
@@ -60,7 +67,10 @@ impl<'a> CycleProblem<'a> {
         let scheme = Scheme::new(degree);
         let n = setting.field.dim();
         let mut problem = CycleProblem {
-            system: Condensed::new(n, &scheme.end, 1 + setting.freedom()),
+            system: System::new(n, &scheme.end, 1 + setting.freedom()),
+            length: 0,
+            width: 1,
+            lengths: Vec::new(),
             scale: setting.scales.to_vec(),
             setting,
             sampling: defect::Sampling::new(&scheme),
@@ -98,6 +108,16 @@ impl<'a> CycleProblem<'a> {
         self.mesh.len() - 1
     }
 
+    /// Points of a batch.
+    fn lanes(&self) -> usize {
+        self.length * self.width * self.scheme.degree
+    }
+
+    /// Where component 0 of the phase condition at Gauss point i of interval j is; the components are W apart.
+    fn phase_at(&self, j: usize, i: usize) -> usize {
+        ((j % self.length) * self.scheme.degree + i) * self.n * self.width + j / self.length
+    }
+
     fn profile_size(&self) -> usize {
         self.intervals() * (self.scheme.degree + 1) * self.n
     }
@@ -133,20 +153,22 @@ impl ZeroProblem for CycleProblem<'_> {
         self.period_scale = u[size].abs().max(f64::MIN_POSITIVE);
         self.phase.fill(0.0);
         let (mut length, mut offset) = (0.0, 0.0);
+        let mut slope = vec![0.0; n];
         for j in 0..self.intervals() {
             let h = self.h(j);
             for i in 0..m {
-                let slope = &mut self.phase[(j * m + i) * n..(j * m + i + 1) * n];
+                slope.fill(0.0);
                 for k in 0..=m {
                     let node = &u[(j * (m + 1) + k) * n..(j * (m + 1) + k + 1) * n];
-                    axpy(self.scheme.derivative[i * (m + 1) + k] / h, node, slope);
+                    axpy(self.scheme.derivative[i * (m + 1) + k] / h, node, &mut slope);
                 }
                 let x = &u[(j * (m + 1) + i + 1) * n..(j * (m + 1) + i + 2) * n];
+                let first = self.phase_at(j, i);
                 for c in 0..n {
-                    let plain = slope[c];
-                    slope[c] /= self.scale[c] * self.scale[c];
-                    length += h * self.scheme.weights[i] * plain * slope[c];
-                    offset += h * self.scheme.weights[i] * x[c] * slope[c];
+                    let weighted = slope[c] / (self.scale[c] * self.scale[c]);
+                    length += h * self.scheme.weights[i] * slope[c] * weighted;
+                    offset += h * self.scheme.weights[i] * x[c] * weighted;
+                    self.phase[first + c * self.width] = weighted;
                 }
             }
         }
@@ -157,14 +179,13 @@ impl ZeroProblem for CycleProblem<'_> {
 
     fn residual(&mut self, u: &[f64], r: &mut [f64]) -> bool {
         let (n, m, count) = (self.n, self.scheme.degree, self.intervals());
-        let (lanes, size, block) = (count * m, self.profile_size(), (m + 1) * n);
+        let (lanes, size, block) = (self.lanes(), self.profile_size(), (m + 1) * n);
         let period = u[size];
         self.gather(u);
         let parameters = self.setting.at(&u[size + 1..]);
         let batch = Batch { lanes, states: &self.states, parameters: Parameters::Shared(&parameters) };
         self.setting.field.evaluate(batch, &mut self.f);
         let mut phase = -self.phase_offset;
-        r[..size].fill(0.0);
         for j in 0..count {
             let h = self.h(j);
             let own = &u[j * block..(j + 1) * block];
@@ -175,13 +196,19 @@ impl ZeroProblem for CycleProblem<'_> {
                 axpy(-self.scheme.end[k], &own[k * n..(k + 1) * n], &mut rows[..n]);
             }
             for i in 0..m {
-                let target = &mut rows[(i + 1) * n..(i + 2) * n];
-                for k in 0..=m {
-                    axpy(self.scheme.derivative[i * (m + 1) + k], &own[k * n..(k + 1) * n], target);
-                }
                 for c in 0..n {
-                    target[c] -= h * period * self.f[c * lanes + j * m + i];
-                    phase += h * self.scheme.weights[i] * self.phase[(j * m + i) * n + c] * own[(i + 1) * n + c];
+                    rows[(i + 1) * n + c] = own[(i + 1) * n + c] - own[c];
+                }
+            }
+            for k in 0..m {
+                let (at, first) = (self.at(j, k), self.phase_at(j, k));
+                for c in 0..n {
+                    let rate = h * period * self.f[c * lanes + at];
+                    for i in 0..m {
+                        rows[(i + 1) * n + c] -= self.scheme.integration[i * m + k] * rate;
+                    }
+                    let weight = h * self.scheme.weights[k] * self.phase[first + c * self.width];
+                    phase += weight * own[(k + 1) * n + c];
                 }
             }
         }
@@ -192,8 +219,7 @@ impl ZeroProblem for CycleProblem<'_> {
     fn factorise(&mut self, u: &[f64], rows: &[f64]) -> Result<(), Singular> {
         self.errors = None;
         self.fill(u, rows);
-        self.system.condense()?;
-        self.system.eliminate(1.0)
+        self.system.factorise(1.0)
     }
 
     fn solve(&mut self, rhs: &[f64], x: &mut [f64]) {
@@ -238,8 +264,13 @@ impl ZeroProblem for CycleProblem<'_> {
         self.mesh = mesh.clone();
         self.errors = None;
         let (n, count) = (self.n, mesh.len() - 1);
-        let lanes = count * self.scheme.degree;
         self.system.resize(count);
+        (self.length, self.width) = (self.system.length(), self.system.lanes());
+        self.lengths = (0..self.system.places())
+            .map(|k| k / self.width + k % self.width * self.length)
+            .map(|j| if j < count { mesh[j + 1] - mesh[j] } else { 0.0 })
+            .collect();
+        let lanes = self.lanes();
         self.phase.resize(lanes * n, 0.0);
         self.states.resize(lanes * n, 0.0);
         self.f.resize(lanes * n, 0.0);
@@ -275,14 +306,11 @@ impl ZeroProblem for CycleProblem<'_> {
 
     fn examine(&mut self, u: &[f64]) -> Examination {
         let (n, count, size) = (self.n, self.intervals(), self.profile_size());
-        let width = n + 1 + self.setting.freedom();
         let mut transitions = vec![0.0; count * n * n];
-        for j in 0..count {
-            let step = self.system.transition(j);
-            for i in 0..n {
-                for c in 0..n {
-                    transitions[(j * n + i) * n + c] = step[i * width + c] * self.scale[c] / self.scale[i];
-                }
+        for (j, own) in transitions.chunks_exact_mut(n * n).enumerate() {
+            self.system.transition(j, own);
+            for (k, g) in own.iter_mut().enumerate() {
+                *g *= self.scale[k % n] / self.scale[k / n];
             }
         }
         let found = floquet::multipliers(&transitions, &self.flow_at_nodes(u), n);
