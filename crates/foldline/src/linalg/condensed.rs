@@ -538,9 +538,16 @@ mod tests {
 
     #[test]
     fn agrees_with_a_dense_solution_of_the_same_equations() {
-        for (intervals, q, closure) in
-            [(1, 2, 1.0), (2, 1, -1.0), (7, 2, 1.0), (8, 2, 1.0), (5, 0, -1.0), (6, 3, 1.0), (17, 2, -1.0), (40, 2, 1.0)]
-        {
+        for (intervals, q, closure) in [
+            (1, 2, 1.0),
+            (2, 1, -1.0),
+            (7, 2, 1.0),
+            (8, 2, 1.0),
+            (5, 0, -1.0),
+            (6, 3, 1.0),
+            (17, 2, -1.0),
+            (40, 2, 1.0),
+        ] {
             agrees::<f64>(intervals, q, closure);
             agrees::<Eight>(intervals, q, closure);
         }

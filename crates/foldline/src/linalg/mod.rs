@@ -11,6 +11,7 @@ pub mod lu;
 pub mod periodic_schur;
 pub mod reflect;
 pub mod system;
+mod tile;
 
 /// Largest absolute value; NaN if any entry is NaN.
 pub fn max_abs(v: &[f64]) -> f64 {
