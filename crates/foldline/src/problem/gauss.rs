@@ -12,6 +12,9 @@
 //!
 //! **Source.** ascher1995, §5; hairer1996, §II.7.
 
+/// The largest degree.
+pub const LARGEST: usize = 12;
+
 /// Nodes and weights for one degree.
 #[derive(Clone, Debug)]
 pub struct Scheme {
@@ -31,9 +34,9 @@ pub struct Scheme {
 }
 
 impl Scheme {
-    /// The scheme of degree m, 1 ≤ m ≤ 12.
+    /// The scheme of degree m, 1 ≤ m ≤ [`LARGEST`]; other degrees become the nearest of these.
     pub fn new(degree: usize) -> Scheme {
-        let m = degree.max(1);
+        let m = degree.clamp(1, LARGEST);
         let (gauss, weights) = gauss_legendre(m);
         let mut nodes = vec![0.0];
         nodes.extend(gauss);
@@ -57,13 +60,45 @@ impl Scheme {
 
     /// Weights `[m + 1]` that give p(s) from the values at the nodes.
     pub fn interpolation(&self, s: f64) -> Vec<f64> {
-        if let Some(k) = self.nodes.iter().position(|&c| c == s) {
-            let mut unit = vec![0.0; self.degree + 1];
-            unit[k] = 1.0;
-            return unit;
+        let mut weights = vec![0.0; self.degree + 1];
+        self.weigh(s, &mut weights);
+        weights
+    }
+
+    /// p(s) `[n]` from the values at the nodes `[m + 1][n]`.
+    pub fn value_into(&self, s: f64, nodes: &[f64], x: &mut [f64]) {
+        let mut weights = [0.0; LARGEST + 1];
+        let weights = &mut weights[..=self.degree];
+        self.weigh(s, weights);
+        let n = x.len();
+        // Four components at a time are two or one vector instructions.
+        let (fours, rest) = x.as_chunks_mut::<4>();
+        for (g, four) in fours.iter_mut().enumerate() {
+            *four = [0.0; 4];
+            for (w, node) in weights.iter().zip(nodes.chunks_exact(n)) {
+                if let Some(values) = node[4 * g..].first_chunk::<4>() {
+                    (0..4).for_each(|c| four[c] += w * values[c]);
+                }
+            }
         }
-        let node_polynomial: f64 = self.nodes.iter().map(|c| s - c).product();
-        self.nodes.iter().zip(&self.barycentric).map(|(c, w)| node_polynomial * w / (s - c)).collect()
+        let first = 4 * fours.len();
+        for (c, value) in rest.iter_mut().enumerate() {
+            *value = weights.iter().zip(nodes.chunks_exact(n)).map(|(w, node)| w * node[first + c]).sum();
+        }
+    }
+
+    /// ℓ_k(s): the product of what is left of node k and of what is right of it, and exactly 1 at the node.
+    fn weigh(&self, s: f64, weights: &mut [f64]) {
+        let mut left = 1.0;
+        for ((w, c), b) in weights.iter_mut().zip(&self.nodes).zip(&self.barycentric) {
+            *w = b * left;
+            left *= s - c;
+        }
+        let mut right = 1.0;
+        for (w, c) in weights.iter_mut().zip(&self.nodes).rev() {
+            *w = if s == *c { 1.0 } else { *w * right };
+            right *= s - c;
+        }
     }
 }
 

@@ -30,8 +30,10 @@ use super::{Setting, extremes, mesh};
 use crate::contract::{Batch, Examination, Parameters, Singular, ZeroProblem};
 use crate::diagram::{Cycle, Mesh, Point, Solution, Trust};
 use crate::linalg::system::System;
-use crate::linalg::{axpy, max_abs};
+use crate::linalg::{axpy, larger, max_abs};
 use crate::stability::floquet;
+use errors::Measured;
+use std::cell::RefCell;
 
 /// Cycles in one free parameter (a curve) or several.
 pub struct CycleProblem<'a> {
@@ -57,8 +59,8 @@ pub struct CycleProblem<'a> {
     fx: Vec<f64>,
     fp: Vec<f64>,
     trace: f64,
-    /// Errors found by the last examination, while its factorisation is the last one.
-    errors: Option<Vec<f64>>,
+    /// What was measured last. Mesh and errors belong together only for the point they were measured at.
+    measured: RefCell<Option<Measured>>,
 }
 
 impl<'a> CycleProblem<'a> {
@@ -86,7 +88,7 @@ impl<'a> CycleProblem<'a> {
             fx: Vec::new(),
             fp: Vec::new(),
             trace: 0.0,
-            errors: None,
+            measured: RefCell::new(None),
         };
         problem.set_mesh(mesh);
         problem
@@ -126,13 +128,18 @@ impl<'a> CycleProblem<'a> {
         self.mesh[j + 1] - self.mesh[j]
     }
 
-    /// Largest |component| over the profile.
+    /// Largest |component| over the profile; NaN where one is.
     fn sizes(&self, u: &[f64]) -> Vec<f64> {
-        let mut sizes = vec![0.0f64; self.n];
-        for x in u[..self.profile_size()].chunks_exact(self.n) {
-            for (s, v) in sizes.iter_mut().zip(x) {
-                *s = s.max(v.abs());
+        // All components of all nodes of an interval at once, so that the loop is one over lanes.
+        let mut largest = vec![0.0f64; (self.scheme.degree + 1) * self.n];
+        for interval in u[..self.profile_size()].chunks_exact(largest.len()) {
+            for (most, v) in largest.iter_mut().zip(interval) {
+                *most = larger(*most, v.abs());
             }
+        }
+        let mut sizes = largest.split_off(largest.len() - self.n);
+        for node in largest.chunks_exact(self.n) {
+            sizes.iter_mut().zip(node).for_each(|(size, v)| *size = larger(*size, *v));
         }
         sizes
     }
@@ -217,7 +224,6 @@ impl ZeroProblem for CycleProblem<'_> {
     }
 
     fn factorise(&mut self, u: &[f64], rows: &[f64]) -> Result<(), Singular> {
-        self.errors = None;
         self.fill(u, rows);
         self.system.factorise(1.0)
     }
@@ -227,14 +233,17 @@ impl ZeroProblem for CycleProblem<'_> {
     }
 
     fn dot(&self, a: &[f64], b: &[f64]) -> f64 {
-        let (n, m, size) = (self.n, self.scheme.degree, self.profile_size());
+        let (n, block, size) = (self.n, (self.scheme.degree + 1) * self.n, self.profile_size());
+        // For every Gauss point and component the sum over the intervals first.
+        let mut sums = vec![0.0; block - n];
+        let intervals = a[..size].chunks_exact(block).zip(b[..size].chunks_exact(block));
+        for ((x, y), pair) in intervals.zip(self.mesh.windows(2)) {
+            let h = pair[1] - pair[0];
+            sums.iter_mut().zip(x[n..].iter().zip(&y[n..])).for_each(|(sum, (x, y))| *sum += h * (x * y));
+        }
         let mut total = 0.0;
-        for j in 0..self.intervals() {
-            for i in 0..m {
-                let at = (j * (m + 1) + i + 1) * n;
-                let local: f64 = (0..n).map(|c| a[at + c] * b[at + c] / (self.scale[c] * self.scale[c])).sum();
-                total += self.h(j) * self.scheme.weights[i] * local;
-            }
+        for (weight, sums) in self.scheme.weights.iter().zip(sums.chunks_exact(n)) {
+            total += weight * sums.iter().zip(&self.scale).map(|(sum, scale)| sum / (scale * scale)).sum::<f64>();
         }
         total / n as f64
             + a[size] * b[size] / (self.period_scale * self.period_scale)
@@ -244,16 +253,8 @@ impl ZeroProblem for CycleProblem<'_> {
     fn relative_size(&self, du: &[f64], u: &[f64]) -> f64 {
         let size = self.profile_size();
         let scale = self.relative_scale(u);
-        let mut largest = (du[size] / u[size]).abs().max(self.setting.relative_size(&du[size + 1..], &u[size + 1..]));
-        for x in du[..size].chunks_exact(self.n) {
-            for (v, s) in x.iter().zip(&scale) {
-                let relative = (v / s).abs();
-                if relative > largest || relative.is_nan() {
-                    largest = relative;
-                }
-            }
-        }
-        largest
+        let scalars = (du[size] / u[size]).abs().max(self.setting.relative_size(&du[size + 1..], &u[size + 1..]));
+        self.sizes(du).iter().zip(&scale).map(|(d, s)| d / s).fold(scalars, larger)
     }
 
     fn mesh(&self) -> Mesh {
@@ -262,7 +263,7 @@ impl ZeroProblem for CycleProblem<'_> {
 
     fn set_mesh(&mut self, mesh: &Mesh) {
         self.mesh = mesh.clone();
-        self.errors = None;
+        self.measured.replace(None);
         let (n, count) = (self.n, mesh.len() - 1);
         self.system.resize(count);
         (self.length, self.width) = (self.system.length(), self.system.lanes());
@@ -289,7 +290,7 @@ impl ZeroProblem for CycleProblem<'_> {
     }
 
     fn better_mesh(&self, u: &[f64], tolerance: f64) -> Option<Mesh> {
-        let errors = self.errors.clone().unwrap_or_else(|| self.measured_errors(u));
+        let errors = self.errors(u);
         let worst = errors.iter().fold(0.0, |m: f64, e| m.max(*e));
         let degree = self.scheme.degree;
         let better = if self.halves {
@@ -315,11 +316,10 @@ impl ZeroProblem for CycleProblem<'_> {
         }
         let found = floquet::multipliers(&transitions, &self.flow_at_nodes(u), n);
         let scale = self.relative_scale(u);
-        let errors = self.measured_errors(u);
+        let errors = self.errors(u);
         let mut r = vec![0.0; u.len()];
         self.residual(u, &mut r);
-        let residual =
-            r[..size].iter().enumerate().map(|(k, v)| (v / scale[k % n]).abs()).fold(r[size].abs(), f64::max);
+        let residual = self.sizes(&r).iter().zip(&scale).map(|(v, s)| v / s).fold(r[size].abs(), f64::max);
         let parameters = self.setting.at(&u[size + 1..]);
         let ranges = extremes::of_profile(self.setting.field, &parameters, &u[..size], &self.mesh, &self.scheme);
         let trust = Trust {
@@ -328,7 +328,6 @@ impl ZeroProblem for CycleProblem<'_> {
             trivial_defect: (found.multipliers[0].re - 1.0).abs(),
             liouville_defect: (found.log_product - self.trace).abs(),
         };
-        self.errors = Some(errors);
         Examination { spectrum: found.multipliers, unstable: found.unstable, ranges, trust }
     }
 
