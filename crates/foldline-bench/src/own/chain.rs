@@ -41,8 +41,7 @@ pub fn model(states: usize) -> Outcome<Model> {
 pub fn plan(model: &Model, until: f64, points: usize) -> Plan {
     let parameters = model.defaults();
     let state = (0..model.states.len()).map(|i| if i % 2 == 0 { 2.0 } else { 0.0 }).collect();
-    let seed =
-        SeedPlan { name: "locked".into(), source: SeedSource::State(state), parameters, samples: 1, random: 1 };
+    let seed = SeedPlan { name: "locked".into(), source: SeedSource::State(state), parameters, samples: 1, random: 1 };
     let branch = BranchPlan {
         name: "locked".into(),
         start: Start::Seed(0),

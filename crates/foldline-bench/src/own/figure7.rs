@@ -15,7 +15,8 @@ pub fn whole(place: &Workplace) -> Outcome<String> {
     let mut usages = Vec::new();
     for k in 0..place.repetitions() {
         let folder = out.join(k.to_string());
-        let arguments = [&*study.to_string_lossy(), "--jobs", "1", "--out", &folder.to_string_lossy()].map(String::from);
+        let arguments =
+            [&*study.to_string_lossy(), "--jobs", "1", "--out", &folder.to_string_lossy()].map(String::from);
         let arguments: Vec<&str> = std::iter::once("run").chain(arguments.iter().map(String::as_str)).collect();
         usages.push(child::run(&place.foldline(), &arguments, &place.root, &[])?.0);
     }
@@ -47,8 +48,7 @@ pub fn work(diagram: &Diagram) -> String {
     let mut total = [0; 5];
     for branch in &diagram.branches {
         let cost = branch.cost();
-        let counts =
-            [branch.points.len(), branch.special.len(), cost.newton, cost.factorisations, cost.rejected];
+        let counts = [branch.points.len(), branch.special.len(), cost.newton, cost.factorisations, cost.rejected];
         total.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
         table.row(&row_of(&branch.name, &counts));
     }
