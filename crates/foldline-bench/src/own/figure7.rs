@@ -1,0 +1,105 @@
+//! The whole of figure 7, and its branch that is compared with others most often.
+
+use crate::report::{Table, digits, time};
+use crate::workplace::Workplace;
+use crate::{Outcome, child, clock, rotor};
+use foldline::diagram::Diagram;
+use foldline_store::run_file;
+use std::path::Path;
+use std::process::Command;
+
+/// Time, instructions, memory and work of the study on one thread.
+pub fn whole(place: &Workplace) -> Outcome<String> {
+    let out = place.scratch("figure7")?;
+    let study = place.study(rotor::FIGURE_7);
+    let mut usages = Vec::new();
+    for k in 0..place.repetitions() {
+        let folder = out.join(k.to_string());
+        let arguments =
+            [&*study.to_string_lossy(), "--jobs", "1", "--out", &folder.to_string_lossy()].map(String::from);
+        let arguments: Vec<&str> = std::iter::once("run").chain(arguments.iter().map(String::as_str)).collect();
+        usages.push(child::run(&place.foldline(), &arguments, &place.root, &[])?.0);
+    }
+    let all = |value: fn(&child::Usage) -> f64| usages.iter().map(value).collect::<Vec<f64>>();
+    let (cpu, wall, memory) = (all(|u| u.cpu), all(|u| u.wall), all(|u| u.memory));
+    let diagram = run_file::load(&out.join("0"))?.diagram;
+
+    // Without the sampling of first solutions, in this process.
+    let study = rotor::study(place, rotor::FIGURE_7)?;
+    let starts = rotor::beginnings(&study);
+    let branches: Vec<f64> = (0..place.repetitions().min(5))
+        .map(|_| clock::timed(|| rotor::run(&study, &study.plan, starts.clone())).0)
+        .collect();
+
+    let mut table = Table::new(&["one thread", "best", "median"]);
+    let row = |name: &str, values: &[f64]| [name.to_string(), time(clock::least(values)), time(clock::median(values))];
+    table.row(&row("processor time of `foldline run --jobs 1`", &cpu));
+    table.row(&row("wall time of the same", &wall));
+    table.row(&row("processor time of the branches alone, first solutions given, nothing stored", &branches));
+    table.row(&["largest resident memory".to_string(), format!("{} MB", digits(clock::median(&memory)))]);
+    table.row(&["instructions".to_string(), instructions(place, &out)?]);
+    let special: usize = diagram.branches.iter().map(|branch| branch.special.len()).sum();
+    Ok(format!("{}\n{special} special points.\n\n{}", table.text(), work(&diagram)))
+}
+
+/// The counters of every branch.
+pub fn work(diagram: &Diagram) -> String {
+    let mut table = Table::new(&["branch", "points", "special", "Newton iterations", "factorisations", "rejected"]);
+    let mut total = [0; 5];
+    for branch in &diagram.branches {
+        let cost = branch.cost();
+        let counts = [branch.points.len(), branch.special.len(), cost.newton, cost.factorisations, cost.rejected];
+        total.iter_mut().zip(counts).for_each(|(sum, count)| *sum += count);
+        table.row(&row_of(&branch.name, &counts));
+    }
+    table.row(&row_of("all", &total));
+    table.text().to_string()
+}
+
+fn row_of(name: &str, counts: &[usize]) -> Vec<String> {
+    std::iter::once(name.to_string()).chain(counts.iter().map(usize::to_string)).collect()
+}
+
+/// Instructions of the whole run under callgrind.
+fn instructions(place: &Workplace, out: &Path) -> Outcome<String> {
+    if place.quick {
+        return Ok("not counted".into());
+    }
+    let counts = out.join("callgrind.out");
+    let ran = Command::new("valgrind")
+        .args(["--tool=callgrind", &format!("--callgrind-out-file={}", counts.display())])
+        .arg(place.foldline())
+        .arg("run")
+        .arg(place.study(rotor::FIGURE_7))
+        .args(["--jobs", "1", "--out"])
+        .arg(out.join("counted"))
+        .output();
+    let Ok(ran) = ran else { return Ok("not counted: valgrind is not installed".into()) };
+    let complaint = String::from_utf8_lossy(&ran.stderr);
+    let text = std::fs::read_to_string(&counts).unwrap_or_default();
+    let total = text.lines().find_map(|line| line.strip_prefix("totals: "));
+    match total.and_then(|line| line.split_whitespace().next()).and_then(|word| word.parse::<f64>().ok()) {
+        Some(count) => Ok(format!("{} · 10⁹", digits(count * 1e-9))),
+        None => Ok(format!("not counted: {}", complaint.lines().last().unwrap_or("valgrind failed"))),
+    }
+}
+
+/// The single loop of the cubic rotor between Ω = 5 and 10, from a given first cycle.
+pub fn single_loop(place: &Workplace) -> Outcome<String> {
+    let study = rotor::study(place, rotor::SINGLE_LOOP)?;
+    let starts = rotor::beginnings(&study);
+    let diagram = rotor::run(&study, &study.plan, starts.clone());
+    let times: Vec<f64> = (0..3 * place.repetitions())
+        .map(|_| clock::timed(|| rotor::run(&study, &study.plan, starts.clone())).0)
+        .collect();
+    let iterations = diagram.branches.first().map_or(0, |branch| branch.cost().newton);
+    Ok(format!(
+        "Processor time from a given first cycle, tolerance {:.0e}: best {}, median {}; {} per Newton iteration with all \
+         that belongs to a branch.\n\n{}",
+        study.plan.tolerance,
+        time(clock::least(&times)),
+        time(clock::median(&times)),
+        time(clock::least(&times) / iterations.max(1) as f64),
+        work(&diagram)
+    ))
+}

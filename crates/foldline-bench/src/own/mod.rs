@@ -1,0 +1,29 @@
+//! What needs no foreign code.
+//!
+//! | part | file |
+//! |---|---|
+//! | the whole of figure 7, and one branch of it | [`figure7`] |
+//! | cost of an iteration against the size of the problem | [`cost`], [`chain`] |
+//! | two threads, ensembles, memory of a long branch, start-up | [`threads`], [`ensemble`], [`stream`], [`startup`] |
+
+pub mod chain;
+pub mod cost;
+pub mod ensemble;
+pub mod figure7;
+mod startup;
+mod stream;
+mod threads;
+
+use crate::workplace::Part;
+
+/// The parts, in the order of the report.
+pub const PARTS: [(&str, Part); 8] = [
+    ("Figure 7", figure7::whole),
+    ("Cubic single loop from 5 to 10", figure7::single_loop),
+    ("Cost against intervals", cost::intervals),
+    ("Cost against states", cost::states),
+    ("Two threads", threads::two),
+    ("Ensemble", ensemble::alone),
+    ("A branch of 100,000 points", stream::long_branch),
+    ("Start-up", startup::table),
+];

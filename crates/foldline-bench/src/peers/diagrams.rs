@@ -1,0 +1,221 @@
+//! Target: all of figure 7.
+//!
+//! **Idea.** AUTO follows the branches that foldline follows, from the same first solutions: to both sides, or once round
+//! where the branch is closed, and from period doublings to the doubled branches and those doubled again. What has to be
+//! known for that, such as after how many points a closed branch has come round, it is told for nothing: a first run finds
+//! it out and only a second one is timed. Several meshes and largest steps are tried; what counts is the setting at which
+//! most special points are found, the fastest if there are several.
+
+use super::auto::Auto;
+use super::auto_files::{Row, write_start};
+use crate::report::{Table, digits, time};
+use crate::workplace::Workplace;
+use crate::{Outcome, clock, rotor};
+use foldline::diagram::{Branch, Diagram, Kind, Point, Solution};
+
+const INTERVALS: [usize; 2] = [100, 200];
+const STEPS: [&str; 4] = ["0.02", "0.05", "0.2", "1"];
+/// Points after which AUTO has surely been round, or never will be.
+const LIMIT: usize = 4000;
+
+/// Everything that AUTO does at one setting.
+struct Tour<'t> {
+    auto: &'t Auto,
+    intervals: usize,
+    step: &'t str,
+    cpu: f64,
+    points: usize,
+    /// Name of the branch of the plan, and a special point found from there.
+    special: Vec<(String, Row)>,
+}
+
+/// One run of AUTO: its constants, and where it starts.
+struct Run<'r> {
+    changes: Vec<(&'r str, String)>,
+    from: Option<(&'r str, usize)>,
+}
+
+impl Run<'_> {
+    fn with(&self, more: &[(&'static str, String)]) -> Run<'_> {
+        let changes = self.changes.iter().cloned().chain(more.iter().cloned()).collect();
+        Run { changes, from: self.from }
+    }
+}
+
+impl Tour<'_> {
+    /// Runs without counting the time.
+    fn tried(&self, run: &Run) -> Outcome<(f64, Vec<Row>)> {
+        let changes: Vec<(&str, &str)> = run.changes.iter().map(|(name, value)| (*name, value.as_str())).collect();
+        let answer = match run.from {
+            None => self.auto.run(&changes)?,
+            Some((solutions, label)) => self.auto.run_from(solutions, label, &changes)?,
+        };
+        Ok((answer.cpu, answer.rows))
+    }
+
+    /// Runs and counts.
+    fn counted(&mut self, name: &str, run: &Run) -> Outcome<Vec<Row>> {
+        let (cpu, rows) = self.tried(run)?;
+        self.cpu += cpu;
+        self.points += rows.len();
+        self.special.extend(rows.iter().filter(|row| kind_of(row).is_some()).map(|row| (name.to_string(), *row)));
+        Ok(rows)
+    }
+
+    fn common(&self, start: &Point) -> Vec<(&'static str, String)> {
+        let [omega, kappa] = [start.parameters[0], start.parameters[1]];
+        vec![
+            ("PAR", format!("{{1: {omega:?}, 2: {kappa:?}}}")),
+            ("UZSTOP", "{1: [0.5, 12.0]}".into()),
+            ("DSMAX", self.step.into()),
+            ("NTST", self.intervals.to_string()),
+            ("NMX", LIMIT.to_string()),
+        ]
+    }
+
+    /// A branch of the plan and what grows from it.
+    fn branch(&mut self, branch: &Branch) -> Outcome<()> {
+        let start = rotor::first(branch)?;
+        let mut changes = self.common(start);
+        let cycle = match &start.solution {
+            Solution::Equilibrium(x) => {
+                let values: Vec<String> = x.iter().enumerate().map(|(k, v)| format!("{}: {v:?}", k + 1)).collect();
+                changes.push(("U", format!("{{{}}}", values.join(", "))));
+                changes.extend([("IPS", "1".into()), ("ICP", "[1]".into()), ("dat", "''".into())]);
+                None
+            }
+            Solution::Cycle(cycle) => {
+                write_start(cycle, &self.auto.start())?;
+                Some(cycle.period)
+            }
+        };
+        for sign in ["", "-"] {
+            let mut own = changes.clone();
+            own.push(("DS", format!("{sign}0.01")));
+            let run = Run { changes: own, from: None };
+            let lap = match cycle {
+                Some(period) => lap(&self.tried(&run)?.1, start.parameters[0], period),
+                None => None,
+            };
+            let run = run.with(&[("NMX", lap.unwrap_or(LIMIT).to_string())]);
+            let rows = self.counted(&branch.name, &run)?;
+            if cycle.is_some() && start.parameters[1] == 1.0 {
+                let solutions = self.auto.solutions()?;
+                self.doubled(&branch.name, start, &solutions, &rows, 2)?;
+            }
+            if lap.is_some() {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// The branches that begin at period doublings, to that depth.
+    fn doubled(&mut self, name: &str, start: &Point, solutions: &str, rows: &[Row], depth: usize) -> Outcome<()> {
+        let mut ends: Vec<f64> = Vec::new();
+        for row in rows.iter().filter(|row| kind_of(row) == Some(Kind::PeriodDoubling) && row.label > 0) {
+            // The other end of a branch followed before.
+            if ends.iter().any(|end| (end - row.parameter).abs() < 1e-2) {
+                continue;
+            }
+            let mut changes = self.common(start);
+            // Twice as long a cycle, twice as many intervals. The branch ends where it meets its parent again.
+            changes.extend([
+                ("ISW", "-1".into()),
+                ("STOP", "['BP1']".into()),
+                ("NTST", (self.intervals << (3 - depth)).to_string()),
+            ]);
+            let run = Run { changes, from: Some((solutions, row.label)) };
+            let rows = self.counted(name, &run)?;
+            ends.extend(rows.iter().filter(|row| row.kind == 6).map(|row| row.parameter));
+            if depth > 1 {
+                let own = self.auto.solutions()?;
+                self.doubled(name, start, &own, &rows, depth - 1)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// After how many points a closed branch has come round to where it started.
+fn lap(rows: &[Row], start: f64, period: f64) -> Option<usize> {
+    let rising = rows.get(1)?.parameter > start;
+    let home = |pair: &[Row]| {
+        let (a, b) = (pair[0].parameter - start, pair[1].parameter - start);
+        a * b <= 0.0 && (b > a) == rising && (pair[1].period / period - 1.0).abs() < 0.02
+    };
+    rows.windows(2).skip(5).position(home).map(|at| at + 7)
+}
+
+/// The kind of special point that a row is.
+fn kind_of(row: &Row) -> Option<Kind> {
+    match row.kind {
+        2 | 5 => Some(Kind::Fold),
+        3 => Some(Kind::Hopf),
+        7 => Some(Kind::PeriodDoubling),
+        8 => Some(Kind::Torus),
+        _ => None,
+    }
+}
+
+/// How many special points of the diagram AUTO has found, and how many it has that are not in the diagram.
+fn matched(diagram: &Diagram, special: &[(String, Row)]) -> (usize, usize) {
+    let root = |name: &str| name.split('/').next().unwrap_or("").to_string();
+    let same = |branch: &Branch, kind: Kind, point: &Point, (name, row): &(String, Row)| {
+        let omega = point.parameters[rotor::OMEGA];
+        let period = point.solution.period().is_none_or(|period| (row.period / period - 1.0).abs() < 1e-2);
+        root(&branch.name) == *name
+            && kind_of(row) == Some(kind)
+            && (row.parameter / omega - 1.0).abs() < 1e-3
+            && period
+    };
+    let known: Vec<_> = diagram.branches.iter().flat_map(|b| b.special.iter().map(move |s| (b, s))).collect();
+    let found = known.iter().filter(|(b, s)| special.iter().any(|row| same(b, s.kind, &s.point, row))).count();
+    let other = special.iter().filter(|row| !known.iter().any(|(b, s)| same(b, s.kind, &s.point, row))).count();
+    (found, other)
+}
+
+fn tour<'t>(auto: &'t Auto, starts: &Diagram, intervals: usize, step: &'t str) -> Outcome<Tour<'t>> {
+    let mut tour = Tour { auto, intervals, step, cpu: 0.0, points: 0, special: Vec::new() };
+    starts.branches.iter().try_for_each(|branch| tour.branch(branch))?;
+    Ok(tour)
+}
+
+/// Both codes.
+pub fn compared(place: &Workplace) -> Outcome<String> {
+    let study = rotor::study(place, rotor::FIGURE_7)?;
+    let starts = rotor::beginnings(&study);
+    let own = || clock::timed(|| rotor::run(&study, &study.plan, starts.clone()));
+    let diagram = own().1;
+    let all: usize = diagram.branches.iter().map(|branch| branch.special.len()).sum();
+    let points: usize = diagram.branches.iter().map(|branch| branch.points.len()).sum();
+    let auto = Auto::new(place, "rotor", "auto-diagrams")?;
+    let mut table = Table::new(&["", "points", "special points found", "not in the diagram", "processor time"]);
+    let mut best: Option<(usize, f64, usize, &str)> = None;
+    for intervals in INTERVALS {
+        for step in STEPS {
+            let tour = tour(&auto, &starts, intervals, step)?;
+            let (found, other) = matched(&diagram, &tour.special);
+            let name = format!("AUTO, NTST {intervals}, DSMAX {step}");
+            table.row(&[name, tour.points.to_string(), format!("{found} of {all}"), other.to_string(), time(tour.cpu)]);
+            if best.is_none_or(|(most, cpu, ..)| found > most || (found == most && tour.cpu < cpu)) {
+                best = Some((found, tour.cpu, intervals, step));
+            }
+        }
+    }
+    let (found, _, intervals, step) = best.ok_or("AUTO was not run")?;
+    let (mut ours, mut ratios) = (Vec::new(), Vec::new());
+    for _ in 0..3 {
+        ours.push(own().0);
+        ratios.push(tour(&auto, &starts, intervals, step)?.cpu / ours[ours.len() - 1]);
+    }
+    let name = format!("foldline, tolerance {:.0e}", study.plan.tolerance);
+    table.row(&[name, points.to_string(), format!("{all} of {all}"), "0".into(), time(clock::median(&ours))]);
+    Ok(format!(
+        "Branches from given first solutions, two levels of period doubling (NTST doubled at each), NCOL 4.\n\n{}\nAUTO's \
+         special points are most complete ({found} of {all}) with NTST {intervals}, DSMAX {step}; foldline is {} times as \
+         fast (median of the ratios; target 20).\n",
+        table.text(),
+        digits(clock::median(&ratios))
+    ))
+}

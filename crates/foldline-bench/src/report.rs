@@ -1,0 +1,75 @@
+//! The report: parts with tables, in Markdown.
+
+use crate::workplace::Workplace;
+use crate::{Outcome, machine};
+use std::path::PathBuf;
+
+/// A report that grows; every part is shown when it is added.
+pub struct Report {
+    text: String,
+}
+
+impl Report {
+    /// Begins with the machine.
+    pub fn new(machine: String) -> Report {
+        let text = format!("# Benchmarks\n\nHow they are made: docs/book/benchmarks.md.\n\n{machine}");
+        println!("{text}");
+        Report { text }
+    }
+
+    /// Adds a part.
+    pub fn add(&mut self, name: &str, text: &str) {
+        let part = format!("\n## {name}\n\n{text}");
+        println!("{part}");
+        self.text.push_str(&part);
+    }
+
+    /// Writes benches/results/DATE.md.
+    pub fn write(&self, place: &Workplace) -> Outcome<PathBuf> {
+        let date = machine::date().ok_or("the command `date` gives no date")?;
+        let file = place.root.join("benches/results").join(format!("{date}.md"));
+        std::fs::write(&file, &self.text)?;
+        Ok(file)
+    }
+}
+
+/// A table in Markdown.
+pub struct Table {
+    columns: usize,
+    text: String,
+}
+
+impl Table {
+    /// The heads of the columns; the first is a name, the others are numbers.
+    pub fn new(heads: &[&str]) -> Table {
+        let rule: Vec<&str> = heads.iter().enumerate().map(|(k, _)| if k == 0 { "---" } else { "---:" }).collect();
+        Table { columns: heads.len(), text: format!("| {} |\n| {} |\n", heads.join(" | "), rule.join(" | ")) }
+    }
+
+    /// One more row; missing cells stay empty.
+    pub fn row<S: AsRef<str>>(&mut self, cells: &[S]) {
+        let cells = (0..self.columns).map(|k| cells.get(k).map_or("", |cell| cell.as_ref()));
+        self.text.push_str(&format!("| {} |\n", cells.collect::<Vec<_>>().join(" | ")));
+    }
+
+    /// The text.
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+}
+
+/// Seconds with a fitting unit and three digits.
+pub fn time(seconds: f64) -> String {
+    let (value, unit) = match seconds {
+        s if s < 1e-3 => (s * 1e6, "µs"),
+        s if s < 1.0 => (s * 1e3, "ms"),
+        s => (s, "s"),
+    };
+    format!("{} {unit}", digits(value))
+}
+
+/// Three significant digits without an exponent.
+pub fn digits(value: f64) -> String {
+    let places = if !value.is_finite() || value == 0.0 { 0 } else { 2 - value.abs().log10().floor() as i32 };
+    format!("{value:.*}", places.clamp(0, 9) as usize)
+}

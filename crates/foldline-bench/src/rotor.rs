@@ -1,0 +1,77 @@
+//! The rotor and its first cycles, as every part uses them.
+
+use crate::Outcome;
+use crate::workplace::Workplace;
+use foldline::contract::{Unobserved, ZeroProblem};
+use foldline::diagram::{Branch, Diagram, Mesh, Point, Solution};
+use foldline::explore::growth::{polished, problem_of, setting, settings};
+use foldline::explore::{self, Plan, Switching, System};
+use foldline::problem::cycle::CycleProblem;
+use foldline_store::study_file::{Study, read_study};
+
+/// The study of figure 7.
+pub const FIGURE_7: &str = "studies/overhung-rotor/bouncing.toml";
+/// The single loop of the cubic rotor from Ω = 5 to 10.
+pub const SINGLE_LOOP: &str = "benches/studies/cubic-single-loop.toml";
+/// Index of Ω.
+pub const OMEGA: usize = 0;
+
+/// A study of the repository.
+pub fn study(place: &Workplace, name: &str) -> Outcome<Study> {
+    read_study(&place.study(name)).map_err(|found| {
+        let lines: Vec<String> = found.iter().map(|diagnostic| diagnostic.to_string()).collect();
+        lines.join("\n").into()
+    })
+}
+
+/// The first point of every branch of a study that starts at a seed, as what an interrupted run has: a run that goes on
+/// from there samples no attractors.
+pub fn beginnings(study: &Study) -> Diagram {
+    let mut plan = study.plan.clone();
+    for branch in &mut plan.branches {
+        (branch.max_points, branch.switching) = (0, Switching::default());
+    }
+    let mut diagram = run(study, &plan, Diagram::default());
+    diagram.branches.iter_mut().for_each(|branch| branch.ends = [None, None]);
+    diagram
+}
+
+/// Carries out a plan on one thread.
+pub fn run(study: &Study, plan: &Plan, earlier: Diagram) -> Diagram {
+    explore::run(&System::of_plan(&study.model, plan), plan, 1, earlier, &Unobserved)
+}
+
+/// The point at which a branch begins.
+pub fn first(branch: &Branch) -> Outcome<&Point> {
+    let first = branch.points.iter().find(|point| point.position == 0);
+    first.ok_or_else(|| format!("{} has no first point", branch.name).into())
+}
+
+/// The largest value of the first output.
+pub fn r_max(point: &Point, states: usize) -> f64 {
+    point.ranges.get(states).map_or(f64::NAN, |range| range[1])
+}
+
+/// The same cycle at the same parameters, as accurate as `tolerance`.
+pub fn refined(system: &System, point: &Point, tolerance: f64) -> Outcome<Point> {
+    let settings = settings(system, tolerance, [f64::NEG_INFINITY, f64::INFINITY], 0);
+    let mut problem = problem_of(system, OMEGA, 4, point, false);
+    let found = polished(&mut *problem, &settings, point).map_err(|why| why.to_string())?;
+    Ok(found.point)
+}
+
+/// A cycle on another mesh, as unknowns of the problem there, the free parameter being `free`.
+pub fn on_mesh<'a>(
+    system: &'a System,
+    point: &Point,
+    free: usize,
+    mesh: &Mesh,
+) -> Outcome<(CycleProblem<'a>, Vec<f64>)> {
+    let Solution::Cycle(cycle) = &point.solution else { return Err("no cycle".into()) };
+    let mut problem = CycleProblem::new(setting(system, free, &point.parameters), cycle.degree, &cycle.mesh);
+    let u = problem.unknowns_of(point);
+    let u = problem.transfer(&u, &cycle.mesh, mesh);
+    problem.set_mesh(mesh);
+    problem.anchor(&u);
+    Ok((problem, u))
+}
