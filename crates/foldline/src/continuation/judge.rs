@@ -77,9 +77,8 @@ impl Follow<'_> {
         self.problem.anchor(&from);
         let gap: Vec<f64> = left.u.iter().zip(&from).map(|(a, b)| a - b).collect();
         let distance = self.problem.dot(&tangent, &gap);
-        let mut back: Vec<f64> = (0..from.len())
-            .map(|i| from[i] + distance * (tangent[i] + 0.5 * (left.tangent[i] - tangent[i])))
-            .collect();
+        let mut back: Vec<f64> =
+            (0..from.len()).map(|i| from[i] + distance * (tangent[i] + 0.5 * (left.tangent[i] - tangent[i]))).collect();
         let plane = Plane { row: tangent, base: from, distance };
         correct(self.problem, self.settings, &plane, &mut back, cost)?;
         let miss: Vec<f64> = back.iter().zip(&left.u).map(|(a, b)| a - b).collect();

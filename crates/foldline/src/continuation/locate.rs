@@ -256,8 +256,9 @@ pub fn locate(
             return Ok(Located { distance, station, error: floor });
         };
         let (fine, off) = relocate(problem, settings, stretch, monitor, &coarse, &finer, &mut slope, cost)?;
-        let error =
-            floor + off + discrepancy(&coarse.point, &fine.point, coarse.parameter() - fine.parameter(), fine.parameter());
+        let error = floor
+            + off
+            + discrepancy(&coarse.point, &fine.point, coarse.parameter() - fine.parameter(), fine.parameter());
         let improved = known.as_ref().is_none_or(|(_, e)| error < *e);
         if improved {
             known = Some((fine.clone(), error));

@@ -16,6 +16,12 @@ const SMALL: usize = 32;
 /// Columns of a panel of a larger one.
 const PANEL: usize = 16;
 
+/// Columns treated together: all of them where every entry is a vector by itself.
+#[inline(always)]
+fn depth<T: Lane>(n: usize) -> usize {
+    if T::COUNT > 1 || n <= SMALL { n.max(1) } else { PANEL }
+}
+
 /// Factorises the row-major n×n matrices `a` in place (the diagonal holds the inverse pivots) and solves a x = b for the
 /// `columns` right-hand sides in `b`, row-major `[n × columns]`. `pivots` is `[n × lanes]`.
 ///
@@ -33,9 +39,9 @@ pub fn factorise<T: Lane>(
 ) -> Result<bool, Singular> {
     let mut exchanged = false;
     // Small matrices are one panel; in larger ones the bulk of the work is products of panels.
-    let depth = if n <= SMALL { n } else { PANEL };
+    let depth = depth::<T>(n);
     let mut left = Vec::new();
-    for first in (0..n).step_by(depth.max(1)) {
+    for first in (0..n).step_by(depth) {
         let end = (first + depth).min(n);
         for k in first..end {
             exchanged |= pivot(a, n, pivots, b, columns, k)?;
@@ -57,7 +63,7 @@ pub fn factorise<T: Lane>(
                 }
             }
         }
-        if depth < n {
+        if T::COUNT == 1 && depth < n {
             update(a, n, b, columns, [first, end], &mut left);
         }
     }
@@ -139,12 +145,12 @@ fn exchange<T: Lane>(a: &mut [T], n: usize, b: &mut [T], columns: usize, k: usiz
 /// The upper triangle, for all columns of `b`.
 #[inline(always)]
 fn back<T: Lane>(a: &[T], n: usize, b: &mut [T], columns: usize, left: &mut Vec<T>) {
-    let depth = if n <= SMALL { n } else { PANEL };
-    for first in (0..n).step_by(depth.max(1)).rev() {
+    let depth = depth::<T>(n);
+    for first in (0..n).step_by(depth).rev() {
         let end = (first + depth).min(n);
         let (own, solved) = b.split_at_mut(end * columns);
         let own = &mut own[first * columns..];
-        if end < n {
+        if T::COUNT == 1 && end < n {
             left.clear();
             left.extend(a[first * n..end * n].chunks_exact(n).flat_map(|row| &row[end..]));
             subtract_product(own, left, solved, columns, n - end, [0, columns]);

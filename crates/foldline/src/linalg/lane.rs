@@ -84,9 +84,8 @@ impl Lane for Eight {
 
     #[inline(always)]
     fn load(from: &[f64]) -> Eight {
-        let mut out = Eight::default();
-        out.0.copy_from_slice(&from[..8]);
-        out
+        let eight: &[f64; 8] = from.first_chunk().unwrap_or(&[0.0; 8]);
+        Eight(*eight)
     }
 
     #[inline(always)]
@@ -101,20 +100,24 @@ impl Lane for Eight {
 
     #[inline(always)]
     fn map(self, f: impl Fn(f64) -> f64) -> Eight {
-        let mut out = Eight::default();
-        for l in 0..8 {
-            out.0[l] = f(self.0[l]);
-        }
-        out
+        let [a, b, c, d, e, g, h, i] = self.0;
+        Eight([f(a), f(b), f(c), f(d), f(e), f(g), f(h), f(i)])
     }
 
     #[inline(always)]
     fn zip(self, other: Eight, f: impl Fn(f64, f64) -> f64) -> Eight {
-        let mut out = Eight::default();
-        for l in 0..8 {
-            out.0[l] = f(self.0[l], other.0[l]);
-        }
-        out
+        let (x, y) = (self.0, other.0);
+        // Written out: a loop would be unrolled again at every use, which multiplies the time to compile.
+        Eight([
+            f(x[0], y[0]),
+            f(x[1], y[1]),
+            f(x[2], y[2]),
+            f(x[3], y[3]),
+            f(x[4], y[4]),
+            f(x[5], y[5]),
+            f(x[6], y[6]),
+            f(x[7], y[7]),
+        ])
     }
 }
 

@@ -25,10 +25,10 @@ pub fn triangularise<T: Lane>(a: &mut [T], rows: usize, width: usize, columns: u
         // Columns in groups whose sums stay in registers.
         let mut c = k;
         while c < width {
-            c += match width - c {
-                1 => apply_group::<T, 1>(reflector, k, a, width, c),
-                2 | 3 => apply_group::<T, 2>(reflector, k, a, width, c),
-                _ => apply_group::<T, 4>(reflector, k, a, width, c),
+            c += match (T::COUNT, width - c) {
+                (1, 8..) => apply_group::<T, 8>(reflector, k, a, width, c),
+                (1, _) | (_, 1) => apply_group::<T, 1>(reflector, k, a, width, c),
+                _ => apply_group::<T, 2>(reflector, k, a, width, c),
             };
         }
         for i in k + 1..rows {

@@ -6,22 +6,8 @@ use super::lane::Lane;
 /// columns).
 #[inline(always)]
 pub fn subtract_product<T: Lane>(y: &mut [T], a: &[T], b: &[T], stride: usize, depth: usize, [from, to]: [usize; 2]) {
-    if T::COUNT == 1 {
-        in_tiles::<T, 4, 8>(y, a, b, stride, depth, [from, to]);
-    } else {
-        in_tiles::<T, 2, 2>(y, a, b, stride, depth, [from, to]);
-    }
-}
-
-#[inline(always)]
-fn in_tiles<T: Lane, const R: usize, const C: usize>(
-    y: &mut [T],
-    a: &[T],
-    b: &[T],
-    stride: usize,
-    depth: usize,
-    [from, to]: [usize; 2],
-) {
+    const R: usize = 4;
+    const C: usize = 8;
     let rows = a.len() / depth.max(1);
     let mut i = 0;
     while i < rows {
