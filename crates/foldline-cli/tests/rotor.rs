@@ -81,6 +81,34 @@ fn every_reference_special_point_is_found() {
     assert_eq!(checked, 7);
 }
 
+/// A slowdown without a clock: how much work each branch takes.
+#[test]
+fn the_work_is_that_of_the_table() {
+    let mut found = "branch,points,newton,factorisations,rejected,evaluations,linearisations\n".to_string();
+    for branch in &diagram().branches {
+        let cost = branch.cost();
+        let counts = [
+            branch.points.len(),
+            cost.newton,
+            cost.factorisations,
+            cost.rejected,
+            cost.evaluations,
+            cost.linearisations,
+        ];
+        found += &format!("{},{}\n", branch.name, counts.map(|count| count.to_string()).join(","));
+    }
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/reference/overhung_rotor_work.csv");
+    if std::env::var_os("FOLDLINE_WRITE_COUNTERS").is_some() {
+        std::fs::write(&file, &found).unwrap();
+    }
+    let known = std::fs::read_to_string(&file).unwrap_or_default();
+    assert!(
+        found == known,
+        "the work has changed; where that is meant, renew the table with\n  \
+         FOLDLINE_WRITE_COUNTERS=1 cargo test -p foldline-cli --test rotor the_work\nknown:\n{known}\nfound:\n{found}"
+    );
+}
+
 fn table(branch: &Branch) -> Vec<(Kind, f64, f64)> {
     branch.special.iter().map(|s| (s.kind, s.point.parameters[OMEGA], s.error)).collect()
 }

@@ -43,7 +43,7 @@ fn point(position: i64, cycle: bool) -> Point {
         unstable: 1,
         ranges: vec![[awkward(1), awkward(5)], [awkward(0), awkward(2)]],
         trust: Trust { discretisation: 1e-9, residual: -0.0, trivial_defect: f64::NAN, liouville_defect: 1.0 / 3.0 },
-        cost: Cost { newton: 3, factorisations: 4, rejected: 1 },
+        cost: Cost { newton: 3, factorisations: 4, rejected: 1, evaluations: 900, linearisations: 700 },
     }
 }
 
@@ -243,6 +243,36 @@ fn numbers_can_be_read_by_name_without_this_program() {
     assert_eq!(row, (3.0 / 7.0, 0.0, 1.0 / 3.0, 1));
 }
 
+/// Makes a file of version 2 of one of version 3.
+const WITHOUT_COUNTERS: &str = "
+    ALTER TABLE points DROP COLUMN evaluations; ALTER TABLE points DROP COLUMN linearisations;
+    ALTER TABLE special_points DROP COLUMN evaluations; ALTER TABLE special_points DROP COLUMN linearisations;
+    PRAGMA user_version = 2;";
+
+fn without_counters(mut diagram: Diagram) -> Diagram {
+    for branch in &mut diagram.branches {
+        let special = branch.special.iter_mut().map(|s| &mut s.point);
+        for point in branch.points.iter_mut().chain(special) {
+            (point.cost.evaluations, point.cost.linearisations) = (0, 0);
+        }
+    }
+    diagram
+}
+
+#[test]
+fn a_file_of_the_second_version_is_read_and_resumed() {
+    let folder = tempfile::tempdir().unwrap();
+    let recorder = Recorder::create(folder.path(), &study()).unwrap();
+    record(&diagram(), &recorder);
+    recorder.finish().unwrap();
+    rusqlite::Connection::open(path_in(folder.path())).unwrap().execute_batch(WITHOUT_COUNTERS).unwrap();
+    assert_eq!(exactly(&load(folder.path()).unwrap().diagram), exactly(&without_counters(diagram())));
+    let (resumed, _) = Recorder::resume(folder.path(), &study()).unwrap();
+    record(&diagram(), &resumed);
+    resumed.finish().unwrap();
+    assert_eq!(exactly(&load(folder.path()).unwrap().diagram), exactly(&diagram()));
+}
+
 #[test]
 fn a_file_of_the_first_version_is_read_and_resumed() {
     let folder = tempfile::tempdir().unwrap();
@@ -254,9 +284,9 @@ fn a_file_of_the_first_version_is_read_and_resumed() {
     let connection = rusqlite::Connection::open(path_in(folder.path())).unwrap();
     let back =
         "ALTER TABLE branches DROP COLUMN held; ALTER TABLE branches DROP COLUMN follows; PRAGMA user_version = 1;";
-    connection.execute_batch(back).unwrap();
+    connection.execute_batch(&format!("{WITHOUT_COUNTERS} {back}")).unwrap();
     drop(connection);
-    assert_eq!(exactly(&load(folder.path()).unwrap().diagram), exactly(&older));
+    assert_eq!(exactly(&load(folder.path()).unwrap().diagram), exactly(&without_counters(older)));
 
     let (resumed, _) = Recorder::resume(folder.path(), &study()).unwrap();
     record(&diagram(), &resumed);

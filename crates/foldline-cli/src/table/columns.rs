@@ -1,7 +1,7 @@
 //! Which columns the tables have.
 
 use super::{Cell, Column, Style, Table};
-use foldline::diagram::{Branch, Diagram, Origin, Point};
+use foldline::diagram::{Branch, Cost, Diagram, Origin, Point};
 use foldline::model::Model;
 
 /// branch, kind, every parameter, period, NAME_max of every output, unstable_before, unstable_after, error.
@@ -36,7 +36,7 @@ pub fn points(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) -> bool) 
     columns.push(column("unstable", Style::Number));
     let sizes = ["discretisation", "residual", "trivial_defect", "liouville_defect"];
     columns.extend(sizes.map(|name| column(name, Style::Size)));
-    columns.extend(["newton", "factorisations", "rejected"].map(|name| column(name, Style::Number)));
+    columns.extend(WORK.map(|name| column(name, Style::Number)));
     columns.push(column("multipliers", Style::Word));
     let row = |branch: &Branch, point: &Point| {
         let mut row = vec![Cell::Word(branch.name.clone()), Cell::Count(point.position)];
@@ -48,7 +48,7 @@ pub fn points(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) -> bool) 
         let trust = point.trust;
         let sizes = [trust.discretisation, trust.residual, trust.trivial_defect, trust.liouville_defect];
         row.extend(sizes.map(Cell::Number));
-        row.extend([point.cost.newton, point.cost.factorisations, point.cost.rejected].map(count));
+        row.extend(work(point.cost).map(count));
         row.push(Cell::Spectrum(point.spectrum.clone()));
         row
     };
@@ -57,12 +57,18 @@ pub fn points(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) -> bool) 
     Table { columns, rows }
 }
 
+/// What was counted, in the order of [`work`].
+const WORK: [&str; 5] = ["newton", "factorisations", "rejected", "evaluations", "linearisations"];
+
+fn work(cost: Cost) -> [usize; 5] {
+    [cost.newton, cost.factorisations, cost.rejected, cost.evaluations, cost.linearisations]
+}
+
 /// One row for each branch: where it comes from, how far it reaches, how its two sides ended, what it cost. Of a curve in
 /// two parameters, what is held along it, and how far it reaches in the parameter that follows too.
 pub fn branches(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) -> bool) -> Table {
     let words = ["branch", "family", "held", "free", "follows", "origin"].map(|name| column(name, Style::Word));
-    let work = ["points", "special", "newton", "factorisations", "rejected"];
-    let numbers = ["from", "to", "follows_from", "follows_to"].into_iter().chain(work);
+    let numbers = ["from", "to", "follows_from", "follows_to", "points", "special"].into_iter().chain(WORK);
     let ends = ["backward_end", "forward_end"].map(|name| column(name, Style::Word));
     let columns = words.into_iter().chain(numbers.map(|name| column(name, Style::Number))).chain(ends).collect();
     let row = |branch: &Branch| {
@@ -70,7 +76,6 @@ pub fn branches(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) -> bool
         let name = |index: Option<usize>| {
             index.and_then(|k| model.parameters.get(k)).map_or(Cell::Empty, |p| Cell::Word(p.name.clone()))
         };
-        let cost = branch.cost();
         let mut row = vec![
             Cell::Word(branch.name.clone()),
             Cell::Word(branch.family.name().into()),
@@ -80,8 +85,8 @@ pub fn branches(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) -> bool
             Cell::Word(origin(&branch.origin)),
         ];
         row.extend(moving.into_iter().flat_map(|index| reach(branch, index)));
-        let counts = [branch.points.len(), branch.special.len(), cost.newton, cost.factorisations, cost.rejected];
-        row.extend(counts.map(count));
+        row.extend([branch.points.len(), branch.special.len()].map(count));
+        row.extend(work(branch.cost()).map(count));
         row.extend(branch.ends.iter().map(|end| end.as_ref().map_or(Cell::Empty, |e| Cell::Word(e.to_string()))));
         row
     };

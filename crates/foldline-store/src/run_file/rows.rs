@@ -35,6 +35,8 @@ pub(super) fn values_of(point: &Point, extra: &[f64]) -> Vec<Value> {
         count(point.cost.newton),
         count(point.cost.factorisations),
         count(point.cost.rejected),
+        count(point.cost.evaluations),
+        count(point.cost.linearisations),
         degree,
         Value::Blob(pack(&point.parameters)),
         Value::Blob(pack(profile)),
@@ -54,6 +56,11 @@ pub(super) fn point_in(row: &Row) -> Result<(Point, Vec<f64>), String> {
         |name: &str| unpack(&blob(name)?).ok_or_else(|| format!("{name} has a length that is no multiple of 8"));
     let count = |name: &str| {
         row.get::<_, i64>(name).ok().and_then(|n| usize::try_from(n).ok()).ok_or_else(|| format!("{name} is no count"))
+    };
+    // Columns that version 2 had not.
+    let later = |name: &str| match row.get::<_, i64>(name) {
+        Err(rusqlite::Error::InvalidColumnName(_)) => Ok(0),
+        _ => count(name),
     };
     let scalars = numbers("scalar_bytes")?;
     let [period, step, discretisation, residual, trivial_defect, liouville_defect, extra @ ..] = &scalars[..] else {
@@ -87,7 +94,13 @@ pub(super) fn point_in(row: &Row) -> Result<(Point, Vec<f64>), String> {
             trivial_defect: *trivial_defect,
             liouville_defect: *liouville_defect,
         },
-        cost: Cost { newton: count("newton")?, factorisations: count("factorisations")?, rejected: count("rejected")? },
+        cost: Cost {
+            newton: count("newton")?,
+            factorisations: count("factorisations")?,
+            rejected: count("rejected")?,
+            evaluations: later("evaluations")?,
+            linearisations: later("linearisations")?,
+        },
     };
     Ok((point, extra.to_vec()))
 }

@@ -46,7 +46,7 @@ impl Columns {
 const OTHERS: [&str; 8] = ["branch", "position", "kind", "key", "unstable_before", "unstable_after", "error", "rowid"];
 
 /// The columns that a point has in both tables of points, with their types: first those to read, then those to load.
-const POINT_COLUMNS: [(&str, &str); 17] = [
+const POINT_COLUMNS: [(&str, &str); 19] = [
     ("period", "REAL"),
     ("unstable", "INTEGER NOT NULL"),
     ("discretisation", "REAL"),
@@ -56,6 +56,8 @@ const POINT_COLUMNS: [(&str, &str); 17] = [
     ("newton", "INTEGER NOT NULL"),
     ("factorisations", "INTEGER NOT NULL"),
     ("rejected", "INTEGER NOT NULL"),
+    ("evaluations", "INTEGER NOT NULL DEFAULT 0"),
+    ("linearisations", "INTEGER NOT NULL DEFAULT 0"),
     ("degree", "INTEGER"),
     ("parameter_bytes", "BLOB NOT NULL"),
     ("solution_bytes", "BLOB NOT NULL"),
@@ -91,10 +93,16 @@ pub(super) fn create(columns: &Columns) -> String {
 
 /// The statements that bring a file of an older version to the present one.
 ///
-/// Version 1 had no curves in two parameters.
+/// Version 1 had no curves in two parameters, version 2 did not count evaluations.
 pub(super) fn upgrade(version: i64) -> &'static str {
     match version {
         1 => "ALTER TABLE branches ADD COLUMN held TEXT; ALTER TABLE branches ADD COLUMN follows INTEGER;",
+        2 => {
+            "ALTER TABLE points ADD COLUMN evaluations INTEGER NOT NULL DEFAULT 0;
+             ALTER TABLE points ADD COLUMN linearisations INTEGER NOT NULL DEFAULT 0;
+             ALTER TABLE special_points ADD COLUMN evaluations INTEGER NOT NULL DEFAULT 0;
+             ALTER TABLE special_points ADD COLUMN linearisations INTEGER NOT NULL DEFAULT 0;"
+        }
         _ => "",
     }
 }

@@ -67,6 +67,9 @@ pub struct Station {
     pub mesh: Mesh,
     /// A mesh with room for the next step, where `mesh` has none left.
     pub roomier: Option<Mesh>,
+    /// Share of the tolerance that the mesh of the next point should be made for: less than 1 where the multipliers ask for
+    /// more than the profile.
+    pub share: f64,
 }
 
 impl Station {
@@ -168,7 +171,7 @@ pub fn correct_within(
             return Err(Failure::NoConvergence(sizes));
         }
         // The matrix is kept while it still gains well over a digit per iteration.
-        fresh = if iteration == 0 { length > 1e-3 } else { ratio > 0.1 };
+        fresh = if iteration == 0 { length > 3e-3 } else { ratio > 0.1 };
     }
     Err(Failure::NoConvergence(sizes))
 }
@@ -252,13 +255,16 @@ pub fn examined(problem: &mut dyn ZeroProblem, u: Vec<f64>, tangent: Vec<f64>, d
     let examination = problem.examine(&u);
     let stored: Vec<f64> = tangent.iter().map(|t| direction * t).collect();
     let point = problem.point(&u, &stored, examination);
-    Station { point, u, tangent, mesh: problem.mesh(), roomier: None }
+    Station { point, u, tangent, mesh: problem.mesh(), roomier: None, share: 1.0 }
 }
 
 /// A multiplier closer to the unit circle than this many defects might lie on its other side …
 const CERTAIN: f64 = 20.0;
 /// … and is computed once more with the tolerance multiplied by this.
 const TIGHTER: f64 = 0.05;
+
+/// Defect, in tolerances, below which the next point may do with a mesh for four times the error.
+const RELAXED: f64 = 0.5;
 
 /// Corrects `u` in `plane` and [`refine`]s it.
 ///
@@ -273,23 +279,25 @@ pub fn settle(
     cost: &mut Cost,
 ) -> Result<Station, Failure> {
     correct(problem, settings, &plane, &mut u, cost)?;
-    refine(problem, settings, plane.row, u, direction, cost)
+    refine(problem, settings, 1.0, plane.row, u, direction, cost)
 }
 
 /// Adapts the mesh at `u`, which has been corrected, until the error estimate meets the tolerance, and both defects of the
-/// multipliers five times that. The problem is left on the mesh of the result and anchored there.
+/// multipliers five times that. It begins with that `share` of the tolerance. The problem is left on the mesh of the result
+/// and anchored there.
 ///
 /// # Errors
 /// See [`Failure`].
 pub fn refine(
     problem: &mut dyn ZeroProblem,
     settings: &Settings,
+    share: f64,
     mut row: Vec<f64>,
     mut u: Vec<f64>,
     direction: f64,
     cost: &mut Cost,
 ) -> Result<Station, Failure> {
-    let (mut tolerance, mut tightened) = (settings.tolerance, false);
+    let (mut tolerance, mut tightened) = (share * settings.tolerance, false);
     for round in 0..4 {
         for attempt in 0..10 {
             // A layer that lies differently between the nodes of every new mesh needs some more of them than one expects.
@@ -317,6 +325,10 @@ pub fn refine(
                 return Err(Failure::Mesh(trust.discretisation));
             }
             let usual = if tightened { tolerance / TIGHTER } else { tolerance };
+            let share = usual / settings.tolerance;
+            // Errors of multipliers shrink at least as fast as those of the profile.
+            found.share =
+                if round == 0 && defect <= RELAXED * settings.tolerance { (4.0 * share).min(1.0) } else { share };
             found.roomier = problem.better_mesh(&found.u, 0.5 * usual);
             return Ok(found);
         }

@@ -110,6 +110,7 @@ pub fn follow(
                     remeshed = 0;
                     step *= match why {
                         Failure::Unexplained => 0.25,
+                        Failure::Elsewhere { miss, .. } if miss > 1.0 => 0.25,
                         Failure::Elsewhere { angle, .. } => (walk.settings.target_angle / angle).clamp(0.2, 0.5),
                         _ => 0.5,
                     };
@@ -271,7 +272,7 @@ impl Follow<'_> {
     ) -> Result<Step, Failure> {
         let guess = self.predicted(left, trail, step);
         let u = self.corrected(left, &guess, step, cost)?;
-        let mut right = refine(self.problem, self.settings, left.tangent.clone(), u, self.direction, cost)?;
+        let mut right = refine(self.problem, self.settings, left.share, left.tangent.clone(), u, self.direction, cost)?;
         if right.mesh != left.mesh && step < SHORT * self.settings.tolerance {
             return Err(Failure::Remeshed(right.mesh));
         }

@@ -164,7 +164,7 @@ impl Follow<'_> {
     /// A full station at distance s of the stretch.
     pub(super) fn cut(&mut self, left: &Station, stretch: &Stretch, s: f64, cost: &mut Cost) -> Option<Station> {
         let u = stretch.corrected(self.problem, self.settings, s, cost).ok()?;
-        refine(self.problem, self.settings, left.tangent.clone(), u, self.direction, cost).ok()
+        refine(self.problem, self.settings, left.share, left.tangent.clone(), u, self.direction, cost).ok()
     }
 
     /// Whether the parabola through three values of some monitor comes close to zero between the last two without the

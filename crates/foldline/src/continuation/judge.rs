@@ -70,11 +70,11 @@ impl Follow<'_> {
         if self.problem.margin(&left.point).min(self.problem.margin(&right.point)) > CROWDED {
             return Ok(());
         }
-        // On the mesh of the left end that is a solution itself; on that of the right one it need not be anything.
-        self.problem.set_mesh(&left.mesh);
+        // Mesh and phase are those of the left end: on the mesh of the right one it need not be a solution, and in its phase
+        // it would be shifted in time.
+        self.place(left);
         let from = self.problem.transfer(&right.u, &right.mesh, &left.mesh);
         let tangent = self.problem.transfer(&right.tangent, &right.mesh, &left.mesh);
-        self.problem.anchor(&from);
         let gap: Vec<f64> = left.u.iter().zip(&from).map(|(a, b)| a - b).collect();
         let distance = self.problem.dot(&tangent, &gap);
         let mut back: Vec<f64> =

@@ -247,6 +247,9 @@ pub fn locate(
         for _ in 0..4 {
             let Some(better) = coarse.better(problem, tolerance) else { break };
             (coarse, _) = relocate(problem, settings, stretch, monitor, &coarse, &better, &mut slope, cost)?;
+            if monitor.jump() > 0 && !monitor.confirms(&coarse.point) {
+                return Ok(Located { distance, station: coarse, error: floor });
+            }
         }
         problem.set_mesh(&coarse.mesh);
         let Some(finer) = problem.finer_mesh() else {
@@ -305,7 +308,7 @@ fn seen_by(
     }
     let stored: Vec<f64> = tangent.iter().map(|t| direction * t).collect();
     let point = problem.point(&u, &stored, Examination::default());
-    Station { point, u, tangent, mesh: problem.mesh(), roomier: None }
+    Station { point, u, tangent, mesh: problem.mesh(), roomier: None, share: 1.0 }
 }
 
 /// The whole station, where only a part of it was [`seen_by`] the monitor; the problem was factorised there last.
@@ -328,17 +331,15 @@ fn relocate(
     problem.set_mesh(finer);
     let base = problem.transfer(&coarse.u, &coarse.mesh, finer);
     let row = problem.transfer(&coarse.tangent, &coarse.mesh, finer);
-    let at = |problem: &mut dyn ZeroProblem, s: f64, cost: &mut Cost| -> Result<(f64, Station), Failure> {
-        problem.anchor(&base);
-        let mut u: Vec<f64> = base.iter().zip(&row).map(|(b, t)| b + s * t).collect();
-        let tangent = arrive(problem, &mut u, &row, settings.newton_tolerance(), cost)?;
+    let mut at = |mut u: Vec<f64>, close: f64| -> Result<(f64, Station), Failure> {
+        let tangent = arrive(problem, &mut u, &row, close, cost)?;
         let found = seen_by(monitor, problem, u, tangent, stretch.direction);
         Ok((monitor.value(&stretch.left.point, &found.point), found))
     };
     // Far enough below the tolerance that the error of the iteration does not show.
     let enough = 1e-2 * settings.tolerance;
     let reach = stretch.length.abs();
-    let (mut a, (mut ga, mut found)) = (0.0, at(problem, 0.0, cost)?);
+    let (mut a, (mut ga, mut found)) = (0.0, at(base, 0.1 * settings.tolerance)?);
     let mut step = match *slope {
         Some(slope) if (ga / slope).abs() < reach => -ga / slope,
         _ => 1e-2 * reach,
@@ -360,8 +361,13 @@ fn relocate(
             }
             _ => {}
         }
-        let (gb, next) = at(problem, b, cost)?;
-        let rise = (gb - ga) / (b - a);
+        let from = found.u.iter().zip(&found.tangent).map(|(u, t)| u + (b - a) * t).collect();
+        let (gb, next) = at(from, settings.newton_tolerance())?;
+        // Of two values that are close together the difference is noise.
+        let rise = match *slope {
+            Some(slope) if (b - a).abs() < 100.0 * settings.tolerance => slope,
+            _ => (gb - ga) / (b - a),
+        };
         step = -gb / rise;
         *slope = Some(rise);
         if (gb > 0.0) != (ga > 0.0) {

@@ -71,7 +71,7 @@ impl Settings {
             stability: true,
             max_points: 10_000,
             max_angle: 0.45,
-            target_angle: 0.2,
+            target_angle: 0.25,
             max_step: 0.2,
             first_step: 0.02,
             min_step: 1e-9,

@@ -54,6 +54,11 @@ pub struct Cost {
     pub factorisations: usize,
     /// Steps tried and rejected before this point was accepted.
     pub rejected: usize,
+    /// Points (states with parameters) at which f was evaluated, those in which its derivatives were wanted too not counted:
+    /// a residual on N intervals of degree m takes N m of them.
+    pub evaluations: usize,
+    /// Points at which derivatives of f were evaluated.
+    pub linearisations: usize,
 }
 
 impl std::ops::AddAssign for Cost {
@@ -61,6 +66,8 @@ impl std::ops::AddAssign for Cost {
         self.newton += other.newton;
         self.factorisations += other.factorisations;
         self.rejected += other.rejected;
+        self.evaluations += other.evaluations;
+        self.linearisations += other.linearisations;
     }
 }
 

@@ -1,6 +1,7 @@
 //! One branch, followed to both sides, from its start or from where an earlier run left it.
 
 use super::System;
+use super::counted::Counted;
 use crate::continuation::corrector::{Plane, parameter_row, settle, station};
 use crate::continuation::{Failure, Follow, Item, Settings, Station, follow};
 use crate::contract::{Event, Monitor, Observer, Verdict, ZeroProblem};
@@ -214,7 +215,7 @@ impl Growth<'_> {
                 for (position, point) in before.into_iter().enumerate() {
                     going &= self.accept(branch, Point { position: position as i64, ..point });
                 }
-                going &= self.accept(branch, Point { position: count, step: self.settings.first_step, ..first.point });
+                going &= self.accept(branch, Point { position: count, ..first.point });
                 going &= self.end(branch, 0, joined);
             }
         }
@@ -274,7 +275,9 @@ impl Growth<'_> {
         let last = last.clone();
         let before = own.get(1).map(|p| (*p).clone());
         let emitted = last.position.unsigned_abs() as usize;
-        let mut problem = self.line(branch).problem(self.system, self.degree, &last);
+        let counted = Counted::new(self.system.field);
+        let system = System { field: &counted, ..self.system.clone() };
+        let mut problem = self.line(branch).problem(&system, self.degree, &last);
         let revive = |problem: &mut dyn ZeroProblem, point: &Point| revived(problem, self.settings, point, direction);
         // The special point at which a branch begins is no predecessor: the matrix is singular there.
         let inside = branch.held.is_some() || matches!(branch.origin, Origin::Seed(_) | Origin::EndOf(_));
@@ -288,7 +291,7 @@ impl Growth<'_> {
             start.point.step = self.settings.first_step;
         }
         let (monitors, collapses) = match branch.held {
-            None => (special::monitors(branch.family), collapses(branch, self.system)),
+            None => (special::monitors(branch.family), collapses(branch, &system)),
             Some(_) => (special::monitors_where_held(), Vec::new()),
         };
         let home = branch.points.iter().find(|p| p.position == 0).filter(|_| branch.ends[0].is_none()).cloned();
@@ -307,7 +310,10 @@ impl Growth<'_> {
                     branch.insert_special(special.clone());
                     self.tell(Event::Special(branch, &special))
                 }
-                Item::Point(point) => self.accept(branch, point),
+                Item::Point(mut point) => {
+                    [point.cost.evaluations, point.cost.linearisations] = counted.take();
+                    self.accept(branch, point)
+                }
             };
             if going { Verdict::Continue } else { Verdict::Stop }
         })

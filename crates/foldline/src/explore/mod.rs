@@ -8,6 +8,7 @@
 //! |---|---|
 //! | what is asked for? | [`plan`] |
 //! | which vector field, which scales, which symmetries? | [`system`] |
+//! | how often is the vector field evaluated? | `counted` |
 //! | where do first solutions come from? | [`seeds`] |
 //! | how is one branch followed to both sides, or resumed? | [`growth`] |
 //! | what follows from a finished branch? | [`family`] |
@@ -18,6 +19,7 @@
 //! | does a solution depend on a parameter that should not matter? | [`persistence`] |
 //! | what does simulation see? | [`responses`] |
 
+mod counted;
 pub mod curves;
 pub mod family;
 pub mod growth;

@@ -72,8 +72,16 @@ fn step_off(
         let scale = problem.dot(&row, &row).sqrt();
         let row: Vec<f64> = row.iter().map(|r| r / scale).collect();
         let guess: Vec<f64> = base.iter().zip(&row).map(|(b, r)| b + distance * r).collect();
-        let plane = Plane { row, base: base.to_vec(), distance };
-        match first_point(problem, settings, plane, guess) {
+        let plane = Plane { row: row.clone(), base: base.to_vec(), distance };
+        let tried = first_point(problem, settings, plane, guess).map(|mut found| {
+            // The branch has turned on this way, and goes on turning as fast.
+            let begun = problem.transfer(&row, &mesh, &found.mesh);
+            let length = problem.dot(&begun, &begun).sqrt() * problem.dot(&found.tangent, &found.tangent).sqrt();
+            let angle = (problem.dot(&begun, &found.tangent) / length).clamp(-1.0, 1.0).acos();
+            found.point.step = settings.first_step.min(distance * settings.target_angle / angle.max(1e-12));
+            found
+        });
+        match tried {
             Ok(found) if expected(&*problem, &found) => return Ok(found),
             Ok(found) => second_best = second_best.or(Some(found)),
             Err(why) => failure = why,

@@ -29,15 +29,21 @@ pub fn divided(mesh: &Mesh, parts: usize) -> Mesh {
     out.into()
 }
 
-/// A mesh on which every interval would carry about `target`, or `None` if more than [`LARGEST`] intervals were needed.
-pub fn equidistributed(errors: &[f64], mesh: &Mesh, degree: usize, target: f64) -> Option<Mesh> {
+/// A mesh on which every interval would carry about `target`, nowhere with less than the share `kept` of the density that
+/// `mesh` has there, or `None` if more than [`LARGEST`] intervals were needed.
+pub fn equidistributed(errors: &[f64], mesh: &Mesh, degree: usize, target: f64, kept: f64) -> Option<Mesh> {
     let count = errors.len();
     let power = 1.0 / (degree as f64 + 1.0);
     let raw: Vec<f64> = (0..count).map(|j| (errors[j] / target).powf(power) / (mesh[j + 1] - mesh[j])).collect();
     let mean: f64 = (0..count).map(|j| raw[j] * (mesh[j + 1] - mesh[j])).sum();
-    // A floor and a look at the neighbours keep the mesh from tearing where the estimate happens to vanish.
+    // A floor and a look at the neighbours keep the mesh from tearing where the estimate happens to vanish, and leave room
+    // for a layer to move. What was fine becomes coarse by and by only: a layer may come back.
+    let beside = |j: usize, k: usize| raw[(j + k) % count].max(raw[(j + count - k) % count]);
     let density: Vec<f64> = (0..count)
-        .map(|j| raw[j].max(0.6 * raw[(j + 1) % count]).max(0.6 * raw[(j + count - 1) % count]).max(0.1 * mean))
+        .map(|j| {
+            let around = raw[j].max(0.8 * beside(j, 1)).max(0.6 * beside(j, 2 % count));
+            around.max(0.1 * mean).max(kept / (mesh[j + 1] - mesh[j]))
+        })
         .collect();
     let total: f64 = (0..count).map(|j| density[j] * (mesh[j + 1] - mesh[j])).sum();
     if !(total.is_finite() && total <= LARGEST as f64) {
@@ -60,12 +66,12 @@ pub fn equidistributed(errors: &[f64], mesh: &Mesh, degree: usize, target: f64) 
 }
 
 /// Like [`equidistributed`] for a mesh whose second half is a copy of the first; so is that of the result.
-pub fn equidistributed_in_halves(errors: &[f64], mesh: &Mesh, degree: usize, target: f64) -> Option<Mesh> {
+pub fn equidistributed_in_halves(errors: &[f64], mesh: &Mesh, degree: usize, target: f64, kept: f64) -> Option<Mesh> {
     let half = errors.len() / 2;
     let worse: Vec<f64> = (0..half).map(|j| errors[j].max(errors[j + half])).collect();
     let stretched: Mesh = mesh[..=half].iter().map(|t| 2.0 * t).collect();
     // Lengths relative to the half are twice those relative to the whole; the errors know nothing of that.
-    let first = equidistributed(&worse, &stretched, degree, target)?;
+    let first = equidistributed(&worse, &stretched, degree, target, kept)?;
     Some(first.iter().map(|t| 0.5 * t).chain(first[1..].iter().map(|t| 0.5 + 0.5 * t)).collect())
 }
 
@@ -107,7 +113,7 @@ mod tests {
         };
         let mut mesh = uniform(20);
         for _ in 0..8 {
-            mesh = equidistributed(&error(&mesh), &mesh, 4, 1e-3).unwrap();
+            mesh = equidistributed(&error(&mesh), &mesh, 4, 1e-3, 0.0).unwrap();
         }
         let worst = error(&mesh).iter().fold(0.0, |m: f64, x| m.max(*x));
         assert!(worst < 2e-3, "{worst}");

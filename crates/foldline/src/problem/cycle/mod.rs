@@ -35,6 +35,11 @@ use crate::stability::floquet;
 use errors::Measured;
 use std::cell::RefCell;
 
+/// Error of every interval of a new mesh, in tolerances: so much less than 1 that the mesh serves for the next points too …
+const TARGET: f64 = 0.1;
+/// … and the share of the density of the old mesh that it has at least.
+const KEPT: f64 = 0.6;
+
 /// Cycles in one free parameter (a curve) or several.
 pub struct CycleProblem<'a> {
     setting: Setting<'a>,
@@ -293,10 +298,11 @@ impl ZeroProblem for CycleProblem<'_> {
         let errors = self.errors(u);
         let worst = errors.iter().fold(0.0, |m: f64, e| m.max(*e));
         let degree = self.scheme.degree;
+        let (target, kept) = (TARGET * tolerance, if worst > tolerance { KEPT } else { 0.0 });
         let better = if self.halves {
-            mesh::equidistributed_in_halves(&errors, &self.mesh, degree, 0.25 * tolerance)?
+            mesh::equidistributed_in_halves(&errors, &self.mesh, degree, target, kept)?
         } else {
-            mesh::equidistributed(&errors, &self.mesh, degree, 0.25 * tolerance)?
+            mesh::equidistributed(&errors, &self.mesh, degree, target, kept)?
         };
         (worst > tolerance || 2 * better.len() < self.mesh.len()).then_some(better)
     }

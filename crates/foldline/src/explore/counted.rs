@@ -1,0 +1,69 @@
+//! A vector field that counts at how many points it is evaluated.
+
+use crate::contract::{Batch, VectorField};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// A field and its counters. Each side of a branch has its own, so they do not depend on what runs beside it.
+pub(super) struct Counted<'f> {
+    field: &'f dyn VectorField,
+    evaluations: AtomicUsize,
+    linearisations: AtomicUsize,
+}
+
+impl<'f> Counted<'f> {
+    /// Counters at zero.
+    pub(super) fn new(field: &'f dyn VectorField) -> Counted<'f> {
+        Counted { field, evaluations: AtomicUsize::new(0), linearisations: AtomicUsize::new(0) }
+    }
+
+    /// Points at which f, and points at which derivatives were evaluated since the last call.
+    pub(super) fn take(&self) -> [usize; 2] {
+        [&self.evaluations, &self.linearisations].map(|counter| counter.swap(0, Ordering::Relaxed))
+    }
+}
+
+impl VectorField for Counted<'_> {
+    fn dim(&self) -> usize {
+        self.field.dim()
+    }
+
+    fn parameter_count(&self) -> usize {
+        self.field.parameter_count()
+    }
+
+    fn evaluate(&self, at: Batch, f: &mut [f64]) {
+        self.evaluations.fetch_add(at.lanes, Ordering::Relaxed);
+        self.field.evaluate(at, f);
+    }
+
+    fn linearise(&self, at: Batch, free: &[usize], f: &mut [f64], fx: &mut [f64], fp: &mut [f64]) {
+        self.linearisations.fetch_add(at.lanes, Ordering::Relaxed);
+        self.field.linearise(at, free, f, fx, fp);
+    }
+
+    fn directional(&self, at: Batch, directions: &[&[f64]], out: &mut [f64]) {
+        self.linearisations.fetch_add(at.lanes, Ordering::Relaxed);
+        self.field.directional(at, directions, out);
+    }
+
+    fn output_count(&self) -> usize {
+        self.field.output_count()
+    }
+
+    fn outputs(&self, at: Batch, out: &mut [f64]) {
+        self.field.outputs(at, out);
+    }
+
+    fn switch_count(&self) -> usize {
+        self.field.switch_count()
+    }
+
+    fn switches(&self, at: Batch, out: &mut [f64]) {
+        self.field.switches(at, out);
+    }
+
+    fn evaluate_switched(&self, at: Batch, signs: &[f64], f: &mut [f64]) {
+        self.evaluations.fetch_add(at.lanes, Ordering::Relaxed);
+        self.field.evaluate_switched(at, signs, f);
+    }
+}
