@@ -6,6 +6,7 @@ use crate::table::{Run, read};
 use foldline::diagram::{Branch, Diagram};
 use foldline::model::Model;
 use foldline_plot::{Picture, Quantity, pdf, png, svg};
+use foldline_store::run_file::Part;
 use std::path::Path;
 
 /// Pixels for each unit of the SVG.
@@ -13,7 +14,7 @@ const SCALE: f32 = 2.0;
 
 /// Writes a picture of a run.
 pub fn write(typed: &Typed) -> Result<Outcome, Failure> {
-    let Run { model, diagram, .. } = read(&typed.folder)?;
+    let Run { model, diagram, .. } = read(&typed.folder, Part::Numbers)?;
     let axis = |option: &str, name: &Option<String>| {
         let quantity = name.as_ref().map(|name| {
             let unknown = |choices| Failure::typed(format!("--{option}: there is no quantity \"{name}\""), choices);

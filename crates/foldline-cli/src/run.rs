@@ -6,7 +6,7 @@ use crate::plot::draw;
 use crate::progress::Progress;
 use crate::table::print_special;
 use foldline::contract::{Event, Observer, Verdict};
-use foldline::diagram::Diagram;
+use foldline::diagram::{Branch, Diagram, Point};
 use foldline::explore;
 use foldline_plot::Picture;
 use foldline_store::order::{names, ordered};
@@ -98,6 +98,14 @@ impl Observer for Watch {
         let verdict = self.recorder.observe(event);
         self.progress.show(event);
         if self.stop.load(Ordering::Relaxed) { Verdict::Stop } else { verdict }
+    }
+
+    fn stores(&self) -> bool {
+        self.recorder.stores()
+    }
+
+    fn recall(&self, branch: &Branch, position: i64) -> Option<Point> {
+        self.recorder.recall(branch, position)
     }
 }
 

@@ -5,7 +5,7 @@ use foldline::diagram::{
     Branch, Cost, Cycle, Diagram, Ending, Family, Kind, Motion, Origin, Point, Response, Responses, Search, Solution,
     SpecialPoint, Trust,
 };
-use foldline_store::run_file::{Recorder, RunFileError, load, path_in};
+use foldline_store::run_file::{Part, Recorder, RunFileError, load, load_part, path_in};
 use foldline_store::study_file::{Study, parse_study};
 use num_complex::Complex64;
 use std::path::Path;
@@ -161,6 +161,52 @@ fn a_diagram_comes_back_to_the_bit_and_so_do_the_texts() {
     assert_eq!(exactly(&back.diagram), exactly(&diagram()));
     assert_eq!((back.study_text.as_str(), back.model_text.as_str()), (STUDY, MODEL));
     assert_eq!(back.notes.len(), 4);
+}
+
+/// The diagram without what [`Part::Numbers`] leaves out.
+fn numbers_of(mut diagram: Diagram) -> Diagram {
+    let strip = |point: &mut Point| {
+        point.tangent.clear();
+        match &mut point.solution {
+            Solution::Equilibrium(x) => x.clear(),
+            Solution::Cycle(cycle) => (cycle.mesh, cycle.profile) = (Vec::new().into(), Vec::new()),
+        }
+    };
+    for branch in &mut diagram.branches {
+        branch.points.iter_mut().for_each(strip);
+        branch.special.iter_mut().for_each(|special| strip(&mut special.point));
+    }
+    diagram
+}
+
+#[test]
+fn a_part_of_a_run_is_the_whole_without_the_rest() {
+    let folder = tempfile::tempdir().unwrap();
+    let recorder = Recorder::create(folder.path(), &study()).unwrap();
+    record(&diagram(), &recorder);
+    recorder.finish().unwrap();
+    let read = |part: Part| exactly(&load_part(folder.path(), part).unwrap().diagram);
+    let mut expected = numbers_of(diagram());
+    assert_eq!(read(Part::Numbers), exactly(&expected));
+    expected.branches.iter_mut().for_each(|branch| branch.points.clear());
+    assert_eq!(read(Part::Special), exactly(&expected));
+    assert_eq!(read(Part::Everything), exactly(&diagram()));
+}
+
+#[test]
+fn the_recorder_recalls_what_it_was_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let recorder = Recorder::create(folder.path(), &study()).unwrap();
+    record(&diagram(), &recorder);
+    assert!(recorder.stores());
+    let with = |branch: &Branch, points: Vec<Point>| {
+        exactly(&Diagram { branches: vec![Branch { points, ..branch.clone() }], ..Diagram::default() })
+    };
+    for branch in &diagram().branches {
+        let recalled = branch.points.iter().map(|p| recorder.recall(branch, p.position).unwrap()).collect();
+        assert_eq!(with(branch, recalled), with(branch, branch.points.clone()));
+        assert!(recorder.recall(branch, 1_000_000).is_none());
+    }
 }
 
 #[test]

@@ -236,6 +236,16 @@ pub enum Verdict {
 pub trait Observer: Sync {
     /// Called once per event, from the thread that follows the branch.
     fn observe(&self, event: Event) -> Verdict;
+
+    /// Whether [`Observer::recall`] answers. Profiles then need not stay in memory.
+    fn stores(&self) -> bool {
+        false
+    }
+
+    /// The accepted point at `position` of a branch, as it was observed.
+    fn recall(&self, _branch: &Branch, _position: i64) -> Option<Point> {
+        None
+    }
 }
 
 /// An observer that lets everything pass.

@@ -10,7 +10,7 @@ use foldline::diagram::{Branch, Diagram};
 use foldline::model::Model;
 use foldline_store::nearest::suggest;
 use foldline_store::order::{leg, names, ordered};
-use foldline_store::run_file::load;
+use foldline_store::run_file::{Part, load_part};
 use foldline_store::study_file::parse_study;
 use std::io::{Write, stdout};
 use std::path::Path;
@@ -51,7 +51,11 @@ pub enum Cell {
 
 /// Prints a table of a run to standard output.
 pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
-    let run = read(&typed.folder)?;
+    let part = match typed.what() {
+        What::Points | What::Branches => Part::Numbers,
+        What::Special | What::Responses | What::Notes => Part::Special,
+    };
+    let run = read(&typed.folder, part)?;
     let kept = |branch: &Branch| typed.branch.as_ref().is_none_or(|name| of_name(&branch.name, name));
     if let Some(name) = typed.branch.as_ref().filter(|_| !run.diagram.branches.iter().any(kept)) {
         let names: Vec<&str> = run.diagram.branches.iter().map(|b| b.name.as_str()).collect();
@@ -94,9 +98,9 @@ pub struct Run {
     pub notes: Vec<(String, String)>,
 }
 
-/// The run in a folder.
-pub fn read(folder: &Path) -> Result<Run, Failure> {
-    let run = load(folder)?;
+/// The run in a folder, as much of it as is asked for.
+pub fn read(folder: &Path, part: Part) -> Result<Run, Failure> {
+    let run = load_part(folder, part)?;
     let study = parse_study(&run.study_text, &run.study_file, &run.model_text, &run.model_file)?;
     let diagram = ordered(run.diagram, &names(&study.plan));
     let seeds = study.plan.seeds.iter().map(|seed| &seed.name);

@@ -17,7 +17,7 @@ mod rows;
 mod schema;
 mod writer;
 
-pub use reader::{Recorded, load};
+pub use reader::{Part, Recorded, load, load_part};
 pub use writer::Recorder;
 
 use std::fmt;

@@ -2,7 +2,7 @@
 
 use super::rows::{ending_in, held_in, kind_named, origin_in, point_in};
 use super::{APPLICATION_ID, FORMAT_VERSION, RunFileError, path_in};
-use foldline::diagram::{Branch, Diagram, Family, SpecialPoint};
+use foldline::diagram::{Branch, Diagram, Family, Point, SpecialPoint};
 use rusqlite::{Connection, OpenFlags, Row};
 use std::path::{Path, PathBuf};
 
@@ -25,8 +25,30 @@ pub struct Recorded {
     pub notes: Vec<(String, String)>,
 }
 
+/// How much of the branches of a run is read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// Everything.
+    Everything,
+    /// Points and special points without states, profiles, meshes and tangents, which are left empty: what tables and
+    /// diagrams show.
+    Numbers,
+    /// Likewise, and no points: branches have their special points and ends only.
+    Special,
+}
+
+/// What every point has that is a few numbers; special points have [`OF_SPECIAL`] besides.
+const NUMBERS: &str = "position, degree, unstable, newton, factorisations, rejected, parameter_bytes, spectrum_bytes, \
+     range_bytes, scalar_bytes";
+const OF_SPECIAL: &str = "kind, unstable_before, unstable_after";
+
 /// Reads the run in `folder`, which may still be growing.
 pub fn load(folder: &Path) -> Result<Recorded, RunFileError> {
+    load_part(folder, Part::Everything)
+}
+
+/// Like [`load`], but only as much as is asked for.
+pub fn load_part(folder: &Path, part: Part) -> Result<Recorded, RunFileError> {
     let path = path_in(folder);
     if !path.exists() {
         return Err(RunFileError::Missing(path));
@@ -51,7 +73,7 @@ pub fn load(folder: &Path) -> Result<Recorded, RunFileError> {
         study_text: text("study")?,
         model_file: text("model_file")?,
         model_text: text("model")?,
-        diagram: load_diagram(&connection, &path)?,
+        diagram: load_diagram(&connection, &path, part)?,
         notes,
         path: path.clone(),
     })
@@ -101,19 +123,27 @@ fn is_empty(connection: &Connection) -> rusqlite::Result<bool> {
 }
 
 /// All branches with their points, special points and endings.
-pub(super) fn load_diagram(connection: &Connection, path: &Path) -> Result<Diagram, RunFileError> {
+pub(super) fn load_diagram(connection: &Connection, path: &Path, part: Part) -> Result<Diagram, RunFileError> {
+    let (of_points, of_special) = match part {
+        Part::Everything => ("*".to_string(), "*".to_string()),
+        Part::Numbers | Part::Special => (NUMBERS.to_string(), format!("{NUMBERS}, {OF_SPECIAL}")),
+    };
     let mut diagram = Diagram::default();
     let branches = read(connection, path, "SELECT * FROM branches ORDER BY branch", &[], |row| {
         let number: i64 = row.get("branch").map_err(|e| e.to_string())?;
         Ok((number, branch_in(row)?))
     })?;
     for (number, mut branch) in branches {
-        let of_branch = |table: &str, order: &str| format!("SELECT * FROM {table} WHERE branch = ?1 ORDER BY {order}");
-        branch.points =
-            read(connection, path, &of_branch("points", "position"), &[number], |row| Ok(point_in(row)?.0))?;
-        branch.special =
-            read(connection, path, &of_branch("special_points", "position, rowid"), &[number], special_in)?;
-        let ends = read(connection, path, &of_branch("ends", "side"), &[number], |row| {
+        let of_branch = |columns: &str, table: &str, order: &str| {
+            format!("SELECT {columns} FROM {table} WHERE branch = ?1 ORDER BY {order}")
+        };
+        if part != Part::Special {
+            let sql = of_branch(&of_points, "points", "position");
+            branch.points = read(connection, path, &sql, &[number], |row| Ok(point_in(row)?.0))?;
+        }
+        let sql = of_branch(&of_special, "special_points", "position, rowid");
+        branch.special = read(connection, path, &sql, &[number], special_in)?;
+        let ends = read(connection, path, &of_branch("*", "ends", "side"), &[number], |row| {
             let side: i64 = row.get("side").map_err(|e| e.to_string())?;
             Ok((side, ending_in(row)?))
         })?;
@@ -126,6 +156,12 @@ pub(super) fn load_diagram(connection: &Connection, path: &Path) -> Result<Diagr
     }
     diagram.responses = super::responses::load(connection, path)?;
     Ok(diagram)
+}
+
+/// One point, whole.
+pub(super) fn point_at(connection: &Connection, branch: i64, position: i64) -> Option<Point> {
+    let mut statement = connection.prepare_cached("SELECT * FROM points WHERE branch = ?1 AND position = ?2").ok()?;
+    statement.query_row([branch, position], |row| Ok(point_in(row).ok())).ok()?.map(|found| found.0)
 }
 
 fn branch_in(row: &Row) -> Result<Branch, String> {

@@ -49,8 +49,10 @@ pub(super) fn values_of(point: &Point, extra: &[f64]) -> Vec<Value> {
     values
 }
 
-/// The point in a row, and the extra numbers kept with its scalars; the error is the column that makes no sense.
+/// The point in a row, and the extra numbers kept with its scalars; the error is the column that makes no sense. Where
+/// the solution was not asked for, it and the tangent are left empty.
 pub(super) fn point_in(row: &Row) -> Result<(Point, Vec<f64>), String> {
+    let whole = row.as_ref().column_index("solution_bytes").is_ok();
     let blob = |name: &str| row.get::<_, Vec<u8>>(name).map_err(|e| e.to_string());
     let numbers =
         |name: &str| unpack(&blob(name)?).ok_or_else(|| format!("{name} has a length that is no multiple of 8"));
@@ -66,14 +68,14 @@ pub(super) fn point_in(row: &Row) -> Result<(Point, Vec<f64>), String> {
     let [period, step, discretisation, residual, trivial_defect, liouville_defect, extra @ ..] = &scalars[..] else {
         return Err("scalar_bytes is too short".to_string());
     };
-    let profile = numbers("solution_bytes")?;
+    let profile = if whole { numbers("solution_bytes")? } else { Vec::new() };
     let solution = match row.get::<_, Option<i64>>("degree").map_err(|e| e.to_string())? {
         None => Solution::Equilibrium(profile),
         Some(_) => {
-            let mesh = numbers("mesh_bytes")?;
+            let mesh = if whole { numbers("mesh_bytes")? } else { Vec::new() };
             let degree = count("degree")?;
             let nodes = mesh.len().saturating_sub(1) * (degree + 1);
-            if nodes == 0 || profile.len() % nodes != 0 {
+            if whole && (nodes == 0 || profile.len() % nodes != 0) {
                 return Err("solution_bytes and mesh_bytes do not belong together".to_string());
             }
             Solution::Cycle(Cycle { period: *period, mesh: mesh.into(), degree, profile })
@@ -83,7 +85,7 @@ pub(super) fn point_in(row: &Row) -> Result<(Point, Vec<f64>), String> {
         position: row.get("position").map_err(|e| e.to_string())?,
         parameters: numbers("parameter_bytes")?,
         solution,
-        tangent: numbers("tangent_bytes")?,
+        tangent: if whole { numbers("tangent_bytes")? } else { Vec::new() },
         step: *step,
         spectrum: unpack_complex(&blob("spectrum_bytes")?).ok_or("spectrum_bytes is no list of pairs")?,
         unstable: count("unstable")?,

@@ -1,6 +1,6 @@
 //! Writing a run as it happens.
 
-use super::reader::{Open, load_diagram, open};
+use super::reader::{Open, Part, load_diagram, open, point_at};
 use super::rows::{ending_values, held_values, origin_values, values_of};
 use super::schema::{Columns, create, insert, upgrade};
 use super::{APPLICATION_ID, FORMAT_VERSION, RunFileError, path_in, responses};
@@ -88,7 +88,7 @@ impl Recorder {
             return Err(RunFileError::Changed(path, "study"));
         }
         modernise(&mut connection).map_err(|e| RunFileError::Database(path.clone(), e))?;
-        let mut diagram = load_diagram(&connection, &path)?;
+        let mut diagram = load_diagram(&connection, &path, Part::Everything)?;
         let stopped = |end: &mut Option<Ending>| *end = end.take().filter(|ending| *ending != Ending::Stopped);
         diagram.branches.iter_mut().flat_map(|branch| &mut branch.ends).for_each(stopped);
         let recorder = Recorder::over(path, connection, study)?;
@@ -176,6 +176,16 @@ impl Observer for Recorder {
             state.failure = self.record(&mut state, event).err();
         }
         if state.failure.is_some() { Verdict::Stop } else { Verdict::Continue }
+    }
+
+    fn stores(&self) -> bool {
+        true
+    }
+
+    fn recall(&self, branch: &Branch, position: i64) -> Option<Point> {
+        let state = self.locked();
+        let number = *state.numbers.get(&branch.name)?;
+        point_at(&state.connection, number, position)
     }
 }
 

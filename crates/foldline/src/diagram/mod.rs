@@ -123,6 +123,19 @@ impl Point {
         largest
     }
 
+    /// Leaves out the profile and mesh of a cycle and the tangent, which make up nearly all of a point.
+    pub fn lighten(&mut self) {
+        if let Solution::Cycle(cycle) = &mut self.solution {
+            (cycle.mesh, cycle.profile) = (Vec::new().into(), Vec::new());
+            self.tangent = Vec::new();
+        }
+    }
+
+    /// Whether profile and tangent were left out.
+    pub fn is_light(&self) -> bool {
+        matches!(&self.solution, Solution::Cycle(cycle) if cycle.profile.is_empty())
+    }
+
     /// Component of the tangent along the continuation parameter.
     pub fn parameter_slope(&self) -> f64 {
         self.tangent.last().copied().unwrap_or(0.0)

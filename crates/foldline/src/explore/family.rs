@@ -172,6 +172,7 @@ impl Work<'_> {
             sides,
             parents,
             observer: self.observer,
+            whole: false,
         }
     }
 
@@ -236,9 +237,15 @@ impl Work<'_> {
             let first = match &beginning {
                 Beginning::Inside(station) | Beginning::Edge { first: station, .. } => &station.point,
             };
-            if let Some(already) =
-                known::branch_of(self.system, &settings, parent.free, self.plan.degree, first, &self.branches)
-            {
+            if let Some(already) = known::branch_of(
+                self.system,
+                &settings,
+                parent.free,
+                self.plan.degree,
+                first,
+                &self.branches,
+                self.observer,
+            ) {
                 self.tell(Event::Note(&parent.name, &format!("{label}: leads to {already}, which is known already")));
                 continue;
             }

@@ -199,7 +199,12 @@ pub struct Growth<'g> {
     pub parents: &'g [SpecialPoint],
     /// Who watches.
     pub observer: &'g dyn Observer,
+    /// Whether inner points stay in memory whole even where the observer could recall them.
+    pub whole: bool,
 }
+
+/// Points at either end of a branch that are always whole: what goes on from there needs them.
+const WHOLE: usize = 3;
 
 impl Growth<'_> {
     /// Follows a new branch. Returns false if the observer wants to stop.
@@ -358,7 +363,13 @@ impl Growth<'_> {
 
     fn accept(&self, branch: &mut Branch, point: Point) -> bool {
         branch.insert(point.clone());
-        self.tell(Event::Point(branch, &point))
+        let going = self.tell(Event::Point(branch, &point));
+        if !self.whole && self.observer.stores() && branch.points.len() > 2 * WHOLE {
+            let forward = branch.points.last().is_some_and(|last| last.position == point.position);
+            let inner = if forward { branch.points.len() - 1 - WHOLE } else { WHOLE };
+            branch.points[inner..=inner].iter_mut().filter(|p| p.position != 0).for_each(Point::lighten);
+        }
+        going
     }
 
     fn end(&self, branch: &mut Branch, side: usize, ending: Ending) -> bool {

@@ -348,6 +348,8 @@ impl Planner<'_> {
             sides,
             parents: &[],
             observer: self.observer,
+            // Where a run does not arrive, others begin at points inside it.
+            whole: true,
         };
         let known = self.earlier.branch(&name).filter(|branch| !branch.points.is_empty());
         let branch = match known {

@@ -8,10 +8,11 @@ use super::System;
 use super::growth::{Line, polished, problem_of, revived};
 use crate::continuation::Settings;
 use crate::continuation::locate::{Stretch, passing};
+use crate::contract::Observer;
 use crate::diagram::{Branch, Cost, Kind, Point};
 
 /// Every solution of a branch at a value of its parameter, by increasing position: one for each time that the branch
-/// passes it.
+/// passes it. Points that are light (see [`Point::is_light`]) are passed over.
 pub fn solutions_at(system: &System, settings: &Settings, branch: &Branch, value: f64) -> Vec<Point> {
     // Between two points the parameter is monotonous, except where a fold lies between them.
     let mut track: Vec<&Point> = branch.points.iter().collect();
@@ -24,6 +25,7 @@ pub fn solutions_at(system: &System, settings: &Settings, branch: &Branch, value
         a * b < 0.0 || a == 0.0
     });
     passes
+        .filter(|pair| pair.iter().all(|point| !point.is_light()))
         .filter_map(|pair| {
             let mut problem = problem_of(system, branch.free, 4, pair[0], false);
             let left = revived(&mut *problem, settings, pair[0], 1.0).ok()?;
@@ -69,6 +71,9 @@ fn least_between(
     quantity: &dyn Fn(&Point) -> f64,
 ) -> Option<(Point, f64)> {
     const SHARE: f64 = 0.618_033_988_749_894_9;
+    if pair.iter().any(Point::is_light) {
+        return None;
+    }
     let line = Line { held: branch.held, ..Line::new(branch.free) };
     let mut problem = line.problem(system, 4, &pair[0]);
     let left = revived(&mut *problem, settings, &pair[0], 1.0).ok()?;
@@ -93,7 +98,7 @@ fn least_between(
     Some(if a.1 < b.1 { (a.2, rest) } else { (b.2, rest) })
 }
 
-/// The name of the branch on which `point` lies.
+/// The name of the branch on which `point` lies; points that are light are recalled from the observer.
 pub fn branch_of<'b>(
     system: &System,
     settings: &Settings,
@@ -101,6 +106,7 @@ pub fn branch_of<'b>(
     degree: usize,
     point: &Point,
     branches: &'b [Branch],
+    observer: &dyn Observer,
 ) -> Option<&'b str> {
     let value = *point.parameters.get(free)?;
     let found = branches.iter().filter(|b| b.free == free).find(|branch| {
@@ -117,8 +123,12 @@ pub fn branch_of<'b>(
             if !close(nearest, 1e-3 + 1.5 * apart) {
                 return false;
             }
-            let mut problem = problem_of(system, free, degree, nearest, false);
-            let mut guess = nearest.clone();
+            let recalled = if nearest.is_light() { observer.recall(branch, nearest.position) } else { None };
+            let mut guess = recalled.unwrap_or_else(|| nearest.clone());
+            if guess.is_light() {
+                return false;
+            }
+            let mut problem = problem_of(system, free, degree, &guess, false);
             guess.parameters[free] = value;
             polished(&mut *problem, settings, &guess).is_ok_and(|same| close(&same.point, 30.0 * settings.tolerance))
         })

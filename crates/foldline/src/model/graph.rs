@@ -143,6 +143,38 @@ impl Node {
     }
 }
 
+impl Node {
+    /// The same with its operands renamed.
+    pub fn renamed(self, name: impl Fn(Id) -> Id) -> Node {
+        match self {
+            Node::Constant(_) | Node::Leaf(_) => self,
+            Node::Unary(op, a) => Node::Unary(op, name(a)),
+            Node::Integer(a, n) => Node::Integer(name(a), n),
+            Node::Binary(op, a, b) => Node::Binary(op, name(a), name(b)),
+            Node::Select(c, a, b) => Node::Select(name(c), name(a), name(b)),
+        }
+    }
+
+    /// The value, from those of the operands and of the parameters.
+    pub fn value(self, of: impl Fn(Id) -> f64, parameters: &[f64]) -> f64 {
+        match self {
+            Node::Constant(bits) => f64::from_bits(bits),
+            Node::Leaf(Leaf::Parameter(k)) => parameters[k as usize],
+            Node::Leaf(_) => f64::NAN,
+            Node::Unary(op, a) => op.of(of(a)),
+            Node::Binary(op, a, b) => op.of(of(a), of(b)),
+            Node::Integer(a, n) => kernels::power(of(a), n),
+            Node::Select(c, a, b) => {
+                if of(c) != 0.0 {
+                    of(a)
+                } else {
+                    of(b)
+                }
+            }
+        }
+    }
+}
+
 /// The nodes made so far.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Graph {

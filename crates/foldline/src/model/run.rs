@@ -2,13 +2,14 @@
 //!
 //! **Idea.** Lanes are taken in blocks of 32 (8 for a short rest), so that one instruction is looked up once and then runs as
 //! a loop of fixed length, which the compiler turns into vector instructions; the widest set that the machine has is chosen
-//! when the program runs. Registers live in a per-thread store that grows to the largest tape and is then reused.
+//! when the program runs. What all lanes share is computed once, as plain numbers. Registers live in a per-thread store that
+//! grows to the largest tape and is then reused; they are cells, so an instruction may write where it reads.
 
 use super::graph::{Binary, Leaf, Unary};
 use super::kernels;
-use super::tape::{Instruction, Place, Tape};
+use super::tape::{Code, Instruction, Place, Sum, Tape};
 use crate::contract::{Batch, Parameters};
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 
 /// Eight lanes, in one cache line.
 #[derive(Clone, Copy)]
@@ -19,10 +20,16 @@ struct Eight([f64; 8]);
 const WIDE: usize = 4;
 
 /// A value for up to 32 lanes.
-type Lanes = [Eight; WIDE];
+type Lanes = [Cell<Eight>; WIDE];
+
+#[derive(Default)]
+struct Store {
+    registers: Vec<Eight>,
+    scalars: Vec<f64>,
+}
 
 thread_local! {
-    static REGISTERS: RefCell<Vec<Lanes>> = const { RefCell::new(Vec::new()) };
+    static STORE: RefCell<Store> = const { RefCell::new(Store { registers: Vec::new(), scalars: Vec::new() }) };
 }
 
 /// What a tape reads.
@@ -30,6 +37,7 @@ thread_local! {
 struct Inputs<'a> {
     at: Batch<'a>,
     directions: &'a [&'a [f64]],
+    scalars: &'a [f64],
     /// First lane of the block.
     first: usize,
     /// How many lanes of the block exist.
@@ -39,22 +47,37 @@ struct Inputs<'a> {
 impl Tape {
     /// Runs the tape for all lanes and writes the results to `arrays`.
     pub fn run(&self, at: Batch, directions: &[&[f64]], arrays: &mut [&mut [f64]]) {
-        REGISTERS.with_borrow_mut(|registers| {
-            if registers.len() < self.registers {
-                registers.resize(self.registers, [Eight([0.0; 8]); WIDE]);
+        let (code, parameters): (&Code, &[f64]) = match at.parameters {
+            Parameters::Shared(values) => (&self.shared, values),
+            Parameters::PerLane(_) => (&self.own, &[]),
+        };
+        STORE.with_borrow_mut(|Store { registers, scalars }| {
+            scalars.clear();
+            for node in &code.scalars {
+                scalars.push(node.value(|id| scalars[id.at()], parameters));
             }
-            pulp::Arch::new().dispatch(Run { tape: self, at, directions, arrays, registers });
+            for &(scalar, place) in &code.uniform {
+                component(arrays, place, at.lanes).fill(scalars[scalar as usize]);
+            }
+            if code.body.is_empty() || at.lanes == 0 {
+                return;
+            }
+            if registers.len() < code.registers * WIDE {
+                registers.resize(code.registers * WIDE, Eight([0.0; 8]));
+            }
+            let registers = Cell::from_mut(registers.as_mut_slice()).as_slice_of_cells().as_chunks().0;
+            let inputs = Inputs { at, directions, scalars, first: 0, live: 0 };
+            pulp::Arch::new().dispatch(Run { code, inputs, arrays, registers });
         });
     }
 }
 
 /// One run, handed to the dispatcher of instruction sets.
 struct Run<'a, 'b, 'c> {
-    tape: &'a Tape,
-    at: Batch<'a>,
-    directions: &'a [&'a [f64]],
+    code: &'a Code,
+    inputs: Inputs<'a>,
     arrays: &'b mut [&'c mut [f64]],
-    registers: &'b mut [Lanes],
+    registers: &'b [Lanes],
 }
 
 impl pulp::NullaryFnOnce for Run<'_, '_, '_> {
@@ -62,52 +85,25 @@ impl pulp::NullaryFnOnce for Run<'_, '_, '_> {
 
     #[inline(always)]
     fn call(self) {
-        // A few lanes need only the first block of each register; two narrow blocks cost less than a wide one that is half empty.
-        match self.at.lanes {
-            0 => {}
-            1..=16 => self.run::<1>(),
-            _ => self.run::<WIDE>(),
+        let Run { code, mut inputs, arrays, registers } = self;
+        let lanes = inputs.at.lanes;
+        // Two narrow blocks cost less than a wide one that is half empty.
+        let wide = |left: usize| left > 16;
+        for &(register, scalar) in &code.filled {
+            let value = Eight([inputs.scalars[scalar as usize]; 8]);
+            let blocks = if wide(lanes) { WIDE } else { 1 };
+            registers[register as usize][..blocks].iter().for_each(|block| block.set(value));
         }
-    }
-}
-
-impl Run<'_, '_, '_> {
-    /// Runs the tape in blocks of 8 W lanes, and a short rest in blocks of 8.
-    #[inline(always)]
-    fn run<const W: usize>(self) {
-        let Run { tape, at, directions, arrays, registers } = self;
-        let lanes = at.lanes;
-        let inputs = |first: usize, width: usize| Inputs { at, directions, first, live: width.min(lanes - first) };
-        for &(register, value) in &tape.constants {
-            registers[register as usize][..W].fill(Eight([value; 8]));
-        }
-        let shared = matches!(at.parameters, Parameters::Shared(_));
-        if shared {
-            section::<W>(&tape.prologue, registers, inputs(0, 8 * W), arrays);
-            for &(register, place) in &tape.uniform {
-                let value = registers[register as usize][0].0[0];
-                component(arrays, place, lanes).fill(value);
+        while inputs.first < lanes {
+            let left = lanes - inputs.first;
+            if wide(left) {
+                inputs.live = left.min(8 * WIDE);
+                section::<WIDE>(&code.body, registers, inputs, arrays);
+            } else {
+                inputs.live = left.min(8);
+                section::<1>(&code.body, registers, inputs, arrays);
             }
-        }
-        let mut first = 0;
-        while first < lanes {
-            let wide = lanes - first > 16;
-            let width = if wide { 8 * W } else { 8 };
-            let inputs = inputs(first, width);
-            if !shared {
-                match wide {
-                    true => section::<W>(&tape.prologue, registers, inputs, arrays),
-                    false => section::<1>(&tape.prologue, registers, inputs, arrays),
-                }
-                for &(register, place) in &tape.uniform {
-                    store(&registers[register as usize], place, inputs, arrays);
-                }
-            }
-            match wide {
-                true => section::<W>(&tape.body, registers, inputs, arrays),
-                false => section::<1>(&tape.body, registers, inputs, arrays),
-            }
-            first += width;
+            inputs.first += inputs.live;
         }
     }
 }
@@ -122,67 +118,64 @@ fn component<'a>(arrays: &'a mut [&mut [f64]], place: Place, lanes: usize) -> &'
 #[inline(always)]
 fn store(value: &Lanes, place: Place, inputs: Inputs, arrays: &mut [&mut [f64]]) {
     let target = &mut component(arrays, place, inputs.at.lanes)[inputs.first..inputs.first + inputs.live];
-    for (chunk, eight) in target.chunks_mut(8).zip(value) {
-        if let Ok(full) = <&mut [f64; 8]>::try_from(&mut *chunk) {
-            *full = eight.0;
-        } else {
-            chunk.copy_from_slice(&eight.0[..chunk.len()]);
-        }
+    let (full, rest) = target.as_chunks_mut::<8>();
+    for (block, eight) in full.iter_mut().zip(value) {
+        *block = eight.get().0;
+    }
+    if let Some(eight) = value.get(full.len()) {
+        rest.copy_from_slice(&eight.get().0[..rest.len()]);
     }
 }
 
 /// Copies the lanes of the block; lanes that do not exist repeat the last one.
 #[inline(always)]
-fn load<const W: usize>(to: &mut Lanes, source: &[f64], index: u32, inputs: Inputs) {
+fn load<const W: usize>(to: &Lanes, source: &[f64], index: u32, inputs: Inputs) {
     let start = index as usize * inputs.at.lanes + inputs.first;
     let source = &source[start..start + inputs.live];
     let last = source[inputs.live - 1];
     for w in 0..W {
         let rest = source.get(8 * w..).unwrap_or(&[]);
-        if let Some(full) = rest.first_chunk::<8>() {
-            to[w].0 = *full;
-        } else {
-            for l in 0..8 {
-                to[w].0[l] = rest.get(l).copied().unwrap_or(last);
-            }
-        }
+        to[w].set(Eight(match rest.first_chunk::<8>() {
+            Some(full) => *full,
+            None => std::array::from_fn(|l| rest.get(l).copied().unwrap_or(last)),
+        }));
     }
 }
 
 #[inline(always)]
-fn map<const W: usize>(to: &mut Lanes, a: &Lanes, f: impl Fn(f64) -> f64) {
+fn map<const W: usize>(to: &Lanes, a: &Lanes, f: impl Fn(f64) -> f64) {
     for w in 0..W {
-        for l in 0..8 {
-            to[w].0[l] = f(a[w].0[l]);
-        }
-    }
-}
-
-/// Like [`map`], for functions that are evaluated lane by lane anyway: only for lanes that exist.
-#[inline(always)]
-fn map_live<const W: usize>(to: &mut Lanes, a: &Lanes, live: usize, f: impl Fn(f64) -> f64) {
-    for w in 0..W {
-        for l in 0..8usize.min(live.saturating_sub(8 * w)) {
-            to[w].0[l] = f(a[w].0[l]);
-        }
+        let (x, mut y) = (a[w].get().0, [0.0; 8]);
+        (0..8).for_each(|l| y[l] = f(x[l]));
+        to[w].set(Eight(y));
     }
 }
 
 #[inline(always)]
-fn zip<const W: usize>(to: &mut Lanes, a: &Lanes, b: &Lanes, f: impl Fn(f64, f64) -> f64) {
+fn zip<const W: usize>(to: &Lanes, a: &Lanes, b: &Lanes, f: impl Fn(f64, f64) -> f64) {
     for w in 0..W {
-        for l in 0..8 {
-            to[w].0[l] = f(a[w].0[l], b[w].0[l]);
-        }
+        let (p, q, mut y) = (a[w].get().0, b[w].get().0, [0.0; 8]);
+        (0..8).for_each(|l| y[l] = f(p[l], q[l]));
+        to[w].set(Eight(y));
     }
 }
 
 #[inline(always)]
-fn zip_live<const W: usize>(to: &mut Lanes, a: &Lanes, b: &Lanes, live: usize, f: impl Fn(f64, f64) -> f64) {
+fn zip3<const W: usize>(to: &Lanes, a: &Lanes, b: &Lanes, c: &Lanes, f: impl Fn(f64, f64, f64) -> f64) {
     for w in 0..W {
-        for l in 0..8usize.min(live.saturating_sub(8 * w)) {
-            to[w].0[l] = f(a[w].0[l], b[w].0[l]);
-        }
+        let (p, q, r, mut y) = (a[w].get().0, b[w].get().0, c[w].get().0, [0.0; 8]);
+        (0..8).for_each(|l| y[l] = f(p[l], q[l], r[l]));
+        to[w].set(Eight(y));
+    }
+}
+
+/// Like [`zip`], for functions that are evaluated lane by lane anyway: only for lanes that exist.
+#[inline(always)]
+fn zip_live<const W: usize>(to: &Lanes, a: &Lanes, b: &Lanes, live: usize, f: impl Fn(f64, f64) -> f64) {
+    for w in 0..W {
+        let (p, q, mut y) = (a[w].get().0, b[w].get().0, [0.0; 8]);
+        (0..8.min(live.saturating_sub(8 * w))).for_each(|l| y[l] = f(p[l], q[l]));
+        to[w].set(Eight(y));
     }
 }
 
@@ -190,58 +183,54 @@ fn zip_live<const W: usize>(to: &mut Lanes, a: &Lanes, b: &Lanes, live: usize, f
 #[inline(always)]
 fn section<const W: usize>(
     instructions: &[Instruction],
-    registers: &mut [Lanes],
+    registers: &[Lanes],
     inputs: Inputs,
     arrays: &mut [&mut [f64]],
 ) {
+    let r = |register: u32| &registers[register as usize];
+    let scalar = |s: u32| inputs.scalars[s as usize];
     for &instruction in instructions {
         match instruction {
-            Instruction::Load { to, from } => {
-                let to = &mut registers[to as usize];
-                match (from, inputs.at.parameters) {
-                    (Leaf::State(i), _) => load::<W>(to, inputs.at.states, i, inputs),
-                    (Leaf::Direction(d, i), _) => load::<W>(to, inputs.directions[d as usize], i, inputs),
-                    (Leaf::Parameter(k), Parameters::PerLane(values)) => load::<W>(to, values, k, inputs),
-                    (Leaf::Parameter(k), Parameters::Shared(values)) => to[..W].fill(Eight([values[k as usize]; 8])),
+            Instruction::Load { to, from } => match (from, inputs.at.parameters) {
+                (Leaf::State(i), _) => load::<W>(r(to), inputs.at.states, i, inputs),
+                (Leaf::Direction(d, i), _) => load::<W>(r(to), inputs.directions[d as usize], i, inputs),
+                (Leaf::Parameter(k), Parameters::PerLane(values)) => load::<W>(r(to), values, k, inputs),
+                // Shared parameters are scalars.
+                (Leaf::Parameter(_), Parameters::Shared(_)) => {}
+            },
+            Instruction::Unary { op, to, a } => unary::<W>(op, r(to), r(a), inputs.live),
+            Instruction::Binary { op, to, a, b } => binary::<W>(op, r(to), r(a), r(b), inputs.live),
+            Instruction::Right { op, to, a, s } => right::<W>(op, r(to), r(a), scalar(s)),
+            Instruction::Left { op, to, s, b } => left::<W>(op, r(to), scalar(s), r(b)),
+            Instruction::Fused { sum, to, a, b, c } => match sum {
+                Sum::Plus => zip3::<W>(r(to), r(a), r(b), r(c), |x, y, z| x * y + z),
+                Sum::Minus => zip3::<W>(r(to), r(a), r(b), r(c), |x, y, z| x * y - z),
+                Sum::From => zip3::<W>(r(to), r(a), r(b), r(c), |x, y, z| z - x * y),
+            },
+            Instruction::Scaled { sum, to, a, s, c } => {
+                let s = scalar(s);
+                match sum {
+                    Sum::Plus => zip::<W>(r(to), r(a), r(c), |x, z| x * s + z),
+                    Sum::Minus => zip::<W>(r(to), r(a), r(c), |x, z| x * s - z),
+                    Sum::From => zip::<W>(r(to), r(a), r(c), |x, z| z - x * s),
                 }
             }
-            Instruction::Unary { op, to, a } => {
-                if let Ok([to, a]) = registers.get_disjoint_mut([to as usize, a as usize]) {
-                    unary::<W>(op, to, a, inputs.live);
-                }
-            }
-            Instruction::Binary { op, to, a, b } => {
-                if let Ok([to, a, b]) = registers.get_disjoint_mut([to as usize, a as usize, b as usize]) {
-                    binary::<W>(op, to, a, b, inputs.live);
-                }
-            }
-            Instruction::Integer { to, a, n } => {
-                if let Ok([to, a]) = registers.get_disjoint_mut([to as usize, a as usize]) {
-                    match n {
-                        2 => map::<W>(to, a, |x| kernels::power(x, 2)),
-                        3 => map::<W>(to, a, |x| kernels::power(x, 3)),
-                        4 => map::<W>(to, a, |x| kernels::power(x, 4)),
-                        _ => map::<W>(to, a, |x| kernels::power(x, n)),
-                    }
-                }
-            }
+            Instruction::Integer { to, a, n } => match n {
+                2 => map::<W>(r(to), r(a), |x| kernels::power(x, 2)),
+                3 => map::<W>(r(to), r(a), |x| kernels::power(x, 3)),
+                4 => map::<W>(r(to), r(a), |x| kernels::power(x, 4)),
+                _ => map::<W>(r(to), r(a), |x| kernels::power(x, n)),
+            },
             Instruction::Select { to, c, a, b } => {
-                let places = [to as usize, c as usize, a as usize, b as usize];
-                if let Ok([to, c, a, b]) = registers.get_disjoint_mut(places) {
-                    for w in 0..W {
-                        for l in 0..8 {
-                            to[w].0[l] = if c[w].0[l] != 0.0 { a[w].0[l] } else { b[w].0[l] };
-                        }
-                    }
-                }
+                zip3::<W>(r(to), r(c), r(a), r(b), |c, x, y| if c != 0.0 { x } else { y });
             }
-            Instruction::Store { from, place } => store(&registers[from as usize], place, inputs, arrays),
+            Instruction::Store { from, place } => store(r(from), place, inputs, arrays),
         }
     }
 }
 
 #[inline(always)]
-fn unary<const W: usize>(op: Unary, to: &mut Lanes, a: &Lanes, live: usize) {
+fn unary<const W: usize>(op: Unary, to: &Lanes, a: &Lanes, live: usize) {
     match op {
         Unary::Negate => map::<W>(to, a, |x| Unary::Negate.of(x)),
         Unary::Sqrt => map::<W>(to, a, |x| Unary::Sqrt.of(x)),
@@ -251,12 +240,12 @@ fn unary<const W: usize>(op: Unary, to: &mut Lanes, a: &Lanes, live: usize) {
         Unary::Abs => map::<W>(to, a, |x| Unary::Abs.of(x)),
         Unary::Sign => map::<W>(to, a, |x| Unary::Sign.of(x)),
         Unary::Heaviside => map::<W>(to, a, |x| Unary::Heaviside.of(x)),
-        _ => map_live::<W>(to, a, live, |x| op.of(x)),
+        _ => zip_live::<W>(to, a, a, live, |x, _| op.of(x)),
     }
 }
 
 #[inline(always)]
-fn binary<const W: usize>(op: Binary, to: &mut Lanes, a: &Lanes, b: &Lanes, live: usize) {
+fn binary<const W: usize>(op: Binary, to: &Lanes, a: &Lanes, b: &Lanes, live: usize) {
     match op {
         Binary::Add => zip::<W>(to, a, b, |x, y| x + y),
         Binary::Subtract => zip::<W>(to, a, b, |x, y| x - y),
@@ -270,5 +259,35 @@ fn binary<const W: usize>(op: Binary, to: &mut Lanes, a: &Lanes, b: &Lanes, live
         Binary::Equal => zip::<W>(to, a, b, |x, y| Binary::Equal.of(x, y)),
         Binary::NotEqual => zip::<W>(to, a, b, |x, y| Binary::NotEqual.of(x, y)),
         Binary::Power | Binary::Atan2 => zip_live::<W>(to, a, b, live, |x, y| op.of(x, y)),
+    }
+}
+
+/// a op s, for the operations that [`super::tape::takes_scalars`] names.
+#[inline(always)]
+fn right<const W: usize>(op: Binary, to: &Lanes, a: &Lanes, s: f64) {
+    match op {
+        Binary::Add => map::<W>(to, a, |x| x + s),
+        Binary::Subtract => map::<W>(to, a, |x| x - s),
+        Binary::Multiply => map::<W>(to, a, |x| x * s),
+        Binary::Divide => map::<W>(to, a, |x| x / s),
+        Binary::Less => map::<W>(to, a, |x| Binary::Less.of(x, s)),
+        Binary::LessOrEqual => map::<W>(to, a, |x| Binary::LessOrEqual.of(x, s)),
+        Binary::Min => map::<W>(to, a, |x| Binary::Min.of(x, s)),
+        _ => map::<W>(to, a, |x| Binary::Max.of(x, s)),
+    }
+}
+
+/// s op b, likewise.
+#[inline(always)]
+fn left<const W: usize>(op: Binary, to: &Lanes, s: f64, b: &Lanes) {
+    match op {
+        Binary::Add => map::<W>(to, b, |x| s + x),
+        Binary::Subtract => map::<W>(to, b, |x| s - x),
+        Binary::Multiply => map::<W>(to, b, |x| s * x),
+        Binary::Divide => map::<W>(to, b, |x| s / x),
+        Binary::Less => map::<W>(to, b, |x| Binary::Less.of(s, x)),
+        Binary::LessOrEqual => map::<W>(to, b, |x| Binary::LessOrEqual.of(s, x)),
+        Binary::Min => map::<W>(to, b, |x| Binary::Min.of(s, x)),
+        _ => map::<W>(to, b, |x| Binary::Max.of(s, x)),
     }
 }

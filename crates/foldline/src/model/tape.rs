@@ -1,24 +1,93 @@
 //! From graph to tape: a straight list of instructions over registers.
 //!
 //! **Idea.** The nodes that the results depend on are put in order, results first come first served, and each gets a
-//! register; a register is used again once its value is no longer needed. What depends on parameters alone goes to a prologue,
-//! which runs once per batch where all lanes share their parameters. Running the tape is in `run`.
+//! register; a register is used again once its value is no longer needed. What depends on parameters alone is computed once per
+//! batch, as plain numbers, where all lanes share their parameters. A product that only one sum needs becomes one instruction
+//! with it, rounded twice as before. Running the tape is in `run`.
 
 use super::graph::{Binary, Graph, Id, Leaf, Node, Unary};
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 
-/// Number of a register.
+/// Number of a register, which holds a value per lane.
 pub(super) type Register = u32;
 
-/// One step. The target is never also an operand, and the two operands of a binary step differ.
+/// Number of a scalar, which all lanes share.
+pub(super) type Scalar = u32;
+
+/// One step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Instruction {
-    Load { to: Register, from: Leaf },
-    Unary { op: Unary, to: Register, a: Register },
-    Binary { op: Binary, to: Register, a: Register, b: Register },
-    Integer { to: Register, a: Register, n: i32 },
-    Select { to: Register, c: Register, a: Register, b: Register },
-    Store { from: Register, place: Place },
+    Load {
+        to: Register,
+        from: Leaf,
+    },
+    Unary {
+        op: Unary,
+        to: Register,
+        a: Register,
+    },
+    Binary {
+        op: Binary,
+        to: Register,
+        a: Register,
+        b: Register,
+    },
+    /// The second operand is a scalar; only where [`takes_scalars`] says so, as the next.
+    Right {
+        op: Binary,
+        to: Register,
+        a: Register,
+        s: Scalar,
+    },
+    /// The first operand is a scalar.
+    Left {
+        op: Binary,
+        to: Register,
+        s: Scalar,
+        b: Register,
+    },
+    /// The product of a and b in a sum with c.
+    Fused {
+        sum: Sum,
+        to: Register,
+        a: Register,
+        b: Register,
+        c: Register,
+    },
+    /// The product of a and a scalar in a sum with c.
+    Scaled {
+        sum: Sum,
+        to: Register,
+        a: Register,
+        s: Scalar,
+        c: Register,
+    },
+    Integer {
+        to: Register,
+        a: Register,
+        n: i32,
+    },
+    Select {
+        to: Register,
+        c: Register,
+        a: Register,
+        b: Register,
+    },
+    Store {
+        from: Register,
+        place: Place,
+    },
+}
+
+/// How a product p and another operand c make a sum.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Sum {
+    /// p + c
+    Plus,
+    /// p - c
+    Minus,
+    /// c - p
+    From,
 }
 
 /// Where a result goes: which array, which component.
@@ -29,70 +98,75 @@ pub(super) struct Place {
 }
 
 /// Instructions that compute a set of results.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(super) struct Tape {
+    /// For lanes that share their parameters.
+    pub shared: Code,
+    /// For lanes with parameters of their own.
+    pub own: Code,
+}
+
+/// Instructions for one of the two ways in which parameters come.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Code {
     /// How many registers are used.
     pub registers: usize,
-    /// Registers that hold numbers.
-    pub constants: Vec<(Register, f64)>,
-    /// What depends on parameters only.
-    pub prologue: Vec<Instruction>,
-    /// Results that depend on parameters only.
-    pub uniform: Vec<(Register, Place)>,
+    /// The scalars in the order in which they are computed; an operand is the number of an earlier one.
+    pub scalars: Vec<Node>,
+    /// Registers that hold a scalar, for instructions that take none.
+    pub filled: Vec<(Register, Scalar)>,
+    /// Results that are scalars.
+    pub uniform: Vec<(Scalar, Place)>,
     /// What differs from lane to lane.
     pub body: Vec<Instruction>,
 }
 
-/// Whether a value is the same in all lanes that share their parameters.
-#[derive(Clone, Copy, PartialEq)]
-enum Extent {
-    Constant,
-    Uniform,
-    Varying,
+/// Whether an operation has the forms [`Instruction::Right`] and [`Instruction::Left`].
+pub(super) fn takes_scalars(op: Binary) -> bool {
+    use Binary::{Add, Divide, Less, LessOrEqual, Max, Min, Multiply, Subtract};
+    matches!(op, Add | Subtract | Multiply | Divide | Less | LessOrEqual | Min | Max)
 }
 
 impl Tape {
     /// The tape for `results`: one list per array, components in order.
     pub fn new(graph: &Graph, results: &[&[Id]]) -> Tape {
+        Tape { shared: Code::new(graph, results, true), own: Code::new(graph, results, false) }
+    }
+}
+
+impl Code {
+    fn new(graph: &Graph, results: &[&[Id]], shared: bool) -> Code {
+        let varying = varying(graph, shared);
         let roots: Vec<Id> = results.iter().flat_map(|list| list.iter().copied()).collect();
-        let reached = graph.reachable(&roots);
-        let extent = extents(graph);
-        let uniform = |id: &Id| extent[id.at()] == Extent::Uniform;
-        let mut order = Order { graph, extent: &extent, done: vec![false; graph.len()], steps: Vec::new() };
-
-        // Prologue: every uniform value that a varying one or a result asks for.
-        let varying = (0..graph.len()).filter(|&i| reached[i] && extent[i] == Extent::Varying);
-        let mut kept: HashSet<Id> = varying.flat_map(|i| graph.node(Id(i as u32)).operands()).filter(uniform).collect();
-        kept.extend(roots.iter().copied().filter(uniform));
-        let mut wanted: Vec<Id> = kept.iter().copied().collect();
-        wanted.sort();
-        wanted.iter().for_each(|&id| order.visit(id));
-        let prologue = std::mem::take(&mut order.steps);
-
-        // Body: each result is stored as soon as it is known.
-        let mut settled: Vec<(Id, Place)> = Vec::new();
+        let fusions = fusions(graph, &varying, &roots);
+        let mut order =
+            Order { graph, varying: &varying, fusions: &fusions, done: vec![false; graph.len()], steps: vec![] };
+        let mut builder = Builder {
+            graph,
+            varying: &varying,
+            fusions: &fusions,
+            code: Code::default(),
+            scalars: HashMap::new(),
+            registers: HashMap::new(),
+            free: Vec::new(),
+        };
+        // Each result is stored as soon as it is known.
         for (array, list) in results.iter().enumerate() {
             for (component, &id) in list.iter().enumerate() {
                 let place = Place { array: array as u32, component: component as u32 };
-                if extent[id.at()] == Extent::Varying {
+                if varying[id.at()] {
                     order.visit(id);
                     order.steps.push(Step::Store(id, place));
                 } else {
-                    settled.push((id, place));
+                    let scalar = builder.scalar(id);
+                    builder.code.uniform.push((scalar, place));
                 }
             }
         }
-        let body = order.steps;
-
-        let mut builder = Builder { graph, tape: Tape::default(), registers: HashMap::new(), free: Vec::new() };
-        let operands = prologue.iter().chain(&body).flat_map(|step| step.operands(graph));
-        for id in operands.chain(settled.iter().map(|s| s.0)).filter(|id| extent[id.at()] == Extent::Constant) {
-            builder.constant(id);
-        }
-        builder.tape.prologue = builder.section(&prologue, &kept);
-        builder.tape.uniform = settled.into_iter().map(|(id, place)| (builder.registers[&id], place)).collect();
-        builder.tape.body = builder.section(&body, &HashSet::new());
-        builder.tape
+        let steps = order.steps;
+        builder.fill(&steps);
+        builder.body(&steps);
+        builder.code
     }
 }
 
@@ -102,43 +176,81 @@ enum Step {
     Store(Id, Place),
 }
 
-impl Step {
-    fn operands(self, graph: &Graph) -> impl Iterator<Item = Id> {
-        let (computed, stored) = match self {
-            Step::Compute(id) => (Some(id), None),
-            Step::Store(id, _) => (None, Some(id)),
-        };
-        computed.map(|id| graph.node(id).operands()).into_iter().flatten().chain(stored)
-    }
+/// A sum with a product that nothing else needs.
+#[derive(Clone, Copy)]
+struct Fusion {
+    sum: Sum,
+    a: Id,
+    b: Id,
+    c: Id,
 }
 
-fn extents(graph: &Graph) -> Vec<Extent> {
-    let mut extent: Vec<Extent> = Vec::with_capacity(graph.len());
+/// Which nodes differ from lane to lane.
+fn varying(graph: &Graph, shared: bool) -> Vec<bool> {
+    let mut varying: Vec<bool> = Vec::with_capacity(graph.len());
     for i in 0..graph.len() {
         let node = graph.node(Id(i as u32));
-        extent.push(match node {
-            Node::Constant(_) => Extent::Constant,
-            Node::Leaf(Leaf::Parameter(_)) => Extent::Uniform,
-            Node::Leaf(_) => Extent::Varying,
-            _ if node.operands().any(|a| extent[a.at()] == Extent::Varying) => Extent::Varying,
-            _ => Extent::Uniform,
+        varying.push(match node {
+            Node::Leaf(Leaf::Parameter(_)) => !shared,
+            Node::Leaf(_) => true,
+            _ => node.operands().any(|a| varying[a.at()]),
         });
     }
-    extent
+    varying
+}
+
+/// The fusions, by the node of the sum.
+fn fusions(graph: &Graph, varying: &[bool], roots: &[Id]) -> HashMap<Id, Fusion> {
+    let reached = graph.reachable(roots);
+    let mut uses = vec![0; graph.len()];
+    roots.iter().for_each(|root| uses[root.at()] += 1);
+    for i in (0..graph.len()).filter(|&i| reached[i]) {
+        graph.node(Id(i as u32)).operands().for_each(|a| uses[a.at()] += 1);
+    }
+    let factors = |id: Id| match graph.node(id) {
+        _ if uses[id.at()] != 1 || !varying[id.at()] => None,
+        Node::Binary(Binary::Multiply, a, b) if varying[a.at()] => Some((a, b)),
+        Node::Binary(Binary::Multiply, a, b) => Some((b, a)),
+        Node::Integer(a, 2) => Some((a, a)),
+        _ => None,
+    };
+    let fusion = |id: Id| {
+        let (x, y, second) = match graph.node(id) {
+            Node::Binary(Binary::Add, x, y) => (x, y, Sum::Plus),
+            Node::Binary(Binary::Subtract, x, y) => (x, y, Sum::From),
+            _ => return None,
+        };
+        let first = if second == Sum::Plus { Sum::Plus } else { Sum::Minus };
+        match (factors(x), factors(y)) {
+            (_, Some((a, b))) if varying[x.at()] => Some(Fusion { sum: second, a, b, c: x }),
+            (Some((a, b)), _) if varying[y.at()] => Some(Fusion { sum: first, a, b, c: y }),
+            _ => None,
+        }
+    };
+    (0..graph.len() as u32).map(Id).filter(|id| reached[id.at()]).filter_map(|id| Some((id, fusion(id)?))).collect()
+}
+
+/// The varying operands of a node, those of its fusion where it has one.
+fn operands(graph: &Graph, varying: &[bool], fusions: &HashMap<Id, Fusion>, id: Id) -> impl Iterator<Item = Id> {
+    let list = match fusions.get(&id) {
+        Some(&Fusion { a, b, c, .. }) => vec![a, b, c],
+        None => graph.node(id).operands().collect(),
+    };
+    list.into_iter().filter(|id| varying[id.at()])
 }
 
 /// Depth-first order without recursion.
 struct Order<'a> {
     graph: &'a Graph,
-    extent: &'a [Extent],
+    varying: &'a [bool],
+    fusions: &'a HashMap<Id, Fusion>,
     done: Vec<bool>,
     steps: Vec<Step>,
 }
 
 impl Order<'_> {
-    /// Appends what `root` needs and `root` itself, as far as it is of the same extent and not in the order yet.
+    /// Appends what `root` needs and `root` itself, as far as it varies and is not in the order yet.
     fn visit(&mut self, root: Id) {
-        let (graph, extent) = (self.graph, self.extent);
         let mut stack = vec![(root, false)];
         while let Some((id, ready)) = stack.pop() {
             if self.done[id.at()] {
@@ -149,17 +261,19 @@ impl Order<'_> {
                 self.steps.push(Step::Compute(id));
             } else {
                 stack.push((id, true));
-                let same = |a: &Id| extent[a.at()] == extent[root.at()];
-                stack.extend(graph.node(id).operands().filter(same).map(|a| (a, false)));
+                stack.extend(operands(self.graph, self.varying, self.fusions, id).map(|a| (a, false)));
             }
         }
     }
 }
 
-/// Hands out registers.
+/// Hands out registers and scalars.
 struct Builder<'a> {
     graph: &'a Graph,
-    tape: Tape,
+    varying: &'a [bool],
+    fusions: &'a HashMap<Id, Fusion>,
+    code: Code,
+    scalars: HashMap<Id, Scalar>,
     registers: HashMap<Id, Register>,
     free: Vec<Register>,
 }
@@ -167,76 +281,107 @@ struct Builder<'a> {
 impl Builder<'_> {
     fn fresh(&mut self) -> Register {
         self.free.pop().unwrap_or_else(|| {
-            self.tape.registers += 1;
-            self.tape.registers as Register - 1
+            self.code.registers += 1;
+            self.code.registers as Register - 1
         })
     }
 
-    fn constant(&mut self, id: Id) {
-        if let (Some(value), false) = (self.graph.value(id), self.registers.contains_key(&id)) {
-            let register = self.fresh();
-            self.registers.insert(id, register);
-            self.tape.constants.push((register, value));
+    /// The number of a value that all lanes share; what it needs is computed before it.
+    fn scalar(&mut self, root: Id) -> Scalar {
+        let mut stack = vec![(root, false)];
+        while let Some((id, ready)) = stack.pop() {
+            if self.scalars.contains_key(&id) {
+                continue;
+            }
+            if ready {
+                let node = self.graph.node(id).renamed(|a| Id(self.scalars[&a]));
+                self.scalars.insert(id, self.code.scalars.len() as Scalar);
+                self.code.scalars.push(node);
+            } else {
+                stack.push((id, true));
+                stack.extend(self.graph.node(id).operands().map(|a| (a, false)));
+            }
         }
+        self.scalars[&root]
     }
 
-    /// Instructions for the steps. Registers of values in `kept`, and of values from before, are not given to others.
-    fn section(&mut self, steps: &[Step], kept: &HashSet<Id>) -> Vec<Instruction> {
-        let mut last: HashMap<Id, usize> = HashMap::new();
-        for (i, step) in steps.iter().enumerate() {
-            if let Step::Compute(id) = step {
-                last.insert(*id, i);
+    /// Puts scalars into registers where an instruction wants them there.
+    fn fill(&mut self, steps: &[Step]) {
+        for step in steps {
+            let Step::Compute(id) = *step else { continue };
+            let node = self.graph.node(id);
+            if matches!(node, Node::Binary(op, ..) if takes_scalars(op)) {
+                continue;
             }
-            for operand in step.operands(self.graph) {
-                if let Some(at) = last.get_mut(&operand) {
-                    *at = i;
+            for operand in node.operands().filter(|a| !self.varying[a.at()]) {
+                if !self.registers.contains_key(&operand) {
+                    let (scalar, register) = (self.scalar(operand), self.fresh());
+                    self.registers.insert(operand, register);
+                    self.code.filled.push((register, scalar));
                 }
             }
         }
-        let mut instructions = Vec::with_capacity(steps.len());
+    }
+
+    fn operands(&self, step: Step) -> Vec<Id> {
+        let mut list: Vec<Id> = match step {
+            Step::Compute(id) => operands(self.graph, self.varying, self.fusions, id).collect(),
+            Step::Store(id, _) => vec![id],
+        };
+        list.sort();
+        list.dedup();
+        list
+    }
+
+    /// Instructions for the steps.
+    fn body(&mut self, steps: &[Step]) {
+        let mut last: HashMap<Id, usize> = HashMap::new();
         for (i, step) in steps.iter().enumerate() {
+            last.extend(self.operands(*step).into_iter().map(|id| (id, i)));
+        }
+        for (i, step) in steps.iter().enumerate() {
+            // Instructions read their operands before they write, so a target may be the register of an operand.
+            let finished = self.operands(*step).into_iter().filter(|id| last.get(id) == Some(&i));
+            let finished: Vec<Register> = finished.map(|id| self.registers[&id]).collect();
             match *step {
-                Step::Store(id, place) => instructions.push(Instruction::Store { from: self.registers[&id], place }),
+                Step::Store(id, place) => {
+                    self.code.body.push(Instruction::Store { from: self.registers[&id], place });
+                    self.free.extend(finished);
+                }
                 Step::Compute(id) => {
-                    // The target is taken before the operands are given back, so it is none of them.
+                    self.free.extend(finished);
                     let to = self.fresh();
-                    self.compute(id, to, &mut instructions);
+                    let instruction = self.instruction(id, to);
+                    self.code.body.push(instruction);
                     self.registers.insert(id, to);
                 }
             }
-            let mut finished: Vec<Id> = step.operands(self.graph).collect();
-            finished.sort();
-            finished.dedup();
-            for id in finished.into_iter().filter(|id| last.get(id) == Some(&i) && !kept.contains(id)) {
-                self.free.push(self.registers[&id]);
-            }
         }
-        instructions
     }
 
-    fn compute(&mut self, id: Id, to: Register, instructions: &mut Vec<Instruction>) {
-        let node = self.graph.node(id);
-        // An operand that is used twice is read from a copy the second time: registers of one instruction all differ.
-        let mut copies = Vec::new();
-        let mut operands: Vec<Register> = Vec::new();
-        for operand in node.operands() {
-            let mut register = self.registers[&operand];
-            if operands.contains(&register) {
-                let copy = self.fresh();
-                instructions.push(Instruction::Integer { to: copy, a: register, n: 1 });
-                copies.push(copy);
-                register = copy;
-            }
-            operands.push(register);
+    fn instruction(&mut self, id: Id, to: Register) -> Instruction {
+        let varies = |id: Id| self.varying[id.at()];
+        let at = |id: Id| self.registers[&id];
+        if let Some(&Fusion { sum, a, b, c }) = self.fusions.get(&id) {
+            let (a, c) = (at(a), at(c));
+            return match varies(b) {
+                true => Instruction::Fused { sum, to, a, b: at(b), c },
+                false => Instruction::Scaled { sum, to, a, s: self.scalar(b), c },
+            };
         }
-        instructions.push(match (node, operands.as_slice()) {
-            (Node::Leaf(from), _) => Instruction::Load { to, from },
-            (Node::Unary(op, _), &[a]) => Instruction::Unary { op, to, a },
-            (Node::Binary(op, ..), &[a, b]) => Instruction::Binary { op, to, a, b },
-            (Node::Integer(_, n), &[a]) => Instruction::Integer { to, a, n },
-            (Node::Select(..), &[c, a, b]) => Instruction::Select { to, c, a, b },
-            _ => unreachable!("constants are no steps, and every node has its own number of operands"),
-        });
-        self.free.append(&mut copies);
+        match self.graph.node(id) {
+            Node::Constant(_) => unreachable!("constants do not vary"),
+            Node::Leaf(from) => Instruction::Load { to, from },
+            Node::Unary(op, a) => Instruction::Unary { op, to, a: at(a) },
+            Node::Binary(op, a, b) if takes_scalars(op) && !varies(b) => {
+                Instruction::Right { op, to, a: at(a), s: self.scalar(b) }
+            }
+            Node::Binary(op, a, b) if takes_scalars(op) && !varies(a) => {
+                Instruction::Left { op, to, b: at(b), s: self.scalar(a) }
+            }
+            Node::Binary(op, a, b) => Instruction::Binary { op, to, a: at(a), b: at(b) },
+            Node::Integer(a, n) => Instruction::Integer { to, a: at(a), n },
+            Node::Select(c, a, b) => Instruction::Select { to, c: at(c), a: at(a), b: at(b) },
+        }
     }
 }
