@@ -67,12 +67,25 @@ fn fastest(auto: &Auto, system: &System, like: &Point, allowed: f64) -> Outcome<
             let own = constants(intervals, step);
             let answer = auto.run(&[&own[..], &[("NPR", "1"), ("IID", "2")]].concat())?;
             // Mistakes that AUTO makes with large steps: it stops before the end, or leaves the branch.
-            if answer.rows.last().is_none_or(|row| row.kind != -4 || (row.parameter - 10.0).abs() > 1e-6) {
+            if answer.rows.last().is_none_or(|row| row.kind != -4 || (row.parameter - 10.0).abs() > 1e-4) {
                 continue;
             }
             let found = cycles(&auto.solutions()?);
             let points: Vec<Point> = found.into_iter().map(|(_, omega, s)| point(system, like, omega, s)).collect();
-            let Ok(errors) = errors(system, points.iter()) else { continue };
+            // The first point is the start as AUTO reads it, between whose values it draws straight lines; no Newton's method.
+            let errors = match errors(system, points.iter().skip(1)) {
+                Ok(errors) => errors,
+                Err(why) => {
+                    eprintln!("  NTST {intervals}, DSMAX {step}: {why}");
+                    continue;
+                }
+            };
+            eprintln!(
+                "  NTST {intervals}, DSMAX {step}: {} points, errors {:.1e} {:.1e}",
+                points.len(),
+                errors[0],
+                errors[1]
+            );
             if points.len() != answer.rows.len() || errors[0].max(errors[1]) > allowed {
                 continue;
             }
