@@ -155,6 +155,16 @@ pub trait Monitor: Send + Sync {
     /// Whether the located zero is an event of this kind (and not, say, a neutral saddle).
     fn confirms(&self, at: &Point) -> bool;
 
+    /// Whether the value depends on more than the tangent of the point.
+    fn reads_spectrum(&self) -> bool {
+        true
+    }
+
+    /// Whether `at`, which is close to the zero but not there yet, leaves it possible that the zero will be confirmed.
+    fn possible(&self, _at: &Point) -> bool {
+        true
+    }
+
     /// By how much an event of this kind changes the number of unstable eigenvalues or multipliers.
     fn jump(&self) -> usize;
 }

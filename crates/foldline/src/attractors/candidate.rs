@@ -6,7 +6,7 @@
 use super::orbit::Orbit;
 use super::returns::{MOST_CROSSINGS, Prediction, Returns};
 use super::{Candidate, Polish, Sampling};
-use crate::contract::{VectorField, Verdict};
+use crate::contract::{Batch, Parameters, VectorField, Verdict};
 use crate::diagram::{Cycle, Solution};
 use crate::simulation::{Integrator, Passage, Tolerance};
 
@@ -34,6 +34,14 @@ impl Context<'_> {
         Tolerance { relative: INTEGRATION, absolute }
     }
 
+    /// f at a state, `[n]`.
+    pub(super) fn slope(&self, state: &[f64]) -> Vec<f64> {
+        let mut f = vec![0.0; state.len()];
+        let at = Batch { lanes: 1, states: state, parameters: Parameters::Shared(self.parameters) };
+        self.field.evaluate(at, &mut f);
+        f
+    }
+
     /// A stable solution near the candidate, as an orbit.
     pub(super) fn polished(&self, candidate: &Candidate) -> Option<Orbit> {
         let polished = |candidate: &Candidate| (self.polish)(candidate).filter(|point| point.unstable == 0);
@@ -42,7 +50,7 @@ impl Context<'_> {
             Solution::Cycle(cycle) => primitive(cycle).and_then(|candidate| polished(&candidate)),
             Solution::Equilibrium(_) => None,
         };
-        Some(Orbit::new(once.unwrap_or(point), &self.sampling.scales))
+        Some(Orbit::new(once.unwrap_or(point), &self.sampling.scales, self.sampling.whirl))
     }
 
     /// The trajectory from a predicted limit over one period, if it comes back.

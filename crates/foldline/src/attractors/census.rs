@@ -1,17 +1,22 @@
 //! From samples to attractors.
+//!
+//! **Idea.** Samples are followed in blocks. What the first block finds is handed to the next ones, which recognise it
+//! instead of finding it anew; what a round of blocks finds is handed to the next round.
 
 use super::candidate::Context;
 use super::orbit::Orbit;
 use super::watch::Watch;
-use super::{Attractor, Census, Polish, Sampling, spectral_ratio};
-use crate::contract::VectorField;
-use crate::diagram::{Point, Solution};
+use super::{Attractor, Census, Enough, Polish, Sampling};
+use crate::contract::{VectorField, Verdict};
+use crate::diagram::Point;
 use crate::simulation::{Ensemble, Outcome};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Trajectories that are integrated together and share what they find. Fixed, so that the result does not depend on the
 /// number of threads.
-const BLOCK: usize = 128;
+const BLOCK: usize = 32;
+/// Blocks per round after the first, which is one block; fixed for the same reason.
+const ROUND: usize = 4;
 /// Steps after which a trajectory counts as unsettled: some thousand periods.
 const STEP_LIMIT: usize = 60_000;
 
@@ -22,62 +27,96 @@ enum Fate {
     Settled(usize),
     Unsettled,
     Escaped,
+    /// Nobody waited for it.
+    Left,
+}
+
+/// A solution, and what is known about the samples that went there.
+struct Reached {
+    orbit: Orbit,
+    hits: usize,
+    /// Number of the first of them.
+    first: usize,
 }
 
 /// The attractors reached from `sampling.samples` initial states.
 ///
 /// `polish` computes a candidate by Newton's method; it is called from several threads.
 pub fn survey(field: &dyn VectorField, parameters: &[f64], sampling: &Sampling, polish: Polish) -> Census {
+    survey_until(field, parameters, sampling, polish, &|_| false)
+}
+
+/// The same, but no further than needed: it ends with the first block of 32 samples in which half of them or more have settled
+/// and `enough` says so of the attractors reached until then, each with its spectral ratio. Which these are depends on the
+/// order of the samples, not on the number of threads.
+pub fn survey_until(
+    field: &dyn VectorField,
+    parameters: &[f64],
+    sampling: &Sampling,
+    polish: Polish,
+    enough: Enough,
+) -> Census {
     let n = field.dim();
     let context = Context { field, parameters, sampling, polish };
     let starts = sampling.starts();
     let blocks: Vec<&[f64]> = starts.chunks((BLOCK * n).max(1)).collect();
-    let mut known: Vec<Orbit> = Vec::new();
-    let mut hits: Vec<(usize, usize)> = Vec::new();
+    let mut reached: Vec<Reached> = Vec::new();
     let mut census = Census::default();
-    for (block, (found, fates)) in watch_blocks(&context, &blocks).into_iter().enumerate() {
-        // The same solution found in several blocks is one.
-        let place: Vec<usize> = found
-            .into_iter()
-            .map(|orbit| {
-                known.iter().position(|k| k.same(&orbit, sampling.tolerance)).unwrap_or_else(|| {
-                    known.push(orbit);
-                    hits.push((0, 0));
-                    known.len() - 1
-                })
-            })
-            .collect();
-        for (lane, fate) in fates.into_iter().enumerate() {
-            match fate {
-                Fate::Settled(index) => {
-                    let (count, first) = &mut hits[place[index]];
-                    if *count == 0 {
-                        *first = block * BLOCK + lane;
-                    }
-                    *count += 1;
-                }
-                Fate::Unsettled => census.unsettled += 1,
-                Fate::Escaped => census.escaped += 1,
-            }
+    let (mut taken, mut ended) = (0, false);
+    while taken < blocks.len() && !ended {
+        let round = if taken == 0 { 1 } else { ROUND.min(blocks.len() - taken) };
+        for watched in watch_blocks(&context, &blocks[taken..taken + round], &reached, enough) {
+            ended = watched.ended;
+            add(watched, taken * BLOCK, &mut reached, &mut census, sampling.tolerance);
+            taken += 1;
         }
     }
-    let mut reached: Vec<(Orbit, (usize, usize))> =
-        known.into_iter().zip(hits).filter(|(_, (hits, _))| *hits > 0).collect();
-    reached.sort_by(|(a, (a_hits, _)), (b, (b_hits, _))| {
-        let key = |orbit: &Orbit| orbit.point.solution.period().unwrap_or_else(|| orbit.norm());
-        let cycle = |orbit: &Orbit| orbit.point.solution.period().is_some();
-        cycle(a).cmp(&cycle(b)).then(b_hits.cmp(a_hits)).then(key(a).total_cmp(&key(b)))
+    census.left += sampling.samples.saturating_sub(taken * BLOCK);
+    reached.retain(|known| known.hits > 0);
+    reached.sort_by(|a, b| {
+        let key = |known: &Reached| known.orbit.point.solution.period().unwrap_or_else(|| known.orbit.norm());
+        let cycle = |known: &Reached| known.orbit.point.solution.period().is_some();
+        cycle(a).cmp(&cycle(b)).then(b.hits.cmp(&a.hits)).then(key(a).total_cmp(&key(b)))
     });
     census.attractors = reached
         .into_iter()
-        .map(|(orbit, (hits, first))| Attractor {
-            ratio: ratio(&orbit.point, sampling.whirl),
-            point: orbit.point,
-            hits,
-            example: starts[first * n..(first + 1) * n].to_vec(),
+        .map(|known| Attractor {
+            ratio: known.orbit.ratio,
+            point: known.orbit.point,
+            hits: known.hits,
+            example: starts[known.first * n..(known.first + 1) * n].to_vec(),
         })
         .collect();
     census
+}
+
+/// Adds what was seen of a block, whose samples are numbered from `first` on.
+fn add(watched: Watched, first: usize, reached: &mut Vec<Reached>, census: &mut Census, tolerance: f64) {
+    // The same solution found in several blocks is one.
+    let place: Vec<usize> = watched
+        .orbits
+        .into_iter()
+        .map(|orbit| {
+            reached.iter().position(|known| known.orbit.same(&orbit, tolerance)).unwrap_or_else(|| {
+                reached.push(Reached { orbit, hits: 0, first: 0 });
+                reached.len() - 1
+            })
+        })
+        .collect();
+    for (lane, fate) in watched.fates.into_iter().enumerate() {
+        match fate {
+            Fate::Settled(index) => {
+                let known = &mut reached[place[index]];
+                if known.hits == 0 {
+                    known.first = first + lane;
+                }
+                known.hits += 1;
+            }
+            Fate::Unsettled => census.unsettled += 1,
+            Fate::Escaped => census.escaped += 1,
+            Fate::Left => census.left += 1,
+        }
+    }
 }
 
 /// The attractor to which the trajectory from `start` `[n]` goes; `None` where it escapes or does not settle.
@@ -88,59 +127,88 @@ pub fn settle(
     start: &[f64],
     polish: Polish,
 ) -> Option<Point> {
-    let (mut known, fates) = watch_block(&Context { field, parameters, sampling, polish }, start);
-    match fates.first() {
-        Some(Fate::Settled(index)) if *index < known.len() => Some(known.swap_remove(*index).point),
+    let mut watched = watch_block(&Context { field, parameters, sampling, polish }, start, &[], &|_| false);
+    match watched.fates.first() {
+        Some(Fate::Settled(index)) if *index < watched.orbits.len() => Some(watched.orbits.swap_remove(*index).point),
         _ => None,
     }
 }
 
-fn ratio(point: &Point, whirl: Option<[usize; 2]>) -> Option<(u32, u32)> {
-    match &point.solution {
-        Solution::Cycle(cycle) => spectral_ratio(cycle, whirl?),
-        Solution::Equilibrium(_) => None,
-    }
-}
-
-/// All blocks, in their order, over the threads asked for.
-fn watch_blocks(context: &Context, blocks: &[&[f64]]) -> Vec<(Vec<Orbit>, Vec<Fate>)> {
-    let jobs = context.sampling.jobs.min(blocks.len());
-    if jobs <= 1 {
-        return blocks.iter().map(|starts| watch_block(context, starts)).collect();
-    }
-    let next = AtomicUsize::new(0);
+/// All blocks of a round, in their order, over the threads asked for; those behind one that ended the survey are left out.
+fn watch_blocks(context: &Context, blocks: &[&[f64]], reached: &[Reached], enough: Enough) -> Vec<Watched> {
+    let (next, last) = (AtomicUsize::new(0), AtomicUsize::new(usize::MAX));
     let work = || {
         let mut done = Vec::new();
         loop {
             let block = next.fetch_add(1, Ordering::Relaxed);
-            let Some(starts) = blocks.get(block) else { return done };
-            done.push((block, watch_block(context, starts)));
+            let Some(starts) = blocks.get(block).filter(|_| block <= last.load(Ordering::Relaxed)) else { return done };
+            let watched = watch_block(context, starts, reached, enough);
+            if watched.ended {
+                last.fetch_min(block, Ordering::Relaxed);
+            }
+            done.push((block, watched));
         }
     };
-    let mut done: Vec<_> = std::thread::scope(|scope| {
-        let threads: Vec<_> = (0..jobs).map(|_| scope.spawn(work)).collect();
-        threads
-            .into_iter()
-            .flat_map(|thread| thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
-            .collect()
-    });
+    let jobs = context.sampling.jobs.min(blocks.len());
+    let mut done = match jobs {
+        0 | 1 => work(),
+        _ => std::thread::scope(|scope| {
+            let threads: Vec<_> = (0..jobs).map(|_| scope.spawn(work)).collect();
+            threads
+                .into_iter()
+                .flat_map(|thread| thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
+                .collect()
+        }),
+    };
     done.sort_by_key(|(block, _)| *block);
-    done.into_iter().map(|(_, result)| result).collect()
+    let last = last.into_inner();
+    done.into_iter().filter(|(block, _)| *block <= last).map(|(_, watched)| watched).collect()
 }
 
-/// Integrates trajectories together until each has settled, escaped or used up its steps.
-fn watch_block(context: &Context, starts: &[f64]) -> (Vec<Orbit>, Vec<Fate>) {
+/// What was seen of a block.
+struct Watched {
+    /// The solutions known before, then those found here.
+    orbits: Vec<Orbit>,
+    fates: Vec<Fate>,
+    /// Whether everything has been found.
+    ended: bool,
+}
+
+/// Integrates trajectories together until each has settled, escaped or used up its steps, or enough is known.
+fn watch_block(context: &Context, starts: &[f64], reached: &[Reached], enough: Enough) -> Watched {
     let n = context.field.dim();
-    let mut known = Vec::new();
+    let mut orbits: Vec<Orbit> = reached.iter().map(|known| known.orbit.clone()).collect();
+    let mut hit: Vec<bool> = reached.iter().map(|known| known.hits > 0).collect();
     let mut watches = vec![Watch::new(n); starts.len().checked_div(n).unwrap_or(0)];
+    let (count, mut settled, mut ended) = (watches.len(), 0, false);
+    let suffices = |orbits: &[Orbit], hit: &[bool]| {
+        let found = orbits.iter().zip(hit).filter(|(_, hit)| **hit).map(|(orbit, _)| (&orbit.point, orbit.ratio));
+        enough(&found.collect::<Vec<_>>())
+    };
     let ensemble = Ensemble::new(context.field, context.parameters, context.tolerance(), starts, [0.0, f64::INFINITY])
         .with_step_limit(STEP_LIMIT);
-    let arrivals = ensemble.run(&mut |step| watches[step.trajectory()].observe(step, &mut known, context));
+    let arrivals = ensemble.run(&mut |step| {
+        if ended {
+            return Verdict::Stop;
+        }
+        let watch = &mut watches[step.trajectory()];
+        let verdict = watch.observe(step, &mut orbits, context);
+        if let Some(index) = watch.settled {
+            hit.resize(orbits.len(), false);
+            hit[index] = true;
+            settled += 1;
+            ended = 2 * settled >= count && suffices(&orbits, &hit);
+        }
+        verdict
+    });
     let fates = arrivals.iter().zip(&watches).map(|(arrival, watch)| match (watch.settled, arrival.outcome) {
         (Some(index), _) => Fate::Settled(index),
+        (None, Outcome::Stopped) => Fate::Left,
         (None, Outcome::Escaped | Outcome::StepTooSmall) => Fate::Escaped,
         (None, _) => Fate::Unsettled,
     });
     let fates = fates.collect();
-    (known, fates)
+    hit.resize(orbits.len(), false);
+    ended |= suffices(&orbits, &hit);
+    Watched { orbits, fates, ended }
 }

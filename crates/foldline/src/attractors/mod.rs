@@ -5,13 +5,14 @@
 //! it has been seen to converge there.
 //!
 //! 1. draw `samples` states, stratified in every component and the same for the same seed (`sampling`);
-//! 2. integrate them in blocks of fixed size, each trajectory with a step of its own (`crate::simulation`);
+//! 2. integrate them in blocks of fixed size, each trajectory with a step of its own (`census`, `crate::simulation`);
 //! 3. watch the extent of each trajectory: where it shrinks, an equilibrium is tried (`watch`);
 //! 4. watch its returns to a section: where they contract regularly, their limit is predicted and a cycle tried (`returns`, `candidate`);
 //! 5. `polish` turns a candidate into a solution with its stability; only stable ones are kept (`candidate`);
 //! 6. a trajectory has settled when its distance to a solution found so far falls steadily, or when the predicted limit of
 //!    its returns lies on that solution (`orbit`, `watch`);
-//! 7. the same solution found in several blocks is one attractor, named by its spectral ratio (`census`, `spectrum`).
+//! 7. the same solution found in several blocks is one attractor, named by its spectral ratio (`census`, `spectrum`); where
+//!    only some types are wanted, no more blocks are followed than it takes to find them.
 //!
 //! Beside this stands simulation that solves no equation for the motions it finds (`brute_force`, `settling`, `runner`, `measure`), to be
 //! compared with branches.
@@ -35,7 +36,7 @@ mod watch;
 mod window;
 
 pub use brute_force::{Report, stepped_sweep, survey_by_simulation};
-pub use census::{settle, survey};
+pub use census::{settle, survey, survey_until};
 pub use sampling::Sampling;
 pub use settling::Trial;
 pub use spectrum::{signed_spectrum, spectral_ratio};
@@ -64,6 +65,8 @@ pub struct Census {
     pub unsettled: usize,
     /// Trajectories that ran to infinity or to where f is not defined.
     pub escaped: usize,
+    /// Samples that were not followed to their end, or not at all, since enough was known; see [`survey_until`].
+    pub left: usize,
 }
 
 /// An approximate solution, to be computed exactly.
@@ -84,3 +87,6 @@ pub enum Candidate {
 
 /// Computes a candidate exactly; `None` where that does not converge.
 pub type Polish<'a> = &'a (dyn Fn(&Candidate) -> Option<Point> + Sync);
+
+/// Says whether the attractors reached so far, each with its spectral ratio, are all that is wanted.
+pub type Enough<'a> = &'a (dyn Fn(&[(&Point, Option<(u32, u32)>)]) -> bool + Sync);

@@ -6,6 +6,7 @@
 //!
 //! the orbit of a cycle being the polygon through its samples.
 
+use super::spectral_ratio;
 use crate::diagram::{Point, Solution};
 
 /// Samples of a cycle; the polygon through them misses the k-th harmonic by (πk / SAMPLES)² / 2 of its amplitude.
@@ -19,14 +20,22 @@ const FLOOR: f64 = 1e-3;
 #[derive(Clone, Debug)]
 pub(super) struct Orbit {
     pub(super) point: Point,
+    /// Spectral ratio of a cycle.
+    pub(super) ratio: Option<(u32, u32)>,
     /// `[n]` s of (1).
     scale: Vec<f64>,
     /// `[sample][n]`; one sample for an equilibrium.
     states: Vec<f64>,
+    /// `[n][sample / STRIDE]` the coarse samples in units of the scale.
+    coarse: Vec<f64>,
 }
 
 impl Orbit {
-    pub(super) fn new(point: Point, scales: &[f64]) -> Orbit {
+    pub(super) fn new(point: Point, scales: &[f64], whirl: Option<[usize; 2]>) -> Orbit {
+        let ratio = match &point.solution {
+            Solution::Cycle(cycle) => whirl.and_then(|whirl| spectral_ratio(cycle, whirl)),
+            Solution::Equilibrium(_) => None,
+        };
         let (states, scale) = match &point.solution {
             Solution::Equilibrium(x) => (x.clone(), scales.to_vec()),
             Solution::Cycle(cycle) => {
@@ -40,7 +49,9 @@ impl Orbit {
                 (states, scale)
             }
         };
-        Orbit { point, scale, states }
+        let every = |i: usize| states.iter().skip(i).step_by(STRIDE * scales.len());
+        let coarse = (0..scales.len()).flat_map(|i| every(i).map(|x| x / scale[i]).collect::<Vec<f64>>()).collect();
+        Orbit { point, ratio, scale, states, coarse }
     }
 
     /// (1); the samples between which the nearest point lies are searched around the nearest coarse sample only.
@@ -52,11 +63,15 @@ impl Orbit {
         }
         let square =
             |k: usize| -> f64 { (0..n).map(|i| ((x[i] - self.states[k * n + i]) / self.scale[i]).powi(2)).sum() };
-        let nearest = |candidates: &mut dyn Iterator<Item = usize>| {
-            candidates.map(|k| (k, square(k))).min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(k, _)| k)
-        };
-        let coarse = nearest(&mut (0..count).step_by(STRIDE));
-        let fine = nearest(&mut (0..2 * STRIDE - 1).map(|k| (coarse + count + k + 1 - STRIDE) % count));
+        let mut squares = [0.0; SAMPLES / STRIDE];
+        for (i, samples) in self.coarse.chunks_exact(SAMPLES / STRIDE).enumerate() {
+            let place = x[i] / self.scale[i];
+            squares.iter_mut().zip(samples).for_each(|(square, sample)| *square += (place - sample) * (place - sample));
+        }
+        let least = squares.iter().fold(f64::INFINITY, |m: f64, square| if *square < m { *square } else { m });
+        let coarse = STRIDE * squares.iter().position(|square| *square == least).unwrap_or(0);
+        let around = (0..2 * STRIDE - 1).map(|k| (coarse + count + k + 1 - STRIDE) % count);
+        let fine = around.map(|k| (k, square(k))).min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(k, _)| k);
         let neighbours = [(fine + count - 1) % count, (fine + 1) % count];
         let onto = |other: usize| {
             let (mut along, mut length) = (0.0, 0.0);

@@ -16,7 +16,7 @@
 //! **Fails when** the map is far from linear over the returns used. In few dimensions (1) has no remainder that would show it;
 //! the limit predicted one return earlier does, and following the prediction for a period.
 
-use crate::linalg::{lu, max_abs};
+use crate::linalg::lu;
 use crate::simulation::Step;
 
 /// Largest number of crossings per period that is looked for.
@@ -33,6 +33,8 @@ const STEADY: f64 = 0.3;
 const WORTHWHILE: [f64; 2] = [0.1, 5e-3];
 /// Largest distance of a predicted limit from the last return, relative to the extent.
 const REACH: f64 = 0.5;
+/// Decrease of a distance over the last returns that counts as an approach.
+const APPROACHED: f64 = 0.95;
 
 /// A plane, and where and when a trajectory came through it.
 #[derive(Clone, Debug, Default)]
@@ -54,6 +56,8 @@ pub(super) struct Returns {
 pub(super) struct Prediction {
     /// `[n]`.
     pub(super) state: Vec<f64>,
+    /// How many returns there are per period.
+    pub(super) crossings: usize,
     /// Time between the last returns that were compared.
     pub(super) period: f64,
     /// The last difference, relative to the extent.
@@ -66,6 +70,12 @@ impl Prediction {
     /// Whether following it for a period is likely enough to show a cycle; that costs more than waiting for a few returns.
     pub(super) fn worthwhile(&self) -> bool {
         self.size <= WORTHWHILE[0] && self.doubt <= WORTHWHILE[1]
+    }
+
+    /// Whether a later prediction is the same motion, to the doubt that is allowed.
+    pub(super) fn agrees(&self, later: &Prediction, extent: &[f64]) -> bool {
+        let moved = (0..extent.len()).fold(0.0, |m: f64, i| m.max((self.state[i] - later.state[i]).abs() / extent[i]));
+        moved <= WORTHWHILE[1] && (self.period - later.period).abs() <= 0.05 * later.period
     }
 }
 
@@ -106,14 +116,13 @@ impl Returns {
         if !(before < 0.0 && self.side >= 0.0) {
             return false;
         }
-        let mut x = vec![0.0; end.len()];
+        let along = step.along(&self.normal);
         // Secants on the continuous solution, kept within the bracket (Illinois).
         let ([mut a, mut b], [mut ga, mut gb]) = ([0.0, 1.0], [before, self.side]);
         let mut theta = 1.0;
         for _ in 0..20 {
             theta = (gb * a - ga * b) / (gb - ga);
-            step.state_into(theta, &mut x);
-            let g = self.value(&x);
+            let g = before + along.change(theta);
             if g.abs() <= 1e-12 * (self.side - before) {
                 break;
             }
@@ -129,7 +138,9 @@ impl Returns {
         }
         self.total += 1;
         self.times.push(step.time_at(theta));
-        self.states.extend(x);
+        let place = self.states.len();
+        self.states.resize(place + end.len(), 0.0);
+        step.state_into(theta, &mut self.states[place..]);
         true
     }
 
@@ -145,25 +156,49 @@ impl Returns {
         }
         // y(0) is the newest return.
         let y = |back: usize| &self.states[(newest - back * q) * n..][..n];
-        let scaled = |a: &[f64], b: &[f64]| -> Vec<f64> { (0..n).map(|i| (a[i] - b[i]) / extent[i]).collect() };
-        let u: Vec<Vec<f64>> = (0..terms + 2).map(|back| scaled(y(back), y(back + 1))).collect();
-        let size = max_abs(&u[0]);
+        let size = (0..n).fold(0.0, |m: f64, i| m.max((y(0)[i] - y(1)[i]).abs() / extent[i]));
         if size.is_nan() || size > NEAR {
             return None;
         }
         let period = self.times[newest] - self.times[newest - q];
         // Differences that small are dominated by the error of the integration.
         if size < 1e-6 {
-            return Some(Prediction { state: y(0).to_vec(), period, size, doubt: size });
+            return Some(Prediction { state: y(0).to_vec(), crossings: q, period, size, doubt: size });
         }
-        let limit = |from: usize| -> Option<Vec<f64>> {
-            let gamma = weights(&u[from..=from + terms])?;
-            Some((0..n).map(|i| gamma.iter().enumerate().map(|(j, g)| g * y(from + j)[i]).sum()).collect())
-        };
-        let (state, earlier) = (limit(0)?, limit(1)?);
-        let doubt = max_abs(&scaled(&state, &earlier));
-        let near = max_abs(&scaled(&state, y(0))) <= REACH;
-        (near && doubt <= STEADY * size).then_some(Prediction { state, period, size, doubt })
+        let gram = Gram::new(terms + 2, extent, y);
+        let (gamma, earlier) = (gram.weights(0, terms + 1)?, gram.weights(1, terms + 1)?);
+        let limit =
+            |gamma: &Weights, from: usize, i: usize| (0..=terms).map(|j| gamma[j] * y(from + j)[i]).sum::<f64>();
+        let (mut doubt, mut reach): (f64, f64) = (0.0, 0.0);
+        for i in 0..n {
+            let here = limit(&gamma, 0, i);
+            doubt = doubt.max((here - limit(&earlier, 1, i)).abs() / extent[i]);
+            reach = reach.max((here - y(0)[i]).abs() / extent[i]);
+        }
+        let state = || (0..n).map(|i| limit(&gamma, 0, i)).collect();
+        (reach <= REACH && doubt <= STEADY * size).then(|| Prediction {
+            state: state(),
+            crossings: q,
+            period,
+            size,
+            doubt,
+        })
+    }
+
+    /// Whether the trajectory came closer and closer, as measured by `distance`: the largest value over each third of the
+    /// last returns, as many as are needed for several periods, is smaller than over the third before.
+    pub(super) fn approach(&self, distance: impl Fn(&[f64]) -> f64) -> bool {
+        let third = (self.times.len() / 3).min(MOST_CROSSINGS);
+        if third < 2 {
+            return false;
+        }
+        let mut largest = [0.0f64; 3];
+        for (back, state) in self.states.rchunks_exact(self.anchor.len().max(1)).take(3 * third).enumerate() {
+            let part = &mut largest[back / third];
+            *part = part.max(distance(state));
+        }
+        let [last, middle, first] = largest;
+        last < middle && middle < first && last <= APPROACHED * first
     }
 
     /// The `count` predictions that deserve to be tried: those that changed least, the fewest crossings per period first.
@@ -188,29 +223,52 @@ impl Returns {
 
 /// (2) from m + 2 iterates, the newest first; differences are measured in `scale`.
 pub(super) fn limit_of(y: &[&[f64]], scale: &[f64]) -> Option<Vec<f64>> {
-    let difference = |pair: &[&[f64]]| (0..scale.len()).map(|i| (pair[0][i] - pair[1][i]) / scale[i]).collect();
-    let u: Vec<Vec<f64>> = y.windows(2).map(difference).collect();
-    let gamma = weights(&u)?;
-    Some((0..scale.len()).map(|i| gamma.iter().zip(y).map(|(g, y)| g * y[i]).sum()).collect())
+    let count = y.len().checked_sub(1).filter(|count| *count <= MOST_TERMS + 2)?;
+    let gamma = Gram::new(count, scale, |back| y[back]).weights(0, count)?;
+    Some((0..scale.len()).map(|i| gamma[..count].iter().zip(y).map(|(g, y)| g * y[i]).sum()).collect())
 }
 
-/// γ of (1), from the normal equations G c = 1, γ = c / Σ c, slightly regularised.
-fn weights(u: &[Vec<f64>]) -> Option<Vec<f64>> {
-    let m = u.len();
-    let mut gram = vec![0.0; m * m];
-    for i in 0..m {
-        for j in 0..m {
-            gram[i * m + j] = crate::linalg::dot(&u[i], &u[j]);
+/// γ of (1); those beyond m are 0.
+type Weights = [f64; MOST_TERMS + 2];
+
+/// Inner products of the differences uⱼ.
+struct Gram([[f64; MOST_TERMS + 2]; MOST_TERMS + 2]);
+
+impl Gram {
+    /// Of `count` differences, at most m + 2, of `count` + 1 iterates, y(0) being the newest.
+    fn new<'a>(count: usize, scale: &[f64], y: impl Fn(usize) -> &'a [f64]) -> Gram {
+        let mut gram = [[0.0; MOST_TERMS + 2]; MOST_TERMS + 2];
+        let mut u = [0.0; MOST_TERMS + 2];
+        for i in 0..scale.len() {
+            for (j, u) in u[..count].iter_mut().enumerate() {
+                *u = (y(j)[i] - y(j + 1)[i]) / scale[i];
+            }
+            for j in 0..count {
+                (0..=j).for_each(|k| gram[j][k] += u[j] * u[k]);
+            }
         }
+        Gram(gram)
     }
-    let trace: f64 = (0..m).map(|i| gram[i * m + i]).sum();
-    (0..m).for_each(|i| gram[i * m + i] += 1e-14 * trace);
-    let mut pivots = vec![0; m];
-    lu::factorise(&mut gram, m, &mut pivots).ok()?;
-    let mut c = vec![1.0; m];
-    lu::solve(&gram, m, &pivots, &mut c, 1);
-    let sum: f64 = c.iter().sum();
-    (sum.is_finite() && sum != 0.0).then(|| c.iter().map(|c| c / sum).collect())
+
+    /// γ of (1) for the m differences from number `from` on, from the normal equations G c = 1, γ = c / Σ c, slightly
+    /// regularised.
+    fn weights(&self, from: usize, m: usize) -> Option<Weights> {
+        let mut gram = [0.0; (MOST_TERMS + 2) * (MOST_TERMS + 2)];
+        for i in 0..m {
+            for j in 0..m {
+                gram[i * m + j] = self.0[from + i.max(j)][from + i.min(j)];
+            }
+        }
+        let trace: f64 = (0..m).map(|i| gram[i * m + i]).sum();
+        (0..m).for_each(|i| gram[i * m + i] += 1e-14 * trace);
+        let mut pivots = [0; MOST_TERMS + 2];
+        lu::factorise(&mut gram[..m * m], m, &mut pivots[..m]).ok()?;
+        let mut c = [0.0; MOST_TERMS + 2];
+        c[..m].fill(1.0);
+        lu::solve(&gram[..m * m], m, &pivots[..m], &mut c[..m], 1);
+        let sum: f64 = c.iter().sum();
+        (sum.is_finite() && sum != 0.0).then(|| c.map(|c| c / sum))
+    }
 }
 
 #[cfg(test)]

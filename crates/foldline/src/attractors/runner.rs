@@ -141,7 +141,7 @@ impl Runner {
             return;
         }
         let Some(prediction) = returns.closest(&self.extent) else { return };
-        let Prediction { state, period, size, doubt } = prediction;
+        let Prediction { state, period, size, doubt, .. } = prediction;
         // Another number of crossings per period begins anew.
         if self.seen.last().is_some_and(|(known, _)| (period - known).abs() > 0.02 * known) {
             self.seen.clear();

@@ -7,8 +7,8 @@
 use super::Candidate;
 use super::candidate::Context;
 use super::orbit::Orbit;
-use super::returns::Returns;
-use crate::contract::{Batch, Parameters, Verdict};
+use super::returns::{Prediction, Returns};
+use crate::contract::Verdict;
 use crate::diagram::Solution;
 use crate::simulation::Step;
 
@@ -31,6 +31,8 @@ const ARRIVED: f64 = 3e-3;
 const NEIGHBOURHOOD: f64 = 0.1;
 /// … if it is this much closer to the solution than the trajectory is.
 const HIT: f64 = 0.1;
+/// Returns after which a predicted limit must still be the same to be followed.
+const PATIENCE: usize = 8;
 /// How far from the candidate a polished solution may lie.
 const FAITHFUL: f64 = 0.1;
 
@@ -50,6 +52,8 @@ pub(super) struct Watch {
     section_ends: usize,
     section_life: usize,
     next_attempt: usize,
+    /// A limit that is followed if it is still predicted at the next attempt.
+    expected: Option<Prediction>,
     approach: Approach,
 }
 
@@ -66,6 +70,7 @@ impl Watch {
             section_ends: 0,
             section_life: FIRST_SECTION,
             next_attempt: 0,
+            expected: None,
             approach: Approach::default(),
         }
     }
@@ -113,15 +118,13 @@ impl Watch {
             self.returns = Returns::across(x.to_vec(), &velocity, extent);
             self.section_ends = self.steps + self.section_life;
             self.section_life *= 2;
-            self.next_attempt = 0;
+            (self.next_attempt, self.expected) = (0, None);
         }
     }
 
     /// The mean of a window or its last state, whichever has the smaller f: a mean suits a spiral, the last state a node.
     fn closer_to_rest(&self, mean: Vec<f64>, step: &Step, x: &[f64], context: &Context) -> Vec<f64> {
-        let mut f = vec![0.0; x.len()];
-        let parameters = Parameters::Shared(context.parameters);
-        context.field.evaluate(Batch { lanes: 1, states: &mean, parameters }, &mut f);
+        let f = context.slope(&mean);
         let speed = |component: &dyn Fn(usize) -> f64| {
             (0..x.len()).map(|i| (component(i) / context.sampling.scales[i]).abs()).fold(0.0, f64::max)
         };
@@ -163,6 +166,9 @@ impl Watch {
                 self.next_attempt = self.returns.total() + 2;
                 return;
             }
+            if !self.lasts(&prediction, &extent) {
+                return;
+            }
             self.next_attempt = self.returns.total() + self.returns.total() / 2;
             let Some(candidate) = context.follow(&self.returns, &prediction, &extent) else { continue };
             if let Some(orbit) = context.polished(&candidate)
@@ -175,12 +181,26 @@ impl Watch {
         }
     }
 
-    /// The solution on which a predicted limit lies.
+    /// Whether the limit is the one that was predicted some returns ago. Where a motion of several frequencies fades, the
+    /// limit of each few returns is steady and yet moves on; that is seen at no cost, unlike by following it.
+    fn lasts(&mut self, prediction: &Prediction, extent: &[f64]) -> bool {
+        let lasts = self.expected.take().is_some_and(|expected| expected.agrees(prediction, extent));
+        if !lasts {
+            self.next_attempt = self.returns.total() + PATIENCE.max(2 * prediction.crossings);
+            self.expected = Some(prediction.clone());
+        }
+        lasts
+    }
+
+    /// The solution on which a predicted limit lies, and to which the trajectory has been coming closer. (The limit alone
+    /// does not tell: the mean over several turns that never become the same is a steady limit too.)
     fn predicted(&self, limit: &[f64], known: &[Orbit]) -> Option<usize> {
         let (_, last) = self.returns.last()?;
         known.iter().position(|orbit| {
             let here = orbit.distance(last);
-            here <= NEIGHBOURHOOD && orbit.distance(limit) <= HIT * here + ARRIVED
+            here <= NEIGHBOURHOOD
+                && orbit.distance(limit) <= HIT * here + ARRIVED
+                && self.returns.approach(|state| orbit.distance(state))
         })
     }
 }

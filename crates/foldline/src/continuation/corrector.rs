@@ -92,7 +92,8 @@ pub struct Plane {
     pub distance: f64,
 }
 
-/// Solves (1) from `u`; returns the size of the last update.
+/// Solves (1) from `u`, so far that what is left of the error is about a tenth of the tolerance (0.001 of it where there is
+/// no mesh); [`station`] does the rest.
 ///
 /// # Errors
 /// See [`Failure`].
@@ -102,8 +103,24 @@ pub fn correct(
     plane: &Plane,
     u: &mut [f64],
     cost: &mut Cost,
-) -> Result<f64, Failure> {
+) -> Result<(), Failure> {
+    correct_within(problem, settings, plane, f64::INFINITY, u, cost)
+}
+
+/// Like [`correct`], given up when the first update is longer than `reach`.
+///
+/// # Errors
+/// See [`Failure`].
+pub fn correct_within(
+    problem: &mut dyn ZeroProblem,
+    settings: &Settings,
+    plane: &Plane,
+    reach: f64,
+    u: &mut [f64],
+    cost: &mut Cost,
+) -> Result<(), Failure> {
     let size = problem.unknowns();
+    let goal = settings.closeness(&problem.mesh());
     let (mut r, mut du, mut gap) = (vec![0.0; size], vec![0.0; size], vec![0.0; size]);
     let mut sizes: Vec<f64> = Vec::new();
     let mut fresh = true;
@@ -123,15 +140,27 @@ pub fn correct(
         if !length.is_finite() {
             return Err(Failure::NotFinite);
         }
+        if iteration == 0 && reach.is_finite() {
+            let miss = problem.dot(&du, &du).sqrt();
+            if miss > reach {
+                return Err(Failure::Elsewhere { angle: 0.0, miss: miss / plane.distance.abs() });
+            }
+        }
         sizes.push(length);
         u.iter_mut().zip(&du).for_each(|(a, b)| *a -= b);
-        if length < settings.newton_tolerance() {
-            return Ok(length);
-        }
         let ratio = if iteration > 0 { length / sizes[iteration - 1] } else { 1.0 };
+        // What is left after this update: with a new matrix its square, with one that was kept it shrinks as before.
+        let left = match iteration {
+            0 => CURVED * length * length,
+            _ if fresh => length * ratio.min(1.0).powi(2).max(CURVED * length),
+            _ => length * ratio.min(1.0),
+        };
+        if left.min(length) < goal {
+            return Ok(());
+        }
         // Next to a branch point the matrix is nearly singular, and rounding ends the descent a little earlier.
         if fresh && iteration > 1 && ratio > 0.3 && length < 0.1 * settings.tolerance {
-            return Ok(length);
+            return Ok(());
         }
         // A matrix that was kept may be at fault; with a new one there is no excuse.
         let worse = (iteration > 1 && ratio > 0.9) || (iteration > 0 && ratio > 4.0);
@@ -144,22 +173,49 @@ pub fn correct(
     Err(Failure::NoConvergence(sizes))
 }
 
-/// A station at the converged point `u`: tangent (2), stability, error estimates. `along` is a vector with which the
-/// tangent shall make an acute angle; `direction` is +1 where travel is towards larger positions, else -1.
+/// Error after the first Newton step, over the square of the error before, that is reckoned with.
+const CURVED: f64 = 10.0;
+
+/// Ends Newton's method at `u` with a matrix that belongs to the result: the last update is no larger than `close`. Returns
+/// the tangent (2); `along` is a vector with which it shall make an acute angle.
 ///
 /// # Errors
 /// See [`Failure`].
-pub fn station(
+pub fn arrive(
     problem: &mut dyn ZeroProblem,
-    u: Vec<f64>,
+    u: &mut [f64],
     along: &[f64],
-    direction: f64,
+    close: f64,
     cost: &mut Cost,
-) -> Result<Station, Failure> {
+) -> Result<Vec<f64>, Failure> {
     let size = problem.unknowns();
-    problem.anchor(&u);
-    problem.factorise(&u, along).map_err(|_| Failure::Singular)?;
-    cost.factorisations += 1;
+    problem.anchor(u);
+    let (mut r, mut du) = (vec![0.0; size], vec![0.0; size]);
+    let mut sizes: Vec<f64> = Vec::new();
+    loop {
+        if !problem.residual(u, &mut r) {
+            return Err(Failure::NotFinite);
+        }
+        r[size - 1] = 0.0;
+        problem.factorise(u, along).map_err(|_| Failure::Singular)?;
+        cost.factorisations += 1;
+        cost.newton += 1;
+        problem.solve(&r, &mut du);
+        let length = problem.relative_size(&du, u);
+        if !length.is_finite() {
+            return Err(Failure::NotFinite);
+        }
+        let stalls = sizes.last().is_some_and(|before| length > 0.3 * before);
+        sizes.push(length);
+        u.iter_mut().zip(&du).for_each(|(a, b)| *a -= b);
+        // Next to a singular matrix rounding ends the descent earlier.
+        if length < close || (stalls && length < 100.0 * close) {
+            break;
+        }
+        if stalls || sizes.len() > 5 {
+            return Err(Failure::NoConvergence(sizes));
+        }
+    }
     let mut last = vec![0.0; size];
     last[size - 1] = 1.0;
     let mut tangent = vec![0.0; size];
@@ -169,10 +225,34 @@ pub fn station(
         return Err(Failure::Singular);
     }
     tangent.iter_mut().for_each(|t| *t /= norm);
+    Ok(tangent)
+}
+
+/// A station next to `u`, which is nearly converged, in the hyperplane through it across `along`: tangent (2), stability,
+/// error estimates. The tangent makes an acute angle with `along`; `direction` is +1 where travel is towards larger
+/// positions, else -1.
+///
+/// # Errors
+/// See [`Failure`].
+pub fn station(
+    problem: &mut dyn ZeroProblem,
+    settings: &Settings,
+    mut u: Vec<f64>,
+    along: &[f64],
+    direction: f64,
+    cost: &mut Cost,
+) -> Result<Station, Failure> {
+    let close = settings.closeness(&problem.mesh());
+    let tangent = arrive(problem, &mut u, along, close, cost)?;
+    Ok(examined(problem, u, tangent, direction))
+}
+
+/// The station at `u`, for which the problem was factorised last.
+pub fn examined(problem: &mut dyn ZeroProblem, u: Vec<f64>, tangent: Vec<f64>, direction: f64) -> Station {
     let examination = problem.examine(&u);
     let stored: Vec<f64> = tangent.iter().map(|t| direction * t).collect();
     let point = problem.point(&u, &stored, examination);
-    Ok(Station { point, u, tangent, mesh: problem.mesh(), roomier: None })
+    Station { point, u, tangent, mesh: problem.mesh(), roomier: None }
 }
 
 /// A multiplier closer to the unit circle than this many defects might lie on its other side …
@@ -180,20 +260,35 @@ const CERTAIN: f64 = 20.0;
 /// … and is computed once more with the tolerance multiplied by this.
 const TIGHTER: f64 = 0.05;
 
-/// Corrects `u` in `plane` and adapts the mesh until the error estimate meets the tolerance, and both defects of the
-/// multipliers five times that. The problem is left on the mesh of the result and anchored there.
+/// Corrects `u` in `plane` and [`refine`]s it.
 ///
 /// # Errors
 /// See [`Failure`].
 pub fn settle(
     problem: &mut dyn ZeroProblem,
     settings: &Settings,
-    mut plane: Plane,
+    plane: Plane,
     mut u: Vec<f64>,
     direction: f64,
     cost: &mut Cost,
 ) -> Result<Station, Failure> {
     correct(problem, settings, &plane, &mut u, cost)?;
+    refine(problem, settings, plane.row, u, direction, cost)
+}
+
+/// Adapts the mesh at `u`, which has been corrected, until the error estimate meets the tolerance, and both defects of the
+/// multipliers five times that. The problem is left on the mesh of the result and anchored there.
+///
+/// # Errors
+/// See [`Failure`].
+pub fn refine(
+    problem: &mut dyn ZeroProblem,
+    settings: &Settings,
+    mut row: Vec<f64>,
+    mut u: Vec<f64>,
+    direction: f64,
+    cost: &mut Cost,
+) -> Result<Station, Failure> {
     let (mut tolerance, mut tightened) = (settings.tolerance, false);
     for round in 0..4 {
         for attempt in 0..10 {
@@ -203,14 +298,13 @@ pub fn settle(
             let from = problem.mesh();
             // The hyperplane through the point itself, so that remeshing does not move it along the curve.
             u = problem.transfer(&u, &from, &better);
-            plane.row = problem.transfer(&plane.row, &from, &better);
+            row = problem.transfer(&row, &from, &better);
             problem.set_mesh(&better);
             problem.anchor(&u);
-            plane.base = u.clone();
-            plane.distance = 0.0;
+            let plane = Plane { row: row.clone(), base: u.clone(), distance: 0.0 };
             correct(problem, settings, &plane, &mut u, cost)?;
         }
-        let mut found = station(problem, u, &plane.row, direction, cost)?;
+        let mut found = station(problem, settings, u, &row, direction, cost)?;
         let trust = found.point.trust;
         let defect = trust.trivial_defect.max(trust.liouville_defect);
         // Multipliers can need a finer mesh than the profile. Where they do not get better with it, the defects say so.

@@ -5,7 +5,7 @@
 //! next step.
 
 use super::Settings;
-use super::corrector::{Failure, Plane, Station, correct, settle, station};
+use super::corrector::{Failure, Plane, Station, correct, refine, station};
 use super::inspect::{Found, History};
 use crate::contract::{Monitor, Verdict, ZeroProblem};
 use crate::diagram::{Cost, Ending, Kind, Mesh, Point, SpecialPoint};
@@ -44,10 +44,18 @@ pub(super) struct Step {
 
 /// What the point before the current one contributes: its tangent for the predictor, its monitors for the inspection.
 struct Trail {
+    u: Vec<f64>,
     tangent: Vec<f64>,
     mesh: Mesh,
+    /// Arclength between the two points.
+    length: f64,
+    /// Angle between their tangents, per arclength.
+    curvature: f64,
     history: History,
 }
+
+/// Steps longer than this many of the one before are predicted from the tangents alone.
+const FARTHEST: f64 = 2.5;
 
 /// Steps shorter than this many tolerances begin and end on the same mesh: two meshes agree to the tolerance only.
 const SHORT: f64 = 200.0;
@@ -100,7 +108,11 @@ pub fn follow(
                 Err(why) => {
                     cost.rejected += 1;
                     remeshed = 0;
-                    step *= if why == Failure::Unexplained { 0.25 } else { 0.5 };
+                    step *= match why {
+                        Failure::Unexplained => 0.25,
+                        Failure::Elsewhere { angle, .. } => (walk.settings.target_angle / angle).clamp(0.2, 0.5),
+                        _ => 0.5,
+                    };
                     if step < walk.settings.min_step {
                         return ended_by(why, left.parameter());
                     }
@@ -112,7 +124,9 @@ pub fn follow(
             _ => found,
         };
         let (angle, length) = walk.angle(&left, &right);
-        let factor = (walk.settings.target_angle / angle.max(1e-12)).clamp(0.3, 2.0);
+        // A bend that has become sharper will go on so.
+        let trend = trail.as_ref().map_or(1.0, |t| angle / (length * t.curvature).max(1e-12)).clamp(1.0, 2.0);
+        let factor = (walk.settings.target_angle / (trend * angle).max(1e-12)).clamp(0.3, 2.0);
         step = (length * factor).clamp(walk.settings.min_step, walk.settings.max_step);
         let sideways = if walk.direction > 0.0 { 0 } else { -1 };
         for item in found {
@@ -188,7 +202,10 @@ impl Follow<'_> {
         let gap: Vec<f64> = u.iter().zip(&before.u).map(|(a, b)| a - b).collect();
         let distance = self.problem.dot(&before.tangent, &gap).abs().max(f64::MIN_POSITIVE);
         let history = History { distance, values: self.monitored(before) };
-        Trail { tangent: before.tangent.clone(), mesh: before.mesh.clone(), history }
+        let (angle, _) = self.angle(before, now);
+        let length = self.problem.dot(&gap, &gap).sqrt().max(distance) * (1.0 + angle * angle / 24.0);
+        let (u, tangent) = (before.u.clone(), before.tangent.clone());
+        Trail { u, tangent, mesh: before.mesh.clone(), length, curvature: angle / length, history }
     }
 
     /// Moves the working copy of a station to a mesh with room for the next step, where its own has none left. The stored
@@ -203,7 +220,7 @@ impl Follow<'_> {
             let plane = Plane { row: left.tangent.clone(), base: left.u.clone(), distance: 0.0 };
             let (mut u, mut cost) = (left.u.clone(), Cost::default());
             let corrected = correct(self.problem, self.settings, &plane, &mut u, &mut cost)
-                .and_then(|_| station(self.problem, u, &plane.row, self.direction, &mut cost));
+                .and_then(|()| station(self.problem, self.settings, u, &plane.row, self.direction, &mut cost));
             if let Ok(found) = corrected {
                 (left.u, left.tangent) = (found.u, found.tangent);
             }
@@ -221,6 +238,29 @@ impl Follow<'_> {
         (cosine.clamp(-1.0, 1.0).acos(), self.problem.dot(&left.tangent, &gap))
     }
 
+    /// The point at distance `step`: on the cubic through the last two points with their tangents.
+    fn predicted(&mut self, left: &Station, trail: Option<&Trail>, step: f64) -> Vec<f64> {
+        self.place(left);
+        let mut guess: Vec<f64> = left.u.iter().zip(&left.tangent).map(|(u, t)| u + step * t).collect();
+        let Some(trail) = trail else { return guess };
+        let (d, x) = (trail.length, step / trail.length);
+        let then = self.problem.transfer(&trail.tangent, &trail.mesh, &left.mesh);
+        if x > FARTHEST {
+            let bend = 0.5 * step * step / d.max(0.2 * step);
+            (0..guess.len()).for_each(|i| guess[i] += bend * (left.tangent[i] - then[i]));
+        } else {
+            let before = self.problem.transfer(&trail.u, &trail.mesh, &left.mesh);
+            for i in 0..guess.len() {
+                let (chord, turn) = (before[i] - left.u[i] + d * left.tangent[i], d * (then[i] - left.tangent[i]));
+                guess[i] += x * x * ((3.0 * chord + turn) + x * (2.0 * chord + turn));
+            }
+        }
+        let gap: Vec<f64> = guess.iter().zip(&left.u).map(|(a, b)| a - b).collect();
+        let off = step - self.problem.dot(&left.tangent, &gap);
+        guess.iter_mut().zip(&left.tangent).for_each(|(g, t)| *g += off * t);
+        guess
+    }
+
     fn attempt(
         &mut self,
         left: &Station,
@@ -229,18 +269,9 @@ impl Follow<'_> {
         emitted: usize,
         cost: &mut Cost,
     ) -> Result<Step, Failure> {
-        self.place(left);
-        let mut guess: Vec<f64> = left.u.iter().zip(&left.tangent).map(|(u, t)| u + step * t).collect();
-        if let Some(trail) = trail {
-            let before = self.problem.transfer(&trail.tangent, &trail.mesh, &left.mesh);
-            let bend = 0.5 * step * step / trail.history.distance.max(0.2 * step);
-            guess
-                .iter_mut()
-                .zip(left.tangent.iter().zip(&before))
-                .for_each(|(g, (now, then))| *g += bend * (now - then));
-        }
-        let plane = Plane { row: left.tangent.clone(), base: left.u.clone(), distance: step };
-        let mut right = settle(self.problem, self.settings, plane, guess.clone(), self.direction, cost)?;
+        let guess = self.predicted(left, trail, step);
+        let u = self.corrected(left, &guess, step, cost)?;
+        let mut right = refine(self.problem, self.settings, left.tangent.clone(), u, self.direction, cost)?;
         if right.mesh != left.mesh && step < SHORT * self.settings.tolerance {
             return Err(Failure::Remeshed(right.mesh));
         }

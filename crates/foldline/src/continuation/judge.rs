@@ -4,7 +4,7 @@
 //! prediction was far off, if the chord points elsewhere than both tangents, or, where branches crowd, if the same step
 //! backwards leads elsewhere.
 
-use super::corrector::{Failure, Plane, Station, correct};
+use super::corrector::{Failure, Plane, Station, correct, correct_within};
 use super::follow::Follow;
 use crate::diagram::Cost;
 
@@ -12,12 +12,42 @@ use crate::diagram::Cost;
 const CROWDED: f64 = 0.02;
 /// How many tolerances off a step may lead back; more is another branch.
 const BACK: f64 = 100.0;
+/// How far off a prediction may be, as a share of the step …
+const MISS: f64 = 0.3;
+/// … and by the first Newton update, which is not the last word.
+const FAR: f64 = 0.6;
 /// Angles of the chord with both tangents: their sum may exceed the angle between the tangents by this factor …
 const CHORD_FACTOR: f64 = 1.5;
 /// … and this much. On an arc the two are equal; on a jump to another branch the chord points elsewhere.
 const CHORD_SLACK: f64 = 0.08;
 
 impl Follow<'_> {
+    /// Corrects `guess` at distance `step` from `left`, on its mesh, and gives up as soon as it is clear that the result does
+    /// not continue the branch; what [`Follow::continues`] asks is looked at here with a little slack, before mesh and
+    /// stability are seen to.
+    pub(super) fn corrected(
+        &mut self,
+        left: &Station,
+        guess: &[f64],
+        step: f64,
+        cost: &mut Cost,
+    ) -> Result<Vec<f64>, Failure> {
+        let plane = Plane { row: left.tangent.clone(), base: left.u.clone(), distance: step };
+        let mut u = guess.to_vec();
+        correct_within(self.problem, self.settings, &plane, FAR * step, &mut u, cost)?;
+        let miss: Vec<f64> = u.iter().zip(guess).map(|(a, b)| a - b).collect();
+        let miss = self.problem.dot(&miss, &miss).sqrt() / step;
+        let (mut last, mut tangent) = (vec![0.0; u.len()], vec![0.0; u.len()]);
+        last[u.len() - 1] = 1.0;
+        self.problem.solve(&last, &mut tangent);
+        // ⟨c, τ⟩ = 1 and |c| = 1.
+        let angle = (1.0 / self.problem.dot(&tangent, &tangent).sqrt()).clamp(-1.0, 1.0).acos();
+        if angle > 1.1 * self.settings.max_angle || miss > 1.1 * MISS {
+            return Err(Failure::Elsewhere { angle, miss });
+        }
+        Ok(u)
+    }
+
     /// Whether `right`, predicted as `guess`, continues the branch at `left`, and neither turns too far nor lies on another
     /// one.
     pub(super) fn continues(&mut self, left: &Station, right: &Station, guess: &[f64]) -> Result<(), Failure> {
@@ -29,7 +59,7 @@ impl Follow<'_> {
         let size = |v: &[f64]| self.problem.dot(v, v).sqrt();
         let against = |t: &[f64]| (self.problem.dot(t, &chord) / (size(t) * size(&chord))).clamp(-1.0, 1.0).acos();
         let (miss, bent) = (size(&miss), against(&left.tangent) + against(&tangent));
-        if angle > self.settings.max_angle || miss > 0.3 * length || bent > CHORD_FACTOR * angle + CHORD_SLACK {
+        if angle > self.settings.max_angle || miss > MISS * length || bent > CHORD_FACTOR * angle + CHORD_SLACK {
             return Err(Failure::Elsewhere { angle, miss: miss / length });
         }
         Ok(())
@@ -40,21 +70,20 @@ impl Follow<'_> {
         if self.problem.margin(&left.point).min(self.problem.margin(&right.point)) > CROWDED {
             return Ok(());
         }
-        self.place(right);
-        let home = self.problem.transfer(&left.u, &left.mesh, &right.mesh);
-        let before = self.problem.transfer(&left.tangent, &left.mesh, &right.mesh);
-        let gap: Vec<f64> = home.iter().zip(&right.u).map(|(a, b)| a - b).collect();
-        let distance = self.problem.dot(&right.tangent, &gap);
-        let mut back: Vec<f64> = (0..home.len())
-            .map(|i| {
-                let bend = 0.5 * distance * (before[i] - right.tangent[i]);
-                right.u[i] + distance * right.tangent[i] + bend
-            })
+        // On the mesh of the left end that is a solution itself; on that of the right one it need not be anything.
+        self.problem.set_mesh(&left.mesh);
+        let from = self.problem.transfer(&right.u, &right.mesh, &left.mesh);
+        let tangent = self.problem.transfer(&right.tangent, &right.mesh, &left.mesh);
+        self.problem.anchor(&from);
+        let gap: Vec<f64> = left.u.iter().zip(&from).map(|(a, b)| a - b).collect();
+        let distance = self.problem.dot(&tangent, &gap);
+        let mut back: Vec<f64> = (0..from.len())
+            .map(|i| from[i] + distance * (tangent[i] + 0.5 * (left.tangent[i] - tangent[i])))
             .collect();
-        let plane = Plane { row: right.tangent.clone(), base: right.u.clone(), distance };
+        let plane = Plane { row: tangent, base: from, distance };
         correct(self.problem, self.settings, &plane, &mut back, cost)?;
-        let miss: Vec<f64> = back.iter().zip(&home).map(|(a, b)| a - b).collect();
-        let miss = self.problem.relative_size(&miss, &home);
+        let miss: Vec<f64> = back.iter().zip(&left.u).map(|(a, b)| a - b).collect();
+        let miss = self.problem.relative_size(&miss, &left.u);
         if miss > BACK * self.settings.tolerance {
             return Err(Failure::Elsewhere { angle: 0.0, miss: miss / distance.abs() });
         }

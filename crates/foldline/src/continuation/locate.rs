@@ -6,10 +6,10 @@
 //!
 //! **Source.** chandrupatla1997 (bracketing with inverse quadratic interpolation and bisection).
 
-use super::corrector::{Plane, Station, correct, parameter_row, settle, station};
+use super::corrector::{Plane, Station, arrive, correct, examined, parameter_row, settle};
 use super::{Failure, Settings};
-use crate::contract::{Monitor, ZeroProblem};
-use crate::diagram::{Cost, Point};
+use crate::contract::{Examination, Monitor, ZeroProblem};
+use crate::diagram::{Cost, Kind, Point};
 
 /// Share of the larger value at the ends that a monitor keeps at a change of sign if it jumps there instead of vanishing.
 const JUMP: f64 = 0.05;
@@ -63,12 +63,65 @@ impl<'s> Stretch<'s> {
         s: f64,
         cost: &mut Cost,
     ) -> Result<Station, Failure> {
+        let (u, tangent) = self.arrived(problem, settings, s, cost)?;
+        Ok(examined(problem, u, tangent, self.direction))
+    }
+
+    /// Unknowns and tangent there.
+    fn arrived(
+        &self,
+        problem: &mut dyn ZeroProblem,
+        settings: &Settings,
+        s: f64,
+        cost: &mut Cost,
+    ) -> Result<(Vec<f64>, Vec<f64>), Failure> {
+        let mut u = self.corrected(problem, settings, s, cost)?;
+        let close = settings.closeness(&self.left.mesh);
+        let tangent = arrive(problem, &mut u, &self.left.tangent, close, cost)?;
+        Ok((u, tangent))
+    }
+
+    /// Unknowns at distance s on the mesh of the left station, nearly converged.
+    ///
+    /// # Errors
+    /// See [`Failure`].
+    pub(super) fn corrected(
+        &self,
+        problem: &mut dyn ZeroProblem,
+        settings: &Settings,
+        s: f64,
+        cost: &mut Cost,
+    ) -> Result<Vec<f64>, Failure> {
         problem.set_mesh(&self.left.mesh);
         problem.anchor(&self.left.u);
-        let mut u = self.hermite(s);
+        let mut u = self.predicted(problem, s);
         let plane = Plane { row: self.left.tangent.clone(), base: self.left.u.clone(), distance: s };
         correct(problem, settings, &plane, &mut u, cost)?;
-        station(problem, u, &self.left.tangent, self.direction, cost)
+        Ok(u)
+    }
+
+    /// The cubic between the stations, in the hyperplane at distance s.
+    fn predicted(&self, problem: &dyn ZeroProblem, s: f64) -> Vec<f64> {
+        let mut u = self.hermite(s);
+        let gap: Vec<f64> = u.iter().zip(&self.left.u).map(|(a, b)| a - b).collect();
+        let off = s - problem.dot(&self.left.tangent, &gap);
+        crate::linalg::axpy(off, &self.left.tangent, &mut u);
+        u
+    }
+
+    /// The distance at which the cubic between the two stations turns back in the continuation parameter.
+    fn turning(&self) -> f64 {
+        let last = self.left.u.len() - 1;
+        let rise = |x: f64| {
+            let h = 1e-4 * self.length;
+            self.hermite_component(x * self.length + h, last) - self.hermite_component(x * self.length - h, last)
+        };
+        let (mut low, mut high) = (0.0, 1.0);
+        for _ in 0..30 {
+            let middle = 0.5 * (low + high);
+            if (rise(middle) > 0.0) == (rise(0.0) > 0.0) { low = middle } else { high = middle }
+        }
+        0.5 * (low + high)
     }
 
     /// The distance at which the cubic between the two stations has that value of the continuation parameter.
@@ -165,32 +218,46 @@ pub fn locate(
     cost: &mut Cost,
 ) -> Result<Located, Failure> {
     let reference = &stretch.left.point;
-    let mut evaluate =
-        |s: f64| stretch.at(problem, settings, s, cost).map(|found| (monitor.value(reference, &found.point), found));
-    let resolution = if stretch.left.mesh.is_empty() { 1e-9 } else { 1e-3 };
-    let (distance, mut coarse) = chandrupatla(&mut evaluate, [0.0, stretch.length], values, resolution)?;
+    let mut evaluate = |s: f64| {
+        let (u, tangent) = stretch.arrived(problem, settings, s, cost)?;
+        let found = seen_by(monitor, problem, u, tangent, stretch.direction);
+        Ok((monitor.value(reference, &found.point), found))
+    };
+    let resolution = if stretch.left.mesh.is_empty() { 1e-9 } else { 1e-2 };
+    let first = match monitor.kind() {
+        Kind::Fold => stretch.turning(),
+        _ => values[0] / (values[0] - values[1]),
+    };
+    let (distance, mut coarse, rise) =
+        chandrupatla(&mut evaluate, [0.0, stretch.length], values, first, [resolution, 0.5 * JUMP])?;
     // A change of sign without a zero: the two ends lie on different branches.
     let smallest = monitor.value(reference, &coarse.point).abs();
     if smallest > JUMP * values[0].abs().max(values[1].abs()) {
         return Err(Failure::Unexplained);
     }
     let floor = 10.0 * settings.newton_tolerance();
-    let (mut tolerance, mut slope) = (0.3 * settings.tolerance, None);
+    let (mut tolerance, mut slope) = (0.3 * settings.tolerance, rise);
+    if !monitor.possible(&coarse.point) {
+        return Ok(Located { distance, station: coarse, error: floor });
+    }
     // First a mesh that resolves this place, then one with every interval halved; if the two disagree by more than the
     // tolerance, the finer one is the starting point for another round.
     let mut known: Option<(Station, f64)> = None;
     for _ in 0..4 {
         for _ in 0..4 {
             let Some(better) = coarse.better(problem, tolerance) else { break };
-            coarse = relocate(problem, settings, stretch, monitor, &coarse, &better, &mut slope, cost)?;
+            (coarse, _) = relocate(problem, settings, stretch, monitor, &coarse, &better, &mut slope, cost)?;
         }
         problem.set_mesh(&coarse.mesh);
         let Some(finer) = problem.finer_mesh() else {
-            return Ok(Located { distance, station: coarse, error: floor });
+            // The last trial need not have been the best one.
+            let _ = problem.factorise(&coarse.u, &coarse.tangent);
+            let station = completed(monitor, problem, coarse, stretch.direction);
+            return Ok(Located { distance, station, error: floor });
         };
-        let fine = relocate(problem, settings, stretch, monitor, &coarse, &finer, &mut slope, cost)?;
+        let (fine, off) = relocate(problem, settings, stretch, monitor, &coarse, &finer, &mut slope, cost)?;
         let error =
-            floor + discrepancy(&coarse.point, &fine.point, coarse.parameter() - fine.parameter(), fine.parameter());
+            floor + off + discrepancy(&coarse.point, &fine.point, coarse.parameter() - fine.parameter(), fine.parameter());
         let improved = known.as_ref().is_none_or(|(_, e)| error < *e);
         if improved {
             known = Some((fine.clone(), error));
@@ -220,8 +287,29 @@ impl Station {
     /// A mesh on which this point would meet the tolerance, if its own does not. Belongs right after the station was made,
     /// while its factorisation is the last one.
     fn better(&self, problem: &mut dyn ZeroProblem, tolerance: f64) -> Option<crate::diagram::Mesh> {
-        (self.point.trust.discretisation > tolerance).then(|| problem.better_mesh(&self.u, tolerance)).flatten()
+        problem.better_mesh(&self.u, tolerance).filter(|better| 2 * better.len() >= self.mesh.len())
     }
+}
+
+/// The station at `u` for the eyes of a monitor: without spectrum, ranges and error estimate if it reads the tangent alone.
+fn seen_by(
+    monitor: &dyn Monitor,
+    problem: &mut dyn ZeroProblem,
+    u: Vec<f64>,
+    tangent: Vec<f64>,
+    direction: f64,
+) -> Station {
+    if monitor.reads_spectrum() {
+        return examined(problem, u, tangent, direction);
+    }
+    let stored: Vec<f64> = tangent.iter().map(|t| direction * t).collect();
+    let point = problem.point(&u, &stored, Examination::default());
+    Station { point, u, tangent, mesh: problem.mesh(), roomier: None }
+}
+
+/// The whole station, where only a part of it was [`seen_by`] the monitor; the problem was factorised there last.
+fn completed(monitor: &dyn Monitor, problem: &mut dyn ZeroProblem, found: Station, direction: f64) -> Station {
+    if monitor.reads_spectrum() { found } else { examined(problem, found.u, found.tangent, direction) }
 }
 
 /// The zero again on a finer mesh, by the secant method from the coarse one; `slope` is that of the monitor, if it is known
@@ -235,21 +323,21 @@ fn relocate(
     finer: &crate::diagram::Mesh,
     slope: &mut Option<f64>,
     cost: &mut Cost,
-) -> Result<Station, Failure> {
+) -> Result<(Station, f64), Failure> {
     problem.set_mesh(finer);
     let base = problem.transfer(&coarse.u, &coarse.mesh, finer);
     let row = problem.transfer(&coarse.tangent, &coarse.mesh, finer);
-    let mut at = |s: f64| -> Result<(f64, Station), Failure> {
+    let at = |problem: &mut dyn ZeroProblem, s: f64, cost: &mut Cost| -> Result<(f64, Station), Failure> {
         problem.anchor(&base);
         let mut u: Vec<f64> = base.iter().zip(&row).map(|(b, t)| b + s * t).collect();
-        correct(problem, settings, &Plane { row: row.clone(), base: base.clone(), distance: s }, &mut u, cost)?;
-        let found = station(problem, u, &row, stretch.direction, cost)?;
+        let tangent = arrive(problem, &mut u, &row, settings.newton_tolerance(), cost)?;
+        let found = seen_by(monitor, problem, u, tangent, stretch.direction);
         Ok((monitor.value(&stretch.left.point, &found.point), found))
     };
     // Far enough below the tolerance that the error of the iteration does not show.
-    let enough = 1e-3 * settings.tolerance;
+    let enough = 1e-2 * settings.tolerance;
     let reach = stretch.length.abs();
-    let (mut a, (mut ga, mut found)) = (0.0, at(0.0)?);
+    let (mut a, (mut ga, mut found)) = (0.0, at(problem, 0.0, cost)?);
     let mut step = match *slope {
         Some(slope) if (ga / slope).abs() < reach => -ga / slope,
         _ => 1e-2 * reach,
@@ -259,7 +347,7 @@ fn relocate(
     let mut other: Option<f64> = None;
     for round in 0..40 {
         if step.abs() < enough || !step.is_finite() {
-            return Ok(found);
+            return Ok((completed(monitor, problem, found, stretch.direction), step.abs()));
         }
         let mut b = a + step;
         match other {
@@ -271,7 +359,7 @@ fn relocate(
             }
             _ => {}
         }
-        let (gb, next) = at(b)?;
+        let (gb, next) = at(problem, b, cost)?;
         let rise = (gb - ga) / (b - a);
         step = -gb / rise;
         *slope = Some(rise);
@@ -280,23 +368,28 @@ fn relocate(
         }
         (a, ga, found) = (b, gb, next);
         if other.is_some_and(|o| (o - a).abs() < enough) {
-            return Ok(found);
+            return Ok((completed(monitor, problem, found, stretch.direction), enough));
         }
     }
     Err(Failure::NoConvergence(vec![step.abs()]))
 }
 
-/// Bracketing root finder; returns the place and what was found there.
+/// Bracketing root finder, with its first trial at the share `first` of the interval; returns the place, what was found
+/// there, and the slope of the function. It ends when the zero is closer than `resolution` of the interval by the secant
+/// and the value below `small` of the larger one at the ends, or when the bracket is a tenth of that.
 fn chandrupatla<T>(
     evaluate: &mut dyn FnMut(f64) -> Result<(f64, T), Failure>,
     [mut a, mut b]: [f64; 2],
     [mut fa, mut fb]: [f64; 2],
-    resolution: f64,
-) -> Result<(f64, T), Failure> {
+    first: f64,
+    [resolution, small]: [f64; 2],
+) -> Result<(f64, T, Option<f64>), Failure> {
     let (mut c, mut fc);
-    let width = (b - a).abs();
-    let mut t = (fa / (fa - fb)).clamp(0.02, 0.98);
+    let (width, largest) = ((b - a).abs(), fa.abs().max(fb.abs()));
+    let resolved = 0.1 * resolution;
+    let mut t = first.clamp(0.02, 0.98);
     let mut best: Option<(f64, f64, T)> = None;
+    let mut slope = None;
     for _ in 0..60 {
         let x = a + t * (b - a);
         let (fx, found) = evaluate(x)?;
@@ -312,7 +405,11 @@ fn chandrupatla<T>(
             (c, b, fc, fb) = (b, a, fb, fa);
         }
         (a, fa) = (x, fx);
-        if (b - a).abs() < resolution * width {
+        let (near, value) = if (c - a).abs() < (b - a).abs() { (c, fc) } else { (b, fb) };
+        let rise = (value - fa) / (near - a);
+        slope = Some(rise);
+        let close = (fa / rise).abs() < resolution * width && fa.abs() < small * largest;
+        if close || (b - a).abs() < resolved * width {
             break;
         }
         let (xi, phi) = ((a - b) / (c - b), (fa - fb) / (fc - fb));
@@ -321,14 +418,14 @@ fn chandrupatla<T>(
         } else {
             0.5
         };
-        let margin = 0.1 * resolution * width / (b - a).abs();
+        let margin = 0.1 * resolved * width / (b - a).abs();
         t = if t.is_finite() && margin < 0.5 { t.clamp(margin, 1.0 - margin) } else { 0.5 };
         // Two neighbouring trials that both sit on the zero to rounding: done.
         if fx.abs() < 1e-14 {
             break;
         }
     }
-    best.map(|(x, _, found)| (x, found)).ok_or(Failure::NotFinite)
+    best.map(|(x, _, found)| (x, found, slope)).ok_or(Failure::NotFinite)
 }
 
 #[cfg(test)]
@@ -347,7 +444,7 @@ mod tests {
                 count += 1;
                 Ok((f(x), x))
             };
-            let (x, _) = chandrupatla(&mut evaluate, [-1.0, 2.0], [f(-1.0), f(2.0)], 1e-9).unwrap();
+            let (x, ..) = chandrupatla(&mut evaluate, [-1.0, 2.0], [f(-1.0), f(2.0)], 0.5, [1e-8, 1.0]).unwrap();
             assert!((x - root).abs() < 1e-4 && count < 45, "{x} after {count}");
         }
     }

@@ -82,6 +82,12 @@ impl Settings {
         }
     }
 
+    /// How far from a point the matrix may be taken that gives its tangent and its multipliers, relative. Next to errors of
+    /// discretisation a tenth of the tolerance does not show; where there are none the iteration goes all the way.
+    pub fn closeness(&self, mesh: &crate::diagram::Mesh) -> f64 {
+        if mesh.is_empty() { self.newton_tolerance() } else { (0.1 * self.tolerance).max(1e-11) }
+    }
+
     /// Size of the last Newton update, relative: far enough below the tolerance that iteration errors do not show.
     pub fn newton_tolerance(&self) -> f64 {
         (1e-3 * self.tolerance).max(1e-11)

@@ -55,13 +55,7 @@ impl Cycle {
         let t = t - t.floor();
         let j = self.mesh.partition_point(|&b| b <= t).clamp(1, self.intervals()) - 1;
         let s = (t - self.mesh[j]) / (self.mesh[j + 1] - self.mesh[j]);
-        let weights = scheme.interpolation(s);
-        let base = j * (self.degree + 1) * n;
-        x.fill(0.0);
-        for (k, w) in weights.iter().enumerate() {
-            for i in 0..n {
-                x[i] += w * self.profile[base + k * n + i];
-            }
-        }
+        let block = (self.degree + 1) * n;
+        scheme.value_into(s, &self.profile[j * block..(j + 1) * block], x);
     }
 }

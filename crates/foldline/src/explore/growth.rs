@@ -160,10 +160,10 @@ pub(super) fn revived(
     let u = problem.unknowns_of(point);
     let tangent: Vec<f64> = point.tangent.iter().map(|t| direction * t).collect();
     problem.anchor(&u);
-    let mut found = station(problem, u, &tangent, direction, &mut Cost::default())?;
+    let mut found = station(problem, settings, u.clone(), &tangent, direction, &mut Cost::default())?;
     found.roomier = problem.better_mesh(&found.u, 0.5 * settings.tolerance);
     found.point = point.clone();
-    found.tangent = tangent;
+    (found.u, found.tangent) = (u, tangent);
     Ok(found)
 }
 

@@ -2,14 +2,15 @@
 
 use crate::diagram::Kind;
 
-/// Which attractor a seed means.
+/// Which attractor a seed means, among those reached until every type was found that the seeds with the same sample ask for
+/// ([`crate::attractors::survey_until`]).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum AttractorKey {
     /// The equilibrium of smallest norm.
     Equilibrium,
     /// The cycle that was reached most often.
     Cycle,
-    /// The cycle with this spectral ratio, such as 2:1.
+    /// The cycle with this spectral ratio, such as 2:1, that was reached most often.
     Ratio(u32, u32),
 }
 
@@ -31,7 +32,7 @@ pub struct SeedPlan {
     pub source: SeedSource,
     /// Every parameter value `[k]` at the seed.
     pub parameters: Vec<f64>,
-    /// How many initial states to sample.
+    /// How many initial states to sample at most.
     pub samples: usize,
     /// Seed of the random numbers.
     pub random: u64,

@@ -1,7 +1,8 @@
 //! Where first solutions come from.
 //!
 //! **Idea.** Attractors are found by sampling initial states ([`crate::attractors`]) and made accurate by the same
-//! collocation that follows them later. Seeds with the same parameters share one census.
+//! collocation that follows them later. Seeds with the same parameters share one census, which goes no further than it takes to
+//! find what they ask for.
 
 use super::System;
 use super::growth::{polished, problem_of, setting, settings};
@@ -14,6 +15,8 @@ use crate::diagram::{Cost, Cycle, Diagram, Point, Solution};
 use crate::linalg::max_abs;
 use crate::problem::equilibrium::EquilibriumProblem;
 use crate::problem::gauss::Scheme;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 /// The first solutions of a plan: one per seed, or why there is none.
 pub struct Seeds {
@@ -39,36 +42,67 @@ pub fn find(system: &System, plan: &Plan, jobs: usize, earlier: &Diagram, observ
         branches.chain(first_legs).any(|name| earlier.branch(&name).is_none_or(|known| known.points.is_empty()))
             || plan.sweeps.iter().any(|sweep| sweep.seed == seed && earlier.response_set(&sweep.name).is_none())
     };
-    let mut censuses: Vec<(&SeedPlan, Census)> = Vec::new();
-    let mut points = Vec::new();
-    for (index, seed) in plan.seeds.iter().enumerate() {
-        if !needed(index) {
-            points.push(Err("not needed".into()));
-            continue;
-        }
-        points.push(match &seed.source {
-            SeedSource::State(state) => {
-                from_state(system, seed, plan, state, jobs).map(|p| with_degree(p, plan.degree))
-            }
-            SeedSource::Attractor(key) => {
-                let same = |other: &SeedPlan| {
-                    other.parameters == seed.parameters && other.samples == seed.samples && other.random == seed.random
-                };
-                if !censuses.iter().any(|(other, _)| same(other)) {
-                    let census = attractors(system, &seed.parameters, seed.samples, seed.random, jobs, plan.tolerance);
-                    observer.observe(Event::Note(&seed.name, &summary(&census)));
-                    censuses.push((seed, census));
-                }
-                match censuses.iter().find(|(other, _)| same(other)) {
-                    Some((_, census)) => {
-                        chosen(census, key).map(|p| with_degree(p, plan.degree)).ok_or_else(|| missing(census, key))
-                    }
-                    None => Err("no census".into()),
-                }
-            }
-        });
+    let needed: Vec<bool> = (0..plan.seeds.len()).map(needed).collect();
+    let censuses = censuses(system, plan, jobs, &needed);
+    for (index, census) in &censuses {
+        observer.observe(Event::Note(&plan.seeds[*index].name, &summary(census)));
     }
-    Seeds { points }
+    let point = |(seed, needed): (&SeedPlan, bool)| match &seed.source {
+        _ if !needed => Err("not needed".into()),
+        SeedSource::State(state) => from_state(system, seed, plan, state, jobs).map(|p| with_degree(p, plan.degree)),
+        SeedSource::Attractor(key) => match censuses.iter().find(|(other, _)| share(&plan.seeds[*other], seed)) {
+            Some((_, census)) => {
+                chosen(census, key).map(|p| with_degree(p, plan.degree)).ok_or_else(|| missing(census, key))
+            }
+            None => Err("no census".into()),
+        },
+    };
+    Seeds { points: plan.seeds.iter().zip(needed.iter().copied()).map(point).collect() }
+}
+
+/// Whether two seeds share a census.
+fn share(a: &SeedPlan, b: &SeedPlan) -> bool {
+    a.parameters == b.parameters && a.samples == b.samples && a.random == b.random
+}
+
+/// The censuses of the seeds that are needed, each with the index of the first seed it is for. A census ends early once it has
+/// what all seeds of the plan ask for that share it, needed or not: what a seed means does not depend on earlier runs.
+fn censuses(system: &System, plan: &Plan, jobs: usize, needed: &[bool]) -> Vec<(usize, Census)> {
+    let mut first: Vec<usize> = Vec::new();
+    for (index, seed) in plan.seeds.iter().enumerate() {
+        let sampled = matches!(seed.source, SeedSource::Attractor(_));
+        if needed[index] && sampled && !first.iter().any(|other| share(&plan.seeds[*other], seed)) {
+            first.push(index);
+        }
+    }
+    let census = |index: usize, jobs: usize| {
+        let seed = &plan.seeds[index];
+        let keys = plan.seeds.iter().filter(|other| share(other, seed)).filter_map(|other| match &other.source {
+            SeedSource::Attractor(key) => Some(key),
+            SeedSource::State(_) => None,
+        });
+        let keys: Vec<&AttractorKey> = keys.collect();
+        let sampling = sampling(system, seed.samples, seed.random, jobs, plan.tolerance);
+        let polish = |candidate: &Candidate| polish(system, &seed.parameters, plan.tolerance, candidate);
+        attractors::survey_until(system.field, &seed.parameters, &sampling, &polish, &|reached| {
+            keys.iter().all(|key| reached.iter().any(|(point, ratio)| is_meant(key, point, *ratio)))
+        })
+    };
+    let (next, done) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
+    let threads = jobs.clamp(1, first.len().max(1));
+    let work = || {
+        while let Some(&index) = first.get(next.fetch_add(1, Ordering::Relaxed)) {
+            let census = census(index, jobs / threads);
+            done.lock().unwrap_or_else(PoisonError::into_inner).push((index, census));
+        }
+    };
+    match threads {
+        1 => work(),
+        _ => std::thread::scope(|scope| (0..threads).for_each(|_| drop(scope.spawn(work)))),
+    }
+    let mut done = done.into_inner().unwrap_or_else(PoisonError::into_inner);
+    done.sort_by_key(|(index, _)| *index);
+    done
 }
 
 /// Samples initial states, follows each to its attractor, and computes the attractors accurately.
@@ -242,20 +276,26 @@ fn from_state(system: &System, seed: &SeedPlan, plan: &Plan, state: &[f64], jobs
     })
 }
 
+/// Whether a solution is of the type that a key names.
+fn is_meant(key: &AttractorKey, point: &Point, ratio: Option<(u32, u32)>) -> bool {
+    match (key, &point.solution) {
+        (AttractorKey::Equilibrium, solution) => matches!(solution, Solution::Equilibrium(_)),
+        (AttractorKey::Cycle, solution) => matches!(solution, Solution::Cycle(_)),
+        (AttractorKey::Ratio(p, q), _) => ratio == Some((*p, *q)),
+    }
+}
+
+/// Of several the equilibrium of smallest norm, or the cycle reached most often.
 fn chosen(census: &Census, key: &AttractorKey) -> Option<Point> {
-    let is_cycle = |a: &&Attractor| matches!(a.point.solution, Solution::Cycle(_));
     let size = |a: &&Attractor| match &a.point.solution {
         Solution::Equilibrium(x) => crate::linalg::dot(x, x),
         Solution::Cycle(_) => f64::INFINITY,
     };
+    let meant = census.attractors.iter().filter(|a| is_meant(key, &a.point, a.ratio));
     let found = match key {
-        AttractorKey::Equilibrium => {
-            census.attractors.iter().filter(|a| !is_cycle(a)).min_by(|a, b| size(a).total_cmp(&size(b)))
-        }
-        AttractorKey::Cycle => census.attractors.iter().filter(is_cycle).max_by_key(|a| a.hits),
-        AttractorKey::Ratio(p, q) => {
-            census.attractors.iter().filter(|a| a.ratio == Some((*p, *q))).max_by_key(|a| a.hits)
-        }
+        AttractorKey::Equilibrium => meant.min_by(|a, b| size(a).total_cmp(&size(b))),
+        // They come by falling number of hits.
+        AttractorKey::Cycle | AttractorKey::Ratio(..) => meant.min_by_key(|a| std::cmp::Reverse(a.hits)),
     };
     found.map(|a| a.point.clone())
 }
@@ -276,6 +316,9 @@ fn summary(census: &Census) -> String {
     }
     if census.escaped > 0 {
         parts.push(format!("escaped ({})", census.escaped));
+    }
+    if census.left > 0 {
+        parts.push(format!("left when that was known ({})", census.left));
     }
     format!("attractors (samples that went there): {}", parts.join(", "))
 }

@@ -1,8 +1,9 @@
 //! The linear system of collocation: condensed per interval, then eliminated block by block with the border outside.
 //!
 //! **Idea.** On every interval the m·n interior unknowns depend only on the left end x_j and on a few scalars σ that are
-//! common to all intervals (period, parameters). Condensing them leaves a recurrence between interval ends, which is
-//! eliminated from left to right by orthogonal transformations, so that growing and decaying solutions are both safe.
+//! common to all intervals (period, parameters). Condensing them leaves a recurrence between interval ends: a chain. The
+//! intervals are dealt to the lanes in contiguous pieces, so that both condensation and elimination run in all lanes at once;
+//! a last, short chain connects the pieces.
 //!
 //! **Equations.** N intervals; unknowns x_j (n), X_j (m·n), σ (q):
 //!
@@ -13,81 +14,84 @@
 //!   (4)  Σ_j ⟨p_j, (x_j, X_j)⟩ + D σ = s                     border,     q rows
 //! ```
 //!
-//! Condensed: x_{j+1} = G_j x_j + g_j σ + h_j. Eliminating x_1 … x_{N-1} by QR of the stacked 2n×n blocks
+//! Condensed: x_{j+1} = G_j x_j + g_j σ + h_j, the links of a [`Chain`]. With W lanes and L = ⌈N / W⌉, interval j is in lane
+//! ⌊j / L⌋ at place j mod L; intervals beyond N have length zero, so that their ends coincide.
 //!
-//! ```text
-//!        x_j    x_{j+1}   x_0   σ                 x_j  x_{j+1}  x_0   σ
-//!      [  E        0       F    g  ]      Qᵀ    [  R      S      F'   g' ]
-//!      [ -G_j      1       0   -g_j ]    ---->  [  0      E      F    g  ]
-//! ```
-//!
-//! leaves n + q equations in (x_0, σ).
-//!
-//! **Source.** Condensation of parameters as in ascher1995, §7; the orthogonal elimination is the structured QR of
-//! ascher1995, §7.2.
+//! **Source.** Condensation of parameters as in ascher1995, §7; division into pieces as in wright1992.
 //!
 //! **Fails when** an interior block or the final matrix is singular to working precision.
 
-use super::{axpy, dot, lu, reflect};
+use super::chain::Chain;
+use super::lane::{Lane, add, dot, subtract};
+use super::{block, lu};
 use crate::contract::Singular;
 
 /// The system, its factorisation and room for both.
 #[derive(Clone, Debug, Default)]
-pub struct Condensed {
+pub struct Condensed<T> {
     n: usize,
     m: usize,
     q: usize,
     intervals: usize,
+    length: usize,
     closure: f64,
     end: Vec<f64>,
-    /// `[N][m·n × m·n]`: A_j, factorised in place.
-    pub interior: Vec<f64>,
-    /// `[N][m·n × (n + q)]`: (B_j, C_j), overwritten by A_j⁻¹(B_j, C_j).
-    pub coupling: Vec<f64>,
-    /// `[q][N · (m + 1) · n]`: border rows in the layout of the unknowns.
-    pub border: Vec<f64>,
+    /// `[L][m·n × m·n]`: A_j, factorised in place.
+    pub interior: Vec<T>,
+    /// `[L][m·n × (n + q)]`: (B_j, C_j), overwritten by A_j⁻¹(B_j, C_j).
+    pub coupling: Vec<T>,
+    /// `[q][L · (m + 1) · n]`: border rows.
+    pub border: Vec<T>,
     /// `[q × q]`: D.
     pub corner: Vec<f64>,
-    pivots: Vec<usize>,
-    step: Vec<f64>,
-    condensed_border: Vec<f64>,
-    reflectors: Vec<f64>,
-    upper: Vec<f64>,
-    multipliers: Vec<f64>,
+    pivots: Vec<u32>,
+    exchanged: Vec<bool>,
+    step: Vec<T>,
+    condensed_border: Vec<T>,
+    pieces: Chain<T>,
+    whole: Chain<f64>,
     last: Vec<f64>,
     last_pivots: Vec<usize>,
-    stack: Vec<f64>,
 }
 
-impl Condensed {
+impl<T: Lane> Condensed<T> {
     /// A system for dimension n, interval weights `end` (m + 1 of them), q scalars.
-    pub fn new(n: usize, end: &[f64], q: usize) -> Condensed {
+    pub fn new(n: usize, end: &[f64], q: usize) -> Condensed<T> {
         Condensed { n, m: end.len() - 1, q, closure: 1.0, end: end.to_vec(), ..Condensed::default() }
     }
 
     /// Makes room for that many intervals; the contents are then undefined.
     pub fn resize(&mut self, intervals: usize) {
         let (n, q, inner) = (self.n, self.q, self.m * self.n);
-        self.intervals = intervals;
-        self.interior.resize(intervals * inner * inner, 0.0);
-        self.coupling.resize(intervals * inner * (n + q), 0.0);
-        self.border.resize(q * intervals * (inner + n), 0.0);
+        let length = intervals.div_ceil(T::COUNT);
+        (self.intervals, self.length) = (intervals, length);
+        self.interior.resize(length * inner * inner, T::default());
+        self.coupling.resize(length * inner * (n + q), T::default());
+        self.border.resize(q * length * (inner + n), T::default());
         self.corner.resize(q * q, 0.0);
-        self.pivots.resize(intervals * inner, 0);
-        self.step.resize(intervals * n * (n + q), 0.0);
-        self.condensed_border.resize(intervals * q * n, 0.0);
-        self.reflectors.resize(intervals * n * 2 * n, 0.0);
-        self.upper.resize(intervals * n * (3 * n + q), 0.0);
-        self.multipliers.resize(intervals * q * n, 0.0);
+        self.pivots.resize(length * inner * T::COUNT, 0);
+        self.exchanged.resize(length, false);
+        self.step.resize(length * n * (n + q), T::default());
+        self.condensed_border.resize(length * q * n, T::default());
+        self.pieces.resize(n, q, length);
+        self.whole.resize(n, q, T::COUNT);
         self.last.resize((n + q) * (n + q), 0.0);
         self.last_pivots.resize(n + q, 0);
-        self.stack.resize(2 * n * (3 * n + q), 0.0);
     }
 
-    /// G_j and g_j side by side, `[n × (n + q)]`: how the right end of interval j follows from its left end and σ.
-    pub fn transition(&self, j: usize) -> &[f64] {
-        let size = self.n * (self.n + self.q);
-        &self.step[j * size..(j + 1) * size]
+    /// L, the places of each lane.
+    pub fn length(&self) -> usize {
+        self.length
+    }
+
+    /// Writes G_j, `[n × n]`: how the right end of interval j follows from its left end.
+    pub fn transition(&self, j: usize, to: &mut [f64]) {
+        let (n, width) = (self.n, self.n + self.q);
+        let (lane, place) = (j / self.length, j % self.length);
+        let step = &self.step[place * n * width..(place + 1) * n * width];
+        for (row, line) in to.chunks_exact_mut(n).zip(step.chunks_exact(width)) {
+            row.iter_mut().zip(line).for_each(|(x, g)| *x = g.lanes()[lane]);
+        }
     }
 
     /// Condenses every interval: `interior`, `coupling` and `border` must be filled.
@@ -95,28 +99,7 @@ impl Condensed {
     /// # Errors
     /// [`Singular`] if an interior block is.
     pub fn condense(&mut self) -> Result<(), Singular> {
-        let (n, m, q, inner) = (self.n, self.m, self.q, self.m * self.n);
-        let width = n + q;
-        for j in 0..self.intervals {
-            let a = &mut self.interior[j * inner * inner..(j + 1) * inner * inner];
-            let pivots = &mut self.pivots[j * inner..(j + 1) * inner];
-            lu::factorise(a, inner, pivots)?;
-            let w = &mut self.coupling[j * inner * width..(j + 1) * inner * width];
-            lu::solve(a, inner, pivots, w, width);
-            let step = &mut self.step[j * n * width..(j + 1) * n * width];
-            step.fill(0.0);
-            for i in 0..n {
-                step[i * width + i] = self.end[0];
-                for k in 0..m {
-                    axpy(
-                        -self.end[k + 1],
-                        &w[(k * n + i) * width..(k * n + i + 1) * width],
-                        &mut step[i * width..(i + 1) * width],
-                    );
-                }
-            }
-        }
-        Ok(())
+        T::dispatch(Condense(self))
     }
 
     /// Eliminates the interval ends after [`Condensed::condense`]; `closure` is κ of (3).
@@ -124,323 +107,449 @@ impl Condensed {
     /// # Errors
     /// [`Singular`] if the remaining matrix is.
     pub fn eliminate(&mut self, closure: f64) -> Result<(), Singular> {
-        let (n, q, inner) = (self.n, self.q, self.m * self.n);
-        let (width, full, count) = (n + q, 3 * n + q, self.intervals);
         self.closure = closure;
-        let mut corner = self.corner.clone();
-        for j in 0..count {
-            let w = &self.coupling[j * inner * width..(j + 1) * inner * width];
-            for c in 0..q {
-                let row = &self.border[(c * count + j) * (inner + n)..(c * count + j + 1) * (inner + n)];
-                let p = &mut self.condensed_border[(j * q + c) * n..(j * q + c + 1) * n];
-                p.copy_from_slice(&row[..n]);
-                for (weight, line) in row[n..].iter().zip(w.chunks_exact(width)) {
-                    if *weight != 0.0 {
-                        axpy(-weight, &line[..n], p);
-                        axpy(-weight, &line[n..], &mut corner[c * q..(c + 1) * q]);
-                    }
-                }
-            }
-        }
-        // Relation E x_j + F x_0 + g σ = h, begun with x_1 - G_0 x_0 - g_0 σ = h_0.
-        let mut relation = vec![0.0; n * (2 * n + q)];
-        for i in 0..n {
-            let line = &mut relation[i * (2 * n + q)..(i + 1) * (2 * n + q)];
-            line[i] = 1.0;
-            for c in 0..width {
-                line[n + c] = -self.step[i * width + c];
-            }
-        }
-        let mut first: Vec<f64> = self.condensed_border[..q * n].to_vec();
-        let mut current = vec![0.0; q * n];
-        for j in 1..count {
-            for c in 0..q * n {
-                current[c] += self.condensed_border[j * q * n + c];
-            }
-            let stack = &mut self.stack;
-            stack.fill(0.0);
-            for i in 0..n {
-                let top = &mut stack[i * full..(i + 1) * full];
-                let line = &relation[i * (2 * n + q)..(i + 1) * (2 * n + q)];
-                top[..n].copy_from_slice(&line[..n]);
-                top[2 * n..].copy_from_slice(&line[n..]);
-                let bottom = &mut stack[(n + i) * full..(n + i + 1) * full];
-                let g = &self.step[(j * n + i) * width..(j * n + i + 1) * width];
-                for c in 0..n {
-                    bottom[c] = -g[c];
-                }
-                bottom[n + i] = 1.0;
-                for c in 0..q {
-                    bottom[3 * n + c] = -g[n + c];
-                }
-            }
-            let v = &mut self.reflectors[j * n * 2 * n..(j + 1) * n * 2 * n];
-            reflect::triangularise(stack, 2 * n, full, n, v);
-            let upper = &mut self.upper[j * n * full..(j + 1) * n * full];
-            upper.copy_from_slice(&stack[..n * full]);
-            for i in 0..n {
-                if upper[i * full + i].abs().partial_cmp(&1e-300) != Some(std::cmp::Ordering::Greater) {
-                    return Err(Singular);
-                }
-                let line = &mut relation[i * (2 * n + q)..(i + 1) * (2 * n + q)];
-                let bottom = &stack[(n + i) * full..(n + i + 1) * full];
-                line.copy_from_slice(&bottom[n..]);
-            }
-            for c in 0..q {
-                let y = &mut self.multipliers[(j * q + c) * n..(j * q + c + 1) * n];
-                y.copy_from_slice(&current[c * n..(c + 1) * n]);
-                let next = &mut current[c * n..(c + 1) * n];
-                next.fill(0.0);
-                for i in 0..n {
-                    let line = &upper[i * full..(i + 1) * full];
-                    y[i] /= line[i];
-                    let yi = y[i];
-                    axpy(-yi, &line[i + 1..n], &mut y[i + 1..]);
-                    axpy(-yi, &line[n..2 * n], next);
-                    axpy(-yi, &line[2 * n..3 * n], &mut first[c * n..(c + 1) * n]);
-                    axpy(-yi, &line[3 * n..], &mut corner[c * q..(c + 1) * q]);
-                }
-            }
-        }
-        for i in 0..n {
-            for c in 0..n {
-                self.last[i * width + c] = closure * relation[i * (2 * n + q) + c] + relation[i * (2 * n + q) + n + c];
-            }
-            for c in 0..q {
-                self.last[i * width + n + c] = relation[i * (2 * n + q) + 2 * n + c];
-            }
-        }
-        for r in 0..q {
-            for c in 0..n {
-                self.last[(n + r) * width + c] = first[r * n + c] + closure * current[r * n + c];
-            }
-            for c in 0..q {
-                self.last[(n + r) * width + n + c] = corner[r * q + c];
-            }
-        }
-        lu::factorise(&mut self.last, width, &mut self.last_pivots)
+        T::dispatch(Eliminate(self))
     }
 
     /// Solves (1)–(4). `rhs` is, per interval, c_j (n) then r_j (m·n), and at the end s (q); the solution has the layout
     /// x_j, X_j per interval, then σ.
     pub fn solve(&self, rhs: &[f64], x: &mut [f64]) {
-        let (n, m, q, inner) = (self.n, self.m, self.q, self.m * self.n);
-        let (width, full, count, block) = (n + q, 3 * n + q, self.intervals, self.m * self.n + self.n);
-        let mut s = rhs[count * block..count * block + q].to_vec();
-        x.copy_from_slice(rhs);
-        let mut h = vec![0.0; count * n];
-        for j in 0..count {
-            let z = &mut x[j * block + n..(j + 1) * block];
-            let a = &self.interior[j * inner * inner..(j + 1) * inner * inner];
-            lu::solve(a, inner, &self.pivots[j * inner..(j + 1) * inner], z, 1);
-            let hj = &mut h[j * n..(j + 1) * n];
-            hj.copy_from_slice(&rhs[j * block..j * block + n]);
-            for k in 0..m {
-                axpy(self.end[k + 1], &z[k * n..(k + 1) * n], hj);
-            }
-            for c in 0..q {
-                s[c] -= dot(&self.border[(c * count + j) * block + n..(c * count + j + 1) * block], z);
-            }
-        }
-        let mut pair = vec![0.0; 2 * n];
-        pair[..n].copy_from_slice(&h[..n]);
-        for j in 1..count {
-            pair[n..].copy_from_slice(&h[j * n..(j + 1) * n]);
-            reflect::apply(&self.reflectors[j * n * 2 * n..(j + 1) * n * 2 * n], 2 * n, n, &mut pair, 1);
-            h[j * n..(j + 1) * n].copy_from_slice(&pair[..n]);
-            for c in 0..q {
-                s[c] -= dot(&self.multipliers[(j * q + c) * n..(j * q + c + 1) * n], &pair[..n]);
-            }
-            pair.copy_within(n.., 0);
-        }
-        let mut tail = vec![0.0; width];
-        tail[..n].copy_from_slice(&pair[..n]);
-        tail[n..].copy_from_slice(&s);
-        lu::solve(&self.last, width, &self.last_pivots, &mut tail, 1);
-        let mut right: Vec<f64> = tail[..n].iter().map(|v| self.closure * v).collect();
-        for j in (0..count).rev() {
-            let left = &mut x[j * block..j * block + n];
-            if j == 0 {
-                left.copy_from_slice(&tail[..n]);
-            } else {
-                let upper = &self.upper[j * n * full..(j + 1) * n * full];
-                for i in (0..n).rev() {
-                    let line = &upper[i * full..(i + 1) * full];
-                    let known = dot(&line[n..2 * n], &right)
-                        + dot(&line[2 * n..], &tail)
-                        + dot(&line[i + 1..n], &left[i + 1..]);
-                    left[i] = (h[j * n + i] - known) / line[i];
-                }
-            }
-            right.copy_from_slice(left);
-            let (left, z) = x[j * block..(j + 1) * block].split_at_mut(n);
-            let w = &self.coupling[j * inner * width..(j + 1) * inner * width];
-            for (zi, line) in z.iter_mut().zip(w.chunks_exact(width)) {
-                *zi -= dot(&line[..n], left) + dot(&line[n..], &tail[n..]);
-            }
-        }
-        x[count * block..].copy_from_slice(&tail[n..]);
+        T::dispatch(Solve { system: self, rhs, x });
     }
 
     /// Solves the transposed system: `z` has the layout of the unknowns (x_j, X_j per interval, then σ), `y` that of the
     /// equations (c_j, r_j per interval, then s).
     pub fn solve_transposed(&self, z: &[f64], y: &mut [f64]) {
-        let (n, m, q, inner) = (self.n, self.m, self.q, self.m * self.n);
-        let (width, full, count, block) = (n + q, 3 * n + q, self.intervals, self.m * self.n + self.n);
-        // Interior columns first: what they leave for the interval ends and the scalars.
-        let mut ends = vec![0.0; count * n];
-        let mut tail = vec![0.0; width];
-        tail[n..].copy_from_slice(&z[count * block..]);
-        for j in 0..count {
-            let own = &z[j * block..(j + 1) * block];
-            let end = &mut ends[j * n..(j + 1) * n];
-            end.copy_from_slice(&own[..n]);
-            let w = &self.coupling[j * inner * width..(j + 1) * inner * width];
-            for (v, line) in own[n..].iter().zip(w.chunks_exact(width)) {
-                axpy(-v, &line[..n], end);
-                axpy(-v, &line[n..], &mut tail[n..]);
+        T::dispatch(SolveTransposed { system: self, z, y });
+    }
+
+    /// From per-interval layout `[N][(m + 1) · n]` to lanes `[L][(m + 1) · n]`; zero beyond N.
+    #[inline(always)]
+    fn deal(&self, from: &[f64]) -> Vec<T> {
+        let block = (self.m + 1) * self.n;
+        let mut out = vec![T::default(); self.length * block];
+        for lane in 0..T::COUNT {
+            let first = (lane * self.length).min(self.intervals) * block;
+            let end = ((lane + 1) * self.length).min(self.intervals) * block;
+            for (to, x) in out.iter_mut().zip(&from[first..end]) {
+                to.lanes_mut()[lane] = *x;
             }
         }
-        tail[..n].copy_from_slice(&ends[..n]);
-        // The triangular factor, from the left.
-        for j in 1..count {
-            let (before, own) = ends.split_at_mut(j * n);
-            let own = &mut own[..n];
-            if j > 1 {
-                let last = &self.upper[(j - 1) * n * full..j * n * full];
-                for (i, v) in before[(j - 1) * n..].iter().enumerate() {
-                    axpy(-v, &last[i * full + n..i * full + 2 * n], own);
-                }
+        out
+    }
+
+    /// The way back.
+    #[inline(always)]
+    fn collect(&self, from: &[T], to: &mut [f64]) {
+        let block = (self.m + 1) * self.n;
+        for lane in 0..T::COUNT {
+            let first = (lane * self.length).min(self.intervals) * block;
+            let end = ((lane + 1) * self.length).min(self.intervals) * block;
+            for (x, from) in to[first..end].iter_mut().zip(from) {
+                *x = from.lanes()[lane];
             }
-            let upper = &self.upper[j * n * full..(j + 1) * n * full];
+        }
+    }
+
+    #[inline(always)]
+    fn lines(&self, t: usize) -> &[T] {
+        let size = self.m * self.n * (self.n + self.q);
+        &self.coupling[t * size..(t + 1) * size]
+    }
+
+    /// x = A_t⁻¹ x, or with the transpose.
+    #[inline(always)]
+    fn interior_solve(&self, t: usize, transposed: bool, x: &mut [T]) {
+        let inner = self.m * self.n;
+        let a = &self.interior[t * inner * inner..(t + 1) * inner * inner];
+        let pivots = &self.pivots[t * inner * T::COUNT..(t + 1) * inner * T::COUNT];
+        let solve = if transposed { block::solve_transposed } else { block::solve };
+        solve(a, inner, pivots, self.exchanged[t], x);
+    }
+}
+
+/// Sum over the lanes, in their order.
+#[inline(always)]
+fn total<T: Lane>(x: T) -> f64 {
+    x.lanes().iter().sum()
+}
+
+/// The lanes, one after the other, of vectors of n components.
+#[inline(always)]
+fn unzipped<T: Lane>(x: &[T]) -> Vec<f64> {
+    (0..T::COUNT).flat_map(|l| x.iter().map(move |x| x.lanes()[l])).collect()
+}
+
+struct Condense<'a, T>(&'a mut Condensed<T>);
+
+impl<T: Lane> pulp::NullaryFnOnce for Condense<'_, T> {
+    type Output = Result<(), Singular>;
+
+    #[inline(always)]
+    fn call(self) -> Self::Output {
+        let Condensed { n, m, q, length, ref end, .. } = *self.0;
+        let (inner, width) = (m * n, n + q);
+        let ends: Vec<T> = end.iter().map(|e| T::splat(*e)).collect();
+        let Condensed { interior, coupling, pivots, exchanged, step, .. } = &mut *self.0;
+        for t in 0..length {
+            let a = &mut interior[t * inner * inner..(t + 1) * inner * inner];
+            let w = &mut coupling[t * inner * width..(t + 1) * inner * width];
+            let p = &mut pivots[t * inner * T::COUNT..(t + 1) * inner * T::COUNT];
+            exchanged[t] = block::factorise(a, inner, p, w, width)?;
+            let step = &mut step[t * n * width..(t + 1) * n * width];
+            step.fill(T::default());
             for i in 0..n {
-                own[i] /= upper[i * full + i];
-                let v = own[i];
-                axpy(-v, &upper[i * full + i + 1..i * full + n], &mut own[i + 1..]);
-                axpy(-v, &upper[i * full + 2 * n..(i + 1) * full], &mut tail);
-                if j + 1 == count {
-                    axpy(-v * self.closure, &upper[i * full + n..i * full + 2 * n], &mut tail[..n]);
+                let row = &mut step[i * width..(i + 1) * width];
+                row[i] = ends[0];
+                for k in 0..m {
+                    subtract(ends[k + 1], &w[(k * n + i) * width..(k * n + i + 1) * width], row);
                 }
             }
         }
-        lu::solve_transposed(&self.last, width, &self.last_pivots, &mut tail);
-        let (mut carry, border) = (tail[..n].to_vec(), &tail[n..]);
-        // The orthogonal factor, from the right.
-        let mut pair = vec![0.0; 2 * n];
-        for j in (1..count).rev() {
-            pair[..n].copy_from_slice(&ends[j * n..(j + 1) * n]);
-            for c in 0..q {
-                axpy(-border[c], &self.multipliers[(j * q + c) * n..(j * q + c + 1) * n], &mut pair[..n]);
+        Ok(())
+    }
+}
+
+struct Eliminate<'a, T>(&'a mut Condensed<T>);
+
+impl<T: Lane> pulp::NullaryFnOnce for Eliminate<'_, T> {
+    type Output = Result<(), Singular>;
+
+    #[inline(always)]
+    fn call(self) -> Self::Output {
+        let Condensed { n, q, closure, .. } = *self.0;
+        let (width, full) = (n + q, 3 * n + q);
+        let mut corner = self.0.corner.clone();
+        let taken = self.0.condense_border();
+        corner.iter_mut().zip(&taken).for_each(|(d, t)| *d -= total(*t));
+        let Condensed { step, condensed_border, pieces, whole, last, last_pivots, .. } = self.0;
+        let link = |t: usize, rows: &mut [T]| {
+            for i in 0..n {
+                let g = &step[(t * n + i) * width..(t * n + i + 1) * width];
+                let row = &mut rows[i * full..(i + 1) * full];
+                for c in 0..n {
+                    row[c] = T::default() - g[c];
+                }
+                row[n + i] = T::splat(1.0);
+                for c in 0..q {
+                    row[3 * n + c] = T::default() - g[n + c];
+                }
             }
-            pair[n..].copy_from_slice(&carry);
-            reflect::apply_reversed(&self.reflectors[j * n * 2 * n..(j + 1) * n * 2 * n], 2 * n, n, &mut pair, 1);
-            carry.copy_from_slice(&pair[..n]);
-            ends[j * n..(j + 1) * n].copy_from_slice(&pair[n..]);
+        };
+        pieces.eliminate(link, condensed_border)?;
+        // The pieces as links between their ends: x_L is one column block on, x_0 two.
+        let piece = |l: usize, rows: &mut [f64]| {
+            for (row, line) in rows.chunks_exact_mut(full).zip(pieces.relation.chunks_exact(full)) {
+                for c in 0..n {
+                    row[c] = line[2 * n + c].lanes()[l];
+                    row[n + c] = line[n + c].lanes()[l];
+                }
+                for c in 0..q {
+                    row[3 * n + c] = line[3 * n + c].lanes()[l];
+                }
+            }
+        };
+        let mut border = unzipped(&pieces.first);
+        let beyond = unzipped(&pieces.last);
+        add(1.0, &beyond[..(T::COUNT - 1) * q * n], &mut border[q * n..]);
+        whole.eliminate(piece, &border)?;
+        add(1.0, &beyond[(T::COUNT - 1) * q * n..], &mut whole.last);
+        for i in 0..n {
+            let line = &whole.relation[i * full..(i + 1) * full];
+            for c in 0..n {
+                last[i * width + c] = closure * line[n + c] + line[2 * n + c];
+            }
+            last[i * width + n..(i + 1) * width].copy_from_slice(&line[3 * n..]);
         }
-        ends[..n].copy_from_slice(&carry);
-        for j in 0..count {
-            let own = &mut y[j * block..(j + 1) * block];
-            own[..n].copy_from_slice(&ends[j * n..(j + 1) * n]);
-            own[n..].copy_from_slice(&z[j * block + n..(j + 1) * block]);
+        for r in 0..q {
+            for c in 0..n {
+                last[(n + r) * width + c] = whole.first[r * n + c] + closure * whole.last[r * n + c];
+            }
+            for c in 0..q {
+                let k = r * q + c;
+                last[(n + r) * width + n + c] = corner[k] + total(pieces.corner[k]) + whole.corner[k];
+            }
+        }
+        lu::factorise(last, width, last_pivots)
+    }
+}
+
+impl<T: Lane> Condensed<T> {
+    /// Border rows on the interval ends alone; returns `[q × q]`, what that takes from D.
+    #[inline(always)]
+    fn condense_border(&mut self) -> Vec<T> {
+        let Condensed { n, m, q, length, .. } = *self;
+        let (inner, width) = (m * n, n + q);
+        let block = inner + n;
+        let mut taken = vec![T::default(); q * q];
+        let Condensed { coupling, border, condensed_border, .. } = self;
+        for t in 0..length {
+            let w = &coupling[t * inner * width..(t + 1) * inner * width];
+            for c in 0..q {
+                let row = &border[(c * length + t) * block..(c * length + t + 1) * block];
+                let p = &mut condensed_border[(t * q + c) * n..(t * q + c + 1) * n];
+                p.copy_from_slice(&row[..n]);
+                for (weight, line) in row[n..].iter().zip(w.chunks_exact(width)) {
+                    subtract(*weight, &line[..n], p);
+                    add(*weight, &line[n..], &mut taken[c * q..(c + 1) * q]);
+                }
+            }
+        }
+        taken
+    }
+}
+
+struct Solve<'a, T> {
+    system: &'a Condensed<T>,
+    rhs: &'a [f64],
+    x: &'a mut [f64],
+}
+
+impl<T: Lane> pulp::NullaryFnOnce for Solve<'_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Solve { system, rhs, x } = self;
+        let Condensed { n, m, q, intervals, length, closure, .. } = *system;
+        let (width, block) = (n + q, (m + 1) * n);
+        let size = intervals * block;
+        let mut z = system.deal(&rhs[..size]);
+        let mut h = vec![T::default(); length * n];
+        let mut taken = vec![T::default(); q];
+        for t in 0..length {
+            let own = &mut z[t * block..(t + 1) * block];
+            system.interior_solve(t, false, &mut own[n..]);
+            let target = &mut h[t * n..(t + 1) * n];
+            target.copy_from_slice(&own[..n]);
             for k in 0..m {
-                axpy(self.end[k + 1], &ends[j * n..(j + 1) * n], &mut own[(k + 1) * n..(k + 2) * n]);
+                add(T::splat(system.end[k + 1]), &own[(k + 1) * n..(k + 2) * n], target);
             }
             for c in 0..q {
-                let row = &self.border[(c * count + j) * block + n..(c * count + j + 1) * block];
-                axpy(-border[c], row, &mut own[n..]);
+                let row = &system.border[(c * length + t) * block + n..(c * length + t + 1) * block];
+                taken[c] = taken[c] - dot(row, &own[n..]);
             }
-            let a = &self.interior[j * inner * inner..(j + 1) * inner * inner];
-            lu::solve_transposed(a, inner, &self.pivots[j * inner..(j + 1) * inner], &mut own[n..]);
         }
-        y[count * block..].copy_from_slice(border);
+        system.pieces.forward(&mut h, &mut taken);
+        let mut ends = unzipped(&h[(length - 1) * n..]);
+        let mut tail = vec![0.0; width];
+        system.whole.forward(&mut ends, &mut tail[n..]);
+        for c in 0..q {
+            tail[n + c] += rhs[size + c] + total(taken[c]);
+        }
+        tail[..n].copy_from_slice(&ends[(T::COUNT - 1) * n..]);
+        lu::solve(&system.last, width, &system.last_pivots, &mut tail, 1);
+        let (first, sigma) = tail.split_at(n);
+        let closing: Vec<f64> = first.iter().map(|v| closure * v).collect();
+        system.whole.backward(&mut ends, first, &closing, sigma);
+        // Ends of the pieces, from x_0 on and from the one after it on.
+        let mut nodes = first.to_vec();
+        nodes.extend_from_slice(&ends[..(T::COUNT - 1) * n]);
+        nodes.extend_from_slice(&closing);
+        let left: Vec<T> = zipped(&nodes[..T::COUNT * n], n);
+        let right: Vec<T> = zipped(&nodes[n..], n);
+        let scalars: Vec<T> = sigma.iter().map(|s| T::splat(*s)).collect();
+        system.pieces.backward(&mut h, &left, &right, &scalars);
+        for t in 0..length {
+            let (end, inside) = z[t * block..(t + 1) * block].split_at_mut(n);
+            end.copy_from_slice(if t == 0 { &left } else { &h[(t - 1) * n..t * n] });
+            for (zi, line) in inside.iter_mut().zip(system.lines(t).chunks_exact(width)) {
+                *zi = *zi - dot(&line[..n], end) - dot(&line[n..], &scalars);
+            }
+        }
+        system.collect(&z, x);
+        x[size..].copy_from_slice(sigma);
+    }
+}
+
+/// Vectors of n components, one after the other, into lanes.
+#[inline(always)]
+fn zipped<T: Lane>(x: &[f64], n: usize) -> Vec<T> {
+    let mut out = vec![T::default(); n];
+    for (l, part) in x.chunks_exact(n).enumerate() {
+        out.iter_mut().zip(part).for_each(|(o, v)| o.lanes_mut()[l] = *v);
+    }
+    out
+}
+
+struct SolveTransposed<'a, T> {
+    system: &'a Condensed<T>,
+    z: &'a [f64],
+    y: &'a mut [f64],
+}
+
+impl<T: Lane> pulp::NullaryFnOnce for SolveTransposed<'_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let SolveTransposed { system, z, y } = self;
+        let Condensed { n, m, q, intervals, length, closure, .. } = *system;
+        let (width, block) = (n + q, (m + 1) * n);
+        let size = intervals * block;
+        let mut own = system.deal(&z[..size]);
+        // Interior columns first: what they leave for the interval ends and the scalars.
+        let mut ends = vec![T::default(); length * n];
+        let mut sigma = vec![T::default(); q];
+        for t in 0..length {
+            let (end, inside) = own[t * block..(t + 1) * block].split_at(n);
+            let target = &mut ends[t * n..(t + 1) * n];
+            target.copy_from_slice(end);
+            for (v, line) in inside.iter().zip(system.lines(t).chunks_exact(width)) {
+                subtract(*v, &line[..n], target);
+                subtract(*v, &line[n..], &mut sigma);
+            }
+        }
+        let mut first = ends[..n].to_vec();
+        let mut beyond = vec![T::default(); n];
+        system.pieces.forward_transposed(&mut ends, &mut first, &mut beyond, &mut sigma);
+        let mut nodes = unzipped(&first);
+        let after = unzipped(&beyond);
+        add(1.0, &after[..(T::COUNT - 1) * n], &mut nodes[n..]);
+        let mut tail = nodes[..n].to_vec();
+        tail.extend(sigma.iter().zip(&z[size..]).map(|(s, z)| z + total(*s)));
+        let mut closing = after[(T::COUNT - 1) * n..].to_vec();
+        let (start, scalars) = tail.split_at_mut(n);
+        system.whole.forward_transposed(&mut nodes, start, &mut closing, scalars);
+        add(closure, &closing, start);
+        lu::solve_transposed(&system.last, width, &system.last_pivots, &mut tail);
+        let (carry, border) = tail.split_at(n);
+        system.whole.backward_transposed(&mut nodes, carry, border);
+        let carry: Vec<T> = zipped(&nodes, n);
+        let rows: Vec<T> = border.iter().map(|b| T::splat(*b)).collect();
+        system.pieces.backward_transposed(&mut ends, &carry, &rows);
+        for t in 0..length {
+            let out = &mut own[t * block..(t + 1) * block];
+            let end = &ends[t * n..(t + 1) * n];
+            out[..n].copy_from_slice(end);
+            for k in 0..m {
+                add(T::splat(system.end[k + 1]), end, &mut out[(k + 1) * n..(k + 2) * n]);
+            }
+            for c in 0..q {
+                let row = &system.border[(c * length + t) * block + n..(c * length + t + 1) * block];
+                subtract(rows[c], row, &mut out[n..]);
+            }
+            system.interior_solve(t, true, &mut out[n..]);
+        }
+        system.collect(&own, y);
+        y[size..].copy_from_slice(border);
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::lane::Eight;
     use super::*;
-    use faer::prelude::*;
+    use faer::prelude::Solve as _;
 
-    /// The same equations as one dense matrix.
-    fn dense(c: &Condensed, closure: f64) -> faer::Mat<f64> {
-        let (n, inner, q, count) = (c.n, c.m * c.n, c.q, c.intervals);
-        let block = n + inner;
+    /// Equations (1)–(4) as one dense matrix.
+    fn dense<T: Lane>(s: &Condensed<T>, closure: f64) -> faer::Mat<f64> {
+        let (n, inner, q, count) = (s.n, s.m * s.n, s.q, s.intervals);
+        let (block, width) = (n + inner, n + q);
         let size = count * block + q;
         let mut a = faer::Mat::zeros(size, size);
         for j in 0..count {
-            let (row, width) = (j * block, n + q);
+            let (lane, t) = (j / s.length, j % s.length);
+            let row = j * block;
             let (next, factor) = if j + 1 == count { (0, closure) } else { ((j + 1) * block, 1.0) };
             for i in 0..n {
                 a[(row + i, next + i)] += factor;
-                a[(row + i, row + i)] -= c.end[0];
-                for k in 0..c.m {
-                    a[(row + i, row + n + k * n + i)] -= c.end[k + 1];
+                a[(row + i, row + i)] -= s.end[0];
+                for k in 0..s.m {
+                    a[(row + i, row + n + k * n + i)] -= s.end[k + 1];
                 }
             }
             for i in 0..inner {
                 for k in 0..inner {
-                    a[(row + n + i, row + n + k)] = c.interior[j * inner * inner + i * inner + k];
+                    a[(row + n + i, row + n + k)] = s.interior[(t * inner + i) * inner + k].lanes()[lane];
                 }
-                for k in 0..n {
-                    a[(row + n + i, row + k)] = c.coupling[(j * inner + i) * width + k];
+                for k in 0..width {
+                    let column = if k < n { row + k } else { count * block + k - n };
+                    a[(row + n + i, column)] = s.coupling[(t * inner + i) * width + k].lanes()[lane];
                 }
-                for k in 0..q {
-                    a[(row + n + i, count * block + k)] = c.coupling[(j * inner + i) * width + n + k];
+            }
+            for r in 0..q {
+                for k in 0..block {
+                    let entry = s.border[(r * s.length + t) * block + k];
+                    a[(count * block + r, row + k)] = entry.lanes()[lane];
                 }
             }
         }
-        for r in 0..q {
-            for k in 0..count * block {
-                a[(count * block + r, k)] = c.border[r * count * block + k];
-            }
-            for k in 0..q {
-                a[(count * block + r, count * block + k)] = c.corner[r * q + k];
-            }
+        for k in 0..q * q {
+            a[(count * block + k / q, count * block + k % q)] = s.corner[k];
         }
         a
     }
 
-    #[test]
-    fn agrees_with_a_dense_solution_of_the_same_equations() {
-        for (intervals, q, closure) in [(1, 2, 1.0), (2, 1, -1.0), (7, 2, 1.0), (5, 0, -1.0), (6, 3, 1.0)] {
-            let mut c = Condensed::new(3, &[0.4, -0.7, 1.3], q);
-            c.resize(intervals);
-            let mut seed = 0.3f64;
-            let mut next = || {
-                seed = (seed * 97.13 + 0.711).fract();
-                seed - 0.5
-            };
-            for v in [&mut c.interior, &mut c.coupling, &mut c.border, &mut c.corner] {
-                v.iter_mut().for_each(|x| *x = next());
-            }
-            for j in 0..intervals {
-                for i in 0..6 {
-                    c.interior[j * 36 + i * 7] += 3.0;
+    /// Entries between -1/2 and 1/2 with a strong diagonal; what lies beyond the last interval has length zero.
+    fn arbitrary<T: Lane>(intervals: usize, q: usize) -> (Condensed<T>, Vec<f64>) {
+        let n = 3;
+        let mut s = Condensed::<T>::new(n, &[0.4, -0.7, 1.3], q);
+        s.resize(intervals);
+        let mut seed = 0.3f64;
+        let mut next = || {
+            seed = (seed * 97.13 + 0.711).fract();
+            seed - 0.5
+        };
+        let (inner, width, block) = (2 * n, n + q, 3 * n);
+        for lane in 0..T::COUNT {
+            for t in 0..s.length {
+                let real = lane * s.length + t < intervals;
+                let mut entry = |x: &mut T, empty: f64, shift: f64| {
+                    x.lanes_mut()[lane] = if real { next() + shift } else { empty };
+                };
+                for k in 0..inner * inner {
+                    let unit = f64::from(k % (inner + 1) == 0);
+                    entry(&mut s.interior[t * inner * inner + k], unit, 3.0 * unit);
+                }
+                for k in 0..inner * width {
+                    let unit = f64::from(k % width == k / width % n);
+                    entry(&mut s.coupling[t * inner * width + k], -unit, 0.0);
+                }
+                for r in 0..q {
+                    for k in 0..block {
+                        entry(&mut s.border[(r * s.length + t) * block + k], 0.0, 0.0);
+                    }
                 }
             }
-            let matrix = dense(&c, closure);
-            let size = intervals * 9 + q;
-            let rhs: Vec<f64> = (0..size).map(|_| next()).collect();
-            let reference = matrix.partial_piv_lu().solve(&faer::Mat::from_fn(size, 1, |i, _| rhs[i]));
-            c.condense().unwrap();
-            c.eliminate(closure).unwrap();
-            let mut x = vec![0.0; size];
-            c.solve(&rhs, &mut x);
-            let transposed = matrix.transpose().to_owned();
-            let second = transposed.partial_piv_lu().solve(&faer::Mat::from_fn(size, 1, |i, _| rhs[i]));
-            let mut y = vec![0.0; size];
-            c.solve_transposed(&rhs, &mut y);
-            for i in 0..size {
-                assert!((y[i] - second[(i, 0)]).abs() < 1e-10, "{intervals} intervals, transposed, {i}");
-            }
-            for i in 0..size {
-                assert!(
-                    (x[i] - reference[(i, 0)]).abs() < 1e-10,
-                    "{intervals} intervals: {} against {}",
-                    x[i],
-                    reference[(i, 0)]
-                );
-            }
+        }
+        s.corner.iter_mut().for_each(|x| *x = next());
+        let rhs = (0..intervals * block + q).map(|_| next()).collect();
+        (s, rhs)
+    }
+
+    fn agrees<T: Lane>(intervals: usize, q: usize, closure: f64) {
+        let (mut system, rhs) = arbitrary::<T>(intervals, q);
+        let matrix = dense(&system, closure);
+        let column = faer::Mat::from_fn(rhs.len(), 1, |i, _| rhs[i]);
+        system.condense().unwrap();
+        system.eliminate(closure).unwrap();
+        let (mut x, mut y) = (vec![0.0; rhs.len()], vec![0.0; rhs.len()]);
+        system.solve(&rhs, &mut x);
+        system.solve_transposed(&rhs, &mut y);
+        let reference = matrix.partial_piv_lu().solve(&column);
+        let transposed = matrix.transpose().to_owned().partial_piv_lu().solve(&column);
+        for i in 0..rhs.len() {
+            let what = format!("{intervals} intervals in {} lanes, component {i}", T::COUNT);
+            assert!((x[i] - reference[(i, 0)]).abs() < 1e-9, "{what}: {} against {}", x[i], reference[(i, 0)]);
+            assert!((y[i] - transposed[(i, 0)]).abs() < 1e-9, "{what}, transposed");
+        }
+    }
+
+    #[test]
+    fn agrees_with_a_dense_solution_of_the_same_equations() {
+        for (intervals, q, closure) in [
+            (1, 2, 1.0),
+            (2, 1, -1.0),
+            (7, 2, 1.0),
+            (8, 2, 1.0),
+            (5, 0, -1.0),
+            (6, 3, 1.0),
+            (17, 2, -1.0),
+            (40, 2, 1.0),
+        ] {
+            agrees::<f64>(intervals, q, closure);
+            agrees::<Eight>(intervals, q, closure);
         }
     }
 }

@@ -3,14 +3,30 @@
 //! Matrices are row-major slices. The kernels serve blocks of up to about forty rows, where calling a general library
 //! costs more than the arithmetic.
 
+pub mod block;
+pub mod chain;
 pub mod condensed;
+pub mod lane;
 pub mod lu;
+pub mod panel;
 pub mod periodic_schur;
 pub mod reflect;
+pub mod system;
+mod tile;
+
+/// The larger one; NaN if either is NaN.
+pub fn larger(a: f64, b: f64) -> f64 {
+    if b > a || b.is_nan() { b } else { a }
+}
 
 /// Largest absolute value; NaN if any entry is NaN.
 pub fn max_abs(v: &[f64]) -> f64 {
-    v.iter().fold(0.0, |m: f64, x| if x.is_nan() || m.is_nan() { f64::NAN } else { m.max(x.abs()) })
+    let (blocks, rest) = v.as_chunks::<8>();
+    let mut most = [0.0; 8];
+    for block in blocks {
+        (0..8).for_each(|l| most[l] = larger(most[l], block[l].abs()));
+    }
+    most.into_iter().chain(rest.iter().map(|x| x.abs())).fold(0.0, larger)
 }
 
 /// a · b.

@@ -66,12 +66,16 @@ pub fn eigenvalues(factors: &[f64], p: usize) -> Option<Vec<Eigenvalue>> {
 /// four digits of the smallest eigenvalue and none of the largest).
 pub fn group(factors: &[f64], p: usize) -> Vec<f64> {
     let size = p * p;
+    if factors.len() < size.max(1) {
+        return Vec::new();
+    }
     let mut out: Vec<f64> = Vec::new();
-    let mut product: Vec<f64> = Vec::new();
+    let mut product = factors[..size].to_vec();
+    let (mut candidate, mut lu) = (vec![0.0; size], vec![0.0; size]);
     let mut pivots = vec![0; p];
-    for factor in factors.chunks_exact(size.max(1)) {
-        let candidate = if product.is_empty() { factor.to_vec() } else { multiply(factor, &product, p) };
-        let mut lu = candidate.clone();
+    for factor in factors.chunks_exact(size).skip(1) {
+        multiply(factor, &product, p, &mut candidate);
+        lu.copy_from_slice(&candidate);
         let condition = match super::lu::factorise(&mut lu, p, &mut pivots) {
             Ok(()) => {
                 let mean = (candidate.iter().map(|x| x * x).sum::<f64>() / p as f64).sqrt();
@@ -79,25 +83,25 @@ pub fn group(factors: &[f64], p: usize) -> Vec<f64> {
             }
             Err(_) => f64::INFINITY,
         };
-        if product.is_empty() || condition < 1e4 {
-            product = candidate;
+        if condition < 1e4 {
+            std::mem::swap(&mut product, &mut candidate);
         } else {
-            out.append(&mut product);
-            product = factor.to_vec();
+            out.extend_from_slice(&product);
+            product.copy_from_slice(factor);
         }
     }
     out.append(&mut product);
     out
 }
 
-fn multiply(a: &[f64], b: &[f64], p: usize) -> Vec<f64> {
-    let mut c = vec![0.0; p * p];
+/// c = a b.
+fn multiply(a: &[f64], b: &[f64], p: usize, c: &mut [f64]) {
+    c.fill(0.0);
     for i in 0..p {
         for k in 0..p {
             super::axpy(a[i * p + k], &b[k * p..(k + 1) * p], &mut c[i * p..(i + 1) * p]);
         }
     }
-    c
 }
 
 struct Cycle {
@@ -358,7 +362,8 @@ mod tests {
         let f = pseudo_random(p * p * count, 0.37);
         let mut product = f[..p * p].to_vec();
         for k in 1..count {
-            product = multiply(&f[k * p * p..(k + 1) * p * p], &product, p);
+            let before = product.clone();
+            multiply(&f[k * p * p..(k + 1) * p * p], &before, p, &mut product);
         }
         let reference = faer::Mat::from_fn(p, p, |i, j| product[i * p + j]).eigenvalues().unwrap();
         for factors in [f.clone(), group(&f, p)] {

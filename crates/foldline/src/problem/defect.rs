@@ -17,19 +17,17 @@
 use super::gauss::{Scheme, gauss_legendre};
 use crate::contract::{Batch, Parameters, VectorField};
 use crate::diagram::Mesh;
-use crate::linalg::axpy;
+use crate::linalg::{axpy, panel};
 
 /// Where the defect is sampled, and how it is integrated.
 #[derive(Clone, Debug)]
 pub struct Sampling {
     /// `[m + 1][m + 1]` values at the sample points from values at the nodes.
-    values: Vec<Vec<f64>>,
+    values: Vec<f64>,
     /// `[m + 1][m + 1]` derivatives likewise.
-    slopes: Vec<Vec<f64>>,
-    /// `[m][m + 1]`: integral to each Gauss point.
-    integrals: Vec<Vec<f64>>,
-    /// `[m + 1]`: integral to 1.
-    weights: Vec<f64>,
+    slopes: Vec<f64>,
+    /// `[m + 1][m + 1]`: integral to each Gauss point, and to 1.
+    integrals: Vec<f64>,
 }
 
 impl Sampling {
@@ -37,14 +35,14 @@ impl Sampling {
     pub fn new(scheme: &Scheme) -> Sampling {
         let m = scheme.degree;
         let (points, weights) = gauss_legendre(m + 1);
-        let values = points.iter().map(|&s| scheme.interpolation(s)).collect();
+        let values = points.iter().flat_map(|&s| scheme.interpolation(s)).collect();
         // p' is a polynomial of degree m - 1 known at the m Gauss points.
         let through = |nodes: &[f64], k: usize, s: f64| -> f64 {
             (0..nodes.len()).filter(|&l| l != k).map(|l| (s - nodes[l]) / (nodes[k] - nodes[l])).product()
         };
         let slopes = points
             .iter()
-            .map(|&s| {
+            .flat_map(|&s| {
                 let mut line = vec![0.0; m + 1];
                 for i in 0..m {
                     axpy(
@@ -56,13 +54,10 @@ impl Sampling {
                 line
             })
             .collect();
-        let integrals = scheme.nodes[1..]
-            .iter()
-            .map(|&c| {
-                (0..=m).map(|k| (0..=m).map(|g| c * weights[g] * through(&points, k, c * points[g])).sum()).collect()
-            })
-            .collect();
-        Sampling { values, slopes, integrals, weights }
+        let to = |c: f64, k: usize| (0..=m).map(|g| c * weights[g] * through(&points, k, c * points[g])).sum::<f64>();
+        let inner = scheme.nodes[1..].iter().flat_map(|&c| (0..=m).map(|k| to(c, k)).collect::<Vec<_>>());
+        let integrals = inner.chain(weights.iter().copied()).collect();
+        Sampling { values, slopes, integrals }
     }
 }
 
@@ -86,36 +81,32 @@ pub fn measure(
     sampling: &Sampling,
     scale: &[f64],
 ) -> Defect {
+    // Intervals are lanes: sample g of interval j is lane g·N + j of the batch.
     let (n, m, count) = (scale.len(), scheme.degree, mesh.len() - 1);
     let lanes = count * (m + 1);
+    let nodes = panel::by_component(profile, m + 1, n);
     let (mut states, mut defect) = (vec![0.0; n * lanes], vec![0.0; n * lanes]);
-    for j in 0..count {
-        for k in 0..=m {
-            let node = &profile[(j * (m + 1) + k) * n..(j * (m + 1) + k + 1) * n];
-            for g in 0..=m {
-                let (value, slope) = (sampling.values[g][k], sampling.slopes[g][k]);
-                for i in 0..n {
-                    states[i * lanes + j * (m + 1) + g] += value * node[i];
-                    defect[i * lanes + j * (m + 1) + g] += slope * node[i];
-                }
-            }
-        }
+    for i in 0..n {
+        let own = i * lanes..(i + 1) * lanes;
+        panel::multiply(&sampling.values, &nodes[own.clone()], count, &mut states[own.clone()]);
+        panel::multiply(&sampling.slopes, &nodes[own.clone()], count, &mut defect[own]);
     }
-    let mut f = vec![0.0; n * lanes];
+    let mut f = nodes;
     field.evaluate(Batch { lanes, states: &states, parameters: Parameters::Shared(parameters) }, &mut f);
+    let times: Vec<f64> = mesh.windows(2).map(|pair| (pair[1] - pair[0]) * period).collect();
+    for (d, f) in defect.chunks_exact_mut(count).zip(f.chunks_exact(count)) {
+        d.iter_mut().zip(f).zip(&times).for_each(|((d, f), ht)| *d -= ht * f);
+    }
     let mut local = vec![0.0f64; count];
     let mut ends = vec![0.0; count * n];
-    for j in 0..count {
-        let ht = (mesh[j + 1] - mesh[j]) * period;
-        for i in 0..n {
-            let at = i * lanes + j * (m + 1);
-            let d = &mut defect[at..at + m + 1];
-            axpy(-ht, &f[at..at + m + 1], d);
-            for line in &sampling.integrals {
-                local[j] = local[j].max((crate::linalg::dot(line, d) / scale[i]).abs());
-            }
-            ends[j * n + i] = crate::linalg::dot(&sampling.weights, d);
+    let mut integrals = vec![0.0; lanes];
+    for i in 0..n {
+        panel::multiply(&sampling.integrals, &defect[i * lanes..(i + 1) * lanes], count, &mut integrals);
+        let (inner, whole) = integrals.split_at(m * count);
+        for line in inner.chunks_exact(count) {
+            local.iter_mut().zip(line).for_each(|(most, e)| *most = most.max((e / scale[i]).abs()));
         }
+        whole.iter().enumerate().for_each(|(j, e)| ends[j * n + i] = *e);
     }
     Defect { local, ends }
 }

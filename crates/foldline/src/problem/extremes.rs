@@ -6,6 +6,7 @@
 use super::gauss::Scheme;
 use crate::contract::{Batch, Parameters, VectorField};
 use crate::diagram::Mesh;
+use crate::linalg::panel;
 
 /// Peaks of one channel that are refined.
 const PEAKS: usize = 3;
@@ -25,88 +26,143 @@ pub fn of_profile(
     mesh: &Mesh,
     scheme: &Scheme,
 ) -> Vec<[f64; 2]> {
-    let (n, outputs, m, count) = (field.dim(), field.output_count(), scheme.degree, mesh.len() - 1);
-    let channels = n + outputs;
-    let per_interval = 2 * m;
-    let lanes = count * per_interval;
-    let inner: Vec<Vec<f64>> =
-        (0..per_interval).map(|s| scheme.interpolation(s as f64 / per_interval as f64)).collect();
-    let mut states = vec![0.0; n * lanes];
-    for j in 0..count {
-        for (s, weights) in inner.iter().enumerate() {
-            let lane = j * per_interval + s;
-            for (k, w) in weights.iter().enumerate() {
-                for i in 0..n {
-                    states[i * lanes + lane] += w * profile[(j * (m + 1) + k) * n + i];
-                }
-            }
-        }
-    }
-    let mut values = states.clone();
-    values.resize(channels * lanes, 0.0);
-    let batch = Batch { lanes, states: &states, parameters: Parameters::Shared(parameters) };
-    field.outputs(batch, &mut values[n * lanes..]);
-
-    // For every channel and both signs the best few peaks: (channel and sign, place in units of samples).
-    let mut places: Vec<(usize, f64)> = Vec::with_capacity(2 * PEAKS * channels);
-    let mut best = vec![f64::NEG_INFINITY; 2 * channels];
-    for c in 0..channels {
-        let line = &values[c * lanes..(c + 1) * lanes];
-        for (q, sign) in [(2 * c, -1.0), (2 * c + 1, 1.0)] {
-            let (mut peaks, mut top) = (Vec::new(), 0);
-            for l in 0..lanes {
-                let [a, b, d] = [(l + lanes - 1) % lanes, l, (l + 1) % lanes].map(|k| sign * line[k]);
-                if b >= a && b >= d {
-                    // How far the parabola rises above the sample.
-                    let rise = if a + d < 2.0 * b { (d - a) * (d - a) / (8.0 * (2.0 * b - a - d)) } else { 0.0 };
-                    peaks.push((b + rise, l));
-                }
-                top = if b > sign * line[top] { l } else { top };
-            }
-            best[q] = sign * line[top];
-            peaks.sort_by(|x, y| y.0.total_cmp(&x.0));
-            places.extend(peaks.iter().take(PEAKS).map(|(_, l)| (q, *l as f64)));
+    let orbit = Orbit { field, parameters, profile, scheme, count: mesh.len() - 1 };
+    let channels = field.dim() + field.output_count();
+    let lanes = orbit.lanes();
+    let values = orbit.samples();
+    // For every channel and both signs the largest value times the sign, and the best few peaks.
+    let mut best = Vec::with_capacity(2 * channels);
+    let mut peaks: Vec<Peak> = Vec::with_capacity(2 * PEAKS * channels);
+    for line in values.chunks_exact(lanes) {
+        for sign in [-1.0, 1.0] {
+            let (top, places) = highest(line, sign);
+            peaks.extend(places.iter().map(|&place| Peak { of: best.len(), sign, place: place as f64 }));
+            best.push(top);
         }
     }
     let mut spacing = 1.0;
     for _ in 0..4 {
-        let probes = 3 * places.len();
+        orbit.refine(&mut peaks, spacing, &mut best);
+        spacing *= 0.2;
+    }
+    best.chunks_exact(2).map(|pair| [-pair[0], pair[1]]).collect()
+}
+
+/// A place, in units of samples, near which a channel times a sign has a peak.
+struct Peak {
+    /// Which channel and sign.
+    of: usize,
+    sign: f64,
+    place: f64,
+}
+
+struct Orbit<'a> {
+    field: &'a dyn VectorField,
+    parameters: &'a [f64],
+    profile: &'a [f64],
+    scheme: &'a Scheme,
+    /// N.
+    count: usize,
+}
+
+impl Orbit<'_> {
+    /// Samples per interval.
+    fn density(&self) -> usize {
+        2 * self.scheme.degree
+    }
+
+    fn lanes(&self) -> usize {
+        self.count * self.density()
+    }
+
+    /// All channels at all samples in the order of time, `[channel][sample]`.
+    fn samples(&self) -> Vec<f64> {
+        let (n, nodes, density, count) = (self.field.dim(), self.scheme.degree + 1, self.density(), self.count);
+        let weights: Vec<f64> =
+            (0..density).flat_map(|s| self.scheme.interpolation(s as f64 / density as f64)).collect();
+        let by_component = panel::by_component(self.profile, nodes, n);
+        let mut states = Vec::with_capacity((n + self.field.output_count()) * self.lanes());
+        let mut sampled = vec![0.0; self.lanes()];
+        for own in by_component.chunks_exact(nodes * count) {
+            panel::multiply(&weights, own, count, &mut sampled);
+            states.extend((0..count).flat_map(|j| sampled[j..].iter().step_by(count)));
+        }
+        self.with_outputs(states)
+    }
+
+    /// States `[n × lanes]` with the outputs behind them.
+    fn with_outputs(&self, states: Vec<f64>) -> Vec<f64> {
+        let n = self.field.dim();
+        let lanes = states.len() / n;
+        let mut outputs = vec![0.0; self.field.output_count() * lanes];
+        let batch = Batch { lanes, states: &states, parameters: Parameters::Shared(self.parameters) };
+        self.field.outputs(batch, &mut outputs);
+        let mut values = states;
+        values.append(&mut outputs);
+        values
+    }
+
+    /// Moves each peak to the top of the parabola through itself and its neighbours `spacing` samples away.
+    fn refine(&self, peaks: &mut [Peak], spacing: f64, best: &mut [f64]) {
+        let (n, probes) = (self.field.dim(), 3 * peaks.len());
         let mut states = vec![0.0; n * probes];
-        for (probe, (_, place)) in places.iter().enumerate() {
-            for (k, offset) in [-spacing, 0.0, spacing].iter().enumerate() {
-                let position = (place + offset).rem_euclid(lanes as f64) / per_interval as f64;
-                let j = (position.floor() as usize).min(count - 1);
-                let weights = scheme.interpolation(position - j as f64);
-                for (node, w) in weights.iter().enumerate() {
-                    for i in 0..n {
-                        states[i * probes + 3 * probe + k] += w * profile[(j * (m + 1) + node) * n + i];
-                    }
-                }
+        let mut x = vec![0.0; n];
+        for (p, peak) in peaks.iter().enumerate() {
+            for (k, offset) in [-spacing, 0.0, spacing].into_iter().enumerate() {
+                self.state_into(peak.place + offset, &mut x);
+                (0..n).for_each(|i| states[i * probes + 3 * p + k] = x[i]);
             }
         }
-        let mut values = states.clone();
-        values.resize(channels * probes, 0.0);
-        let batch = Batch { lanes: probes, states: &states, parameters: Parameters::Shared(parameters) };
-        field.outputs(batch, &mut values[n * probes..]);
-        for (probe, (q, place)) in places.iter_mut().enumerate() {
-            let q = *q;
-            let sign = if q % 2 == 0 { -1.0 } else { 1.0 };
-            let at = (q / 2) * probes + 3 * probe;
-            let (a, b, c) = (sign * values[at], sign * values[at + 1], sign * values[at + 2]);
-            best[q] = best[q].max(a).max(b).max(c);
+        let values = self.with_outputs(states);
+        for (p, peak) in peaks.iter_mut().enumerate() {
+            let at = (peak.of / 2) * probes + 3 * p;
+            let [a, b, c] = [0, 1, 2].map(|k| peak.sign * values[at + k]);
+            let best = &mut best[peak.of];
+            *best = best.max(a).max(b).max(c);
             let bend = a - 2.0 * b + c;
             if bend < 0.0 {
                 let shift = 0.5 * (a - c) / bend;
-                *place += spacing * shift.clamp(-1.0, 1.0);
+                peak.place += spacing * shift.clamp(-1.0, 1.0);
                 let top = b - 0.125 * (c - a) * (c - a) / bend;
                 if shift.abs() <= 1.0 && spacing < 0.1 {
-                    best[q] = best[q].max(top);
+                    *best = best.max(top);
                 }
             } else if a > b || c > b {
-                *place += if a > c { -spacing } else { spacing };
+                peak.place += if a > c { -spacing } else { spacing };
             }
         }
-        spacing *= 0.2;
     }
-    (0..channels).map(|c| [-best[2 * c], best[2 * c + 1]]).collect()
+
+    /// The state at a place in units of samples.
+    fn state_into(&self, place: f64, x: &mut [f64]) {
+        let position = place.rem_euclid(self.lanes() as f64) / self.density() as f64;
+        let j = (position.floor() as usize).min(self.count - 1);
+        let block = (self.scheme.degree + 1) * x.len();
+        self.scheme.value_into(position - j as f64, &self.profile[j * block..(j + 1) * block], x);
+    }
+}
+
+/// The largest value of sign · line, and the samples of its best few peaks, the best first.
+fn highest(line: &[f64], sign: f64) -> (f64, Vec<usize>) {
+    let lanes = line.len();
+    let mut top = f64::NEG_INFINITY;
+    // (How high the parabola through a peak and its neighbours rises, sample); the first of equals stays first.
+    let mut peaks: Vec<(f64, usize)> = Vec::with_capacity(PEAKS + 1);
+    let mut before = sign * line[lanes - 1];
+    for (l, value) in line.iter().enumerate() {
+        let here = sign * value;
+        if here > top {
+            top = here;
+        }
+        let after = sign * line[if l + 1 < lanes { l + 1 } else { 0 }];
+        if here >= before && here >= after {
+            let bend = 2.0 * here - before - after;
+            let rise = if bend > 0.0 { (after - before) * (after - before) / (8.0 * bend) } else { 0.0 };
+            let at = peaks.partition_point(|peak| peak.0.total_cmp(&(here + rise)).is_ge());
+            peaks.insert(at, (here + rise, l));
+            peaks.truncate(PEAKS);
+        }
+        before = here;
+    }
+    (top, peaks.into_iter().map(|peak| peak.1).collect())
 }

@@ -8,8 +8,12 @@
 //!   (1)  p'(c_i) = Σ_k D_ik p(c_k),   D_ik = ℓ_k'(c_i),  i = 1…m, k = 0…m
 //!   (2)  p(1)    = Σ_k e_k p(c_k),    e_k  = ℓ_k(1)
 //!   (3)  ∫₀¹ p   ≈ Σ_i b_i p(c_i),    exact to degree 2m - 1
+//!   (4)  p(c_i) - p(0) = Σ_k a_ik p'(c_k),   A = (D_ik)⁻¹, i, k = 1…m
 //!
 //! **Source.** ascher1995, §5; hairer1996, §II.7.
+
+/// The largest degree.
+pub const LARGEST: usize = 12;
 
 /// Nodes and weights for one degree.
 #[derive(Clone, Debug)]
@@ -22,15 +26,17 @@ pub struct Scheme {
     pub weights: Vec<f64>,
     /// `[m × (m + 1)]` derivative matrix D, row-major.
     pub derivative: Vec<f64>,
+    /// `[m × m]` integration matrix A of (4), row-major.
+    pub integration: Vec<f64>,
     /// `[m + 1]` extrapolation to 1, e.
     pub end: Vec<f64>,
     barycentric: Vec<f64>,
 }
 
 impl Scheme {
-    /// The scheme of degree m, 1 ≤ m ≤ 12.
+    /// The scheme of degree m, 1 ≤ m ≤ [`LARGEST`]; other degrees become the nearest of these.
     pub fn new(degree: usize) -> Scheme {
-        let m = degree.max(1);
+        let m = degree.clamp(1, LARGEST);
         let (gauss, weights) = gauss_legendre(m);
         let mut nodes = vec![0.0];
         nodes.extend(gauss);
@@ -46,21 +52,68 @@ impl Scheme {
             }
             row[i] = diagonal;
         }
-        let mut scheme = Scheme { degree: m, nodes, weights, derivative, end: Vec::new(), barycentric };
+        let integration = integration(&nodes[1..], &weights);
+        let mut scheme = Scheme { degree: m, nodes, weights, derivative, integration, end: Vec::new(), barycentric };
         scheme.end = scheme.interpolation(1.0);
         scheme
     }
 
     /// Weights `[m + 1]` that give p(s) from the values at the nodes.
     pub fn interpolation(&self, s: f64) -> Vec<f64> {
-        if let Some(k) = self.nodes.iter().position(|&c| c == s) {
-            let mut unit = vec![0.0; self.degree + 1];
-            unit[k] = 1.0;
-            return unit;
-        }
-        let node_polynomial: f64 = self.nodes.iter().map(|c| s - c).product();
-        self.nodes.iter().zip(&self.barycentric).map(|(c, w)| node_polynomial * w / (s - c)).collect()
+        let mut weights = vec![0.0; self.degree + 1];
+        self.weigh(s, &mut weights);
+        weights
     }
+
+    /// p(s) `[n]` from the values at the nodes `[m + 1][n]`.
+    pub fn value_into(&self, s: f64, nodes: &[f64], x: &mut [f64]) {
+        let mut weights = [0.0; LARGEST + 1];
+        let weights = &mut weights[..=self.degree];
+        self.weigh(s, weights);
+        let n = x.len();
+        // Four components at a time are two or one vector instructions.
+        let (fours, rest) = x.as_chunks_mut::<4>();
+        for (g, four) in fours.iter_mut().enumerate() {
+            *four = [0.0; 4];
+            for (w, node) in weights.iter().zip(nodes.chunks_exact(n)) {
+                if let Some(values) = node[4 * g..].first_chunk::<4>() {
+                    (0..4).for_each(|c| four[c] += w * values[c]);
+                }
+            }
+        }
+        let first = 4 * fours.len();
+        for (c, value) in rest.iter_mut().enumerate() {
+            *value = weights.iter().zip(nodes.chunks_exact(n)).map(|(w, node)| w * node[first + c]).sum();
+        }
+    }
+
+    /// ℓ_k(s): the product of what is left of node k and of what is right of it, and exactly 1 at the node.
+    fn weigh(&self, s: f64, weights: &mut [f64]) {
+        let mut left = 1.0;
+        for ((w, c), b) in weights.iter_mut().zip(&self.nodes).zip(&self.barycentric) {
+            *w = b * left;
+            left *= s - c;
+        }
+        let mut right = 1.0;
+        for (w, c) in weights.iter_mut().zip(&self.nodes).rev() {
+            *w = if s == *c { 1.0 } else { *w * right };
+            right *= s - c;
+        }
+    }
+}
+
+/// ∫ of the Lagrange polynomials on the Gauss points from 0 to each of them, by the quadrature of those points.
+fn integration(gauss: &[f64], weights: &[f64]) -> Vec<f64> {
+    let m = gauss.len();
+    let through = |k: usize, s: f64| -> f64 {
+        (0..m).filter(|&l| l != k).map(|l| (s - gauss[l]) / (gauss[k] - gauss[l])).product()
+    };
+    (0..m * m)
+        .map(|at| {
+            let (c, k) = (gauss[at / m], at % m);
+            (0..m).map(|g| c * weights[g] * through(k, c * gauss[g])).sum()
+        })
+        .collect()
 }
 
 /// Gauss–Legendre points and weights on [0, 1], by Newton's method on the Legendre recurrence.
@@ -102,6 +155,11 @@ mod tests {
                     let d: f64 = (0..=m).map(|k| scheme.derivative[i * (m + 1) + k] * values[k]).sum();
                     let exact = if power == 0 { 0.0 } else { power as f64 * scheme.nodes[i + 1].powi(power - 1) };
                     assert!((d - exact).abs() < 1e-11, "degree {m}, power {power}: {d} against {exact}");
+                }
+                for i in 0..m {
+                    let slope = |k: usize| power as f64 * scheme.nodes[k + 1].powi((power - 1).max(0));
+                    let rise: f64 = (0..m).map(|k| scheme.integration[i * m + k] * slope(k)).sum();
+                    assert!((rise - (values[i + 1] - values[0])).abs() < 1e-13, "degree {m}, power {power}");
                 }
                 let end: f64 = scheme.end.iter().zip(&values).map(|(e, v)| e * v).sum();
                 assert!((end - 1.0).abs() < 1e-12);

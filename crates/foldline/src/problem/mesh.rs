@@ -71,20 +71,17 @@ pub fn equidistributed_in_halves(errors: &[f64], mesh: &Mesh, degree: usize, tar
 
 /// A periodic profile carried to another mesh by evaluating its polynomials.
 pub fn transferred(profile: &[f64], n: usize, scheme: &Scheme, from: &Mesh, to: &Mesh) -> Vec<f64> {
-    let m = scheme.degree;
-    let mut out = vec![0.0; (to.len() - 1) * (m + 1) * n];
+    let block = (scheme.degree + 1) * n;
+    let mut out = vec![0.0; (to.len() - 1) * block];
     let mut j = 0;
-    for (l, pair) in to.windows(2).enumerate() {
-        for (k, c) in scheme.nodes.iter().enumerate() {
+    for (pair, nodes) in to.windows(2).zip(out.chunks_exact_mut(block)) {
+        for (c, x) in scheme.nodes.iter().zip(nodes.chunks_exact_mut(n)) {
             let t = pair[0] + (pair[1] - pair[0]) * c;
             while j + 2 < from.len() && from[j + 1] <= t {
                 j += 1;
             }
-            let weights = scheme.interpolation((t - from[j]) / (from[j + 1] - from[j]));
-            let x = &mut out[(l * (m + 1) + k) * n..(l * (m + 1) + k + 1) * n];
-            for (i, w) in weights.iter().enumerate() {
-                crate::linalg::axpy(*w, &profile[(j * (m + 1) + i) * n..(j * (m + 1) + i + 1) * n], x);
-            }
+            let s = (t - from[j]) / (from[j + 1] - from[j]);
+            scheme.value_into(s, &profile[j * block..(j + 1) * block], x);
         }
     }
     out

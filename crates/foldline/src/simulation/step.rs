@@ -79,15 +79,40 @@ impl Step<'_> {
         if theta == 1.0 {
             return self.end_into(x);
         }
-        let h = self.length;
-        let rest = 1.0 - theta;
         for (i, x) in x.iter_mut().enumerate() {
-            let at = i * self.lanes + self.column;
-            let change = self.to[at] - self.from[at];
-            let b = h * self.slopes[0][at] - change;
-            let c = change - h * self.slopes[STAGES - 1][at] - b;
-            let d = h * DENSE.iter().zip(self.slopes).map(|(d, k)| d * k[at]).sum::<f64>();
-            *x = self.from[at] + theta * (change + rest * (b + theta * (c + rest * d)));
+            *x = self.start(i) + self.component(i).change(theta);
         }
+    }
+
+    /// How Σ wᵢ xᵢ changes along the step, `weights` `[n]`.
+    pub(crate) fn along(&self, weights: &[f64]) -> Course {
+        let mut along = Course::default();
+        for (i, weight) in weights.iter().enumerate() {
+            let own = self.component(i);
+            (0..4).for_each(|k| along.0[k] += weight * own.0[k]);
+        }
+        along
+    }
+
+    fn component(&self, i: usize) -> Course {
+        let (h, at) = (self.length, i * self.lanes + self.column);
+        let change = self.to[at] - self.from[at];
+        let b = h * self.slopes[0][at] - change;
+        let c = change - h * self.slopes[STAGES - 1][at] - b;
+        let d = h * DENSE.iter().zip(self.slopes).map(|(d, k)| d * k[at]).sum::<f64>();
+        Course([change, b, c, d])
+    }
+}
+
+/// Δ, B, C and D of (3) of the tableau, for one component or a linear function of the state.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Course([f64; 4]);
+
+impl Course {
+    /// The change from the start to a fraction `theta` ∈ [0, 1] of the step.
+    pub(crate) fn change(&self, theta: f64) -> f64 {
+        let [change, b, c, d] = self.0;
+        let rest = 1.0 - theta;
+        theta * (change + rest * (b + theta * (c + rest * d)))
     }
 }

@@ -19,6 +19,10 @@ impl Monitor for Fold {
         true
     }
 
+    fn reads_spectrum(&self) -> bool {
+        false
+    }
+
     fn jump(&self) -> usize {
         1
     }

@@ -23,6 +23,8 @@
 use crate::contract::{Batch, Condition, Parameters};
 use crate::diagram::{Kind, Mesh, Point};
 use crate::linalg::condensed::Condensed;
+use crate::linalg::lane::Lane;
+use crate::linalg::system::System;
 use crate::linalg::{dot, max_abs};
 use crate::problem::gauss::Scheme;
 use crate::problem::{Setting, mesh};
@@ -38,7 +40,7 @@ pub struct OnCycles<'a> {
     /// Components of v: n, or 2n where it is complex (real parts, then imaginary ones).
     parts: usize,
     /// Scalars of the bordered system: T₁ where there is one, then the parts of g.
-    system: Condensed,
+    system: System,
     /// ⟨f, ·⟩ of the phase condition in (1), at the Gauss points.
     phase: Vec<f64>,
     /// b and c as profiles `[N][m+1][parts]`, and their components in the phase row and along T₁.
@@ -68,7 +70,7 @@ impl<'a> OnCycles<'a> {
             _ => return None,
         };
         let mut condition = OnCycles {
-            system: Condensed::new(parts, &scheme.end, scalars),
+            system: System::new(parts, &scheme.end, scalars),
             setting,
             scheme,
             kind,
@@ -164,54 +166,80 @@ impl<'a> OnCycles<'a> {
 
     /// Fills the bordered operator (4).
     fn fill(&mut self, angle: f64) {
-        let (n, m, parts, lanes) = (self.n, self.scheme.degree, self.parts, self.lanes());
-        let (inner, scalars, size) = (m * parts, self.width() + usize::from(self.is_fold()), self.profile_size());
-        let (is_fold, first) = (self.is_fold(), usize::from(self.is_fold()));
-        let width = parts + scalars;
-        self.system.interior.fill(0.0);
-        self.system.coupling.fill(0.0);
-        self.system.border.fill(0.0);
-        self.system.corner.fill(0.0);
-        for lane in 0..lanes {
-            let (j, i) = (lane / m, lane % m);
-            let h = self.mesh[j + 1] - self.mesh[j];
-            let node = (j * (m + 1) + i + 1) * parts;
-            for c in 0..parts {
-                let (block, own) = (c / n * n, c % n);
-                let line = &mut self.system.interior[(j * inner + i * parts + c) * inner..][..inner];
-                for k in 0..m {
-                    line[k * parts + c] = self.scheme.derivative[i * (m + 1) + k + 1];
-                }
-                for d in 0..n {
-                    line[i * parts + block + d] -= h * self.period * self.fx[(own * n + d) * lanes + lane];
-                }
-                if parts > n {
-                    // + iθ v: the real part loses θ times the imaginary one.
-                    let (other, sign) = if c < n { (c + n, -1.0) } else { (c - n, 1.0) };
-                    line[i * parts + other] += sign * h * angle;
-                }
-                let right = &mut self.system.coupling[(j * inner + i * parts + c) * width..][..width];
-                right[c] = self.scheme.derivative[i * (m + 1)];
-                if is_fold {
-                    right[parts] = -h * self.f[c * lanes + lane];
-                }
-                right[parts + first] = h * self.left[node + c];
-                let weight = h * self.scheme.weights[i];
-                self.system.border[first * size + node + c] = weight * self.right[node + c];
-                if is_fold {
-                    self.system.border[node + c] = weight * self.phase[lane * n + c];
-                }
-                if parts > n {
-                    // The second border is i times the first.
-                    let (other, sign) = if c < n { (c + n, -1.0) } else { (c - n, 1.0) };
-                    right[parts + 1] = sign * h * self.left[node + other];
-                    self.system.border[size + node + c] = weight * sign * self.right[node + other];
+        let system = std::mem::replace(&mut self.system, System::new(1, &[1.0, 0.0], 0));
+        self.system = match system {
+            System::Eight(own) => System::Eight(self.filled(own, angle)),
+            System::One(own) => System::One(self.filled(own, angle)),
+        };
+    }
+
+    fn filled<T: Lane>(&self, mut system: Condensed<T>, angle: f64) -> Condensed<T> {
+        let (m, parts, count) = (self.scheme.degree, self.parts, self.intervals());
+        let (is_fold, length) = (self.is_fold(), system.length());
+        system.interior.fill(T::default());
+        system.coupling.fill(T::default());
+        system.border.fill(T::default());
+        system.corner.fill(0.0);
+        for j in 0..length * T::COUNT {
+            // Beyond the last interval the solver has intervals of length zero.
+            let h = if j < count { self.mesh[j + 1] - self.mesh[j] } else { 0.0 };
+            let j = (j.min(count - 1), j % length, j / length);
+            for i in 0..m {
+                for c in 0..parts {
+                    self.fill_line(&mut system, j, i, c, h, angle);
                 }
             }
         }
         if is_fold {
-            self.system.corner[1] = self.left_phase;
-            self.system.corner[2] = self.right_period;
+            system.corner[1] = self.left_phase;
+            system.corner[2] = self.right_period;
+        }
+        system
+    }
+
+    /// Equation c at Gauss point i of an interval (its number, its place, its lane), and its part of the border.
+    fn fill_line<T: Lane>(
+        &self,
+        system: &mut Condensed<T>,
+        (j, place, slot): (usize, usize, usize),
+        i: usize,
+        c: usize,
+        h: f64,
+        angle: f64,
+    ) {
+        let (n, m, parts, lanes) = (self.n, self.scheme.degree, self.parts, self.lanes());
+        let (inner, scalars) = (m * parts, self.width() + usize::from(self.is_fold()));
+        let (width, block, length) = (parts + scalars, (m + 1) * parts, system.length());
+        let (lane, node, first) = (j * m + i, (j * (m + 1) + i + 1) * parts, usize::from(self.is_fold()));
+        let (half, own) = (c / n * n, c % n);
+        let line = &mut system.interior[(place * inner + i * parts + c) * inner..][..inner];
+        for k in 0..m {
+            line[k * parts + c].lanes_mut()[slot] = self.scheme.derivative[i * (m + 1) + k + 1];
+        }
+        for d in 0..n {
+            line[i * parts + half + d].lanes_mut()[slot] -= h * self.period * self.fx[(own * n + d) * lanes + lane];
+        }
+        // + iθ v: the real part loses θ times the imaginary one.
+        let (other, sign) = if c < n { (c + n, -1.0) } else { (c - n, 1.0) };
+        if parts > n {
+            line[i * parts + other].lanes_mut()[slot] += sign * h * angle;
+        }
+        let right = &mut system.coupling[(place * inner + i * parts + c) * width..][..width];
+        right[c].lanes_mut()[slot] = self.scheme.derivative[i * (m + 1)];
+        if self.is_fold() {
+            right[parts].lanes_mut()[slot] = -h * self.f[c * lanes + lane];
+        }
+        right[parts + first].lanes_mut()[slot] = h * self.left[node + c];
+        let weight = h * self.scheme.weights[i];
+        let at = |r: usize| (r * length + place) * block + (i + 1) * parts + c;
+        system.border[at(first)].lanes_mut()[slot] = weight * self.right[node + c];
+        if self.is_fold() {
+            system.border[at(0)].lanes_mut()[slot] = weight * self.phase[lane * n + c];
+        }
+        if parts > n {
+            // The second border is i times the first.
+            right[parts + 1].lanes_mut()[slot] = sign * h * self.left[node + other];
+            system.border[at(1)].lanes_mut()[slot] = weight * sign * self.right[node + other];
         }
     }
 
@@ -241,8 +269,7 @@ impl<'a> OnCycles<'a> {
     fn evaluated(&mut self, u: &[f64], extra: &[f64], g: &mut [f64]) -> Option<()> {
         self.linearise(u);
         self.fill(extra.first().copied().unwrap_or(0.0));
-        self.system.condense().ok()?;
-        self.system.eliminate(self.closure()).ok()?;
+        self.system.factorise(self.closure()).ok()?;
         let (size, first) = (self.profile_size(), usize::from(self.is_fold()));
         let total = size + first + self.width();
         let mut one = vec![0.0; total];

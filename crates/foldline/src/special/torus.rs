@@ -21,6 +21,13 @@ impl Monitor for Torus {
         at.free_spectrum().iter().any(|z| z.im != 0.0 && z.norm().ln().abs() < 1e-4)
     }
 
+    fn possible(&self, at: &Point) -> bool {
+        let z = at.free_spectrum();
+        // A real pair may still become a complex one on the way if it is about to meet.
+        let meets = |a: usize| z[a + 1..].iter().any(|b| b.im == 0.0 && (z[a] - b).norm() < 0.2);
+        (0..z.len()).any(|a| if z[a].im == 0.0 { meets(a) } else { z[a].norm().ln().abs() < 0.1 })
+    }
+
     fn jump(&self) -> usize {
         2
     }

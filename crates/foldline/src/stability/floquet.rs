@@ -35,25 +35,28 @@ pub fn multipliers(transitions: &[f64], flow: &[f64], n: usize) -> Floquet {
     let mut factors = Vec::with_capacity(count * (n - 1) * (n - 1));
     let mut log_others = 0.0;
     let mut pivots = vec![0; n];
-    let mut frame = Frame::new(&flow[..n]);
-    let first = frame.clone();
+    let (mut g, mut block, mut line) = (vec![0.0; n * n], Vec::with_capacity(n * n), vec![0.0; n]);
+    let (mut frame, mut next) = (Frame::new(n), Frame::new(n));
+    frame.turn(&flow[..n]);
     for j in 0..count {
-        let next = if j + 1 == count { first.clone() } else { Frame::new(&flow[(j + 1) * n..(j + 2) * n]) };
-        let mut g = transitions[j * n * n..(j + 1) * n * n].to_vec();
+        let at = (j + 1) % count * n;
+        next.turn(&flow[at..at + n]);
+        g.copy_from_slice(&transitions[j * n * n..(j + 1) * n * n]);
         frame.columns(&mut g, n);
-        next.rows(&mut g, n);
+        next.rows(&mut g, n, &mut line);
         sign *= g[0].signum();
         log_trivial += g[0].abs().ln();
         let start = factors.len();
         for i in 1..n {
             factors.extend_from_slice(&g[i * n + 1..(i + 1) * n]);
         }
-        let mut block = factors[start..].to_vec();
+        block.clear();
+        block.extend_from_slice(&factors[start..]);
         log_others += match lu::factorise(&mut block, n - 1, &mut pivots) {
             Ok(()) => lu::determinant(&block, n - 1, &pivots).1,
             Err(_) => f64::NEG_INFINITY,
         };
-        frame = next;
+        std::mem::swap(&mut frame, &mut next);
     }
     let grouped = periodic_schur::group(&factors, n - 1);
     let others = periodic_schur::eigenvalues(&grouped, n - 1);
@@ -67,23 +70,26 @@ pub fn multipliers(transitions: &[f64], flow: &[f64], n: usize) -> Floquet {
 }
 
 /// The reflection 1 - v vᵀ, times a sign on its first column, whose first column is a given direction.
-#[derive(Clone)]
 struct Frame {
     v: Vec<f64>,
     sign: f64,
 }
 
 impl Frame {
-    fn new(direction: &[f64]) -> Frame {
-        let norm = dot(direction, direction).sqrt();
-        let mut v: Vec<f64> = direction.iter().map(|x| if norm > 0.0 { x / norm } else { 0.0 }).collect();
+    fn new(n: usize) -> Frame {
+        Frame { v: vec![0.0; n], sign: 1.0 }
+    }
+
+    /// Puts the first column along `direction`.
+    fn turn(&mut self, direction: &[f64]) {
+        let (v, norm) = (&mut self.v, dot(direction, direction).sqrt());
+        v.iter_mut().zip(direction).for_each(|(v, x)| *v = if norm > 0.0 { x / norm } else { 0.0 });
         // The reflection takes e_1 to ∓ the direction; the sign that avoids cancellation, undone by `sign`.
-        let sign = if v[0] > 0.0 { -1.0 } else { 1.0 };
-        v[0] -= sign;
-        let size = dot(&v, &v);
+        self.sign = if v[0] > 0.0 { -1.0 } else { 1.0 };
+        v[0] -= self.sign;
+        let size = dot(v, v);
         let scale = if size > 0.0 { (2.0 / size).sqrt() } else { 0.0 };
         v.iter_mut().for_each(|x| *x *= scale);
-        Frame { v, sign }
     }
 
     /// g Q.
@@ -95,14 +101,14 @@ impl Frame {
         }
     }
 
-    /// Qᵀ g.
-    fn rows(&self, g: &mut [f64], n: usize) {
-        let mut s = vec![0.0; n];
+    /// Qᵀ g; `s` is room for a row.
+    fn rows(&self, g: &mut [f64], n: usize, s: &mut [f64]) {
+        s.fill(0.0);
         for (row, v) in g.chunks_exact(n).zip(&self.v) {
-            axpy(*v, row, &mut s);
+            axpy(*v, row, s);
         }
         for (row, v) in g.chunks_exact_mut(n).zip(&self.v) {
-            axpy(-v, &s, row);
+            axpy(-v, s, row);
         }
         g[..n].iter_mut().for_each(|x| *x *= self.sign);
     }

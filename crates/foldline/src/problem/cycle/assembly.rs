@@ -2,7 +2,11 @@
 
 use super::CycleProblem;
 use crate::contract::{Batch, Parameters};
+use crate::linalg::condensed::Condensed;
+use crate::linalg::lane::Lane;
 use crate::linalg::max_abs;
+use crate::linalg::system::{System, either};
+use crate::problem::gauss::Scheme;
 
 impl CycleProblem<'_> {
     /// Profile of an antiperiodic null vector of the variational equation at `u` (it changes sign after one period), if
@@ -12,10 +16,11 @@ impl CycleProblem<'_> {
         self.fill(u, &row);
         let q = 1 + self.setting.freedom();
         // The scalars are frozen by a unit corner, so only the profile moves.
-        self.system.border.fill(0.0);
-        (0..q * q).for_each(|k| self.system.corner[k] = if k % (q + 1) == 0 { 1.0 } else { 0.0 });
-        self.system.condense().ok()?;
-        self.system.eliminate(-1.0).ok()?;
+        either!(&mut self.system, s => {
+            s.border.fill(Default::default());
+            (0..q * q).for_each(|k| s.corner[k] = if k % (q + 1) == 0 { 1.0 } else { 0.0 });
+        });
+        self.system.factorise(-1.0).ok()?;
         let size = self.profile_size();
         let mut v: Vec<f64> = (0..size + q).map(|k| ((k * k) as f64 * 0.7 + 0.3).sin()).collect();
         let mut next = v.clone();
@@ -32,75 +37,172 @@ impl CycleProblem<'_> {
         Some(v)
     }
 
-    /// Gathers the Gauss points, component-major.
+    /// Index of Gauss point i of interval j among those of a batch: the intervals that the solver treats together stand together.
+    #[inline]
+    pub(super) fn at(&self, j: usize, i: usize) -> usize {
+        let (place, lane) = (j % self.length, j / self.length);
+        (place * self.scheme.degree + i) * self.width + lane
+    }
+
+    /// Gathers the Gauss points, component-major. What the solver has beyond the last interval repeats it.
     pub(super) fn gather(&mut self, u: &[f64]) {
-        let (n, m, lanes) = (self.n, self.scheme.degree, self.intervals() * self.scheme.degree);
-        for j in 0..self.intervals() {
+        let (n, m, lanes) = (self.n, self.scheme.degree, self.lanes());
+        for j in 0..self.length * self.width {
+            let from = j.min(self.intervals() - 1) * (m + 1) * n;
             for k in 0..m {
-                let x = &u[(j * (m + 1) + k + 1) * n..(j * (m + 1) + k + 2) * n];
+                let x = &u[from + (k + 1) * n..from + (k + 2) * n];
+                let at = self.at(j, k);
                 for i in 0..n {
-                    self.states[i * lanes + j * m + k] = x[i];
+                    self.states[i * lanes + at] = x[i];
                 }
             }
         }
     }
 
-    /// Linearises at `u` and fills the blocks; the `rows` act through [`ZeroProblem::dot`].
+    /// Linearises at `u` and fills the blocks; the `rows` act through [`crate::contract::ZeroProblem::dot`].
     pub(super) fn fill(&mut self, u: &[f64], rows: &[f64]) {
-        let (n, m, count) = (self.n, self.scheme.degree, self.intervals());
-        let (lanes, size, inner, block) = (count * m, self.profile_size(), m * n, (m + 1) * n);
-        let (period, k_free) = (u[size], self.setting.freedom());
+        let (lanes, size) = (self.lanes(), self.profile_size());
         self.gather(u);
         let parameters = self.setting.at(&u[size + 1..]);
         let batch = Batch { lanes, states: &self.states, parameters: Parameters::Shared(&parameters) };
         self.setting.linearise(batch, &mut self.f, &mut self.fx, &mut self.fp);
-        self.trace = 0.0;
-        self.system.interior.fill(0.0);
-        self.system.coupling.fill(0.0);
-        self.system.border.fill(0.0);
-        let width = n + 1 + k_free;
-        for j in 0..count {
-            let h = self.mesh[j + 1] - self.mesh[j];
-            let ht = h * period;
-            let a = &mut self.system.interior[j * inner * inner..(j + 1) * inner * inner];
-            let b = &mut self.system.coupling[j * inner * width..(j + 1) * inner * width];
-            for i in 0..m {
-                let lane = j * m + i;
-                for c in 0..n {
-                    let line = &mut a[(i * n + c) * inner..(i * n + c + 1) * inner];
-                    for k in 0..m {
-                        line[k * n + c] = self.scheme.derivative[i * (m + 1) + k + 1];
-                    }
-                    for d in 0..n {
-                        line[i * n + d] -= ht * self.fx[(c * n + d) * lanes + lane];
-                    }
-                    self.trace += ht * self.scheme.weights[i] * self.fx[(c * n + c) * lanes + lane];
-                    let right = &mut b[(i * n + c) * width..(i * n + c + 1) * width];
-                    right[c] = self.scheme.derivative[i * (m + 1)];
-                    right[n] = -h * self.f[c * lanes + lane];
-                    for a in 0..k_free {
-                        right[n + 1 + a] = -ht * self.fp[(c * k_free + a) * lanes + lane];
-                    }
-                }
-                for c in 0..n {
-                    let at = j * block + (i + 1) * n + c;
-                    let weight = h * self.scheme.weights[i];
-                    self.system.border[at] = weight * self.phase[(j * m + i) * n + c];
-                    for (r, row) in rows.chunks_exact(u.len()).enumerate() {
-                        self.system.border[(1 + r) * size + at] =
-                            weight * row[at] / (self.scale[c] * self.scale[c] * n as f64);
-                    }
-                }
-            }
-        }
-        let q = 1 + k_free;
-        self.system.corner[..q].fill(0.0);
+        let linear = Linear {
+            n: self.n,
+            free: self.setting.freedom(),
+            scheme: &self.scheme,
+            lengths: &self.lengths,
+            period: u[size],
+            f: &self.f,
+            fx: &self.fx,
+            fp: &self.fp,
+            phase: &self.phase,
+        };
+        let (trace, corner) = either!(&mut self.system, s => (write(linear, s), &mut s.corner));
+        self.trace = trace;
+        let q = 1 + self.setting.freedom();
+        corner[..q].fill(0.0);
         for (r, row) in rows.chunks_exact(u.len()).enumerate() {
-            let corner = &mut self.system.corner[(1 + r) * q..(2 + r) * q];
+            let corner = &mut corner[(1 + r) * q..(2 + r) * q];
             corner[0] = row[size] / (self.period_scale * self.period_scale);
             for (a, axis) in self.setting.axes.iter().enumerate() {
                 corner[1 + a] = row[size + 1 + a] / (axis.scale * axis.scale);
             }
         }
+        for (r, row) in rows.chunks_exact(u.len()).enumerate() {
+            self.fill_row(1 + r, &row[..size]);
+        }
+    }
+
+    /// A border row that acts on the profile through the inner product.
+    fn fill_row(&mut self, r: usize, row: &[f64]) {
+        let (n, m, length, width) = (self.n, self.scheme.degree, self.length, self.width);
+        let block = (m + 1) * n;
+        let weights: Vec<f64> = (0..m * n)
+            .map(|k| self.scheme.weights[k / n] / (self.scale[k % n] * self.scale[k % n] * n as f64))
+            .collect();
+        let lengths = &self.lengths;
+        either!(&mut self.system, s => {
+            let border = &mut s.border[r * length * block..(r + 1) * length * block];
+            for (t, own) in border.chunks_exact_mut(block).enumerate() {
+                let (ends, inside) = own.split_at_mut(n);
+                ends.fill(Default::default());
+                for lane in 0..width {
+                    // Beyond the last interval the length is zero.
+                    let j = (lane * length + t).min(row.len() / block - 1);
+                    let h = lengths[t * width + lane];
+                    for (k, target) in inside.iter_mut().enumerate() {
+                        target.lanes_mut()[lane] = h * weights[k] * row[j * block + n + k];
+                    }
+                }
+            }
+        });
+    }
+}
+
+/// A linearised cycle, ready to be written into the blocks.
+struct Linear<'a> {
+    n: usize,
+    free: usize,
+    scheme: &'a Scheme,
+    /// `[L][W]`: h_j, zero beyond the last interval.
+    lengths: &'a [f64],
+    period: f64,
+    f: &'a [f64],
+    fx: &'a [f64],
+    fp: &'a [f64],
+    phase: &'a [f64],
+}
+
+/// Writes equation (1) and the phase row; returns ∫ tr f_x dt over the period.
+fn write<T: Lane>(linear: Linear, system: &mut Condensed<T>) -> f64 {
+    T::dispatch(Write { linear, system })
+}
+
+struct Write<'a, 'b, T> {
+    linear: Linear<'a>,
+    system: &'b mut Condensed<T>,
+}
+
+impl<T: Lane> pulp::NullaryFnOnce for Write<'_, '_, T> {
+    type Output = f64;
+
+    #[inline(always)]
+    fn call(self) -> f64 {
+        let Write { linear, system } = self;
+        let Linear { n, free, scheme, lengths, period, f, fx, fp, phase } = linear;
+        let (m, w, length) = (scheme.degree, T::COUNT, system.length());
+        let (inner, width, block, lanes) = (m * n, n + 1 + free, (m + 1) * n, length * m * w);
+        let (one, zero) = (T::splat(1.0), T::default());
+        let mut trace = zero;
+        for t in 0..length {
+            let h = T::load(&lengths[t * w..]);
+            let ht = h * T::splat(period);
+            let a = &mut system.interior[t * inner * inner..(t + 1) * inner * inner];
+            let b = &mut system.coupling[t * inner * width..(t + 1) * inner * width];
+            let border = &mut system.border[t * block..(t + 1) * block];
+            b.fill(zero);
+            border[..n].fill(zero);
+            for k in 0..m {
+                let at = (t * m + k) * w;
+                let weight = T::splat(scheme.weights[k]);
+                for c in 0..n {
+                    for d in 0..n {
+                        let slope = ht * T::load(&fx[(c * n + d) * lanes + at..]);
+                        for i in 0..m {
+                            let unit = if i == k && c == d { one } else { zero };
+                            let share = T::splat(scheme.integration[i * m + k]);
+                            a[(i * n + c) * inner + k * n + d] = unit - share * slope;
+                        }
+                        if c == d {
+                            trace = trace + weight * slope;
+                        }
+                    }
+                    let rate = h * T::load(&f[c * lanes + at..]);
+                    for i in 0..m {
+                        let share = T::splat(scheme.integration[i * m + k]);
+                        let right = &mut b[(i * n + c) * width..(i * n + c + 1) * width];
+                        right[n] = right[n] - share * rate;
+                    }
+                    for p in 0..free {
+                        let slope = ht * T::load(&fp[(c * free + p) * lanes + at..]);
+                        for i in 0..m {
+                            let share = T::splat(scheme.integration[i * m + k]);
+                            let right = &mut b[(i * n + c) * width + n + 1 + p];
+                            *right = *right - share * slope;
+                        }
+                    }
+                    b[(k * n + c) * width + c] = zero - one;
+                    border[(k + 1) * n + c] = h * weight * T::load(&phase[(at * n + c * w)..]);
+                }
+            }
+        }
+        trace.lanes().iter().sum()
+    }
+}
+
+impl System {
+    /// The places of all intervals, those beyond the last one included.
+    pub(crate) fn places(&self) -> usize {
+        self.lanes() * self.length()
     }
 }

@@ -4,9 +4,25 @@ use super::CycleProblem;
 use crate::contract::{Batch, Parameters, ZeroProblem};
 use crate::problem::defect::{self, Defect};
 
+/// Errors and the unknowns they belong to.
+pub(super) struct Measured {
+    at: Vec<f64>,
+    errors: Vec<f64>,
+}
+
 impl CycleProblem<'_> {
-    /// Estimated error on every interval, relative; uses the last factorisation, which must belong to the current mesh.
-    pub(super) fn measured_errors(&self, u: &[f64]) -> Vec<f64> {
+    /// Estimated error on every interval, relative. A point that was just measured is not measured again: the last
+    /// factorisation, which must belong to the current mesh, was close enough to it then.
+    pub(super) fn errors(&self, u: &[f64]) -> Vec<f64> {
+        if let Some(known) = self.measured.borrow().as_ref().filter(|known| known.at == u) {
+            return known.errors.clone();
+        }
+        let errors = self.measured_errors(u);
+        self.measured.replace(Some(Measured { at: u.to_vec(), errors: errors.clone() }));
+        errors
+    }
+
+    fn measured_errors(&self, u: &[f64]) -> Vec<f64> {
         let size = self.profile_size();
         let scale = self.relative_scale(u);
         let parameters = self.setting.at(&u[size + 1..]);

@@ -4,17 +4,19 @@
 //! left end and at the Gauss points, where it satisfies the differential equation. An integral phase condition fixes the
 //! shift in time.
 //!
-//! **Equations.** u = (profile, T, λ₁ … λ_k), N(m+1)n + 1 + k unknowns, k = 1 for a curve; D, e, b, c from [`Scheme`]; h_j interval lengths:
+//! **Equations.** u = (profile, T, λ₁ … λ_k), N(m+1)n + 1 + k unknowns, k = 1 for a curve; A, e, b from [`Scheme`]; h_j interval lengths:
 //!
 //! ```text
-//!   (1)  Σ_k D_ik X_{j,k} - h_j T f(X_{j,i}, λ) = 0                     i = 1…m, j = 0…N-1
+//!   (1)  X_{j,i} - x_j - h_j T Σ_k a_ik f(X_{j,k}, λ) = 0               i = 1…m, j = 0…N-1
 //!   (2)  x_{j+1} - Σ_k e_k X_{j,k} = 0,   x_N = x_0                     X_{j,0} = x_j
 //!   (3)  Σ_j h_j Σ_i b_i ⟨X_{j,i} - X̃_{j,i}, X̃'_{j,i}⟩ = 0              phase, with reference X̃
 //! ```
 //!
+//! (1) is the Runge–Kutta form of collocation: its matrix is close to the identity where intervals are short.
+//!
 //! Inner products of states divide component c by s_c = (model scale) + max |X̃_c|.
 //!
-//! **Source.** ascher1995, §5; doedel1991 (integral phase condition).
+//! **Source.** ascher1995, §5; hairer1996, §IV.8; doedel1991 (integral phase condition).
 //!
 //! **Fails when** the cycle shrinks to an equilibrium (the phase condition loses its meaning there) or its period grows
 //! without bound; the continuation recognises both.
@@ -27,9 +29,11 @@ use super::gauss::Scheme;
 use super::{Setting, extremes, mesh};
 use crate::contract::{Batch, Examination, Parameters, Singular, ZeroProblem};
 use crate::diagram::{Cycle, Mesh, Point, Solution, Trust};
-use crate::linalg::condensed::Condensed;
-use crate::linalg::{axpy, max_abs};
+use crate::linalg::system::System;
+use crate::linalg::{axpy, larger, max_abs};
 use crate::stability::floquet;
+use errors::Measured;
+use std::cell::RefCell;
 
 /// Cycles in one free parameter (a curve) or several.
 pub struct CycleProblem<'a> {
@@ -39,19 +43,24 @@ pub struct CycleProblem<'a> {
     mesh: Mesh,
     n: usize,
     halves: bool,
-    /// X̃' / s² at the Gauss points, `[N][m][n]`, normalised to unit length, and ⟨X̃, X̃'⟩ in that weight.
+    /// X̃' / s² at the Gauss points, `[L][m][n][W]`, normalised to unit length, and ⟨X̃, X̃'⟩ in that weight.
     phase: Vec<f64>,
     phase_offset: f64,
     scale: Vec<f64>,
     period_scale: f64,
-    system: Condensed,
+    system: System,
+    /// Places and lanes of the solver; see [`System`].
+    length: usize,
+    width: usize,
+    /// `[L][W]`: h_j where the solver has interval j, zero beyond the last one.
+    lengths: Vec<f64>,
     states: Vec<f64>,
     f: Vec<f64>,
     fx: Vec<f64>,
     fp: Vec<f64>,
     trace: f64,
-    /// Errors found by the last examination, while its factorisation is the last one.
-    errors: Option<Vec<f64>>,
+    /// What was measured last. Mesh and errors belong together only for the point they were measured at.
+    measured: RefCell<Option<Measured>>,
 }
 
 impl<'a> CycleProblem<'a> {
@@ -60,7 +69,10 @@ impl<'a> CycleProblem<'a> {
         let scheme = Scheme::new(degree);
         let n = setting.field.dim();
         let mut problem = CycleProblem {
-            system: Condensed::new(n, &scheme.end, 1 + setting.freedom()),
+            system: System::new(n, &scheme.end, 1 + setting.freedom()),
+            length: 0,
+            width: 1,
+            lengths: Vec::new(),
             scale: setting.scales.to_vec(),
             setting,
             sampling: defect::Sampling::new(&scheme),
@@ -76,7 +88,7 @@ impl<'a> CycleProblem<'a> {
             fx: Vec::new(),
             fp: Vec::new(),
             trace: 0.0,
-            errors: None,
+            measured: RefCell::new(None),
         };
         problem.set_mesh(mesh);
         problem
@@ -98,6 +110,16 @@ impl<'a> CycleProblem<'a> {
         self.mesh.len() - 1
     }
 
+    /// Points of a batch.
+    fn lanes(&self) -> usize {
+        self.length * self.width * self.scheme.degree
+    }
+
+    /// Where component 0 of the phase condition at Gauss point i of interval j is; the components are W apart.
+    fn phase_at(&self, j: usize, i: usize) -> usize {
+        ((j % self.length) * self.scheme.degree + i) * self.n * self.width + j / self.length
+    }
+
     fn profile_size(&self) -> usize {
         self.intervals() * (self.scheme.degree + 1) * self.n
     }
@@ -106,13 +128,18 @@ impl<'a> CycleProblem<'a> {
         self.mesh[j + 1] - self.mesh[j]
     }
 
-    /// Largest |component| over the profile.
+    /// Largest |component| over the profile; NaN where one is.
     fn sizes(&self, u: &[f64]) -> Vec<f64> {
-        let mut sizes = vec![0.0f64; self.n];
-        for x in u[..self.profile_size()].chunks_exact(self.n) {
-            for (s, v) in sizes.iter_mut().zip(x) {
-                *s = s.max(v.abs());
+        // All components of all nodes of an interval at once, so that the loop is one over lanes.
+        let mut largest = vec![0.0f64; (self.scheme.degree + 1) * self.n];
+        for interval in u[..self.profile_size()].chunks_exact(largest.len()) {
+            for (most, v) in largest.iter_mut().zip(interval) {
+                *most = larger(*most, v.abs());
             }
+        }
+        let mut sizes = largest.split_off(largest.len() - self.n);
+        for node in largest.chunks_exact(self.n) {
+            sizes.iter_mut().zip(node).for_each(|(size, v)| *size = larger(*size, *v));
         }
         sizes
     }
@@ -133,20 +160,22 @@ impl ZeroProblem for CycleProblem<'_> {
         self.period_scale = u[size].abs().max(f64::MIN_POSITIVE);
         self.phase.fill(0.0);
         let (mut length, mut offset) = (0.0, 0.0);
+        let mut slope = vec![0.0; n];
         for j in 0..self.intervals() {
             let h = self.h(j);
             for i in 0..m {
-                let slope = &mut self.phase[(j * m + i) * n..(j * m + i + 1) * n];
+                slope.fill(0.0);
                 for k in 0..=m {
                     let node = &u[(j * (m + 1) + k) * n..(j * (m + 1) + k + 1) * n];
-                    axpy(self.scheme.derivative[i * (m + 1) + k] / h, node, slope);
+                    axpy(self.scheme.derivative[i * (m + 1) + k] / h, node, &mut slope);
                 }
                 let x = &u[(j * (m + 1) + i + 1) * n..(j * (m + 1) + i + 2) * n];
+                let first = self.phase_at(j, i);
                 for c in 0..n {
-                    let plain = slope[c];
-                    slope[c] /= self.scale[c] * self.scale[c];
-                    length += h * self.scheme.weights[i] * plain * slope[c];
-                    offset += h * self.scheme.weights[i] * x[c] * slope[c];
+                    let weighted = slope[c] / (self.scale[c] * self.scale[c]);
+                    length += h * self.scheme.weights[i] * slope[c] * weighted;
+                    offset += h * self.scheme.weights[i] * x[c] * weighted;
+                    self.phase[first + c * self.width] = weighted;
                 }
             }
         }
@@ -157,14 +186,13 @@ impl ZeroProblem for CycleProblem<'_> {
 
     fn residual(&mut self, u: &[f64], r: &mut [f64]) -> bool {
         let (n, m, count) = (self.n, self.scheme.degree, self.intervals());
-        let (lanes, size, block) = (count * m, self.profile_size(), (m + 1) * n);
+        let (lanes, size, block) = (self.lanes(), self.profile_size(), (m + 1) * n);
         let period = u[size];
         self.gather(u);
         let parameters = self.setting.at(&u[size + 1..]);
         let batch = Batch { lanes, states: &self.states, parameters: Parameters::Shared(&parameters) };
         self.setting.field.evaluate(batch, &mut self.f);
         let mut phase = -self.phase_offset;
-        r[..size].fill(0.0);
         for j in 0..count {
             let h = self.h(j);
             let own = &u[j * block..(j + 1) * block];
@@ -175,13 +203,19 @@ impl ZeroProblem for CycleProblem<'_> {
                 axpy(-self.scheme.end[k], &own[k * n..(k + 1) * n], &mut rows[..n]);
             }
             for i in 0..m {
-                let target = &mut rows[(i + 1) * n..(i + 2) * n];
-                for k in 0..=m {
-                    axpy(self.scheme.derivative[i * (m + 1) + k], &own[k * n..(k + 1) * n], target);
-                }
                 for c in 0..n {
-                    target[c] -= h * period * self.f[c * lanes + j * m + i];
-                    phase += h * self.scheme.weights[i] * self.phase[(j * m + i) * n + c] * own[(i + 1) * n + c];
+                    rows[(i + 1) * n + c] = own[(i + 1) * n + c] - own[c];
+                }
+            }
+            for k in 0..m {
+                let (at, first) = (self.at(j, k), self.phase_at(j, k));
+                for c in 0..n {
+                    let rate = h * period * self.f[c * lanes + at];
+                    for i in 0..m {
+                        rows[(i + 1) * n + c] -= self.scheme.integration[i * m + k] * rate;
+                    }
+                    let weight = h * self.scheme.weights[k] * self.phase[first + c * self.width];
+                    phase += weight * own[(k + 1) * n + c];
                 }
             }
         }
@@ -190,10 +224,8 @@ impl ZeroProblem for CycleProblem<'_> {
     }
 
     fn factorise(&mut self, u: &[f64], rows: &[f64]) -> Result<(), Singular> {
-        self.errors = None;
         self.fill(u, rows);
-        self.system.condense()?;
-        self.system.eliminate(1.0)
+        self.system.factorise(1.0)
     }
 
     fn solve(&mut self, rhs: &[f64], x: &mut [f64]) {
@@ -201,14 +233,17 @@ impl ZeroProblem for CycleProblem<'_> {
     }
 
     fn dot(&self, a: &[f64], b: &[f64]) -> f64 {
-        let (n, m, size) = (self.n, self.scheme.degree, self.profile_size());
+        let (n, block, size) = (self.n, (self.scheme.degree + 1) * self.n, self.profile_size());
+        // For every Gauss point and component the sum over the intervals first.
+        let mut sums = vec![0.0; block - n];
+        let intervals = a[..size].chunks_exact(block).zip(b[..size].chunks_exact(block));
+        for ((x, y), pair) in intervals.zip(self.mesh.windows(2)) {
+            let h = pair[1] - pair[0];
+            sums.iter_mut().zip(x[n..].iter().zip(&y[n..])).for_each(|(sum, (x, y))| *sum += h * (x * y));
+        }
         let mut total = 0.0;
-        for j in 0..self.intervals() {
-            for i in 0..m {
-                let at = (j * (m + 1) + i + 1) * n;
-                let local: f64 = (0..n).map(|c| a[at + c] * b[at + c] / (self.scale[c] * self.scale[c])).sum();
-                total += self.h(j) * self.scheme.weights[i] * local;
-            }
+        for (weight, sums) in self.scheme.weights.iter().zip(sums.chunks_exact(n)) {
+            total += weight * sums.iter().zip(&self.scale).map(|(sum, scale)| sum / (scale * scale)).sum::<f64>();
         }
         total / n as f64
             + a[size] * b[size] / (self.period_scale * self.period_scale)
@@ -218,16 +253,8 @@ impl ZeroProblem for CycleProblem<'_> {
     fn relative_size(&self, du: &[f64], u: &[f64]) -> f64 {
         let size = self.profile_size();
         let scale = self.relative_scale(u);
-        let mut largest = (du[size] / u[size]).abs().max(self.setting.relative_size(&du[size + 1..], &u[size + 1..]));
-        for x in du[..size].chunks_exact(self.n) {
-            for (v, s) in x.iter().zip(&scale) {
-                let relative = (v / s).abs();
-                if relative > largest || relative.is_nan() {
-                    largest = relative;
-                }
-            }
-        }
-        largest
+        let scalars = (du[size] / u[size]).abs().max(self.setting.relative_size(&du[size + 1..], &u[size + 1..]));
+        self.sizes(du).iter().zip(&scale).map(|(d, s)| d / s).fold(scalars, larger)
     }
 
     fn mesh(&self) -> Mesh {
@@ -236,10 +263,15 @@ impl ZeroProblem for CycleProblem<'_> {
 
     fn set_mesh(&mut self, mesh: &Mesh) {
         self.mesh = mesh.clone();
-        self.errors = None;
+        self.measured.replace(None);
         let (n, count) = (self.n, mesh.len() - 1);
-        let lanes = count * self.scheme.degree;
         self.system.resize(count);
+        (self.length, self.width) = (self.system.length(), self.system.lanes());
+        self.lengths = (0..self.system.places())
+            .map(|k| k / self.width + k % self.width * self.length)
+            .map(|j| if j < count { mesh[j + 1] - mesh[j] } else { 0.0 })
+            .collect();
+        let lanes = self.lanes();
         self.phase.resize(lanes * n, 0.0);
         self.states.resize(lanes * n, 0.0);
         self.f.resize(lanes * n, 0.0);
@@ -258,7 +290,7 @@ impl ZeroProblem for CycleProblem<'_> {
     }
 
     fn better_mesh(&self, u: &[f64], tolerance: f64) -> Option<Mesh> {
-        let errors = self.errors.clone().unwrap_or_else(|| self.measured_errors(u));
+        let errors = self.errors(u);
         let worst = errors.iter().fold(0.0, |m: f64, e| m.max(*e));
         let degree = self.scheme.degree;
         let better = if self.halves {
@@ -275,23 +307,19 @@ impl ZeroProblem for CycleProblem<'_> {
 
     fn examine(&mut self, u: &[f64]) -> Examination {
         let (n, count, size) = (self.n, self.intervals(), self.profile_size());
-        let width = n + 1 + self.setting.freedom();
         let mut transitions = vec![0.0; count * n * n];
-        for j in 0..count {
-            let step = self.system.transition(j);
-            for i in 0..n {
-                for c in 0..n {
-                    transitions[(j * n + i) * n + c] = step[i * width + c] * self.scale[c] / self.scale[i];
-                }
+        for (j, own) in transitions.chunks_exact_mut(n * n).enumerate() {
+            self.system.transition(j, own);
+            for (k, g) in own.iter_mut().enumerate() {
+                *g *= self.scale[k % n] / self.scale[k / n];
             }
         }
         let found = floquet::multipliers(&transitions, &self.flow_at_nodes(u), n);
         let scale = self.relative_scale(u);
-        let errors = self.measured_errors(u);
+        let errors = self.errors(u);
         let mut r = vec![0.0; u.len()];
         self.residual(u, &mut r);
-        let residual =
-            r[..size].iter().enumerate().map(|(k, v)| (v / scale[k % n]).abs()).fold(r[size].abs(), f64::max);
+        let residual = self.sizes(&r).iter().zip(&scale).map(|(v, s)| v / s).fold(r[size].abs(), f64::max);
         let parameters = self.setting.at(&u[size + 1..]);
         let ranges = extremes::of_profile(self.setting.field, &parameters, &u[..size], &self.mesh, &self.scheme);
         let trust = Trust {
@@ -300,7 +328,6 @@ impl ZeroProblem for CycleProblem<'_> {
             trivial_defect: (found.multipliers[0].re - 1.0).abs(),
             liouville_defect: (found.log_product - self.trace).abs(),
         };
-        self.errors = Some(errors);
         Examination { spectrum: found.multipliers, unstable: found.unstable, ranges, trust }
     }
 

@@ -1,0 +1,207 @@
+//! A chain of linear relations between neighbours, reduced to one between its ends.
+//!
+//! **Idea.** Inner nodes are eliminated from left to right by orthogonal transformations, so that growing and decaying
+//! solutions are both safe. Several chains of the same length run side by side, one in each lane.
+//!
+//! **Equations.** Nodes x_0 … x_L of n components, scalars σ (q):
+//!
+//! ```text
+//!   (1)  F_j x_j + E_j x_{j+1} + g_j σ = h_j            j = 0 … L-1, n rows each
+//!   (2)  Σ_j p_j x_j                                    q rows that stand outside, j = 0 … L-1
+//! ```
+//!
+//! Eliminating x_1 … x_{L-1} by QR of the stacked 2n×n blocks
+//!
+//! ```text
+//!        x_j    x_{j+1}   x_0   σ                 x_j  x_{j+1}  x_0   σ
+//!      [  E        0       F    g  ]      Qᵀ    [  R      S      F'   g' ]
+//!      [  F_j     E_j      0    g_j]    ---->   [  0      E      F    g  ]
+//! ```
+//!
+//! leaves E x_L + F x_0 + g σ = h, and (2) in terms of x_0, x_L and σ.
+//!
+//! **Source.** The structured QR of ascher1995, §7.2.
+//!
+//! **Fails when** R is singular to working precision.
+
+use super::lane::{Lane, add, dot, subtract};
+use super::reflect;
+use crate::contract::Singular;
+
+/// Chains side by side, and what their elimination leaves.
+#[derive(Clone, Debug, Default)]
+pub struct Chain<T> {
+    n: usize,
+    q: usize,
+    length: usize,
+    /// `[L][n × 2n]`; j = 0 is not used.
+    reflectors: Vec<T>,
+    /// `[L][n × (3n + q)]`: R, S, F', g'; j = 0 is not used. The diagonal of R is held inverted.
+    upper: Vec<T>,
+    /// `[L][q × n]`.
+    multipliers: Vec<T>,
+    /// `[n × (3n + q)]`: the relation that is left, with columns x_{L-1} (zero), x_L, x_0, σ.
+    pub relation: Vec<T>,
+    /// `[q × n]`: (2) on x_0.
+    pub first: Vec<T>,
+    /// `[q × n]`: (2) on x_L.
+    pub last: Vec<T>,
+    /// `[q × q]`: what elimination adds to σ in (2).
+    pub corner: Vec<T>,
+    stack: Vec<T>,
+}
+
+impl<T: Lane> Chain<T> {
+    /// Makes room for chains of `length` relations; the contents are then undefined.
+    pub fn resize(&mut self, n: usize, q: usize, length: usize) {
+        (self.n, self.q, self.length) = (n, q, length);
+        let full = 3 * n + q;
+        self.reflectors.resize(length * n * 2 * n, T::default());
+        self.upper.resize(length * n * full, T::default());
+        self.multipliers.resize(length * q * n, T::default());
+        self.relation.resize(n * full, T::default());
+        self.first.resize(q * n, T::default());
+        self.last.resize(q * n, T::default());
+        self.corner.resize(q * q, T::default());
+        self.stack.resize(2 * n * full, T::default());
+    }
+
+    /// Eliminates the inner nodes. `link(j, rows)` writes F_j, E_j, g_j to columns 0, n and 3n of `rows`, `[n × (3n + q)]`, which
+    /// is zero before; `border` is `[L][q × n]`, the p_j.
+    ///
+    /// # Errors
+    /// [`Singular`] if R is.
+    #[inline(always)]
+    pub fn eliminate(&mut self, link: impl Fn(usize, &mut [T]), border: &[T]) -> Result<(), Singular> {
+        let (n, q, full) = (self.n, self.q, 3 * self.n + self.q);
+        self.corner.fill(T::default());
+        self.first.copy_from_slice(&border[..q * n]);
+        self.last.fill(T::default());
+        self.stack.fill(T::default());
+        link(0, &mut self.stack[n * full..]);
+        for row in self.stack[n * full..].chunks_exact_mut(full) {
+            for c in 0..n {
+                row[2 * n + c] = row[c];
+                row[c] = T::default();
+            }
+        }
+        for j in 1..self.length {
+            add(T::splat(1.0), &border[j * q * n..(j + 1) * q * n], &mut self.last);
+            let (top, bottom) = self.stack.split_at_mut(n * full);
+            for (row, relation) in top.chunks_exact_mut(full).zip(bottom.chunks_exact(full)) {
+                row[..n].copy_from_slice(&relation[n..2 * n]);
+                row[n..2 * n].fill(T::default());
+                row[2 * n..].copy_from_slice(&relation[2 * n..]);
+            }
+            bottom.fill(T::default());
+            link(j, bottom);
+            let v = &mut self.reflectors[j * n * 2 * n..(j + 1) * n * 2 * n];
+            reflect::triangularise(&mut self.stack, 2 * n, full, n, v);
+            let upper = &mut self.upper[j * n * full..(j + 1) * n * full];
+            upper.copy_from_slice(&self.stack[..n * full]);
+            for i in 0..n {
+                let pivot = upper[i * full + i];
+                if pivot.lanes().iter().any(|x| x.abs().partial_cmp(&1e-300) != Some(std::cmp::Ordering::Greater)) {
+                    return Err(Singular);
+                }
+                upper[i * full + i] = pivot.map(|x| 1.0 / x);
+            }
+            self.carry_border(j);
+        }
+        self.relation.copy_from_slice(&self.stack[n * full..]);
+        Ok(())
+    }
+
+    /// Replaces x_j in (2) by means of the rows just made triangular.
+    #[inline(always)]
+    fn carry_border(&mut self, j: usize) {
+        let (n, q, full) = (self.n, self.q, 3 * self.n + self.q);
+        let upper = &self.upper[j * n * full..(j + 1) * n * full];
+        for c in 0..q {
+            let y = &mut self.multipliers[(j * q + c) * n..(j * q + c + 1) * n];
+            let current = &mut self.last[c * n..(c + 1) * n];
+            y.copy_from_slice(current);
+            current.fill(T::default());
+            for i in 0..n {
+                let line = &upper[i * full..(i + 1) * full];
+                y[i] = y[i] * line[i];
+                let yi = y[i];
+                subtract(yi, &line[i + 1..n], &mut y[i + 1..]);
+                subtract(yi, &line[n..2 * n], current);
+                subtract(yi, &line[2 * n..3 * n], &mut self.first[c * n..(c + 1) * n]);
+                subtract(yi, &line[3 * n..], &mut self.corner[c * q..(c + 1) * q]);
+            }
+        }
+    }
+
+    /// Carries right-hand sides h `[L × n]` through the elimination; afterwards the last n are those of the relation that is left.
+    /// `s` `[q]` receives what elimination takes from the right-hand sides of (2).
+    #[inline(always)]
+    pub fn forward(&self, h: &mut [T], s: &mut [T]) {
+        let (n, q) = (self.n, self.q);
+        for j in 1..self.length {
+            let pair = &mut h[(j - 1) * n..(j + 1) * n];
+            reflect::apply(&self.reflectors[j * n * 2 * n..(j + 1) * n * 2 * n], n, pair);
+            for c in 0..q {
+                s[c] = s[c] - dot(&self.multipliers[(j * q + c) * n..(j * q + c + 1) * n], &pair[..n]);
+            }
+        }
+    }
+
+    /// The inner nodes from x_0, x_L and σ: h as [`Chain::forward`] left it, on return x_1 … x_{L-1} at 0 … L-2.
+    #[inline(always)]
+    pub fn backward(&self, h: &mut [T], first: &[T], last: &[T], sigma: &[T]) {
+        let (n, full) = (self.n, 3 * self.n + self.q);
+        for j in (1..self.length).rev() {
+            let upper = &self.upper[j * n * full..(j + 1) * n * full];
+            let (head, tail) = h.split_at_mut(j * n);
+            let own = &mut head[(j - 1) * n..];
+            let right = if j + 1 == self.length { last } else { &tail[..n] };
+            for i in (0..n).rev() {
+                let line = &upper[i * full..(i + 1) * full];
+                let known = dot(&line[n..2 * n], right) + dot(&line[2 * n..3 * n], first) + dot(&line[3 * n..], sigma);
+                let known = known + dot(&line[i + 1..n], &own[i + 1..]);
+                own[i] = (own[i] - known) * line[i];
+            }
+        }
+    }
+
+    /// The transposed upper triangle: `z` `[L × n]` holds the right-hand sides of x_1 … x_{L-1} at 1 … L-1, replaced by the solution;
+    /// takes from `first`, `last` `[n]` and `sigma` `[q]` what belongs to x_0, x_L and σ.
+    #[inline(always)]
+    pub fn forward_transposed(&self, z: &mut [T], first: &mut [T], last: &mut [T], sigma: &mut [T]) {
+        let (n, full) = (self.n, 3 * self.n + self.q);
+        for j in 1..self.length {
+            let upper = &self.upper[j * n * full..(j + 1) * n * full];
+            let (head, tail) = z.split_at_mut((j + 1) * n);
+            let own = &mut head[j * n..];
+            let next = if j + 1 == self.length { &mut *last } else { &mut tail[..n] };
+            for i in 0..n {
+                let line = &upper[i * full..(i + 1) * full];
+                own[i] = own[i] * line[i];
+                let v = own[i];
+                subtract(v, &line[i + 1..n], &mut own[i + 1..]);
+                subtract(v, &line[n..2 * n], next);
+                subtract(v, &line[2 * n..3 * n], first);
+                subtract(v, &line[3 * n..], sigma);
+            }
+        }
+    }
+
+    /// Multipliers of (1) from those of the triangular rows (`z` as [`Chain::forward_transposed`] left it), of the relation that
+    /// is left (`carry` `[n]`) and of (2) (`border` `[q]`): `z` `[L × n]` is replaced by them.
+    #[inline(always)]
+    pub fn backward_transposed(&self, z: &mut [T], carry: &[T], border: &[T]) {
+        let (n, q) = (self.n, self.q);
+        // Row j of the triangular rows moves to place j - 1, so that each pair stands together.
+        z.copy_within(n.., 0);
+        z[(self.length - 1) * n..].copy_from_slice(carry);
+        for j in (1..self.length).rev() {
+            let pair = &mut z[(j - 1) * n..(j + 1) * n];
+            for c in 0..q {
+                subtract(border[c], &self.multipliers[(j * q + c) * n..(j * q + c + 1) * n], &mut pair[..n]);
+            }
+            reflect::apply_reversed(&self.reflectors[j * n * 2 * n..(j + 1) * n * 2 * n], n, pair);
+        }
+    }
+}

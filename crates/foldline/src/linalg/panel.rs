@@ -1,0 +1,94 @@
+//! A small matrix times long rows.
+//!
+//! **Idea.** A quantity at the nodes of every interval, laid out with the intervals as lanes, becomes one at other points of
+//! every interval by the same small matrix. Eight lanes at a time are one or two vector registers.
+
+/// Lanes taken together.
+const WIDTH: usize = 8;
+
+/// `out` `[rows × lanes]` = `matrix` `[rows × columns]` · `panel` `[columns × lanes]`, all row-major.
+pub fn multiply(matrix: &[f64], panel: &[f64], lanes: usize, out: &mut [f64]) {
+    if lanes > 0 {
+        pulp::Arch::new().dispatch(Multiply { matrix, panel, lanes, out });
+    }
+}
+
+struct Multiply<'a, 'b> {
+    matrix: &'a [f64],
+    panel: &'a [f64],
+    lanes: usize,
+    out: &'b mut [f64],
+}
+
+impl pulp::NullaryFnOnce for Multiply<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Multiply { matrix, panel, lanes, out } = self;
+        let columns = panel.len() / lanes;
+        let full = lanes - lanes % WIDTH;
+        for (line, weights) in out.chunks_exact_mut(lanes).zip(matrix.chunks_exact(columns)) {
+            let (blocks, rest) = line.as_chunks_mut::<WIDTH>();
+            for (b, block) in blocks.iter_mut().enumerate() {
+                let mut sum = [0.0; WIDTH];
+                for (w, row) in weights.iter().zip(panel.chunks_exact(lanes)) {
+                    if let Some(values) = row[b * WIDTH..].first_chunk::<WIDTH>() {
+                        (0..WIDTH).for_each(|l| sum[l] += w * values[l]);
+                    }
+                }
+                *block = sum;
+            }
+            for (l, value) in rest.iter_mut().enumerate() {
+                *value = weights.iter().zip(panel.chunks_exact(lanes)).map(|(w, row)| w * row[full + l]).sum();
+            }
+        }
+    }
+}
+
+/// A profile `[interval][node][component]` with the intervals as lanes: `[component][node][interval]`.
+pub fn by_component(profile: &[f64], nodes: usize, n: usize) -> Vec<f64> {
+    let count = profile.len() / (nodes * n).max(1);
+    let mut out = vec![0.0; profile.len()];
+    for (j, interval) in profile.chunks_exact(nodes * n).enumerate() {
+        for (k, node) in interval.chunks_exact(n).enumerate() {
+            for (i, x) in node.iter().enumerate() {
+                out[(i * nodes + k) * count + j] = *x;
+            }
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_product_is_that_of_the_definition_whatever_the_number_of_lanes() {
+        let (rows, columns) = (3, 5);
+        let matrix: Vec<f64> = (0..rows * columns).map(|k| (k as f64 * 0.7).sin()).collect();
+        for lanes in [1, 7, 8, 9, 30] {
+            let panel: Vec<f64> = (0..columns * lanes).map(|k| (k as f64 * 1.3).cos()).collect();
+            let mut out = vec![f64::NAN; rows * lanes];
+            multiply(&matrix, &panel, lanes, &mut out);
+            for (at, value) in out.iter().enumerate() {
+                let (r, l) = (at / lanes, at % lanes);
+                let expected: f64 = (0..columns).map(|k| matrix[r * columns + k] * panel[k * lanes + l]).sum();
+                // The same sum in the same order.
+                assert_eq!(*value, expected, "{lanes} lanes, entry {at}");
+            }
+        }
+        multiply(&matrix, &[], 0, &mut []);
+    }
+
+    #[test]
+    fn a_profile_is_rearranged_by_component() {
+        let (count, nodes, n) = (3, 2, 2);
+        let profile: Vec<f64> = (0..count * nodes * n).map(|k| k as f64).collect();
+        let by = by_component(&profile, nodes, n);
+        for (j, k, i) in [(0, 0, 0), (2, 1, 0), (1, 0, 1)] {
+            assert_eq!(by[(i * nodes + k) * count + j], profile[(j * nodes + k) * n + i]);
+        }
+    }
+}

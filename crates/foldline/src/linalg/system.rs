@@ -1,0 +1,84 @@
+//! The block system in as many lanes as suit its size.
+
+use super::condensed::Condensed;
+use super::lane::Eight;
+use crate::contract::Singular;
+
+/// Interior unknowns per interval up to which intervals share a vector; larger blocks fill vectors by themselves, and eight
+/// of them would leave the cache.
+const SMALL: usize = 64;
+
+/// A condensed system in eight lanes or one.
+#[derive(Clone, Debug)]
+pub enum System {
+    /// Eight intervals at a time.
+    Eight(Condensed<Eight>),
+    /// One interval at a time.
+    One(Condensed<f64>),
+}
+
+/// The same expression for both.
+macro_rules! either {
+    ($system:expr, $inner:ident => $body:expr) => {
+        match $system {
+            System::Eight($inner) => $body,
+            System::One($inner) => $body,
+        }
+    };
+}
+pub(crate) use either;
+
+impl System {
+    /// See [`Condensed::new`].
+    pub fn new(n: usize, end: &[f64], q: usize) -> System {
+        if n * (end.len() - 1) <= SMALL {
+            System::Eight(Condensed::new(n, end, q))
+        } else {
+            System::One(Condensed::new(n, end, q))
+        }
+    }
+
+    /// W, the number of lanes.
+    pub fn lanes(&self) -> usize {
+        match self {
+            System::Eight(_) => 8,
+            System::One(_) => 1,
+        }
+    }
+
+    /// L, the places of each lane: interval j is in lane ⌊j / L⌋ at place j mod L.
+    pub fn length(&self) -> usize {
+        either!(self, s => s.length())
+    }
+
+    /// See [`Condensed::resize`].
+    pub fn resize(&mut self, intervals: usize) {
+        either!(self, s => s.resize(intervals));
+    }
+
+    /// See [`Condensed::transition`].
+    pub fn transition(&self, j: usize, to: &mut [f64]) {
+        either!(self, s => s.transition(j, to));
+    }
+
+    /// Condensation and elimination; `closure` is κ.
+    ///
+    /// # Errors
+    /// [`Singular`] if an interior block or the remaining matrix is.
+    pub fn factorise(&mut self, closure: f64) -> Result<(), Singular> {
+        either!(self, s => {
+            s.condense()?;
+            s.eliminate(closure)
+        })
+    }
+
+    /// See [`Condensed::solve`].
+    pub fn solve(&self, rhs: &[f64], x: &mut [f64]) {
+        either!(self, s => s.solve(rhs, x));
+    }
+
+    /// See [`Condensed::solve_transposed`].
+    pub fn solve_transposed(&self, z: &[f64], y: &mut [f64]) {
+        either!(self, s => s.solve_transposed(z, y));
+    }
+}
