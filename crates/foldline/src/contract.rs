@@ -236,6 +236,12 @@ pub enum Verdict {
 pub trait Observer: Sync {
     /// Called once per event, from the thread that follows the branch.
     fn observe(&self, event: Event) -> Verdict;
+
+    /// Whether the points that this observer receives are safe with it, so that of a branch whose inner points nothing asks
+    /// for again only the start and the ends need stay in memory.
+    fn keeps_points(&self) -> bool {
+        false
+    }
 }
 
 /// An observer that lets everything pass.

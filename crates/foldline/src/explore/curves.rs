@@ -54,7 +54,16 @@ pub fn follow(
     observer: &dyn Observer,
 ) -> (Branch, bool) {
     let growth = |settings: &Settings, sides: [bool; 2], branch: &mut Branch, beginning: Option<Beginning>| {
-        let growth = Growth { system, settings, degree: plan.degree, ties: Vec::new(), sides, parents: &[], observer };
+        let growth = Growth {
+            system,
+            settings,
+            degree: plan.degree,
+            ties: Vec::new(),
+            sides,
+            parents: &[],
+            observer,
+            sparse: false,
+        };
         match beginning {
             Some(beginning) => growth.begin(branch, beginning),
             None => growth.resume(branch),

@@ -172,6 +172,8 @@ impl Work<'_> {
             sides,
             parents,
             observer: self.observer,
+            // Switching asks whether a branch is known already, and compares with the points of all.
+            sparse: self.observer.keeps_points() && !self.plan.branches.iter().any(|b| b.switching.anywhere()),
         }
     }
 

@@ -198,6 +198,8 @@ pub struct Growth<'g> {
     pub parents: &'g [SpecialPoint],
     /// Who watches.
     pub observer: &'g dyn Observer,
+    /// Whether only the start and the ends of the branch stay in memory.
+    pub sparse: bool,
 }
 
 impl Growth<'_> {
@@ -352,7 +354,11 @@ impl Growth<'_> {
 
     fn accept(&self, branch: &mut Branch, point: Point) -> bool {
         branch.insert(point.clone());
-        self.tell(Event::Point(branch, &point))
+        let going = self.tell(Event::Point(branch, &point));
+        if self.sparse {
+            branch.keep_ends();
+        }
+        going
     }
 
     fn end(&self, branch: &mut Branch, side: usize, ending: Ending) -> bool {

@@ -348,6 +348,7 @@ impl Planner<'_> {
             sides,
             parents: &[],
             observer: self.observer,
+            sparse: false,
         };
         let known = self.earlier.branch(&name).filter(|branch| !branch.points.is_empty());
         let branch = match known {

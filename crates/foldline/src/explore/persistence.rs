@@ -69,8 +69,16 @@ pub fn persistence(
     let unstable = start.point.unstable;
     let mut branch = Branch::new("persistence", family, free, Origin::Seed(String::new()));
     let sides = [!forward, forward];
-    let growth =
-        Growth { system, settings: &settings, degree, ties: Vec::new(), sides, parents: &[], observer: &UntilFold };
+    let growth = Growth {
+        system,
+        settings: &settings,
+        degree,
+        ties: Vec::new(),
+        sides,
+        parents: &[],
+        observer: &UntilFold,
+        sparse: false,
+    };
     growth.begin(&mut branch, Beginning::Inside(start));
     decided(&branch, value, forward, unstable)
 }
