@@ -135,6 +135,7 @@ fn the_other_direction_gives_the_same_special_points() {
             sides: [closed || known.points[0].parameter_slope() < 0.0, true],
             parents: &[],
             observer: &Unobserved,
+            sparse: false,
         };
         if closed {
             let growth = growth::Growth { sides: [true, false], ..growth };

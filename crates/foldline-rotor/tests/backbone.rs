@@ -192,6 +192,7 @@ fn followed(rotor: &OverhungRotor, point: &Point, free: usize, range: [f64; 2]) 
         parents: &[],
         ties: Vec::new(),
         observer: &Unobserved,
+        sparse: false,
     };
     growth.begin(&mut branch, growth::Beginning::Inside(station));
     branch

@@ -7,7 +7,8 @@ use std::time::Instant;
 const USAGE: &str = "cargo xtask TASK
   test        format, clippy without warnings, references, every test of the workspace
   check       the same without the tests
-  bench       the reference study in a release build on one thread: time, and work of each branch
+  bench       time, instructions, memory and work, written to benches/results/DATE.md; with --peers beside AUTO-07p and SciPy
+              too; --only PART and --quick for a look (docs/book/benchmarks.md)
   reproduce   every figure and claim of the reference publication in a release build, from nothing; fails where a verdict is
               not the one in crates/foldline-reproduce/verdicts.txt, which `reproduce --write` renews
   docs        the documentation of the source, without warnings";
@@ -17,7 +18,7 @@ fn main() -> ExitCode {
     let done = match task.as_str() {
         "test" => check() && cargo(&["test", "--workspace", "--quiet"]),
         "check" => check(),
-        "bench" => bench(),
+        "bench" => bench(&std::env::args().skip(2).collect::<Vec<String>>()),
         "reproduce" => reproduce(std::env::args().nth(2).as_deref() == Some("--write")),
         "docs" => docs(),
         _ => {
@@ -78,19 +79,15 @@ fn collect(folder: &Path, files: &mut Vec<PathBuf>) {
     }
 }
 
-fn bench() -> bool {
-    if !cargo(&["build", "--release", "--quiet", "--package", "foldline-cli"]) {
-        return false;
-    }
-    let program = root().join("target/release/foldline");
-    let out = root().join("target/bench");
-    // The folder of an earlier benchmark, if there is one.
-    let _ = std::fs::remove_dir_all(&out);
-    let study = root().join("studies/overhung-rotor/bouncing.toml");
-    let start = Instant::now();
-    let ran = run(Command::new(&program).arg("run").arg(study).args(["--jobs", "1", "--out"]).arg(&out));
-    eprintln!("{:.3} s", start.elapsed().as_secs_f64());
-    ran && run(Command::new(&program).arg("table").arg(&out).arg("--branches"))
+/// The command and the examples that the benchmarks run, then the benchmarks, which write benches/results/DATE.md.
+fn bench(arguments: &[String]) -> bool {
+    let build = ["build", "--release", "--quiet", "--package", "foldline-cli", "--package", "foldline-rotor"];
+    let own = ["run", "--release", "--quiet", "--package", "foldline-bench", "--"];
+    let arguments: Vec<&str> = own.into_iter().chain(arguments.iter().map(String::as_str)).collect();
+    // A selection of parts is for looking at; only the whole is a result.
+    let whole = !arguments.contains(&"--only") && !arguments.contains(&"--quick");
+    let write: &[&str] = if whole { &["--write"] } else { &[] };
+    cargo(&[&build[..], &["--bins", "--examples"]].concat()) && cargo(&[&arguments[..], write].concat())
 }
 
 /// Everything from nothing; a figure that fails, a branch that ends short or a verdict that has changed is a failure.

@@ -7,7 +7,7 @@ use crate::workplace::Workplace;
 use std::process::Command;
 
 /// How many trajectories, for how long, at which tolerance.
-pub const CASE: [&str; 3] = ["256", "100", "1e-6"];
+const CASE: [&str; 3] = ["256", "100", "1e-6"];
 
 /// Seconds and steps of the ensemble, then of the scalar loop.
 pub fn measured(place: &Workplace, case: [&str; 3]) -> Outcome<[(f64, f64); 2]> {
@@ -18,7 +18,7 @@ pub fn measured(place: &Workplace, case: [&str; 3]) -> Outcome<[(f64, f64); 2]> 
     let line = |name: &str| -> Outcome<(f64, f64)> {
         let found = text.lines().find_map(|line| line.strip_prefix(name)).ok_or_else(|| format!("no line {name}"))?;
         let numbers: Vec<f64> = found.split_whitespace().filter_map(|word| word.parse().ok()).collect();
-        let [seconds, steps] = numbers[..] else { return Err(format!("{name}{found}").into()) };
+        let [seconds, steps, ..] = numbers[..] else { return Err(format!("{name}{found}").into()) };
         Ok((seconds, steps))
     };
     Ok([line("ensemble ")?, line("scalar ")?])

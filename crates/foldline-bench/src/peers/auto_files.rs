@@ -8,8 +8,6 @@ use std::path::Path;
 /// A point of `fort.7`.
 #[derive(Clone, Copy, Debug)]
 pub struct Row {
-    /// Number of the branch.
-    pub branch: i64,
     /// 5 fold, 6 branch point, 7 period doubling, 8 torus, -4 user's value, 9 end, -9 no convergence; 1 to 3 fold, branch
     /// point and Hopf of equilibria; 0 regular.
     pub kind: i64,
@@ -41,9 +39,9 @@ pub fn rows(text: &str) -> Vec<Row> {
     let row = |line: &str| {
         let words: Vec<&str> = line.split_whitespace().collect();
         let whole = |k: usize| words.get(k).and_then(|word| word.parse::<i64>().ok());
-        let branch = whole(0).filter(|branch| *branch != 0)?;
+        // Heads of columns have no number of a branch.
+        whole(0).filter(|branch| *branch != 0)?;
         Some(Row {
-            branch: branch.abs(),
             kind: match whole(2)? {
                 kind @ (-9 | -4) => kind,
                 kind => kind % 10,
@@ -152,7 +150,7 @@ mod tests {
     fn points_are_read() {
         let text = "   0   PT\n  -1    12   5    2  1.5E+000  4.4E+001  2.0E+000\n   1    13  -9    0  1.6-101  4.4E+001  2.1E+000\n";
         let rows = rows(text);
-        assert_eq!((rows[0].branch, rows[0].kind, rows[0].label), (1, 5, 2));
+        assert_eq!((rows[0].kind, rows[0].label), (5, 2));
         assert_eq!((rows[0].parameter, rows[0].period), (1.5, 2.0));
         assert_eq!((rows[1].kind, rows[1].parameter), (-9, 1.6e-101));
     }

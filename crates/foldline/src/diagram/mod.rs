@@ -365,6 +365,15 @@ impl Branch {
         self.points.insert(at, point);
     }
 
+    /// Forgets all points but the start and the outermost two of each side, from which the branch can go on.
+    pub fn keep_ends(&mut self) {
+        let (mut index, count) = (0, self.points.len());
+        self.points.retain(|point| {
+            index += 1;
+            index <= 2 || index + 2 > count || point.position == 0
+        });
+    }
+
     /// Inserts a special point at its position.
     pub fn insert_special(&mut self, special: SpecialPoint) {
         let at = self.special.partition_point(|s| s.point.position <= special.point.position);

@@ -63,6 +63,7 @@ pub fn follow(
             parents: &[],
             observer,
             whole: false,
+            sparse: false,
         };
         match beginning {
             Some(beginning) => growth.begin(branch, beginning),

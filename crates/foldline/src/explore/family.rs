@@ -173,6 +173,8 @@ impl Work<'_> {
             parents,
             observer: self.observer,
             whole: false,
+            // Switching asks whether a branch is known already, and compares with the points of all.
+            sparse: self.observer.stores() && !self.plan.branches.iter().any(|b| b.switching.anywhere()),
         }
     }
 

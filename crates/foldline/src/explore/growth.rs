@@ -201,6 +201,8 @@ pub struct Growth<'g> {
     pub observer: &'g dyn Observer,
     /// Whether inner points stay in memory whole even where the observer could recall them.
     pub whole: bool,
+    /// Whether only the start and the ends of the branch stay in memory.
+    pub sparse: bool,
 }
 
 /// Points at either end of a branch that are always whole: what goes on from there needs them.
@@ -364,7 +366,9 @@ impl Growth<'_> {
     fn accept(&self, branch: &mut Branch, point: Point) -> bool {
         branch.insert(point.clone());
         let going = self.tell(Event::Point(branch, &point));
-        if !self.whole && self.observer.stores() && branch.points.len() > 2 * WHOLE {
+        if self.sparse {
+            branch.keep_ends();
+        } else if !self.whole && self.observer.stores() && branch.points.len() > 2 * WHOLE {
             let forward = branch.points.last().is_some_and(|last| last.position == point.position);
             let inner = if forward { branch.points.len() - 1 - WHOLE } else { WHOLE };
             branch.points[inner..=inner].iter_mut().filter(|p| p.position != 0).for_each(Point::lighten);

@@ -350,6 +350,7 @@ impl Planner<'_> {
             observer: self.observer,
             // Where a run does not arrive, others begin at points inside it.
             whole: true,
+            sparse: false,
         };
         let known = self.earlier.branch(&name).filter(|branch| !branch.points.is_empty());
         let branch = match known {

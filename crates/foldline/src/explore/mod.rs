@@ -31,6 +31,8 @@ pub mod responses;
 pub mod seeds;
 pub mod switch;
 pub mod system;
+#[cfg(test)]
+mod tests;
 
 pub use persistence::{Persistence, persistence};
 pub use plan::{
@@ -47,6 +49,9 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Carries out a plan with that many threads. `earlier` is what an interrupted run of the same plan has already: finished
 /// sides are kept, unfinished ones are continued from their last point.
+///
+/// With an observer that [keeps the points](Observer::stores) branches come back with their start, ends and special
+/// points only, unless the plan switches at special points: memory does not grow with the number of points then.
 pub fn run(system: &System, plan: &Plan, jobs: usize, earlier: Diagram, observer: &dyn Observer) -> Diagram {
     let seeds = seeds::find(system, plan, jobs, &earlier, observer);
     let families = family::roots(plan);

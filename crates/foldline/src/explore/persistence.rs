@@ -78,6 +78,7 @@ pub fn persistence(
         parents: &[],
         observer: &UntilFold,
         whole: true,
+        sparse: false,
     };
     growth.begin(&mut branch, Beginning::Inside(start));
     decided(&branch, value, forward, unstable)

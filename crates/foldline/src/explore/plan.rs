@@ -65,6 +65,11 @@ impl Switching {
         self.depth.iter().find(|(k, _)| *k == kind).map_or(0, |(_, d)| *d)
     }
 
+    /// Whether it switches at any kind.
+    pub fn anywhere(&self) -> bool {
+        self.depth.iter().any(|(_, depth)| *depth > 0)
+    }
+
     /// What remains for a branch that was reached by switching at a point of that kind.
     pub fn below(&self, kind: Kind) -> Switching {
         Switching {
