@@ -44,7 +44,7 @@ pub fn reference_study() -> Result<Outcome, Failure> {
     let recorder = Recorder::create(&folder, &study)?;
     let outcome = run(&study, processors(), recorder, Diagram::default(), &folder)?;
     // What the run still has in memory need not be all of it.
-    let diagram = crate::table::read(&folder)?.diagram;
+    let diagram = crate::table::read(&folder, foldline_store::run_file::Part::Everything)?.diagram;
     // In full view the peak of contact S, r = 51.7, would press everything else against the axis.
     let picture = Picture { window: Some([0.5, 12.0, 0.0, 11.0]), ..Picture::default() };
     for name in ["diagram.svg", "diagram.png"] {
