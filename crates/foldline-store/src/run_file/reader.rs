@@ -40,6 +40,8 @@ pub enum Part {
 /// What every point has that is a few numbers; special points have [`OF_SPECIAL`] besides.
 const NUMBERS: &str = "position, degree, unstable, newton, factorisations, rejected, parameter_bytes, spectrum_bytes, \
      range_bytes, scalar_bytes";
+/// Likewise, since format 3.
+const LATER_NUMBERS: &str = ", evaluations, linearisations";
 const OF_SPECIAL: &str = "kind, unstable_before, unstable_after";
 
 /// Reads the run in `folder`, which may still be growing.
@@ -126,7 +128,13 @@ fn is_empty(connection: &Connection) -> rusqlite::Result<bool> {
 pub(super) fn load_diagram(connection: &Connection, path: &Path, part: Part) -> Result<Diagram, RunFileError> {
     let (of_points, of_special) = match part {
         Part::Everything => ("*".to_string(), "*".to_string()),
-        Part::Numbers | Part::Special => (NUMBERS.to_string(), format!("{NUMBERS}, {OF_SPECIAL}")),
+        Part::Numbers | Part::Special => {
+            let version: i64 = connection
+                .pragma_query_value(None, "user_version", |row| row.get(0))
+                .map_err(|error| RunFileError::Database(path.to_path_buf(), error))?;
+            let numbers = format!("{NUMBERS}{}", if version < 3 { "" } else { LATER_NUMBERS });
+            (numbers.clone(), format!("{numbers}, {OF_SPECIAL}"))
+        }
     };
     let mut diagram = Diagram::default();
     let branches = read(connection, path, "SELECT * FROM branches ORDER BY branch", &[], |row| {

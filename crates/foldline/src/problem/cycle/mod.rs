@@ -29,6 +29,7 @@ use super::gauss::Scheme;
 use super::{Setting, extremes, mesh};
 use crate::contract::{Batch, Examination, Parameters, Singular, ZeroProblem};
 use crate::diagram::{Cycle, Mesh, Point, Solution, Trust};
+use crate::linalg::panel;
 use crate::linalg::system::System;
 use crate::linalg::{axpy, larger, max_abs};
 use crate::stability::floquet;
@@ -165,22 +166,22 @@ impl ZeroProblem for CycleProblem<'_> {
         self.period_scale = u[size].abs().max(f64::MIN_POSITIVE);
         self.phase.fill(0.0);
         let (mut length, mut offset) = (0.0, 0.0);
-        let mut slope = vec![0.0; n];
-        for j in 0..self.intervals() {
-            let h = self.h(j);
+        let count = self.intervals();
+        let nodes = panel::by_component(&u[..size], m + 1, n);
+        let mut rises = vec![0.0; m * count];
+        for c in 0..n {
+            let own = &nodes[c * (m + 1) * count..(c + 1) * (m + 1) * count];
+            panel::multiply(&self.scheme.derivative, own, count, &mut rises);
+            let scale = 1.0 / (self.scale[c] * self.scale[c]);
             for i in 0..m {
-                slope.fill(0.0);
-                for k in 0..=m {
-                    let node = &u[(j * (m + 1) + k) * n..(j * (m + 1) + k + 1) * n];
-                    axpy(self.scheme.derivative[i * (m + 1) + k] / h, node, &mut slope);
-                }
-                let x = &u[(j * (m + 1) + i + 1) * n..(j * (m + 1) + i + 2) * n];
-                let first = self.phase_at(j, i);
-                for c in 0..n {
-                    let weighted = slope[c] / (self.scale[c] * self.scale[c]);
-                    length += h * self.scheme.weights[i] * slope[c] * weighted;
-                    offset += h * self.scheme.weights[i] * x[c] * weighted;
-                    self.phase[first + c * self.width] = weighted;
+                let weight = self.scheme.weights[i] * scale;
+                for j in 0..count {
+                    let (rise, h) = (rises[i * count + j], self.h(j));
+                    // With X̃' = rise / h.
+                    length += weight * rise * rise / h;
+                    offset += weight * own[(i + 1) * count + j] * rise;
+                    let at = self.phase_at(j, i) + c * self.width;
+                    self.phase[at] = scale * rise / h;
                 }
             }
         }
