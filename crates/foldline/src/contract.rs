@@ -123,9 +123,15 @@ pub trait ZeroProblem {
     /// Carries a vector from one mesh to another.
     fn transfer(&self, v: &[f64], from: &Mesh, to: &Mesh) -> Vec<f64>;
 
-    /// The mesh on which `u` would meet `tolerance`, or `None` where the current one serves. The last factorisation must be
-    /// one near `u` on the current mesh.
+    /// The mesh on which `u` would meet `tolerance`, or `None` where it does on the current one. The last factorisation must
+    /// be one near `u` on the current mesh.
     fn better_mesh(&self, u: &[f64], tolerance: f64) -> Option<Mesh>;
+
+    /// A mesh with fewer intervals, where less than half of them would do for `tolerance`; asked like
+    /// [`ZeroProblem::better_mesh`].
+    fn coarser_mesh(&self, _u: &[f64], _tolerance: f64) -> Option<Mesh> {
+        None
+    }
 
     /// A mesh with every interval halved; `None` for problems that have none.
     fn finer_mesh(&self) -> Option<Mesh>;

@@ -123,7 +123,7 @@ pub fn correct_within(
     cost: &mut Cost,
 ) -> Result<(), Failure> {
     let size = problem.unknowns();
-    let goal = settings.closeness(&problem.mesh());
+    let goal = settings.closeness(&problem.mesh(), f64::INFINITY);
     let (mut r, mut du, mut gap) = (vec![0.0; size], vec![0.0; size], vec![0.0; size]);
     let mut sizes: Vec<f64> = Vec::new();
     let mut fresh = true;
@@ -232,20 +232,19 @@ pub fn arrive(
 }
 
 /// A station next to `u`, which is nearly converged, in the hyperplane through it across `along`: tangent (2), stability,
-/// error estimates. The tangent makes an acute angle with `along`; `direction` is +1 where travel is towards larger
+/// error estimates, from a matrix no farther than `close`. The tangent makes an acute angle with `along`; `direction` is +1 where travel is towards larger
 /// positions, else -1.
 ///
 /// # Errors
 /// See [`Failure`].
 pub fn station(
     problem: &mut dyn ZeroProblem,
-    settings: &Settings,
     mut u: Vec<f64>,
     along: &[f64],
+    close: f64,
     direction: f64,
     cost: &mut Cost,
 ) -> Result<Station, Failure> {
-    let close = settings.closeness(&problem.mesh());
     let tangent = arrive(problem, &mut u, along, close, cost)?;
     Ok(examined(problem, u, tangent, direction))
 }
@@ -266,6 +265,15 @@ const TIGHTER: f64 = 0.05;
 /// Defect, in tolerances, below which the next point may do with a mesh for four times the error.
 const RELAXED: f64 = 0.5;
 
+/// What [`refine`] aims at.
+#[derive(Clone, Copy, Debug)]
+pub struct Aim {
+    /// Share of the tolerance to begin with, as [`Station::share`].
+    pub share: f64,
+    /// How far from the point its matrix may be taken; see [`Settings::closeness`].
+    pub close: f64,
+}
+
 /// Corrects `u` in `plane` and [`refine`]s it.
 ///
 /// # Errors
@@ -279,11 +287,12 @@ pub fn settle(
     cost: &mut Cost,
 ) -> Result<Station, Failure> {
     correct(problem, settings, &plane, &mut u, cost)?;
-    refine(problem, settings, 1.0, plane.row, u, direction, cost)
+    let aim = Aim { share: 1.0, close: settings.closeness(&problem.mesh(), plane.distance) };
+    refine(problem, settings, aim, plane.row, u, direction, cost)
 }
 
 /// Adapts the mesh at `u`, which has been corrected, until the error estimate meets the tolerance, and both defects of the
-/// multipliers five times that. It begins with that `share` of the tolerance. The problem is left on the mesh of the result
+/// multipliers five times that. The problem is left on the mesh of the result
 /// and anchored there.
 ///
 /// # Errors
@@ -291,18 +300,19 @@ pub fn settle(
 pub fn refine(
     problem: &mut dyn ZeroProblem,
     settings: &Settings,
-    share: f64,
+    aim: Aim,
     mut row: Vec<f64>,
     mut u: Vec<f64>,
     direction: f64,
     cost: &mut Cost,
 ) -> Result<Station, Failure> {
-    let (mut tolerance, mut tightened) = (share * settings.tolerance, false);
+    let (mut tolerance, mut tightened) = (aim.share * settings.tolerance, aim.share <= TIGHTER);
+    let mut coarser = problem.coarser_mesh(&u, tolerance);
     for round in 0..4 {
         for attempt in 0..10 {
             // A layer that lies differently between the nodes of every new mesh needs some more of them than one expects.
             let wanted = tolerance * 0.7f64.powi((attempt - 2).max(0));
-            let Some(better) = problem.better_mesh(&u, wanted) else { break };
+            let Some(better) = coarser.take().or_else(|| problem.better_mesh(&u, wanted)) else { break };
             let from = problem.mesh();
             // The hyperplane through the point itself, so that remeshing does not move it along the curve.
             u = problem.transfer(&u, &from, &better);
@@ -312,24 +322,25 @@ pub fn refine(
             let plane = Plane { row: row.clone(), base: u.clone(), distance: 0.0 };
             correct(problem, settings, &plane, &mut u, cost)?;
         }
-        let mut found = station(problem, settings, u, &row, direction, cost)?;
+        let mut found = station(problem, u, &row, aim.close, direction, cost)?;
         let trust = found.point.trust;
         let defect = trust.trivial_defect.max(trust.liouville_defect);
         // Multipliers can need a finer mesh than the profile. Where they do not get better with it, the defects say so.
         let accurate = defect <= 5.0 * settings.tolerance || round == 3;
         // Whether a multiplier lies inside or outside the unit circle must not be a matter of its error.
-        let close = |z: &num_complex::Complex64| z.norm().ln().abs() < CERTAIN * defect;
-        let certain = !settings.stability || tightened || round == 3 || !found.point.free_spectrum().iter().any(close);
+        let close = |defect: f64| found.point.free_spectrum().iter().any(|z| z.norm().ln().abs() < CERTAIN * defect);
+        let certain = !settings.stability || tightened || round == 3 || !close(defect);
         if accurate && certain {
             if trust.discretisation > 1.5 * settings.tolerance {
                 return Err(Failure::Mesh(trust.discretisation));
             }
-            let usual = if tightened { tolerance / TIGHTER } else { tolerance };
-            let share = usual / settings.tolerance;
             // Errors of multipliers shrink at least as fast as those of the profile.
-            found.share =
-                if round == 0 && defect <= RELAXED * settings.tolerance { (4.0 * share).min(1.0) } else { share };
-            found.roomier = problem.better_mesh(&found.u, 0.5 * usual);
+            let ample = round == 0 && defect <= RELAXED * settings.tolerance && !close(defect / TIGHTER);
+            found.share = tolerance / settings.tolerance;
+            if ample {
+                found.share = (4.0 * found.share).min(1.0);
+            }
+            found.roomier = problem.better_mesh(&found.u, 0.5 * tolerance);
             return Ok(found);
         }
         u = found.u;

@@ -5,7 +5,7 @@
 //! next step.
 
 use super::Settings;
-use super::corrector::{Failure, Plane, Station, correct, refine, station};
+use super::corrector::{Aim, Failure, Plane, Station, correct, refine, station};
 use super::inspect::{Found, History};
 use crate::contract::{Monitor, Verdict, ZeroProblem};
 use crate::diagram::{Cost, Ending, Kind, Mesh, Point, SpecialPoint};
@@ -220,8 +220,9 @@ impl Follow<'_> {
             self.place(left);
             let plane = Plane { row: left.tangent.clone(), base: left.u.clone(), distance: 0.0 };
             let (mut u, mut cost) = (left.u.clone(), Cost::default());
+            let close = self.settings.closeness(&left.mesh, step);
             let corrected = correct(self.problem, self.settings, &plane, &mut u, &mut cost)
-                .and_then(|()| station(self.problem, self.settings, u, &plane.row, self.direction, &mut cost));
+                .and_then(|()| station(self.problem, u, &plane.row, close, self.direction, &mut cost));
             if let Ok(found) = corrected {
                 (left.u, left.tangent) = (found.u, found.tangent);
             }
@@ -272,7 +273,8 @@ impl Follow<'_> {
     ) -> Result<Step, Failure> {
         let guess = self.predicted(left, trail, step);
         let u = self.corrected(left, &guess, step, cost)?;
-        let mut right = refine(self.problem, self.settings, left.share, left.tangent.clone(), u, self.direction, cost)?;
+        let aim = Aim { share: left.share, close: self.settings.closeness(&left.mesh, step) };
+        let mut right = refine(self.problem, self.settings, aim, left.tangent.clone(), u, self.direction, cost)?;
         if right.mesh != left.mesh && step < SHORT * self.settings.tolerance {
             return Err(Failure::Remeshed(right.mesh));
         }

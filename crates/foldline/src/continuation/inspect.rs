@@ -5,7 +5,7 @@
 //! that the special point found does not explain, or while a monitor bends so much that it may have touched zero and come
 //! back. What stays unexplained at the end of that is recorded as such: no silent change of stability.
 
-use super::corrector::{Failure, Station, refine};
+use super::corrector::{Aim, Failure, Station, refine};
 use super::follow::Follow;
 use super::locate::{Located, Stretch, locate};
 use super::straddle::straddle;
@@ -164,7 +164,8 @@ impl Follow<'_> {
     /// A full station at distance s of the stretch.
     pub(super) fn cut(&mut self, left: &Station, stretch: &Stretch, s: f64, cost: &mut Cost) -> Option<Station> {
         let u = stretch.corrected(self.problem, self.settings, s, cost).ok()?;
-        refine(self.problem, self.settings, left.share, left.tangent.clone(), u, self.direction, cost).ok()
+        let aim = Aim { share: left.share, close: self.settings.closeness(&left.mesh, s) };
+        refine(self.problem, self.settings, aim, left.tangent.clone(), u, self.direction, cost).ok()
     }
 
     /// Whether the parabola through three values of some monitor comes close to zero between the last two without the

@@ -76,7 +76,7 @@ impl<'s> Stretch<'s> {
         cost: &mut Cost,
     ) -> Result<(Vec<f64>, Vec<f64>), Failure> {
         let mut u = self.corrected(problem, settings, s, cost)?;
-        let close = settings.closeness(&self.left.mesh);
+        let close = settings.closeness(&self.left.mesh, self.length);
         let tangent = arrive(problem, &mut u, &self.left.tangent, close, cost)?;
         Ok((u, tangent))
     }
@@ -291,7 +291,7 @@ impl Station {
     /// A mesh on which this point would meet the tolerance, if its own does not. Belongs right after the station was made,
     /// while its factorisation is the last one.
     fn better(&self, problem: &mut dyn ZeroProblem, tolerance: f64) -> Option<crate::diagram::Mesh> {
-        problem.better_mesh(&self.u, tolerance).filter(|better| 2 * better.len() >= self.mesh.len())
+        problem.better_mesh(&self.u, tolerance)
     }
 }
 
@@ -339,7 +339,7 @@ fn relocate(
     // Far enough below the tolerance that the error of the iteration does not show.
     let enough = 1e-2 * settings.tolerance;
     let reach = stretch.length.abs();
-    let (mut a, (mut ga, mut found)) = (0.0, at(base, 0.1 * settings.tolerance)?);
+    let (mut a, (mut ga, mut found)) = (0.0, at(base, settings.closeness(finer, stretch.length))?);
     let mut step = match *slope {
         Some(slope) if (ga / slope).abs() < reach => -ga / slope,
         _ => 1e-2 * reach,

@@ -83,9 +83,11 @@ impl Settings {
     }
 
     /// How far from a point the matrix may be taken that gives its tangent and its multipliers, relative. Next to errors of
-    /// discretisation a tenth of the tolerance does not show; where there are none the iteration goes all the way.
-    pub fn closeness(&self, mesh: &crate::diagram::Mesh) -> f64 {
-        if mesh.is_empty() { self.newton_tolerance() } else { (0.1 * self.tolerance).max(1e-11) }
+    /// discretisation a tenth of the tolerance does not show, nor does a thousandth of the step of that `length` in what
+    /// changes along it; where there is no mesh the iteration goes all the way.
+    pub fn closeness(&self, mesh: &crate::diagram::Mesh, length: f64) -> f64 {
+        let far = if mesh.is_empty() { 0.0 } else { (0.1 * self.tolerance).min(1e-3 * length.abs()) };
+        far.max(self.newton_tolerance())
     }
 
     /// Size of the last Newton update, relative: far enough below the tolerance that iteration errors do not show.

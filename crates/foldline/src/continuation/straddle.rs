@@ -59,7 +59,7 @@ pub fn straddle(
             problem.anchor(&u);
             let plane = Plane { row: row.clone(), base: u.clone(), distance: 0.0 };
             correct(problem, settings, &plane, &mut u, cost)?;
-            refined.push(station(problem, settings, u, &row, stretch.direction, cost)?);
+            refined.push(station(problem, u, &row, settings.newton_tolerance(), stretch.direction, cost)?);
         }
         root = zero(&nodes, &refined.iter().map(value).collect::<Vec<_>>())?;
         stations = refined;

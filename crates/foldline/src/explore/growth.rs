@@ -161,7 +161,8 @@ pub(super) fn revived(
     let u = problem.unknowns_of(point);
     let tangent: Vec<f64> = point.tangent.iter().map(|t| direction * t).collect();
     problem.anchor(&u);
-    let mut found = station(problem, settings, u.clone(), &tangent, direction, &mut Cost::default())?;
+    let close = settings.closeness(&problem.mesh(), f64::INFINITY);
+    let mut found = station(problem, u.clone(), &tangent, close, direction, &mut Cost::default())?;
     found.roomier = problem.better_mesh(&found.u, 0.5 * settings.tolerance);
     found.point = point.clone();
     (found.u, found.tangent) = (u, tangent);

@@ -100,7 +100,8 @@ fn first_point(
 ) -> Result<Station, Failure> {
     let (mut u, mut cost) = (guess.clone(), Cost::default());
     correct(problem, settings, &plane, &mut u, &mut cost)?;
-    let found = station(problem, settings, u, &plane.row, 1.0, &mut cost)?;
+    let close = settings.closeness(&problem.mesh(), plane.distance);
+    let found = station(problem, u, &plane.row, close, 1.0, &mut cost)?;
     let trust = found.point.trust;
     let defect = trust.trivial_defect.max(trust.liouville_defect);
     if trust.discretisation <= settings.tolerance && defect <= 5.0 * settings.tolerance {

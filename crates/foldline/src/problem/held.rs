@@ -237,6 +237,10 @@ impl ZeroProblem for Held<'_> {
         self.surface.better_mesh(&u[self.extra()..], tolerance)
     }
 
+    fn coarser_mesh(&self, u: &[f64], tolerance: f64) -> Option<Mesh> {
+        self.surface.coarser_mesh(&u[self.extra()..], tolerance)
+    }
+
     fn finer_mesh(&self) -> Option<Mesh> {
         self.surface.finer_mesh()
     }

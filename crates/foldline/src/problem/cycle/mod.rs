@@ -134,6 +134,16 @@ impl<'a> CycleProblem<'a> {
         self.mesh[j + 1] - self.mesh[j]
     }
 
+    /// A mesh for that tolerance, from the errors on the current one.
+    fn equidistributed(&self, errors: &[f64], tolerance: f64, kept: f64) -> Option<Mesh> {
+        let (degree, target) = (self.scheme.degree, TARGET * tolerance);
+        if self.halves {
+            mesh::equidistributed_in_halves(errors, &self.mesh, degree, target, kept)
+        } else {
+            mesh::equidistributed(errors, &self.mesh, degree, target, kept)
+        }
+    }
+
     /// Largest |component| over the profile; NaN where one is.
     fn sizes(&self, u: &[f64]) -> Vec<f64> {
         // All components of all nodes of an interval at once, so that the loop is one over lanes.
@@ -298,14 +308,14 @@ impl ZeroProblem for CycleProblem<'_> {
     fn better_mesh(&self, u: &[f64], tolerance: f64) -> Option<Mesh> {
         let errors = self.errors(u);
         let worst = errors.iter().fold(0.0, |m: f64, e| m.max(*e));
-        let degree = self.scheme.degree;
-        let (target, kept) = (TARGET * tolerance, if worst > tolerance { KEPT } else { 0.0 });
-        let better = if self.halves {
-            mesh::equidistributed_in_halves(&errors, &self.mesh, degree, target, kept)?
-        } else {
-            mesh::equidistributed(&errors, &self.mesh, degree, target, kept)?
-        };
-        (worst > tolerance || 2 * better.len() < self.mesh.len()).then_some(better)
+        (worst > tolerance).then(|| self.equidistributed(&errors, tolerance, KEPT)).flatten()
+    }
+
+    fn coarser_mesh(&self, u: &[f64], tolerance: f64) -> Option<Mesh> {
+        let errors = self.errors.clone().unwrap_or_else(|| self.measured_errors(u));
+        let enough = self.equidistributed(&errors, tolerance, 0.0)?;
+        // Not all at once: where errors of the ends dominate they grow with a higher power than reckoned with.
+        (2 * enough.len() < self.mesh.len()).then(|| self.equidistributed(&errors, tolerance, KEPT)).flatten()
     }
 
     fn finer_mesh(&self) -> Option<Mesh> {
