@@ -336,10 +336,17 @@ fn relocate(
         let found = seen_by(monitor, problem, u, tangent, stretch.direction);
         Ok((monitor.value(&stretch.left.point, &found.point), found))
     };
-    // Far enough below the tolerance that the error of the iteration does not show.
-    let enough = 1e-2 * settings.tolerance;
     let reach = stretch.length.abs();
+<<<<<<< Updated upstream
     let (mut a, (mut ga, mut found)) = (0.0, at(base, settings.closeness(finer, stretch.length))?);
+=======
+    // So far below the tolerance that the error of the iteration does not show, and on a short stretch so little of it that
+    // the monitor has no doubt.
+    let enough = (1e-2 * settings.tolerance).min(1e-3 * reach);
+    // Of two values closer together than this the difference is noise.
+    let apart = (100.0 * settings.tolerance).min(1e-2 * reach);
+    let (mut a, (mut ga, mut found)) = (0.0, at(base, 0.1 * settings.tolerance)?);
+>>>>>>> Stashed changes
     let mut step = match *slope {
         Some(slope) if (ga / slope).abs() < reach => -ga / slope,
         _ => 1e-2 * reach,
@@ -363,9 +370,8 @@ fn relocate(
         }
         let from = found.u.iter().zip(&found.tangent).map(|(u, t)| u + (b - a) * t).collect();
         let (gb, next) = at(from, settings.newton_tolerance())?;
-        // Of two values that are close together the difference is noise.
         let rise = match *slope {
-            Some(slope) if (b - a).abs() < 100.0 * settings.tolerance => slope,
+            Some(slope) if (b - a).abs() < apart => slope,
             _ => (gb - ga) / (b - a),
         };
         step = -gb / rise;
