@@ -337,16 +337,12 @@ fn relocate(
         Ok((monitor.value(&stretch.left.point, &found.point), found))
     };
     let reach = stretch.length.abs();
-<<<<<<< Updated upstream
-    let (mut a, (mut ga, mut found)) = (0.0, at(base, settings.closeness(finer, stretch.length))?);
-=======
     // So far below the tolerance that the error of the iteration does not show, and on a short stretch so little of it that
     // the monitor has no doubt.
     let enough = (1e-2 * settings.tolerance).min(1e-3 * reach);
     // Of two values closer together than this the difference is noise.
     let apart = (100.0 * settings.tolerance).min(1e-2 * reach);
-    let (mut a, (mut ga, mut found)) = (0.0, at(base, 0.1 * settings.tolerance)?);
->>>>>>> Stashed changes
+    let (mut a, (mut ga, mut found)) = (0.0, at(base, settings.closeness(finer, stretch.length))?);
     let mut step = match *slope {
         Some(slope) if (ga / slope).abs() < reach => -ga / slope,
         _ => 1e-2 * reach,

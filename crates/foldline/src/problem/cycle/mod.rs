@@ -312,7 +312,7 @@ impl ZeroProblem for CycleProblem<'_> {
     }
 
     fn coarser_mesh(&self, u: &[f64], tolerance: f64) -> Option<Mesh> {
-        let errors = self.errors.clone().unwrap_or_else(|| self.measured_errors(u));
+        let errors = self.errors(u);
         let enough = self.equidistributed(&errors, tolerance, 0.0)?;
         // Not all at once: where errors of the ends dominate they grow with a higher power than reckoned with.
         (2 * enough.len() < self.mesh.len()).then(|| self.equidistributed(&errors, tolerance, KEPT)).flatten()
