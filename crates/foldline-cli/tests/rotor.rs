@@ -136,6 +136,7 @@ fn the_other_direction_gives_the_same_special_points() {
             parents: &[],
             observer: &Unobserved,
             sparse: false,
+            whole: true,
         };
         if closed {
             let growth = growth::Growth { sides: [true, false], ..growth };

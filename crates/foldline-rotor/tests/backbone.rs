@@ -193,6 +193,7 @@ fn followed(rotor: &OverhungRotor, point: &Point, free: usize, range: [f64; 2]) 
         ties: Vec::new(),
         observer: &Unobserved,
         sparse: false,
+        whole: true,
     };
     growth.begin(&mut branch, growth::Beginning::Inside(station));
     branch
