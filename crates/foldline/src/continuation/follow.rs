@@ -61,6 +61,8 @@ const FARTHEST: f64 = 2.5;
 const SHORT: f64 = 200.0;
 /// Step down to which a change of stability without explanation is taken for a jump to another branch.
 const SURE: f64 = 1e-4;
+/// Step down to which a branch point without a symmetry that makes it is taken for two branches that pass each other.
+const CROSSING: f64 = 2e-3;
 
 /// Growth of the period from which on a parameter that stands still means that the period has no bound.
 const LONG: f64 = 3.0;
@@ -95,8 +97,11 @@ pub fn follow(
         let (Step { mut right, end }, found) = loop {
             let attempt = walk.attempt(&left, trail.as_ref(), step, emitted, &mut cost).and_then(|tried| {
                 let found = walk.inspect(&left, &tried.right, history.as_ref(), 0, &mut cost);
-                let unexplained = found.iter().any(|f| matches!(f, Found::Special(s) if s.kind == Kind::Unexplained));
-                if unexplained && step > SURE { Err(Failure::Unexplained) } else { Ok((tried, found)) }
+                let believed = found.iter().all(|f| match f {
+                    Found::Special(s) => step <= walk.believed_at(s.kind),
+                    Found::Inserted(..) => true,
+                });
+                if believed { Ok((tried, found)) } else { Err(Failure::Unexplained) }
             });
             match attempt {
                 Ok(accepted) => break accepted,
@@ -185,6 +190,15 @@ fn ended_by(why: Failure, parameter: f64) -> Ending {
 }
 
 impl Follow<'_> {
+    /// The longest step in which something of that kind is believed.
+    fn believed_at(&self, kind: Kind) -> f64 {
+        match kind {
+            Kind::Unexplained => SURE,
+            Kind::BranchPoint if self.settings.reflections.len() < 2 => CROSSING,
+            _ => f64::INFINITY,
+        }
+    }
+
     pub(super) fn place(&mut self, station: &Station) {
         self.problem.set_mesh(&station.mesh);
         self.problem.anchor(&station.u);
