@@ -189,8 +189,8 @@ impl<'a> Ensemble<'a> {
         kinks: &mut Vec<(usize, Kink)>,
         observe: &mut dyn FnMut(&Step) -> Verdict,
     ) {
-        // NaN is too large as well.
-        if !(self.lanes.error[l] <= 1.0) {
+        let error = self.lanes.error[l];
+        if error.is_nan() || error > 1.0 {
             return self.reject(l);
         }
         let tried = self.lanes.h[l];
@@ -210,7 +210,8 @@ impl<'a> Ensemble<'a> {
         let remaining = self.end - end_time;
         // A last step a little longer than planned saves a tiny one.
         lanes.h[l] = if h.abs() * 1.01 >= remaining.abs() { remaining } else { h };
-        run.done = if !(lanes.largest[l] <= run.bound) {
+        let largest = lanes.largest[l];
+        run.done = if largest.is_nan() || largest > run.bound {
             Some(Outcome::Escaped)
         } else if verdict == Verdict::Stop {
             Some(Outcome::Stopped)
