@@ -16,7 +16,7 @@ const USAGE: &str = "cargo xtask TASK
 fn main() -> ExitCode {
     let task = std::env::args().nth(1).unwrap_or_default();
     let done = match task.as_str() {
-        "test" => check() && cargo(&["test", "--workspace", "--quiet"]),
+        "test" => check() && cargo(&["test", "--workspace", "--quiet", "--no-fail-fast"]),
         "check" => check(),
         "bench" => bench(&std::env::args().skip(2).collect::<Vec<String>>()),
         "reproduce" => reproduce(std::env::args().nth(2).as_deref() == Some("--write")),
