@@ -33,6 +33,9 @@ const STEADY: f64 = 0.3;
 const WORTHWHILE: [f64; 2] = [0.1, 5e-3];
 /// Largest distance of a predicted limit from the last return, relative to the extent.
 const REACH: f64 = 0.5;
+/// Difference, relative to the extent, below which successive turns are one motion: a spiral that turns by nearly half a
+/// revolution per turn comes much closer to where it was two turns ago.
+const SAME: f64 = 1e-5;
 /// Decrease of a distance over the last returns that counts as an approach.
 const APPROACHED: f64 = 0.95;
 
@@ -216,7 +219,7 @@ impl Returns {
     pub(super) fn closest(&self, extent: &[f64]) -> Option<Prediction> {
         let mut found: Vec<Prediction> = (1..=MOST_CROSSINGS).filter_map(|q| self.predict(q, extent)).collect();
         let least = found.iter().fold(f64::INFINITY, |m, p| m.min(p.size));
-        found.retain(|p| p.size <= 10.0 * least + 1e-7);
+        found.retain(|p| p.size <= 10.0 * least + SAME);
         found.into_iter().next()
     }
 }

@@ -34,7 +34,7 @@ const ROUGH: usize = 6144;
 /// Predicted limits that are tried; after those the trajectory is left to itself.
 pub(super) const JUMPS: usize = 8;
 /// Steps of all rounds after which a motion counts as neither at rest nor periodic.
-pub(super) const STEPS: usize = 200_000;
+pub(super) const STEPS: usize = 400_000;
 /// Predictions from which contraction can be told.
 const SEEN: usize = 12;
 /// Contraction over the predictions of a round: for few of them, and for many.
