@@ -19,6 +19,9 @@ const RECURRENT: f64 = 0.001;
 /// … and relative to the last returns of the trajectory.
 const BETTER: f64 = 0.1;
 
+/// Samples per step of a trajectory that is to be polished.
+const PARTS: usize = 4;
+
 /// What all trajectories of a survey share.
 #[derive(Clone, Copy)]
 pub(super) struct Context<'a> {
@@ -53,9 +56,26 @@ impl Context<'_> {
         Some(Orbit::new(once.unwrap_or(point), &self.sampling.scales, self.sampling.whirl))
     }
 
+    /// The trajectory from a state on a cycle over its period.
+    pub(super) fn turn(&self, state: &[f64], period: f64) -> Candidate {
+        let integrator = Integrator::new(self.field, self.parameters, self.tolerance()).with_step_limit(FOLLOWED);
+        let (mut times, mut states) = (vec![0.0], state.to_vec());
+        let mut x = vec![0.0; state.len()];
+        integrator.trajectory(state, [0.0, period], &[], &mut |passage| {
+            let Passage::Step(step) = passage else { return Verdict::Continue };
+            for part in 1..=PARTS {
+                let theta = part as f64 / PARTS as f64;
+                step.state_into(theta, &mut x);
+                times.push(step.time_at(theta));
+                states.extend_from_slice(&x);
+            }
+            Verdict::Continue
+        });
+        Candidate::Cycle { period, times, states }
+    }
+
     /// The trajectory from a predicted limit over one period, if it comes back.
     pub(super) fn follow(&self, returns: &Returns, prediction: &Prediction, extent: &[f64]) -> Option<Candidate> {
-        const PARTS: usize = 4;
         let n = extent.len();
         let mut plane = returns.again_from(&prediction.state);
         let integrator = Integrator::new(self.field, self.parameters, self.tolerance()).with_step_limit(FOLLOWED);

@@ -5,10 +5,11 @@
 
 use super::candidate::Context;
 use super::orbit::Orbit;
+use super::settling::{Trial, settle_together};
 use super::watch::Watch;
-use super::{Attractor, Census, Enough, Polish, Sampling};
+use super::{Attractor, Candidate, Census, Enough, Polish, Sampling};
 use crate::contract::{VectorField, Verdict};
-use crate::diagram::Point;
+use crate::diagram::{Motion, Point};
 use crate::simulation::{Ensemble, Outcome};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -119,7 +120,8 @@ fn add(watched: Watched, first: usize, reached: &mut Vec<Reached>, census: &mut 
     }
 }
 
-/// The attractor to which the trajectory from `start` `[n]` goes; `None` where it escapes or does not settle.
+/// The attractor to which the trajectory from `start` `[n]` goes; `None` where it escapes or does not settle. Where the watch
+/// sees none, as with cycles of many turns, the trajectory is followed until it repeats itself.
 pub fn settle(
     field: &dyn VectorField,
     parameters: &[f64],
@@ -127,11 +129,26 @@ pub fn settle(
     start: &[f64],
     polish: Polish,
 ) -> Option<Point> {
-    let mut watched = watch_block(&Context { field, parameters, sampling, polish }, start, &[], &|_| false);
+    let context = Context { field, parameters, sampling, polish };
+    let mut watched = watch_block(&context, start, &[], &|_| false);
     match watched.fates.first() {
         Some(Fate::Settled(index)) if *index < watched.orbits.len() => Some(watched.orbits.swap_remove(*index).point),
+        Some(Fate::Unsettled) => patiently(&context, start),
         _ => None,
     }
+}
+
+/// The same by simulation alone, up to the last Newton steps.
+fn patiently(context: &Context, start: &[f64]) -> Option<Point> {
+    let Sampling { scales, whirl, .. } = context.sampling;
+    let trial = Trial { field: context.field, scales, whirl: *whirl, jobs: 1 };
+    let settled = settle_together(&trial, context.parameters, start).pop()?;
+    let candidate = match settled.motion {
+        Motion::Equilibrium => Candidate::Equilibrium(settled.state),
+        Motion::Cycle => context.turn(&settled.state, settled.period),
+        Motion::Escaped | Motion::Other => return None,
+    };
+    Some(context.polished(&candidate)?.point)
 }
 
 /// All blocks of a round, in their order, over the threads asked for; those behind one that ended the survey are left out.

@@ -9,10 +9,14 @@
 use super::spectral_ratio;
 use crate::diagram::{Point, Solution};
 
-/// Samples of a cycle; the polygon through them misses the k-th harmonic by (πk / SAMPLES)² / 2 of its amplitude.
-const SAMPLES: usize = 256;
-/// The nearest sample is first sought among every STRIDE-th.
+/// Samples of a cycle, doubled until the polygon through them misses it by SAG at most: N samples miss the k-th harmonic by
+/// (πk / N)² / 2 of its amplitude.
+const SAMPLES: [usize; 2] = [256, 8192];
+/// In the measure of (1).
+const SAG: f64 = 2e-3;
+/// The nearest sample is first sought among every STRIDE-th, so many at a time.
 const STRIDE: usize = 4;
+const COARSE: usize = SAMPLES[0] / STRIDE;
 /// A component that hardly moves on a cycle is measured against this fraction of its scale.
 const FLOOR: f64 = 1e-3;
 
@@ -26,7 +30,7 @@ pub(super) struct Orbit {
     scale: Vec<f64>,
     /// `[sample][n]`; one sample for an equilibrium.
     states: Vec<f64>,
-    /// `[n][sample / STRIDE]` the coarse samples in units of the scale.
+    /// `[group][n][COARSE]` the coarse samples in units of the scale.
     coarse: Vec<f64>,
 }
 
@@ -39,18 +43,34 @@ impl Orbit {
         let (states, scale) = match &point.solution {
             Solution::Equilibrium(x) => (x.clone(), scales.to_vec()),
             Solution::Cycle(cycle) => {
-                let states = cycle.uniform(SAMPLES);
-                let scale = scales.iter().enumerate().map(|(i, scale)| {
-                    let component = states.iter().skip(i).step_by(scales.len());
-                    let [low, high] = component.fold([f64::MAX, f64::MIN], |[low, high], x| [x.min(low), x.max(high)]);
-                    (0.5 * (high - low)).max(FLOOR * scale)
-                });
-                let scale = scale.collect();
+                let mut states = cycle.uniform(SAMPLES[0]);
+                let scale: Vec<f64> = scales
+                    .iter()
+                    .enumerate()
+                    .map(|(i, scale)| {
+                        let component = states.iter().skip(i).step_by(scales.len());
+                        let [low, high] =
+                            component.fold([f64::MAX, f64::MIN], |[low, high], x| [x.min(low), x.max(high)]);
+                        (0.5 * (high - low)).max(FLOOR * scale)
+                    })
+                    .collect();
+                for doubled in std::iter::successors(Some(2 * SAMPLES[0]), |count| Some(2 * count)) {
+                    let finer = cycle.uniform(doubled);
+                    let sag = sag(&finer, &scale);
+                    if sag <= SAG || doubled > SAMPLES[1] {
+                        break;
+                    }
+                    states = finer;
+                }
                 (states, scale)
             }
         };
-        let every = |i: usize| states.iter().skip(i).step_by(STRIDE * scales.len());
-        let coarse = (0..scales.len()).flat_map(|i| every(i).map(|x| x / scale[i]).collect::<Vec<f64>>()).collect();
+        let n = scale.len();
+        let every: Vec<&[f64]> = states.chunks_exact(n.max(1)).step_by(STRIDE).collect();
+        let group = |group: &[&[f64]]| -> Vec<f64> {
+            (0..n).flat_map(|i| group.iter().map(|x| x[i] / scale[i]).collect::<Vec<f64>>()).collect()
+        };
+        let coarse = every.chunks(COARSE).flat_map(group).collect();
         Orbit { point, ratio, scale, states, coarse }
     }
 
@@ -63,13 +83,22 @@ impl Orbit {
         }
         let square =
             |k: usize| -> f64 { (0..n).map(|i| ((x[i] - self.states[k * n + i]) / self.scale[i]).powi(2)).sum() };
-        let mut squares = [0.0; SAMPLES / STRIDE];
-        for (i, samples) in self.coarse.chunks_exact(SAMPLES / STRIDE).enumerate() {
-            let place = x[i] / self.scale[i];
-            squares.iter_mut().zip(samples).for_each(|(square, sample)| *square += (place - sample) * (place - sample));
+        let (mut coarse, mut nearest) = (0, f64::INFINITY);
+        for (number, group) in self.coarse.chunks_exact(n * COARSE).enumerate() {
+            let mut squares = [0.0; COARSE];
+            for (i, samples) in group.chunks_exact(COARSE).enumerate() {
+                let place = x[i] / self.scale[i];
+                squares
+                    .iter_mut()
+                    .zip(samples)
+                    .for_each(|(square, sample)| *square += (place - sample) * (place - sample));
+            }
+            let least = squares.iter().fold(f64::INFINITY, |m: f64, square| if *square < m { *square } else { m });
+            if least < nearest {
+                let place = squares.iter().position(|square| *square == least).unwrap_or(0);
+                (coarse, nearest) = (STRIDE * (number * COARSE + place), least);
+            }
         }
-        let least = squares.iter().fold(f64::INFINITY, |m: f64, square| if *square < m { *square } else { m });
-        let coarse = STRIDE * squares.iter().position(|square| *square == least).unwrap_or(0);
         let around = (0..2 * STRIDE - 1).map(|k| (coarse + count + k + 1 - STRIDE) % count);
         let fine = around.map(|k| (k, square(k))).min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |(k, _)| k);
         let neighbours = [(fine + count - 1) % count, (fine + 1) % count];
@@ -113,4 +142,13 @@ impl Orbit {
     pub(super) fn norm(&self) -> f64 {
         self.states.iter().take(self.scale.len()).map(|x| x * x).sum::<f64>().sqrt()
     }
+}
+
+/// Largest distance of every second sample `[sample][n]` from the middle between its neighbours, in units of `scale`.
+fn sag(samples: &[f64], scale: &[f64]) -> f64 {
+    let n = scale.len();
+    let count = samples.len() / n;
+    let of = |k: usize, i: usize| samples[k % count * n + i];
+    let middle = |k: usize, i: usize| (of(k, i) - 0.5 * (of(k - 1, i) + of(k + 1, i))).abs() / scale[i];
+    (1..count).step_by(2).flat_map(|k| (0..n).map(move |i| (k, i))).fold(0.0, |m, (k, i)| m.max(middle(k, i)))
 }

@@ -174,7 +174,8 @@ fn bare(parameters: &[f64], solution: Solution) -> Point {
 
 /// A trajectory over one period as a profile on a mesh with equal arclength per interval.
 fn first_profile(n: usize, period: f64, times: &[f64], states: &[f64]) -> Cycle {
-    let intervals = 60;
+    // A cycle of many turns needs more of them.
+    let intervals = (times.len() / 12).clamp(60, 1200);
     let scheme = Scheme::new(4);
     let size: Vec<f64> =
         (0..n).map(|i| states.iter().skip(i).step_by(n).fold(1e-300, |m: f64, v| m.max(v.abs()))).collect();
