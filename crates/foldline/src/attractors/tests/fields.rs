@@ -5,6 +5,7 @@ use super::*;
 /// A vector field as a function of one point.
 pub struct Field {
     pub dim: usize,
+    pub parameters: usize,
     pub f: fn(&[f64], &[f64], &mut [f64]),
 }
 
@@ -14,16 +15,21 @@ impl VectorField for Field {
     }
 
     fn parameter_count(&self) -> usize {
-        0
+        self.parameters
     }
 
     fn evaluate(&self, at: Batch, f: &mut [f64]) {
-        let Parameters::Shared(parameters) = at.parameters else { return f.fill(f64::NAN) };
-        let (mut x, mut y) = ([0.0; 4], [0.0; 4]);
-        let n = self.dim;
+        let (mut x, mut y, mut p) = ([0.0; 4], [0.0; 4], [0.0; 4]);
+        let (n, k) = (self.dim, self.parameters);
         for l in 0..at.lanes {
             (0..n).for_each(|i| x[i] = at.states[i * at.lanes + l]);
-            (self.f)(&x[..n], parameters, &mut y[..n]);
+            (0..k).for_each(|i| {
+                p[i] = match at.parameters {
+                    Parameters::Shared(shared) => shared[i],
+                    Parameters::PerLane(own) => own[i * at.lanes + l],
+                }
+            });
+            (self.f)(&x[..n], &p[..k], &mut y[..n]);
             (0..n).for_each(|i| f[i * at.lanes + l] = y[i]);
         }
     }
@@ -40,6 +46,7 @@ impl VectorField for Field {
 /// x'' = μ (1 - x²) x' - x, parameter μ.
 pub const VAN_DER_POL: Field = Field {
     dim: 2,
+    parameters: 1,
     f: |x, p, f| {
         f[0] = x[1];
         f[1] = p[0] * (1.0 - x[0] * x[0]) * x[1] - x[0];
@@ -50,6 +57,7 @@ pub const VAN_DER_POL: Field = Field {
 /// values.
 pub const ROTOR: Field = Field {
     dim: 4,
+    parameters: 2,
     f: |x, p, f| {
         let (zeta, jp, m, epsilon, gamma, beta, k) = (0.01, 0.143, 0.9, 0.353, 0.25, 10.0, 150.0);
         let [u, v, du, dv] = [x[0], x[1], x[2], x[3]];
@@ -67,11 +75,12 @@ pub const ROTOR: Field = Field {
 };
 
 /// x' = x - x³.
-pub const BISTABLE: Field = Field { dim: 1, f: |x, _, f| f[0] = x[0] - x[0].powi(3) };
+pub const BISTABLE: Field = Field { dim: 1, parameters: 0, f: |x, _, f| f[0] = x[0] - x[0].powi(3) };
 
 /// x'' + x'/5 + x - x³ = 0.
 pub const ESCAPING: Field = Field {
     dim: 2,
+    parameters: 0,
     f: |x, _, f| {
         f[0] = x[1];
         f[1] = -0.2 * x[1] - x[0] + x[0].powi(3);
@@ -81,6 +90,7 @@ pub const ESCAPING: Field = Field {
 /// x'' + x = 0.
 pub const CENTRE: Field = Field {
     dim: 2,
+    parameters: 0,
     f: |x, _, f| {
         f[0] = x[1];
         f[1] = -x[0];
