@@ -98,7 +98,8 @@ impl Follow<'_> {
             || (standing && jumps.is_empty() && change == 1);
         // A change of sign that could not be located is not passed over either.
         let explained = accounted && !(lost && jumps.is_empty() && self.settings.stability);
-        let suspicious = depth < 3 && history.is_some_and(|h| self.may_touch(h, &at_left, &at_right, stretch.length));
+        let touches = || history.is_some_and(|h| self.may_touch(h, &at_left, &at_right, stretch.length));
+        let suspicious = depth < 3 && (touches() || (!standing && stretch.may_turn_twice()));
         if depth < DEEPEST
             && (jumps.len() > 1 || !explained || (suspicious && jumps.is_empty()))
             && stretch.length.abs() > self.settings.min_step

@@ -141,6 +141,18 @@ impl<'s> Stretch<'s> {
     }
 
     /// Cubic through both ends with both tangents.
+    /// Whether the cubic between the two stations turns back in the continuation parameter and then turns once more, or
+    /// nearly does: where two folds lie close together on a long step, the ends show nothing of them.
+    pub(super) fn may_turn_twice(&self) -> bool {
+        let i = self.left.u.len() - 1;
+        let rise = self.right[i] - self.left.u[i];
+        let [p, q] = [self.length * self.left.tangent[i], self.length * self.slope[i]];
+        // Slope p + 2 b x + 3 c x² for x from 0 to 1.
+        let (b, c) = (3.0 * rise - 2.0 * p - q, p + q - 2.0 * rise);
+        let at = -b / (3.0 * c);
+        p * q > 0.0 && at > 0.0 && at < 1.0 && (p + b * at) * p.signum() < 0.1 * p.abs().min(q.abs())
+    }
+
     fn hermite_component(&self, s: f64, i: usize) -> f64 {
         let (l, x) = (self.length, s / self.length);
         let (a, b) = (self.left.u[i], self.right[i]);
