@@ -17,6 +17,10 @@ use crate::diagram::Cost;
 /// Distances between nodes, as shares of the stretch, in the order in which they are tried.
 const SPACINGS: [f64; 3] = [0.25, 0.1, 0.04];
 
+/// Share of the values next to the zero that the cubic may add to the parabola: with more the branch does not go smoothly
+/// through the place.
+const SMOOTH: f64 = 0.05;
+
 /// Interpolates the zero of `monitor` in `stretch`, whose ends have values of opposite sign.
 ///
 /// # Errors
@@ -43,6 +47,10 @@ pub fn straddle(
         let next = zero(&nodes, &stations.iter().map(value).collect::<Vec<_>>())?;
         moved = (next - root).abs();
         root = next;
+    }
+    let values: Vec<f64> = stations.iter().map(value).collect();
+    if bend(&nodes, &values, root) > SMOOTH * values[1].abs().max(values[2].abs()) {
+        return Err(Failure::Unexplained);
     }
     let mut coarse = blend(problem, &nodes, &stations, root, stretch.left, stretch.direction);
     let floor =
@@ -77,6 +85,16 @@ pub fn straddle(
 /// Values at `s` of the Lagrange polynomials of the nodes.
 fn weights(nodes: &[f64; 4], s: f64) -> [f64; 4] {
     std::array::from_fn(|i| (0..4).filter(|&k| k != i).map(|k| (s - nodes[k]) / (nodes[i] - nodes[k])).product())
+}
+
+/// By how much the interpolated value at `s` changes if the node farthest from it is left out.
+fn bend(nodes: &[f64; 4], values: &[f64], s: f64) -> f64 {
+    // The third difference, which the cubic adds times the product of the distances.
+    let part = |i: usize| (0..4).filter(|&k| k != i).map(|k| nodes[i] - nodes[k]).product::<f64>();
+    let third: f64 = (0..4).map(|i| values[i] / part(i)).sum();
+    let distances = nodes.map(|node| (s - node).abs());
+    let farthest = distances.iter().fold(0.0, |m: f64, d| m.max(*d));
+    (third * distances.iter().filter(|d| **d < farthest).product::<f64>()).abs()
 }
 
 /// The zero (1) between the outer nodes, by bisection.
