@@ -21,10 +21,12 @@ use crate::simulation::Step;
 
 /// Largest number of crossings per period that is looked for.
 pub(super) const MOST_CROSSINGS: usize = 16;
+/// The same where a trajectory is followed until it repeats itself.
+const MOST_REPEATED: usize = 40;
 /// Largest m of (1).
 const MOST_TERMS: usize = 8;
 /// Returns that are kept.
-const KEPT: usize = MOST_CROSSINGS * 6 + 1;
+const KEPT: usize = MOST_REPEATED * 6 + 1;
 /// Largest last difference, relative to the extent, from which a limit is predicted.
 const NEAR: f64 = 0.5;
 /// Largest difference between the limits predicted from successive returns, relative to the last difference of returns.
@@ -147,7 +149,7 @@ impl Returns {
         true
     }
 
-    /// The limit of every q-th return, 1 ≤ q ≤ [`MOST_CROSSINGS`], if the last of them are close together and the limit was the
+    /// The limit of every q-th return, 1 ≤ q ≤ [`MOST_REPEATED`], if the last of them are close together and the limit was the
     /// same one return earlier.
     fn predict(&self, q: usize, extent: &[f64]) -> Option<Prediction> {
         let n = self.anchor.len();
@@ -217,7 +219,7 @@ impl Returns {
     /// The prediction over that number of crossings per period after which the trajectory itself comes closest, the fewest
     /// of several that do. (A mean over the crossings of a period is a steady prediction too, and no state of the motion.)
     pub(super) fn closest(&self, extent: &[f64]) -> Option<Prediction> {
-        let mut found: Vec<Prediction> = (1..=MOST_CROSSINGS).filter_map(|q| self.predict(q, extent)).collect();
+        let mut found: Vec<Prediction> = (1..=MOST_REPEATED).filter_map(|q| self.predict(q, extent)).collect();
         let least = found.iter().fold(f64::INFINITY, |m, p| m.min(p.size));
         found.retain(|p| p.size <= 10.0 * least + SAME);
         found.into_iter().next()
