@@ -26,6 +26,26 @@ pub fn roots(plan: &Plan) -> Vec<Root> {
     branches.chain(homotopies).collect()
 }
 
+/// How many branches may grow from there, roughly: those with most are best begun first.
+pub fn weight(plan: &Plan, root: Root) -> usize {
+    let following = |end: Start| {
+        let branches = (0..plan.branches.len()).filter(|&i| plan.branches[i].start == end).map(Root::Branch);
+        let homotopies = (0..plan.homotopies.len()).filter(|&i| plan.homotopies[i].start == end).map(Root::Homotopy);
+        branches.chain(homotopies).map(|next| weight(plan, next)).sum::<usize>()
+    };
+    match root {
+        Root::Branch(index) => {
+            let branch = &plan.branches[index];
+            let switched: usize = branch.switching.depth.iter().map(|(_, depth)| (1 << depth.min(&8)) - 1).sum();
+            let curves = (0..plan.curves.len()).filter(|&i| plan.curves[i].of == branch.name);
+            1 + switched
+                + following(Start::EndOf(index))
+                + curves.map(|i| 2 + following(Start::EndOfCurve(i))).sum::<usize>()
+        }
+        Root::Homotopy(index) => 4 + following(Start::EndOfHomotopy(index)),
+    }
+}
+
 /// Everything that grows from there, in the order in which it was begun.
 pub fn grow(
     system: &System,

@@ -55,15 +55,17 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 pub fn run(system: &System, plan: &Plan, jobs: usize, earlier: Diagram, observer: &dyn Observer) -> Diagram {
     let seeds = seeds::find(system, plan, jobs, &earlier, observer);
     let families = family::roots(plan);
+    // The longest first, so that no thread is left alone with it in the end.
+    let mut order: Vec<usize> = (0..families.len()).collect();
+    order.sort_by_key(|&index| std::cmp::Reverse(family::weight(plan, families[index])));
     let next = AtomicUsize::new(0);
     let done: Vec<Mutex<Vec<Branch>>> = families.iter().map(|_| Mutex::new(Vec::new())).collect();
     std::thread::scope(|scope| {
         for _ in 0..jobs.clamp(1, families.len().max(1)) {
             scope.spawn(|| {
                 loop {
-                    let index = next.fetch_add(1, Ordering::Relaxed);
-                    let Some(&root) = families.get(index) else { break };
-                    let branches = family::grow(system, plan, root, &seeds, &earlier, observer);
+                    let Some(&index) = order.get(next.fetch_add(1, Ordering::Relaxed)) else { break };
+                    let branches = family::grow(system, plan, families[index], &seeds, &earlier, observer);
                     if let Ok(mut slot) = done[index].lock() {
                         *slot = branches;
                     }

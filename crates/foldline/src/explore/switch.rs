@@ -8,8 +8,8 @@ use super::System;
 use super::growth::{Beginning, problem_of, setting};
 use crate::continuation::corrector::{Plane, Station, correct, settle, station};
 use crate::continuation::{Failure, Settings};
-use crate::contract::ZeroProblem;
-use crate::diagram::{Cost, Cycle, Ending, Family, Kind, Point, Solution, SpecialPoint};
+use crate::contract::{Examination, ZeroProblem};
+use crate::diagram::{Cost, Cycle, Ending, Family, Kind, Mesh, Point, Solution, SpecialPoint, Trust};
 use crate::problem::cycle::CycleProblem;
 use crate::problem::{gauss::Scheme, mesh};
 use crate::special::{branch_point, hopf, period_doubling};
@@ -48,18 +48,19 @@ fn joined(at: &SpecialPoint, free: usize) -> Ending {
     Ending::Joined { at: at.kind, parameter: at.point.parameters[free] }
 }
 
-/// The first point at one of the [`DISTANCES`] along `direction` (not normalised) from `base`.
+/// The first point at one of the `distances` along `direction` (not normalised) from `base`.
 fn step_off(
     problem: &mut dyn ZeroProblem,
     settings: &Settings,
     base: &[f64],
     direction: &[f64],
     sign: f64,
+    distances: &[f64],
     expected: &dyn Fn(&dyn ZeroProblem, &Station) -> bool,
 ) -> Result<Station, Failure> {
     let mesh = problem.mesh();
     let (mut failure, mut second_best) = (Failure::Singular, None);
-    for distance in DISTANCES {
+    for &distance in distances {
         if !mesh.is_empty() {
             problem.set_mesh(&mesh);
         }
@@ -129,13 +130,28 @@ fn doubled(
     at: &SpecialPoint,
     cycle: &Cycle,
 ) -> Result<Beginning, String> {
-    let (mut problem, base, direction) =
-        double(system, free, at, cycle).ok_or("no vector of period doubling was found")?;
-    let first =
-        step_off(&mut problem, settings, &base, &direction, 1.0, &|_, found| exchanges_stability(at, free, found))
-            .map_err(|why| why.to_string())?;
+    let leave = |cycle: &Cycle, distances: &[f64]| {
+        let (mut problem, base, direction) =
+            double(system, free, at, cycle).ok_or("no vector of period doubling was found")?;
+        let expected = |_: &dyn ZeroProblem, found: &Station| exchanges_stability(at, free, found);
+        step_off(&mut problem, settings, &base, &direction, 1.0, distances, &expected).map_err(|why| why.to_string())
+    };
+    // The special point was located on a mesh twice as fine as points are computed on. Where that is not needed either …
+    let coarse = leave(&coarsened(cycle), &DISTANCES[..2]).ok().filter(|found| exchanges_stability(at, free, found));
+    // … it is not used.
+    let first = coarse.map_or_else(|| leave(cycle, &DISTANCES), Ok)?;
     let before = doubled_edge(system, free, at, &first.point).into_iter().collect();
     Ok(Beginning::Edge { before, first, joined: joined(at, free) })
+}
+
+/// The cycle on a mesh of every second node, where that makes sense.
+fn coarsened(cycle: &Cycle) -> Cycle {
+    if cycle.intervals() % 2 != 0 {
+        return cycle.clone();
+    }
+    let mesh: Mesh = cycle.mesh.iter().copied().step_by(2).collect();
+    let profile = mesh::transferred(&cycle.profile, cycle.dim(), &Scheme::new(cycle.degree), &cycle.mesh, &mesh);
+    Cycle { period: cycle.period, mesh, degree: cycle.degree, profile }
 }
 
 /// The problem of doubled cycles at a period doubling, the cycle run through twice, and the direction of the new branch.
@@ -146,31 +162,38 @@ fn double<'a>(
     cycle: &Cycle,
 ) -> Option<(CycleProblem<'a>, Vec<f64>, Vec<f64>)> {
     let mut single = CycleProblem::new(setting(system, free, &at.point.parameters), cycle.degree, &cycle.mesh);
-    let u = single.unknowns_of(&at.point);
+    let with = |solution: Cycle| Point { solution: Solution::Cycle(solution), ..at.point.clone() };
+    let u = single.unknowns_of(&with(cycle.clone()));
     single.anchor(&u);
     let vector = single.antiperiodic_direction(&u)?;
     let (twice, mut direction) = period_doubling::doubled(cycle, &vector);
     direction.extend([0.0, 0.0]);
     let mut problem =
         CycleProblem::new(setting(system, free, &at.point.parameters), twice.degree, &twice.mesh).with_equal_halves();
-    let base = problem.unknowns_of(&Point { solution: Solution::Cycle(twice), ..at.point.clone() });
+    let base = problem.unknowns_of(&with(twice));
     Some((problem, base, direction))
 }
 
 /// A period doubling as a point of the doubled branch that begins or ends there; its stability is that of `next`, the
-/// point of the branch beside it.
+/// point of the branch beside it. Everything else is that of the special point, run through twice.
 pub fn doubled_edge(system: &System, free: usize, at: &SpecialPoint, next: &Point) -> Option<Point> {
     let Solution::Cycle(cycle) = &at.point.solution else { return None };
     let (mut problem, base, direction) = double(system, free, at, cycle)?;
     problem.anchor(&base);
     let norm = problem.dot(&direction, &direction).sqrt();
     let tangent: Vec<f64> = direction.iter().map(|d| d / norm).collect();
-    // The matrix may be singular here; what the examination needs of it does not depend on that.
-    let _ = problem.factorise(&base, &tangent);
-    let mut examination = problem.examine(&base);
-    // The error estimate does need the solution of the linear system; the cycle is that of the special point, twice.
-    examination.trust.discretisation = at.point.trust.discretisation;
-    Some(Point { unstable: next.unstable, ..problem.point(&base, &tangent, examination) })
+    let once = &at.point;
+    let examination = Examination {
+        spectrum: once.spectrum.iter().map(|z| z * z).collect(),
+        unstable: next.unstable,
+        ranges: once.ranges.clone(),
+        trust: Trust {
+            trivial_defect: 2.0 * once.trust.trivial_defect,
+            liouville_defect: 2.0 * once.trust.liouville_defect,
+            ..once.trust
+        },
+    };
+    Some(problem.point(&base, &tangent, examination))
 }
 
 fn born(
@@ -189,9 +212,10 @@ fn born(
     let mut base = problem.unknowns_of(&at.point);
     let size = base.len();
     base[size - 2] = period;
-    let first =
-        step_off(&mut problem, settings, &base, &direction, 1.0, &|_, found| exchanges_stability(at, free, found))
-            .map_err(|why| why.to_string())?;
+    let first = step_off(&mut problem, settings, &base, &direction, 1.0, &DISTANCES, &|_, found| {
+        exchanges_stability(at, free, found)
+    })
+    .map_err(|why| why.to_string())?;
     Ok(Beginning::Edge { before: Vec::new(), first, joined: joined(at, free) })
 }
 
@@ -216,9 +240,9 @@ fn crossing(
         let lengths = |a: &[f64]| problem.dot(a, a).sqrt();
         problem.dot(&tangent, own).abs() < 0.95 * lengths(&tangent) * lengths(own)
     };
-    let one = step_off(problem, settings, &u, &vector, 1.0, &leaves).map_err(|why| why.to_string())?;
+    let one = step_off(problem, settings, &u, &vector, 1.0, &DISTANCES, &leaves).map_err(|why| why.to_string())?;
     problem.set_mesh(&mesh);
-    let symmetric = step_off(problem, settings, &u, &vector, -1.0, &|_, _| true).is_ok_and(|other| {
+    let symmetric = step_off(problem, settings, &u, &vector, -1.0, &DISTANCES, &|_, _| true).is_ok_and(|other| {
         let images = system.reflections.iter().filter(|r| r.contains(&true));
         let gap = (one.parameter() - other.parameter()).abs();
         gap < 1e-6 * (1.0 + one.parameter().abs())
