@@ -190,6 +190,19 @@ impl Returns {
         })
     }
 
+    /// Whether any difference of every q-th return is small enough for its limit to be worth following; the prediction itself
+    /// costs much more.
+    pub(super) fn comes_back(&self, extent: &[f64]) -> bool {
+        let n = self.anchor.len();
+        let Some((_, last)) = self.last() else { return false };
+        let near = |q: usize| {
+            let Some(from) = self.times.len().checked_sub(q + 1) else { return false };
+            let then = &self.states[from * n..][..n];
+            (0..n).all(|i| (last[i] - then[i]).abs() <= WORTHWHILE[0] * extent[i])
+        };
+        (1..=MOST_CROSSINGS).any(near)
+    }
+
     /// Whether the trajectory came closer and closer, as measured by `distance`: the largest value over each third of the
     /// last returns, as many as are needed for several periods, is smaller than over the third before.
     pub(super) fn approach(&self, distance: impl Fn(&[f64]) -> f64) -> bool {

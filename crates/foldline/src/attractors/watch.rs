@@ -151,6 +151,12 @@ impl Watch {
             return;
         }
         let Some(extent) = self.extent.clone() else { return };
+        // Far from everything known, and not nearly back anywhere: nothing below could come of it.
+        let near = |last: &[f64]| known.iter().any(|k| k.distance(last) <= NEIGHBOURHOOD);
+        if !self.returns.comes_back(&extent) && !self.returns.last().is_some_and(|(_, last)| near(last)) {
+            self.next_attempt = self.returns.total() + 2;
+            return;
+        }
         for prediction in self.returns.predictions(2, &extent) {
             self.settled = self.predicted(&prediction.state, known);
             if self.settled.is_some() {
