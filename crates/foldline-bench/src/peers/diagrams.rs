@@ -195,10 +195,16 @@ pub fn compared(place: &Workplace) -> Outcome<String> {
     let mut best: Option<(usize, f64, usize, &str)> = None;
     for intervals in INTERVALS {
         for step in STEPS {
-            let tour = tour(&auto, &starts, intervals, step)?;
+            let name = format!("AUTO, NTST {intervals}, DSMAX {step}");
+            let tour = match tour(&auto, &starts, intervals, step) {
+                Ok(tour) => tour,
+                Err(why) => {
+                    table.row(&[name, "".into(), format!("failed: {why}"), "".into(), "".into()]);
+                    continue;
+                }
+            };
             eprintln!("  NTST {intervals}, DSMAX {step}: {}", time(tour.cpu));
             let (found, other) = matched(&diagram, &tour.special);
-            let name = format!("AUTO, NTST {intervals}, DSMAX {step}");
             table.row(&[name, tour.points.to_string(), format!("{found} of {all}"), other.to_string(), time(tour.cpu)]);
             if best.is_none_or(|(most, cpu, ..)| found > most || (found == most && tour.cpu < cpu)) {
                 best = Some((found, tour.cpu, intervals, step));

@@ -36,22 +36,20 @@ fn reduce(x: f64) -> (f64, f64, f64) {
     (k, r, (high - r) - low)
 }
 
-/// e(r) - r of equation 1, for |r| ≤ ln 2 / 2.
+/// e(r) - r of equation 1, for |r| ≤ ln 2 / 2. The terms are paired rather than nested: a sum of twelve nested terms would
+/// have the processor wait for each.
 #[inline(always)]
 fn series(r: f64) -> f64 {
-    let mut sum = 1.0 / 6227020800.0;
-    sum = sum * r + 1.0 / 479001600.0;
-    sum = sum * r + 1.0 / 39916800.0;
-    sum = sum * r + 1.0 / 3628800.0;
-    sum = sum * r + 1.0 / 362880.0;
-    sum = sum * r + 1.0 / 40320.0;
-    sum = sum * r + 1.0 / 5040.0;
-    sum = sum * r + 1.0 / 720.0;
-    sum = sum * r + 1.0 / 120.0;
-    sum = sum * r + 1.0 / 24.0;
-    sum = sum * r + 1.0 / 6.0;
-    sum = sum * r + 0.5;
-    sum * (r * r)
+    let r2 = r * r;
+    let r4 = r2 * r2;
+    let r8 = r4 * r4;
+    let two = 0.5 + r * (1.0 / 6.0);
+    let four = 1.0 / 24.0 + r * (1.0 / 120.0);
+    let six = 1.0 / 720.0 + r * (1.0 / 5040.0);
+    let eight = 1.0 / 40320.0 + r * (1.0 / 362880.0);
+    let ten = 1.0 / 3628800.0 + r * (1.0 / 39916800.0);
+    let twelve = 1.0 / 479001600.0 + r * (1.0 / 6227020800.0);
+    r2 * (((two + r2 * four) + r4 * (six + r2 * eight)) + r8 * (ten + r2 * twelve))
 }
 
 /// `x` limited to `[low, high]`; NaN stays NaN.
