@@ -55,9 +55,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 pub fn run(system: &System, plan: &Plan, jobs: usize, earlier: Diagram, observer: &dyn Observer) -> Diagram {
     let seeds = seeds::find(system, plan, jobs, &earlier, observer);
     let families = family::roots(plan);
-    // The longest first, so that no thread is left alone with it in the end.
+    // The longest first, so that no thread is left alone with it in the end; what a plan names later builds on what it names
+    // earlier and takes longer, if anything.
     let mut order: Vec<usize> = (0..families.len()).collect();
-    order.sort_by_key(|&index| std::cmp::Reverse(family::weight(plan, families[index])));
+    order.sort_by_key(|&index| std::cmp::Reverse((family::weight(plan, families[index]), index)));
     let next = AtomicUsize::new(0);
     let done: Vec<Mutex<Vec<Branch>>> = families.iter().map(|_| Mutex::new(Vec::new())).collect();
     std::thread::scope(|scope| {

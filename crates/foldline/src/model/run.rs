@@ -2,7 +2,8 @@
 //!
 //! **Idea.** Lanes are taken in blocks of 32 (8 for a short rest), so that one instruction is looked up once and then runs as
 //! a loop of fixed length, which the compiler turns into vector instructions; the widest set that the machine has is chosen
-//! when the program runs. What all lanes share is computed once, as plain numbers. Registers live in a per-thread store that
+//! when the program runs. What all lanes share is computed once, as plain numbers, and not again while one tape runs at the
+//! same parameters. Registers live in a per-thread store that
 //! grows to the largest tape and is then reused; they are cells, so an instruction may write where it reads.
 
 use super::graph::{Binary, Leaf, Unary};
@@ -26,10 +27,15 @@ type Lanes = [Cell<Eight>; WIDE];
 struct Store {
     registers: Vec<Eight>,
     scalars: Vec<f64>,
+    /// The code and the parameters to which the scalars belong.
+    code: u64,
+    parameters: Vec<f64>,
 }
 
 thread_local! {
-    static STORE: RefCell<Store> = const { RefCell::new(Store { registers: Vec::new(), scalars: Vec::new() }) };
+    static STORE: RefCell<Store> = const {
+        RefCell::new(Store { registers: Vec::new(), scalars: Vec::new(), code: 0, parameters: Vec::new() })
+    };
 }
 
 /// What a tape reads.
@@ -51,10 +57,17 @@ impl Tape {
             Parameters::Shared(values) => (&self.shared, values),
             Parameters::PerLane(_) => (&self.own, &[]),
         };
-        STORE.with_borrow_mut(|Store { registers, scalars }| {
-            scalars.clear();
-            for node in &code.scalars {
-                scalars.push(node.value(|id| scalars[id.at()], parameters));
+        STORE.with_borrow_mut(|Store { registers, scalars, code: last, parameters: known }| {
+            let same = |(a, b): (&f64, &f64)| a.to_bits() == b.to_bits();
+            let unchanged = known.len() == parameters.len() && known.iter().zip(parameters).all(same);
+            if *last != code.number || !unchanged {
+                scalars.clear();
+                for node in &code.scalars {
+                    scalars.push(node.value(|id| scalars[id.at()], parameters));
+                }
+                *last = code.number;
+                known.clear();
+                known.extend_from_slice(parameters);
             }
             for &(scalar, place) in &code.uniform {
                 component(arrays, place, at.lanes).fill(scalars[scalar as usize]);

@@ -7,6 +7,7 @@
 
 use super::graph::{Binary, Graph, Id, Leaf, Node, Unary};
 use std::collections::HashMap;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Number of a register, which holds a value per lane.
 pub(super) type Register = u32;
@@ -109,6 +110,8 @@ pub(super) struct Tape {
 /// Instructions for one of the two ways in which parameters come.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Code {
+    /// No two that were made apart have the same; never 0.
+    pub number: u64,
     /// How many registers are used.
     pub registers: usize,
     /// The scalars in the order in which they are computed; an operand is the number of an earlier one.
@@ -166,7 +169,8 @@ impl Code {
         let steps = order.steps;
         builder.fill(&steps);
         builder.body(&steps);
-        builder.code
+        static MADE: AtomicU64 = AtomicU64::new(1);
+        Code { number: MADE.fetch_add(1, Ordering::Relaxed), ..builder.code }
     }
 }
 
