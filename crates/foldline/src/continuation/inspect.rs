@@ -9,7 +9,7 @@ use super::corrector::{Aim, Failure, Station, refine};
 use super::follow::Follow;
 use super::locate::{Located, Stretch, locate};
 use super::straddle::straddle;
-use crate::diagram::{Cost, Kind, SpecialPoint};
+use crate::diagram::{Cost, Kind, Point, SpecialPoint};
 
 /// What was found on the way, in the order of travel.
 pub enum Found {
@@ -24,6 +24,9 @@ const DEEPEST: usize = 14;
 
 /// Halvings after which the ends of a stretch show what lies between them.
 const CLOSE: usize = 6;
+
+/// Asymmetry of a located pitchfork: the square root of the accuracy to which it is located.
+const SYMMETRIC: f64 = 3e-3;
 
 /// Values of all monitors at the left end of a stretch and before it, for the test on bending.
 #[derive(Clone, Debug)]
@@ -69,15 +72,21 @@ impl Follow<'_> {
             let mut found = locate(self.problem, self.settings, &stretch, monitor, values, cost);
             if found.is_err() && matches!(kind, Kind::Fold | Kind::BranchPoint) {
                 found = straddle(self.problem, self.settings, &stretch, monitor, values, cost);
-                // A fold with a singular matrix at which stability stays: this branch is the one that leaves another at a
-                // pitchfork, and goes on as its own mirror image. Without a mirror the step has cut across to another branch.
-                if kind == Kind::Fold && left.point.unstable == right.point.unstable {
-                    if self.settings.reflections.len() > 1 {
-                        (kind, jump) = (Kind::BranchPoint, 0);
-                    } else {
-                        found = Err(Failure::Unexplained);
-                    }
+                // A singular matrix at which the parameter turns and stability stays is a pitchfork, or else the step has
+                // cut across to another branch.
+                if kind == Kind::Fold
+                    && left.point.unstable == right.point.unstable
+                    && self.settings.reflections.len() < 2
+                {
+                    found = Err(Failure::Unexplained);
                 }
+            }
+            // This branch is the one that leaves another at a pitchfork, and goes on as its own mirror image.
+            if kind == Kind::Fold
+                && left.point.unstable == right.point.unstable
+                && found.as_ref().is_ok_and(|found| self.is_symmetric(&found.station.point))
+            {
+                (kind, jump) = (Kind::BranchPoint, 0);
             }
             match found {
                 Ok(found) if jump == 0 || monitor.confirms(&found.station.point) => {
@@ -96,8 +105,10 @@ impl Follow<'_> {
         let accounted = !self.settings.stability
             || explains(&jumps, left.point.unstable as i64, right.point.unstable as i64)
             || (standing && jumps.is_empty() && change == 1);
-        // A change of sign that could not be located is not passed over either, not even next to one that could.
-        let explained = accounted && !(lost && (jumps.is_empty() || depth < CLOSE) && self.settings.stability);
+        // A change of sign that could not be located is not passed over either, not even next to one that could; only next to
+        // a pitchfork, where every matrix is singular, it is no wonder.
+        let closer = jumps.is_empty() || (depth < CLOSE && !jumps.contains(&0));
+        let explained = accounted && !(lost && closer && self.settings.stability);
         let touches = || history.is_some_and(|h| self.may_touch(h, &at_left, &at_right, stretch.length));
         let suspicious = depth < 3 && (touches() || (!standing && stretch.may_turn_twice()));
         if depth < DEEPEST
@@ -145,6 +156,12 @@ impl Follow<'_> {
             }
         }
         out
+    }
+
+    /// Whether a point is its own mirror image, as far as its ranges tell.
+    fn is_symmetric(&self, point: &Point) -> bool {
+        let images = self.settings.reflections.iter().filter(|r| r.contains(&true));
+        images.into_iter().any(|r| point.difference(point, &self.settings.scales, r) < SYMMETRIC)
     }
 
     fn either_confirms(&self, monitor: usize, left: &Station, right: &Station) -> bool {

@@ -64,8 +64,7 @@ pub fn run(system: &System, plan: &Plan, jobs: usize, earlier: Diagram, observer
     std::thread::scope(|scope| {
         for _ in 0..jobs.clamp(1, families.len().max(1)) {
             scope.spawn(|| {
-                loop {
-                    let Some(&index) = order.get(next.fetch_add(1, Ordering::Relaxed)) else { break };
+                while let Some(&index) = order.get(next.fetch_add(1, Ordering::Relaxed)) {
                     let branches = family::grow(system, plan, families[index], &seeds, &earlier, observer);
                     if let Ok(mut slot) = done[index].lock() {
                         *slot = branches;

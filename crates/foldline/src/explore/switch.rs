@@ -146,7 +146,7 @@ fn doubled(
 
 /// The cycle on a mesh of every second node, where that makes sense.
 fn coarsened(cycle: &Cycle) -> Cycle {
-    if cycle.intervals() % 2 != 0 {
+    if !cycle.intervals().is_multiple_of(2) {
         return cycle.clone();
     }
     let mesh: Mesh = cycle.mesh.iter().copied().step_by(2).collect();
