@@ -141,33 +141,6 @@ impl Follow<'_> {
         cost: &mut Cost,
     ) -> Result<Option<Station>, Failure> {
         let Some(home) = self.home else { return Ok(None) };
-        if emitted < 3 || left.slope() * right.slope() >= 0.0 {
-            return self.passes_home(home, left, right, emitted, cost);
-        }
-        // The branch turns on the way: home may lie on either part, and next to the fold the ends do not show it.
-        let close = |point: &Point| {
-            self.settings.reflections.iter().any(|r| point.difference(home, &self.settings.scales, r) < 0.1)
-        };
-        if !close(&left.point) && !close(&right.point) {
-            return Ok(None);
-        }
-        let stretch = Stretch::new(self.problem, left, right, self.direction);
-        let Some(turn) = self.cut(left, &stretch, stretch.turning(), cost) else { return Ok(None) };
-        match self.passes_home(home, left, &turn, emitted, cost)? {
-            Some(back) => Ok(Some(back)),
-            None => self.passes_home(home, &turn, right, emitted, cost),
-        }
-    }
-
-    /// The same on a step along which the parameter does not turn.
-    fn passes_home(
-        &mut self,
-        home: &Point,
-        left: &Station,
-        right: &Station,
-        emitted: usize,
-        cost: &mut Cost,
-    ) -> Result<Option<Station>, Failure> {
         let value = home.parameters[self.free];
         let between = (left.parameter() - value) * (right.parameter() - value) <= 0.0;
         let same_way = home.parameter_slope() * self.direction * (right.slope() + left.slope()) > 0.0;

@@ -110,7 +110,7 @@ impl<'s> Stretch<'s> {
     }
 
     /// The distance at which the cubic between the two stations turns back in the continuation parameter.
-    pub(super) fn turning(&self) -> f64 {
+    fn turning(&self) -> f64 {
         let last = self.left.u.len() - 1;
         let rise = |x: f64| {
             let h = 1e-4 * self.length;

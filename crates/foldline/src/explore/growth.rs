@@ -111,13 +111,15 @@ pub fn polished(problem: &mut dyn ZeroProblem, settings: &Settings, point: &Poin
     Ok(found)
 }
 
-/// A solution a little beside `point` on the curve, which may be a fold: from a fold itself a branch could not be told
-/// from the other side when it comes back.
+/// A solution beside `point` on the curve, which may be a fold: from a fold itself, or from next to one, a branch could not
+/// be told from the other side when it comes back. Goes on until the parameter changes noticeably.
 ///
 /// # Errors
 /// See [`Failure`].
 pub fn beside(problem: &mut dyn ZeroProblem, settings: &Settings, point: &Point) -> Result<Point, Failure> {
     const DISTANCES: [f64; 4] = [0.05, 0.01, 2e-3, 4e-4];
+    const SLOPE: f64 = 0.15;
+    const FARTHEST: usize = 12;
     let u = problem.unknowns_of(point);
     problem.anchor(&u);
     // Any row will do for the first tangent unless it is orthogonal to it.
@@ -133,19 +135,29 @@ pub fn beside(problem: &mut dyn ZeroProblem, settings: &Settings, point: &Point)
     }
     let mut cost = Cost::default();
     let plane = Plane { row, base: u.clone(), distance: 0.0 };
-    let there = settle(problem, settings, plane, u, 1.0, &mut cost)?;
-    let mut failure = Failure::Singular;
-    for distance in DISTANCES {
-        problem.set_mesh(&there.mesh);
-        problem.anchor(&there.u);
-        let guess = there.u.iter().zip(&there.tangent).map(|(u, t)| u + distance * t).collect();
-        let plane = Plane { row: there.tangent.clone(), base: there.u.clone(), distance };
-        match settle(problem, settings, plane, guess, 1.0, &mut cost) {
-            Ok(found) => return Ok(found.point),
-            Err(why) => failure = why,
+    let mut there = settle(problem, settings, plane, u, 1.0, &mut cost)?;
+    for count in 0..FARTHEST {
+        let mut next = Err(Failure::Singular);
+        for distance in DISTANCES {
+            problem.set_mesh(&there.mesh);
+            problem.anchor(&there.u);
+            let guess = there.u.iter().zip(&there.tangent).map(|(u, t)| u + distance * t).collect();
+            let plane = Plane { row: there.tangent.clone(), base: there.u.clone(), distance };
+            next = settle(problem, settings, plane, guess, 1.0, &mut cost);
+            if next.is_ok() {
+                break;
+            }
+        }
+        match next {
+            Ok(found) => there = found,
+            Err(why) if count == 0 => return Err(why),
+            Err(_) => break,
+        }
+        if there.slope().abs() > SLOPE {
+            break;
         }
     }
-    Err(failure)
+    Ok(there.point)
 }
 
 /// A stored point as a station again.
