@@ -37,23 +37,20 @@ impl CycleProblem<'_> {
         Some(v)
     }
 
-    /// Index of Gauss point i of interval j among those of a batch: the intervals that the solver treats together stand together.
-    #[inline]
-    pub(super) fn at(&self, j: usize, i: usize) -> usize {
-        let (place, lane) = (j % self.length, j / self.length);
-        (place * self.scheme.degree + i) * self.width + lane
-    }
-
-    /// Gathers the Gauss points, component-major. What the solver has beyond the last interval repeats it.
+    /// Gathers the Gauss points, component-major, those of the intervals that the solver treats together side by side: point i
+    /// of place t in a lane is number (t m + i) W + lane. What the solver has beyond the last interval repeats it.
     pub(super) fn gather(&mut self, u: &[f64]) {
         let (n, m, lanes) = (self.n, self.scheme.degree, self.lanes());
-        for j in 0..self.length * self.width {
-            let from = j.min(self.intervals() - 1) * (m + 1) * n;
-            for k in 0..m {
-                let x = &u[from + (k + 1) * n..from + (k + 2) * n];
-                let at = self.at(j, k);
-                for i in 0..n {
-                    self.states[i * lanes + at] = x[i];
+        let last = self.intervals() - 1;
+        for lane in 0..self.width {
+            for t in 0..self.length {
+                let from = (lane * self.length + t).min(last) * (m + 1) * n;
+                for k in 0..m {
+                    let x = &u[from + (k + 1) * n..from + (k + 2) * n];
+                    let at = (t * m + k) * self.width + lane;
+                    for i in 0..n {
+                        self.states[i * lanes + at] = x[i];
+                    }
                 }
             }
         }

@@ -121,9 +121,9 @@ impl<'a> CycleProblem<'a> {
         self.length * self.width * self.scheme.degree
     }
 
-    /// Where component 0 of the phase condition at Gauss point i of interval j is; the components are W apart.
-    fn phase_at(&self, j: usize, i: usize) -> usize {
-        ((j % self.length) * self.scheme.degree + i) * self.n * self.width + j / self.length
+    /// The intervals of a lane.
+    fn piece(&self, lane: usize) -> std::ops::Range<usize> {
+        (lane * self.length).min(self.intervals())..((lane + 1) * self.length).min(self.intervals())
     }
 
     fn profile_size(&self) -> usize {
@@ -185,13 +185,14 @@ impl ZeroProblem for CycleProblem<'_> {
             let scale = 1.0 / (self.scale[c] * self.scale[c]);
             for i in 0..m {
                 let weight = self.scheme.weights[i] * scale;
-                for j in 0..count {
-                    let (rise, h) = (rises[i * count + j], self.h(j));
-                    // With X̃' = rise / h.
-                    length += weight * rise * rise / h;
-                    offset += weight * own[(i + 1) * count + j] * rise;
-                    let at = self.phase_at(j, i) + c * self.width;
-                    self.phase[at] = scale * rise / h;
+                for lane in 0..self.width {
+                    for (t, j) in self.piece(lane).enumerate() {
+                        let (rise, h) = (rises[i * count + j], self.h(j));
+                        // With X̃' = rise / h.
+                        length += weight * rise * rise / h;
+                        offset += weight * own[(i + 1) * count + j] * rise;
+                        self.phase[((t * m + i) * n + c) * self.width + lane] = scale * rise / h;
+                    }
                 }
             }
         }
@@ -209,29 +210,31 @@ impl ZeroProblem for CycleProblem<'_> {
         let batch = Batch { lanes, states: &self.states, parameters: Parameters::Shared(&parameters) };
         self.setting.field.evaluate(batch, &mut self.f);
         let mut phase = -self.phase_offset;
-        for j in 0..count {
-            let h = self.h(j);
-            let own = &u[j * block..(j + 1) * block];
-            let next = (j + 1) % count * block;
-            let rows = &mut r[j * block..(j + 1) * block];
-            rows[..n].copy_from_slice(&u[next..next + n]);
-            for k in 0..=m {
-                axpy(-self.scheme.end[k], &own[k * n..(k + 1) * n], &mut rows[..n]);
-            }
-            for i in 0..m {
-                for c in 0..n {
-                    rows[(i + 1) * n + c] = own[(i + 1) * n + c] - own[c];
+        for lane in 0..self.width {
+            for (t, j) in self.piece(lane).enumerate() {
+                let h = self.h(j);
+                let own = &u[j * block..(j + 1) * block];
+                let next = if j + 1 == count { 0 } else { (j + 1) * block };
+                let rows = &mut r[j * block..(j + 1) * block];
+                rows[..n].copy_from_slice(&u[next..next + n]);
+                for k in 0..=m {
+                    axpy(-self.scheme.end[k], &own[k * n..(k + 1) * n], &mut rows[..n]);
                 }
-            }
-            for k in 0..m {
-                let (at, first) = (self.at(j, k), self.phase_at(j, k));
-                for c in 0..n {
-                    let rate = h * period * self.f[c * lanes + at];
-                    for i in 0..m {
-                        rows[(i + 1) * n + c] -= self.scheme.integration[i * m + k] * rate;
+                for i in 0..m {
+                    for c in 0..n {
+                        rows[(i + 1) * n + c] = own[(i + 1) * n + c] - own[c];
                     }
-                    let weight = h * self.scheme.weights[k] * self.phase[first + c * self.width];
-                    phase += weight * own[(k + 1) * n + c];
+                }
+                for k in 0..m {
+                    let at = t * m + k;
+                    for c in 0..n {
+                        let rate = h * period * self.f[c * lanes + at * self.width + lane];
+                        for i in 0..m {
+                            rows[(i + 1) * n + c] -= self.scheme.integration[i * m + k] * rate;
+                        }
+                        let weight = h * self.scheme.weights[k] * self.phase[(at * n + c) * self.width + lane];
+                        phase += weight * own[(k + 1) * n + c];
+                    }
                 }
             }
         }
