@@ -27,7 +27,9 @@ impl Report {
     /// Writes benches/results/DATE.md.
     pub fn write(&self, place: &Workplace) -> Outcome<PathBuf> {
         let date = machine::date().ok_or("the command `date` gives no date")?;
-        let file = place.root.join("benches/results").join(format!("{date}.md"));
+        let folder = place.root.join("benches/results");
+        std::fs::create_dir_all(&folder)?;
+        let file = folder.join(format!("{date}.md"));
         std::fs::write(&file, &self.text)?;
         Ok(file)
     }

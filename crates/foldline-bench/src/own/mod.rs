@@ -3,6 +3,7 @@
 //! | part | file |
 //! |---|---|
 //! | the whole of figure 7, and one branch of it | [`figure7`] |
+//! | parts of an iteration | [`parts`] |
 //! | cost of an iteration against the size of the problem | [`cost`], [`chain`] |
 //! | two threads, ensembles, memory of a long branch, start-up | [`threads`], [`ensemble`], [`stream`], [`startup`] |
 
@@ -10,6 +11,7 @@ pub mod chain;
 pub mod cost;
 pub mod ensemble;
 pub mod figure7;
+mod parts;
 mod startup;
 mod stream;
 mod threads;
@@ -17,9 +19,10 @@ mod threads;
 use crate::workplace::Part;
 
 /// The parts, in the order of the report.
-pub const PARTS: [(&str, Part); 8] = [
+pub const PARTS: [(&str, Part); 9] = [
     ("Figure 7", figure7::whole),
     ("Cubic single loop from 5 to 10", figure7::single_loop),
+    ("Where an iteration goes", parts::timed),
     ("Cost against intervals", cost::intervals),
     ("Cost against states", cost::states),
     ("Two threads", threads::two),

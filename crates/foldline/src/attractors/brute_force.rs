@@ -6,7 +6,7 @@
 
 use super::Sampling;
 use super::measure::response;
-use super::settling::{Settled, Trial, settle_together};
+use super::settling::{First, Settled, Trial, settle_together};
 use crate::contract::Verdict;
 use crate::diagram::{Motion, Response};
 use std::sync::Mutex;
@@ -43,7 +43,7 @@ pub fn survey_by_simulation(
             own[free] = value;
             let settled: Vec<Settled> = starts
                 .chunks((BLOCK * n).max(1))
-                .flat_map(|block| settle_together(trial, &own.repeat(block.len() / n), block))
+                .flat_map(|block| settle_together(trial, &own.repeat(block.len() / n), block, First::Rough))
                 .collect();
             let found = grouped(trial, settled.iter().map(|settled| response(trial, &own, free, settled)).collect());
             if report(&found) == Verdict::Stop {
@@ -116,7 +116,7 @@ pub fn stepped_sweep(
     let (mut own, mut state) = (parameters.to_vec(), start.to_vec());
     for &value in values {
         own[free] = value;
-        let Some(settled) = settle_together(trial, &own, &state).pop() else { break };
+        let Some(settled) = settle_together(trial, &own, &state, First::Accurate).pop() else { break };
         let response = response(trial, &own, free, &settled);
         state.clone_from(&response.state);
         let over = response.motion == Motion::Escaped || report(std::slice::from_ref(&response)) == Verdict::Stop;

@@ -5,7 +5,7 @@
 
 use super::candidate::Context;
 use super::orbit::Orbit;
-use super::settling::{Trial, settle_together};
+use super::settling::{First, Trial, settle_together};
 use super::watch::Watch;
 use super::{Attractor, Candidate, Census, Enough, Polish, Sampling};
 use crate::contract::{VectorField, Verdict};
@@ -142,7 +142,7 @@ pub fn settle(
 fn patiently(context: &Context, start: &[f64]) -> Option<Point> {
     let Sampling { scales, whirl, .. } = context.sampling;
     let trial = Trial { field: context.field, scales, whirl: *whirl, jobs: 1 };
-    let settled = settle_together(&trial, context.parameters, start).pop()?;
+    let settled = settle_together(&trial, context.parameters, start, First::Accurate).pop()?;
     let candidate = match settled.motion {
         Motion::Equilibrium => Candidate::Equilibrium(settled.state),
         Motion::Cycle => context.turn(&settled.state, settled.period),

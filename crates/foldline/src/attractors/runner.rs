@@ -5,7 +5,7 @@
 //! itself or rests, it has been seen to contract and goes on close to the predicted limit, or its steps are used up.
 
 use super::returns::{Prediction, Returns};
-use super::settling::{Settled, Trial};
+use super::settling::{First, Settled, Trial};
 use super::window::Window;
 use crate::contract::{Batch, Parameters, Verdict};
 use crate::diagram::Motion;
@@ -42,6 +42,7 @@ const CONTRACTED: [f64; 2] = [0.9, 0.97];
 
 /// One trajectory.
 pub(super) struct Runner {
+    first: First,
     pub(super) start: Vec<f64>,
     parameters: Vec<f64>,
     pub(super) found: Option<Settled>,
@@ -73,10 +74,11 @@ pub(super) struct Runner {
 }
 
 impl Runner {
-    pub(super) fn new(trial: &Trial, start: &[f64]) -> Runner {
+    pub(super) fn new(trial: &Trial, start: &[f64], first: First) -> Runner {
         let n = start.len();
         Runner {
             start: start.to_vec(),
+            first,
             parameters: Vec::new(),
             found: None,
             steps: 0,
@@ -124,13 +126,13 @@ impl Runner {
         }
         self.x = x;
         // At its low accuracy the first round does not see small motions contract.
-        let rough = self.is_first_round() && self.steps >= ROUGH;
+        let rough = self.is_rough() && self.steps >= ROUGH;
         let over = self.found.is_some() || self.next.is_some() || self.steps >= STEPS || rough;
         if over { Verdict::Stop } else { Verdict::Continue }
     }
 
-    fn is_first_round(&self) -> bool {
-        self.steps == self.round_steps
+    fn is_rough(&self) -> bool {
+        self.first == First::Rough && self.steps == self.round_steps
     }
 
     /// What the returns so far say.
@@ -187,7 +189,7 @@ impl Runner {
         self.renew_extent(&window, trial);
         if let Some(repeats) = self.repeats.take().filter(|_| self.moves) {
             // The first round is not accurate enough to be the last.
-            match self.is_first_round() {
+            match self.is_rough() {
                 true => self.next = Some(repeats.state),
                 false => self.found = Some(repeats),
             }

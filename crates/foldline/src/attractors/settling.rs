@@ -20,8 +20,17 @@ use crate::contract::VectorField;
 use crate::diagram::Motion;
 use crate::simulation::{Ensemble, Tolerance};
 
-/// Accuracy of the integration, relative, in the first round and in those after it.
+/// Accuracy of the integration, relative, in a rough first round and in all others.
 const INTEGRATION: [f64; 2] = [1e-6, 1e-9];
+
+/// How the first round is integrated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum First {
+    /// Roughly: from afar a trajectory has a long way to go, and nothing is decided on it.
+    Rough,
+    /// Accurately: the start lies close to a motion whose basin may be narrow.
+    Accurate,
+}
 
 /// A vector field, and what its motions are measured by.
 #[derive(Clone, Copy)]
@@ -50,9 +59,9 @@ pub(super) struct Settled {
 }
 
 /// Follows trajectories together, each at parameters of its own: `parameters` `[count][k]`, `starts` `[count][n]`.
-pub(super) fn settle_together(trial: &Trial, parameters: &[f64], starts: &[f64]) -> Vec<Settled> {
+pub(super) fn settle_together(trial: &Trial, parameters: &[f64], starts: &[f64], first: First) -> Vec<Settled> {
     let (n, k) = (trial.field.dim(), trial.field.parameter_count());
-    let mut runners: Vec<Runner> = starts.chunks_exact(n).map(|start| Runner::new(trial, start)).collect();
+    let mut runners: Vec<Runner> = starts.chunks_exact(n).map(|start| Runner::new(trial, start, first)).collect();
     for round in 0..JUMPS + 2 {
         let open: Vec<usize> = (0..runners.len()).filter(|&r| runners[r].found.is_none()).collect();
         if open.is_empty() {
@@ -60,7 +69,7 @@ pub(super) fn settle_together(trial: &Trial, parameters: &[f64], starts: &[f64])
         }
         let from: Vec<f64> = open.iter().flat_map(|&r| runners[r].start.clone()).collect();
         let own: Vec<f64> = open.iter().flat_map(|&r| parameters[r * k..(r + 1) * k].to_vec()).collect();
-        let relative = INTEGRATION[round.min(1)];
+        let relative = INTEGRATION[usize::from(round > 0 || first == First::Accurate)];
         let tolerance = Tolerance { relative, absolute: trial.scales.iter().map(|s| relative * s).collect() };
         let left = |r: usize| STEPS.saturating_sub(runners[r].steps);
         let limit = open.iter().map(|&r| left(r)).max().unwrap_or(0).max(1);

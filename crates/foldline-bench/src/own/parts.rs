@@ -1,0 +1,80 @@
+//! Where the linear algebra of a Newton iteration goes: its parts one by one, on a system of the shape of the rotor's.
+
+use crate::report::{Table, digits, time};
+use crate::workplace::Workplace;
+use crate::{Outcome, clock};
+use foldline::linalg::condensed::Condensed;
+use foldline::linalg::lane::{Eight, Lane as _};
+use std::hint::black_box;
+
+const STATES: usize = 4;
+const DEGREE: usize = 4;
+const SCALARS: usize = 2;
+const INTERVALS: usize = 100;
+
+/// The parts.
+pub fn timed(_place: &Workplace) -> Outcome<String> {
+    let (mut system, rhs) = filled();
+    let (interior, coupling) = (system.interior.clone(), system.coupling.clone());
+    let copy = clock::best(|| {
+        system.interior.copy_from_slice(&interior);
+        system.coupling.copy_from_slice(&coupling);
+    });
+    let condensed = clock::best(|| {
+        system.interior.copy_from_slice(&interior);
+        system.coupling.copy_from_slice(&coupling);
+        let _ = black_box(system.condense());
+    }) - copy;
+    let eliminated = clock::best(|| {
+        let _ = black_box(system.eliminate(1.0));
+    });
+    let mut x = vec![0.0; rhs.len()];
+    let solved = clock::best(|| system.solve(&rhs, black_box(&mut x)));
+    let places = (system.length() * Eight::COUNT) as f64;
+    let (inner, width) = ((STATES * DEGREE) as f64, (STATES + SCALARS) as f64);
+    let condensation = places * (2.0 / 3.0 * inner.powi(3) + 2.0 * inner * inner * width + 2.0 * inner * width);
+    // Triangles and coupling once each, and the rows of the border.
+    let solution = places * (2.0 * inner * inner + 2.0 * inner * width + 2.0 * inner * SCALARS as f64);
+    let mut table = Table::new(&["", "time", "operations", "rate"]);
+    let rate = |operations: f64, seconds: f64| {
+        let rate = operations / seconds;
+        [digits(1e-6 * operations) + " M", digits(1e-9 * rate) + " G/s"]
+    };
+    for (name, seconds, operations) in [("condensation", condensed, condensation), ("solution", solved, solution)] {
+        let [operations, rate] = rate(operations, seconds);
+        table.row(&[name.into(), time(seconds), operations, rate]);
+    }
+    table.row(&["elimination of the interval ends".into(), time(eliminated), "".into(), "".into()]);
+    Ok(format!(
+        "{STATES} states, degree {DEGREE}, {INTERVALS} intervals in {} places of eight lanes; sums and products in double \
+         precision are counted.\n\n{}\n",
+        system.length(),
+        table.text()
+    ))
+}
+
+/// A system like that of collocation in Runge–Kutta form: the identity and something small.
+fn filled() -> (Condensed<Eight>, Vec<f64>) {
+    let mut system = Condensed::<Eight>::new(STATES, &[1.0, 0.2, 0.3, 0.3, 0.2], SCALARS);
+    system.resize(INTERVALS);
+    let mut seed = 0.3f64;
+    let mut next = || {
+        seed = (seed * 97.13 + 0.711).fract();
+        0.1 * (seed - 0.5)
+    };
+    let (inner, width) = (STATES * DEGREE, STATES + SCALARS);
+    for (k, entry) in system.interior.iter_mut().enumerate() {
+        let place = k % (inner * inner);
+        let unit = f64::from(u8::from(place / inner == place % inner));
+        entry.lanes_mut().iter_mut().for_each(|x| *x = unit + next());
+    }
+    for (k, entry) in system.coupling.iter_mut().enumerate() {
+        let place = k % (inner * width);
+        let unit = f64::from(u8::from(place / width % STATES == place % width));
+        entry.lanes_mut().iter_mut().for_each(|x| *x = next() - unit);
+    }
+    system.border.iter_mut().for_each(|entry| entry.lanes_mut().iter_mut().for_each(|x| *x = next()));
+    system.corner.iter_mut().for_each(|x| *x = 1.0 + next());
+    let rhs = (0..INTERVALS * (inner + STATES) + SCALARS).map(|_| next()).collect();
+    (system, rhs)
+}
