@@ -79,15 +79,29 @@ fn the_pull_of_the_tanh_law_leads_out_of_the_contact_interval() {
     }
 }
 
+/// The power that goes into an orbit comes out again, as far as its integration is accurate: a tenth of the tolerance, and a
+/// hundredth of it less than a thirtieth of that.
 #[test]
-fn orbits_balance_power_and_close() {
+fn orbits_balance_power_to_the_tolerance_that_is_asked_for() {
+    for (constants, ratio) in [(CUBIC, RATIOS[0]), (CUBIC, RATIOS[1]), (CONTACT, RATIOS[0]), (CONTACT, RATIOS[1])] {
+        let largest = |tolerance: f64| {
+            let reach = Reach { speeds: [0.5, 8.0], radius: 4.0, tolerance };
+            let found = backbone(&constants, ContactLaw::Softplus, ratio, &reach).unwrap();
+            assert!(found.points.len() > 15);
+            found.points.iter().step_by(3).map(|p| spectrum(p).power_defect().abs()).fold(0.0, f64::max)
+        };
+        let (loose, tight) = (largest(1e-7), largest(1e-9));
+        assert!(loose < 1e-8 && tight < loose / 30.0, "{loose:e} {tight:e}");
+    }
+}
+
+#[test]
+fn orbits_close() {
     for (constants, ratio) in [(CUBIC, RATIOS[0]), (CUBIC, RATIOS[1]), (CONTACT, RATIOS[0]), (CONTACT, RATIOS[1])] {
         let found = computed(&constants, ContactLaw::Softplus, ratio, 8.0, 4.0);
         assert!(found.points.len() > 15);
         for p in found.points.iter().step_by(5) {
             let Solution::Cycle(cycle) = &p.point.solution else { panic!() };
-            // The profile is a polynomial of degree 5 on each step of an integration to 1e-8, relative to which the powers are.
-            assert!(spectrum(p).power_defect().abs() < 1e-8, "{}: {}", p.speed, spectrum(p).power_defect());
             let integrator = Integrator::new(
                 &OverhungRotor { law: ContactLaw::Softplus },
                 &p.point.parameters,
