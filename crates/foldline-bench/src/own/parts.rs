@@ -12,6 +12,9 @@ const DEGREE: usize = 4;
 const SCALARS: usize = 2;
 const INTERVALS: usize = 100;
 
+/// Which rates depend on which states: two positions, their velocities, and accelerations that depend on everything.
+const COUPLED: [u8; STATES * STATES] = [0, 0, 1, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1];
+
 /// The parts.
 pub fn timed(_place: &Workplace) -> Outcome<String> {
     let (mut system, rhs) = filled();
@@ -56,7 +59,10 @@ pub fn timed(_place: &Workplace) -> Outcome<String> {
 /// A system like that of collocation in Runge–Kutta form: the identity and something small.
 fn filled() -> (Condensed<Eight>, Vec<f64>) {
     let mut system = Condensed::<Eight>::new(STATES, &[1.0, 0.2, 0.3, 0.3, 0.2], SCALARS);
+    system.couple(&COUPLED.map(|x| x == 1));
     system.resize(INTERVALS);
+    let mut component = [0; STATES * DEGREE];
+    (0..component.len()).for_each(|k| component[system.slot(k / STATES, k % STATES)] = k % STATES);
     let mut seed = 0.3f64;
     let mut next = || {
         seed = (seed * 97.13 + 0.711).fract();
@@ -66,12 +72,15 @@ fn filled() -> (Condensed<Eight>, Vec<f64>) {
     for (k, entry) in system.interior.iter_mut().enumerate() {
         let place = k % (inner * inner);
         let unit = f64::from(u8::from(place / inner == place % inner));
-        entry.lanes_mut().iter_mut().for_each(|x| *x = unit + next());
+        let coupled = f64::from(COUPLED[component[place / inner] * STATES + component[place % inner]]);
+        entry.lanes_mut().iter_mut().for_each(|x| *x = unit + coupled * next());
     }
     for (k, entry) in system.coupling.iter_mut().enumerate() {
         let place = k % (inner * width);
-        let unit = f64::from(u8::from(place / width % STATES == place % width));
-        entry.lanes_mut().iter_mut().for_each(|x| *x = next() - unit);
+        let (c, d) = (component[place / width], place % width);
+        let scalar = f64::from(u8::from(d >= STATES));
+        let unit = f64::from(u8::from(c == d));
+        entry.lanes_mut().iter_mut().for_each(|x| *x = scalar * next() - unit);
     }
     system.border.iter_mut().for_each(|entry| entry.lanes_mut().iter_mut().for_each(|x| *x = next()));
     system.corner.iter_mut().for_each(|x| *x = 1.0 + next());

@@ -1,12 +1,15 @@
 //! LU factorisation of small dense matrices, one in each lane.
 //!
-//! **Idea.** Gaussian elimination with a diagonal pivot while it is at least a tenth of what stands below it. Otherwise the lane
-//! that needs it exchanges rows by itself; the matrices of collocation in Runge–Kutta form rarely do.
+//! **Idea.** Gaussian elimination with a diagonal pivot while it is at least a tenth of what stands below it, component by
+//! component, looking only at blocks that can differ from zero ([`Shape`]). Where a diagonal does not serve, the lanes that need
+//! it exchange rows by themselves, and from there on every entry is looked at; the matrices of collocation in Runge–Kutta form
+//! rarely need that. Matrices that fill the vectors by themselves are eliminated in panels.
 //!
 //! **Source.** Threshold pivoting: duff2017, §5.2.
 
-use super::lane::{Lane, subtract};
-use super::tile::subtract_product;
+use super::lane::{Lane, dot, subtract};
+use super::shape::{Shape, Step};
+use super::tile::{self, subtract_product};
 use crate::contract::Singular;
 
 /// Share of the largest candidate that the diagonal must have to serve as pivot.
@@ -16,14 +19,14 @@ const SMALL: usize = 32;
 /// Columns of a panel of a larger one.
 const PANEL: usize = 16;
 
-/// Columns treated together: all of them where every entry is a vector by itself.
+/// Whether the matrix fills the vectors by itself, in panels; it needs no shape then.
 #[inline(always)]
-fn depth<T: Lane>(n: usize) -> usize {
-    if T::COUNT > 1 || n <= SMALL { n.max(1) } else { PANEL }
+pub fn in_panels<T: Lane>(n: usize) -> bool {
+    T::COUNT == 1 && n > SMALL
 }
 
 /// Factorises the row-major n×n matrices `a` in place (the diagonal holds the inverse pivots) and solves a x = b for the
-/// `columns` right-hand sides in `b`, row-major `[n × columns]`. `pivots` is `[n × lanes]`.
+/// `columns` right-hand sides in `b`, row-major `[n × columns]`. `pivots` is `[n × lanes]`. What `shape` says to be zero must be.
 ///
 /// Returns whether any rows were exchanged.
 ///
@@ -36,38 +39,238 @@ pub fn factorise<T: Lane>(
     pivots: &mut [u32],
     b: &mut [T],
     columns: usize,
+    shape: &Shape,
+) -> Result<bool, Singular> {
+    let mut room = Vec::new();
+    if in_panels::<T>(n) {
+        return panels(a, n, pivots, b, columns, &mut room);
+    }
+    // The usual degree as a constant.
+    let reached = match shape.nodes {
+        4 => blocks(a, n, b, columns, shape, 4, &mut room),
+        m => blocks(a, n, b, columns, shape, m, &mut room),
+    };
+    let exchanged = reached < n;
+    if exchanged {
+        whole(a, n, pivots, b, columns, reached)?;
+    } else {
+        match shape.nodes {
+            4 => back_in_blocks(a, n, b, columns, shape, 4),
+            m => back_in_blocks(a, n, b, columns, shape, m),
+        }
+    }
+    Ok(exchanged)
+}
+
+/// Eliminates component by component; returns the first column whose component needs another pivot than the diagonal, n if none does.
+#[inline(always)]
+fn blocks<T: Lane>(
+    a: &mut [T],
+    n: usize,
+    b: &mut [T],
+    columns: usize,
+    shape: &Shape,
+    m: usize,
+    room: &mut Vec<T>,
+) -> usize {
+    room.resize(n * m, T::default());
+    for (p, step) in shape.steps.iter().enumerate() {
+        let first = p * m;
+        let serves = if step.own { own_block(a, n, first, m, step, room) } else { identity(a, n, first, m, step) };
+        if !serves {
+            return first;
+        }
+        let (upper, lower) = a.split_at_mut((first + m) * n);
+        let (done, rest) = b.split_at_mut((first + m) * columns);
+        let (upper, done) = (&mut upper[first * n..], &mut done[first * columns..]);
+        if step.own {
+            // The rows of the block to the right of it.
+            for k in 1..m {
+                let (before, own) = upper.split_at_mut(k * n);
+                let (right_before, right) = done.split_at_mut(k * columns);
+                for i in 0..k {
+                    let factor = own[first + i];
+                    for q in &step.right {
+                        subtract(factor, &before[i * n + q * m..i * n + (q + 1) * m], &mut own[q * m..(q + 1) * m]);
+                    }
+                    for range in &step.carried {
+                        let from = i * columns;
+                        subtract(factor, &right_before[from + range.start..from + range.end], &mut right[range.clone()]);
+                    }
+                }
+            }
+        }
+        for q in &step.below {
+            let rows = &mut lower[(q * m - first - m) * n..(q * m - first) * n];
+            for (to, row) in room.chunks_exact_mut(m).zip(rows.chunks_exact(n)) {
+                to.copy_from_slice(&row[first..first + m]);
+            }
+            for r in &step.right {
+                tile::subtract(rows, n, room, m, upper, n, [m, m, m], [r * m, 0, r * m]);
+            }
+            let right = &mut rest[(q * m - first - m) * columns..(q * m - first) * columns];
+            for range in &step.carried {
+                let (c, wide) = (range.start, range.len());
+                tile::subtract(right, columns, room, m, done, columns, [m, m, wide], [c, 0, c]);
+            }
+        }
+    }
+    n
+}
+
+/// Whether the identity serves as pivots of a component: what stands below it are the factors.
+#[inline(always)]
+fn identity<T: Lane>(a: &[T], n: usize, first: usize, m: usize, step: &Step) -> bool {
+    let mut largest = T::default();
+    for q in &step.below {
+        for row in a[q * m * n..(q + 1) * m * n].chunks_exact(n) {
+            for x in &row[first..first + m] {
+                largest = largest.zip(*x, |most, x| if x.abs() > most { x.abs() } else { most });
+            }
+        }
+    }
+    T::splat(1.0).all(largest, serves)
+}
+
+/// Whether a diagonal serves, given the largest entry of its column.
+#[inline(always)]
+fn serves(diagonal: f64, largest: f64) -> bool {
+    (diagonal >= THRESHOLD * largest) & (diagonal > 1e-300) & (diagonal < f64::INFINITY)
+}
+
+/// Eliminates the columns of a component from its own rows and those below, within these columns; false, and nothing changed, if a
+/// diagonal does not serve.
+#[inline(always)]
+fn own_block<T: Lane>(a: &mut [T], n: usize, first: usize, m: usize, step: &Step, room: &mut [T]) -> bool {
+    let rows = || std::iter::once(first / m).chain(step.below.iter().copied()).flat_map(move |q| q * m..(q + 1) * m);
+    let panel = &mut room[..(1 + step.below.len()) * m * m];
+    for (row, i) in panel.chunks_exact_mut(m).zip(rows()) {
+        row.copy_from_slice(&a[i * n + first..i * n + first + m]);
+    }
+    for k in 0..m {
+        let (upper, lower) = panel.split_at_mut((k + 1) * m);
+        let pivot = &mut upper[k * m..];
+        let mut largest = T::default();
+        for row in lower.chunks_exact(m) {
+            largest = largest.zip(row[k], |most, x| if x.abs() > most { x.abs() } else { most });
+        }
+        if !pivot[k].map(f64::abs).all(largest, serves) {
+            return false;
+        }
+        pivot[k] = pivot[k].map(|x| 1.0 / x);
+        for row in lower.chunks_exact_mut(m) {
+            let factor = row[k] * pivot[k];
+            row[k] = factor;
+            for j in k + 1..m {
+                row[j] = row[j] - factor * pivot[j];
+            }
+        }
+    }
+    for (i, row) in rows().zip(panel.chunks_exact(m)) {
+        a[i * n + first..i * n + first + m].copy_from_slice(row);
+    }
+    true
+}
+
+/// The upper triangle after [`blocks`], for all columns of `b`.
+#[inline(always)]
+fn back_in_blocks<T: Lane>(a: &[T], n: usize, b: &mut [T], columns: usize, shape: &Shape, m: usize) {
+    for (p, step) in shape.steps.iter().enumerate().rev() {
+        let first = p * m;
+        let (head, tail) = b.split_at_mut((first + m) * columns);
+        let rows = &mut head[first * columns..];
+        let lines = &a[first * n..(first + m) * n];
+        for q in &step.right {
+            let below = &tail[(q * m - first - m) * columns..(q * m - first) * columns];
+            for range in &shape.steps[*q].solved {
+                let (c, wide) = (range.start, range.len());
+                tile::subtract(rows, columns, lines, n, below, columns, [m, m, wide], [c, q * m, c]);
+            }
+        }
+        if step.own {
+            for k in (0..m).rev() {
+                let (own, done) = rows.split_at_mut((k + 1) * columns);
+                let row = &mut own[k * columns..];
+                let line = &lines[k * n + first..k * n + first + m];
+                for range in &step.solved {
+                    for (i, below) in done.chunks_exact(columns).enumerate() {
+                        subtract(line[k + 1 + i], &below[range.clone()], &mut row[range.clone()]);
+                    }
+                    row[range.clone()].iter_mut().for_each(|x| *x = *x * line[k]);
+                }
+            }
+        }
+    }
+}
+
+/// Eliminates from column `from` on with exchanges of rows where they are needed, then the upper triangle.
+#[inline(never)]
+fn whole<T: Lane>(
+    a: &mut [T],
+    n: usize,
+    pivots: &mut [u32],
+    b: &mut [T],
+    columns: usize,
+    from: usize,
+) -> Result<(), Singular> {
+    for k in 0..from {
+        pivots[k * T::COUNT..(k + 1) * T::COUNT].fill(k as u32);
+    }
+    for k in from..n {
+        pivot(a, n, pivots, b, columns, k)?;
+        let inverse = a[k * n + k];
+        let (upper, lower) = a.split_at_mut((k + 1) * n);
+        let (row_k, right_k) = (&upper[k * n + k + 1..], &b[k * columns..(k + 1) * columns].to_vec());
+        for (i, row) in lower.chunks_exact_mut(n).enumerate() {
+            let factor = row[k] * inverse;
+            row[k] = factor;
+            subtract(factor, row_k, &mut row[k + 1..]);
+            let right = (k + 1 + i) * columns;
+            subtract(factor, right_k, &mut b[right..right + columns]);
+        }
+    }
+    for k in (0..n).rev() {
+        let (head, tail) = b.split_at_mut((k + 1) * columns);
+        let row = &mut head[k * columns..];
+        for (i, below) in tail.chunks_exact(columns.max(1)).enumerate() {
+            subtract(a[k * n + k + 1 + i], below, row);
+        }
+        row.iter_mut().for_each(|x| *x = *x * a[k * n + k]);
+    }
+    Ok(())
+}
+
+/// A large one, the bulk of whose work is products of panels.
+#[inline(always)]
+fn panels<T: Lane>(
+    a: &mut [T],
+    n: usize,
+    pivots: &mut [u32],
+    b: &mut [T],
+    columns: usize,
+    left: &mut Vec<T>,
 ) -> Result<bool, Singular> {
     let mut exchanged = false;
-    // Small matrices are one panel; in larger ones the bulk of the work is products of panels.
-    let depth = depth::<T>(n);
-    let mut left = Vec::new();
-    for first in (0..n).step_by(depth) {
-        let end = (first + depth).min(n);
+    for first in (0..n).step_by(PANEL) {
+        let end = (first + PANEL).min(n);
         for k in first..end {
             exchanged |= pivot(a, n, pivots, b, columns, k)?;
             let inverse = a[k * n + k];
             let (upper, lower) = a.split_at_mut((k + 1) * n);
             let row_k = &upper[k * n + k + 1..k * n + end];
-            let (done, rest) = b.split_at_mut((k + 1) * columns);
-            let right_k = &done[k * columns..];
-            for (i, row) in lower.chunks_exact_mut(n).enumerate() {
-                // Many entries vanish in every lane: components that do not depend on each other.
+            for row in lower.chunks_exact_mut(n) {
+                // Many entries vanish: components that do not depend on each other.
                 if row[k].lanes().iter().all(|x| *x == 0.0) {
                     continue;
                 }
                 let factor = row[k] * inverse;
                 row[k] = factor;
                 subtract(factor, row_k, &mut row[k + 1..end]);
-                if end == n && first == 0 {
-                    subtract(factor, right_k, &mut rest[i * columns..(i + 1) * columns]);
-                }
             }
         }
-        if T::COUNT == 1 && depth < n {
-            update(a, n, b, columns, [first, end], &mut left);
-        }
+        update(a, n, b, columns, [first, end], left);
     }
-    back(a, n, b, columns, &mut left);
+    back(a, n, b, columns, left);
     Ok(exchanged)
 }
 
@@ -86,14 +289,12 @@ fn pivot<T: Lane>(
     for i in k + 1..n {
         largest = largest.zip(a[i * n + k], |m, x| if x.abs() > m { x.abs() } else { m });
     }
-    let serves =
-        diagonal.zip(largest, |d, m| if d >= THRESHOLD * m && d > 1e-300 && d < f64::INFINITY { 0.0 } else { 1.0 });
     let own = &mut pivots[k * T::COUNT..(k + 1) * T::COUNT];
     own.fill(k as u32);
-    let wanting = serves.lanes().iter().any(|x| *x > 0.0);
+    let wanting = !diagonal.all(largest, serves);
     if wanting {
         for l in 0..T::COUNT {
-            if serves.lanes()[l] > 0.0 {
+            if !serves(diagonal.lanes()[l], largest.lanes()[l]) {
                 own[l] = exchange(a, n, b, columns, k, l)?;
             }
         }
@@ -145,12 +346,11 @@ fn exchange<T: Lane>(a: &mut [T], n: usize, b: &mut [T], columns: usize, k: usiz
 /// The upper triangle, for all columns of `b`.
 #[inline(always)]
 fn back<T: Lane>(a: &[T], n: usize, b: &mut [T], columns: usize, left: &mut Vec<T>) {
-    let depth = depth::<T>(n);
-    for first in (0..n).step_by(depth).rev() {
-        let end = (first + depth).min(n);
+    for first in (0..n).step_by(PANEL).rev() {
+        let end = (first + PANEL).min(n);
         let (own, solved) = b.split_at_mut(end * columns);
         let own = &mut own[first * columns..];
-        if T::COUNT == 1 && end < n {
+        if end < n {
             left.clear();
             left.extend(a[first * n..end * n].chunks_exact(n).flat_map(|row| &row[end..]));
             subtract_product(own, left, solved, columns, n - end, [0, columns]);
@@ -169,43 +369,112 @@ fn back<T: Lane>(a: &[T], n: usize, b: &mut [T], columns: usize, left: &mut Vec<
 
 /// Solves for one right-hand side `[n]` in place.
 #[inline(always)]
-pub fn solve<T: Lane>(a: &[T], n: usize, pivots: &[u32], exchanged: bool, b: &mut [T]) {
+pub fn solve<T: Lane>(a: &[T], n: usize, pivots: &[u32], exchanged: bool, b: &mut [T], shape: &Shape) {
     if exchanged {
         for k in 0..n {
             swap_lanes(b, k, &pivots[k * T::COUNT..(k + 1) * T::COUNT]);
         }
     }
-    for k in 1..n {
-        let mut sum = b[k];
-        for i in 0..k {
-            sum = sum - a[k * n + i] * b[i];
+    if exchanged || in_panels::<T>(n) {
+        for k in 1..n {
+            b[k] = b[k] - dot(&a[k * n..k * n + k], &b[..k]);
         }
-        b[k] = sum;
+        for k in (0..n).rev() {
+            b[k] = (b[k] - dot(&a[k * n + k + 1..(k + 1) * n], &b[k + 1..n])) * a[k * n + k];
+        }
+        return;
     }
-    for k in (0..n).rev() {
-        let mut sum = b[k];
-        for i in k + 1..n {
-            sum = sum - a[k * n + i] * b[i];
+    match shape.nodes {
+        4 => solve_in_blocks(a, n, b, shape, 4),
+        m => solve_in_blocks(a, n, b, shape, m),
+    }
+}
+
+#[inline(always)]
+fn solve_in_blocks<T: Lane>(a: &[T], n: usize, b: &mut [T], shape: &Shape, m: usize) {
+    for (p, step) in shape.steps.iter().enumerate() {
+        let lines = &a[p * m * n..(p + 1) * m * n];
+        let (done, rest) = b.split_at_mut(p * m);
+        let own = &mut rest[..m];
+        for q in &step.left {
+            tile::subtract(own, 1, lines, n, done, 1, [m, m, 1], [0, q * m, q * m]);
         }
-        b[k] = sum * a[k * n + k];
+        if step.own {
+            for k in 1..m {
+                for i in 0..k {
+                    own[k] = own[k] - lines[k * n + p * m + i] * own[i];
+                }
+            }
+        }
+    }
+    for (p, step) in shape.steps.iter().enumerate().rev() {
+        let lines = &a[p * m * n..(p + 1) * m * n];
+        let (head, done) = b.split_at_mut((p + 1) * m);
+        let own = &mut head[p * m..];
+        for q in &step.right {
+            tile::subtract(own, 1, lines, n, done, 1, [m, m, 1], [0, q * m, (q - p - 1) * m]);
+        }
+        if step.own {
+            for k in (0..m).rev() {
+                let line = &lines[k * n + p * m..k * n + (p + 1) * m];
+                for i in k + 1..m {
+                    own[k] = own[k] - line[i] * own[i];
+                }
+                own[k] = own[k] * line[k];
+            }
+        }
     }
 }
 
 /// Solves aᵀ x = b for one right-hand side `[n]` in place.
 #[inline(always)]
-pub fn solve_transposed<T: Lane>(a: &[T], n: usize, pivots: &[u32], exchanged: bool, b: &mut [T]) {
-    for k in 0..n {
-        b[k] = b[k] * a[k * n + k];
-        let (head, tail) = b.split_at_mut(k + 1);
-        subtract(head[k], &a[k * n + k + 1..(k + 1) * n], tail);
-    }
-    for k in (1..n).rev() {
-        let (head, tail) = b.split_at_mut(k);
-        subtract(tail[0], &a[k * n..k * n + k], head);
+pub fn solve_transposed<T: Lane>(a: &[T], n: usize, pivots: &[u32], exchanged: bool, b: &mut [T], shape: &Shape) {
+    if exchanged || in_panels::<T>(n) {
+        for k in 0..n {
+            b[k] = b[k] * a[k * n + k];
+            let (head, tail) = b.split_at_mut(k + 1);
+            subtract(head[k], &a[k * n + k + 1..(k + 1) * n], tail);
+        }
+        for k in (1..n).rev() {
+            let (head, tail) = b.split_at_mut(k);
+            subtract(tail[0], &a[k * n..k * n + k], head);
+        }
+    } else {
+        transposed_in_blocks(a, n, b, shape);
     }
     if exchanged {
         for k in (0..n).rev() {
             swap_lanes(b, k, &pivots[k * T::COUNT..(k + 1) * T::COUNT]);
+        }
+    }
+}
+
+#[inline(always)]
+fn transposed_in_blocks<T: Lane>(a: &[T], n: usize, b: &mut [T], shape: &Shape) {
+    let m = shape.nodes;
+    for (p, step) in shape.steps.iter().enumerate() {
+        for k in p * m..(p + 1) * m {
+            let line = &a[k * n..(k + 1) * n];
+            let (head, tail) = b.split_at_mut(k + 1);
+            if step.own {
+                head[k] = head[k] * line[k];
+                subtract(head[k], &line[k + 1..(p + 1) * m], &mut tail[..(p + 1) * m - k - 1]);
+            }
+            for q in &step.right {
+                subtract(head[k], &line[q * m..(q + 1) * m], &mut tail[q * m - k - 1..(q + 1) * m - k - 1]);
+            }
+        }
+    }
+    for (p, step) in shape.steps.iter().enumerate().rev() {
+        for k in (p * m..(p + 1) * m).rev() {
+            let line = &a[k * n..(k + 1) * n];
+            let (head, tail) = b.split_at_mut(k);
+            if step.own {
+                subtract(tail[0], &line[p * m..k], &mut head[p * m..k]);
+            }
+            for q in &step.left {
+                subtract(tail[0], &line[q * m..(q + 1) * m], &mut head[q * m..(q + 1) * m]);
+            }
         }
     }
 }
@@ -249,9 +518,10 @@ mod tests {
         let mut one = fill(n, &|l, k| right(l, k * columns));
         let mut turned = one.clone();
         let mut pivots = vec![0; 8 * n];
-        assert!(factorise(&mut a, n, &mut pivots, &mut b, columns).unwrap());
-        solve(&a, n, &pivots, true, &mut one);
-        solve_transposed(&a, n, &pivots, true, &mut turned);
+        let shape = Shape::new(&vec![true; n * n], &vec![true; n * n], 1, columns);
+        assert!(factorise(&mut a, n, &mut pivots, &mut b, columns, &shape).unwrap());
+        solve(&a, n, &pivots, true, &mut one, &shape);
+        solve_transposed(&a, n, &pivots, true, &mut turned, &shape);
         for l in 0..8 {
             let mut plain: Vec<f64> = (0..n * n).map(|k| entry(l, k / n, k % n)).collect();
             let mut p = vec![0; n];
@@ -273,6 +543,6 @@ mod tests {
         let mut a = vec![Eight([1.0; 8]); 4];
         a[3] = Eight([2.0, 2.0, 2.0, 1.0, 2.0, 2.0, 2.0, 2.0]);
         let mut none: [Eight; 0] = [];
-        assert_eq!(factorise(&mut a, 2, &mut [0; 16], &mut none, 0), Err(Singular));
+        assert_eq!(factorise(&mut a, 2, &mut [0; 16], &mut none, 0, &Shape::new(&[true; 4], &[true; 4], 1, 0)), Err(Singular));
     }
 }

@@ -29,6 +29,9 @@ pub trait Lane: Copy + Default + Send + Sync + Add<Output = Self> + Sub<Output =
     /// A function of two numbers applied lane by lane.
     fn zip(self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self;
 
+    /// Whether something holds for the numbers of every lane.
+    fn all(self, other: Self, holds: impl Fn(f64, f64) -> bool) -> bool;
+
     /// Runs work compiled for the widest instruction set of the machine.
     fn dispatch<R>(work: impl pulp::NullaryFnOnce<Output = R>) -> R {
         pulp::Arch::new().dispatch(work)
@@ -66,6 +69,11 @@ impl Lane for f64 {
     #[inline(always)]
     fn zip(self, other: f64, f: impl Fn(f64, f64) -> f64) -> f64 {
         f(self, other)
+    }
+
+    #[inline(always)]
+    fn all(self, other: f64, holds: impl Fn(f64, f64) -> bool) -> bool {
+        holds(self, other)
     }
 }
 
@@ -119,6 +127,14 @@ impl Lane for Eight {
             f(x[7], y[7]),
         ])
     }
+
+    #[inline(always)]
+    fn all(self, other: Eight, holds: impl Fn(f64, f64) -> bool) -> bool {
+        // As numbers: a comparison of vectors and one test of what it leaves.
+        let fails = self.zip(other, |x, y| if holds(x, y) { 0.0 } else { 1.0 });
+        let [a, b, c, d, e, g, h, i] = fails.0;
+        ((a + b) + (c + d)) + ((e + g) + (h + i)) == 0.0
+    }
 }
 
 impl Add for Eight {
@@ -164,8 +180,18 @@ pub fn add<T: Lane>(s: T, x: &[T], y: &mut [T]) {
     }
 }
 
-/// a · b in every lane.
+/// a · b in every lane: four sums, added at the end, so that few products wait for each other.
 #[inline(always)]
 pub fn dot<T: Lane>(a: &[T], b: &[T]) -> T {
-    a.iter().zip(b).fold(T::default(), |sum, (a, b)| sum + *a * *b)
+    let ((a4, a), (b4, b)) = (a.as_chunks::<4>(), b.as_chunks::<4>());
+    let mut sums = [T::default(); 4];
+    for (a, b) in a4.iter().zip(b4) {
+        for k in 0..4 {
+            sums[k] = sums[k] + a[k] * b[k];
+        }
+    }
+    for (k, (a, b)) in a.iter().zip(b).enumerate() {
+        sums[k % 4] = sums[k % 4] + *a * *b;
+    }
+    (sums[0] + sums[1]) + (sums[2] + sums[3])
 }

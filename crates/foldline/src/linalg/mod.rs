@@ -11,6 +11,7 @@ pub mod lu;
 pub mod panel;
 pub mod periodic_schur;
 pub mod reflect;
+pub mod shape;
 pub mod system;
 mod tile;
 

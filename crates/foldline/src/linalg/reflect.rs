@@ -23,32 +23,34 @@ pub fn triangularise<T: Lane>(a: &mut [T], rows: usize, width: usize, columns: u
         let scale = beta.map(|b| if b > 0.0 && b < f64::INFINITY { 1.0 / b.sqrt() } else { 0.0 });
         reflector[k..].iter_mut().for_each(|x| *x = *x * scale);
         // Columns in groups whose sums stay in registers.
+        let (v, block) = (&reflector[k..], &mut a[k * width..rows * width]);
         let mut c = k;
         while c < width {
-            c += match (T::COUNT, width - c) {
-                (1, 8..) => apply_group::<T, 8>(reflector, k, a, width, c),
-                (1, _) | (_, 1) => apply_group::<T, 1>(reflector, k, a, width, c),
-                _ => apply_group::<T, 2>(reflector, k, a, width, c),
+            c += match width - c {
+                8.. => apply_group::<T, 8>(v, block, width, c),
+                4.. => apply_group::<T, 4>(v, block, width, c),
+                2.. => apply_group::<T, 2>(v, block, width, c),
+                _ => apply_group::<T, 1>(v, block, width, c),
             };
         }
-        for i in k + 1..rows {
-            a[i * width + k] = T::default();
+        for row in block[width..].chunks_exact_mut(width) {
+            row[k] = T::default();
         }
     }
 }
 
 /// Applies 1 - v vᵀ to C columns from `c` on; returns C.
 #[inline(always)]
-fn apply_group<T: Lane, const C: usize>(v: &[T], first: usize, a: &mut [T], width: usize, c: usize) -> usize {
+fn apply_group<T: Lane, const C: usize>(v: &[T], a: &mut [T], width: usize, c: usize) -> usize {
     let mut sums = [T::default(); C];
-    for (i, v) in v.iter().enumerate().skip(first) {
-        let row = &a[i * width + c..i * width + c + C];
+    for (v, row) in v.iter().zip(a.chunks_exact(width)) {
+        let row = &row[c..c + C];
         for k in 0..C {
             sums[k] = sums[k] + *v * row[k];
         }
     }
-    for (i, v) in v.iter().enumerate().skip(first) {
-        let row = &mut a[i * width + c..i * width + c + C];
+    for (v, row) in v.iter().zip(a.chunks_exact_mut(width)) {
+        let row = &mut row[c..c + C];
         for k in 0..C {
             row[k] = row[k] - *v * sums[k];
         }

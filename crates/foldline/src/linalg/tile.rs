@@ -48,6 +48,71 @@ fn tile<T: Lane, const R: usize, const C: usize>(y: &mut [T], a: &[T], b: &[T], 
     }
 }
 
+/// Y -= A B for blocks of row-major matrices with strides of their own: rows, depth and columns in `size`, first columns of the
+/// blocks of Y, A and B in `at`.
+#[inline(always)]
+#[expect(clippy::too_many_arguments, reason = "three matrices with a stride each")]
+pub fn subtract<T: Lane>(
+    y: &mut [T],
+    y_stride: usize,
+    a: &[T],
+    a_stride: usize,
+    b: &[T],
+    b_stride: usize,
+    [rows, depth, columns]: [usize; 3],
+    [y_at, a_at, b_at]: [usize; 3],
+) {
+    const C: usize = 4;
+    let mut i = 0;
+    while i < rows {
+        let whole = i + 4 <= rows;
+        let (own, left) = (&mut y[i * y_stride + y_at..], &a[i * a_stride + a_at..]);
+        let mut c = 0;
+        while c < columns {
+            let (own, right) = (&mut own[c..], &b[b_at + c..]);
+            c += match (whole, columns - c) {
+                (true, C..) => strided::<T, 4, C>(own, y_stride, left, a_stride, right, b_stride, depth),
+                (true, 2..) => strided::<T, 4, 2>(own, y_stride, left, a_stride, right, b_stride, depth),
+                (true, _) => strided::<T, 4, 1>(own, y_stride, left, a_stride, right, b_stride, depth),
+                (false, C..) => strided::<T, 1, C>(own, y_stride, left, a_stride, right, b_stride, depth),
+                (false, _) => strided::<T, 1, 1>(own, y_stride, left, a_stride, right, b_stride, depth),
+            };
+        }
+        i += if whole { 4 } else { 1 };
+    }
+}
+
+/// One tile; returns its columns.
+#[inline(always)]
+fn strided<T: Lane, const R: usize, const C: usize>(
+    y: &mut [T],
+    y_stride: usize,
+    a: &[T],
+    a_stride: usize,
+    b: &[T],
+    b_stride: usize,
+    depth: usize,
+) -> usize {
+    let mut sums = [[T::default(); C]; R];
+    for r in 0..R {
+        sums[r].copy_from_slice(&y[r * y_stride..r * y_stride + C]);
+    }
+    let lines: [&[T]; R] = std::array::from_fn(|r| &a[r * a_stride..r * a_stride + depth]);
+    for k in 0..depth {
+        let row = &b[k * b_stride..k * b_stride + C];
+        for r in 0..R {
+            let factor = lines[r][k];
+            for j in 0..C {
+                sums[r][j] = sums[r][j] - factor * row[j];
+            }
+        }
+    }
+    for r in 0..R {
+        y[r * y_stride..r * y_stride + C].copy_from_slice(&sums[r]);
+    }
+    C
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -212,26 +212,27 @@ impl<'a> OnCycles<'a> {
         let (width, block, length) = (parts + scalars, (m + 1) * parts, system.length());
         let (lane, node, first) = (j * m + i, (j * (m + 1) + i + 1) * parts, usize::from(self.is_fold()));
         let (half, own) = (c / n * n, c % n);
-        let line = &mut system.interior[(place * inner + i * parts + c) * inner..][..inner];
+        let slots: Vec<usize> = (0..inner).map(|k| system.slot(k / parts, k % parts)).collect();
+        let line = &mut system.interior[(place * inner + slots[i * parts + c]) * inner..][..inner];
         for k in 0..m {
-            line[k * parts + c].lanes_mut()[slot] = self.scheme.derivative[i * (m + 1) + k + 1];
+            line[slots[k * parts + c]].lanes_mut()[slot] = self.scheme.derivative[i * (m + 1) + k + 1];
         }
         for d in 0..n {
-            line[i * parts + half + d].lanes_mut()[slot] -= h * self.period * self.fx[(own * n + d) * lanes + lane];
+            line[slots[i * parts + half + d]].lanes_mut()[slot] -= h * self.period * self.fx[(own * n + d) * lanes + lane];
         }
         // + iθ v: the real part loses θ times the imaginary one.
         let (other, sign) = if c < n { (c + n, -1.0) } else { (c - n, 1.0) };
         if parts > n {
-            line[i * parts + other].lanes_mut()[slot] += sign * h * angle;
+            line[slots[i * parts + other]].lanes_mut()[slot] += sign * h * angle;
         }
-        let right = &mut system.coupling[(place * inner + i * parts + c) * width..][..width];
+        let right = &mut system.coupling[(place * inner + slots[i * parts + c]) * width..][..width];
         right[c].lanes_mut()[slot] = self.scheme.derivative[i * (m + 1)];
         if self.is_fold() {
             right[parts].lanes_mut()[slot] = -h * self.f[c * lanes + lane];
         }
         right[parts + first].lanes_mut()[slot] = h * self.left[node + c];
         let weight = h * self.scheme.weights[i];
-        let at = |r: usize| (r * length + place) * block + (i + 1) * parts + c;
+        let at = |r: usize| (r * length + place) * block + parts + slots[i * parts + c];
         system.border[at(first)].lanes_mut()[slot] = weight * self.right[node + c];
         if self.is_fold() {
             system.border[at(0)].lanes_mut()[slot] = weight * self.phase[lane * n + c];

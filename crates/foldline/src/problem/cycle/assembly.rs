@@ -37,19 +37,22 @@ impl CycleProblem<'_> {
         Some(v)
     }
 
-    /// Gathers the Gauss points, component-major, those of the intervals that the solver treats together side by side: point i
-    /// of place t in a lane is number (t m + i) W + lane. What the solver has beyond the last interval repeats it.
+    /// Gathers left ends and Gauss points, component-major, those of the intervals that the solver treats together side by side:
+    /// point i of place t in a lane is number (t m + i) W + lane. What the solver has beyond the last interval repeats it.
     pub(super) fn gather(&mut self, u: &[f64]) {
-        let (n, m, lanes) = (self.n, self.scheme.degree, self.lanes());
+        let (n, m, lanes, places) = (self.n, self.scheme.degree, self.lanes(), self.length * self.width);
         let last = self.intervals() - 1;
-        for lane in 0..self.width {
-            for t in 0..self.length {
+        for t in 0..self.length {
+            for lane in 0..self.width {
                 let from = (lane * self.length + t).min(last) * (m + 1) * n;
-                for k in 0..m {
-                    let x = &u[from + (k + 1) * n..from + (k + 2) * n];
-                    let at = (t * m + k) * self.width + lane;
-                    for i in 0..n {
-                        self.states[i * lanes + at] = x[i];
+                let (end, inside) = u[from..from + (m + 1) * n].split_at(n);
+                for (own, x) in self.ends.chunks_exact_mut(places).zip(end) {
+                    own[t * self.width + lane] = *x;
+                }
+                for (i, own) in self.states.chunks_exact_mut(lanes).enumerate() {
+                    let own = &mut own[t * m * self.width + lane..];
+                    for (to, x) in own.iter_mut().step_by(self.width).zip(inside[i..].iter().step_by(n)) {
+                        *to = *x;
                     }
                 }
             }
@@ -63,6 +66,11 @@ impl CycleProblem<'_> {
         let parameters = self.setting.at(&u[size + 1..]);
         let batch = Batch { lanes, states: &self.states, parameters: Parameters::Shared(&parameters) };
         self.setting.linearise(batch, &mut self.f, &mut self.fx, &mut self.fp);
+        for (coupled, entry) in self.coupled.iter_mut().zip(self.fx.chunks_exact(lanes)) {
+            // What was coupled once remains so: the order of elimination rarely changes.
+            *coupled |= !vanishes(entry);
+        }
+        either!(&mut self.system, s => s.couple(&self.coupled));
         let linear = Linear {
             n: self.n,
             free: self.setting.freedom(),
@@ -73,6 +81,7 @@ impl CycleProblem<'_> {
             fx: &self.fx,
             fp: &self.fp,
             phase: &self.phase,
+            coupled: &self.coupled,
         };
         let (trace, corner) = either!(&mut self.system, s => (write(linear, s), &mut s.corner));
         self.trace = trace;
@@ -99,6 +108,7 @@ impl CycleProblem<'_> {
             .collect();
         let lengths = &self.lengths;
         either!(&mut self.system, s => {
+            let slots: Vec<usize> = (0..m * n).map(|k| s.slot(k / n, k % n)).collect();
             let border = &mut s.border[r * length * block..(r + 1) * length * block];
             for (t, own) in border.chunks_exact_mut(block).enumerate() {
                 let (ends, inside) = own.split_at_mut(n);
@@ -107,8 +117,9 @@ impl CycleProblem<'_> {
                     // Beyond the last interval the length is zero.
                     let j = (lane * length + t).min(row.len() / block - 1);
                     let h = lengths[t * width + lane];
-                    for (k, target) in inside.iter_mut().enumerate() {
-                        target.lanes_mut()[lane] = h * weights[k] * row[j * block + n + k];
+                    let row = &row[j * block + n..(j + 1) * block];
+                    for ((weight, x), slot) in weights.iter().zip(row).zip(&slots) {
+                        inside[*slot].lanes_mut()[lane] = h * weight * x;
                     }
                 }
             }
@@ -128,6 +139,8 @@ struct Linear<'a> {
     fx: &'a [f64],
     fp: &'a [f64],
     phase: &'a [f64],
+    /// `[n × n]`: which entries of f_x are not zero everywhere.
+    coupled: &'a [bool],
 }
 
 /// Writes equation (1) and the phase row; returns ∫ tr f_x dt over the period.
@@ -146,55 +159,70 @@ impl<T: Lane> pulp::NullaryFnOnce for Write<'_, '_, T> {
     #[inline(always)]
     fn call(self) -> f64 {
         let Write { linear, system } = self;
-        let Linear { n, free, scheme, lengths, period, f, fx, fp, phase } = linear;
+        let Linear { n, free, scheme, lengths, period, f, fx, fp, phase, coupled } = linear;
         let (m, w, length) = (scheme.degree, T::COUNT, system.length());
         let (inner, width, block, lanes) = (m * n, n + 1 + free, (m + 1) * n, length * m * w);
         let (one, zero) = (T::splat(1.0), T::default());
+        let shares: Vec<T> = scheme.integration.iter().map(|a| T::splat(-a)).collect();
+        let slots: Vec<usize> = (0..n).map(|c| system.slot(0, c)).collect();
         let mut trace = zero;
         for t in 0..length {
             let h = T::load(&lengths[t * w..]);
             let ht = h * T::splat(period);
-            let a = &mut system.interior[t * inner * inner..(t + 1) * inner * inner];
-            let b = &mut system.coupling[t * inner * width..(t + 1) * inner * width];
-            let border = &mut system.border[t * block..(t + 1) * block];
-            b.fill(zero);
-            border[..n].fill(zero);
-            for k in 0..m {
-                let at = (t * m + k) * w;
-                let weight = T::splat(scheme.weights[k]);
-                for c in 0..n {
-                    for d in 0..n {
-                        let slope = ht * T::load(&fx[(c * n + d) * lanes + at..]);
+            let border = t * block;
+            system.border[border..border + n].fill(zero);
+            for c in 0..n {
+                let first = slots[c];
+                let a = &mut system.interior[(t * inner + first) * inner..(t * inner + first + m) * inner];
+                a.fill(zero);
+                for d in (0..n).filter(|d| coupled[c * n + d]) {
+                    let column = slots[d];
+                    for k in 0..m {
+                        let slope = ht * T::load(&fx[(c * n + d) * lanes + (t * m + k) * w..]);
                         for i in 0..m {
-                            let unit = if i == k && c == d { one } else { zero };
-                            let share = T::splat(scheme.integration[i * m + k]);
-                            a[(i * n + c) * inner + k * n + d] = unit - share * slope;
+                            a[i * inner + column + k] = shares[i * m + k] * slope;
                         }
                         if c == d {
-                            trace = trace + weight * slope;
+                            trace = trace + T::splat(scheme.weights[k]) * slope;
                         }
                     }
+                }
+                for i in 0..m {
+                    let diagonal = &mut a[i * inner + first + i];
+                    *diagonal = *diagonal + one;
+                }
+                let b = &mut system.coupling[(t * inner + first) * width..(t * inner + first + m) * width];
+                b.fill(zero);
+                for k in 0..m {
+                    let at = (t * m + k) * w;
                     let rate = h * T::load(&f[c * lanes + at..]);
                     for i in 0..m {
-                        let share = T::splat(scheme.integration[i * m + k]);
-                        let right = &mut b[(i * n + c) * width..(i * n + c + 1) * width];
-                        right[n] = right[n] - share * rate;
+                        let right = &mut b[i * width + n];
+                        *right = *right + shares[i * m + k] * rate;
                     }
                     for p in 0..free {
                         let slope = ht * T::load(&fp[(c * free + p) * lanes + at..]);
                         for i in 0..m {
-                            let share = T::splat(scheme.integration[i * m + k]);
-                            let right = &mut b[(i * n + c) * width + n + 1 + p];
-                            *right = *right - share * slope;
+                            let right = &mut b[i * width + n + 1 + p];
+                            *right = *right + shares[i * m + k] * slope;
                         }
                     }
-                    b[(k * n + c) * width + c] = zero - one;
-                    border[(k + 1) * n + c] = h * weight * T::load(&phase[(at * n + c * w)..]);
+                    let weight = h * T::splat(scheme.weights[k]);
+                    system.border[border + n + first + k] = weight * T::load(&phase[(at * n + c * w)..]);
                 }
+                (0..m).for_each(|i| b[i * width + c] = zero - one);
             }
         }
         trace.lanes().iter().sum()
     }
+}
+
+/// Whether all are zero.
+fn vanishes(entries: &[f64]) -> bool {
+    let (blocks, rest) = entries.as_chunks::<8>();
+    // No early end within a block, so that it is one comparison of vectors.
+    let nothing = |block: &[f64; 8]| block.iter().fold(true, |all, x| all & (*x == 0.0));
+    blocks.iter().all(nothing) && rest.iter().all(|x| *x == 0.0)
 }
 
 impl System {

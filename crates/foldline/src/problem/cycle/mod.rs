@@ -23,15 +23,17 @@
 
 mod assembly;
 mod errors;
+mod residual;
 
 use super::defect;
 use super::gauss::Scheme;
 use super::{Setting, extremes, mesh};
 use crate::contract::{Batch, Examination, Parameters, Singular, ZeroProblem};
 use crate::diagram::{Cycle, Mesh, Point, Solution, Trust};
+use crate::linalg::lane::Eight;
 use crate::linalg::panel;
 use crate::linalg::system::System;
-use crate::linalg::{axpy, larger, max_abs};
+use crate::linalg::{larger, max_abs};
 use crate::stability::floquet;
 use errors::Measured;
 use std::cell::RefCell;
@@ -60,10 +62,15 @@ pub struct CycleProblem<'a> {
     width: usize,
     /// `[L][W]`: h_j where the solver has interval j, zero beyond the last one.
     lengths: Vec<f64>,
+    /// `[n][L][m][W]`: X_{j,i}.
     states: Vec<f64>,
+    /// `[n][L][W]`: x_j.
+    ends: Vec<f64>,
     f: Vec<f64>,
     fx: Vec<f64>,
     fp: Vec<f64>,
+    /// `[n × n]`: which entries of f_x were ever met different from zero.
+    coupled: Vec<bool>,
     trace: f64,
     /// What was measured last. Mesh and errors belong together only for the point they were measured at.
     measured: RefCell<Option<Measured>>,
@@ -90,9 +97,11 @@ impl<'a> CycleProblem<'a> {
             phase_offset: 0.0,
             period_scale: 1.0,
             states: Vec::new(),
+            ends: Vec::new(),
             f: Vec::new(),
             fx: Vec::new(),
             fp: Vec::new(),
+            coupled: vec![false; n * n],
             trace: 0.0,
             measured: RefCell::new(None),
         };
@@ -202,44 +211,17 @@ impl ZeroProblem for CycleProblem<'_> {
     }
 
     fn residual(&mut self, u: &[f64], r: &mut [f64]) -> bool {
-        let (n, m, count) = (self.n, self.scheme.degree, self.intervals());
-        let (lanes, size, block) = (self.lanes(), self.profile_size(), (m + 1) * n);
-        let period = u[size];
+        let size = self.profile_size();
         self.gather(u);
         let parameters = self.setting.at(&u[size + 1..]);
-        let batch = Batch { lanes, states: &self.states, parameters: Parameters::Shared(&parameters) };
+        let batch = Batch { lanes: self.lanes(), states: &self.states, parameters: Parameters::Shared(&parameters) };
         self.setting.field.evaluate(batch, &mut self.f);
-        let mut phase = -self.phase_offset;
-        for lane in 0..self.width {
-            for (t, j) in self.piece(lane).enumerate() {
-                let h = self.h(j);
-                let own = &u[j * block..(j + 1) * block];
-                let next = if j + 1 == count { 0 } else { (j + 1) * block };
-                let rows = &mut r[j * block..(j + 1) * block];
-                rows[..n].copy_from_slice(&u[next..next + n]);
-                for k in 0..=m {
-                    axpy(-self.scheme.end[k], &own[k * n..(k + 1) * n], &mut rows[..n]);
-                }
-                for i in 0..m {
-                    for c in 0..n {
-                        rows[(i + 1) * n + c] = own[(i + 1) * n + c] - own[c];
-                    }
-                }
-                for k in 0..m {
-                    let at = t * m + k;
-                    for c in 0..n {
-                        let rate = h * period * self.f[c * lanes + at * self.width + lane];
-                        for i in 0..m {
-                            rows[(i + 1) * n + c] -= self.scheme.integration[i * m + k] * rate;
-                        }
-                        let weight = h * self.scheme.weights[k] * self.phase[(at * n + c) * self.width + lane];
-                        phase += weight * own[(k + 1) * n + c];
-                    }
-                }
-            }
-        }
-        r[size] = phase;
-        max_abs(&r[..=size]).is_finite() && period > 0.0
+        let phase = match self.width {
+            1 => self.defects::<f64>(u, r),
+            _ => self.defects::<Eight>(u, r),
+        };
+        r[size] = phase - self.phase_offset;
+        max_abs(&r[..=size]).is_finite() && u[size] > 0.0
     }
 
     fn factorise(&mut self, u: &[f64], rows: &[f64]) -> Result<(), Singular> {
@@ -293,6 +275,7 @@ impl ZeroProblem for CycleProblem<'_> {
         let lanes = self.lanes();
         self.phase.resize(lanes * n, 0.0);
         self.states.resize(lanes * n, 0.0);
+        self.ends.resize(self.length * self.width * n, 0.0);
         self.f.resize(lanes * n, 0.0);
         self.fx.resize(lanes * n * n, 0.0);
         self.fp.resize(lanes * n * self.setting.freedom(), 0.0);
