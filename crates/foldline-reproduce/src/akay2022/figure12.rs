@@ -2,7 +2,7 @@
 
 use super::figure04::chosen;
 use super::figure10::diagrams;
-use super::rotor::{OMEGA, max_r, min_r, smallest};
+use super::rotor::{OMEGA, is_closed, max_r, min_r, smallest};
 use crate::claims::{Claim, Finding, digits};
 use crate::publication::{FigurePlan, Made};
 use crate::runs::{Run, Runs};
@@ -119,6 +119,7 @@ fn stable_zones(branch: &Branch) -> Vec<Zone> {
     }
     // A special point lies behind the point of its position.
     marks.sort_by_key(|m| (m.0, m.1));
+    let ends = [marks.first().is_some_and(|m| m.4), marks.last().is_some_and(|m| m.4)];
     let mut zones: Vec<Zone> = Vec::new();
     let mut open = false;
     for (_, _, w, r, stable, error) in marks {
@@ -132,6 +133,16 @@ fn stable_zones(branch: &Branch) -> Vec<Zone> {
             _ => {}
         }
         open = stable;
+    }
+    // A closed branch that begins inside a zone has met it twice.
+    if zones.len() > 1 && ends == [true, true] && is_closed(branch) {
+        let first = zones.remove(0);
+        if let Some(last) = zones.last_mut() {
+            let joined = |a: [f64; 2], b: [f64; 2]| [a[0].min(b[0]), a[1].max(b[1])];
+            last.speed = joined(first.speed, last.speed);
+            last.radius = joined(first.radius, last.radius);
+            last.error = first.error.max(last.error);
+        }
     }
     zones
 }

@@ -98,6 +98,8 @@ impl Recorder {
     fn begin(path: PathBuf, study: &Study) -> Result<Recorder, RunFileError> {
         let failed = |e| RunFileError::Database(path.clone(), e);
         let mut connection = Connection::open(&path).map_err(failed)?;
+        // A profile fills several pages of the usual size.
+        connection.pragma_update(None, "page_size", 16384).map_err(failed)?;
         connection.pragma_update(None, "journal_mode", "WAL").map_err(failed)?;
         let transaction = connection.transaction().map_err(failed)?;
         transaction.execute_batch(&create(&Columns::new(&study.model))).map_err(failed)?;

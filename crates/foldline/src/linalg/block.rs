@@ -95,7 +95,11 @@ fn blocks<T: Lane>(
                     }
                     for range in &step.carried {
                         let from = i * columns;
-                        subtract(factor, &right_before[from + range.start..from + range.end], &mut right[range.clone()]);
+                        subtract(
+                            factor,
+                            &right_before[from + range.start..from + range.end],
+                            &mut right[range.clone()],
+                        );
                     }
                 }
             }
@@ -543,6 +547,9 @@ mod tests {
         let mut a = vec![Eight([1.0; 8]); 4];
         a[3] = Eight([2.0, 2.0, 2.0, 1.0, 2.0, 2.0, 2.0, 2.0]);
         let mut none: [Eight; 0] = [];
-        assert_eq!(factorise(&mut a, 2, &mut [0; 16], &mut none, 0, &Shape::new(&[true; 4], &[true; 4], 1, 0)), Err(Singular));
+        assert_eq!(
+            factorise(&mut a, 2, &mut [0; 16], &mut none, 0, &Shape::new(&[true; 4], &[true; 4], 1, 0)),
+            Err(Singular)
+        );
     }
 }

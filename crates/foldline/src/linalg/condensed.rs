@@ -24,7 +24,7 @@
 use super::chain::Chain;
 use super::lane::{Lane, add, dot, subtract};
 use super::shape::Shape;
-use super::{block, lu};
+use super::{block, lu, tile};
 use crate::contract::Singular;
 
 /// The system, its factorisation and room for both.
@@ -102,14 +102,14 @@ impl<T: Lane> Condensed<T> {
         let (n, q, inner) = (self.n, self.q, self.m * self.n);
         let length = intervals.div_ceil(T::COUNT);
         (self.intervals, self.length) = (intervals, length);
-        self.interior.resize(length * inner * inner, T::default());
-        self.coupling.resize(length * inner * (n + q), T::default());
-        self.border.resize(q * length * (inner + n), T::default());
-        self.corner.resize(q * q, 0.0);
-        self.pivots.resize(length * inner * T::COUNT, 0);
-        self.exchanged.resize(length, false);
-        self.step.resize(length * n * (n + q), T::default());
-        self.condensed_border.resize(length * q * n, T::default());
+        room(&mut self.interior, length * inner * inner);
+        room(&mut self.coupling, length * inner * (n + q));
+        room(&mut self.border, q * length * (inner + n));
+        room(&mut self.corner, q * q);
+        room(&mut self.pivots, length * inner * T::COUNT);
+        room(&mut self.exchanged, length);
+        room(&mut self.step, length * n * (n + q));
+        room(&mut self.condensed_border, length * q * n);
         self.pieces.resize(n, q, length);
         self.whole.resize(n, q, T::COUNT);
         self.last.resize((n + q) * (n + q), 0.0);
@@ -217,6 +217,13 @@ impl<T: Lane> Condensed<T> {
     }
 }
 
+/// At least that long; never shorter than it was, so that nothing is written twice when the mesh changes back and forth.
+fn room<X: Copy + Default>(v: &mut Vec<X>, length: usize) {
+    if v.len() < length {
+        v.resize(length, X::default());
+    }
+}
+
 /// Sum over the lanes, in their order.
 #[inline(always)]
 fn total<T: Lane>(x: T) -> f64 {
@@ -271,7 +278,7 @@ impl<T: Lane> pulp::NullaryFnOnce for Eliminate<'_, T> {
         let (width, full) = (n + q, 3 * n + q);
         let mut corner = self.0.corner.clone();
         let taken = self.0.condense_border();
-        corner.iter_mut().zip(&taken).for_each(|(d, t)| *d -= total(*t));
+        corner.iter_mut().zip(&taken).for_each(|(d, t)| *d += total(*t));
         let Condensed { step, condensed_border, pieces, whole, last, last_pivots, .. } = self.0;
         let link = |t: usize, rows: &mut [T]| {
             for i in 0..n {
@@ -325,7 +332,7 @@ impl<T: Lane> pulp::NullaryFnOnce for Eliminate<'_, T> {
 }
 
 impl<T: Lane> Condensed<T> {
-    /// Border rows on the interval ends alone; returns `[q × q]`, what that takes from D.
+    /// Border rows on the interval ends alone; returns `[q × q]`, what that adds to D.
     #[inline(always)]
     fn condense_border(&mut self) -> Vec<T> {
         let Condensed { n, m, q, length, .. } = *self;
@@ -339,10 +346,9 @@ impl<T: Lane> Condensed<T> {
                 let row = &border[(c * length + t) * block..(c * length + t + 1) * block];
                 let p = &mut condensed_border[(t * q + c) * n..(t * q + c + 1) * n];
                 p.copy_from_slice(&row[..n]);
-                for (weight, line) in row[n..].iter().zip(w.chunks_exact(width)) {
-                    subtract(*weight, &line[..n], p);
-                    add(*weight, &line[n..], &mut taken[c * q..(c + 1) * q]);
-                }
+                let own = &mut taken[c * q..(c + 1) * q];
+                tile::subtract(p, n, &row[n..], inner, w, width, [1, inner, n], [0, 0, 0]);
+                tile::subtract(own, q, &row[n..], inner, w, width, [1, inner, q], [0, 0, n]);
             }
         }
         taken

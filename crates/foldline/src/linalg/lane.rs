@@ -17,6 +17,9 @@ pub trait Lane: Copy + Default + Send + Sync + Add<Output = Self> + Sub<Output =
     /// The first `COUNT` numbers of a slice.
     fn load(from: &[f64]) -> Self;
 
+    /// One number for every lane.
+    fn each(f: impl FnMut(usize) -> f64) -> Self;
+
     /// The lanes as a slice.
     fn lanes(&self) -> &[f64];
 
@@ -49,6 +52,11 @@ impl Lane for f64 {
     #[inline(always)]
     fn load(from: &[f64]) -> f64 {
         from[0]
+    }
+
+    #[inline(always)]
+    fn each(mut f: impl FnMut(usize) -> f64) -> f64 {
+        f(0)
     }
 
     #[inline(always)]
@@ -94,6 +102,11 @@ impl Lane for Eight {
     fn load(from: &[f64]) -> Eight {
         let eight: &[f64; 8] = from.first_chunk().unwrap_or(&[0.0; 8]);
         Eight(*eight)
+    }
+
+    #[inline(always)]
+    fn each(f: impl FnMut(usize) -> f64) -> Eight {
+        Eight(std::array::from_fn(f))
     }
 
     #[inline(always)]

@@ -218,7 +218,8 @@ impl<'a> OnCycles<'a> {
             line[slots[k * parts + c]].lanes_mut()[slot] = self.scheme.derivative[i * (m + 1) + k + 1];
         }
         for d in 0..n {
-            line[slots[i * parts + half + d]].lanes_mut()[slot] -= h * self.period * self.fx[(own * n + d) * lanes + lane];
+            line[slots[i * parts + half + d]].lanes_mut()[slot] -=
+                h * self.period * self.fx[(own * n + d) * lanes + lane];
         }
         // + iθ v: the real part loses θ times the imaginary one.
         let (other, sign) = if c < n { (c + n, -1.0) } else { (c - n, 1.0) };

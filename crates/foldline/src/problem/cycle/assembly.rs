@@ -3,7 +3,7 @@
 use super::CycleProblem;
 use crate::contract::{Batch, Parameters};
 use crate::linalg::condensed::Condensed;
-use crate::linalg::lane::Lane;
+use crate::linalg::lane::{Eight, Lane};
 use crate::linalg::max_abs;
 use crate::linalg::system::{System, either};
 use crate::problem::gauss::Scheme;
@@ -40,20 +40,26 @@ impl CycleProblem<'_> {
     /// Gathers left ends and Gauss points, component-major, those of the intervals that the solver treats together side by side:
     /// point i of place t in a lane is number (t m + i) W + lane. What the solver has beyond the last interval repeats it.
     pub(super) fn gather(&mut self, u: &[f64]) {
-        let (n, m, lanes, places) = (self.n, self.scheme.degree, self.lanes(), self.length * self.width);
-        let last = self.intervals() - 1;
-        for t in 0..self.length {
-            for lane in 0..self.width {
-                let from = (lane * self.length + t).min(last) * (m + 1) * n;
-                let (end, inside) = u[from..from + (m + 1) * n].split_at(n);
-                for (own, x) in self.ends.chunks_exact_mut(places).zip(end) {
-                    own[t * self.width + lane] = *x;
-                }
-                for (i, own) in self.states.chunks_exact_mut(lanes).enumerate() {
-                    let own = &mut own[t * m * self.width + lane..];
-                    for (to, x) in own.iter_mut().step_by(self.width).zip(inside[i..].iter().step_by(n)) {
-                        *to = *x;
-                    }
+        match self.width {
+            1 => self.gather_lanes::<f64>(u),
+            _ => self.gather_lanes::<Eight>(u),
+        }
+    }
+
+    fn gather_lanes<T: Lane>(&mut self, u: &[f64]) {
+        let (n, m, length, lanes) = (self.n, self.scheme.degree, self.length, self.lanes());
+        let (block, last) = ((m + 1) * n, self.intervals() - 1);
+        for t in 0..length {
+            let mut first = [0; 8];
+            (0..T::COUNT).for_each(|lane| first[lane] = (lane * length + t).min(last) * block);
+            for c in 0..n {
+                let put = |to: &mut [f64], at: usize, from: usize| {
+                    let x = T::each(|lane| u[first[lane] + from]);
+                    to[at..at + T::COUNT].copy_from_slice(x.lanes());
+                };
+                put(&mut self.ends, (c * length + t) * T::COUNT, c);
+                for k in 0..m {
+                    put(&mut self.states, c * lanes + (t * m + k) * T::COUNT, (k + 1) * n + c);
                 }
             }
         }

@@ -26,7 +26,7 @@ impl<T: Lane> pulp::NullaryFnOnce for Defects<'_, '_, T> {
     fn call(self) -> f64 {
         let Defects { problem, u, r, .. } = self;
         let CycleProblem { ref scheme, n, length, .. } = *problem;
-        let (m, block, count) = (scheme.degree, (scheme.degree + 1) * n, problem.intervals());
+        let (block, count) = ((scheme.degree + 1) * n, problem.intervals());
         let period = T::splat(u[problem.profile_size()]);
         let mut rows = vec![T::default(); block];
         let mut phase = T::default();
