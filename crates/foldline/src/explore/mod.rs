@@ -61,17 +61,18 @@ pub fn run(system: &System, plan: &Plan, jobs: usize, earlier: Diagram, observer
     order.sort_by_key(|&index| std::cmp::Reverse((family::weight(plan, families[index]), index)));
     let next = AtomicUsize::new(0);
     let done: Vec<Mutex<Vec<Branch>>> = families.iter().map(|_| Mutex::new(Vec::new())).collect();
-    std::thread::scope(|scope| {
-        for _ in 0..jobs.clamp(1, families.len().max(1)) {
-            scope.spawn(|| {
-                while let Some(&index) = order.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    let branches = family::grow(system, plan, families[index], &seeds, &earlier, observer);
-                    if let Ok(mut slot) = done[index].lock() {
-                        *slot = branches;
-                    }
-                }
-            });
+    let work = || {
+        while let Some(&index) = order.get(next.fetch_add(1, Ordering::Relaxed)) {
+            let branches = family::grow(system, plan, families[index], &seeds, &earlier, observer);
+            if let Ok(mut slot) = done[index].lock() {
+                *slot = branches;
+            }
         }
+    };
+    // This thread takes part.
+    std::thread::scope(|scope| {
+        (1..jobs.min(families.len())).for_each(|_| drop(scope.spawn(work)));
+        work();
     });
     let branches = done.into_iter().flat_map(|slot| slot.into_inner().unwrap_or_default()).collect();
     let responses = responses::simulate(system, plan, &seeds, jobs, &earlier, observer);

@@ -96,10 +96,10 @@ fn censuses(system: &System, plan: &Plan, jobs: usize, needed: &[bool]) -> Vec<(
             done.lock().unwrap_or_else(PoisonError::into_inner).push((index, census));
         }
     };
-    match threads {
-        1 => work(),
-        _ => std::thread::scope(|scope| (0..threads).for_each(|_| drop(scope.spawn(work)))),
-    }
+    std::thread::scope(|scope| {
+        (1..threads).for_each(|_| drop(scope.spawn(work)));
+        work();
+    });
     let mut done = done.into_inner().unwrap_or_else(PoisonError::into_inner);
     done.sort_by_key(|(index, _)| *index);
     done
