@@ -271,6 +271,8 @@ fn a_symmetric_lorenz_cycle_loses_its_symmetry_at_a_branch_point() {
     let other = along("305", "[300, 340]");
     let place = |branch: &Branch| branch.special[0].point.parameters[branch.free];
     assert!(near(place(branch(&other, "b")), place(branch(&diagram, "b")), 3e-5));
+    let [only] = &branch(&other, "b").special[..] else { panic!("{:?}", branch(&other, "b").special.len()) };
+    assert_eq!((only.kind, only.unstable_before, only.unstable_after), (Kind::BranchPoint, 0, 0));
     let symmetric = branch(&other, "b/branch-point-1");
     has(symmetric, &[(Kind::BranchPoint, 312.97353)], 1e-7);
     ends(symmetric, ["bound", "bound"]);

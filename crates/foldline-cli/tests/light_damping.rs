@@ -56,3 +56,35 @@ fn a_branch_with_close_neighbours_is_the_same_wherever_it_is_begun() {
         assert!(p.0 == q.0 && (p.1 - q.1).abs() < p.2 + q.2, "{p:?} {q:?}");
     }
 }
+
+/// Of another route (through the folds in epsilon and zeta at lower speeds) and other tolerances, to the digits given.
+#[test]
+fn a_large_unbalance_leaves_two_folds_on_one_step_and_torus_points_next_to_folds() {
+    let model = include_str!("../../../models/overhung-rotor.toml");
+    let text = include_str!("../../../studies/akay2022/light-damping-large-unbalance-contact.toml");
+    let study = parse_study(text, "study", model, "model").unwrap_or_else(|f| panic!("{}", f[0]));
+    let diagram = run(&System::of_plan(&study.model, &study.plan), &study.plan, 2, Diagram::default(), &Unobserved);
+    let is = |name: &str, expected: &[(Kind, f64)]| {
+        let branch = diagram.branch(name).unwrap();
+        assert!(branch.ends.iter().all(|end| *end == Some(Ending::Closed)), "{:?}", branch.ends);
+        let found = special(branch);
+        assert_eq!(found.len(), expected.len(), "{found:?}");
+        for (found, expected) in found.iter().zip(expected) {
+            assert!(found.0 == expected.0 && (found.1 - expected.1).abs() < 1e-7 + found.2, "{found:?} {expected:?}");
+        }
+    };
+    let [fold, torus] = [Kind::Fold, Kind::Torus];
+    is("contact SL", &[(fold, 8.5904468), (fold, 9.6380474), (fold, 9.6448438), (fold, 11.0037953)]);
+    is(
+        "contact DL",
+        &[
+            (fold, 5.9987289),
+            (fold, 6.2787697),
+            (fold, 6.3352986),
+            (fold, 7.1908811),
+            (torus, 5.9987551),
+            (torus, 6.2790433),
+            (torus, 6.3352956),
+        ],
+    );
+}

@@ -421,3 +421,27 @@ fn a_homotopy_reaches_the_lightly_damped_rotor() {
     );
     assert_eq!(table(branch).len(), 1);
 }
+
+/// Such cycles attract so few states that sampling does not find them; states on them come from long simulations.
+#[test]
+fn states_on_cycles_of_many_turns_lead_to_them() {
+    let model = include_str!("../../../models/overhung-rotor.toml");
+    // Speed, state, period over that of one turn of the 3:1 or 4:1 cycle at that speed is about 3, 4 and 5.
+    for (omega, state, period) in [
+        (3.99, "u = -1.194, v = -0.046, du = -2.112, dv = -1.438", 12.114265),
+        (4.11, "u = -1.695, v = -1.616, du = -5.755, dv = 2.337", 15.713851),
+        (4.83, "u = -0.031, v = -0.813, du = -0.775, dv = -3.906", 13.580696),
+    ] {
+        let text = format!(
+            "model = \"m\"\n[[seed]]\nname = \"s\"\nstate = {{ {state} }}\nparameters = {{ Omega = {omega}, kappa = 1 }}\n\
+             [[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"Omega\"\nrange = [{omega}, {}]\n",
+            omega + 1e-4
+        );
+        let study = parse_study(&text, "study", model, "model").unwrap_or_else(|f| panic!("{}", f[0]));
+        let system = System::of_plan(&study.model, &study.plan);
+        let diagram = explore::run(&system, &study.plan, 1, Diagram::default(), &Unobserved);
+        let start = &diagram.branch("b").unwrap().points[0];
+        let found = start.solution.period().unwrap();
+        assert!((found - period).abs() < 1e-5 && start.unstable == 0, "{found} {}", start.unstable);
+    }
+}

@@ -8,7 +8,7 @@ use super::returns::{MOST_CROSSINGS, Prediction, Returns};
 use super::{Candidate, Polish, Sampling};
 use crate::contract::{Batch, Parameters, VectorField, Verdict};
 use crate::diagram::{Cycle, Solution};
-use crate::simulation::{Integrator, Passage, Tolerance};
+use crate::simulation::{Integrator, Passage, Step, Tolerance};
 
 /// Accuracy of the integration, relative. It only decides where a trajectory goes; solutions are polished.
 const INTEGRATION: f64 = 1e-6;
@@ -56,12 +56,13 @@ impl Context<'_> {
         Some(Orbit::new(once.unwrap_or(point), &self.sampling.scales, self.sampling.whirl))
     }
 
-    /// The trajectory from a state on a cycle over its period.
-    pub(super) fn turn(&self, state: &[f64], period: f64) -> Candidate {
+    /// The trajectory from a state over that time: times and states `[time][n]` of its samples. `each` sees every step and
+    /// the state at its end.
+    fn sampled(&self, state: &[f64], time: f64, each: &mut dyn FnMut(&Step, &[f64])) -> (Vec<f64>, Vec<f64>) {
         let integrator = Integrator::new(self.field, self.parameters, self.tolerance()).with_step_limit(FOLLOWED);
         let (mut times, mut states) = (vec![0.0], state.to_vec());
         let mut x = vec![0.0; state.len()];
-        integrator.trajectory(state, [0.0, period], &[], &mut |passage| {
+        integrator.trajectory(state, [0.0, time], &[], &mut |passage| {
             let Passage::Step(step) = passage else { return Verdict::Continue };
             for part in 1..=PARTS {
                 let theta = part as f64 / PARTS as f64;
@@ -69,8 +70,15 @@ impl Context<'_> {
                 times.push(step.time_at(theta));
                 states.extend_from_slice(&x);
             }
+            each(step, &x);
             Verdict::Continue
         });
+        (times, states)
+    }
+
+    /// The trajectory from a state on a cycle over its period.
+    pub(super) fn turn(&self, state: &[f64], period: f64) -> Candidate {
+        let (times, states) = self.sampled(state, period, &mut |_, _| {});
         Candidate::Cycle { period, times, states }
     }
 
@@ -78,20 +86,10 @@ impl Context<'_> {
     pub(super) fn follow(&self, returns: &Returns, prediction: &Prediction, extent: &[f64]) -> Option<Candidate> {
         let n = extent.len();
         let mut plane = returns.again_from(&prediction.state);
-        let integrator = Integrator::new(self.field, self.parameters, self.tolerance()).with_step_limit(FOLLOWED);
-        let (mut times, mut states) = (vec![0.0], prediction.state.clone());
         // The return that comes closest to the start, around the expected time.
         let mut back: Option<(f64, f64, Vec<f64>)> = None;
-        let mut x = vec![0.0; n];
-        integrator.trajectory(&prediction.state, [0.0, 1.3 * prediction.period], &[], &mut |passage| {
-            let Passage::Step(step) = passage else { return Verdict::Continue };
-            for part in 1..=PARTS {
-                let theta = part as f64 / PARTS as f64;
-                step.state_into(theta, &mut x);
-                times.push(step.time_at(theta));
-                states.extend_from_slice(&x);
-            }
-            if plane.follow(step, &x)
+        let mut look = |step: &Step, x: &[f64]| {
+            if plane.follow(step, x)
                 && let Some((time, state)) = plane.last()
                 && time > 0.7 * prediction.period
             {
@@ -100,8 +98,8 @@ impl Context<'_> {
                     back = Some((distance, time, state.to_vec()));
                 }
             }
-            Verdict::Continue
-        });
+        };
+        let (mut times, mut states) = self.sampled(&prediction.state, 1.3 * prediction.period, &mut look);
         let (distance, period, end) = back?;
         let kept = times.partition_point(|t| *t < period);
         times.truncate(kept);

@@ -152,3 +152,22 @@ fn sag(samples: &[f64], scale: &[f64]) -> f64 {
     let middle = |k: usize, i: usize| (of(k, i) - 0.5 * (of(k - 1, i) + of(k + 1, i))).abs() / scale[i];
     (1..count).step_by(2).flat_map(|k| (0..n).map(move |i| (k, i))).fold(0.0, |m, (k, i)| m.max(middle(k, i)))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_sag_of_a_polygon_is_that_of_its_arcs() {
+        for count in [16, 64] {
+            let step = std::f64::consts::TAU / count as f64;
+            let samples: Vec<f64> =
+                (0..count).flat_map(|k| [3.0 * (k as f64 * step).cos(), (k as f64 * step).sin()]).collect();
+            // The farthest of the two components, over their scales: radius times 1 - cos of half the angle of two sides.
+            let expected = 1.0 - step.cos();
+            let found = sag(&samples, &[3.0, 1.0]);
+            assert!(found <= expected * (1.0 + 1e-12) && found > 0.9 * expected, "{found} {expected}");
+        }
+        assert_eq!(sag(&[0.0, 0.0, 1.0, 2.0, 2.0, 4.0, 1.0, 2.0], &[1.0, 1.0]), 0.0);
+    }
+}

@@ -140,19 +140,15 @@ impl<'s> Stretch<'s> {
         (0..self.right.len()).map(|i| self.hermite_component(s, i)).collect()
     }
 
-    /// Cubic through both ends with both tangents.
     /// Whether the cubic between the two stations turns back in the continuation parameter and then turns once more, or
     /// nearly does: where two folds lie close together on a long step, the ends show nothing of them.
     pub(super) fn may_turn_twice(&self) -> bool {
         let i = self.left.u.len() - 1;
         let rise = self.right[i] - self.left.u[i];
-        let [p, q] = [self.length * self.left.tangent[i], self.length * self.slope[i]];
-        // Slope p + 2 b x + 3 c x² for x from 0 to 1.
-        let (b, c) = (3.0 * rise - 2.0 * p - q, p + q - 2.0 * rise);
-        let at = -b / (3.0 * c);
-        p * q > 0.0 && at > 0.0 && at < 1.0 && (p + b * at) * p.signum() < 0.1 * p.abs().min(q.abs())
+        turns_twice(rise, [self.length * self.left.tangent[i], self.length * self.slope[i]])
     }
 
+    /// Cubic through both ends with both tangents.
     fn hermite_component(&self, s: f64, i: usize) -> f64 {
         let (l, x) = (self.length, s / self.length);
         let (a, b) = (self.left.u[i], self.right[i]);
@@ -160,6 +156,15 @@ impl<'s> Stretch<'s> {
         let c = b - a;
         a + x * (p + x * ((3.0 * c - 2.0 * p - q) + x * (p + q - 2.0 * c)))
     }
+}
+
+/// Whether the cubic on [0, 1] that rises by `rise` and has these slopes at its ends has, or nearly has, a maximum and a
+/// minimum inside.
+fn turns_twice(rise: f64, [p, q]: [f64; 2]) -> bool {
+    // Slope p + 2 b x + 3 c x² for x from 0 to 1; its extremum in between is compared with the ends.
+    let (b, c) = (3.0 * rise - 2.0 * p - q, p + q - 2.0 * rise);
+    let at = -b / (3.0 * c);
+    p * q > 0.0 && at > 0.0 && at < 1.0 && (p + b * at) * p.signum() < 0.1 * p.abs().min(q.abs())
 }
 
 /// The point between two stations at which the continuation parameter has the given value, which lies between theirs.
@@ -452,6 +457,16 @@ fn chandrupatla<T>(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_cubic_that_turns_back_and_on_again_is_seen_from_its_ends() {
+        // x³ - a x on [-1, 1]: slopes 3 - a at both ends, rise 2 - 2 a; extrema at ± (a / 3)^½. On an interval of length 2.
+        let seen = |a: f64| turns_twice(2.0 - 2.0 * a, [2.0 * (3.0 - a); 2]);
+        assert!(seen(0.5) && seen(0.01), "turns twice");
+        assert!(seen(-0.1) && !seen(-1.0), "nearly does; does not");
+        // The other way round, and a cubic with a single turn between its ends.
+        assert!(turns_twice(-1.0, [-5.0; 2]) && !turns_twice(1.0, [2.0, -1.0]) && !turns_twice(1.0, [1.0; 2]));
+    }
 
     #[test]
     fn the_root_finder_handles_simple_and_triple_zeros() {

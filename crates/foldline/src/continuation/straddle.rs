@@ -142,3 +142,19 @@ fn blend(
     let point = problem.point(&u, &stored, examination);
     Station { point, u, tangent, mesh, roomier: None, share: 1.0 }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_bend_is_what_the_cubic_adds_to_the_parabola() {
+        let nodes = [-1.5, -0.5, 0.5, 1.5];
+        let line = nodes.map(|s| 2.0 * s - 1.0 + s * s);
+        assert!(bend(&nodes, &line, 0.2) < 1e-14, "nothing for a parabola");
+        // x³ minus its parabola through the three nodes next to 0.2, which is without that at -1.5.
+        let cubic = nodes.map(|s: f64| s.powi(3));
+        assert!((bend(&nodes, &cubic, 0.2) - 0.7 * 0.3 * 1.3).abs() < 1e-14);
+        assert!((zero(&nodes, &nodes.map(|s: f64| s.powi(3) - 0.001)).unwrap() - 0.1).abs() < 1e-12);
+    }
+}

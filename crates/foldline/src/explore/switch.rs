@@ -136,9 +136,9 @@ fn doubled(
         let expected = |_: &dyn ZeroProblem, found: &Station| exchanges_stability(at, free, found);
         step_off(&mut problem, settings, &base, &direction, 1.0, distances, &expected).map_err(|why| why.to_string())
     };
-    // The special point was located on a mesh twice as fine as points are computed on. Where that is not needed either …
+    // The special point was located on a mesh twice as fine as points are computed on; every second node is enough for the
+    // first point of the branch, unless it is not found there or has the wrong stability.
     let coarse = leave(&coarsened(cycle), &DISTANCES[..4]).ok().filter(|found| exchanges_stability(at, free, found));
-    // … it is not used.
     let first = coarse.map_or_else(|| leave(cycle, &DISTANCES), Ok)?;
     let before = doubled_edge(system, free, at, &first.point).into_iter().collect();
     Ok(Beginning::Edge { before, first, joined: joined(at, free) })
