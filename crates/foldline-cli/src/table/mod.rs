@@ -82,7 +82,8 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
 pub fn print_special(diagram: &Diagram, model: &Model) -> Result<(), Failure> {
     let mut out = std::io::BufWriter::new(stdout().lock());
     if diagram.responses.is_empty() || !diagram.branches.is_empty() {
-        format::text(&columns::special(diagram, model, &|_| true), &mut out)?;
+        let special = columns::special(diagram, model, &|_| true);
+        if special.rows.is_empty() { writeln!(out, "no special points")? } else { format::text(&special, &mut out)? }
     }
     if !diagram.responses.is_empty() {
         format::text(&responses::summary(diagram, model), &mut out)?;

@@ -105,9 +105,8 @@ impl Follow<'_> {
         let accounted = !self.settings.stability
             || explains(&jumps, left.point.unstable as i64, right.point.unstable as i64)
             || (standing && jumps.is_empty() && change == 1);
-        // A change of sign that could not be located is not passed over either, not even next to one that could; only next to
-        // a pitchfork, where every matrix is singular, it is no wonder.
-        let closer = jumps.is_empty() || (depth < CLOSE && !jumps.contains(&0));
+        // A change of sign that could not be located is not passed over either, not even next to one that could.
+        let closer = jumps.is_empty() || depth < CLOSE;
         let explained = accounted && !(lost && closer && self.settings.stability);
         let touches = || history.is_some_and(|h| self.may_touch(h, &at_left, &at_right, stretch.length));
         let suspicious = depth < 3 && (touches() || (!standing && stretch.may_turn_twice()));

@@ -12,7 +12,7 @@ use super::corrector::{Plane, Station, correct, station};
 use super::locate::{Located, Stretch, discrepancy};
 use super::{Failure, Settings};
 use crate::contract::{Monitor, ZeroProblem};
-use crate::diagram::{Cost, Kind};
+use crate::diagram::Cost;
 
 /// Distances between nodes, as shares of the stretch, in the order in which they are tried.
 const SPACINGS: [f64; 3] = [0.25, 0.1, 0.04];
@@ -49,9 +49,7 @@ pub fn straddle(
         root = next;
     }
     let values: Vec<f64> = stations.iter().map(value).collect();
-    // Monitors of branch points are products in which rounding may be all there is.
-    let smooth = || bend(&nodes, &values, root) <= SMOOTH * values[1].abs().max(values[2].abs());
-    if monitor.kind() == Kind::Fold && !smooth() {
+    if bend(&nodes, &values, root) > SMOOTH * values[1].abs().max(values[2].abs()) {
         return Err(Failure::Unexplained);
     }
     let mut coarse = blend(problem, &nodes, &stations, root, stretch.left, stretch.direction);
