@@ -19,6 +19,12 @@ const EXIT_CODES: &str = "Exit codes:
   2  a mistake in what was typed or in a file; the message says where, what and how to put it right
   3  done, but some branch ended short of what was asked (or the run was stopped; `--resume` goes on)";
 
+const VERIFY_CODES: &str = "Exit codes:
+  0  every number is as accurate as it says
+  1  something outside failed
+  2  a mistake in what was typed, or no run in the folder
+  3  some number is worse than its stated error";
+
 #[derive(Debug, Subcommand)]
 pub enum Command {
     /// Run a study and print its special points
@@ -26,6 +32,9 @@ pub enum Command {
     Run(Run),
     /// Print what a run has found
     Table(Table),
+    /// Compute the solutions of a run again in another way and compare
+    #[command(after_help = VERIFY_CODES)]
+    Verify(Verify),
     /// Draw the bifurcation diagram of a run
     Plot(Plot),
     /// Sample initial states of a model and list where they settle
@@ -111,6 +120,25 @@ pub enum Format {
     Csv,
     /// A list of objects, every digit
     Json,
+}
+
+#[derive(Debug, Args)]
+pub struct Verify {
+    /// Folder of the run
+    #[arg(value_name = "DIR")]
+    pub folder: PathBuf,
+    /// Compute at most so many points again, spread evenly; special points always are [default: all]
+    #[arg(long, value_name = "N")]
+    pub sample: Option<usize>,
+    /// Only this branch, or the legs of this homotopy
+    #[arg(long, value_name = "NAME")]
+    pub branch: Option<String>,
+    /// How many of the worst comparisons are listed
+    #[arg(long, value_name = "N", default_value_t = 20)]
+    pub worst: usize,
+    /// How the table is written
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    pub format: Format,
 }
 
 #[derive(Debug, Args)]

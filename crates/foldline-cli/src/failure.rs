@@ -13,6 +13,8 @@ pub enum Outcome {
     Done,
     /// Except that some branch ended short.
     Short,
+    /// And found something wrong with a run.
+    Wrong,
 }
 
 /// A command that could not.

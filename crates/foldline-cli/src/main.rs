@@ -9,6 +9,7 @@ mod progress;
 mod reproduce;
 mod run;
 mod table;
+mod verify;
 
 use arguments::{Arguments, Command};
 use clap::Parser;
@@ -18,7 +19,7 @@ use std::process::ExitCode;
 fn main() -> ExitCode {
     match answer(Arguments::parse()) {
         Ok(Outcome::Done) => ExitCode::SUCCESS,
-        Ok(Outcome::Short) => ExitCode::from(3),
+        Ok(Outcome::Short | Outcome::Wrong) => ExitCode::from(3),
         Err(failure) => failure.report(),
     }
 }
@@ -28,6 +29,7 @@ fn answer(arguments: Arguments) -> Result<Outcome, Failure> {
         None => run::reference_study(),
         Some(Command::Run(typed)) => run::study(&typed),
         Some(Command::Table(typed)) => table::print(&typed),
+        Some(Command::Verify(typed)) => verify::print(&typed),
         Some(Command::Plot(typed)) => plot::write(&typed),
         Some(Command::Attractors(typed)) => attractors::print(&typed),
         Some(Command::Check(typed)) => check::print(&typed),

@@ -18,6 +18,7 @@
 //! | what happened there? | [`special`] |
 //! | where do first solutions come from? | [`attractors`] |
 //! | how does a whole diagram come about? | [`explore`] |
+//! | is it right? | [`verify`] |
 
 pub mod attractors;
 pub mod continuation;
@@ -30,3 +31,4 @@ pub mod problem;
 pub mod simulation;
 pub mod special;
 pub mod stability;
+pub mod verify;

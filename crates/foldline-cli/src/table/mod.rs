@@ -7,6 +7,7 @@ mod responses;
 use crate::arguments::{Format, Table as Typed, What};
 use crate::failure::{Failure, Outcome};
 use foldline::diagram::{Branch, Diagram};
+use foldline::explore::plan::Plan;
 use foldline::model::Model;
 use foldline_store::nearest::suggest;
 use foldline_store::order::{leg, names, ordered};
@@ -56,11 +57,7 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
         What::Special | What::Responses | What::Notes => Part::Special,
     };
     let run = read(&typed.folder, part)?;
-    let kept = |branch: &Branch| typed.branch.as_ref().is_none_or(|name| of_name(&branch.name, name));
-    if let Some(name) = typed.branch.as_ref().filter(|_| !run.diagram.branches.iter().any(kept)) {
-        let names: Vec<&str> = run.diagram.branches.iter().map(|b| b.name.as_str()).collect();
-        return Err(Failure::typed(format!("--branch: the run has no branch \"{name}\""), suggest(name, &names)));
-    }
+    let kept = asked_for(&run.diagram, typed.branch.as_deref())?;
     let table = match typed.what() {
         What::Points => columns::points(&run.diagram, &run.model, &kept),
         What::Branches => columns::branches(&run.diagram, &run.model, &kept),
@@ -69,13 +66,18 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
         What::Notes => columns::notes(&run.notes, typed.branch.as_deref()),
     };
     let mut out = std::io::BufWriter::new(stdout().lock());
-    match typed.format {
-        Format::Text => format::text(&table, &mut out)?,
-        Format::Csv => format::csv(&table, &mut out)?,
-        Format::Json => format::json(&table, &mut out)?,
-    }
+    write(&table, typed.format, &mut out)?;
     out.flush()?;
     Ok(Outcome::Done)
+}
+
+/// Writes a table in a format.
+pub fn write(table: &Table, format: Format, out: &mut impl Write) -> std::io::Result<()> {
+    match format {
+        Format::Text => format::text(table, out),
+        Format::Csv => format::csv(table, out),
+        Format::Json => format::json(table, out),
+    }
 }
 
 /// Prints the special points as text, and a line for what each survey and sweep saw.
@@ -94,6 +96,7 @@ pub fn print_special(diagram: &Diagram, model: &Model) -> Result<(), Failure> {
 /// A run, in the order in which it is shown.
 pub struct Run {
     pub model: Model,
+    pub plan: Plan,
     pub diagram: Diagram,
     /// What each remark is about, and the remark.
     pub notes: Vec<(String, String)>,
@@ -109,7 +112,17 @@ pub fn read(folder: &Path, part: Part) -> Result<Run, Failure> {
     let mut notes = run.notes;
     // Remarks about one thing stay in the order in which they were made.
     notes.sort_by_key(|(about, _)| shown.iter().position(|name| of_name(name, about)).unwrap_or(usize::MAX));
-    Ok(Run { model: study.model, diagram, notes })
+    Ok(Run { model: study.model, plan: study.plan, diagram, notes })
+}
+
+/// Which branches are meant by a name that was typed: all without one.
+pub fn asked_for<'n>(diagram: &Diagram, name: Option<&'n str>) -> Result<impl Fn(&Branch) -> bool + use<'n>, Failure> {
+    let kept = move |branch: &Branch| name.is_none_or(|name| of_name(&branch.name, name));
+    if let Some(name) = name.filter(|_| !diagram.branches.iter().any(kept)) {
+        let names: Vec<&str> = diagram.branches.iter().map(|b| b.name.as_str()).collect();
+        return Err(Failure::typed(format!("--branch: the run has no branch \"{name}\""), suggest(name, &names)));
+    }
+    Ok(kept)
 }
 
 /// Whether a branch goes by that name: its own, or that of the homotopy of which it is a leg.

@@ -50,7 +50,7 @@ impl Cycle {
         out
     }
 
-    fn state_into(&self, scheme: &Scheme, t: f64, x: &mut [f64]) {
+    pub(crate) fn state_into(&self, scheme: &Scheme, t: f64, x: &mut [f64]) {
         let n = x.len();
         let t = t - t.floor();
         let j = self.mesh.partition_point(|&b| b <= t).clamp(1, self.intervals()) - 1;

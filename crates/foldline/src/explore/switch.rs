@@ -190,7 +190,9 @@ pub fn doubled_edge(system: &System, free: usize, at: &SpecialPoint, next: &Poin
         trust: Trust {
             trivial_defect: 2.0 * once.trust.trivial_defect,
             liouville_defect: 2.0 * once.trust.liouville_defect,
-            ..once.trust
+            // Where the special point is interpolated it is no nearer to a solution than that.
+            discretisation: once.trust.discretisation.max(at.error),
+            residual: once.trust.residual,
         },
     };
     Some(problem.point(&base, &tangent, examination))

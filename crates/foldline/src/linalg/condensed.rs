@@ -164,13 +164,22 @@ impl<T: Lane> Condensed<T> {
     #[inline(always)]
     fn deal(&self, from: &[f64]) -> Vec<T> {
         let block = (self.m + 1) * self.n;
-        let mut out = vec![T::default(); self.length * block];
-        for (t, to) in out.chunks_exact_mut(block).enumerate() {
+        let mut out = Vec::with_capacity(self.length * block);
+        for t in 0..self.length {
+            // Where the interval of each lane begins, if there is one.
+            let mut first = [None; 8];
             for lane in 0..T::COUNT {
-                if let Some(x) = self.of_interval(from, lane, t) {
-                    for (to, source) in to.iter_mut().zip(&self.order) {
-                        to.lanes_mut()[lane] = x[*source];
-                    }
+                let j = lane * self.length + t;
+                first[lane] = (j < self.intervals).then_some(j * block);
+            }
+            match first[T::COUNT - 1] {
+                Some(_) => {
+                    let first = first.map(|at| at.unwrap_or(0));
+                    out.extend(self.order.iter().map(|source| T::each(|lane| from[first[lane] + source])));
+                }
+                None => {
+                    let value = |lane: usize, source: usize| first[lane].map_or(0.0, |at| from[at + source]);
+                    out.extend(self.order.iter().map(|source| T::each(|lane| value(lane, *source))));
                 }
             }
         }
@@ -191,13 +200,6 @@ impl<T: Lane> Condensed<T> {
                 }
             }
         }
-    }
-
-    /// The numbers of the interval at that place of a lane, if there is one.
-    #[inline(always)]
-    fn of_interval<'x>(&self, x: &'x [f64], lane: usize, t: usize) -> Option<&'x [f64]> {
-        let (j, block) = (lane * self.length + t, (self.m + 1) * self.n);
-        (j < self.intervals).then(|| &x[j * block..(j + 1) * block])
     }
 
     #[inline(always)]

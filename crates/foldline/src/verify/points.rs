@@ -1,0 +1,316 @@
+//! Is a point what it says?
+//!
+//! **Equations.** For eigenvalues λ of an equilibrium with Jacobian J, k = 1 … n, which together determine them:
+//!
+//!   (1)  Σ λᵏ = tr Jᵏ
+
+use super::shooting::{Orbit, Shooting, Solved};
+use super::{Check, Quantity, Undecided, Verified, accuracy, of_cycles};
+use crate::contract::{Batch, Parameters, VectorField};
+use crate::diagram::{Branch, Cycle, Point, Solution};
+use crate::explore::System;
+use crate::linalg::{axpy, dot, larger, lu};
+use crate::problem::Setting;
+use crate::problem::gauss::Scheme;
+use num_complex::Complex64;
+
+/// Defects of multipliers up to which they are taken to be off, as in the continuation.
+const CERTAIN: f64 = 20.0;
+/// Error of a comparison itself, in units of the accuracy of the integration.
+const NOISE: f64 = 100.0;
+/// Places per step at which a trajectory is looked at for its extreme values.
+const PLACES: usize = 4;
+/// Places between two of these around a peak.
+const FINER: usize = 20;
+/// Peaks that are looked at.
+const PEAKS: usize = 3;
+/// Cycles integrated at a time.
+const BLOCK: usize = 16;
+
+/// Verifies the points with these indices.
+pub(super) fn verify(
+    system: &System,
+    setting: &Setting,
+    branch: &Branch,
+    chosen: &[usize],
+    tolerance: f64,
+) -> Verified {
+    let mut out = Verified::default();
+    let points: Vec<&Point> = chosen.iter().map(|i| &branch.points[*i]).collect();
+    let part = Part { system, setting, branch, noise: NOISE * accuracy(tolerance) };
+    if of_cycles(branch) {
+        points.chunks(BLOCK).for_each(|block| part.cycles(block, accuracy(tolerance), &mut out));
+    } else {
+        points.iter().for_each(|point| part.equilibrium(point, &mut out));
+    }
+    out
+}
+
+struct Part<'a> {
+    system: &'a System<'a>,
+    setting: &'a Setting<'a>,
+    branch: &'a Branch,
+    /// What two computations may differ by although both are right.
+    noise: f64,
+}
+
+impl Part<'_> {
+    fn check(&self, point: &Point, quantity: Quantity, stated: f64, found: f64) -> Check {
+        let parameter = point.parameters.get(self.branch.free).copied().unwrap_or(f64::NAN);
+        let (branch, position) = (self.branch.name.clone(), point.position);
+        Check { branch, position, special: None, parameter, quantity, stated: stated + self.noise, found }
+    }
+
+    fn undecided(&self, point: &Point, why: &'static str) -> Undecided {
+        Undecided { branch: self.branch.name.clone(), position: point.position, special: None, why }
+    }
+
+    fn cycles(&self, points: &[&Point], accuracy: f64, out: &mut Verified) {
+        let shooting = Shooting { setting: self.setting, accuracy };
+        let (mut own, mut orbits) = (Vec::new(), Vec::new());
+        for point in points {
+            match Orbit::of(self.setting, point) {
+                Some(orbit) => {
+                    own.push(*point);
+                    orbits.push(orbit);
+                }
+                None => out.undecided.push(self.undecided(point, "its profile was not stored")),
+            }
+        }
+        let solved = shooting.solve(&orbits, &[]);
+        let kept: Vec<&Solved> = solved.iter().flatten().collect();
+        let mut seen = Seen::new(self.setting.field.dim(), kept.len());
+        let again: Vec<&Orbit> = kept.iter().map(|solved| &solved.orbit).collect();
+        shooting.flows(&again, &mut |index, step| {
+            // The state comes first, then its derivatives, which are not looked at.
+            let mut x = vec![0.0; seen.n];
+            for k in 0..PLACES {
+                let theta = k as f64 / PLACES as f64;
+                step.state_into(theta, &mut x);
+                seen.push(index, step.trajectory(), step.time_at(theta), &x);
+            }
+        });
+        let mut paths = kept.iter().enumerate().map(|(index, solved)| seen.path(index, &solved.orbit));
+        for ((point, orbit), solved) in own.into_iter().zip(&orbits).zip(&solved) {
+            let Some(solved) = solved else {
+                out.undecided.push(self.undecided(point, "shooting did not converge"));
+                continue;
+            };
+            let (Some(path), Solution::Cycle(cycle)) = (paths.next(), &point.solution) else { continue };
+            out.points += 1;
+            let off = shooting.between(orbit, &solved.orbit);
+            let stated = point.trust.discretisation + point.trust.residual;
+            out.checks.push(self.check(point, Quantity::Profile, stated, path.off(cycle, &orbit.scales)));
+            out.checks.push(self.check(point, Quantity::Period, stated, off[orbit.nodes.len()].abs()));
+            let ranges = path.ranges(self.setting.field, &self.setting.at(&solved.orbit.free), solved.orbit.period);
+            out.checks.push(self.check(point, Quantity::Range, stated, self.range_difference(point, &ranges)));
+            self.multipliers(point, solved, out);
+        }
+    }
+
+    fn range_difference(&self, point: &Point, ranges: &[[f64; 2]]) -> f64 {
+        let scale = |c: usize, size: f64| self.system.scales.get(c).copied().unwrap_or(0.0) + size;
+        point.ranges.iter().zip(ranges).enumerate().fold(0.0, |most, (c, (a, b))| {
+            let size = a[0].abs().max(a[1].abs()).max(f64::MIN_POSITIVE);
+            larger(most, (a[0] - b[0]).abs().max((a[1] - b[1]).abs()) / scale(c, size))
+        })
+    }
+
+    fn multipliers(&self, point: &Point, solved: &Solved, out: &mut Verified) {
+        let found = solved.flow.multipliers(&solved.orbit);
+        let found = found.get(1..).unwrap_or(&[]);
+        let stated = CERTAIN * point.trust.trivial_defect.max(point.trust.liouville_defect)
+            + point.trust.discretisation;
+        let pairs = matched(point.free_spectrum(), found);
+
+        let apart = pairs.iter().fold(0.0, |m, (a, b)| larger(m, (a - b).norm() / a.norm().max(1.0)));
+        out.checks.push(self.check(point, Quantity::Spectrum, stated, apart));
+        let wrong = pairs.iter().filter(|(a, b)| (a.norm() > 1.0) != (b.norm() > 1.0));
+        let side = wrong.fold(0.0, |m, (_, b)| larger(m, (b.norm() - 1.0).abs()));
+        out.checks.push(self.check(point, Quantity::Stability, stated, side));
+    }
+
+    fn equilibrium(&self, point: &Point, out: &mut Verified) {
+        let Solution::Equilibrium(x) = &point.solution else { return };
+        let (n, k) = (x.len(), self.setting.freedom());
+        let (mut f, mut fx, mut fp) = (vec![0.0; n], vec![0.0; n * n], vec![0.0; n * k]);
+        let batch = Batch { lanes: 1, states: x, parameters: Parameters::Shared(&point.parameters) };
+        self.setting.linearise(batch, &mut f, &mut fx, &mut fp);
+        out.points += 1;
+        let scales: Vec<f64> = x.iter().zip(self.setting.scales).map(|(x, s)| x.abs() + s).collect();
+        // The shortest way to a solution in state and parameters.
+        let mut line: Vec<f64> = Vec::with_capacity(n * (n + k));
+        for i in 0..n {
+            line.extend((0..n).map(|j| fx[i * n + j] * scales[j]));
+            line.extend(self.setting.axes.iter().enumerate().map(|(a, axis)| fp[i * k + a] * axis.scale));
+        }
+        let width = n + k;
+        let mut gram: Vec<f64> = (0..n * n)
+            .map(|at| dot(&line[at / n * width..(at / n + 1) * width], &line[at % n * width..(at % n + 1) * width]))
+            .collect();
+        let mut pivots = vec![0; n];
+        if lu::factorise(&mut gram, n, &mut pivots).is_err() {
+            out.undecided.push(self.undecided(point, "the Jacobian is singular there"));
+            return;
+        }
+        lu::solve(&gram, n, &pivots, &mut f, 1);
+        let mut update = vec![0.0; width];
+        f.iter().enumerate().for_each(|(i, y)| axpy(*y, &line[i * width..(i + 1) * width], &mut update));
+        let off = update.iter().fold(0.0, |m, d| larger(m, d.abs()));
+        out.checks.push(self.check(point, Quantity::Profile, point.trust.residual, off));
+        let (mut power, mut worst) = (fx.clone(), 0.0);
+        for exponent in 1..=n as i32 {
+            let trace: f64 = (0..n).map(|i| power[i * n + i]).sum();
+            let sum: Complex64 = point.spectrum.iter().map(|z| z.powi(exponent)).sum();
+            let size: f64 = point.spectrum.iter().map(|z| z.norm().powi(exponent)).sum();
+            let entries: f64 = power.iter().fold(0.0, |m, x| larger(m, x.abs()));
+            worst = larger(worst, (sum - trace).norm() / size.max(entries).max(f64::MIN_POSITIVE));
+            let old = power.clone();
+            for (at, x) in power.iter_mut().enumerate() {
+                *x = (0..n).map(|j| old[at / n * n + j] * fx[j * n + at % n]).sum();
+            }
+        }
+        out.checks.push(self.check(point, Quantity::Spectrum, 0.0, worst));
+        let unstable = point.spectrum.iter().filter(|z| z.re > 0.0).count();
+        let least = point.spectrum.iter().map(|z| z.re.abs()).fold(f64::INFINITY, f64::min);
+        out.checks.push(self.check(
+            point,
+            Quantity::Stability,
+            0.0,
+            if unstable == point.unstable { 0.0 } else { least },
+        ));
+    }
+}
+
+/// Each of `a` with one of `b`: always the closest pair that is left, relative to its size.
+fn matched(a: &[Complex64], b: &[Complex64]) -> Vec<(Complex64, Complex64)> {
+    let mut rest: Vec<Complex64> = b.to_vec();
+    let mut out: Vec<Option<Complex64>> = vec![None; a.len()];
+    for _ in 0..a.len().min(b.len()) {
+        let apart = |i: usize, j: usize| (a[i] - rest[j]).norm() / a[i].norm().max(1.0);
+        let all = (0..a.len()).filter(|i| out[*i].is_none()).flat_map(|i| (0..rest.len()).map(move |j| (i, j)));
+        let Some((i, j)) = all.min_by(|p, q| apart(p.0, p.1).total_cmp(&apart(q.0, q.1))) else { break };
+        out[i] = Some(rest.swap_remove(j));
+    }
+    a.iter().zip(out).map(|(a, b)| (*a, b.unwrap_or(Complex64::new(f64::NAN, 0.0)))).collect()
+}
+
+/// States along some cycles, collected while they are integrated.
+struct Seen {
+    n: usize,
+    /// For each cycle its samples: segment, time in it, state.
+    samples: Vec<Vec<(usize, f64, Vec<f64>)>>,
+}
+
+impl Seen {
+    fn new(n: usize, count: usize) -> Seen {
+        Seen { n, samples: vec![Vec::new(); count] }
+    }
+
+    fn push(&mut self, cycle: usize, segment: usize, time: f64, x: &[f64]) {
+        self.samples[cycle].push((segment, time, x.to_vec()));
+    }
+
+    /// The path of a cycle over one period.
+    fn path(&self, cycle: usize, orbit: &Orbit) -> Path {
+        let mut samples: Vec<&(usize, f64, Vec<f64>)> = self.samples[cycle].iter().collect();
+        samples.sort_by(|a, b| (a.0, a.1).partial_cmp(&(b.0, b.1)).unwrap_or(std::cmp::Ordering::Equal));
+        let first = samples.first().map_or(0, |s| s.0);
+        let mut begins = vec![0.0];
+        orbit.shares.iter().for_each(|share| begins.push(begins[begins.len() - 1] + share));
+        Path {
+            times: samples.iter().map(|(s, t, _)| begins[s - first] + t * orbit.shares[s - first]).collect(),
+            states: (0..self.n).flat_map(|c| samples.iter().map(move |s| s.2[c])).collect(),
+        }
+    }
+}
+
+/// An integrated cycle.
+struct Path {
+    /// Normalised, from 0 on.
+    times: Vec<f64>,
+    /// `[n × times]`.
+    states: Vec<f64>,
+}
+
+impl Path {
+    /// The largest distance of a profile from it, relative to `scales`.
+    fn off(&self, cycle: &Cycle, scales: &[f64]) -> f64 {
+        let (scheme, count) = (Scheme::new(cycle.degree), self.times.len());
+        let mut x = vec![0.0; scales.len()];
+        let mut most = 0.0;
+        for (k, t) in self.times.iter().enumerate() {
+            cycle.state_into(&scheme, *t, &mut x);
+            let apart = |c: usize| (x[c] - self.states[c * count + k]).abs() / scales[c];
+            most = (0..x.len()).fold(most, |m, c| larger(m, apart(c)));
+        }
+        most
+    }
+
+    /// Smallest and largest values of states and outputs of a cycle of that period.
+    fn ranges(&self, field: &dyn VectorField, parameters: &[f64], period: f64) -> Vec<[f64; 2]> {
+        let (n, lanes) = (field.dim(), self.times.len());
+        let at = |states: &'_ [f64], lanes: usize| -> Vec<f64> {
+            let mut values = states.to_vec();
+            values.resize((n + field.output_count()) * lanes, 0.0);
+            let (states, outputs) = values.split_at_mut(n * lanes);
+            field.outputs(Batch { lanes, states, parameters: Parameters::Shared(parameters) }, outputs);
+            values
+        };
+        let mut slopes = vec![0.0; n * lanes];
+        field.evaluate(Batch { lanes, states: &self.states, parameters: Parameters::Shared(parameters) }, &mut slopes);
+        slopes.iter_mut().for_each(|f| *f *= period);
+        let largest = |c: usize, line: &[f64], sign: f64| {
+            let tops = peaks(line, sign).into_iter().map(|place| {
+                let fine = self.between(&slopes, place);
+                let count = fine.len() / n;
+                top(&at(&fine, count)[c * count..(c + 1) * count], sign)
+            });
+            tops.fold(f64::NEG_INFINITY, f64::max)
+        };
+        let values = at(&self.states, lanes);
+        values
+            .chunks_exact(lanes)
+            .enumerate()
+            .map(|(c, line)| [-largest(c, line, -1.0), largest(c, line, 1.0)])
+            .collect()
+    }
+
+    /// States `[n × times]` at equal distances between the samples next to a sample, on the cubics with the given slopes.
+    fn between(&self, slopes: &[f64], place: usize) -> Vec<f64> {
+        let lanes = self.times.len();
+        let intervals = [(place + lanes - 1) % lanes, place];
+        let hermite = |c: usize, from: usize, s: f64| {
+            let to = (from + 1) % lanes;
+            let h = (self.times[to] - self.times[from]).rem_euclid(1.0);
+            let [x, y] = [from, to].map(|k| self.states[c * lanes + k]);
+            let [p, q] = [from, to].map(|k| h * slopes[c * lanes + k]);
+            let d = y - x;
+            x + s * (p + s * ((3.0 * d - 2.0 * p - q) + s * (p + q - 2.0 * d)))
+        };
+        let places = || intervals.iter().flat_map(|from| (0..FINER).map(move |k| (*from, k as f64 / FINER as f64)));
+        (0..self.states.len() / lanes).flat_map(|c| places().map(move |(from, s)| (c, from, s))).map(|(c, from, s)| hermite(c, from, s)).collect()
+    }
+}
+
+/// The best few samples at which `sign` times a periodic function has a peak.
+fn peaks(values: &[f64], sign: f64) -> Vec<usize> {
+    let count = values.len();
+    let value = |k: usize| sign * values[k % count];
+    let mut places: Vec<usize> =
+        (0..count).filter(|&k| value(k) >= value(k + count - 1) && value(k) >= value(k + 1)).collect();
+    places.sort_by(|a, b| value(*b).total_cmp(&value(*a)));
+    places.truncate(PEAKS);
+    places
+}
+
+/// Largest value of `sign` times a function at equal distances: at the top of the parabola through three samples.
+fn top(values: &[f64], sign: f64) -> f64 {
+    let largest = values.iter().fold(f64::NEG_INFINITY, |m, v| m.max(sign * v));
+    let tops = values.windows(3).map(|three| {
+        let [a, b, c] = [sign * three[0], sign * three[1], sign * three[2]];
+        let bend = a - 2.0 * b + c;
+        if b >= a && b >= c && bend < 0.0 { b - 0.125 * (c - a) * (c - a) / bend } else { f64::NEG_INFINITY }
+    });
+    tops.fold(largest, f64::max)
+}

@@ -1,0 +1,318 @@
+//! Cycles by multiple shooting.
+//!
+//! **Idea.** A cycle is cut into segments at some of its mesh points. Each is integrated with the variational equations; that
+//! the end of each is the start of the next is solved by Newton's method. Segments keep what grows along the cycle from
+//! drowning everything else.
+//!
+//! **Equations.** Nodes x_i, i = 0 … K-1, x_K = x_0; φ the flow; s_i the share of the period between x_i and x_{i+1}; k free
+//! parameters λ:
+//!
+//! ```text
+//!   (1)  φ(x_i; s_i T, λ) - x_{i+1} = 0
+//!   (2)  Σ_i ⟨f(x̃_i), x_i - x̃_i⟩ = 0                    phase, x̃ the nodes at the beginning
+//!   (3)  ⟨c_r, (x, T, λ) - (x, T, λ)~⟩ = d_r             r = 1 … k
+//! ```
+//!
+//! Without rows c the shortest update is taken: that towards the nearest solution.
+//!
+//! **Source.** ascher1995, §4.
+
+use super::variational::Variational;
+use crate::contract::{Batch, Parameters, Verdict};
+use crate::diagram::{Cycle, Point, Solution};
+use crate::linalg::{axpy, dot, lu};
+use crate::problem::Setting;
+use crate::simulation::{Ensemble, Outcome, Step, Tolerance};
+use crate::stability::floquet;
+use num_complex::Complex64;
+
+/// Segments of a cycle.
+const SEGMENTS: usize = 16;
+/// Updates relative to the size of the cycle after which Newton's method has arrived.
+const ARRIVED: f64 = 1e-9;
+const ITERATIONS: usize = 6;
+/// Steps after which an integration is given up.
+const STEPS: usize = 2_000_000;
+
+/// A cycle as its nodes.
+#[derive(Clone, Debug)]
+pub(super) struct Orbit {
+    /// `[K][n]`.
+    pub(super) nodes: Vec<f64>,
+    /// `[K]`: s_i.
+    pub(super) shares: Vec<f64>,
+    /// T.
+    pub(super) period: f64,
+    /// `[k]`.
+    pub(super) free: Vec<f64>,
+    /// `[n]`: scale of the model and largest value of each component.
+    pub(super) scales: Vec<f64>,
+    /// Mesh interval at which each segment begins, `[K]`.
+    pub(super) intervals: Vec<usize>,
+}
+
+impl Orbit {
+    /// The orbit of a point, in the free parameters of a setting; `None` if it is no cycle or has no profile.
+    pub(super) fn of(setting: &Setting, point: &Point) -> Option<Orbit> {
+        let Solution::Cycle(cycle) = &point.solution else { return None };
+        let (n, count) = (setting.field.dim(), cycle.intervals());
+        if count == 0 || cycle.dim() != n {
+            return None;
+        }
+        let segments = SEGMENTS.min(count);
+        let intervals: Vec<usize> = (0..segments).map(|i| i * count / segments).collect();
+        let ends = intervals[1..].iter().map(|j| cycle.mesh[*j]).chain([1.0]);
+        let shares = ends.zip(&intervals).map(|(end, j)| end - cycle.mesh[*j]).collect();
+        let scales = (0..n).map(|c| setting.scales[c] + largest(cycle, n, c)).collect();
+        Some(Orbit {
+            nodes: at_left_ends(&cycle.profile, &intervals, cycle.degree, n),
+            shares,
+            period: cycle.period,
+            free: setting.values_of(point),
+            scales,
+            intervals,
+        })
+    }
+
+    pub(super) fn dim(&self) -> usize {
+        self.scales.len()
+    }
+
+    /// Unknowns of (1) to (3): K n + 1 + k.
+    pub(super) fn unknowns(&self) -> usize {
+        self.nodes.len() + 1 + self.free.len()
+    }
+
+    /// The same moved by a scaled update.
+    pub(super) fn moved(&self, setting: &Setting, update: &[f64]) -> Orbit {
+        let n = self.dim();
+        let mut out = self.clone();
+        let (nodes, rest) = update.split_at(self.nodes.len());
+        out.nodes.iter_mut().zip(nodes).enumerate().for_each(|(at, (x, d))| *x += d * self.scales[at % n]);
+        out.period += rest[0] * self.period;
+        for ((value, d), axis) in out.free.iter_mut().zip(&rest[1..]).zip(&setting.axes) {
+            *value += d * axis.scale;
+        }
+        out
+    }
+}
+
+fn largest(cycle: &Cycle, n: usize, c: usize) -> f64 {
+    cycle.profile.iter().skip(c).step_by(n).fold(0.0, |m: f64, x| m.max(x.abs()))
+}
+
+/// The values of a profile `[interval][node][n]` at the left ends of some intervals.
+pub(super) fn at_left_ends(profile: &[f64], intervals: &[usize], degree: usize, n: usize) -> Vec<f64> {
+    intervals.iter().flat_map(|j| &profile[j * (degree + 1) * n..][..n]).copied().collect()
+}
+
+/// What integrating the segments of an orbit yields.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Flow {
+    /// `[K][n]`.
+    ends: Vec<f64>,
+    /// `[K][n × n]`, in scaled components.
+    pub(super) transitions: Vec<f64>,
+    /// `[K][n × k]`.
+    by_free: Vec<f64>,
+    /// `[K][n]`: f at the starts and ends of the segments.
+    begins: Vec<f64>,
+    finishes: Vec<f64>,
+}
+
+impl Flow {
+    /// The multipliers, the trivial one first.
+    pub(super) fn multipliers(&self, orbit: &Orbit) -> Vec<Complex64> {
+        let n = orbit.dim();
+        let flow: Vec<f64> = self.begins.iter().enumerate().map(|(at, f)| f / orbit.scales[at % n]).collect();
+        floquet::multipliers(&self.transitions, &flow, n).multipliers
+    }
+}
+
+/// A row of (3): scaled coefficients, and the distance.
+pub(super) type Row = (Vec<f64>, f64);
+
+/// A solution of (1).
+#[derive(Clone, Debug)]
+pub(super) struct Solved {
+    pub(super) orbit: Orbit,
+    pub(super) flow: Flow,
+    /// `[k][unknowns]` in scaled unknowns: directions in which (1) and (2) stay satisfied, orthonormal; with one row, that which
+    /// makes an acute angle with it.
+    pub(super) kernel: Vec<Vec<f64>>,
+}
+
+/// Integration of orbits in a setting.
+pub(super) struct Shooting<'a> {
+    pub(super) setting: &'a Setting<'a>,
+    /// Accuracy of the integration, relative.
+    pub(super) accuracy: f64,
+}
+
+impl Shooting<'_> {
+    /// The flow along each orbit; `None` where the integration fails. `sample` sees every step of every orbit.
+    pub(super) fn flows(&self, orbits: &[&Orbit], sample: &mut dyn FnMut(usize, &Step)) -> Vec<Option<Flow>> {
+        let (n, k) = (self.setting.field.dim(), self.setting.freedom());
+        let field = Variational { setting: self.setting };
+        let (mut starts, mut parameters, mut owners) = (Vec::new(), Vec::new(), Vec::new());
+        for (index, orbit) in orbits.iter().enumerate() {
+            let values = self.setting.at(&orbit.free);
+            for (x, share) in orbit.nodes.chunks_exact(n).zip(&orbit.shares) {
+                starts.extend_from_slice(x);
+                starts.extend((0..n * n).map(|at| if at % (n + 1) == 0 { 1.0 } else { 0.0 }));
+                starts.extend(std::iter::repeat_n(0.0, n * k));
+                parameters.extend_from_slice(&values);
+                parameters.push(share * orbit.period);
+                owners.push(index);
+            }
+        }
+        let scales = self.setting.scales;
+        let matrix = (0..n * n).map(|at| scales[at / n] / scales[at % n]);
+        let by_free = (0..n * k).map(|at| scales[at / k.max(1)] / self.setting.axes[at % k.max(1)].scale);
+        let absolute = scales.iter().copied().chain(matrix).chain(by_free).map(|s| s * self.accuracy).collect();
+        let tolerance = Tolerance { relative: self.accuracy, absolute };
+        let ensemble = Ensemble::with_own_parameters(&field, &parameters, tolerance, &starts, [0.0, 1.0]);
+        let arrivals = ensemble.with_step_limit(STEPS).run(&mut |step| {
+            sample(owners[step.trajectory()], step);
+            Verdict::Continue
+        });
+        let mut out: Vec<Option<Flow>> = vec![Some(Flow::default()); orbits.len()];
+        for (arrival, owner) in arrivals.iter().zip(&owners) {
+            let scales = &orbits[*owner].scales;
+            match &mut out[*owner] {
+                Some(flow) if arrival.outcome == Outcome::Reached => {
+                    let (x, rest) = arrival.state.split_at(n);
+                    let (matrix, by_free) = rest.split_at(n * n);
+                    flow.ends.extend_from_slice(x);
+                    let scaled = matrix.iter().enumerate().map(|(at, m)| m * scales[at % n] / scales[at / n]);
+                    flow.transitions.extend(scaled);
+                    flow.by_free.extend_from_slice(by_free);
+                }
+                slot => *slot = None,
+            }
+        }
+        for (orbit, flow) in orbits.iter().zip(&mut out) {
+            if let Some(flow) = flow {
+                flow.begins = self.slopes(&orbit.nodes, &orbit.free);
+                flow.finishes = self.slopes(&flow.ends, &orbit.free);
+            }
+        }
+        out
+    }
+
+    /// f at states `[K][n]`.
+    fn slopes(&self, states: &[f64], free: &[f64]) -> Vec<f64> {
+        let n = self.setting.field.dim();
+        let parameters = self.setting.at(free);
+        let mut f = vec![0.0; states.len()];
+        for (x, f) in states.chunks_exact(n).zip(f.chunks_exact_mut(n)) {
+            self.setting.field.evaluate(Batch { lanes: 1, states: x, parameters: Parameters::Shared(&parameters) }, f);
+        }
+        f
+    }
+
+    /// Solutions next to the orbits, each with its rows (k of them) or none.
+    pub(super) fn solve(&self, orbits: &[Orbit], rows: &[Vec<Row>]) -> Vec<Option<Solved>> {
+        let mut found: Vec<Option<Solved>> = vec![None; orbits.len()];
+        let mut current: Vec<Option<Orbit>> = orbits.iter().cloned().map(Some).collect();
+        for _ in 0..ITERATIONS {
+            let open: Vec<usize> = (0..orbits.len()).filter(|&i| found[i].is_none() && current[i].is_some()).collect();
+            let at: Vec<&Orbit> = open.iter().filter_map(|&i| current[i].as_ref()).collect();
+            if at.is_empty() {
+                break;
+            }
+            let flows = self.flows(&at, &mut |_, _| {});
+            for (&i, flow) in open.iter().zip(flows) {
+                let Some(now) = current[i].take() else { continue };
+                let Some((update, kernel)) =
+                    flow.as_ref().and_then(|flow| self.update(&orbits[i], &now, flow, rows.get(i).map_or(&[], |r| r)))
+                else {
+                    continue;
+                };
+                let size = update.iter().fold(0.0, |m: f64, d| if d.abs() > m || d.is_nan() { d.abs() } else { m });
+                let next = now.moved(self.setting, &update);
+                if size < ARRIVED {
+                    found[i] = flow.map(|flow| Solved { orbit: next, flow, kernel });
+                } else if size < 1.0 && next.period > 0.0 {
+                    current[i] = Some(next);
+                }
+            }
+        }
+        found
+    }
+
+    /// A Newton step for (1) to (3), scaled, and the kernel.
+    fn update(
+        &self,
+        origin: &Orbit,
+        orbit: &Orbit,
+        flow: &Flow,
+        rows: &[Row],
+    ) -> Option<(Vec<f64>, Vec<Vec<f64>>)> {
+        let (n, k, size) = (orbit.dim(), orbit.free.len(), orbit.unknowns());
+        let (count, scales) = (orbit.shares.len(), &orbit.scales);
+        let (inner, mut a) = (count * n, vec![0.0; size * size]);
+        let mut right = vec![0.0; size * (1 + k)];
+        let stride = 1 + k;
+        for i in 0..count {
+            let next = (i + 1) % count;
+            for r in 0..n {
+                let row = i * n + r;
+                let line = &mut a[row * size..(row + 1) * size];
+                line[i * n..(i + 1) * n].copy_from_slice(&flow.transitions[(i * n + r) * n..(i * n + r + 1) * n]);
+                line[next * n + r] -= 1.0;
+                line[inner] = flow.finishes[row] * orbit.shares[i] * orbit.period / scales[r];
+                for (c, axis) in self.setting.axes.iter().enumerate() {
+                    line[inner + 1 + c] = flow.by_free[row * k + c] * axis.scale / scales[r];
+                }
+                right[row * stride] = -(flow.ends[row] - orbit.nodes[next * n + r]) / scales[r];
+            }
+        }
+        let line = &mut a[inner * size..(inner + 1) * size];
+        for at in 0..inner {
+            line[at] = flow.begins[at] * orbit.period / scales[at % n] / count as f64;
+        }
+        right[inner * stride] = 0.0;
+        for r in 0..k {
+            let line = &mut a[(inner + 1 + r) * size..(inner + 2 + r) * size];
+            let place = (inner + 1 + r) * stride;
+            match rows.get(r) {
+                Some((row, distance)) => {
+                    line.copy_from_slice(row);
+                    right[place] = distance - dot(row, &self.between(origin, orbit));
+                }
+                // Any row will do that is not orthogonal to the kernel.
+                None => (0..size).for_each(|c| line[c] = ((c * c + 3 * c + 7 * r) as f64 * 0.37).sin()),
+            }
+            right[place + 1 + r] = 1.0;
+        }
+        let mut pivots = vec![0; size];
+        lu::factorise(&mut a, size, &mut pivots).ok()?;
+        lu::solve(&a, size, &pivots, &mut right, stride);
+        let column = |c: usize| -> Vec<f64> { right.iter().skip(c).step_by(stride).copied().collect() };
+        let mut update = column(0);
+        let mut kernel: Vec<Vec<f64>> = Vec::new();
+        for r in 0..k {
+            let mut own = column(1 + r);
+            kernel.iter().for_each(|other| axpy(-dot(other, &own), other, &mut own));
+            let norm = dot(&own, &own).sqrt();
+            own.iter_mut().for_each(|x| *x /= norm);
+            kernel.push(own);
+        }
+        if rows.is_empty() {
+            for own in &kernel {
+                let part = dot(own, &update);
+                axpy(-part, own, &mut update);
+            }
+        }
+        update.iter().all(|x| x.is_finite()).then_some((update, kernel))
+    }
+
+    /// From one orbit to another, scaled as the first.
+    pub(super) fn between(&self, from: &Orbit, to: &Orbit) -> Vec<f64> {
+        let n = from.dim();
+        let nodes = from.nodes.iter().zip(&to.nodes).enumerate().map(|(at, (a, b))| (b - a) / from.scales[at % n]);
+        let free = from.free.iter().zip(&to.free).zip(&self.setting.axes).map(|((a, b), axis)| (b - a) / axis.scale);
+        nodes.chain([(to.period - from.period) / from.period]).chain(free).collect()
+    }
+}

@@ -1,0 +1,86 @@
+//! The variational equations as a vector field of their own.
+//!
+//! **Equations.** In the time of one segment of a cycle, which lasts S:
+//!
+//! ```text
+//!   (1)  x' = S f(x, p),   X' = S f_x X,   Y' = S (f_x Y + f_λ)          X(0) = I,  Y(0) = 0
+//! ```
+//!
+//! so that X and Y are the derivatives of the end with respect to the start and the free parameters λ.
+
+use crate::contract::{Batch, Parameters, VectorField};
+use crate::problem::Setting;
+
+/// (1): states x `[n]`, X `[n × n]`, Y `[n × k]`, row-major; parameters are those of the model and S.
+pub(super) struct Variational<'a> {
+    /// The vector field with its k free parameters.
+    pub(super) setting: &'a Setting<'a>,
+}
+
+impl Variational<'_> {
+    fn sizes(&self) -> [usize; 2] {
+        [self.setting.field.dim(), self.setting.freedom()]
+    }
+}
+
+impl VectorField for Variational<'_> {
+    fn dim(&self) -> usize {
+        let [n, k] = self.sizes();
+        n * (1 + n + k)
+    }
+
+    fn parameter_count(&self) -> usize {
+        self.setting.field.parameter_count() + 1
+    }
+
+    fn evaluate(&self, at: Batch, out: &mut [f64]) {
+        let ([n, k], lanes) = (self.sizes(), at.lanes);
+        let count = self.setting.field.parameter_count();
+        let shared;
+        let (parameters, lengths): (Parameters, &[f64]) = match at.parameters {
+            Parameters::PerLane(all) => {
+                (Parameters::PerLane(&all[..count * lanes]), &all[count * lanes..(count + 1) * lanes])
+            }
+            Parameters::Shared(all) => {
+                shared = vec![all[count]; lanes];
+                (Parameters::Shared(&all[..count]), &shared)
+            }
+        };
+        let inner = Batch { lanes, states: &at.states[..n * lanes], parameters };
+        let (mut fx, mut fp) = (vec![0.0; n * n * lanes], vec![0.0; n * k * lanes]);
+        let (f, rest) = out.split_at_mut(n * lanes);
+        self.setting.linearise(inner, f, &mut fx, &mut fp);
+        for row in f.chunks_exact_mut(lanes) {
+            row.iter_mut().zip(lengths).for_each(|(f, s)| *f *= s);
+        }
+        let (along, by) = rest.split_at_mut(n * n * lanes);
+        by.copy_from_slice(&fp);
+        along.fill(0.0);
+        // X and Y are two blocks of columns, each row-major.
+        for (block, width, first) in [(along, n, n), (by, k, n + n * n)] {
+            for i in 0..n {
+                for j in 0..n {
+                    let slope = &fx[(i * n + j) * lanes..(i * n + j + 1) * lanes];
+                    for c in 0..width {
+                        let from = &at.states[(first + j * width + c) * lanes..(first + j * width + c + 1) * lanes];
+                        let to = &mut block[(i * width + c) * lanes..(i * width + c + 1) * lanes];
+                        (0..lanes).for_each(|l| to[l] += slope[l] * from[l]);
+                    }
+                }
+            }
+            for row in block.chunks_exact_mut(lanes) {
+                row.iter_mut().zip(lengths).for_each(|(x, s)| *x *= s);
+            }
+        }
+    }
+
+    /// Not known: nothing that integrates asks for it.
+    fn linearise(&self, _at: Batch, _free: &[usize], f: &mut [f64], fx: &mut [f64], fp: &mut [f64]) {
+        [f, fx, fp].into_iter().for_each(|all| all.fill(f64::NAN));
+    }
+
+    /// Not known either.
+    fn directional(&self, _at: Batch, _directions: &[&[f64]], out: &mut [f64]) {
+        out.fill(f64::NAN);
+    }
+}
