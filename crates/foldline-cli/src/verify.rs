@@ -48,9 +48,9 @@ fn listed(checks: &[&Check]) -> Table {
             check.special.map_or(Cell::Empty, |kind| Cell::Word(kind.name().to_string())),
             Cell::Number(check.parameter),
             Cell::Word(check.quantity.name().to_string()),
-            Cell::Number(check.stated),
+            check.stated.map_or(Cell::Empty, Cell::Number),
             Cell::Number(check.found),
-            Cell::Number(check.ratio()),
+            check.ratio().map_or(Cell::Empty, Cell::Number),
         ]
     };
     Table { columns, rows: checks.iter().map(row).collect() }
@@ -64,22 +64,29 @@ fn summary(verified: &Verified, wrong: usize, out: &mut impl Write) -> std::io::
         verified.special,
         verified.checks.len()
     )?;
-    let mut each: BTreeMap<Quantity, Vec<f64>> = BTreeMap::new();
-    for check in verified.checks.iter().filter(|check| check.quantity != Quantity::Record) {
-        each.entry(check.quantity).or_default().push(check.ratio());
-    }
-    for (quantity, ratios) in each {
-        let share = |holds: &dyn Fn(f64) -> bool| {
-            100.0 * ratios.iter().filter(|ratio| holds(**ratio)).count() as f64 / ratios.len() as f64
-        };
-        writeln!(
-            out,
-            "{:10} {:5} comparisons: {:5.1} % within what is stated, {:5.1} % of them within a hundredth of it",
-            quantity.name(),
-            ratios.len(),
-            share(&|ratio| ratio <= 1.0),
-            share(&|ratio| ratio < 0.01),
-        )?;
+    let of = |quantity: Quantity| verified.checks.iter().filter(move |check| check.quantity == quantity);
+    for quantity in Quantity::ALL {
+        let ratios: Vec<f64> = of(quantity).filter_map(Check::ratio).collect();
+        if !ratios.is_empty() {
+            let within = ratios.iter().filter(|ratio| **ratio <= 1.0).count();
+            let share = 100.0 * within as f64 / ratios.len() as f64;
+            writeln!(
+                out,
+                "{:10} {:6} compared, {share:5.1} % within the error that is stated",
+                quantity.name(),
+                ratios.len()
+            )?;
+        }
+        let mut free: Vec<f64> = of(quantity).filter(|check| check.stated.is_none()).map(|check| check.found).collect();
+        free.sort_by(f64::total_cmp);
+        if let (Some(half), Some(most)) = (free.get(free.len() / 2), free.last()) {
+            let name = quantity.name();
+            let count = free.len();
+            writeln!(
+                out,
+                "{name:10} {count:6} compared, no error is stated; half of them differ by less than {half:.1e}, the worst by {most:.1e}"
+            )?;
+        }
     }
     let mut reasons: BTreeMap<&str, usize> = BTreeMap::new();
     verified.undecided.iter().for_each(|undecided| *reasons.entry(undecided.why).or_default() += 1);

@@ -105,7 +105,7 @@ fn first_point(
     let found = station(problem, u, &plane.row, close, 1.0, &mut cost)?;
     let trust = found.point.trust;
     let defect = trust.trivial_defect.max(trust.liouville_defect);
-    if trust.discretisation <= settings.tolerance && defect <= 5.0 * settings.tolerance {
+    if trust.discretisation <= 2.0 * settings.tolerance && defect <= 5.0 * settings.tolerance {
         return Ok(found);
     }
     problem.anchor(&guess);

@@ -10,6 +10,10 @@ use crate::linalg::panel;
 
 /// Peaks of one channel that are refined.
 const PEAKS: usize = 3;
+/// Distance from its neighbours, in samples, down to which a peak is refined.
+const CLOSE: f64 = 0.005;
+/// Refinements at most: four, and one for every sample or part of one that the peak moves aside.
+const ROUNDS: usize = 12;
 
 /// At one state: every range is a single value.
 pub fn of_state(field: &dyn VectorField, parameters: &[f64], x: &[f64]) -> Vec<[f64; 2]> {
@@ -36,14 +40,13 @@ pub fn of_profile(
     for line in values.chunks_exact(lanes) {
         for sign in [-1.0, 1.0] {
             let (top, places) = highest(line, sign);
-            peaks.extend(places.iter().map(|&place| Peak { of: best.len(), sign, place: place as f64 }));
+            peaks.extend(places.iter().map(|&place| Peak { of: best.len(), sign, place: place as f64, spacing: 1.0 }));
             best.push(top);
         }
     }
-    let mut spacing = 1.0;
-    for _ in 0..4 {
-        orbit.refine(&mut peaks, spacing, &mut best);
-        spacing *= 0.2;
+    for _ in 0..ROUNDS {
+        orbit.refine(&mut peaks, &mut best);
+        peaks.retain(|peak| peak.spacing > CLOSE);
     }
     best.chunks_exact(2).map(|pair| [-pair[0], pair[1]]).collect()
 }
@@ -54,6 +57,8 @@ struct Peak {
     of: usize,
     sign: f64,
     place: f64,
+    /// Distance of the neighbours that are looked at.
+    spacing: f64,
 }
 
 struct Orbit<'a> {
@@ -102,13 +107,17 @@ impl Orbit<'_> {
         values
     }
 
-    /// Moves each peak to the top of the parabola through itself and its neighbours `spacing` samples away.
-    fn refine(&self, peaks: &mut [Peak], spacing: f64, best: &mut [f64]) {
+    /// Moves each peak to the top of the parabola through itself and its neighbours. They come closer where the top lies between
+    /// them; next to the end of an interval, where samples are not equally far apart in time, it may not.
+    fn refine(&self, peaks: &mut [Peak], best: &mut [f64]) {
         let (n, probes) = (self.field.dim(), 3 * peaks.len());
+        if probes == 0 {
+            return;
+        }
         let mut states = vec![0.0; n * probes];
         let mut x = vec![0.0; n];
         for (p, peak) in peaks.iter().enumerate() {
-            for (k, offset) in [-spacing, 0.0, spacing].into_iter().enumerate() {
+            for (k, offset) in [-peak.spacing, 0.0, peak.spacing].into_iter().enumerate() {
                 self.state_into(peak.place + offset, &mut x);
                 (0..n).for_each(|i| states[i * probes + 3 * p + k] = x[i]);
             }
@@ -120,15 +129,19 @@ impl Orbit<'_> {
             let best = &mut best[peak.of];
             *best = best.max(a).max(b).max(c);
             let bend = a - 2.0 * b + c;
+            let between = b >= a && b >= c;
             if bend < 0.0 {
                 let shift = 0.5 * (a - c) / bend;
-                peak.place += spacing * shift.clamp(-1.0, 1.0);
-                let top = b - 0.125 * (c - a) * (c - a) / bend;
-                if shift.abs() <= 1.0 && spacing < 0.1 {
-                    *best = best.max(top);
+                peak.place += peak.spacing * shift.clamp(-1.0, 1.0);
+                if between && peak.spacing < 0.1 {
+                    *best = best.max(b - 0.125 * (c - a) * (c - a) / bend);
                 }
             } else if a > b || c > b {
-                peak.place += if a > c { -spacing } else { spacing };
+                peak.place += if a > c { -peak.spacing } else { peak.spacing };
+            }
+            // A constant has its top everywhere.
+            if between {
+                peak.spacing *= 0.2;
             }
         }
     }

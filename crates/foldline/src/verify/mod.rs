@@ -39,7 +39,8 @@ pub enum Quantity {
     Range,
     /// Multipliers, relative to the larger of 1 and their size; for an equilibrium the power sums of its eigenvalues.
     Spectrum,
-    /// A multiplier on the wrong side of the unit circle: its distance to it.
+    /// A multiplier on the wrong side of the unit circle, or an eigenvalue of the imaginary axis: its distance to it. The end of a
+    /// branch that joins another, where one lies on it, is left out.
     Stability,
     /// The parameter at a special point, relative to 1 + its size.
     Place,
@@ -48,6 +49,17 @@ pub enum Quantity {
 }
 
 impl Quantity {
+    /// Every quantity.
+    pub const ALL: [Quantity; 7] = [
+        Quantity::Profile,
+        Quantity::Period,
+        Quantity::Range,
+        Quantity::Spectrum,
+        Quantity::Stability,
+        Quantity::Place,
+        Quantity::Record,
+    ];
+
     /// The name used in tables.
     pub fn name(self) -> &'static str {
         match self {
@@ -75,16 +87,22 @@ pub struct Check {
     pub parameter: f64,
     /// What is compared.
     pub quantity: Quantity,
-    /// The error that the diagram states.
-    pub stated: f64,
+    /// The error that the diagram states, and what the comparison itself may be off by; `None` where it states none: no bound is
+    /// known for multipliers.
+    pub stated: Option<f64>,
     /// The difference that was found.
     pub found: f64,
 }
 
 impl Check {
-    /// The difference over the stated error; above 1 the diagram is wrong.
-    pub fn ratio(&self) -> f64 {
-        if self.found == 0.0 { 0.0 } else { self.found / self.stated }
+    /// The difference over the stated error; above 1 the diagram is wrong. `None` where no error is stated.
+    pub fn ratio(&self) -> Option<f64> {
+        let stated = self.stated?;
+        Some(if self.found == 0.0 { 0.0 } else { self.found / stated })
+    }
+
+    fn order(&self) -> f64 {
+        self.ratio().unwrap_or(-1.0)
     }
 }
 
@@ -124,7 +142,7 @@ impl Verified {
 
     /// Comparisons that show something wrong.
     pub fn wrong(&self) -> impl Iterator<Item = &Check> {
-        self.checks.iter().filter(|check| check.ratio().is_nan() || check.ratio() > 1.0)
+        self.checks.iter().filter(|check| check.ratio().is_some_and(|ratio| ratio.is_nan() || ratio > 1.0))
     }
 }
 
@@ -153,7 +171,7 @@ pub fn verify(
         out.add(special::verify(&setting, branch, tolerance));
         out.add(record::verify(branch));
     }
-    out.checks.sort_by(|a, b| b.ratio().total_cmp(&a.ratio()));
+    out.checks.sort_by(|a, b| b.order().total_cmp(&a.order()));
     out
 }
 

@@ -7,15 +7,13 @@
 use super::shooting::{Orbit, Shooting, Solved};
 use super::{Check, Quantity, Undecided, Verified, accuracy, of_cycles};
 use crate::contract::{Batch, Parameters, VectorField};
-use crate::diagram::{Branch, Cycle, Point, Solution};
+use crate::diagram::{Branch, Cycle, Ending, Point, Solution};
 use crate::explore::System;
 use crate::linalg::{axpy, dot, larger, lu};
 use crate::problem::Setting;
 use crate::problem::gauss::Scheme;
 use num_complex::Complex64;
 
-/// Defects of multipliers up to which they are taken to be off, as in the continuation.
-const CERTAIN: f64 = 20.0;
 /// Error of a comparison itself, in units of the accuracy of the integration.
 const NOISE: f64 = 100.0;
 /// Places per step at which a trajectory is looked at for its extreme values.
@@ -55,10 +53,10 @@ struct Part<'a> {
 }
 
 impl Part<'_> {
-    fn check(&self, point: &Point, quantity: Quantity, stated: f64, found: f64) -> Check {
+    fn check(&self, point: &Point, quantity: Quantity, stated: Option<f64>, found: f64) -> Check {
         let parameter = point.parameters.get(self.branch.free).copied().unwrap_or(f64::NAN);
         let (branch, position) = (self.branch.name.clone(), point.position);
-        Check { branch, position, special: None, parameter, quantity, stated: stated + self.noise, found }
+        Check { branch, position, special: None, parameter, quantity, stated, found }
     }
 
     fn undecided(&self, point: &Point, why: &'static str) -> Undecided {
@@ -99,7 +97,7 @@ impl Part<'_> {
             let (Some(path), Solution::Cycle(cycle)) = (paths.next(), &point.solution) else { continue };
             out.points += 1;
             let off = shooting.between(orbit, &solved.orbit);
-            let stated = point.trust.discretisation + point.trust.residual;
+            let stated = Some(point.trust.discretisation + point.trust.residual + self.noise);
             out.checks.push(self.check(point, Quantity::Profile, stated, path.off(cycle, &orbit.scales)));
             out.checks.push(self.check(point, Quantity::Period, stated, off[orbit.nodes.len()].abs()));
             let ranges = path.ranges(self.setting.field, &self.setting.at(&solved.orbit.free), solved.orbit.period);
@@ -119,15 +117,23 @@ impl Part<'_> {
     fn multipliers(&self, point: &Point, solved: &Solved, out: &mut Verified) {
         let found = solved.flow.multipliers(&solved.orbit);
         let found = found.get(1..).unwrap_or(&[]);
-        let stated = CERTAIN * point.trust.trivial_defect.max(point.trust.liouville_defect)
-            + point.trust.discretisation;
         let pairs = matched(point.free_spectrum(), found);
 
         let apart = pairs.iter().fold(0.0, |m, (a, b)| larger(m, (a - b).norm() / a.norm().max(1.0)));
-        out.checks.push(self.check(point, Quantity::Spectrum, stated, apart));
+        out.checks.push(self.check(point, Quantity::Spectrum, None, apart));
         let wrong = pairs.iter().filter(|(a, b)| (a.norm() > 1.0) != (b.norm() > 1.0));
         let side = wrong.fold(0.0, |m, (_, b)| larger(m, (b.norm() - 1.0).abs()));
-        out.checks.push(self.check(point, Quantity::Stability, stated, side));
+        if !self.joins(point) {
+            out.checks.push(self.check(point, Quantity::Stability, Some(0.0), side));
+        }
+    }
+
+    /// Whether the branch ends at this point by joining another: a multiplier is on the unit circle there.
+    fn joins(&self, point: &Point) -> bool {
+        let ends = [self.branch.points.first(), self.branch.points.last()];
+        ends.iter().zip(&self.branch.ends).any(|(end, why)| {
+            end.is_some_and(|end| end.position == point.position) && matches!(why, Some(Ending::Joined { .. }))
+        })
     }
 
     fn equilibrium(&self, point: &Point, out: &mut Verified) {
@@ -157,7 +163,7 @@ impl Part<'_> {
         let mut update = vec![0.0; width];
         f.iter().enumerate().for_each(|(i, y)| axpy(*y, &line[i * width..(i + 1) * width], &mut update));
         let off = update.iter().fold(0.0, |m, d| larger(m, d.abs()));
-        out.checks.push(self.check(point, Quantity::Profile, point.trust.residual, off));
+        out.checks.push(self.check(point, Quantity::Profile, Some(point.trust.residual + self.noise), off));
         let (mut power, mut worst) = (fx.clone(), 0.0);
         for exponent in 1..=n as i32 {
             let trace: f64 = (0..n).map(|i| power[i * n + i]).sum();
@@ -170,15 +176,11 @@ impl Part<'_> {
                 *x = (0..n).map(|j| old[at / n * n + j] * fx[j * n + at % n]).sum();
             }
         }
-        out.checks.push(self.check(point, Quantity::Spectrum, 0.0, worst));
+        out.checks.push(self.check(point, Quantity::Spectrum, Some(self.noise), worst));
         let unstable = point.spectrum.iter().filter(|z| z.re > 0.0).count();
         let least = point.spectrum.iter().map(|z| z.re.abs()).fold(f64::INFINITY, f64::min);
-        out.checks.push(self.check(
-            point,
-            Quantity::Stability,
-            0.0,
-            if unstable == point.unstable { 0.0 } else { least },
-        ));
+        let side = if unstable == point.unstable { 0.0 } else { least };
+        out.checks.push(self.check(point, Quantity::Stability, Some(0.0), side));
     }
 }
 
@@ -289,7 +291,10 @@ impl Path {
             x + s * (p + s * ((3.0 * d - 2.0 * p - q) + s * (p + q - 2.0 * d)))
         };
         let places = || intervals.iter().flat_map(|from| (0..FINER).map(move |k| (*from, k as f64 / FINER as f64)));
-        (0..self.states.len() / lanes).flat_map(|c| places().map(move |(from, s)| (c, from, s))).map(|(c, from, s)| hermite(c, from, s)).collect()
+        (0..self.states.len() / lanes)
+            .flat_map(|c| places().map(move |(from, s)| (c, from, s)))
+            .map(|(c, from, s)| hermite(c, from, s))
+            .collect()
     }
 }
 

@@ -8,14 +8,28 @@ pub(super) fn verify(branch: &Branch) -> Verified {
     let mut out = Verified::default();
     let mut check = |position: i64, special: Option<Kind>, parameter: f64, found: usize, stated: f64| {
         let (branch, quantity) = (branch.name.clone(), Quantity::Record);
-        out.checks.push(Check { branch, position, special, parameter, quantity, stated, found: found as f64 });
+        out.checks.push(Check {
+            branch,
+            position,
+            special,
+            parameter,
+            quantity,
+            stated: Some(stated),
+            found: found as f64,
+        });
     };
     let value = |parameters: &[f64]| parameters.get(branch.free).copied().unwrap_or(f64::NAN);
     for pair in branch.points.windows(2) {
         let [before, after] = [&pair[0], &pair[1]];
         let mut count = before.unstable;
         for special in branch.special.iter().filter(|special| special.point.position == before.position) {
-            check(before.position, Some(special.kind), value(&special.point.parameters), count.abs_diff(special.unstable_before), 0.0);
+            check(
+                before.position,
+                Some(special.kind),
+                value(&special.point.parameters),
+                count.abs_diff(special.unstable_before),
+                0.0,
+            );
             let change = special.unstable_before.abs_diff(special.unstable_after);
             let (fits, own) = match special.kind {
                 Kind::Fold | Kind::PeriodDoubling => (change == 1, 1),

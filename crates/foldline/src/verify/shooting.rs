@@ -242,13 +242,7 @@ impl Shooting<'_> {
     }
 
     /// A Newton step for (1) to (3), scaled, and the kernel.
-    fn update(
-        &self,
-        origin: &Orbit,
-        orbit: &Orbit,
-        flow: &Flow,
-        rows: &[Row],
-    ) -> Option<(Vec<f64>, Vec<Vec<f64>>)> {
+    fn update(&self, origin: &Orbit, orbit: &Orbit, flow: &Flow, rows: &[Row]) -> Option<(Vec<f64>, Vec<Vec<f64>>)> {
         let (n, k, size) = (orbit.dim(), orbit.free.len(), orbit.unknowns());
         let (count, scales) = (orbit.shares.len(), &orbit.scales);
         let (inner, mut a) = (count * n, vec![0.0; size * size]);

@@ -57,7 +57,7 @@ pub(super) fn verify(setting: &Setting, branch: &Branch, tolerance: f64) -> Veri
                     special: Some(special.kind),
                     parameter,
                     quantity: Quantity::Place,
-                    stated: special.error + 100.0 * accuracy(tolerance),
+                    stated: Some(special.error + 100.0 * accuracy(tolerance)),
                     found: there.map_or(f64::INFINITY, |there| (there - parameter).abs() / (1.0 + parameter.abs())),
                 });
             }
@@ -96,7 +96,9 @@ impl Place<'_> {
                 _ => std::slice::from_ref(&self.special.kind),
             };
             let values = tests.iter().filter_map(|test| all(&around, |nearby| self.test(*test, nearby)));
-            let Some(values) = values.into_iter().find(|values| (values[0] > 0.0) != (values[3] > 0.0)) else { continue };
+            let Some(values) = values.into_iter().find(|values| (values[0] > 0.0) != (values[3] > 0.0)) else {
+                continue;
+            };
             crossed = true;
             why = "what different distances say about it does not agree";
             let root = zero(&nodes, &values);

@@ -99,7 +99,8 @@ fn a_right_diagram_is_found_right_and_what_is_changed_in_it_is_found() {
     assert_eq!(worst(&|d| cycle(d, &|c| c.period += 1e-4)).0, Quantity::Period);
     assert_eq!(worst(&|d| cycle(d, &|c| c.profile[7] += 1e-3)).0, Quantity::Profile);
     assert_eq!(worst(&|d| d.branches[1].points[3].ranges[0][1] += 1e-3).0, Quantity::Range);
-    assert_eq!(worst(&|d| d.branches[1].points[3].spectrum[1] += 0.01).0, Quantity::Spectrum);
+    assert_eq!(worst(&|d| d.branches[1].points[3].spectrum[1] += 1.0).0, Quantity::Stability);
+    assert_eq!(worst(&|d| d.branches[0].points[3].spectrum[1] += 1e-6).0, Quantity::Spectrum);
     assert_eq!(worst(&|d| d.branches[1].points[3].unstable = 1).0, Quantity::Record);
     assert_eq!(worst(&|d| d.branches[0].special[0].point.parameters[0] += 1e-5), (Quantity::Place, Some(Kind::Hopf)));
     assert_eq!(worst(&|d| d.branches[0].special[0].kind = Kind::Fold), (Quantity::Place, Some(Kind::Fold)));
