@@ -39,8 +39,7 @@ pub enum Quantity {
     Range,
     /// Multipliers, relative to the larger of 1 and their size; for an equilibrium the power sums of its eigenvalues.
     Spectrum,
-    /// A multiplier on the wrong side of the unit circle, or an eigenvalue of the imaginary axis: its distance to it. The end of a
-    /// branch that joins another, where one lies on it, is left out.
+    /// A multiplier on the wrong side of the unit circle, or an eigenvalue of the imaginary axis: its distance to it.
     Stability,
     /// The parameter at a special point, relative to 1 + its size.
     Place,

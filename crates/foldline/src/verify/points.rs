@@ -67,6 +67,10 @@ impl Part<'_> {
         let shooting = Shooting { setting: self.setting, accuracy };
         let (mut own, mut orbits) = (Vec::new(), Vec::new());
         for point in points {
+            if self.joins(point) {
+                out.undecided.push(self.undecided(point, "two branches meet there, and shooting is singular"));
+                continue;
+            }
             match Orbit::of(self.setting, point) {
                 Some(orbit) => {
                     own.push(*point);
@@ -123,12 +127,10 @@ impl Part<'_> {
         out.checks.push(self.check(point, Quantity::Spectrum, None, apart));
         let wrong = pairs.iter().filter(|(a, b)| (a.norm() > 1.0) != (b.norm() > 1.0));
         let side = wrong.fold(0.0, |m, (_, b)| larger(m, (b.norm() - 1.0).abs()));
-        if !self.joins(point) {
-            out.checks.push(self.check(point, Quantity::Stability, Some(0.0), side));
-        }
+        out.checks.push(self.check(point, Quantity::Stability, Some(0.0), side));
     }
 
-    /// Whether the branch ends at this point by joining another: a multiplier is on the unit circle there.
+    /// Whether the branch ends at this point by joining another.
     fn joins(&self, point: &Point) -> bool {
         let ends = [self.branch.points.first(), self.branch.points.last()];
         ends.iter().zip(&self.branch.ends).any(|(end, why)| {

@@ -25,7 +25,7 @@ use crate::problem::Setting;
 use num_complex::Complex64;
 
 /// Distances between neighbouring solutions, in scaled unknowns, in the order in which they are tried.
-const DISTANCES: [f64; 6] = [1e-2, 3e-3, 1e-3, 1e-4, 1e-5, 1e-6];
+const DISTANCES: [f64; 10] = [1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6, 3e-7];
 /// Share of the values next to the zero that the cubic may add to the parabola.
 const SMOOTH: f64 = 0.05;
 
@@ -85,9 +85,9 @@ impl Place<'_> {
     fn found(&self) -> Result<Option<f64>, &'static str> {
         let mut why = "the solutions around it could not be computed";
         let (mut tried, mut crossed) = (false, false);
-        let mut before: Option<f64> = None;
+        let (mut centre, mut before) = (0.0, None::<f64>);
         for distance in DISTANCES {
-            let nodes = [-1.5, -0.5, 0.5, 1.5].map(|k| k * distance);
+            let nodes = [-1.5, -0.5, 0.5, 1.5].map(|k| centre + k * distance);
             let Some(around) = self.solutions(&nodes)? else { continue };
             tried = true;
             let tests: &[Kind] = match self.special.kind {
@@ -107,13 +107,20 @@ impl Place<'_> {
             }
             let parameters: Vec<f64> = around.iter().map(|nearby| nearby.parameter).collect();
             let there = dot(&weights(&nodes, root), &parameters);
-            let close = AGREEING * self.special.error + 10.0 * self.accuracy;
+            // The distances must agree better than is stated, or than the place is off.
+            let off = (there - self.stated()).abs() / (1.0 + there.abs());
+            let close = (AGREEING * self.special.error).max(0.1 * off) + 10.0 * self.accuracy;
             if before.is_some_and(|before| (there - before).abs() < close * (1.0 + there.abs())) {
                 return Ok(Some(there));
             }
-            before = Some(there);
+            (centre, before) = (root, Some(there));
         }
         if tried && !crossed { Ok(None) } else { Err(why) }
+    }
+
+    /// The parameter where the special point says to be.
+    fn stated(&self) -> f64 {
+        self.setting.values_of(&self.special.point)[0]
     }
 
     fn test(&self, kind: Kind, nearby: &Nearby) -> Option<f64> {
@@ -246,7 +253,7 @@ fn weights(nodes: &[f64; 4], s: f64) -> [f64; 4] {
 
 /// What the cubic through the nodes adds at `s` to the parabola through the three nearest ones.
 fn bend(nodes: &[f64; 4], values: &[f64; 4], s: f64) -> f64 {
-    let farthest = if s > 0.0 { 0 } else { 3 };
+    let farthest = if s - nodes[0] > nodes[3] - s { 0 } else { 3 };
     let three = |i: usize| -> f64 {
         (0..4).filter(|&k| k != i && k != farthest).map(|k| (s - nodes[k]) / (nodes[i] - nodes[k])).product()
     };

@@ -1,0 +1,57 @@
+//! `foldline verify` on the reference study as it is, and with numbers changed in its file.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+fn foldline(arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_foldline")).args(arguments).output().unwrap()
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8(bytes.to_vec()).unwrap()
+}
+
+#[test]
+fn the_reference_run_is_right_and_what_is_changed_in_it_is_found() {
+    let folder = tempfile::tempdir().unwrap();
+    let study = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../studies/overhung-rotor/bouncing.toml");
+    let run = folder.path().join("run").to_string_lossy().into_owned();
+    assert!(foldline(&["run", &study.to_string_lossy(), "--out", &run]).status.success());
+
+    // Every point; both defects of what is said: that it is right, and how much was looked at.
+    let right = foldline(&["verify", &run]);
+    let said = text(&right.stdout);
+    assert_eq!(right.status.code(), Some(0), "{said}");
+    let summary = said.lines().find(|line| line.contains("computed again")).unwrap();
+    assert!(summary.contains(" 0 worse than stated"), "{said}");
+    let counts: Vec<usize> = summary.split_whitespace().filter_map(|word| word.parse().ok()).collect();
+    let [points, special, comparisons, ..] = counts[..] else { panic!("{summary}") };
+    assert!(points > 480 && special > 18 && comparisons > 4 * points, "{summary}");
+
+    // A sample of one branch as CSV, the worst first.
+    let sample =
+        foldline(&["verify", &run, "--branch", "cubic SL", "--sample", "5", "--worst", "9", "--format", "csv"]);
+    let sample = text(&sample.stdout);
+    let ratios: Vec<f64> = sample.lines().skip(1).filter_map(|line| line.rsplit(',').next()?.parse().ok()).collect();
+    assert!(ratios.len() == 9 && ratios.is_sorted_by(|a, b| a >= b), "{sample}");
+    assert!(sample.lines().skip(1).all(|line| line.starts_with("cubic SL,")), "{sample}");
+
+    // A special point that says to be elsewhere than it is.
+    let file = rusqlite::Connection::open(Path::new(&run).join("run.sqlite")).unwrap();
+    let (row, mut bytes): (i64, Vec<u8>) = file
+        .query_row(
+            "SELECT rowid, parameter_bytes FROM special_points WHERE kind = 'period-doubling' LIMIT 1",
+            [],
+            |row| Ok((row.get(0)?, row.get(1)?)),
+        )
+        .unwrap();
+    let moved = f64::from_le_bytes(bytes[..8].try_into().unwrap()) + 1e-4;
+    bytes[..8].copy_from_slice(&moved.to_le_bytes());
+    file.execute("UPDATE special_points SET parameter_bytes = ? WHERE rowid = ?", rusqlite::params![bytes, row])
+        .unwrap();
+    drop(file);
+    let wrong = foldline(&["verify", &run, "--sample", "10"]);
+    let said = text(&wrong.stdout);
+    assert_eq!(wrong.status.code(), Some(3), "{said}");
+    assert!(said.lines().nth(1).unwrap().contains("period-doubling") && said.contains("place"), "{said}");
+}
