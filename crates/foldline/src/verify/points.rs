@@ -7,7 +7,7 @@
 use super::shooting::{Orbit, Shooting, Solved};
 use super::{Check, Quantity, Undecided, Verified, accuracy, of_cycles};
 use crate::contract::{Batch, Parameters, VectorField};
-use crate::diagram::{Branch, Cycle, Ending, Point, Solution};
+use crate::diagram::{Branch, Cycle, Ending, Kind, Point, Solution};
 use crate::explore::System;
 use crate::linalg::{axpy, dot, larger, lu};
 use crate::problem::Setting;
@@ -130,11 +130,12 @@ impl Part<'_> {
         out.checks.push(self.check(point, Quantity::Stability, Some(0.0), side));
     }
 
-    /// Whether the branch ends at this point by joining another.
+    /// Whether this point is where the branch ends on another: doubled branches have a point there.
     fn joins(&self, point: &Point) -> bool {
         let ends = [self.branch.points.first(), self.branch.points.last()];
         ends.iter().zip(&self.branch.ends).any(|(end, why)| {
-            end.is_some_and(|end| end.position == point.position) && matches!(why, Some(Ending::Joined { .. }))
+            end.is_some_and(|end| end.position == point.position)
+                && matches!(why, Some(Ending::Joined { at: Kind::PeriodDoubling, .. }))
         })
     }
 
