@@ -5,17 +5,17 @@
 //!   (1)  Σ λᵏ = tr Jᵏ
 
 use super::shooting::{Orbit, Shooting, Solved};
-use super::{Check, Quantity, Undecided, Verified, accuracy, of_cycles};
+use super::{Check, Quantity, Undecided, Verified, accuracies, of_cycles};
 use crate::contract::{Batch, Parameters, VectorField};
 use crate::diagram::{Branch, Cycle, Ending, Kind, Point, Solution};
 use crate::explore::System;
-use crate::linalg::{axpy, dot, larger, lu};
+use crate::linalg::{axpy, dot, larger, lu, max_abs};
 use crate::problem::Setting;
 use crate::problem::gauss::Scheme;
 use num_complex::Complex64;
 
-/// Error of a comparison itself, in units of the accuracy of the integration.
-const NOISE: f64 = 100.0;
+/// What rounding does to a comparison, relative.
+const ROUNDING: f64 = 1e-11;
 /// Places per step at which a trajectory is looked at for its extreme values.
 const PLACES: usize = 4;
 /// Places between two of these around a peak.
@@ -35,9 +35,9 @@ pub(super) fn verify(
 ) -> Verified {
     let mut out = Verified::default();
     let points: Vec<&Point> = chosen.iter().map(|i| &branch.points[*i]).collect();
-    let part = Part { system, setting, branch, noise: NOISE * accuracy(tolerance) };
+    let part = Part { system, setting, branch };
     if of_cycles(branch) {
-        points.chunks(BLOCK).for_each(|block| part.cycles(block, accuracy(tolerance), &mut out));
+        points.chunks(BLOCK).for_each(|block| part.cycles(block, accuracies(tolerance), &mut out));
     } else {
         points.iter().for_each(|point| part.equilibrium(point, &mut out));
     }
@@ -48,8 +48,6 @@ struct Part<'a> {
     system: &'a System<'a>,
     setting: &'a Setting<'a>,
     branch: &'a Branch,
-    /// What two computations may differ by although both are right.
-    noise: f64,
 }
 
 impl Part<'_> {
@@ -63,8 +61,8 @@ impl Part<'_> {
         Undecided { branch: self.branch.name.clone(), position: point.position, special: None, why }
     }
 
-    fn cycles(&self, points: &[&Point], accuracy: f64, out: &mut Verified) {
-        let shooting = Shooting { setting: self.setting, accuracy };
+    fn cycles(&self, points: &[&Point], [accuracy, coarser]: [f64; 2], out: &mut Verified) {
+        let [shooting, coarse] = [accuracy, coarser].map(|accuracy| Shooting { setting: self.setting, accuracy });
         let (mut own, mut orbits) = (Vec::new(), Vec::new());
         for point in points {
             if self.joins(point) {
@@ -79,7 +77,11 @@ impl Part<'_> {
                 None => out.undecided.push(self.undecided(point, "its profile was not stored")),
             }
         }
-        let solved = shooting.solve(&orbits, &[]);
+        let roughly = coarse.solve(&orbits, &[]);
+        let nearly: Vec<Orbit> =
+            roughly.iter().zip(&orbits).map(|(r, own)| r.as_ref().map_or(own, |r| &r.orbit).clone()).collect();
+        let mut solved = shooting.solve(&nearly, &[]);
+        solved.iter_mut().zip(&roughly).filter(|(_, r)| r.is_none()).for_each(|(s, _)| *s = None);
         let kept: Vec<&Solved> = solved.iter().flatten().collect();
         let mut seen = Seen::new(self.setting.field.dim(), kept.len());
         let again: Vec<&Orbit> = kept.iter().map(|solved| &solved.orbit).collect();
@@ -93,20 +95,21 @@ impl Part<'_> {
             }
         });
         let mut paths = kept.iter().enumerate().map(|(index, solved)| seen.path(index, &solved.orbit));
-        for ((point, orbit), solved) in own.into_iter().zip(&orbits).zip(&solved) {
-            let Some(solved) = solved else {
+        for (((point, orbit), solved), rough) in own.into_iter().zip(&orbits).zip(&solved).zip(&roughly) {
+            let (Some(solved), Some(rough)) = (solved, rough) else {
                 out.undecided.push(self.undecided(point, "shooting did not converge"));
                 continue;
             };
             let (Some(path), Solution::Cycle(cycle)) = (paths.next(), &point.solution) else { continue };
             out.points += 1;
             let off = shooting.between(orbit, &solved.orbit);
-            let stated = Some(point.trust.discretisation + point.trust.residual + self.noise);
+            let noise = ROUNDING + max_abs(&shooting.between(&rough.orbit, &solved.orbit));
+            let stated = Some(point.trust.discretisation + point.trust.residual + noise);
             out.checks.push(self.check(point, Quantity::Profile, stated, path.off(cycle, &orbit.scales)));
             out.checks.push(self.check(point, Quantity::Period, stated, off[orbit.nodes.len()].abs()));
             let ranges = path.ranges(self.setting.field, &self.setting.at(&solved.orbit.free), solved.orbit.period);
             out.checks.push(self.check(point, Quantity::Range, stated, self.range_difference(point, &ranges)));
-            self.multipliers(point, solved, out);
+            self.multipliers(point, solved, rough, out);
         }
     }
 
@@ -118,16 +121,17 @@ impl Part<'_> {
         })
     }
 
-    fn multipliers(&self, point: &Point, solved: &Solved, out: &mut Verified) {
-        let found = solved.flow.multipliers(&solved.orbit);
-        let found = found.get(1..).unwrap_or(&[]);
+    fn multipliers(&self, point: &Point, solved: &Solved, rough: &Solved, out: &mut Verified) {
+        let [found, other] = [solved, rough].map(|solved| solved.flow.multipliers(&solved.orbit).split_off(1));
+        let found = &found[..];
+        let noise = matched(found, &other).iter().fold(ROUNDING, |m, (a, b)| larger(m, (a - b).norm()));
         let pairs = matched(point.free_spectrum(), found);
 
         let apart = pairs.iter().fold(0.0, |m, (a, b)| larger(m, (a - b).norm() / a.norm().max(1.0)));
         out.checks.push(self.check(point, Quantity::Spectrum, None, apart));
         let wrong = pairs.iter().filter(|(a, b)| (a.norm() > 1.0) != (b.norm() > 1.0));
         let side = wrong.fold(0.0, |m, (_, b)| larger(m, (b.norm() - 1.0).abs()));
-        out.checks.push(self.check(point, Quantity::Stability, Some(0.0), side));
+        out.checks.push(self.check(point, Quantity::Stability, Some(noise), side));
     }
 
     /// Whether this point is where the branch ends on another: doubled branches have a point there.
@@ -166,7 +170,7 @@ impl Part<'_> {
         let mut update = vec![0.0; width];
         f.iter().enumerate().for_each(|(i, y)| axpy(*y, &line[i * width..(i + 1) * width], &mut update));
         let off = update.iter().fold(0.0, |m, d| larger(m, d.abs()));
-        out.checks.push(self.check(point, Quantity::Profile, Some(point.trust.residual + self.noise), off));
+        out.checks.push(self.check(point, Quantity::Profile, Some(point.trust.residual + ROUNDING), off));
         let (mut power, mut worst) = (fx.clone(), 0.0);
         for exponent in 1..=n as i32 {
             let trace: f64 = (0..n).map(|i| power[i * n + i]).sum();
@@ -179,7 +183,7 @@ impl Part<'_> {
                 *x = (0..n).map(|j| old[at / n * n + j] * fx[j * n + at % n]).sum();
             }
         }
-        out.checks.push(self.check(point, Quantity::Spectrum, Some(self.noise), worst));
+        out.checks.push(self.check(point, Quantity::Spectrum, Some(ROUNDING), worst));
         let unstable = point.spectrum.iter().filter(|z| z.re > 0.0).count();
         let least = point.spectrum.iter().map(|z| z.re.abs()).fold(f64::INFINITY, f64::min);
         let side = if unstable == point.unstable { 0.0 } else { least };

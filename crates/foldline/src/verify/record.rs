@@ -38,7 +38,7 @@ pub(super) fn verify(branch: &Branch) -> Verified {
                 Kind::BranchPoint => (change <= 1, 1),
                 Kind::Unexplained => (true, 0),
             };
-            if !fits && branch.held.is_none() {
+            if !fits {
                 check(before.position, Some(special.kind), value(&special.point.parameters), change.abs_diff(own), 0.0);
             }
             count = special.unstable_after;

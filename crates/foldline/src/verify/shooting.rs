@@ -28,8 +28,10 @@ use num_complex::Complex64;
 
 /// Segments of a cycle.
 const SEGMENTS: usize = 16;
-/// Updates relative to the size of the cycle after which Newton's method has arrived.
+/// Updates relative to the size of the cycle after which Newton's method has arrived …
 const ARRIVED: f64 = 1e-9;
+/// … and below which it may end because they do not become smaller: what is left is the error of the integration.
+const STALLED: f64 = 1e-5;
 const ITERATIONS: usize = 6;
 /// Steps after which an integration is given up.
 const STEPS: usize = 2_000_000;
@@ -215,6 +217,7 @@ impl Shooting<'_> {
     pub(super) fn solve(&self, orbits: &[Orbit], rows: &[Vec<Row>]) -> Vec<Option<Solved>> {
         let mut found: Vec<Option<Solved>> = vec![None; orbits.len()];
         let mut current: Vec<Option<Orbit>> = orbits.iter().cloned().map(Some).collect();
+        let mut last = vec![f64::INFINITY; orbits.len()];
         for _ in 0..ITERATIONS {
             let open: Vec<usize> = (0..orbits.len()).filter(|&i| found[i].is_none() && current[i].is_some()).collect();
             let at: Vec<&Orbit> = open.iter().filter_map(|&i| current[i].as_ref()).collect();
@@ -231,7 +234,9 @@ impl Shooting<'_> {
                 };
                 let size = update.iter().fold(0.0, |m: f64, d| if d.abs() > m || d.is_nan() { d.abs() } else { m });
                 let next = now.moved(self.setting, &update);
-                if size < ARRIVED {
+                let stalled = size < STALLED && size > 0.3 * last[i];
+                last[i] = size;
+                if size < ARRIVED || stalled {
                     found[i] = flow.map(|flow| Solved { orbit: next, flow, kernel });
                 } else if size < 1.0 && next.period > 0.0 {
                     current[i] = Some(next);

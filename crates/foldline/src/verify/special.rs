@@ -17,7 +17,7 @@
 //! and μ - 1 is replaced by the eigenvalue closest to 0 for equilibria.
 
 use super::shooting::{Orbit, Row, Shooting, at_left_ends};
-use super::{Check, Quantity, Undecided, Verified, accuracy};
+use super::{Check, Quantity, Undecided, Verified, accuracies};
 use crate::contract::{Batch, Parameters};
 use crate::diagram::{Branch, Kind, Solution, SpecialPoint};
 use crate::linalg::{dot, lu, max_abs, periodic_schur};
@@ -35,6 +35,7 @@ const AGREEING: f64 = 0.2;
 /// Verifies the special points of a branch.
 pub(super) fn verify(setting: &Setting, branch: &Branch, tolerance: f64) -> Verified {
     let mut out = Verified::default();
+    let [accuracy, _] = accuracies(tolerance);
     for special in branch.special.iter().filter(|special| special.kind != Kind::Unexplained) {
         let undecided = |why| Undecided {
             branch: branch.name.clone(),
@@ -47,7 +48,7 @@ pub(super) fn verify(setting: &Setting, branch: &Branch, tolerance: f64) -> Veri
             out.undecided.push(undecided("it lies on a curve in several parameters"));
             continue;
         }
-        let place = Place { setting, special, accuracy: accuracy(tolerance) };
+        let place = Place { setting, special, accuracy };
         match place.found() {
             Ok(there) => {
                 out.special += 1;
@@ -57,7 +58,7 @@ pub(super) fn verify(setting: &Setting, branch: &Branch, tolerance: f64) -> Veri
                     special: Some(special.kind),
                     parameter,
                     quantity: Quantity::Place,
-                    stated: Some(special.error + 100.0 * accuracy(tolerance)),
+                    stated: Some(special.error + 1000.0 * accuracy),
                     found: there.map_or(f64::INFINITY, |there| (there - parameter).abs() / (1.0 + parameter.abs())),
                 });
             }
@@ -109,7 +110,7 @@ impl Place<'_> {
             let there = dot(&weights(&nodes, root), &parameters);
             // The distances must agree better than is stated, or than the place is off.
             let off = (there - self.stated()).abs() / (1.0 + there.abs());
-            let close = (AGREEING * self.special.error).max(0.1 * off) + 10.0 * self.accuracy;
+            let close = (AGREEING * self.special.error).max(0.1 * off) + 100.0 * self.accuracy;
             if before.is_some_and(|before| (there - before).abs() < close * (1.0 + there.abs())) {
                 return Ok(Some(there));
             }
