@@ -2,7 +2,7 @@
 //!
 //! **Idea.** From a state of the motion the trajectory is integrated more accurately than before: a cycle over its period,
 //! which is where it returns to the plane across its start; anything else over a number of steps. The stretch is sampled
-//! uniformly in time; extremes are those of parabolas through three samples.
+//! uniformly in time; extremes are those of quartics through five samples.
 
 use super::settling::{Settled, Trial};
 use super::spectrum::lines;
@@ -148,16 +148,53 @@ fn ranges(trial: &Trial, parameters: &[f64], states: &[f64]) -> Vec<[f64; 2]> {
     major.chunks_exact(count).chain(outputs.chunks_exact(count)).map(extremes).collect()
 }
 
-/// Smallest and largest value, between the samples too.
+/// Smallest and largest value, between the samples too: where a sample is higher or lower than its neighbours, the quartic
+/// through it and two on either side.
 fn extremes(values: &[f64]) -> [f64; 2] {
     let mut found = values.iter().fold([f64::MAX, f64::MIN], |[low, high], v| [low.min(*v), high.max(*v)]);
-    for w in values.windows(3) {
-        let (slope, curvature) = (0.5 * (w[2] - w[0]), w[0] - 2.0 * w[1] + w[2]);
-        // The summit of the parabola, where it lies between the neighbours.
-        if slope.abs() < curvature.abs() {
-            let summit = w[1] - 0.5 * slope * slope / curvature;
+    for w in values.windows(5) {
+        let extreme = (w[2] - w[1]) * (w[2] - w[3]) >= 0.0;
+        if !extreme {
+            continue;
+        }
+        // Derivatives at the middle, in units of the spacing.
+        let first = (w[0] - 8.0 * w[1] + 8.0 * w[3] - w[4]) / 12.0;
+        let second = (-w[0] + 16.0 * w[1] - 30.0 * w[2] + 16.0 * w[3] - w[4]) / 12.0;
+        let third = (-w[0] + 2.0 * w[1] - 2.0 * w[3] + w[4]) / 2.0;
+        let fourth = w[0] - 4.0 * w[1] + 6.0 * w[2] - 4.0 * w[3] + w[4];
+        let mut t = 0.0;
+        for _ in 0..4 {
+            let slope = first + t * (second + t * (third / 2.0 + t * fourth / 6.0));
+            let bend = second + t * (third + t * fourth / 2.0);
+            t -= slope / bend;
+        }
+        let summit = w[2] + t * (first + t * (second / 2.0 + t * (third / 6.0 + t * fourth / 24.0)));
+        // Between the neighbours, and no farther off than they are.
+        let near = (w[2] - w[1]).abs().max((w[2] - w[3]).abs());
+        if t.abs() < 1.0 && (summit - w[2]).abs() <= near {
             found = [found[0].min(summit), found[1].max(summit)];
         }
     }
     found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn extremes_between_samples_are_found_to_the_fifth_order() {
+        let off = |count: usize| {
+            let at = |k: usize| (std::f64::consts::TAU * (k as f64 + 0.3) / count as f64).sin();
+            let values: Vec<f64> = (0..count).map(|k| at(k) + 0.3 * at(2 * k)).collect();
+            let fine: Vec<f64> = (0..1_000_000)
+                .map(|k| std::f64::consts::TAU * k as f64 / 1e6)
+                .map(|a| a.sin() + 0.3 * (2.0 * a - 0.3 * std::f64::consts::TAU / count as f64).sin())
+                .collect();
+            let [low, high] = extremes(&values);
+            let exact = fine.iter().fold([f64::MAX, f64::MIN], |[l, h], v| [l.min(*v), h.max(*v)]);
+            (low - exact[0]).abs().max((high - exact[1]).abs())
+        };
+        assert!(off(40) < 3e-5 && off(160) < 1e-7, "{} {}", off(40), off(160));
+    }
 }
