@@ -281,3 +281,21 @@ fn names_that_a_run_does_not_have() {
     std::fs::write(desk.path().join("study.toml"), study.replace("4]", "5]")).unwrap();
     refused(&["run", "study.toml", "--resume"], &["the study has changed", "--out DIR"]);
 }
+
+#[test]
+fn tables_are_the_same_bytes_for_any_number_of_threads_and_every_time() {
+    let folder = tempfile::tempdir().unwrap();
+    let study = root().join("studies/overhung-rotor/bouncing.toml");
+    let tables = |name: &str, jobs: &str| {
+        printed(folder.path(), &["run", &study.to_string_lossy(), "--jobs", jobs, "--out", name], 0);
+        ["--special", "--points", "--branches", "--notes"]
+            .map(|what| printed(folder.path(), &["table", name, what, "--format", "csv"], 0))
+    };
+    let first = tables("one", "1");
+    assert!(first[1].lines().count() > 400);
+    for (name, jobs) in [("again", "1"), ("two", "2"), ("five", "5")] {
+        for (a, b) in first.iter().zip(tables(name, jobs)) {
+            assert_eq!(*a, b, "{jobs} threads");
+        }
+    }
+}
