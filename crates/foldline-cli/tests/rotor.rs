@@ -373,18 +373,32 @@ fn a_run_that_is_stopped_anywhere_goes_on_to_the_same_diagram() {
     study.plan.branches.retain(|b| b.name == "contact SL");
     let system = System::of_plan(&study.model, &study.plan);
     let whole = explore::run(&system, &study.plan, 1, Diagram::default(), &Unobserved);
-    for points in [1, 17, 40, 69, 75, 95] {
+    // Anywhere along them, and next to where the doubled branches begin and end: with their special points alone, and with those at
+    // both ends but without the word that they are ends.
+    let mut places = vec![1, 17, 40];
+    let mut before = 0;
+    for branch in &whole.branches {
+        before += branch.points.len();
+        places.extend([before - 5, before, before + 1, before + 2]);
+    }
+    places.truncate(places.len() - 3);
+    for points in places {
         let mut earlier =
             explore::run(&system, &study.plan, 1, Diagram::default(), &Impatient(AtomicUsize::new(points)));
         // A run that was killed knows of no ending.
         for branch in &mut earlier.branches {
             branch.ends.iter_mut().for_each(|end| *end = end.take().filter(|e| *e != Ending::Stopped));
         }
+        if let Some(last) = earlier.branches.last_mut().filter(|branch| growth::is_doubled(branch)) {
+            last.ends = [None, None];
+        }
         let kept: usize = earlier.branches.iter().map(|b| b.points.len()).sum();
         let resumed = explore::run(&system, &study.plan, 1, earlier, &Unobserved);
-        assert!(resumed.branches.iter().map(|b| b.points.len()).sum::<usize>() > kept);
+        assert!(resumed.branches.iter().map(|b| b.points.len()).sum::<usize>() >= kept);
         assert_eq!(resumed.branches.len(), whole.branches.len(), "after {points} points");
         for (a, b) in resumed.branches.iter().zip(&whole.branches) {
+            let codes = |branch: &Branch| branch.ends.clone().map(|end| end.map(|end| end.code()));
+            assert_eq!(codes(a), codes(b), "{} after {points} points", a.name);
             assert_eq!(
                 a.special.len(),
                 b.special.len(),

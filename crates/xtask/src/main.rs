@@ -1,4 +1,7 @@
-//! Development tasks: `cargo xtask test | check | bench | reproduce | docs`. What continuous integration runs, and nothing else.
+//! Development tasks: `cargo xtask test | check | bench | reproduce | kill | docs`. What continuous integration runs, and nothing
+//! else.
+
+mod kill;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
@@ -11,6 +14,8 @@ const USAGE: &str = "cargo xtask TASK
               too; --only PART and --quick for a look (docs/book/benchmarks.md)
   reproduce   every figure and claim of the reference publication in a release build, from nothing; fails where a verdict is
               not the one in crates/foldline-reproduce/verdicts.txt, which `reproduce --write` renews
+  kill        runs of the reference study killed at random instants, 100 or as many as a number says: each must resume, lose
+              no point and find the same special points (docs/book/trust.md)
   docs        the documentation of the source, without warnings";
 
 fn main() -> ExitCode {
@@ -20,6 +25,7 @@ fn main() -> ExitCode {
         "check" => check(),
         "bench" => bench(&std::env::args().skip(2).collect::<Vec<String>>()),
         "reproduce" => reproduce(std::env::args().nth(2).as_deref() == Some("--write")),
+        "kill" => kill::test(std::env::args().nth(2).and_then(|times| times.parse().ok()).unwrap_or(100)),
         "docs" => docs(),
         _ => {
             eprintln!("{USAGE}");

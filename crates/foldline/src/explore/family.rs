@@ -218,7 +218,9 @@ impl Work<'_> {
             let label = format!("{} {parameter:.6} of {}", special.kind, parent.name);
             let name = format!("{}/{}-{}", parent.name, special.kind, counts[slot]);
             let origin = Origin::Switch { parent: parent.name.clone(), kind: special.kind, parameter };
-            if let Some(earlier) = self.earlier.branch(&name).filter(|b| !b.points.is_empty()) {
+            // A doubled branch of which there is only the special point begins anew.
+            let begun = |b: &&Branch| b.points.len() > usize::from(growth::is_doubled(b));
+            if let Some(earlier) = self.earlier.branch(&name).filter(begun) {
                 let mut branch = earlier.clone();
                 let going = self.growth(&settings, [true, true], &parent.special).resume(&mut branch);
                 self.branches.push(branch);

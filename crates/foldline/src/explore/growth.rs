@@ -264,6 +264,9 @@ impl Growth<'_> {
                     branch.points.first().map_or(f64::NAN, |p| p.parameters.get(branch.free).copied().unwrap_or(0.0));
                 going &= self.end(branch, side, Ending::Bound(at));
             }
+            if let Some(ending) = self.at_edge(branch, side).filter(|_| branch.ends[side].is_none()) {
+                going &= self.end(branch, side, ending);
+            }
             if branch.ends[side].is_none() {
                 let ending = self.side(branch, side);
                 going &= ending != Ending::Stopped;
@@ -337,6 +340,19 @@ impl Growth<'_> {
             };
             if going { Verdict::Continue } else { Verdict::Stop }
         })
+    }
+
+    /// How a side of a doubled branch ended that has its last point, the special point of the parent, but was interrupted before
+    /// that was said. The matrix is singular there, so nothing can go on from it.
+    fn at_edge(&self, branch: &Branch, side: usize) -> Option<Ending> {
+        let end = if side == 1 { branch.points.last() } else { branch.points.first() }?;
+        if branch.points.len() < 2 || !is_doubled(branch) {
+            return None;
+        }
+        let value = |point: &Point| point.parameters.get(branch.free).copied();
+        let same = |s: &&SpecialPoint| s.kind == Kind::PeriodDoubling && value(&s.point) == value(end);
+        let parameter = self.parents.iter().find(same).and_then(|s| value(&s.point))?;
+        Some(Ending::Joined { at: Kind::PeriodDoubling, parameter })
     }
 
     /// An end at a special point of the parent gets the accurate parameter of that point; where the special point, as a
