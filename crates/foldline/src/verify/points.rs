@@ -14,6 +14,9 @@ use crate::problem::Setting;
 use crate::problem::gauss::Scheme;
 use num_complex::Complex64;
 
+/// Distance, relative, from which on what is found is not taken for the same solution: along a branch, and along a curve in two
+/// parameters, where there is a surface of solutions to go astray on.
+const ELSEWHERE: [f64; 2] = [0.1, 1e-3];
 /// What rounding does to a comparison, relative.
 const ROUNDING: f64 = 1e-11;
 /// Places per step at which a trajectory is looked at for its extreme values.
@@ -101,8 +104,12 @@ impl Part<'_> {
                 continue;
             };
             let (Some(path), Solution::Cycle(cycle)) = (paths.next(), &point.solution) else { continue };
-            out.points += 1;
             let off = shooting.between(orbit, &solved.orbit);
+            if max_abs(&off) > ELSEWHERE[usize::from(self.branch.held.is_some())] {
+                out.undecided.push(self.undecided(point, "shooting leads to another solution"));
+                continue;
+            }
+            out.points += 1;
             let noise = ROUNDING + max_abs(&shooting.between(&rough.orbit, &solved.orbit));
             let stated = Some(point.trust.discretisation + point.trust.residual + noise);
             out.checks.push(self.check(point, Quantity::Profile, stated, path.off(cycle, &orbit.scales)));
