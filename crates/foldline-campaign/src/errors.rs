@@ -1,0 +1,85 @@
+//! How large are the errors really?
+//!
+//! **Idea.** The point is computed again for a thousandth of the tolerance, in the hyperplane through it across the branch, so that it
+//! does not move along the branch meanwhile.
+
+use crate::DEGREE;
+use foldline::continuation::Settings;
+use foldline::continuation::corrector::{Plane, settle};
+use foldline::diagram::{Branch, Cost, Point, Solution};
+use foldline::explore::System;
+use foldline::explore::growth::problem_of;
+
+/// How much finer the second computation is.
+const FINER: f64 = 1e-3;
+/// Places along a cycle at which two are compared.
+const PLACES: usize = 400;
+
+/// A point's stated and true error.
+#[derive(Clone, Debug)]
+pub struct Honesty {
+    /// Where, for the report.
+    pub place: String,
+    /// What the point states.
+    pub stated: f64,
+    /// The largest difference of profile, period and extreme values, relative.
+    pub found: f64,
+    /// The largest difference of a multiplier, relative to the larger of 1 and its size.
+    pub multipliers: f64,
+    /// What the point states about its multipliers.
+    pub stated_multipliers: f64,
+}
+
+/// Computes up to `count` cycles of a branch again. Those that do not converge are left out and counted.
+pub fn sampled(system: &System, settings: &Settings, branch: &Branch, count: usize) -> (Vec<Honesty>, usize) {
+    let fine = Settings { tolerance: FINER * settings.tolerance, ..settings.clone() };
+    let all = branch.points.len();
+    let chosen = (0..count.min(all)).map(|k| &branch.points[(2 * k + 1) * all / (2 * count.min(all))]);
+    let mut failed = 0;
+    let mut out = Vec::new();
+    for point in chosen.filter(|point| matches!(point.solution, Solution::Cycle(_)) && !point.tangent.is_empty()) {
+        let mut problem = problem_of(system, branch.free, DEGREE, point, false);
+        let u = problem.unknowns_of(point);
+        problem.anchor(&u);
+        let plane = Plane { row: point.tangent.clone(), base: u.clone(), distance: 0.0 };
+        match settle(&mut *problem, &fine, plane, u, 1.0, &mut Cost::default()) {
+            Ok(better) => out.extend(compared(system, branch, point, &better.point)),
+            Err(_) => failed += 1,
+        }
+    }
+    (out, failed)
+}
+
+fn compared(system: &System, branch: &Branch, point: &Point, better: &Point) -> Option<Honesty> {
+    let (Solution::Cycle(a), Solution::Cycle(b)) = (&point.solution, &better.solution) else { return None };
+    let n = a.dim();
+    let (x, y) = (a.uniform(PLACES), b.uniform(PLACES));
+    let size = |i: usize| y.iter().skip(i).step_by(n).fold(system.scales[i], |most: f64, v| most.max(v.abs()));
+    let sizes: Vec<f64> = (0..n).map(|i| size(i) + system.scales[i]).collect();
+    let profile = x.iter().zip(&y).enumerate().fold(0.0f64, |most, (k, (a, b))| most.max((a - b).abs() / sizes[k % n]));
+    let found = profile.max(point.difference(better, &system.scales, &[]));
+    let value = point.parameters.get(branch.free).copied().unwrap_or(f64::NAN);
+    Some(Honesty {
+        place: format!("{value:.6} (position {})", point.position),
+        stated: point.trust.discretisation + point.trust.residual,
+        found,
+        multipliers: spectrum_difference(point, better),
+        stated_multipliers: point.trust.trivial_defect.max(point.trust.liouville_defect),
+    })
+}
+
+/// Each multiplier against the nearest of the other list that is left.
+fn spectrum_difference(point: &Point, better: &Point) -> f64 {
+    let mut left: Vec<_> = better.spectrum.clone();
+    let mut most = 0.0f64;
+    let mut own: Vec<_> = point.spectrum.clone();
+    own.sort_by(|a, b| b.norm().total_cmp(&a.norm()));
+    for z in own {
+        let Some(nearest) = (0..left.len()).min_by(|a, b| (left[*a] - z).norm().total_cmp(&(left[*b] - z).norm())) else {
+            continue;
+        };
+        let other = left.remove(nearest);
+        most = most.max((z - other).norm() / z.norm().max(1.0));
+    }
+    most
+}

@@ -1,0 +1,58 @@
+//! `foldline-campaign [COUNT] [--only TEXT] [--classical STARTS]`: what `cargo xtask campaign` runs.
+
+use foldline_campaign::{campaign, cases, rotor};
+use std::process::ExitCode;
+
+const USAGE: &str = "foldline-campaign [COUNT] [--from NUMBER] [--classical STARTS] [--only TEXT] [--verbose]
+  COUNT        how many random rotors, 200 if not said
+  --from       number of the first rotor
+  --classical  starts for each classical problem, 5 if not said
+  --only       only cases whose name contains TEXT
+  --verbose    a line for each case";
+
+fn main() -> ExitCode {
+    match answer() {
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::from(3),
+        Err(why) => {
+            eprintln!("{why}\n{USAGE}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn answer() -> Result<bool, String> {
+    let (mut count, mut from, mut starts, mut only, mut verbose) = (200usize, 0usize, 5usize, String::new(), false);
+    let mut rest = std::env::args().skip(1);
+    while let Some(argument) = rest.next() {
+        let mut number = |what: &str| {
+            rest.next().and_then(|text| text.parse().ok()).ok_or_else(|| format!("{what} needs a number"))
+        };
+        match argument.as_str() {
+            "--from" => from = number("--from")?,
+            "--classical" => starts = number("--classical")?,
+            "--only" => only = rest.next().ok_or("--only needs a text")?,
+            "--verbose" => verbose = true,
+            other => count = other.parse().map_err(|_| format!("{other}: not a number"))?,
+        }
+    }
+    let mut all = rotor::rotors(from..from + count);
+    all.extend(cases::classical(starts));
+    all.retain(|case| case.name.contains(&only));
+    let jobs = std::thread::available_parallelism().map_or(1, |n| n.get());
+    let start = std::time::Instant::now();
+    let report = campaign(&all, jobs, &|index, report| {
+        if verbose {
+            eprintln!("{:6.1} s  {}: {} branches, {} points", start.elapsed().as_secs_f64(), all[index].name, report.branches, report.points);
+        }
+        for line in report.short.iter().chain(&report.differences).chain(&report.unexplained) {
+            eprintln!("{line}");
+        }
+        for bad in report.honesty.iter().filter(|h| h.found > h.stated) {
+            eprintln!("{}: error {:.1e}, stated {:.1e}", bad.place, bad.found, bad.stated);
+        }
+    });
+    print!("{report}");
+    println!("{:.0} s", start.elapsed().as_secs_f64());
+    Ok(report.good() && report.shares()[0] >= 0.99 && report.shares()[1] >= 0.9)
+}

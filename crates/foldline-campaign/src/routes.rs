@@ -1,0 +1,193 @@
+//! How a branch is followed, and from where.
+
+use crate::cases::{Case, First};
+use crate::errors;
+use crate::report::Report;
+use crate::same::differences;
+use crate::{DEGREE, TOLERANCE};
+use foldline::continuation::Settings;
+use foldline::contract::Unobserved;
+use foldline::diagram::{Branch, Diagram, Family, Kind, Origin, Point, Solution};
+use foldline::explore::growth::{Beginning, Growth, polished, problem_of, settings};
+use foldline::explore::{self, System};
+
+/// First steps, the middle one being the usual one.
+const FIRST_STEPS: [f64; 2] = [2e-4, 0.2];
+/// Where along a branch it is entered again, as shares of its points.
+const ENTRANCES: [f64; 2] = [0.23, 0.81];
+/// Points per side at which a run gives up.
+const MOST_POINTS: usize = 4000;
+/// How many points of a branch are computed again.
+const AGAIN: usize = 8;
+/// Samples from which first solutions come.
+const SAMPLES: usize = 32;
+/// Cycles per case.
+const CYCLES: usize = 3;
+
+/// Follows everything of one case in every way.
+pub fn examine(case: &Case) -> Report {
+    let mut report = Report { cases: 1, ..Report::default() };
+    let system = System::of_plan(case.model(), &case.study.plan);
+    let plan = &case.study.plan.branches[0];
+    let (free, range) = (plan.free, plan.range);
+    match &case.first {
+        First::Planned => {
+            let diagram = explore::run(&system, &case.study.plan, 1, Diagram::default(), &Unobserved);
+            for branch in &diagram.branches {
+                let settings = settings(&system, TOLERANCE, plan.range, MOST_POINTS);
+                routes(&system, &settings, &case.name, branch, &mut report);
+            }
+        }
+        First::Sampled { parameters, to, random } => {
+            let census = explore::attractors(&system, parameters, SAMPLES, *random, 1, TOLERANCE);
+            let equilibria = census.attractors.iter().filter(|a| a.point.solution.period().is_none()).take(1);
+            let cycles = census.attractors.iter().filter(|a| a.point.solution.period().is_some()).take(CYCLES);
+            for (number, attractor) in equilibria.chain(cycles).enumerate() {
+                let Some(start) = brought(&system, &attractor.point, *to) else {
+                    report.not_brought += 1;
+                    continue;
+                };
+                let settings = settings(&system, TOLERANCE, range, MOST_POINTS);
+                let kind = attractor.ratio.map_or(String::new(), |(a, b)| format!(" {a}:{b}"));
+                let name = format!("{number}{kind}");
+                let Some(branch) = followed(&system, &settings, free, &name, &start) else {
+                    report.differences.push(format!("{}: {name}: the start did not converge", case.name));
+                    continue;
+                };
+                routes(&system, &settings, &case.name, &branch, &mut report);
+            }
+        }
+    }
+    report
+}
+
+/// A solution at another value of a parameter, along a branch in it.
+fn brought(system: &System, point: &Point, (index, value): (usize, f64)) -> Option<Point> {
+    let now = point.parameters[index];
+    if (now - value).abs() <= 1e-12 * now.abs() {
+        return Some(point.clone());
+    }
+    let range = [now.min(value), now.max(value)];
+    let settings = settings(system, TOLERANCE, range, MOST_POINTS);
+    let sides = if value > now { [false, true] } else { [true, false] };
+    let branch = grown(system, &settings, index, "way", point, sides)?;
+    let ends = [branch.points.first()?, branch.points.last()?];
+    ends.into_iter().find(|end| (end.parameters[index] - value).abs() <= 1e-9 * (1.0 + value.abs())).cloned()
+}
+
+fn followed(system: &System, settings: &Settings, free: usize, name: &str, start: &Point) -> Option<Branch> {
+    grown(system, settings, free, name, start, [true, true])
+}
+
+fn grown(
+    system: &System,
+    settings: &Settings,
+    free: usize,
+    name: &str,
+    start: &Point,
+    sides: [bool; 2],
+) -> Option<Branch> {
+    let mut problem = problem_of(system, free, DEGREE, start, false);
+    let station = polished(&mut *problem, settings, start).ok()?;
+    let family = match start.solution {
+        Solution::Equilibrium(_) => Family::Equilibrium,
+        Solution::Cycle(_) => Family::Cycle,
+    };
+    let mut branch = Branch::new(name, family, free, Origin::Seed(name.into()));
+    let growth = Growth {
+        system,
+        settings,
+        degree: DEGREE,
+        ties: Vec::new(),
+        sides,
+        parents: &[],
+        observer: &Unobserved,
+        whole: true,
+        sparse: false,
+    };
+    growth.begin(&mut branch, Beginning::Inside(station));
+    Some(branch)
+}
+
+/// Follows a branch again in every way and compares.
+fn routes(system: &System, settings: &Settings, case: &str, base: &Branch, report: &mut Report) {
+    let place = format!("{case}: {}", base.name);
+    report.branches += 1;
+    report.special += base.special.len();
+    count(&place, base, report);
+    let (points, failed) = errors::sampled(system, settings, base, AGAIN);
+    report.not_again += failed;
+    report.honesty.extend(points.into_iter().map(|h| errors::Honesty { place: format!("{place} at {}", h.place), ..h }));
+    // A branch that was switched to begins where another ends, and cannot be entered in other ways but from inside.
+    let seeded = matches!(base.origin, Origin::Seed(_));
+    let start = base.points.iter().find(|p| p.position == 0);
+    let mut compare = |how: &str, settings: &Settings, start: &Point| {
+        let Some(other) = followed(system, settings, base.free, &base.name, start) else {
+            report.differences.push(format!("{place}: {how}: the start did not converge"));
+            return;
+        };
+        count(&format!("{place}: {how}"), &other, report);
+        // What is switched to ends at the special point of its parent, which a branch from inside only knows as nearly.
+        let slack = if seeded { 0.0 } else { 10.0 * TOLERANCE };
+        let lines = differences(base, &other, slack);
+        if let Some(first) = lines.first() {
+            let more = if lines.len() > 1 { format!(", and {} more", lines.len() - 1) } else { String::new() };
+            let counts = [base.special.len(), other.special.len()];
+            report.differences.push(format!("{place}: {how}: {first}{more} ({} special points, {})", counts[0], counts[1]));
+        }
+        if seeded && codes(base) != codes(&other) {
+            report.differences.push(format!("{place}: {how}: ends {:?} instead of {:?}", codes(&other), codes(base)));
+        }
+    };
+    if let Some(start) = start.filter(|_| seeded) {
+        for first_step in FIRST_STEPS {
+            let settings = Settings { first_step, ..settings.clone() };
+            compare(&format!("first step {first_step}"), &settings, start);
+        }
+    }
+    for share in ENTRANCES {
+        let index = (share * base.points.len() as f64) as usize;
+        if let Some(start) = base.points.get(index).filter(|p| p.position != 0 && !p.is_light()) {
+            let value = start.parameters[base.free];
+            compare(&format!("from {value:?} (position {})", start.position), settings, start);
+        }
+    }
+}
+
+/// Codes of both ends, in a fixed order: a branch entered the other way round has them exchanged.
+fn codes(branch: &Branch) -> Vec<String> {
+    let mut codes: Vec<String> =
+        branch.ends.iter().map(|end| end.as_ref().map_or("none".to_string(), |end| end.to_string())).collect();
+    codes.sort();
+    codes
+}
+
+fn count(place: &str, branch: &Branch, report: &mut Report) {
+    report.runs += 1;
+    report.points += branch.points.len();
+    for end in &branch.ends {
+        report.ended(end.as_ref().map_or("none", |end| end.code()), 1);
+        let explained = end.as_ref().is_some_and(|e| e.complete() || e.code() == "period-unbounded");
+        if !explained {
+            let why = end.as_ref().map_or("it was not finished".to_string(), |end| end.to_string());
+            report.short.push(format!("{place}: {why}"));
+        }
+    }
+    for special in branch.special.iter().filter(|s| s.kind == Kind::Unexplained) {
+        let value = special.point.parameters[branch.free];
+        report.unexplained.push(format!("{place}: {value:.9}"));
+    }
+    for pair in branch.points.windows(2) {
+        let between = branch.special.iter().filter(|s| s.point.position == pair[0].position);
+        let mut now = pair[0].unstable;
+        for special in between {
+            if special.unstable_before != now {
+                report.unexplained.push(format!("{place}: before {}", special.point.parameters[branch.free]));
+            }
+            now = special.unstable_after;
+        }
+        if now != pair[1].unstable {
+            report.unexplained.push(format!("{place}: silently at {}", pair[1].parameters[branch.free]));
+        }
+    }
+}
