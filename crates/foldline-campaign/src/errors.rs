@@ -75,7 +75,8 @@ fn spectrum_difference(point: &Point, better: &Point) -> f64 {
     let mut own: Vec<_> = point.spectrum.clone();
     own.sort_by(|a, b| b.norm().total_cmp(&a.norm()));
     for z in own {
-        let Some(nearest) = (0..left.len()).min_by(|a, b| (left[*a] - z).norm().total_cmp(&(left[*b] - z).norm())) else {
+        let Some(nearest) = (0..left.len()).min_by(|a, b| (left[*a] - z).norm().total_cmp(&(left[*b] - z).norm()))
+        else {
             continue;
         };
         let other = left.remove(nearest);

@@ -8,7 +8,8 @@ const USAGE: &str = "foldline-campaign [COUNT] [--from NUMBER] [--classical STAR
   --from       number of the first rotor
   --classical  starts for each classical problem, 5 if not said
   --only       only cases whose name contains TEXT
-  --verbose    a line for each case";
+  --verbose    a line for each case
+  --trace      every point of every run";
 
 fn main() -> ExitCode {
     match answer() {
@@ -22,17 +23,18 @@ fn main() -> ExitCode {
 }
 
 fn answer() -> Result<bool, String> {
-    let (mut count, mut from, mut starts, mut only, mut verbose) = (200usize, 0usize, 5usize, String::new(), false);
+    let (mut count, mut from, mut starts, mut only) = (200usize, 0usize, 5usize, String::new());
+    let (mut verbose, mut trace) = (false, false);
     let mut rest = std::env::args().skip(1);
     while let Some(argument) = rest.next() {
-        let mut number = |what: &str| {
-            rest.next().and_then(|text| text.parse().ok()).ok_or_else(|| format!("{what} needs a number"))
-        };
+        let mut number =
+            |what: &str| rest.next().and_then(|text| text.parse().ok()).ok_or_else(|| format!("{what} needs a number"));
         match argument.as_str() {
             "--from" => from = number("--from")?,
             "--classical" => starts = number("--classical")?,
             "--only" => only = rest.next().ok_or("--only needs a text")?,
             "--verbose" => verbose = true,
+            "--trace" => trace = true,
             other => count = other.parse().map_err(|_| format!("{other}: not a number"))?,
         }
     }
@@ -43,10 +45,19 @@ fn answer() -> Result<bool, String> {
     let start = std::time::Instant::now();
     let report = campaign(&all, jobs, &|index, report| {
         if verbose {
-            eprintln!("{:6.1} s  {}: {} branches, {} points", start.elapsed().as_secs_f64(), all[index].name, report.branches, report.points);
+            eprintln!(
+                "{:6.1} s  {}: {} branches, {} points",
+                start.elapsed().as_secs_f64(),
+                all[index].name,
+                report.branches,
+                report.points
+            );
         }
         for line in report.short.iter().chain(&report.differences).chain(&report.unexplained) {
             eprintln!("{line}");
+        }
+        if trace {
+            report.traces.iter().for_each(|text| println!("{text}"));
         }
         for bad in report.honesty.iter().filter(|h| h.found > h.stated) {
             eprintln!("{}: error {:.1e}, stated {:.1e}", bad.place, bad.found, bad.stated);

@@ -30,6 +30,8 @@ pub struct Report {
     pub honesty: Vec<Honesty>,
     /// Points that could not be computed again.
     pub not_again: usize,
+    /// The special points of every run, for those who look closer.
+    pub traces: Vec<String>,
 }
 
 impl Report {
@@ -47,6 +49,7 @@ impl Report {
         self.differences.append(&mut other.differences);
         self.unexplained.append(&mut other.unexplained);
         self.honesty.append(&mut other.honesty);
+        self.traces.append(&mut other.traces);
     }
 
     /// Counts sides that ended like that.

@@ -7,8 +7,8 @@ use crate::same::differences;
 use crate::{DEGREE, TOLERANCE};
 use foldline::continuation::Settings;
 use foldline::contract::Unobserved;
-use foldline::diagram::{Branch, Diagram, Family, Kind, Origin, Point, Solution};
-use foldline::explore::growth::{Beginning, Growth, polished, problem_of, settings};
+use foldline::diagram::{Branch, Diagram, Family, Kind, Origin, Point, Solution, SpecialPoint};
+use foldline::explore::growth::{Beginning, Growth, is_doubled, polished, problem_of, settings};
 use foldline::explore::{self, System};
 
 /// First steps, the middle one being the usual one.
@@ -35,7 +35,11 @@ pub fn examine(case: &Case) -> Report {
             let diagram = explore::run(&system, &case.study.plan, 1, Diagram::default(), &Unobserved);
             for branch in &diagram.branches {
                 let settings = settings(&system, TOLERANCE, plan.range, MOST_POINTS);
-                routes(&system, &settings, &case.name, branch, &mut report);
+                let parents = match &branch.origin {
+                    Origin::Switch { parent, .. } => diagram.branch(parent).map_or(&[][..], |parent| &parent.special),
+                    _ => &[],
+                };
+                routes(&system, &settings, &case.name, branch, parents, &mut report);
             }
         }
         First::Sampled { parameters, to, random } => {
@@ -54,7 +58,7 @@ pub fn examine(case: &Case) -> Report {
                     report.differences.push(format!("{}: {name}: the start did not converge", case.name));
                     continue;
                 };
-                routes(&system, &settings, &case.name, &branch, &mut report);
+                routes(&system, &settings, &case.name, &branch, &[], &mut report);
             }
         }
     }
@@ -70,37 +74,41 @@ fn brought(system: &System, point: &Point, (index, value): (usize, f64)) -> Opti
     let range = [now.min(value), now.max(value)];
     let settings = settings(system, TOLERANCE, range, MOST_POINTS);
     let sides = if value > now { [false, true] } else { [true, false] };
-    let branch = grown(system, &settings, index, "way", point, sides)?;
+    let way = Branch::new("way", family(point), index, Origin::Seed("way".into()));
+    let branch = grown(system, &settings, way, &[], point, sides)?;
     let ends = [branch.points.first()?, branch.points.last()?];
     ends.into_iter().find(|end| (end.parameters[index] - value).abs() <= 1e-9 * (1.0 + value.abs())).cloned()
 }
 
 fn followed(system: &System, settings: &Settings, free: usize, name: &str, start: &Point) -> Option<Branch> {
-    grown(system, settings, free, name, start, [true, true])
+    let branch = Branch::new(name, family(start), free, Origin::Seed(name.into()));
+    grown(system, settings, branch, &[], start, [true, true])
+}
+
+fn family(point: &Point) -> Family {
+    match point.solution {
+        Solution::Equilibrium(_) => Family::Equilibrium,
+        Solution::Cycle(_) => Family::Cycle,
+    }
 }
 
 fn grown(
     system: &System,
     settings: &Settings,
-    free: usize,
-    name: &str,
+    mut branch: Branch,
+    parents: &[SpecialPoint],
     start: &Point,
     sides: [bool; 2],
 ) -> Option<Branch> {
-    let mut problem = problem_of(system, free, DEGREE, start, false);
+    let mut problem = problem_of(system, branch.free, DEGREE, start, is_doubled(&branch));
     let station = polished(&mut *problem, settings, start).ok()?;
-    let family = match start.solution {
-        Solution::Equilibrium(_) => Family::Equilibrium,
-        Solution::Cycle(_) => Family::Cycle,
-    };
-    let mut branch = Branch::new(name, family, free, Origin::Seed(name.into()));
     let growth = Growth {
         system,
         settings,
         degree: DEGREE,
         ties: Vec::new(),
         sides,
-        parents: &[],
+        parents,
         observer: &Unobserved,
         whole: true,
         sparse: false,
@@ -110,19 +118,29 @@ fn grown(
 }
 
 /// Follows a branch again in every way and compares.
-fn routes(system: &System, settings: &Settings, case: &str, base: &Branch, report: &mut Report) {
+fn routes(
+    system: &System,
+    settings: &Settings,
+    case: &str,
+    base: &Branch,
+    parents: &[SpecialPoint],
+    report: &mut Report,
+) {
     let place = format!("{case}: {}", base.name);
     report.branches += 1;
     report.special += base.special.len();
     count(&place, base, report);
     let (points, failed) = errors::sampled(system, settings, base, AGAIN);
     report.not_again += failed;
-    report.honesty.extend(points.into_iter().map(|h| errors::Honesty { place: format!("{place} at {}", h.place), ..h }));
+    report
+        .honesty
+        .extend(points.into_iter().map(|h| errors::Honesty { place: format!("{place} at {}", h.place), ..h }));
     // A branch that was switched to begins where another ends, and cannot be entered in other ways but from inside.
     let seeded = matches!(base.origin, Origin::Seed(_));
     let start = base.points.iter().find(|p| p.position == 0);
     let mut compare = |how: &str, settings: &Settings, start: &Point| {
-        let Some(other) = followed(system, settings, base.free, &base.name, start) else {
+        let again = Branch::new(&base.name, base.family, base.free, base.origin.clone());
+        let Some(other) = grown(system, settings, again, parents, start, [true, true]) else {
             report.differences.push(format!("{place}: {how}: the start did not converge"));
             return;
         };
@@ -133,7 +151,9 @@ fn routes(system: &System, settings: &Settings, case: &str, base: &Branch, repor
         if let Some(first) = lines.first() {
             let more = if lines.len() > 1 { format!(", and {} more", lines.len() - 1) } else { String::new() };
             let counts = [base.special.len(), other.special.len()];
-            report.differences.push(format!("{place}: {how}: {first}{more} ({} special points, {})", counts[0], counts[1]));
+            report
+                .differences
+                .push(format!("{place}: {how}: {first}{more} ({} special points, {})", counts[0], counts[1]));
         }
         if seeded && codes(base) != codes(&other) {
             report.differences.push(format!("{place}: {how}: ends {:?} instead of {:?}", codes(&other), codes(base)));
@@ -162,7 +182,54 @@ fn codes(branch: &Branch) -> Vec<String> {
     codes
 }
 
+/// Everything about one run, a line for each point and special point.
+fn trace(place: &str, branch: &Branch) -> String {
+    use std::fmt::Write;
+    let mut text = format!("== {place}: {:?}\n", branch.ends);
+    let mut line = |head: &str, p: &Point| {
+        let spectrum: Vec<String> = p
+            .free_spectrum()
+            .iter()
+            .map(|z| {
+                if p.solution.period().is_some() {
+                    format!("{:.6}<{:.4}", z.norm(), z.arg())
+                } else {
+                    format!("{:.3e}{:+.3e}i", z.re, z.im)
+                }
+            })
+            .collect();
+        let _ = writeln!(
+            text,
+            "{head} {:4} {:.9} slope {:+.2e} step {:.1e} unstable {} T {:.6} |{}| disc {:.1e} triv {:.1e} liou {:.1e} r {:.7} rej {} N {}",
+            p.position,
+            p.parameters[branch.free],
+            p.parameter_slope(),
+            p.step,
+            p.unstable,
+            p.solution.period().unwrap_or(0.0),
+            spectrum.join(" "),
+            p.trust.discretisation,
+            p.trust.trivial_defect,
+            p.trust.liouville_defect,
+            p.ranges.last().map_or(0.0, |r| r[1]),
+            p.cost.rejected,
+            match &p.solution {
+                Solution::Cycle(c) => c.intervals(),
+                _ => 0,
+            }
+        );
+    };
+    for p in &branch.points {
+        line("   ", p);
+        for s in branch.special.iter().filter(|s| s.point.position == p.position) {
+            line(&format!(">> {} {}->{} ({:.1e})", s.kind, s.unstable_before, s.unstable_after, s.error), &s.point);
+        }
+    }
+    text
+}
+
 fn count(place: &str, branch: &Branch, report: &mut Report) {
+    report.traces.push(trace(place, branch));
     report.runs += 1;
     report.points += branch.points.len();
     for end in &branch.ends {

@@ -20,9 +20,8 @@ pub fn differences(base: &Branch, other: &Branch, slack: f64) -> Vec<String> {
             (value(special) - value(candidate)).abs() / (1.0 + value(special).abs()) + period
         };
         let alike = |candidate: &&SpecialPoint| candidate.kind == special.kind;
-        let nearest = (0..left.len())
-            .filter(|i| alike(&left[*i]))
-            .min_by(|a, b| apart(left[*a]).total_cmp(&apart(left[*b])));
+        let nearest =
+            (0..left.len()).filter(|i| alike(&left[*i])).min_by(|a, b| apart(left[*a]).total_cmp(&apart(left[*b])));
         let at = value(special);
         match nearest.map(|i| (i, left[i])) {
             None => lines.push(format!("{} {at:.9} is missing", special.kind)),

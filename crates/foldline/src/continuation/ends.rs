@@ -5,12 +5,15 @@ use super::follow::{Follow, Step};
 use super::inspect::Found;
 use super::locate::{Stretch, passing};
 use crate::diagram::{Cost, Ending, Point};
+use crate::linalg::dot;
 
 /// Share of the deviation from simpler solutions below which a step is not accepted: it may have landed on them, and it
 /// could not be told on which side of the meeting it is.
 const LITTLE: f64 = 0.25;
 /// Share below which a point close to the meeting counts as beyond it.
 const NOTHING: f64 = 0.05;
+/// Difference, in tolerances, up to which a point is the start again.
+const HOME: f64 = 30.0;
 
 impl Follow<'_> {
     /// The bound of a further parameter that this step passes, and the point there.
@@ -141,24 +144,85 @@ impl Follow<'_> {
         cost: &mut Cost,
     ) -> Result<Option<Station>, Failure> {
         let Some(home) = self.home else { return Ok(None) };
-        let value = home.parameters[self.free];
-        let between = (left.parameter() - value) * (right.parameter() - value) <= 0.0;
-        let same_way = home.parameter_slope() * self.direction * (right.slope() + left.slope()) > 0.0;
-        if emitted < 3 || !between || !same_way {
+        if emitted < 3 {
             return Ok(None);
         }
+        let value = home.parameters[self.free];
         let near = |point: &Point, tolerance: f64| {
             self.settings.reflections.iter().any(|r| point.difference(home, &self.settings.scales, r) < tolerance)
         };
-        if !near(&right.point, 0.5) {
-            return Ok(None);
+        let between = (left.parameter() - value) * (right.parameter() - value) <= 0.0;
+        let same_way = home.parameter_slope() * self.direction * (right.slope() + left.slope()) > 0.0;
+        if between && same_way && near(&right.point, 0.5) {
+            let back = self.at_parameter(left, right, value, cost)?;
+            if near(&back.point, HOME * self.settings.tolerance) {
+                return Ok(Some(back));
+            }
         }
-        let back = self.at_parameter(left, right, value, cost)?;
-        let near = self
-            .settings
-            .reflections
-            .iter()
-            .any(|r| back.point.difference(home, &self.settings.scales, r) < 30.0 * self.settings.tolerance);
-        Ok(near.then_some(back))
+        Ok(self.crosses(left, right, home, cost))
+    }
+
+    /// The start again, where the parameter does not show that this step passes it: next to a fold two solutions share
+    /// a value of the parameter, and a step round the fold need not pass that value at all. What distinguishes solutions without
+    /// regard to their phase, parameter, period and extreme values, says on which side of the start a point is.
+    fn crosses(&mut self, left: &Station, right: &Station, home: &Point, cost: &mut Cost) -> Option<Station> {
+        let next = self.next_to_home.clone()?;
+        for reflection in self.settings.reflections.clone() {
+            let features = |point: &Point, seen: &[bool]| self.features(point, home, seen);
+            let own = features(home, &[]);
+            let along: Vec<f64> = features(&next, &[]).iter().zip(&own).map(|(b, a)| b - a).collect();
+            let length = dot(&along, &along).sqrt();
+            let side = |f: &[f64]| f.iter().zip(&own).zip(&along).map(|((f, a), d)| (f - a) * d).sum::<f64>() / length;
+            let [from, to] = [left, right].map(|station| features(&station.point, &reflection));
+            let (mut low, mut high) = ((0.0, side(&from)), (0.0, side(&to)));
+            if !(low.1 <= 0.0 && high.1 > 0.0) {
+                continue;
+            }
+            // Most passages are elsewhere in the plane across the start, which costs nothing to see.
+            let share = low.1 / (low.1 - high.1);
+            let distance = |f: &[f64], g: &[f64]| f.iter().zip(g).fold(0.0f64, |most, (a, b)| most.max((a - b).abs()));
+            let between: Vec<f64> = from.iter().zip(&to).map(|(a, b)| a + share * (b - a)).collect();
+            if distance(&between, &own) > distance(&from, &to) {
+                continue;
+            }
+            let stretch = Stretch::new(self.problem, left, right, self.direction);
+            high.0 = stretch.length;
+            for count in 0..12 {
+                let share = if count % 3 == 2 { 0.5 } else { (low.1 / (low.1 - high.1)).clamp(0.05, 0.95) };
+                let s = low.0 + share * (high.0 - low.0);
+                let found = self.cut(left, &stretch, s, cost)?;
+                let f = self.features(&found.point, home, &reflection);
+                let off = side(&f);
+                if distance(&f, &own) < HOME * self.settings.tolerance {
+                    return Some(found);
+                }
+                if off <= 0.0 {
+                    low = (s, off)
+                } else {
+                    high = (s, off)
+                }
+                if off.abs() < self.settings.tolerance {
+                    break;
+                }
+            }
+        }
+        None
+    }
+
+    /// Parameter, period and extreme values of a point, each relative to its size at `home`; `seen` is the reflection in which
+    /// it is looked at.
+    fn features(&self, point: &Point, home: &Point, seen: &[bool]) -> Vec<f64> {
+        let value = |p: &Point| p.parameters.get(self.free).copied().unwrap_or(0.0);
+        let mut all = vec![value(point) / (1.0 + value(home).abs())];
+        if let Some(period) = point.solution.period() {
+            all.push(period.ln());
+        }
+        for (i, (range, at_home)) in point.ranges.iter().zip(&home.ranges).enumerate() {
+            let range = if seen.get(i).copied().unwrap_or(false) { [-range[1], -range[0]] } else { *range };
+            let size = at_home[0].abs().max(at_home[1].abs());
+            let scale = self.settings.scales.get(i).copied().unwrap_or(f64::MIN_POSITIVE) + size;
+            all.extend(range.map(|v| v / scale));
+        }
+        all
     }
 }

@@ -34,6 +34,8 @@ pub struct Follow<'w> {
     pub free: usize,
     /// The point whose return ends the run as closed; `None` where the branch cannot close.
     pub home: Option<&'w Point>,
+    /// The point after `home` in the direction of travel; a run that begins at `home` finds it itself.
+    pub next_to_home: Option<Point>,
 }
 
 /// An accepted step, perhaps the last one.
@@ -81,7 +83,7 @@ pub fn follow(
     let mut position = left.point.position;
     let mut trail = previous.map(|p| walk.trail(&p, &left));
     let first_period = walk.home.unwrap_or(&left.point).solution.period();
-    let (mut ever_moved, mut moved) = (false, true);
+    let (mut ever_moved, mut moved, mut grows) = (false, true, false);
     loop {
         let outward = |bound: f64| (left.parameter() - bound).abs() <= 1e-12 * (1.0 + bound.abs());
         let [low, high] = walk.settings.range;
@@ -120,7 +122,11 @@ pub fn follow(
                         _ => 0.5,
                     };
                     if step < walk.settings.min_step {
-                        return ended_by(why, left.parameter());
+                        // Where the period grows and nothing else changes, the end is foreseeable.
+                        return match left.point.solution.period() {
+                            Some(period) if grows && !moved => Ending::PeriodUnbounded(period),
+                            _ => ended_by(why, left.parameter()),
+                        };
                     }
                 }
             }
@@ -145,6 +151,9 @@ pub fn follow(
                     position += walk.direction as i64;
                     emitted += 1;
                     let point = Point { position, step: rest, ..station.point };
+                    if position.abs() == 1 {
+                        walk.next_to_home.get_or_insert_with(|| point.clone());
+                    }
                     sink(Item::Point(point))
                 }
             };
@@ -154,6 +163,9 @@ pub fn follow(
         }
         position += walk.direction as i64;
         emitted += 1;
+        if position.abs() == 1 {
+            walk.next_to_home.get_or_insert_with(|| right.point.clone());
+        }
         let mut point = right.point.clone();
         (point.position, point.step, point.cost) = (position, step, cost);
         if sink(Item::Point(point)) == Verdict::Stop {
@@ -167,6 +179,7 @@ pub fn follow(
         {
             let moves = walk.moves(&left, &right, [before, now]);
             let settled = ever_moved && !moved && !moves;
+            grows = now > before;
             (ever_moved, moved) = (ever_moved || moves, moves);
             if now > before && (now > walk.settings.period_growth * first || (settled && now > LONG * first)) {
                 return Ending::PeriodUnbounded(now);
@@ -216,7 +229,7 @@ impl Follow<'_> {
         let u = self.problem.transfer(&now.u, &now.mesh, &before.mesh);
         let gap: Vec<f64> = u.iter().zip(&before.u).map(|(a, b)| a - b).collect();
         let distance = self.problem.dot(&before.tangent, &gap).abs().max(f64::MIN_POSITIVE);
-        let history = History { distance, values: self.monitored(before) };
+        let history = History { distance, values: self.monitored(before), spectrum: before.point.spectrum.clone() };
         let (angle, _) = self.angle(before, now);
         let length = self.problem.dot(&gap, &gap).sqrt().max(distance) * (1.0 + angle * angle / 24.0);
         let (u, tangent) = (before.u.clone(), before.tangent.clone());
@@ -293,6 +306,9 @@ impl Follow<'_> {
             return Err(Failure::Remeshed(right.mesh));
         }
         self.continues(left, &right, &guess)?;
+        if trail.is_none() || left.mesh.is_empty() {
+            self.is_smooth(left, &right, cost)?;
+        }
         self.leads_back(left, &right, cost)?;
         if let Some(ended) = self.collapsed(left, &right, cost)? {
             return Ok(ended);

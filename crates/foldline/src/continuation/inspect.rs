@@ -10,6 +10,8 @@ use super::follow::Follow;
 use super::locate::{Located, Stretch, locate};
 use super::straddle::straddle;
 use crate::diagram::{Cost, Kind, Point, SpecialPoint};
+use num_complex::Complex64;
+use std::f64::consts::PI;
 
 /// What was found on the way, in the order of travel.
 pub enum Found {
@@ -35,6 +37,8 @@ pub struct History {
     pub distance: f64,
     /// Values there, one per monitor.
     pub values: Vec<f64>,
+    /// Eigenvalues or multipliers there.
+    pub spectrum: Vec<Complex64>,
 }
 
 impl Follow<'_> {
@@ -108,8 +112,18 @@ impl Follow<'_> {
         // A change of sign that could not be located is not passed over either, not even next to one that could.
         let closer = jumps.is_empty() || depth < CLOSE;
         let explained = accounted && !(lost && closer && self.settings.stability);
-        let touches = || history.is_some_and(|h| self.may_touch(h, &at_left, &at_right, stretch.length));
-        let suspicious = depth < 3 && (touches() || (!standing && stretch.may_turn_twice()));
+        let touches = || {
+            history.is_some_and(|h| {
+                self.may_touch(h, &at_left, &at_right, stretch.length) || may_double(h, left, right, stretch.length)
+            })
+        };
+        let mut suspicious = depth < 3 && (touches() || (!standing && stretch.may_turn_twice()));
+        // Nothing is known of how monitors change on a first step; at equilibria it costs next to nothing to look.
+        if depth == 0 && !suspicious && jumps.is_empty() && (history.is_none() || left.mesh.is_empty()) {
+            let middle = stretch.at(self.problem, self.settings, 0.5 * stretch.length, cost);
+            let differs = |(a, b): (&f64, &f64)| (*a > 0.0) != (*b > 0.0);
+            suspicious = middle.is_ok_and(|found| self.monitored(&found).iter().zip(&at_left).any(differs));
+        }
         if depth < DEEPEST
             && (jumps.len() > 1 || !explained || (suspicious && jumps.is_empty()))
             && stretch.length.abs() > self.settings.min_step
@@ -124,7 +138,8 @@ impl Follow<'_> {
             if apart && let Some(middle) = self.cut(left, &stretch, cut, cost) {
                 let rest = stretch.length - cut;
                 let before = self.inspect(left, &middle, history, depth + 1, cost);
-                let next = History { distance: cut, values: at_left.clone() };
+                let spectrum = left.point.spectrum.clone();
+                let next = History { distance: cut, values: at_left.clone(), spectrum };
                 let after = self.inspect(&middle, right, Some(&next), depth + 1, cost);
                 let inserted = Found::Inserted(Box::new(middle), rest);
                 return before.into_iter().chain([inserted]).chain(after).collect();
@@ -200,6 +215,24 @@ impl Follow<'_> {
             let value = b + at * (slope + bend * at);
             bend * b > 0.0 && at > 0.0 && at < length && value / b < 0.1
         })
+    }
+}
+
+/// Whether a pair of multipliers may have met on the negative real axis, passed -1 there and come back: the pair is about as far
+/// from the axis before as after, and has moved fast enough to have been there.
+fn may_double(history: &History, left: &Station, right: &Station, length: f64) -> bool {
+    const FAST: f64 = 1.5;
+    if left.mesh.is_empty() {
+        return false;
+    }
+    let from_axis = |spectrum: &[Complex64]| {
+        let pairs = spectrum.iter().filter(|z| z.im > 0.0 && z.norm().ln().abs() < 1.0);
+        pairs.map(|z| PI - z.arg()).min_by(f64::total_cmp)
+    };
+    let [before, now, then] = [&history.spectrum, &left.point.spectrum, &right.point.spectrum].map(|s| from_axis(s));
+    match (before, now, then) {
+        (Some(before), Some(now), Some(then)) => now + then < FAST * (now - before).abs() / history.distance * length,
+        _ => false,
     }
 }
 

@@ -6,6 +6,7 @@
 
 use super::corrector::{Failure, Plane, Station, correct, correct_within};
 use super::follow::Follow;
+use super::locate::Stretch;
 use crate::diagram::Cost;
 
 /// Margin from a singular matrix below which a step must also lead back to where it came from.
@@ -16,6 +17,8 @@ const BACK: f64 = 100.0;
 const MISS: f64 = 0.3;
 /// … and by the first Newton update, which is not the last word.
 const FAR: f64 = 0.6;
+/// How far off the cubic between both ends of a step the curve may be midway, as a share of the step.
+const OFF: f64 = 0.01;
 /// Angles of the chord with both tangents: their sum may exceed the angle between the tangents by this factor …
 const CHORD_FACTOR: f64 = 1.5;
 /// … and this much. On an arc the two are equal; on a jump to another branch the chord points elsewhere.
@@ -61,6 +64,22 @@ impl Follow<'_> {
         let (miss, bent) = (size(&miss), against(&left.tangent) + against(&tangent));
         if angle > self.settings.max_angle || miss > MISS * length || bent > CHORD_FACTOR * angle + CHORD_SLACK {
             return Err(Failure::Elsewhere { angle, miss: miss / length });
+        }
+        Ok(())
+    }
+
+    /// Whether the curve keeps to the cubic between both ends of a step. A wiggle shorter than the step shows at neither end;
+    /// looking midway is cheap for equilibria, and where there is no step before that says how the curve bends.
+    pub(super) fn is_smooth(&mut self, left: &Station, right: &Station, cost: &mut Cost) -> Result<(), Failure> {
+        let stretch = Stretch::new(self.problem, left, right, self.direction);
+        let middle = 0.5 * stretch.length;
+        let guess = stretch.predicted(self.problem, middle);
+        let u = stretch.corrected(self.problem, self.settings, middle, cost)?;
+        let miss: Vec<f64> = u.iter().zip(&guess).map(|(a, b)| a - b).collect();
+        let miss = self.problem.dot(&miss, &miss).sqrt() / stretch.length.abs();
+        // Meshes agree to the tolerance only.
+        if miss > OFF + self.settings.tolerance / stretch.length.abs() {
+            return Err(Failure::Elsewhere { angle: 0.0, miss });
         }
         Ok(())
     }

@@ -101,7 +101,7 @@ impl<'s> Stretch<'s> {
     }
 
     /// The cubic between the stations, in the hyperplane at distance s.
-    fn predicted(&self, problem: &dyn ZeroProblem, s: f64) -> Vec<f64> {
+    pub(super) fn predicted(&self, problem: &dyn ZeroProblem, s: f64) -> Vec<f64> {
         let mut u = self.hermite(s);
         let gap: Vec<f64> = u.iter().zip(&self.left.u).map(|(a, b)| a - b).collect();
         let off = s - problem.dot(&self.left.tangent, &gap);

@@ -318,6 +318,11 @@ impl Growth<'_> {
             Some(_) => (special::monitors_where_held(), Vec::new()),
         };
         let home = branch.points.iter().find(|p| p.position == 0).filter(|_| branch.ends[0].is_none()).cloned();
+        let next_to_home = home.as_ref().and_then(|_| {
+            let position = direction as i64;
+            let own = branch.points.iter().find(|p| p.position == position).cloned();
+            own.or_else(|| self.observer.recall(branch, position))
+        });
         let mut walk = Follow {
             problem: &mut *problem,
             settings: self.settings,
@@ -326,6 +331,7 @@ impl Growth<'_> {
             direction,
             free: branch.free,
             home: home.as_ref(),
+            next_to_home,
         };
         follow(&mut walk, start, previous, emitted, &mut |item| {
             let going = match item {
