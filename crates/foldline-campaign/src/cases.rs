@@ -30,6 +30,8 @@ pub struct Case {
     pub study: Study,
     /// Where first solutions come from.
     pub first: First,
+    /// The one tolerance.
+    pub tolerance: f64,
 }
 
 impl Case {
@@ -136,7 +138,12 @@ pub fn classical(starts: usize) -> Vec<Case> {
             let value = Random::new((1000 * i + k) as u64).uniform(problem.between[0], problem.between[1]);
             let seed = problem.seed.replace("{}", &format!("{value:?}"));
             let study = study(problem.model, &seed, problem.branch);
-            Case { name: format!("{} from {value:.4}", problem.name), study, first: First::Planned }
+            Case {
+                name: format!("{} from {value:.4}", problem.name),
+                study,
+                first: First::Planned,
+                tolerance: TOLERANCE,
+            }
         })
     };
     (0..starts).flat_map(each).collect()

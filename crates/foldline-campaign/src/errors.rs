@@ -57,10 +57,24 @@ fn compared(system: &System, branch: &Branch, point: &Point, better: &Point) -> 
     let size = |i: usize| y.iter().skip(i).step_by(n).fold(system.scales[i], |most: f64, v| most.max(v.abs()));
     let sizes: Vec<f64> = (0..n).map(|i| size(i) + system.scales[i]).collect();
     let profile = x.iter().zip(&y).enumerate().fold(0.0f64, |most, (k, (a, b))| most.max((a - b).abs() / sizes[k % n]));
-    let found = profile.max(point.difference(better, &system.scales, &[]));
+    let period = (a.period / b.period).ln().abs();
+    // The stated error is one of states and period; outputs follow from them.
+    let ranges = point
+        .ranges
+        .iter()
+        .zip(&better.ranges)
+        .take(n)
+        .zip(&sizes)
+        .fold(0.0f64, |most, ((a, b), size)| most.max((a[0] - b[0]).abs() / size).max((a[1] - b[1]).abs() / size));
+    let found = profile.max(period).max(ranges);
     let value = point.parameters.get(branch.free).copied().unwrap_or(f64::NAN);
     Some(Honesty {
-        place: format!("{value:.6} (position {})", point.position),
+        place: format!(
+            "{value:.6} (position {}, profile {profile:.1e}, period {period:.1e}, {} intervals, then {})",
+            point.position,
+            a.intervals(),
+            b.intervals()
+        ),
         stated: point.trust.discretisation + point.trust.residual,
         found,
         multipliers: spectrum_difference(point, better),

@@ -8,6 +8,7 @@ const USAGE: &str = "foldline-campaign [COUNT] [--from NUMBER] [--classical STAR
   --from       number of the first rotor
   --classical  starts for each classical problem, 5 if not said
   --only       only cases whose name contains TEXT
+  --tolerance  instead of 1e-6
   --verbose    a line for each case
   --trace      every point of every run";
 
@@ -24,7 +25,7 @@ fn main() -> ExitCode {
 
 fn answer() -> Result<bool, String> {
     let (mut count, mut from, mut starts, mut only) = (200usize, 0usize, 5usize, String::new());
-    let (mut verbose, mut trace) = (false, false);
+    let (mut verbose, mut trace, mut tolerance) = (false, false, None);
     let mut rest = std::env::args().skip(1);
     while let Some(argument) = rest.next() {
         let mut number =
@@ -33,6 +34,7 @@ fn answer() -> Result<bool, String> {
             "--from" => from = number("--from")?,
             "--classical" => starts = number("--classical")?,
             "--only" => only = rest.next().ok_or("--only needs a text")?,
+            "--tolerance" => tolerance = rest.next().and_then(|t| t.parse().ok()),
             "--verbose" => verbose = true,
             "--trace" => trace = true,
             other => count = other.parse().map_err(|_| format!("{other}: not a number"))?,
@@ -40,6 +42,9 @@ fn answer() -> Result<bool, String> {
     }
     let mut all = rotor::rotors(from..from + count);
     all.extend(cases::classical(starts));
+    all.iter_mut()
+        .zip(std::iter::repeat(tolerance))
+        .for_each(|(case, own)| case.tolerance = own.unwrap_or(case.tolerance));
     all.retain(|case| case.name.contains(&only));
     let jobs = std::thread::available_parallelism().map_or(1, |n| n.get());
     let start = std::time::Instant::now();

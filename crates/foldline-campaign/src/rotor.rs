@@ -1,5 +1,6 @@
 //! Rotors: random parameters of the overhung rotor.
 
+use crate::TOLERANCE;
 use crate::cases::{Case, First, study};
 use crate::random::Random;
 
@@ -37,5 +38,5 @@ fn rotor(number: usize) -> Case {
         "rotor {number} (zeta {zeta:.3e}, epsilon {epsilon:.3}, beta {beta:.1}, gamma {gamma:.2}, J_p {polar:.3}, kappa {kappa}, \
          Omega {omega:.3})"
     );
-    Case { name, study, first }
+    Case { name, study, first, tolerance: TOLERANCE }
 }

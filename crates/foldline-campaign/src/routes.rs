@@ -1,13 +1,14 @@
 //! How a branch is followed, and from where.
 
+use crate::DEGREE;
 use crate::cases::{Case, First};
 use crate::errors;
 use crate::report::Report;
 use crate::same::differences;
-use crate::{DEGREE, TOLERANCE};
 use foldline::continuation::Settings;
+use foldline::continuation::corrector::{Plane, settle};
 use foldline::contract::Unobserved;
-use foldline::diagram::{Branch, Diagram, Family, Kind, Origin, Point, Solution, SpecialPoint};
+use foldline::diagram::{Branch, Cost, Diagram, Ending, Family, Kind, Origin, Point, Solution, SpecialPoint};
 use foldline::explore::growth::{Beginning, Growth, is_doubled, polished, problem_of, settings};
 use foldline::explore::{self, System};
 
@@ -34,7 +35,7 @@ pub fn examine(case: &Case) -> Report {
         First::Planned => {
             let diagram = explore::run(&system, &case.study.plan, 1, Diagram::default(), &Unobserved);
             for branch in &diagram.branches {
-                let settings = settings(&system, TOLERANCE, plan.range, MOST_POINTS);
+                let settings = settings(&system, case.tolerance, plan.range, MOST_POINTS);
                 let parents = match &branch.origin {
                     Origin::Switch { parent, .. } => diagram.branch(parent).map_or(&[][..], |parent| &parent.special),
                     _ => &[],
@@ -43,15 +44,15 @@ pub fn examine(case: &Case) -> Report {
             }
         }
         First::Sampled { parameters, to, random } => {
-            let census = explore::attractors(&system, parameters, SAMPLES, *random, 1, TOLERANCE);
+            let census = explore::attractors(&system, parameters, SAMPLES, *random, 1, case.tolerance);
             let equilibria = census.attractors.iter().filter(|a| a.point.solution.period().is_none()).take(1);
             let cycles = census.attractors.iter().filter(|a| a.point.solution.period().is_some()).take(CYCLES);
             for (number, attractor) in equilibria.chain(cycles).enumerate() {
-                let Some(start) = brought(&system, &attractor.point, *to) else {
+                let Some(start) = brought(&system, case.tolerance, &attractor.point, *to) else {
                     report.not_brought += 1;
                     continue;
                 };
-                let settings = settings(&system, TOLERANCE, range, MOST_POINTS);
+                let settings = settings(&system, case.tolerance, range, MOST_POINTS);
                 let kind = attractor.ratio.map_or(String::new(), |(a, b)| format!(" {a}:{b}"));
                 let name = format!("{number}{kind}");
                 let Some(branch) = followed(&system, &settings, free, &name, &start) else {
@@ -66,13 +67,13 @@ pub fn examine(case: &Case) -> Report {
 }
 
 /// A solution at another value of a parameter, along a branch in it.
-fn brought(system: &System, point: &Point, (index, value): (usize, f64)) -> Option<Point> {
+fn brought(system: &System, tolerance: f64, point: &Point, (index, value): (usize, f64)) -> Option<Point> {
     let now = point.parameters[index];
     if (now - value).abs() <= 1e-12 * now.abs() {
         return Some(point.clone());
     }
     let range = [now.min(value), now.max(value)];
-    let settings = settings(system, TOLERANCE, range, MOST_POINTS);
+    let settings = settings(system, tolerance, range, MOST_POINTS);
     let sides = if value > now { [false, true] } else { [true, false] };
     let way = Branch::new("way", family(point), index, Origin::Seed("way".into()));
     let branch = grown(system, &settings, way, &[], point, sides)?;
@@ -101,7 +102,15 @@ fn grown(
     sides: [bool; 2],
 ) -> Option<Branch> {
     let mut problem = problem_of(system, branch.free, DEGREE, start, is_doubled(&branch));
-    let station = polished(&mut *problem, settings, start).ok()?;
+    let mut station = polished(&mut *problem, settings, start);
+    if station.is_err() && !start.tangent.is_empty() {
+        // Next to a fold, or where only the period still changes, the parameter is a bad thing to hold.
+        let u = problem.unknowns_of(start);
+        problem.anchor(&u);
+        let plane = Plane { row: start.tangent.clone(), base: u.clone(), distance: 0.0 };
+        station = settle(&mut *problem, settings, plane, u, 1.0, &mut Cost::default());
+    }
+    let station = station.ok()?;
     let growth = Growth {
         system,
         settings,
@@ -146,7 +155,7 @@ fn routes(
         };
         count(&format!("{place}: {how}"), &other, report);
         // What is switched to ends at the special point of its parent, which a branch from inside only knows as nearly.
-        let slack = if seeded { 0.0 } else { 10.0 * TOLERANCE };
+        let slack = if seeded { 0.0 } else { 10.0 * settings.tolerance };
         let lines = differences(base, &other, slack);
         if let Some(first) = lines.first() {
             let more = if lines.len() > 1 { format!(", and {} more", lines.len() - 1) } else { String::new() };
@@ -176,8 +185,7 @@ fn routes(
 
 /// Codes of both ends, in a fixed order: a branch entered the other way round has them exchanged.
 fn codes(branch: &Branch) -> Vec<String> {
-    let mut codes: Vec<String> =
-        branch.ends.iter().map(|end| end.as_ref().map_or("none".to_string(), |end| end.to_string())).collect();
+    let mut codes: Vec<String> = branch.ends.iter().map(|end| end.as_ref().map_or("none".to_string(), told)).collect();
     codes.sort();
     codes
 }
@@ -226,6 +234,14 @@ fn trace(place: &str, branch: &Branch) -> String {
         }
     }
     text
+}
+
+/// Where branches meet is extrapolated, and good to a few digits.
+fn told(end: &Ending) -> String {
+    match end {
+        Ending::Joined { at, parameter } => format!("joined at {at} {parameter:.3}"),
+        other => other.to_string(),
+    }
 }
 
 fn count(place: &str, branch: &Branch, report: &mut Report) {

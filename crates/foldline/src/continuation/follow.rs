@@ -61,6 +61,8 @@ const FARTHEST: f64 = 2.5;
 
 /// Steps shorter than this many tolerances begin and end on the same mesh: two meshes agree to the tolerance only.
 const SHORT: f64 = 200.0;
+/// Share of the tolerance below which a mesh is not refined on account of short steps.
+const SHARPEST: f64 = 1e-3;
 /// Step down to which a change of stability without explanation is taken for a jump to another branch.
 const SURE: f64 = 1e-4;
 /// Step down to which a branch point without a symmetry that makes it is taken for two branches that pass each other.
@@ -93,8 +95,9 @@ pub fn follow(
         if emitted >= walk.settings.max_points {
             return Ending::PointLimit(emitted);
         }
-        walk.refresh(&mut left, step);
         let (mut cost, mut remeshed) = (Cost::default(), 0);
+        walk.sharpen(&mut left, step, &mut cost);
+        walk.refresh(&mut left, step);
         let history = trail.as_ref().map(|t| t.history.clone());
         let (Step { mut right, end }, found) = loop {
             let attempt = walk.attempt(&left, trail.as_ref(), step, emitted, &mut cost).and_then(|tried| {
@@ -121,6 +124,8 @@ pub fn follow(
                         Failure::Elsewhere { angle, .. } => (walk.settings.target_angle / angle).clamp(0.2, 0.5),
                         _ => 0.5,
                     };
+                    walk.sharpen(&mut left, step, &mut cost);
+                    walk.refresh(&mut left, step);
                     if step < walk.settings.min_step {
                         // Where the period grows and nothing else changes, the end is foreseeable.
                         return match left.point.solution.period() {
@@ -234,6 +239,23 @@ impl Follow<'_> {
         let length = self.problem.dot(&gap, &gap).sqrt().max(distance) * (1.0 + angle * angle / 24.0);
         let (u, tangent) = (before.u.clone(), before.tangent.clone());
         Trail { u, tangent, mesh: before.mesh.clone(), length, curvature: angle / length, history }
+    }
+
+    /// Where steps are short, the curve is so curved that errors of a tolerance would show: the mesh is made for errors that are
+    /// as small a share of the step as they are of a step of usual length.
+    fn sharpen(&mut self, left: &mut Station, step: f64, cost: &mut Cost) {
+        let share = (step / (SHORT * self.settings.tolerance)).clamp(SHARPEST, 1.0);
+        if left.mesh.is_empty() || share > 0.5 * left.share {
+            return;
+        }
+        left.share = share;
+        self.place(left);
+        cost.factorisations += 1;
+        if self.problem.factorise(&left.u, &left.tangent).is_ok()
+            && let Some(better) = self.problem.better_mesh(&left.u, share * self.settings.tolerance)
+        {
+            left.roomier = Some(better);
+        }
     }
 
     /// Moves the working copy of a station to a mesh with room for the next step, where its own has none left. The stored

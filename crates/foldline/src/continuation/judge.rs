@@ -62,8 +62,11 @@ impl Follow<'_> {
         let size = |v: &[f64]| self.problem.dot(v, v).sqrt();
         let against = |t: &[f64]| (self.problem.dot(t, &chord) / (size(t) * size(&chord))).clamp(-1.0, 1.0).acos();
         let (miss, bent) = (size(&miss), against(&left.tangent) + against(&tangent));
-        if angle > self.settings.max_angle || miss > MISS * length || bent > CHORD_FACTOR * angle + CHORD_SLACK {
-            return Err(Failure::Elsewhere { angle, miss: miss / length });
+        // A point far away need not be far off in proportion.
+        let ahead: Vec<f64> = guess.iter().zip(&left.u).map(|(a, b)| a - b).collect();
+        let step = self.problem.dot(&left.tangent, &ahead).min(length).max(f64::MIN_POSITIVE);
+        if angle > self.settings.max_angle || miss > MISS * step || bent > CHORD_FACTOR * angle + CHORD_SLACK {
+            return Err(Failure::Elsewhere { angle, miss: miss / step });
         }
         Ok(())
     }

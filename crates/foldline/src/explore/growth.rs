@@ -438,9 +438,7 @@ fn collapses<'a>(branch: &Branch, system: &'a System) -> Vec<Box<dyn Monitor + '
         }
     }
     if branch.family == Family::Cycle {
-        if is_doubled(branch) {
-            all.push(Box::new(collapse::Halves));
-        }
+        all.push(Box::new(collapse::Halves { born: is_doubled(branch) }));
         all.push(Box::new(collapse::Shrinks { field: system.field, free: branch.free, scales: &system.scales }));
     }
     all

@@ -7,10 +7,12 @@
 //!
 //! **Equations.** d(s) = U'(s) - h T f(U(s)) on an interval, s ∈ [0, 1]:
 //!
-//!   (1)  local error   max_i |∫₀^{c_i} d ds|     (c_i the Gauss points, where d vanishes and the integral is extreme)
-//!   (2)  end error     ∫₀¹ d ds                  (of higher order where the solution is smooth)
+//!   (1)  local error   w(s) = ∫₀ˢ d ds           (largest at the Gauss points, where d vanishes)
+//!   (2)  v' = h T J v + h T J w                  what w does to the cycle beyond itself, v continuous but for w(1)
 //!
-//! d is integrated through its values at the m + 1 Gauss points of the next degree, exactly for its leading term.
+//! d is integrated through its values at the m + 1 Gauss points of the next degree, exactly for its leading term. Within an
+//! interval w(1) and the source of (2) are of the same, higher order; the source, h T (f(U + w) - f(U)), is projected onto the
+//! polynomials that collocation at the Gauss points integrates, so that (2) has the matrix of the cycle itself.
 //!
 //! **Source.** The role of the defect: enright2000.
 
@@ -28,6 +30,10 @@ pub struct Sampling {
     slopes: Vec<f64>,
     /// `[m + 1][m + 1]`: integral to each Gauss point, and to 1.
     integrals: Vec<f64>,
+    /// `[m + 1][m + 1]`: integral to each sample point.
+    partial: Vec<f64>,
+    /// `[m + 1][m + 1]`: right-hand sides of the collocation equations from a source at the sample points, then its integral.
+    sources: Vec<f64>,
 }
 
 impl Sampling {
@@ -57,7 +63,15 @@ impl Sampling {
         let to = |c: f64, k: usize| (0..=m).map(|g| c * weights[g] * through(&points, k, c * points[g])).sum::<f64>();
         let inner = scheme.nodes[1..].iter().flat_map(|&c| (0..=m).map(|k| to(c, k)).collect::<Vec<_>>());
         let integrals = inner.chain(weights.iter().copied()).collect();
-        Sampling { values, slopes, integrals }
+        let partial = points.iter().flat_map(|&c| (0..=m).map(|k| to(c, k)).collect::<Vec<_>>()).collect();
+        // The Lagrange polynomials of the Gauss points are orthogonal, with the weights as their squares.
+        let gauss = &scheme.nodes[1..];
+        let projected = |k: usize, g: usize| weights[g] * through(gauss, k, points[g]) / scheme.weights[k];
+        let line = |i: usize| {
+            (0..=m).map(move |g| (0..m).map(|k| scheme.integration[i * m + k] * projected(k, g)).sum::<f64>())
+        };
+        let sources = (0..m).flat_map(|i| line(i).collect::<Vec<_>>()).chain(weights.iter().copied()).collect();
+        Sampling { values, slopes, integrals, partial, sources }
     }
 }
 
@@ -66,8 +80,12 @@ impl Sampling {
 pub struct Defect {
     /// `[N]`: (1), largest component relative to its scale.
     pub local: Vec<f64>,
-    /// `[N][n]`: (2).
+    /// `[N][n]`: w(1).
     pub ends: Vec<f64>,
+    /// `[N][m][n]`: right-hand sides of (2) at the Gauss points.
+    pub sources: Vec<f64>,
+    /// `[N][n]`: w(1) with the integral of the source, by which the interval misses its right end.
+    pub misses: Vec<f64>,
 }
 
 /// Measures the defect of a profile `[interval][node][component]`.
@@ -100,6 +118,28 @@ pub fn measure(
     let mut local = vec![0.0f64; count];
     let mut ends = vec![0.0; count * n];
     let mut integrals = vec![0.0; lanes];
+    // U + w, then f there.
+    for i in 0..n {
+        let own = i * lanes..(i + 1) * lanes;
+        panel::multiply(&sampling.partial, &defect[own.clone()], count, &mut integrals);
+        states[own].iter_mut().zip(&integrals).for_each(|(x, w)| *x += w);
+    }
+    let mut source = vec![0.0; n * lanes];
+    field.evaluate(Batch { lanes, states: &states, parameters: Parameters::Shared(parameters) }, &mut source);
+    for ((g, f), k) in source.iter_mut().zip(&f).zip(0..) {
+        let change = times[k % count] * (*g - f);
+        // Next to where f ends its end is not the error's business.
+        *g = if change.is_finite() { change } else { 0.0 };
+    }
+    let (mut sources, mut misses) = (vec![0.0; count * m * n], vec![0.0; count * n]);
+    for i in 0..n {
+        panel::multiply(&sampling.sources, &source[i * lanes..(i + 1) * lanes], count, &mut integrals);
+        let (inner, whole) = integrals.split_at(m * count);
+        for (k, line) in inner.chunks_exact(count).enumerate() {
+            line.iter().enumerate().for_each(|(j, r)| sources[(j * m + k) * n + i] = *r);
+        }
+        whole.iter().enumerate().for_each(|(j, r)| misses[j * n + i] = *r);
+    }
     for i in 0..n {
         panel::multiply(&sampling.integrals, &defect[i * lanes..(i + 1) * lanes], count, &mut integrals);
         let (inner, whole) = integrals.split_at(m * count);
@@ -108,7 +148,8 @@ pub fn measure(
         }
         whole.iter().enumerate().for_each(|(j, e)| ends[j * n + i] = *e);
     }
-    Defect { local, ends }
+    misses.iter_mut().zip(&ends).for_each(|(miss, end)| *miss += end);
+    Defect { local, ends, sources, misses }
 }
 
 #[cfg(test)]

@@ -75,6 +75,30 @@ pub fn equidistributed_in_halves(errors: &[f64], mesh: &Mesh, degree: usize, tar
     Some(first.iter().map(|t| 0.5 * t).chain(first[1..].iter().map(|t| 0.5 + 0.5 * t)).collect())
 }
 
+/// Whether the second half of a mesh is a copy of the first.
+pub fn in_halves(mesh: &Mesh) -> bool {
+    let half = (mesh.len() - 1) / 2;
+    mesh.len() % 2 == 1 && (0..=half).all(|j| (mesh[j] + 0.5 - mesh[j + half]).abs() < 1e-14)
+}
+
+/// A mesh whose second half is a copy of the first, with every boundary of `mesh` in one half or the other, and the errors that its
+/// intervals have if those of `mesh` have `errors`.
+pub fn halved(errors: &[f64], mesh: &Mesh, degree: usize) -> (Vec<f64>, Mesh) {
+    let mut first: Vec<f64> = mesh.iter().map(|t| if *t < 0.5 { *t } else { t - 0.5 }).collect();
+    first.push(0.5);
+    first.sort_by(f64::total_cmp);
+    first.dedup_by(|b, a| *b - *a < 1e-9);
+    let last = first.len() - 1;
+    (first[0], first[last]) = (0.0, 0.5);
+    let whole: Mesh = first.iter().copied().chain(first[1..].iter().map(|t| 0.5 + t)).collect();
+    let error = |pair: &[f64]| {
+        let middle = 0.5 * (pair[0] + pair[1]);
+        let j = mesh.partition_point(|t| *t <= middle).clamp(1, errors.len()) - 1;
+        errors[j] * ((pair[1] - pair[0]) / (mesh[j + 1] - mesh[j])).powi(degree as i32 + 1)
+    };
+    (whole.windows(2).map(error).collect(), whole)
+}
+
 /// A periodic profile carried to another mesh by evaluating its polynomials.
 pub fn transferred(profile: &[f64], n: usize, scheme: &Scheme, from: &Mesh, to: &Mesh) -> Vec<f64> {
     let block = (scheme.degree + 1) * n;
@@ -102,6 +126,17 @@ mod tests {
         mesh.windows(2)
             .flat_map(|p| scheme.nodes.iter().map(|c| f(p[0] + (p[1] - p[0]) * c)).collect::<Vec<_>>())
             .collect()
+    }
+
+    #[test]
+    fn a_mesh_in_halves_keeps_every_boundary() {
+        let mesh: Mesh = vec![0.0, 0.2, 0.3, 0.9, 1.0].into();
+        assert!(!in_halves(&mesh));
+        let (errors, whole) = halved(&[1.0, 2.0, 64.0, 4.0], &mesh, 4);
+        assert!(in_halves(&whole), "{whole:?}");
+        let expected = [0.0, 0.2, 0.3, 0.4, 0.5, 0.7, 0.8, 0.9, 1.0];
+        assert!(whole.len() == 9 && whole.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-15), "{whole:?}");
+        assert!((errors[0] - 1.0).abs() < 1e-12 && (errors[2] - 64.0 / 6f64.powi(5)).abs() < 1e-12, "{errors:?}");
     }
 
     #[test]

@@ -31,7 +31,29 @@ impl Shrinks<'_> {
 }
 
 /// Difference between the halves of a cycle: vanishes where it becomes a cycle of half the period.
-pub struct Halves;
+pub struct Halves {
+    /// Whether the branch is known to have begun by period doubling. On any other one halves that differ much are not compared.
+    pub born: bool,
+}
+
+/// Difference between the halves of a cycle, as a share of its extent, up to which they are nearly the same.
+pub const NEARLY: f64 = 0.3;
+
+impl Halves {
+    fn comparable(&self, at: &Point) -> bool {
+        let Solution::Cycle(cycle) = &at.solution else { return false };
+        let (x, n) = (cycle.uniform(SAMPLES), cycle.dim());
+        let half = x.len() / 2;
+        self.born
+            || (0..n).all(|c| {
+                let own = || x.iter().skip(c).step_by(n);
+                let (low, high) =
+                    own().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(*v), high.max(*v)));
+                let apart = (c..half).step_by(n).fold(0.0f64, |most, k| most.max((x[k + half] - x[k]).abs()));
+                apart <= NEARLY * (high - low)
+            })
+    }
+}
 
 impl Monitor for Shrinks<'_> {
     fn kind(&self) -> Kind {
@@ -120,6 +142,9 @@ impl Monitor for Halves {
     }
 
     fn value(&self, reference: &Point, at: &Point) -> f64 {
+        if !self.comparable(reference) {
+            return 1.0;
+        }
         compare(reference, at, |x, _| {
             let half = x.len() / 2;
             (0..half).map(|k| x[k + half] - x[k]).collect()

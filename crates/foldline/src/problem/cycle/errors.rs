@@ -26,7 +26,7 @@ impl CycleProblem<'_> {
         let size = self.profile_size();
         let scale = self.relative_scale(u);
         let parameters = self.setting.at(&u[size + 1..]);
-        let Defect { local, ends } = defect::measure(
+        let Defect { local, ends, sources, misses } = defect::measure(
             self.setting.field,
             &parameters,
             &u[..size],
@@ -38,13 +38,17 @@ impl CycleProblem<'_> {
         );
         let block = (self.scheme.degree + 1) * self.n;
         let mut rhs = vec![0.0; u.len()];
-        for (j, end) in ends.chunks_exact(self.n).enumerate() {
-            rhs[j * block..j * block + self.n].copy_from_slice(end);
+        let inner = self.scheme.degree * self.n;
+        for (own, (end, source)) in
+            rhs.chunks_exact_mut(block).zip(ends.chunks_exact(self.n).zip(sources.chunks_exact(inner)))
+        {
+            own[..self.n].copy_from_slice(end);
+            own[self.n..].copy_from_slice(source);
         }
         let mut shift = vec![0.0; u.len()];
         self.system.solve(&rhs, &mut shift);
         let response = self.relative_size(&shift, u);
-        let sizes: Vec<f64> = ends
+        let sizes: Vec<f64> = misses
             .chunks_exact(self.n)
             .map(|e| e.iter().zip(&scale).map(|(v, s)| (v / s).abs()).fold(0.0, f64::max))
             .collect();
