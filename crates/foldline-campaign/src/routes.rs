@@ -16,6 +16,8 @@ use foldline::explore::{self, System};
 const FIRST_STEPS: [f64; 2] = [2e-4, 0.2];
 /// Where along a branch it is entered again, as shares of its points.
 const ENTRANCES: [f64; 2] = [0.23, 0.81];
+/// Slope of a branch of cycles in its parameter below which it is not entered.
+const STANDS: f64 = 1e-7;
 /// Points per side at which a run gives up.
 const MOST_POINTS: usize = 4000;
 /// How many points of a branch are computed again.
@@ -176,7 +178,9 @@ fn routes(
     }
     for share in ENTRANCES {
         let index = (share * base.points.len() as f64) as usize;
-        if let Some(start) = base.points.get(index).filter(|p| p.position != 0 && !p.is_light()) {
+        // Where a period without bound is all that still changes, the parameter says nothing about where one is.
+        let stands = |p: &Point| p.solution.period().is_some() && p.parameter_slope().abs() < STANDS;
+        if let Some(start) = base.points.get(index).filter(|p| p.position != 0 && !p.is_light() && !stands(p)) {
             let value = start.parameters[base.free];
             compare(&format!("from {value:?} (position {})", start.position), settings, start);
         }

@@ -68,8 +68,12 @@ const SURE: f64 = 1e-4;
 /// Step down to which a branch point without a symmetry that makes it is taken for two branches that pass each other.
 const CROSSING: f64 = 2e-3;
 
-/// Growth of the period from which on a parameter that stands still means that the period has no bound.
-const LONG: f64 = 3.0;
+/// Growth of the period while the parameter stands still, having moved before, that means that the period has no bound.
+const LONG: f64 = 1.5;
+/// Change of the logarithm of the period that shows whether the parameter still moves with it.
+const SHOWN: f64 = 0.01;
+/// Steps given up in turn because no permitted mesh is fine enough, until the side ends for that.
+const COARSE: usize = 6;
 
 /// Follows one side from `start`, which has been emitted already, and of which `previous` is the predecessor on the same
 /// side if there is one. `emitted` counts the points of this side so far.
@@ -85,7 +89,10 @@ pub fn follow(
     let mut position = left.point.position;
     let mut trail = previous.map(|p| walk.trail(&p, &left));
     let first_period = walk.home.unwrap_or(&left.point).solution.period();
-    let (mut ever_moved, mut moved, mut grows) = (false, true, false);
+    let (mut ever_moved, mut moved) = (false, true);
+    // Parameter and period where the parameter was last seen to move, or to stand.
+    let mut mark = left.point.solution.period().map(|period| (left.parameter(), period));
+    let mut moving = mark;
     loop {
         let outward = |bound: f64| (left.parameter() - bound).abs() <= 1e-12 * (1.0 + bound.abs());
         let [low, high] = walk.settings.range;
@@ -95,7 +102,7 @@ pub fn follow(
         if emitted >= walk.settings.max_points {
             return Ending::PointLimit(emitted);
         }
-        let (mut cost, mut remeshed) = (Cost::default(), 0);
+        let (mut cost, mut remeshed, mut coarse) = (Cost::default(), 0, 0);
         walk.sharpen(&mut left, step, &mut cost);
         walk.refresh(&mut left, step);
         let history = trail.as_ref().map(|t| t.history.clone());
@@ -124,15 +131,18 @@ pub fn follow(
                         Failure::Elsewhere { angle, .. } => (walk.settings.target_angle / angle).clamp(0.2, 0.5),
                         _ => 0.5,
                     };
-                    walk.sharpen(&mut left, step, &mut cost);
-                    walk.refresh(&mut left, step);
-                    if step < walk.settings.min_step {
+                    coarse += usize::from(matches!(why, Failure::Mesh(_)));
+                    if step < walk.settings.min_step || coarse == COARSE {
                         // Where the period grows and nothing else changes, the end is foreseeable.
-                        return match left.point.solution.period() {
-                            Some(period) if grows && !moved => Ending::PeriodUnbounded(period),
+                        return match (left.point.solution.period(), moving) {
+                            (Some(period), Some((_, then))) if !moved && period > then => {
+                                Ending::PeriodUnbounded(period)
+                            }
                             _ => ended_by(why, left.parameter()),
                         };
                     }
+                    walk.sharpen(&mut left, step, &mut cost);
+                    walk.refresh(&mut left, step);
                 }
             }
         };
@@ -179,14 +189,18 @@ pub fn follow(
         if let Some(ending) = end {
             return ending;
         }
-        if let (Some(first), Some(before), Some(now)) =
-            (first_period, left.point.solution.period(), right.point.solution.period())
-        {
-            let moves = walk.moves(&left, &right, [before, now]);
-            let settled = ever_moved && !moved && !moves;
-            grows = now > before;
-            (ever_moved, moved) = (ever_moved || moves, moves);
-            if now > before && (now > walk.settings.period_growth * first || (settled && now > LONG * first)) {
+        if let (Some(first), Some(now), Some(then)) = (first_period, right.point.solution.period(), mark) {
+            let here = (right.parameter(), now);
+            if (now / then.1).ln().abs() > SHOWN {
+                moved = walk.moves(then, here);
+                ever_moved |= moved;
+                mark = Some(here);
+                if moved {
+                    moving = mark;
+                }
+            }
+            let grown = moving.is_some_and(|(_, period)| now > LONG * period);
+            if now > walk.settings.period_growth * first || (ever_moved && !moved && grown) {
                 return Ending::PeriodUnbounded(now);
             }
         }
@@ -222,11 +236,11 @@ impl Follow<'_> {
         self.problem.anchor(&station.u);
     }
 
-    /// Whether the parameter still moves where the period grows: dλ/d ln T, which tends to zero with the distance from an
-    /// orbit of infinite period, exceeds the tolerance.
-    fn moves(&self, left: &Station, right: &Station, [before, now]: [f64; 2]) -> bool {
-        let change = (right.parameter() - left.parameter()).abs();
-        change > 0.1 * self.settings.tolerance * (1.0 + right.parameter().abs()) * (now / before).ln().abs()
+    /// Whether the parameter still moves where the period changes, from one pair of both to another: dλ/d ln T, which tends to
+    /// zero with the distance from an orbit of infinite period, exceeds the tolerance.
+    fn moves(&self, then: (f64, f64), now: (f64, f64)) -> bool {
+        let change = (now.0 - then.0).abs();
+        change > 0.1 * self.settings.tolerance * (1.0 + now.0.abs()) * (now.1 / then.1).ln().abs()
     }
 
     fn trail(&mut self, before: &Station, now: &Station) -> Trail {

@@ -30,6 +30,9 @@ const CLOSE: usize = 6;
 /// Asymmetry of a located pitchfork: the square root of the accuracy to which it is located.
 const SYMMETRIC: f64 = 3e-3;
 
+/// Share of a step within which a monitor that goes on as before must change sign to be looked for.
+const WELL: f64 = 0.75;
+
 /// Values of all monitors at the left end of a stretch and before it, for the test on bending.
 #[derive(Clone, Debug)]
 pub struct History {
@@ -117,20 +120,20 @@ impl Follow<'_> {
                 self.may_touch(h, &at_left, &at_right, stretch.length) || may_double(h, left, right, stretch.length)
             })
         };
-        let mut suspicious = depth < 3 && (touches() || (!standing && stretch.may_turn_twice()));
+        let suspicious = depth < 3 && (touches() || (!standing && stretch.may_turn_twice()));
         // Nothing is known of how monitors change on a first step; at equilibria it costs next to nothing to look.
-        if depth == 0 && !suspicious && jumps.is_empty() && (history.is_none() || left.mesh.is_empty()) {
-            let middle = stretch.at(self.problem, self.settings, 0.5 * stretch.length, cost);
-            let differs = |(a, b): (&f64, &f64)| (*a > 0.0) != (*b > 0.0);
-            suspicious = middle.is_ok_and(|found| self.monitored(&found).iter().zip(&at_left).any(differs));
+        let mut seen = None;
+        if depth == 0 && jumps.is_empty() && (history.is_none() || left.mesh.is_empty()) {
+            seen = self.seen_between(&stretch, &at_left, cost);
         }
+        let suspicious = suspicious || seen.is_some();
         if depth < DEEPEST
             && (jumps.len() > 1 || !explained || (suspicious && jumps.is_empty()))
             && stretch.length.abs() > self.settings.min_step
         {
             let cut = match &located[..] {
                 [a, .., b] => 0.5 * (a.2.distance + b.2.distance),
-                _ => 0.5 * stretch.length,
+                _ => seen.unwrap_or(0.5 * stretch.length),
             };
             // Neighbouring special points that cannot be told apart any more stay together.
             let apart = located.len() < 2
@@ -193,6 +196,16 @@ impl Follow<'_> {
         })
     }
 
+    /// A place in the stretch at which some monitor has not the sign that it has at the left end.
+    fn seen_between(&mut self, stretch: &Stretch, at_left: &[f64], cost: &mut Cost) -> Option<f64> {
+        const PLACES: [f64; 3] = [0.5, 0.25, 0.75];
+        let differs = |(a, b): (&f64, &f64)| (*a > 0.0) != (*b > 0.0);
+        PLACES.map(|share| share * stretch.length).into_iter().find(|s| {
+            let middle = stretch.at(self.problem, self.settings, *s, cost);
+            middle.is_ok_and(|found| self.monitored(&found).iter().zip(at_left).any(differs))
+        })
+    }
+
     /// A full station at distance s of the stretch.
     pub(super) fn cut(&mut self, left: &Station, stretch: &Stretch, s: f64, cost: &mut Cost) -> Option<Station> {
         let u = stretch.corrected(self.problem, self.settings, s, cost).ok()?;
@@ -200,8 +213,8 @@ impl Follow<'_> {
         refine(self.problem, self.settings, aim, left.tangent.clone(), u, self.direction, cost).ok()
     }
 
-    /// Whether the parabola through three values of some monitor comes close to zero between the last two without the
-    /// values showing it.
+    /// Whether some monitor may have passed zero between the last two of three values and come back: the parabola through them comes
+    /// close, or the line through the first two goes on to the other side well before the last.
     fn may_touch(&self, history: &History, left: &[f64], right: &[f64], length: f64) -> bool {
         (0..left.len()).any(|k| {
             let (a, b, c) = (history.values[k], left[k], right[k]);
@@ -209,6 +222,9 @@ impl Follow<'_> {
                 return false;
             }
             let (before, after) = ((b - a) / history.distance, (c - b) / length);
+            if (b + WELL * length * before) * b < 0.0 {
+                return true;
+            }
             let bend = (after - before) / (history.distance + length);
             let slope = after - bend * length;
             let at = -slope / (2.0 * bend);

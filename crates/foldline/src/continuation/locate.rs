@@ -273,7 +273,8 @@ pub fn locate(
             // The last trial need not have been the best one.
             let _ = problem.factorise(&coarse.u, &coarse.tangent);
             let station = completed(monitor, problem, coarse, stretch.direction);
-            return Ok(Located { distance, station, error: floor });
+            let error = floor + noise(problem, settings, stretch, monitor, distance, &station, cost);
+            return Ok(Located { distance, station, error });
         };
         let (fine, off) = relocate(problem, settings, stretch, monitor, &coarse, &finer, &mut slope, cost)?;
         let error = floor
@@ -290,6 +291,36 @@ pub fn locate(
         tolerance *= 0.1;
     }
     known.map(|(station, error)| Located { distance, station, error }).ok_or(Failure::NotFinite)
+}
+
+/// How far rounding may have moved the zero of a monitor, in the parameter, relative to 1 + its size: the monitor is nearly
+/// linear so close by, and what it departs from a line is rounding.
+fn noise(
+    problem: &mut dyn ZeroProblem,
+    settings: &Settings,
+    stretch: &Stretch,
+    monitor: &dyn Monitor,
+    distance: f64,
+    found: &Station,
+    cost: &mut Cost,
+) -> f64 {
+    const NEAR: f64 = 1e-5;
+    const PLACES: [f64; 6] = [-1.0, -0.6, -0.2, 0.2, 0.6, 1.0];
+    let mut values = [0.0; 6];
+    for (value, place) in values.iter_mut().zip(PLACES) {
+        let s = distance + place * NEAR * stretch.length;
+        let Ok(there) = stretch.at(problem, settings, s, cost) else { return 0.0 };
+        *value = monitor.value(&stretch.left.point, &there.point);
+    }
+    let mean = values.iter().sum::<f64>() / 6.0;
+    let square: f64 = PLACES.iter().map(|x| x * x).sum();
+    let slope = PLACES.iter().zip(&values).map(|(x, v)| x * v).sum::<f64>() / square;
+    let off = PLACES.iter().zip(&values).fold(0.0f64, |most, (x, v)| most.max((v - mean - slope * x).abs()));
+    // Where the line has its zero says as much as how far the values are off it.
+    let shift = ((mean / slope).abs() + 2.0 * (off / slope).abs()) * NEAR * stretch.length.abs();
+    let slope = found.slope().abs();
+    let error = shift * slope / (1.0 + found.parameter().abs());
+    if error.is_finite() { error } else { 0.0 }
 }
 
 /// Largest difference of parameter, period and ranges, each relative to 1 + |value|.

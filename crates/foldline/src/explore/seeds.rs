@@ -259,19 +259,26 @@ fn with_degree(mut point: Point, degree: usize) -> Point {
 
 /// A given state: an equilibrium if Newton's method finds one next to it, else what the trajectory from it settles to.
 fn from_state(system: &System, seed: &SeedPlan, plan: &Plan, state: &[f64], jobs: usize) -> Result<Point, String> {
+    const NEXT: f64 = 1e-2;
+    const NEAR: f64 = 0.3;
     let settings = settings(system, plan.tolerance, [f64::NEG_INFINITY, f64::INFINITY], 0);
     let mut problem = EquilibriumProblem::new(setting(system, 0, &seed.parameters));
-    if let Ok(found) = polished(&mut problem, &settings, &bare(&seed.parameters, Solution::Equilibrium(state.to_vec())))
-    {
+    let given = bare(&seed.parameters, Solution::Equilibrium(state.to_vec()));
+    let found = polished(&mut problem, &settings, &given).ok().map(|found| {
         let moved: Vec<f64> =
             found.u.iter().zip(state).zip(&system.scales).map(|((a, b), s)| (a - b) / (s + b.abs())).collect();
-        if max_abs(&moved) < 1e-2 {
-            return Ok(found.point);
-        }
+        (max_abs(&moved), found.point)
+    });
+    if let Some((moved, point)) = &found
+        && *moved < NEXT
+    {
+        return Ok(point.clone());
     }
     let sampling = sampling(system, 1, seed.random, jobs, plan.tolerance);
     let polish = |candidate: &Candidate| polish(system, &seed.parameters, plan.tolerance, candidate);
-    attractors::settle(system.field, &seed.parameters, &sampling, state, &polish).ok_or_else(|| {
+    let settled = attractors::settle(system.field, &seed.parameters, &sampling, state, &polish);
+    // A saddle that the trajectory leads to and does not stay at, if that was meant.
+    settled.or(found.filter(|(moved, _)| *moved < NEAR).map(|(_, point)| point)).ok_or_else(|| {
         "the trajectory from the given state settles neither to an equilibrium nor to a cycle; try another state or other parameters"
             .to_string()
     })
