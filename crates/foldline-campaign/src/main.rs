@@ -64,6 +64,9 @@ fn answer() -> Result<bool, String> {
         if trace {
             report.traces.iter().for_each(|text| println!("{text}"));
         }
+        for bad in report.honesty.iter().filter(|h| trace && !(h.multipliers <= h.stated_multipliers)) {
+            println!("{}: multipliers {:.1e}, stated {:.1e}", bad.place, bad.multipliers, bad.stated_multipliers);
+        }
         for bad in report.honesty.iter().filter(|h| h.found > h.stated) {
             eprintln!("{}: error {:.1e}, stated {:.1e}", bad.place, bad.found, bad.stated);
         }

@@ -62,7 +62,9 @@ impl From<Vec<Diagnostic>> for Failure {
 impl From<RunFileError> for Failure {
     fn from(error: RunFileError) -> Failure {
         match error {
-            RunFileError::Database(..) => Failure::Outside(error.to_string()),
+            RunFileError::Database(..) | RunFileError::Full(_) | RunFileError::Vanished(_) => {
+                Failure::Outside(error.to_string())
+            }
             _ => Failure::Typed(error.to_string()),
         }
     }

@@ -42,7 +42,13 @@ fn point(position: i64, cycle: bool) -> Point {
         spectrum: vec![Complex64::new(awkward(0), awkward(1)), Complex64::new(awkward(5), awkward(4))],
         unstable: 1,
         ranges: vec![[awkward(1), awkward(5)], [awkward(0), awkward(2)]],
-        trust: Trust { discretisation: 1e-9, residual: -0.0, trivial_defect: f64::NAN, liouville_defect: 1.0 / 3.0 },
+        trust: Trust {
+            discretisation: 1e-9,
+            residual: -0.0,
+            trivial_defect: f64::NAN,
+            liouville_defect: 1.0 / 3.0,
+            spectrum: 2.0 / 3.0,
+        },
         cost: Cost { newton: 3, factorisations: 4, rejected: 1, evaluations: 900, linearisations: 700 },
     }
 }
@@ -134,7 +140,7 @@ fn exactly(diagram: &Diagram) -> String {
         };
         let spectrum: Vec<f64> = p.spectrum.iter().flat_map(|z| [z.re, z.im]).collect();
         let t = p.trust;
-        let trust = [t.discretisation, t.residual, t.trivial_defect, t.liouville_defect, p.step];
+        let trust = [t.discretisation, t.residual, t.trivial_defect, t.liouville_defect, t.spectrum, p.step];
         let lists = [&p.parameters[..], &p.tangent, &spectrum, p.ranges.as_flattened(), &trust].map(bits);
         format!("{} {solution} {lists:?} {} {:?}\n", p.position, p.unstable, p.cost)
     }

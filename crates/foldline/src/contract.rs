@@ -139,6 +139,12 @@ pub trait ZeroProblem {
     /// Stability and trust at `u`, for which [`ZeroProblem::factorise`] was called last.
     fn examine(&mut self, u: &[f64]) -> Examination;
 
+    /// Estimated error of the spectrum at `u`, relative to the larger of 1 and each modulus; `spectrum` is what
+    /// [`ZeroProblem::examine`] found there. The last factorisation must be one near `u` on the current mesh, and stays.
+    fn spectrum_error(&mut self, _u: &[f64], _spectrum: &[Complex64]) -> f64 {
+        f64::NAN
+    }
+
     /// How far a point is from one at which F_x is singular, in terms of its spectrum: small where another branch may be
     /// close by.
     fn margin(&self, at: &Point) -> f64;

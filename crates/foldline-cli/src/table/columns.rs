@@ -34,7 +34,7 @@ pub fn points(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) -> bool) 
     let extremes = |name: &str| [format!("{name}_max"), format!("{name}_min")];
     columns.extend(model.states.iter().flat_map(|s| extremes(&s.name)).map(|name| column(&name, Style::Number)));
     columns.push(column("unstable", Style::Number));
-    let sizes = ["discretisation", "residual", "trivial_defect", "liouville_defect"];
+    let sizes = ["discretisation", "residual", "trivial_defect", "liouville_defect", "spectrum_error"];
     columns.extend(sizes.map(|name| column(name, Style::Size)));
     columns.extend(WORK.map(|name| column(name, Style::Number)));
     columns.push(column("multipliers", Style::Word));
@@ -46,7 +46,8 @@ pub fn points(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) -> bool) 
         row.extend((0..n).flat_map(|k| [extreme(point, k, 1), extreme(point, k, 0)]));
         row.push(count(point.unstable));
         let trust = point.trust;
-        let sizes = [trust.discretisation, trust.residual, trust.trivial_defect, trust.liouville_defect];
+        let sizes =
+            [trust.discretisation, trust.residual, trust.trivial_defect, trust.liouville_defect, trust.spectrum];
         row.extend(sizes.map(Cell::Number));
         row.extend(work(point.cost).map(count));
         row.push(Cell::Spectrum(point.spectrum.clone()));

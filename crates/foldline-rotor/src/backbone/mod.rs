@@ -175,6 +175,7 @@ pub fn backbone(constants: &Nondimensional, law: ContactLaw, ratio: Ratio, reach
         direction: 1.0,
         free: 0,
         home: None,
+        next_to_home: None,
     };
     let ending = follow(&mut walk, begun, None, 0, &mut |item| {
         if let Item::Point(point) = item {

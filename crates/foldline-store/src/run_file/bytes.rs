@@ -29,3 +29,34 @@ pub(super) fn unpack_pairs(bytes: &[u8]) -> Option<Vec<[f64; 2]>> {
 pub(super) fn unpack_complex(bytes: &[u8]) -> Option<Vec<Complex64>> {
     Some(unpack_pairs(bytes)?.into_iter().map(|[re, im]| Complex64::new(re, im)).collect())
 }
+
+/// A checksum of numbers and bytes: after each word h ← (h xor word) · 0x100000001b3, h ← h xor (h >> 32), from
+/// 0xcbf29ce484222325 on. Bytes are taken as little-endian words of 8, the last one filled up with zeros.
+#[derive(Clone, Copy)]
+pub(super) struct Checksum(u64);
+
+impl Checksum {
+    pub(super) fn new() -> Checksum {
+        Checksum(0xcbf2_9ce4_8422_2325)
+    }
+
+    pub(super) fn word(&mut self, word: u64) {
+        self.0 = (self.0 ^ word).wrapping_mul(0x0100_0000_01b3);
+        self.0 ^= self.0 >> 32;
+    }
+
+    pub(super) fn bytes(&mut self, bytes: &[u8]) {
+        let (words, rest) = bytes.as_chunks::<8>();
+        words.iter().for_each(|word| self.word(u64::from_le_bytes(*word)));
+        if !rest.is_empty() {
+            let mut last = [0; 8];
+            last[..rest.len()].copy_from_slice(rest);
+            self.word(u64::from_le_bytes(last));
+        }
+    }
+
+    /// As SQLite stores it.
+    pub(super) fn value(self) -> i64 {
+        self.0 as i64
+    }
+}

@@ -25,7 +25,7 @@ use std::path::{Path, PathBuf};
 
 /// The version of the format written here. A file of a newer version is refused; a change that older readers would
 /// misunderstand raises it.
-pub const FORMAT_VERSION: i64 = 3;
+pub const FORMAT_VERSION: i64 = 4;
 
 /// Marks an SQLite file as a run file ("fold" in ASCII).
 pub const APPLICATION_ID: i64 = 0x666f_6c64;
@@ -52,8 +52,28 @@ pub enum RunFileError {
     Changed(PathBuf, &'static str),
     /// The file contradicts itself; the sentence says where.
     Damaged(PathBuf, String),
+    /// Another run is writing there.
+    Busy(PathBuf),
+    /// There is no space left, or a quota is used up.
+    Full(PathBuf),
+    /// The file was deleted, moved or replaced while the run was writing to it.
+    Vanished(PathBuf),
     /// The database refused.
     Database(PathBuf, rusqlite::Error),
+}
+
+impl RunFileError {
+    /// What SQLite answered about the file at `path`, in terms of what happened to it.
+    pub(crate) fn from_sqlite(path: &Path, error: rusqlite::Error) -> RunFileError {
+        use rusqlite::ErrorCode::{DatabaseBusy, DatabaseCorrupt, DatabaseLocked, DiskFull, NotADatabase};
+        let path = path.to_path_buf();
+        match error.sqlite_error_code() {
+            Some(DatabaseCorrupt | NotADatabase) => RunFileError::Damaged(path, format!("SQLite finds {error}")),
+            Some(DiskFull) => RunFileError::Full(path),
+            Some(DatabaseBusy | DatabaseLocked) => RunFileError::Busy(path),
+            _ => RunFileError::Database(path, error),
+        }
+    }
 }
 
 impl fmt::Display for RunFileError {
@@ -89,11 +109,33 @@ impl fmt::Display for RunFileError {
                 path.display()
             ),
             RunFileError::Damaged(path, what) => {
-                write!(f, "{} is damaged: {what}\n  help: start a new run with `--out DIR`", path.display())
+                write!(
+                    f,
+                    "{path} is damaged: {what}\n  help: bring it back from a copy, or start a new run with `--out DIR`; `sqlite3 {path} \
+                     .recover` shows what can still be read",
+                    path = path.display()
+                )
             }
+            RunFileError::Busy(path) => write!(
+                f,
+                "another run is writing to {}\n  help: wait until it has finished, or write elsewhere with `--out DIR`",
+                path.display()
+            ),
+            RunFileError::Full(path) => write!(
+                f,
+                "there is no space left to write {}\n  help: everything accepted until then is stored; make room and go on with \
+                 `--resume`",
+                path.display()
+            ),
+            RunFileError::Vanished(path) => write!(
+                f,
+                "{} was deleted, moved or replaced while the run was writing to it, and the run has stopped\n  help: leave the \
+                 folder in peace while a run lasts; if it was moved, `--resume --out DIR` goes on there",
+                path.display()
+            ),
             RunFileError::Database(path, error) => write!(
                 f,
-                "{}: {error}\n  help: check free space and permissions, and that no other run writes there",
+                "{}: {error}\n  help: check permissions, quotas and the disk; what was accepted before is stored, `--resume` goes on",
                 path.display()
             ),
         }

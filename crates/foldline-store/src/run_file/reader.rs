@@ -42,6 +42,8 @@ const NUMBERS: &str = "position, degree, unstable, newton, factorisations, rejec
      range_bytes, scalar_bytes";
 /// Likewise, since format 3.
 const LATER_NUMBERS: &str = ", evaluations, linearisations";
+/// Likewise, since format 4.
+const CHECKED_NUMBERS: &str = ", numbers_checksum";
 const OF_SPECIAL: &str = "kind, unstable_before, unstable_after";
 
 /// Reads the run in `folder`, which may still be growing.
@@ -59,7 +61,10 @@ pub fn load_part(folder: &Path, part: Part) -> Result<Recorded, RunFileError> {
         Open::Run(connection) => connection,
         Open::Empty => return Err(RunFileError::Damaged(path, "it is empty".to_string())),
     };
-    let failed = |e| RunFileError::Database(path.clone(), e);
+    let failed = |e| RunFileError::from_sqlite(&path, e);
+    if part == Part::Everything {
+        sound(&connection, &path)?;
+    }
     // One transaction, so that a run that is still growing is seen at one instant.
     connection.execute_batch("BEGIN").map_err(failed)?;
     let text = |key: &str| {
@@ -91,7 +96,7 @@ pub(super) enum Open {
 
 /// Opens a run file after making sure that it is one, of a version known here.
 pub(super) fn open(path: &Path, write: bool) -> Result<Open, RunFileError> {
-    let failed = |e| RunFileError::Database(path.to_path_buf(), e);
+    let failed = |e| RunFileError::from_sqlite(path, e);
     let foreign = || RunFileError::Foreign(path.to_path_buf());
     let access = if write { OpenFlags::SQLITE_OPEN_READ_WRITE } else { OpenFlags::SQLITE_OPEN_READ_ONLY };
     let number =
@@ -100,6 +105,9 @@ pub(super) fn open(path: &Path, write: bool) -> Result<Open, RunFileError> {
     let connection = match number(&plain, "application_id") {
         Ok(_) => plain,
         Err(error) if error.sqlite_error_code() == Some(rusqlite::ErrorCode::NotADatabase) => return Err(foreign()),
+        Err(error) if error.sqlite_error_code() == Some(rusqlite::ErrorCode::DatabaseCorrupt) => {
+            return Err(failed(error));
+        }
         // In a folder where nothing can be written the log cannot be opened; the file alone can.
         Err(error) if write => return Err(failed(error)),
         Err(error) => immutable(path).ok_or_else(|| failed(error))?,
@@ -110,6 +118,15 @@ pub(super) fn open(path: &Path, write: bool) -> Result<Open, RunFileError> {
         APPLICATION_ID => Ok(Open::Run(connection)),
         _ if is_empty(&connection).map_err(failed)? => Ok(Open::Empty),
         _ => Err(foreign()),
+    }
+}
+
+/// Whether the database itself is in order: its pages, and that every row has its index.
+pub(super) fn sound(connection: &Connection, path: &Path) -> Result<(), RunFileError> {
+    let found: Result<String, _> = connection.query_row("PRAGMA integrity_check(1)", [], |row| row.get(0));
+    match found.map_err(|error| RunFileError::from_sqlite(path, error))?.as_str() {
+        "ok" => Ok(()),
+        what => Err(RunFileError::Damaged(path.to_path_buf(), format!("SQLite finds {}", what.replace('\n', " ")))),
     }
 }
 
@@ -131,8 +148,9 @@ pub(super) fn load_diagram(connection: &Connection, path: &Path, part: Part) -> 
         Part::Numbers | Part::Special => {
             let version: i64 = connection
                 .pragma_query_value(None, "user_version", |row| row.get(0))
-                .map_err(|error| RunFileError::Database(path.to_path_buf(), error))?;
-            let numbers = format!("{NUMBERS}{}", if version < 3 { "" } else { LATER_NUMBERS });
+                .map_err(|error| RunFileError::from_sqlite(path, error))?;
+            let later = if version < 3 { "" } else { LATER_NUMBERS };
+            let numbers = format!("{NUMBERS}{later}{}", if version < 4 { "" } else { CHECKED_NUMBERS });
             (numbers.clone(), format!("{numbers}, {OF_SPECIAL}"))
         }
     };
@@ -148,6 +166,10 @@ pub(super) fn load_diagram(connection: &Connection, path: &Path, part: Part) -> 
         if part != Part::Special {
             let sql = of_branch(&of_points, "points", "position");
             branch.points = read(connection, path, &sql, &[number], |row| Ok(point_in(row)?.0))?;
+            if let Some(pair) = branch.points.windows(2).find(|pair| pair[1].position != pair[0].position + 1) {
+                let what = format!("branch {} has no point at position {}", branch.name, pair[0].position + 1);
+                return Err(RunFileError::Damaged(path.to_path_buf(), what));
+            }
         }
         let sql = of_branch(&of_special, "special_points", "position, rowid");
         branch.special = read(connection, path, &sql, &[number], special_in)?;
@@ -205,7 +227,7 @@ fn read<T>(
     parameters: &[i64],
     mut convert: impl FnMut(&Row) -> Result<T, String>,
 ) -> Result<Vec<T>, RunFileError> {
-    let failed = |e| RunFileError::Database(path.to_path_buf(), e);
+    let failed = |e| RunFileError::from_sqlite(path, e);
     let mut statement = connection.prepare_cached(sql).map_err(failed)?;
     let mut rows = statement.query(rusqlite::params_from_iter(parameters)).map_err(failed)?;
     let mut found = Vec::new();

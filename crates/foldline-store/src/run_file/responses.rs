@@ -105,7 +105,7 @@ fn values_of(response: &Response, shown: usize) -> Vec<Value> {
 
 /// All sets, in the order in which they were completed.
 pub(super) fn load(connection: &Connection, path: &Path) -> Result<Vec<Responses>, RunFileError> {
-    let failed = |e| RunFileError::Database(path.to_path_buf(), e);
+    let failed = |e| RunFileError::from_sqlite(path, e);
     let damaged = |what: String| RunFileError::Damaged(path.to_path_buf(), what);
     let there = "SELECT count(*) > 0 FROM sqlite_master WHERE type = 'table' AND name = 'responses'";
     if !connection.query_row(there, [], |row| row.get::<_, bool>(0)).map_err(failed)? {

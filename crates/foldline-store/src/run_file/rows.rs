@@ -1,6 +1,6 @@
 //! A point as a row, and back.
 
-use super::bytes::{pack, pack_complex, pack_pairs, unpack, unpack_complex, unpack_pairs};
+use super::bytes::{Checksum, pack, pack_complex, pack_pairs, unpack, unpack_complex, unpack_pairs};
 use foldline::diagram::{Cost, Cycle, Ending, Kind, Origin, Point, Solution, Trust};
 use rusqlite::Row;
 use rusqlite::types::Value;
@@ -8,9 +8,9 @@ use rusqlite::types::Value;
 /// The shown columns and the columns of a point, in the order of the insertion. `extra` numbers are kept with the scalars.
 pub(super) fn values_of(point: &Point, extra: &[f64]) -> Vec<Value> {
     let count = |n: usize| Value::Integer(i64::try_from(n).unwrap_or(i64::MAX));
-    let (degree, mesh, profile) = match &point.solution {
-        Solution::Equilibrium(state) => (Value::Null, Value::Null, state),
-        Solution::Cycle(cycle) => (count(cycle.degree), Value::Blob(pack(&cycle.mesh)), &cycle.profile),
+    let (degree, profile) = match &point.solution {
+        Solution::Equilibrium(state) => (Value::Null, state),
+        Solution::Cycle(cycle) => (count(cycle.degree), &cycle.profile),
     };
     let trust = &point.trust;
     let shown = point.parameters.iter().chain(point.ranges.as_flattened());
@@ -23,8 +23,15 @@ pub(super) fn values_of(point: &Point, extra: &[f64]) -> Vec<Value> {
         trust.residual,
         trust.trivial_defect,
         trust.liouville_defect,
+        trust.spectrum,
     ];
     scalars.extend_from_slice(extra);
+    let light = [pack(&point.parameters), pack_complex(&point.spectrum), pack_pairs(&point.ranges), pack(&scalars)];
+    let heavy = [pack(profile), mesh_bytes(&point.solution), pack(&point.tangent)];
+    let checksums = [numbers_checksum(point.position, point.unstable, &light), checksum(&heavy)];
+    let [parameters, spectrum, ranges, scalars] = light;
+    let [profile, mesh, tangent] = heavy;
+    let mesh = if degree == Value::Null { Value::Null } else { Value::Blob(mesh) };
     values.extend([
         period.map_or(Value::Null, Value::Real),
         count(point.unstable),
@@ -37,16 +44,41 @@ pub(super) fn values_of(point: &Point, extra: &[f64]) -> Vec<Value> {
         count(point.cost.rejected),
         count(point.cost.evaluations),
         count(point.cost.linearisations),
+        Value::Real(trust.spectrum),
         degree,
-        Value::Blob(pack(&point.parameters)),
-        Value::Blob(pack(profile)),
+        Value::Blob(parameters),
+        Value::Blob(profile),
         mesh,
-        Value::Blob(pack(&point.tangent)),
-        Value::Blob(pack_complex(&point.spectrum)),
-        Value::Blob(pack_pairs(&point.ranges)),
-        Value::Blob(pack(&scalars)),
+        Value::Blob(tangent),
+        Value::Blob(spectrum),
+        Value::Blob(ranges),
+        Value::Blob(scalars),
+        Value::Integer(checksums[0]),
+        Value::Integer(checksums[1]),
     ]);
     values
+}
+
+fn mesh_bytes(solution: &Solution) -> Vec<u8> {
+    match solution {
+        Solution::Equilibrium(_) => Vec::new(),
+        Solution::Cycle(cycle) => pack(&cycle.mesh),
+    }
+}
+
+fn checksum(parts: &[Vec<u8>]) -> i64 {
+    let mut sum = Checksum::new();
+    parts.iter().for_each(|part| sum.bytes(part));
+    sum.value()
+}
+
+/// That of everything about a point that is a few numbers.
+fn numbers_checksum(position: i64, unstable: usize, light: &[Vec<u8>]) -> i64 {
+    let mut sum = Checksum::new();
+    sum.word(position as u64);
+    sum.word(unstable as u64);
+    light.iter().for_each(|part| sum.bytes(part));
+    sum.value()
 }
 
 /// The point in a row, and the extra numbers kept with its scalars; the error is the column that makes no sense. Where
@@ -64,7 +96,32 @@ pub(super) fn point_in(row: &Row) -> Result<(Point, Vec<f64>), String> {
         Err(rusqlite::Error::InvalidColumnName(_)) => Ok(0),
         _ => count(name),
     };
-    let scalars = numbers("scalar_bytes")?;
+    let position: i64 = row.get("position").map_err(|e| e.to_string())?;
+    // Those of older versions have none.
+    let stated = |name: &str| match row.get::<_, Option<i64>>(name) {
+        Err(rusqlite::Error::InvalidColumnName(_)) => Ok(None),
+        other => other.map_err(|e| e.to_string()),
+    };
+    let of_numbers = stated("numbers_checksum")?;
+    if let Some(stated) = of_numbers {
+        let light = ["parameter_bytes", "spectrum_bytes", "range_bytes", "scalar_bytes"].map(blob);
+        let light = light.into_iter().collect::<Result<Vec<_>, _>>()?;
+        if numbers_checksum(position, count("unstable")?, &light) != stated {
+            return Err(format!("the numbers of the point at position {position} do not have their checksum"));
+        }
+    }
+    if let Some(stated) = stated("solution_checksum")?.filter(|_| whole) {
+        let mesh = row.get::<_, Option<Vec<u8>>>("mesh_bytes").map_err(|e| e.to_string())?.unwrap_or_default();
+        if checksum(&[blob("solution_bytes")?, mesh, blob("tangent_bytes")?]) != stated {
+            return Err(format!("the solution of the point at position {position} does not have its checksum"));
+        }
+    }
+    let mut scalars = numbers("scalar_bytes")?;
+    // One more since version 4.
+    let spectrum_error = match of_numbers {
+        Some(_) if scalars.len() > 6 => scalars.remove(6),
+        _ => f64::NAN,
+    };
     let [period, step, discretisation, residual, trivial_defect, liouville_defect, extra @ ..] = &scalars[..] else {
         return Err("scalar_bytes is too short".to_string());
     };
@@ -82,7 +139,7 @@ pub(super) fn point_in(row: &Row) -> Result<(Point, Vec<f64>), String> {
         }
     };
     let point = Point {
-        position: row.get("position").map_err(|e| e.to_string())?,
+        position,
         parameters: numbers("parameter_bytes")?,
         solution,
         tangent: if whole { numbers("tangent_bytes")? } else { Vec::new() },
@@ -95,6 +152,7 @@ pub(super) fn point_in(row: &Row) -> Result<(Point, Vec<f64>), String> {
             residual: *residual,
             trivial_defect: *trivial_defect,
             liouville_defect: *liouville_defect,
+            spectrum: spectrum_error,
         },
         cost: Cost {
             newton: count("newton")?,

@@ -46,7 +46,7 @@ impl Columns {
 const OTHERS: [&str; 8] = ["branch", "position", "kind", "key", "unstable_before", "unstable_after", "error", "rowid"];
 
 /// The columns that a point has in both tables of points, with their types: first those to read, then those to load.
-const POINT_COLUMNS: [(&str, &str); 19] = [
+const POINT_COLUMNS: [(&str, &str); 22] = [
     ("period", "REAL"),
     ("unstable", "INTEGER NOT NULL"),
     ("discretisation", "REAL"),
@@ -58,6 +58,7 @@ const POINT_COLUMNS: [(&str, &str); 19] = [
     ("rejected", "INTEGER NOT NULL"),
     ("evaluations", "INTEGER NOT NULL DEFAULT 0"),
     ("linearisations", "INTEGER NOT NULL DEFAULT 0"),
+    ("spectrum_error", "REAL"),
     ("degree", "INTEGER"),
     ("parameter_bytes", "BLOB NOT NULL"),
     ("solution_bytes", "BLOB NOT NULL"),
@@ -66,6 +67,8 @@ const POINT_COLUMNS: [(&str, &str); 19] = [
     ("spectrum_bytes", "BLOB NOT NULL"),
     ("range_bytes", "BLOB NOT NULL"),
     ("scalar_bytes", "BLOB NOT NULL"),
+    ("numbers_checksum", "INTEGER"),
+    ("solution_checksum", "INTEGER"),
 ];
 
 /// The statements that make all tables.
@@ -93,7 +96,8 @@ pub(super) fn create(columns: &Columns) -> String {
 
 /// The statements that bring a file of an older version to the present one.
 ///
-/// Version 1 had no curves in two parameters, version 2 did not count evaluations.
+/// Version 1 had no curves in two parameters, version 2 did not count evaluations, version 3 had neither checksums nor errors of
+/// multipliers.
 pub(super) fn upgrade(version: i64) -> &'static str {
     match version {
         1 => "ALTER TABLE branches ADD COLUMN held TEXT; ALTER TABLE branches ADD COLUMN follows INTEGER;",
@@ -102,6 +106,14 @@ pub(super) fn upgrade(version: i64) -> &'static str {
              ALTER TABLE points ADD COLUMN linearisations INTEGER NOT NULL DEFAULT 0;
              ALTER TABLE special_points ADD COLUMN evaluations INTEGER NOT NULL DEFAULT 0;
              ALTER TABLE special_points ADD COLUMN linearisations INTEGER NOT NULL DEFAULT 0;"
+        }
+        3 => {
+            "ALTER TABLE points ADD COLUMN spectrum_error REAL;
+             ALTER TABLE points ADD COLUMN numbers_checksum INTEGER;
+             ALTER TABLE points ADD COLUMN solution_checksum INTEGER;
+             ALTER TABLE special_points ADD COLUMN spectrum_error REAL;
+             ALTER TABLE special_points ADD COLUMN numbers_checksum INTEGER;
+             ALTER TABLE special_points ADD COLUMN solution_checksum INTEGER;"
         }
         _ => "",
     }

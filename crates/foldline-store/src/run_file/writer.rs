@@ -1,6 +1,6 @@
 //! Writing a run as it happens.
 
-use super::reader::{Open, Part, load_diagram, open, point_at};
+use super::reader::{Open, Part, load_diagram, open, point_at, sound};
 use super::rows::{ending_values, held_values, origin_values, values_of};
 use super::schema::{Columns, create, insert, upgrade};
 use super::{APPLICATION_ID, FORMAT_VERSION, RunFileError, path_in, responses};
@@ -10,6 +10,7 @@ use foldline::diagram::{Branch, Diagram, Ending, Point, SpecialPoint};
 use rusqlite::types::Value;
 use rusqlite::{Connection, params, params_from_iter};
 use std::collections::HashMap;
+use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -18,6 +19,8 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 /// If writing fails (the disk is full, say) it asks every branch to stop; [`Recorder::finish`] then returns the reason.
 pub struct Recorder {
     path: PathBuf,
+    /// Held as long as the run writes.
+    _lock: Option<File>,
     insert_point: String,
     insert_special: String,
     insert_response: String,
@@ -29,7 +32,36 @@ pub struct Recorder {
 struct State {
     connection: Connection,
     numbers: HashMap<String, i64>,
-    failure: Option<rusqlite::Error>,
+    /// Which file the path led to in the beginning.
+    file: Option<Identity>,
+    failure: Option<RunFileError>,
+}
+
+/// Device and number of a file.
+type Identity = (u64, u64);
+
+#[cfg(unix)]
+fn identity(path: &Path) -> Option<Identity> {
+    use std::os::unix::fs::MetadataExt;
+    std::fs::metadata(path).ok().map(|data| (data.dev(), data.ino()))
+}
+
+#[cfg(not(unix))]
+fn identity(path: &Path) -> Option<Identity> {
+    path.exists().then_some((0, 0))
+}
+
+/// A file beside the run file that whoever writes there has locked. The lock ends with the process, however that ends.
+fn lock(folder: &Path) -> Result<Option<File>, RunFileError> {
+    let path = folder.join("run.lock");
+    let open = File::options().create(true).write(true).truncate(false).open(&path);
+    let file = open.map_err(|e| RunFileError::Folder(folder.to_path_buf(), e))?;
+    match file.try_lock() {
+        Ok(()) => Ok(Some(file)),
+        Err(TryLockError::WouldBlock) => Err(RunFileError::Busy(path_in(folder))),
+        // Some file systems have no locks.
+        Err(TryLockError::Error(_)) => Ok(None),
+    }
 }
 
 impl Recorder {
@@ -40,9 +72,13 @@ impl Recorder {
             return Err(RunFileError::Exists(path));
         }
         std::fs::create_dir_all(folder).map_err(|e| RunFileError::Folder(folder.to_path_buf(), e))?;
+        let lock = lock(folder)?;
         // SQLite's own words for a folder without write permission name neither the folder nor the reason.
-        std::fs::File::create_new(&path).map_err(|e| RunFileError::Folder(folder.to_path_buf(), e))?;
-        Recorder::begin(path, study)
+        File::create_new(&path).map_err(|e| match e.kind() {
+            std::io::ErrorKind::AlreadyExists => RunFileError::Exists(path.clone()),
+            _ => RunFileError::Folder(folder.to_path_buf(), e),
+        })?;
+        Recorder::begin(path, lock, study)
     }
 
     /// Removes the run in `folder`, if there is one; any other file of that name stays and is an error.
@@ -52,6 +88,7 @@ impl Recorder {
             return Ok(());
         }
         drop(open(&path, false)?);
+        drop(lock(folder)?);
         for end in ["", "-wal", "-shm"] {
             let mut file = path.clone().into_os_string();
             file.push(end);
@@ -72,14 +109,18 @@ impl Recorder {
         if !path.exists() {
             return Ok((Recorder::create(folder, study)?, Diagram::default()));
         }
-        let mut connection = match open(&path, true)? {
-            Open::Empty => return Ok((Recorder::begin(path, study)?, Diagram::default())),
+        // Whether it is a run comes first: a file of something else is not locked.
+        let opened = open(&path, true)?;
+        let lock = lock(folder)?;
+        let mut connection = match opened {
+            Open::Empty => return Ok((Recorder::begin(path, lock, study)?, Diagram::default())),
             Open::Run(connection) => connection,
         };
+        sound(&connection, &path)?;
         let text = |key: &str| {
             connection
                 .query_row("SELECT value FROM meta WHERE key = ?", [key], |row| row.get::<_, String>(0))
-                .map_err(|e| RunFileError::Database(path.clone(), e))
+                .map_err(|e| RunFileError::from_sqlite(&path, e))
         };
         if text("model")? != study.model_text {
             return Err(RunFileError::Changed(path, "model"));
@@ -87,16 +128,17 @@ impl Recorder {
         if text("study")? != study.text {
             return Err(RunFileError::Changed(path, "study"));
         }
-        modernise(&mut connection).map_err(|e| RunFileError::Database(path.clone(), e))?;
+        connection.pragma_update(None, "journal_mode", "WAL").map_err(|e| RunFileError::from_sqlite(&path, e))?;
+        modernise(&mut connection).map_err(|e| RunFileError::from_sqlite(&path, e))?;
         let mut diagram = load_diagram(&connection, &path, Part::Everything)?;
         let stopped = |end: &mut Option<Ending>| *end = end.take().filter(|ending| *ending != Ending::Stopped);
         diagram.branches.iter_mut().flat_map(|branch| &mut branch.ends).for_each(stopped);
-        let recorder = Recorder::over(path, connection, study)?;
+        let recorder = Recorder::over(path, lock, connection, study)?;
         Ok((recorder, diagram))
     }
 
-    fn begin(path: PathBuf, study: &Study) -> Result<Recorder, RunFileError> {
-        let failed = |e| RunFileError::Database(path.clone(), e);
+    fn begin(path: PathBuf, lock: Option<File>, study: &Study) -> Result<Recorder, RunFileError> {
+        let failed = |e| RunFileError::from_sqlite(&path, e);
         let mut connection = Connection::open(&path).map_err(failed)?;
         // A profile fills several pages of the usual size.
         connection.pragma_update(None, "page_size", 16384).map_err(failed)?;
@@ -118,11 +160,16 @@ impl Recorder {
         transaction.pragma_update(None, "application_id", APPLICATION_ID).map_err(failed)?;
         transaction.pragma_update(None, "user_version", FORMAT_VERSION).map_err(failed)?;
         transaction.commit().map_err(failed)?;
-        Recorder::over(path, connection, study)
+        Recorder::over(path, lock, connection, study)
     }
 
-    fn over(path: PathBuf, connection: Connection, study: &Study) -> Result<Recorder, RunFileError> {
-        let failed = |e| RunFileError::Database(path.clone(), e);
+    fn over(
+        path: PathBuf,
+        lock: Option<File>,
+        connection: Connection,
+        study: &Study,
+    ) -> Result<Recorder, RunFileError> {
+        let failed = |e| RunFileError::from_sqlite(&path, e);
         connection.pragma_update(None, "synchronous", "NORMAL").map_err(failed)?;
         connection.busy_timeout(std::time::Duration::from_secs(10)).map_err(failed)?;
         let numbers = {
@@ -138,18 +185,28 @@ impl Recorder {
             insert_special: insert("special_points", &special, &columns),
             insert_response: responses::insert(&study.model),
             shown: columns.names().count(),
-            state: Mutex::new(State { connection, numbers, failure: None }),
+            state: Mutex::new(State { connection, numbers, file: identity(&path), failure: None }),
             path,
+            _lock: lock,
         })
     }
 
     /// Closes the file. The error is the first one met while recording.
     pub fn finish(self) -> Result<(), RunFileError> {
         let state = self.state.into_inner().unwrap_or_else(PoisonError::into_inner);
-        match state.failure {
-            Some(error) => Err(RunFileError::Database(self.path, error)),
-            None => state.connection.close().map_err(|(_, error)| RunFileError::Database(self.path, error)),
+        if let Some(error) = state.failure {
+            return Err(error);
         }
+        if identity(&self.path) != state.file {
+            return Err(RunFileError::Vanished(self.path));
+        }
+        // One file that needs no others, unless someone is reading it just now.
+        let _ = state.connection.pragma_update(None, "journal_mode", "DELETE");
+        state.connection.close().map_err(|(_, error)| RunFileError::from_sqlite(&self.path, error))?;
+        if let Some(folder) = self.path.parent() {
+            let _ = std::fs::remove_file(folder.join("run.lock"));
+        }
+        Ok(())
     }
 
     fn locked(&self) -> MutexGuard<'_, State> {
@@ -175,7 +232,11 @@ impl Observer for Recorder {
     fn observe(&self, event: Event) -> Verdict {
         let mut state = self.locked();
         if state.failure.is_none() {
-            state.failure = self.record(&mut state, event).err();
+            state.failure = if identity(&self.path) == state.file {
+                self.record(&mut state, event).err().map(|error| RunFileError::from_sqlite(&self.path, error))
+            } else {
+                Some(RunFileError::Vanished(self.path.clone()))
+            };
         }
         if state.failure.is_some() { Verdict::Stop } else { Verdict::Continue }
     }

@@ -257,6 +257,11 @@ pub fn examined(problem: &mut dyn ZeroProblem, u: Vec<f64>, tangent: Vec<f64>, d
     Station { point, u, tangent, mesh: problem.mesh(), roomier: None, share: 1.0 }
 }
 
+/// Estimates the error of the spectrum of a station, at which the problem was factorised last.
+pub fn doubted(problem: &mut dyn ZeroProblem, found: &mut Station) {
+    found.point.trust.spectrum = problem.spectrum_error(&found.u, &found.point.spectrum);
+}
+
 /// A multiplier closer to the unit circle than this many defects might lie on its other side …
 const CERTAIN: f64 = 20.0;
 /// … and is computed once more with the tolerance multiplied by this.
@@ -342,6 +347,7 @@ pub fn refine(
                 found.share = (4.0 * found.share).min(1.0);
             }
             found.roomier = problem.better_mesh(&found.u, 0.5 * tolerance);
+            doubted(problem, &mut found);
             return Ok(found);
         }
         u = found.u;

@@ -5,7 +5,7 @@
 //! that the special point found does not explain, or while a monitor bends so much that it may have touched zero and come
 //! back. What stays unexplained at the end of that is recorded as such: no silent change of stability.
 
-use super::corrector::{Aim, Failure, Station, refine};
+use super::corrector::{Aim, Failure, Station, doubted, refine};
 use super::follow::Follow;
 use super::locate::{Located, Stretch, locate};
 use super::straddle::straddle;
@@ -185,7 +185,13 @@ impl Follow<'_> {
         self.monitors[monitor].confirms(&left.point) || self.monitors[monitor].confirms(&right.point)
     }
 
-    fn special(&self, kind: Kind, station: Station, before: i64, after: i64, error: f64) -> Box<SpecialPoint> {
+    fn special(&mut self, kind: Kind, mut station: Station, before: i64, after: i64, error: f64) -> Box<SpecialPoint> {
+        if station.point.trust.spectrum.is_nan() {
+            self.place(&station);
+            if self.problem.factorise(&station.u, &station.tangent).is_ok() {
+                doubted(self.problem, &mut station);
+            }
+        }
         let (before, after) = if self.direction > 0.0 { (before, after) } else { (after, before) };
         Box::new(SpecialPoint {
             kind,

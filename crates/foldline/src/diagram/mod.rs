@@ -43,6 +43,9 @@ pub struct Trust {
     pub trivial_defect: f64,
     /// |log ∏μ - ∫ tr J dt|; 0 for equilibria.
     pub liouville_defect: f64,
+    /// Estimated error of the eigenvalues or multipliers, relative to the larger of 1 and their modulus; NaN where it was not
+    /// estimated.
+    pub spectrum: f64,
 }
 
 /// What a point cost.

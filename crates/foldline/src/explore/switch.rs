@@ -6,7 +6,7 @@
 
 use super::System;
 use super::growth::{Beginning, problem_of, setting};
-use crate::continuation::corrector::{Plane, Station, correct, settle, station};
+use crate::continuation::corrector::{Plane, Station, correct, doubted, settle, station};
 use crate::continuation::{Failure, Settings};
 use crate::contract::{Examination, ZeroProblem};
 use crate::diagram::{Cost, Cycle, Ending, Family, Kind, Mesh, Point, Solution, SpecialPoint, Trust};
@@ -102,7 +102,8 @@ fn first_point(
     let (mut u, mut cost) = (guess.clone(), Cost::default());
     correct(problem, settings, &plane, &mut u, &mut cost)?;
     let close = settings.closeness(&problem.mesh(), plane.distance);
-    let found = station(problem, u, &plane.row, close, 1.0, &mut cost)?;
+    let mut found = station(problem, u, &plane.row, close, 1.0, &mut cost)?;
+    doubted(problem, &mut found);
     let trust = found.point.trust;
     let defect = trust.trivial_defect.max(trust.liouville_defect);
     if trust.discretisation <= 2.0 * settings.tolerance && defect <= 5.0 * settings.tolerance {
@@ -193,6 +194,7 @@ pub fn doubled_edge(system: &System, free: usize, at: &SpecialPoint, next: &Poin
             // Where the special point is interpolated it is no nearer to a solution than that.
             discretisation: once.trust.discretisation.max(at.error),
             residual: once.trust.residual,
+            spectrum: 2.0 * once.trust.spectrum,
         },
     };
     Some(problem.point(&base, &tangent, examination))

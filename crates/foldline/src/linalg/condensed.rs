@@ -131,6 +131,16 @@ impl<T: Lane> Condensed<T> {
         }
     }
 
+    /// Writes how the inner nodes of interval j follow from its left end, `[m][n × n]`, once it is condensed.
+    pub fn inner(&self, j: usize, to: &mut [f64]) {
+        let (n, width, inner) = (self.n, self.n + self.q, self.m * self.n);
+        let (lane, place) = (j / self.length, j % self.length);
+        for (k, row) in to.chunks_exact_mut(n).enumerate() {
+            let own = (place * inner + self.slot(k / n, k % n)) * width;
+            row.iter_mut().zip(&self.coupling[own..own + n]).for_each(|(x, c)| *x = -c.lanes()[lane]);
+        }
+    }
+
     /// Condenses every interval: `interior`, `coupling` and `border` must be filled.
     ///
     /// # Errors

@@ -56,6 +56,11 @@ impl System {
         either!(self, s => s.resize(intervals));
     }
 
+    /// See [`Condensed::inner`].
+    pub fn inner(&self, j: usize, to: &mut [f64]) {
+        either!(self, s => s.inner(j, to));
+    }
+
     /// See [`Condensed::transition`].
     pub fn transition(&self, j: usize, to: &mut [f64]) {
         either!(self, s => s.transition(j, to));

@@ -8,6 +8,7 @@ use crate::diagram::{Mesh, Point, Solution, Trust};
 use crate::linalg::{lu, max_abs};
 use crate::problem::extremes;
 use crate::stability::eigenvalues;
+use num_complex::Complex64;
 
 /// Equilibria in one free parameter (a curve) or several.
 pub struct EquilibriumProblem<'a> {
@@ -129,6 +130,12 @@ impl ZeroProblem for EquilibriumProblem<'_> {
         let residual = (0..n).map(|i| (self.f[i] / (rate * self.scale[i])).abs()).fold(0.0, f64::max);
         let ranges = extremes::of_state(self.setting.field, &self.setting.at(&u[n..]), &u[..n]);
         Examination { spectrum, unstable, ranges, trust: Trust { residual, ..Trust::default() } }
+    }
+
+    fn spectrum_error(&mut self, _u: &[f64], spectrum: &[Complex64]) -> f64 {
+        // Rounding moves two eigenvalues that meet by the root of its size.
+        let size = spectrum.iter().fold(1.0f64, |most, z| most.max(z.norm()));
+        4.0 * f64::EPSILON.sqrt() * size
     }
 
     fn margin(&self, at: &Point) -> f64 {

@@ -21,6 +21,7 @@
 use crate::contract::{Condition, Examination, Singular, ZeroProblem};
 use crate::diagram::{Kind, Mesh, Point};
 use crate::linalg::lu;
+use num_complex::Complex64;
 
 /// A surface with a condition held.
 pub struct Held<'a> {
@@ -243,6 +244,10 @@ impl ZeroProblem for Held<'_> {
 
     fn finer_mesh(&self) -> Option<Mesh> {
         self.surface.finer_mesh()
+    }
+
+    fn spectrum_error(&mut self, u: &[f64], spectrum: &[Complex64]) -> f64 {
+        self.surface.spectrum_error(&u[self.extra()..], spectrum)
     }
 
     fn examine(&mut self, u: &[f64]) -> Examination {

@@ -2,12 +2,39 @@
 
 use super::CycleProblem;
 use crate::contract::{Batch, Parameters, ZeroProblem};
+use crate::linalg::{max_abs, panel};
 use crate::problem::defect::{self, Defect};
+use num_complex::Complex64;
+
+/// Stated error of multipliers over the estimated one.
+const SPECTRUM_SAFE: f64 = 2.0;
+/// What rounding adds.
+const SPECTRUM_ROUNDING: f64 = 1e-9;
+
+/// Each multiplier against the nearest of the other list that is left, the largest first: the largest difference, relative to
+/// the larger of 1 and the modulus.
+fn spectrum_difference(spectrum: &[Complex64], other: &[Complex64]) -> f64 {
+    let mut own: Vec<Complex64> = spectrum.to_vec();
+    own.sort_by(|a, b| b.norm().total_cmp(&a.norm()));
+    let mut left = other.to_vec();
+    let mut most = 0.0f64;
+    for z in own {
+        let distance = |w: &Complex64| (w - z).norm();
+        let nearest = (0..left.len()).min_by(|a, b| distance(&left[*a]).total_cmp(&distance(&left[*b])));
+        let Some(nearest) = nearest else { return f64::NAN };
+        most = most.max(distance(&left.remove(nearest)) / z.norm().max(1.0));
+    }
+    most
+}
 
 /// Errors and the unknowns they belong to.
 pub(super) struct Measured {
     at: Vec<f64>,
     errors: Vec<f64>,
+    /// The part of the error that goes on from interval to interval, in the layout of the unknowns.
+    shift: Vec<f64>,
+    /// The part within intervals, `[n][m + 1][N]` at the sample points.
+    within: Vec<f64>,
 }
 
 impl CycleProblem<'_> {
@@ -17,16 +44,57 @@ impl CycleProblem<'_> {
         if let Some(known) = self.measured.borrow().as_ref().filter(|known| known.at == u) {
             return known.errors.clone();
         }
-        let errors = self.measured_errors(u);
-        self.measured.replace(Some(Measured { at: u.to_vec(), errors: errors.clone() }));
+        let measured = self.measured_errors(u);
+        let errors = measured.errors.clone();
+        self.measured.replace(Some(measured));
         errors
     }
 
-    fn measured_errors(&self, u: &[f64]) -> Vec<f64> {
+    /// Estimated error of the multipliers `spectrum` at `u`: they change by it where the transitions of all intervals are made more
+    /// accurate, with the Jacobian not along the profile but along the profile without its estimated error. Identities
+    /// between multipliers see little of this error, which is large where the Jacobian changes sharply.
+    pub(super) fn multiplier_error(&self, u: &[f64], spectrum: &[Complex64]) -> f64 {
+        self.errors(u);
+        let (n, m, count, size) = (self.n, self.scheme.degree, self.intervals(), self.profile_size());
+        let (better, mut states) = match self.measured.borrow().as_ref() {
+            Some(known) => {
+                let better: Vec<f64> = u.iter().zip(&known.shift).map(|(u, e)| u - e).collect();
+                (better, known.within.clone())
+            }
+            None => return f64::NAN,
+        };
+        let lanes = count * (m + 1);
+        let nodes = panel::by_component(&better[..size], m + 1, n);
+        let mut values = vec![0.0; lanes];
+        for (own, nodes) in states.chunks_exact_mut(lanes).zip(nodes.chunks_exact(lanes)) {
+            self.sampling.sampled(nodes, count, &mut values);
+            own.iter_mut().zip(&values).for_each(|(w, x)| *w = x - *w);
+        }
+        let parameters = self.setting.at(&better[size + 1..]);
+        let (mut f, mut fx) = (vec![0.0; n * lanes], vec![0.0; n * n * lanes]);
+        let batch = Batch { lanes, states: &states, parameters: Parameters::Shared(&parameters) };
+        self.setting.field.linearise(batch, &[], &mut f, &mut fx, &mut []);
+        if !max_abs(&fx).is_finite() || !max_abs(&better).is_finite() {
+            return f64::NAN;
+        }
+        let (mut inner, mut jacobians) = (vec![0.0; (m + 1) * n * n], vec![0.0; (m + 1) * n * n]);
+        inner[..n * n].iter_mut().enumerate().for_each(|(k, x)| *x = f64::from(u8::from(k / n == k % n)));
+        let found = self.floquet_with(&better, |j, transition| {
+            self.system.inner(j, &mut inner[n * n..]);
+            let time = self.h(j) * better[size];
+            for (k, x) in jacobians.iter_mut().enumerate() {
+                *x = time * fx[k % (n * n) * lanes + k / (n * n) * count + j];
+            }
+            defect::corrected(&self.sampling, &inner, &jacobians, n, transition);
+        });
+        SPECTRUM_SAFE * spectrum_difference(spectrum, &found.multipliers) + SPECTRUM_ROUNDING
+    }
+
+    fn measured_errors(&self, u: &[f64]) -> Measured {
         let size = self.profile_size();
         let scale = self.relative_scale(u);
         let parameters = self.setting.at(&u[size + 1..]);
-        let Defect { local, ends, sources, misses } = defect::measure(
+        let Defect { local, within, ends, sources, misses } = defect::measure(
             self.setting.field,
             &parameters,
             &u[..size],
@@ -54,7 +122,8 @@ impl CycleProblem<'_> {
             .collect();
         let largest = sizes.iter().fold(f64::MIN_POSITIVE, |m: f64, s| m.max(*s));
         let gain = if response.is_finite() { response / largest } else { 1.0 };
-        local.iter().zip(&sizes).map(|(l, s)| l + gain * s).collect()
+        let errors = local.iter().zip(&sizes).map(|(l, s)| l + gain * s).collect();
+        Measured { at: u.to_vec(), errors, shift, within }
     }
 
     pub(super) fn flow_at_nodes(&self, u: &[f64]) -> Vec<f64> {

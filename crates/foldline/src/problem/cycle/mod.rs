@@ -35,8 +35,9 @@ use crate::linalg::panel;
 use crate::linalg::system::System;
 use crate::linalg::{larger, max_abs};
 use crate::special::collapse;
-use crate::stability::floquet;
+use crate::stability::floquet::{self, Floquet};
 use errors::Measured;
+use num_complex::Complex64;
 use std::cell::RefCell;
 
 /// Error of every interval of a new mesh, in tolerances: so much less than 1 that the mesh serves for the next points too …
@@ -184,6 +185,25 @@ impl<'a> CycleProblem<'a> {
             }
         }
         (0..self.n).all(|c| apart[c] <= collapse::NEARLY * (highest[c] - lowest[c]))
+    }
+
+    /// Multipliers from the last factorisation, which belongs to `u`.
+    fn floquet(&self, u: &[f64]) -> Floquet {
+        self.floquet_with(u, |_, _| ())
+    }
+
+    /// The same with every transition, `[n × n]`, changed as said.
+    fn floquet_with(&self, u: &[f64], mut change: impl FnMut(usize, &mut [f64])) -> Floquet {
+        let (n, count) = (self.n, self.intervals());
+        let mut transitions = vec![0.0; count * n * n];
+        for (j, own) in transitions.chunks_exact_mut(n * n).enumerate() {
+            self.system.transition(j, own);
+            change(j, own);
+            for (k, g) in own.iter_mut().enumerate() {
+                *g *= self.scale[k % n] / self.scale[k / n];
+            }
+        }
+        floquet::multipliers(&transitions, &self.flow_at_nodes(u), n)
     }
 
     fn block(&self) -> usize {
@@ -347,15 +367,8 @@ impl ZeroProblem for CycleProblem<'_> {
     }
 
     fn examine(&mut self, u: &[f64]) -> Examination {
-        let (n, count, size) = (self.n, self.intervals(), self.profile_size());
-        let mut transitions = vec![0.0; count * n * n];
-        for (j, own) in transitions.chunks_exact_mut(n * n).enumerate() {
-            self.system.transition(j, own);
-            for (k, g) in own.iter_mut().enumerate() {
-                *g *= self.scale[k % n] / self.scale[k / n];
-            }
-        }
-        let found = floquet::multipliers(&transitions, &self.flow_at_nodes(u), n);
+        let size = self.profile_size();
+        let found = self.floquet(u);
         let scale = self.relative_scale(u);
         let errors = self.errors(u);
         let mut r = vec![0.0; u.len()];
@@ -368,8 +381,13 @@ impl ZeroProblem for CycleProblem<'_> {
             residual,
             trivial_defect: (found.multipliers[0].re - 1.0).abs(),
             liouville_defect: (found.log_product - self.trace).abs(),
+            spectrum: f64::NAN,
         };
         Examination { spectrum: found.multipliers, unstable: found.unstable, ranges, trust }
+    }
+
+    fn spectrum_error(&mut self, u: &[f64], spectrum: &[Complex64]) -> f64 {
+        self.multiplier_error(u, spectrum)
     }
 
     fn margin(&self, at: &Point) -> f64 {
