@@ -1,4 +1,4 @@
-//! `foldline-campaign [COUNT] [--only TEXT] [--classical STARTS]`: what `cargo xtask campaign` runs.
+//! `foldline-campaign [COUNT] [OPTIONS]`: what `cargo xtask campaign` runs.
 
 use foldline_campaign::{campaign, cases, rotor};
 use std::process::ExitCode;
@@ -64,7 +64,7 @@ fn answer() -> Result<bool, String> {
         if trace {
             report.traces.iter().for_each(|text| println!("{text}"));
         }
-        for bad in report.honesty.iter().filter(|h| trace && !(h.multipliers <= h.stated_multipliers)) {
+        for bad in report.honesty.iter().filter(|h| trace && h.multipliers > h.stated_multipliers) {
             println!("{}: multipliers {:.1e}, stated {:.1e}", bad.place, bad.multipliers, bad.stated_multipliers);
         }
         for bad in report.honesty.iter().filter(|h| h.found > h.stated) {

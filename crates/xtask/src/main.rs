@@ -1,4 +1,4 @@
-//! Development tasks: `cargo xtask test | check | bench | reproduce | kill | docs`. What continuous integration runs, and nothing
+//! Development tasks: `cargo xtask test | check | bench | reproduce | kill | campaign | docs`. What continuous integration runs, and nothing
 //! else.
 
 mod kill;
@@ -16,6 +16,8 @@ const USAGE: &str = "cargo xtask TASK
               not the one in crates/foldline-reproduce/verdicts.txt, which `reproduce --write` renews
   kill        runs of the reference study killed at random instants, 100 or as many as a number says: each must resume, lose
               no point and find the same special points (docs/book/trust.md)
+  campaign    random rotors and classical problems, 200 and 5 starts of each, or as many as numbers say: each branch followed in several
+              ways must come out the same, and errors must be what is stated (docs/book/trust.md)
   docs        the documentation of the source, without warnings";
 
 fn main() -> ExitCode {
@@ -26,6 +28,7 @@ fn main() -> ExitCode {
         "bench" => bench(&std::env::args().skip(2).collect::<Vec<String>>()),
         "reproduce" => reproduce(std::env::args().nth(2).as_deref() == Some("--write")),
         "kill" => kill::test(std::env::args().nth(2).and_then(|times| times.parse().ok()).unwrap_or(100)),
+        "campaign" => campaign(&std::env::args().skip(2).collect::<Vec<String>>()),
         "docs" => docs(),
         _ => {
             eprintln!("{USAGE}");
@@ -94,6 +97,12 @@ fn bench(arguments: &[String]) -> bool {
     let whole = !arguments.contains(&"--only") && !arguments.contains(&"--quick");
     let write: &[&str] = if whole { &["--write"] } else { &[] };
     cargo(&[&build[..], &["--bins", "--examples"]].concat()) && cargo(&[&arguments[..], write].concat())
+}
+
+/// In a release build; the options are those of the program.
+fn campaign(arguments: &[String]) -> bool {
+    let own = ["run", "--release", "--quiet", "--package", "foldline-campaign", "--"];
+    cargo(&own.into_iter().chain(arguments.iter().map(String::as_str)).collect::<Vec<&str>>())
 }
 
 /// Everything from nothing; a figure that fails, a branch that ends short or a verdict that has changed is a failure.

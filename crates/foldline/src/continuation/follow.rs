@@ -69,7 +69,9 @@ const SURE: f64 = 1e-4;
 const CROSSING: f64 = 2e-3;
 
 /// Growth of the period while the parameter stands still, having moved before, that means that the period has no bound.
-const LONG: f64 = 1.5;
+const LONG: f64 = 2.0;
+/// Slope of a branch in its parameter below which it does not change along the branch but for rounding.
+pub(super) const STANDS: f64 = 1e-9;
 /// Change of the logarithm of the period that shows whether the parameter still moves with it.
 const SHOWN: f64 = 0.01;
 /// Steps given up in turn because no permitted mesh is fine enough, until the side ends for that.
@@ -89,7 +91,7 @@ pub fn follow(
     let mut position = left.point.position;
     let mut trail = previous.map(|p| walk.trail(&p, &left));
     let first_period = walk.home.unwrap_or(&left.point).solution.period();
-    let (mut ever_moved, mut moved) = (false, true);
+    let (mut ever_moved, mut moved) = (left.slope().abs() > STANDS, true);
     // Parameter and period where the parameter was last seen to move, or to stand.
     let mut mark = left.point.solution.period().map(|period| (left.parameter(), period));
     let mut moving = mark;

@@ -6,7 +6,7 @@
 //! back. What stays unexplained at the end of that is recorded as such: no silent change of stability.
 
 use super::corrector::{Aim, Failure, Station, doubted, refine};
-use super::follow::Follow;
+use super::follow::{Follow, STANDS};
 use super::locate::{Located, Stretch, locate};
 use super::straddle::straddle;
 use crate::diagram::{Cost, Kind, Point, SpecialPoint};
@@ -261,7 +261,7 @@ fn may_double(history: &History, left: &Station, right: &Station, length: f64) -
 /// Whether the parameter does not change along the branch, but for rounding. Then every solution of the family has an
 /// eigenvalue 0 (a second multiplier 1), and neither the sign of that nor of the change of the parameter means anything.
 fn stands(station: &Station) -> bool {
-    station.slope().abs() < 1e-9
+    station.slope().abs() < STANDS
 }
 
 /// Whether jumps of these sizes, each with either sign, lead from one count to the other.

@@ -86,8 +86,8 @@ pub struct Check {
     pub parameter: f64,
     /// What is compared.
     pub quantity: Quantity,
-    /// The error that the diagram states, and what the comparison itself may be off by; `None` where it states none: no bound is
-    /// known for multipliers.
+    /// The error that the diagram states, and what the comparison itself may be off by; `None` where it states none, as runs of
+    /// earlier versions for multipliers.
     pub stated: Option<f64>,
     /// The difference that was found.
     pub found: f64,

@@ -135,7 +135,8 @@ impl Part<'_> {
         let pairs = matched(point.free_spectrum(), found);
 
         let apart = pairs.iter().fold(0.0, |m, (a, b)| larger(m, (a - b).norm() / a.norm().max(1.0)));
-        out.checks.push(self.check(point, Quantity::Spectrum, None, apart));
+        let stated = Some(point.trust.spectrum + noise).filter(|stated| stated.is_finite());
+        out.checks.push(self.check(point, Quantity::Spectrum, stated, apart));
         let wrong = pairs.iter().filter(|(a, b)| (a.norm() > 1.0) != (b.norm() > 1.0));
         let side = wrong.fold(0.0, |m, (_, b)| larger(m, (b.norm() - 1.0).abs()));
         out.checks.push(self.check(point, Quantity::Stability, Some(noise), side));
