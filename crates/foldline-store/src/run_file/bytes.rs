@@ -60,3 +60,11 @@ impl Checksum {
         self.0 as i64
     }
 }
+
+/// That of study and model, in hexadecimal digits.
+pub(super) fn texts_checksum(study: &str, model: &str) -> String {
+    let mut sum = Checksum::new();
+    sum.bytes(study.as_bytes());
+    sum.bytes(model.as_bytes());
+    format!("{:016x}", sum.0)
+}

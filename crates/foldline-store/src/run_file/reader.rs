@@ -1,5 +1,6 @@
 //! Reading a run back.
 
+use super::bytes::texts_checksum;
 use super::rows::{ending_in, held_in, kind_named, origin_in, point_in};
 use super::{APPLICATION_ID, FORMAT_VERSION, RunFileError, path_in};
 use foldline::diagram::{Branch, Diagram, Family, Point, SpecialPoint};
@@ -67,9 +68,15 @@ pub fn load_part(folder: &Path, part: Part) -> Result<Recorded, RunFileError> {
     }
     // One transaction, so that a run that is still growing is seen at one instant.
     connection.execute_batch("BEGIN").map_err(failed)?;
-    let text = |key: &str| {
+    let text = |key: &str| -> Result<String, RunFileError> {
         connection.query_row("SELECT value FROM meta WHERE key = ?", [key], |row| row.get(0)).map_err(failed)
     };
+    // Files of versions before 4 have none.
+    if let Ok(stated) = text("texts_checksum")
+        && stated != texts_checksum(&text("study")?, &text("model")?)
+    {
+        return Err(RunFileError::Damaged(path, "study and model do not have their checksum".to_string()));
+    }
     let notes = {
         let mut statement = connection.prepare("SELECT branch, note FROM notes ORDER BY rowid").map_err(failed)?;
         let rows = statement.query_map([], |row| Ok((row.get(0)?, row.get(1)?))).map_err(failed)?;

@@ -1,5 +1,6 @@
 //! Writing a run as it happens.
 
+use super::bytes::texts_checksum;
 use super::reader::{Open, Part, load_diagram, open, point_at, sound};
 use super::rows::{ending_values, held_values, origin_values, values_of};
 use super::schema::{Columns, create, insert, upgrade};
@@ -382,6 +383,7 @@ fn description(study: &Study) -> Vec<(&'static str, String)> {
         ("study", study.text.clone()),
         ("model_file", study.model_file.clone()),
         ("model", study.model_text.clone()),
+        ("texts_checksum", texts_checksum(&study.text, &study.model_text)),
     ]
 }
 

@@ -336,8 +336,8 @@ pub fn refine(
         let close = |defect: f64| found.point.free_spectrum().iter().any(|z| z.norm().ln().abs() < CERTAIN * defect);
         let certain = !settings.stability || tightened || round == 3 || !close(defect);
         if accurate && certain {
-            // What is stated is twice the estimate.
-            if trust.discretisation > 3.0 * settings.tolerance {
+            // What is stated is three times the estimate.
+            if trust.discretisation > 4.5 * settings.tolerance {
                 return Err(Failure::Mesh(trust.discretisation));
             }
             // Errors of multipliers shrink at least as fast as those of the profile.

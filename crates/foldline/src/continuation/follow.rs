@@ -69,7 +69,7 @@ const SURE: f64 = 1e-4;
 const CROSSING: f64 = 2e-3;
 
 /// Growth of the period while the parameter stands still, having moved before, that means that the period has no bound.
-const LONG: f64 = 2.0;
+const LONG: f64 = 3.0;
 /// Slope of a branch in its parameter below which it does not change along the branch but for rounding.
 pub(super) const STANDS: f64 = 1e-9;
 /// Change of the logarithm of the period that shows whether the parameter still moves with it.
@@ -91,7 +91,7 @@ pub fn follow(
     let mut position = left.point.position;
     let mut trail = previous.map(|p| walk.trail(&p, &left));
     let first_period = walk.home.unwrap_or(&left.point).solution.period();
-    let (mut ever_moved, mut moved) = (left.slope().abs() > STANDS, true);
+    let (mut ever_moved, mut moved, mut still) = (left.slope().abs() > STANDS, true, 0);
     // Parameter and period where the parameter was last seen to move, or to stand.
     let mut mark = left.point.solution.period().map(|period| (left.parameter(), period));
     let mut moving = mark;
@@ -195,14 +195,16 @@ pub fn follow(
             let here = (right.parameter(), now);
             if (now / then.1).ln().abs() > SHOWN {
                 moved = walk.moves(then, here);
+                still = if moved { 0 } else { still + 1 };
                 ever_moved |= moved;
                 mark = Some(here);
                 if moved {
                     moving = mark;
                 }
             }
-            let grown = moving.is_some_and(|(_, period)| now > LONG * period);
-            if now > walk.settings.period_growth * first || (ever_moved && !moved && grown) {
+            let since = moving.map_or(first, |(_, period)| period);
+            let grown = still > 0 && now > LONG * since || still > 1 && now > LONG * first;
+            if now > walk.settings.period_growth * first || (ever_moved && grown) {
                 return Ending::PeriodUnbounded(now);
             }
         }

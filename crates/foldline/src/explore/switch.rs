@@ -106,7 +106,7 @@ fn first_point(
     doubted(problem, &mut found);
     let trust = found.point.trust;
     let defect = trust.trivial_defect.max(trust.liouville_defect);
-    if trust.discretisation <= 2.0 * settings.tolerance && defect <= 5.0 * settings.tolerance {
+    if trust.discretisation <= 3.0 * settings.tolerance && defect <= 5.0 * settings.tolerance {
         return Ok(found);
     }
     problem.anchor(&guess);

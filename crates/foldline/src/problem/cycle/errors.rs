@@ -7,7 +7,7 @@ use crate::problem::defect::{self, Defect};
 use num_complex::Complex64;
 
 /// Stated error of multipliers over the estimated one.
-const SPECTRUM_SAFE: f64 = 2.0;
+const SPECTRUM_SAFE: f64 = 4.0;
 /// What rounding adds.
 const SPECTRUM_ROUNDING: f64 = 1e-9;
 
