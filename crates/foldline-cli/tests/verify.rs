@@ -38,17 +38,31 @@ fn the_reference_run_is_right_and_what_is_changed_in_it_is_found() {
 
     // A special point that says to be elsewhere than it is.
     let file = rusqlite::Connection::open(Path::new(&run).join("run.sqlite")).unwrap();
-    let (row, mut bytes): (i64, Vec<u8>) = file
-        .query_row(
-            "SELECT rowid, parameter_bytes FROM special_points WHERE kind = 'period-doubling' LIMIT 1",
-            [],
-            |row| Ok((row.get(0)?, row.get(1)?)),
-        )
+    let sql = "SELECT rowid, position, unstable, parameter_bytes, spectrum_bytes, range_bytes, scalar_bytes
+               FROM special_points WHERE kind = 'period-doubling' LIMIT 1";
+    let (row, counts, mut lists): (i64, [i64; 2], [Vec<u8>; 4]) = file
+        .query_row(sql, [], |row| {
+            let lists = [row.get(3)?, row.get(4)?, row.get(5)?, row.get(6)?];
+            Ok((row.get(0)?, [row.get(1)?, row.get(2)?], lists))
+        })
         .unwrap();
+    let bytes = &mut lists[0];
     let moved = f64::from_le_bytes(bytes[..8].try_into().unwrap()) + 1e-4;
     bytes[..8].copy_from_slice(&moved.to_le_bytes());
-    file.execute("UPDATE special_points SET parameter_bytes = ? WHERE rowid = ?", rusqlite::params![bytes, row])
-        .unwrap();
+    let change = "UPDATE special_points SET parameter_bytes = ? WHERE rowid = ?";
+    file.execute(change, rusqlite::params![lists[0], row]).unwrap();
+    // The checksum tells that someone has been there …
+    let spoilt = foldline(&["verify", &run, "--sample", "10"]);
+    let said = text(&spoilt.stderr);
+    assert!(spoilt.status.code() == Some(2) && said.contains("do not have their checksum"), "{said}");
+    // … unless they put it right, as docs/book/run-file.md says.
+    let words = lists.concat().chunks_exact(8).map(|w| u64::from_le_bytes(w.try_into().unwrap())).collect::<Vec<u64>>();
+    let sum = counts.map(|count| count as u64).iter().chain(&words).fold(0xcbf2_9ce4_8422_2325u64, |h, word| {
+        let h = (h ^ word).wrapping_mul(0x0100_0000_01b3);
+        h ^ (h >> 32)
+    });
+    let change = "UPDATE special_points SET numbers_checksum = ? WHERE rowid = ?";
+    file.execute(change, rusqlite::params![sum as i64, row]).unwrap();
     drop(file);
     let wrong = foldline(&["verify", &run, "--sample", "10"]);
     let said = text(&wrong.stdout);
