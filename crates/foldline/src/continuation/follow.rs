@@ -263,7 +263,8 @@ impl Follow<'_> {
     /// as small a share of the step as they are of a step of usual length.
     fn sharpen(&mut self, left: &mut Station, step: f64, cost: &mut Cost) {
         let share = (step / (SHORT * self.settings.tolerance)).clamp(SHARPEST, 1.0);
-        if left.mesh.is_empty() || share > 0.5 * left.share {
+        // Curves with something held are smooth where they turn: at their cusps.
+        if left.mesh.is_empty() || !self.settings.stability || share > 0.5 * left.share {
             return;
         }
         left.share = share;
