@@ -107,6 +107,7 @@ fn grown(
     let mut station = polished(&mut *problem, settings, start);
     if station.is_err() && !start.tangent.is_empty() {
         // Next to a fold, or where only the period still changes, the parameter is a bad thing to hold.
+        problem = problem_of(system, branch.free, DEGREE, start, is_doubled(&branch));
         let u = problem.unknowns_of(start);
         problem.anchor(&u);
         let plane = Plane { row: start.tangent.clone(), base: u.clone(), distance: 0.0 };
@@ -256,7 +257,7 @@ fn count(place: &str, branch: &Branch, report: &mut Report) {
         report.ended(end.as_ref().map_or("none", |end| end.code()), 1);
         let explained = end.as_ref().is_some_and(|e| e.complete() || e.code() == "period-unbounded");
         if !explained {
-            let why = end.as_ref().map_or("it was not finished".to_string(), |end| end.to_string());
+            let why = end.as_ref().map_or("it was not finished".to_string(), |end| end.brief());
             report.short.push(format!("{place}: {why}"));
         }
     }

@@ -40,7 +40,8 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
         writeln!(out, "{}", line(attractor))?;
     }
     let samples = typed.samples;
-    writeln!(out, "{samples} samples, {} escaped, {} not settled", census.escaped, census.unsettled)?;
+    let stuck = if census.stuck > 0 { format!(", {} stuck", census.stuck) } else { String::new() };
+    writeln!(out, "{samples} samples, {} escaped{stuck}, {} not settled", census.escaped, census.unsettled)?;
     Ok(Outcome::Done)
 }
 

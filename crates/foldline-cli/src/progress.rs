@@ -102,7 +102,7 @@ impl Progress {
         let live = self.live.lock().unwrap_or_else(PoisonError::into_inner).remove(&branch.name);
         let Some(live) = live else { return };
         live.bar.finish_and_clear();
-        let mut ends: Vec<String> = live.ends.iter().map(Ending::to_string).collect();
+        let mut ends: Vec<String> = live.ends.iter().map(Ending::brief).collect();
         ends.dedup();
         self.say(&format!(
             "{:<28} {:>5} points, {} special: {}",

@@ -71,7 +71,7 @@ fn run(study: &Study, jobs: usize, recorder: Recorder, earlier: Diagram, folder:
     print_special(&diagram, &study.model)?;
     let short = short::lines(&diagram, &study.plan, &study.model);
     let mut err = stderr().lock();
-    short.iter().try_for_each(|line| writeln!(err, "ended short: {line}"))?;
+    short.iter().try_for_each(|line| writeln!(err, "ended short: {}", line.replace('\n', "\n  ")))?;
     if !study.plan.homotopies.is_empty() {
         writeln!(err, "routes: foldline table {} --notes", folder.display())?;
     }

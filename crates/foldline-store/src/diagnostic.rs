@@ -11,9 +11,11 @@ pub struct Diagnostic {
     pub line: usize,
     /// Column in characters, from 1.
     pub column: usize,
-    /// The line of the file.
+    /// The line of the file, or the part of it around the place.
     pub snippet: String,
-    /// How many characters of the line are meant.
+    /// How many characters of the snippet stand before the place.
+    pub mark: usize,
+    /// How many characters of the snippet are meant.
     pub length: usize,
     /// What is wrong.
     pub message: String,
@@ -30,7 +32,7 @@ impl fmt::Display for Diagnostic {
         write!(f, "{margin}--> {}:{}:{}", self.file, self.line, self.column)?;
         if !self.snippet.is_empty() {
             // Tabs are kept in front of the mark, so that it stands under its place however wide they are shown.
-            let before = self.snippet.chars().take(self.column.saturating_sub(1));
+            let before = self.snippet.chars().take(self.mark);
             let indent: String = before.map(|c| if c == '\t' { '\t' } else { ' ' }).collect();
             let marks = "^".repeat(self.length.max(1));
             write!(f, "\n{margin} |\n{number} | {}\n{margin} | {indent}{marks}", self.snippet)?;
@@ -55,6 +57,7 @@ mod tests {
             line: 12,
             column: 6,
             snippet: "\tx = \"tahn(u)\"".into(),
+            mark: 5,
             length: 4,
             message: "there is no function `tahn`".into(),
             hint: Some("did you mean `tanh`?".into()),

@@ -4,7 +4,7 @@
 //! carried back to its line and column in the file. The format is described in docs/book/model-files.md.
 
 use crate::diagnostic::Diagnostic;
-use crate::toml_walk::{Value, Walk, unreadable};
+use crate::toml_walk::{Value, Walk, read_text, unreadable};
 use foldline::model::{Definition, Field, Item, Model, ModelError, ModelSource, Output, Parameter, State};
 use std::collections::HashMap;
 use std::ops::Range;
@@ -17,7 +17,7 @@ const ROOT_KEYS: [&str; 9] =
 /// Reads a model file: the model and the text, verbatim. Every mistake found is returned.
 pub fn read_model(path: &Path) -> Result<(Model, String), Vec<Diagnostic>> {
     let file = path.display().to_string();
-    let text = std::fs::read_to_string(path).map_err(|error| vec![unreadable(&file, "the model file", &error)])?;
+    let text = read_text(path).map_err(|error| vec![unreadable(&file, "the model file", &error)])?;
     Ok((parse_model(&text, &file)?, text))
 }
 

@@ -1,7 +1,7 @@
 //! What of a study was not reached.
 
 use crate::order::leg;
-use foldline::diagram::{Branch, Diagram, Point};
+use foldline::diagram::{Branch, Diagram, Ending, Point};
 use foldline::explore::Plan;
 use foldline::model::Model;
 
@@ -33,12 +33,14 @@ pub fn lines(diagram: &Diagram, plan: &Plan, model: &Model) -> Vec<String> {
         let before = lines.len();
         let short = branch.ends.iter().flatten().filter(|end| !end.complete());
         lines.extend(short.map(|end| format!("{}: {end}", branch.name)));
+        // A branch that did not begin has not begun on either side.
+        lines.dedup();
         if branch.ends.iter().all(Option::is_none) {
             lines.push(format!("{}: it is not finished", branch.name));
         }
         let target = asked.iter().find(|(name, _)| **name == branch.name).and_then(|(_, target)| *target);
         if let Some(target) = target.filter(|target| lines.len() == before && !arrived(branch, &[*target])) {
-            let ends: Vec<String> = branch.ends.iter().flatten().map(|end| end.to_string()).collect();
+            let ends: Vec<String> = branch.ends.iter().flatten().map(Ending::brief).collect();
             let place = place(&[target], model);
             lines.push(format!("{}: it did not arrive at {place}; {}", branch.name, ends.join("; ")));
         }
@@ -67,7 +69,7 @@ fn place(targets: &[(usize, f64)], model: &Model) -> String {
 mod tests {
     use super::*;
     use crate::study_file::{Study, parse_study};
-    use foldline::diagram::{Cost, Ending, Family, Kind, Origin, Solution, Trust};
+    use foldline::diagram::{Cost, Family, Kind, Origin, Solution, Trust};
 
     const MODEL: &str = "name = \"m\"\n[parameters]\nOmega = 1\nkappa = 0\n[states]\nx = \"-x\"\n";
     const STUDY: &str = "model = \"m\"\n[[seed]]\nname = \"s\"\nstate = { x = 0 }\n\

@@ -2,9 +2,18 @@
 
 use crate::diagnostic::Diagnostic;
 use crate::nearest::suggest;
+use std::io::Read;
 use std::ops::Range;
+use std::path::Path;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
+
+/// Mistakes that are noted in one file.
+const MOST: usize = 100;
+/// Longest file that is read, in bytes.
+const LARGEST: u64 = 64 << 20;
+/// Characters of a message, a hint and a line of the file that are shown.
+const LONGEST: usize = 400;
 
 /// A value with its place in the text.
 pub(crate) type Value<'t> = Spanned<DeValue<'t>>;
@@ -30,8 +39,11 @@ impl<'t> Walk<'t> {
         }
     }
 
-    /// Notes a mistake.
+    /// Notes a mistake; those after the first hundred are passed over.
     pub(crate) fn report(&mut self, span: Range<usize>, message: impl Into<String>, hint: impl Into<String>) {
+        if self.found.len() == MOST {
+            return;
+        }
         self.found.push(diagnose(self.file, self.text, span, message.into(), hint.into()));
     }
 
@@ -138,20 +150,63 @@ impl<'t> Walk<'t> {
     }
 }
 
-/// A diagnostic for a byte range of a text.
+/// A diagnostic for a byte range of a text. Of a long line, the part around the place is shown; characters that would do
+/// something to a terminal are written as their code points.
 pub(crate) fn diagnose(file: &str, text: &str, span: Range<usize>, message: String, hint: String) -> Diagnostic {
-    let start = (0..=span.start.min(text.len())).rev().find(|&at| text.is_char_boundary(at)).unwrap_or(0);
+    let boundary = |at: usize| (0..=at.min(text.len())).rev().find(|&at| text.is_char_boundary(at)).unwrap_or(0);
+    let start = boundary(span.start);
     let line_start = text[..start].rfind('\n').map_or(0, |at| at + 1);
     let line_end = text[start..].find('\n').map_or(text.len(), |at| start + at);
-    let end = (start..=span.end.clamp(start, line_end)).rev().find(|&at| text.is_char_boundary(at)).unwrap_or(start);
+    let end = boundary(span.end.clamp(start, line_end)).max(start);
+    let (before, within) = (&text[line_start..start], &text[start..end]);
+    let after = text[end..line_end].trim_end_matches(['\r', ' ', '\t']);
+    let column = before.chars().count() + 1;
+    let lead: String = match before.char_indices().rev().nth(LONGEST / 4) {
+        Some((at, _)) => format!("…{}", &before[at..]),
+        None => before.to_string(),
+    };
+    let (lead, within, after) =
+        (visible(&lead), visible(&shortened(within, LONGEST / 2)), visible(&shortened(after, LONGEST / 4)));
     Diagnostic {
         file: file.to_string(),
         line: text[..start].matches('\n').count() + 1,
-        column: text[line_start..start].chars().count() + 1,
-        snippet: text[line_start..line_end].trim_end().to_string(),
-        length: text[start..end].chars().count().max(1),
-        message,
-        hint: Some(hint),
+        column,
+        mark: lead.chars().count(),
+        length: within.trim_end().chars().count().max(1),
+        snippet: format!("{lead}{within}{after}").trim_end().to_string(),
+        message: visible(&shortened(&message, LONGEST)),
+        hint: Some(visible(&shortened(&hint, 2 * LONGEST))),
+    }
+}
+
+/// At most `most` characters of `text`.
+fn shortened(text: &str, most: usize) -> String {
+    match text.char_indices().nth(most) {
+        Some((end, _)) => format!("{}…", &text[..end]),
+        None => text.to_string(),
+    }
+}
+
+/// The text with control characters, and those that turn the direction of writing or have no width, as code points.
+fn visible(text: &str) -> String {
+    let hidden = |c: char| {
+        let invisible =
+            matches!(c, '\u{200b}'..='\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2060}'..='\u{206f}' | '\u{feff}');
+        invisible || (c.is_control() && c != '\t')
+    };
+    if !text.contains(hidden) {
+        return text.to_string();
+    }
+    text.chars().map(|c| if hidden(c) { c.escape_unicode().to_string() } else { c.to_string() }).collect()
+}
+
+/// The text of a file, unless it is too long to be one of ours or no text.
+pub(crate) fn read_text(path: &Path) -> std::io::Result<String> {
+    let mut text = String::new();
+    let length = std::fs::File::open(path)?.take(LARGEST + 1).read_to_string(&mut text)?;
+    match length as u64 > LARGEST {
+        true => Err(std::io::Error::other(format!("it is longer than {} MiB", LARGEST >> 20))),
+        false => Ok(text),
     }
 }
 
@@ -164,4 +219,27 @@ pub(crate) fn unreadable(file: &str, what: &str, error: &std::io::Error) -> Diag
         _ => "check that the path names a readable text file",
     };
     diagnose(file, "", 0..0, format!("{what} cannot be read: {error}"), hint.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_a_long_line_the_part_around_the_place_is_shown() {
+        let text = format!("a = 1\n{}bad{}\n", "x".repeat(5000), "y".repeat(5000));
+        let at = 6 + 5000;
+        let d = diagnose("f", &text, at..at + 3, "m".repeat(10_000), "h".into());
+        assert_eq!((d.line, d.column, d.length), (2, 5001, 3));
+        assert_eq!(d.snippet.chars().skip(d.mark).take(3).collect::<String>(), "bad");
+        assert!(d.snippet.chars().count() < 500 && d.message.chars().count() < 500);
+    }
+
+    #[test]
+    fn what_a_terminal_would_obey_is_written_as_code_points() {
+        let text = "x = \u{1b}[31m\u{202e}y";
+        let d = diagnose("f", text, 4..5, format!("unexpected {}", '\u{1b}'), "h".into());
+        assert_eq!(d.snippet, "x = \\u{1b}[31m\\u{202e}y");
+        assert_eq!((d.mark, d.length, d.message.as_str()), (4, 6, "unexpected \\u{1b}"));
+    }
 }

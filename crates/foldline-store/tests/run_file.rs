@@ -75,7 +75,10 @@ fn diagram() -> Diagram {
         Some(Ending::StepTooSmall("Newton left its region 7 times".into())),
     ];
     let mut third = Branch::new("third", Family::Cycle, 2, Origin::EndOf("main".into()));
-    third.ends = [Some(Ending::PointLimit(17)), Some(Ending::PeriodUnbounded(1.0 / 3.0))];
+    third.ends = [
+        Some(Ending::SolutionUnbounded("it grew\nlikely cause: an asymptote".into())),
+        Some(Ending::PeriodUnbounded(1.0 / 3.0)),
+    ];
     let origin = Origin::Switch { parent: "third".into(), kind: Kind::PeriodDoubling, parameter: -0.0 };
     let mut curve = Branch::new("curve", Family::Cycle, 0, origin);
     curve.held = Some((Kind::PeriodDoubling, 2));
@@ -295,7 +298,7 @@ fn numbers_can_be_read_by_name_without_this_program() {
     assert_eq!(row, (3.0 / 7.0, 0.0, 1.0 / 3.0, 1));
 }
 
-/// Makes a file of version 3 of one of version 4, then one of version 2.
+/// Makes a file of version 3 of one of version 4 or 5, then one of version 2.
 const WITHOUT_COUNTERS: &str = "
     ALTER TABLE points DROP COLUMN numbers_checksum; ALTER TABLE points DROP COLUMN solution_checksum;
     ALTER TABLE points DROP COLUMN spectrum_error; ALTER TABLE special_points DROP COLUMN spectrum_error;

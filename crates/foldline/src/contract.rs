@@ -61,6 +61,12 @@ pub trait VectorField: Send + Sync {
         0
     }
 
+    /// f `[n]` at one point in twice the working precision: states `[n]`, parameters `[k]` and results are sums of two numbers,
+    /// the larger first. `None` where f is not finite, or the field cannot do that. For checks; it may be slow.
+    fn evaluate_precisely(&self, _states: &[[f64; 2]], _parameters: &[[f64; 2]]) -> Option<Vec<[f64; 2]>> {
+        None
+    }
+
     /// The switches: writes `[switch_count × lanes]`.
     fn switches(&self, _at: Batch, _out: &mut [f64]) {}
 

@@ -1,5 +1,5 @@
-//! Development tasks: `cargo xtask test | check | bench | reproduce | kill | campaign | docs`. What continuous integration runs, and nothing
-//! else.
+//! Development tasks: `cargo xtask test | check | deny | bench | reproduce | kill | campaign | docs`. What continuous integration runs, and
+//! nothing else.
 
 mod kill;
 
@@ -8,8 +8,9 @@ use std::process::{Command, ExitCode};
 use std::time::Instant;
 
 const USAGE: &str = "cargo xtask TASK
-  test        format, clippy without warnings, references, every test of the workspace
-  check       the same without the tests
+  test        format, clippy without warnings, references, every test of the workspace, dependencies
+  check       the same without the tests and the dependencies
+  deny        licences, sources and advisories of the dependencies by cargo-deny, which is installed under target if it is not there
   bench       time, instructions, memory and work, written to benches/results/DATE.md; with --peers beside AUTO-07p and SciPy
               too; --only PART and --quick for a look (docs/book/benchmarks.md)
   reproduce   every figure and claim of the reference publication in a release build, from nothing; fails where a verdict is
@@ -23,8 +24,9 @@ const USAGE: &str = "cargo xtask TASK
 fn main() -> ExitCode {
     let task = std::env::args().nth(1).unwrap_or_default();
     let done = match task.as_str() {
-        "test" => check() && cargo(&["test", "--workspace", "--quiet", "--no-fail-fast"]),
+        "test" => check() && cargo(&["test", "--workspace", "--quiet", "--no-fail-fast"]) && deny(),
         "check" => check(),
+        "deny" => deny(),
         "bench" => bench(&std::env::args().skip(2).collect::<Vec<String>>()),
         "reproduce" => reproduce(std::env::args().nth(2).as_deref() == Some("--write")),
         "kill" => kill::test(std::env::args().nth(2).and_then(|times| times.parse().ok()).unwrap_or(100)),
@@ -42,6 +44,36 @@ fn check() -> bool {
     cargo(&["fmt", "--all", "--check"])
         && cargo(&["clippy", "--workspace", "--all-targets", "--quiet", "--", "-D", "warnings"])
         && references()
+}
+
+/// cargo-deny, which is the newest version that was tried; building it without optimisation takes a third of the time.
+fn deny() -> bool {
+    const VERSION: &str = "0.20.2";
+    let tools = root().join("target/tools");
+    let own = tools.join("bin/cargo-deny");
+    let program = match Command::new("cargo-deny").arg("--version").output() {
+        Ok(output) if output.status.success() => PathBuf::from("cargo-deny"),
+        _ if own.exists() => own,
+        _ => {
+            let install = ["install", "cargo-deny", "--version", VERSION, "--locked", "--debug", "--quiet", "--root"];
+            if !run(Command::new(cargo_path()).args(install).arg(&tools)) {
+                return false;
+            }
+            own
+        }
+    };
+    let mut passed = true;
+    let mut check = |what: &[&str]| {
+        eprintln!("cargo deny check {}", what.join(" "));
+        passed &= run(Command::new(&program).args(["--log-level", "error", "check", "--allow", "warnings"]).args(what));
+    };
+    check(&["licenses", "bans", "sources"]);
+    // Advisories are kept in a repository; without a way to it there is nothing to compare with, and that is said.
+    match Command::new(&program).current_dir(root()).args(["--log-level", "off", "fetch", "db"]).output() {
+        Ok(output) if output.status.success() => check(&["advisories"]),
+        _ => eprintln!("advisories NOT checked: their database cannot be reached from here"),
+    }
+    passed
 }
 
 fn docs() -> bool {

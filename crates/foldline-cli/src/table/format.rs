@@ -54,7 +54,7 @@ fn decimals(cells: &[&Cell]) -> Option<usize> {
 fn shown(cell: &Cell, style: Style, decimals: Option<usize>) -> String {
     match (cell, style, decimals) {
         (Cell::Empty, ..) => "·".to_string(),
-        (Cell::Word(word), ..) => word.clone(),
+        (Cell::Word(word), ..) => word.lines().next().unwrap_or_default().to_string(),
         (Cell::Count(count), ..) => count.to_string(),
         (Cell::Number(value), Style::Size, _) => format!("{value:.1e}"),
         (Cell::Number(value), _, Some(decimals)) => format!("{value:.decimals$}"),
@@ -82,7 +82,7 @@ pub fn csv(table: &Table, out: &mut impl Write) -> Result<()> {
 fn exact(cell: &Cell) -> String {
     match cell {
         Cell::Empty => String::new(),
-        Cell::Word(word) => word.clone(),
+        Cell::Word(word) => word.replace('\n', "; "),
         Cell::Count(count) => count.to_string(),
         // The shortest decimal that reads back as the same number, with an exponent where it would be long.
         Cell::Number(value) => format!("{value:?}"),
@@ -161,6 +161,18 @@ mod tests {
                         contact SL  10.34061714  1.5e-9  1.000000 -0.500000-0.000000i\n\
                         a \"b\", c     0.33333333  1.5e-9  1.000000 -0.500000-0.000000i\n";
         assert_eq!(written(text), expected);
+    }
+
+    #[test]
+    fn of_a_text_of_several_lines_the_first_is_shown_and_the_rest_follows_where_everything_is_written() {
+        let mut table = table();
+        table.rows[0][0] = Cell::Word("it ended\nlikely cause: a cusp".into());
+        let (mut short, mut long) = (Vec::new(), Vec::new());
+        text(&table, &mut short).unwrap();
+        csv(&table, &mut long).unwrap();
+        let [short, long] = [short, long].map(|bytes| String::from_utf8(bytes).unwrap());
+        assert!(short.contains("it ended ") && !short.contains("likely"), "{short}");
+        assert!(long.contains("it ended; likely cause: a cusp,"), "{long}");
     }
 
     #[test]

@@ -170,9 +170,11 @@ pub(super) fn ending_values(ending: &Ending) -> [Value; 4] {
     let (detail, kind, count, value) = match ending {
         Ending::Bound(value) | Ending::PeriodUnbounded(value) => (None, None, None, Some(*value)),
         Ending::Joined { at, parameter } => (None, Some(*at), None, Some(*parameter)),
-        Ending::StepTooSmall(why) | Ending::MeshTooLarge(why) | Ending::NotFinite(why) | Ending::NoStart(why) => {
-            (Some(why.clone()), None, None, None)
-        }
+        Ending::StepTooSmall(why)
+        | Ending::MeshTooLarge(why)
+        | Ending::SolutionUnbounded(why)
+        | Ending::NotFinite(why)
+        | Ending::NoStart(why) => (Some(why.clone()), None, None, None),
         Ending::PointLimit(points) => (None, None, Some(*points), None),
         Ending::Closed | Ending::Stopped => (None, None, None, None),
     };
@@ -196,6 +198,7 @@ pub(super) fn ending_in(row: &Row) -> Result<Ending, String> {
         "step-too-small" => Ending::StepTooSmall(detail()?),
         "mesh-too-large" => Ending::MeshTooLarge(detail()?),
         "period-unbounded" => Ending::PeriodUnbounded(value()?),
+        "solution-unbounded" => Ending::SolutionUnbounded(detail()?),
         "point-limit" => {
             let count: i64 = row.get("count").map_err(|e| e.to_string())?;
             Ending::PointLimit(usize::try_from(count).map_err(|e| e.to_string())?)

@@ -97,7 +97,7 @@ pub(super) fn create(columns: &Columns) -> String {
 /// The statements that bring a file of an older version to the present one.
 ///
 /// Version 1 had no curves in two parameters, version 2 did not count evaluations, version 3 had neither checksums nor errors of
-/// multipliers.
+/// multipliers, version 4 did not know that a solution can be without bound.
 pub(super) fn upgrade(version: i64) -> &'static str {
     match version {
         1 => "ALTER TABLE branches ADD COLUMN held TEXT; ALTER TABLE branches ADD COLUMN follows INTEGER;",

@@ -15,7 +15,7 @@ use crate::diagnostic::Diagnostic;
 use crate::finite::check_seeds;
 use crate::model_file::{parse_model, read_model};
 use crate::nearest::suggest;
-use crate::toml_walk::{Value, Walk, unreadable};
+use crate::toml_walk::{Value, Walk, read_text, unreadable};
 use foldline::explore::Plan;
 use foldline::model::Model;
 use items::Items;
@@ -58,7 +58,7 @@ const ROOT_KEYS: [&str; 13] = [
 /// Reads a study file and the model that it names. Every mistake found is returned.
 pub fn read_study(path: &Path) -> Result<Study, Vec<Diagnostic>> {
     let file = path.display().to_string();
-    let text = std::fs::read_to_string(path).map_err(|error| vec![unreadable(&file, "the study file", &error)])?;
+    let text = read_text(path).map_err(|error| vec![unreadable(&file, "the study file", &error)])?;
     let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
     parse(&text, &file, |walk, root| {
         let value = model_key(walk, root)?;

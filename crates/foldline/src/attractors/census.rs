@@ -28,6 +28,8 @@ enum Fate {
     Settled(usize),
     Unsettled,
     Escaped,
+    /// Its steps became too small.
+    Stuck,
     /// Nobody waited for it.
     Left,
 }
@@ -115,12 +117,24 @@ fn add(watched: Watched, first: usize, reached: &mut Vec<Reached>, census: &mut 
             }
             Fate::Unsettled => census.unsettled += 1,
             Fate::Escaped => census.escaped += 1,
+            Fate::Stuck => census.stuck += 1,
             Fate::Left => census.left += 1,
         }
     }
 }
 
-/// The attractor to which the trajectory from `start` `[n]` goes; `None` where it escapes or does not settle. Where the watch
+/// What became of a trajectory that led to no attractor.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Lost {
+    /// It ran on without coming to anything.
+    Unsettled,
+    /// It left every bound.
+    Escaped,
+    /// Its steps became too small: f jumps, or is too stiff.
+    Stuck,
+}
+
+/// The attractor to which the trajectory from `start` `[n]` goes. Where the watch
 /// sees none, as with cycles of many turns, the trajectory is followed until it repeats itself.
 pub fn settle(
     field: &dyn VectorField,
@@ -128,13 +142,15 @@ pub fn settle(
     sampling: &Sampling,
     start: &[f64],
     polish: Polish,
-) -> Option<Point> {
+) -> Result<Point, Lost> {
     let context = Context { field, parameters, sampling, polish };
     let mut watched = watch_block(&context, start, &[], &|_| false);
     match watched.fates.first() {
-        Some(Fate::Settled(index)) if *index < watched.orbits.len() => Some(watched.orbits.swap_remove(*index).point),
-        Some(Fate::Unsettled) => patiently(&context, start),
-        _ => None,
+        Some(Fate::Settled(index)) if *index < watched.orbits.len() => Ok(watched.orbits.swap_remove(*index).point),
+        Some(Fate::Unsettled) => patiently(&context, start).ok_or(Lost::Unsettled),
+        Some(Fate::Escaped) => Err(Lost::Escaped),
+        Some(Fate::Stuck) => Err(Lost::Stuck),
+        _ => Err(Lost::Unsettled),
     }
 }
 
@@ -221,7 +237,8 @@ fn watch_block(context: &Context, starts: &[f64], reached: &[Reached], enough: E
     let fates = arrivals.iter().zip(&watches).map(|(arrival, watch)| match (watch.settled, arrival.outcome) {
         (Some(index), _) => Fate::Settled(index),
         (None, Outcome::Stopped) => Fate::Left,
-        (None, Outcome::Escaped | Outcome::StepTooSmall) => Fate::Escaped,
+        (None, Outcome::Escaped) => Fate::Escaped,
+        (None, Outcome::StepTooSmall) => Fate::Stuck,
         (None, _) => Fate::Unsettled,
     });
     let fates = fates.collect();

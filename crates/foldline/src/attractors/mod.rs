@@ -36,7 +36,7 @@ mod watch;
 mod window;
 
 pub use brute_force::{Report, stepped_sweep, survey_by_simulation};
-pub use census::{settle, survey, survey_until};
+pub use census::{Lost, settle, survey, survey_until};
 pub use sampling::Sampling;
 pub use settling::Trial;
 pub use spectrum::{signed_spectrum, spectral_ratio};
@@ -65,6 +65,8 @@ pub struct Census {
     pub unsettled: usize,
     /// Trajectories that ran to infinity or to where f is not defined.
     pub escaped: usize,
+    /// Trajectories whose steps became too small: f jumps, or is too stiff for the method.
+    pub stuck: usize,
     /// Samples that were not followed to their end, or not at all, since enough was known; see [`survey_until`].
     pub left: usize,
 }

@@ -70,6 +70,8 @@ pub struct Station {
     /// Share of the tolerance that the mesh of the next point should be made for: less than 1 where the multipliers ask for
     /// more than the profile.
     pub share: f64,
+    /// The parameter midway from the station before, against the cubic through both; 0 where it was not looked at.
+    pub midway: f64,
 }
 
 impl Station {
@@ -254,7 +256,7 @@ pub fn examined(problem: &mut dyn ZeroProblem, u: Vec<f64>, tangent: Vec<f64>, d
     let examination = problem.examine(&u);
     let stored: Vec<f64> = tangent.iter().map(|t| direction * t).collect();
     let point = problem.point(&u, &stored, examination);
-    Station { point, u, tangent, mesh: problem.mesh(), roomier: None, share: 1.0 }
+    Station { point, u, tangent, mesh: problem.mesh(), roomier: None, share: 1.0, midway: 0.0 }
 }
 
 /// Estimates the error of the spectrum of a station, at which the problem was factorised last.
@@ -329,15 +331,15 @@ pub fn refine(
         }
         let mut found = station(problem, u, &row, aim.close, direction, cost)?;
         let trust = found.point.trust;
-        let defect = trust.trivial_defect.max(trust.liouville_defect);
+        let defect = found.point.multiplier_defect();
         // Multipliers can need a finer mesh than the profile. Where they do not get better with it, the defects say so.
         let accurate = defect <= 5.0 * settings.tolerance || round == 3;
         // Whether a multiplier lies inside or outside the unit circle must not be a matter of its error.
         let close = |defect: f64| found.point.free_spectrum().iter().any(|z| z.norm().ln().abs() < CERTAIN * defect);
         let certain = !settings.stability || tightened || round == 3 || !close(defect);
         if accurate && certain {
-            // What is stated is three times the estimate.
-            if trust.discretisation > 4.5 * settings.tolerance {
+            // What is stated is four times the estimate.
+            if trust.discretisation > 6.0 * settings.tolerance {
                 return Err(Failure::Mesh(trust.discretisation));
             }
             // Errors of multipliers shrink at least as fast as those of the profile.

@@ -6,6 +6,7 @@
 
 use super::Settings;
 use super::corrector::{Aim, Failure, Plane, Station, correct, refine, station};
+use super::diagnosis::{Past, Tried};
 use super::inspect::{Found, History};
 use crate::contract::{Monitor, Verdict, ZeroProblem};
 use crate::diagram::{Cost, Ending, Kind, Mesh, Point, SpecialPoint};
@@ -72,6 +73,11 @@ const CROSSING: f64 = 2e-3;
 const LONG: f64 = 3.0;
 /// Slope of a branch in its parameter below which it does not change along the branch but for rounding.
 pub(super) const STANDS: f64 = 1e-9;
+/// Distance midway from the cubic through both ends, as a share of the step, from which on the parameter there is looked at.
+const BENT: f64 = 2e-3;
+/// Change of the parameter, over so many equilibria, below which it has come to a stand.
+const REST: f64 = 1e-11;
+const PATIENCE: usize = 100;
 /// Change of the logarithm of the period that shows whether the parameter still moves with it.
 const SHOWN: f64 = 0.01;
 /// Steps given up in turn because no permitted mesh is fine enough, until the side ends for that.
@@ -92,6 +98,8 @@ pub fn follow(
     let mut trail = previous.map(|p| walk.trail(&p, &left));
     let first_period = walk.home.unwrap_or(&left.point).solution.period();
     let (mut ever_moved, mut moved, mut still) = (left.slope().abs() > STANDS, true, 0);
+    let mut stirred = ever_moved;
+    let mut stand = (left.parameter(), emitted);
     // Parameter and period where the parameter was last seen to move, or to stand.
     let mut mark = left.point.solution.period().map(|period| (left.parameter(), period));
     let mut moving = mark;
@@ -105,6 +113,7 @@ pub fn follow(
             return Ending::PointLimit(emitted);
         }
         let (mut cost, mut remeshed, mut coarse) = (Cost::default(), 0, 0);
+        let (past, mut tried) = (Past { first_period, moved: stirred }, Tried::new());
         walk.sharpen(&mut left, step, &mut cost);
         walk.refresh(&mut left, step);
         let history = trail.as_ref().map(|t| t.history.clone());
@@ -127,6 +136,7 @@ pub fn follow(
                 Err(why) => {
                     cost.rejected += 1;
                     remeshed = 0;
+                    tried.note(step, walk.problem.mesh().len().saturating_sub(1), &why);
                     step *= match why {
                         Failure::Unexplained => 0.25,
                         Failure::Elsewhere { miss, .. } if miss > 1.0 => 0.25,
@@ -140,7 +150,7 @@ pub fn follow(
                             (Some(period), Some((_, then))) if !moved && period > then => {
                                 Ending::PeriodUnbounded(period)
                             }
-                            _ => ended_by(why, left.parameter()),
+                            _ => walk.short_end(&left, &tried, &why, past),
                         };
                     }
                     walk.sharpen(&mut left, step, &mut cost);
@@ -191,6 +201,16 @@ pub fn follow(
         if let Some(ending) = end {
             return ending;
         }
+        stirred |= right.slope().abs() > STANDS;
+        let here = right.parameter();
+        if (here - stand.0).abs() > REST * (1.0 + here.abs()) {
+            stand = (here, emitted);
+        } else if first_period.is_none() && stirred && emitted - stand.1 >= PATIENCE {
+            return walk.at_a_stand(&right);
+        }
+        if let Some(ending) = walk.unbounded(&left, &right, past) {
+            return ending;
+        }
         if let (Some(first), Some(now), Some(then)) = (first_period, right.point.solution.period(), mark) {
             let here = (right.parameter(), now);
             if (now / then.1).ln().abs() > SHOWN {
@@ -210,18 +230,6 @@ pub fn follow(
         }
         trail = Some(walk.trail(&left, &right));
         left = right;
-    }
-}
-
-fn ended_by(why: Failure, parameter: f64) -> Ending {
-    match why {
-        Failure::NotFinite => Ending::NotFinite(format!("the vector field is not finite next to {parameter:?}")),
-        Failure::Mesh(_) => Ending::MeshTooLarge(why.to_string()),
-        Failure::Singular
-        | Failure::NoConvergence(_)
-        | Failure::Elsewhere { .. }
-        | Failure::Remeshed(_)
-        | Failure::Unexplained => Ending::StepTooSmall(format!("{why} next to {parameter:?}")),
     }
 }
 
@@ -263,7 +271,7 @@ impl Follow<'_> {
     /// as small a share of the step as they are of a step of usual length.
     fn sharpen(&mut self, left: &mut Station, step: f64, cost: &mut Cost) {
         let share = (step / (SHORT * self.settings.tolerance)).clamp(SHARPEST, 1.0);
-        // Curves with something held are smooth where they turn: at their cusps.
+        // Where something is held this fails at cusps, for a reason that is not known (docs/decisions/0010).
         if left.mesh.is_empty() || !self.settings.stability || share > 0.5 * left.share {
             return;
         }
@@ -346,11 +354,18 @@ impl Follow<'_> {
         if right.mesh != left.mesh && step < SHORT * self.settings.tolerance {
             return Err(Failure::Remeshed(right.mesh));
         }
+        let mut miss = 0.0;
+        if !left.mesh.is_empty() {
+            miss = self.is_nearly_smooth(left, &right)?;
+        }
         self.continues(left, &right, &guess)?;
         if trail.is_none() || left.mesh.is_empty() {
             self.is_smooth(left, &right, cost)?;
         }
         self.leads_back(left, &right, cost)?;
+        if miss > BENT {
+            right.midway = self.midway(left, &right, cost)?;
+        }
         if let Some(ended) = self.collapsed(left, &right, cost)? {
             return Ok(ended);
         }

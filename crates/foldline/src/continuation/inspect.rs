@@ -50,6 +50,19 @@ impl Follow<'_> {
         self.monitors.iter().map(|m| m.value(&station.point, &station.point)).collect()
     }
 
+    /// Whether the parameter does not change along the branch, but for rounding. Then every solution of the family has an
+    /// eigenvalue 0 (a second multiplier 1), and neither the sign of that nor of the change of the parameter means anything.
+    /// Next to an orbit of infinite period the matrix is as ill-conditioned as the multipliers are far apart, and rounding
+    /// reaches farther: there a slope that a whole step shows less than the tolerance means nothing either, unless a multiplier
+    /// is so close to 1 that the branch might turn (in a canard explosion it does, within as little).
+    fn stands(&self, left: &Station, right: &Station, length: f64) -> bool {
+        let far = |station: &Station| station.point.free_spectrum().iter().all(|z| z.norm().ln().abs() > CRITICAL);
+        let certain = left.point.unstable == right.point.unstable && far(left) && far(right);
+        let whole = length > WHOLE && left.point.solution.period().is_some() && certain;
+        let least = if whole { STANDS.max(UNSEEN * self.settings.tolerance) } else { STANDS };
+        left.slope().abs().max(right.slope().abs()) < least
+    }
+
     /// Everything special between two stations.
     pub fn inspect(
         &mut self,
@@ -61,7 +74,7 @@ impl Follow<'_> {
     ) -> Vec<Found> {
         let stretch = Stretch::new(self.problem, left, right, self.direction);
         let (at_left, at_right) = (self.monitored(left), self.monitored(right));
-        let standing = stands(left) && stands(right);
+        let standing = self.stands(left, right, stretch.length.abs());
         let mut located: Vec<(Kind, usize, Located)> = Vec::new();
         let mut lost = false;
         for k in 0..self.monitors.len() {
@@ -124,7 +137,7 @@ impl Follow<'_> {
         // Nothing is known of how monitors change on a first step; at equilibria it costs next to nothing to look.
         let mut seen = None;
         if depth == 0 && jumps.is_empty() && (history.is_none() || left.mesh.is_empty()) {
-            seen = self.seen_between(&stretch, &at_left, cost);
+            seen = self.seen_between(&stretch, &at_left, history.is_none(), cost);
         }
         let suspicious = suspicious || seen.is_some();
         if depth < DEEPEST
@@ -202,11 +215,14 @@ impl Follow<'_> {
         })
     }
 
-    /// A place in the stretch at which some monitor has not the sign that it has at the left end.
-    fn seen_between(&mut self, stretch: &Stretch, at_left: &[f64], cost: &mut Cost) -> Option<f64> {
-        const PLACES: [f64; 3] = [0.5, 0.25, 0.75];
+    /// A place in the stretch at which some monitor has not the sign that it has at the left end. `first` says that nothing is
+    /// known of the way before: there it is looked at more closely, towards both ends, which for equilibria costs nothing.
+    fn seen_between(&mut self, stretch: &Stretch, at_left: &[f64], first: bool, cost: &mut Cost) -> Option<f64> {
+        const PLACES: [f64; 15] =
+            [0.5, 0.25, 0.75, 0.125, 0.375, 0.625, 0.875, 0.0625, 0.1875, 0.03, 0.015, 0.007, 0.003, 0.001, 0.97];
+        let count = if first && stretch.left.mesh.is_empty() { PLACES.len() } else { 3 };
         let differs = |(a, b): (&f64, &f64)| (*a > 0.0) != (*b > 0.0);
-        PLACES.map(|share| share * stretch.length).into_iter().find(|s| {
+        PLACES[..count].iter().map(|share| share * stretch.length).find(|s| {
             let middle = stretch.at(self.problem, self.settings, *s, cost);
             middle.is_ok_and(|found| self.monitored(&found).iter().zip(at_left).any(differs))
         })
@@ -258,11 +274,11 @@ fn may_double(history: &History, left: &Station, right: &Station, length: f64) -
     }
 }
 
-/// Whether the parameter does not change along the branch, but for rounding. Then every solution of the family has an
-/// eigenvalue 0 (a second multiplier 1), and neither the sign of that nor of the change of the parameter means anything.
-fn stands(station: &Station) -> bool {
-    station.slope().abs() < STANDS
-}
+/// Shortest step on which a slope below so many tolerances is none.
+const WHOLE: f64 = 1e-2;
+const UNSEEN: f64 = 0.2;
+/// Logarithm of a multiplier from which on a whole step does not bring it to 1.
+const CRITICAL: f64 = 3.0;
 
 /// Whether jumps of these sizes, each with either sign, lead from one count to the other.
 fn explains(jumps: &[usize], from: i64, to: i64) -> bool {

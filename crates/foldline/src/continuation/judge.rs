@@ -19,6 +19,10 @@ const MISS: f64 = 0.3;
 const FAR: f64 = 0.6;
 /// How far off the cubic between both ends of a step the curve may be midway, as a share of the step.
 const OFF: f64 = 0.01;
+/// … and how far by an estimate.
+const NEARLY_OFF: f64 = 0.02;
+/// The same where branches crowd: the arms of a loop of the branch can lie that close to each other.
+const NEARLY_OFF_CROWDED: f64 = 0.003;
 /// Angles of the chord with both tangents: their sum may exceed the angle between the tangents by this factor …
 const CHORD_FACTOR: f64 = 1.5;
 /// … and this much. On an arc the two are equal; on a jump to another branch the chord points elsewhere.
@@ -85,6 +89,41 @@ impl Follow<'_> {
             return Err(Failure::Elsewhere { angle: 0.0, miss });
         }
         Ok(())
+    }
+
+    /// The same for a tenth of the cost: one Newton step midway with the matrix of `right`, for which the problem was factorised last
+    /// and on whose mesh it is. Returns how far off the cubic the curve is, as a share of the step.
+    pub(super) fn is_nearly_smooth(&mut self, left: &Station, right: &Station) -> Result<f64, Failure> {
+        let u = self.problem.transfer(&left.u, &left.mesh, &right.mesh);
+        let tangent = self.problem.transfer(&left.tangent, &left.mesh, &right.mesh);
+        let gap: Vec<f64> = right.u.iter().zip(&u).map(|(a, b)| a - b).collect();
+        let (length, forward) = (self.problem.dot(&tangent, &gap), self.problem.dot(&tangent, &right.tangent));
+        let bend = 0.125 * length;
+        let middle: Vec<f64> = (0..u.len())
+            .map(|i| 0.5 * (u[i] + right.u[i]) + bend * (tangent[i] - right.tangent[i] / forward.abs().max(0.1)))
+            .collect();
+        let (mut r, mut du) = (vec![0.0; u.len()], vec![0.0; u.len()]);
+        if !self.problem.residual(&middle, &mut r) {
+            return Err(Failure::NotFinite);
+        }
+        r[u.len() - 1] = 0.0;
+        self.problem.solve(&r, &mut du);
+        let miss = self.problem.dot(&du, &du).sqrt() / length.abs();
+        let crowded = self.problem.margin(&left.point).min(self.problem.margin(&right.point)) < CROWDED;
+        let allowed = if crowded { NEARLY_OFF_CROWDED } else { NEARLY_OFF };
+        if miss > allowed + self.settings.tolerance / length.abs() {
+            return Err(Failure::Elsewhere { angle: 0.0, miss });
+        }
+        Ok(miss)
+    }
+
+    /// How far the parameter midway is off the cubic, by Newton's method there.
+    pub(super) fn midway(&mut self, left: &Station, right: &Station, cost: &mut Cost) -> Result<f64, Failure> {
+        let stretch = Stretch::new(self.problem, left, right, self.direction);
+        let middle = 0.5 * stretch.length;
+        let guess = stretch.predicted(self.problem, middle);
+        let u = stretch.corrected(self.problem, self.settings, middle, cost)?;
+        Ok(u[u.len() - 1] - guess[u.len() - 1])
     }
 
     /// Where another branch may be close: whether the same step backwards from `right` leads to `left` again.

@@ -34,6 +34,8 @@ pub struct Stretch<'s> {
     slope: Vec<f64>,
     /// Distance of the right station along the tangent of the left.
     pub length: f64,
+    /// As [`Station::midway`] of the right station.
+    midway: f64,
     /// +1 towards larger positions, -1 towards smaller.
     pub(super) direction: f64,
 }
@@ -49,7 +51,7 @@ impl<'s> Stretch<'s> {
         let length = problem.dot(&left.tangent, &gap);
         let forward = problem.dot(&left.tangent, &slope);
         slope.iter_mut().for_each(|t| *t /= forward.abs().max(0.1));
-        Stretch { left, right: u, slope, length, direction }
+        Stretch { left, right: u, slope, length, midway: right.midway, direction }
     }
 
     /// The point at distance s on the mesh of the left station.
@@ -140,12 +142,12 @@ impl<'s> Stretch<'s> {
         (0..self.right.len()).map(|i| self.hermite_component(s, i)).collect()
     }
 
-    /// Whether the cubic between the two stations turns back in the continuation parameter and then turns once more, or
-    /// nearly does: where two folds lie close together on a long step, the ends show nothing of them.
+    /// Whether the curve between the two stations turns back in the continuation parameter and then turns once more, or
+    /// nearly does, as far as ends and middle show: where two folds lie close together on a long step, the ends show nothing of them.
     pub(super) fn may_turn_twice(&self) -> bool {
         let i = self.left.u.len() - 1;
         let rise = self.right[i] - self.left.u[i];
-        turns_twice(rise, [self.length * self.left.tangent[i], self.length * self.slope[i]])
+        turns_twice(rise, [self.length * self.left.tangent[i], self.length * self.slope[i]], self.midway)
     }
 
     /// Cubic through both ends with both tangents.
@@ -158,13 +160,15 @@ impl<'s> Stretch<'s> {
     }
 }
 
-/// Whether the cubic on [0, 1] that rises by `rise` and has these slopes at its ends has, or nearly has, a maximum and a
-/// minimum inside.
-fn turns_twice(rise: f64, [p, q]: [f64; 2]) -> bool {
-    // Slope p + 2 b x + 3 c x² for x from 0 to 1; its extremum in between is compared with the ends.
+/// Whether the polynomial on [0, 1] that rises by `rise`, has these slopes at its ends, and lies by `off` beside the cubic in the
+/// middle, has, or nearly has, a maximum and a minimum inside.
+fn turns_twice(rise: f64, [p, q]: [f64; 2], off: f64) -> bool {
+    const PLACES: usize = 64;
+    // Slope p + 2 b x + 3 c x² of the cubic, and that of 16 off x² (1 - x)²; the least in between is compared with the ends.
     let (b, c) = (3.0 * rise - 2.0 * p - q, p + q - 2.0 * rise);
-    let at = -b / (3.0 * c);
-    p * q > 0.0 && at > 0.0 && at < 1.0 && (p + b * at) * p.signum() < 0.1 * p.abs().min(q.abs())
+    let slope = |x: f64| p + x * (2.0 * b + 3.0 * c * x) + 32.0 * off * x * (1.0 - x) * (1.0 - 2.0 * x);
+    let places = (1..PLACES).map(|k| k as f64 / PLACES as f64);
+    p * q > 0.0 && places.map(|x| slope(x) * p.signum()).fold(f64::INFINITY, f64::min) < 0.1 * p.abs().min(q.abs())
 }
 
 /// The point between two stations at which the continuation parameter has the given value, which lies between theirs.
@@ -356,7 +360,7 @@ fn seen_by(
     }
     let stored: Vec<f64> = tangent.iter().map(|t| direction * t).collect();
     let point = problem.point(&u, &stored, Examination::default());
-    Station { point, u, tangent, mesh: problem.mesh(), roomier: None, share: 1.0 }
+    Station { point, u, tangent, mesh: problem.mesh(), roomier: None, share: 1.0, midway: 0.0 }
 }
 
 /// The whole station, where only a part of it was [`seen_by`] the monitor; the problem was factorised there last.
@@ -492,11 +496,14 @@ mod tests {
     #[test]
     fn a_cubic_that_turns_back_and_on_again_is_seen_from_its_ends() {
         // x³ - a x on [-1, 1]: slopes 3 - a at both ends, rise 2 - 2 a; extrema at ± (a / 3)^½. On an interval of length 2.
-        let seen = |a: f64| turns_twice(2.0 - 2.0 * a, [2.0 * (3.0 - a); 2]);
+        let seen = |a: f64| turns_twice(2.0 - 2.0 * a, [2.0 * (3.0 - a); 2], 0.0);
         assert!(seen(0.5) && seen(0.01), "turns twice");
         assert!(seen(-0.1) && !seen(-1.0), "nearly does; does not");
         // The other way round, and a cubic with a single turn between its ends.
-        assert!(turns_twice(-1.0, [-5.0; 2]) && !turns_twice(1.0, [2.0, -1.0]) && !turns_twice(1.0, [1.0; 2]));
+        assert!(turns_twice(-1.0, [-5.0; 2], 0.0) && !turns_twice(1.0, [2.0, -1.0], 0.0));
+        assert!(!turns_twice(1.0, [1.0; 2], 0.0));
+        // The middle shows what the ends do not: it lies a third of the rise off the straight line.
+        assert!(turns_twice(1.0, [1.0; 2], 0.33) && !turns_twice(1.0, [1.0; 2], 0.01));
     }
 
     #[test]

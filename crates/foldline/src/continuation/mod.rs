@@ -16,6 +16,7 @@
 //! **Source.** keller1977 (pseudo-arclength); allgower1990 (step length by angle and contraction).
 
 pub mod corrector;
+mod diagnosis;
 mod ends;
 pub mod follow;
 pub mod inspect;
@@ -59,6 +60,8 @@ pub struct Settings {
     pub reflections: Vec<Vec<bool>>,
     /// `[n]` characteristic sizes of the states.
     pub scales: Vec<f64>,
+    /// In how many places the right-hand side is not smooth; for the diagnosis of ends.
+    pub kinks: usize,
 }
 
 impl Settings {
@@ -79,6 +82,7 @@ impl Settings {
             max_newton: 8,
             reflections: vec![vec![false; scales.len()]],
             scales: scales.to_vec(),
+            kinks: 0,
         }
     }
 

@@ -108,6 +108,15 @@ impl Point {
         }
     }
 
+    /// How far the multipliers may be off, for what depends on them: the larger of the two defects. Liouville's is a relative
+    /// error of their product; where the smallest of them is so small that nothing depends on its digits, neither does
+    /// anything on those of the product.
+    pub fn multiplier_defect(&self) -> f64 {
+        const SMALL: f64 = 1e-3;
+        let smallest = self.free_spectrum().iter().fold(SMALL, |m, z| m.min(z.norm()));
+        self.trust.trivial_defect.max(self.trust.liouville_defect * smallest / SMALL)
+    }
+
     /// Largest difference of period and ranges between two points, each relative to its scale (`scales` for the states;
     /// outputs and period by their own size). `reflection[i]` says that the other point is seen with state i negated.
     /// Infinite if one is an equilibrium and the other a cycle.
@@ -240,12 +249,15 @@ pub enum Ending {
         /// Value of the continuation parameter there.
         parameter: f64,
     },
-    /// The step length fell below its limit; the sentence says what was tried and what the likely cause is.
+    /// The step length fell below its limit. Here and below, a text has three lines: what was tried, what the likely cause is,
+    /// what can be done.
     StepTooSmall(String),
     /// The mesh would need more intervals than allowed.
     MeshTooLarge(String),
     /// The period grew beyond its limit: the cycle probably approaches a homoclinic or heteroclinic orbit.
     PeriodUnbounded(f64),
+    /// A state grew beyond every measure while the parameter came to a stand; the sentence says which is the likely cause.
+    SolutionUnbounded(String),
     /// The limit on the number of points was reached.
     PointLimit(usize),
     /// f is not finite at the start of the branch or beyond its last point.
@@ -266,11 +278,18 @@ impl Ending {
             Ending::StepTooSmall(_) => "step-too-small",
             Ending::MeshTooLarge(_) => "mesh-too-large",
             Ending::PeriodUnbounded(_) => "period-unbounded",
+            Ending::SolutionUnbounded(_) => "solution-unbounded",
             Ending::PointLimit(_) => "point-limit",
             Ending::NotFinite(_) => "not-finite",
             Ending::NoStart(_) => "no-start",
             Ending::Stopped => "stopped",
         }
+    }
+
+    /// The first line of its text.
+    pub fn brief(&self) -> String {
+        let text = self.to_string();
+        text.lines().next().unwrap_or_default().to_string()
     }
 
     /// Whether the branch ended where it should: at a bound, closed, or joined to another branch.
@@ -294,6 +313,7 @@ impl fmt::Display for Ending {
             Ending::PeriodUnbounded(period) => {
                 write!(f, "period grew to {period:.4}: probably close to a homoclinic or heteroclinic orbit")
             }
+            Ending::SolutionUnbounded(why) => write!(f, "solution without bound: {why}"),
             Ending::PointLimit(points) => write!(f, "stopped at the limit of {points} points"),
             Ending::NotFinite(why) => write!(f, "not finite: {why}"),
             Ending::NoStart(why) => write!(f, "no start: {why}"),

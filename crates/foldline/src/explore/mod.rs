@@ -21,6 +21,7 @@
 
 mod counted;
 pub mod curves;
+mod diagnosis;
 pub mod family;
 pub mod growth;
 pub mod homotopy;

@@ -5,9 +5,10 @@
 //! find what they ask for.
 
 use super::System;
+use super::diagnosis::{Seen, of_no_start};
 use super::growth::{polished, problem_of, setting, settings};
 use super::plan::{AttractorKey, Plan, SeedPlan, SeedSource, Start};
-use crate::attractors::{self, Attractor, Candidate, Census, Sampling};
+use crate::attractors::{self, Attractor, Candidate, Census, Lost, Sampling};
 use crate::continuation::Settings;
 use crate::continuation::corrector::{Plane, correct, parameter_row};
 use crate::contract::{Event, Examination, Observer};
@@ -51,9 +52,9 @@ pub fn find(system: &System, plan: &Plan, jobs: usize, earlier: &Diagram, observ
         _ if !needed => Err("not needed".into()),
         SeedSource::State(state) => from_state(system, seed, plan, state, jobs).map(|p| with_degree(p, plan.degree)),
         SeedSource::Attractor(key) => match censuses.iter().find(|(other, _)| share(&plan.seeds[*other], seed)) {
-            Some((_, census)) => {
-                chosen(census, key).map(|p| with_degree(p, plan.degree)).ok_or_else(|| missing(census, key))
-            }
+            Some((_, census)) => chosen(census, key)
+                .map(|p| with_degree(p, plan.degree))
+                .ok_or_else(|| missing(system, seed, census, key)),
             None => Err("no census".into()),
         },
     };
@@ -278,9 +279,20 @@ fn from_state(system: &System, seed: &SeedPlan, plan: &Plan, state: &[f64], jobs
     let polish = |candidate: &Candidate| polish(system, &seed.parameters, plan.tolerance, candidate);
     let settled = attractors::settle(system.field, &seed.parameters, &sampling, state, &polish);
     // A saddle that the trajectory leads to and does not stay at, if that was meant.
-    settled.or(found.filter(|(moved, _)| *moved < NEAR).map(|(_, point)| point)).ok_or_else(|| {
-        "the trajectory from the given state settles neither to an equilibrium nor to a cycle; try another state or other parameters"
-            .to_string()
+    settled.or_else(|lost| match found {
+        Some((moved, point)) if moved < NEAR => Ok(point),
+        _ => {
+            let what = match lost {
+                Lost::Unsettled => "settles neither to an equilibrium nor to a cycle",
+                Lost::Escaped => "leaves every bound",
+                Lost::Stuck => "cannot be followed: its steps become too small",
+            };
+            let why = {
+                let (stuck, all_escaped) = (lost == Lost::Stuck, lost == Lost::Escaped);
+                of_no_start(system, &seed.parameters, Seen { state: Some(state), stuck, all_escaped })
+            };
+            Err(format!("the trajectory from the given state {what}{why}"))
+        }
     })
 }
 
@@ -325,17 +337,24 @@ fn summary(census: &Census) -> String {
     if census.escaped > 0 {
         parts.push(format!("escaped ({})", census.escaped));
     }
+    if census.stuck > 0 {
+        parts.push(format!("stuck where steps became too small ({})", census.stuck));
+    }
     if census.left > 0 {
         parts.push(format!("left when that was known ({})", census.left));
     }
     format!("attractors (samples that went there): {}", parts.join(", "))
 }
 
-fn missing(census: &Census, key: &AttractorKey) -> String {
+fn missing(system: &System, seed: &SeedPlan, census: &Census, key: &AttractorKey) -> String {
     let wanted = match key {
         AttractorKey::Equilibrium => "no stable equilibrium".to_string(),
         AttractorKey::Cycle => "no stable cycle".to_string(),
         AttractorKey::Ratio(p, q) => format!("no stable {p}:{q} cycle"),
     };
-    format!("{wanted} was found; {}; try more samples, other parameters, or give a state", summary(census))
+    let why = {
+        let all_escaped = census.attractors.is_empty() && census.unsettled == 0 && census.escaped > 0;
+        of_no_start(system, &seed.parameters, Seen { state: None, stuck: census.stuck > 0, all_escaped })
+    };
+    format!("{wanted} was found; {}{why}", summary(census))
 }

@@ -105,8 +105,8 @@ fn first_point(
     let mut found = station(problem, u, &plane.row, close, 1.0, &mut cost)?;
     doubted(problem, &mut found);
     let trust = found.point.trust;
-    let defect = trust.trivial_defect.max(trust.liouville_defect);
-    if trust.discretisation <= 3.0 * settings.tolerance && defect <= 5.0 * settings.tolerance {
+    let defect = found.point.multiplier_defect();
+    if trust.discretisation <= 4.0 * settings.tolerance && defect <= 5.0 * settings.tolerance {
         return Ok(found);
     }
     problem.anchor(&guess);

@@ -9,6 +9,8 @@ use crate::model::Model;
 pub struct System<'a> {
     /// The vector field.
     pub field: &'a dyn VectorField,
+    /// `[n]` name of each state, for messages.
+    pub state_names: Vec<String>,
     /// `[n]` characteristic size of each state.
     pub scales: Vec<f64>,
     /// `[k]` characteristic size of each parameter: a length along a branch counts changes of a parameter relative to it.
@@ -27,6 +29,7 @@ impl<'a> System<'a> {
         let n = field.dim();
         System {
             field,
+            state_names: (1..=n).map(|i| format!("state {i}")).collect(),
             scales: vec![1.0; n],
             parameter_scales: vec![1.0; field.parameter_count()],
             ranges: vec![[-2.0, 2.0]; n],
@@ -39,6 +42,7 @@ impl<'a> System<'a> {
     /// there.
     pub fn of(model: &'a Model, parameters: &[f64]) -> System<'a> {
         let mut system = System {
+            state_names: model.states.iter().map(|s| s.name.clone()).collect(),
             scales: model.states.iter().map(|s| s.scale).collect(),
             // A parameter that is zero says nothing about its size.
             parameter_scales: model

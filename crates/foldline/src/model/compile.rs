@@ -40,9 +40,22 @@ impl Symbol {
     }
 }
 
-/// Compiles `source`, or returns everything that is wrong with it.
+/// Most states: the matrices of a cycle are dense in them, a Jacobian for each collocation point.
+const MOST_STATES: usize = 1000;
+/// Most parameters, definitions and outputs, each. Equations beyond those of the states are reported one by one.
+const MOST: usize = 100_000;
+/// Names of a circle of definitions that are listed.
+const LONGEST_CIRCLE: usize = 12;
+/// Further mistakes than these are not looked for.
+const MOST_ERRORS: usize = 100;
+
+/// Compiles `source`, or returns what is wrong with it: everything, up to a hundred mistakes.
 pub(super) fn compile(source: &ModelSource) -> Result<Compiled, Vec<ModelError>> {
     let mut check = Check { source, symbols: HashMap::new(), errors: Vec::new() };
+    check.sizes();
+    if !check.errors.is_empty() {
+        return Err(check.errors);
+    }
     check.names();
     check.numbers();
     let equation_of = check.equations();
@@ -77,17 +90,42 @@ struct Check<'a> {
 
 impl<'a> Check<'a> {
     fn report(&mut self, item: Item, field: Field, message: impl Into<String>, hint: impl Into<String>) {
+        if self.errors.len() == MOST_ERRORS {
+            return;
+        }
         let name = name_of(self.source, item).to_string();
         self.errors.push(ModelError { item, field, name, span: None, message: message.into(), hint: hint.into() });
     }
 
     fn complain(&mut self, item: Item, complaint: Complaint) {
+        if self.errors.len() == MOST_ERRORS {
+            return;
+        }
         let Complaint { span, message, mut hint, function } = complaint;
         if let Some((name, symbol)) = function.and_then(|f| Some((f.clone(), *self.symbols.get(f.as_str())?))) {
             hint = format!("`{name}` is {}; write a product with a star: `{name}*(…)`", symbol.article());
         }
         let name = name_of(self.source, item).to_string();
         self.errors.push(ModelError { item, field: Field::Expression, name, span: Some(span), message, hint });
+    }
+
+    /// Refuses what no computer would get through.
+    fn sizes(&mut self) {
+        let source = self.source;
+        let counts = [
+            ("states", source.states.len(), MOST_STATES),
+            ("parameters", source.parameters.len(), MOST),
+            ("definitions", source.definitions.len(), MOST),
+            ("outputs", source.outputs.len(), MOST),
+        ];
+        for (what, count, most) in counts.into_iter().filter(|(_, count, most)| count > most) {
+            let message = format!("the model has {count} {what}, more than {most}");
+            let hint = match what {
+                "states" => "use a coarser discretisation or fewer modes: the matrices here are dense in the states",
+                _ => "leave out what is not needed",
+            };
+            self.report(Item::Model, Field::Name, message, hint);
+        }
     }
 
     /// Fills the table of names.
@@ -180,8 +218,9 @@ impl<'a> Check<'a> {
         let source = self.source;
         let mut equation_of = vec![None; source.states.len()];
         let states: Vec<&str> = source.states.iter().map(|s| s.name.as_str()).collect();
+        let place: HashMap<&str, usize> = states.iter().enumerate().rev().map(|(i, &name)| (name, i)).collect();
         for (i, equation) in source.equations.iter().enumerate() {
-            match states.iter().position(|&name| name == equation.name) {
+            match place.get(equation.name.as_str()).copied() {
                 None => {
                     let message = format!("an equation for `{}`, which is not a declared state", equation.name);
                     self.report(Item::Equation(i), Field::Name, message, suggest(&equation.name, &states));
@@ -227,8 +266,8 @@ impl<'a> Check<'a> {
                 return None;
             }
         };
-        for (name, span) in expression.names().filter(|(name, _)| !self.symbols.contains_key(name)).collect::<Vec<_>>()
-        {
+        let unknown = expression.names().filter(|(name, _)| !self.symbols.contains_key(name));
+        for (name, span) in unknown.take(MOST_ERRORS).collect::<Vec<_>>() {
             let hint = match function(name) {
                 Some(function) => format!("`{name}` is a function: write `{}`", function.signature),
                 None if name == "t" || name == "time" => {
@@ -266,20 +305,23 @@ impl<'a> Check<'a> {
                     .collect()
             })
             .collect();
-        let mut open: Vec<usize> = (0..definitions.len()).collect();
-        let mut order = Vec::with_capacity(open.len());
-        let mut settled = vec![false; open.len()];
-        loop {
-            let (ready, rest): (Vec<usize>, Vec<usize>) =
-                open.iter().partition(|&&i| uses[i].iter().all(|(j, _)| settled[*j]));
-            if ready.is_empty() {
-                break;
+        let mut users: Vec<Vec<usize>> = vec![Vec::new(); definitions.len()];
+        uses.iter().enumerate().for_each(|(i, list)| list.iter().for_each(|(j, _)| users[*j].push(i)));
+        let mut waits_for: Vec<usize> = uses.iter().map(Vec::len).collect();
+        let mut settled: Vec<bool> = waits_for.iter().map(|&count| count == 0).collect();
+        let mut order: Vec<usize> = (0..definitions.len()).filter(|&i| settled[i]).collect();
+        let mut next = 0;
+        while let Some(&done) = order.get(next) {
+            next += 1;
+            for &user in &users[done] {
+                waits_for[user] -= 1;
+                if waits_for[user] == 0 {
+                    settled[user] = true;
+                    order.push(user);
+                }
             }
-            ready.iter().for_each(|&i| settled[i] = true);
-            order.extend(ready);
-            open = rest;
         }
-        if let Some(&start) = open.first() {
+        if let Some(start) = settled.iter().position(|settled| !settled) {
             self.cycle(start, &uses, &settled);
         }
         order
@@ -288,11 +330,15 @@ impl<'a> Check<'a> {
     /// Reports the cycle that is reached from `start` along definitions that are not settled.
     fn cycle(&mut self, start: usize, uses: &[Vec<(usize, std::ops::Range<usize>)>], settled: &[bool]) {
         let mut path = vec![start];
+        let mut place: HashMap<usize, usize> = HashMap::from([(start, 0)]);
         while let Some((next, span)) = uses[path[path.len() - 1]].iter().find(|(j, _)| !settled[*j]) {
-            if let Some(at) = path.iter().position(|i| i == next) {
+            if let Some(&at) = place.get(next) {
                 let mut names: Vec<&str> =
                     path[at..].iter().map(|&i| self.source.definitions[i].name.as_str()).collect();
                 names.push(names[0]);
+                if names.len() > LONGEST_CIRCLE {
+                    names.splice(LONGEST_CIRCLE / 2..names.len() - LONGEST_CIRCLE / 2, ["…"]);
+                }
                 let chain = names.join(" → ");
                 let last = Item::Definition(path[path.len() - 1]);
                 let message = format!("definitions that need each other: {chain}");
@@ -302,6 +348,7 @@ impl<'a> Check<'a> {
                 );
                 return;
             }
+            place.insert(*next, path.len());
             path.push(*next);
         }
     }

@@ -17,6 +17,7 @@ mod kernels;
 mod lexer;
 mod nearest;
 mod parser;
+mod precise;
 mod run;
 mod source;
 mod switches;
@@ -212,6 +213,11 @@ impl VectorField for Model {
 
     fn switches(&self, at: Batch, out: &mut [f64]) {
         self.inner.switches.values.run(at, &[], &mut [out]);
+    }
+
+    fn evaluate_precisely(&self, states: &[[f64; 2]], parameters: &[[f64; 2]]) -> Option<Vec<[f64; 2]>> {
+        let Compiled { graph, field, .. } = &self.inner.compiled;
+        precise::evaluate(graph, field, states, parameters)
     }
 
     fn evaluate_switched(&self, at: Batch, signs: &[f64], f: &mut [f64]) {

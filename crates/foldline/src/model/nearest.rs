@@ -3,22 +3,46 @@
 /// The candidate closest to `word` by edit distance, if it is close enough to be what was meant; among equals the one whose
 /// length differs least, so that swapped letters come before missing ones.
 pub fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
-    let allowed = (word.chars().count() / 3).max(1);
+    let length = word.chars().count();
+    if length > LONGEST {
+        return None;
+    }
+    let allowed = (length / 3).max(1);
     candidates
         .into_iter()
-        .map(|candidate| (distance(&word.to_lowercase(), &candidate.to_lowercase()), candidate))
+        .filter(|candidate| candidate.chars().count().abs_diff(length) <= allowed)
+        .map(|candidate| (distance(&folded(word), &folded(candidate)), candidate))
         .filter(|(d, _)| *d <= allowed)
-        .min_by_key(|(d, candidate)| (*d, candidate.chars().count().abs_diff(word.chars().count())))
+        .min_by_key(|(d, candidate)| (*d, candidate.chars().count().abs_diff(length)))
         .map(|(_, candidate)| candidate)
 }
 
-/// A hint that names the nearest candidate, or lists them all where none is near.
+/// Candidates that are listed where none is near.
+const LISTED: usize = 24;
+/// Longer words are not compared letter by letter.
+const LONGEST: usize = 64;
+
+/// A hint that names the nearest candidate, or lists the candidates where none is near. Letters that look alike and are not
+/// the same are given with their code points.
 pub fn suggest(word: &str, candidates: &[&str]) -> String {
-    match nearest(word, candidates.iter().copied()) {
-        Some(candidate) => format!("did you mean `{candidate}`?"),
-        None if candidates.is_empty() => "there is none to choose from".to_string(),
-        None => format!("one of: {}", candidates.join(", ")),
+    let Some(candidate) = nearest(word, candidates.iter().copied()) else {
+        return match candidates.get(..LISTED) {
+            _ if candidates.is_empty() => "there is none to choose from".to_string(),
+            None => format!("one of: {}", candidates.join(", ")),
+            Some(first) => format!("one of: {}, and {} more", first.join(", "), candidates.len() - LISTED),
+        };
+    };
+    let letters = word.chars().zip(candidate.chars()).find(|(a, b)| a != b);
+    match letters.filter(|(a, b)| !a.is_ascii() && a.is_alphabetic() && b.is_alphabetic()) {
+        Some((a, b)) => format!("did you mean `{candidate}`? `{a}` is U+{:04X}, `{b}` is U+{:04X}", a as u32, b as u32),
+        None => format!("did you mean `{candidate}`?"),
     }
+}
+
+/// In small letters, with the micro sign of keyboards as the Greek letter (the signs for ohm and ångström have small letters
+/// that are the letters').
+fn folded(word: &str) -> String {
+    word.to_lowercase().replace('\u{b5}', "\u{3bc}")
 }
 
 /// Insertions, deletions, replacements and swaps of neighbours that turn one word into the other.
@@ -52,5 +76,23 @@ mod tests {
         assert_eq!(nearest("omega", ["kappa", "Omega"]), Some("Omega"));
         assert_eq!(nearest("tahn", ["tan", "tanh"]), Some("tanh"));
         assert_eq!(nearest("torque", ["kappa", "Omega"]), None);
+    }
+
+    #[test]
+    fn letters_that_look_alike_are_told_apart() {
+        assert_eq!(
+            suggest("\u{b5}", &["\u{3bc}", "x"]),
+            "did you mean `\u{3bc}`? `\u{b5}` is U+00B5, `\u{3bc}` is U+03BC"
+        );
+        assert!(suggest("\u{b5}", &["x", "\u{3bc}"]).starts_with("did you mean `\u{3bc}`?"));
+        assert_eq!(suggest("y", &["x"]), "did you mean `x`?");
+    }
+
+    #[test]
+    fn long_words_and_long_lists_make_short_hints() {
+        let names: Vec<String> = (0..1000).map(|i| format!("parameter_{i}")).collect();
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        assert!(suggest("torque", &names).ends_with("parameter_23, and 976 more"));
+        assert!(suggest(&"x".repeat(1_000_000), &names).len() < 500);
     }
 }

@@ -51,31 +51,40 @@ impl CycleProblem<'_> {
     }
 
     /// Estimated error of the multipliers `spectrum` at `u`: they change by it where the transitions of all intervals are made more
-    /// accurate, with the Jacobian not along the profile but along the profile without its estimated error. Identities
-    /// between multipliers see little of this error, which is large where the Jacobian changes sharply.
+    /// accurate, and again where the Jacobian is taken not along the profile but along the profile without its estimated error.
+    /// The two can cancel; their sizes are added. Identities between multipliers see little of this error, which is large where the
+    /// Jacobian changes sharply.
     pub(super) fn multiplier_error(&self, u: &[f64], spectrum: &[Complex64]) -> f64 {
         self.errors(u);
+        let [Some(own), Some(better)] = [0.0, 1.0].map(|share| self.corrected_multipliers(u, share)) else {
+            return f64::NAN;
+        };
+        let apart = spectrum_difference(spectrum, &own) + spectrum_difference(&own, &better);
+        SPECTRUM_SAFE * apart + SPECTRUM_ROUNDING
+    }
+
+    /// The multipliers from more accurate transitions, with the Jacobian along the profile without that share of its error.
+    fn corrected_multipliers(&self, u: &[f64], share: f64) -> Option<Vec<Complex64>> {
         let (n, m, count, size) = (self.n, self.scheme.degree, self.intervals(), self.profile_size());
-        let (better, mut states) = match self.measured.borrow().as_ref() {
-            Some(known) => {
-                let better: Vec<f64> = u.iter().zip(&known.shift).map(|(u, e)| u - e).collect();
-                (better, known.within.clone())
-            }
-            None => return f64::NAN,
+        let (better, mut states) = {
+            let known = self.measured.borrow();
+            let known = known.as_ref()?;
+            let better: Vec<f64> = u.iter().zip(&known.shift).map(|(u, e)| u - share * e).collect();
+            (better, known.within.clone())
         };
         let lanes = count * (m + 1);
         let nodes = panel::by_component(&better[..size], m + 1, n);
         let mut values = vec![0.0; lanes];
         for (own, nodes) in states.chunks_exact_mut(lanes).zip(nodes.chunks_exact(lanes)) {
             self.sampling.sampled(nodes, count, &mut values);
-            own.iter_mut().zip(&values).for_each(|(w, x)| *w = x - *w);
+            own.iter_mut().zip(&values).for_each(|(w, x)| *w = x - share * *w);
         }
         let parameters = self.setting.at(&better[size + 1..]);
         let (mut f, mut fx) = (vec![0.0; n * lanes], vec![0.0; n * n * lanes]);
         let batch = Batch { lanes, states: &states, parameters: Parameters::Shared(&parameters) };
         self.setting.field.linearise(batch, &[], &mut f, &mut fx, &mut []);
         if !max_abs(&fx).is_finite() || !max_abs(&better).is_finite() {
-            return f64::NAN;
+            return None;
         }
         let (mut inner, mut jacobians) = (vec![0.0; (m + 1) * n * n], vec![0.0; (m + 1) * n * n]);
         inner[..n * n].iter_mut().enumerate().for_each(|(k, x)| *x = f64::from(u8::from(k / n == k % n)));
@@ -87,7 +96,7 @@ impl CycleProblem<'_> {
             }
             defect::corrected(&self.sampling, &inner, &jacobians, n, transition);
         });
-        SPECTRUM_SAFE * spectrum_difference(spectrum, &found.multipliers) + SPECTRUM_ROUNDING
+        Some(found.multipliers)
     }
 
     fn measured_errors(&self, u: &[f64]) -> Measured {

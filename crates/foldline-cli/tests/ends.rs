@@ -1,0 +1,149 @@
+//! Models that cannot be followed on, each ending with the reason, the likely cause, and what can be done.
+
+use std::process::Command;
+
+/// A model of `states` (name and equation) in parameters, and one branch from a seed.
+struct Case<'a> {
+    parameters: &'a [(&'a str, f64)],
+    states: &'a [(&'a str, &'a str)],
+    seed: &'a str,
+    /// The first parameter is free.
+    range: [f64; 2],
+    /// Further lines of the branch.
+    more: &'a str,
+}
+
+impl Case<'_> {
+    /// Exit code and what is said to the user at the end of the run.
+    fn run(&self) -> (Option<i32>, String) {
+        let folder = tempfile::tempdir().unwrap();
+        let mut model = String::from("[parameters]\n");
+        self.parameters.iter().for_each(|(name, value)| model += &format!("{name} = {value:?}\n"));
+        self.states.iter().for_each(|(name, f)| model += &format!("[states.{name}]\nequation = \"{f}\"\n"));
+        let (free, [low, high]) = (self.parameters[0].0, self.range);
+        let study = format!(
+            "model = \"m.toml\"\n[[seed]]\nname = \"s\"\n{}\n[[branch]]\nname = \"b\"\nfrom = \"s\"\n\
+             free = \"{free}\"\nrange = [{low:?}, {high:?}]\n{}\n",
+            self.seed, self.more
+        );
+        std::fs::write(folder.path().join("m.toml"), model).unwrap();
+        std::fs::write(folder.path().join("s.toml"), study).unwrap();
+        let command = ["run", "s.toml", "--out", "r"];
+        let output =
+            Command::new(env!("CARGO_BIN_EXE_foldline")).args(command).current_dir(folder.path()).output().unwrap();
+        (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+    }
+
+    /// The run ends short, and says all of these.
+    #[track_caller]
+    fn ends(&self, pieces: &[&str]) {
+        let (code, said) = self.run();
+        assert_eq!(code, Some(3), "{said}");
+        for piece in pieces {
+            assert!(said.contains(piece), "{piece:?} is missing in\n{said}");
+        }
+        assert!(said.contains("\n  what to do: ") || said.contains("period grew"), "{said}");
+        // Once, and not for each side.
+        assert_eq!(said.matches("ended short").count(), 1, "{said}");
+    }
+}
+
+const MU: &[(&str, f64)] = &[("mu", 1.0)];
+
+#[test]
+fn f_is_not_finite_beyond_a_state() {
+    let states = [("x", "mu - 0.5*sqrt(1 - x) - x")];
+    Case { parameters: MU, states: &states, seed: "state = { x = 0.6 }", range: [0.0, 4.0], more: "" }
+        .ends(&["not finite: next to 1.0000", "the edge of the region in which the vector field is defined"]);
+}
+
+#[test]
+fn f_is_not_finite_beyond_a_value_of_the_parameter() {
+    let states = [("x", "log(mu) - x")];
+    Case { parameters: MU, states: &states, seed: "state = { x = 0 }", range: [-1.0, 2.0], more: "" }
+        .ends(&["not finite: the parameter comes to a stand", "the edge of the region"]);
+}
+
+#[test]
+fn an_asymptote() {
+    let states = [("x", "mu*x - 1")];
+    Case { parameters: MU, states: &states, seed: "state = { x = 1 }", range: [-1.0, 1.0], more: "" }
+        .ends(&["solution without bound: a state has grown to", "the branch has an asymptote there"]);
+}
+
+/// x₁' = mu (y - x), y' = mu (x - y): the Jacobian is singular everywhere.
+#[test]
+fn a_conserved_combination() {
+    let states = [("x", "2*mu*(y - x)"), ("y", "mu*(x - y)")];
+    Case { parameters: MU, states: &states, seed: "state = { x = 0.5, y = 0.5 }", range: [0.5, 2.0], more: "" }
+        .ends(&["no start", "likely cause: x + 2 y never changes", "eliminate one state"]);
+    let states = [("x", "0*mu")];
+    Case { parameters: MU, states: &states, seed: "state = { x = 0.5 }", range: [0.5, 2.0], more: "" }
+        .ends(&["likely cause: x never changes"]);
+}
+
+/// At mu = 0 the oscillator is conservative and linear: cycles of all sizes.
+#[test]
+fn a_family_of_cycles_at_one_value_of_the_parameter() {
+    let parameters = [("mu", -0.5)];
+    let states = [("x", "y"), ("y", "mu*y - x")];
+    let more = "switch = { hopf = 1 }";
+    Case { parameters: &parameters, states: &states, seed: "attractor = \"equilibrium\"", range: [-1.0, 1.0], more }
+        .ends(&["b/hopf-1: solution without bound", "a system with a conserved quantity"]);
+}
+
+/// The cycles from the Hopf point at mu = 1 end at the homoclinic orbit of the saddle (1, 0), near mu = 5/7.
+#[test]
+fn a_homoclinic_orbit() {
+    let parameters = [("mu", 1.5)];
+    let states = [("x", "y"), ("y", "-1 + mu*y + x^2 + x*y")];
+    let more = "switch = { hopf = 1 }";
+    Case { parameters: &parameters, states: &states, seed: "state = { x = -1, y = 0 }", range: [0.0, 2.0], more }
+        .ends(&["b/hopf-1: period grew to", "close to a homoclinic"]);
+}
+
+/// The same branch of cycles from its other end: it shrinks to the equilibrium, which is where it should end.
+#[test]
+fn a_hopf_point_reached_from_its_cycles() {
+    let states = [("x", "mu*x - y - x*(x^2 + y^2)"), ("y", "x + mu*y - y*(x^2 + y^2)")];
+    let case = Case { parameters: MU, states: &states, seed: "attractor = \"cycle\"", range: [-1.0, 1.5], more: "" };
+    let (code, said) = case.run();
+    assert_eq!(code, Some(0), "{said}");
+    assert!(said.contains("shrank to an equilibrium at 0.000000") || said.contains("at -0.000000"), "{said}");
+}
+
+#[test]
+fn a_corner() {
+    let states = [("x", "mu - abs(x)")];
+    Case { parameters: MU, states: &states, seed: "state = { x = 1 }", range: [-1.0, 2.0], more: "" }.ends(&[
+        "step too small",
+        "the right-hand side is not smooth in one place",
+        "with a sharpness",
+    ]);
+}
+
+#[test]
+fn trajectories_that_slide() {
+    let parameters = [("c", 0.05)];
+    let states = [("x", "v"), ("v", "-x - c*v + 0.3*sign(0.5 - v)*(1 + 0.5*exp(-abs(v - 0.5)))")];
+    Case { parameters: &parameters, states: &states, seed: "attractor = \"cycle\"", range: [0.0, 1.0], more: "" }
+        .ends(&["stuck where steps became too small", "slide along the jump", "replace the jump by a smooth step"]);
+}
+
+#[test]
+fn nothing_attracts() {
+    let states = [("x", "1 + x^2 + mu^2")];
+    Case { parameters: MU, states: &states, seed: "attractor = \"equilibrium\"", range: [-1.0, 2.0], more: "" }
+        .ends(&["escaped (128)", "nothing attracts from the range of the states"]);
+}
+
+#[test]
+fn an_isolated_point_and_a_cusp() {
+    let parameters = [("mu", 0.0)];
+    let states = [("x", "-x^2 - mu^2")];
+    Case { parameters: &parameters, states: &states, seed: "state = { x = 0 }", range: [-1.0, 1.0], more: "" }
+        .ends(&["the state is an equilibrium, and a singular one"]);
+    let states = [("x", "mu^3 - x^2")];
+    Case { parameters: MU, states: &states, seed: "state = { x = 1 }", range: [-1.0, 2.0], more: "" }
+        .ends(&["steps from", "the solutions form no smooth curve here: a cusp"]);
+}

@@ -1,0 +1,108 @@
+//! Texts that are nearly right.
+
+use arbitrary::{Result, Unstructured};
+
+/// Pieces that have a meaning somewhere, or had better have none.
+const PIECES: [&str; 58] = [
+    "nan",
+    "inf",
+    "-inf",
+    "1e999",
+    "-1e308",
+    "1e-400",
+    "99999999999999999999",
+    "0x10",
+    "1_000",
+    "-0.0",
+    "0",
+    "true",
+    "[",
+    "]",
+    "[[",
+    "]]",
+    "{",
+    "}",
+    "\"",
+    "'''",
+    "\"\"\"",
+    "\\",
+    "\\u0000",
+    "=",
+    "==",
+    ",",
+    ".",
+    "\n",
+    "\r",
+    "\t",
+    "#",
+    "(",
+    ")",
+    "((((((((",
+    "^",
+    "**",
+    "^-",
+    "<",
+    "!=",
+    "if(",
+    "heaviside(",
+    "hypot(",
+    "pi",
+    "t",
+    "0^0",
+    "/0",
+    "µ",
+    "Ω",
+    "\u{202e}",
+    "\u{feff}",
+    "é",
+    "𝛀",
+    "[seed]",
+    "[[branch]]",
+    "range = [1, -1]",
+    "from = \"x\"",
+    "[states]",
+    "until = 0",
+];
+
+/// The text with a few edits: pieces put in, cut out, doubled, moved.
+pub fn edited(u: &mut Unstructured, text: &str) -> Result<String> {
+    let mut text = text.to_string();
+    for _ in 0..u.int_in_range(1..=6u8)? {
+        let (from, to) = range(u, &text)?;
+        match u.int_in_range(0..=5u8)? {
+            0 => text.replace_range(from..to, ""),
+            1 => text.insert_str(from, u.choose(&PIECES)?),
+            2 => text.replace_range(from..to, u.choose(&PIECES)?),
+            3 => {
+                let piece = text[from..to].to_string();
+                let (at, _) = range(u, &text)?;
+                text.insert_str(at, &piece);
+            }
+            4 => {
+                let (first, last) = line(&text, from);
+                let piece = text[first..last].to_string();
+                let times = u.int_in_range(0..=3usize)?;
+                text.replace_range(first..last, &piece.repeat(times));
+            }
+            _ => {
+                let letter: char = u.arbitrary()?;
+                text.insert(from, letter);
+            }
+        }
+    }
+    Ok(text)
+}
+
+/// A short range on the boundaries of characters.
+fn range(u: &mut Unstructured, text: &str) -> Result<(usize, usize)> {
+    let boundary = |at: usize| (0..=at.min(text.len())).rev().find(|&at| text.is_char_boundary(at)).unwrap_or(0);
+    let from = boundary(u.int_in_range(0..=text.len())?);
+    let to = boundary(from + u.int_in_range(0..=40usize)?).max(from);
+    Ok((from, to))
+}
+
+/// The line around `at`, its end included.
+fn line(text: &str, at: usize) -> (usize, usize) {
+    let first = text[..at].rfind('\n').map_or(0, |end| end + 1);
+    (first, text[at..].find('\n').map_or(text.len(), |end| at + end + 1))
+}

@@ -1,0 +1,159 @@
+//! Formulas of the model language as trees, and how they are written.
+
+use arbitrary::{Result, Unstructured};
+
+/// Operators in infix form, with how tightly they bind.
+pub const OPERATORS: [(&str, u8); 11] =
+    [("<", 1), ("<=", 1), (">", 1), (">=", 1), ("==", 1), ("!=", 1), ("+", 2), ("-", 2), ("*", 3), ("/", 3), ("^", 5)];
+/// How tightly a sign binds.
+const SIGN: u8 = 4;
+/// Nothing binds tighter.
+const ATOM: u8 = 6;
+/// Functions of one argument.
+pub const ONE: [&str; 16] = [
+    "sqrt",
+    "exp",
+    "log",
+    "sin",
+    "cos",
+    "tan",
+    "asin",
+    "acos",
+    "atan",
+    "sinh",
+    "cosh",
+    "tanh",
+    "abs",
+    "sign",
+    "heaviside",
+    "+",
+];
+/// Functions of two arguments.
+pub const TWO: [&str; 4] = ["atan2", "min", "max", "hypot"];
+/// Constants that are worth trying beside random ones.
+const NUMBERS: [f64; 14] = [0.0, 1.0, 2.0, 3.0, 0.5, 1.5, 7.0, 0.25, 10.0, 1e-8, 1e8, 0.1, 1e300, 1e-300];
+
+/// A formula.
+#[derive(Clone, Debug)]
+pub enum Formula {
+    /// A number that is not negative.
+    Number(f64),
+    /// Something that has a name; which, counted over states, parameters and definitions.
+    Name(usize),
+    /// -a.
+    Negative(Box<Formula>),
+    /// a operator b; the operator by its place in [`OPERATORS`].
+    Infix(usize, Box<[Formula; 2]>),
+    /// A function of one argument by its place in [`ONE`]; the last is the sign +.
+    One(usize, Box<Formula>),
+    /// A function of two arguments by its place in [`TWO`].
+    Two(usize, Box<[Formula; 2]>),
+    /// `if(condition, a, b)`.
+    If(Box<[Formula; 3]>),
+}
+
+impl Formula {
+    /// A formula over `names` names, at most `depth` deep.
+    pub fn random(u: &mut Unstructured, names: usize, depth: usize) -> Result<Formula> {
+        if depth == 0 || u.is_empty() {
+            return Ok(match u.ratio(1u8, 3u8)? {
+                true => Formula::Number(number(u)?),
+                false => Formula::Name(u.choose_index(names)?),
+            });
+        }
+        let inner = |u: &mut Unstructured| Formula::random(u, names, depth - 1);
+        Ok(match u.int_in_range(0..=9u8)? {
+            0 => Formula::Negative(Box::new(inner(u)?)),
+            // Comparisons less often than arithmetic.
+            n @ 1..=5 => {
+                let operators = if n == 1 { 0..OPERATORS.len() } else { 6..OPERATORS.len() };
+                Formula::Infix(u.int_in_range(operators.start..=operators.end - 1)?, Box::new([inner(u)?, inner(u)?]))
+            }
+            6 | 7 => Formula::One(u.choose_index(ONE.len())?, Box::new(inner(u)?)),
+            8 => Formula::Two(u.choose_index(TWO.len())?, Box::new([inner(u)?, inner(u)?])),
+            _ => Formula::If(Box::new([inner(u)?, inner(u)?, inner(u)?])),
+        })
+    }
+
+    /// The formula as text, with no more brackets than needed or a few more; `name` writes a name.
+    pub fn write(&self, u: &mut Unstructured, name: &dyn Fn(usize) -> String, out: &mut String) -> Result<()> {
+        self.write_within(u, name, 0, out)
+    }
+
+    /// In brackets where it binds less tightly than `least`.
+    fn write_within(
+        &self,
+        u: &mut Unstructured,
+        name: &dyn Fn(usize) -> String,
+        least: u8,
+        out: &mut String,
+    ) -> Result<()> {
+        let bracket = self.strength() < least || u.ratio(1u8, 10u8)?;
+        if bracket {
+            out.push('(');
+        }
+        let arguments = |u: &mut Unstructured, function: &str, list: &[Formula], out: &mut String| -> Result<()> {
+            out.push_str(function);
+            for (i, argument) in list.iter().enumerate() {
+                out.push_str(if i == 0 { "(" } else { ", " });
+                argument.write_within(u, name, 0, out)?;
+            }
+            out.push(')');
+            Ok(())
+        };
+        match self {
+            Formula::Number(value) => out.push_str(&match u.int_in_range(0..=2u8)? {
+                0 => format!("{value}"),
+                1 => format!("{value:?}"),
+                _ => format!("{value:e}"),
+            }),
+            Formula::Name(i) => out.push_str(&name(*i)),
+            Formula::Negative(a) => {
+                out.push('-');
+                a.write_within(u, name, SIGN, out)?;
+            }
+            Formula::One(i, a) if ONE[*i] == "+" => {
+                out.push('+');
+                a.write_within(u, name, SIGN, out)?;
+            }
+            Formula::Infix(operator, operands) => {
+                let (symbol, strength) = OPERATORS[*operator];
+                // Sums and products of the same strength lean to the left, powers to the right, comparisons to neither.
+                let (left, right) = match strength {
+                    1 => (2, 2),
+                    5 => (ATOM, SIGN),
+                    _ => (strength, strength + 1),
+                };
+                operands[0].write_within(u, name, left, out)?;
+                out.push_str(if u.arbitrary()? { " " } else { "" });
+                out.push_str(symbol);
+                out.push_str(if u.arbitrary()? { " " } else { "" });
+                operands[1].write_within(u, name, right, out)?;
+            }
+            Formula::One(i, a) => arguments(u, ONE[*i], std::slice::from_ref(a), out)?,
+            Formula::Two(i, list) => arguments(u, TWO[*i], &list[..], out)?,
+            Formula::If(list) => arguments(u, "if", &list[..], out)?,
+        }
+        if bracket {
+            out.push(')');
+        }
+        Ok(())
+    }
+
+    fn strength(&self) -> u8 {
+        match self {
+            Formula::Negative(_) => SIGN,
+            Formula::One(i, _) if ONE[*i] == "+" => SIGN,
+            Formula::Infix(operator, _) => OPERATORS[*operator].1,
+            _ => ATOM,
+        }
+    }
+}
+
+/// A number that is finite and not negative.
+fn number(u: &mut Unstructured) -> Result<f64> {
+    Ok(match u.ratio(7u8, 8u8)? {
+        true => *u.choose(&NUMBERS)?,
+        false => Some(f64::from_bits(u.arbitrary()?).abs()).filter(|x| x.is_finite()).unwrap_or(4.25),
+    })
+}

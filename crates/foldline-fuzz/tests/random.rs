@@ -1,0 +1,45 @@
+//! The properties, for the same random inputs every time.
+
+use arbitrary::Unstructured;
+use foldline_fuzz::edits::edited;
+use foldline_fuzz::tapes::{Seen, tape};
+use foldline_fuzz::{bytes, texts};
+
+#[test]
+fn tapes_compute_what_the_formulas_say() {
+    let mut seen = Seen::default();
+    for stream in 0..3000 {
+        let data = bytes(stream, 2000);
+        if let Ok(one) = tape(&mut Unstructured::new(&data)) {
+            seen.values += one.values;
+            seen.slopes += one.slopes;
+        }
+    }
+    assert!(seen.values > 8_000 && seen.slopes > 4_000, "{seen:?}");
+}
+
+#[test]
+fn model_files_are_read_or_refused_with_a_place() {
+    let corpus = texts::corpus("models");
+    let (mut read, mut refused) = (0, 0);
+    for (stream, (_, text)) in (0..6000).zip(corpus.iter().cycle()) {
+        let data = bytes(stream, 600);
+        let Ok(text) = edited(&mut Unstructured::new(&data), text) else { continue };
+        *if texts::model(&text) { &mut read } else { &mut refused } += 1;
+    }
+    assert!(read > 500 && refused > 2000, "{read} {refused}");
+}
+
+#[test]
+fn study_files_are_read_or_refused_with_a_place() {
+    let corpus = texts::corpus("studies");
+    let models = texts::corpus("models");
+    let (_, rotor) = models.iter().find(|(path, _)| path.ends_with("overhung-rotor.toml")).expect("the rotor");
+    let (mut read, mut refused) = (0, 0);
+    for (stream, (_, text)) in (0..3000).zip(corpus.iter().cycle()) {
+        let data = bytes(stream, 600);
+        let Ok(text) = edited(&mut Unstructured::new(&data), text) else { continue };
+        *if texts::study(&text, rotor).is_some() { &mut read } else { &mut refused } += 1;
+    }
+    assert!(read > 150 && refused > 1000, "{read} {refused}");
+}

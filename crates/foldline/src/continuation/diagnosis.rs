@@ -1,0 +1,216 @@
+//! What is said of a side that ends short: what was tried, what the likely cause is, what can be done.
+//!
+//! **Idea.** While steps from a point are given up, it is noted how many, how long, on which meshes and why. When the last
+//! one is given up, the signs are gone through from the surest to the least: f that is not finite a little farther on, a
+//! period that had grown, a parameter that had stood still, a right-hand side with kinks, a mesh that did not suffice.
+
+use super::corrector::{Failure, Station};
+use super::follow::{Follow, STANDS};
+use crate::diagram::Ending;
+
+/// Steps that were given up in a row.
+#[derive(Debug)]
+pub(super) struct Tried {
+    steps: usize,
+    longest: f64,
+    shortest: f64,
+    intervals: [usize; 2],
+    /// How many were given up because the point found did not continue the branch, and because Newton's method failed.
+    elsewhere: usize,
+    diverged: usize,
+}
+
+/// What is known of a side beside its last point.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Past {
+    /// The period at the beginning.
+    pub first_period: Option<f64>,
+    /// Whether the parameter has ever moved.
+    pub moved: bool,
+}
+
+/// A cause, and what helps against it.
+type Cause = (String, &'static str);
+
+/// f that is not defined everywhere.
+const EDGE: (&str, &str) = (
+    "the solution reaches the edge of the region in which the vector field is defined (a division by zero, a log or a \
+     root of something negative)",
+    "if that edge belongs to the problem, the branch ends here; otherwise write the equation so that it is defined on the \
+     way, or end the range before",
+);
+
+/// Growth of the period that makes an orbit of infinite period likely.
+const GROWN: f64 = 2.0;
+
+impl Tried {
+    pub fn new() -> Tried {
+        let (longest, shortest, intervals) = (0.0, f64::INFINITY, [usize::MAX, 0]);
+        Tried { steps: 0, longest, shortest, intervals, elsewhere: 0, diverged: 0 }
+    }
+
+    /// A step of that length was given up on a mesh of that many intervals.
+    pub fn note(&mut self, step: f64, intervals: usize, why: &Failure) {
+        self.steps += 1;
+        (self.longest, self.shortest) = (self.longest.max(step), self.shortest.min(step));
+        self.intervals = [self.intervals[0].min(intervals), self.intervals[1].max(intervals)];
+        self.elsewhere += usize::from(matches!(why, Failure::Elsewhere { .. } | Failure::Unexplained));
+        self.diverged += usize::from(matches!(why, Failure::NoConvergence(_) | Failure::Singular));
+    }
+
+    fn sentence(&self, why: &Failure, parameter: f64) -> String {
+        let steps = match self.steps {
+            0 | 1 => format!("one step of {:.1e} was tried", self.longest),
+            n => format!("{n} steps from {:.1e} down to {:.1e} were tried", self.longest, self.shortest),
+        };
+        let meshes = match self.intervals {
+            [_, 0] => String::new(),
+            [few, many] if few == many => format!(" on {few} intervals"),
+            [few, many] => format!(" on {few} to {many} intervals"),
+        };
+        let counts = match (self.elsewhere, self.diverged) {
+            (_, 0) | (0, _) => String::new(),
+            (a, b) => format!(" ({a} led elsewhere, Newton's method failed in {b})"),
+        };
+        format!("next to {parameter:?}, {steps}{meshes}{counts}; the last failed because {why}")
+    }
+}
+
+impl Follow<'_> {
+    /// The ending of a side at `left`, beyond which no step led.
+    pub(super) fn short_end(&mut self, left: &Station, tried: &Tried, why: &Failure, past: Past) -> Ending {
+        let (cause, cure) = self.cause(left, tried, why, past);
+        let said = format!("{}\nlikely cause: {cause}\nwhat to do: {cure}", tried.sentence(why, left.parameter()));
+        match why {
+            Failure::NotFinite => Ending::NotFinite(said),
+            Failure::Mesh(_) => Ending::MeshTooLarge(said),
+            _ => Ending::StepTooSmall(said),
+        }
+    }
+
+    fn cause(&mut self, left: &Station, tried: &Tried, why: &Failure, past: Past) -> Cause {
+        let period = left.point.solution.period();
+        let grown = period.zip(past.first_period).map_or(1.0, |(now, first)| now / first);
+        if *why == Failure::NotFinite || self.breaks_off(left, tried.longest) {
+            return (EDGE.0.into(), EDGE.1);
+        }
+        if grown > GROWN {
+            return (
+                format!(
+                    "the period has grown {grown:.1} times and most of it passes next to an equilibrium: a homoclinic or \
+                     heteroclinic orbit is near, at which the branch ends"
+                ),
+                "take the value of the parameter here as that of the orbit, or end the range before",
+            );
+        }
+        if !past.moved && left.slope().abs() < STANDS {
+            return (
+                "the parameter has not moved since the branch began: a family of solutions at one value of it, as a system \
+                 with a conserved quantity has them"
+                    .into(),
+                "add a small damping and follow it to zero, or take a parameter that the family depends on",
+            );
+        }
+        match self.settings.kinks {
+            0 => {}
+            n => {
+                let places = if n == 1 { "one place".to_string() } else { format!("{n} places") };
+                return (
+                    format!(
+                        "the right-hand side is not smooth in {places} (abs, sign, heaviside, min, max, if, comparisons), \
+                         and the solution meets one of them here"
+                    ),
+                    "replace them by smooth functions with a sharpness, such as tanh(s*x) for sign(x) or \
+                     sqrt(x^2 + 1/s^2) for abs(x), and follow the solution to the sharpness needed",
+                );
+            }
+        }
+        match why {
+            Failure::Mesh(_) => (
+                "a layer in time too thin for any mesh allowed here: a relaxation oscillation that is very stiff, a canard, \
+                 or a contact that is nearly a jump"
+                    .into(),
+                "ask for a larger tolerance or a higher degree, or make the stiff term milder and follow it back",
+            ),
+            Failure::Unexplained => (
+                "another branch passes closer than the tolerance tells apart, or a multiplier that matters is not resolved"
+                    .into(),
+                "ask for a smaller tolerance",
+            ),
+            Failure::Singular | Failure::Elsewhere { .. } => (
+                "the solutions form no smooth curve here: a cusp, an isolated point, or branches that meet in a way that \
+                 one parameter and the symmetries of the model do not explain"
+                    .into(),
+                "change another parameter a little, which opens such a point, and follow the branches on both sides of it",
+            ),
+            _ => (
+                "the solution changes over a much shorter way than the scales of states and parameters suggest".into(),
+                "give each state its `scale` in the model file, and the parameter a value of its typical size",
+            ),
+        }
+    }
+
+    /// Whether the vector field is not finite somewhere along the tangent, within the longest step that was tried, or a
+    /// little farther on in the parameter alone.
+    fn breaks_off(&mut self, left: &Station, longest: f64) -> bool {
+        self.place(left);
+        let mut r = vec![0.0; left.u.len()];
+        let last = left.u.len() - 1;
+        let beside = 1e-6 * (1.0 + left.parameter().abs()) * left.slope().signum();
+        (0..=40).any(|k| {
+            let share = 0.5f64.powi(40 - k);
+            let along: Vec<f64> = left.u.iter().zip(&left.tangent).map(|(u, t)| u + share * longest * t).collect();
+            let mut aside = left.u.clone();
+            aside[last] += share * beside;
+            !self.problem.residual(&along, &mut r) || !self.problem.residual(&aside, &mut r)
+        })
+    }
+
+    /// The ending of a side of equilibria on which the parameter has come to a stand and the solution goes on changing.
+    pub(super) fn at_a_stand(&mut self, right: &Station) -> Ending {
+        let edge = self.breaks_off(right, self.settings.first_step);
+        let said =
+            format!("the parameter comes to a stand at {:?} while the solution goes on changing", right.parameter());
+        match edge {
+            true => Ending::NotFinite(format!("{said}\nlikely cause: {}\nwhat to do: {}", EDGE.0, EDGE.1)),
+            false => Ending::SolutionUnbounded(format!(
+                "{said}\nlikely cause: the branch has an asymptote there\nwhat to do: nothing if that is so"
+            )),
+        }
+    }
+
+    /// The ending of a side along which the solution grows while the parameter comes to a stand, as at a vertical asymptote.
+    pub(super) fn unbounded(&self, left: &Station, right: &Station, past: Past) -> Option<Ending> {
+        let home = self.home.map_or(&[][..], |home| &home.ranges);
+        let size = |ranges: &[[f64; 2]], i: usize| ranges.get(i).map_or(0.0, |[low, high]| low.abs().max(high.abs()));
+        let grown = |i: usize, ranges: &[[f64; 2]]| size(ranges, i) / (self.settings.scales[i] + size(home, i));
+        let (now, before) = (&right.point.ranges, &left.point.ranges);
+        let states = 0..self.settings.scales.len();
+        let i = states.max_by(|a, b| grown(*a, now).total_cmp(&grown(*b, now)))?;
+        if grown(i, now) < FAR || size(now, i) <= size(before, i) {
+            return None;
+        }
+        let moved = (right.parameter() - left.parameter()).abs();
+        if moved > STILL * (1.0 + right.parameter().abs()) * (size(now, i) / size(before, i)).ln() {
+            return None;
+        }
+        let cause = match past.moved {
+            true => "the branch has an asymptote there: solutions run to infinity at a finite value of the parameter",
+            false => {
+                "a family of solutions at one value of the parameter, as a system with a conserved quantity has them"
+            }
+        };
+        Some(Ending::SolutionUnbounded(format!(
+            "a state has grown to {:.1e} while the parameter stands at {}\nlikely cause: {cause}\nwhat to do: nothing if \
+             that is so; if such sizes are usual, give the state its `scale` in the model file",
+            size(now, i),
+            // No -0.
+            (1e9 * right.parameter()).round() / 1e9 + 0.0
+        )))
+    }
+}
+
+/// Growth of a state, against its scale and its size at the start, from which it may be unbounded.
+const FAR: f64 = 1e6;
+/// Change of the parameter, for a growth by e, below which it stands.
+const STILL: f64 = 1e-5;

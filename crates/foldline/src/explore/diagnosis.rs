@@ -1,0 +1,166 @@
+//! Why no first solution was found: what in the vector field makes that likely, and what can be done.
+//!
+//! **Idea.** f at a few places of the sampling box tells whether some combination of the states never changes. Then no
+//! equilibrium and no cycle is isolated, and Newton's method has nothing to converge to.
+
+use super::System;
+use crate::contract::{Batch, Parameters};
+use crate::linalg::max_abs;
+
+/// Largest number of states for which conserved combinations are looked for.
+const MOST: usize = 64;
+/// Size, relative to the largest, below which what is left of a column is rounding.
+const ROUNDING: f64 = 1e-10;
+
+/// What is known of trajectories that led nowhere.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Seen<'a> {
+    /// The state that was given, if one was.
+    pub state: Option<&'a [f64]>,
+    /// Whether some could not be followed on, their steps having become too small.
+    pub stuck: bool,
+    /// Whether all left every bound.
+    pub all_escaped: bool,
+}
+
+/// Lines that say a likely cause and a cure, to be put after what happened.
+pub(super) fn of_no_start(system: &System, parameters: &[f64], seen: Seen) -> String {
+    let stuck = seen.stuck;
+    let conserved = conserved(system, parameters);
+    if let [first, rest @ ..] = &conserved[..] {
+        let more = if rest.is_empty() { String::new() } else { format!(", and {} more", rest.len()) };
+        return format!(
+            "\nlikely cause: {}{more} never changes, whatever the state: solutions are not isolated but come in families\n\
+             what to do: eliminate one state by its conserved combination, and make the conserved value a parameter",
+            combination(first, &system.state_names)
+        );
+    }
+    if seen.state.is_some_and(|state| rests(system, parameters, state)) {
+        return "\nlikely cause: the state is an equilibrium, and a singular one: a fold, a branch point or an isolated point, \
+                from which nothing says where a branch leads\nwhat to do: start at another value of the parameter, on one of the \
+                branches that come together there"
+            .into();
+    }
+    match system.field.switch_count() {
+        0 if stuck => "\nlikely cause: f jumps, or is too stiff for the explicit method that simulates\nwhat to do: give a state \
+                       next to an equilibrium, or milder parameters, and follow from there"
+            .into(),
+        n if stuck && n > 0 => "\nlikely cause: f jumps where it is not smooth (sign, heaviside, if, comparisons), and trajectories \
+                       slide along the jump, as with dry friction\nwhat to do: replace the jump by a smooth step such as \
+                       tanh(s*x), and follow the solution to the sharpness needed"
+            .into(),
+        _ if seen.all_escaped => "\nlikely cause: at these parameters nothing attracts from the range of the states\nwhat to do: \
+                                  other parameters, another range of the states, or a given state next to the solution"
+            .into(),
+        _ => "\nwhat to do: more samples, other parameters, another range of the states, or a given state".into(),
+    }
+}
+
+/// Whether f vanishes at a state.
+fn rests(system: &System, parameters: &[f64], state: &[f64]) -> bool {
+    let mut f = vec![0.0; state.len()];
+    system.field.evaluate(Batch { lanes: 1, states: state, parameters: Parameters::Shared(parameters) }, &mut f);
+    f.iter().zip(&system.scales).all(|(v, scale)| v.abs() <= ROUNDING * scale)
+}
+
+/// Combinations wᵀx that never change, wᵀf = 0 at every place tried: each `[n]`, its smallest entry ±1.
+fn conserved(system: &System, parameters: &[f64]) -> Vec<Vec<f64>> {
+    let n = system.field.dim();
+    if n > MOST {
+        return Vec::new();
+    }
+    let golden = 0.618_033_988_749_895;
+    let mut rows: Vec<Vec<f64>> = Vec::new();
+    for place in 1..=4 * n + 8 {
+        let share = |i: usize| (golden * (place * (i + 2)) as f64 + 0.17 * (i * i) as f64).fract();
+        let state: Vec<f64> = system.ranges.iter().enumerate().map(|(i, [a, b])| a + share(i) * (b - a)).collect();
+        let mut f = vec![0.0; n];
+        system.field.evaluate(Batch { lanes: 1, states: &state, parameters: Parameters::Shared(parameters) }, &mut f);
+        if f.iter().all(|v| v.is_finite()) {
+            rows.push(f);
+        }
+    }
+    // Too few places say nothing.
+    if rows.len() < 2 * n + 4 { Vec::new() } else { null_space(rows, n) }
+}
+
+/// The vectors w with `row`·w = 0 for all rows, by elimination with complete pivoting; empty where there is none.
+fn null_space(mut rows: Vec<Vec<f64>>, n: usize) -> Vec<Vec<f64>> {
+    let sizes: Vec<f64> = (0..n).map(|j| rows.iter().fold(0.0f64, |m, row| m.max(row[j].abs()))).collect();
+    let sizes: Vec<f64> = sizes.iter().map(|&s| if s > 0.0 { s } else { 1.0 }).collect();
+    rows.iter_mut().for_each(|row| row.iter_mut().zip(&sizes).for_each(|(v, s)| *v /= s));
+    let mut columns: Vec<usize> = (0..n).collect();
+    let mut rank = 0;
+    while rank < n.min(rows.len()) {
+        let places = (rank..rows.len()).flat_map(|i| (rank..n).map(move |j| (i, j)));
+        let Some((i, j)) =
+            places.max_by(|a, b| rows[a.0][columns[a.1]].abs().total_cmp(&rows[b.0][columns[b.1]].abs()))
+        else {
+            break;
+        };
+        let pivot = rows[i][columns[j]];
+        if pivot.abs() < ROUNDING {
+            break;
+        }
+        rows.swap(rank, i);
+        columns.swap(rank, j);
+        let top = rows[rank].clone();
+        for row in rows.iter_mut().skip(rank + 1) {
+            let factor = row[columns[rank]] / pivot;
+            row.iter_mut().zip(&top).for_each(|(v, t)| *v -= factor * t);
+        }
+        rank += 1;
+    }
+    let mut found = Vec::new();
+    for free in rank..n {
+        let mut w = vec![0.0; n];
+        w[columns[free]] = 1.0;
+        for k in (0..rank).rev() {
+            let sum: f64 = (k + 1..n).map(|j| rows[k][columns[j]] * w[columns[j]]).sum();
+            w[columns[k]] = -sum / rows[k][columns[k]];
+        }
+        w.iter_mut().zip(&sizes).for_each(|(v, s)| *v /= s);
+        let largest = max_abs(&w);
+        let smallest = w.iter().filter(|v| v.abs() > 1e-6 * largest).fold(f64::INFINITY, |m, v| m.min(v.abs()));
+        let first = w.iter().find(|v| v.abs() > 1e-6 * largest).map_or(1.0, |v| v.signum());
+        found.push(w.iter().map(|v| if v.abs() > 1e-6 * largest { first * v / smallest } else { 0.0 }).collect());
+    }
+    found
+}
+
+/// w as a sum, such as `x + 2 y`.
+fn combination(w: &[f64], names: &[String]) -> String {
+    let mut text = String::new();
+    for (i, value) in w.iter().enumerate().filter(|(_, v)| **v != 0.0) {
+        let name = names.get(i).map_or("?", String::as_str);
+        let rounded = (value.abs() * 1e6).round() / 1e6;
+        let factor = if rounded == 1.0 { String::new() } else { format!("{rounded} ") };
+        text += match (text.is_empty(), *value < 0.0) {
+            (true, false) => "",
+            (true, true) => "-",
+            (false, false) => " + ",
+            (false, true) => " - ",
+        };
+        text += &format!("{factor}{name}");
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn conserved_combinations_are_found_and_none_where_there_is_none() {
+        // x + y/2 - z is conserved by (a, 2b, a + b), and nothing by (a, b, a b).
+        let places: Vec<[f64; 2]> = (1..20).map(|k| [(k as f64).sin(), (0.7 * (k * k) as f64).cos()]).collect();
+        let rows = places.iter().map(|[a, b]| vec![*a, 2.0 * b, a + b]).collect();
+        let found = null_space(rows, 3);
+        assert_eq!(found.len(), 1);
+        let names = ["x", "y", "z"].map(String::from);
+        assert_eq!(combination(&found[0], &names), "2 x + y - 2 z");
+        let rows = places.iter().map(|[a, b]| vec![*a, *b, a * b]).collect();
+        assert!(null_space(rows, 3).is_empty());
+        assert_eq!(null_space(vec![vec![0.0]; 9], 1), vec![vec![1.0]]);
+    }
+}
