@@ -115,8 +115,8 @@ fn exp(x: TwoFloat) -> TwoFloat {
 /// By the series around the nearest multiple of a right angle.
 fn sin_cos(x: TwoFloat) -> (TwoFloat, TwoFloat) {
     let quarters = (x.hi() / std::f64::consts::FRAC_PI_2).round();
-    // Beyond this the nearest multiple is not known, with infinities and what is no number.
-    if !(quarters.abs() < 1e15) {
+    // Beyond this the nearest multiple is not known.
+    if quarters.is_nan() || quarters.abs() > 1e15 {
         return (x.hi().sin().into(), x.hi().cos().into());
     }
     let r = x - twofloat::consts::FRAC_PI_2 * quarters;
