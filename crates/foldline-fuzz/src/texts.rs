@@ -38,7 +38,7 @@ pub fn model(text: &str) -> bool {
     let states: Vec<f64> = model.states.iter().map(|s| 0.3 * s.range[0] + 0.7 * s.range[1]).collect();
     let parameters = model.defaults();
     let free: Vec<usize> = (0..q).collect();
-    let at = Batch { lanes: 1, states: &states, parameters: Parameters::Shared(&parameters) };
+    let at = Batch { lanes: 1, states: &states, parameters: Parameters::Shared(&parameters), times: &[] };
     let (mut f, mut fx, mut fp) = (vec![0.0; n], vec![0.0; n * n], vec![0.0; n * q]);
     model.linearise(at, &free, &mut f, &mut fx, &mut fp);
     let mut outputs = vec![0.0; model.output_count()];
@@ -91,7 +91,7 @@ pub fn expression(text: &str) {
     };
     match Model::compile(source) {
         Ok(model) => {
-            let at = Batch { lanes: 1, states: &[0.7], parameters: Parameters::Shared(&[0.5]) };
+            let at = Batch { lanes: 1, states: &[0.7], parameters: Parameters::Shared(&[0.5]), times: &[] };
             let (mut f, mut fx, mut fp) = ([0.0], [0.0], [0.0]);
             model.linearise(at, &[0], &mut f, &mut fx, &mut fp);
         }

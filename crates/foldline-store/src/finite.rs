@@ -49,7 +49,7 @@ fn at_equation(model: &Model, component: usize, message: String, model_text: &st
 /// The first component of f that is not finite at a state.
 fn not_finite(model: &Model, state: &[f64], parameters: &[f64]) -> Option<usize> {
     let mut f = vec![0.0; model.dim()];
-    model.evaluate(Batch { lanes: 1, states: state, parameters: Parameters::Shared(parameters) }, &mut f);
+    model.evaluate(Batch { lanes: 1, states: state, parameters: Parameters::Shared(parameters), times: &[] }, &mut f);
     f.iter().position(|v| !v.is_finite())
 }
 

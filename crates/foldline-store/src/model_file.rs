@@ -5,14 +5,24 @@
 
 use crate::diagnostic::Diagnostic;
 use crate::toml_walk::{Value, Walk, read_text, unreadable};
-use foldline::model::{Definition, Field, Item, Model, ModelError, ModelSource, Output, Parameter, State};
+use foldline::model::{Definition, Field, Forcing, Item, Model, ModelError, ModelSource, Output, Parameter, State};
 use std::collections::HashMap;
 use std::ops::Range;
 use std::path::Path;
 use toml::de::{DeTable, DeValue};
 
-const ROOT_KEYS: [&str; 9] =
-    ["name", "description", "source", "parameters", "definitions", "states", "equations", "outputs", "whirl"];
+const ROOT_KEYS: [&str; 10] = [
+    "name",
+    "description",
+    "source",
+    "parameters",
+    "forcing",
+    "definitions",
+    "states",
+    "equations",
+    "outputs",
+    "whirl",
+];
 
 /// Reads a model file: the model and the text, verbatim. Every mistake found is returned.
 pub fn read_model(path: &Path) -> Result<(Model, String), Vec<Diagnostic>> {
@@ -62,6 +72,7 @@ impl Reader<'_> {
             self.places.insert((Item::Parameter(i), Field::Name), place);
             source.parameters.push(self.parameter(i, name, value));
         }
+        source.forcing = root.get("forcing").and_then(|value| self.forcing(value));
         for (i, (name, place, value)) in self.entries(root, "definitions").into_iter().enumerate() {
             let expression = self.expression(Item::Definition(i), place, value, &format!("the definition `{name}`"));
             source.definitions.push(Definition { name, expression });
@@ -104,6 +115,27 @@ impl Reader<'_> {
     fn labels(&mut self, table: &DeTable) -> (String, String) {
         let unit = table.get("unit").and_then(|value| self.walk.string(value, "`unit`"));
         (unit.unwrap_or_else(|| "1".into()), self.prose(table, "description"))
+    }
+
+    /// `frequency` or `period`, one of the two.
+    fn forcing(&mut self, value: &Value) -> Option<Forcing> {
+        let table = self.walk.table(value, "`forcing`")?;
+        self.walk.only(table, &["frequency", "period"], "`forcing`");
+        let (is_frequency, own) = match (table.get("frequency"), table.get("period")) {
+            (Some(own), None) => (true, own),
+            (None, Some(own)) => (false, own),
+            (both, _) => {
+                let message =
+                    if both.is_some() { "both a frequency and a period" } else { "no frequency and no period" };
+                let hint = "say either `frequency = \"…\"`, the angular one, or `period = \"…\"`";
+                self.walk.report(value.span(), format!("the forcing has {message}"), hint);
+                return None;
+            }
+        };
+        self.places.insert((Item::Forcing, Field::Name), value.span());
+        let what = if is_frequency { "the frequency of the forcing" } else { "the period of the forcing" };
+        let expression = self.expression(Item::Forcing, own.span(), own, what);
+        Some(Forcing { is_frequency, expression })
     }
 
     fn parameter(&mut self, i: usize, name: String, value: &Value) -> Parameter {

@@ -36,7 +36,7 @@ fn every_published_model_compiles_and_is_finite() {
         // Both ends and the middle of the sampling ranges.
         for share in [0.0, 0.5, 1.0] {
             let x: Vec<f64> = model.states.iter().map(|s| s.range[0] + share * (s.range[1] - s.range[0])).collect();
-            let at = Batch { lanes: 1, states: &x, parameters: Parameters::Shared(&p) };
+            let at = Batch { lanes: 1, states: &x, parameters: Parameters::Shared(&p), times: &[] };
             let (mut f, mut outputs) = (vec![0.0; model.dim()], vec![0.0; model.output_count()]);
             model.evaluate(at, &mut f);
             model.outputs(at, &mut outputs);
@@ -90,7 +90,7 @@ fn short_forms() {
     let model = parse_model(text, "some/folder/pendulum.toml").unwrap_or_else(|found| panic!("{}", found[0]));
     assert_eq!(model.name, "pendulum");
     let mut f = [0.0; 2];
-    model.evaluate(Batch { lanes: 1, states: &[1.0, 2.0], parameters: Parameters::Shared(&[]) }, &mut f);
+    model.evaluate(Batch { lanes: 1, states: &[1.0, 2.0], parameters: Parameters::Shared(&[]), times: &[] }, &mut f);
     assert_eq!(f, [2.0, -3.0]);
 
     let text = "[states.x]\nrange = [0, 1]\n[equations]\nx = -1\n";
@@ -174,7 +174,7 @@ fn the_first_model_of_the_book_is_right() {
     assert!(text.lines().count() <= 21, "twenty lines are promised");
     let model = parse_model(text, "first.toml").unwrap_or_else(|found| panic!("{}", found[0]));
     let (mut f, p) = ([0.0; 4], model.defaults());
-    let at = Batch { lanes: 1, states: &[0.5, 0.25, 0.6, 0.8], parameters: Parameters::Shared(&p) };
+    let at = Batch { lanes: 1, states: &[0.5, 0.25, 0.6, 0.8], parameters: Parameters::Shared(&p), times: &[] };
     model.evaluate(at, &mut f);
     let expected = [0.25, 0.06 * 0.6 - 2.0 * 0.02 * 0.25 - 0.625, -1.2 * 0.8, 1.2 * 0.6];
     for (found, expected) in f.iter().zip(expected) {

@@ -29,7 +29,13 @@ fn point(position: i64, cycle: bool) -> Point {
     let list = |n: usize, from: usize| (0..n).map(|k| awkward(k + from)).collect::<Vec<f64>>();
     let solution = if cycle {
         let mesh: Vec<f64> = vec![0.0, 1.0 / 3.0, 1.0];
-        Solution::Cycle(Cycle { period: awkward(5), mesh: mesh.into(), degree: 4, profile: list(2 * 5, 3) })
+        Solution::Cycle(Cycle {
+            period: awkward(5),
+            forcing_periods: 3,
+            mesh: mesh.into(),
+            degree: 4,
+            profile: list(2 * 5, 3),
+        })
     } else {
         Solution::Equilibrium(list(1, 5))
     };

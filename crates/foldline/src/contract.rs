@@ -24,9 +24,14 @@ pub struct Batch<'a> {
     pub states: &'a [f64],
     /// Parameter values.
     pub parameters: Parameters<'a>,
+    /// `[lanes]` where the field is forced: the time of each point in periods of the forcing. Empty where it is autonomous.
+    pub times: &'a [f64],
 }
 
 /// A vector field x' = f(x, p), x ∈ ℝⁿ, p ∈ ℝᵏ, with exact derivatives, evaluated for a batch of points at once.
+///
+/// A forced field has x' = f(x, p, τ) where τ is time counted in periods of the forcing, and x' the change per such period: f has
+/// the period 1 in τ whatever the parameters are. What one unit of τ is in the time of the model is [`VectorField::time_unit`].
 ///
 /// All arrays are component-major over the lanes of the batch: a quantity with components `c` stores lane `l` at
 /// `c * lanes + l`.
@@ -47,6 +52,16 @@ pub trait VectorField: Send + Sync {
     /// The multilinear derivative Dᵏf[d₁, …, dₖ] in states and parameters, k = `directions.len()` ≥ 1: each direction is
     /// `[(n + k_p) × lanes]` (state part first, then all parameters); writes `[n × lanes]`.
     fn directional(&self, at: Batch, directions: &[&[f64]], out: &mut [f64]);
+
+    /// Whether f depends on time.
+    fn forced(&self) -> bool {
+        false
+    }
+
+    /// The unit of the field's time in that of the model: 1, or the period of the forcing at parameters `[k]`.
+    fn time_unit(&self, _parameters: &[f64]) -> f64 {
+        1.0
+    }
 
     /// How many scalar outputs the model defines besides its states.
     fn output_count(&self) -> usize {
@@ -84,8 +99,10 @@ pub struct Singular;
 /// What a curve knows about the stability of one of its points, and how far that can be trusted.
 #[derive(Clone, Debug, Default)]
 pub struct Examination {
-    /// Eigenvalues of an equilibrium; Floquet multipliers of a cycle, the trivial one first.
+    /// Eigenvalues of an equilibrium; Floquet multipliers of a cycle, the trivial one first where there is one.
     pub spectrum: Vec<Complex64>,
+    /// How many trivial ones there are: 1 for cycles of an autonomous field, else 0.
+    pub trivial: usize,
     /// How many of them are unstable (the trivial one never counts).
     pub unstable: usize,
     /// Smallest and largest value of every state, then of every output.

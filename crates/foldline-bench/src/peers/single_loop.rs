@@ -39,7 +39,7 @@ fn point(system: &System, like: &Point, omega: f64, solution: Solution) -> Point
     parameters[rotor::OMEGA] = omega;
     let ranges = match &solution {
         Solution::Cycle(c) => {
-            extremes::of_profile(system.field, &parameters, &c.profile, &c.mesh, &Scheme::new(c.degree))
+            extremes::of_profile(system.field, &parameters, [&c.profile, &c.mesh], 0, &Scheme::new(c.degree))
         }
         Solution::Equilibrium(_) => Vec::new(),
     };

@@ -116,7 +116,7 @@ impl BackboneProblem {
         if let (Outcome::Reached, Some(last)) = (arrival.outcome, mesh.last_mut()) {
             *last = 1.0;
         }
-        Cycle { period, mesh: mesh.into(), degree: DEGREE, profile }
+        Cycle { period, forcing_periods: 0, mesh: mesh.into(), degree: DEGREE, profile }
     }
 }
 
@@ -189,7 +189,7 @@ impl ZeroProblem for BackboneProblem {
         let parameters = self.at(u[3]).parameters();
         let scheme = Scheme::new(cycle.degree);
         let ranges = match cycle.profile.iter().all(|x| x.is_finite()) && cycle.intervals() > 0 {
-            true => extremes::of_profile(&self.rotor, &parameters, &cycle.profile, &cycle.mesh, &scheme),
+            true => extremes::of_profile(&self.rotor, &parameters, [&cycle.profile, &cycle.mesh], 0, &scheme),
             false => vec![[f64::NAN; 2]; 5],
         };
         let mut r = [0.0; SIZE];

@@ -45,6 +45,8 @@ const NUMBERS: &str = "position, degree, unstable, newton, factorisations, rejec
 const LATER_NUMBERS: &str = ", evaluations, linearisations";
 /// Likewise, since format 4.
 const CHECKED_NUMBERS: &str = ", numbers_checksum";
+/// Likewise, since format 6.
+const FORCED_NUMBERS: &str = ", forcing_periods";
 const OF_SPECIAL: &str = "kind, unstable_before, unstable_after";
 
 /// Reads the run in `folder`, which may still be growing.
@@ -156,8 +158,9 @@ pub(super) fn load_diagram(connection: &Connection, path: &Path, part: Part) -> 
             let version: i64 = connection
                 .pragma_query_value(None, "user_version", |row| row.get(0))
                 .map_err(|error| RunFileError::from_sqlite(path, error))?;
-            let later = if version < 3 { "" } else { LATER_NUMBERS };
-            let numbers = format!("{NUMBERS}{later}{}", if version < 4 { "" } else { CHECKED_NUMBERS });
+            let since = |format: i64, own: &'static str| if version < format { "" } else { own };
+            let later = [since(3, LATER_NUMBERS), since(4, CHECKED_NUMBERS), since(6, FORCED_NUMBERS)].concat();
+            let numbers = format!("{NUMBERS}{later}");
             (numbers.clone(), format!("{numbers}, {OF_SPECIAL}"))
         }
     };

@@ -28,7 +28,9 @@ pub(super) fn values_of(point: &Point, extra: &[f64]) -> Vec<Value> {
     scalars.extend_from_slice(extra);
     let light = [pack(&point.parameters), pack_complex(&point.spectrum), pack_pairs(&point.ranges), pack(&scalars)];
     let heavy = [pack(profile), mesh_bytes(&point.solution), pack(&point.tangent)];
-    let checksums = [numbers_checksum(point.position, point.unstable, &light), checksum(&heavy)];
+    let forcing_periods = point.solution.forcing_periods();
+    let counts = [point.unstable, forcing_periods as usize];
+    let checksums = [numbers_checksum(point.position, counts, &light), checksum(&heavy)];
     let [parameters, spectrum, ranges, scalars] = light;
     let [profile, mesh, tangent] = heavy;
     let mesh = if degree == Value::Null { Value::Null } else { Value::Blob(mesh) };
@@ -46,6 +48,7 @@ pub(super) fn values_of(point: &Point, extra: &[f64]) -> Vec<Value> {
         count(point.cost.linearisations),
         Value::Real(trust.spectrum),
         degree,
+        Value::Integer(i64::from(forcing_periods)),
         Value::Blob(parameters),
         Value::Blob(profile),
         mesh,
@@ -72,11 +75,14 @@ fn checksum(parts: &[Vec<u8>]) -> i64 {
     sum.value()
 }
 
-/// That of everything about a point that is a few numbers.
-fn numbers_checksum(position: i64, unstable: usize, light: &[Vec<u8>]) -> i64 {
+/// That of everything about a point that is a few numbers; the second count is left out where it is 0.
+fn numbers_checksum(position: i64, [unstable, forcing_periods]: [usize; 2], light: &[Vec<u8>]) -> i64 {
     let mut sum = Checksum::new();
     sum.word(position as u64);
     sum.word(unstable as u64);
+    if forcing_periods > 0 {
+        sum.word(forcing_periods as u64);
+    }
     light.iter().for_each(|part| sum.bytes(part));
     sum.value()
 }
@@ -106,7 +112,7 @@ pub(super) fn point_in(row: &Row) -> Result<(Point, Vec<f64>), String> {
     if let Some(stated) = of_numbers {
         let light = ["parameter_bytes", "spectrum_bytes", "range_bytes", "scalar_bytes"].map(blob);
         let light = light.into_iter().collect::<Result<Vec<_>, _>>()?;
-        if numbers_checksum(position, count("unstable")?, &light) != stated {
+        if numbers_checksum(position, [count("unstable")?, later("forcing_periods")?], &light) != stated {
             return Err(format!("the numbers of the point at position {position} do not have their checksum"));
         }
     }
@@ -135,7 +141,8 @@ pub(super) fn point_in(row: &Row) -> Result<(Point, Vec<f64>), String> {
             if whole && (nodes == 0 || profile.len() % nodes != 0) {
                 return Err("solution_bytes and mesh_bytes do not belong together".to_string());
             }
-            Solution::Cycle(Cycle { period: *period, mesh: mesh.into(), degree, profile })
+            let forcing_periods = u32::try_from(later("forcing_periods")?).map_err(|e| e.to_string())?;
+            Solution::Cycle(Cycle { period: *period, forcing_periods, mesh: mesh.into(), degree, profile })
         }
     };
     let point = Point {

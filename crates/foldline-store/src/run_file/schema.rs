@@ -46,7 +46,7 @@ impl Columns {
 const OTHERS: [&str; 8] = ["branch", "position", "kind", "key", "unstable_before", "unstable_after", "error", "rowid"];
 
 /// The columns that a point has in both tables of points, with their types: first those to read, then those to load.
-const POINT_COLUMNS: [(&str, &str); 22] = [
+const POINT_COLUMNS: [(&str, &str); 23] = [
     ("period", "REAL"),
     ("unstable", "INTEGER NOT NULL"),
     ("discretisation", "REAL"),
@@ -60,6 +60,7 @@ const POINT_COLUMNS: [(&str, &str); 22] = [
     ("linearisations", "INTEGER NOT NULL DEFAULT 0"),
     ("spectrum_error", "REAL"),
     ("degree", "INTEGER"),
+    ("forcing_periods", "INTEGER NOT NULL DEFAULT 0"),
     ("parameter_bytes", "BLOB NOT NULL"),
     ("solution_bytes", "BLOB NOT NULL"),
     ("mesh_bytes", "BLOB"),
@@ -97,7 +98,7 @@ pub(super) fn create(columns: &Columns) -> String {
 /// The statements that bring a file of an older version to the present one.
 ///
 /// Version 1 had no curves in two parameters, version 2 did not count evaluations, version 3 had neither checksums nor errors of
-/// multipliers, version 4 did not know that a solution can be without bound.
+/// multipliers, version 4 did not know that a solution can be without bound, version 5 had no forced models.
 pub(super) fn upgrade(version: i64) -> &'static str {
     match version {
         1 => "ALTER TABLE branches ADD COLUMN held TEXT; ALTER TABLE branches ADD COLUMN follows INTEGER;",
@@ -114,6 +115,10 @@ pub(super) fn upgrade(version: i64) -> &'static str {
              ALTER TABLE special_points ADD COLUMN spectrum_error REAL;
              ALTER TABLE special_points ADD COLUMN numbers_checksum INTEGER;
              ALTER TABLE special_points ADD COLUMN solution_checksum INTEGER;"
+        }
+        5 => {
+            "ALTER TABLE points ADD COLUMN forcing_periods INTEGER NOT NULL DEFAULT 0;
+             ALTER TABLE special_points ADD COLUMN forcing_periods INTEGER NOT NULL DEFAULT 0;"
         }
         _ => "",
     }

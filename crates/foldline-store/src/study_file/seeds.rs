@@ -3,6 +3,7 @@
 use super::{override_parameters, unique_name};
 use crate::nearest::suggest;
 use crate::toml_walk::{Value, Walk};
+use foldline::contract::VectorField;
 use foldline::explore::{AttractorKey, SeedPlan, SeedSource};
 use foldline::model::Model;
 use std::ops::Range;
@@ -57,7 +58,13 @@ fn attractor(walk: &mut Walk, value: &Value, model: &Model) -> Option<AttractorK
     let text = walk.string(value, "`attractor`")?;
     let ratio = text.split_once(':').and_then(|(a, b)| Some((a.trim().parse().ok()?, b.trim().parse().ok()?)));
     match (text.as_str(), ratio) {
-        ("equilibrium", _) => Some(AttractorKey::Equilibrium),
+        ("equilibrium", _) => {
+            if model.forced() {
+                let hint = "use `attractor = \"cycle\"`: where there is a forcing nothing is at rest";
+                walk.report(value.span(), "the model is forced and has no equilibria", hint);
+            }
+            Some(AttractorKey::Equilibrium)
+        }
         ("cycle", _) => Some(AttractorKey::Cycle),
         (_, Some((a, b))) if a > 0 && b > 0 => {
             if model.whirl.is_none() {

@@ -4,9 +4,9 @@
 //! sweep lets one trajectory settle at the first value and starts at each next one from the last state before. Neither
 //! knows of branches: a motion is recorded as the trajectory shows it (`settling`, `measure`).
 
-use super::Sampling;
 use super::measure::response;
 use super::settling::{First, Settled, Trial, settle_together};
+use super::{Sampling, driven};
 use crate::contract::Verdict;
 use crate::diagram::{Motion, Response};
 use std::sync::Mutex;
@@ -31,6 +31,12 @@ pub fn survey_by_simulation(
     values: &[f64],
     report: Report,
 ) -> Vec<Response> {
+    if trial.field.forced() {
+        let sampling = driven::with_clock(sampling);
+        return driven::simulate(trial, report, |trial, report| {
+            survey_by_simulation(trial, &sampling, parameters, free, values, report)
+        });
+    }
     let starts = sampling.starts();
     let n = trial.field.dim();
     let (next, stop) = (AtomicUsize::new(0), AtomicBool::new(false));
@@ -112,6 +118,12 @@ pub fn stepped_sweep(
     start: &[f64],
     report: Report,
 ) -> Vec<Response> {
+    if trial.field.forced() {
+        let start = [start, &[1.0, 0.0]].concat();
+        return driven::simulate(trial, report, |trial, report| {
+            stepped_sweep(trial, parameters, free, values, &start, report)
+        });
+    }
     let mut found: Vec<Response> = Vec::new();
     let (mut own, mut state) = (parameters.to_vec(), start.to_vec());
     for &value in values {

@@ -40,7 +40,7 @@ impl Context<'_> {
     /// f at a state, `[n]`.
     pub(super) fn slope(&self, state: &[f64]) -> Vec<f64> {
         let mut f = vec![0.0; state.len()];
-        let at = Batch { lanes: 1, states: state, parameters: Parameters::Shared(self.parameters) };
+        let at = Batch { lanes: 1, states: state, parameters: Parameters::Shared(self.parameters), times: &[] };
         self.field.evaluate(at, &mut f);
         f
     }
@@ -162,7 +162,7 @@ mod tests {
             }
         }
         let mesh: Vec<f64> = (0..=intervals).map(|j| j as f64 / intervals as f64).collect();
-        Cycle { period: 6.0, mesh: mesh.into(), degree: 4, profile }
+        Cycle { period: 6.0, forcing_periods: 0, mesh: mesh.into(), degree: 4, profile }
     }
 
     #[test]

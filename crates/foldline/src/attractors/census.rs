@@ -42,17 +42,8 @@ struct Reached {
     first: usize,
 }
 
-/// The attractors reached from `sampling.samples` initial states.
-///
-/// `polish` computes a candidate by Newton's method; it is called from several threads.
-pub fn survey(field: &dyn VectorField, parameters: &[f64], sampling: &Sampling, polish: Polish) -> Census {
-    survey_until(field, parameters, sampling, polish, &|_| false)
-}
-
-/// The same, but no further than needed: it ends with the first block of 32 samples in which half of them or more have settled
-/// and `enough` says so of the attractors reached until then, each with its spectral ratio. Which these are depends on the
-/// order of the samples, not on the number of threads.
-pub fn survey_until(
+/// The attractors of an autonomous field; see [`super::survey_until`].
+pub(super) fn survey(
     field: &dyn VectorField,
     parameters: &[f64],
     sampling: &Sampling,
@@ -134,9 +125,8 @@ pub enum Lost {
     Stuck,
 }
 
-/// The attractor to which the trajectory from `start` `[n]` goes. Where the watch
-/// sees none, as with cycles of many turns, the trajectory is followed until it repeats itself.
-pub fn settle(
+/// The attractor of an autonomous field; see [`super::settle`].
+pub(super) fn settle(
     field: &dyn VectorField,
     parameters: &[f64],
     sampling: &Sampling,

@@ -14,6 +14,8 @@
 //! 7. the same solution found in several blocks is one attractor, named by its spectral ratio (`census`, `spectrum`); where
 //!    only some types are wanted, no more blocks are followed than it takes to find them.
 //!
+//! A forced field is sampled as an autonomous one with two states more (`driven`).
+//!
 //! Beside this stands simulation that solves no equation for the motions it finds (`brute_force`, `settling`, `runner`, `measure`), to be
 //! compared with branches.
 //!
@@ -23,6 +25,7 @@
 mod brute_force;
 mod candidate;
 mod census;
+mod driven;
 mod measure;
 mod orbit;
 mod returns;
@@ -36,11 +39,12 @@ mod watch;
 mod window;
 
 pub use brute_force::{Report, stepped_sweep, survey_by_simulation};
-pub use census::{Lost, settle, survey, survey_until};
+pub use census::Lost;
 pub use sampling::Sampling;
 pub use settling::Trial;
 pub use spectrum::{signed_spectrum, spectral_ratio};
 
+use crate::contract::VectorField;
 use crate::diagram::Point;
 
 /// A stable equilibrium or cycle, and how often it was reached.
@@ -92,3 +96,42 @@ pub type Polish<'a> = &'a (dyn Fn(&Candidate) -> Option<Point> + Sync);
 
 /// Says whether the attractors reached so far, each with its spectral ratio, are all that is wanted.
 pub type Enough<'a> = &'a (dyn Fn(&[(&Point, Option<(u32, u32)>)]) -> bool + Sync);
+
+/// The attractors reached from `sampling.samples` initial states.
+///
+/// `polish` computes a candidate by Newton's method; it is called from several threads. Periods of candidates are in the time of the
+/// field: for a forced one in periods of the forcing, with which they begin.
+pub fn survey(field: &dyn VectorField, parameters: &[f64], sampling: &Sampling, polish: Polish) -> Census {
+    survey_until(field, parameters, sampling, polish, &|_| false)
+}
+
+/// The same, but no further than needed: it ends with the first block of 32 samples in which half of them or more have settled
+/// and `enough` says so of the attractors reached until then, each with its spectral ratio. Which these are depends on the
+/// order of the samples, not on the number of threads.
+pub fn survey_until(
+    field: &dyn VectorField,
+    parameters: &[f64],
+    sampling: &Sampling,
+    polish: Polish,
+    enough: Enough,
+) -> Census {
+    match field.forced() {
+        true => driven::survey(field, parameters, sampling, polish, enough),
+        false => census::survey(field, parameters, sampling, polish, enough),
+    }
+}
+
+/// The attractor to which the trajectory from `start` `[n]` goes, with a forced field from the beginning of a period on. Where the
+/// watch sees none, as with cycles of many turns, the trajectory is followed until it repeats itself.
+pub fn settle(
+    field: &dyn VectorField,
+    parameters: &[f64],
+    sampling: &Sampling,
+    start: &[f64],
+    polish: Polish,
+) -> Result<Point, Lost> {
+    match field.forced() {
+        true => driven::settle(field, parameters, sampling, start, polish),
+        false => census::settle(field, parameters, sampling, start, polish),
+    }
+}

@@ -89,7 +89,7 @@ impl Follow<'_> {
     }
 
     fn cause(&mut self, left: &Station, tried: &Tried, why: &Failure, past: Past) -> Cause {
-        let period = left.point.solution.period();
+        let period = left.point.solution.free_period();
         let grown = period.zip(past.first_period).map_or(1.0, |(now, first)| now / first);
         if *why == Failure::NotFinite || self.breaks_off(left, tried.longest) {
             return (EDGE.0.into(), EDGE.1);

@@ -14,6 +14,8 @@ const LITTLE: f64 = 0.25;
 const NOTHING: f64 = 0.05;
 /// Difference, in tolerances, up to which a point is the start again.
 const HOME: f64 = 30.0;
+/// Distances from the start, in tolerances, at which a branch that comes back is looked at for its side of a special point.
+const BESIDE: [f64; 6] = [0.1, -0.1, 1.0, -1.0, 10.0, -10.0];
 
 impl Follow<'_> {
     /// The bound of a further parameter that this step passes, and the point there.
@@ -156,6 +158,21 @@ impl Follow<'_> {
         if between && same_way && near(&right.point, 0.5) {
             let back = self.at_parameter(left, right, value, cost)?;
             if near(&back.point, HOME * self.settings.tolerance) {
+                if back.point.unstable == home.unstable {
+                    return Ok(Some(back));
+                }
+                // The start is as near to a special point as it is accurate: it is met again on its own side of that.
+                let onwards = (right.parameter() - left.parameter()).signum() * (1.0 + value.abs());
+                for aside in BESIDE {
+                    let there = value + aside * self.settings.tolerance * onwards;
+                    let inside = (left.parameter() - there) * (right.parameter() - there) < 0.0;
+                    if let Some(beside) = inside.then(|| self.at_parameter(left, right, there, cost).ok()).flatten()
+                        && beside.point.unstable == home.unstable
+                        && near(&beside.point, HOME * self.settings.tolerance)
+                    {
+                        return Ok(Some(beside));
+                    }
+                }
                 return Ok(Some(back));
             }
         }
@@ -187,6 +204,8 @@ impl Follow<'_> {
             }
             let stretch = Stretch::new(self.problem, left, right, self.direction);
             high.0 = stretch.length;
+            // On the other side of a special point than the start, which may be as near to one as it is accurate.
+            let mut aside = None;
             for count in 0..12 {
                 let share = if count % 3 == 2 { 0.5 } else { (low.1 / (low.1 - high.1)).clamp(0.05, 0.95) };
                 let s = low.0 + share * (high.0 - low.0);
@@ -194,17 +213,32 @@ impl Follow<'_> {
                 let f = self.features(&found.point, home, &reflection);
                 let off = side(&f);
                 if distance(&f, &own) < HOME * self.settings.tolerance {
-                    return Some(found);
+                    if found.point.unstable == home.unstable {
+                        return Some(found);
+                    }
+                    aside = Some((s, found));
                 }
                 if off <= 0.0 {
                     low = (s, off)
                 } else {
                     high = (s, off)
                 }
-                if off.abs() < self.settings.tolerance {
+                if off.abs() < self.settings.tolerance * if aside.is_some() { 1e-2 } else { 1.0 } {
                     break;
                 }
             }
+            let Some((s, found)) = aside else { continue };
+            let unit = self.settings.tolerance * (high.0 - low.0) / (high.1 - low.1);
+            for aside in BESIDE {
+                let there = (s + aside * unit).clamp(0.0, stretch.length);
+                if let Some(beside) = self.cut(left, &stretch, there, cost)
+                    && beside.point.unstable == home.unstable
+                    && distance(&self.features(&beside.point, home, &reflection), &own) < HOME * self.settings.tolerance
+                {
+                    return Some(beside);
+                }
+            }
+            return Some(found);
         }
         None
     }

@@ -96,12 +96,12 @@ pub fn follow(
     let mut step = if left.point.step > 0.0 { left.point.step } else { walk.settings.first_step };
     let mut position = left.point.position;
     let mut trail = previous.map(|p| walk.trail(&p, &left));
-    let first_period = walk.home.unwrap_or(&left.point).solution.period();
+    let first_period = walk.home.unwrap_or(&left.point).solution.free_period();
     let (mut ever_moved, mut moved, mut still) = (left.slope().abs() > STANDS, true, 0);
     let mut stirred = ever_moved;
     let mut stand = (left.parameter(), emitted);
     // Parameter and period where the parameter was last seen to move, or to stand.
-    let mut mark = left.point.solution.period().map(|period| (left.parameter(), period));
+    let mut mark = left.point.solution.free_period().map(|period| (left.parameter(), period));
     let mut moving = mark;
     loop {
         let outward = |bound: f64| (left.parameter() - bound).abs() <= 1e-12 * (1.0 + bound.abs());
@@ -146,7 +146,7 @@ pub fn follow(
                     coarse += usize::from(matches!(why, Failure::Mesh(_)));
                     if step < walk.settings.min_step || coarse == COARSE {
                         // Where the period grows and nothing else changes, the end is foreseeable.
-                        return match (left.point.solution.period(), moving) {
+                        return match (left.point.solution.free_period(), moving) {
                             (Some(period), Some((_, then))) if !moved && period > then => {
                                 Ending::PeriodUnbounded(period)
                             }
@@ -211,7 +211,7 @@ pub fn follow(
         if let Some(ending) = walk.unbounded(&left, &right, past) {
             return ending;
         }
-        if let (Some(first), Some(now), Some(then)) = (first_period, right.point.solution.period(), mark) {
+        if let (Some(first), Some(now), Some(then)) = (first_period, right.point.solution.free_period(), mark) {
             let here = (right.parameter(), now);
             if (now / then.1).ln().abs() > SHOWN {
                 moved = walk.moves(then, here);

@@ -12,6 +12,8 @@ use crate::problem::gauss::Scheme;
 pub struct Cycle {
     /// T, in the time unit of the model.
     pub period: f64,
+    /// How many periods of the forcing it lasts; 0 where the model is autonomous.
+    pub forcing_periods: u32,
     /// `[N + 1]` interval boundaries from 0 to 1.
     pub mesh: Mesh,
     /// m.

@@ -30,6 +30,19 @@ impl Solution {
             Solution::Cycle(cycle) => Some(cycle.period),
         }
     }
+
+    /// The period of a cycle that no forcing gives.
+    pub fn free_period(&self) -> Option<f64> {
+        self.period().filter(|_| self.forcing_periods() == 0)
+    }
+
+    /// How many periods of the forcing a cycle lasts; 0 where there is none.
+    pub fn forcing_periods(&self) -> u32 {
+        match self {
+            Solution::Equilibrium(_) => 0,
+            Solution::Cycle(cycle) => cycle.forcing_periods,
+        }
+    }
 }
 
 /// How far a point can be trusted.
@@ -39,7 +52,7 @@ pub struct Trust {
     pub discretisation: f64,
     /// max |F(u)| after the last Newton step, relative.
     pub residual: f64,
-    /// |μ₁ - 1| of the trivial multiplier; 0 for equilibria.
+    /// |μ₁ - 1| of the trivial multiplier; 0 for equilibria and forced cycles.
     pub trivial_defect: f64,
     /// |log ∏μ - ∫ tr J dt|; 0 for equilibria.
     pub liouville_defect: f64,
@@ -87,7 +100,7 @@ pub struct Point {
     pub tangent: Vec<f64>,
     /// Arclength step with which the next point towards larger |position| will be tried.
     pub step: f64,
-    /// Eigenvalues (equilibrium) or Floquet multipliers (cycle, trivial one first).
+    /// Eigenvalues (equilibrium) or Floquet multipliers (cycle; the trivial one first where it is not forced).
     pub spectrum: Vec<Complex64>,
     /// How many eigenvalues or multipliers are unstable.
     pub unstable: usize,
@@ -100,11 +113,11 @@ pub struct Point {
 }
 
 impl Point {
-    /// The non-trivial part of the spectrum: all eigenvalues, or the multipliers after the trivial one.
+    /// The non-trivial part of the spectrum: all eigenvalues, all multipliers of a forced cycle, or those after the trivial one.
     pub fn free_spectrum(&self) -> &[Complex64] {
-        match self.solution {
-            Solution::Equilibrium(_) => &self.spectrum,
-            Solution::Cycle(_) => self.spectrum.get(1..).unwrap_or(&[]),
+        match &self.solution {
+            Solution::Cycle(cycle) if cycle.forcing_periods == 0 => self.spectrum.get(1..).unwrap_or(&[]),
+            _ => &self.spectrum,
         }
     }
 

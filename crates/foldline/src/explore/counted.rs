@@ -46,6 +46,14 @@ impl VectorField for Counted<'_> {
         self.field.directional(at, directions, out);
     }
 
+    fn forced(&self) -> bool {
+        self.field.forced()
+    }
+
+    fn time_unit(&self, parameters: &[f64]) -> f64 {
+        self.field.time_unit(parameters)
+    }
+
     fn output_count(&self) -> usize {
         self.field.output_count()
     }

@@ -59,7 +59,9 @@ pub(super) fn of_no_start(system: &System, parameters: &[f64], seen: Seen) -> St
 /// Whether f vanishes at a state.
 fn rests(system: &System, parameters: &[f64], state: &[f64]) -> bool {
     let mut f = vec![0.0; state.len()];
-    system.field.evaluate(Batch { lanes: 1, states: state, parameters: Parameters::Shared(parameters) }, &mut f);
+    system
+        .field
+        .evaluate(Batch { lanes: 1, states: state, parameters: Parameters::Shared(parameters), times: &[] }, &mut f);
     f.iter().zip(&system.scales).all(|(v, scale)| v.abs() <= ROUNDING * scale)
 }
 
@@ -75,7 +77,10 @@ fn conserved(system: &System, parameters: &[f64]) -> Vec<Vec<f64>> {
         let share = |i: usize| (golden * (place * (i + 2)) as f64 + 0.17 * (i * i) as f64).fract();
         let state: Vec<f64> = system.ranges.iter().enumerate().map(|(i, [a, b])| a + share(i) * (b - a)).collect();
         let mut f = vec![0.0; n];
-        system.field.evaluate(Batch { lanes: 1, states: &state, parameters: Parameters::Shared(parameters) }, &mut f);
+        system.field.evaluate(
+            Batch { lanes: 1, states: &state, parameters: Parameters::Shared(parameters), times: &[] },
+            &mut f,
+        );
         if f.iter().all(|v| v.is_finite()) {
             rows.push(f);
         }

@@ -48,12 +48,9 @@ impl Line {
         let surface: Box<dyn ZeroProblem + 'a> = match &point.solution {
             Solution::Equilibrium(_) => Box::new(EquilibriumProblem::new(setting)),
             Solution::Cycle(cycle) if self.doubled && cycle.intervals() > 0 => {
-                Box::new(CycleProblem::new(setting, cycle.degree, &cycle.mesh).with_equal_halves())
+                Box::new(CycleProblem::like(setting, cycle).with_equal_halves())
             }
-            Solution::Cycle(cycle) if cycle.intervals() > 0 => {
-                Box::new(CycleProblem::new(setting, cycle.degree, &cycle.mesh))
-            }
-            Solution::Cycle(_) => Box::new(CycleProblem::new(setting, degree, &mesh::uniform(20))),
+            Solution::Cycle(cycle) => Box::new(CycleProblem::like(setting, &mesh::at_least_some(cycle, degree))),
         };
         match condition {
             Some(condition) => Box::new(Held::new(surface, condition)),
@@ -429,7 +426,13 @@ fn collapses<'a>(branch: &Branch, system: &'a System) -> Vec<Box<dyn Monitor + '
     let mut all: Vec<Box<dyn Monitor + 'a>> = Vec::new();
     if matches!(branch.origin, Origin::Switch { kind: Kind::BranchPoint, .. }) {
         for reflection in system.reflections.iter().filter(|r| r.contains(&true)) {
+            let forced = system.field.forced();
             for half in [false, true].into_iter().take(if branch.family == Family::Cycle { 2 } else { 1 }) {
+                // Half a period of an odd number of them is one at which the forcing is another.
+                let odd = branch.points.first().is_some_and(|p| p.solution.forcing_periods() % 2 == 1);
+                if forced && !system.mirrors_after(reflection, half && odd) {
+                    continue;
+                }
                 all.push(Box::new(collapse::Mirrors {
                     reflection: reflection.clone(),
                     scales: system.scales.clone(),
@@ -440,6 +443,8 @@ fn collapses<'a>(branch: &Branch, system: &'a System) -> Vec<Box<dyn Monitor + '
     }
     if branch.family == Family::Cycle {
         all.push(Box::new(collapse::Halves { born: is_doubled(branch) }));
+    }
+    if branch.family == Family::Cycle && !system.field.forced() {
         all.push(Box::new(collapse::Shrinks { field: system.field, free: branch.free, scales: &system.scales }));
     }
     all

@@ -142,7 +142,11 @@ fn polish(system: &System, parameters: &[f64], tolerance: f64, candidate: &Candi
     let solution = match candidate {
         Candidate::Equilibrium(x) => Solution::Equilibrium(x.clone()),
         Candidate::Cycle { period, times, states } => {
-            Solution::Cycle(first_profile(system.field.dim(), *period, times, states))
+            let mut cycle = first_profile(system.field.dim(), *period, times, states);
+            if system.field.forced() {
+                cycle.forcing_periods = period.round() as u32;
+            }
+            Solution::Cycle(cycle)
         }
     };
     let mut guess = bare(parameters, solution);
@@ -215,7 +219,7 @@ fn first_profile(n: usize, period: f64, times: &[f64], states: &[f64]) -> Cycle 
             }
         }
     }
-    Cycle { period, mesh: mesh.into(), degree: 4, profile }
+    Cycle { period, forcing_periods: 0, mesh: mesh.into(), degree: 4, profile }
 }
 
 /// Cubic interpolation of component i through the four samples around interval k-1…k.
@@ -265,7 +269,8 @@ fn from_state(system: &System, seed: &SeedPlan, plan: &Plan, state: &[f64], jobs
     let settings = settings(system, plan.tolerance, [f64::NEG_INFINITY, f64::INFINITY], 0);
     let mut problem = EquilibriumProblem::new(setting(system, 0, &seed.parameters));
     let given = bare(&seed.parameters, Solution::Equilibrium(state.to_vec()));
-    let found = polished(&mut problem, &settings, &given).ok().map(|found| {
+    let at_rest = (!system.field.forced()).then(|| polished(&mut problem, &settings, &given).ok()).flatten();
+    let found = at_rest.map(|found| {
         let moved: Vec<f64> =
             found.u.iter().zip(state).zip(&system.scales).map(|((a, b), s)| (a - b) / (s + b.abs())).collect();
         (max_abs(&moved), found.point)

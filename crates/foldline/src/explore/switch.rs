@@ -152,7 +152,7 @@ fn coarsened(cycle: &Cycle) -> Cycle {
     }
     let mesh: Mesh = cycle.mesh.iter().copied().step_by(2).collect();
     let profile = mesh::transferred(&cycle.profile, cycle.dim(), &Scheme::new(cycle.degree), &cycle.mesh, &mesh);
-    Cycle { period: cycle.period, mesh, degree: cycle.degree, profile }
+    Cycle { mesh, profile, ..*cycle }
 }
 
 /// The problem of doubled cycles at a period doubling, the cycle run through twice, and the direction of the new branch.
@@ -162,15 +162,14 @@ fn double<'a>(
     at: &SpecialPoint,
     cycle: &Cycle,
 ) -> Option<(CycleProblem<'a>, Vec<f64>, Vec<f64>)> {
-    let mut single = CycleProblem::new(setting(system, free, &at.point.parameters), cycle.degree, &cycle.mesh);
+    let mut single = CycleProblem::like(setting(system, free, &at.point.parameters), cycle);
     let with = |solution: Cycle| Point { solution: Solution::Cycle(solution), ..at.point.clone() };
     let u = single.unknowns_of(&with(cycle.clone()));
     single.anchor(&u);
     let vector = single.antiperiodic_direction(&u)?;
     let (twice, mut direction) = period_doubling::doubled(cycle, &vector);
     direction.extend([0.0, 0.0]);
-    let mut problem =
-        CycleProblem::new(setting(system, free, &at.point.parameters), twice.degree, &twice.mesh).with_equal_halves();
+    let mut problem = CycleProblem::like(setting(system, free, &at.point.parameters), &twice).with_equal_halves();
     let base = problem.unknowns_of(&with(twice));
     Some((problem, base, direction))
 }
@@ -186,6 +185,7 @@ pub fn doubled_edge(system: &System, free: usize, at: &SpecialPoint, next: &Poin
     let once = &at.point;
     let examination = Examination {
         spectrum: once.spectrum.iter().map(|z| z * z).collect(),
+        trivial: once.spectrum.len() - once.free_spectrum().len(),
         unstable: next.unstable,
         ranges: once.ranges.clone(),
         trust: Trust {

@@ -19,8 +19,11 @@ pub struct System<'a> {
     pub ranges: Vec<[f64; 2]>,
     /// The two states that form the complex whirl signal, if the model has one.
     pub whirl: Option<[usize; 2]>,
-    /// Coordinate reflections under which the field is equivariant, the identity first.
+    /// Coordinate reflections under which the field is equivariant, the identity first; those of a forced field too under which
+    /// it is so half a period of the forcing later.
     pub reflections: Vec<Vec<bool>>,
+    /// Of a forced field, for each of these: whether it is equivariant at the same time, and half a period later.
+    pub(super) mirrors: Vec<[bool; 2]>,
 }
 
 impl<'a> System<'a> {
@@ -35,6 +38,7 @@ impl<'a> System<'a> {
             ranges: vec![[-2.0, 2.0]; n],
             whirl: None,
             reflections: vec![vec![false; n]],
+            mirrors: Vec::new(),
         }
     }
 
@@ -68,9 +72,19 @@ impl<'a> System<'a> {
         let mut systems = places.iter().map(|place| System::of(model, place));
         let Some(mut common) = systems.next() else { return System::new(model) };
         for other in systems {
+            let kept: Vec<bool> = common.reflections.iter().map(|own| other.reflections.contains(own)).collect();
             common.reflections.retain(|reflection| other.reflections.contains(reflection));
+            let mut kept = kept.into_iter();
+            common.mirrors.retain(|_| kept.next().unwrap_or(true));
         }
         common
+    }
+
+    /// Whether a forced field is equivariant under one of [`System::reflections`], half a period of the forcing later if `half`
+    /// says so.
+    pub fn mirrors_after(&self, reflection: &[bool], half: bool) -> bool {
+        let place = self.reflections.iter().position(|own| own == reflection);
+        place.and_then(|place| self.mirrors.get(place)).is_some_and(|mirrors| mirrors[usize::from(half)])
     }
 
     /// Finds the reflections R = diag(±1), n ≤ 10, with f(R x) = R f(x), by trial at a few points and the parameter values
@@ -86,23 +100,35 @@ impl<'a> System<'a> {
                 (0..n).map(|i| self.scales[i] * ((3 * k + 1) as f64 * 0.71 + (i * i + 1) as f64 * 1.37).sin()).collect()
             })
             .collect();
-        let value = |x: &[f64]| {
-            let mut f = vec![0.0; n];
-            self.field.evaluate(Batch { lanes: 1, states: x, parameters: Parameters::Shared(parameters) }, &mut f);
+        let forced = self.field.forced();
+        let value = |x: &[f64], time: f64| {
+            let (times, mut f) = ([time], vec![0.0; n]);
+            let (parameters, times) = (Parameters::Shared(parameters), if forced { &times[..] } else { &[] });
+            self.field.evaluate(Batch { lanes: 1, states: x, parameters, times }, &mut f);
             f
         };
+        let equivariant = |reflection: &[bool], later: f64| {
+            let reflect =
+                |x: &[f64]| -> Vec<f64> { x.iter().zip(reflection).map(|(v, r)| if *r { -v } else { *v }).collect() };
+            points.iter().enumerate().all(|(k, x)| {
+                let time = 0.137 + 0.211 * k as f64;
+                let (a, b) = (value(&reflect(x), time + later), reflect(&value(x, time)));
+                let size = if forced { crate::linalg::max_abs(&b) } else { 0.0 };
+                a.iter().zip(&b).all(|(p, q)| p.is_finite() && (p - q).abs() <= 1e-10 * (p.abs() + q.abs() + size))
+            })
+        };
+        let mut mirrors = vec![[true, false]];
+        let mut found = Vec::new();
         for bits in 1..1usize << n {
             let reflection: Vec<bool> = (0..n).map(|i| bits >> i & 1 == 1).collect();
-            let reflect =
-                |x: &[f64]| -> Vec<f64> { x.iter().zip(&reflection).map(|(v, r)| if *r { -v } else { *v }).collect() };
-            let equivariant = points.iter().all(|x| {
-                let (a, b) = (value(&reflect(x)), reflect(&value(x)));
-                a.iter().zip(&b).all(|(p, q)| p.is_finite() && (p - q).abs() <= 1e-10 * (p.abs() + q.abs()))
-            });
-            if equivariant {
-                self.reflections.push(reflection);
+            let holds = [equivariant(&reflection, 0.0), forced && equivariant(&reflection, 0.5)];
+            if holds.contains(&true) {
+                found.push(reflection);
+                mirrors.push(holds);
             }
         }
+        self.reflections.extend(found);
+        self.mirrors = mirrors;
     }
 }
 

@@ -12,8 +12,10 @@ use std::collections::{HashMap, HashSet};
 #[derive(Debug)]
 pub(super) struct Compiled {
     pub graph: Graph,
-    /// f, one node per state.
+    /// f, one node per state; per period of the forcing where there is one.
     pub field: Vec<Id>,
+    /// The period of the forcing.
+    pub period: Option<Id>,
     /// One node per output.
     pub outputs: Vec<Id>,
     /// The states that form the complex signal.
@@ -27,6 +29,7 @@ enum Symbol {
     Parameter(usize),
     Definition(usize),
     Number(f64),
+    Time,
 }
 
 impl Symbol {
@@ -36,6 +39,7 @@ impl Symbol {
             Symbol::Parameter(_) => "a parameter",
             Symbol::Definition(_) => "a definition",
             Symbol::Number(_) => "a constant",
+            Symbol::Time => "the time",
         }
     }
 }
@@ -46,6 +50,8 @@ const MOST_STATES: usize = 1000;
 const MOST: usize = 100_000;
 /// Names of a circle of definitions that are listed.
 const LONGEST_CIRCLE: usize = 12;
+/// The name of the time.
+const TIME: &str = "t";
 /// Further mistakes than these are not looked for.
 const MOST_ERRORS: usize = 100;
 
@@ -67,19 +73,37 @@ pub(super) fn compile(source: &ModelSource) -> Result<Compiled, Vec<ModelError>>
         source.equations.iter().enumerate().map(|(i, d)| check.parse(Item::Equation(i), &d.expression)).collect();
     let outputs: Vec<Option<Expression>> =
         source.outputs.iter().enumerate().map(|(i, o)| check.parse(Item::Output(i), &o.expression)).collect();
+    let forcing = source.forcing.as_ref().and_then(|forcing| check.parse(Item::Forcing, &forcing.expression));
     let order = check.order(&definitions);
+    if let Some(forcing) = &forcing {
+        check.forcing(forcing, &definitions);
+    }
     if !check.errors.is_empty() {
         return Err(check.errors);
     }
 
-    let mut lowering = Lowering { graph: Graph::default(), symbols: &check.symbols, definitions: HashMap::new() };
-    for i in order {
-        let id = lowering.lower(definitions[i].as_ref());
-        lowering.definitions.insert(i, id);
+    let mut lowering =
+        Lowering { graph: Graph::default(), symbols: &check.symbols, definitions: HashMap::new(), period: None };
+    if let Some(own) = &source.forcing {
+        // Definitions that the period needs come before those that need the time, in whatever order they are.
+        order.iter().for_each(|&i| lowering.define(i, definitions[i].as_ref()));
+        let given = lowering.lower(forcing.as_ref());
+        lowering.period = Some(match own.is_frequency {
+            true => {
+                let turn = lowering.graph.constant(std::f64::consts::TAU);
+                lowering.graph.divide(turn, given)
+            }
+            false => given,
+        });
     }
-    let field = equation_of.iter().map(|e| lowering.lower(e.and_then(|e| equations[e].as_ref()))).collect();
+    order.iter().for_each(|&i| lowering.define(i, definitions[i].as_ref()));
+    let mut field: Vec<Id> =
+        equation_of.iter().map(|e| lowering.lower(e.and_then(|e| equations[e].as_ref()))).collect();
+    if let Some(period) = lowering.period {
+        field.iter_mut().for_each(|f| *f = lowering.graph.multiply(period, *f));
+    }
     let outputs = outputs.iter().map(|o| lowering.lower(o.as_ref())).collect();
-    Ok(Compiled { graph: lowering.graph, field, outputs, whirl })
+    Ok(Compiled { period: lowering.period, graph: lowering.graph, field, outputs, whirl })
 }
 
 struct Check<'a> {
@@ -134,6 +158,9 @@ impl<'a> Check<'a> {
         for (name, value) in CONSTANTS {
             self.symbols.insert(name, Symbol::Number(value));
         }
+        if source.forcing.is_some() {
+            self.symbols.insert(TIME, Symbol::Time);
+        }
         let parameters = source.parameters.iter().enumerate();
         let states = source.states.iter().enumerate();
         let definitions = source.definitions.iter().enumerate();
@@ -146,6 +173,10 @@ impl<'a> Check<'a> {
             match self.symbols.get(name) {
                 Some(Symbol::Number(_)) => {
                     self.report(item, Field::Name, format!("`{name}` is a constant"), "choose another name")
+                }
+                Some(Symbol::Time) => {
+                    let message = format!("`{name}` is the time, since the model has a forcing");
+                    self.report(item, Field::Name, message, "choose another name")
                 }
                 Some(earlier) => {
                     let message = format!("the name `{name}` is used twice: it is {} already", earlier.article());
@@ -270,8 +301,10 @@ impl<'a> Check<'a> {
         for (name, span) in unknown.take(MOST_ERRORS).collect::<Vec<_>>() {
             let hint = match function(name) {
                 Some(function) => format!("`{name}` is a function: write `{}`", function.signature),
-                None if name == "t" || name == "time" => {
-                    "models do not depend on time; write a forcing as two states of an oscillator of unit amplitude"
+                None if name == "time" && self.symbols.contains_key(TIME) => "time is called `t`".into(),
+                None if name == TIME || name == "time" => {
+                    "time is `t` where the model says how long a period of its forcing is: [forcing] with \
+                     `frequency = \"…\"` (angular) or `period = \"…\"`"
                         .into()
                 }
                 None => {
@@ -289,6 +322,28 @@ impl<'a> Check<'a> {
             self.complain(item, Complaint::new(span, message, hint));
         }
         Some(expression)
+    }
+
+    /// The period of the forcing may depend on parameters only.
+    fn forcing(&mut self, expression: &Expression, definitions: &[Option<Expression>]) {
+        let mut seen = vec![false; definitions.len()];
+        let mut wait: Vec<(&Expression, Option<std::ops::Range<usize>>)> = vec![(expression, None)];
+        while let Some((next, place)) = wait.pop() {
+            for (name, span) in next.names().collect::<Vec<_>>() {
+                let span = place.clone().unwrap_or(span);
+                match self.symbols.get(name).copied() {
+                    Some(symbol @ (Symbol::State(_) | Symbol::Time)) => {
+                        let message = format!("the forcing depends on `{name}`, which is {}", symbol.article());
+                        let hint = "its frequency or period is made of numbers and parameters";
+                        return self.complain(Item::Forcing, Complaint::new(span, message, hint));
+                    }
+                    Some(Symbol::Definition(j)) if !std::mem::replace(&mut seen[j], true) => {
+                        wait.extend(definitions[j].as_ref().map(|own| (own, Some(span))));
+                    }
+                    _ => {}
+                }
+            }
+        }
     }
 
     /// The definitions in an order in which each uses only earlier ones.
@@ -362,7 +417,7 @@ fn name_of(source: &ModelSource, item: Item) -> &str {
         Item::State(i) => &source.states[i].name,
         Item::Equation(i) => &source.equations[i].name,
         Item::Output(i) => &source.outputs[i].name,
-        Item::Whirl => "",
+        Item::Whirl | Item::Forcing => "",
     }
 }
 
@@ -371,9 +426,17 @@ struct Lowering<'a> {
     graph: Graph,
     symbols: &'a HashMap<&'a str, Symbol>,
     definitions: HashMap<usize, Id>,
+    /// Of the forcing, once it is known.
+    period: Option<Id>,
 }
 
 impl Lowering<'_> {
+    /// Gives a definition its node.
+    fn define(&mut self, number: usize, expression: Option<&Expression>) {
+        let id = self.lower(expression);
+        self.definitions.insert(number, id);
+    }
+
     /// The node of an expression that was checked; 0 for one that is missing, which the checks exclude.
     fn lower(&mut self, expression: Option<&Expression>) -> Id {
         let zero = self.graph.constant(0.0);
@@ -386,6 +449,10 @@ impl Lowering<'_> {
                     Some(Symbol::State(i)) => self.graph.leaf(Leaf::State(*i as u32)),
                     Some(Symbol::Parameter(k)) => self.graph.leaf(Leaf::Parameter(*k as u32)),
                     Some(Symbol::Definition(j)) => self.definitions.get(j).copied().unwrap_or(zero),
+                    Some(Symbol::Time) => {
+                        let time = self.graph.leaf(Leaf::Time);
+                        self.period.map_or(time, |period| self.graph.multiply(time, period))
+                    }
                     None => zero,
                 },
                 Term::Unary(op, a) => self.graph.unary(*op, ids[*a]),

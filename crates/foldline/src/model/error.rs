@@ -20,6 +20,8 @@ pub enum Item {
     Equation(usize),
     /// An output.
     Output(usize),
+    /// The frequency or period of the forcing.
+    Forcing,
     /// The pair of states that forms the complex signal.
     Whirl,
 }
@@ -65,6 +67,7 @@ impl fmt::Display for ModelError {
             Item::State(_) => "the state",
             Item::Equation(_) => "the equation of",
             Item::Output(_) => "the output",
+            Item::Forcing => "the forcing",
             Item::Whirl => "whirl",
         };
         write!(f, "{part}")?;

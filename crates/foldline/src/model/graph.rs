@@ -24,6 +24,8 @@ pub(super) enum Leaf {
     State(u32),
     /// Parameter.
     Parameter(u32),
+    /// Time in periods of the forcing.
+    Time,
     /// Component of a direction: which direction, which component (states first, then parameters).
     Direction(u32, u32),
 }

@@ -25,9 +25,9 @@ mod tape;
 
 pub use error::{Field, Item, ModelError};
 pub use nearest::{nearest, suggest};
-pub use source::{Definition, ModelSource, Output, Parameter, State};
+pub use source::{Definition, Forcing, ModelSource, Output, Parameter, State};
 
-use crate::contract::{Batch, VectorField};
+use crate::contract::{Batch, Parameters, VectorField};
 use compile::{Compiled, compile};
 use graph::Leaf;
 use std::collections::HashMap;
@@ -80,6 +80,7 @@ struct Inner {
     about: About,
     compiled: Compiled,
     field: Tape,
+    period: Option<Tape>,
     outputs: Tape,
     switches: Switches,
     linear: RwLock<HashMap<Vec<usize>, Arc<Tape>>>,
@@ -101,11 +102,71 @@ impl Model {
         let field = Tape::new(&compiled.graph, &[&compiled.field]);
         let outputs = Tape::new(&compiled.graph, &[&compiled.outputs]);
         let switches = Switches::new(&compiled.graph, &compiled.field);
+        let period = compiled.period.map(|period| Tape::new(&compiled.graph, &[&[period]]));
         let ModelSource { name, description, source, parameters, states, outputs: output_list, .. } = source;
         let whirl = compiled.whirl;
         let about = About { name, description, source, states, parameters, outputs: output_list, whirl };
         let (linear, directional) = (RwLock::default(), RwLock::default());
-        Ok(Model { inner: Arc::new(Inner { about, compiled, field, outputs, switches, linear, directional }) })
+        let inner = Inner { about, compiled, field, period, outputs, switches, linear, directional };
+        let model = Model { inner: Arc::new(inner) };
+        match model.wrong_period() {
+            Some(error) => Err(vec![error]),
+            None => Ok(model),
+        }
+    }
+
+    /// A forcing that does not repeat itself after the period it is said to have.
+    fn wrong_period(&self) -> Option<ModelError> {
+        const PLACES: usize = 16;
+        const SAME: f64 = 1e-8;
+        let parameters = self.defaults();
+        let report = |message: String, hint: &str| ModelError {
+            item: Item::Forcing,
+            field: Field::Expression,
+            name: String::new(),
+            span: None,
+            message,
+            hint: hint.into(),
+        };
+        let unit = self.inner.period.as_ref().map(|_| self.time_unit(&parameters))?;
+        if !(unit > 0.0 && unit.is_finite()) {
+            let message = format!("the period of the forcing is {unit} at the values of the parameters");
+            return Some(report(message, "a period, and a frequency, is a positive number"));
+        }
+        let n = self.dim();
+        let at = |time: f64, states: &[f64]| {
+            let mut f = vec![0.0; n];
+            self.evaluate(
+                Batch { lanes: 1, states, parameters: Parameters::Shared(&parameters), times: &[time] },
+                &mut f,
+            );
+            f
+        };
+        for place in 0..PLACES {
+            let share = |k: usize| (0.5 + (k * PLACES + place) as f64 * 0.618_033_988_7).fract();
+            let states: Vec<f64> = self
+                .states
+                .iter()
+                .enumerate()
+                .map(|(i, s)| s.range[0] + share(i) * (s.range[1] - s.range[0]))
+                .collect();
+            let time = share(n);
+            let (now, later) = (at(time, &states), at(time + 1.0, &states));
+            for (i, (a, b)) in now.iter().zip(&later).enumerate() {
+                if (a - b).abs() > SAME * (a.abs() + b.abs() + unit * self.states[i].scale) {
+                    let (name, time) = (&self.states[i].name, time * unit);
+                    let message = format!(
+                        "the equations do not repeat themselves after the period {unit}: that of `{name}` is {:.6} at t = \
+                         {time:.6} and {:.6} one period later, in the same state",
+                        a / unit,
+                        b / unit
+                    );
+                    let hint = "say the frequency or period that all of the forcing has in common";
+                    return Some(report(message, hint));
+                }
+            }
+        }
+        None
     }
 
     /// Position of the parameter of that name.
@@ -184,6 +245,19 @@ impl VectorField for Model {
 
     fn parameter_count(&self) -> usize {
         self.parameters.len()
+    }
+
+    fn forced(&self) -> bool {
+        self.inner.period.is_some()
+    }
+
+    fn time_unit(&self, parameters: &[f64]) -> f64 {
+        let mut unit = [1.0];
+        if let Some(period) = &self.inner.period {
+            let at = Batch { lanes: 1, states: &[], parameters: Parameters::Shared(parameters), times: &[] };
+            period.run(at, &[], &mut [&mut unit]);
+        }
+        unit[0]
     }
 
     fn evaluate(&self, at: Batch, f: &mut [f64]) {

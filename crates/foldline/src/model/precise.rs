@@ -24,7 +24,7 @@ pub(super) fn evaluate(
             Node::Constant(bits) => f64::from_bits(bits).into(),
             Node::Leaf(Leaf::State(j)) => sum(states[j as usize]),
             Node::Leaf(Leaf::Parameter(k)) => sum(parameters[k as usize]),
-            Node::Leaf(Leaf::Direction(..)) => 0.0.into(),
+            Node::Leaf(Leaf::Direction(..) | Leaf::Time) => 0.0.into(),
             Node::Unary(op, a) => unary(op, of(a)),
             Node::Binary(op, a, b) => binary(op, of(a), of(b)),
             Node::Integer(a, n) => integer_power(of(a), n),
@@ -251,7 +251,8 @@ mod tests {
             let model = model(formula);
             let x = 0.712_345_678_9;
             let mut f = [0.0];
-            model.evaluate(Batch { lanes: 1, states: &[x], parameters: Parameters::Shared(&[0.3]) }, &mut f);
+            model
+                .evaluate(Batch { lanes: 1, states: &[x], parameters: Parameters::Shared(&[0.3]), times: &[] }, &mut f);
             let precise = model.evaluate_precisely(&[[x, 0.0]], &[[0.3, 0.0]]).unwrap();
             assert!((precise[0][0] - f[0]).abs() < 1e-14 * (1.0 + f[0].abs()), "{formula}: {precise:?} {f:?}");
         }

@@ -207,6 +207,8 @@ fn section<const W: usize>(
             Instruction::Load { to, from } => match (from, inputs.at.parameters) {
                 (Leaf::State(i), _) => load::<W>(r(to), inputs.at.states, i, inputs),
                 (Leaf::Direction(d, i), _) => load::<W>(r(to), inputs.directions[d as usize], i, inputs),
+                (Leaf::Time, _) if inputs.at.times.is_empty() => map::<W>(r(to), r(to), |_| 0.0),
+                (Leaf::Time, _) => load::<W>(r(to), inputs.at.times, 0, inputs),
                 (Leaf::Parameter(k), Parameters::PerLane(values)) => load::<W>(r(to), values, k, inputs),
                 // Shared parameters are scalars.
                 (Leaf::Parameter(_), Parameters::Shared(_)) => {}

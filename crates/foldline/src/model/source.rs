@@ -50,6 +50,15 @@ pub struct Definition {
     pub expression: String,
 }
 
+/// What `t` means in a model: how long a period of its forcing is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Forcing {
+    /// Whether the expression is the angular frequency, 2π over the period.
+    pub is_frequency: bool,
+    /// The frequency or the period, in terms of parameters.
+    pub expression: String,
+}
+
 /// A model as it is written.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ModelSource {
@@ -61,6 +70,8 @@ pub struct ModelSource {
     pub source: String,
     /// Parameters, in the order in which they are numbered.
     pub parameters: Vec<Parameter>,
+    /// The forcing, where expressions use the time `t`.
+    pub forcing: Option<Forcing>,
     /// Intermediate expressions, in any order.
     pub definitions: Vec<Definition>,
     /// States, in the order in which they are numbered.

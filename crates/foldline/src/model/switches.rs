@@ -59,12 +59,12 @@ impl Switches {
     }
 }
 
-/// Which nodes depend on the state.
+/// Which nodes change along a trajectory.
 fn depends_on_state(graph: &Graph) -> Vec<bool> {
     let mut depends: Vec<bool> = Vec::with_capacity(graph.len());
     for i in 0..graph.len() {
         let node = graph.node(Id(i as u32));
-        let own = matches!(node, Node::Leaf(Leaf::State(_)));
+        let own = matches!(node, Node::Leaf(Leaf::State(_) | Leaf::Time));
         depends.push(own || node.operands().any(|a| depends[a.at()]));
     }
     depends
@@ -158,7 +158,7 @@ mod tests {
         for text in cases {
             let model = model(text);
             let value = |x: [f64; 2], signs: Option<&[f64]>| {
-                let at = Batch { lanes: 1, states: &x, parameters: Parameters::Shared(&[0.5]) };
+                let at = Batch { lanes: 1, states: &x, parameters: Parameters::Shared(&[0.5]), times: &[] };
                 let mut f = [0.0; 2];
                 match signs {
                     None => model.evaluate(at, &mut f),
@@ -168,7 +168,7 @@ mod tests {
             };
             for x in [[0.7, 0.2], [-0.3, 0.1], [-0.4, -0.9]] {
                 let mut switches = vec![0.0; model.switch_count()];
-                let at = Batch { lanes: 1, states: &x, parameters: Parameters::Shared(&[0.5]) };
+                let at = Batch { lanes: 1, states: &x, parameters: Parameters::Shared(&[0.5]), times: &[] };
                 model.switches(at, &mut switches);
                 let actual: Vec<f64> = switches.iter().map(|s| s.signum()).collect();
                 assert_eq!(value(x, Some(&actual)), value(x, None), "{text} at {x:?}");

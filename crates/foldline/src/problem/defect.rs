@@ -24,6 +24,8 @@ use crate::linalg::{axpy, lu, panel};
 /// Where the defect is sampled, and how it is integrated.
 #[derive(Clone, Debug)]
 pub struct Sampling {
+    /// `[m + 1]` the sample points.
+    points: Vec<f64>,
     /// `[m + 1][m + 1]` values at the sample points from values at the nodes.
     values: Vec<f64>,
     /// `[m + 1][m + 1]` derivatives likewise.
@@ -71,11 +73,20 @@ impl Sampling {
             (0..=m).map(move |g| (0..m).map(|k| scheme.integration[i * m + k] * projected(k, g)).sum::<f64>())
         };
         let sources = (0..m).flat_map(|i| line(i).collect::<Vec<_>>()).chain(weights.iter().copied()).collect();
-        Sampling { values, slopes, integrals, partial, sources }
+        Sampling { points, values, slopes, integrals, partial, sources }
     }
 }
 
 impl Sampling {
+    /// `[m + 1][N]`: the times of the sample points in periods of the forcing, of which a cycle lasts so many; nothing where it has
+    /// none.
+    pub fn times(&self, mesh: &[f64], forcing_periods: u32) -> Vec<f64> {
+        let points = self.points.iter().take(if forcing_periods > 0 { usize::MAX } else { 0 });
+        let of =
+            |s: f64| mesh.windows(2).map(move |pair| f64::from(forcing_periods) * (pair[0] + s * (pair[1] - pair[0])));
+        points.flat_map(|&s| of(s)).collect()
+    }
+
     /// One component at the sample points, `[m + 1][N]`, from its values at the nodes, `[m + 1][N]`.
     pub fn sampled(&self, nodes: &[f64], intervals: usize, out: &mut [f64]) {
         panel::multiply(&self.values, nodes, intervals, out);
@@ -97,12 +108,13 @@ pub struct Defect {
     pub misses: Vec<f64>,
 }
 
-/// Measures the defect of a profile `[interval][node][component]`.
+/// Measures the defect of a profile `[interval][node][component]`; a forced cycle lasts so many periods of the forcing.
 pub fn measure(
     field: &dyn VectorField,
     parameters: &[f64],
     profile: &[f64],
     period: f64,
+    forcing_periods: u32,
     mesh: &Mesh,
     scheme: &Scheme,
     sampling: &Sampling,
@@ -119,7 +131,8 @@ pub fn measure(
         panel::multiply(&sampling.slopes, &nodes[own.clone()], count, &mut defect[own]);
     }
     let mut f = nodes;
-    field.evaluate(Batch { lanes, states: &states, parameters: Parameters::Shared(parameters) }, &mut f);
+    let (places, parameters) = (sampling.times(mesh, forcing_periods), Parameters::Shared(parameters));
+    field.evaluate(Batch { lanes, states: &states, parameters, times: &places }, &mut f);
     let times: Vec<f64> = mesh.windows(2).map(|pair| (pair[1] - pair[0]) * period).collect();
     for (d, f) in defect.chunks_exact_mut(count).zip(f.chunks_exact(count)) {
         d.iter_mut().zip(f).zip(&times).for_each(|((d, f), ht)| *d -= ht * f);
@@ -135,7 +148,7 @@ pub fn measure(
         states[own.clone()].iter_mut().zip(&within[own]).for_each(|(x, w)| *x += w);
     }
     let mut source = vec![0.0; n * lanes];
-    field.evaluate(Batch { lanes, states: &states, parameters: Parameters::Shared(parameters) }, &mut source);
+    field.evaluate(Batch { lanes, states: &states, parameters, times: &places }, &mut source);
     for ((g, f), k) in source.iter_mut().zip(&f).zip(0..) {
         let change = times[k % count] * (*g - f);
         // Next to where f ends its end is not the error's business.
@@ -280,7 +293,7 @@ mod tests {
         let at = |count: usize| {
             let (mesh, period) = (super::super::mesh::uniform(count), std::f64::consts::TAU);
             let profile = collocated(&scheme, &mesh, period);
-            let d = measure(&Integral, &[], &profile, period, &mesh, &scheme, &sampling, &[1.0, 1.0]);
+            let d = measure(&Integral, &[], &profile, period, 0, &mesh, &scheme, &sampling, &[1.0, 1.0]);
             [largest(&d.local), largest(&d.ends)]
         };
         let (coarse, fine) = (at(10), at(20));

@@ -43,7 +43,7 @@ impl<'a> EquilibriumProblem<'a> {
     fn linearise(&mut self, u: &[f64]) {
         let n = self.n();
         let parameters = self.setting.at(&u[n..]);
-        let batch = Batch { lanes: 1, states: &u[..n], parameters: Parameters::Shared(&parameters) };
+        let batch = Batch { lanes: 1, states: &u[..n], parameters: Parameters::Shared(&parameters), times: &[] };
         self.setting.linearise(batch, &mut self.f, &mut self.fx, &mut self.fp);
     }
 }
@@ -62,7 +62,7 @@ impl ZeroProblem for EquilibriumProblem<'_> {
     fn residual(&mut self, u: &[f64], r: &mut [f64]) -> bool {
         let n = self.n();
         let parameters = self.setting.at(&u[n..]);
-        let batch = Batch { lanes: 1, states: &u[..n], parameters: Parameters::Shared(&parameters) };
+        let batch = Batch { lanes: 1, states: &u[..n], parameters: Parameters::Shared(&parameters), times: &[] };
         self.setting.field.evaluate(batch, &mut r[..n]);
         max_abs(&r[..n]).is_finite()
     }
@@ -129,7 +129,7 @@ impl ZeroProblem for EquilibriumProblem<'_> {
         let rate = max_abs(&self.fx).max(f64::MIN_POSITIVE);
         let residual = (0..n).map(|i| (self.f[i] / (rate * self.scale[i])).abs()).fold(0.0, f64::max);
         let ranges = extremes::of_state(self.setting.field, &self.setting.at(&u[n..]), &u[..n]);
-        Examination { spectrum, unstable, ranges, trust: Trust { residual, ..Trust::default() } }
+        Examination { spectrum, trivial: 0, unstable, ranges, trust: Trust { residual, ..Trust::default() } }
     }
 
     fn spectrum_error(&mut self, _u: &[f64], spectrum: &[Complex64]) -> f64 {

@@ -5,7 +5,6 @@
 
 use super::gauss::Scheme;
 use crate::contract::{Batch, Parameters, VectorField};
-use crate::diagram::Mesh;
 use crate::linalg::panel;
 
 /// Peaks of one channel that are refined.
@@ -18,19 +17,20 @@ const ROUNDS: usize = 12;
 /// At one state: every range is a single value.
 pub fn of_state(field: &dyn VectorField, parameters: &[f64], x: &[f64]) -> Vec<[f64; 2]> {
     let mut outputs = vec![0.0; field.output_count()];
-    field.outputs(Batch { lanes: 1, states: x, parameters: Parameters::Shared(parameters) }, &mut outputs);
+    field.outputs(Batch { lanes: 1, states: x, parameters: Parameters::Shared(parameters), times: &[] }, &mut outputs);
     x.iter().chain(&outputs).map(|&v| [v, v]).collect()
 }
 
-/// Over a periodic profile `[interval][node][component]`.
+/// Over a periodic profile `[interval][node][component]` on a mesh, which lasts so many periods of the forcing, none where the
+/// field is autonomous.
 pub fn of_profile(
     field: &dyn VectorField,
     parameters: &[f64],
-    profile: &[f64],
-    mesh: &Mesh,
+    [profile, mesh]: [&[f64]; 2],
+    forcing_periods: u32,
     scheme: &Scheme,
 ) -> Vec<[f64; 2]> {
-    let orbit = Orbit { field, parameters, profile, scheme, count: mesh.len() - 1 };
+    let orbit = Orbit { field, parameters, profile, mesh, forcing_periods, scheme, count: mesh.len() - 1 };
     let channels = field.dim() + field.output_count();
     let lanes = orbit.lanes();
     let values = orbit.samples();
@@ -65,6 +65,8 @@ struct Orbit<'a> {
     field: &'a dyn VectorField,
     parameters: &'a [f64],
     profile: &'a [f64],
+    mesh: &'a [f64],
+    forcing_periods: u32,
     scheme: &'a Scheme,
     /// N.
     count: usize,
@@ -92,15 +94,35 @@ impl Orbit<'_> {
             panel::multiply(&weights, own, count, &mut sampled);
             states.extend((0..count).flat_map(|j| sampled[j..].iter().step_by(count)));
         }
-        self.with_outputs(states)
+        let places = (0..self.lanes()).map(|k| k as f64);
+        self.with_outputs(states, &self.times(places))
     }
 
-    /// States `[n × lanes]` with the outputs behind them.
-    fn with_outputs(&self, states: Vec<f64>) -> Vec<f64> {
+    /// The times of places in periods of the forcing; nothing where there is none.
+    fn times(&self, places: impl Iterator<Item = f64>) -> Vec<f64> {
+        if self.forcing_periods == 0 {
+            return Vec::new();
+        }
+        let time = |place: f64| {
+            let (j, s) = self.interval(place);
+            f64::from(self.forcing_periods) * (self.mesh[j] + s * (self.mesh[j + 1] - self.mesh[j]))
+        };
+        places.map(time).collect()
+    }
+
+    /// The interval of a place in units of samples, and where in it that is.
+    fn interval(&self, place: f64) -> (usize, f64) {
+        let position = place.rem_euclid(self.lanes() as f64) / self.density() as f64;
+        let j = (position.floor() as usize).min(self.count - 1);
+        (j, position - j as f64)
+    }
+
+    /// States `[n × lanes]` at these times with the outputs behind them.
+    fn with_outputs(&self, states: Vec<f64>, times: &[f64]) -> Vec<f64> {
         let n = self.field.dim();
         let lanes = states.len() / n;
         let mut outputs = vec![0.0; self.field.output_count() * lanes];
-        let batch = Batch { lanes, states: &states, parameters: Parameters::Shared(self.parameters) };
+        let batch = Batch { lanes, states: &states, parameters: Parameters::Shared(self.parameters), times };
         self.field.outputs(batch, &mut outputs);
         let mut values = states;
         values.append(&mut outputs);
@@ -122,7 +144,9 @@ impl Orbit<'_> {
                 (0..n).for_each(|i| states[i * probes + 3 * p + k] = x[i]);
             }
         }
-        let values = self.with_outputs(states);
+        let near = peaks.iter().flat_map(|peak| [-1.0, 0.0, 1.0].map(|k| peak.place + k * peak.spacing));
+        let times = self.times(near);
+        let values = self.with_outputs(states, &times);
         for (p, peak) in peaks.iter_mut().enumerate() {
             let at = (peak.of / 2) * probes + 3 * p;
             let [a, b, c] = [0, 1, 2].map(|k| peak.sign * values[at + k]);
@@ -148,10 +172,9 @@ impl Orbit<'_> {
 
     /// The state at a place in units of samples.
     fn state_into(&self, place: f64, x: &mut [f64]) {
-        let position = place.rem_euclid(self.lanes() as f64) / self.density() as f64;
-        let j = (position.floor() as usize).min(self.count - 1);
+        let (j, s) = self.interval(place);
         let block = (self.scheme.degree + 1) * x.len();
-        self.scheme.value_into(position - j as f64, &self.profile[j * block..(j + 1) * block], x);
+        self.scheme.value_into(s, &self.profile[j * block..(j + 1) * block], x);
     }
 }
 

@@ -253,13 +253,13 @@ impl ZeroProblem for Held<'_> {
     fn examine(&mut self, u: &[f64]) -> Examination {
         let mut found = self.surface.examine(&u[self.extra()..]);
         // The eigenvalues that are held count as neither stable nor unstable.
-        let first = usize::from(!self.surface.mesh().is_empty());
+        let (first, is_cycle) = (found.trivial, !self.surface.mesh().is_empty());
         let mut order: Vec<usize> = (first..found.spectrum.len()).collect();
         let distance = |k: &usize| self.condition.distance(found.spectrum[*k]);
         order.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
         let outside = |k: &&usize| {
             let z = found.spectrum[**k];
-            if first == 0 { z.re > 0.0 } else { z.norm() > 1.0 }
+            if is_cycle { z.norm() > 1.0 } else { z.re > 0.0 }
         };
         found.unstable = order.iter().skip(self.condition.held()).filter(outside).count();
         found

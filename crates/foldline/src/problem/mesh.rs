@@ -8,7 +8,7 @@
 //! **Source.** deboor1973; ascher1995, §9.
 
 use super::gauss::Scheme;
-use crate::diagram::Mesh;
+use crate::diagram::{Cycle, Mesh};
 
 /// The largest mesh that is tried.
 pub const LARGEST: usize = 4000;
@@ -115,6 +115,14 @@ pub fn transferred(profile: &[f64], n: usize, scheme: &Scheme, from: &Mesh, to: 
         }
     }
     out
+}
+
+/// The cycle, or where it has no mesh one like it of that degree on a uniform one, whose profile is not known.
+pub fn at_least_some(cycle: &Cycle, degree: usize) -> Cycle {
+    match cycle.intervals() {
+        0 => Cycle { mesh: uniform(20), degree, profile: Vec::new(), ..*cycle },
+        _ => cycle.clone(),
+    }
 }
 
 #[cfg(test)]

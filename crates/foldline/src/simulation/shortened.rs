@@ -54,7 +54,7 @@ impl<'a> Shortened<'a> {
 
     /// f at `x`, as slope number `k`.
     pub(super) fn slope_at(&mut self, x: &[f64], k: usize) {
-        let at = Batch { lanes: 1, states: x, parameters: Parameters::Shared(&self.parameters) };
+        let at = Batch { lanes: 1, states: x, parameters: Parameters::Shared(&self.parameters), times: &[] };
         match self.signs.is_empty() {
             true => self.field.evaluate(at, &mut self.slopes[k]),
             false => self.field.evaluate_switched(at, &self.signs, &mut self.slopes[k]),
@@ -63,7 +63,7 @@ impl<'a> Shortened<'a> {
 
     /// The values of all switches at `x`.
     pub(super) fn switches_into(&self, x: &[f64], values: &mut [f64]) {
-        let at = Batch { lanes: 1, states: x, parameters: Parameters::Shared(&self.parameters) };
+        let at = Batch { lanes: 1, states: x, parameters: Parameters::Shared(&self.parameters), times: &[] };
         self.field.switches(at, values);
     }
 

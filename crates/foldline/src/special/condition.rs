@@ -16,9 +16,6 @@ pub fn condition<'a>(
 ) -> Option<Box<dyn Condition + 'a>> {
     match at {
         Solution::Equilibrium(_) => Some(Box::new(OnEquilibria::new(kind, setting)?)),
-        Solution::Cycle(cycle) if cycle.intervals() > 0 => {
-            Some(Box::new(OnCycles::new(kind, setting, cycle.degree, &cycle.mesh)?))
-        }
-        Solution::Cycle(_) => Some(Box::new(OnCycles::new(kind, setting, degree, &mesh::uniform(20))?)),
+        Solution::Cycle(cycle) => Some(Box::new(OnCycles::new(kind, setting, &mesh::at_least_some(cycle, degree))?)),
     }
 }

@@ -87,7 +87,7 @@ fn growth_rate(field: &dyn VectorField, parameters: &[f64], scales: &[f64], x: &
     let n = x.len();
     let (mut f, mut fx, mut pivots) = (vec![0.0; n], vec![0.0; n * n], vec![0; n]);
     for _ in 0..20 {
-        let batch = Batch { lanes: 1, states: x, parameters: Parameters::Shared(parameters) };
+        let batch = Batch { lanes: 1, states: x, parameters: Parameters::Shared(parameters), times: &[] };
         field.linearise(batch, &[], &mut f, &mut fx, &mut []);
         let jacobian = fx.clone();
         lu::factorise(&mut fx, n, &mut pivots).ok()?;
@@ -120,7 +120,7 @@ pub fn direction(
     let omega = frequency(at)?;
     let (mut f, mut fx) = (vec![0.0; n], vec![0.0; n * n]);
     field.linearise(
-        Batch { lanes: 1, states: x, parameters: Parameters::Shared(&at.parameters) },
+        Batch { lanes: 1, states: x, parameters: Parameters::Shared(&at.parameters), times: &[] },
         &[],
         &mut f,
         &mut fx,

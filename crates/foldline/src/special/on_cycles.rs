@@ -21,7 +21,7 @@
 //! orthogonal to the null vectors on the way.
 
 use crate::contract::{Batch, Condition, Parameters};
-use crate::diagram::{Kind, Mesh, Point};
+use crate::diagram::{Cycle, Kind, Mesh, Point};
 use crate::linalg::condensed::Condensed;
 use crate::linalg::lane::Lane;
 use crate::linalg::system::System;
@@ -57,14 +57,19 @@ pub struct OnCycles<'a> {
     states: Vec<f64>,
     f: Vec<f64>,
     fx: Vec<f64>,
+    /// As in the cycle.
+    forcing_periods: u32,
+    times: Vec<f64>,
 }
 
 impl<'a> OnCycles<'a> {
     /// The condition of that kind for cycles on `mesh`; `None` for a kind that cycles do not have.
-    pub fn new(kind: Kind, setting: Setting<'a>, degree: usize, mesh: &Mesh) -> Option<OnCycles<'a>> {
+    pub fn new(kind: Kind, setting: Setting<'a>, cycle: &Cycle) -> Option<OnCycles<'a>> {
+        let Cycle { degree, forcing_periods, ref mesh, .. } = *cycle;
         let (scheme, n) = (Scheme::new(degree), setting.field.dim());
         let (parts, scalars) = match kind {
-            Kind::Fold => (n, 2),
+            Kind::Fold if forcing_periods == 0 => (n, 2),
+            Kind::Fold => (n, 1),
             Kind::PeriodDoubling => (n, 1),
             Kind::Torus => (2 * n, 2),
             _ => return None,
@@ -89,6 +94,8 @@ impl<'a> OnCycles<'a> {
             states: Vec::new(),
             f: Vec::new(),
             fx: Vec::new(),
+            forcing_periods,
+            times: Vec::new(),
         };
         condition.resize();
         // Any border will do for the first evaluation unless it is orthogonal to a null vector.
@@ -115,8 +122,10 @@ impl<'a> OnCycles<'a> {
         self.parts / self.n
     }
 
+    /// Whether (1) is held as it stands, with its period; a forced cycle has a given period, and (1) is the first of its equations
+    /// alone.
     fn is_fold(&self) -> bool {
-        self.kind == Kind::Fold
+        self.kind == Kind::Fold && self.forcing_periods == 0
     }
 
     fn resize(&mut self) {
@@ -125,6 +134,12 @@ impl<'a> OnCycles<'a> {
         self.states.resize(lanes * self.n, 0.0);
         self.f.resize(lanes * self.n, 0.0);
         self.fx.resize(lanes * self.n * self.n, 0.0);
+        let (m, mesh) = (self.scheme.degree, &self.mesh);
+        let time = |lane: usize| {
+            let j = lane / m;
+            f64::from(self.forcing_periods) * (mesh[j] + (mesh[j + 1] - mesh[j]) * self.scheme.nodes[lane % m + 1])
+        };
+        self.times = (0..if self.forcing_periods > 0 { lanes } else { 0 }).map(time).collect();
         self.phase.clear();
     }
 
@@ -144,8 +159,12 @@ impl<'a> OnCycles<'a> {
         self.states = self.gather(&u[..size], self.n, 0);
         self.period = u[size];
         self.parameters = self.setting.at(&u[size + 1..]);
-        let batch =
-            Batch { lanes: self.lanes(), states: &self.states, parameters: Parameters::Shared(&self.parameters) };
+        let batch = Batch {
+            lanes: self.lanes(),
+            states: &self.states,
+            parameters: Parameters::Shared(&self.parameters),
+            times: &self.times,
+        };
         self.setting.field.linearise(batch, &[], &mut self.f, &mut self.fx, &mut []);
         if self.phase.is_empty() {
             let (m, lanes) = (self.scheme.degree, self.lanes());
@@ -360,7 +379,8 @@ impl Condition for OnCycles<'_> {
         let (n, m, parts, lanes) = (self.n, self.scheme.degree, self.parts, self.lanes());
         let (size, states) = (self.profile_size(), self.intervals() * (m + 1) * n);
         let known = self.setting.parameters.len();
-        let batch = Batch { lanes, states: &self.states, parameters: Parameters::Shared(&self.parameters) };
+        let batch =
+            Batch { lanes, states: &self.states, parameters: Parameters::Shared(&self.parameters), times: &self.times };
         let mut direction = self.gather(&du[..states], n, 0);
         direction.extend(self.setting.spread(&du[states + 1..]).iter().flat_map(|p| std::iter::repeat_n(*p, lanes)));
         let turn = extra.first().copied().unwrap_or(0.0);

@@ -64,7 +64,8 @@ impl<'a> OnEquilibria<'a> {
         let total = size + self.width;
         self.state = u[..n].to_vec();
         self.parameters = self.setting.at(&u[n..]);
-        let batch = Batch { lanes: 1, states: &self.state, parameters: Parameters::Shared(&self.parameters) };
+        let batch =
+            Batch { lanes: 1, states: &self.state, parameters: Parameters::Shared(&self.parameters), times: &[] };
         let (mut f, mut fx) = (vec![0.0; n], vec![0.0; n * n]);
         self.setting.field.linearise(batch, &[], &mut f, &mut fx, &mut []);
         let frequency = extra.first().copied().unwrap_or(0.0);
@@ -148,7 +149,8 @@ impl Condition for OnEquilibria<'_> {
 
     fn derivative(&mut self, du: &[f64], extra: &[f64], dg: &mut [f64]) {
         let (n, size) = (self.n, self.n * self.width);
-        let batch = Batch { lanes: 1, states: &self.state, parameters: Parameters::Shared(&self.parameters) };
+        let batch =
+            Batch { lanes: 1, states: &self.state, parameters: Parameters::Shared(&self.parameters), times: &[] };
         let direction = [&du[..n], &self.setting.spread(&du[n..])].concat();
         let turn = extra.first().copied().unwrap_or(0.0);
         let mut change = vec![0.0; size];

@@ -35,5 +35,6 @@ pub fn doubled(cycle: &Cycle, direction: &[f64]) -> (Cycle, Vec<f64>) {
     let mesh: Mesh = half.iter().copied().chain(half[1..].iter().map(|t| 0.5 + t)).collect();
     let profile = [&cycle.profile[..], &cycle.profile[..]].concat();
     let perturbation = direction.iter().copied().chain(direction.iter().map(|v| -v)).collect();
-    (Cycle { period: 2.0 * cycle.period, mesh, degree: cycle.degree, profile }, perturbation)
+    let (period, forcing_periods) = (2.0 * cycle.period, 2 * cycle.forcing_periods);
+    (Cycle { period, forcing_periods, mesh, degree: cycle.degree, profile }, perturbation)
 }

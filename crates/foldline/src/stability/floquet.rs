@@ -19,9 +19,9 @@ use num_complex::Complex64;
 /// Multipliers and how far they can be trusted.
 #[derive(Clone, Debug, Default)]
 pub struct Floquet {
-    /// The trivial multiplier first, then the others by decreasing modulus.
+    /// The trivial multiplier first where there is one, then the others by decreasing modulus.
     pub multipliers: Vec<Complex64>,
-    /// How many of the others lie outside the unit circle.
+    /// How many of the others, the free ones, lie outside the unit circle.
     pub unstable: usize,
     /// log of the product of all moduli.
     pub log_product: f64,
@@ -67,6 +67,26 @@ pub fn multipliers(transitions: &[f64], flow: &[f64], n: usize) -> Floquet {
         None => multipliers.extend(vec![Complex64::new(f64::NAN, f64::NAN); n - 1]),
     }
     Floquet { multipliers, unstable, log_product: log_trivial + log_others }
+}
+
+/// Multipliers of a forced cycle, none of which is trivial. `transitions`: `[N]` G_j row-major n×n.
+pub fn forced(transitions: &[f64], n: usize) -> Floquet {
+    let mut pivots = vec![0; n];
+    let log_product = transitions
+        .chunks_exact(n * n)
+        .map(|g| {
+            let mut g = g.to_vec();
+            lu::factorise(&mut g, n, &mut pivots).map_or(f64::NEG_INFINITY, |()| lu::determinant(&g, n, &pivots).1)
+        })
+        .sum();
+    let grouped = periodic_schur::group(transitions, n);
+    let found = periodic_schur::eigenvalues(&grouped, n);
+    let unstable = found.iter().flatten().filter(|e| e.log_modulus > 0.0).count();
+    let multipliers = match found {
+        Some(found) => found.into_iter().map(|e| e.value()).collect(),
+        None => vec![Complex64::new(f64::NAN, f64::NAN); n],
+    };
+    Floquet { multipliers, unstable, log_product }
 }
 
 /// The reflection 1 - v vᵀ, times a sign on its first column, whose first column is a given direction.

@@ -27,6 +27,8 @@ const PLACES: usize = 4;
 const FINER: usize = 20;
 /// Peaks that are looked at.
 const PEAKS: usize = 3;
+/// Distance from the unit circle within which a multiplier is what a curve holds there.
+const HELD: f64 = 1e-6;
 /// Cycles integrated at a time.
 const BLOCK: usize = 16;
 
@@ -116,22 +118,34 @@ impl Part<'_> {
             let stated = Some(point.trust.discretisation + point.trust.residual + noise);
             out.checks.push(self.check(point, Quantity::Profile, stated, path.off(cycle, &orbit.scales)));
             out.checks.push(self.check(point, Quantity::Period, stated, off[orbit.nodes.len()].abs()));
-            let ranges = path.ranges(self.setting.field, &self.setting.at(&solved.orbit.free), solved.orbit.period);
-            out.checks.push(self.check(point, Quantity::Range, stated, self.range_difference(point, &ranges)));
+            let along = Along {
+                field: self.setting.field,
+                parameters: &self.setting.at(&solved.orbit.free),
+                orbit: &solved.orbit,
+            };
+            let ranges = path.ranges(along);
+            let passed_on = path.passed_on(along, stated.unwrap_or(0.0));
+            let (stated, off) = self.range_difference(point, &ranges, stated.unwrap_or(f64::NAN), &passed_on);
+            out.checks.push(self.check(point, Quantity::Range, Some(stated), off));
             self.multipliers(point, solved, rough, out);
         }
     }
 
-    fn range_difference(&self, point: &Point, ranges: &[[f64; 2]]) -> f64 {
-        let scale = |c: usize, size: f64| self.system.scales.get(c).copied().unwrap_or(0.0) + size;
-        point.ranges.iter().zip(ranges).enumerate().fold(0.0, |most, (c, (a, b))| {
+    /// Of the state or output whose range is off by most of what is stated: that, and by how much it is off, relative to its size. Outputs
+    /// may be off by what the error of the states, passed on to them, makes of it too.
+    fn range_difference(&self, point: &Point, ranges: &[[f64; 2]], stated: f64, passed_on: &[f64]) -> (f64, f64) {
+        let n = self.system.scales.len();
+        let each = point.ranges.iter().zip(ranges).enumerate().map(|(c, (a, b))| {
             let size = a[0].abs().max(a[1].abs()).max(f64::MIN_POSITIVE);
-            larger(most, (a[0] - b[0]).abs().max((a[1] - b[1]).abs()) / scale(c, size))
-        })
+            let scale = self.system.scales.get(c).copied().unwrap_or(0.0) + size;
+            let own = if c < n { 0.0 } else { passed_on[c - n] / scale };
+            (stated + own, (a[0] - b[0]).abs().max((a[1] - b[1]).abs()) / scale)
+        });
+        each.max_by(|a, b| (a.1 / a.0).total_cmp(&(b.1 / b.0))).unwrap_or((stated, 0.0))
     }
 
     fn multipliers(&self, point: &Point, solved: &Solved, rough: &Solved, out: &mut Verified) {
-        let [found, other] = [solved, rough].map(|solved| solved.flow.multipliers(&solved.orbit).split_off(1));
+        let [found, other] = [solved, rough].map(|solved| solved.flow.free_multipliers(&solved.orbit));
         let found = &found[..];
         let noise = matched(found, &other).iter().fold(ROUNDING, |m, (a, b)| larger(m, (a - b).norm()));
         let pairs = matched(point.free_spectrum(), found);
@@ -139,7 +153,10 @@ impl Part<'_> {
         let apart = pairs.iter().fold(0.0, |m, (a, b)| larger(m, (a - b).norm() / a.norm().max(1.0)));
         let stated = Some(point.trust.spectrum + noise).filter(|stated| stated.is_finite());
         out.checks.push(self.check(point, Quantity::Spectrum, stated, apart));
-        let wrong = pairs.iter().filter(|(a, b)| (a.norm() > 1.0) != (b.norm() > 1.0));
+        // What a curve holds at the unit circle is on neither side of it.
+        let aside = if self.branch.held.is_some() { HELD } else { 0.0 };
+        let wrong =
+            pairs.iter().filter(|(a, b)| (a.norm() > 1.0) != (b.norm() > 1.0) && (b.norm() - 1.0).abs() >= aside);
         let side = wrong.fold(0.0, |m, (_, b)| larger(m, (b.norm() - 1.0).abs()));
         out.checks.push(self.check(point, Quantity::Stability, Some(noise), side));
     }
@@ -183,7 +200,7 @@ impl Part<'_> {
         let Solution::Equilibrium(x) = &point.solution else { return };
         let (n, k) = (x.len(), self.setting.freedom());
         let (mut f, mut fx, mut fp) = (vec![0.0; n], vec![0.0; n * n], vec![0.0; n * k]);
-        let batch = Batch { lanes: 1, states: x, parameters: Parameters::Shared(&point.parameters) };
+        let batch = Batch { lanes: 1, states: x, parameters: Parameters::Shared(&point.parameters), times: &[] };
         self.setting.linearise(batch, &mut f, &mut fx, &mut fp);
         out.points += 1;
         let scales: Vec<f64> = x.iter().zip(self.setting.scales).map(|(x, s)| x.abs() + s).collect();
@@ -284,7 +301,43 @@ struct Path {
     states: Vec<f64>,
 }
 
+/// The flow in which a path lies.
+#[derive(Clone, Copy)]
+struct Along<'a> {
+    field: &'a dyn VectorField,
+    parameters: &'a [f64],
+    orbit: &'a Orbit,
+}
+
+impl Along<'_> {
+    /// Normalised times as those of the field.
+    fn times(&self, times: &[f64]) -> Vec<f64> {
+        times.iter().take(if self.orbit.forced { usize::MAX } else { 0 }).map(|t| t * self.orbit.period).collect()
+    }
+
+    /// The outputs `[output × times]` at states `[n × times]`.
+    fn outputs(&self, states: &[f64], times: &[f64]) -> Vec<f64> {
+        let mut outputs = vec![0.0; self.field.output_count() * times.len()];
+        let (parameters, lanes) = (Parameters::Shared(self.parameters), times.len());
+        self.field.outputs(Batch { lanes, states, parameters, times: &self.times(times) }, &mut outputs);
+        outputs
+    }
+}
+
 impl Path {
+    /// By how much every output changes at most where all states change by `error`, relative to their scales.
+    fn passed_on(&self, along: Along, error: f64) -> Vec<f64> {
+        let (lanes, outputs) = (self.times.len(), along.outputs(&self.states, &self.times));
+        let mut total = vec![0.0; outputs.len()];
+        for (c, scale) in along.orbit.scales.iter().enumerate() {
+            let mut moved = self.states.clone();
+            moved[c * lanes..(c + 1) * lanes].iter_mut().for_each(|x| *x += error * scale);
+            let there = along.outputs(&moved, &self.times);
+            total.iter_mut().zip(there.iter().zip(&outputs)).for_each(|(sum, (a, b))| *sum += (a - b).abs());
+        }
+        total.chunks_exact(lanes).map(max_abs).collect()
+    }
+
     /// The largest distance of a profile from it, relative to `scales`.
     fn off(&self, cycle: &Cycle, scales: &[f64]) -> f64 {
         let (scheme, count) = (Scheme::new(cycle.degree), self.times.len());
@@ -298,28 +351,22 @@ impl Path {
         most
     }
 
-    /// Smallest and largest values of states and outputs of a cycle of that period.
-    fn ranges(&self, field: &dyn VectorField, parameters: &[f64], period: f64) -> Vec<[f64; 2]> {
-        let (n, lanes) = (field.dim(), self.times.len());
-        let at = |states: &'_ [f64], lanes: usize| -> Vec<f64> {
-            let mut values = states.to_vec();
-            values.resize((n + field.output_count()) * lanes, 0.0);
-            let (states, outputs) = values.split_at_mut(n * lanes);
-            field.outputs(Batch { lanes, states, parameters: Parameters::Shared(parameters) }, outputs);
-            values
-        };
-        let mut slopes = vec![0.0; n * lanes];
-        field.evaluate(Batch { lanes, states: &self.states, parameters: Parameters::Shared(parameters) }, &mut slopes);
-        slopes.iter_mut().for_each(|f| *f *= period);
+    /// Smallest and largest values of states and outputs of the cycle.
+    fn ranges(&self, along: Along) -> Vec<[f64; 2]> {
+        let (n, lanes, parameters) = (along.field.dim(), self.times.len(), Parameters::Shared(along.parameters));
+        let at = |states: &[f64], times: &[f64]| [states.to_vec(), along.outputs(states, times)].concat();
+        let (mut slopes, times) = (vec![0.0; n * lanes], along.times(&self.times));
+        along.field.evaluate(Batch { lanes, states: &self.states, parameters, times: &times }, &mut slopes);
+        slopes.iter_mut().for_each(|f| *f *= along.orbit.period);
         let largest = |c: usize, line: &[f64], sign: f64| {
             let tops = peaks(line, sign).into_iter().map(|place| {
-                let fine = self.between(&slopes, place);
-                let count = fine.len() / n;
-                top(&at(&fine, count)[c * count..(c + 1) * count], sign)
+                let (times, fine) = self.between(&slopes, place);
+                let count = times.len();
+                top(&at(&fine, &times)[c * count..(c + 1) * count], sign)
             });
             tops.fold(f64::NEG_INFINITY, f64::max)
         };
-        let values = at(&self.states, lanes);
+        let values = at(&self.states, &self.times);
         values
             .chunks_exact(lanes)
             .enumerate()
@@ -327,8 +374,8 @@ impl Path {
             .collect()
     }
 
-    /// States `[n × times]` at equal distances between the samples next to a sample, on the cubics with the given slopes.
-    fn between(&self, slopes: &[f64], place: usize) -> Vec<f64> {
+    /// Times, and states `[n × times]`, at equal distances between the samples next to a sample, on the cubics with the given slopes.
+    fn between(&self, slopes: &[f64], place: usize) -> (Vec<f64>, Vec<f64>) {
         let lanes = self.times.len();
         let intervals = [(place + lanes - 1) % lanes, place];
         let hermite = |c: usize, from: usize, s: f64| {
@@ -340,10 +387,13 @@ impl Path {
             x + s * (p + s * ((3.0 * d - 2.0 * p - q) + s * (p + q - 2.0 * d)))
         };
         let places = || intervals.iter().flat_map(|from| (0..FINER).map(move |k| (*from, k as f64 / FINER as f64)));
-        (0..self.states.len() / lanes)
+        let time = |(from, s): (usize, f64)| {
+            self.times[from] + s * (self.times[(from + 1) % lanes] - self.times[from]).rem_euclid(1.0)
+        };
+        let states = (0..self.states.len() / lanes)
             .flat_map(|c| places().map(move |(from, s)| (c, from, s)))
-            .map(|(c, from, s)| hermite(c, from, s))
-            .collect()
+            .map(|(c, from, s)| hermite(c, from, s));
+        (places().map(time).collect(), states.collect())
     }
 }
 

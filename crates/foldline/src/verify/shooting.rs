@@ -13,6 +13,8 @@
 //!   (3)  ⟨c_r, (x, T, λ) - (x, T, λ)~⟩ = d_r             r = 1 … k
 //! ```
 //!
+//! A forced cycle has a given T, which takes the place of (2).
+//!
 //! Without rows c the shortest update is taken: that towards the nearest solution.
 //!
 //! **Source.** ascher1995, §4.
@@ -43,8 +45,10 @@ pub(super) struct Orbit {
     pub(super) nodes: Vec<f64>,
     /// `[K]`: s_i.
     pub(super) shares: Vec<f64>,
-    /// T.
+    /// T, in the time of the field.
     pub(super) period: f64,
+    /// Whether T is given.
+    pub(super) forced: bool,
     /// `[k]`.
     pub(super) free: Vec<f64>,
     /// `[n]`: scale of the model and largest value of each component.
@@ -69,7 +73,8 @@ impl Orbit {
         Some(Orbit {
             nodes: at_left_ends(&cycle.profile, &intervals, cycle.degree, n),
             shares,
-            period: cycle.period,
+            period: if cycle.forcing_periods > 0 { f64::from(cycle.forcing_periods) } else { cycle.period },
+            forced: cycle.forcing_periods > 0,
             free: setting.values_of(point),
             scales,
             intervals,
@@ -78,6 +83,13 @@ impl Orbit {
 
     pub(super) fn dim(&self) -> usize {
         self.scales.len()
+    }
+
+    /// `[K + 1]` the times of the nodes and of the end, in the time of the field.
+    pub(super) fn times(&self) -> Vec<f64> {
+        let mut times = vec![0.0];
+        self.shares.iter().for_each(|share| times.push(times[times.len() - 1] + share * self.period));
+        times
     }
 
     /// Unknowns of (1) to (3): K n + 1 + k.
@@ -123,7 +135,15 @@ pub(super) struct Flow {
 }
 
 impl Flow {
-    /// The multipliers, the trivial one first.
+    /// The multipliers without the trivial one.
+    pub(super) fn free_multipliers(&self, orbit: &Orbit) -> Vec<Complex64> {
+        if orbit.forced {
+            return floquet::forced(&self.transitions, orbit.dim()).multipliers;
+        }
+        self.multipliers(orbit).split_off(1)
+    }
+
+    /// The multipliers of a cycle that is not forced, the trivial one first.
     pub(super) fn multipliers(&self, orbit: &Orbit) -> Vec<Complex64> {
         let n = orbit.dim();
         let flow: Vec<f64> = self.begins.iter().enumerate().map(|(at, f)| f / orbit.scales[at % n]).collect();
@@ -159,10 +179,11 @@ impl Shooting<'_> {
         let (mut starts, mut parameters, mut owners) = (Vec::new(), Vec::new(), Vec::new());
         for (index, orbit) in orbits.iter().enumerate() {
             let values = self.setting.at(&orbit.free);
-            for (x, share) in orbit.nodes.chunks_exact(n).zip(&orbit.shares) {
+            for ((x, share), time) in orbit.nodes.chunks_exact(n).zip(&orbit.shares).zip(orbit.times()) {
                 starts.extend_from_slice(x);
                 starts.extend((0..n * n).map(|at| if at % (n + 1) == 0 { 1.0 } else { 0.0 }));
                 starts.extend(std::iter::repeat_n(0.0, n * k));
+                starts.extend(orbit.forced.then_some(time));
                 parameters.extend_from_slice(&values);
                 parameters.push(share * orbit.period);
                 owners.push(index);
@@ -171,7 +192,9 @@ impl Shooting<'_> {
         let scales = self.setting.scales;
         let matrix = (0..n * n).map(|at| scales[at / n] / scales[at % n]);
         let by_free = (0..n * k).map(|at| scales[at / k.max(1)] / self.setting.axes[at % k.max(1)].scale);
-        let absolute = scales.iter().copied().chain(matrix).chain(by_free).map(|s| s * self.accuracy).collect();
+        let clock = self.setting.field.forced().then_some(1.0);
+        let absolute = scales.iter().copied().chain(matrix).chain(by_free).chain(clock);
+        let absolute = absolute.map(|s| s * self.accuracy).collect();
         let tolerance = Tolerance { relative: self.accuracy, absolute };
         let ensemble = Ensemble::with_own_parameters(&field, &parameters, tolerance, &starts, [0.0, 1.0]);
         let arrivals = ensemble.with_step_limit(STEPS).run(&mut |step| {
@@ -184,7 +207,7 @@ impl Shooting<'_> {
             match &mut out[*owner] {
                 Some(flow) if arrival.outcome == Outcome::Reached => {
                     let (x, rest) = arrival.state.split_at(n);
-                    let (matrix, by_free) = rest.split_at(n * n);
+                    let (matrix, by_free) = rest[..n * n + n * k].split_at(n * n);
                     flow.ends.extend_from_slice(x);
                     let scaled = matrix.iter().enumerate().map(|(at, m)| m * scales[at % n] / scales[at / n]);
                     flow.transitions.extend(scaled);
@@ -195,20 +218,23 @@ impl Shooting<'_> {
         }
         for (orbit, flow) in orbits.iter().zip(&mut out) {
             if let Some(flow) = flow {
-                flow.begins = self.slopes(&orbit.nodes, &orbit.free);
-                flow.finishes = self.slopes(&flow.ends, &orbit.free);
+                let times = orbit.times();
+                flow.begins = self.slopes(&orbit.nodes, &times, orbit);
+                flow.finishes = self.slopes(&flow.ends, &times[1..], orbit);
             }
         }
         out
     }
 
-    /// f at states `[K][n]`.
-    fn slopes(&self, states: &[f64], free: &[f64]) -> Vec<f64> {
+    /// f at states `[K][n]` and times `[K]`.
+    fn slopes(&self, states: &[f64], times: &[f64], orbit: &Orbit) -> Vec<f64> {
         let n = self.setting.field.dim();
-        let parameters = self.setting.at(free);
+        let parameters = self.setting.at(&orbit.free);
         let mut f = vec![0.0; states.len()];
-        for (x, f) in states.chunks_exact(n).zip(f.chunks_exact_mut(n)) {
-            self.setting.field.evaluate(Batch { lanes: 1, states: x, parameters: Parameters::Shared(&parameters) }, f);
+        for ((x, time), f) in states.chunks_exact(n).zip(times.chunks_exact(1)).zip(f.chunks_exact_mut(n)) {
+            let times = if orbit.forced { time } else { &[] };
+            let at = Batch { lanes: 1, states: x, parameters: Parameters::Shared(&parameters), times };
+            self.setting.field.evaluate(at, f);
         }
         f
     }
@@ -268,7 +294,10 @@ impl Shooting<'_> {
             }
         }
         let line = &mut a[inner * size..(inner + 1) * size];
-        for at in 0..inner {
+        if orbit.forced {
+            line[inner] = 1.0;
+        }
+        for at in 0..if orbit.forced { 0 } else { inner } {
             line[at] = flow.begins[at] * orbit.period / scales[at % n] / count as f64;
         }
         right[inner * stride] = 0.0;

@@ -162,7 +162,8 @@ impl Place<'_> {
                 }
                 let mut along: Vec<f64> = at_left_ends(&tangent[..size], &base.intervals, cycle.degree, n);
                 along.iter_mut().enumerate().for_each(|(at, t)| *t /= base.scales[at % n]);
-                along.push(tangent[size] / base.period);
+                // Of a forced cycle the tangent says nothing about the period, which is given.
+                along.push(if base.forced { 0.0 } else { tangent[size] / base.period });
                 along.push(tangent[size + 1] / self.setting.axes[0].scale);
                 normalise(&mut along);
                 let shooting = Shooting { setting: self.setting, accuracy: self.accuracy };
@@ -173,7 +174,7 @@ impl Place<'_> {
                 let solved = shooting.solve(&orbits, &rows);
                 let nearby = solved.into_iter().map(|solved| {
                     let solved = solved?;
-                    let spectrum = solved.flow.multipliers(&solved.orbit).split_off(1);
+                    let spectrum = solved.flow.free_multipliers(&solved.orbit);
                     let slope = *solved.kernel.first()?.last()?;
                     Some(Nearby { parameter: solved.orbit.free[0], slope, spectrum })
                 });
@@ -205,7 +206,7 @@ impl Place<'_> {
         for _ in 0..20 {
             let (mut f, mut fx, mut fp) = (vec![0.0; n], vec![0.0; n * n], vec![0.0; n]);
             let parameters = self.setting.at(&[value]);
-            let batch = Batch { lanes: 1, states: &state, parameters: Parameters::Shared(&parameters) };
+            let batch = Batch { lanes: 1, states: &state, parameters: Parameters::Shared(&parameters), times: &[] };
             self.setting.linearise(batch, &mut f, &mut fx, &mut fp);
             let mut a = Vec::with_capacity(size * size);
             for i in 0..n {

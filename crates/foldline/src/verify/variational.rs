@@ -6,12 +6,14 @@
 //!   (1)  x' = S f(x, p),   X' = S f_x X,   Y' = S (f_x Y + f_λ)          X(0) = I,  Y(0) = 0
 //! ```
 //!
+//! with the time τ' = S as the last state where the field is forced,
+//!
 //! so that X and Y are the derivatives of the end with respect to the start and the free parameters λ.
 
 use crate::contract::{Batch, Parameters, VectorField};
 use crate::problem::Setting;
 
-/// (1): states x `[n]`, X `[n × n]`, Y `[n × k]`, row-major; parameters are those of the model and S.
+/// (1): states x `[n]`, X `[n × n]`, Y `[n × k]`, row-major, and τ if any; parameters are those of the model and S.
 pub(super) struct Variational<'a> {
     /// The vector field with its k free parameters.
     pub(super) setting: &'a Setting<'a>,
@@ -26,7 +28,7 @@ impl Variational<'_> {
 impl VectorField for Variational<'_> {
     fn dim(&self) -> usize {
         let [n, k] = self.sizes();
-        n * (1 + n + k)
+        n * (1 + n + k) + usize::from(self.setting.field.forced())
     }
 
     fn parameter_count(&self) -> usize {
@@ -46,14 +48,17 @@ impl VectorField for Variational<'_> {
                 (Parameters::Shared(&all[..count]), &shared)
             }
         };
-        let inner = Batch { lanes, states: &at.states[..n * lanes], parameters };
+        let inner =
+            Batch { lanes, states: &at.states[..n * lanes], parameters, times: &at.states[n * (1 + n + k) * lanes..] };
         let (mut fx, mut fp) = (vec![0.0; n * n * lanes], vec![0.0; n * k * lanes]);
         let (f, rest) = out.split_at_mut(n * lanes);
         self.setting.linearise(inner, f, &mut fx, &mut fp);
         for row in f.chunks_exact_mut(lanes) {
             row.iter_mut().zip(lengths).for_each(|(f, s)| *f *= s);
         }
-        let (along, by) = rest.split_at_mut(n * n * lanes);
+        let (along, rest) = rest.split_at_mut(n * n * lanes);
+        let (by, clock) = rest.split_at_mut(n * k * lanes);
+        clock.iter_mut().zip(lengths).for_each(|(f, s)| *f = *s);
         by.copy_from_slice(&fp);
         along.fill(0.0);
         // X and Y are two blocks of columns, each row-major.

@@ -12,7 +12,7 @@ pub fn polish(field: &Field, parameters: &[f64], candidate: &Candidate) -> Optio
 
 fn slope(field: &Field, parameters: &[f64], x: &[f64]) -> Vec<f64> {
     let mut f = vec![0.0; x.len()];
-    field.evaluate(Batch { lanes: 1, states: x, parameters: Parameters::Shared(parameters) }, &mut f);
+    field.evaluate(Batch { lanes: 1, states: x, parameters: Parameters::Shared(parameters), times: &[] }, &mut f);
     f
 }
 
@@ -114,7 +114,7 @@ fn profile(integrator: &Integrator, start: &[f64], period: f64) -> Option<Cycle>
             profile.extend_from_slice(&x);
         }
     }
-    Some(Cycle { period, mesh: mesh.into(), degree: 4, profile })
+    Some(Cycle { period, forcing_periods: 0, mesh: mesh.into(), degree: 4, profile })
 }
 
 fn point(solution: Solution, spectrum: Vec<Complex64>, unstable: usize, ranges: Vec<[f64; 2]>) -> Point {

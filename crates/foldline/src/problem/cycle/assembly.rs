@@ -70,7 +70,8 @@ impl CycleProblem<'_> {
         let (lanes, size) = (self.lanes(), self.profile_size());
         self.gather(u);
         let parameters = self.setting.at(&u[size + 1..]);
-        let batch = Batch { lanes, states: &self.states, parameters: Parameters::Shared(&parameters) };
+        let parameters = Parameters::Shared(&parameters);
+        let batch = Batch { lanes, states: &self.states, parameters, times: &self.times };
         self.setting.linearise(batch, &mut self.f, &mut self.fx, &mut self.fp);
         for (coupled, entry) in self.coupled.iter_mut().zip(self.fx.chunks_exact(lanes)) {
             // What was coupled once remains so: the order of elimination rarely changes.
@@ -93,6 +94,7 @@ impl CycleProblem<'_> {
         self.trace = trace;
         let q = 1 + self.setting.freedom();
         corner[..q].fill(0.0);
+        corner[0] = f64::from(u8::from(self.forcing_periods > 0));
         for (r, row) in rows.chunks_exact(u.len()).enumerate() {
             let corner = &mut corner[(1 + r) * q..(2 + r) * q];
             corner[0] = row[size] / (self.period_scale * self.period_scale);

@@ -81,7 +81,8 @@ impl CycleProblem<'_> {
         }
         let parameters = self.setting.at(&better[size + 1..]);
         let (mut f, mut fx) = (vec![0.0; n * lanes], vec![0.0; n * n * lanes]);
-        let batch = Batch { lanes, states: &states, parameters: Parameters::Shared(&parameters) };
+        let times = self.sampling.times(&self.mesh, self.forcing_periods);
+        let batch = Batch { lanes, states: &states, parameters: Parameters::Shared(&parameters), times: &times };
         self.setting.field.linearise(batch, &[], &mut f, &mut fx, &mut []);
         if !max_abs(&fx).is_finite() || !max_abs(&better).is_finite() {
             return None;
@@ -108,6 +109,7 @@ impl CycleProblem<'_> {
             &parameters,
             &u[..size],
             u[size],
+            self.forcing_periods,
             &self.mesh,
             &self.scheme,
             &self.sampling,
@@ -145,7 +147,7 @@ impl CycleProblem<'_> {
         }
         let mut f = vec![0.0; n * count];
         let parameters = self.setting.at(&u[self.profile_size() + 1..]);
-        let batch = Batch { lanes: count, states: &states, parameters: Parameters::Shared(&parameters) };
+        let batch = Batch { lanes: count, states: &states, parameters: Parameters::Shared(&parameters), times: &[] };
         self.setting.field.evaluate(batch, &mut f);
         let mut flow = vec![0.0; n * count];
         for j in 0..count {

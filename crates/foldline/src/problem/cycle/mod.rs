@@ -12,6 +12,12 @@
 //!   (3)  Σ_j h_j Σ_i b_i ⟨X_{j,i} - X̃_{j,i}, X̃'_{j,i}⟩ = 0              phase, with reference X̃
 //! ```
 //!
+//! A forced field has f(X, λ, τ) with its time τ in periods of the forcing. A cycle lasts a given number q of them, and instead of (3)
+//!
+//! ```text
+//!   (4)  T - q = 0,   τ_{j,i} = q t_{j,i}
+//! ```
+//!
 //! (1) is the Runge–Kutta form of collocation: its matrix is close to the identity where intervals are short.
 //!
 //! Inner products of states divide component c by s_c = (model scale) + max |X̃_c|.
@@ -58,6 +64,10 @@ pub struct CycleProblem<'a> {
     mesh: Mesh,
     n: usize,
     halves: bool,
+    /// q of (4); 0 where the field is autonomous.
+    forcing_periods: u32,
+    /// `[L][m][W]`: τ_{j,i}, nothing where the field is autonomous.
+    times: Vec<f64>,
     /// X̃' / s² at the Gauss points, `[L][m][n][W]`, normalised to unit length, and ⟨X̃, X̃'⟩ in that weight.
     phase: Vec<f64>,
     phase_offset: f64,
@@ -100,6 +110,8 @@ impl<'a> CycleProblem<'a> {
             mesh: mesh.clone(),
             n,
             halves: false,
+            forcing_periods: 0,
+            times: Vec::new(),
             phase: Vec::new(),
             phase_offset: 0.0,
             period_scale: 1.0,
@@ -114,6 +126,19 @@ impl<'a> CycleProblem<'a> {
         };
         problem.set_mesh(mesh);
         problem
+    }
+
+    /// Cycles like that one: with polynomials of its degree, on its mesh, over as many periods of the forcing.
+    pub fn like(setting: Setting<'a>, cycle: &Cycle) -> CycleProblem<'a> {
+        let mut problem = CycleProblem::new(setting, cycle.degree, &cycle.mesh);
+        problem.forcing_periods = cycle.forcing_periods;
+        problem.set_mesh(&cycle.mesh);
+        problem
+    }
+
+    /// Whether (4) takes the place of (3).
+    fn is_forced(&self) -> bool {
+        self.forcing_periods > 0
     }
 
     /// Keeps the second half of every new mesh a copy of the first. A doubled cycle meets its parent at a pitchfork that is
@@ -144,6 +169,14 @@ impl<'a> CycleProblem<'a> {
 
     fn profile_size(&self) -> usize {
         self.intervals() * (self.scheme.degree + 1) * self.n
+    }
+
+    /// τ of a point of the batch.
+    fn time_of(&self, at: usize) -> f64 {
+        let (m, lane) = (self.scheme.degree, at % self.width);
+        let (place, i) = (at / self.width / m, at / self.width % m);
+        let j = (lane * self.length + place).min(self.intervals() - 1);
+        f64::from(self.forcing_periods) * (self.mesh[j] + self.h(j) * self.scheme.nodes[i + 1])
     }
 
     fn h(&self, j: usize) -> f64 {
@@ -202,7 +235,10 @@ impl<'a> CycleProblem<'a> {
                 *g *= self.scale[k % n] / self.scale[k / n];
             }
         }
-        floquet::multipliers(&transitions, &self.flow_at_nodes(u), n)
+        match self.is_forced() {
+            true => floquet::forced(&transitions, n),
+            false => floquet::multipliers(&transitions, &self.flow_at_nodes(u), n),
+        }
     }
 
     fn block(&self) -> usize {
@@ -240,6 +276,9 @@ impl ZeroProblem for CycleProblem<'_> {
         self.scale = self.relative_scale(u);
         self.period_scale = u[size].abs().max(f64::MIN_POSITIVE);
         self.phase.fill(0.0);
+        if self.is_forced() {
+            return;
+        }
         let (mut length, mut offset) = (0.0, 0.0);
         let count = self.intervals();
         let nodes = panel::by_component(&u[..size], m + 1, n);
@@ -270,13 +309,17 @@ impl ZeroProblem for CycleProblem<'_> {
         let size = self.profile_size();
         self.gather(u);
         let parameters = self.setting.at(&u[size + 1..]);
-        let batch = Batch { lanes: self.lanes(), states: &self.states, parameters: Parameters::Shared(&parameters) };
+        let (lanes, parameters) = (self.lanes(), Parameters::Shared(&parameters));
+        let batch = Batch { lanes, states: &self.states, parameters, times: &self.times };
         self.setting.field.evaluate(batch, &mut self.f);
         let phase = match self.width {
             1 => self.defects::<f64>(u, r),
             _ => self.defects::<Eight>(u, r),
         };
-        r[size] = phase - self.phase_offset;
+        r[size] = match self.is_forced() {
+            true => u[size] - f64::from(self.forcing_periods),
+            false => phase - self.phase_offset,
+        };
         max_abs(&r[..=size]).is_finite() && u[size] > 0.0
     }
 
@@ -329,6 +372,10 @@ impl ZeroProblem for CycleProblem<'_> {
             .map(|j| if j < count { mesh[j + 1] - mesh[j] } else { 0.0 })
             .collect();
         let lanes = self.lanes();
+        self.times = match self.is_forced() {
+            true => (0..lanes).map(|at| self.time_of(at)).collect(),
+            false => Vec::new(),
+        };
         self.phase.resize(lanes * n, 0.0);
         self.states.resize(lanes * n, 0.0);
         self.ends.resize(self.length * self.width * n, 0.0);
@@ -374,15 +421,17 @@ impl ZeroProblem for CycleProblem<'_> {
         self.residual(u, &mut r);
         let residual = self.sizes(&r).iter().zip(&scale).map(|(v, s)| v / s).fold(r[size].abs(), f64::max);
         let parameters = self.setting.at(&u[size + 1..]);
-        let ranges = extremes::of_profile(self.setting.field, &parameters, &u[..size], &self.mesh, &self.scheme);
+        let cycle = [&u[..size], &self.mesh[..]];
+        let ranges = extremes::of_profile(self.setting.field, &parameters, cycle, self.forcing_periods, &self.scheme);
         let trust = Trust {
             discretisation: SAFE * errors.iter().fold(0.0, |m: f64, e| m.max(*e)) + ROUNDING,
             residual,
-            trivial_defect: (found.multipliers[0].re - 1.0).abs(),
+            trivial_defect: if self.is_forced() { 0.0 } else { (found.multipliers[0].re - 1.0).abs() },
             liouville_defect: (found.log_product - self.trace).abs(),
             spectrum: f64::NAN,
         };
-        Examination { spectrum: found.multipliers, unstable: found.unstable, ranges, trust }
+        let trivial = usize::from(!self.is_forced());
+        Examination { spectrum: found.multipliers, trivial, unstable: found.unstable, ranges, trust }
     }
 
     fn spectrum_error(&mut self, u: &[f64], spectrum: &[Complex64]) -> f64 {
@@ -395,15 +444,17 @@ impl ZeroProblem for CycleProblem<'_> {
 
     fn point(&self, u: &[f64], tangent: &[f64], examination: Examination) -> Point {
         let size = self.profile_size();
+        let parameters = self.setting.at(&u[size + 1..]);
         Point {
             position: 0,
-            parameters: self.setting.at(&u[size + 1..]),
             solution: Solution::Cycle(Cycle {
-                period: u[size],
+                period: u[size] * self.setting.field.time_unit(&parameters),
+                forcing_periods: self.forcing_periods,
                 mesh: self.mesh.clone(),
                 degree: self.scheme.degree,
                 profile: u[..size].to_vec(),
             }),
+            parameters,
             tangent: tangent.to_vec(),
             step: 0.0,
             spectrum: examination.spectrum,
@@ -419,7 +470,7 @@ impl ZeroProblem for CycleProblem<'_> {
             Solution::Cycle(cycle) => (cycle.profile.clone(), cycle.period),
             Solution::Equilibrium(x) => (x.iter().copied().cycle().take(self.profile_size()).collect(), 1.0),
         };
-        u.push(period);
+        u.push(if self.is_forced() { f64::from(self.forcing_periods) } else { period });
         u.extend(self.setting.values_of(point));
         u
     }

@@ -77,10 +77,10 @@ impl Ensemble<'_> {
             Parameters::Shared(_) => Vec::new(),
         };
         let parameters = shared_or_own(self.parameters, &own);
-        let (signs, switches) = self.first_signs(Batch { lanes: m, states: &x, parameters });
+        let (signs, switches) = self.first_signs(Batch { lanes: m, states: &x, parameters, times: &[] });
         let evaluate = |states: &[f64]| {
             let mut f = vec![0.0; n * m];
-            let at = Batch { lanes: m, states, parameters };
+            let at = Batch { lanes: m, states, parameters, times: &[] };
             match signs.is_empty() {
                 true => self.field.evaluate(at, &mut f),
                 false => self.field.evaluate_switched(at, &signs, &mut f),

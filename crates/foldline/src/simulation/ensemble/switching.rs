@@ -42,7 +42,7 @@ impl Ensemble<'_> {
             }
             let mut ahead = std::mem::take(&mut self.lanes.ahead[place]);
             let parameters = self.lanes.parameters(self.parameters);
-            self.field.switches(Batch { lanes, states: &self.lanes.stage, parameters }, &mut ahead);
+            self.field.switches(Batch { lanes, states: &self.lanes.stage, parameters, times: &[] }, &mut ahead);
             self.lanes.ahead[place] = ahead;
         }
     }

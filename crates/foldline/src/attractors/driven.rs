@@ -1,0 +1,230 @@
+//! Trajectories of a forced field, as those of an autonomous one.
+//!
+//! **Idea.** Two states more, which run round the unit circle once per period of the forcing, tell the time; sections, returns and
+//! distances then need to know nothing of it. They exist here alone: solutions come out with the states of the model, beginning
+//! where the forcing does.
+//!
+//! **Equations.** With z = c + i s and the time τ in periods of the forcing:
+//!
+//! ```text
+//!   (1)  x' = f(x, p, τ),   z' = 2π i z + (1 - |z|²) z,   τ = arg z / 2π
+//! ```
+
+use super::{Attractor, Candidate, Census, Enough, Lost, Polish, Report, Sampling, Trial};
+use crate::contract::{Batch, VectorField};
+use crate::diagram::{Cycle, Point, Response, Solution};
+use std::f64::consts::TAU;
+
+/// How far from a whole number of periods of the forcing a motion may last and still be one that repeats with it.
+const WHOLE: f64 = 0.02;
+
+/// (1), for simulation: it has no derivatives.
+pub(super) struct Driven<'a>(pub(super) &'a dyn VectorField);
+
+impl Driven<'_> {
+    fn n(&self) -> usize {
+        self.0.dim()
+    }
+
+    /// τ of every lane.
+    fn times(&self, at: Batch) -> Vec<f64> {
+        let (n, lanes) = (self.n(), at.lanes);
+        let (c, s) = at.states[n * lanes..].split_at(lanes);
+        c.iter().zip(s).map(|(c, s)| s.atan2(*c) / TAU).collect()
+    }
+
+    /// Calls with the batch that the forced field sees.
+    fn inner(&self, at: Batch, call: impl FnOnce(Batch)) {
+        let times = self.times(at);
+        call(Batch { states: &at.states[..self.n() * at.lanes], times: &times, ..at });
+    }
+
+    fn circle(&self, at: Batch, f: &mut [f64]) {
+        let (n, lanes) = (self.n(), at.lanes);
+        let (c, s) = at.states[n * lanes..].split_at(lanes);
+        let (fc, fs) = f[n * lanes..].split_at_mut(lanes);
+        for l in 0..lanes {
+            let back = 1.0 - c[l] * c[l] - s[l] * s[l];
+            fc[l] = back * c[l] - TAU * s[l];
+            fs[l] = back * s[l] + TAU * c[l];
+        }
+    }
+}
+
+impl VectorField for Driven<'_> {
+    fn dim(&self) -> usize {
+        self.n() + 2
+    }
+
+    fn parameter_count(&self) -> usize {
+        self.0.parameter_count()
+    }
+
+    fn evaluate(&self, at: Batch, f: &mut [f64]) {
+        self.inner(at, |inner| self.0.evaluate(inner, &mut f[..self.n() * at.lanes]));
+        self.circle(at, f);
+    }
+
+    fn linearise(&self, _at: Batch, _free: &[usize], f: &mut [f64], fx: &mut [f64], fp: &mut [f64]) {
+        [f, fx, fp].into_iter().for_each(|none| none.fill(f64::NAN));
+    }
+
+    fn directional(&self, _at: Batch, _directions: &[&[f64]], out: &mut [f64]) {
+        out.fill(f64::NAN);
+    }
+
+    fn output_count(&self) -> usize {
+        self.0.output_count()
+    }
+
+    fn outputs(&self, at: Batch, out: &mut [f64]) {
+        self.inner(at, |inner| self.0.outputs(inner, out));
+    }
+
+    fn switch_count(&self) -> usize {
+        self.0.switch_count()
+    }
+
+    fn switches(&self, at: Batch, out: &mut [f64]) {
+        self.inner(at, |inner| self.0.switches(inner, out));
+    }
+
+    fn evaluate_switched(&self, at: Batch, signs: &[f64], f: &mut [f64]) {
+        self.inner(at, |inner| self.0.evaluate_switched(inner, signs, &mut f[..self.n() * at.lanes]));
+        self.circle(at, f);
+    }
+}
+
+/// The census of a forced field; see [`super::survey_until`].
+pub(super) fn survey(
+    field: &dyn VectorField,
+    parameters: &[f64],
+    sampling: &Sampling,
+    polish: Polish,
+    enough: Enough,
+) -> Census {
+    let n = field.dim();
+    let polish = |candidate: &Candidate| polish(&without_circle(candidate, n)?).and_then(|found| with_circle(found, n));
+    let mut census = super::census::survey(&Driven(field), parameters, &with_clock(sampling), &polish, enough);
+    for Attractor { point, example, .. } in &mut census.attractors {
+        bare(point, n, field.time_unit(parameters));
+        example.truncate(n);
+    }
+    census
+}
+
+/// Where the trajectory from `start` at the beginning of a period of the forcing goes; see [`super::settle`].
+pub(super) fn settle(
+    field: &dyn VectorField,
+    parameters: &[f64],
+    sampling: &Sampling,
+    start: &[f64],
+    polish: Polish,
+) -> Result<Point, Lost> {
+    let n = field.dim();
+    let polish = |candidate: &Candidate| polish(&without_circle(candidate, n)?).and_then(|found| with_circle(found, n));
+    let mut point = super::census::settle(
+        &Driven(field),
+        parameters,
+        &with_clock(sampling),
+        &[start, &[1.0, 0.0]].concat(),
+        &polish,
+    )?;
+    bare(&mut point, n, field.time_unit(parameters));
+    Ok(point)
+}
+
+/// Scales with those of the circle.
+pub(super) fn with_unit_scales(scales: &[f64]) -> Vec<f64> {
+    [scales, &[1.0, 1.0]].concat()
+}
+
+/// Every sample begins with a period of the forcing.
+pub(super) fn with_clock(sampling: &Sampling) -> Sampling {
+    let ranges = [&sampling.ranges[..], &[[1.0, 1.0], [0.0, 0.0]]].concat();
+    Sampling { ranges, scales: with_unit_scales(&sampling.scales), ..sampling.clone() }
+}
+
+/// Calls with the trial that (1) is, and gives the responses without the circle.
+pub(super) fn simulate(
+    trial: &Trial,
+    report: Report,
+    run: impl FnOnce(&Trial, Report) -> Vec<Response>,
+) -> Vec<Response> {
+    let (driven, scales) = (Driven(trial.field), with_unit_scales(trial.scales));
+    let own = Trial { field: &driven, scales: &scales, whirl: trial.whirl, jobs: trial.jobs };
+    let plain = |found: &[Response]| -> Vec<Response> { found.iter().map(|r| without(r, trial.field)).collect() };
+    let found = run(&own, &|found| report(&plain(found)));
+    plain(&found)
+}
+
+fn without(response: &Response, field: &dyn VectorField) -> Response {
+    let (n, unit) = (field.dim(), field.time_unit(&response.parameters));
+    let mut plain = response.clone();
+    plain.state.truncate(n);
+    plain.ranges.drain(n..(n + 2).min(response.ranges.len()));
+    // What repeats with the forcing does so after a whole number of its periods.
+    let whole = |period: f64| if (period - period.round()).abs() < WHOLE { period.round() } else { period };
+    plain.period = response.period.map(|period| whole(period) * unit);
+    plain.settled_after *= unit;
+    plain
+}
+
+/// A cycle in states with the circle as one without, from the beginning of a period of the forcing on.
+fn without_circle(candidate: &Candidate, n: usize) -> Option<Candidate> {
+    let Candidate::Cycle { period, times, states } = candidate else { return None };
+    let whole = period.round();
+    if whole < 1.0 || (period - whole).abs() > WHOLE || times.len() < 3 {
+        return None;
+    }
+    let count = times.len() - 1;
+    // Time until the forcing begins anew.
+    let first = &states[n..n + 2];
+    let wait = (-first[1].atan2(first[0]) / TAU).rem_euclid(1.0);
+    let state = |k: usize| &states[k % count * (n + 2)..][..n];
+    let k = times.partition_point(|t| *t <= wait).clamp(1, count);
+    let share = (wait - times[k - 1]) / (times[k] - times[k - 1]);
+    let start: Vec<f64> = state(k - 1).iter().zip(state(k)).map(|(a, b)| a + share * (b - a)).collect();
+    let (mut turned, mut profile) = (vec![0.0], start.clone());
+    for step in 0..count {
+        let at = k + step;
+        let time = times[at % count] + if at >= count { *period } else { 0.0 } - wait;
+        // Samples that nearly fall together are of no use.
+        if time > turned[turned.len() - 1] + 1e-9 && time < period - 1e-9 {
+            turned.push(time);
+            profile.extend_from_slice(state(at));
+        }
+    }
+    turned.push(*period);
+    profile.extend(start);
+    let times = turned.iter().map(|t| t * whole / period).collect();
+    Some(Candidate::Cycle { period: whole, times, states: profile })
+}
+
+/// The cycle of a point with the circle; its period is counted in those of the forcing.
+fn with_circle(mut point: Point, n: usize) -> Option<Point> {
+    let Solution::Cycle(cycle) = &mut point.solution else { return None };
+    let scheme = crate::problem::gauss::Scheme::new(cycle.degree);
+    let turns = f64::from(cycle.forcing_periods);
+    let mut profile = Vec::with_capacity(cycle.profile.len() / n * (n + 2));
+    let mut nodes = cycle.profile.chunks_exact(n);
+    for pair in cycle.mesh.windows(2) {
+        for c in &scheme.nodes {
+            let (sin, cos) = (TAU * turns * (pair[0] + c * (pair[1] - pair[0]))).sin_cos();
+            profile.extend_from_slice(nodes.next()?);
+            profile.extend([cos, sin]);
+        }
+    }
+    (cycle.profile, cycle.period) = (profile, turns);
+    point.ranges.splice(n..n, [[-1.0, 1.0]; 2]);
+    Some(point)
+}
+
+/// Takes the circle away again; `unit` is the period of the forcing.
+fn bare(point: &mut Point, n: usize, unit: f64) {
+    if let Solution::Cycle(Cycle { profile, period, forcing_periods, .. }) = &mut point.solution {
+        *profile = profile.chunks_exact(n + 2).flat_map(|x| &x[..n]).copied().collect();
+        *period = f64::from(*forcing_periods) * unit;
+    }
+    point.ranges.drain(n..(n + 2).min(point.ranges.len()));
+}
