@@ -84,3 +84,15 @@ fn hopf_points_and_folds_in_a_wiggle_shorter_than_a_step_are_not_passed_over() {
 fn hopf_points_next_to_no_damping_state_what_rounding_does() {
     comes_out_the_same(&of(&rotors(31..32)));
 }
+
+#[test]
+fn a_torus_in_front_of_a_fold_is_not_passed_over_because_the_counts_fit() {
+    // 10:1, flat in Ω: the multipliers at the fold said that something had happened before; and what a multiplier close to 1 is has to
+    // be known better than by the two identities.
+    comes_out_the_same(&of(&rotors(95..96)));
+}
+
+#[test]
+fn a_start_next_to_a_torus_is_met_again_on_its_own_side() {
+    comes_out_the_same(&of(&rotors(117..118)));
+}

@@ -61,11 +61,106 @@ fn folds_of_equilibria_go_round_the_cusp() {
     satisfies(&diagram, 10, |mu, lambda| 27.0 * mu * mu - 4.0 * lambda.powi(3));
     // Both arms of the cusp belong to the same curve: it turns back in lambda, at the cusp.
     let curve = diagram.branch("curve").unwrap();
-    assert_eq!(curve.special.len(), 1);
-    let cusp = &curve.special[0].point.parameters;
+    let [only] = &curve.special[..] else { panic!("{:?}", curve.special.len()) };
+    // x' = mu + lambda x - x³ is its own normal form, and its quadratic terms vanish there.
+    assert!(only.kind == Kind::Cusp && (only.coefficients[0] + 1.0).abs() < 1e-6, "{}", only.normal_form());
+    let cusp = &only.point.parameters;
     assert!(cusp[0].abs() < TOLERANCE && cusp[1].abs() < TOLERANCE, "{cusp:?}");
     let mu = |p: Option<&foldline::diagram::Point>| p.unwrap().parameters[0];
     assert!(mu(curve.points.first()) * mu(curve.points.last()) < 0.0);
+}
+
+/// What lies on the curve, by increasing second parameter; a closed curve is followed once.
+fn lies_on(diagram: &Diagram, expected: &[(Kind, f64, f64)]) {
+    let curve = diagram.branch("curve").unwrap();
+    complete(curve);
+    let (_, first) = curve.held.unwrap();
+    let of = |s: &foldline::diagram::SpecialPoint| {
+        (s.kind, s.point.parameters[first], s.point.parameters[curve.free], s.error)
+    };
+    let mut found: Vec<(Kind, f64, f64, f64)> = curve.special.iter().map(of).collect();
+    found.sort_by(|a, b| a.2.total_cmp(&b.2));
+    let agrees = |(own, known): (&(Kind, f64, f64, f64), &(Kind, f64, f64))| {
+        let error = 1e-8_f64.max(own.3);
+        own.0 == known.0 && (own.1 - known.1).abs() < error && (own.2 - known.2).abs() < error
+    };
+    assert!(found.len() == expected.len() && found.iter().zip(expected).all(agrees), "{found:?}");
+}
+
+/// Published values; all from Newton's method on the defining equations.
+#[test]
+fn curves_of_co_oxidation_have_their_points_of_codimension_two() {
+    use Kind::{BogdanovTakens, Cusp, Fold, GeneralisedHopf, Hopf};
+    let model = include_str!("../../../models/co-oxidation.toml");
+    let branch = "[[seed]]\nname = \"s\"\nattractor = \"equilibrium\"\nparameters = { q2 = 0.9 }\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"q2\"\nrange = [0.5, 3]\n";
+    let takens = [(1.1611987088, 0.7223390725), (1.4176276376, 0.9713975735)];
+    let folds = with_curve(study(model, branch), Fold, 1.05, "k", [0.0, 2.0], None);
+    let [a, b] = takens.map(|(q, k)| (BogdanovTakens, q, k));
+    lies_on(&folds, &[(Cusp, 1.0064083297, 0.3559912732), a, b]);
+    // From either Hopf point: the curve ends on that of the folds at both sides, with a turn in k on its way.
+    for near in [1.04, 1.06] {
+        let hopf = with_curve(study(model, branch), Hopf, near, "k", [0.0, 2.0], None);
+        let curve = hopf.branch("curve").unwrap();
+        let turn = curve.special.iter().find(|s| s.kind == Fold).unwrap();
+        let generalised =
+            [(0.8913189808, 0.2324873542), (0.9242550152, 0.3058792675)].map(|(q, k)| (GeneralisedHopf, q, k));
+        let turn = (Fold, turn.point.parameters[1], turn.point.parameters[6]);
+        lies_on(&hopf, &[turn, generalised[0], generalised[1], a, b]);
+        // Between the two generalised Hopf points the first Lyapunov coefficient has the other sign.
+        for end in &curve.ends {
+            assert_eq!(end.as_ref().unwrap().code(), "joined");
+        }
+    }
+}
+
+#[test]
+fn folds_of_the_a_to_b_reaction_have_a_cusp_and_meet_the_hopf_points() {
+    let model = include_str!("../../../models/ab-reaction.toml");
+    let branch = "[[seed]]\nname = \"s\"\nattractor = \"equilibrium\"\nparameters = { p1 = 0.05 }\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"p1\"\nrange = [0.05, 1]\n";
+    let folds = with_curve(study(model, branch), Kind::Fold, 0.1, "p3", [1.5, 6.0], None);
+    let hopf = with_curve(study(model, branch), Kind::Hopf, 0.13, "p3", [1.5, 6.0], None);
+    let takens = |diagram: &Diagram| -> Vec<f64> {
+        let all = &diagram.branch("curve").unwrap().special;
+        let found: Vec<_> = all.iter().filter(|s| s.kind == Kind::BogdanovTakens).collect();
+        assert_eq!(found.len(), 1, "{:?}", all.iter().map(|s| s.kind).collect::<Vec<_>>());
+        [&found[0].point.parameters[..], &found[0].coefficients].concat()
+    };
+    // Both curves, by conditions of their own, meet at one point with one normal form.
+    let (one, other) = (takens(&folds), takens(&hopf));
+    assert!(
+        one.iter().zip(&other).all(|(a, b)| (a.abs() - b.abs()).abs() < 1e-6 * (1.0 + a.abs())),
+        "{one:?} {other:?}"
+    );
+    // Closed form: p₃ = 5/2, p₁ = e⁻².
+    let cusp = folds.branch("curve").unwrap().special.iter().find(|s| s.kind == Kind::Cusp).unwrap();
+    let [p1, _, p3] = cusp.point.parameters[..] else { panic!("three parameters") };
+    assert!((p1 - (-2f64).exp()).abs() < 1e-8 && (p3 - 2.5).abs() < 1e-8, "{p1} {p3}");
+}
+
+/// x' = beta + x² + s (y² + z²), with a pair of frequency 1 that grows like mu + c x: the normal form of an eigenvalue 0 with a pair, whose
+/// curves of folds (beta = 0) and Hopf points (beta = -mu²) touch at the origin.
+#[test]
+fn folds_and_hopf_points_meet_at_a_zero_hopf_point() {
+    let model = "[parameters]\nbeta = -0.5\nmu = -0.3\n[states]\nx = \"beta + x^2 - y^2 - z^2\"\ny = \"(mu + x)*y - z\"\nz = \"y + (mu + x)*z\"\n";
+    let branch = "[[seed]]\nname = \"s\"\nstate = { x = -0.70711, y = 0, z = 0 }\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"beta\"\nrange = [-2, 1]\n";
+    let folds = with_curve(study(model, branch), Kind::Fold, 0.0, "mu", [-1.0, 1.0], None);
+    lies_on(&folds, &[(Kind::ZeroHopf, 0.0, 0.0)]);
+    let hopf = with_curve(study(model, branch), Kind::Hopf, -0.09, "mu", [-1.0, 1.0], None);
+    satisfies(&hopf, 5, |beta, mu| beta + mu * mu);
+    let kinds: Vec<Kind> = hopf.branch("curve").unwrap().special.iter().map(|s| s.kind).collect();
+    assert_eq!(kinds, [Kind::ZeroHopf]);
+}
+
+/// Two oscillators, each with a growth rate of its own in which both parameters have a part.
+#[test]
+fn two_curves_of_hopf_points_cross_at_a_double_hopf_point() {
+    let model = "[parameters]\np = -1\nq = -0.4\n[states]\na = \"(p + q)*a - b - a*(a^2 + b^2)\"\nb = \"a + (p + q)*b\"\nc = \"(p - q + 0.1*a)*c - 2.3*d\"\nd = \"2.3*c + (p - q)*d - d*c^2\"\n";
+    let branch = "[[seed]]\nname = \"s\"\nstate = { a = 0, b = 0, c = 0, d = 0 }\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"p\"\nrange = [-2, 2]\n";
+    for (near, slope) in [(0.4, -1.0), (-0.4, 1.0)] {
+        let hopf = with_curve(study(model, branch), Kind::Hopf, near, "q", [-1.0, 1.0], None);
+        satisfies(&hopf, 4, |p, q| p - slope * q);
+        lies_on(&hopf, &[(Kind::DoubleHopf, 0.0, 0.0)]);
+    }
 }
 
 #[test]

@@ -67,6 +67,7 @@ fn run() -> tempfile::TempDir {
         unstable_before: 0,
         unstable_after: 1,
         error: 1e-9,
+        coefficients: Vec::new(),
     };
     let mut main = branch("main", 0, None, Origin::Seed("start".into()), &[[0.0, 0.0], [2.0, 0.0], [0.5, 0.0]]);
     main.insert_special(fold(1, [2.0, 0.0]));

@@ -253,6 +253,13 @@ impl Marker {
             Kind::Hopf => Marker::Diamond,
             Kind::PeriodDoubling => Marker::Square,
             Kind::Torus => Marker::Triangle,
+            // On curves in two parameters, where none of the above lie.
+            Kind::Cusp => Marker::Nabla,
+            Kind::BogdanovTakens | Kind::Resonance11 => Marker::Plus,
+            Kind::ZeroHopf | Kind::FoldTorus | Kind::Resonance13 => Marker::Triangle,
+            Kind::GeneralisedHopf | Kind::GeneralisedPeriodDoubling | Kind::Chenciner => Marker::Diamond,
+            Kind::DoubleHopf | Kind::DoubleTorus | Kind::Resonance14 => Marker::Square,
+            Kind::FoldFlip | Kind::FlipTorus | Kind::Resonance12 => Marker::Cross,
             Kind::Unexplained => Marker::Star,
         }
     }

@@ -60,6 +60,7 @@ fn peak(name: &str, scale: f64) -> Branch {
             unstable_before: k,
             unstable_after: 1 - k,
             error: 1e-9,
+            coefficients: Vec::new(),
         });
     }
     branch.ends = [Some(Ending::Bound(0.5)), Some(Ending::Bound(12.0))];
@@ -88,7 +89,14 @@ fn isola(name: &str, centre: [f64; 2]) -> Branch {
     }
     for (angle, kind, unstable_before, unstable_after) in specials {
         let special = point((angle / turn * 120.0) as i64, at(angle)[0], at(angle)[1], 0, true);
-        branch.insert_special(SpecialPoint { kind, point: special, unstable_before, unstable_after, error: 1e-9 });
+        branch.insert_special(SpecialPoint {
+            kind,
+            point: special,
+            unstable_before,
+            unstable_after,
+            error: 1e-9,
+            coefficients: Vec::new(),
+        });
     }
     branch.ends = [Some(Ending::Closed), Some(Ending::Closed)];
     branch

@@ -164,8 +164,7 @@ fn a_file_that_is_not_there_is_named() {
     assert!(found[0].message.contains("cannot be read") && found[0].file.contains("model.toml"), "{}", found[0]);
 }
 
-/// The forced oscillator of the book: its forcing circles at unit amplitude and frequency omega, so on the circle (c, s)
-/// turns without changing its length.
+/// The forced oscillator of the book, whose equations are per period of the forcing.
 #[test]
 fn the_first_model_of_the_book_is_right() {
     let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/book/model-files.md");
@@ -173,11 +172,13 @@ fn the_first_model_of_the_book_is_right() {
     let text = page.split("```").nth(1).and_then(|block| block.strip_prefix("toml\n")).expect("it has a model");
     assert!(text.lines().count() <= 21, "twenty lines are promised");
     let model = parse_model(text, "first.toml").unwrap_or_else(|found| panic!("{}", found[0]));
-    let (mut f, p) = ([0.0; 4], model.defaults());
-    let at = Batch { lanes: 1, states: &[0.5, 0.25, 0.6, 0.8], parameters: Parameters::Shared(&p), times: &[] };
+    let (mut f, p) = ([0.0; 2], model.defaults());
+    let at = Batch { lanes: 1, states: &[0.5, 0.25], parameters: Parameters::Shared(&p), times: &[0.3] };
     model.evaluate(at, &mut f);
-    let expected = [0.25, 0.06 * 0.6 - 2.0 * 0.02 * 0.25 - 0.625, -1.2 * 0.8, 1.2 * 0.6];
-    for (found, expected) in f.iter().zip(expected) {
-        assert!((found - expected).abs() < 1e-15, "{f:?}");
+    let period = std::f64::consts::TAU / 1.2;
+    assert!(model.forced() && (model.time_unit(&p) - period).abs() < 1e-15);
+    let force = 0.06 * (0.3 * std::f64::consts::TAU).cos();
+    for (found, expected) in f.iter().zip([0.25, force - 2.0 * 0.02 * 0.25 - 0.625]) {
+        assert!((found - period * expected).abs() < 1e-14, "{f:?}");
     }
 }

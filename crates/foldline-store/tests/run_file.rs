@@ -62,7 +62,14 @@ fn point(position: i64, cycle: bool) -> Point {
 fn special(kind: Kind, position: i64, parameter: f64, cycle: bool) -> SpecialPoint {
     let mut point = point(position, cycle);
     point.parameters[0] = parameter;
-    SpecialPoint { kind, point, unstable_before: 0, unstable_after: 2, error: awkward(5) }
+    SpecialPoint {
+        kind,
+        point,
+        unstable_before: 0,
+        unstable_after: 2,
+        error: awkward(5),
+        coefficients: vec![awkward(7), -1.5],
+    }
 }
 
 fn diagram() -> Diagram {
@@ -304,8 +311,10 @@ fn numbers_can_be_read_by_name_without_this_program() {
     assert_eq!(row, (3.0 / 7.0, 0.0, 1.0 / 3.0, 1));
 }
 
-/// Makes a file of version 3 of one of version 4 or 5, then one of version 2.
+/// Makes a file of version 3 of one of version 4 to 6, then one of version 2.
 const WITHOUT_COUNTERS: &str = "
+    ALTER TABLE points DROP COLUMN forcing_periods; ALTER TABLE special_points DROP COLUMN forcing_periods;
+    ALTER TABLE special_points DROP COLUMN normal_form;
     ALTER TABLE points DROP COLUMN numbers_checksum; ALTER TABLE points DROP COLUMN solution_checksum;
     ALTER TABLE points DROP COLUMN spectrum_error; ALTER TABLE special_points DROP COLUMN spectrum_error;
     ALTER TABLE special_points DROP COLUMN numbers_checksum; ALTER TABLE special_points DROP COLUMN solution_checksum;

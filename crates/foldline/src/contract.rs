@@ -202,6 +202,17 @@ pub trait Monitor: Send + Sync {
 
     /// By how much an event of this kind changes the number of unstable eigenvalues or multipliers.
     fn jump(&self) -> usize;
+
+    /// Whether the branch ends at such an event.
+    fn ends(&self) -> bool {
+        false
+    }
+
+    /// How many eigenvalues or multipliers are unstable at a located event besides those that pass there: on one side of it the count is
+    /// this, on the other this with the jump. `None` where some are too close to neutral to say.
+    fn others_unstable(&self, _at: &Point) -> Option<usize> {
+        None
+    }
 }
 
 /// The extra unknowns and equations that hold a special point: e unknowns (such as a frequency) and e + 1 scalar equations

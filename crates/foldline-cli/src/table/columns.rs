@@ -4,7 +4,7 @@ use super::{Cell, Column, Style, Table};
 use foldline::diagram::{Branch, Cost, Diagram, Origin, Point};
 use foldline::model::Model;
 
-/// branch, kind, every parameter, period, NAME_max of every output, unstable_before, unstable_after, error.
+/// branch, kind, every parameter, period, NAME_max of every output, unstable_before, unstable_after, error, normal_form.
 pub fn special(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) -> bool) -> Table {
     let mut columns = vec![column("branch", Style::Word), column("kind", Style::Word)];
     columns.extend(parameter_columns(diagram, model, kept));
@@ -12,11 +12,14 @@ pub fn special(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) -> bool)
     columns.extend(output_columns(model));
     columns.extend([column("unstable_before", Style::Number), column("unstable_after", Style::Number)]);
     columns.push(column("error", Style::Size));
+    columns.push(column("normal_form", Style::Word));
     let row = |branch: &Branch, index: usize| {
         let special = &branch.special[index];
         let mut row = vec![Cell::Word(branch.name.clone()), Cell::Word(special.kind.name().into())];
         row.extend(place_cells(&special.point, model));
         row.extend([count(special.unstable_before), count(special.unstable_after), Cell::Number(special.error)]);
+        let form = special.normal_form();
+        row.push(if form.is_empty() { Cell::Empty } else { Cell::Word(form) });
         row
     };
     let shown = diagram.branches.iter().filter(|b| kept(b));

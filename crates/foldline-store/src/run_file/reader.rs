@@ -227,6 +227,7 @@ fn special_in(row: &Row) -> Result<SpecialPoint, String> {
         unstable_before: count("unstable_before")?,
         unstable_after: count("unstable_after")?,
         error: *extra.first().ok_or("scalar_bytes lacks the error")?,
+        coefficients: extra[1..].to_vec(),
     })
 }
 

@@ -43,7 +43,8 @@ impl Columns {
 }
 
 /// Names that the two tables of points have besides those of [`POINT_COLUMNS`], and one that SQLite has in every table.
-const OTHERS: [&str; 8] = ["branch", "position", "kind", "key", "unstable_before", "unstable_after", "error", "rowid"];
+const OTHERS: [&str; 9] =
+    ["branch", "position", "kind", "key", "unstable_before", "unstable_after", "error", "normal_form", "rowid"];
 
 /// The columns that a point has in both tables of points, with their types: first those to read, then those to load.
 const POINT_COLUMNS: [(&str, &str); 23] = [
@@ -89,7 +90,7 @@ pub(super) fn create(columns: &Columns) -> String {
              {of_points}, PRIMARY KEY (branch, position));
          CREATE TABLE special_points (branch INTEGER NOT NULL REFERENCES branches, kind TEXT NOT NULL,
              position INTEGER NOT NULL, key BLOB NOT NULL, unstable_before INTEGER NOT NULL,
-             unstable_after INTEGER NOT NULL, error REAL, {shown}
+             unstable_after INTEGER NOT NULL, error REAL, normal_form TEXT, {shown}
              {of_points}, PRIMARY KEY (branch, kind, position, key));
          CREATE TABLE notes (branch TEXT NOT NULL, note TEXT NOT NULL, UNIQUE (branch, note));"
     )
@@ -98,7 +99,8 @@ pub(super) fn create(columns: &Columns) -> String {
 /// The statements that bring a file of an older version to the present one.
 ///
 /// Version 1 had no curves in two parameters, version 2 did not count evaluations, version 3 had neither checksums nor errors of
-/// multipliers, version 4 did not know that a solution can be without bound, version 5 had no forced models.
+/// multipliers, version 4 did not know that a solution can be without bound, version 5 had neither forced models nor
+/// normal forms.
 pub(super) fn upgrade(version: i64) -> &'static str {
     match version {
         1 => "ALTER TABLE branches ADD COLUMN held TEXT; ALTER TABLE branches ADD COLUMN follows INTEGER;",
@@ -118,7 +120,8 @@ pub(super) fn upgrade(version: i64) -> &'static str {
         }
         5 => {
             "ALTER TABLE points ADD COLUMN forcing_periods INTEGER NOT NULL DEFAULT 0;
-             ALTER TABLE special_points ADD COLUMN forcing_periods INTEGER NOT NULL DEFAULT 0;"
+             ALTER TABLE special_points ADD COLUMN forcing_periods INTEGER NOT NULL DEFAULT 0;
+             ALTER TABLE special_points ADD COLUMN normal_form TEXT;"
         }
         _ => "",
     }

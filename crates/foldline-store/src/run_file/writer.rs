@@ -180,7 +180,8 @@ impl Recorder {
         };
         let columns = Columns::new(&study.model);
         connection.execute_batch(&responses::create(&study.model)).map_err(failed)?;
-        let special = ["branch", "kind", "position", "key", "unstable_before", "unstable_after", "error"];
+        let special =
+            ["branch", "kind", "position", "key", "unstable_before", "unstable_after", "error", "normal_form"];
         Ok(Recorder {
             insert_point: insert("points", &["branch", "position"], &columns),
             insert_special: insert("special_points", &special, &columns),
@@ -327,8 +328,10 @@ impl State {
             Value::Integer(special.unstable_before as i64),
             Value::Integer(special.unstable_after as i64),
             Value::Real(special.error),
+            Value::Text(special.normal_form()),
         ];
-        let values = first.into_iter().chain(values_of(&special.point, &[special.error]));
+        let extra = [&[special.error], &special.coefficients[..]].concat();
+        let values = first.into_iter().chain(values_of(&special.point, &extra));
         self.connection.prepare_cached(sql)?.execute(params_from_iter(values)).map(|_| ())
     }
 

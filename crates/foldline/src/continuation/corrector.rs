@@ -335,8 +335,13 @@ pub fn refine(
         // Multipliers can need a finer mesh than the profile. Where they do not get better with it, the defects say so.
         let accurate = defect <= 5.0 * settings.tolerance || round == 3;
         // Whether a multiplier lies inside or outside the unit circle must not be a matter of its error.
-        let close = |defect: f64| found.point.free_spectrum().iter().any(|z| z.norm().ln().abs() < CERTAIN * defect);
-        let certain = !settings.stability || tightened || round == 3 || !close(defect);
+        let again = settings.stability && !tightened && round < 3;
+        if again && accurate {
+            doubted(problem, &mut found);
+        }
+        let within = |distance: f64| found.point.free_spectrum().iter().any(|z| z.norm().ln().abs() < distance);
+        let close = |defect: f64| within(CERTAIN * defect);
+        let certain = !(again && (close(defect) || within(found.point.trust.spectrum)));
         if accurate && certain {
             // What is stated is four times the estimate.
             if trust.discretisation > 6.0 * settings.tolerance {
@@ -349,7 +354,9 @@ pub fn refine(
                 found.share = (4.0 * found.share).min(1.0);
             }
             found.roomier = problem.better_mesh(&found.u, 0.5 * tolerance);
-            doubted(problem, &mut found);
+            if found.point.trust.spectrum.is_nan() {
+                doubted(problem, &mut found);
+            }
             return Ok(found);
         }
         u = found.u;

@@ -4,7 +4,7 @@ use super::corrector::{Failure, Station};
 use super::follow::{Follow, Step};
 use super::inspect::Found;
 use super::locate::{Stretch, passing};
-use crate::diagram::{Cost, Ending, Point};
+use crate::diagram::{Cost, Ending, Kind, Point};
 use crate::linalg::dot;
 
 /// Share of the deviation from simpler solutions below which a step is not accepted: it may have landed on them, and it
@@ -83,6 +83,25 @@ impl Follow<'_> {
             right.point.unstable = count;
         }
         kept
+    }
+
+    /// What was found on a step up to an event at which the branch ends, which `right` becomes.
+    pub(super) fn up_to_end(
+        &self,
+        end: Option<Ending>,
+        mut found: Vec<Found>,
+        right: &mut Station,
+    ) -> (Option<Ending>, Vec<Found>) {
+        let ends = |kind: Kind| self.monitors.iter().any(|monitor| monitor.ends() && monitor.kind() == kind);
+        let last = found.iter().enumerate().find_map(|(k, item)| match item {
+            Found::Special(special) if ends(special.kind) => Some((k, special.clone())),
+            _ => None,
+        });
+        let Some((k, special)) = last else { return (end, found) };
+        found.truncate(k + 1);
+        let parameter = special.point.parameters.get(self.free).copied().unwrap_or(f64::NAN);
+        right.point = special.point;
+        (Some(Ending::Joined { at: special.kind, parameter }), found)
     }
 
     /// Whether the step passes the place where the branch meets simpler solutions. If so the step ends a little before it.

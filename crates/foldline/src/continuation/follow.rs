@@ -26,7 +26,7 @@ pub struct Follow<'w> {
     /// What governs the run.
     pub settings: &'w Settings,
     /// What to look for.
-    pub monitors: &'w [Box<dyn Monitor>],
+    pub monitors: &'w [Box<dyn Monitor + 'w>],
     /// Sign changes that end the branch: it has met the branch of simpler solutions that it comes from.
     pub collapses: &'w [Box<dyn Monitor + 'w>],
     /// +1 towards larger positions, -1 towards smaller.
@@ -162,6 +162,7 @@ pub fn follow(
             Some(Ending::Joined { parameter, .. }) => walk.up_to(parameter, found, left.point.unstable, &mut right),
             _ => found,
         };
+        let (end, found) = walk.up_to_end(end, found, &mut right);
         let (angle, length) = walk.angle(&left, &right);
         // A bend that has become sharper will go on so.
         let trend = trail.as_ref().map_or(1.0, |t| angle / (length * t.curvature).max(1e-12)).clamp(1.0, 2.0);

@@ -27,6 +27,9 @@ const DEEPEST: usize = 14;
 /// Halvings after which the ends of a stretch show what lies between them.
 const CLOSE: usize = 6;
 
+/// Share of a step within which a curve turns because of what lies there.
+const TOGETHER: f64 = 1e-3;
+
 /// Asymmetry of a located pitchfork: the square root of the accuracy to which it is located.
 const SYMMETRIC: f64 = 3e-3;
 
@@ -76,6 +79,7 @@ impl Follow<'_> {
         let (at_left, at_right) = (self.monitored(left), self.monitored(right));
         let standing = self.stands(left, right, stretch.length.abs());
         let mut located: Vec<(Kind, usize, Located)> = Vec::new();
+        let mut others: Vec<Option<usize>> = Vec::new();
         let mut lost = false;
         for k in 0..self.monitors.len() {
             let values = [at_left[k], at_right[k]];
@@ -109,8 +113,9 @@ impl Follow<'_> {
                 (kind, jump) = (Kind::BranchPoint, 0);
             }
             match found {
-                Ok(found) if jump == 0 || monitor.confirms(&found.station.point) => {
+                Ok(found) if monitor.confirms(&found.station.point) => {
                     located.push((kind, jump, found));
+                    others.push(monitor.others_unstable(&located[located.len() - 1].2.station.point));
                 }
                 Ok(_) => {}
                 // So close by there would be something to see of an event of this kind; without it there is none, as where
@@ -119,9 +124,25 @@ impl Follow<'_> {
                 Err(_) => lost = true,
             }
         }
+        // At what takes two parameters to meet the curve may turn as well, which is no event of its own.
+        let double: Vec<f64> =
+            located.iter().filter(|(kind, ..)| kind.has_codimension_two()).map(|(.., found)| found.distance).collect();
+        let apart = TOGETHER * stretch.length.abs();
+        located.retain(|(kind, _, found)| {
+            kind.has_codimension_two() || double.iter().all(|there| (found.distance - there).abs() > apart)
+        });
         located.sort_by(|a, b| a.2.distance.total_cmp(&b.2.distance));
         let jumps: Vec<usize> = located.iter().map(|(_, jump, _)| *jump).collect();
         let change = left.point.unstable.abs_diff(right.point.unstable);
+        // What is located alone must fit in with the rest of its own spectrum; else something lies on the way to it, or beyond.
+        let counts = [left.point.unstable, right.point.unstable];
+        let misfit = match (&located[..], &others[..]) {
+            ([(_, jump, found)], [Some(others)]) if *jump > 0 && self.settings.stability => {
+                let side = counts.iter().position(|count| *count != *others && *count != others + jump);
+                side.map(|side| 0.5 * (found.distance + if side == 0 { 0.0 } else { stretch.length }))
+            }
+            _ => None,
+        };
         let accounted = !self.settings.stability
             || explains(&jumps, left.point.unstable as i64, right.point.unstable as i64)
             || (standing && jumps.is_empty() && change == 1);
@@ -141,12 +162,12 @@ impl Follow<'_> {
         }
         let suspicious = suspicious || seen.is_some();
         if depth < DEEPEST
-            && (jumps.len() > 1 || !explained || (suspicious && jumps.is_empty()))
+            && (jumps.len() > 1 || !explained || misfit.is_some() || (suspicious && jumps.is_empty()))
             && stretch.length.abs() > self.settings.min_step
         {
             let cut = match &located[..] {
                 [a, .., b] => 0.5 * (a.2.distance + b.2.distance),
-                _ => seen.unwrap_or(0.5 * stretch.length),
+                _ => misfit.or(seen).unwrap_or(0.5 * stretch.length),
             };
             // Neighbouring special points that cannot be told apart any more stay together.
             let apart = located.len() < 2
@@ -212,6 +233,7 @@ impl Follow<'_> {
             unstable_before: before.max(0) as usize,
             unstable_after: after.max(0) as usize,
             error,
+            coefficients: Vec::new(),
         })
     }
 

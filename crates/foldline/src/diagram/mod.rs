@@ -180,14 +180,82 @@ pub enum Kind {
     PeriodDoubling,
     /// A complex pair of multipliers crosses the unit circle (Neimark–Sacker).
     Torus,
+    /// On a curve of folds: the quadratic coefficient of the normal form vanishes, and two folds meet.
+    Cusp,
+    /// A double eigenvalue 0: a curve of Hopf points ends on one of folds.
+    BogdanovTakens,
+    /// An eigenvalue 0 and a pair on the imaginary axis.
+    ZeroHopf,
+    /// On a curve of Hopf points: the first Lyapunov coefficient vanishes (Bautin).
+    GeneralisedHopf,
+    /// Two pairs of eigenvalues on the imaginary axis.
+    DoubleHopf,
+    /// On a curve of period doublings: the cubic coefficient of the normal form vanishes.
+    GeneralisedPeriodDoubling,
+    /// On a curve of torus points: the cubic coefficient of the normal form vanishes.
+    Chenciner,
+    /// A curve of torus points ends at a double multiplier 1.
+    Resonance11,
+    /// A double multiplier -1: a curve of torus points ends on one of period doublings.
+    Resonance12,
+    /// On a curve of torus points: the third power of the multipliers is 1.
+    Resonance13,
+    /// On a curve of torus points: the fourth power of the multipliers is 1.
+    Resonance14,
+    /// Multipliers 1 and -1.
+    FoldFlip,
+    /// A multiplier 1 and a pair on the unit circle.
+    FoldTorus,
+    /// A multiplier -1 and a pair on the unit circle.
+    FlipTorus,
+    /// Two pairs of multipliers on the unit circle.
+    DoubleTorus,
     /// A stability change that no located special point explains.
     Unexplained,
 }
 
 impl Kind {
     /// Every kind, in the order in which tables list them.
-    pub const ALL: [Kind; 6] =
-        [Kind::Fold, Kind::BranchPoint, Kind::Hopf, Kind::PeriodDoubling, Kind::Torus, Kind::Unexplained];
+    pub const ALL: [Kind; 21] = [
+        Kind::Fold,
+        Kind::BranchPoint,
+        Kind::Hopf,
+        Kind::PeriodDoubling,
+        Kind::Torus,
+        Kind::Cusp,
+        Kind::BogdanovTakens,
+        Kind::ZeroHopf,
+        Kind::GeneralisedHopf,
+        Kind::DoubleHopf,
+        Kind::GeneralisedPeriodDoubling,
+        Kind::Chenciner,
+        Kind::Resonance11,
+        Kind::Resonance12,
+        Kind::Resonance13,
+        Kind::Resonance14,
+        Kind::FoldFlip,
+        Kind::FoldTorus,
+        Kind::FlipTorus,
+        Kind::DoubleTorus,
+        Kind::Unexplained,
+    ];
+
+    /// Whether it takes two parameters to meet it.
+    pub fn has_codimension_two(self) -> bool {
+        use Kind::{BranchPoint, Fold, Hopf, PeriodDoubling, Torus, Unexplained};
+        !matches!(self, Fold | BranchPoint | Hopf | PeriodDoubling | Torus | Unexplained)
+    }
+
+    /// The names of the coefficients of its normal form, as [`crate::special::normal_form`] defines them.
+    pub fn coefficients(self) -> &'static [&'static str] {
+        match self {
+            Kind::Fold => &["a"],
+            Kind::Hopf => &["l1"],
+            Kind::Cusp => &["c"],
+            Kind::BogdanovTakens => &["a", "b"],
+            _ => &[],
+        }
+    }
 
     /// The name used in files and tables.
     pub fn name(self) -> &'static str {
@@ -197,6 +265,21 @@ impl Kind {
             Kind::Hopf => "hopf",
             Kind::PeriodDoubling => "period-doubling",
             Kind::Torus => "torus",
+            Kind::Cusp => "cusp",
+            Kind::BogdanovTakens => "bogdanov-takens",
+            Kind::ZeroHopf => "zero-hopf",
+            Kind::GeneralisedHopf => "generalised-hopf",
+            Kind::DoubleHopf => "double-hopf",
+            Kind::GeneralisedPeriodDoubling => "generalised-period-doubling",
+            Kind::Chenciner => "chenciner",
+            Kind::Resonance11 => "1:1-resonance",
+            Kind::Resonance12 => "1:2-resonance",
+            Kind::Resonance13 => "1:3-resonance",
+            Kind::Resonance14 => "1:4-resonance",
+            Kind::FoldFlip => "fold-flip",
+            Kind::FoldTorus => "fold-torus",
+            Kind::FlipTorus => "flip-torus",
+            Kind::DoubleTorus => "double-torus",
             Kind::Unexplained => "unexplained",
         }
     }
@@ -226,6 +309,33 @@ pub struct SpecialPoint {
     pub unstable_after: usize,
     /// Bound on the error of the parameter, the period and the ranges, relative to 1 + |value|.
     pub error: f64,
+    /// Coefficients of the normal form, named by [`Kind::coefficients`]; none where they are not known.
+    pub coefficients: Vec<f64>,
+}
+
+impl SpecialPoint {
+    /// Whether the solutions that are born there are stable as far as it goes (supercritical), or take the stability of those that they
+    /// leave with them (subcritical); `None` where there are no such, or it is not known.
+    pub fn criticality(&self) -> Option<&'static str> {
+        let first = *self.coefficients.first()?;
+        match self.kind {
+            Kind::Hopf | Kind::PeriodDoubling | Kind::Torus if first < 0.0 => Some("supercritical"),
+            Kind::Hopf | Kind::PeriodDoubling | Kind::Torus if first > 0.0 => Some("subcritical"),
+            _ => None,
+        }
+    }
+
+    /// Coefficients and criticality in words, as `l1 = -0.0123, supercritical`.
+    pub fn normal_form(&self) -> String {
+        let named = self.kind.coefficients().iter().zip(&self.coefficients);
+        let parts = named.map(|(name, value)| format!("{name} = {}", shortly(*value)));
+        parts.chain(self.criticality().map(str::to_string)).collect::<Vec<_>>().join(", ")
+    }
+}
+
+/// Five digits.
+fn shortly(value: f64) -> String {
+    if value != 0.0 && !(1e-3..1e4).contains(&value.abs()) { format!("{value:.4e}") } else { format!("{value:.5}") }
 }
 
 /// What kind of solution a branch is made of.

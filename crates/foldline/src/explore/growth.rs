@@ -313,7 +313,7 @@ impl Growth<'_> {
         }
         let (monitors, collapses) = match branch.held {
             None => (special::monitors(branch.family), collapses(branch, &system)),
-            Some(_) => (special::monitors_where_held(), Vec::new()),
+            Some((kind, _)) => (special::monitors_where_held(system.field, branch.family, kind), Vec::new()),
         };
         let home = branch.points.iter().find(|p| p.position == 0).filter(|_| branch.ends[0].is_none()).cloned();
         let next_to_home = home.as_ref().and_then(|_| {
@@ -333,7 +333,12 @@ impl Growth<'_> {
         };
         follow(&mut walk, start, previous, emitted, &mut |item| {
             let going = match item {
-                Item::Special(special) => {
+                Item::Special(mut special) => {
+                    // Where a curve only turns there is none.
+                    if branch.held.is_none() || special.kind.has_codimension_two() {
+                        special.coefficients =
+                            special::normal_form::coefficients(system.field, special.kind, &special.point);
+                    }
                     branch.insert_special(special.clone());
                     self.tell(Event::Special(branch, &special))
                 }

@@ -33,6 +33,11 @@ impl Monitor for BranchPoint {
     fn jump(&self) -> usize {
         1
     }
+
+    fn others_unstable(&self, at: &Point) -> Option<usize> {
+        let centre = if matches!(at.solution, Solution::Cycle(_)) { 1.0 } else { 0.0 };
+        super::others_unstable(at, 1, |z| (z - centre).norm())
+    }
 }
 
 /// The null vector of F_u orthogonal to the tangent at a branch point, of unit length; the problem must be on the mesh of

@@ -1,7 +1,7 @@
 //! Folds (limit points, saddle-nodes): the branch turns back in its parameter.
 
 use crate::contract::Monitor;
-use crate::diagram::{Kind, Point};
+use crate::diagram::{Kind, Point, Solution};
 
 /// The parameter component of the tangent.
 pub struct Fold;
@@ -25,5 +25,10 @@ impl Monitor for Fold {
 
     fn jump(&self) -> usize {
         1
+    }
+
+    fn others_unstable(&self, at: &Point) -> Option<usize> {
+        let centre = if matches!(at.solution, Solution::Cycle(_)) { 1.0 } else { 0.0 };
+        super::others_unstable(at, 1, |z| (z - centre).norm())
     }
 }

@@ -35,6 +35,10 @@ impl Monitor for Hopf {
     fn jump(&self) -> usize {
         2
     }
+
+    fn others_unstable(&self, at: &Point) -> Option<usize> {
+        super::others_unstable(at, 2, |z| if z.im == 0.0 { f64::INFINITY } else { (z.re / z.im).abs() })
+    }
 }
 
 /// ω of the pair closest to the imaginary axis, if it is there.

@@ -14,17 +14,19 @@
 //! **Source.** kuznetsov2004, §10.
 
 pub mod branch_point;
+pub mod codim_two;
 pub mod collapse;
 pub mod condition;
 pub mod fold;
 pub mod hopf;
+pub mod normal_form;
 pub mod on_cycles;
 pub mod on_equilibria;
 pub mod period_doubling;
 pub mod torus;
 
-use crate::contract::Monitor;
-use crate::diagram::Family;
+use crate::contract::{Monitor, VectorField};
+use crate::diagram::{Family, Kind, Point, Solution};
 use num_complex::Complex64;
 
 /// Everything to look for on branches of a family.
@@ -39,12 +41,32 @@ pub fn monitors(family: Family) -> Vec<Box<dyn Monitor>> {
     }
 }
 
-/// What to look for where a special point is held along the curve: where it turns back in the second parameter.
-pub fn monitors_where_held() -> Vec<Box<dyn Monitor>> {
-    vec![Box::new(fold::Fold)]
+/// What to look for where a special point of that kind is held along the curve: what takes two parameters to meet, and where the curve
+/// turns back in the second of them.
+pub fn monitors_where_held<'a>(field: &'a dyn VectorField, family: Family, held: Kind) -> Vec<Box<dyn Monitor + 'a>> {
+    let mut all = codim_two::monitors(field, family, held);
+    all.push(Box::new(fold::Fold));
+    all
 }
 
 /// Product over all of (z - at) / (1 + |z|): real for a spectrum closed under conjugation and a real `at`.
 fn distance_product(spectrum: &[Complex64], at: f64) -> f64 {
     spectrum.iter().map(|z| (z - at) / (1.0 + z.norm())).product::<Complex64>().re
+}
+
+/// How many of the free eigenvalues or multipliers are unstable, those `passing` ones left out that are closest by `distance` to where
+/// the event has them; `None` where another is within its error, or a little more, of neutral.
+fn others_unstable(at: &Point, passing: usize, distance: impl Fn(Complex64) -> f64) -> Option<usize> {
+    const CLEAR: f64 = 1e-3;
+    let is_cycle = matches!(at.solution, Solution::Cycle(_));
+    let growth = |z: Complex64| if is_cycle { z.norm().ln() } else { z.re };
+    let mut others: Vec<Complex64> = at.free_spectrum().to_vec();
+    others.sort_by(|a, b| distance(*a).total_cmp(&distance(*b)));
+    let largest = if is_cycle { 1.0 } else { others.iter().fold(f64::MIN_POSITIVE, |m, z| m.max(z.norm())) };
+    let clear =
+        (CLEAR * largest).max(if at.trust.spectrum.is_nan() { 0.0 } else { 10.0 * at.trust.spectrum * largest });
+    let others = others.get(passing..)?;
+    // (NaN is not clear either.)
+    let all_clear = others.iter().all(|z| growth(*z).abs() > clear);
+    all_clear.then(|| others.iter().filter(|z| growth(**z) > 0.0).count())
 }

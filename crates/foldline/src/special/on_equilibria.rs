@@ -1,22 +1,26 @@
 //! Conditions on equilibria: a fold or a Hopf point is held.
 //!
-//! **Equations.** With v the null vector, borders b and c:
+//! **Idea.** At each of these points an operator L has a null space: of dimension one at a fold, two at a Hopf point, where L is real and
+//! does not know whether the pair of eigenvalues is ±iω or has become a pair ±λ of real ones. L is bordered by approximate null
+//! vectors, which makes it regular, and what the borders have to add is held at zero.
+//!
+//! **Equations.** With A = f_x, null vector v, borders b and c of one or two columns:
 //!
 //! ```text
-//!   fold   (1)  f_x v = 0
-//!   Hopf   (2)  (f_x - iω) v = 0                                    v complex
+//!   fold   (1)  L = A
+//!   Hopf   (2)  L = A² + κ                                          κ = ω², the extra unknown
 //!
-//!   (3)  [ L   b ] [ v ]   [ 0 ]
-//!        [ c*  0 ] [ g ] = [ 1 ],      dg = -w* (dL) v   with   L* w + c g* = 0,  b* w = 1
+//!   (3)  [ L   b ] [ v ]   [ 0  ]
+//!        [ cᵀ  0 ] [ g ] = [ e₁ ],      dg_k = -w_kᵀ (dL) v   with   [ w_k ] the solution for e_k of the transposed
 //! ```
 //!
-//! **Source.** govaerts2000, §3 and §4.
+//! **Source.** govaerts2000, §3 and §4 (folds), §5.2 (Hopf points).
 //!
 //! **Departures.** b and c are taken anew from w and v at every accepted point.
 
 use crate::contract::{Batch, Condition, Parameters};
 use crate::diagram::{Kind, Mesh, Point};
-use crate::linalg::{dot, lu, max_abs};
+use crate::linalg::{axpy, dot, lu, max_abs};
 use crate::problem::Setting;
 use num_complex::Complex64;
 
@@ -25,14 +29,18 @@ pub struct OnEquilibria<'a> {
     setting: Setting<'a>,
     kind: Kind,
     n: usize,
-    /// 1, or 2 where v is complex (real parts, then imaginary ones).
+    /// Dimension of the null space, 1 or 2.
     width: usize,
+    /// `[width][n]` b and c.
     left: Vec<f64>,
     right: Vec<f64>,
+    /// `[width][n + width]` solutions of (3) for every unit vector, and of the transposed.
     null: Vec<f64>,
-    adjoint: Vec<Vec<f64>>,
+    adjoint: Vec<f64>,
     state: Vec<f64>,
     parameters: Vec<f64>,
+    /// `[n × n]` A.
+    jacobian: Vec<f64>,
 }
 
 impl<'a> OnEquilibria<'a> {
@@ -56,56 +64,62 @@ impl<'a> OnEquilibria<'a> {
             adjoint: Vec::new(),
             state: Vec::new(),
             parameters: Vec::new(),
+            jacobian: Vec::new(),
         })
     }
 
+    fn batch(&self) -> Batch<'_> {
+        let parameters = Parameters::Shared(&self.parameters);
+        Batch { lanes: 1, states: &self.state, parameters, times: &[] }
+    }
+
+    /// A x.
+    fn times_jacobian(&self, x: &[f64]) -> Vec<f64> {
+        self.jacobian.chunks_exact(self.n).map(|row| dot(row, x)).collect()
+    }
+
     fn evaluated(&mut self, u: &[f64], extra: &[f64], g: &mut [f64]) -> Option<()> {
-        let (n, size) = (self.n, self.n * self.width);
-        let total = size + self.width;
+        let (n, width) = (self.n, self.width);
+        let total = n + width;
         self.state = u[..n].to_vec();
         self.parameters = self.setting.at(&u[n..]);
-        let batch =
-            Batch { lanes: 1, states: &self.state, parameters: Parameters::Shared(&self.parameters), times: &[] };
         let (mut f, mut fx) = (vec![0.0; n], vec![0.0; n * n]);
-        self.setting.field.linearise(batch, &[], &mut f, &mut fx, &mut []);
-        let frequency = extra.first().copied().unwrap_or(0.0);
+        self.setting.field.linearise(self.batch(), &[], &mut f, &mut fx, &mut []);
+        self.jacobian = fx;
         let mut matrix = vec![0.0; total * total];
-        for c in 0..size {
-            let block = c / n * n;
-            for d in 0..n {
-                matrix[c * total + block + d] = fx[c % n * n + d];
+        for i in 0..n {
+            let row = &mut matrix[i * total..i * total + n];
+            let own = &self.jacobian[i * n..(i + 1) * n];
+            match width {
+                1 => row.copy_from_slice(own),
+                _ => {
+                    own.iter().zip(self.jacobian.chunks_exact(n)).for_each(|(a, other)| axpy(*a, other, row));
+                    row[i] += extra[0];
+                }
             }
-            let rotated = rotated(c, n);
-            if self.width == 2 {
-                // - iω v: the real part gains ω times the imaginary one.
-                matrix[c * total + rotated.0] -= rotated.1 * frequency;
-                matrix[c * total + size + 1] = rotated.1 * self.left[rotated.0];
-                matrix[(size + 1) * total + c] = rotated.1 * self.right[rotated.0];
+            for k in 0..width {
+                matrix[i * total + n + k] = self.left[k * n + i];
+                matrix[(n + k) * total + i] = self.right[k * n + i];
             }
-            matrix[c * total + size] = self.left[c];
-            matrix[size * total + c] = self.right[c];
         }
         let mut pivots = vec![0; total];
         lu::factorise(&mut matrix, total, &mut pivots).ok()?;
-        self.null = vec![0.0; total];
-        self.null[size] = 1.0;
-        lu::solve(&matrix, total, &pivots, &mut self.null, 1);
-        self.adjoint = (0..self.width)
-            .map(|part| {
-                let mut w = vec![0.0; total];
-                w[size + part] = 1.0;
-                lu::solve_transposed(&matrix, total, &pivots, &mut w);
-                w
-            })
-            .collect();
-        g.copy_from_slice(&self.null[size..]);
-        (max_abs(&self.null).is_finite() && self.adjoint.iter().all(|w| max_abs(w).is_finite())).then_some(())
+        let unit = |k: usize| {
+            let mut one = vec![0.0; total];
+            one[n + k] = 1.0;
+            one
+        };
+        (self.null, self.adjoint) = (Vec::new(), Vec::new());
+        for k in 0..width {
+            let (mut v, mut w) = (unit(k), unit(k));
+            lu::solve(&matrix, total, &pivots, &mut v, 1);
+            lu::solve_transposed(&matrix, total, &pivots, &mut w);
+            self.null.extend(v);
+            self.adjoint.extend(w);
+        }
+        g.copy_from_slice(&self.null[n..total]);
+        (max_abs(&self.null).is_finite() && max_abs(&self.adjoint).is_finite()).then_some(())
     }
-}
-
-/// Component and sign that i times a vector has at component c.
-fn rotated(c: usize, n: usize) -> (usize, f64) {
-    if c < n { (c + n, -1.0) } else { (c - n, 1.0) }
 }
 
 impl Condition for OnEquilibria<'_> {
@@ -118,22 +132,39 @@ impl Condition for OnEquilibria<'_> {
     }
 
     fn guess(&self, point: &Point) -> Vec<f64> {
-        let complex = point.spectrum.iter().filter(|z| z.im > 0.0);
-        let nearest = complex.min_by(|a, b| (a.re / a.im).abs().total_cmp(&(b.re / b.im).abs()));
-        (0..self.extra()).map(|_| nearest.map_or(1.0, |z| z.im)).collect()
+        // Of the two eigenvalues whose sum is least against their size κ is the product.
+        let z = &point.spectrum;
+        let pairs = (0..z.len()).flat_map(|j| (0..j).map(move |i| (z[i], z[j])));
+        let balance = |(a, b): &(Complex64, Complex64)| (a + b).norm() / (1e-300 + a.norm() + b.norm());
+        let pair = pairs.min_by(|p, q| balance(p).total_cmp(&balance(q)));
+        (0..self.extra()).map(|_| pair.map_or(1.0, |(a, b)| (a * b).re)).collect()
     }
 
     fn anchor(&mut self) {
         if self.null.is_empty() {
             return;
         }
-        let size = self.n * self.width;
-        let scale = |k: usize| self.setting.scales[k % self.n];
-        let v: f64 = (0..size).map(|k| (self.null[k] / scale(k)).powi(2)).sum();
-        let w = (0..size).map(|k| (self.adjoint[0][k] * scale(k)).powi(2)).sum::<f64>().sqrt();
-        if v.is_finite() && v > 0.0 && w.is_finite() && w > 0.0 {
-            self.right = (0..size).map(|k| self.null[k] / (scale(k).powi(2) * v)).collect();
-            self.left = self.adjoint[0][..size].iter().map(|x| x / w).collect();
+        let (n, total) = (self.n, self.n + self.width);
+        let scale = |i: usize| self.setting.scales[i];
+        // Orthonormal in scaled components, one after the other.
+        let (mut left, mut right): (Vec<Vec<f64>>, Vec<Vec<f64>>) = (Vec::new(), Vec::new());
+        for (v, w) in self.null.chunks_exact(total).zip(self.adjoint.chunks_exact(total)) {
+            let mut v: Vec<f64> = (0..n).map(|i| v[i] / scale(i)).collect();
+            let mut w: Vec<f64> = (0..n).map(|i| w[i] * scale(i)).collect();
+            for (own, others) in [(&mut v, &right), (&mut w, &left)] {
+                others.iter().for_each(|other| axpy(-dot(own, other), other, own));
+                let norm = dot(own, own).sqrt();
+                own.iter_mut().for_each(|x| *x /= norm);
+            }
+            left.push(w);
+            right.push(v);
+        }
+        let (left, right) = (left.concat(), right.concat());
+        if max_abs(&left).is_finite() && max_abs(&right).is_finite() {
+            self.right = right.iter().enumerate().map(|(k, x)| x / scale(k % n)).collect();
+            self.left = left.iter().enumerate().map(|(k, x)| x / scale(k % n)).collect();
+            // As L maps scaled components: its range is measured like the states.
+            self.left.iter_mut().enumerate().for_each(|(k, x)| *x *= scale(k % n) * scale(k % n));
         }
     }
 
@@ -148,25 +179,27 @@ impl Condition for OnEquilibria<'_> {
     }
 
     fn derivative(&mut self, du: &[f64], extra: &[f64], dg: &mut [f64]) {
-        let (n, size) = (self.n, self.n * self.width);
-        let batch =
-            Batch { lanes: 1, states: &self.state, parameters: Parameters::Shared(&self.parameters), times: &[] };
+        let (n, total) = (self.n, self.n + self.width);
         let direction = [&du[..n], &self.setting.spread(&du[n..])].concat();
-        let turn = extra.first().copied().unwrap_or(0.0);
-        let mut change = vec![0.0; size];
-        for part in 0..self.width {
-            let mut v = self.null[part * n..(part + 1) * n].to_vec();
-            v.resize(direction.len(), 0.0);
-            self.setting.field.directional(batch, &[&v, &direction], &mut change[part * n..(part + 1) * n]);
-        }
+        // dA x.
+        let changed = |x: &[f64]| {
+            let mut full = x.to_vec();
+            full.resize(direction.len(), 0.0);
+            let mut change = vec![0.0; n];
+            self.setting.field.directional(self.batch(), &[&full, &direction], &mut change);
+            change
+        };
+        let v = &self.null[..n];
+        let mut change = changed(v);
         if self.width == 2 {
-            for (c, value) in change.iter_mut().enumerate() {
-                let (other, sign) = rotated(c, n);
-                *value -= sign * turn * self.null[other];
-            }
+            // dA A v + A dA v + dκ v.
+            let first = self.times_jacobian(&change);
+            change = changed(&self.times_jacobian(v));
+            axpy(1.0, &first, &mut change);
+            axpy(extra.first().copied().unwrap_or(0.0), v, &mut change);
         }
-        for (value, w) in dg.iter_mut().zip(&self.adjoint) {
-            *value = -dot(&w[..size], &change);
+        for (value, w) in dg.iter_mut().zip(self.adjoint.chunks_exact(total)) {
+            *value = -dot(&w[..n], &change);
         }
     }
 

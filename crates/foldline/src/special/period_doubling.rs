@@ -27,6 +27,10 @@ impl Monitor for PeriodDoubling {
     fn jump(&self) -> usize {
         1
     }
+
+    fn others_unstable(&self, at: &Point) -> Option<usize> {
+        super::others_unstable(at, 1, |z| (z + 1.0).norm())
+    }
 }
 
 /// The cycle run through twice, and a perturbation on one period continued antiperiodically to two.

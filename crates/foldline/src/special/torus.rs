@@ -31,4 +31,8 @@ impl Monitor for Torus {
     fn jump(&self) -> usize {
         2
     }
+
+    fn others_unstable(&self, at: &Point) -> Option<usize> {
+        super::others_unstable(at, 2, |z| if z.im == 0.0 { f64::INFINITY } else { z.norm().ln().abs() })
+    }
 }

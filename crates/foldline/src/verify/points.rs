@@ -115,17 +115,17 @@ impl Part<'_> {
             }
             out.points += 1;
             let noise = ROUNDING + max_abs(&shooting.between(&rough.orbit, &solved.orbit));
-            let stated = Some(point.trust.discretisation + point.trust.residual + noise);
-            out.checks.push(self.check(point, Quantity::Profile, stated, path.off(cycle, &orbit.scales)));
-            out.checks.push(self.check(point, Quantity::Period, stated, off[orbit.nodes.len()].abs()));
+            let stated = point.trust.discretisation + point.trust.residual + noise;
+            out.checks.push(self.check(point, Quantity::Profile, Some(stated), path.off(cycle, &orbit.scales)));
+            out.checks.push(self.check(point, Quantity::Period, Some(stated), off[orbit.nodes.len()].abs()));
             let along = Along {
                 field: self.setting.field,
                 parameters: &self.setting.at(&solved.orbit.free),
                 orbit: &solved.orbit,
             };
             let ranges = path.ranges(along);
-            let passed_on = path.passed_on(along, stated.unwrap_or(0.0));
-            let (stated, off) = self.range_difference(point, &ranges, stated.unwrap_or(f64::NAN), &passed_on);
+            let passed_on = path.passed_on(along, stated);
+            let (stated, off) = self.range_difference(point, &ranges, stated, &passed_on);
             out.checks.push(self.check(point, Quantity::Range, Some(stated), off));
             self.multipliers(point, solved, rough, out);
         }

@@ -36,7 +36,7 @@ pub(super) fn verify(branch: &Branch) -> Verified {
                 Kind::Hopf | Kind::Torus => (change == 2, 2),
                 // A pitchfork seen from the branch that ends in it changes nothing.
                 Kind::BranchPoint => (change <= 1, 1),
-                Kind::Unexplained => (true, 0),
+                _ => (true, 0),
             };
             if !fits {
                 check(before.position, Some(special.kind), value(&special.point.parameters), change.abs_diff(own), 0.0);

@@ -144,7 +144,7 @@ impl Place<'_> {
                 pairs.sort_by(|a, b| a.re.abs().total_cmp(&b.re.abs()));
                 pairs.first().map(|z| z.re)
             }
-            Kind::Unexplained => None,
+            _ => None,
         }
     }
 
