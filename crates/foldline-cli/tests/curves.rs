@@ -80,11 +80,11 @@ fn lies_on(diagram: &Diagram, expected: &[(Kind, f64, f64)]) {
     };
     let mut found: Vec<(Kind, f64, f64, f64)> = curve.special.iter().map(of).collect();
     found.sort_by(|a, b| a.2.total_cmp(&b.2));
-    let agrees = |(own, known): (&(Kind, f64, f64, f64), &(Kind, f64, f64))| {
+    let agree = found.iter().zip(expected).all(|(own, known)| {
         let error = 1e-8_f64.max(own.3);
         own.0 == known.0 && (own.1 - known.1).abs() < error && (own.2 - known.2).abs() < error
-    };
-    assert!(found.len() == expected.len() && found.iter().zip(expected).all(agrees), "{found:?}");
+    });
+    assert!(agree && found.len() == expected.len(), "{found:?}");
 }
 
 /// Published values; all from Newton's method on the defining equations.
