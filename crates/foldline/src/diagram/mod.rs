@@ -246,11 +246,14 @@ impl Kind {
         !matches!(self, Fold | BranchPoint | Hopf | PeriodDoubling | Torus | Unexplained)
     }
 
-    /// The names of the coefficients of its normal form, as [`crate::special::normal_form`] defines them.
+    /// The names of the coefficients of its normal form, as [`crate::special::normal_form`] and
+    /// [`crate::special::cycle_form`] define them; of a torus point the real part of d.
     pub fn coefficients(self) -> &'static [&'static str] {
         match self {
             Kind::Fold => &["a"],
             Kind::Hopf => &["l1"],
+            Kind::PeriodDoubling => &["c"],
+            Kind::Torus => &["d"],
             Kind::Cusp => &["c"],
             Kind::BogdanovTakens => &["a", "b"],
             _ => &[],

@@ -336,8 +336,7 @@ impl Growth<'_> {
                 Item::Special(mut special) => {
                     // Where a curve only turns there is none.
                     if branch.held.is_none() || special.kind.has_codimension_two() {
-                        special.coefficients =
-                            special::normal_form::coefficients(system.field, special.kind, &special.point);
+                        special.coefficients = self.coefficients(&system, branch.free, &special);
                     }
                     branch.insert_special(special.clone());
                     self.tell(Event::Special(branch, &special))
@@ -412,6 +411,17 @@ impl Growth<'_> {
             branch.points[inner..=inner].iter_mut().filter(|p| p.position != 0).for_each(Point::lighten);
         }
         going
+    }
+
+    /// Of the normal form.
+    fn coefficients(&self, system: &System, free: usize, special: &SpecialPoint) -> Vec<f64> {
+        match special.point.solution {
+            Solution::Equilibrium(_) => special::normal_form::coefficients(system.field, special.kind, &special.point),
+            Solution::Cycle(_) => {
+                let setting = setting(system, free, &special.point.parameters);
+                special::cycle_form::coefficient(special.kind, setting, &special.point).into_iter().collect()
+            }
+        }
     }
 
     fn end(&self, branch: &mut Branch, side: usize, ending: Ending) -> bool {

@@ -39,6 +39,8 @@ pub struct OnCycles<'a> {
     n: usize,
     /// Components of v: n, or 2n where it is complex (real parts, then imaginary ones).
     parts: usize,
+    /// Whether b and c are there: without them L stands by itself.
+    bordered: bool,
     /// Scalars of the bordered system: T₁ where there is one, then the parts of g.
     system: System,
     /// ⟨f, ·⟩ of the phase condition in (1), at the Gauss points.
@@ -82,6 +84,7 @@ impl<'a> OnCycles<'a> {
             mesh: mesh.clone(),
             n,
             parts,
+            bordered: true,
             phase: Vec::new(),
             left: Vec::new(),
             left_phase: 0.3,
@@ -103,6 +106,119 @@ impl<'a> OnCycles<'a> {
         condition.left = (0..size).map(|k| 0.4 + (k as f64 * 0.013).sin()).collect();
         condition.right = (0..size).map(|k| 0.5 + (k as f64 * 0.017).cos()).collect();
         Some(condition)
+    }
+
+    /// L of (1), or of (3) where `complex` says so, by itself, which is regular where it has no null vector.
+    pub(super) fn operator(setting: Setting<'a>, cycle: &Cycle, complex: bool) -> Option<OnCycles<'a>> {
+        let kind = if complex { Kind::Torus } else { Kind::Fold };
+        let mut own = OnCycles::new(kind, setting, cycle)?;
+        own.bordered = false;
+        own.system = System::new(own.parts, &own.scheme.end, own.scalars());
+        own.resize();
+        Some(own)
+    }
+
+    /// Factorises L at `u`; `angle` is θ of (3).
+    pub(super) fn prepare(&mut self, u: &[f64], angle: f64) -> Option<()> {
+        self.linearise(u);
+        self.fill(angle);
+        self.system.factorise(self.closure()).ok()
+    }
+
+    /// Solves L y = r, r at the Gauss points `[parts × lanes]`: y there, and T₁ where it has one.
+    pub(super) fn solved(&self, r: &[f64]) -> (Vec<f64>, f64) {
+        let (size, lanes) = (self.profile_size(), self.lanes());
+        let mut right = vec![0.0; size + self.scalars()];
+        self.each(|lane, node, h, _| {
+            (0..self.parts).for_each(|c| right[node + c] = h * r[c * lanes + lane]);
+        });
+        let mut y = right.clone();
+        self.system.solve(&right, &mut y);
+        let period = if self.is_fold() { y[size] } else { 0.0 };
+        (self.at_points(&y[..size]), period)
+    }
+
+    /// Every Gauss point: its number, the place of its node in a profile, the length of its interval, its weight.
+    fn each(&self, mut call: impl FnMut(usize, usize, f64, f64)) {
+        let m = self.scheme.degree;
+        for lane in 0..self.lanes() {
+            let h = self.mesh[lane / m + 1] - self.mesh[lane / m];
+            call(lane, (lane / m * (m + 1) + lane % m + 1) * self.parts, h, self.scheme.weights[lane % m]);
+        }
+    }
+
+    /// The values of a profile at the Gauss points, `[parts × lanes]`.
+    fn at_points(&self, profile: &[f64]) -> Vec<f64> {
+        let lanes = self.lanes();
+        let mut out = vec![0.0; self.parts * lanes];
+        self.each(|lane, node, _, _| (0..self.parts).for_each(|c| out[c * lanes + lane] = profile[node + c]));
+        out
+    }
+
+    /// The null vector that was found last, `[parts × lanes]`, and T₁ where it has one.
+    pub(super) fn null(&self) -> (Vec<f64>, f64) {
+        let size = self.profile_size();
+        (self.at_points(&self.null[..size]), if self.is_fold() { self.null[size] } else { 0.0 })
+    }
+
+    /// What has to vanish for L y = r to have a solution, r at the Gauss points: a number, complex where v is.
+    pub(super) fn solvability(&self, r: &[f64]) -> Complex64 {
+        let lanes = self.lanes();
+        let mut parts = [0.0; 2];
+        for (part, w) in parts.iter_mut().zip(&self.adjoint) {
+            self.each(|lane, node, h, _| {
+                (0..self.parts).for_each(|c| *part += h * w[node + c] * r[c * lanes + lane]);
+            });
+        }
+        Complex64::new(parts[0], parts[1])
+    }
+
+    /// ∫ |v|² over normalised time, v at the Gauss points.
+    pub(super) fn square(&self, v: &[f64]) -> f64 {
+        let lanes = self.lanes();
+        let mut total = 0.0;
+        self.each(|lane, _, h, weight| {
+            total += h * weight * (0..self.parts).map(|c| v[c * lanes + lane].powi(2)).sum::<f64>();
+        });
+        total
+    }
+
+    /// f_x v there, `[n × lanes]`.
+    pub(super) fn along(&self, v: &[f64]) -> Vec<f64> {
+        let (n, lanes) = (self.n, self.lanes());
+        let mut out = vec![0.0; n * lanes];
+        for c in 0..n {
+            for d in 0..n {
+                let slope = &self.fx[(c * n + d) * lanes..(c * n + d + 1) * lanes];
+                let own = out[c * lanes..(c + 1) * lanes].iter_mut().zip(slope);
+                own.zip(&v[d * lanes..(d + 1) * lanes]).for_each(|((o, a), x)| *o += a * x);
+            }
+        }
+        out
+    }
+
+    /// A derivative of f in the states there, along directions `[n × lanes]`.
+    pub(super) fn bent(&self, along: &[&[f64]]) -> Vec<f64> {
+        let (lanes, known) = (self.lanes(), self.setting.parameters.len());
+        let full: Vec<Vec<f64>> = along
+            .iter()
+            .map(|d| {
+                let mut own = d.to_vec();
+                own.resize((self.n + known) * lanes, 0.0);
+                own
+            })
+            .collect();
+        let full: Vec<&[f64]> = full.iter().map(Vec::as_slice).collect();
+        let parameters = Parameters::Shared(&self.parameters);
+        let mut out = vec![0.0; self.n * lanes];
+        let batch = Batch { lanes, states: &self.states, parameters, times: &self.times };
+        self.setting.field.directional(batch, &full, &mut out);
+        out
+    }
+
+    /// Scalars of the system.
+    fn scalars(&self) -> usize {
+        usize::from(self.is_fold()) + if self.bordered { self.width() } else { 0 }
     }
 
     fn intervals(&self) -> usize {
@@ -209,7 +325,7 @@ impl<'a> OnCycles<'a> {
                 }
             }
         }
-        if is_fold {
+        if is_fold && self.bordered {
             system.corner[1] = self.left_phase;
             system.corner[2] = self.right_period;
         }
@@ -227,7 +343,7 @@ impl<'a> OnCycles<'a> {
         angle: f64,
     ) {
         let (n, m, parts, lanes) = (self.n, self.scheme.degree, self.parts, self.lanes());
-        let (inner, scalars) = (m * parts, self.width() + usize::from(self.is_fold()));
+        let (inner, scalars) = (m * parts, self.scalars());
         let (width, block, length) = (parts + scalars, (m + 1) * parts, system.length());
         let (lane, node, first) = (j * m + i, (j * (m + 1) + i + 1) * parts, usize::from(self.is_fold()));
         let (half, own) = (c / n * n, c % n);
@@ -250,9 +366,15 @@ impl<'a> OnCycles<'a> {
         if self.is_fold() {
             right[parts].lanes_mut()[slot] = -h * self.f[c * lanes + lane];
         }
-        right[parts + first].lanes_mut()[slot] = h * self.left[node + c];
         let weight = h * self.scheme.weights[i];
         let at = |r: usize| (r * length + place) * block + parts + slots[i * parts + c];
+        if !self.bordered {
+            if self.is_fold() {
+                system.border[at(0)].lanes_mut()[slot] = weight * self.phase[lane * n + c];
+            }
+            return;
+        }
+        right[parts + first].lanes_mut()[slot] = h * self.left[node + c];
         system.border[at(first)].lanes_mut()[slot] = weight * self.right[node + c];
         if self.is_fold() {
             system.border[at(0)].lanes_mut()[slot] = weight * self.phase[lane * n + c];

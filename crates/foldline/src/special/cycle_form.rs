@@ -1,0 +1,299 @@
+//! Normal forms of cycles at folds, period doublings and torus points.
+//!
+//! **Equations.** In the time of the model, T the period, A = f_x, B and C the second and third derivatives of f along the cycle, τ the place
+//! on it, φ the functional that vanishes where the variational equation with the closure of v and a right-hand side has a solution:
+//!
+//! ```text
+//!   fold             (1)  v' - A v = f:                       ξ' = … + a ξ²,     a = φ(½ B(v,v) + A v) / φ(v)
+//!   period doubling  (2)  v' - A v = 0, v(T) = -v(0):         ξ' = … + c ξ³,     c = φ(⅙ C(v,v,v) + ½ B(v,h) - α A v) / φ(v)
+//!                         h' - A h = B(v,v) - 2 α f, h(T) = h(0)
+//!   torus            (3)  v' - A v + iθ/T v = 0, v(T) = v(0): z' = … + d z |z|², d = φ(½ C(v,v,v̄) + B(v,h₁₁) + ½ B(v̄,h₂₀) - α A v) / φ(v)
+//!                         h₁₁' - A h₁₁ = B(v,v̄) - α f,  h₂₀' - A h₂₀ + 2iθ/T h₂₀ = B(v,v)         both periodic
+//! ```
+//!
+//! with ∫ |v|² dt = 1 over a period in (2) and (3). Negative c and Re d mean that the doubled cycle, or the torus, is born stable. A forced
+//! cycle has no freedom in time: α = 0, and (1) is v' - A v = 0, ∫ |v|² dt = 1, a = ½ φ(B(v,v)) / φ(v), whose sign is that of v.
+//!
+//! **Source.** kuznetsov2005; in the form of bordered equations, govaerts2000, §7.
+
+use super::on_cycles::OnCycles;
+use crate::contract::Condition;
+use crate::diagram::{Cycle, Kind, Point, Solution};
+use crate::problem::Setting;
+
+/// The coefficient of a cycle at a special point of that kind; `None` for kinds that have none, and where it cannot be computed. The
+/// setting has any free parameters.
+pub fn coefficient(kind: Kind, setting: Setting, at: &Point) -> Option<f64> {
+    let Solution::Cycle(cycle) = &at.solution else { return None };
+    if cycle.intervals() == 0 || !matches!(kind, Kind::Fold | Kind::PeriodDoubling | Kind::Torus) {
+        return None;
+    }
+    let unit = setting.field.time_unit(&at.parameters);
+    let own = if cycle.forcing_periods > 0 { f64::from(cycle.forcing_periods) } else { cycle.period };
+    let mut u = cycle.profile.clone();
+    u.push(own);
+    u.extend(setting.values_of(at));
+    let mut condition = OnCycles::new(kind, setting.clone(), cycle)?;
+    let extra = condition.guess(at);
+    let mut g = vec![0.0; 1 + extra.len()];
+    // Borders that fit better each time.
+    for _ in 0..3 {
+        if !Condition::evaluate(&mut condition, &u, &extra, &mut g) {
+            return None;
+        }
+        condition.anchor();
+    }
+    Condition::evaluate(&mut condition, &u, &extra, &mut g).then_some(())?;
+    let form = Form { setting, cycle, u: &u, period: own, condition: &condition };
+    let (mut v, scalar) = condition.null();
+    let free_fold = kind == Kind::Fold && cycle.forcing_periods == 0;
+    let size = match free_fold {
+        // v_s - T A v = T₁ f, of which T f is wanted.
+        true => scalar / own,
+        false => (cycle.period * condition.square(&v)).sqrt(),
+    };
+    v.iter_mut().for_each(|x| *x /= size);
+    let found = match kind {
+        Kind::Fold => form.fold(&v, free_fold),
+        Kind::PeriodDoubling => form.doubling(&v),
+        _ => form.torus(&v, extra[0]),
+    }?;
+    Some(found / unit).filter(|value| value.is_finite())
+}
+
+/// A cycle with what is known about its critical eigenfunction. All right-hand sides are those in normalised time.
+struct Form<'a, 'b> {
+    setting: Setting<'a>,
+    cycle: &'b Cycle,
+    u: &'b [f64],
+    /// T in the time of the field.
+    period: f64,
+    condition: &'b OnCycles<'a>,
+}
+
+impl Form<'_, '_> {
+    /// The periodic solution of y' - A y + α f = r, and α.
+    fn periodic(&self, r: &[f64]) -> Option<(Vec<f64>, f64)> {
+        let mut operator = OnCycles::operator(self.setting.clone(), self.cycle, false)?;
+        operator.prepare(self.u, 0.0)?;
+        let (y, scalar) = operator.solved(&scaled(r, self.period));
+        Some((y, -scalar / self.period))
+    }
+
+    fn ratio(&self, above: &[f64], below: &[f64]) -> f64 {
+        (self.condition.solvability(above) / self.condition.solvability(below)).re
+    }
+
+    fn fold(&self, v: &[f64], free: bool) -> Option<f64> {
+        let mut right = scaled(&self.condition.bent(&[v, v]), 0.5);
+        if free {
+            add(&mut right, 1.0, &self.condition.along(v));
+        }
+        Some(self.ratio(&right, v))
+    }
+
+    fn doubling(&self, v: &[f64]) -> Option<f64> {
+        let (h, twice) = self.periodic(&self.condition.bent(&[v, v]))?;
+        let mut right = scaled(&self.condition.bent(&[v, v, v]), 1.0 / 6.0);
+        add(&mut right, 0.5, &self.condition.bent(&[v, &h]));
+        add(&mut right, -0.5 * twice, &self.condition.along(v));
+        Some(self.ratio(&right, v))
+    }
+
+    fn torus(&self, v: &[f64], angle: f64) -> Option<f64> {
+        let (x, y) = v.split_at(v.len() / 2);
+        let b = |p: &[f64], q: &[f64]| self.condition.bent(&[p, q]);
+        let c = |p: &[f64], q: &[f64], r: &[f64]| self.condition.bent(&[p, q, r]);
+        let (xx, xy, yy) = (b(x, x), b(x, y), b(y, y));
+        let (mean, alpha) = self.periodic(&sum(&xx, 1.0, &yy))?;
+        let mut operator = OnCycles::operator(self.setting.clone(), self.cycle, true)?;
+        operator.prepare(self.u, 2.0 * angle)?;
+        let second = [sum(&xx, -1.0, &yy), scaled(&xy, 2.0)].concat();
+        let (second, _) = operator.solved(&scaled(&second, self.period));
+        let (p, q) = second.split_at(second.len() / 2);
+        // C(v, v, v̄), B(v, h₁₁), B(v̄, h₂₀), each as real and imaginary part.
+        let mut real = scaled(&sum(&c(x, x, x), 1.0, &c(x, y, y)), 0.5);
+        let mut imaginary = scaled(&sum(&c(x, x, y), 1.0, &c(y, y, y)), 0.5);
+        add(&mut real, 1.0, &b(x, &mean));
+        add(&mut imaginary, 1.0, &b(y, &mean));
+        add(&mut real, 0.5, &sum(&b(x, p), 1.0, &b(y, q)));
+        add(&mut imaginary, 0.5, &sum(&b(x, q), -1.0, &b(y, p)));
+        add(&mut real, -alpha, &self.condition.along(x));
+        add(&mut imaginary, -alpha, &self.condition.along(y));
+        Some(self.ratio(&[real, imaginary].concat(), v))
+    }
+}
+
+fn scaled(v: &[f64], factor: f64) -> Vec<f64> {
+    v.iter().map(|x| factor * x).collect()
+}
+
+fn sum(a: &[f64], factor: f64, b: &[f64]) -> Vec<f64> {
+    a.iter().zip(b).map(|(a, b)| a + factor * b).collect()
+}
+
+fn add(to: &mut [f64], factor: f64, v: &[f64]) {
+    to.iter_mut().zip(v).for_each(|(t, x)| *t += factor * x);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contract::VectorField;
+    use crate::model::{Definition, Forcing, Model, ModelSource, Parameter, State};
+    use crate::problem::{Axis, gauss::Scheme, mesh};
+    use num_complex::Complex64;
+    use std::f64::consts::TAU;
+
+    fn model(forcing: Option<&str>, definitions: &[(&str, &str)], equations: &[(&str, &str)]) -> Model {
+        let defined = |(name, text): &(&str, &str)| Definition::new(name, text);
+        Model::compile(ModelSource {
+            forcing: forcing.map(|period| Forcing { is_frequency: false, expression: period.into() }),
+            parameters: vec![Parameter::new("p", 0.0)],
+            definitions: definitions.iter().map(defined).collect(),
+            states: equations.iter().map(|(name, _)| State::new(name)).collect(),
+            equations: equations.iter().map(defined).collect(),
+            ..ModelSource::default()
+        })
+        .unwrap_or_else(|errors| panic!("{}", errors[0]))
+    }
+
+    /// The coefficient on the cycle `state`, a function of normalised time, of a given period.
+    fn of(model: &Model, kind: Kind, period: f64, spectrum: &[Complex64], state: impl Fn(f64) -> Vec<f64>) -> f64 {
+        let (degree, mesh) = (4, mesh::uniform(60));
+        let scheme = Scheme::new(degree);
+        let places =
+            mesh.windows(2).flat_map(|pair| scheme.nodes.iter().map(move |c| pair[0] + c * (pair[1] - pair[0])));
+        let profile = places.flat_map(&state).collect();
+        let point = Point {
+            position: 0,
+            parameters: model.defaults(),
+            solution: Solution::Cycle(Cycle {
+                period,
+                forcing_periods: u32::from(model.forced()),
+                mesh: mesh.clone(),
+                degree,
+                profile,
+            }),
+            tangent: Vec::new(),
+            step: 0.0,
+            spectrum: spectrum.to_vec(),
+            unstable: 0,
+            ranges: Vec::new(),
+            trust: Default::default(),
+            cost: Default::default(),
+        };
+        let scales = model.scales();
+        let setting =
+            Setting { field: model, scales: &scales, parameters: model.defaults(), axes: vec![Axis::new(0, 1.0)] };
+        coefficient(kind, setting, &point).unwrap()
+    }
+
+    fn near(a: f64, b: f64) {
+        assert!((a - b).abs() < 1e-6 * (1.0 + b.abs()), "{a} {b}");
+    }
+
+    fn circle(t: f64, rest: &[f64]) -> Vec<f64> {
+        let (sin, cos) = (TAU * t).sin_cos();
+        [&[cos, sin], rest].concat()
+    }
+
+    /// ρ' = ρ (p - 1 + 2 ρ² - ρ⁴), φ' = 1 + k (ρ² - 1): a fold of cycles at ρ = 1, where ρ - 1 changes by -4 (ρ - 1)² and the period by
+    /// -2 k (ρ - 1). With a period that changes by -1 per unit, a is 2 / k.
+    #[test]
+    fn a_fold_of_cycles() {
+        for k in [0.5, -1.25] {
+            let grow = "p - 1 + 2*(x^2 + y^2) - (x^2 + y^2)^2";
+            let turn = format!("1 + {k}*(x^2 + y^2 - 1)");
+            let model =
+                model(None, &[("grow", grow), ("turn", &turn)], &[("x", "grow*x - turn*y"), ("y", "turn*x + grow*y")]);
+            near(of(&model, Kind::Fold, TAU, &[], |t| circle(t, &[])), 2.0 / k);
+        }
+    }
+
+    /// In a frame that turns by half a revolution per period of the forcing, a' = p a + c a³ + g a h and b' = -b; h' = -k h + a² follows.
+    #[test]
+    fn a_period_doubling_of_a_forced_cycle() {
+        // With w = p + i q: a² and e^{it/2} a are functions of w with the period of the forcing.
+        let (c, g, k, period) = (-0.7, 0.4, 1.3, 3.0);
+        let definitions = [
+            ("cos1", "cos(2*pi*t/3)".to_string()),
+            ("sin1", "sin(2*pi*t/3)".to_string()),
+            ("square", "(u^2 + v^2)/2 + ((u^2 - v^2)*cos1 + 2*u*v*sin1)/2".into()),
+            ("along_u", "(u + u*cos1 + v*sin1)/2".into()),
+            ("along_v", "(v + u*sin1 - v*cos1)/2".into()),
+            ("rate", format!("p + {c}*square + {g}*h")),
+        ];
+        let definitions: Vec<(&str, &str)> = definitions.iter().map(|(n, t)| (*n, t.as_str())).collect();
+        let model = model(
+            Some("3"),
+            &definitions,
+            &[
+                ("u", "-pi/3*v + rate*along_u - (u - along_u)"),
+                ("v", "pi/3*u + rate*along_v - (v - along_v)"),
+                ("h", &format!("-{k}*h + square")),
+            ],
+        );
+        // a = ξ/√T.
+        near(of(&model, Kind::PeriodDoubling, period, &[], |_| vec![0.0; 3]), (c + g / k) / period);
+    }
+
+    /// The same around an oscillator of its own, whose radius and speed the doubled motion changes: with u + iv its position, the angle is that.
+    #[test]
+    fn a_period_doubling_of_a_free_cycle() {
+        let (c, g, k, m) = (-0.3, 0.5, 0.8, 0.9);
+        let definitions = [
+            ("size", "x^2 + y^2".to_string()),
+            ("cos1", "x/sqrt(size)".into()),
+            ("sin1", "y/sqrt(size)".into()),
+            ("square", "(u^2 + v^2)/2 + ((u^2 - v^2)*cos1 + 2*u*v*sin1)/2".into()),
+            ("along_u", "(u + u*cos1 + v*sin1)/2".into()),
+            ("along_v", "(v + u*sin1 - v*cos1)/2".into()),
+            ("rate", format!("p + {c}*square + {g}*(size - 1)")),
+            ("grow", format!("{k}*(1 - size) + square")),
+            ("turn", format!("1 + {m}*square")),
+        ];
+        let definitions: Vec<(&str, &str)> = definitions.iter().map(|(n, t)| (*n, t.as_str())).collect();
+        let model = model(
+            None,
+            &definitions,
+            &[
+                ("x", "grow*x - turn*y"),
+                ("y", "grow*y + turn*x"),
+                ("u", "-turn/2*v + rate*along_u - (u - along_u)"),
+                ("v", "turn/2*u + rate*along_v - (v - along_v)"),
+            ],
+        );
+        // ρ² - 1 follows as a²/k.
+        near(of(&model, Kind::PeriodDoubling, TAU, &[], |t| circle(t, &[0.0, 0.0])), (c + g / k) / TAU);
+    }
+
+    /// A Hopf point in a plane beside an oscillator whose radius and speed it changes: z' = (p + iω) z + c z |z|² + g z (ρ² - 1),
+    /// ρ' = ρ (k (1 - ρ²) + |z|²).
+    #[test]
+    fn a_torus_point() {
+        let (c, g, k, m, omega) = (0.2, 0.6, 0.75, 0.4, 0.31);
+        let definitions = [
+            ("size", "x^2 + y^2".to_string()),
+            ("square", "u^2 + v^2".into()),
+            ("rate", format!("p + {c}*square + {g}*(size - 1)")),
+            ("grow", format!("{k}*(1 - size) + square")),
+            ("turn", format!("1 + {m}*square + 0.3*u*v*x")),
+        ];
+        let definitions: Vec<(&str, &str)> = definitions.iter().map(|(n, t)| (*n, t.as_str())).collect();
+        let model = model(
+            None,
+            &definitions,
+            &[
+                ("x", "grow*x - turn*y"),
+                ("y", "grow*y + turn*x"),
+                ("u", &format!("rate*u - {omega}*v")),
+                ("v", &format!("rate*v + {omega}*u")),
+            ],
+        );
+        let pair = Complex64::from_polar(1.0, omega * TAU);
+        let spectrum = [Complex64::new(1.0, 0.0), pair, pair.conj(), Complex64::new((-2.0 * k * TAU).exp(), 0.0)];
+        // |z|² is 2 |ξ|² / T, and ρ² - 1 follows as |z|²/k.
+        near(of(&model, Kind::Torus, TAU, &spectrum, |t| circle(t, &[0.0, 0.0])), (c + g / k) * 2.0 / TAU);
+    }
+}
