@@ -241,8 +241,8 @@ pub trait Condition {
     /// The derivative of g along (`du`, `extra`) at the place of the last evaluation: writes e + 1 values.
     fn derivative(&mut self, du: &[f64], extra: &[f64], dg: &mut [f64]);
 
-    /// How many of the eigenvalues or multipliers are held.
-    fn held(&self) -> usize;
+    /// The eigenvalues or multipliers that are held, as the extra unknowns say.
+    fn held(&self, extra: &[f64]) -> Vec<Complex64>;
 
     /// How far an eigenvalue or multiplier is from where one is held.
     fn distance(&self, z: Complex64) -> f64;

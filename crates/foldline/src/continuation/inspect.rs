@@ -94,7 +94,8 @@ impl Follow<'_> {
             let monitor = &*self.monitors[k];
             let mut jump = monitor.jump();
             let mut found = locate(self.problem, self.settings, &stretch, monitor, values, cost);
-            if found.is_err() && matches!(kind, Kind::Fold | Kind::BranchPoint) {
+            let singular = matches!(kind, Kind::Fold | Kind::BranchPoint) || kind.has_codimension_two();
+            if found.is_err() && singular {
                 found = straddle(self.problem, self.settings, &stretch, monitor, values, cost);
                 // A singular matrix at which the parameter turns and stability stays is a pitchfork, or else the step has
                 // cut across to another branch.

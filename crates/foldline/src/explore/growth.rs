@@ -313,7 +313,9 @@ impl Growth<'_> {
         }
         let (monitors, collapses) = match branch.held {
             None => (special::monitors(branch.family), collapses(branch, &system)),
-            Some((kind, _)) => (special::monitors_where_held(system.field, branch.family, kind), Vec::new()),
+            Some((kind, _)) => {
+                (special::monitors_where_held(system.field, &system.scales, branch.family, kind), Vec::new())
+            }
         };
         let home = branch.points.iter().find(|p| p.position == 0).filter(|_| branch.ends[0].is_none()).cloned();
         let next_to_home = home.as_ref().and_then(|_| {

@@ -261,7 +261,11 @@ impl ZeroProblem for Held<'_> {
             let z = found.spectrum[**k];
             if is_cycle { z.norm() > 1.0 } else { z.re > 0.0 }
         };
-        found.unstable = order.iter().skip(self.condition.held()).filter(outside).count();
+        let held = self.condition.held(&u[..self.extra()]);
+        found.unstable = order.iter().skip(held.len()).filter(outside).count();
+        // What is held comes first, as it is meant: computed, a double eigenvalue would be known to half the digits.
+        let others = order.iter().skip(held.len()).map(|k| found.spectrum[*k]);
+        found.spectrum = found.spectrum[..first].iter().copied().chain(held).chain(others).collect();
         found
     }
 

@@ -1,41 +1,66 @@
-//! Points that it takes two parameters to meet, on curves of folds or Hopf points of equilibria.
+//! Points that it takes two parameters to meet, on curves along which something is held.
 //!
 //! | on a curve of | kind | test function |
 //! |---|---|---|
-//! | folds | cusp | ⟨p, B(q, q)⟩ |
-//! | folds | Bogdanov–Takens | ⟨p, q⟩ |
-//! | folds | zero-Hopf | sums of two of the other eigenvalues |
+//! | folds | cusp | ⟨p, B(q, q)⟩; for cycles a of the normal form |
+//! | folds of equilibria | Bogdanov–Takens | ⟨p, q⟩ |
+//! | folds of equilibria | zero-Hopf | sums of two of the other eigenvalues |
 //! | Hopf points | Bogdanov–Takens | the product of the two held: ω², negative where they are real |
 //! | Hopf points | generalised Hopf | the first Lyapunov coefficient |
 //! | Hopf points | zero-Hopf | the product of the other eigenvalues |
 //! | Hopf points | double Hopf | sums of two of the others |
+//! | period doublings | generalised period doubling | c of the normal form |
+//! | torus points | Chenciner | Re d of the normal form |
+//! | torus points | 1:1, 1:2 resonance | sin θ, which changes its sign where e^{iθ} is 1 or -1 |
+//! | torus points | 1:3, 1:4 resonance | cos θ + ½, cos θ |
+//! | folds, torus points | 1:1 resonance, fold–torus | the product of the others minus 1 |
+//! | period doublings, folds, torus points | fold–flip, 1:2 resonance, flip–torus | the product of the others minus 1, plus 1 |
+//! | all of cycles | fold–torus, flip–torus, double torus | products of two of the others minus 1 |
 //!
-//! p and q are of unit length, and point the way that they did where the step began.
+//! p and q are of unit length, and point the way that they did where the step began; so does the null vector in a of a forced cycle.
 //!
-//! **Source.** kuznetsov2004, §10.3.
+//! **Source.** kuznetsov2004, §10.3 (equilibria), §9 (cycles).
 
+use super::cycle_form;
 use super::normal_form::Local;
 use crate::contract::{Monitor, VectorField};
 use crate::diagram::{Family, Kind, Point};
 use crate::linalg::dot;
+use crate::problem::Setting;
 use num_complex::Complex64;
 
 /// One line of the table.
 pub struct CodimensionTwo<'a> {
     field: &'a dyn VectorField,
+    scales: &'a [f64],
     held: Kind,
     kind: Kind,
 }
 
-/// What to look for along a curve on which a special point of that kind is held.
-pub fn monitors<'a>(field: &'a dyn VectorField, family: Family, held: Kind) -> Vec<Box<dyn Monitor + 'a>> {
-    use Kind::{BogdanovTakens, Cusp, DoubleHopf, Fold, GeneralisedHopf, Hopf, ZeroHopf};
+/// What to look for along a curve on which a special point of that kind is held; `scales` `[n]` are those of the states.
+pub fn monitors<'a>(
+    field: &'a dyn VectorField,
+    scales: &'a [f64],
+    family: Family,
+    held: Kind,
+) -> Vec<Box<dyn Monitor + 'a>> {
+    use Kind::{
+        BogdanovTakens, Chenciner, Cusp, DoubleHopf, DoubleTorus, FlipTorus, Fold, FoldFlip, FoldTorus,
+        GeneralisedHopf, GeneralisedPeriodDoubling, Hopf, PeriodDoubling, Resonance11, Resonance12, Resonance13,
+        Resonance14, Torus, ZeroHopf,
+    };
     let kinds: &[Kind] = match (family, held) {
         (Family::Equilibrium, Fold) => &[Cusp, BogdanovTakens, ZeroHopf],
         (Family::Equilibrium, Hopf) => &[BogdanovTakens, GeneralisedHopf, ZeroHopf, DoubleHopf],
+        (Family::Cycle, Fold) => &[Cusp, Resonance11, FoldFlip, FoldTorus],
+        (Family::Cycle, PeriodDoubling) => &[GeneralisedPeriodDoubling, Resonance12, FoldFlip, FlipTorus],
+        (Family::Cycle, Torus) => {
+            &[Resonance11, Resonance12, Resonance13, Resonance14, Chenciner, FoldTorus, FlipTorus, DoubleTorus]
+        }
         _ => &[],
     };
-    kinds.iter().map(|&kind| Box::new(CodimensionTwo { field, held, kind }) as Box<dyn Monitor + 'a>).collect()
+    let monitor = |&kind: &Kind| Box::new(CodimensionTwo { field, scales, held, kind }) as Box<dyn Monitor + 'a>;
+    kinds.iter().map(monitor).collect()
 }
 
 impl CodimensionTwo<'_> {
@@ -46,28 +71,35 @@ impl CodimensionTwo<'_> {
     }
 
     /// Of the spectrum, what is held, then the rest.
-    fn parts(&self, at: &Point) -> (Vec<Complex64>, Vec<Complex64>) {
-        let mut all = at.spectrum.clone();
-        if self.held == Kind::Fold {
-            all.sort_by(|a, b| a.norm().total_cmp(&b.norm()));
-            let rest = all.split_off(1.min(all.len()));
-            return (all, rest);
-        }
-        // The two whose sum is least against their size.
-        let balance = |i: usize, j: usize| (all[i] + all[j]).norm() / (1e-300 + all[i].norm() + all[j].norm());
-        let pairs = (0..all.len()).flat_map(|j| (0..j).map(move |i| (i, j)));
-        let Some((i, j)) = pairs.min_by(|a, b| balance(a.0, a.1).total_cmp(&balance(b.0, b.1))) else {
-            return (Vec::new(), all);
+    fn parts<'p>(&self, at: &'p Point) -> (&'p [Complex64], &'p [Complex64]) {
+        let all = at.free_spectrum();
+        let held = if matches!(self.held, Kind::Hopf | Kind::Torus) { 2 } else { 1 };
+        all.split_at(held.min(all.len()))
+    }
+
+    /// The coefficient of the normal form of what is held on cycles.
+    fn coefficient(&self, reference: &Point, at: &Point) -> Option<f64> {
+        let setting = |point: &Point| Setting {
+            field: self.field,
+            scales: self.scales,
+            parameters: point.parameters.clone(),
+            axes: Vec::new(),
         };
-        let held = vec![all[i], all[j]];
-        all.remove(j);
-        all.remove(i);
-        (held, all)
+        let value = cycle_form::coefficient(self.held, setting(at), at)?;
+        if self.held != Kind::Fold || at.solution.forcing_periods() == 0 {
+            return Some(value);
+        }
+        let [before, now] = [reference, at].map(|point| cycle_form::direction(self.held, setting(point), point));
+        Some(value * dot(&before?, &now?).signum())
     }
 
     fn tested(&self, reference: &Point, at: &Point) -> Option<f64> {
         let (held, rest) = self.parts(at);
+        let of_cycle = at.solution.period().is_some();
+        let product = |centre: f64| rest.iter().map(|z| (z - centre) / (1.0 + z.norm())).product::<Complex64>().re;
+        let pairs = || (0..rest.len()).flat_map(|j| (0..j).map(move |i| (i, j)));
         Some(match self.kind {
+            Kind::Cusp if of_cycle => self.coefficient(reference, at)?,
             Kind::Cusp => Local::new(self.field, at)?.quadratic(&self.oriented(reference, at)?),
             Kind::BogdanovTakens if self.held == Kind::Fold => {
                 let [q, p] = self.oriented(reference, at)?;
@@ -76,9 +108,28 @@ impl CodimensionTwo<'_> {
             Kind::BogdanovTakens => (held.first()? * held.get(1)?).re,
             Kind::GeneralisedHopf => Local::new(self.field, at)?.hopf(held.first()?.im.abs())?,
             Kind::ZeroHopf if self.held == Kind::Hopf => rest.iter().product::<Complex64>().re,
+            Kind::GeneralisedPeriodDoubling | Kind::Chenciner => self.coefficient(reference, at)?,
+            Kind::Resonance11 | Kind::Resonance12 if self.held == Kind::Torus => {
+                let z = held.first()?;
+                // The other end of the circle is the business of the other.
+                if (z.re > 0.0) != (self.kind == Kind::Resonance11) {
+                    return None;
+                }
+                z.im
+            }
+            Kind::Resonance13 => held.first()?.re + 0.5,
+            Kind::Resonance14 => held.first()?.re,
+            Kind::Resonance11 => product(1.0),
+            Kind::Resonance12 => product(-1.0),
+            Kind::FoldFlip => product(if self.held == Kind::Fold { -1.0 } else { 1.0 }),
+            Kind::FoldTorus if self.held == Kind::Torus => product(1.0),
+            Kind::FlipTorus if self.held == Kind::Torus => product(-1.0),
+            Kind::FoldTorus | Kind::FlipTorus | Kind::DoubleTorus => {
+                let products = pairs().map(|(i, j)| rest[i] * rest[j]);
+                products.map(|z| (z - 1.0) / (1.0 + z.norm())).product::<Complex64>().re
+            }
             _ => {
-                let pairs = (0..rest.len()).flat_map(|j| (0..j).map(move |i| (i, j)));
-                let sums = pairs.map(|(i, j)| (rest[i] + rest[j]) / (1e-300 + rest[i].norm() + rest[j].norm()));
+                let sums = pairs().map(|(i, j)| (rest[i] + rest[j]) / (1e-300 + rest[i].norm() + rest[j].norm()));
                 sums.product::<Complex64>().re
             }
         })
@@ -97,11 +148,14 @@ impl Monitor for CodimensionTwo<'_> {
     fn confirms(&self, at: &Point) -> bool {
         let (held, rest) = self.parts(at);
         let on_axis = |z: &Complex64| z.im != 0.0 && z.re.abs() < 1e-3 * z.im.abs();
+        let on_circle = |z: &Complex64| z.im != 0.0 && z.norm().ln().abs() < 1e-3;
         match self.kind {
             // Two real eigenvalues with the sum 0 are none of these.
             Kind::ZeroHopf if self.held == Kind::Fold => rest.iter().any(on_axis),
             Kind::ZeroHopf | Kind::GeneralisedHopf => held.iter().all(on_axis),
             Kind::DoubleHopf => rest.iter().any(on_axis) && held.iter().all(on_axis),
+            Kind::FoldTorus | Kind::FlipTorus if self.held != Kind::Torus => rest.iter().any(on_circle),
+            Kind::DoubleTorus => rest.iter().any(on_circle),
             _ => true,
         }
     }
@@ -111,6 +165,10 @@ impl Monitor for CodimensionTwo<'_> {
     }
 
     fn ends(&self) -> bool {
-        self.held == Kind::Hopf && self.kind == Kind::BogdanovTakens
+        match self.held {
+            Kind::Hopf => self.kind == Kind::BogdanovTakens,
+            Kind::Torus => matches!(self.kind, Kind::Resonance11 | Kind::Resonance12),
+            _ => false,
+        }
     }
 }

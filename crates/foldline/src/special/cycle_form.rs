@@ -25,25 +25,9 @@ use crate::problem::Setting;
 /// setting has any free parameters.
 pub fn coefficient(kind: Kind, setting: Setting, at: &Point) -> Option<f64> {
     let Solution::Cycle(cycle) = &at.solution else { return None };
-    if cycle.intervals() == 0 || !matches!(kind, Kind::Fold | Kind::PeriodDoubling | Kind::Torus) {
-        return None;
-    }
     let unit = setting.field.time_unit(&at.parameters);
     let own = if cycle.forcing_periods > 0 { f64::from(cycle.forcing_periods) } else { cycle.period };
-    let mut u = cycle.profile.clone();
-    u.push(own);
-    u.extend(setting.values_of(at));
-    let mut condition = OnCycles::new(kind, setting.clone(), cycle)?;
-    let extra = condition.guess(at);
-    let mut g = vec![0.0; 1 + extra.len()];
-    // Borders that fit better each time.
-    for _ in 0..3 {
-        if !Condition::evaluate(&mut condition, &u, &extra, &mut g) {
-            return None;
-        }
-        condition.anchor();
-    }
-    Condition::evaluate(&mut condition, &u, &extra, &mut g).then_some(())?;
+    let (condition, u, extra) = evaluated(kind, setting.clone(), at)?;
     let form = Form { setting, cycle, u: &u, period: own, condition: &condition };
     let (mut v, scalar) = condition.null();
     let free_fold = kind == Kind::Fold && cycle.forcing_periods == 0;
@@ -59,6 +43,36 @@ pub fn coefficient(kind: Kind, setting: Setting, at: &Point) -> Option<f64> {
         _ => form.torus(&v, extra[0]),
     }?;
     Some(found / unit).filter(|value| value.is_finite())
+}
+
+/// Where the null vector points, at a few places that are the same whatever the mesh is.
+pub(super) fn direction(kind: Kind, setting: Setting, at: &Point) -> Option<Vec<f64>> {
+    const PLACES: usize = 16;
+    let (condition, ..) = evaluated(kind, setting, at)?;
+    Some(condition.null_at(PLACES))
+}
+
+/// The condition of that kind with its null vector, the unknowns, and the extra ones.
+fn evaluated<'a>(kind: Kind, setting: Setting<'a>, at: &Point) -> Option<(OnCycles<'a>, Vec<f64>, Vec<f64>)> {
+    let Solution::Cycle(cycle) = &at.solution else { return None };
+    if cycle.intervals() == 0 || !matches!(kind, Kind::Fold | Kind::PeriodDoubling | Kind::Torus) {
+        return None;
+    }
+    let own = if cycle.forcing_periods > 0 { f64::from(cycle.forcing_periods) } else { cycle.period };
+    let mut u = cycle.profile.clone();
+    u.push(own);
+    u.extend(setting.values_of(at));
+    let mut condition = OnCycles::new(kind, setting, cycle)?;
+    let extra = condition.guess(at);
+    let mut g = vec![0.0; 1 + extra.len()];
+    // Borders that fit better each time.
+    for _ in 0..3 {
+        if !Condition::evaluate(&mut condition, &u, &extra, &mut g) {
+            return None;
+        }
+        condition.anchor();
+    }
+    Condition::evaluate(&mut condition, &u, &extra, &mut g).then_some((condition, u, extra))
 }
 
 /// A cycle with what is known about its critical eigenfunction. All right-hand sides are those in normalised time.

@@ -44,8 +44,13 @@ pub fn monitors(family: Family) -> Vec<Box<dyn Monitor>> {
 
 /// What to look for where a special point of that kind is held along the curve: what takes two parameters to meet, and where the curve
 /// turns back in the second of them.
-pub fn monitors_where_held<'a>(field: &'a dyn VectorField, family: Family, held: Kind) -> Vec<Box<dyn Monitor + 'a>> {
-    let mut all = codim_two::monitors(field, family, held);
+pub fn monitors_where_held<'a>(
+    field: &'a dyn VectorField,
+    scales: &'a [f64],
+    family: Family,
+    held: Kind,
+) -> Vec<Box<dyn Monitor + 'a>> {
+    let mut all = codim_two::monitors(field, scales, family, held);
     all.push(Box::new(fold::Fold));
     all
 }

@@ -203,8 +203,11 @@ impl Condition for OnEquilibria<'_> {
         }
     }
 
-    fn held(&self) -> usize {
-        self.width
+    fn held(&self, extra: &[f64]) -> Vec<Complex64> {
+        match self.kind {
+            Kind::Fold => vec![Complex64::new(0.0, 0.0)],
+            _ => [1.0, -1.0].map(|sign| sign * Complex64::new(-extra[0], 0.0).sqrt()).to_vec(),
+        }
     }
 
     fn distance(&self, z: Complex64) -> f64 {
