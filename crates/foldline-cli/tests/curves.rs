@@ -221,3 +221,86 @@ fn period_doublings_over_the_damping_pass_those_of_another_damping() {
     let gap = gaps.map(|s| (s.point.parameters[0] - arrived.parameters[0]).abs()).fold(f64::INFINITY, f64::min);
     assert!(gap < TOLERANCE, "{gap:.1e} from {:?}", arrived.parameters);
 }
+
+/// Blocks that do not know of each other, forced with the period 3: one that doubles its period where its rate vanishes, one with a
+/// torus where its rate does, one with a fold at q = 0. The cycle is zero but for that.
+fn forced(blocks: &[(&str, &str)]) -> String {
+    let mut text = String::from(
+        "[parameters]\np = -0.4\nq = -0.3\n[forcing]\nperiod = \"3\"\n[definitions]\ncos1 = \"cos(2*pi*t/3)\"\nsin1 = \"sin(2*pi*t/3)\"\n",
+    );
+    let mut states = String::from("[states]\n");
+    for (k, (block, rate)) in blocks.iter().enumerate() {
+        match *block {
+            "flip" => {
+                text += &format!(
+                    "square{k} = \"(u{k}^2 + v{k}^2)/2 + ((u{k}^2 - v{k}^2)*cos1 + 2*u{k}*v{k}*sin1)/2\"\nrate{k} = \"{rate}\"\n\
+                     along{k} = \"(u{k} + u{k}*cos1 + v{k}*sin1)/2\"\nacross{k} = \"(v{k} + u{k}*sin1 - v{k}*cos1)/2\"\n"
+                );
+                states += &format!(
+                    "u{k} = \"-pi/3*v{k} + rate{k}*along{k} - (u{k} - along{k})\"\nv{k} = \"pi/3*u{k} + rate{k}*across{k} - (v{k} - across{k})\"\n"
+                );
+            }
+            "torus" => {
+                text += &format!("square{k} = \"u{k}^2 + v{k}^2\"\nrate{k} = \"{rate}\"\n");
+                let turn = 0.31 + 0.23 * k as f64;
+                states += &format!("u{k} = \"rate{k}*u{k} - {turn}*v{k}\"\nv{k} = \"rate{k}*v{k} + {turn}*u{k}\"\n");
+            }
+            _ => states += &format!("h{k} = \"{rate} + h{k}^2\"\n"),
+        }
+    }
+    text + &states
+}
+
+#[test]
+fn curves_of_cycles_have_their_points_of_codimension_two() {
+    use Kind::{
+        Chenciner, DoubleTorus, FlipTorus, FoldFlip, FoldTorus, GeneralisedPeriodDoubling, PeriodDoubling, Torus,
+    };
+    let cases = [
+        (vec![("flip", "p + q*square0")], PeriodDoubling, GeneralisedPeriodDoubling),
+        (vec![("torus", "p + q*square0")], Torus, Chenciner),
+        (vec![("flip", "p - square0"), ("fold", "q")], PeriodDoubling, FoldFlip),
+        (vec![("torus", "p - square0"), ("fold", "q")], Torus, FoldTorus),
+        (vec![("flip", "p - square0"), ("torus", "q - square1")], PeriodDoubling, FlipTorus),
+        (vec![("torus", "p - square0"), ("torus", "q - square1")], Torus, DoubleTorus),
+    ];
+    for (blocks, hold, expected) in cases {
+        let branch = "[[seed]]\nname = \"s\"\nattractor = \"cycle\"\nsamples = 16\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"p\"\nrange = [-1, 1]\n";
+        let model = forced(&blocks);
+        let diagram = with_curve(study(&model, branch), hold, 0.0, "q", [-0.5, 0.5], None);
+        let curve = diagram.branch("curve").unwrap();
+        assert!(curve.points.iter().all(|p| p.parameters[0].abs() < TOLERANCE), "{expected}");
+        let found: Vec<(Kind, f64)> = curve.special.iter().map(|s| (s.kind, s.point.parameters[1])).collect();
+        assert!(
+            matches!(found[..], [(kind, q)] if kind == expected && q.abs() < TOLERANCE),
+            "{expected}: {found:?} {:?}",
+            curve.ends
+        );
+    }
+}
+
+/// Folds and torus points of the entrained van der Pol oscillator end at the same 1:1 resonance, found by conditions of their own.
+#[test]
+fn torus_points_of_the_forced_van_der_pol_oscillator_end_on_its_folds() {
+    let model = include_str!("../../../models/van-der-pol-forced.toml");
+    let from = |frequency: f64, low: f64| {
+        format!(
+            "[[seed]]\nname = \"s\"\nattractor = \"cycle\"\nsamples = 16\nparameters = {{ s = 1, Omega = {frequency} }}\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"s\"\nrange = [{low}, 3]\n"
+        )
+    };
+    let folds = with_curve(study(model, &from(1.1, 0.3)), Kind::Fold, 0.45, "Omega", [1.05, 1.3], None);
+    let tori = with_curve(study(model, &from(1.2, 0.3)), Kind::Torus, 0.76, "Omega", [1.0, 1.6], None);
+    let place = |diagram: &Diagram, kind: Kind| -> Vec<f64> {
+        let curve = diagram.branch("curve").unwrap();
+        let found: Vec<_> = curve.special.iter().filter(|s| s.kind == kind).collect();
+        assert_eq!(found.len(), 1, "{kind}: {:?}", curve.special.iter().map(|s| s.kind).collect::<Vec<_>>());
+        found[0].point.parameters.clone()
+    };
+    let (one, other) = (place(&folds, Kind::Resonance11), place(&tori, Kind::Resonance11));
+    assert!(one.iter().zip(&other).all(|(a, b)| (a - b).abs() < 2e-8), "{one:?} {other:?}");
+    let ends = tori.branch("curve").unwrap().ends.iter().flatten().filter(|end| end.code() == "joined").count();
+    assert_eq!(ends, 1, "{:?}", tori.branch("curve").unwrap().ends);
+    place(&folds, Kind::Cusp);
+    place(&tori, Kind::Resonance13);
+    place(&tori, Kind::Resonance14);
+}

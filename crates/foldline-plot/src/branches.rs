@@ -20,12 +20,27 @@ pub fn branch_curve(branch: &Branch, x: Quantity, y: Quantity, colour: &'static 
     Layer { shape, ..Layer::curve(&[], colour) }
 }
 
-/// The special points of a branch, a layer for each kind.
+/// The special points of a branch, a layer for each kind, and where that is known one each for those at which stable solutions are born
+/// (supercritical, hollow) and for the others (subcritical, filled).
 pub fn special_layers(branch: &Branch, x: Quantity, y: Quantity, colour: &'static str) -> Vec<Layer> {
     let all = marks(branch, x, y);
-    let of = |kind: Kind| all.iter().filter(|(k, _)| *k == kind).map(|(_, place)| *place).collect::<Vec<_>>();
-    let kinds = Kind::ALL.into_iter().map(|kind| (kind, of(kind))).filter(|(_, places)| !places.is_empty());
-    kinds.map(|(kind, places)| Layer::scatter(places, Marker::of(kind), colour).hollow().named(kind.name())).collect()
+    let of = |kind: Kind, own: Option<&str>| -> Vec<[f64; 2]> {
+        all.iter().filter(|(k, known, _)| *k == kind && *known == own).map(|(.., place)| *place).collect()
+    };
+    let kinds =
+        Kind::ALL.into_iter().flat_map(|kind| [None, Some("supercritical"), Some("subcritical")].map(|c| (kind, c)));
+    kinds
+        .map(|(kind, known)| (kind, known, of(kind, known)))
+        .filter(|(.., places)| !places.is_empty())
+        .map(|(kind, known, places)| {
+            let layer = Layer::scatter(places, Marker::of(kind), colour);
+            match known {
+                None => layer.hollow().named(kind.name()),
+                Some("subcritical") => layer.named(format!("{kind}, subcritical")),
+                Some(known) => layer.hollow().named(format!("{kind}, {known}")),
+            }
+        })
+        .collect()
 }
 
 /// All branches: a colour for each that was not switched to, the others in the colour of the one they come from, thinner

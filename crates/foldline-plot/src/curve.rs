@@ -120,9 +120,9 @@ pub fn rounded(vertices: &[[f64; 2]], scale: [f64; 2]) -> Vec<Vec<[f64; 2]>> {
     (0..chords.len()).map(piece).collect()
 }
 
-/// The special points of a branch that can be drawn.
-pub fn marks(branch: &Branch, x: Quantity, y: Quantity) -> Vec<(Kind, [f64; 2])> {
-    branch.special.iter().filter_map(|s| Some((s.kind, place(&s.point, x, y)?))).collect()
+/// The special points of a branch that can be drawn: what they are, super- or subcritical where that is known, and where.
+pub fn marks(branch: &Branch, x: Quantity, y: Quantity) -> Vec<(Kind, Option<&'static str>, [f64; 2])> {
+    branch.special.iter().filter_map(|s| Some((s.kind, s.criticality(), place(&s.point, x, y)?))).collect()
 }
 
 fn place(point: &Point, x: Quantity, y: Quantity) -> Option<[f64; 2]> {
