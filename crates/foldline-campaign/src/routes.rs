@@ -115,6 +115,7 @@ fn grown(
     }
     let station = station.ok()?;
     let growth = Growth {
+        marks: &[],
         system,
         settings,
         degree: DEGREE,

@@ -381,3 +381,43 @@ fn an_arm_between_two_pitchforks_joins_both() {
         assert_eq!(diagram.branches.len(), 2, "the second pitchfork is the other end of the same arm");
     }
 }
+
+/// On the line x = p, and on the cycles of the van der Pol oscillator.
+#[test]
+fn marks_lie_at_the_values_asked_for_and_a_branch_stops_there() {
+    let model = "[parameters]\np = 0.5\n[states.x]\nequation = \"p - x\"\n[outputs]\nsquare = \"x^2\"\n";
+    let diagram = explored(
+        model,
+        "attractor = \"equilibrium\"",
+        "free = \"p\"\nrange = [-3, 3]\nmark = { p = [0.25, 1], square_max = 0.01 }\nstop = { x_max = [2, -1.5] }",
+    );
+    let line = branch(&diagram, "b");
+    let places: Vec<f64> = line.special.iter().map(|s| parameter(line, s)).collect();
+    let mut sorted = places.clone();
+    sorted.sort_by(f64::total_cmp);
+    let expected = [-1.5, -0.1, 0.1, 0.25, 1.0, 2.0];
+    assert!(
+        sorted.len() == expected.len() && sorted.iter().zip(expected).all(|(a, b)| near(*a, b, 1e-8)),
+        "{sorted:?}"
+    );
+    // Those of the parameter itself to the last bit.
+    assert!(places.contains(&0.25) && places.contains(&1.0), "{places:?}");
+    ends(line, ["bound", "bound"]);
+    let reach = [line.points.first(), line.points.last()].map(|p| p.unwrap().parameters[0]);
+    assert!(near(reach[0], -1.5, 1e-8) && near(reach[1], 2.0, 1e-8), "{reach:?}");
+
+    let diagram = explored(
+        VAN_DER_POL,
+        "attractor = \"cycle\"\nparameters = { mu = 1 }",
+        "free = \"mu\"\nrange = [0.2, 12]\nmark = { mu = 10, period = 10 }",
+    );
+    let cycles = branch(&diagram, "b");
+    let [at_ten, long] = [true, false].map(|at| {
+        let found = cycles.special.iter().find(|s| (parameter(cycles, s) == 10.0) == at);
+        found.unwrap_or_else(|| panic!("{:?}", cycles.special.len()))
+    });
+    // A separate code, good to the digits given.
+    period_is(at_ten.point.solution.period(), 19.07836957, TOLERANCE);
+    period_is(long.point.solution.period(), 10.0, 2.0 * TOLERANCE);
+    assert!(near(at_ten.point.ranges[0][1], 2.01428536, TOLERANCE));
+}

@@ -32,6 +32,7 @@ fn the_false_unstable_piece_below_contact_is_recognised() {
         range: [0.6, 1.1],
         until: None,
         switching: Switching::default(),
+        marks: Vec::new(),
         max_points: 3000,
     };
     let plan = Plan {

@@ -203,9 +203,9 @@ pub trait Monitor: Send + Sync {
     /// By how much an event of this kind changes the number of unstable eigenvalues or multipliers.
     fn jump(&self) -> usize;
 
-    /// Whether the branch ends at such an event.
-    fn ends(&self) -> bool {
-        false
+    /// How the branch ends at a located event, if it does; `parameter` is that of the continuation there.
+    fn ending(&self, _at: &Point, _parameter: f64) -> Option<Ending> {
+        None
     }
 
     /// How many eigenvalues or multipliers are unstable at a located event besides those that pass there: on one side of it the count is

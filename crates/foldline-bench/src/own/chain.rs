@@ -49,6 +49,7 @@ pub fn plan(model: &Model, until: f64, points: usize) -> Plan {
         range: [1.0, until],
         until: Some(until),
         switching: Switching::default(),
+        marks: Vec::new(),
         max_points: points,
     };
     Plan {

@@ -7,9 +7,11 @@ use crate::toml_walk::{Value, Walk};
 use foldline::diagram::Kind;
 use foldline::explore::{BranchPlan, Start, Switching};
 use foldline::model::Model;
+use foldline::special::mark::{Mark, Quantity};
 use std::ops::Range;
 
-pub(super) const KEYS: [&str; 8] = ["name", "description", "from", "free", "range", "until", "switch", "max-points"];
+pub(super) const KEYS: [&str; 10] =
+    ["name", "description", "from", "free", "range", "until", "switch", "mark", "stop", "max-points"];
 const SWITCHABLE: [Kind; 3] = [Kind::PeriodDoubling, Kind::BranchPoint, Kind::Hopf];
 
 /// A branch; its plan goes to the items read so far.
@@ -25,6 +27,8 @@ pub(super) fn read(
     let origin = origin(walk, item, ground, all);
     let free = free(walk, item, ground.model);
     let switching = table.get("switch").map(|value| switching(walk, value)).unwrap_or_default();
+    let mut marks = marks(walk, table.get("mark"), "`mark`", false, ground.model);
+    marks.extend(self::marks(walk, table.get("stop"), "`stop`", true, ground.model));
     let max_points = max_points(walk, item);
     let start_value = origin.as_ref().zip(free).and_then(|((_, at, _), free)| at[free]);
     let bounds = bounds(walk, item, start_value, free.map(|f| ground.model.parameters[f].name.as_str()));
@@ -32,7 +36,16 @@ pub(super) fn read(
     let mut end = beginning.clone();
     end[free] = until;
     let index = ground.items.branches.len();
-    ground.items.branches.push(BranchPlan { name: name.clone(), start, free, range, until, switching, max_points });
+    ground.items.branches.push(BranchPlan {
+        name: name.clone(),
+        start,
+        free,
+        range,
+        until,
+        switching,
+        marks,
+        max_points,
+    });
     Some(Known { name, start: Start::EndOf(index), beginning, end: Some(end), family })
 }
 
@@ -137,6 +150,48 @@ pub(super) fn range(walk: &mut Walk, value: &Value) -> Option<[f64; 2]> {
         return None;
     }
     Some([low, high])
+}
+
+/// Values of quantities: a number each, or a list.
+fn marks(walk: &mut Walk, value: Option<&Value>, what: &str, stop: bool, model: &Model) -> Vec<Mark> {
+    let Some(table) = value.and_then(|value| walk.table(value, what)) else { return Vec::new() };
+    let mut marks = Vec::new();
+    for (key, value) in table.iter() {
+        let Some(quantity) = quantity(walk, key.get_ref(), key.span(), model) else { continue };
+        let values: Vec<f64> = match value.get_ref().as_array() {
+            Some(list) => list.iter().filter_map(|one| walk.number(one, "a value")).collect(),
+            None => walk.number(value, "the value").into_iter().collect(),
+        };
+        marks.extend(values.into_iter().map(|value| Mark { quantity, value, stop }));
+    }
+    marks
+}
+
+/// A parameter, `period`, or NAME_max or NAME_min of a state or output.
+fn quantity(walk: &mut Walk, name: &str, span: Range<usize>, model: &Model) -> Option<Quantity> {
+    if name == "period" {
+        return Some(Quantity::Period);
+    }
+    if let Some(index) = model.parameter_index(name) {
+        return Some(Quantity::Parameter(index));
+    }
+    let channel = |name: &str| {
+        model.state_index(name).or_else(|| model.output_index(name).map(|index| model.states.len() + index))
+    };
+    let extreme = [("_max", true), ("_min", false)].into_iter().find_map(|(ending, largest)| {
+        let index = channel(name.strip_suffix(ending)?)?;
+        Some(if largest { Quantity::Largest(index) } else { Quantity::Smallest(index) })
+    });
+    if extreme.is_none() {
+        let ranged = model.states.iter().map(|s| &s.name).chain(model.outputs.iter().map(|o| &o.name));
+        let extremes = ranged.flat_map(|name| [format!("{name}_max"), format!("{name}_min")]);
+        let all: Vec<String> =
+            model.parameters.iter().map(|p| p.name.clone()).chain(["period".into()]).chain(extremes).collect();
+        let known: Vec<&str> = all.iter().map(String::as_str).collect();
+        let message = format!("`{name}` is no quantity of a branch");
+        walk.report(span, message, suggest(name, &known));
+    }
+    extreme
 }
 
 fn switching(walk: &mut Walk, value: &Value) -> Switching {

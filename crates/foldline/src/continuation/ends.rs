@@ -92,16 +92,19 @@ impl Follow<'_> {
         mut found: Vec<Found>,
         right: &mut Station,
     ) -> (Option<Ending>, Vec<Found>) {
-        let ends = |kind: Kind| self.monitors.iter().any(|monitor| monitor.ends() && monitor.kind() == kind);
+        let value = |point: &Point| point.parameters.get(self.free).copied().unwrap_or(f64::NAN);
+        let ending = |at: &Point, kind: Kind| {
+            let own = self.monitors.iter().filter(|monitor| monitor.kind() == kind);
+            own.into_iter().find_map(|monitor| monitor.ending(at, value(at)))
+        };
         let last = found.iter().enumerate().find_map(|(k, item)| match item {
-            Found::Special(special) if ends(special.kind) => Some((k, special.clone())),
-            _ => None,
+            Found::Special(special) => Some((k, special.point.clone(), ending(&special.point, special.kind)?)),
+            Found::Inserted(..) => None,
         });
-        let Some((k, special)) = last else { return (end, found) };
+        let Some((k, point, ending)) = last else { return (end, found) };
         found.truncate(k + 1);
-        let parameter = special.point.parameters.get(self.free).copied().unwrap_or(f64::NAN);
-        right.point = special.point;
-        (Some(Ending::Joined { at: special.kind, parameter }), found)
+        right.point = point;
+        (Some(ending), found)
     }
 
     /// Whether the step passes the place where the branch meets simpler solutions. If so the step ends a little before it.

@@ -84,7 +84,8 @@ impl Follow<'_> {
         for k in 0..self.monitors.len() {
             let values = [at_left[k], at_right[k]];
             let mut kind = self.monitors[k].kind();
-            let pitchfork = kind == Kind::BranchPoint && located.iter().any(|(_, jump, _)| *jump == 0);
+            let pitchfork = kind == Kind::BranchPoint
+                && located.iter().any(|(kind, jump, _)| *kind == Kind::BranchPoint && *jump == 0);
             if pitchfork || (standing && matches!(kind, Kind::Fold | Kind::BranchPoint)) {
                 continue;
             }

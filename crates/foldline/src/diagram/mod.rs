@@ -210,13 +210,15 @@ pub enum Kind {
     FlipTorus,
     /// Two pairs of multipliers on the unit circle.
     DoubleTorus,
+    /// A place that was asked for: a quantity has a given value.
+    Mark,
     /// A stability change that no located special point explains.
     Unexplained,
 }
 
 impl Kind {
     /// Every kind, in the order in which tables list them.
-    pub const ALL: [Kind; 21] = [
+    pub const ALL: [Kind; 22] = [
         Kind::Fold,
         Kind::BranchPoint,
         Kind::Hopf,
@@ -237,13 +239,14 @@ impl Kind {
         Kind::FoldTorus,
         Kind::FlipTorus,
         Kind::DoubleTorus,
+        Kind::Mark,
         Kind::Unexplained,
     ];
 
     /// Whether it takes two parameters to meet it.
     pub fn has_codimension_two(self) -> bool {
-        use Kind::{BranchPoint, Fold, Hopf, PeriodDoubling, Torus, Unexplained};
-        !matches!(self, Fold | BranchPoint | Hopf | PeriodDoubling | Torus | Unexplained)
+        use Kind::{BranchPoint, Fold, Hopf, Mark, PeriodDoubling, Torus, Unexplained};
+        !matches!(self, Fold | BranchPoint | Hopf | PeriodDoubling | Torus | Mark | Unexplained)
     }
 
     /// The names of the coefficients of its normal form, as [`crate::special::normal_form`] and
@@ -283,6 +286,7 @@ impl Kind {
             Kind::FoldTorus => "fold-torus",
             Kind::FlipTorus => "flip-torus",
             Kind::DoubleTorus => "double-torus",
+            Kind::Mark => "mark",
             Kind::Unexplained => "unexplained",
         }
     }

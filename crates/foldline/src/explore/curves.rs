@@ -61,6 +61,7 @@ pub fn follow(
             ties: Vec::new(),
             sides,
             parents: &[],
+            marks: &[],
             observer,
             whole: false,
             sparse: false,

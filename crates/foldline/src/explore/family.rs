@@ -155,7 +155,7 @@ impl Work<'_> {
         let known = self.earlier.branch(&plan.name).filter(|b| !b.points.is_empty());
         if let Some(earlier) = known {
             let (settings, sides) = self.growth_settings(plan, earlier.points.iter().find(|p| p.position == 0)?);
-            let growth = self.growth(&settings, sides, &[]);
+            let growth = self.growth(plan, &settings, sides, &[]);
             let mut branch = earlier.clone();
             let going = growth.resume(&mut branch);
             return Some((branch, going));
@@ -176,14 +176,20 @@ impl Work<'_> {
         });
         let going = match begun {
             Ok((settings, sides, station)) => {
-                self.growth(&settings, sides, &[]).begin(&mut branch, Beginning::Inside(station))
+                self.growth(plan, &settings, sides, &[]).begin(&mut branch, Beginning::Inside(station))
             }
             Err(why) => without_start(self.observer, &mut branch, why),
         };
         Some((branch, going))
     }
 
-    fn growth<'s>(&'s self, settings: &'s Settings, sides: [bool; 2], parents: &'s [SpecialPoint]) -> Growth<'s> {
+    fn growth<'s>(
+        &'s self,
+        plan: &'s BranchPlan,
+        settings: &'s Settings,
+        sides: [bool; 2],
+        parents: &'s [SpecialPoint],
+    ) -> Growth<'s> {
         Growth {
             system: self.system,
             settings,
@@ -191,6 +197,7 @@ impl Work<'_> {
             ties: Vec::new(),
             sides,
             parents,
+            marks: &plan.marks,
             observer: self.observer,
             whole: false,
             // Switching asks whether a branch is known already, and compares with the points of all.
@@ -222,7 +229,7 @@ impl Work<'_> {
             let begun = |b: &&Branch| b.points.len() > usize::from(growth::is_doubled(b));
             if let Some(earlier) = self.earlier.branch(&name).filter(begun) {
                 let mut branch = earlier.clone();
-                let going = self.growth(&settings, [true, true], &parent.special).resume(&mut branch);
+                let going = self.growth(plan, &settings, [true, true], &parent.special).resume(&mut branch);
                 self.branches.push(branch);
                 more.push(Pending {
                     branch: self.branches.len() - 1,
@@ -274,7 +281,7 @@ impl Work<'_> {
                 continue;
             }
             let mut branch = Branch::new(name, family, parent.free, origin);
-            let going = self.growth(&settings, [true, true], &parent.special).begin(&mut branch, beginning);
+            let going = self.growth(plan, &settings, [true, true], &parent.special).begin(&mut branch, beginning);
             self.branches.push(branch);
             more.push(Pending { branch: self.branches.len() - 1, switching: pending.switching.below(special.kind) });
             if !going {

@@ -7,6 +7,7 @@ use crate::continuation::{Failure, Follow, Item, Settings, Station, follow};
 use crate::contract::{Event, Monitor, Observer, Verdict, ZeroProblem};
 use crate::diagram::{Branch, Cost, Ending, Family, Kind, Origin, Point, Solution, SpecialPoint};
 use crate::problem::{Axis, Setting, Tie, cycle::CycleProblem, equilibrium::EquilibriumProblem, held::Held, mesh};
+use crate::special::mark::{Mark, Quantity};
 use crate::special::{self, collapse};
 
 /// Which curve through a point is meant.
@@ -208,6 +209,8 @@ pub struct Growth<'g> {
     pub sides: [bool; 2],
     /// Special points of the branch that this one was switched from; it may end at another of them.
     pub parents: &'g [SpecialPoint],
+    /// Values to mark, or to stop at.
+    pub marks: &'g [Mark],
     /// Who watches.
     pub observer: &'g dyn Observer,
     /// Whether inner points stay in memory whole even where the observer could recall them.
@@ -311,12 +314,13 @@ impl Growth<'_> {
         if emitted == 0 {
             start.point.step = self.settings.first_step;
         }
-        let (monitors, collapses) = match branch.held {
+        let (mut monitors, collapses) = match branch.held {
             None => (special::monitors(branch.family), collapses(branch, &system)),
             Some((kind, _)) => {
                 (special::monitors_where_held(system.field, &system.scales, branch.family, kind), Vec::new())
             }
         };
+        monitors.extend(self.marks.iter().map(|mark| Box::new(*mark) as Box<dyn Monitor>));
         let home = branch.points.iter().find(|p| p.position == 0).filter(|_| branch.ends[0].is_none()).cloned();
         let next_to_home = home.as_ref().and_then(|_| {
             let position = direction as i64;
@@ -340,6 +344,7 @@ impl Growth<'_> {
                     if branch.held.is_none() || special.kind.has_codimension_two() {
                         special.coefficients = self.coefficients(&system, branch.free, &special);
                     }
+                    self.place_exactly(&system, branch, &mut special);
                     branch.insert_special(special.clone());
                     self.tell(Event::Special(branch, &special))
                 }
@@ -413,6 +418,27 @@ impl Growth<'_> {
             branch.points[inner..=inner].iter_mut().filter(|p| p.position != 0).for_each(Point::lighten);
         }
         going
+    }
+
+    /// Puts a mark at a value of the parameter itself there to the last bit.
+    fn place_exactly(&self, system: &System, branch: &Branch, special: &mut SpecialPoint) {
+        const SAME: f64 = 1e-6;
+        let own = self.marks.iter().filter(|mark| mark.quantity == Quantity::Parameter(branch.free));
+        let off = |mark: &Mark| (mark.value - special.point.parameters[branch.free]).abs();
+        let near =
+            own.filter(|mark| off(mark) <= SAME * (1.0 + mark.value.abs())).min_by(|a, b| off(a).total_cmp(&off(b)));
+        let Some(mark) = near.filter(|_| special.kind == Kind::Mark && branch.held.is_none()) else { return };
+        let mut there = special.point.clone();
+        there.parameters[branch.free] = mark.value;
+        let mut problem = self.line(branch).problem(system, self.degree, &there);
+        if let Ok(found) = polished(&mut *problem, self.settings, &there) {
+            let (position, tangent, step) = (there.position, there.tangent, there.step);
+            special.point = Point { position, step, ..found.point };
+            // Which way is forward the solution alone does not say.
+            if special.point.tangent.last().is_some_and(|t| tangent.last().is_some_and(|own| t * own < 0.0)) {
+                special.point.tangent.iter_mut().for_each(|t| *t = -*t);
+            }
+        }
     }
 
     /// Of the normal form.

@@ -347,6 +347,7 @@ impl Planner<'_> {
             ties: line.ties.clone(),
             sides,
             parents: &[],
+            marks: &[],
             observer: self.observer,
             // Where a run does not arrive, others begin at points inside it.
             whole: true,

@@ -76,6 +76,7 @@ pub fn persistence(
         ties: Vec::new(),
         sides,
         parents: &[],
+        marks: &[],
         observer: &UntilFold,
         whole: true,
         sparse: false,

@@ -1,6 +1,7 @@
 //! What a study asks for, in terms of the model.
 
 use crate::diagram::Kind;
+use crate::special::mark::Mark;
 
 /// Which attractor a seed means, among those reached until every type was found that the seeds with the same sample ask for
 /// ([`crate::attractors::survey_until`]).
@@ -93,6 +94,8 @@ pub struct BranchPlan {
     pub until: Option<f64>,
     /// Where to branch off.
     pub switching: Switching,
+    /// Values to mark, or to stop at, on it and on what is switched to from it.
+    pub marks: Vec<Mark>,
     /// Limit on the number of points per side.
     pub max_points: usize,
 }

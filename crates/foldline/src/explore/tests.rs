@@ -44,6 +44,7 @@ fn followed(keeps: bool) -> (Branch, Vec<Point>) {
         range: [-4.0, 8.0],
         until: None,
         switching: Switching::default(),
+        marks: Vec::new(),
         max_points: 1000,
     };
     let plan = Plan {

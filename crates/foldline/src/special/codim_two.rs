@@ -24,7 +24,7 @@
 use super::cycle_form;
 use super::normal_form::Local;
 use crate::contract::{Monitor, VectorField};
-use crate::diagram::{Family, Kind, Point};
+use crate::diagram::{Ending, Family, Kind, Point};
 use crate::linalg::dot;
 use crate::problem::Setting;
 use num_complex::Complex64;
@@ -164,11 +164,12 @@ impl Monitor for CodimensionTwo<'_> {
         0
     }
 
-    fn ends(&self) -> bool {
-        match self.held {
+    fn ending(&self, _at: &Point, parameter: f64) -> Option<Ending> {
+        let ends = match self.held {
             Kind::Hopf => self.kind == Kind::BogdanovTakens,
             Kind::Torus => matches!(self.kind, Kind::Resonance11 | Kind::Resonance12),
             _ => false,
-        }
+        };
+        ends.then_some(Ending::Joined { at: self.kind, parameter })
     }
 }

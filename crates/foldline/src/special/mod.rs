@@ -20,6 +20,7 @@ pub mod condition;
 pub mod cycle_form;
 pub mod fold;
 pub mod hopf;
+pub mod mark;
 pub mod normal_form;
 pub mod on_cycles;
 pub mod on_equilibria;

@@ -38,6 +38,7 @@ fn computed(model: &Model) -> Diagram {
         free: 0,
         range: [-0.5, 0.5],
         until: None,
+        marks: Vec::new(),
         max_points: 1000,
         switching: Switching { depth: vec![(Kind::Hopf, 1)] },
     };
