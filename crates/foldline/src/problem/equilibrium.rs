@@ -126,15 +126,13 @@ impl ZeroProblem for EquilibriumProblem<'_> {
         self.linearise(u);
         let spectrum = eigenvalues(&self.fx, n, self.setting.scales);
         let unstable = spectrum.iter().filter(|z| z.re > 0.0).count();
-        // Where f_x vanishes f still changes with the parameters.
+        // Next to where f_x vanishes f still changes with the parameters.
         let free = self.setting.freedom();
-        let rate = |i: usize| {
-            let by_state = self.fx[i * n..(i + 1) * n].iter().zip(&self.scale).map(|(a, s)| (a * s).abs());
-            let by_free = self.fp[i * free..(i + 1) * free].iter().zip(&self.setting.axes);
-            let by_free = by_free.map(|(a, axis)| (a * axis.scale).abs());
-            by_state.chain(by_free).fold(f64::MIN_POSITIVE, f64::max)
-        };
-        let residual = (0..n).map(|i| (self.f[i] / rate(i)).abs()).fold(0.0, f64::max);
+        let by_free = (0..self.n() * free).fold(0.0, |most: f64, k| {
+            most.max((self.fp[k] * self.setting.axes[k % free].scale / self.scale[k / free]).abs())
+        });
+        let rate = max_abs(&self.fx).max(1e-6 * by_free).max(f64::MIN_POSITIVE);
+        let residual = (0..n).map(|i| (self.f[i] / (rate * self.scale[i])).abs()).fold(0.0, f64::max);
         let ranges = extremes::of_state(self.setting.field, &self.setting.at(&u[n..]), &u[..n]);
         Examination { spectrum, trivial: 0, unstable, ranges, trust: Trust { residual, ..Trust::default() } }
     }
