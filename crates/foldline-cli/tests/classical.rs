@@ -421,3 +421,42 @@ fn marks_lie_at_the_values_asked_for_and_a_branch_stops_there() {
     period_is(long.point.solution.period(), 10.0, 2.0 * TOLERANCE);
     assert!(near(at_ten.point.ranges[0][1], 2.01428536, TOLERANCE));
 }
+
+/// Closed form of the defining equations; both Hopf points are subcritical, and sit between the folds and outside them.
+#[test]
+fn co_oxidation_has_two_folds_and_two_subcritical_hopf_points() {
+    let diagram = explored(
+        include_str!("../../../models/co-oxidation.toml"),
+        "attractor = \"equilibrium\"\nparameters = { q2 = 0.9 }",
+        "free = \"q2\"\nrange = [0.5, 2]",
+    );
+    let expected = [
+        (Kind::Hopf, 1.04099156953),
+        (Kind::Fold, 1.04204850),
+        (Kind::Hopf, 1.05155746246),
+        (Kind::Fold, 1.0522002878699546),
+    ];
+    let found = has(branch(&diagram, "b"), &expected, 2e-8);
+    for hopf in [&found[0], &found[2]] {
+        assert_eq!(hopf.criticality(), Some("subcritical"), "{}", hopf.normal_form());
+    }
+}
+
+/// A conservative oscillator has a cycle of every amplitude, all at the same value of a damping: elliptic integrals for x'' + x + x³ = 0.
+#[test]
+fn a_conservative_oscillator_has_the_periods_of_its_elliptic_integrals() {
+    let model = "[parameters]\np = 0.5\n[states.x]\nequation = \"v\"\n[states.v]\nequation = \"-p*v - x - x^3\"\n";
+    let diagram = explored(
+        model,
+        "attractor = \"equilibrium\"\nsamples = 16",
+        "free = \"p\"\nrange = [-1, 1]\nswitch = { hopf = 1 }\nmark = { x_max = [1, 2] }\nstop = { x_max = 2.5 }",
+    );
+    let family = branch(&diagram, "b/hopf-1");
+    let marks: Vec<&SpecialPoint> = family.special.iter().filter(|s| s.kind == Kind::Mark).collect();
+    for (amplitude, period) in [(1.0, 4.76802203), (2.0, 3.17972332)] {
+        let found = marks.iter().find(|s| near(s.point.ranges[0][1], amplitude, TOLERANCE)).unwrap();
+        assert!(parameter(family, found).abs() < TOLERANCE);
+        // The period changes by 2 where the amplitude changes by 1.
+        period_is(found.point.solution.period(), period, 3.0 * TOLERANCE);
+    }
+}

@@ -304,3 +304,31 @@ fn torus_points_of_the_forced_van_der_pol_oscillator_end_on_its_folds() {
     place(&tori, Kind::Resonance13);
     place(&tori, Kind::Resonance14);
 }
+
+/// Closed form: Hopf points at αβ = 1; period doublings as another continuation code has them.
+#[test]
+fn hopf_points_and_period_doublings_of_the_lure_system() {
+    let model = include_str!("../../../models/lure.toml");
+    let branch = "[[seed]]\nname = \"s\"\nstate = { x = 0, y = 0, z = 0 }\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"alpha\"\nrange = [0.35, 2.5]\nswitch = { hopf = 1 }\n";
+    let hopf = with_curve(study(model, branch), Kind::Hopf, 1.0, "beta", [0.5, 1.6], None);
+    satisfies(&hopf, 4, |alpha, beta| alpha * beta - 1.0);
+    // One study for each of the published values: the curve stops there.
+    for (beta, alpha) in [(1.2, 0.48096156567), (0.8, 0.81012451210)] {
+        let mut study = study(model, branch);
+        study.plan.curves.push(CurvePlan {
+            name: "curve".into(),
+            hold: Kind::PeriodDoubling,
+            of: "b/hopf-1".into(),
+            near: Some(0.63),
+            free: study.model.parameter_index("beta").unwrap(),
+            ranges: [[0.35, 2.5], [0.7, 1.3]],
+            until: Some(beta),
+            max_points: 500,
+        });
+        let diagram = grown(&study);
+        let curve = diagram.branch("curve").unwrap();
+        complete(curve);
+        let last = if beta > 1.0 { curve.points.last() } else { curve.points.first() }.unwrap();
+        assert!((last.parameters[0] - alpha).abs() < 1e-8 && last.parameters[1] == beta, "{:?}", last.parameters);
+    }
+}

@@ -128,6 +128,7 @@ fn the_other_direction_gives_the_same_special_points() {
         let station = growth::polished(&mut *problem, &settings, start).unwrap();
         let mut branch = Branch::new(name, known.family, OMEGA, known.origin.clone());
         let growth = growth::Growth {
+            marks: &[],
             system: &system,
             settings: &settings,
             degree: 4,

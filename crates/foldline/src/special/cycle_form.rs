@@ -16,6 +16,7 @@
 //!
 //! **Source.** kuznetsov2005; in the form of bordered equations, govaerts2000, §7.
 
+use super::normal_form::without_rounding;
 use super::on_cycles::OnCycles;
 use crate::contract::Condition;
 use crate::diagram::{Cycle, Kind, Point, Solution};
@@ -98,6 +99,13 @@ impl Form<'_, '_> {
         (self.condition.solvability(above) / self.condition.solvability(below)).re
     }
 
+    /// The sum of the ratios; zero where nothing is left of them but the error of collocation.
+    fn total(&self, terms: &[Vec<f64>], below: &[f64]) -> f64 {
+        const SHARE: f64 = 1e-9;
+        let terms: Vec<f64> = terms.iter().map(|term| self.ratio(term, below)).collect();
+        without_rounding(&terms, &terms.iter().map(|term| term.abs()).collect::<Vec<f64>>(), SHARE)
+    }
+
     fn fold(&self, v: &[f64], free: bool) -> Option<f64> {
         let mut right = scaled(&self.condition.bent(&[v, v]), 0.5);
         if free {
@@ -108,10 +116,12 @@ impl Form<'_, '_> {
 
     fn doubling(&self, v: &[f64]) -> Option<f64> {
         let (h, twice) = self.periodic(&self.condition.bent(&[v, v]))?;
-        let mut right = scaled(&self.condition.bent(&[v, v, v]), 1.0 / 6.0);
-        add(&mut right, 0.5, &self.condition.bent(&[v, &h]));
-        add(&mut right, -0.5 * twice, &self.condition.along(v));
-        Some(self.ratio(&right, v))
+        let terms = [
+            scaled(&self.condition.bent(&[v, v, v]), 1.0 / 6.0),
+            scaled(&self.condition.bent(&[v, &h]), 0.5),
+            scaled(&self.condition.along(v), -0.5 * twice),
+        ];
+        Some(self.total(&terms, v))
     }
 
     fn torus(&self, v: &[f64], angle: f64) -> Option<f64> {
@@ -125,16 +135,12 @@ impl Form<'_, '_> {
         let second = [sum(&xx, -1.0, &yy), scaled(&xy, 2.0)].concat();
         let (second, _) = operator.solved(&scaled(&second, self.period));
         let (p, q) = second.split_at(second.len() / 2);
-        // C(v, v, v̄), B(v, h₁₁), B(v̄, h₂₀), each as real and imaginary part.
-        let mut real = scaled(&sum(&c(x, x, x), 1.0, &c(x, y, y)), 0.5);
-        let mut imaginary = scaled(&sum(&c(x, x, y), 1.0, &c(y, y, y)), 0.5);
-        add(&mut real, 1.0, &b(x, &mean));
-        add(&mut imaginary, 1.0, &b(y, &mean));
-        add(&mut real, 0.5, &sum(&b(x, p), 1.0, &b(y, q)));
-        add(&mut imaginary, 0.5, &sum(&b(x, q), -1.0, &b(y, p)));
-        add(&mut real, -alpha, &self.condition.along(x));
-        add(&mut imaginary, -alpha, &self.condition.along(y));
-        Some(self.ratio(&[real, imaginary].concat(), v))
+        // C(v, v, v̄), B(v, h₁₁), B(v̄, h₂₀), A v, each as real and imaginary part.
+        let cubic = [sum(&c(x, x, x), 1.0, &c(x, y, y)), sum(&c(x, x, y), 1.0, &c(y, y, y))].concat();
+        let slow = [b(x, &mean), b(y, &mean)].concat();
+        let fast = [sum(&b(x, p), 1.0, &b(y, q)), sum(&b(x, q), -1.0, &b(y, p))].concat();
+        let along = [self.condition.along(x), self.condition.along(y)].concat();
+        Some(self.total(&[scaled(&cubic, 0.5), slow, scaled(&fast, 0.5), scaled(&along, -alpha)], v))
     }
 }
 

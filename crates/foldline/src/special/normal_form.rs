@@ -205,8 +205,10 @@ impl<'a> Local<'a> {
         // (2iω - A)⁻¹ r is minus what solves (A - 2iω) x = r.
         let second = self.solved(Complex64::new(0.0, 2.0 * omega), &self.bilinear(&q, &q))?;
         let (cubic, slow, fast) = (self.cubic(&q), self.bilinear(&q, &mean), self.bilinear(&conjugate, &second));
-        let total: Complex = [0, 1].map(|k| sum(&sum(&cubic[k], -2.0, &slow[k]), -1.0, &fast[k]));
-        Some((hermitian(&p, &total) / hermitian(&p, &q)).re / (2.0 * omega))
+        let size = hermitian(&p, &q);
+        let terms = [(1.0, &cubic), (-2.0, &slow), (-1.0, &fast)];
+        let terms = terms.map(|(factor, term)| factor * (hermitian(&p, term) / size));
+        Some(without_rounding(&terms.map(|z| z.re), &terms.map(|z| z.norm()), ROUNDING) / (2.0 * omega))
     }
 
     /// a and b of (4).
@@ -227,6 +229,15 @@ impl<'a> Local<'a> {
         let mixed = self.derivative(&[q0, &q1]);
         Some([0.5 * dot(p1, &quadratic) / size, (dot(&p0, &quadratic) + dot(p1, &mixed)) / size])
     }
+}
+
+/// Relative to the terms of a coefficient, what is left of them is no more than rounding.
+const ROUNDING: f64 = 1e-12;
+
+/// The sum of some terms; exactly zero where it is less than that share of their sizes.
+pub(super) fn without_rounding(terms: &[f64], sizes: &[f64], share: f64) -> f64 {
+    let (total, size) = (terms.iter().sum::<f64>(), sizes.iter().sum::<f64>());
+    if total.abs() <= share * size { 0.0 } else { total }
 }
 
 fn sum(a: &[f64], factor: f64, b: &[f64]) -> Vec<f64> {
