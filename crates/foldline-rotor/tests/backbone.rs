@@ -199,6 +199,7 @@ fn followed(rotor: &OverhungRotor, point: &Point, free: usize, range: [f64; 2]) 
     let mut branch = Branch::new("forced", Family::Cycle, free, Origin::Seed("reference".into()));
     let (system, settings) = (&system, &settings);
     let growth = growth::Growth {
+        marks: &[],
         system,
         settings,
         degree: 4,
