@@ -46,7 +46,7 @@ pub trait VectorField: Send + Sync {
     fn evaluate(&self, at: Batch, f: &mut [f64]);
 
     /// f and its first derivatives: `f` is `[n × lanes]`, `fx` is `[n·n × lanes]` (entry ∂fᵢ/∂xⱼ is component `i * n + j`),
-    /// `fp` is `[n·q × lanes]` with q = `free.len()` (entry ∂fᵢ/∂p_{free[c]} is component `i * q + c`).
+    /// `fp` is `[n·q × lanes]` with q = `free.len()` (entry ∂fᵢ/∂p_{free\[c\]} is component `i * q + c`).
     fn linearise(&self, at: Batch, free: &[usize], f: &mut [f64], fx: &mut [f64], fp: &mut [f64]);
 
     /// The multilinear derivative Dᵏf[d₁, …, dₖ] in states and parameters, k = `directions.len()` ≥ 1: each direction is

@@ -6,7 +6,7 @@
 //! | step | file |
 //! |---|---|
 //! | Newton's method in a hyperplane; tangent | [`corrector`] |
-//! | from one accepted point to the next | [`follow`] |
+//! | from one accepted point to the next | [`mod@follow`] |
 //! | whether a step may be accepted | `judge` |
 //! | why a side ends | `ends` |
 //! | what lies between two accepted points | [`inspect`] |

@@ -16,7 +16,7 @@
 //! | is this branch known already? | [`known`] |
 //! | where does a special point go when a second parameter changes? | [`curves`] |
 //! | how does a family get to other parameter values? | [`homotopy`] |
-//! | does a solution depend on a parameter that should not matter? | [`persistence`] |
+//! | does a solution depend on a parameter that should not matter? | [`mod@persistence`] |
 //! | what does simulation see? | [`responses`] |
 
 mod counted;
