@@ -174,7 +174,13 @@ impl Follow<'_> {
             // Neighbouring special points that cannot be told apart any more stay together.
             let apart = located.len() < 2
                 || located[located.len() - 1].2.distance - located[0].2.distance > 1e-7 * (1.0 + stretch.length);
-            if apart && let Some(middle) = self.cut(left, &stretch, cut, cost) {
+            // Exactly there Newton's method may fail.
+            let places = if apart { [cut, 0.5 * cut, 0.5 * (cut + stretch.length)] } else { [f64::NAN; 3] };
+            let middle = places
+                .into_iter()
+                .filter(|place| place.is_finite())
+                .find_map(|place| Some((place, self.cut(left, &stretch, place, cost)?)));
+            if let Some((cut, middle)) = middle {
                 let rest = stretch.length - cut;
                 let before = self.inspect(left, &middle, history, depth + 1, cost);
                 let spectrum = left.point.spectrum.clone();
