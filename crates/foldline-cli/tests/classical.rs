@@ -402,7 +402,7 @@ fn marks_lie_at_the_values_asked_for_and_a_branch_stops_there() {
     );
     // Those of the parameter itself to the last bit.
     assert!(places.contains(&0.25) && places.contains(&1.0), "{places:?}");
-    ends(line, ["bound", "bound"]);
+    ends(line, ["asked", "asked"]);
     let reach = [line.points.first(), line.points.last()].map(|p| p.unwrap().parameters[0]);
     assert!(near(reach[0], -1.5, 1e-8) && near(reach[1], 2.0, 1e-8), "{reach:?}");
 

@@ -148,7 +148,16 @@ fn what_is_wrong_with_a_forcing_is_said_where_it_stands() {
     };
     for (forcing, equation, expected) in [
         ("", "-x + cos(w*t)", "[forcing]"),
-        ("[forcing]\nfrequency = \"w\"", "-x + cos(1.5*w*t)", "do not repeat themselves after the period 3.14159"),
+        (
+            "[forcing]\nfrequency = \"w\"",
+            "-x + cos(1.5*w*t)",
+            "the equation of `x` does not repeat itself after the period 3.14159",
+        ),
+        (
+            "[forcing]\nfrequency = \"w\"\n[outputs]\no = \"x*cos(w*t/2)\"",
+            "-x + cos(w*t)",
+            "the output `o` does not repeat itself after the period 3.14159",
+        ),
         ("[forcing]\nfrequency = \"x\"", "-x + cos(w*t)", "the forcing depends on `x`, which is a state"),
         ("[forcing]\nfrequency = \"t\"", "-x + cos(w*t)", "the forcing depends on `t`, which is the time"),
         ("[forcing]\nperiod = \"-w\"", "-x + cos(w*t)", "the period of the forcing is -2"),
@@ -165,4 +174,47 @@ fn what_is_wrong_with_a_forcing_is_said_where_it_stands() {
         let found = told(forcing, equation);
         assert!(found.contains(expected), "{forcing} {equation}:\n{found}");
     }
+}
+
+/// Two frequencies that agree by default do so at the default only.
+#[test]
+fn a_branch_on_which_the_forcing_does_not_repeat_itself_is_refused() {
+    let model = "[parameters]\nomega = 0.8\nw2 = 0.8\nA = 0.1\n[forcing]\nfrequency = \"omega\"\n[states.x]\nequation = \
+                 \"-x + A*cos(omega*t) + A*sin(w2*t)\"\n";
+    for (free, range, code) in
+        [("omega", "[0.5, 1]", "no-start"), ("w2", "[0.5, 1]", "no-start"), ("A", "[0, 1]", "bound")]
+    {
+        let text = one_branch("attractor = \"cycle\"\nsamples = 8", &format!("free = \"{free}\"\nrange = {range}"));
+        let study = parse_study(&format!("model = \"m\"\n{text}"), "study", model, "model").unwrap();
+        let system = System::of_plan(&study.model, &study.plan);
+        let diagram = explore::run(&system, &study.plan, 1, Diagram::default(), &Unobserved);
+        let end = diagram.branches[0].ends[1].as_ref().unwrap();
+        assert_eq!(end.code(), code, "{free}: {end}");
+        assert!(code == "bound" || end.to_string().contains("does not repeat itself"), "{end}");
+    }
+    // A frequency that changes its sign on the way has no period there.
+    let model = "[parameters]\nomega = 0.8\nA = 0.1\n[forcing]\nfrequency = \"omega\"\n[states.x]\nequation = \"-x + A*cos(omega*t)\"\n";
+    let text = one_branch("attractor = \"cycle\"\nsamples = 8", "free = \"omega\"\nrange = [-0.5, 1]");
+    let study = parse_study(&format!("model = \"m\"\n{text}"), "study", model, "model").unwrap();
+    let system = System::of_plan(&study.model, &study.plan);
+    let diagram = explore::run(&system, &study.plan, 1, Diagram::default(), &Unobserved);
+    let branch = &diagram.branches[0];
+    assert!(branch.points.iter().all(|p| p.parameters[0] > 0.0), "{:?}", branch.ends);
+    assert!(!branch.ends[0].as_ref().unwrap().complete() && branch.special.is_empty());
+}
+
+/// Rest of a parametrically forced oscillator, approached in slow oscillations, is a cycle of one period of the forcing and loses its
+/// stability by period doubling. Mathieu's equation with damping: near eps = 4 zeta, here with its next terms from shooting.
+#[test]
+fn rest_under_parametric_forcing_doubles_its_period() {
+    let model = "[parameters]\nomega = 2\neps = 0\nzeta = 0.02\n[forcing]\nfrequency = \"omega\"\n[states.x]\nequation = \
+                 \"v\"\n[states.v]\nequation = \"-2*zeta*v - (1 + eps*cos(omega*t))*x - x^3\"\n";
+    let text = one_branch("attractor = \"cycle\"\nsamples = 8", "free = \"eps\"\nrange = [0, 0.2]");
+    let study = parse_study(&format!("model = \"m\"\n{text}"), "study", model, "model").unwrap();
+    let system = System::of_plan(&study.model, &study.plan);
+    let diagram = explore::run(&system, &study.plan, 1, Diagram::default(), &Unobserved);
+    let branch = &diagram.branches[0];
+    let [special] = &branch.special[..] else { panic!("{:?} {:?}", branch.special.len(), branch.ends) };
+    assert_eq!((special.kind, special.point.solution.forcing_periods()), (Kind::PeriodDoubling, 1));
+    assert!((special.point.parameters[1] - 0.08).abs() < 1e-4, "{:?}", special.point.parameters);
 }

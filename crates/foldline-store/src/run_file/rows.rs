@@ -175,7 +175,9 @@ pub(super) fn point_in(row: &Row) -> Result<(Point, Vec<f64>), String> {
 /// `detail, kind, count, value_bytes` of an ending; its code and sentence come from the ending itself.
 pub(super) fn ending_values(ending: &Ending) -> [Value; 4] {
     let (detail, kind, count, value) = match ending {
-        Ending::Bound(value) | Ending::PeriodUnbounded(value) => (None, None, None, Some(*value)),
+        Ending::Bound(value) | Ending::PeriodUnbounded(value) | Ending::Asked(value) => {
+            (None, None, None, Some(*value))
+        }
         Ending::Joined { at, parameter } => (None, Some(*at), None, Some(*parameter)),
         Ending::StepTooSmall(why)
         | Ending::MeshTooLarge(why)
@@ -200,6 +202,7 @@ pub(super) fn ending_in(row: &Row) -> Result<Ending, String> {
     let value = || single(row, "value_bytes");
     Ok(match text("code")?.unwrap_or_default().as_str() {
         "bound" => Ending::Bound(value()?),
+        "asked" => Ending::Asked(value()?),
         "closed" => Ending::Closed,
         "joined" => Ending::Joined { at: kind_named(&text("kind")?.unwrap_or_default())?, parameter: value()? },
         "step-too-small" => Ending::StepTooSmall(detail()?),

@@ -50,7 +50,9 @@ impl Context<'_> {
         let polished = |candidate: &Candidate| (self.polish)(candidate).filter(|point| point.unstable == 0);
         let point = polished(candidate)?;
         let once = match &point.solution {
-            Solution::Cycle(cycle) => primitive(cycle).and_then(|candidate| polished(&candidate)),
+            Solution::Cycle(cycle) => {
+                primitive(cycle, &self.sampling.scales).and_then(|candidate| polished(&candidate))
+            }
             Solution::Equilibrium(_) => None,
         };
         Some(Orbit::new(once.unwrap_or(point), &self.sampling.scales, self.sampling.whirl))
@@ -124,14 +126,15 @@ fn extents(states: &[f64], n: usize) -> Vec<f64> {
 
 /// One turn of a cycle that runs several times around nearly the same loop, as a candidate: the cycle may be another one
 /// several times over, or have just doubled its period.
-fn primitive(cycle: &Cycle) -> Option<Candidate> {
+fn primitive(cycle: &Cycle, scales: &[f64]) -> Option<Candidate> {
     const COUNT: usize = 240;
     const PROBES: usize = 24;
     let n = cycle.dim();
     let states = cycle.uniform(COUNT);
     // A component that hardly moves is compared to a part of its size: what it does move is the error of the solution.
     let size = |i: usize| states.iter().skip(i).step_by(n).fold(0.0, |m: f64, x| m.max(x.abs()));
-    let extent: Vec<f64> = extents(&states, n).iter().enumerate().map(|(i, e)| e.max(0.01 * size(i))).collect();
+    let extent: Vec<f64> =
+        extents(&states, n).iter().enumerate().map(|(i, e)| e.max(0.01 * size(i)).max(1e-6 * scales[i])).collect();
     let repeats = |turns: usize| {
         (0..PROBES).map(|k| k as f64 / PROBES as f64).all(|t| {
             let (here, there) = (cycle.state(t), cycle.state(t + 1.0 / turns as f64));
@@ -168,7 +171,7 @@ mod tests {
     #[test]
     fn a_cycle_run_through_several_times_is_reduced_to_one_turn() {
         for turns in [2, 3, 7] {
-            let Some(Candidate::Cycle { period, times, states }) = primitive(&ellipse(turns, 0.0)) else {
+            let Some(Candidate::Cycle { period, times, states }) = primitive(&ellipse(turns, 0.0), &[1.0; 2]) else {
                 panic!("{turns} turns not seen")
             };
             assert_eq!((period, times.last()), (6.0 / turns as f64, Some(&period)));
@@ -178,7 +181,7 @@ mod tests {
                 assert!((x[0] - angle.cos()).abs() < 1e-5 && (x[1] - 2.0 * angle.sin()).abs() < 1e-5);
             }
         }
-        assert!(primitive(&ellipse(1, 0.0)).is_none());
-        assert!(primitive(&ellipse(2, 0.1)).is_none(), "a cycle of twice the period is not its half");
+        assert!(primitive(&ellipse(1, 0.0), &[1.0; 2]).is_none());
+        assert!(primitive(&ellipse(2, 0.1), &[1.0; 2]).is_none(), "a cycle of twice the period is not its half");
     }
 }

@@ -89,10 +89,21 @@ impl Follow<'_> {
             if pitchfork || (standing && matches!(kind, Kind::Fold | Kind::BranchPoint)) {
                 continue;
             }
+            let monitor = &*self.monitors[k];
+            // A value that was asked for and is met at the end of a step, as at a bound, is there; at the beginning it was.
+            if kind == Kind::Mark && values.contains(&0.0) {
+                let again =
+                    located.iter().any(|(kind, _, found)| *kind == Kind::Mark && found.distance == stretch.length);
+                if values[1] == 0.0 && values[0] != 0.0 && !again {
+                    let error = 10.0 * self.settings.newton_tolerance();
+                    located.push((kind, 0, Located { distance: stretch.length, station: right.clone(), error }));
+                    others.push(None);
+                }
+                continue;
+            }
             if (values[0] > 0.0) == (values[1] > 0.0) || values.iter().any(|v| v.is_nan()) {
                 continue;
             }
-            let monitor = &*self.monitors[k];
             let mut jump = monitor.jump();
             let mut found = locate(self.problem, self.settings, &stretch, monitor, values, cost);
             let singular = matches!(kind, Kind::Fold | Kind::BranchPoint) || kind.has_codimension_two();
@@ -175,7 +186,12 @@ impl Follow<'_> {
             let apart = located.len() < 2
                 || located[located.len() - 1].2.distance - located[0].2.distance > 1e-7 * (1.0 + stretch.length);
             // Exactly there Newton's method may fail.
-            let places = if apart { [cut, 0.5 * cut, 0.5 * (cut + stretch.length)] } else { [f64::NAN; 3] };
+            let places = match &located[..] {
+                _ if apart => [cut, 0.5 * cut, 0.5 * (cut + stretch.length)],
+                // What else there is lies before or behind them.
+                [a, .., b] if !explained => [0.5 * (b.2.distance + stretch.length), 0.5 * a.2.distance, f64::NAN],
+                _ => [f64::NAN; 3],
+            };
             let middle = places
                 .into_iter()
                 .filter(|place| place.is_finite())

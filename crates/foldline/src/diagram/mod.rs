@@ -394,6 +394,8 @@ pub enum Ending {
     NotFinite(String),
     /// The start did not converge.
     NoStart(String),
+    /// A quantity has the value at which the study asks to stop.
+    Asked(f64),
     /// The observer asked to stop.
     Stopped,
 }
@@ -412,6 +414,7 @@ impl Ending {
             Ending::PointLimit(_) => "point-limit",
             Ending::NotFinite(_) => "not-finite",
             Ending::NoStart(_) => "no-start",
+            Ending::Asked(_) => "asked",
             Ending::Stopped => "stopped",
         }
     }
@@ -424,7 +427,7 @@ impl Ending {
 
     /// Whether the branch ended where it should: at a bound, closed, or joined to another branch.
     pub fn complete(&self) -> bool {
-        matches!(self, Ending::Bound(_) | Ending::Closed | Ending::Joined { .. })
+        matches!(self, Ending::Bound(_) | Ending::Closed | Ending::Joined { .. } | Ending::Asked(_))
     }
 }
 
@@ -432,6 +435,7 @@ impl fmt::Display for Ending {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
             Ending::Bound(value) => write!(f, "reached {value}"),
+            Ending::Asked(value) => write!(f, "stopped where the study asks to, at the value {value}"),
             Ending::Closed => write!(f, "closed on itself"),
             Ending::Joined { at: Kind::Hopf, parameter } => write!(f, "shrank to an equilibrium at {parameter:.6}"),
             Ending::Joined { at: Kind::PeriodDoubling, parameter } => {

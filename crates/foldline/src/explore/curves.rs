@@ -85,6 +85,7 @@ pub fn follow(
     branch.held = Some((curve.hold, parent.free));
     let begun = special.and_then(|special| {
         let at = special.point.parameters[curve.free];
+        system.repeats(&special.point.parameters, &[(parent.free, curve.ranges[0]), (curve.free, curve.ranges[1])])?;
         let (settings, sides) = settings(system, plan, curve, parent.free, at);
         let line = Line { held: branch.held, ..Line::new(curve.free) };
         let mut problem = line.problem(system, plan.degree, &special.point);

@@ -169,6 +169,7 @@ impl Work<'_> {
             let value = point.parameters.get(plan.free).copied().unwrap_or(0.0);
             let name = format!("the start {value} lies outside the range {:?}", plan.range);
             let inside = plan.until.is_some() || (plan.range[0] <= value && value <= plan.range[1]);
+            self.system.repeats(&point.parameters, &[(plan.free, plan.range)])?;
             let (settings, sides) = self.growth_settings(plan, &point);
             let mut problem = growth::problem_of(self.system, plan.free, self.plan.degree, &point, false);
             let station = growth::polished(&mut *problem, &settings, &point).map_err(|why| why.to_string())?;
@@ -333,6 +334,7 @@ fn end_of(branch: &Branch, plan: &BranchPlan) -> Result<Point, String> {
     let arrived = |value: f64| plan.until.is_none_or(|target| (value - target).abs() <= 1e-9 * (1.0 + target.abs()));
     match (&branch.ends[side], point) {
         (Some(Ending::Bound(value)), Some(point)) if arrived(*value) => Ok(point.clone()),
+        (Some(Ending::Asked(_)), Some(point)) => Ok(point.clone()),
         (Some(other), _) => Err(format!("branch {} did not get to its end: {other}", plan.name)),
         _ => Err(format!("branch {} was not finished", plan.name)),
     }

@@ -229,7 +229,20 @@ impl Growth<'_> {
         match beginning {
             Beginning::Inside(start) => {
                 let point = Point { position: 0, step: self.settings.first_step, ..start.point };
+                let marked = self.marks.iter().filter(|mark| mark.quantity.of(&point) == Some(mark.value)).count();
+                let special = SpecialPoint {
+                    kind: Kind::Mark,
+                    unstable_before: point.unstable,
+                    unstable_after: point.unstable,
+                    error: 10.0 * self.settings.newton_tolerance(),
+                    coefficients: Vec::new(),
+                    point: point.clone(),
+                };
                 going &= self.accept(branch, point);
+                for _ in 0..marked.min(1) {
+                    branch.insert_special(special.clone());
+                    going &= self.tell(Event::Special(branch, &special));
+                }
             }
             Beginning::Edge { before, first, joined } => {
                 let count = before.len() as i64;

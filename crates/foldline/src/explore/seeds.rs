@@ -48,8 +48,7 @@ pub fn find(system: &System, plan: &Plan, jobs: usize, earlier: &Diagram, observ
     for (index, census) in &censuses {
         observer.observe(Event::Note(&plan.seeds[*index].name, &summary(census)));
     }
-    let point = |(seed, needed): (&SeedPlan, bool)| match &seed.source {
-        _ if !needed => Err("not needed".into()),
+    let found = |seed: &SeedPlan| match &seed.source {
         SeedSource::State(state) => from_state(system, seed, plan, state, jobs).map(|p| with_degree(p, plan.degree)),
         SeedSource::Attractor(key) => match censuses.iter().find(|(other, _)| share(&plan.seeds[*other], seed)) {
             Some((_, census)) => chosen(census, key)
@@ -57,6 +56,10 @@ pub fn find(system: &System, plan: &Plan, jobs: usize, earlier: &Diagram, observ
                 .ok_or_else(|| missing(system, seed, census, key)),
             None => Err("no census".into()),
         },
+    };
+    let point = |(seed, needed): (&SeedPlan, bool)| match needed {
+        true => system.repeats(&seed.parameters, &[]).and_then(|()| found(seed)),
+        false => Err("not needed".into()),
     };
     Seeds { points: plan.seeds.iter().zip(needed.iter().copied()).map(point).collect() }
 }
@@ -72,7 +75,8 @@ fn censuses(system: &System, plan: &Plan, jobs: usize, needed: &[bool]) -> Vec<(
     let mut first: Vec<usize> = Vec::new();
     for (index, seed) in plan.seeds.iter().enumerate() {
         let sampled = matches!(seed.source, SeedSource::Attractor(_));
-        if needed[index] && sampled && !first.iter().any(|other| share(&plan.seeds[*other], seed)) {
+        let repeats = system.repeats(&seed.parameters, &[]).is_ok();
+        if needed[index] && sampled && repeats && !first.iter().any(|other| share(&plan.seeds[*other], seed)) {
             first.push(index);
         }
     }
@@ -142,7 +146,7 @@ fn polish(system: &System, parameters: &[f64], tolerance: f64, candidate: &Candi
     let solution = match candidate {
         Candidate::Equilibrium(x) => Solution::Equilibrium(x.clone()),
         Candidate::Cycle { period, times, states } => {
-            let mut cycle = first_profile(system.field.dim(), *period, times, states);
+            let mut cycle = first_profile(&system.scales, *period, times, states);
             if system.field.forced() {
                 cycle.forcing_periods = period.round() as u32;
             }
@@ -178,12 +182,15 @@ fn bare(parameters: &[f64], solution: Solution) -> Point {
 }
 
 /// A trajectory over one period as a profile on a mesh with equal arclength per interval.
-fn first_profile(n: usize, period: f64, times: &[f64], states: &[f64]) -> Cycle {
+fn first_profile(scales: &[f64], period: f64, times: &[f64], states: &[f64]) -> Cycle {
+    // Of what moves less only the time counts.
+    const LEAST: f64 = 1e-8;
+    let n = scales.len();
     // A cycle of many turns needs more of them.
     let intervals = (times.len() / 12).clamp(60, 1200);
     let scheme = Scheme::new(4);
     let size: Vec<f64> =
-        (0..n).map(|i| states.iter().skip(i).step_by(n).fold(1e-300, |m: f64, v| m.max(v.abs()))).collect();
+        (0..n).map(|i| states.iter().skip(i).step_by(n).fold(LEAST * scales[i], |m: f64, v| m.max(v.abs()))).collect();
     // Arclength in scaled states, plus time, so that no interval becomes empty.
     let mut length = vec![0.0];
     for k in 1..times.len() {
@@ -215,7 +222,9 @@ fn first_profile(n: usize, period: f64, times: &[f64], states: &[f64]) -> Cycle 
                     let k = times.partition_point(|g| *g <= t * period).clamp(1, count.max(2) - 1);
                     cubic(times, states, n, i, k, t * period)
                 };
-                profile.push(component - t * gap[i]);
+                let value = component - t * gap[i];
+                // What has decayed to nothing is nothing.
+                profile.push(if value.abs() < f64::EPSILON * scales[i] { 0.0 } else { value });
             }
         }
     }

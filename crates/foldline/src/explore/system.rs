@@ -3,6 +3,7 @@
 use super::plan::Plan;
 use crate::contract::{Batch, Parameters, VectorField};
 use crate::model::Model;
+use crate::model::forcing::unrepeated;
 
 /// A vector field, its scales, and where to look for attractors.
 #[derive(Clone)]
@@ -78,6 +79,33 @@ impl<'a> System<'a> {
             common.mirrors.retain(|_| kept.next().unwrap_or(true));
         }
         common
+    }
+
+    /// That a forced field repeats itself at these parameters `[k]` and at others, each of them anywhere in its range.
+    ///
+    /// # Errors
+    /// A sentence that says what does not.
+    pub fn repeats(&self, parameters: &[f64], moving: &[(usize, [f64; 2])]) -> Result<(), String> {
+        const SHARES: [f64; 3] = [0.0, 0.371, 0.829];
+        for share in SHARES {
+            let mut there = parameters.to_vec();
+            for (index, [low, high]) in moving.iter().filter(|_| share > 0.0) {
+                there[*index] = low + share * (high - low);
+            }
+            // Where a range reaches beyond the periods that make sense the branch ends on its way there.
+            let senseless = share > 0.0 && self.field.time_unit(&there) <= 0.0;
+            let wrong = unrepeated(self.field, &self.state_names, &self.ranges, &there).filter(|_| !senseless);
+            if let Some([message, hint]) = wrong {
+                let moved: Vec<String> = moving.iter().map(|(k, _)| format!("{}", there[*k])).collect();
+                let place = if moved.is_empty() {
+                    String::new()
+                } else {
+                    format!(", with {} for what varies", moved.join(" and "))
+                };
+                return Err(format!("{message}{place}: {hint}"));
+            }
+        }
+        Ok(())
     }
 
     /// Whether a forced field is equivariant under one of [`System::reflections`], half a period of the forcing later if `half`

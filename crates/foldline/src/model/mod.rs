@@ -10,6 +10,7 @@
 mod compile;
 mod derive;
 mod error;
+pub mod forcing;
 mod function;
 mod graph;
 mod identities;
@@ -117,56 +118,12 @@ impl Model {
 
     /// A forcing that does not repeat itself after the period it is said to have.
     fn wrong_period(&self) -> Option<ModelError> {
-        const PLACES: usize = 16;
-        const SAME: f64 = 1e-8;
-        let parameters = self.defaults();
-        let report = |message: String, hint: &str| ModelError {
-            item: Item::Forcing,
-            field: Field::Expression,
-            name: String::new(),
-            span: None,
-            message,
-            hint: hint.into(),
-        };
-        let unit = self.inner.period.as_ref().map(|_| self.time_unit(&parameters))?;
-        if !(unit > 0.0 && unit.is_finite()) {
-            let message = format!("the period of the forcing is {unit} at the values of the parameters");
-            return Some(report(message, "a period, and a frequency, is a positive number"));
-        }
-        let n = self.dim();
-        let at = |time: f64, states: &[f64]| {
-            let mut f = vec![0.0; n];
-            self.evaluate(
-                Batch { lanes: 1, states, parameters: Parameters::Shared(&parameters), times: &[time] },
-                &mut f,
-            );
-            f
-        };
-        for place in 0..PLACES {
-            let share = |k: usize| (0.5 + (k * PLACES + place) as f64 * 0.618_033_988_7).fract();
-            let states: Vec<f64> = self
-                .states
-                .iter()
-                .enumerate()
-                .map(|(i, s)| s.range[0] + share(i) * (s.range[1] - s.range[0]))
-                .collect();
-            let time = share(n);
-            let (now, later) = (at(time, &states), at(time + 1.0, &states));
-            for (i, (a, b)) in now.iter().zip(&later).enumerate() {
-                if (a - b).abs() > SAME * (a.abs() + b.abs() + unit * self.states[i].scale) {
-                    let (name, time) = (&self.states[i].name, time * unit);
-                    let message = format!(
-                        "the equations do not repeat themselves after the period {unit}: that of `{name}` is {:.6} at t = \
-                         {time:.6} and {:.6} one period later, in the same state",
-                        a / unit,
-                        b / unit
-                    );
-                    let hint = "say the frequency or period that all of the forcing has in common";
-                    return Some(report(message, hint));
-                }
-            }
-        }
-        None
+        let names: Vec<String> =
+            self.states.iter().map(|s| &s.name).chain(self.outputs.iter().map(|o| &o.name)).cloned().collect();
+        let ranges: Vec<[f64; 2]> = self.states.iter().map(|s| s.range).collect();
+        let [message, hint] = forcing::unrepeated(self, &names, &ranges, &self.defaults())?;
+        let (item, field) = (Item::Forcing, Field::Expression);
+        Some(ModelError { item, field, name: String::new(), span: None, message, hint })
     }
 
     /// Position of the parameter of that name.

@@ -59,6 +59,6 @@ impl Monitor for Mark {
     fn ending(&self, at: &Point, _parameter: f64) -> Option<Ending> {
         const SAME: f64 = 1e-4;
         let own = self.quantity.of(at).is_some_and(|own| (own - self.value).abs() <= SAME * (1.0 + self.value.abs()));
-        (self.stop && own).then_some(Ending::Bound(self.value))
+        (self.stop && own).then_some(Ending::Asked(self.value))
     }
 }

@@ -309,7 +309,8 @@ impl ZeroProblem for CycleProblem<'_> {
         let size = self.profile_size();
         self.gather(u);
         let parameters = self.setting.at(&u[size + 1..]);
-        let (lanes, parameters) = (self.lanes(), Parameters::Shared(&parameters));
+        let all = parameters;
+        let (lanes, parameters) = (self.lanes(), Parameters::Shared(&all));
         let batch = Batch { lanes, states: &self.states, parameters, times: &self.times };
         self.setting.field.evaluate(batch, &mut self.f);
         let phase = match self.width {
@@ -320,7 +321,8 @@ impl ZeroProblem for CycleProblem<'_> {
             true => u[size] - f64::from(self.forcing_periods),
             false => phase - self.phase_offset,
         };
-        max_abs(&r[..=size]).is_finite() && u[size] > 0.0
+        let unit = if self.is_forced() { self.setting.field.time_unit(&all) } else { 1.0 };
+        max_abs(&r[..=size]).is_finite() && u[size] > 0.0 && unit > 0.0 && unit.is_finite()
     }
 
     fn factorise(&mut self, u: &[f64], rows: &[f64]) -> Result<(), Singular> {

@@ -1,0 +1,61 @@
+//! Whether a forced field repeats itself after the period that it states.
+
+use crate::contract::{Batch, Parameters, VectorField};
+
+/// What does not, and what would be right: the period is no positive number at these parameters `[k]`, or some equation or output is not
+/// the same one period later. States are taken from `ranges` `[n]`; `names` are those of the states, then of the outputs, as far as known.
+/// `None` for a field that is not forced.
+pub fn unrepeated(
+    field: &dyn VectorField,
+    names: &[String],
+    ranges: &[[f64; 2]],
+    parameters: &[f64],
+) -> Option<[String; 2]> {
+    const PLACES: usize = 16;
+    const SAME: f64 = 1e-8;
+    if !field.forced() {
+        return None;
+    }
+    let (n, outputs) = (field.dim(), field.output_count());
+    let unit = field.time_unit(parameters);
+    if !(unit > 0.0 && unit.is_finite()) {
+        let message = format!("the period of the forcing is {unit}");
+        return Some([message, "a period, and a frequency, is a positive number".into()]);
+    }
+    let at = |time: f64, states: &[f64]| {
+        let (mut f, mut g) = (vec![0.0; n], vec![0.0; outputs]);
+        let batch = Batch { lanes: 1, states, parameters: Parameters::Shared(parameters), times: &[time] };
+        field.evaluate(batch, &mut f);
+        field.outputs(batch, &mut g);
+        // Per unit of time.
+        f.iter_mut().for_each(|f| *f /= unit);
+        [f, g].concat()
+    };
+    for place in 0..PLACES {
+        let share = |k: usize| (0.5 + (k * PLACES + place) as f64 * 0.618_033_988_7).fract();
+        let states: Vec<f64> =
+            ranges.iter().enumerate().map(|(i, [low, high])| low + share(i) * (high - low)).collect();
+        let time = share(n);
+        let (now, later) = (at(time, &states), at(time + 1.0, &states));
+        let size = now.iter().chain(&later).filter(|x| x.is_finite()).fold(0.0f64, |m, x| m.max(x.abs()));
+        for (i, (a, b)) in now.iter().zip(&later).enumerate() {
+            if (a - b).abs() > SAME * (a.abs() + b.abs() + size) {
+                let own = match names.get(i) {
+                    Some(name) if i < n => format!("the equation of `{name}`"),
+                    Some(name) => format!("the output `{name}`"),
+                    None => "an output".into(),
+                };
+                let time = time * unit;
+                let message = format!(
+                    "{own} does not repeat itself after the period {unit} of the forcing: it is {a:.6} at t = {time:.6} and {b:.6} one \
+                     period later, in the same state"
+                );
+                return Some([
+                    message,
+                    "say the frequency or period that all that depends on `t` has in common".into(),
+                ]);
+            }
+        }
+    }
+    None
+}
