@@ -186,12 +186,7 @@ impl Follow<'_> {
             let apart = located.len() < 2
                 || located[located.len() - 1].2.distance - located[0].2.distance > 1e-7 * (1.0 + stretch.length);
             // Exactly there Newton's method may fail.
-            let places = match &located[..] {
-                _ if apart => [cut, 0.5 * cut, 0.5 * (cut + stretch.length)],
-                // What else there is lies before or behind them.
-                [a, .., b] if !explained => [0.5 * (b.2.distance + stretch.length), 0.5 * a.2.distance, f64::NAN],
-                _ => [f64::NAN; 3],
-            };
+            let places = if apart { [cut, 0.5 * cut, 0.5 * (cut + stretch.length)] } else { [f64::NAN; 3] };
             let middle = places
                 .into_iter()
                 .filter(|place| place.is_finite())
