@@ -105,11 +105,15 @@ impl Place {
     }
 }
 
-/// Whether two rows are the same special point within their stated errors: branch, kind, parameter first, error last.
+/// Whether two rows are the same special point within their stated errors: branch, kind, parameter first, error and normal form last.
 fn same(a: &str, b: &str) -> bool {
-    let [a, b] = [a, b].map(|row| row.split(',').collect::<Vec<&str>>());
-    let number = |text: Option<&&str>| text.and_then(|text| text.parse::<f64>().ok()).unwrap_or(f64::NAN);
-    let (x, y) = (number(a.get(2)), number(b.get(2)));
-    let allowed = number(a.last()) + number(b.last());
-    a[..2] == b[..2] && (x - y).abs() <= allowed * (1.0 + x.abs())
+    let number = |text: Option<&str>| text.and_then(|text| text.parse::<f64>().ok()).unwrap_or(f64::NAN);
+    // A normal form in which there is a comma is quoted.
+    let error = |row: &str| {
+        let end = if row.ends_with('"') { row.rfind(",\"") } else { row.rfind(',') };
+        number(row[..end.unwrap_or(row.len())].rsplit(',').next())
+    };
+    let heads = |row: &str| row.split(',').take(2).map(str::to_string).collect::<Vec<String>>();
+    let [x, y] = [a, b].map(|row| number(row.split(',').nth(2)));
+    heads(a) == heads(b) && (x - y).abs() <= (error(a) + error(b)) * (1.0 + x.abs())
 }
