@@ -106,7 +106,14 @@ fn curves_of_co_oxidation_have_their_points_of_codimension_two() {
             [(0.8913189808, 0.2324873542), (0.9242550152, 0.3058792675)].map(|(q, k)| (GeneralisedHopf, q, k));
         let turn = (Fold, turn.point.parameters[1], turn.point.parameters[6]);
         lies_on(&hopf, &[turn, generalised[0], generalised[1], a, b]);
+        // Where the curve turns in k is its lowest point, which its own points surround.
+        let lowest = curve.points.iter().map(|p| p.parameters[6]).fold(f64::INFINITY, f64::min);
+        assert!(turn.2 <= lowest + 1e-9 && lowest - turn.2 < 1e-2, "{} {lowest}", turn.2);
         // Between the two generalised Hopf points the first Lyapunov coefficient has the other sign.
+        let model = study(model, branch).model;
+        let first = |p: &foldline::diagram::Point| foldline::special::normal_form::coefficients(&model, Hopf, p)[0];
+        let signs: Vec<bool> = curve.points[1..curve.points.len() - 1].iter().map(|p| first(p) > 0.0).collect();
+        assert_eq!(signs.windows(2).filter(|pair| pair[0] != pair[1]).count(), 2, "{signs:?}");
         for end in &curve.ends {
             assert_eq!(end.as_ref().unwrap().code(), "joined");
         }

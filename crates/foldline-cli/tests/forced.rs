@@ -172,6 +172,8 @@ fn what_is_wrong_with_a_forcing_is_said_where_it_stands() {
         ),
     ] {
         let found = told(forcing, equation);
+        // One mistake is told once.
+        assert_eq!(found.matches("error").count(), 1, "{forcing} {equation}:\n{found}");
         assert!(found.contains(expected), "{forcing} {equation}:\n{found}");
     }
 }

@@ -34,12 +34,14 @@ pub fn read_model(path: &Path) -> Result<(Model, String), Vec<Diagnostic>> {
 /// Reads a model text; `file` is its name in messages. Every mistake found is returned.
 pub fn parse_model(text: &str, file: &str) -> Result<Model, Vec<Diagnostic>> {
     let (walk, root) = Walk::parse(text, file)?;
-    let mut reader = Reader { walk, text, places: HashMap::new() };
+    let mut reader = Reader { walk, text, places: HashMap::new(), forcing_misspelt: false };
     let source = reader.source(&root, file);
     match Model::compile(source) {
         Ok(model) if reader.walk.found.is_empty() => Ok(model),
         Ok(_) => Err(reader.walk.found),
         Err(errors) => {
+            let told = |error: &ModelError| !(reader.forcing_misspelt && error.item == Item::Forcing);
+            let errors: Vec<ModelError> = errors.into_iter().filter(told).collect();
             errors.into_iter().for_each(|error| reader.report(error));
             let mut found = reader.walk.found;
             found.sort_by_key(|diagnostic| (diagnostic.line, diagnostic.column));
@@ -53,6 +55,7 @@ struct Reader<'t> {
     walk: Walk<'t>,
     text: &'t str,
     places: HashMap<(Item, Field), Range<usize>>,
+    forcing_misspelt: bool,
 }
 
 /// The entries of a table in the order of the file.
@@ -120,10 +123,14 @@ impl Reader<'_> {
     /// `frequency` or `period`, one of the two.
     fn forcing(&mut self, value: &Value) -> Option<Forcing> {
         let table = self.walk.table(value, "`forcing`")?;
+        let before = self.walk.found.len();
         self.walk.only(table, &["frequency", "period"], "`forcing`");
+        // Nothing further is said of a period whose key is misspelt, nor of the time.
+        self.forcing_misspelt = self.walk.found.len() > before;
         let (is_frequency, own) = match (table.get("frequency"), table.get("period")) {
             (Some(own), None) => (true, own),
             (None, Some(own)) => (false, own),
+            _ if self.forcing_misspelt => return Some(Forcing { is_frequency: false, expression: "1".into() }),
             (both, _) => {
                 let message =
                     if both.is_some() { "both a frequency and a period" } else { "no frequency and no period" };

@@ -186,10 +186,10 @@ impl Follow<'_> {
             let apart = located.len() < 2
                 || located[located.len() - 1].2.distance - located[0].2.distance > 1e-7 * (1.0 + stretch.length);
             // Exactly there Newton's method may fail.
-            let places = if apart { [cut, 0.5 * cut, 0.5 * (cut + stretch.length)] } else { [f64::NAN; 3] };
+            let places = [cut, 0.5 * cut, 0.5 * (cut + stretch.length)];
             let middle = places
                 .into_iter()
-                .filter(|place| place.is_finite())
+                .filter(|_| apart)
                 .find_map(|place| Some((place, self.cut(left, &stretch, place, cost)?)));
             if let Some((cut, middle)) = middle {
                 let rest = stretch.length - cut;

@@ -132,9 +132,8 @@ impl<'a> Local<'a> {
         (0..ROUNDS).try_fold([generic(1.3), generic(1.9)], |vectors, _| self.null_vectors_near(&vectors))
     }
 
-    /// The same from approximate ones, by a system that is regular where an eigenvalue 0 is double too: they change smoothly with the place
-    /// and keep their direction.
-    pub fn null_vectors_near(&self, [q, p]: &[Vec<f64>; 2]) -> Option<[Vec<f64>; 2]> {
+    /// The factors of A with the column p and the row q.
+    fn with_borders(&self, q: &[f64], p: &[f64]) -> Option<(Vec<f64>, Vec<usize>)> {
         let (n, size) = (self.n, self.n + 1);
         let mut matrix = vec![0.0; size * size];
         for i in 0..n {
@@ -143,6 +142,14 @@ impl<'a> Local<'a> {
         }
         let mut pivots = vec![0; size];
         lu::factorise(&mut matrix, size, &mut pivots).ok()?;
+        Some((matrix, pivots))
+    }
+
+    /// The same from approximate ones, by a system that is regular where an eigenvalue 0 is double too: they change smoothly with the place
+    /// and keep their direction.
+    pub fn null_vectors_near(&self, [q, p]: &[Vec<f64>; 2]) -> Option<[Vec<f64>; 2]> {
+        let (n, size) = (self.n, self.n + 1);
+        let (matrix, pivots) = self.with_borders(q, p)?;
         let (mut v, mut w) = (vec![0.0; size], vec![0.0; size]);
         (v[n], w[n]) = (1.0, 1.0);
         lu::solve(&matrix, size, &pivots, &mut v, 1);
@@ -159,13 +166,7 @@ impl<'a> Local<'a> {
     /// Solves A y = r with ⟨p, y⟩ = 0 where that has a solution, for q and p as [`Local::null_vectors`] gives them.
     fn bordered(&self, [q, p]: &[Vec<f64>; 2], r: &[f64]) -> Option<Vec<f64>> {
         let (n, size) = (self.n, self.n + 1);
-        let mut matrix = vec![0.0; size * size];
-        for i in 0..n {
-            matrix[i * size..i * size + n].copy_from_slice(&self.jacobian[i * n..(i + 1) * n]);
-            (matrix[i * size + n], matrix[n * size + i]) = (p[i], q[i]);
-        }
-        let mut pivots = vec![0; size];
-        lu::factorise(&mut matrix, size, &mut pivots).ok()?;
+        let (matrix, pivots) = self.with_borders(q, p)?;
         let mut y = [r, &[0.0]].concat();
         lu::solve(&matrix, size, &pivots, &mut y, 1);
         y.truncate(n);
