@@ -30,6 +30,9 @@ pub enum Command {
     /// Run a study and print its special points
     #[command(after_help = EXIT_CODES)]
     Run(Run),
+    /// Find the whole diagram of a model in a box of parameters, without being told where anything is
+    #[command(after_help = EXIT_CODES)]
+    Explore(Explore),
     /// Print what a run has found
     Table(Table),
     /// Compute the solutions of a run again in another way and compare
@@ -60,6 +63,52 @@ pub struct Run {
     /// Go on with a run that was stopped or killed
     #[arg(long)]
     pub resume: bool,
+}
+
+#[derive(Debug, Args)]
+pub struct Explore {
+    /// Model file
+    #[arg(value_name = "MODEL.toml")]
+    pub model: PathBuf,
+    /// The parameter that varies, and its range
+    #[arg(long, value_name = "NAME=LOW:HIGH", allow_hyphen_values = true)]
+    pub free: String,
+    /// Change another parameter
+    #[arg(long = "set", value_name = "NAME=VALUE")]
+    pub set: Vec<String>,
+    /// Follow folds in a second parameter too, to branches that nothing else leads to
+    #[arg(long, value_name = "NAME=LOW:HIGH", allow_hyphen_values = true)]
+    pub connect: Option<String>,
+    /// At how many values of the parameter attractors and equilibria are looked for
+    #[arg(long, value_name = "N", default_value_t = 15, value_parser = clap::value_parser!(u32).range(1..))]
+    pub values: u32,
+    /// How many initial states at each
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..))]
+    pub samples: u32,
+    /// Seed of the random numbers; the same seed gives the same diagram
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(..=i64::MAX as u64))]
+    pub seed: u64,
+    /// No branch is begun once this many points are accepted
+    #[arg(long, value_name = "N", default_value_t = 100_000, value_parser = clap::value_parser!(u32).range(1..))]
+    pub budget: u32,
+    /// How many levels of period doubling are followed [default: 2]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(0..=16))]
+    pub doublings: Option<u8>,
+    /// The one tolerance, from 1e-10 to 1e-4
+    #[arg(long, value_name = "X", default_value_t = 1e-6)]
+    pub tolerance: f64,
+    /// Folder for the run [default: runs/explore-NAME OF THE MODEL]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Threads [default: number of processors]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
+    pub jobs: Option<u16>,
+    /// Go on with an exploration that was stopped or killed
+    #[arg(long)]
+    pub resume: bool,
+    /// Print the study that does the same, and do nothing else
+    #[arg(long)]
+    pub print: bool,
 }
 
 #[derive(Debug, Args)]

@@ -3,6 +3,7 @@
 mod arguments;
 mod attractors;
 mod check;
+mod explore;
 mod failure;
 mod plot;
 mod progress;
@@ -28,6 +29,7 @@ fn answer(arguments: Arguments) -> Result<Outcome, Failure> {
     match arguments.command {
         None => run::reference_study(),
         Some(Command::Run(typed)) => run::study(&typed),
+        Some(Command::Explore(typed)) => explore::diagram(&typed),
         Some(Command::Table(typed)) => table::print(&typed),
         Some(Command::Verify(typed)) => verify::print(&typed),
         Some(Command::Plot(typed)) => plot::write(&typed),

@@ -28,12 +28,16 @@ pub fn study(typed: &Typed) -> Result<Outcome, Failure> {
         let stem = typed.study.file_stem().unwrap_or("study".as_ref());
         PathBuf::from("runs").join(stem)
     });
-    let jobs = typed.jobs.map_or_else(processors, usize::from);
-    let (recorder, earlier) = match typed.resume {
-        true => Recorder::resume(&folder, &study)?,
-        false => (Recorder::create(&folder, &study)?, Diagram::default()),
+    carried_out(&study, typed.jobs.map_or_else(processors, usize::from), typed.resume, &folder)
+}
+
+/// Runs a study into a folder, or goes on with it there.
+pub fn carried_out(study: &Study, jobs: usize, resume: bool, folder: &Path) -> Result<Outcome, Failure> {
+    let (recorder, earlier) = match resume {
+        true => Recorder::resume(folder, study)?,
+        false => (Recorder::create(folder, study)?, Diagram::default()),
     };
-    run(&study, jobs, recorder, earlier, &folder)
+    run(study, jobs, recorder, earlier, folder)
 }
 
 /// Runs the study that is built in, over an earlier run of it, and draws it.

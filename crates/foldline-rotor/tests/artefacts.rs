@@ -42,6 +42,7 @@ fn the_false_unstable_piece_below_contact_is_recognised() {
         branches: vec![branch],
         curves: Vec::new(),
         homotopies: Vec::new(),
+        explorations: Vec::new(),
         surveys: Vec::new(),
         sweeps: Vec::new(),
     };

@@ -3,7 +3,7 @@
 use crate::diagnostic::Diagnostic;
 use crate::toml_walk::{Walk, diagnose};
 use foldline::contract::{Batch, Parameters, VectorField};
-use foldline::explore::{SeedPlan, SeedSource};
+use foldline::explore::{ExplorePlan, SeedPlan, SeedSource};
 use foldline::model::Model;
 use std::ops::Range;
 use toml::de::DeTable;
@@ -37,6 +37,26 @@ pub(crate) fn check_seeds(
         walk.report(span.clone(), format!("the seed \"{}\" cannot start: {message}", seed.name), CURE);
         let message = format!("this equation is not finite at the seed \"{}\"", seed.name);
         walk.found.push(at_equation(model, component, message, model_text, model_file));
+        return;
+    }
+}
+
+/// Reports explorations in whose ranges the vector field is finite nowhere, as far as a few probes tell.
+pub(crate) fn check_explorations(walk: &mut Walk, explorations: &[ExplorePlan], model: &Model, text: &str, file: &str) {
+    const SHARES: [f64; 3] = [0.5, 0.25, 0.75];
+    for exploration in explorations {
+        let [low, high] = exploration.range;
+        let place = |share: f64| {
+            let mut parameters = exploration.parameters.clone();
+            parameters[exploration.free] = low + share * (high - low);
+            parameters
+        };
+        let failing: Vec<_> = SHARES.iter().map_while(|share| failing_everywhere(model, &place(*share))).collect();
+        let Some((component, state)) = failing.first().filter(|_| failing.len() == SHARES.len()) else { continue };
+        let message = complaint(model, *component, state, &place(SHARES[0]));
+        walk.report(0..0, format!("the exploration \"{}\" cannot start: {message}", exploration.name), CURE);
+        let message = format!("this equation is not finite in the exploration \"{}\"", exploration.name);
+        walk.found.push(at_equation(model, *component, message, text, file));
         return;
     }
 }

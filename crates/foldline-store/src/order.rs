@@ -3,12 +3,14 @@
 use foldline::diagram::{Branch, Diagram, Origin};
 use foldline::explore::{Plan, Start};
 
-/// The names of what a study asks for: branches, curves and homotopies as it lists them, each behind what it starts from.
+/// The names of what a study asks for: branches, curves and homotopies as it lists them, each behind what it starts from; then
+/// explorations.
 pub fn names(plan: &Plan) -> Vec<String> {
     let mut names = Names { plan, found: Vec::new() };
     (0..plan.branches.len()).for_each(|index| names.add(&Start::EndOf(index)));
     (0..plan.curves.len()).for_each(|index| names.add(&Start::EndOfCurve(index)));
     (0..plan.homotopies.len()).for_each(|index| names.add(&Start::EndOfHomotopy(index)));
+    names.found.extend(plan.explorations.iter().map(|exploration| exploration.name.clone()));
     names.found
 }
 
@@ -39,9 +41,15 @@ pub fn leg(name: &str, homotopy: &str) -> Option<usize> {
     name.strip_prefix(homotopy)?.strip_prefix('/')?.parse().ok()
 }
 
+/// The number of what that exploration found, if the name is that of a first branch of it: `NAME/cycle-3` is the third cycle.
+fn finding(name: &str, exploration: &str) -> Option<usize> {
+    let rest = name.strip_prefix(exploration)?.strip_prefix('/')?;
+    rest.rsplit_once('-').filter(|(kind, _)| !kind.contains('/'))?.1.parse().ok()
+}
+
 /// The branches of a diagram in an order that does not depend on how the work was shared out: those of the study in the
 /// order of its [`names`], each followed by the branches that come from it, by the parameter at which they do, and by the
-/// curves in two parameters that begin on it; the legs of a homotopy as they were tried.
+/// curves in two parameters that begin on it; the legs of a homotopy as they were tried; what an exploration found by number.
 pub fn ordered(mut diagram: Diagram, study: &[String]) -> Diagram {
     let legs =
         |branch: &Branch| study.iter().enumerate().find_map(|(place, name)| Some((place, leg(&branch.name, name)?)));
@@ -56,7 +64,9 @@ pub fn ordered(mut diagram: Diagram, study: &[String]) -> Diagram {
             Origin::Switch { parameter, .. } => (false, parameter),
             _ => (false, f64::NEG_INFINITY),
         };
-        (behind, own.or_else(|| legs(branch)).unwrap_or((usize::MAX, 0)), parameter)
+        let found = || study.iter().enumerate().find_map(|(place, name)| Some((place, finding(&branch.name, name)?)));
+        let found = || Some(branch).filter(|b| !matches!(b.origin, Origin::Switch { .. })).and_then(|_| found());
+        (behind, own.or_else(|| legs(branch)).or_else(found).unwrap_or((usize::MAX, 0)), parameter)
     };
     let mut waiting = std::mem::take(&mut diagram.branches);
     waiting.sort_by(|a, b| {

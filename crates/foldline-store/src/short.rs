@@ -26,6 +26,12 @@ pub fn lines(diagram: &Diagram, plan: &Plan, model: &Model) -> Vec<String> {
             lines.push(format!("{}: it did not arrive at {}", homotopy.name, place(&homotopy.targets, model)));
         }
     }
+    for exploration in &plan.explorations {
+        let part = |branch: &Branch| branch.name.strip_prefix(&exploration.name).is_some_and(|n| n.starts_with('/'));
+        if !diagram.branches.iter().any(part) {
+            lines.push(format!("{}: nothing was found to follow", exploration.name));
+        }
+    }
     for branch in &diagram.branches {
         if plan.homotopies.iter().any(|homotopy| leg(&branch.name, &homotopy.name).is_some()) {
             continue;

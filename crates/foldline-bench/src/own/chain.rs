@@ -59,6 +59,7 @@ pub fn plan(model: &Model, until: f64, points: usize) -> Plan {
         branches: vec![branch],
         curves: Vec::new(),
         homotopies: Vec::new(),
+        explorations: Vec::new(),
         surveys: Vec::new(),
         sweeps: Vec::new(),
     }

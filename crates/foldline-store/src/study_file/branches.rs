@@ -194,7 +194,7 @@ fn quantity(walk: &mut Walk, name: &str, span: Range<usize>, model: &Model) -> O
     extreme
 }
 
-fn switching(walk: &mut Walk, value: &Value) -> Switching {
+pub(super) fn switching(walk: &mut Walk, value: &Value) -> Switching {
     let mut switching = Switching::default();
     let Some(table) = walk.table(value, "`switch`") else { return switching };
     let names = SWITCHABLE.map(Kind::name);

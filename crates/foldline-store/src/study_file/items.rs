@@ -66,7 +66,7 @@ pub(super) fn read(walk: &mut Walk, root: &DeTable, model: &Model, seeds: &[(Ran
         all.extend(walk.tables(root, what).into_iter().map(|(span, table)| Item { what, span, table }));
     }
     all.sort_by_key(|item| item.span.start);
-    if ["branch", "homotopy", "survey", "sweep"]
+    if ["branch", "homotopy", "explore", "survey", "sweep"]
         .iter()
         .all(|what| root.get(*what).is_none_or(|v| v.get_ref().as_array().is_some_and(|list| list.is_empty())))
     {

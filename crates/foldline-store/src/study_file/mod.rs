@@ -1,18 +1,19 @@
 //! A study file becomes a plan.
 //!
 //! **Idea.** A study says in TOML what to compute with a model: parameter overrides, first solutions (`[[seed]]`), branches
-//! (`[[branch]]`), two-parameter curves (`[[curve]]`) and homotopies (`[[homotopy]]`). The whole text is read before anything is refused, so that all mistakes are said at once, each
+//! (`[[branch]]`), two-parameter curves (`[[curve]]`), homotopies (`[[homotopy]]`) and whole diagrams (`[[explore]]`). The whole text is read before anything is refused, so that all mistakes are said at once, each
 //! with its place, what is wrong, and what would be right. The format is described in docs/book/study-files.md.
 
 mod branches;
 mod curves;
+mod explorations;
 mod homotopies;
 mod items;
 mod responses;
 mod seeds;
 
 use crate::diagnostic::Diagnostic;
-use crate::finite::check_seeds;
+use crate::finite::{check_explorations, check_seeds};
 use crate::model_file::{parse_model, read_model};
 use crate::nearest::suggest;
 use crate::toml_walk::{Value, Walk, read_text, unreadable};
@@ -39,7 +40,7 @@ pub struct Study {
     pub plan: Plan,
 }
 
-const ROOT_KEYS: [&str; 13] = [
+const ROOT_KEYS: [&str; 14] = [
     "model",
     "title",
     "description",
@@ -51,6 +52,7 @@ const ROOT_KEYS: [&str; 13] = [
     "branch",
     "curve",
     "homotopy",
+    "explore",
     "survey",
     "sweep",
 ];
@@ -100,7 +102,7 @@ pub fn parse_study(text: &str, file: &str, model_text: &str, model_file: &str) -
 /// something to compute.
 pub fn is_study(text: &str) -> bool {
     let (root, _) = DeTable::parse_recoverable(text);
-    let keys = ["model", "seed", "branch", "curve", "homotopy", "survey", "sweep"];
+    let keys = ["model", "seed", "branch", "curve", "homotopy", "explore", "survey", "sweep"];
     keys.iter().any(|key| root.get_ref().contains_key(*key))
 }
 
@@ -127,14 +129,17 @@ fn parse(
     let surveys = responses::surveys(&mut walk, &root, &model, &defaults, &taken);
     let taken: Vec<&str> = taken.into_iter().chain(surveys.iter().map(|s| s.name.as_str())).collect();
     let sweeps = responses::sweeps(&mut walk, &root, &model, &seeds, &taken);
+    let taken: Vec<&str> = taken.into_iter().chain(sweeps.iter().map(|s| s.name.as_str())).collect();
+    let explorations = explorations::read(&mut walk, &root, &model, &defaults, &taken);
     if walk.found.is_empty() {
         check_seeds(&mut walk, &seeds, &model, &model_text, &model_file);
+        check_explorations(&mut walk, &explorations, &model, &model_text, &model_file);
     }
     if !walk.found.is_empty() {
         return Err(walk.found);
     }
     let seeds = seeds.into_iter().map(|(_, seed)| seed).collect();
-    let plan = Plan { tolerance, degree, seeds, branches, curves, homotopies, surveys, sweeps };
+    let plan = Plan { tolerance, degree, seeds, branches, curves, homotopies, explorations, surveys, sweeps };
     Ok(Study { file: file.to_string(), text: text.to_string(), model_file, model_text, model, plan })
 }
 
@@ -196,7 +201,7 @@ fn unique_name(
         walk.report(
             value.span(),
             format!("the name \"{name}\" is used twice"),
-            "give every seed, branch, curve, homotopy, survey and sweep a name of its own",
+            "give every seed, branch, curve, homotopy, exploration, survey and sweep a name of its own",
         );
     }
     Some(name)
@@ -240,6 +245,7 @@ mod tests {
         assert_eq!(keys("/$defs/branch/properties"), sorted(&branches::KEYS));
         assert_eq!(keys("/$defs/curve/properties"), sorted(&curves::KEYS));
         assert_eq!(keys("/$defs/homotopy/properties"), sorted(&homotopies::KEYS));
+        assert_eq!(keys("/$defs/explore/properties"), sorted(&explorations::KEYS));
         assert_eq!(keys("/$defs/survey/properties"), sorted(&responses::SURVEY_KEYS));
         assert_eq!(keys("/$defs/sweep/properties"), sorted(&responses::SWEEP_KEYS));
     }

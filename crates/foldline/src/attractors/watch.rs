@@ -133,8 +133,10 @@ impl Watch {
     }
 
     fn try_equilibrium(&mut self, x: Vec<f64>, extent: &[f64], known: &mut Vec<Orbit>, context: &Context) {
-        let scales = &context.sampling.scales;
-        let near = |rest: &[f64]| (0..x.len()).all(|i| (rest[i] - x[i]).abs() <= 2.0 * extent[i] + 1e-6 * scales[i]);
+        // An explicit method with steps as long as they can be may stand still at some errors of a step from the equilibrium.
+        let own = context.tolerance();
+        let room = |i: usize| 2.0 * extent[i] + 10.0 * (own.absolute[i] + own.relative * x[i].abs());
+        let near = |rest: &[f64]| (0..x.len()).all(|i| (rest[i] - x[i]).abs() <= room(i));
         if known.iter().any(|k| matches!(&k.point.solution, Solution::Equilibrium(rest) if near(rest))) {
             return;
         }

@@ -79,11 +79,15 @@ impl Follow<'_> {
     /// looking midway is cheap for equilibria, and where there is no step before that says how the curve bends.
     pub(super) fn is_smooth(&mut self, left: &Station, right: &Station, cost: &mut Cost) -> Result<(), Failure> {
         let stretch = Stretch::new(self.problem, left, right, self.direction);
-        let middle = 0.5 * stretch.length;
-        let guess = stretch.predicted(self.problem, middle);
-        let u = stretch.corrected(self.problem, self.settings, middle, cost)?;
-        let miss: Vec<f64> = u.iter().zip(&guess).map(|(a, b)| a - b).collect();
-        let miss = self.problem.dot(&miss, &miss).sqrt() / stretch.length.abs();
+        let mut looked = |share: f64| -> Result<f64, Failure> {
+            let middle = share * stretch.length;
+            let guess = stretch.predicted(self.problem, middle);
+            let u = stretch.corrected(self.problem, self.settings, middle, cost)?;
+            let miss: Vec<f64> = u.iter().zip(&guess).map(|(a, b)| a - b).collect();
+            Ok(self.problem.dot(&miss, &miss).sqrt() / stretch.length.abs())
+        };
+        // A step that doubles or halves may have a branch point right in its middle, where Newton's method fails.
+        let miss = looked(0.5).or_else(|_| looked(0.43))?;
         // Meshes agree to the tolerance only.
         if miss > OFF + self.settings.tolerance / stretch.length.abs() {
             return Err(Failure::Elsewhere { angle: 0.0, miss });

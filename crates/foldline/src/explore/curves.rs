@@ -9,6 +9,7 @@ use super::plan::{CurvePlan, Plan};
 use crate::continuation::Settings;
 use crate::contract::Observer;
 use crate::diagram::{Branch, Ending, Origin, Point, SpecialPoint};
+use crate::special::mark::Mark;
 
 /// A special point moves along the branch by more than the error of the solutions; against the tolerance of the plan.
 const SHARPER: f64 = 0.2;
@@ -53,6 +54,20 @@ pub fn follow(
     earlier: Option<&Branch>,
     observer: &dyn Observer,
 ) -> (Branch, bool) {
+    follow_from(system, plan, curve, parent, start(curve, parent), &[], earlier, observer)
+}
+
+/// The same from a given special point, with values to mark on the way.
+pub fn follow_from(
+    system: &System,
+    plan: &Plan,
+    curve: &CurvePlan,
+    parent: &Branch,
+    special: Result<&SpecialPoint, String>,
+    marks: &[Mark],
+    earlier: Option<&Branch>,
+    observer: &dyn Observer,
+) -> (Branch, bool) {
     let growth = |settings: &Settings, sides: [bool; 2], branch: &mut Branch, beginning: Option<Beginning>| {
         let growth = Growth {
             system,
@@ -61,7 +76,7 @@ pub fn follow(
             ties: Vec::new(),
             sides,
             parents: &[],
-            marks: &[],
+            marks,
             observer,
             whole: false,
             sparse: false,
@@ -78,7 +93,6 @@ pub fn follow(
         let going = growth(&settings, sides, &mut branch, None);
         return (branch, going);
     }
-    let special = start(curve, parent);
     let parameter = special.as_ref().map_or(f64::NAN, |s| s.point.parameters[parent.free]);
     let origin = Origin::Switch { parent: parent.name.clone(), kind: curve.hold, parameter };
     let mut branch = Branch::new(&curve.name, parent.family, curve.free, origin);
@@ -112,11 +126,19 @@ pub fn end_of(system: &System, plan: &Plan, curve: &CurvePlan, branch: &Branch) 
     match (ending, point) {
         (Some(Ending::Bound(_)), Some(point)) if arrived(point.parameters[curve.free]) => {
             let first = branch.held.map_or(curve.free, |(_, first)| first);
-            let settings = growth::settings(system, plan.tolerance, [f64::NEG_INFINITY, f64::INFINITY], 0);
-            let mut problem = growth::problem_of(system, first, plan.degree, point, false);
-            growth::beside(&mut *problem, &settings, point).map_err(|why| why.to_string())
+            leaving(system, plan, first, point)
         }
         (Some(other), _) => Err(format!("the curve {} did not get to its end: {other}", curve.name)),
         _ => Err(format!("the curve {} was not finished", curve.name)),
     }
+}
+
+/// A solution beside a point of a curve, from which the branch in the parent's parameter, of that index, can start.
+///
+/// # Errors
+/// Why there is none.
+pub fn leaving(system: &System, plan: &Plan, first: usize, point: &Point) -> Result<Point, String> {
+    let settings = growth::settings(system, plan.tolerance, [f64::NEG_INFINITY, f64::INFINITY], 0);
+    let mut problem = growth::problem_of(system, first, plan.degree, point, false);
+    growth::beside(&mut *problem, &settings, point).map_err(|why| why.to_string())
 }

@@ -3,7 +3,7 @@
 use super::growth::{self, Beginning, Growth};
 use super::plan::{BranchPlan, Plan, Start, Switching};
 use super::seeds::Seeds;
-use super::{System, curves, homotopy, known, switch};
+use super::{System, curves, discovery, homotopy, known, switch};
 use crate::continuation::Settings;
 use crate::contract::{Event, Observer, Verdict};
 use crate::diagram::{Branch, Diagram, Ending, Family, Kind, Origin, Point, Solution, SpecialPoint};
@@ -16,14 +16,17 @@ pub enum Root {
     Branch(usize),
     /// The homotopy of that index.
     Homotopy(usize),
+    /// The exploration of that index.
+    Exploration(usize),
 }
 
-/// Everything that starts at a seed.
+/// Everything that starts at a seed, or looks for starts itself.
 pub fn roots(plan: &Plan) -> Vec<Root> {
     let seeded = |start: &Start| matches!(start, Start::Seed(_));
     let branches = (0..plan.branches.len()).filter(|&i| seeded(&plan.branches[i].start)).map(Root::Branch);
     let homotopies = (0..plan.homotopies.len()).filter(|&i| seeded(&plan.homotopies[i].start)).map(Root::Homotopy);
-    branches.chain(homotopies).collect()
+    let explorations = (0..plan.explorations.len()).map(Root::Exploration);
+    branches.chain(homotopies).chain(explorations).collect()
 }
 
 /// How many branches may grow from there, roughly: those with most are best begun first.
@@ -43,6 +46,7 @@ pub fn weight(plan: &Plan, root: Root) -> usize {
                 + curves.map(|i| 2 + following(Start::EndOfCurve(i))).sum::<usize>()
         }
         Root::Homotopy(index) => 4 + following(Start::EndOfHomotopy(index)),
+        Root::Exploration(_) => 100,
     }
 }
 
@@ -52,29 +56,36 @@ pub fn grow(
     plan: &Plan,
     root: Root,
     seeds: &Seeds,
+    jobs: usize,
     earlier: &Diagram,
     observer: &dyn Observer,
 ) -> Vec<Branch> {
-    let mut work = Work { system, plan, earlier, observer, branches: Vec::new() };
-    let start = match root {
-        Root::Branch(index) => &plan.branches[index].start,
-        Root::Homotopy(index) => &plan.homotopies[index].start,
+    let mut work = Work { system, plan, earlier, observer, branches: Vec::new(), budget: usize::MAX };
+    let seeded = |start: &Start| match start {
+        Start::Seed(seed) => Some((Origin::Seed(plan.seeds[*seed].name.clone()), seeds.point(*seed))),
+        _ => None,
     };
-    let Start::Seed(seed) = *start else { return Vec::new() };
-    let origin = Origin::Seed(plan.seeds[seed].name.clone());
     match root {
-        Root::Branch(index) => work.planned(index, origin, seeds.point(seed)),
-        Root::Homotopy(index) => work.brought(index, origin, seeds.point(seed)),
+        Root::Branch(index) => {
+            seeded(&plan.branches[index].start).map(|(origin, point)| work.planned(index, origin, point))
+        }
+        Root::Homotopy(index) => {
+            seeded(&plan.homotopies[index].start).map(|(origin, point)| work.brought(index, origin, point))
+        }
+        Root::Exploration(index) => Some(discovery::explore(&mut work, &plan.explorations[index], jobs)),
     };
     work.branches
 }
 
-struct Work<'w> {
-    system: &'w System<'w>,
-    plan: &'w Plan,
-    earlier: &'w Diagram,
-    observer: &'w dyn Observer,
-    branches: Vec<Branch>,
+/// What grows, and what it grows from.
+pub(super) struct Work<'w> {
+    pub(super) system: &'w System<'w>,
+    pub(super) plan: &'w Plan,
+    pub(super) earlier: &'w Diagram,
+    pub(super) observer: &'w dyn Observer,
+    pub(super) branches: Vec<Branch>,
+    /// No branch is switched to once this many points are accepted.
+    pub(super) budget: usize,
 }
 
 /// A branch still to be switched from: its index, and how deep.
@@ -87,9 +98,18 @@ impl Work<'_> {
     /// Follows a branch of the plan, what is switched to from it, and the branches that start at its end.
     fn planned(&mut self, index: usize, origin: Origin, start: Result<Point, String>) -> bool {
         let plan = &self.plan.branches[index];
-        let Some((branch, going)) = self.root(plan, origin, start) else { return true };
-        let ended = end_of(&branch, plan);
         let first = self.branches.len();
+        if !self.grown(plan, origin, start) {
+            return false;
+        }
+        let Some(branch) = self.branches.get(first) else { return true };
+        let ended = end_of(branch, plan);
+        self.curves(first..self.branches.len()) && self.after(Start::EndOf(index), &plan.name, ended)
+    }
+
+    /// Follows a branch and what is switched to from it. Returns false if the observer wants to stop.
+    pub(super) fn grown(&mut self, plan: &BranchPlan, origin: Origin, start: Result<Point, String>) -> bool {
+        let Some((branch, going)) = self.root(plan, origin, start) else { return true };
         self.branches.push(branch);
         if !going {
             return false;
@@ -102,7 +122,12 @@ impl Work<'_> {
                 None => return false,
             }
         }
-        self.curves(first..self.branches.len()) && self.after(Start::EndOf(index), &plan.name, ended)
+        true
+    }
+
+    /// How many points all branches have.
+    pub(super) fn points(&self) -> usize {
+        self.branches.iter().map(|branch| branch.points.len()).sum()
     }
 
     /// The branches and homotopies that start there.
@@ -202,11 +227,13 @@ impl Work<'_> {
             observer: self.observer,
             whole: false,
             // Switching asks whether a branch is known already, and compares with the points of all.
-            sparse: self.observer.stores() && !self.plan.branches.iter().any(|b| b.switching.anywhere()),
+            sparse: self.observer.stores()
+                && self.plan.explorations.is_empty()
+                && !self.plan.branches.iter().any(|b| b.switching.anywhere()),
         }
     }
 
-    fn tell(&self, event: Event) -> bool {
+    pub(super) fn tell(&self, event: Event) -> bool {
         self.observer.observe(event) == Verdict::Continue
     }
 
@@ -224,6 +251,10 @@ impl Work<'_> {
             }
             let parameter = special.point.parameters[parent.free];
             let label = format!("{} {parameter:.6} of {}", special.kind, parent.name);
+            if self.points() >= self.budget {
+                self.tell(Event::Note(&parent.name, &format!("{label}: not switched to, since the budget is used up")));
+                continue;
+            }
             let name = format!("{}/{}-{}", parent.name, special.kind, counts[slot]);
             let origin = Origin::Switch { parent: parent.name.clone(), kind: special.kind, parameter };
             // A doubled branch of which there is only the special point begins anew.
@@ -244,7 +275,6 @@ impl Work<'_> {
             // Where a branch that crosses another one started, the other one is its parent.
             if let Origin::Switch { parent: from, kind: Kind::BranchPoint, parameter: there } = &parent.origin
                 && special.kind == Kind::BranchPoint
-                && special.point.position.abs() <= 2
                 && (there - parameter).abs() < 1e3 * self.plan.tolerance * (1.0 + there.abs())
             {
                 self.tell(Event::Note(&parent.name, &format!("{label}: the branch there is {from}, the parent")));

@@ -14,26 +14,34 @@ use crate::diagram::{Branch, Cost, Kind, Point};
 /// Every solution of a branch at a value of its parameter, by increasing position: one for each time that the branch
 /// passes it. Points that are light (see [`Point::is_light`]) are passed over.
 pub fn solutions_at(system: &System, settings: &Settings, branch: &Branch, value: f64) -> Vec<Point> {
-    // Between two points the parameter is monotonous, except where a fold lies between them.
+    let track = track(branch);
+    let passes = track.windows(2).filter(|pair| {
+        let [a, b] = [0, 1].map(|k| pair[k].parameters[branch.free] - value);
+        a * b < 0.0 || a == 0.0
+    });
+    passes.filter_map(|pair| between(system, settings, branch, [pair[0], pair[1]], value)).collect()
+}
+
+/// The solution between two neighbouring points of a branch at a value of its parameter; `None` if one of them is light.
+fn between(system: &System, settings: &Settings, branch: &Branch, pair: [&Point; 2], value: f64) -> Option<Point> {
+    if pair.iter().any(|point| point.is_light() || point.tangent.is_empty()) {
+        return None;
+    }
+    let mut problem = problem_of(system, branch.free, 4, pair[0], false);
+    let left = revived(&mut *problem, settings, pair[0], 1.0).ok()?;
+    let right = revived(&mut *problem, settings, pair[1], 1.0).ok()?;
+    let found = passing(&mut *problem, settings, [&left, &right], value, 1.0, &mut Cost::default());
+    found.ok().map(|station| station.point)
+}
+
+/// The points of a branch and its folds: between two of them the parameter is monotonous.
+fn track(branch: &Branch) -> Vec<&Point> {
     let mut track: Vec<&Point> = branch.points.iter().collect();
     for fold in branch.special.iter().filter(|s| s.kind == Kind::Fold) {
         let after = track.partition_point(|p| p.position <= fold.point.position);
         track.insert(after, &fold.point);
     }
-    let passes = track.windows(2).filter(|pair| {
-        let [a, b] = [0, 1].map(|k| pair[k].parameters[branch.free] - value);
-        a * b < 0.0 || a == 0.0
-    });
-    passes
-        .filter(|pair| pair.iter().all(|point| !point.is_light()))
-        .filter_map(|pair| {
-            let mut problem = problem_of(system, branch.free, 4, pair[0], false);
-            let left = revived(&mut *problem, settings, pair[0], 1.0).ok()?;
-            let right = revived(&mut *problem, settings, pair[1], 1.0).ok()?;
-            let found = passing(&mut *problem, settings, [&left, &right], value, 1.0, &mut Cost::default());
-            found.ok().map(|station| station.point)
-        })
-        .collect()
+    track
 }
 
 /// The solution on a branch at which a quantity is least, which lies between accepted points as a rule, and a bound on the
@@ -109,28 +117,37 @@ pub fn branch_of<'b>(
     observer: &dyn Observer,
 ) -> Option<&'b str> {
     let value = *point.parameters.get(free)?;
-    let found = branches.iter().filter(|b| b.free == free).find(|branch| {
-        branch.points.windows(2).any(|pair| {
+    let found = branches.iter().filter(|b| b.free == free && b.held.is_none()).find(|branch| {
+        track(branch).windows(2).any(|pair| {
             let (a, b) = (pair[0].parameters[free], pair[1].parameters[free]);
             if (a - value) * (b - value) > 0.0 {
                 return false;
             }
-            let nearest = if (a - value).abs() < (b - value).abs() { &pair[0] } else { &pair[1] };
-            let apart = pair[0].difference(&pair[1], &system.scales, &[]);
+            // From a fold Newton's method would go to either side.
+            let fold = |point: &Point| branch.special.iter().any(|s| std::ptr::eq(&s.point, point));
+            let first = fold(pair[1]) || !fold(pair[0]) && (a - value).abs() < (b - value).abs();
+            let nearest = if first { pair[0] } else { pair[1] };
+            let apart = pair[0].difference(pair[1], &system.scales, &[]);
             let close = |other: &Point, tolerance: f64| {
                 system.reflections.iter().any(|r| point.difference(other, &system.scales, r) < tolerance)
             };
             if !close(nearest, 1e-3 + 1.5 * apart) {
                 return false;
             }
-            let recalled = if nearest.is_light() { observer.recall(branch, nearest.position) } else { None };
-            let mut guess = recalled.unwrap_or_else(|| nearest.clone());
-            if guess.is_light() {
-                return false;
-            }
+            let whole = |point: &Point| match point.is_light() {
+                true => observer.recall(branch, point.position),
+                false => Some(point.clone()),
+            };
+            let Some(mut guess) = whole(nearest).filter(|point| !point.is_light()) else { return false };
             let mut problem = problem_of(system, free, degree, &guess, false);
             guess.parameters[free] = value;
-            polished(&mut *problem, settings, &guess).is_ok_and(|same| close(&same.point, 30.0 * settings.tolerance))
+            let same = |point: &Point| close(point, 30.0 * settings.tolerance);
+            if polished(&mut *problem, settings, &guess).is_ok_and(|found| same(&found.point)) {
+                return true;
+            }
+            // Where branches cross Newton's method from there may have gone to the other one.
+            let [Some(left), Some(right)] = [whole(pair[0]), whole(pair[1])] else { return false };
+            between(system, settings, branch, [&left, &right], value).is_some_and(|found| same(&found))
         })
     });
     found.map(|branch| branch.name.as_str())

@@ -12,6 +12,7 @@
 //! | where do first solutions come from? | [`seeds`] |
 //! | how is one branch followed to both sides, or resumed? | [`growth`] |
 //! | what follows from a finished branch? | [`family`] |
+//! | how is a diagram found without being told where anything is? | `discovery` |
 //! | how does one leave a special point on the other branch? | [`switch`] |
 //! | is this branch known already? | [`known`] |
 //! | where does a special point go when a second parameter changes? | [`curves`] |
@@ -22,6 +23,7 @@
 mod counted;
 pub mod curves;
 mod diagnosis;
+mod discovery;
 pub mod family;
 pub mod growth;
 pub mod homotopy;
@@ -37,8 +39,8 @@ mod tests;
 
 pub use persistence::{Persistence, persistence};
 pub use plan::{
-    AttractorKey, BranchPlan, CurvePlan, HomotopyPlan, Plan, SeedPlan, SeedSource, Start, SurveyPlan, SweepPlan,
-    Switching,
+    AttractorKey, BranchPlan, CurvePlan, ExplorePlan, HomotopyPlan, Plan, SeedPlan, SeedSource, Start, SurveyPlan,
+    SweepPlan, Switching,
 };
 pub use seeds::attractors;
 pub use system::System;
@@ -64,7 +66,7 @@ pub fn run(system: &System, plan: &Plan, jobs: usize, earlier: Diagram, observer
     let done: Vec<Mutex<Vec<Branch>>> = families.iter().map(|_| Mutex::new(Vec::new())).collect();
     let work = || {
         while let Some(&index) = order.get(next.fetch_add(1, Ordering::Relaxed)) {
-            let branches = family::grow(system, plan, families[index], &seeds, &earlier, observer);
+            let branches = family::grow(system, plan, families[index], &seeds, jobs, &earlier, observer);
             if let Ok(mut slot) = done[index].lock() {
                 *slot = branches;
             }

@@ -138,6 +138,33 @@ pub struct HomotopyPlan {
     pub max_points: usize,
 }
 
+/// A diagram to be found without being told where anything is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ExplorePlan {
+    /// Unique name; what is found is named after it.
+    pub name: String,
+    /// Every parameter value `[k]`; that of the free parameter does not count.
+    pub parameters: Vec<f64>,
+    /// Index of the continuation parameter.
+    pub free: usize,
+    /// Smallest and largest value of the parameter.
+    pub range: [f64; 2],
+    /// At how many values of it attractors and equilibria are looked for.
+    pub values: usize,
+    /// How many initial states are sampled at each.
+    pub samples: usize,
+    /// Seed of the random numbers.
+    pub random: u64,
+    /// Where to branch off.
+    pub switching: Switching,
+    /// A second parameter, and its range, in which folds are followed to isolated branches.
+    pub connect: Option<(usize, [f64; 2])>,
+    /// No branch is begun once this many points are accepted.
+    pub budget: usize,
+    /// Limit on the number of points per side of a branch.
+    pub max_points: usize,
+}
+
 /// Simulation from many starts at many values of a parameter.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SurveyPlan {
@@ -183,6 +210,8 @@ pub struct Plan {
     pub curves: Vec<CurvePlan>,
     /// Homotopies.
     pub homotopies: Vec<HomotopyPlan>,
+    /// Diagrams to be found.
+    pub explorations: Vec<ExplorePlan>,
     /// Surveys by simulation.
     pub surveys: Vec<SurveyPlan>,
     /// Stepped sweeps by simulation.

@@ -166,7 +166,7 @@ fn polish(system: &System, parameters: &[f64], tolerance: f64, candidate: &Candi
 }
 
 /// A point about which nothing but the solution is known.
-fn bare(parameters: &[f64], solution: Solution) -> Point {
+pub(super) fn bare(parameters: &[f64], solution: Solution) -> Point {
     Point {
         position: 0,
         parameters: parameters.to_vec(),
@@ -251,7 +251,7 @@ fn cubic(times: &[f64], states: &[f64], n: usize, i: usize, k: usize, t: f64) ->
 }
 
 /// The same solution in polynomials of another degree, to be polished again.
-fn with_degree(mut point: Point, degree: usize) -> Point {
+pub(super) fn with_degree(mut point: Point, degree: usize) -> Point {
     if let Solution::Cycle(cycle) = &mut point.solution
         && cycle.degree != degree
     {
@@ -343,7 +343,7 @@ fn described(attractor: &Attractor) -> String {
     format!("{what} ({})", attractor.hits)
 }
 
-fn summary(census: &Census) -> String {
+pub(super) fn summary(census: &Census) -> String {
     let mut parts: Vec<String> = census.attractors.iter().map(described).collect();
     if census.unsettled > 0 {
         parts.push(format!("unsettled ({})", census.unsettled));

@@ -1,6 +1,6 @@
 //! A vector field together with what exploring it needs to know.
 
-use super::plan::Plan;
+use super::plan::{ExplorePlan, Plan};
 use crate::contract::{Batch, Parameters, VectorField};
 use crate::model::Model;
 use crate::model::forcing::unrepeated;
@@ -70,6 +70,7 @@ impl<'a> System<'a> {
         let mut places: Vec<Vec<f64>> = plan.seeds.iter().map(|seed| seed.parameters.clone()).collect();
         places.extend(plan.seeds.iter().map(|seed| away(plan, &seed.parameters)));
         places.extend(plan.surveys.iter().map(|survey| survey.parameters.clone()));
+        places.extend(plan.explorations.iter().map(inside));
         let mut systems = places.iter().map(|place| System::of(model, place));
         let Some(mut common) = systems.next() else { return System::new(model) };
         for other in systems {
@@ -160,10 +161,23 @@ impl<'a> System<'a> {
     }
 }
 
+/// The parameters of an exploration, those that it changes replaced by values inside their ranges.
+fn inside(exploration: &ExplorePlan) -> Vec<f64> {
+    let mut place = exploration.parameters.clone();
+    place[exploration.free] = between(exploration.range);
+    if let Some((second, range)) = exploration.connect {
+        place[second] = between(range);
+    }
+    place
+}
+
+fn between([low, high]: [f64; 2]) -> f64 {
+    const SHARE: f64 = 0.617;
+    low + SHARE * (high - low)
+}
+
 /// The parameters of a seed, those that the plan changes replaced by values between those that they reach.
 fn away(plan: &Plan, seed: &[f64]) -> Vec<f64> {
-    const SHARE: f64 = 0.617;
-    let between = |[low, high]: [f64; 2]| low + SHARE * (high - low);
     let mut place = seed.to_vec();
     for homotopy in &plan.homotopies {
         place[homotopy.via] = between(homotopy.range);

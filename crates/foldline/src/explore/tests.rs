@@ -54,6 +54,7 @@ fn followed(keeps: bool) -> (Branch, Vec<Point>) {
         branches: vec![branch],
         curves: Vec::new(),
         homotopies: Vec::new(),
+        explorations: Vec::new(),
         surveys: Vec::new(),
         sweeps: Vec::new(),
     };

@@ -49,6 +49,7 @@ fn computed(model: &Model) -> Diagram {
         branches: vec![branch],
         curves: Vec::new(),
         homotopies: Vec::new(),
+        explorations: Vec::new(),
         surveys: Vec::new(),
         sweeps: Vec::new(),
     };

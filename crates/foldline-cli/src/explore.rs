@@ -1,0 +1,106 @@
+//! `foldline explore`: the whole diagram of a model, from a box of parameters.
+//!
+//! What was typed becomes a study with one `[[explore]]`, which is run, recorded and resumed like any other.
+
+use crate::arguments::Explore as Typed;
+use crate::failure::{Failure, Outcome};
+use crate::run::{carried_out, processors};
+use foldline::model::Model;
+use foldline_store::model_file::read_model;
+use foldline_store::nearest::suggest;
+use foldline_store::study_file::parse_study;
+use std::fmt::Write as _;
+use std::io::{Write as _, stdout};
+use std::path::PathBuf;
+
+/// Runs the exploration, or prints it as a study.
+pub fn diagram(typed: &Typed) -> Result<Outcome, Failure> {
+    let (model, model_text) = read_model(&typed.model)?;
+    let text = study(typed, &model)?;
+    if typed.print {
+        write!(stdout().lock(), "{text}")?;
+        return Ok(Outcome::Done);
+    }
+    let stem = typed.model.file_stem().unwrap_or("model".as_ref());
+    let folder = typed.out.clone().unwrap_or_else(|| PathBuf::from("runs").join(format!("explore-{}", stem.display())));
+    let study = parse_study(&text, "explore.toml", &model_text, &typed.model.display().to_string())?;
+    carried_out(&study, typed.jobs.map_or_else(processors, usize::from), typed.resume, &folder)
+}
+
+/// The study that does what was typed.
+fn study(typed: &Typed, model: &Model) -> Result<String, Failure> {
+    let free = ranged("--free", &typed.free, model)?;
+    let connect = typed.connect.as_ref().map(|text| ranged("--connect", text, model)).transpose()?;
+    let set = typed.set.iter().map(|text| valued(text, model)).collect::<Result<Vec<_>, _>>()?;
+    if let Some((name, _)) = connect.as_ref().filter(|(name, _)| *name == free.0) {
+        let message = format!("--connect {name}: that is the parameter of --free");
+        return Err(Failure::typed(message, "name a second parameter, in which folds are followed"));
+    }
+    if let Some((name, [low, high])) = &connect {
+        let given = set.iter().rev().find(|(other, _)| other == name).map(|(_, value)| *value);
+        let own = model.parameter_index(name).map(|index| model.parameters[index].value);
+        let own = given.or(own).unwrap_or(*low);
+        if !(*low..=*high).contains(&own) {
+            let message =
+                format!("--connect {name}={low}:{high}: the diagram is at {name} = {own}, outside this range");
+            return Err(Failure::typed(message, format!("a range that contains {own}, or another --set {name}=VALUE")));
+        }
+    }
+    let quoted = |text: &str| serde_json::Value::from(text).to_string();
+    let key = |name: &str| quoted(name);
+    let mut text = String::new();
+    let mut line = |words: std::fmt::Arguments| {
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "{words}");
+    };
+    line(format_args!("model = {}", quoted(&typed.model.display().to_string())));
+    line(format_args!("tolerance = {:e}", typed.tolerance));
+    line(format_args!("\n[[explore]]\nname = {}", quoted(&model.name)));
+    if !set.is_empty() {
+        let values: Vec<String> = set.iter().map(|(name, value)| format!("{} = {value:?}", key(name))).collect();
+        line(format_args!("parameters = {{ {} }}", values.join(", ")));
+    }
+    line(format_args!("free = {}\nrange = [{:?}, {:?}]", quoted(&free.0), free.1[0], free.1[1]));
+    line(format_args!("values = {}\nsamples = {}\nrandom = {}", typed.values, typed.samples, typed.seed));
+    if let Some((name, [low, high])) = connect {
+        line(format_args!("connect = {{ {} = [{low:?}, {high:?}] }}", key(&name)));
+    }
+    line(format_args!("budget = {}", typed.budget));
+    if let Some(depth) = typed.doublings {
+        line(format_args!("switch = {{ hopf = 4, branch-point = 4, period-doubling = {depth} }}"));
+    }
+    Ok(text)
+}
+
+/// `NAME=LOW:HIGH`.
+fn ranged(option: &str, typed: &str, model: &Model) -> Result<(String, [f64; 2]), Failure> {
+    let said = |message: &str, cure: &str| Failure::typed(format!("{option} {typed}: {message}"), cure);
+    let example = format!("write {option} NAME=LOW:HIGH, for example {option} Omega=0.5:12");
+    let (name, ends) = typed.split_once('=').ok_or_else(|| said("there is no `=`", &example))?;
+    let (low, high) = ends.split_once(':').ok_or_else(|| said("there is no `:` between two values", &example))?;
+    let name = parameter(name.trim(), model).map_err(|(message, cure)| said(&message, &cure))?;
+    let [low, high] = [low, high].map(|end| end.trim().parse::<f64>().ok().filter(|v| v.is_finite()));
+    match (low, high) {
+        (Some(low), Some(high)) if low < high => Ok((name, [low, high])),
+        (Some(_), Some(_)) => Err(said("the first value is not smaller than the second", &example)),
+        _ => Err(said("an end is not a finite number", &example)),
+    }
+}
+
+/// `NAME=VALUE`.
+fn valued(typed: &str, model: &Model) -> Result<(String, f64), Failure> {
+    let said = |message: &str, cure: &str| Failure::typed(format!("--set {typed}: {message}"), cure);
+    let example = "write --set NAME=VALUE, for example --set Omega=5";
+    let (name, value) = typed.split_once('=').ok_or_else(|| said("there is no `=`", example))?;
+    let name = parameter(name.trim(), model).map_err(|(message, cure)| said(&message, &cure))?;
+    let value = value.trim().parse::<f64>().ok().filter(|v| v.is_finite());
+    value.map(|value| (name, value)).ok_or_else(|| said("the value is not a finite number", example))
+}
+
+fn parameter(name: &str, model: &Model) -> Result<String, (String, String)> {
+    if model.parameter_index(name).is_some() {
+        return Ok(name.to_string());
+    }
+    let known: Vec<&str> = model.parameters.iter().map(|p| p.name.as_str()).collect();
+    Err((format!("the model `{}` has no parameter `{name}`", model.name), suggest(name, &known)))
+}

@@ -1,0 +1,289 @@
+//! A diagram found without being told where anything is.
+//!
+//! **Idea.** At values spread over the range of the parameter attractors are sampled, and equilibria, stable or not, are
+//! found by Newton's method from the same initial states. What lies on no branch yet begins a new one, which is followed over
+//! the whole range, with everything that is switched to from it. Folds are followed in a second parameter, if there is
+//! one: where their curve comes back to the value that it started with lies another fold, perhaps of a branch that nothing else
+//! leads to.
+//!
+//! 1. the values: halves, quarters, eighths of the range and so on, so that the largest gap is looked into first;
+//! 2. at each value: equilibria by growing size, then cycles by falling number of samples that went there;
+//! 3. each of these: on a known branch (`known`), or the start of a new one (`family`);
+//! 4. each fold of each branch, unless a curve has passed it: its curve (`curves`), and a new branch from each fold met there
+//!    that is not known; folds of these too, until there is no more.
+//!
+//! It ends when all of this is done, or when no new branch may be begun since the budget of points is used up; what was left
+//! undone then is said. The result depends on the number of threads in no way.
+//!
+//! **Fails when** a branch has no stable part at any of the values, no equilibria, no bifurcation that leads to it and no fold
+//! connected with a known one: there is no proof that a diagram is complete.
+
+use super::family::Work;
+use super::growth::{polished, setting, settings};
+use super::plan::{BranchPlan, CurvePlan, ExplorePlan, Start};
+use super::seeds::{attractors, bare, sampling, summary, with_degree};
+use super::{curves, known};
+use crate::attractors::spectral_ratio;
+use crate::contract::Event;
+use crate::diagram::{Branch, Kind, Origin, Point, Solution, SpecialPoint};
+use crate::linalg::dot;
+use crate::problem::equilibrium::EquilibriumProblem;
+use crate::special::mark::{Mark, Quantity};
+
+/// Carries out an exploration. Returns false if the observer wants to stop.
+pub(super) fn explore(work: &mut Work, plan: &ExplorePlan, jobs: usize) -> bool {
+    work.budget = plan.budget;
+    let mut discovery = Discovery { work, plan, named: Vec::new() };
+    let sampled = (0..plan.values).all(|index| discovery.looked_at(index, jobs));
+    let going = sampled && plan.connect.is_none_or(|(second, range)| discovery.connected(second, range));
+    going && discovery.told()
+}
+
+struct Discovery<'d, 'w> {
+    work: &'d mut Work<'w>,
+    plan: &'d ExplorePlan,
+    /// What roots were called, such as `cycle`, once for each of them.
+    named: Vec<String>,
+}
+
+impl Discovery<'_, '_> {
+    /// Step 2 and 3 at one of the values.
+    fn looked_at(&mut self, index: usize, jobs: usize) -> bool {
+        if self.exhausted() {
+            return true;
+        }
+        let (work, plan) = (&*self.work, self.plan);
+        let [low, high] = plan.range;
+        let mut parameters = plan.parameters.clone();
+        parameters[plan.free] = low + share(index) * (high - low);
+        if let Err(why) = work.system.repeats(&parameters, &[(plan.free, plan.range)]) {
+            return self.note(&format!("nothing can be followed from {}: {why}", parameters[plan.free]));
+        }
+        // Other values, other samples: together they say more.
+        let random = plan.random.wrapping_add(index as u64);
+        let census = attractors(work.system, &parameters, plan.samples, random, jobs, work.plan.tolerance);
+        let size = |point: &Point| match &point.solution {
+            Solution::Equilibrium(x) => dot(x, x),
+            Solution::Cycle(_) => f64::INFINITY,
+        };
+        let mut found: Vec<Point> = Vec::new();
+        for point in census.attractors.iter().map(|a| a.point.clone()).chain(self.rests(&parameters, random)) {
+            if !found.iter().any(|other| self.same(other, &point)) {
+                found.push(point);
+            }
+        }
+        found.sort_by(|a, b| size(a).total_cmp(&size(b)));
+        let rests = found.iter().filter(|p| matches!(p.solution, Solution::Equilibrium(_))).count();
+        let place = parameters[plan.free];
+        let said = format!("at {place}: {}; equilibria but for symmetry: {rests}", summary(&census));
+        self.note(&said)
+            && found.into_iter().all(|point| self.followed(point, Origin::Seed(format!("{}, at {place}", plan.name))))
+    }
+
+    /// Equilibria in the ranges of the states, stable or not.
+    fn rests(&self, parameters: &[f64], random: u64) -> Vec<Point> {
+        let system = self.work.system;
+        if system.field.forced() {
+            return Vec::new();
+        }
+        let tolerance = self.work.plan.tolerance;
+        let settings = settings(system, tolerance, [f64::NEG_INFINITY, f64::INFINITY], 0);
+        let starts = sampling(system, self.plan.samples, random, 1, tolerance).starts();
+        let mut found: Vec<Point> = Vec::new();
+        for start in starts.chunks_exact(system.field.dim().max(1)) {
+            let mut problem = EquilibriumProblem::new(setting(system, self.plan.free, parameters));
+            let guess = bare(parameters, Solution::Equilibrium(start.to_vec()));
+            if let Ok(station) = polished(&mut problem, &settings, &guess)
+                && self.inside(&station.point)
+                && !found.iter().any(|other| self.same(other, &station.point))
+            {
+                found.push(station.point);
+            }
+        }
+        found
+    }
+
+    /// Whether an equilibrium lies in the ranges of the states, or less than half their widths outside.
+    fn inside(&self, point: &Point) -> bool {
+        let Solution::Equilibrium(x) = &point.solution else { return false };
+        x.iter().zip(&self.work.system.ranges).all(|(x, [low, high])| {
+            let room = 0.5 * (high - low);
+            (low - room..=high + room).contains(x)
+        })
+    }
+
+    /// Whether two solutions at the same parameter values are the same, or images of each other under a symmetry.
+    fn same(&self, a: &Point, b: &Point) -> bool {
+        let system = self.work.system;
+        let close = 30.0 * self.work.plan.tolerance;
+        system.reflections.iter().any(|reflection| a.difference(b, &system.scales, reflection) < close)
+    }
+
+    /// Step 3: a new branch from a solution, unless that lies on one that is known.
+    fn followed(&mut self, point: Point, origin: Origin) -> bool {
+        if self.exhausted() {
+            return true;
+        }
+        let (work, plan) = (&mut *self.work, self.plan);
+        let point = with_degree(point, work.plan.degree);
+        let settings = settings(work.system, work.plan.tolerance, plan.range, plan.max_points);
+        let (system, degree, observer) = (work.system, work.plan.degree, work.observer);
+        if known::branch_of(system, &settings, plan.free, degree, &point, &work.branches, observer).is_some() {
+            return true;
+        }
+        let kind = match (&point.solution, system.whirl) {
+            (Solution::Equilibrium(_), _) => "equilibrium".to_string(),
+            (Solution::Cycle(cycle), Some(whirl)) => {
+                spectral_ratio(cycle, whirl).map_or("cycle".to_string(), |(p, q)| format!("{p}:{q}"))
+            }
+            (Solution::Cycle(_), None) => "cycle".to_string(),
+        };
+        self.named.push(kind.clone());
+        let number = self.named.iter().filter(|other| **other == kind).count();
+        let branch = BranchPlan {
+            name: format!("{}/{kind}-{number}", plan.name),
+            start: Start::Seed(0),
+            free: plan.free,
+            range: plan.range,
+            until: None,
+            switching: plan.switching.clone(),
+            marks: Vec::new(),
+            max_points: plan.max_points,
+        };
+        work.grown(&branch, origin, Ok(point))
+    }
+
+    /// Step 4.
+    fn connected(&mut self, second: usize, range: [f64; 2]) -> bool {
+        let home = self.plan.parameters[second];
+        // Folds that a curve has passed.
+        let mut passed: Vec<Point> = Vec::new();
+        let mut branch = 0;
+        while branch < self.work.branches.len() {
+            let parent = self.work.branches[branch].clone();
+            let folds = parent.special.iter().filter(|s| s.kind == Kind::Fold && parent.held.is_none());
+            for (number, fold) in folds.enumerate() {
+                if passed.iter().any(|other| self.same_fold(other, &fold.point)) || self.exhausted() {
+                    continue;
+                }
+                let (curve, going) = self.fold_curve(&parent, (number + 1, fold), second, range);
+                let met: Vec<Point> = (curve.special.iter())
+                    .filter(|s| s.kind == Kind::Mark && s.point.position != 0)
+                    .filter(|s| (s.point.parameters[second] - home).abs() <= 1e-6 * (1.0 + home.abs()))
+                    .map(|s| s.point.clone())
+                    .collect();
+                let name = curve.name.clone();
+                self.work.branches.push(curve);
+                if !going {
+                    return false;
+                }
+                passed.extend(met.iter().cloned());
+                for other in &met {
+                    if !self.known_fold(other) && !self.left_from(other, home, second, &name) {
+                        return false;
+                    }
+                }
+            }
+            branch += 1;
+        }
+        true
+    }
+
+    /// The curve of a fold in both parameters, with marks where the second is what it is along the branches.
+    fn fold_curve(
+        &self,
+        parent: &Branch,
+        (number, fold): (usize, &SpecialPoint),
+        second: usize,
+        range: [f64; 2],
+    ) -> (Branch, bool) {
+        let (work, plan) = (&*self.work, self.plan);
+        let curve = CurvePlan {
+            name: format!("{}/fold-{number}", parent.name),
+            hold: Kind::Fold,
+            of: parent.name.clone(),
+            near: None,
+            free: second,
+            ranges: [plan.range, range],
+            until: None,
+            max_points: plan.max_points,
+        };
+        let home = Mark { quantity: Quantity::Parameter(second), value: plan.parameters[second], stop: false };
+        let earlier = work.earlier.branch(&curve.name);
+        curves::follow_from(work.system, work.plan, &curve, parent, Ok(fold), &[home], earlier, work.observer)
+    }
+
+    /// Whether it is a fold of a known branch.
+    fn known_fold(&self, at: &Point) -> bool {
+        let branches = self.work.branches.iter().filter(|branch| branch.held.is_none());
+        let mut folds = branches.flat_map(|branch| branch.special.iter().filter(|s| s.kind == Kind::Fold));
+        folds.any(|fold| self.same_fold(&fold.point, at))
+    }
+
+    /// Whether two folds at the same value of the second parameter are the same, or images of each other.
+    fn same_fold(&self, a: &Point, b: &Point) -> bool {
+        // The solution at a fold moves along the branch with the root of the error of its place.
+        let near = 1e3 * self.work.plan.tolerance;
+        let (system, free) = (self.work.system, self.plan.free);
+        let [p, q] = [a, b].map(|point| point.parameters[free]);
+        (p - q).abs() <= near * (1.0 + p.abs())
+            && system.reflections.iter().any(|r| a.difference(b, &system.scales, r) < near.sqrt())
+    }
+
+    /// A new branch from a fold that a curve has met.
+    fn left_from(&mut self, fold: &Point, home: f64, second: usize, curve: &str) -> bool {
+        let mut fold = fold.clone();
+        fold.parameters[second] = home;
+        match curves::leaving(self.work.system, self.work.plan, self.plan.free, &fold) {
+            Ok(point) => self.followed(point, Origin::EndOf(curve.to_string())),
+            Err(why) => {
+                let value = fold.parameters[self.plan.free];
+                self.note(&format!(
+                    "the fold at {value:.6} that {curve} leads to: no solution beside it was found: {why}"
+                ))
+            }
+        }
+    }
+
+    fn exhausted(&self) -> bool {
+        self.work.points() >= self.plan.budget
+    }
+
+    fn note(&self, text: &str) -> bool {
+        self.work.tell(Event::Note(&self.plan.name, text))
+    }
+
+    /// What came of it.
+    fn told(&self) -> bool {
+        let count = |held: bool| self.work.branches.iter().filter(|b| b.held.is_some() == held).count();
+        let (branches, curves, points) = (count(false), count(true), self.work.points());
+        let budget = self.plan.budget;
+        self.note(&match self.exhausted() {
+            true => format!(
+                "{branches} branches and {curves} curves with {points} points: the budget of {budget} is used up, and \
+                 the diagram may lack branches; a larger `budget` goes on"
+            ),
+            false => format!("{branches} branches and {curves} curves with {points} points; nothing was left undone"),
+        })
+    }
+}
+
+/// The place of a value in the range, as a share: 1/2, 1/4, 3/4, 1/8, 5/8, 3/8, 7/8 and so on.
+fn share(index: usize) -> f64 {
+    let (mut left, mut share, mut weight) = (index + 1, 0.0, 0.5);
+    while left > 0 {
+        share += weight * (left & 1) as f64;
+        (left, weight) = (left >> 1, 0.5 * weight);
+    }
+    share
+}
+
+#[cfg(test)]
+mod tests {
+    use super::share;
+
+    #[test]
+    fn values_halve_the_largest_gap() {
+        assert_eq!([0, 1, 2, 3, 4, 5, 6].map(share), [0.5, 0.25, 0.75, 0.125, 0.625, 0.375, 0.875]);
+    }
+}
