@@ -1,4 +1,4 @@
-//! Every example of the pages on bifurcations is run, and what they quote is what the program prints.
+//! Every example of the pages on bifurcations, and of those for who comes from another program, is run, and what they quote is what the program prints.
 //!
 //! On these pages a block of TOML begins with the name of its file, and a block `console` holds commands and what they answer. Where that has
 //! changed and is meant to, `FOLDLINE_WRITE_BOOK=1 cargo test -p foldline-cli --test book` renews the answers and the pictures.
@@ -135,6 +135,15 @@ fn labels(picture: &Path) -> Vec<String> {
     text.split("<text").skip(1).filter_map(|t| Some(t.split_once('>')?.1.split_once('<')?.0.to_string())).collect()
 }
 
+/// What the last line of a page cites: names followed by a year.
+fn keys(page: &Path) -> Vec<String> {
+    let text = std::fs::read_to_string(page).unwrap();
+    let last = text.lines().last().unwrap_or_default();
+    assert!(last.starts_with("Source: "), "{} ends with its sources", page.display());
+    let words = last.split(|c: char| !c.is_ascii_alphanumeric());
+    words.filter(|word| word.len() > 6 && word.ends_with(|c: char| c.is_ascii_digit())).map(str::to_string).collect()
+}
+
 /// Runs the examples of a page; what is not as quoted.
 fn check(path: &Path, renew: bool) -> Vec<String> {
     let mut page = Page::open(path);
@@ -177,11 +186,20 @@ fn the_pages_on_bifurcations_quote_what_the_program_prints() {
     let folder = root().join("docs/book/bifurcations");
     let mut pages: Vec<PathBuf> = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect();
     pages.sort();
+    let bibliography = std::fs::read_to_string(root().join("docs/references.bib")).unwrap();
     let overview = std::fs::read_to_string(root().join("docs/book/bifurcations.md")).unwrap();
     for page in &pages {
         let link = format!("(bifurcations/{})", page.file_name().unwrap().to_string_lossy());
         assert!(overview.contains(&link), "the overview has no link {link}");
+        for key in keys(page) {
+            assert!(
+                bibliography.contains(&format!("{{{key},")),
+                "{}: {key} is not in docs/references.bib",
+                page.display()
+            );
+        }
     }
+    pages.push(root().join("docs/book/from-auto.md"));
     let (renew, next) = (std::env::var_os("FOLDLINE_WRITE_BOOK").is_some(), AtomicUsize::new(0));
     let work = || {
         let mut wrong = Vec::new();
