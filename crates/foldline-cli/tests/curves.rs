@@ -1,7 +1,7 @@
 //! Two-parameter curves: against closed forms, and through the special points of one-parameter runs.
 
 use foldline::contract::Unobserved;
-use foldline::diagram::{Branch, Diagram, Kind};
+use foldline::diagram::{Branch, Diagram, Ending, Kind};
 use foldline::explore::{CurvePlan, System, run};
 use foldline_store::study_file::{Study, parse_study};
 
@@ -156,6 +156,33 @@ fn folds_and_hopf_points_meet_at_a_zero_hopf_point() {
     satisfies(&hopf, 5, |beta, mu| beta + mu * mu);
     let kinds: Vec<Kind> = hopf.branch("curve").unwrap().special.iter().map(|s| s.kind).collect();
     assert_eq!(kinds, [Kind::ZeroHopf]);
+}
+
+/// r' = r (mu + nu r² - r⁴): folds of cycles at mu = -nu²/4, r² = nu/2, up to the generalised Hopf point at the origin. The period changes
+/// with the radius, or does not change at the folds, or at one of them.
+#[test]
+fn folds_of_cycles_end_at_a_generalised_hopf_point() {
+    for turn in ["1 + square", "1", "1 + (square - 0.25)^2"] {
+        let model = format!(
+            "[parameters]\nmu = -1\nnu = 1\n[definitions]\nsquare = \"x^2 + y^2\"\ngrowth = \"mu + nu*square - square^2\"\nturn = \"{turn}\"\n\
+             [states]\nx = \"growth*x - turn*y\"\ny = \"turn*x + growth*y\"\n"
+        );
+        let text = "[[seed]]\nname = \"s\"\nstate = { x = 0, y = 0 }\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"mu\"\nrange = [-1, 1]\nswitch = { hopf = 1 }\n\
+                    [[curve]]\nname = \"curve\"\nhold = \"fold\"\nof = \"b/hopf-1\"\nfree = \"nu\"\nrange = [-1, 1.2]\n";
+        let diagram = grown(&study(&model, text));
+        satisfies(&diagram, 5, |mu, nu| mu + nu * nu / 4.0);
+        let curve = diagram.branch("curve").unwrap();
+        assert!(curve.special.is_empty(), "{turn}: {:?}", curve.special.iter().map(|s| s.kind).collect::<Vec<_>>());
+        let joined = curve.ends.iter().flatten().find_map(|end| match end {
+            Ending::Joined { at, parameter } => Some((*at, *parameter)),
+            _ => None,
+        });
+        assert!(
+            joined.is_some_and(|(at, nu)| at == Kind::GeneralisedHopf && nu.abs() < TOLERANCE),
+            "{turn}: {:?}",
+            curve.ends
+        );
+    }
 }
 
 /// Two oscillators, each with a growth rate of its own in which both parameters have a part.

@@ -57,13 +57,21 @@ fn shown(cell: &Cell, style: Style, decimals: Option<usize>) -> String {
         (Cell::Word(word), ..) => word.lines().next().unwrap_or_default().to_string(),
         (Cell::Count(count), ..) => count.to_string(),
         (Cell::Number(value), Style::Size, _) => format!("{value:.1e}"),
-        (Cell::Number(value), _, Some(decimals)) => format!("{value:.decimals$}"),
+        (Cell::Number(value), _, Some(decimals)) => without_sign_of_zero(format!("{value:.decimals$}")),
         (Cell::Number(value), _, None) => format!("{value:.9e}"),
         (Cell::Spectrum(values), ..) => {
             let one =
                 |z: &Complex64| if z.im == 0.0 { format!("{:.6}", z.re) } else { format!("{:.6}{:+.6}i", z.re, z.im) };
             values.iter().map(one).collect::<Vec<_>>().join(" ")
         }
+    }
+}
+
+/// -0.000 is 0.000 to the digits shown.
+fn without_sign_of_zero(text: String) -> String {
+    match text.strip_prefix('-') {
+        Some(rest) if rest.chars().all(|c| c == '0' || c == '.') => rest.to_string(),
+        _ => text,
     }
 }
 

@@ -329,8 +329,11 @@ impl Growth<'_> {
         }
         let (mut monitors, collapses) = match branch.held {
             None => (special::monitors(branch.family), collapses(branch, &system)),
-            Some((kind, _)) => {
-                (special::monitors_where_held(system.field, &system.scales, branch.family, kind), Vec::new())
+            Some((kind, first)) => {
+                let monitors = special::monitors_where_held(system.field, &system.scales, branch.family, kind);
+                // Folds of cycles shrink to a generalised Hopf point; the Hopf points there lie along the second parameter.
+                let ends = kind == Kind::Fold && branch.family == Family::Cycle && !system.field.forced();
+                (monitors, ends.then(|| shrinks(&system, first, Kind::GeneralisedHopf)).into_iter().collect())
             }
         };
         monitors.extend(self.marks.iter().map(|mark| Box::new(*mark) as Box<dyn Monitor>));
@@ -501,7 +504,12 @@ fn collapses<'a>(branch: &Branch, system: &'a System) -> Vec<Box<dyn Monitor + '
         all.push(Box::new(collapse::Halves { born: is_doubled(branch) }));
     }
     if branch.family == Family::Cycle && !system.field.forced() {
-        all.push(Box::new(collapse::Shrinks { field: system.field, free: branch.free, scales: &system.scales }));
+        all.push(shrinks(system, branch.free, Kind::Hopf));
     }
     all
+}
+
+/// Where cycles shrink to an equilibrium.
+fn shrinks<'a>(system: &'a System, free: usize, at: Kind) -> Box<dyn Monitor + 'a> {
+    Box::new(collapse::Shrinks { field: system.field, free, scales: &system.scales, at })
 }

@@ -16,10 +16,12 @@ const SAMPLES: usize = 128;
 pub struct Shrinks<'a> {
     /// The vector field.
     pub field: &'a dyn VectorField,
-    /// Index of the continuation parameter.
+    /// Index of the parameter along which the Hopf point is looked for.
     pub free: usize,
     /// `[n]` characteristic sizes of the states.
     pub scales: &'a [f64],
+    /// What lies there: a Hopf point, or, on a curve of folds, a generalised one.
+    pub at: Kind,
 }
 
 impl Shrinks<'_> {
@@ -57,7 +59,7 @@ impl Halves {
 
 impl Monitor for Shrinks<'_> {
     fn kind(&self) -> Kind {
-        Kind::Hopf
+        self.at
     }
 
     fn value(&self, reference: &Point, at: &Point) -> f64 {
