@@ -345,3 +345,46 @@ fn the_curves_and_homotopies_of_the_book_are_right() {
     assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
     says(&String::from_utf8_lossy(&output.stdout), &["5 branches, 1 curve, 1 homotopy"]);
 }
+
+#[test]
+fn explorations() {
+    let desk = Desk::new();
+    let explored = |lines: &str| desk.study("[[branch]]", &format!("[[explore]]\n{lines}\n[[branch]]"));
+    let right = "name = \"all\"\nfree = \"mu\"\nrange = [0, 1]\n";
+    says(&explored("free = \"mu\"\nrange = [0, 1]"), &["this exploration has no name"]);
+    says(&explored("name = \"all\"\nfree = \"mu\""), &["in which range", "range = [0.5, 12]"]);
+    says(&explored(&right.replace("mu", "my")), &["no parameter `my`", "did you mean `mu`"]);
+    says(&explored(&right.replace("all", "main")), &["\"main\" is used twice"]);
+    let inside = "name = \"main/hopf-1\"\nfree = \"mu\"\nrange = [0, 1]\n";
+    says(&explored(inside), &["could be called like \"main\""]);
+    says(&explored(&format!("{right}connect = {{ mu = [0, 1] }}")), &["`mu` is the free parameter already"]);
+    says(&explored(&format!("{right}connect = {{ kappa = [2, 3] }}")), &["at kappa = 1", "a range that contains 1"]);
+    says(&explored(&format!("{right}connect = {{ }}")), &["names not exactly one parameter"]);
+    says(&explored(&format!("{right}values = 0")), &["`values`"]);
+    says(&explored(&format!("{right}switch = {{ fold = 1 }}")), &["no branch of equilibria or cycles begins at a fold"]);
+}
+
+#[test]
+fn what_explore_is_told() {
+    let desk = Desk::new();
+    let told = |arguments: &[&str]| desk.refused(&[&["explore", "pendulum.toml"], arguments].concat());
+    says(&told(&["--free", "mi=0:1"]), &["no parameter `mi`", "did you mean `mu`"]);
+    says(&told(&["--free", "mu"]), &["there is no `=`", "--free NAME=LOW:HIGH"]);
+    says(&told(&["--free", "mu=1"]), &["no `:` between two values"]);
+    says(&told(&["--free", "mu=1:x"]), &["not a finite number"]);
+    says(&told(&["--free", "mu=1:0"]), &["not smaller than the second"]);
+    says(&told(&["--free", "mu=0:1", "--set", "kappa"]), &["there is no `=`"]);
+    says(&told(&["--free", "mu=0:1", "--connect", "mu=0:1"]), &["that is the parameter of --free"]);
+    says(&told(&["--free", "mu=0:1", "--connect", "kappa=2:3"]), &["at kappa = 1", "a range that contains 1"]);
+    says(&told(&["--free", "mu=0:1", "--tolerance", "1"]), &["tolerance", "1e-10 to 1e-4"]);
+    // What it prints is a study that does the same.
+    let printed = desk.foldline(&["explore", "pendulum.toml", "--free", "mu=-1:2", "--values", "3", "--print"]);
+    desk.write("all.toml", &String::from_utf8_lossy(&printed.stdout));
+    let [own, other] = [
+        desk.foldline(&["explore", "pendulum.toml", "--free", "mu=-1:2", "--values", "3", "--out", "a"]),
+        desk.foldline(&["run", "all.toml", "--out", "b"]),
+    ];
+    assert_eq!(own.status.code(), Some(0), "{}", String::from_utf8_lossy(&own.stderr));
+    assert_eq!(own.stdout, other.stdout);
+    assert!(String::from_utf8_lossy(&own.stdout).contains("pendulum/equilibrium-1"));
+}

@@ -2,6 +2,7 @@
 
 use foldline::diagram::{Branch, Diagram, Origin};
 use foldline::explore::{Plan, Start};
+use std::cmp::Ordering;
 
 /// The names of what a study asks for: branches, curves and homotopies as it lists them, each behind what it starts from; then
 /// explorations.
@@ -41,21 +42,28 @@ pub fn leg(name: &str, homotopy: &str) -> Option<usize> {
     name.strip_prefix(homotopy)?.strip_prefix('/')?.parse().ok()
 }
 
-/// The number of what that exploration found, if the name is that of a first branch of it: `NAME/cycle-3` is the third cycle.
-fn finding(name: &str, exploration: &str) -> Option<usize> {
-    let rest = name.strip_prefix(exploration)?.strip_prefix('/')?;
-    rest.rsplit_once('-').filter(|(kind, _)| !kind.contains('/'))?.1.parse().ok()
+/// Whether the name is that of a first branch of that exploration: `NAME/cycle-3` is its third cycle.
+fn is_finding(name: &str, exploration: &str) -> bool {
+    let rest = name.strip_prefix(exploration).and_then(|rest| rest.strip_prefix('/'));
+    rest.and_then(|rest| rest.rsplit_once('-')).is_some_and(|(kind, number)| {
+        !kind.contains('/') && number.parse::<usize>().is_ok()
+    })
 }
 
 /// The branches of a diagram in an order that does not depend on how the work was shared out: those of the study in the
 /// order of its [`names`], each followed by the branches that come from it, by the parameter at which they do, and by the
-/// curves in two parameters that begin on it; the legs of a homotopy as they were tried; what an exploration found by number.
+/// curves in two parameters that begin on it; the legs of a homotopy as they were tried; what an exploration found as it was found.
 pub fn ordered(mut diagram: Diagram, study: &[String]) -> Diagram {
     let legs =
         |branch: &Branch| study.iter().enumerate().find_map(|(place, name)| Some((place, leg(&branch.name, name)?)));
     let parent = |branch: &Branch| match &branch.origin {
         Origin::Switch { parent, .. } if legs(branch).is_none() => Some(parent.clone()),
         _ => None,
+    };
+    // What an exploration finds keeps its order: one after the other was found.
+    let found = |branch: &Branch| {
+        let first = !matches!(branch.origin, Origin::Switch { .. });
+        study.iter().position(|name| first && is_finding(&branch.name, name)).map(|place| (place, 0))
     };
     let rank = |branch: &Branch| {
         let own = study.iter().position(|name| *name == branch.name).map(|place| (place, 0));
@@ -64,14 +72,13 @@ pub fn ordered(mut diagram: Diagram, study: &[String]) -> Diagram {
             Origin::Switch { parameter, .. } => (false, parameter),
             _ => (false, f64::NEG_INFINITY),
         };
-        let found = || study.iter().enumerate().find_map(|(place, name)| Some((place, finding(&branch.name, name)?)));
-        let found = || Some(branch).filter(|b| !matches!(b.origin, Origin::Switch { .. })).and_then(|_| found());
-        (behind, own.or_else(|| legs(branch)).or_else(found).unwrap_or((usize::MAX, 0)), parameter)
+        (behind, own.or_else(|| legs(branch)).or_else(|| found(branch)).unwrap_or((usize::MAX, 0)), parameter)
     };
     let mut waiting = std::mem::take(&mut diagram.branches);
     waiting.sort_by(|a, b| {
         let ((c, p, x), (d, q, y)) = (rank(a), rank(b));
-        (c, p).cmp(&(d, q)).then(x.total_cmp(&y)).then_with(|| a.name.cmp(&b.name))
+        let by_name = || if found(a).is_some() && found(b).is_some() { Ordering::Equal } else { a.name.cmp(&b.name) };
+        (c, p).cmp(&(d, q)).then(x.total_cmp(&y)).then_with(by_name)
     });
     // A branch is listed once its parent is; what is left over at last has no parent in the diagram.
     while !waiting.is_empty() {
@@ -150,6 +157,18 @@ mod tests {
             let names: Vec<&str> = sorted.branches.iter().map(|b| b.name.as_str()).collect();
             assert_eq!(names, branches.each_ref().map(|b| b.name.as_str()));
         }
+    }
+
+    #[test]
+    fn what_an_exploration_finds_keeps_its_order() {
+        let root = |name: &str| Branch::new(name, Family::Cycle, 0, Origin::Seed(String::new()));
+        let names = ["all/equilibrium-1", "all/equilibrium-1/hopf-1", "all/cycle-2", "all/3:1-1", "all/2:1-1"];
+        let mut branches: Vec<Branch> = names.map(root).to_vec();
+        branches[1] = from("all/equilibrium-1", "all/equilibrium-1/hopf-1", 1.0);
+        let last = branches.remove(1);
+        branches.push(last);
+        let sorted = ordered(Diagram { branches, ..Diagram::default() }, &["all".into()]);
+        assert_eq!(sorted.branches.iter().map(|b| b.name.as_str()).collect::<Vec<_>>(), names);
     }
 
     #[test]
