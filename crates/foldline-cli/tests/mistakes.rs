@@ -361,7 +361,10 @@ fn explorations() {
     says(&explored(&format!("{right}connect = {{ kappa = [2, 3] }}")), &["at kappa = 1", "a range that contains 1"]);
     says(&explored(&format!("{right}connect = {{ }}")), &["names not exactly one parameter"]);
     says(&explored(&format!("{right}values = 0")), &["`values`"]);
-    says(&explored(&format!("{right}switch = {{ fold = 1 }}")), &["no branch of equilibria or cycles begins at a fold"]);
+    says(
+        &explored(&format!("{right}switch = {{ fold = 1 }}")),
+        &["no branch of equilibria or cycles begins at a fold"],
+    );
 }
 
 #[test]

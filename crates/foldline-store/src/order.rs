@@ -45,9 +45,8 @@ pub fn leg(name: &str, homotopy: &str) -> Option<usize> {
 /// Whether the name is that of a first branch of that exploration: `NAME/cycle-3` is its third cycle.
 fn is_finding(name: &str, exploration: &str) -> bool {
     let rest = name.strip_prefix(exploration).and_then(|rest| rest.strip_prefix('/'));
-    rest.and_then(|rest| rest.rsplit_once('-')).is_some_and(|(kind, number)| {
-        !kind.contains('/') && number.parse::<usize>().is_ok()
-    })
+    rest.and_then(|rest| rest.rsplit_once('-'))
+        .is_some_and(|(kind, number)| !kind.contains('/') && number.parse::<usize>().is_ok())
 }
 
 /// The branches of a diagram in an order that does not depend on how the work was shared out: those of the study in the

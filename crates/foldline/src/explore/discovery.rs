@@ -7,7 +7,7 @@
 //! leads to.
 //!
 //! 1. the values: halves, quarters, eighths of the range and so on, so that the largest gap is looked into first;
-//! 2. at each value: equilibria by growing size, then cycles by falling number of samples that went there;
+//! 2. at each value (`lookout`): equilibria by growing size, then cycles by falling number of samples that went there;
 //! 3. each of these: on a known branch (`known`), or the start of a new one (`family`);
 //! 4. each fold of each branch, unless a curve has passed it: its curve (`curves`), and a new branch from each fold met there
 //!    that is not known; folds of these too, until there is no more.
@@ -19,22 +19,28 @@
 //! connected with a known one: there is no proof that a diagram is complete.
 
 use super::family::Work;
-use super::growth::{polished, setting, settings};
+use super::growth::settings;
+use super::lookout::{Lookout, Sight};
 use super::plan::{BranchPlan, CurvePlan, ExplorePlan, Start};
-use super::seeds::{attractors, bare, sampling, summary, with_degree};
+use super::seeds::with_degree;
 use super::{curves, known};
 use crate::attractors::spectral_ratio;
 use crate::contract::Event;
 use crate::diagram::{Branch, Kind, Origin, Point, Solution, SpecialPoint};
-use crate::linalg::dot;
-use crate::problem::equilibrium::EquilibriumProblem;
 use crate::special::mark::{Mark, Quantity};
 
 /// Carries out an exploration. Returns false if the observer wants to stop.
 pub(super) fn explore(work: &mut Work, plan: &ExplorePlan, jobs: usize) -> bool {
     work.budget = plan.budget;
+    let lookout = Lookout::new(work.system, plan, work.plan.tolerance);
     let mut discovery = Discovery { work, plan, named: Vec::new() };
-    let sampled = (0..plan.values).all(|index| discovery.looked_at(index, jobs));
+    // While this thread follows what was found at one value, others look at the next ones.
+    let sampled = std::thread::scope(|scope| {
+        (1..jobs.min(plan.values)).for_each(|_| drop(scope.spawn(|| while lookout.look() {})));
+        let going = (0..plan.values).all(|index| discovery.exhausted() || discovery.met(lookout.at(index)));
+        lookout.close();
+        going
+    });
     let going = sampled && plan.connect.is_none_or(|(second, range)| discovery.connected(second, range));
     going && discovery.told()
 }
@@ -47,76 +53,15 @@ struct Discovery<'d, 'w> {
 }
 
 impl Discovery<'_, '_> {
-    /// Step 2 and 3 at one of the values.
-    fn looked_at(&mut self, index: usize, jobs: usize) -> bool {
-        if self.exhausted() {
-            return true;
-        }
-        let (work, plan) = (&*self.work, self.plan);
-        let [low, high] = plan.range;
-        let mut parameters = plan.parameters.clone();
-        parameters[plan.free] = low + share(index) * (high - low);
-        if let Err(why) = work.system.repeats(&parameters, &[(plan.free, plan.range)]) {
-            return self.note(&format!("nothing can be followed from {}: {why}", parameters[plan.free]));
-        }
-        // Other values, other samples: together they say more.
-        let random = plan.random.wrapping_add(index as u64);
-        let census = attractors(work.system, &parameters, plan.samples, random, jobs, work.plan.tolerance);
-        let size = |point: &Point| match &point.solution {
-            Solution::Equilibrium(x) => dot(x, x),
-            Solution::Cycle(_) => f64::INFINITY,
+    /// Steps 2 and 3 at one of the values.
+    fn met(&mut self, sight: Sight) -> bool {
+        let value = sight.value;
+        let (found, said) = match sight.found {
+            Ok(found) => found,
+            Err(why) => return self.note(&format!("nothing can be followed from {value}: {why}")),
         };
-        let mut found: Vec<Point> = Vec::new();
-        for point in census.attractors.iter().map(|a| a.point.clone()).chain(self.rests(&parameters, random)) {
-            if !found.iter().any(|other| self.same(other, &point)) {
-                found.push(point);
-            }
-        }
-        found.sort_by(|a, b| size(a).total_cmp(&size(b)));
-        let rests = found.iter().filter(|p| matches!(p.solution, Solution::Equilibrium(_))).count();
-        let place = parameters[plan.free];
-        let said = format!("at {place}: {}; equilibria but for symmetry: {rests}", summary(&census));
-        self.note(&said)
-            && found.into_iter().all(|point| self.followed(point, Origin::Seed(format!("{}, at {place}", plan.name))))
-    }
-
-    /// Equilibria in the ranges of the states, stable or not.
-    fn rests(&self, parameters: &[f64], random: u64) -> Vec<Point> {
-        let system = self.work.system;
-        if system.field.forced() {
-            return Vec::new();
-        }
-        let tolerance = self.work.plan.tolerance;
-        let settings = settings(system, tolerance, [f64::NEG_INFINITY, f64::INFINITY], 0);
-        let starts = sampling(system, self.plan.samples, random, 1, tolerance).starts();
-        let mut found: Vec<Point> = Vec::new();
-        for start in starts.chunks_exact(system.field.dim().max(1)) {
-            let mut problem = EquilibriumProblem::new(setting(system, self.plan.free, parameters));
-            let guess = bare(parameters, Solution::Equilibrium(start.to_vec()));
-            if let Ok(station) = polished(&mut problem, &settings, &guess)
-                && self.inside(&station.point)
-                && !found.iter().any(|other| self.same(other, &station.point))
-            {
-                found.push(station.point);
-            }
-        }
-        found
-    }
-
-    /// Whether an equilibrium lies in the ranges of the states, or less than half their widths outside.
-    fn inside(&self, point: &Point) -> bool {
-        let Solution::Equilibrium(x) = &point.solution else { return false };
-        x.iter().zip(&self.work.system.ranges).all(|(x, [low, high])| {
-            let room = 0.5 * (high - low);
-            (low - room..=high + room).contains(x)
-        })
-    }
-
-    /// Whether two solutions at the same parameter values are the same, or images of each other under a symmetry.
-    fn same(&self, a: &Point, b: &Point) -> bool {
-        let system = self.work.system;
-        let close = 30.0 * self.work.plan.tolerance;
-        system.reflections.iter().any(|reflection| a.difference(b, &system.scales, reflection) < close)
+        let origin = Origin::Seed(format!("{}, at {value}", self.plan.name));
+        self.note(&said) && found.into_iter().all(|point| self.followed(point, origin.clone()))
     }
 
     /// Step 3: a new branch from a solution, unless that lies on one that is known.
@@ -265,25 +210,5 @@ impl Discovery<'_, '_> {
             ),
             false => format!("{branches} branches and {curves} curves with {points} points; nothing was left undone"),
         })
-    }
-}
-
-/// The place of a value in the range, as a share: 1/2, 1/4, 3/4, 1/8, 5/8, 3/8, 7/8 and so on.
-fn share(index: usize) -> f64 {
-    let (mut left, mut share, mut weight) = (index + 1, 0.0, 0.5);
-    while left > 0 {
-        share += weight * (left & 1) as f64;
-        (left, weight) = (left >> 1, 0.5 * weight);
-    }
-    share
-}
-
-#[cfg(test)]
-mod tests {
-    use super::share;
-
-    #[test]
-    fn values_halve_the_largest_gap() {
-        assert_eq!([0, 1, 2, 3, 4, 5, 6].map(share), [0.5, 0.25, 0.75, 0.125, 0.625, 0.375, 0.875]);
     }
 }

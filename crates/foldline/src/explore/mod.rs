@@ -12,7 +12,7 @@
 //! | where do first solutions come from? | [`seeds`] |
 //! | how is one branch followed to both sides, or resumed? | [`growth`] |
 //! | what follows from a finished branch? | [`family`] |
-//! | how is a diagram found without being told where anything is? | `discovery` |
+//! | how is a diagram found without being told where anything is? | `discovery`, `lookout` |
 //! | how does one leave a special point on the other branch? | [`switch`] |
 //! | is this branch known already? | [`known`] |
 //! | where does a special point go when a second parameter changes? | [`curves`] |
@@ -28,6 +28,7 @@ pub mod family;
 pub mod growth;
 pub mod homotopy;
 pub mod known;
+mod lookout;
 pub mod persistence;
 pub mod plan;
 pub mod responses;

@@ -1,0 +1,189 @@
+//! What there is at values of a parameter: attractors and equilibria, looked for on several threads.
+
+use super::System;
+use super::growth::{polished, setting, settings};
+use super::plan::ExplorePlan;
+use super::seeds::{attractors, bare, sampling, summary};
+use crate::diagram::{Point, Solution};
+use crate::linalg::dot;
+use crate::problem::equilibrium::EquilibriumProblem;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Condvar, Mutex, PoisonError};
+
+/// What there is at a value of the parameter.
+pub(super) struct Sight {
+    pub(super) value: f64,
+    /// Solutions, none of which is another one under a symmetry, or why nothing can be followed from there.
+    pub(super) found: Result<(Vec<Point>, String), String>,
+}
+
+/// Looks at the values, shared among threads.
+pub(super) struct Lookout<'l> {
+    system: &'l System<'l>,
+    plan: &'l ExplorePlan,
+    tolerance: f64,
+    seen: Slots<Sight>,
+}
+
+impl<'l> Lookout<'l> {
+    pub(super) fn new(system: &'l System<'l>, plan: &'l ExplorePlan, tolerance: f64) -> Lookout<'l> {
+        Lookout { system, plan, tolerance, seen: Slots::new(plan.values) }
+    }
+
+    /// Nobody looks at any more values.
+    pub(super) fn close(&self) {
+        self.seen.close();
+    }
+
+    /// Looks at the next value that nobody has taken; false if there is none.
+    pub(super) fn look(&self) -> bool {
+        let Some(index) = self.seen.take() else { return false };
+        self.seen.put(index, self.sight(index));
+        true
+    }
+
+    /// What there is at that value; helps until it is known.
+    pub(super) fn at(&self, index: usize) -> Sight {
+        loop {
+            if let Some(sight) = self.seen.ready(index) {
+                return sight;
+            }
+            if !self.look() {
+                return self.seen.wait(index);
+            }
+        }
+    }
+
+    /// Step 2 without following anything.
+    fn sight(&self, index: usize) -> Sight {
+        let (system, plan) = (self.system, self.plan);
+        let [low, high] = plan.range;
+        let value = low + share(index) * (high - low);
+        let mut parameters = plan.parameters.clone();
+        parameters[plan.free] = value;
+        if let Err(why) = system.repeats(&parameters, &[(plan.free, plan.range)]) {
+            return Sight { value, found: Err(why) };
+        }
+        // Other values, other samples: together they say more.
+        let random = plan.random.wrapping_add(index as u64);
+        let census = attractors(system, &parameters, plan.samples, random, 1, self.tolerance);
+        let mut found: Vec<Point> = Vec::new();
+        for point in census.attractors.iter().map(|a| a.point.clone()).chain(self.rests(&parameters, random)) {
+            if !found.iter().any(|other| same(system, self.tolerance, other, &point)) {
+                found.push(point);
+            }
+        }
+        let size = |point: &Point| match &point.solution {
+            Solution::Equilibrium(x) => dot(x, x),
+            Solution::Cycle(_) => f64::INFINITY,
+        };
+        found.sort_by(|a, b| size(a).total_cmp(&size(b)));
+        let rests = found.iter().filter(|p| matches!(p.solution, Solution::Equilibrium(_))).count();
+        let said = format!("at {value}: {}; equilibria but for symmetry: {rests}", summary(&census));
+        Sight { value, found: Ok((found, said)) }
+    }
+
+    /// Equilibria in the ranges of the states, stable or not.
+    fn rests(&self, parameters: &[f64], random: u64) -> Vec<Point> {
+        let system = self.system;
+        if system.field.forced() {
+            return Vec::new();
+        }
+        let settings = settings(system, self.tolerance, [f64::NEG_INFINITY, f64::INFINITY], 0);
+        let starts = sampling(system, self.plan.samples, random, 1, self.tolerance).starts();
+        let mut found: Vec<Point> = Vec::new();
+        for start in starts.chunks_exact(system.field.dim().max(1)) {
+            let mut problem = EquilibriumProblem::new(setting(system, self.plan.free, parameters));
+            let guess = bare(parameters, Solution::Equilibrium(start.to_vec()));
+            if let Ok(station) = polished(&mut problem, &settings, &guess)
+                && self.inside(&station.point)
+                && !found.iter().any(|other| same(system, self.tolerance, other, &station.point))
+            {
+                found.push(station.point);
+            }
+        }
+        found
+    }
+
+    /// Whether an equilibrium lies in the ranges of the states, or less than half their widths outside.
+    fn inside(&self, point: &Point) -> bool {
+        let Solution::Equilibrium(x) = &point.solution else { return false };
+        x.iter().zip(&self.system.ranges).all(|(x, [low, high])| {
+            let room = 0.5 * (high - low);
+            (low - room..=high + room).contains(x)
+        })
+    }
+}
+
+/// Results by number, computed by several threads and taken in order by one.
+struct Slots<T> {
+    slots: Mutex<Vec<Option<T>>>,
+    next: AtomicUsize,
+    arrived: Condvar,
+}
+
+impl<T> Slots<T> {
+    fn new(count: usize) -> Slots<T> {
+        let slots = Mutex::new((0..count).map(|_| None).collect());
+        Slots { slots, next: AtomicUsize::new(0), arrived: Condvar::new() }
+    }
+
+    /// The next number that nobody has taken.
+    fn take(&self) -> Option<usize> {
+        let count = self.slots.lock().unwrap_or_else(PoisonError::into_inner).len();
+        Some(self.next.fetch_add(1, Ordering::Relaxed)).filter(|index| *index < count)
+    }
+
+    /// Nothing more is to be taken.
+    fn close(&self) {
+        self.next.store(usize::MAX / 2, Ordering::Relaxed);
+    }
+
+    fn put(&self, index: usize, result: T) {
+        if let Some(slot) = self.slots.lock().unwrap_or_else(PoisonError::into_inner).get_mut(index) {
+            *slot = Some(result);
+        }
+        self.arrived.notify_all();
+    }
+
+    fn ready(&self, index: usize) -> Option<T> {
+        self.slots.lock().unwrap_or_else(PoisonError::into_inner).get_mut(index)?.take()
+    }
+
+    /// The result of that number, which some thread has taken.
+    fn wait(&self, index: usize) -> T {
+        let mut slots = self.slots.lock().unwrap_or_else(PoisonError::into_inner);
+        loop {
+            if let Some(result) = slots.get_mut(index).and_then(Option::take) {
+                return result;
+            }
+            slots = self.arrived.wait(slots).unwrap_or_else(PoisonError::into_inner);
+        }
+    }
+}
+
+/// Whether two solutions at the same parameter values are the same, or images of each other under a symmetry.
+fn same(system: &System, tolerance: f64, a: &Point, b: &Point) -> bool {
+    let close = 30.0 * tolerance;
+    system.reflections.iter().any(|reflection| a.difference(b, &system.scales, reflection) < close)
+}
+
+/// The place of a value in the range, as a share: 1/2, 1/4, 3/4, 1/8, 5/8, 3/8, 7/8 and so on.
+fn share(index: usize) -> f64 {
+    let (mut left, mut share, mut weight) = (index + 1, 0.0, 0.5);
+    while left > 0 {
+        share += weight * (left & 1) as f64;
+        (left, weight) = (left >> 1, 0.5 * weight);
+    }
+    share
+}
+
+#[cfg(test)]
+mod tests {
+    use super::share;
+
+    #[test]
+    fn values_halve_the_largest_gap() {
+        assert_eq!([0, 1, 2, 3, 4, 5, 6].map(share), [0.5, 0.25, 0.75, 0.125, 0.625, 0.375, 0.875]);
+    }
+}
