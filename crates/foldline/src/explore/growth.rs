@@ -355,7 +355,7 @@ impl Growth<'_> {
                 Item::Special(mut special) => {
                     // Where a curve only turns there is none.
                     if branch.held.is_none() || special.kind.has_codimension_two() {
-                        special.coefficients = self.coefficients(&system, branch.free, &special);
+                        special.coefficients = self.coefficients(&system, branch, &special);
                     }
                     self.place_exactly(&system, branch, &mut special);
                     branch.insert_special(special.clone());
@@ -455,12 +455,15 @@ impl Growth<'_> {
     }
 
     /// Of the normal form.
-    fn coefficients(&self, system: &System, free: usize, special: &SpecialPoint) -> Vec<f64> {
+    fn coefficients(&self, system: &System, branch: &Branch, special: &SpecialPoint) -> Vec<f64> {
+        let own = setting(system, branch.free, &special.point.parameters);
         match special.point.solution {
-            Solution::Equilibrium(_) => special::normal_form::coefficients(system.field, special.kind, &special.point),
+            Solution::Equilibrium(_) => {
+                let own = Setting { axes: vec![self.line(branch).axis(system, branch.free)], ..own };
+                special::normal_form::coefficients(&own, special.kind, &special.point)
+            }
             Solution::Cycle(_) => {
-                let setting = setting(system, free, &special.point.parameters);
-                special::cycle_form::coefficient(special.kind, setting, &special.point).into_iter().collect()
+                special::cycle_form::coefficient(special.kind, own, &special.point).into_iter().collect()
             }
         }
     }

@@ -1,0 +1,64 @@
+//! Normal forms of an eigenvalue 0: folds, cusps, branch points, Bogdanov–Takens points.
+
+use super::ROUNDING;
+use super::local::Local;
+use super::manifold::Manifold;
+use super::without_rounding;
+use crate::linalg::dot;
+
+/// Amplitude, as a share of the scales of the states, up to which the cubic term of a branch point outweighs the quadratic one where it
+/// counts as a pitchfork.
+const PITCHFORK: f64 = 1e-5;
+
+impl Local<'_> {
+    /// a of (1).
+    pub fn fold(&self) -> Option<f64> {
+        Some(0.5 * Manifold::new(self, true, &[])?.motion(0, &[0, 0])?.value.re)
+    }
+
+    /// c of (2).
+    pub fn cusp(&self) -> Option<f64> {
+        Some(Manifold::new(self, true, &[])?.motion(0, &[0, 0, 0])?.value.re / 6.0)
+    }
+
+    /// a and b of (3), then c where it is a pitchfork: then a is 0. `along` is the tangent of the branch `[n + k]` in states and parameters,
+    /// for one unit of its parameter; `scales` `[n]` are those of the states.
+    pub fn crossing(&self, along: &[f64], scales: &[f64]) -> Option<Vec<f64>> {
+        let [q, p] = self.null_vectors()?;
+        let b = dot(&p, &self.derivative(&[&q, along])) / dot(&p, &q);
+        let (a, c) = (self.fold()?, self.cusp()?);
+        let reach = 1.0 / q.iter().zip(scales).fold(f64::MIN_POSITIVE, |most, (q, s)| most.max((q / s).abs()));
+        Some(if a.abs() <= PITCHFORK * reach * c.abs() { vec![0.0, b, c] } else { vec![a, b] })
+    }
+
+    /// a and b of (7).
+    pub fn takens(&self) -> Option<[f64; 2]> {
+        let vectors = self.null_vectors()?;
+        let [q0, p1] = &vectors;
+        let q1 = self.bordered(&vectors, q0)?;
+        let p0 = self.transposed().bordered(&[p1.clone(), q0.clone()], p1)?;
+        // ⟨p₁, q₁⟩ = ⟨p₀, q₀⟩ is a number that p₀ and p₁ are divided by; what q₁ has along q₀ is chosen so that ⟨p₀, q₁⟩ = 0.
+        let size = dot(p1, &q1);
+        let along = dot(&p0, &q1) / size;
+        let q1: Vec<f64> = q1.iter().zip(q0).map(|(q1, q0)| q1 - along * q0).collect();
+        let quadratic = self.derivative(&[q0, q0]);
+        let mixed = self.derivative(&[q0, &q1]);
+        Some([0.5 * dot(p1, &quadratic) / size, (dot(&p0, &quadratic) + dot(p1, &mixed)) / size])
+    }
+
+    /// s, θ and E of (6) for the frequency ω; `None` where b or c of (6) vanishes.
+    pub fn zero_hopf(&self, omega: f64) -> Option<[f64; 3]> {
+        let mut manifold = Manifold::new(self, true, &[omega])?;
+        let mut g = |i: usize, m: &[usize]| manifold.motion(i, m);
+        let real = |g: super::manifold::Sized| without_rounding(&[g.value.re], &[g.size], ROUNDING);
+        let (g200, g011) = (real(g(0, &[0, 0])?), real(g(0, &[1, 2])?));
+        if g200 == 0.0 || g011 == 0.0 {
+            return None;
+        }
+        let (g300, g111) = (g(0, &[0, 0, 0])?.value.re, g(0, &[0, 1, 2])?.value.re);
+        let (h110, h210, h021) = (g(1, &[0, 1])?.value, g(1, &[0, 0, 1])?.value, g(1, &[1, 1, 2])?.value);
+        let time = h021.re / g011 - g300 / g200 + g111 / g011;
+        let e = 0.5 * (h210 + h110 * time - h021 * g200 / (2.0 * g011)).re;
+        Some([(g200 * g011).signum(), 2.0 * h110.re / g200, e])
+    }
+}
