@@ -47,6 +47,9 @@ impl Line {
             .held
             .and_then(|(kind, _)| special::condition::condition(kind, setting.clone(), degree, &point.solution));
         let surface: Box<dyn ZeroProblem + 'a> = match &point.solution {
+            Solution::Equilibrium(_) if self.held.is_some_and(|(kind, _)| kind == Kind::BranchPoint) => {
+                Box::new(EquilibriumProblem::unfolded(setting))
+            }
             Solution::Equilibrium(_) => Box::new(EquilibriumProblem::new(setting)),
             Solution::Cycle(cycle) if self.doubled && cycle.intervals() > 0 => {
                 Box::new(CycleProblem::like(setting, cycle).with_equal_halves())

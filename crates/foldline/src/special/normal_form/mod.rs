@@ -93,7 +93,12 @@ pub fn coefficients(setting: &Setting, kind: Kind, at: &Point) -> Vec<f64> {
 /// The tangent of a branch in states and parameters `[n + k]` for one unit of its parameter.
 fn tangent(setting: &Setting, at: &Point) -> Option<Vec<f64>> {
     let Solution::Equilibrium(x) = &at.solution else { return None };
+    // A branch that itself turns there has another one as its line of reference.
+    const STEEP: f64 = 1e-6;
     let (slope, states) = (at.parameter_slope(), at.tangent.get(..x.len())?);
+    if slope.abs() < STEEP {
+        return None;
+    }
     let mut unit = vec![0.0; setting.freedom()];
     *unit.last_mut()? = 1.0;
     Some(states.iter().map(|t| t / slope).chain(setting.spread(&unit)).collect())

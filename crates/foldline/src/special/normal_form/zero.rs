@@ -26,9 +26,14 @@ impl Local<'_> {
     pub fn crossing(&self, along: &[f64], scales: &[f64]) -> Option<Vec<f64>> {
         let [q, p] = self.null_vectors()?;
         let b = dot(&p, &self.derivative(&[&q, along])) / dot(&p, &q);
-        let (a, c) = (self.fold()?, self.cusp()?);
+        Some(if self.is_pitchfork(scales, PITCHFORK)? { vec![0.0, b, self.cusp()?] } else { vec![self.fold()?, b] })
+    }
+
+    /// Whether a ξ² is less than c ξ³ as soon as ξ q is that share of the `scales` `[n]` of the states.
+    pub fn is_pitchfork(&self, scales: &[f64], share: f64) -> Option<bool> {
+        let [q, _] = self.null_vectors()?;
         let reach = 1.0 / q.iter().zip(scales).fold(f64::MIN_POSITIVE, |most, (q, s)| most.max((q / s).abs()));
-        Some(if a.abs() <= PITCHFORK * reach * c.abs() { vec![0.0, b, c] } else { vec![a, b] })
+        Some(self.fold()?.abs() <= share * reach * self.cusp()?.abs())
     }
 
     /// a and b of (7).
