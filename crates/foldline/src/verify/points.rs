@@ -221,14 +221,17 @@ impl Part<'_> {
         self.setting.linearise(batch, &mut f, &mut fx, &mut fp);
         out.points += 1;
         let scales: Vec<f64> = x.iter().zip(self.setting.scales).map(|(x, s)| x.abs() + s).collect();
-        // Where branches cross all along, only what the Jacobian reaches of the residual can be made up for.
-        let beyond = match self.branch.held {
-            Some((Kind::BranchPoint, _)) => {
+        let held = self.branch.held.map(|(kind, _)| kind);
+        let null = match held {
+            Some(Kind::Fold | Kind::BranchPoint) => {
                 Local::new(self.setting.field, point).and_then(|local| local.null_vectors())
             }
             _ => None,
         };
-        let rate = beyond.as_ref().map_or(0.0, |[q, _]| self.rate(batch, &fx, q));
+        // Of a single state nothing is left of the Jacobian.
+        let rate = null.as_ref().map_or(0.0, |[q, _]| self.rate(batch, &fx, q));
+        // Where branches cross all along, only what the Jacobian reaches of the residual can be made up for.
+        let beyond = null.filter(|_| held == Some(Kind::BranchPoint));
         // The shortest way to a solution in state and parameters.
         let mut line: Vec<f64> = Vec::with_capacity(n * (n + k));
         for i in 0..n {
@@ -263,7 +266,8 @@ impl Part<'_> {
             let sum: Complex64 = point.spectrum.iter().map(|z| z.powi(exponent)).sum();
             let size: f64 = point.spectrum.iter().map(|z| z.norm().powi(exponent)).sum();
             let entries: f64 = power.iter().fold(0.0, |m, x| larger(m, x.abs()));
-            worst = larger(worst, (sum - trace).norm() / size.max(entries).max(f64::MIN_POSITIVE));
+            worst =
+                larger(worst, (sum - trace).norm() / size.max(entries).max(rate.powi(exponent)).max(f64::MIN_POSITIVE));
             let old = power.clone();
             for (at, x) in power.iter_mut().enumerate() {
                 *x = (0..n).map(|j| old[at / n * n + j] * fx[j * n + at % n]).sum();
