@@ -243,6 +243,9 @@ pub trait Condition {
     /// Takes the null vectors of the last evaluation as reference until the next call.
     fn anchor(&mut self);
 
+    /// Learns which way the curve goes, in the unknowns of the surface.
+    fn face(&mut self, _along: &[f64]) {}
+
     /// Moves to another mesh.
     fn set_mesh(&mut self, mesh: &Mesh);
 

@@ -154,6 +154,9 @@ impl ZeroProblem for Held<'_> {
         let e = self.extra();
         self.surface.anchor(&u[e..]);
         self.condition.anchor();
+        if self.row.len() == self.unknowns() {
+            self.condition.face(&self.row[e..]);
+        }
         self.known = None;
         self.follow_plane();
         self.scale.iter_mut().zip(u).for_each(|(s, v)| *s = 1.0 + v.abs());

@@ -33,6 +33,9 @@ use num_complex::Complex64;
 /// Share of the cubic term, over the scales of the states, below which a quadratic one is rounding.
 const VANISHING: f64 = 1e-9;
 
+/// ⟨p, q⟩ of unit vectors below which an eigenvalue 0 is double, as far as located points tell.
+const DOUBLE: f64 = 1e-6;
+
 /// One line of the table.
 pub struct CodimensionTwo<'a> {
     field: &'a dyn VectorField,
@@ -165,6 +168,11 @@ impl Monitor for CodimensionTwo<'_> {
             // Two real eigenvalues with the sum 0 are none of these.
             Kind::ZeroHopf if self.held != Kind::Hopf => rest.iter().any(on_axis),
             Kind::ZeroHopf | Kind::GeneralisedHopf => held.iter().all(on_axis),
+            // Where a fold and a branch point meet at a double eigenvalue 0, ⟨p, B(q, q)⟩ vanishes with ⟨p, q⟩.
+            Kind::Cusp if at.solution.period().is_none() => {
+                let vectors = Local::new(self.field, at).and_then(|local| local.null_vectors());
+                vectors.is_some_and(|[q, p]| dot(&p, &q).abs() > DOUBLE)
+            }
             Kind::DoubleHopf => rest.iter().any(on_axis) && held.iter().all(on_axis),
             Kind::FoldTorus | Kind::FlipTorus if self.held != Kind::Torus => rest.iter().any(on_circle),
             Kind::DoubleTorus => rest.iter().any(on_circle),

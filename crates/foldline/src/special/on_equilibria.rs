@@ -1,4 +1,4 @@
-//! Conditions on equilibria: a fold, a branch point or a Hopf point is held.
+//! Conditions on equilibria: a fold or a Hopf point is held.
 //!
 //! **Idea.** At each of these points an operator L has a null space: of dimension one at a fold, two at a Hopf point, where L is real and
 //! does not know whether the pair of eigenvalues is ±iω or has become a pair ±λ of real ones. L is bordered by approximate null
@@ -7,23 +7,16 @@
 //! **Equations.** With A = f_x, null vector v, borders b and c of one or two columns:
 //!
 //! ```text
-//!   fold, branch point   (1)  L = A
-//!   Hopf                 (2)  L = A² + κ                            κ = ω², the extra unknown
+//!   fold   (1)  L = A
+//!   Hopf   (2)  L = A² + κ                                          κ = ω², the extra unknown
 //!
 //!   (3)  [ L   b ] [ v ]   [ 0  ]
 //!        [ cᵀ  0 ] [ g ] = [ e₁ ],      dg_k = -w_kᵀ (dL) v   with   [ w_k ] the solution for e_k of the transposed
-//!
-//!   branch point   (4)  ⟨w, f_λ⟩ = 0,   d⟨w, f_λ⟩ = ⟨w, df_λ - (dA) y⟩   with   [ y ] the solution of (3) for f_λ
 //! ```
 //!
-//! λ being the direction in the plane of the two parameters in which the eigenvalue changes most, first that of the branch. That (1) and (4)
-//! hold along a curve in two parameters is not generic: something in the model must make branches cross, a symmetry or a solution that is
-//! always there. So they are asked of f(x, λ) + β d = 0, of which there always is such a curve; where the amplitude β stays 0, it is one of
-//! branch points of f, and the direction does not matter.
+//! **Source.** govaerts2000, §3 and §4 (folds), §5.2 (Hopf points).
 //!
-//! **Source.** govaerts2000, §3 and §4 (folds), §5.2 (Hopf points); allgower1990, §8 (branch points).
-//!
-//! **Departures.** b, c and the direction of λ are taken anew from w and v at every accepted point.
+//! **Departures.** b and c are taken anew from w and v at every accepted point.
 
 use crate::contract::{Batch, Condition, Parameters};
 use crate::diagram::{Kind, Mesh, Point};
@@ -31,7 +24,7 @@ use crate::linalg::{axpy, dot, lu, max_abs};
 use crate::problem::Setting;
 use num_complex::Complex64;
 
-/// A fold, branch point or Hopf point held on equilibria.
+/// A fold or Hopf point held on equilibria.
 pub struct OnEquilibria<'a> {
     setting: Setting<'a>,
     kind: Kind,
@@ -48,16 +41,13 @@ pub struct OnEquilibria<'a> {
     parameters: Vec<f64>,
     /// `[n × n]` A.
     jacobian: Vec<f64>,
-    /// The direction of λ in (4), and y `[n]`.
-    across: [f64; 2],
-    through: Vec<f64>,
 }
 
 impl<'a> OnEquilibria<'a> {
     /// The condition of that kind; `None` for a kind that equilibria do not have.
     pub fn new(kind: Kind, setting: Setting<'a>) -> Option<OnEquilibria<'a>> {
         let width = match kind {
-            Kind::Fold | Kind::BranchPoint => 1,
+            Kind::Fold => 1,
             Kind::Hopf => 2,
             _ => return None,
         };
@@ -75,34 +65,7 @@ impl<'a> OnEquilibria<'a> {
             state: Vec::new(),
             parameters: Vec::new(),
             jacobian: Vec::new(),
-            across: [1.0, 0.0],
-            through: Vec::new(),
         })
-    }
-
-    /// Where the free parameters begin in the unknowns of the surface: at a branch point there is β before them.
-    fn first(&self) -> usize {
-        self.n + usize::from(self.kind == Kind::BranchPoint)
-    }
-
-    /// A direction in the two parameters as one in states and parameters.
-    fn in_parameters(&self, direction: &[f64; 2]) -> Vec<f64> {
-        [vec![0.0; self.n], self.setting.spread(direction)].concat()
-    }
-
-    /// The direction in the plane of the parameters, in their scales, in which the eigenvalue 0 changes most.
-    fn steepest(&self) -> Option<[f64; 2]> {
-        let n = self.n;
-        let mut v = self.null[..n].to_vec();
-        v.resize(n + self.parameters.len(), 0.0);
-        let scales = [0, 1].map(|a| self.setting.axes[a].scale);
-        let slopes = [[scales[0], 0.0], [0.0, scales[1]]].map(|unit| {
-            let mut change = vec![0.0; n];
-            self.setting.field.directional(self.batch(), &[&v, &self.in_parameters(&unit)], &mut change);
-            dot(&self.adjoint[..n], &change)
-        });
-        let norm = slopes[0].hypot(slopes[1]);
-        (norm.is_finite() && norm > 0.0).then(|| [0, 1].map(|a| slopes[a] / norm * scales[a]))
     }
 
     fn batch(&self) -> Batch<'_> {
@@ -119,7 +82,7 @@ impl<'a> OnEquilibria<'a> {
         let (n, width) = (self.n, self.width);
         let total = n + width;
         self.state = u[..n].to_vec();
-        self.parameters = self.setting.at(&u[self.first()..]);
+        self.parameters = self.setting.at(&u[n..]);
         let (mut f, mut fx) = (vec![0.0; n], vec![0.0; n * n]);
         self.setting.field.linearise(self.batch(), &[], &mut f, &mut fx, &mut []);
         self.jacobian = fx;
@@ -154,16 +117,7 @@ impl<'a> OnEquilibria<'a> {
             self.null.extend(v);
             self.adjoint.extend(w);
         }
-        g[..width].copy_from_slice(&self.null[n..total]);
-        if self.kind == Kind::BranchPoint {
-            let mut slope = vec![0.0; n];
-            self.setting.field.directional(self.batch(), &[&self.in_parameters(&self.across)], &mut slope);
-            g[1] = dot(&self.adjoint[..n], &slope);
-            slope.push(0.0);
-            lu::solve(&matrix, total, &pivots, &mut slope, 1);
-            slope.truncate(n);
-            self.through = slope;
-        }
+        g.copy_from_slice(&self.null[n..total]);
         (max_abs(&self.null).is_finite() && max_abs(&self.adjoint).is_finite()).then_some(())
     }
 }
@@ -175,10 +129,6 @@ impl Condition for OnEquilibria<'_> {
 
     fn extra(&self) -> usize {
         self.width - 1
-    }
-
-    fn equations(&self) -> usize {
-        if self.kind == Kind::BranchPoint { 2 } else { self.width }
     }
 
     fn guess(&self, point: &Point) -> Vec<f64> {
@@ -195,9 +145,6 @@ impl Condition for OnEquilibria<'_> {
             return;
         }
         let (n, total) = (self.n, self.n + self.width);
-        if self.kind == Kind::BranchPoint {
-            self.across = self.steepest().unwrap_or(self.across);
-        }
         let scale = |i: usize| self.setting.scales[i];
         // Orthonormal in scaled components, one after the other.
         let (mut left, mut right): (Vec<Vec<f64>>, Vec<Vec<f64>>) = (Vec::new(), Vec::new());
@@ -233,7 +180,7 @@ impl Condition for OnEquilibria<'_> {
 
     fn derivative(&mut self, du: &[f64], extra: &[f64], dg: &mut [f64]) {
         let (n, total) = (self.n, self.n + self.width);
-        let direction = [&du[..n], &self.setting.spread(&du[self.first()..])].concat();
+        let direction = [&du[..n], &self.setting.spread(&du[n..])].concat();
         // dA x.
         let changed = |x: &[f64]| {
             let mut full = x.to_vec();
@@ -254,24 +201,18 @@ impl Condition for OnEquilibria<'_> {
         for (value, w) in dg.iter_mut().zip(self.adjoint.chunks_exact(total)) {
             *value = -dot(&w[..n], &change);
         }
-        if self.kind == Kind::BranchPoint {
-            let mut slope = vec![0.0; n];
-            self.setting.field.directional(self.batch(), &[&self.in_parameters(&self.across), &direction], &mut slope);
-            axpy(-1.0, &changed(&self.through), &mut slope);
-            dg[1] = dot(&self.adjoint[..n], &slope);
-        }
     }
 
     fn held(&self, extra: &[f64]) -> Vec<Complex64> {
         match self.kind {
-            Kind::Fold | Kind::BranchPoint => vec![Complex64::new(0.0, 0.0)],
+            Kind::Fold => vec![Complex64::new(0.0, 0.0)],
             _ => [1.0, -1.0].map(|sign| sign * Complex64::new(-extra[0], 0.0).sqrt()).to_vec(),
         }
     }
 
     fn distance(&self, z: Complex64) -> f64 {
         match self.kind {
-            Kind::Fold | Kind::BranchPoint => z.norm(),
+            Kind::Fold => z.norm(),
             _ if z.im == 0.0 => f64::INFINITY,
             _ => z.re.abs(),
         }
