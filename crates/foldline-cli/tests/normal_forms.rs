@@ -113,10 +113,15 @@ fn convection_begins_at_a_supercritical_pitchfork() {
 #[test]
 fn prey_appear_at_a_transcritical_point() {
     let model = include_str!("../../../models/predator-prey.toml");
-    let branch = "[[seed]]\nname = \"s\"\nstate = { u = 0, v = 0 }\nparameters = { p1 = 0.1 }\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"p1\"\nrange = [0.1, 0.7]\n";
+    let branch = "[[seed]]\nname = \"s\"\nstate = { u = 0, v = 0 }\nparameters = { p1 = 0.1 }\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"p1\"\nrange = [0.1, 0.7]\nswitch = { branch-point = 1 }\n";
     let diagram = grown(model, branch);
     let [point] = of_kind(diagram.branch("b").unwrap(), Kind::BranchPoint)[..] else { panic!("one branch point") };
     let [a, b] = point.coefficients[..] else { panic!("transcritical: {}", point.normal_form()) };
     assert!((a.abs() - 4.5).abs() < 1e-7 && (b + 5.0).abs() < 1e-7, "{}", point.normal_form());
     assert!(point.normal_form().ends_with("transcritical") && point.criticality().is_none());
+    // Along the other branch the eigenvalue passes 0 the other way.
+    let [same] = of_kind(diagram.branch("b/branch-point-1").unwrap(), Kind::BranchPoint)[..] else {
+        panic!("the same")
+    };
+    assert!((same.coefficients[1] - 5.0).abs() < 1e-6, "{}", same.normal_form());
 }

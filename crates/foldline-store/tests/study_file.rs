@@ -149,7 +149,8 @@ fn all_are_said(cases: &[Case]) {
 fn mistakes_about_what_is_held() {
     all_are_said(&[
         ("hold = \"fold\"", "hold = \"fald\"", "\"fald\"", "no kind of special point that can be held", "`fold`"),
-        ("hold = \"fold\"", "hold = \"branch-point\"", "\"branch-point\"", "branch-point cannot be held", "torus"),
+        ("hold = \"fold\"", "hold = \"cusp\"", "\"cusp\"", "cusp cannot be held", "torus"),
+        ("hold = \"fold\"", "hold = \"branch-point\"", "\"branch-point\"", "of cycles cannot be held", "torus"),
         ("hold = \"fold\"", "", "[[curve]]", "does not say what is held", "\"hopf\""),
         ("hold = \"fold\"", "hold = 1", "1", "not a text", "text"),
         ("hold = \"period-doubling\"", "hold = \"hopf\"", "\"hopf\"", "cycles have no Hopf points", "torus"),

@@ -94,9 +94,11 @@ pub fn coefficients(setting: &Setting, kind: Kind, at: &Point) -> Vec<f64> {
 fn tangent(setting: &Setting, at: &Point) -> Option<Vec<f64>> {
     let Solution::Equilibrium(x) = &at.solution else { return None };
     // A branch that itself turns there has another one as its line of reference.
-    const STEEP: f64 = 1e-6;
+    const STEEP: f64 = 1e-3;
     let (slope, states) = (at.parameter_slope(), at.tangent.get(..x.len())?);
-    if slope.abs() < STEEP {
+    let scale = setting.axes.last()?.scale;
+    let sideways = states.iter().zip(setting.scales).fold(0.0f64, |most, (t, s)| most.max((t / s).abs()));
+    if (slope / scale).abs() < STEEP * sideways {
         return None;
     }
     let mut unit = vec![0.0; setting.freedom()];

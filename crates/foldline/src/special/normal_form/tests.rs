@@ -215,6 +215,11 @@ fn coordinates_do_not_change_a_branch_point() {
     let [same, back] = local.crossing(&other, &[1.0; 3]).unwrap()[..] else { panic!("it is transcritical") };
     near(same, quadratic);
     near(back, -0.8);
+    // So next to the point that a tangent may be anything between both, the one that is closer counts.
+    for (share, expected) in [(0.4, 0.8), (0.6, -0.8)] {
+        let between: Vec<f64> = along.iter().zip(&other).map(|(a, b)| a + share * (b - a)).collect();
+        near(local.crossing(&between, &[1.0; 3]).unwrap()[1], expected);
+    }
     // ξ' = 0.8 μ ξ + c ξ³ with a slave that adds to c: y₁ = y₀² and 2 y₀ y₁.
     for (cubic, whole) in [("-5", -3.0), ("1.5", 3.5)] {
         let first = format!("0.8*p*y0 + ({cubic})*y0^3 + 2*y0*y1");

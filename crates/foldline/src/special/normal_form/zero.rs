@@ -21,12 +21,22 @@ impl Local<'_> {
         Some(Manifold::new(self, true, &[])?.motion(0, &[0, 0, 0])?.value.re / 6.0)
     }
 
-    /// a and b of (3), then c where it is a pitchfork: then a is 0. `along` is the tangent of the branch `[n + k]` in states and parameters,
-    /// for one unit of its parameter; `scales` `[n]` are those of the states.
+    /// a and b of (3), then c where it is a pitchfork: then a is 0. `along` `[n + k]`, in states and parameters, is a direction closer to the
+    /// branch than to the one that crosses it, for one unit of its parameter; `scales` `[n]` are those of the states. `None` where no branches
+    /// cross.
     pub fn crossing(&self, along: &[f64], scales: &[f64]) -> Option<Vec<f64>> {
         let [q, p] = self.null_vectors()?;
-        let b = dot(&p, &self.derivative(&[&q, along])) / dot(&p, &q);
-        Some(if self.is_pitchfork(scales, PITCHFORK)? { vec![0.0, b, self.cusp()?] } else { vec![self.fold()?, b] })
+        let size = dot(&p, &q);
+        let b = dot(&p, &self.derivative(&[&q, along])) / size;
+        if self.is_pitchfork(scales, PITCHFORK)? {
+            return Some(vec![0.0, b, self.cusp()?]);
+        }
+        // Next to the point both tangents and all between solve the linear equations. Those of the branches, along + t q, are the roots of
+        // a t² + b t + ½ ⟨p, f(along, along)⟩, and at the nearer one b is half its derivative there.
+        let a = self.fold()?;
+        let rest = 0.5 * dot(&p, &self.derivative(&[along, along])) / size;
+        let square = b * b - 4.0 * a * rest;
+        (square >= 0.0).then(|| vec![a, square.sqrt().copysign(b)])
     }
 
     /// Whether a ξ² is less than c ξ³ as soon as ξ q is that share of the `scales` `[n]` of the states.
