@@ -168,6 +168,12 @@ fn two_curves_of_hopf_points_cross_at_a_double_hopf_point() {
         let hopf = with_curve(study(model, branch), Kind::Hopf, near, "q", [-1.0, 1.0], None);
         satisfies(&hopf, 4, |p, q| p - slope * q);
         lies_on(&hopf, &[(Kind::DoubleHopf, 0.0, 0.0)]);
+        // r' = -r³/8 for c and d, which are faster, and -r³/2 for a and b; r² = 2 |w|². What a adds to c averages out.
+        let double = &hopf.branch("curve").unwrap().special[0];
+        let expected = [-0.25, 0.0, 0.0, -1.0, 0.0, 0.0];
+        let off = double.coefficients.iter().zip(expected).map(|(own, known)| (own - known).abs());
+        assert!(double.coefficients.len() == 6 && off.fold(0.0, f64::max) < 1e-7, "{}", double.normal_form());
+        assert!(double.normal_form().ends_with("simple"));
     }
 }
 

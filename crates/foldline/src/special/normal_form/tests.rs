@@ -50,6 +50,7 @@ fn a_normal_form_has_its_own_coefficients() {
         near(a * b, -0.28);
         near(a.abs(), 0.7);
     });
+    with(&[("x", "y"), ("y", "-x^3 + x^2*y")], 0.0, |at| assert!(at.takens().is_none()));
 }
 
 #[test]

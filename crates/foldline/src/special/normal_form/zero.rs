@@ -46,7 +46,7 @@ impl Local<'_> {
         Some(self.fold()?.abs() <= share * reach * self.cusp()?.abs())
     }
 
-    /// a and b of (7).
+    /// a and b of (7); `None` where both vanish, by a symmetry.
     pub fn takens(&self) -> Option<[f64; 2]> {
         let vectors = self.null_vectors()?;
         let [q0, p1] = &vectors;
@@ -58,7 +58,14 @@ impl Local<'_> {
         let q1: Vec<f64> = q1.iter().zip(q0).map(|(q1, q0)| q1 - along * q0).collect();
         let quadratic = self.derivative(&[q0, q0]);
         let mixed = self.derivative(&[q0, &q1]);
-        Some([0.5 * dot(p1, &quadratic) / size, (dot(&p0, &quadratic) + dot(p1, &mixed)) / size])
+        let norm = |v: &[f64]| dot(v, v).sqrt();
+        let product = |p: &[f64], b: &[f64]| (dot(p, b), norm(p) * norm(b));
+        let (first, of_first) = product(p1, &quadratic);
+        let (second, of_second) = product(&p0, &quadratic);
+        let (third, of_third) = product(p1, &mixed);
+        let a = without_rounding(&[0.5 * first], &[of_first], ROUNDING) / size;
+        let b = without_rounding(&[second, third], &[of_second, of_third], ROUNDING) / size;
+        (a != 0.0 || b != 0.0).then_some([a, b])
     }
 
     /// s, θ and E of (6) for the frequency ω; `None` where b or c of (6) vanishes.
