@@ -1,8 +1,9 @@
 //! Two-parameter curves: against closed forms, and through the special points of one-parameter runs.
 
 use foldline::contract::Unobserved;
-use foldline::diagram::{Branch, Diagram, Ending, Kind};
+use foldline::diagram::{Branch, Diagram, Ending, Kind, Point};
 use foldline::explore::{CurvePlan, System, run};
+use foldline::special::normal_form::Local;
 use foldline_store::study_file::{Study, parse_study};
 
 const ROTOR: &str = include_str!("../../../models/overhung-rotor.toml");
@@ -66,7 +67,7 @@ fn folds_of_equilibria_go_round_the_cusp() {
     assert!(only.kind == Kind::Cusp && (only.coefficients[0] + 1.0).abs() < 1e-6, "{}", only.normal_form());
     let cusp = &only.point.parameters;
     assert!(cusp[0].abs() < TOLERANCE && cusp[1].abs() < TOLERANCE, "{cusp:?}");
-    let mu = |p: Option<&foldline::diagram::Point>| p.unwrap().parameters[0];
+    let mu = |p: Option<&Point>| p.unwrap().parameters[0];
     assert!(mu(curve.points.first()) * mu(curve.points.last()) < 0.0);
 }
 
@@ -111,7 +112,7 @@ fn curves_of_co_oxidation_have_their_points_of_codimension_two() {
         assert!(turn.2 <= lowest + 1e-9 && lowest - turn.2 < 1e-2, "{} {lowest}", turn.2);
         // Between the two generalised Hopf points the first Lyapunov coefficient has the other sign.
         let model = study(model, branch).model;
-        let first = |p: &foldline::diagram::Point| foldline::special::normal_form::coefficients(&model, Hopf, p)[0];
+        let first = |p: &Point| Local::new(&model, p).unwrap().hopf(p.spectrum[0].im.abs()).unwrap();
         let signs: Vec<bool> = curve.points[1..curve.points.len() - 1].iter().map(|p| first(p) > 0.0).collect();
         assert_eq!(signs.windows(2).filter(|pair| pair[0] != pair[1]).count(), 2, "{signs:?}");
         for end in &curve.ends {
@@ -194,6 +195,12 @@ fn two_curves_of_hopf_points_cross_at_a_double_hopf_point() {
         let hopf = with_curve(study(model, branch), Kind::Hopf, near, "q", [-1.0, 1.0], None);
         satisfies(&hopf, 4, |p, q| p - slope * q);
         lies_on(&hopf, &[(Kind::DoubleHopf, 0.0, 0.0)]);
+        // r' = -r³/8 for c and d, which are faster, and -r³/2 for a and b; r² = 2 |w|². What a adds to c averages out.
+        let double = &hopf.branch("curve").unwrap().special[0];
+        let expected = [-0.25, 0.0, 0.0, -1.0, 0.0, 0.0];
+        let off = double.coefficients.iter().zip(expected).map(|(own, known)| (own - known).abs());
+        assert!(double.coefficients.len() == 6 && off.fold(0.0, f64::max) < 1e-7, "{}", double.normal_form());
+        assert!(double.normal_form().ends_with("simple"));
     }
 }
 

@@ -172,6 +172,11 @@ pub trait ZeroProblem {
     /// close by.
     fn margin(&self, at: &Point) -> f64;
 
+    /// How far `u`, which solves equations that were added to, is from solving those that were given, relative: 0 where nothing is added.
+    fn departure(&self, _u: &[f64]) -> f64 {
+        0.0
+    }
+
     /// `u` as plain data.
     fn point(&self, u: &[f64], tangent: &[f64], examination: Examination) -> Point;
 
@@ -216,7 +221,8 @@ pub trait Monitor: Send + Sync {
 }
 
 /// The extra unknowns and equations that hold a special point: e unknowns (such as a frequency) and e + 1 scalar equations
-/// g = 0. A surface of solutions with one of them held is a two-parameter curve.
+/// g = 0, or more by the number of unknowns that the surface has besides two parameters. A surface of solutions with one of them held is a
+/// two-parameter curve.
 ///
 /// Vectors `u` are those of the surface, a [`ZeroProblem`] with two free parameters.
 pub trait Condition {
@@ -226,19 +232,27 @@ pub trait Condition {
     /// e.
     fn extra(&self) -> usize;
 
+    /// How many equations there are.
+    fn equations(&self) -> usize {
+        self.extra() + 1
+    }
+
     /// First values `[e]` of the extra unknowns, from the spectrum of a point close to the special one.
     fn guess(&self, point: &Point) -> Vec<f64>;
 
     /// Takes the null vectors of the last evaluation as reference until the next call.
     fn anchor(&mut self);
 
+    /// Learns which way the curve goes, in the unknowns of the surface.
+    fn face(&mut self, _along: &[f64]) {}
+
     /// Moves to another mesh.
     fn set_mesh(&mut self, mesh: &Mesh);
 
-    /// g: writes e + 1 values. Returns false if they are not finite there.
+    /// g: writes all its values. Returns false if they are not finite there.
     fn evaluate(&mut self, u: &[f64], extra: &[f64], g: &mut [f64]) -> bool;
 
-    /// The derivative of g along (`du`, `extra`) at the place of the last evaluation: writes e + 1 values.
+    /// The derivative of g along (`du`, `extra`) at the place of the last evaluation: writes as many values.
     fn derivative(&mut self, du: &[f64], extra: &[f64], dg: &mut [f64]);
 
     /// The eigenvalues or multipliers that are held, as the extra unknowns say.

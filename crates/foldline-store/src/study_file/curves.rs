@@ -9,7 +9,7 @@ use foldline::explore::{BranchPlan, CurvePlan, Start};
 
 pub(super) const KEYS: [&str; 10] =
     ["name", "description", "hold", "of", "near", "free", "range", "branch-range", "until", "max-points"];
-const HELD: [Kind; 4] = [Kind::Fold, Kind::Hopf, Kind::PeriodDoubling, Kind::Torus];
+const HELD: [Kind; 5] = [Kind::Fold, Kind::BranchPoint, Kind::Hopf, Kind::PeriodDoubling, Kind::Torus];
 
 /// The branch on which the special point lies.
 struct Base {
@@ -64,7 +64,7 @@ pub(super) fn read(
         max_points,
     });
     let family = match hold {
-        Kind::Hopf => Some(Family::Equilibrium),
+        Kind::Hopf | Kind::BranchPoint => Some(Family::Equilibrium),
         Kind::PeriodDoubling | Kind::Torus => Some(Family::Cycle),
         _ => base.family,
     };
@@ -156,8 +156,12 @@ fn hold(walk: &mut Walk, item: &Item, family: Option<Family>) -> Option<Kind> {
     };
     let wrong = match (kind, family) {
         (Kind::Hopf, Some(Family::Cycle)) => Some(("cycles have no Hopf points", "fold, period-doubling or torus")),
-        (Kind::PeriodDoubling | Kind::Torus, Some(Family::Equilibrium)) => {
-            Some(("equilibria have only folds and Hopf points", "fold or hopf, or a branch of cycles"))
+        (Kind::PeriodDoubling | Kind::Torus, Some(Family::Equilibrium)) => Some((
+            "equilibria have only folds, branch points and Hopf points",
+            "fold, branch-point or hopf, or a branch of cycles",
+        )),
+        (Kind::BranchPoint, Some(Family::Cycle)) => {
+            Some(("branch points of cycles cannot be held along a curve", "fold, period-doubling or torus"))
         }
         _ => None,
     };

@@ -32,6 +32,8 @@ pub enum Failure {
     Remeshed(Mesh),
     /// No mesh of the permitted size meets the tolerance.
     Mesh(f64),
+    /// The point solves the equations only with what was added to them: branches do not cross there.
+    Departed,
 }
 
 impl std::fmt::Display for Failure {
@@ -49,6 +51,7 @@ impl std::fmt::Display for Failure {
             }
             Failure::Unexplained => write!(f, "stability changes without a special point that explains it"),
             Failure::Remeshed(mesh) => write!(f, "the mesh keeps changing ({} intervals)", mesh.len().max(1) - 1),
+            Failure::Departed => write!(f, "the branches that crossed no longer do"),
             Failure::Mesh(error) => write!(f, "the error estimate stays at {error:.1e} on the largest mesh"),
         }
     }

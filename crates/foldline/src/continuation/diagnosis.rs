@@ -40,6 +40,13 @@ const EDGE: (&str, &str) = (
      way, or end the range before",
 );
 
+/// Branches that cross for one value of a second parameter.
+pub(crate) const UNCROSSED: (&str, &str) = (
+    "the second parameter breaks what makes branches cross: a symmetry, or a solution that is always there",
+    "take a second parameter that keeps it; or follow the branch at another value of this one, where a fold is left of the \
+     branch point, and hold that",
+);
+
 /// Growth of the period that makes an orbit of infinite period likely.
 const GROWN: f64 = 2.0;
 
@@ -93,6 +100,9 @@ impl Follow<'_> {
         let grown = period.zip(past.first_period).map_or(1.0, |(now, first)| now / first);
         if *why == Failure::NotFinite || self.breaks_off(left, tried.longest) {
             return (EDGE.0.into(), EDGE.1);
+        }
+        if *why == Failure::Departed {
+            return (UNCROSSED.0.into(), UNCROSSED.1);
         }
         if grown > GROWN {
             return (

@@ -360,6 +360,9 @@ impl Follow<'_> {
             miss = self.is_nearly_smooth(left, &right)?;
         }
         self.continues(left, &right, &guess)?;
+        if self.problem.departure(&right.u) > self.settings.newton_tolerance() {
+            return Err(Failure::Departed);
+        }
         if trail.is_none() || left.mesh.is_empty() {
             self.is_smooth(left, &right, cost)?;
         }

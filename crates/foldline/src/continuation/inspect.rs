@@ -118,8 +118,10 @@ impl Follow<'_> {
                     found = Err(Failure::Unexplained);
                 }
             }
-            // This branch is the one that leaves another at a pitchfork, and goes on as its own mirror image.
+            // This branch is the one that leaves another at a pitchfork, and goes on as its own mirror image. (Where something is held,
+            // a symmetric solution may as well just turn.)
             if kind == Kind::Fold
+                && self.settings.stability
                 && left.point.unstable == right.point.unstable
                 && found.as_ref().is_ok_and(|found| self.is_symmetric(&found.station.point))
             {

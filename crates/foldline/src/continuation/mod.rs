@@ -25,6 +25,7 @@ pub mod locate;
 pub mod straddle;
 
 pub use corrector::{Failure, Station};
+pub(crate) use diagnosis::UNCROSSED;
 pub use follow::{Follow, Item, follow};
 
 /// Everything that governs a continuation run. The user states `tolerance`, the range and the limit on points; the rest

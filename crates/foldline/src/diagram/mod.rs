@@ -254,11 +254,15 @@ impl Kind {
     pub fn coefficients(self) -> &'static [&'static str] {
         match self {
             Kind::Fold => &["a"],
+            Kind::BranchPoint => &["a", "b", "c"],
             Kind::Hopf => &["l1"],
             Kind::PeriodDoubling => &["c"],
             Kind::Torus => &["d"],
             Kind::Cusp => &["c"],
             Kind::BogdanovTakens => &["a", "b"],
+            Kind::GeneralisedHopf => &["l2"],
+            Kind::ZeroHopf => &["s", "theta", "E"],
+            Kind::DoubleHopf => &["p11", "p12", "p21", "p22", "theta", "delta"],
             _ => &[],
         }
     }
@@ -324,19 +328,36 @@ impl SpecialPoint {
     /// Whether the solutions that are born there are stable as far as it goes (supercritical), or take the stability of those that they
     /// leave with them (subcritical); `None` where there are no such, or it is not known.
     pub fn criticality(&self) -> Option<&'static str> {
-        let first = *self.coefficients.first()?;
-        match self.kind {
-            Kind::Hopf | Kind::PeriodDoubling | Kind::Torus if first < 0.0 => Some("supercritical"),
-            Kind::Hopf | Kind::PeriodDoubling | Kind::Torus if first > 0.0 => Some("subcritical"),
+        let decides = match (self.kind, &self.coefficients[..]) {
+            (Kind::Hopf | Kind::PeriodDoubling | Kind::Torus, [first, ..]) => *first,
+            (Kind::BranchPoint, [_, _, cubic]) => *cubic,
+            _ => return None,
+        };
+        match decides {
+            c if c < 0.0 => Some("supercritical"),
+            c if c > 0.0 => Some("subcritical"),
             _ => None,
         }
     }
 
-    /// Coefficients and criticality in words, as `l1 = -0.0123, supercritical`.
+    /// Which of the cases it is that the coefficients tell apart: a branch point is transcritical or a pitchfork, a double Hopf point
+    /// simple where p₁₁ and p₂₂ have the same sign, else difficult.
+    pub fn case(&self) -> Option<&'static str> {
+        match (self.kind, &self.coefficients[..]) {
+            (Kind::BranchPoint, [_, _]) => Some("transcritical"),
+            (Kind::BranchPoint, [_, _, _]) => Some("pitchfork"),
+            (Kind::DoubleHopf, [p11, _, _, p22, ..]) if p11 * p22 > 0.0 => Some("simple"),
+            (Kind::DoubleHopf, [p11, _, _, p22, ..]) if p11 * p22 < 0.0 => Some("difficult"),
+            _ => None,
+        }
+    }
+
+    /// Coefficients, case and criticality in words, as `l1 = -0.0123, supercritical`.
     pub fn normal_form(&self) -> String {
         let named = self.kind.coefficients().iter().zip(&self.coefficients);
         let parts = named.map(|(name, value)| format!("{name} = {}", shortly(*value)));
-        parts.chain(self.criticality().map(str::to_string)).collect::<Vec<_>>().join(", ")
+        let words = [self.case(), self.criticality()].into_iter().flatten().map(str::to_string);
+        parts.chain(words).collect::<Vec<_>>().join(", ")
     }
 }
 

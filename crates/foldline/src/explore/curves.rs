@@ -6,9 +6,9 @@
 use super::System;
 use super::growth::{self, Beginning, Growth, Line};
 use super::plan::{CurvePlan, Plan};
-use crate::continuation::Settings;
+use crate::continuation::{Settings, UNCROSSED};
 use crate::contract::Observer;
-use crate::diagram::{Branch, Ending, Origin, Point, SpecialPoint};
+use crate::diagram::{Branch, Ending, Family, Kind, Origin, Point, SpecialPoint};
 use crate::special::mark::Mark;
 
 /// A special point moves along the branch by more than the error of the solutions; against the tolerance of the plan.
@@ -102,8 +102,21 @@ pub fn follow_from(
         system.repeats(&special.point.parameters, &[(parent.free, curve.ranges[0]), (curve.free, curve.ranges[1])])?;
         let (settings, sides) = settings(system, plan, curve, parent.free, at);
         let line = Line { held: branch.held, ..Line::new(curve.free) };
+        if parent.family == Family::Cycle && curve.hold == Kind::BranchPoint {
+            return Err(format!("branch points of cycles cannot be held, and {} is a branch of cycles", parent.name));
+        }
         let mut problem = line.problem(system, plan.degree, &special.point);
         let station = growth::polished(&mut *problem, &settings, &special.point).map_err(|why| why.to_string())?;
+        // (The tangent tells how fast the equations would have to be added to.)
+        if problem.departure(&station.u) > settings.newton_tolerance()
+            || problem.departure(&station.tangent) > settings.tolerance
+        {
+            let value = special.point.parameters[parent.free];
+            return Err(format!(
+                "the branches that cross at {value:.6} do so at this value of the second parameter only\nlikely cause: {}\nwhat to do: {}",
+                UNCROSSED.0, UNCROSSED.1
+            ));
+        }
         Ok((settings, sides, station))
     });
     let going = match begun {

@@ -47,6 +47,9 @@ impl Line {
             .held
             .and_then(|(kind, _)| special::condition::condition(kind, setting.clone(), degree, &point.solution));
         let surface: Box<dyn ZeroProblem + 'a> = match &point.solution {
+            Solution::Equilibrium(_) if self.held.is_some_and(|(kind, _)| kind == Kind::BranchPoint) => {
+                Box::new(EquilibriumProblem::unfolded(setting))
+            }
             Solution::Equilibrium(_) => Box::new(EquilibriumProblem::new(setting)),
             Solution::Cycle(cycle) if self.doubled && cycle.intervals() > 0 => {
                 Box::new(CycleProblem::like(setting, cycle).with_equal_halves())
@@ -358,7 +361,7 @@ impl Growth<'_> {
                 Item::Special(mut special) => {
                     // Where a curve only turns there is none.
                     if branch.held.is_none() || special.kind.has_codimension_two() {
-                        special.coefficients = self.coefficients(&system, branch.free, &special);
+                        special.coefficients = self.coefficients(&system, branch, side, &special);
                     }
                     self.place_exactly(&system, branch, &mut special);
                     branch.insert_special(special.clone());
@@ -458,12 +461,25 @@ impl Growth<'_> {
     }
 
     /// Of the normal form.
-    fn coefficients(&self, system: &System, free: usize, special: &SpecialPoint) -> Vec<f64> {
+    fn coefficients(&self, system: &System, branch: &Branch, side: usize, special: &SpecialPoint) -> Vec<f64> {
+        let own = setting(system, branch.free, &special.point.parameters);
         match special.point.solution {
-            Solution::Equilibrium(_) => special::normal_form::coefficients(system.field, special.kind, &special.point),
+            Solution::Equilibrium(_) => {
+                let own = Setting { axes: vec![self.line(branch).axis(system, branch.free)], ..own };
+                let mut at = special.point.clone();
+                let before = if side == 1 { branch.points.last() } else { branch.points.first() };
+                if special.kind == Kind::BranchPoint
+                    && let Some(Solution::Equilibrium(x)) = before.map(|point| &point.solution)
+                    && let Solution::Equilibrium(there) = &special.point.solution
+                {
+                    // The tangent there may be one between those of both branches.
+                    let gap = |point: &Point| special.point.parameters[branch.free] - point.parameters[branch.free];
+                    at.tangent = there.iter().zip(x).map(|(a, b)| a - b).chain(before.map(gap)).collect();
+                }
+                special::normal_form::coefficients(&own, special.kind, &at)
+            }
             Solution::Cycle(_) => {
-                let setting = setting(system, free, &special.point.parameters);
-                special::cycle_form::coefficient(special.kind, setting, &special.point).into_iter().collect()
+                special::cycle_form::coefficient(special.kind, own, &special.point).into_iter().collect()
             }
         }
     }

@@ -1,11 +1,13 @@
 //! Equilibria.
 //!
-//! **Equations.** u = (x, λ₁ … λ_k):  f(x, λ) = 0, n equations; k = 1 for a curve.
+//! **Equations.** u = (x, λ₁ … λ_k):  f(x, λ) = 0, n equations; k = 1 for a curve. Where branches cross, u = (x, b, λ₁ … λ_k) and
+//! f(x, λ) + b d = 0, with d as in `unfolding`.
 
 use super::Setting;
+use super::unfolding::Unfolding;
 use crate::contract::{Batch, Examination, Parameters, Singular, ZeroProblem};
 use crate::diagram::{Mesh, Point, Solution, Trust};
-use crate::linalg::{lu, max_abs};
+use crate::linalg::{axpy, dot, larger, lu, max_abs};
 use crate::problem::extremes;
 use crate::stability::eigenvalues;
 use num_complex::Complex64;
@@ -13,6 +15,7 @@ use num_complex::Complex64;
 /// Equilibria in one free parameter (a curve) or several.
 pub struct EquilibriumProblem<'a> {
     setting: Setting<'a>,
+    unfolding: Option<Unfolding>,
     scale: Vec<f64>,
     f: Vec<f64>,
     fx: Vec<f64>,
@@ -33,6 +36,18 @@ impl<'a> EquilibriumProblem<'a> {
             matrix: vec![0.0; (n + k) * (n + k)],
             pivots: vec![0; n + k],
             setting,
+            unfolding: None,
+        }
+    }
+
+    /// The same where branches cross: the amplitude b counts as the first free parameter.
+    pub fn unfolded(setting: Setting<'a>) -> EquilibriumProblem<'a> {
+        let (n, k) = (setting.field.dim(), setting.freedom() + 1);
+        EquilibriumProblem {
+            matrix: vec![0.0; (n + k) * (n + k)],
+            pivots: vec![0; n + k],
+            unfolding: Some(Unfolding::new(n)),
+            ..EquilibriumProblem::new(setting)
         }
     }
 
@@ -40,9 +55,14 @@ impl<'a> EquilibriumProblem<'a> {
         self.scale.len()
     }
 
+    /// Where the free parameters of the setting begin.
+    fn first(&self) -> usize {
+        self.n() + usize::from(self.unfolding.is_some())
+    }
+
     fn linearise(&mut self, u: &[f64]) {
         let n = self.n();
-        let parameters = self.setting.at(&u[n..]);
+        let parameters = self.setting.at(&u[self.first()..]);
         let batch = Batch { lanes: 1, states: &u[..n], parameters: Parameters::Shared(&parameters), times: &[] };
         self.setting.linearise(batch, &mut self.f, &mut self.fx, &mut self.fp);
     }
@@ -50,37 +70,51 @@ impl<'a> EquilibriumProblem<'a> {
 
 impl ZeroProblem for EquilibriumProblem<'_> {
     fn unknowns(&self) -> usize {
-        self.n() + self.setting.freedom()
+        self.first() + self.setting.freedom()
     }
 
     fn anchor(&mut self, u: &[f64]) {
         for (scale, (own, x)) in self.scale.iter_mut().zip(self.setting.scales.iter().zip(u)) {
             *scale = own + x.abs();
         }
+        if self.unfolding.is_some() {
+            self.linearise(u);
+            let (n, parameters) = (self.n(), self.setting.at(&u[self.first()..]));
+            let unfolding = self.unfolding.iter_mut();
+            unfolding.for_each(|own| own.anchor(&self.setting, &u[..n], &parameters, &self.fx));
+        }
     }
 
     fn residual(&mut self, u: &[f64], r: &mut [f64]) -> bool {
         let n = self.n();
-        let parameters = self.setting.at(&u[n..]);
+        let parameters = self.setting.at(&u[self.first()..]);
         let batch = Batch { lanes: 1, states: &u[..n], parameters: Parameters::Shared(&parameters), times: &[] };
         self.setting.field.evaluate(batch, &mut r[..n]);
+        if let Some(unfolding) = &self.unfolding {
+            axpy(u[n], &unfolding.column, &mut r[..n]);
+        }
         max_abs(&r[..n]).is_finite()
     }
 
     fn factorise(&mut self, u: &[f64], rows: &[f64]) -> Result<(), Singular> {
         let (n, k) = (self.n(), self.setting.freedom());
-        let size = n + k;
+        let (first, size) = (self.first(), self.unknowns());
         self.linearise(u);
         for i in 0..n {
             self.matrix[i * size..i * size + n].copy_from_slice(&self.fx[i * n..(i + 1) * n]);
-            self.matrix[i * size + n..(i + 1) * size].copy_from_slice(&self.fp[i * k..(i + 1) * k]);
+            if let Some(unfolding) = &self.unfolding {
+                self.matrix[i * size + n] = unfolding.column[i];
+            }
+            self.matrix[i * size + first..(i + 1) * size].copy_from_slice(&self.fp[i * k..(i + 1) * k]);
         }
         for (line, row) in self.matrix[n * size..].chunks_exact_mut(size).zip(rows.chunks_exact(size)) {
             for i in 0..n {
                 line[i] = row[i] / (self.scale[i] * self.scale[i] * n as f64);
             }
+            // (b is a relative number.)
+            line[n..first].copy_from_slice(&row[n..first]);
             for (a, axis) in self.setting.axes.iter().enumerate() {
-                line[n + a] = row[n + a] / (axis.scale * axis.scale);
+                line[first + a] = row[first + a] / (axis.scale * axis.scale);
             }
         }
         lu::factorise(&mut self.matrix, size, &mut self.pivots)
@@ -94,13 +128,15 @@ impl ZeroProblem for EquilibriumProblem<'_> {
     fn dot(&self, a: &[f64], b: &[f64]) -> f64 {
         let n = self.n();
         let profile: f64 = (0..n).map(|i| a[i] * b[i] / (self.scale[i] * self.scale[i])).sum();
-        profile / n as f64 + self.setting.dot(&a[n..], &b[n..])
+        let first = self.first();
+        profile / n as f64 + dot(&a[n..first], &b[n..first]) + self.setting.dot(&a[first..], &b[first..])
     }
 
     fn relative_size(&self, du: &[f64], u: &[f64]) -> f64 {
-        let n = self.n();
+        let (n, first) = (self.n(), self.first());
         let states = (0..n).map(|i| (du[i] / (self.setting.scales[i] + u[i].abs())).abs());
-        states.fold(self.setting.relative_size(&du[n..], &u[n..]), |m, x| if x > m || x.is_nan() { x } else { m })
+        let free = larger(self.setting.relative_size(&du[first..], &u[first..]), max_abs(&du[n..first]));
+        states.fold(free, larger)
     }
 
     fn mesh(&self) -> Mesh {
@@ -131,9 +167,10 @@ impl ZeroProblem for EquilibriumProblem<'_> {
         let by_free = (0..self.n() * free).fold(0.0, |most: f64, k| {
             most.max((self.fp[k] * self.setting.axes[k % free].scale / self.scale[k / free]).abs())
         });
-        let rate = max_abs(&self.fx).max(1e-6 * by_free).max(f64::MIN_POSITIVE);
+        let unfolded = self.unfolding.as_ref().map_or(f64::MIN_POSITIVE, |own| own.rate);
+        let rate = max_abs(&self.fx).max(1e-6 * by_free).max(unfolded).max(f64::MIN_POSITIVE);
         let residual = (0..n).map(|i| (self.f[i] / (rate * self.scale[i])).abs()).fold(0.0, f64::max);
-        let ranges = extremes::of_state(self.setting.field, &self.setting.at(&u[n..]), &u[..n]);
+        let ranges = extremes::of_state(self.setting.field, &self.setting.at(&u[self.first()..]), &u[..n]);
         Examination { spectrum, trivial: 0, unstable, ranges, trust: Trust { residual, ..Trust::default() } }
     }
 
@@ -152,7 +189,7 @@ impl ZeroProblem for EquilibriumProblem<'_> {
         let n = self.n();
         Point {
             position: 0,
-            parameters: self.setting.at(&u[n..]),
+            parameters: self.setting.at(&u[self.first()..]),
             solution: Solution::Equilibrium(u[..n].to_vec()),
             tangent: tangent.to_vec(),
             step: 0.0,
@@ -169,7 +206,12 @@ impl ZeroProblem for EquilibriumProblem<'_> {
             Solution::Equilibrium(x) => x.clone(),
             Solution::Cycle(cycle) => cycle.state(0.0),
         };
+        u.resize(self.first(), 0.0);
         u.extend(self.setting.values_of(point));
         u
+    }
+
+    fn departure(&self, u: &[f64]) -> f64 {
+        max_abs(&u[self.n()..self.first()])
     }
 }

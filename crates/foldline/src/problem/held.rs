@@ -14,20 +14,22 @@
 //!        [ ⟨c, τ₁⟩  ⟨c, τ₂⟩  c_σ ] [ σ ]  =  [ r_c - ⟨c, w_p⟩ ]
 //! ```
 //!
+//! Where branches cross, the surface has an unknown more (`equilibrium`), three vectors τ span it, and there is an equation more.
+//!
 //! **Source.** govaerts2000, §4 (bordered extended systems); the elimination (2), (3) is ours.
 //!
 //! **Fails when** the surface itself is singular (two curves of special points cross).
 
 use crate::contract::{Condition, Examination, Singular, ZeroProblem};
 use crate::diagram::{Kind, Mesh, Point};
-use crate::linalg::lu;
+use crate::linalg::{axpy, lu};
 use num_complex::Complex64;
 
 /// A surface with a condition held.
 pub struct Held<'a> {
     surface: Box<dyn ZeroProblem + 'a>,
     condition: Box<dyn Condition + 'a>,
-    /// Two rows that fix the place on the surface, and the tangents τ found with them, each `[2][surface unknowns]`.
+    /// Rows that fix the place on the surface, and the tangents τ found with them, each `[freedom][surface unknowns]`.
     rows: Vec<f64>,
     tangents: Vec<f64>,
     /// Size of the extra unknowns.
@@ -44,7 +46,8 @@ pub struct Held<'a> {
 impl<'a> Held<'a> {
     /// `surface` has two free parameters; both are on the same mesh.
     pub fn new(surface: Box<dyn ZeroProblem + 'a>, condition: Box<dyn Condition + 'a>) -> Held<'a> {
-        let (scale, rows) = (vec![1.0; condition.extra()], generic(2 * surface.unknowns()));
+        let freedom = condition.equations() + 1 - condition.extra();
+        let (scale, rows) = (vec![1.0; condition.extra()], generic(freedom * surface.unknowns()));
         Held {
             surface,
             condition,
@@ -67,7 +70,7 @@ impl<'a> Held<'a> {
             return;
         }
         let e = self.extra();
-        let mut g = vec![0.0; e + 1];
+        let mut g = vec![0.0; self.condition.equations()];
         for _ in 0..ROUNDS {
             if self.surface.factorise(&u[e..], &self.rows).is_ok() {
                 self.span();
@@ -79,13 +82,13 @@ impl<'a> Held<'a> {
         }
     }
 
-    /// τ₁ and τ₂ from the last factorisation of the surface.
+    /// The τ from the last factorisation of the surface.
     fn span(&mut self) {
-        let size = self.surface.unknowns();
-        self.tangents = vec![0.0; 2 * size];
+        let (size, k) = (self.surface.unknowns(), self.freedom());
+        self.tangents = vec![0.0; k * size];
         for (i, tangent) in self.tangents.chunks_exact_mut(size).enumerate() {
             let mut one = vec![0.0; size];
-            one[size - 2 + i] = 1.0;
+            one[size - k + i] = 1.0;
             self.surface.solve(&one, tangent);
         }
     }
@@ -109,20 +112,28 @@ impl<'a> Held<'a> {
         self.condition.extra()
     }
 
-    /// Two orthonormal vectors in place of the rows: those that span the tangent plane found last.
+    /// How many directions the surface has.
+    fn freedom(&self) -> usize {
+        self.condition.equations() + 1 - self.extra()
+    }
+
+    /// Orthonormal vectors in place of the rows: those that span the tangent plane found last.
     fn follow_plane(&mut self) {
-        let size = self.surface.unknowns();
-        if self.tangents.len() != 2 * size {
+        let (size, k) = (self.surface.unknowns(), self.freedom());
+        if self.tangents.len() != k * size {
             return;
         }
         let mut rows = self.tangents.clone();
-        let (a, b) = rows.split_at_mut(size);
-        let norm = self.surface.dot(a, a).sqrt();
-        a.iter_mut().for_each(|x| *x /= norm);
-        let along = self.surface.dot(a, b);
-        b.iter_mut().zip(a.iter()).for_each(|(y, x)| *y -= along * x);
-        let norm = self.surface.dot(b, b).sqrt();
-        b.iter_mut().for_each(|x| *x /= norm);
+        for i in 0..k {
+            let (done, rest) = rows.split_at_mut(i * size);
+            let own = &mut rest[..size];
+            for other in done.chunks_exact(size) {
+                let along = self.surface.dot(other, own);
+                axpy(-along, other, own);
+            }
+            let norm = self.surface.dot(own, own).sqrt();
+            own.iter_mut().for_each(|x| *x /= norm);
+        }
         if rows.iter().all(|x| x.is_finite()) {
             self.rows = rows;
         }
@@ -143,37 +154,40 @@ impl ZeroProblem for Held<'_> {
         let e = self.extra();
         self.surface.anchor(&u[e..]);
         self.condition.anchor();
+        if self.row.len() == self.unknowns() {
+            self.condition.face(&self.row[e..]);
+        }
         self.known = None;
         self.follow_plane();
         self.scale.iter_mut().zip(u).for_each(|(s, v)| *s = 1.0 + v.abs());
     }
 
     fn residual(&mut self, u: &[f64], r: &mut [f64]) -> bool {
-        let (e, size) = (self.extra(), self.surface.unknowns());
-        self.surface.residual(&u[e..], &mut r[..size]) && self.condition_at(u, &mut r[size - 2..size - 1 + e])
+        let (e, size, k) = (self.extra(), self.surface.unknowns(), self.freedom());
+        self.surface.residual(&u[e..], &mut r[..size]) && self.condition_at(u, &mut r[size - k..size + e - 1])
     }
 
     fn factorise(&mut self, u: &[f64], row: &[f64]) -> Result<(), Singular> {
-        let (e, size) = (self.extra(), self.surface.unknowns());
-        let mut g = vec![0.0; e + 1];
+        let (e, size, k) = (self.extra(), self.surface.unknowns(), self.freedom());
+        let width = e + k;
+        let mut g = vec![0.0; width - 1];
         if !self.condition_at(u, &mut g) {
             return Err(Singular);
         }
         self.surface.factorise(&u[e..], &self.rows)?;
         self.span();
-        let width = e + 2;
         self.small = vec![0.0; width * width];
         for (i, tangent) in self.tangents.chunks_exact(size).enumerate() {
             self.condition.derivative(tangent, &vec![0.0; e], &mut g);
-            (0..=e).for_each(|k| self.small[k * width + i] = g[k]);
-            self.small[(e + 1) * width + i] = self.surface.dot(&row[e..], tangent);
+            (0..width - 1).for_each(|line| self.small[line * width + i] = g[line]);
+            self.small[(width - 1) * width + i] = self.surface.dot(&row[e..], tangent);
         }
         for i in 0..e {
             let mut turn = vec![0.0; e];
             turn[i] = 1.0;
             self.condition.derivative(&vec![0.0; size], &turn, &mut g);
-            (0..=e).for_each(|k| self.small[k * width + 2 + i] = g[k]);
-            self.small[(e + 1) * width + 2 + i] = row[i] / (self.scale[i] * self.scale[i]);
+            (0..width - 1).for_each(|line| self.small[line * width + k + i] = g[line]);
+            self.small[(width - 1) * width + k + i] = row[i] / (self.scale[i] * self.scale[i]);
         }
         self.row = row.to_vec();
         self.pivots = vec![0; width];
@@ -181,19 +195,20 @@ impl ZeroProblem for Held<'_> {
     }
 
     fn solve(&mut self, rhs: &[f64], x: &mut [f64]) {
-        let (e, size) = (self.extra(), self.surface.unknowns());
+        let (e, size, k) = (self.extra(), self.surface.unknowns(), self.freedom());
+        let width = e + k;
         let mut own = rhs[..size].to_vec();
-        own[size - 2..].fill(0.0);
+        own[size - k..].fill(0.0);
         let mut particular = vec![0.0; size];
         self.surface.solve(&own, &mut particular);
-        let mut tail = vec![0.0; e + 2];
-        self.condition.derivative(&particular, &vec![0.0; e], &mut tail[..=e]);
-        (0..=e).for_each(|k| tail[k] = rhs[size - 2 + k] - tail[k]);
-        tail[e + 1] = rhs[size + e - 1] - self.surface.dot(&self.row[e..], &particular);
-        lu::solve(&self.small, e + 2, &self.pivots, &mut tail, 1);
-        x[..e].copy_from_slice(&tail[2..]);
+        let mut tail = vec![0.0; width];
+        self.condition.derivative(&particular, &vec![0.0; e], &mut tail[..width - 1]);
+        (0..width - 1).for_each(|line| tail[line] = rhs[size - k + line] - tail[line]);
+        tail[width - 1] = rhs[size + e - 1] - self.surface.dot(&self.row[e..], &particular);
+        lu::solve(&self.small, width, &self.pivots, &mut tail, 1);
+        x[..e].copy_from_slice(&tail[k..]);
         x[e..].copy_from_slice(&particular);
-        for (a, tangent) in tail[..2].iter().zip(self.tangents.chunks_exact(size)) {
+        for (a, tangent) in tail[..k].iter().zip(self.tangents.chunks_exact(size)) {
             x[e..].iter_mut().zip(tangent).for_each(|(x, t)| *x += a * t);
         }
     }
@@ -271,12 +286,16 @@ impl ZeroProblem for Held<'_> {
 
     fn margin(&self, at: &Point) -> f64 {
         // One multiplier may lie there all the way; what counts is a second one.
-        let held = if self.condition.kind() == Kind::Fold { 1 } else { 0 };
+        let held = if matches!(self.condition.kind(), Kind::Fold | Kind::BranchPoint) { 1 } else { 0 };
         let mut others = at.clone();
         let first = at.spectrum.len() - at.free_spectrum().len();
         others.spectrum[first..].sort_by(|a, b| self.condition.distance(*a).total_cmp(&self.condition.distance(*b)));
         others.spectrum.drain(first..(first + held).min(at.spectrum.len()));
         self.surface.margin(&others)
+    }
+
+    fn departure(&self, u: &[f64]) -> f64 {
+        self.surface.departure(&u[self.extra()..])
     }
 
     fn point(&self, u: &[f64], tangent: &[f64], examination: Examination) -> Point {

@@ -14,5 +14,6 @@ pub mod gauss;
 pub mod held;
 pub mod mesh;
 pub mod setting;
+mod unfolding;
 
 pub use setting::{Axis, Setting, Tie};

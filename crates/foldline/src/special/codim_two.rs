@@ -3,8 +3,9 @@
 //! | on a curve of | kind | test function |
 //! |---|---|---|
 //! | folds | cusp | ⟨p, B(q, q)⟩; for cycles a of the normal form |
-//! | folds of equilibria | Bogdanov–Takens | ⟨p, q⟩ |
-//! | folds of equilibria | zero-Hopf | sums of two of the other eigenvalues |
+//! | branch points of equilibria | cusp | ⟨p, B(q, q)⟩ where they are not pitchforks throughout |
+//! | folds, branch points of equilibria | Bogdanov–Takens | ⟨p, q⟩ |
+//! | folds, branch points of equilibria | zero-Hopf | sums of two of the other eigenvalues |
 //! | Hopf points | Bogdanov–Takens | the product of the two held: ω², negative where they are real |
 //! | Hopf points | generalised Hopf | the first Lyapunov coefficient |
 //! | Hopf points | zero-Hopf | the product of the other eigenvalues |
@@ -29,6 +30,12 @@ use crate::linalg::dot;
 use crate::problem::Setting;
 use num_complex::Complex64;
 
+/// Share of the cubic term, over the scales of the states, below which a quadratic one is rounding.
+const VANISHING: f64 = 1e-9;
+
+/// ⟨p, q⟩ of unit vectors below which an eigenvalue 0 is double, as far as located points tell.
+const DOUBLE: f64 = 1e-6;
+
 /// One line of the table.
 pub struct CodimensionTwo<'a> {
     field: &'a dyn VectorField,
@@ -45,12 +52,12 @@ pub fn monitors<'a>(
     held: Kind,
 ) -> Vec<Box<dyn Monitor + 'a>> {
     use Kind::{
-        BogdanovTakens, Chenciner, Cusp, DoubleHopf, DoubleTorus, FlipTorus, Fold, FoldFlip, FoldTorus,
+        BogdanovTakens, BranchPoint, Chenciner, Cusp, DoubleHopf, DoubleTorus, FlipTorus, Fold, FoldFlip, FoldTorus,
         GeneralisedHopf, GeneralisedPeriodDoubling, Hopf, PeriodDoubling, Resonance11, Resonance12, Resonance13,
         Resonance14, Torus, ZeroHopf,
     };
     let kinds: &[Kind] = match (family, held) {
-        (Family::Equilibrium, Fold) => &[Cusp, BogdanovTakens, ZeroHopf],
+        (Family::Equilibrium, Fold | BranchPoint) => &[Cusp, BogdanovTakens, ZeroHopf],
         (Family::Equilibrium, Hopf) => &[BogdanovTakens, GeneralisedHopf, ZeroHopf, DoubleHopf],
         (Family::Cycle, Fold) => &[Cusp, Resonance11, FoldFlip, FoldTorus],
         (Family::Cycle, PeriodDoubling) => &[GeneralisedPeriodDoubling, Resonance12, FoldFlip, FlipTorus],
@@ -100,8 +107,16 @@ impl CodimensionTwo<'_> {
         let pairs = || (0..rest.len()).flat_map(|j| (0..j).map(move |i| (i, j)));
         Some(match self.kind {
             Kind::Cusp if of_cycle => self.coefficient(reference, at)?,
-            Kind::Cusp => Local::new(self.field, at)?.quadratic(&self.oriented(reference, at)?),
-            Kind::BogdanovTakens if self.held == Kind::Fold => {
+            Kind::Cusp => {
+                // By symmetry it vanishes everywhere, but for rounding.
+                if self.held == Kind::BranchPoint
+                    && Local::new(self.field, reference)?.is_pitchfork(self.scales, VANISHING)?
+                {
+                    return None;
+                }
+                Local::new(self.field, at)?.quadratic(&self.oriented(reference, at)?)
+            }
+            Kind::BogdanovTakens if self.held != Kind::Hopf => {
                 let [q, p] = self.oriented(reference, at)?;
                 dot(&p, &q)
             }
@@ -151,8 +166,13 @@ impl Monitor for CodimensionTwo<'_> {
         let on_circle = |z: &Complex64| z.im != 0.0 && z.norm().ln().abs() < 1e-3;
         match self.kind {
             // Two real eigenvalues with the sum 0 are none of these.
-            Kind::ZeroHopf if self.held == Kind::Fold => rest.iter().any(on_axis),
+            Kind::ZeroHopf if self.held != Kind::Hopf => rest.iter().any(on_axis),
             Kind::ZeroHopf | Kind::GeneralisedHopf => held.iter().all(on_axis),
+            // Where a fold and a branch point meet at a double eigenvalue 0, ⟨p, B(q, q)⟩ vanishes with ⟨p, q⟩.
+            Kind::Cusp if at.solution.period().is_none() => {
+                let vectors = Local::new(self.field, at).and_then(|local| local.null_vectors());
+                vectors.is_some_and(|[q, p]| dot(&p, &q).abs() > DOUBLE)
+            }
             Kind::DoubleHopf => rest.iter().any(on_axis) && held.iter().all(on_axis),
             Kind::FoldTorus | Kind::FlipTorus if self.held != Kind::Torus => rest.iter().any(on_circle),
             Kind::DoubleTorus => rest.iter().any(on_circle),

@@ -1,5 +1,6 @@
 //! Which condition holds which special point.
 
+use super::on_branch_points::OnBranchPoints;
 use super::on_cycles::OnCycles;
 use super::on_equilibria::OnEquilibria;
 use crate::contract::Condition;
@@ -15,6 +16,7 @@ pub fn condition<'a>(
     at: &Solution,
 ) -> Option<Box<dyn Condition + 'a>> {
     match at {
+        Solution::Equilibrium(_) if kind == Kind::BranchPoint => Some(Box::new(OnBranchPoints::new(setting))),
         Solution::Equilibrium(_) => Some(Box::new(OnEquilibria::new(kind, setting)?)),
         Solution::Cycle(cycle) => Some(Box::new(OnCycles::new(kind, setting, &mesh::at_least_some(cycle, degree))?)),
     }

@@ -22,6 +22,7 @@ pub mod fold;
 pub mod hopf;
 pub mod mark;
 pub mod normal_form;
+pub mod on_branch_points;
 pub mod on_cycles;
 pub mod on_equilibria;
 pub mod period_doubling;

@@ -12,6 +12,7 @@ use crate::explore::System;
 use crate::linalg::{axpy, dot, larger, lu, max_abs};
 use crate::problem::Setting;
 use crate::problem::gauss::Scheme;
+use crate::special::normal_form::Local;
 use num_complex::Complex64;
 
 /// Distance, relative, from which on what is found is not taken for the same solution: along a branch, and along a curve in two
@@ -196,6 +197,22 @@ impl Part<'_> {
         Some(max_abs(&whole))
     }
 
+    /// How fast f changes with the states, or, where it hardly does, how fast that changes over the scales along the null vector q.
+    fn rate(&self, batch: Batch, fx: &[f64], q: &[f64]) -> f64 {
+        let (n, scales) = (q.len(), self.setting.scales);
+        let size = q.iter().zip(scales).fold(f64::MIN_POSITIVE, |most, (q, s)| most.max((q / s).abs()));
+        let along: Vec<f64> = q.iter().map(|q| q / size).chain(vec![0.0; self.setting.parameters.len()]).collect();
+        let by_axes = self.setting.axes.iter().enumerate().map(|(a, axis)| {
+            let unit: Vec<f64> = (0..self.setting.freedom()).map(|k| if k == a { axis.scale } else { 0.0 }).collect();
+            [vec![0.0; n], self.setting.spread(&unit)].concat()
+        });
+        by_axes.chain([along.clone()]).fold(max_abs(fx), |most, change| {
+            let mut out = vec![0.0; n];
+            self.setting.field.directional(batch, &[&along, &change], &mut out);
+            out.iter().zip(scales).fold(most, |most, (f, s)| larger(most, (f / s).abs()))
+        })
+    }
+
     fn equilibrium(&self, point: &Point, out: &mut Verified) {
         let Solution::Equilibrium(x) = &point.solution else { return };
         let (n, k) = (x.len(), self.setting.freedom());
@@ -204,13 +221,25 @@ impl Part<'_> {
         self.setting.linearise(batch, &mut f, &mut fx, &mut fp);
         out.points += 1;
         let scales: Vec<f64> = x.iter().zip(self.setting.scales).map(|(x, s)| x.abs() + s).collect();
+        let held = self.branch.held.map(|(kind, _)| kind);
+        let null = match held {
+            Some(Kind::Fold | Kind::BranchPoint) => {
+                Local::new(self.setting.field, point).and_then(|local| local.null_vectors())
+            }
+            _ => None,
+        };
+        // Of a single state nothing is left of the Jacobian.
+        let rate = null.as_ref().map_or(0.0, |[q, _]| self.rate(batch, &fx, q));
+        // Where branches cross all along, only what the Jacobian reaches of the residual can be made up for.
+        let beyond = null.filter(|_| held == Some(Kind::BranchPoint));
         // The shortest way to a solution in state and parameters.
         let mut line: Vec<f64> = Vec::with_capacity(n * (n + k));
         for i in 0..n {
             line.extend((0..n).map(|j| fx[i * n + j] * scales[j]));
             line.extend(self.setting.axes.iter().enumerate().map(|(a, axis)| fp[i * k + a] * axis.scale));
+            line.extend(beyond.iter().map(|[_, p]| rate * p[i]));
         }
-        let width = n + k;
+        let width = n + k + usize::from(beyond.is_some());
         let mut gram: Vec<f64> = (0..n * n)
             .map(|at| dot(&line[at / n * width..(at / n + 1) * width], &line[at % n * width..(at % n + 1) * width]))
             .collect();
@@ -223,6 +252,7 @@ impl Part<'_> {
             lu::solve(&gram, n, &pivots, &mut f, 1);
             let mut update = vec![0.0; width];
             f.iter().enumerate().for_each(|(i, y)| axpy(*y, &line[i * width..(i + 1) * width], &mut update));
+            update.truncate(n + k);
             update
         };
         let (off, rounding) = match self.precisely(point, x, &scales, &step) {
@@ -236,7 +266,8 @@ impl Part<'_> {
             let sum: Complex64 = point.spectrum.iter().map(|z| z.powi(exponent)).sum();
             let size: f64 = point.spectrum.iter().map(|z| z.norm().powi(exponent)).sum();
             let entries: f64 = power.iter().fold(0.0, |m, x| larger(m, x.abs()));
-            worst = larger(worst, (sum - trace).norm() / size.max(entries).max(f64::MIN_POSITIVE));
+            worst =
+                larger(worst, (sum - trace).norm() / size.max(entries).max(rate.powi(exponent)).max(f64::MIN_POSITIVE));
             let old = power.clone();
             for (at, x) in power.iter_mut().enumerate() {
                 *x = (0..n).map(|j| old[at / n * n + j] * fx[j * n + at % n]).sum();

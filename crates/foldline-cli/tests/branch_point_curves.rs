@@ -1,0 +1,152 @@
+//! Curves of branch points of equilibria in two parameters, against closed forms.
+
+use foldline::contract::Unobserved;
+use foldline::diagram::{Branch, Diagram, Ending, Kind};
+use foldline::explore::{System, run};
+use foldline::verify::verify;
+use foldline_store::study_file::{Study, parse_study};
+
+fn study(model: &str, rest: &str) -> Study {
+    parse_study(&format!("model = \"m\"\n{rest}"), "study", model, "model")
+        .unwrap_or_else(|found| panic!("{}", found[0]))
+}
+
+fn grown(model: &str, rest: &str) -> Diagram {
+    let study = study(model, rest);
+    let system = System::of_plan(&study.model, &study.plan);
+    let diagram = run(&system, &study.plan, 1, Diagram::default(), &Unobserved);
+    // What is right by a closed form must not be called wrong, nor left undecided, by the program itself.
+    let verified = verify(&system, &diagram, study.plan.tolerance, None, &|branch| branch.held.is_some());
+    assert!(verified.wrong().next().is_none(), "{:?}", verified.wrong().next());
+    let points = verified.undecided.iter().filter(|undecided| undecided.special.is_none());
+    assert_eq!(points.count(), 0, "{:?}", verified.undecided);
+    diagram
+}
+
+/// Every point of the curve satisfies `defect` = 0, a function of the branch's parameter and the second one; both sides end at bounds.
+fn satisfies(curve: &Branch, points: usize, defect: impl Fn(f64, f64) -> f64) {
+    for end in &curve.ends {
+        assert!(matches!(end, Some(Ending::Bound(_))), "{end:?}");
+    }
+    assert!(curve.points.len() >= points, "{} points", curve.points.len());
+    let (_, first) = curve.held.unwrap();
+    for point in &curve.points {
+        let at = (point.parameters[first], point.parameters[curve.free]);
+        assert!(defect(at.0, at.1).abs() < 1e-9, "{at:?}: {:.1e}", defect(at.0, at.1));
+        assert!(point.trust.residual < 1e-12, "{:.1e}", point.trust.residual);
+    }
+}
+
+/// Kinds and places of what lies on the curve, by increasing second parameter.
+fn lies_on(curve: &Branch, expected: &[(Kind, f64, f64)]) {
+    let (_, first) = curve.held.unwrap();
+    let mut found: Vec<_> = curve
+        .special
+        .iter()
+        .map(|s| (s.kind, s.point.parameters[first], s.point.parameters[curve.free], s.error))
+        .collect();
+    found.sort_by(|a, b| a.2.total_cmp(&b.2));
+    let agree = found.iter().zip(expected).all(|(own, known)| {
+        let error = own.3.max(1e-8);
+        own.0 == known.0 && (own.1 - known.1).abs() < error && (own.2 - known.2).abs() < error
+    });
+    assert!(agree && found.len() == expected.len(), "{found:?}");
+}
+
+const PLAN: &str = "[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"mu\"\nrange = [-3, 3]\n[[curve]]\nname = \"curve\"\nhold = \"branch-point\"\nof = \"b\"\nfree = \"q\"\n";
+
+/// x = 0, y = q mu is always a solution; x gets its quadratic term from y as well, as -1 + 2 q, and a cubic one where that vanishes.
+#[test]
+fn transcritical_points_pass_a_pitchfork() {
+    let model =
+        "[parameters]\nmu = 0.2\nq = 0.3\n[states]\nx = \"x*(mu - 1 - x + y)\"\ny = \"q*mu - y + 2*q*x - x^2\"\n";
+    let seed = "[[seed]]\nname = \"s\"\nstate = { x = 0, y = 0.06 }\n";
+    let diagram = grown(model, &format!("{seed}{PLAN}range = [-0.5, 1.5]\n"));
+    let curve = diagram.branch("curve").unwrap();
+    satisfies(curve, 8, |mu, q| mu * (1.0 + q) - 1.0);
+    lies_on(curve, &[(Kind::Cusp, 2.0 / 3.0, 0.5)]);
+    // (ξ = √2 x; the slave y - q mu = x - x² leaves -x³.)
+    assert!((curve.special[0].coefficients[0] + 0.5).abs() < 1e-7, "{}", curve.special[0].normal_form());
+}
+
+/// With one state there is nothing but the null vector: f_x and the derivatives along both parameters vanish together.
+#[test]
+fn a_single_state_is_enough() {
+    let model = "[parameters]\nmu = -1\nq = 0.4\n[states]\nx = \"1e3*((mu - q^2)*x - x^2)\"\n";
+    let seed = "[[seed]]\nname = \"s\"\nstate = { x = 0 }\n";
+    let diagram = grown(model, &format!("{seed}{PLAN}range = [-1, 1]\n"));
+    satisfies(diagram.branch("curve").unwrap(), 5, |mu, q| mu - q * q);
+    lies_on(diagram.branch("curve").unwrap(), &[]);
+}
+
+#[test]
+fn convection_begins_at_the_same_rayleigh_number_for_every_fluid() {
+    let model = include_str!("../../../models/lorenz.toml");
+    let text = "[[seed]]\nname = \"s\"\nstate = { x = 0, y = 0, z = 0 }\nparameters = { rho = 0.5 }\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"rho\"\nrange = [0.5, 2]\n";
+    let curve =
+        "[[curve]]\nname = \"curve\"\nhold = \"branch-point\"\nof = \"b\"\nfree = \"sigma\"\nrange = [0.5, 50]\n";
+    let diagram = grown(model, &format!("{text}{curve}"));
+    let curve = diagram.branch("curve").unwrap();
+    satisfies(curve, 5, |rho, _| rho - 1.0);
+    // Pitchforks all of them: the quadratic coefficient is rounding, and its signs are no cusps.
+    assert!(curve.special.is_empty());
+}
+
+/// A pitchfork at q = mu² - ½, which turns back in q; beside it a real eigenvalue becomes 0 at mu = -0.4 and a pair crosses at mu = 0.3.
+#[test]
+fn pitchforks_turn_back_and_meet_other_bifurcations() {
+    let model = "[parameters]\nmu = -1.1\nq = 0.4\n[states]\nx = \"(q - mu^2 + 0.5)*x - x^3 + 0.2*x*u\"\nw = \"(mu + 0.4)*w + x - w^3\"\nu = \"(mu - 0.3)*u - 2*v + x^2\"\nv = \"2*u + (mu - 0.3)*v - v*u^2\"\n";
+    let seed = "[[seed]]\nname = \"s\"\nstate = { x = 0, w = 0, u = 0, v = 0 }\n";
+    let diagram =
+        grown(model, &format!("{seed}{}near = -0.94\nrange = [-2, 1.1]\n", PLAN.replace("[-3, 3]", "[-1.2, 1.2]")));
+    let curve = diagram.branch("curve").unwrap();
+    satisfies(curve, 8, |mu, q| mu * mu - 0.5 - q);
+    lies_on(curve, &[(Kind::Fold, 0.0, -0.5), (Kind::ZeroHopf, 0.3, -0.41), (Kind::BogdanovTakens, -0.4, -0.34)]);
+}
+
+/// p₁ = 3/5 where the prey appear; where the predators do, at u = 1/p₄, p₁ (1 - e^{-5/p₄}) = 3 (1 - 1/p₄)/p₄. There the curve also goes over
+/// the fold of the prey alone, u = 0.411161560751.
+#[test]
+fn prey_and_predators_appear_along_two_curves() {
+    let model = include_str!("../../../models/predator-prey.toml");
+    let text = "[[seed]]\nname = \"s\"\nstate = { u = 0, v = 0 }\nparameters = { p1 = 0.1 }\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"p1\"\nrange = [0.1, 1]\nswitch = { branch-point = 1 }\n";
+    let curve = |name: &str, of: &str, near: f64| {
+        format!(
+            "[[curve]]\nname = \"{name}\"\nhold = \"branch-point\"\nof = \"{of}\"\nnear = {near}\nfree = \"p4\"\nrange = [2, 6]\n"
+        )
+    };
+    let diagram =
+        grown(model, &format!("{text}{}{}", curve("prey", "b", 0.6), curve("predators", "b/branch-point-1", 0.82)));
+    satisfies(diagram.branch("prey").unwrap(), 3, |p, _| p - 0.6);
+    let predators = diagram.branch("predators").unwrap();
+    satisfies(predators, 5, |p, gain| p * (1.0 - (-5.0 / gain).exp()) - 3.0 * (1.0 - 1.0 / gain) / gain);
+    let double: Vec<_> = predators.special.iter().filter(|s| s.kind == Kind::BogdanovTakens).collect();
+    assert_eq!(double.len(), 1, "{:?}", predators.special.iter().map(|s| s.kind).collect::<Vec<_>>());
+    assert!((1.0 / double[0].point.parameters[1] - 0.411161560751).abs() < 1e-11);
+}
+
+/// Away from q = 0 the crossing opens: there is a branch point at one value of q, and no curve of them. Where it opens like q³, one begins, and
+/// ends as soon as that shows.
+#[test]
+fn there_is_no_curve_where_branches_no_longer_cross() {
+    for (opening, begins) in [("0.1*q", false), ("-0.3*q^2", true), ("0.1*q^3", true)] {
+        let model = format!("[parameters]\nmu = -1\nq = 0\n[states]\nx = \"mu*x - x^2 + {opening}\"\n");
+        opens(&model, begins);
+    }
+}
+
+fn opens(model: &str, begins: bool) {
+    let seed = "[[seed]]\nname = \"s\"\nstate = { x = 0 }\n";
+    let study = study(model, &format!("{seed}{PLAN}range = [-1, 1]\n"));
+    let diagram = run(&System::of_plan(&study.model, &study.plan), &study.plan, 1, Diagram::default(), &Unobserved);
+    let curve = diagram.branch("curve").unwrap();
+    assert_eq!(!curve.points.is_empty(), begins);
+    assert!(curve.points.iter().all(|point| point.parameters[1].abs() < 5e-3 && point.trust.residual < 1e-8));
+    for end in &curve.ends {
+        match end {
+            Some(Ending::NoStart(why)) => assert!(!begins && why.contains("symmetry"), "{why}"),
+            Some(Ending::StepTooSmall(why)) => assert!(begins && why.contains("symmetry"), "{why}"),
+            _ => panic!("{end:?}"),
+        }
+    }
+}

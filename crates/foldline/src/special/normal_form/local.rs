@@ -1,0 +1,195 @@
+//! An equilibrium, the derivatives of f there, and its critical eigenvectors.
+
+use crate::contract::{Batch, Parameters, VectorField};
+use crate::diagram::{Point, Solution};
+use crate::linalg::{dot, lu, max_abs};
+use num_complex::Complex64;
+
+/// An equilibrium and the derivatives of f there.
+pub struct Local<'a> {
+    field: &'a dyn VectorField,
+    state: &'a [f64],
+    parameters: &'a [f64],
+    pub(super) n: usize,
+    /// `[n × n]`.
+    jacobian: Vec<f64>,
+}
+
+impl<'a> Local<'a> {
+    /// At a point; `None` where it is a cycle.
+    pub fn new(field: &'a dyn VectorField, at: &'a Point) -> Option<Local<'a>> {
+        let Solution::Equilibrium(state) = &at.solution else { return None };
+        let n = state.len();
+        let (mut f, mut jacobian) = (vec![0.0; n], vec![0.0; n * n]);
+        let batch = Batch { lanes: 1, states: state, parameters: Parameters::Shared(&at.parameters), times: &[] };
+        field.linearise(batch, &[], &mut f, &mut jacobian, &mut []);
+        Some(Local { field, state, parameters: &at.parameters, n, jacobian })
+    }
+
+    /// The same with the transposed Jacobian, for left vectors.
+    pub(super) fn transposed(&self) -> Local<'a> {
+        let n = self.n;
+        Local { jacobian: (0..n * n).map(|k| self.jacobian[k % n * n + k / n]).collect(), ..*self }
+    }
+
+    /// A derivative of f along some directions in the states `[n]`, or in states and parameters `[n + k]`.
+    pub(super) fn derivative(&self, along: &[&[f64]]) -> Vec<f64> {
+        let size = self.n + self.parameters.len();
+        let full: Vec<Vec<f64>> =
+            along.iter().map(|d| d.iter().copied().chain(std::iter::repeat(0.0)).take(size).collect()).collect();
+        let full: Vec<&[f64]> = full.iter().map(Vec::as_slice).collect();
+        let at = Batch { lanes: 1, states: self.state, parameters: Parameters::Shared(self.parameters), times: &[] };
+        let mut out = vec![0.0; self.n];
+        self.field.directional(at, &full, &mut out);
+        out
+    }
+
+    /// A derivative of f along complex directions `[n]`: the sum over all choices of a real or an imaginary part for each.
+    pub(super) fn multilinear(&self, along: &[&[Complex64]]) -> Vec<Complex64> {
+        let parts: Vec<[Vec<f64>; 2]> =
+            along.iter().map(|d| [d.iter().map(|z| z.re).collect(), d.iter().map(|z| z.im).collect()]).collect();
+        let mut out = vec![Complex64::new(0.0, 0.0); self.n];
+        for choice in 0..1usize << along.len() {
+            let chosen: Vec<&[f64]> =
+                parts.iter().enumerate().map(|(k, both)| both[choice >> k & 1].as_slice()).collect();
+            if chosen.iter().any(|d| max_abs(d) == 0.0) {
+                continue;
+            }
+            let unit = Complex64::i().powu(choice.count_ones());
+            out.iter_mut().zip(self.derivative(&chosen)).for_each(|(z, d)| *z += unit * d);
+        }
+        out
+    }
+
+    /// The factors of A - z with the columns `right` and the rows `left` (conjugated), as a real system of twice the size.
+    pub(super) fn shifted(&self, z: Complex64, right: &[&[Complex64]], left: &[&[Complex64]]) -> Option<Shifted> {
+        let (n, half) = (self.n, self.n + right.len());
+        let size = 2 * half;
+        let mut matrix = vec![0.0; size * size];
+        let mut put = |i: usize, j: usize, z: Complex64| {
+            matrix[i * size + j] += z.re;
+            matrix[(half + i) * size + half + j] += z.re;
+            matrix[i * size + half + j] -= z.im;
+            matrix[(half + i) * size + j] += z.im;
+        };
+        (0..n * n).for_each(|k| put(k / n, k % n, self.jacobian[k].into()));
+        (0..n).for_each(|i| put(i, i, -z));
+        for (k, (q, p)) in right.iter().zip(left).enumerate() {
+            (0..n).for_each(|i| put(i, n + k, q[i]));
+            (0..n).for_each(|i| put(n + k, i, p[i].conj()));
+        }
+        let mut pivots = vec![0; size];
+        lu::factorise(&mut matrix, size, &mut pivots).ok()?;
+        Some(Shifted { matrix, pivots, n })
+    }
+
+    /// Right and left eigenvectors of the eigenvalue closest to z, q of unit length and ⟨p, q⟩ = 1: A q = z q, pᴴ A = z pᴴ.
+    pub(super) fn eigenvectors(&self, z: Complex64) -> Option<[Vec<Complex64>; 2]> {
+        // A shift of the size of rounding keeps the matrix regular at an eigenvalue.
+        let shift = 1e-14 * max_abs(&self.jacobian).max(z.norm());
+        let factors = self.shifted(z + shift, &[], &[])?;
+        let mut out = [const { Vec::new() }; 2];
+        for (side, vector) in out.iter_mut().enumerate() {
+            *vector = (0..2 * self.n).map(|k| (1.0 + k as f64).sin()).collect();
+            for _ in 0..3 {
+                match side {
+                    0 => lu::solve(&factors.matrix, 2 * self.n, &factors.pivots, vector, 1),
+                    _ => lu::solve_transposed(&factors.matrix, 2 * self.n, &factors.pivots, vector),
+                }
+                let norm = dot(vector, vector).sqrt();
+                if !(norm.is_finite() && norm > 0.0) {
+                    return None;
+                }
+                vector.iter_mut().for_each(|x| *x /= norm);
+            }
+        }
+        let [q, mut p] = out.map(|both| complex(&both));
+        let size = hermitian(&p, &q).conj();
+        p.iter_mut().for_each(|p| *p /= size);
+        Some([q, p])
+    }
+
+    /// q and p of a zero eigenvalue, both of unit length.
+    pub fn null_vectors(&self) -> Option<[Vec<f64>; 2]> {
+        const ROUNDS: usize = 5;
+        let generic = |k: f64| (0..self.n).map(|i| 0.6 + (1.0 + k * i as f64).sin()).collect();
+        (0..ROUNDS).try_fold([generic(1.3), generic(1.9)], |vectors, _| self.null_vectors_near(&vectors))
+    }
+
+    /// The factors of A with the column p and the row q.
+    fn with_borders(&self, q: &[f64], p: &[f64]) -> Option<(Vec<f64>, Vec<usize>)> {
+        let (n, size) = (self.n, self.n + 1);
+        let mut matrix = vec![0.0; size * size];
+        for i in 0..n {
+            matrix[i * size..i * size + n].copy_from_slice(&self.jacobian[i * n..(i + 1) * n]);
+            (matrix[i * size + n], matrix[n * size + i]) = (p[i], q[i]);
+        }
+        let mut pivots = vec![0; size];
+        lu::factorise(&mut matrix, size, &mut pivots).ok()?;
+        Some((matrix, pivots))
+    }
+
+    /// The same from approximate ones, by a system that is regular where an eigenvalue 0 is double too: they change smoothly with the place
+    /// and keep their direction.
+    pub fn null_vectors_near(&self, [q, p]: &[Vec<f64>; 2]) -> Option<[Vec<f64>; 2]> {
+        let (n, size) = (self.n, self.n + 1);
+        let (matrix, pivots) = self.with_borders(q, p)?;
+        let (mut v, mut w) = (vec![0.0; size], vec![0.0; size]);
+        (v[n], w[n]) = (1.0, 1.0);
+        lu::solve(&matrix, size, &pivots, &mut v, 1);
+        lu::solve_transposed(&matrix, size, &pivots, &mut w);
+        let unit = |mut x: Vec<f64>| {
+            x.truncate(n);
+            let norm = dot(&x, &x).sqrt();
+            x.iter_mut().for_each(|x| *x /= norm);
+            x
+        };
+        Some([unit(v), unit(w)])
+    }
+
+    /// Solves A y = r with ⟨p, y⟩ = 0 where that has a solution, for q and p as [`Local::null_vectors`] gives them.
+    pub(super) fn bordered(&self, [q, p]: &[Vec<f64>; 2], r: &[f64]) -> Option<Vec<f64>> {
+        let (n, size) = (self.n, self.n + 1);
+        let (matrix, pivots) = self.with_borders(q, p)?;
+        let mut y = [r, &[0.0]].concat();
+        lu::solve(&matrix, size, &pivots, &mut y, 1);
+        y.truncate(n);
+        Some(y)
+    }
+
+    /// ⟨p, B(q, q)⟩ of vectors of unit length, each of which points the way that the others do.
+    pub fn quadratic(&self, [q, p]: &[Vec<f64>; 2]) -> f64 {
+        dot(p, &self.derivative(&[q, q]))
+    }
+}
+
+/// A factorised A - z, perhaps with borders.
+pub(super) struct Shifted {
+    matrix: Vec<f64>,
+    pivots: Vec<usize>,
+    n: usize,
+}
+
+impl Shifted {
+    /// The x `[n]` for a right-hand side `[n]` that is continued by zeros.
+    pub(super) fn solve(&self, r: &[Complex64]) -> Vec<Complex64> {
+        let half = self.pivots.len() / 2;
+        let mut both = vec![0.0; 2 * half];
+        r.iter().enumerate().for_each(|(i, z)| (both[i], both[half + i]) = (z.re, z.im));
+        lu::solve(&self.matrix, 2 * half, &self.pivots, &mut both, 1);
+        let mut x = complex(&both);
+        x.truncate(self.n);
+        x
+    }
+}
+
+/// The vector whose real parts come first.
+fn complex(both: &[f64]) -> Vec<Complex64> {
+    let (re, im) = both.split_at(both.len() / 2);
+    re.iter().zip(im).map(|(re, im)| Complex64::new(*re, *im)).collect()
+}
+
+/// Σ p̄ x.
+pub(super) fn hermitian(p: &[Complex64], x: &[Complex64]) -> Complex64 {
+    p.iter().zip(x).map(|(p, x)| p.conj() * x).sum()
+}

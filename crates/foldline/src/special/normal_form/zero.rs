@@ -1,0 +1,86 @@
+//! Normal forms of an eigenvalue 0: folds, cusps, branch points, Bogdanov–Takens points.
+
+use super::ROUNDING;
+use super::local::Local;
+use super::manifold::Manifold;
+use super::without_rounding;
+use crate::linalg::dot;
+
+/// Amplitude, as a share of the scales of the states, up to which the cubic term of a branch point outweighs the quadratic one where it
+/// counts as a pitchfork.
+const PITCHFORK: f64 = 1e-5;
+
+impl Local<'_> {
+    /// a of (1).
+    pub fn fold(&self) -> Option<f64> {
+        Some(0.5 * Manifold::new(self, true, &[])?.motion(0, &[0, 0])?.value.re)
+    }
+
+    /// c of (2).
+    pub fn cusp(&self) -> Option<f64> {
+        Some(Manifold::new(self, true, &[])?.motion(0, &[0, 0, 0])?.value.re / 6.0)
+    }
+
+    /// a and b of (3), then c where it is a pitchfork: then a is 0. `along` `[n + k]`, in states and parameters, is a direction closer to the
+    /// branch than to the one that crosses it, for one unit of its parameter; `scales` `[n]` are those of the states. `None` where no branches
+    /// cross.
+    pub fn crossing(&self, along: &[f64], scales: &[f64]) -> Option<Vec<f64>> {
+        let [q, p] = self.null_vectors()?;
+        let size = dot(&p, &q);
+        let b = dot(&p, &self.derivative(&[&q, along])) / size;
+        if self.is_pitchfork(scales, PITCHFORK)? {
+            return Some(vec![0.0, b, self.cusp()?]);
+        }
+        // Next to the point both tangents and all between solve the linear equations. Those of the branches, along + t q, are the roots of
+        // a t² + b t + ½ ⟨p, f(along, along)⟩, and at the nearer one b is half its derivative there.
+        let a = self.fold()?;
+        let rest = 0.5 * dot(&p, &self.derivative(&[along, along])) / size;
+        let square = b * b - 4.0 * a * rest;
+        (square >= 0.0).then(|| vec![a, square.sqrt().copysign(b)])
+    }
+
+    /// Whether a ξ² is less than c ξ³ as soon as ξ q is that share of the `scales` `[n]` of the states.
+    pub fn is_pitchfork(&self, scales: &[f64], share: f64) -> Option<bool> {
+        let [q, _] = self.null_vectors()?;
+        let reach = 1.0 / q.iter().zip(scales).fold(f64::MIN_POSITIVE, |most, (q, s)| most.max((q / s).abs()));
+        Some(self.fold()?.abs() <= share * reach * self.cusp()?.abs())
+    }
+
+    /// a and b of (7); `None` where both vanish, by a symmetry.
+    pub fn takens(&self) -> Option<[f64; 2]> {
+        let vectors = self.null_vectors()?;
+        let [q0, p1] = &vectors;
+        let q1 = self.bordered(&vectors, q0)?;
+        let p0 = self.transposed().bordered(&[p1.clone(), q0.clone()], p1)?;
+        // ⟨p₁, q₁⟩ = ⟨p₀, q₀⟩ is a number that p₀ and p₁ are divided by; what q₁ has along q₀ is chosen so that ⟨p₀, q₁⟩ = 0.
+        let size = dot(p1, &q1);
+        let along = dot(&p0, &q1) / size;
+        let q1: Vec<f64> = q1.iter().zip(q0).map(|(q1, q0)| q1 - along * q0).collect();
+        let quadratic = self.derivative(&[q0, q0]);
+        let mixed = self.derivative(&[q0, &q1]);
+        let norm = |v: &[f64]| dot(v, v).sqrt();
+        let product = |p: &[f64], b: &[f64]| (dot(p, b), norm(p) * norm(b));
+        let (first, of_first) = product(p1, &quadratic);
+        let (second, of_second) = product(&p0, &quadratic);
+        let (third, of_third) = product(p1, &mixed);
+        let a = without_rounding(&[0.5 * first], &[of_first], ROUNDING) / size;
+        let b = without_rounding(&[second, third], &[of_second, of_third], ROUNDING) / size;
+        (a != 0.0 || b != 0.0).then_some([a, b])
+    }
+
+    /// s, θ and E of (6) for the frequency ω; `None` where b or c of (6) vanishes.
+    pub fn zero_hopf(&self, omega: f64) -> Option<[f64; 3]> {
+        let mut manifold = Manifold::new(self, true, &[omega])?;
+        let mut g = |i: usize, m: &[usize]| manifold.motion(i, m);
+        let real = |g: super::manifold::Sized| without_rounding(&[g.value.re], &[g.size], ROUNDING);
+        let (g200, g011) = (real(g(0, &[0, 0])?), real(g(0, &[1, 2])?));
+        if g200 == 0.0 || g011 == 0.0 {
+            return None;
+        }
+        let (g300, g111) = (g(0, &[0, 0, 0])?.value.re, g(0, &[0, 1, 2])?.value.re);
+        let (h110, h210, h021) = (g(1, &[0, 1])?.value, g(1, &[0, 0, 1])?.value, g(1, &[1, 1, 2])?.value);
+        let time = h021.re / g011 - g300 / g200 + g111 / g011;
+        let e = 0.5 * (h210 + h110 * time - h021 * g200 / (2.0 * g011)).re;
+        Some([(g200 * g011).signum(), 2.0 * h110.re / g200, e])
+    }
+}

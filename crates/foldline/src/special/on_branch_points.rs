@@ -1,0 +1,188 @@
+//! A branch point of equilibria is held.
+//!
+//! **Idea.** Where branches over λ cross, the matrix of f_x and f_λ has two null vectors and a left one. It is bordered by approximate ones, which
+//! makes it regular, and what the borders have to add is held at zero.
+//!
+//! **Equations.** With B = [f_x f_λ] `[n × (n + 1)]`, a column d, and two rows C:
+//!
+//! ```text
+//!   (1)  [ wᵀ  g₁  g₂ ] [ B  d ]  =  [ 0 … 0  1 ]
+//!                       [ C  0 ]
+//!
+//!   (2)  dg_k = -wᵀ (dB) v_k   with   [ B  d ] [ v_k ]  =  [ 0   ]
+//!                                     [ C  0 ] [  ·  ]     [ e_k ]
+//! ```
+//!
+//! λ is a direction in the plane of the two parameters: across the curve, at first that of the branch. That (1) holds along a curve is not
+//! generic: something in the model must make branches cross, a symmetry or a solution that is always there. So it is asked of f(x, λ) + b d, of
+//! which there always is such a curve, as in `equilibrium`; where the amplitude b stays 0, it is one of branch points of f, whichever way λ points.
+//!
+//! **Source.** govaerts2000, §3 (bordered matrices) and §6 (branch points); allgower1990, §8.
+//!
+//! **Departures.** One of the null vectors of f_x alone with ⟨w, f_λ⟩ would do but for double eigenvalues 0, where a curve of folds begins that
+//! has the former too. d, C and λ are taken anew at every accepted point.
+
+use crate::contract::{Batch, Condition, Parameters};
+use crate::diagram::{Kind, Mesh, Point};
+use crate::linalg::{axpy, dot, lu, max_abs};
+use crate::problem::Setting;
+use num_complex::Complex64;
+
+/// A branch point held on equilibria.
+pub struct OnBranchPoints<'a> {
+    setting: Setting<'a>,
+    n: usize,
+    /// The direction of λ in the two parameters.
+    across: [f64; 2],
+    /// d `[n]` and C `[2][n + 1]`.
+    left: Vec<f64>,
+    right: Vec<f64>,
+    /// w `[n]` and the v `[2][n + 1]` of the last evaluation.
+    adjoint: Vec<f64>,
+    null: Vec<f64>,
+    state: Vec<f64>,
+    parameters: Vec<f64>,
+}
+
+impl<'a> OnBranchPoints<'a> {
+    /// In a setting with two free parameters.
+    pub fn new(setting: Setting<'a>) -> OnBranchPoints<'a> {
+        let n = setting.field.dim();
+        OnBranchPoints {
+            setting,
+            n,
+            across: [1.0, 0.0],
+            left: (0..n).map(|k| 0.4 + (k as f64 * 1.3).sin()).collect(),
+            right: (0..2 * (n + 1)).map(|k| 0.5 + (k as f64 * 1.7).cos()).collect(),
+            adjoint: Vec::new(),
+            null: Vec::new(),
+            state: Vec::new(),
+            parameters: Vec::new(),
+        }
+    }
+
+    fn batch(&self) -> Batch<'_> {
+        Batch { lanes: 1, states: &self.state, parameters: Parameters::Shared(&self.parameters), times: &[] }
+    }
+
+    /// A vector `[n + 1]` as a direction in states and parameters.
+    fn spread(&self, v: &[f64]) -> Vec<f64> {
+        let change = self.across.map(|a| v[self.n] * a);
+        [&v[..self.n], &self.setting.spread(&change)].concat()
+    }
+
+    fn evaluated(&mut self, u: &[f64], g: &mut [f64]) -> Option<()> {
+        let (n, size) = (self.n, self.n + 2);
+        self.state = u[..n].to_vec();
+        self.parameters = self.setting.at(&u[n + 1..]);
+        let (mut f, mut fx, mut fp) = (vec![0.0; n], vec![0.0; n * n], vec![0.0; 2 * n]);
+        self.setting.linearise(self.batch(), &mut f, &mut fx, &mut fp);
+        let mut matrix = vec![0.0; size * size];
+        for i in 0..n {
+            matrix[i * size..i * size + n].copy_from_slice(&fx[i * n..(i + 1) * n]);
+            matrix[i * size + n] = dot(&fp[2 * i..2 * i + 2], &self.across);
+            matrix[i * size + n + 1] = self.left[i];
+        }
+        for (k, row) in self.right.chunks_exact(n + 1).enumerate() {
+            matrix[(n + k) * size..(n + k) * size + n + 1].copy_from_slice(row);
+        }
+        let mut pivots = vec![0; size];
+        lu::factorise(&mut matrix, size, &mut pivots).ok()?;
+        let unit = |k: usize| {
+            let mut one = vec![0.0; size];
+            one[k] = 1.0;
+            one
+        };
+        self.adjoint = unit(n + 1);
+        lu::solve_transposed(&matrix, size, &pivots, &mut self.adjoint);
+        g.copy_from_slice(&self.adjoint[n..]);
+        self.adjoint.truncate(n);
+        self.null = Vec::new();
+        for k in 0..2 {
+            let mut v = unit(n + k);
+            lu::solve(&matrix, size, &pivots, &mut v, 1);
+            self.null.extend(&v[..=n]);
+        }
+        (max_abs(&self.null).is_finite() && max_abs(&self.adjoint).is_finite()).then_some(())
+    }
+}
+
+impl Condition for OnBranchPoints<'_> {
+    fn kind(&self) -> Kind {
+        Kind::BranchPoint
+    }
+
+    fn extra(&self) -> usize {
+        0
+    }
+
+    fn equations(&self) -> usize {
+        2
+    }
+
+    fn guess(&self, _point: &Point) -> Vec<f64> {
+        Vec::new()
+    }
+
+    fn face(&mut self, along: &[f64]) {
+        let [first, second] = [0, 1].map(|a| self.setting.axes[a].scale);
+        let [a, b] = [along[self.n + 1] / first, along[self.n + 2] / second];
+        let length = a.hypot(b);
+        if length > 0.0 {
+            // The null vectors belong to another λ.
+            self.across = [-b / length * first, a / length * second];
+        }
+    }
+
+    fn anchor(&mut self) {
+        if self.null.is_empty() {
+            return;
+        }
+        // In scaled components; λ is scaled by its direction.
+        let scale = |i: usize| self.setting.scales.get(i).copied().unwrap_or(1.0);
+        let mut rows: Vec<Vec<f64>> = Vec::new();
+        for v in self.null.chunks_exact(self.n + 1) {
+            let mut v: Vec<f64> = v.iter().enumerate().map(|(i, x)| x / scale(i)).collect();
+            rows.iter().for_each(|other| axpy(-dot(&v, other), other, &mut v));
+            let norm = dot(&v, &v).sqrt();
+            v.iter_mut().for_each(|x| *x /= norm);
+            rows.push(v);
+        }
+        let norm = self.adjoint.iter().enumerate().map(|(i, w)| (w * scale(i)).powi(2)).sum::<f64>().sqrt();
+        let (rows, left) = (rows.concat(), self.adjoint.iter().map(|w| w / norm).collect::<Vec<f64>>());
+        if max_abs(&rows).is_finite() && max_abs(&left).is_finite() {
+            let width = self.n + 1;
+            self.right = rows.iter().enumerate().map(|(k, x)| x / scale(k % width)).collect();
+            // As f maps scaled states: its range is measured like them.
+            self.left = left.iter().enumerate().map(|(i, w)| w * scale(i) * scale(i)).collect();
+        }
+    }
+
+    fn set_mesh(&mut self, _mesh: &Mesh) {}
+
+    fn evaluate(&mut self, u: &[f64], _extra: &[f64], g: &mut [f64]) -> bool {
+        if self.evaluated(u, g).is_none() {
+            self.null.clear();
+            return false;
+        }
+        true
+    }
+
+    fn derivative(&mut self, du: &[f64], _extra: &[f64], dg: &mut [f64]) {
+        let n = self.n;
+        let direction = [&du[..n], &self.setting.spread(&du[n + 1..])].concat();
+        for (value, v) in dg.iter_mut().zip(self.null.chunks_exact(n + 1)) {
+            let mut change = vec![0.0; n];
+            self.setting.field.directional(self.batch(), &[&self.spread(v), &direction], &mut change);
+            *value = -dot(&self.adjoint, &change);
+        }
+    }
+
+    fn held(&self, _extra: &[f64]) -> Vec<Complex64> {
+        vec![Complex64::new(0.0, 0.0)]
+    }
+
+    fn distance(&self, z: Complex64) -> f64 {
+        z.norm()
+    }
+}
