@@ -195,7 +195,7 @@ pub struct Plot {
     /// Folder of the run
     #[arg(value_name = "DIR")]
     pub folder: PathBuf,
-    /// Horizontal axis: a parameter, `period`, NAME_max or NAME_min of a state or output [default: the free parameter]
+    /// Horizontal axis: a parameter, `period`, `norm`, or a state or output with _max, _min, _mean, _rms or _integral behind its name [default: the free parameter]
     #[arg(long, value_name = "NAME")]
     pub x: Option<String>,
     /// Vertical axis [default: the largest value of the first output]

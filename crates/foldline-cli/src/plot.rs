@@ -18,7 +18,7 @@ pub fn write(typed: &Typed) -> Result<Outcome, Failure> {
     let axis = |option: &str, name: &Option<String>| {
         let quantity = name.as_ref().map(|name| {
             let unknown = |choices| Failure::typed(format!("--{option}: there is no quantity \"{name}\""), choices);
-            Quantity::named(name, &model).map_err(unknown)
+            foldline_plot::axis(name, &model).map_err(unknown)
         });
         quantity.transpose()
     };

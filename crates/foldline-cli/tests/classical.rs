@@ -460,3 +460,41 @@ fn a_conservative_oscillator_has_the_periods_of_its_elliptic_integrals() {
         period_is(found.point.solution.period(), period, 3.0 * TOLERANCE);
     }
 }
+
+#[test]
+fn averages_over_a_cycle() {
+    use foldline::special::quantity::Quantity;
+    // A circle of radius r: means 0, root mean squares r/√2, norm r, and the output r itself; 2π r over a period.
+    let line = "attractor = \"cycle\"\nparameters = { growth = 1 }";
+    let diagram =
+        explored(STUART_LANDAU, line, "free = \"growth\"\nrange = [0.25, 4]\nmark = { x_rms = 0.5, norm = 1.5 }");
+    let circle = branch(&diagram, "b");
+    let marked: Vec<f64> = circle.special.iter().map(|s| parameter(circle, s)).collect();
+    assert!(marked.len() == 2 && near(marked[0], 0.5, 1e-8) && near(marked[1], 2.25, 1e-8), "{marked:?}");
+    for point in &circle.points {
+        let r = parameter_of(circle, point).sqrt();
+        let of = |quantity: Quantity| quantity.of(point).unwrap();
+        assert!(of(Quantity::Mean(0)).abs() < 1e-9 && near(of(Quantity::Rms(1)), r / 2f64.sqrt(), 1e-8));
+        assert!(near(of(Quantity::Norm(2)), r, 1e-8) && near(of(Quantity::Mean(2)), r, 1e-8));
+        assert!(near(of(Quantity::Integral(2)), std::f64::consts::TAU * r, TOLERANCE));
+    }
+    // Parts: along a cycle of x'' = μ (1 - x²) x' - x the mean of (x x')' and of x x' (1 - x²) is 0, so that those of x'² and x² agree.
+    let diagram = explored(VAN_DER_POL, "attractor = \"cycle\"", "free = \"mu\"\nrange = [0.5, 4]");
+    for point in &branch(&diagram, "b").points {
+        let [x, v] = [0, 1].map(|k| Quantity::Rms(k).of(point).unwrap());
+        assert!(x > 1.0 && near(v, x, TOLERANCE), "{x} {v}");
+    }
+    // At rest all are the value itself, and there is no period to integrate over.
+    let diagram = explored(
+        STUART_LANDAU,
+        "state = { x = 0, y = 0 }\nparameters = { growth = -1 }",
+        "free = \"growth\"\nrange = [-2, -0.5]",
+    );
+    let rest = &branch(&diagram, "b").points[0];
+    assert_eq!(Quantity::Mean(2).of(rest), Some(0.0));
+    assert_eq!(Quantity::Integral(2).of(rest), None);
+}
+
+fn parameter_of(branch: &Branch, point: &foldline::diagram::Point) -> f64 {
+    point.parameters[branch.free]
+}

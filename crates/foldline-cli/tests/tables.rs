@@ -41,6 +41,7 @@ fn point(position: i64, [omega, kappa]: [f64; 2], r: f64) -> Point {
         spectrum: Vec::new(),
         unstable: 0,
         ranges: vec![[r, r], [r, r]],
+        averages: vec![[r, r * r], [r, r * r]],
         trust: Trust::default(),
         cost: Cost::default(),
     }

@@ -3,8 +3,8 @@
 use crate::curve::{marks, stretches};
 use crate::figure::{Layer, Marker, Shape};
 use crate::palette::nth;
-use crate::quantity::Quantity;
 use foldline::diagram::{Branch, Diagram, Kind, Origin};
+use foldline::special::quantity::Quantity;
 
 /// A branch in one colour: solid where it is stable, dashed where not, and its special points, hollow and named by their
 /// kind. The curve comes first.

@@ -1,8 +1,9 @@
 //! From a branch to polylines of one stability each, and marks.
 
 use crate::figure::Vertex;
-use crate::quantity::Quantity;
+use crate::quantity::drawn;
 use foldline::diagram::{Branch, Ending, Kind, Point};
+use foldline::special::quantity::Quantity;
 
 /// A piece of a branch along which the stability does not change.
 #[derive(Clone, Debug, PartialEq)]
@@ -126,7 +127,7 @@ pub fn marks(branch: &Branch, x: Quantity, y: Quantity) -> Vec<(Kind, Option<&'s
 }
 
 fn place(point: &Point, x: Quantity, y: Quantity) -> Option<[f64; 2]> {
-    Some([x.of(point)?, y.of(point)?])
+    Some([drawn(x, point)?, drawn(y, point)?])
 }
 
 /// The parts of a polyline within a window `[x0, x1, y0, y1]`.

@@ -26,6 +26,7 @@ pub mod ticks;
 pub use branches::{branch_curve, branch_layers, diagram_layers, special_layers};
 pub use compose::figure_svg;
 pub use figure::{Axis, Figure, Layer, LegendPlace, Marker, Panel};
+pub use foldline::special::quantity::Quantity;
 pub use page::{Picture, svg};
-pub use quantity::Quantity;
+pub use quantity::axis;
 pub use render::{RenderError, pdf, png};

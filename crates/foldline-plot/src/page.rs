@@ -3,9 +3,10 @@
 use crate::branches::diagram_layers;
 use crate::compose::figure_svg;
 use crate::figure::{Axis, Figure, LegendPlace, Panel};
-use crate::quantity::Quantity;
+use crate::quantity::{default_x, default_y, label};
 use foldline::diagram::Diagram;
 use foldline::model::Model;
+use foldline::special::quantity::Quantity;
 
 /// What is to be drawn.
 #[derive(Clone, Debug)]
@@ -30,9 +31,9 @@ impl Default for Picture {
 
 /// The picture of a diagram as SVG.
 pub fn svg(diagram: &Diagram, model: &Model, picture: &Picture) -> String {
-    let x = picture.x.unwrap_or_else(|| Quantity::default_x(diagram));
-    let y = picture.y.unwrap_or_else(|| Quantity::default_y(model));
-    let axis = |quantity: Quantity, range: Option<[f64; 2]>| Axis { range, ..Axis::new(quantity.label(model)) };
+    let x = picture.x.unwrap_or_else(|| default_x(diagram));
+    let y = picture.y.unwrap_or_else(|| default_y(model));
+    let axis = |quantity: Quantity, range: Option<[f64; 2]>| Axis { range, ..Axis::new(label(quantity, model)) };
     let [wide, high] = picture.window.map_or([None, None], |[x0, x1, y0, y1]| [Some([x0, x1]), Some([y0, y1])]);
     let [width, height] = picture.size;
     let title = if picture.title.is_some() { 31.0 } else { 0.0 };

@@ -33,6 +33,7 @@ fn point(position: i64, omega: f64, r: f64, unstable: usize, cycle: bool) -> Poi
         spectrum: Vec::new(),
         unstable,
         ranges: vec![[-r, r], [-r, r], [0.5 * r, r]],
+        averages: vec![[0.0, 0.5 * r * r], [0.0, 0.5 * r * r], [0.75 * r, 0.6 * r * r]],
         trust: Trust::default(),
         cost: Cost::default(),
     }

@@ -99,6 +99,7 @@ mod tests {
             spectrum: Vec::new(),
             unstable: 0,
             ranges: Vec::new(),
+            averages: Vec::new(),
             trust: Trust::default(),
             cost: Cost::default(),
         });

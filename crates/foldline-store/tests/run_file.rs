@@ -48,6 +48,7 @@ fn point(position: i64, cycle: bool) -> Point {
         spectrum: vec![Complex64::new(awkward(0), awkward(1)), Complex64::new(awkward(5), awkward(4))],
         unstable: 1,
         ranges: vec![[awkward(1), awkward(5)], [awkward(0), awkward(2)]],
+        averages: vec![[awkward(2), awkward(4)], [awkward(3), awkward(1)]],
         trust: Trust {
             discretisation: 1e-9,
             residual: -0.0,

@@ -107,6 +107,8 @@ pub struct Examination {
     pub unstable: usize,
     /// Smallest and largest value of every state, then of every output.
     pub ranges: Vec<[f64; 2]>,
+    /// Mean and mean square of every state, then of every output.
+    pub averages: Vec<[f64; 2]>,
     /// Accuracy of the point.
     pub trust: Trust,
 }

@@ -3,6 +3,7 @@
 use super::{Cell, Column, Style, Table};
 use foldline::diagram::{Branch, Cost, Diagram, Origin, Point};
 use foldline::model::Model;
+use foldline::special::quantity::Quantity;
 
 /// branch, kind, every parameter, period, NAME_max of every output, unstable_before, unstable_after, error, normal_form.
 pub fn special(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) -> bool) -> Table {
@@ -27,7 +28,7 @@ pub fn special(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) -> bool)
     Table { columns, rows }
 }
 
-/// As above for every accepted point, and position, the extremes of the states, multipliers (eigenvalues), accuracy, work.
+/// As above for every accepted point, and position, the extremes of the states, averages, multipliers (eigenvalues), accuracy, work.
 pub fn points(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) -> bool) -> Table {
     let mut columns = vec![column("branch", Style::Word), column("position", Style::Number)];
     columns.extend(parameter_columns(diagram, model, kept));
@@ -36,6 +37,9 @@ pub fn points(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) -> bool) 
     columns.extend(model.outputs.iter().map(|o| column(&format!("{}_min", o.name), Style::Number)));
     let extremes = |name: &str| [format!("{name}_max"), format!("{name}_min")];
     columns.extend(model.states.iter().flat_map(|s| extremes(&s.name)).map(|name| column(&name, Style::Number)));
+    let averages = |name: &String| [format!("{name}_mean"), format!("{name}_rms")];
+    let channels = model.outputs.iter().map(|o| &o.name).chain(model.states.iter().map(|s| &s.name));
+    columns.extend(channels.flat_map(averages).map(|name| column(&name, Style::Number)));
     columns.push(column("unstable", Style::Number));
     let sizes = ["discretisation", "residual", "trivial_defect", "liouville_defect", "spectrum_error"];
     columns.extend(sizes.map(|name| column(name, Style::Size)));
@@ -47,6 +51,10 @@ pub fn points(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) -> bool) 
         let n = model.states.len();
         row.extend((n..n + model.outputs.len()).map(|k| extreme(point, k, 0)));
         row.extend((0..n).flat_map(|k| [extreme(point, k, 1), extreme(point, k, 0)]));
+        let of = |quantity: Quantity| quantity.of(point).map_or(Cell::Empty, Cell::Number);
+        row.extend(
+            (n..n + model.outputs.len()).chain(0..n).flat_map(|k| [of(Quantity::Mean(k)), of(Quantity::Rms(k))]),
+        );
         row.push(count(point.unstable));
         let trust = point.trust;
         let sizes =

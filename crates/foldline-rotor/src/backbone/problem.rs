@@ -217,6 +217,7 @@ impl ZeroProblem for BackboneProblem {
             spectrum: examination.spectrum,
             unstable: examination.unstable,
             ranges: examination.ranges,
+            averages: examination.averages,
             trust: examination.trust,
             cost: Default::default(),
         }

@@ -26,12 +26,18 @@ pub(super) fn values_of(point: &Point, extra: &[f64]) -> Vec<Value> {
         trust.spectrum,
     ];
     scalars.extend_from_slice(extra);
-    let light = [pack(&point.parameters), pack_complex(&point.spectrum), pack_pairs(&point.ranges), pack(&scalars)];
+    let light = [
+        pack(&point.parameters),
+        pack_complex(&point.spectrum),
+        pack_pairs(&point.ranges),
+        pack(&scalars),
+        pack_pairs(&point.averages),
+    ];
     let heavy = [pack(profile), mesh_bytes(&point.solution), pack(&point.tangent)];
     let forcing_periods = point.solution.forcing_periods();
     let counts = [point.unstable, forcing_periods as usize];
     let checksums = [numbers_checksum(point.position, counts, &light), checksum(&heavy)];
-    let [parameters, spectrum, ranges, scalars] = light;
+    let [parameters, spectrum, ranges, scalars, averages] = light;
     let [profile, mesh, tangent] = heavy;
     let mesh = if degree == Value::Null { Value::Null } else { Value::Blob(mesh) };
     values.extend([
@@ -55,6 +61,7 @@ pub(super) fn values_of(point: &Point, extra: &[f64]) -> Vec<Value> {
         Value::Blob(tangent),
         Value::Blob(spectrum),
         Value::Blob(ranges),
+        Value::Blob(averages),
         Value::Blob(scalars),
         Value::Integer(checksums[0]),
         Value::Integer(checksums[1]),
@@ -103,6 +110,11 @@ pub(super) fn point_in(row: &Row) -> Result<(Point, Vec<f64>), String> {
         _ => count(name),
     };
     let position: i64 = row.get("position").map_err(|e| e.to_string())?;
+    // Those before version 7 had none, and their checksum was that of nothing.
+    let average_bytes = || match row.get::<_, Option<Vec<u8>>>("average_bytes") {
+        Err(rusqlite::Error::InvalidColumnName(_)) => Ok(Vec::new()),
+        other => other.map(Option::unwrap_or_default).map_err(|e| e.to_string()),
+    };
     // Those of older versions have none.
     let stated = |name: &str| match row.get::<_, Option<i64>>(name) {
         Err(rusqlite::Error::InvalidColumnName(_)) => Ok(None),
@@ -111,7 +123,7 @@ pub(super) fn point_in(row: &Row) -> Result<(Point, Vec<f64>), String> {
     let of_numbers = stated("numbers_checksum")?;
     if let Some(stated) = of_numbers {
         let light = ["parameter_bytes", "spectrum_bytes", "range_bytes", "scalar_bytes"].map(blob);
-        let light = light.into_iter().collect::<Result<Vec<_>, _>>()?;
+        let light = light.into_iter().chain([average_bytes()]).collect::<Result<Vec<_>, _>>()?;
         if numbers_checksum(position, [count("unstable")?, later("forcing_periods")?], &light) != stated {
             return Err(format!("the numbers of the point at position {position} do not have their checksum"));
         }
@@ -154,6 +166,7 @@ pub(super) fn point_in(row: &Row) -> Result<(Point, Vec<f64>), String> {
         spectrum: unpack_complex(&blob("spectrum_bytes")?).ok_or("spectrum_bytes is no list of pairs")?,
         unstable: count("unstable")?,
         ranges: unpack_pairs(&blob("range_bytes")?).ok_or("range_bytes is no list of pairs")?,
+        averages: unpack_pairs(&average_bytes()?).ok_or("average_bytes is no list of pairs")?,
         trust: Trust {
             discretisation: *discretisation,
             residual: *residual,

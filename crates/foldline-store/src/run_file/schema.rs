@@ -47,7 +47,7 @@ const OTHERS: [&str; 9] =
     ["branch", "position", "kind", "key", "unstable_before", "unstable_after", "error", "normal_form", "rowid"];
 
 /// The columns that a point has in both tables of points, with their types: first those to read, then those to load.
-const POINT_COLUMNS: [(&str, &str); 23] = [
+const POINT_COLUMNS: [(&str, &str); 24] = [
     ("period", "REAL"),
     ("unstable", "INTEGER NOT NULL"),
     ("discretisation", "REAL"),
@@ -68,6 +68,7 @@ const POINT_COLUMNS: [(&str, &str); 23] = [
     ("tangent_bytes", "BLOB NOT NULL"),
     ("spectrum_bytes", "BLOB NOT NULL"),
     ("range_bytes", "BLOB NOT NULL"),
+    ("average_bytes", "BLOB"),
     ("scalar_bytes", "BLOB NOT NULL"),
     ("numbers_checksum", "INTEGER"),
     ("solution_checksum", "INTEGER"),
@@ -100,7 +101,7 @@ pub(super) fn create(columns: &Columns) -> String {
 ///
 /// Version 1 had no curves in two parameters, version 2 did not count evaluations, version 3 had neither checksums nor errors of
 /// multipliers, version 4 did not know that a solution can be without bound, version 5 had neither forced models nor
-/// normal forms.
+/// normal forms, version 6 no averages.
 pub(super) fn upgrade(version: i64) -> &'static str {
     match version {
         1 => "ALTER TABLE branches ADD COLUMN held TEXT; ALTER TABLE branches ADD COLUMN follows INTEGER;",
@@ -122,6 +123,10 @@ pub(super) fn upgrade(version: i64) -> &'static str {
             "ALTER TABLE points ADD COLUMN forcing_periods INTEGER NOT NULL DEFAULT 0;
              ALTER TABLE special_points ADD COLUMN forcing_periods INTEGER NOT NULL DEFAULT 0;
              ALTER TABLE special_points ADD COLUMN normal_form TEXT;"
+        }
+        6 => {
+            "ALTER TABLE points ADD COLUMN average_bytes BLOB;
+             ALTER TABLE special_points ADD COLUMN average_bytes BLOB;"
         }
         _ => "",
     }

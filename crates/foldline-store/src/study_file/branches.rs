@@ -7,7 +7,8 @@ use crate::toml_walk::{Value, Walk};
 use foldline::diagram::Kind;
 use foldline::explore::{BranchPlan, Start, Switching};
 use foldline::model::Model;
-use foldline::special::mark::{Mark, Quantity};
+use foldline::special::mark::Mark;
+use foldline::special::quantity::Quantity;
 use std::ops::Range;
 
 pub(super) const KEYS: [&str; 10] =
@@ -167,31 +168,15 @@ fn marks(walk: &mut Walk, value: Option<&Value>, what: &str, stop: bool, model: 
     marks
 }
 
-/// A parameter, `period`, or NAME_max or NAME_min of a state or output.
+/// A quantity of a branch by its name.
 fn quantity(walk: &mut Walk, name: &str, span: Range<usize>, model: &Model) -> Option<Quantity> {
-    if name == "period" {
-        return Some(Quantity::Period);
-    }
-    if let Some(index) = model.parameter_index(name) {
-        return Some(Quantity::Parameter(index));
-    }
-    let channel = |name: &str| {
-        model.state_index(name).or_else(|| model.output_index(name).map(|index| model.states.len() + index))
-    };
-    let extreme = [("_max", true), ("_min", false)].into_iter().find_map(|(ending, largest)| {
-        let index = channel(name.strip_suffix(ending)?)?;
-        Some(if largest { Quantity::Largest(index) } else { Quantity::Smallest(index) })
-    });
-    if extreme.is_none() {
-        let ranged = model.states.iter().map(|s| &s.name).chain(model.outputs.iter().map(|o| &o.name));
-        let extremes = ranged.flat_map(|name| [format!("{name}_max"), format!("{name}_min")]);
-        let all: Vec<String> =
-            model.parameters.iter().map(|p| p.name.clone()).chain(["period".into()]).chain(extremes).collect();
+    let found = Quantity::named(name, model);
+    if found.is_none() {
+        let all = Quantity::names(model);
         let known: Vec<&str> = all.iter().map(String::as_str).collect();
-        let message = format!("`{name}` is no quantity of a branch");
-        walk.report(span, message, suggest(name, &known));
+        walk.report(span, format!("`{name}` is no quantity of a branch"), suggest(name, &known));
     }
-    extreme
+    found
 }
 
 pub(super) fn switching(walk: &mut Walk, value: &Value) -> Switching {

@@ -106,6 +106,8 @@ pub struct Point {
     pub unstable: usize,
     /// Smallest and largest value of every state, then of every output.
     pub ranges: Vec<[f64; 2]>,
+    /// Mean over the cycle, and mean of the square, of every state, then of every output; empty where a file has none.
+    pub averages: Vec<[f64; 2]>,
     /// Accuracy.
     pub trust: Trust,
     /// Work done since the previous point.

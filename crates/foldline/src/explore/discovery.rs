@@ -27,7 +27,8 @@ use super::{curves, known};
 use crate::attractors::spectral_ratio;
 use crate::contract::Event;
 use crate::diagram::{Branch, Kind, Origin, Point, Solution, SpecialPoint};
-use crate::special::mark::{Mark, Quantity};
+use crate::special::mark::Mark;
+use crate::special::quantity::Quantity;
 
 /// Carries out an exploration. Returns false if the observer wants to stop.
 pub(super) fn explore(work: &mut Work, plan: &ExplorePlan, jobs: usize) -> bool {

@@ -7,7 +7,8 @@ use crate::continuation::{Failure, Follow, Item, Settings, Station, follow};
 use crate::contract::{Event, Monitor, Observer, Verdict, ZeroProblem};
 use crate::diagram::{Branch, Cost, Ending, Family, Kind, Origin, Point, Solution, SpecialPoint};
 use crate::problem::{Axis, Setting, Tie, cycle::CycleProblem, equilibrium::EquilibriumProblem, held::Held, mesh};
-use crate::special::mark::{Mark, Quantity};
+use crate::special::mark::Mark;
+use crate::special::quantity::Quantity;
 use crate::special::{self, collapse};
 
 /// Which curve through a point is meant.

@@ -176,6 +176,7 @@ pub(super) fn bare(parameters: &[f64], solution: Solution) -> Point {
         spectrum: Vec::new(),
         unstable: 0,
         ranges: Vec::new(),
+        averages: Vec::new(),
         trust: Default::default(),
         cost: Default::default(),
     }

@@ -188,6 +188,7 @@ pub fn doubled_edge(system: &System, free: usize, at: &SpecialPoint, next: &Poin
         trivial: once.spectrum.len() - once.free_spectrum().len(),
         unstable: next.unstable,
         ranges: once.ranges.clone(),
+        averages: once.averages.clone(),
         trust: Trust {
             trivial_defect: 2.0 * once.trust.trivial_defect,
             liouville_defect: 2.0 * once.trust.liouville_defect,

@@ -8,7 +8,7 @@ use super::unfolding::Unfolding;
 use crate::contract::{Batch, Examination, Parameters, Singular, ZeroProblem};
 use crate::diagram::{Mesh, Point, Solution, Trust};
 use crate::linalg::{axpy, dot, larger, lu, max_abs};
-use crate::problem::extremes;
+use crate::problem::{averages, extremes};
 use crate::stability::eigenvalues;
 use num_complex::Complex64;
 
@@ -171,7 +171,8 @@ impl ZeroProblem for EquilibriumProblem<'_> {
         let rate = max_abs(&self.fx).max(1e-6 * by_free).max(unfolded).max(f64::MIN_POSITIVE);
         let residual = (0..n).map(|i| (self.f[i] / (rate * self.scale[i])).abs()).fold(0.0, f64::max);
         let ranges = extremes::of_state(self.setting.field, &self.setting.at(&u[self.first()..]), &u[..n]);
-        Examination { spectrum, trivial: 0, unstable, ranges, trust: Trust { residual, ..Trust::default() } }
+        let averages = averages::of_state(self.setting.field, &self.setting.at(&u[self.first()..]), &u[..n]);
+        Examination { spectrum, trivial: 0, unstable, ranges, averages, trust: Trust { residual, ..Trust::default() } }
     }
 
     fn spectrum_error(&mut self, _u: &[f64], spectrum: &[Complex64]) -> f64 {
@@ -196,6 +197,7 @@ impl ZeroProblem for EquilibriumProblem<'_> {
             spectrum: examination.spectrum,
             unstable: examination.unstable,
             ranges: examination.ranges,
+            averages: examination.averages,
             trust: examination.trust,
             cost: Default::default(),
         }

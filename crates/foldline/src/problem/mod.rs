@@ -6,6 +6,7 @@
 //! | cycles | profile at mesh nodes and Gauss points, T, λ | [`cycle`] |
 //! | special points in two parameters | either of these with both parameters, and what the condition adds | [`held`] |
 
+pub mod averages;
 pub mod cycle;
 pub mod defect;
 pub mod equilibrium;

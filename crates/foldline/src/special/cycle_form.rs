@@ -216,6 +216,7 @@ mod tests {
             spectrum: spectrum.to_vec(),
             unstable: 0,
             ranges: Vec::new(),
+            averages: Vec::new(),
             trust: Default::default(),
             cost: Default::default(),
         };

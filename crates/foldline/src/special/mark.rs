@@ -1,32 +1,8 @@
 //! Marks: places of a branch at which a quantity has a given value.
 
+use super::quantity::Quantity;
 use crate::contract::Monitor;
 use crate::diagram::{Ending, Kind, Point};
-
-/// A quantity that every point of a branch has.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Quantity {
-    /// The parameter of that index.
-    Parameter(usize),
-    /// The period of a cycle.
-    Period,
-    /// The smallest value of a state or output over the solution; outputs are numbered after the states.
-    Smallest(usize),
-    /// The largest one.
-    Largest(usize),
-}
-
-impl Quantity {
-    /// Its value at a point, if that has it.
-    pub fn of(self, point: &Point) -> Option<f64> {
-        match self {
-            Quantity::Parameter(k) => point.parameters.get(k).copied(),
-            Quantity::Period => point.solution.period(),
-            Quantity::Smallest(k) => point.ranges.get(k).map(|range| range[0]),
-            Quantity::Largest(k) => point.ranges.get(k).map(|range| range[1]),
-        }
-    }
-}
 
 /// A value of a quantity that is marked where a branch passes it.
 #[derive(Clone, Copy, Debug, PartialEq)]

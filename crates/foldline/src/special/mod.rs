@@ -26,6 +26,7 @@ pub mod on_branch_points;
 pub mod on_cycles;
 pub mod on_equilibria;
 pub mod period_doubling;
+pub mod quantity;
 pub mod torus;
 
 use crate::contract::{Monitor, VectorField};

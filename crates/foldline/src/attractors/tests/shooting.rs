@@ -127,6 +127,7 @@ fn point(solution: Solution, spectrum: Vec<Complex64>, unstable: usize, ranges: 
         spectrum,
         unstable,
         ranges,
+        averages: Vec::new(),
         trust: Trust::default(),
         cost: Cost::default(),
     }

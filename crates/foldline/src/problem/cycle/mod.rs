@@ -33,7 +33,7 @@ mod residual;
 
 use super::defect;
 use super::gauss::Scheme;
-use super::{Setting, extremes, mesh};
+use super::{Setting, averages, extremes, mesh};
 use crate::contract::{Batch, Examination, Parameters, Singular, ZeroProblem};
 use crate::diagram::{Cycle, Mesh, Point, Solution, Trust};
 use crate::linalg::lane::Eight;
@@ -425,6 +425,7 @@ impl ZeroProblem for CycleProblem<'_> {
         let parameters = self.setting.at(&u[size + 1..]);
         let cycle = [&u[..size], &self.mesh[..]];
         let ranges = extremes::of_profile(self.setting.field, &parameters, cycle, self.forcing_periods, &self.scheme);
+        let averages = averages::of_profile(self.setting.field, &parameters, cycle, self.forcing_periods, &self.scheme);
         let trust = Trust {
             discretisation: SAFE * errors.iter().fold(0.0, |m: f64, e| m.max(*e)) + ROUNDING,
             residual,
@@ -433,7 +434,7 @@ impl ZeroProblem for CycleProblem<'_> {
             spectrum: f64::NAN,
         };
         let trivial = usize::from(!self.is_forced());
-        Examination { spectrum: found.multipliers, trivial, unstable: found.unstable, ranges, trust }
+        Examination { spectrum: found.multipliers, trivial, unstable: found.unstable, ranges, averages, trust }
     }
 
     fn spectrum_error(&mut self, u: &[f64], spectrum: &[Complex64]) -> f64 {
@@ -462,6 +463,7 @@ impl ZeroProblem for CycleProblem<'_> {
             spectrum: examination.spectrum,
             unstable: examination.unstable,
             ranges: examination.ranges,
+            averages: examination.averages,
             trust: examination.trust,
             cost: Default::default(),
         }

@@ -23,6 +23,7 @@ fn origin(model: &Model) -> Point {
         spectrum: Vec::new(),
         unstable: 0,
         ranges: Vec::new(),
+        averages: Vec::new(),
         trust: Default::default(),
         cost: Default::default(),
     }

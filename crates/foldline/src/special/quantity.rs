@@ -1,0 +1,79 @@
+//! Scalars that every point of a branch has, by name.
+
+use crate::diagram::Point;
+use crate::model::Model;
+
+/// A quantity of a point. States and outputs are numbered together, outputs after the states.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Quantity {
+    /// The parameter of that index.
+    Parameter(usize),
+    /// The period of a cycle; equilibria have none.
+    Period,
+    /// The smallest value of a state or output over the solution.
+    Smallest(usize),
+    /// The largest one.
+    Largest(usize),
+    /// The mean over the solution, (1/T) ∫ g dt.
+    Mean(usize),
+    /// The root mean square, ((1/T) ∫ g² dt)^½.
+    Rms(usize),
+    /// The integral over one period, ∫ g dt; equilibria have none.
+    Integral(usize),
+    /// The root mean square of the vector of states, ((1/T) ∫ Σ x_i² dt)^½, of which there are so many.
+    Norm(usize),
+}
+
+type Made = fn(usize) -> Quantity;
+const ENDINGS: [(&str, Made); 5] = [
+    ("_max", Quantity::Largest),
+    ("_min", Quantity::Smallest),
+    ("_mean", Quantity::Mean),
+    ("_rms", Quantity::Rms),
+    ("_integral", Quantity::Integral),
+];
+
+impl Quantity {
+    /// Its value at a point, if that has it.
+    pub fn of(self, point: &Point) -> Option<f64> {
+        let average = |k: usize, power: usize| point.averages.get(k).map(|average| average[power]);
+        match self {
+            Quantity::Parameter(k) => point.parameters.get(k).copied(),
+            Quantity::Period => point.solution.period(),
+            Quantity::Smallest(k) => point.ranges.get(k).map(|range| range[0]),
+            Quantity::Largest(k) => point.ranges.get(k).map(|range| range[1]),
+            Quantity::Mean(k) => average(k, 0),
+            Quantity::Rms(k) => average(k, 1).map(|square| square.max(0.0).sqrt()),
+            Quantity::Integral(k) => average(k, 0).zip(point.solution.period()).map(|(mean, period)| mean * period),
+            Quantity::Norm(n) => {
+                let squares = point.averages.get(..n).filter(|own| !own.is_empty())?;
+                Some(squares.iter().map(|own| own[1]).sum::<f64>().max(0.0).sqrt())
+            }
+        }
+    }
+
+    /// The quantity of that name: a parameter, `period`, `norm`, or NAME_max, NAME_min, NAME_mean, NAME_rms or NAME_integral of a state
+    /// or output.
+    pub fn named(name: &str, model: &Model) -> Option<Quantity> {
+        if let Some(index) = model.parameter_index(name) {
+            return Some(Quantity::Parameter(index));
+        }
+        let channel = |name: &str| {
+            model.state_index(name).or_else(|| model.output_index(name).map(|index| model.states.len() + index))
+        };
+        let ended = || ENDINGS.iter().find_map(|(ending, made)| Some(made(channel(name.strip_suffix(ending)?)?)));
+        match name {
+            "period" => Some(Quantity::Period),
+            "norm" => Some(Quantity::Norm(model.states.len())),
+            _ => ended(),
+        }
+    }
+
+    /// Every name that [`Quantity::named`] knows.
+    pub fn names(model: &Model) -> Vec<String> {
+        let channels = model.states.iter().map(|s| &s.name).chain(model.outputs.iter().map(|o| &o.name));
+        let ended = channels.flat_map(|name| ENDINGS.map(|(ending, _)| format!("{name}{ending}")));
+        let parameters = model.parameters.iter().map(|p| p.name.clone());
+        parameters.chain(["period".into(), "norm".into()]).chain(ended).collect()
+    }
+}
