@@ -37,6 +37,8 @@ pub enum Command {
     Verify(Verify),
     /// Draw the bifurcation diagram of a run
     Plot(Plot),
+    /// Write a run as CSV, Parquet or NetCDF for other programs
+    Export(Export),
     /// Sample initial states of a model and list where they settle
     Attractors(Attractors),
     /// Say whether a model or study file is right, and if not where and why
@@ -164,6 +166,35 @@ pub struct Plot {
     /// Picture to write; the ending says which kind
     #[arg(short, long = "output", value_name = "FILE.svg|png|pdf")]
     pub output: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub struct Export {
+    /// Folder of the run
+    #[arg(value_name = "DIR")]
+    pub folder: PathBuf,
+    /// What is written
+    #[arg(long, value_enum)]
+    pub format: ExportFormat,
+    /// Folder for the tables, or NetCDF file [default: DIR/csv, DIR/parquet, DIR/run.nc]
+    #[arg(long, value_name = "PATH")]
+    pub out: Option<PathBuf>,
+    /// Only this branch, or the legs of this homotopy; may be given several times [default: everything]
+    #[arg(long, value_name = "NAME")]
+    pub branch: Vec<String>,
+    /// Leave out the profiles of cycles, which make up nearly all of a run
+    #[arg(long)]
+    pub no_profiles: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum ExportFormat {
+    /// A folder of tables with comma-separated values, every digit
+    Csv,
+    /// The same tables as Parquet files
+    Parquet,
+    /// One NetCDF-4 file with a group for each branch
+    Netcdf,
 }
 
 #[derive(Debug, Args)]

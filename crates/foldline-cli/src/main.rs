@@ -3,6 +3,7 @@
 mod arguments;
 mod attractors;
 mod check;
+mod export;
 mod failure;
 mod plot;
 mod progress;
@@ -31,6 +32,7 @@ fn answer(arguments: Arguments) -> Result<Outcome, Failure> {
         Some(Command::Table(typed)) => table::print(&typed),
         Some(Command::Verify(typed)) => verify::print(&typed),
         Some(Command::Plot(typed)) => plot::write(&typed),
+        Some(Command::Export(typed)) => export::write(&typed),
         Some(Command::Attractors(typed)) => attractors::print(&typed),
         Some(Command::Check(typed)) => check::print(&typed),
         Some(Command::Reproduce(typed)) => reproduce::publication(&typed),
