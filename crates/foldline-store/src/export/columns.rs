@@ -114,8 +114,7 @@ impl Variables {
         let parameters: Vec<Column> =
             parameters.map(|(name, p)| labelled(name, &p.unit, described(&p.name, &p.description))).collect();
         let ranged = model.states.iter().map(|s| (&s.name, &s.unit, &s.description));
-        let ranged: Vec<_> =
-            ranged.chain(model.outputs.iter().map(|o| (&o.name, &o.unit, &o.description))).collect();
+        let ranged: Vec<_> = ranged.chain(model.outputs.iter().map(|o| (&o.name, &o.unit, &o.description))).collect();
         let ends = ["smallest", "largest"].into_iter().cycle().zip(&names.ranges).enumerate();
         let range = |(k, (end, column)): (usize, (&str, &String))| {
             let (name, unit, description) = ranged[k / 2];
@@ -152,8 +151,14 @@ impl Variables {
             real("discretisation", "estimated discretisation error, relative"),
             real("residual", "of the equations after the last Newton step, relative"),
             real("trivial_defect", "distance from 1 of the multiplier that is 1 in exact arithmetic"),
-            real("liouville_defect", "difference of log of the product of the multipliers and the integral of the trace"),
-            real("spectrum_error", "estimated error of eigenvalues or multipliers, relative to the larger of 1 and their modulus"),
+            real(
+                "liouville_defect",
+                "difference of log of the product of the multipliers and the integral of the trace",
+            ),
+            real(
+                "spectrum_error",
+                "estimated error of eigenvalues or multipliers, relative to the larger of 1 and their modulus",
+            ),
             real("step", "arclength with which the next point was to be tried"),
             integer("newton", "Newton iterations since the point before"),
             integer("factorisations", "matrices factorised since the point before"),

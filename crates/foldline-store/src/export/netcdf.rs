@@ -155,7 +155,15 @@ fn about(export: &Export, plan: &mut Plan) {
 
 /// A name that NetCDF allows: no `/`, which would be a group in a group, nothing unprintable, a letter, digit or `_` in front.
 fn group_name(name: &str) -> String {
-    let allowed = |c: char| if c == '/' { '|' } else if c.is_control() { '_' } else { c };
+    let allowed = |c: char| {
+        if c == '/' {
+            '|'
+        } else if c.is_control() {
+            '_'
+        } else {
+            c
+        }
+    };
     let name: String = name.trim().chars().map(allowed).collect();
     let plain = name.starts_with(|c: char| c.is_ascii_alphanumeric() || c == '_' || !c.is_ascii());
     if plain { name } else { format!("_{name}") }

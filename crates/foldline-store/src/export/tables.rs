@@ -38,12 +38,7 @@ fn branches(export: &Export, folder: &Path, begin: &Begin) -> Result<PathBuf, Ex
 }
 
 /// The tables of points and special points, and those of their profiles where there are any.
-fn points(
-    export: &Export,
-    folder: &Path,
-    begin: &Begin,
-    variables: &Variables,
-) -> Result<Vec<PathBuf>, ExportError> {
+fn points(export: &Export, folder: &Path, begin: &Begin, variables: &Variables) -> Result<Vec<PathBuf>, ExportError> {
     let (model, branches) = (&export.study.model, &export.diagram.branches);
     let (mut width, mut cycles) = (0, [false; 2]);
     for branch in branches {
@@ -131,12 +126,7 @@ fn profile_columns(name: &Column, variables: &Variables, index: &str) -> Vec<Col
     columns
 }
 
-fn profile_rows(
-    table: &mut Option<Box<dyn Rows>>,
-    branch: &str,
-    index: i64,
-    point: &Point,
-) -> Result<(), ExportError> {
+fn profile_rows(table: &mut Option<Box<dyn Rows>>, branch: &str, index: i64, point: &Point) -> Result<(), ExportError> {
     let (Some(table), Some((times, states))) = (table, profile(point)) else { return Ok(()) };
     let n = states.len() / times.len().max(1);
     let mut row = vec![Cell::Text(branch.to_string()), Cell::Integer(index)];
@@ -149,12 +139,7 @@ fn profile_rows(
     Ok(())
 }
 
-fn responses(
-    export: &Export,
-    folder: &Path,
-    begin: &Begin,
-    variables: &Variables,
-) -> Result<PathBuf, ExportError> {
+fn responses(export: &Export, folder: &Path, begin: &Begin, variables: &Variables) -> Result<PathBuf, ExportError> {
     let word = |name: &str, description: &str| Column {
         name: name.into(),
         class: Class::Text,

@@ -245,7 +245,8 @@ impl Plan {
         out.extend(object.attributes.iter().map(|(name, value)| self.attribute(name, value, places)));
         match &object.kind {
             Kind::Group { members } => {
-                let link = |(k, id): (usize, &Id)| messages::link(&self.objects[*id].name, k as u64, places.objects[*id]);
+                let link =
+                    |(k, id): (usize, &Id)| messages::link(&self.objects[*id].name, k as u64, places.objects[*id]);
                 out.extend(members.iter().enumerate().map(link));
             }
             Kind::Dimension { users, .. } if !users.is_empty() => {
