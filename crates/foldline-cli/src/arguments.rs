@@ -39,6 +39,8 @@ pub enum Command {
     Plot(Plot),
     /// Write a run as CSV, Parquet or NetCDF for other programs
     Export(Export),
+    /// List the solutions in files of AUTO-07p, or make a study that starts from them
+    ImportAuto(ImportAuto),
     /// Sample initial states of a model and list where they settle
     Attractors(Attractors),
     /// Say whether a model or study file is right, and if not where and why
@@ -195,6 +197,28 @@ pub enum ExportFormat {
     Parquet,
     /// One NetCDF-4 file with a group for each branch
     Netcdf,
+}
+
+#[derive(Debug, Args)]
+pub struct ImportAuto {
+    /// Files s.NAME of AUTO; b.NAME and c.NAME beside or among them tell the names of states and parameters
+    #[arg(value_name = "FILE", required = true)]
+    pub files: Vec<PathBuf>,
+    /// Model of the same equations; without it the solutions are listed
+    #[arg(long, value_name = "MODEL.toml")]
+    pub model: Option<PathBuf>,
+    /// Only the solution with this label; may be given several times [default: all of them]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    pub label: Vec<i64>,
+    /// Which parameters of AUTO are which of the model's, where their names do not say it
+    #[arg(long, value_name = "1=NAME,...", value_delimiter = ',')]
+    pub parameters: Vec<String>,
+    /// Which states of AUTO are which of the model's, where neither their names nor their order say it
+    #[arg(long, value_name = "1=NAME,...", value_delimiter = ',')]
+    pub states: Vec<String>,
+    /// Study to write [default: NAME.toml, for the first s.NAME]
+    #[arg(short, long = "output", value_name = "STUDY.toml", requires = "model")]
+    pub output: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]

@@ -5,6 +5,7 @@ mod attractors;
 mod check;
 mod export;
 mod failure;
+mod import_auto;
 mod plot;
 mod progress;
 mod reproduce;
@@ -33,6 +34,7 @@ fn answer(arguments: Arguments) -> Result<Outcome, Failure> {
         Some(Command::Verify(typed)) => verify::print(&typed),
         Some(Command::Plot(typed)) => plot::write(&typed),
         Some(Command::Export(typed)) => export::write(&typed),
+        Some(Command::ImportAuto(typed)) => import_auto::answer(&typed),
         Some(Command::Attractors(typed)) => attractors::print(&typed),
         Some(Command::Check(typed)) => check::print(&typed),
         Some(Command::Reproduce(typed)) => reproduce::publication(&typed),

@@ -4,6 +4,7 @@
 //! ([`model_file`]), and a growing diagram a database that survives being killed ([`run_file`]), from which other formats follow ([`export`]). Whatever is wrong with
 //! a text is said with its place ([`diagnostic`]).
 
+pub mod auto;
 pub mod diagnostic;
 pub mod export;
 pub mod finite;

@@ -23,6 +23,7 @@ mod counted;
 pub mod curves;
 mod diagnosis;
 pub mod family;
+pub mod given;
 pub mod growth;
 pub mod homotopy;
 pub mod known;
@@ -35,6 +36,7 @@ pub mod system;
 #[cfg(test)]
 mod tests;
 
+pub use given::mismatch;
 pub use persistence::{Persistence, persistence};
 pub use plan::{
     AttractorKey, BranchPlan, CurvePlan, HomotopyPlan, Plan, SeedPlan, SeedSource, Start, SurveyPlan, SweepPlan,
