@@ -4,11 +4,13 @@
 //! collocation like ours and between them, evenly spaced. `c.NAME` and `b.NAME` tell how states and parameters are called and how
 //! far the branch was to go ([`names`]). [`study`] makes of a solution a study of our own, in which it is a seed.
 //!
-//! **Source.** doedel2012, sections 5.9 and 10; the layout of the numbers is checked against files written by AUTO-07p 0.9.3.
+//! **Source.** doedel2019, chapter 6 for the kinds; the layout of the numbers is that of files which AUTO-07p 0.9.2 has written
+//! (tests/auto).
 //!
-//! **Departures.** The last three files that AUTO may write (directions, diagnostics) are not looked at.
+//! **Departures.** The direction of a branch, which stands behind each solution, is not used: it follows from the model.
 
 mod names;
+mod reader;
 mod solutions;
 mod study;
 

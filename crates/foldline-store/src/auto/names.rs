@@ -3,7 +3,7 @@
 //! **Idea.** Both have lines such as `parnames = {1: 'p1', 11: 'PERIOD'}`. What else there is, and files of versions that
 //! had no names, are passed over: nothing depends on names that cannot be typed too.
 
-use super::solutions::number;
+use super::reader::number;
 
 /// What is known besides the solutions.
 #[derive(Clone, Debug, Default, PartialEq)]

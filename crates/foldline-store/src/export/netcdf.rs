@@ -4,7 +4,7 @@
 //! first. Then the points pass, and each adds its numbers to the end of every variable. Profiles have different meshes; they
 //! are filled up with NaN to the length of the longest one of the branch.
 //!
-//! **Source.** unidata2024; eaton2024 for the names of attributes (`units`, `long_name`, `coordinates`).
+//! **Source.** unidata2024; eaton2023 for the names of attributes (`units`, `long_name`, `coordinates`).
 
 use super::columns::{
     Cell, Class, Column, Variables, branch_cells, of_branch, point_cells, profile, response_cells, special_cells,
@@ -366,7 +366,7 @@ impl Group {
     }
 
     fn flush(&mut self, laid: &mut Laid) -> std::io::Result<()> {
-        let all = self.scalars.iter_mut().chain(&mut self.spectrum).chain(&mut self.profile);
-        all.map(|growth| growth.flush(laid)).collect()
+        let mut all = self.scalars.iter_mut().chain(&mut self.spectrum).chain(&mut self.profile);
+        all.try_for_each(|growth| growth.flush(laid))
     }
 }

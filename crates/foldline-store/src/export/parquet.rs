@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Cells of a row group.
-const CELLS: usize = 4_000_000;
+const CELLS: usize = 1_000_000;
 
 struct Parquet {
     growing: Growing,

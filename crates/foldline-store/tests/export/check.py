@@ -7,6 +7,7 @@ import sqlite3
 import sys
 from pathlib import Path
 
+import h5py
 import numpy
 import pandas
 import xarray
@@ -88,6 +89,21 @@ for engine in ["netcdf4", "h5netcdf"]:
             check_group(alone, special, "special_node")
     assert tree["down"]["hits"].values.tolist() == [7]
     tree.close()
+
+attached = 0
+with h5py.File(run / "run.nc") as file:
+
+    def check_dimensions(name, variable):
+        """Every dimension of a variable knows of it, and it of them."""
+        global attached
+        for place, scales in enumerate(variable.attrs.get("DIMENSION_LIST", [])):
+            scale = file[scales[0]]
+            assert h5py.h5ds.is_scale(scale.id) and h5py.h5ds.is_attached(variable.id, scale.id, place), name
+            assert scale.shape[0] == variable.shape[place]
+            attached += 1
+
+    file.visititems(check_dimensions)
+assert attached > 100
 
 for table in ["branches", "points", "special_points", "profiles", "special_profiles", "responses"]:
     texts = pandas.read_csv(run / "csv" / f"{table}.csv", keep_default_na=False, dtype=str)

@@ -1,7 +1,7 @@
 //! A run with everything that could go wrong in another format: numbers that decimals lose, meshes of different sizes, names that
 //! are taken or not allowed, a branch without points, texts of any length.
 
-use foldline::contract::{Event, Observer};
+use foldline::contract::{Event, Observer, Verdict};
 use foldline::diagram::{
     Branch, Cost, Cycle, Ending, Family, Kind, Motion, Origin, Point, Response, Responses, Search, Solution,
     SpecialPoint, Trust,
@@ -109,8 +109,8 @@ pub fn record(folder: &Path) {
         let mut bare = branch.clone();
         (bare.points, bare.special, bare.ends) = (Vec::new(), Vec::new(), [None, None]);
         recorder.observe(Event::Begin(&bare));
-        branch.points.iter().for_each(|p| drop(recorder.observe(Event::Point(&branch, p))));
-        branch.special.iter().for_each(|s| drop(recorder.observe(Event::Special(&branch, s))));
+        branch.points.iter().for_each(|p| assert_eq!(recorder.observe(Event::Point(&branch, p)), Verdict::Continue));
+        branch.special.iter().for_each(|s| assert_eq!(recorder.observe(Event::Special(&branch, s)), Verdict::Continue));
         for (side, ending) in branch.ends.iter().enumerate().filter_map(|(s, e)| Some((s, e.as_ref()?))) {
             recorder.observe(Event::SideEnded(&branch, side, ending));
         }

@@ -107,7 +107,9 @@ fn csv_has_every_digit() {
             assert_eq!(row["position"], point.position.to_string());
             assert!(number(&row["normalised_time"]).is_some_and(|found| (found - time).abs() < 1e-15));
             let wanted = [("x", state[0]), ("node_2", state[1])];
-            wanted.map(|(name, value)| assert!(same(number(&row[name]), Some(value)), "{name} {value} {row:?}"));
+            for (name, value) in wanted {
+                assert!(same(number(&row[name]), Some(value)), "{name} {value} {row:?}");
+            }
         }
     }
     assert_eq!(rows.count(), 0);

@@ -86,12 +86,12 @@ pub(super) fn from_cycle(system: &System, seed: &SeedPlan, tolerance: f64, cycle
     let off = match mismatch(system.field, &seed.parameters, &given.solution) {
         Some((component, share)) => {
             let name = system.state_names.get(component).map_or("", String::as_str);
-            format!("the equation of {name} is off by {share:.1e} of its size")
+            format!("on it the equation of {name} is off by {share:.2} of its size")
         }
         None => "the equations are not finite on it".to_string(),
     };
     Err(format!(
-        "no cycle was found next to the given one: {why}\nlikely cause: {off}; where that is more than some 1e-2, it belongs to other \
-         equations or other parameters\nwhat to do: compare the equations, and which state and parameter is which"
+        "no cycle was found next to the given one: {why}\nlikely cause: it is too far from any, or belongs to other equations or \
+         parameters: {off}\nwhat to do: compare the equations, and which state and parameter is which; or give more states of it"
     ))
 }
