@@ -9,11 +9,13 @@
 //!
 //! **Departures.** The direction of a branch, which stands behind each solution, is not used: it follows from the model.
 
+mod mapping;
 mod names;
 mod reader;
 mod solutions;
 mod study;
 
+pub use mapping::{Complaint, Mapping};
 pub use names::Names;
 pub use solutions::{Labelled, read_solutions, solutions};
-pub use study::{Chosen, Complaint, Mapping, study};
+pub use study::{Chosen, study};

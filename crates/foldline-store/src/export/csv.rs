@@ -1,6 +1,7 @@
 //! Comma-separated values.
 
-use super::columns::{Cell, Column};
+use super::cells::Cell;
+use super::columns::Column;
 use super::tables::Rows;
 use super::{ExportError, Growing};
 use std::fs::File;

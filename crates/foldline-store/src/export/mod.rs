@@ -7,8 +7,10 @@
 //!
 //! **Departures.** A file is written under another name, and takes its own when it is complete.
 
+mod cells;
 mod columns;
 mod csv;
+mod groups;
 pub mod hdf5;
 mod netcdf;
 mod parquet;

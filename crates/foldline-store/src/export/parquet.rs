@@ -3,7 +3,8 @@
 //! **Idea.** A row group holds so many cells; then it is written and the next one begins. Numbers are stored as they are,
 //! texts with a dictionary, nothing compressed.
 
-use super::columns::{Cell, Class, Column};
+use super::cells::Cell;
+use super::columns::{Class, Column};
 use super::tables::Rows;
 use super::{ExportError, Growing};
 use parquet::basic::{ConvertedType, Repetition, Type as Physical};

@@ -1,8 +1,7 @@
 //! The tables of an export: `branches`, `points`, `special_points`, `profiles`, `special_profiles`, `responses`.
 
-use super::columns::{
-    Cell, Class, Column, Variables, branch_cells, of_branch, point_cells, profile, response_cells, special_cells,
-};
+use super::cells::{Cell, branch_cells, point_cells, profile, response_cells, special_cells};
+use super::columns::{Class, Column, Variables, of_branch};
 use super::{Export, ExportError};
 use foldline::diagram::Point;
 use foldline::model::Model;

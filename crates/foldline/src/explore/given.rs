@@ -95,3 +95,87 @@ pub(super) fn from_cycle(system: &System, seed: &SeedPlan, tolerance: f64, cycle
          parameters: {off}\nwhat to do: compare the equations, and which state and parameter is which; or give more states of it"
     ))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::plan::SeedSource;
+    use super::*;
+    use crate::model::{Definition, Model, ModelSource, Parameter, State};
+    use std::f64::consts::TAU;
+
+    /// x' = μx - ωy - x(x² + y²), y' = ωx + μy - y(x² + y²): the cycle is a circle of radius √μ and period 2π/ω.
+    fn circle() -> Model {
+        let equation = |name: &str, text: &str| Definition::new(name, text);
+        Model::compile(ModelSource {
+            name: "circle".into(),
+            parameters: vec![Parameter::new("mu", 1.0), Parameter::new("omega", 2.0)],
+            states: vec![State::new("x"), State::new("y")],
+            equations: vec![
+                equation("x", "mu*x - omega*y - x*(x^2 + y^2)"),
+                equation("y", "omega*x + mu*y - y*(x^2 + y^2)"),
+            ],
+            ..ModelSource::default()
+        })
+        .unwrap()
+    }
+
+    /// The circle of that radius and period through `count` states of each turn.
+    fn given(radius: f64, period: f64, count: usize, through: usize) -> Cycle {
+        let times: Vec<f64> = (0..=count).map(|k| k as f64 / count as f64).collect();
+        let states: Vec<f64> =
+            times.iter().flat_map(|t| [(TAU * t).cos(), (TAU * t).sin()].map(|v| radius * v)).collect();
+        Cycle::given(period, &times, &states, through, 4).unwrap()
+    }
+
+    #[test]
+    fn polynomials_through_given_states_are_the_same_on_another_mesh() {
+        // t⁴ is its own interpolant of degree 4, whatever the nodes.
+        let times = [0.0, 0.1, 0.3, 0.35, 0.5, 0.6, 0.7, 0.9, 1.0];
+        let states = times.map(|t: f64| t.powi(4));
+        let cycle = Cycle::given(1.0, &times, &states, 4, 5).unwrap();
+        assert_eq!((cycle.intervals(), cycle.degree, &cycle.mesh[..]), (2, 5, &[0.0, 0.5, 1.0][..]));
+        for t in [0.05, 0.2, 0.42, 0.77, 0.95f64] {
+            assert!((cycle.state(t)[0] - t.powi(4)).abs() < 1e-14);
+        }
+        assert!(Cycle::given(1.0, &times[..8], &states[..8], 4, 5).is_none(), "no time 1");
+        assert!(Cycle::given(1.0, &times, &states, 3, 5).is_none(), "eight steps are no multiple of three");
+        assert!(Cycle::given(1.0, &times, &states[..8], 4, 5).is_none());
+    }
+
+    #[test]
+    fn a_mismatch_is_what_the_equations_are_off_by() {
+        let model = circle();
+        let off = |solution: &Solution, parameters: &[f64]| mismatch(&model, parameters, solution).unwrap().1;
+        // The error of polynomials of degree 4 on 40 intervals: (2π/40)⁵ over some hundreds.
+        assert!(off(&Solution::Cycle(given(1.0, TAU / 2.0, 160, 4)), &[1.0, 2.0]) < 1e-6);
+        // A period that is a tenth too long makes every slope an eleventh too small.
+        let slow = off(&Solution::Cycle(given(1.0, 1.1 * TAU / 2.0, 160, 4)), &[1.0, 2.0]);
+        assert!((slow - 0.1 / 1.1).abs() < 1e-6, "{slow}");
+        // At (0.3, 0) f is 0.3 - 0.027, and is made of ∂f/∂x x = (1 - 3 · 0.09) 0.3 and ∂f/∂μ μ = 0.3.
+        let (component, share) = mismatch(&model, &[1.0, 2.0], &Solution::Equilibrium(vec![0.3, 0.0])).unwrap();
+        assert!(component == 0 && (share - 0.273 / 0.519).abs() < 1e-12, "{component} {share}");
+        assert_eq!(off(&Solution::Equilibrium(vec![0.0, 0.0]), &[1.0, 2.0]), 0.0);
+        assert_eq!(mismatch(&model, &[f64::NAN, 2.0], &Solution::Equilibrium(vec![0.3, 0.0])), None);
+    }
+
+    #[test]
+    fn newton_leads_from_a_crude_cycle_to_the_cycle_or_says_why_not() {
+        let model = circle();
+        let system = System::of(&model, &[1.0, 2.0]);
+        let seed = |cycle: &Cycle| SeedPlan {
+            name: "given".into(),
+            source: SeedSource::Cycle(cycle.clone()),
+            parameters: vec![1.0, 2.0],
+            samples: 1,
+            random: 1,
+        };
+        // Twelve straight lines, a tenth too wide, a fiftieth too slow.
+        let crude = given(1.1, 1.02 * TAU / 2.0, 12, 1);
+        let found = from_cycle(&system, &seed(&crude), 1e-8, &crude).unwrap();
+        assert!((found.solution.period().unwrap() - TAU / 2.0).abs() < 1e-7);
+        assert!(found.ranges[..2].iter().all(|[low, high]| (low + 1.0).abs() < 1e-6 && (high - 1.0).abs() < 1e-6));
+        let wrong = given(1.0, TAU, 12, 1);
+        let said = from_cycle(&system, &seed(&wrong), 1e-8, &wrong).unwrap_err();
+        assert!(said.contains("no cycle was found next to the given one") && said.contains("likely cause"), "{said}");
+    }
+}
