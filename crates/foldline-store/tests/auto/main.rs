@@ -86,9 +86,9 @@ fn spoilt_files_are_answered_with_a_place_and_a_cure() {
         ),
         (
             "huge",
-            CYCLES.replacen("      81     3", "      999999999999     3", 1),
+            CYCLES.replacen("      81     3", "      81     999999999999", 1),
             1,
-            "too few for 999999999999 points",
+            "too few for 81 points of 999999999999 columns",
         ),
     ];
     for (what, text, line, message) in cases {
