@@ -2,7 +2,7 @@
 //!
 //! **Idea.** A file `s.NAME` holds labelled solutions ([`solutions`]): equilibria, or cycles as values at the mesh points of a
 //! collocation like ours and between them, evenly spaced. `c.NAME` and `b.NAME` tell how states and parameters are called and how
-//! far the branch was to go ([`names`]). [`study`] makes of a solution a study of our own, in which it is a seed.
+//! far the branch was to go ([`Names`]). [`study`] makes of a solution a study of our own, in which it is a seed.
 //!
 //! **Source.** doedel2019, chapter 6 for the kinds; the layout of the numbers is that of files which AUTO-07p 0.9.2 has written
 //! (tests/auto).

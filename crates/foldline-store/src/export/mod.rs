@@ -1,8 +1,8 @@
 //! A run for other programs: CSV, Parquet, NetCDF.
 //!
-//! **Idea.** What is written follows from the [`columns`], which all formats share: the same names, units and descriptions. The
+//! **Idea.** What is written follows from the `columns`, which all formats share: the same names, units and descriptions. The
 //! points of a branch pass one after the other ([`Reading::each_point`]), so that no run is too long. CSV and Parquet have a
-//! file for each [`table`](tables); NetCDF has a group for each branch ([`netcdf`]), in a file whose places are laid out
+//! file for each table (`tables`); NetCDF has a group for each branch (`netcdf`), in a file whose places are laid out
 //! before any number is written ([`hdf5`]). Everything is described in docs/book/exports.md.
 //!
 //! **Departures.** A file is written under another name, and takes its own when it is complete.
