@@ -40,6 +40,10 @@ pub enum Command {
     Verify(Verify),
     /// Draw the bifurcation diagram of a run
     Plot(Plot),
+    /// Write a run as CSV, Parquet or NetCDF for other programs
+    Export(Export),
+    /// List the solutions in files of AUTO-07p, or make a study that starts from them
+    ImportAuto(ImportAuto),
     /// Sample initial states of a model and list where they settle
     Attractors(Attractors),
     /// Say whether a model or study file is right, and if not where and why
@@ -213,6 +217,57 @@ pub struct Plot {
     /// Picture to write; the ending says which kind
     #[arg(short, long = "output", value_name = "FILE.svg|png|pdf")]
     pub output: PathBuf,
+}
+
+#[derive(Debug, Args)]
+pub struct Export {
+    /// Folder of the run
+    #[arg(value_name = "DIR")]
+    pub folder: PathBuf,
+    /// What is written
+    #[arg(long, value_enum)]
+    pub format: ExportFormat,
+    /// Folder for the tables, or NetCDF file [default: DIR/csv, DIR/parquet, DIR/run.nc]
+    #[arg(long, value_name = "PATH")]
+    pub out: Option<PathBuf>,
+    /// Only this branch, or the legs of this homotopy; may be given several times [default: everything]
+    #[arg(long, value_name = "NAME")]
+    pub branch: Vec<String>,
+    /// Leave out the profiles of cycles, which make up nearly all of a run
+    #[arg(long)]
+    pub no_profiles: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum ExportFormat {
+    /// A folder of tables with comma-separated values, every digit
+    Csv,
+    /// The same tables as Parquet files
+    Parquet,
+    /// One NetCDF-4 file with a group for each branch
+    Netcdf,
+}
+
+#[derive(Debug, Args)]
+pub struct ImportAuto {
+    /// Files s.NAME of AUTO; b.NAME and c.NAME beside or among them tell the names of states and parameters
+    #[arg(value_name = "FILE", required = true)]
+    pub files: Vec<PathBuf>,
+    /// Model of the same equations; without it the solutions are listed
+    #[arg(long, value_name = "MODEL.toml")]
+    pub model: Option<PathBuf>,
+    /// Only the solution with this label; may be given several times [default: all of them]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    pub label: Vec<i64>,
+    /// Which parameters of AUTO are which of the model's, where their names do not say it
+    #[arg(long, value_name = "1=NAME,...", value_delimiter = ',')]
+    pub parameters: Vec<String>,
+    /// Which states of AUTO are which of the model's, where neither their names nor their order say it
+    #[arg(long, value_name = "1=NAME,...", value_delimiter = ',')]
+    pub states: Vec<String>,
+    /// Study to write [default: NAME.toml, for the first s.NAME]
+    #[arg(short, long = "output", value_name = "STUDY.toml", requires = "model")]
+    pub output: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]

@@ -4,7 +4,9 @@ mod arguments;
 mod attractors;
 mod check;
 mod explore;
+mod export;
 mod failure;
+mod import_auto;
 mod plot;
 mod progress;
 mod reproduce;
@@ -33,6 +35,8 @@ fn answer(arguments: Arguments) -> Result<Outcome, Failure> {
         Some(Command::Table(typed)) => table::print(&typed),
         Some(Command::Verify(typed)) => verify::print(&typed),
         Some(Command::Plot(typed)) => plot::write(&typed),
+        Some(Command::Export(typed)) => export::write(&typed),
+        Some(Command::ImportAuto(typed)) => import_auto::answer(&typed),
         Some(Command::Attractors(typed)) => attractors::print(&typed),
         Some(Command::Check(typed)) => check::print(&typed),
         Some(Command::Reproduce(typed)) => reproduce::publication(&typed),

@@ -1,7 +1,7 @@
 //! What must hold for any input.
 //!
-//! **Idea.** Each property takes bytes and makes of them an input that is nearly right: a formula, a model file or a study
-//! file of this repository in which a few things were changed. It panics where something does not hold. The tests call it
+//! **Idea.** Each property takes bytes and makes of them an input that is nearly right: a formula, a model file, a study
+//! file or a file of AUTO-07p of this repository in which a few things were changed. It panics where something does not hold. The tests call it
 //! with the same random bytes every time; the fuzzer, in the folder `fuzz`, searches for bytes that reach new code.
 
 pub mod edits;

@@ -1,6 +1,8 @@
-//! Whatever a file holds: a model, a study, or mistakes with their places.
+//! Whatever a file holds: a model, a study, solutions of AUTO, or mistakes with their places.
 
 use foldline::contract::{Batch, Parameters, VectorField};
+use foldline::model::Model;
+use foldline_store::auto::{self, Chosen, Mapping, Names, solutions};
 use foldline_store::diagnostic::Diagnostic;
 use foldline_store::model_file::parse_model;
 use foldline_store::study_file::{Study, parse_study};
@@ -59,6 +61,33 @@ pub fn study(text: &str, model_text: &str) -> Option<Study> {
         }
     }
 }
+
+/// A text as a file of solutions of AUTO-07p is read or refused, at a place within it; what is read has as many states as it says. A
+/// solution that is read with a model makes a study that is right, or is refused with a reason. What was read, if it was.
+pub fn solution_file(text: &str, model: &Model) -> Option<usize> {
+    let found = match solutions(text, "s.auto") {
+        Ok(found) => found,
+        Err(found) => {
+            sound(&found, &[("s.auto", text)]);
+            return None;
+        }
+    };
+    let names = Names::of(text);
+    for solution in &found {
+        assert!(!solution.times.is_empty() && solution.states.len() == solution.times.len() * solution.dim());
+        let written = Mapping::new(model, &names, &[(1, "p1".to_string())], &[], solution.dim()).and_then(|mapping| {
+            auto::study(model, "m.toml", &[Chosen { file: "s.auto", solution, names: &names, mapping }])
+        });
+        match written {
+            Ok(text) => assert!(parse_study(&text, "s.toml", AUTO_MODEL, "m.toml").is_ok(), "{text}"),
+            Err(complaint) => assert!(!complaint.message.is_empty() && !complaint.hint.is_empty()),
+        }
+    }
+    Some(found.len())
+}
+
+/// The model of the files of AUTO-07p among the tests.
+pub const AUTO_MODEL: &str = include_str!("../../../models/ab-reaction.toml");
 
 /// The texts of the files in a folder of this repository and the folders in it.
 pub fn corpus(folder: &str) -> Vec<(PathBuf, String)> {

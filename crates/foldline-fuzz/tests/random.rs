@@ -45,3 +45,17 @@ fn study_files_are_read_or_refused_with_a_place() {
     }
     assert!(read > 150 && refused > 1000, "{read} {refused}");
 }
+
+#[test]
+fn files_of_auto_are_read_or_refused_with_a_place() {
+    let mut corpus = texts::corpus("crates/foldline-store/tests/auto");
+    corpus.retain(|(path, _)| path.file_name().is_some_and(|name| name.to_string_lossy().starts_with("s.")));
+    let model = foldline_store::model_file::parse_model(texts::AUTO_MODEL, "m.toml").expect("the model is right");
+    let (mut read, mut refused) = (0, 0);
+    for (stream, (_, text)) in (0..2000).zip(corpus.iter().cycle()) {
+        let data = bytes(stream, 600);
+        let Ok(text) = edited(&mut Unstructured::new(&data), text) else { continue };
+        *if texts::solution_file(&text, &model).is_some() { &mut read } else { &mut refused } += 1;
+    }
+    assert!(read > 100 && refused > 500, "{read} {refused}");
+}

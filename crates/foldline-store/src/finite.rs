@@ -30,6 +30,10 @@ pub(crate) fn check_seeds(
     for (span, seed) in seeds {
         let failing = match &seed.source {
             SeedSource::State(state) => not_finite(model, state, &seed.parameters).map(|c| (c, state.clone())),
+            SeedSource::Cycle(cycle) => {
+                let state = &cycle.profile[..cycle.dim()];
+                not_finite(model, state, &seed.parameters).map(|c| (c, state.to_vec()))
+            }
             SeedSource::Attractor(_) => failing_everywhere(model, &seed.parameters),
         };
         let Some((component, state)) = failing else { continue };

@@ -312,8 +312,9 @@ fn numbers_can_be_read_by_name_without_this_program() {
     assert_eq!(row, (3.0 / 7.0, 0.0, 1.0 / 3.0, 1));
 }
 
-/// Makes a file of version 3 of one of version 4 to 6, then one of version 2.
+/// Makes a file of version 3 of one of version 4 to 7, then one of version 2.
 const WITHOUT_COUNTERS: &str = "
+    ALTER TABLE points DROP COLUMN average_bytes; ALTER TABLE special_points DROP COLUMN average_bytes;
     ALTER TABLE points DROP COLUMN forcing_periods; ALTER TABLE special_points DROP COLUMN forcing_periods;
     ALTER TABLE special_points DROP COLUMN normal_form;
     ALTER TABLE points DROP COLUMN numbers_checksum; ALTER TABLE points DROP COLUMN solution_checksum;
@@ -332,6 +333,7 @@ fn without_counters(mut diagram: Diagram) -> Diagram {
         for point in branch.points.iter_mut().chain(special) {
             (point.cost.evaluations, point.cost.linearisations) = (0, 0);
             point.trust.spectrum = f64::NAN;
+            point.averages.clear();
         }
     }
     diagram

@@ -15,9 +15,12 @@ mod reader;
 mod responses;
 mod rows;
 mod schema;
+mod stream;
 mod writer;
 
-pub use reader::{Part, Recorded, load, load_part};
+pub use reader::{Part, Reading, Recorded, load, load_part};
+pub(crate) use schema::{Columns, free_name};
+pub use stream::Extent;
 pub use writer::Recorder;
 
 use std::fmt;

@@ -47,6 +47,8 @@ const LATER_NUMBERS: &str = ", evaluations, linearisations";
 const CHECKED_NUMBERS: &str = ", numbers_checksum";
 /// Likewise, since format 6.
 const FORCED_NUMBERS: &str = ", forcing_periods";
+/// Likewise, since format 7.
+const AVERAGES: &str = ", average_bytes";
 const OF_SPECIAL: &str = "kind, unstable_before, unstable_after";
 
 /// Reads the run in `folder`, which may still be growing.
@@ -56,43 +58,70 @@ pub fn load(folder: &Path) -> Result<Recorded, RunFileError> {
 
 /// Like [`load`], but only as much as is asked for.
 pub fn load_part(folder: &Path, part: Part) -> Result<Recorded, RunFileError> {
-    let path = path_in(folder);
-    if !path.exists() {
-        return Err(RunFileError::Missing(path));
-    }
-    let connection = match open(&path, false)? {
-        Open::Run(connection) => connection,
-        Open::Empty => return Err(RunFileError::Damaged(path, "it is empty".to_string())),
-    };
-    let failed = |e| RunFileError::from_sqlite(&path, e);
+    let reading = Reading::open(folder)?;
     if part == Part::Everything {
-        sound(&connection, &path)?;
+        sound(&reading.connection, &reading.path)?;
     }
-    // One transaction, so that a run that is still growing is seen at one instant.
-    connection.execute_batch("BEGIN").map_err(failed)?;
-    let text = |key: &str| -> Result<String, RunFileError> {
-        connection.query_row("SELECT value FROM meta WHERE key = ?", [key], |row| row.get(0)).map_err(failed)
-    };
-    // Files of versions before 4 have none.
-    if let Ok(stated) = text("texts_checksum")
-        && stated != texts_checksum(&text("study")?, &text("model")?)
-    {
-        return Err(RunFileError::Damaged(path, "study and model do not have their checksum".to_string()));
+    reading.recorded(part)
+}
+
+/// A run file as it is at one instant, though the run may go on.
+pub struct Reading {
+    pub(super) connection: Connection,
+    pub(super) path: PathBuf,
+}
+
+impl Reading {
+    /// Opens the run in `folder`.
+    ///
+    /// # Errors
+    /// If there is none, or it cannot be read.
+    pub fn open(folder: &Path) -> Result<Reading, RunFileError> {
+        let path = path_in(folder);
+        if !path.exists() {
+            return Err(RunFileError::Missing(path));
+        }
+        let connection = match open(&path, false)? {
+            Open::Run(connection) => connection,
+            Open::Empty => return Err(RunFileError::Damaged(path, "it is empty".to_string())),
+        };
+        // One transaction, so that a run that is still growing is seen at one instant.
+        connection.execute_batch("BEGIN").map_err(|e| RunFileError::from_sqlite(&path, e))?;
+        Ok(Reading { connection, path })
     }
-    let notes = {
-        let mut statement = connection.prepare("SELECT branch, note FROM notes ORDER BY rowid").map_err(failed)?;
-        let rows = statement.query_map([], |row| Ok((row.get(0)?, row.get(1)?))).map_err(failed)?;
-        rows.collect::<Result<_, _>>().map_err(failed)?
-    };
-    Ok(Recorded {
-        study_file: text("study_file")?,
-        study_text: text("study")?,
-        model_file: text("model_file")?,
-        model_text: text("model")?,
-        diagram: load_diagram(&connection, &path, part)?,
-        notes,
-        path: path.clone(),
-    })
+
+    /// The run, or as much of it as is asked for.
+    ///
+    /// # Errors
+    /// If the file cannot be read, or contradicts itself.
+    pub fn recorded(&self, part: Part) -> Result<Recorded, RunFileError> {
+        let Reading { connection, path } = self;
+        let failed = |e| RunFileError::from_sqlite(path, e);
+        let text = |key: &str| -> Result<String, RunFileError> {
+            connection.query_row("SELECT value FROM meta WHERE key = ?", [key], |row| row.get(0)).map_err(failed)
+        };
+        // Files of versions before 4 have none.
+        if let Ok(stated) = text("texts_checksum")
+            && stated != texts_checksum(&text("study")?, &text("model")?)
+        {
+            let what = "study and model do not have their checksum".to_string();
+            return Err(RunFileError::Damaged(path.clone(), what));
+        }
+        let notes = {
+            let mut statement = connection.prepare("SELECT branch, note FROM notes ORDER BY rowid").map_err(failed)?;
+            let rows = statement.query_map([], |row| Ok((row.get(0)?, row.get(1)?))).map_err(failed)?;
+            rows.collect::<Result<_, _>>().map_err(failed)?
+        };
+        Ok(Recorded {
+            study_file: text("study_file")?,
+            study_text: text("study")?,
+            model_file: text("model_file")?,
+            model_text: text("model")?,
+            diagram: load_diagram(connection, path, part)?,
+            notes,
+            path: path.clone(),
+        })
+    }
 }
 
 /// A file that was opened.
@@ -159,7 +188,9 @@ pub(super) fn load_diagram(connection: &Connection, path: &Path, part: Part) -> 
                 .pragma_query_value(None, "user_version", |row| row.get(0))
                 .map_err(|error| RunFileError::from_sqlite(path, error))?;
             let since = |format: i64, own: &'static str| if version < format { "" } else { own };
-            let later = [since(3, LATER_NUMBERS), since(4, CHECKED_NUMBERS), since(6, FORCED_NUMBERS)].concat();
+            let later =
+                [since(3, LATER_NUMBERS), since(4, CHECKED_NUMBERS), since(6, FORCED_NUMBERS), since(7, AVERAGES)]
+                    .concat();
             let numbers = format!("{NUMBERS}{later}");
             (numbers.clone(), format!("{numbers}, {OF_SPECIAL}"))
         }
@@ -216,7 +247,7 @@ fn branch_in(row: &Row) -> Result<Branch, String> {
     Ok(Branch { held: held_in(row)?, ..Branch::new(name, family, free, origin_in(row)?) })
 }
 
-fn special_in(row: &Row) -> Result<SpecialPoint, String> {
+pub(super) fn special_in(row: &Row) -> Result<SpecialPoint, String> {
     let (point, extra) = point_in(row)?;
     let count = |name: &str| {
         row.get::<_, i64>(name).ok().and_then(|n| usize::try_from(n).ok()).ok_or_else(|| format!("{name} is no count"))

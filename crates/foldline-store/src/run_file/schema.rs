@@ -3,15 +3,15 @@
 use foldline::model::Model;
 
 /// The columns of a model that the tables show by name.
-pub(super) struct Columns {
+pub(crate) struct Columns {
     /// Every parameter.
-    pub(super) parameters: Vec<String>,
+    pub(crate) parameters: Vec<String>,
     /// `NAME_min`, `NAME_max` of every state, then of every output.
-    pub(super) ranges: Vec<String>,
+    pub(crate) ranges: Vec<String>,
 }
 
 impl Columns {
-    pub(super) fn new(model: &Model) -> Columns {
+    pub(crate) fn new(model: &Model) -> Columns {
         let own: Vec<&str> = POINT_COLUMNS.iter().map(|(name, _)| *name).chain(OTHERS).collect();
         Columns::beside(model, &own)
     }
@@ -19,17 +19,7 @@ impl Columns {
     /// The columns of a model in a table that has the columns `fixed` besides.
     pub(super) fn beside(model: &Model, fixed: &[&str]) -> Columns {
         let mut taken: Vec<String> = fixed.iter().map(|s| s.to_string()).collect();
-        // SQLite does not tell capitals from small letters in column names: of K and k the later becomes k_2.
-        let mut unique = |name: String| {
-            let mut candidate = name.clone();
-            let mut count = 2;
-            while taken.contains(&candidate.to_lowercase()) {
-                candidate = format!("{name}_{count}");
-                count += 1;
-            }
-            taken.push(candidate.to_lowercase());
-            candidate
-        };
+        let mut unique = |name: String| free_name(name, &mut taken);
         let parameters = model.parameters.iter().map(|p| unique(p.name.clone())).collect();
         let ranged = model.states.iter().map(|s| &s.name).chain(model.outputs.iter().map(|o| &o.name));
         let ranges = ranged.flat_map(|name| [format!("{name}_min"), format!("{name}_max")]).map(&mut unique).collect();
@@ -37,9 +27,23 @@ impl Columns {
     }
 
     /// All of them, in the order of the tables.
-    pub(super) fn names(&self) -> impl Iterator<Item = &String> {
+    pub(crate) fn names(&self) -> impl Iterator<Item = &String> {
         self.parameters.iter().chain(&self.ranges)
     }
+}
+
+/// The name, or where it is taken `NAME_2` or `NAME_3` and so on, which is then taken too.
+///
+/// SQLite does not tell capitals from small letters in column names: of K and k the later becomes k_2.
+pub(crate) fn free_name(name: String, taken: &mut Vec<String>) -> String {
+    let mut candidate = name.clone();
+    let mut count = 2;
+    while taken.contains(&candidate.to_lowercase()) {
+        candidate = format!("{name}_{count}");
+        count += 1;
+    }
+    taken.push(candidate.to_lowercase());
+    candidate
 }
 
 /// Names that the two tables of points have besides those of [`POINT_COLUMNS`], and one that SQLite has in every table.

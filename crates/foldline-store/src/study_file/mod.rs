@@ -9,6 +9,7 @@ mod curves;
 mod explorations;
 mod homotopies;
 mod items;
+mod profiles;
 mod responses;
 mod seeds;
 
@@ -121,7 +122,7 @@ fn parse(
     if let Some(value) = root.get("parameters") {
         override_parameters(&mut walk, value, &model, &mut defaults);
     }
-    let seeds = seeds::read(&mut walk, &root, &model, &defaults);
+    let seeds = seeds::read(&mut walk, &root, &model, &defaults, degree);
     let Items { branches, curves, homotopies } = items::read(&mut walk, &root, &model, &seeds);
     let items = branches.iter().map(|b| &b.name).chain(curves.iter().map(|c| &c.name));
     let items = items.chain(homotopies.iter().map(|h| &h.name)).map(String::as_str);
@@ -242,6 +243,7 @@ mod tests {
         };
         assert_eq!(keys("/properties"), sorted(&ROOT_KEYS));
         assert_eq!(keys("/$defs/seed/properties"), sorted(&seeds::KEYS));
+        assert_eq!(keys("/$defs/seed/properties/cycle/properties"), sorted(&profiles::KEYS));
         assert_eq!(keys("/$defs/branch/properties"), sorted(&branches::KEYS));
         assert_eq!(keys("/$defs/curve/properties"), sorted(&curves::KEYS));
         assert_eq!(keys("/$defs/homotopy/properties"), sorted(&homotopies::KEYS));

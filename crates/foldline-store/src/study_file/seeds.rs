@@ -1,5 +1,6 @@
 //! `[[seed]]`: first solutions.
 
+use super::profiles::cycle;
 use super::{override_parameters, unique_name};
 use crate::nearest::suggest;
 use crate::toml_walk::{Value, Walk};
@@ -9,13 +10,20 @@ use foldline::model::Model;
 use std::ops::Range;
 use toml::de::DeTable;
 
-pub(super) const KEYS: [&str; 7] = ["name", "description", "attractor", "state", "parameters", "samples", "random"];
+pub(super) const KEYS: [&str; 8] =
+    ["name", "description", "attractor", "state", "cycle", "parameters", "samples", "random"];
 const SAMPLES: usize = 128;
 const RANDOM: u64 = 1;
 
 /// Every seed with its place in the text. A seed in which something is wrong is kept as far as it goes, so that branches
 /// that start from it are not complained about a second time.
-pub(super) fn read(walk: &mut Walk, root: &DeTable, model: &Model, defaults: &[f64]) -> Vec<(Range<usize>, SeedPlan)> {
+pub(super) fn read(
+    walk: &mut Walk,
+    root: &DeTable,
+    model: &Model,
+    defaults: &[f64],
+    degree: usize,
+) -> Vec<(Range<usize>, SeedPlan)> {
     let mut seeds: Vec<(Range<usize>, SeedPlan)> = Vec::new();
     for (span, table) in walk.tables(root, "seed") {
         walk.only(table, &KEYS, "a seed");
@@ -25,7 +33,7 @@ pub(super) fn read(walk: &mut Walk, root: &DeTable, model: &Model, defaults: &[f
         if let Some(value) = table.get("parameters") {
             override_parameters(walk, value, model, &mut parameters);
         }
-        let source = source(walk, table, &span, model);
+        let source = source(walk, table, &span, model, degree);
         let samples = table.get("samples").and_then(|v| walk.integer(v, "`samples`", 1..=1_000_000));
         let random = table.get("random").and_then(|v| walk.integer(v, "`random`", 0..=u64::MAX));
         let samples = samples.map_or(SAMPLES, |n| n as usize);
@@ -34,20 +42,26 @@ pub(super) fn read(walk: &mut Walk, root: &DeTable, model: &Model, defaults: &[f
     seeds
 }
 
-fn source(walk: &mut Walk, table: &DeTable, span: &Range<usize>, model: &Model) -> SeedSource {
+fn source(walk: &mut Walk, table: &DeTable, span: &Range<usize>, model: &Model, degree: usize) -> SeedSource {
     let fallback = SeedSource::Attractor(AttractorKey::Equilibrium);
-    let found = match (table.get("attractor"), table.get("state")) {
-        (Some(value), None) => attractor(walk, value, model).map(SeedSource::Attractor),
-        (None, Some(value)) => state(walk, value, model).map(SeedSource::State),
-        (Some(value), Some(_)) => {
+    let found = match (table.get("attractor"), table.get("state"), table.get("cycle")) {
+        (Some(value), None, None) => attractor(walk, value, model).map(SeedSource::Attractor),
+        (None, Some(value), None) => state(walk, value, model).map(SeedSource::State),
+        (None, None, Some(value)) => cycle(walk, value, model, degree).map(SeedSource::Cycle),
+        (None, None, None) => {
+            let hint =
+                "add `attractor = \"equilibrium\"`, `\"cycle\"` or a ratio such as `\"2:1\"`, or `state = { … }`";
+            walk.report(span.clone(), "this seed does not say which solution it means", hint);
+            None
+        }
+        (Some(value), Some(_), _) => {
             let message = "this seed has both an `attractor` and a `state`";
             walk.report(value.span(), message, "keep one: an attractor is searched for, a state is settled from");
             None
         }
-        (None, None) => {
-            let hint =
-                "add `attractor = \"equilibrium\"`, `\"cycle\"` or a ratio such as `\"2:1\"`, or `state = { … }`";
-            walk.report(span.clone(), "this seed does not say which solution it means", hint);
+        (_, _, Some(value)) => {
+            let message = "this seed has a `cycle` and something else besides";
+            walk.report(value.span(), message, "keep one of `cycle`, `attractor` and `state`");
             None
         }
     };

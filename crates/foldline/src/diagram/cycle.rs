@@ -23,6 +23,34 @@ pub struct Cycle {
 }
 
 impl Cycle {
+    /// The cycle through given states: `times` `[K]` in normalised time from 0 to 1, `states` `[K][n]`. `through` steps of time
+    /// make a mesh interval, on which the polynomial of that degree through its `through + 1` states is taken; of the last
+    /// state, at time 1, only the polynomial knows. Stored in polynomials of degree `degree`.
+    ///
+    /// `None` unless the times increase from 0 to 1, K - 1 is a multiple of `through`, and there is a state for each.
+    pub fn given(period: f64, times: &[f64], states: &[f64], through: usize, degree: usize) -> Option<Cycle> {
+        let (&first, &last) = times.first().zip(times.last())?;
+        let increase = times.windows(2).all(|pair| pair[0] < pair[1]);
+        let n = states.len() / times.len();
+        let whole = through > 0 && times.len() > through && (times.len() - 1).is_multiple_of(through);
+        if !increase || first != 0.0 || last != 1.0 || n == 0 || states.len() != n * times.len() || !whole {
+            return None;
+        }
+        let scheme = Scheme::new(degree);
+        let mut profile = Vec::with_capacity(times.len().div_ceil(through) * (degree + 1) * n);
+        for (interval, nodes) in times[..times.len() - 1].chunks_exact(through).enumerate() {
+            let start = interval * through;
+            let ends = [nodes[0], times[start + through]];
+            for c in &scheme.nodes {
+                let weights = lagrange(&times[start..=start + through], ends[0] + c * (ends[1] - ends[0]));
+                let value = |i: usize| (0..=through).map(|k| weights[k] * states[(start + k) * n + i]).sum::<f64>();
+                profile.extend((0..n).map(value));
+            }
+        }
+        let mesh: Vec<f64> = times.iter().copied().step_by(through).collect();
+        Some(Cycle { period, forcing_periods: 0, mesh: mesh.into(), degree: scheme.degree, profile })
+    }
+
     /// N.
     pub fn intervals(&self) -> usize {
         self.mesh.len().saturating_sub(1)
@@ -60,4 +88,10 @@ impl Cycle {
         let block = (self.degree + 1) * n;
         scheme.value_into(s, &self.profile[j * block..(j + 1) * block], x);
     }
+}
+
+/// The polynomials that are 1 at one of the nodes and 0 at the others, at `t`.
+fn lagrange(nodes: &[f64], t: f64) -> Vec<f64> {
+    let others = |k: usize| nodes.iter().enumerate().filter(move |(l, _)| *l != k);
+    (0..nodes.len()).map(|k| others(k).map(|(_, other)| (t - other) / (nodes[k] - other)).product()).collect()
 }

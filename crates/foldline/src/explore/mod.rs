@@ -25,6 +25,7 @@ pub mod curves;
 mod diagnosis;
 mod discovery;
 pub mod family;
+pub mod given;
 pub mod growth;
 pub mod homotopy;
 pub mod known;
@@ -38,6 +39,7 @@ pub mod system;
 #[cfg(test)]
 mod tests;
 
+pub use given::mismatch;
 pub use persistence::{Persistence, persistence};
 pub use plan::{
     AttractorKey, BranchPlan, CurvePlan, ExplorePlan, HomotopyPlan, Plan, SeedPlan, SeedSource, Start, SurveyPlan,

@@ -1,6 +1,6 @@
 //! What a study asks for, in terms of the model.
 
-use crate::diagram::Kind;
+use crate::diagram::{Cycle, Kind};
 use crate::special::mark::Mark;
 
 /// Which attractor a seed means, among those reached until every type was found that the seeds with the same sample ask for
@@ -22,6 +22,8 @@ pub enum SeedSource {
     Attractor(AttractorKey),
     /// Settled (or polished) from this state `[n]`.
     State(Vec<f64>),
+    /// Polished from this cycle.
+    Cycle(Cycle),
 }
 
 /// A first solution.

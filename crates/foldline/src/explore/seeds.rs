@@ -6,11 +6,12 @@
 
 use super::System;
 use super::diagnosis::{Seen, of_no_start};
+use super::given::from_cycle;
 use super::growth::{polished, problem_of, setting, settings};
 use super::plan::{AttractorKey, Plan, SeedPlan, SeedSource, Start};
 use crate::attractors::{self, Attractor, Candidate, Census, Lost, Sampling};
-use crate::continuation::Settings;
 use crate::continuation::corrector::{Plane, correct, parameter_row};
+use crate::continuation::{Failure, Settings};
 use crate::contract::{Event, Examination, Observer};
 use crate::diagram::{Cost, Cycle, Diagram, Point, Solution};
 use crate::linalg::max_abs;
@@ -49,6 +50,9 @@ pub fn find(system: &System, plan: &Plan, jobs: usize, earlier: &Diagram, observ
         observer.observe(Event::Note(&plan.seeds[*index].name, &summary(census)));
     }
     let found = |seed: &SeedPlan| match &seed.source {
+        SeedSource::Cycle(cycle) => {
+            from_cycle(system, seed, plan.tolerance, cycle).map(|p| with_degree(p, plan.degree))
+        }
         SeedSource::State(state) => from_state(system, seed, plan, state, jobs).map(|p| with_degree(p, plan.degree)),
         SeedSource::Attractor(key) => match censuses.iter().find(|(other, _)| share(&plan.seeds[*other], seed)) {
             Some((_, census)) => chosen(census, key)
@@ -84,7 +88,7 @@ fn censuses(system: &System, plan: &Plan, jobs: usize, needed: &[bool]) -> Vec<(
         let seed = &plan.seeds[index];
         let keys = plan.seeds.iter().filter(|other| share(other, seed)).filter_map(|other| match &other.source {
             SeedSource::Attractor(key) => Some(key),
-            SeedSource::State(_) => None,
+            SeedSource::State(_) | SeedSource::Cycle(_) => None,
         });
         let keys: Vec<&AttractorKey> = keys.collect();
         let sampling = sampling(system, seed.samples, seed.random, jobs, plan.tolerance);
@@ -153,16 +157,21 @@ fn polish(system: &System, parameters: &[f64], tolerance: f64, candidate: &Candi
             Solution::Cycle(cycle)
         }
     };
-    let mut guess = bare(parameters, solution);
+    let guess = near(system, 4, &settings, bare(parameters, solution)).ok()?;
     let mut problem = problem_of(system, free, 4, &guess, false);
-    // Coarsely first, on the mesh as it is: a candidate that is not close to a solution is not worth a finer one.
+    polished(&mut *problem, &settings, &guess).ok().map(|found| found.point)
+}
+
+/// A solution near a candidate, coarsely and on its mesh as it is: a candidate that is not close to one is not worth a finer mesh.
+pub(super) fn near(system: &System, degree: usize, settings: &Settings, mut guess: Point) -> Result<Point, Failure> {
+    let mut problem = problem_of(system, 0, degree, &guess, false);
     let coarse = Settings { tolerance: 1e-2, max_newton: 6, ..settings.clone() };
     let mut u = problem.unknowns_of(&guess);
     problem.anchor(&u);
     let plane = Plane { row: parameter_row(u.len()), base: u.clone(), distance: 0.0 };
-    correct(&mut *problem, &coarse, &plane, &mut u, &mut Cost::default()).ok()?;
+    correct(&mut *problem, &coarse, &plane, &mut u, &mut Cost::default())?;
     guess.solution = problem.point(&u, &[], Examination::default()).solution;
-    polished(&mut *problem, &settings, &guess).ok().map(|found| found.point)
+    Ok(guess)
 }
 
 /// A point about which nothing but the solution is known.

@@ -1,0 +1,182 @@
+//! `foldline import-auto`: the solutions in files of AUTO-07p as a table, or as a study that starts from them.
+
+use crate::arguments::{Format, ImportAuto as Typed};
+use crate::failure::{Failure, Outcome};
+use crate::table::{Cell, Column, Style, Table, write as write_table};
+use foldline_store::auto::{Chosen, Complaint, Labelled, Mapping, Names, read_solutions, study};
+use foldline_store::model_file::read_model;
+use foldline_store::study_file::parse_study;
+use std::io::{Write, stderr, stdout};
+use std::path::{Path, PathBuf};
+
+/// A file of solutions, and what the files beside it tell.
+struct Source {
+    path: PathBuf,
+    solutions: Vec<Labelled>,
+    names: Names,
+}
+
+/// Lists the solutions, or writes a study.
+pub fn answer(typed: &Typed) -> Result<Outcome, Failure> {
+    let sources = sources(&typed.files)?;
+    let chosen = chosen(&sources, &typed.label)?;
+    match &typed.model {
+        Some(model) => written(typed, model, &chosen),
+        None => {
+            let mut out = stdout().lock();
+            write_table(&listed(&chosen), Format::Text, &mut out)?;
+            Ok(Outcome::Done)
+        }
+    }
+}
+
+/// Each file of solutions with the names from files that were given, or that lie beside it.
+fn sources(files: &[PathBuf]) -> Result<Vec<Source>, Failure> {
+    let (named, solved): (Vec<&PathBuf>, Vec<&PathBuf>) =
+        files.iter().partition(|file| begins(file, &["b.", "c.", "fort.7", "fort.2"]));
+    if solved.is_empty() {
+        return Err(Failure::typed(
+            "no file of solutions was given",
+            "give s.NAME, or fort.8; b.NAME and c.NAME only tell names",
+        ));
+    }
+    let mut given = Names::default();
+    for file in named {
+        let text = std::fs::read_to_string(file).map_err(|error| {
+            Failure::typed(format!("{} cannot be read: {error}", file.display()), "check the spelling of the path")
+        })?;
+        given = given.or(Names::of(&text));
+    }
+    let source = |file: &PathBuf| {
+        let beside = |prefix: &str| {
+            let name = file.file_name()?.to_str()?.strip_prefix("s.")?;
+            std::fs::read_to_string(file.with_file_name(format!("{prefix}{name}"))).ok()
+        };
+        let beside = ["c.", "b."].into_iter().filter_map(beside).map(|text| Names::of(&text));
+        let names = beside.fold(given.clone(), Names::or);
+        Ok(Source { path: file.clone(), solutions: read_solutions(file)?, names })
+    };
+    solved.into_iter().map(source).collect()
+}
+
+fn begins(file: &Path, prefixes: &[&str]) -> bool {
+    let name = file.file_name().unwrap_or_default().to_string_lossy();
+    prefixes.iter().any(|prefix| name.starts_with(prefix))
+}
+
+/// The solutions with these labels, all where there are none.
+fn chosen<'s>(sources: &'s [Source], labels: &[i64]) -> Result<Vec<(&'s Source, &'s Labelled)>, Failure> {
+    let all: Vec<_> = sources.iter().flat_map(|source| source.solutions.iter().map(move |s| (source, s))).collect();
+    if let Some(label) = labels.iter().find(|label| all.iter().all(|(_, s)| s.label != **label)) {
+        let there: Vec<String> = all.iter().map(|(_, s)| s.label.to_string()).collect();
+        let message = format!("--label {label}: there is no solution with this label");
+        return Err(Failure::typed(message, format!("one of {}", there.join(", "))));
+    }
+    Ok(all.into_iter().filter(|(_, s)| labels.is_empty() || labels.contains(&s.label)).collect())
+}
+
+/// label, what it is, the free parameters, period, mesh.
+fn listed(chosen: &[(&Source, &Labelled)]) -> Table {
+    let column = |name: &str, style: Style| Column { name: name.to_string(), style };
+    let mut free: Vec<(usize, String)> = Vec::new();
+    for (source, solution) in chosen {
+        // The period has a column of its own.
+        for number in solution.free.iter().filter(|number| **number != 11) {
+            let name = source.names.parameters.iter().find(|(n, _)| n == number);
+            free.push((*number, name.map_or_else(|| format!("PAR({number})"), |(_, name)| name.clone())));
+        }
+    }
+    free.sort();
+    free.dedup();
+    let mut columns =
+        vec![column("file", Style::Word), column("branch", Style::Number), column("label", Style::Number)];
+    columns.extend(["type", "kind", "solution"].map(|name| column(name, Style::Word)));
+    columns.extend(free.iter().map(|(_, name)| column(name, Style::Number)));
+    columns.extend(["period", "states", "NTST", "NCOL"].map(|name| column(name, Style::Number)));
+    let count = |n: usize| Cell::Count(n as i64);
+    let row = |(source, solution): &(&Source, &Labelled)| {
+        let (letters, kind) = solution.named().unwrap_or_default();
+        let word = |text: &str| if text.is_empty() { Cell::Empty } else { Cell::Word(text.to_string()) };
+        let mut row = vec![
+            Cell::Word(source.path.display().to_string()),
+            Cell::Count(solution.branch),
+            Cell::Count(solution.label),
+            word(letters),
+            word(kind),
+            word(if solution.lasts() { "cycle" } else { "equilibrium" }),
+        ];
+        let value = |number: usize| solution.parameters.get(number - 1).map_or(Cell::Empty, |v| Cell::Number(*v));
+        row.extend(free.iter().map(|(number, _)| value(*number)));
+        row.push(solution.period().map_or(Cell::Empty, Cell::Number));
+        row.push(count(solution.dim()));
+        let mesh = [solution.intervals, solution.degree];
+        row.extend(mesh.map(|n| if solution.lasts() { count(n) } else { Cell::Empty }));
+        row
+    };
+    Table { columns, rows: chosen.iter().map(row).collect() }
+}
+
+fn written(typed: &Typed, model_path: &Path, chosen: &[(&Source, &Labelled)]) -> Result<Outcome, Failure> {
+    let (model, model_text) = read_model(model_path)?;
+    let parameters = assignments("parameters", &typed.parameters)?;
+    let states = assignments("states", &typed.states)?;
+    let files: Vec<String> = chosen.iter().map(|(source, _)| source.path.display().to_string()).collect();
+    let mut all = Vec::new();
+    for ((source, solution), file) in chosen.iter().zip(&files) {
+        let mapping = Mapping::new(&model, &source.names, &parameters, &states, solution.dim())?;
+        all.push(Chosen { file, solution, names: &source.names, mapping });
+    }
+    let output = typed.output.clone().unwrap_or_else(|| PathBuf::from(format!("{}.toml", stem(&files[0]))));
+    if output.exists() && typed.output.is_none() {
+        let message = format!("{} exists already", output.display());
+        return Err(Failure::typed(message, "name the study with `--output`, which is then replaced"));
+    }
+    let text = study(&model, &named_from(&output, model_path)?, &all)?;
+    // What is written can be read, or something is wrong that the user should see now.
+    parse_study(&text, &output.display().to_string(), &model_text, &model_path.display().to_string())?;
+    std::fs::write(&output, text).map_err(|error| {
+        Failure::typed(
+            format!("{} cannot be written: {error}", output.display()),
+            "a file in a folder you may write to",
+        )
+    })?;
+    writeln!(
+        stderr(),
+        "written: {} with {}",
+        output.display(),
+        if all.len() == 1 { "1 seed".into() } else { format!("{} seeds", all.len()) }
+    )?;
+    writeln!(stderr(), "next: foldline run {}", output.display())?;
+    Ok(Outcome::Done)
+}
+
+fn stem(file: &str) -> String {
+    let name = Path::new(file).file_name().unwrap_or_default().to_string_lossy().into_owned();
+    name.strip_prefix("s.").unwrap_or(&name).to_string()
+}
+
+/// The path of the model as a study at `output` has to name it.
+fn named_from(output: &Path, model: &Path) -> Result<String, Failure> {
+    let beside = output.parent().is_none_or(|folder| folder.as_os_str().is_empty());
+    let path = if beside || model.is_absolute() { model.to_path_buf() } else { std::path::absolute(model)? };
+    Ok(path.display().to_string())
+}
+
+/// `1=p1` and so on.
+fn assignments(option: &str, typed: &[String]) -> Result<Vec<(usize, String)>, Failure> {
+    let one = |text: &String| {
+        let (number, name) = text.split_once('=')?;
+        Some((number.trim().parse().ok().filter(|n| *n > 0)?, name.trim().to_string()))
+    };
+    let pairs = typed.iter().map(|text| {
+        let cure = format!("AUTO's number, `=` and the name in the model, as in --{option} 1=mu,2=nu");
+        one(text).ok_or_else(|| Failure::typed(format!("--{option} {text}: this is no pair"), cure))
+    });
+    pairs.collect()
+}
+
+impl From<Complaint> for Failure {
+    fn from(complaint: Complaint) -> Failure {
+        Failure::typed(complaint.message, complaint.hint)
+    }
+}

@@ -1,0 +1,152 @@
+//! A run for other programs: CSV, Parquet, NetCDF.
+//!
+//! **Idea.** What is written follows from the `columns`, which all formats share: the same names, units and descriptions. The
+//! points of a branch pass one after the other ([`Reading::each_point`]), so that no run is too long. CSV and Parquet have a
+//! file for each table (`tables`); NetCDF has a group for each branch (`netcdf`), in a file whose places are laid out
+//! before any number is written ([`hdf5`]). Everything is described in docs/book/exports.md.
+//!
+//! **Departures.** A file is written under another name, and takes its own when it is complete.
+
+mod cells;
+mod columns;
+mod csv;
+mod groups;
+pub mod hdf5;
+mod netcdf;
+mod parquet;
+mod tables;
+
+use crate::diagnostic::Diagnostic;
+use crate::order::{names, ordered};
+use crate::run_file::{Part, Reading, RunFileError};
+use crate::study_file::{Study, parse_study};
+use foldline::diagram::{Branch, Diagram};
+use std::fmt;
+use std::fs::File;
+use std::path::{Path, PathBuf};
+
+/// What is written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// A folder of files with comma-separated values.
+    Csv,
+    /// A folder of Parquet files.
+    Parquet,
+    /// One NetCDF-4 file.
+    NetCdf,
+}
+
+/// Why a run could not be exported.
+#[derive(Debug)]
+pub enum ExportError {
+    /// The run could not be read.
+    Run(RunFileError),
+    /// Study or model within the run make no sense.
+    Study(Vec<Diagnostic>),
+    /// The file or folder cannot be written.
+    Output(PathBuf, std::io::Error),
+}
+
+impl From<RunFileError> for ExportError {
+    fn from(error: RunFileError) -> ExportError {
+        ExportError::Run(error)
+    }
+}
+
+impl fmt::Display for ExportError {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        match self {
+            ExportError::Run(error) => write!(f, "{error}"),
+            ExportError::Study(found) => {
+                found.iter().enumerate().try_for_each(|(k, d)| write!(f, "{}{d}", if k > 0 { "\n\n" } else { "" }))
+            }
+            ExportError::Output(path, error) => write!(
+                f,
+                "{} cannot be written: {error}\n  help: make room there, or choose another place with `--out PATH`",
+                path.display()
+            ),
+        }
+    }
+}
+
+impl std::error::Error for ExportError {}
+
+/// A run that is to be exported.
+pub struct Export {
+    reading: Reading,
+    study: Study,
+    /// What is exported, in the order in which it is listed: branches with their special points and ends, without points.
+    pub diagram: Diagram,
+    /// Whether the profiles of cycles are exported too.
+    pub profiles: bool,
+}
+
+impl Export {
+    /// Opens the run in a folder and has the whole file checked.
+    ///
+    /// # Errors
+    /// If it cannot be read.
+    pub fn open(folder: &Path) -> Result<Export, ExportError> {
+        let reading = Reading::open(folder)?;
+        reading.sound()?;
+        let run = reading.recorded(Part::Special)?;
+        let study = parse_study(&run.study_text, &run.study_file, &run.model_text, &run.model_file);
+        let study = study.map_err(ExportError::Study)?;
+        let diagram = ordered(run.diagram, &names(&study.plan));
+        Ok(Export { reading, study, diagram, profiles: true })
+    }
+
+    /// Leaves out all branches but those for which `kept` holds, and what was found by simulation.
+    pub fn keep(&mut self, kept: impl Fn(&Branch) -> bool) {
+        self.diagram.branches.retain(|branch| kept(branch));
+        self.diagram.responses.clear();
+    }
+
+    /// Writes to a folder, which is made where it does not exist, or to a file. Returns the files written.
+    ///
+    /// # Errors
+    /// If the run cannot be read, or `out` cannot be written.
+    pub fn write(&self, format: Format, out: &Path) -> Result<Vec<PathBuf>, ExportError> {
+        let folder = if format == Format::NetCdf { out.parent().unwrap_or(Path::new("")) } else { out };
+        if !folder.as_os_str().is_empty() {
+            std::fs::create_dir_all(folder).map_err(|error| ExportError::Output(folder.to_path_buf(), error))?;
+        }
+        match format {
+            Format::Csv => tables::write(self, out, &csv::begin),
+            Format::Parquet => tables::write(self, out, &parquet::begin),
+            Format::NetCdf => netcdf::write(self, out),
+        }
+    }
+}
+
+/// A file that gets its name when it is complete.
+struct Growing {
+    path: PathBuf,
+    meanwhile: PathBuf,
+}
+
+impl Growing {
+    fn create(path: &Path) -> Result<(Growing, File), ExportError> {
+        let mut name = path.file_name().unwrap_or_default().to_os_string();
+        name.push(".part");
+        let growing = Growing { path: path.to_path_buf(), meanwhile: path.with_file_name(name) };
+        let file = File::create(&growing.meanwhile).map_err(|error| growing.failed(error))?;
+        Ok((growing, file))
+    }
+
+    fn failed(&self, error: std::io::Error) -> ExportError {
+        ExportError::Output(self.path.clone(), error)
+    }
+
+    fn finish(self) -> Result<PathBuf, ExportError> {
+        std::fs::rename(&self.meanwhile, &self.path).map_err(|error| self.failed(error))?;
+        Ok(self.path.clone())
+    }
+}
+
+impl Drop for Growing {
+    /// What was not finished is of no use; after a rename there is nothing left.
+    fn drop(&mut self) {
+        let _ = std::fs::remove_file(&self.meanwhile);
+    }
+}

@@ -1,0 +1,164 @@
+//! The tables of an export: `branches`, `points`, `special_points`, `profiles`, `special_profiles`, `responses`.
+
+use super::cells::{Cell, branch_cells, point_cells, profile, response_cells, special_cells};
+use super::columns::{Class, Column, Variables, of_branch};
+use super::{Export, ExportError};
+use foldline::diagram::Point;
+use foldline::model::Model;
+use std::path::{Path, PathBuf};
+
+/// A table that is being written, a row at a time.
+pub(super) trait Rows {
+    fn row(&mut self, cells: &[Cell]) -> Result<(), ExportError>;
+    fn finish(self: Box<Self>) -> Result<PathBuf, ExportError>;
+}
+
+/// How the table of a name is begun in a folder.
+pub(super) type Begin = dyn Fn(&Path, &str, &[Column]) -> Result<Box<dyn Rows>, ExportError>;
+
+/// Writes all tables that have rows, and `branches`, `points` and `special_points` in any case.
+pub(super) fn write(export: &Export, folder: &Path, begin: &Begin) -> Result<Vec<PathBuf>, ExportError> {
+    let variables = Variables::new(&export.study.model);
+    let mut done = vec![branches(export, folder, begin)?];
+    done.extend(points(export, folder, begin, &variables)?);
+    if !export.diagram.responses.is_empty() {
+        done.push(responses(export, folder, begin, &variables)?);
+    }
+    Ok(done)
+}
+
+fn branches(export: &Export, folder: &Path, begin: &Begin) -> Result<PathBuf, ExportError> {
+    let mut table = begin(folder, "branches", &of_branch())?;
+    for branch in &export.diagram.branches {
+        let [extent, _] = export.reading.extents(&branch.name)?;
+        table.row(&branch_cells(branch, &export.study.model, extent.points))?;
+    }
+    table.finish()
+}
+
+/// The tables of points and special points, and those of their profiles where there are any.
+fn points(export: &Export, folder: &Path, begin: &Begin, variables: &Variables) -> Result<Vec<PathBuf>, ExportError> {
+    let (model, branches) = (&export.study.model, &export.diagram.branches);
+    let (mut width, mut cycles) = (0, [false; 2]);
+    for branch in branches {
+        for (k, extent) in export.reading.extents(&branch.name)?.into_iter().enumerate() {
+            width = width.max(extent.spectrum as usize);
+            cycles[k] |= export.profiles && extent.nodes > 0;
+        }
+    }
+    let name = Column {
+        name: "branch".into(),
+        class: Class::Text,
+        unit: String::new(),
+        description: "name of the branch".into(),
+    };
+    let own = [vec![name.clone()], variables.of_point(false), spectrum_columns(width)].concat();
+    let mut table = begin(folder, "points", &own)?;
+    let mut profiles = match cycles[0] {
+        true => Some(begin(folder, "profiles", &profile_columns(&name, variables, "position"))?),
+        false => None,
+    };
+    for branch in branches {
+        export.reading.each_point(&branch.name, |point| {
+            table.row(&cells(&branch.name, &point, model, width))?;
+            profile_rows(&mut profiles, &branch.name, point.position, &point)
+        })?;
+    }
+    let mut done = vec![table.finish()?];
+    done.extend(profiles.map(|table| table.finish()).transpose()?);
+
+    let mut own = own;
+    own.extend(Variables::of_special());
+    let mut table = begin(folder, "special_points", &own)?;
+    let mut profiles = match cycles[1] {
+        true => Some(begin(folder, "special_profiles", &profile_columns(&name, variables, "special"))?),
+        false => None,
+    };
+    for branch in branches {
+        let mut number = 0;
+        export.reading.each_special(&branch.name, |special| {
+            let mut row = cells(&branch.name, &special.point, model, width);
+            row.extend(special_cells(&special));
+            table.row(&row)?;
+            number += 1;
+            profile_rows(&mut profiles, &branch.name, number - 1, &special.point)
+        })?;
+    }
+    done.push(table.finish()?);
+    done.extend(profiles.map(|table| table.finish()).transpose()?);
+    Ok(done)
+}
+
+fn cells(branch: &str, point: &Point, model: &Model, width: usize) -> Vec<Cell> {
+    let mut row = vec![Cell::Text(branch.to_string())];
+    row.extend(point_cells(point, model, false));
+    let parts = |k: usize| point.spectrum.get(k).map_or([Cell::Empty, Cell::Empty], |z| [z.re, z.im].map(Cell::Real));
+    row.extend((0..width).flat_map(parts));
+    row
+}
+
+fn spectrum_columns(width: usize) -> Vec<Column> {
+    let part = |k: usize, part: &str| Column {
+        name: format!("spectrum_{k}_{part}"),
+        class: Class::Real,
+        unit: String::new(),
+        description: format!("eigenvalue or multiplier {k}, {part}"),
+    };
+    (1..=width).flat_map(|k| [part(k, "re"), part(k, "im")]).collect()
+}
+
+/// `index` says which of the points of a branch a profile belongs to.
+fn profile_columns(name: &Column, variables: &Variables, index: &str) -> Vec<Column> {
+    let own = |name: &str, class: Class, description: &str| Column {
+        name: name.into(),
+        class,
+        unit: String::new(),
+        description: description.into(),
+    };
+    let mut columns = vec![
+        name.clone(),
+        own(index, Class::Integer, "which point of the branch"),
+        own("node", Class::Integer, "number within the profile, from 0"),
+        own("normalised_time", Class::Real, "time over period, from 0 to 1"),
+    ];
+    columns.extend_from_slice(variables.states());
+    columns
+}
+
+fn profile_rows(table: &mut Option<Box<dyn Rows>>, branch: &str, index: i64, point: &Point) -> Result<(), ExportError> {
+    let (Some(table), Some((times, states))) = (table, profile(point)) else { return Ok(()) };
+    let n = states.len() / times.len().max(1);
+    let mut row = vec![Cell::Text(branch.to_string()), Cell::Integer(index)];
+    for (node, (time, state)) in times.iter().zip(states.chunks_exact(n.max(1))).enumerate() {
+        row.truncate(2);
+        row.extend([Cell::Integer(node as i64), Cell::Real(*time)]);
+        row.extend(state.iter().map(|v| Cell::Real(*v)));
+        table.row(&row)?;
+    }
+    Ok(())
+}
+
+fn responses(export: &Export, folder: &Path, begin: &Begin, variables: &Variables) -> Result<PathBuf, ExportError> {
+    let word = |name: &str, description: &str| Column {
+        name: name.into(),
+        class: Class::Text,
+        unit: String::new(),
+        description: description.into(),
+    };
+    let model = &export.study.model;
+    let first = [
+        word("set", "name of the survey or sweep"),
+        word("search", "survey or sweep"),
+        word("free", "parameter that varies"),
+    ];
+    let mut table = begin(folder, "responses", &[&first[..], &variables.of_response()].concat())?;
+    for set in &export.diagram.responses {
+        let free = model.parameters.get(set.free).map_or("", |p| p.name.as_str());
+        for response in &set.responses {
+            let mut row: Vec<Cell> = [&set.name, set.search.name(), free].map(|text| Cell::Text(text.into())).into();
+            row.extend(response_cells(response, model));
+            table.row(&row)?;
+        }
+    }
+    table.finish()
+}

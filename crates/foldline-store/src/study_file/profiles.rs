@@ -1,0 +1,120 @@
+//! `cycle` of a seed: a cycle that was computed or measured elsewhere.
+
+use crate::nearest::suggest;
+use crate::toml_walk::{Value, Walk};
+use foldline::contract::VectorField;
+use foldline::diagram::Cycle;
+use foldline::model::Model;
+
+pub(super) const KEYS: [&str; 4] = ["period", "through", "times", "states"];
+
+/// The cycle, in polynomials of degree `degree`.
+pub(super) fn cycle(walk: &mut Walk, value: &Value, model: &Model, degree: usize) -> Option<Cycle> {
+    if model.forced() {
+        let hint =
+            "use `attractor = \"cycle\"` or `state = { … }`: a given cycle does not say where in the forcing it begins";
+        walk.report(value.span(), "the model is forced, and a seed cannot be a given `cycle`", hint);
+        return None;
+    }
+    let table = walk.table(value, "`cycle`")?;
+    walk.only(table, &KEYS, "a cycle");
+    let missing: Vec<&str> =
+        ["period", "times", "states"].into_iter().filter(|key| table.get(*key).is_none()).collect();
+    if !missing.is_empty() {
+        let hint = "`cycle = { period = 6.3, times = [0, …, 1], states = { x = […], … } }`";
+        walk.report(value.span(), format!("the cycle lacks {}", missing.join(", ")), hint);
+        return None;
+    }
+    let place = table.get("period")?;
+    let period = walk.number(place, "`period`")?;
+    if period <= 0.0 {
+        walk.report(
+            place.span(),
+            "the period is not positive",
+            "write the duration of the cycle in the time of the model",
+        );
+        return None;
+    }
+    let through = table.get("through").and_then(|v| walk.integer(v, "`through`", 1..=12)).unwrap_or(1) as usize;
+    let place = table.get("times")?;
+    let times = list(walk, place, "`times`")?;
+    if let Some(k) = times.windows(2).position(|pair| pair[0] >= pair[1]) {
+        let hint = "normalised times increase from 0 at the start to 1 at the end of the period";
+        walk.report(
+            place.span(),
+            format!("the times do not increase: {} is followed by {}", times[k], times[k + 1]),
+            hint,
+        );
+        return None;
+    }
+    if times.first() != Some(&0.0) || times.last() != Some(&1.0) {
+        let hint = "divide the times by the period: the first is 0, the last 1";
+        walk.report(place.span(), "the times do not run from 0 to 1", hint);
+        return None;
+    }
+    if !(times.len() - 1).is_multiple_of(through) {
+        let message = format!("{} steps of time are no multiple of `through`, {through}", times.len() - 1);
+        walk.report(place.span(), message, "leave `through` out, or give the nodes of every mesh interval");
+        return None;
+    }
+    let states = states(walk, table.get("states")?, model, times.len())?;
+    let found = Cycle::given(period, &times, &states, through, degree);
+    if found.is_none() {
+        walk.report(value.span(), "these times and states make no cycle", "a state for each time, from 0 to 1");
+    }
+    found
+}
+
+/// `[count][n]`.
+fn states(walk: &mut Walk, value: &Value, model: &Model, count: usize) -> Option<Vec<f64>> {
+    let table = walk.table(value, "`states`")?;
+    let known: Vec<&str> = model.states.iter().map(|s| s.name.as_str()).collect();
+    for key in table.keys() {
+        let name: &str = key.get_ref();
+        if !known.contains(&name) {
+            let message = format!("the model `{}` has no state `{name}`", model.name);
+            walk.report(key.span(), message, suggest(name, &known));
+        }
+    }
+    let missing: Vec<&str> = known.iter().copied().filter(|name| table.get(*name).is_none()).collect();
+    if !missing.is_empty() {
+        let message = format!("the states lack {}", missing.join(", "));
+        walk.report(value.span(), message, format!("give a list of numbers for each of {}", known.join(", ")));
+        return None;
+    }
+    let mut out = vec![0.0; count * known.len()];
+    for (i, name) in known.iter().enumerate() {
+        let place = table.get(*name)?;
+        let values = list(walk, place, &format!("the state `{name}`"))?;
+        if values.len() != count {
+            let message = format!("the state `{name}` has {} values where there are {count} times", values.len());
+            walk.report(place.span(), message, "give a value for each time, that at the end of the period too");
+            return None;
+        }
+        values.iter().enumerate().for_each(|(k, v)| out[k * known.len() + i] = *v);
+    }
+    Some(out)
+}
+
+fn list(walk: &mut Walk, value: &Value, what: &str) -> Option<Vec<f64>> {
+    match value.get_ref().as_array() {
+        Some(values) if values.len() > 1 => values.iter().map(|v| walk.number(v, what)).collect(),
+        Some(_) => {
+            walk.report(
+                value.span(),
+                format!("{what} has less than two numbers"),
+                "a list of numbers such as [0, 0.5, 1]",
+            );
+            None
+        }
+        None => {
+            let found = value.get_ref().type_str();
+            walk.report(
+                value.span(),
+                format!("{what} is a {found}, not a list"),
+                "a list of numbers such as [0, 0.5, 1]",
+            );
+            None
+        }
+    }
+}
