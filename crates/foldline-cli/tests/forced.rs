@@ -220,3 +220,25 @@ fn rest_under_parametric_forcing_doubles_its_period() {
     assert_eq!((special.kind, special.point.solution.forcing_periods()), (Kind::PeriodDoubling, 1));
     assert!((special.point.parameters[1] - 0.08).abs() < 1e-4, "{:?}", special.point.parameters);
 }
+
+/// At ω = 5, A = 10 most samples of the hardening oscillator follow the forcing, and a few swing once in three of its periods.
+#[test]
+fn a_cycle_of_a_stated_number_of_periods_of_the_forcing() {
+    let seed = "attractor = \"cycle\"\nperiods = 3\nparameters = { A = 10, omega = 5 }\nsamples = 64";
+    let diagram = run(DUFFING, &one_branch(seed, "free = \"omega\"\nrange = [3.5, 8]"));
+    for point in &diagram.branches[0].points {
+        let Solution::Cycle(cycle) = &point.solution else { panic!("a forced model has cycles only") };
+        let expected = 3.0 * std::f64::consts::TAU / point.parameters[diagram.branches[0].free];
+        assert!(cycle.forcing_periods == 3 && (cycle.period - expected).abs() < 1e-10);
+    }
+    let refused = |model: &str, seed: &str| {
+        let text = format!("model = \"m\"\n{}", one_branch(seed, "free = \"omega\"\nrange = [4.5, 5.5]"));
+        let found = parse_study(&text, "study", model, "model").expect_err("the study is wrong");
+        found.iter().map(|d| d.to_string()).collect::<Vec<_>>().join("\n")
+    };
+    let free = "[parameters]\nomega = 5.0\n[states]\nx = \"omega - x\"\n";
+    let said = refused(free, "attractor = \"cycle\"\nperiods = 3");
+    assert!(said.contains("no forcing whose periods"), "{said}");
+    let said = refused(DUFFING, "state = { x = 0, v = 0 }\nperiods = 3");
+    assert!(said.contains("goes with `attractor = \"cycle\"`"), "{said}");
+}

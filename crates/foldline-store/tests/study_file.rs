@@ -247,7 +247,7 @@ fn mistakes_about_names_and_about_what_a_branch_starts_from() {
             "name = \"folds\"",
             "\"folds\"",
             "\"folds\" is used twice",
-            "curve, homotopy, survey and sweep",
+            "curve, homotopy, exploration, survey and sweep",
         ),
         (
             "name = \"doublings\"",

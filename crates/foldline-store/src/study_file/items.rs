@@ -94,9 +94,8 @@ fn known_seed(index: usize, seed: &SeedPlan) -> Known {
     let at: Vec<Option<f64>> = seed.parameters.iter().map(|v| Some(*v)).collect();
     let family = match &seed.source {
         SeedSource::Attractor(AttractorKey::Equilibrium) => Some(Family::Equilibrium),
-        SeedSource::Attractor(AttractorKey::Cycle | AttractorKey::Ratio(..)) | SeedSource::Cycle(_) => {
-            Some(Family::Cycle)
-        }
+        SeedSource::Attractor(AttractorKey::Cycle | AttractorKey::Ratio(..) | AttractorKey::Lasting(_))
+        | SeedSource::Cycle(_) => Some(Family::Cycle),
         SeedSource::State(_) => None,
     };
     Known { name: seed.name.clone(), start: Start::Seed(index), beginning: at.clone(), end: Some(at), family }

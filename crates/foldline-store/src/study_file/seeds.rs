@@ -10,8 +10,8 @@ use foldline::model::Model;
 use std::ops::Range;
 use toml::de::DeTable;
 
-pub(super) const KEYS: [&str; 8] =
-    ["name", "description", "attractor", "state", "cycle", "parameters", "samples", "random"];
+pub(super) const KEYS: [&str; 9] =
+    ["name", "description", "attractor", "periods", "state", "cycle", "parameters", "samples", "random"];
 const SAMPLES: usize = 128;
 const RANDOM: u64 = 1;
 
@@ -33,7 +33,8 @@ pub(super) fn read(
         if let Some(value) = table.get("parameters") {
             override_parameters(walk, value, model, &mut parameters);
         }
-        let source = source(walk, table, &span, model, degree);
+        let meant = source(walk, table, &span, model, degree);
+        let source = lasting(walk, table, meant, model);
         let samples = table.get("samples").and_then(|v| walk.integer(v, "`samples`", 1..=1_000_000));
         let random = table.get("random").and_then(|v| walk.integer(v, "`random`", 0..=u64::MAX));
         let samples = samples.map_or(SAMPLES, |n| n as usize);
@@ -66,6 +67,20 @@ fn source(walk: &mut Walk, table: &DeTable, span: &Range<usize>, model: &Model, 
         }
     };
     found.unwrap_or(fallback)
+}
+
+/// The same with `periods`, if they are stated: how many periods of the forcing the cycle lasts.
+fn lasting(walk: &mut Walk, table: &DeTable, source: SeedSource, model: &Model) -> SeedSource {
+    let Some(value) = table.get("periods") else { return source };
+    let periods = walk.integer(value, "`periods`", 1..=10_000);
+    if !model.forced() {
+        let hint = "leave `periods` out: the period of a cycle follows from the equations";
+        walk.report(value.span(), "the model has no forcing whose periods could be counted", hint);
+    } else if source != SeedSource::Attractor(AttractorKey::Cycle) {
+        let message = "`periods` goes with `attractor = \"cycle\"`";
+        walk.report(value.span(), message, "leave `periods` out, or write `attractor = \"cycle\"`");
+    }
+    periods.map_or(source, |periods| SeedSource::Attractor(AttractorKey::Lasting(periods as u32)))
 }
 
 fn attractor(walk: &mut Walk, value: &Value, model: &Model) -> Option<AttractorKey> {

@@ -13,6 +13,8 @@ pub enum AttractorKey {
     Cycle,
     /// The cycle with this spectral ratio, such as 2:1, that was reached most often.
     Ratio(u32, u32),
+    /// The cycle that lasts so many periods of the forcing and was reached most often.
+    Lasting(u32),
 }
 
 /// Where a first solution comes from.

@@ -326,6 +326,7 @@ fn is_meant(key: &AttractorKey, point: &Point, ratio: Option<(u32, u32)>) -> boo
         (AttractorKey::Equilibrium, solution) => matches!(solution, Solution::Equilibrium(_)),
         (AttractorKey::Cycle, solution) => matches!(solution, Solution::Cycle(_)),
         (AttractorKey::Ratio(p, q), _) => ratio == Some((*p, *q)),
+        (AttractorKey::Lasting(periods), solution) => solution.forcing_periods() == *periods,
     }
 }
 
@@ -339,7 +340,9 @@ fn chosen(census: &Census, key: &AttractorKey) -> Option<Point> {
     let found = match key {
         AttractorKey::Equilibrium => meant.min_by(|a, b| size(a).total_cmp(&size(b))),
         // They come by falling number of hits.
-        AttractorKey::Cycle | AttractorKey::Ratio(..) => meant.min_by_key(|a| std::cmp::Reverse(a.hits)),
+        AttractorKey::Cycle | AttractorKey::Ratio(..) | AttractorKey::Lasting(_) => {
+            meant.min_by_key(|a| std::cmp::Reverse(a.hits))
+        }
     };
     found.map(|a| a.point.clone())
 }
@@ -375,6 +378,7 @@ fn missing(system: &System, seed: &SeedPlan, census: &Census, key: &AttractorKey
         AttractorKey::Equilibrium => "no stable equilibrium".to_string(),
         AttractorKey::Cycle => "no stable cycle".to_string(),
         AttractorKey::Ratio(p, q) => format!("no stable {p}:{q} cycle"),
+        AttractorKey::Lasting(periods) => format!("no stable cycle of {periods} periods of the forcing"),
     };
     let why = {
         let all_escaped = census.attractors.is_empty() && census.unsettled == 0 && census.escaped > 0;
