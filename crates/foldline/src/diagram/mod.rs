@@ -356,8 +356,12 @@ impl SpecialPoint {
 
     /// Coefficients, case and criticality in words, as `l1 = -0.0123, supercritical`.
     pub fn normal_form(&self) -> String {
+        // Beside the others, what is so small is rounding.
+        const NOTHING: f64 = 1e-13;
+        let largest = self.coefficients.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
         let named = self.kind.coefficients().iter().zip(&self.coefficients);
-        let parts = named.map(|(name, value)| format!("{name} = {}", shortly(*value)));
+        let shown = |value: f64| if value.abs() < NOTHING * largest { 0.0 } else { value };
+        let parts = named.map(|(name, value)| format!("{name} = {}", shortly(shown(*value))));
         let words = [self.case(), self.criticality()].into_iter().flatten().map(str::to_string);
         parts.chain(words).collect::<Vec<_>>().join(", ")
     }
