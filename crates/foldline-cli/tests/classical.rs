@@ -141,13 +141,18 @@ fn brusselator_oscillates_beyond_b_equal_one_plus_a_squared_in_both_directions()
 
 #[test]
 fn van_der_pol_cycle_relaxes() {
-    let diagram = explored(VAN_DER_POL, "attractor = \"cycle\"", "free = \"mu\"\nrange = [1, 10]");
+    let line = "free = \"mu\"\nrange = [1, 100]\nmark = { mu = [10, 30] }";
+    let diagram = explored(VAN_DER_POL, "attractor = \"cycle\"", line);
     let cycle = branch(&diagram, "b");
     ends(cycle, ["bound", "bound"]);
-    // Other continuation code and high-order integration: period and amplitude.
-    for (point, period, amplitude) in
-        [(&cycle.points[0], 6.66328686, 2.00861986), (&cycle.points[cycle.points.len() - 1], 19.07836957, 2.01428536)]
-    {
+    // Other continuation code, and integration by Radau's method at 1e-12: period and amplitude.
+    let last = &cycle.points[cycle.points.len() - 1];
+    for (point, period, amplitude) in [
+        (&cycle.points[0], 6.66328686, 2.00861986),
+        (&cycle.special[0].point, 19.07836957, 2.01428536),
+        (&cycle.special[1].point, 50.543686482741, 2.005164254841),
+        (last, 162.837071092370, 2.001318681177),
+    ] {
         period_is(point.solution.period(), period, TOLERANCE);
         assert!(near(point.ranges[0][1], amplitude, TOLERANCE), "{:?}", point.ranges[0]);
     }
@@ -189,8 +194,8 @@ fn a_cycle_followed_down_to_its_hopf_point_ends_there() {
 
 #[test]
 fn a_cubic_has_two_folds() {
-    let model = "name = \"Cusp\"\n[parameters]\nmu = -1\nlambda = 1\n[states]\nx = \"mu + lambda*x - x^3\"\n";
-    let diagram = explored(model, "state = { x = -1.32 }", "free = \"mu\"\nrange = [-2, 2]");
+    let model = include_str!("../../../models/cusp.toml");
+    let diagram = explored(model, "state = { x = -1.32 }\nparameters = { mu = -1 }", "free = \"mu\"\nrange = [-2, 2]");
     // Closed form: mu = ±2/(3√3) at lambda = 1.
     let mu = 2.0 / 27f64.sqrt();
     has(branch(&diagram, "b"), &[(Kind::Fold, -mu), (Kind::Fold, mu)], 1e-8);
@@ -198,7 +203,7 @@ fn a_cubic_has_two_folds() {
 
 #[test]
 fn fitzhugh_nagumo_cycles_span_from_one_hopf_point_to_the_other() {
-    let model = "name = \"FitzHugh-Nagumo\"\n[parameters]\na = 0\nb = 0.8\nc = 3\n[states]\nx = \"c*(x - x^3/3 + y)\"\ny = \"-(x - a + b*y)/c\"\n";
+    let model = include_str!("../../../models/fitzhugh-nagumo.toml");
     let diagram = explored(
         model,
         "state = { x = 1.2, y = -0.62 }\nparameters = { a = 0.7 }",
@@ -445,9 +450,8 @@ fn co_oxidation_has_two_folds_and_two_subcritical_hopf_points() {
 /// A conservative oscillator has a cycle of every amplitude, all at the same value of a damping: elliptic integrals for x'' + x + x³ = 0.
 #[test]
 fn a_conservative_oscillator_has_the_periods_of_its_elliptic_integrals() {
-    let model = "[parameters]\np = 0.5\n[states.x]\nequation = \"v\"\n[states.v]\nequation = \"-p*v - x - x^3\"\n";
     let diagram = explored(
-        model,
+        include_str!("../../../models/duffing.toml"),
         "attractor = \"equilibrium\"\nsamples = 16",
         "free = \"p\"\nrange = [-1, 1]\nswitch = { hopf = 1 }\nmark = { x_max = [1, 2] }\nstop = { x_max = 2.5 }",
     );
