@@ -67,6 +67,10 @@ pub(super) const SHORT: f64 = 200.0;
 const SHARPEST: f64 = 1e-3;
 /// Step down to which a change of stability without explanation is taken for a jump to another branch.
 const SURE: f64 = 1e-4;
+/// How often a mesh is halved for a change of stability without explanation in a short step …
+const SHARPENED: usize = 2;
+/// … and what that makes of its error, at least.
+const FINER: f64 = 1.0 / 32.0;
 /// Step down to which a branch point without a symmetry that makes it is taken for two branches that pass each other.
 const CROSSING: f64 = 2e-3;
 
@@ -113,7 +117,7 @@ pub fn follow(
         if emitted >= walk.settings.max_points {
             return Ending::PointLimit(emitted);
         }
-        let (mut cost, mut remeshed, mut coarse) = (Cost::default(), 0, 0);
+        let (mut cost, mut remeshed, mut coarse, mut sharpened) = (Cost::default(), 0, 0, 0);
         let (past, mut tried) = (Past { first_period, moved: stirred }, Tried::new());
         walk.sharpen(&mut left, step, &mut cost);
         let mut rigid = !walk.refresh(&mut left, step, &mut cost);
@@ -128,6 +132,15 @@ pub fn follow(
                 if believed { Ok((tried, found)) } else { Err(Failure::Unexplained) }
             });
             match attempt {
+                Ok((_, found)) if is_unexplained(&found) && sharpened < SHARPENED && walk.is_short(&left.mesh, step) => {
+                    // What multipliers do closer together than this mesh is accurate it need not show as it is.
+                    sharpened += 1;
+                    cost.rejected += 1;
+                    walk.place(&left);
+                    left.share = (FINER * left.share).max(SHARPEST);
+                    left.roomier = walk.problem.finer_mesh();
+                    rigid = !walk.refresh(&mut left, step, &mut cost);
+                }
                 Ok(accepted) => break accepted,
                 Err(Failure::Remeshed(mesh)) if remeshed < 3 => {
                     remeshed += 1;
@@ -234,6 +247,10 @@ pub fn follow(
         trail = Some(walk.trail(&left, &right));
         left = right;
     }
+}
+
+fn is_unexplained(found: &[Found]) -> bool {
+    found.iter().any(|item| matches!(item, Found::Special(special) if special.kind == Kind::Unexplained))
 }
 
 impl Follow<'_> {

@@ -100,7 +100,9 @@ impl Settings {
             return self.newton_tolerance();
         }
         let far = (0.1 * self.tolerance).min(1e-3 * length.abs());
-        far.max(self.newton_tolerance().min(1e-5 * length.abs())).max(ROUNDING)
+        // In a step so short that more would show, closer than elsewhere.
+        let near = if length == 0.0 { f64::INFINITY } else { 1e-5 * length.abs() };
+        far.max(self.newton_tolerance().min(near)).max(ROUNDING)
     }
 
     /// Size of the last Newton update, relative: far enough below the tolerance that iteration errors do not show.
