@@ -183,10 +183,10 @@ impl Follow<'_> {
         Ok(None)
     }
 
-    /// Takes note of it when the branch has gone so far from its start that it can come back.
-    pub(super) fn leaves_home(&mut self, here: &Station) {
+    /// Takes note of it when the branch has gone so far from its start, to `here`, that it can come back.
+    pub fn leaves_home(&mut self, here: &Point) {
         let Some(home) = self.home.filter(|_| !self.homecoming.away) else { return };
-        let off = distance(&self.features(&here.point, home, &[]), &self.features(home, home, &[]));
+        let off = distance(&self.features(here, home, &[]), &self.features(home, home, &[]));
         self.homecoming.away = off > AWAY * self.settings.tolerance;
     }
 
@@ -259,7 +259,8 @@ impl Follow<'_> {
         // Where the step ends a little before the plane, the start may be met already.
         let error = doubt(&right.point, home, tolerance);
         let [(from, _), (to, _)] = [left, right].map(|station| self.against(station, image));
-        if !(from <= 0.0 && to > -error) {
+        // A run that was stopped there goes on from the start itself.
+        if !(from <= error && to > -error) {
             return None;
         }
         let stretch = Stretch::new(self.problem, left, right, self.direction);

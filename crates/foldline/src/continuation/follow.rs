@@ -216,7 +216,7 @@ pub fn follow(
             }
             return ending;
         }
-        walk.leaves_home(&right);
+        walk.leaves_home(&right.point);
         stirred |= right.slope().abs() > STANDS;
         let here = right.parameter();
         if (here - stand.0).abs() > REST * (1.0 + here.abs()) {

@@ -345,6 +345,8 @@ impl Growth<'_> {
             home: home.as_ref(),
             homecoming: Homecoming::default(),
         };
+        // A run that goes on may be on its way back already.
+        branch.points.iter().filter(|p| p.position as f64 * direction > 0.0).for_each(|p| walk.leaves_home(p));
         follow(&mut walk, start, previous, emitted, &mut |item| {
             let going = match item {
                 Item::Special(mut special) => {

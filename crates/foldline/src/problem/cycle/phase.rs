@@ -121,6 +121,17 @@ mod tests {
     use crate::problem::gauss::Scheme;
     use crate::problem::{Axis, Setting, mesh};
 
+    fn field() -> Model {
+        Model::compile(ModelSource {
+            name: "two".into(),
+            parameters: vec![Parameter::new("p", 1.0)],
+            states: vec![State::new("x"), State::new("y")],
+            equations: vec![Definition::new("x", "p*y"), Definition::new("y", "-x")],
+            ..ModelSource::default()
+        })
+        .unwrap()
+    }
+
     /// (sin τ + sin 3τ / 2, cos τ) at τ = 2π (t + phase), on a mesh.
     fn cycle(intervals: usize, phase: f64) -> Cycle {
         let scheme = Scheme::new(4);
@@ -131,15 +142,25 @@ mod tests {
     }
 
     #[test]
+    fn a_cycle_that_is_nearly_a_shorter_one_is_seen_once_for_each_turn() {
+        // Three turns, which differ by a thousandth.
+        let field = field();
+        let scales = [1.0, 1.0];
+        let setting = Setting { field: &field, scales: &scales, parameters: vec![1.0], axes: vec![Axis::new(0, 1.0)] };
+        let times = (0..90).flat_map(|j| Scheme::new(4).nodes.into_iter().map(move |c| std::f64::consts::TAU * (j as f64 + c) / 90.0));
+        let profile = times.flat_map(|a| [(3.0 * a).sin() + 1e-3 * a.sin(), (3.0 * a).cos()]).collect();
+        let turns = Cycle { period: 2.0, forcing_periods: 0, mesh: mesh::uniform(90), degree: 4, profile };
+        let mut problem = CycleProblem::like(setting, &turns);
+        let beside: Vec<f64> = turns.profile.iter().copied().chain([2.0, 1.0]).collect();
+        problem.anchor(&beside);
+        let point = problem.point(&beside, &beside, Default::default());
+        assert_eq!(problem.in_phase(&beside, &point, &[false; 2], 1e-2).len(), 3);
+        assert_eq!(problem.in_phase(&beside, &point, &[false; 2], 1e-5).len(), 1);
+    }
+
+    #[test]
     fn a_cycle_is_seen_in_the_phase_and_the_reflection_of_another() {
-        let model = Model::compile(ModelSource {
-            name: "two".into(),
-            parameters: vec![Parameter::new("p", 1.0)],
-            states: vec![State::new("x"), State::new("y")],
-            equations: vec![Definition::new("x", "p*y"), Definition::new("y", "-x")],
-            ..ModelSource::default()
-        })
-        .unwrap();
+        let model = field();
         let scales = [1.0, 1.0];
         let setting = Setting { field: &model, scales: &scales, parameters: vec![1.0], axes: vec![Axis::new(0, 1.0)] };
         let (here, there) = (cycle(60, 0.0), cycle(84, 0.3137));
@@ -159,7 +180,6 @@ mod tests {
             let off = u.iter().zip(&beside).fold(0.0f64, |most, (a, b)| most.max((a - b).abs()));
             // What polynomials of degree 4 on 60 intervals leave of sin 3τ.
             assert!(off < 1e-5, "{off:e}");
-            assert!(problem.in_phase(&beside, &point, &[reflected; 2], 10.0).len() > 1, "other minima of the distance");
             let off = along.iter().zip(&beside[..here.profile.len()]).fold(0.0f64, |m, (a, b)| m.max((a - sign * b).abs()));
             assert!(off < 1e-5, "{off:e}");
         }
