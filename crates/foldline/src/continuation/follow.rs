@@ -132,7 +132,9 @@ pub fn follow(
                 if believed { Ok((tried, found)) } else { Err(Failure::Unexplained) }
             });
             match attempt {
-                Ok((_, found)) if is_unexplained(&found) && sharpened < SHARPENED && walk.is_short(&left.mesh, step) => {
+                Ok((_, found))
+                    if is_unexplained(&found) && sharpened < SHARPENED && walk.is_short(&left.mesh, step) =>
+                {
                     // What multipliers do closer together than this mesh is accurate it need not show as it is.
                     sharpened += 1;
                     cost.rejected += 1;

@@ -198,8 +198,7 @@ impl Follow<'_> {
             };
             // Neighbouring special points that cannot be told apart any more stay together.
             let together = if short { CLOSEST } else { 1e-7 * (1.0 + stretch.length) };
-            let apart = located.len() < 2
-                || located[located.len() - 1].2.distance - located[0].2.distance > together;
+            let apart = located.len() < 2 || located[located.len() - 1].2.distance - located[0].2.distance > together;
             // Exactly there Newton's method may fail.
             let places = [cut, 0.5 * cut, 0.5 * (cut + stretch.length)];
             let middle = places
@@ -253,7 +252,14 @@ impl Follow<'_> {
         self.monitors[monitor].confirms(&left.point) || self.monitors[monitor].confirms(&right.point)
     }
 
-    pub(super) fn special(&mut self, kind: Kind, mut station: Station, before: i64, after: i64, error: f64) -> Box<SpecialPoint> {
+    pub(super) fn special(
+        &mut self,
+        kind: Kind,
+        mut station: Station,
+        before: i64,
+        after: i64,
+        error: f64,
+    ) -> Box<SpecialPoint> {
         if station.point.trust.spectrum.is_nan() {
             self.place(&station);
             if self.problem.factorise(&station.u, &station.tangent).is_ok() {

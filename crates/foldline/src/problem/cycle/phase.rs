@@ -22,7 +22,13 @@ const FINEST: f64 = 1e-14;
 
 impl CycleProblem<'_> {
     /// See [`crate::contract::ZeroProblem::images`].
-    pub(super) fn in_phase(&self, beside: &[f64], point: &Point, reflection: &[bool], within: f64) -> Vec<[Vec<f64>; 2]> {
+    pub(super) fn in_phase(
+        &self,
+        beside: &[f64],
+        point: &Point,
+        reflection: &[bool],
+        within: f64,
+    ) -> Vec<[Vec<f64>; 2]> {
         let Solution::Cycle(cycle) = &point.solution else { return Vec::new() };
         let (n, size, whole) = (self.n, self.profile_size(), cycle.profile.len());
         if cycle.degree != self.scheme.degree || point.tangent.len() + size != whole + beside.len() {
@@ -75,7 +81,9 @@ impl CycleProblem<'_> {
         let count = all.len();
         let lowest = |k: &usize| all[*k] <= all[(k + 1) % count] && all[*k] <= all[(k + count - 1) % count];
         let about = (0..count).filter(lowest).map(|k| k as f64 / count as f64);
-        about.map(|about| if self.is_forced() { about } else { self.exactly(x, y, about, 1.0 / count as f64) }).collect()
+        about
+            .map(|about| if self.is_forced() { about } else { self.exactly(x, y, about, 1.0 / count as f64) })
+            .collect()
     }
 
     /// The zero of (1) no farther than `width` from `about`.
@@ -83,7 +91,11 @@ impl CycleProblem<'_> {
         let (mut low, mut high, mut shift) = (about - width, about + width, about);
         for _ in 0..ROUNDS {
             let (g, slope) = self.out_of_phase(x, y, shift);
-            if g > 0.0 { high = shift } else { low = shift }
+            if g > 0.0 {
+                high = shift
+            } else {
+                low = shift
+            }
             let step = -g / slope;
             if step.abs() < FINEST {
                 break;
@@ -135,7 +147,8 @@ mod tests {
     /// (sin τ + sin 3τ / 2, cos τ) at τ = 2π (t + phase), on a mesh.
     fn cycle(intervals: usize, phase: f64) -> Cycle {
         let scheme = Scheme::new(4);
-        let times = (0..intervals).flat_map(|j| scheme.nodes.iter().map(move |c| (j as f64 + c) / intervals as f64).collect::<Vec<_>>());
+        let times = (0..intervals)
+            .flat_map(|j| scheme.nodes.iter().map(move |c| (j as f64 + c) / intervals as f64).collect::<Vec<_>>());
         let turned = times.map(|t| std::f64::consts::TAU * (t + phase));
         let profile = turned.flat_map(|a| [a.sin() + 0.5 * (3.0 * a).sin(), a.cos()]).collect();
         Cycle { period: 2.0, forcing_periods: 0, mesh: mesh::uniform(intervals), degree: 4, profile }
@@ -147,7 +160,8 @@ mod tests {
         let field = field();
         let scales = [1.0, 1.0];
         let setting = Setting { field: &field, scales: &scales, parameters: vec![1.0], axes: vec![Axis::new(0, 1.0)] };
-        let times = (0..90).flat_map(|j| Scheme::new(4).nodes.into_iter().map(move |c| std::f64::consts::TAU * (j as f64 + c) / 90.0));
+        let times = (0..90)
+            .flat_map(|j| Scheme::new(4).nodes.into_iter().map(move |c| std::f64::consts::TAU * (j as f64 + c) / 90.0));
         let profile = times.flat_map(|a| [(3.0 * a).sin() + 1e-3 * a.sin(), (3.0 * a).cos()]).collect();
         let turns = Cycle { period: 2.0, forcing_periods: 0, mesh: mesh::uniform(90), degree: 4, profile };
         let mut problem = CycleProblem::like(setting, &turns);
@@ -180,7 +194,8 @@ mod tests {
             let off = u.iter().zip(&beside).fold(0.0f64, |most, (a, b)| most.max((a - b).abs()));
             // What polynomials of degree 4 on 60 intervals leave of sin 3τ.
             assert!(off < 1e-5, "{off:e}");
-            let off = along.iter().zip(&beside[..here.profile.len()]).fold(0.0f64, |m, (a, b)| m.max((a - sign * b).abs()));
+            let off =
+                along.iter().zip(&beside[..here.profile.len()]).fold(0.0f64, |m, (a, b)| m.max((a - sign * b).abs()));
             assert!(off < 1e-5, "{off:e}");
         }
     }
