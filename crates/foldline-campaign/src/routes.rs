@@ -279,4 +279,11 @@ fn count(place: &str, branch: &Branch, report: &mut Report) {
             report.unexplained.push(format!("{place}: silently at {}", pair[1].parameters[branch.free]));
         }
     }
+    // A closed branch ends with the solution that it began with.
+    if let [first, .., last] = &branch.points[..]
+        && branch.ends.iter().all(|end| *end == Some(Ending::Closed))
+        && first.unstable != last.unstable
+    {
+        report.unexplained.push(format!("{place}: on closing at {}", last.parameters[branch.free]));
+    }
 }

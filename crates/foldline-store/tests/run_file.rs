@@ -186,6 +186,27 @@ fn a_diagram_comes_back_to_the_bit_and_so_do_the_texts() {
     assert_eq!(back.notes.len(), 4);
 }
 
+#[test]
+fn special_points_of_one_step_backwards_are_in_the_order_of_the_branch() {
+    let folder = tempfile::tempdir().unwrap();
+    let recorder = Recorder::create(folder.path(), &study()).unwrap();
+    let mut branch = Branch::new("back", Family::Equilibrium, 0, Origin::Seed("start".into()));
+    recorder.observe(Event::Begin(&branch));
+    for (position, met) in [(0, &[0.3, 0.4][..]), (-1, &[0.2, 0.1])] {
+        branch.insert(point(position, false));
+        recorder.observe(Event::Point(&branch, &branch.points[0]));
+        for parameter in met {
+            let special = special(Kind::Hopf, position, *parameter, false);
+            branch.insert_special(special.clone());
+            recorder.observe(Event::Special(&branch, &special));
+        }
+    }
+    recorder.finish().unwrap();
+    let order = |branch: &Branch| branch.special.iter().map(|s| s.point.parameters[0]).collect::<Vec<_>>();
+    assert_eq!(order(&branch), [0.1, 0.2, 0.3, 0.4]);
+    assert_eq!(order(&load(folder.path()).unwrap().diagram.branches[0]), [0.1, 0.2, 0.3, 0.4]);
+}
+
 /// The diagram without what [`Part::Numbers`] leaves out.
 fn numbers_of(mut diagram: Diagram) -> Diagram {
     let strip = |point: &mut Point| {

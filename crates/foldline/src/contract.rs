@@ -184,6 +184,21 @@ pub trait ZeroProblem {
 
     /// The unknowns of a point, the mesh being that of the point.
     fn unknowns_of(&mut self, point: &Point) -> Vec<f64>;
+
+    /// Unknowns and tangent of a point as it can be seen no farther than `within` from `beside`: on the current mesh, on which `beside`
+    /// is, in that reflection (state i negated where it says so), in every phase that is close where a solution has one. None where
+    /// it is farther, or does not belong to this problem.
+    fn images(&mut self, beside: &[f64], point: &Point, reflection: &[bool], within: f64) -> Vec<[Vec<f64>; 2]> {
+        let mut seen = [self.unknowns_of(point), point.tangent.clone()];
+        for (i, _) in reflection.iter().enumerate().filter(|(_, negated)| **negated) {
+            seen.iter_mut().filter_map(|v| v.get_mut(i)).for_each(|v| *v = -*v);
+        }
+        if seen.iter().any(|v| v.len() != beside.len()) {
+            return Vec::new();
+        }
+        let off: Vec<f64> = seen[0].iter().zip(beside).map(|(a, b)| a - b).collect();
+        if self.dot(&off, &off) <= within * within { vec![seen] } else { Vec::new() }
+    }
 }
 
 /// A scalar along the branch whose sign change between two points is a special point.

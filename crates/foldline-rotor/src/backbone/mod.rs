@@ -45,7 +45,7 @@ use crate::quantities::Nondimensional;
 use crate::spectrum::Spectrum;
 use crate::units::Mistake;
 use foldline::continuation::corrector::{Plane, settle};
-use foldline::continuation::{Follow, Item, Settings, follow};
+use foldline::continuation::{Follow, Homecoming, Item, Settings, follow};
 use foldline::contract::{Verdict, ZeroProblem};
 use foldline::diagram::{Cost, Ending, Point, Solution};
 
@@ -175,7 +175,7 @@ pub fn backbone(constants: &Nondimensional, law: ContactLaw, ratio: Ratio, reach
         direction: 1.0,
         free: 0,
         home: None,
-        next_to_home: None,
+        homecoming: Homecoming::default(),
     };
     let ending = follow(&mut walk, begun, None, 0, &mut |item| {
         if let Item::Point(point) = item {

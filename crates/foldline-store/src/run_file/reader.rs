@@ -212,7 +212,9 @@ pub(super) fn load_diagram(connection: &Connection, path: &Path, part: Part) -> 
                 return Err(RunFileError::Damaged(path.to_path_buf(), what));
             }
         }
-        let sql = of_branch(&of_special, "special_points", "position, rowid");
+        // As they are in a branch: on the way backwards the first one met comes last.
+        let sql =
+            of_branch(&of_special, "special_points", "position, CASE WHEN position < 0 THEN -rowid ELSE rowid END");
         branch.special = read(connection, path, &sql, &[number], special_in)?;
         let ends = read(connection, path, &of_branch("*", "ends", "side"), &[number], |row| {
             let side: i64 = row.get("side").map_err(|e| e.to_string())?;

@@ -181,6 +181,9 @@ pub fn correct_within(
     Err(Failure::NoConvergence(sizes))
 }
 
+/// Newton updates, relative, that rounding may leave next to a singular matrix.
+const STALLED: f64 = 1e-9;
+
 /// Error after the first Newton step, over the square of the error before, that is reckoned with.
 const CURVED: f64 = 10.0;
 
@@ -217,7 +220,7 @@ pub fn arrive(
         sizes.push(length);
         u.iter_mut().zip(&du).for_each(|(a, b)| *a -= b);
         // Next to a singular matrix rounding ends the descent earlier.
-        if length < close || (stalls && length < 100.0 * close) {
+        if length < close || (stalls && length < (100.0 * close).max(STALLED)) {
             break;
         }
         if stalls || sizes.len() > 5 {

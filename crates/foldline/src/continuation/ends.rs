@@ -1,21 +1,45 @@
 //! Where a side ends: at a bound, where it closes, where it meets simpler solutions.
 
-use super::corrector::{Failure, Station};
+use super::corrector::{Failure, Station, doubted};
 use super::follow::{Follow, Step};
 use super::inspect::Found;
 use super::locate::{Stretch, passing};
-use crate::diagram::{Cost, Ending, Kind, Point};
-use crate::linalg::dot;
+use crate::diagram::{Cost, Ending, Kind, Mesh, Point, SpecialPoint};
 
 /// Share of the deviation from simpler solutions below which a step is not accepted: it may have landed on them, and it
 /// could not be told on which side of the meeting it is.
 const LITTLE: f64 = 0.25;
 /// Share below which a point close to the meeting counts as beyond it.
 const NOTHING: f64 = 0.05;
-/// Difference, in tolerances, up to which a point is the start again.
+/// Distance along the branch, in tolerances, up to which a point is the start again: next to a fold the parameter places it
+/// less well than it is computed.
 const HOME: f64 = 30.0;
-/// Distances from the start, in tolerances, at which a branch that comes back is looked at for its side of a special point.
-const BESIDE: [f64; 6] = [0.1, -0.1, 1.0, -1.0, 10.0, -10.0];
+/// Distance from the start, in tolerances, from which on a branch can come back to it.
+const AWAY: f64 = 100.0;
+
+/// What a run knows of its way back to the start.
+#[derive(Clone, Debug, Default)]
+pub struct Homecoming {
+    /// Whether it has left.
+    away: bool,
+}
+
+/// The start in one phase and reflection.
+struct Image {
+    u: Vec<f64>,
+    tangent: Vec<f64>,
+    mesh: Mesh,
+}
+
+/// By how much two points that are one solution may differ: the errors that they state, and as much as a point may miss its mesh's
+/// solution by.
+fn doubt(point: &Point, home: &Point, tolerance: f64) -> f64 {
+    2.0 * (point.trust.discretisation + home.trust.discretisation) + tolerance
+}
+
+fn distance(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).fold(0.0, |most, (a, b)| most.max((a - b).abs()))
+}
 
 impl Follow<'_> {
     /// The bound of a further parameter that this step passes, and the point there.
@@ -159,110 +183,161 @@ impl Follow<'_> {
         Ok(None)
     }
 
+    /// Takes note of it when the branch has gone so far from its start, to `here`, that it can come back.
+    pub fn leaves_home(&mut self, here: &Point) {
+        let Some(home) = self.home.filter(|_| !self.homecoming.away) else { return };
+        let off = distance(&self.features(here, home, &[]), &self.features(home, home, &[]));
+        self.homecoming.away = off > AWAY * self.settings.tolerance;
+    }
+
     /// The start again, if this step passes it.
-    pub(super) fn closes(
+    ///
+    /// The start is passed where the branch goes through the plane across its tangent there, no farther from it than the errors that
+    /// both state. Where special points lie closer to it than that, they decide where it is ([`super::side`]).
+    pub(super) fn closes(&mut self, left: &Station, right: &Station, cost: &mut Cost) -> Option<Station> {
+        let home = self.home.filter(|_| self.homecoming.away)?;
+        let wanted = self.signature(home);
+        let back = self.at_its_parameter(left, right, home, cost);
+        match back {
+            Some(back) if self.signature(&back.point) == wanted => Some(back),
+            back => self.crosses(left, right, home, cost).or(back),
+        }
+    }
+
+    /// The start where its value of the parameter is met again.
+    fn at_its_parameter(&mut self, left: &Station, right: &Station, home: &Point, cost: &mut Cost) -> Option<Station> {
+        let value = home.parameters[self.free];
+        let between = (left.parameter() - value) * (right.parameter() - value) <= 0.0;
+        let same_way = home.parameter_slope() * self.direction * (right.slope() + left.slope()) > 0.0;
+        let near = |r: &Vec<bool>| right.point.difference(home, &self.settings.scales, r) < 0.5;
+        if !(between && same_way && self.settings.reflections.iter().any(near)) {
+            return None;
+        }
+        let back = self.at_parameter(left, right, value, cost).ok()?;
+        let far = 10.0 * HOME * self.settings.tolerance;
+        for reflection in self.settings.reflections.clone() {
+            let images = self.images_of_home(&back, home, &reflection, far);
+            if images.iter().any(|image| self.is_home(&back, home, image)) {
+                return Some(back);
+            }
+        }
+        None
+    }
+
+    /// The start where the plane across it is passed: next to a fold two solutions share a value of the parameter, and a
+    /// step round the fold need not pass that value at all.
+    fn crosses(&mut self, left: &Station, right: &Station, home: &Point, cost: &mut Cost) -> Option<Station> {
+        let tolerance = self.settings.tolerance;
+        let own = self.features(home, home, &[]);
+        for reflection in self.settings.reflections.clone() {
+            let [from, to] = [left, right].map(|station| self.features(&station.point, home, &reflection));
+            // Most steps are elsewhere, which costs nothing to see.
+            let near = 1.5 * distance(&from, &to) + HOME * tolerance;
+            if distance(&from, &own).min(distance(&to, &own)) > near {
+                continue;
+            }
+            let length = self.angle(left, right).1;
+            for image in self.images_of_home(right, home, &reflection, 2.0 * length + HOME * tolerance) {
+                if let Some(found) = self.crosses_at(left, right, home, &image, cost) {
+                    return Some(found);
+                }
+            }
+        }
+        None
+    }
+
+    /// The same for one image of the start.
+    fn crosses_at(
         &mut self,
         left: &Station,
         right: &Station,
-        emitted: usize,
+        home: &Point,
+        image: &Image,
         cost: &mut Cost,
-    ) -> Result<Option<Station>, Failure> {
-        let Some(home) = self.home else { return Ok(None) };
-        if emitted < 3 {
-            return Ok(None);
+    ) -> Option<Station> {
+        let tolerance = self.settings.tolerance;
+        // Where the step ends a little before the plane, the start may be met already.
+        let error = doubt(&right.point, home, tolerance);
+        let [(from, _), (to, _)] = [left, right].map(|station| self.against(station, image));
+        // A run that was stopped there goes on from the start itself.
+        if !(from <= error && to > -error) {
+            return None;
         }
-        let value = home.parameters[self.free];
-        let near = |point: &Point, tolerance: f64| {
-            self.settings.reflections.iter().any(|r| point.difference(home, &self.settings.scales, r) < tolerance)
-        };
-        let between = (left.parameter() - value) * (right.parameter() - value) <= 0.0;
-        let same_way = home.parameter_slope() * self.direction * (right.slope() + left.slope()) > 0.0;
-        if between && same_way && near(&right.point, 0.5) {
-            let back = self.at_parameter(left, right, value, cost)?;
-            if near(&back.point, HOME * self.settings.tolerance) {
-                if back.point.unstable == home.unstable {
-                    return Ok(Some(back));
-                }
-                // The start is as near to a special point as it is accurate: it is met again on its own side of that.
-                let onwards = (right.parameter() - left.parameter()).signum() * (1.0 + value.abs());
-                for aside in BESIDE {
-                    let there = value + aside * self.settings.tolerance * onwards;
-                    let inside = (left.parameter() - there) * (right.parameter() - there) < 0.0;
-                    if let Some(beside) = inside.then(|| self.at_parameter(left, right, there, cost).ok()).flatten()
-                        && beside.point.unstable == home.unstable
-                        && near(&beside.point, HOME * self.settings.tolerance)
-                    {
-                        return Ok(Some(beside));
-                    }
-                }
-                return Ok(Some(back));
+        let stretch = Stretch::new(self.problem, left, right, self.direction);
+        let (mut low, mut high) = ((0.0, from), (stretch.length, to));
+        let mut there = stretch.length;
+        for count in 0..20 {
+            if high.1 <= 0.0 || high.0 - low.0 < 1e-3 * error {
+                there = high.0;
+                break;
+            }
+            let share = if count % 3 == 2 { 0.5 } else { (low.1 / (low.1 - high.1)).clamp(0.05, 0.95) };
+            there = low.0 + share * (high.0 - low.0);
+            let found = stretch.at(self.problem, self.settings, there, cost).ok()?;
+            let (off, _) = self.against(&found, image);
+            if off <= 0.0 {
+                low = (there, off)
+            } else {
+                high = (there, off)
+            }
+            if off.abs() < 1e-2 * tolerance {
+                break;
             }
         }
-        Ok(self.crosses(left, right, home, cost))
-    }
-
-    /// The start again, where the parameter does not show that this step passes it: next to a fold two solutions share
-    /// a value of the parameter, and a step round the fold need not pass that value at all. What distinguishes solutions without
-    /// regard to their phase, parameter, period and extreme values, says on which side of the start a point is.
-    fn crosses(&mut self, left: &Station, right: &Station, home: &Point, cost: &mut Cost) -> Option<Station> {
-        let next = self.next_to_home.clone()?;
-        for reflection in self.settings.reflections.clone() {
-            let features = |point: &Point, seen: &[bool]| self.features(point, home, seen);
-            let own = features(home, &[]);
-            let along: Vec<f64> = features(&next, &[]).iter().zip(&own).map(|(b, a)| b - a).collect();
-            let length = dot(&along, &along).sqrt();
-            let side = |f: &[f64]| f.iter().zip(&own).zip(&along).map(|((f, a), d)| (f - a) * d).sum::<f64>() / length;
-            let [from, to] = [left, right].map(|station| features(&station.point, &reflection));
-            let (mut low, mut high) = ((0.0, side(&from)), (0.0, side(&to)));
-            if !(low.1 <= 0.0 && high.1 > 0.0) {
-                continue;
-            }
-            // Most passages are elsewhere in the plane across the start, which costs nothing to see.
-            let share = low.1 / (low.1 - high.1);
-            let distance = |f: &[f64], g: &[f64]| f.iter().zip(g).fold(0.0f64, |most, (a, b)| most.max((a - b).abs()));
-            let between: Vec<f64> = from.iter().zip(&to).map(|(a, b)| a + share * (b - a)).collect();
-            if distance(&between, &own) > distance(&from, &to) {
-                continue;
-            }
-            let stretch = Stretch::new(self.problem, left, right, self.direction);
-            high.0 = stretch.length;
-            // On the other side of a special point than the start, which may be as near to one as it is accurate.
-            let mut aside = None;
-            for count in 0..12 {
-                let share = if count % 3 == 2 { 0.5 } else { (low.1 / (low.1 - high.1)).clamp(0.05, 0.95) };
-                let s = low.0 + share * (high.0 - low.0);
-                let found = self.cut(left, &stretch, s, cost)?;
-                let f = self.features(&found.point, home, &reflection);
-                let off = side(&f);
-                if distance(&f, &own) < HOME * self.settings.tolerance {
-                    if found.point.unstable == home.unstable {
-                        return Some(found);
-                    }
-                    aside = Some((s, found));
-                }
-                if off <= 0.0 {
-                    low = (s, off)
-                } else {
-                    high = (s, off)
-                }
-                if off.abs() < self.settings.tolerance * if aside.is_some() { 1e-2 } else { 1.0 } {
-                    break;
-                }
-            }
-            let Some((s, found)) = aside else { continue };
-            let unit = self.settings.tolerance * (high.0 - low.0) / (high.1 - low.1);
-            for aside in BESIDE {
-                let there = (s + aside * unit).clamp(0.0, stretch.length);
-                if let Some(beside) = self.cut(left, &stretch, there, cost)
-                    && beside.point.unstable == home.unstable
-                    && distance(&self.features(&beside.point, home, &reflection), &own) < HOME * self.settings.tolerance
-                {
-                    return Some(beside);
-                }
-            }
+        let found = self.cut(left, &stretch, there, cost)?;
+        if !self.is_home(&found, home, image) {
+            return None;
+        }
+        let wanted = self.signature(home);
+        if self.signature(&found.point) == wanted {
             return Some(found);
         }
-        None
+        let shortest = 0.1 * there.min(stretch.length);
+        let mut at = |walk: &mut Self, s: f64| {
+            let mut found = stretch.at(walk.problem, walk.settings, s.max(shortest), cost).ok()?;
+            doubted(walk.problem, &mut found);
+            Some(found)
+        };
+        self.on_its_side(&wanted, there, error, &mut at).or(Some(found))
+    }
+
+    /// The start as it can be seen no farther than `within` from a station.
+    fn images_of_home(&mut self, from: &Station, home: &Point, reflection: &[bool], within: f64) -> Vec<Image> {
+        self.place(from);
+        let images = self.problem.images(&from.u, home, reflection, within);
+        images.into_iter().map(|[u, tangent]| Image { u, tangent, mesh: from.mesh.clone() }).collect()
+    }
+
+    /// How far ahead of an image of the start a station lies, along the tangent there in the direction of travel, and how far off across
+    /// it, relative.
+    fn against(&mut self, found: &Station, image: &Image) -> (f64, f64) {
+        self.place(found);
+        let [u, along] = [&image.u, &image.tangent].map(|v| self.problem.transfer(v, &image.mesh, &found.mesh));
+        let size = self.direction * self.problem.dot(&along, &along).sqrt();
+        let mut off: Vec<f64> = found.u.iter().zip(&u).map(|(a, b)| a - b).collect();
+        let ahead = self.problem.dot(&along, &off) / size;
+        off.iter_mut().zip(&along).for_each(|(off, t)| *off -= ahead / size * t);
+        (ahead, self.problem.relative_size(&off, &found.u))
+    }
+
+    /// Whether a station is the start as far as the errors of both tell: no farther off across the branch.
+    fn is_home(&mut self, found: &Station, home: &Point, image: &Image) -> bool {
+        let tolerance = self.settings.tolerance;
+        let (ahead, across) = self.against(found, image);
+        ahead.abs() < HOME * tolerance && across < doubt(&found.point, home, tolerance)
+    }
+
+    /// What has become of the count of unstable multipliers on the way to `right`, where the branch has come back to its start.
+    pub(super) fn changed_on_return(&mut self, right: &Station, position: i64) -> Option<SpecialPoint> {
+        let home = self.home?;
+        if !self.settings.stability || right.point.unstable == home.unstable {
+            return None;
+        }
+        let [before, after] = [right.point.unstable, home.unstable].map(|count| count as i64);
+        let error = doubt(&right.point, home, self.settings.tolerance);
+        let mut special = *self.special(Kind::Unexplained, right.clone(), before, after, error);
+        special.point.position = if self.direction > 0.0 { position } else { position - 1 };
+        Some(special)
     }
 
     /// Parameter, period and extreme values of a point, each relative to its size at `home`; `seen` is the reflection in which

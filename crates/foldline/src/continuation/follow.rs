@@ -5,8 +5,9 @@
 //! next step.
 
 use super::Settings;
-use super::corrector::{Aim, Failure, Plane, Station, correct, refine, station};
+use super::corrector::{Aim, Failure, Station, refine};
 use super::diagnosis::{Past, Tried};
+use super::ends::Homecoming;
 use super::inspect::{Found, History};
 use crate::contract::{Monitor, Verdict, ZeroProblem};
 use crate::diagram::{Cost, Ending, Kind, Mesh, Point, SpecialPoint};
@@ -35,8 +36,8 @@ pub struct Follow<'w> {
     pub free: usize,
     /// The point whose return ends the run as closed; `None` where the branch cannot close.
     pub home: Option<&'w Point>,
-    /// The point after `home` in the direction of travel; a run that begins at `home` finds it itself.
-    pub next_to_home: Option<Point>,
+    /// What is known of the way back there; nothing when a run begins.
+    pub homecoming: Homecoming,
 }
 
 /// An accepted step, perhaps the last one.
@@ -61,11 +62,15 @@ struct Trail {
 const FARTHEST: f64 = 2.5;
 
 /// Steps shorter than this many tolerances begin and end on the same mesh: two meshes agree to the tolerance only.
-const SHORT: f64 = 200.0;
+pub(super) const SHORT: f64 = 200.0;
 /// Share of the tolerance below which a mesh is not refined on account of short steps.
 const SHARPEST: f64 = 1e-3;
 /// Step down to which a change of stability without explanation is taken for a jump to another branch.
 const SURE: f64 = 1e-4;
+/// How often a mesh is halved for a change of stability without explanation in a short step …
+const SHARPENED: usize = 2;
+/// … and what that makes of its error, at least.
+const FINER: f64 = 1.0 / 32.0;
 /// Step down to which a branch point without a symmetry that makes it is taken for two branches that pass each other.
 const CROSSING: f64 = 2e-3;
 
@@ -112,13 +117,13 @@ pub fn follow(
         if emitted >= walk.settings.max_points {
             return Ending::PointLimit(emitted);
         }
-        let (mut cost, mut remeshed, mut coarse) = (Cost::default(), 0, 0);
+        let (mut cost, mut remeshed, mut coarse, mut sharpened) = (Cost::default(), 0, 0, 0);
         let (past, mut tried) = (Past { first_period, moved: stirred }, Tried::new());
         walk.sharpen(&mut left, step, &mut cost);
-        walk.refresh(&mut left, step);
+        let mut rigid = !walk.refresh(&mut left, step, &mut cost);
         let history = trail.as_ref().map(|t| t.history.clone());
         let (Step { mut right, end }, found) = loop {
-            let attempt = walk.attempt(&left, trail.as_ref(), step, emitted, &mut cost).and_then(|tried| {
+            let attempt = walk.attempt(&left, trail.as_ref(), step, rigid, &mut cost).and_then(|tried| {
                 let found = walk.inspect(&left, &tried.right, history.as_ref(), 0, &mut cost);
                 let believed = found.iter().all(|f| match f {
                     Found::Special(s) => step <= walk.believed_at(s.kind),
@@ -127,11 +132,22 @@ pub fn follow(
                 if believed { Ok((tried, found)) } else { Err(Failure::Unexplained) }
             });
             match attempt {
+                Ok((_, found))
+                    if is_unexplained(&found) && sharpened < SHARPENED && walk.is_short(&left.mesh, step) =>
+                {
+                    // What multipliers do closer together than this mesh is accurate it need not show as it is.
+                    sharpened += 1;
+                    cost.rejected += 1;
+                    walk.place(&left);
+                    left.share = (FINER * left.share).max(SHARPEST);
+                    left.roomier = walk.problem.finer_mesh();
+                    rigid = !walk.refresh(&mut left, step, &mut cost);
+                }
                 Ok(accepted) => break accepted,
                 Err(Failure::Remeshed(mesh)) if remeshed < 3 => {
                     remeshed += 1;
                     left.roomier = Some(mesh);
-                    walk.refresh(&mut left, step);
+                    rigid = !walk.refresh(&mut left, step, &mut cost);
                 }
                 Err(why) => {
                     cost.rejected += 1;
@@ -154,7 +170,7 @@ pub fn follow(
                         };
                     }
                     walk.sharpen(&mut left, step, &mut cost);
-                    walk.refresh(&mut left, step);
+                    rigid = !walk.refresh(&mut left, step, &mut cost);
                 }
             }
         };
@@ -179,9 +195,6 @@ pub fn follow(
                     position += walk.direction as i64;
                     emitted += 1;
                     let point = Point { position, step: rest, ..station.point };
-                    if position.abs() == 1 {
-                        walk.next_to_home.get_or_insert_with(|| point.clone());
-                    }
                     sink(Item::Point(point))
                 }
             };
@@ -191,17 +204,21 @@ pub fn follow(
         }
         position += walk.direction as i64;
         emitted += 1;
-        if position.abs() == 1 {
-            walk.next_to_home.get_or_insert_with(|| right.point.clone());
-        }
         let mut point = right.point.clone();
         (point.position, point.step, point.cost) = (position, step, cost);
         if sink(Item::Point(point)) == Verdict::Stop {
             return Ending::Stopped;
         }
         if let Some(ending) = end {
+            if ending == Ending::Closed
+                && let Some(change) = walk.changed_on_return(&right, position)
+                && sink(Item::Special(change)) == Verdict::Stop
+            {
+                return Ending::Stopped;
+            }
             return ending;
         }
+        walk.leaves_home(&right.point);
         stirred |= right.slope().abs() > STANDS;
         let here = right.parameter();
         if (here - stand.0).abs() > REST * (1.0 + here.abs()) {
@@ -232,6 +249,10 @@ pub fn follow(
         trail = Some(walk.trail(&left, &right));
         left = right;
     }
+}
+
+fn is_unexplained(found: &[Found]) -> bool {
+    found.iter().any(|item| matches!(item, Found::Special(special) if special.kind == Kind::Unexplained))
 }
 
 impl Follow<'_> {
@@ -287,23 +308,21 @@ impl Follow<'_> {
     }
 
     /// Moves the working copy of a station to a mesh with room for the next step, where its own has none left. The stored
-    /// point stays as it is. If the step is so short that the change of mesh would show in it, the copy is corrected there.
-    fn refresh(&mut self, left: &mut Station, step: f64) {
-        let Some(better) = left.roomier.take() else { return };
+    /// point stays as it is. If the step is so short that the change of mesh would show in it, the copy is a solution there, on
+    /// its own side of special points; false where there is none, and the copy stays on its mesh.
+    fn refresh(&mut self, left: &mut Station, step: f64, cost: &mut Cost) -> bool {
+        let Some(better) = left.roomier.take() else { return true };
+        if self.is_short(&left.mesh, step) {
+            match self.carried(left, &better, step, cost) {
+                Some(found) => *left = found,
+                None => return false,
+            }
+            return true;
+        }
         left.u = self.problem.transfer(&left.u, &left.mesh, &better);
         left.tangent = self.problem.transfer(&left.tangent, &left.mesh, &better);
         left.mesh = better;
-        if step < SHORT * self.settings.tolerance {
-            self.place(left);
-            let plane = Plane { row: left.tangent.clone(), base: left.u.clone(), distance: 0.0 };
-            let (mut u, mut cost) = (left.u.clone(), Cost::default());
-            let close = self.settings.closeness(&left.mesh, step);
-            let corrected = correct(self.problem, self.settings, &plane, &mut u, &mut cost)
-                .and_then(|()| station(self.problem, u, &plane.row, close, self.direction, &mut cost));
-            if let Ok(found) = corrected {
-                (left.u, left.tangent) = (found.u, found.tangent);
-            }
-        }
+        true
     }
 
     /// Angle between the tangents, and distance along the left one.
@@ -345,14 +364,19 @@ impl Follow<'_> {
         left: &Station,
         trail: Option<&Trail>,
         step: f64,
-        emitted: usize,
+        rigid: bool,
         cost: &mut Cost,
     ) -> Result<Step, Failure> {
         let guess = self.predicted(left, trail, step);
         let u = self.corrected(left, &guess, step, cost)?;
         let aim = Aim { share: left.share, close: self.settings.closeness(&left.mesh, step) };
-        let mut right = refine(self.problem, self.settings, aim, left.tangent.clone(), u, self.direction, cost)?;
-        if right.mesh != left.mesh && step < SHORT * self.settings.tolerance {
+        let short = self.is_short(&left.mesh, step);
+        let mut right = if rigid && short {
+            self.unrefined(left, u, aim.close, cost)?
+        } else {
+            refine(self.problem, self.settings, aim, left.tangent.clone(), u, self.direction, cost)?
+        };
+        if right.mesh != left.mesh && short {
             return Err(Failure::Remeshed(right.mesh));
         }
         let mut miss = 0.0;
@@ -389,7 +413,7 @@ impl Follow<'_> {
         if let Some((value, there)) = self.beyond(left, &right, cost) {
             return Ok(Step { right: there, end: Some(Ending::Bound(value)) });
         }
-        if let Some(home) = self.closes(left, &right, emitted, cost)? {
+        if let Some(home) = self.closes(left, &right, cost) {
             return Ok(Step { right: home, end: Some(Ending::Closed) });
         }
         Ok(Step { right, end })

@@ -24,6 +24,9 @@ pub enum Found {
 /// Halvings of one step before what is left is recorded as it is.
 const DEEPEST: usize = 14;
 
+/// Distance below which two places of a curve on one mesh cannot be told apart for rounding.
+const CLOSEST: f64 = 1e-11;
+
 /// Halvings after which the ends of a stretch show what lies between them.
 const CLOSE: usize = 6;
 
@@ -75,7 +78,18 @@ impl Follow<'_> {
         depth: usize,
         cost: &mut Cost,
     ) -> Vec<Found> {
-        let stretch = Stretch::new(self.problem, left, right, self.direction);
+        // What lies closer together than two meshes agree is told apart on one of them.
+        let mut stretch = Stretch::new(self.problem, left, right, self.direction);
+        let short = self.is_short(&left.mesh, stretch.length);
+        let carried = if short && self.settings.stability && right.mesh != left.mesh {
+            self.carried(right, &left.mesh, stretch.length, cost)
+        } else {
+            None
+        };
+        if let Some(carried) = &carried {
+            stretch = Stretch::new(self.problem, left, carried, self.direction);
+        }
+        let right = carried.as_ref().unwrap_or(right);
         let (at_left, at_right) = (self.monitored(left), self.monitored(right));
         let standing = self.stands(left, right, stretch.length.abs());
         let mut located: Vec<(Kind, usize, Located)> = Vec::new();
@@ -160,7 +174,7 @@ impl Follow<'_> {
         };
         let accounted = !self.settings.stability
             || explains(&jumps, left.point.unstable as i64, right.point.unstable as i64)
-            || (standing && jumps.is_empty() && change == 1);
+            || (standing && !short && jumps.is_empty() && change == 1);
         // A change of sign that could not be located is not passed over either, not even next to one that could.
         let closer = jumps.is_empty() || depth < CLOSE;
         let explained = accounted && !(lost && closer && self.settings.stability);
@@ -178,15 +192,15 @@ impl Follow<'_> {
         let suspicious = suspicious || seen.is_some();
         if depth < DEEPEST
             && (jumps.len() > 1 || !explained || misfit.is_some() || (suspicious && jumps.is_empty()))
-            && stretch.length.abs() > self.settings.min_step
+            && stretch.length.abs() > if short { CLOSEST } else { self.settings.min_step }
         {
             let cut = match &located[..] {
                 [a, .., b] => 0.5 * (a.2.distance + b.2.distance),
                 _ => misfit.or(seen).unwrap_or(0.5 * stretch.length),
             };
             // Neighbouring special points that cannot be told apart any more stay together.
-            let apart = located.len() < 2
-                || located[located.len() - 1].2.distance - located[0].2.distance > 1e-7 * (1.0 + stretch.length);
+            let together = if short { CLOSEST } else { 1e-7 * (1.0 + stretch.length) };
+            let apart = located.len() < 2 || located[located.len() - 1].2.distance - located[0].2.distance > together;
             // Exactly there Newton's method may fail.
             let places = [cut, 0.5 * cut, 0.5 * (cut + stretch.length)];
             let middle = places
@@ -240,7 +254,14 @@ impl Follow<'_> {
         self.monitors[monitor].confirms(&left.point) || self.monitors[monitor].confirms(&right.point)
     }
 
-    fn special(&mut self, kind: Kind, mut station: Station, before: i64, after: i64, error: f64) -> Box<SpecialPoint> {
+    pub(super) fn special(
+        &mut self,
+        kind: Kind,
+        mut station: Station,
+        before: i64,
+        after: i64,
+        error: f64,
+    ) -> Box<SpecialPoint> {
         if station.point.trust.spectrum.is_nan() {
             self.place(&station);
             if self.problem.factorise(&station.u, &station.tangent).is_ok() {
@@ -274,6 +295,10 @@ impl Follow<'_> {
     /// A full station at distance s of the stretch.
     pub(super) fn cut(&mut self, left: &Station, stretch: &Stretch, s: f64, cost: &mut Cost) -> Option<Station> {
         let u = stretch.corrected(self.problem, self.settings, s, cost).ok()?;
+        if self.settings.stability && self.is_short(&left.mesh, stretch.length) {
+            let close = self.settings.closeness(&left.mesh, stretch.length);
+            return self.unrefined(left, u, close, cost).ok();
+        }
         let aim = Aim { share: left.share, close: self.settings.closeness(&left.mesh, s) };
         refine(self.problem, self.settings, aim, left.tangent.clone(), u, self.direction, cost).ok()
     }

@@ -7,12 +7,15 @@
 //! **Source.** chandrupatla1997 (bracketing with inverse quadratic interpolation and bisection).
 
 use super::corrector::{Plane, Station, arrive, correct, examined, parameter_row, settle};
-use super::{Failure, Settings};
+use super::{Failure, ROUNDING, Settings};
 use crate::contract::{Examination, Monitor, ZeroProblem};
 use crate::diagram::{Cost, Kind, Point};
 
 /// Share of the larger value at the ends that a monitor keeps at a change of sign if it jumps there instead of vanishing.
 const JUMP: f64 = 0.05;
+
+/// Distance along the curve below which a zero is not looked for more closely, for rounding.
+const FINEST: f64 = 1e-12;
 
 /// A located zero.
 #[derive(Clone, Debug)]
@@ -388,12 +391,13 @@ fn relocate(
         let found = seen_by(monitor, problem, u, tangent, stretch.direction);
         Ok((monitor.value(&stretch.left.point, &found.point), found))
     };
-    let reach = stretch.length.abs();
+    // Along the curve the zero may be as far off as two meshes agree, which can be more than the stretch.
+    let reach = stretch.length.abs().max(settings.tolerance);
     // So far below the tolerance that the error of the iteration does not show, and on a short stretch so little of it that
     // the monitor has no doubt.
-    let enough = (1e-2 * settings.tolerance).min(1e-3 * reach);
+    let mut enough = (1e-2 * settings.tolerance).min(1e-3 * stretch.length.abs());
     // Of two values closer together than this the difference is noise.
-    let apart = (100.0 * settings.tolerance).min(1e-2 * reach);
+    let mut apart = (100.0 * settings.tolerance).min(1e-2 * stretch.length.abs());
     let (mut a, (mut ga, mut found)) = (0.0, at(base, settings.closeness(finer, stretch.length))?);
     let mut step = match *slope {
         Some(slope) if (ga / slope).abs() < reach => -ga / slope,
@@ -402,9 +406,16 @@ fn relocate(
     // The closest known place with the other sign: a monitor that bends sharply throws secant steps off, and past such a
     // place they are replaced by halves.
     let mut other: Option<f64> = None;
+    // Where multipliers change fast along the curve, this close is not close enough to see what they do.
+    let unclear = |found: &Station, enough: f64| {
+        enough > FINEST && monitor.jump() > 0 && monitor.possible(&found.point) && !monitor.confirms(&found.point)
+    };
     for round in 0..40 {
         if step.abs() < enough || !step.is_finite() {
-            return Ok((completed(monitor, problem, found, stretch.direction), step.abs()));
+            if !step.is_finite() || !unclear(&found, enough) {
+                return Ok((completed(monitor, problem, found, stretch.direction), step.abs()));
+            }
+            (enough, apart) = (1e-2 * enough, 0.0);
         }
         let mut b = a + step;
         match other {
@@ -417,7 +428,7 @@ fn relocate(
             _ => {}
         }
         let from = found.u.iter().zip(&found.tangent).map(|(u, t)| u + (b - a) * t).collect();
-        let (gb, next) = at(from, settings.newton_tolerance())?;
+        let (gb, next) = at(from, settings.newton_tolerance().min(0.1 * enough).max(ROUNDING))?;
         let rise = match *slope {
             Some(slope) if (b - a).abs() < apart => slope,
             _ => (gb - ga) / (b - a),
@@ -429,7 +440,10 @@ fn relocate(
         }
         (a, ga, found) = (b, gb, next);
         if other.is_some_and(|o| (o - a).abs() < enough) {
-            return Ok((completed(monitor, problem, found, stretch.direction), enough));
+            if !unclear(&found, enough) {
+                return Ok((completed(monitor, problem, found, stretch.direction), enough));
+            }
+            (enough, apart) = (1e-2 * enough, 0.0);
         }
     }
     Err(Failure::NoConvergence(vec![step.abs()]))

@@ -10,6 +10,7 @@
 //! | whether a step may be accepted | `judge` |
 //! | why a side ends | `ends` |
 //! | what lies between two accepted points | [`inspect`] |
+//! | on which side of it a point is | `side` |
 //! | zero of a monitor along the curve | [`locate`] |
 //! | the same where branches cross | [`straddle`] |
 //!
@@ -22,11 +23,16 @@ pub mod follow;
 pub mod inspect;
 mod judge;
 pub mod locate;
+mod side;
 pub mod straddle;
 
 pub use corrector::{Failure, Station};
 pub(crate) use diagnosis::UNCROSSED;
+pub use ends::Homecoming;
 pub use follow::{Follow, Item, follow};
+
+/// Newton updates on a mesh, relative, that rounding may leave.
+const ROUNDING: f64 = 1e-12;
 
 /// Everything that governs a continuation run. The user states `tolerance`, the range and the limit on points; the rest
 /// follows from them and never needs touching.
@@ -91,8 +97,13 @@ impl Settings {
     /// discretisation a tenth of the tolerance does not show, nor does a thousandth of the step of that `length` in what
     /// changes along it; where there is no mesh the iteration goes all the way.
     pub fn closeness(&self, mesh: &crate::diagram::Mesh, length: f64) -> f64 {
-        let far = if mesh.is_empty() { 0.0 } else { (0.1 * self.tolerance).min(1e-3 * length.abs()) };
-        far.max(self.newton_tolerance())
+        if mesh.is_empty() {
+            return self.newton_tolerance();
+        }
+        let far = (0.1 * self.tolerance).min(1e-3 * length.abs());
+        // In a step so short that more would show, closer than elsewhere.
+        let near = if length == 0.0 { f64::INFINITY } else { 1e-5 * length.abs() };
+        far.max(self.newton_tolerance().min(near)).max(ROUNDING)
     }
 
     /// Size of the last Newton update, relative: far enough below the tolerance that iteration errors do not show.

@@ -31,6 +31,14 @@ impl Solution {
         }
     }
 
+    /// The mesh of a cycle; empty for an equilibrium.
+    pub fn mesh(&self) -> Mesh {
+        match self {
+            Solution::Equilibrium(_) => Mesh::default(),
+            Solution::Cycle(cycle) => cycle.mesh.clone(),
+        }
+    }
+
     /// The period of a cycle that no forcing gives.
     pub fn free_period(&self) -> Option<f64> {
         self.period().filter(|_| self.forcing_periods() == 0)
@@ -560,7 +568,9 @@ impl Branch {
 
     /// Inserts a special point at its position.
     pub fn insert_special(&mut self, special: SpecialPoint) {
-        let at = self.special.partition_point(|s| s.point.position <= special.point.position);
+        // On the way backwards the first one met comes last.
+        let own = special.point.position;
+        let at = self.special.partition_point(|s| s.point.position < own || own >= 0 && s.point.position == own);
         self.special.insert(at, special);
     }
 

@@ -3,7 +3,7 @@
 use super::System;
 use super::counted::Counted;
 use crate::continuation::corrector::{Plane, parameter_row, settle, station};
-use crate::continuation::{Failure, Follow, Item, Settings, Station, follow};
+use crate::continuation::{Failure, Follow, Homecoming, Item, Settings, Station, follow};
 use crate::contract::{Event, Monitor, Observer, Verdict, ZeroProblem};
 use crate::diagram::{Branch, Cost, Ending, Family, Kind, Origin, Point, Solution, SpecialPoint};
 use crate::problem::{Axis, Setting, Tie, cycle::CycleProblem, equilibrium::EquilibriumProblem, held::Held, mesh};
@@ -342,11 +342,6 @@ impl Growth<'_> {
         };
         monitors.extend(self.marks.iter().map(|mark| Box::new(*mark) as Box<dyn Monitor>));
         let home = branch.points.iter().find(|p| p.position == 0).filter(|_| branch.ends[0].is_none()).cloned();
-        let next_to_home = home.as_ref().and_then(|_| {
-            let position = direction as i64;
-            let own = branch.points.iter().find(|p| p.position == position).cloned();
-            own.or_else(|| self.observer.recall(branch, position))
-        });
         let mut walk = Follow {
             problem: &mut *problem,
             settings: self.settings,
@@ -355,8 +350,10 @@ impl Growth<'_> {
             direction,
             free: branch.free,
             home: home.as_ref(),
-            next_to_home,
+            homecoming: Homecoming::default(),
         };
+        // A run that goes on may be on its way back already.
+        branch.points.iter().filter(|p| p.position as f64 * direction > 0.0).for_each(|p| walk.leaves_home(p));
         follow(&mut walk, start, previous, emitted, &mut |item| {
             let going = match item {
                 Item::Special(mut special) => {

@@ -302,6 +302,15 @@ impl ZeroProblem for Held<'_> {
         self.surface.point(&u[self.extra()..], tangent, examination)
     }
 
+    fn images(&mut self, beside: &[f64], point: &Point, reflection: &[bool], within: f64) -> Vec<[Vec<f64>; 2]> {
+        let e = self.extra();
+        let Some((extra, rest)) = point.tangent.split_at_checked(e) else { return Vec::new() };
+        let below = Point { tangent: rest.to_vec(), ..point.clone() };
+        let guess = self.condition.guess(point);
+        let images = self.surface.images(&beside[e..], &below, reflection, within);
+        images.into_iter().map(|[u, along]| [[&guess[..], &u].concat(), [extra, &along].concat()]).collect()
+    }
+
     fn unknowns_of(&mut self, point: &Point) -> Vec<f64> {
         let mut u = self.condition.guess(point);
         u.extend(self.surface.unknowns_of(point));

@@ -21,7 +21,10 @@ impl Monitor for PeriodDoubling {
     }
 
     fn confirms(&self, at: &Point) -> bool {
-        at.free_spectrum().iter().any(|z| (z + 1.0).norm() < 1e-2)
+        // Where a pair has just met at -1, each is off by the square root of what their product is.
+        let mut off: Vec<f64> = at.free_spectrum().iter().map(|z| (z + 1.0).norm() / (1.0 + z.norm())).collect();
+        off.sort_by(f64::total_cmp);
+        off.iter().take(2).product::<f64>() < 2.5e-3 || off.first().is_some_and(|least| *least < 5e-3)
     }
 
     fn jump(&self) -> usize {

@@ -29,6 +29,7 @@
 
 mod assembly;
 mod errors;
+mod phase;
 mod residual;
 
 use super::defect;
@@ -467,6 +468,10 @@ impl ZeroProblem for CycleProblem<'_> {
             trust: examination.trust,
             cost: Default::default(),
         }
+    }
+
+    fn images(&mut self, beside: &[f64], point: &Point, reflection: &[bool], within: f64) -> Vec<[Vec<f64>; 2]> {
+        self.in_phase(beside, point, reflection, within)
     }
 
     fn unknowns_of(&mut self, point: &Point) -> Vec<f64> {

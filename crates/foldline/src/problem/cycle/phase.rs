@@ -1,0 +1,202 @@
+//! A cycle in the phases in which it is close to another one.
+//!
+//! **Idea.** A branch that comes back to a cycle comes back to it in any phase. Shifts θ are sought at which the distance of both
+//! profiles is smallest: at equal distances first, then as zeros of the phase condition (1), whose slope is next to that
+//! of two equal profiles. There can be several: where a cycle of three turns is nearly one turn run through three times, it is close to
+//! itself a third of its period later.
+//!
+//! **Equations.** With weights w at the Gauss points t of the mesh of x:
+//!
+//!   (1)  g(θ) = Σ w ⟨y(t + θ) - x(t), x'(t)⟩ = 0,   g' ≈ Σ w ⟨x'(t), x'(t)⟩
+
+use super::CycleProblem;
+use crate::contract::ZeroProblem;
+use crate::diagram::{Cycle, Point, Solution};
+
+/// Equal distances at which two profiles are compared.
+const PLACES: usize = 480;
+/// Newton steps, or halvings, for (1).
+const ROUNDS: usize = 60;
+/// Shift below which none is seen.
+const FINEST: f64 = 1e-14;
+
+impl CycleProblem<'_> {
+    /// See [`crate::contract::ZeroProblem::images`].
+    pub(super) fn in_phase(
+        &self,
+        beside: &[f64],
+        point: &Point,
+        reflection: &[bool],
+        within: f64,
+    ) -> Vec<[Vec<f64>; 2]> {
+        let Solution::Cycle(cycle) = &point.solution else { return Vec::new() };
+        let (n, size, whole) = (self.n, self.profile_size(), cycle.profile.len());
+        if cycle.degree != self.scheme.degree || point.tangent.len() + size != whole + beside.len() {
+            return Vec::new();
+        }
+        let mirrored = |profile: &[f64]| -> Cycle {
+            let sign = |k: usize| if reflection.get(k % n).copied().unwrap_or(false) { -1.0 } else { 1.0 };
+            let profile = profile.iter().enumerate().map(|(k, v)| sign(k) * v).collect();
+            Cycle { profile, ..cycle.clone() }
+        };
+        let (states, tangent) = (mirrored(&cycle.profile), mirrored(&point.tangent[..whole]));
+        let period = if self.is_forced() { f64::from(self.forcing_periods) } else { cycle.period };
+        let scalars = [&[period][..], &self.setting.values_of(point)].concat();
+        let close = |u: &Vec<f64>| {
+            let off: Vec<f64> = u.iter().zip(beside).map(|(a, b)| a - b).collect();
+            self.dot(&off, &off) <= within * within
+        };
+        let images = self.shifts(&beside[..size], &states).into_iter().map(|shift| {
+            let u = [&self.moved(&states, shift)[..], &scalars].concat();
+            [u, [&self.moved(&tangent, shift)[..], &point.tangent[whole..]].concat()]
+        });
+        images.filter(|[u, _]| close(u)).collect()
+    }
+
+    /// The profile of `y` on the mesh of this problem, later by θ.
+    fn moved(&self, y: &Cycle, shift: f64) -> Vec<f64> {
+        let mut out = vec![0.0; self.profile_size()];
+        for (j, block) in out.chunks_exact_mut(self.block()).enumerate() {
+            for (node, to) in self.scheme.nodes.iter().zip(block.chunks_exact_mut(self.n)) {
+                y.state_into(&self.scheme, self.mesh[j] + node * self.h(j) + shift, to);
+            }
+        }
+        out
+    }
+
+    /// Every θ at which the distance is smaller than close by.
+    fn shifts(&self, x: &[f64], y: &Cycle) -> Vec<f64> {
+        let n = self.n;
+        let periods = self.forcing_periods as usize;
+        let here = Cycle { mesh: self.mesh.clone(), profile: x.to_vec(), ..y.clone() };
+        // A forced cycle is a solution only where it is moved by whole periods of the forcing.
+        let places = if self.is_forced() { (PLACES / periods).max(8) * periods } else { PLACES };
+        let stride = if self.is_forced() { places / periods } else { 1 };
+        let (a, b) = (here.uniform(places), y.uniform(places));
+        let apart = |k: usize| -> f64 {
+            let later = b[k * n..].iter().chain(&b[..k * n]);
+            a.iter().zip(later).enumerate().map(|(i, (a, b))| ((a - b) / self.scale[i % n]).powi(2)).sum()
+        };
+        let all: Vec<f64> = (0..places).step_by(stride).map(apart).collect();
+        let count = all.len();
+        let lowest = |k: &usize| all[*k] <= all[(k + 1) % count] && all[*k] <= all[(k + count - 1) % count];
+        let about = (0..count).filter(lowest).map(|k| k as f64 / count as f64);
+        about
+            .map(|about| if self.is_forced() { about } else { self.exactly(x, y, about, 1.0 / count as f64) })
+            .collect()
+    }
+
+    /// The zero of (1) no farther than `width` from `about`.
+    fn exactly(&self, x: &[f64], y: &Cycle, about: f64, width: f64) -> f64 {
+        let (mut low, mut high, mut shift) = (about - width, about + width, about);
+        for _ in 0..ROUNDS {
+            let (g, slope) = self.out_of_phase(x, y, shift);
+            if g > 0.0 {
+                high = shift
+            } else {
+                low = shift
+            }
+            let step = -g / slope;
+            if step.abs() < FINEST {
+                break;
+            }
+            shift = if shift + step > low && shift + step < high { shift + step } else { 0.5 * (low + high) };
+        }
+        shift
+    }
+
+    /// (1) and its slope for equal profiles.
+    fn out_of_phase(&self, x: &[f64], y: &Cycle, shift: f64) -> (f64, f64) {
+        let (n, m) = (self.n, self.scheme.degree);
+        let (mut g, mut slope, mut other) = (0.0, 0.0, vec![0.0; n]);
+        for (j, block) in x.chunks_exact(self.block()).enumerate() {
+            let h = self.h(j);
+            for i in 1..=m {
+                y.state_into(&self.scheme, self.mesh[j] + self.scheme.nodes[i] * h + shift, &mut other);
+                let row = &self.scheme.derivative[(i - 1) * (m + 1)..i * (m + 1)];
+                for c in 0..n {
+                    let rate = row.iter().zip(block[c..].iter().step_by(n)).map(|(d, v)| d * v).sum::<f64>() / h;
+                    let weight = self.scheme.weights[i - 1] * h / self.scale[c].powi(2);
+                    g += weight * (other[c] - block[i * n + c]) * rate;
+                    slope += weight * rate * rate;
+                }
+            }
+        }
+        (g, slope)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::{Definition, Model, ModelSource, Parameter, State};
+    use crate::problem::gauss::Scheme;
+    use crate::problem::{Axis, Setting, mesh};
+
+    fn field() -> Model {
+        Model::compile(ModelSource {
+            name: "two".into(),
+            parameters: vec![Parameter::new("p", 1.0)],
+            states: vec![State::new("x"), State::new("y")],
+            equations: vec![Definition::new("x", "p*y"), Definition::new("y", "-x")],
+            ..ModelSource::default()
+        })
+        .unwrap()
+    }
+
+    /// (sin τ + sin 3τ / 2, cos τ) at τ = 2π (t + phase), on a mesh.
+    fn cycle(intervals: usize, phase: f64) -> Cycle {
+        let scheme = Scheme::new(4);
+        let times = (0..intervals)
+            .flat_map(|j| scheme.nodes.iter().map(move |c| (j as f64 + c) / intervals as f64).collect::<Vec<_>>());
+        let turned = times.map(|t| std::f64::consts::TAU * (t + phase));
+        let profile = turned.flat_map(|a| [a.sin() + 0.5 * (3.0 * a).sin(), a.cos()]).collect();
+        Cycle { period: 2.0, forcing_periods: 0, mesh: mesh::uniform(intervals), degree: 4, profile }
+    }
+
+    #[test]
+    fn a_cycle_that_is_nearly_a_shorter_one_is_seen_once_for_each_turn() {
+        // Three turns, which differ by a thousandth.
+        let field = field();
+        let scales = [1.0, 1.0];
+        let setting = Setting { field: &field, scales: &scales, parameters: vec![1.0], axes: vec![Axis::new(0, 1.0)] };
+        let times = (0..90)
+            .flat_map(|j| Scheme::new(4).nodes.into_iter().map(move |c| std::f64::consts::TAU * (j as f64 + c) / 90.0));
+        let profile = times.flat_map(|a| [(3.0 * a).sin() + 1e-3 * a.sin(), (3.0 * a).cos()]).collect();
+        let turns = Cycle { period: 2.0, forcing_periods: 0, mesh: mesh::uniform(90), degree: 4, profile };
+        let mut problem = CycleProblem::like(setting, &turns);
+        let beside: Vec<f64> = turns.profile.iter().copied().chain([2.0, 1.0]).collect();
+        problem.anchor(&beside);
+        let point = problem.point(&beside, &beside, Default::default());
+        assert_eq!(problem.in_phase(&beside, &point, &[false; 2], 1e-2).len(), 3);
+        assert_eq!(problem.in_phase(&beside, &point, &[false; 2], 1e-5).len(), 1);
+    }
+
+    #[test]
+    fn a_cycle_is_seen_in_the_phase_and_the_reflection_of_another() {
+        let model = field();
+        let scales = [1.0, 1.0];
+        let setting = Setting { field: &model, scales: &scales, parameters: vec![1.0], axes: vec![Axis::new(0, 1.0)] };
+        let (here, there) = (cycle(60, 0.0), cycle(84, 0.3137));
+        let mut problem = CycleProblem::like(setting, &here);
+        let beside: Vec<f64> = here.profile.iter().copied().chain([2.0, 1.0]).collect();
+        problem.anchor(&beside);
+        // The tangent is the profile itself, so that it shows where that went.
+        let tangent: Vec<f64> = there.profile.iter().copied().chain([0.5, 0.25]).collect();
+        let mut point = problem.point(&beside, &tangent, Default::default());
+        for reflected in [false, true] {
+            let sign = if reflected { -1.0 } else { 1.0 };
+            let profile = there.profile.iter().map(|v| sign * v).collect();
+            point.solution = Solution::Cycle(Cycle { profile, ..there.clone() });
+            let images = problem.in_phase(&beside, &point, &[reflected; 2], 1e-3);
+            let [[u, along]] = &images[..] else { panic!("{} images", images.len()) };
+            assert_eq!((u.len(), &along[along.len() - 2..]), (beside.len(), &[0.5, 0.25][..]));
+            let off = u.iter().zip(&beside).fold(0.0f64, |most, (a, b)| most.max((a - b).abs()));
+            // What polynomials of degree 4 on 60 intervals leave of sin 3τ.
+            assert!(off < 1e-5, "{off:e}");
+            let off =
+                along.iter().zip(&beside[..here.profile.len()]).fold(0.0f64, |m, (a, b)| m.max((a - sign * b).abs()));
+            assert!(off < 1e-5, "{off:e}");
+        }
+    }
+}
