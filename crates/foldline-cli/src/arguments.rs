@@ -84,7 +84,7 @@ pub struct Explore {
     #[arg(long, value_name = "NAME=LOW:HIGH", allow_hyphen_values = true)]
     pub connect: Option<String>,
     /// At how many values of the parameter attractors and equilibria are looked for
-    #[arg(long, value_name = "N", default_value_t = 15, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 15, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub values: u32,
     /// How many initial states at each
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..))]

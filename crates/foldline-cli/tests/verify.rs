@@ -38,7 +38,8 @@ fn the_reference_run_is_right_and_what_is_changed_in_it_is_found() {
 
     // A special point that says to be elsewhere than it is.
     let file = rusqlite::Connection::open(Path::new(&run).join("run.sqlite")).unwrap();
-    let sql = "SELECT rowid, position, unstable, parameter_bytes, spectrum_bytes, range_bytes, scalar_bytes, average_bytes
+    let sql =
+        "SELECT rowid, position, unstable, parameter_bytes, spectrum_bytes, range_bytes, scalar_bytes, average_bytes
                FROM special_points WHERE kind = 'period-doubling' LIMIT 1";
     let (row, counts, mut lists): (i64, [i64; 2], [Vec<u8>; 5]) = file
         .query_row(sql, [], |row| {

@@ -55,7 +55,8 @@ pub(super) fn read(
             let given = table.get(key).and_then(|v| walk.integer(v, &format!("`{key}`"), 1..=100_000_000));
             given.map_or(usual, |n| n as usize)
         };
-        let values = whole(walk, "values", VALUES);
+        let values =
+            table.get("values").and_then(|v| walk.integer(v, "`values`", 1..=10_000)).map_or(VALUES, |n| n as usize);
         let samples = whole(walk, "samples", SAMPLES);
         let budget = whole(walk, "budget", BUDGET);
         let random = table.get("random").and_then(|v| walk.integer(v, "`random`", 0..=u64::MAX)).unwrap_or(RANDOM);
