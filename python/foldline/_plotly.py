@@ -1,0 +1,104 @@
+"""Interactive pictures with plotly, which is imported only here."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ._errors import InputError
+from ._plot import COLOURS, _root, quantities
+
+if TYPE_CHECKING:
+    from ._branch import Branch
+
+_SYMBOLS = {
+    "fold": "circle", "branch-point": "x", "hopf": "square", "period-doubling": "triangle-up", "torus": "diamond",
+    "mark": "line-ns", "unexplained": "x-thin",
+}  # fmt: skip
+
+
+def figure(branches: Sequence[Branch], x: str | None, y: str | None) -> Any:
+    """Lines with hover for points, marks for special points."""
+    try:
+        from plotly import graph_objects
+    except ImportError as error:
+        raise ImportError("interactive pictures need plotly: pip install plotly") from error
+    shown = [branch for branch in branches if len(branch)]
+    if not shown:
+        raise InputError("there is nothing to draw\n  help: follow a branch first")
+    held = shown[0].held
+    across, up = (x or held[1], y or shown[0].free) if held is not None else quantities(shown, x, y)
+    picture = graph_objects.Figure()
+    roots = list(dict.fromkeys(_root(own.diagram, own.name) for own in shown))
+    for own in shown:
+        colour = COLOURS[roots.index(_root(own.diagram, own.name)) % len(COLOURS)]
+        for trace in (*_lines(graph_objects, own, across, up, colour), *_marks(graph_objects, own, across, up, colour)):
+            picture.add_trace(trace)
+    picture.update_layout(xaxis_title=across, yaxis_title=up, template="plotly_white", hovermode="closest")
+    return picture
+
+
+def _lines(graph_objects: Any, own: Branch, x: str, y: str, colour: str) -> list[Any]:
+    """One line where the branch is stable, one where not; where two meet both have the special point."""
+    places, heights, stable, texts = _rows(own, x, y)
+    traces = []
+    for wanted, dash in ((True, "solid"), (False, "dash")):
+        kept = np.array([s is None or s == wanted for s in stable])
+        if not any(s == wanted for s in stable):
+            continue
+        style = {"color": colour, "dash": dash, "width": 2}
+        traces.append(
+            graph_objects.Scatter(
+                x=np.where(kept, places, np.nan), y=np.where(kept, heights, np.nan), mode="lines", line=style, name=own.name,
+                legendgroup=own.name, showlegend=not traces, text=texts, hoverinfo="text", connectgaps=False,
+            )  # fmt: skip
+        )
+    return traces
+
+
+def _rows(own: Branch, x: str, y: str) -> tuple[Any, Any, list[bool | None], list[str]]:
+    rows = []
+    for k in range(len(own)):
+        place = (int(own.position[k]), 0)
+        rows.append((place, own[x][k], own[y][k], bool(own.unstable[k] == 0), _text(own, k)))
+    rows += [((p._native.position, 1), p[x], p[y], None, _special_text(p)) for p in own.special]
+    rows.sort(key=lambda row: row[0])
+    return np.array([r[1] for r in rows]), np.array([r[2] for r in rows]), [r[3] for r in rows], [r[4] for r in rows]
+
+
+def _text(own: Branch, k: int) -> str:
+    values = [f"{name} = {value:.8g}" for name, value in zip(own.diagram.model.parameters, own.parameters[k], strict=True)]
+    period = [] if np.isnan(own.period[k]) else [f"period {own.period[k]:.8g}"]
+    what = "multipliers" if own.family == "cycle" else "eigenvalues"
+    spectrum = ", ".join(_complex(value) for value in own.spectrum[k])
+    error = f"error {own['discretisation'][k]:.1e}, of {what} {own['spectrum_error'][k]:.1e}"
+    return "<br>".join([own.name, ", ".join(values), *period, f"{what} {spectrum}", error])
+
+
+def _special_text(point: Any) -> str:
+    values = [f"{name} = {value:.10g}" for name, value in point.parameters.items()]
+    period = [] if point.period is None else [f"period {point.period:.8g}"]
+    form = [point.normal_form] if point.normal_form else []
+    head = f"<b>{point.kind}</b> of {point.branch.name}"
+    spectrum = ", ".join(_complex(value) for value in point.spectrum)
+    return "<br>".join([head, ", ".join(values), *period, spectrum, f"error {point.error:.1e}", *form])
+
+
+def _complex(value: complex) -> str:
+    return f"{value.real:.4g}" if value.imag == 0 else f"{value.real:.4g}{value.imag:+.4g}j"
+
+
+def _marks(graph_objects: Any, own: Branch, x: str, y: str, colour: str) -> list[Any]:
+    traces = []
+    for kind in dict.fromkeys(point.kind for point in own.special):
+        chosen = own.special[kind]
+        style = {"symbol": _SYMBOLS.get(kind, "star"), "color": colour, "size": 9, "line": {"width": 1, "color": "white"}}
+        traces.append(
+            graph_objects.Scatter(
+                x=[p[x] for p in chosen], y=[p[y] for p in chosen], mode="markers", marker=style, name=kind,
+                legendgroup=own.name, showlegend=False, text=[_special_text(p) for p in chosen], hoverinfo="text",
+            )  # fmt: skip
+        )
+    return traces
