@@ -164,7 +164,7 @@ class Symbol:
         raise refused(
             "the model branches on a value that is not known while it is traced",
             "write foldline.where(condition, a, b) instead of `if`, `and`, `or`, `while` and chained comparisons; & and | combine "
-            "conditions; np.minimum and np.maximum replace min and max",
+            "conditions; np.minimum and np.maximum, of single values, replace min and max",
         )
 
     def __float__(self) -> float:
@@ -214,6 +214,19 @@ class Symbol:
             f"np.{getattr(function, '__name__', '?')} cannot be traced",
             "write it with + - * / **, foldline.where and the elementary functions of numpy",
         )
+
+    # What NumPy calls for the elements of an array of objects; the table below has the functions of one operand.
+
+    def hypot(self, other: Any) -> Any:
+        return _function("hypot", (self, other))
+
+    def arctan2(self, other: Any) -> Any:
+        return _function("arctan2", (self, other))
+
+    def __getattr__(self, name: str) -> Any:
+        if name in _ONE or name in ("deg2rad", "radians", "log10", "log2"):
+            return lambda: _function(name, (self,))
+        raise AttributeError(f"a symbol has no attribute `{name}`")
 
     def __repr__(self) -> str:
         from ._write import written

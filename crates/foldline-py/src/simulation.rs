@@ -4,7 +4,7 @@ use crate::bytes::{numbers, read};
 use crate::model::{Model, outputs_at};
 use crate::patience::patiently;
 use foldline::contract::{VectorField, Verdict};
-use foldline::simulation::{Integrator, Outcome, Passage, Tolerance};
+use foldline::simulation::{Clocked, Integrator, Outcome, Passage, Tolerance};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use std::sync::Arc;
@@ -49,14 +49,16 @@ fn course(
     tolerance: f64,
     stop: &AtomicBool,
 ) -> (Vec<f64>, Vec<f64>, Outcome) {
-    let scales = model.scales();
-    let absolute = scales.iter().map(|scale| tolerance * scale).collect();
-    let integrator = Integrator::new(model, parameters, Tolerance { relative: tolerance, absolute });
+    let absolute = model.scales().iter().chain([&1.0]).map(|scale| tolerance * scale).collect();
+    let field = Clocked(model);
+    let integrator = Integrator::new(&field, parameters, Tolerance { relative: tolerance, absolute });
+    let n = model.dim();
+    let start = &[start, &span[..1]].concat();
     let forwards = span[1] >= span[0];
     let (mut times, mut states) = (Vec::new(), Vec::new());
     let mut keep = |time: f64, state: &[f64]| {
         times.push(time);
-        states.extend_from_slice(state);
+        states.extend_from_slice(&state[..n]);
     };
     let mut next = 0;
     let ahead = |next: usize, end: f64| {
@@ -72,7 +74,7 @@ fn course(
             }
         }
     }
-    let mut x = start.to_vec();
+    let mut x = start.clone();
     let arrival = integrator.trajectory(start, span, &[], &mut |passage| {
         if let Passage::Step(step) = passage {
             if wanted.is_none() {

@@ -207,7 +207,9 @@ pub(super) fn switching(walk: &mut Walk, value: &Value) -> Switching {
                 }
             }
             None if switch_step(name).is_some() => {
-                if let (Some((kind, number)), Some(depth)) = (switch_step(name), walk.integer(value, "the depth", 0..=16)) {
+                if let (Some((kind, number)), Some(depth)) =
+                    (switch_step(name), walk.integer(value, "the depth", 0..=16))
+                {
                     switching.only.push((kind, number, depth as usize));
                 }
             }
