@@ -188,7 +188,8 @@ class Branch(Sequence[Solution]):
     @property
     def stable(self) -> np.ndarray[Any, np.dtype[np.bool_]]:
         """Whether none is, shape (points,)."""
-        return self.unstable == 0
+        found: np.ndarray[Any, np.dtype[np.bool_]] = self.unstable == 0
+        return found
 
     @cached_property
     def period(self) -> Floats:

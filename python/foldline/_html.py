@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from html import escape
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from . import _native
 from ._branch import Branch, SpecialPoints, branch_text_of
-from ._plot import COLOURS, _root, quantities, stretches
+from ._plot import quantities
 
 if TYPE_CHECKING:
     from ._diagram import Diagram
@@ -18,7 +19,8 @@ if TYPE_CHECKING:
 
 #: Rows of a table that are shown; the rest is counted.
 _MOST = 40
-_WIDTH, _HEIGHT, _MARGIN = 420, 240, 34
+#: Width and height of the picture.
+_SIZE = (640.0, 360.0)
 
 
 def _cells(points: SpecialPoints) -> tuple[list[str], list[list[str]]]:
@@ -49,8 +51,12 @@ def special_text(points: SpecialPoints) -> str:
         return "no special points"
     widths = [max(len(row[k]) for row in [names, *rows]) for k in range(len(names))]
     words = {0, 1, len(names) - 1} if names[-1] == "normal form" else {0, 1}
-    line = lambda row: "  ".join(c.ljust(w) if k in words else c.rjust(w) for k, (c, w) in enumerate(zip(row, widths, strict=True)))  # noqa: E731
-    return "\n".join(line(row).rstrip() for row in [names, *rows])
+
+    def line(row: list[str]) -> str:
+        cells = (c.ljust(w) if k in words else c.rjust(w) for k, (c, w) in enumerate(zip(row, widths, strict=True)))
+        return "  ".join(cells).rstrip()
+
+    return "\n".join(line(row) for row in [names, *rows])
 
 
 def branch_text(branch: Branch) -> str:
@@ -92,49 +98,14 @@ def diagram(own: Diagram) -> str:
 
 
 def _picture(shown: Sequence[Branch]) -> str:
-    """An SVG of a few kilobytes: stable solid, unstable dashed, special points as dots."""
+    """The picture that the command line draws, smaller."""
     drawn = [branch for branch in shown if len(branch)]
     if not drawn:
         return ""
     held = drawn[0].held
     x, y = (held[1], drawn[0].free) if held is not None else quantities(drawn, None, None)
-    across = np.concatenate([branch[x] for branch in drawn])
-    up = np.concatenate([branch[y] for branch in drawn])
-    seen = np.isfinite(across) & np.isfinite(up)
-    if not seen.any():
-        return ""
-    low, high = np.array([across[seen].min(), up[seen].min()]), np.array([across[seen].max(), up[seen].max()])
-    span = np.where(high > low, high - low, 1.0)
-
-    def place(a: Any, b: Any) -> str:
-        px = _MARGIN + (a - low[0]) / span[0] * (_WIDTH - 2 * _MARGIN)
-        py = _HEIGHT - _MARGIN - (b - low[1]) / span[1] * (_HEIGHT - 2 * _MARGIN)
-        return f"{px:.1f},{py:.1f}"
-
-    parts = []
-    roots = list(dict.fromkeys(_root(branch.diagram, branch.name) for branch in drawn))
-    for branch in drawn:
-        colour = COLOURS[roots.index(_root(branch.diagram, branch.name)) % len(COLOURS)]
-        for xs, ys, stable in stretches(branch, x, y):
-            every = max(1, len(xs) // 300)
-            path = " ".join(place(a, b) for a, b in [*zip(xs[:-1:every], ys[:-1:every], strict=True), (xs[-1], ys[-1])])
-            dashes = "" if stable or branch.held is not None else ' stroke-dasharray="4 3"'
-            parts.append(f'<polyline points="{path}" fill="none" stroke="{colour}" stroke-width="1.5"{dashes}/>')
-        for point in branch.special:
-            cx, cy = place(point[x], point[y]).split(",")
-            name = escape(f"{point.kind} {point.value:.8g}")
-            parts.append(f'<circle cx="{cx}" cy="{cy}" r="3" fill="white" stroke="{colour}"><title>{name}</title></circle>')
-    text = 'font-family="sans-serif" font-size="11" fill="currentColor"'
-    bottom, top = _HEIGHT - _MARGIN, _MARGIN
-    frame = f'<path d="M{_MARGIN},{top} V{bottom} H{_WIDTH - _MARGIN}" fill="none" stroke="currentColor" stroke-width="0.8"/>'
-    ticks = [
-        (f"{low[0]:.4g}", _MARGIN, bottom + 14, "start"), (f"{high[0]:.4g}", _WIDTH - _MARGIN, bottom + 14, "end"),
-        (x, _WIDTH / 2, bottom + 26, "middle"), (f"{high[1]:.4g}", _MARGIN, top - 6, "middle"),
-        (f"{y}   ({low[1]:.4g} below)", _MARGIN + 30, top - 6, "start"),
-    ]  # fmt: skip
-    words = "".join(f'<text x="{a:g}" y="{b:g}" text-anchor="{anchor}" {text}>{escape(word)}</text>' for word, a, b, anchor in ticks)
-    size = f'width="{_WIDTH}" height="{_HEIGHT}" viewBox="0 0 {_WIDTH} {_HEIGHT}"'
-    return f'<svg xmlns="http://www.w3.org/2000/svg" {size}>{frame}{words}{"".join(parts)}</svg>'
+    svg = _native.svg(drawn[0].diagram._native, [branch._index for branch in drawn], x, y, _SIZE)
+    return f'<div style="max-width: {_SIZE[0]:g}px; background: white">{svg}</div>'
 
 
 def solution(own: Solution) -> str:

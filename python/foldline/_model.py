@@ -78,15 +78,12 @@ class Model:
         self.name = native.name
         self.description = native.description
         self.states: dict[str, dict[str, Any]] = {
-            name: {"unit": unit, "description": text, "scale": scale, "range": span}
-            for (name, unit, text), scale, span in native.states
+            name: {"unit": unit, "description": text, "scale": scale, "range": span} for (name, unit, text), scale, span in native.states
         }
         self.parameters: dict[str, dict[str, Any]] = {
             name: {"value": value, "unit": unit, "description": text} for (name, unit, text), value in native.parameters
         }
-        self.outputs: dict[str, dict[str, Any]] = {
-            name: {"unit": unit, "description": text} for name, unit, text in native.outputs
-        }
+        self.outputs: dict[str, dict[str, Any]] = {name: {"unit": unit, "description": text} for name, unit, text in native.outputs}
 
     @property
     def text(self) -> str:
@@ -182,9 +179,7 @@ class Model:
         attractor = start if isinstance(start, str) else None
         state = b"" if isinstance(start, str) else raw(self.state(start))
         values = self._values(parameters)
-        found = _native.settle(
-            self._native, attractor, state, values, samples, random, tolerance, processors(jobs)
-        )
+        found = _native.settle(self._native, attractor, state, values, samples, random, tolerance, processors(jobs))
         return Solution(found, self)
 
     def attractors(
@@ -216,9 +211,7 @@ class Model:
         Attractors
             A sequence of solutions with `hits`, `ratio` and `example`.
         """
-        found, lost = _native.attractors(
-            self._native, self._values(parameters), samples, seed, tolerance, processors(jobs)
-        )
+        found, lost = _native.attractors(self._native, self._values(parameters), samples, seed, tolerance, processors(jobs))
         each = [Attractor(own, self, ratio, hits, floats(example)) for own, ratio, hits, example in found]
         return Attractors(each, samples, *lost)
 
@@ -402,16 +395,16 @@ def model(
     """
     if path is not None:
         if not isinstance(path, (str, os.PathLike)):
-            raise TypeError("@foldline.model needs brackets with the states: @foldline.model(states=\"x y\")")
+            raise TypeError('@foldline.model needs brackets with the states: @foldline.model(states="x y")')
         return Model(_native.Model.read(os.fspath(path)))
     parts = _Parts(states, equations, parameters, definitions, outputs, frequency, period, whirl)
     if equations is not None:
         return parts.compiled(equations, name or "model", description or "")
 
     def traced(function: Callable[..., Any]) -> Model:
-        own = name or getattr(function, "__name__", "model")
-        text = inspect.getdoc(function) if description is None else description
-        return parts.compiled(parts.trace(function), own, text or "")
+        own = name or str(getattr(function, "__name__", "model"))
+        text = (inspect.getdoc(function) or "") if description is None else description
+        return parts.compiled(parts.trace(function), own, text)
 
     return traced
 
@@ -435,9 +428,7 @@ class _Parts:
         elif isinstance(states, str):
             states = states.replace(",", " ").split()
         self.states: dict[str, Mapping[str, Any]] = (
-            {str(name): own or {} for name, own in states.items()}
-            if isinstance(states, Mapping)
-            else {str(name): {} for name in states}
+            {str(name): own or {} for name, own in states.items()} if isinstance(states, Mapping) else {str(name): {} for name in states}
         )
         self.parameters = dict(parameters or {})
         self.definitions = dict(definitions or {})
@@ -483,9 +474,11 @@ class _Parts:
         lines += _table("parameters", self.parameters)
         lines += _table("forcing", forcing)
         lines += _table("definitions", {**definitions, **writer.definitions})
-        for state, own in self.states.items():
-            lines += _table(f"states.{_write.key(state)}", {**({"equation": own_equations[state]} if state in own_equations else {}), **own})
-        extra = {state: own for state, own in own_equations.items() if state not in self.states}
+        for state, about in self.states.items():
+            equation = {"equation": own_equations[state]} if state in own_equations else {}
+            lines += _table(f"states.{_write.key(state)}", {**equation, **about})
+        # The equations of states that there are not: the reader says so.
+        extra = {state: text for state, text in own_equations.items() if state not in self.states}
         lines += _table("equations", extra)
         lines += _table("outputs", outputs)
         return "\n".join(lines) + "\n"

@@ -7,11 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from . import _native
+from ._arrays import Floats, floats
 from ._errors import InputError
 
 if TYPE_CHECKING:
     from ._branch import Branch
     from ._diagram import Diagram
+    from ._model import Model
     from ._solution import Solution
 
 #: Told apart with every common kind of colour vision (Okabe and Ito); the same as in the pictures of the command line.
@@ -20,9 +23,6 @@ COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#0
 MARKS = {
     "fold": "o", "branch-point": "X", "hopf": "s", "period-doubling": "^", "torus": "D", "mark": "|", "unexplained": "x",
 }  # fmt: skip
-_GREEK = (
-    "alpha beta gamma delta epsilon zeta eta theta kappa lambda mu nu xi rho sigma tau phi chi psi omega Omega Gamma Delta Lambda"
-).split()
 
 
 def axes_or_new(ax: Any) -> Any:
@@ -36,18 +36,9 @@ def axes_or_new(ax: Any) -> Any:
     return pyplot.subplots(layout="constrained")[1]
 
 
-def label(name: str, model: Any) -> str:
+def label(name: str, model: Model) -> str:
     """An axis label: Greek names as letters, the unit in brackets where there is one."""
-    front, own = "", name
-    for ending, word in (("_max", "max "), ("_min", "min ")):
-        if name.endswith(ending) and name not in model.parameters:
-            front, own = word, name[: -len(ending)]
-    known = model.parameters.get(own) or model.states.get(own) or model.outputs.get(own) or {}
-    unit = known.get("unit", "1")
-    head, _, tail = own.partition("_")
-    if head in _GREEK:
-        own = f"$\\{head}_{{{tail}}}$" if tail else f"$\\{head}$"
-    return f"{front}{own}" + (f" [{unit}]" if unit not in ("", "1", "-") else "")
+    return _native.label(model._native, name)
 
 
 def quantities(branches: Sequence[Branch], x: str | None, y: str | None) -> tuple[str, str]:
@@ -56,54 +47,43 @@ def quantities(branches: Sequence[Branch], x: str | None, y: str | None) -> tupl
     first = next(iter(model.outputs), None) or next(iter(model.states))
     free = [own.free for own in branches]
     chosen = x or max(dict.fromkeys(free), key=free.count), y or f"{first}_max"
-    known = branches[0].columns + [*model.states, *model.outputs]
+    known = [*branches[0].columns, *model.states, *model.outputs]
     for name in chosen:
         if name not in known:
             raise InputError(f"there is no quantity `{name}`\n  help: one of {', '.join(known)}")
     return chosen
 
 
-def stretches(branch: Branch, x: str, y: str) -> Iterator[tuple[Any, Any, bool]]:
-    """Pieces of one stability: the change lies exactly at the special point between two points."""
-    rows = [(own, False, place, value, unstable) for own, place, value, unstable in zip(
-        branch.position, branch[x], branch[y], branch.unstable, strict=True)]  # fmt: skip
-    rows += [(own._native.position, True, own[x], own[y], -1) for own in branch.special]
-    # A special point has the position of the point just before it; of several, those further on come later.
-    rows.sort(key=lambda row: (row[0], row[1]))
-    piece: list[tuple[float, float]] = []
-    stable: bool | None = None
-    for _, special, place, value, unstable in rows:
-        if special:
-            piece.append((place, value))
-            continue
-        if stable is not None and stable != (unstable == 0):
-            yield (*_columns(piece), stable)
-            piece = piece[-1:]
-        stable = bool(unstable == 0)
-        piece.append((place, value))
-    if piece:
-        yield (*_columns(piece), bool(stable))
+def pieces(branch: Branch, x: str, y: str, scale: tuple[float, float]) -> Iterator[tuple[Floats, Floats, bool]]:
+    """Pieces of one stability; the change lies exactly at the special point, and between the points the curve is rounded."""
+    for stable, across, up in _native.pieces(branch.diagram._native, branch._index, x, y, scale):
+        yield floats(across), floats(up), stable
 
 
-def _columns(piece: list[tuple[float, float]]) -> tuple[Any, Any]:
-    table = np.array(piece)
-    return table[:, 0], table[:, 1]
+def size(branches: Sequence[Branch], x: str, y: str) -> tuple[float, float]:
+    """How large branches are in both directions together."""
+    spans = []
+    for name in (x, y):
+        values = np.concatenate([branch[name] for branch in branches])
+        seen = values[np.isfinite(values)]
+        spans.append(float(np.ptp(seen)) if seen.size and np.ptp(seen) > 0 else 1.0)
+    return spans[0], spans[1]
 
 
 def branch(own: Branch, ax: Any, x: str | None, y: str | None, style: dict[str, Any]) -> list[Any]:
     """Draws one branch."""
     axes = axes_or_new(ax)
     across, up = quantities([own], x, y) if own.held is None else (x or own.held[1], y or own.free)
-    artists = _lines(axes, own, across, up, {"color": COLOURS[0], "label": own.name, **style})
+    artists = _lines(axes, own, across, up, size([own], across, up), {"color": COLOURS[0], "label": own.name, **style})
     artists += _marks(axes, own, across, up, artists[0].get_color() if artists else COLOURS[0])
     axes.set_xlabel(label(across, own.diagram.model))
     axes.set_ylabel(label(up, own.diagram.model))
     return artists
 
 
-def _lines(axes: Any, own: Branch, x: str, y: str, style: dict[str, Any]) -> list[Any]:
+def _lines(axes: Any, own: Branch, x: str, y: str, scale: tuple[float, float], style: dict[str, Any]) -> list[Any]:
     artists: list[Any] = []
-    for across, up, stable in stretches(own, x, y):
+    for across, up, stable in pieces(own, x, y, scale):
         dashes = "-" if stable or own.held is not None else "--"
         artists += axes.plot(across, up, **{"linestyle": dashes, **style})
         style = {**style, "label": "_"}
@@ -118,9 +98,7 @@ def _marks(axes: Any, own: Branch, x: str, y: str, colour: Any) -> list[Any]:
             if chosen:
                 face = colour if filled else "white"
                 places = ([p[x] for p in chosen], [p[y] for p in chosen])
-                artists += axes.plot(
-                    *places, MARKS.get(kind, "P"), color=colour, markerfacecolor=face, markersize=5, label="_", zorder=3
-                )
+                artists += axes.plot(*places, MARKS.get(kind, "P"), color=colour, markerfacecolor=face, markersize=5, label="_", zorder=3)
     return artists
 
 
@@ -134,13 +112,14 @@ def diagram(own: Diagram, ax: Any, x: str | None, y: str | None, curves: bool) -
     held = shown[0].held
     across, up = (x or held[1], y or shown[0].free) if held is not None else quantities(shown, x, y)
     roots = list(dict.fromkeys(_root(own, branch.name) for branch in shown))
+    scale = size(shown, across, up)
     artists: list[Any] = []
     for branch in shown:
         root = _root(own, branch.name)
         colour = COLOURS[roots.index(root) % len(COLOURS)]
         main = branch.name == root
         style = {"color": colour, "linewidth": 1.8 if main else 1.2, "alpha": 1 if main else 0.65}
-        artists += _lines(axes, branch, across, up, {**style, "label": branch.name if main else "_"})
+        artists += _lines(axes, branch, across, up, scale, {**style, "label": branch.name if main else "_"})
     for branch in shown:
         artists += _marks(axes, branch, across, up, COLOURS[roots.index(_root(own, branch.name)) % len(COLOURS)])
     axes.set_xlabel(label(across, own.model))
@@ -182,7 +161,7 @@ def _figure(count: int) -> Any:
     except ImportError as error:
         raise ImportError("pictures need matplotlib: pip install matplotlib") from error
     rows, columns = (2, 2) if count > 3 else (1, count)
-    figure, panels = pyplot.subplots(rows, columns, layout="constrained", figsize=(4 * columns, 3.4 * rows))
+    _, panels = pyplot.subplots(rows, columns, layout="constrained", figsize=(4 * columns, 3.4 * rows))
     return panels
 
 
@@ -216,10 +195,10 @@ def _series(axes: Any, own: Solution) -> list[Any]:
 
 def _spectrum(axes: Any, own: Solution) -> list[Any]:
     frequencies, amplitudes = own.signed_spectrum(1024)
-    size = np.abs(amplitudes)
-    loud = size > 1e-4 * size.max()
-    lines = axes.vlines(frequencies[loud], 1e-4 * size.max(), size[loud], color=COLOURS[0])
-    heads = axes.plot(frequencies[loud], size[loud], "o", color=COLOURS[0], markersize=3)
+    height = np.abs(amplitudes)
+    loud = height > 1e-4 * height.max()
+    lines = axes.vlines(frequencies[loud], 1e-4 * height.max(), height[loud], color=COLOURS[0])
+    heads = axes.plot(frequencies[loud], height[loud], "o", color=COLOURS[0], markersize=3)
     axes.set_yscale("log")
     axes.set_xlabel("frequency (backward < 0 < forward)")
     axes.set_ylabel("amplitude")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ._errors import InputError
-from ._plot import COLOURS, _root, quantities
+from ._plot import COLOURS, _root, label, pieces, quantities, size
 
 if TYPE_CHECKING:
     from ._branch import Branch
@@ -30,42 +30,30 @@ def figure(branches: Sequence[Branch], x: str | None, y: str | None) -> Any:
         raise InputError("there is nothing to draw\n  help: follow a branch first")
     held = shown[0].held
     across, up = (x or held[1], y or shown[0].free) if held is not None else quantities(shown, x, y)
+    scale = size(shown, across, up)
     picture = graph_objects.Figure()
     roots = list(dict.fromkeys(_root(own.diagram, own.name) for own in shown))
     for own in shown:
         colour = COLOURS[roots.index(_root(own.diagram, own.name)) % len(COLOURS)]
-        for trace in (*_lines(graph_objects, own, across, up, colour), *_marks(graph_objects, own, across, up, colour)):
+        for trace in (*_lines(graph_objects, own, across, up, scale, colour), *_marks(graph_objects, own, across, up, colour)):
             picture.add_trace(trace)
-    picture.update_layout(xaxis_title=across, yaxis_title=up, template="plotly_white", hovermode="closest")
+    model = shown[0].diagram.model
+    picture.update_layout(xaxis_title=label(across, model), yaxis_title=label(up, model), template="plotly_white", hovermode="closest")
     return picture
 
 
-def _lines(graph_objects: Any, own: Branch, x: str, y: str, colour: str) -> list[Any]:
-    """One line where the branch is stable, one where not; where two meet both have the special point."""
-    places, heights, stable, texts = _rows(own, x, y)
-    traces = []
-    for wanted, dash in ((True, "solid"), (False, "dash")):
-        kept = np.array([s is None or s == wanted for s in stable])
-        if not any(s == wanted for s in stable):
-            continue
-        style = {"color": colour, "dash": dash, "width": 2}
-        traces.append(
-            graph_objects.Scatter(
-                x=np.where(kept, places, np.nan), y=np.where(kept, heights, np.nan), mode="lines", line=style, name=own.name,
-                legendgroup=own.name, showlegend=not traces, text=texts, hoverinfo="text", connectgaps=False,
-            )  # fmt: skip
-        )
-    return traces
-
-
-def _rows(own: Branch, x: str, y: str) -> tuple[Any, Any, list[bool | None], list[str]]:
-    rows = []
-    for k in range(len(own)):
-        place = (int(own.position[k]), 0)
-        rows.append((place, own[x][k], own[y][k], bool(own.unstable[k] == 0), _text(own, k)))
-    rows += [((p._native.position, 1), p[x], p[y], None, _special_text(p)) for p in own.special]
-    rows.sort(key=lambda row: row[0])
-    return np.array([r[1] for r in rows]), np.array([r[2] for r in rows]), [r[3] for r in rows], [r[4] for r in rows]
+def _lines(graph_objects: Any, own: Branch, x: str, y: str, scale: tuple[float, float], colour: str) -> list[Any]:
+    """The curve, solid where it is stable, dashed where not, and its points, which are seen when the pointer is at them."""
+    common = {"legendgroup": own.name, "name": own.name}
+    traces: list[Any] = []
+    for across, up, stable in pieces(own, x, y, scale):
+        style = {"color": colour, "dash": "solid" if stable or own.held is not None else "dash", "width": 2}
+        shown = {"mode": "lines", "line": style, "hoverinfo": "skip", "showlegend": not traces}
+        traces.append(graph_objects.Scatter(x=across, y=up, **shown, **common))
+    texts = [_text(own, k) for k in range(len(own))]
+    style = {"color": colour, "size": 7, "opacity": 0}
+    told = {"mode": "markers", "marker": style, "text": texts, "hoverinfo": "text", "showlegend": False}
+    return [*traces, graph_objects.Scatter(x=own[x], y=own[y], **told, **common)]
 
 
 def _text(own: Branch, k: int) -> str:
@@ -97,8 +85,15 @@ def _marks(graph_objects: Any, own: Branch, x: str, y: str, colour: str) -> list
         style = {"symbol": _SYMBOLS.get(kind, "star"), "color": colour, "size": 9, "line": {"width": 1, "color": "white"}}
         traces.append(
             graph_objects.Scatter(
-                x=[p[x] for p in chosen], y=[p[y] for p in chosen], mode="markers", marker=style, name=kind,
-                legendgroup=own.name, showlegend=False, text=[_special_text(p) for p in chosen], hoverinfo="text",
-            )  # fmt: skip
+                x=[p[x] for p in chosen],
+                y=[p[y] for p in chosen],
+                mode="markers",
+                marker=style,
+                name=kind,
+                legendgroup=own.name,
+                showlegend=False,
+                text=[_special_text(p) for p in chosen],
+                hoverinfo="text",
+            )
         )
     return traces

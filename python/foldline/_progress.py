@@ -30,20 +30,21 @@ def shown(progress: Progress) -> Iterator[Callable[[int, int, str], None] | None
     if not wanted or importlib.util.find_spec("tqdm") is None:
         yield None
         return
-    bar = _bar()
+    # What is done at once needs no bar, unless one was asked for.
+    bar = _bar(0.5 if progress is None else 0.0)
     try:
         yield lambda points, special, place: _show(bar, points, special, place)
     finally:
         bar.close()
 
 
-def _bar() -> Any:
-    form = "{n_fmt} points, {postfix} [{elapsed}]"
+def _bar(delay: float) -> Any:
+    form = "{n_fmt} points{postfix} [{elapsed}]"
     if _notebook() and importlib.util.find_spec("ipywidgets") is not None:
         from tqdm.notebook import tqdm
     else:
         from tqdm import tqdm
-    return tqdm(bar_format=form, postfix="", leave=False)
+    return tqdm(bar_format=form, leave=False, delay=delay)
 
 
 def _show(bar: Any, points: int, special: int, place: str) -> None:

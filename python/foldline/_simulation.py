@@ -86,14 +86,10 @@ class Trajectory:
         return f"<trajectory of {self.model.name}: {len(self)} times, {span}, {self.ending}>"
 
 
-def simulated(
-    model: Model, state: Any, span: tuple[float, float], times: Any, parameters: bytes, tolerance: float
-) -> Trajectory:
+def simulated(model: Model, state: Any, span: tuple[float, float], times: Any, parameters: bytes, tolerance: float) -> Trajectory:
     """Integrates; Ctrl-C ends it, and is raised again."""
     wanted = None if times is None else raw(np.asarray(times, dtype=float).ravel())
-    (t, states, outputs, ending), interrupt = _native.simulate(
-        model._native, raw(state), span, wanted, parameters, tolerance
-    )
+    (t, states, outputs, ending), interrupt = _native.simulate(model._native, raw(state), span, wanted, parameters, tolerance)
     at = floats(t)
     rows = floats(states, len(at), len(model.states))
     found = Trajectory(model, at, rows, floats(outputs, len(at), len(model.outputs)), ending)

@@ -132,7 +132,7 @@ class Solution:
 
         names = [*self.model.states, *self.model.outputs]
         rows = floats(self._native.uniform(count)).reshape(-1, len(names))
-        times = np.arange(len(rows)) * ((self.period or 0.0) / count)
+        times = np.arange(len(rows), dtype=np.float64) * np.float64((self.period or 0.0) / count)
         return {"t": times, **{name: rows[:, k] for k, name in enumerate(names)}}
 
     def signed_spectrum(self, count: int = 1024) -> tuple[Floats, Complexes]:
@@ -224,9 +224,7 @@ class Attractor(Solution):
         The first of them.
     """
 
-    def __init__(
-        self, native: _native.Solution, model: Model, ratio: tuple[int, int] | None, hits: int, example: Floats
-    ) -> None:
+    def __init__(self, native: _native.Solution, model: Model, ratio: tuple[int, int] | None, hits: int, example: Floats) -> None:
         super().__init__(native, model)
         self._ratio = ratio
         self.hits = hits

@@ -196,9 +196,7 @@ class Symbol:
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Any:
         if method != "__call__" or any(value is not None for key, value in options.items() if key in ("out", "where")):
-            raise refused(
-                f"np.{ufunc.__name__}.{method} cannot be traced", "write the operation out, one value after the other"
-            )
+            raise refused(f"np.{ufunc.__name__}.{method} cannot be traced", "write the operation out, one value after the other")
         if any(isinstance(value, np.ndarray) and value.ndim > 0 for value in inputs):
             each = np.frompyfunc(lambda *own: _function(ufunc.__name__, own), len(inputs), 1)
             return each(*(_boxed(value) for value in inputs))
@@ -262,7 +260,7 @@ def operand(value: Any) -> Operand:
 
 
 def _operator(op: str, a: Any, b: Any) -> Any:
-    if isinstance(a, np.ndarray) and a.ndim > 0 or isinstance(b, np.ndarray) and b.ndim > 0:
+    if (isinstance(a, np.ndarray) and a.ndim > 0) or (isinstance(b, np.ndarray) and b.ndim > 0):
         each = np.frompyfunc(lambda x, y: Symbol(op, (operand(x), operand(y))), 2, 1)
         return each(_boxed(a), _boxed(b))
     return Symbol(op, (operand(a), operand(b)))
@@ -271,7 +269,7 @@ def _operator(op: str, a: Any, b: Any) -> Any:
 def _condition(value: Any) -> Operand:
     own = operand(value)
     if isinstance(own, Symbol):
-        logical = own.op in COMPARISONS or own.op in ("*", "max", "-") and all(_logical(part) for part in own.operands)
+        logical = own.op in COMPARISONS or (own.op in ("*", "max", "-") and all(_logical(part) for part in own.operands))
         if logical:
             return own
     raise refused("& | ~ combine conditions only", "put each comparison in brackets: (a < b) & (b < c)")
@@ -279,7 +277,7 @@ def _condition(value: Any) -> Operand:
 
 def _logical(value: Operand) -> bool:
     if isinstance(value, Symbol):
-        return value.op in COMPARISONS or value.op in ("*", "max", "-") and all(_logical(part) for part in value.operands)
+        return value.op in COMPARISONS or (value.op in ("*", "max", "-") and all(_logical(part) for part in value.operands))
     return value in (0.0, 1.0)
 
 

@@ -34,14 +34,14 @@ def _xarray() -> Any:
 
 def branches_frame(branches: Sequence[Branch]) -> pandas.DataFrame:
     """A row for each point."""
-    pandas = _pandas()
+    library = _pandas()
     tables = []
     for branch in branches:
         columns: dict[str, Any] = {"branch": [branch.name] * len(branch)}
         columns.update({name: branch[name] for name in branch.columns if len(branch)})
         columns["multipliers"] = list(branch.spectrum)
-        tables.append(pandas.DataFrame(columns))
-    frame: pandas.DataFrame = pandas.concat(tables, ignore_index=True) if tables else pandas.DataFrame()
+        tables.append(library.DataFrame(columns))
+    frame: pandas.DataFrame = library.concat(tables, ignore_index=True) if tables else library.DataFrame()
     return frame
 
 

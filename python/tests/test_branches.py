@@ -152,6 +152,7 @@ def test_what_things_say_of_themselves(steady, brusselator):
         html = own._repr_html_()
         assert "<svg" in html
         assert "stroke-dasharray" in html
+        assert "</svg>" in html
         assert "<td>hopf</td>" in html
     for own in (brusselator, steady[0], diagram[1][2], steady.special):
         assert own._repr_html_().count("<") == own._repr_html_().count(">")

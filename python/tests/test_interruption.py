@@ -7,10 +7,9 @@ import sys
 import threading
 
 import pytest
+from conftest import ROOT
 
 import foldline
-
-from conftest import ROOT
 
 STUDY = os.path.join(ROOT, "studies", "overhung-rotor", "bouncing.toml")
 
@@ -41,7 +40,7 @@ def test_ctrl_c_stops_at_the_next_point_and_keeps_what_is_there():
 
 
 def test_an_interrupted_run_in_a_folder_resumes(tmp_path):
-    show, seen = interrupting(1)
+    show, _seen = interrupting(1)
     with pytest.raises(foldline.Interrupted) as interrupt:
         foldline.run(STUDY, out=tmp_path / "run", progress=show)
     kept = {branch.name: len(branch) for branch in interrupt.value.partial}
@@ -79,9 +78,7 @@ def test_a_mistake_in_progress_is_raised(brusselator):
 
 def test_progress_counts_the_points(steady, brusselator):
     last = []
-    branch = foldline.follow(
-        brusselator.settle(), "B", (0.5, 4), progress=lambda points, special, place: last.append((points, special))
-    )
+    branch = foldline.follow(brusselator.settle(), "B", (0.5, 4), progress=lambda points, special, place: last.append((points, special)))
     assert last[-1] == (len(branch), 1)
 
 

@@ -6,10 +6,9 @@ import subprocess
 
 import numpy as np
 import pytest
+from conftest import ROOT
 
 import foldline
-
-from conftest import ROOT
 
 PLACES = np.random.default_rng(1).normal(scale=2.0, size=(200, 4))
 
@@ -172,7 +171,7 @@ def test_a_mistake_in_a_model_file_is_told_as_on_the_command_line(tmp_path):
 
 
 def test_wrong_arguments_are_answered_with_the_cure(brusselator):
-    with pytest.raises(foldline.InputError, match="has no parameter `b`(.|\n)*help"):
+    with pytest.raises(foldline.InputError, match=r"has no parameter `b`(.|\n)*help"):
         brusselator.settle(parameters={"b": 3})
     with pytest.raises(foldline.InputError, match="has no state `z`"):
         brusselator.settle({"z": 3})

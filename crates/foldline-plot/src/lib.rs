@@ -18,6 +18,7 @@ pub mod page;
 mod paint;
 pub mod palette;
 pub mod quantity;
+#[cfg(feature = "render")]
 mod render;
 mod scale;
 mod texts;
@@ -28,4 +29,5 @@ pub use compose::figure_svg;
 pub use figure::{Axis, Figure, Layer, LegendPlace, Marker, Panel};
 pub use page::{Picture, svg};
 pub use quantity::Quantity;
+#[cfg(feature = "render")]
 pub use render::{RenderError, pdf, png};

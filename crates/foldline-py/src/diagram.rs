@@ -32,7 +32,8 @@ impl Diagram {
         Diagram { diagram, study, notes }
     }
 
-    fn branch(&self, py: Python, index: usize) -> PyResult<&Branch> {
+    /// The branch of that number.
+    pub fn branch(&self, py: Python, index: usize) -> PyResult<&Branch> {
         let found = self.diagram.branches.get(index);
         found.ok_or_else(|| failure::internal(py, format!("there is no branch {index}")))
     }

@@ -10,6 +10,7 @@
 //! | what is to be computed? | [`study`] |
 //! | how is it computed, without the interpreter's lock, and stopped? | [`work`], [`patience`] |
 //! | what came out? | [`diagram`], [`solution`] |
+//! | how is it drawn? | [`pictures`] |
 //! | as which exceptions do mistakes arrive? | [`failure`] |
 
 mod bytes;
@@ -17,6 +18,7 @@ mod diagram;
 mod failure;
 mod model;
 mod patience;
+mod pictures;
 mod saving;
 mod seeds;
 mod simulation;
@@ -32,6 +34,8 @@ mod _native {
     use crate::diagram::Diagram;
     #[pymodule_export]
     use crate::model::Model;
+    #[pymodule_export]
+    use crate::pictures::{label, pieces, svg};
     #[pymodule_export]
     use crate::seeds::{attractors, settle};
     #[pymodule_export]
