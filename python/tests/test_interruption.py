@@ -14,6 +14,16 @@ import foldline
 STUDY = os.path.join(ROOT, "studies", "overhung-rotor", "bouncing.toml")
 
 
+@pytest.fixture(scope="module")
+def long_study(tmp_path_factory):
+    """The reference study with a tolerance that makes it take long enough to be interrupted."""
+    with open(STUDY, encoding="utf-8") as file:
+        text = "tolerance = 1e-9\n" + file.read().replace("../../models", os.path.join(ROOT, "models"))
+    path = tmp_path_factory.mktemp("study") / "long.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
 def interrupting(points):
     """A progress that presses Ctrl-C once when so many points are there, and what it saw."""
     seen = []
@@ -26,10 +36,10 @@ def interrupting(points):
     return show, seen
 
 
-def test_ctrl_c_stops_at_the_next_point_and_keeps_what_is_there():
+def test_ctrl_c_stops_at_the_next_point_and_keeps_what_is_there(long_study):
     show, seen = interrupting(1)
     with pytest.raises(foldline.Interrupted) as interrupt:
-        foldline.run(STUDY, progress=show)
+        foldline.run(long_study, progress=show)
     assert isinstance(interrupt.value, KeyboardInterrupt)
     assert "Omega = " in seen[0][2]
     partial = interrupt.value.partial
@@ -39,18 +49,18 @@ def test_ctrl_c_stops_at_the_next_point_and_keeps_what_is_there():
     assert any(branch.stopped for branch in partial)
 
 
-def test_an_interrupted_run_in_a_folder_resumes(tmp_path):
+def test_an_interrupted_run_in_a_folder_resumes(long_study, tmp_path):
     show, _seen = interrupting(1)
     with pytest.raises(foldline.Interrupted) as interrupt:
-        foldline.run(STUDY, out=tmp_path / "run", progress=show)
+        foldline.run(long_study, out=tmp_path / "run", progress=show)
     kept = {branch.name: len(branch) for branch in interrupt.value.partial}
-    whole = foldline.run(STUDY, out=tmp_path / "run", resume=True)
+    whole = foldline.run(long_study, out=tmp_path / "run", resume=True)
     assert not any(branch.stopped for branch in whole)
     assert all(len(whole[name]) >= count for name, count in kept.items())
     assert sum(len(branch) for branch in whole) > sum(kept.values())
 
 
-def test_other_threads_run_while_it_computes():
+def test_other_threads_run_while_it_computes(long_study):
     turns = []
     done = threading.Event()
 
@@ -61,19 +71,19 @@ def test_other_threads_run_while_it_computes():
     thread = threading.Thread(target=turn)
     thread.start()
     before = len(turns)
-    foldline.run(STUDY)
+    foldline.run(long_study)
     after = len(turns)
     done.set()
     thread.join()
     assert after - before > 20
 
 
-def test_a_mistake_in_progress_is_raised(brusselator):
+def test_a_mistake_in_progress_is_raised(long_study):
     def wrong(points, special, place):
         raise ZeroDivisionError
 
     with pytest.raises(ZeroDivisionError):
-        foldline.run(STUDY, progress=wrong)
+        foldline.run(long_study, progress=wrong)
 
 
 def test_progress_counts_the_points(steady, brusselator):
