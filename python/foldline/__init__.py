@@ -54,3 +54,7 @@ __all__ = [
     "run",
     "where",
 ]
+
+# Where they are to be imported from, and how tracebacks call them.
+for _class in [own for own in map(globals().get, __all__) if isinstance(own, type)]:
+    _class.__module__ = __name__

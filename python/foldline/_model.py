@@ -75,8 +75,8 @@ class Model:
 
     def __init__(self, native: _native.Model) -> None:
         self._native = native
-        self.name = native.name
-        self.description = native.description
+        self.name: str = native.name
+        self.description: str = native.description
         self.states: dict[str, dict[str, Any]] = {
             name: {"unit": unit, "description": text, "scale": scale, "range": span} for (name, unit, text), scale, span in native.states
         }
@@ -455,7 +455,7 @@ class _Parts:
     def compiled(self, equations: Expressions, name: str, description: str) -> Model:
         """The model, by way of its text."""
         text = self.text(equations, name, description)
-        return Model(_native.Model.parse(text, f"<model {name}>"))
+        return Model(_native.Model.parse(text, "<model>" if name == "model" else f"<model {name}>"))
 
     def text(self, equations: Expressions, name: str, description: str) -> str:
         """The text of a model file."""

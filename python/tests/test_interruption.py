@@ -7,9 +7,10 @@ import sys
 import threading
 
 import pytest
-from conftest import ROOT
 
 import foldline
+
+from conftest import ROOT
 
 STUDY = os.path.join(ROOT, "studies", "overhung-rotor", "bouncing.toml")
 

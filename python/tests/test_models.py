@@ -6,9 +6,10 @@ import subprocess
 
 import numpy as np
 import pytest
-from conftest import ROOT
 
 import foldline
+
+from conftest import ROOT
 
 PLACES = np.random.default_rng(1).normal(scale=2.0, size=(200, 4))
 

@@ -3,6 +3,7 @@
 import os
 
 import pytest
+
 from conftest import ROOT
 
 FOLDER = os.path.join(ROOT, "python", "notebooks")

@@ -4,9 +4,10 @@ import os
 
 import numpy as np
 import pytest
-from conftest import ROOT
 
 import foldline
+
+from conftest import ROOT
 
 STUDY = {
     "seed": [
