@@ -70,7 +70,12 @@ impl Environment {
         let found = std::env::var_os("PATH").unwrap_or_default();
         let paths = std::iter::once(self.programs.clone()).chain(std::env::split_paths(&found));
         let path = std::env::join_paths(paths).unwrap_or(found);
-        run(Command::new(self.programs.join(program)).args(arguments).env("PATH", path).env_remove("PYTHONPATH"))
+        let mut command = Command::new(self.programs.join(program));
+        // Another environment that is active here is not meant.
+        for name in ["PYTHONPATH", "VIRTUAL_ENV", "CONDA_PREFIX"] {
+            command.env_remove(name);
+        }
+        run(command.args(arguments).env("PATH", path))
     }
 }
 
