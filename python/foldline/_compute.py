@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import builtins
 import os
+import sys
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -22,6 +23,9 @@ from ._solution import Solution
 
 Path = str | os.PathLike[str]
 Range = Sequence[float]
+
+#: What the seed is called at which something starts.
+_START = "the given solution"
 
 _rescued: list[Any] = []
 
@@ -161,7 +165,7 @@ def follow(
     """
     _is_solution(start)
     own = name or f"{start.family} over {free}"
-    item = {"name": own, "from": "start", "free": free, "range": range, "until": until, "switch": switch, "mark": mark,
+    item = {"name": own, "from": _START, "free": free, "range": range, "until": until, "switch": switch, "mark": mark,
             "stop": stop, "max-points": max_points}  # fmt: skip
     study = _study(start, tolerance, degree, branch=[_cleaned(item)])
     return _branch(study, start, own, out=out, jobs=jobs, progress=progress)
@@ -271,7 +275,7 @@ def homotopy(
         `arrived`, `end` (the solution at the goal), `route` (in sentences), and the branches on the way.
     """
     _is_solution(start)
-    item = {"name": name, "from": "start", "to": dict(to), "via": via, "range": range, "max-points": max_points}
+    item = {"name": name, "from": _START, "to": dict(to), "via": via, "range": range, "max-points": max_points}
     study = _study(start, tolerance, degree, homotopy=[_cleaned(item)])
     made: Callable[..., Diagram] = Homotopy
     found = _carried_out(study, made, start.model, given=start, out=out, jobs=jobs, progress=progress)
@@ -339,6 +343,15 @@ def explore(
     return _carried_out(study, Diagram, model, out=out, jobs=jobs, resume=resume, progress=progress)
 
 
+def _depth() -> int:
+    """How many calls below the user's code the caller is."""
+    inner = os.path.dirname(os.path.abspath(__file__))
+    frame, depth = sys._getframe(1).f_back, 2
+    while frame is not None and os.path.dirname(os.path.abspath(frame.f_code.co_filename)) == inner:
+        frame, depth = frame.f_back, depth + 1
+    return depth
+
+
 # How a question becomes a study.
 
 
@@ -375,7 +388,7 @@ def _parsed(tables: dict[str, Any], model: Model) -> _native.Study:
 def _study(start: Solution, tolerance: float, degree: int, **items: Any) -> _native.Study:
     """A study with one seed, whose solution is known."""
     state = dict(zip(start.model.states, start.state.tolist(), strict=True))
-    seed = {"name": "start", "state": state, "parameters": start.parameters}
+    seed = {"name": _START, "state": state, "parameters": start.parameters}
     return _parsed({"tolerance": float(tolerance), "degree": degree, "seed": [seed], **items}, start.model)
 
 
@@ -386,7 +399,7 @@ def _going_on(branch: Branch, options: dict[str, Any], **items: Any) -> tuple[_n
     span = options.pop("range", None) or own.range_of(branch.name)
     if span is None:
         span = (float(branch[branch.free].min()), float(branch[branch.free].max()))
-    item = {"name": branch.name, "from": "start", "free": branch.free, "range": span, "switch": items.pop("switch", None)}
+    item = {"name": branch.name, "from": _START, "free": branch.free, "range": span, "switch": items.pop("switch", None)}
     item.update({key.replace("_", "-"): options.pop(key) for key in ("max_points", "mark", "stop") if key in options})
     return _study(start, own.tolerance, own.degree, branch=[_cleaned(item)], **items), start
 
@@ -417,7 +430,7 @@ def _carried_out(
 ) -> Diagram:
     folder = None if out is None else os.fspath(out)
     known = None if earlier is None else native_only(earlier)
-    seeds = {} if given is None else {"start": given._native}
+    seeds = {} if given is None else {_START: given._native}
     with shown(progress) as show:
         native, short, interrupt = _native.run(study, seeds, known, folder, jobs, resume, show)
     diagram = made(native if native is not None else lambda: _native.Diagram.load(folder or ""), model, folder)
@@ -431,5 +444,5 @@ def _carried_out(
     known_short = f"{earlier.name}:" if earlier is not None else "\0"
     for line in short:
         if not line.startswith(known_short):
-            warnings.warn(line, EndedShort, stacklevel=3)
+            warnings.warn(line, EndedShort, stacklevel=_depth())
     return diagram

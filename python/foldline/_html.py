@@ -15,7 +15,7 @@ from ._plot import quantities
 if TYPE_CHECKING:
     from ._diagram import Diagram
     from ._model import Model
-    from ._solution import Solution
+    from ._solution import Attractors, Solution
 
 #: Rows of a table that are shown; the rest is counted.
 _MOST = 40
@@ -117,6 +117,13 @@ def solution(own: Solution) -> str:
     rows.append(("trust", ", ".join(f"{name} {value:.1e}" for name, value in own.trust.items())))
     body = "".join(f"<tr><th>{escape(name)}</th><td>{escape(value)}</td></tr>" for name, value in rows)
     return f"<div><p>{escape(own._what())}</p><table>{body}</table></div>"
+
+
+def attractors(found: Attractors) -> str:
+    """A table of attractors."""
+    rows = "".join(f"<tr><td>{own.hits}</td><td>{escape(own._what())}</td></tr>" for own in found)
+    head = "<tr><th>hits</th><th>attractor</th></tr>"
+    return f"<div><table>{head}{rows}</table><p>{escape(repr(found).splitlines()[-1])}</p></div>"
 
 
 def model(own: Model) -> str:

@@ -276,3 +276,8 @@ class Attractors(Sequence[Attractor]):
         stuck = f", {self.stuck} stuck" if self.stuck else ""
         lines.append(f"{self.samples} samples, {self.escaped} escaped{stuck}, {self.unsettled} not settled")
         return "\n".join(["  hits  attractor", *lines])
+
+    def _repr_html_(self) -> str:
+        from ._html import attractors
+
+        return attractors(self)

@@ -110,8 +110,9 @@ def test_exploring_finds_the_equilibrium_and_the_cycles(brusselator):
 
 
 def test_a_branch_that_ends_short_is_warned_about(brusselator):
-    with pytest.warns(foldline.EndedShort, match="limit of 3 points"):
+    with pytest.warns(foldline.EndedShort, match="limit of 3 points") as warned:
         branch = foldline.follow(brusselator.settle(), "B", (0.5, 4), max_points=3)
+    assert {own.filename for own in warned} == {__file__}
     assert not branch.complete
 
 

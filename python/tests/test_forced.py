@@ -56,8 +56,7 @@ def test_the_same_as_the_file_of_the_model():
 
 
 def _equations(model):
-    import tomllib
-
+    tomllib = pytest.importorskip("tomllib")
     states = tomllib.loads(model.text)["states"]
     found = {name: own if isinstance(own, str) else own["equation"] for name, own in states.items()}
     definitions = tomllib.loads(model.text).get("definitions", {})
