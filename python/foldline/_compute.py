@@ -14,6 +14,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from . import _native, _write
+from ._arrays import whole
 from ._branch import Branch, SpecialPoint, native_only
 from ._diagram import Diagram, Homotopy
 from ._errors import EndedShort, InputError, Interrupted, NoSolution
@@ -86,8 +87,7 @@ def run(
     elif model is None:
         own = _native.Study.read(os.fspath(study))
     else:
-        with builtins.open(study, encoding="utf-8") as file:
-            own = _native.Study.parse(file.read(), os.fspath(study), model._native)
+        own = _native.Study.parse(_text(study), os.fspath(study), model._native)
     return _carried_out(own, Diagram, model, out=out, jobs=jobs, resume=resume, progress=progress)
 
 
@@ -343,6 +343,15 @@ def explore(
     return _carried_out(study, Diagram, model, out=out, jobs=jobs, resume=resume, progress=progress)
 
 
+def _text(study: Path) -> str:
+    try:
+        with builtins.open(study, encoding="utf-8") as file:
+            return file.read()
+    except (OSError, UnicodeDecodeError) as error:
+        cure = "check the spelling of the path; relative paths start at the current folder"
+        raise InputError(f"the study file {os.fspath(study)} cannot be read: {error}\n  help: {cure}") from error
+
+
 def _depth() -> int:
     """How many calls below the user's code the caller is."""
     inner = os.path.dirname(os.path.abspath(__file__))
@@ -429,6 +438,10 @@ def _carried_out(
     progress: Progress = None,
 ) -> Diagram:
     folder = None if out is None else os.fspath(out)
+    if jobs is not None:
+        whole("jobs", jobs)
+    if resume and folder is None:
+        raise InputError('resume=True goes on with a run in a folder, and none is given\n  help: out="runs/study"')
     known = None if earlier is None else native_only(earlier)
     seeds = {} if given is None else {_START: given._native}
     with shown(progress) as show:

@@ -12,7 +12,7 @@ from typing import Any, overload
 import numpy as np
 
 from . import _native, _write
-from ._arrays import floats, pairs, processors, raw
+from ._arrays import finite, floats, pairs, processors, raw, tolerable, whole
 from ._errors import Error, TraceError
 from ._simulation import Trajectory, simulated
 from ._solution import Attractor, Attractors, Solution
@@ -179,7 +179,8 @@ class Model:
         attractor = start if isinstance(start, str) else None
         state = b"" if isinstance(start, str) else raw(self.state(start))
         values = self._values(parameters)
-        found = _native.settle(self._native, attractor, state, values, samples, random, tolerance, processors(jobs))
+        counts = whole("samples", samples), whole("random", random, 0)
+        found = _native.settle(self._native, attractor, state, values, *counts, tolerable(tolerance), processors(jobs))
         return Solution(found, self)
 
     def attractors(
@@ -211,7 +212,8 @@ class Model:
         Attractors
             A sequence of solutions with `hits`, `ratio` and `example`.
         """
-        found, lost = _native.attractors(self._native, self._values(parameters), samples, seed, tolerance, processors(jobs))
+        counts = whole("samples", samples), whole("seed", seed, 0)
+        found, lost = _native.attractors(self._native, self._values(parameters), *counts, tolerable(tolerance), processors(jobs))
         each = [Attractor(own, self, ratio, hits, floats(example)) for own, ratio, hits, example in found]
         return Attractors(each, samples, *lost)
 
@@ -232,8 +234,8 @@ class Model:
             A value for every state, or a solution, whose parameters are taken too.
         span : float or pair
             How long, or from when to when, in the time unit of the model; it may run backwards.
-        times : array, optional
-            When the state is wanted, growing in the direction of the span; by default at the ends of the steps.
+        times : array, shape (times,), optional
+            When the state is wanted, within the span and growing in its direction; by default at the ends of the steps.
         parameters : mapping, optional
             Values that replace those of the model, or of the solution.
         tolerance : float
@@ -247,7 +249,7 @@ class Model:
         given = {**(start.parameters if isinstance(start, Solution) else {}), **(parameters or {})}
         state = start.state if isinstance(start, Solution) else self.state(start)
         ends = (0.0, float(span)) if isinstance(span, (int, float)) else (float(span[0]), float(span[1]))
-        return simulated(self, state, ends, times, self._values(given), tolerance)
+        return simulated(self, state, ends, times, self._values(given), tolerable(tolerance, 1e-14, 1e-1))
 
     def state(self, values: Mapping[str, float] | Sequence[float]) -> Any:
         """A state by names or in order, as an array of shape (n,)."""
@@ -261,7 +263,7 @@ class Model:
                 cure = f"give a number for each of {', '.join(self.states)}"
                 raise InputError(f"the model `{self.name}` {what}\n  help: {cure}")
             values = [values[name] for name in self.states]
-        array = np.asarray(values, dtype=float)
+        array = finite("the state", values)
         self._fitting(array)
         return array
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import _native
-from ._arrays import Floats, floats, raw
-from ._errors import Interrupted
+from ._arrays import Floats, finite, floats, raw
+from ._errors import InputError, Interrupted
 
 if TYPE_CHECKING:
     import pandas
@@ -88,7 +88,8 @@ class Trajectory:
 
 def simulated(model: Model, state: Any, span: tuple[float, float], times: Any, parameters: bytes, tolerance: float) -> Trajectory:
     """Integrates; Ctrl-C ends it, and is raised again."""
-    wanted = None if times is None else raw(np.asarray(times, dtype=float).ravel())
+    finite("the time span", span)
+    wanted = None if times is None else raw(_within(finite("times", times).ravel(), span))
     (t, states, outputs, ending), interrupt = _native.simulate(model._native, raw(state), span, wanted, parameters, tolerance)
     at = floats(t)
     rows = floats(states, len(at), len(model.states))
@@ -96,3 +97,15 @@ def simulated(model: Model, state: Any, span: tuple[float, float], times: Any, p
     if interrupt is not None:
         raise Interrupted(found) if isinstance(interrupt, KeyboardInterrupt) else interrupt
     return found
+
+
+def _within(times: Floats, span: tuple[float, float]) -> Floats:
+    """Times in the direction of the span and, but for rounding, within it."""
+    low, high = sorted(span)
+    steps = np.diff(times) * (1.0 if span[1] >= span[0] else -1.0)
+    room = 1e-12 * max(abs(low), abs(high))
+    if (steps < 0).any() or (times.size and not (low - room <= times.min() and times.max() <= high + room)):
+        message = f"the times do not go from {span[0]:g} towards {span[1]:g}"
+        raise InputError(f"{message}\n  help: times within the span, in its direction, as np.linspace({span[0]:g}, {span[1]:g}, 100)")
+    clipped: Floats = np.clip(times, low, high)
+    return clipped

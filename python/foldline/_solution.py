@@ -205,7 +205,7 @@ class Solution:
 
     def __repr__(self) -> str:
         at = ", ".join(f"{name}={value:g}" for name, value in self.parameters.items())
-        return f"<{self._what()} of {self.model.name} at {at}>"
+        return f"<{self._what()} of {self.model.name}{' at ' if at else ''}{at}>"
 
     def _repr_html_(self) -> str:
         from ._html import solution

@@ -182,6 +182,16 @@ def test_wrong_arguments_are_answered_with_the_cure(brusselator):
         brusselator.settle("cycle")
     with pytest.raises(foldline.InputError, match="the wrong way round"):
         foldline.follow(brusselator.settle(), "B", (4, 0.5))
+    for wrong in (dict(samples=0), dict(jobs=-1), dict(tolerance=1.0), dict(samples=2.5)):
+        with pytest.raises(foldline.InputError, match=r"help: a (whole )?number from"):
+            brusselator.settle(**wrong)
+    for span, times in ((float("nan"), None), (1.0, [0.5, 2.0]), (1.0, [0.5, 0.2]), (1.0, [float("inf")])):
+        with pytest.raises(foldline.InputError, match="help: "):
+            brusselator.simulate([1.0, 1.0], span, times=times)
+    with pytest.raises(foldline.InputError, match="cannot be read"):
+        foldline.run("nowhere.toml", brusselator)
+    with pytest.raises(foldline.InputError, match="none is given"):
+        foldline.run({"survey": [{"name": "s", "free": "B", "values": [1]}]}, brusselator, resume=True)
     with pytest.raises(foldline.InputError, match="is no solution to start from"):
         foldline.follow(brusselator, "B", (0.5, 4))
 
