@@ -6,34 +6,38 @@ command line, and everything can be saved as a run.
 
 from __future__ import annotations
 
-import builtins
 import os
-import sys
-import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any
 
-from . import _native, _write
-from ._arrays import whole
-from ._branch import Branch, SpecialPoint, native_only
+from . import _native
+from ._branch import Branch, SpecialPoint
 from ._diagram import Diagram, Homotopy
-from ._errors import EndedShort, InputError, Interrupted, NoSolution
+from ._errors import InputError, NoSolution
 from ._model import Model
-from ._progress import Progress, shown
+from ._progress import Progress
 from ._solution import Solution
-
-Path = str | os.PathLike[str]
-Range = Sequence[float]
-
-#: What the seed is called at which something starts.
-_START = "the given solution"
-
-_rescued: list[Any] = []
+from ._studies import (
+    RESCUED,
+    START,
+    Path,
+    Range,
+    begun,
+    branch_of,
+    carried_out,
+    check_ordinary,
+    check_solution,
+    cleaned,
+    going_on,
+    parsed,
+    study_from,
+    text_of,
+)
 
 
 def rescued() -> Any:
     """What the last computation that Ctrl-C ended had found until then, or None."""
-    return _rescued[-1] if _rescued else None
+    return RESCUED[-1] if RESCUED else None
 
 
 def run(
@@ -83,12 +87,12 @@ def run(
     if isinstance(study, Mapping):
         if model is None:
             raise InputError("a study that is a dictionary names no model\n  help: foldline.run(study, model)")
-        own = _parsed(dict(study), model)
+        own = parsed(dict(study), model)
     elif model is None:
         own = _native.Study.read(os.fspath(study))
     else:
-        own = _native.Study.parse(_text(study), os.fspath(study), model._native)
-    return _carried_out(own, Diagram, model, out=out, jobs=jobs, resume=resume, progress=progress)
+        own = _native.Study.parse(text_of(study), os.fspath(study), model._native)
+    return carried_out(own, Diagram, model, out=out, jobs=jobs, resume=resume, progress=progress)
 
 
 def open(folder: Path) -> Diagram:
@@ -163,22 +167,22 @@ def follow(
     InputError, Interrupted
         As for `run`. After Ctrl-C the branch is in `partial`.
     """
-    _is_solution(start)
+    check_solution(start)
     own = name or f"{start.family} over {free}"
-    item = {"name": own, "from": _START, "free": free, "range": range, "until": until, "switch": switch, "mark": mark,
+    item = {"name": own, "from": START, "free": free, "range": range, "until": until, "switch": switch, "mark": mark,
             "stop": stop, "max-points": max_points}  # fmt: skip
-    study = _study(start, tolerance, degree, branch=[_cleaned(item)])
-    return _branch(study, start, own, out=out, jobs=jobs, progress=progress)
+    study = study_from(start, tolerance, degree, branch=[cleaned(item)])
+    return branch_of(study, start, own, out=out, jobs=jobs, progress=progress)
 
 
 def switched(branch: Branch, point: SpecialPoint, depth: int, options: dict[str, Any]) -> Branch:
     """The branch that leaves another one at a special point."""
     if not isinstance(point, SpecialPoint) or point.branch.name != branch.name:
         raise InputError(f"{point!r} is no special point of {branch.name}\n  help: one of branch.special")
-    _ordinary(branch, "switched from")
+    check_ordinary(branch, "switched from")
     name = f"{branch.name}/{point.kind}-{point.number}"
-    study, start = _going_on(branch, options, switch={f"{point.kind}-{point.number}": depth})
-    diagram = _carried_out(study, Diagram, branch.diagram.model, given=start, earlier=branch, of=name, **options)
+    study, start = going_on(branch, options, switch={f"{point.kind}-{point.number}": depth})
+    diagram = carried_out(study, Diagram, branch.diagram.model, given=start, earlier=branch, of=name, **options)
     if name not in diagram:
         about = [note for whose, note in diagram.notes if whose == branch.name]
         raise NoSolution("\n".join(about) or f"no branch leaves {branch.name} at this {point.kind}")
@@ -226,14 +230,14 @@ def hold(
     if not isinstance(point, SpecialPoint):
         raise InputError(f"{point!r} is no special point\n  help: one of branch.special")
     branch = point.branch
-    _ordinary(branch, "held on")
+    check_ordinary(branch, "held on")
     own = name or f"{point.kind} of {branch.name} over {free}"
     options: dict[str, Any] = {"out": out, "jobs": jobs, "progress": progress}
     curve = {"name": own, "hold": point.kind, "of": branch.name, "near": point.value, "free": free, "range": range,
              "branch-range": branch_range, "until": until, "max-points": max_points}  # fmt: skip
-    study, start = _going_on(branch, options, curve=[_cleaned(curve)])
-    diagram = _carried_out(study, Diagram, branch.diagram.model, given=start, earlier=branch, of=own, **options)
-    return _begun(diagram, own)
+    study, start = going_on(branch, options, curve=[cleaned(curve)])
+    diagram = carried_out(study, Diagram, branch.diagram.model, given=start, earlier=branch, of=own, **options)
+    return begun(diagram, own)
 
 
 def homotopy(
@@ -274,11 +278,11 @@ def homotopy(
     Homotopy
         `arrived`, `end` (the solution at the goal), `route` (in sentences), and the branches on the way.
     """
-    _is_solution(start)
-    item = {"name": name, "from": _START, "to": dict(to), "via": via, "range": range, "max-points": max_points}
-    study = _study(start, tolerance, degree, homotopy=[_cleaned(item)])
+    check_solution(start)
+    item = {"name": name, "from": START, "to": dict(to), "via": via, "range": range, "max-points": max_points}
+    study = study_from(start, tolerance, degree, homotopy=[cleaned(item)])
     made: Callable[..., Diagram] = Homotopy
-    found = _carried_out(study, made, start.model, given=start, out=out, jobs=jobs, progress=progress)
+    found = carried_out(study, made, start.model, given=start, out=out, jobs=jobs, progress=progress)
     assert isinstance(found, Homotopy)
     found.name = name
     return found
@@ -339,123 +343,5 @@ def explore(
             "budget": budget}  # fmt: skip
     if doublings is not None:
         item["switch"] = {"hopf": 4, "branch-point": 4, "period-doubling": doublings}
-    study = _parsed({"tolerance": tolerance, "explore": [_cleaned(item)]}, model)
-    return _carried_out(study, Diagram, model, out=out, jobs=jobs, resume=resume, progress=progress)
-
-
-def _text(study: Path) -> str:
-    try:
-        with builtins.open(study, encoding="utf-8") as file:
-            return file.read()
-    except (OSError, UnicodeDecodeError) as error:
-        cure = "check the spelling of the path; relative paths start at the current folder"
-        raise InputError(f"the study file {os.fspath(study)} cannot be read: {error}\n  help: {cure}") from error
-
-
-def _depth() -> int:
-    """How many calls below the user's code the caller is."""
-    inner = os.path.dirname(os.path.abspath(__file__))
-    frame, depth = sys._getframe(1).f_back, 2
-    while frame is not None and os.path.dirname(os.path.abspath(frame.f_code.co_filename)) == inner:
-        frame, depth = frame.f_back, depth + 1
-    return depth
-
-
-# How a question becomes a study.
-
-
-def _cleaned(item: Mapping[str, Any]) -> dict[str, Any]:
-    """Without what was not said; names with hyphens, as files have them; numbers, where files have numbers."""
-    cleaned = {key: value for key, value in item.items() if value is not None}
-    for key in ("range", "branch-range"):
-        if key in cleaned:
-            cleaned[key] = [float(end) for end in cleaned[key]]
-    if "switch" in cleaned:
-        cleaned["switch"] = {str(kind).replace("_", "-"): depth for kind, depth in cleaned["switch"].items()}
-    if "connect" in cleaned:
-        cleaned["connect"] = {name: [float(end) for end in ends] for name, ends in cleaned["connect"].items()}
-    return cleaned
-
-
-def _is_solution(start: Any) -> None:
-    if not isinstance(start, Solution):
-        cure = "model.settle(...), one of model.attractors(), or a point of a branch, such as branch[-1]"
-        raise InputError(f"{start!r} is no solution to start from\n  help: {cure}")
-
-
-def _ordinary(branch: Branch, what: str) -> None:
-    if branch.held is not None or branch.diagram._native.study().is_leg(branch.name):
-        noun = "curve in two parameters" if branch.held is not None else "run of a homotopy"
-        raise InputError(f"{branch.name} is a {noun}, which cannot be {what}\n  help: follow a branch from one of its points")
-
-
-def _parsed(tables: dict[str, Any], model: Model) -> _native.Study:
-    text = _write.study({"model": model._native.file, **{k: v for k, v in tables.items() if k != "model"}})
-    return _native.Study.parse(text, "<study>", model._native)
-
-
-def _study(start: Solution, tolerance: float, degree: int, **items: Any) -> _native.Study:
-    """A study with one seed, whose solution is known."""
-    state = dict(zip(start.model.states, start.state.tolist(), strict=True))
-    seed = {"name": _START, "state": state, "parameters": start.parameters}
-    return _parsed({"tolerance": float(tolerance), "degree": degree, "seed": [seed], **items}, start.model)
-
-
-def _going_on(branch: Branch, options: dict[str, Any], **items: Any) -> tuple[_native.Study, Solution]:
-    """A study that has a finished branch already."""
-    own = branch.diagram._native.study()
-    start = branch[int((branch.position == 0).argmax())]
-    span = options.pop("range", None) or own.range_of(branch.name)
-    if span is None:
-        span = (float(branch[branch.free].min()), float(branch[branch.free].max()))
-    item = {"name": branch.name, "from": _START, "free": branch.free, "range": span, "switch": items.pop("switch", None)}
-    item.update({key.replace("_", "-"): options.pop(key) for key in ("max_points", "mark", "stop") if key in options})
-    return _study(start, own.tolerance, own.degree, branch=[_cleaned(item)], **items), start
-
-
-def _branch(study: _native.Study, start: Solution, name: str, **options: Any) -> Branch:
-    return _begun(_carried_out(study, Diagram, start.model, given=start, of=name, **options), name)
-
-
-def _begun(diagram: Diagram, name: str) -> Branch:
-    if name not in diagram or len(diagram[name]) == 0:
-        ends = list(dict.fromkeys(diagram[name].ends)) if name in diagram else diagram.short
-        raise NoSolution("; ".join(ends))
-    return diagram[name]
-
-
-def _carried_out(
-    study: _native.Study,
-    made: Callable[..., Diagram],
-    model: Model | None,
-    *,
-    given: Solution | None = None,
-    earlier: Branch | None = None,
-    of: str | None = None,
-    out: Path | None = None,
-    jobs: int | None = None,
-    resume: bool = False,
-    progress: Progress = None,
-) -> Diagram:
-    folder = None if out is None else os.fspath(out)
-    if jobs is not None:
-        whole("jobs", jobs)
-    if resume and folder is None:
-        raise InputError('resume=True goes on with a run in a folder, and none is given\n  help: out="runs/study"')
-    known = None if earlier is None else native_only(earlier)
-    seeds = {} if given is None else {_START: given._native}
-    with shown(progress) as show:
-        native, short, interrupt = _native.run(study, seeds, known, folder, jobs, resume, show)
-    diagram = made(native if native is not None else lambda: _native.Diagram.load(folder or ""), model, folder)
-    if interrupt is not None:
-        if not isinstance(interrupt, KeyboardInterrupt):
-            raise interrupt
-        partial = diagram[of] if of is not None and of in diagram else diagram
-        _rescued[:] = [partial]
-        raise Interrupted(partial) from None
-    # That a branch ended short from which another one is switched to is known already.
-    known_short = f"{earlier.name}:" if earlier is not None else "\0"
-    for line in short:
-        if not line.startswith(known_short):
-            warnings.warn(line, EndedShort, stacklevel=_depth())
-    return diagram
+    study = parsed({"tolerance": tolerance, "explore": [cleaned(item)]}, model)
+    return carried_out(study, Diagram, model, out=out, jobs=jobs, resume=resume, progress=progress)
