@@ -12,17 +12,15 @@ from ._arrays import Floats, floats
 from ._errors import InputError
 
 if TYPE_CHECKING:
-    from ._branch import Branch
+    from ._branch import Branch, SpecialPoint
     from ._diagram import Diagram
     from ._model import Model
     from ._solution import Solution
 
 #: Told apart with every common kind of colour vision (Okabe and Ito); the same as in the pictures of the command line.
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
-#: Of matplotlib, by kind.
-MARKS = {
-    "fold": "o", "branch-point": "X", "hopf": "s", "period-doubling": "^", "torus": "D", "mark": "|", "unexplained": "x",
-}  # fmt: skip
+#: Of matplotlib, by the shapes that the command line draws.
+MARKS = {"circle": "o", "square": "s", "diamond": "D", "triangle": "^", "nabla": "v", "cross": "x", "plus": "+", "star": "*", "dot": "."}
 
 
 def axes_or_new(ax: Any) -> Any:
@@ -39,6 +37,11 @@ def axes_or_new(ax: Any) -> Any:
 def label(name: str, model: Model) -> str:
     """An axis label: Greek names as letters, the unit in brackets where there is one."""
     return _native.label(model._native, name)
+
+
+def _variable(name: str, model: Model) -> str:
+    """The label of a state or output itself, not of its largest value."""
+    return label(f"{name}_max", model).removeprefix("max ")
 
 
 def quantities(branches: Sequence[Branch], x: str | None, y: str | None) -> tuple[str, str]:
@@ -75,7 +78,7 @@ def branch(own: Branch, ax: Any, x: str | None, y: str | None, style: dict[str, 
     axes = axes_or_new(ax)
     across, up = quantities([own], x, y) if own.held is None else (x or own.held[1], y or own.free)
     artists = _lines(axes, own, across, up, size([own], across, up), {"color": COLOURS[0], "label": own.name, **style})
-    artists += _marks(axes, own, across, up, artists[0].get_color() if artists else COLOURS[0])
+    artists += _marks(axes, own, across, up, artists[0].get_color() if artists else COLOURS[0], set())
     axes.set_xlabel(label(across, own.diagram.model))
     axes.set_ylabel(label(up, own.diagram.model))
     return artists
@@ -90,15 +93,19 @@ def _lines(axes: Any, own: Branch, x: str, y: str, scale: tuple[float, float], s
     return artists
 
 
-def _marks(axes: Any, own: Branch, x: str, y: str, colour: Any) -> list[Any]:
+def _marks(axes: Any, own: Branch, x: str, y: str, colour: Any, named: set[str]) -> list[Any]:
+    """Special points, hollow, subcritical ones filled; each sort is named once."""
+    sorts: dict[tuple[str, str | None], list[SpecialPoint]] = {}
+    for point in own.special:
+        sorts.setdefault((point.kind, point.criticality), []).append(point)
     artists: list[Any] = []
-    for kind in dict.fromkeys(point.kind for point in own.special):
-        for filled in (False, True):
-            chosen = [p for p in own.special if p.kind == kind and (p.criticality == "subcritical") == filled]
-            if chosen:
-                face = colour if filled else "white"
-                places = ([p[x] for p in chosen], [p[y] for p in chosen])
-                artists += axes.plot(*places, MARKS.get(kind, "P"), color=colour, markerfacecolor=face, markersize=5, label="_", zorder=3)
+    for (kind, criticality), points in sorts.items():
+        name = kind if criticality is None else f"{kind}, {criticality}"
+        style = {"color": colour, "markerfacecolor": colour if criticality == "subcritical" else "white", "markersize": 5, "zorder": 3}
+        places = ([p[x] for p in points], [p[y] for p in points])
+        mark = MARKS[_native.marker(kind)]
+        artists += axes.plot(*places, marker=mark, linestyle="none", label="_" if name in named else name, **style)
+        named.add(name)
     return artists
 
 
@@ -120,11 +127,12 @@ def diagram(own: Diagram, ax: Any, x: str | None, y: str | None, curves: bool) -
         main = branch.name == root
         style = {"color": colour, "linewidth": 1.8 if main else 1.2, "alpha": 1 if main else 0.65}
         artists += _lines(axes, branch, across, up, scale, {**style, "label": branch.name if main else "_"})
+    named: set[str] = set()
     for branch in shown:
-        artists += _marks(axes, branch, across, up, COLOURS[roots.index(_root(own, branch.name)) % len(COLOURS)])
+        artists += _marks(axes, branch, across, up, COLOURS[roots.index(_root(own, branch.name)) % len(COLOURS)], named)
     axes.set_xlabel(label(across, own.model))
     axes.set_ylabel(label(up, own.model))
-    if 1 < len(roots) <= 14:
+    if len(roots) <= 14:
         axes.legend(fontsize="small")
     return artists
 
@@ -172,8 +180,8 @@ def _orbit(axes: Any, own: Solution) -> list[Any]:
     track = own.uniform(2048)
     closed = [np.append(track[name], track[name][:1]) for name in pair]
     artists: list[Any] = axes.plot(*closed, color=COLOURS[0])
-    axes.set_xlabel(label(pair[0], own.model))
-    axes.set_ylabel(label(pair[1], own.model))
+    axes.set_xlabel(_variable(pair[0], own.model))
+    axes.set_ylabel(_variable(pair[1], own.model))
     if whirl is not None:
         axes.set_aspect("equal", "datalim")
     return artists
@@ -189,7 +197,7 @@ def _series(axes: Any, own: Solution) -> list[Any]:
     if len(names) > 1:
         axes.legend(fontsize="small")
     else:
-        axes.set_ylabel(label(names[0], own.model))
+        axes.set_ylabel(_variable(names[0], own.model))
     return artists
 
 
@@ -213,7 +221,11 @@ def _multipliers(axes: Any, own: Solution) -> list[Any]:
     else:
         artists.append(axes.axvline(0, color="#9a9a9a", linewidth=1))
     values = own.spectrum
-    outside = np.abs(values) > 1 if own.is_cycle else values.real > 0
+    # The trivial multiplier, which is 1 but for rounding, comes first where there is one.
+    trivial = 1 if own.is_cycle and not own.forcing_periods else 0
+    size = np.abs(values[trivial:]) if own.is_cycle else values.real
+    outside = np.zeros(len(values), dtype=bool)
+    outside[trivial + np.argsort(-size)[: own.unstable]] = True
     for chosen, colour in ((~outside, COLOURS[0]), (outside, COLOURS[1])):
         artists += axes.plot(values.real[chosen], values.imag[chosen], "o", color=colour, markersize=5)
     if own.is_cycle:

@@ -7,16 +7,25 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from . import _native
 from ._errors import InputError
 from ._plot import COLOURS, _root, label, pieces, quantities, size
 
 if TYPE_CHECKING:
     from ._branch import Branch
 
+#: Of plotly, by the shapes that the command line draws.
 _SYMBOLS = {
-    "fold": "circle", "branch-point": "x", "hopf": "square", "period-doubling": "triangle-up", "torus": "diamond",
-    "mark": "line-ns", "unexplained": "x-thin",
-}  # fmt: skip
+    "circle": "circle",
+    "square": "square",
+    "diamond": "diamond",
+    "triangle": "triangle-up",
+    "nabla": "triangle-down",
+    "cross": "x",
+    "plus": "cross",
+    "star": "star",
+    "dot": "circle-dot",
+}
 
 
 def figure(branches: Sequence[Branch], x: str | None, y: str | None) -> Any:
@@ -82,7 +91,7 @@ def _marks(graph_objects: Any, own: Branch, x: str, y: str, colour: str) -> list
     traces = []
     for kind in dict.fromkeys(point.kind for point in own.special):
         chosen = own.special[kind]
-        style = {"symbol": _SYMBOLS.get(kind, "star"), "color": colour, "size": 9, "line": {"width": 1, "color": "white"}}
+        style = {"symbol": _SYMBOLS[_native.marker(kind)], "color": colour, "size": 9, "line": {"width": 1, "color": "white"}}
         traces.append(
             graph_objects.Scatter(
                 x=[p[x] for p in chosen],

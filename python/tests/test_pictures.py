@@ -26,7 +26,8 @@ def test_a_branch_is_solid_where_it_is_stable_and_changes_at_the_special_point(s
     assert solid.get_xdata()[-1] == dashed.get_xdata()[0] == hopf["B"]
     assert solid.get_ydata()[-1] == dashed.get_ydata()[0] == hopf["x_max"]
     assert marks.get_xdata() == [hopf["B"]]
-    assert marks.get_markerfacecolor() == "white"
+    assert (marks.get_markerfacecolor(), marks.get_marker()) == ("white", "D")
+    assert marks.get_label() == "hopf, supercritical"
     assert solid.axes.get_xlabel() == "B"
     drawn = np.concatenate([line.get_xydata() for line in (solid, dashed)])
     for place in zip(steady["B"], steady["x_max"], strict=True):
@@ -66,6 +67,9 @@ def test_a_cycle_is_drawn_in_panels(cycles, rotor):
     assert np.allclose(np.hypot(circle.get_xdata(), circle.get_ydata()), 1)
     drawn = sum(len(line.get_xdata()) for line in panels["multipliers"][1:])
     assert drawn == len(whirling.spectrum)
+    assert panels["orbit"][0].axes.get_xlabel() == "u"
+    # Nothing is unstable, whatever side of 1 the trivial multiplier is on.
+    assert len(panels["multipliers"][-1].get_xdata()) == whirling.unstable == 0
 
 
 def test_an_equilibrium_is_drawn_as_its_eigenvalues(steady):

@@ -35,7 +35,7 @@ mod _native {
     #[pymodule_export]
     use crate::model::Model;
     #[pymodule_export]
-    use crate::pictures::{label, pieces, svg};
+    use crate::pictures::{label, marker, pieces, svg};
     #[pymodule_export]
     use crate::seeds::{attractors, settle};
     #[pymodule_export]

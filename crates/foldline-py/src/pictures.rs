@@ -4,9 +4,9 @@ use crate::bytes::numbers;
 use crate::diagram::Diagram;
 use crate::failure;
 use crate::model::Model;
-use foldline::diagram;
+use foldline::diagram::{self, Kind};
 use foldline_plot::curve;
-use foldline_plot::{Picture, Quantity};
+use foldline_plot::{Marker, Picture, Quantity};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
@@ -19,6 +19,22 @@ fn quantity(py: Python, name: &str, model: &foldline::model::Model) -> PyResult<
 #[pyfunction]
 pub fn label(py: Python, model: &Model, name: &str) -> PyResult<String> {
     Ok(quantity(py, name, &model.model)?.label(&model.model))
+}
+
+/// The shape of the mark for a kind of special point.
+#[pyfunction]
+pub fn marker(kind: &str) -> &'static str {
+    match Kind::from_name(kind).map_or(Marker::Dot, Marker::of) {
+        Marker::Circle => "circle",
+        Marker::Square => "square",
+        Marker::Diamond => "diamond",
+        Marker::Triangle => "triangle",
+        Marker::Nabla => "nabla",
+        Marker::Cross => "cross",
+        Marker::Plus => "plus",
+        Marker::Star => "star",
+        Marker::Dot => "dot",
+    }
 }
 
 type Piece<'py> = (bool, Bound<'py, PyBytes>, Bound<'py, PyBytes>);
