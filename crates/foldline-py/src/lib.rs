@@ -6,12 +6,12 @@
 //!
 //! | question | file |
 //! |---|---|
-//! | how is a model read, how does a trajectory run? | [`model`], [`simulation`] |
-//! | what is to be computed? | [`study`] |
-//! | how is it computed, without the interpreter's lock, and stopped? | [`work`], [`patience`] |
-//! | what came out? | [`diagram`], [`solution`] |
-//! | how is it drawn? | [`pictures`] |
-//! | as which exceptions do mistakes arrive? | [`failure`] |
+//! | how is a model read, how does a trajectory run? | `model`, `simulation` |
+//! | what is to be computed? | `study` |
+//! | how is it computed, without the interpreter's lock, and stopped? | `work`, `patience` |
+//! | what came out? | `diagram`, `solution` |
+//! | how is it drawn? | `pictures` |
+//! | as which exceptions do mistakes arrive? | `failure` |
 
 mod bytes;
 mod diagram;
