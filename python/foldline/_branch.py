@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, overload
 
@@ -254,7 +254,19 @@ class Branch(Sequence[Solution]):
         """The branches of the diagram that leave this one at its special points."""
         return [own for own in self.diagram if own.origin[:2] == ("switch", self.name) and own.held is None]
 
-    def switch(self, point: SpecialPoint, *, depth: int = 1, **options: Any) -> Branch:
+    def switch(
+        self,
+        point: SpecialPoint,
+        *,
+        depth: int = 1,
+        range: Sequence[float] | None = None,
+        mark: Mapping[str, Any] | None = None,
+        stop: Mapping[str, Any] | None = None,
+        max_points: int = 5000,
+        out: str | os.PathLike[str] | None = None,
+        jobs: int | None = None,
+        progress: bool | Callable[[int, int, str], None] | None = None,
+    ) -> Branch:
         """Follows the branch that leaves this one at a Hopf point, branch point or period doubling.
 
         Parameters
@@ -263,18 +275,25 @@ class Branch(Sequence[Solution]):
             Of this branch.
         depth : int
             At how many levels it is switched on, at points of the same kind of the new branch.
-        **options
-            `range`, `max_points`, `mark`, `stop`, `out`, `jobs`, `progress`, as for `foldline.follow`; the range is by default that
-            of this branch.
+        range : pair, optional
+            Smallest and largest value of the parameter; by default those of this branch.
+        mark, stop, max_points, out, jobs, progress
+            As for `foldline.follow`.
 
         Returns
         -------
         Branch
             In a diagram with this one.
+
+        Raises
+        ------
+        NoSolution
+            Where no branch leaves there, or one that is known already; the message says which.
         """
         from ._compute import switched
 
-        return switched(self, point, depth, options)
+        own = {"range": range, "mark": mark, "stop": stop, "max-points": max_points}
+        return switched(self, point, depth, own, out=out, jobs=jobs, progress=progress)
 
     def plot(self, ax: Any = None, x: str | None = None, y: str | None = None, **style: Any) -> list[Any]:
         """Draws the branch: stable pieces solid, unstable ones dashed, special points as marks.

@@ -175,13 +175,13 @@ def follow(
     return branch_of(study, start, own, out=out, jobs=jobs, progress=progress)
 
 
-def switched(branch: Branch, point: SpecialPoint, depth: int, options: dict[str, Any]) -> Branch:
+def switched(branch: Branch, point: SpecialPoint, depth: int, own: Mapping[str, Any], **options: Any) -> Branch:
     """The branch that leaves another one at a special point."""
     if not isinstance(point, SpecialPoint) or point.branch.name != branch.name:
         raise InputError(f"{point!r} is no special point of {branch.name}\n  help: one of branch.special")
     check_ordinary(branch, "switched from")
     name = f"{branch.name}/{point.kind}-{point.number}"
-    study, start = going_on(branch, options, switch={f"{point.kind}-{point.number}": depth})
+    study, start = going_on(branch, {**own, "switch": {f"{point.kind}-{point.number}": depth}})
     diagram = carried_out(study, Diagram, branch.diagram.model, given=start, earlier=branch, of=name, **options)
     if name not in diagram:
         about = [note for whose, note in diagram.notes if whose == branch.name]
@@ -235,7 +235,7 @@ def hold(
     options: dict[str, Any] = {"out": out, "jobs": jobs, "progress": progress}
     curve = {"name": own, "hold": point.kind, "of": branch.name, "near": point.value, "free": free, "range": range,
              "branch-range": branch_range, "until": until, "max-points": max_points}  # fmt: skip
-    study, start = going_on(branch, options, curve=[cleaned(curve)])
+    study, start = going_on(branch, {}, curve=[cleaned(curve)])
     diagram = carried_out(study, Diagram, branch.diagram.model, given=start, earlier=branch, of=own, **options)
     return begun(diagram, own)
 

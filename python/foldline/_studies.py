@@ -82,16 +82,15 @@ def study_from(start: Solution, tolerance: float, degree: int, **items: Any) -> 
     return parsed({"tolerance": float(tolerance), "degree": degree, "seed": [seed], **items}, start.model)
 
 
-def going_on(branch: Branch, options: dict[str, Any], **items: Any) -> tuple[_native.Study, Solution]:
-    """A study that has a finished branch already."""
-    own = branch.diagram._native.study()
+def going_on(branch: Branch, own: Mapping[str, Any], **items: Any) -> tuple[_native.Study, Solution]:
+    """A study that has a finished branch already, with what is said about it now."""
+    study = branch.diagram._native.study()
     start = branch[int((branch.position == 0).argmax())]
-    span = options.pop("range", None) or own.range_of(branch.name)
+    span = own.get("range") or study.range_of(branch.name)
     if span is None:
         span = (float(branch[branch.free].min()), float(branch[branch.free].max()))
-    item = {"name": branch.name, "from": START, "free": branch.free, "range": span, "switch": items.pop("switch", None)}
-    item.update({key.replace("_", "-"): options.pop(key) for key in ("max_points", "mark", "stop") if key in options})
-    return study_from(start, own.tolerance, own.degree, branch=[cleaned(item)], **items), start
+    item = {"name": branch.name, "from": START, "free": branch.free, **own, "range": span}
+    return study_from(start, study.tolerance, study.degree, branch=[cleaned(item)], **items), start
 
 
 def branch_of(study: _native.Study, start: Solution, name: str, **options: Any) -> Branch:
