@@ -18,6 +18,7 @@ pub mod page;
 mod paint;
 pub mod palette;
 pub mod quantity;
+#[cfg(feature = "render")]
 mod render;
 mod scale;
 mod texts;
@@ -28,5 +29,6 @@ pub use compose::figure_svg;
 pub use figure::{Axis, Figure, Layer, LegendPlace, Marker, Panel};
 pub use foldline::special::quantity::Quantity;
 pub use page::{Picture, svg};
-pub use quantity::axis;
+pub use quantity::{axis, label};
+#[cfg(feature = "render")]
 pub use render::{RenderError, pdf, png};

@@ -278,3 +278,21 @@ fn nothing_starts_at_the_end_of_a_curve_that_has_none() {
         assert!(mistake.message.contains("\"folds\" has no `until`"), "{mistake}");
     }
 }
+
+#[test]
+fn one_special_point_is_switched_at_and_its_branch_has_curves() {
+    let text = STUDY.replace("{ period-doubling = 2 }", "{ period-doubling-1 = 1, hopf = 1 }");
+    let cycles = read(&text).plan.branches[1].clone();
+    assert_eq!(cycles.switching.only, [(Kind::PeriodDoubling, 1, 1)]);
+    let depths = [1, 2].map(|number| cycles.switching.at_point(Kind::PeriodDoubling, number));
+    assert_eq!(depths, [1, 0]);
+    let below = cycles.switching.below(Kind::PeriodDoubling, 1);
+    assert_eq!((below.at_point(Kind::PeriodDoubling, 1), below.at_point(Kind::Hopf, 3)), (0, 1));
+    let other = text.replace("period-doubling-1 = 1", "period-doubling-2 = 1");
+    let found = parse_study(&other, "study.toml", MODEL, "pendulum.toml").unwrap_err();
+    assert!(found[0].message.contains("\"cycles/period-doubling-1\" will not be followed"), "{}", found[0]);
+    for wrong in ["period-doubling-0 = 1", "fold-1 = 1", "period-doubling-1 = 17"] {
+        let text = STUDY.replace("period-doubling = 2", wrong);
+        assert!(parse_study(&text, "study.toml", MODEL, "pendulum.toml").is_err(), "{wrong}");
+    }
+}

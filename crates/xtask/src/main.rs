@@ -1,18 +1,20 @@
-//! Development tasks: `cargo xtask test | check | deny | python | bench | reproduce | kill | campaign | docs`. What continuous integration runs, and
+//! Development tasks: `cargo xtask test | check | python | deny | bench | reproduce | kill | campaign | docs`. What continuous integration runs, and
 //! nothing else.
 
 mod kill;
 mod python;
+mod readers;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 use std::time::Instant;
 
 const USAGE: &str = "cargo xtask TASK
-  test        format, clippy without warnings, references, every test of the workspace, dependencies
+  test        format, clippy without warnings, references, every test of the workspace and of the Python package, dependencies
   check       the same without the tests and the dependencies
+  python      the wheel of the Python package, its formatter, type checker and tests in an environment under target; where there is no
+              Python that is said
   deny        licences, sources and advisories of the dependencies by cargo-deny, which is installed under target if it is not there
-  python      a Python with xarray and pandas under target, which the tests of the exports use if it is there; a part of test
   bench       time, instructions, memory and work, written to benches/results/DATE.md; with --peers beside AUTO-07p and SciPy
               too; --only PART and --quick for a look (docs/book/benchmarks.md)
   reproduce   every figure and claim of the reference publication in a release build, from nothing; fails where a verdict is
@@ -27,11 +29,15 @@ fn main() -> ExitCode {
     let task = std::env::args().nth(1).unwrap_or_default();
     let done = match task.as_str() {
         "test" => {
-            check() && python::prepared() && cargo(&["test", "--workspace", "--quiet", "--no-fail-fast"]) && deny()
+            check()
+                && readers::prepared()
+                && cargo(&["test", "--workspace", "--quiet", "--no-fail-fast"])
+                && python::test()
+                && deny()
         }
         "check" => check(),
+        "python" => python::test(),
         "deny" => deny(),
-        "python" => python::prepared(),
         "bench" => bench(&std::env::args().skip(2).collect::<Vec<String>>()),
         "reproduce" => reproduce(std::env::args().nth(2).as_deref() == Some("--write")),
         "kill" => kill::test(std::env::args().nth(2).and_then(|times| times.parse().ok()).unwrap_or(100)),

@@ -1,28 +1,86 @@
-//! `cargo xtask python`: the packages with which the tests look at exported files as others do.
+//! `cargo xtask python`: the wheel of the Python package, and its tests in an environment that has nothing else.
 
 use crate::{root, run};
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// The newest versions that were tried. xarray brings numpy and pandas with it.
-const PACKAGES: [&str; 5] =
-    ["xarray==2026.9.0", "netCDF4==1.7.5.1.post1", "h5netcdf==1.8.2", "h5py==3.16.0", "pyarrow==26.0.1"];
+const REQUIREMENTS: &str = "python/tests/requirements.txt";
 
-/// Whether the tests can go on: where there is no Python or no way to its packages, it is said that they look less far.
-pub fn prepared() -> bool {
-    let folder = root().join("target/tools/python");
-    let complete = folder.join("complete");
-    let wanted = PACKAGES.join("\n");
-    if std::fs::read_to_string(&complete).is_ok_and(|there| there == wanted) {
+/// Builds the wheel, installs it into an environment of its own under target, and runs formatter, type checker and tests there.
+/// The environment is made anew when its requirements change.
+pub fn test() -> bool {
+    let Some((python, version)) = interpreter() else {
+        eprintln!("the Python package NOT tested: there is no python3 of version 3.10 or later");
         return true;
+    };
+    let home = root().join("target/python");
+    let Some(environment) = Environment::ready(&python, &version, &home) else { return false };
+    let wheels = home.join("wheels");
+    // Those of an earlier call.
+    let _ = std::fs::remove_dir_all(&wheels);
+    let build = [OsStr::new("build"), "--quiet".as_ref(), "--out".as_ref(), wheels.as_ref()];
+    environment.runs("maturin", build)
+        && wheel(&wheels).is_some_and(|wheel| {
+            let install = ["-m", "pip", "install", "--quiet", "--force-reinstall", "--no-deps"].map(OsStr::new);
+            environment.runs("python", install.into_iter().chain([wheel.as_os_str()]))
+        })
+        && environment.runs("ruff", ["format", "--quiet", "--check", "python"].map(OsStr::new))
+        && environment.runs("ruff", ["check", "--quiet", "python"].map(OsStr::new))
+        && environment.runs("mypy", ["--no-error-summary", "python/foldline"].map(OsStr::new))
+        && environment.runs("pytest", ["--quiet", "python/tests"].map(OsStr::new))
+}
+
+/// What to call, and its version.
+fn interpreter() -> Option<(String, String)> {
+    let tried = std::env::var("PYTHON").into_iter().chain(["python3".to_string(), "python".to_string()]);
+    tried.into_iter().find_map(|name| {
+        let say = "import sys; assert sys.version_info >= (3, 10); print(sys.version)";
+        let output = Command::new(&name).args(["-c", say]).output().ok().filter(|output| output.status.success())?;
+        Some((name, String::from_utf8_lossy(&output.stdout).into_owned()))
+    })
+}
+
+struct Environment {
+    programs: PathBuf,
+}
+
+impl Environment {
+    fn ready(python: &str, version: &str, home: &Path) -> Option<Environment> {
+        let place = home.join("environment");
+        let environment = Environment { programs: place.join(if cfg!(windows) { "Scripts" } else { "bin" }) };
+        let wanted = std::fs::read_to_string(root().join(REQUIREMENTS)).ok()? + version;
+        let stamp = place.join("made-for");
+        if std::fs::read_to_string(&stamp).is_ok_and(|made| made == wanted) {
+            return Some(environment);
+        }
+        let _ = std::fs::remove_dir_all(&place);
+        eprintln!("making {}", place.display());
+        let install =
+            ["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "-r", REQUIREMENTS].map(OsStr::new);
+        let made = run(Command::new(python).args(["-m", "venv"]).arg(&place)) && environment.runs("python", install);
+        (made && std::fs::write(&stamp, wanted).is_ok()).then_some(environment)
     }
-    let python = folder.join("bin/python");
-    let made = run(Command::new("python3").args(["-m", "venv"]).arg(&folder))
-        && run(Command::new(&python)
-            .args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check"])
-            .args(PACKAGES));
-    if !made {
-        eprintln!("exports NOT checked with Python: python3 or its packages cannot be had here");
-        return true;
+
+    /// Whether one of its programs succeeds.
+    fn runs<'a>(&self, program: &str, arguments: impl IntoIterator<Item = &'a OsStr>) -> bool {
+        let arguments: Vec<&OsStr> = arguments.into_iter().collect();
+        let shown: Vec<_> = arguments.iter().map(|argument| argument.to_string_lossy()).collect();
+        eprintln!("{program} {}", shown.join(" "));
+        let found = std::env::var_os("PATH").unwrap_or_default();
+        let paths = std::iter::once(self.programs.clone()).chain(std::env::split_paths(&found));
+        let path = std::env::join_paths(paths).unwrap_or(found);
+        let mut command = Command::new(self.programs.join(program));
+        // Another environment that is active here is not meant.
+        for name in ["PYTHONPATH", "VIRTUAL_ENV", "CONDA_PREFIX"] {
+            command.env_remove(name);
+        }
+        run(command.args(arguments).env("PATH", path))
     }
-    std::fs::write(&complete, wanted).inspect_err(|error| eprintln!("{}: {error}", complete.display())).is_ok()
+}
+
+/// The one wheel in a folder.
+fn wheel(folder: &Path) -> Option<PathBuf> {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
+    entries.into_iter().find(|path| path.extension().is_some_and(|ending| ending == "whl"))
 }

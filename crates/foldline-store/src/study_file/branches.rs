@@ -191,6 +191,13 @@ pub(super) fn switching(walk: &mut Walk, value: &Value) -> Switching {
                     switching.depth.push((kind, depth as usize));
                 }
             }
+            None if switch_step(name).is_some() => {
+                if let (Some((kind, number)), Some(depth)) =
+                    (switch_step(name), walk.integer(value, "the depth", 0..=16))
+                {
+                    switching.only.push((kind, number, depth as usize));
+                }
+            }
             None => {
                 let message = match Kind::from_name(name) {
                     Some(_) => format!("no branch of equilibria or cycles begins at a {name} point"),

@@ -115,20 +115,22 @@ fn of_branch(ground: &Ground, known: &Known, index: usize) -> Base {
 fn switched(walk: &mut Walk, value: &Value, mut base: Base, known: &Known, steps: &str) -> Option<Base> {
     let (from, name) = (&known.name, format!("{}{steps}", known.name));
     let mut depth = [0; Kind::ALL.len()];
+    let mut switching = base.plan.switching.clone();
     for step in steps.split('/').skip(1) {
-        let Some((kind, _)) = switch_step(step) else {
+        let Some((kind, number)) = switch_step(step) else {
             let message = format!("no branch that leaves \"{from}\" is called \"{name}\"");
             walk.report(value.span(), message, format!("a name such as \"{from}/period-doubling-1\""));
             return None;
         };
         depth[kind as usize] += 1;
-        if base.plan.switching.at(kind) < depth[kind as usize] {
+        if switching.at_point(kind, number) == 0 {
             let message =
                 format!("\"{name}\" will not be followed: \"{from}\" does not switch that far at {kind} points");
             let right = format!("give the branch \"{from}\" a line `switch = {{ {kind} = {} }}`", depth[kind as usize]);
             walk.report(value.span(), message, right);
             return None;
         }
+        switching = switching.below(kind, number);
         if kind != Kind::BranchPoint {
             base.family = Some(Family::Cycle);
         }

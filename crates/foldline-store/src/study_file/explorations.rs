@@ -62,7 +62,7 @@ pub(super) fn read(
         let random = table.get("random").and_then(|v| walk.integer(v, "`random`", 0..=u64::MAX)).unwrap_or(RANDOM);
         let switching = match table.get("switch") {
             Some(value) => switching(walk, value),
-            None => Switching { depth: DEPTHS.to_vec() },
+            None => Switching { depth: DEPTHS.to_vec(), only: Vec::new() },
         };
         let connect = table.get("connect").and_then(|value| connect(walk, value, model, free, &parameters));
         let max_points = max_points(walk, &item);

@@ -39,7 +39,9 @@ pub fn weight(plan: &Plan, root: Root) -> usize {
     match root {
         Root::Branch(index) => {
             let branch = &plan.branches[index];
-            let switched: usize = branch.switching.depth.iter().map(|(_, depth)| (1 << depth.min(&8)) - 1).sum();
+            let kinds = branch.switching.depth.iter().map(|(_, depth)| *depth);
+            let depths = kinds.chain(branch.switching.only.iter().map(|(.., depth)| *depth));
+            let switched: usize = depths.map(|depth| (1 << depth.min(8)) - 1).sum();
             let curves = (0..plan.curves.len()).filter(|&i| plan.curves[i].of == branch.name);
             1 + switched
                 + following(Start::EndOf(index))
@@ -246,7 +248,7 @@ impl Work<'_> {
         for special in &parent.special {
             let slot = Kind::ALL.iter().position(|k| *k == special.kind)?;
             counts[slot] += 1;
-            if pending.switching.at(special.kind) == 0 {
+            if pending.switching.at_point(special.kind, counts[slot]) == 0 {
                 continue;
             }
             let parameter = special.point.parameters[parent.free];
@@ -265,7 +267,7 @@ impl Work<'_> {
                 self.branches.push(branch);
                 more.push(Pending {
                     branch: self.branches.len() - 1,
-                    switching: pending.switching.below(special.kind),
+                    switching: pending.switching.below(special.kind, counts[slot]),
                 });
                 if !going {
                     return None;
@@ -314,7 +316,8 @@ impl Work<'_> {
             let mut branch = Branch::new(name, family, parent.free, origin);
             let going = self.growth(plan, &settings, [true, true], &parent.special).begin(&mut branch, beginning);
             self.branches.push(branch);
-            more.push(Pending { branch: self.branches.len() - 1, switching: pending.switching.below(special.kind) });
+            let switching = pending.switching.below(special.kind, counts[slot]);
+            more.push(Pending { branch: self.branches.len() - 1, switching });
             if !going {
                 return None;
             }

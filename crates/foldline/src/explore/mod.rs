@@ -45,11 +45,11 @@ pub use plan::{
     AttractorKey, BranchPlan, CurvePlan, ExplorePlan, HomotopyPlan, Plan, SeedPlan, SeedSource, Start, SurveyPlan,
     SweepPlan, Switching,
 };
-pub use seeds::attractors;
+pub use seeds::{attractors, first_solution};
 pub use system::System;
 
 use crate::contract::Observer;
-use crate::diagram::{Branch, Diagram};
+use crate::diagram::{Branch, Diagram, Point};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -59,7 +59,19 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 /// With an observer that [keeps the points](Observer::stores) branches come back with their start, ends and special
 /// points only, unless the plan switches at special points: memory does not grow with the number of points then.
 pub fn run(system: &System, plan: &Plan, jobs: usize, earlier: Diagram, observer: &dyn Observer) -> Diagram {
-    let seeds = seeds::find(system, plan, jobs, &earlier, observer);
+    run_from(system, plan, jobs, earlier, &[], observer)
+}
+
+/// Likewise, with solutions that are known already for some of the seeds, by index: these are not looked for.
+pub fn run_from(
+    system: &System,
+    plan: &Plan,
+    jobs: usize,
+    earlier: Diagram,
+    given: &[(usize, Point)],
+    observer: &dyn Observer,
+) -> Diagram {
+    let seeds = seeds::find(system, plan, jobs, &earlier, given, observer);
     let families = family::roots(plan);
     // The longest first, so that no thread is left alone with it in the end; what a plan names later builds on what it names
     // earlier and takes longer, if anything.

@@ -62,6 +62,9 @@ pub struct Switching {
     /// Depth for each kind; a kind that is not listed is not switched at. A depth of 2 at period doublings follows the
     /// period-doubled branches and the branches that double there again.
     pub depth: Vec<(Kind, usize)>,
+    /// Depth at single special points, of that kind and number counted from the side of smaller positions, which goes before that
+    /// of the kind; on the branch itself, not on what is switched to.
+    pub only: Vec<(Kind, usize, usize)>,
 }
 
 impl Switching {
@@ -70,16 +73,22 @@ impl Switching {
         self.depth.iter().find(|(k, _)| *k == kind).map_or(0, |(_, d)| *d)
     }
 
-    /// Whether it switches at any kind.
-    pub fn anywhere(&self) -> bool {
-        self.depth.iter().any(|(_, depth)| *depth > 0)
+    /// The depth at the special point of that kind and number, from 1.
+    pub fn at_point(&self, kind: Kind, number: usize) -> usize {
+        let single = self.only.iter().find(|(k, n, _)| *k == kind && *n == number);
+        single.map_or_else(|| self.at(kind), |(.., depth)| *depth)
     }
 
-    /// What remains for a branch that was reached by switching at a point of that kind.
-    pub fn below(&self, kind: Kind) -> Switching {
-        Switching {
-            depth: self.depth.iter().map(|(k, d)| (*k, if *k == kind { d.saturating_sub(1) } else { *d })).collect(),
-        }
+    /// Whether it switches at any kind.
+    pub fn anywhere(&self) -> bool {
+        self.depth.iter().any(|(_, depth)| *depth > 0) || self.only.iter().any(|(.., depth)| *depth > 0)
+    }
+
+    /// What remains for a branch that was reached by switching at the point of that kind and number.
+    pub fn below(&self, kind: Kind, number: usize) -> Switching {
+        let left = self.at_point(kind, number).saturating_sub(1);
+        let others = self.depth.iter().copied().filter(|(k, _)| *k != kind);
+        Switching { depth: others.chain([(kind, left)]).collect(), only: Vec::new() }
     }
 }
 
@@ -220,4 +229,21 @@ pub struct Plan {
     pub surveys: Vec<SurveyPlan>,
     /// Stepped sweeps by simulation.
     pub sweeps: Vec<SweepPlan>,
+}
+
+impl Plan {
+    /// A plan that asks for nothing.
+    pub fn empty(tolerance: f64, degree: usize) -> Plan {
+        Plan {
+            tolerance,
+            degree,
+            seeds: Vec::new(),
+            branches: Vec::new(),
+            curves: Vec::new(),
+            homotopies: Vec::new(),
+            explorations: Vec::new(),
+            surveys: Vec::new(),
+            sweeps: Vec::new(),
+        }
+    }
 }

@@ -8,11 +8,11 @@ use super::System;
 use super::diagnosis::{Seen, of_no_start};
 use super::given::from_cycle;
 use super::growth::{polished, problem_of, setting, settings};
-use super::plan::{AttractorKey, Plan, SeedPlan, SeedSource, Start};
+use super::plan::{AttractorKey, BranchPlan, Plan, SeedPlan, SeedSource, Start};
 use crate::attractors::{self, Attractor, Candidate, Census, Lost, Sampling};
 use crate::continuation::corrector::{Plane, correct, parameter_row};
 use crate::continuation::{Failure, Settings};
-use crate::contract::{Event, Examination, Observer};
+use crate::contract::{Event, Examination, Observer, Unobserved};
 use crate::diagram::{Cost, Cycle, Diagram, Point, Solution};
 use crate::linalg::max_abs;
 use crate::problem::equilibrium::EquilibriumProblem;
@@ -35,8 +35,17 @@ impl Seeds {
     }
 }
 
-/// Finds every seed that a branch without points in `earlier`, or a sweep that is not there, starts from.
-pub fn find(system: &System, plan: &Plan, jobs: usize, earlier: &Diagram, observer: &dyn Observer) -> Seeds {
+/// Finds every seed that a branch without points in `earlier`, or a sweep that is not there, starts from, but for those that
+/// are `given`, by index.
+pub fn find(
+    system: &System,
+    plan: &Plan,
+    jobs: usize,
+    earlier: &Diagram,
+    given: &[(usize, Point)],
+    observer: &dyn Observer,
+) -> Seeds {
+    let known = |seed: usize| given.iter().find(|(index, _)| *index == seed).map(|(_, point)| point);
     let needed = |seed: usize| {
         let start = Start::Seed(seed);
         let branches = plan.branches.iter().filter(|b| b.start == start).map(|b| b.name.clone());
@@ -44,7 +53,7 @@ pub fn find(system: &System, plan: &Plan, jobs: usize, earlier: &Diagram, observ
         branches.chain(first_legs).any(|name| earlier.branch(&name).is_none_or(|known| known.points.is_empty()))
             || plan.sweeps.iter().any(|sweep| sweep.seed == seed && earlier.response_set(&sweep.name).is_none())
     };
-    let needed: Vec<bool> = (0..plan.seeds.len()).map(needed).collect();
+    let needed: Vec<bool> = (0..plan.seeds.len()).map(|seed| needed(seed) && known(seed).is_none()).collect();
     let censuses = censuses(system, plan, jobs, &needed);
     for (index, census) in &censuses {
         observer.observe(Event::Note(&plan.seeds[*index].name, &summary(census)));
@@ -61,11 +70,26 @@ pub fn find(system: &System, plan: &Plan, jobs: usize, earlier: &Diagram, observ
             None => Err("no census".into()),
         },
     };
-    let point = |(seed, needed): (&SeedPlan, bool)| match needed {
-        true => system.repeats(&seed.parameters, &[]).and_then(|()| found(seed)),
-        false => Err("not needed".into()),
+    let point = |(index, seed): (usize, &SeedPlan)| match (needed[index], known(index)) {
+        (true, _) => system.repeats(&seed.parameters, &[]).and_then(|()| found(seed)),
+        (false, Some(point)) => Ok(with_degree(point.clone(), plan.degree)),
+        (false, None) => Err("not needed".into()),
     };
-    Seeds { points: plan.seeds.iter().zip(needed.iter().copied()).map(point).collect() }
+    Seeds { points: plan.seeds.iter().enumerate().map(point).collect() }
+}
+
+/// The first solution that a seed means, by itself.
+///
+/// # Errors
+/// A sentence that says why there is none.
+pub fn first_solution(system: &System, seed: &SeedPlan, tolerance: f64, jobs: usize) -> Result<Point, String> {
+    const DEGREE: usize = 4;
+    let (seeds, free, range) = (vec![seed.clone()], 0, [f64::NEG_INFINITY, f64::INFINITY]);
+    let (switching, marks) = Default::default();
+    let start = Start::Seed(0);
+    let branch = BranchPlan { name: String::new(), start, free, range, until: None, switching, marks, max_points: 0 };
+    let plan = Plan { seeds, branches: vec![branch], ..Plan::empty(tolerance, DEGREE) };
+    find(system, &plan, jobs, &Diagram::default(), &[], &Unobserved).point(0)
 }
 
 /// Whether two seeds share a census.

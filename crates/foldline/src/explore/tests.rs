@@ -1,8 +1,8 @@
-//! What stays in memory.
+//! What stays in memory, what is switched at, where branches start.
 
-use super::{BranchPlan, Plan, SeedPlan, SeedSource, Start, Switching, System, run};
-use crate::contract::{Event, Observer, Verdict};
-use crate::diagram::{Branch, Diagram, Point};
+use super::{BranchPlan, Plan, SeedPlan, SeedSource, Start, Switching, System, first_solution, run, run_from};
+use crate::contract::{Event, Observer, Unobserved, Verdict};
+use crate::diagram::{Branch, Diagram, Kind, Point};
 use crate::model::{Definition, Model, ModelSource, Parameter, State};
 use std::sync::Mutex;
 
@@ -81,4 +81,58 @@ fn points_kept_elsewhere_do_not_stay_in_memory() {
         .map(|(_, place)| *place)
         .collect();
     assert_eq!(few, expected);
+}
+
+/// x' = p (p - 2) x - x³, with a pitchfork at 0 and one at 2.
+fn pitchforks() -> Model {
+    Model::compile(ModelSource {
+        name: "two pitchforks".into(),
+        parameters: vec![Parameter::new("p", 1.0)],
+        states: vec![State::new("x")],
+        equations: vec![Definition::new("x", "p*(p - 2)*x - x^3")],
+        ..ModelSource::default()
+    })
+    .unwrap()
+}
+
+fn pitchfork_plan(switching: Switching) -> Plan {
+    let source = SeedSource::State(vec![0.0]);
+    let seed = SeedPlan { name: "at 1".into(), source, parameters: vec![1.0], samples: 1, random: 1 };
+    let branch = BranchPlan {
+        name: "rest".into(),
+        start: Start::Seed(0),
+        free: 0,
+        range: [-1.0, 3.0],
+        until: None,
+        switching,
+        marks: Vec::new(),
+        max_points: 1000,
+    };
+    Plan { seeds: vec![seed], branches: vec![branch], ..Plan::empty(1e-6, 4) }
+}
+
+#[test]
+fn only_the_special_point_that_is_named_is_switched_at() {
+    let model = pitchforks();
+    let only = vec![(Kind::BranchPoint, 2, 1)];
+    let plan = pitchfork_plan(Switching { depth: Vec::new(), only });
+    let system = System::of_plan(&model, &plan);
+    let diagram = run(&system, &plan, 1, Diagram::default(), &Unobserved);
+    let names: Vec<&str> = diagram.branches.iter().map(|b| b.name.as_str()).collect();
+    assert_eq!(diagram.branches[0].special.iter().map(|s| s.kind).collect::<Vec<_>>(), [Kind::BranchPoint; 2]);
+    assert_eq!(names, ["rest", "rest/branch-point-2"]);
+}
+
+#[test]
+fn a_solution_that_is_given_is_not_looked_for() {
+    let model = pitchforks();
+    let plan = pitchfork_plan(Switching::default());
+    // At 3 there is sqrt 3; the state of the seed would lead to 0, at 1.
+    let seed = SeedPlan { source: SeedSource::State(vec![1.7]), parameters: vec![3.0], ..plan.seeds[0].clone() };
+    let given = first_solution(&System::of(&model, &[3.0]), &seed, 1e-6, 1).unwrap();
+    let system = System::of_plan(&model, &plan);
+    let diagram = run_from(&system, &plan, 1, Diagram::default(), &[(0, given)], &Unobserved);
+    let start = diagram.branches[0].points.iter().find(|p| p.position == 0).unwrap();
+    assert!((start.ranges[0][1] - 3.0_f64.sqrt()).abs() < 1e-8, "{:?}", start.ranges);
+    assert_eq!(start.parameters, [3.0]);
 }

@@ -10,7 +10,9 @@
 //! | many trajectories? | [`Ensemble`] |
 //! | what is known between the ends of a step? | [`Step`] |
 //! | where does a function of the state change sign? | [`Section`] |
+//! | a forced field? | [`Clocked`]: those above take autonomous ones |
 
+mod clocked;
 mod ensemble;
 mod kink;
 mod root;
@@ -24,6 +26,7 @@ mod tests;
 mod tests_kinks;
 mod trajectory;
 
+pub use clocked::Clocked;
 pub use ensemble::Ensemble;
 pub use section::{Crossing, Direction, Section};
 pub use step::Step;

@@ -228,3 +228,24 @@ fn a_trajectory_does_not_depend_on_its_company() {
             && together.iter().any(|a| a.outcome == Outcome::Reached)
     );
 }
+
+/// x' = cos 2πτ with τ in periods, of which the solution from 0 is sin(2πτ)/2π.
+#[test]
+fn a_clock_tells_a_forced_field_the_time() {
+    use crate::model::{Definition, Forcing, Model, ModelSource, State};
+    let model = Model::compile(ModelSource {
+        name: "forced".into(),
+        forcing: Some(Forcing { is_frequency: false, expression: "1".into() }),
+        states: vec![State::new("x")],
+        equations: vec![Definition::new("x", "cos(2*pi*t)")],
+        ..ModelSource::default()
+    })
+    .unwrap();
+    let field = Clocked(&model);
+    let integrator = Integrator::new(&field, &[], Tolerance::uniform(1e-10, 2));
+    for end in [0.3, 1.0, 2.7] {
+        let state = integrator.state_after(&[0.0, 0.0], [0.0, end]).unwrap();
+        assert!((state[0] - (2.0 * PI * end).sin() / (2.0 * PI)).abs() < 1e-8, "{state:?}");
+        assert!((state[1] - end).abs() < 1e-14);
+    }
+}

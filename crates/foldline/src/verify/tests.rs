@@ -40,7 +40,7 @@ fn computed(model: &Model) -> Diagram {
         until: None,
         marks: Vec::new(),
         max_points: 1000,
-        switching: Switching { depth: vec![(Kind::Hopf, 1)] },
+        switching: Switching { depth: vec![(Kind::Hopf, 1)], only: Vec::new() },
     };
     let plan = Plan {
         tolerance: 1e-6,

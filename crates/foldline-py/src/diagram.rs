@@ -1,0 +1,220 @@
+//! What came out: branches as columns, solutions one by one.
+
+use crate::bytes::{counted, integers, numbers, parts};
+use crate::failure;
+use crate::saving::save;
+use crate::solution::Solution;
+use crate::study::Study;
+use foldline::diagram::{self, Branch, Ending, Origin, Point};
+use foldline_store::order::{leg, names, ordered};
+use foldline_store::run_file::load;
+use foldline_store::short;
+use foldline_store::study_file::{self, parse_study};
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyDict};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// A diagram with the study that it answers.
+#[pyclass(frozen, module = "foldline._native")]
+pub struct Diagram {
+    pub diagram: Arc<diagram::Diagram>,
+    pub study: Arc<study_file::Study>,
+    /// What a remark is about, and the remark.
+    #[pyo3(get)]
+    pub notes: Vec<(String, String)>,
+}
+
+impl Diagram {
+    /// In the order of the study.
+    pub fn new(diagram: diagram::Diagram, study: Arc<study_file::Study>, notes: Vec<(String, String)>) -> Diagram {
+        let diagram = Arc::new(ordered(diagram, &names(&study.plan)));
+        Diagram { diagram, study, notes }
+    }
+
+    /// The branch of that number.
+    pub fn branch(&self, py: Python, index: usize) -> PyResult<&Branch> {
+        let found = self.diagram.branches.get(index);
+        found.ok_or_else(|| failure::internal(py, format!("there is no branch {index}")))
+    }
+}
+
+#[pymethods]
+impl Diagram {
+    /// The run in a folder.
+    #[staticmethod]
+    fn load(py: Python, folder: PathBuf) -> PyResult<Diagram> {
+        let run = py.detach(|| load(&folder)).map_err(|error| failure::of_run_file(py, &error))?;
+        let study = py.detach(|| parse_study(&run.study_text, &run.study_file, &run.model_text, &run.model_file));
+        let study = study.map_err(|found| failure::of_text(py, &found))?;
+        Ok(Diagram::new(run.diagram, Arc::new(study), run.notes))
+    }
+
+    /// Writes it as a run, into a folder that has none.
+    fn save(&self, py: Python, folder: PathBuf) -> PyResult<()> {
+        let saved = py.detach(|| save(&folder, &self.study, &self.diagram, &self.notes));
+        saved.map_err(|error| failure::of_run_file(py, &error))
+    }
+
+    /// The study.
+    fn study(&self) -> Study {
+        Study { study: Arc::clone(&self.study) }
+    }
+
+    /// What of the study was not reached.
+    fn short(&self) -> Vec<String> {
+        short::lines(&self.diagram, &self.study.plan, &self.study.model)
+    }
+
+    /// What each branch is.
+    fn branches<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        self.diagram.branches.iter().map(|branch| described(py, branch)).collect()
+    }
+
+    /// A column of the points of a branch, or of its special points: an array's bytes.
+    fn column<'py>(&self, py: Python<'py>, branch: usize, special: bool, name: &str) -> PyResult<Bound<'py, PyBytes>> {
+        let branch = self.branch(py, branch)?;
+        let points: Vec<&Point> = match special {
+            true => branch.special.iter().map(|s| &s.point).collect(),
+            false => branch.points.iter().collect(),
+        };
+        column(py, &points, branch, special, name)
+    }
+
+    /// Kind, unstable before and after, error, coefficients, criticality and normal form of each special point of a branch.
+    fn special(&self, py: Python, branch: usize) -> PyResult<Vec<SpecialRow>> {
+        let row = |s: &diagram::SpecialPoint| {
+            let (before, after) = (s.unstable_before, s.unstable_after);
+            (s.kind.name(), before, after, s.error, s.coefficients.clone(), s.criticality(), s.normal_form())
+        };
+        Ok(self.branch(py, branch)?.special.iter().map(row).collect())
+    }
+
+    /// A point, or special point, of a branch.
+    fn solution(&self, py: Python, branch: usize, special: bool, index: usize) -> PyResult<Solution> {
+        let branch = self.branch(py, branch)?;
+        let point = match special {
+            true => branch.special.get(index).map(|s| &s.point),
+            false => branch.points.get(index),
+        };
+        let point = point.ok_or_else(|| failure::internal(py, format!("there is no point {index}")))?;
+        Ok(Solution::new(point.clone(), &self.study.model))
+    }
+
+    /// Only one branch, to be told to a computation that goes on from it.
+    fn only(&self, py: Python, branch: usize, name: &str) -> PyResult<Diagram> {
+        let mut branch = self.branch(py, branch)?.clone();
+        branch.name = name.to_string();
+        let diagram = diagram::Diagram { branches: vec![branch], responses: Vec::new() };
+        Ok(Diagram { diagram: Arc::new(diagram), study: Arc::clone(&self.study), notes: Vec::new() })
+    }
+
+    /// The solution at the goal of a homotopy.
+    fn arrival(&self, homotopy: &str) -> Option<Solution> {
+        const ROUNDING: f64 = 1e-9;
+        let plan = self.study.plan.homotopies.iter().find(|plan| plan.name == homotopy)?;
+        let there = |point: &&Point| {
+            let near = |(k, goal): &(usize, f64)| (point.parameters[*k] - goal).abs() <= ROUNDING * (1.0 + goal.abs());
+            plan.targets.iter().all(near)
+        };
+        let legs = self.diagram.branches.iter().filter(|b| leg(&b.name, homotopy).is_some());
+        // The first leg that is there ended the search.
+        let point = legs.flat_map(|leg| [leg.points.first(), leg.points.last()]).flatten().find(there)?;
+        Some(Solution::new(point.clone(), &self.study.model))
+    }
+
+    /// What surveys and sweeps saw: one table each.
+    fn responses<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
+        self.diagram.responses.iter().map(|set| responses(py, set)).collect()
+    }
+}
+
+type SpecialRow = (&'static str, usize, usize, f64, Vec<f64>, Option<&'static str>, String);
+
+fn described<'py>(py: Python<'py>, branch: &Branch) -> PyResult<Bound<'py, PyDict>> {
+    let parts = PyDict::new(py);
+    parts.set_item("name", &branch.name)?;
+    parts.set_item("family", branch.family.name())?;
+    parts.set_item("free", branch.free)?;
+    parts.set_item("held", branch.held.map(|(kind, first)| (kind.name(), first)))?;
+    let (word, from, kind, parameter) = match &branch.origin {
+        Origin::Seed(name) => ("seed", name, None, None),
+        Origin::EndOf(name) => ("end", name, None, None),
+        Origin::Switch { parent, kind, parameter } => ("switch", parent, Some(kind.name()), Some(*parameter)),
+    };
+    parts.set_item("origin", (word, from, kind, parameter))?;
+    parts.set_item("points", branch.points.len())?;
+    parts.set_item("special", branch.special.len())?;
+    let end = |end: &Ending| (end.code(), end.to_string(), end.complete());
+    parts.set_item("ends", branch.ends.iter().map(|own| own.as_ref().map(end)).collect::<Vec<_>>())?;
+    Ok(parts)
+}
+
+fn column<'py>(
+    py: Python<'py>,
+    points: &[&Point],
+    branch: &Branch,
+    special: bool,
+    name: &str,
+) -> PyResult<Bound<'py, PyBytes>> {
+    let count = points.len();
+    let whole = |of: fn(&Point) -> usize| integers(py, points.iter().map(|p| of(p) as i64));
+    let number = |of: fn(&Point) -> f64| numbers(py, points.iter().map(|p| of(p)));
+    match name {
+        "position" => integers(py, points.iter().map(|p| p.position)),
+        "parameters" => {
+            let width = points.first().map_or(0, |p| p.parameters.len());
+            counted(py, count * width, points.iter().flat_map(|p| p.parameters.iter().copied()))
+        }
+        "ranges" => {
+            let width = points.first().map_or(0, |p| 2 * p.ranges.len());
+            counted(py, count * width, points.iter().flat_map(|p| p.ranges.as_flattened().iter().copied()))
+        }
+        "spectrum" => {
+            // What of a spectrum could not be computed is not a number.
+            let width = points.iter().map(|p| p.spectrum.len()).max().unwrap_or(0);
+            let padded = |p: &&Point| parts(&p.spectrum).chain(std::iter::repeat(f64::NAN)).take(2 * width).collect();
+            let rows: Vec<Vec<f64>> = points.iter().map(padded).collect();
+            counted(py, 2 * count * width, rows.into_iter().flatten())
+        }
+        "period" => number(|p| p.solution.period().unwrap_or(f64::NAN)),
+        "step" => number(|p| p.step),
+        "unstable" => whole(|p| p.unstable),
+        "forcing_periods" => whole(|p| p.solution.forcing_periods() as usize),
+        "discretisation" => number(|p| p.trust.discretisation),
+        "residual" => number(|p| p.trust.residual),
+        "trivial_defect" => number(|p| p.trust.trivial_defect),
+        "liouville_defect" => number(|p| p.trust.liouville_defect),
+        "spectrum_error" => number(|p| p.trust.spectrum),
+        "newton" => whole(|p| p.cost.newton),
+        "factorisations" => whole(|p| p.cost.factorisations),
+        "rejected" => whole(|p| p.cost.rejected),
+        "evaluations" => whole(|p| p.cost.evaluations),
+        "linearisations" => whole(|p| p.cost.linearisations),
+        "error" if special => numbers(py, branch.special.iter().map(|s| s.error)),
+        _ => Err(failure::internal(py, format!("there is no column {name}"))),
+    }
+}
+
+fn responses<'py>(py: Python<'py>, set: &diagram::Responses) -> PyResult<Bound<'py, PyDict>> {
+    let (parts, all) = (PyDict::new(py), &set.responses);
+    let number = |of: fn(&diagram::Response) -> f64| numbers(py, all.iter().map(of));
+    parts.set_item("name", &set.name)?;
+    parts.set_item("search", set.search.name())?;
+    parts.set_item("free", set.free)?;
+    parts.set_item("value", number(|r| r.value)?)?;
+    parts.set_item("period", number(|r| r.period.unwrap_or(f64::NAN))?)?;
+    parts.set_item("settled_after", number(|r| r.settled_after)?)?;
+    parts.set_item("error", number(|r| r.error)?)?;
+    parts.set_item("motion", all.iter().map(|r| r.motion.name()).collect::<Vec<_>>())?;
+    parts.set_item("ratio", all.iter().map(|r| r.ratio).collect::<Vec<_>>())?;
+    parts.set_item("multiplicity", all.iter().map(|r| r.multiplicity).collect::<Vec<_>>())?;
+    parts.set_item("hits", all.iter().map(|r| r.hits).collect::<Vec<_>>())?;
+    let width = all.first().map_or(0, |r| r.parameters.len());
+    let parameters = all.iter().flat_map(|r| r.parameters.iter().copied());
+    parts.set_item("parameters", counted(py, all.len() * width, parameters)?)?;
+    let width = all.first().map_or(0, |r| 2 * r.ranges.len());
+    let ranges = all.iter().flat_map(|r| r.ranges.as_flattened().iter().copied());
+    parts.set_item("ranges", counted(py, all.len() * width, ranges)?)?;
+    Ok(parts)
+}

@@ -1,0 +1,30 @@
+//! A finished diagram as a run file.
+
+use foldline::contract::{Event, Observer};
+use foldline::diagram::{Branch, Diagram};
+use foldline_store::run_file::{Recorder, RunFileError};
+use foldline_store::study_file::Study;
+use std::path::Path;
+
+/// Writes a diagram into a folder that has no run yet, by telling it as it was told when it was computed.
+pub fn save(folder: &Path, study: &Study, diagram: &Diagram, notes: &[(String, String)]) -> Result<(), RunFileError> {
+    let recorder = Recorder::create(folder, study)?;
+    // What cannot be written `finish` says.
+    let tell = |event: Event| {
+        recorder.observe(event);
+    };
+    diagram.branches.iter().for_each(|branch| branch_told(&tell, branch));
+    notes.iter().for_each(|(about, note)| tell(Event::Note(about, note)));
+    diagram.responses.iter().for_each(|set| tell(Event::Responses(set)));
+    recorder.finish()
+}
+
+fn branch_told(tell: &dyn Fn(Event), branch: &Branch) {
+    let empty = Branch::new(&branch.name, branch.family, branch.free, branch.origin.clone());
+    tell(Event::Begin(&Branch { held: branch.held, ..empty }));
+    branch.points.iter().for_each(|point| tell(Event::Point(branch, point)));
+    branch.special.iter().for_each(|special| tell(Event::Special(branch, special)));
+    for (side, ending) in branch.ends.iter().enumerate() {
+        ending.iter().for_each(|ending| tell(Event::SideEnded(branch, side, ending)));
+    }
+}

@@ -1,0 +1,98 @@
+//! First solutions: where states settle.
+
+use crate::bytes::{numbers, read};
+use crate::failure;
+use crate::model::Model;
+use crate::patience::patiently;
+use crate::solution::Solution;
+use foldline::explore::{self, AttractorKey, SeedPlan, SeedSource, System};
+use foldline_store::finite::never_finite;
+use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+
+/// The solution that an attractor's name (`equilibrium`, `cycle`, `2:1`) or a state `[n]` means.
+#[pyfunction]
+#[pyo3(signature = (model, attractor, state, parameters, samples, random, tolerance, jobs))]
+pub fn settle(
+    py: Python,
+    model: &Model,
+    attractor: Option<&str>,
+    state: &[u8],
+    parameters: &[u8],
+    samples: usize,
+    random: u64,
+    tolerance: f64,
+    jobs: usize,
+) -> PyResult<Solution> {
+    let parameters = checked(py, model, parameters)?;
+    let source = match attractor {
+        Some(name) => SeedSource::Attractor(key(py, model, name)?),
+        None => SeedSource::State(read(state)),
+    };
+    let seed = SeedPlan { name: "start".into(), source, parameters, samples, random };
+    let own = model.model.clone();
+    let (found, _) = patiently(py, None, &mut |_| Ok(()), move || {
+        explore::first_solution(&System::of(&own, &seed.parameters), &seed, tolerance, jobs)
+    })?;
+    found.map(|point| Solution::new(point, &model.model)).map_err(|why| failure::no_solution(py, why))
+}
+
+type Found<'py> = (Solution, Option<(u32, u32)>, usize, Bound<'py, PyBytes>);
+
+/// The attractors that sampled states reach, each with its ratio, how many went there and the first state that did; then how
+/// many escaped, got stuck, and had not settled.
+#[pyfunction]
+pub fn attractors<'py>(
+    py: Python<'py>,
+    model: &Model,
+    parameters: &[u8],
+    samples: usize,
+    seed: u64,
+    tolerance: f64,
+    jobs: usize,
+) -> PyResult<(Vec<Found<'py>>, (usize, usize, usize))> {
+    let parameters = checked(py, model, parameters)?;
+    let own = model.model.clone();
+    let (census, _) = patiently(py, None, &mut |_| Ok(()), move || {
+        explore::attractors(&System::of(&own, &parameters), &parameters, samples, seed, jobs, tolerance)
+    })?;
+    let found = census.attractors.into_iter().map(|attractor| {
+        let example = numbers(py, attractor.example.iter().copied())?;
+        Ok((Solution::new(attractor.point, &model.model), attractor.ratio, attractor.hits, example))
+    });
+    Ok((found.collect::<PyResult<_>>()?, (census.escaped, census.stuck, census.unsettled)))
+}
+
+/// The parameters, at which the model must be finite somewhere.
+fn checked(py: Python, model: &Model, parameters: &[u8]) -> PyResult<Vec<f64>> {
+    let parameters = read(parameters);
+    match never_finite(&model.model, &parameters, &model.text, &model.file) {
+        Some(found) => Err(failure::of_text(py, &[found])),
+        None => Ok(parameters),
+    }
+}
+
+fn key(py: Python, model: &Model, name: &str) -> PyResult<AttractorKey> {
+    use foldline::contract::VectorField;
+    let said = |message: String, cure: &str| Err(failure::of_argument(py, message, cure));
+    let ratio = name.split_once(':').and_then(|(a, b)| Some((a.trim().parse().ok()?, b.trim().parse().ok()?)));
+    match (name, ratio) {
+        ("equilibrium", _) if model.model.forced() => said(
+            "the model is forced and has no equilibria".into(),
+            "use \"cycle\": where there is a forcing nothing is at rest",
+        ),
+        ("equilibrium", _) => Ok(AttractorKey::Equilibrium),
+        ("cycle", _) => Ok(AttractorKey::Cycle),
+        (_, Some((a, b))) if a > 0 && b > 0 => match model.model.whirl {
+            Some(_) => Ok(AttractorKey::Ratio(a, b)),
+            None => said(
+                format!("the ratio \"{name}\" needs a whirling motion, which this model does not name"),
+                "name its two states, as in whirl=\"u v\", or ask for a \"cycle\"",
+            ),
+        },
+        _ => said(
+            format!("\"{name}\" is no attractor"),
+            "\"equilibrium\", \"cycle\", or a ratio of whole numbers such as \"2:1\"",
+        ),
+    }
+}

@@ -1,0 +1,150 @@
+//! Carrying out a study.
+
+use crate::diagram::Diagram;
+use crate::failure;
+use crate::patience::patiently;
+use crate::saving::save;
+use crate::solution::Solution;
+use crate::study::Study;
+use foldline::contract::{Event, Observer, Verdict};
+use foldline::diagram::{self, Branch, Point};
+use foldline::explore;
+use foldline_store::run_file::{Recorder, RunFileError};
+use foldline_store::{short, study_file};
+use pyo3::prelude::*;
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// The diagram that a study asks for, what of the study was not reached, and the exception of the Ctrl-C that ended it early, if
+/// one did.
+///
+/// `given` are solutions for seeds by name, `earlier` what is known already. With a `folder` every point is written there as it is
+/// accepted, and the diagram is not returned: it is to be loaded. `progress` is called with the number of points and special points and
+/// the place of the last point, a few times a second.
+#[pyfunction]
+#[pyo3(signature = (study, given, earlier, folder, jobs, resume, progress))]
+pub fn run(
+    py: Python,
+    study: &Study,
+    given: HashMap<String, Py<Solution>>,
+    earlier: Option<&Diagram>,
+    folder: Option<PathBuf>,
+    jobs: Option<usize>,
+    resume: bool,
+    progress: Option<Py<PyAny>>,
+) -> PyResult<(Option<Diagram>, Vec<String>, Option<PyErr>)> {
+    let study = Arc::clone(&study.study);
+    let seeds = study.plan.seeds.iter().enumerate();
+    let given: Vec<(usize, Point)> =
+        seeds.filter_map(|(k, seed)| Some((k, (*given.get(&seed.name)?.get().point).clone()))).collect();
+    let known = earlier.map(|earlier| Arc::clone(&earlier.diagram));
+    let opened = |folder: &PathBuf| recorded(folder, &study, known.as_deref(), resume);
+    let opened = py.detach(|| folder.as_ref().map(opened).transpose()).map_err(|e| failure::of_run_file(py, &e))?;
+    let (recorder, earlier) = match opened {
+        Some((recorder, earlier)) => (Some(recorder), earlier),
+        None => (None, known.map_or_else(diagram::Diagram::default, |known| (*known).clone())),
+    };
+    let jobs = jobs.unwrap_or_else(|| std::thread::available_parallelism().map_or(1, |n| n.get()));
+
+    let stop = Arc::new(AtomicBool::new(false));
+    let seen = Arc::new(Mutex::new(Seen::default()));
+    let names = study.model.parameters.iter().map(|p| p.name.clone()).collect();
+    let watch = Watch { recorder, stop: Arc::clone(&stop), seen: Arc::clone(&seen), names, notes: Mutex::default() };
+    let own = Arc::clone(&study);
+    let work = move || {
+        let system = explore::System::of_plan(&own.model, &own.plan);
+        let diagram = explore::run_from(&system, &own.plan, jobs, earlier, &given, &watch);
+        drop(system);
+        let stored = watch.recorder.map(Recorder::finish);
+        (diagram, watch.notes.into_inner().unwrap_or_else(PoisonError::into_inner), stored)
+    };
+    let mut show = |py: Python| match &progress {
+        Some(progress) => {
+            let seen = seen.lock().unwrap_or_else(PoisonError::into_inner).clone();
+            progress.call1(py, (seen.points, seen.special, seen.place)).map(|_| ())
+        }
+        None => Ok(()),
+    };
+    let ((diagram, notes, stored), interrupt) = patiently(py, Some(&stop), &mut show, work)?;
+    let short = short::lines(&diagram, &study.plan, &study.model);
+    match stored {
+        Some(Ok(())) => Ok((None, short, interrupt)),
+        Some(Err(error)) => Err(failure::of_run_file(py, &error)),
+        None => Ok((Some(Diagram::new(diagram, study, notes)), short, interrupt)),
+    }
+}
+
+/// The recorder of a folder, and what is known there.
+fn recorded(
+    folder: &Path,
+    study: &study_file::Study,
+    known: Option<&diagram::Diagram>,
+    resume: bool,
+) -> Result<(Recorder, diagram::Diagram), RunFileError> {
+    if resume {
+        return Recorder::resume(folder, study);
+    }
+    match known {
+        Some(known) => save(folder, study, known, &[]).and_then(|()| Recorder::resume(folder, study)),
+        None => Ok((Recorder::create(folder, study)?, diagram::Diagram::default())),
+    }
+}
+
+/// How far it is.
+#[derive(Clone, Default)]
+struct Seen {
+    points: usize,
+    special: usize,
+    place: String,
+}
+
+/// Records, remembers what is shown, and stops when asked to.
+struct Watch {
+    recorder: Option<Recorder>,
+    stop: Arc<AtomicBool>,
+    seen: Arc<Mutex<Seen>>,
+    names: Vec<String>,
+    notes: Mutex<Vec<(String, String)>>,
+}
+
+impl Watch {
+    fn place(&self, branch: &Branch, point: &Point) -> String {
+        let (name, value) = (self.names.get(branch.free), point.parameters.get(branch.free));
+        format!("{} at {} = {:.6}", branch.name, name.map_or("", String::as_str), value.copied().unwrap_or(f64::NAN))
+    }
+}
+
+impl Observer for Watch {
+    fn observe(&self, event: Event) -> Verdict {
+        let verdict = self.recorder.as_ref().map_or(Verdict::Continue, |recorder| recorder.observe(event));
+        let seen = || self.seen.lock().unwrap_or_else(PoisonError::into_inner);
+        match event {
+            Event::Point(branch, point) => {
+                let place = self.place(branch, point);
+                let mut seen = seen();
+                seen.points += 1;
+                seen.place = place;
+            }
+            Event::Special(..) => seen().special += 1,
+            Event::Visited(name, value, done, of) => {
+                seen().place = format!("{name}: {done} of {of} values, at {value:.6}")
+            }
+            Event::Note(about, note) => {
+                let mut notes = self.notes.lock().unwrap_or_else(PoisonError::into_inner);
+                notes.push((about.to_string(), note.to_string()));
+            }
+            _ => {}
+        }
+        if self.stop.load(Ordering::Relaxed) { Verdict::Stop } else { verdict }
+    }
+
+    fn stores(&self) -> bool {
+        self.recorder.is_some()
+    }
+
+    fn recall(&self, branch: &Branch, position: i64) -> Option<Point> {
+        self.recorder.as_ref()?.recall(branch, position)
+    }
+}

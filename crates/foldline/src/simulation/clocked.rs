@@ -1,0 +1,66 @@
+//! A forced field with its time as a state.
+//!
+//! **Idea.** Trajectories are those of autonomous fields. One state more, which grows by one per period of the forcing and which every
+//! method integrates exactly, tells a forced field the time: x' = f(x, p, τ), τ' = 1.
+
+use crate::contract::{Batch, VectorField};
+
+/// The field as an autonomous one, for simulation: it has no derivatives. An autonomous field gets a clock that it does not read.
+#[derive(Clone, Copy)]
+pub struct Clocked<'a>(pub &'a dyn VectorField);
+
+impl Clocked<'_> {
+    /// What the field itself sees.
+    fn inner<'b>(&self, at: Batch<'b>) -> Batch<'b> {
+        let (states, times) = at.states.split_at(self.0.dim() * at.lanes);
+        Batch { states, times: if self.0.forced() { times } else { &[] }, ..at }
+    }
+
+    fn with_clock(&self, at: Batch, f: &mut [f64], evaluate: impl FnOnce(Batch, &mut [f64])) {
+        let (own, clock) = f.split_at_mut(self.0.dim() * at.lanes);
+        evaluate(self.inner(at), own);
+        clock.fill(1.0);
+    }
+}
+
+impl VectorField for Clocked<'_> {
+    fn dim(&self) -> usize {
+        self.0.dim() + 1
+    }
+
+    fn parameter_count(&self) -> usize {
+        self.0.parameter_count()
+    }
+
+    fn evaluate(&self, at: Batch, f: &mut [f64]) {
+        self.with_clock(at, f, |inner, own| self.0.evaluate(inner, own));
+    }
+
+    fn linearise(&self, _at: Batch, _free: &[usize], f: &mut [f64], fx: &mut [f64], fp: &mut [f64]) {
+        [f, fx, fp].into_iter().for_each(|none| none.fill(f64::NAN));
+    }
+
+    fn directional(&self, _at: Batch, _directions: &[&[f64]], out: &mut [f64]) {
+        out.fill(f64::NAN);
+    }
+
+    fn output_count(&self) -> usize {
+        self.0.output_count()
+    }
+
+    fn outputs(&self, at: Batch, out: &mut [f64]) {
+        self.0.outputs(self.inner(at), out);
+    }
+
+    fn switch_count(&self) -> usize {
+        self.0.switch_count()
+    }
+
+    fn switches(&self, at: Batch, out: &mut [f64]) {
+        self.0.switches(self.inner(at), out);
+    }
+
+    fn evaluate_switched(&self, at: Batch, signs: &[f64], f: &mut [f64]) {
+        self.with_clock(at, f, |inner, own| self.0.evaluate_switched(inner, signs, own));
+    }
+}

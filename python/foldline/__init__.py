@@ -1,0 +1,60 @@
+"""Bifurcation diagrams of ordinary differential equations.
+
+>>> import foldline
+>>> @foldline.model(states={"x": dict(range=(0, 5)), "y": dict(range=(0, 5))}, parameters=dict(A=1.0, B=1.5))
+... def brusselator(s, p):
+...     return p.A - (p.B + 1)*s.x + s.x**2*s.y, p.B*s.x - s.x**2*s.y
+>>> steady = foldline.follow(brusselator.settle(), "B", (0.5, 4), switch={"hopf": 1})
+>>> [(point.kind, round(point["B"], 6)) for point in steady.special]
+[('hopf', 2.0)]
+"""
+
+from importlib.metadata import PackageNotFoundError as _NotFound
+from importlib.metadata import version as _version
+
+from ._branch import Branch, SpecialPoint, SpecialPoints
+from ._compute import explore, follow, hold, homotopy, open, rescued, run
+from ._diagram import Diagram, Homotopy
+from ._errors import EndedShort, Error, InputError, Interrupted, NoSolution, RunFileError, TraceError
+from ._model import Model, model
+from ._simulation import Trajectory
+from ._solution import Attractor, Attractors, Solution
+from ._symbols import where
+
+try:
+    __version__ = _version("foldline")
+except _NotFound:
+    __version__ = "unknown"
+
+__all__ = [
+    "Attractor",
+    "Attractors",
+    "Branch",
+    "Diagram",
+    "EndedShort",
+    "Error",
+    "Homotopy",
+    "InputError",
+    "Interrupted",
+    "Model",
+    "NoSolution",
+    "RunFileError",
+    "Solution",
+    "SpecialPoint",
+    "SpecialPoints",
+    "TraceError",
+    "Trajectory",
+    "explore",
+    "follow",
+    "hold",
+    "homotopy",
+    "model",
+    "open",
+    "rescued",
+    "run",
+    "where",
+]
+
+# Where they are to be imported from, and how tracebacks call them.
+for _class in [own for own in map(globals().get, __all__) if isinstance(own, type)]:
+    _class.__module__ = __name__

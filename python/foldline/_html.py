@@ -1,0 +1,131 @@
+"""How results show themselves: text in terminals, a small diagram with a table in notebooks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from . import _native
+from ._branch import Branch, SpecialPoints, branch_text_of
+from ._plot import quantities
+
+if TYPE_CHECKING:
+    from ._diagram import Diagram
+    from ._model import Model
+    from ._solution import Attractors, Solution
+
+#: Rows of a table that are shown; the rest is counted.
+_MOST = 40
+#: Width and height of the picture.
+_SIZE = (640.0, 360.0)
+
+
+def _cells(points: SpecialPoints) -> tuple[list[str], list[list[str]]]:
+    """Columns and rows of special points. Parameters that are the same everywhere are left out."""
+    shown = list(points)
+    if not shown:
+        return [], []
+    model = shown[0].model
+    free = {own.branch.free for own in shown} | {own.branch.held[1] for own in shown if own.branch.held}
+    varying = [n for n in model.parameters if n in free or len({own[n] for own in shown}) > 1]
+    outputs = [name for name in model.outputs if name in shown[0].ranges]
+    cycles = any(own.is_cycle for own in shown)
+    names = ["branch", "kind", *varying, *(["period"] if cycles else []), *(f"{n}_max" for n in outputs), "unstable", "error"]
+    forms = any(own.normal_form for own in shown)
+    rows = []
+    for own in shown:
+        numbers = [own[name] for name in [*varying, *(["period"] if cycles else []), *(f"{n}_max" for n in outputs)]]
+        row = [own.branch.name, own.kind, *("" if np.isnan(v) else f"{v:.10g}" for v in numbers)]
+        row += [f"{own.unstable_before} → {own.unstable_after}", f"{own.error:.1e}"]
+        rows.append([*row, *([own.normal_form] if forms else [])])
+    return [*names, *(["normal form"] if forms else [])], rows
+
+
+def special_text(points: SpecialPoints) -> str:
+    """A table in aligned columns."""
+    names, rows = _cells(points)
+    if not rows:
+        return "no special points"
+    widths = [max(len(row[k]) for row in [names, *rows]) for k in range(len(names))]
+    words = {0, 1, len(names) - 1} if names[-1] == "normal form" else {0, 1}
+
+    def line(row: list[str]) -> str:
+        cells = (c.ljust(w) if k in words else c.rjust(w) for k, (c, w) in enumerate(zip(row, widths, strict=True)))
+        return "  ".join(cells).rstrip()
+
+    return "\n".join(line(row) for row in [names, *rows])
+
+
+def branch_text(branch: Branch) -> str:
+    """What `repr` says of a branch."""
+    table = f"\n{special_text(branch.special)}" if len(branch.special) else ""
+    return f"<branch {branch_text_of(branch)}>{table}"
+
+
+def diagram_text(own: Diagram) -> str:
+    """What `repr` says of a diagram."""
+    points = sum(len(branch) for branch in own)
+    head = f"<diagram of {own.model.name}: {len(own)} branches, {points} points, {len(own.special)} special points>"
+    return "\n".join([head, *(f"  {branch_text_of(branch)}" for branch in own)])
+
+
+def special_table(points: SpecialPoints) -> str:
+    """A table of special points."""
+    names, rows = _cells(points)
+    if not rows:
+        return "<p>no special points</p>"
+    head = "".join(f"<th>{escape(name)}</th>" for name in names)
+    body = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows[:_MOST])
+    more = f"<p>and {len(rows) - _MOST} more</p>" if len(rows) > _MOST else ""
+    return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>{more}"
+
+
+def branches(shown: Sequence[Branch], caption: str) -> str:
+    """A small diagram and the table of special points."""
+    special = SpecialPoints([point for branch in shown for point in branch.special])
+    return f"<div><p>{escape(caption)}</p>{_picture(shown)}{special_table(special)}</div>"
+
+
+def diagram(own: Diagram) -> str:
+    """The same for a whole diagram."""
+    ordinary = [branch for branch in own if branch.held is None] or list(own)
+    lines = "<br>".join(escape(line) for line in diagram_text(own).splitlines()[1 : _MOST + 1])
+    special = special_table(own.special)
+    return f"<div>{_picture(ordinary)}<details><summary>{len(own)} branches</summary>{lines}</details>{special}</div>"
+
+
+def _picture(shown: Sequence[Branch]) -> str:
+    """The picture that the command line draws, smaller."""
+    drawn = [branch for branch in shown if len(branch)]
+    if not drawn:
+        return ""
+    held = drawn[0].held
+    x, y = (held[1], drawn[0].free) if held is not None else quantities(drawn, None, None)
+    svg = _native.svg(drawn[0].diagram._native, [branch._index for branch in drawn], x, y, _SIZE)
+    return f'<div style="max-width: {_SIZE[0]:g}px; background: white">{svg}</div>'
+
+
+def solution(own: Solution) -> str:
+    """A table of what is known about a solution."""
+    rows = [*((name, f"{value:.10g}") for name, value in own.parameters.items())]
+    rows += [(name, f"{low:.8g} … {high:.8g}") for name, (low, high) in own.ranges.items()]
+    what = "multipliers" if own.is_cycle else "eigenvalues"
+    rows.append((what, ", ".join(f"{value:.5g}" for value in own.spectrum)))
+    rows.append(("trust", ", ".join(f"{name} {value:.1e}" for name, value in own.trust.items())))
+    body = "".join(f"<tr><th>{escape(name)}</th><td>{escape(value)}</td></tr>" for name, value in rows)
+    return f"<div><p>{escape(own._what())}</p><table>{body}</table></div>"
+
+
+def attractors(found: Attractors) -> str:
+    """A table of attractors."""
+    rows = "".join(f"<tr><td>{own.hits}</td><td>{escape(own._what())}</td></tr>" for own in found)
+    head = "<tr><th>hits</th><th>attractor</th></tr>"
+    return f"<div><table>{head}{rows}</table><p>{escape(repr(found).splitlines()[-1])}</p></div>"
+
+
+def model(own: Model) -> str:
+    """A model as its text."""
+    return f"<div><p>{escape(repr(own))}</p><details><summary>text</summary><pre>{escape(own.text)}</pre></details></div>"

@@ -1,0 +1,53 @@
+"""What is seen while a computation goes on: a bar of tqdm, where that is installed and somebody is looking."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+Progress = bool | Callable[[int, int, str], None] | None
+
+
+def _notebook() -> bool:
+    shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()
+    return shell is not None and hasattr(shell, "kernel")
+
+
+def _watched() -> bool:
+    return _notebook() or bool(getattr(sys.stderr, "isatty", lambda: False)())
+
+
+@contextmanager
+def shown(progress: Progress) -> Iterator[Callable[[int, int, str], None] | None]:
+    """What is to be called with points, special points and the place of the last one; `None` if nothing is shown."""
+    if callable(progress):
+        yield progress
+        return
+    wanted = _watched() if progress is None else progress
+    if not wanted or importlib.util.find_spec("tqdm") is None:
+        yield None
+        return
+    # What is done at once needs no bar, unless one was asked for.
+    bar = _bar(0.5 if progress is None else 0.0)
+    try:
+        yield lambda points, special, place: _show(bar, points, special, place)
+    finally:
+        bar.close()
+
+
+def _bar(delay: float) -> Any:
+    form = "{n_fmt} points{postfix} [{elapsed}]"
+    if _notebook() and importlib.util.find_spec("ipywidgets") is not None:
+        from tqdm.notebook import tqdm
+    else:
+        from tqdm import tqdm
+    return tqdm(bar_format=form, leave=False, delay=delay)
+
+
+def _show(bar: Any, points: int, special: int, place: str) -> None:
+    bar.set_postfix_str(f"{special} special   {place}", refresh=False)
+    bar.update(points - bar.n)
+    bar.refresh()

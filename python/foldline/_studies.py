@@ -1,0 +1,141 @@
+"""How a question becomes a study, and how a study is carried out."""
+
+from __future__ import annotations
+
+import builtins
+import os
+import sys
+import warnings
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+from . import _native, _write
+from ._arrays import whole
+from ._branch import Branch, native_only
+from ._diagram import Diagram
+from ._errors import EndedShort, InputError, Interrupted, NoSolution
+from ._model import Model
+from ._progress import Progress, shown
+from ._solution import Solution
+
+Path = str | os.PathLike[str]
+Range = Sequence[float]
+
+#: What the seed is called at which something starts.
+START = "the given solution"
+#: What the last computation that was interrupted had found.
+RESCUED: list[Any] = []
+
+
+def text_of(study: Path) -> str:
+    try:
+        with builtins.open(study, encoding="utf-8") as file:
+            return file.read()
+    except (OSError, UnicodeDecodeError) as error:
+        cure = "check the spelling of the path; relative paths start at the current folder"
+        raise InputError(f"the study file {os.fspath(study)} cannot be read: {error}\n  help: {cure}") from error
+
+
+def _depth() -> int:
+    """How many calls below the user's code the caller is."""
+    inner = os.path.dirname(os.path.abspath(__file__))
+    frame, depth = sys._getframe(1).f_back, 2
+    while frame is not None and os.path.dirname(os.path.abspath(frame.f_code.co_filename)) == inner:
+        frame, depth = frame.f_back, depth + 1
+    return depth
+
+
+def cleaned(item: Mapping[str, Any]) -> dict[str, Any]:
+    """Without what was not said; names with hyphens, as files have them; numbers, where files have numbers."""
+    kept = {key: value for key, value in item.items() if value is not None}
+    for key in ("range", "branch-range"):
+        if key in kept:
+            kept[key] = [float(end) for end in kept[key]]
+    if "switch" in kept:
+        kept["switch"] = {str(kind).replace("_", "-"): depth for kind, depth in kept["switch"].items()}
+    if "connect" in kept:
+        kept["connect"] = {name: [float(end) for end in ends] for name, ends in kept["connect"].items()}
+    return kept
+
+
+def check_solution(start: Any) -> None:
+    if not isinstance(start, Solution):
+        cure = "model.settle(...), one of model.attractors(), or a point of a branch, such as branch[-1]"
+        raise InputError(f"{start!r} is no solution to start from\n  help: {cure}")
+
+
+def check_ordinary(branch: Branch, what: str) -> None:
+    if branch.held is not None or branch.diagram._native.study().is_leg(branch.name):
+        noun = "curve in two parameters" if branch.held is not None else "run of a homotopy"
+        raise InputError(f"{branch.name} is a {noun}, which cannot be {what}\n  help: follow a branch from one of its points")
+
+
+def parsed(tables: dict[str, Any], model: Model) -> _native.Study:
+    text = _write.study({"model": model._native.file, **{k: v for k, v in tables.items() if k != "model"}})
+    return _native.Study.parse(text, "<study>", model._native)
+
+
+def study_from(start: Solution, tolerance: float, degree: int, **items: Any) -> _native.Study:
+    """A study with one seed, whose solution is known."""
+    state = dict(zip(start.model.states, start.state.tolist(), strict=True))
+    seed = {"name": START, "state": state, "parameters": start.parameters}
+    return parsed({"tolerance": float(tolerance), "degree": degree, "seed": [seed], **items}, start.model)
+
+
+def going_on(branch: Branch, own: Mapping[str, Any], **items: Any) -> tuple[_native.Study, Solution]:
+    """A study that has a finished branch already, with what is said about it now."""
+    study = branch.diagram._native.study()
+    start = branch[int((branch.position == 0).argmax())]
+    span = own.get("range") or study.range_of(branch.name)
+    if span is None:
+        span = (float(branch[branch.free].min()), float(branch[branch.free].max()))
+    item = {"name": branch.name, "from": START, "free": branch.free, **own, "range": span}
+    return study_from(start, study.tolerance, study.degree, branch=[cleaned(item)], **items), start
+
+
+def branch_of(study: _native.Study, start: Solution, name: str, **options: Any) -> Branch:
+    return begun(carried_out(study, Diagram, start.model, given=start, of=name, **options), name)
+
+
+def begun(diagram: Diagram, name: str) -> Branch:
+    if name not in diagram or len(diagram[name]) == 0:
+        ends = list(dict.fromkeys(diagram[name].ends)) if name in diagram else diagram.short
+        raise NoSolution("; ".join(ends))
+    return diagram[name]
+
+
+def carried_out(
+    study: _native.Study,
+    made: Callable[..., Diagram],
+    model: Model | None,
+    *,
+    given: Solution | None = None,
+    earlier: Branch | None = None,
+    of: str | None = None,
+    out: Path | None = None,
+    jobs: int | None = None,
+    resume: bool = False,
+    progress: Progress = None,
+) -> Diagram:
+    folder = None if out is None else os.fspath(out)
+    if jobs is not None:
+        whole("jobs", jobs)
+    if resume and folder is None:
+        raise InputError('resume=True goes on with a run in a folder, and none is given\n  help: out="runs/study"')
+    known = None if earlier is None else native_only(earlier)
+    seeds = {} if given is None else {START: given._native}
+    with shown(progress) as show:
+        native, short, interrupt = _native.run(study, seeds, known, folder, jobs, resume, show)
+    diagram = made(native if native is not None else lambda: _native.Diagram.load(folder or ""), model, folder)
+    if interrupt is not None:
+        if not isinstance(interrupt, KeyboardInterrupt):
+            raise interrupt
+        partial = diagram[of] if of is not None and of in diagram else diagram
+        RESCUED[:] = [partial]
+        raise Interrupted(partial) from None
+    # That a branch ended short from which another one is switched to is known already.
+    known_short = f"{earlier.name}:" if earlier is not None else "\0"
+    for line in short:
+        if not line.startswith(known_short):
+            warnings.warn(line, EndedShort, stacklevel=_depth())
+    return diagram
