@@ -87,13 +87,13 @@ pub struct Explore {
     #[arg(long, value_name = "N", default_value_t = 15, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub values: u32,
     /// How many initial states at each
-    #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub samples: u32,
     /// Seed of the random numbers; the same seed gives the same diagram
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(..=i64::MAX as u64))]
     pub seed: u64,
     /// No branch is begun once this many points are accepted
-    #[arg(long, value_name = "N", default_value_t = 100_000, value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 100_000, value_parser = clap::value_parser!(u32).range(1..=100_000_000))]
     pub budget: u32,
     /// How many levels of period doubling are followed [default: 2]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(0..=16))]
@@ -101,7 +101,7 @@ pub struct Explore {
     /// The one tolerance, from 1e-10 to 1e-4
     #[arg(long, value_name = "X", default_value_t = 1e-6)]
     pub tolerance: f64,
-    /// Folder for the run [default: runs/explore-NAME OF THE MODEL]
+    /// Folder for the run [default: runs/explore-NAME OF THE MODEL FILE]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Threads [default: number of processors]

@@ -17,13 +17,13 @@ use std::path::PathBuf;
 pub fn diagram(typed: &Typed) -> Result<Outcome, Failure> {
     let (model, model_text) = read_model(&typed.model)?;
     let text = study(typed, &model)?;
+    let study = parse_study(&text, "explore.toml", &model_text, &typed.model.display().to_string())?;
     if typed.print {
-        write!(stdout().lock(), "{text}")?;
+        write!(stdout().lock(), "# `model` is relative to the folder in which this study lies.\n{text}")?;
         return Ok(Outcome::Done);
     }
     let stem = typed.model.file_stem().unwrap_or("model".as_ref());
     let folder = typed.out.clone().unwrap_or_else(|| PathBuf::from("runs").join(format!("explore-{}", stem.display())));
-    let study = parse_study(&text, "explore.toml", &model_text, &typed.model.display().to_string())?;
     carried_out(&study, typed.jobs.map_or_else(processors, usize::from), typed.resume, &folder)
 }
 
@@ -31,13 +31,29 @@ pub fn diagram(typed: &Typed) -> Result<Outcome, Failure> {
 fn study(typed: &Typed, model: &Model) -> Result<String, Failure> {
     let free = ranged("--free", &typed.free, model)?;
     let connect = typed.connect.as_ref().map(|text| ranged("--connect", text, model)).transpose()?;
-    let set = typed.set.iter().map(|text| valued(text, model)).collect::<Result<Vec<_>, _>>()?;
+    if !(1e-10..=1e-4).contains(&typed.tolerance) {
+        return Err(Failure::typed(
+            format!("--tolerance {}: it is out of bounds", typed.tolerance),
+            "a number from 1e-10 to 1e-4",
+        ));
+    }
+    let mut set: Vec<(String, f64)> = Vec::new();
+    for text in &typed.set {
+        let (name, value) = valued(text, model)?;
+        if name == free.0 {
+            let message = format!("--set {text}: that is the parameter of --free, which varies");
+            return Err(Failure::typed(message, "leave it out"));
+        }
+        // The last one counts.
+        set.retain(|(other, _)| *other != name);
+        set.push((name, value));
+    }
     if let Some((name, _)) = connect.as_ref().filter(|(name, _)| *name == free.0) {
         let message = format!("--connect {name}: that is the parameter of --free");
         return Err(Failure::typed(message, "name a second parameter, in which folds are followed"));
     }
     if let Some((name, [low, high])) = &connect {
-        let given = set.iter().rev().find(|(other, _)| other == name).map(|(_, value)| *value);
+        let given = set.iter().find(|(other, _)| other == name).map(|(_, value)| *value);
         let own = model.parameter_index(name).map(|index| model.parameters[index].value);
         let own = given.or(own).unwrap_or(*low);
         if !(*low..=*high).contains(&own) {

@@ -79,11 +79,12 @@ fn run(study: &Study, jobs: usize, recorder: Recorder, earlier: Diagram, folder:
     if !study.plan.homotopies.is_empty() {
         writeln!(err, "routes: foldline table {} --notes", folder.display())?;
     }
-    if watch.stop.load(Ordering::Relaxed) {
+    let stopped = watch.stop.load(Ordering::Relaxed);
+    if stopped {
         writeln!(err, "stopped; go on with --resume --out {}", folder.display())?;
     }
     writeln!(err, "run: {}", folder.display())?;
-    Ok(if short.is_empty() { Outcome::Done } else { Outcome::Short })
+    Ok(if short.is_empty() && !stopped { Outcome::Done } else { Outcome::Short })
 }
 
 /// Records, shows, and stops when asked to.

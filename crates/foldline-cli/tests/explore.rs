@@ -211,3 +211,21 @@ fn a_budget_ends_it() {
     let points: usize = few.branches.iter().map(|b| b.points.len()).sum();
     assert!(points >= 30 && few.branches.len() == 2, "{points} on {:?}", names(&few));
 }
+
+/// A parameter in metres: two isolas whose folds lie 1e-4 of it apart and have the same state.
+#[test]
+fn folds_of_a_small_parameter_are_told_apart() {
+    let model = "name = \"small\"\n[parameters]\nl = 1e-3\na = 0\n[states.x]\nequation = \
+        \"-400*(1000*l - 1)*(1000*l - 1.15)*(1000*l - 1.2)*(1000*l - 1.35) - a - (x - 0.1)^2\"\nrange = [-1, 1]\n";
+    let lines = "free = \"l\"\nrange = [0.7e-3, 1.45e-3]\nvalues = 1\nconnect = { a = [-3, 1] }";
+    agree(&explored(model, lines), &[1e-3, 1.15e-3, 1.2e-3, 1.35e-3].map(|l| (Kind::Fold, l)), 1e-9);
+}
+
+/// A parameter that the model gives no value, in a range of thousands.
+#[test]
+fn steps_fit_the_range_whatever_the_value_in_the_model() {
+    let model = "name = \"wide\"\n[parameters]\nmu = 0\n[states.x]\nequation = \"mu + 300*x - x^3\"\nrange = [-50, 50]\nscale = 20\n";
+    let diagram = explored(model, "free = \"mu\"\nrange = [-1e4, 1e4]\nvalues = 3");
+    agree(&diagram, &[(Kind::Fold, -2000.0), (Kind::Fold, 2000.0)], 1e-8);
+    assert!(diagram.branches.len() == 1 && diagram.branches[0].points.len() < 200, "{:?}", names(&diagram));
+}

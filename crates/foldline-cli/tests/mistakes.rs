@@ -380,6 +380,10 @@ fn what_explore_is_told() {
     says(&told(&["--free", "mu=0:1", "--connect", "mu=0:1"]), &["that is the parameter of --free"]);
     says(&told(&["--free", "mu=0:1", "--connect", "kappa=2:3"]), &["at kappa = 1", "a range that contains 1"]);
     says(&told(&["--free", "mu=0:1", "--tolerance", "1"]), &["tolerance", "1e-10 to 1e-4"]);
+    says(&told(&["--free", "mu=0:1", "--set", "mu=1"]), &["that is the parameter of --free"]);
+    let few = desk.foldline(&["explore", "pendulum.toml", "--free", "mu=-1:2", "--budget", "5", "--out", "few"]);
+    says(&String::from_utf8_lossy(&few.stderr), &["the budget of 5 points is used up"]);
+    assert_eq!(few.status.code(), Some(3));
     // What it prints is a study that does the same.
     let printed = desk.foldline(&["explore", "pendulum.toml", "--free", "mu=-1:2", "--values", "3", "--print"]);
     desk.write("all.toml", &String::from_utf8_lossy(&printed.stdout));

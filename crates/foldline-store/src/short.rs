@@ -28,8 +28,14 @@ pub fn lines(diagram: &Diagram, plan: &Plan, model: &Model) -> Vec<String> {
     }
     for exploration in &plan.explorations {
         let part = |branch: &Branch| branch.name.strip_prefix(&exploration.name).is_some_and(|n| n.starts_with('/'));
-        if !diagram.branches.iter().any(part) {
-            lines.push(format!("{}: nothing was found to follow", exploration.name));
+        let points: usize = diagram.branches.iter().filter(|b| part(b)).map(|b| b.points.len()).sum();
+        match points {
+            0 => lines.push(format!("{}: no branch was followed", exploration.name)),
+            _ if points >= exploration.budget => lines.push(format!(
+                "{}: the budget of {} points is used up; begin again with a larger one",
+                exploration.name, exploration.budget
+            )),
+            _ => {}
         }
     }
     for branch in &diagram.branches {

@@ -57,7 +57,10 @@ pub(super) fn read(
         };
         let values =
             table.get("values").and_then(|v| walk.integer(v, "`values`", 1..=10_000)).map_or(VALUES, |n| n as usize);
-        let samples = whole(walk, "samples", SAMPLES);
+        let samples = table
+            .get("samples")
+            .and_then(|v| walk.integer(v, "`samples`", 1..=1_000_000))
+            .map_or(SAMPLES, |n| n as usize);
         let budget = whole(walk, "budget", BUDGET);
         let random = table.get("random").and_then(|v| walk.integer(v, "`random`", 0..=u64::MAX)).unwrap_or(RANDOM);
         let switching = match table.get("switch") {

@@ -34,7 +34,7 @@ use crate::special::quantity::Quantity;
 pub(super) fn explore(work: &mut Work, plan: &ExplorePlan, jobs: usize) -> bool {
     work.budget = plan.budget;
     let lookout = Lookout::new(work.system, plan, work.plan.tolerance);
-    let mut discovery = Discovery { work, plan, named: Vec::new() };
+    let mut discovery = Discovery { work, plan, named: Vec::new(), unclear: 0 };
     // While this thread follows what was found at one value, others look at the next ones.
     let sampled = std::thread::scope(|scope| {
         (1..jobs.min(plan.values)).for_each(|_| drop(scope.spawn(|| while lookout.look() {})));
@@ -51,12 +51,15 @@ struct Discovery<'d, 'w> {
     plan: &'d ExplorePlan,
     /// What roots were called, such as `cycle`, once for each of them.
     named: Vec<String>,
+    /// At how many values some samples were not seen to settle, or nothing could be followed.
+    unclear: usize,
 }
 
 impl Discovery<'_, '_> {
     /// Steps 2 and 3 at one of the values.
     fn met(&mut self, sight: Sight) -> bool {
         let value = sight.value;
+        self.unclear += usize::from(sight.unclear);
         let (found, said) = match sight.found {
             Ok(found) => found,
             Err(why) => return self.note(&format!("nothing can be followed from {value}: {why}")),
@@ -168,12 +171,13 @@ impl Discovery<'_, '_> {
 
     /// Whether two folds at the same value of the second parameter are the same, or images of each other.
     fn same_fold(&self, a: &Point, b: &Point) -> bool {
-        // The solution at a fold moves along the branch with the root of the error of its place.
-        let near = 1e3 * self.work.plan.tolerance;
-        let (system, free) = (self.work.system, self.plan.free);
+        // The solution at a fold moves along the branch with the root of the error of its place. Two folds that are taken for
+        // different ones though they are not lead to a branch that is known.
+        const NEAR: f64 = 1e-4;
+        let (system, free, [low, high]) = (self.work.system, self.plan.free, self.plan.range);
         let [p, q] = [a, b].map(|point| point.parameters[free]);
-        (p - q).abs() <= near * (1.0 + p.abs())
-            && system.reflections.iter().any(|r| a.difference(b, &system.scales, r) < near.sqrt())
+        (p - q).abs() <= NEAR * (high - low)
+            && system.reflections.iter().any(|r| a.difference(b, &system.scales, r) < NEAR.sqrt())
     }
 
     /// A new branch from a fold that a curve has met.
@@ -203,13 +207,18 @@ impl Discovery<'_, '_> {
     fn told(&self) -> bool {
         let count = |held: bool| self.work.branches.iter().filter(|b| b.held.is_some() == held).count();
         let (branches, curves, points) = (count(false), count(true), self.work.points());
-        let budget = self.plan.budget;
-        self.note(&match self.exhausted() {
-            true => format!(
-                "{branches} branches and {curves} curves with {points} points: the budget of {budget} is used up, and \
-                 the diagram may lack branches; a larger `budget` goes on"
+        let (budget, values, unclear) = (self.plan.budget, self.plan.values, self.unclear);
+        let found = format!("{branches} branches and {curves} curves with {points} points");
+        let done = match self.exhausted() {
+            true => format!("the budget of {budget} is used up, and the diagram may lack branches"),
+            false => "everything that was found is followed".to_string(),
+        };
+        let rest = match unclear {
+            0 => String::new(),
+            _ => format!(
+                "; at {unclear} of {values} values some samples did not settle: tori, chaos and what settles slowly are not followed"
             ),
-            false => format!("{branches} branches and {curves} curves with {points} points; nothing was left undone"),
-        })
+        };
+        self.note(&format!("{found}; {done}{rest}"))
     }
 }

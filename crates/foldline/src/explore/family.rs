@@ -74,7 +74,13 @@ pub fn grow(
         Root::Homotopy(index) => {
             seeded(&plan.homotopies[index].start).map(|(origin, point)| work.brought(index, origin, point))
         }
-        Root::Exploration(index) => Some(discovery::explore(&mut work, &plan.explorations[index], jobs)),
+        Root::Exploration(index) => {
+            let exploration = &plan.explorations[index];
+            let system = system.in_box(exploration);
+            let mut own = Work { system: &system, plan, earlier, observer, branches: Vec::new(), budget: usize::MAX };
+            discovery::explore(&mut own, exploration, jobs / plan.explorations.len().max(1));
+            return own.branches;
+        }
     };
     work.branches
 }

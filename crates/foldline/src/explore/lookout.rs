@@ -13,6 +13,8 @@ use std::sync::{Condvar, Mutex, PoisonError};
 /// What there is at a value of the parameter.
 pub(super) struct Sight {
     pub(super) value: f64,
+    /// Whether some samples were not seen to settle, or nothing can be followed.
+    pub(super) unclear: bool,
     /// Solutions, none of which is another one under a symmetry, or why nothing can be followed from there.
     pub(super) found: Result<(Vec<Point>, String), String>,
 }
@@ -38,7 +40,9 @@ impl<'l> Lookout<'l> {
     /// Looks at the next value that nobody has taken; false if there is none.
     pub(super) fn look(&self) -> bool {
         let Some(index) = self.seen.take() else { return false };
-        self.seen.put(index, self.sight(index));
+        // Whoever waits for it must not wait for ever.
+        let mut promise = Promise { slots: &self.seen, index, kept: None };
+        promise.kept = Some(self.sight(index));
         true
     }
 
@@ -62,7 +66,7 @@ impl<'l> Lookout<'l> {
         let mut parameters = plan.parameters.clone();
         parameters[plan.free] = value;
         if let Err(why) = system.repeats(&parameters, &[(plan.free, plan.range)]) {
-            return Sight { value, found: Err(why) };
+            return Sight { value, unclear: true, found: Err(why) };
         }
         // Other values, other samples: together they say more.
         let random = plan.random.wrapping_add(index as u64);
@@ -80,7 +84,7 @@ impl<'l> Lookout<'l> {
         found.sort_by(|a, b| size(a).total_cmp(&size(b)));
         let rests = found.iter().filter(|p| matches!(p.solution, Solution::Equilibrium(_))).count();
         let said = format!("at {value}: {}; equilibria but for symmetry: {rests}", summary(&census));
-        Sight { value, found: Ok((found, said)) }
+        Sight { value, unclear: census.unsettled + census.stuck > 0, found: Ok((found, said)) }
     }
 
     /// Equilibria in the ranges of the states, stable or not.
@@ -112,6 +116,20 @@ impl<'l> Lookout<'l> {
             let room = 0.5 * (high - low);
             (low - room..=high + room).contains(x)
         })
+    }
+}
+
+/// A result that is put into its slot whatever happens.
+struct Promise<'s> {
+    slots: &'s Slots<Sight>,
+    index: usize,
+    kept: Option<Sight>,
+}
+
+impl Drop for Promise<'_> {
+    fn drop(&mut self) {
+        let lost = || Sight { value: f64::NAN, unclear: true, found: Err("looking there failed".into()) };
+        self.slots.put(self.index, self.kept.take().unwrap_or_else(lost));
     }
 }
 

@@ -82,6 +82,19 @@ impl<'a> System<'a> {
         common
     }
 
+    /// The same with sizes of the parameters that fit the box of an exploration: where a model gives a parameter a value that is
+    /// far smaller or larger than the range in which it varies, or none, steps would not fit the range.
+    pub(super) fn in_box(&self, exploration: &ExplorePlan) -> System<'a> {
+        const LEAST: f64 = 0.01;
+        let mut system = self.clone();
+        for (index, [low, high]) in exploration.connect.into_iter().chain([(exploration.free, exploration.range)]) {
+            if let Some(scale) = system.parameter_scales.get_mut(index) {
+                *scale = scale.clamp(LEAST * (high - low), high - low);
+            }
+        }
+        system
+    }
+
     /// That a forced field repeats itself at these parameters `[k]` and at others, each of them anywhere in its range.
     ///
     /// # Errors
