@@ -85,7 +85,7 @@ impl<'a> System<'a> {
     /// The same with sizes of the parameters that fit the box of an exploration: where a model gives a parameter a value that is
     /// far smaller or larger than the range in which it varies, or none, steps would not fit the range.
     pub(super) fn in_box(&self, exploration: &ExplorePlan) -> System<'a> {
-        const LEAST: f64 = 0.01;
+        const LEAST: f64 = 0.05;
         let mut system = self.clone();
         for (index, [low, high]) in exploration.connect.into_iter().chain([(exploration.free, exploration.range)]) {
             if let Some(scale) = system.parameter_scales.get_mut(index) {
