@@ -23,6 +23,8 @@ const OFF: f64 = 0.01;
 const NEARLY_OFF: f64 = 0.02;
 /// The same where branches crowd: the arms of a loop of the branch can lie that close to each other.
 const NEARLY_OFF_CROWDED: f64 = 0.003;
+/// Newton update, relative, that says that a matrix is singular.
+const THROWN: f64 = 10.0;
 /// Angles of the chord with both tangents: their sum may exceed the angle between the tangents by this factor …
 const CHORD_FACTOR: f64 = 1.5;
 /// … and this much. On an arc the two are equal; on a jump to another branch the chord points elsewhere.
@@ -87,7 +89,15 @@ impl Follow<'_> {
             Ok(self.problem.dot(&miss, &miss).sqrt() / stretch.length.abs())
         };
         // A step that doubles or halves may have a branch point right in its middle, where Newton's method fails.
-        let miss = looked(0.5).or_else(|_| looked(0.43))?;
+        let thrown = |why: &Failure| match why {
+            Failure::Singular => true,
+            Failure::NoConvergence(sizes) => sizes.last().is_some_and(|size| *size > THROWN),
+            _ => false,
+        };
+        let miss = match looked(0.5) {
+            Err(why) if thrown(&why) => looked(0.43)?.max(looked(0.57)?),
+            other => other?,
+        };
         // Meshes agree to the tolerance only.
         if miss > OFF + self.settings.tolerance / stretch.length.abs() {
             return Err(Failure::Elsewhere { angle: 0.0, miss });

@@ -255,9 +255,15 @@ impl Part<'_> {
             update.truncate(n + k);
             update
         };
+        // Where branches come close to each other, or cross, rounding of f moves a solution by more than a digit of its own.
+        let moved = |i: usize| {
+            let size: f64 = (0..n).map(|j| (fx[i * n + j] * scales[j]).abs()).sum();
+            max_abs(&step((0..n).map(|other| if other == i { f64::EPSILON * size } else { 0.0 }).collect()))
+        };
+        let moved = (0..n).map(moved).fold(f64::EPSILON, larger);
         let (off, rounding) = match self.precisely(point, x, &scales, &step) {
-            Some(off) => (off, f64::EPSILON),
-            None => (max_abs(&step(f)), ROUNDING),
+            Some(off) => (off, moved),
+            None => (max_abs(&step(f)), moved.max(ROUNDING)),
         };
         out.checks.push(self.check(point, Quantity::Profile, Some(point.trust.residual + rounding), off));
         let (mut power, mut worst) = (fx.clone(), 0.0);
