@@ -246,6 +246,28 @@ fn the_fold_of_the_single_loop_leads_from_the_cubic_spring_to_contact() {
     assert!(curve.points.iter().all(|p| p.trust.discretisation < TOLERANCE));
 }
 
+/// The two cusps lie 4e-4 apart in speed, and in the second one the curve turns within 1e-4 of its length: there its arms are so close
+/// that steps went over from one to the other, or back the way they came.
+#[test]
+fn the_fold_of_the_double_loop_passes_two_narrow_cusps() {
+    let branch = "[[seed]]\nname = \"s\"\nattractor = \"3:1\"\nparameters = { Omega = 5, kappa = 0 }\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"Omega\"\nrange = [0.5, 12]\n";
+    for tolerance in [1e-4, 1e-5, 2e-6] {
+        let study = study(ROTOR, &format!("tolerance = {tolerance:e}\n{branch}"));
+        let flow = with_curve(study, Kind::Fold, 2.8, "kappa", [0.0, 1.0], Some(1.0));
+        let curve = flow.branch("curve").unwrap();
+        complete(curve);
+        assert_eq!(curve.points.last().unwrap().parameters[1], 1.0, "at {tolerance:e}");
+        let found: Vec<Kind> = curve.special.iter().map(|s| s.kind).collect();
+        assert_eq!(found, [Kind::Cusp; 2], "at {tolerance:e}");
+        // As a run at a tolerance of 1e-7 has them; parameters at a cusp are known better than its cycle.
+        for (special, expected) in curve.special.iter().zip([[2.763550064, 0.739588323], [2.763881635, 0.539289978]]) {
+            for (value, expected) in special.point.parameters.iter().zip(expected) {
+                assert!((value - expected).abs() < tolerance + 1e-8, "{value} at {tolerance:e}, not {expected}");
+            }
+        }
+    }
+}
+
 #[test]
 fn period_doublings_over_the_damping_pass_those_of_another_damping() {
     let at = |zeta: f64| {

@@ -212,6 +212,11 @@ pub trait Monitor: Send + Sync {
     /// Whether the located zero is an event of this kind (and not, say, a neutral saddle).
     fn confirms(&self, at: &Point) -> bool;
 
+    /// The same with a look at the points `ends` between which the zero was located.
+    fn confirms_between(&self, _ends: [&Point; 2], at: &Point) -> bool {
+        self.confirms(at)
+    }
+
     /// Whether the value depends on more than the tangent of the point.
     fn reads_spectrum(&self) -> bool {
         true

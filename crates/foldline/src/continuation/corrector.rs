@@ -181,8 +181,10 @@ pub fn correct_within(
     Err(Failure::NoConvergence(sizes))
 }
 
-/// Newton updates, relative, that rounding may leave next to a singular matrix.
+/// Newton updates, relative, that rounding may leave next to a singular matrix …
 const STALLED: f64 = 1e-9;
+/// … and larger ones where no more than this is left of the equations, relative: there it is rounding and no curvature.
+const ROUNDED: f64 = 1e-11;
 
 /// Error after the first Newton step, over the square of the error before, that is reckoned with.
 const CURVED: f64 = 10.0;
@@ -217,10 +219,11 @@ pub fn arrive(
             return Err(Failure::NotFinite);
         }
         let stalls = sizes.last().is_some_and(|before| length > 0.3 * before);
+        let rounding = length < STALLED || length < 100.0 * close && problem.relative_size(&r, u) < ROUNDED;
         sizes.push(length);
         u.iter_mut().zip(&du).for_each(|(a, b)| *a -= b);
         // Next to a singular matrix rounding ends the descent earlier.
-        if length < close || (stalls && length < (100.0 * close).max(STALLED)) {
+        if length < close || (stalls && rounding) {
             break;
         }
         if stalls || sizes.len() > 5 {

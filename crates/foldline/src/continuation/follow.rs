@@ -293,8 +293,7 @@ impl Follow<'_> {
     /// as small a share of the step as they are of a step of usual length.
     fn sharpen(&mut self, left: &mut Station, step: f64, cost: &mut Cost) {
         let share = (step / (SHORT * self.settings.tolerance)).clamp(SHARPEST, 1.0);
-        // Where something is held this fails at cusps, for a reason that is not known (docs/decisions/0010).
-        if left.mesh.is_empty() || !self.settings.stability || share > 0.5 * left.share {
+        if left.mesh.is_empty() || share > 0.5 * left.share {
             return;
         }
         left.share = share;

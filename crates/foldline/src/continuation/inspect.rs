@@ -142,7 +142,7 @@ impl Follow<'_> {
                 (kind, jump) = (Kind::BranchPoint, 0);
             }
             match found {
-                Ok(found) if monitor.confirms(&found.station.point) => {
+                Ok(found) if monitor.confirms_between([&left.point, &right.point], &found.station.point) => {
                     located.push((kind, jump, found));
                     others.push(monitor.others_unstable(&located[located.len() - 1].2.station.point));
                 }

@@ -140,9 +140,11 @@ impl Follow<'_> {
         Ok(u[u.len() - 1] - guess[u.len() - 1])
     }
 
-    /// Where another branch may be close: whether the same step backwards from `right` leads to `left` again.
+    /// Where another branch may be close, or along a curve the other arm of a cusp: whether the same step backwards from `right` leads
+    /// to `left` again.
     pub(super) fn leads_back(&mut self, left: &Station, right: &Station, cost: &mut Cost) -> Result<(), Failure> {
-        if self.problem.margin(&left.point).min(self.problem.margin(&right.point)) > CROWDED {
+        let held = !self.settings.stability;
+        if !held && self.problem.margin(&left.point).min(self.problem.margin(&right.point)) > CROWDED {
             return Ok(());
         }
         // Mesh and phase are those of the left end: on the mesh of the right one it need not be a solution, and in its phase

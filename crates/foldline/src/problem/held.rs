@@ -40,6 +40,9 @@ pub struct Held<'a> {
     pivots: Vec<usize>,
     /// Where g was evaluated last, and g; nothing where the borders have changed since.
     known: Option<(Vec<f64>, Vec<f64>)>,
+    /// Where the null vectors and the tangents belong to; nothing where there are none.
+    nulls_at: Vec<f64>,
+    tangents_at: Vec<f64>,
     adapted: bool,
 }
 
@@ -58,6 +61,8 @@ impl<'a> Held<'a> {
             small: Vec::new(),
             pivots: Vec::new(),
             known: None,
+            nulls_at: Vec::new(),
+            tangents_at: Vec::new(),
             adapted: false,
         }
     }
@@ -69,21 +74,19 @@ impl<'a> Held<'a> {
         if std::mem::replace(&mut self.adapted, true) {
             return;
         }
-        let e = self.extra();
-        let mut g = vec![0.0; self.condition.equations()];
         for _ in 0..ROUNDS {
-            if self.surface.factorise(&u[e..], &self.rows).is_ok() {
-                self.span();
+            if self.surface.factorise(&u[self.extra()..], &self.rows).is_ok() {
+                self.span(u);
                 self.follow_plane();
             }
-            if self.condition.evaluate(&u[e..], &u[..e], &mut g) {
+            if self.evaluate(u, &mut vec![0.0; self.condition.equations()]) {
                 self.condition.anchor();
             }
         }
     }
 
-    /// The τ from the last factorisation of the surface.
-    fn span(&mut self) {
+    /// The τ from the last factorisation of the surface, which is one at `u`.
+    fn span(&mut self, u: &[f64]) {
         let (size, k) = (self.surface.unknowns(), self.freedom());
         self.tangents = vec![0.0; k * size];
         for (i, tangent) in self.tangents.chunks_exact_mut(size).enumerate() {
@@ -91,6 +94,25 @@ impl<'a> Held<'a> {
             one[size - k + i] = 1.0;
             self.surface.solve(&one, tangent);
         }
+        self.tangents_at = u.to_vec();
+    }
+
+    /// Whether vectors found at `place` will do as references at `u`. Those of an iterate that went astray would not: with such
+    /// borders g is so curved that the next step fails too.
+    fn serves(&self, place: &[f64], u: &[f64]) -> bool {
+        const NEAR: f64 = 1e-5;
+        place.len() == u.len() && {
+            let off: Vec<f64> = u.iter().zip(place).map(|(a, b)| a - b).collect();
+            self.relative_size(&off, u) < NEAR
+        }
+    }
+
+    /// g with the borders as they are.
+    fn evaluate(&mut self, u: &[f64], g: &mut [f64]) -> bool {
+        let e = self.extra();
+        let finite = self.condition.evaluate(&u[e..], &u[..e], g);
+        self.nulls_at = if finite { u.to_vec() } else { Vec::new() };
+        finite
     }
 
     /// g at `u`.
@@ -102,8 +124,7 @@ impl<'a> Held<'a> {
             g.copy_from_slice(value);
             return true;
         }
-        let e = self.extra();
-        let finite = self.condition.evaluate(&u[e..], &u[..e], g);
+        let finite = self.evaluate(u, g);
         self.known = finite.then(|| (u.to_vec(), g.to_vec()));
         finite
     }
@@ -153,12 +174,19 @@ impl ZeroProblem for Held<'_> {
     fn anchor(&mut self, u: &[f64]) {
         let e = self.extra();
         self.surface.anchor(&u[e..]);
-        self.condition.anchor();
+        if !self.adapted
+            || self.serves(&self.nulls_at, u)
+            || self.evaluate(u, &mut vec![0.0; self.condition.equations()])
+        {
+            self.condition.anchor();
+        }
         if self.row.len() == self.unknowns() {
             self.condition.face(&self.row[e..]);
         }
         self.known = None;
-        self.follow_plane();
+        if self.serves(&self.tangents_at, u) {
+            self.follow_plane();
+        }
         self.scale.iter_mut().zip(u).for_each(|(s, v)| *s = 1.0 + v.abs());
     }
 
@@ -175,7 +203,7 @@ impl ZeroProblem for Held<'_> {
             return Err(Singular);
         }
         self.surface.factorise(&u[e..], &self.rows)?;
-        self.span();
+        self.span(u);
         self.small = vec![0.0; width * width];
         for (i, tangent) in self.tangents.chunks_exact(size).enumerate() {
             self.condition.derivative(tangent, &vec![0.0; e], &mut g);
@@ -239,6 +267,8 @@ impl ZeroProblem for Held<'_> {
             self.rows.chunks_exact(size).flat_map(|row| self.surface.transfer(row, &from, mesh)).collect();
         self.rows = carried;
         self.tangents.clear();
+        self.tangents_at.clear();
+        self.nulls_at.clear();
         self.known = None;
         self.surface.set_mesh(mesh);
         self.condition.set_mesh(mesh);

@@ -2,7 +2,7 @@
 //!
 //! | on a curve of | kind | test function |
 //! |---|---|---|
-//! | folds | cusp | ⟨p, B(q, q)⟩; for cycles a of the normal form |
+//! | folds | cusp | ⟨p, B(q, q)⟩; for cycles the slope in the first parameter, where it vanishes with that in the second |
 //! | branch points of equilibria | cusp | ⟨p, B(q, q)⟩ where they are not pitchforks throughout |
 //! | folds, branch points of equilibria | Bogdanov–Takens | ⟨p, q⟩ |
 //! | folds, branch points of equilibria | zero-Hopf | sums of two of the other eigenvalues |
@@ -18,12 +18,12 @@
 //! | period doublings, folds, torus points | fold–flip, 1:2 resonance, flip–torus | the product of the others minus 1, plus 1 |
 //! | all of cycles | fold–torus, flip–torus, double torus | products of two of the others minus 1 |
 //!
-//! p and q are of unit length, and point the way that they did where the step began; so does the null vector in a of a forced cycle.
+//! p and q are of unit length, and point the way that they did where the step began.
 //!
 //! **Source.** kuznetsov2004, §10.3 (equilibria), §9 (cycles).
 
-use super::cycle_form;
 use super::normal_form::Local;
+use super::{cycle_form, fold};
 use crate::contract::{Monitor, VectorField};
 use crate::diagram::{Ending, Family, Kind, Point};
 use crate::linalg::dot;
@@ -85,19 +85,9 @@ impl CodimensionTwo<'_> {
     }
 
     /// The coefficient of the normal form of what is held on cycles.
-    fn coefficient(&self, reference: &Point, at: &Point) -> Option<f64> {
-        let setting = |point: &Point| Setting {
-            field: self.field,
-            scales: self.scales,
-            parameters: point.parameters.clone(),
-            axes: Vec::new(),
-        };
-        let value = cycle_form::coefficient(self.held, setting(at), at)?;
-        if self.held != Kind::Fold || at.solution.forcing_periods() == 0 {
-            return Some(value);
-        }
-        let [before, now] = [reference, at].map(|point| cycle_form::direction(self.held, setting(point), point));
-        Some(value * dot(&before?, &now?).signum())
+    fn coefficient(&self, at: &Point) -> Option<f64> {
+        let (field, scales, parameters) = (self.field, self.scales, at.parameters.clone());
+        cycle_form::coefficient(self.held, Setting { field, scales, parameters, axes: Vec::new() }, at)
     }
 
     fn tested(&self, reference: &Point, at: &Point) -> Option<f64> {
@@ -106,7 +96,7 @@ impl CodimensionTwo<'_> {
         let product = |centre: f64| rest.iter().map(|z| (z - centre) / (1.0 + z.norm())).product::<Complex64>().re;
         let pairs = || (0..rest.len()).flat_map(|j| (0..j).map(move |i| (i, j)));
         Some(match self.kind {
-            Kind::Cusp if of_cycle => self.coefficient(reference, at)?,
+            Kind::Cusp if of_cycle => fold::first_slope(at),
             Kind::Cusp => {
                 // By symmetry it vanishes everywhere, but for rounding.
                 if self.held == Kind::BranchPoint
@@ -123,7 +113,7 @@ impl CodimensionTwo<'_> {
             Kind::BogdanovTakens => (held.first()? * held.get(1)?).re,
             Kind::GeneralisedHopf => Local::new(self.field, at)?.hopf(held.first()?.im.abs())?,
             Kind::ZeroHopf if self.held == Kind::Hopf => rest.iter().product::<Complex64>().re,
-            Kind::GeneralisedPeriodDoubling | Kind::Chenciner => self.coefficient(reference, at)?,
+            Kind::GeneralisedPeriodDoubling | Kind::Chenciner => self.coefficient(at)?,
             Kind::Resonance11 | Kind::Resonance12 if self.held == Kind::Torus => {
                 let z = held.first()?;
                 // The other end of the circle is the business of the other.
@@ -178,6 +168,11 @@ impl Monitor for CodimensionTwo<'_> {
             Kind::DoubleTorus => rest.iter().any(on_circle),
             _ => true,
         }
+    }
+
+    fn confirms_between(&self, ends: [&Point; 2], at: &Point) -> bool {
+        let of_cycle = at.solution.period().is_some();
+        if self.kind == Kind::Cusp && of_cycle { fold::parameters_rest(ends, at) } else { self.confirms(at) }
     }
 
     fn jump(&self) -> usize {

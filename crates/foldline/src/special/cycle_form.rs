@@ -52,13 +52,6 @@ pub fn coefficient(kind: Kind, setting: Setting, at: &Point) -> Option<f64> {
     Some(found / unit).filter(|value| value.is_finite())
 }
 
-/// Where the null vector points, at a few places that are the same whatever the mesh is.
-pub(super) fn direction(kind: Kind, setting: Setting, at: &Point) -> Option<Vec<f64>> {
-    const PLACES: usize = 16;
-    let (condition, ..) = evaluated(kind, setting, at)?;
-    Some(condition.null_at(PLACES))
-}
-
 /// The condition of that kind with its null vector, the unknowns, and the extra ones.
 fn evaluated<'a>(kind: Kind, setting: Setting<'a>, at: &Point) -> Option<(OnCycles<'a>, Vec<f64>, Vec<f64>)> {
     let Solution::Cycle(cycle) = &at.solution else { return None };

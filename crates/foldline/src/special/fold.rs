@@ -1,4 +1,5 @@
-//! Folds (limit points, saddle-nodes): the branch turns back in its parameter.
+//! Folds (limit points, saddle-nodes): the branch turns back in its parameter. Curves in two parameters turn back in one of them, or
+//! at a cusp in both.
 
 use crate::contract::Monitor;
 use crate::diagram::{Kind, Point, Solution};
@@ -31,4 +32,52 @@ impl Monitor for Fold {
         let centre = if matches!(at.solution, Solution::Cycle(_)) { 1.0 } else { 0.0 };
         super::others_unstable(at, 1, |z| (z - centre).norm())
     }
+}
+
+/// The same where something is held along a curve in two parameters, and one of them is to turn alone.
+pub struct Turn;
+
+impl Monitor for Turn {
+    fn kind(&self) -> Kind {
+        Kind::Fold
+    }
+
+    fn value(&self, _reference: &Point, at: &Point) -> f64 {
+        at.parameter_slope()
+    }
+
+    fn confirms(&self, _at: &Point) -> bool {
+        true
+    }
+
+    fn confirms_between(&self, ends: [&Point; 2], at: &Point) -> bool {
+        !parameters_rest(ends, at)
+    }
+
+    fn reads_spectrum(&self) -> bool {
+        false
+    }
+
+    fn jump(&self) -> usize {
+        1
+    }
+}
+
+/// Whether neither of the last two components of the tangent, those along the parameters of a curve in two of them, is left of what
+/// both are at `ends`: the curve has a cusp in the plane of the parameters.
+pub(super) fn parameters_rest(ends: [&Point; 2], at: &Point) -> bool {
+    const LEFT: f64 = 0.02;
+    [1, 2].into_iter().all(|back| {
+        let slope = |point: &Point| at_end(&point.tangent, back).abs();
+        slope(at) < LEFT * slope(ends[0]).max(slope(ends[1]))
+    })
+}
+
+/// The component along the first parameter of a curve in two.
+pub(super) fn first_slope(at: &Point) -> f64 {
+    at_end(&at.tangent, 2)
+}
+
+fn at_end(v: &[f64], back: usize) -> f64 {
+    v.len().checked_sub(back).map_or(f64::NAN, |i| v[i])
 }

@@ -54,7 +54,7 @@ pub fn monitors_where_held<'a>(
     held: Kind,
 ) -> Vec<Box<dyn Monitor + 'a>> {
     let mut all = codim_two::monitors(field, scales, family, held);
-    all.push(Box::new(fold::Fold));
+    all.push(Box::new(fold::Turn));
     all
 }
 

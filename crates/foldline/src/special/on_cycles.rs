@@ -161,19 +161,6 @@ impl<'a> OnCycles<'a> {
         (self.at_points(&self.null[..size]), if self.is_fold() { self.null[size] } else { 0.0 })
     }
 
-    /// The null vector that was found last at so many equal distances of time, `[place][parts]`.
-    pub(super) fn null_at(&self, places: usize) -> Vec<f64> {
-        let mut out = vec![0.0; places * self.parts];
-        let block = (self.scheme.degree + 1) * self.parts;
-        for (k, to) in out.chunks_exact_mut(self.parts).enumerate() {
-            let t = k as f64 / places as f64;
-            let j = self.mesh.partition_point(|b| *b <= t).clamp(1, self.intervals()) - 1;
-            let s = (t - self.mesh[j]) / (self.mesh[j + 1] - self.mesh[j]);
-            self.scheme.value_into(s, &self.null[j * block..(j + 1) * block], to);
-        }
-        out
-    }
-
     /// What has to vanish for L y = r to have a solution, r at the Gauss points: a number, complex where v is.
     pub(super) fn solvability(&self, r: &[f64]) -> Complex64 {
         let lanes = self.lanes();
