@@ -179,6 +179,12 @@ pub trait ZeroProblem {
         0.0
     }
 
+    /// Along a curve of folds, a smooth function whose sign tells the two arms of a cusp apart, at a solution `u` on the current mesh. It
+    /// may be compared until the next call of [`ZeroProblem::anchor`].
+    fn arm(&mut self, _u: &[f64]) -> Option<f64> {
+        None
+    }
+
     /// `u` as plain data.
     fn point(&self, u: &[f64], tangent: &[f64], examination: Examination) -> Point;
 
@@ -276,6 +282,11 @@ pub trait Condition {
 
     /// The derivative of g along (`du`, `extra`) at the place of the last evaluation: writes as many values.
     fn derivative(&mut self, du: &[f64], extra: &[f64], dg: &mut [f64]);
+
+    /// Where folds are held, the null vector found at the last evaluation, as a direction in the unknowns of the surface.
+    fn null_direction(&self) -> Option<Vec<f64>> {
+        None
+    }
 
     /// The eigenvalues or multipliers that are held, as the extra unknowns say.
     fn held(&self, extra: &[f64]) -> Vec<Complex64>;

@@ -13,6 +13,8 @@ use crate::diagram::Cost;
 const CROWDED: f64 = 0.02;
 /// How many tolerances off a step may lead back; more is another branch.
 const BACK: f64 = 100.0;
+/// Size of what tells the arms of a cusp apart below which it is rounding.
+const UNSIGNED: f64 = 1e-7;
 /// How far off a prediction may be, as a share of the step …
 const MISS: f64 = 0.3;
 /// … and by the first Newton update, which is not the last word.
@@ -140,6 +142,18 @@ impl Follow<'_> {
         Ok(u[u.len() - 1] - guess[u.len() - 1])
     }
 
+    /// Whether a step along a curve of folds ends on the arm of a cusp on which it began or, where it turned back in the plane of the
+    /// parameters, on the other. However close the arms are, on them the cycle or equilibrium turns to opposite sides. All is on the mesh
+    /// of `left`, where the problem is anchored.
+    fn stays_on_arm(&mut self, left: &Station, u: &[f64], tangent: &[f64]) -> bool {
+        let Some(before) = self.problem.arm(&left.u) else { return true };
+        let Some(after) = self.problem.arm(u) else { return true };
+        let last = tangent.len().saturating_sub(2);
+        let shares = left.tangent[last..].iter().zip(&tangent[last..]).map(|(a, b)| a * b / (a * a).max(b * b));
+        let forth = shares.filter(|share| share.is_finite()).sum::<f64>() > 0.0;
+        before.abs().min(after.abs()) < UNSIGNED || (before * after > 0.0) == forth
+    }
+
     /// Where another branch may be close, or along a curve the other arm of a cusp: whether the same step backwards from `right` leads
     /// to `left` again.
     pub(super) fn leads_back(&mut self, left: &Station, right: &Station, cost: &mut Cost) -> Result<(), Failure> {
@@ -154,6 +168,9 @@ impl Follow<'_> {
         let tangent = self.problem.transfer(&right.tangent, &right.mesh, &left.mesh);
         let gap: Vec<f64> = left.u.iter().zip(&from).map(|(a, b)| a - b).collect();
         let distance = self.problem.dot(&tangent, &gap);
+        if held && !self.stays_on_arm(left, &from, &tangent) {
+            return Err(Failure::Elsewhere { angle: 0.0, miss: 0.0 });
+        }
         let mut back: Vec<f64> =
             (0..from.len()).map(|i| from[i] + distance * (tangent[i] + 0.5 * (left.tangent[i] - tangent[i]))).collect();
         let plane = Plane { row: tangent, base: from, distance };

@@ -324,6 +324,14 @@ impl ZeroProblem for Held<'_> {
         self.surface.margin(&others)
     }
 
+    /// The change of g along the null vector: it vanishes at cusps.
+    fn arm(&mut self, u: &[f64]) -> Option<f64> {
+        let mut g = vec![0.0; self.condition.equations()];
+        let along = self.condition_at(u, &mut g).then(|| self.condition.null_direction())??;
+        self.condition.derivative(&along, &vec![0.0; self.extra()], &mut g);
+        g.first().copied().filter(|value| value.is_finite())
+    }
+
     fn departure(&self, u: &[f64]) -> f64 {
         self.surface.departure(&u[self.extra()..])
     }

@@ -537,6 +537,12 @@ impl Condition for OnCycles<'_> {
         }
     }
 
+    fn null_direction(&self) -> Option<Vec<f64>> {
+        let own = (self.kind == Kind::Fold).then(|| self.null.get(..self.profile_size()))??;
+        let period = if self.is_fold() { self.null[own.len()] } else { 0.0 };
+        Some([own, &[period, 0.0, 0.0]].concat())
+    }
+
     fn held(&self, extra: &[f64]) -> Vec<Complex64> {
         match self.kind {
             Kind::PeriodDoubling => vec![Complex64::new(-1.0, 0.0)],

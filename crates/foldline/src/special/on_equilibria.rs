@@ -203,6 +203,11 @@ impl Condition for OnEquilibria<'_> {
         }
     }
 
+    fn null_direction(&self) -> Option<Vec<f64>> {
+        let own = (self.kind == Kind::Fold).then(|| self.null.get(..self.n))??;
+        Some([own, &[0.0; 2]].concat())
+    }
+
     fn held(&self, extra: &[f64]) -> Vec<Complex64> {
         match self.kind {
             Kind::Fold => vec![Complex64::new(0.0, 0.0)],
