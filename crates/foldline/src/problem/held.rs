@@ -299,18 +299,16 @@ impl ZeroProblem for Held<'_> {
         let mut found = self.surface.examine(&u[self.extra()..]);
         // The eigenvalues that are held count as neither stable nor unstable.
         let (first, is_cycle) = (found.trivial, !self.surface.mesh().is_empty());
-        let mut order: Vec<usize> = (first..found.spectrum.len()).collect();
-        let distance = |k: &usize| self.condition.distance(found.spectrum[*k]);
-        order.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
-        let outside = |k: &&usize| {
-            let z = found.spectrum[**k];
-            if is_cycle { z.norm() > 1.0 } else { z.re > 0.0 }
-        };
+        let mut others = found.spectrum.split_off(first.min(found.spectrum.len()));
         let held = self.condition.held(&u[..self.extra()]);
-        found.unstable = order.iter().skip(held.len()).filter(outside).count();
+        for z in &held {
+            let closest = (0..others.len()).min_by(|a, b| (others[*a] - z).norm().total_cmp(&(others[*b] - z).norm()));
+            closest.map(|k| others.remove(k));
+        }
+        others.sort_by(|a, b| self.condition.distance(*a).total_cmp(&self.condition.distance(*b)));
+        found.unstable = others.iter().filter(|z| if is_cycle { z.norm() > 1.0 } else { z.re > 0.0 }).count();
         // What is held comes first, as it is meant: computed, a double eigenvalue would be known to half the digits.
-        let others = order.iter().skip(held.len()).map(|k| found.spectrum[*k]);
-        found.spectrum = found.spectrum[..first].iter().copied().chain(held).chain(others).collect();
+        found.spectrum.extend(held.into_iter().chain(others));
         found
     }
 
