@@ -56,48 +56,60 @@ impl CycleProblem<'_> {
     /// Jacobian changes sharply.
     pub(super) fn multiplier_error(&self, u: &[f64], spectrum: &[Complex64]) -> f64 {
         self.errors(u);
-        let [Some(own), Some(better)] = [0.0, 1.0].map(|share| self.corrected_multipliers(u, share)) else {
-            return f64::NAN;
-        };
+        let Some([own, better]) = self.corrected_multipliers(u) else { return f64::NAN };
         let apart = spectrum_difference(spectrum, &own) + spectrum_difference(&own, &better);
         SPECTRUM_SAFE * apart + SPECTRUM_ROUNDING
     }
 
-    /// The multipliers from more accurate transitions, with the Jacobian along the profile without that share of its error.
-    fn corrected_multipliers(&self, u: &[f64], share: f64) -> Option<Vec<Complex64>> {
+    /// The multipliers from more accurate transitions, with the Jacobian along the profile, and along the profile without its error.
+    fn corrected_multipliers(&self, u: &[f64]) -> Option<[Vec<Complex64>; 2]> {
         let (n, m, count, size) = (self.n, self.scheme.degree, self.intervals(), self.profile_size());
-        let (better, mut states) = {
-            let known = self.measured.borrow();
-            let known = known.as_ref()?;
-            let better: Vec<f64> = u.iter().zip(&known.shift).map(|(u, e)| u - share * e).collect();
-            (better, known.within.clone())
-        };
-        let lanes = count * (m + 1);
-        let nodes = panel::by_component(&better[..size], m + 1, n);
-        let mut values = vec![0.0; lanes];
-        for (own, nodes) in states.chunks_exact_mut(lanes).zip(nodes.chunks_exact(lanes)) {
-            self.sampling.sampled(nodes, count, &mut values);
-            own.iter_mut().zip(&values).for_each(|(w, x)| *w = x - share * *w);
-        }
-        let parameters = self.setting.at(&better[size + 1..]);
-        let (mut f, mut fx) = (vec![0.0; n * lanes], vec![0.0; n * n * lanes]);
+        let (square, lanes, padded) = (n * n, count * (m + 1), defect::padded(count));
+        let last = |j: usize| j.min(count - 1);
+        let known = self.measured.borrow();
+        let known = known.as_ref()?;
         let times = self.sampling.times(&self.mesh, self.forcing_periods);
-        let batch = Batch { lanes, states: &states, parameters: Parameters::Shared(&parameters), times: &times };
-        self.setting.field.linearise(batch, &[], &mut f, &mut fx, &mut []);
-        if !max_abs(&fx).is_finite() || !max_abs(&better).is_finite() {
-            return None;
-        }
-        let (mut inner, mut jacobians) = (vec![0.0; (m + 1) * n * n], vec![0.0; (m + 1) * n * n]);
-        inner[..n * n].iter_mut().enumerate().for_each(|(k, x)| *x = f64::from(u8::from(k / n == k % n)));
-        let found = self.floquet_with(&better, |j, transition| {
-            self.system.inner(j, &mut inner[n * n..]);
-            let time = self.h(j) * better[size];
-            for (k, x) in jacobians.iter_mut().enumerate() {
-                *x = time * fx[k % (n * n) * lanes + k / (n * n) * count + j];
+        let better: Vec<f64> = u.iter().zip(&known.shift).map(|(u, e)| u - e).collect();
+        let courses = [(u, 0.0), (&better[..], 1.0)];
+        let mut jacobians = vec![0.0; square * 2 * (m + 1) * padded];
+        let (mut states, mut f, mut fx) = (known.within.clone(), vec![0.0; n * lanes], vec![0.0; square * lanes]);
+        let mut values = vec![0.0; lanes];
+        for (course, (u, share)) in courses.iter().enumerate() {
+            let nodes = panel::by_component(&u[..size], m + 1, n);
+            let without = states.chunks_exact_mut(lanes).zip(known.within.chunks_exact(lanes));
+            for ((own, within), nodes) in without.zip(nodes.chunks_exact(lanes)) {
+                self.sampling.sampled(nodes, count, &mut values);
+                own.iter_mut().zip(&values).zip(within).for_each(|((own, x), w)| *own = x - share * w);
             }
-            defect::corrected(&self.sampling, &inner, &jacobians, n, transition);
-        });
-        Some(found.multipliers)
+            let parameters = self.setting.at(&u[size + 1..]);
+            let batch = Batch { lanes, states: &states, parameters: Parameters::Shared(&parameters), times: &times };
+            self.setting.field.linearise(batch, &[], &mut f, &mut fx, &mut []);
+            if !max_abs(&fx).is_finite() || !max_abs(u).is_finite() {
+                return None;
+            }
+            for (k, from) in fx.chunks_exact(count).enumerate() {
+                let (entry, g) = (k / (m + 1), k % (m + 1));
+                let to = &mut jacobians[((entry * 2 + course) * (m + 1) + g) * padded..][..padded];
+                to.iter_mut().enumerate().for_each(|(j, x)| *x = self.h(last(j)) * u[size] * from[last(j)]);
+            }
+        }
+        let (mut nodes, mut transitions) = (vec![0.0; (m + 1) * square * padded], vec![0.0; square * 2 * padded]);
+        (0..n).for_each(|c| nodes[c * (n + 1) * padded..][..padded].fill(1.0));
+        let (mut inner, mut own) = (vec![0.0; m * square], vec![0.0; square]);
+        for j in 0..padded {
+            self.system.inner(last(j), &mut inner);
+            self.system.transition(last(j), &mut own);
+            inner.iter().enumerate().for_each(|(k, x)| nodes[(square + k) * padded + j] = *x);
+            own.iter().enumerate().for_each(|(k, x)| (0..2).for_each(|c| transitions[(2 * k + c) * padded + j] = *x));
+        }
+        defect::correct(&self.sampling, &nodes, &jacobians, &mut transitions, n);
+        let corrected = |course: usize, u: &[f64]| {
+            let transition = |j: usize, to: &mut [f64]| {
+                to.iter_mut().enumerate().for_each(|(k, x)| *x = transitions[(2 * k + course) * padded + j]);
+            };
+            self.floquet_with(u, transition).multipliers
+        };
+        Some([corrected(0, u), corrected(1, &better)])
     }
 
     fn measured_errors(&self, u: &[f64]) -> Measured {
