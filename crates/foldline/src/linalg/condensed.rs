@@ -63,12 +63,8 @@ impl<T: Lane> Condensed<T> {
     pub fn new(n: usize, end: &[f64], q: usize) -> Condensed<T> {
         let m = end.len() - 1;
         let mut system = Condensed { n, m, q, closure: 1.0, end: end.to_vec(), ..Condensed::default() };
-        if block::in_panels::<T>(n * m) {
-            system.arrange(Shape::plain(n, m));
-        } else {
-            let every = vec![true; n * n];
-            system.arrange(Shape::new(&every, &every, m, n + q));
-        }
+        let every = vec![true; n * n];
+        system.arrange(block::shape::<T>(&every, &every, m, n + q));
         system
     }
 
@@ -76,9 +72,9 @@ impl<T: Lane> Condensed<T> {
     /// `pattern[c n + d]`, and B is zero unless c = d. The slots may change. Without it every entry may be anything.
     pub fn couple(&mut self, pattern: &[bool]) {
         let n = self.n;
-        if !block::in_panels::<T>(n * self.m) && pattern != self.shape.pattern() {
+        if pattern != self.shape.pattern() {
             let ends: Vec<bool> = (0..n * n).map(|k| k % (n + 1) == 0).collect();
-            self.arrange(Shape::new(pattern, &ends, self.m, n + self.q));
+            self.arrange(block::shape::<T>(pattern, &ends, self.m, n + self.q));
         }
     }
 

@@ -7,41 +7,58 @@ use super::lane::{Lane, subtract};
 /// in `v` (`[columns × rows]`, one unit-scaled vector per column, H = 1 - v vᵀ).
 #[inline(always)]
 pub fn triangularise<T: Lane>(a: &mut [T], rows: usize, width: usize, columns: usize, v: &mut [T]) {
-    for k in 0..columns.min(rows) {
-        let reflector = &mut v[k * rows..(k + 1) * rows];
-        reflector[..k].fill(T::default());
-        let mut norm2 = T::default();
-        for i in k..rows {
-            let x = a[i * width + k];
-            reflector[i] = x;
-            norm2 = norm2 + x * x;
-        }
-        // A column that vanishes, or is not finite, is left alone.
-        let alpha = norm2.zip(reflector[k], |s, x| if x > 0.0 { -s.sqrt() } else { s.sqrt() });
-        let beta = norm2 - alpha * reflector[k];
-        reflector[k] = reflector[k] - alpha;
-        let scale = beta.map(|b| if b > 0.0 && b < f64::INFINITY { 1.0 / b.sqrt() } else { 0.0 });
-        reflector[k..].iter_mut().for_each(|x| *x = *x * scale);
-        // Columns in groups whose sums stay in registers.
-        let (v, block) = (&reflector[k..], &mut a[k * width..rows * width]);
-        let mut c = k;
-        while c < width {
-            c += match width - c {
-                8.. => apply_group::<T, 8>(v, block, width, c),
-                4.. => apply_group::<T, 4>(v, block, width, c),
-                2.. => apply_group::<T, 2>(v, block, width, c),
-                _ => apply_group::<T, 1>(v, block, width, c),
-            };
-        }
-        for row in block[width..].chunks_exact_mut(width) {
-            row[k] = T::default();
-        }
+    // Columns in groups whose sums stay in registers; a group stays in the cache until all reflections are applied to it.
+    let mut c = 0;
+    while c < width {
+        c += match width - c {
+            16.. if T::COUNT == 1 => group::<T, 16>(a, [rows, width, columns], c, v),
+            8.. => group::<T, 8>(a, [rows, width, columns], c, v),
+            4.. => group::<T, 4>(a, [rows, width, columns], c, v),
+            2.. => group::<T, 2>(a, [rows, width, columns], c, v),
+            _ => group::<T, 1>(a, [rows, width, columns], c, v),
+        };
     }
 }
 
-/// Applies 1 - v vᵀ to C columns from `c` on; returns C.
+/// Applies to C columns from `c` on the reflections of the columns before them, then makes those reflections that are theirs;
+/// returns C.
 #[inline(always)]
-fn apply_group<T: Lane, const C: usize>(v: &[T], a: &mut [T], width: usize, c: usize) -> usize {
+fn group<T: Lane, const C: usize>(a: &mut [T], [rows, width, columns]: [usize; 3], c: usize, v: &mut [T]) -> usize {
+    let columns = columns.min(rows);
+    for k in 0..(c + C).min(columns) {
+        let reflector = &mut v[k * rows..(k + 1) * rows];
+        let block = &mut a[k * width..];
+        if k >= c {
+            reflector[..k].fill(T::default());
+            reflection(&mut reflector[k..], block, width, k);
+        }
+        apply_group::<T, C>(&reflector[k..], block, width, c);
+        if k >= c {
+            block[width..].chunks_exact_mut(width).for_each(|row| row[k] = T::default());
+        }
+    }
+    C
+}
+
+/// The reflection that leaves of column k only its first entry.
+#[inline(always)]
+fn reflection<T: Lane>(v: &mut [T], block: &[T], width: usize, k: usize) {
+    let mut norm2 = T::default();
+    for (v, row) in v.iter_mut().zip(block.chunks_exact(width)) {
+        *v = row[k];
+        norm2 = norm2 + row[k] * row[k];
+    }
+    // A column that vanishes, or is not finite, is left alone.
+    let alpha = norm2.zip(v[0], |s, x| if x > 0.0 { -s.sqrt() } else { s.sqrt() });
+    let beta = norm2 - alpha * v[0];
+    v[0] = v[0] - alpha;
+    let scale = beta.map(|b| if b > 0.0 && b < f64::INFINITY { 1.0 / b.sqrt() } else { 0.0 });
+    v.iter_mut().for_each(|x| *x = *x * scale);
+}
+
+/// Applies 1 - v vᵀ to C columns from `c` on.
+#[inline(always)]
+fn apply_group<T: Lane, const C: usize>(v: &[T], a: &mut [T], width: usize, c: usize) {
     let mut sums = [T::default(); C];
     for (v, row) in v.iter().zip(a.chunks_exact(width)) {
         let row = &row[c..c + C];
@@ -50,12 +67,14 @@ fn apply_group<T: Lane, const C: usize>(v: &[T], a: &mut [T], width: usize, c: u
         }
     }
     for (v, row) in v.iter().zip(a.chunks_exact_mut(width)) {
-        let row = &mut row[c..c + C];
+        let (v, row) = (*v, &mut row[c..c + C]);
+        // All of it before anything is written, so that one number of many becomes a vector.
+        let mut left = [T::default(); C];
         for k in 0..C {
-            row[k] = row[k] - *v * sums[k];
+            left[k] = row[k] - v * sums[k];
         }
+        row.copy_from_slice(&left);
     }
-    C
 }
 
 /// Applies the stored reflections, `columns` of them, in order to the vector `b`.

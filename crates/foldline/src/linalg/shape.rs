@@ -88,8 +88,21 @@ impl Shape {
     }
 
     /// Components in their own order, and no steps: for matrices that fill the vectors by themselves.
-    pub fn plain(n: usize, nodes: usize) -> Shape {
-        Shape { pattern: vec![true; n * n], rank: (0..n).collect(), nodes, steps: Vec::new() }
+    pub fn plain(pattern: &[bool], nodes: usize) -> Shape {
+        Shape { pattern: pattern.to_vec(), rank: (0..pattern.len().isqrt()).collect(), nodes, steps: Vec::new() }
+    }
+
+    /// Whether there are no steps, so that every entry is looked at.
+    #[inline(always)]
+    pub fn is_plain(&self) -> bool {
+        self.steps.is_empty()
+    }
+
+    /// Products of entries that the steps take, as a share of those that they take where nothing is zero.
+    pub fn share(&self, columns: usize) -> f64 {
+        let products = |below: usize, right: usize| (below * right * self.nodes + (below + right) * columns) as f64;
+        let taken: f64 = self.steps.iter().map(|step| products(step.below.len(), step.right.len())).sum();
+        taken / (0..self.steps.len()).map(|rest| products(rest, rest)).sum::<f64>()
     }
 
     /// The pattern that it was made for.
