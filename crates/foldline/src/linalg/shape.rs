@@ -22,6 +22,8 @@ pub struct Shape {
     pub nodes: usize,
     /// The steps.
     pub steps: Vec<Step>,
+    /// Blocks, row and column, that are zero before elimination and not afterwards, and the diagonal where it is the identity.
+    pub fresh: Vec<[usize; 2]>,
 }
 
 /// What the elimination of a component touches.
@@ -61,6 +63,11 @@ impl Shape {
                 (p + 1..width).for_each(|at| row[at] |= upper[p * width + at]);
             }
         }
+        let starts_empty = |p: usize, j: usize| !pattern[order[p] * n + order[j]];
+        let fresh = (0..n * n)
+            .map(|k| [k / n, k % n])
+            .filter(|&[p, j]| starts_empty(p, j) && (p == j || filled[p * width + j]))
+            .collect();
         let mut steps: Vec<Step> = (0..n)
             .map(|p| {
                 let row = &filled[p * width..(p + 1) * width];
@@ -84,12 +91,12 @@ impl Shape {
             }
             steps[p].solved = ranges(&row[n..]);
         }
-        Shape { pattern: pattern.to_vec(), rank, nodes, steps }
+        Shape { pattern: pattern.to_vec(), rank, nodes, steps, fresh }
     }
 
     /// Components in their own order, and no steps: for matrices that fill the vectors by themselves.
     pub fn plain(pattern: &[bool], nodes: usize) -> Shape {
-        Shape { pattern: pattern.to_vec(), rank: (0..pattern.len().isqrt()).collect(), nodes, steps: Vec::new() }
+        Shape { pattern: pattern.to_vec(), rank: (0..pattern.len().isqrt()).collect(), nodes, ..Shape::default() }
     }
 
     /// Whether there are no steps, so that every entry is looked at.
