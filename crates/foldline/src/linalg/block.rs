@@ -3,7 +3,7 @@
 //! **Idea.** Gaussian elimination with a diagonal pivot while it is at least a tenth of what stands below it, component by
 //! component, looking only at blocks that can differ from zero ([`Shape`]). Where a diagonal does not serve, the lanes that need
 //! it exchange rows by themselves, and from there on every entry is looked at; the matrices of collocation in Runge–Kutta form
-//! rarely need that. Matrices that fill the vectors by themselves are eliminated in panels.
+//! rarely need that. A large matrix of which few blocks vanish fills the vectors by itself and is eliminated in panels.
 //!
 //! **Source.** Threshold pivoting: duff2017, §5.2.
 
