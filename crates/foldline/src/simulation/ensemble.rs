@@ -2,7 +2,7 @@
 //!
 //! **Idea.** Some of the trajectories are the lanes of one batch. In each sweep every lane tries one step of its own length;
 //! those whose error is too large try again with a shorter one in the next sweep. A lane that is finished takes over the next
-//! trajectory that waits; once none waits it is taken out of the batch.
+//! trajectory that waits; once none waits it rests, and lanes at rest are taken out of the batch eight at a time.
 //!
 //! **Equations.** The pair of the tableau, and with err the root mean square of errorᵢ / (absoluteᵢ + relative max(|x₀|, |x₁|)ᵢ):
 //!
@@ -135,8 +135,11 @@ impl<'a> Ensemble<'a> {
             self.lanes.advance(self.field, self.parameters, &self.tolerance, &self.limits);
             if !self.lanes.signs.is_empty() {
                 self.look_ahead();
-                let held = (0..self.lanes.count).filter(|&l| self.lanes.accepted[l] != 0.0).collect::<Vec<_>>();
-                kinks.extend(held.into_iter().filter_map(|l| Some((l, self.shortened(l, &mut again)?))));
+                for l in 0..self.lanes.count {
+                    if self.lanes.accepted[l] != 0.0 {
+                        kinks.extend(self.shortened(l, &mut again).map(|kink| (l, kink)));
+                    }
+                }
             }
             let stopped = self.show(observe);
             if self.lanes.take_over(&self.limits) || !stopped.is_empty() {
