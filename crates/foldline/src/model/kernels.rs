@@ -13,6 +13,8 @@
 //!
 //! **Source.** Argument reduction with a two-part ln 2: cody1980.
 
+use std::ops::RangeInclusive;
+
 /// Adding it to |x| < 2⁵¹ rounds x to an integer, which then sits in the low bits of the sum.
 const ROUNDER: f64 = 6755399441055744.0; // 1.5 · 2⁵²
 /// Leading part of ln 2 with trailing zeros, so that k · LN2_HIGH is exact.
@@ -102,14 +104,14 @@ pub(super) fn hypot(a: f64, b: f64) -> f64 {
 }
 
 /// Squares of lengths between these make [`hypot`] a plain square root.
-const PLAIN: [f64; 2] = [1e-279, 1e299];
+const PLAIN: RangeInclusive<f64> = 1e-279..=1e299;
 
 /// [`hypot`] of eight pairs, without the scaling where none of them needs it.
 #[inline(always)]
 pub(super) fn hypots(a: [f64; 8], b: [f64; 8]) -> [f64; 8] {
     let mut y = [0.0; 8];
     (0..8).for_each(|l| y[l] = a[l] * a[l] + b[l] * b[l]);
-    let plain = y.iter().fold(true, |plain, &square| plain & (square >= PLAIN[0]) & (square <= PLAIN[1]));
+    let plain = y.iter().fold(true, |plain, square| plain & PLAIN.contains(square));
     match plain {
         true => (0..8).for_each(|l| y[l] = y[l].sqrt()),
         false => (0..8).for_each(|l| y[l] = hypot(a[l], b[l])),

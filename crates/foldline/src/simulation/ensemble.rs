@@ -199,7 +199,7 @@ impl<'a> Ensemble<'a> {
                 let escaped = !lanes.error[l].is_finite();
                 let too_small = if escaped { Outcome::Escaped } else { Outcome::StepTooSmall };
                 pace::too_small(lanes.h[l], lanes.time[l]).then_some(too_small).or(too_long)
-            } else if !(lanes.largest[l] <= lanes.bound[l]) {
+            } else if pace::escaped(lanes.largest[l], lanes.bound[l]) {
                 Some(Outcome::Escaped)
             } else if stopped.contains(&l) {
                 Some(Outcome::Stopped)

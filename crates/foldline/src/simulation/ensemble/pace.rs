@@ -108,10 +108,17 @@ pub(super) fn go_on(
         // A last step a little longer than planned saves a tiny one.
         let last = holds & (planned[l].abs() * 1.01 >= remaining.abs());
         let next = if last { remaining } else { planned[l] };
-        let ended = (remaining == 0.0) | (tried[l] >= limits.steps) | too_small(next, now) | !(largest[l] <= bound[l]);
+        let ended =
+            (remaining == 0.0) | (tried[l] >= limits.steps) | too_small(next, now) | escaped(largest[l], bound[l]);
         remarkable[l] = if ended & (bound[l] > 0.0) { 1.0 } else { 0.0 };
         (time[l], h[l]) = (now, next);
     }
+}
+
+/// Whether a trajectory runs to infinity, or is there.
+#[inline(always)]
+pub(super) fn escaped(largest: f64, bound: f64) -> bool {
+    (largest > bound) | largest.is_nan()
 }
 
 /// Whether a step is too short to get on.
