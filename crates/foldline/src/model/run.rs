@@ -1,10 +1,10 @@
 //! Running a tape over the lanes of a batch.
 //!
-//! **Idea.** Lanes are taken by eights, up to eight of these at a time, so that one instruction is looked up once and then runs
-//! as a loop whose body, an operation on eight lanes, the compiler turns into vector instructions; the widest set that the
-//! machine has is chosen when the program runs. What all lanes share is computed once, as plain numbers, and not again while one
-//! tape runs at the same parameters. Registers live in a per-thread store that grows to the largest tape and is then reused; they
-//! are cells, so an instruction may write where it reads.
+//! **Idea.** Lanes are taken 64 or 32 at a time (8 for a short rest), so that one instruction is looked up once and then runs
+//! as a loop of fixed length, which the compiler turns into vector instructions; the widest set that the machine has is chosen
+//! when the program runs. What all lanes share is computed once, as plain numbers, and not again while one tape runs at the
+//! same parameters. Registers live in a per-thread store that grows to the largest tape and is then reused; they are cells, so
+//! an instruction may write where it reads.
 
 use super::graph::{Binary, Leaf, Unary};
 use super::kernels;
@@ -17,14 +17,14 @@ use std::cell::{Cell, RefCell};
 #[repr(align(64))]
 struct Eight([f64; 8]);
 
-/// Eights of lanes that are taken at a time: at least [`FEWEST`] where there are so many, at most [`MOST`], in between as many as
-/// keep the registers within [`IN_CACHE`] eights, a good part of the fastest cache.
-const FEWEST: usize = 4;
-const MOST: usize = 8;
+/// Eights of lanes that are taken at a time: the more where the registers then fill no more than [`IN_CACHE`] eights, a good
+/// part of the fastest cache.
+const FEW: usize = 4;
+const MANY: usize = 8;
 const IN_CACHE: usize = 256;
 
 /// A value for the lanes that are taken together.
-type Lanes = [Cell<Eight>];
+type Lanes<const W: usize> = [Cell<Eight>; W];
 
 #[derive(Default)]
 struct Store {
@@ -78,8 +78,8 @@ impl Tape {
             if code.body.is_empty() || at.lanes == 0 {
                 return;
             }
-            if registers.len() < code.registers * MOST {
-                registers.resize(code.registers * MOST, Eight([0.0; 8]));
+            if registers.len() < code.registers * MANY {
+                registers.resize(code.registers * MANY, Eight([0.0; 8]));
             }
             let registers = Cell::from_mut(registers.as_mut_slice()).as_slice_of_cells();
             let inputs = Inputs { at, directions, scalars, first: 0, live: 0 };
@@ -103,17 +103,20 @@ impl pulp::NullaryFnOnce for Run<'_, '_, '_> {
     fn call(self) {
         let Run { code, mut inputs, arrays, registers } = self;
         let lanes = inputs.at.lanes;
-        let most = (IN_CACHE / code.registers.max(1)).clamp(FEWEST, MOST);
+        let most = if code.registers * MANY > IN_CACHE { FEW } else { MANY };
         while inputs.first < lanes {
-            let eights = (lanes - inputs.first).div_ceil(8).min(most);
-            inputs.live = (lanes - inputs.first).min(8 * eights);
+            let left = lanes - inputs.first;
+            // Two narrow ones cost less than a wide one that is half empty.
+            let eights = [most, FEW].into_iter().find(|eights| left > 4 * eights).unwrap_or(1);
+            inputs.live = left.min(8 * eights);
             for &(register, scalar) in &code.filled {
                 let value = Eight([inputs.scalars[scalar as usize]; 8]);
                 registers[register as usize * eights..][..eights].iter().for_each(|eight| eight.set(value));
             }
             match eights {
-                MOST => section::<MOST>(&code.body, registers, MOST, inputs, arrays),
-                _ => section::<0>(&code.body, registers, eights, inputs, arrays),
+                MANY => section::<MANY>(&code.body, registers, inputs, arrays),
+                FEW => section::<FEW>(&code.body, registers, inputs, arrays),
+                _ => section::<1>(&code.body, registers, inputs, arrays),
             }
             inputs.first += inputs.live;
         }
@@ -128,7 +131,7 @@ fn component<'a>(arrays: &'a mut [&mut [f64]], place: Place, lanes: usize) -> &'
 }
 
 #[inline(always)]
-fn store(value: &Lanes, place: Place, inputs: Inputs, arrays: &mut [&mut [f64]]) {
+fn store<const W: usize>(value: &Lanes<W>, place: Place, inputs: Inputs, arrays: &mut [&mut [f64]]) {
     let target = &mut component(arrays, place, inputs.at.lanes)[inputs.first..inputs.first + inputs.live];
     let (full, rest) = target.as_chunks_mut::<8>();
     for (block, eight) in full.iter_mut().zip(value) {
@@ -141,19 +144,17 @@ fn store(value: &Lanes, place: Place, inputs: Inputs, arrays: &mut [&mut [f64]])
 
 /// Copies the lanes; those that do not exist repeat the last one.
 #[inline(always)]
-fn load(to: &Lanes, source: &[f64], index: u32, inputs: Inputs) {
+fn load<const W: usize>(to: &Lanes<W>, source: &[f64], index: u32, inputs: Inputs) {
     let start = index as usize * inputs.at.lanes + inputs.first;
     let (full, rest) = source[start..start + inputs.live].as_chunks::<8>();
     to.iter().zip(full).for_each(|(to, eight)| to.set(Eight(*eight)));
     if let (Some(to), Some(&last)) = (to.get(full.len()), rest.last()) {
-        let mut eight = [last; 8];
-        eight[..rest.len()].copy_from_slice(rest);
-        to.set(Eight(eight));
+        to.set(Eight(std::array::from_fn(|l| rest.get(l).copied().unwrap_or(last))));
     }
 }
 
 #[inline(always)]
-fn map(to: &Lanes, a: &Lanes, f: impl Fn(f64) -> f64) {
+fn map<const W: usize>(to: &Lanes<W>, a: &Lanes<W>, f: impl Fn(f64) -> f64) {
     for (to, a) in to.iter().zip(a) {
         let (x, mut y) = (a.get().0, [0.0; 8]);
         (0..8).for_each(|l| y[l] = f(x[l]));
@@ -162,7 +163,7 @@ fn map(to: &Lanes, a: &Lanes, f: impl Fn(f64) -> f64) {
 }
 
 #[inline(always)]
-fn zip(to: &Lanes, a: &Lanes, b: &Lanes, f: impl Fn(f64, f64) -> f64) {
+fn zip<const W: usize>(to: &Lanes<W>, a: &Lanes<W>, b: &Lanes<W>, f: impl Fn(f64, f64) -> f64) {
     for ((to, a), b) in to.iter().zip(a).zip(b) {
         let (p, q, mut y) = (a.get().0, b.get().0, [0.0; 8]);
         (0..8).for_each(|l| y[l] = f(p[l], q[l]));
@@ -171,7 +172,7 @@ fn zip(to: &Lanes, a: &Lanes, b: &Lanes, f: impl Fn(f64, f64) -> f64) {
 }
 
 #[inline(always)]
-fn zip3(to: &Lanes, a: &Lanes, b: &Lanes, c: &Lanes, f: impl Fn(f64, f64, f64) -> f64) {
+fn zip3<const W: usize>(to: &Lanes<W>, a: &Lanes<W>, b: &Lanes<W>, c: &Lanes<W>, f: impl Fn(f64, f64, f64) -> f64) {
     for (((to, a), b), c) in to.iter().zip(a).zip(b).zip(c) {
         let (p, q, r, mut y) = (a.get().0, b.get().0, c.get().0, [0.0; 8]);
         (0..8).for_each(|l| y[l] = f(p[l], q[l], r[l]));
@@ -181,7 +182,7 @@ fn zip3(to: &Lanes, a: &Lanes, b: &Lanes, c: &Lanes, f: impl Fn(f64, f64, f64) -
 
 /// Like [`zip`], for functions that are evaluated lane by lane anyway: only for lanes that exist.
 #[inline(always)]
-fn zip_live(to: &Lanes, a: &Lanes, b: &Lanes, live: usize, f: impl Fn(f64, f64) -> f64) {
+fn zip_live<const W: usize>(to: &Lanes<W>, a: &Lanes<W>, b: &Lanes<W>, live: usize, f: impl Fn(f64, f64) -> f64) {
     for (w, ((to, a), b)) in to.iter().zip(a).zip(b).enumerate() {
         let (p, q, mut y) = (a.get().0, b.get().0, [0.0; 8]);
         (0..8.min(live.saturating_sub(8 * w))).for_each(|l| y[l] = f(p[l], q[l]));
@@ -189,18 +190,16 @@ fn zip_live(to: &Lanes, a: &Lanes, b: &Lanes, live: usize, f: impl Fn(f64, f64) 
     }
 }
 
-/// Runs instructions for lanes that are taken together, `eights` times eight. `EIGHTS` is the same or 0: where the compiler
-/// knows the number it leaves out what makes a loop a loop.
+/// Runs instructions for W eights of lanes.
 #[inline(always)]
-fn section<const EIGHTS: usize>(
+fn section<const W: usize>(
     instructions: &[Instruction],
     registers: &[Cell<Eight>],
-    eights: usize,
     inputs: Inputs,
     arrays: &mut [&mut [f64]],
 ) {
-    let eights = if EIGHTS > 0 { EIGHTS } else { eights };
-    let r = |register: u32| &registers[register as usize * eights..][..eights];
+    let registers: &[[Cell<Eight>; W]] = registers.as_chunks().0;
+    let r = |register: u32| &registers[register as usize];
     let scalar = |s: u32| inputs.scalars[s as usize];
     for &instruction in instructions {
         match instruction {
@@ -245,7 +244,7 @@ fn section<const EIGHTS: usize>(
 }
 
 #[inline(always)]
-fn unary(op: Unary, to: &Lanes, a: &Lanes, live: usize) {
+fn unary<const W: usize>(op: Unary, to: &Lanes<W>, a: &Lanes<W>, live: usize) {
     match op {
         Unary::Negate => map(to, a, |x| Unary::Negate.of(x)),
         Unary::Sqrt => map(to, a, |x| Unary::Sqrt.of(x)),
@@ -260,7 +259,7 @@ fn unary(op: Unary, to: &Lanes, a: &Lanes, live: usize) {
 }
 
 #[inline(always)]
-fn binary(op: Binary, to: &Lanes, a: &Lanes, b: &Lanes, live: usize) {
+fn binary<const W: usize>(op: Binary, to: &Lanes<W>, a: &Lanes<W>, b: &Lanes<W>, live: usize) {
     match op {
         Binary::Add => zip(to, a, b, |x, y| x + y),
         Binary::Subtract => zip(to, a, b, |x, y| x - y),
@@ -283,7 +282,7 @@ fn binary(op: Binary, to: &Lanes, a: &Lanes, b: &Lanes, live: usize) {
 
 /// a op s, for the operations that [`super::tape::takes_scalars`] names.
 #[inline(always)]
-fn right(op: Binary, to: &Lanes, a: &Lanes, s: f64) {
+fn right<const W: usize>(op: Binary, to: &Lanes<W>, a: &Lanes<W>, s: f64) {
     match op {
         Binary::Add => map(to, a, |x| x + s),
         Binary::Subtract => map(to, a, |x| x - s),
@@ -298,7 +297,7 @@ fn right(op: Binary, to: &Lanes, a: &Lanes, s: f64) {
 
 /// s op b, likewise.
 #[inline(always)]
-fn left(op: Binary, to: &Lanes, s: f64, b: &Lanes) {
+fn left<const W: usize>(op: Binary, to: &Lanes<W>, s: f64, b: &Lanes<W>) {
     match op {
         Binary::Add => map(to, b, |x| s + x),
         Binary::Subtract => map(to, b, |x| s - x),
