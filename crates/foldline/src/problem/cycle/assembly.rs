@@ -199,24 +199,26 @@ impl<T: Lane> pulp::NullaryFnOnce for Write<'_, '_, T> {
                     let diagonal = &mut a[i * inner + first + i];
                     *diagonal = *diagonal + one;
                 }
-                for k in 0..m {
-                    let weight = h * T::splat(scheme.weights[k]);
-                    system.border[border + n + first + k] = weight * T::load(&phase[((t * m + k) * n + c) * w..]);
-                }
                 let b = &mut system.coupling[(t * inner + first) * width..(t * inner + first + m) * width];
-                for (row, shares) in b.chunks_exact_mut(width).zip(shares.chunks_exact(m)) {
-                    // Over the nodes of a line of `f` or `fp`.
-                    let sum = |factor: T, line: &[f64]| {
-                        let rates = line[t * m * w..].chunks_exact(w);
-                        shares.iter().zip(rates).fold(zero, |sum, (a, rate)| sum + *a * (factor * T::load(rate)))
-                    };
-                    row.fill(zero);
-                    row[c] = zero - one;
-                    row[n] = sum(h, &f[c * lanes..]);
-                    for p in 0..free {
-                        row[n + 1 + p] = sum(ht, &fp[(c * free + p) * lanes..]);
+                b.fill(zero);
+                for k in 0..m {
+                    let at = (t * m + k) * w;
+                    let rate = h * T::load(&f[c * lanes + at..]);
+                    for i in 0..m {
+                        let right = &mut b[i * width + n];
+                        *right = *right + shares[i * m + k] * rate;
                     }
+                    for p in 0..free {
+                        let slope = ht * T::load(&fp[(c * free + p) * lanes + at..]);
+                        for i in 0..m {
+                            let right = &mut b[i * width + n + 1 + p];
+                            *right = *right + shares[i * m + k] * slope;
+                        }
+                    }
+                    let weight = h * T::splat(scheme.weights[k]);
+                    system.border[border + n + first + k] = weight * T::load(&phase[(at * n + c * w)..]);
                 }
+                (0..m).for_each(|i| b[i * width + c] = zero - one);
             }
         }
         trace.lanes().iter().sum()

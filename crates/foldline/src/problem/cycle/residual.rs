@@ -60,12 +60,17 @@ fn of_component<T: Lane>(problem: &CycleProblem, scheme: &Scheme, [t, c]: [usize
     let mut phase = T::default();
     for i in 0..m {
         let own = T::load(&problem.states[c * lanes + at(i)..]);
+        rows[(i + 1) * n + c] = own - x;
         end = end - T::splat(scheme.end[i + 1]) * own;
         phase = phase + T::splat(scheme.weights[i]) * T::load(&problem.phase[at(i) * n + c * T::COUNT..]) * own;
-        rows[(i + 1) * n + c] = (0..m).fold(own - x, |row, k| {
-            row - T::splat(scheme.integration[i * m + k]) * (ht * T::load(&problem.f[c * lanes + at(k)..]))
-        });
     }
     rows[c] = end;
+    for k in 0..m {
+        let rate = ht * T::load(&problem.f[c * lanes + at(k)..]);
+        for i in 0..m {
+            let row = &mut rows[(i + 1) * n + c];
+            *row = *row - T::splat(scheme.integration[i * m + k]) * rate;
+        }
+    }
     phase
 }
