@@ -3,7 +3,7 @@
 //! **Idea.** Gaussian elimination with a diagonal pivot while it is at least a tenth of what stands below it, component by
 //! component, looking only at blocks that can differ from zero ([`Shape`]). Where a diagonal does not serve, the lanes that need
 //! it exchange rows by themselves, and from there on every entry is looked at; the matrices of collocation in Runge–Kutta form
-//! rarely need that. Matrices that fill the vectors by themselves are eliminated in panels.
+//! rarely need that. A large matrix of which few blocks vanish fills the vectors by itself and is eliminated in panels.
 //!
 //! **Source.** Threshold pivoting: duff2017, §5.2.
 
@@ -16,13 +16,22 @@ use crate::contract::Singular;
 const THRESHOLD: f64 = 0.1;
 /// Rows up to which a matrix is treated as a whole.
 const SMALL: usize = 32;
+/// Share of the products of a full matrix up to which blocks are faster than panels.
+const SPARSE: f64 = 0.3;
 /// Columns of a panel of a larger one.
 const PANEL: usize = 16;
 
-/// Whether the matrix fills the vectors by itself, in panels; it needs no shape then.
+/// Whether a matrix fills the vectors by itself, in panels.
 #[inline(always)]
-pub fn in_panels<T: Lane>(n: usize) -> bool {
+fn in_panels<T: Lane>(n: usize) -> bool {
     T::COUNT == 1 && n > SMALL
+}
+
+/// The shape that suits: none where so much differs from zero that panels are faster. Arguments as those of [`Shape::new`].
+pub fn shape<T: Lane>(pattern: &[bool], ends: &[bool], nodes: usize, columns: usize) -> Shape {
+    let shape = Shape::new(pattern, ends, nodes, columns);
+    let dense = in_panels::<T>(pattern.len().isqrt() * nodes) && shape.share(columns) > SPARSE;
+    if dense { Shape::plain(pattern, nodes) } else { shape }
 }
 
 /// Factorises the row-major n×n matrices `a` in place (the diagonal holds the inverse pivots) and solves a x = b for the
@@ -42,8 +51,8 @@ pub fn factorise<T: Lane>(
     shape: &Shape,
 ) -> Result<bool, Singular> {
     let mut room = Vec::new();
-    if in_panels::<T>(n) {
-        return panels(a, n, pivots, b, columns, &mut room);
+    if shape.is_plain() {
+        return panels(a, n, pivots, b, columns, 0, &mut room);
     }
     // The usual degree as a constant.
     let reached = match shape.nodes {
@@ -52,7 +61,12 @@ pub fn factorise<T: Lane>(
     };
     let exchanged = reached < n;
     if exchanged {
-        whole(a, n, pivots, b, columns, reached)?;
+        (0..reached).for_each(|k| pivots[k * T::COUNT..(k + 1) * T::COUNT].fill(k as u32));
+        if in_panels::<T>(n) {
+            panels(a, n, pivots, b, columns, reached, &mut room)?;
+        } else {
+            whole(a, n, pivots, b, columns, reached)?;
+        }
     } else {
         match shape.nodes {
             4 => back_in_blocks(a, n, b, columns, shape, 4),
@@ -217,9 +231,6 @@ fn whole<T: Lane>(
     columns: usize,
     from: usize,
 ) -> Result<(), Singular> {
-    for k in 0..from {
-        pivots[k * T::COUNT..(k + 1) * T::COUNT].fill(k as u32);
-    }
     for k in from..n {
         pivot(a, n, pivots, b, columns, k)?;
         let inverse = a[k * n + k];
@@ -244,7 +255,7 @@ fn whole<T: Lane>(
     Ok(())
 }
 
-/// A large one, the bulk of whose work is products of panels.
+/// The same for a large one, the bulk of whose work is products of panels; returns whether rows were exchanged.
 #[inline(always)]
 fn panels<T: Lane>(
     a: &mut [T],
@@ -252,10 +263,11 @@ fn panels<T: Lane>(
     pivots: &mut [u32],
     b: &mut [T],
     columns: usize,
+    from: usize,
     left: &mut Vec<T>,
 ) -> Result<bool, Singular> {
     let mut exchanged = false;
-    for first in (0..n).step_by(PANEL) {
+    for first in (from..n).step_by(PANEL) {
         let end = (first + PANEL).min(n);
         for k in first..end {
             exchanged |= pivot(a, n, pivots, b, columns, k)?;
@@ -379,7 +391,7 @@ pub fn solve<T: Lane>(a: &[T], n: usize, pivots: &[u32], exchanged: bool, b: &mu
             swap_lanes(b, k, &pivots[k * T::COUNT..(k + 1) * T::COUNT]);
         }
     }
-    if exchanged || in_panels::<T>(n) {
+    if exchanged || shape.is_plain() {
         for k in 1..n {
             b[k] = b[k] - dot(&a[k * n..k * n + k], &b[..k]);
         }
@@ -433,7 +445,7 @@ fn solve_in_blocks<T: Lane>(a: &[T], n: usize, b: &mut [T], shape: &Shape, m: us
 /// Solves aᵀ x = b for one right-hand side `[n]` in place.
 #[inline(always)]
 pub fn solve_transposed<T: Lane>(a: &[T], n: usize, pivots: &[u32], exchanged: bool, b: &mut [T], shape: &Shape) {
-    if exchanged || in_panels::<T>(n) {
+    if exchanged || shape.is_plain() {
         for k in 0..n {
             b[k] = b[k] * a[k * n + k];
             let (head, tail) = b.split_at_mut(k + 1);

@@ -1,47 +1,70 @@
 //! Householder triangularisation of a tall block, with right-hand columns carried along, in every lane.
 
-use super::lane::{Lane, subtract};
+use super::lane::{Lane, dot, subtract};
 
 /// Triangularises the first `columns` columns of the row-major `rows × width` matrix `a` in place by Householder
 /// reflections applied to every column; entries below the diagonal of those columns become zero. The reflectors are stored
 /// in `v` (`[columns × rows]`, one unit-scaled vector per column, H = 1 - v vᵀ).
 #[inline(always)]
 pub fn triangularise<T: Lane>(a: &mut [T], rows: usize, width: usize, columns: usize, v: &mut [T]) {
-    for k in 0..columns.min(rows) {
-        let reflector = &mut v[k * rows..(k + 1) * rows];
-        reflector[..k].fill(T::default());
-        let mut norm2 = T::default();
-        for i in k..rows {
-            let x = a[i * width + k];
-            reflector[i] = x;
-            norm2 = norm2 + x * x;
-        }
-        // A column that vanishes, or is not finite, is left alone.
-        let alpha = norm2.zip(reflector[k], |s, x| if x > 0.0 { -s.sqrt() } else { s.sqrt() });
-        let beta = norm2 - alpha * reflector[k];
-        reflector[k] = reflector[k] - alpha;
-        let scale = beta.map(|b| if b > 0.0 && b < f64::INFINITY { 1.0 / b.sqrt() } else { 0.0 });
-        reflector[k..].iter_mut().for_each(|x| *x = *x * scale);
-        // Columns in groups whose sums stay in registers.
-        let (v, block) = (&reflector[k..], &mut a[k * width..rows * width]);
-        let mut c = k;
-        while c < width {
-            c += match width - c {
-                8.. => apply_group::<T, 8>(v, block, width, c),
-                4.. => apply_group::<T, 4>(v, block, width, c),
-                2.. => apply_group::<T, 2>(v, block, width, c),
-                _ => apply_group::<T, 1>(v, block, width, c),
-            };
-        }
-        for row in block[width..].chunks_exact_mut(width) {
-            row[k] = T::default();
-        }
+    // Columns in groups whose sums stay in registers; a group stays in the cache until all reflections are applied to it.
+    let mut c = 0;
+    while c < width {
+        c += match width - c {
+            16.. if T::COUNT == 1 => group::<T, 16>(a, [rows, width, columns], c, v),
+            8.. => group::<T, 8>(a, [rows, width, columns], c, v),
+            4.. => group::<T, 4>(a, [rows, width, columns], c, v),
+            2.. => group::<T, 2>(a, [rows, width, columns], c, v),
+            _ => group::<T, 1>(a, [rows, width, columns], c, v),
+        };
     }
 }
 
-/// Applies 1 - v vᵀ to C columns from `c` on; returns C.
+/// Applies to C columns from `c` on the reflections of the columns before them, then makes those reflections that are theirs;
+/// returns C.
 #[inline(always)]
-fn apply_group<T: Lane, const C: usize>(v: &[T], a: &mut [T], width: usize, c: usize) -> usize {
+fn group<T: Lane, const C: usize>(a: &mut [T], [rows, width, columns]: [usize; 3], c: usize, v: &mut [T]) -> usize {
+    let columns = columns.min(rows);
+    // Two at a time where that many sums fit into registers.
+    let pairs = if T::COUNT == 1 { c.min(columns) / 2 } else { 0 };
+    for (k, two) in v.chunks_exact(2 * rows).take(pairs).enumerate() {
+        let (first, second) = two.split_at(rows);
+        apply_two::<T, C>(&first[2 * k..], &second[2 * k..], &mut a[2 * k * width..], width, c);
+    }
+    for k in 2 * pairs..(c + C).min(columns) {
+        let reflector = &mut v[k * rows..(k + 1) * rows];
+        let block = &mut a[k * width..];
+        if k >= c {
+            reflector[..k].fill(T::default());
+            reflection(&mut reflector[k..], block, width, k);
+        }
+        apply_group::<T, C>(&reflector[k..], block, width, c);
+        if k >= c {
+            block[width..].chunks_exact_mut(width).for_each(|row| row[k] = T::default());
+        }
+    }
+    C
+}
+
+/// The reflection that leaves of column k only its first entry.
+#[inline(always)]
+fn reflection<T: Lane>(v: &mut [T], block: &[T], width: usize, k: usize) {
+    let mut norm2 = T::default();
+    for (v, row) in v.iter_mut().zip(block.chunks_exact(width)) {
+        *v = row[k];
+        norm2 = norm2 + row[k] * row[k];
+    }
+    // A column that vanishes, or is not finite, is left alone.
+    let alpha = norm2.zip(v[0], |s, x| if x > 0.0 { -s.sqrt() } else { s.sqrt() });
+    let beta = norm2 - alpha * v[0];
+    v[0] = v[0] - alpha;
+    let scale = beta.map(|b| if b > 0.0 && b < f64::INFINITY { 1.0 / b.sqrt() } else { 0.0 });
+    v.iter_mut().for_each(|x| *x = *x * scale);
+}
+
+/// Applies 1 - v vᵀ to C columns from `c` on.
+#[inline(always)]
+fn apply_group<T: Lane, const C: usize>(v: &[T], a: &mut [T], width: usize, c: usize) {
     let mut sums = [T::default(); C];
     for (v, row) in v.iter().zip(a.chunks_exact(width)) {
         let row = &row[c..c + C];
@@ -50,12 +73,39 @@ fn apply_group<T: Lane, const C: usize>(v: &[T], a: &mut [T], width: usize, c: u
         }
     }
     for (v, row) in v.iter().zip(a.chunks_exact_mut(width)) {
-        let row = &mut row[c..c + C];
+        let (v, row) = (*v, &mut row[c..c + C]);
+        // All of it before anything is written, so that one number of many becomes a vector.
+        let mut left = [T::default(); C];
         for k in 0..C {
-            row[k] = row[k] - *v * sums[k];
+            left[k] = row[k] - v * sums[k];
+        }
+        row.copy_from_slice(&left);
+    }
+}
+
+/// Applies (1 - w wᵀ)(1 - v vᵀ) = 1 - v vᵀ - w (w - (w·v) v)ᵀ to C columns from `c` on.
+#[inline(always)]
+fn apply_two<T: Lane, const C: usize>(v: &[T], w: &[T], a: &mut [T], width: usize, c: usize) {
+    let (mut first, mut second) = ([T::default(); C], [T::default(); C]);
+    for ((v, w), row) in v.iter().zip(w).zip(a.chunks_exact(width)) {
+        let row = &row[c..c + C];
+        for k in 0..C {
+            first[k] = first[k] + *v * row[k];
+            second[k] = second[k] + *w * row[k];
         }
     }
-    C
+    let common = dot(v, w);
+    for k in 0..C {
+        second[k] = second[k] - common * first[k];
+    }
+    for ((v, w), row) in v.iter().zip(w).zip(a.chunks_exact_mut(width)) {
+        let (v, w, row) = (*v, *w, &mut row[c..c + C]);
+        let mut left = [T::default(); C];
+        for k in 0..C {
+            left[k] = row[k] - v * first[k] - w * second[k];
+        }
+        row.copy_from_slice(&left);
+    }
 }
 
 /// Applies the stored reflections, `columns` of them, in order to the vector `b`.
@@ -76,7 +126,7 @@ pub fn apply_reversed<T: Lane>(v: &[T], columns: usize, b: &mut [T]) {
 
 #[inline(always)]
 fn apply_one<T: Lane>(v: &[T], b: &mut [T]) {
-    let sum = super::lane::dot(v, b);
+    let sum = dot(v, b);
     subtract(sum, v, b);
 }
 
@@ -87,26 +137,34 @@ mod tests {
 
     #[test]
     fn the_product_of_reflections_is_orthogonal_and_makes_the_block_triangular() {
-        let (rows, width, columns) = (6, 8, 3);
+        for [rows, width, columns] in [[6, 8, 3], [6, 13, 6], [40, 61, 20]] {
+            triangular::<Eight>(rows, width, columns);
+            triangular::<f64>(rows, width, columns);
+        }
+    }
+
+    fn triangular<T: Lane>(rows: usize, width: usize, columns: usize) {
         let entry = |l: usize, k: usize| if l == 3 && k % width == 1 { 0.0 } else { ((k * k + l + 1) as f64).sin() };
-        let original: Vec<Eight> = (0..rows * width).map(|k| Eight(std::array::from_fn(|l| entry(l, k)))).collect();
+        let original: Vec<T> = (0..rows * width).map(|k| T::each(|l| entry(l, k))).collect();
         let mut a = original.clone();
-        let mut v = vec![Eight::default(); columns * rows];
+        let mut v = vec![T::default(); columns * rows];
         triangularise(&mut a, rows, width, columns, &mut v);
         for c in 0..width {
-            let mut column: Vec<Eight> = (0..rows).map(|i| original[i * width + c]).collect();
+            let mut column: Vec<T> = (0..rows).map(|i| original[i * width + c]).collect();
             apply(&v, columns, &mut column);
-            for l in 0..8 {
+            for l in 0..T::COUNT {
                 for i in 0..rows {
-                    assert!((column[i].0[l] - a[i * width + c].0[l]).abs() < 1e-14);
-                    assert!(i <= c || c >= columns || a[i * width + c].0[l] == 0.0);
+                    assert!((column[i].lanes()[l] - a[i * width + c].lanes()[l]).abs() < 1e-13);
+                    assert!(i <= c || c >= columns || a[i * width + c].lanes()[l] == 0.0);
                 }
-                let size = |m: &[Eight]| (0..rows).map(|i| m[i * width + c].0[l].powi(2)).sum::<f64>();
+                let size = |m: &[T]| (0..rows).map(|i| m[i * width + c].lanes()[l].powi(2)).sum::<f64>();
                 assert!((size(&original) - size(&a)).abs() < 1e-13);
             }
             apply_reversed(&v, columns, &mut column);
             for i in 0..rows {
-                assert!((0..8).all(|l| (column[i].0[l] - original[i * width + c].0[l]).abs() < 1e-14));
+                assert!(
+                    (0..T::COUNT).all(|l| (column[i].lanes()[l] - original[i * width + c].lanes()[l]).abs() < 1e-13)
+                );
             }
         }
     }

@@ -22,6 +22,8 @@ pub struct Shape {
     pub nodes: usize,
     /// The steps.
     pub steps: Vec<Step>,
+    /// Blocks, row and column, that are zero before elimination and not afterwards, and the diagonal where it is the identity.
+    pub fresh: Vec<[usize; 2]>,
 }
 
 /// What the elimination of a component touches.
@@ -61,6 +63,11 @@ impl Shape {
                 (p + 1..width).for_each(|at| row[at] |= upper[p * width + at]);
             }
         }
+        let starts_empty = |p: usize, j: usize| !pattern[order[p] * n + order[j]];
+        let fresh = (0..n * n)
+            .map(|k| [k / n, k % n])
+            .filter(|&[p, j]| starts_empty(p, j) && (p == j || filled[p * width + j]))
+            .collect();
         let mut steps: Vec<Step> = (0..n)
             .map(|p| {
                 let row = &filled[p * width..(p + 1) * width];
@@ -84,12 +91,25 @@ impl Shape {
             }
             steps[p].solved = ranges(&row[n..]);
         }
-        Shape { pattern: pattern.to_vec(), rank, nodes, steps }
+        Shape { pattern: pattern.to_vec(), rank, nodes, steps, fresh }
     }
 
     /// Components in their own order, and no steps: for matrices that fill the vectors by themselves.
-    pub fn plain(n: usize, nodes: usize) -> Shape {
-        Shape { pattern: vec![true; n * n], rank: (0..n).collect(), nodes, steps: Vec::new() }
+    pub fn plain(pattern: &[bool], nodes: usize) -> Shape {
+        Shape { pattern: pattern.to_vec(), rank: (0..pattern.len().isqrt()).collect(), nodes, ..Shape::default() }
+    }
+
+    /// Whether there are no steps, so that every entry is looked at.
+    #[inline(always)]
+    pub fn is_plain(&self) -> bool {
+        self.steps.is_empty()
+    }
+
+    /// Products of entries that the steps take, as a share of those that they take where nothing is zero.
+    pub fn share(&self, columns: usize) -> f64 {
+        let products = |below: usize, right: usize| (below * right * self.nodes + (below + right) * columns) as f64;
+        let taken: f64 = self.steps.iter().map(|step| products(step.below.len(), step.right.len())).sum();
+        taken / (0..self.steps.len()).map(|rest| products(rest, rest)).sum::<f64>()
     }
 
     /// The pattern that it was made for.

@@ -13,6 +13,8 @@
 //!
 //! **Source.** Argument reduction with a two-part ln 2: cody1980.
 
+use std::ops::RangeInclusive;
+
 /// Adding it to |x| < 2⁵¹ rounds x to an integer, which then sits in the low bits of the sum.
 const ROUNDER: f64 = 6755399441055744.0; // 1.5 · 2⁵²
 /// Leading part of ln 2 with trailing zeros, so that k · LN2_HIGH is exact.
@@ -99,6 +101,22 @@ pub(super) fn hypot(a: f64, b: f64) -> f64 {
     let back = if m < 1e-140 { SMALL } else { back };
     let (p, q) = (p * scale, q * scale);
     (p * p + q * q).sqrt() * back
+}
+
+/// Squares of lengths between these make [`hypot`] a plain square root.
+const PLAIN: RangeInclusive<f64> = 1e-279..=1e299;
+
+/// [`hypot`] of eight pairs, without the scaling where none of them needs it.
+#[inline(always)]
+pub(super) fn hypots(a: [f64; 8], b: [f64; 8]) -> [f64; 8] {
+    let mut y = [0.0; 8];
+    (0..8).for_each(|l| y[l] = a[l] * a[l] + b[l] * b[l]);
+    let plain = y.iter().fold(true, |plain, square| plain & PLAIN.contains(square));
+    match plain {
+        true => (0..8).for_each(|l| y[l] = y[l].sqrt()),
+        false => (0..8).for_each(|l| y[l] = hypot(a[l], b[l])),
+    }
+    y
 }
 
 /// -1, 0 or 1; NaN for NaN.
@@ -201,6 +219,17 @@ mod tests {
         for f in [hypot, min, max] {
             assert!(f(f64::NAN, 1.0).is_nan() && f(1.0, f64::NAN).is_nan());
         }
+    }
+
+    #[test]
+    fn eight_lengths_are_those_of_each_pair() {
+        for scale in [1e-300, 2e-140, 1e-139, 1.0, 1e149, 1e200] {
+            let (a, b) = ([0.3, -1.0, 0.0, 2.0, 1.0, 1e-9, 3.0, 5.5].map(|a| a * scale), [0.7; 8].map(|b| b * scale));
+            assert_eq!(hypots(a, b), std::array::from_fn(|l| hypot(a[l], b[l])), "{scale}");
+        }
+        let odd = [0.0, f64::INFINITY, 1.0, f64::NAN, 1e-200, 1e200, -0.0, 1.0];
+        let lengths = hypots(odd, [0.0; 8]);
+        assert!((0..8).all(|l| lengths[l].to_bits() == hypot(odd[l], 0.0).to_bits() || lengths[l].is_nan() && odd[l].is_nan()));
     }
 
     #[test]

@@ -1,10 +1,10 @@
 //! Running a tape over the lanes of a batch.
 //!
-//! **Idea.** Lanes are taken in blocks of 32 (8 for a short rest), so that one instruction is looked up once and then runs as
-//! a loop of fixed length, which the compiler turns into vector instructions; the widest set that the machine has is chosen
+//! **Idea.** Lanes are taken 64 or 32 at a time (8 for a short rest), so that one instruction is looked up once and then runs
+//! as a loop of fixed length, which the compiler turns into vector instructions; the widest set that the machine has is chosen
 //! when the program runs. What all lanes share is computed once, as plain numbers, and not again while one tape runs at the
-//! same parameters. Registers live in a per-thread store that
-//! grows to the largest tape and is then reused; they are cells, so an instruction may write where it reads.
+//! same parameters. Registers live in a per-thread store that grows to the largest tape and is then reused; they are cells, so
+//! an instruction may write where it reads.
 
 use super::graph::{Binary, Leaf, Unary};
 use super::kernels;
@@ -17,11 +17,14 @@ use std::cell::{Cell, RefCell};
 #[repr(align(64))]
 struct Eight([f64; 8]);
 
-/// Blocks of eight lanes per register.
-const WIDE: usize = 4;
+/// Eights of lanes that are taken at a time: the more where the registers then fill no more than [`IN_CACHE`] eights, a good
+/// part of the fastest cache.
+const FEW: usize = 4;
+const MANY: usize = 8;
+const IN_CACHE: usize = 256;
 
-/// A value for up to 32 lanes.
-type Lanes = [Cell<Eight>; WIDE];
+/// A value for the lanes that are taken together.
+type Lanes<const W: usize> = [Cell<Eight>; W];
 
 #[derive(Default)]
 struct Store {
@@ -44,9 +47,9 @@ struct Inputs<'a> {
     at: Batch<'a>,
     directions: &'a [&'a [f64]],
     scalars: &'a [f64],
-    /// First lane of the block.
+    /// First of the lanes that are taken together.
     first: usize,
-    /// How many lanes of the block exist.
+    /// How many of them exist.
     live: usize,
 }
 
@@ -75,10 +78,10 @@ impl Tape {
             if code.body.is_empty() || at.lanes == 0 {
                 return;
             }
-            if registers.len() < code.registers * WIDE {
-                registers.resize(code.registers * WIDE, Eight([0.0; 8]));
+            if registers.len() < code.registers * MANY {
+                registers.resize(code.registers * MANY, Eight([0.0; 8]));
             }
-            let registers = Cell::from_mut(registers.as_mut_slice()).as_slice_of_cells().as_chunks().0;
+            let registers = Cell::from_mut(registers.as_mut_slice()).as_slice_of_cells();
             let inputs = Inputs { at, directions, scalars, first: 0, live: 0 };
             pulp::Arch::new().dispatch(Run { code, inputs, arrays, registers });
         });
@@ -90,7 +93,7 @@ struct Run<'a, 'b, 'c> {
     code: &'a Code,
     inputs: Inputs<'a>,
     arrays: &'b mut [&'c mut [f64]],
-    registers: &'b [Lanes],
+    registers: &'b [Cell<Eight>],
 }
 
 impl pulp::NullaryFnOnce for Run<'_, '_, '_> {
@@ -100,21 +103,20 @@ impl pulp::NullaryFnOnce for Run<'_, '_, '_> {
     fn call(self) {
         let Run { code, mut inputs, arrays, registers } = self;
         let lanes = inputs.at.lanes;
-        // Two narrow blocks cost less than a wide one that is half empty.
-        let wide = |left: usize| left > 16;
-        for &(register, scalar) in &code.filled {
-            let value = Eight([inputs.scalars[scalar as usize]; 8]);
-            let blocks = if wide(lanes) { WIDE } else { 1 };
-            registers[register as usize][..blocks].iter().for_each(|block| block.set(value));
-        }
+        let most = if code.registers * MANY > IN_CACHE { FEW } else { MANY };
         while inputs.first < lanes {
             let left = lanes - inputs.first;
-            if wide(left) {
-                inputs.live = left.min(8 * WIDE);
-                section::<WIDE>(&code.body, registers, inputs, arrays);
-            } else {
-                inputs.live = left.min(8);
-                section::<1>(&code.body, registers, inputs, arrays);
+            // Two narrow ones cost less than a wide one that is half empty.
+            let eights = [most, FEW].into_iter().find(|eights| left > 4 * eights).unwrap_or(1);
+            inputs.live = left.min(8 * eights);
+            for &(register, scalar) in &code.filled {
+                let value = Eight([inputs.scalars[scalar as usize]; 8]);
+                registers[register as usize * eights..][..eights].iter().for_each(|eight| eight.set(value));
+            }
+            match eights {
+                MANY => section::<MANY>(&code.body, registers, inputs, arrays),
+                FEW => section::<FEW>(&code.body, registers, inputs, arrays),
+                _ => section::<1>(&code.body, registers, inputs, arrays),
             }
             inputs.first += inputs.live;
         }
@@ -129,7 +131,7 @@ fn component<'a>(arrays: &'a mut [&mut [f64]], place: Place, lanes: usize) -> &'
 }
 
 #[inline(always)]
-fn store(value: &Lanes, place: Place, inputs: Inputs, arrays: &mut [&mut [f64]]) {
+fn store<const W: usize>(value: &Lanes<W>, place: Place, inputs: Inputs, arrays: &mut [&mut [f64]]) {
     let target = &mut component(arrays, place, inputs.at.lanes)[inputs.first..inputs.first + inputs.live];
     let (full, rest) = target.as_chunks_mut::<8>();
     for (block, eight) in full.iter_mut().zip(value) {
@@ -140,104 +142,101 @@ fn store(value: &Lanes, place: Place, inputs: Inputs, arrays: &mut [&mut [f64]])
     }
 }
 
-/// Copies the lanes of the block; lanes that do not exist repeat the last one.
+/// Copies the lanes; those that do not exist repeat the last one.
 #[inline(always)]
-fn load<const W: usize>(to: &Lanes, source: &[f64], index: u32, inputs: Inputs) {
+fn load<const W: usize>(to: &Lanes<W>, source: &[f64], index: u32, inputs: Inputs) {
     let start = index as usize * inputs.at.lanes + inputs.first;
-    let source = &source[start..start + inputs.live];
-    let last = source[inputs.live - 1];
-    for w in 0..W {
-        let rest = source.get(8 * w..).unwrap_or(&[]);
-        to[w].set(Eight(match rest.first_chunk::<8>() {
-            Some(full) => *full,
-            None => std::array::from_fn(|l| rest.get(l).copied().unwrap_or(last)),
-        }));
+    let (full, rest) = source[start..start + inputs.live].as_chunks::<8>();
+    to.iter().zip(full).for_each(|(to, eight)| to.set(Eight(*eight)));
+    if let (Some(to), Some(&last)) = (to.get(full.len()), rest.last()) {
+        to.set(Eight(std::array::from_fn(|l| rest.get(l).copied().unwrap_or(last))));
     }
 }
 
 #[inline(always)]
-fn map<const W: usize>(to: &Lanes, a: &Lanes, f: impl Fn(f64) -> f64) {
-    for w in 0..W {
-        let (x, mut y) = (a[w].get().0, [0.0; 8]);
+fn map<const W: usize>(to: &Lanes<W>, a: &Lanes<W>, f: impl Fn(f64) -> f64) {
+    for (to, a) in to.iter().zip(a) {
+        let (x, mut y) = (a.get().0, [0.0; 8]);
         (0..8).for_each(|l| y[l] = f(x[l]));
-        to[w].set(Eight(y));
+        to.set(Eight(y));
     }
 }
 
 #[inline(always)]
-fn zip<const W: usize>(to: &Lanes, a: &Lanes, b: &Lanes, f: impl Fn(f64, f64) -> f64) {
-    for w in 0..W {
-        let (p, q, mut y) = (a[w].get().0, b[w].get().0, [0.0; 8]);
+fn zip<const W: usize>(to: &Lanes<W>, a: &Lanes<W>, b: &Lanes<W>, f: impl Fn(f64, f64) -> f64) {
+    for ((to, a), b) in to.iter().zip(a).zip(b) {
+        let (p, q, mut y) = (a.get().0, b.get().0, [0.0; 8]);
         (0..8).for_each(|l| y[l] = f(p[l], q[l]));
-        to[w].set(Eight(y));
+        to.set(Eight(y));
     }
 }
 
 #[inline(always)]
-fn zip3<const W: usize>(to: &Lanes, a: &Lanes, b: &Lanes, c: &Lanes, f: impl Fn(f64, f64, f64) -> f64) {
-    for w in 0..W {
-        let (p, q, r, mut y) = (a[w].get().0, b[w].get().0, c[w].get().0, [0.0; 8]);
+fn zip3<const W: usize>(to: &Lanes<W>, a: &Lanes<W>, b: &Lanes<W>, c: &Lanes<W>, f: impl Fn(f64, f64, f64) -> f64) {
+    for (((to, a), b), c) in to.iter().zip(a).zip(b).zip(c) {
+        let (p, q, r, mut y) = (a.get().0, b.get().0, c.get().0, [0.0; 8]);
         (0..8).for_each(|l| y[l] = f(p[l], q[l], r[l]));
-        to[w].set(Eight(y));
+        to.set(Eight(y));
     }
 }
 
 /// Like [`zip`], for functions that are evaluated lane by lane anyway: only for lanes that exist.
 #[inline(always)]
-fn zip_live<const W: usize>(to: &Lanes, a: &Lanes, b: &Lanes, live: usize, f: impl Fn(f64, f64) -> f64) {
-    for w in 0..W {
-        let (p, q, mut y) = (a[w].get().0, b[w].get().0, [0.0; 8]);
+fn zip_live<const W: usize>(to: &Lanes<W>, a: &Lanes<W>, b: &Lanes<W>, live: usize, f: impl Fn(f64, f64) -> f64) {
+    for (w, ((to, a), b)) in to.iter().zip(a).zip(b).enumerate() {
+        let (p, q, mut y) = (a.get().0, b.get().0, [0.0; 8]);
         (0..8.min(live.saturating_sub(8 * w))).for_each(|l| y[l] = f(p[l], q[l]));
-        to[w].set(Eight(y));
+        to.set(Eight(y));
     }
 }
 
-/// Runs instructions for the first W blocks of the registers.
+/// Runs instructions for W eights of lanes.
 #[inline(always)]
 fn section<const W: usize>(
     instructions: &[Instruction],
-    registers: &[Lanes],
+    registers: &[Cell<Eight>],
     inputs: Inputs,
     arrays: &mut [&mut [f64]],
 ) {
+    let registers: &[[Cell<Eight>; W]] = registers.as_chunks().0;
     let r = |register: u32| &registers[register as usize];
     let scalar = |s: u32| inputs.scalars[s as usize];
     for &instruction in instructions {
         match instruction {
             Instruction::Load { to, from } => match (from, inputs.at.parameters) {
-                (Leaf::State(i), _) => load::<W>(r(to), inputs.at.states, i, inputs),
-                (Leaf::Direction(d, i), _) => load::<W>(r(to), inputs.directions[d as usize], i, inputs),
-                (Leaf::Time, _) if inputs.at.times.is_empty() => map::<W>(r(to), r(to), |_| 0.0),
-                (Leaf::Time, _) => load::<W>(r(to), inputs.at.times, 0, inputs),
-                (Leaf::Parameter(k), Parameters::PerLane(values)) => load::<W>(r(to), values, k, inputs),
+                (Leaf::State(i), _) => load(r(to), inputs.at.states, i, inputs),
+                (Leaf::Direction(d, i), _) => load(r(to), inputs.directions[d as usize], i, inputs),
+                (Leaf::Time, _) if inputs.at.times.is_empty() => map(r(to), r(to), |_| 0.0),
+                (Leaf::Time, _) => load(r(to), inputs.at.times, 0, inputs),
+                (Leaf::Parameter(k), Parameters::PerLane(values)) => load(r(to), values, k, inputs),
                 // Shared parameters are scalars.
                 (Leaf::Parameter(_), Parameters::Shared(_)) => {}
             },
-            Instruction::Unary { op, to, a } => unary::<W>(op, r(to), r(a), inputs.live),
-            Instruction::Binary { op, to, a, b } => binary::<W>(op, r(to), r(a), r(b), inputs.live),
-            Instruction::Right { op, to, a, s } => right::<W>(op, r(to), r(a), scalar(s)),
-            Instruction::Left { op, to, s, b } => left::<W>(op, r(to), scalar(s), r(b)),
+            Instruction::Unary { op, to, a } => unary(op, r(to), r(a), inputs.live),
+            Instruction::Binary { op, to, a, b } => binary(op, r(to), r(a), r(b), inputs.live),
+            Instruction::Right { op, to, a, s } => right(op, r(to), r(a), scalar(s)),
+            Instruction::Left { op, to, s, b } => left(op, r(to), scalar(s), r(b)),
             Instruction::Fused { sum, to, a, b, c } => match sum {
-                Sum::Plus => zip3::<W>(r(to), r(a), r(b), r(c), |x, y, z| x * y + z),
-                Sum::Minus => zip3::<W>(r(to), r(a), r(b), r(c), |x, y, z| x * y - z),
-                Sum::From => zip3::<W>(r(to), r(a), r(b), r(c), |x, y, z| z - x * y),
+                Sum::Plus => zip3(r(to), r(a), r(b), r(c), |x, y, z| x * y + z),
+                Sum::Minus => zip3(r(to), r(a), r(b), r(c), |x, y, z| x * y - z),
+                Sum::From => zip3(r(to), r(a), r(b), r(c), |x, y, z| z - x * y),
             },
             Instruction::Scaled { sum, to, a, s, c } => {
                 let s = scalar(s);
                 match sum {
-                    Sum::Plus => zip::<W>(r(to), r(a), r(c), |x, z| x * s + z),
-                    Sum::Minus => zip::<W>(r(to), r(a), r(c), |x, z| x * s - z),
-                    Sum::From => zip::<W>(r(to), r(a), r(c), |x, z| z - x * s),
+                    Sum::Plus => zip(r(to), r(a), r(c), |x, z| x * s + z),
+                    Sum::Minus => zip(r(to), r(a), r(c), |x, z| x * s - z),
+                    Sum::From => zip(r(to), r(a), r(c), |x, z| z - x * s),
                 }
             }
             Instruction::Integer { to, a, n } => match n {
-                2 => map::<W>(r(to), r(a), |x| kernels::power(x, 2)),
-                3 => map::<W>(r(to), r(a), |x| kernels::power(x, 3)),
-                4 => map::<W>(r(to), r(a), |x| kernels::power(x, 4)),
-                _ => map::<W>(r(to), r(a), |x| kernels::power(x, n)),
+                2 => map(r(to), r(a), |x| kernels::power(x, 2)),
+                3 => map(r(to), r(a), |x| kernels::power(x, 3)),
+                4 => map(r(to), r(a), |x| kernels::power(x, 4)),
+                _ => map(r(to), r(a), |x| kernels::power(x, n)),
             },
             Instruction::Select { to, c, a, b } => {
-                zip3::<W>(r(to), r(c), r(a), r(b), |c, x, y| if c != 0.0 { x } else { y });
+                zip3(r(to), r(c), r(a), r(b), |c, x, y| if c != 0.0 { x } else { y });
             }
             Instruction::Store { from, place } => store(r(from), place, inputs, arrays),
         }
@@ -245,64 +244,68 @@ fn section<const W: usize>(
 }
 
 #[inline(always)]
-fn unary<const W: usize>(op: Unary, to: &Lanes, a: &Lanes, live: usize) {
+fn unary<const W: usize>(op: Unary, to: &Lanes<W>, a: &Lanes<W>, live: usize) {
     match op {
-        Unary::Negate => map::<W>(to, a, |x| Unary::Negate.of(x)),
-        Unary::Sqrt => map::<W>(to, a, |x| Unary::Sqrt.of(x)),
-        Unary::Exp => map::<W>(to, a, |x| Unary::Exp.of(x)),
-        Unary::Tanh => map::<W>(to, a, |x| Unary::Tanh.of(x)),
-        Unary::SechSquared => map::<W>(to, a, |x| Unary::SechSquared.of(x)),
-        Unary::Abs => map::<W>(to, a, |x| Unary::Abs.of(x)),
-        Unary::Sign => map::<W>(to, a, |x| Unary::Sign.of(x)),
-        Unary::Heaviside => map::<W>(to, a, |x| Unary::Heaviside.of(x)),
-        _ => zip_live::<W>(to, a, a, live, |x, _| op.of(x)),
+        Unary::Negate => map(to, a, |x| Unary::Negate.of(x)),
+        Unary::Sqrt => map(to, a, |x| Unary::Sqrt.of(x)),
+        Unary::Exp => map(to, a, |x| Unary::Exp.of(x)),
+        Unary::Tanh => map(to, a, |x| Unary::Tanh.of(x)),
+        Unary::SechSquared => map(to, a, |x| Unary::SechSquared.of(x)),
+        Unary::Abs => map(to, a, |x| Unary::Abs.of(x)),
+        Unary::Sign => map(to, a, |x| Unary::Sign.of(x)),
+        Unary::Heaviside => map(to, a, |x| Unary::Heaviside.of(x)),
+        _ => zip_live(to, a, a, live, |x, _| op.of(x)),
     }
 }
 
 #[inline(always)]
-fn binary<const W: usize>(op: Binary, to: &Lanes, a: &Lanes, b: &Lanes, live: usize) {
+fn binary<const W: usize>(op: Binary, to: &Lanes<W>, a: &Lanes<W>, b: &Lanes<W>, live: usize) {
     match op {
-        Binary::Add => zip::<W>(to, a, b, |x, y| x + y),
-        Binary::Subtract => zip::<W>(to, a, b, |x, y| x - y),
-        Binary::Multiply => zip::<W>(to, a, b, |x, y| x * y),
-        Binary::Divide => zip::<W>(to, a, b, |x, y| x / y),
-        Binary::Min => zip::<W>(to, a, b, |x, y| Binary::Min.of(x, y)),
-        Binary::Max => zip::<W>(to, a, b, |x, y| Binary::Max.of(x, y)),
-        Binary::Hypot => zip::<W>(to, a, b, |x, y| Binary::Hypot.of(x, y)),
-        Binary::Less => zip::<W>(to, a, b, |x, y| Binary::Less.of(x, y)),
-        Binary::LessOrEqual => zip::<W>(to, a, b, |x, y| Binary::LessOrEqual.of(x, y)),
-        Binary::Equal => zip::<W>(to, a, b, |x, y| Binary::Equal.of(x, y)),
-        Binary::NotEqual => zip::<W>(to, a, b, |x, y| Binary::NotEqual.of(x, y)),
-        Binary::Power | Binary::Atan2 => zip_live::<W>(to, a, b, live, |x, y| op.of(x, y)),
+        Binary::Add => zip(to, a, b, |x, y| x + y),
+        Binary::Subtract => zip(to, a, b, |x, y| x - y),
+        Binary::Multiply => zip(to, a, b, |x, y| x * y),
+        Binary::Divide => zip(to, a, b, |x, y| x / y),
+        Binary::Min => zip(to, a, b, |x, y| Binary::Min.of(x, y)),
+        Binary::Max => zip(to, a, b, |x, y| Binary::Max.of(x, y)),
+        Binary::Hypot => {
+            for ((to, a), b) in to.iter().zip(a).zip(b) {
+                to.set(Eight(kernels::hypots(a.get().0, b.get().0)));
+            }
+        }
+        Binary::Less => zip(to, a, b, |x, y| Binary::Less.of(x, y)),
+        Binary::LessOrEqual => zip(to, a, b, |x, y| Binary::LessOrEqual.of(x, y)),
+        Binary::Equal => zip(to, a, b, |x, y| Binary::Equal.of(x, y)),
+        Binary::NotEqual => zip(to, a, b, |x, y| Binary::NotEqual.of(x, y)),
+        Binary::Power | Binary::Atan2 => zip_live(to, a, b, live, |x, y| op.of(x, y)),
     }
 }
 
 /// a op s, for the operations that [`super::tape::takes_scalars`] names.
 #[inline(always)]
-fn right<const W: usize>(op: Binary, to: &Lanes, a: &Lanes, s: f64) {
+fn right<const W: usize>(op: Binary, to: &Lanes<W>, a: &Lanes<W>, s: f64) {
     match op {
-        Binary::Add => map::<W>(to, a, |x| x + s),
-        Binary::Subtract => map::<W>(to, a, |x| x - s),
-        Binary::Multiply => map::<W>(to, a, |x| x * s),
-        Binary::Divide => map::<W>(to, a, |x| x / s),
-        Binary::Less => map::<W>(to, a, |x| Binary::Less.of(x, s)),
-        Binary::LessOrEqual => map::<W>(to, a, |x| Binary::LessOrEqual.of(x, s)),
-        Binary::Min => map::<W>(to, a, |x| Binary::Min.of(x, s)),
-        _ => map::<W>(to, a, |x| Binary::Max.of(x, s)),
+        Binary::Add => map(to, a, |x| x + s),
+        Binary::Subtract => map(to, a, |x| x - s),
+        Binary::Multiply => map(to, a, |x| x * s),
+        Binary::Divide => map(to, a, |x| x / s),
+        Binary::Less => map(to, a, |x| Binary::Less.of(x, s)),
+        Binary::LessOrEqual => map(to, a, |x| Binary::LessOrEqual.of(x, s)),
+        Binary::Min => map(to, a, |x| Binary::Min.of(x, s)),
+        _ => map(to, a, |x| Binary::Max.of(x, s)),
     }
 }
 
 /// s op b, likewise.
 #[inline(always)]
-fn left<const W: usize>(op: Binary, to: &Lanes, s: f64, b: &Lanes) {
+fn left<const W: usize>(op: Binary, to: &Lanes<W>, s: f64, b: &Lanes<W>) {
     match op {
-        Binary::Add => map::<W>(to, b, |x| s + x),
-        Binary::Subtract => map::<W>(to, b, |x| s - x),
-        Binary::Multiply => map::<W>(to, b, |x| s * x),
-        Binary::Divide => map::<W>(to, b, |x| s / x),
-        Binary::Less => map::<W>(to, b, |x| Binary::Less.of(s, x)),
-        Binary::LessOrEqual => map::<W>(to, b, |x| Binary::LessOrEqual.of(s, x)),
-        Binary::Min => map::<W>(to, b, |x| Binary::Min.of(s, x)),
-        _ => map::<W>(to, b, |x| Binary::Max.of(s, x)),
+        Binary::Add => map(to, b, |x| s + x),
+        Binary::Subtract => map(to, b, |x| s - x),
+        Binary::Multiply => map(to, b, |x| s * x),
+        Binary::Divide => map(to, b, |x| s / x),
+        Binary::Less => map(to, b, |x| Binary::Less.of(s, x)),
+        Binary::LessOrEqual => map(to, b, |x| Binary::LessOrEqual.of(s, x)),
+        Binary::Min => map(to, b, |x| Binary::Min.of(s, x)),
+        _ => map(to, b, |x| Binary::Max.of(s, x)),
     }
 }

@@ -19,6 +19,7 @@
 use super::gauss::{Scheme, gauss_legendre};
 use crate::contract::{Batch, Parameters, VectorField};
 use crate::diagram::Mesh;
+use crate::linalg::lane::{self, Eight, Lane};
 use crate::linalg::{axpy, lu, panel};
 
 /// Where the defect is sampled, and how it is integrated.
@@ -175,45 +176,141 @@ pub fn measure(
     Defect { local, within, ends, sources, misses }
 }
 
-/// Solutions of the variational equations x' = h T J x on one interval, made more accurate.
+/// Intervals as [`correct`] takes them: so many side by side, and the last one again where they are fewer.
+pub fn padded(count: usize) -> usize {
+    count.next_multiple_of(Eight::COUNT)
+}
+
+/// Solutions of the variational equations x' = h T J x on all intervals, made more accurate, for several courses of J.
 ///
-/// `nodes` `[m + 1][n × n]` are their values V at the nodes, the identity at the first; `jacobians` `[m + 1][n × n]` is h T J at the
-/// sample points s_g with weights w_g. Takes from `transition` `[n × n]`, what the polynomials give at the right end, the error that
-/// they have there, with D = V' - h T J V:
+/// With P [`padded`] intervals, `nodes` `[m + 1][n × n][P]` are their values V at the nodes, the identity at the first; `jacobians`
+/// `[n × n][course][m + 1][P]` is h T J at the sample points s_g with weights w_g. `transitions` `[n × n][course][P]`, what the polynomials
+/// give at the right ends, lose the error that they have there, with D = V' - h T J V:
 ///
 ///   (3)  ∫₀¹ V(1) V(s)⁻¹ D(s) ds = V(1) Σ_g w_g V(s_g)⁻¹ D(s_g)
 ///
-/// Left as it is where V cannot be inverted.
-pub fn corrected(sampling: &Sampling, nodes: &[f64], jacobians: &[f64], n: usize, transition: &mut [f64]) {
-    let (square, points) = (n * n, jacobians.len() / (n * n));
-    let combined = |matrix: &[f64], of: &[f64], out: &mut [f64]| {
-        for (line, to) in matrix.chunks_exact(points).zip(out.chunks_exact_mut(square)) {
-            line.iter().zip(of.chunks_exact(square)).for_each(|(weight, v)| axpy(*weight, v, to));
+/// Where V cannot be inverted they stay as they are.
+pub fn correct(sampling: &Sampling, nodes: &[f64], jacobians: &[f64], transitions: &mut [f64], n: usize) {
+    Eight::dispatch(Correction { sampling, nodes, jacobians, transitions, n });
+}
+
+struct Correction<'a> {
+    sampling: &'a Sampling,
+    nodes: &'a [f64],
+    jacobians: &'a [f64],
+    transitions: &'a mut [f64],
+    n: usize,
+}
+
+impl pulp::NullaryFnOnce for Correction<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Correction { sampling, nodes, jacobians, transitions, n } = self;
+        let (square, points) = (n * n, sampling.points.len());
+        let count = nodes.len() / (square * points);
+        // Right-hand sides of all courses stand side by side in a row.
+        let columns = transitions.len() / (n * count);
+        let room = |size: usize| vec![Eight::default(); size];
+        let (mut own, mut values, mut slopes) = (room(square * points), room(square * points), room(square * points));
+        let [mut matrix, mut defect, mut right, mut sum] = [square, n * columns, n * columns, n * columns].map(room);
+        let weights = &sampling.sources[(points - 1) * points..];
+        for first in (0..count).step_by(Eight::COUNT) {
+            own.iter_mut().zip(nodes.chunks_exact(count)).for_each(|(v, from)| *v = Eight::load(&from[first..]));
+            for (rows, out) in [(&sampling.values, &mut values), (&sampling.slopes, &mut slopes)] {
+                out.fill(Eight::default());
+                for (row, to) in rows.chunks_exact(points).zip(out.chunks_exact_mut(square)) {
+                    row.iter().zip(own.chunks_exact(square)).for_each(|(w, v)| lane::add(Eight::splat(*w), v, to));
+                }
+            }
+            sum.fill(Eight::default());
+            let samples = values.chunks_exact(square).zip(slopes.chunks_exact(square)).zip(weights);
+            for (g, ((value, slope), weight)) in samples.enumerate() {
+                for ((c, to), slope) in defect.chunks_exact_mut(columns).enumerate().zip(slope.chunks_exact(n)) {
+                    for (course, to) in to.chunks_exact_mut(n).enumerate() {
+                        to.copy_from_slice(slope);
+                        for (d, v) in value.chunks_exact(n).enumerate() {
+                            let entry = (((c * n + d) * (columns / n) + course) * points + g) * count + first;
+                            lane::subtract(Eight::load(&jacobians[entry..]), v, to);
+                        }
+                    }
+                }
+                matrix.copy_from_slice(value);
+                right.copy_from_slice(&defect);
+                if !eliminated(&mut matrix, &mut right, n) {
+                    exchanging(value, &defect, &mut right, n);
+                }
+                lane::add(Eight::splat(*weight), &right, &mut sum);
+            }
+            // V(1) times the sum.
+            right.fill(Eight::default());
+            for (c, error) in right.chunks_exact_mut(columns).enumerate() {
+                for (d, sums) in sum.chunks_exact(columns).enumerate() {
+                    for (course, (error, sums)) in error.chunks_exact_mut(n).zip(sums.chunks_exact(n)).enumerate() {
+                        let entry = ((c * n + d) * (columns / n) + course) * count + first;
+                        lane::add(Eight::load(&transitions[entry..]), sums, error);
+                    }
+                }
+            }
+            let finite = right
+                .iter()
+                .fold([true; Eight::COUNT], |all, e| std::array::from_fn(|lane| all[lane] && e.0[lane].is_finite()));
+            for (c, row) in right.chunks_exact(columns).enumerate() {
+                for (k, error) in row.iter().enumerate() {
+                    let entry = ((c * n + k % n) * (columns / n) + k / n) * count + first;
+                    let lanes = transitions[entry..].iter_mut().zip(&error.0).zip(finite);
+                    lanes.filter(|(_, finite)| *finite).for_each(|((t, e), _)| *t -= e);
+                }
+            }
         }
-    };
-    let (mut values, mut defect) = (vec![0.0; nodes.len()], vec![0.0; nodes.len()]);
-    combined(&sampling.values, nodes, &mut values);
-    combined(&sampling.slopes, nodes, &mut defect);
-    let weights = &sampling.sources[(points - 1) * points..];
-    let (mut sum, mut pivots) = (vec![0.0; square], vec![0; n]);
-    for (g, weight) in weights.iter().enumerate() {
-        let own = g * square..(g + 1) * square;
-        let (v, d, j) = (&mut values[own.clone()], &mut defect[own.clone()], &jacobians[own]);
-        for (row, line) in d.chunks_exact_mut(n).zip(j.chunks_exact(n)) {
-            line.iter().zip(v.chunks_exact(n)).for_each(|(entry, x)| axpy(-entry, x, row));
-        }
-        if lu::factorise(v, n, &mut pivots).is_err() {
-            return;
-        }
-        lu::solve(v, n, &pivots, d, n);
-        axpy(*weight, d, &mut sum);
     }
-    let mut error = vec![0.0; square];
-    for (row, line) in error.chunks_exact_mut(n).zip(transition.chunks_exact(n)) {
-        line.iter().zip(sum.chunks_exact(n)).for_each(|(entry, x)| axpy(*entry, x, row));
+}
+
+/// Solves a x = b in every lane without exchanging rows, x in place of b; false where a pivot is too small for that in some lane.
+#[inline(always)]
+fn eliminated(a: &mut [Eight], b: &mut [Eight], n: usize) -> bool {
+    const SMALL: f64 = 1e-3;
+    let columns = b.len() / n;
+    for k in 0..n {
+        let largest =
+            a[k * n..].iter().skip(k).step_by(n).fold(Eight::default(), |most, x| most.zip(*x, |m, x| m.max(x.abs())));
+        let pivot = a[k * n + k];
+        if !pivot.all(largest, |pivot, largest| pivot.abs() > SMALL * largest) {
+            return false;
+        }
+        let inverse = pivot.map(|x| 1.0 / x);
+        let (above, below) = a.split_at_mut((k + 1) * n);
+        let (done, rest) = b.split_at_mut((k + 1) * columns);
+        for (row, right) in below.chunks_exact_mut(n).zip(rest.chunks_exact_mut(columns)) {
+            let factor = row[k] * inverse;
+            lane::subtract(factor, &above[k * n + k + 1..], &mut row[k + 1..]);
+            lane::subtract(factor, &done[k * columns..], right);
+        }
+        a[k * n + k] = inverse;
     }
-    if error.iter().all(|e| e.is_finite()) {
-        axpy(-1.0, &error, transition);
+    for k in (0..n).rev() {
+        let (head, done) = b.split_at_mut((k + 1) * columns);
+        let own = &mut head[k * columns..];
+        for (entry, x) in a[k * n + k + 1..(k + 1) * n].iter().zip(done.chunks_exact(columns)) {
+            lane::subtract(*entry, x, own);
+        }
+        own.iter_mut().for_each(|x| *x = *x * a[k * n + k]);
+    }
+    true
+}
+
+/// The same lane by lane, with exchanges; NaN where that does not help.
+fn exchanging(a: &[Eight], b: &[Eight], x: &mut [Eight], n: usize) {
+    let mut pivots = vec![0; n];
+    for lane in 0..Eight::COUNT {
+        let mut matrix: Vec<f64> = a.iter().map(|a| a.0[lane]).collect();
+        let mut right: Vec<f64> = b.iter().map(|b| b.0[lane]).collect();
+        match lu::factorise(&mut matrix, n, &mut pivots) {
+            Ok(()) => lu::solve(&matrix, n, &pivots, &mut right, b.len() / n),
+            Err(_) => right.fill(f64::NAN),
+        }
+        x.iter_mut().zip(right).for_each(|(x, value)| x.0[lane] = value);
     }
 }
 
@@ -234,12 +331,16 @@ mod tests {
         let (mut pivots, mut inner) = (vec![0; m], vec![1.0; m]);
         crate::linalg::lu::factorise(&mut matrix, m, &mut pivots).unwrap();
         crate::linalg::lu::solve(&matrix, m, &pivots, &mut inner, 1);
-        let nodes = [vec![1.0], inner.clone()].concat();
-        let mut transition = [scheme.end[0] + crate::linalg::dot(&scheme.end[1..], &inner)];
+        let own = [vec![1.0], inner.clone()].concat();
+        let end = scheme.end[0] + crate::linalg::dot(&scheme.end[1..], &inner);
         let exact = (0.4f64 + 0.16).exp();
-        let before = (transition[0] - exact).abs();
-        let jacobians: Vec<f64> = gauss_legendre(m + 1).0.into_iter().map(rate).collect();
-        corrected(&sampling, &nodes, &jacobians, 1, &mut transition);
+        let before = (end - exact).abs();
+        let everywhere = |values: Vec<f64>| -> Vec<f64> {
+            values.into_iter().flat_map(|x| std::iter::repeat_n(x, padded(1))).collect()
+        };
+        let jacobians = everywhere(gauss_legendre(m + 1).0.into_iter().map(rate).collect());
+        let mut transition = everywhere(vec![end]);
+        correct(&sampling, &everywhere(own), &jacobians, &mut transition, 1);
         let after = (transition[0] - exact).abs();
         assert!(before > 1e-9 && after < 0.15 * before, "{before:e} {after:e}");
     }

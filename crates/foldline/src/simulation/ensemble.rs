@@ -2,7 +2,7 @@
 //!
 //! **Idea.** Some of the trajectories are the lanes of one batch. In each sweep every lane tries one step of its own length;
 //! those whose error is too large try again with a shorter one in the next sweep. A lane that is finished takes over the next
-//! trajectory that waits; once none waits it is taken out of the batch.
+//! trajectory that waits; once none waits it rests, and lanes at rest are taken out of the batch eight at a time.
 //!
 //! **Equations.** The pair of the tableau, and with err the root mean square of errorᵢ / (absoluteᵢ + relative max(|x₀|, |x₁|)ᵢ):
 //!
@@ -33,6 +33,7 @@ use super::shortened::Shortened;
 use super::{Arrival, Outcome, Step, Tolerance};
 use crate::contract::{Parameters, VectorField, Verdict};
 use lanes::Lanes;
+use pace::Limits;
 
 /// Trajectories that are integrated at a time: enough to keep vector instructions busy, few enough to stay in the cache.
 const WIDTH: usize = 64;
@@ -52,11 +53,7 @@ pub struct Ensemble<'a> {
     waiting: usize,
     tolerance: Tolerance,
     begin: f64,
-    /// End of the time span, and the sign of the direction in which it lies.
-    end: f64,
-    sign: f64,
-    step_limit: usize,
-    longest: f64,
+    limits: Limits,
     lanes: Lanes,
     /// What each lane knows besides.
     runs: Vec<Run>,
@@ -67,14 +64,11 @@ pub struct Ensemble<'a> {
 #[derive(Clone, Debug)]
 struct Run {
     trajectory: usize,
-    time: f64,
-    just_rejected: bool,
-    steps: usize,
-    rejected: usize,
-    bound: f64,
     /// How often in succession a switch changed sign without getting on.
     stuck: usize,
     done: Option<Outcome>,
+    /// Nothing runs in this lane any more.
+    over: bool,
 }
 
 impl<'a> Ensemble<'a> {
@@ -94,10 +88,12 @@ impl<'a> Ensemble<'a> {
             waiting: 0,
             tolerance,
             begin: span[0],
-            end: span[1],
-            sign: if span[1] < span[0] { -1.0 } else { 1.0 },
-            step_limit: usize::MAX,
-            longest: LONGEST,
+            limits: Limits {
+                end: span[1],
+                sign: if span[1] < span[0] { -1.0 } else { 1.0 },
+                longest: LONGEST,
+                steps: f64::INFINITY,
+            },
             lanes: Lanes::default(),
             runs: Vec::new(),
             arrivals: vec![None; starts.len().checked_div(field.dim()).unwrap_or(0)],
@@ -117,13 +113,13 @@ impl<'a> Ensemble<'a> {
 
     /// Ends a trajectory after this many accepted and rejected steps.
     pub fn with_step_limit(mut self, limit: usize) -> Ensemble<'a> {
-        self.step_limit = limit;
+        self.limits.steps = limit as f64;
         self
     }
 
     /// No step is longer than this time, which is positive.
     pub fn with_longest_step(mut self, longest: f64) -> Ensemble<'a> {
-        self.longest = longest.min(LONGEST);
+        self.limits.longest = longest.min(LONGEST);
         self
     }
 
@@ -136,13 +132,24 @@ impl<'a> Ensemble<'a> {
         let mut kinks: Vec<(usize, Kink)> = Vec::new();
         self.fill();
         while !self.runs.is_empty() {
-            self.lanes.advance(self.field, self.parameters, &self.tolerance);
-            self.look_ahead();
-            for l in 0..self.runs.len() {
-                self.judge(l, &mut again, &mut kinks, observe);
+            self.lanes.advance(self.field, self.parameters, &self.tolerance, &self.limits);
+            if !self.lanes.signs.is_empty() {
+                self.look_ahead();
+                for l in 0..self.lanes.count {
+                    if self.lanes.accepted[l] != 0.0 {
+                        kinks.extend(self.shortened(l, &mut again).map(|kink| (l, kink)));
+                    }
+                }
             }
-            self.lanes.take_over(self.runs.iter().map(|run| !run.just_rejected));
-            kinks.drain(..).for_each(|(l, kink)| self.pass(l, &kink, &mut again));
+            let stopped = self.show(observe);
+            if self.lanes.take_over(&self.limits) || !stopped.is_empty() {
+                self.end_some(&stopped);
+            }
+            for (l, kink) in kinks.drain(..) {
+                if self.runs[l].done.is_none() {
+                    self.pass(l, &kink, &mut again);
+                }
+            }
             self.replace_finished();
         }
         self.arrivals.into_iter().flatten().collect()
@@ -150,15 +157,14 @@ impl<'a> Ensemble<'a> {
 
     /// The step that lane `l` tries.
     fn step_of(&self, l: usize) -> Step<'_> {
-        let (run, lanes) = (&self.runs[l], &self.lanes);
-        let last = (self.end - run.time - lanes.h[l]) * self.sign <= 0.0;
+        let lanes = &self.lanes;
         Step {
-            trajectory: run.trajectory,
+            trajectory: self.runs[l].trajectory,
             column: l,
             lanes: lanes.count,
-            time: run.time,
+            time: lanes.time[l],
             length: lanes.h[l],
-            end_time: if last { self.end } else { run.time + lanes.h[l] },
+            end_time: lanes.end[l],
             from: &lanes.x,
             to: &lanes.next,
             slopes: &lanes.slopes,
@@ -167,91 +173,82 @@ impl<'a> Ensemble<'a> {
         }
     }
 
-    /// Makes the step of lane `l` shorter after an error that is too large.
-    fn reject(&mut self, l: usize) {
-        let (run, lanes) = (&mut self.runs[l], &mut self.lanes);
-        let finite = lanes.error[l].is_finite();
-        run.rejected += 1;
-        run.just_rejected = true;
-        lanes.h[l] *= if finite { lanes.shrink[l].clamp(pace::LEAST, 1.0) } else { pace::LEAST };
-        if lanes.h[l].abs() <= 4.0 * f64::EPSILON * run.time.abs() || lanes.h[l].abs() < 1e-300 {
-            run.done = Some(if finite { Outcome::StepTooSmall } else { Outcome::Escaped });
-        } else if run.steps + run.rejected >= self.step_limit {
-            run.done = Some(Outcome::StepLimit);
+    /// Shows the steps that hold; returns the lanes that are to stop. A kink at the very start of a step leaves nothing to show.
+    fn show(&self, observe: &mut dyn FnMut(&Step) -> Verdict) -> Vec<usize> {
+        let mut stopped = Vec::new();
+        let mut step = self.step_of(0);
+        let lanes = self.lanes.accepted.iter().zip(self.lanes.h.iter()).zip(self.lanes.time.iter());
+        for (l, (((&accepted, &h), &time), (&end, run))) in lanes.zip(self.lanes.end.iter().zip(&self.runs)).enumerate()
+        {
+            if accepted != 0.0 && h != 0.0 {
+                step = Step { trajectory: run.trajectory, column: l, time, length: h, end_time: end, ..step };
+                if observe(&step) == Verdict::Stop {
+                    stopped.push(l);
+                }
+            }
+        }
+        stopped
+    }
+
+    /// Ends trajectories: those in `stopped`, and those of the lanes that are remarkable where there is a reason.
+    fn end_some(&mut self, stopped: &[usize]) {
+        let lanes = &self.lanes;
+        for (l, run) in self.runs.iter_mut().enumerate().filter(|(_, run)| !run.over) {
+            let too_long = (lanes.tried[l] >= self.limits.steps).then_some(Outcome::StepLimit);
+            run.done = if lanes.accepted[l] == 0.0 {
+                let escaped = !lanes.error[l].is_finite();
+                let too_small = if escaped { Outcome::Escaped } else { Outcome::StepTooSmall };
+                pace::too_small(lanes.h[l], lanes.time[l]).then_some(too_small).or(too_long)
+            } else if pace::escaped(lanes.largest[l], lanes.bound[l]) {
+                Some(Outcome::Escaped)
+            } else if stopped.contains(&l) {
+                Some(Outcome::Stopped)
+            } else if lanes.time[l] == self.limits.end {
+                Some(Outcome::Reached)
+            } else {
+                too_long
+            };
         }
     }
 
-    /// Accepts or rejects the step of lane `l`.
-    fn judge(
-        &mut self,
-        l: usize,
-        again: &mut Shortened,
-        kinks: &mut Vec<(usize, Kink)>,
-        observe: &mut dyn FnMut(&Step) -> Verdict,
-    ) {
-        let error = self.lanes.error[l];
-        if error.is_nan() || error > 1.0 {
-            return self.reject(l);
-        }
-        let tried = self.lanes.h[l];
-        let kink = self.shortened(l, again);
-        let step = self.step_of(l);
-        let end_time = step.end_time();
-        let nowhere = kink.as_ref().is_some_and(|kink| kink.theta == 0.0);
-        let verdict = if nowhere { Verdict::Continue } else { observe(&step) };
-        let (run, lanes) = (&mut self.runs[l], &mut self.lanes);
-        run.time = end_time;
-        run.steps += 1;
-        // (1)
-        let most = if run.just_rejected { 1.0 } else { pace::MOST };
-        let h = (tried * lanes.growth[l].clamp(pace::LEAST, most)).max(-self.longest).min(self.longest);
-        lanes.remember_error(l);
-        run.just_rejected = false;
-        let remaining = self.end - end_time;
-        // A last step a little longer than planned saves a tiny one.
-        lanes.h[l] = if h.abs() * 1.01 >= remaining.abs() { remaining } else { h };
-        let largest = lanes.largest[l];
-        run.done = if largest.is_nan() || largest > run.bound {
-            Some(Outcome::Escaped)
-        } else if verdict == Verdict::Stop {
-            Some(Outcome::Stopped)
-        } else if end_time == self.end {
-            Some(Outcome::Reached)
-        } else if run.steps + run.rejected >= self.step_limit {
-            Some(Outcome::StepLimit)
-        } else {
-            None
-        };
-        kinks.extend(kink.filter(|_| run.done.is_none()).map(|kink| (l, kink)));
-    }
-
-    /// Gives the lanes that are done to trajectories that wait, and takes out of the batch those for which none waits.
+    /// Gives the lanes that are done to trajectories that wait, and takes out of the batch those for which none waits, eight at
+    /// a time while there are more than eight: so the rest remains a whole number of vectors.
     fn replace_finished(&mut self) {
         // Some end where they begin.
         while self.runs.iter().any(|run| run.done.is_some()) {
             let mut fresh = Vec::new();
             for l in 0..self.runs.len() {
-                let run = &self.runs[l];
-                let Some(outcome) = run.done else { continue };
+                let run = &mut self.runs[l];
+                let Some(outcome) = run.done.take() else { continue };
                 self.arrivals[run.trajectory] = Some(Arrival {
-                    time: run.time,
+                    time: self.lanes.time[l],
                     state: self.lanes.state(l),
                     outcome,
-                    steps: run.steps,
-                    rejected: run.rejected,
+                    steps: self.lanes.steps[l] as usize,
+                    rejected: (self.lanes.tried[l] - self.lanes.steps[l]) as usize,
                 });
+                run.over = true;
                 if self.waiting < self.arrivals.len() {
                     self.runs[l] = self.next_run(l);
                     fresh.push(l);
+                } else {
+                    self.lanes.clear(l);
                 }
             }
-            if fresh.is_empty() {
-                let kept: Vec<usize> = (0..self.runs.len()).filter(|&l| self.runs[l].done.is_none()).collect();
-                self.lanes.keep(&kept);
-                self.runs.retain(|run| run.done.is_none());
-            } else {
-                self.begin(&fresh);
-            }
+            self.begin(&fresh);
+        }
+        let live = self.runs.iter().filter(|run| !run.over).count();
+        let count = if live < 8 { live } else { live.next_multiple_of(8) };
+        if count < self.runs.len() {
+            let mut idle = count - live;
+            let mut stays = |run: &Run| {
+                let fills = run.over && idle > 0;
+                idle -= usize::from(fills);
+                fills || !run.over
+            };
+            let kept: Vec<usize> = (0..self.runs.len()).filter(|&l| stays(&self.runs[l])).collect();
+            self.lanes.keep(&kept);
+            self.runs = kept.iter().map(|&l| self.runs[l].clone()).collect();
         }
     }
 
@@ -260,17 +257,10 @@ impl<'a> Ensemble<'a> {
         let (trajectory, n, k) = (self.waiting, self.field.dim(), self.field.parameter_count());
         self.waiting += 1;
         let start = &self.starts[trajectory * n..(trajectory + 1) * n];
-        self.lanes.set(l, start, self.own.get(trajectory * k..(trajectory + 1) * k).unwrap_or(&[]));
-        Run {
-            trajectory,
-            time: self.begin,
-            just_rejected: false,
-            steps: 0,
-            rejected: 0,
-            bound: BOUND * (1.0 + crate::linalg::max_abs(start)),
-            stuck: 0,
-            done: None,
-        }
+        let own = self.own.get(trajectory * k..(trajectory + 1) * k).unwrap_or(&[]);
+        let bound = BOUND * (1.0 + crate::linalg::max_abs(start));
+        self.lanes.set(l, start, own, self.begin, bound);
+        Run { trajectory, stuck: 0, done: None, over: false }
     }
 
     /// The first trajectories.

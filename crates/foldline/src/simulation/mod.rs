@@ -12,6 +12,7 @@
 //! | where does a function of the state change sign? | [`Section`] |
 //! | a forced field? | [`Clocked`]: those above take autonomous ones |
 
+mod aligned;
 mod clocked;
 mod ensemble;
 mod kink;

@@ -1,5 +1,6 @@
 //! One accepted step, and the state anywhere on it.
 
+use super::aligned::Aligned;
 use super::tableau::{DENSE, STAGES};
 use crate::contract::Parameters;
 
@@ -17,7 +18,7 @@ pub struct Step<'a> {
     pub(super) from: &'a [f64],
     pub(super) to: &'a [f64],
     /// `[STAGES][n × lanes]`.
-    pub(super) slopes: &'a [Vec<f64>; STAGES],
+    pub(super) slopes: &'a [Aligned; STAGES],
     pub(super) parameters: Parameters<'a>,
     /// `[switches × lanes]` signs of the switches along the step.
     pub(super) signs: &'a [f64],

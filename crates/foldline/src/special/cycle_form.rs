@@ -65,13 +65,11 @@ fn evaluated<'a>(kind: Kind, setting: Setting<'a>, at: &Point) -> Option<(OnCycl
     let mut condition = OnCycles::new(kind, setting, cycle)?;
     let extra = condition.guess(at);
     let mut g = vec![0.0; 1 + extra.len()];
-    // Borders that fit better each time.
-    for _ in 0..3 {
-        if !Condition::evaluate(&mut condition, &u, &extra, &mut g) {
-            return None;
-        }
-        condition.anchor();
+    // Where the operator is singular any borders give its null vectors, and those make better ones.
+    if !Condition::evaluate(&mut condition, &u, &extra, &mut g) {
+        return None;
     }
+    condition.anchor();
     Condition::evaluate(&mut condition, &u, &extra, &mut g).then_some((condition, u, extra))
 }
 

@@ -315,13 +315,14 @@ impl<'a> OnCycles<'a> {
         system.coupling.fill(T::default());
         system.border.fill(T::default());
         system.corner.fill(0.0);
+        let slots: Vec<usize> = (0..m * parts).map(|k| system.slot(k / parts, k % parts)).collect();
         for j in 0..length * T::COUNT {
             // Beyond the last interval the solver has intervals of length zero.
             let h = if j < count { self.mesh[j + 1] - self.mesh[j] } else { 0.0 };
             let j = (j.min(count - 1), j % length, j / length);
             for i in 0..m {
                 for c in 0..parts {
-                    self.fill_line(&mut system, j, i, c, h, angle);
+                    self.fill_line(&mut system, &slots, j, i, c, h, angle);
                 }
             }
         }
@@ -336,6 +337,7 @@ impl<'a> OnCycles<'a> {
     fn fill_line<T: Lane>(
         &self,
         system: &mut Condensed<T>,
+        slots: &[usize],
         (j, place, slot): (usize, usize, usize),
         i: usize,
         c: usize,
@@ -347,7 +349,6 @@ impl<'a> OnCycles<'a> {
         let (width, block, length) = (parts + scalars, (m + 1) * parts, system.length());
         let (lane, node, first) = (j * m + i, (j * (m + 1) + i + 1) * parts, usize::from(self.is_fold()));
         let (half, own) = (c / n * n, c % n);
-        let slots: Vec<usize> = (0..inner).map(|k| system.slot(k / parts, k % parts)).collect();
         let line = &mut system.interior[(place * inner + slots[i * parts + c]) * inner..][..inner];
         for k in 0..m {
             line[slots[k * parts + c]].lanes_mut()[slot] = self.scheme.derivative[i * (m + 1) + k + 1];

@@ -179,10 +179,10 @@ impl<T: Lane> pulp::NullaryFnOnce for Write<'_, '_, T> {
             let ht = h * T::splat(period);
             let border = t * block;
             system.border[border..border + n].fill(zero);
+            system.clear(t);
             for c in 0..n {
                 let first = slots[c];
                 let a = &mut system.interior[(t * inner + first) * inner..(t * inner + first + m) * inner];
-                a.fill(zero);
                 for d in (0..n).filter(|d| coupled[c * n + d]) {
                     let column = slots[d];
                     for k in 0..m {

@@ -27,10 +27,15 @@ fn spectrum_difference(spectrum: &[Complex64], other: &[Complex64]) -> f64 {
     most
 }
 
+/// Error of an interval that rounding alone may leave, relative.
+const ROUNDING: f64 = 32.0 * f64::EPSILON;
+
 /// Errors and the unknowns they belong to.
 pub(super) struct Measured {
     at: Vec<f64>,
     errors: Vec<f64>,
+    /// What rounding alone may make of them.
+    rounding: f64,
     /// The part of the error that goes on from interval to interval, in the layout of the unknowns.
     shift: Vec<f64>,
     /// The part within intervals, `[n][m + 1][N]` at the sample points.
@@ -50,54 +55,72 @@ impl CycleProblem<'_> {
         errors
     }
 
+    /// Error at `u` that finer meshes do not make smaller: next to a singular matrix the rounding of single intervals many times over.
+    pub(super) fn rounding(&self, u: &[f64]) -> f64 {
+        self.errors(u);
+        self.measured.borrow().as_ref().map_or(0.0, |known| known.rounding)
+    }
+
     /// Estimated error of the multipliers `spectrum` at `u`: they change by it where the transitions of all intervals are made more
     /// accurate, and again where the Jacobian is taken not along the profile but along the profile without its estimated error.
     /// The two can cancel; their sizes are added. Identities between multipliers see little of this error, which is large where the
     /// Jacobian changes sharply.
     pub(super) fn multiplier_error(&self, u: &[f64], spectrum: &[Complex64]) -> f64 {
         self.errors(u);
-        let [Some(own), Some(better)] = [0.0, 1.0].map(|share| self.corrected_multipliers(u, share)) else {
-            return f64::NAN;
-        };
+        let Some([own, better]) = self.corrected_multipliers(u) else { return f64::NAN };
         let apart = spectrum_difference(spectrum, &own) + spectrum_difference(&own, &better);
         SPECTRUM_SAFE * apart + SPECTRUM_ROUNDING
     }
 
-    /// The multipliers from more accurate transitions, with the Jacobian along the profile without that share of its error.
-    fn corrected_multipliers(&self, u: &[f64], share: f64) -> Option<Vec<Complex64>> {
+    /// The multipliers from more accurate transitions, with the Jacobian along the profile, and along the profile without its error.
+    fn corrected_multipliers(&self, u: &[f64]) -> Option<[Vec<Complex64>; 2]> {
         let (n, m, count, size) = (self.n, self.scheme.degree, self.intervals(), self.profile_size());
-        let (better, mut states) = {
-            let known = self.measured.borrow();
-            let known = known.as_ref()?;
-            let better: Vec<f64> = u.iter().zip(&known.shift).map(|(u, e)| u - share * e).collect();
-            (better, known.within.clone())
-        };
-        let lanes = count * (m + 1);
-        let nodes = panel::by_component(&better[..size], m + 1, n);
-        let mut values = vec![0.0; lanes];
-        for (own, nodes) in states.chunks_exact_mut(lanes).zip(nodes.chunks_exact(lanes)) {
-            self.sampling.sampled(nodes, count, &mut values);
-            own.iter_mut().zip(&values).for_each(|(w, x)| *w = x - share * *w);
-        }
-        let parameters = self.setting.at(&better[size + 1..]);
-        let (mut f, mut fx) = (vec![0.0; n * lanes], vec![0.0; n * n * lanes]);
+        let (square, lanes, padded) = (n * n, count * (m + 1), defect::padded(count));
+        let last = |j: usize| j.min(count - 1);
+        let known = self.measured.borrow();
+        let known = known.as_ref()?;
         let times = self.sampling.times(&self.mesh, self.forcing_periods);
-        let batch = Batch { lanes, states: &states, parameters: Parameters::Shared(&parameters), times: &times };
-        self.setting.field.linearise(batch, &[], &mut f, &mut fx, &mut []);
-        if !max_abs(&fx).is_finite() || !max_abs(&better).is_finite() {
-            return None;
-        }
-        let (mut inner, mut jacobians) = (vec![0.0; (m + 1) * n * n], vec![0.0; (m + 1) * n * n]);
-        inner[..n * n].iter_mut().enumerate().for_each(|(k, x)| *x = f64::from(u8::from(k / n == k % n)));
-        let found = self.floquet_with(&better, |j, transition| {
-            self.system.inner(j, &mut inner[n * n..]);
-            let time = self.h(j) * better[size];
-            for (k, x) in jacobians.iter_mut().enumerate() {
-                *x = time * fx[k % (n * n) * lanes + k / (n * n) * count + j];
+        let better: Vec<f64> = u.iter().zip(&known.shift).map(|(u, e)| u - e).collect();
+        let courses = [(u, 0.0), (&better[..], 1.0)];
+        let mut jacobians = vec![0.0; square * 2 * (m + 1) * padded];
+        let (mut states, mut f, mut fx) = (known.within.clone(), vec![0.0; n * lanes], vec![0.0; square * lanes]);
+        let mut values = vec![0.0; lanes];
+        for (course, (u, share)) in courses.iter().enumerate() {
+            let nodes = panel::by_component(&u[..size], m + 1, n);
+            let without = states.chunks_exact_mut(lanes).zip(known.within.chunks_exact(lanes));
+            for ((own, within), nodes) in without.zip(nodes.chunks_exact(lanes)) {
+                self.sampling.sampled(nodes, count, &mut values);
+                own.iter_mut().zip(&values).zip(within).for_each(|((own, x), w)| *own = x - share * w);
             }
-            defect::corrected(&self.sampling, &inner, &jacobians, n, transition);
-        });
-        Some(found.multipliers)
+            let parameters = self.setting.at(&u[size + 1..]);
+            let batch = Batch { lanes, states: &states, parameters: Parameters::Shared(&parameters), times: &times };
+            self.setting.field.linearise(batch, &[], &mut f, &mut fx, &mut []);
+            if !max_abs(&fx).is_finite() || !max_abs(u).is_finite() {
+                return None;
+            }
+            for (k, from) in fx.chunks_exact(count).enumerate() {
+                let (entry, g) = (k / (m + 1), k % (m + 1));
+                let to = &mut jacobians[((entry * 2 + course) * (m + 1) + g) * padded..][..padded];
+                to.iter_mut().enumerate().for_each(|(j, x)| *x = self.h(last(j)) * u[size] * from[last(j)]);
+            }
+        }
+        let (mut nodes, mut transitions) = (vec![0.0; (m + 1) * square * padded], vec![0.0; square * 2 * padded]);
+        (0..n).for_each(|c| nodes[c * (n + 1) * padded..][..padded].fill(1.0));
+        let (mut inner, mut own) = (vec![0.0; m * square], vec![0.0; square]);
+        for j in 0..padded {
+            self.system.inner(last(j), &mut inner);
+            self.system.transition(last(j), &mut own);
+            inner.iter().enumerate().for_each(|(k, x)| nodes[(square + k) * padded + j] = *x);
+            own.iter().enumerate().for_each(|(k, x)| (0..2).for_each(|c| transitions[(2 * k + c) * padded + j] = *x));
+        }
+        defect::correct(&self.sampling, &nodes, &jacobians, &mut transitions, n);
+        let corrected = |course: usize, u: &[f64]| {
+            let transition = |j: usize, to: &mut [f64]| {
+                to.iter_mut().enumerate().for_each(|(k, x)| *x = transitions[(2 * k + course) * padded + j]);
+            };
+            self.floquet_with(u, transition).multipliers
+        };
+        Some([corrected(0, u), corrected(1, &better)])
     }
 
     fn measured_errors(&self, u: &[f64]) -> Measured {
@@ -134,7 +157,7 @@ impl CycleProblem<'_> {
         let largest = sizes.iter().fold(f64::MIN_POSITIVE, |m: f64, s| m.max(*s));
         let gain = if response.is_finite() { response / largest } else { 1.0 };
         let errors = local.iter().zip(&sizes).map(|(l, s)| l + gain * s).collect();
-        Measured { at: u.to_vec(), errors, shift, within }
+        Measured { at: u.to_vec(), errors, rounding: ROUNDING * gain, shift, within }
     }
 
     pub(super) fn flow_at_nodes(&self, u: &[f64]) -> Vec<f64> {

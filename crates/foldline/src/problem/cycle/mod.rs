@@ -399,6 +399,7 @@ impl ZeroProblem for CycleProblem<'_> {
 
     fn better_mesh(&self, u: &[f64], tolerance: f64) -> Option<Mesh> {
         let errors = self.errors(u);
+        let tolerance = tolerance.max(self.rounding(u));
         let worst = errors.iter().fold(0.0, |m: f64, e| m.max(*e));
         let lopsided = || !self.halves && self.nearly_doubled(u) && !mesh::in_halves(&self.mesh);
         (worst > tolerance || lopsided()).then(|| self.equidistributed(u, &errors, tolerance, KEPT)).flatten()

@@ -46,7 +46,15 @@ impl CycleProblem<'_> {
             let off: Vec<f64> = u.iter().zip(beside).map(|(a, b)| a - b).collect();
             self.dot(&off, &off) <= within * within
         };
-        let images = self.shifts(&beside[..size], &states).into_iter().map(|shift| {
+        // The scalars are as far off in every phase.
+        let apart = [&vec![0.0; size][..], &scalars].concat();
+        let there = [&vec![0.0; size][..], &beside[size..]].concat();
+        let off: Vec<f64> = apart.iter().zip(&there).map(|(a, b)| a - b).collect();
+        let room = within * within - self.dot(&off, &off);
+        if room < 0.0 {
+            return Vec::new();
+        }
+        let images = self.shifts(&beside[..size], &states, room.sqrt()).into_iter().map(|shift| {
             let u = [&self.moved(&states, shift)[..], &scalars].concat();
             [u, [&self.moved(&tangent, shift)[..], &point.tangent[whole..]].concat()]
         });
@@ -64,22 +72,37 @@ impl CycleProblem<'_> {
         out
     }
 
-    /// Every θ at which the distance is smaller than close by.
-    fn shifts(&self, x: &[f64], y: &Cycle) -> Vec<f64> {
+    /// Every θ at which the distance is smaller than close by, and may be as small as `within`.
+    fn shifts(&self, x: &[f64], y: &Cycle, within: f64) -> Vec<f64> {
         let n = self.n;
         let periods = self.forcing_periods as usize;
         let here = Cycle { mesh: self.mesh.clone(), profile: x.to_vec(), ..y.clone() };
         // A forced cycle is a solution only where it is moved by whole periods of the forcing.
         let places = if self.is_forced() { (PLACES / periods).max(8) * periods } else { PLACES };
         let stride = if self.is_forced() { places / periods } else { 1 };
-        let (a, b) = (here.uniform(places), y.uniform(places));
-        let apart = |k: usize| -> f64 {
-            let later = b[k * n..].iter().chain(&b[..k * n]);
-            a.iter().zip(later).enumerate().map(|(i, (a, b))| ((a - b) / self.scale[i % n]).powi(2)).sum()
+        let scaled = |cycle: &Cycle| -> Vec<f64> {
+            cycle.uniform(places).iter().zip(self.scale.iter().cycle()).map(|(v, scale)| v / scale).collect()
         };
-        let all: Vec<f64> = (0..places).step_by(stride).map(apart).collect();
-        let count = all.len();
-        let lowest = |k: &usize| all[*k] <= all[(k + 1) % count] && all[*k] <= all[(k + count - 1) % count];
+        let (a, b) = (scaled(&here), scaled(y));
+        let between = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>();
+        let apart = |k: usize| {
+            let (before, after) = a.split_at((places - k) * n);
+            between(before, &b[k * n..]) + between(after, &b[..k * n])
+        };
+        // Moved by one place the distance changes by no more than this.
+        let moves = (between(&b[n..], &b[..(places - 1) * n]) + between(&b[..n], &b[(places - 1) * n..])).sqrt();
+        let limit = 1.1 * within * ((places * n) as f64).sqrt() + if self.is_forced() { 0.0 } else { moves };
+        let count = places / stride;
+        let mut all = vec![f64::INFINITY; count];
+        let mut k = 0;
+        while k < count {
+            all[k] = apart(k * stride).sqrt();
+            // What cannot be within the limit need not be looked at; a distance more than enough away stands for those that follow.
+            let clear = if self.is_forced() { 0.0 } else { (all[k] - limit) / moves.max(f64::MIN_POSITIVE) };
+            k += (clear as usize).max(1);
+        }
+        let lowest =
+            |k: &usize| all[*k] <= limit && all[*k] <= all[(k + 1) % count] && all[*k] <= all[(k + count - 1) % count];
         let about = (0..count).filter(lowest).map(|k| k as f64 / count as f64);
         about
             .map(|about| if self.is_forced() { about } else { self.exactly(x, y, about, 1.0 / count as f64) })
@@ -89,8 +112,15 @@ impl CycleProblem<'_> {
     /// The zero of (1) no farther than `width` from `about`.
     fn exactly(&self, x: &[f64], y: &Cycle, about: f64, width: f64) -> f64 {
         let (mut low, mut high, mut shift) = (about - width, about + width, about);
+        let mut before: Option<(f64, f64)> = None;
         for _ in 0..ROUNDS {
-            let (g, slope) = self.out_of_phase(x, y, shift);
+            let (g, mut slope) = self.out_of_phase(x, y, shift);
+            // The slope is that of equal profiles; two values know better.
+            let secant = before.map_or(f64::NAN, |(there, value)| (g - value) / (shift - there));
+            if secant > 0.2 * slope && secant < 5.0 * slope {
+                slope = secant;
+            }
+            before = Some((shift, g));
             if g > 0.0 {
                 high = shift
             } else {

@@ -1,12 +1,14 @@
 //! What is computed for all lanes of a batch at once.
 //!
-//! **Idea.** Every quantity is an array over the lanes, one for each component. The stages, the error and the factors by which
-//! steps may change are loops over such arrays, compiled for the widest vector instructions that the machine has.
+//! **Idea.** Every quantity is an array over the lanes, one for each component. The stages, the error, whether a step holds and
+//! how long the next one is are loops over such arrays, compiled for the widest vector instructions that the machine has.
 
 use super::super::Tolerance;
+use super::super::aligned::Aligned;
 use super::super::kink::PLACES;
 use super::super::tableau::{A, ERROR, STAGES};
-use super::{pace, shared_or_own};
+use super::pace::{self, Limits};
+use super::shared_or_own;
 use crate::contract::{Batch, Parameters, VectorField};
 
 /// The arrays.
@@ -15,35 +17,47 @@ pub(super) struct Lanes {
     pub(super) count: usize,
     pub(super) n: usize,
     /// `[n × lanes]`.
-    pub(super) x: Vec<f64>,
-    pub(super) next: Vec<f64>,
-    pub(super) stage: Vec<f64>,
-    pub(super) slopes: [Vec<f64>; STAGES],
+    pub(super) x: Aligned,
+    pub(super) next: Aligned,
+    pub(super) stage: Aligned,
+    pub(super) slopes: [Aligned; STAGES],
     /// `[k × lanes]` where every trajectory has parameters of its own, else empty.
-    own: Vec<f64>,
+    own: Aligned,
     /// `[switches × lanes]`: the sign of each, and its value at the start of the step, 0 where it has just changed sign.
-    pub(super) signs: Vec<f64>,
-    pub(super) switches: Vec<f64>,
+    pub(super) signs: Aligned,
+    pub(super) switches: Aligned,
     /// `[switches × lanes]` values at each of [`PLACES`].
-    pub(super) ahead: [Vec<f64>; PLACES.len()],
-    /// `[lanes]` signed length of the step to try.
-    pub(super) h: Vec<f64>,
+    pub(super) ahead: [Aligned; PLACES.len()],
+    /// `[lanes]` time reached, and that at the end of the step that was tried.
+    pub(super) time: Aligned,
+    pub(super) end: Aligned,
+    /// `[lanes]` signed length of the step to try, and of the one after it.
+    pub(super) h: Aligned,
+    pub(super) planned: Aligned,
+    /// `[lanes]` the factor by which it may be longer, at most.
+    pub(super) most: Aligned,
     /// `[lanes]` error of the step that was tried, in units of the tolerance; NaN if anything is not finite.
-    pub(super) error: Vec<f64>,
-    /// `[lanes]` largest component at its end.
-    pub(super) largest: Vec<f64>,
-    /// `[lanes]` factor (1) of the ensemble without and with its second power.
-    pub(super) shrink: Vec<f64>,
-    pub(super) growth: Vec<f64>,
-    /// `[lanes]` err_prev.
-    before: Vec<f64>,
+    pub(super) error: Aligned,
+    /// `[lanes]` 1 where that error is small enough, else 0.
+    pub(super) accepted: Aligned,
+    /// `[lanes]` binary logarithm of the second power in (1) of the ensemble.
+    pub(super) second: Aligned,
+    /// `[lanes]` largest component at the ends of the step, and beyond which magnitude a trajectory runs to infinity: 0 in a
+    /// lane without one.
+    pub(super) largest: Aligned,
+    pub(super) bound: Aligned,
+    /// `[lanes]` steps tried, and those accepted.
+    pub(super) tried: Aligned,
+    pub(super) steps: Aligned,
+    /// `[lanes]` 1 where a trajectory may have ended, else 0.
+    pub(super) remarkable: Aligned,
 }
 
 impl Lanes {
     /// Room for `count` trajectories with `own` parameters each.
     pub(super) fn new(field: &dyn VectorField, count: usize, own: usize) -> Lanes {
         let n = field.dim();
-        let of = |components: usize| vec![0.0; components * count];
+        let of = |components: usize| Aligned::zeros(components * count);
         let switches = field.switch_count();
         Lanes {
             count,
@@ -56,12 +70,19 @@ impl Lanes {
             signs: of(switches),
             switches: of(switches),
             ahead: std::array::from_fn(|_| of(switches)),
+            time: of(1),
+            end: of(1),
             h: of(1),
+            planned: of(1),
+            most: of(1),
             error: of(1),
+            accepted: of(1),
+            second: of(1),
             largest: of(1),
-            shrink: of(1),
-            growth: of(1),
-            before: of(1),
+            bound: of(1),
+            tried: of(1),
+            steps: of(1),
+            remarkable: of(1),
         }
     }
 
@@ -75,21 +96,29 @@ impl Lanes {
         self.x.iter().skip(l).step_by(self.count).copied().collect()
     }
 
-    /// Lane `l` takes over a trajectory.
-    pub(super) fn set(&mut self, l: usize, start: &[f64], own: &[f64]) {
+    /// Lane `l` takes over a trajectory, which begins at that time and runs to infinity beyond that bound.
+    pub(super) fn set(&mut self, l: usize, start: &[f64], own: &[f64], time: f64, bound: f64) {
         start.iter().enumerate().for_each(|(i, x)| self.x[i * self.count + l] = *x);
         own.iter().enumerate().for_each(|(k, p)| self.own[k * self.count + l] = *p);
-        self.before[l] = pace::SMALLEST_BEFORE;
+        (self.time[l], self.bound[l]) = (time, bound);
+        (self.tried[l], self.steps[l]) = (0.0, 0.0);
+        (self.most[l], self.second[l]) = (pace::MOST, pace::second(0.0));
     }
 
-    /// The error of the step of lane `l` influences the next one.
-    pub(super) fn remember_error(&mut self, l: usize) {
-        self.before[l] = self.error[l].max(pace::SMALLEST_BEFORE);
+    /// Lane `l` is left without a trajectory: its state stays where it is.
+    pub(super) fn clear(&mut self, l: usize) {
+        (self.h[l], self.bound[l]) = (0.0, 0.0);
     }
 
-    /// Tries a step in every lane: stages 2 to 7, error, and by how much the next step may be longer.
-    pub(super) fn advance(&mut self, field: &dyn VectorField, parameters: &[f64], tolerance: &Tolerance) {
-        pulp::Arch::new().dispatch(Advance { lanes: self, field, parameters, tolerance });
+    /// Tries a step in every lane: stages 2 to 7, error, whether the step holds, and how long the next one is.
+    pub(super) fn advance(
+        &mut self,
+        field: &dyn VectorField,
+        parameters: &[f64],
+        tolerance: &Tolerance,
+        limits: &Limits,
+    ) {
+        pulp::Arch::new().dispatch(Advance { lanes: self, field, parameters, tolerance, limits });
     }
 
     #[inline(always)]
@@ -112,10 +141,13 @@ impl Lanes {
     #[inline(always)]
     fn stage<const N: usize>(&mut self, row: usize) {
         let count = self.count;
-        let a: [f64; N] = std::array::from_fn(|j| A[row][j]);
+        let mut a = [0.0; N];
+        a.copy_from_slice(A[row]);
         let target = if N + 1 == STAGES { &mut self.next } else { &mut self.stage };
         for (i, (to, x)) in target.chunks_exact_mut(count).zip(self.x.chunks_exact(count)).enumerate() {
-            combine(to, x, &self.h, a, std::array::from_fn(|j| &self.slopes[j][i * count..][..count]));
+            let mut k: [&[f64]; N] = [&[]; N];
+            (0..N).for_each(|j| k[j] = &self.slopes[j][i * count..][..count]);
+            combine(to, x, &self.h, a, k);
         }
     }
 
@@ -137,8 +169,9 @@ impl Lanes {
         self.error.fill(0.0);
         self.largest.fill(0.0);
         for i in 0..self.n {
-            let ends = [&self.x, &self.next].map(|x| &x[i * count..][..count]);
-            let k = std::array::from_fn(|j| &self.slopes[j][i * count..][..count]);
+            let ends = [&self.x[i * count..], &self.next[i * count..]];
+            let mut k: [&[f64]; STAGES] = [&[]; STAGES];
+            (0..STAGES).for_each(|j| k[j] = &self.slopes[j][i * count..]);
             let tolerance = [tolerance.absolute[i], tolerance.relative];
             add_errors(&mut self.error, &mut self.largest, &self.h, ends, k, tolerance);
         }
@@ -146,13 +179,13 @@ impl Lanes {
         self.error.iter_mut().for_each(|error| *error = (*error * mean).sqrt());
     }
 
-    /// The lanes of which `accepted` says so go to the end of their step, the others stay.
-    pub(super) fn take_over(&mut self, accepted: impl Iterator<Item = bool>) {
+    /// The lanes whose step holds go to its end, the others stay. Returns whether any is remarkable.
+    pub(super) fn take_over(&mut self, limits: &Limits) -> bool {
         std::mem::swap(&mut self.x, &mut self.next);
         let [first, .., last] = &mut self.slopes;
         std::mem::swap(first, last);
         std::mem::swap(&mut self.switches, &mut self.ahead[PLACES.len() - 1]);
-        for (l, _) in accepted.enumerate().filter(|(_, accepted)| !accepted) {
+        for l in (0..self.count).filter(|&l| self.accepted[l] == 0.0) {
             for at in (l..self.x.len()).step_by(self.count) {
                 self.x[at] = self.next[at];
                 self.slopes[0][at] = self.slopes[STAGES - 1][at];
@@ -160,11 +193,14 @@ impl Lanes {
             let back = &self.ahead[PLACES.len() - 1];
             (l..back.len()).step_by(self.count).for_each(|at| self.switches[at] = back[at]);
         }
+        pulp::Arch::new().dispatch(GoOn { lanes: self, limits });
+        self.remarkable.iter().any(|&remarkable| remarkable != 0.0)
     }
 
     /// Only these lanes stay.
     pub(super) fn keep(&mut self, kept: &[usize]) {
-        let scalars = [&mut self.h, &mut self.before];
+        let scalars = [&mut self.time, &mut self.h, &mut self.most, &mut self.second, &mut self.bound];
+        let scalars = scalars.into_iter().chain([&mut self.tried, &mut self.steps]);
         let of_lanes =
             [&mut self.x, &mut self.slopes[0], &mut self.own, &mut self.signs, &mut self.switches].into_iter();
         for array in of_lanes.chain(scalars) {
@@ -181,16 +217,17 @@ impl Lanes {
         self.ahead.iter_mut().for_each(|values| values.truncate(self.signs.len()));
         self.slopes.iter_mut().for_each(|k| k.truncate(self.n * self.count));
         [&mut self.next, &mut self.stage].into_iter().for_each(|v| v.truncate(self.n * self.count));
-        let scalars = [&mut self.error, &mut self.largest, &mut self.shrink, &mut self.growth];
-        scalars.into_iter().for_each(|v| v.truncate(self.count));
+        let scalars = [&mut self.end, &mut self.planned, &mut self.error, &mut self.accepted, &mut self.largest];
+        scalars.into_iter().chain([&mut self.remarkable]).for_each(|v| v.truncate(self.count));
     }
 }
 
 /// x + h Σ a k. (A function of its own, so that the compiler knows that `to` is none of the others.)
 #[inline(always)]
-fn combine<const N: usize>(to: &mut [f64], x: &[f64], h: &[f64], a: [f64; N], k: [&[f64]; N]) {
+fn combine<const N: usize>(to: &mut [f64], x: &[f64], h: &[f64], a: [f64; N], mut k: [&[f64]; N]) {
     let count = to.len();
-    let (x, h, k) = (&x[..count], &h[..count], k.map(|k| &k[..count]));
+    let (x, h) = (&x[..count], &h[..count]);
+    k.iter_mut().for_each(|k| *k = &k[..count]);
     for l in 0..count {
         let mut change = a[0] * k[0][l];
         for j in 1..N {
@@ -207,11 +244,12 @@ fn add_errors(
     largest: &mut [f64],
     h: &[f64],
     ends: [&[f64]; 2],
-    k: [&[f64]; STAGES],
+    mut k: [&[f64]; STAGES],
     tolerance: [f64; 2],
 ) {
     let count = error.len();
-    let (h, largest, ends, k) = (&h[..count], &mut largest[..count], ends.map(|x| &x[..count]), k.map(|k| &k[..count]));
+    let (h, largest, ends) = (&h[..count], &mut largest[..count], [&ends[0][..count], &ends[1][..count]]);
+    k.iter_mut().for_each(|k| *k = &k[..count]);
     for l in 0..count {
         let mut e = ERROR[0] * k[0][l];
         for j in 2..STAGES {
@@ -236,6 +274,7 @@ struct Advance<'a, 'b> {
     field: &'b dyn VectorField,
     parameters: &'b [f64],
     tolerance: &'b Tolerance,
+    limits: &'b Limits,
 }
 
 impl pulp::NullaryFnOnce for Advance<'_, '_> {
@@ -243,9 +282,26 @@ impl pulp::NullaryFnOnce for Advance<'_, '_> {
 
     #[inline(always)]
     fn call(self) {
-        let Advance { lanes, field, parameters, tolerance } = self;
+        let Advance { lanes, field, parameters, tolerance, limits } = self;
         lanes.stages(field, parameters);
         lanes.errors(tolerance);
-        pace::all_factors(&lanes.error, &lanes.before, &mut lanes.shrink, &mut lanes.growth);
+        let Lanes { error, bound, time, h, accepted, end, planned, most, second, .. } = lanes;
+        pace::judge(limits, [error, bound, time, h], accepted, end, planned, most, second);
+    }
+}
+
+/// The end of a sweep, likewise.
+struct GoOn<'a, 'b> {
+    lanes: &'a mut Lanes,
+    limits: &'b Limits,
+}
+
+impl pulp::NullaryFnOnce for GoOn<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Lanes { accepted, end, planned, largest, bound, time, h, tried, steps, remarkable, .. } = self.lanes;
+        pace::go_on(self.limits, [accepted, end, planned, largest, bound], time, h, tried, steps, remarkable);
     }
 }

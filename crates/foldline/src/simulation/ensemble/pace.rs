@@ -1,4 +1,4 @@
-//! How long steps are: the first one, and by which factor the next one may differ.
+//! Which steps hold, and how long they are: the first one, and by which factor the next one differs.
 //!
 //! **Source.** hairer1993, §II.4 (step control and first step); hairer1996, §IV.2 (the second factor of (1) of the ensemble).
 //!
@@ -14,27 +14,117 @@ const ALPHA: f64 = 0.2 - 0.75 * BETA;
 /// Limits of the factor.
 pub(super) const LEAST: f64 = 0.2;
 pub(super) const MOST: f64 = 10.0;
-/// What counts as the previous error at the first step, and at least.
-pub(super) const SMALLEST_BEFORE: f64 = 1e-4;
+/// What counts as the previous error at least, and at the first step.
+const SMALLEST_BEFORE: f64 = 1e-4;
 
-/// (1) of the ensemble before it is clamped, without and with the second power.
+/// What ends steps and trajectories, the same for all lanes.
+pub(super) struct Limits {
+    /// End of the time span, and the sign of the direction in which it lies.
+    pub(super) end: f64,
+    pub(super) sign: f64,
+    /// Longest step.
+    pub(super) longest: f64,
+    /// Most steps, accepted and rejected.
+    pub(super) steps: f64,
+}
+
+impl Limits {
+    /// Where a step of that length from that time ends.
+    #[inline(always)]
+    pub(super) fn end_of(&self, time: f64, h: f64) -> f64 {
+        if (self.end - time - h) * self.sign <= 0.0 { self.end } else { time + h }
+    }
+}
+
+/// Binary logarithm of the first power in (1) of the ensemble.
 #[inline(always)]
-fn factors(error: f64, before: f64) -> [f64; 2] {
+fn first(error: f64) -> f64 {
     // Between these the factor goes from beyond the one limit to beyond the other.
     let error = if error > 1e-10 { error } else { 1e-10 };
     let error = if error < 1e10 { error } else { 1e10 };
-    let power = -ALPHA * log2(error);
-    [SAFETY * exp2(power), SAFETY * exp2(power + BETA * log2(before))]
+    -ALPHA * log2(error)
 }
 
-/// The same for all lanes.
+/// Binary logarithm of the second power, after a step with that error.
 #[inline(always)]
-pub(super) fn all_factors(error: &[f64], before: &[f64], shrink: &mut [f64], growth: &mut [f64]) {
+pub(super) fn second(error: f64) -> f64 {
+    BETA * log2(if error > SMALLEST_BEFORE { error } else { SMALLEST_BEFORE })
+}
+
+/// Whether the steps that were tried hold, where they end, and how long the next ones are. (What is written comes as arguments
+/// here and below, so that the compiler knows that all are different.)
+#[inline(always)]
+pub(super) fn judge(
+    limits: &Limits,
+    [error, bound, time, h]: [&[f64]; 4],
+    accepted: &mut [f64],
+    end: &mut [f64],
+    planned: &mut [f64],
+    most: &mut [f64],
+    before: &mut [f64],
+) {
     let count = error.len();
-    let (before, shrink, growth) = (&before[..count], &mut shrink[..count], &mut growth[..count]);
+    let (bound, time, h) = (&bound[..count], &time[..count], &h[..count]);
+    let (accepted, end, planned) = (&mut accepted[..count], &mut end[..count], &mut planned[..count]);
+    let (most, before) = (&mut most[..count], &mut before[..count]);
     for l in 0..count {
-        [shrink[l], growth[l]] = factors(error[l], before[l]);
+        let holds = (error[l] <= 1.0) & (bound[l] > 0.0);
+        let factor = SAFETY * exp2(first(error[l]) + if holds { before[l] } else { 0.0 });
+        let limit = if holds { most[l] } else { 1.0 };
+        let factor = if factor < limit { factor } else { limit };
+        // A NaN makes the step as short as it may become.
+        let factor = if (factor > LEAST) & !error[l].is_nan() { factor } else { LEAST };
+        let next = h[l] * factor;
+        let next = if next < limits.longest { next } else { limits.longest };
+        planned[l] = if next > -limits.longest { next } else { -limits.longest };
+        accepted[l] = if holds { 1.0 } else { 0.0 };
+        end[l] = limits.end_of(time[l], h[l]);
+        before[l] = if holds { second(error[l]) } else { before[l] };
+        most[l] = if holds { MOST } else { 1.0 };
     }
+}
+
+/// Counts the steps, goes to the ends of those that hold, and on to the next length; says which trajectories may have ended.
+#[inline(always)]
+pub(super) fn go_on(
+    limits: &Limits,
+    [accepted, end, planned, largest, bound]: [&[f64]; 5],
+    time: &mut [f64],
+    h: &mut [f64],
+    tried: &mut [f64],
+    steps: &mut [f64],
+    remarkable: &mut [f64],
+) {
+    let count = accepted.len();
+    let (end, planned, largest, bound) = (&end[..count], &planned[..count], &largest[..count], &bound[..count]);
+    let (time, h, remarkable) = (&mut time[..count], &mut h[..count], &mut remarkable[..count]);
+    let (tried, steps) = (&mut tried[..count], &mut steps[..count]);
+    for l in 0..count {
+        let holds = accepted[l] != 0.0;
+        tried[l] += 1.0;
+        steps[l] += accepted[l];
+        let now = if holds { end[l] } else { time[l] };
+        let remaining = limits.end - now;
+        // A last step a little longer than planned saves a tiny one.
+        let last = holds & (planned[l].abs() * 1.01 >= remaining.abs());
+        let next = if last { remaining } else { planned[l] };
+        let ended =
+            (remaining == 0.0) | (tried[l] >= limits.steps) | too_small(next, now) | escaped(largest[l], bound[l]);
+        remarkable[l] = if ended & (bound[l] > 0.0) { 1.0 } else { 0.0 };
+        (time[l], h[l]) = (now, next);
+    }
+}
+
+/// Whether a trajectory runs to infinity, or is there.
+#[inline(always)]
+pub(super) fn escaped(largest: f64, bound: f64) -> bool {
+    (largest > bound) | largest.is_nan()
+}
+
+/// Whether a step is too short to get on.
+#[inline(always)]
+pub(super) fn too_small(h: f64, time: f64) -> bool {
+    (h.abs() <= 4.0 * f64::EPSILON * time.abs()) | (h.abs() < 1e-300)
 }
 
 /// Binary logarithm of a positive normal number to 2e-5: that of a mantissa m is 2/ln 2 · artanh((m - 1)/(m + 1)).
@@ -91,13 +181,13 @@ impl Ensemble<'_> {
         let weight =
             |i: usize, c: usize| 1.0 / (self.tolerance.absolute[i] + self.tolerance.relative * x[i * m + c].abs());
         let size = |c: usize, of: &dyn Fn(usize) -> f64| (0..n).map(|i| (of(i * m + c) * weight(i, c)).powi(2)).sum();
-        let span = (self.end - self.begin).abs();
+        let span = (self.limits.end - self.begin).abs();
         let trial = |c: usize| {
             let [x, f]: [f64; 2] = [size(c, &|at| x[at]), size(c, &|at| f[at])];
             if x > 1e-10 && f > 1e-10 { (0.01 * (x / f).sqrt()).min(span) } else { span.min(1e-6) }
         };
         let h: Vec<f64> = (0..m).map(trial).collect();
-        let moved: Vec<f64> = (0..n * m).map(|at| x[at] + self.sign * h[at % m] * f[at]).collect();
+        let moved: Vec<f64> = (0..n * m).map(|at| x[at] + self.limits.sign * h[at % m] * f[at]).collect();
         let there = evaluate(&moved);
         let first = |c: usize| {
             let curvature: f64 = size(c, &|at| there[at] - f[at]);
@@ -106,7 +196,7 @@ impl Ensemble<'_> {
             let second = if largest > 1e-15 { (0.01 / largest).powf(0.2) } else { (h[c] * 1e-3).max(1e-6) };
             // f may be undefined at the trial point although it is not at the start.
             let step = if second.is_finite() { second.min(100.0 * h[c]) } else { 1e-3 * h[c] };
-            self.sign * step.min(span).min(self.longest)
+            self.limits.sign * step.min(span).min(self.limits.longest)
         };
         let steps: Vec<f64> = (0..m).map(first).collect();
         for (c, &l) in columns.iter().enumerate() {
@@ -132,16 +222,17 @@ mod tests {
 
     #[test]
     fn factors_are_powers_to_five_digits() {
-        let mut error = 1e-10;
+        let mut error: f64 = 1e-10;
         while error < 1e10 {
-            for before in [1e-4, 0.3, 1.0] {
-                let [shrink, growth] = factors(error, before);
+            for before in [1e-4f64, 0.3, 1.0] {
                 let exact = SAFETY * error.powf(-ALPHA);
+                let shrink = SAFETY * exp2(first(error));
                 assert!((shrink / exact - 1.0).abs() < 1e-5, "{error}: {shrink} against {exact}");
+                let growth = SAFETY * exp2(first(error) + second(before));
                 assert!((growth / (exact * before.powf(BETA)) - 1.0).abs() < 1e-5, "{error}, {before}");
             }
             error *= 1.37;
         }
-        assert!(factors(0.0, 1.0)[0] > MOST && factors(f64::INFINITY, 1.0)[0] < LEAST);
+        assert!(SAFETY * exp2(first(0.0)) > MOST && SAFETY * exp2(first(f64::INFINITY)) < LEAST);
     }
 }

@@ -22,7 +22,7 @@ impl Ensemble<'_> {
         self.field.switches(at, &mut here);
         let mut f = vec![0.0; at.states.len()];
         self.field.evaluate(at, &mut f);
-        let moved: Vec<f64> = at.states.iter().zip(&f).map(|(x, f)| x + self.sign * 1e-9 * f).collect();
+        let moved: Vec<f64> = at.states.iter().zip(&f).map(|(x, f)| x + self.limits.sign * 1e-9 * f).collect();
         self.field.switches(Batch { states: &moved, ..at }, &mut later);
         let sign = |(here, later): (&f64, &f64)| if *here == 0.0 { *later } else { *here }.signum();
         (here.iter().zip(&later).map(sign).collect(), here)
@@ -50,9 +50,6 @@ impl Ensemble<'_> {
     /// Ends the step that lane `l` tries where the first switch changes sign; the kink there, if there is one. A kink at the
     /// very start leaves no step.
     pub(super) fn shortened(&mut self, l: usize, again: &mut Shortened) -> Option<Kink> {
-        if self.lanes.signs.is_empty() {
-            return None;
-        }
         let (n, lanes) = (self.lanes.n, self.lanes.count);
         let step = self.step_of(l);
         let kink = kink::first(&step, again, |switch| {
@@ -72,6 +69,7 @@ impl Ensemble<'_> {
             (1..STAGES).for_each(|k| self.lanes.slopes[k][i * lanes + l] = again.slopes[k][i]);
         }
         self.lanes.h[l] = length;
+        self.lanes.end[l] = self.limits.end_of(self.lanes.time[l], length);
         Some(kink)
     }
 
