@@ -88,7 +88,7 @@ impl Scheme {
     }
 
     /// ℓ_k(s): the product of what is left of node k and of what is right of it, and exactly 1 at the node.
-    fn weigh(&self, s: f64, weights: &mut [f64]) {
+    pub fn weigh(&self, s: f64, weights: &mut [f64]) {
         let mut left = 1.0;
         for ((w, c), b) in weights.iter_mut().zip(&self.nodes).zip(&self.barycentric) {
             *w = b * left;

@@ -99,22 +99,73 @@ pub fn halved(errors: &[f64], mesh: &Mesh, degree: usize) -> (Vec<f64>, Mesh) {
     (whole.windows(2).map(error).collect(), whole)
 }
 
-/// A periodic profile carried to another mesh by evaluating its polynomials.
-pub fn transferred(profile: &[f64], n: usize, scheme: &Scheme, from: &Mesh, to: &Mesh) -> Vec<f64> {
-    let block = (scheme.degree + 1) * n;
-    let mut out = vec![0.0; (to.len() - 1) * block];
-    let mut j = 0;
-    for (pair, nodes) in to.windows(2).zip(out.chunks_exact_mut(block)) {
-        for (c, x) in scheme.nodes.iter().zip(nodes.chunks_exact_mut(n)) {
-            let t = pair[0] + (pair[1] - pair[0]) * c;
+/// Whether two meshes have the same boundaries.
+pub fn same(a: &Mesh, b: &Mesh) -> bool {
+    std::sync::Arc::ptr_eq(a, b) || a == b
+}
+
+/// From one mesh to another.
+#[derive(Clone, Debug)]
+pub struct Passage {
+    from: Mesh,
+    to: Mesh,
+    degree: usize,
+    /// Of every node of the new mesh the old interval in which it lies.
+    within: Vec<usize>,
+    /// … and what the nodes there contribute, `[N (m + 1)][m + 1]`.
+    weights: Vec<f64>,
+}
+
+impl Passage {
+    /// For polynomials of that scheme.
+    pub fn new(scheme: &Scheme, from: &Mesh, to: &Mesh) -> Passage {
+        let nodes = scheme.degree + 1;
+        let count = (to.len() - 1) * nodes;
+        let (mut within, mut weights) = (Vec::with_capacity(count), vec![0.0; count * nodes]);
+        let places = to.windows(2).flat_map(|pair| scheme.nodes.iter().map(move |c| pair[0] + (pair[1] - pair[0]) * c));
+        let mut j = 0;
+        for (t, own) in places.zip(weights.chunks_exact_mut(nodes)) {
             while j + 2 < from.len() && from[j + 1] <= t {
                 j += 1;
             }
-            let s = (t - from[j]) / (from[j + 1] - from[j]);
-            scheme.value_into(s, &profile[j * block..(j + 1) * block], x);
+            within.push(j);
+            scheme.weigh((t - from[j]) / (from[j + 1] - from[j]), own);
+        }
+        Passage { from: from.clone(), to: to.clone(), degree: scheme.degree, within, weights }
+    }
+
+    /// Whether it leads from one of these meshes to the other.
+    pub fn is_between(&self, from: &Mesh, to: &Mesh) -> bool {
+        same(&self.from, from) && same(&self.to, to)
+    }
+
+    /// A profile of n components, `[interval][node][component]`, on the new mesh.
+    pub fn carried(&self, profile: &[f64], n: usize) -> Vec<f64> {
+        match n {
+            4 => self.carried_by(profile, 4),
+            _ => self.carried_by(profile, n),
         }
     }
-    out
+
+    /// The usual number of components as a constant.
+    #[inline(always)]
+    fn carried_by(&self, profile: &[f64], n: usize) -> Vec<f64> {
+        let nodes = self.degree + 1;
+        let mut out = vec![0.0; self.within.len() * n];
+        let places = self.within.iter().zip(self.weights.chunks_exact(nodes));
+        for (x, (j, weights)) in out.chunks_exact_mut(n).zip(places) {
+            let own = profile[j * nodes * n..(j + 1) * nodes * n].chunks_exact(n);
+            for (w, node) in weights.iter().zip(own) {
+                x.iter_mut().zip(node).for_each(|(x, value)| *x += w * value);
+            }
+        }
+        out
+    }
+}
+
+/// A periodic profile carried to another mesh by evaluating its polynomials.
+pub fn transferred(profile: &[f64], n: usize, scheme: &Scheme, from: &Mesh, to: &Mesh) -> Vec<f64> {
+    Passage::new(scheme, from, to).carried(profile, n)
 }
 
 /// The cycle, or where it has no mesh one like it of that degree on a uniform one, whose profile is not known.

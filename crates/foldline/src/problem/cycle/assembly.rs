@@ -68,6 +68,7 @@ impl CycleProblem<'_> {
     /// Linearises at `u` and fills the blocks; the `rows` act through [`crate::contract::ZeroProblem::dot`].
     pub(super) fn fill(&mut self, u: &[f64], rows: &[f64]) {
         let (lanes, size) = (self.lanes(), self.profile_size());
+        self.lay_phase();
         self.gather(u);
         let parameters = self.setting.at(&u[size + 1..]);
         let parameters = Parameters::Shared(&parameters);

@@ -34,6 +34,7 @@ mod residual;
 
 use super::defect;
 use super::gauss::Scheme;
+use super::mesh::Passage;
 use super::{Setting, averages, extremes, mesh};
 use crate::contract::{Batch, Examination, Parameters, Singular, ZeroProblem};
 use crate::diagram::{Cycle, Mesh, Point, Solution, Trust};
@@ -72,6 +73,9 @@ pub struct CycleProblem<'a> {
     /// X̃' / s² at the Gauss points, `[L][m][n][W]`, normalised to unit length, and ⟨X̃, X̃'⟩ in that weight.
     phase: Vec<f64>,
     phase_offset: f64,
+    /// X̃ with its scalars; empty where there is none on this mesh. Whether `phase` is still to be made from it.
+    anchored: Vec<f64>,
+    unphased: bool,
     scale: Vec<f64>,
     period_scale: f64,
     system: System,
@@ -92,7 +96,12 @@ pub struct CycleProblem<'a> {
     trace: f64,
     /// What was measured last. Mesh and errors belong together only for the point they were measured at.
     measured: RefCell<Option<Measured>>,
+    /// How the last pairs of meshes are passed between.
+    passages: RefCell<Vec<Passage>>,
 }
+
+/// Pairs of meshes that are remembered: one step goes to and fro between those of its ends and of the point before.
+const PASSAGES: usize = 4;
 
 impl<'a> CycleProblem<'a> {
     /// Polynomials of degree `degree` on `mesh`.
@@ -115,6 +124,8 @@ impl<'a> CycleProblem<'a> {
             times: Vec::new(),
             phase: Vec::new(),
             phase_offset: 0.0,
+            anchored: Vec::new(),
+            unphased: false,
             period_scale: 1.0,
             states: Vec::new(),
             ends: Vec::new(),
@@ -124,8 +135,9 @@ impl<'a> CycleProblem<'a> {
             coupled: vec![false; n * n],
             trace: 0.0,
             measured: RefCell::new(None),
+            passages: RefCell::new(Vec::new()),
         };
-        problem.set_mesh(mesh);
+        problem.arrange();
         problem
     }
 
@@ -133,7 +145,7 @@ impl<'a> CycleProblem<'a> {
     pub fn like(setting: Setting<'a>, cycle: &Cycle) -> CycleProblem<'a> {
         let mut problem = CycleProblem::new(setting, cycle.degree, &cycle.mesh);
         problem.forcing_periods = cycle.forcing_periods;
-        problem.set_mesh(&cycle.mesh);
+        problem.arrange();
         problem
     }
 
@@ -182,6 +194,81 @@ impl<'a> CycleProblem<'a> {
 
     fn h(&self, j: usize) -> f64 {
         self.mesh[j + 1] - self.mesh[j]
+    }
+
+    /// Makes room for everything on the current mesh.
+    fn arrange(&mut self) {
+        self.measured.replace(None);
+        self.anchored.clear();
+        self.unphased = false;
+        let (n, count, mesh) = (self.n, self.intervals(), &self.mesh);
+        self.system.resize(count);
+        (self.length, self.width) = (self.system.length(), self.system.lanes());
+        self.lengths = (0..self.system.places())
+            .map(|k| k / self.width + k % self.width * self.length)
+            .map(|j| if j < count { mesh[j + 1] - mesh[j] } else { 0.0 })
+            .collect();
+        let lanes = self.lanes();
+        self.times = match self.is_forced() {
+            true => (0..lanes).map(|at| self.time_of(at)).collect(),
+            false => Vec::new(),
+        };
+        self.phase.resize(lanes * n, 0.0);
+        self.states.resize(lanes * n, 0.0);
+        self.ends.resize(self.length * self.width * n, 0.0);
+        self.f.resize(lanes * n, 0.0);
+        self.fx.resize(lanes * n * n, 0.0);
+        self.fp.resize(lanes * n * self.setting.freedom(), 0.0);
+    }
+
+    /// What (3) takes from the point where the problem was anchored last, unless that is there already.
+    fn lay_phase(&mut self) {
+        if !std::mem::take(&mut self.unphased) {
+            return;
+        }
+        let (n, m) = (self.n, self.scheme.degree);
+        self.phase.fill(0.0);
+        if self.is_forced() {
+            return;
+        }
+        let (mut length, mut offset) = (0.0, 0.0);
+        let count = self.intervals();
+        let nodes = panel::by_component(&self.anchored[..self.profile_size()], m + 1, n);
+        let mut rises = vec![0.0; m * count];
+        for c in 0..n {
+            let own = &nodes[c * (m + 1) * count..(c + 1) * (m + 1) * count];
+            panel::multiply(&self.scheme.derivative, own, count, &mut rises);
+            let scale = 1.0 / (self.scale[c] * self.scale[c]);
+            for i in 0..m {
+                let weight = self.scheme.weights[i] * scale;
+                for lane in 0..self.width {
+                    for (t, j) in self.piece(lane).enumerate() {
+                        let (rise, h) = (rises[i * count + j], self.h(j));
+                        // With X̃' = rise / h.
+                        length += weight * rise * rise / h;
+                        offset += weight * own[(i + 1) * count + j] * rise;
+                        self.phase[((t * m + i) * n + c) * self.width + lane] = scale * rise / h;
+                    }
+                }
+            }
+        }
+        let norm = length.sqrt().max(f64::MIN_POSITIVE);
+        self.phase.iter_mut().for_each(|p| *p /= norm);
+        self.phase_offset = offset / norm;
+    }
+
+    /// A profile on another mesh.
+    fn passed(&self, profile: &[f64], from: &Mesh, to: &Mesh) -> Vec<f64> {
+        let mut known = self.passages.borrow_mut();
+        let at = known.iter().position(|passage| passage.is_between(from, to));
+        let at = at.unwrap_or_else(|| {
+            if known.len() == PASSAGES {
+                known.remove(0);
+            }
+            known.push(Passage::new(&self.scheme, from, to));
+            known.len() - 1
+        });
+        known[at].carried(profile, self.n)
     }
 
     /// A mesh for that tolerance at `u`, from the errors on the current one.
@@ -273,41 +360,19 @@ impl ZeroProblem for CycleProblem<'_> {
     }
 
     fn anchor(&mut self, u: &[f64]) {
-        let (n, m, size) = (self.n, self.scheme.degree, self.profile_size());
-        self.scale = self.relative_scale(u);
-        self.period_scale = u[size].abs().max(f64::MIN_POSITIVE);
-        self.phase.fill(0.0);
-        if self.is_forced() {
+        if self.anchored == u {
             return;
         }
-        let (mut length, mut offset) = (0.0, 0.0);
-        let count = self.intervals();
-        let nodes = panel::by_component(&u[..size], m + 1, n);
-        let mut rises = vec![0.0; m * count];
-        for c in 0..n {
-            let own = &nodes[c * (m + 1) * count..(c + 1) * (m + 1) * count];
-            panel::multiply(&self.scheme.derivative, own, count, &mut rises);
-            let scale = 1.0 / (self.scale[c] * self.scale[c]);
-            for i in 0..m {
-                let weight = self.scheme.weights[i] * scale;
-                for lane in 0..self.width {
-                    for (t, j) in self.piece(lane).enumerate() {
-                        let (rise, h) = (rises[i * count + j], self.h(j));
-                        // With X̃' = rise / h.
-                        length += weight * rise * rise / h;
-                        offset += weight * own[(i + 1) * count + j] * rise;
-                        self.phase[((t * m + i) * n + c) * self.width + lane] = scale * rise / h;
-                    }
-                }
-            }
-        }
-        let norm = length.sqrt().max(f64::MIN_POSITIVE);
-        self.phase.iter_mut().for_each(|p| *p /= norm);
-        self.phase_offset = offset / norm;
+        self.scale = self.relative_scale(u);
+        self.period_scale = u[self.profile_size()].abs().max(f64::MIN_POSITIVE);
+        self.anchored.clear();
+        self.anchored.extend_from_slice(u);
+        self.unphased = true;
     }
 
     fn residual(&mut self, u: &[f64], r: &mut [f64]) -> bool {
         let size = self.profile_size();
+        self.lay_phase();
         self.gather(u);
         let parameters = self.setting.at(&u[size + 1..]);
         let all = parameters;
@@ -365,34 +430,18 @@ impl ZeroProblem for CycleProblem<'_> {
     }
 
     fn set_mesh(&mut self, mesh: &Mesh) {
-        self.mesh = mesh.clone();
-        self.measured.replace(None);
-        let (n, count) = (self.n, mesh.len() - 1);
-        self.system.resize(count);
-        (self.length, self.width) = (self.system.length(), self.system.lanes());
-        self.lengths = (0..self.system.places())
-            .map(|k| k / self.width + k % self.width * self.length)
-            .map(|j| if j < count { mesh[j + 1] - mesh[j] } else { 0.0 })
-            .collect();
-        let lanes = self.lanes();
-        self.times = match self.is_forced() {
-            true => (0..lanes).map(|at| self.time_of(at)).collect(),
-            false => Vec::new(),
-        };
-        self.phase.resize(lanes * n, 0.0);
-        self.states.resize(lanes * n, 0.0);
-        self.ends.resize(self.length * self.width * n, 0.0);
-        self.f.resize(lanes * n, 0.0);
-        self.fx.resize(lanes * n * n, 0.0);
-        self.fp.resize(lanes * n * self.setting.freedom(), 0.0);
+        if !mesh::same(&self.mesh, mesh) {
+            self.mesh = mesh.clone();
+            self.arrange();
+        }
     }
 
     fn transfer(&self, v: &[f64], from: &Mesh, to: &Mesh) -> Vec<f64> {
-        if from == to {
+        if mesh::same(from, to) {
             return v.to_vec();
         }
         let size = v.len() - 1 - self.setting.freedom();
-        let mut out = mesh::transferred(&v[..size], self.n, &self.scheme, from, to);
+        let mut out = self.passed(&v[..size], from, to);
         out.extend_from_slice(&v[size..]);
         out
     }
