@@ -152,13 +152,17 @@ impl<T: Lane> Condensed<T> {
         }
     }
 
-    /// Writes how the inner nodes of interval j follow from its left end, `[m][n × n]`, once it is condensed.
-    pub fn inner(&self, j: usize, to: &mut [f64]) {
+    /// Writes how the inner nodes of all intervals follow from their left ends, `[m][n × n][stride]` with an interval for each of the
+    /// first entries of a line, once they are condensed.
+    pub fn inner(&self, stride: usize, to: &mut [f64]) {
         let (n, width, inner) = (self.n, self.n + self.q, self.m * self.n);
-        let (lane, place) = (j / self.length, j % self.length);
-        for (k, row) in to.chunks_exact_mut(n).enumerate() {
-            let own = (place * inner + self.slot(k / n, k % n)) * width;
-            row.iter_mut().zip(&self.coupling[own..own + n]).for_each(|(x, c)| *x = -c.lanes()[lane]);
+        for (k, line) in to.chunks_exact_mut(stride).enumerate() {
+            let (row, column) = (k / n, k % n);
+            let own = self.slot(row / n, row % n) * width + column;
+            for (t, c) in self.coupling[own..].iter().step_by(inner * width).take(self.length).enumerate() {
+                let places = line[..self.intervals].iter_mut().skip(t).step_by(self.length);
+                places.zip(c.lanes()).for_each(|(x, c)| *x = -c);
+            }
         }
     }
 
@@ -254,7 +258,9 @@ impl<T: Lane> Condensed<T> {
 /// At least that long; never shorter than it was, so that nothing is written twice when the mesh changes back and forth.
 fn room<X: Copy + Default>(v: &mut Vec<X>, length: usize) {
     if v.len() < length {
-        v.resize(length, X::default());
+        // What was there is not needed: it goes first, and no more is taken than that.
+        *v = Vec::new();
+        *v = vec![X::default(); length];
     }
 }
 

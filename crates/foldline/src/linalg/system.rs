@@ -57,8 +57,8 @@ impl System {
     }
 
     /// See [`Condensed::inner`].
-    pub fn inner(&self, j: usize, to: &mut [f64]) {
-        either!(self, s => s.inner(j, to));
+    pub fn inner(&self, stride: usize, to: &mut [f64]) {
+        either!(self, s => s.inner(stride, to));
     }
 
     /// See [`Condensed::transition`].

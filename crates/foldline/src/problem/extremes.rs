@@ -89,10 +89,13 @@ impl Orbit<'_> {
             (0..density).flat_map(|s| self.scheme.interpolation(s as f64 / density as f64)).collect();
         let by_component = panel::by_component(self.profile, nodes, n);
         let mut states = Vec::with_capacity((n + self.field.output_count()) * self.lanes());
+        states.resize(n * self.lanes(), 0.0);
         let mut sampled = vec![0.0; self.lanes()];
-        for own in by_component.chunks_exact(nodes * count) {
+        for (own, line) in by_component.chunks_exact(nodes * count).zip(states.chunks_exact_mut(self.lanes())) {
             panel::multiply(&weights, own, count, &mut sampled);
-            states.extend((0..count).flat_map(|j| sampled[j..].iter().step_by(count)));
+            for (s, values) in sampled.chunks_exact(count).enumerate() {
+                line[s..].iter_mut().step_by(density).zip(values).for_each(|(x, value)| *x = *value);
+            }
         }
         let places = (0..self.lanes()).map(|k| k as f64);
         self.with_outputs(states, &self.times(places))

@@ -13,7 +13,7 @@
 //!
 //! **Source.** lust2001; (2) is Liouville's formula.
 
-use crate::linalg::{axpy, dot, lu, periodic_schur};
+use crate::linalg::{axpy, dot, periodic_schur};
 use num_complex::Complex64;
 
 /// Multipliers and how far they can be trusted.
@@ -33,9 +33,7 @@ pub fn multipliers(transitions: &[f64], flow: &[f64], n: usize) -> Floquet {
     let mut log_trivial = 0.0;
     let mut sign = 1.0;
     let mut factors = Vec::with_capacity(count * (n - 1) * (n - 1));
-    let mut log_others = 0.0;
-    let mut pivots = vec![0; n];
-    let (mut g, mut block, mut line) = (vec![0.0; n * n], Vec::with_capacity(n * n), vec![0.0; n]);
+    let (mut g, mut line) = (vec![0.0; n * n], vec![0.0; n]);
     let (mut frame, mut next) = (Frame::new(n), Frame::new(n));
     frame.turn(&flow[..n]);
     for j in 0..count {
@@ -46,19 +44,13 @@ pub fn multipliers(transitions: &[f64], flow: &[f64], n: usize) -> Floquet {
         next.rows(&mut g, n, &mut line);
         sign *= g[0].signum();
         log_trivial += g[0].abs().ln();
-        let start = factors.len();
         for i in 1..n {
             factors.extend_from_slice(&g[i * n + 1..(i + 1) * n]);
         }
-        block.clear();
-        block.extend_from_slice(&factors[start..]);
-        log_others += match lu::factorise(&mut block, n - 1, &mut pivots) {
-            Ok(()) => lu::determinant(&block, n - 1, &pivots).1,
-            Err(_) => f64::NEG_INFINITY,
-        };
         std::mem::swap(&mut frame, &mut next);
     }
     let grouped = periodic_schur::group(&factors, n - 1);
+    let log_others = periodic_schur::log_determinant(&grouped, n - 1);
     let others = periodic_schur::eigenvalues(&grouped, n - 1);
     let unstable = others.iter().flatten().filter(|e| e.log_modulus > 0.0).count();
     let mut multipliers = vec![Complex64::new(sign * log_trivial.exp(), 0.0)];
@@ -71,15 +63,8 @@ pub fn multipliers(transitions: &[f64], flow: &[f64], n: usize) -> Floquet {
 
 /// Multipliers of a forced cycle, none of which is trivial. `transitions`: `[N]` G_j row-major n×n.
 pub fn forced(transitions: &[f64], n: usize) -> Floquet {
-    let mut pivots = vec![0; n];
-    let log_product = transitions
-        .chunks_exact(n * n)
-        .map(|g| {
-            let mut g = g.to_vec();
-            lu::factorise(&mut g, n, &mut pivots).map_or(f64::NEG_INFINITY, |()| lu::determinant(&g, n, &pivots).1)
-        })
-        .sum();
     let grouped = periodic_schur::group(transitions, n);
+    let log_product = periodic_schur::log_determinant(&grouped, n);
     let found = periodic_schur::eigenvalues(&grouped, n);
     let unstable = found.iter().flatten().filter(|e| e.log_modulus > 0.0).count();
     let multipliers = match found {

@@ -2,7 +2,7 @@
 
 use super::CycleProblem;
 use crate::contract::{Batch, Parameters, ZeroProblem};
-use crate::linalg::{max_abs, panel};
+use crate::linalg::panel;
 use crate::problem::defect::{self, Defect};
 use num_complex::Complex64;
 
@@ -29,6 +29,12 @@ fn spectrum_difference(spectrum: &[Complex64], other: &[Complex64]) -> f64 {
 
 /// Error of an interval that rounding alone may leave, relative.
 const ROUNDING: f64 = 32.0 * f64::EPSILON;
+
+/// Fills a line up with the last of its `count` values.
+fn repeat_last(line: &mut [f64], count: usize) {
+    let last = line[count - 1];
+    line[count..].fill(last);
+}
 
 /// Errors and the unknowns they belong to.
 pub(super) struct Measured {
@@ -76,7 +82,6 @@ impl CycleProblem<'_> {
     fn corrected_multipliers(&self, u: &[f64]) -> Option<[Vec<Complex64>; 2]> {
         let (n, m, count, size) = (self.n, self.scheme.degree, self.intervals(), self.profile_size());
         let (square, lanes, padded) = (n * n, count * (m + 1), defect::padded(count));
-        let last = |j: usize| j.min(count - 1);
         let known = self.measured.borrow();
         let known = known.as_ref()?;
         let times = self.sampling.times(&self.mesh, self.forcing_periods);
@@ -95,24 +100,24 @@ impl CycleProblem<'_> {
             let parameters = self.setting.at(&u[size + 1..]);
             let batch = Batch { lanes, states: &states, parameters: Parameters::Shared(&parameters), times: &times };
             self.setting.field.linearise(batch, &[], &mut f, &mut fx, &mut []);
-            if !max_abs(&fx).is_finite() || !max_abs(u).is_finite() {
-                return None;
-            }
+            let lengths: Vec<f64> = self.mesh.windows(2).map(|pair| (pair[1] - pair[0]) * u[size]).collect();
             for (k, from) in fx.chunks_exact(count).enumerate() {
                 let (entry, g) = (k / (m + 1), k % (m + 1));
                 let to = &mut jacobians[((entry * 2 + course) * (m + 1) + g) * padded..][..padded];
-                to.iter_mut().enumerate().for_each(|(j, x)| *x = self.h(last(j)) * u[size] * from[last(j)]);
+                to.iter_mut().zip(&lengths).zip(from).for_each(|((x, h), from)| *x = h * from);
+                repeat_last(to, count);
             }
         }
         let (mut nodes, mut transitions) = (vec![0.0; (m + 1) * square * padded], vec![0.0; square * 2 * padded]);
         (0..n).for_each(|c| nodes[c * (n + 1) * padded..][..padded].fill(1.0));
-        let (mut inner, mut own) = (vec![0.0; m * square], vec![0.0; square]);
-        for j in 0..padded {
-            self.system.inner(last(j), &mut inner);
-            self.system.transition(last(j), &mut own);
-            inner.iter().enumerate().for_each(|(k, x)| nodes[(square + k) * padded + j] = *x);
+        self.system.inner(padded, &mut nodes[square * padded..]);
+        nodes[square * padded..].chunks_exact_mut(padded).for_each(|line| repeat_last(line, count));
+        let mut own = vec![0.0; square];
+        for j in 0..count {
+            self.system.transition(j, &mut own);
             own.iter().enumerate().for_each(|(k, x)| (0..2).for_each(|c| transitions[(2 * k + c) * padded + j] = *x));
         }
+        transitions.chunks_exact_mut(padded).for_each(|line| repeat_last(line, count));
         defect::correct(&self.sampling, &nodes, &jacobians, &mut transitions, n);
         let corrected = |course: usize, u: &[f64]| {
             let transition = |j: usize, to: &mut [f64]| {
@@ -120,7 +125,8 @@ impl CycleProblem<'_> {
             };
             self.floquet_with(u, transition).multipliers
         };
-        Some([corrected(0, u), corrected(1, &better)])
+        let found = [corrected(0, u), corrected(1, &better)];
+        found.iter().flatten().all(|z| z.re.is_finite() && z.im.is_finite()).then_some(found)
     }
 
     fn measured_errors(&self, u: &[f64]) -> Measured {
