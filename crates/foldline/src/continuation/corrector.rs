@@ -26,6 +26,11 @@ pub enum Failure {
         /// Relative to the step.
         miss: f64,
     },
+    /// The same step backwards ends a share `miss` of it from where it began: another branch, or the other arm of a cusp, is close.
+    NotBack {
+        /// Relative to the step.
+        miss: f64,
+    },
     /// Stability changes on the way in a manner that nothing located explains: the step has probably ended on another branch.
     Unexplained,
     /// The point needs this mesh, and the step is too short to end on another mesh than it began on.
@@ -48,6 +53,12 @@ impl std::fmt::Display for Failure {
             }
             Failure::Elsewhere { angle, miss } => {
                 write!(f, "the branch turns too sharply (by {angle:.2} rad, {miss:.2} of a step off the prediction)")
+            }
+            Failure::NotBack { .. } => {
+                write!(
+                    f,
+                    "another branch, or the other arm of a cusp, is so close that the same step backwards leads there"
+                )
             }
             Failure::Unexplained => write!(f, "stability changes without a special point that explains it"),
             Failure::Remeshed(mesh) => write!(f, "the mesh keeps changing ({} intervals)", mesh.len().max(1) - 1),

@@ -155,7 +155,7 @@ pub fn follow(
                     tried.note(step, walk.problem.mesh().len().saturating_sub(1), &why);
                     step *= match why {
                         Failure::Unexplained => 0.25,
-                        Failure::Elsewhere { miss, .. } if miss > 1.0 => 0.25,
+                        Failure::Elsewhere { miss, .. } | Failure::NotBack { miss } if miss > 1.0 => 0.25,
                         Failure::Elsewhere { angle, .. } => (walk.settings.target_angle / angle).clamp(0.2, 0.5),
                         _ => 0.5,
                     };

@@ -169,7 +169,7 @@ impl Follow<'_> {
         let gap: Vec<f64> = left.u.iter().zip(&from).map(|(a, b)| a - b).collect();
         let distance = self.problem.dot(&tangent, &gap);
         if held && !self.stays_on_arm(left, &from, &tangent) {
-            return Err(Failure::Elsewhere { angle: 0.0, miss: 0.0 });
+            return Err(Failure::NotBack { miss: 0.0 });
         }
         let mut back: Vec<f64> =
             (0..from.len()).map(|i| from[i] + distance * (tangent[i] + 0.5 * (left.tangent[i] - tangent[i]))).collect();
@@ -178,7 +178,7 @@ impl Follow<'_> {
         let miss: Vec<f64> = back.iter().zip(&left.u).map(|(a, b)| a - b).collect();
         let miss = self.problem.relative_size(&miss, &left.u);
         if miss > BACK * self.settings.tolerance {
-            return Err(Failure::Elsewhere { angle: 0.0, miss: miss / distance.abs() });
+            return Err(Failure::NotBack { miss: miss / distance.abs() });
         }
         Ok(())
     }

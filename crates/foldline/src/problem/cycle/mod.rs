@@ -29,6 +29,7 @@
 
 mod assembly;
 mod errors;
+mod meshes;
 mod phase;
 mod residual;
 
@@ -39,18 +40,14 @@ use super::{Setting, averages, extremes, mesh};
 use crate::contract::{Batch, Examination, Parameters, Singular, ZeroProblem};
 use crate::diagram::{Cycle, Mesh, Point, Solution, Trust};
 use crate::linalg::lane::Eight;
-use crate::linalg::panel;
 use crate::linalg::system::System;
 use crate::linalg::{larger, max_abs};
-use crate::special::collapse;
 use crate::stability::floquet::{self, Floquet};
 use errors::Measured;
 use num_complex::Complex64;
 use std::cell::RefCell;
 
-/// Error of every interval of a new mesh, in tolerances: so much less than 1 that the mesh serves for the next points too …
-const TARGET: f64 = 0.1;
-/// … and the share of the density of the old mesh that it has at least.
+/// Share of the density of a mesh that the next one has at least.
 const KEPT: f64 = 0.6;
 
 /// Stated error over the estimated one. On the reference study `foldline verify` finds true errors of up to 2.2 estimates.
@@ -99,9 +96,6 @@ pub struct CycleProblem<'a> {
     /// How the last pairs of meshes are passed between.
     passages: RefCell<Vec<Passage>>,
 }
-
-/// Pairs of meshes that are remembered: one step goes to and fro between those of its ends and of the point before.
-const PASSAGES: usize = 4;
 
 impl<'a> CycleProblem<'a> {
     /// Polynomials of degree `degree` on `mesh`.
@@ -194,117 +188,6 @@ impl<'a> CycleProblem<'a> {
 
     fn h(&self, j: usize) -> f64 {
         self.mesh[j + 1] - self.mesh[j]
-    }
-
-    /// Makes room for everything on the current mesh.
-    fn arrange(&mut self) {
-        self.measured.replace(None);
-        self.anchored.clear();
-        self.unphased = false;
-        let (n, count, mesh) = (self.n, self.intervals(), &self.mesh);
-        self.system.resize(count);
-        (self.length, self.width) = (self.system.length(), self.system.lanes());
-        self.lengths = (0..self.system.places())
-            .map(|k| k / self.width + k % self.width * self.length)
-            .map(|j| if j < count { mesh[j + 1] - mesh[j] } else { 0.0 })
-            .collect();
-        let lanes = self.lanes();
-        self.times = match self.is_forced() {
-            true => (0..lanes).map(|at| self.time_of(at)).collect(),
-            false => Vec::new(),
-        };
-        self.phase.resize(lanes * n, 0.0);
-        self.states.resize(lanes * n, 0.0);
-        self.ends.resize(self.length * self.width * n, 0.0);
-        self.f.resize(lanes * n, 0.0);
-        self.fx.resize(lanes * n * n, 0.0);
-        self.fp.resize(lanes * n * self.setting.freedom(), 0.0);
-    }
-
-    /// What (3) takes from the point where the problem was anchored last, unless that is there already.
-    fn lay_phase(&mut self) {
-        if !std::mem::take(&mut self.unphased) {
-            return;
-        }
-        let (n, m) = (self.n, self.scheme.degree);
-        self.phase.fill(0.0);
-        if self.is_forced() {
-            return;
-        }
-        let (mut length, mut offset) = (0.0, 0.0);
-        let count = self.intervals();
-        let nodes = panel::by_component(&self.anchored[..self.profile_size()], m + 1, n);
-        let mut rises = vec![0.0; m * count];
-        for c in 0..n {
-            let own = &nodes[c * (m + 1) * count..(c + 1) * (m + 1) * count];
-            panel::multiply(&self.scheme.derivative, own, count, &mut rises);
-            let scale = 1.0 / (self.scale[c] * self.scale[c]);
-            for i in 0..m {
-                let weight = self.scheme.weights[i] * scale;
-                for lane in 0..self.width {
-                    for (t, j) in self.piece(lane).enumerate() {
-                        let (rise, h) = (rises[i * count + j], self.h(j));
-                        // With X̃' = rise / h.
-                        length += weight * rise * rise / h;
-                        offset += weight * own[(i + 1) * count + j] * rise;
-                        self.phase[((t * m + i) * n + c) * self.width + lane] = scale * rise / h;
-                    }
-                }
-            }
-        }
-        let norm = length.sqrt().max(f64::MIN_POSITIVE);
-        self.phase.iter_mut().for_each(|p| *p /= norm);
-        self.phase_offset = offset / norm;
-    }
-
-    /// A profile on another mesh.
-    fn passed(&self, profile: &[f64], from: &Mesh, to: &Mesh) -> Vec<f64> {
-        let mut known = self.passages.borrow_mut();
-        let at = known.iter().position(|passage| passage.is_between(from, to));
-        let at = at.unwrap_or_else(|| {
-            if known.len() == PASSAGES {
-                known.remove(0);
-            }
-            known.push(Passage::new(&self.scheme, from, to));
-            known.len() - 1
-        });
-        known[at].carried(profile, self.n)
-    }
-
-    /// A mesh for that tolerance at `u`, from the errors on the current one.
-    fn equidistributed(&self, u: &[f64], errors: &[f64], tolerance: f64, kept: f64) -> Option<Mesh> {
-        let (degree, target) = (self.scheme.degree, TARGET * tolerance);
-        if self.halves {
-            mesh::equidistributed_in_halves(errors, &self.mesh, degree, target, kept)
-        } else if self.nearly_doubled(u) {
-            let (errors, halved) = mesh::halved(errors, &self.mesh, degree);
-            mesh::equidistributed_in_halves(&errors, &halved, degree, target, kept)
-        } else {
-            mesh::equidistributed(errors, &self.mesh, degree, target, kept)
-        }
-    }
-
-    /// Whether the halves of the cycle differ little: it may be about to become a cycle of half the period.
-    fn nearly_doubled(&self, u: &[f64]) -> bool {
-        const PLACES: usize = 16;
-        let state = |t: f64, x: &mut [f64]| {
-            let (j, block) = (self.mesh.partition_point(|b| *b <= t).clamp(1, self.intervals()) - 1, self.block());
-            self.scheme.value_into((t - self.mesh[j]) / self.h(j), &u[j * block..(j + 1) * block], x);
-        };
-        let (mut x, mut y) = (vec![0.0; self.n], vec![0.0; self.n]);
-        let (mut apart, mut lowest) = (vec![0.0f64; self.n], vec![f64::INFINITY; self.n]);
-        let mut highest = vec![f64::NEG_INFINITY; self.n];
-        for k in 0..PLACES {
-            let t = 0.5 * (k as f64 + 0.3) / PLACES as f64;
-            state(t, &mut x);
-            state(t + 0.5, &mut y);
-            for c in 0..self.n {
-                apart[c] = apart[c].max((x[c] - y[c]).abs());
-                lowest[c] = lowest[c].min(x[c].min(y[c]));
-                highest[c] = highest[c].max(x[c].max(y[c]));
-            }
-        }
-        (0..self.n).all(|c| apart[c] <= collapse::NEARLY * (highest[c] - lowest[c]))
     }
 
     /// Multipliers from the last factorisation, which belongs to `u`.

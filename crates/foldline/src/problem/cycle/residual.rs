@@ -2,9 +2,46 @@
 
 use super::CycleProblem;
 use crate::linalg::lane::Lane;
+use crate::linalg::panel;
 use crate::problem::gauss::Scheme;
 
 impl CycleProblem<'_> {
+    /// What (3) takes from the point where the problem was anchored last, unless that is there already.
+    pub(super) fn lay_phase(&mut self) {
+        if !std::mem::take(&mut self.unphased) {
+            return;
+        }
+        let (n, m) = (self.n, self.scheme.degree);
+        self.phase.fill(0.0);
+        if self.is_forced() {
+            return;
+        }
+        let (mut length, mut offset) = (0.0, 0.0);
+        let count = self.intervals();
+        let nodes = panel::by_component(&self.anchored[..self.profile_size()], m + 1, n);
+        let mut rises = vec![0.0; m * count];
+        for c in 0..n {
+            let own = &nodes[c * (m + 1) * count..(c + 1) * (m + 1) * count];
+            panel::multiply(&self.scheme.derivative, own, count, &mut rises);
+            let scale = 1.0 / (self.scale[c] * self.scale[c]);
+            for i in 0..m {
+                let weight = self.scheme.weights[i] * scale;
+                for lane in 0..self.width {
+                    for (t, j) in self.piece(lane).enumerate() {
+                        let (rise, h) = (rises[i * count + j], self.h(j));
+                        // With X̃' = rise / h.
+                        length += weight * rise * rise / h;
+                        offset += weight * own[(i + 1) * count + j] * rise;
+                        self.phase[((t * m + i) * n + c) * self.width + lane] = scale * rise / h;
+                    }
+                }
+            }
+        }
+        let norm = length.sqrt().max(f64::MIN_POSITIVE);
+        self.phase.iter_mut().for_each(|p| *p /= norm);
+        self.phase_offset = offset / norm;
+    }
+
     /// Residuals of (1) and (2) at `u` into `r`, with the states gathered and f evaluated there; returns the sum of (3) without
     /// what belongs to the reference alone.
     pub(super) fn defects<T: Lane>(&self, u: &[f64], r: &mut [f64]) -> f64 {
