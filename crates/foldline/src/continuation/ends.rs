@@ -16,6 +16,8 @@ const NOTHING: f64 = 0.05;
 const HOME: f64 = 30.0;
 /// Distance from the start, in tolerances, from which on a branch can come back to it.
 const AWAY: f64 = 100.0;
+/// Step down to which one that cannot be looked into is tried in halves.
+const DIVISIBLE: f64 = 1e-3;
 
 /// What a run knows of its way back to the start.
 #[derive(Clone, Debug, Default)]
@@ -194,34 +196,54 @@ impl Follow<'_> {
     ///
     /// The start is passed where the branch goes through the plane across its tangent there, no farther from it than the errors that
     /// both state. Where special points lie closer to it than that, they decide where it is ([`super::side`]).
-    pub(super) fn closes(&mut self, left: &Station, right: &Station, cost: &mut Cost) -> Option<Station> {
-        let home = self.home.filter(|_| self.homecoming.away)?;
+    ///
+    /// # Errors
+    /// Why the start could not be looked for, where a shorter step may find it: passed unseen, the branch would be followed again.
+    pub(super) fn closes(
+        &mut self,
+        left: &Station,
+        right: &Station,
+        cost: &mut Cost,
+    ) -> Result<Option<Station>, Failure> {
+        let Some(home) = self.home.filter(|_| self.homecoming.away) else { return Ok(None) };
         let wanted = self.signature(home);
         let back = self.at_its_parameter(left, right, home, cost);
-        match back {
-            Some(back) if self.signature(&back.point) == wanted => Some(back),
-            back => self.crosses(left, right, home, cost).or(back),
+        if let Ok(Some(back)) = &back
+            && self.signature(&back.point) == wanted
+        {
+            return Ok(Some(back.clone()));
+        }
+        match (self.crosses(left, right, home, cost), back) {
+            (Some(found), _) => Ok(Some(found)),
+            (None, Err(why)) if self.angle(left, right).1 > DIVISIBLE => Err(why),
+            (None, back) => Ok(back.unwrap_or(None)),
         }
     }
 
     /// The start where its value of the parameter is met again.
-    fn at_its_parameter(&mut self, left: &Station, right: &Station, home: &Point, cost: &mut Cost) -> Option<Station> {
+    fn at_its_parameter(
+        &mut self,
+        left: &Station,
+        right: &Station,
+        home: &Point,
+        cost: &mut Cost,
+    ) -> Result<Option<Station>, Failure> {
         let value = home.parameters[self.free];
         let between = (left.parameter() - value) * (right.parameter() - value) <= 0.0;
         let same_way = home.parameter_slope() * self.direction * (right.slope() + left.slope()) > 0.0;
         let near = |r: &Vec<bool>| right.point.difference(home, &self.settings.scales, r) < 0.5;
         if !(between && same_way && self.settings.reflections.iter().any(near)) {
-            return None;
+            return Ok(None);
         }
-        let back = self.at_parameter(left, right, value, cost).ok()?;
+        let back = self.at_parameter(left, right, value, cost)?;
         let far = 10.0 * HOME * self.settings.tolerance;
         for reflection in self.settings.reflections.clone() {
             let images = self.images_of_home(&back, home, &reflection, far);
             if images.iter().any(|image| self.is_home(&back, home, image)) {
-                return Some(back);
+                return Ok(Some(back));
             }
         }
-        None
+        Ok(None)
     }
 
     /// The start where the plane across it is passed: next to a fold two solutions share a value of the parameter, and a

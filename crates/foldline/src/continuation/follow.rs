@@ -412,7 +412,7 @@ impl Follow<'_> {
         if let Some((value, there)) = self.beyond(left, &right, cost) {
             return Ok(Step { right: there, end: Some(Ending::Bound(value)) });
         }
-        if let Some(home) = self.closes(left, &right, cost) {
+        if let Some(home) = self.closes(left, &right, cost)? {
             return Ok(Step { right: home, end: Some(Ending::Closed) });
         }
         Ok(Step { right, end })
