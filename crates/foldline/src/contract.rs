@@ -164,6 +164,11 @@ pub trait ZeroProblem {
     /// Stability and trust at `u`, for which [`ZeroProblem::factorise`] was called last.
     fn examine(&mut self, u: &[f64]) -> Examination;
 
+    /// The stability alone, of [`ZeroProblem::examine`], where that is cheaper: what belongs to the spectrum, the rest as it comes.
+    fn stability(&mut self, u: &[f64]) -> Examination {
+        self.examine(u)
+    }
+
     /// Estimated error of the spectrum at `u`, relative to the larger of 1 and each modulus; `spectrum` is what
     /// [`ZeroProblem::examine`] found there. The last factorisation must be one near `u` on the current mesh, and stays.
     fn spectrum_error(&mut self, _u: &[f64], _spectrum: &[Complex64]) -> f64 {
@@ -207,6 +212,17 @@ pub trait ZeroProblem {
     }
 }
 
+/// What of a point is looked at beside its solution and its parameters.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Sight {
+    /// Its tangent.
+    Tangent,
+    /// Its tangent and its spectrum.
+    Stability,
+    /// All that is ever known of it.
+    Everything,
+}
+
 /// A scalar along the branch whose sign change between two points is a special point.
 pub trait Monitor: Send + Sync {
     /// What is found where the sign changes.
@@ -223,9 +239,9 @@ pub trait Monitor: Send + Sync {
         self.confirms(at)
     }
 
-    /// Whether the value depends on more than the tangent of the point.
-    fn reads_spectrum(&self) -> bool {
-        true
+    /// On what of a point the value depends, and whether it is confirmed.
+    fn reads(&self) -> Sight {
+        Sight::Stability
     }
 
     /// Whether `at`, which is close to the zero but not there yet, leaves it possible that the zero will be confirmed.

@@ -16,7 +16,6 @@
 //! **Fails when** the map is far from linear over the returns used. In few dimensions (1) has no remainder that would show it;
 //! the limit predicted one return earlier does, and following the prediction for a period.
 
-use crate::linalg::lu;
 use crate::simulation::Step;
 
 /// Largest number of crossings per period that is looked for.
@@ -271,19 +270,31 @@ impl Gram {
     /// γ of (1) for the m differences from number `from` on, from the normal equations G c = 1, γ = c / Σ c, slightly
     /// regularised.
     fn weights(&self, from: usize, m: usize) -> Option<Weights> {
-        let mut gram = [0.0; (MOST_TERMS + 2) * (MOST_TERMS + 2)];
-        for i in 0..m {
-            for j in 0..m {
-                gram[i * m + j] = self.0[from + i.max(j)][from + i.min(j)];
+        let trace: f64 = (0..m).map(|i| self.0[from + i][from + i]).sum();
+        // G = L D Lᵀ; row k has L D until its pivot is known.
+        let mut l = [[0.0; MOST_TERMS + 2]; MOST_TERMS + 2];
+        let (mut d, mut c) = ([0.0; MOST_TERMS + 2], [0.0; MOST_TERMS + 2]);
+        for k in 0..m {
+            let mut own = l[k];
+            for j in 0..k {
+                own[j] = self.0[from + k][from + j] - (0..j).map(|i| own[i] * l[j][i]).sum::<f64>();
             }
+            (d[k], c[k]) = (self.0[from + k][from + k] + 1e-14 * trace, 1.0);
+            for j in 0..k {
+                let factor = own[j] / d[j];
+                d[k] -= own[j] * factor;
+                c[k] -= factor * c[j];
+                own[j] = factor;
+            }
+            if d[k].is_nan() || d[k] <= 0.0 {
+                return None;
+            }
+            l[k] = own;
         }
-        let trace: f64 = (0..m).map(|i| gram[i * m + i]).sum();
-        (0..m).for_each(|i| gram[i * m + i] += 1e-14 * trace);
-        let mut pivots = [0; MOST_TERMS + 2];
-        lu::factorise(&mut gram[..m * m], m, &mut pivots[..m]).ok()?;
-        let mut c = [0.0; MOST_TERMS + 2];
-        c[..m].fill(1.0);
-        lu::solve(&gram[..m * m], m, &pivots[..m], &mut c[..m], 1);
+        c.iter_mut().zip(&d).take(m).for_each(|(c, d)| *c /= d);
+        for k in (0..m).rev() {
+            (0..k).for_each(|j| c[j] -= l[k][j] * c[k]);
+        }
         let sum: f64 = c.iter().sum();
         (sum.is_finite() && sum != 0.0).then(|| c.map(|c| c / sum))
     }

@@ -89,6 +89,13 @@ pub struct Station {
 }
 
 impl Station {
+    /// Turns the tangent, where need be, so that along it the parameter changes the way `slope` says.
+    pub fn head(&mut self, slope: f64) {
+        if self.slope() * slope < 0.0 {
+            self.tangent.iter_mut().chain(&mut self.point.tangent).for_each(|t| *t = -*t);
+        }
+    }
+
     /// The continuation parameter.
     pub fn parameter(&self) -> f64 {
         self.u[self.u.len() - 1]
@@ -292,13 +299,15 @@ const TIGHTER: f64 = 0.05;
 /// Defect, in tolerances, below which the next point may do with a mesh for four times the error.
 const RELAXED: f64 = 0.5;
 
-/// What [`refine`] aims at.
+/// How a point is to be [`refine`]d.
 #[derive(Clone, Copy, Debug)]
-pub struct Aim {
+pub struct Care {
     /// Share of the tolerance to begin with, as [`Station::share`].
     pub share: f64,
     /// How far from the point its matrix may be taken; see [`Settings::closeness`].
     pub close: f64,
+    /// Whether the mesh will probably do: its errors are measured only once all is known of the point.
+    pub trusted: bool,
 }
 
 /// Corrects `u` in `plane` and [`refine`]s it.
@@ -314,8 +323,8 @@ pub fn settle(
     cost: &mut Cost,
 ) -> Result<Station, Failure> {
     correct(problem, settings, &plane, &mut u, cost)?;
-    let aim = Aim { share: 1.0, close: settings.closeness(&problem.mesh(), plane.distance) };
-    refine(problem, settings, aim, plane.row, u, direction, cost)
+    let care = Care { share: 1.0, close: settings.closeness(&problem.mesh(), plane.distance), trusted: false };
+    refine(problem, settings, care, plane.row, u, direction, cost)
 }
 
 /// Adapts the mesh at `u`, which has been corrected, until the error estimate meets the tolerance, and both defects of the
@@ -327,16 +336,23 @@ pub fn settle(
 pub fn refine(
     problem: &mut dyn ZeroProblem,
     settings: &Settings,
-    aim: Aim,
+    care: Care,
     mut row: Vec<f64>,
     mut u: Vec<f64>,
     direction: f64,
     cost: &mut Cost,
 ) -> Result<Station, Failure> {
-    let (mut tolerance, mut tightened) = (aim.share * settings.tolerance, aim.share <= TIGHTER);
-    let mut coarser = problem.coarser_mesh(&u, tolerance);
+    let (mut tolerance, mut tightened) = (care.share * settings.tolerance, care.share <= TIGHTER);
+    let mut known = None;
+    if care.trusted {
+        let found = station(problem, u.clone(), &row, care.close, direction, cost)?;
+        u.clone_from(&found.u);
+        let fits = problem.better_mesh(&u, tolerance).is_none() && problem.coarser_mesh(&u, tolerance).is_none();
+        known = fits.then_some(found);
+    }
+    let mut coarser = if known.is_some() { None } else { problem.coarser_mesh(&u, tolerance) };
     for round in 0..4 {
-        for attempt in 0..10 {
+        for attempt in 0..if known.is_some() { 0 } else { 10 } {
             // A layer that lies differently between the nodes of every new mesh needs some more of them than one expects.
             let wanted = tolerance * 0.7f64.powi((attempt - 2).max(0));
             let Some(better) = coarser.take().or_else(|| problem.better_mesh(&u, wanted)) else { break };
@@ -349,7 +365,10 @@ pub fn refine(
             let plane = Plane { row: row.clone(), base: u.clone(), distance: 0.0 };
             correct(problem, settings, &plane, &mut u, cost)?;
         }
-        let mut found = station(problem, u, &row, aim.close, direction, cost)?;
+        let mut found = match known.take() {
+            Some(found) => found,
+            None => station(problem, u, &row, care.close, direction, cost)?,
+        };
         let trust = found.point.trust;
         let defect = found.point.multiplier_defect();
         // Multipliers can need a finer mesh than the profile. Where they do not get better with it, the defects say so.

@@ -259,7 +259,7 @@ impl Follow<'_> {
                 continue;
             }
             let length = self.angle(left, right).1;
-            for image in self.images_of_home(right, home, &reflection, 2.0 * length + HOME * tolerance) {
+            for image in self.images_of_home(right, home, &reflection, 1.5 * length + HOME * tolerance) {
                 if let Some(found) = self.crosses_at(left, right, home, &image, cost) {
                     return Some(found);
                 }

@@ -5,7 +5,7 @@
 //! next step.
 
 use super::Settings;
-use super::corrector::{Aim, Failure, Station, refine};
+use super::corrector::{Care, Failure, Station, refine};
 use super::diagnosis::{Past, Tried};
 use super::ends::Homecoming;
 use super::inspect::{Found, History};
@@ -58,8 +58,30 @@ struct Trail {
     history: History,
 }
 
+/// What a step aims at.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Aim {
+    /// The plane across the tangent at this distance.
+    Plane(f64),
+    /// The value of the parameter that the prediction has, about this far.
+    Value(f64),
+}
+
+impl Aim {
+    /// How far that is.
+    pub(super) fn step(self) -> f64 {
+        match self {
+            Aim::Plane(step) | Aim::Value(step) => step,
+        }
+    }
+}
+
 /// Steps longer than this many of the one before are predicted from the tangents alone.
 const FARTHEST: f64 = 2.5;
+/// By how much a step is longer if that takes it to a bound: what is left would be a step of its own.
+const STRETCHED: f64 = 1.2;
+/// How close to a bound a prediction must be, as a share of its way there, to be moved to it.
+const NEAR_BOUND: f64 = 1e-4;
 
 /// Steps shorter than this many tolerances begin and end on the same mesh: two meshes agree to the tolerance only.
 pub(super) const SHORT: f64 = 200.0;
@@ -74,6 +96,8 @@ const FINER: f64 = 1.0 / 32.0;
 /// Step down to which a branch point without a symmetry that makes it is taken for two branches that pass each other.
 const CROSSING: f64 = 2e-3;
 
+/// Growth of a step over the one before, at most: the prediction is by the cubic through both ends of that.
+const GROWTH: f64 = 2.5;
 /// Growth of the period while the parameter stands still, having moved before, that means that the period has no bound.
 const LONG: f64 = 3.0;
 /// Slope of a branch in its parameter below which it does not change along the branch but for rounding.
@@ -182,7 +206,7 @@ pub fn follow(
         let (angle, length) = walk.angle(&left, &right);
         // A bend that has become sharper will go on so.
         let trend = trail.as_ref().map_or(1.0, |t| angle / (length * t.curvature).max(1e-12)).clamp(1.0, 2.0);
-        let factor = (walk.settings.target_angle / (trend * angle).max(1e-12)).clamp(0.3, 2.0);
+        let factor = (walk.settings.target_angle / (trend * angle).max(1e-12)).clamp(0.3, GROWTH);
         step = (length * factor).clamp(walk.settings.min_step, walk.settings.max_step);
         let sideways = if walk.direction > 0.0 { 0 } else { -1 };
         for item in found {
@@ -324,6 +348,18 @@ impl Follow<'_> {
         true
     }
 
+    /// How a point next to `left` is refined.
+    pub(super) fn care(&self, left: &Station, step: f64) -> Care {
+        Care { share: left.share, close: self.settings.closeness(&left.mesh, step), trusted: false }
+    }
+
+    /// Whether the mesh of `left` has served for a step already and has room left: what the tolerance leaves of what is stated, which is
+    /// several times the estimate.
+    fn trusts(&self, left: &Station, trail: Option<&Trail>) -> bool {
+        let room = left.point.trust.discretisation < left.share * self.settings.tolerance;
+        room && trail.is_some_and(|trail| trail.mesh == left.mesh)
+    }
+
     /// Angle between the tangents, and distance along the left one.
     pub(super) fn angle(&mut self, left: &Station, right: &Station) -> (f64, f64) {
         self.place(left);
@@ -367,14 +403,79 @@ impl Follow<'_> {
         cost: &mut Cost,
     ) -> Result<Step, Failure> {
         let guess = self.predicted(left, trail, step);
-        let u = self.corrected(left, &guess, step, cost)?;
-        let aim = Aim { share: left.share, close: self.settings.closeness(&left.mesh, step) };
+        // A step that would pass a bound is aimed at it; where that fails, the bound is looked for after the step.
+        if let Some((nearer, landing)) = self.landing(left, trail, &guess, step)
+            && !self.is_short(&left.mesh, nearer)
+            && let Ok(landed) = self.tried(left, trail, &landing, Aim::Value(nearer), rigid, cost)
+        {
+            return Ok(landed);
+        }
+        self.place(left);
+        self.tried(left, trail, &guess, Aim::Plane(step), rigid, cost)
+    }
+
+    /// Where the prediction passes a bound, within the step or a little farther: at what step, and the prediction there, with the
+    /// parameter at the bound.
+    fn landing(&mut self, left: &Station, trail: Option<&Trail>, guess: &[f64], step: f64) -> Option<(f64, Vec<f64>)> {
+        let last = guess.len() - 1;
+        let (here, way) = (left.parameter(), guess[last] - left.parameter());
+        let [low, high] = self.settings.range;
+        let there = here + STRETCHED * way;
+        let bound = if there < low { low } else { (there > high).then_some(high)? };
+        if left.slope() * way <= 0.0 || (here - bound) * way >= 0.0 {
+            return None;
+        }
+        let gap = |at: &[f64]| (at[last] - bound) * way.signum();
+        let farthest = STRETCHED * step;
+        let (mut inner, mut outer) =
+            ((0.0, -(here - bound).abs()), (farthest, gap(&self.predicted(left, trail, farthest))));
+        if outer.1 < 0.0 {
+            return None;
+        }
+        for _ in 0..20 {
+            let s = inner.0 + (outer.0 - inner.0) * inner.1 / (inner.1 - outer.1);
+            let mut landing = self.predicted(left, trail, s);
+            let miss = gap(&landing);
+            if miss > 0.0 {
+                outer = (s, miss)
+            } else {
+                inner = (s, miss)
+            }
+            if miss.abs() < NEAR_BOUND * (s * left.slope()).abs() {
+                landing[last] = bound;
+                return Some((s, landing));
+            }
+        }
+        None
+    }
+
+    /// The step to what was predicted, in the plane or at the value of the parameter that is aimed at.
+    fn tried(
+        &mut self,
+        left: &Station,
+        trail: Option<&Trail>,
+        guess: &[f64],
+        aim: Aim,
+        rigid: bool,
+        cost: &mut Cost,
+    ) -> Result<Step, Failure> {
+        let step = aim.step();
+        let (u, row) = self.corrected(left, guess, aim, cost)?;
         let short = self.is_short(&left.mesh, step);
         let mut right = if rigid && short {
-            self.unrefined(left, u, aim.close, cost)?
+            let close = self.settings.closeness(&left.mesh, step);
+            self.unrefined(left, u, close, cost)?
         } else {
-            refine(self.problem, self.settings, aim, left.tangent.clone(), u, self.direction, cost)?
+            let care = Care { trusted: self.trusts(left, trail), ..self.care(left, step) };
+            refine(self.problem, self.settings, care, row, u, self.direction, cost)?
         };
+        if let Aim::Value(_) = aim {
+            // Where travel is towards smaller values the row has turned the tangent round.
+            right.head(left.slope());
+            if self.angle(left, &right).0 > self.settings.max_angle {
+                return Err(Failure::Singular);
+            }
+        }
         if right.mesh != left.mesh && short {
             return Err(Failure::Remeshed(right.mesh));
         }
@@ -382,7 +483,7 @@ impl Follow<'_> {
         if !left.mesh.is_empty() {
             miss = self.is_nearly_smooth(left, &right)?;
         }
-        self.continues(left, &right, &guess)?;
+        self.continues(left, &right, guess)?;
         if self.problem.departure(&right.u) > self.settings.newton_tolerance() {
             return Err(Failure::Departed);
         }
@@ -397,10 +498,16 @@ impl Follow<'_> {
             return Ok(ended);
         }
         let [low, high] = self.settings.range;
-        let bound = if right.parameter() < low { Some(low) } else { (right.parameter() > high).then_some(high) };
+        let bound = match aim {
+            Aim::Value(_) => Some(guess[guess.len() - 1]),
+            Aim::Plane(_) if right.parameter() < low => Some(low),
+            Aim::Plane(_) => (right.parameter() > high).then_some(high),
+        };
         let mut end = None;
         if let Some(bound) = bound {
-            right = self.at_parameter(left, &right, bound, cost)?;
+            if let Aim::Plane(_) = aim {
+                right = self.at_parameter(left, &right, bound, cost)?;
+            }
             // To the last bit, whatever rounding Newton's method left.
             let last = right.u.len() - 1;
             right.u[last] = bound;

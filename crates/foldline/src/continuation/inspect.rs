@@ -5,10 +5,11 @@
 //! that the special point found does not explain, or while a monitor bends so much that it may have touched zero and come
 //! back. What stays unexplained at the end of that is recorded as such: no silent change of stability.
 
-use super::corrector::{Aim, Failure, Station, doubted, refine};
+use super::corrector::{Failure, Station, doubted, refine};
 use super::follow::{Follow, STANDS};
 use super::locate::{Located, Stretch, locate};
 use super::straddle::straddle;
+use crate::contract::Sight;
 use crate::diagram::{Cost, Kind, Point, SpecialPoint};
 use num_complex::Complex64;
 use std::f64::consts::PI;
@@ -286,8 +287,9 @@ impl Follow<'_> {
             [0.5, 0.25, 0.75, 0.125, 0.375, 0.625, 0.875, 0.0625, 0.1875, 0.03, 0.015, 0.007, 0.003, 0.001, 0.97];
         let count = if first && stretch.left.mesh.is_empty() { PLACES.len() } else { 3 };
         let differs = |(a, b): (&f64, &f64)| (*a > 0.0) != (*b > 0.0);
+        let sight = self.monitors.iter().map(|monitor| monitor.reads()).max().unwrap_or(Sight::Tangent);
         PLACES[..count].iter().map(|share| share * stretch.length).find(|s| {
-            let middle = stretch.at(self.problem, self.settings, *s, cost);
+            let middle = stretch.seen_at(sight, self.problem, self.settings, *s, cost);
             middle.is_ok_and(|found| self.monitored(&found).iter().zip(at_left).any(differs))
         })
     }
@@ -299,8 +301,8 @@ impl Follow<'_> {
             let close = self.settings.closeness(&left.mesh, stretch.length);
             return self.unrefined(left, u, close, cost).ok();
         }
-        let aim = Aim { share: left.share, close: self.settings.closeness(&left.mesh, s) };
-        refine(self.problem, self.settings, aim, left.tangent.clone(), u, self.direction, cost).ok()
+        let care = self.care(left, s);
+        refine(self.problem, self.settings, care, left.tangent.clone(), u, self.direction, cost).ok()
     }
 
     /// Whether some monitor may have passed zero between the last two of three values and come back: the parabola through them comes

@@ -4,8 +4,8 @@
 //! prediction was far off, if the chord points elsewhere than both tangents, or, where branches crowd, if the same step
 //! backwards leads elsewhere.
 
-use super::corrector::{Failure, Plane, Station, correct, correct_within};
-use super::follow::Follow;
+use super::corrector::{Failure, Plane, Station, correct, correct_within, parameter_row};
+use super::follow::{Aim, Follow};
 use super::locate::Stretch;
 use crate::diagram::Cost;
 
@@ -33,30 +33,33 @@ const CHORD_FACTOR: f64 = 1.5;
 const CHORD_SLACK: f64 = 0.08;
 
 impl Follow<'_> {
-    /// Corrects `guess` at distance `step` from `left`, on its mesh, and gives up as soon as it is clear that the result does
+    /// Corrects `guess`, on the mesh of `left`, in what is aimed at, and gives up as soon as it is clear that the result does
     /// not continue the branch; what [`Follow::continues`] asks is looked at here with a little slack, before mesh and
-    /// stability are seen to.
+    /// stability are seen to. Returns the row of the plane too.
     pub(super) fn corrected(
         &mut self,
         left: &Station,
         guess: &[f64],
-        step: f64,
+        aim: Aim,
         cost: &mut Cost,
-    ) -> Result<Vec<f64>, Failure> {
-        let plane = Plane { row: left.tangent.clone(), base: left.u.clone(), distance: step };
-        let mut u = guess.to_vec();
+    ) -> Result<(Vec<f64>, Vec<f64>), Failure> {
+        let (step, mut u) = (aim.step(), guess.to_vec());
+        let plane = match aim {
+            Aim::Plane(step) => Plane { row: left.tangent.clone(), base: left.u.clone(), distance: step },
+            Aim::Value(_) => Plane { row: parameter_row(u.len()), base: u.clone(), distance: 0.0 },
+        };
         correct_within(self.problem, self.settings, &plane, FAR * step, &mut u, cost)?;
         let miss: Vec<f64> = u.iter().zip(guess).map(|(a, b)| a - b).collect();
         let miss = self.problem.dot(&miss, &miss).sqrt() / step;
         let (mut last, mut tangent) = (vec![0.0; u.len()], vec![0.0; u.len()]);
         last[u.len() - 1] = 1.0;
         self.problem.solve(&last, &mut tangent);
-        // ⟨c, τ⟩ = 1 and |c| = 1.
-        let angle = (1.0 / self.problem.dot(&tangent, &tangent).sqrt()).clamp(-1.0, 1.0).acos();
+        let along = self.problem.dot(&left.tangent, &tangent).abs();
+        let angle = (along / self.problem.dot(&tangent, &tangent).sqrt()).clamp(-1.0, 1.0).acos();
         if angle > 1.1 * self.settings.max_angle || miss > 1.1 * MISS {
             return Err(Failure::Elsewhere { angle, miss });
         }
-        Ok(u)
+        Ok((u, plane.row))
     }
 
     /// Whether `right`, predicted as `guess`, continues the branch at `left`, and neither turns too far nor lies on another

@@ -6,9 +6,9 @@
 //!
 //! **Source.** chandrupatla1997 (bracketing with inverse quadratic interpolation and bisection).
 
-use super::corrector::{Plane, Station, arrive, correct, examined, parameter_row, settle};
+use super::corrector::{Plane, Station, arrive, correct, doubted, examined, parameter_row, settle};
 use super::{Failure, ROUNDING, Settings};
-use crate::contract::{Examination, Monitor, ZeroProblem};
+use crate::contract::{Examination, Monitor, Sight, ZeroProblem};
 use crate::diagram::{Cost, Kind, Point};
 
 /// Share of the larger value at the ends that a monitor keeps at a change of sign if it jumps there instead of vanishing.
@@ -68,8 +68,23 @@ impl<'s> Stretch<'s> {
         s: f64,
         cost: &mut Cost,
     ) -> Result<Station, Failure> {
+        self.seen_at(Sight::Everything, problem, settings, s, cost)
+    }
+
+    /// The same as far as it is looked at.
+    ///
+    /// # Errors
+    /// See [`Failure`].
+    pub(super) fn seen_at(
+        &self,
+        sight: Sight,
+        problem: &mut dyn ZeroProblem,
+        settings: &Settings,
+        s: f64,
+        cost: &mut Cost,
+    ) -> Result<Station, Failure> {
         let (u, tangent) = self.arrived(problem, settings, s, cost)?;
-        Ok(examined(problem, u, tangent, self.direction))
+        Ok(seen(sight, problem, u, tangent, self.direction))
     }
 
     /// Unknowns and tangent there.
@@ -222,10 +237,7 @@ pub fn passing(
     let plane = Plane { row: parameter_row(u.len()), base: u.clone(), distance: 0.0 };
     let mut found = settle(problem, settings, plane, u, direction, cost)?;
     // Travel goes on the way it came, also where the parameter row has turned the tangent round.
-    if found.slope() * slope < 0.0 {
-        found.tangent.iter_mut().for_each(|t| *t = -*t);
-        found.point.tangent.iter_mut().for_each(|t| *t = -*t);
-    }
+    found.head(slope);
     Ok(found)
 }
 
@@ -244,7 +256,7 @@ pub fn locate(
     let reference = &stretch.left.point;
     let mut evaluate = |s: f64| {
         let (u, tangent) = stretch.arrived(problem, settings, s, cost)?;
-        let found = seen_by(monitor, problem, u, tangent, stretch.direction);
+        let found = seen(monitor.reads(), problem, u, tangent, stretch.direction);
         Ok((monitor.value(reference, &found.point), found))
     };
     let resolution = if stretch.left.mesh.is_empty() { 1e-9 } else { 1e-2 };
@@ -277,17 +289,19 @@ pub fn locate(
         }
         problem.set_mesh(&coarse.mesh);
         let Some(finer) = problem.finer_mesh() else {
-            // The last trial need not have been the best one.
-            let _ = problem.factorise(&coarse.u, &coarse.tangent);
-            let station = completed(monitor, problem, coarse, stretch.direction);
+            let station = whole(problem, coarse, stretch.direction);
             let error = floor + noise(problem, settings, stretch, monitor, distance, &station, cost);
             return Ok(Located { distance, station, error });
         };
-        let (fine, off) = relocate(problem, settings, stretch, monitor, &coarse, &finer, &mut slope, cost)?;
+        coarse = whole(problem, coarse, stretch.direction);
+        let (mut fine, off) = relocate(problem, settings, stretch, monitor, &coarse, &finer, &mut slope, cost)?;
         let error = floor
             + off
             + discrepancy(&coarse.point, &fine.point, coarse.parameter() - fine.parameter(), fine.parameter());
         let improved = known.as_ref().is_none_or(|(_, e)| error < *e);
+        if error <= settings.tolerance {
+            doubted(problem, &mut fine);
+        }
         if improved {
             known = Some((fine.clone(), error));
         }
@@ -343,6 +357,11 @@ pub(super) fn discrepancy(a: &Point, b: &Point, gap: f64, parameter: f64) -> f64
 }
 
 impl Station {
+    /// Whether it was examined.
+    fn is_whole(&self) -> bool {
+        !self.point.ranges.is_empty()
+    }
+
     /// A mesh on which this point would meet the tolerance, if its own does not. Belongs right after the station was made,
     /// while its factorisation is the last one.
     fn better(&self, problem: &mut dyn ZeroProblem, tolerance: f64) -> Option<crate::diagram::Mesh> {
@@ -350,25 +369,31 @@ impl Station {
     }
 }
 
-/// The station at `u` for the eyes of a monitor: without spectrum, ranges and error estimate if it reads the tangent alone.
-fn seen_by(
-    monitor: &dyn Monitor,
-    problem: &mut dyn ZeroProblem,
-    u: Vec<f64>,
-    tangent: Vec<f64>,
-    direction: f64,
-) -> Station {
-    if monitor.reads_spectrum() {
-        return examined(problem, u, tangent, direction);
-    }
+/// The station at `u`, for which the problem was factorised last, as far as it is looked at.
+fn seen(sight: Sight, problem: &mut dyn ZeroProblem, u: Vec<f64>, tangent: Vec<f64>, direction: f64) -> Station {
+    let examination = match sight {
+        Sight::Everything => return examined(problem, u, tangent, direction),
+        Sight::Stability => problem.stability(&u),
+        Sight::Tangent => Examination::default(),
+    };
     let stored: Vec<f64> = tangent.iter().map(|t| direction * t).collect();
-    let point = problem.point(&u, &stored, Examination::default());
+    let point = problem.point(&u, &stored, examination);
     Station { point, u, tangent, mesh: problem.mesh(), roomier: None, share: 1.0, midway: 0.0 }
 }
 
-/// The whole station, where only a part of it was [`seen_by`] the monitor; the problem was factorised there last.
-fn completed(monitor: &dyn Monitor, problem: &mut dyn ZeroProblem, found: Station, direction: f64) -> Station {
-    if monitor.reads_spectrum() { found } else { examined(problem, found.u, found.tangent, direction) }
+/// The whole station, where only a part of it was [`seen`]; the problem was factorised there last.
+fn completed(problem: &mut dyn ZeroProblem, found: Station, direction: f64) -> Station {
+    if found.is_whole() { found } else { examined(problem, found.u, found.tangent, direction) }
+}
+
+/// The same where the problem may have been factorised elsewhere since: the last trial need not have been the best one.
+fn whole(problem: &mut dyn ZeroProblem, found: Station, direction: f64) -> Station {
+    if found.is_whole() {
+        return found;
+    }
+    problem.anchor(&found.u);
+    let _ = problem.factorise(&found.u, &found.tangent);
+    examined(problem, found.u, found.tangent, direction)
 }
 
 /// The zero again on a finer mesh, by the secant method from the coarse one; `slope` is that of the monitor, if it is known
@@ -388,7 +413,7 @@ fn relocate(
     let row = problem.transfer(&coarse.tangent, &coarse.mesh, finer);
     let mut at = |mut u: Vec<f64>, close: f64| -> Result<(f64, Station), Failure> {
         let tangent = arrive(problem, &mut u, &row, close, cost)?;
-        let found = seen_by(monitor, problem, u, tangent, stretch.direction);
+        let found = seen(monitor.reads(), problem, u, tangent, stretch.direction);
         Ok((monitor.value(&stretch.left.point, &found.point), found))
     };
     // Along the curve the zero may be as far off as two meshes agree, which can be more than the stretch.
@@ -413,7 +438,7 @@ fn relocate(
     for round in 0..40 {
         if step.abs() < enough || !step.is_finite() {
             if !step.is_finite() || !unclear(&found, enough) {
-                return Ok((completed(monitor, problem, found, stretch.direction), step.abs()));
+                return Ok((completed(problem, found, stretch.direction), step.abs()));
             }
             (enough, apart) = (1e-2 * enough, 0.0);
         }
@@ -441,7 +466,7 @@ fn relocate(
         (a, ga, found) = (b, gb, next);
         if other.is_some_and(|o| (o - a).abs() < enough) {
             if !unclear(&found, enough) {
-                return Ok((completed(monitor, problem, found, stretch.direction), enough));
+                return Ok((completed(problem, found, stretch.direction), enough));
             }
             (enough, apart) = (1e-2 * enough, 0.0);
         }

@@ -74,19 +74,28 @@ impl Cycle {
         let n = self.dim();
         let scheme = Scheme::new(self.degree);
         let mut out = vec![0.0; count * n];
+        let mut j = 1;
         for (s, x) in out.chunks_exact_mut(n.max(1)).enumerate() {
-            self.state_into(&scheme, s as f64 / count as f64, x);
+            let t = s as f64 / count as f64;
+            while j < self.intervals() && self.mesh[j] <= t {
+                j += 1;
+            }
+            self.state_within(&scheme, j - 1, t, x);
         }
         out
     }
 
+    /// The state at time `t` in interval j.
+    fn state_within(&self, scheme: &Scheme, j: usize, t: f64, x: &mut [f64]) {
+        let s = (t - self.mesh[j]) / (self.mesh[j + 1] - self.mesh[j]);
+        let block = (self.degree + 1) * x.len();
+        scheme.value_into(s, &self.profile[j * block..(j + 1) * block], x);
+    }
+
     pub(crate) fn state_into(&self, scheme: &Scheme, t: f64, x: &mut [f64]) {
-        let n = x.len();
         let t = t - t.floor();
         let j = self.mesh.partition_point(|&b| b <= t).clamp(1, self.intervals()) - 1;
-        let s = (t - self.mesh[j]) / (self.mesh[j + 1] - self.mesh[j]);
-        let block = (self.degree + 1) * n;
-        scheme.value_into(s, &self.profile[j * block..(j + 1) * block], x);
+        self.state_within(scheme, j, t, x);
     }
 }
 

@@ -57,7 +57,7 @@ pub fn grow(
     system: &System,
     plan: &Plan,
     root: Root,
-    seeds: &Seeds,
+    seeds: &Seeds<'_>,
     jobs: usize,
     earlier: &Diagram,
     observer: &dyn Observer,

@@ -10,6 +10,7 @@
 //! | which vector field, which scales, which symmetries? | [`system`] |
 //! | how often is the vector field evaluated? | `counted` |
 //! | where do first solutions come from? | [`seeds`] |
+//! | what is done first, by which thread? | `schedule` |
 //! | how is one branch followed to both sides, or resumed? | [`growth`] |
 //! | what follows from a finished branch? | [`family`] |
 //! | how is a diagram found without being told where anything is? | `discovery`, `lookout` |
@@ -33,6 +34,7 @@ mod lookout;
 pub mod persistence;
 pub mod plan;
 pub mod responses;
+mod schedule;
 pub mod seeds;
 pub mod switch;
 pub mod system;
@@ -49,9 +51,10 @@ pub use seeds::{attractors, first_solution};
 pub use system::System;
 
 use crate::contract::Observer;
-use crate::diagram::{Branch, Diagram, Point};
+use crate::diagram::{Branch, Diagram, Ending, Point};
+use schedule::{Schedule, Task};
+use seeds::Seeds;
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// Carries out a plan with that many threads. `earlier` is what an interrupted run of the same plan has already: finished
 /// sides are kept, unfinished ones are continued from their last point.
@@ -71,25 +74,29 @@ pub fn run_from(
     given: &[(usize, Point)],
     observer: &dyn Observer,
 ) -> Diagram {
-    let seeds = seeds::find(system, plan, jobs, &earlier, given, observer);
+    let seeds = Seeds::new(system, plan, jobs, &earlier, given, observer);
     let families = family::roots(plan);
-    // The longest first, so that no thread is left alone with it in the end; what a plan names later builds on what it names
-    // earlier and takes longer, if anything.
-    let mut order: Vec<usize> = (0..families.len()).collect();
-    order.sort_by_key(|&index| std::cmp::Reverse((family::weight(plan, families[index]), index)));
-    let next = AtomicUsize::new(0);
     let done: Vec<Mutex<Vec<Branch>>> = families.iter().map(|_| Mutex::new(Vec::new())).collect();
+    let schedule = Schedule::new(plan, &families, &seeds);
     let work = || {
-        while let Some(&index) = order.get(next.fetch_add(1, Ordering::Relaxed)) {
-            let branches = family::grow(system, plan, families[index], &seeds, jobs, &earlier, observer);
-            if let Ok(mut slot) = done[index].lock() {
-                *slot = branches;
+        while let Some(claim) = schedule.next() {
+            match claim.task {
+                Task::Census(number) => _ = seeds.census(number),
+                Task::Family(index) => {
+                    let branches = family::grow(system, plan, families[index], &seeds, jobs, &earlier, observer);
+                    if branches.iter().flat_map(|branch| &branch.ends).flatten().any(|end| *end == Ending::Stopped) {
+                        schedule.hurry();
+                    }
+                    if let Ok(mut slot) = done[index].lock() {
+                        *slot = branches;
+                    }
+                }
             }
         }
     };
     // This thread takes part.
     std::thread::scope(|scope| {
-        (1..jobs.min(families.len())).for_each(|_| drop(scope.spawn(work)));
+        (1..jobs.min(families.len().max(seeds.count()))).for_each(|_| drop(scope.spawn(work)));
         work();
     });
     let branches = done.into_iter().flat_map(|slot| slot.into_inner().unwrap_or_default()).collect();

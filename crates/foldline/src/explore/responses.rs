@@ -16,7 +16,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 pub fn simulate(
     system: &System,
     plan: &Plan,
-    seeds: &Seeds,
+    seeds: &Seeds<'_>,
     jobs: usize,
     earlier: &Diagram,
     observer: &dyn Observer,
@@ -88,7 +88,7 @@ fn one_sweep(
     system: &System,
     plan: &Plan,
     sweep: &SweepPlan,
-    seeds: &Seeds,
+    seeds: &Seeds<'_>,
     observer: &dyn Observer,
 ) -> Option<Responses> {
     let SweepPlan { name, seed, free, values } = sweep;

@@ -17,65 +17,104 @@ use crate::diagram::{Cost, Cycle, Diagram, Point, Solution};
 use crate::linalg::max_abs;
 use crate::problem::equilibrium::EquilibriumProblem;
 use crate::problem::gauss::Scheme;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::OnceLock;
 
-/// The first solutions of a plan: one per seed, or why there is none.
-pub struct Seeds {
-    points: Vec<Result<Point, String>>,
+/// The first solutions of a plan, one per seed, or why there is none. Each is found when it is asked for.
+pub struct Seeds<'p> {
+    system: &'p System<'p>,
+    plan: &'p Plan,
+    /// Threads that one census, or one sample, may take.
+    jobs: usize,
+    given: &'p [(usize, Point)],
+    observer: &'p dyn Observer,
+    /// `[seed]`: whether anything that is still to be done starts there.
+    needed: Vec<bool>,
+    /// The censuses that are needed, each with the index of the first seed it is for.
+    censuses: Vec<(usize, OnceLock<Census>)>,
+    points: Vec<OnceLock<Result<Point, String>>>,
 }
 
-impl Seeds {
+impl<'p> Seeds<'p> {
+    /// Those that a branch without points in `earlier`, or a sweep that is not there, starts from, but for those that are `given`, by
+    /// index; `jobs` threads between them.
+    pub fn new(
+        system: &'p System<'p>,
+        plan: &'p Plan,
+        jobs: usize,
+        earlier: &Diagram,
+        given: &'p [(usize, Point)],
+        observer: &'p dyn Observer,
+    ) -> Seeds<'p> {
+        let needed = |seed: usize| {
+            let start = Start::Seed(seed);
+            let branches = plan.branches.iter().filter(|b| b.start == start).map(|b| b.name.clone());
+            let first_legs = plan.homotopies.iter().filter(|h| h.start == start).map(|h| format!("{}/1", h.name));
+            branches.chain(first_legs).any(|name| earlier.branch(&name).is_none_or(|known| known.points.is_empty()))
+                || plan.sweeps.iter().any(|sweep| sweep.seed == seed && earlier.response_set(&sweep.name).is_none())
+        };
+        let known = |seed: usize| given.iter().any(|(index, _)| *index == seed);
+        let needed: Vec<bool> = (0..plan.seeds.len()).map(|seed| needed(seed) && !known(seed)).collect();
+        let censuses = sampled(system, plan, &needed);
+        Seeds {
+            system,
+            plan,
+            jobs: (jobs / censuses.len().max(1)).max(1),
+            given,
+            observer,
+            needed,
+            censuses: censuses.into_iter().map(|index| (index, OnceLock::new())).collect(),
+            points: plan.seeds.iter().map(|_| OnceLock::new()).collect(),
+        }
+    }
+
+    /// How many censuses are needed.
+    pub fn count(&self) -> usize {
+        self.censuses.len()
+    }
+
+    /// The census, of those, from which that seed is taken.
+    pub fn census_of(&self, seed: usize) -> Option<usize> {
+        let own = &self.plan.seeds[seed];
+        let sampled = self.needed[seed] && matches!(own.source, SeedSource::Attractor(_));
+        self.censuses.iter().position(|(other, _)| sampled && share(&self.plan.seeds[*other], own))
+    }
+
+    /// The attractors that were found at a seed's parameters.
+    pub fn census(&self, number: usize) -> &Census {
+        let (index, census) = &self.censuses[number];
+        census.get_or_init(|| {
+            let found = census_for(self.system, self.plan, *index, self.jobs);
+            self.observer.observe(Event::Note(&self.plan.seeds[*index].name, &summary(&found)));
+            found
+        })
+    }
+
     /// The first solution of that seed.
     ///
     /// # Errors
     /// A sentence that says why there is none.
     pub fn point(&self, seed: usize) -> Result<Point, String> {
-        self.points.get(seed).cloned().unwrap_or_else(|| Err("no such seed".into()))
+        let Some(slot) = self.points.get(seed) else { return Err("no such seed".into()) };
+        slot.get_or_init(|| self.found(seed)).clone()
     }
-}
 
-/// Finds every seed that a branch without points in `earlier`, or a sweep that is not there, starts from, but for those that
-/// are `given`, by index.
-pub fn find(
-    system: &System,
-    plan: &Plan,
-    jobs: usize,
-    earlier: &Diagram,
-    given: &[(usize, Point)],
-    observer: &dyn Observer,
-) -> Seeds {
-    let known = |seed: usize| given.iter().find(|(index, _)| *index == seed).map(|(_, point)| point);
-    let needed = |seed: usize| {
-        let start = Start::Seed(seed);
-        let branches = plan.branches.iter().filter(|b| b.start == start).map(|b| b.name.clone());
-        let first_legs = plan.homotopies.iter().filter(|h| h.start == start).map(|h| format!("{}/1", h.name));
-        branches.chain(first_legs).any(|name| earlier.branch(&name).is_none_or(|known| known.points.is_empty()))
-            || plan.sweeps.iter().any(|sweep| sweep.seed == seed && earlier.response_set(&sweep.name).is_none())
-    };
-    let needed: Vec<bool> = (0..plan.seeds.len()).map(|seed| needed(seed) && known(seed).is_none()).collect();
-    let censuses = censuses(system, plan, jobs, &needed);
-    for (index, census) in &censuses {
-        observer.observe(Event::Note(&plan.seeds[*index].name, &summary(census)));
-    }
-    let found = |seed: &SeedPlan| match &seed.source {
-        SeedSource::Cycle(cycle) => {
-            from_cycle(system, seed, plan.tolerance, cycle).map(|p| with_degree(p, plan.degree))
+    fn found(&self, index: usize) -> Result<Point, String> {
+        let (system, plan, seed) = (self.system, self.plan, &self.plan.seeds[index]);
+        if !self.needed[index] {
+            let given = self.given.iter().find(|(other, _)| *other == index);
+            return given.map(|(_, point)| with_degree(point.clone(), plan.degree)).ok_or("not needed".into());
         }
-        SeedSource::State(state) => from_state(system, seed, plan, state, jobs).map(|p| with_degree(p, plan.degree)),
-        SeedSource::Attractor(key) => match censuses.iter().find(|(other, _)| share(&plan.seeds[*other], seed)) {
-            Some((_, census)) => chosen(census, key)
-                .map(|p| with_degree(p, plan.degree))
-                .ok_or_else(|| missing(system, seed, census, key)),
-            None => Err("no census".into()),
-        },
-    };
-    let point = |(index, seed): (usize, &SeedPlan)| match (needed[index], known(index)) {
-        (true, _) => system.repeats(&seed.parameters, &[]).and_then(|()| found(seed)),
-        (false, Some(point)) => Ok(with_degree(point.clone(), plan.degree)),
-        (false, None) => Err("not needed".into()),
-    };
-    Seeds { points: plan.seeds.iter().enumerate().map(point).collect() }
+        system.repeats(&seed.parameters, &[])?;
+        let point = match &seed.source {
+            SeedSource::Cycle(cycle) => from_cycle(system, seed, plan.tolerance, cycle)?,
+            SeedSource::State(state) => from_state(system, seed, plan, state, self.jobs)?,
+            SeedSource::Attractor(key) => {
+                let census = self.census(self.census_of(index).ok_or("no census")?);
+                chosen(census, key).ok_or_else(|| missing(system, seed, census, key))?
+            }
+        };
+        Ok(with_degree(point, plan.degree))
+    }
 }
 
 /// The first solution that a seed means, by itself.
@@ -89,7 +128,7 @@ pub fn first_solution(system: &System, seed: &SeedPlan, tolerance: f64, jobs: us
     let start = Start::Seed(0);
     let branch = BranchPlan { name: String::new(), start, free, range, until: None, switching, marks, max_points: 0 };
     let plan = Plan { seeds, branches: vec![branch], ..Plan::empty(tolerance, DEGREE) };
-    find(system, &plan, jobs, &Diagram::default(), &[], &Unobserved).point(0)
+    Seeds::new(system, &plan, jobs, &Diagram::default(), &[], &Unobserved).point(0)
 }
 
 /// Whether two seeds share a census.
@@ -97,9 +136,8 @@ fn share(a: &SeedPlan, b: &SeedPlan) -> bool {
     a.parameters == b.parameters && a.samples == b.samples && a.random == b.random
 }
 
-/// The censuses of the seeds that are needed, each with the index of the first seed it is for. A census ends early once it has
-/// what all seeds of the plan ask for that share it, needed or not: what a seed means does not depend on earlier runs.
-fn censuses(system: &System, plan: &Plan, jobs: usize, needed: &[bool]) -> Vec<(usize, Census)> {
+/// The seeds that a census is needed for, of those that share one the first.
+fn sampled(system: &System, plan: &Plan, needed: &[bool]) -> Vec<usize> {
     let mut first: Vec<usize> = Vec::new();
     for (index, seed) in plan.seeds.iter().enumerate() {
         let sampled = matches!(seed.source, SeedSource::Attractor(_));
@@ -108,34 +146,23 @@ fn censuses(system: &System, plan: &Plan, jobs: usize, needed: &[bool]) -> Vec<(
             first.push(index);
         }
     }
-    let census = |index: usize, jobs: usize| {
-        let seed = &plan.seeds[index];
-        let keys = plan.seeds.iter().filter(|other| share(other, seed)).filter_map(|other| match &other.source {
-            SeedSource::Attractor(key) => Some(key),
-            SeedSource::State(_) | SeedSource::Cycle(_) => None,
-        });
-        let keys: Vec<&AttractorKey> = keys.collect();
-        let sampling = sampling(system, seed.samples, seed.random, jobs, plan.tolerance);
-        let polish = |candidate: &Candidate| polish(system, &seed.parameters, plan.tolerance, candidate);
-        attractors::survey_until(system.field, &seed.parameters, &sampling, &polish, &|reached| {
-            keys.iter().all(|key| reached.iter().any(|(point, ratio)| is_meant(key, point, *ratio)))
-        })
-    };
-    let (next, done) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
-    let threads = jobs.clamp(1, first.len().max(1));
-    let work = || {
-        while let Some(&index) = first.get(next.fetch_add(1, Ordering::Relaxed)) {
-            let census = census(index, jobs / threads);
-            done.lock().unwrap_or_else(PoisonError::into_inner).push((index, census));
-        }
-    };
-    std::thread::scope(|scope| {
-        (1..threads).for_each(|_| drop(scope.spawn(work)));
-        work();
+    first
+}
+
+/// The census for a seed. It ends early once it has what all seeds of the plan ask for that share it, needed or not: what a seed means
+/// does not depend on earlier runs.
+fn census_for(system: &System, plan: &Plan, index: usize, jobs: usize) -> Census {
+    let seed = &plan.seeds[index];
+    let keys = plan.seeds.iter().filter(|other| share(other, seed)).filter_map(|other| match &other.source {
+        SeedSource::Attractor(key) => Some(key),
+        SeedSource::State(_) | SeedSource::Cycle(_) => None,
     });
-    let mut done = done.into_inner().unwrap_or_else(PoisonError::into_inner);
-    done.sort_by_key(|(index, _)| *index);
-    done
+    let keys: Vec<&AttractorKey> = keys.collect();
+    let sampling = sampling(system, seed.samples, seed.random, jobs, plan.tolerance);
+    let polish = |candidate: &Candidate| polish(system, &seed.parameters, plan.tolerance, candidate);
+    attractors::survey_until(system.field, &seed.parameters, &sampling, &polish, &|reached| {
+        keys.iter().all(|key| reached.iter().any(|(point, ratio)| is_meant(key, point, *ratio)))
+    })
 }
 
 /// Samples initial states, follows each to its attractor, and computes the attractors accurately.

@@ -152,16 +152,20 @@ impl<T: Lane> Condensed<T> {
         }
     }
 
-    /// Writes how the inner nodes of all intervals follow from their left ends, `[m][n × n][stride]` with an interval for each of the
+    /// Writes how the inner nodes of some intervals follow from their left ends, `[m][n × n][stride]` with an interval for each of the
     /// first entries of a line, once they are condensed.
-    pub fn inner(&self, stride: usize, to: &mut [f64]) {
+    pub fn inner(&self, piece: std::ops::Range<usize>, stride: usize, to: &mut [f64]) {
         let (n, width, inner) = (self.n, self.n + self.q, self.m * self.n);
         for (k, line) in to.chunks_exact_mut(stride).enumerate() {
             let (row, column) = (k / n, k % n);
             let own = self.slot(row / n, row % n) * width + column;
-            for (t, c) in self.coupling[own..].iter().step_by(inner * width).take(self.length).enumerate() {
-                let places = line[..self.intervals].iter_mut().skip(t).step_by(self.length);
-                places.zip(c.lanes()).for_each(|(x, c)| *x = -c);
+            let (mut lane, mut place) = (piece.start / self.length, piece.start % self.length);
+            for x in line.iter_mut().take(piece.len()) {
+                *x = -self.coupling[own + place * inner * width].lanes()[lane];
+                place += 1;
+                if place == self.length {
+                    (lane, place) = (lane + 1, 0);
+                }
             }
         }
     }

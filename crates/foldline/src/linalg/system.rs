@@ -57,8 +57,8 @@ impl System {
     }
 
     /// See [`Condensed::inner`].
-    pub fn inner(&self, stride: usize, to: &mut [f64]) {
-        either!(self, s => s.inner(stride, to));
+    pub fn inner(&self, piece: std::ops::Range<usize>, stride: usize, to: &mut [f64]) {
+        either!(self, s => s.inner(piece, stride, to));
     }
 
     /// See [`Condensed::transition`].

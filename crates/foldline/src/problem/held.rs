@@ -138,6 +138,23 @@ impl<'a> Held<'a> {
         self.condition.equations() + 1 - self.extra()
     }
 
+    /// What is known of the surface, with what is held put where it belongs; `u` with the extra unknowns.
+    fn with_held(&self, u: &[f64], mut found: Examination) -> Examination {
+        // The eigenvalues that are held count as neither stable nor unstable.
+        let (first, is_cycle) = (found.trivial, !self.surface.mesh().is_empty());
+        let mut others = found.spectrum.split_off(first.min(found.spectrum.len()));
+        let held = self.condition.held(&u[..self.extra()]);
+        for z in &held {
+            let closest = (0..others.len()).min_by(|a, b| (others[*a] - z).norm().total_cmp(&(others[*b] - z).norm()));
+            closest.map(|k| others.remove(k));
+        }
+        others.sort_by(|a, b| self.condition.distance(*a).total_cmp(&self.condition.distance(*b)));
+        found.unstable = others.iter().filter(|z| if is_cycle { z.norm() > 1.0 } else { z.re > 0.0 }).count();
+        // What is held comes first, as it is meant: computed, a double eigenvalue would be known to half the digits.
+        found.spectrum.extend(held.into_iter().chain(others));
+        found
+    }
+
     /// Orthonormal vectors in place of the rows: those that span the tangent plane found last.
     fn follow_plane(&mut self) {
         let (size, k) = (self.surface.unknowns(), self.freedom());
@@ -296,20 +313,13 @@ impl ZeroProblem for Held<'_> {
     }
 
     fn examine(&mut self, u: &[f64]) -> Examination {
-        let mut found = self.surface.examine(&u[self.extra()..]);
-        // The eigenvalues that are held count as neither stable nor unstable.
-        let (first, is_cycle) = (found.trivial, !self.surface.mesh().is_empty());
-        let mut others = found.spectrum.split_off(first.min(found.spectrum.len()));
-        let held = self.condition.held(&u[..self.extra()]);
-        for z in &held {
-            let closest = (0..others.len()).min_by(|a, b| (others[*a] - z).norm().total_cmp(&(others[*b] - z).norm()));
-            closest.map(|k| others.remove(k));
-        }
-        others.sort_by(|a, b| self.condition.distance(*a).total_cmp(&self.condition.distance(*b)));
-        found.unstable = others.iter().filter(|z| if is_cycle { z.norm() > 1.0 } else { z.re > 0.0 }).count();
-        // What is held comes first, as it is meant: computed, a double eigenvalue would be known to half the digits.
-        found.spectrum.extend(held.into_iter().chain(others));
-        found
+        let found = self.surface.examine(&u[self.extra()..]);
+        self.with_held(u, found)
+    }
+
+    fn stability(&mut self, u: &[f64]) -> Examination {
+        let found = self.surface.stability(&u[self.extra()..]);
+        self.with_held(u, found)
     }
 
     fn margin(&self, at: &Point) -> f64 {

@@ -115,7 +115,8 @@ impl Monitor for Mirrors {
 
     fn value(&self, reference: &Point, at: &Point) -> f64 {
         let n = self.reflection.len();
-        let ((x, own), (_, other)) = (self.parts(reference), self.parts(at));
+        let (x, own) = self.parts(reference);
+        let other = if std::ptr::eq(reference, at) { own.clone() } else { self.parts(at).1 };
         if own.len() != other.len() {
             return 1.0;
         }
@@ -166,11 +167,13 @@ impl Monitor for Halves {
 fn compare(reference: &Point, at: &Point, deviation: impl Fn(&[f64], usize) -> Vec<f64>) -> f64 {
     let (Solution::Cycle(a), Solution::Cycle(b)) = (&reference.solution, &at.solution) else { return 1.0 };
     let of = |cycle: &Cycle| deviation(&cycle.uniform(SAMPLES), cycle.dim());
-    let (da, db) = (of(a), of(b));
+    let da = of(a);
+    let other = if std::ptr::eq(a, b) { None } else { Some(of(b)) };
+    let db = other.as_ref().unwrap_or(&da);
     // Components of very different unit must not drown each other.
     let n = a.dim();
     let mut weight = vec![f64::MIN_POSITIVE; n];
     da.iter().enumerate().for_each(|(k, v)| weight[k % n] += v * v);
-    let product: f64 = da.iter().zip(&db).enumerate().map(|(k, (x, y))| x * y / weight[k % n]).sum();
+    let product: f64 = da.iter().zip(db).enumerate().map(|(k, (x, y))| x * y / weight[k % n]).sum();
     product / n as f64
 }

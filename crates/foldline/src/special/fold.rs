@@ -1,7 +1,7 @@
 //! Folds (limit points, saddle-nodes): the branch turns back in its parameter. Curves in two parameters turn back in one of them, or
 //! at a cusp in both.
 
-use crate::contract::Monitor;
+use crate::contract::{Monitor, Sight};
 use crate::diagram::{Kind, Point, Solution};
 
 /// The parameter component of the tangent.
@@ -20,8 +20,8 @@ impl Monitor for Fold {
         true
     }
 
-    fn reads_spectrum(&self) -> bool {
-        false
+    fn reads(&self) -> Sight {
+        Sight::Tangent
     }
 
     fn jump(&self) -> usize {
@@ -54,8 +54,8 @@ impl Monitor for Turn {
         !parameters_rest(ends, at)
     }
 
-    fn reads_spectrum(&self) -> bool {
-        false
+    fn reads(&self) -> Sight {
+        Sight::Tangent
     }
 
     fn jump(&self) -> usize {

@@ -1,7 +1,7 @@
 //! Marks: places of a branch at which a quantity has a given value.
 
 use super::quantity::Quantity;
-use crate::contract::Monitor;
+use crate::contract::{Monitor, Sight};
 use crate::diagram::{Ending, Kind, Point};
 
 /// A value of a quantity that is marked where a branch passes it.
@@ -26,6 +26,10 @@ impl Monitor for Mark {
 
     fn confirms(&self, _at: &Point) -> bool {
         true
+    }
+
+    fn reads(&self) -> Sight {
+        Sight::Everything
     }
 
     fn jump(&self) -> usize {

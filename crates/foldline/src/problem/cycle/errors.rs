@@ -5,6 +5,7 @@ use crate::contract::{Batch, Parameters, ZeroProblem};
 use crate::linalg::panel;
 use crate::problem::defect::{self, Defect};
 use num_complex::Complex64;
+use std::ops::Range;
 
 /// Stated error of multipliers over the estimated one.
 const SPECTRUM_SAFE: f64 = 4.0;
@@ -34,6 +35,41 @@ const ROUNDING: f64 = 32.0 * f64::EPSILON;
 fn repeat_last(line: &mut [f64], count: usize) {
     let last = line[count - 1];
     line[count..].fill(last);
+}
+
+/// Intervals whose transitions are made more accurate at a time: what that takes stays in the cache.
+const TOGETHER: usize = 64;
+
+/// A profile along which Jacobians are taken.
+struct Course<'a> {
+    u: &'a [f64],
+    /// What is subtracted within intervals, as [`Measured::within`].
+    without: Option<&'a [f64]>,
+}
+
+/// Room for some intervals.
+#[derive(Default)]
+struct Room {
+    /// `[n][m + 1][count]`, at the sample points.
+    states: Vec<f64>,
+    f: Vec<f64>,
+    fx: Vec<f64>,
+    /// As [`defect::correct`] takes them.
+    nodes: Vec<f64>,
+    jacobians: Vec<f64>,
+    transitions: Vec<f64>,
+}
+
+impl Room {
+    fn resize(&mut self, n: usize, m: usize, count: usize) {
+        let (square, lanes, padded) = (n * n, count * (m + 1), defect::padded(count));
+        self.states.resize(n * lanes, 0.0);
+        self.f.resize(n * lanes, 0.0);
+        self.fx.resize(square * lanes, 0.0);
+        self.nodes.resize((m + 1) * square * padded, 0.0);
+        self.jacobians.resize(2 * (m + 1) * square * padded, 0.0);
+        self.transitions.resize(2 * square * padded, 0.0);
+    }
 }
 
 /// Errors and the unknowns they belong to.
@@ -80,53 +116,64 @@ impl CycleProblem<'_> {
 
     /// The multipliers from more accurate transitions, with the Jacobian along the profile, and along the profile without its error.
     fn corrected_multipliers(&self, u: &[f64]) -> Option<[Vec<Complex64>; 2]> {
-        let (n, m, count, size) = (self.n, self.scheme.degree, self.intervals(), self.profile_size());
-        let (square, lanes, padded) = (n * n, count * (m + 1), defect::padded(count));
         let known = self.measured.borrow();
         let known = known.as_ref()?;
-        let times = self.sampling.times(&self.mesh, self.forcing_periods);
         let better: Vec<f64> = u.iter().zip(&known.shift).map(|(u, e)| u - e).collect();
-        let courses = [(u, 0.0), (&better[..], 1.0)];
-        let mut jacobians = vec![0.0; square * 2 * (m + 1) * padded];
-        let (mut states, mut f, mut fx) = (known.within.clone(), vec![0.0; n * lanes], vec![0.0; square * lanes]);
-        let mut values = vec![0.0; lanes];
-        for (course, (u, share)) in courses.iter().enumerate() {
-            let nodes = panel::by_component(&u[..size], m + 1, n);
-            let without = states.chunks_exact_mut(lanes).zip(known.within.chunks_exact(lanes));
-            for ((own, within), nodes) in without.zip(nodes.chunks_exact(lanes)) {
-                self.sampling.sampled(nodes, count, &mut values);
-                own.iter_mut().zip(&values).zip(within).for_each(|((own, x), w)| *own = x - share * w);
+        let mut transitions = [self.transitions(), Vec::new()];
+        transitions[1] = transitions[0].clone();
+        let courses = [Course { u, without: None }, Course { u: &better, without: Some(&known.within) }];
+        let mut room = Room::default();
+        for first in (0..self.intervals()).step_by(TOGETHER) {
+            self.correct(first..(first + TOGETHER).min(self.intervals()), &courses, &mut transitions, &mut room);
+        }
+        let [own, other] = transitions;
+        let found = [self.floquet_of(u, own).multipliers, self.floquet_of(&better, other).multipliers];
+        found.iter().flatten().all(|z| z.re.is_finite() && z.im.is_finite()).then_some(found)
+    }
+
+    /// Makes the transitions of some intervals more accurate, with the Jacobian along each of the courses.
+    fn correct(&self, piece: Range<usize>, courses: &[Course; 2], transitions: &mut [Vec<f64>; 2], room: &mut Room) {
+        let (n, m, block, count) = (self.n, self.scheme.degree, self.block(), piece.len());
+        let (square, lanes, padded) = (n * n, count * (m + 1), defect::padded(count));
+        room.resize(n, m, count);
+        let mesh = &self.mesh[piece.start..=piece.end];
+        let times = self.sampling.times(mesh, self.forcing_periods);
+        for (course, Course { u, without }) in courses.iter().enumerate() {
+            let (size, own) = (self.profile_size(), piece.start * block..piece.end * block);
+            let nodes = panel::by_component(&u[own], m + 1, n);
+            for (c, (states, nodes)) in room.states.chunks_exact_mut(lanes).zip(nodes.chunks_exact(lanes)).enumerate() {
+                self.sampling.sampled(nodes, count, states);
+                for (g, states) in states.chunks_exact_mut(count).enumerate().take(without.map_or(0, |_| m + 1)) {
+                    let within = &without.unwrap_or(&[])[(c * (m + 1) + g) * self.intervals()..][piece.clone()];
+                    states.iter_mut().zip(within).for_each(|(x, w)| *x -= w);
+                }
             }
             let parameters = self.setting.at(&u[size + 1..]);
-            let batch = Batch { lanes, states: &states, parameters: Parameters::Shared(&parameters), times: &times };
-            self.setting.field.linearise(batch, &[], &mut f, &mut fx, &mut []);
-            let lengths: Vec<f64> = self.mesh.windows(2).map(|pair| (pair[1] - pair[0]) * u[size]).collect();
-            for (k, from) in fx.chunks_exact(count).enumerate() {
+            let batch =
+                Batch { lanes, states: &room.states, parameters: Parameters::Shared(&parameters), times: &times };
+            self.setting.field.linearise(batch, &[], &mut room.f, &mut room.fx, &mut []);
+            let lengths: Vec<f64> = mesh.windows(2).map(|pair| (pair[1] - pair[0]) * u[size]).collect();
+            for (k, from) in room.fx.chunks_exact(count).enumerate() {
                 let (entry, g) = (k / (m + 1), k % (m + 1));
-                let to = &mut jacobians[((entry * 2 + course) * (m + 1) + g) * padded..][..padded];
+                let to = &mut room.jacobians[((entry * 2 + course) * (m + 1) + g) * padded..][..padded];
                 to.iter_mut().zip(&lengths).zip(from).for_each(|((x, h), from)| *x = h * from);
                 repeat_last(to, count);
             }
         }
-        let (mut nodes, mut transitions) = (vec![0.0; (m + 1) * square * padded], vec![0.0; square * 2 * padded]);
-        (0..n).for_each(|c| nodes[c * (n + 1) * padded..][..padded].fill(1.0));
-        self.system.inner(padded, &mut nodes[square * padded..]);
-        nodes[square * padded..].chunks_exact_mut(padded).for_each(|line| repeat_last(line, count));
-        let mut own = vec![0.0; square];
-        for j in 0..count {
-            self.system.transition(j, &mut own);
-            own.iter().enumerate().for_each(|(k, x)| (0..2).for_each(|c| transitions[(2 * k + c) * padded + j] = *x));
+        room.nodes[..square * padded].fill(0.0);
+        (0..n).for_each(|c| room.nodes[c * (n + 1) * padded..][..padded].fill(1.0));
+        self.system.inner(piece.clone(), padded, &mut room.nodes[square * padded..]);
+        room.nodes[square * padded..].chunks_exact_mut(padded).for_each(|line| repeat_last(line, count));
+        for (k, line) in room.transitions.chunks_exact_mut(padded).enumerate() {
+            let own = transitions[k % 2][piece.start * square + k / 2..].iter().step_by(square);
+            line.iter_mut().zip(own).take(count).for_each(|(x, g)| *x = *g);
+            repeat_last(line, count);
         }
-        transitions.chunks_exact_mut(padded).for_each(|line| repeat_last(line, count));
-        defect::correct(&self.sampling, &nodes, &jacobians, &mut transitions, n);
-        let corrected = |course: usize, u: &[f64]| {
-            let transition = |j: usize, to: &mut [f64]| {
-                to.iter_mut().enumerate().for_each(|(k, x)| *x = transitions[(2 * k + course) * padded + j]);
-            };
-            self.floquet_with(u, transition).multipliers
-        };
-        let found = [corrected(0, u), corrected(1, &better)];
-        found.iter().flatten().all(|z| z.re.is_finite() && z.im.is_finite()).then_some(found)
+        defect::correct(&self.sampling, &room.nodes, &room.jacobians, &mut room.transitions, n);
+        for (k, line) in room.transitions.chunks_exact(padded).enumerate() {
+            let own = transitions[k % 2][piece.start * square + k / 2..].iter_mut().step_by(square);
+            own.zip(line).take(count).for_each(|(g, x)| *g = *x);
+        }
     }
 
     fn measured_errors(&self, u: &[f64]) -> Measured {

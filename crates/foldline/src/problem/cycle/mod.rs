@@ -192,19 +192,22 @@ impl<'a> CycleProblem<'a> {
 
     /// Multipliers from the last factorisation, which belongs to `u`.
     fn floquet(&self, u: &[f64]) -> Floquet {
-        self.floquet_with(u, |_, _| ())
+        self.floquet_of(u, self.transitions())
     }
 
-    /// The same with every transition, `[n × n]`, changed as said.
-    fn floquet_with(&self, u: &[f64], mut change: impl FnMut(usize, &mut [f64])) -> Floquet {
-        let (n, count) = (self.n, self.intervals());
-        let mut transitions = vec![0.0; count * n * n];
-        for (j, own) in transitions.chunks_exact_mut(n * n).enumerate() {
-            self.system.transition(j, own);
-            change(j, own);
-            for (k, g) in own.iter_mut().enumerate() {
-                *g *= self.scale[k % n] / self.scale[k / n];
-            }
+    /// `[N][n × n]`: how the right end of each interval follows from its left end.
+    fn transitions(&self) -> Vec<f64> {
+        let mut transitions = vec![0.0; self.intervals() * self.n * self.n];
+        transitions.chunks_exact_mut(self.n * self.n).enumerate().for_each(|(j, own)| self.system.transition(j, own));
+        transitions
+    }
+
+    /// Multipliers from transitions.
+    fn floquet_of(&self, u: &[f64], mut transitions: Vec<f64>) -> Floquet {
+        let n = self.n;
+        let factors: Vec<f64> = (0..n * n).map(|k| self.scale[k % n] / self.scale[k / n]).collect();
+        for own in transitions.chunks_exact_mut(n * n) {
+            own.iter_mut().zip(&factors).for_each(|(g, factor)| *g *= factor);
         }
         match self.is_forced() {
             true => floquet::forced(&transitions, n),
@@ -348,9 +351,22 @@ impl ZeroProblem for CycleProblem<'_> {
         Some(mesh::divided(&self.mesh, 2))
     }
 
+    fn stability(&mut self, u: &[f64]) -> Examination {
+        let found = self.floquet(u);
+        let trust = Trust {
+            trivial_defect: if self.is_forced() { 0.0 } else { (found.multipliers[0].re - 1.0).abs() },
+            liouville_defect: (found.log_product - self.trace).abs(),
+            spectrum: f64::NAN,
+            ..Trust::default()
+        };
+        let trivial = usize::from(!self.is_forced());
+        let (spectrum, unstable) = (found.multipliers, found.unstable);
+        Examination { spectrum, trivial, unstable, trust, ..Examination::default() }
+    }
+
     fn examine(&mut self, u: &[f64]) -> Examination {
         let size = self.profile_size();
-        let found = self.floquet(u);
+        let mut found = self.stability(u);
         let scale = self.relative_scale(u);
         let errors = self.errors(u);
         let mut r = vec![0.0; u.len()];
@@ -358,17 +374,12 @@ impl ZeroProblem for CycleProblem<'_> {
         let residual = self.sizes(&r).iter().zip(&scale).map(|(v, s)| v / s).fold(r[size].abs(), f64::max);
         let parameters = self.setting.at(&u[size + 1..]);
         let cycle = [&u[..size], &self.mesh[..]];
-        let ranges = extremes::of_profile(self.setting.field, &parameters, cycle, self.forcing_periods, &self.scheme);
-        let averages = averages::of_profile(self.setting.field, &parameters, cycle, self.forcing_periods, &self.scheme);
-        let trust = Trust {
-            discretisation: SAFE * errors.iter().fold(0.0, |m: f64, e| m.max(*e)) + ROUNDING,
-            residual,
-            trivial_defect: if self.is_forced() { 0.0 } else { (found.multipliers[0].re - 1.0).abs() },
-            liouville_defect: (found.log_product - self.trace).abs(),
-            spectrum: f64::NAN,
-        };
-        let trivial = usize::from(!self.is_forced());
-        Examination { spectrum: found.multipliers, trivial, unstable: found.unstable, ranges, averages, trust }
+        found.ranges = extremes::of_profile(self.setting.field, &parameters, cycle, self.forcing_periods, &self.scheme);
+        found.averages =
+            averages::of_profile(self.setting.field, &parameters, cycle, self.forcing_periods, &self.scheme);
+        found.trust.discretisation = SAFE * errors.iter().fold(0.0, |m: f64, e| m.max(*e)) + ROUNDING;
+        found.trust.residual = residual;
+        found
     }
 
     fn spectrum_error(&mut self, u: &[f64], spectrum: &[Complex64]) -> f64 {

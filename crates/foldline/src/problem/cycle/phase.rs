@@ -54,11 +54,34 @@ impl CycleProblem<'_> {
         if room < 0.0 {
             return Vec::new();
         }
+        if self.apart_in_any_phase(&beside[..size], &states) > room {
+            return Vec::new();
+        }
         let images = self.shifts(&beside[..size], &states, room.sqrt()).into_iter().map(|shift| {
             let u = [&self.moved(&states, shift)[..], &scalars].concat();
             [u, [&self.moved(&tangent, shift)[..], &point.tangent[whole..]].concat()]
         });
         images.filter(|[u, _]| close(u)).collect()
+    }
+
+    /// What the square of the distance of two profiles, of which the first is on the mesh of this problem, is at least, whatever
+    /// their phases: by how much their means differ, and their distances from them.
+    fn apart_in_any_phase(&self, x: &[f64], y: &Cycle) -> f64 {
+        let moments = |profile: &[f64], mesh: &[f64]| -> Vec<[f64; 2]> {
+            let mut sums = vec![[0.0; 2]; self.n];
+            for (block, ends) in profile.chunks_exact(self.block()).zip(mesh.windows(2)) {
+                for (b, node) in self.scheme.weights.iter().zip(block[self.n..].chunks_exact(self.n)) {
+                    let weight = (ends[1] - ends[0]) * b;
+                    for (sum, v) in sums.iter_mut().zip(node) {
+                        *sum = [sum[0] + weight * v, sum[1] + weight * v * v];
+                    }
+                }
+            }
+            sums.into_iter().map(|[mean, square]| [mean, (square - mean * mean).max(0.0).sqrt()]).collect()
+        };
+        let pairs = moments(x, &self.mesh).into_iter().zip(moments(&y.profile, &y.mesh));
+        let off = |(a, b): ([f64; 2], [f64; 2])| (a[0] - b[0]).powi(2) + (a[1] - b[1]).powi(2);
+        pairs.zip(&self.scale).map(|(pair, scale)| off(pair) / (scale * scale)).sum::<f64>() / self.n as f64
     }
 
     /// The profile of `y` on the mesh of this problem, later by θ.
