@@ -14,9 +14,13 @@ use crate::{Outcome, clock, rotor};
 use foldline::diagram::{Branch, Diagram, Kind, Point, Solution};
 
 const INTERVALS: [usize; 2] = [100, 200];
-const STEPS: [&str; 3] = ["0.05", "0.2", "1"];
-/// Points after which AUTO has surely been round, or never will be.
-const LIMIT: usize = 2500;
+const STEPS: [&str; 5] = ["0.01", "0.02", "0.05", "0.2", "1"];
+/// Length of a branch of cycles, in the largest of the usual steps, after which AUTO has surely been round or never will be …
+const FAR: f64 = 50.0;
+/// … and of one of equilibria, which reaches large amplitudes …
+const FARTHER: f64 = 400.0;
+/// … and points that are enough where steps are long.
+const LEAST: usize = 2500;
 
 /// Everything that AUTO does at one setting.
 struct Tour<'t> {
@@ -62,26 +66,33 @@ impl Tour<'_> {
         Ok(rows)
     }
 
-    fn common(&self, start: &Point) -> Vec<(&'static str, String)> {
-        let [omega, kappa] = [start.parameters[0], start.parameters[1]];
+    /// Points after which a branch is given up.
+    fn limit(&self, length: f64) -> usize {
+        let step: f64 = self.step.parse().unwrap_or(1.0);
+        ((length / step) as usize).max(LEAST)
+    }
+
+    fn common(&self) -> Vec<(&'static str, String)> {
         vec![
-            ("PAR", format!("{{1: {omega:?}, 2: {kappa:?}}}")),
             ("UZSTOP", "{1: [0.5, 12.0]}".into()),
             ("DSMAX", self.step.into()),
             ("NTST", self.intervals.to_string()),
-            ("NMX", LIMIT.to_string()),
+            ("NMX", self.limit(FAR).to_string()),
         ]
     }
 
     /// A branch of the plan and what grows from it.
     fn branch(&mut self, branch: &Branch) -> Outcome<()> {
         let start = rotor::first(branch)?;
-        let mut changes = self.common(start);
+        let [omega, kappa] = [start.parameters[0], start.parameters[1]];
+        let mut changes = self.common();
+        changes.push(("PAR", format!("{{1: {omega:?}, 2: {kappa:?}}}")));
         let cycle = match &start.solution {
             Solution::Equilibrium(x) => {
                 let values: Vec<String> = x.iter().enumerate().map(|(k, v)| format!("{}: {v:?}", k + 1)).collect();
                 changes.push(("U", format!("{{{}}}", values.join(", "))));
                 changes.extend([("IPS", "1".into()), ("ICP", "[1]".into()), ("dat", "''".into())]);
+                changes.push(("NMX", self.limit(FARTHER).to_string()));
                 None
             }
             Solution::Cycle(cycle) => {
@@ -98,11 +109,14 @@ impl Tour<'_> {
                 None => None,
             };
             // Counted once more, up to where it came round.
-            let run = run.with(&[("NMX", lap.unwrap_or(LIMIT).to_string())]);
+            let run = match lap {
+                Some(points) => run.with(&[("NMX", points.to_string())]),
+                None => run,
+            };
             let rows = self.counted(&branch.name, &run)?;
             if cycle.is_some() && start.parameters[1] == 1.0 {
                 let solutions = self.auto.solutions()?;
-                self.doubled(&branch.name, start, &solutions, &rows, 2)?;
+                self.doubled(&branch.name, &solutions, &rows, 2)?;
             }
             if lap.is_some() {
                 break;
@@ -112,16 +126,18 @@ impl Tour<'_> {
     }
 
     /// The branches that begin at period doublings, to that depth.
-    fn doubled(&mut self, name: &str, start: &Point, solutions: &str, rows: &[Row], depth: usize) -> Outcome<()> {
+    fn doubled(&mut self, name: &str, solutions: &str, rows: &[Row], depth: usize) -> Outcome<()> {
         let mut ends: Vec<f64> = Vec::new();
         for row in rows.iter().filter(|row| kind_of(row) == Some(Kind::PeriodDoubling) && row.label > 0) {
             // The other end of a branch followed before.
             if ends.iter().any(|end| (end - row.parameter).abs() < 1e-2) {
                 continue;
             }
-            let mut changes = self.common(start);
-            // Twice as long a cycle, twice as many intervals. The branch ends where it meets its parent again.
+            let mut changes = self.common();
+            // Twice as long a cycle, twice as many intervals. The branch ends where it meets its parent again. Parameters that are
+            // given would replace those of the solution.
             changes.extend([
+                ("PAR", "{}".into()),
                 ("ISW", "-1".into()),
                 ("STOP", "['BP1']".into()),
                 ("NTST", (self.intervals << (3 - depth)).to_string()),
@@ -131,7 +147,7 @@ impl Tour<'_> {
             ends.extend(rows.iter().filter(|row| row.kind == 6).map(|row| row.parameter));
             if depth > 1 {
                 let own = self.auto.solutions()?;
-                self.doubled(name, start, &own, &rows, depth - 1)?;
+                self.doubled(name, &own, &rows, depth - 1)?;
             }
         }
         Ok(())

@@ -90,8 +90,9 @@ impl Follow<'_> {
         let (cause, cure) = self.cause(left, tried, why, past);
         let said = format!("{}\nlikely cause: {cause}\nwhat to do: {cure}", tried.sentence(why, left.parameter()));
         match why {
-            Failure::NotFinite => Ending::NotFinite(said),
             Failure::Mesh(_) => Ending::MeshTooLarge(said),
+            // Whatever the last of the steps failed for.
+            _ if cause == EDGE.0 => Ending::NotFinite(said),
             _ => Ending::StepTooSmall(said),
         }
     }

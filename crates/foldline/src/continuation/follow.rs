@@ -472,9 +472,6 @@ impl Follow<'_> {
         if let Aim::Value(_) = aim {
             // Where travel is towards smaller values the row has turned the tangent round.
             right.head(left.slope());
-            if self.angle(left, &right).0 > self.settings.max_angle {
-                return Err(Failure::Singular);
-            }
         }
         if right.mesh != left.mesh && short {
             return Err(Failure::Remeshed(right.mesh));

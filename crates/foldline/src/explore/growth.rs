@@ -4,7 +4,7 @@ use super::System;
 use super::counted::Counted;
 use crate::continuation::corrector::{Plane, parameter_row, settle, station};
 use crate::continuation::{Failure, Follow, Homecoming, Item, Settings, Station, follow};
-use crate::contract::{Event, Monitor, Observer, Verdict, ZeroProblem};
+use crate::contract::{Event, Examination, Monitor, Observer, Verdict, ZeroProblem};
 use crate::diagram::{Branch, Cost, Ending, Family, Kind, Origin, Point, Solution, SpecialPoint};
 use crate::problem::{Axis, Setting, Tie, cycle::CycleProblem, equilibrium::EquilibriumProblem, held::Held, mesh};
 use crate::special::mark::Mark;
@@ -103,14 +103,10 @@ pub fn polished(problem: &mut dyn ZeroProblem, settings: &Settings, point: &Poin
     let (row, value) = (parameter_row(u.len()), u[u.len() - 1]);
     let plane = Plane { row, base: u.clone(), distance: 0.0 };
     let mut found = settle(problem, settings, plane, u, 1.0, &mut Cost::default())?;
-    // To the last bit, whatever rounding Newton's method left.
-    for (now, given) in found.point.parameters.iter_mut().zip(&point.parameters) {
-        if (*now - given).abs() <= 1e-12 * (1.0 + given.abs()) {
-            *now = *given;
-        }
-    }
+    // To the last bit, whatever rounding Newton's method left; a second parameter that was solved for stays as it was found.
     let last = found.u.len() - 1;
     found.u[last] = value;
+    found.point.parameters = problem.point(&found.u, &found.tangent, Examination::default()).parameters;
     Ok(found)
 }
 

@@ -159,13 +159,14 @@ impl<T: Lane> Condensed<T> {
         for (k, line) in to.chunks_exact_mut(stride).enumerate() {
             let (row, column) = (k / n, k % n);
             let own = self.slot(row / n, row % n) * width + column;
-            let (mut lane, mut place) = (piece.start / self.length, piece.start % self.length);
-            for x in line.iter_mut().take(piece.len()) {
-                *x = -self.coupling[own + place * inner * width].lanes()[lane];
-                place += 1;
-                if place == self.length {
-                    (lane, place) = (lane + 1, 0);
-                }
+            let mut j = piece.start;
+            while j < piece.end {
+                let (lane, place) = (j / self.length, j % self.length);
+                let places = self.coupling[own + place * inner * width..].iter().step_by(inner * width);
+                let count = (self.length - place).min(piece.end - j);
+                let to = &mut line[j - piece.start..][..count];
+                to.iter_mut().zip(places).for_each(|(x, c)| *x = -c.lanes()[lane]);
+                j += count;
             }
         }
     }

@@ -207,11 +207,29 @@ impl pulp::NullaryFnOnce for Correction<'_> {
 
     #[inline(always)]
     fn call(self) {
-        let Correction { sampling, nodes, jacobians, transitions, n } = self;
-        let (square, points) = (n * n, sampling.points.len());
-        let count = nodes.len() / (square * points);
+        // The usual case with its sizes as constants.
+        let courses = self.transitions.len() / (self.n * self.n * self.count());
+        match (self.n, self.sampling.points.len(), courses) {
+            (4, 5, 2) => self.corrected(4, 5, 2),
+            (n, points, courses) => self.corrected(n, points, courses),
+        }
+    }
+}
+
+impl Correction<'_> {
+    /// P.
+    #[inline(always)]
+    fn count(&self) -> usize {
+        self.nodes.len() / (self.n * self.n * self.sampling.points.len())
+    }
+
+    #[inline(always)]
+    fn corrected(self, n: usize, points: usize, courses: usize) {
+        let count = self.count();
+        let Correction { sampling, nodes, jacobians, transitions, .. } = self;
+        let square = n * n;
         // Right-hand sides of all courses stand side by side in a row.
-        let columns = transitions.len() / (n * count);
+        let columns = n * courses;
         let room = |size: usize| vec![Eight::default(); size];
         let (mut own, mut values, mut slopes) = (room(square * points), room(square * points), room(square * points));
         let [mut matrix, mut defect, mut right, mut sum] = [square, n * columns, n * columns, n * columns].map(room);
@@ -231,7 +249,7 @@ impl pulp::NullaryFnOnce for Correction<'_> {
                     for (course, to) in to.chunks_exact_mut(n).enumerate() {
                         to.copy_from_slice(slope);
                         for (d, v) in value.chunks_exact(n).enumerate() {
-                            let entry = (((c * n + d) * (columns / n) + course) * points + g) * count + first;
+                            let entry = (((c * n + d) * courses + course) * points + g) * count + first;
                             lane::subtract(Eight::load(&jacobians[entry..]), v, to);
                         }
                     }
@@ -248,7 +266,7 @@ impl pulp::NullaryFnOnce for Correction<'_> {
             for (c, error) in right.chunks_exact_mut(columns).enumerate() {
                 for (d, sums) in sum.chunks_exact(columns).enumerate() {
                     for (course, (error, sums)) in error.chunks_exact_mut(n).zip(sums.chunks_exact(n)).enumerate() {
-                        let entry = ((c * n + d) * (columns / n) + course) * count + first;
+                        let entry = ((c * n + d) * courses + course) * count + first;
                         lane::add(Eight::load(&transitions[entry..]), sums, error);
                     }
                 }
@@ -258,7 +276,7 @@ impl pulp::NullaryFnOnce for Correction<'_> {
                 .fold([true; Eight::COUNT], |all, e| std::array::from_fn(|lane| all[lane] && e.0[lane].is_finite()));
             for (c, row) in right.chunks_exact(columns).enumerate() {
                 for (k, error) in row.iter().enumerate() {
-                    let entry = ((c * n + k % n) * (columns / n) + k / n) * count + first;
+                    let entry = ((c * n + k % n) * courses + k / n) * count + first;
                     let lanes = transitions[entry..].iter_mut().zip(&error.0).zip(finite);
                     lanes.filter(|(_, finite)| *finite).for_each(|((t, e), _)| *t -= e);
                 }

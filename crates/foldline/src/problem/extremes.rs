@@ -38,8 +38,7 @@ pub fn of_profile(
     let mut best = Vec::with_capacity(2 * channels);
     let mut peaks: Vec<Peak> = Vec::with_capacity(2 * PEAKS * channels);
     for line in values.chunks_exact(lanes) {
-        for sign in [-1.0, 1.0] {
-            let (top, places) = highest(line, sign);
+        for (sign, (top, places)) in [-1.0, 1.0].into_iter().zip(outermost(line)) {
             peaks.extend(places.iter().map(|&place| Peak { of: best.len(), sign, place: place as f64, spacing: 1.0 }));
             best.push(top);
         }
@@ -181,27 +180,59 @@ impl Orbit<'_> {
     }
 }
 
-/// The largest value of sign · line, and the samples of its best few peaks, the best first.
-fn highest(line: &[f64], sign: f64) -> (f64, Vec<usize>) {
+/// For either sign, -1 first, the largest value of sign · line, and the samples of its best few peaks, the best first.
+fn outermost(line: &[f64]) -> [(f64, Vec<usize>); 2] {
     let lanes = line.len();
-    let mut top = f64::NEG_INFINITY;
-    // (How high the parabola through a peak and its neighbours rises, sample); the first of equals stays first.
-    let mut peaks: Vec<(f64, usize)> = Vec::with_capacity(PEAKS + 1);
-    let mut before = sign * line[lanes - 1];
-    for (l, value) in line.iter().enumerate() {
-        let here = sign * value;
-        if here > top {
-            top = here;
+    let mut found = [Summit::default(), Summit::default()];
+    let mut look = |l: usize| {
+        let triple =
+            [line[if l > 0 { l - 1 } else { lanes - 1 }], line[l], line[if l + 1 < lanes { l + 1 } else { 0 }]];
+        let [low, high] = &mut found;
+        low.look(l, triple.map(|v| -v));
+        high.look(l, triple);
+    };
+    // Where the line only rises or only falls, over a block and one sample to either side, no sample is a peak.
+    const BLOCK: usize = 8;
+    let mut l = 0;
+    while l < lanes {
+        let next = (l + BLOCK).min(lanes);
+        let around = if l > 0 && next < lanes { &line[l - 1..=next] } else { &[] };
+        let (rising, falling) =
+            around.windows(2).fold((true, true), |(r, f), w| (r & (w[0] < w[1]), f & (w[0] > w[1])));
+        if around.is_empty() || !(rising || falling) {
+            (l..next).for_each(&mut look);
         }
-        let after = sign * line[if l + 1 < lanes { l + 1 } else { 0 }];
+        l = next;
+    }
+    found.map(|summit| (summit.top, summit.peaks.into_iter().map(|peak| peak.1).collect()))
+}
+
+/// The largest of the values looked at, and the best few peaks among them.
+struct Summit {
+    top: f64,
+    /// (How high the parabola through a peak and its neighbours rises, sample); the first of equals stays first.
+    peaks: Vec<(f64, usize)>,
+}
+
+impl Default for Summit {
+    fn default() -> Summit {
+        Summit { top: f64::NEG_INFINITY, peaks: Vec::with_capacity(PEAKS + 1) }
+    }
+}
+
+impl Summit {
+    /// Takes note of sample l, which has these neighbours.
+    #[inline(always)]
+    fn look(&mut self, l: usize, [before, here, after]: [f64; 3]) {
+        if here > self.top {
+            self.top = here;
+        }
         if here >= before && here >= after {
             let bend = 2.0 * here - before - after;
             let rise = if bend > 0.0 { (after - before) * (after - before) / (8.0 * bend) } else { 0.0 };
-            let at = peaks.partition_point(|peak| peak.0.total_cmp(&(here + rise)).is_ge());
-            peaks.insert(at, (here + rise, l));
-            peaks.truncate(PEAKS);
+            let at = self.peaks.partition_point(|peak| peak.0.total_cmp(&(here + rise)).is_ge());
+            self.peaks.insert(at, (here + rise, l));
+            self.peaks.truncate(PEAKS);
         }
-        before = here;
     }
-    (top, peaks.into_iter().map(|peak| peak.1).collect())
 }

@@ -7,6 +7,8 @@
 use super::hopf;
 use crate::contract::{Monitor, VectorField};
 use crate::diagram::{Cycle, Kind, Point, Solution};
+use crate::problem::gauss::Scheme;
+use crate::problem::mesh;
 use std::f64::consts::TAU;
 
 const SAMPLES: usize = 128;
@@ -63,6 +65,12 @@ impl Monitor for Shrinks<'_> {
     }
 
     fn value(&self, reference: &Point, at: &Point) -> f64 {
+        if let (Solution::Cycle(a), Solution::Cycle(b)) = (&reference.solution, &at.solution)
+            && a.degree == b.degree
+            && mesh::same(&a.mesh, &b.mesh)
+        {
+            return on_one_mesh(a, b);
+        }
         compare(reference, at, |x, n| {
             let mean = Shrinks::mean(x, n);
             x.iter().enumerate().map(|(k, v)| v - mean[k % n]).collect()
@@ -161,6 +169,27 @@ impl Monitor for Halves {
     fn jump(&self) -> usize {
         0
     }
+}
+
+/// What [`compare`] finds of the deviations from the means, by the quadrature of the Gauss points.
+fn on_one_mesh(a: &Cycle, b: &Cycle) -> f64 {
+    let (scheme, n) = (Scheme::new(a.degree), a.dim());
+    let block = (a.degree + 1) * n;
+    // Means of a and b, of a² and a b.
+    let mut sums = vec![[0.0; 4]; n];
+    let intervals = a.profile.chunks_exact(block).zip(b.profile.chunks_exact(block));
+    for ((x, y), ends) in intervals.zip(a.mesh.windows(2)) {
+        let nodes = x[n..].chunks_exact(n).zip(y[n..].chunks_exact(n));
+        for ((x, y), share) in nodes.zip(&scheme.weights) {
+            let weight = (ends[1] - ends[0]) * share;
+            for (sum, (x, y)) in sums.iter_mut().zip(x.iter().zip(y)) {
+                let (x, y, weighted) = (*x, *y, weight * x);
+                *sum = [sum[0] + weighted, sum[1] + weight * y, sum[2] + weighted * x, sum[3] + weighted * y];
+            }
+        }
+    }
+    let share = |[x, y, square, product]: [f64; 4]| (product - x * y) / (square - x * x).max(f64::MIN_POSITIVE);
+    sums.into_iter().map(share).sum::<f64>() / n as f64
 }
 
 /// Inner product of the deviations of both points, relative to that of the reference.

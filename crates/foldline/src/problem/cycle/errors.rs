@@ -49,7 +49,7 @@ struct Course<'a> {
 
 /// Room for some intervals.
 #[derive(Default)]
-struct Room {
+pub(super) struct Room {
     /// `[n][m + 1][count]`, at the sample points.
     states: Vec<f64>,
     f: Vec<f64>,
@@ -122,9 +122,9 @@ impl CycleProblem<'_> {
         let mut transitions = [self.transitions(), Vec::new()];
         transitions[1] = transitions[0].clone();
         let courses = [Course { u, without: None }, Course { u: &better, without: Some(&known.within) }];
-        let mut room = Room::default();
+        let room = &mut *self.room.borrow_mut();
         for first in (0..self.intervals()).step_by(TOGETHER) {
-            self.correct(first..(first + TOGETHER).min(self.intervals()), &courses, &mut transitions, &mut room);
+            self.correct(first..(first + TOGETHER).min(self.intervals()), &courses, &mut transitions, room);
         }
         let [own, other] = transitions;
         let found = [self.floquet_of(u, own).multipliers, self.floquet_of(&better, other).multipliers];

@@ -43,7 +43,7 @@ use crate::linalg::lane::Eight;
 use crate::linalg::system::System;
 use crate::linalg::{larger, max_abs};
 use crate::stability::floquet::{self, Floquet};
-use errors::Measured;
+use errors::{Measured, Room};
 use num_complex::Complex64;
 use std::cell::RefCell;
 
@@ -93,6 +93,7 @@ pub struct CycleProblem<'a> {
     trace: f64,
     /// What was measured last. Mesh and errors belong together only for the point they were measured at.
     measured: RefCell<Option<Measured>>,
+    room: RefCell<Room>,
     /// How the last pairs of meshes are passed between.
     passages: RefCell<Vec<Passage>>,
 }
@@ -129,7 +130,8 @@ impl<'a> CycleProblem<'a> {
             coupled: vec![false; n * n],
             trace: 0.0,
             measured: RefCell::new(None),
-            passages: RefCell::new(Vec::new()),
+            room: RefCell::default(),
+            passages: RefCell::default(),
         };
         problem.arrange();
         problem

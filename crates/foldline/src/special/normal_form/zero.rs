@@ -25,7 +25,11 @@ impl Local<'_> {
     /// branch than to the one that crosses it, for one unit of its parameter; `scales` `[n]` are those of the states. `None` where no branches
     /// cross.
     pub fn crossing(&self, along: &[f64], scales: &[f64]) -> Option<Vec<f64>> {
-        let [q, p] = self.null_vectors()?;
+        let vectors = self.null_vectors()?;
+        // A tangent that was interpolated solves the linear equations only nearly.
+        let off = self.bordered(&vectors, &self.derivative(&[along]))?;
+        let along: Vec<f64> = along.iter().enumerate().map(|(i, x)| x - off.get(i).copied().unwrap_or(0.0)).collect();
+        let (along, [q, p]) = (&along[..], vectors);
         let size = dot(&p, &q);
         let b = dot(&p, &self.derivative(&[&q, along])) / size;
         if self.is_pitchfork(scales, PITCHFORK)? {
