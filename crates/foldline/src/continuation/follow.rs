@@ -97,7 +97,7 @@ const FINER: f64 = 1.0 / 32.0;
 const CROSSING: f64 = 2e-3;
 
 /// Growth of a step over the one before, at most: the prediction is by the cubic through both ends of that.
-const GROWTH: f64 = 2.5;
+const GROWTH: f64 = 2.0;
 /// Growth of the period while the parameter stands still, having moved before, that means that the period has no bound.
 const LONG: f64 = 3.0;
 /// Slope of a branch in its parameter below which it does not change along the branch but for rounding.

@@ -187,7 +187,8 @@ impl Follow<'_> {
         let suspicious = depth < 3 && (touches() || (!standing && stretch.may_turn_twice()));
         // Nothing is known of how monitors change on a first step; at equilibria it costs next to nothing to look.
         let mut seen = None;
-        if depth == 0 && jumps.is_empty() && (history.is_none() || left.mesh.is_empty()) {
+        let unknown = history.is_none() || left.mesh.is_empty() || may_double_unseen(left, right, stretch.length);
+        if depth == 0 && jumps.is_empty() && unknown {
             seen = self.seen_between(&stretch, &at_left, history.is_none(), cost);
         }
         let suspicious = suspicious || seen.is_some();
@@ -342,6 +343,24 @@ fn may_double(history: &History, left: &Station, right: &Station, length: f64) -
         (Some(before), Some(now), Some(then)) => now + then < FAST * (now - before).abs() / history.distance * length,
         _ => false,
     }
+}
+
+/// Angle from the negative real axis of the pair of multipliers that is closest to it, among those close enough to the unit circle to pass
+/// -1 once they are real.
+fn from_negative_axis(spectrum: &[Complex64]) -> Option<f64> {
+    const RING: f64 = 0.2;
+    let pairs = spectrum.iter().filter(|z| z.im > 0.0 && z.norm().ln().abs() < RING);
+    pairs.map(|z| PI - z.arg()).min_by(f64::total_cmp)
+}
+
+/// Whether a pair of multipliers stays so close to the negative real axis over a long step that it may have met there, passed -1 and
+/// come back. Its angle is the root of something smooth: what both ends show of that says little of the middle.
+fn may_double_unseen(left: &Station, right: &Station, length: f64) -> bool {
+    const LONG: f64 = 0.05;
+    const NEAR: f64 = 0.8;
+    let [now, then] = [left, right].map(|station| from_negative_axis(&station.point.spectrum));
+    let near = now.zip(then).is_some_and(|(now, then)| now + then < NEAR);
+    near && !left.mesh.is_empty() && length.abs() > LONG
 }
 
 /// Shortest step on which a slope below so many tolerances is none.
