@@ -105,29 +105,41 @@ impl CycleProblem<'_> {
 
     /// Estimated error of the multipliers `spectrum` at `u`: they change by it where the transitions of all intervals are made more
     /// accurate, and again where the Jacobian is taken not along the profile but along the profile without its estimated error.
-    /// The two can cancel; their sizes are added. Identities between multipliers see little of this error, which is large where the
+    /// The two can cancel, and so can the errors of neighbouring intervals: every second interval is changed first, then the others, and the
+    /// sizes of all changes are added. Identities between multipliers see little of this error, which is large where the
     /// Jacobian changes sharply.
     pub(super) fn multiplier_error(&self, u: &[f64], spectrum: &[Complex64]) -> f64 {
         self.errors(u);
-        let Some([own, better]) = self.corrected_multipliers(u) else { return f64::NAN };
-        let apart = spectrum_difference(spectrum, &own) + spectrum_difference(&own, &better);
+        let Some(spectra) = self.corrected_multipliers(u) else { return f64::NAN };
+        let before = std::iter::once(spectrum).chain(spectra.iter().map(Vec::as_slice));
+        let apart: f64 = before.zip(&spectra).map(|(one, next)| spectrum_difference(one, next)).sum();
         SPECTRUM_SAFE * apart + SPECTRUM_ROUNDING
     }
 
-    /// The multipliers from more accurate transitions, with the Jacobian along the profile, and along the profile without its error.
-    fn corrected_multipliers(&self, u: &[f64]) -> Option<[Vec<Complex64>; 2]> {
+    /// The multipliers from more accurate transitions, with the Jacobian along the profile, and along the profile without its error; before
+    /// either of them those where every second interval is so.
+    fn corrected_multipliers(&self, u: &[f64]) -> Option<[Vec<Complex64>; 4]> {
         let known = self.measured.borrow();
         let known = known.as_ref()?;
         let better: Vec<f64> = u.iter().zip(&known.shift).map(|(u, e)| u - e).collect();
-        let mut transitions = [self.transitions(), Vec::new()];
-        transitions[1] = transitions[0].clone();
+        let plain = self.transitions();
+        let mut transitions = [plain.clone(), plain.clone()];
         let courses = [Course { u, without: None }, Course { u: &better, without: Some(&known.within) }];
         let room = &mut *self.room.borrow_mut();
         for first in (0..self.intervals()).step_by(TOGETHER) {
             self.correct(first..(first + TOGETHER).min(self.intervals()), &courses, &mut transitions, room);
         }
         let [own, other] = transitions;
-        let found = [self.floquet_of(u, own).multipliers, self.floquet_of(&better, other).multipliers];
+        let square = self.n * self.n;
+        let halfway = |from: &[f64], to: &[f64]| -> Vec<Complex64> {
+            let mut mixed = from.to_vec();
+            let seconds = mixed.chunks_exact_mut(square).zip(to.chunks_exact(square)).step_by(2);
+            seconds.for_each(|(x, y)| x.copy_from_slice(y));
+            self.floquet_of(u, mixed).multipliers
+        };
+        let (first, third) = (halfway(&plain, &own), halfway(&own, &other));
+        let second = self.floquet_of(u, own).multipliers;
+        let found = [first, second, third, self.floquet_of(&better, other).multipliers];
         found.iter().flatten().all(|z| z.re.is_finite() && z.im.is_finite()).then_some(found)
     }
 
