@@ -331,36 +331,36 @@ impl Follow<'_> {
 /// from the axis before as after, and has moved fast enough to have been there.
 fn may_double(history: &History, left: &Station, right: &Station, length: f64) -> bool {
     const FAST: f64 = 1.5;
+    const RING: f64 = 1.0;
     if left.mesh.is_empty() {
         return false;
     }
-    let from_axis = |spectrum: &[Complex64]| {
-        let pairs = spectrum.iter().filter(|z| z.im > 0.0 && z.norm().ln().abs() < 1.0);
-        pairs.map(|z| PI - z.arg()).min_by(f64::total_cmp)
-    };
-    let [before, now, then] = [&history.spectrum, &left.point.spectrum, &right.point.spectrum].map(|s| from_axis(s));
-    match (before, now, then) {
-        (Some(before), Some(now), Some(then)) => now + then < FAST * (now - before).abs() / history.distance * length,
+    let spectra = [&history.spectrum, &left.point.spectrum, &right.point.spectrum];
+    match spectra.map(|spectrum| from_negative_axis(spectrum, RING)) {
+        [Some(before), Some(now), Some(then)] => now + then < FAST * (now - before).abs() / history.distance * length,
         _ => false,
     }
 }
 
-/// Angle from the negative real axis of the pair of multipliers that is closest to it, among those close enough to the unit circle to pass
-/// -1 once they are real.
-fn from_negative_axis(spectrum: &[Complex64]) -> Option<f64> {
-    const RING: f64 = 0.2;
-    let pairs = spectrum.iter().filter(|z| z.im > 0.0 && z.norm().ln().abs() < RING);
+/// Angle from the negative real axis of the pair of multipliers that is closest to it, among those with the logarithm of their modulus
+/// within `ring`: close enough to the unit circle to pass -1 once they are real.
+fn from_negative_axis(spectrum: &[Complex64], ring: f64) -> Option<f64> {
+    let pairs = spectrum.iter().filter(|z| z.im > 0.0 && z.norm().ln().abs() < ring);
     pairs.map(|z| PI - z.arg()).min_by(f64::total_cmp)
 }
 
 /// Whether a pair of multipliers stays so close to the negative real axis over a long step that it may have met there, passed -1 and
 /// come back. Its angle is the root of something smooth: what both ends show of that says little of the middle.
 fn may_double_unseen(left: &Station, right: &Station, length: f64) -> bool {
+    !left.mesh.is_empty() && stays_near(&left.point.spectrum, &right.point.spectrum, length)
+}
+
+fn stays_near(now: &[Complex64], then: &[Complex64], length: f64) -> bool {
     const LONG: f64 = 0.05;
     const NEAR: f64 = 0.8;
-    let [now, then] = [left, right].map(|station| from_negative_axis(&station.point.spectrum));
-    let near = now.zip(then).is_some_and(|(now, then)| now + then < NEAR);
-    near && !left.mesh.is_empty() && length.abs() > LONG
+    const RING: f64 = 0.2;
+    let angles = from_negative_axis(now, RING).zip(from_negative_axis(then, RING));
+    length.abs() > LONG && angles.is_some_and(|(now, then)| now + then < NEAR)
 }
 
 /// Shortest step on which a slope below so many tolerances is none.
@@ -395,5 +395,20 @@ mod tests {
         assert!(explains(&[1], 1, 2) && explains(&[1], 1, 0) && !explains(&[1], 1, 1));
         assert!(explains(&[2], 0, 2) && !explains(&[2], 1, 2) && !explains(&[2], 1, 0));
         assert!(explains(&[1, 2], 0, 3) && !explains(&[1, 2], 0, 1) && explains(&[1, 1], 1, 1));
+    }
+    #[test]
+    fn a_pair_that_stays_next_to_minus_one_over_a_long_step_is_looked_into() {
+        let pair = |modulus: f64, angle: f64| {
+            let one = Complex64::from_polar(modulus, PI - angle);
+            vec![Complex64::new(1.0, 0.0), one, one.conj(), Complex64::new(0.3, 0.0)]
+        };
+        assert!(
+            stays_near(&pair(0.95, 0.3), &pair(0.97, 0.4), 0.1) && stays_near(&pair(0.95, 0.3), &pair(0.97, 0.4), -0.1)
+        );
+        assert!(!stays_near(&pair(0.95, 0.3), &pair(0.97, 0.4), 0.04), "a short step");
+        assert!(!stays_near(&pair(0.95, 0.3), &pair(0.97, 0.6), 0.1), "far from the axis");
+        assert!(!stays_near(&pair(0.7, 0.3), &pair(0.7, 0.3), 0.1), "far inside the circle");
+        let real = [1.0, -0.9, -0.95, 0.3].map(|x| Complex64::new(x, 0.0));
+        assert!(!stays_near(&pair(0.95, 0.3), &real, 0.1), "met already: the multipliers themselves show what they do");
     }
 }

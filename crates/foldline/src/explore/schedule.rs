@@ -101,3 +101,103 @@ impl Drop for Claim<'_> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::plan::{AttractorKey, BranchPlan, SeedPlan, SeedSource, Switching};
+    use super::super::system::System;
+    use super::*;
+    use crate::contract::Unobserved;
+    use crate::diagram::{Diagram, Kind};
+    use crate::model::{Definition, Model, ModelSource, Parameter, State};
+
+    /// A branch from each of three seeds: two share a census, the one of the other is needed by the longest branch, and a last branch
+    /// starts from a state.
+    fn plan() -> Plan {
+        let sampled = SeedSource::Attractor(AttractorKey::Equilibrium);
+        let sources =
+            [(1.0, sampled.clone()), (2.0, sampled.clone()), (1.0, sampled), (1.0, SeedSource::State(vec![0.5]))];
+        let seeds = sources.into_iter().enumerate().map(|(k, (value, source))| SeedPlan {
+            name: k.to_string(),
+            source,
+            parameters: vec![value],
+            samples: 4,
+            random: 1,
+        });
+        let branch = |seed: usize, depth: usize| BranchPlan {
+            name: seed.to_string(),
+            start: Start::Seed(seed),
+            free: 0,
+            range: [0.0, 3.0],
+            until: None,
+            switching: Switching { depth: vec![(Kind::BranchPoint, depth)], only: Vec::new() },
+            marks: Vec::new(),
+            max_points: 10,
+        };
+        let branches = vec![branch(0, 0), branch(1, 2), branch(2, 1), branch(3, 0)];
+        Plan { seeds: seeds.collect(), branches, ..Plan::empty(1e-6, 4) }
+    }
+
+    fn decay() -> Model {
+        Model::compile(ModelSource {
+            name: "decay".into(),
+            parameters: vec![Parameter::new("p", 1.0)],
+            states: vec![State::new("x")],
+            equations: vec![Definition::new("x", "p - x")],
+            ..ModelSource::default()
+        })
+        .unwrap()
+    }
+
+    fn scheduled(work: impl FnOnce(&Schedule)) {
+        let (model, plan, earlier) = (decay(), plan(), Diagram::default());
+        let system = System::of_plan(&model, &plan);
+        let seeds = Seeds::new(&system, &plan, 1, &earlier, &[], &Unobserved);
+        assert_eq!((seeds.census_of(0), seeds.census_of(1), seeds.census_of(2)), (Some(0), Some(1), Some(0)));
+        let families: Vec<Root> = (0..4).map(Root::Branch).collect();
+        work(&Schedule::new(&plan, &families, &seeds));
+    }
+
+    #[test]
+    fn the_census_of_the_longest_family_goes_first_and_families_wait_for_their_own_only() {
+        scheduled(|schedule| {
+            let long = schedule.next().unwrap();
+            let short = schedule.next().unwrap();
+            assert_eq!((long.task, short.task), (Task::Census(1), Task::Census(0)));
+            // Nothing else can begin but what starts from a state.
+            assert_eq!(schedule.next().unwrap().task, Task::Family(3));
+            drop(short);
+            assert_eq!(schedule.next().unwrap().task, Task::Family(2));
+            drop(long);
+            let rest = [schedule.next().unwrap().task, schedule.next().unwrap().task];
+            assert_eq!(rest, [Task::Family(1), Task::Family(0)]);
+            assert!(schedule.next().is_none());
+        });
+    }
+
+    #[test]
+    fn a_thread_waits_until_what_is_left_can_begin() {
+        scheduled(|schedule| {
+            let first = schedule.next().unwrap();
+            std::thread::scope(|scope| {
+                let others = scope.spawn(|| std::iter::from_fn(|| schedule.next().map(|claim| claim.task)).count());
+                drop(first);
+                // The rest, but for what this thread takes meanwhile.
+                let own = std::iter::from_fn(|| schedule.next().map(|claim| claim.task)).count();
+                assert_eq!(own + others.join().unwrap(), 5);
+            });
+        });
+    }
+
+    #[test]
+    fn in_a_hurry_no_census_begins_nor_what_waits_for_one() {
+        scheduled(|schedule| {
+            let census = schedule.next().unwrap();
+            assert_eq!(census.task, Task::Census(1));
+            schedule.hurry();
+            drop(census);
+            assert_eq!(schedule.next().unwrap().task, Task::Family(3));
+            assert!(schedule.next().is_none());
+        });
+    }
+}

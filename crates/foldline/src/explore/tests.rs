@@ -1,8 +1,10 @@
 //! What stays in memory, what is switched at, where branches start.
 
-use super::{BranchPlan, Plan, SeedPlan, SeedSource, Start, Switching, System, first_solution, run, run_from};
+use super::{
+    AttractorKey, BranchPlan, Plan, SeedPlan, SeedSource, Start, Switching, System, first_solution, run, run_from,
+};
 use crate::contract::{Event, Observer, Unobserved, Verdict};
-use crate::diagram::{Branch, Diagram, Kind, Point};
+use crate::diagram::{Branch, Diagram, Ending, Kind, Point};
 use crate::model::{Definition, Model, ModelSource, Parameter, State};
 use std::sync::Mutex;
 
@@ -135,4 +137,44 @@ fn a_solution_that_is_given_is_not_looked_for() {
     let start = diagram.branches[0].points.iter().find(|p| p.position == 0).unwrap();
     assert!((start.ranges[0][1] - 3.0_f64.sqrt()).abs() < 1e-8, "{:?}", start.ranges);
     assert_eq!(start.parameters, [3.0]);
+}
+
+/// The cycle of the Stuart–Landau equation, of radius √p and period 2π.
+fn circles() -> Model {
+    Model::compile(ModelSource {
+        name: "circles".into(),
+        parameters: vec![Parameter::new("p", 1.0)],
+        states: vec![State::new("x"), State::new("y")],
+        equations: vec![
+            Definition::new("x", "p*x - y - x*(x^2 + y^2)"),
+            Definition::new("y", "x + p*y - y*(x^2 + y^2)"),
+        ],
+        ..ModelSource::default()
+    })
+    .unwrap()
+}
+
+#[test]
+fn the_last_step_lands_on_the_bound() {
+    let model = circles();
+    let source = SeedSource::Attractor(AttractorKey::Cycle);
+    let seed = SeedPlan { name: "at 1".into(), source, parameters: vec![1.0], samples: 4, random: 1 };
+    let branch = BranchPlan {
+        name: "circle".into(),
+        range: [0.4, 7.3],
+        ..pitchfork_plan(Switching::default()).branches[0].clone()
+    };
+    let plan = Plan { seeds: vec![seed], branches: vec![branch], ..Plan::empty(1e-6, 4) };
+    let diagram = run(&System::of_plan(&model, &plan), &plan, 1, Diagram::default(), &Unobserved);
+    let branch = &diagram.branches[0];
+    assert_eq!(branch.ends, [Some(Ending::Bound(0.4)), Some(Ending::Bound(7.3))]);
+    let values: Vec<f64> = branch.points.iter().map(|point| point.parameters[0]).collect();
+    let count = values.len();
+    assert_eq!([values[0], values[count - 1]], [0.4, 7.3], "to the last bit");
+    assert!(values.is_sorted() && count > 8, "{values:?}");
+    for point in [&branch.points[0], &branch.points[count - 1]] {
+        assert!((point.ranges[0][1] - point.parameters[0].sqrt()).abs() < 1e-7);
+        // A step that is cut off at a bound afterwards solves there again: twice the work of a step.
+        assert!(point.cost.newton <= 6 && point.cost.rejected == 0, "{:?}", point.cost);
+    }
 }

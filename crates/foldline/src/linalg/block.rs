@@ -99,30 +99,16 @@ fn blocks<T: Lane>(
         let (upper, done) = (&mut upper[first * n..], &mut done[first * columns..]);
         if step.own {
             // The rows of the block to the right of it.
-            for k in 1..m {
-                let (before, own) = upper.split_at_mut(k * n);
-                let (right_before, right) = done.split_at_mut(k * columns);
-                for i in 0..k {
-                    let factor = own[first + i];
-                    for q in &step.right {
-                        subtract(factor, &before[i * n + q * m..i * n + (q + 1) * m], &mut own[q * m..(q + 1) * m]);
-                    }
-                    for range in &step.carried {
-                        let from = i * columns;
-                        subtract(
-                            factor,
-                            &right_before[from + range.start..from + range.end],
-                            &mut right[range.clone()],
-                        );
-                    }
-                }
+            for q in &step.right {
+                tile::forward(upper, n, q * m, room, m, m);
+            }
+            for range in &step.carried {
+                tile::forward(done, columns, range.start, room, m, range.len());
             }
         }
         for q in &step.below {
             let rows = &mut lower[(q * m - first - m) * n..(q * m - first) * n];
-            for (to, row) in room.chunks_exact_mut(m).zip(rows.chunks_exact(n)) {
-                to.copy_from_slice(&row[first..first + m]);
-            }
+            copy_block(&rows[first..], n, room, m, m);
             for r in &step.right {
                 tile::subtract(rows, n, room, m, upper, n, [m, m, m], [r * m, 0, r * m]);
             }
@@ -143,11 +129,17 @@ fn identity<T: Lane>(a: &[T], n: usize, first: usize, m: usize, step: &Step) -> 
     for q in &step.below {
         for row in a[q * m * n..(q + 1) * m * n].chunks_exact(n) {
             for x in &row[first..first + m] {
-                largest = largest.zip(*x, |most, x| if x.abs() > most { x.abs() } else { most });
+                largest = larger(largest, *x);
             }
         }
     }
     T::splat(1.0).all(largest, serves)
+}
+
+/// The larger one of a number and the size of another.
+#[inline(always)]
+fn larger<T: Lane>(most: T, x: T) -> T {
+    most.zip(x.map(f64::abs), |most, x| if x > most { x } else { most })
 }
 
 /// Whether a diagonal serves, given the largest entry of its column.
@@ -156,21 +148,30 @@ fn serves(diagonal: f64, largest: f64) -> bool {
     (diagonal >= THRESHOLD * largest) & (diagonal > 1e-300) & (diagonal < f64::INFINITY)
 }
 
+/// Copies an m×m block between matrices of different strides.
+#[inline(always)]
+fn copy_block<T: Lane>(from: &[T], from_stride: usize, to: &mut [T], to_stride: usize, m: usize) {
+    for k in 0..m {
+        to[k * to_stride..k * to_stride + m].copy_from_slice(&from[k * from_stride..k * from_stride + m]);
+    }
+}
+
 /// Eliminates the columns of a component from its own rows and those below, within these columns; false, and nothing changed, if a
 /// diagonal does not serve.
 #[inline(always)]
 fn own_block<T: Lane>(a: &mut [T], n: usize, first: usize, m: usize, step: &Step, room: &mut [T]) -> bool {
-    let rows = || std::iter::once(first / m).chain(step.below.iter().copied()).flat_map(move |q| q * m..(q + 1) * m);
-    let panel = &mut room[..(1 + step.below.len()) * m * m];
-    for (row, i) in panel.chunks_exact_mut(m).zip(rows()) {
-        row.copy_from_slice(&a[i * n + first..i * n + first + m]);
+    let size = m * m;
+    let panel = &mut room[..(1 + step.below.len()) * size];
+    copy_block(&a[first * n + first..], n, &mut panel[..size], m, m);
+    for (to, q) in panel[size..].chunks_exact_mut(size).zip(&step.below) {
+        copy_block(&a[q * m * n + first..], n, to, m, m);
     }
     for k in 0..m {
         let (upper, lower) = panel.split_at_mut((k + 1) * m);
         let pivot = &mut upper[k * m..];
         let mut largest = T::default();
         for row in lower.chunks_exact(m) {
-            largest = largest.zip(row[k], |most, x| if x.abs() > most { x.abs() } else { most });
+            largest = larger(largest, row[k]);
         }
         if !pivot[k].map(f64::abs).all(largest, serves) {
             return false;
@@ -184,8 +185,9 @@ fn own_block<T: Lane>(a: &mut [T], n: usize, first: usize, m: usize, step: &Step
             }
         }
     }
-    for (i, row) in rows().zip(panel.chunks_exact(m)) {
-        a[i * n + first..i * n + first + m].copy_from_slice(row);
+    copy_block(&panel[..size], m, &mut a[first * n + first..], n, m);
+    for (from, q) in panel[size..].chunks_exact(size).zip(&step.below) {
+        copy_block(from, m, &mut a[q * m * n + first..], n, m);
     }
     true
 }
@@ -206,16 +208,8 @@ fn back_in_blocks<T: Lane>(a: &[T], n: usize, b: &mut [T], columns: usize, shape
             }
         }
         if step.own {
-            for k in (0..m).rev() {
-                let (own, done) = rows.split_at_mut((k + 1) * columns);
-                let row = &mut own[k * columns..];
-                let line = &lines[k * n + first..k * n + first + m];
-                for range in &step.solved {
-                    for (i, below) in done.chunks_exact(columns).enumerate() {
-                        subtract(line[k + 1 + i], &below[range.clone()], &mut row[range.clone()]);
-                    }
-                    row[range.clone()].iter_mut().for_each(|x| *x = *x * line[k]);
-                }
+            for range in &step.solved {
+                tile::backward(rows, columns, range.start, lines, n, first, m, range.len());
             }
         }
     }
@@ -413,7 +407,7 @@ fn solve_in_blocks<T: Lane>(a: &[T], n: usize, b: &mut [T], shape: &Shape, m: us
         let (done, rest) = b.split_at_mut(p * m);
         let own = &mut rest[..m];
         for q in &step.left {
-            tile::subtract(own, 1, lines, n, done, 1, [m, m, 1], [0, q * m, q * m]);
+            tile::subtract_image(own, lines, n, q * m, &done[q * m..(q + 1) * m], m);
         }
         if step.own {
             for k in 1..m {
@@ -428,7 +422,7 @@ fn solve_in_blocks<T: Lane>(a: &[T], n: usize, b: &mut [T], shape: &Shape, m: us
         let (head, done) = b.split_at_mut((p + 1) * m);
         let own = &mut head[p * m..];
         for q in &step.right {
-            tile::subtract(own, 1, lines, n, done, 1, [m, m, 1], [0, q * m, (q - p - 1) * m]);
+            tile::subtract_image(own, lines, n, q * m, &done[(q - p - 1) * m..(q - p) * m], m);
         }
         if step.own {
             for k in (0..m).rev() {

@@ -51,6 +51,12 @@ pub struct Chain<T> {
     stack: Vec<T>,
 }
 
+/// Where the relations (1) come from.
+pub trait Links<T> {
+    /// Writes F_j, E_j, g_j to columns 0, n and 3n of `rows`, `[n × (3n + q)]`, which is zero before.
+    fn write(&self, j: usize, rows: &mut [T]);
+}
+
 impl<T: Lane> Chain<T> {
     /// Makes room for chains of `length` relations; the contents are then undefined.
     pub fn resize(&mut self, n: usize, q: usize, length: usize) {
@@ -66,19 +72,27 @@ impl<T: Lane> Chain<T> {
         self.stack.resize(2 * n * full, T::default());
     }
 
-    /// Eliminates the inner nodes. `link(j, rows)` writes F_j, E_j, g_j to columns 0, n and 3n of `rows`, `[n × (3n + q)]`, which
-    /// is zero before; `border` is `[L][q × n]`, the p_j.
+    /// Eliminates the inner nodes; `border` is `[L][q × n]`, the p_j.
     ///
     /// # Errors
     /// [`Singular`] if R is.
     #[inline(always)]
-    pub fn eliminate(&mut self, link: impl Fn(usize, &mut [T]), border: &[T]) -> Result<(), Singular> {
-        let (n, q, full) = (self.n, self.q, 3 * self.n + self.q);
+    pub fn eliminate(&mut self, links: impl Links<T>, border: &[T]) -> Result<(), Singular> {
+        // The usual dimensions as constants.
+        match (self.n, self.q) {
+            (4, 2) => self.eliminated(links, border, 4, 2),
+            (n, q) => self.eliminated(links, border, n, q),
+        }
+    }
+
+    #[inline(always)]
+    fn eliminated(&mut self, links: impl Links<T>, border: &[T], n: usize, q: usize) -> Result<(), Singular> {
+        let full = 3 * n + q;
         self.corner.fill(T::default());
         self.first.copy_from_slice(&border[..q * n]);
         self.last.fill(T::default());
         self.stack.fill(T::default());
-        link(0, &mut self.stack[n * full..]);
+        links.write(0, &mut self.stack[n * full..]);
         for row in self.stack[n * full..].chunks_exact_mut(full) {
             for c in 0..n {
                 row[2 * n + c] = row[c];
@@ -94,7 +108,7 @@ impl<T: Lane> Chain<T> {
                 row[2 * n..].copy_from_slice(&relation[2 * n..]);
             }
             bottom.fill(T::default());
-            link(j, bottom);
+            links.write(j, bottom);
             let v = &mut self.reflectors[j * n * 2 * n..(j + 1) * n * 2 * n];
             reflect::triangularise(&mut self.stack, 2 * n, full, n, v);
             let upper = &mut self.upper[j * n * full..(j + 1) * n * full];
@@ -106,7 +120,7 @@ impl<T: Lane> Chain<T> {
                 }
                 upper[i * full + i] = pivot.map(|x| 1.0 / x);
             }
-            self.carry_border(j);
+            self.carry_border(j, n, q);
         }
         self.relation.copy_from_slice(&self.stack[n * full..]);
         Ok(())
@@ -114,8 +128,8 @@ impl<T: Lane> Chain<T> {
 
     /// Replaces x_j in (2) by means of the rows just made triangular.
     #[inline(always)]
-    fn carry_border(&mut self, j: usize) {
-        let (n, q, full) = (self.n, self.q, 3 * self.n + self.q);
+    fn carry_border(&mut self, j: usize, n: usize, q: usize) {
+        let full = 3 * n + q;
         let upper = &self.upper[j * n * full..(j + 1) * n * full];
         for c in 0..q {
             let y = &mut self.multipliers[(j * q + c) * n..(j * q + c + 1) * n];

@@ -21,7 +21,7 @@
 //!
 //! **Fails when** an interior block or the final matrix is singular to working precision.
 
-use super::chain::Chain;
+use super::chain::{Chain, Links};
 use super::lane::{Lane, add, dot, subtract};
 use super::shape::Shape;
 use super::{block, lu, tile};
@@ -288,10 +288,21 @@ impl<T: Lane> pulp::NullaryFnOnce for Condense<'_, T> {
 
     #[inline(always)]
     fn call(self) -> Self::Output {
-        let Condensed { n, m, q, length, ref end, .. } = *self.0;
+        // The usual dimensions as constants.
+        match (self.0.n, self.0.m, self.0.q) {
+            (4, 4, 2) => self.0.condensed(4, 4, 2),
+            (n, m, q) => self.0.condensed(n, m, q),
+        }
+    }
+}
+
+impl<T: Lane> Condensed<T> {
+    #[inline(always)]
+    fn condensed(&mut self, n: usize, m: usize, q: usize) -> Result<(), Singular> {
+        let Condensed { length, ref end, .. } = *self;
         let (inner, width) = (m * n, n + q);
         let ends: Vec<T> = end.iter().map(|e| T::splat(*e)).collect();
-        let Condensed { interior, coupling, pivots, exchanged, step, shape, .. } = &mut *self.0;
+        let Condensed { interior, coupling, pivots, exchanged, step, shape, .. } = self;
         for t in 0..length {
             let a = &mut interior[t * inner * inner..(t + 1) * inner * inner];
             let w = &mut coupling[t * inner * width..(t + 1) * inner * width];
@@ -316,6 +327,56 @@ impl<T: Lane> pulp::NullaryFnOnce for Condense<'_, T> {
 
 struct Eliminate<'a, T>(&'a mut Condensed<T>);
 
+/// The condensed intervals as links, in every lane: E = 1.
+struct Steps<'a, T> {
+    step: &'a [T],
+    n: usize,
+    q: usize,
+}
+
+impl<T: Lane> Links<T> for Steps<'_, T> {
+    #[inline(always)]
+    fn write(&self, t: usize, rows: &mut [T]) {
+        let Steps { step, n, q } = *self;
+        let (width, full) = (n + q, 3 * n + q);
+        for i in 0..n {
+            let g = &step[(t * n + i) * width..(t * n + i + 1) * width];
+            let row = &mut rows[i * full..(i + 1) * full];
+            for c in 0..n {
+                row[c] = T::default() - g[c];
+            }
+            row[n + i] = T::splat(1.0);
+            for c in 0..q {
+                row[3 * n + c] = T::default() - g[n + c];
+            }
+        }
+    }
+}
+
+/// The pieces as links between their ends: x_L is one column block on, x_0 two.
+struct Pieces<'a, T> {
+    relation: &'a [T],
+    n: usize,
+    q: usize,
+}
+
+impl<T: Lane> Links<f64> for Pieces<'_, T> {
+    #[inline(always)]
+    fn write(&self, l: usize, rows: &mut [f64]) {
+        let Pieces { relation, n, q } = *self;
+        let full = 3 * n + q;
+        for (row, line) in rows.chunks_exact_mut(full).zip(relation.chunks_exact(full)) {
+            for c in 0..n {
+                row[c] = line[2 * n + c].lanes()[l];
+                row[n + c] = line[n + c].lanes()[l];
+            }
+            for c in 0..q {
+                row[3 * n + c] = line[3 * n + c].lanes()[l];
+            }
+        }
+    }
+}
+
 impl<T: Lane> pulp::NullaryFnOnce for Eliminate<'_, T> {
     type Output = Result<(), Singular>;
 
@@ -327,36 +388,11 @@ impl<T: Lane> pulp::NullaryFnOnce for Eliminate<'_, T> {
         let taken = self.0.condense_border();
         corner.iter_mut().zip(&taken).for_each(|(d, t)| *d += total(*t));
         let Condensed { step, condensed_border, pieces, whole, last, last_pivots, .. } = self.0;
-        let link = |t: usize, rows: &mut [T]| {
-            for i in 0..n {
-                let g = &step[(t * n + i) * width..(t * n + i + 1) * width];
-                let row = &mut rows[i * full..(i + 1) * full];
-                for c in 0..n {
-                    row[c] = T::default() - g[c];
-                }
-                row[n + i] = T::splat(1.0);
-                for c in 0..q {
-                    row[3 * n + c] = T::default() - g[n + c];
-                }
-            }
-        };
-        pieces.eliminate(link, condensed_border)?;
-        // The pieces as links between their ends: x_L is one column block on, x_0 two.
-        let piece = |l: usize, rows: &mut [f64]| {
-            for (row, line) in rows.chunks_exact_mut(full).zip(pieces.relation.chunks_exact(full)) {
-                for c in 0..n {
-                    row[c] = line[2 * n + c].lanes()[l];
-                    row[n + c] = line[n + c].lanes()[l];
-                }
-                for c in 0..q {
-                    row[3 * n + c] = line[3 * n + c].lanes()[l];
-                }
-            }
-        };
+        pieces.eliminate(Steps { step, n, q }, condensed_border)?;
         let mut border = unzipped(&pieces.first);
         let beyond = unzipped(&pieces.last);
         add(1.0, &beyond[..(T::COUNT - 1) * q * n], &mut border[q * n..]);
-        whole.eliminate(piece, &border)?;
+        whole.eliminate(Pieces { relation: &pieces.relation, n, q }, &border)?;
         add(1.0, &beyond[(T::COUNT - 1) * q * n..], &mut whole.last);
         for i in 0..n {
             let line = &whole.relation[i * full..(i + 1) * full];
@@ -394,8 +430,8 @@ impl<T: Lane> Condensed<T> {
                 let p = &mut condensed_border[(t * q + c) * n..(t * q + c + 1) * n];
                 p.copy_from_slice(&row[..n]);
                 let own = &mut taken[c * q..(c + 1) * q];
-                tile::subtract(p, n, &row[n..], inner, w, width, [1, inner, n], [0, 0, 0]);
-                tile::subtract(own, q, &row[n..], inner, w, width, [1, inner, q], [0, 0, n]);
+                tile::subtract_combination(p, &row[n..], w, width, 0);
+                tile::subtract_combination(own, &row[n..], w, width, n);
             }
         }
         taken

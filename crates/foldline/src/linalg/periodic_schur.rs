@@ -75,6 +75,18 @@ const CONDITION: f64 = 1e4;
 ///
 /// so that most products need not be looked at.
 pub fn group(factors: &[f64], p: usize) -> Vec<f64> {
+    // Small dimensions as constants.
+    match p {
+        1 => grouped(factors, 1),
+        2 => grouped(factors, 2),
+        3 => grouped(factors, 3),
+        4 => grouped(factors, 4),
+        p => grouped(factors, p),
+    }
+}
+
+#[inline(always)]
+fn grouped(factors: &[f64], p: usize) -> Vec<f64> {
     let size = p * p;
     if factors.len() < size.max(1) {
         return Vec::new();
@@ -114,7 +126,9 @@ pub fn group(factors: &[f64], p: usize) -> Vec<f64> {
 }
 
 /// A bound of κ in (4): where |FᵀF - 1| ≤ δ in the Frobenius norm, σ² lies within 1 ± δ. Infinite where that says nothing.
+#[inline(always)]
 fn spread_of(factor: &[f64], p: usize) -> f64 {
+    let factor = &factor[..p * p];
     let mut delta2 = 0.0;
     for i in 0..p {
         for k in 0..=i {
@@ -137,11 +151,12 @@ pub fn log_determinant(grouped: &[f64], p: usize) -> f64 {
 }
 
 /// c = a b.
+#[inline(always)]
 fn multiply(a: &[f64], b: &[f64], p: usize, c: &mut [f64]) {
-    c.fill(0.0);
+    let (a, b, c) = (&a[..p * p], &b[..p * p], &mut c[..p * p]);
     for i in 0..p {
         for k in 0..p {
-            super::axpy(a[i * p + k], &b[k * p..(k + 1) * p], &mut c[i * p..(i + 1) * p]);
+            c[i * p + k] = (0..p).map(|l| a[i * p + l] * b[l * p + k]).sum();
         }
     }
 }

@@ -1,6 +1,7 @@
 //! Householder triangularisation of a tall block, with right-hand columns carried along, in every lane.
 
 use super::lane::{Lane, dot, subtract};
+use super::tile::{piece, piece_mut};
 
 /// Triangularises the first `columns` columns of the row-major `rows × width` matrix `a` in place by Householder
 /// reflections applied to every column; entries below the diagonal of those columns become zero. The reflectors are stored
@@ -12,7 +13,7 @@ pub fn triangularise<T: Lane>(a: &mut [T], rows: usize, width: usize, columns: u
     while c < width {
         c += match width - c {
             16.. if T::COUNT == 1 => group::<T, 16>(a, [rows, width, columns], c, v),
-            8.. => group::<T, 8>(a, [rows, width, columns], c, v),
+            8.. if T::COUNT == 1 => group::<T, 8>(a, [rows, width, columns], c, v),
             4.. => group::<T, 4>(a, [rows, width, columns], c, v),
             2.. => group::<T, 2>(a, [rows, width, columns], c, v),
             _ => group::<T, 1>(a, [rows, width, columns], c, v),
@@ -40,7 +41,7 @@ fn group<T: Lane, const C: usize>(a: &mut [T], [rows, width, columns]: [usize; 3
         }
         apply_group::<T, C>(&reflector[k..], block, width, c);
         if k >= c {
-            block[width..].chunks_exact_mut(width).for_each(|row| row[k] = T::default());
+            (1..rows - k).for_each(|i| block[i * width + k] = T::default());
         }
     }
     C
@@ -50,9 +51,10 @@ fn group<T: Lane, const C: usize>(a: &mut [T], [rows, width, columns]: [usize; 3
 #[inline(always)]
 fn reflection<T: Lane>(v: &mut [T], block: &[T], width: usize, k: usize) {
     let mut norm2 = T::default();
-    for (v, row) in v.iter_mut().zip(block.chunks_exact(width)) {
-        *v = row[k];
-        norm2 = norm2 + row[k] * row[k];
+    for (i, v) in v.iter_mut().enumerate() {
+        let x = block[i * width + k];
+        *v = x;
+        norm2 = norm2 + x * x;
     }
     // A column that vanishes, or is not finite, is left alone.
     let alpha = norm2.zip(v[0], |s, x| if x > 0.0 { -s.sqrt() } else { s.sqrt() });
@@ -66,20 +68,20 @@ fn reflection<T: Lane>(v: &mut [T], block: &[T], width: usize, k: usize) {
 #[inline(always)]
 fn apply_group<T: Lane, const C: usize>(v: &[T], a: &mut [T], width: usize, c: usize) {
     let mut sums = [T::default(); C];
-    for (v, row) in v.iter().zip(a.chunks_exact(width)) {
-        let row = &row[c..c + C];
+    for (i, v) in v.iter().enumerate() {
+        let row: &[T; C] = piece(a, i * width + c);
         for k in 0..C {
             sums[k] = sums[k] + *v * row[k];
         }
     }
-    for (v, row) in v.iter().zip(a.chunks_exact_mut(width)) {
-        let (v, row) = (*v, &mut row[c..c + C]);
+    for (i, v) in v.iter().enumerate() {
+        let row: &mut [T; C] = piece_mut(a, i * width + c);
         // All of it before anything is written, so that one number of many becomes a vector.
         let mut left = [T::default(); C];
         for k in 0..C {
-            left[k] = row[k] - v * sums[k];
+            left[k] = row[k] - *v * sums[k];
         }
-        row.copy_from_slice(&left);
+        *row = left;
     }
 }
 
@@ -87,8 +89,8 @@ fn apply_group<T: Lane, const C: usize>(v: &[T], a: &mut [T], width: usize, c: u
 #[inline(always)]
 fn apply_two<T: Lane, const C: usize>(v: &[T], w: &[T], a: &mut [T], width: usize, c: usize) {
     let (mut first, mut second) = ([T::default(); C], [T::default(); C]);
-    for ((v, w), row) in v.iter().zip(w).zip(a.chunks_exact(width)) {
-        let row = &row[c..c + C];
+    for (i, (v, w)) in v.iter().zip(w).enumerate() {
+        let row: &[T; C] = piece(a, i * width + c);
         for k in 0..C {
             first[k] = first[k] + *v * row[k];
             second[k] = second[k] + *w * row[k];
@@ -98,13 +100,13 @@ fn apply_two<T: Lane, const C: usize>(v: &[T], w: &[T], a: &mut [T], width: usiz
     for k in 0..C {
         second[k] = second[k] - common * first[k];
     }
-    for ((v, w), row) in v.iter().zip(w).zip(a.chunks_exact_mut(width)) {
-        let (v, w, row) = (*v, *w, &mut row[c..c + C]);
+    for (i, (v, w)) in v.iter().zip(w).enumerate() {
+        let (v, w, row): (T, T, &mut [T; C]) = (*v, *w, piece_mut(a, i * width + c));
         let mut left = [T::default(); C];
         for k in 0..C {
             left[k] = row[k] - v * first[k] - w * second[k];
         }
-        row.copy_from_slice(&left);
+        *row = left;
     }
 }
 

@@ -2,6 +2,37 @@
 
 use super::lane::Lane;
 
+/// Repeats a call for C columns from `c` on.
+macro_rules! in_columns {
+    ($columns:expr, $c:ident, $C:ident, $call:expr) => {{
+        let mut $c = 0;
+        while $c < $columns {
+            $c += match $columns - $c {
+                4.. => {
+                    const $C: usize = 4;
+                    $call;
+                    $C
+                }
+                3 => {
+                    const $C: usize = 3;
+                    $call;
+                    $C
+                }
+                2 => {
+                    const $C: usize = 2;
+                    $call;
+                    $C
+                }
+                _ => {
+                    const $C: usize = 1;
+                    $call;
+                    $C
+                }
+            };
+        }
+    }};
+}
+
 /// Y -= A B for row-major Y `[rows × stride]` (columns `from..to` of it), A `[rows × depth]` and B `[depth × stride]` (the same
 /// columns).
 #[inline(always)]
@@ -63,6 +94,12 @@ pub fn subtract<T: Lane>(
     [y_at, a_at, b_at]: [usize; 3],
 ) {
     const C: usize = 4;
+    if T::COUNT > 1 && depth == 4 {
+        in_columns!(columns, c, C, {
+            in_rows::<T, 4, C>(y, y_stride, y_at + c, a, a_stride, a_at, b, b_stride, b_at + c, rows)
+        });
+        return;
+    }
     let mut i = 0;
     while i < rows {
         let whole = i + 4 <= rows;
@@ -80,6 +117,76 @@ pub fn subtract<T: Lane>(
         }
         i += if whole { 4 } else { 1 };
     }
+}
+
+/// C of them from `at` on.
+#[inline(always)]
+pub fn piece<T, const C: usize>(x: &[T], at: usize) -> &[T; C] {
+    &x[at..at + C].as_chunks().0[0]
+}
+
+/// C of them from `at` on.
+#[inline(always)]
+pub fn piece_mut<T, const C: usize>(x: &mut [T], at: usize) -> &mut [T; C] {
+    &mut x[at..at + C].as_chunks_mut().0[0]
+}
+
+/// C columns, row by row.
+#[inline(always)]
+fn in_rows<T: Lane, const M: usize, const C: usize>(
+    y: &mut [T],
+    y_stride: usize,
+    y_at: usize,
+    a: &[T],
+    a_stride: usize,
+    a_at: usize,
+    b: &[T],
+    b_stride: usize,
+    b_at: usize,
+    rows: usize,
+) {
+    let b: [&[T; C]; M] = std::array::from_fn(|k| piece(b, k * b_stride + b_at));
+    for r in 0..rows {
+        let factors: &[T; M] = piece(a, r * a_stride + a_at);
+        let own: &mut [T; C] = piece_mut(y, r * y_stride + y_at);
+        let mut sums = *own;
+        for k in 0..M {
+            for j in 0..C {
+                sums[j] = sums[j] - factors[k] * b[k][j];
+            }
+        }
+        *own = sums;
+    }
+}
+
+/// y -= A b for M rows of A, with M columns from `at` on.
+#[inline(always)]
+pub fn subtract_image<T: Lane>(y: &mut [T], a: &[T], stride: usize, at: usize, b: &[T], m: usize) {
+    for (k, y) in y.iter_mut().enumerate() {
+        let line = &a[k * stride + at..k * stride + at + m];
+        let mut sum = *y;
+        for k in 0..m {
+            sum = sum - line[k] * b[k];
+        }
+        *y = sum;
+    }
+}
+
+/// y -= Σ_k f_k b_k for the rows b_k of B, their columns from `at` on.
+#[inline(always)]
+pub fn subtract_combination<T: Lane>(y: &mut [T], factors: &[T], b: &[T], stride: usize, at: usize) {
+    let columns = y.len();
+    in_columns!(columns, c, C, {
+        let own: &mut [T; C] = piece_mut(y, c);
+        let mut sums = *own;
+        for (k, f) in factors.iter().enumerate() {
+            let row: &[T; C] = piece(b, k * stride + at + c);
+            for j in 0..C {
+                sums[j] = sums[j] - *f * row[j];
+            }
+        }
+        *own = sums;
+    });
 }
 
 /// One tile; returns its columns.
@@ -113,9 +220,138 @@ fn strided<T: Lane, const R: usize, const C: usize>(
     C
 }
 
+/// Y = L⁻¹ Y for columns `at..at + columns` of m rows of Y, L being the unit lower triangle of the m×m matrix `l`.
+#[inline(always)]
+pub fn forward<T: Lane>(y: &mut [T], stride: usize, at: usize, l: &[T], m: usize, columns: usize) {
+    in_columns!(columns, c, C, forward_in::<T, C>(y, stride, at + c, l, m));
+}
+
+#[inline(always)]
+fn forward_in<T: Lane, const C: usize>(y: &mut [T], stride: usize, at: usize, l: &[T], m: usize) {
+    for k in 1..m {
+        let (before, own) = y.split_at_mut(k * stride);
+        let own: &mut [T; C] = piece_mut(own, at);
+        let mut sums = *own;
+        for (i, l) in l[k * m..k * m + k].iter().enumerate() {
+            let row: &[T; C] = piece(before, i * stride + at);
+            for j in 0..C {
+                sums[j] = sums[j] - *l * row[j];
+            }
+        }
+        *own = sums;
+    }
+}
+
+/// Y = U⁻¹ Y for columns `at..at + columns` of m rows of Y, U being the upper triangle of `u` from column `first` on, with its
+/// diagonal inverted.
+#[inline(always)]
+pub fn backward<T: Lane>(
+    y: &mut [T],
+    stride: usize,
+    at: usize,
+    u: &[T],
+    u_stride: usize,
+    first: usize,
+    m: usize,
+    columns: usize,
+) {
+    in_columns!(columns, c, C, backward_in::<T, C>(y, stride, at + c, u, u_stride, first, m));
+}
+
+#[inline(always)]
+fn backward_in<T: Lane, const C: usize>(
+    y: &mut [T],
+    stride: usize,
+    at: usize,
+    u: &[T],
+    u_stride: usize,
+    first: usize,
+    m: usize,
+) {
+    for k in (0..m).rev() {
+        let (head, after) = y.split_at_mut((k + 1) * stride);
+        let own: &mut [T; C] = piece_mut(head, k * stride + at);
+        let line = &u[k * u_stride + first..k * u_stride + first + m];
+        let mut sums = *own;
+        for (i, u) in line[k + 1..].iter().enumerate() {
+            let row: &[T; C] = piece(after, i * stride + at);
+            for j in 0..C {
+                sums[j] = sums[j] - *u * row[j];
+            }
+        }
+        for j in 0..C {
+            own[j] = sums[j] * line[k];
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
+    use super::super::lane::Eight;
     use super::*;
+
+    /// An entry from the rest of its column, its row, column and lane.
+    type Expected<'e> = &'e dyn Fn(&dyn Fn(usize) -> f64, usize, usize, usize) -> f64;
+
+    fn numbers<T: Lane>(count: usize, shift: f64) -> Vec<T> {
+        (0..count).map(|k| T::each(|lane| ((k * T::COUNT + lane) as f64 + shift).sin())).collect()
+    }
+
+    /// Every lane of row-major matrices is compared with plain loops; columns outside stay as they are.
+    fn blocks_agree<T: Lane>(m: usize, at: usize, columns: usize, stride: usize) {
+        let what = format!("{m} rows, columns {at} to {} of {stride}, {} lanes", at + columns, T::COUNT);
+        let (start, a, b) = (numbers::<T>(m * stride, 0.3), numbers::<T>(m * m, 0.7), numbers::<T>(m * stride, 0.9));
+        let one = |x: &[T], k: usize, lane: usize| x[k].lanes()[lane];
+        let check = |found: &[T], expected: Expected| {
+            for (k, lane) in (0..m * stride).flat_map(|k| (0..T::COUNT).map(move |lane| (k, lane))) {
+                let (i, c) = (k / stride, k % stride);
+                let now = |row: usize| one(found, row * stride + c, lane);
+                let wanted = match (at..at + columns).contains(&c) {
+                    true => expected(&now, i, c, lane),
+                    false => one(&start, k, lane),
+                };
+                assert!((one(found, k, lane) - wanted).abs() < 1e-13, "{what}: row {i}, column {c}, lane {lane}");
+            }
+        };
+        let before = |i: usize, c: usize, lane: usize| one(&start, i * stride + c, lane);
+        let sum = |range: std::ops::Range<usize>, term: &dyn Fn(usize) -> f64| range.map(term).sum::<f64>();
+
+        let mut y = start.clone();
+        subtract(&mut y, stride, &a, m, &b, stride, [m, m, columns], [at, 0, at]);
+        check(&y, &|_, i, c, lane| {
+            before(i, c, lane) - sum(0..m, &|k| one(&a, i * m + k, lane) * one(&b, k * stride + c, lane))
+        });
+        let mut y = start.clone();
+        forward(&mut y, stride, at, &a, m, columns);
+        check(&y, &|now, i, c, lane| before(i, c, lane) - sum(0..i, &|k| one(&a, i * m + k, lane) * now(k)));
+        let mut y = start.clone();
+        backward(&mut y, stride, at, &a, m, 0, m, columns);
+        check(&y, &|now, i, c, lane| {
+            (before(i, c, lane) - sum(i + 1..m, &|k| one(&a, i * m + k, lane) * now(k))) * one(&a, i * m + i, lane)
+        });
+        let mut y = start.clone();
+        subtract_combination(&mut y[at..at + columns], &a[..m], &b, stride, at);
+        check(&y, &|_, i, c, lane| {
+            let taken = if i == 0 { sum(0..m, &|k| one(&a, k, lane) * one(&b, k * stride + c, lane)) } else { 0.0 };
+            before(i, c, lane) - taken
+        });
+        let mut y = start[..m].to_vec();
+        subtract_image(&mut y, &b, stride, at, &a[..columns], columns);
+        for (i, lane) in (0..m).flat_map(|i| (0..T::COUNT).map(move |lane| (i, lane))) {
+            let taken = sum(0..columns, &|k| one(&b, i * stride + at + k, lane) * one(&a, k, lane));
+            assert!((one(&y, i, lane) - (one(&start, i, lane) - taken)).abs() < 1e-13, "{what}");
+        }
+    }
+
+    #[test]
+    fn blocks_of_every_width_agree_with_plain_loops() {
+        for columns in 1..=9 {
+            for (m, at) in [(4, 0), (4, 2), (3, 1), (5, 0)] {
+                blocks_agree::<Eight>(m, at, columns, at + columns + 1);
+                blocks_agree::<f64>(m, at, columns, at + columns + 1);
+            }
+        }
+    }
 
     #[test]
     fn a_product_in_tiles_is_the_plain_one() {

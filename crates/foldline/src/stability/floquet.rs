@@ -13,7 +13,7 @@
 //!
 //! **Source.** lust2001; (2) is Liouville's formula.
 
-use crate::linalg::{axpy, dot, periodic_schur};
+use crate::linalg::periodic_schur;
 use num_complex::Complex64;
 
 /// Multipliers and how far they can be trusted.
@@ -29,26 +29,13 @@ pub struct Floquet {
 
 /// `transitions`: G_j row-major n×n one after the other, in scaled components; `flow`: `[N][n]` x' at the left ends.
 pub fn multipliers(transitions: &[f64], flow: &[f64], n: usize) -> Floquet {
-    let count = flow.len() / n.max(1);
-    let mut log_trivial = 0.0;
-    let mut sign = 1.0;
-    let mut factors = Vec::with_capacity(count * (n - 1) * (n - 1));
-    let (mut g, mut line) = (vec![0.0; n * n], vec![0.0; n]);
-    let (mut frame, mut next) = (Frame::new(n), Frame::new(n));
-    frame.turn(&flow[..n]);
-    for j in 0..count {
-        let at = (j + 1) % count * n;
-        next.turn(&flow[at..at + n]);
-        g.copy_from_slice(&transitions[j * n * n..(j + 1) * n * n]);
-        frame.columns(&mut g, n);
-        next.rows(&mut g, n, &mut line);
-        sign *= g[0].signum();
-        log_trivial += g[0].abs().ln();
-        for i in 1..n {
-            factors.extend_from_slice(&g[i * n + 1..(i + 1) * n]);
-        }
-        std::mem::swap(&mut frame, &mut next);
-    }
+    // Small dimensions as constants.
+    let (factors, Trivial { sign, log: log_trivial }) = match n {
+        2 => split(transitions, flow, 2),
+        3 => split(transitions, flow, 3),
+        4 => split(transitions, flow, 4),
+        n => split(transitions, flow, n),
+    };
     let grouped = periodic_schur::group(&factors, n - 1);
     let log_others = periodic_schur::log_determinant(&grouped, n - 1);
     let others = periodic_schur::eigenvalues(&grouped, n - 1);
@@ -59,6 +46,42 @@ pub fn multipliers(transitions: &[f64], flow: &[f64], n: usize) -> Floquet {
         None => multipliers.extend(vec![Complex64::new(f64::NAN, f64::NAN); n - 1]),
     }
     Floquet { multipliers, unstable, log_product: log_trivial + log_others }
+}
+
+/// ∏ g_j of (1).
+struct Trivial {
+    sign: f64,
+    log: f64,
+}
+
+/// (1): the S_j, row-major one after the other, and the product of the g_j.
+#[inline(always)]
+fn split(transitions: &[f64], flow: &[f64], n: usize) -> (Vec<f64>, Trivial) {
+    // Where a product is taken as its logarithm, long before it leaves the range of f64.
+    const FAR: f64 = 1e100;
+    let count = flow.len() / n.max(1);
+    let (mut product, mut log) = (1.0, 0.0);
+    let mut factors = Vec::with_capacity(count * (n - 1) * (n - 1));
+    let (mut g, mut line) = (vec![0.0; n * n], vec![0.0; n]);
+    let (mut frame, mut next) = (Frame::new(n), Frame::new(n));
+    frame.turn(&flow[..n], n);
+    for j in 0..count {
+        let at = (j + 1) % count * n;
+        next.turn(&flow[at..at + n], n);
+        g.copy_from_slice(&transitions[j * n * n..(j + 1) * n * n]);
+        frame.columns(&mut g, n);
+        next.rows(&mut g, n, &mut line);
+        product *= g[0];
+        if !(1.0 / FAR..FAR).contains(&f64::abs(product)) {
+            log += product.abs().ln();
+            product = product.signum();
+        }
+        for i in 1..n {
+            factors.extend_from_slice(&g[i * n + 1..(i + 1) * n]);
+        }
+        std::mem::swap(&mut frame, &mut next);
+    }
+    (factors, Trivial { sign: product.signum(), log: log + product.abs().ln() })
 }
 
 /// Multipliers of a forced cycle, none of which is trivial. `transitions`: `[N]` G_j row-major n×n.
@@ -86,35 +109,51 @@ impl Frame {
     }
 
     /// Puts the first column along `direction`.
-    fn turn(&mut self, direction: &[f64]) {
-        let (v, norm) = (&mut self.v, dot(direction, direction).sqrt());
-        v.iter_mut().zip(direction).for_each(|(v, x)| *v = if norm > 0.0 { x / norm } else { 0.0 });
+    #[inline(always)]
+    fn turn(&mut self, direction: &[f64], n: usize) {
+        let (v, direction) = (&mut self.v[..n], &direction[..n]);
+        let norm = product(direction, direction, n).sqrt();
+        for i in 0..n {
+            v[i] = if norm > 0.0 { direction[i] / norm } else { 0.0 };
+        }
         // The reflection takes e_1 to ∓ the direction; the sign that avoids cancellation, undone by `sign`.
         self.sign = if v[0] > 0.0 { -1.0 } else { 1.0 };
         v[0] -= self.sign;
-        let size = dot(v, v);
+        let size = product(v, v, n);
         let scale = if size > 0.0 { (2.0 / size).sqrt() } else { 0.0 };
-        v.iter_mut().for_each(|x| *x *= scale);
+        (0..n).for_each(|i| v[i] *= scale);
     }
 
     /// g Q.
+    #[inline(always)]
     fn columns(&self, g: &mut [f64], n: usize) {
-        for row in g.chunks_exact_mut(n) {
-            let s = dot(row, &self.v);
-            axpy(-s, &self.v, row);
+        let (v, g) = (&self.v[..n], &mut g[..n * n]);
+        for i in 0..n {
+            let row = &mut g[i * n..(i + 1) * n];
+            let s = product(row, v, n);
+            (0..n).for_each(|k| row[k] -= s * v[k]);
             row[0] *= self.sign;
         }
     }
 
     /// Qᵀ g; `s` is room for a row.
+    #[inline(always)]
     fn rows(&self, g: &mut [f64], n: usize, s: &mut [f64]) {
+        let (v, g, s) = (&self.v[..n], &mut g[..n * n], &mut s[..n]);
         s.fill(0.0);
-        for (row, v) in g.chunks_exact(n).zip(&self.v) {
-            axpy(*v, row, s);
+        for i in 0..n {
+            (0..n).for_each(|k| s[k] += v[i] * g[i * n + k]);
         }
-        for (row, v) in g.chunks_exact_mut(n).zip(&self.v) {
-            axpy(-v, s, row);
+        for i in 0..n {
+            (0..n).for_each(|k| g[i * n + k] -= v[i] * s[k]);
         }
-        g[..n].iter_mut().for_each(|x| *x *= self.sign);
+        (0..n).for_each(|k| g[k] *= self.sign);
     }
+}
+
+/// a · b, with the length where the compiler can see it.
+#[inline(always)]
+fn product(a: &[f64], b: &[f64], n: usize) -> f64 {
+    let (a, b) = (&a[..n], &b[..n]);
+    (0..n).map(|k| a[k] * b[k]).sum()
 }
