@@ -94,14 +94,14 @@ impl<const FUSED: bool, const CHAINS: usize> pulp::NullaryFnOnce for Peak<FUSED,
 
     #[inline(always)]
     fn call(self) -> f64 {
-        let (x, y) = (black_box(0.999), black_box(0.001));
-        let mut sums = [[1.0; Eight::COUNT]; CHAINS];
+        let (x, y) = (Eight::splat(black_box(0.999)), black_box(0.001));
+        let mut sums = [Eight::splat(1.0); CHAINS];
         for _ in 0..ROUNDS {
-            for sum in sums.iter_mut().flatten() {
-                *sum = if FUSED { f64::mul_add(*sum, x, y) } else { *sum * x + y };
+            for sum in &mut sums {
+                *sum = sum.zip(x, |sum, x| if FUSED { f64::mul_add(sum, x, y) } else { sum * x + y });
             }
         }
-        sums.iter().flatten().sum()
+        sums.iter().map(|sum| sum.lanes().iter().sum::<f64>()).sum()
     }
 }
 

@@ -35,7 +35,8 @@ pub fn shape<T: Lane>(pattern: &[bool], ends: &[bool], nodes: usize, columns: us
 }
 
 /// Factorises the row-major n×n matrices `a` in place (the diagonal holds the inverse pivots) and solves a x = b for the
-/// `columns` right-hand sides in `b`, row-major `[n × columns]`. `pivots` is `[n × lanes]`. What `shape` says to be zero must be.
+/// `columns` right-hand sides in `b`, row-major `[n × columns]`. `pivots` is `[n × lanes]`. What `shape` says to be zero must be;
+/// `nodes` are its nodes, once more so that a caller who knows them can make them a constant.
 ///
 /// Returns whether any rows were exchanged.
 ///
@@ -49,13 +50,15 @@ pub fn factorise<T: Lane>(
     b: &mut [T],
     columns: usize,
     shape: &Shape,
+    nodes: usize,
 ) -> Result<bool, Singular> {
     let mut room = Vec::new();
-    if shape.is_plain() {
+    // Lanes of numbers are never so.
+    if T::COUNT == 1 && shape.is_plain() {
         return panels(a, n, pivots, b, columns, 0, &mut room);
     }
     // The usual degree as a constant.
-    let reached = match shape.nodes {
+    let reached = match nodes {
         4 => blocks(a, n, b, columns, shape, 4, &mut room),
         m => blocks(a, n, b, columns, shape, m, &mut room),
     };
@@ -68,7 +71,7 @@ pub fn factorise<T: Lane>(
             whole(a, n, pivots, b, columns, reached)?;
         }
     } else {
-        match shape.nodes {
+        match nodes {
             4 => back_in_blocks(a, n, b, columns, shape, 4),
             m => back_in_blocks(a, n, b, columns, shape, m),
         }
@@ -529,7 +532,7 @@ mod tests {
         let mut turned = one.clone();
         let mut pivots = vec![0; 8 * n];
         let shape = Shape::new(&vec![true; n * n], &vec![true; n * n], 1, columns);
-        assert!(factorise(&mut a, n, &mut pivots, &mut b, columns, &shape).unwrap());
+        assert!(factorise(&mut a, n, &mut pivots, &mut b, columns, &shape, shape.nodes).unwrap());
         solve(&a, n, &pivots, true, &mut one, &shape);
         solve_transposed(&a, n, &pivots, true, &mut turned, &shape);
         for l in 0..8 {
@@ -554,7 +557,7 @@ mod tests {
         a[3] = Eight([2.0, 2.0, 2.0, 1.0, 2.0, 2.0, 2.0, 2.0]);
         let mut none: [Eight; 0] = [];
         assert_eq!(
-            factorise(&mut a, 2, &mut [0; 16], &mut none, 0, &Shape::new(&[true; 4], &[true; 4], 1, 0)),
+            factorise(&mut a, 2, &mut [0; 16], &mut none, 0, &Shape::new(&[true; 4], &[true; 4], 1, 0), 1),
             Err(Singular)
         );
     }

@@ -288,37 +288,39 @@ impl<T: Lane> pulp::NullaryFnOnce for Condense<'_, T> {
 
     #[inline(always)]
     fn call(self) -> Self::Output {
-        // The usual dimensions as constants.
-        match (self.0.n, self.0.m, self.0.q) {
-            (4, 4, 2) => self.0.condensed(4, 4, 2),
-            (n, m, q) => self.0.condensed(n, m, q),
+        let Condensed { n, m, q, length, .. } = *self.0;
+        // No closure: it would be compiled by itself, without the vector instructions.
+        for t in 0..length {
+            self.0.condense_at(t, [n, m, q])?;
         }
+        Ok(())
     }
 }
 
 impl<T: Lane> Condensed<T> {
+    /// Condenses the intervals at place t alone, from within [`Lane::dispatch`]: whoever fills them can do it while they are in the cache.
+    /// The dimensions n, m and q are given once more, so that a caller who knows them can make them constants.
+    ///
+    /// # Errors
+    /// [`Singular`] if an interior block is.
     #[inline(always)]
-    fn condensed(&mut self, n: usize, m: usize, q: usize) -> Result<(), Singular> {
-        let Condensed { length, ref end, .. } = *self;
+    pub fn condense_at(&mut self, t: usize, [n, m, q]: [usize; 3]) -> Result<(), Singular> {
         let (inner, width) = (m * n, n + q);
-        let ends: Vec<T> = end.iter().map(|e| T::splat(*e)).collect();
-        let Condensed { interior, coupling, pivots, exchanged, step, shape, .. } = self;
-        for t in 0..length {
-            let a = &mut interior[t * inner * inner..(t + 1) * inner * inner];
-            let w = &mut coupling[t * inner * width..(t + 1) * inner * width];
-            let p = &mut pivots[t * inner * T::COUNT..(t + 1) * inner * T::COUNT];
-            // Should it fail, every entry may have changed.
-            exchanged[t] = true;
-            exchanged[t] = block::factorise(a, inner, p, w, width, shape)?;
-            let step = &mut step[t * n * width..(t + 1) * n * width];
-            step.fill(T::default());
-            for i in 0..n {
-                let row = &mut step[i * width..(i + 1) * width];
-                row[i] = ends[0];
-                for k in 0..m {
-                    let at = shape.slot(k, i) * width;
-                    subtract(ends[k + 1], &w[at..at + width], row);
-                }
+        let Condensed { interior, coupling, pivots, exchanged, step, shape, end, .. } = self;
+        let a = &mut interior[t * inner * inner..(t + 1) * inner * inner];
+        let w = &mut coupling[t * inner * width..(t + 1) * inner * width];
+        let p = &mut pivots[t * inner * T::COUNT..(t + 1) * inner * T::COUNT];
+        // Should it fail, every entry may have changed.
+        exchanged[t] = true;
+        exchanged[t] = block::factorise(a, inner, p, w, width, shape, m)?;
+        let step = &mut step[t * n * width..(t + 1) * n * width];
+        step.fill(T::default());
+        for i in 0..n {
+            let row = &mut step[i * width..(i + 1) * width];
+            row[i] = T::splat(end[0]);
+            for k in 0..m {
+                let at = shape.slot(k, i) * width;
+                subtract(T::splat(end[k + 1]), &w[at..at + width], row);
             }
         }
         Ok(())

@@ -68,10 +68,10 @@ const CONDITION: f64 = 1e4;
 
 /// Multiplies neighbouring factors together while their product stays well conditioned.
 ///
-/// With |F| the root of the mean square of the singular values σ of a p×p matrix, what is bounded by [`CONDITION`] and the quotient of the
-/// largest and the smallest of them bound each other (guggenheimer1995):
+/// With |F| the root of the mean square of the singular values σ of a p×p matrix, and κ the quotient of the largest and the smallest of
+/// them, what is bounded by [`CONDITION`] is (guggenheimer1995)
 ///
-///   (4)  |F|ᵖ / |det F| ≤ κᵖ⁻¹,   κ ≤ 2 |F|ᵖ / |det F|,   κ(A B) ≤ κ(A) κ(B)
+///   (4)  c(F) = |F|ᵖ / |det F| ≤ κ(F)ᵖ⁻¹,   c(A B) ≤ κ(A)ᵖ⁻¹ c(B)
 ///
 /// so that most products need not be looked at.
 pub fn group(factors: &[f64], p: usize) -> Vec<f64> {
@@ -93,14 +93,15 @@ fn grouped(factors: &[f64], p: usize) -> Vec<f64> {
     }
     let mut out: Vec<f64> = Vec::new();
     let mut product = factors[..size].to_vec();
-    let mut spread = spread_of(&product, p);
+    let powered = |factor: &[f64]| spread_of(factor, p).powi(p.max(2) as i32 - 1);
+    let mut bound = powered(&product);
     let (mut candidate, mut lu) = (vec![0.0; size], vec![0.0; size]);
     let mut pivots = vec![0; p];
     for factor in factors.chunks_exact(size).skip(1) {
         multiply(factor, &product, p, &mut candidate);
-        let own = spread_of(factor, p);
-        if (spread * own).powi(p.max(2) as i32 - 1) < CONDITION {
-            spread *= own;
+        let own = powered(factor);
+        if bound * own < CONDITION {
+            bound *= own;
             std::mem::swap(&mut product, &mut candidate);
             continue;
         }
@@ -113,10 +114,10 @@ fn grouped(factors: &[f64], p: usize) -> Vec<f64> {
             Err(_) => f64::INFINITY,
         };
         if condition < CONDITION {
-            spread = 2.0 * condition;
+            bound = condition;
             std::mem::swap(&mut product, &mut candidate);
         } else {
-            spread = own;
+            bound = own;
             out.extend_from_slice(&product);
             product.copy_from_slice(factor);
         }

@@ -77,6 +77,14 @@ impl System {
         })
     }
 
+    /// See [`Condensed::eliminate`].
+    ///
+    /// # Errors
+    /// [`Singular`] if the remaining matrix is.
+    pub fn eliminate(&mut self, closure: f64) -> Result<(), Singular> {
+        either!(self, s => s.eliminate(closure))
+    }
+
     /// See [`Condensed::solve`].
     pub fn solve(&self, rhs: &[f64], x: &mut [f64]) {
         either!(self, s => s.solve(rhs, x));

@@ -1,7 +1,7 @@
 //! The matrix of a cycle: equations (1) to (3) of [`super`] linearised, and its antiperiodic relative.
 
 use super::CycleProblem;
-use crate::contract::{Batch, Parameters};
+use crate::contract::{Batch, Parameters, Singular};
 use crate::linalg::condensed::Condensed;
 use crate::linalg::lane::{Eight, Lane};
 use crate::linalg::max_abs;
@@ -13,14 +13,14 @@ impl CycleProblem<'_> {
     /// there is one: the direction of period doubling. Layout of the profile.
     pub fn antiperiodic_direction(&mut self, u: &[f64]) -> Option<Vec<f64>> {
         let row = vec![0.0; self.setting.freedom() * u.len()];
-        self.fill(u, &row);
+        self.fill(u, &row).ok()?;
         let q = 1 + self.setting.freedom();
         // The scalars are frozen by a unit corner, so only the profile moves.
         either!(&mut self.system, s => {
             s.border.fill(Default::default());
             (0..q * q).for_each(|k| s.corner[k] = if k % (q + 1) == 0 { 1.0 } else { 0.0 });
         });
-        self.system.factorise(-1.0).ok()?;
+        self.system.eliminate(-1.0).ok()?;
         let size = self.profile_size();
         let mut v: Vec<f64> = (0..size + q).map(|k| ((k * k) as f64 * 0.7 + 0.3).sin()).collect();
         let mut next = v.clone();
@@ -65,8 +65,12 @@ impl CycleProblem<'_> {
         }
     }
 
-    /// Linearises at `u` and fills the blocks; the `rows` act through [`crate::contract::ZeroProblem::dot`].
-    pub(super) fn fill(&mut self, u: &[f64], rows: &[f64]) {
+    /// Linearises at `u`, fills the blocks and condenses them, each while it is in the cache; the `rows` act through
+    /// [`crate::contract::ZeroProblem::dot`].
+    ///
+    /// # Errors
+    /// [`Singular`] if a block of an interval is.
+    pub(super) fn fill(&mut self, u: &[f64], rows: &[f64]) -> Result<(), Singular> {
         let (lanes, size) = (self.lanes(), self.profile_size());
         self.lay_phase();
         self.gather(u);
@@ -91,7 +95,7 @@ impl CycleProblem<'_> {
             phase: &self.phase,
             coupled: &self.coupled,
         };
-        let (trace, corner) = either!(&mut self.system, s => (write(linear, s), &mut s.corner));
+        let (trace, corner) = either!(&mut self.system, s => (write(linear, s)?, &mut s.corner));
         self.trace = trace;
         let q = 1 + self.setting.freedom();
         corner[..q].fill(0.0);
@@ -106,6 +110,7 @@ impl CycleProblem<'_> {
         for (r, row) in rows.chunks_exact(u.len()).enumerate() {
             self.fill_row(1 + r, &row[..size]);
         }
+        Ok(())
     }
 
     /// A border row that acts on the profile through the inner product.
@@ -152,8 +157,8 @@ struct Linear<'a> {
     coupled: &'a [bool],
 }
 
-/// Writes equation (1) and the phase row; returns ∫ tr f_x dt over the period.
-fn write<T: Lane>(linear: Linear, system: &mut Condensed<T>) -> f64 {
+/// Writes equation (1) and the phase row, and condenses; returns ∫ tr f_x dt over the period.
+fn write<T: Lane>(linear: Linear, system: &mut Condensed<T>) -> Result<f64, Singular> {
     T::dispatch(Write { linear, system })
 }
 
@@ -163,13 +168,25 @@ struct Write<'a, 'b, T> {
 }
 
 impl<T: Lane> pulp::NullaryFnOnce for Write<'_, '_, T> {
-    type Output = f64;
+    type Output = Result<f64, Singular>;
 
     #[inline(always)]
-    fn call(self) -> f64 {
+    fn call(self) -> Self::Output {
+        // Common dimensions as constants, and every block condensed while it is in the cache. That is a copy of the whole factorisation,
+        // so that it is not made for all of them.
+        match (self.linear.n, self.linear.scheme.degree, self.linear.free) {
+            (4, 4, 1) if T::COUNT > 1 => self.written::<true>(4, 4, 1),
+            (n, m, free) => self.written::<false>(n, m, free),
+        }
+    }
+}
+
+impl<T: Lane> Write<'_, '_, T> {
+    #[inline(always)]
+    fn written<const CONDENSED: bool>(self, n: usize, m: usize, free: usize) -> Result<f64, Singular> {
         let Write { linear, system } = self;
-        let Linear { n, free, scheme, lengths, period, f, fx, fp, phase, coupled } = linear;
-        let (m, w, length) = (scheme.degree, T::COUNT, system.length());
+        let Linear { scheme, lengths, period, f, fx, fp, phase, coupled, .. } = linear;
+        let (w, length) = (T::COUNT, system.length());
         let (inner, width, block, lanes) = (m * n, n + 1 + free, (m + 1) * n, length * m * w);
         let (one, zero) = (T::splat(1.0), T::default());
         let shares: Vec<T> = scheme.integration.iter().map(|a| T::splat(-a)).collect();
@@ -221,8 +238,14 @@ impl<T: Lane> pulp::NullaryFnOnce for Write<'_, '_, T> {
                 }
                 (0..m).for_each(|i| b[i * width + c] = zero - one);
             }
+            if CONDENSED {
+                system.condense_at(t, [n, m, 1 + free])?;
+            }
         }
-        trace.lanes().iter().sum()
+        if !CONDENSED {
+            system.condense()?;
+        }
+        Ok(trace.lanes().iter().sum())
     }
 }
 

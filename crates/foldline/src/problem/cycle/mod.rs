@@ -280,8 +280,8 @@ impl ZeroProblem for CycleProblem<'_> {
     }
 
     fn factorise(&mut self, u: &[f64], rows: &[f64]) -> Result<(), Singular> {
-        self.fill(u, rows);
-        self.system.factorise(1.0)
+        self.fill(u, rows)?;
+        self.system.eliminate(1.0)
     }
 
     fn solve(&mut self, rhs: &[f64], x: &mut [f64]) {
