@@ -19,8 +19,6 @@ const UNSIGNED: f64 = 1e-7;
 const MISS: f64 = 0.3;
 /// … and by the first Newton update, which is not the last word.
 const FAR: f64 = 0.6;
-/// Share of the step below which a prediction was so good that the tangent need not be looked at before it is there anyway.
-const HIT: f64 = 0.02;
 /// How far off the cubic between both ends of a step the curve may be midway, as a share of the step.
 const OFF: f64 = 0.01;
 /// … and how far by an estimate.
@@ -53,9 +51,6 @@ impl Follow<'_> {
         correct_within(self.problem, self.settings, &plane, FAR * step, &mut u, cost)?;
         let miss: Vec<f64> = u.iter().zip(guess).map(|(a, b)| a - b).collect();
         let miss = self.problem.dot(&miss, &miss).sqrt() / step;
-        if miss < HIT {
-            return Ok((u, plane.row));
-        }
         let (mut last, mut tangent) = (vec![0.0; u.len()], vec![0.0; u.len()]);
         last[u.len() - 1] = 1.0;
         self.problem.solve(&last, &mut tangent);
