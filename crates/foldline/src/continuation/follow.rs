@@ -98,9 +98,6 @@ const CROSSING: f64 = 2e-3;
 
 /// Growth of a step over the one before, at most: the prediction is by the cubic through both ends of that.
 const GROWTH: f64 = 2.0;
-/// The same for the second step along cycles: the first is chosen without knowing anything of the curve. A step that grows by more than
-/// [`GROWTH`] is looked at midway.
-const OPENING: f64 = 4.0;
 /// Growth of the period while the parameter stands still, having moved before, that means that the period has no bound.
 const LONG: f64 = 3.0;
 /// Slope of a branch in its parameter below which it does not change along the branch but for rounding.
@@ -209,8 +206,7 @@ pub fn follow(
         let (angle, length) = walk.angle(&left, &right);
         // A bend that has become sharper will go on so.
         let trend = trail.as_ref().map_or(1.0, |t| angle / (length * t.curvature).max(1e-12)).clamp(1.0, 2.0);
-        let growth = if trail.is_none() && !left.mesh.is_empty() { OPENING } else { GROWTH };
-        let factor = (walk.settings.target_angle / (trend * angle).max(1e-12)).clamp(0.3, growth);
+        let factor = (walk.settings.target_angle / (trend * angle).max(1e-12)).clamp(0.3, GROWTH);
         step = (length * factor).clamp(walk.settings.min_step, walk.settings.max_step);
         let sideways = if walk.direction > 0.0 { 0 } else { -1 };
         for item in found {
@@ -488,8 +484,7 @@ impl Follow<'_> {
         if self.problem.departure(&right.u) > self.settings.newton_tolerance() {
             return Err(Failure::Departed);
         }
-        let leap = trail.is_none_or(|trail| step > 1.01 * GROWTH * trail.length);
-        if leap || left.mesh.is_empty() {
+        if trail.is_none() || left.mesh.is_empty() {
             self.is_smooth(left, &right, cost)?;
         }
         self.leads_back(left, &right, cost)?;

@@ -83,7 +83,7 @@ impl Settings {
             max_angle: 0.45,
             target_angle: 0.25,
             max_step: 0.2,
-            first_step: 0.04,
+            first_step: 0.02,
             min_step: 1e-9,
             period_growth: 1e3,
             max_newton: 8,
