@@ -43,22 +43,6 @@ fn distance(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).fold(0.0, |most, (a, b)| most.max((a - b).abs()))
 }
 
-/// Whether the parameter may have a value on a step of that length: the cubic through both ends comes close to it.
-fn may_have_at(left: &Station, right: &Station, length: f64, value: f64) -> bool {
-    comes_close([left.parameter(), right.parameter()], [length * left.slope(), length * right.slope()], value)
-}
-
-/// Whether the cubic on [0, 1] with these values and slopes at its ends comes as close to a value as a fifth of the way that it makes.
-fn comes_close([a, b]: [f64; 2], [p, q]: [f64; 2], value: f64) -> bool {
-    const PLACES: usize = 16;
-    const CLOSE: f64 = 0.2;
-    let at = |x: f64| a + x * (p + x * ((3.0 * (b - a) - 2.0 * p - q) + x * (p + q - 2.0 * (b - a))));
-    let values = (0..=PLACES).map(|k| at(k as f64 / PLACES as f64));
-    let [low, high] = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| [l.min(v), h.max(v)]);
-    let slack = CLOSE * (high - low).max(p.abs()).max(q.abs());
-    (low - slack..=high + slack).contains(&value)
-}
-
 impl Follow<'_> {
     /// The bound of a further parameter that this step passes, and the point there.
     pub(super) fn beyond(&mut self, left: &Station, right: &Station, cost: &mut Cost) -> Option<(f64, Station)> {
@@ -275,9 +259,6 @@ impl Follow<'_> {
                 continue;
             }
             let length = self.angle(left, right).1;
-            if !may_have_at(left, right, length, home.parameters[self.free]) {
-                break;
-            }
             for image in self.images_of_home(right, home, &reflection, 1.5 * length + HOME * tolerance) {
                 if let Some(found) = self.crosses_at(left, right, home, &image, cost) {
                     return Some(found);
@@ -396,19 +377,5 @@ impl Follow<'_> {
             all.extend(range.map(|v| v / scale));
         }
         all
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_step_round_a_fold_has_values_beyond_both_of_its_ends() {
-        // From 1 up to 1.25 and back to 1.
-        assert!(comes_close([1.0, 1.0], [1.0, -1.0], 1.25) && comes_close([1.0, 1.0], [1.0, -1.0], 1.3));
-        assert!(!comes_close([1.0, 1.0], [1.0, -1.0], 1.5));
-        // Straight on: what lies behind stays there.
-        assert!(!comes_close([2.0, 3.0], [1.0, 1.0], 1.7) && comes_close([2.0, 3.0], [1.0, 1.0], 1.9));
     }
 }

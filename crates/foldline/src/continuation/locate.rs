@@ -95,16 +95,8 @@ impl<'s> Stretch<'s> {
         s: f64,
         cost: &mut Cost,
     ) -> Result<(Vec<f64>, Vec<f64>), Failure> {
+        let mut u = self.corrected(problem, settings, s, cost)?;
         let close = settings.closeness(&self.left.mesh, self.length);
-        // Between two points of a branch the cubic is so close that two steps with new matrices do; where they do not, from afar.
-        problem.set_mesh(&self.left.mesh);
-        let mut u = self.predicted(problem, s);
-        if !self.left.mesh.is_empty()
-            && let Ok(tangent) = arrive(problem, &mut u, &self.left.tangent, close, cost)
-        {
-            return Ok((u, tangent));
-        }
-        u = self.corrected(problem, settings, s, cost)?;
         let tangent = arrive(problem, &mut u, &self.left.tangent, close, cost)?;
         Ok((u, tangent))
     }
