@@ -71,7 +71,7 @@ const CONDITION: f64 = 1e4;
 /// With |F| the root of the mean square of the singular values σ of a p×p matrix, and κ the quotient of the largest and the smallest of
 /// them, what is bounded by [`CONDITION`] is (guggenheimer1995)
 ///
-///   (4)  c(F) = |F|ᵖ / |det F| ≤ κ(F)ᵖ⁻¹,   c(A B) ≤ κ(A)ᵖ⁻¹ c(B)
+///   (4)  c(F) = |F|ᵖ / |det F|,   κ(F) ≤ 2 c(F),   c(F) ≤ κ(F)ᵖ⁻¹,   c(A B) ≤ κ(A)ᵖ⁻¹ c(B)
 ///
 /// so that most products need not be looked at.
 pub fn group(factors: &[f64], p: usize) -> Vec<f64> {
