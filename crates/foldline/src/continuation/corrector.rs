@@ -86,9 +86,16 @@ pub struct Station {
     pub share: f64,
     /// The parameter midway from the station before, against the cubic through both; 0 where it was not looked at.
     pub midway: f64,
+    /// Where the way from the station before was looked at on its mesh: the distance along its tangent, and the unknowns there.
+    pub middle: Option<(f64, Vec<f64>)>,
 }
 
 impl Station {
+    /// A station at `u`, of which nothing else is known yet.
+    pub fn new(point: Point, u: Vec<f64>, tangent: Vec<f64>, mesh: Mesh) -> Station {
+        Station { point, u, tangent, mesh, roomier: None, share: 1.0, midway: 0.0, middle: None }
+    }
+
     /// Turns the tangent, where need be, so that along it the parameter changes the way `slope` says.
     pub fn head(&mut self, slope: f64) {
         if self.slope() * slope < 0.0 {
@@ -283,7 +290,7 @@ pub fn examined(problem: &mut dyn ZeroProblem, u: Vec<f64>, tangent: Vec<f64>, d
     let examination = problem.examine(&u);
     let stored: Vec<f64> = tangent.iter().map(|t| direction * t).collect();
     let point = problem.point(&u, &stored, examination);
-    Station { point, u, tangent, mesh: problem.mesh(), roomier: None, share: 1.0, midway: 0.0 }
+    Station::new(point, u, tangent, problem.mesh())
 }
 
 /// Estimates the error of the spectrum of a station, at which the problem was factorised last.

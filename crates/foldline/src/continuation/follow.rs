@@ -485,7 +485,7 @@ impl Follow<'_> {
             return Err(Failure::Departed);
         }
         if trail.is_none() || left.mesh.is_empty() {
-            self.is_smooth(left, &right, cost)?;
+            self.is_smooth(left, &mut right, cost)?;
         }
         self.leads_back(left, &right, cost)?;
         if miss > BENT {

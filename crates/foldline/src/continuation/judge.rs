@@ -83,14 +83,16 @@ impl Follow<'_> {
     }
 
     /// Whether the curve keeps to the cubic between both ends of a step. A wiggle shorter than the step shows at neither end;
-    /// looking midway is cheap for equilibria, and where there is no step before that says how the curve bends.
-    pub(super) fn is_smooth(&mut self, left: &Station, right: &Station, cost: &mut Cost) -> Result<(), Failure> {
+    /// looking midway is cheap for equilibria, and where there is no step before that says how the curve bends. `right` takes note of what
+    /// is there.
+    pub(super) fn is_smooth(&mut self, left: &Station, right: &mut Station, cost: &mut Cost) -> Result<(), Failure> {
         let stretch = Stretch::new(self.problem, left, right, self.direction);
         let mut looked = |share: f64| -> Result<f64, Failure> {
             let middle = share * stretch.length;
             let guess = stretch.predicted(self.problem, middle);
             let u = stretch.corrected(self.problem, self.settings, middle, cost)?;
             let miss: Vec<f64> = u.iter().zip(&guess).map(|(a, b)| a - b).collect();
+            right.middle = Some((middle, u));
             Ok(self.problem.dot(&miss, &miss).sqrt() / stretch.length.abs())
         };
         // A step that doubles or halves may have a branch point right in its middle, where Newton's method fails.

@@ -39,6 +39,8 @@ pub struct Stretch<'s> {
     pub length: f64,
     /// As [`Station::midway`] of the right station.
     midway: f64,
+    /// As [`Station::middle`] of the right station.
+    middle: Option<(f64, Vec<f64>)>,
     /// +1 towards larger positions, -1 towards smaller.
     pub(super) direction: f64,
 }
@@ -54,7 +56,8 @@ impl<'s> Stretch<'s> {
         let length = problem.dot(&left.tangent, &gap);
         let forward = problem.dot(&left.tangent, &slope);
         slope.iter_mut().for_each(|t| *t /= forward.abs().max(0.1));
-        Stretch { left, right: u, slope, length, midway: right.midway, direction }
+        let (midway, middle) = (right.midway, right.middle.clone());
+        Stretch { left, right: u, slope, length, midway, middle, direction }
     }
 
     /// The point at distance s on the mesh of the left station.
@@ -114,6 +117,9 @@ impl<'s> Stretch<'s> {
     ) -> Result<Vec<f64>, Failure> {
         problem.set_mesh(&self.left.mesh);
         problem.anchor(&self.left.u);
+        if let Some((_, known)) = self.middle.as_ref().filter(|(there, _)| *there == s) {
+            return Ok(known.clone());
+        }
         let mut u = self.predicted(problem, s);
         let plane = Plane { row: self.left.tangent.clone(), base: self.left.u.clone(), distance: s };
         correct(problem, settings, &plane, &mut u, cost)?;
@@ -378,7 +384,7 @@ fn seen(sight: Sight, problem: &mut dyn ZeroProblem, u: Vec<f64>, tangent: Vec<f
     };
     let stored: Vec<f64> = tangent.iter().map(|t| direction * t).collect();
     let point = problem.point(&u, &stored, examination);
-    Station { point, u, tangent, mesh: problem.mesh(), roomier: None, share: 1.0, midway: 0.0 }
+    Station::new(point, u, tangent, problem.mesh())
 }
 
 /// The whole station, where only a part of it was [`seen`]; the problem was factorised there last.

@@ -138,7 +138,7 @@ fn blend(
     examination.trust.discretisation = stations.iter().map(|own| own.point.trust.discretisation).fold(0.0, f64::max);
     let stored: Vec<f64> = tangent.iter().map(|t| direction * t).collect();
     let point = problem.point(&u, &stored, examination);
-    Station { point, u, tangent, mesh, roomier: None, share: 1.0, midway: 0.0 }
+    Station::new(point, u, tangent, mesh)
 }
 
 #[cfg(test)]

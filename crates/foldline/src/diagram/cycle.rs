@@ -64,15 +64,13 @@ impl Cycle {
     /// The state `[n]` at normalised time `t` (taken modulo 1).
     pub fn state(&self, t: f64) -> Vec<f64> {
         let mut x = vec![0.0; self.dim()];
-        let scheme = Scheme::new(self.degree);
-        self.state_into(&scheme, t, &mut x);
+        self.state_into(Scheme::of(self.degree), t, &mut x);
         x
     }
 
     /// `count` states at uniformly spaced times over one period, the end point excluded: `[count][n]`.
     pub fn uniform(&self, count: usize) -> Vec<f64> {
-        let n = self.dim();
-        let scheme = Scheme::new(self.degree);
+        let (n, scheme) = (self.dim(), Scheme::of(self.degree));
         let mut out = vec![0.0; count * n];
         let mut j = 1;
         for (s, x) in out.chunks_exact_mut(n.max(1)).enumerate() {
@@ -80,7 +78,7 @@ impl Cycle {
             while j < self.intervals() && self.mesh[j] <= t {
                 j += 1;
             }
-            self.state_within(&scheme, j - 1, t, x);
+            self.state_within(scheme, j - 1, t, x);
         }
         out
     }

@@ -456,8 +456,12 @@ impl<T: Lane> pulp::NullaryFnOnce for Solve<'_, T> {
         let (width, block) = (n + q, (m + 1) * n);
         let size = intervals * block;
         let mut z = system.deal(&rhs[..size]);
-        let mut h = vec![T::default(); length * n];
-        let mut taken = vec![T::default(); q];
+        // Allocated at once.
+        let mut room = vec![T::default(); length * n + 2 * n + 2 * q];
+        let (h, rest) = room.split_at_mut(length * n);
+        let (taken, rest) = rest.split_at_mut(q);
+        let (scalars, rest) = rest.split_at_mut(q);
+        let (left, right) = rest.split_at_mut(n);
         for t in 0..length {
             let own = &mut z[t * block..(t + 1) * block];
             system.interior_solve(t, false, &mut own[n..]);
@@ -473,7 +477,7 @@ impl<T: Lane> pulp::NullaryFnOnce for Solve<'_, T> {
                 taken[c] = taken[c] - dot(row, &own[n..]);
             }
         }
-        system.pieces.forward(&mut h, &mut taken);
+        system.pieces.forward(h, taken);
         let mut ends = unzipped(&h[(length - 1) * n..]);
         let mut tail = vec![0.0; width];
         system.whole.forward(&mut ends, &mut tail[n..]);
@@ -489,15 +493,15 @@ impl<T: Lane> pulp::NullaryFnOnce for Solve<'_, T> {
         let mut nodes = first.to_vec();
         nodes.extend_from_slice(&ends[..(T::COUNT - 1) * n]);
         nodes.extend_from_slice(&closing);
-        let left: Vec<T> = zipped(&nodes[..T::COUNT * n], n);
-        let right: Vec<T> = zipped(&nodes[n..], n);
-        let scalars: Vec<T> = sigma.iter().map(|s| T::splat(*s)).collect();
-        system.pieces.backward(&mut h, &left, &right, &scalars);
+        zip(&nodes[..T::COUNT * n], left);
+        zip(&nodes[n..], right);
+        scalars.iter_mut().zip(sigma).for_each(|(to, s)| *to = T::splat(*s));
+        system.pieces.backward(h, left, right, scalars);
         for t in 0..length {
             let (end, inside) = z[t * block..(t + 1) * block].split_at_mut(n);
-            end.copy_from_slice(if t == 0 { &left } else { &h[(t - 1) * n..t * n] });
+            end.copy_from_slice(if t == 0 { left } else { &h[(t - 1) * n..t * n] });
             for (zi, line) in inside.iter_mut().zip(system.lines(t).chunks_exact(width)) {
-                *zi = *zi - dot(&line[..n], end) - dot(&line[n..], &scalars);
+                *zi = *zi - dot(&line[..n], end) - dot(&line[n..], scalars);
             }
         }
         system.collect(&z, x);
@@ -505,14 +509,12 @@ impl<T: Lane> pulp::NullaryFnOnce for Solve<'_, T> {
     }
 }
 
-/// Vectors of n components, one after the other, into lanes.
+/// Vectors, one after the other, into the lanes of one.
 #[inline(always)]
-fn zipped<T: Lane>(x: &[f64], n: usize) -> Vec<T> {
-    let mut out = vec![T::default(); n];
-    for (l, part) in x.chunks_exact(n).enumerate() {
+fn zip<T: Lane>(x: &[f64], out: &mut [T]) {
+    for (l, part) in x.chunks_exact(out.len()).enumerate() {
         out.iter_mut().zip(part).for_each(|(o, v)| o.lanes_mut()[l] = *v);
     }
-    out
 }
 
 struct SolveTransposed<'a, T> {
@@ -558,7 +560,8 @@ impl<T: Lane> pulp::NullaryFnOnce for SolveTransposed<'_, T> {
         lu::solve_transposed(&system.last, width, &system.last_pivots, &mut tail);
         let (carry, border) = tail.split_at(n);
         system.whole.backward_transposed(&mut nodes, carry, border);
-        let carry: Vec<T> = zipped(&nodes, n);
+        let mut carry = vec![T::default(); n];
+        zip(&nodes, &mut carry);
         let rows: Vec<T> = border.iter().map(|b| T::splat(*b)).collect();
         system.pieces.backward_transposed(&mut ends, &carry, &rows);
         for t in 0..length {

@@ -20,7 +20,7 @@ use super::gauss::{Scheme, gauss_legendre};
 use crate::contract::{Batch, Parameters, VectorField};
 use crate::diagram::Mesh;
 use crate::linalg::lane::{self, Eight, Lane};
-use crate::linalg::{axpy, lu, panel};
+use crate::linalg::{axpy, lu, panel, tile};
 
 /// Where the defect is sampled, and how it is integrated.
 #[derive(Clone, Debug)]
@@ -150,10 +150,12 @@ pub fn measure(
     }
     let mut source = vec![0.0; n * lanes];
     field.evaluate(Batch { lanes, states: &states, parameters, times: &places }, &mut source);
-    for ((g, f), k) in source.iter_mut().zip(&f).zip(0..) {
-        let change = times[k % count] * (*g - f);
-        // Next to where f ends its end is not the error's business.
-        *g = if change.is_finite() { change } else { 0.0 };
+    for (own, f) in source.chunks_exact_mut(count).zip(f.chunks_exact(count)) {
+        for ((g, f), ht) in own.iter_mut().zip(f).zip(&times) {
+            let change = ht * (*g - f);
+            // Next to where f ends its end is not the error's business.
+            *g = if change.is_finite() { change } else { 0.0 };
+        }
     }
     let (mut sources, mut misses) = (vec![0.0; count * m * n], vec![0.0; count * n]);
     for i in 0..n {
@@ -176,156 +178,163 @@ pub fn measure(
     Defect { local, within, ends, sources, misses }
 }
 
-/// Intervals as [`correct`] takes them: so many side by side, and the last one again where they are fewer.
-pub fn padded(count: usize) -> usize {
-    count.next_multiple_of(Eight::COUNT)
+/// A course of J along which solutions of the variational equations are made more accurate.
+pub struct Course<'a> {
+    /// `[n × n][m + 1][N]`: J at the sample points.
+    pub jacobians: &'a [f64],
+    /// `[N]`: h T.
+    pub lengths: &'a [f64],
+    /// `[N][n × n]`: what the polynomials give at the right ends, V(1).
+    pub transitions: &'a mut [f64],
 }
 
 /// Solutions of the variational equations x' = h T J x on all intervals, made more accurate, for several courses of J.
 ///
-/// With P [`padded`] intervals, `nodes` `[m + 1][n × n][P]` are their values V at the nodes, the identity at the first; `jacobians`
-/// `[n × n][course][m + 1][P]` is h T J at the sample points s_g with weights w_g. `transitions` `[n × n][course][P]`, what the polynomials
-/// give at the right ends, lose the error that they have there, with D = V' - h T J V:
+/// `nodes` `[m][n × n][N]` are the values of the polynomials V at the inner nodes, which begin with the identity. With the sample points
+/// s_g, their weights w_g and D = V' - h T J V, the transitions lose the error that they have:
 ///
 ///   (3)  ∫₀¹ V(1) V(s)⁻¹ D(s) ds = V(1) Σ_g w_g V(s_g)⁻¹ D(s_g)
 ///
 /// Where V cannot be inverted they stay as they are.
-pub fn correct(sampling: &Sampling, nodes: &[f64], jacobians: &[f64], transitions: &mut [f64], n: usize) {
-    Eight::dispatch(Correction { sampling, nodes, jacobians, transitions, n });
+pub fn correct(sampling: &Sampling, nodes: &[f64], courses: &mut [Course], n: usize) {
+    Eight::dispatch(Correction { sampling, nodes, courses, n });
 }
 
-struct Correction<'a> {
+struct Correction<'a, 'b, 'c> {
     sampling: &'a Sampling,
     nodes: &'a [f64],
-    jacobians: &'a [f64],
-    transitions: &'a mut [f64],
+    courses: &'b mut [Course<'c>],
     n: usize,
 }
 
-impl pulp::NullaryFnOnce for Correction<'_> {
+impl pulp::NullaryFnOnce for Correction<'_, '_, '_> {
     type Output = ();
 
     #[inline(always)]
     fn call(self) {
         // The usual case with its sizes as constants.
-        let courses = self.transitions.len() / (self.n * self.n * self.count());
-        match (self.n, self.sampling.points.len(), courses) {
-            (4, 5, 2) => self.corrected(4, 5, 2),
-            (n, points, courses) => self.corrected(n, points, courses),
+        match (self.n, self.sampling.points.len()) {
+            (4, 5) => self.corrected(4, 5),
+            (n, points) => self.corrected(n, points),
         }
     }
 }
 
-impl Correction<'_> {
-    /// P.
-    #[inline(always)]
-    fn count(&self) -> usize {
-        self.nodes.len() / (self.n * self.n * self.sampling.points.len())
+/// Eight numbers of a line from `first` on, of which it has `valid`; the last one again beyond that.
+#[inline(always)]
+fn loaded(line: &[f64], first: usize, valid: usize) -> Eight {
+    match valid {
+        Eight::COUNT => Eight::load(&line[first..]),
+        _ => Eight::each(|lane| line[first + lane.min(valid - 1)]),
     }
+}
 
+impl Correction<'_, '_, '_> {
     #[inline(always)]
-    fn corrected(self, n: usize, points: usize, courses: usize) {
-        let count = self.count();
-        let Correction { sampling, nodes, jacobians, transitions, .. } = self;
-        let square = n * n;
-        // Right-hand sides of all courses stand side by side in a row.
-        let columns = n * courses;
+    fn corrected(self, n: usize, points: usize) {
+        let Correction { sampling, nodes, courses, .. } = self;
+        let (square, count) = (n * n, nodes.len() / (n * n * (points - 1)));
         let room = |size: usize| vec![Eight::default(); size];
-        let (mut own, mut values, mut slopes) = (room(square * points), room(square * points), room(square * points));
-        let [mut matrix, mut defect, mut right, mut sum] = [square, n * columns, n * columns, n * columns].map(room);
+        let [mut own, mut values, mut slopes] = [square * points; 3].map(room);
+        let [mut factors, mut matrix, mut right] = [square; 3].map(room);
+        // Σ_g of (3), `[course][n × n]`.
+        let mut sums = room(square * courses.len());
+        let negative = |weights: &[f64]| -> Vec<Eight> { weights.iter().map(|w| Eight::splat(-w)).collect() };
+        let (to_values, to_slopes) = (negative(&sampling.values), negative(&sampling.slopes));
         let weights = &sampling.sources[(points - 1) * points..];
+        (0..n).for_each(|c| own[c * (n + 1)] = Eight::splat(1.0));
         for first in (0..count).step_by(Eight::COUNT) {
-            own.iter_mut().zip(nodes.chunks_exact(count)).for_each(|(v, from)| *v = Eight::load(&from[first..]));
-            for (rows, out) in [(&sampling.values, &mut values), (&sampling.slopes, &mut slopes)] {
+            let valid = (count - first).min(Eight::COUNT);
+            for (v, line) in own[square..].iter_mut().zip(nodes.chunks_exact(count)) {
+                *v = loaded(line, first, valid);
+            }
+            for (rows, out) in [(&to_values, &mut values), (&to_slopes, &mut slopes)] {
                 out.fill(Eight::default());
                 for (row, to) in rows.chunks_exact(points).zip(out.chunks_exact_mut(square)) {
-                    row.iter().zip(own.chunks_exact(square)).for_each(|(w, v)| lane::add(Eight::splat(*w), v, to));
+                    tile::subtract_combination(to, row, &own, square, 0);
                 }
             }
-            sum.fill(Eight::default());
-            let samples = values.chunks_exact(square).zip(slopes.chunks_exact(square)).zip(weights);
-            for (g, ((value, slope), weight)) in samples.enumerate() {
-                for ((c, to), slope) in defect.chunks_exact_mut(columns).enumerate().zip(slope.chunks_exact(n)) {
-                    for (course, to) in to.chunks_exact_mut(n).enumerate() {
-                        to.copy_from_slice(slope);
-                        for (d, v) in value.chunks_exact(n).enumerate() {
-                            let entry = (((c * n + d) * courses + course) * points + g) * count + first;
-                            lane::subtract(Eight::load(&jacobians[entry..]), v, to);
-                        }
+            sums.fill(Eight::default());
+            for (g, weight) in weights.iter().enumerate() {
+                let (value, slope) = (&values[g * square..(g + 1) * square], &slopes[g * square..(g + 1) * square]);
+                factors.copy_from_slice(value);
+                let regular = factorised(&mut factors, n);
+                for (course, sum) in courses.iter().zip(sums.chunks_exact_mut(square)) {
+                    let length = loaded(course.lengths, first, valid);
+                    for (entry, to) in matrix.iter_mut().enumerate() {
+                        let line = &course.jacobians[(entry * points + g) * count..(entry * points + g + 1) * count];
+                        *to = length * loaded(line, first, valid);
                     }
+                    // D, then V⁻¹ D.
+                    right.copy_from_slice(slope);
+                    tile::subtract(&mut right, n, &matrix, n, value, n, [n; 3], [0; 3]);
+                    if regular {
+                        tile::forward(&mut right, n, 0, &factors, n, n);
+                        tile::backward(&mut right, n, 0, &factors, n, 0, n, n);
+                    } else {
+                        exchanging(value, &mut right, n);
+                    }
+                    lane::add(Eight::splat(*weight), &right, sum);
                 }
-                matrix.copy_from_slice(value);
-                right.copy_from_slice(&defect);
-                if !eliminated(&mut matrix, &mut right, n) {
-                    exchanging(value, &defect, &mut right, n);
-                }
-                lane::add(Eight::splat(*weight), &right, &mut sum);
             }
             // V(1) times the sum.
-            right.fill(Eight::default());
-            for (c, error) in right.chunks_exact_mut(columns).enumerate() {
-                for (d, sums) in sum.chunks_exact(columns).enumerate() {
-                    for (course, (error, sums)) in error.chunks_exact_mut(n).zip(sums.chunks_exact(n)).enumerate() {
-                        let entry = ((c * n + d) * courses + course) * count + first;
-                        lane::add(Eight::load(&transitions[entry..]), sums, error);
-                    }
+            for (course, sum) in courses.iter_mut().zip(sums.chunks_exact(square)) {
+                let transitions = &mut course.transitions[first * square..(first + valid) * square];
+                for (entry, to) in matrix.iter_mut().enumerate() {
+                    *to = Eight::each(|lane| transitions[lane.min(valid - 1) * square + entry]);
                 }
-            }
-            let finite = right
-                .iter()
-                .fold([true; Eight::COUNT], |all, e| std::array::from_fn(|lane| all[lane] && e.0[lane].is_finite()));
-            for (c, row) in right.chunks_exact(columns).enumerate() {
-                for (k, error) in row.iter().enumerate() {
-                    let entry = ((c * n + k % n) * courses + k / n) * count + first;
-                    let lanes = transitions[entry..].iter_mut().zip(&error.0).zip(finite);
-                    lanes.filter(|(_, finite)| *finite).for_each(|((t, e), _)| *t -= e);
+                right.fill(Eight::default());
+                tile::subtract(&mut right, n, &matrix, n, sum, n, [n; 3], [0; 3]);
+                // Zero in lanes where all are finite.
+                let mut finite = Eight::default();
+                for change in &right {
+                    finite = finite.zip(*change, |all, x| all + 0.0 * x);
+                }
+                for (entry, (before, change)) in matrix.iter().zip(&right).enumerate() {
+                    let after = *before + finite.zip(*change, |all, x| if all == 0.0 { x } else { 0.0 });
+                    let own = transitions[entry..].iter_mut().step_by(square);
+                    own.zip(after.lanes()).for_each(|(to, after)| *to = *after);
                 }
             }
         }
     }
 }
 
-/// Solves a x = b in every lane without exchanging rows, x in place of b; false where a pivot is too small for that in some lane.
+/// Factorises in every lane without exchanging rows: L without its diagonal of ones below the diagonal, U on and above it, the inverse of
+/// its diagonal; false where a pivot is too small for that in some lane.
 #[inline(always)]
-fn eliminated(a: &mut [Eight], b: &mut [Eight], n: usize) -> bool {
+fn factorised(a: &mut [Eight], n: usize) -> bool {
     const SMALL: f64 = 1e-3;
-    let columns = b.len() / n;
     for k in 0..n {
-        let largest =
-            a[k * n..].iter().skip(k).step_by(n).fold(Eight::default(), |most, x| most.zip(*x, |m, x| m.max(x.abs())));
         let pivot = a[k * n + k];
+        let mut largest = Eight::default();
+        for i in k..n {
+            largest = largest.zip(a[i * n + k], |most, x| most.max(x.abs()));
+        }
         if !pivot.all(largest, |pivot, largest| pivot.abs() > SMALL * largest) {
             return false;
         }
         let inverse = pivot.map(|x| 1.0 / x);
-        let (above, below) = a.split_at_mut((k + 1) * n);
-        let (done, rest) = b.split_at_mut((k + 1) * columns);
-        for (row, right) in below.chunks_exact_mut(n).zip(rest.chunks_exact_mut(columns)) {
-            let factor = row[k] * inverse;
-            lane::subtract(factor, &above[k * n + k + 1..], &mut row[k + 1..]);
-            lane::subtract(factor, &done[k * columns..], right);
+        for i in k + 1..n {
+            let factor = a[i * n + k] * inverse;
+            a[i * n + k] = factor;
+            for j in k + 1..n {
+                a[i * n + j] = a[i * n + j] - factor * a[k * n + j];
+            }
         }
         a[k * n + k] = inverse;
-    }
-    for k in (0..n).rev() {
-        let (head, done) = b.split_at_mut((k + 1) * columns);
-        let own = &mut head[k * columns..];
-        for (entry, x) in a[k * n + k + 1..(k + 1) * n].iter().zip(done.chunks_exact(columns)) {
-            lane::subtract(*entry, x, own);
-        }
-        own.iter_mut().for_each(|x| *x = *x * a[k * n + k]);
     }
     true
 }
 
-/// The same lane by lane, with exchanges; NaN where that does not help.
-fn exchanging(a: &[Eight], b: &[Eight], x: &mut [Eight], n: usize) {
+/// Solves a x = b lane by lane, with exchanges, b in place of x; NaN where that does not help.
+fn exchanging(a: &[Eight], x: &mut [Eight], n: usize) {
     let mut pivots = vec![0; n];
     for lane in 0..Eight::COUNT {
         let mut matrix: Vec<f64> = a.iter().map(|a| a.0[lane]).collect();
-        let mut right: Vec<f64> = b.iter().map(|b| b.0[lane]).collect();
+        let mut right: Vec<f64> = x.iter().map(|x| x.0[lane]).collect();
         match lu::factorise(&mut matrix, n, &mut pivots) {
-            Ok(()) => lu::solve(&matrix, n, &pivots, &mut right, b.len() / n),
+            Ok(()) => lu::solve(&matrix, n, &pivots, &mut right, x.len() / n),
             Err(_) => right.fill(f64::NAN),
         }
         x.iter_mut().zip(right).for_each(|(x, value)| x.0[lane] = value);
@@ -349,16 +358,13 @@ mod tests {
         let (mut pivots, mut inner) = (vec![0; m], vec![1.0; m]);
         crate::linalg::lu::factorise(&mut matrix, m, &mut pivots).unwrap();
         crate::linalg::lu::solve(&matrix, m, &pivots, &mut inner, 1);
-        let own = [vec![1.0], inner.clone()].concat();
         let end = scheme.end[0] + crate::linalg::dot(&scheme.end[1..], &inner);
         let exact = (0.4f64 + 0.16).exp();
         let before = (end - exact).abs();
-        let everywhere = |values: Vec<f64>| -> Vec<f64> {
-            values.into_iter().flat_map(|x| std::iter::repeat_n(x, padded(1))).collect()
-        };
-        let jacobians = everywhere(gauss_legendre(m + 1).0.into_iter().map(rate).collect());
-        let mut transition = everywhere(vec![end]);
-        correct(&sampling, &everywhere(own), &jacobians, &mut transition, 1);
+        let jacobians: Vec<f64> = gauss_legendre(m + 1).0.into_iter().map(|s| rate(s) / 0.4).collect();
+        let mut transition = [end];
+        let course = Course { jacobians: &jacobians, lengths: &[0.4], transitions: &mut transition };
+        correct(&sampling, &inner, &mut [course], 1);
         let after = (transition[0] - exact).abs();
         assert!(before > 1e-9 && after < 0.15 * before, "{before:e} {after:e}");
     }

@@ -5,6 +5,7 @@
 
 use super::gauss::Scheme;
 use crate::contract::{Batch, Parameters, VectorField};
+use crate::linalg::lane::{Eight, Lane};
 use crate::linalg::panel;
 
 /// Peaks of one channel that are refined.
@@ -192,19 +193,27 @@ fn outermost(line: &[f64]) -> [(f64, Vec<usize>); 2] {
         high.look(l, triple);
     };
     // Where the line only rises or only falls, over a block and one sample to either side, no sample is a peak.
-    const BLOCK: usize = 8;
+    const BLOCK: usize = Eight::COUNT;
     let mut l = 0;
     while l < lanes {
         let next = (l + BLOCK).min(lanes);
-        let around = if l > 0 && next < lanes { &line[l - 1..=next] } else { &[] };
-        let (rising, falling) =
-            around.windows(2).fold((true, true), |(r, f), w| (r & (w[0] < w[1]), f & (w[0] > w[1])));
-        if around.is_empty() || !(rising || falling) {
+        let inside = l > 0 && next < lanes && next == l + BLOCK;
+        if !(inside && is_monotone(&line[l - 1..=next])) {
             (l..next).for_each(&mut look);
         }
         l = next;
     }
     found.map(|summit| (summit.top, summit.peaks.into_iter().map(|peak| peak.1).collect()))
+}
+
+/// Whether ten numbers only rise or only fall.
+fn is_monotone(line: &[f64]) -> bool {
+    let (before, here) = (Eight::load(line), Eight::load(&line[1..]));
+    let [next, last] = [8, 9].map(|k| line[k]);
+    match next < last {
+        true => before.all(here, |x, y| x < y),
+        false => next > last && before.all(here, |x, y| x > y),
+    }
 }
 
 /// The largest of the values looked at, and the best few peaks among them.

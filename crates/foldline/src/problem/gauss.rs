@@ -12,6 +12,8 @@
 //!
 //! **Source.** ascher1995, §5; hairer1996, §II.7.
 
+use std::sync::OnceLock;
+
 /// The largest degree.
 pub const LARGEST: usize = 12;
 
@@ -34,6 +36,13 @@ pub struct Scheme {
 }
 
 impl Scheme {
+    /// The scheme of a degree, as [`Scheme::new`] makes it, made once.
+    pub fn of(degree: usize) -> &'static Scheme {
+        static KNOWN: [OnceLock<Scheme>; LARGEST] = [const { OnceLock::new() }; LARGEST];
+        let m = degree.clamp(1, LARGEST);
+        KNOWN[m - 1].get_or_init(|| Scheme::new(m))
+    }
+
     /// The scheme of degree m, 1 ≤ m ≤ [`LARGEST`]; other degrees become the nearest of these.
     pub fn new(degree: usize) -> Scheme {
         let m = degree.clamp(1, LARGEST);

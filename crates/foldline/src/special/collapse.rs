@@ -46,15 +46,20 @@ pub const NEARLY: f64 = 0.3;
 impl Halves {
     fn comparable(&self, at: &Point) -> bool {
         let Solution::Cycle(cycle) = &at.solution else { return false };
-        let (x, n) = (cycle.uniform(SAMPLES), cycle.dim());
-        let half = x.len() / 2;
-        self.born
-            || (0..n).all(|c| {
-                let own = || x.iter().skip(c).step_by(n);
-                let (low, high) =
-                    own().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(*v), high.max(*v)));
-                let apart = (c..half).step_by(n).fold(0.0f64, |most, k| most.max((x[k + half] - x[k]).abs()));
-                apart <= NEARLY * (high - low)
+        if self.born {
+            return true;
+        }
+        let n = cycle.dim();
+        let [mut one, mut other] = [vec![0.0; n], vec![0.0; n]];
+        let scheme = Scheme::of(cycle.degree);
+        // Most cycles differ at the first place that is looked at.
+        at.ranges.len() >= n
+            && (0..SAMPLES / 2).all(|k| {
+                let t = k as f64 / SAMPLES as f64;
+                cycle.state_into(scheme, t, &mut one);
+                cycle.state_into(scheme, t + 0.5, &mut other);
+                let mut pairs = one.iter().zip(&other).zip(&at.ranges);
+                pairs.all(|((x, y), [low, high])| (x - y).abs() <= NEARLY * (high - low))
             })
     }
 }
@@ -173,7 +178,7 @@ impl Monitor for Halves {
 
 /// What [`compare`] finds of the deviations from the means, by the quadrature of the Gauss points.
 fn on_one_mesh(a: &Cycle, b: &Cycle) -> f64 {
-    let (scheme, n) = (Scheme::new(a.degree), a.dim());
+    let (scheme, n) = (Scheme::of(a.degree), a.dim());
     let block = (a.degree + 1) * n;
     // Means of a and b, of a² and a b.
     let mut sums = vec![[0.0; 4]; n];

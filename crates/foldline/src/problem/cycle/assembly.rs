@@ -50,17 +50,18 @@ impl CycleProblem<'_> {
         let (n, m, length, lanes) = (self.n, self.scheme.degree, self.length, self.lanes());
         let (block, last) = ((m + 1) * n, self.intervals() - 1);
         for t in 0..length {
-            let mut first = [0; 8];
-            (0..T::COUNT).for_each(|lane| first[lane] = (lane * length + t).min(last) * block);
+            let own: [&[f64]; 8] = std::array::from_fn(|lane| {
+                let j = (lane % T::COUNT * length + t).min(last);
+                &u[j * block..(j + 1) * block]
+            });
             for c in 0..n {
-                let put = |to: &mut [f64], at: usize, from: usize| {
-                    let x = T::each(|lane| u[first[lane] + from]);
-                    to[at..at + T::COUNT].copy_from_slice(x.lanes());
+                let put = |to: &mut [f64], from: usize| {
+                    let x = T::each(|lane| own[lane][from]);
+                    to[..T::COUNT].copy_from_slice(x.lanes());
                 };
-                put(&mut self.ends, (c * length + t) * T::COUNT, c);
-                for k in 0..m {
-                    put(&mut self.states, c * lanes + (t * m + k) * T::COUNT, (k + 1) * n + c);
-                }
+                put(&mut self.ends[(c * length + t) * T::COUNT..], c);
+                let states = &mut self.states[c * lanes + t * m * T::COUNT..][..m * T::COUNT];
+                states.chunks_exact_mut(T::COUNT).enumerate().for_each(|(k, to)| put(to, (k + 1) * n + c));
             }
         }
     }

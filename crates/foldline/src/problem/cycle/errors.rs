@@ -2,8 +2,8 @@
 
 use super::CycleProblem;
 use crate::contract::{Batch, Parameters, ZeroProblem};
-use crate::linalg::panel;
-use crate::problem::defect::{self, Defect};
+use crate::linalg::{panel, same};
+use crate::problem::defect::{self, Course, Defect};
 use num_complex::Complex64;
 use std::ops::Range;
 
@@ -31,17 +31,11 @@ fn spectrum_difference(spectrum: &[Complex64], other: &[Complex64]) -> f64 {
 /// Error of an interval that rounding alone may leave, relative.
 const ROUNDING: f64 = 32.0 * f64::EPSILON;
 
-/// Fills a line up with the last of its `count` values.
-fn repeat_last(line: &mut [f64], count: usize) {
-    let last = line[count - 1];
-    line[count..].fill(last);
-}
-
 /// Intervals whose transitions are made more accurate at a time: what that takes stays in the cache.
 const TOGETHER: usize = 64;
 
 /// A profile along which Jacobians are taken.
-struct Course<'a> {
+struct Profile<'a> {
     u: &'a [f64],
     /// What is subtracted within intervals, as [`Measured::within`].
     without: Option<&'a [f64]>,
@@ -53,22 +47,18 @@ pub(super) struct Room {
     /// `[n][m + 1][count]`, at the sample points.
     states: Vec<f64>,
     f: Vec<f64>,
-    fx: Vec<f64>,
     /// As [`defect::correct`] takes them.
     nodes: Vec<f64>,
-    jacobians: Vec<f64>,
-    transitions: Vec<f64>,
+    jacobians: [Vec<f64>; 2],
 }
 
 impl Room {
     fn resize(&mut self, n: usize, m: usize, count: usize) {
-        let (square, lanes, padded) = (n * n, count * (m + 1), defect::padded(count));
+        let (square, lanes) = (n * n, count * (m + 1));
         self.states.resize(n * lanes, 0.0);
         self.f.resize(n * lanes, 0.0);
-        self.fx.resize(square * lanes, 0.0);
-        self.nodes.resize((m + 1) * square * padded, 0.0);
-        self.jacobians.resize(2 * (m + 1) * square * padded, 0.0);
-        self.transitions.resize(2 * square * padded, 0.0);
+        self.nodes.resize(m * square * count, 0.0);
+        self.jacobians.iter_mut().for_each(|fx| fx.resize(square * lanes, 0.0));
     }
 }
 
@@ -88,7 +78,7 @@ impl CycleProblem<'_> {
     /// Estimated error on every interval, relative. A point that was just measured is not measured again: the last
     /// factorisation, which must belong to the current mesh, was close enough to it then.
     pub(super) fn errors(&self, u: &[f64]) -> Vec<f64> {
-        if let Some(known) = self.measured.borrow().as_ref().filter(|known| known.at == u) {
+        if let Some(known) = self.measured.borrow().as_ref().filter(|known| same(&known.at, u)) {
             return known.errors.clone();
         }
         let measured = self.measured_errors(u);
@@ -124,10 +114,10 @@ impl CycleProblem<'_> {
         let better: Vec<f64> = u.iter().zip(&known.shift).map(|(u, e)| u - e).collect();
         let plain = self.transitions();
         let mut transitions = [plain.clone(), plain.clone()];
-        let courses = [Course { u, without: None }, Course { u: &better, without: Some(&known.within) }];
+        let profiles = [Profile { u, without: None }, Profile { u: &better, without: Some(&known.within) }];
         let room = &mut *self.room.borrow_mut();
         for first in (0..self.intervals()).step_by(TOGETHER) {
-            self.correct(first..(first + TOGETHER).min(self.intervals()), &courses, &mut transitions, room);
+            self.correct(first..(first + TOGETHER).min(self.intervals()), &profiles, &mut transitions, room);
         }
         let [own, other] = transitions;
         let square = self.n * self.n;
@@ -143,49 +133,38 @@ impl CycleProblem<'_> {
         found.iter().flatten().all(|z| z.re.is_finite() && z.im.is_finite()).then_some(found)
     }
 
-    /// Makes the transitions of some intervals more accurate, with the Jacobian along each of the courses.
-    fn correct(&self, piece: Range<usize>, courses: &[Course; 2], transitions: &mut [Vec<f64>; 2], room: &mut Room) {
+    /// Makes the transitions of some intervals more accurate, with the Jacobian along each of the profiles.
+    fn correct(&self, piece: Range<usize>, profiles: &[Profile; 2], transitions: &mut [Vec<f64>; 2], room: &mut Room) {
         let (n, m, block, count) = (self.n, self.scheme.degree, self.block(), piece.len());
-        let (square, lanes, padded) = (n * n, count * (m + 1), defect::padded(count));
+        let (square, lanes, size) = (n * n, count * (m + 1), self.profile_size());
         room.resize(n, m, count);
+        let Room { states, f, nodes, jacobians } = room;
         let mesh = &self.mesh[piece.start..=piece.end];
         let times = self.sampling.times(mesh, self.forcing_periods);
-        for (course, Course { u, without }) in courses.iter().enumerate() {
-            let (size, own) = (self.profile_size(), piece.start * block..piece.end * block);
-            let nodes = panel::by_component(&u[own], m + 1, n);
-            for (c, (states, nodes)) in room.states.chunks_exact_mut(lanes).zip(nodes.chunks_exact(lanes)).enumerate() {
-                self.sampling.sampled(nodes, count, states);
+        for (Profile { u, without }, fx) in profiles.iter().zip(&mut *jacobians) {
+            let own = panel::by_component(&u[piece.start * block..piece.end * block], m + 1, n);
+            for (c, (states, own)) in states.chunks_exact_mut(lanes).zip(own.chunks_exact(lanes)).enumerate() {
+                self.sampling.sampled(own, count, states);
                 for (g, states) in states.chunks_exact_mut(count).enumerate().take(without.map_or(0, |_| m + 1)) {
                     let within = &without.unwrap_or(&[])[(c * (m + 1) + g) * self.intervals()..][piece.clone()];
                     states.iter_mut().zip(within).for_each(|(x, w)| *x -= w);
                 }
             }
             let parameters = self.setting.at(&u[size + 1..]);
-            let batch =
-                Batch { lanes, states: &room.states, parameters: Parameters::Shared(&parameters), times: &times };
-            self.setting.field.linearise(batch, &[], &mut room.f, &mut room.fx, &mut []);
-            let lengths: Vec<f64> = mesh.windows(2).map(|pair| (pair[1] - pair[0]) * u[size]).collect();
-            for (k, from) in room.fx.chunks_exact(count).enumerate() {
-                let (entry, g) = (k / (m + 1), k % (m + 1));
-                let to = &mut room.jacobians[((entry * 2 + course) * (m + 1) + g) * padded..][..padded];
-                to.iter_mut().zip(&lengths).zip(from).for_each(|((x, h), from)| *x = h * from);
-                repeat_last(to, count);
-            }
+            let batch = Batch { lanes, states, parameters: Parameters::Shared(&parameters), times: &times };
+            self.setting.field.linearise(batch, &[], f, fx, &mut []);
         }
-        room.nodes[..square * padded].fill(0.0);
-        (0..n).for_each(|c| room.nodes[c * (n + 1) * padded..][..padded].fill(1.0));
-        self.system.inner(piece.clone(), padded, &mut room.nodes[square * padded..]);
-        room.nodes[square * padded..].chunks_exact_mut(padded).for_each(|line| repeat_last(line, count));
-        for (k, line) in room.transitions.chunks_exact_mut(padded).enumerate() {
-            let own = transitions[k % 2][piece.start * square + k / 2..].iter().step_by(square);
-            line.iter_mut().zip(own).take(count).for_each(|(x, g)| *x = *g);
-            repeat_last(line, count);
-        }
-        defect::correct(&self.sampling, &room.nodes, &room.jacobians, &mut room.transitions, n);
-        for (k, line) in room.transitions.chunks_exact(padded).enumerate() {
-            let own = transitions[k % 2][piece.start * square + k / 2..].iter_mut().step_by(square);
-            own.zip(line).take(count).for_each(|(g, x)| *g = *x);
-        }
+        self.system.inner(piece.clone(), count, nodes);
+        let lengths = profiles
+            .each_ref()
+            .map(|profile| -> Vec<f64> { mesh.windows(2).map(|pair| (pair[1] - pair[0]) * profile.u[size]).collect() });
+        let [own, other] = transitions;
+        let mut courses = [(own, 0), (other, 1)].map(|(transitions, k)| Course {
+            jacobians: &jacobians[k],
+            lengths: &lengths[k],
+            transitions: &mut transitions[piece.start * square..piece.end * square],
+        });
+        defect::correct(&self.sampling, nodes, &mut courses, n);
     }
 
     fn measured_errors(&self, u: &[f64]) -> Measured {

@@ -39,9 +39,9 @@ use super::mesh::Passage;
 use super::{Setting, averages, extremes, mesh};
 use crate::contract::{Batch, Examination, Parameters, Singular, ZeroProblem};
 use crate::diagram::{Cycle, Mesh, Point, Solution, Trust};
-use crate::linalg::lane::Eight;
+use crate::linalg::lane::{Eight, Lane};
 use crate::linalg::system::System;
-use crate::linalg::{larger, max_abs};
+use crate::linalg::{larger, max_abs, same};
 use crate::stability::floquet::{self, Floquet};
 use errors::{Measured, Room};
 use num_complex::Complex64;
@@ -171,11 +171,6 @@ impl<'a> CycleProblem<'a> {
         self.length * self.width * self.scheme.degree
     }
 
-    /// The intervals of a lane.
-    fn piece(&self, lane: usize) -> std::ops::Range<usize> {
-        (lane * self.length).min(self.intervals())..((lane + 1) * self.length).min(self.intervals())
-    }
-
     fn profile_size(&self) -> usize {
         self.intervals() * (self.scheme.degree + 1) * self.n
     }
@@ -225,11 +220,7 @@ impl<'a> CycleProblem<'a> {
     fn sizes(&self, u: &[f64]) -> Vec<f64> {
         // All components of all nodes of an interval at once, so that the loop is one over lanes.
         let mut largest = vec![0.0f64; (self.scheme.degree + 1) * self.n];
-        for interval in u[..self.profile_size()].chunks_exact(largest.len()) {
-            for (most, v) in largest.iter_mut().zip(interval) {
-                *most = larger(*most, v.abs());
-            }
-        }
+        Eight::dispatch(Largest { profile: &u[..self.profile_size()], largest: &mut largest });
         let mut sizes = largest.split_off(largest.len() - self.n);
         for node in largest.chunks_exact(self.n) {
             sizes.iter_mut().zip(node).for_each(|(size, v)| *size = larger(*size, *v));
@@ -242,13 +233,57 @@ impl<'a> CycleProblem<'a> {
     }
 }
 
+/// The largest absolute value of every entry of an interval.
+struct Largest<'a, 'b> {
+    profile: &'a [f64],
+    largest: &'b mut [f64],
+}
+
+impl pulp::NullaryFnOnce for Largest<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        for interval in self.profile.chunks_exact(self.largest.len()) {
+            for (most, v) in self.largest.iter_mut().zip(interval) {
+                *most = larger(*most, v.abs());
+            }
+        }
+    }
+}
+
+/// Σ_j h_j a_j b_j for every entry of an interval but the first few.
+struct Products<'a, 'b> {
+    a: &'a [f64],
+    b: &'a [f64],
+    mesh: &'a [f64],
+    skipped: usize,
+    sums: &'b mut [f64],
+}
+
+impl pulp::NullaryFnOnce for Products<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Products { a, b, mesh, skipped, sums } = self;
+        let block = skipped + sums.len();
+        for ((x, y), pair) in a.chunks_exact(block).zip(b.chunks_exact(block)).zip(mesh.windows(2)) {
+            let h = pair[1] - pair[0];
+            for ((sum, x), y) in sums.iter_mut().zip(&x[skipped..]).zip(&y[skipped..]) {
+                *sum += h * (x * y);
+            }
+        }
+    }
+}
+
 impl ZeroProblem for CycleProblem<'_> {
     fn unknowns(&self) -> usize {
         self.profile_size() + 1 + self.setting.freedom()
     }
 
     fn anchor(&mut self, u: &[f64]) {
-        if self.anchored == u {
+        if same(&self.anchored, u) {
             return;
         }
         self.scale = self.relative_scale(u);
@@ -292,11 +327,7 @@ impl ZeroProblem for CycleProblem<'_> {
         let (n, block, size) = (self.n, (self.scheme.degree + 1) * self.n, self.profile_size());
         // For every Gauss point and component the sum over the intervals first.
         let mut sums = vec![0.0; block - n];
-        let intervals = a[..size].chunks_exact(block).zip(b[..size].chunks_exact(block));
-        for ((x, y), pair) in intervals.zip(self.mesh.windows(2)) {
-            let h = pair[1] - pair[0];
-            sums.iter_mut().zip(x[n..].iter().zip(&y[n..])).for_each(|(sum, (x, y))| *sum += h * (x * y));
-        }
+        Eight::dispatch(Products { a: &a[..size], b: &b[..size], mesh: &self.mesh, skipped: n, sums: &mut sums });
         let mut total = 0.0;
         for (weight, sums) in self.scheme.weights.iter().zip(sums.chunks_exact(n)) {
             total += weight * sums.iter().zip(&self.scale).map(|(sum, scale)| sum / (scale * scale)).sum::<f64>();

@@ -35,8 +35,10 @@ impl CycleProblem<'_> {
             return Vec::new();
         }
         let mirrored = |profile: &[f64]| -> Cycle {
-            let sign = |k: usize| if reflection.get(k % n).copied().unwrap_or(false) { -1.0 } else { 1.0 };
-            let profile = profile.iter().enumerate().map(|(k, v)| sign(k) * v).collect();
+            let mut profile = profile.to_vec();
+            for c in (0..n).filter(|c| reflection.get(*c).copied().unwrap_or(false)) {
+                profile[c..].iter_mut().step_by(n).for_each(|v| *v = -*v);
+            }
             Cycle { profile, ..cycle.clone() }
         };
         let (states, tangent) = (mirrored(&cycle.profile), mirrored(&point.tangent[..whole]));

@@ -1,9 +1,9 @@
 //! The residual of a cycle: equations (1) to (3) of [`super`], eight intervals at a time.
 
 use super::CycleProblem;
-use crate::linalg::lane::Lane;
-use crate::linalg::panel;
+use crate::linalg::lane::{Eight, Lane};
 use crate::problem::gauss::Scheme;
+use std::marker::PhantomData;
 
 impl CycleProblem<'_> {
     /// What (3) takes from the point where the problem was anchored last, unless that is there already.
@@ -11,41 +11,82 @@ impl CycleProblem<'_> {
         if !std::mem::take(&mut self.unphased) {
             return;
         }
-        let (n, m) = (self.n, self.scheme.degree);
-        self.phase.fill(0.0);
         if self.is_forced() {
+            self.phase.fill(0.0);
             return;
         }
-        let (mut length, mut offset) = (0.0, 0.0);
-        let count = self.intervals();
-        let nodes = panel::by_component(&self.anchored[..self.profile_size()], m + 1, n);
-        let mut rises = vec![0.0; m * count];
-        for c in 0..n {
-            let own = &nodes[c * (m + 1) * count..(c + 1) * (m + 1) * count];
-            panel::multiply(&self.scheme.derivative, own, count, &mut rises);
-            let scale = 1.0 / (self.scale[c] * self.scale[c]);
-            for i in 0..m {
-                let weight = self.scheme.weights[i] * scale;
-                for lane in 0..self.width {
-                    for (t, j) in self.piece(lane).enumerate() {
-                        let (rise, h) = (rises[i * count + j], self.h(j));
-                        // With X̃' = rise / h.
-                        length += weight * rise * rise / h;
-                        offset += weight * own[(i + 1) * count + j] * rise;
-                        self.phase[((t * m + i) * n + c) * self.width + lane] = scale * rise / h;
-                    }
-                }
-            }
-        }
-        let norm = length.sqrt().max(f64::MIN_POSITIVE);
+        let anchored = std::mem::take(&mut self.anchored);
+        self.gather(&anchored);
+        self.anchored = anchored;
+        let [square, offset] = match self.width {
+            1 => self.laid_phase::<f64>(),
+            _ => self.laid_phase::<Eight>(),
+        };
+        let norm = square.sqrt().max(f64::MIN_POSITIVE);
         self.phase.iter_mut().for_each(|p| *p /= norm);
         self.phase_offset = offset / norm;
+    }
+
+    /// X̃' of the states gathered last, as (3) takes it; returns its square norm and its product with those states.
+    fn laid_phase<T: Lane>(&mut self) -> [f64; 2] {
+        let (n, length, lanes) = (self.n, self.length, self.lanes());
+        let CycleProblem { scheme, lengths, scale, ends, states, phase, .. } = self;
+        T::dispatch(Phase::<T> { n, length, lanes, scheme, lengths, scale, ends, states, phase, lane: PhantomData })
     }
 
     /// Residuals of (1) and (2) at `u` into `r`, with the states gathered and f evaluated there; returns the sum of (3) without
     /// what belongs to the reference alone.
     pub(super) fn defects<T: Lane>(&self, u: &[f64], r: &mut [f64]) -> f64 {
-        T::dispatch(Defects::<T> { problem: self, u, r, lane: std::marker::PhantomData })
+        T::dispatch(Defects::<T> { problem: self, u, r, lane: PhantomData })
+    }
+}
+
+struct Phase<'a, 'b, T> {
+    n: usize,
+    length: usize,
+    lanes: usize,
+    scheme: &'a Scheme,
+    lengths: &'a [f64],
+    scale: &'a [f64],
+    ends: &'a [f64],
+    states: &'a [f64],
+    phase: &'b mut [f64],
+    lane: PhantomData<T>,
+}
+
+impl<T: Lane> pulp::NullaryFnOnce for Phase<'_, '_, T> {
+    type Output = [f64; 2];
+
+    #[inline(always)]
+    fn call(self) -> [f64; 2] {
+        let Phase { n, length, lanes, scheme, lengths, scale, ends, states, phase, .. } = self;
+        let (m, w) = (scheme.degree, T::COUNT);
+        let (mut square, mut offset) = (T::default(), T::default());
+        for t in 0..length {
+            // Beyond the last interval the length is zero.
+            let h = T::load(&lengths[t * w..]);
+            let there = h.map(|h| if h > 0.0 { 1.0 } else { 0.0 });
+            let inverse = h.map(|h| if h > 0.0 { 1.0 / h } else { 0.0 });
+            for c in 0..n {
+                let share = T::splat(1.0 / (scale[c] * scale[c]));
+                let x = T::load(&ends[(c * length + t) * w..]);
+                let own = &states[c * lanes + t * m * w..][..m * w];
+                for (i, row) in scheme.derivative.chunks_exact(m + 1).enumerate() {
+                    let mut rise = T::splat(row[0]) * x;
+                    for k in 0..m {
+                        rise = rise + T::splat(row[k + 1]) * T::load(&own[k * w..]);
+                    }
+                    // With X̃' = rise / h.
+                    let rise = there * rise;
+                    let slope = share * rise * inverse;
+                    let weight = T::splat(scheme.weights[i]);
+                    square = square + weight * rise * slope;
+                    offset = offset + weight * share * rise * T::load(&own[i * w..]);
+                    phase[((t * m + i) * n + c) * w..][..w].copy_from_slice(slope.lanes());
+                }
+            }
+        }
+        [square, offset].map(|sum| sum.lanes().iter().sum())
     }
 }
 
@@ -53,7 +94,7 @@ struct Defects<'a, 'b, T> {
     problem: &'a CycleProblem<'a>,
     u: &'a [f64],
     r: &'b mut [f64],
-    lane: std::marker::PhantomData<T>,
+    lane: PhantomData<T>,
 }
 
 impl<T: Lane> pulp::NullaryFnOnce for Defects<'_, '_, T> {
