@@ -189,7 +189,7 @@ impl Follow<'_> {
         let mut seen = None;
         let unknown = history.is_none() || left.mesh.is_empty() || may_double_unseen(left, right, stretch.length);
         if depth == 0 && jumps.is_empty() && unknown {
-            seen = self.seen_between(&stretch, &at_left, history.is_none(), cost);
+            seen = self.seen_between(&stretch, [&at_left, &at_right], history.is_none(), cost);
         }
         let suspicious = suspicious || seen.is_some();
         if depth < DEEPEST
@@ -282,17 +282,39 @@ impl Follow<'_> {
     }
 
     /// A place in the stretch at which some monitor has not the sign that it has at the left end. `first` says that nothing is
-    /// known of the way before: there it is looked at more closely, towards both ends, which for equilibria costs nothing.
-    fn seen_between(&mut self, stretch: &Stretch, at_left: &[f64], first: bool, cost: &mut Cost) -> Option<f64> {
+    /// known of the way before: there equilibria, where that costs nothing, are looked at more closely, towards both ends; with cycles the
+    /// middle says how monitors change, and that is enough where none may have touched zero.
+    fn seen_between(
+        &mut self,
+        stretch: &Stretch,
+        [at_left, at_right]: [&[f64]; 2],
+        first: bool,
+        cost: &mut Cost,
+    ) -> Option<f64> {
         const PLACES: [f64; 15] =
             [0.5, 0.25, 0.75, 0.125, 0.375, 0.625, 0.875, 0.0625, 0.1875, 0.03, 0.015, 0.007, 0.003, 0.001, 0.97];
-        let count = if first && stretch.left.mesh.is_empty() { PLACES.len() } else { 3 };
+        let cycles = !stretch.left.mesh.is_empty();
+        let count = if first && !cycles { PLACES.len() } else { 3 };
         let differs = |(a, b): (&f64, &f64)| (*a > 0.0) != (*b > 0.0);
         let sight = self.monitors.iter().map(|monitor| monitor.reads()).max().unwrap_or(Sight::Tangent);
-        PLACES[..count].iter().map(|share| share * stretch.length).find(|s| {
-            let middle = stretch.seen_at(sight, self.problem, self.settings, *s, cost);
-            middle.is_ok_and(|found| self.monitored(&found).iter().zip(at_left).any(differs))
-        })
+        for (k, share) in PLACES[..count].iter().enumerate() {
+            let s = share * stretch.length;
+            let Ok(found) = stretch.seen_at(sight, self.problem, self.settings, s, cost) else { continue };
+            let here = self.monitored(&found);
+            if here.iter().zip(at_left).any(differs) {
+                return Some(s);
+            }
+            if k == 0 && first && cycles {
+                let half = s.abs();
+                let from = |values: &[f64]| History { distance: half, values: values.to_vec(), spectrum: Vec::new() };
+                let touches = self.may_touch(&from(at_left), &here, at_right, half)
+                    || self.may_touch(&from(at_right), &here, at_left, half);
+                if !touches {
+                    return None;
+                }
+            }
+        }
+        None
     }
 
     /// A full station at distance s of the stretch.

@@ -188,6 +188,11 @@ fn outermost(line: &[f64]) -> [(f64, Vec<usize>); 2] {
     let mut look = |l: usize| {
         let triple =
             [line[if l > 0 { l - 1 } else { lanes - 1 }], line[l], line[if l + 1 < lanes { l + 1 } else { 0 }]];
+        // Between its neighbours it is no peak, and one of them is more extreme to either side.
+        let [before, here, after] = triple;
+        if (before < here && here < after) || (before > here && here > after) {
+            return;
+        }
         let [low, high] = &mut found;
         low.look(l, triple.map(|v| -v));
         high.look(l, triple);

@@ -27,14 +27,15 @@ pub struct Floquet {
     pub log_product: f64,
 }
 
-/// `transitions`: G_j row-major n×n one after the other, in scaled components; `flow`: `[N][n]` x' at the left ends.
-pub fn multipliers(transitions: &[f64], flow: &[f64], n: usize) -> Floquet {
+/// Multipliers of an autonomous cycle. `transitions`: `[N]` G_j row-major n×n, in the components of the flow that the frames were made
+/// from.
+pub fn multipliers(transitions: &[f64], frames: &Frames, n: usize) -> Floquet {
     // Small dimensions as constants.
     let (factors, Trivial { sign, log: log_trivial }) = match n {
-        2 => split(transitions, flow, 2),
-        3 => split(transitions, flow, 3),
-        4 => split(transitions, flow, 4),
-        n => split(transitions, flow, n),
+        2 => split(transitions, frames, 2),
+        3 => split(transitions, frames, 3),
+        4 => split(transitions, frames, 4),
+        n => split(transitions, frames, n),
     };
     let grouped = periodic_schur::group(&factors, n - 1);
     let log_others = periodic_schur::log_determinant(&grouped, n - 1);
@@ -56,21 +57,18 @@ struct Trivial {
 
 /// (1): the S_j, row-major one after the other, and the product of the g_j.
 #[inline(always)]
-fn split(transitions: &[f64], flow: &[f64], n: usize) -> (Vec<f64>, Trivial) {
+fn split(transitions: &[f64], frames: &Frames, n: usize) -> (Vec<f64>, Trivial) {
     // Where a product is taken as its logarithm, long before it leaves the range of f64.
     const FAR: f64 = 1e100;
-    let count = flow.len() / n.max(1);
+    let count = frames.signs.len();
     let (mut product, mut log) = (1.0, 0.0);
     let mut factors = Vec::with_capacity(count * (n - 1) * (n - 1));
     let (mut g, mut line) = (vec![0.0; n * n], vec![0.0; n]);
-    let (mut frame, mut next) = (Frame::new(n), Frame::new(n));
-    frame.turn(&flow[..n], n);
-    for j in 0..count {
-        let at = (j + 1) % count * n;
-        next.turn(&flow[at..at + n], n);
-        g.copy_from_slice(&transitions[j * n * n..(j + 1) * n * n]);
-        frame.columns(&mut g, n);
-        next.rows(&mut g, n, &mut line);
+    for (j, own) in transitions.chunks_exact(n * n).enumerate() {
+        let next = if j + 1 < count { j + 1 } else { 0 };
+        g.copy_from_slice(own);
+        frames.columns(j, &mut g, n);
+        frames.rows(next, &mut g, n, &mut line);
         product *= g[0];
         if !(1.0 / FAR..FAR).contains(&f64::abs(product)) {
             log += product.abs().ln();
@@ -79,7 +77,6 @@ fn split(transitions: &[f64], flow: &[f64], n: usize) -> (Vec<f64>, Trivial) {
         for i in 1..n {
             factors.extend_from_slice(&g[i * n + 1..(i + 1) * n]);
         }
-        std::mem::swap(&mut frame, &mut next);
     }
     (factors, Trivial { sign: product.signum(), log: log + product.abs().ln() })
 }
@@ -97,49 +94,62 @@ pub fn forced(transitions: &[f64], n: usize) -> Floquet {
     Floquet { multipliers, unstable, log_product }
 }
 
-/// The reflection 1 - v vᵀ, times a sign on its first column, whose first column is a given direction.
-struct Frame {
+/// The Q_j of (1): reflections 1 - v vᵀ, times a sign on their first column.
+#[derive(Clone, Debug)]
+pub struct Frames {
+    /// `[N][n]`.
     v: Vec<f64>,
-    sign: f64,
+    /// `[N]`.
+    signs: Vec<f64>,
 }
 
-impl Frame {
-    fn new(n: usize) -> Frame {
-        Frame { v: vec![0.0; n], sign: 1.0 }
-    }
-
-    /// Puts the first column along `direction`.
-    #[inline(always)]
-    fn turn(&mut self, direction: &[f64], n: usize) {
-        let (v, direction) = (&mut self.v[..n], &direction[..n]);
-        let norm = product(direction, direction, n).sqrt();
-        for i in 0..n {
-            v[i] = if norm > 0.0 { direction[i] / norm } else { 0.0 };
+impl Frames {
+    /// Along `flow`, `[N][n]` x' at the left ends.
+    pub fn along(flow: &[f64], n: usize) -> Frames {
+        let mut frames = Frames { v: flow.to_vec(), signs: vec![1.0; flow.len() / n.max(1)] };
+        // Small dimensions as constants.
+        match n {
+            2 => frames.turn(2),
+            3 => frames.turn(3),
+            4 => frames.turn(4),
+            n => frames.turn(n),
         }
-        // The reflection takes e_1 to ∓ the direction; the sign that avoids cancellation, undone by `sign`.
-        self.sign = if v[0] > 0.0 { -1.0 } else { 1.0 };
-        v[0] -= self.sign;
-        let size = product(v, v, n);
-        let scale = if size > 0.0 { (2.0 / size).sqrt() } else { 0.0 };
-        (0..n).for_each(|i| v[i] *= scale);
+        frames
     }
 
-    /// g Q.
+    /// Replaces directions by the reflections whose first columns lie along them.
     #[inline(always)]
-    fn columns(&self, g: &mut [f64], n: usize) {
-        let (v, g) = (&self.v[..n], &mut g[..n * n]);
+    fn turn(&mut self, n: usize) {
+        for (v, sign) in self.v.chunks_exact_mut(n).zip(&mut self.signs) {
+            let norm = product(v, v, n).sqrt();
+            for i in 0..n {
+                v[i] = if norm > 0.0 { v[i] / norm } else { 0.0 };
+            }
+            // The reflection takes e_1 to ∓ the direction; the sign that avoids cancellation, undone by `signs`.
+            *sign = if v[0] > 0.0 { -1.0 } else { 1.0 };
+            v[0] -= *sign;
+            let size = product(v, v, n);
+            let scale = if size > 0.0 { (2.0 / size).sqrt() } else { 0.0 };
+            (0..n).for_each(|i| v[i] *= scale);
+        }
+    }
+
+    /// g Q_j.
+    #[inline(always)]
+    fn columns(&self, j: usize, g: &mut [f64], n: usize) {
+        let (v, g) = (&self.v[j * n..j * n + n], &mut g[..n * n]);
         for i in 0..n {
             let row = &mut g[i * n..(i + 1) * n];
             let s = product(row, v, n);
             (0..n).for_each(|k| row[k] -= s * v[k]);
-            row[0] *= self.sign;
+            row[0] *= self.signs[j];
         }
     }
 
-    /// Qᵀ g; `s` is room for a row.
+    /// Q_jᵀ g; `s` is room for a row.
     #[inline(always)]
-    fn rows(&self, g: &mut [f64], n: usize, s: &mut [f64]) {
-        let (v, g, s) = (&self.v[..n], &mut g[..n * n], &mut s[..n]);
+    fn rows(&self, j: usize, g: &mut [f64], n: usize, s: &mut [f64]) {
+        let (v, g, s) = (&self.v[j * n..j * n + n], &mut g[..n * n], &mut s[..n]);
         s.fill(0.0);
         for i in 0..n {
             (0..n).for_each(|k| s[k] += v[i] * g[i * n + k]);
@@ -147,7 +157,7 @@ impl Frame {
         for i in 0..n {
             (0..n).for_each(|k| g[i * n + k] -= v[i] * s[k]);
         }
-        (0..n).for_each(|k| g[k] *= self.sign);
+        (0..n).for_each(|k| g[k] *= self.signs[j]);
     }
 }
 

@@ -25,7 +25,7 @@ use crate::diagram::{Cycle, Point, Solution};
 use crate::linalg::{axpy, dot, lu};
 use crate::problem::Setting;
 use crate::simulation::{Ensemble, Outcome, Step, Tolerance};
-use crate::stability::floquet;
+use crate::stability::floquet::{self, Frames};
 use num_complex::Complex64;
 
 /// Segments of a cycle.
@@ -147,7 +147,7 @@ impl Flow {
     pub(super) fn multipliers(&self, orbit: &Orbit) -> Vec<Complex64> {
         let n = orbit.dim();
         let flow: Vec<f64> = self.begins.iter().enumerate().map(|(at, f)| f / orbit.scales[at % n]).collect();
-        floquet::multipliers(&self.transitions, &flow, n).multipliers
+        floquet::multipliers(&self.transitions, &Frames::along(&flow, n), n).multipliers
     }
 }
 

@@ -121,15 +121,16 @@ impl CycleProblem<'_> {
         }
         let [own, other] = transitions;
         let square = self.n * self.n;
+        let [frames, others] = [u, &better].map(|u| self.frames(u));
         let halfway = |from: &[f64], to: &[f64]| -> Vec<Complex64> {
             let mut mixed = from.to_vec();
             let seconds = mixed.chunks_exact_mut(square).zip(to.chunks_exact(square)).step_by(2);
             seconds.for_each(|(x, y)| x.copy_from_slice(y));
-            self.floquet_of(u, mixed).multipliers
+            self.floquet_of(frames.as_ref(), mixed).multipliers
         };
         let (first, third) = (halfway(&plain, &own), halfway(&own, &other));
-        let second = self.floquet_of(u, own).multipliers;
-        let found = [first, second, third, self.floquet_of(&better, other).multipliers];
+        let second = self.floquet_of(frames.as_ref(), own).multipliers;
+        let found = [first, second, third, self.floquet_of(others.as_ref(), other).multipliers];
         found.iter().flatten().all(|z| z.re.is_finite() && z.im.is_finite()).then_some(found)
     }
 

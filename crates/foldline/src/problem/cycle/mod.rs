@@ -42,7 +42,7 @@ use crate::diagram::{Cycle, Mesh, Point, Solution, Trust};
 use crate::linalg::lane::{Eight, Lane};
 use crate::linalg::system::System;
 use crate::linalg::{larger, max_abs, same};
-use crate::stability::floquet::{self, Floquet};
+use crate::stability::floquet::{self, Floquet, Frames};
 use errors::{Measured, Room};
 use num_complex::Complex64;
 use std::cell::RefCell;
@@ -189,7 +189,7 @@ impl<'a> CycleProblem<'a> {
 
     /// Multipliers from the last factorisation, which belongs to `u`.
     fn floquet(&self, u: &[f64]) -> Floquet {
-        self.floquet_of(u, self.transitions())
+        self.floquet_of(self.frames(u).as_ref(), self.transitions())
     }
 
     /// `[N][n × n]`: how the right end of each interval follows from its left end.
@@ -199,16 +199,21 @@ impl<'a> CycleProblem<'a> {
         transitions
     }
 
+    /// What splits the trivial multiplier off, where there is one.
+    fn frames(&self, u: &[f64]) -> Option<Frames> {
+        (!self.is_forced()).then(|| Frames::along(&self.flow_at_nodes(u), self.n))
+    }
+
     /// Multipliers from transitions.
-    fn floquet_of(&self, u: &[f64], mut transitions: Vec<f64>) -> Floquet {
+    fn floquet_of(&self, frames: Option<&Frames>, mut transitions: Vec<f64>) -> Floquet {
         let n = self.n;
         let factors: Vec<f64> = (0..n * n).map(|k| self.scale[k % n] / self.scale[k / n]).collect();
         for own in transitions.chunks_exact_mut(n * n) {
             own.iter_mut().zip(&factors).for_each(|(g, factor)| *g *= factor);
         }
-        match self.is_forced() {
-            true => floquet::forced(&transitions, n),
-            false => floquet::multipliers(&transitions, &self.flow_at_nodes(u), n),
+        match frames {
+            None => floquet::forced(&transitions, n),
+            Some(frames) => floquet::multipliers(&transitions, frames, n),
         }
     }
 
