@@ -78,6 +78,16 @@ fn a_large_unbalance_leaves_two_folds_on_one_step_and_torus_points_next_to_folds
         diagram.branch("contact SL").unwrap().points.iter().filter(|p| (p.parameters[0] - 9.4354).abs() < 1e-4);
     let meshes: Vec<usize> = beside.map(|point| point.solution.mesh().len()).collect();
     assert!(meshes.len() > 10 && meshes.iter().all(|count| *count < 400), "{meshes:?}");
+    // On the way there a third multiplier is 1 at these, where errors of 5e-9 take two that meet apart by 1e-4.
+    let meetings = diagram.branch("contact DL to 1.5/2").unwrap().special.iter();
+    let mut meetings: Vec<f64> =
+        meetings.filter(|s| s.kind == Kind::Resonance11).map(|s| s.point.parameters[0]).collect();
+    meetings.sort_by(f64::total_cmp);
+    let expected = [4.7839763, 5.0908154, 5.5123790, 5.7533501, 5.7806451, 6.0080574];
+    assert!(
+        meetings.len() == expected.len() && meetings.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-6),
+        "{meetings:?}"
+    );
     let [fold, torus] = [Kind::Fold, Kind::Torus];
     is("contact SL", &[(fold, 8.5904468), (fold, 9.6380474), (fold, 9.6448438), (fold, 11.0037953)]);
     is(

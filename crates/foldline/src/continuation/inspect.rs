@@ -179,6 +179,9 @@ impl Follow<'_> {
         // A change of sign that could not be located is not passed over either, not even next to one that could.
         let closer = jumps.is_empty() || depth < CLOSE;
         let explained = accounted && !(lost && closer && self.settings.stability);
+        // Along a curve monitors may jump as well. But where the count changes with one that could not be located, the two ends have
+        // meshes that do not agree about where: closer together they do.
+        let misplaced = !self.settings.stability && lost && jumps.is_empty() && change > 0;
         let touches = || {
             history.is_some_and(|h| {
                 self.may_touch(h, &at_left, &at_right, stretch.length) || may_double(h, left, right, stretch.length)
@@ -193,7 +196,7 @@ impl Follow<'_> {
         }
         let suspicious = suspicious || seen.is_some();
         if depth < DEEPEST
-            && (jumps.len() > 1 || !explained || misfit.is_some() || (suspicious && jumps.is_empty()))
+            && (jumps.len() > 1 || !explained || misplaced || misfit.is_some() || (suspicious && jumps.is_empty()))
             && stretch.length.abs() > if short { CLOSEST } else { self.settings.min_step }
         {
             let cut = match &located[..] {

@@ -25,6 +25,9 @@ use crate::diagram::{Kind, Mesh, Point};
 use crate::linalg::{axpy, lu};
 use num_complex::Complex64;
 
+/// The eigenvalue next to the one that is held meets it where it is closer to it than so many times what that one is off by.
+const MEETING: f64 = 10.0;
+
 /// A surface with a condition held.
 pub struct Held<'a> {
     surface: Box<dyn ZeroProblem + 'a>,
@@ -145,8 +148,16 @@ impl<'a> Held<'a> {
         let mut others = found.spectrum.split_off(first.min(found.spectrum.len()));
         let held = self.condition.held(&u[..self.extra()]);
         for z in &held {
-            let closest = (0..others.len()).min_by(|a, b| (others[*a] - z).norm().total_cmp(&(others[*b] - z).norm()));
-            closest.map(|k| others.remove(k));
+            let closest = |others: &[Complex64]| {
+                (0..others.len()).min_by(|a, b| (others[*a] - z).norm().total_cmp(&(others[*b] - z).norm()))
+            };
+            let off = closest(&others).map_or(Complex64::ZERO, |k| others.remove(k) - z);
+            // Of two that meet the sum is known better than either: where one is as meant, the other is what remains of the sum.
+            if let ([_], Some(next)) = (&held[..], closest(&others))
+                && (others[next] - z).norm() < MEETING * off.norm()
+            {
+                others[next] += off;
+            }
         }
         others.sort_by(|a, b| self.condition.distance(*a).total_cmp(&self.condition.distance(*b)));
         found.unstable = others.iter().filter(|z| if is_cycle { z.norm() > 1.0 } else { z.re > 0.0 }).count();

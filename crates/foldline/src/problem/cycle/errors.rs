@@ -28,8 +28,8 @@ fn spectrum_difference(spectrum: &[Complex64], other: &[Complex64]) -> f64 {
     most
 }
 
-/// Error of an interval that rounding alone may leave, relative.
-const ROUNDING: f64 = 32.0 * f64::EPSILON;
+/// Error of an interval that rounding alone may leave, relative. Those of all intervals add up.
+const ROUNDING: f64 = 0.5 * f64::EPSILON;
 
 /// Intervals whose transitions are made more accurate at a time: what that takes stays in the cache.
 const TOGETHER: usize = 64;
@@ -202,7 +202,8 @@ impl CycleProblem<'_> {
         let largest = sizes.iter().fold(f64::MIN_POSITIVE, |m: f64, s| m.max(*s));
         let gain = if response.is_finite() { response / largest } else { 1.0 };
         let errors = local.iter().zip(&sizes).map(|(l, s)| l + gain * s).collect();
-        Measured { at: u.to_vec(), errors, rounding: ROUNDING * gain, shift, within }
+        let rounding = ROUNDING * self.intervals() as f64 * gain;
+        Measured { at: u.to_vec(), errors, rounding, shift, within }
     }
 
     pub(super) fn flow_at_nodes(&self, u: &[f64]) -> Vec<f64> {
