@@ -196,31 +196,32 @@ fn lanes(p: &Nondimensional, starts: &[f64], steps: usize, h: f64, tolerance: f6
     let groups = starts.chunks_exact(4 * Eight::COUNT);
     let count = groups.len() * Eight::COUNT * steps;
     for start in groups {
-        let x = std::array::from_fn(|i| std::array::from_fn(|lane| start[lane * 4 + i]));
+        let x = std::array::from_fn(|i| Eight::each(|lane| start[lane * 4 + i]));
         std::hint::black_box(Eight::dispatch(Trial { constants: &constants, x, steps, h, tolerance }));
     }
     count
 }
 
-/// One number for each of eight trajectories.
-type Lanes = [f64; Eight::COUNT];
+/// One number for each of eight trajectories, four times.
+type Lanes = [Eight; 4];
 
 struct Trial<'c> {
     constants: &'c Constants,
-    x: [Lanes; 4],
+    x: Lanes,
     steps: usize,
     h: f64,
     tolerance: f64,
 }
 
 impl pulp::NullaryFnOnce for Trial<'_> {
-    type Output = f64;
+    type Output = Eight;
 
     #[inline(always)]
-    fn call(self) -> f64 {
+    fn call(self) -> Eight {
         let Trial { constants: p, mut x, steps, h, tolerance } = self;
+        let (h, tolerance) = (Eight::splat(h), Eight::splat(tolerance));
         let mut k1 = slopes(p, &x);
-        let mut largest: f64 = 0.0;
+        let mut largest = Eight::default();
         for _ in 0..steps {
             let k2 = slopes(p, &ahead(&x, h, [(1.0 / 5.0, &k1)]));
             let k3 = slopes(p, &ahead(&x, h, [(3.0 / 40.0, &k1), (9.0 / 40.0, &k2)]));
@@ -235,54 +236,60 @@ impl pulp::NullaryFnOnce for Trial<'_> {
             let k7 = slopes(p, &next);
             let row = [71.0 / 57600.0, -71.0 / 16695.0, 71.0 / 1920.0, -17253.0 / 339200.0, 22.0 / 525.0, -1.0 / 40.0];
             let terms = [(row[0], &k1), (row[1], &k3), (row[2], &k4), (row[3], &k5), (row[4], &k6), (row[5], &k7)];
-            let error = ahead(&[[0.0; Eight::COUNT]; 4], h, terms);
-            for lane in 0..Eight::COUNT {
-                let square = |i: usize| {
-                    let scale = tolerance + tolerance * x[i][lane].abs().max(next[i][lane].abs());
-                    (error[i][lane] / scale).powi(2)
-                };
-                largest = largest.max(0.25 * (square(0) + square(1) + square(2) + square(3)));
+            let error = ahead(&[Eight::default(); 4], h, terms);
+            let mut squares = Eight::default();
+            for i in 0..4 {
+                let scale = tolerance + tolerance * x[i].zip(next[i], |a, b| a.abs().max(b.abs()));
+                let share = error[i].zip(scale, |error, scale| error / scale);
+                squares = squares + share * share;
             }
+            largest = largest.zip(squares, f64::max);
             (x, k1) = (next, k7);
         }
         largest
     }
 }
 
+/// x + h Σ a k. In operations of whole lanes and plain loops here and below: what would be a function of its own, as the `map` of an array,
+/// is compiled without the vector instructions.
 #[inline(always)]
-fn ahead<const N: usize>(x: &[Lanes; 4], h: f64, terms: [(f64, &[Lanes; 4]); N]) -> [Lanes; 4] {
-    let mut out = [[0.0; Eight::COUNT]; 4];
+fn ahead<const N: usize>(x: &Lanes, h: Eight, terms: [(f64, &Lanes); N]) -> Lanes {
+    let mut out = *x;
     for i in 0..4 {
-        for lane in 0..Eight::COUNT {
-            let sum = terms.iter().fold(0.0, |sum, (a, k)| sum + a * k[i][lane]);
-            out[i][lane] = x[i][lane] + h * sum;
+        let mut sum = Eight::splat(terms[0].0) * terms[0].1[i];
+        for (a, k) in &terms[1..] {
+            sum = sum + Eight::splat(*a) * k[i];
         }
+        out[i] = x[i] + h * sum;
     }
     out
 }
 
 #[inline(always)]
-fn slopes(p: &Constants, x: &[Lanes; 4]) -> [Lanes; 4] {
-    let mut radius = [0.0; Eight::COUNT];
-    (0..Eight::COUNT).for_each(|lane| radius[lane] = (x[0][lane] * x[0][lane] + x[1][lane] * x[1][lane]).sqrt());
+fn slopes(p: &Constants, [u, v, du, dv]: &Lanes) -> Lanes {
+    let (u, v, du, dv) = (*u, *v, *du, *dv);
+    let [forcing, gyroscopic, damping, circulatory] =
+        [p.forcing, p.gyroscopic, p.damping, p.circulatory].map(Eight::splat);
+    let one = Eight::splat(1.0);
+    let square = u * u + v * v;
+    let r = square.map(f64::sqrt);
+    let gap = Eight::splat(p.sharpness) * (r - one);
     let mut edge = [0.0; Eight::COUNT];
     // As the tape does it: nothing to compute where all of them are ±1.
-    if radius.iter().fold(true, |all, r| all & ((p.sharpness * (r - 1.0)).abs() >= 19.5)) {
-        (0..Eight::COUNT).for_each(|lane| edge[lane] = f64::copysign(1.0, radius[lane] - 1.0));
+    if gap.all(one, |gap, _| gap.abs() >= 19.5) {
+        for lane in 0..Eight::COUNT {
+            edge[lane] = f64::copysign(1.0, gap.0[lane]);
+        }
     } else {
-        (0..Eight::COUNT).for_each(|lane| edge[lane] = tanh(p.sharpness * (radius[lane] - 1.0)));
+        for lane in 0..Eight::COUNT {
+            edge[lane] = tanh(gap.0[lane]);
+        }
     }
-    let mut out = [[0.0; Eight::COUNT]; 4];
-    for lane in 0..Eight::COUNT {
-        let ([u, v, du, dv], r) = (x.map(|x| x[lane]), radius[lane]);
-        let contact = p.ring * (edge[lane] + 1.0) * (1.0 - 1.0 / r);
-        let stiffness = p.linear + p.cubic * (r * r) + contact;
-        out[0][lane] = du;
-        out[1][lane] = dv;
-        out[2][lane] = p.forcing + p.gyroscopic * dv - p.damping * du - stiffness * u + p.circulatory * v;
-        out[3][lane] = -p.gyroscopic * du - p.damping * dv - stiffness * v - p.circulatory * u;
-    }
-    out
+    let contact = Eight::splat(p.ring) * (Eight(edge) + one) * (one - r.map(|r| 1.0 / r));
+    let stiffness = Eight::splat(p.linear) + Eight::splat(p.cubic) * square + contact;
+    let x = forcing + gyroscopic * dv - damping * du - stiffness * u + circulatory * v;
+    let y = Eight::default() - gyroscopic * du - damping * dv - stiffness * v - circulatory * u;
+    [du, dv, x, y]
 }
 
 /// tanh without branches, from exp(2 |x|) - 1 by its series after taking out a power of two.

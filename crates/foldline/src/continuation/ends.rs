@@ -1,9 +1,10 @@
 //! Where a side ends: at a bound, where it closes, where it meets simpler solutions.
 
 use super::corrector::{Failure, Station, doubted};
-use super::follow::{Follow, Step};
+use super::follow::Follow;
 use super::inspect::Found;
 use super::locate::{Stretch, passing};
+use super::step::Step;
 use crate::diagram::{Cost, Ending, Kind, Mesh, Point, SpecialPoint};
 
 /// Share of the deviation from simpler solutions below which a step is not accepted: it may have landed on them, and it
@@ -24,6 +25,8 @@ const DIVISIBLE: f64 = 1e-3;
 pub struct Homecoming {
     /// Whether it has left.
     away: bool,
+    /// For every reflection how far it has been from the start as that shows it, and whether it has come nearer to that since.
+    reached: Vec<(f64, bool)>,
 }
 
 /// The start in one phase and reflection.
@@ -180,16 +183,32 @@ impl Follow<'_> {
             }
             let share = (monitor.value(&left.point, &near.point) / values[0]).powi(2);
             let parameter = (near.parameter() - share * left.parameter()) / (1.0 - share);
-            return Ok(Some(Step { right: near, end: Some(Ending::Joined { at: monitor.kind(), parameter }) }));
+            return Ok(Some(Step {
+                right: near,
+                end: Some(Ending::Joined { at: monitor.kind(), parameter }),
+                between: None,
+            }));
         }
         Ok(None)
     }
 
-    /// Takes note of it when the branch has gone so far from its start, to `here`, that it can come back.
+    /// Takes note of how far the branch has gone from its start, to `here`: whether so far that it can come back. To be told of every
+    /// point in the order of travel.
     pub fn leaves_home(&mut self, here: &Point) {
-        let Some(home) = self.home.filter(|_| !self.homecoming.away) else { return };
-        let off = distance(&self.features(here, home, &[]), &self.features(home, home, &[]));
-        self.homecoming.away = off > AWAY * self.settings.tolerance;
+        let Some(home) = self.home else { return };
+        let own = self.features(home, home, &[]);
+        if self.homecoming.reached.is_empty() {
+            let seen = |reflection: &Vec<bool>| (distance(&self.features(home, home, reflection), &own), false);
+            self.homecoming.reached = self.settings.reflections.iter().map(seen).collect();
+        }
+        let mut reached = std::mem::take(&mut self.homecoming.reached);
+        for ((farthest, nearer), reflection) in reached.iter_mut().zip(&self.settings.reflections) {
+            let off = distance(&self.features(here, home, reflection), &own);
+            *nearer |= off < *farthest;
+            *farthest = farthest.max(off);
+        }
+        self.homecoming.away |= reached.first().is_some_and(|(off, _)| *off > AWAY * self.settings.tolerance);
+        self.homecoming.reached = reached;
     }
 
     /// The start again, if this step passes it.
@@ -215,7 +234,7 @@ impl Follow<'_> {
         }
         match (self.crosses(left, right, home, cost), back) {
             (Some(found), _) => Ok(Some(found)),
-            (None, Err(why)) if self.angle(left, right).1 > DIVISIBLE => Err(why),
+            (None, Err(why)) if self.between(left, right).along > DIVISIBLE => Err(why),
             (None, back) => Ok(back.unwrap_or(None)),
         }
     }
@@ -251,14 +270,20 @@ impl Follow<'_> {
     fn crosses(&mut self, left: &Station, right: &Station, home: &Point, cost: &mut Cost) -> Option<Station> {
         let tolerance = self.settings.tolerance;
         let own = self.features(home, home, &[]);
-        for reflection in self.settings.reflections.clone() {
+        for (k, reflection) in self.settings.reflections.clone().into_iter().enumerate() {
             let [from, to] = [left, right].map(|station| self.features(&station.point, home, &reflection));
+            // A branch that has only gone away from it so far, and does so in this step, turns back in a later one.
+            let receding =
+                self.homecoming.reached.get(k).is_some_and(|(off, nearer)| !nearer && distance(&to, &own) > *off);
+            if receding {
+                continue;
+            }
             // Most steps are elsewhere, which costs nothing to see.
             let near = 1.5 * distance(&from, &to) + HOME * tolerance;
             if distance(&from, &own).min(distance(&to, &own)) > near {
                 continue;
             }
-            let length = self.angle(left, right).1;
+            let length = self.between(left, right).along;
             for image in self.images_of_home(right, home, &reflection, 1.5 * length + HOME * tolerance) {
                 if let Some(found) = self.crosses_at(left, right, home, &image, cost) {
                     return Some(found);

@@ -5,12 +5,13 @@
 //! next step.
 
 use super::Settings;
-use super::corrector::{Care, Failure, Station, refine};
+use super::corrector::{Care, Failure, Station};
 use super::diagnosis::{Past, Tried};
 use super::ends::Homecoming;
-use super::inspect::{Found, History};
+use super::inspect::Found;
+use super::step::Step;
 use crate::contract::{Monitor, Verdict, ZeroProblem};
-use crate::diagram::{Cost, Ending, Kind, Mesh, Point, SpecialPoint};
+use crate::diagram::{Cost, Ending, Kind, Point, SpecialPoint};
 
 /// What a run emits, in the order of travel.
 pub enum Item {
@@ -40,49 +41,6 @@ pub struct Follow<'w> {
     pub homecoming: Homecoming,
 }
 
-/// An accepted step, perhaps the last one.
-pub(super) struct Step {
-    pub(super) right: Station,
-    pub(super) end: Option<Ending>,
-}
-
-/// What the point before the current one contributes: its tangent for the predictor, its monitors for the inspection.
-struct Trail {
-    u: Vec<f64>,
-    tangent: Vec<f64>,
-    mesh: Mesh,
-    /// Arclength between the two points.
-    length: f64,
-    /// Angle between their tangents, per arclength.
-    curvature: f64,
-    history: History,
-}
-
-/// What a step aims at.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Aim {
-    /// The plane across the tangent at this distance.
-    Plane(f64),
-    /// The value of the parameter that the prediction has, about this far.
-    Value(f64),
-}
-
-impl Aim {
-    /// How far that is.
-    pub(super) fn step(self) -> f64 {
-        match self {
-            Aim::Plane(step) | Aim::Value(step) => step,
-        }
-    }
-}
-
-/// Steps longer than this many of the one before are predicted from the tangents alone.
-const FARTHEST: f64 = 2.5;
-/// By how much a step is longer if that takes it to a bound: what is left would be a step of its own.
-const STRETCHED: f64 = 1.2;
-/// How close to a bound a prediction must be, as a share of its way there, to be moved to it.
-const NEAR_BOUND: f64 = 1e-4;
-
 /// Steps shorter than this many tolerances begin and end on the same mesh: two meshes agree to the tolerance only.
 pub(super) const SHORT: f64 = 200.0;
 /// Share of the tolerance below which a mesh is not refined on account of short steps.
@@ -102,8 +60,6 @@ const GROWTH: f64 = 2.0;
 const LONG: f64 = 3.0;
 /// Slope of a branch in its parameter below which it does not change along the branch but for rounding.
 pub(super) const STANDS: f64 = 1e-9;
-/// Distance midway from the cubic through both ends, as a share of the step, from which on the parameter there is looked at.
-const BENT: f64 = 2e-3;
 /// Change of the parameter, over so many equilibria, below which it has come to a stand.
 const REST: f64 = 1e-11;
 const PATIENCE: usize = 100;
@@ -124,7 +80,10 @@ pub fn follow(
     let mut left = start;
     let mut step = if left.point.step > 0.0 { left.point.step } else { walk.settings.first_step };
     let mut position = left.point.position;
-    let mut trail = previous.map(|p| walk.trail(&p, &left));
+    let mut trail = previous.map(|before| {
+        let between = walk.between(&before, &left);
+        walk.trail(&before, between)
+    });
     let first_period = walk.home.unwrap_or(&left.point).solution.free_period();
     let (mut ever_moved, mut moved, mut still) = (left.slope().abs() > STANDS, true, 0);
     let mut stirred = ever_moved;
@@ -146,7 +105,7 @@ pub fn follow(
         walk.sharpen(&mut left, step, &mut cost);
         let mut rigid = !walk.refresh(&mut left, step, &mut cost);
         let history = trail.as_ref().map(|t| t.history.clone());
-        let (Step { mut right, end }, found) = loop {
+        let (Step { mut right, end, between }, found) = loop {
             let attempt = walk.attempt(&left, trail.as_ref(), step, rigid, &mut cost).and_then(|tried| {
                 let found = walk.inspect(&left, &tried.right, history.as_ref(), 0, &mut cost);
                 let believed = found.iter().all(|f| match f {
@@ -203,7 +162,8 @@ pub fn follow(
             _ => found,
         };
         let (end, found) = walk.up_to_end(end, found, &mut right);
-        let (angle, length) = walk.angle(&left, &right);
+        let between = between.unwrap_or_else(|| walk.between(&left, &right));
+        let (angle, length) = (between.angle, between.along);
         // A bend that has become sharper will go on so.
         let trend = trail.as_ref().map_or(1.0, |t| angle / (length * t.curvature).max(1e-12)).clamp(1.0, 2.0);
         let factor = (walk.settings.target_angle / (trend * angle).max(1e-12)).clamp(0.3, GROWTH);
@@ -270,7 +230,7 @@ pub fn follow(
                 return Ending::PeriodUnbounded(now);
             }
         }
-        trail = Some(walk.trail(&left, &right));
+        trail = Some(walk.trail(&left, between));
         left = right;
     }
 }
@@ -299,18 +259,6 @@ impl Follow<'_> {
     fn moves(&self, then: (f64, f64), now: (f64, f64)) -> bool {
         let change = (now.0 - then.0).abs();
         change > 0.1 * self.settings.tolerance * (1.0 + now.0.abs()) * (now.1 / then.1).ln().abs()
-    }
-
-    fn trail(&mut self, before: &Station, now: &Station) -> Trail {
-        self.place(before);
-        let u = self.problem.transfer(&now.u, &now.mesh, &before.mesh);
-        let gap: Vec<f64> = u.iter().zip(&before.u).map(|(a, b)| a - b).collect();
-        let distance = self.problem.dot(&before.tangent, &gap).abs().max(f64::MIN_POSITIVE);
-        let history = History { distance, values: self.monitored(before), spectrum: before.point.spectrum.clone() };
-        let (angle, _) = self.angle(before, now);
-        let length = self.problem.dot(&gap, &gap).sqrt().max(distance) * (1.0 + angle * angle / 24.0);
-        let (u, tangent) = (before.u.clone(), before.tangent.clone());
-        Trail { u, tangent, mesh: before.mesh.clone(), length, curvature: angle / length, history }
     }
 
     /// Where steps are short, the curve is so curved that errors of a tolerance would show: the mesh is made for errors that are
@@ -351,174 +299,5 @@ impl Follow<'_> {
     /// How a point next to `left` is refined.
     pub(super) fn care(&self, left: &Station, step: f64) -> Care {
         Care { share: left.share, close: self.settings.closeness(&left.mesh, step), trusted: false }
-    }
-
-    /// Whether the mesh of `left` has served for a step already and has room left: what the tolerance leaves of what is stated, which is
-    /// several times the estimate.
-    fn trusts(&self, left: &Station, trail: Option<&Trail>) -> bool {
-        let room = left.point.trust.discretisation < left.share * self.settings.tolerance;
-        room && trail.is_some_and(|trail| trail.mesh == left.mesh)
-    }
-
-    /// Angle between the tangents, and distance along the left one.
-    pub(super) fn angle(&mut self, left: &Station, right: &Station) -> (f64, f64) {
-        self.place(left);
-        let tangent = self.problem.transfer(&right.tangent, &right.mesh, &left.mesh);
-        let u = self.problem.transfer(&right.u, &right.mesh, &left.mesh);
-        let gap: Vec<f64> = u.iter().zip(&left.u).map(|(a, b)| a - b).collect();
-        let sizes = (self.problem.dot(&tangent, &tangent) * self.problem.dot(&left.tangent, &left.tangent)).sqrt();
-        let cosine = self.problem.dot(&left.tangent, &tangent) / sizes;
-        (cosine.clamp(-1.0, 1.0).acos(), self.problem.dot(&left.tangent, &gap))
-    }
-
-    /// The point at distance `step`: on the cubic through the last two points with their tangents.
-    fn predicted(&mut self, left: &Station, trail: Option<&Trail>, step: f64) -> Vec<f64> {
-        self.place(left);
-        let mut guess: Vec<f64> = left.u.iter().zip(&left.tangent).map(|(u, t)| u + step * t).collect();
-        let Some(trail) = trail else { return guess };
-        let (d, x) = (trail.length, step / trail.length);
-        let then = self.problem.transfer(&trail.tangent, &trail.mesh, &left.mesh);
-        if x > FARTHEST {
-            let bend = 0.5 * step * step / d.max(0.2 * step);
-            (0..guess.len()).for_each(|i| guess[i] += bend * (left.tangent[i] - then[i]));
-        } else {
-            let before = self.problem.transfer(&trail.u, &trail.mesh, &left.mesh);
-            for i in 0..guess.len() {
-                let (chord, turn) = (before[i] - left.u[i] + d * left.tangent[i], d * (then[i] - left.tangent[i]));
-                guess[i] += x * x * ((3.0 * chord + turn) + x * (2.0 * chord + turn));
-            }
-        }
-        let gap: Vec<f64> = guess.iter().zip(&left.u).map(|(a, b)| a - b).collect();
-        let off = step - self.problem.dot(&left.tangent, &gap);
-        guess.iter_mut().zip(&left.tangent).for_each(|(g, t)| *g += off * t);
-        guess
-    }
-
-    fn attempt(
-        &mut self,
-        left: &Station,
-        trail: Option<&Trail>,
-        step: f64,
-        rigid: bool,
-        cost: &mut Cost,
-    ) -> Result<Step, Failure> {
-        let guess = self.predicted(left, trail, step);
-        // A step that would pass a bound is aimed at it; where that fails, the bound is looked for after the step.
-        if let Some((nearer, landing)) = self.landing(left, trail, &guess, step)
-            && !self.is_short(&left.mesh, nearer)
-            && let Ok(landed) = self.tried(left, trail, &landing, Aim::Value(nearer), rigid, cost)
-        {
-            return Ok(landed);
-        }
-        self.place(left);
-        self.tried(left, trail, &guess, Aim::Plane(step), rigid, cost)
-    }
-
-    /// Where the prediction passes a bound, within the step or a little farther: at what step, and the prediction there, with the
-    /// parameter at the bound.
-    fn landing(&mut self, left: &Station, trail: Option<&Trail>, guess: &[f64], step: f64) -> Option<(f64, Vec<f64>)> {
-        let last = guess.len() - 1;
-        let (here, way) = (left.parameter(), guess[last] - left.parameter());
-        let [low, high] = self.settings.range;
-        let there = here + STRETCHED * way;
-        let bound = if there < low { low } else { (there > high).then_some(high)? };
-        if left.slope() * way <= 0.0 || (here - bound) * way >= 0.0 {
-            return None;
-        }
-        let gap = |at: &[f64]| (at[last] - bound) * way.signum();
-        let farthest = STRETCHED * step;
-        let (mut inner, mut outer) =
-            ((0.0, -(here - bound).abs()), (farthest, gap(&self.predicted(left, trail, farthest))));
-        if outer.1 < 0.0 {
-            return None;
-        }
-        for _ in 0..20 {
-            let s = inner.0 + (outer.0 - inner.0) * inner.1 / (inner.1 - outer.1);
-            let mut landing = self.predicted(left, trail, s);
-            let miss = gap(&landing);
-            if miss > 0.0 {
-                outer = (s, miss)
-            } else {
-                inner = (s, miss)
-            }
-            if miss.abs() < NEAR_BOUND * (s * left.slope()).abs() {
-                landing[last] = bound;
-                return Some((s, landing));
-            }
-        }
-        None
-    }
-
-    /// The step to what was predicted, in the plane or at the value of the parameter that is aimed at.
-    fn tried(
-        &mut self,
-        left: &Station,
-        trail: Option<&Trail>,
-        guess: &[f64],
-        aim: Aim,
-        rigid: bool,
-        cost: &mut Cost,
-    ) -> Result<Step, Failure> {
-        let step = aim.step();
-        let (u, row) = self.corrected(left, guess, aim, cost)?;
-        let short = self.is_short(&left.mesh, step);
-        let mut right = if rigid && short {
-            let close = self.settings.closeness(&left.mesh, step);
-            self.unrefined(left, u, close, cost)?
-        } else {
-            let care = Care { trusted: self.trusts(left, trail), ..self.care(left, step) };
-            refine(self.problem, self.settings, care, row, u, self.direction, cost)?
-        };
-        if let Aim::Value(_) = aim {
-            // Where travel is towards smaller values the row has turned the tangent round.
-            right.head(left.slope());
-        }
-        if right.mesh != left.mesh && short {
-            return Err(Failure::Remeshed(right.mesh));
-        }
-        let mut miss = 0.0;
-        if !left.mesh.is_empty() {
-            miss = self.is_nearly_smooth(left, &right)?;
-        }
-        self.continues(left, &right, guess)?;
-        if self.problem.departure(&right.u) > self.settings.newton_tolerance() {
-            return Err(Failure::Departed);
-        }
-        if trail.is_none() || left.mesh.is_empty() {
-            self.is_smooth(left, &mut right, cost)?;
-        }
-        self.leads_back(left, &right, cost)?;
-        if miss > BENT {
-            right.midway = self.midway(left, &right, cost)?;
-        }
-        if let Some(ended) = self.collapsed(left, &right, cost)? {
-            return Ok(ended);
-        }
-        let [low, high] = self.settings.range;
-        let bound = match aim {
-            Aim::Value(_) => Some(guess[guess.len() - 1]),
-            Aim::Plane(_) if right.parameter() < low => Some(low),
-            Aim::Plane(_) => (right.parameter() > high).then_some(high),
-        };
-        let mut end = None;
-        if let Some(bound) = bound {
-            if let Aim::Plane(_) = aim {
-                right = self.at_parameter(left, &right, bound, cost)?;
-            }
-            // To the last bit, whatever rounding Newton's method left.
-            let last = right.u.len() - 1;
-            right.u[last] = bound;
-            if let Some(own) = right.point.parameters.get_mut(self.free) {
-                *own = bound;
-            }
-            end = Some(Ending::Bound(bound));
-        }
-        if let Some((value, there)) = self.beyond(left, &right, cost) {
-            return Ok(Step { right: there, end: Some(Ending::Bound(value)) });
-        }
-        if let Some(home) = self.closes(left, &right, cost)? {
-            return Ok(Step { right: home, end: Some(Ending::Closed) });
-        }
-        Ok(Step { right, end })
     }
 }

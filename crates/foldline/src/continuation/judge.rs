@@ -5,8 +5,9 @@
 //! backwards leads elsewhere.
 
 use super::corrector::{Failure, Plane, Station, correct, correct_within, parameter_row};
-use super::follow::{Aim, Follow};
+use super::follow::Follow;
 use super::locate::Stretch;
+use super::step::{Aim, Between};
 use crate::diagram::Cost;
 
 /// Margin from a singular matrix below which a step must also lead back to where it came from.
@@ -64,12 +65,14 @@ impl Follow<'_> {
 
     /// Whether `right`, predicted as `guess`, continues the branch at `left`, and neither turns too far nor lies on another
     /// one.
-    pub(super) fn continues(&mut self, left: &Station, right: &Station, guess: &[f64]) -> Result<(), Failure> {
-        let (angle, length) = self.angle(left, right);
+    pub(super) fn continues(&mut self, left: &Station, right: &Station, guess: &[f64]) -> Result<Between, Failure> {
+        self.place(left);
         let landed = self.problem.transfer(&right.u, &right.mesh, &left.mesh);
         let tangent = self.problem.transfer(&right.tangent, &right.mesh, &left.mesh);
         let miss: Vec<f64> = landed.iter().zip(guess).map(|(a, b)| a - b).collect();
         let chord: Vec<f64> = landed.iter().zip(&left.u).map(|(a, b)| a - b).collect();
+        let between = self.lie(left, &tangent, &chord);
+        let (angle, length) = (between.angle, between.along);
         let size = |v: &[f64]| self.problem.dot(v, v).sqrt();
         let against = |t: &[f64]| (self.problem.dot(t, &chord) / (size(t) * size(&chord))).clamp(-1.0, 1.0).acos();
         let (miss, bent) = (size(&miss), against(&left.tangent) + against(&tangent));
@@ -79,7 +82,7 @@ impl Follow<'_> {
         if angle > self.settings.max_angle || miss > MISS * step || bent > CHORD_FACTOR * angle + CHORD_SLACK {
             return Err(Failure::Elsewhere { angle, miss: miss / step });
         }
-        Ok(())
+        Ok(between)
     }
 
     /// Whether the curve keeps to the cubic between both ends of a step. A wiggle shorter than the step shows at neither end;
@@ -119,10 +122,9 @@ impl Follow<'_> {
         let tangent = self.problem.transfer(&left.tangent, &left.mesh, &right.mesh);
         let gap: Vec<f64> = right.u.iter().zip(&u).map(|(a, b)| a - b).collect();
         let (length, forward) = (self.problem.dot(&tangent, &gap), self.problem.dot(&tangent, &right.tangent));
-        let bend = 0.125 * length;
-        let middle: Vec<f64> = (0..u.len())
-            .map(|i| 0.5 * (u[i] + right.u[i]) + bend * (tangent[i] - right.tangent[i] / forward.abs().max(0.1)))
-            .collect();
+        let (bend, forward) = (0.125 * length, forward.abs().max(0.1));
+        let sides = u.iter().zip(&tangent).zip(right.u.iter().zip(&right.tangent));
+        let middle: Vec<f64> = sides.map(|((u, t), (v, s))| 0.5 * (u + v) + bend * (t - s / forward)).collect();
         let (mut r, mut du) = (vec![0.0; u.len()], vec![0.0; u.len()]);
         if !self.problem.residual(&middle, &mut r) {
             return Err(Failure::NotFinite);

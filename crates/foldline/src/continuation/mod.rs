@@ -24,6 +24,7 @@ pub mod inspect;
 mod judge;
 pub mod locate;
 mod side;
+mod step;
 pub mod straddle;
 
 pub use corrector::{Failure, Station};

@@ -349,7 +349,9 @@ impl Growth<'_> {
             homecoming: Homecoming::default(),
         };
         // A run that goes on may be on its way back already.
-        branch.points.iter().filter(|p| p.position as f64 * direction > 0.0).for_each(|p| walk.leaves_home(p));
+        let mut before: Vec<&Point> = branch.points.iter().filter(|p| p.position as f64 * direction > 0.0).collect();
+        before.sort_by_key(|p| p.position.abs());
+        before.into_iter().for_each(|p| walk.leaves_home(p));
         follow(&mut walk, start, previous, emitted, &mut |item| {
             let going = match item {
                 Item::Special(mut special) => {

@@ -149,10 +149,10 @@ impl<T: Lane> Chain<T> {
     }
 
     /// Carries right-hand sides h `[L × n]` through the elimination; afterwards the last n are those of the relation that is left.
-    /// `s` `[q]` receives what elimination takes from the right-hand sides of (2).
+    /// `s` `[q]` receives what elimination takes from the right-hand sides of (2). The dimensions are given once more, so that a caller who
+    /// knows them can make them constants.
     #[inline(always)]
-    pub fn forward(&self, h: &mut [T], s: &mut [T]) {
-        let (n, q) = (self.n, self.q);
+    pub fn forward(&self, h: &mut [T], s: &mut [T], [n, q]: [usize; 2]) {
         for j in 1..self.length {
             let pair = &mut h[(j - 1) * n..(j + 1) * n];
             reflect::apply(&self.reflectors[j * n * 2 * n..(j + 1) * n * 2 * n], n, pair);
@@ -164,8 +164,8 @@ impl<T: Lane> Chain<T> {
 
     /// The inner nodes from x_0, x_L and σ: h as [`Chain::forward`] left it, on return x_1 … x_{L-1} at 0 … L-2.
     #[inline(always)]
-    pub fn backward(&self, h: &mut [T], first: &[T], last: &[T], sigma: &[T]) {
-        let (n, full) = (self.n, 3 * self.n + self.q);
+    pub fn backward(&self, h: &mut [T], first: &[T], last: &[T], sigma: &[T], [n, q]: [usize; 2]) {
+        let full = 3 * n + q;
         for j in (1..self.length).rev() {
             let upper = &self.upper[j * n * full..(j + 1) * n * full];
             let (head, tail) = h.split_at_mut(j * n);
@@ -173,7 +173,8 @@ impl<T: Lane> Chain<T> {
             let right = if j + 1 == self.length { last } else { &tail[..n] };
             for i in (0..n).rev() {
                 let line = &upper[i * full..(i + 1) * full];
-                let known = dot(&line[n..2 * n], right) + dot(&line[2 * n..3 * n], first) + dot(&line[3 * n..], sigma);
+                let ends = dot(&line[n..2 * n], &right[..n]) + dot(&line[2 * n..3 * n], &first[..n]);
+                let known = ends + dot(&line[3 * n..], &sigma[..q]);
                 let known = known + dot(&line[i + 1..n], &own[i + 1..]);
                 own[i] = (own[i] - known) * line[i];
             }

@@ -200,28 +200,21 @@ impl<T: Lane> Condensed<T> {
         T::dispatch(SolveTransposed { system: self, z, y });
     }
 
-    /// From per-interval layout `[N][(m + 1) · n]` to lanes `[L][(m + 1) · n]`, in slots; zero beyond N.
+    /// From per-interval layout `[N][block]`, block = (m + 1) · n, to lanes `[L][block]`, in slots; zero beyond N.
     #[inline(always)]
-    fn deal(&self, from: &[f64]) -> Vec<T> {
-        let block = (self.m + 1) * self.n;
+    fn deal(&self, from: &[f64], block: usize) -> Vec<T> {
         let mut out = vec![T::default(); self.length * block];
+        let nothing = vec![0.0; block];
         for (t, out) in out.chunks_exact_mut(block).enumerate() {
-            // Where the interval of each lane begins, if there is one.
-            let mut first = [None; 8];
+            let mut own = [&nothing[..]; 8];
             for lane in 0..T::COUNT {
                 let j = lane * self.length + t;
-                first[lane] = (j < self.intervals).then_some(j * block);
+                if j < self.intervals {
+                    own[lane] = &from[j * block..(j + 1) * block];
+                }
             }
-            let slots = out.iter_mut().zip(&self.order);
-            match first[T::COUNT - 1] {
-                Some(_) => {
-                    let first = first.map(|at| at.unwrap_or(0));
-                    slots.for_each(|(to, source)| *to = T::each(|lane| from[first[lane] + source]));
-                }
-                None => {
-                    let value = |lane: usize, source: usize| first[lane].map_or(0.0, |at| from[at + source]);
-                    slots.for_each(|(to, source)| *to = T::each(|lane| value(lane, *source)));
-                }
+            for (to, source) in out.iter_mut().zip(&self.order[..block]) {
+                *to = T::each(|lane| own[lane][*source]);
             }
         }
         out
@@ -229,13 +222,13 @@ impl<T: Lane> Condensed<T> {
 
     /// The way back.
     #[inline(always)]
-    fn collect(&self, from: &[T], to: &mut [f64]) {
-        let block = (self.m + 1) * self.n;
+    fn collect(&self, from: &[T], to: &mut [f64], block: usize) {
+        let order = &self.order[..block];
         for (t, from) in from.chunks_exact(block).enumerate() {
             for lane in 0..T::COUNT {
                 let j = lane * self.length + t;
                 if let Some(x) = (j < self.intervals).then(|| &mut to[j * block..(j + 1) * block]) {
-                    for (from, target) in from.iter().zip(&self.order) {
+                    for (from, target) in from.iter().zip(order) {
                         x[*target] = from.lanes()[lane];
                     }
                 }
@@ -451,11 +444,24 @@ impl<T: Lane> pulp::NullaryFnOnce for Solve<'_, T> {
 
     #[inline(always)]
     fn call(self) {
+        let Condensed { n, m, q, .. } = *self.system;
+        // Common dimensions as constants.
+        match (n, m, q) {
+            (4, 4, 2) if T::COUNT > 1 => self.solved([4, 4, 2]),
+            (n, m, q) => self.solved([n, m, q]),
+        }
+    }
+}
+
+impl<T: Lane> Solve<'_, T> {
+    /// The dimensions are given once more, so that they can be constants.
+    #[inline(always)]
+    fn solved(self, [n, m, q]: [usize; 3]) {
         let Solve { system, rhs, x } = self;
-        let Condensed { n, m, q, intervals, length, closure, .. } = *system;
+        let Condensed { intervals, length, closure, .. } = *system;
         let (width, block) = (n + q, (m + 1) * n);
         let size = intervals * block;
-        let mut z = system.deal(&rhs[..size]);
+        let mut z = system.deal(&rhs[..size], block);
         // Allocated at once.
         let mut room = vec![T::default(); length * n + 2 * n + 2 * q];
         let (h, rest) = room.split_at_mut(length * n);
@@ -477,10 +483,10 @@ impl<T: Lane> pulp::NullaryFnOnce for Solve<'_, T> {
                 taken[c] = taken[c] - dot(row, &own[n..]);
             }
         }
-        system.pieces.forward(h, taken);
+        system.pieces.forward(h, taken, [n, q]);
         let mut ends = unzipped(&h[(length - 1) * n..]);
         let mut tail = vec![0.0; width];
-        system.whole.forward(&mut ends, &mut tail[n..]);
+        system.whole.forward(&mut ends, &mut tail[n..], [n, q]);
         for c in 0..q {
             tail[n + c] += rhs[size + c] + total(taken[c]);
         }
@@ -488,7 +494,7 @@ impl<T: Lane> pulp::NullaryFnOnce for Solve<'_, T> {
         lu::solve(&system.last, width, &system.last_pivots, &mut tail, 1);
         let (first, sigma) = tail.split_at(n);
         let closing: Vec<f64> = first.iter().map(|v| closure * v).collect();
-        system.whole.backward(&mut ends, first, &closing, sigma);
+        system.whole.backward(&mut ends, first, &closing, sigma, [n, q]);
         // Ends of the pieces, from x_0 on and from the one after it on.
         let mut nodes = first.to_vec();
         nodes.extend_from_slice(&ends[..(T::COUNT - 1) * n]);
@@ -496,15 +502,15 @@ impl<T: Lane> pulp::NullaryFnOnce for Solve<'_, T> {
         zip(&nodes[..T::COUNT * n], left);
         zip(&nodes[n..], right);
         scalars.iter_mut().zip(sigma).for_each(|(to, s)| *to = T::splat(*s));
-        system.pieces.backward(h, left, right, scalars);
+        system.pieces.backward(h, left, right, scalars, [n, q]);
         for t in 0..length {
             let (end, inside) = z[t * block..(t + 1) * block].split_at_mut(n);
             end.copy_from_slice(if t == 0 { left } else { &h[(t - 1) * n..t * n] });
             for (zi, line) in inside.iter_mut().zip(system.lines(t).chunks_exact(width)) {
-                *zi = *zi - dot(&line[..n], end) - dot(&line[n..], scalars);
+                *zi = *zi - dot(&line[..n], &end[..n]) - dot(&line[n..], &scalars[..q]);
             }
         }
-        system.collect(&z, x);
+        system.collect(&z, x, block);
         x[size..].copy_from_slice(sigma);
     }
 }
@@ -532,7 +538,7 @@ impl<T: Lane> pulp::NullaryFnOnce for SolveTransposed<'_, T> {
         let Condensed { n, m, q, intervals, length, closure, .. } = *system;
         let (width, block) = (n + q, (m + 1) * n);
         let size = intervals * block;
-        let mut own = system.deal(&z[..size]);
+        let mut own = system.deal(&z[..size], block);
         // Interior columns first: what they leave for the interval ends and the scalars.
         let mut ends = vec![T::default(); length * n];
         let mut sigma = vec![T::default(); q];
@@ -580,7 +586,7 @@ impl<T: Lane> pulp::NullaryFnOnce for SolveTransposed<'_, T> {
             }
             system.interior_solve(t, true, &mut out[n..]);
         }
-        system.collect(&own, y);
+        system.collect(&own, y, block);
         y[size..].copy_from_slice(border);
     }
 }

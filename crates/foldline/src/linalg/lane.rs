@@ -105,8 +105,9 @@ impl Lane for Eight {
     }
 
     #[inline(always)]
-    fn each(f: impl FnMut(usize) -> f64) -> Eight {
-        Eight(std::array::from_fn(f))
+    fn each(mut f: impl FnMut(usize) -> f64) -> Eight {
+        // Written out: `from_fn` can become a function of its own, compiled without the vector instructions.
+        Eight([f(0), f(1), f(2), f(3), f(4), f(5), f(6), f(7)])
     }
 
     #[inline(always)]
@@ -203,8 +204,15 @@ pub fn dot<T: Lane>(a: &[T], b: &[T]) -> T {
             sums[k] = sums[k] + a[k] * b[k];
         }
     }
-    for (k, (a, b)) in a.iter().zip(b).enumerate() {
-        sums[k % 4] = sums[k % 4] + *a * *b;
+    // No loop: of single numbers it would become one with a mask.
+    if let ([a0, ..], [b0, ..]) = (a, b) {
+        sums[0] = sums[0] + *a0 * *b0;
+    }
+    if let ([_, a1, ..], [_, b1, ..]) = (a, b) {
+        sums[1] = sums[1] + *a1 * *b1;
+    }
+    if let ([_, _, a2], [_, _, b2]) = (a, b) {
+        sums[2] = sums[2] + *a2 * *b2;
     }
     (sums[0] + sums[1]) + (sums[2] + sums[3])
 }

@@ -25,15 +25,25 @@ impl pulp::NullaryFnOnce for Multiply<'_, '_> {
 
     #[inline(always)]
     fn call(self) {
+        // The usual degree's as a constant.
+        match self.panel.len() / self.lanes {
+            5 => self.multiplied(5),
+            columns => self.multiplied(columns),
+        }
+    }
+}
+
+impl Multiply<'_, '_> {
+    #[inline(always)]
+    fn multiplied(self, columns: usize) {
         let Multiply { matrix, panel, lanes, out } = self;
-        let columns = panel.len() / lanes;
         let full = lanes - lanes % WIDTH;
         for (line, weights) in out.chunks_exact_mut(lanes).zip(matrix.chunks_exact(columns)) {
             let (blocks, rest) = line.as_chunks_mut::<WIDTH>();
             for (b, block) in blocks.iter_mut().enumerate() {
                 let mut sum = [0.0; WIDTH];
-                for (w, row) in weights.iter().zip(panel.chunks_exact(lanes)) {
-                    if let Some(values) = row[b * WIDTH..].first_chunk::<WIDTH>() {
+                for (k, w) in weights[..columns].iter().enumerate() {
+                    if let Some(values) = panel[k * lanes + b * WIDTH..].first_chunk::<WIDTH>() {
                         (0..WIDTH).for_each(|l| sum[l] += w * values[l]);
                     }
                 }

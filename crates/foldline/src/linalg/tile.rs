@@ -145,14 +145,18 @@ fn in_rows<T: Lane, const M: usize, const C: usize>(
     b_at: usize,
     rows: usize,
 ) {
-    let b: [&[T; C]; M] = std::array::from_fn(|k| piece(b, k * b_stride + b_at));
+    // No `from_fn`: it can become a function of its own, compiled without the vector instructions.
+    let mut lines: [&[T; C]; M] = [piece(b, b_at); M];
+    for k in 1..M {
+        lines[k] = piece(b, k * b_stride + b_at);
+    }
     for r in 0..rows {
         let factors: &[T; M] = piece(a, r * a_stride + a_at);
         let own: &mut [T; C] = piece_mut(y, r * y_stride + y_at);
         let mut sums = *own;
         for k in 0..M {
             for j in 0..C {
-                sums[j] = sums[j] - factors[k] * b[k][j];
+                sums[j] = sums[j] - factors[k] * lines[k][j];
             }
         }
         *own = sums;
@@ -204,7 +208,10 @@ fn strided<T: Lane, const R: usize, const C: usize>(
     for r in 0..R {
         sums[r].copy_from_slice(&y[r * y_stride..r * y_stride + C]);
     }
-    let lines: [&[T]; R] = std::array::from_fn(|r| &a[r * a_stride..r * a_stride + depth]);
+    let mut lines = [&a[..depth]; R];
+    for r in 1..R {
+        lines[r] = &a[r * a_stride..r * a_stride + depth];
+    }
     for k in 0..depth {
         let row = &b[k * b_stride..k * b_stride + C];
         for r in 0..R {

@@ -86,10 +86,13 @@ const SATURATED: f64 = 19.5;
 /// [`tanh`] of eight numbers; nothing to compute where all of them are large, as a contact law is away from the edge of the contact.
 #[inline(always)]
 pub(super) fn tanhs(x: [f64; 8]) -> [f64; 8] {
+    let mut y = [0.0; 8];
+    // No `map` of the array: it is a function of its own, compiled without the vector instructions.
     match x.iter().fold(true, |all, x| all & (x.abs() >= SATURATED)) {
-        true => x.map(|x| f64::copysign(1.0, x)),
-        false => x.map(tanh),
+        true => (0..8).for_each(|l| y[l] = f64::copysign(1.0, x[l])),
+        false => (0..8).for_each(|l| y[l] = tanh(x[l])),
     }
+    y
 }
 
 /// 1 / cosh² x.

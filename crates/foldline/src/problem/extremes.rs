@@ -40,13 +40,19 @@ pub fn of_profile(
     let mut peaks: Vec<Peak> = Vec::with_capacity(2 * PEAKS * channels);
     for line in values.chunks_exact(lanes) {
         for (sign, (top, places)) in [-1.0, 1.0].into_iter().zip(outermost(line)) {
-            peaks.extend(places.iter().map(|&place| Peak { of: best.len(), sign, place: place as f64, spacing: 1.0 }));
+            peaks.extend(places.iter().map(|&place| Peak {
+                of: best.len(),
+                sign,
+                place: place as f64,
+                spacing: 1.0,
+                reach: f64::INFINITY,
+            }));
             best.push(top);
         }
     }
     for _ in 0..ROUNDS {
         orbit.refine(&mut peaks, &mut best);
-        peaks.retain(|peak| peak.spacing > CLOSE);
+        peaks.retain(|peak| peak.spacing > CLOSE && peak.reach >= best[peak.of]);
     }
     best.chunks_exact(2).map(|pair| [-pair[0], pair[1]]).collect()
 }
@@ -59,6 +65,8 @@ struct Peak {
     place: f64,
     /// Distance of the neighbours that are looked at.
     spacing: f64,
+    /// What it will not rise above: the top of its parabola, and twice what that falls to its neighbours on average.
+    reach: f64,
 }
 
 struct Orbit<'a> {
@@ -157,8 +165,12 @@ impl Orbit<'_> {
             *best = best.max(a).max(b).max(c);
             let bend = a - 2.0 * b + c;
             let between = b >= a && b >= c;
+            peak.reach = f64::INFINITY;
             if bend < 0.0 {
                 let shift = 0.5 * (a - c) / bend;
+                if between {
+                    peak.reach = b - 0.125 * (c - a) * (c - a) / bend - bend;
+                }
                 peak.place += peak.spacing * shift.clamp(-1.0, 1.0);
                 if between && peak.spacing < 0.1 {
                     *best = best.max(b - 0.125 * (c - a) * (c - a) / bend);

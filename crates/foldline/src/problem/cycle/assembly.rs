@@ -237,7 +237,9 @@ impl<T: Lane> Write<'_, '_, T> {
                     let weight = h * T::splat(scheme.weights[k]);
                     system.border[border + n + first + k] = weight * T::load(&phase[(at * n + c * w)..]);
                 }
-                (0..m).for_each(|i| b[i * width + c] = zero - one);
+                for i in 0..m {
+                    b[i * width + c] = zero - one;
+                }
             }
             if CONDENSED {
                 system.condense_at(t, [n, m, 1 + free])?;

@@ -41,7 +41,7 @@ use crate::contract::{Batch, Examination, Parameters, Singular, ZeroProblem};
 use crate::diagram::{Cycle, Mesh, Point, Solution, Trust};
 use crate::linalg::lane::{Eight, Lane};
 use crate::linalg::system::System;
-use crate::linalg::{larger, max_abs, same};
+use crate::linalg::{all_finite, larger, same};
 use crate::stability::floquet::{self, Floquet, Frames};
 use errors::{Measured, Room};
 use num_complex::Complex64;
@@ -249,8 +249,19 @@ impl pulp::NullaryFnOnce for Largest<'_, '_> {
 
     #[inline(always)]
     fn call(self) {
-        for interval in self.profile.chunks_exact(self.largest.len()) {
-            for (most, v) in self.largest.iter_mut().zip(interval) {
+        let size = self.largest.len();
+        let (blocks, rest) = self.largest.as_chunks_mut::<4>();
+        let first = size - rest.len();
+        // What is compared stays in registers.
+        for (k, most) in blocks.iter_mut().enumerate() {
+            let mut own = *most;
+            for v in self.profile.chunks_exact(size).filter_map(|interval| interval[4 * k..].first_chunk::<4>()) {
+                (0..4).for_each(|l| own[l] = larger(own[l], v[l].abs()));
+            }
+            *most = own;
+        }
+        for interval in self.profile.chunks_exact(size) {
+            for (most, v) in rest.iter_mut().zip(&interval[first..]) {
                 *most = larger(*most, v.abs());
             }
         }
@@ -273,9 +284,21 @@ impl pulp::NullaryFnOnce for Products<'_, '_> {
     fn call(self) {
         let Products { a, b, mesh, skipped, sums } = self;
         let block = skipped + sums.len();
-        for ((x, y), pair) in a.chunks_exact(block).zip(b.chunks_exact(block)).zip(mesh.windows(2)) {
+        let intervals = || a.chunks_exact(block).zip(b.chunks_exact(block)).zip(mesh.windows(2));
+        let (blocks, rest) = sums.as_chunks_mut::<8>();
+        // Sums stay in registers.
+        for (k, sums) in blocks.iter_mut().enumerate() {
+            let at = skipped + 8 * k;
+            let mut sum = Eight::load(sums);
+            for ((x, y), pair) in intervals() {
+                sum = sum + Eight::splat(pair[1] - pair[0]) * (Eight::load(&x[at..]) * Eight::load(&y[at..]));
+            }
+            *sums = sum.0;
+        }
+        let at = block - rest.len();
+        for ((x, y), pair) in intervals().take(if rest.is_empty() { 0 } else { mesh.len() }) {
             let h = pair[1] - pair[0];
-            for ((sum, x), y) in sums.iter_mut().zip(&x[skipped..]).zip(&y[skipped..]) {
+            for ((sum, x), y) in rest.iter_mut().zip(&x[at..]).zip(&y[at..]) {
                 *sum += h * (x * y);
             }
         }
@@ -316,7 +339,7 @@ impl ZeroProblem for CycleProblem<'_> {
             false => phase - self.phase_offset,
         };
         let unit = if self.is_forced() { self.setting.field.time_unit(&all) } else { 1.0 };
-        max_abs(&r[..=size]).is_finite() && u[size] > 0.0 && unit > 0.0 && unit.is_finite()
+        all_finite(&r[..=size]) && u[size] > 0.0 && unit > 0.0 && unit.is_finite()
     }
 
     fn factorise(&mut self, u: &[f64], rows: &[f64]) -> Result<(), Singular> {

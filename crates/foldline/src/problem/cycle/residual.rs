@@ -102,16 +102,27 @@ impl<T: Lane> pulp::NullaryFnOnce for Defects<'_, '_, T> {
 
     #[inline(always)]
     fn call(self) -> f64 {
+        // Common dimensions as constants.
+        match (self.problem.n, self.problem.scheme.degree) {
+            (4, 4) if T::COUNT > 1 => self.taken(4, 4),
+            (n, m) => self.taken(n, m),
+        }
+    }
+}
+
+impl<T: Lane> Defects<'_, '_, T> {
+    #[inline(always)]
+    fn taken(self, n: usize, m: usize) -> f64 {
         let Defects { problem, u, r, .. } = self;
-        let CycleProblem { ref scheme, n, length, .. } = *problem;
-        let (block, count) = ((scheme.degree + 1) * n, problem.intervals());
+        let length = problem.length;
+        let (block, count) = ((m + 1) * n, problem.intervals());
         let period = T::splat(u[problem.profile_size()]);
         let mut rows = vec![T::default(); block];
         let mut phase = T::default();
         for t in 0..length {
             let h = T::load(&problem.lengths[t * T::COUNT..]);
             for c in 0..n {
-                phase = phase + h * of_component(problem, scheme, [t, c], h * period, &mut rows);
+                phase = phase + h * of_component(problem, [t, c], h * period, &mut rows, [n, m]);
             }
             for lane in 0..T::COUNT {
                 let j = lane * length + t;
@@ -130,8 +141,8 @@ impl<T: Lane> pulp::NullaryFnOnce for Defects<'_, '_, T> {
 
 /// One component at one place of every lane: its rows of (1), that of (2) without x_{j+1}, and its part of (3) over h.
 #[inline(always)]
-fn of_component<T: Lane>(problem: &CycleProblem, scheme: &Scheme, [t, c]: [usize; 2], ht: T, rows: &mut [T]) -> T {
-    let (n, m, lanes) = (problem.n, scheme.degree, problem.lanes());
+fn of_component<T: Lane>(problem: &CycleProblem, [t, c]: [usize; 2], ht: T, rows: &mut [T], [n, m]: [usize; 2]) -> T {
+    let (scheme, lanes) = (&problem.scheme, problem.lanes());
     let at = |k: usize| (t * m + k) * T::COUNT;
     let x = T::load(&problem.ends[(c * problem.length + t) * T::COUNT..]);
     let mut end = T::default() - T::splat(scheme.end[0]) * x;

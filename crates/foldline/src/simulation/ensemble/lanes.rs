@@ -146,7 +146,9 @@ impl Lanes {
         let target = if N + 1 == STAGES { &mut self.next } else { &mut self.stage };
         for (i, (to, x)) in target.chunks_exact_mut(count).zip(self.x.chunks_exact(count)).enumerate() {
             let mut k: [&[f64]; N] = [&[]; N];
-            (0..N).for_each(|j| k[j] = &self.slopes[j][i * count..][..count]);
+            for j in 0..N {
+                k[j] = &self.slopes[j][i * count..][..count];
+            }
             combine(to, x, &self.h, a, k);
         }
     }
@@ -171,7 +173,9 @@ impl Lanes {
         for i in 0..self.n {
             let ends = [&self.x[i * count..], &self.next[i * count..]];
             let mut k: [&[f64]; STAGES] = [&[]; STAGES];
-            (0..STAGES).for_each(|j| k[j] = &self.slopes[j][i * count..]);
+            for j in 0..STAGES {
+                k[j] = &self.slopes[j][i * count..];
+            }
             let tolerance = [tolerance.absolute[i], tolerance.relative];
             add_errors(&mut self.error, &mut self.largest, &self.h, ends, k, tolerance);
         }
@@ -255,17 +259,12 @@ fn add_errors(
         for j in 2..STAGES {
             e += ERROR[j] * k[j][l];
         }
-        let size = larger(ends[0][l].abs(), ends[1][l].abs());
+        let size = ends[0][l].abs().max(ends[1][l].abs());
         let scaled = h[l] * e / (tolerance[0] + tolerance[1] * size);
         error[l] += scaled * scaled;
-        largest[l] = larger(largest[l], size);
+        // No `if`: one that leaves a number where it stands becomes a store under a mask, which some processors take very long for.
+        largest[l] = largest[l].max(size);
     }
-}
-
-/// The larger of two magnitudes.
-#[inline(always)]
-fn larger(a: f64, b: f64) -> f64 {
-    if a > b { a } else { b }
 }
 
 /// One sweep, handed to the dispatcher of instruction sets.

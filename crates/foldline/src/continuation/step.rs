@@ -1,0 +1,255 @@
+//! One step: predicted, corrected, judged, and ended where the branch ends.
+//!
+//! **Idea.** The prediction lies on the cubic through the last two points with their tangents. Where it would pass a bound it is
+//! moved there. What Newton's method makes of it is refined, compared with where it began, and looked through for ends.
+
+use super::corrector::{Care, Failure, Station, refine};
+use super::follow::Follow;
+use super::inspect::History;
+use crate::diagram::{Cost, Ending, Mesh};
+
+/// An accepted step, perhaps the last one.
+pub(super) struct Step {
+    pub(super) right: Station,
+    pub(super) end: Option<Ending>,
+    /// How its ends lie to each other, where that is known already.
+    pub(super) between: Option<Between>,
+}
+
+/// How two neighbours lie to each other.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Between {
+    /// Between the tangents.
+    pub(super) angle: f64,
+    /// Distance along the left tangent.
+    pub(super) along: f64,
+    /// Distance.
+    pub(super) chord: f64,
+}
+
+/// What the point before the current one contributes: its tangent for the predictor, its monitors for the inspection.
+pub(super) struct Trail {
+    u: Vec<f64>,
+    tangent: Vec<f64>,
+    mesh: Mesh,
+    /// Arclength between the two points.
+    pub(super) length: f64,
+    /// Angle between their tangents, per arclength.
+    pub(super) curvature: f64,
+    pub(super) history: History,
+}
+
+/// What a step aims at.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Aim {
+    /// The plane across the tangent at this distance.
+    Plane(f64),
+    /// The value of the parameter that the prediction has, about this far.
+    Value(f64),
+}
+
+impl Aim {
+    /// How far that is.
+    pub(super) fn step(self) -> f64 {
+        match self {
+            Aim::Plane(step) | Aim::Value(step) => step,
+        }
+    }
+}
+
+/// Steps longer than this many of the one before are predicted from the tangents alone.
+const FARTHEST: f64 = 2.5;
+/// By how much a step is longer if that takes it to a bound: what is left would be a step of its own.
+const STRETCHED: f64 = 1.2;
+/// How close to a bound a prediction must be, as a share of its way there, to be moved to it.
+const NEAR_BOUND: f64 = 1e-4;
+
+/// Distance midway from the cubic through both ends, as a share of the step, from which on the parameter there is looked at.
+const BENT: f64 = 2e-3;
+impl Follow<'_> {
+    /// What `before` contributes to the step from `now` on.
+    pub(super) fn trail(&mut self, before: &Station, between: Between) -> Trail {
+        let distance = between.along.abs().max(f64::MIN_POSITIVE);
+        let history = History { distance, values: self.monitored(before), spectrum: before.point.spectrum.clone() };
+        let length = between.chord.max(distance) * (1.0 + between.angle * between.angle / 24.0);
+        let (u, tangent) = (before.u.clone(), before.tangent.clone());
+        Trail { u, tangent, mesh: before.mesh.clone(), length, curvature: between.angle / length, history }
+    }
+
+    /// How two stations lie to each other, as the left one sees it.
+    pub(super) fn between(&mut self, left: &Station, right: &Station) -> Between {
+        self.place(left);
+        let tangent = self.problem.transfer(&right.tangent, &right.mesh, &left.mesh);
+        let mut chord = self.problem.transfer(&right.u, &right.mesh, &left.mesh);
+        chord.iter_mut().zip(&left.u).for_each(|(a, b)| *a -= b);
+        self.lie(left, &tangent, &chord)
+    }
+
+    /// The same from the right tangent and from the chord, on the mesh of `left`, where the problem is anchored.
+    pub(super) fn lie(&self, left: &Station, tangent: &[f64], chord: &[f64]) -> Between {
+        let dot = |a: &[f64], b: &[f64]| self.problem.dot(a, b);
+        let sizes = (dot(tangent, tangent) * dot(&left.tangent, &left.tangent)).sqrt();
+        let cosine = dot(&left.tangent, tangent) / sizes;
+        let (along, chord) = (dot(&left.tangent, chord), dot(chord, chord).sqrt());
+        Between { angle: cosine.clamp(-1.0, 1.0).acos(), along, chord }
+    }
+
+    /// Whether the mesh of `left` has served for a step already and has room left: what the tolerance leaves of what is stated, which is
+    /// several times the estimate.
+    fn trusts(&self, left: &Station, trail: Option<&Trail>) -> bool {
+        let room = left.point.trust.discretisation < left.share * self.settings.tolerance;
+        room && trail.is_some_and(|trail| trail.mesh == left.mesh)
+    }
+
+    /// The point at distance `step`: on the cubic through the last two points with their tangents.
+    fn predicted(&mut self, left: &Station, trail: Option<&Trail>, step: f64) -> Vec<f64> {
+        self.place(left);
+        let mut guess: Vec<f64> = left.u.iter().zip(&left.tangent).map(|(u, t)| u + step * t).collect();
+        let Some(trail) = trail else { return guess };
+        let (d, x) = (trail.length, step / trail.length);
+        let then = self.problem.transfer(&trail.tangent, &trail.mesh, &left.mesh);
+        if x > FARTHEST {
+            let bend = 0.5 * step * step / d.max(0.2 * step);
+            (0..guess.len()).for_each(|i| guess[i] += bend * (left.tangent[i] - then[i]));
+        } else {
+            let before = self.problem.transfer(&trail.u, &trail.mesh, &left.mesh);
+            for i in 0..guess.len() {
+                let (chord, turn) = (before[i] - left.u[i] + d * left.tangent[i], d * (then[i] - left.tangent[i]));
+                guess[i] += x * x * ((3.0 * chord + turn) + x * (2.0 * chord + turn));
+            }
+        }
+        let gap: Vec<f64> = guess.iter().zip(&left.u).map(|(a, b)| a - b).collect();
+        let off = step - self.problem.dot(&left.tangent, &gap);
+        guess.iter_mut().zip(&left.tangent).for_each(|(g, t)| *g += off * t);
+        guess
+    }
+
+    pub(super) fn attempt(
+        &mut self,
+        left: &Station,
+        trail: Option<&Trail>,
+        step: f64,
+        rigid: bool,
+        cost: &mut Cost,
+    ) -> Result<Step, Failure> {
+        let guess = self.predicted(left, trail, step);
+        // A step that would pass a bound is aimed at it; where that fails, the bound is looked for after the step.
+        if let Some((nearer, landing)) = self.landing(left, trail, &guess, step)
+            && !self.is_short(&left.mesh, nearer)
+            && let Ok(landed) = self.tried(left, trail, &landing, Aim::Value(nearer), rigid, cost)
+        {
+            return Ok(landed);
+        }
+        self.place(left);
+        self.tried(left, trail, &guess, Aim::Plane(step), rigid, cost)
+    }
+
+    /// Where the prediction passes a bound, within the step or a little farther: at what step, and the prediction there, with the
+    /// parameter at the bound.
+    fn landing(&mut self, left: &Station, trail: Option<&Trail>, guess: &[f64], step: f64) -> Option<(f64, Vec<f64>)> {
+        let last = guess.len() - 1;
+        let (here, way) = (left.parameter(), guess[last] - left.parameter());
+        let [low, high] = self.settings.range;
+        let there = here + STRETCHED * way;
+        let bound = if there < low { low } else { (there > high).then_some(high)? };
+        if left.slope() * way <= 0.0 || (here - bound) * way >= 0.0 {
+            return None;
+        }
+        let gap = |at: &[f64]| (at[last] - bound) * way.signum();
+        let farthest = STRETCHED * step;
+        let (mut inner, mut outer) =
+            ((0.0, -(here - bound).abs()), (farthest, gap(&self.predicted(left, trail, farthest))));
+        if outer.1 < 0.0 {
+            return None;
+        }
+        for _ in 0..20 {
+            let s = inner.0 + (outer.0 - inner.0) * inner.1 / (inner.1 - outer.1);
+            let mut landing = self.predicted(left, trail, s);
+            let miss = gap(&landing);
+            if miss > 0.0 {
+                outer = (s, miss)
+            } else {
+                inner = (s, miss)
+            }
+            if miss.abs() < NEAR_BOUND * (s * left.slope()).abs() {
+                landing[last] = bound;
+                return Some((s, landing));
+            }
+        }
+        None
+    }
+
+    /// The step to what was predicted, in the plane or at the value of the parameter that is aimed at.
+    fn tried(
+        &mut self,
+        left: &Station,
+        trail: Option<&Trail>,
+        guess: &[f64],
+        aim: Aim,
+        rigid: bool,
+        cost: &mut Cost,
+    ) -> Result<Step, Failure> {
+        let step = aim.step();
+        let (u, row) = self.corrected(left, guess, aim, cost)?;
+        let short = self.is_short(&left.mesh, step);
+        let mut right = if rigid && short {
+            let close = self.settings.closeness(&left.mesh, step);
+            self.unrefined(left, u, close, cost)?
+        } else {
+            let care = Care { trusted: self.trusts(left, trail), ..self.care(left, step) };
+            refine(self.problem, self.settings, care, row, u, self.direction, cost)?
+        };
+        if let Aim::Value(_) = aim {
+            // Where travel is towards smaller values the row has turned the tangent round.
+            right.head(left.slope());
+        }
+        if right.mesh != left.mesh && short {
+            return Err(Failure::Remeshed(right.mesh));
+        }
+        let mut miss = 0.0;
+        if !left.mesh.is_empty() {
+            miss = self.is_nearly_smooth(left, &right)?;
+        }
+        let between = self.continues(left, &right, guess)?;
+        if self.problem.departure(&right.u) > self.settings.newton_tolerance() {
+            return Err(Failure::Departed);
+        }
+        if trail.is_none() || left.mesh.is_empty() {
+            self.is_smooth(left, &mut right, cost)?;
+        }
+        self.leads_back(left, &right, cost)?;
+        if miss > BENT {
+            right.midway = self.midway(left, &right, cost)?;
+        }
+        if let Some(ended) = self.collapsed(left, &right, cost)? {
+            return Ok(ended);
+        }
+        let [low, high] = self.settings.range;
+        let bound = match aim {
+            Aim::Value(_) => Some(guess[guess.len() - 1]),
+            Aim::Plane(_) if right.parameter() < low => Some(low),
+            Aim::Plane(_) => (right.parameter() > high).then_some(high),
+        };
+        let (mut end, mut between) = (None, Some(between));
+        if let Some(bound) = bound {
+            between = None;
+            if let Aim::Plane(_) = aim {
+                right = self.at_parameter(left, &right, bound, cost)?;
+            }
+            // To the last bit, whatever rounding Newton's method left.
+            let last = right.u.len() - 1;
+            right.u[last] = bound;
+            if let Some(own) = right.point.parameters.get_mut(self.free) {
+                *own = bound;
+            }
+            end = Some(Ending::Bound(bound));
+        }
+        if let Some((value, there)) = self.beyond(left, &right, cost) {
+            return Ok(Step { right: there, end: Some(Ending::Bound(value)), between: None });
+        }
+        if let Some(home) = self.closes(left, &right, cost)? {
+            return Ok(Step { right: home, end: Some(Ending::Closed), between: None });
+        }
+        Ok(Step { right, end, between })
+    }
+}
