@@ -13,7 +13,7 @@ use crate::workplace::Workplace;
 use crate::{Outcome, clock, rotor};
 use foldline::diagram::{Branch, Diagram, Kind, Point, Solution};
 
-const INTERVALS: [usize; 2] = [100, 200];
+const INTERVALS: [usize; 3] = [100, 200, 400];
 const STEPS: [&str; 5] = ["0.01", "0.02", "0.05", "0.2", "1"];
 /// Length of a branch of cycles, in the largest of the usual steps, after which AUTO has surely been round or never will be …
 const FAR: f64 = 50.0;
@@ -175,8 +175,16 @@ fn kind_of(row: &Row) -> Option<Kind> {
     }
 }
 
-/// How many special points of the diagram AUTO has found, and how many it has that are not in the diagram.
-fn matched(diagram: &Diagram, special: &[(String, Row)]) -> (usize, usize) {
+/// What AUTO has found of the special points of a diagram.
+struct Matched {
+    found: usize,
+    /// How many of them are period doublings.
+    doublings: usize,
+    /// Special points that are not in the diagram.
+    other: usize,
+}
+
+fn matched(diagram: &Diagram, special: &[(String, Row)]) -> Matched {
     let root = |name: &str| name.split('/').next().unwrap_or("").to_string();
     let same = |branch: &Branch, kind: Kind, point: &Point, (name, row): &(String, Row)| {
         let omega = point.parameters[rotor::OMEGA];
@@ -187,9 +195,14 @@ fn matched(diagram: &Diagram, special: &[(String, Row)]) -> (usize, usize) {
             && period
     };
     let known: Vec<_> = diagram.branches.iter().flat_map(|b| b.special.iter().map(move |s| (b, s))).collect();
-    let found = known.iter().filter(|(b, s)| special.iter().any(|row| same(b, s.kind, &s.point, row))).count();
+    let found: Vec<Kind> = known
+        .iter()
+        .filter(|(b, s)| special.iter().any(|row| same(b, s.kind, &s.point, row)))
+        .map(|(_, s)| s.kind)
+        .collect();
+    let doublings = found.iter().filter(|kind| **kind == Kind::PeriodDoubling).count();
     let other = special.iter().filter(|row| !known.iter().any(|(b, s)| same(b, s.kind, &s.point, row))).count();
-    (found, other)
+    Matched { found: found.len(), doublings, other }
 }
 
 fn tour<'t>(auto: &'t Auto, starts: &Diagram, intervals: usize, step: &'t str) -> Outcome<Tour<'t>> {
@@ -207,7 +220,14 @@ pub fn compared(place: &Workplace) -> Outcome<String> {
     let all: usize = diagram.branches.iter().map(|branch| branch.special.len()).sum();
     let points: usize = diagram.branches.iter().map(|branch| branch.points.len()).sum();
     let auto = Auto::new(place, "rotor", "auto-diagrams")?;
-    let mut table = Table::new(&["", "points", "special points found", "not in the diagram", "processor time"]);
+    let mut table = Table::new(&[
+        "",
+        "points",
+        "special points found",
+        "period doublings of them",
+        "not in the diagram",
+        "processor time",
+    ]);
     let mut best: Option<(usize, f64, usize, &str)> = None;
     for intervals in INTERVALS {
         for step in STEPS {
@@ -215,13 +235,20 @@ pub fn compared(place: &Workplace) -> Outcome<String> {
             let tour = match tour(&auto, &starts, intervals, step) {
                 Ok(tour) => tour,
                 Err(why) => {
-                    table.row(&[name, "".into(), format!("failed: {why}"), "".into(), "".into()]);
+                    table.row(&[name, "".into(), format!("failed: {why}"), "".into(), "".into(), "".into()]);
                     continue;
                 }
             };
             eprintln!("  NTST {intervals}, DSMAX {step}: {}", time(tour.cpu));
-            let (found, other) = matched(&diagram, &tour.special);
-            table.row(&[name, tour.points.to_string(), format!("{found} of {all}"), other.to_string(), time(tour.cpu)]);
+            let Matched { found, doublings, other } = matched(&diagram, &tour.special);
+            table.row(&[
+                name,
+                tour.points.to_string(),
+                format!("{found} of {all}"),
+                doublings.to_string(),
+                other.to_string(),
+                time(tour.cpu),
+            ]);
             if best.is_none_or(|(most, cpu, ..)| found > most || (found == most && tour.cpu < cpu)) {
                 best = Some((found, tour.cpu, intervals, step));
             }
@@ -234,7 +261,10 @@ pub fn compared(place: &Workplace) -> Outcome<String> {
         ratios.push(tour(&auto, &starts, intervals, step)?.cpu / ours[ours.len() - 1]);
     }
     let name = format!("foldline, tolerance {:.0e}", study.plan.tolerance);
-    table.row(&[name, points.to_string(), format!("{all} of {all}"), "0".into(), time(clock::median(&ours))]);
+    let kinds = diagram.branches.iter().flat_map(|branch| &branch.special).map(|special| special.kind);
+    let doublings = kinds.filter(|kind| *kind == Kind::PeriodDoubling).count();
+    let own = [format!("{all} of {all}"), doublings.to_string(), "0".into(), time(clock::median(&ours))];
+    table.row(&[[name, points.to_string()].as_slice(), &own].concat());
     Ok(format!(
         "Branches from given first solutions, two levels of period doubling (NTST doubled at each), NCOL 4.\n\n{}\nAUTO's \
          special points are most complete ({found} of {all}) with NTST {intervals}, DSMAX {step}; foldline is {} times as \
