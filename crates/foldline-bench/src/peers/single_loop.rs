@@ -119,7 +119,8 @@ pub fn compared(place: &Workplace) -> Outcome<String> {
     let usual = usual(&auto, &system, like)?;
     let changes = constants(choice.intervals, choice.step);
     let (mut ours, mut theirs, mut idle, mut ratios) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-    for _ in 0..2 * place.repetitions() {
+    // Many, since each is short beside the time for which something else slows the machine down.
+    for _ in 0..12 * place.repetitions() {
         // Of AUTO's time what it takes to start is taken off below; the first run after a pause is the same here.
         rotor::run(&study, &study.plan, starts.clone());
         ours.push(clock::timed(|| rotor::run(&study, &study.plan, starts.clone())).0);

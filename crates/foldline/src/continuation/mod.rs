@@ -7,6 +7,7 @@
 //! |---|---|
 //! | Newton's method in a hyperplane; tangent | [`corrector`] |
 //! | from one accepted point to the next | [`mod@follow`] |
+//! | one step: predicted, corrected, compared with what it comes from | `step` |
 //! | whether a step may be accepted | `judge` |
 //! | why a side ends | `ends` |
 //! | what lies between two accepted points | [`inspect`] |

@@ -63,9 +63,9 @@ const FARTHEST: f64 = 2.5;
 const STRETCHED: f64 = 1.2;
 /// How close to a bound a prediction must be, as a share of its way there, to be moved to it.
 const NEAR_BOUND: f64 = 1e-4;
-
 /// Distance midway from the cubic through both ends, as a share of the step, from which on the parameter there is looked at.
 const BENT: f64 = 2e-3;
+
 impl Follow<'_> {
     /// What `before` contributes to the step from `now` on.
     pub(super) fn trail(&mut self, before: &Station, between: Between) -> Trail {
