@@ -17,7 +17,8 @@ pub(crate) mod tile;
 
 /// The larger one; NaN if either is NaN.
 pub fn larger(a: f64, b: f64) -> f64 {
-    // Not `if`: where the larger one stands in memory already that becomes a store under a mask, which some processors take very long for.
+    // A selection, so that it is one in vectors too. Loops keep the larger one in a variable: one that stays in memory becomes a store
+    // under a mask nevertheless, which some processors take very long for.
     std::hint::select_unpredictable((b > a) | b.is_nan(), b, a)
 }
 
