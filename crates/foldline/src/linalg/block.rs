@@ -36,7 +36,7 @@ pub fn shape<T: Lane>(pattern: &[bool], ends: &[bool], nodes: usize, columns: us
 
 /// Factorises the row-major n×n matrices `a` in place (the diagonal holds the inverse pivots) and solves a x = b for the
 /// `columns` right-hand sides in `b`, row-major `[n × columns]`. `pivots` is `[n × lanes]`. What `shape` says to be zero must be;
-/// `nodes` are its nodes, once more so that a caller who knows them can make them a constant.
+/// `nodes` are its nodes, once more so that a caller who knows them can make them a constant. `room` may hold anything.
 ///
 /// Returns whether any rows were exchanged.
 ///
@@ -51,22 +51,22 @@ pub fn factorise<T: Lane>(
     columns: usize,
     shape: &Shape,
     nodes: usize,
+    room: &mut Vec<T>,
 ) -> Result<bool, Singular> {
-    let mut room = Vec::new();
     // Lanes of numbers are never so.
     if T::COUNT == 1 && shape.is_plain() {
-        return panels(a, n, pivots, b, columns, 0, &mut room);
+        return panels(a, n, pivots, b, columns, 0, room);
     }
     // The usual degree as a constant.
     let reached = match nodes {
-        4 => blocks(a, n, b, columns, shape, 4, &mut room),
-        m => blocks(a, n, b, columns, shape, m, &mut room),
+        4 => blocks(a, n, b, columns, shape, 4, room),
+        m => blocks(a, n, b, columns, shape, m, room),
     };
     let exchanged = reached < n;
     if exchanged {
         (0..reached).for_each(|k| pivots[k * T::COUNT..(k + 1) * T::COUNT].fill(k as u32));
         if in_panels::<T>(n) {
-            panels(a, n, pivots, b, columns, reached, &mut room)?;
+            panels(a, n, pivots, b, columns, reached, room)?;
         } else {
             whole(a, n, pivots, b, columns, reached)?;
         }
@@ -532,7 +532,7 @@ mod tests {
         let mut turned = one.clone();
         let mut pivots = vec![0; 8 * n];
         let shape = Shape::new(&vec![true; n * n], &vec![true; n * n], 1, columns);
-        assert!(factorise(&mut a, n, &mut pivots, &mut b, columns, &shape, shape.nodes).unwrap());
+        assert!(factorise(&mut a, n, &mut pivots, &mut b, columns, &shape, shape.nodes, &mut Vec::new()).unwrap());
         solve(&a, n, &pivots, true, &mut one, &shape);
         solve_transposed(&a, n, &pivots, true, &mut turned, &shape);
         for l in 0..8 {
@@ -557,7 +557,7 @@ mod tests {
         a[3] = Eight([2.0, 2.0, 2.0, 1.0, 2.0, 2.0, 2.0, 2.0]);
         let mut none: [Eight; 0] = [];
         assert_eq!(
-            factorise(&mut a, 2, &mut [0; 16], &mut none, 0, &Shape::new(&[true; 4], &[true; 4], 1, 0), 1),
+            factorise(&mut a, 2, &mut [0; 16], &mut none, 0, &Shape::new(&[true; 4], &[true; 4], 1, 0), 1, &mut Vec::new()),
             Err(Singular)
         );
     }

@@ -52,6 +52,10 @@ pub struct Condensed<T> {
     pub corner: Vec<f64>,
     pivots: Vec<u32>,
     exchanged: Vec<bool>,
+    /// Room for the factorisation of a block.
+    tiles: Vec<T>,
+    /// `[(m + 1) · n]`: what stands in the lanes that have no interval.
+    nothing: Vec<f64>,
     step: Vec<T>,
     condensed_border: Vec<T>,
     pieces: Chain<T>,
@@ -64,7 +68,7 @@ impl<T: Lane> Condensed<T> {
     /// A system for dimension n, interval weights `end` (m + 1 of them), q scalars.
     pub fn new(n: usize, end: &[f64], q: usize) -> Condensed<T> {
         let m = end.len() - 1;
-        let mut system = Condensed { n, m, q, closure: 1.0, end: end.to_vec(), ..Condensed::default() };
+        let mut system = Condensed { n, m, q, closure: 1.0, end: end.to_vec(), nothing: vec![0.0; (m + 1) * n], ..Condensed::default() };
         let every = vec![true; n * n];
         system.arrange(block::shape::<T>(&every, &every, m, n + q));
         system
@@ -204,9 +208,8 @@ impl<T: Lane> Condensed<T> {
     #[inline(always)]
     fn deal(&self, from: &[f64], block: usize) -> Vec<T> {
         let mut out = vec![T::default(); self.length * block];
-        let nothing = vec![0.0; block];
         for (t, out) in out.chunks_exact_mut(block).enumerate() {
-            let mut own = [&nothing[..]; 8];
+            let mut own = [&self.nothing[..]; 8];
             for lane in 0..T::COUNT {
                 let j = lane * self.length + t;
                 if j < self.intervals {
@@ -271,7 +274,11 @@ fn total<T: Lane>(x: T) -> f64 {
 /// The lanes, one after the other, of vectors of n components.
 #[inline(always)]
 fn unzipped<T: Lane>(x: &[T]) -> Vec<f64> {
-    (0..T::COUNT).flat_map(|l| x.iter().map(move |x| x.lanes()[l])).collect()
+    let mut out = vec![0.0; T::COUNT * x.len()];
+    for (l, part) in out.chunks_exact_mut(x.len().max(1)).enumerate() {
+        part.iter_mut().zip(x).for_each(|(o, x)| *o = x.lanes()[l]);
+    }
+    out
 }
 
 struct Condense<'a, T>(&'a mut Condensed<T>);
@@ -299,13 +306,13 @@ impl<T: Lane> Condensed<T> {
     #[inline(always)]
     pub fn condense_at(&mut self, t: usize, [n, m, q]: [usize; 3]) -> Result<(), Singular> {
         let (inner, width) = (m * n, n + q);
-        let Condensed { interior, coupling, pivots, exchanged, step, shape, end, .. } = self;
+        let Condensed { interior, coupling, pivots, exchanged, step, shape, end, tiles, .. } = self;
         let a = &mut interior[t * inner * inner..(t + 1) * inner * inner];
         let w = &mut coupling[t * inner * width..(t + 1) * inner * width];
         let p = &mut pivots[t * inner * T::COUNT..(t + 1) * inner * T::COUNT];
         // Should it fail, every entry may have changed.
         exchanged[t] = true;
-        exchanged[t] = block::factorise(a, inner, p, w, width, shape, m)?;
+        exchanged[t] = block::factorise(a, inner, p, w, width, shape, m, tiles)?;
         let step = &mut step[t * n * width..(t + 1) * n * width];
         step.fill(T::default());
         for i in 0..n {
@@ -485,20 +492,21 @@ impl<T: Lane> Solve<'_, T> {
         }
         system.pieces.forward(h, taken, [n, q]);
         let mut ends = unzipped(&h[(length - 1) * n..]);
-        let mut tail = vec![0.0; width];
+        // The last system, then the ends of the pieces, from x_0 on and from the one after it on.
+        let mut room = vec![0.0; width + (T::COUNT + 1) * n];
+        let (tail, nodes) = room.split_at_mut(width);
         system.whole.forward(&mut ends, &mut tail[n..], [n, q]);
         for c in 0..q {
             tail[n + c] += rhs[size + c] + total(taken[c]);
         }
         tail[..n].copy_from_slice(&ends[(T::COUNT - 1) * n..]);
-        lu::solve(&system.last, width, &system.last_pivots, &mut tail, 1);
+        lu::solve(&system.last, width, &system.last_pivots, tail, 1);
         let (first, sigma) = tail.split_at(n);
-        let closing: Vec<f64> = first.iter().map(|v| closure * v).collect();
-        system.whole.backward(&mut ends, first, &closing, sigma, [n, q]);
-        // Ends of the pieces, from x_0 on and from the one after it on.
-        let mut nodes = first.to_vec();
-        nodes.extend_from_slice(&ends[..(T::COUNT - 1) * n]);
-        nodes.extend_from_slice(&closing);
+        let (beginning, closing) = nodes.split_at_mut(T::COUNT * n);
+        closing.iter_mut().zip(first).for_each(|(to, v)| *to = closure * v);
+        system.whole.backward(&mut ends, first, closing, sigma, [n, q]);
+        beginning[..n].copy_from_slice(first);
+        beginning[n..].copy_from_slice(&ends[..(T::COUNT - 1) * n]);
         zip(&nodes[..T::COUNT * n], left);
         zip(&nodes[n..], right);
         scalars.iter_mut().zip(sigma).for_each(|(to, s)| *to = T::splat(*s));

@@ -64,7 +64,7 @@ pub fn eigenvalues(factors: &[f64], p: usize) -> Option<Vec<Eigenvalue>> {
 
 /// Condition up to which neighbouring factors are multiplied together: it costs at most four digits of the smallest eigenvalue and
 /// none of the largest.
-const CONDITION: f64 = 1e4;
+pub(crate) const CONDITION: f64 = 1e4;
 
 /// Multiplies neighbouring factors together while their product stays well conditioned.
 ///
@@ -93,26 +93,17 @@ fn grouped(factors: &[f64], p: usize) -> Vec<f64> {
     }
     let mut out: Vec<f64> = Vec::new();
     let mut product = factors[..size].to_vec();
-    let powered = |factor: &[f64]| spread_of(factor, p).powi(p.max(2) as i32 - 1);
-    let mut bound = powered(&product);
-    let (mut candidate, mut lu) = (vec![0.0; size], vec![0.0; size]);
-    let mut pivots = vec![0; p];
+    let mut bound = spread_of(&product, p);
+    let mut candidate = vec![0.0; size];
     for factor in factors.chunks_exact(size).skip(1) {
         multiply(factor, &product, p, &mut candidate);
-        let own = powered(factor);
+        let own = spread_of(factor, p);
         if bound * own < CONDITION {
             bound *= own;
             std::mem::swap(&mut product, &mut candidate);
             continue;
         }
-        lu.copy_from_slice(&candidate);
-        let condition = match super::lu::factorise(&mut lu, p, &mut pivots) {
-            Ok(()) => {
-                let mean = (candidate.iter().map(|x| x * x).sum::<f64>() / p as f64).sqrt();
-                (p as f64 * mean.ln() - super::lu::determinant(&lu, p, &pivots).1).exp()
-            }
-            Err(_) => f64::INFINITY,
-        };
+        let condition = condition(&mut candidate.clone(), p);
         if condition < CONDITION {
             bound = condition;
             std::mem::swap(&mut product, &mut candidate);
@@ -126,7 +117,30 @@ fn grouped(factors: &[f64], p: usize) -> Vec<f64> {
     out
 }
 
-/// A bound of κ in (4): where |FᵀF - 1| ≤ δ in the Frobenius norm, σ² lies within 1 ± δ. Infinite where that says nothing.
+/// c(F) of (4); the matrix is overwritten.
+pub(crate) fn condition(matrix: &mut [f64], p: usize) -> f64 {
+    let mean = (matrix.iter().map(|x| x * x).sum::<f64>() / p as f64).sqrt();
+    let mut pivots = vec![0; p];
+    match super::lu::factorise(matrix, p, &mut pivots) {
+        Ok(()) => (p as f64 * mean.ln() - super::lu::determinant(matrix, p, &pivots).1).exp(),
+        Err(_) => f64::INFINITY,
+    }
+}
+
+/// A bound of κ in (4) to the power p - 1, 1 at least, from `delta2`, the square of δ: where |FᵀF - 1| ≤ δ in the Frobenius norm, σ² lies
+/// within 1 ± δ. Infinite where that says nothing.
+#[inline(always)]
+pub(crate) fn spread(delta2: f64, p: usize) -> f64 {
+    let delta = delta2.sqrt();
+    let square = (1.0 + delta) / (1.0 - delta);
+    let power = match p {
+        3 => square,
+        p => square.sqrt().powi(p.max(2) as i32 - 1),
+    };
+    if delta2 < 1.0 { power } else { f64::INFINITY }
+}
+
+/// That of a factor.
 #[inline(always)]
 fn spread_of(factor: &[f64], p: usize) -> f64 {
     let factor = &factor[..p * p];
@@ -137,7 +151,7 @@ fn spread_of(factor: &[f64], p: usize) -> f64 {
             delta2 += if i == k { (product - 1.0) * (product - 1.0) } else { 2.0 * product * product };
         }
     }
-    if delta2 < 1.0 { ((1.0 + delta2.sqrt()) / (1.0 - delta2.sqrt())).sqrt() } else { f64::INFINITY }
+    spread(delta2, p)
 }
 
 /// log |det (F_K ⋯ F_1)| of [`group`]ed factors.

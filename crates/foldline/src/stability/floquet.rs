@@ -13,6 +13,7 @@
 //!
 //! **Source.** lust2001; (2) is Liouville's formula.
 
+use super::reduction::{self, Reduced};
 use crate::linalg::periodic_schur;
 use num_complex::Complex64;
 
@@ -27,86 +28,64 @@ pub struct Floquet {
     pub log_product: f64,
 }
 
+/// What multipliers are made from.
+#[derive(Clone, Copy)]
+pub struct Course<'a> {
+    /// `[N]` G_j row-major n×n, those of the even j and those of the odd ones: each is read from its own list.
+    pub transitions: [&'a [f64]; 2],
+    /// Along the flow; a forced cycle has none, and no trivial multiplier.
+    pub frames: Option<&'a Frames>,
+}
+
 /// Multipliers of an autonomous cycle. `transitions`: `[N]` G_j row-major n×n, in the components of the flow that the frames were made
 /// from.
 pub fn multipliers(transitions: &[f64], frames: &Frames, n: usize) -> Floquet {
-    // Small dimensions as constants.
-    let (factors, Trivial { sign, log: log_trivial }) = match n {
-        2 => split(transitions, frames, 2),
-        3 => split(transitions, frames, 3),
-        4 => split(transitions, frames, 4),
-        n => split(transitions, frames, n),
-    };
-    let grouped = periodic_schur::group(&factors, n - 1);
-    let log_others = periodic_schur::log_determinant(&grouped, n - 1);
-    let others = periodic_schur::eigenvalues(&grouped, n - 1);
-    let unstable = others.iter().flatten().filter(|e| e.log_modulus > 0.0).count();
-    let mut multipliers = vec![Complex64::new(sign * log_trivial.exp(), 0.0)];
-    match others {
-        Some(found) => multipliers.extend(found.into_iter().map(|e| e.value())),
-        None => multipliers.extend(vec![Complex64::new(f64::NAN, f64::NAN); n - 1]),
-    }
-    Floquet { multipliers, unstable, log_product: log_trivial + log_others }
-}
-
-/// ∏ g_j of (1).
-struct Trivial {
-    sign: f64,
-    log: f64,
-}
-
-/// (1): the S_j, row-major one after the other, and the product of the g_j.
-#[inline(always)]
-fn split(transitions: &[f64], frames: &Frames, n: usize) -> (Vec<f64>, Trivial) {
-    // Where a product is taken as its logarithm, long before it leaves the range of f64.
-    const FAR: f64 = 1e100;
-    let count = frames.signs.len();
-    let (mut product, mut log) = (1.0, 0.0);
-    let mut factors = Vec::with_capacity(count * (n - 1) * (n - 1));
-    let (mut g, mut line) = (vec![0.0; n * n], vec![0.0; n]);
-    for (j, own) in transitions.chunks_exact(n * n).enumerate() {
-        let next = if j + 1 < count { j + 1 } else { 0 };
-        g.copy_from_slice(own);
-        frames.columns(j, &mut g, n);
-        frames.rows(next, &mut g, n, &mut line);
-        product *= g[0];
-        if !(1.0 / FAR..FAR).contains(&f64::abs(product)) {
-            log += product.abs().ln();
-            product = product.signum();
-        }
-        for i in 1..n {
-            factors.extend_from_slice(&g[i * n + 1..(i + 1) * n]);
-        }
-    }
-    (factors, Trivial { sign: product.signum(), log: log + product.abs().ln() })
+    one(Course { transitions: [transitions; 2], frames: Some(frames) }, &vec![1.0; n])
 }
 
 /// Multipliers of a forced cycle, none of which is trivial. `transitions`: `[N]` G_j row-major n×n.
 pub fn forced(transitions: &[f64], n: usize) -> Floquet {
-    let grouped = periodic_schur::group(transitions, n);
-    let log_product = periodic_schur::log_determinant(&grouped, n);
-    let found = periodic_schur::eigenvalues(&grouped, n);
-    let unstable = found.iter().flatten().filter(|e| e.log_modulus > 0.0).count();
-    let multipliers = match found {
-        Some(found) => found.into_iter().map(|e| e.value()).collect(),
-        None => vec![Complex64::new(f64::NAN, f64::NAN); n],
-    };
-    Floquet { multipliers, unstable, log_product }
+    one(Course { transitions: [transitions; 2], frames: None }, &vec![1.0; n])
 }
 
-/// The Q_j of (1): reflections 1 - v vᵀ, times a sign on their first column.
+/// Multipliers of one course, as those of [`several`].
+pub fn one(course: Course, scale: &[f64]) -> Floquet {
+    several([course], scale).map(|[found]| found).unwrap_or_default()
+}
+
+/// Multipliers of up to eight courses with as many intervals each, all with frames or all without. `scale` `[n]` are the sizes of the components: the
+/// frames are along the flow measured in them. Nothing where there are more courses, or transitions are missing.
+pub fn several<const K: usize>(courses: [Course; K], scale: &[f64]) -> Option<[Floquet; K]> {
+    let n = scale.len();
+    let mut reduced = reduction::reduced(&courses, scale)?.into_iter();
+    Some(courses.map(|course| {
+        let trivial = usize::from(course.frames.is_some());
+        let Reduced { factors, sign, log } = reduced.next().unwrap_or_default();
+        let grouped = periodic_schur::group(&factors, n - trivial);
+        let log_others = periodic_schur::log_determinant(&grouped, n - trivial);
+        let others = periodic_schur::eigenvalues(&grouped, n - trivial);
+        let unstable = others.iter().flatten().filter(|e| e.log_modulus > 0.0).count();
+        let mut multipliers = vec![Complex64::new(sign * log.exp(), 0.0); trivial];
+        match others {
+            Some(found) => multipliers.extend(found.into_iter().map(|e| e.value())),
+            None => multipliers.extend(vec![Complex64::new(f64::NAN, f64::NAN); n - trivial]),
+        }
+        Floquet { multipliers, unstable, log_product: log + log_others }
+    }))
+}
+
+/// The Q_j of (1): reflections 1 - v vᵀ, whose first columns lie along the flow or against it. Which of the two is of no account: each is
+/// met twice on the way round.
 #[derive(Clone, Debug)]
 pub struct Frames {
     /// `[N][n]`.
     v: Vec<f64>,
-    /// `[N]`.
-    signs: Vec<f64>,
 }
 
 impl Frames {
     /// Along `flow`, `[N][n]` x' at the left ends.
     pub fn along(flow: &[f64], n: usize) -> Frames {
-        let mut frames = Frames { v: flow.to_vec(), signs: vec![1.0; flow.len() / n.max(1)] };
+        let mut frames = Frames { v: flow.to_vec() };
         // Small dimensions as constants.
         match n {
             2 => frames.turn(2),
@@ -120,44 +99,22 @@ impl Frames {
     /// Replaces directions by the reflections whose first columns lie along them.
     #[inline(always)]
     fn turn(&mut self, n: usize) {
-        for (v, sign) in self.v.chunks_exact_mut(n).zip(&mut self.signs) {
+        for v in self.v.chunks_exact_mut(n) {
             let norm = product(v, v, n).sqrt();
             for i in 0..n {
                 v[i] = if norm > 0.0 { v[i] / norm } else { 0.0 };
             }
-            // The reflection takes e_1 to ∓ the direction; the sign that avoids cancellation, undone by `signs`.
-            *sign = if v[0] > 0.0 { -1.0 } else { 1.0 };
-            v[0] -= *sign;
+            // The reflection takes e_1 to ∓ the direction: the one that avoids cancellation.
+            v[0] += if v[0] > 0.0 { 1.0 } else { -1.0 };
             let size = product(v, v, n);
             let scale = if size > 0.0 { (2.0 / size).sqrt() } else { 0.0 };
             (0..n).for_each(|i| v[i] *= scale);
         }
     }
 
-    /// g Q_j.
-    #[inline(always)]
-    fn columns(&self, j: usize, g: &mut [f64], n: usize) {
-        let (v, g) = (&self.v[j * n..j * n + n], &mut g[..n * n]);
-        for i in 0..n {
-            let row = &mut g[i * n..(i + 1) * n];
-            let s = product(row, v, n);
-            (0..n).for_each(|k| row[k] -= s * v[k]);
-            row[0] *= self.signs[j];
-        }
-    }
-
-    /// Q_jᵀ g; `s` is room for a row.
-    #[inline(always)]
-    fn rows(&self, j: usize, g: &mut [f64], n: usize, s: &mut [f64]) {
-        let (v, g, s) = (&self.v[j * n..j * n + n], &mut g[..n * n], &mut s[..n]);
-        s.fill(0.0);
-        for i in 0..n {
-            (0..n).for_each(|k| s[k] += v[i] * g[i * n + k]);
-        }
-        for i in 0..n {
-            (0..n).for_each(|k| g[i * n + k] -= v[i] * s[k]);
-        }
-        (0..n).for_each(|k| g[k] *= self.signs[j]);
+    /// v of Q_j, `[n]`.
+    pub(super) fn reflection(&self, j: usize, n: usize) -> &[f64] {
+        &self.v[j * n..(j + 1) * n]
     }
 }
 
@@ -166,4 +123,94 @@ impl Frames {
 fn product(a: &[f64], b: &[f64], n: usize) -> f64 {
     let (a, b) = (&a[..n], &b[..n]);
     (0..n).map(|k| a[k] * b[k]).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Numbers between -1 and 1.
+    fn numbers(count: usize, seed: f64) -> Vec<f64> {
+        (0..count).map(|k| 2.0 * ((k * k) as f64 * 0.618 + seed * (1.0 + 0.37 * k as f64)).sin().abs().fract() - 1.0).collect()
+    }
+
+    /// Transitions that carry a flow round, `[N]` n×n, and the flow `[N][n]`.
+    fn carried(count: usize, n: usize, seed: f64) -> (Vec<f64>, Vec<f64>) {
+        let flow = numbers(count * n, 0.3);
+        let mut transitions = numbers(count * n * n, seed);
+        for j in 0..count {
+            let (here, next) = (&flow[j * n..(j + 1) * n], &flow[(j + 1) % count * n..][..n]);
+            let size: f64 = here.iter().map(|x| x * x).sum();
+            for i in 0..n {
+                let row = &mut transitions[(j * n + i) * n..][..n];
+                let miss = next[i] - row.iter().zip(here).map(|(g, x)| g * x).sum::<f64>();
+                row.iter_mut().zip(here).for_each(|(g, x)| *g += miss * x / size);
+            }
+        }
+        (transitions, flow)
+    }
+
+    /// Eigenvalues of the product of the transitions, even ones from one list and odd ones from another.
+    fn reference(transitions: [&[f64]; 2], count: usize, n: usize) -> Vec<Complex64> {
+        let of = |j: usize| faer::Mat::from_fn(n, n, |i, k| transitions[j % 2][(j * n + i) * n + k]);
+        (1..count).fold(of(0), |product, j| of(j) * product).eigenvalues().unwrap()
+    }
+
+    fn assert_same(found: &[Complex64], expected: &[Complex64], what: &str) {
+        assert_eq!(found.len(), expected.len());
+        let largest = expected.iter().fold(1.0f64, |m, z| m.max(z.norm()));
+        for z in expected {
+            let nearest = found.iter().map(|w| (w - z).norm()).fold(f64::INFINITY, f64::min);
+            assert!(nearest < 1e-9 * largest, "{what}: {z} is {nearest} from {found:?}");
+        }
+    }
+
+    #[test]
+    fn several_spectra_agree_with_products_that_are_multiplied_out() {
+        for (n, count) in [(1, 3), (2, 1), (2, 9), (3, 4), (4, 1), (4, 7), (4, 8), (4, 19), (5, 11)] {
+            let ((own, flow), (other, _)) = (carried(count, n, 0.45), carried(count, n, 1.9));
+            let frames = Frames::along(&flow, n);
+            let what = format!("n = {n}, {count} intervals");
+            let [a, b, c] = [[&*own, &*own], [&*other, &*own], [&*other, &*other]]
+                .map(|transitions| Course { transitions, frames: Some(&frames) });
+            let found = several([a, b, c], &vec![1.0; n]).unwrap();
+            for (found, course) in found.iter().zip([a, b, c]) {
+                assert!((found.multipliers[0] - 1.0).norm() < 1e-9, "{what}: {:?}", found.multipliers);
+                assert_same(&found.multipliers, &reference(course.transitions, count, n), &what);
+            }
+            // One in eight pieces, and without the direction of the flow.
+            assert_same(&one(b, &vec![1.0; n]).multipliers, &reference(b.transitions, count, n), &what);
+            assert_same(&forced(&own, n).multipliers, &reference(a.transitions, count, n), &what);
+        }
+    }
+
+    #[test]
+    fn scales_change_what_the_frames_are_along_and_no_multiplier() {
+        let (n, count) = (3, 10);
+        let (transitions, flow) = carried(count, n, 0.45);
+        let scale = [2.0, 0.1, 30.0];
+        let measured: Vec<f64> = flow.iter().enumerate().map(|(k, x)| x / scale[k % n]).collect();
+        let frames = Frames::along(&measured, n);
+        let found = one(Course { transitions: [&transitions; 2], frames: Some(&frames) }, &scale);
+        assert!((found.multipliers[0] - 1.0).norm() < 1e-9);
+        assert_same(&found.multipliers, &reference([&transitions; 2], count, n), "scaled");
+    }
+
+    #[test]
+    fn products_far_beyond_the_range_of_numbers_keep_their_logarithm() {
+        // Along the flow every transition is the identity; across it 10^40 and 10^-45, forty times.
+        let (n, count) = (3, 40);
+        let transitions: Vec<f64> = (0..count).flat_map(|_| [1.0, 0.0, 0.0, 0.0, 1e40, 0.0, 0.0, 0.0, 1e-45]).collect();
+        let flow: Vec<f64> = (0..count).flat_map(|_| [1.0, 0.0, 0.0]).collect();
+        let found = multipliers(&transitions, &Frames::along(&flow, n), n);
+        assert_eq!(found.unstable, 1);
+        assert!((found.log_product / std::f64::consts::LN_10 + 200.0).abs() < 1e-6, "{}", found.log_product);
+        // Where the flow itself is stretched, the trivial product leaves the range on the way and comes back.
+        let stretched: Vec<f64> =
+            (0..count).flat_map(|j| [if j < 20 { 1e60 } else { 1e-60 }, 0.0, 0.0, 2.0]).collect();
+        let flow: Vec<f64> = (0..count).flat_map(|_| [1.0, 0.0]).collect();
+        let found = multipliers(&stretched, &Frames::along(&flow, 2), 2);
+        assert!((found.multipliers[0] - 1.0).norm() < 1e-9, "{:?}", found.multipliers);
+        assert!((found.log_product - 40.0 * 2f64.ln()).abs() < 1e-9);
+    }
 }

@@ -1,6 +1,7 @@
 //! Is it stable? Eigenvalues of equilibria, Floquet multipliers of cycles.
 
 pub mod floquet;
+mod reduction;
 
 use crate::linalg::periodic_schur;
 use num_complex::Complex64;

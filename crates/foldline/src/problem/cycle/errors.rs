@@ -4,6 +4,7 @@ use super::CycleProblem;
 use crate::contract::{Batch, Parameters, ZeroProblem};
 use crate::linalg::{panel, same};
 use crate::problem::defect::{self, Course, Defect};
+use crate::stability::floquet;
 use num_complex::Complex64;
 use std::ops::Range;
 
@@ -120,17 +121,12 @@ impl CycleProblem<'_> {
             self.correct(first..(first + TOGETHER).min(self.intervals()), &profiles, &mut transitions, room);
         }
         let [own, other] = transitions;
-        let square = self.n * self.n;
         let [frames, others] = [u, &better].map(|u| self.frames(u));
-        let halfway = |from: &[f64], to: &[f64]| -> Vec<Complex64> {
-            let mut mixed = from.to_vec();
-            let seconds = mixed.chunks_exact_mut(square).zip(to.chunks_exact(square)).step_by(2);
-            seconds.for_each(|(x, y)| x.copy_from_slice(y));
-            self.floquet_of(frames.as_ref(), mixed).multipliers
-        };
-        let (first, third) = (halfway(&plain, &own), halfway(&own, &other));
-        let second = self.floquet_of(frames.as_ref(), own).multipliers;
-        let found = [first, second, third, self.floquet_of(others.as_ref(), other).multipliers];
+        // Those of the even intervals and those of the odd ones, and the frames.
+        let courses = [(&own, &plain, &frames), (&own, &own, &frames), (&other, &own, &frames), (&other, &other, &others)];
+        let courses = courses
+            .map(|(even, odd, frames)| floquet::Course { transitions: [even, odd], frames: frames.as_ref() });
+        let found = floquet::several(courses, &self.scale)?.map(|found| found.multipliers);
         found.iter().flatten().all(|z| z.re.is_finite() && z.im.is_finite()).then_some(found)
     }
 

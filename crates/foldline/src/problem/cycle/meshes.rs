@@ -71,13 +71,17 @@ impl CycleProblem<'_> {
             let (j, block) = (self.mesh.partition_point(|b| *b <= t).clamp(1, self.intervals()) - 1, self.block());
             self.scheme.value_into((t - self.mesh[j]) / self.h(j), &u[j * block..(j + 1) * block], x);
         };
-        let (mut x, mut y) = (vec![0.0; self.n], vec![0.0; self.n]);
-        let (mut apart, mut lowest) = (vec![0.0f64; self.n], vec![f64::INFINITY; self.n]);
-        let mut highest = vec![f64::NEG_INFINITY; self.n];
+        let mut room = vec![0.0f64; 5 * self.n];
+        let (x, rest) = room.split_at_mut(self.n);
+        let (y, rest) = rest.split_at_mut(self.n);
+        let (apart, rest) = rest.split_at_mut(self.n);
+        let (lowest, highest) = rest.split_at_mut(self.n);
+        lowest.fill(f64::INFINITY);
+        highest.fill(f64::NEG_INFINITY);
         for k in 0..PLACES {
             let t = 0.5 * (k as f64 + 0.3) / PLACES as f64;
-            state(t, &mut x);
-            state(t + 0.5, &mut y);
+            state(t, x);
+            state(t + 0.5, y);
             for c in 0..self.n {
                 apart[c] = apart[c].max((x[c] - y[c]).abs());
                 lowest[c] = lowest[c].min(x[c].min(y[c]));

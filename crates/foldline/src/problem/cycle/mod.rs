@@ -42,7 +42,7 @@ use crate::diagram::{Cycle, Mesh, Point, Solution, Trust};
 use crate::linalg::lane::{Eight, Lane};
 use crate::linalg::system::System;
 use crate::linalg::{all_finite, larger, same};
-use crate::stability::floquet::{self, Floquet, Frames};
+use crate::stability::floquet::{self, Course, Floquet, Frames};
 use errors::{Measured, Room};
 use num_complex::Complex64;
 use std::cell::RefCell;
@@ -189,7 +189,9 @@ impl<'a> CycleProblem<'a> {
 
     /// Multipliers from the last factorisation, which belongs to `u`.
     fn floquet(&self, u: &[f64]) -> Floquet {
-        self.floquet_of(self.frames(u).as_ref(), self.transitions())
+        let (frames, transitions) = (self.frames(u), self.transitions());
+        let course = Course { transitions: [&transitions; 2], frames: frames.as_ref() };
+        floquet::one(course, &self.scale)
     }
 
     /// `[N][n × n]`: how the right end of each interval follows from its left end.
@@ -204,19 +206,6 @@ impl<'a> CycleProblem<'a> {
         (!self.is_forced()).then(|| Frames::along(&self.flow_at_nodes(u), self.n))
     }
 
-    /// Multipliers from transitions.
-    fn floquet_of(&self, frames: Option<&Frames>, mut transitions: Vec<f64>) -> Floquet {
-        let n = self.n;
-        let factors: Vec<f64> = (0..n * n).map(|k| self.scale[k % n] / self.scale[k / n]).collect();
-        for own in transitions.chunks_exact_mut(n * n) {
-            own.iter_mut().zip(&factors).for_each(|(g, factor)| *g *= factor);
-        }
-        match frames {
-            None => floquet::forced(&transitions, n),
-            Some(frames) => floquet::multipliers(&transitions, frames, n),
-        }
-    }
-
     fn block(&self) -> usize {
         (self.scheme.degree + 1) * self.n
     }
@@ -226,15 +215,17 @@ impl<'a> CycleProblem<'a> {
         // All components of all nodes of an interval at once, so that the loop is one over lanes.
         let mut largest = vec![0.0f64; (self.scheme.degree + 1) * self.n];
         Eight::dispatch(Largest { profile: &u[..self.profile_size()], largest: &mut largest });
-        let mut sizes = largest.split_off(largest.len() - self.n);
-        for node in largest.chunks_exact(self.n) {
-            sizes.iter_mut().zip(node).for_each(|(size, v)| *size = larger(*size, *v));
+        for k in self.n..largest.len() {
+            largest[k % self.n] = larger(largest[k % self.n], largest[k]);
         }
-        sizes
+        largest.truncate(self.n);
+        largest
     }
 
     fn relative_scale(&self, u: &[f64]) -> Vec<f64> {
-        self.sizes(u).iter().zip(self.setting.scales).map(|(size, scale)| size + scale).collect()
+        let mut sizes = self.sizes(u);
+        sizes.iter_mut().zip(self.setting.scales).for_each(|(size, scale)| *size += scale);
+        sizes
     }
 }
 
