@@ -3,8 +3,12 @@
 use crate::report::{Table, digits, time};
 use crate::workplace::Workplace;
 use crate::{Outcome, child, clock, rotor};
-use foldline::diagram::Diagram;
+use foldline::contract::ZeroProblem;
+use foldline::diagram::{Diagram, Solution};
+use foldline::explore::System;
 use foldline_store::run_file;
+use foldline_store::study_file::Study;
+use std::hint::black_box;
 use std::path::Path;
 use std::process::Command;
 
@@ -24,22 +28,61 @@ pub fn whole(place: &Workplace) -> Outcome<String> {
     let (cpu, wall, memory) = (all(|u| u.cpu), all(|u| u.wall), all(|u| u.memory));
     let diagram = run_file::load(&out.join("0"))?.diagram;
 
-    // Without the sampling of first solutions, in this process.
+    // Its parts by themselves, in this process.
     let study = rotor::study(place, rotor::FIGURE_7)?;
     let starts = rotor::beginnings(&study);
-    let branches: Vec<f64> = (0..place.repetitions().min(5))
-        .map(|_| clock::timed(|| rotor::run(&study, &study.plan, starts.clone())).0)
-        .collect();
+    let again = || 0..place.repetitions().min(5);
+    let sampled: Vec<f64> = again().map(|_| clock::timed(|| rotor::beginnings(&study)).0).collect();
+    let branches: Vec<f64> =
+        again().map(|_| clock::timed(|| rotor::run(&study, &study.plan, starts.clone())).0).collect();
+    let parts = again().map(|_| repeated(&study, &diagram)).collect::<Outcome<Vec<[f64; 2]>>>()?;
+    let part = |which: usize| parts.iter().map(|part| part[which]).collect::<Vec<f64>>();
 
     let mut table = Table::new(&["one thread", "best", "median"]);
     let row = |name: &str, values: &[f64]| [name.to_string(), time(clock::least(values)), time(clock::median(values))];
     table.row(&row("processor time of `foldline run --jobs 1`", &cpu));
     table.row(&row("wall time of the same", &wall));
+    table.row(&row("processor time of the first solutions alone", &sampled));
     table.row(&row("processor time of the branches alone, first solutions given, nothing stored", &branches));
+    table.row(&row(
+        "of Newton's method alone: as many residuals, factorisations and solutions on the mesh of every cycle",
+        &part(0),
+    ));
+    table.row(&row("of the examination of every cycle alone: multipliers, errors, ranges, once each", &part(1)));
     table.row(&["largest resident memory".to_string(), format!("{} MB", digits(clock::median(&memory)))]);
     table.row(&["instructions".to_string(), instructions(place, &out)?]);
     let special: usize = diagram.branches.iter().map(|branch| branch.special.len()).sum();
     Ok(format!("{}\n{special} special points.\n\n{}", table.text(), work(&diagram)))
+}
+
+/// Processor time of what every cycle of a diagram cannot do without, by itself: as many residuals, factorisations and solutions as its counters
+/// say, on its own mesh (some were on finer ones), and one examination.
+fn repeated(study: &Study, diagram: &Diagram) -> Outcome<[f64; 2]> {
+    let system = System::of_plan(&study.model, &study.plan);
+    let mut total = [0.0; 2];
+    for (branch, point) in diagram.branches.iter().flat_map(|b| b.points.iter().map(move |point| (b, point))) {
+        let Solution::Cycle(cycle) = &point.solution else { continue };
+        let (mut problem, u) = rotor::on_mesh(&system, point, branch.free, &cycle.mesh)?;
+        let (mut r, mut du, mut row) = (vec![0.0; u.len()], vec![0.0; u.len()], vec![0.0; u.len()]);
+        row[u.len() - 1] = 1.0;
+        total[0] += clock::timed(|| {
+            for _ in 0..point.cost.factorisations {
+                // Next to a fold the matrix of that row is singular, which takes as long.
+                let _ = black_box(problem.factorise(&u, &row));
+            }
+            for _ in 0..point.cost.newton {
+                black_box(problem.residual(&u, &mut r));
+                problem.solve(&r, black_box(&mut du));
+            }
+        })
+        .0;
+        total[1] += clock::timed(|| {
+            let found = problem.examine(&u);
+            black_box(problem.spectrum_error(&u, &found.spectrum));
+        })
+        .0;
+    }
+    Ok(total)
 }
 
 /// The counters of every branch.

@@ -66,7 +66,8 @@ pub(super) fn survey(
         }
     }
     census.left += sampling.samples.saturating_sub(taken * BLOCK);
-    reached.retain(|known| known.hits > 0);
+    // A survey to its end names what samples go to.
+    reached.retain(|known| known.hits > 0 || ended);
     reached.sort_by(|a, b| {
         let key = |known: &Reached| known.orbit.point.solution.period().unwrap_or_else(|| known.orbit.norm());
         let cycle = |known: &Reached| known.orbit.point.solution.period().is_some();
@@ -75,10 +76,13 @@ pub(super) fn survey(
     census.attractors = reached
         .into_iter()
         .map(|known| Attractor {
+            example: match known.hits {
+                0 => known.orbit.start().to_vec(),
+                _ => starts[known.first * n..(known.first + 1) * n].to_vec(),
+            },
             ratio: known.orbit.ratio,
             point: known.orbit.point,
             hits: known.hits,
-            example: starts[known.first * n..(known.first + 1) * n].to_vec(),
         })
         .collect();
     census
@@ -204,9 +208,12 @@ fn watch_block(context: &Context, starts: &[f64], reached: &[Reached], enough: E
     let mut hit: Vec<bool> = reached.iter().map(|known| known.hits > 0).collect();
     let mut watches = vec![Watch::new(n); starts.len().checked_div(n).unwrap_or(0)];
     let (count, mut settled, mut ended) = (watches.len(), 0, false);
+    // What is known attracts, by its spectrum. Of several equilibria, or cycles, that with the most samples is preferred: they have to be
+    // seen.
     let suffices = |orbits: &[Orbit], hit: &[bool]| {
-        let found = orbits.iter().zip(hit).filter(|(_, hit)| **hit).map(|(orbit, _)| (&orbit.point, orbit.ratio));
-        enough(&found.collect::<Vec<_>>())
+        let alone = |orbit: &Orbit| orbits.iter().filter(|other| other.is_cycle() == orbit.is_cycle()).count() == 1;
+        let found = orbits.iter().zip(hit).filter(|(orbit, hit)| **hit || alone(orbit));
+        enough(&found.map(|(orbit, _)| (&orbit.point, orbit.ratio)).collect::<Vec<_>>())
     };
     let ensemble = Ensemble::new(context.field, context.parameters, context.tolerance(), starts, [0.0, f64::INFINITY])
         .with_step_limit(STEP_LIMIT);
@@ -216,10 +223,12 @@ fn watch_block(context: &Context, starts: &[f64], reached: &[Reached], enough: E
         }
         let watch = &mut watches[step.trajectory()];
         let verdict = watch.observe(step, &mut orbits, context);
-        if let Some(index) = watch.settled {
+        if watch.settled.is_some() || orbits.len() > hit.len() {
             hit.resize(orbits.len(), false);
-            hit[index] = true;
-            settled += 1;
+            if let Some(index) = watch.settled {
+                hit[index] = true;
+                settled += 1;
+            }
             ended = 2 * settled >= count && suffices(&orbits, &hit);
         }
         verdict
@@ -232,7 +241,6 @@ fn watch_block(context: &Context, starts: &[f64], reached: &[Reached], enough: E
         (None, _) => Fate::Unsettled,
     });
     let fates = fates.collect();
-    hit.resize(orbits.len(), false);
     ended |= suffices(&orbits, &hit);
     Watched { orbits, fates, ended }
 }

@@ -54,9 +54,9 @@ pub struct Attractor {
     pub point: Point,
     /// Spectral ratio of a cycle such as 2:1, where a whirl plane was named; see [`spectral_ratio`].
     pub ratio: Option<(u32, u32)>,
-    /// How many trajectories went there.
+    /// How many trajectories went there; 0 where its spectrum says that it attracts, and the survey ended before one did.
     pub hits: usize,
-    /// `[n]` initial state of the first of them.
+    /// `[n]` initial state of the first of them, or where there is none a state of its own.
     pub example: Vec<f64>,
 }
 
@@ -106,8 +106,9 @@ pub fn survey(field: &dyn VectorField, parameters: &[f64], sampling: &Sampling, 
 }
 
 /// The same, but no further than needed: it ends with the first block of 32 samples in which half of them or more have settled
-/// and `enough` says so of the attractors reached until then, each with its spectral ratio. Which these are depends on the
-/// order of the samples, not on the number of threads.
+/// and `enough` says so of the attractors known until then, each with its spectral ratio: those reached, and those that Newton's method has
+/// found on the way, whose spectrum says that they attract, and of which only one equilibrium, or only one cycle, is known. Which these are depends on the order of the samples, not on the number of
+/// threads.
 pub fn survey_until(
     field: &dyn VectorField,
     parameters: &[f64],

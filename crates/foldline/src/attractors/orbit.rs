@@ -123,6 +123,11 @@ impl Orbit {
         })
     }
 
+    /// Whether it is one of a cycle.
+    pub(super) fn is_cycle(&self) -> bool {
+        self.point.solution.period().is_some()
+    }
+
     /// Whether two orbits are the same solution, computed to `tolerance` relative.
     pub(super) fn same(&self, other: &Orbit, tolerance: f64) -> bool {
         let n = self.scale.len();
@@ -138,9 +143,14 @@ impl Orbit {
         }
     }
 
+    /// The first sample, `[n]`.
+    pub(super) fn start(&self) -> &[f64] {
+        &self.states[..self.scale.len()]
+    }
+
     /// Norm of the first sample, by which equilibria are ordered.
     pub(super) fn norm(&self) -> f64 {
-        self.states.iter().take(self.scale.len()).map(|x| x * x).sum::<f64>().sqrt()
+        self.start().iter().map(|x| x * x).sum::<f64>().sqrt()
     }
 }
 

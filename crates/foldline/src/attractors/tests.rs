@@ -92,6 +92,49 @@ fn every_sample_of_the_contact_rotor_is_counted_where_a_long_integration_ends() 
 }
 
 #[test]
+fn what_is_known_to_attract_is_not_waited_for() {
+    // The only equilibrium of the contact rotor attracts few samples, slowly; Newton's method finds it long before.
+    let polish = |candidate: &Candidate| shooting::polish(&ROTOR, &[5.0, 1.0], candidate);
+    let whole = survey_of(&ROTOR, &[5.0, 1.0], &rotor_sampling(32, 2));
+    let mut unseen = 0;
+    for seed in 0..5 {
+        let sampling = Sampling { seed, ..rotor_sampling(96, 2) };
+        let census = survey_until(&ROTOR, &[5.0, 1.0], &sampling, &polish, &|known| {
+            let ratios = [None, Some((2, 1)), Some((3, 1))];
+            ratios.iter().all(|ratio| known.iter().any(|(_, found)| found == ratio))
+        });
+        assert_eq!(census.attractors.len(), 3);
+        for (found, expected) in census.attractors.iter().zip(&whole.attractors) {
+            assert_eq!(found.point.solution.period().is_some(), expected.point.solution.period().is_some());
+            let expected = whole.attractors.iter().find(|attractor| attractor.ratio == found.ratio).unwrap();
+            let [a, b] = [found, expected].map(|attractor| radii(&attractor.point.solution));
+            assert!((a[0] - b[0]).abs() < 1e-5 && (a[1] - b[1]).abs() < 1e-5, "{a:?} {b:?}");
+        }
+        let hits: usize = census.attractors.iter().map(|attractor| attractor.hits).sum();
+        assert!(hits >= 16 && census.left == 96 - hits, "{hits} {}", census.left);
+        let rest = &census.attractors[0];
+        let Solution::Equilibrium(x) = &rest.point.solution else { panic!("a cycle without a ratio") };
+        if rest.hits == 0 {
+            assert_eq!(&rest.example, x);
+            unseen += 1;
+        }
+    }
+    assert!(unseen > 0);
+}
+
+#[test]
+fn of_several_equilibria_one_has_to_be_seen() {
+    // Both are found at once, and nothing else is asked for; the one that samples go to comes first.
+    let polish = |candidate: &Candidate| shooting::polish(&BISTABLE, &[], candidate);
+    for seed in 0..8 {
+        let mut sampling = sampling(&[[-2.0, 3.0]], 60, 1);
+        sampling.seed = seed;
+        let census = survey_until(&BISTABLE, &[], &sampling, &polish, &|known| !known.is_empty());
+        assert!(census.attractors[0].hits > 0 && census.left > 0, "{census:?}");
+    }
+}
+
+#[test]
 fn the_census_does_not_depend_on_the_number_of_threads() {
     let run = |jobs| {
         let census = survey_of(&ROTOR, &[5.0, 0.0], &rotor_sampling(72, jobs));

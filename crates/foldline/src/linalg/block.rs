@@ -557,7 +557,16 @@ mod tests {
         a[3] = Eight([2.0, 2.0, 2.0, 1.0, 2.0, 2.0, 2.0, 2.0]);
         let mut none: [Eight; 0] = [];
         assert_eq!(
-            factorise(&mut a, 2, &mut [0; 16], &mut none, 0, &Shape::new(&[true; 4], &[true; 4], 1, 0), 1, &mut Vec::new()),
+            factorise(
+                &mut a,
+                2,
+                &mut [0; 16],
+                &mut none,
+                0,
+                &Shape::new(&[true; 4], &[true; 4], 1, 0),
+                1,
+                &mut Vec::new()
+            ),
             Err(Singular)
         );
     }

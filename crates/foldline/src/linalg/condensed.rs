@@ -68,7 +68,15 @@ impl<T: Lane> Condensed<T> {
     /// A system for dimension n, interval weights `end` (m + 1 of them), q scalars.
     pub fn new(n: usize, end: &[f64], q: usize) -> Condensed<T> {
         let m = end.len() - 1;
-        let mut system = Condensed { n, m, q, closure: 1.0, end: end.to_vec(), nothing: vec![0.0; (m + 1) * n], ..Condensed::default() };
+        let mut system = Condensed {
+            n,
+            m,
+            q,
+            closure: 1.0,
+            end: end.to_vec(),
+            nothing: vec![0.0; (m + 1) * n],
+            ..Condensed::default()
+        };
         let every = vec![true; n * n];
         system.arrange(block::shape::<T>(&every, &every, m, n + q));
         system

@@ -131,7 +131,9 @@ mod tests {
 
     /// Numbers between -1 and 1.
     fn numbers(count: usize, seed: f64) -> Vec<f64> {
-        (0..count).map(|k| 2.0 * ((k * k) as f64 * 0.618 + seed * (1.0 + 0.37 * k as f64)).sin().abs().fract() - 1.0).collect()
+        (0..count)
+            .map(|k| 2.0 * ((k * k) as f64 * 0.618 + seed * (1.0 + 0.37 * k as f64)).sin().abs().fract() - 1.0)
+            .collect()
     }
 
     /// Transitions that carry a flow round, `[N]` n×n, and the flow `[N][n]`.
@@ -206,8 +208,7 @@ mod tests {
         assert_eq!(found.unstable, 1);
         assert!((found.log_product / std::f64::consts::LN_10 + 200.0).abs() < 1e-6, "{}", found.log_product);
         // Where the flow itself is stretched, the trivial product leaves the range on the way and comes back.
-        let stretched: Vec<f64> =
-            (0..count).flat_map(|j| [if j < 20 { 1e60 } else { 1e-60 }, 0.0, 0.0, 2.0]).collect();
+        let stretched: Vec<f64> = (0..count).flat_map(|j| [if j < 20 { 1e60 } else { 1e-60 }, 0.0, 0.0, 2.0]).collect();
         let flow: Vec<f64> = (0..count).flat_map(|_| [1.0, 0.0]).collect();
         let found = multipliers(&stretched, &Frames::along(&flow, 2), 2);
         assert!((found.multipliers[0] - 1.0).norm() < 1e-9, "{:?}", found.multipliers);

@@ -123,9 +123,10 @@ impl CycleProblem<'_> {
         let [own, other] = transitions;
         let [frames, others] = [u, &better].map(|u| self.frames(u));
         // Those of the even intervals and those of the odd ones, and the frames.
-        let courses = [(&own, &plain, &frames), (&own, &own, &frames), (&other, &own, &frames), (&other, &other, &others)];
-        let courses = courses
-            .map(|(even, odd, frames)| floquet::Course { transitions: [even, odd], frames: frames.as_ref() });
+        let courses =
+            [(&own, &plain, &frames), (&own, &own, &frames), (&other, &own, &frames), (&other, &other, &others)];
+        let courses =
+            courses.map(|(even, odd, frames)| floquet::Course { transitions: [even, odd], frames: frames.as_ref() });
         let found = floquet::several(courses, &self.scale)?.map(|found| found.multipliers);
         found.iter().flatten().all(|z| z.re.is_finite() && z.im.is_finite()).then_some(found)
     }
