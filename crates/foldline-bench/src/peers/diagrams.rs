@@ -11,7 +11,8 @@ use super::auto_files::{Row, write_start};
 use crate::report::{Table, digits, time};
 use crate::workplace::Workplace;
 use crate::{Outcome, clock, rotor};
-use foldline::diagram::{Branch, Diagram, Kind, Point, Solution};
+use foldline::diagram::{Branch, Diagram, Kind, Point, Solution, SpecialPoint};
+use foldline::explore::Plan;
 
 const INTERVALS: [usize; 3] = [100, 200, 400];
 const STEPS: [&str; 5] = ["0.01", "0.02", "0.05", "0.2", "1"];
@@ -21,6 +22,9 @@ const FAR: f64 = 50.0;
 const FARTHER: f64 = 400.0;
 /// … and points that are enough where steps are long.
 const LEAST: usize = 2500;
+
+/// The largest tolerance that a study may have: what it finds is compared with what AUTO finds too.
+const LOOSE: f64 = 1e-4;
 
 /// Everything that AUTO does at one setting.
 struct Tour<'t> {
@@ -175,13 +179,33 @@ fn kind_of(row: &Row) -> Option<Kind> {
     }
 }
 
-/// What AUTO has found of the special points of a diagram.
+/// Where a special point is, as a row of AUTO.
+fn row_of(kind: Kind, point: &Point) -> Option<Row> {
+    let codes = [(Kind::Fold, 5), (Kind::Hopf, 3), (Kind::PeriodDoubling, 7), (Kind::Torus, 8)];
+    let (_, code) = codes.into_iter().find(|(known, _)| *known == kind)?;
+    let period = point.solution.period().unwrap_or(f64::NAN);
+    Some(Row { kind: code, label: 0, parameter: point.parameters[rotor::OMEGA], period })
+}
+
+/// The special points of a diagram, each with the name of the branch of the plan from which it was found.
+fn special_of(diagram: &Diagram) -> Vec<(String, Row)> {
+    let of = |branch: &Branch| {
+        let root = branch.name.split('/').next().unwrap_or("").to_string();
+        let rows = branch.special.iter().filter_map(|special| row_of(special.kind, &special.point));
+        rows.map(|row| (root.clone(), row)).collect::<Vec<_>>()
+    };
+    diagram.branches.iter().flat_map(of).collect()
+}
+
+/// What has been found of the special points of a diagram.
 struct Matched {
     found: usize,
     /// How many of them are period doublings.
     doublings: usize,
     /// Special points that are not in the diagram.
     other: usize,
+    /// By how much the parameters of those found are off at most, relative.
+    error: f64,
 }
 
 fn matched(diagram: &Diagram, special: &[(String, Row)]) -> Matched {
@@ -195,14 +219,16 @@ fn matched(diagram: &Diagram, special: &[(String, Row)]) -> Matched {
             && period
     };
     let known: Vec<_> = diagram.branches.iter().flat_map(|b| b.special.iter().map(move |s| (b, s))).collect();
-    let found: Vec<Kind> = known
-        .iter()
-        .filter(|(b, s)| special.iter().any(|row| same(b, s.kind, &s.point, row)))
-        .map(|(_, s)| s.kind)
-        .collect();
-    let doublings = found.iter().filter(|kind| **kind == Kind::PeriodDoubling).count();
+    let off = |point: &Point, row: &Row| (row.parameter / point.parameters[rotor::OMEGA] - 1.0).abs();
+    let nearest = |b: &Branch, s: &SpecialPoint| {
+        let rows = special.iter().filter(|row| same(b, s.kind, &s.point, row));
+        rows.map(|(_, row)| off(&s.point, row)).min_by(f64::total_cmp)
+    };
+    let found: Vec<(Kind, f64)> = known.iter().filter_map(|(b, s)| Some((s.kind, nearest(b, s)?))).collect();
+    let doublings = found.iter().filter(|(kind, _)| *kind == Kind::PeriodDoubling).count();
+    let error = found.iter().fold(0.0f64, |most, (_, error)| most.max(*error));
     let other = special.iter().filter(|row| !known.iter().any(|(b, s)| same(b, s.kind, &s.point, row))).count();
-    Matched { found: found.len(), doublings, other }
+    Matched { found: found.len(), doublings, other, error }
 }
 
 fn tour<'t>(auto: &'t Auto, starts: &Diagram, intervals: usize, step: &'t str) -> Outcome<Tour<'t>> {
@@ -215,10 +241,12 @@ fn tour<'t>(auto: &'t Auto, starts: &Diagram, intervals: usize, step: &'t str) -
 pub fn compared(place: &Workplace) -> Outcome<String> {
     let study = rotor::study(place, rotor::FIGURE_7)?;
     let starts = rotor::beginnings(&study);
-    let own = || clock::timed(|| rotor::run(&study, &study.plan, starts.clone()));
-    let diagram = own().1;
+    let own = |tolerance: f64| {
+        let plan = Plan { tolerance, ..study.plan.clone() };
+        clock::timed(|| rotor::run(&study, &plan, starts.clone()))
+    };
+    let diagram = own(study.plan.tolerance).1;
     let all: usize = diagram.branches.iter().map(|branch| branch.special.len()).sum();
-    let points: usize = diagram.branches.iter().map(|branch| branch.points.len()).sum();
     let auto = Auto::new(place, "rotor", "auto-diagrams")?;
     let mut table = Table::new(&[
         "",
@@ -226,6 +254,7 @@ pub fn compared(place: &Workplace) -> Outcome<String> {
         "special points found",
         "period doublings of them",
         "not in the diagram",
+        "error of their Ω, at most",
         "processor time",
     ]);
     let mut best: Option<(usize, f64, usize, &str)> = None;
@@ -235,18 +264,19 @@ pub fn compared(place: &Workplace) -> Outcome<String> {
             let tour = match tour(&auto, &starts, intervals, step) {
                 Ok(tour) => tour,
                 Err(why) => {
-                    table.row(&[name, "".into(), format!("failed: {why}"), "".into(), "".into(), "".into()]);
+                    table.row(&[name, "".into(), format!("failed: {why}"), "".into(), "".into(), "".into(), "".into()]);
                     continue;
                 }
             };
             eprintln!("  NTST {intervals}, DSMAX {step}: {}", time(tour.cpu));
-            let Matched { found, doublings, other } = matched(&diagram, &tour.special);
+            let Matched { found, doublings, other, error } = matched(&diagram, &tour.special);
             table.row(&[
                 name,
                 tour.points.to_string(),
                 format!("{found} of {all}"),
                 doublings.to_string(),
                 other.to_string(),
+                format!("{error:.0e}"),
                 time(tour.cpu),
             ]);
             if best.is_none_or(|(most, cpu, ..)| found > most || (found == most && tour.cpu < cpu)) {
@@ -255,21 +285,39 @@ pub fn compared(place: &Workplace) -> Outcome<String> {
         }
     }
     let (found, _, intervals, step) = best.ok_or("AUTO was not run")?;
-    let (mut ours, mut ratios) = (Vec::new(), Vec::new());
-    for _ in 0..3 {
-        ours.push(own().0);
-        ratios.push(tour(&auto, &starts, intervals, step)?.cpu / ours[ours.len() - 1]);
+    let tolerances = [study.plan.tolerance, LOOSE];
+    let (mut ours, mut ratios) = ([const { Vec::new() }; 2], [const { Vec::new() }; 2]);
+    for _ in 0..5 {
+        let theirs = tour(&auto, &starts, intervals, step)?.cpu;
+        for (which, tolerance) in tolerances.into_iter().enumerate() {
+            let seconds = own(tolerance).0;
+            ours[which].push(seconds);
+            ratios[which].push(theirs / seconds);
+        }
     }
-    let name = format!("foldline, tolerance {:.0e}", study.plan.tolerance);
-    let kinds = diagram.branches.iter().flat_map(|branch| &branch.special).map(|special| special.kind);
-    let doublings = kinds.filter(|kind| *kind == Kind::PeriodDoubling).count();
-    let own = [format!("{all} of {all}"), doublings.to_string(), "0".into(), time(clock::median(&ours))];
-    table.row(&[[name, points.to_string()].as_slice(), &own].concat());
+    for (tolerance, seconds) in tolerances.into_iter().zip(&ours) {
+        let again = own(tolerance).1;
+        let Matched { found, doublings, other, error } = matched(&diagram, &special_of(&again));
+        let points: usize = again.branches.iter().map(|branch| branch.points.len()).sum();
+        // With the tolerance of the study it is the same run.
+        let error = if tolerance == study.plan.tolerance { "·".into() } else { format!("{error:.0e}") };
+        table.row(&[
+            format!("foldline, tolerance {tolerance:.0e}"),
+            points.to_string(),
+            format!("{found} of {all}"),
+            doublings.to_string(),
+            other.to_string(),
+            error,
+            time(clock::median(seconds)),
+        ]);
+    }
     Ok(format!(
-        "Branches from given first solutions, two levels of period doubling (NTST doubled at each), NCOL 4.\n\n{}\nAUTO's \
-         special points are most complete ({found} of {all}) with NTST {intervals}, DSMAX {step}; foldline is {} times as \
-         fast (median of the ratios; target 20).\n",
+        "Branches from given first solutions, two levels of period doubling (NTST doubled at each), NCOL 4. Errors of Ω are against foldline's \
+         diagram at tolerance {:.0e}.\n\n{}\nAUTO's special points are most complete ({found} of {all}) with NTST {intervals}, DSMAX {step}; \
+         foldline is {} times as fast, and {} times at the largest tolerance that a study may have (medians of the ratios; target 20).\n",
+        study.plan.tolerance,
         table.text(),
-        digits(clock::median(&ratios))
+        digits(clock::median(&ratios[0])),
+        digits(clock::median(&ratios[1])),
     ))
 }
