@@ -66,8 +66,12 @@ pub(super) fn survey(
         }
     }
     census.left += sampling.samples.saturating_sub(taken * BLOCK);
-    // A survey to its end names what samples go to.
-    reached.retain(|known| known.hits > 0 || ended);
+    // A survey to its end names what samples go to; one that ended early also what needed no sample, unless one went to a rival.
+    let kinds =
+        [false, true].map(|cycle| reached.iter().any(|known| known.orbit.is_cycle() == cycle && known.hits > 0));
+    reached.retain(|known| {
+        known.hits > 0 || ended && known.orbit.attracts() && !kinds[usize::from(known.orbit.is_cycle())]
+    });
     reached.sort_by(|a, b| {
         let key = |known: &Reached| known.orbit.point.solution.period().unwrap_or_else(|| known.orbit.norm());
         let cycle = |known: &Reached| known.orbit.point.solution.period().is_some();
@@ -208,11 +212,11 @@ fn watch_block(context: &Context, starts: &[f64], reached: &[Reached], enough: E
     let mut hit: Vec<bool> = reached.iter().map(|known| known.hits > 0).collect();
     let mut watches = vec![Watch::new(n); starts.len().checked_div(n).unwrap_or(0)];
     let (count, mut settled, mut ended) = (watches.len(), 0, false);
-    // What is known attracts, by its spectrum. Of several equilibria, or cycles, that with the most samples is preferred: they have to be
-    // seen.
-    let suffices = |orbits: &[Orbit], hit: &[bool]| {
-        let alone = |orbit: &Orbit| orbits.iter().filter(|other| other.is_cycle() == orbit.is_cycle()).count() == 1;
-        let found = orbits.iter().zip(hit).filter(|(orbit, hit)| **hit || alone(orbit));
+    let suffices = |orbits: &[Orbit], hit: &[bool], half: bool| {
+        let sorts: Vec<Sort> =
+            orbits.iter().map(|orbit| Sort { cycle: orbit.is_cycle(), attracts: orbit.attracts() }).collect();
+        let counts = counted(&sorts, hit, half);
+        let found = orbits.iter().zip(counts).filter(|(_, counts)| *counts);
         enough(&found.map(|(orbit, _)| (&orbit.point, orbit.ratio)).collect::<Vec<_>>())
     };
     let ensemble = Ensemble::new(context.field, context.parameters, context.tolerance(), starts, [0.0, f64::INFINITY])
@@ -229,7 +233,7 @@ fn watch_block(context: &Context, starts: &[f64], reached: &[Reached], enough: E
                 hit[index] = true;
                 settled += 1;
             }
-            ended = 2 * settled >= count && suffices(&orbits, &hit);
+            ended = 2 * settled >= count && suffices(&orbits, &hit, true);
         }
         verdict
     });
@@ -241,6 +245,40 @@ fn watch_block(context: &Context, starts: &[f64], reached: &[Reached], enough: E
         (None, _) => Fate::Unsettled,
     });
     let fates = fates.collect();
-    ended |= suffices(&orbits, &hit);
+    hit.resize(orbits.len(), false);
+    ended |= suffices(&orbits, &hit, 2 * settled >= count);
     Watched { orbits, fates, ended }
+}
+
+/// What a solution is, as far as [`counted`] asks.
+#[derive(Clone, Copy, Debug)]
+struct Sort {
+    cycle: bool,
+    /// Whether its spectrum leaves no doubt that it attracts.
+    attracts: bool,
+}
+
+/// Which of the solutions known count as reached: those that a trajectory was seen to go to, and, once half of the trajectories have settled
+/// somewhere, the only equilibrium and the only cycle known if they attract without doubt. With rivals, which of them a seed means depends
+/// on the samples.
+fn counted(sorts: &[Sort], hit: &[bool], half: bool) -> Vec<bool> {
+    let alone = |sort: &Sort| sorts.iter().filter(|other| other.cycle == sort.cycle).count() == 1;
+    sorts.iter().zip(hit).map(|(sort, hit)| *hit || half && sort.attracts && alone(sort)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Sort, counted};
+
+    #[test]
+    fn only_what_has_no_rival_counts_unseen() {
+        let [rest, cycle] = [false, true].map(|cycle| Sort { cycle, attracts: true });
+        let doubtful = Sort { attracts: false, ..rest };
+        assert_eq!(counted(&[rest, cycle], &[false, false], true), [true, true]);
+        assert_eq!(counted(&[rest, cycle], &[false, true], false), [false, true], "before half have settled");
+        assert_eq!(counted(&[rest, rest, cycle], &[false, true, false], true), [false, true, true]);
+        assert_eq!(counted(&[rest, rest], &[false, false], true), [false, false]);
+        assert_eq!(counted(&[doubtful], &[false], true), [false]);
+        assert_eq!(counted(&[doubtful], &[true], false), [true]);
+    }
 }

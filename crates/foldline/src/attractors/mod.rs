@@ -94,7 +94,7 @@ pub enum Candidate {
 /// Computes a candidate exactly; `None` where that does not converge.
 pub type Polish<'a> = &'a (dyn Fn(&Candidate) -> Option<Point> + Sync);
 
-/// Says whether the attractors reached so far, each with its spectral ratio, are all that is wanted.
+/// Says whether the attractors that count as reached so far (see [`survey_until`]), each with its spectral ratio, are all that is wanted.
 pub type Enough<'a> = &'a (dyn Fn(&[(&Point, Option<(u32, u32)>)]) -> bool + Sync);
 
 /// The attractors reached from `sampling.samples` initial states.
@@ -106,9 +106,9 @@ pub fn survey(field: &dyn VectorField, parameters: &[f64], sampling: &Sampling, 
 }
 
 /// The same, but no further than needed: it ends with the first block of 32 samples in which half of them or more have settled
-/// and `enough` says so of the attractors known until then, each with its spectral ratio: those reached, and those that Newton's method has
-/// found on the way, whose spectrum says that they attract, and of which only one equilibrium, or only one cycle, is known. Which these are depends on the order of the samples, not on the number of
-/// threads.
+/// and `enough` says so of the attractors that count as reached until then, each with its spectral ratio. What counts is what samples were
+/// seen to go to; and what Newton's method has found on the way, if it is the only equilibrium, or the only cycle, that is known and its
+/// spectrum leaves no doubt that it attracts. Which these are depends on the order of the samples, not on the number of threads.
 pub fn survey_until(
     field: &dyn VectorField,
     parameters: &[f64],

@@ -20,6 +20,9 @@ const COARSE: usize = SAMPLES[0] / STRIDE;
 /// A component that hardly moves on a cycle is measured against this fraction of its scale.
 const FLOOR: f64 = 1e-3;
 
+/// How far inside the edge of stability a spectrum must be to leave no doubt: relative to the largest eigenvalue, or to 1 for multipliers.
+const EDGE: f64 = 1e-6;
+
 /// An attractor that distances can be measured to.
 #[derive(Clone, Debug)]
 pub(super) struct Orbit {
@@ -120,6 +123,17 @@ impl Orbit {
         (0..n).fold(0.0, |m: f64, i| {
             let p = (1.0 - s) * self.states[from * n + i] + s * self.states[to * n + i];
             m.max((x[i] - p).abs() / self.scale[i])
+        })
+    }
+
+    /// Whether its spectrum leaves no doubt that it attracts. At the edge, as without damping, or with a spectrum that could not be computed,
+    /// only trajectories tell.
+    pub(super) fn attracts(&self) -> bool {
+        let spectrum = self.point.free_spectrum();
+        let largest = spectrum.iter().fold(f64::MIN_POSITIVE, |m: f64, z| m.max(z.norm()));
+        spectrum.iter().all(|z| match self.is_cycle() {
+            true => z.norm() <= 1.0 - EDGE,
+            false => z.re <= -EDGE * largest,
         })
     }
 

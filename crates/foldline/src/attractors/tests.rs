@@ -123,18 +123,6 @@ fn what_is_known_to_attract_is_not_waited_for() {
 }
 
 #[test]
-fn of_several_equilibria_one_has_to_be_seen() {
-    // Both are found at once, and nothing else is asked for; the one that samples go to comes first.
-    let polish = |candidate: &Candidate| shooting::polish(&BISTABLE, &[], candidate);
-    for seed in 0..8 {
-        let mut sampling = sampling(&[[-2.0, 3.0]], 60, 1);
-        sampling.seed = seed;
-        let census = survey_until(&BISTABLE, &[], &sampling, &polish, &|known| !known.is_empty());
-        assert!(census.attractors[0].hits > 0 && census.left > 0, "{census:?}");
-    }
-}
-
-#[test]
 fn the_census_does_not_depend_on_the_number_of_threads() {
     let run = |jobs| {
         let census = survey_of(&ROTOR, &[5.0, 0.0], &rotor_sampling(72, jobs));

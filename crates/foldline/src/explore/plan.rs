@@ -3,7 +3,7 @@
 use crate::diagram::{Cycle, Kind};
 use crate::special::mark::Mark;
 
-/// Which attractor a seed means, among those reached until every type was found that the seeds with the same sample ask for
+/// Which attractor a seed means, among those that count as reached until every type was found that the seeds with the same sample ask for
 /// ([`crate::attractors::survey_until`]).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum AttractorKey {

@@ -140,7 +140,7 @@ pub(crate) fn spread(delta2: f64, p: usize) -> f64 {
     if delta2 < 1.0 { power } else { f64::INFINITY }
 }
 
-/// That of a factor.
+/// The bound of κ to the power p - 1 of a factor.
 #[inline(always)]
 fn spread_of(factor: &[f64], p: usize) -> f64 {
     let factor = &factor[..p * p];

@@ -3,7 +3,7 @@
 //! **Idea.** The flow direction is carried round the cycle exactly, so it is split off: what remains are (n-1)×(n-1)
 //! blocks whose product has the non-trivial multipliers. The product is never formed.
 //!
-//! **Equations.** With G_j the transition over interval j and Q_j orthogonal, its first column along x'(t_j):
+//! **Equations.** With G_j the transition over interval j and Q_j orthogonal, its first column along x'(t_j) or against it:
 //!
 //! ```text
 //!   (1)  Q_{j+1}ᵀ G_j Q_j = [ g_j  *  ]        ∏ g_j = 1 up to the discretisation: the trivial multiplier
@@ -48,9 +48,11 @@ pub fn forced(transitions: &[f64], n: usize) -> Floquet {
     one(Course { transitions: [transitions; 2], frames: None }, &vec![1.0; n])
 }
 
-/// Multipliers of one course, as those of [`several`].
+/// Multipliers of one course, as those of [`several`]; not numbers where those are nothing.
 pub fn one(course: Course, scale: &[f64]) -> Floquet {
-    several([course], scale).map(|[found]| found).unwrap_or_default()
+    let unknown =
+        || Floquet { multipliers: vec![Complex64::new(f64::NAN, f64::NAN); scale.len()], ..Floquet::default() };
+    several([course], scale).map_or_else(unknown, |[found]| found)
 }
 
 /// Multipliers of up to eight courses with as many intervals each, all with frames or all without. `scale` `[n]` are the sizes of the components: the
@@ -112,6 +114,11 @@ impl Frames {
         }
     }
 
+    /// How many there are, of dimension n.
+    pub(super) fn count(&self, n: usize) -> usize {
+        self.v.len() / n.max(1)
+    }
+
     /// v of Q_j, `[n]`.
     pub(super) fn reflection(&self, j: usize, n: usize) -> &[f64] {
         &self.v[j * n..(j + 1) * n]
@@ -158,12 +165,17 @@ mod tests {
         (1..count).fold(of(0), |product, j| of(j) * product).eigenvalues().unwrap()
     }
 
+    /// Each of one list is one of the other, the largest first.
     fn assert_same(found: &[Complex64], expected: &[Complex64], what: &str) {
         assert_eq!(found.len(), expected.len());
         let largest = expected.iter().fold(1.0f64, |m, z| m.max(z.norm()));
+        let mut left = found.to_vec();
         for z in expected {
-            let nearest = found.iter().map(|w| (w - z).norm()).fold(f64::INFINITY, f64::min);
-            assert!(nearest < 1e-9 * largest, "{what}: {z} is {nearest} from {found:?}");
+            let distance = |w: &Complex64| (w - z).norm();
+            let nearest = (0..left.len()).min_by(|a, b| distance(&left[*a]).total_cmp(&distance(&left[*b]))).unwrap();
+            let apart = distance(&left.remove(nearest));
+            // What is multiplied out has the errors of the largest.
+            assert!(apart < 1e-11 * largest, "{what}: {z} is {apart} from {found:?}");
         }
     }
 
@@ -184,6 +196,24 @@ mod tests {
             assert_same(&one(b, &vec![1.0; n]).multipliers, &reference(b.transitions, count, n), &what);
             assert_same(&forced(&own, n).multipliers, &reference(a.transitions, count, n), &what);
         }
+    }
+
+    #[test]
+    fn one_spectrum_that_is_none_leaves_the_others_alone() {
+        let (n, count) = (4, 12);
+        let (own, flow) = carried(count, n, 0.45);
+        let (mut broken, mut singular) = (own.clone(), own.clone());
+        broken[5 * n * n + 7] = f64::NAN;
+        // One row of one transition a multiple of another, but for what carries the flow.
+        singular[6 * n * n..7 * n * n].fill(0.0);
+        let frames = Frames::along(&flow, n);
+        let courses =
+            [&own, &broken, &singular, &own].map(|list| Course { transitions: [list; 2], frames: Some(&frames) });
+        let [a, b, c, d] = several(courses, &[1.0; 4]).unwrap();
+        assert_same(&a.multipliers, &reference([&own; 2], count, n), "beside one that is not a number");
+        assert_same(&d.multipliers, &a.multipliers, "twice the same");
+        assert!(b.multipliers[1..].iter().all(|z| z.re.is_nan()), "{b:?}");
+        assert!(c.unstable == 0 && !c.multipliers[1..].iter().any(|z| z.norm() > 0.0), "{c:?}");
     }
 
     #[test]

@@ -31,7 +31,8 @@ pub fn reduced(courses: &[Course], scale: &[f64]) -> Option<Vec<Reduced>> {
     let framed = first.frames.is_some();
     let alike = |course: &Course| {
         let long = course.transitions.iter().all(|list| list.len() >= count * n * n);
-        long && course.frames.is_some() == framed
+        let fitting = course.frames.is_none_or(|frames| frames.count(n) == count);
+        long && fitting && course.frames.is_some() == framed
     };
     if courses.len() > Eight::COUNT || count == 0 || !courses.iter().all(alike) {
         return None;
