@@ -107,6 +107,7 @@ fn what_is_known_to_attract_is_not_waited_for() {
         for (found, expected) in census.attractors.iter().zip(&whole.attractors) {
             assert_eq!(found.point.solution.period().is_some(), expected.point.solution.period().is_some());
             let expected = whole.attractors.iter().find(|attractor| attractor.ratio == found.ratio).unwrap();
+            // Radii are read off samples that need not begin at the same phase, and miss an extremum by some 1e-6.
             let [a, b] = [found, expected].map(|attractor| radii(&attractor.point.solution));
             assert!((a[0] - b[0]).abs() < 1e-5 && (a[1] - b[1]).abs() < 1e-5, "{a:?} {b:?}");
         }

@@ -204,7 +204,7 @@ mod tests {
         let (own, flow) = carried(count, n, 0.45);
         let (mut broken, mut singular) = (own.clone(), own.clone());
         broken[5 * n * n + 7] = f64::NAN;
-        // One row of one transition a multiple of another, but for what carries the flow.
+        // A transition that is zero: so are all multipliers, or they could not be computed.
         singular[6 * n * n..7 * n * n].fill(0.0);
         let frames = Frames::along(&flow, n);
         let courses =
