@@ -1,18 +1,18 @@
 //! How fast many trajectories of the overhung rotor are integrated, beside a plain loop over one after the other:
 //! `cargo run --release -p foldline-rotor --example ensemble -- SAMPLES TIME TOLERANCE [KAPPA]`
 //!
-//! Prints for each of the two the best of several runs in seconds on one thread, the steps of all trajectories, accepted and
-//! rejected, and the median over the trajectories of the largest error at the end. Then, as the limit for any such program on this
-//! machine, the same for as many steps of one length with eight trajectories in lanes, the equations compiled into the loop: no step
-//! control, no end, nobody who watches. The first two use the same method, step control,
-//! tolerance, starts and parameters (those of models/overhung-rotor.toml with kappa = 1); the plain loop has the right-hand
-//! side written by hand with everything constant taken out of it, the ensemble has it from the model's text.
+//! Prints for the ensemble with the model's text, the ensemble with the field written in Rust, and the plain loop with the right-hand side
+//! written by hand and everything constant taken out of it: the best of several runs in seconds on one thread, the steps of all
+//! trajectories, accepted and rejected, and the median over the trajectories of the largest error at the end. The three use the same
+//! method, step control, tolerance, starts and parameters (those of models/overhung-rotor.toml with kappa = 1). Then, as the limit for any such
+//! program on this machine, the same for as many steps of one length with eight trajectories in lanes: no step control, no end, nobody
+//! who watches.
 
 use foldline::attractors::Sampling;
-use foldline::contract::{VectorField, Verdict};
+use foldline::contract::VectorField;
 use foldline::linalg::lane::{Eight, Lane as _};
 use foldline::simulation::{Ensemble, Outcome, Tolerance};
-use foldline_rotor::Nondimensional;
+use foldline_rotor::{Constants, Nondimensional, OverhungRotor};
 use foldline_store::model_file::read_model;
 use std::path::Path;
 use std::time::Instant;
@@ -32,12 +32,15 @@ fn main() -> Result<(), String> {
     let starts = starts(samples as usize);
     let exact = ensemble(&model, &p, &starts, time, 1e-4 * tolerance);
     let mut steps = 0;
-    for (name, run) in [("ensemble", &ensemble as Run), ("scalar", &scalar)] {
+    let rotor = OverhungRotor::default();
+    let programs: [(&str, &dyn VectorField, Run); 3] =
+        [("text", &model, &ensemble), ("rust", &rotor, &ensemble), ("scalar", &rotor, &scalar)];
+    for (name, field, run) in programs {
         let mut best = f64::INFINITY;
         let mut found = (Vec::new(), 0);
         for _ in 0..RUNS {
             let clock = Instant::now();
-            found = run(&model, &p, &starts, time, tolerance);
+            found = run(field, &p, &starts, time, tolerance);
             best = best.min(clock.elapsed().as_secs_f64());
         }
         println!("{name} {best:.6} {} {:.1e}", found.1, median_error(&found.0, &exact.0));
@@ -70,51 +73,25 @@ fn ensemble(
 ) -> (Vec<[f64; 4]>, usize) {
     let parameters = p.parameters();
     let tolerance = Tolerance::uniform(tolerance, 4);
-    let arrivals = Ensemble::new(field, &parameters, tolerance, starts, [0.0, time]).run(&mut |_| Verdict::Continue);
+    let arrivals = Ensemble::new(field, &parameters, tolerance, starts, [0.0, time]).arrive();
     let steps = arrivals.iter().map(|arrival| arrival.steps + arrival.rejected).sum();
     let ends = arrivals.iter().filter(|arrival| arrival.outcome == Outcome::Reached);
     (ends.map(|arrival| std::array::from_fn(|i| arrival.state[i])).collect(), steps)
 }
 
-/// What f needs of the parameters.
-struct Constants {
-    forcing: f64,
-    gyroscopic: f64,
-    damping: f64,
-    circulatory: f64,
-    linear: f64,
-    cubic: f64,
-    ring: f64,
-    sharpness: f64,
-}
-
-impl Constants {
-    fn of(p: &Nondimensional) -> Constants {
-        Constants {
-            forcing: p.mass * p.epsilon * p.omega * p.omega,
-            gyroscopic: (2.0 - p.polar) * p.omega,
-            damping: 2.0 * p.zeta,
-            circulatory: 2.0 * p.zeta * p.omega,
-            linear: 1.0 - (1.0 - p.polar) * p.omega * p.omega,
-            cubic: (1.0 - p.kappa) * p.gamma,
-            ring: 0.5 * p.kappa * p.beta,
-            sharpness: p.sharpness,
-        }
-    }
-
-    #[inline(always)]
-    fn slope(&self, [u, v, du, dv]: [f64; 4]) -> [f64; 4] {
-        let square = u * u + v * v;
-        let r = square.sqrt();
-        let contact = self.ring * ((self.sharpness * (r - 1.0)).tanh() + 1.0) * (1.0 - 1.0 / r);
-        let stiffness = self.linear + self.cubic * square + contact;
-        [
-            du,
-            dv,
-            self.forcing + self.gyroscopic * dv - self.damping * du - stiffness * u + self.circulatory * v,
-            -self.gyroscopic * du - self.damping * dv - stiffness * v - self.circulatory * u,
-        ]
-    }
+/// f of one state.
+#[inline(always)]
+fn slope(p: &Constants, [u, v, du, dv]: [f64; 4]) -> [f64; 4] {
+    let square = u * u + v * v;
+    let r = square.sqrt();
+    let contact = p.ring * ((p.sharpness * (r - 1.0)).tanh() + 1.0) * (1.0 - 1.0 / r);
+    let stiffness = p.linear + p.cubic * square + contact;
+    [
+        du,
+        dv,
+        p.forcing + p.gyroscopic * dv - p.damping * du - stiffness * u + p.circulatory * v,
+        -p.gyroscopic * du - p.damping * dv - stiffness * v - p.circulatory * u,
+    ]
 }
 
 /// x + h Σ a k.
@@ -148,24 +125,24 @@ fn integrate(p: &Constants, start: [f64; 4], end: f64, tolerance: f64) -> ([f64;
         let square = |i: usize| (e[i] / (tolerance + tolerance * x[i].abs().max(y[i].abs()))).powi(2);
         (0.25 * (square(0) + square(1) + square(2) + square(3))).sqrt()
     };
-    let (mut x, mut t, mut k1) = (start, 0.0, p.slope(start));
+    let (mut x, mut t, mut k1) = (start, 0.0, slope(p, start));
     let mut h: f64 = 0.01 * norm(&x, &x, &x) / norm(&x, &x, &k1);
-    let k2 = p.slope(at(&x, h, [(1.0, &k1)]));
+    let k2 = slope(p, at(&x, h, [(1.0, &k1)]));
     let curvature = norm(&x, &x, &std::array::from_fn(|i| (k2[i] - k1[i]) / h)).max(norm(&x, &x, &k1));
     h = (0.01 / curvature).powf(0.2).min(100.0 * h).min(end);
     let (mut before, mut rejected, mut steps): (f64, bool, usize) = (1e-4, false, 0);
     while t < end {
         steps += 1;
-        let k2 = p.slope(at(&x, h, [(1.0 / 5.0, &k1)]));
-        let k3 = p.slope(at(&x, h, [(3.0 / 40.0, &k1), (9.0 / 40.0, &k2)]));
-        let k4 = p.slope(at(&x, h, [(44.0 / 45.0, &k1), (-56.0 / 15.0, &k2), (32.0 / 9.0, &k3)]));
+        let k2 = slope(p, at(&x, h, [(1.0 / 5.0, &k1)]));
+        let k3 = slope(p, at(&x, h, [(3.0 / 40.0, &k1), (9.0 / 40.0, &k2)]));
+        let k4 = slope(p, at(&x, h, [(44.0 / 45.0, &k1), (-56.0 / 15.0, &k2), (32.0 / 9.0, &k3)]));
         let row = [19372.0 / 6561.0, -25360.0 / 2187.0, 64448.0 / 6561.0, -212.0 / 729.0];
-        let k5 = p.slope(at(&x, h, [(row[0], &k1), (row[1], &k2), (row[2], &k3), (row[3], &k4)]));
+        let k5 = slope(p, at(&x, h, [(row[0], &k1), (row[1], &k2), (row[2], &k3), (row[3], &k4)]));
         let row = [9017.0 / 3168.0, -355.0 / 33.0, 46732.0 / 5247.0, 49.0 / 176.0, -5103.0 / 18656.0];
-        let k6 = p.slope(at(&x, h, [(row[0], &k1), (row[1], &k2), (row[2], &k3), (row[3], &k4), (row[4], &k5)]));
+        let k6 = slope(p, at(&x, h, [(row[0], &k1), (row[1], &k2), (row[2], &k3), (row[3], &k4), (row[4], &k5)]));
         let row = [35.0 / 384.0, 500.0 / 1113.0, 125.0 / 192.0, -2187.0 / 6784.0, 11.0 / 84.0];
         let next = at(&x, h, [(row[0], &k1), (row[1], &k3), (row[2], &k4), (row[3], &k5), (row[4], &k6)]);
-        let k7 = p.slope(next);
+        let k7 = slope(p, next);
         let row = [71.0 / 57600.0, -71.0 / 16695.0, 71.0 / 1920.0, -17253.0 / 339200.0, 22.0 / 525.0, -1.0 / 40.0];
         let e = at(
             &[0.0; 4],
@@ -220,20 +197,20 @@ impl pulp::NullaryFnOnce for Trial<'_> {
     fn call(self) -> Eight {
         let Trial { constants: p, mut x, steps, h, tolerance } = self;
         let (h, tolerance) = (Eight::splat(h), Eight::splat(tolerance));
-        let mut k1 = slopes(p, &x);
+        let mut k1 = p.slopes(x);
         let mut largest = Eight::default();
         for _ in 0..steps {
-            let k2 = slopes(p, &ahead(&x, h, [(1.0 / 5.0, &k1)]));
-            let k3 = slopes(p, &ahead(&x, h, [(3.0 / 40.0, &k1), (9.0 / 40.0, &k2)]));
-            let k4 = slopes(p, &ahead(&x, h, [(44.0 / 45.0, &k1), (-56.0 / 15.0, &k2), (32.0 / 9.0, &k3)]));
+            let k2 = p.slopes(ahead(&x, h, [(1.0 / 5.0, &k1)]));
+            let k3 = p.slopes(ahead(&x, h, [(3.0 / 40.0, &k1), (9.0 / 40.0, &k2)]));
+            let k4 = p.slopes(ahead(&x, h, [(44.0 / 45.0, &k1), (-56.0 / 15.0, &k2), (32.0 / 9.0, &k3)]));
             let row = [19372.0 / 6561.0, -25360.0 / 2187.0, 64448.0 / 6561.0, -212.0 / 729.0];
-            let k5 = slopes(p, &ahead(&x, h, [(row[0], &k1), (row[1], &k2), (row[2], &k3), (row[3], &k4)]));
+            let k5 = p.slopes(ahead(&x, h, [(row[0], &k1), (row[1], &k2), (row[2], &k3), (row[3], &k4)]));
             let row = [9017.0 / 3168.0, -355.0 / 33.0, 46732.0 / 5247.0, 49.0 / 176.0, -5103.0 / 18656.0];
             let k6 =
-                slopes(p, &ahead(&x, h, [(row[0], &k1), (row[1], &k2), (row[2], &k3), (row[3], &k4), (row[4], &k5)]));
+                p.slopes(ahead(&x, h, [(row[0], &k1), (row[1], &k2), (row[2], &k3), (row[3], &k4), (row[4], &k5)]));
             let row = [35.0 / 384.0, 500.0 / 1113.0, 125.0 / 192.0, -2187.0 / 6784.0, 11.0 / 84.0];
             let next = ahead(&x, h, [(row[0], &k1), (row[1], &k3), (row[2], &k4), (row[3], &k5), (row[4], &k6)]);
-            let k7 = slopes(p, &next);
+            let k7 = p.slopes(next);
             let row = [71.0 / 57600.0, -71.0 / 16695.0, 71.0 / 1920.0, -17253.0 / 339200.0, 22.0 / 525.0, -1.0 / 40.0];
             let terms = [(row[0], &k1), (row[1], &k3), (row[2], &k4), (row[3], &k5), (row[4], &k6), (row[5], &k7)];
             let error = ahead(&[Eight::default(); 4], h, terms);
@@ -263,50 +240,6 @@ fn ahead<const N: usize>(x: &Lanes, h: Eight, terms: [(f64, &Lanes); N]) -> Lane
         out[i] = x[i] + h * sum;
     }
     out
-}
-
-#[inline(always)]
-fn slopes(p: &Constants, [u, v, du, dv]: &Lanes) -> Lanes {
-    let (u, v, du, dv) = (*u, *v, *du, *dv);
-    let [forcing, gyroscopic, damping, circulatory] =
-        [p.forcing, p.gyroscopic, p.damping, p.circulatory].map(Eight::splat);
-    let one = Eight::splat(1.0);
-    let square = u * u + v * v;
-    let r = square.map(f64::sqrt);
-    let gap = Eight::splat(p.sharpness) * (r - one);
-    let mut edge = [0.0; Eight::COUNT];
-    // As the tape does it: nothing to compute where all of them are ±1.
-    if gap.all(one, |gap, _| gap.abs() >= 19.5) {
-        for lane in 0..Eight::COUNT {
-            edge[lane] = f64::copysign(1.0, gap.0[lane]);
-        }
-    } else {
-        for lane in 0..Eight::COUNT {
-            edge[lane] = tanh(gap.0[lane]);
-        }
-    }
-    let contact = Eight::splat(p.ring) * (Eight(edge) + one) * (one - r.map(|r| 1.0 / r));
-    let stiffness = Eight::splat(p.linear) + Eight::splat(p.cubic) * square + contact;
-    let x = forcing + gyroscopic * dv - damping * du - stiffness * u + circulatory * v;
-    let y = Eight::default() - gyroscopic * du - damping * dv - stiffness * v - circulatory * u;
-    [du, dv, x, y]
-}
-
-/// tanh without branches, from exp(2 |x|) - 1 by its series after taking out a power of two.
-#[inline(always)]
-fn tanh(x: f64) -> f64 {
-    const ROUNDER: f64 = 6755399441055744.0;
-    let y = 2.0 * x.abs();
-    let y = if y > 44.0 { 44.0 } else { y };
-    let k = (y * std::f64::consts::LOG2_E + ROUNDER) - ROUNDER;
-    let r = y - k * std::f64::consts::LN_2;
-    let (r2, power) = (r * r, f64::from_bits((k + ROUNDER).to_bits().wrapping_add(1023) << 52));
-    let (r4, r8) = (r2 * r2, (r2 * r2) * (r2 * r2));
-    let low = (0.5 + r * (1.0 / 6.0)) + r2 * (1.0 / 24.0 + r * (1.0 / 120.0));
-    let middle = (1.0 / 720.0 + r * (1.0 / 5040.0)) + r2 * (1.0 / 40320.0 + r * (1.0 / 362880.0));
-    let high = (1.0 / 3628800.0 + r * (1.0 / 39916800.0)) + r2 * (1.0 / 479001600.0);
-    let m = power * (r + r2 * (low + r4 * middle + r8 * high)) + (power - 1.0);
-    (m / (m + 2.0)).copysign(x)
 }
 
 /// The middle one of the largest errors of each trajectory.

@@ -2,6 +2,7 @@
 
 use crate::contact::ContactLaw;
 use crate::jet::Jet;
+use crate::lanes::{self, Constants};
 use crate::quantities::Nondimensional;
 use foldline::contract::{Batch, Parameters, VectorField};
 
@@ -129,6 +130,10 @@ impl VectorField for OverhungRotor {
     }
 
     fn evaluate(&self, at: Batch, f: &mut [f64]) {
+        if let (ContactLaw::Tanh, Parameters::Shared(&[a, b, c, d, e, g, h, i, j])) = (self.law, at.parameters) {
+            let p = Nondimensional::from_parameters([a, b, c, d, e, g, h, i, j]);
+            return lanes::evaluate(&Constants::of(&p), at, f);
+        }
         for l in 0..at.lanes {
             let (x, p) = lane(&at, l);
             let value = self.field(x, &Nondimensional::from_parameters(p));

@@ -149,6 +149,11 @@ impl<T: Lane> Condensed<T> {
         self.last_pivots.resize(n + q, 0);
     }
 
+    /// n and q.
+    pub fn shape(&self) -> (usize, usize) {
+        (self.n, self.q)
+    }
+
     /// L, the places of each lane.
     pub fn length(&self) -> usize {
         self.length

@@ -144,10 +144,16 @@ impl Lane for Eight {
 
     #[inline(always)]
     fn all(self, other: Eight, holds: impl Fn(f64, f64) -> bool) -> bool {
-        // As numbers: a comparison of vectors and one test of what it leaves.
-        let fails = self.zip(other, |x, y| if holds(x, y) { 0.0 } else { 1.0 });
-        let [a, b, c, d, e, g, h, i] = fails.0;
-        ((a + b) + (c + d)) + ((e + g) + (h + i)) == 0.0
+        let (x, y) = (self.0, other.0);
+        // Written out, without `&&`: one comparison of vectors and one test of the mask that it leaves.
+        holds(x[0], y[0])
+            & holds(x[1], y[1])
+            & holds(x[2], y[2])
+            & holds(x[3], y[3])
+            & holds(x[4], y[4])
+            & holds(x[5], y[5])
+            & holds(x[6], y[6])
+            & holds(x[7], y[7])
     }
 }
 

@@ -38,6 +38,11 @@ impl System {
         }
     }
 
+    /// n and q.
+    pub fn shape(&self) -> (usize, usize) {
+        either!(self, s => s.shape())
+    }
+
     /// W, the number of lanes.
     pub fn lanes(&self) -> usize {
         match self {

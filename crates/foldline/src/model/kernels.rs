@@ -1,4 +1,4 @@
-//! Scalar arithmetic of the tape, written so that loops over lanes vectorise.
+//! Scalar arithmetic of the tape, written so that loops over lanes vectorise; some of it for vector fields written in Rust, too.
 //!
 //! **Idea.** `exp`, `tanh`, `sech²` and `hypot` sit in the inner loop of contact laws; the standard library evaluates them one
 //! lane at a time. Here they are branch-free polynomials, so the compiler turns a loop over lanes into vector instructions.
@@ -13,6 +13,7 @@
 //!
 //! **Source.** Argument reduction with a two-part ln 2: cody1980.
 
+use crate::linalg::lane::{Eight, Lane};
 use std::ops::RangeInclusive;
 
 /// Adding it to |x| < 2⁵¹ rounds x to an integer, which then sits in the low bits of the sum.
@@ -63,7 +64,7 @@ fn limit(x: f64, low: f64, high: f64) -> f64 {
 
 /// eˣ.
 #[inline(always)]
-pub(super) fn exp(x: f64) -> f64 {
+pub fn exp(x: f64) -> f64 {
     let (k, r, error) = reduce(limit(x, -746.0, 710.0));
     let p = 1.0 + (r + (series(r) + error));
     // In two halves, so that results below the normal range and overflow come out right.
@@ -73,7 +74,7 @@ pub(super) fn exp(x: f64) -> f64 {
 
 /// tanh x.
 #[inline(always)]
-pub(super) fn tanh(x: f64) -> f64 {
+pub fn tanh(x: f64) -> f64 {
     let (k, r, error) = reduce(limit(2.0 * x.abs(), 0.0, 44.0));
     let s = power_of_two(k);
     let m = s * (r + (series(r) + error)) + (s - 1.0);
@@ -85,19 +86,16 @@ const SATURATED: f64 = 19.5;
 
 /// [`tanh`] of eight numbers; nothing to compute where all of them are large, as a contact law is away from the edge of the contact.
 #[inline(always)]
-pub(super) fn tanhs(x: [f64; 8]) -> [f64; 8] {
-    let mut y = [0.0; 8];
-    // No `map` of the array: it is a function of its own, compiled without the vector instructions.
-    match x.iter().fold(true, |all, x| all & (x.abs() >= SATURATED)) {
-        true => (0..8).for_each(|l| y[l] = f64::copysign(1.0, x[l])),
-        false => (0..8).for_each(|l| y[l] = tanh(x[l])),
+pub fn tanhs(x: Eight) -> Eight {
+    match x.all(x, |x, _| x.abs() >= SATURATED) {
+        true => x.map(|x| f64::copysign(1.0, x)),
+        false => x.map(tanh),
     }
-    y
 }
 
 /// 1 / cosh² x.
 #[inline(always)]
-pub(super) fn sech_squared(x: f64) -> f64 {
+pub fn sech_squared(x: f64) -> f64 {
     let s = exp(-2.0 * x.abs());
     let d = 1.0 + s;
     4.0 * s / (d * d)
@@ -105,7 +103,7 @@ pub(super) fn sech_squared(x: f64) -> f64 {
 
 /// sqrt(a² + b²) without overflow or underflow on the way.
 #[inline(always)]
-pub(super) fn hypot(a: f64, b: f64) -> f64 {
+pub fn hypot(a: f64, b: f64) -> f64 {
     const BIG: f64 = f64::from_bits((1023 + 600) << 52); // 2⁶⁰⁰
     const SMALL: f64 = f64::from_bits((1023 - 600) << 52); // 2⁻⁶⁰⁰
     let (p, q) = (a.abs(), b.abs());
@@ -123,15 +121,12 @@ const PLAIN: RangeInclusive<f64> = 1e-279..=1e299;
 
 /// [`hypot`] of eight pairs, without the scaling where none of them needs it.
 #[inline(always)]
-pub(super) fn hypots(a: [f64; 8], b: [f64; 8]) -> [f64; 8] {
-    let mut y = [0.0; 8];
-    (0..8).for_each(|l| y[l] = a[l] * a[l] + b[l] * b[l]);
-    let plain = y.iter().fold(true, |plain, square| plain & PLAIN.contains(square));
-    match plain {
-        true => (0..8).for_each(|l| y[l] = y[l].sqrt()),
-        false => (0..8).for_each(|l| y[l] = hypot(a[l], b[l])),
+pub fn hypots(a: Eight, b: Eight) -> Eight {
+    let squares = a * a + b * b;
+    match squares.all(squares, |square, _| (square >= *PLAIN.start()) & (square <= *PLAIN.end())) {
+        true => squares.map(f64::sqrt),
+        false => a.zip(b, hypot),
     }
-    y
 }
 
 /// -1, 0 or 1; NaN for NaN.
@@ -240,21 +235,21 @@ mod tests {
     fn eight_tangents_are_those_of_each_to_the_bit() {
         for base in [0.0, 1.0, 19.0, 19.4, 19.5, 19.6, 22.0, 300.0, f64::INFINITY] {
             let x: [f64; 8] = std::array::from_fn(|l| (base + 0.01 * l as f64) * if l % 3 == 0 { -1.0 } else { 1.0 });
-            assert_eq!(tanhs(x).map(f64::to_bits), x.map(|x| tanh(x).to_bits()), "{base}");
+            assert_eq!(tanhs(Eight(x)).0.map(f64::to_bits), x.map(|x| tanh(x).to_bits()), "{base}");
         }
         let mut x = [30.0; 8];
         x[5] = f64::NAN;
-        assert!(tanhs(x)[5].is_nan() && tanhs(x)[4] == 1.0);
+        assert!(tanhs(Eight(x)).0[5].is_nan() && tanhs(Eight(x)).0[4] == 1.0);
     }
 
     #[test]
     fn eight_lengths_are_those_of_each_pair() {
         for scale in [1e-300, 2e-140, 1e-139, 1.0, 1e149, 1e200] {
             let (a, b) = ([0.3, -1.0, 0.0, 2.0, 1.0, 1e-9, 3.0, 5.5].map(|a| a * scale), [0.7; 8].map(|b| b * scale));
-            assert_eq!(hypots(a, b), std::array::from_fn(|l| hypot(a[l], b[l])), "{scale}");
+            assert_eq!(hypots(Eight(a), Eight(b)).0, std::array::from_fn(|l| hypot(a[l], b[l])), "{scale}");
         }
         let odd = [0.0, f64::INFINITY, 1.0, f64::NAN, 1e-200, 1e200, -0.0, 1.0];
-        let lengths = hypots(odd, [0.0; 8]);
+        let lengths = hypots(Eight(odd), Eight([0.0; 8])).0;
         assert!((0..8).all(|l| lengths[l].to_bits() == hypot(odd[l], 0.0).to_bits() || lengths[l].is_nan() && odd[l].is_nan()));
     }
 

@@ -14,7 +14,7 @@ pub mod forcing;
 mod function;
 mod graph;
 mod identities;
-mod kernels;
+pub mod kernels;
 mod lexer;
 mod nearest;
 mod parser;

@@ -8,14 +8,10 @@
 
 use super::graph::{Binary, Leaf, Unary};
 use super::kernels;
-use super::tape::{Code, Instruction, Place, Sum, Tape};
+use super::tape::{Code, Instruction, Place, Sum, Tape, Term};
 use crate::contract::{Batch, Parameters};
+use crate::linalg::lane::{Eight, Lane as _};
 use std::cell::{Cell, RefCell};
-
-/// Eight lanes, in one cache line.
-#[derive(Clone, Copy)]
-#[repr(align(64))]
-struct Eight([f64; 8]);
 
 /// Eights of lanes that are taken at a time: the more where the registers then fill no more than [`IN_CACHE`] eights, a good
 /// part of the fastest cache.
@@ -114,9 +110,9 @@ impl pulp::NullaryFnOnce for Run<'_, '_, '_> {
                 registers[register as usize * eights..][..eights].iter().for_each(|eight| eight.set(value));
             }
             match eights {
-                MANY => section::<MANY>(&code.body, registers, inputs, arrays),
-                FEW => section::<FEW>(&code.body, registers, inputs, arrays),
-                _ => section::<1>(&code.body, registers, inputs, arrays),
+                MANY => section::<MANY>(code, registers, inputs, arrays),
+                FEW => section::<FEW>(code, registers, inputs, arrays),
+                _ => section::<1>(code, registers, inputs, arrays),
             }
             inputs.first += inputs.live;
         }
@@ -192,16 +188,11 @@ fn zip_live<const W: usize>(to: &Lanes<W>, a: &Lanes<W>, b: &Lanes<W>, live: usi
 
 /// Runs instructions for W eights of lanes.
 #[inline(always)]
-fn section<const W: usize>(
-    instructions: &[Instruction],
-    registers: &[Cell<Eight>],
-    inputs: Inputs,
-    arrays: &mut [&mut [f64]],
-) {
+fn section<const W: usize>(code: &Code, registers: &[Cell<Eight>], inputs: Inputs, arrays: &mut [&mut [f64]]) {
     let registers: &[[Cell<Eight>; W]] = registers.as_chunks().0;
     let r = |register: u32| &registers[register as usize];
     let scalar = |s: u32| inputs.scalars[s as usize];
-    for &instruction in instructions {
+    for &instruction in &code.body {
         match instruction {
             Instruction::Load { to, from } => match (from, inputs.at.parameters) {
                 (Leaf::State(i), _) => load(r(to), inputs.at.states, i, inputs),
@@ -229,6 +220,9 @@ fn section<const W: usize>(
                     Sum::From => zip(r(to), r(a), r(c), |x, z| z - x * s),
                 }
             }
+            Instruction::Terms { to, c, first, count } => {
+                terms(r(to), r(c), &code.terms[first as usize..][..count as usize], registers, inputs.scalars);
+            }
             Instruction::Integer { to, a, n } => match n {
                 2 => map(r(to), r(a), |x| kernels::power(x, 2)),
                 3 => map(r(to), r(a), |x| kernels::power(x, 3)),
@@ -243,6 +237,48 @@ fn section<const W: usize>(
     }
 }
 
+/// Adds products to c, [`FEW`] eights of lanes at a time, whose sums stay in vector registers.
+#[inline(always)]
+fn terms<const W: usize>(to: &Lanes<W>, c: &Lanes<W>, terms: &[Term], registers: &[[Cell<Eight>; W]], scalars: &[f64]) {
+    let (whole, _) = c.as_chunks::<FEW>();
+    for (part, c) in whole.iter().enumerate() {
+        let mut sums = [c[0].get(), c[1].get(), c[2].get(), c[3].get()];
+        let of = |register: u32| -> [Eight; FEW] {
+            let own = &registers[register as usize][FEW * part..][..FEW];
+            [own[0].get(), own[1].get(), own[2].get(), own[3].get()]
+        };
+        for &term in terms {
+            let (sum, [a0, a1, a2, a3], [b0, b1, b2, b3]) = match term {
+                Term::Product { sum, a, b } => (sum, of(a), of(b)),
+                Term::Scaled { sum, a, s } => (sum, of(a), [Eight::splat(scalars[s as usize]); FEW]),
+            };
+            let [s0, s1, s2, s3] = sums;
+            let [p0, p1, p2, p3] = [a0 * b0, a1 * b1, a2 * b2, a3 * b3];
+            sums = match sum {
+                Sum::Plus => [p0 + s0, p1 + s1, p2 + s2, p3 + s3],
+                Sum::Minus => [p0 - s0, p1 - s1, p2 - s2, p3 - s3],
+                Sum::From => [s0 - p0, s1 - p1, s2 - p2, s3 - p3],
+            };
+        }
+        to[FEW * part..][..FEW].iter().zip(sums).for_each(|(to, sum)| to.set(sum));
+    }
+    for w in FEW * whole.len()..W {
+        let mut own = c[w].get();
+        for &term in terms {
+            let (sum, p) = match term {
+                Term::Product { sum, a, b } => (sum, registers[a as usize][w].get() * registers[b as usize][w].get()),
+                Term::Scaled { sum, a, s } => (sum, registers[a as usize][w].get() * Eight::splat(scalars[s as usize])),
+            };
+            own = match sum {
+                Sum::Plus => p + own,
+                Sum::Minus => p - own,
+                Sum::From => own - p,
+            };
+        }
+        to[w].set(own);
+    }
+}
+
 #[inline(always)]
 fn unary<const W: usize>(op: Unary, to: &Lanes<W>, a: &Lanes<W>, live: usize) {
     match op {
@@ -252,7 +288,7 @@ fn unary<const W: usize>(op: Unary, to: &Lanes<W>, a: &Lanes<W>, live: usize) {
         // No `for_each`: with a closure of that size it is a function of its own, compiled without the vector instructions.
         Unary::Tanh => {
             for (to, a) in to.iter().zip(a) {
-                to.set(Eight(kernels::tanhs(a.get().0)));
+                to.set(kernels::tanhs(a.get()));
             }
         }
         Unary::SechSquared => map(to, a, |x| Unary::SechSquared.of(x)),
@@ -274,7 +310,7 @@ fn binary<const W: usize>(op: Binary, to: &Lanes<W>, a: &Lanes<W>, b: &Lanes<W>,
         Binary::Max => zip(to, a, b, |x, y| Binary::Max.of(x, y)),
         Binary::Hypot => {
             for ((to, a), b) in to.iter().zip(a).zip(b) {
-                to.set(Eight(kernels::hypots(a.get().0, b.get().0)));
+                to.set(kernels::hypots(a.get(), b.get()));
             }
         }
         Binary::Less => zip(to, a, b, |x, y| Binary::Less.of(x, y)),

@@ -63,6 +63,13 @@ pub(super) enum Instruction {
         s: Scalar,
         c: Register,
     },
+    /// Several products, one after the other, in sums that begin with c: `count` of [`Code::terms`] from `first` on.
+    Terms {
+        to: Register,
+        c: Register,
+        first: u32,
+        count: u32,
+    },
     Integer {
         to: Register,
         a: Register,
@@ -78,6 +85,15 @@ pub(super) enum Instruction {
         from: Register,
         place: Place,
     },
+}
+
+/// A product in a sum.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Term {
+    /// Of a and b.
+    Product { sum: Sum, a: Register, b: Register },
+    /// Of a and a scalar.
+    Scaled { sum: Sum, a: Register, s: Scalar },
 }
 
 /// How a product p and another operand c make a sum.
@@ -122,6 +138,8 @@ pub(super) struct Code {
     pub uniform: Vec<(Scalar, Place)>,
     /// What differs from lane to lane.
     pub body: Vec<Instruction>,
+    /// The products of [`Instruction::Terms`].
+    pub terms: Vec<Term>,
 }
 
 /// Whether an operation has the forms [`Instruction::Right`] and [`Instruction::Left`].
@@ -180,13 +198,15 @@ enum Step {
     Store(Id, Place),
 }
 
-/// A sum with a product that nothing else needs.
-#[derive(Clone, Copy)]
+/// Products in one sum at most: the sums of four eights of lanes fill half of sixteen vector registers, and every operand needs a
+/// register until the last of them is added.
+const MOST_TERMS: usize = 4;
+
+/// Sums one after the other with products that nothing else needs: each of its predecessor, the first of c.
+#[derive(Clone)]
 struct Fusion {
-    sum: Sum,
-    a: Id,
-    b: Id,
     c: Id,
+    terms: Vec<(Sum, [Id; 2])>,
 }
 
 /// Which nodes differ from lane to lane.
@@ -226,18 +246,35 @@ fn fusions(graph: &Graph, varying: &[bool], roots: &[Id]) -> HashMap<Id, Fusion>
         };
         let first = if second == Sum::Plus { Sum::Plus } else { Sum::Minus };
         match (factors(x), factors(y)) {
-            (_, Some((a, b))) if varying[x.at()] => Some(Fusion { sum: second, a, b, c: x }),
-            (Some((a, b)), _) if varying[y.at()] => Some(Fusion { sum: first, a, b, c: y }),
+            (_, Some((a, b))) if varying[x.at()] => Some((x, (second, [a, b]))),
+            (Some((a, b)), _) if varying[y.at()] => Some((y, (first, [a, b]))),
             _ => None,
         }
     };
-    (0..graph.len() as u32).map(Id).filter(|id| reached[id.at()]).filter_map(|id| Some((id, fusion(id)?))).collect()
+    let mut found: HashMap<Id, Fusion> = HashMap::new();
+    // Operands have smaller numbers than what is made of them.
+    for id in (0..graph.len() as u32).map(Id).filter(|id| reached[id.at()]) {
+        let Some((c, term)) = fusion(id) else { continue };
+        let before = if uses[c.at()] == 1 { found.remove(&c) } else { None };
+        let own = match before {
+            Some(Fusion { c, terms }) if terms.len() < MOST_TERMS => {
+                Fusion { c, terms: [&terms[..], &[term]].concat() }
+            }
+            Some(full) => {
+                found.insert(c, full);
+                Fusion { c, terms: vec![term] }
+            }
+            None => Fusion { c, terms: vec![term] },
+        };
+        found.insert(id, own);
+    }
+    found
 }
 
 /// The varying operands of a node, those of its fusion where it has one.
 fn operands(graph: &Graph, varying: &[bool], fusions: &HashMap<Id, Fusion>, id: Id) -> impl Iterator<Item = Id> {
-    let list = match fusions.get(&id) {
-        Some(&Fusion { a, b, c, .. }) => vec![a, b, c],
+    let list: Vec<Id> = match fusions.get(&id) {
+        Some(Fusion { c, terms }) => terms.iter().flat_map(|(_, factors)| *factors).chain([*c]).collect(),
         None => graph.node(id).operands().collect(),
     };
     list.into_iter().filter(|id| varying[id.at()])
@@ -363,16 +400,34 @@ impl Builder<'_> {
         }
     }
 
+    /// The instruction for products in sums that begin with c.
+    fn sum(&mut self, to: Register, c: Id, terms: &[(Sum, [Id; 2])]) -> Instruction {
+        let c = self.registers[&c];
+        let mut own = Vec::with_capacity(terms.len());
+        for &(sum, [a, b]) in terms {
+            let register = self.registers[&a];
+            own.push(match self.varying[b.at()] {
+                true => Term::Product { sum, a: register, b: self.registers[&b] },
+                false => Term::Scaled { sum, a: register, s: self.scalar(b) },
+            });
+        }
+        match own[..] {
+            [Term::Product { sum, a, b }] => Instruction::Fused { sum, to, a, b, c },
+            [Term::Scaled { sum, a, s }] => Instruction::Scaled { sum, to, a, s, c },
+            _ => {
+                let (first, count) = (self.code.terms.len() as u32, own.len() as u32);
+                self.code.terms.append(&mut own);
+                Instruction::Terms { to, c, first, count }
+            }
+        }
+    }
+
     fn instruction(&mut self, id: Id, to: Register) -> Instruction {
+        if let Some(Fusion { c, terms }) = self.fusions.get(&id) {
+            return self.sum(to, *c, terms);
+        }
         let varies = |id: Id| self.varying[id.at()];
         let at = |id: Id| self.registers[&id];
-        if let Some(&Fusion { sum, a, b, c }) = self.fusions.get(&id) {
-            let (a, c) = (at(a), at(c));
-            return match varies(b) {
-                true => Instruction::Fused { sum, to, a, b: at(b), c },
-                false => Instruction::Scaled { sum, to, a, s: self.scalar(b), c },
-            };
-        }
         match self.graph.node(id) {
             Node::Constant(_) => unreachable!("constants do not vary"),
             Node::Leaf(from) => Instruction::Load { to, from },

@@ -125,7 +125,16 @@ impl<'a> Ensemble<'a> {
 
     /// Integrates until every trajectory has ended; `observe` sees every accepted step and may stop its trajectory there.
     /// Returns the arrivals in the order of the starts.
-    pub fn run(mut self, observe: &mut dyn FnMut(&Step) -> Verdict) -> Vec<Arrival> {
+    pub fn run(self, observe: &mut dyn FnMut(&Step) -> Verdict) -> Vec<Arrival> {
+        self.integrate(Some(observe))
+    }
+
+    /// The same where only the arrivals are wanted: nobody is shown the steps.
+    pub fn arrive(self) -> Vec<Arrival> {
+        self.integrate(None)
+    }
+
+    fn integrate(mut self, mut observe: Option<&mut dyn FnMut(&Step) -> Verdict>) -> Vec<Arrival> {
         let count = self.arrivals.len().min(WIDTH);
         self.lanes = Lanes::new(self.field, count, if self.own.is_empty() { 0 } else { self.field.parameter_count() });
         let mut again = Shortened::new(self.field);
@@ -141,16 +150,19 @@ impl<'a> Ensemble<'a> {
                     }
                 }
             }
-            let stopped = self.show(observe);
-            if self.lanes.take_over(&self.limits) || !stopped.is_empty() {
+            let stopped = observe.as_mut().map_or(Vec::new(), |observe| self.show(*observe));
+            let ended = self.lanes.take_over(&self.limits) || !stopped.is_empty();
+            if ended {
                 self.end_some(&stopped);
             }
-            for (l, kink) in kinks.drain(..) {
-                if self.runs[l].done.is_none() {
-                    self.pass(l, &kink, &mut again);
+            if ended || !kinks.is_empty() {
+                for (l, kink) in kinks.drain(..) {
+                    if self.runs[l].done.is_none() {
+                        self.pass(l, &kink, &mut again);
+                    }
                 }
+                self.replace_finished();
             }
-            self.replace_finished();
         }
         self.arrivals.into_iter().flatten().collect()
     }
@@ -181,7 +193,8 @@ impl<'a> Ensemble<'a> {
         for (l, (((&accepted, &h), &time), (&end, run))) in lanes.zip(self.lanes.end.iter().zip(&self.runs)).enumerate()
         {
             if accepted != 0.0 && h != 0.0 {
-                step = Step { trajectory: run.trajectory, column: l, time, length: h, end_time: end, ..step };
+                (step.trajectory, step.column) = (run.trajectory, l);
+                (step.time, step.length, step.end_time) = (time, h, end);
                 if observe(&step) == Verdict::Stop {
                     stopped.push(l);
                 }

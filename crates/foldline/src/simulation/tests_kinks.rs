@@ -129,11 +129,9 @@ fn every_lane_has_its_own_parameters_and_kinks() {
     let gaps: Vec<f64> = (0..20).map(|k| 0.03 + 0.049 * k as f64).collect();
     let starts = [0.0, 1.0].repeat(gaps.len());
     let tolerance = Tolerance::uniform(1e-9, 2);
-    let together = Ensemble::with_own_parameters(&model, &gaps, tolerance.clone(), &starts, [0.0, 30.0])
-        .run(&mut |_| Verdict::Continue);
+    let together = Ensemble::with_own_parameters(&model, &gaps, tolerance.clone(), &starts, [0.0, 30.0]).arrive();
     for (arrival, a) in together.iter().zip(&gaps) {
-        let alone =
-            Ensemble::new(&model, &[*a], tolerance.clone(), &[0.0, 1.0], [0.0, 30.0]).run(&mut |_| Verdict::Continue);
+        let alone = Ensemble::new(&model, &[*a], tolerance.clone(), &[0.0, 1.0], [0.0, 30.0]).arrive();
         assert_eq!(*arrival, alone[0], "a = {a}");
         let exact = bouncer(*a, 30.0);
         assert!((arrival.state[0] - exact[0]).abs() < 1e-7, "a = {a}: {} {}", arrival.state[0], exact[0]);

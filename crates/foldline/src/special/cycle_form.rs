@@ -22,6 +22,7 @@ use super::normal_form::without_rounding;
 use super::on_cycles::OnCycles;
 use crate::contract::Condition;
 use crate::diagram::{Cycle, Kind, Point, Solution};
+use crate::linalg::system::System;
 use crate::problem::Setting;
 
 /// Share of the null vector of a fold below which a change of the period is the error of collocation.
@@ -33,7 +34,8 @@ pub fn coefficient(kind: Kind, setting: Setting, at: &Point) -> Option<f64> {
     let Solution::Cycle(cycle) = &at.solution else { return None };
     let unit = setting.field.time_unit(&at.parameters);
     let own = if cycle.forcing_periods > 0 { f64::from(cycle.forcing_periods) } else { cycle.period };
-    let (condition, u, extra) = evaluated(kind, setting.clone(), at)?;
+    let (mut condition, u, extra) = evaluated(kind, setting.clone(), at)?;
+    let spare = Some(condition.take_system());
     let form = Form { setting, cycle, u: &u, period: own, condition: &condition };
     let (mut v, scalar) = condition.null();
     let free_fold = kind == Kind::Fold && cycle.forcing_periods == 0;
@@ -46,8 +48,8 @@ pub fn coefficient(kind: Kind, setting: Setting, at: &Point) -> Option<f64> {
     v.iter_mut().for_each(|x| *x /= size);
     let found = match kind {
         Kind::Fold => form.fold(&v, free_fold),
-        Kind::PeriodDoubling => form.doubling(&v),
-        _ => form.torus(&v, extra[0]),
+        Kind::PeriodDoubling => form.doubling(&v, spare),
+        _ => form.torus(&v, extra[0], spare),
     }?;
     Some(found / unit).filter(|value| value.is_finite())
 }
@@ -85,8 +87,8 @@ struct Form<'a, 'b> {
 
 impl Form<'_, '_> {
     /// The periodic solution of y' - A y + α f = r, and α.
-    fn periodic(&self, r: &[f64]) -> Option<(Vec<f64>, f64)> {
-        let mut operator = OnCycles::operator(self.setting.clone(), self.cycle, false)?;
+    fn periodic(&self, r: &[f64], spare: Option<System>) -> Option<(Vec<f64>, f64)> {
+        let mut operator = OnCycles::operator(self.setting.clone(), self.cycle, false, spare)?;
         operator.prepare(self.u, 0.0)?;
         let (y, scalar) = operator.solved(&scaled(r, self.period));
         Some((y, -scalar / self.period))
@@ -111,8 +113,8 @@ impl Form<'_, '_> {
         Some(self.ratio(&right, v))
     }
 
-    fn doubling(&self, v: &[f64]) -> Option<f64> {
-        let (h, twice) = self.periodic(&self.condition.bent(&[v, v]))?;
+    fn doubling(&self, v: &[f64], spare: Option<System>) -> Option<f64> {
+        let (h, twice) = self.periodic(&self.condition.bent(&[v, v]), spare)?;
         let terms = [
             scaled(&self.condition.bent(&[v, v, v]), 1.0 / 6.0),
             scaled(&self.condition.bent(&[v, &h]), 0.5),
@@ -121,13 +123,13 @@ impl Form<'_, '_> {
         Some(self.total(&terms, v))
     }
 
-    fn torus(&self, v: &[f64], angle: f64) -> Option<f64> {
+    fn torus(&self, v: &[f64], angle: f64, spare: Option<System>) -> Option<f64> {
         let (x, y) = v.split_at(v.len() / 2);
         let b = |p: &[f64], q: &[f64]| self.condition.bent(&[p, q]);
         let c = |p: &[f64], q: &[f64], r: &[f64]| self.condition.bent(&[p, q, r]);
         let (xx, xy, yy) = (b(x, x), b(x, y), b(y, y));
-        let (mean, alpha) = self.periodic(&sum(&xx, 1.0, &yy))?;
-        let mut operator = OnCycles::operator(self.setting.clone(), self.cycle, true)?;
+        let (mean, alpha) = self.periodic(&sum(&xx, 1.0, &yy), None)?;
+        let mut operator = OnCycles::operator(self.setting.clone(), self.cycle, true, spare)?;
         operator.prepare(self.u, 2.0 * angle)?;
         let second = [sum(&xx, -1.0, &yy), scaled(&xy, 2.0)].concat();
         let (second, _) = operator.solved(&scaled(&second, self.period));

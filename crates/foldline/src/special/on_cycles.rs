@@ -67,24 +67,34 @@ pub struct OnCycles<'a> {
 impl<'a> OnCycles<'a> {
     /// The condition of that kind for cycles on `mesh`; `None` for a kind that cycles do not have.
     pub fn new(kind: Kind, setting: Setting<'a>, cycle: &Cycle) -> Option<OnCycles<'a>> {
+        let mut condition = OnCycles::empty(kind, setting, cycle, true)?;
+        condition.system = System::new(condition.parts, &condition.scheme.end, condition.scalars());
+        condition.resize();
+        // Any border will do for the first evaluation unless it is orthogonal to a null vector.
+        let size = condition.profile_size();
+        condition.left = wave(size, 0.4, 0.013, [0.0, 1.0]);
+        condition.right = wave(size, 0.5, 0.017, [1.0, 0.0]);
+        Some(condition)
+    }
+
+    /// Without room for a system and without borders.
+    fn empty(kind: Kind, setting: Setting<'a>, cycle: &Cycle, bordered: bool) -> Option<OnCycles<'a>> {
         let Cycle { degree, forcing_periods, ref mesh, .. } = *cycle;
         let (scheme, n) = (Scheme::new(degree), setting.field.dim());
-        let (parts, scalars) = match kind {
-            Kind::Fold if forcing_periods == 0 => (n, 2),
-            Kind::Fold => (n, 1),
-            Kind::PeriodDoubling => (n, 1),
-            Kind::Torus => (2 * n, 2),
+        let parts = match kind {
+            Kind::Fold | Kind::PeriodDoubling => n,
+            Kind::Torus => 2 * n,
             _ => return None,
         };
-        let mut condition = OnCycles {
-            system: System::new(parts, &scheme.end, scalars),
+        Some(OnCycles {
+            system: nothing(),
             setting,
             scheme,
             kind,
             mesh: mesh.clone(),
             n,
             parts,
-            bordered: true,
+            bordered,
             phase: Vec::new(),
             left: Vec::new(),
             left_phase: 0.3,
@@ -99,23 +109,29 @@ impl<'a> OnCycles<'a> {
             fx: Vec::new(),
             forcing_periods,
             times: Vec::new(),
-        };
-        condition.resize();
-        // Any border will do for the first evaluation unless it is orthogonal to a null vector.
-        let size = condition.profile_size();
-        condition.left = (0..size).map(|k| 0.4 + (k as f64 * 0.013).sin()).collect();
-        condition.right = (0..size).map(|k| 0.5 + (k as f64 * 0.017).cos()).collect();
-        Some(condition)
+        })
     }
 
-    /// L of (1), or of (3) where `complex` says so, by itself, which is regular where it has no null vector.
-    pub(super) fn operator(setting: Setting<'a>, cycle: &Cycle, complex: bool) -> Option<OnCycles<'a>> {
+    /// L of (1), or of (3) where `complex` says so, by itself, which is regular where it has no null vector; in a system that is given
+    /// where that has the shape.
+    pub(super) fn operator(
+        setting: Setting<'a>,
+        cycle: &Cycle,
+        complex: bool,
+        spare: Option<System>,
+    ) -> Option<OnCycles<'a>> {
         let kind = if complex { Kind::Torus } else { Kind::Fold };
-        let mut own = OnCycles::new(kind, setting, cycle)?;
-        own.bordered = false;
-        own.system = System::new(own.parts, &own.scheme.end, own.scalars());
+        let mut own = OnCycles::empty(kind, setting, cycle, false)?;
+        let shape = (own.parts, own.scalars());
+        let spare = spare.filter(|system| system.shape() == shape);
+        own.system = spare.unwrap_or_else(|| System::new(shape.0, &own.scheme.end, shape.1));
         own.resize();
         Some(own)
+    }
+
+    /// Takes the system away; what was found with it stays.
+    pub(super) fn take_system(&mut self) -> System {
+        std::mem::replace(&mut self.system, nothing())
     }
 
     /// Factorises L at `u`; `angle` is θ of (3).
@@ -301,8 +317,7 @@ impl<'a> OnCycles<'a> {
 
     /// Fills the bordered operator (4).
     fn fill(&mut self, angle: f64) {
-        let system = std::mem::replace(&mut self.system, System::new(1, &[1.0, 0.0], 0));
-        self.system = match system {
+        self.system = match self.take_system() {
             System::Eight(own) => System::Eight(self.filled(own, angle)),
             System::One(own) => System::One(self.filled(own, angle)),
         };
@@ -431,6 +446,22 @@ impl<'a> OnCycles<'a> {
         g.copy_from_slice(&self.null[size + first..]);
         (max_abs(&self.null).is_finite() && self.adjoint.iter().all(|w| max_abs(w).is_finite())).then_some(())
     }
+}
+
+/// A system without intervals.
+fn nothing() -> System {
+    System::new(1, &[1.0, 0.0], 0)
+}
+
+/// So many values of a wave around a mean, which advances by an angle from one to the next, from its sine and cosine.
+fn wave(size: usize, mean: f64, angle: f64, [mut sin, mut cos]: [f64; 2]) -> Vec<f64> {
+    let (s, c) = angle.sin_cos();
+    let mut next = || {
+        let value = mean + sin;
+        (sin, cos) = (sin * c + cos * s, cos * c - sin * s);
+        value
+    };
+    (0..size).map(|_| next()).collect()
 }
 
 impl Condition for OnCycles<'_> {

@@ -123,7 +123,7 @@ impl Reduction<'_, '_> {
                 }
                 reflect(g, left, right, sums, n);
                 trivial = trivial * g[0];
-                if !trivial.all(one, |x, _| (1.0 / FAR..FAR).contains(&x.abs())) {
+                if !trivial.all(one, |x, _| (x.abs() >= 1.0 / FAR) & (x.abs() < FAR)) {
                     for (x, lane) in trivial.lanes_mut().iter_mut().zip(lanes.iter_mut()) {
                         lane.log += x.abs().ln();
                         *x = x.signum();

@@ -189,16 +189,23 @@ impl Lanes {
         let [first, .., last] = &mut self.slopes;
         std::mem::swap(first, last);
         std::mem::swap(&mut self.switches, &mut self.ahead[PLACES.len() - 1]);
-        for l in (0..self.count).filter(|&l| self.accepted[l] == 0.0) {
-            for at in (l..self.x.len()).step_by(self.count) {
-                self.x[at] = self.next[at];
-                self.slopes[0][at] = self.slopes[STAGES - 1][at];
+        for first in (0..self.count).step_by(8) {
+            // Mostly all of eight go on.
+            if self.accepted[first..].first_chunk().is_some_and(|eight| *eight == [1.0; 8]) {
+                continue;
             }
-            let back = &self.ahead[PLACES.len() - 1];
-            (l..back.len()).step_by(self.count).for_each(|at| self.switches[at] = back[at]);
+            for l in (first..self.count.min(first + 8)).filter(|&l| self.accepted[l] == 0.0) {
+                for at in (l..self.x.len()).step_by(self.count) {
+                    self.x[at] = self.next[at];
+                    self.slopes[0][at] = self.slopes[STAGES - 1][at];
+                }
+                let back = &self.ahead[PLACES.len() - 1];
+                (l..back.len()).step_by(self.count).for_each(|at| self.switches[at] = back[at]);
+            }
         }
         pulp::Arch::new().dispatch(GoOn { lanes: self, limits });
-        self.remarkable.iter().any(|&remarkable| remarkable != 0.0)
+        // 1 or 0: as bits, since those have no order in which they must be put together.
+        self.remarkable.iter().fold(0, |any, remarkable| any | remarkable.to_bits()) != 0
     }
 
     /// Only these lanes stay.

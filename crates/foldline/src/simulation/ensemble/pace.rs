@@ -106,7 +106,9 @@ pub(super) fn go_on(
         let holds = accepted[l] != 0.0;
         tried[l] += 1.0;
         steps[l] += accepted[l];
-        let now = if holds { end[l] } else { time[l] };
+        // Both are read: of a number that is read in one case only, the compiler makes an address, and no vector.
+        let (there, here) = (end[l], time[l]);
+        let now = select_unpredictable(holds, there, here);
         let remaining = limits.end - now;
         // A last step a little longer than planned saves a tiny one.
         let last = holds & (planned[l].abs() * 1.01 >= remaining.abs());
