@@ -350,3 +350,48 @@ fn left<const W: usize>(op: Binary, to: &Lanes<W>, s: f64, b: &Lanes<W>) {
         _ => map(to, b, |x| Binary::Max.of(s, x)),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::contract::{Batch, Parameters, VectorField};
+    use crate::model::{Definition, Model, ModelSource, Parameter, State};
+
+    /// Sums of products of every sign and length, in batches of every width, are what the formula says to the bit.
+    #[test]
+    fn sums_of_products_are_added_in_their_order() {
+        let text = |f: &[(&str, &str)]| f.iter().map(|(name, text)| Definition::new(name, text)).collect();
+        let model = Model::compile(ModelSource {
+            parameters: vec![Parameter::new("p", 0.0)],
+            states: ["x", "y", "z"].map(State::new).to_vec(),
+            equations: text(&[
+                ("x", "z + p*x - y*z + x*y - p*z + z^2 - y*x*z + 0.3*y"),
+                ("y", "x*y - z + p*x - y*z"),
+                ("z", "p*y - (x*z - y) + z*(x - p*y)"),
+            ]),
+            ..ModelSource::default()
+        })
+        .unwrap();
+        for lanes in [1, 3, 8, 9, 16, 17, 24, 32, 33, 64, 65, 100, 200] {
+            let p = -0.7;
+            let states: Vec<f64> =
+                (0..3 * lanes).map(|k| (1.7 * k as f64).sin() * 10f64.powi(k as i32 % 5 - 2)).collect();
+            for own in [false, true] {
+                let all = vec![p; lanes];
+                let parameters = if own { Parameters::PerLane(&all) } else { Parameters::Shared(&all[..1]) };
+                let mut f = vec![f64::NAN; 3 * lanes];
+                model.evaluate(Batch { lanes, states: &states, parameters, times: &[] }, &mut f);
+                for l in 0..lanes {
+                    let [x, y, z] = [states[l], states[lanes + l], states[2 * lanes + l]];
+                    let expected = [
+                        z + p * x - y * z + x * y - p * z + z * z - y * x * z + 0.3 * y,
+                        x * y - z + p * x - y * z,
+                        p * y - (x * z - y) + z * (x - p * y),
+                    ];
+                    for i in 0..3 {
+                        assert_eq!(f[i * lanes + l].to_bits(), expected[i].to_bits(), "{lanes} lanes, {own}, {l}, {i}");
+                    }
+                }
+            }
+        }
+    }
+}
