@@ -178,14 +178,22 @@ fn routes(
             compare(&format!("first step {first_step}"), &settings, start);
         }
     }
-    for share in ENTRANCES {
-        let index = (share * base.points.len() as f64) as usize;
-        // Where a period without bound is all that still changes, the parameter says nothing about where one is.
-        let stands = |p: &Point| p.solution.period().is_some() && p.parameter_slope().abs() < STANDS;
-        if let Some(start) = base.points.get(index).filter(|p| p.position != 0 && !p.is_light() && !stands(p)) {
-            let value = start.parameters[base.free];
-            compare(&format!("from {value:?} (position {})", start.position), settings, start);
-        }
+    // Where a period without bound is all that still changes, the parameter says nothing about where one is.
+    let stands = |p: &Point| p.solution.period().is_some() && p.parameter_slope().abs() < STANDS;
+    let fits = |p: &&Point| p.position != 0 && !p.is_light() && !stands(p);
+    let mut starts: Vec<&Point> = ENTRANCES
+        .iter()
+        .filter_map(|share| base.points.get((share * base.points.len() as f64) as usize).filter(fits))
+        .collect();
+    // Next to a fold a branch that comes back does not pass the value that the parameter had in the beginning.
+    if base.special.iter().any(|special| special.kind == Kind::Fold) {
+        let slope = |p: &&Point| p.parameter_slope().abs();
+        starts.extend(base.points.iter().filter(fits).min_by(|a, b| slope(a).total_cmp(&slope(b))));
+    }
+    starts.dedup_by_key(|start| start.position);
+    for start in starts {
+        let value = start.parameters[base.free];
+        compare(&format!("from {value:?} (position {})", start.position), settings, start);
     }
 }
 

@@ -26,6 +26,13 @@ pub enum Failure {
         /// Relative to the step.
         miss: f64,
     },
+    /// Midway the curve lies `miss` times as far as is allowed from the cubic between both ends, which is the share `allowed` of the step.
+    Bent {
+        /// In what is allowed.
+        miss: f64,
+        /// Relative to the step.
+        allowed: f64,
+    },
     /// The same step backwards ends a share `miss` of it from where it began: another branch, or the other arm of a cusp, is close.
     NotBack {
         /// Relative to the step.
@@ -53,6 +60,14 @@ impl std::fmt::Display for Failure {
             }
             Failure::Elsewhere { angle, miss } => {
                 write!(f, "the branch turns too sharply (by {angle:.2} rad, {miss:.2} of a step off the prediction)")
+            }
+            Failure::Bent { miss, allowed } => {
+                let miss = miss * allowed;
+                write!(
+                    f,
+                    "the branch bends too much within the step (midway it lies {miss:.1e} of a step beside the cubic \
+                     between both ends, where {allowed:.1e} is allowed)"
+                )
             }
             Failure::NotBack { .. } => {
                 write!(

@@ -61,8 +61,10 @@ impl Tried {
         self.steps += 1;
         (self.longest, self.shortest) = (self.longest.max(step), self.shortest.min(step));
         self.intervals = [self.intervals[0].min(intervals), self.intervals[1].max(intervals)];
-        self.elsewhere +=
-            usize::from(matches!(why, Failure::Elsewhere { .. } | Failure::NotBack { .. } | Failure::Unexplained));
+        self.elsewhere += usize::from(matches!(
+            why,
+            Failure::Elsewhere { .. } | Failure::Bent { .. } | Failure::NotBack { .. } | Failure::Unexplained
+        ));
         self.diverged += usize::from(matches!(why, Failure::NoConvergence(_) | Failure::Singular));
     }
 
@@ -149,7 +151,7 @@ impl Follow<'_> {
                     .into(),
                 "ask for a smaller tolerance",
             ),
-            Failure::Singular | Failure::Elsewhere { .. } | Failure::NotBack { .. } => (
+            Failure::Singular | Failure::Elsewhere { .. } | Failure::Bent { .. } | Failure::NotBack { .. } => (
                 "the solutions form no smooth curve here: a cusp, an isolated point, or branches that meet in a way that \
                  one parameter and the symmetries of the model do not explain"
                     .into(),

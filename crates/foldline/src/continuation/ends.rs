@@ -285,7 +285,7 @@ impl Follow<'_> {
             }
             let length = self.between(left, right).along;
             for image in self.images_of_home(right, home, &reflection, 1.5 * length + HOME * tolerance) {
-                if let Some(found) = self.crosses_at(left, right, home, &image, cost) {
+                if let Some(found) = self.crosses_at(left, right, home, &reflection, &image, cost) {
                     return Some(found);
                 }
             }
@@ -293,12 +293,13 @@ impl Follow<'_> {
         None
     }
 
-    /// The same for one image of the start.
+    /// The same for one reflection and one image of the start, as it is seen from `right`.
     fn crosses_at(
         &mut self,
         left: &Station,
         right: &Station,
         home: &Point,
+        reflection: &[bool],
         image: &Image,
         cost: &mut Cost,
     ) -> Option<Station> {
@@ -332,7 +333,9 @@ impl Follow<'_> {
             }
         }
         let found = self.cut(left, &stretch, there, cost)?;
-        if !self.is_home(&found, home, image) {
+        // In the phase that suits the end of the step the image is shifted in time a little, by more than is asked for here.
+        let images = self.images_of_home(&found, home, reflection, 10.0 * HOME * tolerance);
+        if !images.iter().any(|image| self.is_home(&found, home, image)) {
             return None;
         }
         let wanted = self.signature(home);

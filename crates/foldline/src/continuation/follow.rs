@@ -63,6 +63,9 @@ pub(super) const STANDS: f64 = 1e-9;
 /// Change of the parameter, over so many equilibria, below which it has come to a stand.
 const REST: f64 = 1e-11;
 const PATIENCE: usize = 100;
+/// Share of what is allowed midway of a step that the next one is to reach at most: what is off there, as a share of the step, grows with
+/// its cube.
+const BENT: f64 = 0.8;
 /// Change of the logarithm of the period that shows whether the parameter still moves with it.
 const SHOWN: f64 = 0.01;
 /// Steps given up in turn because no permitted mesh is fine enough, until the side ends for that.
@@ -139,6 +142,7 @@ pub fn follow(
                     step *= match why {
                         Failure::Unexplained => 0.25,
                         Failure::Elsewhere { miss, .. } | Failure::NotBack { miss } if miss > 1.0 => 0.25,
+                        Failure::Bent { miss, allowed } if miss * allowed > 1.0 => 0.25,
                         Failure::Elsewhere { angle, .. } => (walk.settings.target_angle / angle).clamp(0.2, 0.5),
                         _ => 0.5,
                     };
@@ -166,7 +170,8 @@ pub fn follow(
         let (angle, length) = (between.angle, between.along);
         // A bend that has become sharper will go on so.
         let trend = trail.as_ref().map_or(1.0, |t| angle / (length * t.curvature).max(1e-12)).clamp(1.0, 2.0);
-        let factor = (walk.settings.target_angle / (trend * angle).max(1e-12)).clamp(0.3, GROWTH);
+        let factor = walk.settings.target_angle / (trend * angle).max(1e-12);
+        let factor = factor.min((BENT / between.bent).cbrt()).clamp(0.3, GROWTH);
         step = (length * factor).clamp(walk.settings.min_step, walk.settings.max_step);
         let sideways = if walk.direction > 0.0 { 0 } else { -1 };
         for item in found {

@@ -109,15 +109,16 @@ impl Follow<'_> {
             other => other?,
         };
         // Meshes agree to the tolerance only.
-        if miss > OFF + self.settings.tolerance / stretch.length.abs() {
-            return Err(Failure::Elsewhere { angle: 0.0, miss });
+        let allowed = OFF + self.settings.tolerance / stretch.length.abs();
+        if miss > allowed {
+            return Err(Failure::Bent { miss: miss / allowed, allowed });
         }
         Ok(())
     }
 
     /// The same for a tenth of the cost: one Newton step midway with the matrix of `right`, for which the problem was factorised last
-    /// and on whose mesh it is. Returns how far off the cubic the curve is, as a share of the step.
-    pub(super) fn is_nearly_smooth(&mut self, left: &Station, right: &Station) -> Result<f64, Failure> {
+    /// and on whose mesh it is. Returns how far off the cubic the curve is, as a share of the step, and how far it may be.
+    pub(super) fn is_nearly_smooth(&mut self, left: &Station, right: &Station) -> Result<[f64; 2], Failure> {
         let u = self.problem.transfer(&left.u, &left.mesh, &right.mesh);
         let tangent = self.problem.transfer(&left.tangent, &left.mesh, &right.mesh);
         let gap: Vec<f64> = right.u.iter().zip(&u).map(|(a, b)| a - b).collect();
@@ -134,10 +135,11 @@ impl Follow<'_> {
         let miss = self.problem.dot(&du, &du).sqrt() / length.abs();
         let crowded = self.problem.margin(&left.point).min(self.problem.margin(&right.point)) < CROWDED;
         let allowed = if crowded { NEARLY_OFF_CROWDED } else { NEARLY_OFF };
-        if miss > allowed + self.settings.tolerance / length.abs() {
-            return Err(Failure::Elsewhere { angle: 0.0, miss });
+        let allowed = allowed + self.settings.tolerance / length.abs();
+        if miss > allowed {
+            return Err(Failure::Bent { miss: miss / allowed, allowed });
         }
-        Ok(miss)
+        Ok([miss, allowed])
     }
 
     /// How far the parameter midway is off the cubic, by Newton's method there.

@@ -25,6 +25,8 @@ pub(super) struct Between {
     pub(super) along: f64,
     /// Distance.
     pub(super) chord: f64,
+    /// How far midway the curve lies beside the cubic between them, as a share of what is allowed; 0 where nobody looked.
+    pub(super) bent: f64,
 }
 
 /// What the point before the current one contributes: its tangent for the predictor, its monitors for the inspection.
@@ -91,7 +93,7 @@ impl Follow<'_> {
         let sizes = (dot(tangent, tangent) * dot(&left.tangent, &left.tangent)).sqrt();
         let cosine = dot(&left.tangent, tangent) / sizes;
         let (along, chord) = (dot(&left.tangent, chord), dot(chord, chord).sqrt());
-        Between { angle: cosine.clamp(-1.0, 1.0).acos(), along, chord }
+        Between { angle: cosine.clamp(-1.0, 1.0).acos(), along, chord, bent: 0.0 }
     }
 
     /// Whether the mesh of `left` has served for a step already and has room left: what the tolerance leaves of what is stated, which is
@@ -206,11 +208,11 @@ impl Follow<'_> {
         if right.mesh != left.mesh && short {
             return Err(Failure::Remeshed(right.mesh));
         }
-        let mut miss = 0.0;
+        let (mut miss, mut allowed) = (0.0, f64::INFINITY);
         if !left.mesh.is_empty() {
-            miss = self.is_nearly_smooth(left, &right)?;
+            [miss, allowed] = self.is_nearly_smooth(left, &right)?;
         }
-        let between = self.continues(left, &right, guess)?;
+        let between = Between { bent: miss / allowed, ..self.continues(left, &right, guess)? };
         if self.problem.departure(&right.u) > self.settings.newton_tolerance() {
             return Err(Failure::Departed);
         }
