@@ -348,7 +348,9 @@ impl Follow<'_> {
             doubted(walk.problem, &mut found);
             Some(found)
         };
-        self.on_its_side(&wanted, there, error, &mut at).or(Some(found))
+        let same = self.on_its_side(&wanted, there, error, &mut at);
+        // Where the plane is still ahead, so may be the special point between here and the start: a hairpin narrower than the errors.
+        same.or((to > 0.0).then_some(found))
     }
 
     /// The start as it can be seen no farther than `within` from a station.
