@@ -14,6 +14,9 @@ use crate::diagram::{Cost, Kind, Point};
 /// Share of the larger value at the ends that a monitor keeps at a change of sign if it jumps there instead of vanishing.
 const JUMP: f64 = 0.05;
 
+/// Share of the value of a monitor that a secant step leaves at most where its slope is right.
+const LEADS: f64 = 0.2;
+
 /// Distance along the curve below which a zero is not looked for more closely, for rounding.
 const FINEST: f64 = 1e-12;
 
@@ -285,12 +288,26 @@ pub fn locate(
     // First a mesh that resolves this place, then one with every interval halved; if the two disagree by more than the
     // tolerance, the finer one is the starting point for another round.
     let mut known: Option<(Station, f64)> = None;
+    let mut settled = false;
     for _ in 0..4 {
         for _ in 0..4 {
-            let Some(better) = coarse.better(problem, tolerance) else { break };
-            (coarse, _) = relocate(problem, settings, stretch, monitor, &coarse, &better, &mut slope, cost)?;
+            let better = coarse.better(problem, tolerance);
+            // The trials ended a little off the zero. Compared with the finer mesh, that would be taken for an error of this one.
+            if better.is_none() && (settled || coarse.mesh.is_empty()) {
+                break;
+            }
+            let found = relocate(problem, settings, stretch, monitor, &coarse, better.as_ref(), &mut slope, cost);
+            settled = true;
+            match found {
+                Ok((found, _)) => coarse = found,
+                Err(why) if better.is_some() => return Err(why),
+                Err(_) => break,
+            }
             if monitor.jump() > 0 && !monitor.confirms(&coarse.point) {
                 return Ok(Located { distance, station: coarse, error: floor });
+            }
+            if better.is_none() {
+                break;
             }
         }
         problem.set_mesh(&coarse.mesh);
@@ -300,7 +317,7 @@ pub fn locate(
             return Ok(Located { distance, station, error });
         };
         coarse = whole(problem, coarse, stretch.direction);
-        let (mut fine, off) = relocate(problem, settings, stretch, monitor, &coarse, &finer, &mut slope, cost)?;
+        let (mut fine, off) = relocate(problem, settings, stretch, monitor, &coarse, Some(&finer), &mut slope, cost)?;
         let error = floor
             + off
             + discrepancy(&coarse.point, &fine.point, coarse.parameter() - fine.parameter(), fine.parameter());
@@ -402,25 +419,26 @@ fn whole(problem: &mut dyn ZeroProblem, found: Station, direction: f64) -> Stati
     examined(problem, found.u, found.tangent, direction)
 }
 
-/// The zero again on a finer mesh, by the secant method from the coarse one; `slope` is that of the monitor, if it is known
-/// already.
+/// The zero again on a finer mesh, or on its own one more closely, by the secant method from the coarse one; `slope` is that of the
+/// monitor, if it is known already.
 fn relocate(
     problem: &mut dyn ZeroProblem,
     settings: &Settings,
     stretch: &Stretch,
     monitor: &dyn Monitor,
     coarse: &Station,
-    finer: &crate::diagram::Mesh,
+    finer: Option<&crate::diagram::Mesh>,
     slope: &mut Option<f64>,
     cost: &mut Cost,
 ) -> Result<(Station, f64), Failure> {
-    problem.set_mesh(finer);
-    let base = problem.transfer(&coarse.u, &coarse.mesh, finer);
-    let row = problem.transfer(&coarse.tangent, &coarse.mesh, finer);
-    let mut at = |mut u: Vec<f64>, close: f64| -> Result<(f64, Station), Failure> {
+    let mesh = finer.unwrap_or(&coarse.mesh);
+    problem.set_mesh(mesh);
+    let row = problem.transfer(&coarse.tangent, &coarse.mesh, mesh);
+    let value = |found: &Station| monitor.value(&stretch.left.point, &found.point);
+    let mut at = |problem: &mut dyn ZeroProblem, mut u: Vec<f64>, close: f64| -> Result<(f64, Station), Failure> {
         let tangent = arrive(problem, &mut u, &row, close, cost)?;
         let found = seen(monitor.reads(), problem, u, tangent, stretch.direction);
-        Ok((monitor.value(&stretch.left.point, &found.point), found))
+        Ok((value(&found), found))
     };
     // Along the curve the zero may be as far off as two meshes agree, which can be more than the stretch.
     let reach = stretch.length.abs().max(settings.tolerance);
@@ -429,7 +447,13 @@ fn relocate(
     let mut enough = (1e-2 * settings.tolerance).min(1e-3 * stretch.length.abs());
     // Of two values closer together than this the difference is noise.
     let mut apart = (100.0 * settings.tolerance).min(1e-2 * stretch.length.abs());
-    let (mut a, (mut ga, mut found)) = (0.0, at(base, settings.closeness(finer, stretch.length))?);
+    let (mut a, (mut ga, mut found)) = match finer {
+        None => (0.0, (value(coarse), coarse.clone())),
+        Some(_) => {
+            let base = problem.transfer(&coarse.u, &coarse.mesh, mesh);
+            (0.0, at(problem, base, settings.closeness(mesh, stretch.length))?)
+        }
+    };
     let mut step = match *slope {
         Some(slope) if (ga / slope).abs() < reach => -ga / slope,
         _ => 1e-2 * reach,
@@ -444,7 +468,9 @@ fn relocate(
     for round in 0..40 {
         if step.abs() < enough || !step.is_finite() {
             if !step.is_finite() || !unclear(&found, enough) {
-                return Ok((completed(problem, found, stretch.direction), step.abs()));
+                // What was not even moved was not factorised here.
+                let done = if round == 0 && finer.is_none() { whole } else { completed };
+                return Ok((done(problem, found, stretch.direction), step.abs()));
             }
             (enough, apart) = (1e-2 * enough, 0.0);
         }
@@ -459,9 +485,11 @@ fn relocate(
             _ => {}
         }
         let from = found.u.iter().zip(&found.tangent).map(|(u, t)| u + (b - a) * t).collect();
-        let (gb, next) = at(from, settings.newton_tolerance().min(0.1 * enough).max(ROUNDING))?;
+        let (gb, next) = at(problem, from, settings.newton_tolerance().min(0.1 * enough).max(ROUNDING))?;
+        // A slope that does not lead on is not the slope here.
+        let leads = gb.abs() < LEADS * ga.abs() || (b - a).abs() < 100.0 * settings.newton_tolerance();
         let rise = match *slope {
-            Some(slope) if (b - a).abs() < apart => slope,
+            Some(slope) if (b - a).abs() < apart && leads => slope,
             _ => (gb - ga) / (b - a),
         };
         step = -gb / rise;

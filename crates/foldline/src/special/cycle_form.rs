@@ -71,6 +71,10 @@ fn evaluated<'a>(kind: Kind, setting: Setting<'a>, at: &Point) -> Option<(OnCycl
     if !Condition::evaluate(&mut condition, &u, &extra, &mut g) {
         return None;
     }
+    if extra.is_empty() {
+        condition.sharpen()?;
+        return Some((condition, u, extra));
+    }
     condition.anchor();
     Condition::evaluate(&mut condition, &u, &extra, &mut g).then_some((condition, u, extra))
 }

@@ -402,6 +402,40 @@ impl<'a> OnCycles<'a> {
         }
     }
 
+    /// Makes the null vectors that were evaluated last what (4) gives with borders made of them, from the matrix as it is. Where v is real:
+    /// with b', c' the new borders and g, v, w from the old ones,
+    ///
+    /// ```text
+    ///   (5)  [ L   b ] [ z ]   [ b' ]
+    ///        [ c*  0 ] [ s ] = [ 0  ],      v' = v - g/s z,   L v' = -g/s b'
+    /// ```
+    ///
+    /// and likewise for w.
+    pub(super) fn sharpen(&mut self) -> Option<()> {
+        let (size, first) = (self.profile_size(), usize::from(self.is_fold()));
+        let (total, g) = (size + first + 1, *self.null.last()?);
+        if self.width() > 1 || self.null.len() != total {
+            return None;
+        }
+        self.anchor();
+        let [mut left, mut right, mut z] = [(); 3].map(|()| vec![0.0; total]);
+        self.each(|_, node, h, weight| {
+            for at in node..node + self.parts {
+                (left[at], right[at]) = (h * self.left[at], h * weight * self.right[at]);
+            }
+        });
+        if self.is_fold() {
+            (left[size], right[size]) = (self.left_phase, self.right_period);
+        }
+        self.system.solve(&left, &mut z);
+        let share = g / z[total - 1];
+        self.null.iter_mut().zip(&z).for_each(|(v, z)| *v -= share * z);
+        self.system.solve_transposed(&right, &mut z);
+        let share = g / z[total - 1];
+        self.adjoint[0].iter_mut().zip(&z).for_each(|(w, z)| *w -= share * z);
+        (max_abs(&self.null).is_finite() && max_abs(&self.adjoint[0]).is_finite()).then_some(())
+    }
+
     /// w as a profile: left ends from the continuity rows, Gauss points from the collocation rows over their weights.
     fn adjoint_profile(&self) -> Vec<f64> {
         let (m, parts, count) = (self.scheme.degree, self.parts, self.intervals());
