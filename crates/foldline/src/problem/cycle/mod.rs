@@ -241,22 +241,40 @@ impl pulp::NullaryFnOnce for Largest<'_, '_> {
     #[inline(always)]
     fn call(self) {
         let size = self.largest.len();
-        let (blocks, rest) = self.largest.as_chunks_mut::<4>();
-        let first = size - rest.len();
-        // What is compared stays in registers.
-        for (k, most) in blocks.iter_mut().enumerate() {
-            let mut own = *most;
-            for v in self.profile.chunks_exact(size).filter_map(|interval| interval[4 * k..].first_chunk::<4>()) {
-                (0..4).for_each(|l| own[l] = larger(own[l], v[l].abs()));
-            }
-            *most = own;
-        }
-        for interval in self.profile.chunks_exact(size) {
-            for (most, v) in rest.iter_mut().zip(&interval[first..]) {
-                *most = larger(*most, v.abs());
-            }
+        let mut at = 0;
+        while at < size {
+            at += match size - at {
+                8.. => largest_of::<8>(self.profile, size, at, self.largest),
+                4.. => largest_of::<4>(self.profile, size, at, self.largest),
+                _ => largest_of::<1>(self.profile, size, at, self.largest),
+            };
         }
     }
+}
+
+/// The same for C entries from `at` on; returns C. What is compared stays in registers, in four rows that do not wait for each other.
+#[inline(always)]
+fn largest_of<const C: usize>(profile: &[f64], size: usize, at: usize, largest: &mut [f64]) -> usize {
+    let mut own = [[0.0f64; C]; 4];
+    let compare = |own: &mut [f64; C], interval: &[f64]| {
+        let Some(v) = interval[at..].first_chunk::<C>() else { return };
+        (0..C).for_each(|l| own[l] = larger(own[l], v[l].abs()));
+    };
+    let mut fours = profile.chunks_exact(4 * size);
+    for four in &mut fours {
+        let (two, other) = four.split_at(2 * size);
+        let ((a, b), (c, d)) = (two.split_at(size), other.split_at(size));
+        compare(&mut own[0], a);
+        compare(&mut own[1], b);
+        compare(&mut own[2], c);
+        compare(&mut own[3], d);
+    }
+    fours.remainder().chunks_exact(size).for_each(|interval| compare(&mut own[0], interval));
+    for l in 0..C {
+        let [a, b, c, d] = [own[0][l], own[1][l], own[2][l], own[3][l]];
+        largest[at + l] = larger(larger(larger(larger(largest[at + l], a), b), c), d);
+    }
+    C
 }
 
 /// Σ_j h_j a_j b_j for every entry of an interval but the first few.
