@@ -19,6 +19,10 @@ use clap::Parser;
 use failure::{Failure, Outcome};
 use std::process::ExitCode;
 
+/// Meshes change size all the time: what is given back is kept for the next one, and not asked of the system again.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 fn main() -> ExitCode {
     match answer(Arguments::parse()) {
         Ok(Outcome::Done) => ExitCode::SUCCESS,

@@ -220,10 +220,18 @@ impl Returns {
 
     /// The `count` predictions that deserve to be tried: those that changed least, the fewest crossings per period first.
     pub(super) fn predictions(&self, count: usize, extent: &[f64]) -> Vec<Prediction> {
-        let mut found: Vec<Prediction> = (1..=MOST_CROSSINGS).filter_map(|q| self.predict(q, extent)).collect();
-        let least = found.iter().fold(f64::INFINITY, |m, p| m.min(p.doubt));
         // A cycle seen over several turns is predicted as well as over one.
-        found.retain(|p| p.doubt <= 3.0 * least + 1e-4);
+        const AS_WELL: f64 = 1e-4;
+        let mut found: Vec<Prediction> = Vec::new();
+        for q in 1..=MOST_CROSSINGS {
+            found.extend(self.predict(q, extent));
+            // Whatever comes after these, they stay and are the first.
+            if found.len() >= count && found.iter().all(|p| p.doubt <= AS_WELL) {
+                break;
+            }
+        }
+        let least = found.iter().fold(f64::INFINITY, |m, p| m.min(p.doubt));
+        found.retain(|p| p.doubt <= 3.0 * least + AS_WELL);
         found.truncate(count);
         found
     }

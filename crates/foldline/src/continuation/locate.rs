@@ -2,7 +2,7 @@
 //!
 //! **Idea.** Between two accepted points the curve is parametrised by the distance s along the tangent of the first; a
 //! bracketing method finds the zero in s, each trial point being a full solution of the problem. The zero is then found
-//! again on a mesh with every interval halved, and the difference is the stated error.
+//! again on a finer mesh, and the difference is the stated error.
 //!
 //! **Source.** chandrupatla1997 (bracketing with inverse quadratic interpolation and bisection).
 
@@ -285,11 +285,11 @@ pub fn locate(
     if !monitor.possible(&coarse.point) {
         return Ok(Located { distance, station: coarse, error: floor });
     }
-    // First a mesh that resolves this place, then one with every interval halved; if the two disagree by more than the
-    // tolerance, the finer one is the starting point for another round.
+    // First a mesh that resolves this place, then a finer one; if the two disagree by more than the tolerance, the finer one is the starting
+    // point for another round, with every interval halved.
     let mut known: Option<(Station, f64)> = None;
     let mut settled = false;
-    for _ in 0..4 {
+    for round in 0..4 {
         for _ in 0..4 {
             let better = coarse.better(problem, tolerance);
             // The trials ended a little off the zero. Compared with the finer mesh, that would be taken for an error of this one.
@@ -311,7 +311,7 @@ pub fn locate(
             }
         }
         problem.set_mesh(&coarse.mesh);
-        let Some(finer) = problem.finer_mesh() else {
+        let Some(finer) = (if round == 0 { problem.denser_mesh() } else { problem.finer_mesh() }) else {
             let station = whole(problem, coarse, stretch.direction);
             let error = floor + noise(problem, settings, stretch, monitor, distance, &station, cost);
             return Ok(Located { distance, station, error });

@@ -9,6 +9,7 @@
 
 use super::gauss::Scheme;
 use crate::diagram::{Cycle, Mesh};
+use crate::linalg::lane::{Eight, Lane as _};
 
 /// The largest mesh that is tried.
 pub const LARGEST: usize = 4000;
@@ -27,6 +28,27 @@ pub fn divided(mesh: &Mesh, parts: usize) -> Mesh {
     }
     out.push(1.0);
     out.into()
+}
+
+/// Half as many intervals again, everywhere; the second half of a mesh that is a copy of the first stays one.
+pub fn denser(mesh: &Mesh) -> Mesh {
+    let thicker = |nodes: &[f64]| -> Vec<f64> {
+        let count = nodes.len() - 1;
+        let wanted = (3 * count).div_ceil(2);
+        let node = |k: usize| {
+            let (j, rest) = (k * count / wanted, k * count % wanted);
+            let next = nodes[(j + 1).min(count)];
+            nodes[j] + (next - nodes[j]) * rest as f64 / wanted as f64
+        };
+        (0..=wanted).map(node).collect()
+    };
+    if !in_halves(mesh) {
+        return thicker(mesh).into();
+    }
+    let mut first = thicker(&mesh[..=(mesh.len() - 1) / 2]);
+    let second: Vec<f64> = first[1..].iter().map(|t| 0.5 + t).collect();
+    first.extend(second);
+    first.into()
 }
 
 /// A mesh on which every interval would carry about `target`, nowhere with less than the share `kept` of the density that
@@ -141,25 +163,45 @@ impl Passage {
 
     /// A profile of n components, `[interval][node][component]`, on the new mesh.
     pub fn carried(&self, profile: &[f64], n: usize) -> Vec<f64> {
-        match n {
-            4 => self.carried_by(profile, 4),
-            _ => self.carried_by(profile, n),
+        let mut out = vec![0.0; self.within.len() * n];
+        Eight::dispatch(Carried { passage: self, profile, out: &mut out, n });
+        out
+    }
+}
+
+struct Carried<'a, 'b> {
+    passage: &'a Passage,
+    profile: &'a [f64],
+    out: &'b mut [f64],
+    n: usize,
+}
+
+impl pulp::NullaryFnOnce for Carried<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        // The usual numbers as constants.
+        match (self.n, self.passage.degree + 1) {
+            (4, 5) => self.fill(4, 5),
+            (n, nodes) => self.fill(n, nodes),
         }
     }
+}
 
-    /// The usual number of components as a constant.
+impl Carried<'_, '_> {
     #[inline(always)]
-    fn carried_by(&self, profile: &[f64], n: usize) -> Vec<f64> {
-        let nodes = self.degree + 1;
-        let mut out = vec![0.0; self.within.len() * n];
-        let places = self.within.iter().zip(self.weights.chunks_exact(nodes));
+    fn fill(self, n: usize, nodes: usize) {
+        let Carried { passage, profile, out, .. } = self;
+        let places = passage.within.iter().zip(passage.weights.chunks_exact(nodes));
         for (x, (j, weights)) in out.chunks_exact_mut(n).zip(places) {
-            let own = profile[j * nodes * n..(j + 1) * nodes * n].chunks_exact(n);
-            for (w, node) in weights.iter().zip(own) {
-                x.iter_mut().zip(node).for_each(|(x, value)| *x += w * value);
+            let own = &profile[j * nodes * n..(j + 1) * nodes * n];
+            for k in 0..nodes {
+                for c in 0..n {
+                    x[c] += weights[k] * own[k * n + c];
+                }
             }
         }
-        out
     }
 }
 
@@ -196,6 +238,19 @@ mod tests {
         let expected = [0.0, 0.2, 0.3, 0.4, 0.5, 0.7, 0.8, 0.9, 1.0];
         assert!(whole.len() == 9 && whole.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-15), "{whole:?}");
         assert!((errors[0] - 1.0).abs() < 1e-12 && (errors[2] - 64.0 / 6f64.powi(5)).abs() < 1e-12, "{errors:?}");
+    }
+
+    #[test]
+    fn a_denser_mesh_has_half_as_many_intervals_again_and_keeps_its_halves() {
+        let mesh: Mesh = vec![0.0, 0.1, 0.3, 0.7, 1.0].into();
+        let expected = [0.0, 0.1 * 2.0 / 3.0, 0.1 + 0.2 / 3.0, 0.3, 0.3 + 0.4 * 2.0 / 3.0, 0.7 + 0.1, 1.0];
+        let denser_one = denser(&mesh);
+        assert_eq!(denser_one.len(), expected.len());
+        assert!(denser_one.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-15), "{denser_one:?}");
+        let halves: Mesh = vec![0.0, 0.2, 0.4, 0.5, 0.7, 0.9, 1.0].into();
+        let denser_two = denser(&halves);
+        assert!(in_halves(&denser_two) && denser_two.len() == 11, "{denser_two:?}");
+        assert!(denser_two.windows(2).all(|pair| pair[1] > pair[0]));
     }
 
     #[test]

@@ -23,7 +23,8 @@ use super::on_cycles::OnCycles;
 use crate::contract::Condition;
 use crate::diagram::{Cycle, Kind, Point, Solution};
 use crate::linalg::system::System;
-use crate::problem::Setting;
+use crate::problem::gauss::Scheme;
+use crate::problem::{Setting, mesh};
 
 /// Share of the null vector of a fold below which a change of the period is the error of collocation.
 const NOTHING: f64 = 1e-8;
@@ -31,6 +32,7 @@ const NOTHING: f64 = 1e-8;
 /// The coefficient of a cycle at a special point of that kind; `None` for kinds that have none, and where it cannot be computed. The
 /// setting has any free parameters.
 pub fn coefficient(kind: Kind, setting: Setting, at: &Point) -> Option<f64> {
+    let at = &denser(at)?;
     let Solution::Cycle(cycle) = &at.solution else { return None };
     let unit = setting.field.time_unit(&at.parameters);
     let own = if cycle.forcing_periods > 0 { f64::from(cycle.forcing_periods) } else { cycle.period };
@@ -52,6 +54,18 @@ pub fn coefficient(kind: Kind, setting: Setting, at: &Point) -> Option<f64> {
         _ => form.torus(&v, extra[0], spare),
     }?;
     Some(found / unit).filter(|value| value.is_finite())
+}
+
+/// The point with its cycle on a denser mesh: higher derivatives of a field change more sharply than the cycle that the mesh was made for.
+fn denser(at: &Point) -> Option<Point> {
+    let Solution::Cycle(cycle) = &at.solution else { return None };
+    if cycle.intervals() == 0 {
+        return None;
+    }
+    let mesh = mesh::denser(&cycle.mesh);
+    let profile = mesh::transferred(&cycle.profile, cycle.dim(), &Scheme::new(cycle.degree), &cycle.mesh, &mesh);
+    let solution = Solution::Cycle(Cycle { mesh, profile, ..*cycle });
+    Some(Point { solution, ..at.clone() })
 }
 
 /// The condition of that kind with its null vector, the unknowns, and the extra ones.
@@ -164,7 +178,7 @@ mod tests {
     use super::*;
     use crate::contract::VectorField;
     use crate::model::{Definition, Forcing, Model, ModelSource, Parameter, State};
-    use crate::problem::{Axis, gauss::Scheme, mesh};
+    use crate::problem::Axis;
     use num_complex::Complex64;
     use std::f64::consts::TAU;
 

@@ -33,7 +33,7 @@ fn spectrum_difference(spectrum: &[Complex64], other: &[Complex64]) -> f64 {
 const ROUNDING: f64 = 0.5 * f64::EPSILON;
 
 /// Intervals whose transitions are made more accurate at a time: what that takes stays in the cache.
-const TOGETHER: usize = 64;
+const TOGETHER: usize = 32;
 
 /// A profile along which Jacobians are taken.
 struct Profile<'a> {
