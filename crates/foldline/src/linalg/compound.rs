@@ -104,6 +104,14 @@ impl<T: Lane> Compound<T> {
     /// Right-hand sides h `[L × n]` become b_1 … b_L; takes from `s` `[q]` what the border `[L][q × n]` has on them.
     #[inline(always)]
     pub fn forward(&self, links: &[T], border: &[T], h: &mut [T], s: &mut [T], [n, q]: [usize; 2]) {
+        match (n, q) {
+            (4, 2) => self.forwarded(links, border, h, s, [4, 2]),
+            (n, q) => self.forwarded(links, border, h, s, [n, q]),
+        }
+    }
+
+    #[inline(always)]
+    fn forwarded(&self, links: &[T], border: &[T], h: &mut [T], s: &mut [T], [n, q]: [usize; 2]) {
         let (width, size) = (n + q, n * (n + q));
         for (j, link) in links.chunks_exact(size).enumerate().skip(1) {
             let (before, own) = h[(j - 1) * n..(j + 1) * n].split_at_mut(n);
@@ -119,6 +127,14 @@ impl<T: Lane> Compound<T> {
     /// x_1 … x_{L-1} at 0 … L-2 from x_0 and σ, h as [`Compound::forward`] left it.
     #[inline(always)]
     pub fn backward(&self, h: &mut [T], first: &[T], sigma: &[T], [n, q]: [usize; 2]) {
+        match (n, q) {
+            (4, 2) => self.backwarded(h, first, sigma, [4, 2]),
+            (n, q) => self.backwarded(h, first, sigma, [n, q]),
+        }
+    }
+
+    #[inline(always)]
+    fn backwarded(&self, h: &mut [T], first: &[T], sigma: &[T], [n, q]: [usize; 2]) {
         let (width, size) = (n + q, n * (n + q));
         let inner = self.products.len() / size - 1;
         for (x, product) in h.chunks_exact_mut(n).zip(self.products.chunks_exact(size)).take(inner) {
