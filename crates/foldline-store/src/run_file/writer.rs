@@ -33,10 +33,14 @@ pub struct Recorder {
 struct State {
     connection: Connection,
     numbers: HashMap<String, i64>,
-    /// Which file the path led to in the beginning.
+    /// Which file the path led to in the beginning, and how many events have been recorded.
     file: Option<Identity>,
+    events: usize,
     failure: Option<RunFileError>,
 }
+
+/// Events between two looks whether the file is still where it was.
+const LOOKS: usize = 16;
 
 /// Device and number of a file.
 type Identity = (u64, u64);
@@ -187,7 +191,7 @@ impl Recorder {
             insert_special: insert("special_points", &special, &columns),
             insert_response: responses::insert(&study.model),
             shown: columns.names().count(),
-            state: Mutex::new(State { connection, numbers, file: identity(&path), failure: None }),
+            state: Mutex::new(State { connection, numbers, file: identity(&path), events: 0, failure: None }),
             path,
             _lock: lock,
         })
@@ -234,7 +238,9 @@ impl Observer for Recorder {
     fn observe(&self, event: Event) -> Verdict {
         let mut state = self.locked();
         if state.failure.is_none() {
-            state.failure = if identity(&self.path) == state.file {
+            let looks = state.events.is_multiple_of(LOOKS);
+            state.events += 1;
+            state.failure = if !looks || identity(&self.path) == state.file {
                 self.record(&mut state, event).err().map(|error| RunFileError::from_sqlite(&self.path, error))
             } else {
                 Some(RunFileError::Vanished(self.path.clone()))

@@ -24,6 +24,8 @@ pub(super) const MOST_CROSSINGS: usize = 16;
 const MOST_REPEATED: usize = 40;
 /// Largest m of (1).
 const MOST_TERMS: usize = 8;
+/// Differences that these take, with one for the comparison.
+const MOST: usize = MOST_TERMS + 2;
 /// Returns that are kept.
 const KEPT: usize = MOST_REPEATED * 6 + 1;
 /// Largest last difference, relative to the extent, from which a limit is predicted.
@@ -151,9 +153,17 @@ impl Returns {
     /// The limit of every q-th return, 1 ≤ q ≤ [`MOST_REPEATED`], if the last of them are close together and the limit was the
     /// same one return earlier.
     fn predict(&self, q: usize, extent: &[f64]) -> Option<Prediction> {
+        // Small matrices where that many terms do.
+        match MOST_TERMS.min(self.anchor.len().saturating_sub(1)) {
+            ..=3 => self.predict_in::<5>(q, extent),
+            _ => self.predict_in::<MOST>(q, extent),
+        }
+    }
+
+    fn predict_in<const M: usize>(&self, q: usize, extent: &[f64]) -> Option<Prediction> {
         let n = self.anchor.len();
         let newest = self.times.len().checked_sub(1)?;
-        let terms = MOST_TERMS.min(n.saturating_sub(1)).min(KEPT / q - 3);
+        let terms = (M - 2).min(n.saturating_sub(1)).min(KEPT / q - 3);
         // m + 1 differences, of one return more for the comparison.
         if newest < (terms + 2) * q {
             return None;
@@ -169,10 +179,10 @@ impl Returns {
         if size < 1e-6 {
             return Some(Prediction { state: y(0).to_vec(), crossings: q, period, size, doubt: size });
         }
-        let gram = Gram::new(terms + 2, extent, y);
+        let gram = Gram::<M>::new(terms + 2, extent, y);
         let (gamma, earlier) = (gram.weights(0, terms + 1)?, gram.weights(1, terms + 1)?);
         let limit =
-            |gamma: &Weights, from: usize, i: usize| (0..=terms).map(|j| gamma[j] * y(from + j)[i]).sum::<f64>();
+            |gamma: &[f64; M], from: usize, i: usize| (0..=terms).map(|j| gamma[j] * y(from + j)[i]).sum::<f64>();
         let (mut doubt, mut reach): (f64, f64) = (0.0, 0.0);
         for i in 0..n {
             let here = limit(&gamma, 0, i);
@@ -248,22 +258,19 @@ impl Returns {
 
 /// (2) from m + 2 iterates, the newest first; differences are measured in `scale`.
 pub(super) fn limit_of(y: &[&[f64]], scale: &[f64]) -> Option<Vec<f64>> {
-    let count = y.len().checked_sub(1).filter(|count| *count <= MOST_TERMS + 2)?;
-    let gamma = Gram::new(count, scale, |back| y[back]).weights(0, count)?;
+    let count = y.len().checked_sub(1).filter(|count| *count <= MOST)?;
+    let gamma = Gram::<MOST>::new(count, scale, |back| y[back]).weights(0, count)?;
     Some((0..scale.len()).map(|i| gamma[..count].iter().zip(y).map(|(g, y)| g * y[i]).sum()).collect())
 }
 
-/// γ of (1); those beyond m are 0.
-type Weights = [f64; MOST_TERMS + 2];
+/// Inner products of the differences uⱼ, at most M of them.
+struct Gram<const M: usize>([[f64; M]; M]);
 
-/// Inner products of the differences uⱼ.
-struct Gram([[f64; MOST_TERMS + 2]; MOST_TERMS + 2]);
-
-impl Gram {
+impl<const M: usize> Gram<M> {
     /// Of `count` differences, at most m + 2, of `count` + 1 iterates, y(0) being the newest.
-    fn new<'a>(count: usize, scale: &[f64], y: impl Fn(usize) -> &'a [f64]) -> Gram {
-        let mut gram = [[0.0; MOST_TERMS + 2]; MOST_TERMS + 2];
-        let mut u = [0.0; MOST_TERMS + 2];
+    fn new<'a>(count: usize, scale: &[f64], y: impl Fn(usize) -> &'a [f64]) -> Gram<M> {
+        let mut gram = [[0.0; M]; M];
+        let mut u = [0.0; M];
         for i in 0..scale.len() {
             for (j, u) in u[..count].iter_mut().enumerate() {
                 *u = (y(j)[i] - y(j + 1)[i]) / scale[i];
@@ -277,11 +284,11 @@ impl Gram {
 
     /// γ of (1) for the m differences from number `from` on, from the normal equations G c = 1, γ = c / Σ c, slightly
     /// regularised.
-    fn weights(&self, from: usize, m: usize) -> Option<Weights> {
+    fn weights(&self, from: usize, m: usize) -> Option<[f64; M]> {
         let trace: f64 = (0..m).map(|i| self.0[from + i][from + i]).sum();
         // G = L D Lᵀ; row k has L D until its pivot is known.
-        let mut l = [[0.0; MOST_TERMS + 2]; MOST_TERMS + 2];
-        let (mut d, mut c) = ([0.0; MOST_TERMS + 2], [0.0; MOST_TERMS + 2]);
+        let mut l = [[0.0; M]; M];
+        let (mut d, mut c) = ([0.0; M], [0.0; M]);
         for k in 0..m {
             let mut own = l[k];
             for j in 0..k {

@@ -58,13 +58,10 @@ pub trait Links<T> {
 }
 
 impl<T: Lane> Chain<T> {
-    /// Makes room for chains of `length` relations; the contents are then undefined.
+    /// Makes room for what is left of chains of `length` relations; the contents are then undefined.
     pub fn resize(&mut self, n: usize, q: usize, length: usize) {
         (self.n, self.q, self.length) = (n, q, length);
         let full = 3 * n + q;
-        self.reflectors.resize(length * n * 2 * n, T::default());
-        self.upper.resize(length * n * full, T::default());
-        self.multipliers.resize(length * q * n, T::default());
         self.relation.resize(n * full, T::default());
         self.first.resize(q * n, T::default());
         self.last.resize(q * n, T::default());
@@ -78,6 +75,10 @@ impl<T: Lane> Chain<T> {
     /// [`Singular`] if R is.
     #[inline(always)]
     pub fn eliminate(&mut self, links: impl Links<T>, border: &[T]) -> Result<(), Singular> {
+        let (n, q, length) = (self.n, self.q, self.length);
+        self.reflectors.resize(length * n * 2 * n, T::default());
+        self.upper.resize(length * n * (3 * n + q), T::default());
+        self.multipliers.resize(length * q * n, T::default());
         // The usual dimensions as constants.
         match (self.n, self.q) {
             (4, 2) => self.eliminated(links, border, 4, 2),

@@ -163,7 +163,9 @@ impl Passage {
 
     /// A profile of n components, `[interval][node][component]`, on the new mesh.
     pub fn carried(&self, profile: &[f64], n: usize) -> Vec<f64> {
-        let mut out = vec![0.0; self.within.len() * n];
+        // With room for the scalars that follow a profile.
+        let mut out = Vec::with_capacity(self.within.len() * n + 8);
+        out.resize(self.within.len() * n, 0.0);
         Eight::dispatch(Carried { passage: self, profile, out: &mut out, n });
         out
     }
