@@ -116,29 +116,60 @@ impl CycleProblem<'_> {
 
     /// A border row that acts on the profile through the inner product.
     fn fill_row(&mut self, r: usize, row: &[f64]) {
-        let (n, m, length, width) = (self.n, self.scheme.degree, self.length, self.width);
-        let block = (m + 1) * n;
+        let (n, m) = (self.n, self.scheme.degree);
         let weights: Vec<f64> = (0..m * n)
             .map(|k| self.scheme.weights[k / n] / (self.scale[k % n] * self.scale[k % n] * n as f64))
             .collect();
-        let lengths = &self.lengths;
+        let (lengths, order) = (&self.lengths, m * n);
         either!(&mut self.system, s => {
-            let slots: Vec<usize> = (0..m * n).map(|k| s.slot(k / n, k % n)).collect();
-            let border = &mut s.border[r * length * block..(r + 1) * length * block];
-            for (t, own) in border.chunks_exact_mut(block).enumerate() {
-                let (ends, inside) = own.split_at_mut(n);
-                ends.fill(Default::default());
-                for lane in 0..width {
-                    // Beyond the last interval the length is zero.
-                    let j = (lane * length + t).min(row.len() / block - 1);
-                    let h = lengths[t * width + lane];
-                    let row = &row[j * block + n..(j + 1) * block];
-                    for ((weight, x), slot) in weights.iter().zip(row).zip(&slots) {
-                        inside[*slot].lanes_mut()[lane] = h * weight * x;
-                    }
-                }
-            }
+            let slots: Vec<usize> = (0..order).map(|k| s.slot(k / n, k % n)).collect();
+            let size = self.length * (order + n);
+            let border = &mut s.border[r * size..(r + 1) * size];
+            lay(Row { row, weights: &weights, slots: &slots, lengths, border, n });
         });
+    }
+}
+
+/// A border row, ready to be dealt to the lanes.
+struct Row<'a, 'b, T> {
+    /// `[N][(m + 1) n]`.
+    row: &'a [f64],
+    /// `[m n]`, and where each goes.
+    weights: &'a [f64],
+    slots: &'a [usize],
+    /// `[L][W]`, zero beyond the last interval.
+    lengths: &'a [f64],
+    /// `[L][(m + 1) n]`.
+    border: &'b mut [T],
+    n: usize,
+}
+
+fn lay<T: Lane>(row: Row<T>) {
+    T::dispatch(row);
+}
+
+impl<T: Lane> pulp::NullaryFnOnce for Row<'_, '_, T> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Row { row, weights, slots, lengths, border, n } = self;
+        let block = weights.len() + n;
+        let (length, last) = (border.len() / block, row.len() / block - 1);
+        for (t, (own, lengths)) in border.chunks_exact_mut(block).zip(lengths.chunks_exact(T::COUNT)).enumerate() {
+            let (ends, inside) = own.split_at_mut(n);
+            ends.fill(T::default());
+            // Beyond the last interval the length is zero.
+            let mut rows = [&row[..block]; 8];
+            for lane in 0..T::COUNT {
+                let j = (lane * length + t).min(last);
+                rows[lane] = &row[j * block..(j + 1) * block];
+            }
+            let h = T::load(lengths);
+            for (k, (weight, slot)) in weights.iter().zip(slots).enumerate() {
+                inside[*slot] = h * T::splat(*weight) * T::each(|lane| rows[lane][n + k]);
+            }
+        }
     }
 }
 
