@@ -39,6 +39,9 @@ struct State {
     failure: Option<RunFileError>,
 }
 
+/// Pages of the log that are carried over at a time: 4 MB, which the processor's cache still has.
+const LOG: i64 = 256;
+
 /// Events between two looks whether the file is still where it was.
 const LOOKS: usize = 16;
 
@@ -176,6 +179,7 @@ impl Recorder {
     ) -> Result<Recorder, RunFileError> {
         let failed = |e| RunFileError::from_sqlite(&path, e);
         connection.pragma_update(None, "synchronous", "NORMAL").map_err(failed)?;
+        connection.pragma_update(None, "wal_autocheckpoint", LOG).map_err(failed)?;
         connection.busy_timeout(std::time::Duration::from_secs(10)).map_err(failed)?;
         let numbers = {
             let mut statement = connection.prepare("SELECT name, branch FROM branches").map_err(failed)?;

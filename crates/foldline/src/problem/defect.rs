@@ -37,6 +37,8 @@ pub struct Sampling {
     partial: Vec<f64>,
     /// `[m + 1][m + 1]`: right-hand sides of the collocation equations from a source at the sample points, then its integral.
     sources: Vec<f64>,
+    /// `[m + 1]`: value at the right end from values at the nodes.
+    end: Vec<f64>,
 }
 
 impl Sampling {
@@ -74,7 +76,7 @@ impl Sampling {
             (0..=m).map(move |g| (0..m).map(|k| scheme.integration[i * m + k] * projected(k, g)).sum::<f64>())
         };
         let sources = (0..m).flat_map(|i| line(i).collect::<Vec<_>>()).chain(weights.iter().copied()).collect();
-        Sampling { points, values, slopes, integrals, partial, sources }
+        Sampling { points, values, slopes, integrals, partial, sources, end: scheme.end.clone() }
     }
 }
 
@@ -184,8 +186,8 @@ pub struct Course<'a> {
     pub jacobians: &'a [f64],
     /// `[N]`: h T.
     pub lengths: &'a [f64],
-    /// `[N][n × n]`: what the polynomials give at the right ends, V(1).
-    pub transitions: &'a mut [f64],
+    /// `[n × n][N]`: receives what the transitions V(1), what the polynomials give at the right ends, gain.
+    pub gains: &'a mut [f64],
 }
 
 /// Solutions of the variational equations x' = h T J x on all intervals, made more accurate, for several courses of J.
@@ -195,7 +197,7 @@ pub struct Course<'a> {
 ///
 ///   (3)  ∫₀¹ V(1) V(s)⁻¹ D(s) ds = V(1) Σ_g w_g V(s_g)⁻¹ D(s_g)
 ///
-/// Where V cannot be inverted they stay as they are.
+/// Where V cannot be inverted they gain nothing.
 pub fn correct(sampling: &Sampling, nodes: &[f64], courses: &mut [Course], n: usize) {
     Eight::dispatch(Correction { sampling, nodes, courses, n });
 }
@@ -240,7 +242,7 @@ impl Correction<'_, '_, '_> {
         // Σ_g of (3), `[course][n × n]`.
         let mut sums = room(square * courses.len());
         let negative = |weights: &[f64]| -> Vec<Eight> { weights.iter().map(|w| Eight::splat(-w)).collect() };
-        let (to_values, to_slopes) = (negative(&sampling.values), negative(&sampling.slopes));
+        let [to_values, to_slopes, to_end] = [&sampling.values, &sampling.slopes, &sampling.end].map(|w| negative(w));
         let weights = &sampling.sources[(points - 1) * points..];
         (0..n).for_each(|c| own[c * (n + 1)] = Eight::splat(1.0));
         for first in (0..count).step_by(Eight::COUNT) {
@@ -278,22 +280,19 @@ impl Correction<'_, '_, '_> {
                 }
             }
             // V(1) times the sum.
+            matrix.fill(Eight::default());
+            tile::subtract_combination(&mut matrix, &to_end, &own, square, 0);
             for (course, sum) in courses.iter_mut().zip(sums.chunks_exact(square)) {
-                let transitions = &mut course.transitions[first * square..(first + valid) * square];
-                for (entry, to) in matrix.iter_mut().enumerate() {
-                    *to = Eight::each(|lane| transitions[lane.min(valid - 1) * square + entry]);
-                }
                 right.fill(Eight::default());
                 tile::subtract(&mut right, n, &matrix, n, sum, n, [n; 3], [0; 3]);
                 // Zero in lanes where all are finite.
                 let mut finite = Eight::default();
-                for change in &right {
-                    finite = finite.zip(*change, |all, x| all + 0.0 * x);
+                for gain in &right {
+                    finite = finite.zip(*gain, |all, x| all + 0.0 * x);
                 }
-                for (entry, (before, change)) in matrix.iter().zip(&right).enumerate() {
-                    let after = *before + finite.zip(*change, |all, x| if all == 0.0 { x } else { 0.0 });
-                    let own = transitions[entry..].iter_mut().step_by(square);
-                    own.zip(after.lanes()).for_each(|(to, after)| *to = *after);
+                for (gain, line) in right.iter().zip(course.gains.chunks_exact_mut(count)) {
+                    let gain = finite.zip(*gain, |all, x| if all == 0.0 { x } else { 0.0 });
+                    line[first..first + valid].copy_from_slice(&gain.lanes()[..valid]);
                 }
             }
         }
@@ -362,10 +361,10 @@ mod tests {
         let exact = (0.4f64 + 0.16).exp();
         let before = (end - exact).abs();
         let jacobians: Vec<f64> = gauss_legendre(m + 1).0.into_iter().map(|s| rate(s) / 0.4).collect();
-        let mut transition = [end];
-        let course = Course { jacobians: &jacobians, lengths: &[0.4], transitions: &mut transition };
+        let mut gain = [0.0];
+        let course = Course { jacobians: &jacobians, lengths: &[0.4], gains: &mut gain };
         correct(&sampling, &inner, &mut [course], 1);
-        let after = (transition[0] - exact).abs();
+        let after = (end + gain[0] - exact).abs();
         assert!(before > 1e-9 && after < 0.15 * before, "{before:e} {after:e}");
     }
 

@@ -51,6 +51,7 @@ pub(super) struct Room {
     /// As [`defect::correct`] takes them.
     nodes: Vec<f64>,
     jacobians: [Vec<f64>; 2],
+    gains: [Vec<f64>; 2],
 }
 
 impl Room {
@@ -60,6 +61,7 @@ impl Room {
         self.f.resize(n * lanes, 0.0);
         self.nodes.resize(m * square * count, 0.0);
         self.jacobians.iter_mut().for_each(|fx| fx.resize(square * lanes, 0.0));
+        self.gains.iter_mut().for_each(|gains| gains.resize(square * count, 0.0));
     }
 }
 
@@ -136,7 +138,7 @@ impl CycleProblem<'_> {
         let (n, m, block, count) = (self.n, self.scheme.degree, self.block(), piece.len());
         let (square, lanes, size) = (n * n, count * (m + 1), self.profile_size());
         room.resize(n, m, count);
-        let Room { states, f, nodes, jacobians } = room;
+        let Room { states, f, nodes, jacobians, gains } = room;
         let mesh = &self.mesh[piece.start..=piece.end];
         let times = self.sampling.times(mesh, self.forcing_periods);
         for (Profile { u, without }, fx) in profiles.iter().zip(&mut *jacobians) {
@@ -156,13 +158,18 @@ impl CycleProblem<'_> {
         let lengths = profiles
             .each_ref()
             .map(|profile| -> Vec<f64> { mesh.windows(2).map(|pair| (pair[1] - pair[0]) * profile.u[size]).collect() });
-        let [own, other] = transitions;
-        let mut courses = [(own, 0), (other, 1)].map(|(transitions, k)| Course {
-            jacobians: &jacobians[k],
-            lengths: &lengths[k],
-            transitions: &mut transitions[piece.start * square..piece.end * square],
-        });
-        defect::correct(&self.sampling, nodes, &mut courses, n);
+        let ([own, other], [more, less]) = (transitions, gains);
+        let courses = &mut [
+            Course { jacobians: &jacobians[0], lengths: &lengths[0], gains: more },
+            Course { jacobians: &jacobians[1], lengths: &lengths[1], gains: less },
+        ];
+        defect::correct(&self.sampling, nodes, courses, n);
+        for (transitions, gains) in [(own, more), (other, less)] {
+            let own = transitions[piece.start * square..piece.end * square].chunks_exact_mut(square);
+            for (j, own) in own.enumerate() {
+                own.iter_mut().zip(gains[j..].iter().step_by(count)).for_each(|(g, gain)| *g += gain);
+            }
+        }
     }
 
     fn measured_errors(&self, u: &[f64]) -> Measured {
