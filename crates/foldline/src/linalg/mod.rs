@@ -5,7 +5,6 @@
 
 pub mod block;
 pub mod chain;
-pub mod compound;
 pub mod condensed;
 pub mod lane;
 pub mod lu;
