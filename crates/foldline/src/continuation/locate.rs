@@ -311,7 +311,9 @@ pub fn locate(
             }
         }
         problem.set_mesh(&coarse.mesh);
-        let Some(finer) = (if round == 0 { problem.denser_mesh() } else { problem.finer_mesh() }) else {
+        // Of multipliers that meet on a curve the root of the error is seen.
+        let denser = round == 0 && !monitor.kind().has_codimension_two();
+        let Some(finer) = (if denser { problem.denser_mesh() } else { problem.finer_mesh() }) else {
             let station = whole(problem, coarse, stretch.direction);
             let error = floor + noise(problem, settings, stretch, monitor, distance, &station, cost);
             return Ok(Located { distance, station, error });
