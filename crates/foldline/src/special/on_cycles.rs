@@ -24,7 +24,7 @@ use crate::contract::{Batch, Condition, Parameters};
 use crate::diagram::{Cycle, Kind, Mesh, Point};
 use crate::linalg::condensed::Condensed;
 use crate::linalg::lane::Lane;
-use crate::linalg::system::{System, either};
+use crate::linalg::system::System;
 use crate::linalg::{dot, max_abs};
 use crate::problem::gauss::Scheme;
 use crate::problem::{Setting, mesh};
@@ -317,13 +317,6 @@ impl<'a> OnCycles<'a> {
 
     /// Fills the bordered operator (4).
     fn fill(&mut self, angle: f64) {
-        if self.parts == self.n {
-            // Each rate contains itself, in the derivative of the polynomials.
-            let (n, lanes) = (self.n, self.lanes());
-            let met = |(k, slope): (usize, &[f64])| k % (n + 1) == 0 || slope.iter().any(|x| *x != 0.0);
-            let coupled: Vec<bool> = self.fx.chunks_exact(lanes).enumerate().map(met).collect();
-            either!(&mut self.system, s => s.couple(&coupled));
-        }
         self.system = match self.take_system() {
             System::Eight(own) => System::Eight(self.filled(own, angle)),
             System::One(own) => System::One(self.filled(own, angle)),
