@@ -387,6 +387,30 @@ fn an_arm_between_two_pitchforks_joins_both() {
     }
 }
 
+#[test]
+fn a_crossing_is_left_although_newtons_method_ends_on_either_branch_next_to_it() {
+    // mu x - x³ + e = 0 are two curves where e is not 0, as it never is to rounding: within e^⅔ of 0 the one from the left turns into what
+    // crosses it. Points there say nothing of either.
+    for offset in ["0", "1e-15", "1e-14", "-1e-13", "1e-12"] {
+        let model = format!("[parameters]\nmu = -1\n[states]\nx = \"y\"\ny = \"-y + mu*x - x^3 + {offset}\"\n");
+        let diagram = explored(
+            &model,
+            "attractor = \"equilibrium\"",
+            "free = \"mu\"\nrange = [-1, 1]\nswitch = { branch-point = 1 }",
+        );
+        let found = has(branch(&diagram, "b"), &[(Kind::BranchPoint, 0.0)], 1e-8);
+        let slope = found[0].point.tangent[2] / found[0].point.tangent[0];
+        assert!(slope.abs() > 10.0, "{offset}: the branch goes straight through: {:?}", found[0].point.tangent);
+        let arm = branch(&diagram, "b/branch-point-1");
+        joined(arm, 0, Kind::BranchPoint, 0.0, 1e-8);
+        for point in &arm.points {
+            let mu = point.parameters[arm.free];
+            let x = point.ranges[0].iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+            assert!(near(x, mu.abs().sqrt(), TOLERANCE), "{offset}, {mu}: {x}");
+        }
+    }
+}
+
 /// On the line x = p, and on the cycles of the van der Pol oscillator.
 #[test]
 fn marks_lie_at_the_values_asked_for_and_a_branch_stops_there() {

@@ -17,6 +17,10 @@ const JUMP: f64 = 0.05;
 /// Share of the value of a monitor that a secant step leaves at most where its slope is right.
 const LEADS: f64 = 0.2;
 
+/// Cosine of the angle by which a tangent may differ from the one expected next to where branches cross: two of them are reached there, or
+/// what rounding makes of both, a bend from one into the other.
+const STRAIGHT: f64 = 0.95;
+
 /// Distance along the curve below which a zero is not looked for more closely, for rounding.
 const FINEST: f64 = 1e-12;
 
@@ -177,6 +181,16 @@ impl<'s> Stretch<'s> {
         turns_twice(rise, [self.length * self.left.tangent[i], self.length * self.slope[i]], self.midway)
     }
 
+    /// The direction of that cubic.
+    fn heading(&self, s: f64) -> Vec<f64> {
+        let (l, x) = (self.length, s / self.length);
+        let own = |i: usize| {
+            let (p, q, c) = (l * self.left.tangent[i], l * self.slope[i], self.right[i] - self.left.u[i]);
+            p + x * (2.0 * (3.0 * c - 2.0 * p - q) + 3.0 * x * (p + q - 2.0 * c))
+        };
+        (0..self.right.len()).map(own).collect()
+    }
+
     /// Cubic through both ends with both tangents.
     fn hermite_component(&self, s: f64, i: usize) -> f64 {
         let (l, x) = (self.length, s / self.length);
@@ -250,10 +264,16 @@ pub fn passing(
     Ok(found)
 }
 
+/// Whether a tangent is that of another branch than the one that is followed.
+fn turned(problem: &dyn ZeroProblem, tangent: &[f64], expected: &[f64]) -> bool {
+    let [along, own, other] = [[tangent, expected], [tangent; 2], [expected; 2]].map(|[a, b]| problem.dot(a, b));
+    along.abs() < STRAIGHT * (own * other).sqrt()
+}
+
 /// Finds the zero of `monitor` in `stretch`, whose ends have values of opposite sign.
 ///
 /// # Errors
-/// See [`Failure`].
+/// See [`Failure`]; next to a branch point also [`Failure::Singular`] where Newton's method leaves the branch for the one that crosses it.
 pub fn locate(
     problem: &mut dyn ZeroProblem,
     settings: &Settings,
@@ -265,6 +285,9 @@ pub fn locate(
     let reference = &stretch.left.point;
     let mut evaluate = |s: f64| {
         let (u, tangent) = stretch.arrived(problem, settings, s, cost)?;
+        if monitor.kind() == Kind::BranchPoint && turned(problem, &tangent, &stretch.heading(s)) {
+            return Err(Failure::Singular);
+        }
         let found = seen(monitor.reads(), problem, u, tangent, stretch.direction);
         Ok((monitor.value(reference, &found.point), found))
     };
@@ -437,6 +460,9 @@ fn relocate(
     let value = |found: &Station| monitor.value(&stretch.left.point, &found.point);
     let mut at = |problem: &mut dyn ZeroProblem, mut u: Vec<f64>, close: f64| -> Result<(f64, Station), Failure> {
         let tangent = arrive(problem, &mut u, &row, close, cost)?;
+        if monitor.kind() == Kind::BranchPoint && turned(problem, &tangent, &row) {
+            return Err(Failure::Singular);
+        }
         let found = seen(monitor.reads(), problem, u, tangent, stretch.direction);
         Ok((value(&found), found))
     };

@@ -15,7 +15,9 @@ use crate::contract::{Monitor, ZeroProblem};
 use crate::diagram::Cost;
 
 /// Distances between nodes, as shares of the stretch, in the order in which they are tried.
-const SPACINGS: [f64; 3] = [0.25, 0.1, 0.04];
+const SPACINGS: [f64; 5] = [0.25, 0.1, 0.04, 4e-3, 4e-4];
+/// How many of them where there is a mesh: closer by, its rounding shows.
+const ON_A_MESH: usize = 3;
 
 /// Share of the values next to the zero that the cubic may add to the parabola: with more the branch does not go smoothly
 /// through the place.
@@ -38,7 +40,8 @@ pub fn straddle(
     let mut root = stretch.length * values[0] / (values[0] - values[1]);
     let (mut nodes, mut stations) = ([0.0; 4], Vec::new());
     let mut moved = 0.0;
-    for spacing in SPACINGS {
+    let count = if stretch.left.mesh.is_empty() { SPACINGS.len() } else { ON_A_MESH };
+    for spacing in &SPACINGS[..count] {
         nodes = [-1.5, -0.5, 0.5, 1.5].map(|k| root + k * spacing * stretch.length);
         stations.clear();
         for s in nodes {
