@@ -161,6 +161,11 @@ pub trait ZeroProblem {
     /// A mesh with every interval halved; `None` for problems that have none.
     fn finer_mesh(&self) -> Option<Mesh>;
 
+    /// A mesh that is finer everywhere, with half as many intervals again: enough to see the error of the current one.
+    fn denser_mesh(&self) -> Option<Mesh> {
+        self.finer_mesh()
+    }
+
     /// Stability and trust at `u`, for which [`ZeroProblem::factorise`] was called last.
     fn examine(&mut self, u: &[f64]) -> Examination;
 

@@ -16,6 +16,7 @@
 //! **Fails when** the map is far from linear over the returns used. In few dimensions (1) has no remainder that would show it;
 //! the limit predicted one return earlier does, and following the prediction for a period.
 
+use super::candidate::INTEGRATION;
 use crate::simulation::Step;
 
 /// Largest number of crossings per period that is looked for.
@@ -176,7 +177,7 @@ impl Returns {
         }
         let period = self.times[newest] - self.times[newest - q];
         // Differences that small are dominated by the error of the integration.
-        if size < 1e-6 {
+        if size < INTEGRATION {
             return Some(Prediction { state: y(0).to_vec(), crossings: q, period, size, doubt: size });
         }
         let gram = Gram::<M>::new(terms + 2, extent, y);

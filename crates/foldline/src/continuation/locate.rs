@@ -308,11 +308,11 @@ pub fn locate(
     if !monitor.possible(&coarse.point) {
         return Ok(Located { distance, station: coarse, error: floor });
     }
-    // First a mesh that resolves this place, then one with every interval halved; if the two disagree by more than the
-    // tolerance, the finer one is the starting point for another round.
+    // First a mesh that resolves this place, then a finer one; if the two disagree by more than the tolerance, the finer one is the starting
+    // point for another round, with every interval halved.
     let mut known: Option<(Station, f64)> = None;
     let mut settled = false;
-    for _ in 0..4 {
+    for round in 0..4 {
         for _ in 0..4 {
             let better = coarse.better(problem, tolerance);
             // The trials ended a little off the zero. Compared with the finer mesh, that would be taken for an error of this one.
@@ -334,7 +334,9 @@ pub fn locate(
             }
         }
         problem.set_mesh(&coarse.mesh);
-        let Some(finer) = problem.finer_mesh() else {
+        // Of multipliers that meet on a curve the root of the error is seen.
+        let denser = round == 0 && !monitor.kind().has_codimension_two();
+        let Some(finer) = (if denser { problem.denser_mesh() } else { problem.finer_mesh() }) else {
             let station = whole(problem, coarse, stretch.direction);
             let error = floor + noise(problem, settings, stretch, monitor, distance, &station, cost);
             return Ok(Located { distance, station, error });

@@ -5,6 +5,7 @@
 
 pub mod block;
 pub mod chain;
+pub mod compound;
 pub mod condensed;
 pub mod lane;
 pub mod lu;

@@ -37,20 +37,31 @@ impl Multiply<'_, '_> {
     #[inline(always)]
     fn multiplied(self, columns: usize) {
         let Multiply { matrix, panel, lanes, out } = self;
-        let full = lanes - lanes % WIDTH;
         for (line, weights) in out.chunks_exact_mut(lanes).zip(matrix.chunks_exact(columns)) {
-            let (blocks, rest) = line.as_chunks_mut::<WIDTH>();
-            for (b, block) in blocks.iter_mut().enumerate() {
+            let eight = |first: usize| {
                 let mut sum = [0.0; WIDTH];
                 for (k, w) in weights[..columns].iter().enumerate() {
-                    if let Some(values) = panel[k * lanes + b * WIDTH..].first_chunk::<WIDTH>() {
+                    if let Some(values) = panel[k * lanes + first..].first_chunk::<WIDTH>() {
                         (0..WIDTH).for_each(|l| sum[l] += w * values[l]);
                     }
                 }
-                *block = sum;
+                sum
+            };
+            let (blocks, rest) = line.as_chunks_mut::<WIDTH>();
+            for (b, block) in blocks.iter_mut().enumerate() {
+                *block = eight(b * WIDTH);
             }
-            for (l, value) in rest.iter_mut().enumerate() {
-                *value = weights.iter().zip(panel.chunks_exact(lanes)).map(|(w, row)| w * row[full + l]).sum();
+            if rest.is_empty() {
+                continue;
+            }
+            // What is left belongs to the last eight, some of which are known already.
+            if let Some(first) = lanes.checked_sub(WIDTH) {
+                let own = eight(first);
+                rest.copy_from_slice(&own[WIDTH - rest.len()..]);
+            } else {
+                for (l, value) in rest.iter_mut().enumerate() {
+                    *value = weights.iter().zip(panel.chunks_exact(lanes)).map(|(w, row)| w * row[l]).sum();
+                }
             }
         }
     }

@@ -319,6 +319,10 @@ impl ZeroProblem for Held<'_> {
         self.surface.finer_mesh()
     }
 
+    fn denser_mesh(&self) -> Option<Mesh> {
+        self.surface.denser_mesh()
+    }
+
     fn spectrum_error(&mut self, u: &[f64], spectrum: &[Complex64]) -> f64 {
         self.surface.spectrum_error(&u[self.extra()..], spectrum)
     }

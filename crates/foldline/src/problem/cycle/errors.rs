@@ -32,6 +32,9 @@ fn spectrum_difference(spectrum: &[Complex64], other: &[Complex64]) -> f64 {
 /// Error of an interval that rounding alone may leave, relative. Those of all intervals add up.
 const ROUNDING: f64 = 0.5 * f64::EPSILON;
 
+/// Share of the error at a point within which its neighbours are not measured again.
+const BESIDE: f64 = 0.1;
+
 /// Intervals whose transitions are made more accurate at a time: what that takes stays in the cache.
 const TOGETHER: usize = 32;
 
@@ -78,16 +81,25 @@ pub(super) struct Measured {
 }
 
 impl CycleProblem<'_> {
-    /// Estimated error on every interval, relative. A point that was just measured is not measured again: the last
-    /// factorisation, which must belong to the current mesh, was close enough to it then.
+    /// Estimated error on every interval, relative. A point that was just measured is not measured again, nor is one that lies within a
+    /// small part of its error from that: the last factorisation, which must belong to the current mesh, was close enough to it then.
     pub(super) fn errors(&self, u: &[f64]) -> Vec<f64> {
-        if let Some(known) = self.measured.borrow().as_ref().filter(|known| same(&known.at, u)) {
+        if let Some(known) = self.measured.borrow().as_ref().filter(|known| self.is_measured(u, known)) {
             return known.errors.clone();
         }
         let measured = self.measured_errors(u);
         let errors = measured.errors.clone();
         self.measured.replace(Some(measured));
         errors
+    }
+
+    fn is_measured(&self, u: &[f64], known: &Measured) -> bool {
+        if same(&known.at, u) {
+            return true;
+        }
+        let largest = known.errors.iter().fold(0.0, |m: f64, e| m.max(*e));
+        let moved: Vec<f64> = u.iter().zip(&known.at).map(|(a, b)| a - b).collect();
+        self.relative_size(&moved, u) <= BESIDE * largest
     }
 
     /// Error at `u` that finer meshes do not make smaller: next to a singular matrix the rounding of single intervals many times over.

@@ -421,6 +421,10 @@ impl ZeroProblem for CycleProblem<'_> {
         Some(mesh::divided(&self.mesh, 2))
     }
 
+    fn denser_mesh(&self) -> Option<Mesh> {
+        Some(mesh::denser(&self.mesh))
+    }
+
     fn stability(&mut self, u: &[f64]) -> Examination {
         let found = self.floquet(u);
         let trust = Trust {

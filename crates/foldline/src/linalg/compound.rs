@@ -1,0 +1,255 @@
+//! A piece of a chain with every node expressed by its first one.
+//!
+//! **Idea.** Links x_{j+1} = G_j x_j + g_j σ + h_j are multiplied together. That takes a fifth of the operations of [`super::chain`], and the
+//! nodes of a piece do not wait for each other when a system is solved. It is safe as long as errors made at one node do not grow on the
+//! way to another, which is measured while multiplying.
+//!
+//! **Equations.** From P_0 = 1, a_0 = 0, b_0 = 0 and C_0 = 1 on:
+//!
+//! ```text
+//!   (1)  P_{j+1} = G_j P_j,   a_{j+1} = G_j a_j + g_j,   b_{j+1} = G_j b_j + h_j,     x_j = P_j x_0 + a_j σ + b_j
+//!   (2)  C_{j+1} = G_j C_j G_jᵀ + 1
+//! ```
+//!
+//! (2) is the covariance of what independent errors of size 1 at x_0 … x_j become at x_{j+1}: its diagonal bounds how much of them grows, from
+//! wherever to wherever, also where growth and decay follow each other and P shows neither.
+//!
+//! **Source.** Compactification, ascher1995, §7.2, which is unstable without a bound on the growth.
+//!
+//! **Fails when** that bound is passed; [`Compound::multiply`] says so, and the caller takes the chain.
+
+use super::lane::{Lane, add, dot, subtract};
+use super::tile::piece;
+
+/// Sum of the diagonals of (2) up to which a piece is multiplied together: errors grow by 10³ at most, of the 10¹⁶ that there are.
+const GROWTH: f64 = 1e6;
+
+/// Pieces side by side, one in each lane.
+#[derive(Clone, Debug, Default)]
+pub struct Compound<T> {
+    /// `[L][n × (n + q)]`: (P_j, a_j) of (1), j = 1 … L.
+    products: Vec<T>,
+    /// `[n × n]`: C of (2), and room for the next one.
+    spread: Vec<T>,
+    room: Vec<T>,
+}
+
+impl<T: Lane> Compound<T> {
+    /// Makes room for pieces of `length` links; the contents are then undefined.
+    pub fn resize(&mut self, n: usize, q: usize, length: usize) {
+        self.products.resize(length * n * (n + q), T::default());
+        self.spread.resize(n * n, T::default());
+        self.room.resize(n * n, T::default());
+    }
+
+    /// (1) and (2) for the links `[L][n × (n + q)]`, (G_j, g_j); false where errors may grow too much.
+    #[inline(always)]
+    pub fn multiply(&mut self, links: &[T], n: usize, q: usize) -> bool {
+        let Compound { products, spread, room } = self;
+        let (width, size) = (n + q, n * (n + q));
+        let mut total = T::default();
+        spread.fill(T::default());
+        (0..n).for_each(|i| spread[i * (n + 1)] = T::splat(1.0));
+        for (j, link) in links.chunks_exact(size).enumerate() {
+            let (before, own) = products.split_at_mut(j * size);
+            let own = &mut own[..size];
+            own.copy_from_slice(link);
+            if let Some(last) = before.rchunks_exact(size).next() {
+                for (row, to) in link.chunks_exact(width).zip(own.chunks_exact_mut(width)) {
+                    to[..n].fill(T::default());
+                    add_combination(to, &row[..n], last, width);
+                }
+            }
+            // The upper triangle of G C Gᵀ + 1, and its mirror image.
+            for (row, to) in link.chunks_exact(width).zip(room.chunks_exact_mut(n)) {
+                to.fill(T::default());
+                add_combination(to, &row[..n], spread, n);
+            }
+            for i in 0..n {
+                for k in i..n {
+                    let entry = dot(&room[i * n..(i + 1) * n], &link[k * width..k * width + n]);
+                    (spread[i * n + k], spread[k * n + i]) = (entry, entry);
+                }
+                spread[i * (n + 1)] = spread[i * (n + 1)] + T::splat(1.0);
+                total = total + spread[i * (n + 1)];
+            }
+        }
+        // Not a number is not small either.
+        total.all(total, |total, _| total <= GROWTH)
+    }
+
+    /// (P_L, a_L).
+    #[inline(always)]
+    pub fn whole(&self, n: usize, q: usize) -> &[T] {
+        &self.products[self.products.len() - n * (n + q)..]
+    }
+
+    /// Rows Σ_j p_j x_j, `border` `[L][q × n]` with j = 0 … L-1, on x_0 (added to `first` `[q × n]`) and on σ (added to `corner` `[q × q]`).
+    #[inline(always)]
+    pub fn carry_border(&self, border: &[T], first: &mut [T], corner: &mut [T], n: usize, q: usize) {
+        let width = n + q;
+        for (j, rows) in border.chunks_exact(q * n).enumerate() {
+            if j == 0 {
+                add(T::splat(1.0), rows, first);
+                continue;
+            }
+            let product = &self.products[(j - 1) * n * width..j * n * width];
+            for (c, row) in rows.chunks_exact(n).enumerate() {
+                add_columns(&mut first[c * n..(c + 1) * n], row, product, width, 0);
+                add_columns(&mut corner[c * q..(c + 1) * q], row, product, width, n);
+            }
+        }
+    }
+
+    /// Right-hand sides h `[L × n]` become b_1 … b_L; takes from `s` `[q]` what the border `[L][q × n]` has on them.
+    #[inline(always)]
+    pub fn forward(&self, links: &[T], border: &[T], h: &mut [T], s: &mut [T], [n, q]: [usize; 2]) {
+        match (n, q) {
+            (4, 2) => self.forwarded(links, border, h, s, [4, 2]),
+            (n, q) => self.forwarded(links, border, h, s, [n, q]),
+        }
+    }
+
+    #[inline(always)]
+    fn forwarded(&self, links: &[T], border: &[T], h: &mut [T], s: &mut [T], [n, q]: [usize; 2]) {
+        let (width, size) = (n + q, n * (n + q));
+        for (j, link) in links.chunks_exact(size).enumerate().skip(1) {
+            let (before, own) = h[(j - 1) * n..(j + 1) * n].split_at_mut(n);
+            for (x, row) in own.iter_mut().zip(link.chunks_exact(width)) {
+                *x = *x + dot(&row[..n], before);
+            }
+            for (s, row) in s.iter_mut().zip(border[j * q * n..(j + 1) * q * n].chunks_exact(n)) {
+                *s = *s - dot(row, before);
+            }
+        }
+    }
+
+    /// x_1 … x_{L-1} at 0 … L-2 from x_0 and σ, h as [`Compound::forward`] left it.
+    #[inline(always)]
+    pub fn backward(&self, h: &mut [T], first: &[T], sigma: &[T], [n, q]: [usize; 2]) {
+        match (n, q) {
+            (4, 2) => self.backwarded(h, first, sigma, [4, 2]),
+            (n, q) => self.backwarded(h, first, sigma, [n, q]),
+        }
+    }
+
+    #[inline(always)]
+    fn backwarded(&self, h: &mut [T], first: &[T], sigma: &[T], [n, q]: [usize; 2]) {
+        let (width, size) = (n + q, n * (n + q));
+        let inner = self.products.len() / size - 1;
+        for (x, product) in h.chunks_exact_mut(n).zip(self.products.chunks_exact(size)).take(inner) {
+            for (x, row) in x.iter_mut().zip(product.chunks_exact(width)) {
+                *x = *x + dot(&row[..n], &first[..n]) + dot(&row[n..], &sigma[..q]);
+            }
+        }
+    }
+
+    /// Adds to the columns of x_0 and σ what those of x_1 … x_{L-1}, in `z` `[L × n]` at 1 … L-1, leave there.
+    #[inline(always)]
+    pub fn forward_transposed(&self, z: &[T], first: &mut [T], sigma: &mut [T], n: usize, q: usize) {
+        let (width, size) = (n + q, n * (n + q));
+        for (z, product) in z.chunks_exact(n).skip(1).zip(self.products.chunks_exact(size)) {
+            for (z, row) in z.iter().zip(product.chunks_exact(width)) {
+                add(*z, &row[..n], first);
+                add(*z, &row[n..], sigma);
+            }
+        }
+    }
+
+    /// Multipliers of the links in place of `z`, which is as before [`Compound::forward_transposed`], from those of the relation between the
+    /// ends (`carry` `[n]`) and of the border (`mu` `[q]`): y_{j-1} = G_jᵀ y_j + z_j - p_jᵀ μ.
+    #[inline(always)]
+    pub fn backward_transposed(&self, links: &[T], border: &[T], z: &mut [T], carry: &[T], mu: &[T]) {
+        let (n, q) = (carry.len(), mu.len());
+        let (width, size) = (n + q, n * (n + q));
+        // z_j moves to place j - 1, where y_{j-1} will be.
+        z.copy_within(n.., 0);
+        let last = z.len() - n;
+        z[last..].copy_from_slice(carry);
+        for j in (1..z.len() / n).rev() {
+            let (own, next) = z[(j - 1) * n..(j + 1) * n].split_at_mut(n);
+            for (y, row) in next.iter().zip(links[j * size..(j + 1) * size].chunks_exact(width)) {
+                add(*y, &row[..n], own);
+            }
+            for (mu, row) in mu.iter().zip(border[j * q * n..(j + 1) * q * n].chunks_exact(n)) {
+                subtract(*mu, row, own);
+            }
+        }
+    }
+}
+
+/// to += row · matrix, all of whose columns `to` has.
+#[inline(always)]
+fn add_combination<T: Lane>(to: &mut [T], row: &[T], matrix: &[T], width: usize) {
+    add_columns(to, row, matrix, width, 0);
+}
+
+/// The same with as many columns as `to` has, from `at` on.
+#[inline(always)]
+fn add_columns<T: Lane>(to: &mut [T], row: &[T], matrix: &[T], width: usize, at: usize) {
+    let mut c = 0;
+    while c < to.len() {
+        c += match to.len() - c {
+            4.. => columns::<T, 4>(&mut to[c..], row, matrix, width, at + c),
+            2.. => columns::<T, 2>(&mut to[c..], row, matrix, width, at + c),
+            _ => columns::<T, 1>(&mut to[c..], row, matrix, width, at + c),
+        };
+    }
+}
+
+/// The same for C columns, whose sums stay in registers; returns C.
+#[inline(always)]
+fn columns<T: Lane, const C: usize>(to: &mut [T], row: &[T], matrix: &[T], width: usize, at: usize) -> usize {
+    let mut sums: [T; C] = *piece(to, 0);
+    for (k, x) in row.iter().enumerate() {
+        let line: &[T; C] = piece(matrix, k * width + at);
+        for c in 0..C {
+            sums[c] = sums[c] + *x * line[c];
+        }
+    }
+    to[..C].copy_from_slice(&sums);
+    C
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Links of one number: a factor each, one scalar.
+    fn links(factors: &[f64]) -> Vec<f64> {
+        factors.iter().enumerate().flat_map(|(j, g)| [*g, j as f64]).collect()
+    }
+
+    fn compound(factors: &[f64]) -> (Compound<f64>, bool) {
+        let mut own = Compound::default();
+        own.resize(1, 1, factors.len());
+        let safe = own.multiply(&links(factors), 1, 1);
+        (own, safe)
+    }
+
+    #[test]
+    fn products_and_nodes_are_those_of_the_recurrence() {
+        let factors = [2.0, -0.5, 3.0, 0.25];
+        let (own, safe) = compound(&factors);
+        assert!(safe);
+        assert_eq!(own.whole(1, 1), [2.0 * -0.5 * 3.0 * 0.25, ((1.0 * 3.0) + 2.0) * 0.25 + 3.0]);
+        let (mut h, mut s) = (vec![1.0, 2.0, 3.0, 4.0], [10.0]);
+        let border = [0.0, 5.0, 6.0, 7.0];
+        own.forward(&links(&factors), &border, &mut h, &mut s, [1, 1]);
+        assert_eq!((&h[..], s), (&[1.0, 1.5, 7.5, 5.875][..], [10.0 - 5.0 - 9.0 - 52.5]));
+        own.backward(&mut h, &[2.0], &[1.0], [1, 1]);
+        // x_0 = 2, σ = 1: x_1 = 2·2 + 0 + 1, x_2 = -½·5 + 1 + 2, x_3 = 3·½ + 2 + 3.
+        assert_eq!(h[..3], [5.0, 0.5, 6.5]);
+    }
+
+    #[test]
+    fn growth_is_seen_wherever_it_is() {
+        assert!(compound(&[0.5; 40]).1 && compound(&[1.0; 100]).1, "decay, or neither");
+        assert!(!compound(&[1.8; 20]).1, "growth");
+        let down_and_up: Vec<f64> = (0..40).map(|j| if j < 20 { 0.5 } else { 2.0 }).collect();
+        assert!(!compound(&down_and_up).1, "the product is 1");
+        let in_between: Vec<f64> = (0..60).map(|j| if j / 20 == 1 { 2.0 } else { 0.4 }).collect();
+        assert!(!compound(&in_between).1, "neither from the left end nor to the right one");
+        assert!(!compound(&[1.0, f64::NAN, 1.0]).1 && !compound(&[1.0, f64::INFINITY]).1);
+    }
+}
