@@ -21,8 +21,8 @@
 use super::lane::{Lane, add, dot, subtract};
 use super::tile::piece;
 
-/// Sum of the diagonals of (2) up to which a piece is multiplied together: errors grow by 10³ at most, of the 10¹⁶ that there are.
-const GROWTH: f64 = 1e6;
+/// Sum of the diagonals of (2) up to which a piece is multiplied together: errors grow by 10² at most, of the 10¹⁶ that there are.
+const GROWTH: f64 = 1e4;
 
 /// Pieces side by side, one in each lane.
 #[derive(Clone, Debug, Default)]

@@ -12,7 +12,7 @@
 //! ```
 //!
 //! with ∫ |v|² dt = 1 over a period in (2) and (3). Negative c and Re d mean that the doubled cycle, or the torus, is born stable. A forced
-//! cycle has no freedom in time: α = 0, and (1) is v' - A v = 0, ∫ |v|² dt = 1, a = ½ φ(B(v,v)) / φ(v), whose sign is that of v.
+//! cycle has no freedom in time: α = 0, and (1) is v' - A v = 0, ∫ |v|² dt = 1, a = ½ φ(B(v,v)) / φ(v), v pointing towards larger motion.
 //!
 //! **Source.** kuznetsov2005; in the form of bordered equations, govaerts2000, §7.
 //!
@@ -43,7 +43,11 @@ pub fn coefficient(kind: Kind, setting: Setting, at: &Point) -> Option<f64> {
     let free_fold = kind == Kind::Fold && cycle.forcing_periods == 0;
     let length = (cycle.period * condition.square(&v)).sqrt();
     // v_s - T A v = T₁ f, of which T f is wanted.
-    let size = if free_fold { scalar / own } else { length };
+    let size = match kind {
+        Kind::Fold if free_fold => scalar / own,
+        Kind::Fold if condition.growth(&v) < 0.0 => -length,
+        _ => length,
+    };
     if size.abs() <= NOTHING * length {
         return None;
     }
@@ -263,6 +267,23 @@ mod tests {
             &[("x", "grow*x - y"), ("y", "x + grow*y")],
         );
         assert_eq!(found(&model, Kind::Fold, TAU, &[], |t| circle(t, &[])), None);
+    }
+
+    /// r' = p + c (r - 1)² with the angle held by the forcing: along v the radius grows, whatever the sign of c. r - 1 = ξ/√T.
+    #[test]
+    fn a_fold_of_a_forced_cycle() {
+        for c in [0.7, -0.4] {
+            let model = model(
+                Some("2*pi"),
+                &[
+                    ("r", "sqrt(x^2 + y^2)"),
+                    ("grow", &format!("(p + {c}*(r - 1)^2)/r")),
+                    ("turn", "1 - (y*cos(t) - x*sin(t))/r"),
+                ],
+                &[("x", "grow*x - turn*y"), ("y", "turn*x + grow*y")],
+            );
+            near(of(&model, Kind::Fold, TAU, &[], |t| circle(t, &[])), c / TAU.sqrt());
+        }
     }
 
     /// In a frame that turns by half a revolution per period of the forcing, a' = p a + c a³ + g a h and b' = -b; h' = -k h + a² follows.

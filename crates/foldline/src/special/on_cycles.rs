@@ -199,6 +199,26 @@ impl<'a> OnCycles<'a> {
         total
     }
 
+    /// By which share the motion becomes larger along v: Σ_i ∫ (x_i - x̄_i) v_i / ∫ (x_i - x̄_i)², x̄ being the mean. No component counts that
+    /// does not move.
+    pub(super) fn growth(&self, v: &[f64]) -> f64 {
+        let lanes = self.lanes();
+        let share = |c: usize| {
+            let [x, v] = [&self.states, v].map(|all| &all[c * lanes..(c + 1) * lanes]);
+            let mut mean = 0.0;
+            self.each(|lane, _, h, weight| mean += h * weight * x[lane]);
+            let (mut along, mut square, mut largest) = (0.0, 0.0, 0.0f64);
+            self.each(|lane, _, h, weight| {
+                let away = x[lane] - mean;
+                along += h * weight * away * v[lane];
+                square += h * weight * away * away;
+                largest = largest.max(x[lane].abs());
+            });
+            if square > (1e-6 * largest).powi(2) { along / square } else { 0.0 }
+        };
+        (0..self.n).map(share).sum()
+    }
+
     /// f_x v there, `[n × lanes]`.
     pub(super) fn along(&self, v: &[f64]) -> Vec<f64> {
         let (n, lanes) = (self.n, self.lanes());

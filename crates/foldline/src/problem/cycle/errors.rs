@@ -32,8 +32,10 @@ fn spectrum_difference(spectrum: &[Complex64], other: &[Complex64]) -> f64 {
 /// Error of an interval that rounding alone may leave, relative. Those of all intervals add up.
 const ROUNDING: f64 = 0.5 * f64::EPSILON;
 
-/// Share of the error at a point within which its neighbours are not measured again.
-const BESIDE: f64 = 0.1;
+/// Share of the error at a point within which its neighbours are not measured again, …
+const BESIDE: f64 = 0.05;
+/// … unless what an interval misses grows to more than this times as much along the cycle: that depends on the matrix.
+const CARRIED: f64 = 100.0;
 
 /// Intervals whose transitions are made more accurate at a time: what that takes stays in the cache.
 const TOGETHER: usize = 32;
@@ -72,8 +74,8 @@ impl Room {
 pub(super) struct Measured {
     at: Vec<f64>,
     errors: Vec<f64>,
-    /// What rounding alone may make of them.
-    rounding: f64,
+    /// How much larger than what single intervals miss the error of the cycle is.
+    gain: f64,
     /// The part of the error that goes on from interval to interval, in the layout of the unknowns.
     shift: Vec<f64>,
     /// The part within intervals, `[n][m + 1][N]` at the sample points.
@@ -97,6 +99,9 @@ impl CycleProblem<'_> {
         if same(&known.at, u) {
             return true;
         }
+        if known.gain.is_nan() || known.gain > CARRIED {
+            return false;
+        }
         let largest = known.errors.iter().fold(0.0, |m: f64, e| m.max(*e));
         let moved: Vec<f64> = u.iter().zip(&known.at).map(|(a, b)| a - b).collect();
         self.relative_size(&moved, u) <= BESIDE * largest
@@ -105,7 +110,7 @@ impl CycleProblem<'_> {
     /// Error at `u` that finer meshes do not make smaller: next to a singular matrix the rounding of single intervals many times over.
     pub(super) fn rounding(&self, u: &[f64]) -> f64 {
         self.errors(u);
-        self.measured.borrow().as_ref().map_or(0.0, |known| known.rounding)
+        self.measured.borrow().as_ref().map_or(0.0, |known| ROUNDING * self.intervals() as f64 * known.gain)
     }
 
     /// Estimated error of the multipliers `spectrum` at `u`: they change by it where the transitions of all intervals are made more
@@ -218,8 +223,7 @@ impl CycleProblem<'_> {
         let largest = sizes.iter().fold(f64::MIN_POSITIVE, |m: f64, s| m.max(*s));
         let gain = if response.is_finite() { response / largest } else { 1.0 };
         let errors = local.iter().zip(&sizes).map(|(l, s)| l + gain * s).collect();
-        let rounding = ROUNDING * self.intervals() as f64 * gain;
-        Measured { at: u.to_vec(), errors, rounding, shift, within }
+        Measured { at: u.to_vec(), errors, gain, shift, within }
     }
 
     pub(super) fn flow_at_nodes(&self, u: &[f64]) -> Vec<f64> {

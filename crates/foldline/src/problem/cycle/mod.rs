@@ -451,7 +451,8 @@ impl ZeroProblem for CycleProblem<'_> {
         found.ranges = extremes::of_profile(self.setting.field, &parameters, cycle, self.forcing_periods, &self.scheme);
         found.averages =
             averages::of_profile(self.setting.field, &parameters, cycle, self.forcing_periods, &self.scheme);
-        found.trust.discretisation = SAFE * errors.iter().fold(0.0, |m: f64, e| m.max(*e)) + ROUNDING;
+        let rounding = ROUNDING + self.rounding(u);
+        found.trust.discretisation = SAFE * errors.iter().fold(0.0, |m: f64, e| m.max(*e)) + rounding;
         found.trust.residual = residual;
         found
     }
