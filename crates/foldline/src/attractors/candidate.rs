@@ -11,7 +11,7 @@ use crate::diagram::{Cycle, Solution};
 use crate::simulation::{Integrator, Passage, Step, Tolerance};
 
 /// Accuracy of the integration, relative. It only decides where a trajectory goes; solutions are polished. Where samples next to the edge
-/// of a basin go depends on it, as it does for any smaller one.
+/// of a basin go depends on it.
 pub(super) const INTEGRATION: f64 = 1e-5;
 /// Steps after which a predicted limit is given up.
 const FOLLOWED: usize = 20_000;
@@ -110,7 +110,7 @@ impl Context<'_> {
         times.push(period);
         states.extend(end);
         let moved = extents(&states, n).iter().zip(extent).fold(0.0, |m: f64, (own, whole)| m.max(own / whole));
-        let closes = distance <= RECURRENT * moved && distance <= BETTER * prediction.size + 1e-5;
+        let closes = distance <= RECURRENT * moved && distance <= BETTER * prediction.size + 10.0 * INTEGRATION;
         closes.then_some(Candidate::Cycle { period, times, states })
     }
 }

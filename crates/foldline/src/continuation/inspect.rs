@@ -95,7 +95,7 @@ impl Follow<'_> {
         let standing = self.stands(left, right, stretch.length.abs());
         let mut located: Vec<(Kind, usize, Located)> = Vec::new();
         let mut others: Vec<Option<usize>> = Vec::new();
-        let (mut lost, mut leaps) = (false, Vec::new());
+        let (mut lost, mut leaps) = (false, false);
         for k in 0..self.monitors.len() {
             let values = [at_left[k], at_right[k]];
             let mut kind = self.monitors[k].kind();
@@ -150,14 +150,17 @@ impl Follow<'_> {
                 Ok(_) => {}
                 // So close by there would be something to see of an event of this kind; without it there is none, as where
                 // two real multipliers have the product 1.
-                Err(_) if depth >= CLOSE && jump > 0 && !self.either_confirms(k, left, right) => leaps.push(kind),
+                Err(_) if depth >= CLOSE && jump > 0 && !self.either_confirms(k, left, right) => {
+                    leaps |= kind == Kind::PeriodDoubling
+                }
                 Err(_) => lost = true,
             }
         }
-        // Where both ∏(μ - 1) and ∏(μ + 1) change sign and neither vanishes, a large multiplier has changed its sign, which none does: the step
+        // Where both ∏(μ + 1) and ∏(μ - 1) change sign and neither vanishes, a large multiplier has changed its sign, which none does: the step
         // has cut across to another branch, with as many unstable ones.
-        let singular = |kind: &Kind| matches!(kind, Kind::Fold | Kind::BranchPoint);
-        lost |= leaps.contains(&Kind::PeriodDoubling) && leaps.iter().any(singular);
+        let above = |point: &Point| point.free_spectrum().iter().filter(|z| z.im == 0.0 && z.re > 1.0).count();
+        let turns = located.iter().any(|(kind, ..)| matches!(kind, Kind::Fold | Kind::BranchPoint));
+        lost |= leaps && !turns && above(&left.point) % 2 != above(&right.point) % 2;
         // At what takes two parameters to meet the curve may turn as well, which is no event of its own.
         let double: Vec<f64> =
             located.iter().filter(|(kind, ..)| kind.has_codimension_two()).map(|(.., found)| found.distance).collect();

@@ -14,7 +14,8 @@ use super::{Failure, Settings};
 use crate::contract::{Monitor, ZeroProblem};
 use crate::diagram::Cost;
 
-/// Distances between nodes, as shares of the stretch, in the order in which they are tried.
+/// Distances between nodes, as shares of the stretch, in the order in which they are tried; the last two where there is no mesh, as far as
+/// Newton's method still finds the branch there.
 const SPACINGS: [f64; 5] = [0.25, 0.1, 0.04, 4e-3, 4e-4];
 /// How many of them where there is a mesh: closer by, its rounding shows.
 const ON_A_MESH: usize = 3;
@@ -41,13 +42,22 @@ pub fn straddle(
     let (mut nodes, mut stations) = ([0.0; 4], Vec::new());
     let mut moved = 0.0;
     let count = if stretch.left.mesh.is_empty() { SPACINGS.len() } else { ON_A_MESH };
-    for spacing in &SPACINGS[..count] {
-        nodes = [-1.5, -0.5, 0.5, 1.5].map(|k| root + k * spacing * stretch.length);
-        stations.clear();
-        for s in nodes {
-            stations.push(stretch.at(problem, settings, s, cost)?);
-        }
-        let next = zero(&nodes, &stations.iter().map(value).collect::<Vec<_>>())?;
+    for (k, spacing) in SPACINGS[..count].iter().enumerate() {
+        let there = [-1.5, -0.5, 0.5, 1.5].map(|k| root + k * spacing * stretch.length);
+        let found: Result<Vec<Station>, Failure> =
+            there.iter().map(|s| stretch.at(problem, settings, *s, cost)).collect();
+        let found = found.and_then(|found| {
+            let next = zero(&there, &found.iter().map(value).collect::<Vec<_>>())?;
+            Ok((found, next))
+        });
+        let next = match found {
+            Ok((found, next)) => {
+                (nodes, stations) = (there, found);
+                next
+            }
+            Err(_) if k >= ON_A_MESH => break,
+            Err(why) => return Err(why),
+        };
         moved = (next - root).abs();
         root = next;
     }

@@ -1,18 +1,18 @@
 //! A piece of a chain with every node expressed by its first one.
 //!
-//! **Idea.** Links x_{j+1} = G_j x_j + g_j σ + h_j are multiplied together. That takes a fifth of the operations of [`super::chain`], and the
+//! **Idea.** Links x_{j+1} = G_j x_j + g_j σ + h_j are multiplied together. That takes a quarter of the operations of [`super::chain`], and the
 //! nodes of a piece do not wait for each other when a system is solved. It is safe as long as errors made at one node do not grow on the
 //! way to another, which is measured while multiplying.
 //!
-//! **Equations.** From P_0 = 1, a_0 = 0, b_0 = 0 and C_0 = 1 on:
+//! **Equations.** From P_0 = 1, a_0 = 0 and b_0 = 0 on:
 //!
 //! ```text
 //!   (1)  P_{j+1} = G_j P_j,   a_{j+1} = G_j a_j + g_j,   b_{j+1} = G_j b_j + h_j,     x_j = P_j x_0 + a_j σ + b_j
-//!   (2)  C_{j+1} = G_j C_j G_jᵀ + 1
+//!   (2)  C_{j+1} = G_j C_j G_jᵀ + S²,  C_0 = S²
 //! ```
 //!
-//! (2) is the covariance of what independent errors of size 1 at x_0 … x_j become at x_{j+1}: its diagonal bounds how much of them grows, from
-//! wherever to wherever, also where growth and decay follow each other and P shows neither.
+//! (2) is the covariance of what independent errors at x_0 … x_j, as large as the scales S of the components, become at x_{j+1}: its diagonal bounds
+//! how much of them grows, from wherever to wherever, also where growth and decay follow each other and P shows neither.
 //!
 //! **Source.** Compactification, ascher1995, §7.2, which is unstable without a bound on the growth.
 //!
@@ -21,8 +21,8 @@
 use super::lane::{Lane, add, dot, subtract};
 use super::tile::piece;
 
-/// Sum of the diagonals of (2) up to which a piece is multiplied together: errors grow by 10² at most, of the 10¹⁶ that there are.
-const GROWTH: f64 = 1e4;
+/// Diagonal of (2), in S², up to which a piece is multiplied together: errors grow some 30 times at most, of the 10¹⁶ that there are.
+const GROWTH: f64 = 1e3;
 
 /// Pieces side by side, one in each lane.
 #[derive(Clone, Debug, Default)]
@@ -42,14 +42,13 @@ impl<T: Lane> Compound<T> {
         self.room.resize(n * n, T::default());
     }
 
-    /// (1) and (2) for the links `[L][n × (n + q)]`, (G_j, g_j); false where errors may grow too much.
+    /// (1) and (2) for the links `[L][n × (n + q)]`, (G_j, g_j), with the scales `[n]`; false where errors may grow too much.
     #[inline(always)]
-    pub fn multiply(&mut self, links: &[T], n: usize, q: usize) -> bool {
+    pub fn multiply(&mut self, links: &[T], scale: &[f64], n: usize, q: usize) -> bool {
         let Compound { products, spread, room } = self;
         let (width, size) = (n + q, n * (n + q));
-        let mut total = T::default();
         spread.fill(T::default());
-        (0..n).for_each(|i| spread[i * (n + 1)] = T::splat(1.0));
+        (0..n).for_each(|i| spread[i * (n + 1)] = T::splat(scale[i] * scale[i]));
         for (j, link) in links.chunks_exact(size).enumerate() {
             let (before, own) = products.split_at_mut(j * size);
             let own = &mut own[..size];
@@ -60,7 +59,7 @@ impl<T: Lane> Compound<T> {
                     add_combination(to, &row[..n], last, width);
                 }
             }
-            // The upper triangle of G C Gᵀ + 1, and its mirror image.
+            // The upper triangle of G C Gᵀ + S², and its mirror image.
             for (row, to) in link.chunks_exact(width).zip(room.chunks_exact_mut(n)) {
                 to.fill(T::default());
                 add_combination(to, &row[..n], spread, n);
@@ -70,12 +69,15 @@ impl<T: Lane> Compound<T> {
                     let entry = dot(&room[i * n..(i + 1) * n], &link[k * width..k * width + n]);
                     (spread[i * n + k], spread[k * n + i]) = (entry, entry);
                 }
-                spread[i * (n + 1)] = spread[i * (n + 1)] + T::splat(1.0);
-                total = total + spread[i * (n + 1)];
+                let square = T::splat(scale[i] * scale[i]);
+                spread[i * (n + 1)] = spread[i * (n + 1)] + square;
+                // Not a number is not small either.
+                if !spread[i * (n + 1)].all(square, |entry, square| entry <= GROWTH * square) {
+                    return false;
+                }
             }
         }
-        // Not a number is not small either.
-        total.all(total, |total, _| total <= GROWTH)
+        true
     }
 
     /// (P_L, a_L).
@@ -223,7 +225,7 @@ mod tests {
     fn compound(factors: &[f64]) -> (Compound<f64>, bool) {
         let mut own = Compound::default();
         own.resize(1, 1, factors.len());
-        let safe = own.multiply(&links(factors), 1, 1);
+        let safe = own.multiply(&links(factors), &[3.0], 1, 1);
         (own, safe)
     }
 
@@ -243,8 +245,21 @@ mod tests {
     }
 
     #[test]
+    fn growth_does_not_depend_on_units() {
+        // A turn by 1 rad, the second component in thousandths, then in thousands: the same motion.
+        for unit in [1e-3, 1.0, 1e3] {
+            let (sin, cos) = 1f64.sin_cos();
+            let link = [cos, -sin / unit, 0.0, sin * unit, cos, 0.0];
+            let mut own = Compound::default();
+            own.resize(2, 1, 50);
+            assert!(own.multiply(&link.repeat(50), &[1.0, unit], 2, 1), "{unit}");
+            assert_eq!(own.multiply(&link.repeat(50), &[1.0, 1.0], 2, 1), unit == 1.0, "{unit}, as if it were 1");
+        }
+    }
+
+    #[test]
     fn growth_is_seen_wherever_it_is() {
-        assert!(compound(&[0.5; 40]).1 && compound(&[1.0; 100]).1, "decay, or neither");
+        assert!(compound(&[0.5; 40]).1 && compound(&[1.0; 1000]).1, "decay, or neither");
         assert!(!compound(&[1.8; 20]).1, "growth");
         let down_and_up: Vec<f64> = (0..40).map(|j| if j < 20 { 0.5 } else { 2.0 }).collect();
         assert!(!compound(&down_and_up).1, "the product is 1");

@@ -60,6 +60,8 @@ pub struct Condensed<T> {
     step: Vec<T>,
     condensed_border: Vec<T>,
     pieces: Chain<T>,
+    /// `[n]`: sizes of the components, for the growth of errors.
+    scale: Vec<f64>,
     /// The same where errors do not grow within a piece, and whether that is so.
     products: Compound<T>,
     gentle: bool,
@@ -79,11 +81,17 @@ impl<T: Lane> Condensed<T> {
             closure: 1.0,
             end: end.to_vec(),
             nothing: vec![0.0; (m + 1) * n],
+            scale: vec![1.0; n],
             ..Condensed::default()
         };
         let every = vec![true; n * n];
         system.arrange(block::shape::<T>(&every, &every, m, n + q));
         system
+    }
+
+    /// Says how large the components are, `[n]`.
+    pub fn measure_in(&mut self, scale: &[f64]) {
+        self.scale.copy_from_slice(scale);
     }
 
     /// Says which components the equations of each component contain, `[n × n]`: A is the identity except at (i, c), (k, d) with
@@ -438,14 +446,14 @@ impl<T: Lane> Condensed<T> {
     fn reduced(&mut self, corner: &[f64], together: bool) -> Result<(), Singular> {
         let Condensed { n, q, closure, length, .. } = *self;
         let (width, full) = (n + q, 3 * n + q);
-        let Condensed { step, condensed_border, pieces, products, gentle, whole, last, last_pivots, .. } = self;
+        let Condensed { step, condensed_border, pieces, scale, products, gentle, whole, last, last_pivots, .. } = self;
         let (step, condensed_border) = (&step[..length * n * width], &condensed_border[..length * q * n]);
         *gentle = together;
         if together {
             // The usual dimensions as constants.
             let safe = match (n, q) {
-                (4, 2) => compounded(products, step, condensed_border, pieces, [4, 2]),
-                (n, q) => compounded(products, step, condensed_border, pieces, [n, q]),
+                (4, 2) => compounded(products, step, condensed_border, pieces, scale, [4, 2]),
+                (n, q) => compounded(products, step, condensed_border, pieces, scale, [n, q]),
             };
             if !safe {
                 return Err(Singular);
@@ -493,10 +501,11 @@ fn compounded<T: Lane>(
     step: &[T],
     border: &[T],
     pieces: &mut Chain<T>,
+    scale: &[f64],
     [n, q]: [usize; 2],
 ) -> bool {
     let (full, width) = (3 * n + q, n + q);
-    if q == 0 || !products.multiply(step, n, q) {
+    if q == 0 || !products.multiply(step, scale, n, q) {
         return false;
     }
     [&mut pieces.relation, &mut pieces.first, &mut pieces.last, &mut pieces.corner]

@@ -304,17 +304,20 @@ impl Correction<'_, '_, '_> {
 /// positions, so that pivots are small; but of a correction a few digits are enough.
 #[inline(always)]
 fn factorised(a: &mut [Eight], n: usize) -> bool {
-    const SMALL: f64 = 1e-8;
+    // How much rounding may grow, over all pivots.
+    const GROWTH: f64 = 1e8;
+    let mut growth = Eight::splat(1.0);
     for k in 0..n {
         let pivot = a[k * n + k];
         let mut largest = Eight::default();
         for i in k..n {
             largest = largest.zip(a[i * n + k], |most, x| most.max(x.abs()));
         }
-        if !pivot.all(largest, |pivot, largest| pivot.abs() > SMALL * largest) {
+        let inverse = pivot.map(|x| 1.0 / x);
+        growth = growth * largest * inverse.map(f64::abs);
+        if !growth.all(growth, |growth, _| growth < GROWTH) {
             return false;
         }
-        let inverse = pivot.map(|x| 1.0 / x);
         for i in k + 1..n {
             let factor = a[i * n + k] * inverse;
             a[i * n + k] = factor;
@@ -373,7 +376,9 @@ mod tests {
     fn a_small_pivot_serves_and_a_vanishing_one_is_exchanged_for_another() {
         let lanes = |x: [f64; 4]| x.map(Eight::splat);
         let right = lanes([3.0, 1.0, 4.0, 2.0]);
-        for (a, serves) in [([1e-5, 1.0, 1.0, 2.0], true), ([0.0, 1.0, 1.0, 2.0], false)] {
+        for (a, serves) in
+            [([1e-5, 1.0, 1.0, 2.0], true), ([1e-9, 1.0, 1.0, 2.0], false), ([0.0, 1.0, 1.0, 2.0], false)]
+        {
             let [mut factors, mut x, mut exchanged] = [lanes(a), right, right];
             assert_eq!(factorised(&mut factors, 2), serves);
             exchanging(&lanes(a), &mut exchanged, 2);

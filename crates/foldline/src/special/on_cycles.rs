@@ -199,22 +199,20 @@ impl<'a> OnCycles<'a> {
         total
     }
 
-    /// By which share the motion becomes larger along v: Σ_i ∫ (x_i - x̄_i) v_i / ∫ (x_i - x̄_i)², x̄ being the mean. No component counts that
-    /// does not move.
+    /// By which share the motion becomes larger along v: Σ_i ∫ (x_i - x̄_i) v_i / ∫ x_i², x̄ being the mean. What hardly moves about its mean
+    /// hardly counts.
     pub(super) fn growth(&self, v: &[f64]) -> f64 {
         let lanes = self.lanes();
         let share = |c: usize| {
             let [x, v] = [&self.states, v].map(|all| &all[c * lanes..(c + 1) * lanes]);
             let mut mean = 0.0;
             self.each(|lane, _, h, weight| mean += h * weight * x[lane]);
-            let (mut along, mut square, mut largest) = (0.0, 0.0, 0.0f64);
+            let (mut along, mut square) = (0.0, 0.0);
             self.each(|lane, _, h, weight| {
-                let away = x[lane] - mean;
-                along += h * weight * away * v[lane];
-                square += h * weight * away * away;
-                largest = largest.max(x[lane].abs());
+                along += h * weight * (x[lane] - mean) * v[lane];
+                square += h * weight * x[lane] * x[lane];
             });
-            if square > (1e-6 * largest).powi(2) { along / square } else { 0.0 }
+            if square > 0.0 { along / square } else { 0.0 }
         };
         (0..self.n).map(share).sum()
     }

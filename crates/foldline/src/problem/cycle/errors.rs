@@ -2,7 +2,7 @@
 
 use super::CycleProblem;
 use crate::contract::{Batch, Parameters, ZeroProblem};
-use crate::linalg::{panel, same};
+use crate::linalg::{larger, panel, same};
 use crate::problem::defect::{self, Course, Defect};
 use crate::stability::floquet;
 use num_complex::Complex64;
@@ -74,8 +74,8 @@ impl Room {
 pub(super) struct Measured {
     at: Vec<f64>,
     errors: Vec<f64>,
-    /// How much larger than what single intervals miss the error of the cycle is.
-    gain: f64,
+    /// How much larger than what single intervals miss the error of the cycle is; infinite where that could not be computed.
+    carried: f64,
     /// The part of the error that goes on from interval to interval, in the layout of the unknowns.
     shift: Vec<f64>,
     /// The part within intervals, `[n][m + 1][N]` at the sample points.
@@ -99,18 +99,20 @@ impl CycleProblem<'_> {
         if same(&known.at, u) {
             return true;
         }
-        if known.gain.is_nan() || known.gain > CARRIED {
+        if known.carried > CARRIED {
             return false;
         }
-        let largest = known.errors.iter().fold(0.0, |m: f64, e| m.max(*e));
+        let largest = known.errors.iter().copied().fold(0.0, larger);
         let moved: Vec<f64> = u.iter().zip(&known.at).map(|(a, b)| a - b).collect();
-        self.relative_size(&moved, u) <= BESIDE * largest
+        largest.is_finite() && self.relative_size(&moved, u) <= BESIDE * largest
     }
 
     /// Error at `u` that finer meshes do not make smaller: next to a singular matrix the rounding of single intervals many times over.
     pub(super) fn rounding(&self, u: &[f64]) -> f64 {
         self.errors(u);
-        self.measured.borrow().as_ref().map_or(0.0, |known| ROUNDING * self.intervals() as f64 * known.gain)
+        self.measured.borrow().as_ref().map_or(0.0, |known| {
+            ROUNDING * self.intervals() as f64 * if known.carried.is_finite() { known.carried } else { 1.0 }
+        })
     }
 
     /// Estimated error of the multipliers `spectrum` at `u`: they change by it where the transitions of all intervals are made more
@@ -221,9 +223,10 @@ impl CycleProblem<'_> {
             .map(|e| e.iter().zip(&scale).map(|(v, s)| (v / s).abs()).fold(0.0, f64::max))
             .collect();
         let largest = sizes.iter().fold(f64::MIN_POSITIVE, |m: f64, s| m.max(*s));
-        let gain = if response.is_finite() { response / largest } else { 1.0 };
+        let carried = if response.is_finite() { response / largest } else { f64::INFINITY };
+        let gain = if carried.is_finite() { carried } else { 1.0 };
         let errors = local.iter().zip(&sizes).map(|(l, s)| l + gain * s).collect();
-        Measured { at: u.to_vec(), errors, gain, shift, within }
+        Measured { at: u.to_vec(), errors, carried, shift, within }
     }
 
     pub(super) fn flow_at_nodes(&self, u: &[f64]) -> Vec<f64> {
