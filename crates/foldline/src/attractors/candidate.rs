@@ -12,7 +12,7 @@ use crate::simulation::{Integrator, Passage, Step, Tolerance};
 
 /// Accuracy of the integration, relative. It only decides where a trajectory goes; solutions are polished. Where samples next to the edge
 /// of a basin go depends on it.
-pub(super) const INTEGRATION: f64 = 1e-5;
+pub(super) const INTEGRATION: f64 = 1e-6;
 /// Steps after which a predicted limit is given up.
 const FOLLOWED: usize = 20_000;
 /// How well a predicted limit must return to itself to be tried, relative to the extent of its motion …
