@@ -259,7 +259,7 @@ mod tests {
 
     #[test]
     fn growth_is_seen_wherever_it_is() {
-        assert!(compound(&[0.5; 40]).1 && compound(&[1.0; 1000]).1, "decay, or neither");
+        assert!(compound(&[0.5; 40]).1 && compound(&[1.0; 900]).1, "decay, or neither");
         assert!(!compound(&[1.8; 20]).1, "growth");
         let down_and_up: Vec<f64> = (0..40).map(|j| if j < 20 { 0.5 } else { 2.0 }).collect();
         assert!(!compound(&down_and_up).1, "the product is 1");
