@@ -2,7 +2,7 @@
 
 use super::CycleProblem;
 use crate::contract::{Batch, Parameters, ZeroProblem};
-use crate::linalg::{larger, panel, same};
+use crate::linalg::{panel, same};
 use crate::problem::defect::{self, Course, Defect};
 use crate::stability::floquet;
 use num_complex::Complex64;
@@ -31,11 +31,6 @@ fn spectrum_difference(spectrum: &[Complex64], other: &[Complex64]) -> f64 {
 
 /// Error of an interval that rounding alone may leave, relative. Those of all intervals add up.
 const ROUNDING: f64 = 0.5 * f64::EPSILON;
-
-/// Share of the error at a point within which its neighbours are not measured again, …
-const BESIDE: f64 = 0.05;
-/// … unless what an interval misses grows to more than this times as much along the cycle: that depends on the matrix.
-const CARRIED: f64 = 100.0;
 
 /// Intervals whose transitions are made more accurate at a time: what that takes stays in the cache.
 const TOGETHER: usize = 32;
@@ -74,8 +69,8 @@ impl Room {
 pub(super) struct Measured {
     at: Vec<f64>,
     errors: Vec<f64>,
-    /// How much larger than what single intervals miss the error of the cycle is; infinite where that could not be computed.
-    carried: f64,
+    /// What rounding alone may make of them.
+    rounding: f64,
     /// The part of the error that goes on from interval to interval, in the layout of the unknowns.
     shift: Vec<f64>,
     /// The part within intervals, `[n][m + 1][N]` at the sample points.
@@ -83,10 +78,10 @@ pub(super) struct Measured {
 }
 
 impl CycleProblem<'_> {
-    /// Estimated error on every interval, relative. A point that was just measured is not measured again, nor is one that lies within a
-    /// small part of its error from that: the last factorisation, which must belong to the current mesh, was close enough to it then.
+    /// Estimated error on every interval, relative. A point that was just measured is not measured again: the last
+    /// factorisation, which must belong to the current mesh, was close enough to it then.
     pub(super) fn errors(&self, u: &[f64]) -> Vec<f64> {
-        if let Some(known) = self.measured.borrow().as_ref().filter(|known| self.is_measured(u, known)) {
+        if let Some(known) = self.measured.borrow().as_ref().filter(|known| same(&known.at, u)) {
             return known.errors.clone();
         }
         let measured = self.measured_errors(u);
@@ -95,24 +90,10 @@ impl CycleProblem<'_> {
         errors
     }
 
-    fn is_measured(&self, u: &[f64], known: &Measured) -> bool {
-        if same(&known.at, u) {
-            return true;
-        }
-        if known.carried > CARRIED {
-            return false;
-        }
-        let largest = known.errors.iter().copied().fold(0.0, larger);
-        let moved: Vec<f64> = u.iter().zip(&known.at).map(|(a, b)| a - b).collect();
-        largest.is_finite() && self.relative_size(&moved, u) <= BESIDE * largest
-    }
-
     /// Error at `u` that finer meshes do not make smaller: next to a singular matrix the rounding of single intervals many times over.
     pub(super) fn rounding(&self, u: &[f64]) -> f64 {
         self.errors(u);
-        self.measured.borrow().as_ref().map_or(0.0, |known| {
-            ROUNDING * self.intervals() as f64 * if known.carried.is_finite() { known.carried } else { 1.0 }
-        })
+        self.measured.borrow().as_ref().map_or(0.0, |known| known.rounding)
     }
 
     /// Estimated error of the multipliers `spectrum` at `u`: they change by it where the transitions of all intervals are made more
@@ -223,10 +204,10 @@ impl CycleProblem<'_> {
             .map(|e| e.iter().zip(&scale).map(|(v, s)| (v / s).abs()).fold(0.0, f64::max))
             .collect();
         let largest = sizes.iter().fold(f64::MIN_POSITIVE, |m: f64, s| m.max(*s));
-        let carried = if response.is_finite() { response / largest } else { f64::INFINITY };
-        let gain = if carried.is_finite() { carried } else { 1.0 };
+        let gain = if response.is_finite() { response / largest } else { 1.0 };
         let errors = local.iter().zip(&sizes).map(|(l, s)| l + gain * s).collect();
-        Measured { at: u.to_vec(), errors, carried, shift, within }
+        let rounding = ROUNDING * self.intervals() as f64 * gain;
+        Measured { at: u.to_vec(), errors, rounding, shift, within }
     }
 
     pub(super) fn flow_at_nodes(&self, u: &[f64]) -> Vec<f64> {
