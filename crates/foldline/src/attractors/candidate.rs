@@ -10,9 +10,6 @@ use crate::contract::{Batch, Parameters, VectorField, Verdict};
 use crate::diagram::{Cycle, Solution};
 use crate::simulation::{Integrator, Passage, Step, Tolerance};
 
-/// Accuracy of the integration, relative. It only decides where a trajectory goes; solutions are polished. Where samples next to the edge
-/// of a basin go depends on it.
-pub(super) const INTEGRATION: f64 = 1e-6;
 /// Steps after which a predicted limit is given up.
 const FOLLOWED: usize = 20_000;
 /// How well a predicted limit must return to itself to be tried, relative to the extent of its motion …
@@ -30,12 +27,15 @@ pub(super) struct Context<'a> {
     pub(super) parameters: &'a [f64],
     pub(super) sampling: &'a Sampling,
     pub(super) polish: Polish<'a>,
+    /// Accuracy of the integration, relative. It only decides where a trajectory goes; solutions are polished. Where samples next to
+    /// the edge of a basin go depends on it.
+    pub(super) accuracy: f64,
 }
 
 impl Context<'_> {
     pub(super) fn tolerance(&self) -> Tolerance {
-        let absolute = self.sampling.scales.iter().map(|s| INTEGRATION * s).collect();
-        Tolerance { relative: INTEGRATION, absolute }
+        let absolute = self.sampling.scales.iter().map(|s| self.accuracy * s).collect();
+        Tolerance { relative: self.accuracy, absolute }
     }
 
     /// f at a state, `[n]`.
@@ -110,7 +110,7 @@ impl Context<'_> {
         times.push(period);
         states.extend(end);
         let moved = extents(&states, n).iter().zip(extent).fold(0.0, |m: f64, (own, whole)| m.max(own / whole));
-        let closes = distance <= RECURRENT * moved && distance <= BETTER * prediction.size + 10.0 * INTEGRATION;
+        let closes = distance <= RECURRENT * moved && distance <= BETTER * prediction.size + 10.0 * self.accuracy;
         closes.then_some(Candidate::Cycle { period, times, states })
     }
 }

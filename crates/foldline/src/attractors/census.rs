@@ -13,9 +13,22 @@ use crate::diagram::{Motion, Point};
 use crate::simulation::{Ensemble, Outcome};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// Trajectories that are integrated together and share what they find. Fixed, so that the result does not depend on the
-/// number of threads.
-const BLOCK: usize = 32;
+/// How samples are followed. Fixed for each kind of survey, so that the result does not depend on the number of threads.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Pace {
+    /// Trajectories that are integrated together and share what they find.
+    pub(super) block: usize,
+    /// Accuracy of their integration, relative.
+    pub(super) accuracy: f64,
+}
+
+impl Pace {
+    /// Where all samples are wanted, and how many went to each attractor.
+    pub(super) const THOROUGH: Pace = Pace { block: 32, accuracy: 1e-6 };
+    /// Where some attractors are wanted. Near the edge of a basin a trajectory may take the other side; there are more of them.
+    pub(super) const BRIEF: Pace = Pace { block: 16, accuracy: 1e-5 };
+}
+
 /// Blocks per round after the first, which is one block; fixed for the same reason.
 const ROUND: usize = 4;
 /// Steps after which a trajectory counts as unsettled: some thousand periods.
@@ -48,12 +61,13 @@ pub(super) fn survey(
     parameters: &[f64],
     sampling: &Sampling,
     polish: Polish,
-    enough: Enough,
+    (pace, enough): (Pace, Enough),
 ) -> Census {
     let n = field.dim();
-    let context = Context { field, parameters, sampling, polish };
+    let Pace { block, accuracy } = pace;
+    let context = Context { field, parameters, sampling, polish, accuracy };
     let starts = sampling.starts();
-    let blocks: Vec<&[f64]> = starts.chunks((BLOCK * n).max(1)).collect();
+    let blocks: Vec<&[f64]> = starts.chunks((block * n).max(1)).collect();
     let mut reached: Vec<Reached> = Vec::new();
     let mut census = Census::default();
     let (mut taken, mut ended) = (0, false);
@@ -61,11 +75,11 @@ pub(super) fn survey(
         let round = if taken == 0 { 1 } else { ROUND.min(blocks.len() - taken) };
         for watched in watch_blocks(&context, &blocks[taken..taken + round], &reached, enough) {
             ended = watched.ended;
-            add(watched, taken * BLOCK, &mut reached, &mut census, sampling.tolerance);
+            add(watched, taken * block, &mut reached, &mut census, sampling.tolerance);
             taken += 1;
         }
     }
-    census.left += sampling.samples.saturating_sub(taken * BLOCK);
+    census.left += sampling.samples.saturating_sub(taken * block);
     // A survey to its end names what samples go to; one that ended early also what needed no sample, unless one went to a rival.
     let kinds =
         [false, true].map(|cycle| reached.iter().any(|known| known.orbit.is_cycle() == cycle && known.hits > 0));
@@ -141,7 +155,7 @@ pub(super) fn settle(
     start: &[f64],
     polish: Polish,
 ) -> Result<Point, Lost> {
-    let context = Context { field, parameters, sampling, polish };
+    let context = Context { field, parameters, sampling, polish, accuracy: Pace::THOROUGH.accuracy };
     let mut watched = watch_block(&context, start, &[], &|_| false);
     match watched.fates.first() {
         Some(Fate::Settled(index)) if *index < watched.orbits.len() => Ok(watched.orbits.swap_remove(*index).point),

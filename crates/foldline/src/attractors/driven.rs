@@ -10,6 +10,7 @@
 //!   (1)  x' = f(x, p, τ),   z' = 2π i z + (1 - |z|²) z,   τ = arg z / 2π
 //! ```
 
+use super::census::Pace;
 use super::{Attractor, Candidate, Census, Enough, Lost, Polish, Report, Sampling, Trial};
 use crate::contract::{Batch, VectorField};
 use crate::diagram::{Cycle, Point, Response, Solution};
@@ -101,11 +102,11 @@ pub(super) fn survey(
     parameters: &[f64],
     sampling: &Sampling,
     polish: Polish,
-    enough: Enough,
+    until: (Pace, Enough),
 ) -> Census {
     let n = field.dim();
     let polish = |candidate: &Candidate| polish(&without_circle(candidate, n)?).and_then(|found| with_circle(found, n));
-    let mut census = super::census::survey(&Driven(field), parameters, &with_clock(sampling), &polish, enough);
+    let mut census = super::census::survey(&Driven(field), parameters, &with_clock(sampling), &polish, until);
     for Attractor { point, example, .. } in &mut census.attractors {
         bare(point, n, field.time_unit(parameters));
         example.truncate(n);

@@ -40,6 +40,7 @@ mod window;
 
 pub use brute_force::{Report, stepped_sweep, survey_by_simulation};
 pub use census::Lost;
+use census::Pace;
 pub use sampling::Sampling;
 pub use settling::Trial;
 pub use spectrum::{signed_spectrum, spectral_ratio};
@@ -102,13 +103,14 @@ pub type Enough<'a> = &'a (dyn Fn(&[(&Point, Option<(u32, u32)>)]) -> bool + Syn
 /// `polish` computes a candidate by Newton's method; it is called from several threads. Periods of candidates are in the time of the
 /// field: for a forced one in periods of the forcing, with which they begin.
 pub fn survey(field: &dyn VectorField, parameters: &[f64], sampling: &Sampling, polish: Polish) -> Census {
-    survey_until(field, parameters, sampling, polish, &|_| false)
+    survey_at(field, parameters, sampling, polish, (Pace::THOROUGH, &|_| false))
 }
 
-/// The same, but no further than needed: it ends with the first block of 32 samples in which half of them or more have settled
+/// The same, but no further than needed: it ends with the first block of 16 samples in which half of them or more have settled
 /// and `enough` says so of the attractors that count as reached until then, each with its spectral ratio. What counts is what samples were
 /// seen to go to; and what Newton's method has found on the way, if it is the only equilibrium, or the only cycle, that is known and its
-/// spectrum leaves no doubt that it attracts. Which these are depends on the order of the samples, not on the number of threads.
+/// spectrum leaves no doubt that it attracts. Which these are depends on the order of the samples, not on the number of threads. Trajectories
+/// are integrated to 1e-5, relative, instead of 1e-6.
 pub fn survey_until(
     field: &dyn VectorField,
     parameters: &[f64],
@@ -116,9 +118,19 @@ pub fn survey_until(
     polish: Polish,
     enough: Enough,
 ) -> Census {
+    survey_at(field, parameters, sampling, polish, (Pace::BRIEF, enough))
+}
+
+fn survey_at(
+    field: &dyn VectorField,
+    parameters: &[f64],
+    sampling: &Sampling,
+    polish: Polish,
+    until: (Pace, Enough),
+) -> Census {
     match field.forced() {
-        true => driven::survey(field, parameters, sampling, polish, enough),
-        false => census::survey(field, parameters, sampling, polish, enough),
+        true => driven::survey(field, parameters, sampling, polish, until),
+        false => census::survey(field, parameters, sampling, polish, until),
     }
 }
 

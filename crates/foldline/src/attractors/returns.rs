@@ -16,7 +16,6 @@
 //! **Fails when** the map is far from linear over the returns used. In few dimensions (1) has no remainder that would show it;
 //! the limit predicted one return earlier does, and following the prediction for a period.
 
-use super::candidate::INTEGRATION;
 use crate::simulation::Step;
 
 /// Largest number of crossings per period that is looked for.
@@ -56,6 +55,8 @@ pub(super) struct Returns {
     times: Vec<f64>,
     /// `[return][n]`.
     states: Vec<f64>,
+    /// Difference, relative to the extent, below which the errors of the integration dominate.
+    noise: f64,
 }
 
 /// A predicted limit of the returns.
@@ -87,12 +88,12 @@ impl Prediction {
 }
 
 impl Returns {
-    /// A plane through `anchor`, across the velocity there as measured in `scale`.
-    pub(super) fn across(anchor: Vec<f64>, velocity: &[f64], scale: &[f64]) -> Returns {
+    /// A plane through `anchor`, across the velocity there as measured in `scale`, for a trajectory whose relative errors are `noise`.
+    pub(super) fn across(anchor: Vec<f64>, velocity: &[f64], scale: &[f64], noise: f64) -> Returns {
         let normal: Vec<f64> = velocity.iter().zip(scale).map(|(v, s)| v / (s * s)).collect();
         let length = normal.iter().map(|v| v * v).sum::<f64>().sqrt();
         let normal = normal.iter().map(|v| v / length).collect();
-        Returns { anchor, normal, side: 0.0, total: 0, times: Vec::new(), states: Vec::new() }
+        Returns { anchor, normal, side: 0.0, total: 0, times: Vec::new(), states: Vec::new(), noise }
     }
 
     /// The equation of the plane.
@@ -112,8 +113,8 @@ impl Returns {
 
     /// The same plane without returns, for a trajectory that starts on it.
     pub(super) fn again_from(&self, start: &[f64]) -> Returns {
-        let (anchor, normal) = (start.to_vec(), self.normal.clone());
-        Returns { anchor, normal, ..Returns::default() }
+        let (anchor, normal, noise) = (start.to_vec(), self.normal.clone(), self.noise);
+        Returns { anchor, normal, noise, ..Returns::default() }
     }
 
     /// Records a crossing in the direction of the normal within the step; says whether there was one.
@@ -176,8 +177,7 @@ impl Returns {
             return None;
         }
         let period = self.times[newest] - self.times[newest - q];
-        // Differences that small are dominated by the error of the integration.
-        if size < INTEGRATION {
+        if size < self.noise {
             return Some(Prediction { state: y(0).to_vec(), crossings: q, period, size, doubt: size });
         }
         let gram = Gram::<M>::new(terms + 2, extent, y);
@@ -322,7 +322,7 @@ mod tests {
 
     /// Returns of a map with multipliers 0.9 e^{±i φ} and 0.5 to the fixed point (0.1, 0.2, 0.3, 0.4), which lies in the plane.
     fn returns(count: usize, angle: f64) -> Returns {
-        let mut returns = Returns::across(vec![0.1, 0.2, 0.3, 0.4], &[0.0, 0.0, 0.0, 1.0], &[1.0; 4]);
+        let mut returns = Returns::across(vec![0.1, 0.2, 0.3, 0.4], &[0.0, 0.0, 0.0, 1.0], &[1.0; 4], 1e-6);
         for k in 0..count {
             let (decay, phase) = (0.01 * 0.9f64.powi(k as i32), angle * k as f64);
             let (a, b, c) = (decay * phase.cos(), decay * phase.sin(), 0.02 * 0.5f64.powi(k as i32));

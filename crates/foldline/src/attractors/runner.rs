@@ -5,7 +5,7 @@
 //! itself or rests, it has been seen to contract and goes on close to the predicted limit, or its steps are used up.
 
 use super::returns::{Prediction, Returns};
-use super::settling::{First, Settled, Trial};
+use super::settling::{First, INTEGRATION, Settled, Trial};
 use super::window::Window;
 use crate::contract::{Batch, Parameters, Verdict};
 use crate::diagram::Motion;
@@ -198,7 +198,7 @@ impl Runner {
         // The first windows of the first round are the transient; a plane through it may be no plane across the motion.
         if self.round_steps >= self.plane_ends && self.steps >= 2 * WINDOW {
             let velocity: Vec<f64> = (0..x.len()).map(|i| step.end_slope(i)).collect();
-            self.returns = Some(Returns::across(x.to_vec(), &velocity, &self.extent));
+            self.returns = Some(Returns::across(x.to_vec(), &velocity, &self.extent, INTEGRATION[0]));
             self.seen.clear();
             self.plane_ends = self.round_steps + self.plane_life;
             self.plane_life *= 2;

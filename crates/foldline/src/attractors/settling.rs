@@ -21,7 +21,7 @@ use crate::diagram::Motion;
 use crate::simulation::{Ensemble, Tolerance};
 
 /// Accuracy of the integration, relative, in a rough first round and in all others.
-const INTEGRATION: [f64; 2] = [1e-6, 1e-9];
+pub(super) const INTEGRATION: [f64; 2] = [1e-6, 1e-9];
 
 /// How the first round is integrated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -72,7 +72,7 @@ fn every_sample_of_the_contact_rotor_is_counted_where_a_long_integration_ends() 
     assert!((low - 0.530563).abs() < 1e-5 && (high - 1.341756).abs() < 1e-5, "{low} {high}");
     // e^(-ζ 1000) = 5e-5 of a small difference to the attractor is left. The same accuracy gives the same trajectories, which
     // matters for those that start near a basin boundary.
-    let tolerance = Tolerance::uniform(super::candidate::INTEGRATION, 4);
+    let tolerance = Tolerance::uniform(super::census::Pace::THOROUGH.accuracy, 4);
     let starts = sampling.starts();
     let mut largest = vec![0.0; 32];
     Ensemble::new(&ROTOR, &[5.0, 1.0], tolerance, &starts, [0.0, 1000.0]).run(&mut |step| {

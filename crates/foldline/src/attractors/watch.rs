@@ -115,7 +115,7 @@ impl Watch {
             && let Some(extent) = &self.extent
         {
             let velocity: Vec<f64> = (0..x.len()).map(|i| step.end_slope(i)).collect();
-            self.returns = Returns::across(x.to_vec(), &velocity, extent);
+            self.returns = Returns::across(x.to_vec(), &velocity, extent, context.accuracy);
             self.section_ends = self.steps + self.section_life;
             self.section_life *= 2;
             (self.next_attempt, self.expected) = (0, None);
