@@ -169,15 +169,15 @@ pub fn correct_within(
 ) -> Result<(), Failure> {
     let size = problem.unknowns();
     let goal = settings.closeness(&problem.mesh(), f64::INFINITY);
-    let (mut r, mut du, mut gap) = (vec![0.0; size], vec![0.0; size], vec![0.0; size]);
+    let (mut r, mut du) = (vec![0.0; size], vec![0.0; size]);
     let mut sizes: Vec<f64> = Vec::new();
     let mut fresh = true;
     for iteration in 0..settings.max_newton {
         if !problem.residual(u, &mut r) {
             return Err(Failure::NotFinite);
         }
-        gap.iter_mut().zip(u.iter().zip(&plane.base)).for_each(|(g, (a, b))| *g = a - b);
-        r[size - 1] = problem.dot(&plane.row, &gap) - plane.distance;
+        du.iter_mut().zip(u.iter().zip(&plane.base)).for_each(|(gap, (a, b))| *gap = a - b);
+        r[size - 1] = problem.dot(&plane.row, &du) - plane.distance;
         if fresh {
             problem.factorise(u, &plane.row).map_err(|_| Failure::Singular)?;
             cost.factorisations += 1;
@@ -270,10 +270,10 @@ pub fn arrive(
             return Err(Failure::NoConvergence(sizes));
         }
     }
-    let mut last = vec![0.0; size];
-    last[size - 1] = 1.0;
-    let mut tangent = vec![0.0; size];
-    problem.solve(&last, &mut tangent);
+    r.fill(0.0);
+    r[size - 1] = 1.0;
+    let mut tangent = du;
+    problem.solve(&r, &mut tangent);
     let norm = problem.dot(&tangent, &tangent).sqrt();
     if !(norm.is_finite() && norm > 0.0) {
         return Err(Failure::Singular);

@@ -68,10 +68,9 @@ impl Multiply<'_, '_> {
 }
 
 /// A profile `[interval][node][component]` with the intervals as lanes: `[component][node][interval]`.
-pub fn by_component(profile: &[f64], nodes: usize, n: usize) -> Vec<f64> {
+pub fn by_component(profile: &[f64], nodes: usize, n: usize, out: &mut [f64]) {
     let block = (nodes * n).max(1);
     let count = profile.len() / block;
-    let mut out = vec![0.0; profile.len()];
     // Eight intervals at a time, so that what is written stands together.
     let (eights, rest) = profile.split_at(profile.len() - profile.len() % (WIDTH * block));
     for (first, eight) in (0..).step_by(WIDTH).zip(eights.chunks_exact(WIDTH * block)) {
@@ -88,7 +87,6 @@ pub fn by_component(profile: &[f64], nodes: usize, n: usize) -> Vec<f64> {
             node.iter().enumerate().for_each(|(i, x)| out[(i * nodes + k) * count + j] = *x);
         }
     }
-    out
 }
 
 #[cfg(test)]
@@ -118,7 +116,8 @@ mod tests {
         let (nodes, n) = (2, 3);
         for count in [0, 3, 8, 19] {
             let profile: Vec<f64> = (0..count * nodes * n).map(|k| k as f64).collect();
-            let by = by_component(&profile, nodes, n);
+            let mut by = vec![f64::NAN; profile.len()];
+            by_component(&profile, nodes, n, &mut by);
             for at in 0..profile.len() {
                 let (j, k, i) = (at / (nodes * n), at / n % nodes, at % n);
                 assert_eq!(by[(i * nodes + k) * count + j], profile[at], "{count} intervals, entry {at}");

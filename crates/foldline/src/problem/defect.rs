@@ -111,6 +111,32 @@ pub struct Defect {
     pub misses: Vec<f64>,
 }
 
+/// Intervals that are looked at together: what that takes stays in the cache.
+pub const TOGETHER: usize = 32;
+
+/// Room for the intervals that are looked at together.
+#[derive(Debug, Default)]
+pub struct Room {
+    /// `[n][m + 1][count]` at the nodes, then f at the sample points.
+    nodes: Vec<f64>,
+    /// `[n][m + 1][count]` at the sample points: states, d, and the source of (2).
+    states: Vec<f64>,
+    defect: Vec<f64>,
+    source: Vec<f64>,
+    /// `[m + 1][count]` of one component.
+    line: Vec<f64>,
+}
+
+impl Room {
+    /// For so many entries, m + 1 of every component of every interval.
+    fn resize(&mut self, n: usize, lanes: usize) {
+        [&mut self.nodes, &mut self.states, &mut self.defect, &mut self.source]
+            .into_iter()
+            .for_each(|room| room.resize(n * lanes, 0.0));
+        self.line.resize(lanes, 0.0);
+    }
+}
+
 /// Measures the defect of a profile `[interval][node][component]`; a forced cycle lasts so many periods of the forcing.
 pub fn measure(
     field: &dyn VectorField,
@@ -122,59 +148,61 @@ pub fn measure(
     scheme: &Scheme,
     sampling: &Sampling,
     scale: &[f64],
+    room: &mut Room,
 ) -> Defect {
-    // Intervals are lanes: sample g of interval j is lane g·N + j of the batch.
-    let (n, m, count) = (scale.len(), scheme.degree, mesh.len() - 1);
-    let lanes = count * (m + 1);
-    let nodes = panel::by_component(profile, m + 1, n);
-    let (mut states, mut defect) = (vec![0.0; n * lanes], vec![0.0; n * lanes]);
-    for i in 0..n {
-        let own = i * lanes..(i + 1) * lanes;
-        panel::multiply(&sampling.values, &nodes[own.clone()], count, &mut states[own.clone()]);
-        panel::multiply(&sampling.slopes, &nodes[own.clone()], count, &mut defect[own]);
-    }
-    let mut f = nodes;
-    let (places, parameters) = (sampling.times(mesh, forcing_periods), Parameters::Shared(parameters));
-    field.evaluate(Batch { lanes, states: &states, parameters, times: &places }, &mut f);
-    let times: Vec<f64> = mesh.windows(2).map(|pair| (pair[1] - pair[0]) * period).collect();
-    for (d, f) in defect.chunks_exact_mut(count).zip(f.chunks_exact(count)) {
-        d.iter_mut().zip(f).zip(&times).for_each(|((d, f), ht)| *d -= ht * f);
-    }
-    let mut local = vec![0.0f64; count];
-    let mut ends = vec![0.0; count * n];
-    let mut within = vec![0.0; n * lanes];
-    let mut integrals = vec![0.0; lanes];
-    // U + w, then f there.
-    for i in 0..n {
-        let own = i * lanes..(i + 1) * lanes;
-        panel::multiply(&sampling.partial, &defect[own.clone()], count, &mut within[own.clone()]);
-        states[own.clone()].iter_mut().zip(&within[own]).for_each(|(x, w)| *x += w);
-    }
-    let mut source = vec![0.0; n * lanes];
-    field.evaluate(Batch { lanes, states: &states, parameters, times: &places }, &mut source);
-    for (own, f) in source.chunks_exact_mut(count).zip(f.chunks_exact(count)) {
-        for ((g, f), ht) in own.iter_mut().zip(f).zip(&times) {
-            let change = ht * (*g - f);
-            // Next to where f ends its end is not the error's business.
-            *g = if change.is_finite() { change } else { 0.0 };
+    let (n, m, all) = (scale.len(), scheme.degree, mesh.len() - 1);
+    let (block, parameters) = ((m + 1) * n, Parameters::Shared(parameters));
+    let [mut local, mut within] = [all, n * (m + 1) * all].map(|size| vec![0.0f64; size]);
+    let [mut ends, mut misses, mut sources] = [all * n, all * n, all * m * n].map(|size| vec![0.0; size]);
+    for first in (0..all).step_by(TOGETHER) {
+        // Intervals are lanes: sample g of interval j is lane g·N + j of the batch, j counting from `first`.
+        let count = (all - first).min(TOGETHER);
+        let (lanes, mesh) = (count * (m + 1), &mesh[first..=first + count]);
+        room.resize(n, lanes);
+        let Room { nodes, states, defect, source, line } = room;
+        panel::by_component(&profile[first * block..(first + count) * block], m + 1, n, nodes);
+        for (own, (states, defect)) in
+            nodes.chunks_exact(lanes).zip(states.chunks_exact_mut(lanes).zip(defect.chunks_exact_mut(lanes)))
+        {
+            panel::multiply(&sampling.values, own, count, states);
+            panel::multiply(&sampling.slopes, own, count, defect);
         }
-    }
-    let (mut sources, mut misses) = (vec![0.0; count * m * n], vec![0.0; count * n]);
-    for i in 0..n {
-        panel::multiply(&sampling.sources, &source[i * lanes..(i + 1) * lanes], count, &mut integrals);
-        let (inner, whole) = integrals.split_at(m * count);
-        for (k, line) in inner.chunks_exact(count).enumerate() {
-            line.iter().enumerate().for_each(|(j, r)| sources[(j * m + k) * n + i] = *r);
+        let (places, f) = (sampling.times(mesh, forcing_periods), nodes);
+        field.evaluate(Batch { lanes, states, parameters, times: &places }, f);
+        let times: Vec<f64> = mesh.windows(2).map(|pair| (pair[1] - pair[0]) * period).collect();
+        for (d, f) in defect.chunks_exact_mut(count).zip(f.chunks_exact(count)) {
+            d.iter_mut().zip(f).zip(&times).for_each(|((d, f), ht)| *d -= ht * f);
         }
-        whole.iter().enumerate().for_each(|(j, r)| misses[j * n + i] = *r);
-    }
-    for i in 0..n {
-        panel::multiply(&sampling.integrals, &defect[i * lanes..(i + 1) * lanes], count, &mut integrals);
-        let (inner, whole) = integrals.split_at(m * count);
-        for line in inner.chunks_exact(count) {
-            local.iter_mut().zip(line).for_each(|(most, e)| *most = most.max((e / scale[i]).abs()));
+        // U + w, then f there.
+        for (i, (states, defect)) in states.chunks_exact_mut(lanes).zip(defect.chunks_exact(lanes)).enumerate() {
+            panel::multiply(&sampling.partial, defect, count, line);
+            states.iter_mut().zip(&*line).for_each(|(x, w)| *x += w);
+            for (g, w) in line.chunks_exact(count).enumerate() {
+                within[(i * (m + 1) + g) * all + first..][..count].copy_from_slice(w);
+            }
         }
-        whole.iter().enumerate().for_each(|(j, e)| ends[j * n + i] = *e);
+        field.evaluate(Batch { lanes, states, parameters, times: &places }, source);
+        for (own, f) in source.chunks_exact_mut(count).zip(f.chunks_exact(count)) {
+            for ((g, f), ht) in own.iter_mut().zip(f).zip(&times) {
+                let change = ht * (*g - f);
+                // Next to where f ends its end is not the error's business.
+                *g = if change.is_finite() { change } else { 0.0 };
+            }
+        }
+        for (i, (source, defect)) in source.chunks_exact(lanes).zip(defect.chunks_exact(lanes)).enumerate() {
+            panel::multiply(&sampling.sources, source, count, line);
+            let (inner, whole) = line.split_at(m * count);
+            for (k, line) in inner.chunks_exact(count).enumerate() {
+                line.iter().enumerate().for_each(|(j, r)| sources[((first + j) * m + k) * n + i] = *r);
+            }
+            whole.iter().enumerate().for_each(|(j, r)| misses[(first + j) * n + i] = *r);
+            panel::multiply(&sampling.integrals, defect, count, line);
+            let (inner, whole) = line.split_at(m * count);
+            for line in inner.chunks_exact(count) {
+                local[first..].iter_mut().zip(line).for_each(|(most, e)| *most = most.max((e / scale[i]).abs()));
+            }
+            whole.iter().enumerate().for_each(|(j, e)| ends[(first + j) * n + i] = *e);
+        }
     }
     misses.iter_mut().zip(&ends).for_each(|(miss, end)| *miss += end);
     Defect { local, within, ends, sources, misses }
@@ -445,7 +473,18 @@ mod tests {
         let at = |count: usize| {
             let (mesh, period) = (super::super::mesh::uniform(count), std::f64::consts::TAU);
             let profile = collocated(&scheme, &mesh, period);
-            let d = measure(&Integral, &[], &profile, period, 0, &mesh, &scheme, &sampling, &[1.0, 1.0]);
+            let d = measure(
+                &Integral,
+                &[],
+                &profile,
+                period,
+                0,
+                &mesh,
+                &scheme,
+                &sampling,
+                &[1.0, 1.0],
+                &mut Room::default(),
+            );
             [largest(&d.local), largest(&d.ends)]
         };
         let (coarse, fine) = (at(10), at(20));

@@ -95,7 +95,8 @@ impl Orbit<'_> {
         let (n, nodes, density, count) = (self.field.dim(), self.scheme.degree + 1, self.density(), self.count);
         let weights: Vec<f64> =
             (0..density).flat_map(|s| self.scheme.interpolation(s as f64 / density as f64)).collect();
-        let by_component = panel::by_component(self.profile, nodes, n);
+        let mut by_component = vec![0.0; self.profile.len()];
+        panel::by_component(self.profile, nodes, n, &mut by_component);
         let mut states = Vec::with_capacity((n + self.field.output_count()) * self.lanes());
         states.resize(n * self.lanes(), 0.0);
         let mut sampled = vec![0.0; self.lanes()];

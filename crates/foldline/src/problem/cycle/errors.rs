@@ -3,7 +3,7 @@
 use super::CycleProblem;
 use crate::contract::{Batch, Parameters, ZeroProblem};
 use crate::linalg::{panel, same};
-use crate::problem::defect::{self, Course, Defect};
+use crate::problem::defect::{self, Course, Defect, TOGETHER};
 use crate::stability::floquet;
 use num_complex::Complex64;
 use std::ops::Range;
@@ -32,9 +32,6 @@ fn spectrum_difference(spectrum: &[Complex64], other: &[Complex64]) -> f64 {
 /// Error of an interval that rounding alone may leave, relative. Those of all intervals add up.
 const ROUNDING: f64 = 0.5 * f64::EPSILON;
 
-/// Intervals whose transitions are made more accurate at a time: what that takes stays in the cache.
-const TOGETHER: usize = 32;
-
 /// A profile along which Jacobians are taken.
 struct Profile<'a> {
     u: &'a [f64],
@@ -45,6 +42,9 @@ struct Profile<'a> {
 /// Room for some intervals.
 #[derive(Default)]
 pub(super) struct Room {
+    measure: defect::Room,
+    /// `[n][m + 1][count]`, at the nodes.
+    own: Vec<f64>,
     /// `[n][m + 1][count]`, at the sample points.
     states: Vec<f64>,
     f: Vec<f64>,
@@ -57,6 +57,7 @@ pub(super) struct Room {
 impl Room {
     fn resize(&mut self, n: usize, m: usize, count: usize) {
         let (square, lanes) = (n * n, count * (m + 1));
+        self.own.resize(n * lanes, 0.0);
         self.states.resize(n * lanes, 0.0);
         self.f.resize(n * lanes, 0.0);
         self.nodes.resize(m * square * count, 0.0);
@@ -138,11 +139,11 @@ impl CycleProblem<'_> {
         let (n, m, block, count) = (self.n, self.scheme.degree, self.block(), piece.len());
         let (square, lanes, size) = (n * n, count * (m + 1), self.profile_size());
         room.resize(n, m, count);
-        let Room { states, f, nodes, jacobians, gains } = room;
+        let Room { own, states, f, nodes, jacobians, gains, .. } = room;
         let mesh = &self.mesh[piece.start..=piece.end];
         let times = self.sampling.times(mesh, self.forcing_periods);
         for (Profile { u, without }, fx) in profiles.iter().zip(&mut *jacobians) {
-            let own = panel::by_component(&u[piece.start * block..piece.end * block], m + 1, n);
+            panel::by_component(&u[piece.start * block..piece.end * block], m + 1, n, own);
             for (c, (states, own)) in states.chunks_exact_mut(lanes).zip(own.chunks_exact(lanes)).enumerate() {
                 self.sampling.sampled(own, count, states);
                 for (g, states) in states.chunks_exact_mut(count).enumerate().take(without.map_or(0, |_| m + 1)) {
@@ -186,6 +187,7 @@ impl CycleProblem<'_> {
             &self.scheme,
             &self.sampling,
             &scale,
+            &mut self.room.borrow_mut().measure,
         );
         let block = (self.scheme.degree + 1) * self.n;
         let mut rhs = vec![0.0; u.len()];
