@@ -183,9 +183,7 @@ fn own_block<T: Lane>(a: &mut [T], n: usize, first: usize, m: usize, step: &Step
         for row in lower.chunks_exact_mut(m) {
             let factor = row[k] * pivot[k];
             row[k] = factor;
-            for j in k + 1..m {
-                row[j] = row[j] - factor * pivot[j];
-            }
+            subtract(factor, &pivot[k + 1..m], &mut row[k + 1..]);
         }
     }
     copy_block(&panel[..size], m, &mut a[first * n + first..], n, m);

@@ -23,7 +23,7 @@
 
 use super::chain::{Chain, Links};
 use super::compound::Compound;
-use super::lane::{Lane, add, dot, subtract};
+use super::lane::{Lane, add, dot, intact, subtract};
 use super::shape::Shape;
 use super::{block, lu, tile};
 use crate::contract::Singular;
@@ -314,7 +314,10 @@ fn total<T: Lane>(x: T) -> f64 {
 fn unzipped<T: Lane>(x: &[T]) -> Vec<f64> {
     let mut out = vec![0.0; T::COUNT * x.len()];
     for (l, part) in out.chunks_exact_mut(x.len().max(1)).enumerate() {
-        part.iter_mut().zip(x).for_each(|(o, x)| *o = x.lanes()[l]);
+        for (o, x) in part.iter_mut().zip(x) {
+            intact::<T>();
+            *o = x.lanes()[l];
+        }
     }
     out
 }
@@ -383,10 +386,12 @@ impl<T: Lane> Links<T> for Steps<'_, T> {
             let g = &step[(t * n + i) * width..(t * n + i + 1) * width];
             let row = &mut rows[i * full..(i + 1) * full];
             for c in 0..n {
+                intact::<T>();
                 row[c] = T::default() - g[c];
             }
             row[n + i] = T::splat(1.0);
             for c in 0..q {
+                intact::<T>();
                 row[3 * n + c] = T::default() - g[n + c];
             }
         }
@@ -516,9 +521,11 @@ fn compounded<T: Lane>(
     {
         row[n + i] = T::splat(1.0);
         for c in 0..n {
+            intact::<T>();
             row[2 * n + c] = T::default() - product[c];
         }
         for c in 0..q {
+            intact::<T>();
             row[3 * n + c] = T::default() - product[n + c];
         }
     }
@@ -649,7 +656,10 @@ impl<T: Lane> Solve<'_, T> {
 #[inline(always)]
 fn zip<T: Lane>(x: &[f64], out: &mut [T]) {
     for (l, part) in x.chunks_exact(out.len()).enumerate() {
-        out.iter_mut().zip(part).for_each(|(o, v)| o.lanes_mut()[l] = *v);
+        for (o, v) in out.iter_mut().zip(part) {
+            intact::<T>();
+            o.lanes_mut()[l] = *v;
+        }
     }
 }
 

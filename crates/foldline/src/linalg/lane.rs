@@ -184,10 +184,20 @@ impl Mul for Eight {
     }
 }
 
+/// To be called within a loop over eights. The compiler would else make vectors of single numbers out of several of them, gathered from
+/// memory and scattered into it, which takes several times as long. It makes no instruction by itself.
+#[inline(always)]
+pub fn intact<T: Lane>() {
+    if T::COUNT > 1 {
+        std::sync::atomic::compiler_fence(std::sync::atomic::Ordering::Release);
+    }
+}
+
 /// y -= s x.
 #[inline(always)]
 pub fn subtract<T: Lane>(s: T, x: &[T], y: &mut [T]) {
     for (y, x) in y.iter_mut().zip(x) {
+        intact::<T>();
         *y = *y - s * *x;
     }
 }
@@ -196,6 +206,7 @@ pub fn subtract<T: Lane>(s: T, x: &[T], y: &mut [T]) {
 #[inline(always)]
 pub fn add<T: Lane>(s: T, x: &[T], y: &mut [T]) {
     for (y, x) in y.iter_mut().zip(x) {
+        intact::<T>();
         *y = *y + s * *x;
     }
 }

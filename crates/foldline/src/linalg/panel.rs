@@ -27,16 +27,43 @@ impl pulp::NullaryFnOnce for Multiply<'_, '_> {
     fn call(self) {
         // The usual degree's as a constant.
         match self.panel.len() / self.lanes {
-            5 => self.multiplied(5),
-            columns => self.multiplied(columns),
+            5 => self.multiplied_by::<5>(),
+            _ => self.multiplied(),
         }
     }
 }
 
 impl Multiply<'_, '_> {
+    /// With so many columns: eight lanes of all of them are in registers for every row.
     #[inline(always)]
-    fn multiplied(self, columns: usize) {
+    fn multiplied_by<const C: usize>(self) {
         let Multiply { matrix, panel, lanes, out } = self;
+        if lanes < WIDTH {
+            return Multiply { matrix, panel, lanes, out }.multiplied();
+        }
+        for first in (0..lanes).step_by(WIDTH) {
+            // The last eight may have some again that are done already.
+            let first = first.min(lanes - WIDTH);
+            let mut columns = [[0.0; WIDTH]; C];
+            for k in 0..C {
+                columns[k].copy_from_slice(&panel[k * lanes + first..][..WIDTH]);
+            }
+            for (line, weights) in out.chunks_exact_mut(lanes).zip(matrix.as_chunks::<C>().0) {
+                let mut sum = [0.0; WIDTH];
+                for k in 0..C {
+                    for l in 0..WIDTH {
+                        sum[l] += weights[k] * columns[k][l];
+                    }
+                }
+                line[first..first + WIDTH].copy_from_slice(&sum);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn multiplied(self) {
+        let Multiply { matrix, panel, lanes, out } = self;
+        let columns = panel.len() / lanes;
         for (line, weights) in out.chunks_exact_mut(lanes).zip(matrix.chunks_exact(columns)) {
             let eight = |first: usize| {
                 let mut sum = [0.0; WIDTH];

@@ -1,6 +1,6 @@
 //! Householder triangularisation of a tall block, with right-hand columns carried along, in every lane.
 
-use super::lane::{Lane, dot, subtract};
+use super::lane::{Lane, dot, intact, subtract};
 use super::tile::{piece, piece_mut};
 
 /// Triangularises the first `columns` columns of the row-major `rows × width` matrix `a` in place by Householder
@@ -61,7 +61,10 @@ fn reflection<T: Lane>(v: &mut [T], block: &[T], width: usize, k: usize) {
     let beta = norm2 - alpha * v[0];
     v[0] = v[0] - alpha;
     let scale = beta.map(|b| if b > 0.0 && b < f64::INFINITY { 1.0 / b.sqrt() } else { 0.0 });
-    v.iter_mut().for_each(|x| *x = *x * scale);
+    for x in v {
+        intact::<T>();
+        *x = *x * scale;
+    }
 }
 
 /// Applies 1 - v vᵀ to C columns from `c` on.

@@ -1,6 +1,6 @@
 //! Running a tape over the lanes of a batch.
 //!
-//! **Idea.** Lanes are taken 64 or 32 at a time (8 for a short rest), so that one instruction is looked up once and then runs
+//! **Idea.** Lanes are taken 64 or 32 at a time (16 or 8 for a short rest), so that one instruction is looked up once and then runs
 //! as a loop of fixed length, which the compiler turns into vector instructions; the widest set that the machine has is chosen
 //! when the program runs. What all lanes share is computed once, as plain numbers, and not again while one tape runs at the
 //! same parameters. Registers live in a per-thread store that grows to the largest tape and is then reused; they are cells, so
@@ -15,6 +15,7 @@ use std::cell::{Cell, RefCell};
 
 /// Eights of lanes that are taken at a time: the more where the registers then fill no more than [`IN_CACHE`] eights, a good
 /// part of the fastest cache.
+const PAIR: usize = 2;
 const FEW: usize = 4;
 const MANY: usize = 8;
 const IN_CACHE: usize = 256;
@@ -103,7 +104,7 @@ impl pulp::NullaryFnOnce for Run<'_, '_, '_> {
         while inputs.first < lanes {
             let left = lanes - inputs.first;
             // Two narrow ones cost less than a wide one that is half empty.
-            let eights = [most, FEW].into_iter().find(|eights| left > 4 * eights).unwrap_or(1);
+            let eights = [most, FEW, PAIR].into_iter().find(|eights| left > 4 * eights).unwrap_or(1);
             inputs.live = left.min(8 * eights);
             for &(register, scalar) in &code.filled {
                 let value = Eight([inputs.scalars[scalar as usize]; 8]);
@@ -112,6 +113,7 @@ impl pulp::NullaryFnOnce for Run<'_, '_, '_> {
             match eights {
                 MANY => section::<MANY>(code, registers, inputs, arrays),
                 FEW => section::<FEW>(code, registers, inputs, arrays),
+                PAIR => section::<PAIR>(code, registers, inputs, arrays),
                 _ => section::<1>(code, registers, inputs, arrays),
             }
             inputs.first += inputs.live;

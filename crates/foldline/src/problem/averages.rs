@@ -48,8 +48,8 @@ pub fn of_profile(
     let batch = Batch { lanes, states, parameters: Parameters::Shared(parameters), times: &times };
     field.outputs(batch, outputs);
     let means = |line: &[f64]| {
-        let of = |power: i32| line.iter().zip(&weights).map(|(v, b)| b * v.powi(power)).sum();
-        [of(1), of(2)]
+        let pairs = || line.iter().zip(&weights);
+        [pairs().map(|(v, b)| b * v).sum(), pairs().map(|(v, b)| b * (v * v)).sum()]
     };
     values.chunks_exact(lanes).map(means).collect()
 }

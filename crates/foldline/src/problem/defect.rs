@@ -19,7 +19,7 @@
 use super::gauss::{Scheme, gauss_legendre};
 use crate::contract::{Batch, Parameters, VectorField};
 use crate::diagram::Mesh;
-use crate::linalg::lane::{self, Eight, Lane};
+use crate::linalg::lane::{self, Eight, Lane, intact};
 use crate::linalg::{axpy, lu, panel, tile};
 
 /// Where the defect is sampled, and how it is integrated.
@@ -227,9 +227,28 @@ pub struct Course<'a> {
 ///
 /// Where V cannot be inverted they gain nothing.
 pub fn correct(sampling: &Sampling, nodes: &[f64], courses: &mut [Course], n: usize) {
-    Eight::dispatch(Correction { sampling, nodes, courses, n });
+    let count = courses.first().map_or(0, |course| course.lengths.len());
+    if count >= Eight::COUNT {
+        Eight::dispatch(Correction { sampling, nodes, courses, n });
+    } else if count > 0 {
+        // So few that the last one is repeated.
+        let filled = |lines: &[f64]| -> Vec<f64> {
+            let line = |line: &[f64]| (0..Eight::COUNT).map(|j| line[j.min(count - 1)]).collect::<Vec<f64>>();
+            lines.chunks_exact(count).flat_map(line).collect()
+        };
+        let nodes = filled(nodes);
+        for Course { jacobians, lengths, gains } in courses {
+            let mut own = filled(gains);
+            let course = Course { jacobians: &filled(jacobians), lengths: &filled(lengths), gains: &mut own };
+            Eight::dispatch(Correction { sampling, nodes: &nodes, courses: &mut [course], n });
+            for (gains, own) in gains.chunks_exact_mut(count).zip(own.chunks_exact(Eight::COUNT)) {
+                gains.copy_from_slice(&own[..count]);
+            }
+        }
+    }
 }
 
+/// For eight intervals or more.
 struct Correction<'a, 'b, 'c> {
     sampling: &'a Sampling,
     nodes: &'a [f64],
@@ -250,112 +269,117 @@ impl pulp::NullaryFnOnce for Correction<'_, '_, '_> {
     }
 }
 
-/// Eight numbers of a line from `first` on, of which it has `valid`; the last one again beyond that.
-#[inline(always)]
-fn loaded(line: &[f64], first: usize, valid: usize) -> Eight {
-    match valid {
-        Eight::COUNT => Eight::load(&line[first..]),
-        _ => Eight::each(|lane| line[first + lane.min(valid - 1)]),
-    }
-}
-
 impl Correction<'_, '_, '_> {
     #[inline(always)]
     fn corrected(self, n: usize, points: usize) {
         let Correction { sampling, nodes, courses, .. } = self;
-        let (square, count) = (n * n, nodes.len() / (n * n * (points - 1)));
-        let room = |size: usize| vec![Eight::default(); size];
-        let [mut own, mut values, mut slopes] = [square * points; 3].map(room);
-        let [mut factors, mut matrix, mut right] = [square; 3].map(room);
+        let (square, inner, count) = (n * n, points - 1, nodes.len() / (n * n * (points - 1)));
+        let mut room = vec![Eight::default(); square * (3 * points + inner + 2) + points];
+        let (values, room) = room.split_at_mut(square * points);
+        let (slopes, room) = room.split_at_mut(square * points);
+        let (factors, room) = room.split_at_mut(square * points);
+        let (own, room) = room.split_at_mut(square * inner);
+        let (matrix, room) = room.split_at_mut(square);
+        let (right, growth) = room.split_at_mut(square);
         // Σ_g of (3), `[course][n × n]`.
-        let mut sums = room(square * courses.len());
+        let mut sums = vec![Eight::default(); square * courses.len()];
         let negative = |weights: &[f64]| -> Vec<Eight> { weights.iter().map(|w| Eight::splat(-w)).collect() };
         let [to_values, to_slopes, to_end] = [&sampling.values, &sampling.slopes, &sampling.end].map(|w| negative(w));
-        let weights = &sampling.sources[(points - 1) * points..];
-        (0..n).for_each(|c| own[c * (n + 1)] = Eight::splat(1.0));
+        let weights = &sampling.sources[inner * points..][..points];
         for first in (0..count).step_by(Eight::COUNT) {
-            let valid = (count - first).min(Eight::COUNT);
-            for (v, line) in own[square..].iter_mut().zip(nodes.chunks_exact(count)) {
-                *v = loaded(line, first, valid);
+            // The last eight may have intervals again that are done already.
+            let first = first.min(count - Eight::COUNT);
+            for (k, v) in own.iter_mut().enumerate() {
+                intact::<Eight>();
+                *v = Eight::load(&nodes[k * count + first..]);
             }
-            for (rows, out) in [(&to_values, &mut values), (&to_slopes, &mut slopes)] {
-                out.fill(Eight::default());
-                for (row, to) in rows.chunks_exact(points).zip(out.chunks_exact_mut(square)) {
-                    tile::subtract_combination(to, row, &own, square, 0);
-                }
+            for g in 0..points {
+                let (row, at) = (g * points..(g + 1) * points, g * square..(g + 1) * square);
+                combined(&to_values[row.clone()], own, &mut values[at.clone()], n);
+                combined(&to_slopes[row], own, &mut slopes[at], n);
             }
+            factors.copy_from_slice(values);
+            factorised(factors, growth, n);
             sums.fill(Eight::default());
-            for (g, weight) in weights.iter().enumerate() {
-                let (value, slope) = (&values[g * square..(g + 1) * square], &slopes[g * square..(g + 1) * square]);
-                factors.copy_from_slice(value);
-                let regular = factorised(&mut factors, n);
-                for (course, sum) in courses.iter().zip(sums.chunks_exact_mut(square)) {
-                    let length = loaded(course.lengths, first, valid);
+            for (course, sum) in courses.iter().zip(sums.chunks_exact_mut(square)) {
+                let length = Eight::load(&course.lengths[first..]);
+                for g in 0..points {
+                    let at = g * square..(g + 1) * square;
                     for (entry, to) in matrix.iter_mut().enumerate() {
-                        let line = &course.jacobians[(entry * points + g) * count..(entry * points + g + 1) * count];
-                        *to = length * loaded(line, first, valid);
+                        intact::<Eight>();
+                        *to = length * Eight::load(&course.jacobians[(entry * points + g) * count + first..]);
                     }
                     // D, then V⁻¹ D.
-                    right.copy_from_slice(slope);
-                    tile::subtract(&mut right, n, &matrix, n, value, n, [n; 3], [0; 3]);
-                    if regular {
-                        tile::forward(&mut right, n, 0, &factors, n, n);
-                        tile::backward(&mut right, n, 0, &factors, n, 0, n, n);
+                    let value = &values[at.clone()];
+                    right.copy_from_slice(&slopes[at.clone()]);
+                    tile::subtract(right, n, matrix, n, value, n, [n; 3], [0; 3]);
+                    if growth[g].all(growth[g], |growth, _| growth < GROWTH) {
+                        tile::forward(right, n, 0, &factors[at.clone()], n, n);
+                        tile::backward(right, n, 0, &factors[at], n, 0, n, n);
                     } else {
-                        exchanging(value, &mut right, n);
+                        exchanging(value, right, n);
                     }
-                    lane::add(Eight::splat(*weight), &right, sum);
+                    lane::add(Eight::splat(weights[g]), right, sum);
                 }
             }
             // V(1) times the sum.
-            matrix.fill(Eight::default());
-            tile::subtract_combination(&mut matrix, &to_end, &own, square, 0);
+            combined(&to_end, own, matrix, n);
             for (course, sum) in courses.iter_mut().zip(sums.chunks_exact(square)) {
                 right.fill(Eight::default());
-                tile::subtract(&mut right, n, &matrix, n, sum, n, [n; 3], [0; 3]);
+                tile::subtract(right, n, matrix, n, sum, n, [n; 3], [0; 3]);
                 // Zero in lanes where all are finite.
                 let mut finite = Eight::default();
-                for gain in &right {
+                for gain in right.iter() {
+                    intact::<Eight>();
                     finite = finite.zip(*gain, |all, x| all + 0.0 * x);
                 }
                 for (gain, line) in right.iter().zip(course.gains.chunks_exact_mut(count)) {
+                    intact::<Eight>();
                     let gain = finite.zip(*gain, |all, x| if all == 0.0 { x } else { 0.0 });
-                    line[first..first + valid].copy_from_slice(&gain.lanes()[..valid]);
+                    line[first..first + Eight::COUNT].copy_from_slice(gain.lanes());
                 }
             }
         }
     }
 }
 
-/// Factorises in every lane without exchanging rows: L without its diagonal of ones below the diagonal, U on and above it, the inverse of
-/// its diagonal; false where a pivot is too small for that in some lane. Contact makes velocities thousands of times as sensitive as
-/// positions, so that pivots are small; but of a correction a few digits are enough.
+/// What weights, whose negatives these are, make of the identity at the first node and of what stands at the others.
 #[inline(always)]
-fn factorised(a: &mut [Eight], n: usize) -> bool {
-    // How much rounding may grow, over all pivots.
-    const GROWTH: f64 = 1e8;
-    let mut growth = Eight::splat(1.0);
+fn combined(negative: &[Eight], others: &[Eight], to: &mut [Eight], n: usize) {
+    to.fill(Eight::default());
+    (0..n).for_each(|c| to[c * (n + 1)] = Eight::default() - negative[0]);
+    tile::subtract_combination(to, &negative[1..], others, n * n, 0);
+}
+
+/// How much rounding may grow, over all pivots.
+const GROWTH: f64 = 1e8;
+
+/// Factorises n×n matrices, in every lane without exchanging rows: L without its diagonal of ones below the diagonal, U on and above it,
+/// the inverse of its diagonal. `growth` receives for each of them by how much rounding may grow, no less than [`GROWTH`] where a pivot
+/// is too small. Contact makes velocities thousands of times as sensitive as positions, so that pivots are small; but of a correction
+/// a few digits are enough.
+#[inline(always)]
+fn factorised(matrices: &mut [Eight], growth: &mut [Eight], n: usize) {
+    growth.fill(Eight::splat(1.0));
+    // All of them pivot by pivot: none waits for its own quotients.
     for k in 0..n {
-        let pivot = a[k * n + k];
-        let mut largest = Eight::default();
-        for i in k..n {
-            largest = largest.zip(a[i * n + k], |most, x| most.max(x.abs()));
-        }
-        let inverse = pivot.map(|x| 1.0 / x);
-        growth = growth * largest * inverse.map(f64::abs);
-        if !growth.all(growth, |growth, _| growth < GROWTH) {
-            return false;
-        }
-        for i in k + 1..n {
-            let factor = a[i * n + k] * inverse;
-            a[i * n + k] = factor;
-            for j in k + 1..n {
-                a[i * n + j] = a[i * n + j] - factor * a[k * n + j];
+        for (a, growth) in matrices.chunks_exact_mut(n * n).zip(&mut *growth) {
+            let mut largest = Eight::default();
+            for i in k..n {
+                largest = largest.zip(a[i * n + k], |most, x| most.max(x.abs()));
             }
+            let inverse = a[k * n + k].map(|x| 1.0 / x);
+            *growth = *growth * largest * inverse.map(f64::abs);
+            for i in k + 1..n {
+                let factor = a[i * n + k] * inverse;
+                a[i * n + k] = factor;
+                for j in k + 1..n {
+                    a[i * n + j] = a[i * n + j] - factor * a[k * n + j];
+                }
+            }
+            a[k * n + k] = inverse;
         }
-        a[k * n + k] = inverse;
     }
-    true
 }
 
 /// Solves a x = b lane by lane, with exchanges, b in place of x; NaN where that does not help.
@@ -401,14 +425,45 @@ mod tests {
     }
 
     #[test]
+    fn intervals_are_corrected_alike_alone_and_among_others() {
+        let (n, all) = (2, 19);
+        let sampling = Sampling::new(&Scheme::new(4));
+        let number = |k: usize, size: f64| size * ((k * k + 3 * k + 1) as f64).sin();
+        // Values next to the identity.
+        let near = |k: usize| f64::from(k / all % 4 % 3 == 0) + number(k, 0.2);
+        let nodes: Vec<f64> = (0..4 * n * n * all).map(near).collect();
+        let jacobians: [Vec<f64>; 2] = [0.5, 0.9].map(|size| (0..5 * n * n * all).map(|k| number(k, size)).collect());
+        let lengths: Vec<f64> = (0..all).map(|j| 0.1 + number(j, 0.05)).collect();
+        let of = |piece: std::ops::Range<usize>| -> Vec<f64> {
+            let cut = |lines: &[f64]| lines.chunks_exact(all).flat_map(|line| &line[piece.clone()]).copied().collect();
+            let own: [Vec<f64>; 4] = [&nodes, &jacobians[0], &jacobians[1], &lengths].map(|lines| cut(lines));
+            let [mut one, mut other] = [(); 2].map(|()| vec![f64::NAN; n * n * piece.len()]);
+            let courses = &mut [
+                Course { jacobians: &own[1], lengths: &own[3], gains: &mut one },
+                Course { jacobians: &own[2], lengths: &own[3], gains: &mut other },
+            ];
+            correct(&sampling, &own[0], courses, n);
+            one.into_iter().chain(other).collect()
+        };
+        let together = of(0..all);
+        assert!(together.iter().all(|gain| gain.abs() > 1e-9), "{together:?}");
+        for piece in [0..1, 3..10, 2..18, 18..19] {
+            let expected = together.chunks_exact(all).flat_map(|line| line[piece.clone()].to_vec());
+            assert_eq!(of(piece.clone()), expected.collect::<Vec<f64>>(), "{piece:?}");
+        }
+        assert!(of(5..5).is_empty());
+    }
+
+    #[test]
     fn a_small_pivot_serves_and_a_vanishing_one_is_exchanged_for_another() {
         let lanes = |x: [f64; 4]| x.map(Eight::splat);
         let right = lanes([3.0, 1.0, 4.0, 2.0]);
         for (a, serves) in
             [([1e-5, 1.0, 1.0, 2.0], true), ([1e-9, 1.0, 1.0, 2.0], false), ([0.0, 1.0, 1.0, 2.0], false)]
         {
-            let [mut factors, mut x, mut exchanged] = [lanes(a), right, right];
-            assert_eq!(factorised(&mut factors, 2), serves);
+            let ([mut factors, mut x, mut exchanged], mut growth) = ([lanes(a), right, right], [Eight::default()]);
+            factorised(&mut factors, &mut growth, 2);
+            assert_eq!(growth[0].all(growth[0], |growth, _| growth < GROWTH), serves);
             exchanging(&lanes(a), &mut exchanged, 2);
             // Back to the right-hand side.
             let apply = |x: &[Eight; 4]| {

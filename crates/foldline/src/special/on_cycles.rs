@@ -23,7 +23,7 @@
 use crate::contract::{Batch, Condition, Parameters};
 use crate::diagram::{Cycle, Kind, Mesh, Point};
 use crate::linalg::condensed::Condensed;
-use crate::linalg::lane::Lane;
+use crate::linalg::lane::{Eight, Lane};
 use crate::linalg::system::System;
 use crate::linalg::{dot, max_abs};
 use crate::problem::gauss::Scheme;
@@ -62,6 +62,22 @@ pub struct OnCycles<'a> {
     /// As in the cycle.
     forcing_periods: u32,
     times: Vec<f64>,
+}
+
+/// The operator (4), filled with the widest instruction set of the machine.
+struct Fill<'a, 'b, T> {
+    own: &'a OnCycles<'b>,
+    system: Condensed<T>,
+    angle: f64,
+}
+
+impl<T: Lane> pulp::NullaryFnOnce for Fill<'_, '_, T> {
+    type Output = Condensed<T>;
+
+    #[inline(always)]
+    fn call(self) -> Condensed<T> {
+        self.own.filled(self.system, self.angle)
+    }
 }
 
 impl<'a> OnCycles<'a> {
@@ -336,11 +352,12 @@ impl<'a> OnCycles<'a> {
     /// Fills the bordered operator (4).
     fn fill(&mut self, angle: f64) {
         self.system = match self.take_system() {
-            System::Eight(own) => System::Eight(self.filled(own, angle)),
-            System::One(own) => System::One(self.filled(own, angle)),
+            System::Eight(system) => System::Eight(Eight::dispatch(Fill { own: self, system, angle })),
+            System::One(system) => System::One(f64::dispatch(Fill { own: self, system, angle })),
         };
     }
 
+    #[inline(always)]
     fn filled<T: Lane>(&self, mut system: Condensed<T>, angle: f64) -> Condensed<T> {
         let (m, parts, count) = (self.scheme.degree, self.parts, self.intervals());
         let (is_fold, length) = (self.is_fold(), system.length());
@@ -349,13 +366,13 @@ impl<'a> OnCycles<'a> {
         system.border.fill(T::default());
         system.corner.fill(0.0);
         let slots: Vec<usize> = (0..m * parts).map(|k| system.slot(k / parts, k % parts)).collect();
-        for j in 0..length * T::COUNT {
+        for place in 0..length {
             // Beyond the last interval the solver has intervals of length zero.
-            let h = if j < count { self.mesh[j + 1] - self.mesh[j] } else { 0.0 };
-            let j = (j.min(count - 1), j % length, j / length);
+            let h = |j: usize| if j < count { self.mesh[j + 1] - self.mesh[j] } else { 0.0 };
+            let h = T::each(|lane| h(lane * length + place));
             for i in 0..m {
                 for c in 0..parts {
-                    self.fill_line(&mut system, &slots, j, i, c, h, angle);
+                    self.fill_line(&mut system, &slots, place, [i, c], h, angle);
                 }
             }
         }
@@ -366,57 +383,61 @@ impl<'a> OnCycles<'a> {
         system
     }
 
-    /// Equation c at Gauss point i of an interval (its number, its place, its lane), and its part of the border.
+    /// Equation c at Gauss point i of the intervals at a place, whose lengths are h, and its part of the border.
+    #[inline(always)]
     fn fill_line<T: Lane>(
         &self,
         system: &mut Condensed<T>,
         slots: &[usize],
-        (j, place, slot): (usize, usize, usize),
-        i: usize,
-        c: usize,
-        h: f64,
+        place: usize,
+        [i, c]: [usize; 2],
+        h: T,
         angle: f64,
     ) {
         let (n, m, parts, lanes) = (self.n, self.scheme.degree, self.parts, self.lanes());
-        let (inner, scalars) = (m * parts, self.scalars());
+        let (inner, scalars, last) = (m * parts, self.scalars(), self.intervals() - 1);
         let (width, block, length) = (parts + scalars, (m + 1) * parts, system.length());
-        let (lane, node, first) = (j * m + i, (j * (m + 1) + i + 1) * parts, usize::from(self.is_fold()));
+        let first = usize::from(self.is_fold());
+        // Numbers at the Gauss point in every interval: of the points one after the other, and of profiles.
+        let interval = |lane: usize| (lane * length + place).min(last);
+        let at_point = |x: &[f64], stride: usize| T::each(|lane| x[(interval(lane) * m + i) * stride]);
+        let at_node = |x: &[f64], c: usize| T::each(|lane| x[interval(lane) * block + (i + 1) * parts + c]);
         let (half, own) = (c / n * n, c % n);
         let line = &mut system.interior[(place * inner + slots[i * parts + c]) * inner..][..inner];
         for k in 0..m {
-            line[slots[k * parts + c]].lanes_mut()[slot] = self.scheme.derivative[i * (m + 1) + k + 1];
+            line[slots[k * parts + c]] = T::splat(self.scheme.derivative[i * (m + 1) + k + 1]);
         }
+        let ht = h * T::splat(self.period);
         for d in 0..n {
-            line[slots[i * parts + half + d]].lanes_mut()[slot] -=
-                h * self.period * self.fx[(own * n + d) * lanes + lane];
+            let entry = &mut line[slots[i * parts + half + d]];
+            *entry = *entry - ht * at_point(&self.fx[(own * n + d) * lanes..], 1);
         }
         // + iθ v: the real part loses θ times the imaginary one.
         let (other, sign) = if c < n { (c + n, -1.0) } else { (c - n, 1.0) };
+        let signed = T::splat(sign) * h;
         if parts > n {
-            line[slots[i * parts + other]].lanes_mut()[slot] += sign * h * angle;
+            let entry = &mut line[slots[i * parts + other]];
+            *entry = *entry + signed * T::splat(angle);
         }
         let right = &mut system.coupling[(place * inner + slots[i * parts + c]) * width..][..width];
-        right[c].lanes_mut()[slot] = self.scheme.derivative[i * (m + 1)];
+        right[c] = T::splat(self.scheme.derivative[i * (m + 1)]);
         if self.is_fold() {
-            right[parts].lanes_mut()[slot] = -h * self.f[c * lanes + lane];
+            right[parts] = T::splat(-1.0) * h * at_point(&self.f[c * lanes..], 1);
         }
-        let weight = h * self.scheme.weights[i];
+        let weight = h * T::splat(self.scheme.weights[i]);
         let at = |r: usize| (r * length + place) * block + parts + slots[i * parts + c];
+        if self.is_fold() {
+            system.border[at(0)] = weight * at_point(&self.phase[c..], n);
+        }
         if !self.bordered {
-            if self.is_fold() {
-                system.border[at(0)].lanes_mut()[slot] = weight * self.phase[lane * n + c];
-            }
             return;
         }
-        right[parts + first].lanes_mut()[slot] = h * self.left[node + c];
-        system.border[at(first)].lanes_mut()[slot] = weight * self.right[node + c];
-        if self.is_fold() {
-            system.border[at(0)].lanes_mut()[slot] = weight * self.phase[lane * n + c];
-        }
+        right[parts + first] = h * at_node(&self.left, c);
+        system.border[at(first)] = weight * at_node(&self.right, c);
         if parts > n {
             // The second border is i times the first.
-            right[parts + 1].lanes_mut()[slot] = sign * h * self.left[node + other];
-            system.border[at(1)].lanes_mut()[slot] = weight * sign * self.right[node + other];
+            right[parts + 1] = signed * at_node(&self.left, other);
+            system.border[at(1)] = weight * T::splat(sign) * at_node(&self.right, other);
         }
     }
 

@@ -7,7 +7,7 @@
 //! **Source.** lust2001; guggenheimer1995.
 
 use super::floquet::Course;
-use crate::linalg::lane::{Eight, Lane};
+use crate::linalg::lane::{self, Eight, Lane};
 use crate::linalg::periodic_schur::{CONDITION, condition, spread};
 
 /// The modulus of a product beyond which, or below the inverse of which, its logarithm is taken.
@@ -110,6 +110,7 @@ impl Reduction<'_, '_> {
                 };
             }
             for k in 0..square {
+                lane::intact::<Eight>();
                 g[k] = units[k] * Eight::each(|lane| matrices[lane][k]);
             }
             if framed {
@@ -164,9 +165,7 @@ fn reflect(g: &mut [Eight], left: &[Eight], right: &[Eight], sums: &mut [Eight],
         for k in 1..n {
             sum = sum + row[k] * left[k];
         }
-        for k in 0..n {
-            row[k] = row[k] - sum * left[k];
-        }
+        lane::subtract(sum, left, row);
     }
     for k in 0..n {
         let mut sum = right[0] * g[k];
@@ -177,9 +176,7 @@ fn reflect(g: &mut [Eight], left: &[Eight], right: &[Eight], sums: &mut [Eight],
     }
     g[0] = g[0] - right[0] * sums[0];
     for i in 1..n {
-        for k in 1..n {
-            g[i * n + k] = g[i * n + k] - right[i] * sums[k];
-        }
+        lane::subtract(right[i], &sums[1..n], &mut g[i * n + 1..]);
     }
 }
 

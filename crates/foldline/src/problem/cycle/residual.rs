@@ -1,7 +1,7 @@
 //! The residual of a cycle: equations (1) to (3) of [`super`], eight intervals at a time.
 
 use super::CycleProblem;
-use crate::linalg::lane::{Eight, Lane};
+use crate::linalg::lane::{Eight, Lane, intact};
 use crate::problem::gauss::Scheme;
 use std::marker::PhantomData;
 
@@ -130,7 +130,10 @@ impl<T: Lane> Defects<'_, '_, T> {
                     continue;
                 }
                 let own = &mut r[j * block..(j + 1) * block];
-                own.iter_mut().zip(&rows).for_each(|(to, row)| *to = row.lanes()[lane]);
+                for (to, row) in own.iter_mut().zip(&rows) {
+                    intact::<T>();
+                    *to = row.lanes()[lane];
+                }
                 let next = if j + 1 == count { 0 } else { (j + 1) * block };
                 own[..n].iter_mut().zip(&u[next..next + n]).for_each(|(to, x)| *to += x);
             }
