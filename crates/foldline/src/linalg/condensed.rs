@@ -412,10 +412,12 @@ impl<T: Lane> Links<f64> for Pieces<'_, T> {
         let full = 3 * n + q;
         for (row, line) in rows.chunks_exact_mut(full).zip(relation.chunks_exact(full)) {
             for c in 0..n {
+                intact::<T>();
                 row[c] = line[2 * n + c].lanes()[l];
                 row[n + c] = line[n + c].lanes()[l];
             }
             for c in 0..q {
+                intact::<T>();
                 row[3 * n + c] = line[3 * n + c].lanes()[l];
             }
         }

@@ -48,8 +48,7 @@ pub fn of_profile(
     let batch = Batch { lanes, states, parameters: Parameters::Shared(parameters), times: &times };
     field.outputs(batch, outputs);
     let means = |line: &[f64]| {
-        let pairs = || line.iter().zip(&weights);
-        [pairs().map(|(v, b)| b * v).sum(), pairs().map(|(v, b)| b * (v * v)).sum()]
+        line.iter().zip(&weights).fold([0.0; 2], |[once, squared], (v, b)| [once + b * v, squared + b * (v * v)])
     };
     values.chunks_exact(lanes).map(means).collect()
 }

@@ -364,20 +364,20 @@ fn factorised(matrices: &mut [Eight], growth: &mut [Eight], n: usize) {
     // All of them pivot by pivot: none waits for its own quotients.
     for k in 0..n {
         for (a, growth) in matrices.chunks_exact_mut(n * n).zip(&mut *growth) {
-            let mut largest = Eight::default();
-            for i in k..n {
-                largest = largest.zip(a[i * n + k], |most, x| most.max(x.abs()));
+            let (upper, lower) = a.split_at_mut((k + 1) * n);
+            let pivot = &mut upper[k * n + k..];
+            let mut largest = pivot[0].map(f64::abs);
+            for row in lower.chunks_exact(n) {
+                intact::<Eight>();
+                largest = largest.zip(row[k], |most, x| most.max(x.abs()));
             }
-            let inverse = a[k * n + k].map(|x| 1.0 / x);
+            let inverse = pivot[0].map(|x| 1.0 / x);
             *growth = *growth * largest * inverse.map(f64::abs);
-            for i in k + 1..n {
-                let factor = a[i * n + k] * inverse;
-                a[i * n + k] = factor;
-                for j in k + 1..n {
-                    a[i * n + j] = a[i * n + j] - factor * a[k * n + j];
-                }
+            for row in lower.chunks_exact_mut(n) {
+                row[k] = row[k] * inverse;
+                lane::subtract(row[k], &pivot[1..], &mut row[k + 1..]);
             }
-            a[k * n + k] = inverse;
+            pivot[0] = inverse;
         }
     }
 }
