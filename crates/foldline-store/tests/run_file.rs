@@ -254,6 +254,44 @@ fn the_recorder_recalls_what_it_was_told() {
 }
 
 #[test]
+fn threads_that_record_at_once_lose_nothing_and_recall_their_own() {
+    let folder = tempfile::tempdir().unwrap();
+    let recorder = Recorder::create(folder.path(), &study()).unwrap();
+    let followed = |name: String| {
+        let mut branch = Branch::new(&name, Family::Cycle, 0, Origin::Seed("start".into()));
+        recorder.observe(Event::Begin(&branch));
+        for position in 0..40 {
+            branch.insert(point(position, true));
+            let found = &branch.points[position as usize];
+            assert_eq!(recorder.observe(Event::Point(&branch, found)), Verdict::Continue);
+            if position % 10 == 7 {
+                let special = special(Kind::Torus, position, position as f64, true);
+                branch.insert_special(special.clone());
+                recorder.observe(Event::Special(&branch, &special));
+                // Another one of this thread, which may still be with whoever writes.
+                let recalled = recorder.recall(&branch, position - 1).expect("it was recorded");
+                assert_eq!(recalled.position, position - 1);
+            }
+        }
+        recorder.observe(Event::Note(&name, "ends here"));
+        branch.ends[1] = Some(Ending::Closed);
+        recorder.observe(Event::SideEnded(&branch, 1, &Ending::Closed));
+        branch
+    };
+    let mut expected: Vec<Branch> = std::thread::scope(|scope| {
+        let threads: Vec<_> = (0..8).map(|k| scope.spawn(move || followed(format!("branch {k}")))).collect();
+        threads.into_iter().map(|thread| thread.join().unwrap()).collect()
+    });
+    recorder.finish().unwrap();
+    let back = load(folder.path()).unwrap();
+    assert_eq!(back.notes.len(), 8);
+    let mut found = back.diagram.branches;
+    [&mut found, &mut expected].into_iter().for_each(|all| all.sort_by(|a, b| a.name.cmp(&b.name)));
+    let whole = |branches| exactly(&Diagram { branches, ..Diagram::default() });
+    assert_eq!(whole(found), whole(expected));
+}
+
+#[test]
 fn a_killed_run_resumes_with_everything_it_had_accepted_and_repetition_changes_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let recorder = Recorder::create(folder.path(), &study()).unwrap();

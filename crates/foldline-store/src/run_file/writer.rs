@@ -1,6 +1,7 @@
 //! Writing a run as it happens.
 
 use super::bytes::texts_checksum;
+use super::queue::{Queue, Row, Table};
 use super::reader::{Open, Part, load_diagram, open, point_at, sound};
 use super::rows::{ending_values, held_values, origin_values, values_of};
 use super::schema::{Columns, create, insert, upgrade};
@@ -13,11 +14,15 @@ use rusqlite::{Connection, params, params_from_iter};
 use std::collections::HashMap;
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{self, Mutex, MutexGuard, PoisonError};
 
 /// An observer that writes everything it sees to the run file.
 ///
 /// If writing fails (the disk is full, say) it asks every branch to stop; [`Recorder::finish`] then returns the reason.
+///
+/// Only one thread writes at a time. Who finds another one at it leaves his row and goes on, and who writes takes what is left for him before
+/// he stops: nobody waits for the disk because of another. One thread alone finds every row in the file when it goes on.
 pub struct Recorder {
     path: PathBuf,
     /// Held as long as the run writes.
@@ -27,12 +32,16 @@ pub struct Recorder {
     insert_response: String,
     /// How many parameters and extremes the tables show by name.
     shown: usize,
+    /// Of the branches that have begun.
+    numbers: Mutex<HashMap<String, i64>>,
+    queue: Queue,
+    /// Whether [`State::failure`] is there.
+    failed: AtomicBool,
     state: Mutex<State>,
 }
 
 struct State {
     connection: Connection,
-    numbers: HashMap<String, i64>,
     /// Which file the path led to in the beginning, and how many events have been recorded.
     file: Option<Identity>,
     events: usize,
@@ -40,7 +49,10 @@ struct State {
 }
 
 /// Pages of the log that are carried over at a time: 4 MB, which the processor's cache still has.
-const LOG: i64 = 256;
+const LOG: i64 = 512;
+
+/// Rows that may wait for whoever writes, before who leaves another one waits too.
+const BACKLOG: usize = 64;
 
 /// Events between two looks whether the file is still where it was.
 const LOOKS: usize = 16;
@@ -148,8 +160,8 @@ impl Recorder {
     fn begin(path: PathBuf, lock: Option<File>, study: &Study) -> Result<Recorder, RunFileError> {
         let failed = |e| RunFileError::from_sqlite(&path, e);
         let mut connection = Connection::open(&path).map_err(failed)?;
-        // A profile fills several pages of the usual size.
-        connection.pragma_update(None, "page_size", 16384).map_err(failed)?;
+        // A profile fills several pages of the usual size; of larger ones a transaction rewrites more that has not changed.
+        connection.pragma_update(None, "page_size", 8192).map_err(failed)?;
         connection.pragma_update(None, "journal_mode", "WAL").map_err(failed)?;
         let transaction = connection.transaction().map_err(failed)?;
         transaction.execute_batch(&create(&Columns::new(&study.model))).map_err(failed)?;
@@ -195,7 +207,10 @@ impl Recorder {
             insert_special: insert("special_points", &special, &columns),
             insert_response: responses::insert(&study.model),
             shown: columns.names().count(),
-            state: Mutex::new(State { connection, numbers, file: identity(&path), events: 0, failure: None }),
+            numbers: Mutex::new(numbers),
+            queue: Queue::default(),
+            failed: AtomicBool::new(false),
+            state: Mutex::new(State { connection, file: identity(&path), events: 0, failure: None }),
             path,
             _lock: lock,
         })
@@ -203,6 +218,7 @@ impl Recorder {
 
     /// Closes the file. The error is the first one met while recording.
     pub fn finish(self) -> Result<(), RunFileError> {
+        drop(self.emptied());
         let state = self.state.into_inner().unwrap_or_else(PoisonError::into_inner);
         if let Some(error) = state.failure {
             return Err(error);
@@ -223,34 +239,114 @@ impl Recorder {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn record(&self, state: &mut State, event: Event) -> rusqlite::Result<()> {
-        match event {
-            Event::Begin(branch) => state.begin_branch(branch),
-            Event::Point(branch, point) => state.point(&self.insert_point, branch, point),
-            Event::Special(branch, special) => state.special(&self.insert_special, branch, special),
-            Event::SideEnded(branch, side, ending) => state.side_ended(branch, side, ending),
-            Event::End(_) | Event::Visited(..) => Ok(()),
-            Event::Responses(set) => responses::write(&mut state.connection, &self.insert_response, set, self.shown),
-            Event::Note(branch, note) => {
-                state.connection.execute("INSERT OR IGNORE INTO notes VALUES (?, ?)", [branch, note]).map(|_| ())
-            }
+    /// The number of a branch that has begun.
+    fn number_of(&self, name: &str) -> Option<i64> {
+        self.numbers.lock().unwrap_or_else(PoisonError::into_inner).get(name).copied()
+    }
+
+    /// The number of a branch; one that was never begun begins here. None where that fails.
+    fn number(&self, branch: &Branch) -> Option<i64> {
+        self.number_of(&branch.name).or_else(|| {
+            self.begin_branch(branch);
+            self.number_of(&branch.name)
+        })
+    }
+
+    fn begin_branch(&self, branch: &Branch) {
+        self.at_once(|state| {
+            let number = state.begin_branch(branch)?;
+            self.numbers.lock().unwrap_or_else(PoisonError::into_inner).insert(branch.name.clone(), number);
+            Ok(())
+        });
+    }
+
+    /// Does something with the file, once all rows that were left are there.
+    fn at_once(&self, work: impl FnOnce(&mut State) -> rusqlite::Result<()>) {
+        self.attempt(&mut self.emptied(), work);
+        self.write();
+    }
+
+    /// Leaves a row and writes what there is, unless someone else does.
+    fn leave(&self, table: Table, values: Vec<Value>) {
+        self.queue.push(Row { table, values });
+        self.write();
+    }
+
+    /// Writes all rows that were left, unless someone else does: he sees them before he stops.
+    fn write(&self) {
+        while !self.queue.is_empty() {
+            let mut state = match self.state.try_lock() {
+                Ok(state) => state,
+                Err(sync::TryLockError::Poisoned(state)) => state.into_inner(),
+                Err(sync::TryLockError::WouldBlock) if self.queue.len() > BACKLOG => self.locked(),
+                Err(sync::TryLockError::WouldBlock) => return,
+            };
+            self.empty(&mut state);
+        }
+    }
+
+    /// The state, with nothing left to write.
+    fn emptied(&self) -> MutexGuard<'_, State> {
+        let mut state = self.locked();
+        self.empty(&mut state);
+        state
+    }
+
+    fn empty(&self, state: &mut State) {
+        while let Some(Row { table, values }) = self.queue.pop() {
+            let sql = match table {
+                Table::Points => &self.insert_point,
+                Table::SpecialPoints => &self.insert_special,
+                Table::Ends => "INSERT OR REPLACE INTO ends VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
+                Table::Notes => "INSERT OR IGNORE INTO notes VALUES (?, ?)",
+            };
+            self.attempt(state, |state| {
+                state.connection.prepare_cached(sql)?.execute(params_from_iter(values)).map(|_| ())
+            });
+        }
+    }
+
+    /// Does something with the file unless something has failed before. Now and then it looks whether the file is still there.
+    fn attempt(&self, state: &mut State, work: impl FnOnce(&mut State) -> rusqlite::Result<()>) {
+        if state.failure.is_some() {
+            return;
+        }
+        let looks = state.events.is_multiple_of(LOOKS);
+        state.events += 1;
+        state.failure = if !looks || identity(&self.path) == state.file {
+            work(state).err().map(|error| RunFileError::from_sqlite(&self.path, error))
+        } else {
+            Some(RunFileError::Vanished(self.path.clone()))
+        };
+        if state.failure.is_some() {
+            self.failed.store(true, Ordering::Release);
         }
     }
 }
 
 impl Observer for Recorder {
     fn observe(&self, event: Event) -> Verdict {
-        let mut state = self.locked();
-        if state.failure.is_none() {
-            let looks = state.events.is_multiple_of(LOOKS);
-            state.events += 1;
-            state.failure = if !looks || identity(&self.path) == state.file {
-                self.record(&mut state, event).err().map(|error| RunFileError::from_sqlite(&self.path, error))
-            } else {
-                Some(RunFileError::Vanished(self.path.clone()))
-            };
+        let own = |branch: &Branch, table: Table, values: &dyn Fn(i64) -> Vec<Value>| {
+            if let Some(number) = self.number(branch) {
+                self.leave(table, values(number));
+            }
+        };
+        match event {
+            Event::Begin(branch) => self.begin_branch(branch),
+            Event::Point(branch, point) => own(branch, Table::Points, &|number| point_row(number, point)),
+            Event::Special(branch, special) => {
+                own(branch, Table::SpecialPoints, &|number| special_row(number, branch, special));
+            }
+            Event::SideEnded(branch, side, ending) => own(branch, Table::Ends, &|number| end_row(number, side, ending)),
+            Event::Note(branch, note) => {
+                self.leave(Table::Notes, [branch, note].map(|text| text.to_string().into()).to_vec())
+            }
+            Event::Responses(set) => {
+                self.at_once(|state| responses::write(&mut state.connection, &self.insert_response, set, self.shown))
+            }
+            Event::End(_) | Event::Visited(..) => {}
         }
-        if state.failure.is_some() { Verdict::Stop } else { Verdict::Continue }
+        if self.failed.load(Ordering::Acquire) { Verdict::Stop } else { Verdict::Continue }
     }
 
     fn stores(&self) -> bool {
@@ -258,14 +354,47 @@ impl Observer for Recorder {
     }
 
     fn recall(&self, branch: &Branch, position: i64) -> Option<Point> {
-        let state = self.locked();
-        let number = *state.numbers.get(&branch.name)?;
-        point_at(&state.connection, number, position)
+        let number = self.number_of(&branch.name)?;
+        let point = point_at(&self.emptied().connection, number, position);
+        self.write();
+        point
     }
 }
 
+fn point_row(number: i64, point: &Point) -> Vec<Value> {
+    let first = [Value::Integer(number), Value::Integer(point.position)];
+    first.into_iter().chain(values_of(point, &[])).collect()
+}
+
+fn special_row(number: i64, branch: &Branch, special: &SpecialPoint) -> Vec<Value> {
+    let (kind, position, key) = key_of(branch, special);
+    let first = [
+        Value::Integer(number),
+        Value::Text(kind.to_string()),
+        Value::Integer(position),
+        Value::Blob(key.to_vec()),
+        Value::Integer(special.unstable_before as i64),
+        Value::Integer(special.unstable_after as i64),
+        Value::Real(special.error),
+        Value::Text(special.normal_form()),
+    ];
+    let extra = [&[special.error], &special.coefficients[..]].concat();
+    first.into_iter().chain(values_of(&special.point, &extra)).collect()
+}
+
+fn end_row(number: i64, side: usize, ending: &Ending) -> Vec<Value> {
+    let first = [
+        Value::Integer(number),
+        Value::Integer(side as i64),
+        Value::Text(ending.code().to_string()),
+        Value::Text(ending.to_string()),
+    ];
+    first.into_iter().chain(ending_values(ending)).collect()
+}
+
 impl State {
-    fn begin_branch(&mut self, branch: &Branch) -> rusqlite::Result<()> {
+    /// Returns the number of the branch.
+    fn begin_branch(&mut self, branch: &Branch) -> rusqlite::Result<i64> {
         let first = [
             Value::Text(branch.name.clone()),
             Value::Text(branch.family.name().to_string()),
@@ -308,54 +437,7 @@ impl State {
             }
         }
         transaction.commit()?;
-        self.numbers.insert(branch.name.clone(), number);
-        Ok(())
-    }
-
-    /// The number of a branch; one that was never begun begins here.
-    fn number(&mut self, branch: &Branch) -> rusqlite::Result<i64> {
-        if !self.numbers.contains_key(&branch.name) {
-            self.begin_branch(branch)?;
-        }
-        Ok(self.numbers[&branch.name])
-    }
-
-    fn point(&mut self, sql: &str, branch: &Branch, point: &Point) -> rusqlite::Result<()> {
-        let number = self.number(branch)?;
-        let first = [Value::Integer(number), Value::Integer(point.position)];
-        let values = first.into_iter().chain(values_of(point, &[]));
-        self.connection.prepare_cached(sql)?.execute(params_from_iter(values)).map(|_| ())
-    }
-
-    fn special(&mut self, sql: &str, branch: &Branch, special: &SpecialPoint) -> rusqlite::Result<()> {
-        let number = self.number(branch)?;
-        let (kind, position, key) = key_of(branch, special);
-        let first = [
-            Value::Integer(number),
-            Value::Text(kind.to_string()),
-            Value::Integer(position),
-            Value::Blob(key.to_vec()),
-            Value::Integer(special.unstable_before as i64),
-            Value::Integer(special.unstable_after as i64),
-            Value::Real(special.error),
-            Value::Text(special.normal_form()),
-        ];
-        let extra = [&[special.error], &special.coefficients[..]].concat();
-        let values = first.into_iter().chain(values_of(&special.point, &extra));
-        self.connection.prepare_cached(sql)?.execute(params_from_iter(values)).map(|_| ())
-    }
-
-    fn side_ended(&mut self, branch: &Branch, side: usize, ending: &Ending) -> rusqlite::Result<()> {
-        let number = self.number(branch)?;
-        let first = [
-            Value::Integer(number),
-            Value::Integer(side as i64),
-            Value::Text(ending.code().to_string()),
-            Value::Text(ending.to_string()),
-        ];
-        let values = first.into_iter().chain(ending_values(ending));
-        let sql = "INSERT OR REPLACE INTO ends VALUES (?, ?, ?, ?, ?, ?, ?, ?)";
-        self.connection.prepare_cached(sql)?.execute(params_from_iter(values)).map(|_| ())
+        Ok(number)
     }
 }
 
