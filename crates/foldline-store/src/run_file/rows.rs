@@ -1,7 +1,7 @@
 //! A point as a row, and back.
 
 use super::bytes::{Checksum, pack, pack_complex, pack_pairs, unpack, unpack_complex, unpack_pairs};
-use foldline::diagram::{Cost, Cycle, Ending, Kind, Origin, Point, Solution, Trust};
+use foldline::diagram::{Branch, Cost, Cycle, Ending, Kind, Origin, Point, Solution, SpecialPoint, Trust};
 use rusqlite::Row;
 use rusqlite::types::Value;
 
@@ -67,6 +67,44 @@ pub(super) fn values_of(point: &Point, extra: &[f64]) -> Vec<Value> {
         Value::Integer(checksums[1]),
     ]);
     values
+}
+
+pub(super) fn point_row(number: i64, point: &Point) -> Vec<Value> {
+    let first = [Value::Integer(number), Value::Integer(point.position)];
+    first.into_iter().chain(values_of(point, &[])).collect()
+}
+
+pub(super) fn special_row(number: i64, branch: &Branch, special: &SpecialPoint) -> Vec<Value> {
+    let (kind, position, key) = key_of(branch, special);
+    let first = [
+        Value::Integer(number),
+        Value::Text(kind.to_string()),
+        Value::Integer(position),
+        Value::Blob(key.to_vec()),
+        Value::Integer(special.unstable_before as i64),
+        Value::Integer(special.unstable_after as i64),
+        Value::Real(special.error),
+        Value::Text(special.normal_form()),
+    ];
+    let extra = [&[special.error], &special.coefficients[..]].concat();
+    first.into_iter().chain(values_of(&special.point, &extra)).collect()
+}
+
+pub(super) fn end_row(number: i64, side: usize, ending: &Ending) -> Vec<Value> {
+    let first = [
+        Value::Integer(number),
+        Value::Integer(side as i64),
+        Value::Text(ending.code().to_string()),
+        Value::Text(ending.to_string()),
+    ];
+    first.into_iter().chain(ending_values(ending)).collect()
+}
+
+/// What tells special points of a branch apart: kind, position, and the bits of the parameter, since two of one kind can lie
+/// between the same two points.
+pub(super) fn key_of(branch: &Branch, special: &SpecialPoint) -> (&'static str, i64, [u8; 8]) {
+    let parameter = special.point.parameters.get(branch.free).copied().unwrap_or(0.0);
+    (special.kind.name(), special.point.position, parameter.to_le_bytes())
 }
 
 fn mesh_bytes(solution: &Solution) -> Vec<u8> {

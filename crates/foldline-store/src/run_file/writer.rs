@@ -1,14 +1,14 @@
 //! Writing a run as it happens.
 
-use super::bytes::texts_checksum;
+use super::meta::{description, variables};
 use super::queue::{Queue, Row, Table};
 use super::reader::{Open, Part, load_diagram, open, point_at, sound};
-use super::rows::{ending_values, held_values, origin_values, values_of};
+use super::rows::{end_row, held_values, key_of, origin_values, point_row, special_row};
 use super::schema::{Columns, create, insert, upgrade};
 use super::{APPLICATION_ID, FORMAT_VERSION, RunFileError, path_in, responses};
 use crate::study_file::Study;
 use foldline::contract::{Event, Observer, Verdict};
-use foldline::diagram::{Branch, Diagram, Ending, Point, SpecialPoint};
+use foldline::diagram::{Branch, Diagram, Ending, Point};
 use rusqlite::types::Value;
 use rusqlite::{Connection, params, params_from_iter};
 use std::collections::HashMap;
@@ -48,11 +48,14 @@ struct State {
     failure: Option<RunFileError>,
 }
 
-/// Pages of the log that are carried over at a time: 4 MB, which the processor's cache still has.
-const LOG: i64 = 512;
+/// A profile fills several pages of SQLite's usual size; of larger ones a transaction rewrites more that has not changed.
+const PAGE: i64 = 8192;
 
-/// Rows that may wait for whoever writes, before who leaves another one waits too.
-const BACKLOG: usize = 64;
+/// Pages of the log that are carried over at a time: 4 MB, which the processor's cache still has.
+const LOG: i64 = (4 << 20) / PAGE;
+
+/// Rows that may wait for whoever writes, before who leaves another one waits too: what a kill makes the run compute again.
+const BACKLOG: usize = 16;
 
 /// Events between two looks whether the file is still where it was.
 const LOOKS: usize = 16;
@@ -160,8 +163,7 @@ impl Recorder {
     fn begin(path: PathBuf, lock: Option<File>, study: &Study) -> Result<Recorder, RunFileError> {
         let failed = |e| RunFileError::from_sqlite(&path, e);
         let mut connection = Connection::open(&path).map_err(failed)?;
-        // A profile fills several pages of the usual size; of larger ones a transaction rewrites more that has not changed.
-        connection.pragma_update(None, "page_size", 8192).map_err(failed)?;
+        connection.pragma_update(None, "page_size", PAGE).map_err(failed)?;
         connection.pragma_update(None, "journal_mode", "WAL").map_err(failed)?;
         let transaction = connection.transaction().map_err(failed)?;
         transaction.execute_batch(&create(&Columns::new(&study.model))).map_err(failed)?;
@@ -361,37 +363,6 @@ impl Observer for Recorder {
     }
 }
 
-fn point_row(number: i64, point: &Point) -> Vec<Value> {
-    let first = [Value::Integer(number), Value::Integer(point.position)];
-    first.into_iter().chain(values_of(point, &[])).collect()
-}
-
-fn special_row(number: i64, branch: &Branch, special: &SpecialPoint) -> Vec<Value> {
-    let (kind, position, key) = key_of(branch, special);
-    let first = [
-        Value::Integer(number),
-        Value::Text(kind.to_string()),
-        Value::Integer(position),
-        Value::Blob(key.to_vec()),
-        Value::Integer(special.unstable_before as i64),
-        Value::Integer(special.unstable_after as i64),
-        Value::Real(special.error),
-        Value::Text(special.normal_form()),
-    ];
-    let extra = [&[special.error], &special.coefficients[..]].concat();
-    first.into_iter().chain(values_of(&special.point, &extra)).collect()
-}
-
-fn end_row(number: i64, side: usize, ending: &Ending) -> Vec<Value> {
-    let first = [
-        Value::Integer(number),
-        Value::Integer(side as i64),
-        Value::Text(ending.code().to_string()),
-        Value::Text(ending.to_string()),
-    ];
-    first.into_iter().chain(ending_values(ending)).collect()
-}
-
 impl State {
     /// Returns the number of the branch.
     fn begin_branch(&mut self, branch: &Branch) -> rusqlite::Result<i64> {
@@ -450,54 +421,4 @@ fn modernise(connection: &mut Connection) -> rusqlite::Result<()> {
     }
     transaction.pragma_update(None, "user_version", FORMAT_VERSION)?;
     transaction.commit()
-}
-
-/// What tells special points of a branch apart: kind, position, and the bits of the parameter, since two of one kind can lie
-/// between the same two points.
-fn key_of(branch: &Branch, special: &SpecialPoint) -> (&'static str, i64, [u8; 8]) {
-    let parameter = special.point.parameters.get(branch.free).copied().unwrap_or(0.0);
-    (special.kind.name(), special.point.position, parameter.to_le_bytes())
-}
-
-/// What is written down about the run as a whole.
-fn description(study: &Study) -> Vec<(&'static str, String)> {
-    let seeds: Vec<serde_json::Value> = study
-        .plan
-        .seeds
-        .iter()
-        .map(|s| serde_json::json!({ "name": s.name, "samples": s.samples, "random": s.random, "parameters": s.parameters }))
-        .collect();
-    let settings =
-        serde_json::json!({ "tolerance": study.plan.tolerance, "degree": study.plan.degree, "seeds": seeds });
-    vec![
-        ("foldline", env!("CARGO_PKG_VERSION").to_string()),
-        ("sqlite", rusqlite::version().to_string()),
-        ("platform", format!("{} {}", std::env::consts::OS, std::env::consts::ARCH)),
-        ("settings", settings.to_string()),
-        ("study_file", study.file.clone()),
-        ("study", study.text.clone()),
-        ("model_file", study.model_file.clone()),
-        ("model", study.model_text.clone()),
-        ("texts_checksum", texts_checksum(&study.text, &study.model_text)),
-    ]
-}
-
-type Variable<'a> = (&'static str, i64, &'a str, &'a str, &'a str);
-
-fn variables(study: &Study) -> Vec<Variable<'_>> {
-    let model = &study.model;
-    let parameters = model.parameters.iter().map(|p| ("parameter", &p.name, &p.unit, &p.description));
-    let states = model.states.iter().map(|s| ("state", &s.name, &s.unit, &s.description));
-    let outputs = model.outputs.iter().map(|o| ("output", &o.name, &o.unit, &o.description));
-    let mut count = HashMap::new();
-    let mut numbered = |class| {
-        let next: &mut i64 = count.entry(class).or_insert(-1);
-        *next += 1;
-        *next
-    };
-    parameters
-        .chain(states)
-        .chain(outputs)
-        .map(|(class, name, unit, text)| (class, numbered(class), name.as_str(), unit.as_str(), text.as_str()))
-        .collect()
 }
