@@ -1,9 +1,8 @@
 //! The run file: everything a run has found, in one SQLite database that survives being killed.
 //!
 //! **Idea.** `DIR/run.sqlite` holds the study and the model verbatim, the settings, and every accepted point, special point
-//! and ending at the moment it is accepted; where several threads find something at once, as soon as the one that writes is done with
-//! what came before. Each is one statement, hence one transaction: after a kill at any instant the file holds a prefix of the run,
-//! and [`Recorder::resume`] goes on from it.
+//! and ending at the moment it is accepted. Each is one statement, hence one transaction: after a kill at any instant the
+//! file holds a prefix of the run, and [`Recorder::resume`] goes on from it.
 //!
 //! * Write-ahead log, so that others can read while the run goes on; `synchronous = NORMAL`, which loses nothing when the
 //!   process is killed and at most the last points, never the consistency, when the power fails.
@@ -13,7 +12,6 @@
 
 mod bytes;
 mod meta;
-mod queue;
 mod reader;
 mod responses;
 mod rows;

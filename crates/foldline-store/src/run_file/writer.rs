@@ -1,7 +1,6 @@
 //! Writing a run as it happens.
 
 use super::meta::{description, variables};
-use super::queue::{Queue, Row, Table};
 use super::reader::{Open, Part, load_diagram, open, point_at, sound};
 use super::rows::{end_row, held_values, key_of, origin_values, point_row, special_row};
 use super::schema::{Columns, create, insert, upgrade};
@@ -15,14 +14,11 @@ use std::collections::HashMap;
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{self, Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// An observer that writes everything it sees to the run file.
 ///
 /// If writing fails (the disk is full, say) it asks every branch to stop; [`Recorder::finish`] then returns the reason.
-///
-/// Only one thread writes at a time. Who finds another one at it leaves his row and goes on, and who writes takes what is left for him before
-/// he stops: nobody waits for the disk because of another. One thread alone finds every row in the file when it goes on.
 pub struct Recorder {
     path: PathBuf,
     /// Held as long as the run writes.
@@ -34,7 +30,6 @@ pub struct Recorder {
     shown: usize,
     /// Of the branches that have begun.
     numbers: Mutex<HashMap<String, i64>>,
-    queue: Queue,
     /// Whether [`State::failure`] is there.
     failed: AtomicBool,
     state: Mutex<State>,
@@ -51,11 +46,8 @@ struct State {
 /// A profile fills several pages of SQLite's usual size; of larger ones a transaction rewrites more that has not changed.
 const PAGE: i64 = 8192;
 
-/// Pages of the log that are carried over at a time: 4 MB, which the processor's cache still has.
-const LOG: i64 = (4 << 20) / PAGE;
-
-/// Rows that may wait for whoever writes, before who leaves another one waits too: what a kill makes the run compute again.
-const BACKLOG: usize = 16;
+/// Bytes of the log that are carried over at a time: as many as the processor's cache still has.
+const LOG: i64 = 4 << 20;
 
 /// Events between two looks whether the file is still where it was.
 const LOOKS: usize = 16;
@@ -193,7 +185,9 @@ impl Recorder {
     ) -> Result<Recorder, RunFileError> {
         let failed = |e| RunFileError::from_sqlite(&path, e);
         connection.pragma_update(None, "synchronous", "NORMAL").map_err(failed)?;
-        connection.pragma_update(None, "wal_autocheckpoint", LOG).map_err(failed)?;
+        // A file of an older version keeps its pages.
+        let page: i64 = connection.pragma_query_value(None, "page_size", |row| row.get(0)).map_err(failed)?;
+        connection.pragma_update(None, "wal_autocheckpoint", LOG / page.max(1)).map_err(failed)?;
         connection.busy_timeout(std::time::Duration::from_secs(10)).map_err(failed)?;
         let numbers = {
             let mut statement = connection.prepare("SELECT name, branch FROM branches").map_err(failed)?;
@@ -210,7 +204,6 @@ impl Recorder {
             insert_response: responses::insert(&study.model),
             shown: columns.names().count(),
             numbers: Mutex::new(numbers),
-            queue: Queue::default(),
             failed: AtomicBool::new(false),
             state: Mutex::new(State { connection, file: identity(&path), events: 0, failure: None }),
             path,
@@ -220,7 +213,6 @@ impl Recorder {
 
     /// Closes the file. The error is the first one met while recording.
     pub fn finish(self) -> Result<(), RunFileError> {
-        drop(self.emptied());
         let state = self.state.into_inner().unwrap_or_else(PoisonError::into_inner);
         if let Some(error) = state.failure {
             return Err(error);
@@ -255,61 +247,20 @@ impl Recorder {
     }
 
     fn begin_branch(&self, branch: &Branch) {
-        self.at_once(|state| {
+        self.write(|state| {
             let number = state.begin_branch(branch)?;
             self.numbers.lock().unwrap_or_else(PoisonError::into_inner).insert(branch.name.clone(), number);
             Ok(())
         });
     }
 
-    /// Does something with the file, once all rows that were left are there.
-    fn at_once(&self, work: impl FnOnce(&mut State) -> rusqlite::Result<()>) {
-        self.attempt(&mut self.emptied(), work);
-        self.write();
-    }
-
-    /// Leaves a row and writes what there is, unless someone else does.
-    fn leave(&self, table: Table, values: Vec<Value>) {
-        self.queue.push(Row { table, values });
-        self.write();
-    }
-
-    /// Writes all rows that were left, unless someone else does: he sees them before he stops.
-    fn write(&self) {
-        while !self.queue.is_empty() {
-            let mut state = match self.state.try_lock() {
-                Ok(state) => state,
-                Err(sync::TryLockError::Poisoned(state)) => state.into_inner(),
-                Err(sync::TryLockError::WouldBlock) if self.queue.len() > BACKLOG => self.locked(),
-                Err(sync::TryLockError::WouldBlock) => return,
-            };
-            self.empty(&mut state);
-        }
-    }
-
-    /// The state, with nothing left to write.
-    fn emptied(&self) -> MutexGuard<'_, State> {
-        let mut state = self.locked();
-        self.empty(&mut state);
-        state
-    }
-
-    fn empty(&self, state: &mut State) {
-        while let Some(Row { table, values }) = self.queue.pop() {
-            let sql = match table {
-                Table::Points => &self.insert_point,
-                Table::SpecialPoints => &self.insert_special,
-                Table::Ends => "INSERT OR REPLACE INTO ends VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
-                Table::Notes => "INSERT OR IGNORE INTO notes VALUES (?, ?)",
-            };
-            self.attempt(state, |state| {
-                state.connection.prepare_cached(sql)?.execute(params_from_iter(values)).map(|_| ())
-            });
-        }
+    fn insert(&self, sql: &str, values: Vec<Value>) {
+        self.write(|state| state.connection.prepare_cached(sql)?.execute(params_from_iter(values)).map(|_| ()));
     }
 
     /// Does something with the file unless something has failed before. Now and then it looks whether the file is still there.
-    fn attempt(&self, state: &mut State, work: impl FnOnce(&mut State) -> rusqlite::Result<()>) {
+    fn write(&self, work: impl FnOnce(&mut State) -> rusqlite::Result<()>) {
+        let state = &mut *self.locked();
         if state.failure.is_some() {
             return;
         }
@@ -328,23 +279,28 @@ impl Recorder {
 
 impl Observer for Recorder {
     fn observe(&self, event: Event) -> Verdict {
-        let own = |branch: &Branch, table: Table, values: &dyn Fn(i64) -> Vec<Value>| {
+        // Rows are put together before the file is asked for.
+        let own = |branch: &Branch, sql: &str, values: &dyn Fn(i64) -> Vec<Value>| {
             if let Some(number) = self.number(branch) {
-                self.leave(table, values(number));
+                self.insert(sql, values(number));
             }
         };
+        let (ends, notes) = (
+            "INSERT OR REPLACE INTO ends VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
+            "INSERT OR IGNORE INTO notes VALUES (?, ?)",
+        );
         match event {
             Event::Begin(branch) => self.begin_branch(branch),
-            Event::Point(branch, point) => own(branch, Table::Points, &|number| point_row(number, point)),
+            Event::Point(branch, point) => own(branch, &self.insert_point, &|number| point_row(number, point)),
             Event::Special(branch, special) => {
-                own(branch, Table::SpecialPoints, &|number| special_row(number, branch, special));
+                own(branch, &self.insert_special, &|number| special_row(number, branch, special));
             }
-            Event::SideEnded(branch, side, ending) => own(branch, Table::Ends, &|number| end_row(number, side, ending)),
+            Event::SideEnded(branch, side, ending) => own(branch, ends, &|number| end_row(number, side, ending)),
             Event::Note(branch, note) => {
-                self.leave(Table::Notes, [branch, note].map(|text| text.to_string().into()).to_vec())
+                self.insert(notes, [branch, note].map(|text| text.to_string().into()).to_vec())
             }
             Event::Responses(set) => {
-                self.at_once(|state| responses::write(&mut state.connection, &self.insert_response, set, self.shown))
+                self.write(|state| responses::write(&mut state.connection, &self.insert_response, set, self.shown));
             }
             Event::End(_) | Event::Visited(..) => {}
         }
@@ -357,9 +313,7 @@ impl Observer for Recorder {
 
     fn recall(&self, branch: &Branch, position: i64) -> Option<Point> {
         let number = self.number_of(&branch.name)?;
-        let point = point_at(&self.emptied().connection, number, position);
-        self.write();
-        point
+        point_at(&self.locked().connection, number, position)
     }
 }
 

@@ -13,12 +13,13 @@ use crate::contract::{Batch, Parameters};
 use crate::linalg::lane::{Eight, Lane as _};
 use std::cell::{Cell, RefCell};
 
-/// Eights of lanes that are taken at a time: the more where the registers then fill no more than [`IN_CACHE`] eights, a good
-/// part of the fastest cache.
-const PAIR: usize = 2;
+/// Eights of lanes that are taken at a time, …
 const FEW: usize = 4;
+/// … where the registers then fill no more than [`IN_CACHE`] eights, a good part of the fastest cache, …
 const MANY: usize = 8;
 const IN_CACHE: usize = 256;
+/// … and at most, but for a single one, where few are left.
+const PAIR: usize = 2;
 
 /// A value for the lanes that are taken together.
 type Lanes<const W: usize> = [Cell<Eight>; W];

@@ -430,13 +430,13 @@ mod tests {
         let sampling = Sampling::new(&Scheme::new(4));
         let number = |k: usize, size: f64| size * ((k * k + 3 * k + 1) as f64).sin();
         // Values next to the identity.
-        let near = |k: usize| f64::from(k / all % 4 % 3 == 0) + number(k, 0.2);
-        let nodes: Vec<f64> = (0..4 * n * n * all).map(near).collect();
+        let near = |k: usize| f64::from([1, 0, 0, 1][k / all % 4]) + number(k, 0.2);
+        let mut nodes: Vec<f64> = (0..4 * n * n * all).map(near).collect();
         let jacobians: [Vec<f64>; 2] = [0.5, 0.9].map(|size| (0..5 * n * n * all).map(|k| number(k, size)).collect());
         let lengths: Vec<f64> = (0..all).map(|j| 0.1 + number(j, 0.05)).collect();
-        let of = |piece: std::ops::Range<usize>| -> Vec<f64> {
+        let of = |nodes: &[f64], piece: std::ops::Range<usize>| -> Vec<f64> {
             let cut = |lines: &[f64]| lines.chunks_exact(all).flat_map(|line| &line[piece.clone()]).copied().collect();
-            let own: [Vec<f64>; 4] = [&nodes, &jacobians[0], &jacobians[1], &lengths].map(|lines| cut(lines));
+            let own: [Vec<f64>; 4] = [nodes, &jacobians[0], &jacobians[1], &lengths].map(cut);
             let [mut one, mut other] = [(); 2].map(|()| vec![f64::NAN; n * n * piece.len()]);
             let courses = &mut [
                 Course { jacobians: &own[1], lengths: &own[3], gains: &mut one },
@@ -445,13 +445,21 @@ mod tests {
             correct(&sampling, &own[0], courses, n);
             one.into_iter().chain(other).collect()
         };
-        let together = of(0..all);
+        let together = of(&nodes, 0..all);
         assert!(together.iter().all(|gain| gain.abs() > 1e-9), "{together:?}");
         for piece in [0..1, 3..10, 2..18, 18..19] {
             let expected = together.chunks_exact(all).flat_map(|line| line[piece.clone()].to_vec());
-            assert_eq!(of(piece.clone()), expected.collect::<Vec<f64>>(), "{piece:?}");
+            assert_eq!(of(&nodes, piece.clone()), expected.collect::<Vec<f64>>(), "{piece:?}");
         }
-        assert!(of(5..5).is_empty());
+        assert!(of(&nodes, 5..5).is_empty());
+        // Where the transition is none it gains nothing, and beside it as much as before.
+        nodes[5] = f64::NAN;
+        for (line, before) in of(&nodes, 0..all).chunks_exact(all).zip(together.chunks_exact(all)) {
+            for (j, (gain, before)) in line.iter().zip(before).enumerate() {
+                let expected = if j == 5 { 0.0 } else { *before };
+                assert!((gain - expected).abs() < 1e-12, "{j}: {gain:e} and {expected:e}");
+            }
+        }
     }
 
     #[test]

@@ -120,8 +120,13 @@ impl CycleProblem<'_> {
         let mut transitions = [plain.clone(), plain.clone()];
         let profiles = [Profile { u, without: None }, Profile { u: &better, without: Some(&known.within) }];
         let room = &mut *self.room.borrow_mut();
-        for first in (0..self.intervals()).step_by(TOGETHER) {
-            self.correct(first..(first + TOGETHER).min(self.intervals()), &profiles, &mut transitions, room);
+        let mut first = 0;
+        while first < self.intervals() {
+            // No short piece at the end.
+            let left = self.intervals() - first;
+            let count = if left < 3 * TOGETHER / 2 { left } else { TOGETHER };
+            self.correct(first..first + count, &profiles, &mut transitions, room);
+            first += count;
         }
         let [own, other] = transitions;
         let [frames, others] = [u, &better].map(|u| self.frames(u));
