@@ -69,9 +69,23 @@ pub enum RunFileError {
 impl RunFileError {
     /// What SQLite answered about the file at `path`, in terms of what happened to it.
     pub(crate) fn from_sqlite(path: &Path, error: rusqlite::Error) -> RunFileError {
+        use rusqlite::Error::{
+            FromSqlConversionFailure, IntegralValueOutOfRange, InvalidColumnType, QueryReturnedNoRows, Utf8Error,
+        };
         use rusqlite::ErrorCode::{DatabaseBusy, DatabaseCorrupt, DatabaseLocked, DiskFull, NotADatabase};
         let path = path.to_path_buf();
+        let unlike_written = matches!(
+            error,
+            FromSqlConversionFailure(..)
+                | IntegralValueOutOfRange(..)
+                | InvalidColumnType(..)
+                | QueryReturnedNoRows
+                | Utf8Error(..)
+        );
         match error.sqlite_error_code() {
+            _ if unlike_written => {
+                RunFileError::Damaged(path, format!("something in it is not as it was written ({error})"))
+            }
             Some(DatabaseCorrupt | NotADatabase) => RunFileError::Damaged(path, format!("SQLite finds {error}")),
             Some(DiskFull) => RunFileError::Full(path),
             Some(DatabaseBusy | DatabaseLocked) => RunFileError::Busy(path),
