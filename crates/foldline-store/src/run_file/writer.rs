@@ -30,7 +30,7 @@ pub struct Recorder {
     shown: usize,
     /// Of the branches that have begun.
     numbers: Mutex<HashMap<String, i64>>,
-    /// Whether [`State::failure`] is there.
+    /// Whether [`State::failure`] is there: to be told without waiting for who writes.
     failed: AtomicBool,
     state: Mutex<State>,
 }
