@@ -20,9 +20,13 @@ fn said(output: &Output) -> String {
 
 /// A study that takes a while, begun in `folder`.
 fn begun(folder: &Path) -> Command {
+    begun_with(folder, "1")
+}
+
+fn begun_with(folder: &Path, jobs: &str) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_foldline"));
     command
-        .args(["run", "studies/overhung-rotor/bouncing.toml", "--jobs", "1", "--out"])
+        .args(["run", "studies/overhung-rotor/bouncing.toml", "--jobs", jobs, "--out"])
         .arg(folder)
         .current_dir(root());
     command.stdout(Stdio::null()).stderr(Stdio::piped());
@@ -80,39 +84,43 @@ fn a_second_run_into_the_same_folder_is_refused_while_the_first_writes() {
 
 #[test]
 fn a_folder_that_is_deleted_during_the_run_ends_it_with_a_message() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("run");
-    let first = begun(&out).spawn().unwrap();
-    until(|| out.join("run.sqlite").exists() && points(&out) > 3);
-    std::fs::remove_dir_all(&out).unwrap();
-    let output = first.wait_with_output().unwrap();
-    let message = said(&output);
-    assert_eq!(output.status.code(), Some(1), "{message}");
-    assert!(message.contains("was deleted, moved or replaced"), "{message}");
+    for jobs in ["1", "3"] {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("run");
+        let first = begun_with(&out, jobs).spawn().unwrap();
+        until(|| out.join("run.sqlite").exists() && points(&out) > 3);
+        std::fs::remove_dir_all(&out).unwrap();
+        let output = first.wait_with_output().unwrap();
+        let message = said(&output);
+        assert_eq!(output.status.code(), Some(1), "{jobs}: {message}");
+        assert!(message.contains("was deleted, moved or replaced"), "{jobs}: {message}");
+    }
 }
 
 #[cfg(unix)]
 #[test]
 fn a_disk_that_refuses_ends_the_run_and_what_was_stored_stays() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("run");
-    // Files may become 3000 blocks of 1024 bytes long, no longer.
-    let script =
-        "trap '' XFSZ; ulimit -f 3000; exec \"$0\" run studies/overhung-rotor/bouncing.toml --jobs 1 --out \"$1\"";
-    let output = Command::new("bash")
-        .args(["-c", script, env!("CARGO_BIN_EXE_foldline")])
-        .arg(&out)
-        .current_dir(root())
-        .output()
-        .unwrap();
-    let message = said(&output);
-    assert_eq!(output.status.code(), Some(1), "{message}");
-    assert!(message.contains("run.sqlite") && message.contains("--resume"), "{message}");
-    let stored = points(&out);
-    assert!(stored > 5, "{stored}");
-    let resumed = begun(&out).arg("--resume").output().unwrap();
-    assert_eq!(resumed.status.code(), Some(0), "{}", said(&resumed));
-    assert!(points(&out) > stored);
+    for jobs in ["1", "3"] {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("run");
+        // Files may become 3000 blocks of 1024 bytes long, no longer.
+        let script = "trap '' XFSZ; ulimit -f 3000; \
+            exec \"$0\" run studies/overhung-rotor/bouncing.toml --jobs \"$1\" --out \"$2\"";
+        let output = Command::new("bash")
+            .args(["-c", script, env!("CARGO_BIN_EXE_foldline"), jobs])
+            .arg(&out)
+            .current_dir(root())
+            .output()
+            .unwrap();
+        let message = said(&output);
+        assert_eq!(output.status.code(), Some(1), "{jobs}: {message}");
+        assert!(message.contains("run.sqlite") && message.contains("--resume"), "{jobs}: {message}");
+        let stored = points(&out);
+        assert!(stored > 5, "{jobs}: {stored}");
+        let resumed = begun_with(&out, jobs).arg("--resume").output().unwrap();
+        assert_eq!(resumed.status.code(), Some(0), "{jobs}: {}", said(&resumed));
+        assert!(points(&out) > stored);
+    }
 }
 
 #[test]

@@ -9,6 +9,7 @@ use foldline_store::run_file::{Part, Recorder, RunFileError, load, load_part, pa
 use foldline_store::study_file::{Study, parse_study};
 use num_complex::Complex64;
 use std::path::Path;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 // K and k: SQLite does not tell them apart in column names.
 const MODEL: &str = "name = \"pitchfork\"\n[parameters]\nmu = 1.0\nK = 2.0\nk = 0.0\n\
@@ -289,6 +290,47 @@ fn threads_that_record_at_once_lose_nothing_and_recall_their_own() {
     [&mut found, &mut expected].into_iter().for_each(|all| all.sort_by(|a, b| a.name.cmp(&b.name)));
     let whole = |branches| exactly(&Diagram { branches, ..Diagram::default() });
     assert_eq!(whole(found), whole(expected));
+}
+
+#[test]
+fn a_thread_goes_on_while_another_writes_but_not_without_end() {
+    let folder = tempfile::tempdir().unwrap();
+    let recorder = Recorder::create(folder.path(), &study()).unwrap();
+    let mut branches = ["a", "b"].map(|name| Branch::new(name, Family::Cycle, 0, Origin::Seed("start".into())));
+    for branch in &mut branches {
+        recorder.observe(Event::Begin(branch));
+        (0..40).for_each(|position| branch.insert(point(position, true)));
+    }
+    // Someone else has the file: who writes first waits for him.
+    let other = rusqlite::Connection::open(path_in(folder.path())).unwrap();
+    other.execute_batch("BEGIN IMMEDIATE").unwrap();
+    let stored = || -> i64 { other.query_row("SELECT count(*) FROM points", [], |row| row.get(0)).unwrap() };
+    let handed_in = AtomicUsize::new(0);
+    std::thread::scope(|scope| {
+        for branch in &branches {
+            scope.spawn(|| {
+                for point in &branch.points {
+                    assert_eq!(recorder.observe(Event::Point(branch, point)), Verdict::Continue);
+                    handed_in.fetch_add(1, Ordering::SeqCst);
+                }
+            });
+        }
+        let start = std::time::Instant::now();
+        while handed_in.load(Ordering::SeqCst) < 16 && start.elapsed().as_secs() < 5 {
+            std::thread::yield_now();
+        }
+        // One waits in its first point, the other in its seventeenth.
+        std::thread::sleep(std::time::Duration::from_millis(50));
+        assert_eq!((handed_in.load(Ordering::SeqCst), stored()), (16, 0));
+        other.execute_batch("COMMIT").unwrap();
+    });
+    // No call is under way any more: a process that is killed now has everything in its file, in order.
+    assert_eq!(stored(), 80);
+    let mut rows = other.prepare("SELECT position FROM points WHERE branch = ? ORDER BY rowid").unwrap();
+    for branch in 1..=2 {
+        let positions = rows.query_map([branch], |row| row.get::<_, i64>(0)).unwrap();
+        assert_eq!(positions.map(Result::unwrap).collect::<Vec<i64>>(), (0..40).collect::<Vec<i64>>());
+    }
 }
 
 #[test]

@@ -137,7 +137,7 @@ pub(super) fn upgrade(version: i64) -> &'static str {
 }
 
 /// `INSERT OR REPLACE` with `first` before the shown columns and the columns of a point after them.
-pub(super) fn insert(table: &str, first: &[&str], columns: &Columns) -> String {
+pub(super) fn insertion(table: &str, first: &[&str], columns: &Columns) -> String {
     let names: Vec<String> = first
         .iter()
         .map(|s| s.to_string())

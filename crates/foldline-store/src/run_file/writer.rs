@@ -3,20 +3,23 @@
 use super::meta::{description, variables};
 use super::reader::{Open, Part, load_diagram, open, point_at, sound};
 use super::rows::{end_row, held_values, key_of, origin_values, point_row, special_row};
-use super::schema::{Columns, create, insert, upgrade};
+use super::schema::{Columns, create, insertion, upgrade};
 use super::{APPLICATION_ID, FORMAT_VERSION, RunFileError, path_in, responses};
 use crate::study_file::Study;
 use foldline::contract::{Event, Observer, Verdict};
 use foldline::diagram::{Branch, Diagram, Ending, Point};
 use rusqlite::types::Value;
 use rusqlite::{Connection, params, params_from_iter};
-use std::collections::HashMap;
+use std::collections::{HashMap, VecDeque};
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{self, Mutex, MutexGuard, PoisonError};
 
 /// An observer that writes everything it sees to the run file.
+///
+/// Threads do not wait for each other: one that finds another writing leaves its points to it and goes on, unless [`AHEAD`]
+/// of them wait already. When no call of [`Observer::observe`] is under way, everything observed is in the file.
 ///
 /// If writing fails (the disk is full, say) it asks every branch to stop; [`Recorder::finish`] then returns the reason.
 pub struct Recorder {
@@ -32,8 +35,20 @@ pub struct Recorder {
     numbers: Mutex<HashMap<String, i64>>,
     /// Whether [`State::failure`] is there: to be told without waiting for who writes.
     failed: AtomicBool,
+    /// Points and special points to be written by who writes next, in their order. Locked after `state` or alone.
+    waiting: Mutex<VecDeque<Row>>,
     state: Mutex<State>,
 }
+
+/// A point or special point that waits to be written.
+struct Row {
+    branch: i64,
+    special: bool,
+    values: Vec<Value>,
+}
+
+/// Points of a branch that may wait at the most: what is computed while the log is carried over, some milliseconds.
+const AHEAD: usize = 16;
 
 struct State {
     connection: Connection,
@@ -199,12 +214,13 @@ impl Recorder {
         let special =
             ["branch", "kind", "position", "key", "unstable_before", "unstable_after", "error", "normal_form"];
         Ok(Recorder {
-            insert_point: insert("points", &["branch", "position"], &columns),
-            insert_special: insert("special_points", &special, &columns),
+            insert_point: insertion("points", &["branch", "position"], &columns),
+            insert_special: insertion("special_points", &special, &columns),
             insert_response: responses::insert(&study.model),
             shown: columns.names().count(),
             numbers: Mutex::new(numbers),
             failed: AtomicBool::new(false),
+            waiting: Mutex::default(),
             state: Mutex::new(State { connection, file: identity(&path), events: 0, failure: None }),
             path,
             _lock: lock,
@@ -229,8 +245,51 @@ impl Recorder {
         Ok(())
     }
 
-    fn locked(&self) -> MutexGuard<'_, State> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    /// Does something with the file when everything that waits has been written.
+    fn with_file<T>(&self, work: impl FnOnce(&mut State) -> T) -> T {
+        let done = {
+            let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+            self.write_waiting(&mut state);
+            work(&mut state)
+        };
+        self.relieve();
+        done
+    }
+
+    fn queue(&self) -> MutexGuard<'_, VecDeque<Row>> {
+        self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn write_waiting(&self, state: &mut State) {
+        loop {
+            let next = self.queue().pop_front();
+            let Some(row) = next else { return };
+            let sql = if row.special { &self.insert_special } else { &self.insert_point };
+            self.write_to(state, |state| insert(&state.connection, sql, row.values));
+        }
+    }
+
+    /// Writes what waits, or leaves it to the thread that has the file. That one comes here when it has let go of it, so that
+    /// a row left in between is not left alone.
+    fn relieve(&self) {
+        while !self.queue().is_empty() {
+            match self.state.try_lock() {
+                Ok(mut state) => self.write_waiting(&mut state),
+                Err(sync::TryLockError::Poisoned(state)) => self.write_waiting(&mut state.into_inner()),
+                Err(sync::TryLockError::WouldBlock) => return,
+            }
+        }
+    }
+
+    /// Has a row written: here, or by the thread that is writing.
+    fn hand_in(&self, row: Row) {
+        let ahead = {
+            let mut queue = self.queue();
+            let ahead = queue.iter().filter(|other| other.branch == row.branch).count();
+            queue.push_back(row);
+            ahead
+        };
+        if ahead < AHEAD { self.relieve() } else { self.with_file(|_| ()) }
     }
 
     /// The number of a branch that has begun.
@@ -254,13 +313,12 @@ impl Recorder {
         });
     }
 
-    fn insert(&self, sql: &str, values: Vec<Value>) {
-        self.write(|state| state.connection.prepare_cached(sql)?.execute(params_from_iter(values)).map(|_| ()));
+    fn write(&self, work: impl FnOnce(&mut State) -> rusqlite::Result<()>) {
+        self.with_file(|state| self.write_to(state, work));
     }
 
     /// Does something with the file unless something has failed before. Now and then it looks whether the file is still there.
-    fn write(&self, work: impl FnOnce(&mut State) -> rusqlite::Result<()>) {
-        let state = &mut *self.locked();
+    fn write_to(&self, state: &mut State, work: impl FnOnce(&mut State) -> rusqlite::Result<()>) {
         if state.failure.is_some() {
             return;
         }
@@ -280,24 +338,25 @@ impl Recorder {
 impl Observer for Recorder {
     fn observe(&self, event: Event) -> Verdict {
         // Rows are put together before the file is asked for.
-        let own = |branch: &Branch, sql: &str, values: &dyn Fn(i64) -> Vec<Value>| {
+        let stored = |branch: &Branch, special: bool, values: &dyn Fn(i64) -> Vec<Value>| {
             if let Some(number) = self.number(branch) {
-                self.insert(sql, values(number));
+                self.hand_in(Row { branch: number, special, values: values(number) });
             }
         };
-        let (ends, notes) = (
-            "INSERT OR REPLACE INTO ends VALUES (?, ?, ?, ?, ?, ?, ?, ?)",
-            "INSERT OR IGNORE INTO notes VALUES (?, ?)",
-        );
         match event {
             Event::Begin(branch) => self.begin_branch(branch),
-            Event::Point(branch, point) => own(branch, &self.insert_point, &|number| point_row(number, point)),
-            Event::Special(branch, special) => {
-                own(branch, &self.insert_special, &|number| special_row(number, branch, special));
+            Event::Point(branch, point) => stored(branch, false, &|number| point_row(number, point)),
+            Event::Special(branch, special) => stored(branch, true, &|number| special_row(number, branch, special)),
+            Event::SideEnded(branch, side, ending) => {
+                if let Some(number) = self.number(branch) {
+                    let (sql, row) =
+                        ("INSERT OR REPLACE INTO ends VALUES (?, ?, ?, ?, ?, ?, ?, ?)", end_row(number, side, ending));
+                    self.write(|state| insert(&state.connection, sql, row));
+                }
             }
-            Event::SideEnded(branch, side, ending) => own(branch, ends, &|number| end_row(number, side, ending)),
             Event::Note(branch, note) => {
-                self.insert(notes, [branch, note].map(|text| text.to_string().into()).to_vec())
+                let row = [branch, note].map(|text| text.to_string().into()).to_vec();
+                self.write(|state| insert(&state.connection, "INSERT OR IGNORE INTO notes VALUES (?, ?)", row));
             }
             Event::Responses(set) => {
                 self.write(|state| responses::write(&mut state.connection, &self.insert_response, set, self.shown));
@@ -313,8 +372,12 @@ impl Observer for Recorder {
 
     fn recall(&self, branch: &Branch, position: i64) -> Option<Point> {
         let number = self.number_of(&branch.name)?;
-        point_at(&self.locked().connection, number, position)
+        self.with_file(|state| point_at(&state.connection, number, position))
     }
+}
+
+fn insert(connection: &Connection, sql: &str, values: Vec<Value>) -> rusqlite::Result<()> {
+    connection.prepare_cached(sql)?.execute(params_from_iter(values)).map(|_| ())
 }
 
 impl State {
