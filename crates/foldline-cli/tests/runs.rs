@@ -198,6 +198,27 @@ fn a_run_cut_off_between_transactions_resumes_without_losing_a_point() {
 }
 
 #[test]
+fn a_closed_branch_that_was_killed_between_its_two_ends_is_not_followed_once_more() {
+    let desk = tempfile::tempdir().unwrap();
+    // Equilibria on the unit circle.
+    let model = "name = \"m\"\n[parameters]\nmu = 0\n[states]\nx = \"1 - mu^2 - x^2\"\n";
+    let study = "model = \"m.toml\"\n[[seed]]\nname = \"s\"\nstate = { x = 1 }\n\
+        [[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"mu\"\nrange = [-2, 2]\n";
+    std::fs::write(desk.path().join("m.toml"), model).unwrap();
+    std::fs::write(desk.path().join("study.toml"), study).unwrap();
+    printed(desk.path(), &["run", "study.toml"], 0);
+    let table = |what: &str| printed(desk.path(), &["table", "runs/study", what, "--format", "csv"], 0);
+    let tables = || ["--points", "--special", "--branches"].map(table);
+    let whole = tables();
+    assert_eq!(rows(&whole[1]).len(), 2, "{}", whole[1]);
+    let file = rusqlite::Connection::open(desk.path().join("runs/study/run.sqlite")).unwrap();
+    assert_eq!(file.execute("DELETE FROM ends WHERE side = 0 AND code = 'closed'", []).unwrap(), 1);
+    drop(file);
+    printed(desk.path(), &["run", "study.toml", "--resume"], 0);
+    assert_eq!(tables(), whole);
+}
+
+#[test]
 fn a_finished_run_resumes_without_doing_anything() {
     let desk = desk("README.md");
     let first = printed(desk.path(), &["run", "study.toml"], 0);

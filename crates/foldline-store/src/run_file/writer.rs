@@ -18,8 +18,8 @@ use std::sync::{self, Mutex, MutexGuard, PoisonError};
 
 /// An observer that writes everything it sees to the run file.
 ///
-/// Threads do not wait for each other: one that finds another writing leaves its points to it and goes on, unless [`AHEAD`]
-/// of them wait already. When no call of [`Observer::observe`] is under way, everything observed is in the file.
+/// Threads do not wait for each other: one that finds another writing leaves its points to it and goes on, unless sixteen
+/// of its branch wait already. When no call of [`Observer::observe`] is under way, everything observed is in the file.
 ///
 /// If writing fails (the disk is full, say) it asks every branch to stop; [`Recorder::finish`] then returns the reason.
 pub struct Recorder {

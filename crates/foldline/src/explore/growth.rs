@@ -270,6 +270,10 @@ impl Growth<'_> {
 
     fn finish(&self, branch: &mut Branch, mut going: bool) -> bool {
         for side in [1, 0] {
+            // Found by the other side, now or in an earlier part of the run.
+            if branch.ends[side].is_none() && branch.ends[1 - side] == Some(Ending::Closed) {
+                going &= self.end(branch, side, Ending::Closed);
+            }
             if !going {
                 break;
             }
@@ -288,11 +292,7 @@ impl Growth<'_> {
                     break;
                 }
                 let ending = self.recognised(branch, side, ending);
-                let closed = ending == Ending::Closed;
                 going &= self.end(branch, side, ending);
-                if closed && branch.ends[1 - side].is_none() {
-                    going &= self.end(branch, 1 - side, Ending::Closed);
-                }
             }
         }
         if branch.ends.iter().all(Option::is_some) {
