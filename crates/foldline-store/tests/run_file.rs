@@ -9,6 +9,7 @@ use foldline_store::run_file::{Part, Recorder, RunFileError, load, load_part, pa
 use foldline_store::study_file::{Study, parse_study};
 use num_complex::Complex64;
 use std::path::Path;
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 // K and k: SQLite does not tell them apart in column names.
@@ -319,7 +320,7 @@ fn a_thread_goes_on_while_another_writes_but_not_without_end() {
         while handed_in.load(Ordering::SeqCst) < 16 && start.elapsed().as_secs() < 5 {
             std::thread::yield_now();
         }
-        // One waits in its first point, the other in its seventeenth.
+        // One waits in its first point, the other in its seventeenth, whosever point is being written.
         std::thread::sleep(std::time::Duration::from_millis(50));
         assert_eq!((handed_in.load(Ordering::SeqCst), stored()), (16, 0));
         other.execute_batch("COMMIT").unwrap();
@@ -331,6 +332,43 @@ fn a_thread_goes_on_while_another_writes_but_not_without_end() {
         let positions = rows.query_map([branch], |row| row.get::<_, i64>(0)).unwrap();
         assert_eq!(positions.map(Result::unwrap).collect::<Vec<i64>>(), (0..40).collect::<Vec<i64>>());
     }
+}
+
+#[test]
+fn no_row_is_left_behind_however_two_threads_meet() {
+    const POINTS: i64 = 4;
+    let folder = tempfile::tempdir().unwrap();
+    let recorder = Recorder::create(folder.path(), &study()).unwrap();
+    let other = Mutex::new(rusqlite::Connection::open(path_in(folder.path())).unwrap());
+    let count =
+        |sql: &str, name: &str| -> i64 { other.lock().unwrap().query_row(sql, [name], |row| row.get(0)).unwrap() };
+    let points = "SELECT count(*) FROM points JOIN branches USING (branch) WHERE name = ?";
+    let ends = "SELECT count(*) FROM ends JOIN branches USING (branch) WHERE name = ?";
+    for round in 0..300 {
+        let names = ["a", "b"].map(|thread| format!("{thread} {round}"));
+        std::thread::scope(|scope| {
+            for name in &names {
+                let (recorder, count) = (&recorder, &count);
+                scope.spawn(move || {
+                    let mut branch = Branch::new(name, Family::Cycle, 0, Origin::Seed("start".into()));
+                    recorder.observe(Event::Begin(&branch));
+                    for position in 0..POINTS {
+                        branch.insert(point(position, false));
+                        recorder.observe(Event::Point(&branch, &branch.points[position as usize]));
+                    }
+                    if round % 2 == 0 {
+                        recorder.observe(Event::SideEnded(&branch, 1, &Ending::Closed));
+                        // What comes before an end is there when it has been said.
+                        assert_eq!(count(points, name), POINTS, "{name}");
+                    }
+                });
+            }
+        });
+        for name in &names {
+            assert_eq!((count(points, name), count(ends, name)), (POINTS, 1 - round % 2), "{name}");
+        }
+    }
+    recorder.finish().unwrap();
 }
 
 #[test]

@@ -321,9 +321,9 @@ pub trait Condition {
 pub enum Event<'a> {
     /// A branch begins; it has no points yet, or those of an earlier run that is being resumed.
     Begin(&'a Branch),
-    /// A point was accepted; [`Point::position`] says where on the branch it belongs.
+    /// A point was found; [`Point::position`] says where on the branch it belongs.
     Point(&'a Branch, &'a Point),
-    /// A special point was located between two accepted points.
+    /// A special point was located behind the last point of its side.
     Special(&'a Branch, &'a SpecialPoint),
     /// One side of the branch ended; side 0 is backward, 1 forward.
     SideEnded(&'a Branch, usize, &'a Ending),
@@ -356,7 +356,7 @@ pub trait Observer: Sync {
         false
     }
 
-    /// The accepted point at `position` of a branch, as it was observed.
+    /// The point at `position` of a branch, as it was observed.
     fn recall(&self, _branch: &Branch, _position: i64) -> Option<Point> {
         None
     }

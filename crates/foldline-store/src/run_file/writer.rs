@@ -18,8 +18,8 @@ use std::sync::{self, Mutex, MutexGuard, PoisonError};
 
 /// An observer that writes everything it sees to the run file.
 ///
-/// Threads do not wait for each other: one that finds another writing leaves its points to it and goes on, unless sixteen
-/// of its branch wait already. When no call of [`Observer::observe`] is under way, everything observed is in the file.
+/// Threads do not wait for each other: one that finds another writing leaves its points to it and goes on, unless sixteen of
+/// its branch, special points included, wait already or are being written. When no call of [`Observer::observe`] is under way, everything observed is in the file.
 ///
 /// If writing fails (the disk is full, say) it asks every branch to stop; [`Recorder::finish`] then returns the reason.
 pub struct Recorder {
@@ -35,7 +35,8 @@ pub struct Recorder {
     numbers: Mutex<HashMap<String, i64>>,
     /// Whether [`State::failure`] is there: to be told without waiting for who writes.
     failed: AtomicBool,
-    /// Points and special points to be written by who writes next, in their order. Locked after `state` or alone.
+    /// Points and special points to be written by who writes next, in their order; the first may be in work. They are removed
+    /// by whoever has locked `state`. Locked after `state` or alone.
     waiting: Mutex<VecDeque<Row>>,
     state: Mutex<State>,
 }
@@ -47,7 +48,8 @@ struct Row {
     values: Vec<Value>,
 }
 
-/// Points of a branch that may wait at the most: what is computed while the log is carried over, some milliseconds.
+/// Rows of a branch that may wait or be in work when another is handed in: what is computed while the log is carried over,
+/// usually some milliseconds.
 const AHEAD: usize = 16;
 
 struct State {
@@ -229,6 +231,8 @@ impl Recorder {
 
     /// Closes the file. The error is the first one met while recording.
     pub fn finish(self) -> Result<(), RunFileError> {
+        // Nothing waits unless a thread was cut off.
+        self.with_file(|_| ());
         let state = self.state.into_inner().unwrap_or_else(PoisonError::into_inner);
         if let Some(error) = state.failure {
             return Err(error);
@@ -262,10 +266,11 @@ impl Recorder {
 
     fn write_waiting(&self, state: &mut State) {
         loop {
-            let next = self.queue().pop_front();
-            let Some(row) = next else { return };
-            let sql = if row.special { &self.insert_special } else { &self.insert_point };
-            self.write_to(state, |state| insert(&state.connection, sql, row.values));
+            let next = self.queue().front_mut().map(|row| (row.special, std::mem::take(&mut row.values)));
+            let Some((special, values)) = next else { return };
+            let sql = if special { &self.insert_special } else { &self.insert_point };
+            self.write_to(state, |state| insert(&state.connection, sql, values));
+            self.queue().pop_front();
         }
     }
 

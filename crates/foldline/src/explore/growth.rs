@@ -228,21 +228,8 @@ impl Growth<'_> {
         let mut going = self.tell(Event::Begin(branch));
         match beginning {
             Beginning::Inside(start) => {
-                let point = Point { position: 0, step: self.settings.first_step, ..start.point };
-                let marked = self.marks.iter().filter(|mark| mark.quantity.of(&point) == Some(mark.value)).count();
-                let special = SpecialPoint {
-                    kind: Kind::Mark,
-                    unstable_before: point.unstable,
-                    unstable_after: point.unstable,
-                    error: 10.0 * self.settings.newton_tolerance(),
-                    coefficients: Vec::new(),
-                    point: point.clone(),
-                };
-                going &= self.accept(branch, point);
-                for _ in 0..marked.min(1) {
-                    branch.insert_special(special.clone());
-                    going &= self.tell(Event::Special(branch, &special));
-                }
+                going &= self.accept(branch, Point { position: 0, step: self.settings.first_step, ..start.point });
+                going &= self.mark_start(branch);
             }
             Beginning::Edge { before, first, joined } => {
                 let count = before.len() as i64;
@@ -256,15 +243,40 @@ impl Growth<'_> {
         self.finish(branch, going)
     }
 
+    /// A mark at which the branch starts, unless it is there already: no step leads over it.
+    fn mark_start(&self, branch: &mut Branch) -> bool {
+        let Some(point) = branch.points.iter().find(|p| p.position == 0) else { return true };
+        let known =
+            |s: &SpecialPoint| s.kind == Kind::Mark && s.point.position == 0 && s.point.parameters == point.parameters;
+        let meant = |mark: &Mark| mark.quantity.of(point) == Some(mark.value);
+        if !self.marks.iter().any(meant) || branch.special.iter().any(known) {
+            return true;
+        }
+        let special = SpecialPoint {
+            kind: Kind::Mark,
+            unstable_before: point.unstable,
+            unstable_after: point.unstable,
+            error: 10.0 * self.settings.newton_tolerance(),
+            coefficients: Vec::new(),
+            point: point.clone(),
+        };
+        branch.insert_special(special.clone());
+        self.tell(Event::Special(branch, &special))
+    }
+
     /// Continues a branch of an earlier run. Returns false if the observer wants to stop.
     pub fn resume(&self, branch: &mut Branch) -> bool {
         let (low, high) = match (branch.points.first(), branch.points.last()) {
             (Some(a), Some(b)) => (a.position, b.position),
             _ => return true,
         };
-        // A special point found in a step whose far end was not stored will be found again.
-        branch.special.retain(|s| s.point.position >= low && s.point.position < high);
-        let going = self.tell(Event::Begin(branch));
+        // A special point found in a step whose far end was not stored will be found again, unless the side has ended with it.
+        let [backward, forward] = [0, 1].map(|side| branch.ends[side].is_some());
+        branch.special.retain(|s| (backward || s.point.position >= low) && (forward || s.point.position < high));
+        let mut going = self.tell(Event::Begin(branch));
+        if starts_inside(branch) {
+            going &= self.mark_start(branch);
+        }
         self.finish(branch, going)
     }
 
@@ -317,8 +329,7 @@ impl Growth<'_> {
         let mut problem = self.line(branch).problem(&system, self.degree, &last);
         let revive = |problem: &mut dyn ZeroProblem, point: &Point| revived(problem, self.settings, point, direction);
         // The special point at which a branch begins is no predecessor: the matrix is singular there.
-        let inside = branch.held.is_some() || matches!(branch.origin, Origin::Seed(_) | Origin::EndOf(_));
-        let before = before.filter(|p| p.position != 0 || inside);
+        let before = before.filter(|p| p.position != 0 || starts_inside(branch));
         let previous = before.and_then(|p| revive(&mut *problem, &p).ok());
         let mut start = match revive(&mut *problem, &last) {
             Ok(start) => start,
@@ -484,6 +495,11 @@ impl Growth<'_> {
         branch.ends[side] = Some(ending.clone());
         self.tell(Event::SideEnded(branch, side, &ending))
     }
+}
+
+/// Whether a branch goes on to both sides of its start, which is then no special point of another one.
+fn starts_inside(branch: &Branch) -> bool {
+    branch.held.is_some() || matches!(branch.origin, Origin::Seed(_) | Origin::EndOf(_))
 }
 
 /// Whether a branch was born by period doubling.

@@ -6,6 +6,8 @@ use super::{
 use crate::contract::{Event, Observer, Unobserved, Verdict};
 use crate::diagram::{Branch, Diagram, Ending, Kind, Point};
 use crate::model::{Definition, Model, ModelSource, Parameter, State};
+use crate::special::mark::Mark;
+use crate::special::quantity::Quantity;
 use std::sync::Mutex;
 
 /// Remembers the points; says that it keeps them, or not.
@@ -177,4 +179,106 @@ fn the_last_step_lands_on_the_bound() {
         // A step that is cut off at a bound afterwards solves there again: twice the work of a step.
         assert!(point.cost.newton <= 6 && point.cost.rejected == 0, "{:?}", point.cost);
     }
+}
+
+#[test]
+fn what_a_side_ended_with_is_kept_when_the_branch_is_resumed() {
+    let ring = Model::compile(ModelSource {
+        name: "ring".into(),
+        parameters: vec![Parameter::new("p", 0.0)],
+        states: vec![State::new("x")],
+        equations: vec![Definition::new("x", "1 - p^2 - x^2")],
+        ..ModelSource::default()
+    })
+    .unwrap();
+    let plan = pitchfork_plan(Switching::default());
+    let seed = SeedPlan { source: SeedSource::State(vec![1.0]), parameters: vec![0.0], ..plan.seeds[0].clone() };
+    let branch = BranchPlan { range: [-2.0, 2.0], ..plan.branches[0].clone() };
+    let plan = Plan { seeds: vec![seed], branches: vec![branch], ..plan };
+    let system = System::of_plan(&ring, &plan);
+    let whole = run(&system, &plan, 1, Diagram::default(), &Unobserved).branches.remove(0);
+    assert_eq!(whole.ends, [Some(Ending::Closed), Some(Ending::Closed)]);
+    let places =
+        |branch: &Branch| -> Vec<(Kind, i64)> { branch.special.iter().map(|s| (s.kind, s.point.position)).collect() };
+    assert_eq!(places(&whole).iter().map(|(kind, _)| *kind).collect::<Vec<_>>(), [Kind::Fold; 2]);
+    // A change of stability that the way back does not explain lies beyond the last point.
+    let mut earlier = whole.clone();
+    let mut change = whole.special[0].clone();
+    change.kind = Kind::Unexplained;
+    change.point.position = whole.points.last().unwrap().position;
+    earlier.insert_special(change);
+    let expected = places(&earlier);
+    assert_eq!(expected.len(), 3);
+    for backward in [Some(Ending::Closed), None] {
+        earlier.ends[0] = backward;
+        let known = Diagram { branches: vec![earlier.clone()], ..Diagram::default() };
+        let again = run(&system, &plan, 1, known, &Unobserved).branches.remove(0);
+        assert_eq!((places(&again), again.points.len()), (expected.clone(), whole.points.len()));
+        assert_eq!(again.ends, whole.ends);
+    }
+}
+
+#[test]
+fn a_mark_at_the_start_is_there_once_wherever_the_run_was_interrupted() {
+    let model = pitchforks();
+    let mut plan = pitchfork_plan(Switching::default());
+    plan.branches[0].marks =
+        [1.0, 2.5].map(|value| Mark { quantity: Quantity::Parameter(0), value, stop: false }).to_vec();
+    let system = System::of_plan(&model, &plan);
+    let marked = |earlier: Diagram| -> Vec<f64> {
+        let branch = run(&system, &plan, 1, earlier, &Unobserved).branches.remove(0);
+        branch.special.iter().filter(|s| s.kind == Kind::Mark).map(|s| s.point.parameters[0]).collect()
+    };
+    let whole = run(&system, &plan, 1, Diagram::default(), &Unobserved).branches.remove(0);
+    assert_eq!(marked(Diagram::default()), [1.0, 2.5]);
+    for marks in [0, 1] {
+        for points in [1, 2, 3] {
+            let mut earlier = whole.clone();
+            earlier.ends = [None, None];
+            earlier.points.retain(|p| (0..points).contains(&p.position));
+            earlier.special.retain(|s| s.kind == Kind::Mark && s.point.parameters[0] == 1.0);
+            earlier.special.truncate(marks);
+            let known = Diagram { branches: vec![earlier], ..Diagram::default() };
+            assert_eq!(marked(known), [1.0, 2.5], "{points} points and {marks} marks");
+        }
+    }
+}
+
+/// Stops at the first point, and remembers for which seeds a census was made.
+struct Impatient(Mutex<Vec<String>>);
+
+impl Observer for Impatient {
+    fn observe(&self, event: Event) -> Verdict {
+        match event {
+            Event::Note(name, _) => self.0.lock().unwrap().push(name.to_string()),
+            Event::Point(..) => return Verdict::Stop,
+            _ => {}
+        }
+        Verdict::Continue
+    }
+}
+
+#[test]
+fn no_census_begins_once_the_observer_has_asked_to_stop() {
+    let model = circles();
+    let source = SeedSource::Attractor(AttractorKey::Cycle);
+    let seeds = [1.0, 2.0, 3.0].map(|p| SeedPlan {
+        name: format!("at {p}"),
+        source: source.clone(),
+        parameters: vec![p],
+        samples: 4,
+        random: 1,
+    });
+    let like = pitchfork_plan(Switching::default()).branches[0].clone();
+    let branches = (0..3).map(|k| BranchPlan {
+        name: format!("from {k}"),
+        start: Start::Seed(k),
+        range: [0.4, 7.3],
+        ..like.clone()
+    });
+    let plan = Plan { branches: branches.collect(), seeds: seeds.to_vec(), ..Plan::empty(1e-6, 4) };
+    let observer = Impatient(Mutex::new(Vec::new()));
+    let diagram = run(&System::of_plan(&model, &plan), &plan, 1, Diagram::default(), &observer);
+    let counts: Vec<usize> = diagram.branches.iter().map(|branch| branch.points.len()).collect();
+    assert_eq!((counts, observer.0.into_inner().unwrap().len()), (vec![1], 1));
 }
