@@ -2,6 +2,7 @@
 
 import _thread
 import os
+import signal
 import subprocess
 import sys
 import threading
@@ -13,6 +14,14 @@ import foldline
 from conftest import ROOT
 
 STUDY = os.path.join(ROOT, "studies", "overhung-rotor", "bouncing.toml")
+
+
+@pytest.fixture(autouse=True)
+def heeded():
+    """Ctrl-C raises: a shell has what it starts in the background ignore it."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 @pytest.fixture(scope="module")
