@@ -21,7 +21,7 @@ pub fn described(place: &Workplace) -> String {
     let load = std::fs::read_to_string("/proc/loadavg").unwrap_or_default();
     let changed = if said("git", &["status", "--porcelain"]).is_empty() { "" } else { ", with changes not committed" };
     format!(
-        "* processor: {}, {cores} cores, {}\n* load when it began: {} (others used the machine if above 1)\n* {}, release \
+        "* processor: {}, {cores} cores, {}\n* load when it began: {} (above 1 others used the machine in the minute before, or it was being built on)\n* {}, release \
          build\n* commit {}{changed}\n",
         field("model name"),
         sets.join(" "),

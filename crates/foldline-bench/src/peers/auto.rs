@@ -57,6 +57,21 @@ impl Auto {
         Ok(Auto { folder, program, template })
     }
 
+    /// Which AUTO it is, and how it was compiled.
+    pub fn version() -> String {
+        let first = |program: &str, arguments: &[&str]| {
+            let out = Command::new(program).args(arguments).output();
+            let text = out.map_or(String::new(), |out| String::from_utf8_lossy(&out.stdout).into_owned());
+            text.lines().next().unwrap_or("unknown").trim().to_string()
+        };
+        format!(
+            "AUTO-07p {} as Debian compiled it (-O2, for any x86-64); its equations by {} with {}, one thread.",
+            first("dpkg-query", &["--showformat", "${Version}", "--show", "auto-07p"]),
+            first("gfortran", &["--version"]),
+            FLAGS.join(" ")
+        )
+    }
+
     /// The file from which a first profile is read.
     pub fn start(&self) -> PathBuf {
         self.folder.join("start.dat")
