@@ -18,8 +18,10 @@ use foldline::problem::gauss::Scheme;
 /// NCOL.
 const DEGREES: [&str; 4] = ["4", "5", "6", "7"];
 /// NTST.
-const INTERVALS: [&str; 18] =
-    ["10", "12", "15", "20", "25", "30", "35", "40", "45", "50", "60", "70", "75", "80", "85", "90", "95", "100"];
+const INTERVALS: [&str; 21] = [
+    "10", "12", "15", "20", "25", "30", "35", "40", "45", "50", "60", "70", "75", "80", "85", "90", "95", "100", "120",
+    "150", "200",
+];
 /// What somebody would begin with who does not know how many intervals are needed.
 const USUAL: Setting = Setting { degree: "4", intervals: "100", first: "0.1", step: "0.2" };
 /// DS and DSMAX.
@@ -42,6 +44,11 @@ pub fn errors<'p>(system: &System, points: impl Iterator<Item = &'p Point>) -> O
         }
     }
     Ok(worst)
+}
+
+/// The points that a branch has found: not the first one, which is given.
+fn found_points(branch: &Branch) -> impl Iterator<Item = &Point> {
+    branch.points.iter().filter(|point| point.position != 0)
 }
 
 /// A solution of AUTO as a point, as far as errors need it.
@@ -122,7 +129,13 @@ fn tried(auto: &Auto, system: &System, like: &Point, setting: Setting) -> Outcom
 }
 
 /// For each of the errors that are allowed the fastest way to stay below it.
-fn fastest(auto: &Auto, system: &System, like: &Point, allowed: &[f64], among: &[Setting]) -> Outcome<Vec<Choice>> {
+fn fastest(
+    auto: &Auto,
+    system: &System,
+    like: &Point,
+    allowed: &[f64],
+    among: &[Setting],
+) -> Outcome<Vec<Option<Choice>>> {
     let mut best: Vec<Option<Choice>> = vec![None; allowed.len()];
     for setting in among.iter().copied() {
         let answer = auto.run(&setting.constants())?;
@@ -138,21 +151,30 @@ fn fastest(auto: &Auto, system: &System, like: &Point, allowed: &[f64], among: &
             }
         }
     }
-    let none = |allowed: f64| format!("AUTO gets to Ω = 10 with errors below {allowed:.0e} in none of the ways tried");
-    best.into_iter().zip(allowed).map(|(best, allowed)| best.ok_or_else(|| none(*allowed).into())).collect()
+    Ok(best)
 }
 
-/// Both codes in turn: seconds of foldline, of AUTO, of AUTO's start, and the ratio without that.
-fn in_turn(auto: &Auto, setting: Setting, repetitions: usize, mut own: impl FnMut()) -> Outcome<[f64; 4]> {
+/// Both codes in turn, each with what it takes to start and for a first point: seconds of foldline, of AUTO, then of the starts, and the
+/// ratio without those.
+fn in_turn(
+    auto: &Auto,
+    setting: Setting,
+    repetitions: usize,
+    mut own: impl FnMut(),
+    mut own_start: impl FnMut(),
+) -> Outcome<[f64; 5]> {
     let changes = setting.constants();
-    let mut all = [const { Vec::new() }; 4];
+    let mut all = [const { Vec::new() }; 5];
     for _ in 0..repetitions {
-        // Of AUTO's time what it takes to start is taken off; the first run after a pause is the same here.
+        // The first run after a pause is not the same: AUTO's start is taken off.
         own();
         let ours = clock::timed(&mut own).0;
+        let our_start = clock::timed(&mut own_start).0;
         let theirs = auto.run(&changes)?.cpu;
-        let idle = auto.run(&[&changes[..], &[("NMX", "1")]].concat())?.cpu;
-        all.iter_mut().zip([ours, theirs, idle, (theirs - idle) / ours]).for_each(|(all, one)| all.push(one));
+        let their_start = auto.run(&[&changes[..], &[("NMX", "1")]].concat())?.cpu;
+        let ratio = (theirs - their_start) / (ours - our_start);
+        let one = [ours, theirs, our_start, their_start, ratio];
+        all.iter_mut().zip(one).for_each(|(all, one)| all.push(one));
     }
     Ok(all.map(|values| clock::median(&values)))
 }
@@ -170,7 +192,7 @@ pub fn compared(place: &Workplace) -> Outcome<String> {
     let own: Vec<Branch> =
         TOLERANCES.iter().map(|t| rotor::run(&study, &plan(*t), starts.clone()).branches.swap_remove(0)).collect();
     let own_errors: Vec<[f64; 2]> =
-        own.iter().map(|branch| errors(&system, branch.points.iter())).collect::<Outcome<_>>()?;
+        own.iter().map(|branch| errors(&system, found_points(branch))).collect::<Outcome<_>>()?;
     let allowed: Vec<f64> = own_errors.iter().map(|[period, radius]| period.max(*radius)).collect();
     let all: Vec<Setting> = Setting::all().collect();
     let plain: Vec<Setting> = all.iter().copied().filter(|setting| setting.is_plain()).collect();
@@ -198,28 +220,50 @@ pub fn compared(place: &Workplace) -> Outcome<String> {
         // Many, since each is short beside the time for which something else slows the machine down.
         let repetitions = if meant { 12 * place.repetitions() } else { 3 * place.repetitions() };
         let plan = plan(tolerance);
+        let mut none = plan.clone();
+        none.branches.iter_mut().for_each(|branch| branch.max_points = 0);
         let mut rows = Vec::new();
-        let mut seconds = Vec::new();
-        for choice in choices.iter().map(|choices| choices[k]).chain(meant.then_some(usual)) {
-            let [ours, theirs, idle, ratio] = in_turn(&auto, choice.setting, repetitions, || {
-                rotor::run(&study, &plan, starts.clone());
-            })?;
+        let (mut seconds, mut start) = (Vec::new(), Vec::new());
+        let tuned = choices.iter().map(|choices| choices[k]);
+        for choice in tuned.chain(meant.then_some(Some(usual))) {
+            let Some(choice) = choice else {
+                rows.push([const { String::new() }; 8].map(|_| "·".to_string()));
+                if meant {
+                    said.push("·".to_string());
+                }
+                continue;
+            };
+            let [ours, theirs, our_start, their_start, ratio] = in_turn(
+                &auto,
+                choice.setting,
+                repetitions,
+                || drop(rotor::run(&study, &plan, starts.clone())),
+                || drop(rotor::run(&study, &none, starts.clone())),
+            )?;
             seconds.push(ours);
+            start.push(our_start);
             let Choice { setting, errors, points, iterations, .. } = choice;
             let Setting { degree, intervals, first, step } = setting;
             let name = format!("AUTO, NTST {intervals}, NCOL {degree}, DS {first}, DSMAX {step}");
-            rows.push(row(name, [points, iterations], errors, theirs, [time(idle), digits(ratio)]));
+            rows.push(row(name, [points, iterations], errors, theirs, [time(their_start), digits(ratio)]));
             if meant {
                 said.push(digits(ratio));
             }
         }
         let name = format!("foldline, tolerance {tolerance:.0e}");
         let counts = [own[k].points.len(), own[k].cost().newton];
-        table.row(&row(name, counts, own_errors[k], clock::median(&seconds), [const { String::new() }; 2]));
+        table.row(&row(
+            name,
+            counts,
+            own_errors[k],
+            clock::median(&seconds),
+            [time(clock::median(&start)), String::new()],
+        ));
         rows.iter().for_each(|row| table.row(row));
     }
     Ok(format!(
-        "Errors are the largest of all points, relative; AUTO's time for its start and a first point is not counted in the ratios (medians). \
+        "Errors are the largest of all points after the first, which is given, relative; what either code takes to start and for a first point \
+         is not counted in the ratios (medians). \
          At tolerance {:.0e} foldline is {} times as fast as AUTO with NTST {}, NCOL {}, DS {}, DSMAX {} (target 10), {} times as with the mesh and the \
          largest step of {} that are the fastest at which AUTO's larger error is not larger, and {} times as with the fastest of {}, if degree and \
          first step are chosen too.\n\n{}",
