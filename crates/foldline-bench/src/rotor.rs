@@ -27,7 +27,12 @@ pub fn study(place: &Workplace, name: &str) -> Outcome<Study> {
 /// The first point of every branch of a study that starts at a seed, as what an interrupted run has: a run that goes on
 /// from there samples no attractors.
 pub fn beginnings(study: &Study) -> Diagram {
-    let mut plan = study.plan.clone();
+    beginnings_at(study, study.plan.tolerance)
+}
+
+/// The same as accurate as `tolerance`: a closed branch does not find back to a start that is less accurate than itself.
+pub fn beginnings_at(study: &Study, tolerance: f64) -> Diagram {
+    let mut plan = Plan { tolerance, ..study.plan.clone() };
     for branch in &mut plan.branches {
         (branch.max_points, branch.switching) = (0, Switching::default());
     }

@@ -314,9 +314,16 @@ pub fn compared(place: &Workplace) -> Outcome<String> {
         let plan = Plan { tolerance, ..study.plan.clone() };
         clock::timed(|| rotor::run(&study, &plan, starts.clone()))
     };
-    let exact = own(EXACT).1;
+    let plan = Plan { tolerance: EXACT, ..study.plan.clone() };
+    let exact = rotor::run(&study, &plan, rotor::beginnings_at(&study, EXACT));
+    let closed =
+        |branch: &Branch| branch.points.len() < plan.branches[0].max_points && branch.ends.iter().all(Option::is_some);
+    if !exact.branches.iter().all(closed) {
+        return Err("what both codes are compared with is not complete".into());
+    }
     let wanted = study.plan.tolerance;
     let all: usize = exact.branches.iter().map(|branch| branch.special.len()).sum();
+    eprintln!("  {all} special points at tolerance {EXACT:.0e}");
     let auto = Auto::new(place, "rotor", "auto-diagrams")?;
     let within = format!("to {wanted:.0e}");
     let mut table = Table::new(&[
