@@ -30,6 +30,10 @@ const USAGE: &str = "foldline-bench [--peers] [--only PART] [--quick] [--write]
   --quick      fewer repetitions, no instruction counts
   --write      write the report to benches/results/DATE.md";
 
+/// What `foldline` allocates with.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 /// Whatever goes wrong ends the benchmark with a sentence.
 type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
 

@@ -5,7 +5,7 @@ use crate::report::{Table, digits, time};
 use crate::workplace::Workplace;
 use crate::{Outcome, clock, rotor};
 use foldline::contract::ZeroProblem;
-use foldline::diagram::Point;
+use foldline::diagram::{Branch, Point, Solution};
 use foldline::explore::System;
 use foldline::problem::mesh;
 
@@ -27,6 +27,30 @@ pub fn measured(system: &System, point: &Point, free: usize, intervals: usize) -
         problem.examine(&u);
     });
     Ok((newton, examination))
+}
+
+/// Seconds for the Newton iterations of a branch and nothing else: those with a new matrix and those with one that was kept, each
+/// timed at the points that were found, on their meshes.
+pub fn newton_of(system: &System, branch: &Branch, free: usize) -> Outcome<f64> {
+    let mut total = 0.0;
+    for point in branch.points.iter().filter(|point| point.position != 0) {
+        let Solution::Cycle(cycle) = &point.solution else { return Err("no cycle".into()) };
+        let (mut problem, mut u) = rotor::on_mesh(system, point, free, &cycle.mesh)?;
+        let size = u.len();
+        let (mut r, mut du, mut row) = (vec![0.0; size], vec![0.0; size], vec![0.0; size]);
+        row[size - 1] = 1.0;
+        let fresh = clock::best(|| {
+            let _ = iterate(&mut problem, &mut u, &row, &mut r, &mut du);
+        });
+        let kept = clock::best(|| {
+            problem.residual(&u, &mut r);
+            r[size - 1] = 0.0;
+            problem.solve(&r, &mut du);
+        });
+        let new = point.cost.factorisations.min(point.cost.newton);
+        total += new as f64 * fresh + (point.cost.newton - new) as f64 * kept;
+    }
+    Ok(total)
 }
 
 fn iterate(problem: &mut dyn ZeroProblem, u: &mut [f64], row: &[f64], r: &mut [f64], du: &mut [f64]) -> Outcome<()> {
