@@ -244,6 +244,11 @@ pub trait Monitor: Send + Sync {
         self.confirms(at)
     }
 
+    /// The value of the parameter at which a branch that comes close at `at` meets simpler solutions, where that can be computed from these.
+    fn meeting(&self, _at: &Point) -> Option<f64> {
+        None
+    }
+
     /// On what of a point the value depends, and whether it is confirmed.
     fn reads(&self) -> Sight {
         Sight::Stability
@@ -256,6 +261,11 @@ pub trait Monitor: Send + Sync {
 
     /// By how much an event of this kind changes the number of unstable eigenvalues or multipliers.
     fn jump(&self) -> usize;
+
+    /// The monitor of the same events that reads the spectrum alone, for branches along which the parameter moves by no more than rounding.
+    fn by_spectrum(&self) -> Option<Box<dyn Monitor>> {
+        None
+    }
 
     /// How the branch ends at a located event, if it does; `parameter` is that of the continuation there.
     fn ending(&self, _at: &Point, _parameter: f64) -> Option<Ending> {

@@ -137,8 +137,9 @@ impl Follow<'_> {
     }
 
     /// Whether the step passes the place where the branch meets simpler solutions. If so the step ends a little before it.
-    /// The place itself is not solved for: it is a branch point, and the deviation from the simpler solution grows like the
-    /// square root of the distance in the parameter, which gives the parameter there well enough to recognise it.
+    /// The place itself is not solved for: it is a branch point. Where the simpler solutions do not say where it lies, the deviation
+    /// from them, which grows like the square root of the distance in the parameter, gives the parameter there well enough to
+    /// recognise it.
     pub(super) fn collapsed(
         &mut self,
         left: &Station,
@@ -182,7 +183,8 @@ impl Follow<'_> {
                 return Err(Failure::Singular);
             }
             let share = (monitor.value(&left.point, &near.point) / values[0]).powi(2);
-            let parameter = (near.parameter() - share * left.parameter()) / (1.0 - share);
+            let extrapolated = (near.parameter() - share * left.parameter()) / (1.0 - share);
+            let parameter = monitor.meeting(&near.point).unwrap_or(extrapolated);
             return Ok(Some(Step {
                 right: near,
                 end: Some(Ending::Joined { at: monitor.kind(), parameter }),

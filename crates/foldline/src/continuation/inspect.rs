@@ -22,6 +22,20 @@ pub enum Found {
     Inserted(Box<Station>, f64),
 }
 
+/// What tells folds and branch points between two stations.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Drift {
+    /// The slope of the parameter along the branch, and the spectrum.
+    Slope,
+    /// The spectrum alone: the slope is lost in rounding.
+    Spectrum,
+    /// Nothing: the parameter stands, and no multiplier passes 1.
+    None,
+}
+
+/// Errors of a multiplier within which it may be 1.
+const NEUTRAL: f64 = 10.0;
+
 /// Halvings of one step before what is left is recorded as it is.
 const DEEPEST: usize = 14;
 
@@ -57,17 +71,35 @@ impl Follow<'_> {
         self.monitors.iter().map(|m| m.value(&station.point, &station.point)).collect()
     }
 
-    /// Whether the parameter does not change along the branch, but for rounding. Then every solution of the family has an
-    /// eigenvalue 0 (a second multiplier 1), and neither the sign of that nor of the change of the parameter means anything.
-    /// Next to an orbit of infinite period the matrix is as ill-conditioned as the multipliers are far apart, and rounding
-    /// reaches farther: there a slope that a whole step shows less than the tolerance means nothing either, unless a multiplier
-    /// is so close to 1 that the branch might turn (in a canard explosion it does, within as little).
-    fn stands(&self, left: &Station, right: &Station, length: f64) -> bool {
+    /// What the change of the parameter says between two stations.
+    ///
+    /// Where the parameter stands and a second multiplier is 1 within its error, as in a family at one value of the parameter, neither the
+    /// sign of that multiplier nor that of the slope means anything. Next to an orbit of infinite period the matrix is as
+    /// ill-conditioned as the multipliers are far apart, and rounding reaches farther: there a slope that a whole step shows less
+    /// than the tolerance means nothing either, as long as no multiplier comes near 1. In a canard explosion the slope is lost in
+    /// rounding and a multiplier passes 1 all the same: that is a fold, and the spectrum alone shows where.
+    fn drift(&self, left: &Station, right: &Station, length: f64) -> Drift {
         let far = |station: &Station| station.point.free_spectrum().iter().all(|z| z.norm().ln().abs() > CRITICAL);
         let certain = left.point.unstable == right.point.unstable && far(left) && far(right);
+        let slope = left.slope().abs().max(right.slope().abs());
         let whole = length > WHOLE && left.point.solution.period().is_some() && certain;
-        let least = if whole { STANDS.max(UNSEEN * self.settings.tolerance) } else { STANDS };
-        left.slope().abs().max(right.slope().abs()) < least
+        if whole && slope < STANDS.max(UNSEEN * self.settings.tolerance) {
+            return Drift::None;
+        }
+        match slope < STANDS {
+            false => Drift::Slope,
+            true if self.is_neutral(left) && self.is_neutral(right) => Drift::None,
+            true => Drift::Spectrum,
+        }
+    }
+
+    /// Whether an eigenvalue is 0 (a second multiplier is 1) as far as its error tells. Of equilibria every one is at which the parameter
+    /// stands: the slope is the determinant of f_x but for a factor that is not small.
+    fn is_neutral(&self, station: &Station) -> bool {
+        let trust = station.point.trust;
+        let spectrum = if trust.spectrum.is_nan() { 0.0 } else { trust.spectrum };
+        let error = spectrum.max(trust.trivial_defect);
+        station.mesh.is_empty() || self.problem.margin(&station.point) <= NEUTRAL * error
     }
 
     /// Everything special between two stations.
@@ -92,7 +124,8 @@ impl Follow<'_> {
         }
         let right = carried.as_ref().unwrap_or(right);
         let (at_left, at_right) = (self.monitored(left), self.monitored(right));
-        let standing = self.stands(left, right, stretch.length.abs());
+        let drift = self.drift(left, right, stretch.length.abs());
+        let standing = drift == Drift::None;
         let mut located: Vec<(Kind, usize, Located)> = Vec::new();
         let mut others: Vec<Option<usize>> = Vec::new();
         let (mut lost, mut leaps) = (false, false);
@@ -101,10 +134,21 @@ impl Follow<'_> {
             let mut kind = self.monitors[k].kind();
             let pitchfork = kind == Kind::BranchPoint
                 && located.iter().any(|(kind, jump, _)| *kind == Kind::BranchPoint && *jump == 0);
-            if pitchfork || (standing && matches!(kind, Kind::Fold | Kind::BranchPoint)) {
+            let without = match kind {
+                Kind::Fold => standing,
+                Kind::BranchPoint => drift != Drift::Slope,
+                _ => false,
+            };
+            if pitchfork || without {
                 continue;
             }
-            let monitor = &*self.monitors[k];
+            let own = &*self.monitors[k];
+            let by_spectrum = own.by_spectrum().filter(|_| drift == Drift::Spectrum);
+            let monitor = by_spectrum.as_deref().unwrap_or(own);
+            let values = match &by_spectrum {
+                Some(other) => [left, right].map(|station| other.value(&left.point, &station.point)),
+                None => values,
+            };
             // A value that was asked for and is met at the end of a step, as at a bound, is there; at the beginning it was.
             if kind == Kind::Mark && values.contains(&0.0) {
                 let again =
@@ -138,7 +182,7 @@ impl Follow<'_> {
             if kind == Kind::Fold
                 && self.settings.stability
                 && left.point.unstable == right.point.unstable
-                && found.as_ref().is_ok_and(|found| self.is_symmetric(&found.station.point))
+                && found.as_ref().is_ok_and(|found| self.is_mirrored([left, right], &found.station.point))
             {
                 (kind, jump) = (Kind::BranchPoint, 0);
             }
@@ -256,10 +300,16 @@ impl Follow<'_> {
         out
     }
 
-    /// Whether a point is its own mirror image, as far as its ranges tell.
-    fn is_symmetric(&self, point: &Point) -> bool {
-        let images = self.settings.reflections.iter().filter(|r| r.contains(&true));
-        images.into_iter().any(|r| point.difference(point, &self.settings.scales, r) < SYMMETRIC)
+    /// Whether a branch of asymmetric solutions passes a symmetric one at `at` and goes on as its own mirror image: the point is
+    /// symmetric as far as its ranges tell, and both ends are less so. Along a branch of symmetric solutions all three are.
+    fn is_mirrored(&self, ends: [&Station; 2], at: &Point) -> bool {
+        let images = || self.settings.reflections.iter().filter(|r| r.contains(&true));
+        let asymmetry = |point: &Point| {
+            images().map(|r| point.difference(point, &self.settings.scales, r)).fold(f64::INFINITY, f64::min)
+        };
+        let here = asymmetry(at);
+        let least = 2.0 * here.max(self.settings.tolerance);
+        here < SYMMETRIC && ends.iter().all(|end| asymmetry(&end.point) > least)
     }
 
     fn either_confirms(&self, monitor: usize, left: &Station, right: &Station) -> bool {

@@ -83,7 +83,11 @@ impl Monitor for Shrinks<'_> {
     }
 
     fn confirms(&self, at: &Point) -> bool {
-        let Solution::Cycle(cycle) = &at.solution else { return false };
+        self.meeting(at).is_some()
+    }
+
+    fn meeting(&self, at: &Point) -> Option<f64> {
+        let Solution::Cycle(cycle) = &at.solution else { return None };
         let mean = Shrinks::mean(&cycle.uniform(SAMPLES), cycle.dim());
         hopf::lies_near(self.field, &at.parameters, self.free, self.scales, &mean, TAU / cycle.period)
     }

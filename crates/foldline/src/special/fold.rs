@@ -28,10 +28,45 @@ impl Monitor for Fold {
         1
     }
 
-    fn others_unstable(&self, at: &Point) -> Option<usize> {
-        let centre = if matches!(at.solution, Solution::Cycle(_)) { 1.0 } else { 0.0 };
-        super::others_unstable(at, 1, |z| (z - centre).norm())
+    fn by_spectrum(&self) -> Option<Box<dyn Monitor>> {
+        Some(Box::new(Passage))
     }
+
+    fn others_unstable(&self, at: &Point) -> Option<usize> {
+        super::others_unstable(at, 1, |z| (z - critical(at)).norm())
+    }
+}
+
+/// A multiplier 1 (an eigenvalue 0): the fold of a branch along which the parameter moves so little that its slope is rounding, as in a canard
+/// explosion.
+struct Passage;
+
+impl Monitor for Passage {
+    fn kind(&self) -> Kind {
+        Kind::Fold
+    }
+
+    fn value(&self, _reference: &Point, at: &Point) -> f64 {
+        super::distance_product(at.free_spectrum(), critical(at))
+    }
+
+    fn confirms(&self, at: &Point) -> bool {
+        const NEAR: f64 = 1e-2;
+        at.free_spectrum().iter().any(|z| (z - critical(at)).norm() < NEAR)
+    }
+
+    fn jump(&self) -> usize {
+        1
+    }
+
+    fn others_unstable(&self, at: &Point) -> Option<usize> {
+        Fold.others_unstable(at)
+    }
+}
+
+/// The eigenvalue or multiplier at a fold.
+fn critical(at: &Point) -> f64 {
+    if matches!(at.solution, Solution::Cycle(_)) { 1.0 } else { 0.0 }
 }
 
 /// The same where something is held along a curve in two parameters, and one of them is to turn alone.

@@ -48,11 +48,20 @@ fn frequency(at: &Point) -> Option<f64> {
     (closest.re.abs() < 1e-4 * closest.im).then_some(closest.im)
 }
 
+/// Newton update, relative, of an equilibrium whose square is rounding.
+const CONVERGED: f64 = 1e-8;
+
+/// First step of the search for a Hopf point, as a share of its reach: next to the root of rounding, below which the difference of two
+/// growth rates is noise.
+const NEXT: f64 = 1e-6;
+/// How often one of its steps is halved.
+const SHORTER: i32 = 8;
+
 /// How far from a small cycle its Hopf point is looked for, relative to 1 + |parameter|.
 const REACH: f64 = 1e-2;
 
-/// Whether the equilibrium next to `state` has a Hopf point near these parameter values, with a frequency close to `omega`:
-/// whether the growth rate of that pair vanishes there.
+/// The value of parameter `free` at which the equilibrium next to `state` has a Hopf point with a frequency close to `omega`: where the
+/// growth rate of that pair vanishes. `None` if that is not near these parameter values.
 pub fn lies_near(
     field: &dyn VectorField,
     parameters: &[f64],
@@ -60,52 +69,59 @@ pub fn lies_near(
     scales: &[f64],
     state: &[f64],
     omega: f64,
-) -> bool {
-    let Some(&value) = parameters.get(free) else { return false };
+) -> Option<f64> {
+    let value = *parameters.get(free)?;
     let mut x = state.to_vec();
     let mut growth = |at: f64| {
         let mut there = parameters.to_vec();
         there[free] = at;
-        growth_rate(field, &there, scales, &mut x, omega)
+        let mut beside = x.clone();
+        let rate = growth_rate(field, &there, scales, &mut beside, omega)?;
+        x = beside;
+        Some(rate)
     };
     // Secant steps along the parameter: the rate is smooth, and all that counts is whether its zero is close.
     let reach = REACH * (1.0 + value.abs());
-    let (mut a, mut b) = (value, value + 1e-2 * reach);
-    let (Some(mut at_a), Some(mut at_b)) = (growth(a), growth(b)) else { return false };
+    let (mut a, mut b) = (value, value + NEXT * reach);
+    let (mut at_a, mut at_b) = (growth(a)?, growth(b)?);
     for _ in 0..20 {
         if at_b == 0.0 || (b - a).abs() < 1e-9 * reach {
-            return (b - value).abs() < reach;
+            break;
         }
         let next = b - at_b * (b - a) / (at_b - at_a);
         if !next.is_finite() || (next - value).abs() > 10.0 * reach {
-            return false;
+            return None;
         }
-        let Some(rate) = growth(next) else { return false };
+        // Beyond a fold of the equilibria there is nothing to be found.
+        let shorter = (0..SHORTER).map(|k| b + (next - b) * 0.5f64.powi(k));
+        let (next, rate) = shorter.into_iter().find_map(|at| Some((at, growth(at)?)))?;
         (a, at_a, b, at_b) = (b, at_b, next, rate);
     }
-    (b - value).abs() < reach && (b - a).abs() < 1e-3 * reach
+    ((b - value).abs() < reach && (b - a).abs() < 1e-3 * reach).then_some(b)
 }
 
 /// Real part of the eigenvalue of frequency closest to `omega` at the equilibrium next to `x`, which is moved there.
 fn growth_rate(field: &dyn VectorField, parameters: &[f64], scales: &[f64], x: &mut [f64], omega: f64) -> Option<f64> {
     let n = x.len();
     let (mut f, mut fx, mut pivots) = (vec![0.0; n], vec![0.0; n * n], vec![0; n]);
+    let mut converged = false;
     for _ in 0..20 {
         let batch = Batch { lanes: 1, states: x, parameters: Parameters::Shared(parameters), times: &[] };
         field.linearise(batch, &[], &mut f, &mut fx, &mut []);
-        let jacobian = fx.clone();
-        lu::factorise(&mut fx, n, &mut pivots).ok()?;
-        lu::solve(&fx, n, &pivots, &mut f, 1);
-        x.iter_mut().zip(&f).for_each(|(x, d)| *x -= d);
-        let size = f.iter().zip(scales).map(|(d, s)| (d / s).abs()).fold(0.0, f64::max);
-        if !size.is_finite() {
-            return None;
-        }
-        if size < 1e-12 {
-            let spectrum = eigenvalues(&jacobian, n, scales);
+        if converged {
+            let spectrum = eigenvalues(&fx, n, scales);
             let closest = spectrum.iter().min_by(|a, b| (a.im - omega).abs().total_cmp(&(b.im - omega).abs()))?;
             return Some(closest.re);
         }
+        lu::factorise(&mut fx, n, &mut pivots).ok()?;
+        lu::solve(&fx, n, &pivots, &mut f, 1);
+        let size = (0..n).map(|i| (f[i] / (scales[i] + x[i].abs())).abs()).fold(0.0, f64::max);
+        if !size.is_finite() {
+            return None;
+        }
+        x.iter_mut().zip(&f).for_each(|(x, d)| *x -= d);
+        // Newton's method converges quadratically: what is left now is the square of that, or rounding.
+        converged = size < CONVERGED;
     }
     None
 }
