@@ -154,6 +154,7 @@ fn a_start_among_special_points_that_lie_close_together_is_met_again() {
         settings: &Settings { max_points: 40, ..settings.clone() },
         monitors: &monitors,
         collapses: &[],
+        limit: &|_| None,
         direction: -1.0,
         free: 0,
         home: Some(&home),

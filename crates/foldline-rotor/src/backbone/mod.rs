@@ -172,6 +172,7 @@ pub fn backbone(constants: &Nondimensional, law: ContactLaw, ratio: Ratio, reach
         settings: &settings,
         monitors: &[],
         collapses: &[],
+        limit: &|_| None,
         direction: 1.0,
         free: 0,
         home: None,

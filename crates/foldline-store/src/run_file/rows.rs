@@ -1,7 +1,7 @@
 //! A point as a row, and back.
 
 use super::bytes::{Checksum, pack, pack_complex, pack_pairs, unpack, unpack_complex, unpack_pairs};
-use foldline::diagram::{Branch, Cost, Cycle, Ending, Kind, Origin, Point, Solution, SpecialPoint, Trust};
+use foldline::diagram::{Branch, Connection, Cost, Cycle, Ending, Kind, Origin, Point, Solution, SpecialPoint, Trust};
 use rusqlite::Row;
 use rusqlite::types::Value;
 
@@ -230,6 +230,8 @@ pub(super) fn ending_values(ending: &Ending) -> [Value; 4] {
             (None, None, None, Some(*value))
         }
         Ending::Joined { at, parameter } => (None, Some(*at), None, Some(*parameter)),
+        // The period to the last bit as well.
+        Ending::Connecting { parameter, period, to, .. } => (Some(format!("{period:?} {to}")), None, None, Some(*parameter)),
         Ending::StepTooSmall(why)
         | Ending::MeshTooLarge(why)
         | Ending::SolutionUnbounded(why)
@@ -267,7 +269,17 @@ pub(super) fn ending_in(row: &Row) -> Result<Ending, String> {
         "not-finite" => Ending::NotFinite(detail()?),
         "no-start" => Ending::NoStart(detail()?),
         "stopped" => Ending::Stopped,
-        other => return Err(format!("unknown ending \"{other}\"")),
+        other => {
+            let unknown = || format!("unknown ending \"{other}\"");
+            let detail = detail()?;
+            let (period, to) = detail.split_once(' ').ok_or_else(unknown)?;
+            Ending::Connecting {
+                connection: Connection::from_name(other).ok_or_else(unknown)?,
+                parameter: value()?,
+                period: period.parse().map_err(|_| unknown())?,
+                to: to.to_string(),
+            }
+        }
     })
 }
 

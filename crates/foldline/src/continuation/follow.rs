@@ -31,6 +31,8 @@ pub struct Follow<'w> {
     pub monitors: &'w [Box<dyn Monitor + 'w>],
     /// Sign changes that end the branch: it has met the branch of simpler solutions that it comes from.
     pub collapses: &'w [Box<dyn Monitor + 'w>],
+    /// The orbit of infinite period to which the branch tends at a point, if the point shows one.
+    pub limit: &'w dyn Fn(&Point) -> Option<Ending>,
     /// +1 towards larger positions, -1 towards smaller.
     pub direction: f64,
     /// Index of the continuation parameter among the parameters of a point.
@@ -56,8 +58,10 @@ const CROSSING: f64 = 2e-3;
 
 /// Growth of a step over the one before, at most: the prediction is by the cubic through both ends of that.
 const GROWTH: f64 = 2.0;
-/// Growth of the period while the parameter stands still, having moved before, that means that the period has no bound.
+/// Growth of the period from which on the branch may tend to an orbit of infinite period …
 const LONG: f64 = 3.0;
+/// … which is looked for whenever it has grown by this much more.
+const AGAIN: f64 = 1.1;
 /// Slope of a branch in its parameter below which it does not change along the branch but for rounding.
 pub(super) const STANDS: f64 = 1e-9;
 /// Change of the parameter, over so many equilibria, below which it has come to a stand.
@@ -66,8 +70,6 @@ const PATIENCE: usize = 100;
 /// Share of what is allowed midway of a step that the next one is to reach at most: what is off there, as a share of the step, grows with
 /// its cube.
 const BENT: f64 = 0.8;
-/// Change of the logarithm of the period that shows whether the parameter still moves with it.
-const SHOWN: f64 = 0.01;
 /// Steps given up in turn because no permitted mesh is fine enough, until the side ends for that.
 const COARSE: usize = 6;
 
@@ -88,12 +90,9 @@ pub fn follow(
         walk.trail(&before, between)
     });
     let first_period = walk.home.unwrap_or(&left.point).solution.free_period();
-    let (mut ever_moved, mut moved, mut still) = (left.slope().abs() > STANDS, true, 0);
-    let mut stirred = ever_moved;
+    let mut stirred = left.slope().abs() > STANDS;
     let mut stand = (left.parameter(), emitted);
-    // Parameter and period where the parameter was last seen to move, or to stand.
-    let mut mark = left.point.solution.free_period().map(|period| (left.parameter(), period));
-    let mut moving = mark;
+    let mut long = first_period.map(|first| LONG * first);
     loop {
         let outward = |bound: f64| (left.parameter() - bound).abs() <= 1e-12 * (1.0 + bound.abs());
         let [low, high] = walk.settings.range;
@@ -148,12 +147,9 @@ pub fn follow(
                     };
                     coarse += usize::from(matches!(why, Failure::Mesh(_)));
                     if step < walk.settings.min_step || coarse == COARSE {
-                        // Where the period grows and nothing else changes, the end is foreseeable.
-                        return match (left.point.solution.free_period(), moving) {
-                            (Some(period), Some((_, then))) if !moved && period > then => {
-                                Ending::PeriodUnbounded(period)
-                            }
-                            _ => walk.short_end(&left, &tried, &why, past),
+                        return match (walk.limit)(&left.point) {
+                            Some(limit) => limit,
+                            None => walk.short_end(&left, &tried, &why, past),
                         };
                     }
                     walk.sharpen(&mut left, step, &mut cost);
@@ -218,22 +214,16 @@ pub fn follow(
         if let Some(ending) = walk.unbounded(&left, &right, past) {
             return ending;
         }
-        if let (Some(first), Some(now), Some(then)) = (first_period, right.point.solution.free_period(), mark) {
-            let here = (right.parameter(), now);
-            if (now / then.1).ln().abs() > SHOWN {
-                moved = walk.moves(then, here);
-                still = if moved { 0 } else { still + 1 };
-                ever_moved |= moved;
-                mark = Some(here);
-                if moved {
-                    moving = mark;
-                }
+        if let (Some(first), Some(now), Some(next)) = (first_period, right.point.solution.free_period(), long)
+            && now > next
+        {
+            if let Some(limit) = (walk.limit)(&right.point).filter(|_| !walk.moves(&left, &right)) {
+                return limit;
             }
-            let since = moving.map_or(first, |(_, period)| period);
-            let grown = still > 0 && now > LONG * since || still > 1 && now > LONG * first;
-            if now > walk.settings.period_growth * first || (ever_moved && grown) {
+            if now > walk.settings.period_growth * first {
                 return Ending::PeriodUnbounded(now);
             }
+            long = Some(AGAIN * now);
         }
         trail = Some(walk.trail(&left, between));
         left = right;
@@ -259,11 +249,12 @@ impl Follow<'_> {
         self.problem.anchor(&station.u);
     }
 
-    /// Whether the parameter still moves where the period changes, from one pair of both to another: dλ/d ln T, which tends to
-    /// zero with the distance from an orbit of infinite period, exceeds the tolerance.
-    fn moves(&self, then: (f64, f64), now: (f64, f64)) -> bool {
-        let change = (now.0 - then.0).abs();
-        change > 0.1 * self.settings.tolerance * (1.0 + now.0.abs()) * (now.1 / then.1).ln().abs()
+    /// True if the parameter still moves where the period changes: dλ/d ln T, which tends to zero with the distance from an orbit of
+    /// infinite period, exceeds the tolerance.
+    fn moves(&self, left: &Station, right: &Station) -> bool {
+        let period = |station: &Station| station.point.solution.free_period().unwrap_or(f64::NAN);
+        let (change, here) = ((right.parameter() - left.parameter()).abs(), right.parameter().abs());
+        change > 0.1 * self.settings.tolerance * (1.0 + here) * (period(right) / period(left)).ln().abs()
     }
 
     /// Where steps are short, the curve is so curved that errors of a tolerance would show: the mesh is made for errors that are

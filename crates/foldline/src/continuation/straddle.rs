@@ -14,11 +14,14 @@ use super::{Failure, Settings};
 use crate::contract::{Monitor, ZeroProblem};
 use crate::diagram::Cost;
 
-/// Distances between nodes, as shares of the stretch, in the order in which they are tried; the last two where there is no mesh, as far as
-/// Newton's method still finds the branch there.
+/// Distances between nodes, as shares of the stretch, in the order in which they are tried; the last two as far as Newton's method still
+/// finds the branch there.
 const SPACINGS: [f64; 5] = [0.25, 0.1, 0.04, 4e-3, 4e-4];
-/// How many of them where there is a mesh: closer by, its rounding shows.
+/// How many of them are enough on a mesh: closer by, its rounding shows.
 const ON_A_MESH: usize = 3;
+/// Share of its last change by which an interpolated zero may still be off: the error of a cubic shrinks with the fourth power of the
+/// spacing, by (0.04 / 0.1)⁴.
+const REST: f64 = 0.0256;
 
 /// Share of the values next to the zero that the cubic may add to the parabola: with more the branch does not go smoothly
 /// through the place.
@@ -41,8 +44,11 @@ pub fn straddle(
     let mut root = stretch.length * values[0] / (values[0] - values[1]);
     let (mut nodes, mut stations) = ([0.0; 4], Vec::new());
     let mut moved = 0.0;
-    let count = if stretch.left.mesh.is_empty() { SPACINGS.len() } else { ON_A_MESH };
-    for (k, spacing) in SPACINGS[..count].iter().enumerate() {
+    for (k, spacing) in SPACINGS.iter().enumerate() {
+        // On a mesh closer nodes show its rounding, and serve only where the interpolation needs them.
+        if k == ON_A_MESH && !stretch.left.mesh.is_empty() && REST * moved * rate(&nodes, &stations) < settings.tolerance {
+            break;
+        }
         let there = [-1.5, -0.5, 0.5, 1.5].map(|k| root + k * spacing * stretch.length);
         let found: Result<Vec<Station>, Failure> =
             there.iter().map(|s| stretch.at(problem, settings, *s, cost)).collect();
@@ -66,8 +72,7 @@ pub fn straddle(
         return Err(Failure::Unexplained);
     }
     let mut coarse = blend(problem, &nodes, &stations, root, stretch.left, stretch.direction);
-    let floor =
-        10.0 * settings.newton_tolerance() + 0.02 * moved * coarse.slope().abs() / (1.0 + coarse.parameter().abs());
+    let floor = 10.0 * settings.newton_tolerance() + REST * moved * rate(&nodes, &stations);
     let mut error = floor;
     for _ in 0..3 {
         problem.set_mesh(&coarse.mesh);
@@ -93,6 +98,12 @@ pub fn straddle(
         }
     }
     Ok(Located { distance: root, station: coarse, error })
+}
+
+/// How fast the point changes along the curve between the inner nodes, in what [`discrepancy`] compares.
+fn rate(nodes: &[f64; 4], stations: &[Station]) -> f64 {
+    let [_, a, b, _] = stations else { return 0.0 };
+    discrepancy(&a.point, &b.point, a.parameter() - b.parameter(), b.parameter()) / (nodes[2] - nodes[1]).abs()
 }
 
 /// Values at `s` of the Lagrange polynomials of the nodes.

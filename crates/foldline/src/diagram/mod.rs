@@ -399,6 +399,36 @@ impl Family {
     }
 }
 
+/// An orbit of infinite period.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Connection {
+    /// From a saddle back to it.
+    Homoclinic,
+    /// From one saddle to another, and so on.
+    Heteroclinic,
+    /// From a saddle-node back to it: saddle-node on an invariant circle.
+    SaddleNode,
+}
+
+impl Connection {
+    /// Every one.
+    pub const ALL: [Connection; 3] = [Connection::Homoclinic, Connection::Heteroclinic, Connection::SaddleNode];
+
+    /// The name used in files and tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Connection::Homoclinic => "homoclinic",
+            Connection::Heteroclinic => "heteroclinic",
+            Connection::SaddleNode => "saddle-node-on-cycle",
+        }
+    }
+
+    /// The connection of that name.
+    pub fn from_name(name: &str) -> Option<Connection> {
+        Connection::ALL.into_iter().find(|connection| connection.name() == name)
+    }
+}
+
 /// Why one side of a branch ended.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Ending {
@@ -419,8 +449,19 @@ pub enum Ending {
     StepTooSmall(String),
     /// The mesh would need more intervals than allowed.
     MeshTooLarge(String),
-    /// The period grew beyond its limit: the cycle probably approaches a homoclinic or heteroclinic orbit.
+    /// The period grew beyond its limit, and no equilibrium was found that explains it.
     PeriodUnbounded(f64),
+    /// The cycles tend to an orbit of infinite period.
+    Connecting {
+        /// Which kind of orbit it is.
+        connection: Connection,
+        /// Value of the continuation parameter there.
+        parameter: f64,
+        /// Period of the last cycle.
+        period: f64,
+        /// The equilibria that it connects.
+        to: String,
+    },
     /// A state grew beyond every measure while the parameter came to a stand; the sentence says which is the likely cause.
     SolutionUnbounded(String),
     /// The limit on the number of points was reached.
@@ -445,6 +486,7 @@ impl Ending {
             Ending::StepTooSmall(_) => "step-too-small",
             Ending::MeshTooLarge(_) => "mesh-too-large",
             Ending::PeriodUnbounded(_) => "period-unbounded",
+            Ending::Connecting { connection, .. } => connection.name(),
             Ending::SolutionUnbounded(_) => "solution-unbounded",
             Ending::PointLimit(_) => "point-limit",
             Ending::NotFinite(_) => "not-finite",
@@ -460,9 +502,10 @@ impl Ending {
         text.lines().next().unwrap_or_default().to_string()
     }
 
-    /// Whether the branch ended where it should: at a bound, closed, or joined to another branch.
+    /// True if the branch ended where it should: at a bound, closed, joined to another branch, or at an orbit of infinite period.
     pub fn complete(&self) -> bool {
-        matches!(self, Ending::Bound(_) | Ending::Closed | Ending::Joined { .. } | Ending::Asked(_))
+        use Ending::{Asked, Bound, Closed, Connecting, Joined};
+        matches!(self, Bound(_) | Closed | Joined { .. } | Asked(_) | Connecting { .. })
     }
 }
 
@@ -480,7 +523,15 @@ impl fmt::Display for Ending {
             Ending::StepTooSmall(why) => write!(f, "step too small: {why}"),
             Ending::MeshTooLarge(why) => write!(f, "mesh too large: {why}"),
             Ending::PeriodUnbounded(period) => {
-                write!(f, "period grew to {period:.4}: probably close to a homoclinic or heteroclinic orbit")
+                write!(f, "period grew to {period:.4}, and no equilibrium was found next to the cycle that explains it")
+            }
+            Ending::Connecting { connection, parameter, period, to } => {
+                let orbit = match connection {
+                    Connection::Homoclinic => "an orbit homoclinic to the saddle",
+                    Connection::Heteroclinic => "a heteroclinic cycle between the saddles",
+                    Connection::SaddleNode => "a saddle-node on the cycle, at",
+                };
+                write!(f, "approaches {orbit} {to} at {parameter:.9}, the period having grown to {period:.4}")
             }
             Ending::SolutionUnbounded(why) => write!(f, "solution without bound: {why}"),
             Ending::PointLimit(points) => write!(f, "stopped at the limit of {points} points"),

@@ -7,6 +7,7 @@ use crate::continuation::{Failure, Follow, Homecoming, Item, Settings, Station, 
 use crate::contract::{Event, Examination, Monitor, Observer, Verdict, ZeroProblem};
 use crate::diagram::{Branch, Cost, Ending, Family, Kind, Origin, Point, Solution, SpecialPoint};
 use crate::problem::{Axis, Setting, Tie, cycle::CycleProblem, equilibrium::EquilibriumProblem, held::Held, mesh};
+use crate::special::connection::Limits;
 use crate::special::mark::Mark;
 use crate::special::quantity::Quantity;
 use crate::special::{self, collapse};
@@ -349,11 +350,19 @@ impl Growth<'_> {
         };
         monitors.extend(self.marks.iter().map(|mark| Box::new(*mark) as Box<dyn Monitor>));
         let home = branch.points.iter().find(|p| p.position == 0).filter(|_| branch.ends[0].is_none()).cloned();
+        let limits = Limits {
+            field: system.field,
+            free: branch.free,
+            scales: &system.scales,
+            tolerance: self.settings.tolerance,
+        };
+        let free_cycles = branch.held.is_none() && !system.field.forced();
         let mut walk = Follow {
             problem: &mut *problem,
             settings: self.settings,
             monitors: &monitors,
             collapses: &collapses,
+            limit: &|at| limits.approached(at).filter(|_| free_cycles),
             direction,
             free: branch.free,
             home: home.as_ref(),

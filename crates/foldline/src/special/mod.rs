@@ -17,6 +17,7 @@ pub mod branch_point;
 pub mod codim_two;
 pub mod collapse;
 pub mod condition;
+pub mod connection;
 pub mod cycle_form;
 pub mod fold;
 pub mod hopf;
