@@ -75,15 +75,15 @@ impl Follow<'_> {
     ///
     /// Where the parameter stands and a second multiplier is 1 within its error, as in a family at one value of the parameter, neither the
     /// sign of that multiplier nor that of the slope means anything. Next to an orbit of infinite period the matrix is as
-    /// ill-conditioned as the multipliers are far apart, and rounding reaches farther: there a slope that a whole step shows less
-    /// than the tolerance means nothing either, as long as no multiplier comes near 1. In a canard explosion the slope is lost in
+    /// ill-conditioned as the multipliers are far apart, and rounding reaches farther: there a change of the parameter below the error of
+    /// both points means nothing either, as long as no multiplier comes near 1. In a canard explosion the slope is lost in
     /// rounding and a multiplier passes 1 all the same: that is a fold, and the spectrum alone shows where.
     fn drift(&self, left: &Station, right: &Station, length: f64) -> Drift {
         let far = |station: &Station| station.point.free_spectrum().iter().all(|z| z.norm().ln().abs() > CRITICAL);
         let certain = left.point.unstable == right.point.unstable && far(left) && far(right);
         let slope = left.slope().abs().max(right.slope().abs());
-        let whole = length > WHOLE && left.point.solution.period().is_some() && certain;
-        if whole && slope < STANDS.max(UNSEEN * self.settings.tolerance) {
+        let unseen = slope * length < UNSEEN * self.settings.tolerance;
+        if unseen && left.point.solution.period().is_some() && certain {
             return Drift::None;
         }
         match slope < STANDS {
@@ -445,8 +445,7 @@ fn stays_near(now: &[Complex64], then: &[Complex64], length: f64) -> bool {
     length.abs() > LONG && angles.is_some_and(|(now, then)| now + then < NEAR)
 }
 
-/// Shortest step on which a slope below so many tolerances is none.
-const WHOLE: f64 = 1e-2;
+/// Change of the parameter along a step, in tolerances, that is lost in the errors of both ends.
 const UNSEEN: f64 = 0.2;
 /// Logarithm of a multiplier from which on a whole step does not bring it to 1.
 const CRITICAL: f64 = 3.0;
