@@ -171,6 +171,7 @@ pub fn backbone(constants: &Nondimensional, law: ContactLaw, ratio: Ratio, reach
         problem: &mut problem,
         settings: &settings,
         monitors: &[],
+        marks: &[],
         collapses: &[],
         direction: 1.0,
         free: 0,

@@ -338,7 +338,7 @@ impl Growth<'_> {
         if emitted == 0 {
             start.point.step = self.settings.first_step;
         }
-        let (mut monitors, collapses) = match branch.held {
+        let (monitors, collapses) = match branch.held {
             None => (special::monitors(branch.family), collapses(branch, &system)),
             Some((kind, first)) => {
                 let monitors = special::monitors_where_held(system.field, &system.scales, branch.family, kind);
@@ -347,12 +347,13 @@ impl Growth<'_> {
                 (monitors, ends.then(|| shrinks(&system, first, Kind::GeneralisedHopf)).into_iter().collect())
             }
         };
-        monitors.extend(self.marks.iter().map(|mark| Box::new(*mark) as Box<dyn Monitor>));
+        let marks: Vec<Box<dyn Monitor>> = self.marks.iter().map(|mark| Box::new(*mark) as Box<dyn Monitor>).collect();
         let home = branch.points.iter().find(|p| p.position == 0).filter(|_| branch.ends[0].is_none()).cloned();
         let mut walk = Follow {
             problem: &mut *problem,
             settings: self.settings,
             monitors: &monitors,
+            marks: &marks,
             collapses: &collapses,
             direction,
             free: branch.free,
