@@ -153,6 +153,7 @@ fn a_start_among_special_points_that_lie_close_together_is_met_again() {
         problem: &mut *problem_of(&system, 0, DEGREE, &start.point, false),
         settings: &Settings { max_points: 40, ..settings.clone() },
         monitors: &monitors,
+        marks: &[],
         collapses: &[],
         limit: &|_| None,
         direction: -1.0,

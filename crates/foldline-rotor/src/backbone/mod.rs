@@ -171,6 +171,7 @@ pub fn backbone(constants: &Nondimensional, law: ContactLaw, ratio: Ratio, reach
         problem: &mut problem,
         settings: &settings,
         monitors: &[],
+        marks: &[],
         collapses: &[],
         limit: &|_| None,
         direction: 1.0,

@@ -231,7 +231,9 @@ pub(super) fn ending_values(ending: &Ending) -> [Value; 4] {
         }
         Ending::Joined { at, parameter } => (None, Some(*at), None, Some(*parameter)),
         // The period to the last bit as well.
-        Ending::Connecting { parameter, period, to, .. } => (Some(format!("{period:?} {to}")), None, None, Some(*parameter)),
+        Ending::Connecting { parameter, period, to, .. } => {
+            (Some(format!("{period:?} {to}")), None, None, Some(*parameter))
+        }
         Ending::StepTooSmall(why)
         | Ending::MeshTooLarge(why)
         | Ending::SolutionUnbounded(why)

@@ -123,7 +123,7 @@ impl Follow<'_> {
     ) -> (Option<Ending>, Vec<Found>) {
         let value = |point: &Point| point.parameters.get(self.free).copied().unwrap_or(f64::NAN);
         let ending = |at: &Point, kind: Kind| {
-            let own = self.monitors.iter().filter(|monitor| monitor.kind() == kind);
+            let own = self.monitors.iter().chain(self.marks).filter(|monitor| monitor.kind() == kind);
             own.into_iter().find_map(|monitor| monitor.ending(at, value(at)))
         };
         let last = found.iter().enumerate().find_map(|(k, item)| match item {

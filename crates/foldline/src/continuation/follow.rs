@@ -29,6 +29,8 @@ pub struct Follow<'w> {
     pub settings: &'w Settings,
     /// What to look for.
     pub monitors: &'w [Box<dyn Monitor + 'w>],
+    /// Values that were asked for; they have no influence on anything else, but for where the branch ends.
+    pub marks: &'w [Box<dyn Monitor + 'w>],
     /// Sign changes that end the branch: it has met the branch of simpler solutions that it comes from.
     pub collapses: &'w [Box<dyn Monitor + 'w>],
     /// The orbit of infinite period to which the branch tends at a point, if the point shows one.

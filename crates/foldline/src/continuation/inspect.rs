@@ -3,7 +3,8 @@
 //! **Idea.** Every monitor whose sign differs at the two ends is located. The step is cut in two, and each half looked at
 //! in turn, while more than one special point is found in it, while the number of unstable multipliers changes by something
 //! that the special point found does not explain, or while a monitor bends so much that it may have touched zero and come
-//! back. What stays unexplained at the end of that is recorded as such: no silent change of stability.
+//! back. What stays unexplained at the end of that is recorded as such: no silent change of stability. Marks are no part of this search:
+//! they are located last, on the pieces that it leaves ([`super::marks`]).
 
 use super::corrector::{Failure, Station, doubted, refine};
 use super::follow::{Follow, STANDS};
@@ -61,6 +62,8 @@ pub struct History {
     pub distance: f64,
     /// Values there, one per monitor.
     pub values: Vec<f64>,
+    /// Values there, one per mark.
+    pub marks: Vec<f64>,
     /// Eigenvalues or multipliers there.
     pub spectrum: Vec<Complex64>,
 }
@@ -149,17 +152,6 @@ impl Follow<'_> {
                 Some(other) => [left, right].map(|station| other.value(&left.point, &station.point)),
                 None => values,
             };
-            // A value that was asked for and is met at the end of a step, as at a bound, is there; at the beginning it was.
-            if kind == Kind::Mark && values.contains(&0.0) {
-                let again =
-                    located.iter().any(|(kind, _, found)| *kind == Kind::Mark && found.distance == stretch.length);
-                if values[1] == 0.0 && values[0] != 0.0 && !again {
-                    let error = 10.0 * self.settings.newton_tolerance();
-                    located.push((kind, 0, Located { distance: stretch.length, station: right.clone(), error }));
-                    others.push(None);
-                }
-                continue;
-            }
             if (values[0] > 0.0) == (values[1] > 0.0) || values.iter().any(|v| v.is_nan()) {
                 continue;
             }
@@ -267,16 +259,22 @@ impl Follow<'_> {
                 let rest = stretch.length - cut;
                 let before = self.inspect(left, &middle, history, depth + 1, cost);
                 let spectrum = left.point.spectrum.clone();
-                let next = History { distance: cut, values: at_left.clone(), spectrum };
+                let next = History { distance: cut, values: at_left.clone(), marks: self.marked(left), spectrum };
                 let after = self.inspect(&middle, right, Some(&next), depth + 1, cost);
                 let inserted = Found::Inserted(Box::new(middle), rest);
                 return before.into_iter().chain([inserted]).chain(after).collect();
             }
         }
+        let known: Vec<(f64, Point)> =
+            located.iter().map(|(.., found)| (found.distance, found.station.point.clone())).collect();
+        let mut marks = self.marks_on(&stretch, right, history, &known, cost).into_iter().peekable();
         let mut count = left.point.unstable as i64;
         let mut out = Vec::new();
         let total = located.len();
         for (index, (kind, _, found)) in located.into_iter().enumerate() {
+            while let Some(mark) = marks.next_if(|mark| mark.distance < found.distance) {
+                out.push(Found::Special(self.special(Kind::Mark, mark.station, count, count, mark.error)));
+            }
             let next = if index + 1 == total {
                 right.point.unstable as i64
             } else {
@@ -284,6 +282,9 @@ impl Follow<'_> {
             };
             out.push(Found::Special(self.special(kind, found.station, count, next, found.error)));
             count = next;
+        }
+        for mark in marks {
+            out.push(Found::Special(self.special(Kind::Mark, mark.station, count, count, mark.error)));
         }
         if !explained {
             let width = (left.parameter() - right.parameter()).abs() / (1.0 + right.parameter().abs());
@@ -366,7 +367,12 @@ impl Follow<'_> {
             }
             if k == 0 && first && cycles {
                 let half = s.abs();
-                let from = |values: &[f64]| History { distance: half, values: values.to_vec(), spectrum: Vec::new() };
+                let from = |values: &[f64]| History {
+                    distance: half,
+                    values: values.to_vec(),
+                    marks: Vec::new(),
+                    spectrum: Vec::new(),
+                };
                 let touches = self.may_touch(&from(at_left), &here, at_right, half)
                     || self.may_touch(&from(at_right), &here, at_left, half);
                 if !touches {

@@ -282,6 +282,22 @@ pub fn locate(
     values: [f64; 2],
     cost: &mut Cost,
 ) -> Result<Located, Failure> {
+    locate_within(problem, settings, stretch, [0.0, stretch.length], monitor, values, cost)
+}
+
+/// As [`locate`], between two distances along the stretch at which the monitor has those values.
+///
+/// # Errors
+/// See [`locate`].
+pub(super) fn locate_within(
+    problem: &mut dyn ZeroProblem,
+    settings: &Settings,
+    stretch: &Stretch,
+    ends: [f64; 2],
+    monitor: &dyn Monitor,
+    values: [f64; 2],
+    cost: &mut Cost,
+) -> Result<Located, Failure> {
     let reference = &stretch.left.point;
     let mut evaluate = |s: f64| {
         let (u, tangent) = stretch.arrived(problem, settings, s, cost)?;
@@ -296,8 +312,7 @@ pub fn locate(
         Kind::Fold => stretch.turning(),
         _ => values[0] / (values[0] - values[1]),
     };
-    let (distance, mut coarse, rise) =
-        chandrupatla(&mut evaluate, [0.0, stretch.length], values, first, [resolution, 0.5 * JUMP])?;
+    let (distance, mut coarse, rise) = chandrupatla(&mut evaluate, ends, values, first, [resolution, 0.5 * JUMP])?;
     // A change of sign without a zero: the two ends lie on different branches.
     let smallest = monitor.value(reference, &coarse.point).abs();
     if smallest > JUMP * values[0].abs().max(values[1].abs()) {

@@ -11,6 +11,7 @@
 //! | whether a step may be accepted | `judge` |
 //! | why a side ends | `ends` |
 //! | what lies between two accepted points | [`inspect`] |
+//! | values that were asked for, on the way | `marks` |
 //! | on which side of it a point is | `side` |
 //! | zero of a monitor along the curve | [`locate`] |
 //! | the same where branches cross | [`straddle`] |
@@ -24,6 +25,7 @@ pub mod follow;
 pub mod inspect;
 mod judge;
 pub mod locate;
+mod marks;
 mod side;
 mod step;
 pub mod straddle;

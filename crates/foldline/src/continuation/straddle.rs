@@ -46,7 +46,10 @@ pub fn straddle(
     let mut moved = 0.0;
     for (k, spacing) in SPACINGS.iter().enumerate() {
         // On a mesh closer nodes show its rounding, and serve only where the interpolation needs them.
-        if k == ON_A_MESH && !stretch.left.mesh.is_empty() && REST * moved * rate(&nodes, &stations) < settings.tolerance {
+        if k == ON_A_MESH
+            && !stretch.left.mesh.is_empty()
+            && REST * moved * rate(&nodes, &stations) < settings.tolerance
+        {
             break;
         }
         let there = [-1.5, -0.5, 0.5, 1.5].map(|k| root + k * spacing * stretch.length);

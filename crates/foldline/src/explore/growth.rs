@@ -339,7 +339,7 @@ impl Growth<'_> {
         if emitted == 0 {
             start.point.step = self.settings.first_step;
         }
-        let (mut monitors, collapses) = match branch.held {
+        let (monitors, collapses) = match branch.held {
             None => (special::monitors(branch.family), collapses(branch, &system)),
             Some((kind, first)) => {
                 let monitors = special::monitors_where_held(system.field, &system.scales, branch.family, kind);
@@ -348,7 +348,7 @@ impl Growth<'_> {
                 (monitors, ends.then(|| shrinks(&system, first, Kind::GeneralisedHopf)).into_iter().collect())
             }
         };
-        monitors.extend(self.marks.iter().map(|mark| Box::new(*mark) as Box<dyn Monitor>));
+        let marks: Vec<Box<dyn Monitor>> = self.marks.iter().map(|mark| Box::new(*mark) as Box<dyn Monitor>).collect();
         let home = branch.points.iter().find(|p| p.position == 0).filter(|_| branch.ends[0].is_none()).cloned();
         let limits = Limits {
             field: system.field,
@@ -361,6 +361,7 @@ impl Growth<'_> {
             problem: &mut *problem,
             settings: self.settings,
             monitors: &monitors,
+            marks: &marks,
             collapses: &collapses,
             limit: &|at| limits.approached(at).filter(|_| free_cycles),
             direction,

@@ -42,6 +42,12 @@ pub struct Sampling {
 }
 
 impl Sampling {
+    /// Weight of a sample point in the mean over an interval.
+    pub fn weight(&self, point: usize) -> f64 {
+        let m = self.points.len() - 1;
+        self.integrals[m * (m + 1) + point]
+    }
+
     /// For a scheme.
     pub fn new(scheme: &Scheme) -> Sampling {
         let m = scheme.degree;

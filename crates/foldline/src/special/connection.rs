@@ -85,7 +85,13 @@ impl Limits<'_> {
     }
 
     /// The saddles next to which the cycle spends its time.
-    fn saddles(&self, period: f64, nodes: &[Node], parameters: &[f64], extents: &[f64]) -> Option<(Connection, String)> {
+    fn saddles(
+        &self,
+        period: f64,
+        nodes: &[Node],
+        parameters: &[f64],
+        extents: &[f64],
+    ) -> Option<(Connection, String)> {
         let mut left: Vec<&Node> = nodes.iter().collect();
         let (mut met, mut spent): (Vec<Vec<f64>>, f64) = (Vec::new(), 0.0);
         for _ in 0..PLACES {
@@ -128,9 +134,8 @@ impl Limits<'_> {
     fn passage(&self, saddle: &[f64], parameters: &[f64], least: f64) -> Option<f64> {
         let (_, fx) = self.linearised(saddle, parameters);
         let rates = eigenvalues(&fx, saddle.len(), self.scales).into_iter().map(|z| z.re);
-        let slowest = |sign: f64| {
-            rates.clone().map(|rate| sign * rate).filter(|rate| *rate > 0.0).fold(f64::INFINITY, f64::min)
-        };
+        let slowest =
+            |sign: f64| rates.clone().map(|rate| sign * rate).filter(|rate| *rate > 0.0).fold(f64::INFINITY, f64::min);
         let [unstable, stable] = [slowest(1.0), slowest(-1.0)];
         let saddle = unstable.is_finite() && stable.is_finite() && least > 0.0;
         saddle.then(|| (1.0 / unstable + 1.0 / stable) * (BALL / least).ln())

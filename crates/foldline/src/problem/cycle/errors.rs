@@ -104,10 +104,40 @@ impl CycleProblem<'_> {
     /// Jacobian changes sharply.
     pub(super) fn multiplier_error(&self, u: &[f64], spectrum: &[Complex64]) -> f64 {
         self.errors(u);
+        if self.is_planar() {
+            // The error of exp(∫ tr f_x), relative to the larger of 1 and itself.
+            let off = self.divergence_error(u);
+            let own = self.trace.exp();
+            return SPECTRUM_SAFE * (off.exp_m1() * own / own.max(1.0)) + SPECTRUM_ROUNDING;
+        }
         let Some(spectra) = self.corrected_multipliers(u) else { return f64::NAN };
         let before = std::iter::once(spectrum).chain(spectra.iter().map(Vec::as_slice));
         let apart: f64 = before.zip(&spectra).map(|(one, next)| spectrum_difference(one, next)).sum();
         SPECTRUM_SAFE * apart + SPECTRUM_ROUNDING
+    }
+
+    /// How far ∫ tr f_x is off: the same at other points of the intervals, along the profile without its estimated error.
+    fn divergence_error(&self, u: &[f64]) -> f64 {
+        let known = self.measured.borrow();
+        let Some(known) = known.as_ref() else { return f64::NAN };
+        let better: Vec<f64> = u.iter().zip(&known.shift).map(|(u, e)| u - e).collect();
+        let (n, size, intervals) = (self.n, self.profile_size(), self.intervals());
+        let (points, lanes) = (self.scheme.degree + 1, intervals * (self.scheme.degree + 1));
+        let (mut own, mut states) = (vec![0.0; n * lanes], vec![0.0; n * lanes]);
+        panel::by_component(&better[..size], points, n, &mut own);
+        for (states, own) in states.chunks_exact_mut(lanes).zip(own.chunks_exact(lanes)) {
+            self.sampling.sampled(own, intervals, states);
+        }
+        states.iter_mut().zip(&known.within).for_each(|(x, w)| *x -= w);
+        let (parameters, times) =
+            (self.setting.at(&better[size + 1..]), self.sampling.times(&self.mesh, self.forcing_periods));
+        let batch = Batch { lanes, states: &states, parameters: Parameters::Shared(&parameters), times: &times };
+        let (mut f, mut fx) = (vec![0.0; n * lanes], vec![0.0; n * n * lanes]);
+        self.setting.field.linearise(batch, &[], &mut f, &mut fx, &mut []);
+        let trace = |lane: usize| (0..n).map(|i| fx[(i * n + i) * lanes + lane]).sum::<f64>();
+        let mean = |j: usize| (0..points).map(|g| self.sampling.weight(g) * trace(g * intervals + j)).sum::<f64>();
+        let total: f64 = (0..intervals).map(|j| (self.mesh[j + 1] - self.mesh[j]) * mean(j)).sum();
+        (better[size] * total - self.trace).abs()
     }
 
     /// The multipliers from more accurate transitions, with the Jacobian along the profile, and along the profile without its error; before

@@ -150,6 +150,11 @@ impl<'a> CycleProblem<'a> {
         self.forcing_periods > 0
     }
 
+    /// True if a single multiplier is not trivial.
+    fn is_planar(&self) -> bool {
+        self.n == if self.is_forced() { 1 } else { 2 }
+    }
+
     /// Keeps the second half of every new mesh a copy of the first. A doubled cycle meets its parent at a pitchfork that is
     /// perfect only if the discretisation does not tell the two halves apart; the mesh must have this form already.
     pub fn with_equal_halves(mut self) -> Self {
@@ -425,15 +430,23 @@ impl ZeroProblem for CycleProblem<'_> {
         Some(mesh::denser(&self.mesh))
     }
 
+    // A single multiplier that is not trivial is exp(∫ tr f_x), by Liouville's formula. The integral is as accurate as the profile, where
+    // transitions over intervals are not: a cycle that follows a repelling slow manifold, as a canard does, is smooth there, and the intervals are
+    // as long as that allows, however fast neighbours leave.
     fn stability(&mut self, u: &[f64]) -> Examination {
-        let found = self.floquet(u);
+        let mut found = self.floquet(u);
+        let trivial = usize::from(!self.is_forced());
+        if self.is_planar() && self.trace.is_finite() {
+            found.multipliers[trivial] = Complex64::new(self.trace.exp(), 0.0);
+            found.unstable = usize::from(self.trace > 0.0);
+            found.log_product = self.trace + found.multipliers[..trivial].iter().map(|z| z.norm().ln()).sum::<f64>();
+        }
         let trust = Trust {
             trivial_defect: if self.is_forced() { 0.0 } else { (found.multipliers[0].re - 1.0).abs() },
             liouville_defect: (found.log_product - self.trace).abs(),
             spectrum: f64::NAN,
             ..Trust::default()
         };
-        let trivial = usize::from(!self.is_forced());
         let (spectrum, unstable) = (found.multipliers, found.unstable);
         Examination { spectrum, trivial, unstable, trust, ..Examination::default() }
     }

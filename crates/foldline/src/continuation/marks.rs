@@ -1,0 +1,144 @@
+//! Marks: places at which a quantity has a value that was asked for.
+//!
+//! **Idea.** A mark says where to look and nothing about the branch, so it must not change what is found there. Marks are located
+//! on the pieces that the search for special points leaves, and no step is cut on their account. Special points divide a piece:
+//! between two of them the parameter is monotonic, and a sign change of quantity minus value is a mark. A quantity that goes to its
+//! value and back within one piece shows that by the parabola through the last three points.
+//!
+//! **Fails when** a quantity passes its value twice within one piece and neither a special point nor the parabola shows it.
+
+use super::corrector::Station;
+use super::follow::Follow;
+use super::inspect::History;
+use super::locate::{Located, Stretch, discrepancy, locate_within};
+use crate::contract::{Monitor, Sight};
+use crate::diagram::{Cost, Point};
+
+/// Halvings of a bracket in which Newton's method does not get to the mark.
+const HALVINGS: usize = 12;
+/// Share of the larger value at the ends of a bracket that is left over where the quantity jumps across its value instead of passing it.
+const JUMPS: f64 = 0.05;
+
+impl Follow<'_> {
+    /// Quantity minus value at a station, for every mark.
+    pub(super) fn marked(&self, station: &Station) -> Vec<f64> {
+        self.marks.iter().map(|mark| mark.value(&station.point, &station.point)).collect()
+    }
+
+    /// All marks on an accepted piece that ends at `right`, in the order of travel. `special` has the special points on it, by their
+    /// distance.
+    pub(super) fn marks_on(
+        &mut self,
+        stretch: &Stretch,
+        right: &Station,
+        history: Option<&History>,
+        special: &[(f64, Point)],
+        cost: &mut Cost,
+    ) -> Vec<Located> {
+        let marks = self.marks;
+        let mut found: Vec<Located> = Vec::new();
+        for (k, mark) in marks.iter().enumerate() {
+            let value = |point: &Point| mark.value(&stretch.left.point, point);
+            let (first, last) = (value(&stretch.left.point), value(&right.point));
+            let within = special.iter().map(|(distance, point)| (*distance, value(point)));
+            let mut known: Vec<(f64, f64)> = [(0.0, first)].into_iter().chain(within).collect();
+            known.retain(|(distance, value)| value.is_finite() && (0.0..stretch.length).contains(distance));
+            // A value that is met at the end of a piece, as at a bound, is there; at the beginning it was.
+            if last == 0.0 && first != 0.0 && !found.iter().any(|other| other.distance == stretch.length) {
+                let error = 10.0 * self.settings.newton_tolerance();
+                found.push(Located { distance: stretch.length, station: right.clone(), error });
+            } else if last.is_finite() && last != 0.0 {
+                known.push((stretch.length, last));
+            }
+            if let Some(distance) =
+                turning(history.map(|h| (h.distance, &h.marks[..])), k, [first, last], stretch.length)
+                && let Ok(there) = stretch.seen_at(Sight::Everything, self.problem, self.settings, distance, cost)
+            {
+                known.push((distance, value(&there.point)));
+            }
+            known.sort_by(|a, b| a.0.total_cmp(&b.0));
+            for pair in known.windows(2).filter(|pair| pair[0].1 != 0.0 && differ(pair[0].1, pair[1].1)) {
+                found.extend(self.mark_between(stretch, &**mark, [pair[0], pair[1]], cost));
+            }
+        }
+        found.sort_by(|a, b| a.distance.total_cmp(&b.distance));
+        found
+    }
+
+    /// The mark between two distances with values of opposite sign; `None` where the quantity jumps across its value. The bracket is
+    /// halved while Newton's method fails.
+    fn mark_between(
+        &mut self,
+        stretch: &Stretch,
+        mark: &dyn Monitor,
+        [mut low, mut high]: [(f64, f64); 2],
+        cost: &mut Cost,
+    ) -> Option<Located> {
+        let whole = low.1.abs().max(high.1.abs());
+        let mut seen: [Option<Station>; 2] = [None, None];
+        for _ in 0..HALVINGS {
+            let ends = [low.0, high.0];
+            if let Ok(found) = locate_within(self.problem, self.settings, stretch, ends, mark, [low.1, high.1], cost) {
+                return Some(found);
+            }
+            // Next to a singular point another share may do.
+            let shares = [0.5, 0.43, 0.57].map(|share| low.0 + share * (high.0 - low.0));
+            let (distance, there) = shares.into_iter().find_map(|s| {
+                let there = stretch.at(self.problem, self.settings, s, cost).ok()?;
+                Some((s, there))
+            })?;
+            let value = mark.value(&stretch.left.point, &there.point);
+            if differ(low.1, value) {
+                (high, seen[1]) = ((distance, value), Some(there));
+            } else {
+                (low, seen[0]) = ((distance, value), Some(there));
+            }
+        }
+        // Closer than this it cannot be told: the nearer end, with the distance of the other as its error.
+        let [below, above] = seen;
+        let (below, above) = (below?, above?);
+        let gap = below.parameter() - above.parameter();
+        let error = discrepancy(&below.point, &above.point, gap, above.parameter());
+        let (distance, value, station) =
+            if low.1.abs() < high.1.abs() { (low.0, low.1, below) } else { (high.0, high.1, above) };
+        (value.abs() < JUMPS * whole).then_some(Located { distance, station, error })
+    }
+}
+
+fn differ(a: f64, b: f64) -> bool {
+    (a > 0.0) != (b > 0.0)
+}
+
+/// Distance at which a value that has one sign at both ends of a piece may have the other: the extremum of the parabola through the
+/// value before and those at the ends, or the middle where nothing is known of the way before. `None` where it stays away from zero.
+fn turning(before: Option<(f64, &[f64])>, k: usize, [first, last]: [f64; 2], length: f64) -> Option<f64> {
+    const NEAR: f64 = 0.1;
+    if first * last <= 0.0 || !(first * last).is_finite() {
+        return None;
+    }
+    let Some((distance, values)) = before else { return Some(0.5 * length) };
+    let (before, after) = ((first - values.get(k)?) / distance, (last - first) / length);
+    let bend = (after - before) / (distance + length);
+    let slope = after - bend * length;
+    let at = -slope / (2.0 * bend);
+    let value = first + at * (slope + bend * at);
+    (bend * first > 0.0 && at > 0.0 && at < length && value / first < NEAR).then_some(at)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_parabola_through_three_values_shows_where_a_quantity_turns() {
+        // (s - 0.6)² - c on [0, 1], known at -0.5 as well.
+        let seen = |c: f64| {
+            let value = |s: f64| (s - 0.6f64).powi(2) - c;
+            turning(Some((0.5, &[value(-0.5)])), 0, [value(0.0), value(1.0)], 1.0)
+        };
+        assert!((seen(0.01).unwrap() - 0.6).abs() < 1e-12, "passes zero twice");
+        assert!(seen(-0.3).is_none(), "stays away from zero");
+        assert_eq!(turning(None, 0, [1.0, 2.0], 0.4), Some(0.2));
+        assert!(turning(None, 0, [1.0, -2.0], 0.4).is_none() && turning(None, 0, [f64::NAN, 1.0], 0.4).is_none());
+    }
+}
