@@ -77,32 +77,29 @@ impl Follow<'_> {
     /// What the change of the parameter says between two stations.
     ///
     /// Where the parameter stands and a second multiplier is 1 within its error, as in a family at one value of the parameter, neither the
-    /// sign of that multiplier nor that of the slope means anything. Next to an orbit of infinite period the matrix is as
+    /// sign of that multiplier nor that of the slope means anything; of equilibria every one has an eigenvalue 0 there. Next to an orbit of infinite period the matrix is as
     /// ill-conditioned as the multipliers are far apart, and rounding reaches farther: there a change of the parameter below the error of
-    /// both points means nothing either, as long as no multiplier comes near 1. In a canard explosion the slope is lost in
-    /// rounding and a multiplier passes 1 all the same: that is a fold, and the spectrum alone shows where.
+    /// both points means nothing either, as long as no multiplier comes near 1. In a canard explosion the slope is lost in errors and
+    /// rounding, and a multiplier passes 1 all the same: that is a fold, and the spectrum alone shows where.
     fn drift(&self, left: &Station, right: &Station, length: f64) -> Drift {
         let far = |station: &Station| station.point.free_spectrum().iter().all(|z| z.norm().ln().abs() > CRITICAL);
         let certain = left.point.unstable == right.point.unstable && far(left) && far(right);
         let slope = left.slope().abs().max(right.slope().abs());
-        let unseen = slope * length < UNSEEN * self.settings.tolerance;
-        if unseen && left.point.solution.period().is_some() && certain {
+        let unseen = UNSEEN * self.settings.tolerance;
+        if left.mesh.is_empty() {
+            return if slope < STANDS { Drift::None } else { Drift::Slope };
+        }
+        if certain && slope * length.min(1.0) < unseen || slope < STANDS && self.is_neutral(left) && self.is_neutral(right) {
             return Drift::None;
         }
-        match slope < STANDS {
-            false => Drift::Slope,
-            true if self.is_neutral(left) && self.is_neutral(right) => Drift::None,
-            true => Drift::Spectrum,
-        }
+        if slope < STANDS.max(unseen) { Drift::Spectrum } else { Drift::Slope }
     }
 
-    /// Whether an eigenvalue is 0 (a second multiplier is 1) as far as its error tells. Of equilibria every one is at which the parameter
-    /// stands: the slope is the determinant of f_x but for a factor that is not small.
+    /// True if a second multiplier is 1 as far as its error tells.
     fn is_neutral(&self, station: &Station) -> bool {
         let trust = station.point.trust;
         let spectrum = if trust.spectrum.is_nan() { 0.0 } else { trust.spectrum };
-        let error = spectrum.max(trust.trivial_defect);
-        station.mesh.is_empty() || self.problem.margin(&station.point) <= NEUTRAL * error
+        self.problem.margin(&station.point) <= NEUTRAL * spectrum.max(trust.trivial_defect)
     }
 
     /// Everything special between two stations.
@@ -270,16 +267,14 @@ impl Follow<'_> {
         let mut marks = self.marks_on(&stretch, right, history, &known, cost).into_iter().peekable();
         let mut count = left.point.unstable as i64;
         let mut out = Vec::new();
+        let (located, jumps) = as_pitchfork(located, jumps, change);
         let total = located.len();
         for (index, (kind, _, found)) in located.into_iter().enumerate() {
             while let Some(mark) = marks.next_if(|mark| mark.distance < found.distance) {
                 out.push(Found::Special(self.special(Kind::Mark, mark.station, count, count, mark.error)));
             }
-            let next = if index + 1 == total {
-                right.point.unstable as i64
-            } else {
-                step_towards(count, right.point.unstable as i64, jumps[index])
-            };
+            let target = right.point.unstable as i64;
+            let next = if index + 1 == total && explained { target } else { step_towards(count, target, jumps[index]) };
             out.push(Found::Special(self.special(kind, found.station, count, next, found.error)));
             count = next;
         }
@@ -451,10 +446,27 @@ fn stays_near(now: &[Complex64], then: &[Complex64], length: f64) -> bool {
     length.abs() > LONG && angles.is_some_and(|(now, then)| now + then < NEAR)
 }
 
-/// Change of the parameter along a step, in tolerances, that is lost in the errors of both ends.
+/// Change of the parameter along a step of at most length 1, in tolerances, that is lost in the errors of both ends.
 const UNSEEN: f64 = 0.2;
 /// Logarithm of a multiplier from which on a whole step does not bring it to 1.
 const CRITICAL: f64 = 3.0;
+
+/// A fold and a branch point that could not be told apart, with as many unstable ones before as after, are one pitchfork, seen from the branch
+/// that turns there.
+fn as_pitchfork(
+    mut located: Vec<(Kind, usize, Located)>,
+    jumps: Vec<usize>,
+    change: usize,
+) -> (Vec<(Kind, usize, Located)>, Vec<usize>) {
+    let is = |wanted: Kind| located.iter().position(|(kind, jump, _)| *kind == wanted && *jump == 1);
+    if let ([_, _], Some(fold), Some(_)) = (&located[..], is(Kind::Fold), is(Kind::BranchPoint))
+        && change == 0
+    {
+        let (.., found) = located.swap_remove(fold);
+        return (vec![(Kind::BranchPoint, 0, found)], vec![0]);
+    }
+    (located, jumps)
+}
 
 /// Whether jumps of these sizes, each with either sign, lead from one count to the other.
 fn explains(jumps: &[usize], from: i64, to: i64) -> bool {
