@@ -40,6 +40,8 @@ pub enum Failure {
     },
     /// Stability changes on the way in a manner that nothing located explains: the step has probably ended on another branch.
     Unexplained,
+    /// The eigenvalues or multipliers could not be computed.
+    Spectrum,
     /// The point needs this mesh, and the step is too short to end on another mesh than it began on.
     Remeshed(Mesh),
     /// No mesh of the permitted size meets the tolerance.
@@ -76,6 +78,7 @@ impl std::fmt::Display for Failure {
                 )
             }
             Failure::Unexplained => write!(f, "stability changes without a special point that explains it"),
+            Failure::Spectrum => write!(f, "the eigenvalues or multipliers could not be computed"),
             Failure::Remeshed(mesh) => write!(f, "the mesh keeps changing ({} intervals)", mesh.len().max(1) - 1),
             Failure::Departed => write!(f, "the branches that crossed no longer do"),
             Failure::Mesh(error) => write!(f, "the error estimate stays at {error:.1e} on the largest mesh"),
@@ -407,6 +410,9 @@ pub fn refine(
             // What is stated is four times the estimate.
             if trust.discretisation > 6.0 * settings.tolerance {
                 return Err(Failure::Mesh(trust.discretisation));
+            }
+            if settings.stability && found.point.spectrum.iter().any(|z| z.re.is_nan()) {
+                return Err(Failure::Spectrum);
             }
             // Errors of multipliers shrink at least as fast as those of the profile.
             let ample = round == 0 && defect <= RELAXED * settings.tolerance && !close(defect / TIGHTER);

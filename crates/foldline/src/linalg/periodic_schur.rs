@@ -317,7 +317,8 @@ impl Cycle {
         }
     }
 
-    /// The Wilkinson shift divided by the product of the leading diagonal entries; 0 where that quotient would not be finite.
+    /// The Wilkinson shift divided by the product of the leading diagonal entries; 0 where that quotient is so large that nothing of the
+    /// matrix would be left beside it. Without a shift the large eigenvalues, which are at the wrong end then, move to the other one at once.
     fn relative_shift(&self, low: usize, high: usize) -> C {
         let p = self.p;
         // Trailing 2×2 block of the product of the triangular factors, times e^log.
@@ -352,7 +353,8 @@ impl Cycle {
             p22
         };
         let relative = shift / leading.0 * (log - leading.1).exp();
-        if relative.re.is_finite() && relative.im.is_finite() { relative } else { C::ZERO }
+        let beside = h[low * p + low].norm() + h[(low + 1) * p + low].norm();
+        if relative.norm() * f64::EPSILON < beside { relative } else { C::ZERO }
     }
 
     fn eigenvalue(&self, i: usize) -> Eigenvalue {
@@ -404,6 +406,34 @@ fn conjugate_pairs(mut found: Vec<Eigenvalue>) -> Vec<Eigenvalue> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn eigenvalues_hundreds_of_orders_of_magnitude_apart_are_found_in_any_order() {
+        // F = Q diag(a, b) Qᵀ, the same Q in all: eigenvalues a^N and b^N. The large one at either end.
+        for (a, b) in [(1e-5, 0.9), (0.9, 1e-5), (1e-5, 1e-4), (2.0, 1e-9)] {
+            let (c, s) = (0.6f64, 0.8f64);
+            let factor = [c * c * a + s * s * b, c * s * (a - b), c * s * (a - b), s * s * a + c * c * b];
+            let count = 80;
+            let found = eigenvalues(&factor.repeat(count), 2).expect("converges");
+            let logs = [a.max(b).ln(), a.min(b).ln()].map(|log: f64| count as f64 * log);
+            for (one, expected) in found.iter().zip(logs) {
+                // Each factor has its smaller eigenvalue to the rounding of the larger one.
+                let error = count as f64 * (4.0 * f64::EPSILON * (a.max(b) / a.min(b)) + 1e-15);
+                assert!((one.log_modulus - expected).abs() < error.max(1e-12), "{a} {b}: {one:?} {expected}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_product_of_which_the_small_eigenvalue_comes_first_converges() {
+        // Upper triangular factors with the small entry first, and a last one that mixes.
+        let mut factors = [1e-5, 0.3, 0.0, 0.7].repeat(61);
+        factors.extend([0.09828358, 0.05788514, -1.11157923, -0.53535464]);
+        let found = eigenvalues(&factors, 2).expect("converges");
+        let determinant = log_determinant(&factors, 2);
+        let sum: f64 = found.iter().map(|one| one.log_modulus).sum();
+        assert!((sum - determinant).abs() < 1e-10 * determinant.abs(), "{found:?} {determinant}");
+    }
 
     fn pseudo_random(count: usize, seed: f64) -> Vec<f64> {
         let mut s = seed;
