@@ -262,6 +262,12 @@ pub trait Monitor: Send + Sync {
     /// By how much an event of this kind changes the number of unstable eigenvalues or multipliers.
     fn jump(&self) -> usize;
 
+    /// How many times an event of this kind makes as many eigenvalues or multipliers unstable as are at `at`, where only such events do;
+    /// `None` where others do as well.
+    fn passed(&self, _at: &Point) -> Option<usize> {
+        None
+    }
+
     /// The monitor of the same events that reads the spectrum alone, for branches along which the parameter moves by no more than rounding.
     fn by_spectrum(&self) -> Option<Box<dyn Monitor>> {
         None

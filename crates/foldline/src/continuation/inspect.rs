@@ -8,7 +8,7 @@
 
 use super::corrector::{Failure, Station, doubted, refine};
 use super::follow::{Follow, STANDS};
-use super::locate::{Located, Stretch, locate};
+use super::locate::{Located, Stretch, discrepancy, locate};
 use super::straddle::straddle;
 use crate::contract::Sight;
 use crate::diagram::{Cost, Kind, Point, SpecialPoint};
@@ -89,7 +89,9 @@ impl Follow<'_> {
         if left.mesh.is_empty() {
             return if slope < STANDS { Drift::None } else { Drift::Slope };
         }
-        if certain && slope * length.min(1.0) < unseen || slope < STANDS && self.is_neutral(left) && self.is_neutral(right) {
+        if certain && slope * length.min(1.0) < unseen
+            || slope < STANDS && self.is_neutral(left) && self.is_neutral(right)
+        {
             return Drift::None;
         }
         if slope < STANDS.max(unseen) { Drift::Spectrum } else { Drift::Slope }
@@ -265,6 +267,9 @@ impl Follow<'_> {
         let known: Vec<(f64, Point)> =
             located.iter().map(|(.., found)| (found.distance, found.station.point.clone())).collect();
         let mut marks = self.marks_on(&stretch, right, history, &known, cost).into_iter().peekable();
+        if !explained && let Some(together) = self.simultaneous(left, right, drift) {
+            return together;
+        }
         let mut count = left.point.unstable as i64;
         let mut out = Vec::new();
         let (located, jumps) = as_pitchfork(located, jumps, change);
@@ -294,6 +299,51 @@ impl Follow<'_> {
             }
         }
         out
+    }
+
+    /// Events that happen together, closer than anything tells apart, as what passes in different parts of a symmetric or a decoupled system:
+    /// what of each kind has become stable or unstable between two points that are one as far as their errors tell. A branch point counts once
+    /// however many eigenvalues pass there, which is the dimension of the kernel.
+    fn simultaneous(&mut self, left: &Station, right: &Station, drift: Drift) -> Option<Vec<Found>> {
+        let error = discrepancy(&left.point, &right.point, left.parameter() - right.parameter(), right.parameter());
+        if !self.settings.stability || error > self.settings.tolerance {
+            return None;
+        }
+        let turns = drift == Drift::Spectrum || left.slope() * right.slope() < 0.0;
+        let mut passed: Vec<(Kind, i64, i64)> = Vec::new();
+        for monitor in self.monitors {
+            let (Some(before), Some(after)) = (monitor.passed(&left.point), monitor.passed(&right.point)) else {
+                continue;
+            };
+            let times = after as i64 - before as i64;
+            let kind = if turns && times.abs() == 1 && monitor.kind() == Kind::BranchPoint {
+                Kind::Fold
+            } else {
+                monitor.kind()
+            };
+            if times != 0 {
+                passed.push((kind, times, monitor.jump() as i64));
+            }
+        }
+        let change: i64 = passed.iter().map(|(_, times, jump)| times * jump).sum();
+        // A pair that meets on the real axis off the unit circle is no event at all.
+        let met = passed
+            .iter()
+            .any(|(_, times, jump)| *jump == 2 && passed.iter().any(|(_, other, own)| *own == 1 && times * other < 0));
+        if passed.is_empty() || met || change != right.point.unstable as i64 - left.point.unstable as i64 {
+            return None;
+        }
+        passed.sort_by_key(|(_, times, _)| *times);
+        let (mut count, mut out) = (left.point.unstable as i64, Vec::new());
+        for (kind, times, jump) in passed {
+            let (steps, change) =
+                if jump == 1 && kind == Kind::BranchPoint { (1, times) } else { (times.abs(), times.signum() * jump) };
+            for _ in 0..steps {
+                out.push(Found::Special(self.special(kind, right.clone(), count, count + change, error)));
+                count += change;
+            }
+        }
+        Some(out)
     }
 
     /// Whether a branch of asymmetric solutions passes a symmetric one at `at` and goes on as its own mirror image: the point is

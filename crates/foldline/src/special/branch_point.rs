@@ -34,6 +34,11 @@ impl Monitor for BranchPoint {
         1
     }
 
+    fn passed(&self, at: &Point) -> Option<usize> {
+        let centre = if matches!(at.solution, Solution::Cycle(_)) { 1.0 } else { 0.0 };
+        Some(at.free_spectrum().iter().filter(|z| z.im == 0.0 && z.re > centre).count())
+    }
+
     fn others_unstable(&self, at: &Point) -> Option<usize> {
         let centre = if matches!(at.solution, Solution::Cycle(_)) { 1.0 } else { 0.0 };
         super::others_unstable(at, 1, |z| (z - centre).norm())

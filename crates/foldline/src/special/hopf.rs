@@ -36,6 +36,10 @@ impl Monitor for Hopf {
         2
     }
 
+    fn passed(&self, at: &Point) -> Option<usize> {
+        Some(at.spectrum.iter().filter(|z| z.im > 0.0 && z.re > 0.0).count())
+    }
+
     fn others_unstable(&self, at: &Point) -> Option<usize> {
         super::others_unstable(at, 2, |z| if z.im == 0.0 { f64::INFINITY } else { (z.re / z.im).abs() })
     }

@@ -31,6 +31,10 @@ impl Monitor for PeriodDoubling {
         1
     }
 
+    fn passed(&self, at: &Point) -> Option<usize> {
+        Some(at.free_spectrum().iter().filter(|z| z.im == 0.0 && z.re < -1.0).count())
+    }
+
     fn others_unstable(&self, at: &Point) -> Option<usize> {
         super::others_unstable(at, 1, |z| (z + 1.0).norm())
     }

@@ -32,6 +32,10 @@ impl Monitor for Torus {
         2
     }
 
+    fn passed(&self, at: &Point) -> Option<usize> {
+        Some(at.free_spectrum().iter().filter(|z| z.im > 0.0 && z.norm() > 1.0).count())
+    }
+
     fn others_unstable(&self, at: &Point) -> Option<usize> {
         super::others_unstable(at, 2, |z| if z.im == 0.0 { f64::INFINITY } else { z.norm().ln().abs() })
     }
