@@ -204,6 +204,9 @@ impl Follow<'_> {
             kind.has_codimension_two() || double.iter().all(|there| (found.distance - there).abs() > apart)
         });
         located.sort_by(|a, b| a.2.distance.total_cmp(&b.2.distance));
+        if self.settings.stability && left.point.unstable == right.point.unstable {
+            located = self.with_vertex(&stretch, located, cost);
+        }
         let jumps: Vec<usize> = located.iter().map(|(_, jump, _)| *jump).collect();
         let change = left.point.unstable.abs_diff(right.point.unstable);
         // What is located alone must fit in with the rest of its own spectrum; else something lies on the way to it, or beyond.
@@ -267,12 +270,11 @@ impl Follow<'_> {
         let known: Vec<(f64, Point)> =
             located.iter().map(|(.., found)| (found.distance, found.station.point.clone())).collect();
         let mut marks = self.marks_on(&stretch, right, history, &known, cost).into_iter().peekable();
-        if !explained && let Some(together) = self.simultaneous(left, right, drift) {
+        if !explained && let Some(together) = self.simultaneous(&stretch, right, drift, cost) {
             return together;
         }
         let mut count = left.point.unstable as i64;
         let mut out = Vec::new();
-        let (located, jumps) = as_pitchfork(located, jumps, change);
         let total = located.len();
         for (index, (kind, _, found)) in located.into_iter().enumerate() {
             while let Some(mark) = marks.next_if(|mark| mark.distance < found.distance) {
@@ -301,10 +303,39 @@ impl Follow<'_> {
         out
     }
 
+    /// A branch that leaves another at a pitchfork turns there, and an eigenvalue touches zero and comes back: the place is no fold, at which the
+    /// count changes, and a branch point besides, but one branch point, at which this branch goes on.
+    fn with_vertex(
+        &mut self,
+        stretch: &Stretch,
+        mut located: Vec<(Kind, usize, Located)>,
+        cost: &mut Cost,
+    ) -> Vec<(Kind, usize, Located)> {
+        let is = |wanted: Kind| located.iter().position(|(kind, jump, _)| *kind == wanted && *jump == 1);
+        let (Some(fold), Some(other), 2) = (is(Kind::Fold), is(Kind::BranchPoint), located.len()) else {
+            return located;
+        };
+        let (there, beside) = (located[fold].2.distance, 0.5 * (located[fold].2.distance - located[other].2.distance));
+        let mut count = |s: f64| Some(stretch.at(self.problem, self.settings, s, cost).ok()?.point.unstable);
+        if beside.abs() < CLOSEST || count(there - beside).is_some_and(|before| count(there + beside) == Some(before)) {
+            let (.., found) = located.swap_remove(fold);
+            return vec![(Kind::BranchPoint, 0, found)];
+        }
+        located
+    }
+
     /// Events that happen together, closer than anything tells apart, as what passes in different parts of a symmetric or a decoupled system:
     /// what of each kind has become stable or unstable between two points that are one as far as their errors tell. A branch point counts once
     /// however many eigenvalues pass there, which is the dimension of the kernel.
-    fn simultaneous(&mut self, left: &Station, right: &Station, drift: Drift) -> Option<Vec<Found>> {
+    fn simultaneous(
+        &mut self,
+        stretch: &Stretch,
+        right: &Station,
+        drift: Drift,
+        cost: &mut Cost,
+    ) -> Option<Vec<Found>> {
+        let ends = self.narrowed(stretch, right, cost);
+        let [left, right] = [&ends[0], &ends[1]];
         let error = discrepancy(&left.point, &right.point, left.parameter() - right.parameter(), right.parameter());
         if !self.settings.stability || error > self.settings.tolerance {
             return None;
@@ -344,6 +375,19 @@ impl Follow<'_> {
             }
         }
         Some(out)
+    }
+
+    /// The ends of a stretch, moved to where the count of unstable ones changes, as close together as can be told apart.
+    fn narrowed(&mut self, stretch: &Stretch, right: &Station, cost: &mut Cost) -> [Station; 2] {
+        let (mut ends, mut places) = ([stretch.left.clone(), right.clone()], [0.0, stretch.length]);
+        let before = stretch.left.point.unstable;
+        while before != right.point.unstable && (places[1] - places[0]).abs() > CLOSEST {
+            let middle = 0.5 * (places[0] + places[1]);
+            let Ok(found) = stretch.at(self.problem, self.settings, middle, cost) else { break };
+            let side = usize::from(found.point.unstable != before);
+            (ends[side], places[side]) = (found, middle);
+        }
+        ends
     }
 
     /// Whether a branch of asymmetric solutions passes a symmetric one at `at` and goes on as its own mirror image: the point is
@@ -500,23 +544,6 @@ fn stays_near(now: &[Complex64], then: &[Complex64], length: f64) -> bool {
 const UNSEEN: f64 = 0.2;
 /// Logarithm of a multiplier from which on a whole step does not bring it to 1.
 const CRITICAL: f64 = 3.0;
-
-/// A fold and a branch point that could not be told apart, with as many unstable ones before as after, are one pitchfork, seen from the branch
-/// that turns there.
-fn as_pitchfork(
-    mut located: Vec<(Kind, usize, Located)>,
-    jumps: Vec<usize>,
-    change: usize,
-) -> (Vec<(Kind, usize, Located)>, Vec<usize>) {
-    let is = |wanted: Kind| located.iter().position(|(kind, jump, _)| *kind == wanted && *jump == 1);
-    if let ([_, _], Some(fold), Some(_)) = (&located[..], is(Kind::Fold), is(Kind::BranchPoint))
-        && change == 0
-    {
-        let (.., found) = located.swap_remove(fold);
-        return (vec![(Kind::BranchPoint, 0, found)], vec![0]);
-    }
-    (located, jumps)
-}
 
 /// Whether jumps of these sizes, each with either sign, lead from one count to the other.
 fn explains(jumps: &[usize], from: i64, to: i64) -> bool {
