@@ -74,7 +74,7 @@ impl Monitor for Shrinks<'_> {
             && a.degree == b.degree
             && mesh::same(&a.mesh, &b.mesh)
         {
-            return on_one_mesh(a, b);
+            return on_one_mesh(a, b, &extents(reference, a.dim()));
         }
         compare(reference, at, |x, n| {
             let mean = Shrinks::mean(x, n);
@@ -181,7 +181,7 @@ impl Monitor for Halves {
 }
 
 /// What [`compare`] finds of the deviations from the means, by the quadrature of the Gauss points.
-fn on_one_mesh(a: &Cycle, b: &Cycle) -> f64 {
+fn on_one_mesh(a: &Cycle, b: &Cycle, extents: &[f64]) -> f64 {
     let (scheme, n) = (Scheme::of(a.degree), a.dim());
     let block = (a.degree + 1) * n;
     // Means of a and b, of a² and a b.
@@ -197,8 +197,30 @@ fn on_one_mesh(a: &Cycle, b: &Cycle) -> f64 {
             }
         }
     }
-    let share = |[x, y, square, product]: [f64; 4]| (product - x * y) / (square - x * x).max(f64::MIN_POSITIVE);
-    sums.into_iter().map(share).sum::<f64>() / n as f64
+    let own: Vec<[f64; 2]> = sums.iter().map(|[x, y, square, product]| [square - x * x, product - x * y]).collect();
+    mean_share(&own, extents)
+}
+
+/// Deviation of a component, as a share of its extent, below which it is noise beside the largest such share.
+const NOISE: f64 = 1e-3;
+
+/// Mean over the components of the inner products of two deviations, each relative to the square of the first: `own` has both for
+/// each component. A component that hardly deviates says nothing, and its quotient would be one of rounding errors.
+fn mean_share(own: &[[f64; 2]], extents: &[f64]) -> f64 {
+    let size = |c: usize| own[c][0] / extents[c].powi(2);
+    let largest = (0..own.len()).map(size).fold(f64::MIN_POSITIVE, f64::max);
+    let (mut total, mut count) = (0.0, 0);
+    for c in (0..own.len()).filter(|c| size(*c) > NOISE * NOISE * largest) {
+        total += own[c][1] / own[c][0];
+        count += 1;
+    }
+    total / f64::from(count.max(1))
+}
+
+/// Extents of the states of a cycle, by which their deviations are measured.
+fn extents(at: &Point, n: usize) -> Vec<f64> {
+    let of = |c: usize| at.ranges.get(c).map_or(1.0, |[low, high]| (high - low).max(low.abs()).max(high.abs()));
+    (0..n).map(|c| of(c).max(f64::MIN_POSITIVE)).collect()
 }
 
 /// Inner product of the deviations of both points, relative to that of the reference.
@@ -210,8 +232,10 @@ fn compare(reference: &Point, at: &Point, deviation: impl Fn(&[f64], usize) -> V
     let db = other.as_ref().unwrap_or(&da);
     // Components of very different unit must not drown each other.
     let n = a.dim();
-    let mut weight = vec![f64::MIN_POSITIVE; n];
-    da.iter().enumerate().for_each(|(k, v)| weight[k % n] += v * v);
-    let product: f64 = da.iter().zip(db).enumerate().map(|(k, (x, y))| x * y / weight[k % n]).sum();
-    product / n as f64
+    let mut sums = vec![[0.0; 2]; n];
+    for (k, (x, y)) in da.iter().zip(db).enumerate() {
+        let sum = &mut sums[k % n];
+        *sum = [sum[0] + x * x, sum[1] + x * y];
+    }
+    mean_share(&sums, &extents(reference, n))
 }
