@@ -64,6 +64,8 @@ pub struct History {
     pub values: Vec<f64>,
     /// Values there, one per mark.
     pub marks: Vec<f64>,
+    /// True if the solution there is one of a family at one value of the parameter.
+    pub stands: bool,
     /// Eigenvalues or multipliers there.
     pub spectrum: Vec<Complex64>,
 }
@@ -81,7 +83,10 @@ impl Follow<'_> {
     /// ill-conditioned as the multipliers are far apart, and rounding reaches farther: there a change of the parameter below the error of
     /// both points means nothing either, as long as no multiplier comes near 1. In a canard explosion the slope is lost in errors and
     /// rounding, and a multiplier passes 1 all the same: that is a fold, and the spectrum alone shows where.
-    fn drift(&self, left: &Station, right: &Station, length: f64) -> Drift {
+    ///
+    /// A step that leads out of such a family, as at the amplitude at which a stop is touched, or into it, has one end in it. `stands` says that the
+    /// step before lay in it.
+    fn drift(&self, [left, right]: [&Station; 2], length: f64, stands: bool) -> Drift {
         let far = |station: &Station| station.point.free_spectrum().iter().all(|z| z.norm().ln().abs() > CRITICAL);
         let certain = left.point.unstable == right.point.unstable && far(left) && far(right);
         let slope = left.slope().abs().max(right.slope().abs());
@@ -89,19 +94,20 @@ impl Follow<'_> {
         if left.mesh.is_empty() {
             return if slope < STANDS { Drift::None } else { Drift::Slope };
         }
-        if certain && slope * length.min(1.0) < unseen
-            || slope < STANDS && self.is_neutral(left) && self.is_neutral(right)
-        {
+        let family = stands && self.stands(left) || self.stands(right);
+        if certain && slope * length.min(1.0) < unseen || family {
             return Drift::None;
         }
         if slope < STANDS.max(unseen) { Drift::Spectrum } else { Drift::Slope }
     }
 
-    /// True if a second multiplier is 1 as far as its error tells.
-    fn is_neutral(&self, station: &Station) -> bool {
+    /// True if the parameter stands there, and a second multiplier is 1 as far as its error tells.
+    pub(super) fn stands(&self, station: &Station) -> bool {
         let trust = station.point.trust;
         let spectrum = if trust.spectrum.is_nan() { 0.0 } else { trust.spectrum };
-        self.problem.margin(&station.point) <= NEUTRAL * spectrum.max(trust.trivial_defect)
+        !station.mesh.is_empty()
+            && station.slope().abs() < STANDS
+            && self.problem.margin(&station.point) <= NEUTRAL * spectrum.max(trust.trivial_defect)
     }
 
     /// Everything special between two stations.
@@ -126,7 +132,7 @@ impl Follow<'_> {
         }
         let right = carried.as_ref().unwrap_or(right);
         let (at_left, at_right) = (self.monitored(left), self.monitored(right));
-        let drift = self.drift(left, right, stretch.length.abs());
+        let drift = self.drift([left, right], stretch.length.abs(), history.is_some_and(|before| before.stands));
         let standing = drift == Drift::None;
         let mut located: Vec<(Kind, usize, Located)> = Vec::new();
         let mut others: Vec<Option<usize>> = Vec::new();
@@ -220,7 +226,7 @@ impl Follow<'_> {
         };
         let accounted = !self.settings.stability
             || explains(&jumps, left.point.unstable as i64, right.point.unstable as i64)
-            || (standing && !short && jumps.is_empty() && change == 1);
+            || (standing && jumps.is_empty() && change == 1);
         // A change of sign that could not be located is not passed over either, not even next to one that could.
         let closer = jumps.is_empty() || depth < CLOSE;
         let explained = accounted && !(lost && closer && self.settings.stability);
@@ -261,7 +267,8 @@ impl Follow<'_> {
                 let rest = stretch.length - cut;
                 let before = self.inspect(left, &middle, history, depth + 1, cost);
                 let spectrum = left.point.spectrum.clone();
-                let next = History { distance: cut, values: at_left.clone(), marks: self.marked(left), spectrum };
+                let (values, marks) = (at_left.clone(), self.marked(left));
+                let next = History { distance: cut, values, marks, spectrum, stands: self.stands(left) };
                 let after = self.inspect(&middle, right, Some(&next), depth + 1, cost);
                 let inserted = Found::Inserted(Box::new(middle), rest);
                 return before.into_iter().chain([inserted]).chain(after).collect();
@@ -271,7 +278,12 @@ impl Follow<'_> {
             located.iter().map(|(.., found)| (found.distance, found.station.point.clone())).collect();
         let mut marks = self.marks_on(&stretch, right, history, &known, cost).into_iter().peekable();
         if !explained && let Some(together) = self.simultaneous(&stretch, right, drift, cost) {
-            return together;
+            let count = left.point.unstable as i64;
+            let mut out: Vec<Found> = Vec::new();
+            for mark in marks {
+                out.push(Found::Special(self.special(Kind::Mark, mark.station, count, count, mark.error)));
+            }
+            return out.into_iter().chain(together).collect();
         }
         let mut count = left.point.unstable as i64;
         let mut out = Vec::new();
@@ -461,6 +473,7 @@ impl Follow<'_> {
                     values: values.to_vec(),
                     marks: Vec::new(),
                     spectrum: Vec::new(),
+                    stands: false,
                 };
                 let touches = self.may_touch(&from(at_left), &here, at_right, half)
                     || self.may_touch(&from(at_right), &here, at_left, half);
