@@ -5,8 +5,8 @@
 //! period that had grown, a parameter that had stood still, a right-hand side with kinks, a mesh that did not suffice.
 
 use super::corrector::{Failure, Station};
-use super::follow::{Follow, STANDS};
-use crate::diagram::Ending;
+use super::follow::Follow;
+use crate::diagram::{Ending, STANDS};
 
 /// Steps that were given up in a row.
 #[derive(Debug)]

@@ -11,7 +11,7 @@ use super::ends::Homecoming;
 use super::inspect::Found;
 use super::step::Step;
 use crate::contract::{Monitor, Verdict, ZeroProblem};
-use crate::diagram::{Cost, Ending, Kind, Point, SpecialPoint};
+use crate::diagram::{Cost, Ending, Kind, Point, STANDS, SpecialPoint};
 
 /// What a run emits, in the order of travel.
 pub enum Item {
@@ -64,8 +64,6 @@ const GROWTH: f64 = 2.0;
 const LONG: f64 = 3.0;
 /// … which is looked for whenever it has grown by this much more.
 const AGAIN: f64 = 1.1;
-/// Slope of a branch in its parameter below which it does not change along the branch but for rounding.
-pub(super) const STANDS: f64 = 1e-9;
 /// Change of the parameter, over so many equilibria, below which it has come to a stand.
 const REST: f64 = 1e-11;
 const PATIENCE: usize = 100;
@@ -191,6 +189,9 @@ pub fn follow(
         }
         position += walk.direction as i64;
         emitted += 1;
+        if walk.settings.stability && right.point.is_one_of_family() {
+            right.point.unstable = right.point.unstable_besides_neutral();
+        }
         let mut point = right.point.clone();
         (point.position, point.step, point.cost) = (position, step, cost);
         if sink(Item::Point(point)) == Verdict::Stop {

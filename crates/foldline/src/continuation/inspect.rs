@@ -7,11 +7,11 @@
 //! they are located last, on the pieces that it leaves ([`super::marks`]).
 
 use super::corrector::{Failure, Station, doubted, refine};
-use super::follow::{Follow, STANDS};
+use super::follow::Follow;
 use super::locate::{Located, Stretch, discrepancy, locate};
 use super::straddle::straddle;
 use crate::contract::Sight;
-use crate::diagram::{Cost, Kind, Point, SpecialPoint};
+use crate::diagram::{Cost, Kind, Point, STANDS, SpecialPoint};
 use num_complex::Complex64;
 use std::f64::consts::PI;
 
@@ -33,9 +33,6 @@ enum Drift {
     /// Nothing: the parameter stands, and no multiplier passes 1.
     None,
 }
-
-/// Errors of a multiplier within which it may be 1.
-const NEUTRAL: f64 = 10.0;
 
 /// Halvings of one step before what is left is recorded as it is.
 const DEEPEST: usize = 14;
@@ -94,20 +91,11 @@ impl Follow<'_> {
         if left.mesh.is_empty() {
             return if slope < STANDS { Drift::None } else { Drift::Slope };
         }
-        let family = stands && self.stands(left) || self.stands(right);
+        let family = stands && left.point.is_one_of_family() || right.point.is_one_of_family();
         if certain && slope * length.min(1.0) < unseen || family {
             return Drift::None;
         }
         if slope < STANDS.max(unseen) { Drift::Spectrum } else { Drift::Slope }
-    }
-
-    /// True if the parameter stands there, and a second multiplier is 1 as far as its error tells.
-    pub(super) fn stands(&self, station: &Station) -> bool {
-        let trust = station.point.trust;
-        let spectrum = if trust.spectrum.is_nan() { 0.0 } else { trust.spectrum };
-        !station.mesh.is_empty()
-            && station.slope().abs() < STANDS
-            && self.problem.margin(&station.point) <= NEUTRAL * spectrum.max(trust.trivial_defect)
     }
 
     /// Everything special between two stations.
@@ -268,7 +256,7 @@ impl Follow<'_> {
                 let before = self.inspect(left, &middle, history, depth + 1, cost);
                 let spectrum = left.point.spectrum.clone();
                 let (values, marks) = (at_left.clone(), self.marked(left));
-                let next = History { distance: cut, values, marks, spectrum, stands: self.stands(left) };
+                let next = History { distance: cut, values, marks, spectrum, stands: left.point.is_one_of_family() };
                 let after = self.inspect(&middle, right, Some(&next), depth + 1, cost);
                 let inserted = Found::Inserted(Box::new(middle), rest);
                 return before.into_iter().chain([inserted]).chain(after).collect();

@@ -73,7 +73,7 @@ impl Follow<'_> {
     pub(super) fn trail(&mut self, before: &Station, between: Between) -> Trail {
         let distance = between.along.abs().max(f64::MIN_POSITIVE);
         let (values, marks) = (self.monitored(before), self.marked(before));
-        let (spectrum, stands) = (before.point.spectrum.clone(), self.stands(before));
+        let (spectrum, stands) = (before.point.spectrum.clone(), before.point.is_one_of_family());
         let history = History { distance, values, marks, spectrum, stands };
         let length = between.chord.max(distance) * (1.0 + between.angle * between.angle / 24.0);
         let (u, tangent) = (before.u.clone(), before.tangent.clone());

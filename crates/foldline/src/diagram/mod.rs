@@ -140,6 +140,30 @@ impl Point {
         self.trust.trivial_defect.max(self.trust.liouville_defect * smallest / SMALL)
     }
 
+    /// True for a cycle of a family at one value of the parameter, as a conservative system has it, or one that is linear up to an amplitude:
+    /// the parameter does not move along the branch, and a second multiplier is 1 as far as its error tells. On which side of 1 it is computed
+    /// means nothing.
+    pub fn is_one_of_family(&self) -> bool {
+        let multiplier = self.neutral_multiplier();
+        self.solution.period().is_some() && self.parameter_slope().abs() < STANDS && multiplier.is_some()
+    }
+
+    /// The multiplier that is 1 as far as its error tells, and closest to that, among those that are not trivial.
+    fn neutral_multiplier(&self) -> Option<Complex64> {
+        const ERRORS: f64 = 10.0;
+        let stated = if self.trust.spectrum.is_nan() { 0.0 } else { self.trust.spectrum };
+        let error = ERRORS * stated.max(self.trust.trivial_defect);
+        let distance = |z: &Complex64| (z - 1.0).norm();
+        let closest = self.free_spectrum().iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
+        (distance(closest) <= error).then_some(*closest)
+    }
+
+    /// How many multipliers are unstable besides one that is 1 as far as its error tells.
+    pub(crate) fn unstable_besides_neutral(&self) -> usize {
+        let own = usize::from(self.neutral_multiplier().is_some_and(|z| z.norm() > 1.0));
+        self.unstable.saturating_sub(own)
+    }
+
     /// Largest difference of period and ranges between two points, each relative to its scale (`scales` for the states;
     /// outputs and period by their own size). `reflection[i]` says that the other point is seen with state i negated.
     /// Infinite if one is an equilibrium and the other a cycle.
@@ -176,6 +200,9 @@ impl Point {
         self.tangent.last().copied().unwrap_or(0.0)
     }
 }
+
+/// Slope of a branch in its parameter below which it does not change along the branch but for rounding.
+pub(crate) const STANDS: f64 = 1e-9;
 
 /// What happens at a special point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
