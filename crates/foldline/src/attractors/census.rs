@@ -5,7 +5,7 @@
 
 use super::candidate::Context;
 use super::orbit::Orbit;
-use super::settling::{First, Trial, settle_together};
+use super::settling::{First, Settled, Trial, settle_together};
 use super::watch::Watch;
 use super::{Attractor, Candidate, Census, Enough, Exit, Polish, Sampling};
 use crate::contract::{VectorField, Verdict};
@@ -150,6 +150,8 @@ pub enum Lost {
         time: f64,
         /// `[n]` extent of its motion at the end.
         extent: Vec<f64>,
+        /// `[n]` its last state.
+        state: Vec<f64>,
     },
     /// It settled to a motion that Newton's method does not confirm as an isolated, stable solution. The period of the motion is 0 if
     /// it is one of rest.
@@ -165,6 +167,13 @@ pub enum Lost {
     Undefined(Exit),
     /// Its steps became too small: f jumps, or is too stiff.
     Stuck,
+}
+
+impl Lost {
+    /// A trajectory that was not followed.
+    fn nothing(start: &[f64]) -> Lost {
+        Lost::Unsettled { time: 0.0, extent: vec![0.0; start.len()], state: start.to_vec() }
+    }
 }
 
 /// The attractor of an autonomous field; see [`super::settle`].
@@ -183,7 +192,7 @@ pub(super) fn settle(
         Some(Fate::Escaped) => Err(Lost::Escaped),
         Some(Fate::Undefined) => Err(watched.exits.pop().map_or(Lost::Escaped, Lost::Undefined)),
         Some(Fate::Stuck) => Err(Lost::Stuck),
-        _ => Err(Lost::Unsettled { time: 0.0, extent: Vec::new() }),
+        _ => Err(Lost::nothing(start)),
     }
 }
 
@@ -192,13 +201,16 @@ fn patiently(context: &Context, start: &[f64]) -> Result<Point, Lost> {
     let Sampling { scales, whirl, .. } = context.sampling;
     let trial = Trial { field: context.field, scales, whirl: *whirl, jobs: 1 };
     let settled = settle_together(&trial, context.parameters, start, First::Accurate).pop();
-    let settled = settled.ok_or(Lost::Unsettled { time: 0.0, extent: Vec::new() })?;
+    let settled = settled.ok_or(Lost::nothing(start))?;
     let candidate = match settled.motion {
         Motion::Equilibrium => Candidate::Equilibrium(settled.state.clone()),
         Motion::Cycle => context.turn(&settled.state, settled.period),
         Motion::Escaped if settled.state.iter().all(|x| x.abs() < Response::UNBOUNDED) => return Err(Lost::Stuck),
         Motion::Escaped => return Err(Lost::Escaped),
-        Motion::Other => return Err(Lost::Unsettled { time: settled.time, extent: settled.extent }),
+        Motion::Other => {
+            let Settled { time, extent, state, .. } = settled;
+            return Err(Lost::Unsettled { time, extent, state });
+        }
     };
     let found = context.polished(&candidate).map(|orbit| orbit.point);
     found.ok_or(Lost::Unconfirmed { period: settled.period, state: settled.state })

@@ -136,9 +136,10 @@ pub(super) fn settle(
             bare_exit(&mut exit, n, unit);
             Err(Lost::Undefined(exit))
         }
-        Err(Lost::Unsettled { time, mut extent }) => {
+        Err(Lost::Unsettled { time, mut extent, mut state }) => {
             extent.truncate(n);
-            Err(Lost::Unsettled { time: time * unit, extent })
+            state.truncate(n);
+            Err(Lost::Unsettled { time: time * unit, extent, state })
         }
         Err(Lost::Unconfirmed { period, mut state }) => {
             state.truncate(n);

@@ -85,11 +85,17 @@ fn of_exit(system: &System, exit: &Exit) -> String {
 
 /// That solutions come in families.
 fn of_family(system: &System, parameters: &[f64]) -> Option<String> {
-    if let Some(states) = symmetry::rotation(system, parameters) {
+    if let Some(pairs) = symmetry::rotation(system, parameters) {
+        let name = |state: &usize| system.state_names.get(*state).map_or("?", String::as_str);
+        let turned: Vec<String> = pairs.iter().map(|[a, b]| format!("({}, {})", name(a), name(b))).collect();
+        let rest: Vec<String> = pairs.iter().map(|[_, b]| format!("{} = 0", name(b))).collect();
         return Some(format!(
-            "\nlikely cause: the equations stay the same when {states} are turned together: a solution can be turned too, and those that \
-             this moves are not isolated but come in families\nwhat to do: start in a direction that the turning leaves free, with all \
-             states of one direction 0, or write the model in coordinates without the angle"
+            "\nlikely cause: the equations stay the same when {} are turned together, so a solution can be turned too: those that this \
+             moves are not isolated but come in families, and Newton's method has nothing to converge to\nwhat to do: if the motion \
+             swings in one direction, take that direction for an axis and start with {}; or write the model in coordinates without \
+             the angle",
+            turned.join(" and "),
+            rest.join(", ")
         ));
     }
     symmetry::keeps_energy(system, parameters).then(|| {

@@ -3,7 +3,7 @@
 //! **Idea.** A cycle that lasts one period of the forcing is the solution of a boundary-value problem on a known interval. Newton's method
 //! solves it from the given state at rest, where its first step is the linear response, or from the trajectory over one period. The
 //! multipliers of the cycle say how long a transient lasts. Only where that is longer than trajectories are followed does the cycle
-//! stand for what the trajectory settles to; otherwise the trajectory itself decides.
+//! stand for what the trajectory settles to; otherwise the trajectory itself decides, by where it is once all transients have decayed.
 //!
 //! **Equations.** With μ the largest multiplier, and s steps of the integration per period of the forcing, a transient falls by the factor
 //! [`FALL`] in
@@ -37,10 +37,11 @@ pub(super) struct Direct {
     pub(super) periods: f64,
     /// True if the cycle passes through the given state.
     pub(super) through: bool,
+    /// True if no trajectory is followed until it has settled there.
+    pub(super) slow: bool,
 }
 
-/// The cycle of one period of the forcing that Newton's method finds from `state`, if the state lies on it, or if it attracts so slowly that
-/// no trajectory is followed until it has settled there.
+/// The cycle of one period of the forcing that Newton's method finds from `state`, if it is stable or passes through the state.
 pub(super) fn direct(system: &System, parameters: &[f64], tolerance: f64, state: &[f64]) -> Option<Direct> {
     if !system.field.forced() {
         return None;
@@ -51,6 +52,22 @@ pub(super) fn direct(system: &System, parameters: &[f64], tolerance: f64, state:
     found.find_map(|point| judged(system, state, point, steps))
 }
 
+impl Direct {
+    /// True if a trajectory that was followed for so long, in the time of the model, and ended in `state` is on the cycle: transients have
+    /// decayed, and the state lies next to the cycle, measured by the extent of each component.
+    pub(super) fn ends(&self, time: f64, state: &[f64], unit: f64) -> bool {
+        const PLACES: usize = 2048;
+        const NEXT: f64 = 0.01;
+        let Solution::Cycle(cycle) = &self.point.solution else { return false };
+        let off = |t: usize| {
+            let here = cycle.state(t as f64 / PLACES as f64);
+            let parts = here.iter().zip(state).zip(&self.point.ranges);
+            parts.map(|((a, b), [low, high])| (a - b).abs() / (high - low).max(f64::MIN_POSITIVE)).fold(0.0, f64::max)
+        };
+        time > self.periods * unit && (0..PLACES).map(off).fold(f64::INFINITY, f64::min) < NEXT
+    }
+}
+
 /// The cycle, if it is of use.
 fn judged(system: &System, state: &[f64], point: Point, steps: usize) -> Option<Direct> {
     let Solution::Cycle(cycle) = &point.solution else { return None };
@@ -59,7 +76,7 @@ fn judged(system: &System, state: &[f64], point: Point, steps: usize) -> Option<
     let through = sizes.all(|((a, b), scale)| (a - b).abs() <= ON * (scale + b.abs()));
     let periods = transient(point.free_spectrum().iter().fold(0.0, |m: f64, z| m.max(z.norm())).ln());
     let slow = point.unstable == 0 && periods * steps as f64 > STEP_LIMIT as f64;
-    (through || slow).then_some(Direct { point, periods, through })
+    (through || point.unstable == 0).then_some(Direct { point, periods, through, slow })
 }
 
 /// N of (1) for the logarithm of |μ|; infinite where nothing decays.

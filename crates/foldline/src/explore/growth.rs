@@ -130,10 +130,12 @@ fn of_family(problem: &mut dyn ZeroProblem, settings: &Settings, point: &Point) 
     const STAYS: f64 = 10.0;
     let u = problem.unknowns_of(point);
     problem.anchor(&u);
-    let (last, value) = (u.len() - 1, u[u.len() - 1]);
+    let value = u[u.len() - 1];
     let row = direction(problem, &u).ok()?;
     let plane = Plane { row, base: u.clone(), distance: 0.0 };
     let mut found = settle(problem, settings, plane, u, 1.0, &mut Cost::default()).ok()?;
+    // On another mesh there are more unknowns, or fewer.
+    let last = found.u.len() - 1;
     if (found.u[last] - value).abs() > STAYS * settings.tolerance {
         return None;
     }

@@ -177,7 +177,7 @@ fn without_samples(system: &System, plan: &Plan, seed: &SeedPlan, keys: &[&Attra
     let found = direct(system, &seed.parameters, plan.tolerance, &next_to_origin(system))?;
     let Solution::Cycle(cycle) = &found.point.solution else { return None };
     let ratio = system.whirl.and_then(|whirl| attractors::spectral_ratio(cycle, whirl));
-    let enough = found.point.unstable == 0 && !keys.is_empty();
+    let enough = found.slow && !keys.is_empty();
     if !enough || found.periods > NEVER || !keys.iter().all(|key| is_meant(key, &found.point, ratio)) {
         return None;
     }
@@ -288,8 +288,9 @@ fn from_state(
     {
         return Ok(point.clone());
     }
-    if let Some(Direct { point, periods, through }) = direct(system, &seed.parameters, plan.tolerance, state) {
-        let slowly = match periods > NEVER {
+    let next = direct(system, &seed.parameters, plan.tolerance, state);
+    if let Some(Direct { point, periods, through, .. }) = next.as_ref().filter(|next| next.through || next.slow) {
+        let slowly = match *periods > NEVER {
             true => "no motion next to it decays".to_string(),
             false => format!("it attracts so slowly that a transient lasts some {periods:.1e} periods of the forcing"),
         };
@@ -298,47 +299,60 @@ fn from_state(
                 "the cycle that Newton's method finds from the given state, not the end of a trajectory: {slowly}"
             ));
         }
-        return Ok(point);
+        return Ok(point.clone());
     }
     let sampling = sampling(system, 1, seed.random, jobs, plan.tolerance);
     let polish = |candidate: &Candidate| polish(system, &seed.parameters, plan.tolerance, candidate);
     let settled = attractors::settle(system.field, &seed.parameters, &sampling, state, &polish);
-    // A saddle that the trajectory leads to and does not stay at, if that was meant.
-    settled.or_else(|lost| match found {
-        Some((moved, point)) if moved < NEAR => Ok(point),
-        _ => {
-            let what = match &lost {
-                Lost::Unsettled { time, extent } => {
-                    let names = system.state_names.iter().zip(extent);
-                    let spans: Vec<String> = names.take(4).map(|(name, span)| format!("{name} by {span:.1e}")).collect();
-                    let more = if extent.len() > 4 { ", …" } else { "" };
-                    let spans = spans.join(", ");
-                    format!(
-                        "settles neither to an equilibrium nor to a cycle: it was followed for a time of {time:.1e}, and at the end \
-                         still moves {spans}{more}"
-                    )
-                }
-                Lost::Unconfirmed { period, .. } if *period > 0.0 => format!(
-                    "settles to a cycle of the period {period:.6}, which Newton's method does not confirm as isolated and stable"
-                ),
-                Lost::Unconfirmed { .. } => {
-                    "comes to rest where Newton's method does not find an isolated, stable solution".to_string()
-                }
-                Lost::Escaped => "leaves every bound".to_string(),
-                Lost::Undefined(_) => "leaves the region in which the vector field is defined".to_string(),
-                Lost::Stuck => "cannot be followed: its steps become too small".to_string(),
-            };
-            let (stuck, all_escaped) = (lost == Lost::Stuck, lost == Lost::Escaped);
-            let unsettled = matches!(lost, Lost::Unsettled { .. } | Lost::Unconfirmed { .. });
-            let exit = match &lost {
-                Lost::Undefined(exit) => Some(exit),
-                _ => None,
-            };
-            let seen = Seen { state: Some(state), stuck, all_escaped, exit, unsettled };
-            let why = of_no_start(system, &seed.parameters, seen);
-            Err(format!("the trajectory from the given state {what}{why}"))
-        }
+    settled.or_else(|lost| match (found, next) {
+        // A saddle that the trajectory leads to and does not stay at, if that was meant.
+        (Some((moved, point)), _) if moved < NEAR => Ok(point),
+        (_, Some(next)) if has_arrived(system, seed, &next, &lost) => Ok(next.point),
+        _ => Err(no_start(system, seed, state, &lost)),
     })
+}
+
+/// Whether a trajectory that does not repeat itself to the accuracy asked for, as where the steps of a stiff model are as long as they can be,
+/// has come to that cycle.
+fn has_arrived(system: &System, seed: &SeedPlan, next: &Direct, lost: &Lost) -> bool {
+    let unit = system.field.time_unit(&seed.parameters);
+    matches!(lost, Lost::Unsettled { time, state, .. } if next.ends(*time, state, unit))
+}
+
+/// What became of the trajectory from a given state, why, and what can be done.
+fn no_start(system: &System, seed: &SeedPlan, state: &[f64], lost: &Lost) -> String {
+    const TOLD: usize = 4;
+    let what = match lost {
+        Lost::Unsettled { time, extent, .. } => {
+            let names = system.state_names.iter().zip(extent).take(TOLD);
+            let spans: Vec<String> = names.map(|(name, span)| format!("{name} by {span:.1e}")).collect();
+            let more = if extent.len() > TOLD { ", …" } else { "" };
+            format!(
+                "settles neither to an equilibrium nor to a cycle: it was followed for a time of {time:.1e}, and at the end still \
+                 moves {}{more}",
+                spans.join(", ")
+            )
+        }
+        Lost::Unconfirmed { period, .. } if *period > 0.0 => {
+            format!(
+                "settles to a cycle of the period {period:.6}, which Newton's method does not confirm as isolated and stable"
+            )
+        }
+        Lost::Unconfirmed { .. } => {
+            "comes to rest where Newton's method does not find an isolated, stable solution".to_string()
+        }
+        Lost::Escaped => "leaves every bound".to_string(),
+        Lost::Undefined(_) => "leaves the region in which the vector field is defined".to_string(),
+        Lost::Stuck => "cannot be followed: its steps become too small".to_string(),
+    };
+    let exit = match lost {
+        Lost::Undefined(exit) => Some(exit),
+        _ => None,
+    };
+    let unsettled = matches!(lost, Lost::Unsettled { .. } | Lost::Unconfirmed { .. });
+    let (stuck, all_escaped) = (*lost == Lost::Stuck, *lost == Lost::Escaped);
+    let why = of_no_start(system, &seed.parameters, Seen { state: Some(state), stuck, all_escaped, exit, unsettled });
+    format!("the trajectory from the given state {what}{why}")
 }
 
 /// Whether a solution is of the type that a key names.

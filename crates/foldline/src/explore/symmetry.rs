@@ -31,8 +31,8 @@ struct Place {
     fx: Vec<f64>,
 }
 
-/// Says which states turn together without a change of the equations, if some do.
-pub(super) fn rotation(system: &System, parameters: &[f64]) -> Option<String> {
+/// The pairs of states that can be turned together without a change of the equations, if there are any.
+pub(super) fn rotation(system: &System, parameters: &[f64]) -> Option<Vec<[usize; 2]>> {
     let n = system.field.dim();
     if !(2..=MOST).contains(&n) {
         return None;
@@ -51,12 +51,11 @@ pub(super) fn rotation(system: &System, parameters: &[f64]) -> Option<String> {
     if rows.len() < n * n + n {
         return None;
     }
-    null_space(rows, n * n).iter().find_map(|generator| turned(generator, &system.state_names))
+    null_space(rows, n * n).iter().find_map(|generator| turned(generator, n))
 }
 
-/// The pairs of states that a generator turns, as text; `None` if it is no rotation.
-fn turned(generator: &[f64], names: &[String]) -> Option<String> {
-    let n = names.len();
+/// The pairs of states that a generator turns; `None` if it is no rotation.
+fn turned(generator: &[f64], n: usize) -> Option<Vec<[usize; 2]>> {
     let size = max_abs(generator);
     let entry = |i: usize, j: usize| generator[i * n + j] / size;
     let mut pairs = Vec::new();
@@ -68,10 +67,10 @@ fn turned(generator: &[f64], names: &[String]) -> Option<String> {
             return None;
         }
         if i < j {
-            pairs.push(format!("({}, {})", names[i], names[j]));
+            pairs.push([i, j]);
         }
     }
-    (!pairs.is_empty()).then(|| pairs.join(" and "))
+    (!pairs.is_empty()).then_some(pairs)
 }
 
 /// True if the system has the form (2): an energy never changes.
@@ -151,7 +150,7 @@ mod tests {
             let model = model(&[("x", "vx"), ("y", "vy"), ("vx", &fx), ("vy", &fy)]);
             rotation(&System::of(&model, &[0.0]), &[0.0])
         };
-        assert_eq!(told("1").as_deref(), Some("(x, y) and (vx, vy)"));
+        assert_eq!(told("1"), Some(vec![[0, 1], [2, 3]]));
         assert_eq!(told("1.01"), None);
     }
 
