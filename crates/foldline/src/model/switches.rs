@@ -149,20 +149,22 @@ mod tests {
 
     #[test]
     fn a_branch_that_cannot_be_continued_gives_way_to_the_one_in_force() {
-        for (text, beyond) in [("max(x - p, 0)^1.5", 0.0), ("if(x > p, log(x - p), 7)", 7.0)] {
+        // The comparison x > p has the switch p - x, the maximum x - p.
+        for (text, sign, beyond, inside) in
+            [("max(x - p, 0)^1.5", 1.0, 0.0, 1.0), ("if(x > p, log(x - p), 7)", -1.0, 7.0, 0.0)]
+        {
             let model = model(text);
-            let at =
-                Batch { lanes: 2, states: &[0.2, 1.5, 0.0, 0.0], parameters: Parameters::Shared(&[0.5]), times: &[] };
+            let states = [0.2, 1.5, 0.0, 0.0];
+            let at = Batch { lanes: 2, states: &states, parameters: Parameters::Shared(&[0.5]), times: &[] };
             let mut f = [0.0; 4];
-            model.evaluate_switched(at, &[1.0, 1.0], &mut f);
-            let inside = if beyond == 0.0 { 1.0 } else { 0.0 };
+            model.evaluate_switched(at, &[sign; 2], &mut f);
             assert_eq!(f[..2], [beyond, inside], "{text}");
         }
         // What is not defined on either side stays so.
         let model = model("if(x > p, sqrt(x - 0.9), 0)");
         let at = Batch { lanes: 1, states: &[0.7, 0.0], parameters: Parameters::Shared(&[0.5]), times: &[] };
         let mut f = [0.0; 2];
-        model.evaluate_switched(at, &[1.0], &mut f);
+        model.evaluate_switched(at, &[-1.0], &mut f);
         assert!(f[0].is_nan());
     }
 
