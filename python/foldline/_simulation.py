@@ -27,7 +27,8 @@ class Trajectory:
     states : array, shape (times, n)
     outputs : array, shape (times, outputs)
     ending : str
-        ``"reached"``, ``"escaped"``, ``"step-too-small"`` or ``"stopped"``.
+        ``"reached"``, ``"escaped"``, ``"undefined"`` (it leads out of the region in which f is defined),
+        ``"step-too-small"`` or ``"stopped"``.
     """
 
     def __init__(self, model: Model, t: Floats, states: Floats, outputs: Floats, ending: str) -> None:

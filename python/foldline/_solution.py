@@ -242,7 +242,8 @@ class Attractors(Sequence[Attractor]):
     Attributes
     ----------
     samples, escaped, stuck, unsettled : int
-        How many initial states there were, and how many ran to infinity, could not be followed, or did not settle.
+        How many initial states there were, and how many ran to infinity or out of the region in which f is defined, could not be
+        followed, or did not settle.
     """
 
     def __init__(self, found: list[Attractor], samples: int, escaped: int, stuck: int, unsettled: int) -> None:

@@ -41,7 +41,11 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
     }
     let samples = typed.samples;
     let stuck = if census.stuck > 0 { format!(", {} stuck", census.stuck) } else { String::new() };
-    writeln!(out, "{samples} samples, {} escaped{stuck}, {} not settled", census.escaped, census.unsettled)?;
+    let exits = match &census.exits[..] {
+        [] => String::new(),
+        exits => format!(", {} left the region in which f is defined", exits.len()),
+    };
+    writeln!(out, "{samples} samples, {} escaped{exits}{stuck}, {} not settled", census.escaped, census.unsettled)?;
     Ok(Outcome::Done)
 }
 

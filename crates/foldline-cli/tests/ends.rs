@@ -147,3 +147,20 @@ fn an_isolated_point_and_a_cusp() {
     Case { parameters: MU, states: &states, seed: "state = { x = 1 }", range: [-1.0, 2.0], more: "" }
         .ends(&["steps from", "the solutions form no smooth curve here: a cusp"]);
 }
+
+#[test]
+fn a_trajectory_that_leaves_the_region_of_definition() {
+    let states = [("x", "v"), ("v", "-mu*v/10 - sqrt(x)")];
+    let exit = ["leaves the region in which the vector field is defined", "likely cause: at the time", "x = 0.000000"];
+    Case { parameters: MU, states: &states, seed: "state = { x = 1, v = 0 }", range: [0.5, 2.0], more: "" }.ends(&exit);
+}
+
+/// Two masses on springs without damping: no trajectory settles, and the reason is the energy.
+#[test]
+fn an_energy_that_never_changes() {
+    let parameters = [("delta", 0.0)];
+    let states = [("x", "v"), ("y", "w"), ("v", "-2*x + y - 0.5*x^3 + delta*v"), ("w", "-2*y + x + delta*w")];
+    let seed = "state = { x = 1, y = 0.5, v = 0, w = 0 }";
+    Case { parameters: &parameters, states: &states, seed, range: [-0.1, 0.1], more: "" }
+        .ends(&["likely cause: nothing is damped and the forces have a potential, so the energy never changes"]);
+}

@@ -102,3 +102,64 @@ fn surveys_and_sweeps_are_run_listed_and_not_repeated() {
     assert!(!said.contains("motions met"), "what is done is repeated: {said}");
     assert_eq!(printed(folder.path(), &["table", "runs/study", "--responses", "--format", "csv"]), csv);
 }
+
+/// The escape equation: x = 1 + y gives y'' + 0.1 y' + y + y² = lam sin(0.81 t) with the edge of its well at y = -1.
+fn escape(force: &str, forcing: &str) -> String {
+    format!(
+        "[parameters]\nw = 0.81\nlam = 0.05\n{forcing}[states]\nx = {{ equation = \"v\", range = [-1, 2] }}\n\
+         v = {{ equation = \"-0.1*v + x - x^2 + {force}\", range = [-1, 1] }}\n"
+    )
+}
+
+const FORCED: [&str; 2] = ["lam*sin(w*t)", "[forcing]\nfrequency = \"w\"\n"];
+const FREE: [&str; 2] = ["lam", ""];
+
+#[test]
+fn every_start_that_escapes_is_counted() {
+    for [force, forcing] in [FORCED, FREE] {
+        let folder = tempfile::tempdir().unwrap();
+        std::fs::write(folder.path().join("m.toml"), escape(force, forcing)).unwrap();
+        let study = "model = \"m.toml\"\n[[survey]]\nname = \"basin\"\nfree = \"lam\"\nvalues = [0.02, 0.06, 0.1]\nstarts = 16\n";
+        std::fs::write(folder.path().join("s.toml"), study).unwrap();
+        let run = foldline(folder.path(), &["run", "s.toml", "--out", "r"]);
+        let said = String::from_utf8_lossy(&run.stderr);
+        assert_eq!(run.status.code(), Some(0), "{said}");
+        let csv = printed(folder.path(), &["table", "r", "--responses", "--format", "csv"]);
+        let mut lines = csv.lines().map(|line| line.split(',').map(str::to_string).collect::<Vec<_>>());
+        let heads = lines.next().unwrap();
+        let place = |name: &str| heads.iter().position(|h| h == name).unwrap();
+        let (lam, motion, hits) = (place("lam"), place("motion"), place("hits"));
+        let rows: Vec<Vec<String>> = lines.collect();
+        for value in ["0.02", "0.06", "0.1"] {
+            let own: Vec<_> = rows.iter().filter(|row| row[lam].parse::<f64>() == value.parse()).collect();
+            let count = |kind: &str| -> usize {
+                own.iter().filter(|row| row[motion] == kind).map(|row| row[hits].parse::<usize>().unwrap()).sum()
+            };
+            let escaped = count("escaped");
+            assert_eq!(escaped + count("cycle") + count("equilibrium") + count("other"), 16, "{csv}");
+            assert!(escaped > 0, "{csv}");
+            assert!(said.contains(&format!("{escaped} at the value {value}")), "{said}");
+        }
+    }
+}
+
+/// Under a slowly growing force the motion in the well escapes for good. Thompson (1989, Proc. R. Soc. A 421) has it at a force of 0.109 for the
+/// frequency 0.85, and lower ones towards the optimum next to 0.8, which no motion in the well survives beyond 0.1.
+#[test]
+fn a_sweep_ends_where_its_motion_escapes_and_keeps_the_rest() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("m.toml"), escape(FORCED[0], FORCED[1])).unwrap();
+    let study = "model = \"m.toml\"\n[[seed]]\nname = \"s\"\nattractor = \"cycle\"\n[[sweep]]\nname = \"up\"\nfrom = \"s\"\nfree = \"lam\"\n\
+                 range = [0.05, 0.3]\ncount = 26\n";
+    std::fs::write(folder.path().join("s.toml"), study).unwrap();
+    let run = foldline(folder.path(), &["run", "s.toml", "--out", "r"]);
+    let said = String::from_utf8_lossy(&run.stderr);
+    assert_eq!(run.status.code(), Some(3), "{said}");
+    let csv = printed(folder.path(), &["table", "r", "--responses", "--format", "csv"]);
+    let rows: Vec<Vec<&str>> = csv.lines().skip(1).map(|line| line.split(',').collect()).collect();
+    let motions: Vec<&str> = rows.iter().map(|row| row[4]).collect();
+    let last: f64 = rows[rows.len() - 1][3].parse().unwrap();
+    assert!(motions[..rows.len() - 1].iter().all(|motion| *motion != "escaped"), "{csv}");
+    assert!(motions[rows.len() - 1] == "escaped" && last > 0.05 && last < 0.11, "{csv}");
+    assert!(said.contains(&format!("up: at lam = {last} the motion runs to infinity; the sweep ends there")), "{said}");
+}

@@ -7,6 +7,7 @@
 pub mod edits;
 pub mod formula;
 pub mod reference;
+pub mod simulations;
 pub mod tapes;
 pub mod texts;
 

@@ -3,7 +3,7 @@
 use arbitrary::Unstructured;
 use foldline_fuzz::edits::edited;
 use foldline_fuzz::tapes::{Seen, tape};
-use foldline_fuzz::{bytes, texts};
+use foldline_fuzz::{bytes, simulations, texts};
 
 #[test]
 fn tapes_compute_what_the_formulas_say() {
@@ -16,6 +16,19 @@ fn tapes_compute_what_the_formulas_say() {
         }
     }
     assert!(seen.values > 8_000 && seen.slopes > 4_000, "{seen:?}");
+}
+
+#[test]
+fn whatever_trajectories_do_is_counted() {
+    let mut seen = simulations::Seen::default();
+    for stream in 0..40 {
+        let data = bytes(stream, 2000);
+        let _ = simulations::simulation(&mut Unstructured::new(&data), &mut seen);
+    }
+    assert!(
+        seen.run.iter().all(|run| *run > 5) && seen.settled > 20 && seen.escaped > 20 && seen.swept > 10,
+        "{seen:?}"
+    );
 }
 
 #[test]

@@ -40,7 +40,7 @@ pub fn settle(
 type Found<'py> = (Solution, Option<(u32, u32)>, usize, Bound<'py, PyBytes>);
 
 /// The attractors that sampled states reach, each with its ratio, how many went there and the first state that did; then how
-/// many escaped, got stuck, and had not settled.
+/// many escaped (out of the region in which f is defined, too), got stuck, and had not settled.
 #[pyfunction]
 pub fn attractors<'py>(
     py: Python<'py>,
@@ -60,7 +60,8 @@ pub fn attractors<'py>(
         let example = numbers(py, attractor.example.iter().copied())?;
         Ok((Solution::new(attractor.point, &model.model), attractor.ratio, attractor.hits, example))
     });
-    Ok((found.collect::<PyResult<_>>()?, (census.escaped, census.stuck, census.unsettled)))
+    let escaped = census.escaped + census.exits.len();
+    Ok((found.collect::<PyResult<_>>()?, (escaped, census.stuck, census.unsettled)))
 }
 
 /// The parameters, at which the model must be finite somewhere.

@@ -98,6 +98,7 @@ fn code(outcome: Outcome) -> &'static str {
         Outcome::Reached => "reached",
         Outcome::Stopped => "stopped",
         Outcome::Escaped => "escaped",
+        Outcome::Undefined => "undefined",
         Outcome::StepTooSmall => "step-too-small",
         Outcome::StepLimit => "step-limit",
     }

@@ -1,7 +1,7 @@
 //! What of a study was not reached.
 
 use crate::order::leg;
-use foldline::diagram::{Branch, Diagram, Ending, Point};
+use foldline::diagram::{Branch, Diagram, Ending, Motion, Point};
 use foldline::explore::Plan;
 use foldline::model::Model;
 
@@ -18,6 +18,20 @@ pub fn lines(diagram: &Diagram, plan: &Plan, model: &Model) -> Vec<String> {
     let simulated = plan.surveys.iter().map(|s| &s.name).chain(plan.sweeps.iter().map(|s| &s.name));
     let missing = simulated.filter(|name| diagram.response_set(name).is_none());
     lines.extend(missing.map(|name| format!("{name}: it is not complete")));
+    let swept = plan.sweeps.iter().filter_map(|sweep| Some((sweep, diagram.response_set(&sweep.name)?)));
+    lines.extend(swept.filter_map(|(sweep, set)| {
+        let last = set.responses.last().filter(|last| last.motion == Motion::Escaped)?;
+        Some(format!(
+            "{}: at {} the motion {}; the sweep ends there, {} of {} values visited\n\
+             likely cause: what was followed ceases to attract, or its basin becomes so narrow that a step of the sweep leads out of it\n\
+             what to do: take smaller steps there, or follow the motion as a branch, which passes the point where it ceases to attract",
+            sweep.name,
+            place(&[(sweep.free, last.value)], model),
+            last.fate(),
+            set.responses.len(),
+            sweep.values.len()
+        ))
+    }));
     for homotopy in &plan.homotopies {
         let legs: Vec<&Branch> = diagram.branches.iter().filter(|b| leg(&b.name, &homotopy.name).is_some()).collect();
         if legs.is_empty() {

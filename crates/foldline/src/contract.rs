@@ -86,7 +86,8 @@ pub trait VectorField: Send + Sync {
     fn switches(&self, _at: Batch, _out: &mut [f64]) {}
 
     /// f as it is where the switches have the given signs (±1, `[switch_count × lanes]`), continued smoothly beyond their
-    /// zeros: writes `[n × lanes]`.
+    /// zeros: writes `[n × lanes]`. Where it cannot be continued, as the root of what is positive on one side only, it is f as
+    /// it is there.
     fn evaluate_switched(&self, at: Batch, _signs: &[f64], f: &mut [f64]) {
         self.evaluate(at, f);
     }

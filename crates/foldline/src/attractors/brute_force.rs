@@ -109,7 +109,7 @@ fn agree(trial: &Trial, a: &Response, b: &Response) -> bool {
 }
 
 /// A stepped sweep: the motion to which the trajectory from `start` `[n]` settles at the first of `values`, then at each next
-/// value the one to which it settles from its last state. It ends early where the trajectory escapes, or a report says stop.
+/// value the one to which it settles from its last state. It ends early with a motion that escaped, or where a report says stop.
 pub fn stepped_sweep(
     trial: &Trial,
     parameters: &[f64],
@@ -131,7 +131,8 @@ pub fn stepped_sweep(
         let Some(settled) = settle_together(trial, &own, &state, First::Accurate).pop() else { break };
         let response = response(trial, &own, free, &settled);
         state.clone_from(&response.state);
-        let over = response.motion == Motion::Escaped || report(std::slice::from_ref(&response)) == Verdict::Stop;
+        let stopped = report(std::slice::from_ref(&response)) == Verdict::Stop;
+        let over = stopped || response.motion == Motion::Escaped;
         found.push(response);
         if over {
             break;

@@ -5,11 +5,11 @@
 
 use super::candidate::Context;
 use super::orbit::Orbit;
-use super::settling::{First, Trial, settle_together};
+use super::settling::{First, Settled, Trial, settle_together};
 use super::watch::Watch;
-use super::{Attractor, Candidate, Census, Enough, Polish, Sampling};
+use super::{Attractor, Candidate, Census, Enough, Exit, Polish, Sampling};
 use crate::contract::{VectorField, Verdict};
-use crate::diagram::{Motion, Point};
+use crate::diagram::{Motion, Point, Response};
 use crate::simulation::{Ensemble, Outcome};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -32,7 +32,7 @@ impl Pace {
 /// Blocks per round after the first, which is one block; fixed for the same reason.
 const ROUND: usize = 4;
 /// Steps after which a trajectory counts as unsettled: some thousand periods.
-const STEP_LIMIT: usize = 60_000;
+pub(crate) const STEP_LIMIT: usize = 60_000;
 
 /// What became of one trajectory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,6 +41,8 @@ enum Fate {
     Settled(usize),
     Unsettled,
     Escaped,
+    /// It left the region in which f is defined.
+    Undefined,
     /// Its steps became too small.
     Stuck,
     /// Nobody waited for it.
@@ -108,6 +110,7 @@ pub(super) fn survey(
 
 /// Adds what was seen of a block, whose samples are numbered from `first` on.
 fn add(watched: Watched, first: usize, reached: &mut Vec<Reached>, census: &mut Census, tolerance: f64) {
+    census.exits.extend(watched.exits);
     // The same solution found in several blocks is one.
     let place: Vec<usize> = watched
         .orbits
@@ -130,6 +133,8 @@ fn add(watched: Watched, first: usize, reached: &mut Vec<Reached>, census: &mut 
             }
             Fate::Unsettled => census.unsettled += 1,
             Fate::Escaped => census.escaped += 1,
+            // Told by their places.
+            Fate::Undefined => {}
             Fate::Stuck => census.stuck += 1,
             Fate::Left => census.left += 1,
         }
@@ -137,14 +142,38 @@ fn add(watched: Watched, first: usize, reached: &mut Vec<Reached>, census: &mut 
 }
 
 /// What became of a trajectory that led to no attractor.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Lost {
     /// It ran on without coming to anything.
-    Unsettled,
+    Unsettled {
+        /// How long it was followed, in the time of the model.
+        time: f64,
+        /// `[n]` extent of its motion at the end.
+        extent: Vec<f64>,
+        /// `[n]` its last state.
+        state: Vec<f64>,
+    },
+    /// It settled to a motion that Newton's method does not confirm as an isolated, stable solution. The period of the motion is 0 if
+    /// it is one of rest.
+    Unconfirmed {
+        /// In the time of the model.
+        period: f64,
+        /// `[n]` a state of the motion.
+        state: Vec<f64>,
+    },
     /// It left every bound.
     Escaped,
+    /// It left the region in which f is defined.
+    Undefined(Exit),
     /// Its steps became too small: f jumps, or is too stiff.
     Stuck,
+}
+
+impl Lost {
+    /// A trajectory that was not followed.
+    fn nothing(start: &[f64]) -> Lost {
+        Lost::Unsettled { time: 0.0, extent: vec![0.0; start.len()], state: start.to_vec() }
+    }
 }
 
 /// The attractor of an autonomous field; see [`super::settle`].
@@ -159,24 +188,32 @@ pub(super) fn settle(
     let mut watched = watch_block(&context, start, &[], &|_| false);
     match watched.fates.first() {
         Some(Fate::Settled(index)) if *index < watched.orbits.len() => Ok(watched.orbits.swap_remove(*index).point),
-        Some(Fate::Unsettled) => patiently(&context, start).ok_or(Lost::Unsettled),
+        Some(Fate::Unsettled) => patiently(&context, start),
         Some(Fate::Escaped) => Err(Lost::Escaped),
+        Some(Fate::Undefined) => Err(watched.exits.pop().map_or(Lost::Escaped, Lost::Undefined)),
         Some(Fate::Stuck) => Err(Lost::Stuck),
-        _ => Err(Lost::Unsettled),
+        _ => Err(Lost::nothing(start)),
     }
 }
 
 /// The same by simulation alone, up to the last Newton steps.
-fn patiently(context: &Context, start: &[f64]) -> Option<Point> {
+fn patiently(context: &Context, start: &[f64]) -> Result<Point, Lost> {
     let Sampling { scales, whirl, .. } = context.sampling;
     let trial = Trial { field: context.field, scales, whirl: *whirl, jobs: 1 };
-    let settled = settle_together(&trial, context.parameters, start, First::Accurate).pop()?;
+    let settled = settle_together(&trial, context.parameters, start, First::Accurate).pop();
+    let settled = settled.ok_or(Lost::nothing(start))?;
     let candidate = match settled.motion {
-        Motion::Equilibrium => Candidate::Equilibrium(settled.state),
+        Motion::Equilibrium => Candidate::Equilibrium(settled.state.clone()),
         Motion::Cycle => context.turn(&settled.state, settled.period),
-        Motion::Escaped | Motion::Other => return None,
+        Motion::Escaped if settled.state.iter().all(|x| x.abs() < Response::UNBOUNDED) => return Err(Lost::Stuck),
+        Motion::Escaped => return Err(Lost::Escaped),
+        Motion::Other => {
+            let Settled { time, extent, state, .. } = settled;
+            return Err(Lost::Unsettled { time, extent, state });
+        }
     };
-    Some(context.polished(&candidate)?.point)
+    let found = context.polished(&candidate).map(|orbit| orbit.point);
+    found.ok_or(Lost::Unconfirmed { period: settled.period, state: settled.state })
 }
 
 /// All blocks of a round, in their order, over the threads asked for; those behind one that ended the survey are left out.
@@ -215,6 +252,8 @@ struct Watched {
     /// The solutions known before, then those found here.
     orbits: Vec<Orbit>,
     fates: Vec<Fate>,
+    /// Of the trajectories that left the region in which f is defined.
+    exits: Vec<Exit>,
     /// Whether everything has been found.
     ended: bool,
 }
@@ -255,13 +294,16 @@ fn watch_block(context: &Context, starts: &[f64], reached: &[Reached], enough: E
         (Some(index), _) => Fate::Settled(index),
         (None, Outcome::Stopped) => Fate::Left,
         (None, Outcome::Escaped) => Fate::Escaped,
+        (None, Outcome::Undefined) => Fate::Undefined,
         (None, Outcome::StepTooSmall) => Fate::Stuck,
         (None, _) => Fate::Unsettled,
     });
-    let fates = fates.collect();
+    let fates: Vec<Fate> = fates.collect();
+    let left = arrivals.iter().zip(&fates).filter(|(_, fate)| **fate == Fate::Undefined);
+    let exits = left.map(|(arrival, _)| Exit { time: arrival.time, state: arrival.state.clone() }).collect();
     hit.resize(orbits.len(), false);
     ended |= suffices(&orbits, &hit, 2 * settled >= count);
-    Watched { orbits, fates, ended }
+    Watched { orbits, fates, exits, ended }
 }
 
 /// What a solution is, as far as [`counted`] asks.

@@ -11,7 +11,7 @@
 //! ```
 
 use super::census::Pace;
-use super::{Attractor, Candidate, Census, Enough, Lost, Polish, Report, Sampling, Trial};
+use super::{Attractor, Candidate, Census, Enough, Exit, Lost, Polish, Report, Sampling, Trial};
 use crate::contract::{Batch, VectorField};
 use crate::diagram::{Cycle, Point, Response, Solution};
 use std::f64::consts::TAU;
@@ -111,6 +111,7 @@ pub(super) fn survey(
         bare(point, n, field.time_unit(parameters));
         example.truncate(n);
     }
+    census.exits.iter_mut().for_each(|exit| bare_exit(exit, n, field.time_unit(parameters)));
     census
 }
 
@@ -124,15 +125,33 @@ pub(super) fn settle(
 ) -> Result<Point, Lost> {
     let n = field.dim();
     let polish = |candidate: &Candidate| polish(&without_circle(candidate, n)?).and_then(|found| with_circle(found, n));
-    let mut point = super::census::settle(
-        &Driven(field),
-        parameters,
-        &with_clock(sampling),
-        &[start, &[1.0, 0.0]].concat(),
-        &polish,
-    )?;
-    bare(&mut point, n, field.time_unit(parameters));
-    Ok(point)
+    let start = [start, &[1.0, 0.0]].concat();
+    let unit = field.time_unit(parameters);
+    match super::census::settle(&Driven(field), parameters, &with_clock(sampling), &start, &polish) {
+        Ok(mut point) => {
+            bare(&mut point, n, unit);
+            Ok(point)
+        }
+        Err(Lost::Undefined(mut exit)) => {
+            bare_exit(&mut exit, n, unit);
+            Err(Lost::Undefined(exit))
+        }
+        Err(Lost::Unsettled { time, mut extent, mut state }) => {
+            extent.truncate(n);
+            state.truncate(n);
+            Err(Lost::Unsettled { time: time * unit, extent, state })
+        }
+        Err(Lost::Unconfirmed { period, mut state }) => {
+            state.truncate(n);
+            Err(Lost::Unconfirmed { period: period * unit, state })
+        }
+        Err(lost) => Err(lost),
+    }
+}
+
+fn bare_exit(exit: &mut Exit, n: usize, unit: f64) {
+    exit.time *= unit;
+    exit.state.truncate(n);
 }
 
 /// Scales with those of the circle.
@@ -163,7 +182,7 @@ fn without(response: &Response, field: &dyn VectorField) -> Response {
     let (n, unit) = (field.dim(), field.time_unit(&response.parameters));
     let mut plain = response.clone();
     plain.state.truncate(n);
-    plain.ranges.drain(n..(n + 2).min(response.ranges.len()));
+    without_ranges_of_circle(&mut plain.ranges, n);
     // What repeats with the forcing does so after a whole number of its periods.
     let whole = |period: f64| if (period - period.round()).abs() < WHOLE { period.round() } else { period };
     plain.period = response.period.map(|period| whole(period) * unit);
@@ -227,5 +246,12 @@ fn bare(point: &mut Point, n: usize, unit: f64) {
         *profile = profile.chunks_exact(n + 2).flat_map(|x| &x[..n]).copied().collect();
         *period = f64::from(*forcing_periods) * unit;
     }
-    point.ranges.drain(n..(n + 2).min(point.ranges.len()));
+    without_ranges_of_circle(&mut point.ranges, n);
+}
+
+/// Of a motion that escaped no ranges are known.
+fn without_ranges_of_circle(ranges: &mut Vec<[f64; 2]>, n: usize) {
+    if ranges.len() >= n + 2 {
+        ranges.drain(n..n + 2);
+    }
 }

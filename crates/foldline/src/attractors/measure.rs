@@ -58,10 +58,14 @@ fn cycle(trial: &Trial, parameters: &[f64], settled: &Settled, response: &mut Re
     let (mut states, mut back) = (Vec::with_capacity(SAMPLES * n), None);
     let (mut x, mut before) = (vec![0.0; n], 0.0);
     let spacing = settled.period / SAMPLES as f64;
+    if spacing.is_nan() || spacing <= 0.0 {
+        response.motion = Motion::Other;
+        return;
+    }
     // Long enough for the period to be a little larger than expected.
     let span = [0.0, 1.02 * settled.period];
     let run = Ensemble::new(trial.field, parameters, tolerance(trial), start, span);
-    run.run(&mut |step| {
+    let arrivals = run.run(&mut |step| {
         sample(step, spacing, &mut states, n);
         step.end_into(&mut x);
         let here = side(&x);
@@ -74,6 +78,10 @@ fn cycle(trial: &Trial, parameters: &[f64], settled: &Settled, response: &mut Re
         before = here;
         Verdict::Continue
     });
+    if arrivals.iter().any(|arrival| arrival.outcome.is_lost()) {
+        response.motion = Motion::Escaped;
+        return;
+    }
     states.truncate(SAMPLES * n);
     response.ranges = ranges(trial, parameters, &states);
     if let Some((period, state)) = back {
@@ -118,7 +126,7 @@ fn sample(step: &Step, spacing: f64, states: &mut Vec<f64>, n: usize) {
     }
 }
 
-/// The motion goes on for a while, and its extremes are kept.
+/// The motion goes on for a while, and its extremes are kept, unless it escapes after all.
 fn other(trial: &Trial, parameters: &[f64], response: &mut Response) {
     const PARTS: usize = 4;
     let n = trial.field.dim();
@@ -131,9 +139,11 @@ fn other(trial: &Trial, parameters: &[f64], response: &mut Response) {
         }
         Verdict::Continue
     });
-    response.ranges = ranges(trial, parameters, &states);
-    if let Some(arrival) = arrivals.into_iter().next() {
-        response.state = arrival.state;
+    let Some(arrival) = arrivals.into_iter().next() else { return };
+    response.state = arrival.state;
+    match arrival.outcome.is_lost() {
+        true => response.motion = Motion::Escaped,
+        false => response.ranges = ranges(trial, parameters, &states),
     }
 }
 
@@ -141,6 +151,9 @@ fn other(trial: &Trial, parameters: &[f64], response: &mut Response) {
 fn ranges(trial: &Trial, parameters: &[f64], states: &[f64]) -> Vec<[f64; 2]> {
     let n = trial.field.dim();
     let count = states.len() / n;
+    if count == 0 {
+        return Vec::new();
+    }
     let major: Vec<f64> = (0..n).flat_map(|i| (0..count).map(move |s| states[s * n + i])).collect();
     let mut outputs = vec![0.0; trial.field.output_count() * count];
     let at = Batch { lanes: count, states: &major, parameters: Parameters::Shared(parameters), times: &[] };

@@ -41,6 +41,7 @@ mod window;
 pub use brute_force::{Report, stepped_sweep, survey_by_simulation};
 pub use census::Lost;
 use census::Pace;
+pub(crate) use census::STEP_LIMIT;
 pub use sampling::Sampling;
 pub use settling::Trial;
 pub use spectrum::{signed_spectrum, spectral_ratio};
@@ -68,12 +69,23 @@ pub struct Census {
     pub attractors: Vec<Attractor>,
     /// Trajectories about which nothing could be said within the limit on the number of steps.
     pub unsettled: usize,
-    /// Trajectories that ran to infinity or to where f is not defined.
+    /// Trajectories whose state grew beyond every measure.
     pub escaped: usize,
+    /// Trajectories that left the region in which f is defined, with the places where they did.
+    pub exits: Vec<Exit>,
     /// Trajectories whose steps became too small: f jumps, or is too stiff for the method.
     pub stuck: usize,
     /// Samples that were not followed to their end, or not at all, since enough was known; see [`survey_until`].
     pub left: usize,
+}
+
+/// Where a trajectory left the region in which f is defined.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Exit {
+    /// Time since the start.
+    pub time: f64,
+    /// `[n]` last state at which f is defined.
+    pub state: Vec<f64>,
 }
 
 /// An approximate solution, to be computed exactly.

@@ -263,7 +263,7 @@ impl Runner {
     pub(super) fn end(&mut self, time: f64, state: Vec<f64>, outcome: Outcome) {
         self.time += time;
         let extent = self.extent.clone();
-        let gone = matches!(outcome, Outcome::Escaped | Outcome::StepTooSmall);
+        let gone = outcome.is_lost();
         if self.found.is_none() && !gone && self.steps >= STEPS {
             self.found = self.nearly();
         }

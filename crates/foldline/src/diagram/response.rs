@@ -9,7 +9,7 @@ pub enum Motion {
     Cycle,
     /// Neither within the limit on the number of steps: chaos, a torus, or an approach too slow to tell.
     Other,
-    /// It ran to infinity, or to where f is not defined.
+    /// It ran to infinity or to where f is not defined, or its steps became too small.
     Escaped,
 }
 
@@ -58,6 +58,19 @@ pub struct Response {
     pub settled_after: f64,
     /// By how much the motion fails to repeat itself, relative to its extent.
     pub error: f64,
+}
+
+impl Response {
+    /// How far a state grows at least before a trajectory counts as one that runs to infinity.
+    pub(crate) const UNBOUNDED: f64 = 1e12;
+
+    /// What became of a trajectory that escaped: it ran to infinity, or it could not be followed beyond its last state.
+    pub fn fate(&self) -> &'static str {
+        match self.state.iter().all(|x| x.abs() < Response::UNBOUNDED) {
+            true => "cannot be followed beyond a state at which f jumps or ceases to be defined",
+            false => "runs to infinity",
+        }
+    }
 }
 
 /// How responses were looked for.

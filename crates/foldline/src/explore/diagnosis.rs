@@ -3,7 +3,9 @@
 //! **Idea.** f at a few places of the sampling box tells whether some combination of the states never changes. Then no
 //! equilibrium and no cycle is isolated, and Newton's method has nothing to converge to.
 
-use super::System;
+use super::direct::{transient, turn};
+use super::{System, symmetry};
+use crate::attractors::{Exit, STEP_LIMIT};
 use crate::contract::{Batch, Parameters};
 use crate::linalg::max_abs;
 
@@ -21,6 +23,10 @@ pub(super) struct Seen<'a> {
     pub stuck: bool,
     /// Whether all left every bound.
     pub all_escaped: bool,
+    /// Where one left the region in which f is defined, if one did.
+    pub exit: Option<&'a Exit>,
+    /// Whether some ran on without coming to anything, or came to something that Newton's method does not confirm.
+    pub unsettled: bool,
 }
 
 /// Lines that say a likely cause and a cure, to be put after what happened.
@@ -41,6 +47,14 @@ pub(super) fn of_no_start(system: &System, parameters: &[f64], seen: Seen) -> St
                 branches that come together there"
             .into();
     }
+    if let Some(why) = seen.exit.map(|exit| of_exit(system, exit)) {
+        return why;
+    }
+    if seen.unsettled
+        && let Some(why) = of_family(system, parameters).or_else(|| of_slow_decay(system, parameters, seen.state))
+    {
+        return why;
+    }
     match system.field.switch_count() {
         0 if stuck => "\nlikely cause: f jumps, or is too stiff for the explicit method that simulates\nwhat to do: give a state \
                        next to an equilibrium, or milder parameters, and follow from there"
@@ -54,6 +68,80 @@ pub(super) fn of_no_start(system: &System, parameters: &[f64], seen: Seen) -> St
             .into(),
         _ => "\nwhat to do: more samples, other parameters, another range of the states, or a given state".into(),
     }
+}
+
+/// That a trajectory met the edge of the region in which f is defined.
+fn of_exit(system: &System, exit: &Exit) -> String {
+    let names = system.state_names.iter().zip(&exit.state);
+    let place: Vec<String> = names.map(|(name, value)| format!("{name} = {value:.6}")).collect();
+    format!(
+        "\nlikely cause: at the time {:.6}, {}, a trajectory meets the edge of the region in which the vector field is defined (a division \
+         by zero, a log or a root of something negative)\nwhat to do: write the equation so that it is defined there, or choose another \
+         range of the states, another state, or other parameters",
+        exit.time,
+        place.join(", ")
+    )
+}
+
+/// That solutions come in families.
+fn of_family(system: &System, parameters: &[f64]) -> Option<String> {
+    if let Some(pairs) = symmetry::rotation(system, parameters) {
+        let name = |state: &usize| system.state_names.get(*state).map_or("?", String::as_str);
+        let turned: Vec<String> = pairs.iter().map(|[a, b]| format!("({}, {})", name(a), name(b))).collect();
+        let rest: Vec<String> = pairs.iter().map(|[_, b]| format!("{} = 0", name(b))).collect();
+        return Some(format!(
+            "\nlikely cause: the equations stay the same when {} are turned together, so a solution can be turned too: those that this \
+             moves are not isolated but come in families, and Newton's method has nothing to converge to\nwhat to do: if the motion \
+             swings in one direction, take that direction for an axis and start with {}; or write the model in coordinates without \
+             the angle",
+            turned.join(" and "),
+            rest.join(", ")
+        ));
+    }
+    symmetry::keeps_energy(system, parameters).then(|| {
+        "\nlikely cause: nothing is damped and the forces have a potential, so the energy never changes: cycles are not isolated but come in \
+         families, one for each energy, and no trajectory settles\nwhat to do: add a small damping to the equations as the free \
+         parameter, give a cycle of the family as `cycle`, or the equilibrium that it surrounds as `state` with a switch at its Hopf \
+         point: the branch at zero damping is the family"
+            .into()
+    })
+}
+
+/// That a forced system is damped so lightly that transients outlast every trajectory, as its linearisation at the state or, where none was
+/// given, at the state of the box next to the origin says.
+fn of_slow_decay(system: &System, parameters: &[f64], state: Option<&[f64]>) -> Option<String> {
+    let n = system.field.dim();
+    if !system.field.forced() {
+        return None;
+    }
+    let central = next_to_origin(system);
+    let state = state.unwrap_or(&central);
+    let (mut f, mut fx) = (vec![0.0; n], vec![0.0; n * n]);
+    let at = Batch { lanes: 1, states: state, parameters: Parameters::Shared(parameters), times: &[0.0] };
+    system.field.linearise(at, &[], &mut f, &mut fx, &mut []);
+    let rates = crate::stability::eigenvalues(&fx, n, &system.scales);
+    let slowest = rates.iter().fold(f64::NEG_INFINITY, |m: f64, z| m.max(z.re));
+    let rounding = ROUNDING * rates.iter().fold(0.0, |m: f64, z| m.max(z.norm()));
+    let periods = if slowest.abs() <= rounding { f64::INFINITY } else { transient(slowest) };
+    let (_, steps) = turn(system, parameters, state)?;
+    let followed = STEP_LIMIT / steps.max(1);
+    let slow = slowest <= rounding && periods > followed as f64;
+    slow.then(|| {
+        let lasts = match periods.is_finite() {
+            true => format!("motions next to the state fall by a thousand in some {periods:.1e} periods of the forcing"),
+            false => "motions next to the state do not decay at all".to_string(),
+        };
+        format!(
+            "\nlikely cause: light damping: {lasts}, and trajectories are followed for {followed}\nwhat to do: start at a parameter at which \
+             there is more damping, or far from resonance, and follow the solution from there (a homotopy or a branch); or give a state \
+             on the cycle"
+        )
+    })
+}
+
+/// The state of the sampling box next to the origin.
+pub(super) fn next_to_origin(system: &System) -> Vec<f64> {
+    system.ranges.iter().map(|[low, high]| 0.0f64.max(*low).min(*high)).collect()
 }
 
 /// Whether f vanishes at a state.
@@ -90,7 +178,7 @@ fn conserved(system: &System, parameters: &[f64]) -> Vec<Vec<f64>> {
 }
 
 /// The vectors w with `row`·w = 0 for all rows, by elimination with complete pivoting; empty where there is none.
-fn null_space(mut rows: Vec<Vec<f64>>, n: usize) -> Vec<Vec<f64>> {
+pub(super) fn null_space(mut rows: Vec<Vec<f64>>, n: usize) -> Vec<Vec<f64>> {
     let sizes: Vec<f64> = (0..n).map(|j| rows.iter().fold(0.0f64, |m, row| m.max(row[j].abs()))).collect();
     let sizes: Vec<f64> = sizes.iter().map(|&s| if s > 0.0 { s } else { 1.0 }).collect();
     rows.iter_mut().for_each(|row| row.iter_mut().zip(&sizes).for_each(|(v, s)| *v /= s));

@@ -22,7 +22,7 @@ use super::family::Work;
 use super::growth::settings;
 use super::lookout::{Lookout, Sight};
 use super::plan::{BranchPlan, CurvePlan, ExplorePlan, Start};
-use super::seeds::with_degree;
+use super::profile::with_degree;
 use super::{curves, known};
 use crate::attractors::spectral_ratio;
 use crate::contract::Event;

@@ -205,7 +205,7 @@ impl Work<'_> {
             self.system.repeats(&point.parameters, &[(plan.free, plan.range)])?;
             let (settings, sides) = self.growth_settings(plan, &point);
             let mut problem = growth::problem_of(self.system, plan.free, self.plan.degree, &point, false);
-            let station = growth::polished(&mut *problem, &settings, &point).map_err(|why| why.to_string())?;
+            let station = growth::first(&mut *problem, &settings, &point).map_err(|why| why.to_string())?;
             if inside { Ok((settings, sides, station)) } else { Err(name) }
         });
         let going = match begun {

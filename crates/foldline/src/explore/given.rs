@@ -4,7 +4,7 @@
 //! equations are off where it is given tells whether they are, before anything is solved; Newton's method does the rest.
 
 use super::System;
-use super::growth::{polished, problem_of, settings};
+use super::growth::{first, polished, problem_of, settings};
 use super::plan::SeedPlan;
 use super::seeds::{bare, near};
 use crate::contract::{Batch, Parameters, VectorField};
@@ -72,6 +72,15 @@ pub(super) fn from_cycle(system: &System, seed: &SeedPlan, tolerance: f64, cycle
     let found = near(system, cycle.degree, &settings, given.clone()).and_then(|guess| {
         let mut problem = problem_of(system, 0, cycle.degree, &guess, false);
         polished(&mut *problem, &settings, &guess).map(|found| found.point)
+    });
+    // One of a family: which parameter has to stay where it is depends on what breaks the family up.
+    let found = found.or_else(|why| {
+        let mut free = 0..system.field.parameter_count();
+        let of_family = free.find_map(|free| {
+            let mut problem = problem_of(system, free, cycle.degree, &given, false);
+            first(&mut *problem, &settings, &given).ok()
+        });
+        of_family.map(|found| found.point).ok_or(why)
     });
     let why = match found {
         Ok(point) => {

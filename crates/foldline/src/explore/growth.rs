@@ -111,6 +111,56 @@ pub fn polished(problem: &mut dyn ZeroProblem, settings: &Settings, point: &Poin
     Ok(found)
 }
 
+/// A first solution at the parameters of `point`: [`polished`], or where solutions are not isolated, as with a conserved quantity, the
+/// one of their family next to it.
+///
+/// # Errors
+/// That of [`polished`].
+pub fn first(problem: &mut dyn ZeroProblem, settings: &Settings, point: &Point) -> Result<Station, Failure> {
+    let mesh = problem.mesh();
+    polished(problem, settings, point).or_else(|why| {
+        problem.set_mesh(&mesh);
+        of_family(problem, settings, point).ok_or(why)
+    })
+}
+
+/// The solution next to `point` of a family at one value of the parameter: that in the hyperplane across the direction of the family.
+/// `None` where the parameter changes on the way to it, so that `point` is next to no family.
+fn of_family(problem: &mut dyn ZeroProblem, settings: &Settings, point: &Point) -> Option<Station> {
+    /// Change of the parameter, in the unknown of the problem, that is rounding and discretisation.
+    const STAYS: f64 = 10.0;
+    let u = problem.unknowns_of(point);
+    problem.anchor(&u);
+    let value = u[u.len() - 1];
+    let row = direction(problem, &u).ok()?;
+    let plane = Plane { row, base: u.clone(), distance: 0.0 };
+    let mut found = settle(problem, settings, plane, u, 1.0, &mut Cost::default()).ok()?;
+    // On another mesh there are more unknowns, or fewer.
+    let last = found.u.len() - 1;
+    if (found.u[last] - value).abs() > STAYS * settings.tolerance {
+        return None;
+    }
+    found.u[last] = value;
+    found.point.parameters = problem.point(&found.u, &found.tangent, Examination::default()).parameters;
+    Some(found)
+}
+
+/// The direction of the curve at `u`, which is nearly on it.
+fn direction(problem: &mut dyn ZeroProblem, u: &[f64]) -> Result<Vec<f64>, Failure> {
+    // Any row will do for the first tangent unless it is orthogonal to it.
+    let mut row: Vec<f64> = (0..u.len()).map(|k| 0.6 + (k as f64 * 0.0113).sin() + (k as f64 * 1.37).cos()).collect();
+    let mut last = vec![0.0; u.len()];
+    last[u.len() - 1] = 1.0;
+    for _ in 0..2 {
+        problem.factorise(u, &row).map_err(|_| Failure::Singular)?;
+        let mut tangent = vec![0.0; u.len()];
+        problem.solve(&last, &mut tangent);
+        let norm = problem.dot(&tangent, &tangent).sqrt();
+        row = tangent.iter().map(|t| t / norm).collect();
+    }
+    Ok(row)
+}
+
 /// A solution beside `point` on the curve, which may be a fold: from a fold itself, or from next to one, a branch could not
 /// be told from the other side when it comes back. Goes on until the parameter changes noticeably.
 ///
@@ -122,17 +172,7 @@ pub fn beside(problem: &mut dyn ZeroProblem, settings: &Settings, point: &Point)
     const FARTHEST: usize = 12;
     let u = problem.unknowns_of(point);
     problem.anchor(&u);
-    // Any row will do for the first tangent unless it is orthogonal to it.
-    let mut row: Vec<f64> = (0..u.len()).map(|k| 0.6 + (k as f64 * 0.0113).sin() + (k as f64 * 1.37).cos()).collect();
-    let mut last = vec![0.0; u.len()];
-    last[u.len() - 1] = 1.0;
-    for _ in 0..2 {
-        problem.factorise(&u, &row).map_err(|_| Failure::Singular)?;
-        let mut tangent = vec![0.0; u.len()];
-        problem.solve(&last, &mut tangent);
-        let norm = problem.dot(&tangent, &tangent).sqrt();
-        row = tangent.iter().map(|t| t / norm).collect();
-    }
+    let row = direction(problem, &u)?;
     let mut cost = Cost::default();
     let plane = Plane { row, base: u.clone(), distance: 0.0 };
     let mut there = settle(problem, settings, plane, u, 1.0, &mut cost)?;

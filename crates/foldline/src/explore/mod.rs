@@ -24,6 +24,7 @@
 mod counted;
 pub mod curves;
 mod diagnosis;
+mod direct;
 mod discovery;
 pub mod family;
 pub mod given;
@@ -33,10 +34,12 @@ pub mod known;
 mod lookout;
 pub mod persistence;
 pub mod plan;
+mod profile;
 pub mod responses;
 mod schedule;
 pub mod seeds;
 pub mod switch;
+mod symmetry;
 pub mod system;
 #[cfg(test)]
 mod tests;

@@ -8,7 +8,7 @@ use super::plan::{Plan, SurveyPlan, SweepPlan};
 use super::seeds::{Seeds, sampling};
 use crate::attractors::{Trial, stepped_sweep, survey_by_simulation};
 use crate::contract::{Event, Observer, Verdict};
-use crate::diagram::{Diagram, Response, Responses, Search, Solution};
+use crate::diagram::{Diagram, Motion, Response, Responses, Search, Solution};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -81,7 +81,23 @@ fn one_survey(
     let count = Count { name, of: values.len(), done: AtomicUsize::new(0), observer };
     let report = |found: &[Response]| count.visited(found);
     let responses = survey_by_simulation(&trial(system, jobs), &sampling, parameters, *free, values, &report);
-    finished(name, Search::Survey, *free, responses, values.len(), &count)
+    let complete = count.done.load(Ordering::Relaxed) >= values.len();
+    if let Some(note) = escapes(&responses, *starts).filter(|_| complete) {
+        observer.observe(Event::Note(name, &note));
+    }
+    complete.then(|| finished(name, Search::Survey, *free, responses, observer))
+}
+
+/// How many starts escaped at each value, if any did.
+fn escapes(responses: &[Response], starts: usize) -> Option<String> {
+    const TOLD: usize = 8;
+    let gone: Vec<&Response> = responses.iter().filter(|r| r.motion == Motion::Escaped).collect();
+    let told: Vec<String> = gone.iter().take(TOLD).map(|r| format!("{} at the value {}", r.hits, r.value)).collect();
+    let more = match gone.len().saturating_sub(TOLD) {
+        0 => String::new(),
+        more => format!(", and some at {more} more values"),
+    };
+    (!gone.is_empty()).then(|| format!("of {starts} starts escaped: {}{more}", told.join(", ")))
 }
 
 fn one_sweep(
@@ -107,28 +123,17 @@ fn one_sweep(
     let count = Count { name, of: values.len(), done: AtomicUsize::new(0), observer };
     let report = |found: &[Response]| count.visited(found);
     let responses = stepped_sweep(&trial(system, 1), parameters, *free, values, &start, &report);
-    let visited = responses.len();
-    if visited < values.len() && count.done.load(Ordering::Relaxed) < visited {
-        let value = responses.last().map_or(f64::NAN, |r| r.value);
-        observer.observe(Event::Note(name, &format!("the trajectory escaped at the value {value}")));
-        return finished(name, Search::Sweep, *free, responses, 0, &count);
+    let escaped = responses.last().filter(|last| last.motion == Motion::Escaped);
+    if let Some(last) = escaped {
+        observer.observe(Event::Note(name, &format!("at the value {} the motion {}", last.value, last.fate())));
     }
-    finished(name, Search::Sweep, *free, responses, values.len(), &count)
+    let complete = escaped.is_some() || responses.len() == values.len();
+    complete.then(|| finished(name, Search::Sweep, *free, responses, observer))
 }
 
-/// The set, if all `wanted` values were visited; what was stopped on the way is not kept.
-fn finished(
-    name: &str,
-    search: Search,
-    free: usize,
-    responses: Vec<Response>,
-    wanted: usize,
-    count: &Count,
-) -> Option<Responses> {
-    if count.done.load(Ordering::Relaxed) < wanted {
-        return None;
-    }
+/// The set of a survey or sweep that came to its end. One that was stopped on the way is not kept.
+fn finished(name: &str, search: Search, free: usize, responses: Vec<Response>, observer: &dyn Observer) -> Responses {
     let set = Responses { name: name.to_string(), search, free, responses };
-    count.observer.observe(Event::Responses(&set));
-    Some(set)
+    observer.observe(Event::Responses(&set));
+    set
 }

@@ -5,18 +5,19 @@
 //! find what they ask for.
 
 use super::System;
-use super::diagnosis::{Seen, of_no_start};
+use super::diagnosis::{Seen, next_to_origin, of_no_start};
+use super::direct::{Direct, NEVER, direct};
 use super::given::from_cycle;
 use super::growth::{polished, problem_of, setting, settings};
 use super::plan::{AttractorKey, BranchPlan, Plan, SeedPlan, SeedSource, Start};
+use super::profile::{first_profile, with_degree};
 use crate::attractors::{self, Attractor, Candidate, Census, Lost, Sampling};
 use crate::continuation::corrector::{Plane, correct, parameter_row};
 use crate::continuation::{Failure, Settings};
 use crate::contract::{Event, Examination, Observer, Unobserved};
-use crate::diagram::{Cost, Cycle, Diagram, Point, Solution};
+use crate::diagram::{Cost, Diagram, Point, Solution};
 use crate::linalg::max_abs;
 use crate::problem::equilibrium::EquilibriumProblem;
-use crate::problem::gauss::Scheme;
 use std::sync::OnceLock;
 
 /// The first solutions of a plan, one per seed, or why there is none. Each is found when it is asked for.
@@ -107,7 +108,10 @@ impl<'p> Seeds<'p> {
         system.repeats(&seed.parameters, &[])?;
         let point = match &seed.source {
             SeedSource::Cycle(cycle) => from_cycle(system, seed, plan.tolerance, cycle)?,
-            SeedSource::State(state) => from_state(system, seed, plan, state, self.jobs)?,
+            SeedSource::State(state) => {
+                let tell = |note: &str| _ = self.observer.observe(Event::Note(&seed.name, note));
+                from_state(system, seed, plan, state, self.jobs, &tell)?
+            }
             SeedSource::Attractor(key) => {
                 let census = self.census(self.census_of(index).ok_or("no census")?);
                 chosen(census, key).ok_or_else(|| missing(system, seed, census, key))?
@@ -158,11 +162,27 @@ fn census_for(system: &System, plan: &Plan, index: usize, jobs: usize) -> Census
         SeedSource::State(_) | SeedSource::Cycle(_) => None,
     });
     let keys: Vec<&AttractorKey> = keys.collect();
+    if let Some(found) = without_samples(system, plan, seed, &keys) {
+        return found;
+    }
     let sampling = sampling(system, seed.samples, seed.random, jobs, plan.tolerance);
     let polish = |candidate: &Candidate| polish(system, &seed.parameters, plan.tolerance, candidate);
     attractors::survey_until(system.field, &seed.parameters, &sampling, &polish, &|reached| {
         keys.iter().all(|key| reached.iter().any(|(point, ratio)| is_meant(key, point, *ratio)))
     })
+}
+
+/// The census where what is asked for is a cycle that attracts so slowly that no sample would be followed until it has settled there.
+fn without_samples(system: &System, plan: &Plan, seed: &SeedPlan, keys: &[&AttractorKey]) -> Option<Census> {
+    let found = direct(system, &seed.parameters, plan.tolerance, &next_to_origin(system))?;
+    let Solution::Cycle(cycle) = &found.point.solution else { return None };
+    let ratio = system.whirl.and_then(|whirl| attractors::spectral_ratio(cycle, whirl));
+    let enough = found.slow && !keys.is_empty();
+    if !enough || found.periods > NEVER || !keys.iter().all(|key| is_meant(key, &found.point, ratio)) {
+        return None;
+    }
+    let attractor = Attractor { ratio, hits: 0, example: cycle.state(0.0), point: found.point };
+    Some(Census { attractors: vec![attractor], left: seed.samples, ..Census::default() })
 }
 
 /// Samples initial states, follows each to its attractor, and computes the attractors accurately.
@@ -195,7 +215,7 @@ pub(super) fn sampling(system: &System, samples: usize, seed: u64, jobs: usize, 
 }
 
 /// Newton's method at fixed parameters.
-fn polish(system: &System, parameters: &[f64], tolerance: f64, candidate: &Candidate) -> Option<Point> {
+pub(super) fn polish(system: &System, parameters: &[f64], tolerance: f64, candidate: &Candidate) -> Option<Point> {
     let settings = settings(system, tolerance, [f64::NEG_INFINITY, f64::INFINITY], 0);
     let free = 0;
     let solution = match candidate {
@@ -242,98 +262,16 @@ pub(super) fn bare(parameters: &[f64], solution: Solution) -> Point {
     }
 }
 
-/// A trajectory over one period as a profile on a mesh with equal arclength per interval.
-fn first_profile(scales: &[f64], period: f64, times: &[f64], states: &[f64]) -> Cycle {
-    // Of what moves less only the time counts.
-    const LEAST: f64 = 1e-8;
-    let n = scales.len();
-    // A cycle of many turns needs more of them.
-    let intervals = (times.len() / 12).clamp(60, 1200);
-    let scheme = Scheme::new(4);
-    let size: Vec<f64> =
-        (0..n).map(|i| states.iter().skip(i).step_by(n).fold(LEAST * scales[i], |m: f64, v| m.max(v.abs()))).collect();
-    // Arclength in scaled states, plus time, so that no interval becomes empty.
-    let mut length = vec![0.0];
-    for k in 1..times.len() {
-        let moved: f64 = (0..n).map(|i| ((states[k * n + i] - states[(k - 1) * n + i]) / size[i]).powi(2)).sum();
-        length.push(length[k - 1] + moved.sqrt() + (times[k] - times[k - 1]) / period);
-    }
-    let total = length.last().copied().unwrap_or(1.0);
-    let place = |grid: &[f64], values: &[f64], at: f64| -> f64 {
-        let k = grid.partition_point(|g| *g <= at).clamp(1, grid.len().max(2) - 1);
-        let share = (at - grid[k - 1]) / (grid[k] - grid[k - 1]).max(f64::MIN_POSITIVE);
-        values[k - 1] + share * (values[k] - values[k - 1])
-    };
-    let mesh: Vec<f64> = (0..=intervals)
-        .map(|j| match j {
-            0 => 0.0,
-            _ if j == intervals => 1.0,
-            _ => (place(&length, times, total * j as f64 / intervals as f64) / period).clamp(0.0, 1.0),
-        })
-        .collect();
-    // The ends of a trajectory over one period do not quite agree: the gap is spread over the period.
-    let count = times.len();
-    let gap: Vec<f64> = (0..n).map(|i| states[(count - 1) * n + i] - states[i]).collect();
-    let mut profile = Vec::with_capacity(intervals * 5 * n);
-    for pair in mesh.windows(2) {
-        for c in &scheme.nodes {
-            let t = pair[0] + (pair[1] - pair[0]) * c;
-            for i in 0..n {
-                let component: f64 = {
-                    let k = times.partition_point(|g| *g <= t * period).clamp(1, count.max(2) - 1);
-                    cubic(times, states, n, i, k, t * period)
-                };
-                let value = component - t * gap[i];
-                // What has decayed to nothing is nothing.
-                profile.push(if value.abs() < f64::EPSILON * scales[i] { 0.0 } else { value });
-            }
-        }
-    }
-    Cycle { period, forcing_periods: 0, mesh: mesh.into(), degree: 4, profile }
-}
-
-/// Cubic interpolation of component i through the four samples around interval k-1…k.
-fn cubic(times: &[f64], states: &[f64], n: usize, i: usize, k: usize, t: f64) -> f64 {
-    let first = (k.max(2) - 2).min(times.len().saturating_sub(4));
-    let nodes: Vec<usize> = (first..times.len().min(first + 4)).collect();
-    nodes
-        .iter()
-        .map(|&a| {
-            let weight: f64 = nodes
-                .iter()
-                .filter(|&&b| b != a)
-                .map(|&b| {
-                    (t - times[b]) / (times[a] - times[b]).abs().max(f64::MIN_POSITIVE).copysign(times[a] - times[b])
-                })
-                .product();
-            weight * states[a * n + i]
-        })
-        .sum()
-}
-
-/// The same solution in polynomials of another degree, to be polished again.
-pub(super) fn with_degree(mut point: Point, degree: usize) -> Point {
-    if let Solution::Cycle(cycle) = &mut point.solution
-        && cycle.degree != degree
-    {
-        let (old, new) = (Scheme::new(cycle.degree), Scheme::new(degree));
-        let n = cycle.dim();
-        let mut profile = Vec::with_capacity(cycle.intervals() * (degree + 1) * n);
-        for interval in cycle.profile.chunks_exact((cycle.degree + 1) * n) {
-            for &c in &new.nodes {
-                let weights = old.interpolation(c);
-                profile.extend(
-                    (0..n).map(|i| weights.iter().enumerate().map(|(k, w)| w * interval[k * n + i]).sum::<f64>()),
-                );
-            }
-        }
-        (cycle.degree, cycle.profile) = (degree, profile);
-    }
-    point
-}
-
-/// A given state: an equilibrium if Newton's method finds one next to it, else what the trajectory from it settles to.
-fn from_state(system: &System, seed: &SeedPlan, plan: &Plan, state: &[f64], jobs: usize) -> Result<Point, String> {
+/// A given state: an equilibrium if Newton's method finds one next to it, the cycle on which it lies or which attracts too slowly to wait
+/// for ([`direct`]), else what the trajectory from it settles to.
+fn from_state(
+    system: &System,
+    seed: &SeedPlan,
+    plan: &Plan,
+    state: &[f64],
+    jobs: usize,
+    tell: &dyn Fn(&str),
+) -> Result<Point, String> {
     const NEXT: f64 = 1e-2;
     const NEAR: f64 = 0.3;
     let settings = settings(system, plan.tolerance, [f64::NEG_INFINITY, f64::INFINITY], 0);
@@ -350,25 +288,71 @@ fn from_state(system: &System, seed: &SeedPlan, plan: &Plan, state: &[f64], jobs
     {
         return Ok(point.clone());
     }
+    let next = direct(system, &seed.parameters, plan.tolerance, state);
+    if let Some(Direct { point, periods, through, .. }) = next.as_ref().filter(|next| next.through || next.slow) {
+        let slowly = match *periods > NEVER {
+            true => "no motion next to it decays".to_string(),
+            false => format!("it attracts so slowly that a transient lasts some {periods:.1e} periods of the forcing"),
+        };
+        if !through {
+            tell(&format!(
+                "the cycle that Newton's method finds from the given state, not the end of a trajectory: {slowly}"
+            ));
+        }
+        return Ok(point.clone());
+    }
     let sampling = sampling(system, 1, seed.random, jobs, plan.tolerance);
     let polish = |candidate: &Candidate| polish(system, &seed.parameters, plan.tolerance, candidate);
     let settled = attractors::settle(system.field, &seed.parameters, &sampling, state, &polish);
-    // A saddle that the trajectory leads to and does not stay at, if that was meant.
-    settled.or_else(|lost| match found {
-        Some((moved, point)) if moved < NEAR => Ok(point),
-        _ => {
-            let what = match lost {
-                Lost::Unsettled => "settles neither to an equilibrium nor to a cycle",
-                Lost::Escaped => "leaves every bound",
-                Lost::Stuck => "cannot be followed: its steps become too small",
-            };
-            let why = {
-                let (stuck, all_escaped) = (lost == Lost::Stuck, lost == Lost::Escaped);
-                of_no_start(system, &seed.parameters, Seen { state: Some(state), stuck, all_escaped })
-            };
-            Err(format!("the trajectory from the given state {what}{why}"))
-        }
+    settled.or_else(|lost| match (found, next) {
+        // A saddle that the trajectory leads to and does not stay at, if that was meant.
+        (Some((moved, point)), _) if moved < NEAR => Ok(point),
+        (_, Some(next)) if has_arrived(system, seed, &next, &lost) => Ok(next.point),
+        _ => Err(no_start(system, seed, state, &lost)),
     })
+}
+
+/// Whether a trajectory that does not repeat itself to the accuracy asked for, as where the steps of a stiff model are as long as they can be,
+/// has come to that cycle.
+fn has_arrived(system: &System, seed: &SeedPlan, next: &Direct, lost: &Lost) -> bool {
+    let unit = system.field.time_unit(&seed.parameters);
+    matches!(lost, Lost::Unsettled { time, state, .. } if next.ends(*time, state, unit))
+}
+
+/// What became of the trajectory from a given state, why, and what can be done.
+fn no_start(system: &System, seed: &SeedPlan, state: &[f64], lost: &Lost) -> String {
+    const TOLD: usize = 4;
+    let what = match lost {
+        Lost::Unsettled { time, extent, .. } => {
+            let names = system.state_names.iter().zip(extent).take(TOLD);
+            let spans: Vec<String> = names.map(|(name, span)| format!("{name} by {span:.1e}")).collect();
+            let more = if extent.len() > TOLD { ", …" } else { "" };
+            format!(
+                "settles neither to an equilibrium nor to a cycle: it was followed for a time of {time:.1e}, and at the end still \
+                 moves {}{more}",
+                spans.join(", ")
+            )
+        }
+        Lost::Unconfirmed { period, .. } if *period > 0.0 => {
+            format!(
+                "settles to a cycle of the period {period:.6}, which Newton's method does not confirm as isolated and stable"
+            )
+        }
+        Lost::Unconfirmed { .. } => {
+            "comes to rest where Newton's method does not find an isolated, stable solution".to_string()
+        }
+        Lost::Escaped => "leaves every bound".to_string(),
+        Lost::Undefined(_) => "leaves the region in which the vector field is defined".to_string(),
+        Lost::Stuck => "cannot be followed: its steps become too small".to_string(),
+    };
+    let exit = match lost {
+        Lost::Undefined(exit) => Some(exit),
+        _ => None,
+    };
+    let unsettled = matches!(lost, Lost::Unsettled { .. } | Lost::Unconfirmed { .. });
+    let (stuck, all_escaped) = (*lost == Lost::Stuck, *lost == Lost::Escaped);
+    let why = of_no_start(system, &seed.parameters, Seen { state: Some(state), stuck, all_escaped, exit, unsettled });
+    format!("the trajectory from the given state {what}{why}")
 }
 
 /// Whether a solution is of the type that a key names.
@@ -399,21 +383,35 @@ fn chosen(census: &Census, key: &AttractorKey) -> Option<Point> {
 }
 
 fn described(attractor: &Attractor) -> String {
-    let what = match (&attractor.point.solution, attractor.ratio) {
+    format!("{} ({})", kind(attractor), attractor.hits)
+}
+
+fn kind(attractor: &Attractor) -> String {
+    match (&attractor.point.solution, attractor.ratio) {
         (Solution::Equilibrium(_), _) => "equilibrium".to_string(),
         (Solution::Cycle(cycle), Some((p, q))) => format!("{p}:{q} cycle of period {:.6}", cycle.period),
         (Solution::Cycle(cycle), None) => format!("cycle of period {:.6}", cycle.period),
-    };
-    format!("{what} ({})", attractor.hits)
+    }
 }
 
 pub(super) fn summary(census: &Census) -> String {
+    if let [found] = &census.attractors[..]
+        && found.hits == 0
+    {
+        let what = kind(found);
+        return format!(
+            "{what} of Newton's method; it attracts, but too slowly for samples to be followed until they have settled there"
+        );
+    }
     let mut parts: Vec<String> = census.attractors.iter().map(described).collect();
     if census.unsettled > 0 {
         parts.push(format!("unsettled ({})", census.unsettled));
     }
     if census.escaped > 0 {
         parts.push(format!("escaped ({})", census.escaped));
+    }
+    if !census.exits.is_empty() {
+        parts.push(format!("left the region in which the vector field is defined ({})", census.exits.len()));
     }
     if census.stuck > 0 {
         parts.push(format!("stuck where steps became too small ({})", census.stuck));
@@ -431,9 +429,11 @@ fn missing(system: &System, seed: &SeedPlan, census: &Census, key: &AttractorKey
         AttractorKey::Ratio(p, q) => format!("no stable {p}:{q} cycle"),
         AttractorKey::Lasting(periods) => format!("no stable cycle of {periods} periods of the forcing"),
     };
-    let why = {
-        let all_escaped = census.attractors.is_empty() && census.unsettled == 0 && census.escaped > 0;
-        of_no_start(system, &seed.parameters, Seen { state: None, stuck: census.stuck > 0, all_escaped })
-    };
+    let all_escaped = census.attractors.is_empty() && census.unsettled == 0 && census.escaped > 0;
+    // Of what some samples did where others settled nothing follows.
+    let none = census.attractors.is_empty();
+    let (stuck, unsettled) = (census.stuck > 0, none && census.unsettled > 0);
+    let exit = census.exits.first().filter(|_| none);
+    let why = of_no_start(system, &seed.parameters, Seen { state: None, stuck, all_escaped, exit, unsettled });
     format!("{wanted} was found; {}{why}", summary(census))
 }

@@ -5,7 +5,7 @@
 //!
 //! **Departures.** At points where a function has no derivative a finite value is taken so that it cannot spoil a whole
 //! Jacobian: `abs`, `sign`, `heaviside` and comparisons contribute sign(x), 0, 0 and 0; `hypot` contributes 0 at the origin,
-//! and `sqrt` contributes 0 where its argument and the derivative of its argument both vanish. Squares of a radius are
+//! and `sqrt` and powers below 1 contribute 0 where their argument and its derivative both vanish. Squares of a radius are
 //! rewritten as sums of squares beforehand (see `identities`), so smooth functions of a radius are not affected.
 //! A choice (`if`, `min`, `max`) has the derivative of the branch that is taken, whatever the other one gives.
 
@@ -164,6 +164,10 @@ impl Graph {
             let power = self.binary(Binary::Power, a, exponent);
             let slope = self.multiply(b, power);
             total = self.multiply(slope, da);
+            if self.value(b).is_none_or(|b| b < 1.0) {
+                let rests = self.binary(Binary::Equal, da, zero);
+                total = self.select(rests, zero, total);
+            }
         }
         if db != zero {
             let logarithm = self.unary(Unary::Log, a);

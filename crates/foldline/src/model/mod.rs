@@ -253,5 +253,11 @@ impl VectorField for Model {
 
     fn evaluate_switched(&self, at: Batch, signs: &[f64], f: &mut [f64]) {
         self.inner.switches.given.run(at, &[signs], &mut [f]);
+        // Beyond its switch a branch need not be defined, as (x - d)^1.5 in front of a contact at d.
+        if f.iter().any(|value| !value.is_finite()) {
+            let mut actual = vec![0.0; f.len()];
+            self.evaluate(at, &mut actual);
+            f.iter_mut().zip(actual).filter(|(value, _)| !value.is_finite()).for_each(|(value, own)| *value = own);
+        }
     }
 }

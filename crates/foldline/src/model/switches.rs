@@ -10,7 +10,8 @@
 //! 2. |a|: s = a, σ a;   sign(a): s = a, σ;   heaviside(a): s = a, (1 + σ)/2
 //!
 //! **Departures.** A switch that cannot change sign (a radius that is compared with 0) or that depends on parameters only
-//! is none. A comparison for equality holds at isolated instants, where it changes nothing.
+//! is none. A comparison for equality holds at isolated instants, where it changes nothing. A branch that is not defined beyond
+//! its switch, such as a root, is not continued: there the branch that the state takes decides ([`super::Model`]).
 
 use super::graph::{Binary, Graph, Id, Leaf, Node, Unary};
 use super::tape::Tape;
@@ -144,6 +145,27 @@ mod tests {
         ] {
             assert_eq!(model(kinked).switch_count(), count, "{kinked}");
         }
+    }
+
+    #[test]
+    fn a_branch_that_cannot_be_continued_gives_way_to_the_one_in_force() {
+        // The comparison x > p has the switch p - x, the maximum x - p.
+        for (text, sign, beyond, inside) in
+            [("max(x - p, 0)^1.5", 1.0, 0.0, 1.0), ("if(x > p, log(x - p), 7)", -1.0, 7.0, 0.0)]
+        {
+            let model = model(text);
+            let states = [0.2, 1.5, 0.0, 0.0];
+            let at = Batch { lanes: 2, states: &states, parameters: Parameters::Shared(&[0.5]), times: &[] };
+            let mut f = [0.0; 4];
+            model.evaluate_switched(at, &[sign; 2], &mut f);
+            assert_eq!(f[..2], [beyond, inside], "{text}");
+        }
+        // What is not defined on either side stays so.
+        let model = model("if(x > p, sqrt(x - 0.9), 0)");
+        let at = Batch { lanes: 1, states: &[0.7, 0.0], parameters: Parameters::Shared(&[0.5]), times: &[] };
+        let mut f = [0.0; 2];
+        model.evaluate_switched(at, &[-1.0], &mut f);
+        assert!(f[0].is_nan());
     }
 
     #[test]

@@ -38,7 +38,7 @@ use pace::Limits;
 /// Trajectories that are integrated at a time: enough to keep vector instructions busy, few enough to stay in the cache.
 const WIDTH: usize = 64;
 /// Beyond this multiple of 1 + |start| in any component a trajectory is taken to run to infinity.
-const BOUND: f64 = 1e12;
+const BOUND: f64 = crate::diagram::Response::UNBOUNDED;
 /// At rest the step grows without end; beyond this length the arithmetic would overflow.
 const LONGEST: f64 = 1e100;
 
@@ -209,8 +209,8 @@ impl<'a> Ensemble<'a> {
         for (l, run) in self.runs.iter_mut().enumerate().filter(|(_, run)| !run.over) {
             let too_long = (lanes.tried[l] >= self.limits.steps).then_some(Outcome::StepLimit);
             run.done = if lanes.accepted[l] == 0.0 {
-                let escaped = !lanes.error[l].is_finite();
-                let too_small = if escaped { Outcome::Escaped } else { Outcome::StepTooSmall };
+                let undefined = !lanes.error[l].is_finite();
+                let too_small = if undefined { Outcome::Undefined } else { Outcome::StepTooSmall };
                 pace::too_small(lanes.h[l], lanes.time[l]).then_some(too_small).or(too_long)
             } else if pace::escaped(lanes.largest[l], lanes.bound[l]) {
                 Some(Outcome::Escaped)

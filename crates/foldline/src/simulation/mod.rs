@@ -56,13 +56,23 @@ pub enum Outcome {
     Reached,
     /// The observer said stop.
     Stopped,
-    /// The state, or f, ceased to be finite, or the state left every reasonable bound in finite time.
+    /// The state grew beyond every measure.
     Escaped,
+    /// The trajectory leads out of the region in which f is defined: f is not finite at its start, or every step on from its
+    /// last state, however short, meets one that it is not finite at.
+    Undefined,
     /// The step fell below the resolution of the time: f jumps where the field names no switch, the trajectory slides along
     /// a switch, or the problem is too stiff here.
     StepTooSmall,
     /// The limit on the number of steps was reached.
     StepLimit,
+}
+
+impl Outcome {
+    /// True if the trajectory could not be followed on, for whatever reason.
+    pub fn is_lost(self) -> bool {
+        matches!(self, Outcome::Escaped | Outcome::Undefined | Outcome::StepTooSmall)
+    }
 }
 
 /// Where a trajectory ended, and what it cost.

@@ -198,9 +198,9 @@ fn what_cannot_go_on_says_why() {
     assert!((blow_up.time - 1.0).abs() < 1e-6);
     // √(1 - x) is not defined beyond x = 1, which is reached with finite speed here.
     let undefined = run(&Native { dim: 1, f: |x, _, f| f[0] = 1.0 + (1.0 - x[0]).sqrt() }, 0.0, 100_000);
-    assert_eq!(undefined.outcome, Outcome::Escaped);
+    assert_eq!(undefined.outcome, Outcome::Undefined);
     assert!((undefined.state[0] - 1.0).abs() < 1e-6);
-    assert_eq!(run(&Native { dim: 1, f: |_, _, f| f[0] = f64::NAN }, 0.0, 100).outcome, Outcome::Escaped);
+    assert_eq!(run(&Native { dim: 1, f: |_, _, f| f[0] = f64::NAN }, 0.0, 100).outcome, Outcome::Undefined);
     assert_eq!(run(&Native { dim: 1, f: |x, _, f| f[0] = -x[0] }, 1.0, 10).outcome, Outcome::StepLimit);
     // Constant solutions are integrated in few steps and not for ever.
     let rest = run(&Native { dim: 1, f: |_, _, f| f[0] = 0.0 }, 1.0, 100_000);

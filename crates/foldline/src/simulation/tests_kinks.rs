@@ -137,3 +137,51 @@ fn every_lane_has_its_own_parameters_and_kinks() {
         assert!((arrival.state[0] - exact[0]).abs() < 1e-7, "a = {a}: {} {}", arrival.state[0], exact[0]);
     }
 }
+
+/// x'' + x + F(x - 0.5) = 0 with a contact force F that is a root of the penetration δ: the energy x'²/2 + x²/2 + ∫ F dδ stays as it is.
+/// Without contact the motion would have the amplitude 1.
+#[test]
+fn a_contact_force_that_is_defined_on_one_side_only_keeps_the_energy() {
+    for (force, exponent) in [
+        ("max(x - 0.5, 0)^1.5", 1.5),
+        ("if(x > 0.5, (x - 0.5)^1.5, 0)", 1.5),
+        ("if(x > 0.5, sqrt(x - 0.5), 0)", 0.5),
+        ("if(x < 0.5, 0, (x - 0.5)^2.3)", 2.3),
+    ] {
+        let contact = model(&[("x", "v"), ("v", &format!("-x - {force}"))]);
+        let energy =
+            |x: f64, v: f64| 0.5 * (x * x + v * v) + (x - 0.5).max(0.0).powf(exponent + 1.0) / (exponent + 1.0);
+        let starts = [0.0, 1.0].repeat(9);
+        let tolerance = Tolerance::uniform(1e-9, 2);
+        let (mut steps, mut deepest, mut off) = (0, 0.0f64, 0.0f64);
+        let arrivals = Ensemble::new(&contact, &[], tolerance.clone(), &starts, [0.0, 40.0]).run(&mut |step| {
+            deepest = deepest.max(step.end(0) - 0.5);
+            off = off.max((energy(step.end(0), step.end(1)) - 0.5).abs());
+            steps += usize::from(step.trajectory() == 0);
+            Verdict::Continue
+        });
+        let alone = Integrator::new(&contact, &[], tolerance);
+        let alone = alone.trajectory(&[0.0, 1.0], [0.0, 40.0], &[], &mut |_| Verdict::Continue);
+        assert!(arrivals.iter().all(|arrival| *arrival == alone), "{force}: lanes differ");
+        assert_eq!(alone.outcome, Outcome::Reached, "{force}");
+        assert!(deepest > 0.3, "{force}: no contact");
+        // The errors of some hundred steps add up; at a root below 1 those next to contact are of a lower order.
+        assert!(off < 1e-6 && steps < 5000, "{force}: {off} after {steps} steps, {} rejected", alone.rejected);
+    }
+}
+
+/// x'' = -√x passes x = 0 with speed: there f ceases to be defined, whether a switch far from there is written around it or not.
+#[test]
+fn a_trajectory_that_leaves_the_region_of_definition_says_so() {
+    for force in ["sqrt(x)", "if(x > -1, sqrt(x), 0)"] {
+        let falling = model(&[("x", "v"), ("v", &format!("-{force}"))]);
+        let integrator = Integrator::new(&falling, &[], Tolerance::uniform(1e-9, 2));
+        let arrival = integrator.trajectory(&[1.0, 0.0], [0.0, 40.0], &[], &mut |_| Verdict::Continue);
+        assert_eq!(arrival.outcome, Outcome::Undefined, "{force}");
+        // v²/2 = 2/3 (1 - x^1.5).
+        assert!(
+            arrival.state[0].abs() < 1e-6 && (arrival.state[1] + (4.0f64 / 3.0).sqrt()).abs() < 1e-6,
+            "{arrival:?}"
+        );
+    }
+}

@@ -71,7 +71,7 @@ impl<'a> Integrator<'a> {
         let mut arrival = arrivals.into_iter().next().unwrap_or(Arrival {
             time: span[0],
             state: start.to_vec(),
-            outcome: Outcome::Escaped,
+            outcome: Outcome::Undefined,
             steps: 0,
             rejected: 0,
         });

@@ -207,7 +207,7 @@ impl Ensemble<'_> {
         for (c, &l) in columns.iter().enumerate() {
             let finite = (0..n).all(|i| x[i * m + c].is_finite() && f[i * m + c].is_finite());
             self.runs[l].done = match finite {
-                false => Some(Outcome::Escaped),
+                false => Some(Outcome::Undefined),
                 true if span == 0.0 => Some(Outcome::Reached),
                 true => None,
             };

@@ -1,0 +1,86 @@
+//! Surveys, sweeps and censuses of random models: whatever trajectories do is data.
+
+use crate::formula::Formula;
+use arbitrary::{Result, Unstructured};
+use foldline::contract::Unobserved;
+use foldline::diagram::{Diagram, Motion};
+use foldline::explore::{self, System};
+use foldline_store::study_file::parse_study;
+
+const STATES: usize = 2;
+const STARTS: usize = 3;
+const VALUES: usize = 2;
+
+/// What was seen, so that a test can tell that something was.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Seen {
+    /// Models that were run, of each kind: free, forced.
+    pub run: [usize; 2],
+    /// Starts of surveys that settled, to rest or to a cycle, …
+    pub settled: usize,
+    /// … and that escaped.
+    pub escaped: usize,
+    /// Sweeps that had a start.
+    pub swept: usize,
+}
+
+/// Simulates a random model in every way there is. Every start of a survey is accounted for at every value, and a sweep whose seed was found is
+/// there as far as its motion could be followed.
+pub fn simulation(u: &mut Unstructured, seen: &mut Seen) -> Result<()> {
+    let forced: bool = u.arbitrary()?;
+    let model = model(u, forced)?;
+    let study = format!(
+        "model = \"m.toml\"\n[[seed]]\nname = \"given\"\nstate = {{ x0 = 0.3, x1 = 0.1 }}\n\
+         [[seed]]\nname = \"sampled\"\nattractor = \"cycle\"\nsamples = {STARTS}\n\
+         [[survey]]\nname = \"survey\"\nfree = \"p\"\nrange = [0.1, 0.6]\ncount = {VALUES}\nstarts = {STARTS}\n\
+         [[sweep]]\nname = \"from given\"\nfrom = \"given\"\nfree = \"p\"\nrange = [0.1, 0.6]\ncount = {VALUES}\n\
+         [[sweep]]\nname = \"from sampled\"\nfrom = \"sampled\"\nfree = \"p\"\nrange = [0.1, 0.6]\ncount = {VALUES}\n"
+    );
+    // A model that is finite nowhere is refused.
+    let Ok(study) = parse_study(&study, "s.toml", &model, "m.toml") else { return Ok(()) };
+    seen.run[usize::from(forced)] += 1;
+    let system = System::of_plan(&study.model, &study.plan);
+    let diagram = explore::run(&system, &study.plan, 1, Diagram::default(), &Unobserved);
+    let survey = diagram.response_set("survey").unwrap_or_else(|| panic!("no survey of\n{model}"));
+    let hits: usize = survey.responses.iter().map(|response| response.hits).sum();
+    assert_eq!(hits, STARTS * VALUES, "starts of\n{model}");
+    for response in &survey.responses {
+        match response.motion {
+            Motion::Escaped => seen.escaped += response.hits,
+            Motion::Equilibrium | Motion::Cycle => seen.settled += response.hits,
+            Motion::Other => {}
+        }
+    }
+    for name in ["from given", "from sampled"] {
+        let Some(sweep) = diagram.response_set(name) else { continue };
+        seen.swept += 1;
+        let escaped = sweep.responses.last().is_some_and(|last| last.motion == Motion::Escaped);
+        assert!(escaped || sweep.responses.len() == VALUES, "{name} of\n{model}");
+    }
+    let parameters = study.model.defaults();
+    let census = explore::attractors(&system, &parameters, STARTS, 1, 1, study.plan.tolerance);
+    let hits: usize = census.attractors.iter().map(|attractor| attractor.hits).sum();
+    let lost = census.escaped + census.exits.len() + census.stuck + census.unsettled + census.left;
+    assert_eq!(hits + lost, STARTS, "samples of\n{model}");
+    Ok(())
+}
+
+/// The text of a model, half of them damped oscillators with a random force.
+fn model(u: &mut Unstructured, forced: bool) -> Result<String> {
+    let oscillator = u.arbitrary()?;
+    let name = |i: usize| ["x0", "x1", "p", "cos(w*t)"][i].to_string();
+    let names = if forced { 4 } else { 3 };
+    let mut equations = Vec::new();
+    for i in 0..STATES {
+        let mut text = String::new();
+        Formula::random(u, names, 3)?.write(u, &name, &mut text)?;
+        equations.push(match (oscillator, i) {
+            (false, _) => text,
+            (true, 0) => "x1".to_string(),
+            (true, _) => format!("-0.3*x1 - x0 + 0.5*({text})"),
+        });
+    }
+    let forcing = if forced { "[forcing]\nfrequency = \"w\"\n" } else { "" };
+    let [f, g] = [&equations[0], &equations[1]];
+    Ok(format!("[parameters]\np = 0.2\nw = 1.3\n{forcing}[states]\nx0 = \"{f}\"\nx1 = \"{g}\"\n"))
+}

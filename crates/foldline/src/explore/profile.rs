@@ -1,0 +1,94 @@
+//! Trajectories as profiles of cycles, and profiles in polynomials of another degree.
+
+use crate::diagram::{Cycle, Point, Solution};
+use crate::problem::gauss::Scheme;
+
+/// A trajectory over one period as a profile on a mesh with equal arclength per interval.
+pub(super) fn first_profile(scales: &[f64], period: f64, times: &[f64], states: &[f64]) -> Cycle {
+    // Of what moves less only the time counts.
+    const LEAST: f64 = 1e-8;
+    let n = scales.len();
+    // A cycle of many turns needs more of them.
+    let intervals = (times.len() / 12).clamp(60, 1200);
+    let scheme = Scheme::new(4);
+    let size: Vec<f64> =
+        (0..n).map(|i| states.iter().skip(i).step_by(n).fold(LEAST * scales[i], |m: f64, v| m.max(v.abs()))).collect();
+    // Arclength in scaled states, plus time, so that no interval becomes empty.
+    let mut length = vec![0.0];
+    for k in 1..times.len() {
+        let moved: f64 = (0..n).map(|i| ((states[k * n + i] - states[(k - 1) * n + i]) / size[i]).powi(2)).sum();
+        length.push(length[k - 1] + moved.sqrt() + (times[k] - times[k - 1]) / period);
+    }
+    let total = length.last().copied().unwrap_or(1.0);
+    let place = |grid: &[f64], values: &[f64], at: f64| -> f64 {
+        let k = grid.partition_point(|g| *g <= at).clamp(1, grid.len().max(2) - 1);
+        let share = (at - grid[k - 1]) / (grid[k] - grid[k - 1]).max(f64::MIN_POSITIVE);
+        values[k - 1] + share * (values[k] - values[k - 1])
+    };
+    let mesh: Vec<f64> = (0..=intervals)
+        .map(|j| match j {
+            0 => 0.0,
+            _ if j == intervals => 1.0,
+            _ => (place(&length, times, total * j as f64 / intervals as f64) / period).clamp(0.0, 1.0),
+        })
+        .collect();
+    // The ends of a trajectory over one period do not quite agree: the gap is spread over the period.
+    let count = times.len();
+    let gap: Vec<f64> = (0..n).map(|i| states[(count - 1) * n + i] - states[i]).collect();
+    let mut profile = Vec::with_capacity(intervals * 5 * n);
+    for pair in mesh.windows(2) {
+        for c in &scheme.nodes {
+            let t = pair[0] + (pair[1] - pair[0]) * c;
+            for i in 0..n {
+                let component: f64 = {
+                    let k = times.partition_point(|g| *g <= t * period).clamp(1, count.max(2) - 1);
+                    cubic(times, states, n, i, k, t * period)
+                };
+                let value = component - t * gap[i];
+                // What has decayed to nothing is nothing.
+                profile.push(if value.abs() < f64::EPSILON * scales[i] { 0.0 } else { value });
+            }
+        }
+    }
+    Cycle { period, forcing_periods: 0, mesh: mesh.into(), degree: 4, profile }
+}
+
+/// Cubic interpolation of component i through the four samples around interval k-1…k.
+fn cubic(times: &[f64], states: &[f64], n: usize, i: usize, k: usize, t: f64) -> f64 {
+    let first = (k.max(2) - 2).min(times.len().saturating_sub(4));
+    let nodes: Vec<usize> = (first..times.len().min(first + 4)).collect();
+    nodes
+        .iter()
+        .map(|&a| {
+            let weight: f64 = nodes
+                .iter()
+                .filter(|&&b| b != a)
+                .map(|&b| {
+                    (t - times[b]) / (times[a] - times[b]).abs().max(f64::MIN_POSITIVE).copysign(times[a] - times[b])
+                })
+                .product();
+            weight * states[a * n + i]
+        })
+        .sum()
+}
+
+/// The same solution in polynomials of another degree, to be polished again.
+pub(super) fn with_degree(mut point: Point, degree: usize) -> Point {
+    if let Solution::Cycle(cycle) = &mut point.solution
+        && cycle.degree != degree
+    {
+        let (old, new) = (Scheme::new(cycle.degree), Scheme::new(degree));
+        let n = cycle.dim();
+        let mut profile = Vec::with_capacity(cycle.intervals() * (degree + 1) * n);
+        for interval in cycle.profile.chunks_exact((cycle.degree + 1) * n) {
+            for &c in &new.nodes {
+                let weights = old.interpolation(c);
+                profile.extend(
+                    (0..n).map(|i| weights.iter().enumerate().map(|(k, w)| w * interval[k * n + i]).sum::<f64>()),
+                );
+            }
+        }
+        (cycle.degree, cycle.profile) = (degree, profile);
+    }
+    point
+}

@@ -1,0 +1,171 @@
+//! Continuous symmetries and conserved energies, which make solutions come in families.
+//!
+//! **Idea.** A linear map A with f_x(x) A x = A f(x) everywhere turns solutions into solutions: those that it moves are not isolated, and
+//! Newton's method has nothing to converge to. The condition is linear in A; derivatives at a few places of the sampling box decide it.
+//! A mechanical system without damping whose forces have a potential keeps its energy, so its cycles form a family too.
+//!
+//! **Equations.** At places x of the box, with τ where the field is forced:
+//!
+//! ```text
+//!   (1)  Σ_jk (f_x)_ij A_jk x_k - Σ_k A_ik f_k = 0   for every i
+//!   (2)  x_i' = v_i,  v_i' = g_i(x),  m_i ∂g_i/∂x_k = m_k ∂g_k/∂x_i
+//! ```
+//!
+//! **Fails when** a symmetry is not linear, or the energy is not of the form (2); then nothing is said.
+
+use super::System;
+use super::diagnosis::null_space;
+use crate::contract::{Batch, Parameters};
+use crate::linalg::max_abs;
+
+/// Most states for which symmetries are looked for: (1) has the square of that many unknowns.
+const MOST: usize = 10;
+/// A difference of derivatives, relative to the largest, that counts as rounding.
+const ROUNDING: f64 = 1e-10;
+
+/// The field at one place.
+struct Place {
+    state: Vec<f64>,
+    f: Vec<f64>,
+    /// `[n][n]`.
+    fx: Vec<f64>,
+}
+
+/// The pairs of states that can be turned together without a change of the equations, if there are any.
+pub(super) fn rotation(system: &System, parameters: &[f64]) -> Option<Vec<[usize; 2]>> {
+    let n = system.field.dim();
+    if !(2..=MOST).contains(&n) {
+        return None;
+    }
+    let places = places(system, parameters, 2 * n + 4);
+    let row = |place: &Place, i: usize| -> Vec<f64> {
+        let mut row = vec![0.0; n * n];
+        for j in 0..n {
+            (0..n).for_each(|k| row[j * n + k] += place.fx[i * n + j] * place.state[k]);
+            row[i * n + j] -= place.f[j];
+        }
+        row
+    };
+    let rows: Vec<Vec<f64>> = places.iter().flat_map(|place| (0..n).map(move |i| row(place, i))).collect();
+    // Fewer equations than unknowns say nothing.
+    if rows.len() < n * n + n {
+        return None;
+    }
+    null_space(rows, n * n).iter().find_map(|generator| turned(generator, n))
+}
+
+/// The pairs of states that a generator turns; `None` if it is no rotation.
+fn turned(generator: &[f64], n: usize) -> Option<Vec<[usize; 2]>> {
+    let size = max_abs(generator);
+    let entry = |i: usize, j: usize| generator[i * n + j] / size;
+    let mut pairs = Vec::new();
+    for i in 0..n {
+        let mut partners = (0..n).filter(|&j| entry(i, j).abs() > 1e-6);
+        let Some(j) = partners.next() else { continue };
+        let opposite = (entry(i, j) + entry(j, i)).abs() < 1e-6;
+        if j == i || partners.next().is_some() || !opposite {
+            return None;
+        }
+        if i < j {
+            pairs.push([i, j]);
+        }
+    }
+    (!pairs.is_empty()).then_some(pairs)
+}
+
+/// True if the system has the form (2): an energy never changes.
+pub(super) fn keeps_energy(system: &System, parameters: &[f64]) -> bool {
+    let n = system.field.dim();
+    if n < 2 || !n.is_multiple_of(2) || system.field.forced() {
+        return false;
+    }
+    let places = places(system, parameters, 2 * n + 4);
+    if places.len() < n {
+        return false;
+    }
+    let Some(pairs) = pairs(&places, n) else { return false };
+    let size = places.iter().fold(0.0, |m: f64, place| m.max(max_abs(&place.fx)));
+    let slope = |place: &Place, of: usize, by: usize| place.fx[of * n + by];
+    let undamped = |place: &Place, v: usize, w: usize| slope(place, v, w).abs() <= ROUNDING * size;
+    // The quotient of two masses is read off at the first place.
+    let potential = |place: &Place, [x, v]: [usize; 2], [y, w]: [usize; 2]| {
+        let [here, there] = [slope(place, v, y), slope(place, w, x)];
+        let [first, second] = [slope(&places[0], v, y), slope(&places[0], w, x)];
+        (here * second - there * first).abs() <= ROUNDING * size * size
+            && (first == 0.0) == (second == 0.0)
+            && first * second >= 0.0
+    };
+    let each = |place: &Place, a: [usize; 2], b: [usize; 2]| undamped(place, a[1], b[1]) && potential(place, a, b);
+    places.iter().all(|place| pairs.iter().all(|a| pairs.iter().all(|b| each(place, *a, *b))))
+}
+
+/// The coordinates with their velocities, if every state is one or the other.
+fn pairs(places: &[Place], n: usize) -> Option<Vec<[usize; 2]>> {
+    let is_unit =
+        |i: usize, j: usize, place: &Place| (0..n).all(|k| place.fx[i * n + k] == f64::from(u8::from(k == j)));
+    let velocity = |i: usize| (0..n).find(|&j| places.iter().all(|place| is_unit(i, j, place)));
+    let pairs: Vec<[usize; 2]> = (0..n).filter_map(|i| Some([i, velocity(i)?])).collect();
+    let mut all: Vec<usize> = pairs.iter().flatten().copied().collect();
+    all.sort_unstable();
+    (all == (0..n).collect::<Vec<_>>()).then_some(pairs)
+}
+
+/// The field at places of the box where it is finite.
+fn places(system: &System, parameters: &[f64], count: usize) -> Vec<Place> {
+    const GOLDEN: f64 = 0.618_033_988_749_895;
+    let n = system.field.dim();
+    let at = |place: usize| {
+        let share = |i: usize| (GOLDEN * (place * (i + 2)) as f64 + 0.17 * (i * i) as f64).fract();
+        let state: Vec<f64> = system.ranges.iter().enumerate().map(|(i, [a, b])| a + share(i) * (b - a)).collect();
+        let times = if system.field.forced() { vec![share(n)] } else { Vec::new() };
+        let (mut f, mut fx) = (vec![0.0; n], vec![0.0; n * n]);
+        let batch = Batch { lanes: 1, states: &state, parameters: Parameters::Shared(parameters), times: &times };
+        system.field.linearise(batch, &[], &mut f, &mut fx, &mut []);
+        let finite = f.iter().chain(&fx).all(|value| value.is_finite());
+        finite.then_some(Place { state, f, fx })
+    };
+    (1..=count).filter_map(at).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::{Definition, Model, ModelSource, Parameter, State};
+
+    fn model(equations: &[(&str, &str)]) -> Model {
+        Model::compile(ModelSource {
+            parameters: vec![Parameter::new("c", 0.0)],
+            states: equations.iter().map(|(name, _)| State::new(name)).collect(),
+            equations: equations.iter().map(|(name, text)| Definition::new(name, text)).collect(),
+            ..ModelSource::default()
+        })
+        .unwrap()
+    }
+
+    #[test]
+    fn a_spherical_oscillator_can_be_turned_and_an_anisotropic_one_cannot() {
+        let told = |stiffness: &str| {
+            let force = |own: &str, k: &str| format!("-0.1*v{own} - ({k} + x^2 + y^2)*{own}");
+            let [fx, fy] = [force("x", "1"), force("y", stiffness)];
+            let model = model(&[("x", "vx"), ("y", "vy"), ("vx", &fx), ("vy", &fy)]);
+            rotation(&System::of(&model, &[0.0]), &[0.0])
+        };
+        assert_eq!(told("1"), Some(vec![[0, 1], [2, 3]]));
+        assert_eq!(told("1.01"), None);
+    }
+
+    #[test]
+    fn two_masses_on_springs_keep_their_energy_until_they_are_damped() {
+        // Masses 1 and 2: the matrix of stiffness over masses is not symmetric.
+        let springs = [("x", "v"), ("y", "w"), ("v", "-2*x + y - 0.5*x^3 + c*v"), ("w", "-2*y + x/2 + c*w")];
+        let masses = [("x", "v"), ("y", "w"), ("v", "-2*x + y - 0.5*x^3"), ("w", "-2*y + x/2")];
+        let follower = [("x", "v"), ("y", "w"), ("v", "-2*x + y*x"), ("w", "-2*y + x")];
+        let keeps = |equations: &[(&str, &str)], c: f64| {
+            let model = model(equations);
+            keeps_energy(&System::of(&model, &[c]), &[c])
+        };
+        assert!(keeps(&springs, 0.0) && keeps(&masses, 0.0));
+        assert!(!keeps(&springs, 0.1) && !keeps(&follower, 0.0));
+        assert!(!keeps(&[("x", "v"), ("v", "-x"), ("z", "-z"), ("u", "z")], 0.0));
+    }
+}
