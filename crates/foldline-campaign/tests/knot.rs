@@ -148,7 +148,7 @@ fn a_start_among_special_points_that_lie_close_together_is_met_again() {
     start.tangent.iter_mut().for_each(|t| *t = -*t);
     home.tangent.iter_mut().for_each(|t| *t = -*t);
     start.point.step = 1e-4;
-    let (monitors, mut met, mut last) = (special::monitors(Family::Cycle), Vec::new(), start.point.unstable);
+    let (monitors, mut met, mut last) = (special::monitors(Family::Cycle, false), Vec::new(), start.point.unstable);
     let mut walk = Follow {
         problem: &mut *problem_of(&system, 0, DEGREE, &start.point, false),
         settings: &Settings { max_points: 40, ..settings.clone() },
@@ -156,6 +156,7 @@ fn a_start_among_special_points_that_lie_close_together_is_met_again() {
         marks: &[],
         collapses: &[],
         limit: &|_| None,
+        symmetric: false,
         direction: -1.0,
         free: 0,
         home: Some(&home),

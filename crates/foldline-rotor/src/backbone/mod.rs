@@ -174,6 +174,7 @@ pub fn backbone(constants: &Nondimensional, law: ContactLaw, ratio: Ratio, reach
         marks: &[],
         collapses: &[],
         limit: &|_| None,
+        symmetric: false,
         direction: 1.0,
         free: 0,
         home: None,

@@ -35,6 +35,8 @@ pub struct Follow<'w> {
     pub collapses: &'w [Box<dyn Monitor + 'w>],
     /// The orbit of infinite period to which the branch tends at a point, if the point shows one.
     pub limit: &'w dyn Fn(&Point) -> Option<Ending>,
+    /// True if solutions come in families because of a continuous symmetry: a multiplier that is 1 within its error is so for that reason.
+    pub symmetric: bool,
     /// +1 towards larger positions, -1 towards smaller.
     pub direction: f64,
     /// Index of the continuation parameter among the parameters of a point.
@@ -83,6 +85,7 @@ pub fn follow(
     sink: &mut dyn FnMut(Item) -> Verdict,
 ) -> Ending {
     let mut left = start;
+    walk.count(&mut left);
     let mut step = if left.point.step > 0.0 { left.point.step } else { walk.settings.first_step };
     let mut position = left.point.position;
     let mut trail = previous.map(|before| {
@@ -189,9 +192,6 @@ pub fn follow(
         }
         position += walk.direction as i64;
         emitted += 1;
-        if walk.settings.stability && right.point.is_one_of_family() {
-            right.point.unstable = right.point.unstable_besides_neutral();
-        }
         let mut point = right.point.clone();
         (point.position, point.step, point.cost) = (position, step, cost);
         if sink(Item::Point(point)) == Verdict::Stop {
@@ -244,6 +244,13 @@ impl Follow<'_> {
             Kind::Unexplained => SURE,
             Kind::BranchPoint if self.settings.reflections.len() < 2 => CROSSING,
             _ => f64::INFINITY,
+        }
+    }
+
+    /// Leaves a multiplier that is 1 for a reason out of the count of unstable ones, whatever its error makes of it.
+    pub(super) fn count(&self, station: &mut Station) {
+        if self.settings.stability && (self.symmetric || station.point.is_one_of_family()) {
+            station.point.unstable = station.point.unstable_besides_neutral();
         }
     }
 

@@ -478,10 +478,15 @@ impl Follow<'_> {
         let u = stretch.corrected(self.problem, self.settings, s, cost).ok()?;
         if self.settings.stability && self.is_short(&left.mesh, stretch.length) {
             let close = self.settings.closeness(&left.mesh, stretch.length);
-            return self.unrefined(left, u, close, cost).ok();
+            let mut found = self.unrefined(left, u, close, cost).ok()?;
+            self.count(&mut found);
+            return Some(found);
         }
         let care = self.care(left, s);
-        refine(self.problem, self.settings, care, left.tangent.clone(), u, self.direction, cost).ok()
+        let row = left.tangent.clone();
+        let mut found = refine(self.problem, self.settings, care, row, u, self.direction, cost).ok()?;
+        self.count(&mut found);
+        Some(found)
     }
 
     /// Whether some monitor may have passed zero between the last two of three values and come back: the parabola through them comes

@@ -203,6 +203,7 @@ impl Follow<'_> {
             let care = Care { trusted: self.trusts(left, trail), ..self.care(left, step) };
             refine(self.problem, self.settings, care, row, u, self.direction, cost)?
         };
+        self.count(&mut right);
         if let Aim::Value(_) = aim {
             // Where travel is towards smaller values the row has turned the tangent round.
             right.head(left.slope());
@@ -239,6 +240,7 @@ impl Follow<'_> {
             between = None;
             if let Aim::Plane(_) = aim {
                 right = self.at_parameter(left, &right, bound, cost)?;
+                self.count(&mut right);
             }
             // To the last bit, whatever rounding Newton's method left.
             let last = right.u.len() - 1;

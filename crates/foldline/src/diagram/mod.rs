@@ -149,7 +149,7 @@ impl Point {
     }
 
     /// The multiplier that is 1 as far as its error tells, and closest to that, among those that are not trivial.
-    fn neutral_multiplier(&self) -> Option<Complex64> {
+    pub(crate) fn neutral_multiplier(&self) -> Option<Complex64> {
         const ERRORS: f64 = 10.0;
         let stated = if self.trust.spectrum.is_nan() { 0.0 } else { self.trust.spectrum };
         let error = ERRORS * stated.max(self.trust.trivial_defect);

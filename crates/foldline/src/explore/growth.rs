@@ -2,6 +2,7 @@
 
 use super::System;
 use super::counted::Counted;
+use super::symmetry::rotation;
 use crate::continuation::corrector::{Plane, parameter_row, settle, station};
 use crate::continuation::{Failure, Follow, Homecoming, Item, Settings, Station, follow};
 use crate::contract::{Event, Examination, Monitor, Observer, Verdict, ZeroProblem};
@@ -379,8 +380,9 @@ impl Growth<'_> {
         if emitted == 0 {
             start.point.step = self.settings.first_step;
         }
+        let symmetric = branch.family == Family::Cycle && rotation(&system, &last.parameters).is_some();
         let (monitors, collapses) = match branch.held {
-            None => (special::monitors(branch.family), collapses(branch, &system)),
+            None => (special::monitors(branch.family, symmetric), collapses(branch, &system)),
             Some((kind, first)) => {
                 let monitors = special::monitors_where_held(system.field, &system.scales, branch.family, kind);
                 // Folds of cycles shrink to a generalised Hopf point; the Hopf points there lie along the second parameter.
@@ -405,6 +407,7 @@ impl Growth<'_> {
             collapses: &collapses,
             limit: &|at| limits.approached(at).filter(|_| free_cycles),
             direction,
+            symmetric,
             free: branch.free,
             home: home.as_ref(),
             homecoming: Homecoming::default(),

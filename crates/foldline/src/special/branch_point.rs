@@ -7,9 +7,25 @@
 
 use crate::contract::{Monitor, ZeroProblem};
 use crate::diagram::{Kind, Point, Solution};
+use num_complex::Complex64;
 
 /// An eigenvalue 0 (a multiplier 1) without a fold.
-pub struct BranchPoint;
+pub struct BranchPoint {
+    /// True if a multiplier is 1 because of a continuous symmetry. It says nothing of branch points.
+    pub symmetric: bool,
+}
+
+impl BranchPoint {
+    /// The multipliers that say something.
+    fn telling(&self, at: &Point) -> Vec<Complex64> {
+        let neutral = at.neutral_multiplier().filter(|_| self.symmetric);
+        let mut spectrum = at.free_spectrum().to_vec();
+        if let Some(index) = neutral.and_then(|neutral| spectrum.iter().position(|z| *z == neutral)) {
+            spectrum.remove(index);
+        }
+        spectrum
+    }
+}
 
 impl Monitor for BranchPoint {
     fn kind(&self) -> Kind {
@@ -18,14 +34,14 @@ impl Monitor for BranchPoint {
 
     fn value(&self, _reference: &Point, at: &Point) -> f64 {
         let centre = if matches!(at.solution, Solution::Cycle(_)) { 1.0 } else { 0.0 };
-        at.parameter_slope() * super::distance_product(at.free_spectrum(), centre)
+        at.parameter_slope() * super::distance_product(&self.telling(at), centre)
     }
 
     fn confirms(&self, at: &Point) -> bool {
         // At a fold, too, the product vanishes; there the tangent has no parameter component.
         let centre = if matches!(at.solution, Solution::Cycle(_)) { 1.0 } else { 0.0 };
         let largest = at.spectrum.iter().map(|z| z.norm()).fold(1e-300, f64::max).min(1.0);
-        let closest = at.free_spectrum().iter().map(|z| (z - centre).norm()).fold(f64::INFINITY, f64::min);
+        let closest = self.telling(at).iter().map(|z| (z - centre).norm()).fold(f64::INFINITY, f64::min);
         // A single eigenvalue has none to be compared with.
         (closest < 1e-2 * largest || at.spectrum.len() == 1) && at.parameter_slope().abs() > 1e-6
     }
@@ -36,7 +52,7 @@ impl Monitor for BranchPoint {
 
     fn passed(&self, at: &Point) -> Option<usize> {
         let centre = if matches!(at.solution, Solution::Cycle(_)) { 1.0 } else { 0.0 };
-        Some(at.free_spectrum().iter().filter(|z| z.im == 0.0 && z.re > centre).count())
+        Some(self.telling(at).iter().filter(|z| z.im == 0.0 && z.re > centre).count())
     }
 
     fn others_unstable(&self, at: &Point) -> Option<usize> {

@@ -34,9 +34,9 @@ use crate::contract::{Monitor, VectorField};
 use crate::diagram::{Family, Kind, Point, Solution};
 use num_complex::Complex64;
 
-/// Everything to look for on branches of a family.
-pub fn monitors(family: Family) -> Vec<Box<dyn Monitor>> {
-    let both: [Box<dyn Monitor>; 2] = [Box::new(fold::Fold), Box::new(branch_point::BranchPoint)];
+/// Everything to look for on branches of a family. `symmetric` says that the model has a continuous symmetry.
+pub fn monitors(family: Family, symmetric: bool) -> Vec<Box<dyn Monitor>> {
+    let both: [Box<dyn Monitor>; 2] = [Box::new(fold::Fold), Box::new(branch_point::BranchPoint { symmetric })];
     match family {
         Family::Equilibrium => both.into_iter().chain([Box::new(hopf::Hopf) as Box<dyn Monitor>]).collect(),
         Family::Cycle => both
