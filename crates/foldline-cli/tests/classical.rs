@@ -252,7 +252,7 @@ fn lorenz_rolls_leave_rest_at_a_pitchfork_and_oscillate_up_to_a_homoclinic_orbit
     let cycle = branch(&diagram, "b/branch-point-1/hopf-1");
     period_is(cycle.points[0].solution.period(), 0.65283033, 1e-4);
     assert!(cycle.points.iter().all(|p| p.parameters[cycle.free] < hopf && p.unstable == 1));
-    ends(cycle, ["joined", "period-unbounded"]);
+    ends(cycle, ["joined", "homoclinic"]);
     assert!(cycle.special.is_empty());
     assert!(near(cycle.points[cycle.points.len() - 1].parameters[cycle.free], 13.926, 5e-5));
 }
@@ -305,7 +305,7 @@ fn predator_and_prey_branch_twice_and_turn_and_oscillate() {
     assert!(near(omega, 0.60478222, 1e-7), "{omega}");
     // Cycles up to a heteroclinic orbit, without anything else on the way.
     let cycle = branch(&diagram, &format!("{}/hopf-1", both.name));
-    ends(cycle, ["joined", "period-unbounded"]);
+    ends(cycle, ["joined", "heteroclinic"]);
     assert!(cycle.special.is_empty());
     assert_eq!(diagram.branches.len(), 4, "the branch points are met again from the other side, and lead nowhere new");
 }
@@ -318,7 +318,7 @@ fn the_ab_reaction_turns_twice_and_its_cycles_end_at_a_homoclinic_orbit() {
     // Other continuation code, 6 to 7 digits; the end of the cycles likewise.
     has(branch(&diagram, "b"), &[(Kind::Fold, 0.08893185), (Kind::Fold, 0.1057390), (Kind::Hopf, 0.1308998)], 3e-7);
     let cycle = branch(&diagram, "b/hopf-1");
-    ends(cycle, ["joined", "period-unbounded"]);
+    ends(cycle, ["joined", "homoclinic"]);
     assert!(cycle.special.is_empty());
     assert!(near(cycle.points[cycle.points.len() - 1].parameters[cycle.free], 0.1055071, 1e-7));
 }

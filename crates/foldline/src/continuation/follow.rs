@@ -11,7 +11,7 @@ use super::ends::Homecoming;
 use super::inspect::Found;
 use super::step::Step;
 use crate::contract::{Monitor, Verdict, ZeroProblem};
-use crate::diagram::{Cost, Ending, Kind, Point, STANDS, SpecialPoint};
+use crate::diagram::{Connection, Cost, Ending, Kind, Point, STANDS, SpecialPoint};
 
 /// What a run emits, in the order of travel.
 pub enum Item {
@@ -220,7 +220,12 @@ pub fn follow(
         if let (Some(first), Some(now), Some(next)) = (first_period, right.point.solution.free_period(), long)
             && now > next
         {
-            if let Some(limit) = (walk.limit)(&right.point).filter(|_| !walk.moves(&left, &right)) {
+            // The place of a saddle-node is solved for; that of any other orbit is where the parameter comes to a stand.
+            let placed = |limit: &Ending| {
+                matches!(limit, Ending::Connecting { connection: Connection::SaddleNode, .. })
+                    || !walk.moves(&left, &right)
+            };
+            if let Some(limit) = (walk.limit)(&right.point).filter(placed) {
                 return limit;
             }
             if now > walk.settings.period_growth * first {

@@ -269,20 +269,35 @@ impl Growth<'_> {
     pub fn begin(&self, branch: &mut Branch, beginning: Beginning) -> bool {
         let mut going = self.tell(Event::Begin(branch));
         match beginning {
-            Beginning::Inside(start) => {
+            Beginning::Inside(mut start) => {
+                self.count(branch, &mut start.point);
                 going &= self.accept(branch, Point { position: 0, step: self.settings.first_step, ..start.point });
                 going &= self.mark_start(branch);
             }
-            Beginning::Edge { before, first, joined } => {
+            Beginning::Edge { before, mut first, joined } => {
                 let count = before.len() as i64;
+                self.count(branch, &mut first.point);
                 for (position, point) in before.into_iter().enumerate() {
-                    going &= self.accept(branch, Point { position: position as i64, ..point });
+                    let unstable = first.point.unstable;
+                    going &= self.accept(branch, Point { position: position as i64, unstable, ..point });
                 }
                 going &= self.accept(branch, Point { position: count, ..first.point });
                 going &= self.end(branch, 0, joined);
             }
         }
         self.finish(branch, going)
+    }
+
+    /// Leaves a multiplier that is 1 for a reason out of the count of unstable ones at the start of a branch.
+    fn count(&self, branch: &Branch, start: &mut Point) {
+        if self.settings.stability && (start.is_one_of_family() || self.is_symmetric(branch, start)) {
+            start.unstable = start.unstable_besides_neutral();
+        }
+    }
+
+    /// True if solutions come in families because the model can be turned.
+    fn is_symmetric(&self, branch: &Branch, at: &Point) -> bool {
+        branch.family == Family::Cycle && branch.held.is_none() && rotation(self.system, &at.parameters).is_some()
     }
 
     /// A mark at which the branch starts, unless it is there already: no step leads over it.
@@ -380,7 +395,7 @@ impl Growth<'_> {
         if emitted == 0 {
             start.point.step = self.settings.first_step;
         }
-        let symmetric = branch.family == Family::Cycle && rotation(&system, &last.parameters).is_some();
+        let symmetric = self.is_symmetric(branch, &last);
         let (monitors, collapses) = match branch.held {
             None => (special::monitors(branch.family, symmetric), collapses(branch, &system)),
             Some((kind, first)) => {
