@@ -398,7 +398,8 @@ fn sharpened(
             best = (b, value, there);
         }
         // The first trial is for the slope; after it the values descend until they are rounding.
-        if !next.is_finite() || (round > 0 && !better) || (next - distance).abs() > 1e-3 * stretch.length.abs() {
+        let inside = (0.0..=1.0).contains(&(next / stretch.length));
+        if !inside || (round > 0 && !better) {
             break;
         }
         (a, b) = ((b, value), next);
@@ -644,6 +645,10 @@ fn chandrupatla<T>(
         };
         let margin = 0.1 * resolved * width / (b - a).abs();
         t = if t.is_finite() && margin < 0.5 { t.clamp(margin, 1.0 - margin) } else { 0.5 };
+        // What is left is rounding of the values at the ends.
+        if fx.abs() < 1e-14 * largest {
+            break;
+        }
     }
     best.map(|(x, _, found)| (x, found, slope)).ok_or(Failure::NotFinite)
 }

@@ -77,7 +77,7 @@ pub(super) fn valued(kind: Kind, setting: Setting, at: &Point) -> Option<Value> 
         _ => form.torus(&v, extra[0], spare)?,
     };
     let divisor = if free_fold { size / length } else { 1.0 };
-    Some(Value { value: value / unit, terms: terms / unit.abs(), divisor }).filter(|found| !found.value.is_nan())
+    Some(Value { value: value / unit, terms: terms / unit.abs(), divisor }).filter(|found| found.value.is_finite())
 }
 
 /// The point with its cycle on another mesh.

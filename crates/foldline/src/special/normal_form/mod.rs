@@ -116,9 +116,10 @@ fn found(uncertain: &Uncertain, kind: Kind) -> Result<Coefficients, String> {
             measured(&|sample| one(sample.local.generalised_hopf(first(sample)?))).ok_or_else(resonant)
         }
         Kind::BogdanovTakens => {
-            let found = measured(&|sample| Some(sample.local.takens()?.to_vec())).ok_or_else(resonant)?;
-            let vanish = found.values.iter().zip(&found.errors).all(|(value, error)| value.abs() <= *error);
-            if vanish { Err("a and b are zero within their errors, by a symmetry perhaps".into()) } else { Ok(found) }
+            let found = measured(&|sample| Some(sample.local.takens()?.to_vec()));
+            let vanishes = |(value, error): (&f64, &f64)| value.abs() <= *error;
+            let found = found.filter(|found| !found.values.iter().zip(&found.errors).all(vanishes));
+            found.ok_or("a and b are zero within their errors, by a symmetry perhaps".into())
         }
         Kind::ZeroHopf => {
             let all = measured(&|sample| Some(sample.local.zero_hopf(first(sample)?)?.to_vec()));
