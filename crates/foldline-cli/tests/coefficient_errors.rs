@@ -103,7 +103,7 @@ const BACK: &str = "[[seed]]\nname = \"s\"\nattractor = \"cycle\"\nparameters = 
 
 #[test]
 fn a_fold_of_cycles_has_an_honest_error_and_so_has_the_hopf_point_at_its_end() {
-    let rest = "[[seed]]\nname = \"r\"\nstate = { x = 0, y = 0 }\nparameters = { p = -0.5 }\n[[branch]]\nname = \"r\"\nfrom = \"r\"\nfree = \"p\"\nrange = [-0.5, 0.5]\n";
+    let rest = "[[seed]]\nname = \"rest\"\nstate = { x = 0, y = 0 }\nparameters = { p = -0.5 }\n[[branch]]\nname = \"r\"\nfrom = \"rest\"\nfree = \"p\"\nrange = [-0.5, 0.5]\n";
     let diagram = grown(&turning_back(""), &format!("{BACK}{rest}"));
     let [fold] = of_kind(diagram.branch("b").unwrap(), Kind::Fold)[..] else { panic!("one fold") };
     honest(fold, 4.0, 1e-5);
