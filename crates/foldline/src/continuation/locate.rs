@@ -307,7 +307,8 @@ pub fn locate(
     }
     let mut floor = 10.0 * settings.newton_tolerance();
     let (mut tolerance, mut slope) = (0.3 * settings.tolerance, rise);
-    if coarse.mesh.is_empty() && monitor.kind() != Kind::BranchPoint {
+    // (A branch that begins at a pitchfork turns where the matrix is singular.)
+    if coarse.mesh.is_empty() && !matches!(monitor.kind(), Kind::BranchPoint | Kind::Fold) {
         (distance, coarse) = sharpened(problem, settings, stretch, monitor, (distance, coarse), cost);
         floor = unsettled(problem, &coarse).unwrap_or(floor);
     }

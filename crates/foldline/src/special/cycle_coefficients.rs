@@ -174,6 +174,8 @@ fn solved(kind: Kind, setting: &Setting, first: &Point, at: &Point, mesh: &Mesh)
     const ROUNDS: usize = 6;
     const FAR: f64 = 1e-2;
     const DONE: f64 = 1e-11;
+    // Error after a step of Newton's method over the square of the error before, that is reckoned with.
+    const CURVED: f64 = 10.0;
     let start = on_mesh(first, mesh)?;
     let (Solution::Cycle(cycle), Solution::Cycle(own)) = (&start.solution, &at.solution) else { return None };
     let mut problem = CycleProblem::like(setting.clone(), cycle);
@@ -185,13 +187,11 @@ fn solved(kind: Kind, setting: &Setting, first: &Point, at: &Point, mesh: &Mesh)
     let mut condition = OnCycles::new(kind, setting.clone(), cycle)?;
     let mut extra = condition.guess(&start);
     let mut g = vec![0.0; condition.equations()];
-    // The second time with borders that are nearly the null vectors.
-    for _ in 0..2 {
-        if !Condition::evaluate(&mut condition, &u, &extra, &mut g) {
-            return None;
-        }
-        condition.anchor();
+    if !Condition::evaluate(&mut condition, &u, &extra, &mut g) {
+        return None;
     }
+    // From here on the borders are nearly the null vectors.
+    condition.anchor();
     problem.anchor(&u);
     let (size, mut before) = (u.len(), f64::INFINITY);
     for _ in 0..ROUNDS {
@@ -214,8 +214,8 @@ fn solved(kind: Kind, setting: &Setting, first: &Point, at: &Point, mesh: &Mesh)
         }
         axpy(1.0, &update, &mut u);
         extra.iter_mut().zip(&shares[1..]).for_each(|(x, d)| *x += d);
-        // Rounding ends the descent, at the latest.
-        if length < DONE || length > 0.3 * before {
+        // What is left is about the square of the update; rounding ends the descent, at the latest.
+        if CURVED * length * length < DONE || length > 0.3 * before {
             return (length < 1e-2 * FAR).then(|| resumed(&problem, &u, &row, &condition, &extra, at));
         }
         before = length;

@@ -24,8 +24,8 @@ struct Noise {
     size: f64,
     /// `[n]` sizes of the states.
     scales: Vec<f64>,
-    /// Largest entry of the Jacobian in those sizes.
-    rate: f64,
+    /// `[n]` largest term of each component of the Jacobian times states of those sizes.
+    rates: Vec<f64>,
     signs: RefCell<Signs>,
 }
 
@@ -58,14 +58,14 @@ impl<'a> Local<'a> {
         Some(Local { field, state, parameters: &at.parameters, n, jacobian, noise: None })
     }
 
-    /// The same with errors of either sign on the Jacobian and on all higher derivatives. They are as large, relative to the largest entry of
-    /// the Jacobian, as `size` says, in states of the sizes `scales` `[n]`: f rounded at states of those sizes tells nothing smaller apart.
+    /// The same with errors of either sign on the Jacobian and on all higher derivatives. They are as large as `size` says, relative to the
+    /// largest term of the same component of f in states of the sizes `scales` `[n]`: f rounded there tells nothing smaller apart.
     pub(super) fn shaken(mut self, size: f64, scales: &[f64], seed: u64) -> Local<'a> {
         let (n, mut signs) = (self.n, Signs::new(seed));
-        let entry = |k: usize| scales[k / n] / scales[k % n];
-        let rate = (0..n * n).fold(0.0f64, |most, k| most.max((self.jacobian[k] / entry(k)).abs()));
-        (0..n * n).for_each(|k| self.jacobian[k] += size * rate * entry(k) * signs.next());
-        self.noise = Some(Noise { size, scales: scales.to_vec(), rate, signs: RefCell::new(signs) });
+        let largest = |row: &[f64]| row.iter().zip(scales).fold(0.0f64, |most, (a, s)| most.max((a * s).abs()));
+        let rates: Vec<f64> = self.jacobian.chunks_exact(n).map(largest).collect();
+        (0..n * n).for_each(|k| self.jacobian[k] += size * rates[k / n] / scales[k % n] * signs.next());
+        self.noise = Some(Noise { size, scales: scales.to_vec(), rates, signs: RefCell::new(signs) });
         self
     }
 
@@ -87,10 +87,10 @@ impl<'a> Local<'a> {
         self.field.directional(at, &full, &mut out);
         if let Some(noise) = &self.noise {
             let largest = |d: &&[f64]| d.iter().zip(&noise.scales).fold(0.0f64, |most, (d, s)| most.max((d / s).abs()));
-            let natural = noise.rate * along.iter().map(largest).product::<f64>();
+            let reach = along.iter().map(largest).product::<f64>();
             let signs = &mut *noise.signs.borrow_mut();
-            for (out, scale) in out.iter_mut().zip(&noise.scales) {
-                *out += noise.size * (out.abs() * signs.next() + natural * scale * signs.next());
+            for (out, rate) in out.iter_mut().zip(&noise.rates) {
+                *out += noise.size * (out.abs() * signs.next() + rate * reach * signs.next());
             }
         }
         out
