@@ -40,10 +40,13 @@ class SpecialPoint(Solution):
         Bound on the error of the parameter, the period and the extremes, relative to 1 + |value|.
     coefficients : tuple of float
         Of the normal form.
+    coefficient_errors : tuple of float
+        Bounds on the errors of the coefficients.
     criticality : str or None
-        ``"supercritical"`` or ``"subcritical"`` where that is known.
+        ``"supercritical"`` or ``"subcritical"`` where that is known, ``"degenerate"`` where a coefficient that matters is zero within its
+        error, ``"undetermined"`` where the error is as large as what the coefficient is made of.
     normal_form : str
-        Both in words.
+        Coefficients and criticality in words, or why there are none.
     """
 
     def __init__(self, branch: Branch, index: int, number: int, row: Any) -> None:
@@ -55,7 +58,8 @@ class SpecialPoint(Solution):
         self.unstable_before: int = row[1]
         self.unstable_after: int = row[2]
         self.error: float = row[3]
-        self.coefficients: tuple[float, ...] = tuple(row[4])
+        self.coefficients: tuple[float, ...] = tuple(row[4][0])
+        self.coefficient_errors: tuple[float, ...] = tuple(row[4][1])
         self.criticality: str | None = row[5]
         self.normal_form: str = row[6]
 

@@ -53,6 +53,9 @@ def special_frame(points: SpecialPoints) -> pandas.DataFrame:
         row: dict[str, Any] = {"branch": point.branch.name, "kind": point.kind, **point.parameters}
         row.update({"period": point["period"], **extremes, "unstable_before": point.unstable_before})
         row.update({"unstable_after": point.unstable_after, "error": point.error, "normal_form": point.normal_form})
+        both = zip(point.coefficients, point.coefficient_errors, strict=False)
+        for number, (value, error) in enumerate(both, start=1):
+            row.update({f"coefficient_{number}": value, f"coefficient_{number}_error": error})
         rows.append(row)
     frame: pandas.DataFrame = _pandas().DataFrame(rows)
     return frame

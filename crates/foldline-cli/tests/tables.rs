@@ -69,6 +69,8 @@ fn run() -> tempfile::TempDir {
         unstable_after: 1,
         error: 1e-9,
         coefficients: Vec::new(),
+        coefficient_errors: Vec::new(),
+        remark: String::new(),
     };
     let mut main = branch("main", 0, None, Origin::Seed("start".into()), &[[0.0, 0.0], [2.0, 0.0], [0.5, 0.0]]);
     main.insert_special(fold(1, [2.0, 0.0]));

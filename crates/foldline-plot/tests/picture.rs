@@ -62,6 +62,8 @@ fn peak(name: &str, scale: f64) -> Branch {
             unstable_after: 1 - k,
             error: 1e-9,
             coefficients: Vec::new(),
+            coefficient_errors: Vec::new(),
+            remark: String::new(),
         });
     }
     branch.ends = [Some(Ending::Bound(0.5)), Some(Ending::Bound(12.0))];
@@ -97,6 +99,8 @@ fn isola(name: &str, centre: [f64; 2]) -> Branch {
             unstable_after,
             error: 1e-9,
             coefficients: Vec::new(),
+            coefficient_errors: Vec::new(),
+            remark: String::new(),
         });
     }
     branch.ends = [Some(Ending::Closed), Some(Ending::Closed)];

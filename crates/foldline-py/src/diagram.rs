@@ -81,11 +81,12 @@ impl Diagram {
         column(py, &points, branch, special, name)
     }
 
-    /// Kind, unstable before and after, error, coefficients, criticality and normal form of each special point of a branch.
+    /// Kind, unstable before and after, error, coefficients, their errors, criticality and normal form of each special point of a branch.
     fn special(&self, py: Python, branch: usize) -> PyResult<Vec<SpecialRow>> {
         let row = |s: &diagram::SpecialPoint| {
             let (before, after) = (s.unstable_before, s.unstable_after);
-            (s.kind.name(), before, after, s.error, s.coefficients.clone(), s.criticality(), s.normal_form())
+            let coefficients = (s.coefficients.clone(), s.coefficient_errors.clone());
+            (s.kind.name(), before, after, s.error, coefficients, s.criticality(), s.normal_form())
         };
         Ok(self.branch(py, branch)?.special.iter().map(row).collect())
     }
@@ -129,7 +130,7 @@ impl Diagram {
     }
 }
 
-type SpecialRow = (&'static str, usize, usize, f64, Vec<f64>, Option<&'static str>, String);
+type SpecialRow = (&'static str, usize, usize, f64, (Vec<f64>, Vec<f64>), Option<&'static str>, String);
 
 fn described<'py>(py: Python<'py>, branch: &Branch) -> PyResult<Bound<'py, PyDict>> {
     let parts = PyDict::new(py);

@@ -72,6 +72,8 @@ fn special(kind: Kind, position: i64, parameter: f64, cycle: bool) -> SpecialPoi
         unstable_after: 2,
         error: awkward(5),
         coefficients: vec![awkward(7), -1.5],
+        coefficient_errors: vec![awkward(3), 2.5e-300],
+        remark: "no more, and \"why\"".into(),
     }
 }
 
@@ -169,6 +171,7 @@ fn exactly(diagram: &Diagram) -> String {
         b.points.iter().for_each(|p| text += &of_point(p));
         for s in &b.special {
             text += &format!("{} {} {} {} ", s.kind, s.unstable_before, s.unstable_after, s.error.to_bits());
+            text += &format!("{:?} {:?} {:?} ", bits(&s.coefficients), bits(&s.coefficient_errors), s.remark);
             text += &of_point(&s.point);
         }
     }
@@ -451,6 +454,13 @@ fn numbers_can_be_read_by_name_without_this_program() {
     assert_eq!(row, (3.0 / 7.0, 0.0, 1.0 / 3.0, 1));
 }
 
+/// Makes a file of version 7 of one of version 8.
+const WITHOUT_ERRORS: &str = "
+    UPDATE special_points SET scalar_bytes = CAST(substr(scalar_bytes, 1, 80) AS BLOB), numbers_checksum = NULL;
+    ALTER TABLE special_points DROP COLUMN coefficient_count;
+    ALTER TABLE special_points DROP COLUMN normal_form_remark;
+    PRAGMA user_version = 7;";
+
 /// Makes a file of version 3 of one of version 4 to 7, then one of version 2.
 const WITHOUT_COUNTERS: &str = "
     ALTER TABLE points DROP COLUMN average_bytes; ALTER TABLE special_points DROP COLUMN average_bytes;
@@ -466,7 +476,31 @@ const WITHOUT_COUNTERS: &str = "
     ALTER TABLE special_points DROP COLUMN evaluations; ALTER TABLE special_points DROP COLUMN linearisations;
     PRAGMA user_version = 2;";
 
-fn without_counters(mut diagram: Diagram) -> Diagram {
+fn without_errors(mut diagram: Diagram) -> Diagram {
+    for special in diagram.branches.iter_mut().flat_map(|branch| &mut branch.special) {
+        special.coefficient_errors.clear();
+        special.remark.clear();
+    }
+    diagram
+}
+
+#[test]
+fn a_file_whose_coefficients_have_no_errors_is_read_and_resumed() {
+    let folder = tempfile::tempdir().unwrap();
+    let recorder = Recorder::create(folder.path(), &study()).unwrap();
+    record(&diagram(), &recorder);
+    recorder.finish().unwrap();
+    rusqlite::Connection::open(path_in(folder.path())).unwrap().execute_batch(WITHOUT_ERRORS).unwrap();
+    assert_eq!(exactly(&load(folder.path()).unwrap().diagram), exactly(&without_errors(diagram())));
+    let (resumed, earlier) = Recorder::resume(folder.path(), &study()).unwrap();
+    assert_eq!(earlier.branches[0].special[0].coefficients, diagram().branches[0].special[0].coefficients);
+    record(&diagram(), &resumed);
+    resumed.finish().unwrap();
+    assert_eq!(exactly(&load(folder.path()).unwrap().diagram), exactly(&diagram()));
+}
+
+fn without_counters(diagram: Diagram) -> Diagram {
+    let mut diagram = without_errors(diagram);
     for branch in &mut diagram.branches {
         let special = branch.special.iter_mut().map(|s| &mut s.point);
         for point in branch.points.iter_mut().chain(special) {
@@ -484,7 +518,9 @@ fn a_file_of_the_second_version_is_read_and_resumed() {
     let recorder = Recorder::create(folder.path(), &study()).unwrap();
     record(&diagram(), &recorder);
     recorder.finish().unwrap();
-    rusqlite::Connection::open(path_in(folder.path())).unwrap().execute_batch(WITHOUT_COUNTERS).unwrap();
+    let connection = rusqlite::Connection::open(path_in(folder.path())).unwrap();
+    connection.execute_batch(&format!("{WITHOUT_ERRORS} {WITHOUT_COUNTERS}")).unwrap();
+    drop(connection);
     assert_eq!(exactly(&load(folder.path()).unwrap().diagram), exactly(&without_counters(diagram())));
     let (resumed, _) = Recorder::resume(folder.path(), &study()).unwrap();
     record(&diagram(), &resumed);
@@ -503,7 +539,7 @@ fn a_file_of_the_first_version_is_read_and_resumed() {
     let connection = rusqlite::Connection::open(path_in(folder.path())).unwrap();
     let back =
         "ALTER TABLE branches DROP COLUMN held; ALTER TABLE branches DROP COLUMN follows; PRAGMA user_version = 1;";
-    connection.execute_batch(&format!("{WITHOUT_COUNTERS} {back}")).unwrap();
+    connection.execute_batch(&format!("{WITHOUT_ERRORS} {WITHOUT_COUNTERS} {back}")).unwrap();
     drop(connection);
     assert_eq!(exactly(&load(folder.path()).unwrap().diagram), exactly(&without_counters(older)));
 

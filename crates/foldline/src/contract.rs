@@ -260,6 +260,12 @@ pub trait Monitor: Send + Sync {
         true
     }
 
+    /// The factor of the value that vanishes next to `near`, as it is at `at`. It has the same zero, and its size does not depend on the other
+    /// factors, whose number grows with that of the states. `None` where the value has no factors.
+    fn factor(&self, _near: &Point, _at: &Point) -> Option<f64> {
+        None
+    }
+
     /// By how much an event of this kind changes the number of unstable eigenvalues or multipliers.
     fn jump(&self) -> usize;
 

@@ -5,7 +5,11 @@ use foldline::diagram::{Branch, Cost, Diagram, Origin, Point};
 use foldline::model::Model;
 use foldline::special::quantity::Quantity;
 
-/// branch, kind, every parameter, period, NAME_max of every output, unstable_before, unstable_after, error, normal_form.
+/// Most coefficients that a normal form has.
+const COEFFICIENTS: usize = 6;
+
+/// branch, kind, every parameter, period, NAME_max of every output, unstable_before, unstable_after, error, normal_form, and every coefficient
+/// with its error.
 pub fn special(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) -> bool) -> Table {
     let mut columns = vec![column("branch", Style::Word), column("kind", Style::Word)];
     columns.extend(parameter_columns(diagram, model, kept));
@@ -14,6 +18,8 @@ pub fn special(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) -> bool)
     columns.extend([column("unstable_before", Style::Number), column("unstable_after", Style::Number)]);
     columns.push(column("error", Style::Size));
     columns.push(column("normal_form", Style::Word));
+    let names = (1..=COEFFICIENTS).flat_map(|k| [format!("coefficient_{k}"), format!("coefficient_{k}_error")]);
+    columns.extend(names.map(|name| column(&name, Style::Exact)));
     let row = |branch: &Branch, index: usize| {
         let special = &branch.special[index];
         let mut row = vec![Cell::Word(branch.name.clone()), Cell::Word(special.kind.name().into())];
@@ -21,6 +27,10 @@ pub fn special(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) -> bool)
         row.extend([count(special.unstable_before), count(special.unstable_after), Cell::Number(special.error)]);
         let form = special.normal_form();
         row.push(if form.is_empty() { Cell::Empty } else { Cell::Word(form) });
+        let number = |list: &[f64], k: usize| list.get(k).map_or(Cell::Empty, |value| Cell::Number(*value));
+        row.extend(
+            (0..COEFFICIENTS).flat_map(|k| [number(&special.coefficients, k), number(&special.coefficient_errors, k)]),
+        );
         row
     };
     let shown = diagram.branches.iter().filter(|b| kept(b));

@@ -15,7 +15,7 @@ pub fn text(table: &Table, out: &mut impl Write) -> Result<()> {
     for (index, column) in table.columns.iter().enumerate() {
         let cells: Vec<&Cell> = table.rows.iter().map(|row| &row[index]).collect();
         let empty = cells.iter().all(|cell| matches!(cell, Cell::Empty));
-        if empty || column.style == Style::Varying && constant(&cells) {
+        if empty || column.style == Style::Exact || column.style == Style::Varying && constant(&cells) {
             continue;
         }
         let decimals = decimals(&cells);

@@ -39,6 +39,8 @@ pub enum Style {
     Varying,
     /// A small quantity of which only the size matters: 1.2e-9.
     Size,
+    /// Left out: for programs, not for readers.
+    Exact,
 }
 
 /// A cell.

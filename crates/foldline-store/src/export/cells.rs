@@ -54,7 +54,9 @@ pub(super) fn point_cells(point: &Point, model: &Model, cycles: bool) -> Vec<Cel
 
 /// The cells of [`super::columns::Variables::of_special`].
 pub(super) fn special_cells(special: &SpecialPoint) -> Vec<Cell> {
-    let coefficient = |k: usize| special.coefficients.get(k).map_or(Cell::Empty, |v| Cell::Real(*v));
+    let each = |list: &[f64]| -> Vec<Cell> {
+        (0..COEFFICIENTS).map(|k| list.get(k).map_or(Cell::Empty, |v| Cell::Real(*v))).collect()
+    };
     let mut out = vec![
         Cell::Text(special.kind.name().into()),
         count(special.unstable_before),
@@ -62,7 +64,8 @@ pub(super) fn special_cells(special: &SpecialPoint) -> Vec<Cell> {
         Cell::Real(special.error),
         Cell::Text(special.normal_form()),
     ];
-    out.extend((0..COEFFICIENTS).map(coefficient));
+    out.extend(each(&special.coefficients));
+    out.extend(each(&special.coefficient_errors));
     out
 }
 

@@ -75,6 +75,12 @@ const OWN: &[&str] = &[
     "coefficient_4",
     "coefficient_5",
     "coefficient_6",
+    "coefficient_1_error",
+    "coefficient_2_error",
+    "coefficient_3_error",
+    "coefficient_4_error",
+    "coefficient_5_error",
+    "coefficient_6_error",
     "set",
     "search",
     "free",
@@ -183,8 +189,13 @@ impl Variables {
             real("error", "bound on the error of parameter, period and extremes, relative to 1 + |value|"),
             text("normal_form", "coefficients of the normal form, and what follows from them, in words"),
         ];
-        let coefficients = OWN.iter().filter(|name| name.starts_with("coefficient_"));
-        out.extend(coefficients.map(|name| real(name, "coefficient of the normal form, in the order of normal_form")));
+        for name in OWN.iter().filter(|name| name.starts_with("coefficient_")) {
+            let text = match name.ends_with("_error") {
+                false => "coefficient of the normal form, in the order of normal_form",
+                true => "bound on the error of that coefficient",
+            };
+            out.push(real(name, text));
+        }
         out
     }
 

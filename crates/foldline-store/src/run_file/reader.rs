@@ -50,6 +50,8 @@ const FORCED_NUMBERS: &str = ", forcing_periods";
 /// Likewise, since format 7.
 const AVERAGES: &str = ", average_bytes";
 const OF_SPECIAL: &str = "kind, unstable_before, unstable_after";
+/// Likewise, of special points since format 8.
+const COEFFICIENT_ERRORS: &str = ", coefficient_count, normal_form_remark";
 
 /// Reads the run in `folder`, which may still be growing.
 pub fn load(folder: &Path) -> Result<Recorded, RunFileError> {
@@ -192,7 +194,7 @@ pub(super) fn load_diagram(connection: &Connection, path: &Path, part: Part) -> 
                 [since(3, LATER_NUMBERS), since(4, CHECKED_NUMBERS), since(6, FORCED_NUMBERS), since(7, AVERAGES)]
                     .concat();
             let numbers = format!("{NUMBERS}{later}");
-            (numbers.clone(), format!("{numbers}, {OF_SPECIAL}"))
+            (numbers.clone(), format!("{numbers}, {OF_SPECIAL}{}", since(8, COEFFICIENT_ERRORS)))
         }
     };
     let mut diagram = Diagram::default();
@@ -254,13 +256,28 @@ pub(super) fn special_in(row: &Row) -> Result<SpecialPoint, String> {
     let count = |name: &str| {
         row.get::<_, i64>(name).ok().and_then(|n| usize::try_from(n).ok()).ok_or_else(|| format!("{name} is no count"))
     };
+    // Rows of versions before 8 have coefficients without errors.
+    let later = |name: &str| match row.get::<_, Option<i64>>(name) {
+        Err(rusqlite::Error::InvalidColumnName(_)) => Ok(None),
+        other => other.map_err(|e| e.to_string()),
+    };
+    let (error, numbers) = extra.split_first().ok_or("scalar_bytes lacks the error")?;
+    let stated = later("coefficient_count")?.map_or(Ok(numbers.len()), usize::try_from).map_err(|e| e.to_string())?;
+    let (coefficients, errors) =
+        numbers.split_at_checked(stated).ok_or("scalar_bytes has fewer coefficients than coefficient_count says")?;
+    let remark = match row.get::<_, Option<String>>("normal_form_remark") {
+        Err(rusqlite::Error::InvalidColumnName(_)) => None,
+        other => other.map_err(|e| e.to_string())?,
+    };
     Ok(SpecialPoint {
         kind: kind_named(&row.get::<_, String>("kind").map_err(|e| e.to_string())?)?,
         point,
         unstable_before: count("unstable_before")?,
         unstable_after: count("unstable_after")?,
-        error: *extra.first().ok_or("scalar_bytes lacks the error")?,
-        coefficients: extra[1..].to_vec(),
+        error: *error,
+        coefficients: coefficients.to_vec(),
+        coefficient_errors: errors.to_vec(),
+        remark: remark.unwrap_or_default(),
     })
 }
 

@@ -85,8 +85,10 @@ pub(super) fn special_row(number: i64, branch: &Branch, special: &SpecialPoint) 
         Value::Integer(special.unstable_after as i64),
         Value::Real(special.error),
         Value::Text(special.normal_form()),
+        Value::Integer(special.coefficients.len() as i64),
+        Value::Text(special.remark.clone()),
     ];
-    let extra = [&[special.error], &special.coefficients[..]].concat();
+    let extra = [&[special.error], &special.coefficients[..], &special.coefficient_errors[..]].concat();
     first.into_iter().chain(values_of(&special.point, &extra)).collect()
 }
 

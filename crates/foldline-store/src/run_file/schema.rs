@@ -47,8 +47,19 @@ pub(crate) fn free_name(name: String, taken: &mut Vec<String>) -> String {
 }
 
 /// Names that the two tables of points have besides those of [`POINT_COLUMNS`], and one that SQLite has in every table.
-const OTHERS: [&str; 9] =
-    ["branch", "position", "kind", "key", "unstable_before", "unstable_after", "error", "normal_form", "rowid"];
+const OTHERS: [&str; 11] = [
+    "branch",
+    "position",
+    "kind",
+    "key",
+    "unstable_before",
+    "unstable_after",
+    "error",
+    "normal_form",
+    "coefficient_count",
+    "normal_form_remark",
+    "rowid",
+];
 
 /// The columns that a point has in both tables of points, with their types: first those to read, then those to load.
 const POINT_COLUMNS: [(&str, &str); 24] = [
@@ -95,7 +106,8 @@ pub(super) fn create(columns: &Columns) -> String {
              {of_points}, PRIMARY KEY (branch, position));
          CREATE TABLE special_points (branch INTEGER NOT NULL REFERENCES branches, kind TEXT NOT NULL,
              position INTEGER NOT NULL, key BLOB NOT NULL, unstable_before INTEGER NOT NULL,
-             unstable_after INTEGER NOT NULL, error REAL, normal_form TEXT, {shown}
+             unstable_after INTEGER NOT NULL, error REAL, normal_form TEXT, coefficient_count INTEGER,
+             normal_form_remark TEXT, {shown}
              {of_points}, PRIMARY KEY (branch, kind, position, key));
          CREATE TABLE notes (branch TEXT NOT NULL, note TEXT NOT NULL, UNIQUE (branch, note));"
     )
@@ -105,7 +117,7 @@ pub(super) fn create(columns: &Columns) -> String {
 ///
 /// Version 1 had no curves in two parameters, version 2 did not count evaluations, version 3 had neither checksums nor errors of
 /// multipliers, version 4 did not know that a solution can be without bound, version 5 had neither forced models nor
-/// normal forms, version 6 no averages.
+/// normal forms, version 6 no averages, version 7 no errors of coefficients.
 pub(super) fn upgrade(version: i64) -> &'static str {
     match version {
         1 => "ALTER TABLE branches ADD COLUMN held TEXT; ALTER TABLE branches ADD COLUMN follows INTEGER;",
@@ -131,6 +143,10 @@ pub(super) fn upgrade(version: i64) -> &'static str {
         6 => {
             "ALTER TABLE points ADD COLUMN average_bytes BLOB;
              ALTER TABLE special_points ADD COLUMN average_bytes BLOB;"
+        }
+        7 => {
+            "ALTER TABLE special_points ADD COLUMN coefficient_count INTEGER;
+             ALTER TABLE special_points ADD COLUMN normal_form_remark TEXT;"
         }
         _ => "",
     }

@@ -213,8 +213,18 @@ impl Recorder {
         };
         let columns = Columns::new(&study.model);
         connection.execute_batch(&responses::create(&study.model)).map_err(failed)?;
-        let special =
-            ["branch", "kind", "position", "key", "unstable_before", "unstable_after", "error", "normal_form"];
+        let special = [
+            "branch",
+            "kind",
+            "position",
+            "key",
+            "unstable_before",
+            "unstable_after",
+            "error",
+            "normal_form",
+            "coefficient_count",
+            "normal_form_remark",
+        ];
         Ok(Recorder {
             insert_point: insertion("points", &["branch", "position"], &columns),
             insert_special: insertion("special_points", &special, &columns),

@@ -67,6 +67,8 @@ fn special(kind: Kind, position: i64, intervals: usize, coefficients: &[f64]) ->
         unstable_after: 2,
         error: awkward(5),
         coefficients: coefficients.into(),
+        coefficient_errors: coefficients.iter().map(|c| 1e-9 * c.abs()).collect(),
+        remark: String::new(),
     }
 }
 

@@ -158,6 +158,7 @@ fn parquet_has_the_same_bits() {
     for (row, special) in found.iter().zip(specials) {
         assert_eq!(row["kind"], Field::Str(special.kind.name().into()));
         assert!(same(number(&row["coefficient_1"]), special.coefficients.first().copied()));
+        assert!(same(number(&row["coefficient_1_error"]), special.coefficient_errors.first().copied()));
         assert!(same(number(&row["error"]), Some(special.error)));
     }
     let cycles = all.iter().filter_map(|point| match &point.solution {

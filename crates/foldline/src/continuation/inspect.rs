@@ -428,6 +428,8 @@ impl Follow<'_> {
             unstable_after: after.max(0) as usize,
             error,
             coefficients: Vec::new(),
+            coefficient_errors: Vec::new(),
+            remark: String::new(),
         })
     }
 

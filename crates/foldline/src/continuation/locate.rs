@@ -312,14 +312,21 @@ pub(super) fn locate_within(
         Kind::Fold => stretch.turning(),
         _ => values[0] / (values[0] - values[1]),
     };
-    let (distance, mut coarse, rise) = chandrupatla(&mut evaluate, ends, values, first, [resolution, 0.5 * JUMP])?;
+    let (mut distance, mut coarse, rise) = chandrupatla(&mut evaluate, ends, values, first, [resolution, 0.5 * JUMP])?;
     // A change of sign without a zero: the two ends lie on different branches.
     let smallest = monitor.value(reference, &coarse.point).abs();
-    if smallest > JUMP * values[0].abs().max(values[1].abs()) {
+    let largest = values[0].abs().max(values[1].abs());
+    // (Of values that underflow only the sign is known.)
+    if smallest > JUMP * largest && largest > f64::MIN_POSITIVE {
         return Err(Failure::Unexplained);
     }
-    let floor = 10.0 * settings.newton_tolerance();
+    let mut floor = 10.0 * settings.newton_tolerance();
     let (mut tolerance, mut slope) = (0.3 * settings.tolerance, rise);
+    // (A branch that begins at a pitchfork turns where the matrix is singular.)
+    if coarse.mesh.is_empty() && !matches!(monitor.kind(), Kind::BranchPoint | Kind::Fold) {
+        (distance, coarse) = sharpened(problem, settings, stretch, monitor, (distance, coarse), cost);
+        floor = unsettled(problem, &coarse).unwrap_or(floor);
+    }
     if !monitor.possible(&coarse.point) {
         return Ok(Located { distance, station: coarse, error: floor });
     }
@@ -377,8 +384,61 @@ pub(super) fn locate_within(
     known.map(|(station, error)| Located { distance, station, error }).ok_or(Failure::NotFinite)
 }
 
-/// How far rounding may have moved the zero of a monitor, in the parameter, relative to 1 + its size: the monitor is nearly
-/// linear so close by, and what it departs from a line is rounding.
+/// What vanishes at the zero of a monitor next to `near`: a factor of its value, where that has any.
+fn vanishing(monitor: &dyn Monitor, stretch: &Stretch, near: &Point, at: &Point) -> f64 {
+    monitor.factor(near, at).unwrap_or_else(|| monitor.value(&stretch.left.point, at))
+}
+
+/// The zero as closely as rounding lets it be found, by the secant method, where there is no mesh.
+fn sharpened(
+    problem: &mut dyn ZeroProblem,
+    settings: &Settings,
+    stretch: &Stretch,
+    monitor: &dyn Monitor,
+    (distance, found): (f64, Station),
+    cost: &mut Cost,
+) -> (f64, Station) {
+    const ROUNDS: usize = 12;
+    // So far from the zero the slope is free of rounding, and nearly that at the zero.
+    const APART: f64 = 1e-6;
+    let near = found.point.clone();
+    let own = vanishing(monitor, stretch, &near, &near);
+    let mut best = (distance, own, found);
+    let (mut a, mut b) = ((distance, own), distance + APART * stretch.length);
+    for round in 0..ROUNDS {
+        let Ok(there) = stretch.seen_at(monitor.reads(), problem, settings, b, cost) else { break };
+        let value = vanishing(monitor, stretch, &near, &there.point);
+        let next = b - value * (b - a.0) / (value - a.1);
+        let better = value.abs() < best.1.abs();
+        if better {
+            best = (b, value, there);
+        }
+        // The first trial is for the slope; after it the values descend until they are rounding.
+        let inside = (0.0..=1.0).contains(&(next / stretch.length));
+        if !inside || (round > 0 && !better) {
+            break;
+        }
+        (a, b) = ((b, value), next);
+    }
+    (best.0, best.2)
+}
+
+/// What rounding leaves of the error of a solution, relative: one more update of Newton's method, and the spacing of numbers.
+fn unsettled(problem: &mut dyn ZeroProblem, found: &Station) -> Option<f64> {
+    const SAFE: f64 = 10.0;
+    let (mut r, mut du) = (vec![0.0; found.u.len()], vec![0.0; found.u.len()]);
+    problem.anchor(&found.u);
+    problem.factorise(&found.u, &found.tangent).ok()?;
+    if !problem.residual(&found.u, &mut r) {
+        return None;
+    }
+    r[found.u.len() - 1] = 0.0;
+    problem.solve(&r, &mut du);
+    Some(SAFE * (problem.relative_size(&du, &found.u) + f64::EPSILON)).filter(|error| error.is_finite())
+}
+
+/// How far rounding may have moved the zero of a monitor, in parameter and states, relative: what vanishes there is a parabola so close by,
+/// and what it departs from one is rounding.
 fn noise(
     problem: &mut dyn ZeroProblem,
     settings: &Settings,
@@ -394,16 +454,20 @@ fn noise(
     for (value, place) in values.iter_mut().zip(PLACES) {
         let s = distance + place * NEAR * stretch.length;
         let Ok(there) = stretch.at(problem, settings, s, cost) else { return 0.0 };
-        *value = monitor.value(&stretch.left.point, &there.point);
+        *value = vanishing(monitor, stretch, &found.point, &there.point);
     }
-    let mean = values.iter().sum::<f64>() / 6.0;
-    let square: f64 = PLACES.iter().map(|x| x * x).sum();
-    let slope = PLACES.iter().zip(&values).map(|(x, v)| x * v).sum::<f64>() / square;
-    let off = PLACES.iter().zip(&values).fold(0.0f64, |most, (x, v)| most.max((v - mean - slope * x).abs()));
-    // Where the line has its zero says as much as how far the values are off it.
-    let shift = ((mean / slope).abs() + 2.0 * (off / slope).abs()) * NEAR * stretch.length.abs();
-    let slope = found.slope().abs();
-    let error = shift * slope / (1.0 + found.parameter().abs());
+    let sum = |of: &dyn Fn(f64) -> f64| PLACES.iter().map(|x| of(*x)).sum::<f64>();
+    let moment = |of: &dyn Fn(f64) -> f64| PLACES.iter().zip(&values).map(|(x, v)| of(*x) * v).sum::<f64>();
+    let square = sum(&|x| x * x) / 6.0;
+    let bent = |x: f64| x * x - square;
+    let (mean, slope) = (moment(&|_| 1.0) / 6.0, moment(&|x| x) / (6.0 * square));
+    let bend = moment(&bent) / sum(&|x| bent(x) * bent(x));
+    let fitted = |x: f64| mean + slope * x + bend * bent(x);
+    let off = PLACES.iter().zip(&values).fold(0.0f64, |most, (x, v)| most.max((v - fitted(*x)).abs()));
+    // Where the parabola has its zero says as much as how far the values are off it.
+    let shift = ((fitted(0.0) / slope).abs() + 2.0 * (off / slope).abs()) * NEAR * stretch.length.abs();
+    let rate = found.slope().abs() / (1.0 + found.parameter().abs());
+    let error = shift * rate.max(problem.relative_size(&found.tangent, &found.u));
     if error.is_finite() { error } else { 0.0 }
 }
 
@@ -597,8 +661,8 @@ fn chandrupatla<T>(
         };
         let margin = 0.1 * resolved * width / (b - a).abs();
         t = if t.is_finite() && margin < 0.5 { t.clamp(margin, 1.0 - margin) } else { 0.5 };
-        // Two neighbouring trials that both sit on the zero to rounding: done.
-        if fx.abs() < 1e-14 {
+        // What is left is rounding of the values at the ends.
+        if fx.abs() < 1e-14 * largest {
             break;
         }
     }

@@ -359,52 +359,83 @@ pub struct SpecialPoint {
     pub error: f64,
     /// Coefficients of the normal form, named by [`Kind::coefficients`]; none where they are not known.
     pub coefficients: Vec<f64>,
+    /// Bounds on the errors of the coefficients; none in files of earlier versions.
+    pub coefficient_errors: Vec<f64>,
+    /// Why there are no coefficients, or why they decide nothing; empty where there is nothing to say.
+    pub remark: String,
 }
 
 impl SpecialPoint {
-    /// Whether the solutions that are born there are stable as far as it goes (supercritical), or take the stability of those that they
-    /// leave with them (subcritical); `None` where there are no such, or it is not known.
-    pub fn criticality(&self) -> Option<&'static str> {
-        let decides = match (self.kind, &self.coefficients[..]) {
-            (Kind::Hopf | Kind::PeriodDoubling | Kind::Torus, [first, ..]) => *first,
-            (Kind::BranchPoint, [_, _, cubic]) => *cubic,
+    /// A coefficient, unless it is zero within its error.
+    fn certain(&self, k: usize) -> Option<f64> {
+        let error = self.coefficient_errors.get(k).copied().unwrap_or(0.0);
+        self.coefficients.get(k).copied().filter(|value| value.abs() > error)
+    }
+
+    /// True if the solutions that are born there are stable as far as it goes (supercritical), false if they take the stability of those that
+    /// they leave with them (subcritical); `None` where there are no such, or where the coefficient that decides is zero within its error.
+    fn is_supercritical(&self) -> Option<bool> {
+        let decides = match (self.kind, self.coefficients.len()) {
+            (Kind::Hopf | Kind::PeriodDoubling | Kind::Torus, 1) => 0,
+            (Kind::BranchPoint, 3) => 2,
             _ => return None,
         };
-        match decides {
-            c if c < 0.0 => Some("supercritical"),
-            c if c > 0.0 => Some("subcritical"),
-            _ => None,
+        self.certain(decides).map(|value| value < 0.0)
+    }
+
+    /// `supercritical` or `subcritical` where that is known, `degenerate` where a coefficient that matters is zero within its error, and
+    /// `undetermined` where that error is as large as what the coefficient is made of.
+    pub fn criticality(&self) -> Option<&'static str> {
+        // Those that must not vanish: a pitchfork has no quadratic term, and oscillations may leave each other alone.
+        let needed: &[usize] = match (self.kind, self.coefficients.len()) {
+            (_, 0) => return None,
+            (_, 1) => &[0],
+            (_, 2) => &[0, 1],
+            (Kind::DoubleHopf, _) => &[0, 3],
+            _ => &[1, 2],
+        };
+        let vanishes = needed.iter().any(|k| self.certain(*k).is_none());
+        match self.is_supercritical() {
+            _ if vanishes && !self.remark.is_empty() => Some("undetermined"),
+            _ if vanishes => Some("degenerate"),
+            Some(true) => Some("supercritical"),
+            Some(false) => Some("subcritical"),
+            None => None,
         }
     }
 
     /// Which of the cases it is that the coefficients tell apart: a branch point is transcritical or a pitchfork, a double Hopf point
     /// simple where p₁₁ and p₂₂ have the same sign, else difficult.
     pub fn case(&self) -> Option<&'static str> {
-        match (self.kind, &self.coefficients[..]) {
-            (Kind::BranchPoint, [_, _]) => Some("transcritical"),
-            (Kind::BranchPoint, [_, _, _]) => Some("pitchfork"),
-            (Kind::DoubleHopf, [p11, _, _, p22, ..]) if p11 * p22 > 0.0 => Some("simple"),
-            (Kind::DoubleHopf, [p11, _, _, p22, ..]) if p11 * p22 < 0.0 => Some("difficult"),
+        match (self.kind, self.coefficients.len()) {
+            (Kind::BranchPoint, 2) => Some("transcritical"),
+            (Kind::BranchPoint, 3) => Some("pitchfork"),
+            (Kind::DoubleHopf, 4..) if self.certain(0)? * self.certain(3)? > 0.0 => Some("simple"),
+            (Kind::DoubleHopf, 4..) => Some("difficult"),
             _ => None,
         }
     }
 
-    /// Coefficients, case and criticality in words, as `l1 = -0.0123, supercritical`.
+    /// Coefficients, case and criticality in words, as `l1 = -0.0123, supercritical`, and the remark. An error is given where the digits
+    /// do not show it.
     pub fn normal_form(&self) -> String {
-        // Beside the others, what is so small is rounding.
-        const NOTHING: f64 = 1e-13;
-        let largest = self.coefficients.iter().fold(0.0, |most: f64, value| most.max(value.abs()));
-        let named = self.kind.coefficients().iter().zip(&self.coefficients);
-        let shown = |value: f64| if value.abs() < NOTHING * largest { 0.0 } else { value };
-        let parts = named.map(|(name, value)| format!("{name} = {}", shortly(shown(*value))));
-        let words = [self.case(), self.criticality()].into_iter().flatten().map(str::to_string);
-        parts.chain(words).collect::<Vec<_>>().join(", ")
+        let named = self.kind.coefficients().iter().zip(&self.coefficients).enumerate();
+        let error = |k: usize| self.coefficient_errors.get(k).copied();
+        let parts = named.map(|(k, (name, value))| format!("{name} = {}", shortly(*value, error(k))));
+        let words = [self.case(), self.criticality(), Some(self.remark.as_str()).filter(|remark| !remark.is_empty())];
+        parts.chain(words.into_iter().flatten().map(str::to_string)).collect::<Vec<_>>().join(", ")
     }
 }
 
-/// Five digits.
-fn shortly(value: f64) -> String {
-    if value != 0.0 && !(1e-3..1e4).contains(&value.abs()) { format!("{value:.4e}") } else { format!("{value:.5}") }
+/// Five digits, and the error where the last of them is not certain. What is zero within so small an error is 0.
+fn shortly(value: f64, error: Option<f64>) -> String {
+    const SMALL: f64 = 5e-6;
+    let error = error.unwrap_or(0.0);
+    let value = if value.abs() <= error && error < SMALL { 0.0 } else { value };
+    let fixed = value == 0.0 || (1e-3..1e4).contains(&value.abs());
+    let text = if fixed { format!("{value:.5}") } else { format!("{value:.4e}") };
+    let last = if fixed { 1e-5 } else { 1e-4 * 10f64.powf(value.abs().log10().floor()) };
+    if error > 0.5 * last { format!("{text} ± {error:.0e}") } else { text }
 }
 
 /// What kind of solution a branch is made of.

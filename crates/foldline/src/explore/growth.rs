@@ -8,6 +8,7 @@ use crate::continuation::{Failure, Follow, Homecoming, Item, Settings, Station, 
 use crate::contract::{Event, Examination, Monitor, Observer, Verdict, ZeroProblem};
 use crate::diagram::{Branch, Cost, Ending, Family, Kind, Origin, Point, Solution, SpecialPoint};
 use crate::problem::{Axis, Setting, Tie, cycle::CycleProblem, equilibrium::EquilibriumProblem, held::Held, mesh};
+use crate::special::coefficients::Coefficients;
 use crate::special::connection::Limits;
 use crate::special::mark::Mark;
 use crate::special::quantity::Quantity;
@@ -272,6 +273,7 @@ impl Growth<'_> {
             Beginning::Inside(mut start) => {
                 self.count(branch, &mut start.point);
                 going &= self.accept(branch, Point { position: 0, step: self.settings.first_step, ..start.point });
+                going &= self.say_what_is_left_out(branch);
                 going &= self.mark_start(branch);
             }
             Beginning::Edge { before, mut first, joined } => {
@@ -300,6 +302,23 @@ impl Growth<'_> {
         branch.family == Family::Cycle && branch.held.is_none() && rotation(self.system, &at.parameters).is_some()
     }
 
+    /// A remark on a curve along which a coefficient that is not defined would have to be looked at.
+    fn say_what_is_left_out(&self, branch: &Branch) -> bool {
+        let sought = match branch.held {
+            Some((Kind::PeriodDoubling, _)) => Kind::GeneralisedPeriodDoubling,
+            Some((Kind::Torus, _)) => Kind::Chenciner,
+            _ => return true,
+        };
+        let Some(start) = branch.points.first() else { return true };
+        let own = setting(self.system, branch.free, &start.parameters);
+        let count = special::cycle_form::switches_passed(&own, start);
+        let note = format!(
+            "points of kind {sought} are not looked for: the orbit passes switches of the right-hand side ({count} times at the start), where the \
+             coefficient that vanishes there is not defined"
+        );
+        count == 0 || self.tell(Event::Note(&branch.name, &note))
+    }
+
     /// A mark at which the branch starts, unless it is there already: no step leads over it.
     fn mark_start(&self, branch: &mut Branch) -> bool {
         let Some(point) = branch.points.iter().find(|p| p.position == 0) else { return true };
@@ -315,6 +334,8 @@ impl Growth<'_> {
             unstable_after: point.unstable,
             error: 10.0 * self.settings.newton_tolerance(),
             coefficients: Vec::new(),
+            coefficient_errors: Vec::new(),
+            remark: String::new(),
             point: point.clone(),
         };
         branch.insert_special(special.clone());
@@ -436,7 +457,9 @@ impl Growth<'_> {
                 Item::Special(mut special) => {
                     // Where a curve only turns there is none.
                     if branch.held.is_none() || special.kind.has_codimension_two() {
-                        special.coefficients = self.coefficients(&system, branch, side, &special);
+                        let found = self.coefficients(&system, branch, side, &special);
+                        (special.coefficients, special.coefficient_errors) = (found.values, found.errors);
+                        special.remark = found.remark;
                     }
                     self.place_exactly(&system, branch, &mut special);
                     branch.insert_special(special.clone());
@@ -536,26 +559,24 @@ impl Growth<'_> {
     }
 
     /// Of the normal form.
-    fn coefficients(&self, system: &System, branch: &Branch, side: usize, special: &SpecialPoint) -> Vec<f64> {
-        let own = setting(system, branch.free, &special.point.parameters);
-        match special.point.solution {
-            Solution::Equilibrium(_) => {
-                let own = Setting { axes: vec![self.line(branch).axis(system, branch.free)], ..own };
+    fn coefficients(&self, system: &System, branch: &Branch, side: usize, special: &SpecialPoint) -> Coefficients {
+        let (line, own) = (self.line(branch), setting(system, branch.free, &special.point.parameters));
+        let free = branch.held.map(|(_, first)| first).into_iter().chain([branch.free]);
+        let own = Setting { axes: free.map(|index| line.axis(system, index)).collect(), ..own };
+        match &special.point.solution {
+            Solution::Equilibrium(there) => {
                 let mut at = special.point.clone();
                 let before = if side == 1 { branch.points.last() } else { branch.points.first() };
                 if special.kind == Kind::BranchPoint
                     && let Some(Solution::Equilibrium(x)) = before.map(|point| &point.solution)
-                    && let Solution::Equilibrium(there) = &special.point.solution
                 {
                     // The tangent there may be one between those of both branches.
                     let gap = |point: &Point| special.point.parameters[branch.free] - point.parameters[branch.free];
                     at.tangent = there.iter().zip(x).map(|(a, b)| a - b).chain(before.map(gap)).collect();
                 }
-                special::normal_form::coefficients(&own, special.kind, &at)
+                special::normal_form::coefficients(&own, special.kind, &at, special.error)
             }
-            Solution::Cycle(_) => {
-                special::cycle_form::coefficient(special.kind, own, &special.point).into_iter().collect()
-            }
+            Solution::Cycle(_) => special::cycle_coefficients::coefficients(special.kind, &own, &special.point),
         }
     }
 

@@ -16,23 +16,45 @@
 //!
 //! **Source.** kuznetsov2005; in the form of bordered equations, govaerts2000, §7.
 //!
-//! **Fails when** the period of free cycles does not change at their fold: (1) has no solution then, and a fold has no coefficient.
+//! **Fails when** the period of free cycles does not change at their fold: (1) has no solution then, and a fold has no coefficient. Where a cycle
+//! passes a switch of a piecewise field, B and C are not all there is: a kink adds impulses.
 
 use super::normal_form::without_rounding;
 use super::on_cycles::OnCycles;
-use crate::contract::Condition;
-use crate::diagram::{Cycle, Kind, Point, Solution};
+use crate::contract::{Batch, Condition, Parameters};
+use crate::diagram::{Cycle, Kind, Mesh, Point, Solution};
 use crate::linalg::system::System;
 use crate::problem::gauss::Scheme;
 use crate::problem::{Setting, mesh};
 
 /// Share of the null vector of a fold below which a change of the period is the error of collocation.
-const NOTHING: f64 = 1e-8;
+pub(super) const NOTHING: f64 = 1e-8;
 
-/// The coefficient of a cycle at a special point of that kind; `None` for kinds that have none, and where it cannot be computed. The
-/// setting has any free parameters.
+/// A coefficient as it is on the mesh of the point.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Value {
+    /// The coefficient.
+    pub(super) value: f64,
+    /// The sum of the sizes of its terms.
+    pub(super) terms: f64,
+    /// Of a fold of free cycles, the share of the period in the null vector, by which v of (1) is divided; 1 elsewhere.
+    pub(super) divisor: f64,
+}
+
+/// The coefficient of a cycle at a special point of that kind, for the sake of its sign; `None` for kinds that have none, and where it cannot
+/// be computed or is not defined. The setting has any free parameters.
 pub fn coefficient(kind: Kind, setting: Setting, at: &Point) -> Option<f64> {
-    let at = &denser(at)?;
+    let Solution::Cycle(cycle) = &at.solution else { return None };
+    if cycle.intervals() == 0 || switches_passed(&setting, at) > 0 {
+        return None;
+    }
+    // Higher derivatives of a field change more sharply than the cycle that the mesh was made for.
+    let found = valued(kind, setting, &on_mesh(at, &mesh::denser(&cycle.mesh))?)?;
+    (found.divisor.abs() > NOTHING).then_some(found.value)
+}
+
+/// The coefficient on the mesh of the point.
+pub(super) fn valued(kind: Kind, setting: Setting, at: &Point) -> Option<Value> {
     let Solution::Cycle(cycle) = &at.solution else { return None };
     let unit = setting.field.time_unit(&at.parameters);
     let own = if cycle.forcing_periods > 0 { f64::from(cycle.forcing_periods) } else { cycle.period };
@@ -48,28 +70,42 @@ pub fn coefficient(kind: Kind, setting: Setting, at: &Point) -> Option<f64> {
         Kind::Fold if condition.growth(&v) < 0.0 => -length,
         _ => length,
     };
-    if size.abs() <= NOTHING * length {
-        return None;
-    }
     v.iter_mut().for_each(|x| *x /= size);
-    let found = match kind {
+    let (value, terms) = match kind {
         Kind::Fold => form.fold(&v, free_fold),
-        Kind::PeriodDoubling => form.doubling(&v, spare),
-        _ => form.torus(&v, extra[0], spare),
-    }?;
-    Some(found / unit).filter(|value| value.is_finite())
+        Kind::PeriodDoubling => form.doubling(&v, spare)?,
+        _ => form.torus(&v, extra[0], spare)?,
+    };
+    let divisor = if free_fold { size / length } else { 1.0 };
+    Some(Value { value: value / unit, terms: terms / unit.abs(), divisor }).filter(|found| found.value.is_finite())
 }
 
-/// The point with its cycle on a denser mesh: higher derivatives of a field change more sharply than the cycle that the mesh was made for.
-fn denser(at: &Point) -> Option<Point> {
+/// The point with its cycle on another mesh.
+pub(super) fn on_mesh(at: &Point, mesh: &Mesh) -> Option<Point> {
     let Solution::Cycle(cycle) = &at.solution else { return None };
-    if cycle.intervals() == 0 {
-        return None;
-    }
-    let mesh = mesh::denser(&cycle.mesh);
-    let profile = mesh::transferred(&cycle.profile, cycle.dim(), &Scheme::new(cycle.degree), &cycle.mesh, &mesh);
-    let solution = Solution::Cycle(Cycle { mesh, profile, ..*cycle });
+    let profile = mesh::transferred(&cycle.profile, cycle.dim(), &Scheme::new(cycle.degree), &cycle.mesh, mesh);
+    let solution = Solution::Cycle(Cycle { mesh: mesh.clone(), profile, ..*cycle });
     Some(Point { solution, ..at.clone() })
+}
+
+/// How often a cycle passes a switch of the field: there its second derivative has a jump of the first to integrate, which no mesh sees.
+pub(crate) fn switches_passed(setting: &Setting, at: &Point) -> usize {
+    let (field, Solution::Cycle(cycle)) = (setting.field, &at.solution) else { return 0 };
+    let (n, count) = (cycle.dim(), field.switch_count());
+    if count == 0 || n == 0 {
+        return 0;
+    }
+    let scheme = Scheme::of(cycle.degree);
+    let lanes = cycle.profile.len() / n;
+    let states: Vec<f64> = (0..n).flat_map(|c| cycle.profile.iter().skip(c).step_by(n).copied()).collect();
+    let places = cycle.mesh.windows(2).flat_map(|pair| scheme.nodes.iter().map(|c| pair[0] + (pair[1] - pair[0]) * c));
+    let times: Vec<f64> = places.map(|t| f64::from(cycle.forcing_periods) * t).collect();
+    let times = if cycle.forcing_periods > 0 { &times[..] } else { &[] };
+    let mut values = vec![0.0; count * lanes];
+    field
+        .switches(Batch { lanes, states: &states, parameters: Parameters::Shared(&at.parameters), times }, &mut values);
+    let changes = |own: &[f64]| (0..lanes).filter(|k| (own[*k] > 0.0) != (own[(k + 1) % lanes] > 0.0)).count();
+    values.chunks_exact(lanes).map(changes).sum()
 }
 
 /// The condition of that kind with its null vector, the unknowns, and the extra ones.
@@ -120,22 +156,23 @@ impl Form<'_, '_> {
         (self.condition.solvability(above) / self.condition.solvability(below)).re
     }
 
-    /// The sum of the ratios; zero where nothing is left of them but the error of collocation.
-    fn total(&self, terms: &[Vec<f64>], below: &[f64]) -> f64 {
+    /// The sum of the ratios, zero where nothing is left of them but the error of collocation, and the sum of their sizes.
+    fn total(&self, terms: &[Vec<f64>], below: &[f64]) -> (f64, f64) {
         const SHARE: f64 = 1e-9;
         let terms: Vec<f64> = terms.iter().map(|term| self.ratio(term, below)).collect();
-        without_rounding(&terms, &terms.iter().map(|term| term.abs()).collect::<Vec<f64>>(), SHARE)
+        let sizes: Vec<f64> = terms.iter().map(|term| term.abs()).collect();
+        (without_rounding(&terms, &sizes, SHARE), sizes.iter().sum())
     }
 
-    fn fold(&self, v: &[f64], free: bool) -> Option<f64> {
-        let mut right = scaled(&self.condition.bent(&[v, v]), 0.5);
+    fn fold(&self, v: &[f64], free: bool) -> (f64, f64) {
+        let mut terms = vec![scaled(&self.condition.bent(&[v, v]), 0.5)];
         if free {
-            add(&mut right, 1.0, &self.condition.along(v));
+            terms.push(self.condition.along(v));
         }
-        Some(self.ratio(&right, v))
+        self.total(&terms, v)
     }
 
-    fn doubling(&self, v: &[f64], spare: Option<System>) -> Option<f64> {
+    fn doubling(&self, v: &[f64], spare: Option<System>) -> Option<(f64, f64)> {
         let (h, twice) = self.periodic(&self.condition.bent(&[v, v]), spare)?;
         let terms = [
             scaled(&self.condition.bent(&[v, v, v]), 1.0 / 6.0),
@@ -145,7 +182,7 @@ impl Form<'_, '_> {
         Some(self.total(&terms, v))
     }
 
-    fn torus(&self, v: &[f64], angle: f64, spare: Option<System>) -> Option<f64> {
+    fn torus(&self, v: &[f64], angle: f64, spare: Option<System>) -> Option<(f64, f64)> {
         let (x, y) = v.split_at(v.len() / 2);
         let b = |p: &[f64], q: &[f64]| self.condition.bent(&[p, q]);
         let c = |p: &[f64], q: &[f64], r: &[f64]| self.condition.bent(&[p, q, r]);
@@ -171,10 +208,6 @@ fn scaled(v: &[f64], factor: f64) -> Vec<f64> {
 
 fn sum(a: &[f64], factor: f64, b: &[f64]) -> Vec<f64> {
     a.iter().zip(b).map(|(a, b)| a + factor * b).collect()
-}
-
-fn add(to: &mut [f64], factor: f64, v: &[f64]) {
-    to.iter_mut().zip(v).for_each(|(t, x)| *t += factor * x);
 }
 
 #[cfg(test)]

@@ -13,6 +13,7 @@ use crate::diagram::{Kind, Mesh, Point, Solution};
 use crate::linalg::{lu, max_abs};
 use crate::problem::gauss::Scheme;
 use crate::stability::eigenvalues;
+use num_complex::Complex64;
 
 /// Sum of two eigenvalues.
 pub struct Hopf;
@@ -23,9 +24,16 @@ impl Monitor for Hopf {
     }
 
     fn value(&self, _reference: &Point, at: &Point) -> f64 {
-        let z = &at.spectrum;
-        let pairs = (0..z.len()).flat_map(|i| (i + 1..z.len()).map(move |j| (i, j)));
-        pairs.map(|(i, j)| (z[i] + z[j]) / (1e-300 + z[i].norm() + z[j].norm())).product::<num_complex::Complex64>().re
+        super::product(|| pairs(&at.spectrum).map(balance))
+    }
+
+    fn factor(&self, near: &Point, at: &Point) -> Option<f64> {
+        let real = |spectrum| pairs(spectrum).filter(|pair| balance(*pair).im == 0.0);
+        let (first, second) = real(&near.spectrum).min_by(|a, b| balance(*a).norm().total_cmp(&balance(*b).norm()))?;
+        let apart = |(a, b): &(Complex64, Complex64)| {
+            ((a - first).norm() + (b - second).norm()).min((a - second).norm() + (b - first).norm())
+        };
+        real(&at.spectrum).min_by(|a, b| apart(a).total_cmp(&apart(b))).map(|pair| balance(pair).re)
     }
 
     fn confirms(&self, at: &Point) -> bool {
@@ -43,6 +51,16 @@ impl Monitor for Hopf {
     fn others_unstable(&self, at: &Point) -> Option<usize> {
         super::others_unstable(at, 2, |z| if z.im == 0.0 { f64::INFINITY } else { (z.re / z.im).abs() })
     }
+}
+
+/// Every two eigenvalues.
+fn pairs(z: &[Complex64]) -> impl Iterator<Item = (Complex64, Complex64)> + '_ {
+    (0..z.len()).flat_map(move |i| (i + 1..z.len()).map(move |j| (z[i], z[j])))
+}
+
+/// The sum of two eigenvalues over the sum of their moduli.
+fn balance((a, b): (Complex64, Complex64)) -> Complex64 {
+    (a + b) / (f64::MIN_POSITIVE + a.norm() + b.norm())
 }
 
 /// ω of the pair closest to the imaginary axis, if it is there.

@@ -15,9 +15,11 @@
 
 pub mod branch_point;
 pub mod codim_two;
+pub mod coefficients;
 pub mod collapse;
 pub mod condition;
 pub mod connection;
+pub mod cycle_coefficients;
 pub mod cycle_form;
 pub mod fold;
 pub mod hopf;
@@ -61,7 +63,18 @@ pub fn monitors_where_held<'a>(
 
 /// Product over all of (z - at) / (1 + |z|): real for a spectrum closed under conjugation and a real `at`.
 fn distance_product(spectrum: &[Complex64], at: f64) -> f64 {
-    spectrum.iter().map(|z| (z - at) / (1.0 + z.norm())).product::<Complex64>().re
+    product(|| spectrum.iter().map(|z| (z - at) / (1.0 + z.norm())))
+}
+
+/// The product of factors of which complex ones come with their conjugates. Where the many factors of a large system underflow together its
+/// sign is right all the same.
+fn product<I: Iterator<Item = Complex64>>(factors: impl Fn() -> I) -> f64 {
+    let product = factors().product::<Complex64>().re;
+    if product.abs() >= f64::MIN_POSITIVE || product.is_nan() {
+        return product;
+    }
+    let real = || factors().filter(|factor| factor.im == 0.0).map(|factor| factor.re);
+    if real().any(|factor| factor == 0.0) { 0.0 } else { f64::MIN_POSITIVE * real().map(f64::signum).product::<f64>() }
 }
 
 /// How many of the free eigenvalues or multipliers are unstable, those `passing` ones left out that are closest by `distance` to where

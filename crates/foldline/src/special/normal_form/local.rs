@@ -4,6 +4,7 @@ use crate::contract::{Batch, Parameters, VectorField};
 use crate::diagram::{Point, Solution};
 use crate::linalg::{dot, lu, max_abs};
 use num_complex::Complex64;
+use std::cell::RefCell;
 
 /// An equilibrium and the derivatives of f there.
 pub struct Local<'a> {
@@ -13,6 +14,37 @@ pub struct Local<'a> {
     pub(super) n: usize,
     /// `[n × n]`.
     jacobian: Vec<f64>,
+    noise: Option<Noise>,
+}
+
+/// Errors put on derivatives to see what they do.
+#[derive(Clone)]
+struct Noise {
+    /// Relative size.
+    size: f64,
+    /// `[n]` sizes of the states.
+    scales: Vec<f64>,
+    /// `[n]` largest term of each component of the Jacobian times states of those sizes.
+    rates: Vec<f64>,
+    signs: RefCell<Signs>,
+}
+
+/// A sequence of signs without order, always the same for a seed.
+#[derive(Clone)]
+pub(super) struct Signs(u64);
+
+impl Signs {
+    pub(super) fn new(seed: u64) -> Signs {
+        Signs(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1)
+    }
+
+    /// +1 or -1.
+    pub(super) fn next(&mut self) -> f64 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        if self.0 >> 32 & 1 == 0 { 1.0 } else { -1.0 }
+    }
 }
 
 impl<'a> Local<'a> {
@@ -23,13 +55,25 @@ impl<'a> Local<'a> {
         let (mut f, mut jacobian) = (vec![0.0; n], vec![0.0; n * n]);
         let batch = Batch { lanes: 1, states: state, parameters: Parameters::Shared(&at.parameters), times: &[] };
         field.linearise(batch, &[], &mut f, &mut jacobian, &mut []);
-        Some(Local { field, state, parameters: &at.parameters, n, jacobian })
+        Some(Local { field, state, parameters: &at.parameters, n, jacobian, noise: None })
+    }
+
+    /// The same with errors of either sign on the Jacobian and on all higher derivatives. They are as large as `size` says, relative to the
+    /// largest term of the same component of f in states of the sizes `scales` `[n]`: f rounded there tells nothing smaller apart.
+    pub(super) fn shaken(mut self, size: f64, scales: &[f64], seed: u64) -> Local<'a> {
+        let (n, mut signs) = (self.n, Signs::new(seed));
+        let largest = |row: &[f64]| row.iter().zip(scales).fold(0.0f64, |most, (a, s)| most.max((a * s).abs()));
+        let rates: Vec<f64> = self.jacobian.chunks_exact(n).map(largest).collect();
+        (0..n * n).for_each(|k| self.jacobian[k] += size * rates[k / n] / scales[k % n] * signs.next());
+        self.noise = Some(Noise { size, scales: scales.to_vec(), rates, signs: RefCell::new(signs) });
+        self
     }
 
     /// The same with the transposed Jacobian, for left vectors.
     pub(super) fn transposed(&self) -> Local<'a> {
         let n = self.n;
-        Local { jacobian: (0..n * n).map(|k| self.jacobian[k % n * n + k / n]).collect(), ..*self }
+        let jacobian = (0..n * n).map(|k| self.jacobian[k % n * n + k / n]).collect();
+        Local { jacobian, noise: self.noise.clone(), ..*self }
     }
 
     /// A derivative of f along some directions in the states `[n]`, or in states and parameters `[n + k]`.
@@ -41,6 +85,14 @@ impl<'a> Local<'a> {
         let at = Batch { lanes: 1, states: self.state, parameters: Parameters::Shared(self.parameters), times: &[] };
         let mut out = vec![0.0; self.n];
         self.field.directional(at, &full, &mut out);
+        if let Some(noise) = &self.noise {
+            let largest = |d: &&[f64]| d.iter().zip(&noise.scales).fold(0.0f64, |most, (d, s)| most.max((d / s).abs()));
+            let reach = along.iter().map(largest).product::<f64>();
+            let signs = &mut *noise.signs.borrow_mut();
+            for (out, rate) in out.iter_mut().zip(&noise.rates) {
+                *out += noise.size * (out.abs() * signs.next() + rate * reach * signs.next());
+            }
+        }
         out
     }
 

@@ -26,7 +26,9 @@
 //!
 //! All are in the units of the model. The signs of a (fold, branch point) and of a and b together (Bogdanov–Takens) change with that of q; those
 //! of b (branch point), c, l₁, l₂, E and the p do not, and s, θ and δ do not depend on the length of q either. A branch point is a pitchfork where a
-//! vanishes but for rounding, by symmetry that is, and transcritical elsewhere.
+//! is zero within its error, by symmetry that is, and transcritical elsewhere.
+//!
+//! Every coefficient has an error, see `errors`. A quotient whose divisor is zero within its error is not defined and is left out.
 //!
 //! | what | file |
 //! |---|---|
@@ -34,11 +36,13 @@
 //! | motion on the centre manifold | `manifold` |
 //! | (1), (2), (3), (6), (7) | `zero` |
 //! | (4), (5), (8) | `oscillating` |
+//! | errors of all of them | `errors` |
 //!
 //! **Source.** kuznetsov2004, §5.4 (fold, Hopf), §8.7 (the others) and §8.5 (what θ and E decide); govaerts2000, §6 (branch points).
 //!
 //! **Departures.** l₂ has the factor 1/ω that l₁ has; MATCONT and BifurcationKit leave it out.
 
+mod errors;
 mod local;
 mod manifold;
 mod oscillating;
@@ -48,8 +52,10 @@ mod zero;
 
 pub use local::Local;
 
+use super::coefficients::Coefficients;
 use crate::diagram::{Kind, Point, Solution};
 use crate::problem::Setting;
+use errors::{Sample, Uncertain};
 
 /// Relative to the terms of a coefficient, what is left of them is no more than rounding.
 const ROUNDING: f64 = 1e-12;
@@ -67,27 +73,100 @@ fn frequencies(at: &Point) -> Vec<f64> {
     pairs.into_iter().map(|z| z.im).collect()
 }
 
-/// The coefficients of the normal form of a special point of that kind, in the order of [`Kind::coefficients`]; none where they are not
-/// known. Of the setting, the field, the scales of the states and the last of the free parameters count, which is that of the branch.
-pub fn coefficients(setting: &Setting, kind: Kind, at: &Point) -> Vec<f64> {
-    let Some(local) = Local::new(setting.field, at) else { return Vec::new() };
-    let frequencies = frequencies(at);
-    let first = frequencies.first().copied();
-    let found = match kind {
-        Kind::Fold => local.fold().map(|a| vec![a]),
-        Kind::BranchPoint => tangent(setting, at).and_then(|along| local.crossing(&along, setting.scales)),
-        Kind::Hopf => first.and_then(|omega| local.hopf(omega)).map(|l| vec![l]),
-        Kind::Cusp => local.cusp().map(|c| vec![c]),
-        Kind::BogdanovTakens => local.takens().map(|both| both.to_vec()),
-        Kind::GeneralisedHopf => first.and_then(|omega| local.generalised_hopf(omega)).map(|l| vec![l]),
-        Kind::ZeroHopf => first.and_then(|omega| local.zero_hopf(omega)).map(|all| all.to_vec()),
-        Kind::DoubleHopf => match frequencies[..] {
-            [a, b, ..] => local.double_hopf([a.max(b), a.min(b)]),
-            _ => None,
-        },
-        _ => None,
-    };
-    found.filter(|all| all.iter().all(|c| c.is_finite())).unwrap_or_default()
+/// Amplitude, as a share of the scales of the states, up to which the cubic term of a branch point outweighs the quadratic one where it
+/// counts as a pitchfork.
+const PITCHFORK: f64 = 1e-5;
+
+/// The coefficients of the normal form of a special point of that kind, in the order of [`Kind::coefficients`]. `error` is the bound on the
+/// error of the point. Of the setting, the field, the scales of the states and the free parameters count, the last of which is that of the branch.
+pub fn coefficients(setting: &Setting, kind: Kind, at: &Point, error: f64) -> Coefficients {
+    if kind.coefficients().is_empty() || !matches!(at.solution, Solution::Equilibrium(_)) {
+        return Coefficients::default();
+    }
+    let uncertain = Uncertain::new(setting, at, error);
+    if uncertain.lies_on_a_switch() {
+        return Coefficients::none("the equilibrium lies on a switch of the right-hand side");
+    }
+    match found(&uncertain, kind) {
+        Ok(found) if found.values.iter().all(|value| value.is_finite()) => found,
+        Ok(_) => Coefficients::none("they are not finite"),
+        Err(why) => Coefficients::none(why),
+    }
+}
+
+/// The same where nothing speaks against it, or what does.
+fn found(uncertain: &Uncertain, kind: Kind) -> Result<Coefficients, String> {
+    const RESONANCE: &str = "eigenvalues are in a resonance, or have no eigenvectors of their own";
+    let first = |sample: &Sample| frequencies(sample.point).first().copied();
+    let one = |value: Option<f64>| value.map(|value| vec![value]);
+    let measured = |formula: &dyn Fn(&Sample) -> Option<Vec<f64>>| uncertain.measured(formula);
+    let resonant = || RESONANCE.to_string();
+    if matches!(kind, Kind::Fold | Kind::Cusp | Kind::BranchPoint | Kind::ZeroHopf) {
+        let simple = measured(&|sample| one(sample.local.simplicity())).ok_or_else(resonant)?;
+        if simple.values[0].abs() <= simple.errors[0] {
+            return Err("the eigenvalue 0 is double".into());
+        }
+    }
+    match kind {
+        Kind::Fold => measured(&|sample| one(sample.local.fold())).ok_or_else(resonant),
+        Kind::Cusp => measured(&|sample| one(sample.local.cusp())).ok_or_else(resonant),
+        Kind::BranchPoint => crossing(uncertain),
+        Kind::Hopf => measured(&|sample| one(sample.local.hopf(first(sample)?))).ok_or_else(resonant),
+        Kind::GeneralisedHopf => {
+            measured(&|sample| one(sample.local.generalised_hopf(first(sample)?))).ok_or_else(resonant)
+        }
+        Kind::BogdanovTakens => {
+            let found = measured(&|sample| Some(sample.local.takens()?.to_vec()));
+            let vanishes = |(value, error): (&f64, &f64)| value.abs() <= *error;
+            let found = found.filter(|found| !found.values.iter().zip(&found.errors).all(vanishes));
+            found.ok_or("a and b are zero within their errors, by a symmetry perhaps".into())
+        }
+        Kind::ZeroHopf => {
+            let all = measured(&|sample| Some(sample.local.zero_hopf(first(sample)?)?.to_vec()));
+            divided(all.ok_or_else(resonant)?, 3, &["b", "c"])
+        }
+        Kind::DoubleHopf => {
+            let all = measured(&|sample| match frequencies(sample.point)[..] {
+                [a, b, ..] => Some(sample.local.double_hopf([a.max(b), a.min(b)])?.to_vec()),
+                _ => None,
+            });
+            let mut all = all.ok_or_else(resonant)?;
+            if [0, 3].iter().any(|k| all.values[*k].abs() <= all.errors[*k]) {
+                all.values.truncate(4);
+                all.errors.truncate(4);
+            }
+            Ok(all)
+        }
+        _ => Ok(Coefficients::default()),
+    }
+}
+
+/// The first so many of the values where none of those after them, which are divisors, is zero within its error.
+fn divided(mut all: Coefficients, count: usize, divisors: &[&str]) -> Result<Coefficients, String> {
+    let zero = |k: &usize| all.values[*k].abs() <= all.errors[*k];
+    if let Some((_, name)) = (count..).zip(divisors).find(|(k, _)| zero(k)) {
+        return Err(format!("{name} of the normal form, by which they are divided, is zero within its error"));
+    }
+    all.values.truncate(count);
+    all.errors.truncate(count);
+    Ok(all)
+}
+
+/// Those of a branch point.
+fn crossing(uncertain: &Uncertain) -> Result<Coefficients, String> {
+    const NONE: &str = "no second branch is found to cross there";
+    let setting = uncertain.setting;
+    let along = tangent(setting, uncertain.at).ok_or("the branch itself turns back there")?;
+    let quadratic = uncertain.measured(&|sample| Some(vec![sample.local.fold()?])).ok_or(NONE)?;
+    let nearly =
+        Local::new(setting.field, uncertain.at).and_then(|local| local.is_pitchfork(setting.scales, PITCHFORK));
+    let pitchfork = nearly == Some(true) || quadratic.values[0].abs() <= quadratic.errors[0];
+    let mut found = uncertain.measured(&|sample| sample.local.crossing(&along, pitchfork)).ok_or(NONE)?;
+    if pitchfork {
+        // By symmetry it is 0.
+        found.errors[0] = quadratic.errors[0];
+    }
+    Ok(found)
 }
 
 /// The tangent of a branch in states and parameters `[n + k]` for one unit of its parameter.

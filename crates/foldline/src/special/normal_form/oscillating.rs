@@ -20,13 +20,12 @@ impl Local<'_> {
         Some(Manifold::new(self, false, &[omega])?.motion(0, &[0, 0, 0, 1, 1])?.value.re / (12.0 * omega))
     }
 
-    /// p₁₁, p₁₂, p₂₁, p₂₂ of (8) for the frequencies ω₁ > ω₂, then θ and δ where neither p₁₁ nor p₂₂ vanishes.
-    pub fn double_hopf(&self, frequencies: [f64; 2]) -> Option<Vec<f64>> {
+    /// p₁₁, p₁₂, p₂₁, p₂₂, θ and δ of (8) for the frequencies ω₁ > ω₂.
+    pub fn double_hopf(&self, frequencies: [f64; 2]) -> Option<[f64; 6]> {
         let mut manifold = Manifold::new(self, false, &frequencies)?;
         let mut p = |i: usize, m: &[usize]| manifold.motion(i, m).map(real);
         let (p11, p12) = (0.5 * p(0, &[0, 0, 1])?, p(0, &[0, 2, 3])?);
         let (p21, p22) = (p(2, &[0, 1, 2])?, 0.5 * p(2, &[2, 2, 3])?);
-        let ratios = (p11 != 0.0 && p22 != 0.0).then(|| [p12 / p22, p21 / p11]);
-        Some([p11, p12, p21, p22].into_iter().chain(ratios.into_iter().flatten()).collect())
+        Some([p11, p12, p21, p22, p12 / p22, p21 / p11])
     }
 }

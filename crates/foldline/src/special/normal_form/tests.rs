@@ -209,25 +209,25 @@ fn coordinates_do_not_change_a_branch_point() {
     let model = disguised(&["0.8*p*y0 + (-1.7)*y0^2 + 2*y0^3", "-y1", "-2*y2"], &SPACE, &turns, &drift);
     let at = origin(&model);
     let local = Local::new(&model, &at).unwrap();
-    let [quadratic, b] = local.crossing(&along, &[1.0; 3]).unwrap()[..] else { panic!("it is transcritical") };
+    let [quadratic, b] = local.crossing(&along, false).unwrap()[..] else { panic!("it is transcritical") };
     near(quadratic.abs(), -a);
     near(b, 0.8);
     let [q, _] = local.null_vectors().unwrap();
     let other: Vec<f64> = (0..4).map(|i| along[i] - if i < 3 { 0.8 / quadratic * q[i] } else { 0.0 }).collect();
-    let [same, back] = local.crossing(&other, &[1.0; 3]).unwrap()[..] else { panic!("it is transcritical") };
+    let [same, back] = local.crossing(&other, false).unwrap()[..] else { panic!("it is transcritical") };
     near(same, quadratic);
     near(back, -0.8);
     // So next to the point that a tangent may be anything between both, the one that is closer counts.
     for (share, expected) in [(0.4, 0.8), (0.6, -0.8)] {
         let between: Vec<f64> = along.iter().zip(&other).map(|(a, b)| a + share * (b - a)).collect();
-        near(local.crossing(&between, &[1.0; 3]).unwrap()[1], expected);
+        near(local.crossing(&between, false).unwrap()[1], expected);
     }
     // ξ' = 0.8 μ ξ + c ξ³ with a slave that adds to c: y₁ = y₀² and 2 y₀ y₁.
     for (cubic, whole) in [("-5", -3.0), ("1.5", 3.5)] {
         let first = format!("0.8*p*y0 + ({cubic})*y0^3 + 2*y0*y1");
         let model = disguised(&[&first, "-y1 + y0^2", "-2*y2"], &[(2, 0, 0, 0.8), (2, 1, 1, 0.4)], &turns, &drift);
         let at = origin(&model);
-        let [zero, b, c] = Local::new(&model, &at).unwrap().crossing(&along, &[1.0; 3]).unwrap()[..] else {
+        let [zero, b, c] = Local::new(&model, &at).unwrap().crossing(&along, true).unwrap()[..] else {
             panic!("it is a pitchfork")
         };
         assert_eq!(zero, 0.0);

@@ -6,10 +6,6 @@ use super::manifold::Manifold;
 use super::without_rounding;
 use crate::linalg::dot;
 
-/// Amplitude, as a share of the scales of the states, up to which the cubic term of a branch point outweighs the quadratic one where it
-/// counts as a pitchfork.
-const PITCHFORK: f64 = 1e-5;
-
 impl Local<'_> {
     /// a of (1).
     pub fn fold(&self) -> Option<f64> {
@@ -21,10 +17,9 @@ impl Local<'_> {
         Some(Manifold::new(self, true, &[])?.motion(0, &[0, 0, 0])?.value.re / 6.0)
     }
 
-    /// a and b of (3), then c where it is a pitchfork: then a is 0. `along` `[n + k]`, in states and parameters, is a direction closer to the
-    /// branch than to the one that crosses it, for one unit of its parameter; `scales` `[n]` are those of the states. `None` where no branches
-    /// cross.
-    pub fn crossing(&self, along: &[f64], scales: &[f64]) -> Option<Vec<f64>> {
+    /// a and b of (3), or 0, b and c at a pitchfork. `along` `[n + k]`, in states and parameters, is a direction closer to the
+    /// branch than to the one that crosses it, for one unit of its parameter. `None` where no branches cross.
+    pub fn crossing(&self, along: &[f64], pitchfork: bool) -> Option<Vec<f64>> {
         let vectors = self.null_vectors()?;
         // A tangent that was interpolated solves the linear equations only nearly.
         let off = self.bordered(&vectors, &self.derivative(&[along]))?;
@@ -32,7 +27,7 @@ impl Local<'_> {
         let (along, [q, p]) = (&along[..], vectors);
         let size = dot(&p, &q);
         let b = dot(&p, &self.derivative(&[&q, along])) / size;
-        if self.is_pitchfork(scales, PITCHFORK)? {
+        if pitchfork {
             return Some(vec![0.0, b, self.cusp()?]);
         }
         // Next to the point both tangents and all between solve the linear equations. Those of the branches, along + t q, are the roots of
@@ -41,6 +36,11 @@ impl Local<'_> {
         let rest = 0.5 * dot(&p, &self.derivative(&[along, along])) / size;
         let square = b * b - 4.0 * a * rest;
         (square >= 0.0).then(|| vec![a, square.sqrt().copysign(b)])
+    }
+
+    /// ⟨p, q⟩ of null vectors of unit length, which vanishes where the eigenvalue 0 is double.
+    pub(super) fn simplicity(&self) -> Option<f64> {
+        self.null_vectors().map(|[q, p]| dot(&p, &q))
     }
 
     /// Whether a ξ² is less than c ξ³ as soon as ξ q is that share of the `scales` `[n]` of the states.
@@ -72,19 +72,15 @@ impl Local<'_> {
         (a != 0.0 || b != 0.0).then_some([a, b])
     }
 
-    /// s, θ and E of (6) for the frequency ω; `None` where b or c of (6) vanishes.
-    pub fn zero_hopf(&self, omega: f64) -> Option<[f64; 3]> {
+    /// s, θ and E of (6) for the frequency ω, then b and c, by which they are divided.
+    pub fn zero_hopf(&self, omega: f64) -> Option<[f64; 5]> {
         let mut manifold = Manifold::new(self, true, &[omega])?;
-        let mut g = |i: usize, m: &[usize]| manifold.motion(i, m);
-        let real = |g: super::manifold::Sized| without_rounding(&[g.value.re], &[g.size], ROUNDING);
-        let (g200, g011) = (real(g(0, &[0, 0])?), real(g(0, &[1, 2])?));
-        if g200 == 0.0 || g011 == 0.0 {
-            return None;
-        }
-        let (g300, g111) = (g(0, &[0, 0, 0])?.value.re, g(0, &[0, 1, 2])?.value.re);
-        let (h110, h210, h021) = (g(1, &[0, 1])?.value, g(1, &[0, 0, 1])?.value, g(1, &[1, 1, 2])?.value);
+        let mut g = |i: usize, m: &[usize]| manifold.motion(i, m).map(|g| g.value);
+        let (g200, g011) = (g(0, &[0, 0])?.re, g(0, &[1, 2])?.re);
+        let (g300, g111) = (g(0, &[0, 0, 0])?.re, g(0, &[0, 1, 2])?.re);
+        let (h110, h210, h021) = (g(1, &[0, 1])?, g(1, &[0, 0, 1])?, g(1, &[1, 1, 2])?);
         let time = h021.re / g011 - g300 / g200 + g111 / g011;
         let e = 0.5 * (h210 + h110 * time - h021 * g200 / (2.0 * g011)).re;
-        Some([(g200 * g011).signum(), 2.0 * h110.re / g200, e])
+        Some([(g200 * g011).signum(), 2.0 * h110.re / g200, e, 0.5 * g200, g011])
     }
 }
