@@ -5,11 +5,13 @@
 //! find what they ask for.
 
 use super::System;
+use super::choice::{Choice, is_meant, missing, summary};
 use super::diagnosis::{Seen, of_no_start};
 use super::given::from_cycle;
 use super::growth::{polished, problem_of, setting, settings};
+use super::minimal::reduced;
 use super::plan::{AttractorKey, BranchPlan, Plan, SeedPlan, SeedSource, Start};
-use crate::attractors::{self, Attractor, Candidate, Census, Lost, Sampling};
+use crate::attractors::{self, Candidate, Census, Lost, Sampling};
 use crate::continuation::corrector::{Plane, correct, parameter_row};
 use crate::continuation::{Failure, Settings};
 use crate::contract::{Event, Examination, Observer, Unobserved};
@@ -84,7 +86,7 @@ impl<'p> Seeds<'p> {
         let (index, census) = &self.censuses[number];
         census.get_or_init(|| {
             let found = census_for(self.system, self.plan, *index, self.jobs);
-            self.observer.observe(Event::Note(&self.plan.seeds[*index].name, &summary(&found)));
+            self.observer.observe(Event::Note(&self.plan.seeds[*index].name, &summary(self.system, &found)));
             found
         })
     }
@@ -98,6 +100,19 @@ impl<'p> Seeds<'p> {
         slot.get_or_init(|| self.found(seed)).clone()
     }
 
+    /// That a given cycle runs through a shorter one several times.
+    fn tell_turns(&self, name: &str, given: &Cycle, found: &Point) {
+        let Some(period) = found.solution.period() else { return };
+        let turns = (given.period / period).round();
+        if turns > 1.0 {
+            let said = format!(
+                "the given cycle of the period {:.6} runs {turns} times through one of the period {period:.6}, which is taken",
+                given.period
+            );
+            self.observer.observe(Event::Note(name, &said));
+        }
+    }
+
     fn found(&self, index: usize) -> Result<Point, String> {
         let (system, plan, seed) = (self.system, self.plan, &self.plan.seeds[index]);
         if !self.needed[index] {
@@ -106,11 +121,19 @@ impl<'p> Seeds<'p> {
         }
         system.repeats(&seed.parameters, &[])?;
         let point = match &seed.source {
-            SeedSource::Cycle(cycle) => from_cycle(system, seed, plan.tolerance, cycle)?,
+            SeedSource::Cycle(cycle) => {
+                let point = from_cycle(system, seed, plan.tolerance, cycle)?;
+                self.tell_turns(&seed.name, cycle, &point);
+                point
+            }
             SeedSource::State(state) => from_state(system, seed, plan, state, self.jobs)?,
             SeedSource::Attractor(key) => {
                 let census = self.census(self.census_of(index).ok_or("no census")?);
-                chosen(census, key).ok_or_else(|| missing(system, seed, census, key))?
+                let choice = Choice::of(system, plan.tolerance, census, key);
+                if let Some(said) = choice.told(system) {
+                    self.observer.observe(Event::Note(&seed.name, &said));
+                }
+                choice.taken().cloned().ok_or_else(|| missing(system, seed, census, key))?
             }
         };
         Ok(with_degree(point, plan.degree))
@@ -194,8 +217,8 @@ pub(super) fn sampling(system: &System, samples: usize, seed: u64, jobs: usize, 
     }
 }
 
-/// Newton's method at fixed parameters.
-fn polish(system: &System, parameters: &[f64], tolerance: f64, candidate: &Candidate) -> Option<Point> {
+/// Newton's method at fixed parameters; a cycle comes with its minimal period.
+pub(super) fn polish(system: &System, parameters: &[f64], tolerance: f64, candidate: &Candidate) -> Option<Point> {
     let settings = settings(system, tolerance, [f64::NEG_INFINITY, f64::INFINITY], 0);
     let free = 0;
     let solution = match candidate {
@@ -210,7 +233,8 @@ fn polish(system: &System, parameters: &[f64], tolerance: f64, candidate: &Candi
     };
     let guess = near(system, 4, &settings, bare(parameters, solution)).ok()?;
     let mut problem = problem_of(system, free, 4, &guess, false);
-    polished(&mut *problem, &settings, &guess).ok().map(|found| found.point)
+    let found = polished(&mut *problem, &settings, &guess).ok()?.point;
+    Some(reduced(system, &settings, &found).unwrap_or(found))
 }
 
 /// A solution near a candidate, coarsely and on its mesh as it is: a candidate that is not close to one is not worth a finer mesh.
@@ -369,71 +393,4 @@ fn from_state(system: &System, seed: &SeedPlan, plan: &Plan, state: &[f64], jobs
             Err(format!("the trajectory from the given state {what}{why}"))
         }
     })
-}
-
-/// Whether a solution is of the type that a key names.
-fn is_meant(key: &AttractorKey, point: &Point, ratio: Option<(u32, u32)>) -> bool {
-    match (key, &point.solution) {
-        (AttractorKey::Equilibrium, solution) => matches!(solution, Solution::Equilibrium(_)),
-        (AttractorKey::Cycle, solution) => matches!(solution, Solution::Cycle(_)),
-        (AttractorKey::Ratio(p, q), _) => ratio == Some((*p, *q)),
-        (AttractorKey::Lasting(periods), solution) => solution.forcing_periods() == *periods,
-    }
-}
-
-/// Of several the equilibrium of smallest norm, or the cycle reached most often.
-fn chosen(census: &Census, key: &AttractorKey) -> Option<Point> {
-    let size = |a: &&Attractor| match &a.point.solution {
-        Solution::Equilibrium(x) => crate::linalg::dot(x, x),
-        Solution::Cycle(_) => f64::INFINITY,
-    };
-    let meant = census.attractors.iter().filter(|a| is_meant(key, &a.point, a.ratio));
-    let found = match key {
-        AttractorKey::Equilibrium => meant.min_by(|a, b| size(a).total_cmp(&size(b))),
-        // They come by falling number of hits.
-        AttractorKey::Cycle | AttractorKey::Ratio(..) | AttractorKey::Lasting(_) => {
-            meant.min_by_key(|a| std::cmp::Reverse(a.hits))
-        }
-    };
-    found.map(|a| a.point.clone())
-}
-
-fn described(attractor: &Attractor) -> String {
-    let what = match (&attractor.point.solution, attractor.ratio) {
-        (Solution::Equilibrium(_), _) => "equilibrium".to_string(),
-        (Solution::Cycle(cycle), Some((p, q))) => format!("{p}:{q} cycle of period {:.6}", cycle.period),
-        (Solution::Cycle(cycle), None) => format!("cycle of period {:.6}", cycle.period),
-    };
-    format!("{what} ({})", attractor.hits)
-}
-
-pub(super) fn summary(census: &Census) -> String {
-    let mut parts: Vec<String> = census.attractors.iter().map(described).collect();
-    if census.unsettled > 0 {
-        parts.push(format!("unsettled ({})", census.unsettled));
-    }
-    if census.escaped > 0 {
-        parts.push(format!("escaped ({})", census.escaped));
-    }
-    if census.stuck > 0 {
-        parts.push(format!("stuck where steps became too small ({})", census.stuck));
-    }
-    if census.left > 0 {
-        parts.push(format!("left when that was known ({})", census.left));
-    }
-    format!("attractors (samples that went there): {}", parts.join(", "))
-}
-
-fn missing(system: &System, seed: &SeedPlan, census: &Census, key: &AttractorKey) -> String {
-    let wanted = match key {
-        AttractorKey::Equilibrium => "no stable equilibrium".to_string(),
-        AttractorKey::Cycle => "no stable cycle".to_string(),
-        AttractorKey::Ratio(p, q) => format!("no stable {p}:{q} cycle"),
-        AttractorKey::Lasting(periods) => format!("no stable cycle of {periods} periods of the forcing"),
-    };
-    let why = {
-        let all_escaped = census.attractors.is_empty() && census.unsettled == 0 && census.escaped > 0;
-        of_no_start(system, &seed.parameters, Seen { state: None, stuck: census.stuck > 0, all_escaped })
-    };
-    format!("{wanted} was found; {}{why}", summary(census))
 }
