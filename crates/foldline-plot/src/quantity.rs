@@ -23,11 +23,12 @@ pub fn axis(name: &str, model: &Model) -> Result<Quantity, String> {
     })
 }
 
-/// The free parameter of most branches; the legs of a homotopy, which only lead to them, count where there is nothing else.
+/// The free parameter of most points of branches; the legs of a homotopy, which only lead to them, count where there is nothing
+/// else.
 pub fn default_x(diagram: &Diagram) -> Quantity {
     let followed: Vec<&Branch> = diagram.branches.iter().filter(|branch| !is_leg(branch)).collect();
     let counted = if followed.is_empty() { diagram.branches.iter().collect() } else { followed };
-    let count = |free: usize| counted.iter().filter(|b| b.free == free).count();
+    let count = |free: usize| counted.iter().filter(|b| b.free == free).map(|b| b.points.len()).sum::<usize>();
     let frees = counted.iter().map(|b| b.free);
     // Of equally many the first: max_by_key would take the last.
     Quantity::Parameter(frees.rev().max_by_key(|free| count(*free)).unwrap_or(0))

@@ -108,6 +108,25 @@ fn a_branch_that_starts_with_two_forcing_periods_ends_where_its_halves_become_eq
     ends_at_both_doublings(&found[0]);
 }
 
+#[test]
+fn a_doubled_branch_ends_at_its_other_period_doubling_though_some_states_do_not_double() {
+    // An absorber tuned to half the frequency: where it moves, `a` repeats itself with the opposite sign after a period of the forcing and
+    // `b` exactly. What is left of the difference of `b` is error.
+    let model = compiled(
+        &[("w", 1.7)],
+        Some("w"),
+        &[("a", "va"), ("b", "vb"), ("va", "-0.02*va - a - 2*a*b"), ("vb", "-0.04*vb - 4*b - a^2 + 0.02*cos(w*t)")],
+    );
+    let start = seed(SeedSource::State(vec![0.0; 4]), &[1.7], 1);
+    let found = followed(&model, start, branch([1.7, 2.3], &[(Kind::PeriodDoubling, 1)]));
+    let names: Vec<&str> = found.iter().map(|branch| branch.name.as_str()).collect();
+    assert_eq!(names, ["branch", "branch/period-doubling-1"]);
+    let at: Vec<f64> = found[0].special.iter().map(|special| special.point.parameters[0]).collect();
+    let ends: Vec<Option<Ending>> = found[1].ends.to_vec();
+    let joined = |value: f64| Some(Ending::Joined { at: Kind::PeriodDoubling, parameter: value });
+    assert_eq!(ends, [joined(at[0]), joined(at[1])]);
+}
+
 /// The same cycle over `turns` periods.
 fn repeated(cycle: &Cycle, turns: usize) -> Cycle {
     let times = |k: usize| cycle.mesh[1..].iter().map(move |t| (k as f64 + t) / turns as f64);

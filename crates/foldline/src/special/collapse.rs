@@ -200,14 +200,30 @@ fn on_one_mesh(a: &Cycle, b: &Cycle) -> f64 {
 /// Inner product of the deviations of both points, relative to that of the reference.
 fn compare(reference: &Point, at: &Point, deviation: impl Fn(&[f64], usize) -> Vec<f64>) -> f64 {
     let (Solution::Cycle(a), Solution::Cycle(b)) = (&reference.solution, &at.solution) else { return 1.0 };
-    let of = |cycle: &Cycle| deviation(&cycle.uniform(SAMPLES), cycle.dim());
-    let da = of(a);
-    let other = if std::ptr::eq(a, b) { None } else { Some(of(b)) };
-    let db = other.as_ref().unwrap_or(&da);
-    // Components of very different unit must not drown each other.
     let n = a.dim();
-    let mut weight = vec![f64::MIN_POSITIVE; n];
-    da.iter().enumerate().for_each(|(k, v)| weight[k % n] += v * v);
-    let product: f64 = da.iter().zip(db).enumerate().map(|(k, (x, y))| x * y / weight[k % n]).sum();
-    product / n as f64
+    let x = a.uniform(SAMPLES);
+    let da = deviation(&x, n);
+    let other = if std::ptr::eq(a, b) { None } else { Some(deviation(&b.uniform(SAMPLES), n)) };
+    let db = other.as_ref().unwrap_or(&da);
+    // Components of very different unit must not drown each other, and one that does not deviate, as where a symmetry forbids it,
+    // counts for nothing: what is left of it is error, and of any sign.
+    let motion = motions(&x, n);
+    let weighted =
+        |other: &[f64]| -> f64 { da.iter().zip(other).enumerate().map(|(k, (x, y))| x * y / motion[k % n]).sum() };
+    weighted(db) / weighted(&da).max(f64::MIN_POSITIVE)
+}
+
+/// Mean square of the motion of each component about its mean, of `x` `[sample][n]`. One that rests has no less than what errors make
+/// of it.
+fn motions(x: &[f64], n: usize) -> Vec<f64> {
+    const REST: f64 = 1e-6;
+    let count = x.len() / n;
+    let of = |i: usize| {
+        let values = || x.iter().skip(i).step_by(n);
+        let mean = values().sum::<f64>() / count as f64;
+        let size = values().fold(0.0, |most: f64, v| most.max(v.abs()));
+        let square = values().map(|v| (v - mean) * (v - mean)).sum::<f64>() / count as f64;
+        square + (REST * size) * (REST * size) + f64::MIN_POSITIVE
+    };
+    (0..n).map(of).collect()
 }
