@@ -536,12 +536,14 @@ fn what_simulation_saw_can_be_read_by_name_and_a_file_without_it_is_read_too() {
     later
         .iter()
         .for_each(|name| connection.execute_batch(&format!("ALTER TABLE responses DROP COLUMN {name}")).unwrap());
+    drop(connection);
     let back = load(folder.path()).unwrap().diagram;
     assert!(back.responses.iter().flat_map(|set| &set.responses).all(|r| r.share.is_none() && r.jumped.is_none()));
     let (recorder, _) = Recorder::resume(folder.path(), &study()).unwrap();
     record(&diagram(), &recorder);
     recorder.finish().unwrap();
     assert_eq!(load(folder.path()).unwrap().diagram.responses, diagram().responses);
+    let connection = rusqlite::Connection::open(path_in(folder.path())).unwrap();
     connection.execute_batch("DROP TABLE responses; DROP TABLE response_sets").unwrap();
     drop(connection);
     let back = load(folder.path()).unwrap().diagram;

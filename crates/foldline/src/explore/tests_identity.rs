@@ -67,6 +67,7 @@ fn ends_at_both_doublings(branch: &Branch) {
             other => panic!("{other}"),
         })
         .collect();
+    assert_eq!(at.len(), 2);
     at.sort_by(f64::total_cmp);
     assert!(at.iter().zip(DOUBLINGS).all(|(a, b)| (a - b).abs() < 1e-6), "{at:?}");
 }
