@@ -542,7 +542,7 @@ fn what_simulation_saw_can_be_read_by_name_and_a_file_without_it_is_read_too() {
     let (recorder, _) = Recorder::resume(folder.path(), &study()).unwrap();
     record(&diagram(), &recorder);
     recorder.finish().unwrap();
-    assert_eq!(load(folder.path()).unwrap().diagram.responses, diagram().responses);
+    assert_eq!(exactly(&load(folder.path()).unwrap().diagram), exactly(&diagram()));
     let connection = rusqlite::Connection::open(path_in(folder.path())).unwrap();
     connection.execute_batch("DROP TABLE responses; DROP TABLE response_sets").unwrap();
     drop(connection);
