@@ -201,7 +201,7 @@ class Homotopy(Diagram):
 
 
 def _response(own: dict[str, Any], model: Model) -> dict[str, Any]:
-    numbers = {key: floats(own[key]) for key in ("value", "period", "settled_after", "error")}
+    numbers = {key: floats(own[key]) for key in ("value", "period", "share", "share_low", "share_high", "settled_after", "error")}
     count = len(numbers["value"])
     parameters = floats(own["parameters"]).reshape(count, -1)
     ranges = floats(own["ranges"]).reshape(count, -1, 2)
@@ -209,5 +209,6 @@ def _response(own: dict[str, Any], model: Model) -> dict[str, Any]:
     for k, name in enumerate([*model.states, *model.outputs] if count else []):
         table[f"{name}_min"], table[f"{name}_max"] = ranges[:, k, 0], ranges[:, k, 1]
     words = {key: np.array(own[key]) for key in ("motion", "multiplicity", "hits")}
+    words["jumped"] = np.array(own["jumped"], dtype=object)
     ratios = ["" if pair is None else f"{pair[0]}:{pair[1]}" for pair in own["ratio"]]
     return {**numbers, **words, "ratio": np.array(ratios), **table}

@@ -121,8 +121,10 @@ def solution(own: Solution) -> str:
 
 def attractors(found: Attractors) -> str:
     """A table of attractors."""
-    rows = "".join(f"<tr><td>{own.hits}</td><td>{escape(own._what())}</td></tr>" for own in found)
-    head = "<tr><th>hits</th><th>attractor</th></tr>"
+    shares = ["" if own.share is None else "{:.3f} [{:.3f}, {:.3f}]".format(*own.share) for own in found]
+    cells = [(str(own.hits), share, escape(own._what())) for own, share in zip(found, shares, strict=True)]
+    rows = "".join(f"<tr><td>{'</td><td>'.join(row)}</td></tr>" for row in cells)
+    head = "<tr><th>hits</th><th>share of uniform</th><th>attractor</th></tr>"
     return f"<div><table>{head}{rows}</table><p>{escape(repr(found).splitlines()[-1])}</p></div>"
 
 

@@ -159,7 +159,7 @@ class Model:
         parameters : mapping, optional
             Values that replace those of the model.
         samples : int
-            How many initial states, from the ranges of the states.
+            How many initial states, from the ranges of the states; every fourth of them is drawn towards the origin.
         seed : int
             Seed of the random numbers; the same seed gives the same table.
         tolerance : float
@@ -170,11 +170,12 @@ class Model:
         Returns
         -------
         Attractors
-            A sequence of solutions with `hits`, `ratio` and `example`.
+            A sequence of solutions with `hits`, `share`, `ratio` and `example`. `share` is that of the initial states drawn
+            uniformly from the ranges, with a confidence interval; `hits` counts those drawn towards the origin too.
         """
         counts = whole("samples", samples), whole("seed", seed, 0)
         found, lost = _native.attractors(self._native, self._values(parameters), *counts, tolerable(tolerance), processors(jobs))
-        each = [Attractor(own, self, ratio, hits, floats(example)) for own, ratio, hits, example in found]
+        each = [Attractor(own, self, ratio, hits, share, floats(example)) for own, ratio, hits, share, example in found]
         return Attractors(each, samples, *lost)
 
     def simulate(

@@ -91,7 +91,7 @@ class Solution:
 
     @property
     def ratio(self) -> tuple[int, int] | None:
-        """The ratio of the two strongest spectral lines of a whirling cycle, such as (2, 1)."""
+        """The ratio of the two strongest spectral lines of a whirling cycle, such as (2, 1); None where one outweighs all others."""
         return self._native.ratio
 
     @cached_property
@@ -219,20 +219,33 @@ class Attractor(Solution):
     Attributes
     ----------
     hits : int
-        How many initial states went there.
+        How many initial states went there. This is not a share of a basin of attraction: every fourth initial state is drawn
+        towards the origin.
+    share : tuple of three floats
+        The share of the initial states drawn uniformly from the ranges that went there, and its 95 % confidence interval
+        (Wilson).
     example : array, shape (n,)
         The first of them.
     """
 
-    def __init__(self, native: _native.Solution, model: Model, ratio: tuple[int, int] | None, hits: int, example: Floats) -> None:
+    def __init__(
+        self,
+        native: _native.Solution,
+        model: Model,
+        ratio: tuple[int, int] | None,
+        hits: int,
+        share: tuple[float, float, float] | None,
+        example: Floats,
+    ) -> None:
         super().__init__(native, model)
         self._ratio = ratio
         self.hits = hits
+        self.share = share
         self.example = example
 
     @property
     def ratio(self) -> tuple[int, int] | None:
-        """The ratio of the two strongest spectral lines of a whirling cycle, such as (2, 1)."""
+        """The ratio of the two strongest spectral lines of a whirling cycle, such as (2, 1); None where one outweighs all others."""
         return self._ratio
 
 
@@ -273,10 +286,11 @@ class Attractors(Sequence[Attractor]):
         return attractors_frame(self)
 
     def __repr__(self) -> str:
-        lines = [f"{own.hits:6d}  {own._what()}" for own in self]
+        shares = ["" if own.share is None else "{:.3f} [{:.3f}, {:.3f}]".format(*own.share) for own in self]
+        lines = [f"{own.hits:6d}  {share:>20}  {own._what()}" for own, share in zip(self, shares, strict=True)]
         stuck = f", {self.stuck} stuck" if self.stuck else ""
         lines.append(f"{self.samples} samples, {self.escaped} escaped{stuck}, {self.unsettled} not settled")
-        return "\n".join(["  hits  attractor", *lines])
+        return "\n".join([f"  hits  {'share of uniform':>20}  attractor", *lines])
 
     def _repr_html_(self) -> str:
         from ._html import attractors

@@ -145,6 +145,7 @@ def attractors_frame(found: Attractors) -> pandas.DataFrame:
     for own in found:
         extremes = {f"{name}_{side}": own[f"{name}_{side}"] for name in own.ranges for side in ("min", "max")}
         ratio = "" if own.ratio is None else f"{own.ratio[0]}:{own.ratio[1]}"
-        rows.append({"family": own.family, "ratio": ratio, "hits": own.hits, "period": own["period"], **extremes})
+        shares = dict(zip(("share", "share_low", "share_high"), own.share or (float("nan"),) * 3, strict=True))
+        rows.append({"family": own.family, "ratio": ratio, "hits": own.hits, **shares, "period": own["period"], **extremes})
     frame: pandas.DataFrame = _pandas().DataFrame(rows)
     return frame

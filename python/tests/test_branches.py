@@ -142,6 +142,9 @@ def test_tables_and_data_sets(steady, brusselator):
     assert len(cycle.to_pandas()) == len(cycle.t)
     attractors = brusselator.attractors(parameters={"B": 3}, samples=8)
     assert attractors.to_pandas()["hits"].sum() == 8
+    shares = [own.share for own in attractors]
+    assert abs(sum(share[0] for share in shares) - 1) < 1e-12, "of the six uniform samples each went somewhere"
+    assert all(0 <= low <= share <= high <= 1 for share, low, high in shares)
     assert "8 samples, 0 escaped, 0 not settled" in repr(attractors)
 
 

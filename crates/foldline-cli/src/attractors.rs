@@ -3,7 +3,8 @@
 use crate::arguments::Attractors as Typed;
 use crate::failure::{Failure, Outcome};
 use crate::run::processors;
-use foldline::attractors::Attractor;
+use foldline::attractors::{Attractor, Sampling, Sense, whirl_sense};
+use foldline::contract::VectorField;
 use foldline::diagram::Solution;
 use foldline::explore::System;
 use foldline::explore::attractors;
@@ -15,7 +16,7 @@ use std::io::{Write, stdout};
 
 const TOLERANCE: f64 = 1e-6;
 
-/// Prints the attractors of a model and how often each was reached.
+/// Prints the attractors of a model, how often each was reached, and the share of uniform initial states that went there.
 pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
     let (model, text) = read_model(&typed.model)?;
     let mut parameters: Vec<f64> = model.parameters.iter().map(|p| p.value).collect();
@@ -35,9 +36,9 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
     let mut out = stdout().lock();
     let names = model.states.iter().map(|s| &s.name).chain(model.outputs.iter().map(|o| &o.name));
     let heads: String = names.map(|name| format!("  {:>24}", format!("{name} from … to"))).collect();
-    writeln!(out, "{:<12} {:>6} {:>6} {:>14}{heads}", "attractor", "ratio", "hits", "period")?;
+    writeln!(out, "{:<14} {:>6} {:>6} {:>20} {:>14}{heads}", "attractor", "ratio", "hits", "share", "period")?;
     for attractor in &census.attractors {
-        writeln!(out, "{}", line(attractor))?;
+        writeln!(out, "{}", line(attractor, &model))?;
     }
     let samples = typed.samples;
     let stuck = if census.stuck > 0 { format!(", {} stuck", census.stuck) } else { String::new() };
@@ -46,14 +47,30 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
         exits => format!(", {} left the region in which f is defined", exits.len()),
     };
     writeln!(out, "{samples} samples, {} escaped{exits}{stuck}, {} not settled", census.escaped, census.unsettled)?;
+    let uniform = (0..samples as usize).filter(|number| Sampling::is_uniform(*number)).count();
+    writeln!(
+        out,
+        "share: of the {uniform} samples drawn uniformly from the ranges of the states, with its 95 % confidence interval; the other {} \
+         are drawn towards the origin and count as hits alone",
+        samples as usize - uniform
+    )?;
     Ok(Outcome::Done)
 }
 
-fn line(attractor: &Attractor) -> String {
+fn line(attractor: &Attractor, model: &Model) -> String {
     let point = &attractor.point;
     let (kind, period) = match &point.solution {
         Solution::Equilibrium(_) => ("equilibrium", "·".to_string()),
-        Solution::Cycle(cycle) => ("cycle", format!("{:.9}", cycle.period)),
+        Solution::Cycle(cycle) => {
+            // In an autonomous model the plane may turn with the shaft.
+            let sense = model.whirl.filter(|_| model.forced()).and_then(|whirl| whirl_sense(cycle, whirl));
+            let kind = match (attractor.ratio, sense) {
+                (None, Some(Sense::Forward)) => "forward whirl",
+                (None, Some(Sense::Backward)) => "backward whirl",
+                _ => "cycle",
+            };
+            (kind, format!("{:.9}", cycle.period))
+        }
     };
     let ratio = attractor.ratio.map_or("·".to_string(), |(a, b)| format!("{a}:{b}"));
     let range = |r: &[f64; 2]| match r[0] == r[1] {
@@ -61,7 +78,11 @@ fn line(attractor: &Attractor) -> String {
         false => format!("{:.6} … {:.6}", r[0], r[1]),
     };
     let ranges: String = point.ranges.iter().map(|r| format!("  {:>24}", range(r))).collect();
-    format!("{kind:<12} {ratio:>6} {:>6} {period:>14}{ranges}", attractor.hits)
+    let share = attractor.share.map_or("·".to_string(), |share| {
+        let [low, high] = share.interval();
+        format!("{:.3} [{low:.3}, {high:.3}]", share.value())
+    });
+    format!("{kind:<14} {ratio:>6} {:>6} {share:>20} {period:>14}{ranges}", attractor.hits)
 }
 
 /// Carries out `NAME=VALUE`.

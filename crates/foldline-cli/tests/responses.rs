@@ -83,6 +83,19 @@ fn surveys_and_sweeps_are_run_listed_and_not_repeated() {
     assert_eq!(sorted(met), expected);
     let hits: f64 = of("what attracts").map(|row| number(row, "hits")).sum();
     assert_eq!(hits, 36.0);
+    // Of twelve starts at each value nine are uniform, and each of them went somewhere.
+    for mu in ["-0.5", "-0.1", "0.4"] {
+        let own = of("what attracts").filter(|row| cell(row, "mu") == mu);
+        let shares: Vec<[f64; 3]> =
+            own.map(|row| ["share", "share_low", "share_high"].map(|name| number(row, name))).collect();
+        assert!((shares.iter().map(|share| share[0]).sum::<f64>() - 1.0).abs() < 1e-12, "{shares:?}");
+        assert!(
+            shares.iter().all(|[share, low, high]| low <= share && share <= high && high - low > 0.2),
+            "{shares:?}"
+        );
+        assert!(shares.iter().all(|[share, ..]| (9.0 * share - (9.0 * share).round()).abs() < 1e-9), "{shares:?}");
+    }
+    assert!(of("down").all(|row| cell(row, "share").is_empty()));
     for row in rows.iter().filter(|row| cell(row, "motion") == "cycle") {
         // The cycle settles until its returns agree to 1e-7, and attracts at least like e^(-0.1 t).
         assert!((number(row, "R_max") - radius(number(row, "mu"))).abs() < 1e-5, "{row:?}");

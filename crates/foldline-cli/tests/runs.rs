@@ -257,6 +257,9 @@ fn attractors_are_listed_with_their_hits() {
     let cycle = printed(desk.path(), &["attractors", "brusselator.toml", "--samples", "16", "--set", "B=3"], 0);
     // The period at A = 1, B = 3 is 7.1569199 by the classical Runge–Kutta method with step 5e-4.
     assert!(cycle.lines().any(|line| line.starts_with("cycle") && line.contains(" 7.156919")), "{cycle}");
+    // All of the twelve uniform ones: Wilson's interval begins at 12 / (12 + 1.96²).
+    assert!(cycle.contains("1.000 [0.758, 1.000]"), "{cycle}");
+    assert!(cycle.contains("share: of the 12 samples drawn uniformly"), "{cycle}");
     let again = printed(desk.path(), &["attractors", "brusselator.toml", "--samples", "16", "--set", "B=3"], 0);
     assert_eq!(cycle, again);
 }

@@ -35,6 +35,8 @@ pub fn special_layers(branch: &Branch, x: Quantity, y: Quantity, colour: &'stati
         .map(|(kind, known, places)| {
             let layer = Layer::scatter(places, Marker::of(kind), colour);
             match known {
+                // A dot has no outline: hollow it could not be seen.
+                None if kind == Kind::Mark => layer.wide(MARK).named(kind.name()),
                 None => layer.hollow().named(kind.name()),
                 Some("subcritical") => layer.named(format!("{kind}, subcritical")),
                 Some(known) => layer.hollow().named(format!("{kind}, {known}")),
@@ -64,6 +66,9 @@ pub fn diagram_layers(diagram: &Diagram, x: Quantity, y: Quantity) -> Vec<Layer>
     curves.sort_by_key(|layer| layer.name.as_deref() == Some(LIGHTER));
     curves.into_iter().chain(specials).collect()
 }
+
+/// Width of a mark that was asked for: smaller than a special point, larger than the curve is wide.
+const MARK: f64 = 2.6;
 
 /// What the legend calls branches that come from a special point of another.
 const LIGHTER: &str = "branching off";

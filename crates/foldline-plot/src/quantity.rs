@@ -23,12 +23,20 @@ pub fn axis(name: &str, model: &Model) -> Result<Quantity, String> {
     })
 }
 
-/// The free parameter of most branches.
+/// The free parameter of most points of branches; the legs of a homotopy, which only lead to them, count where there is nothing
+/// else.
 pub fn default_x(diagram: &Diagram) -> Quantity {
-    let count = |free: usize| diagram.branches.iter().filter(|b: &&Branch| b.free == free).count();
-    let frees = diagram.branches.iter().map(|b| b.free);
+    let followed: Vec<&Branch> = diagram.branches.iter().filter(|branch| !is_leg(branch)).collect();
+    let counted = if followed.is_empty() { diagram.branches.iter().collect() } else { followed };
+    let count = |free: usize| counted.iter().filter(|b| b.free == free).map(|b| b.points.len()).sum::<usize>();
+    let frees = counted.iter().map(|b| b.free);
     // Of equally many the first: max_by_key would take the last.
     Quantity::Parameter(frees.rev().max_by_key(|free| count(*free)).unwrap_or(0))
+}
+
+/// Whether a branch is a leg of a homotopy: the third one of `NAME` is called `NAME/3`.
+fn is_leg(branch: &Branch) -> bool {
+    branch.name.rsplit_once('/').is_some_and(|(_, number)| number.parse::<usize>().is_ok())
 }
 
 /// The largest value of the first output, or of the first state where there is no output.

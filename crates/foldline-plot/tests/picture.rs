@@ -4,6 +4,7 @@ use foldline::diagram::{
     Branch, Cost, Cycle, Diagram, Ending, Family, Kind, Origin, Point, Solution, SpecialPoint, Trust,
 };
 use foldline::model::Model;
+use foldline_plot::quantity::default_x;
 use foldline_plot::{Picture, Quantity, curve, pdf, png, svg};
 use foldline_store::model_file::parse_model;
 
@@ -180,4 +181,35 @@ fn a_window_holds_every_coordinate_and_an_empty_diagram_has_axes() {
     }
     let empty = svg(&Diagram::default(), &model(), &Picture::default());
     assert!(png(&empty, 1.0).is_ok());
+}
+
+#[test]
+fn a_mark_that_was_asked_for_can_be_seen_in_the_diagram_and_in_the_legend() {
+    let mut branch = peak("curve", 1.0);
+    let special = point(50, 3.5, 1.2, 0, false);
+    branch.insert_special(SpecialPoint {
+        kind: Kind::Mark,
+        point: special,
+        unstable_before: 0,
+        unstable_after: 0,
+        error: 1e-9,
+        coefficients: Vec::new(),
+    });
+    let diagram = Diagram { branches: vec![branch], ..Diagram::default() };
+    let drawn = svg(&diagram, &model(), &Picture::default());
+    // A dot has no outline; white on white would be nothing.
+    let dots: Vec<&str> = drawn.lines().filter(|line| line.contains("stroke=\"none\"/></g>")).collect();
+    assert_eq!(dots.len(), 2, "in the diagram and in the legend");
+    assert!(dots.iter().all(|dot| !dot.contains("fill=\"#fff\"")), "{dots:?}");
+    assert!(drawn.contains(">mark<"));
+}
+
+#[test]
+fn the_legs_of_a_homotopy_do_not_decide_what_the_axis_shows() {
+    let mut legs: Vec<Branch> = ["way/1", "way/2", "way/10"].map(|name| peak(name, 1.0)).to_vec();
+    legs.iter_mut().for_each(|leg| leg.free = 7);
+    let only = Diagram { branches: legs.clone(), ..Diagram::default() };
+    assert_eq!(default_x(&only), Quantity::Parameter(7));
+    legs.push(peak("resonance", 1.0));
+    assert_eq!(default_x(&Diagram { branches: legs, ..Diagram::default() }), Quantity::Parameter(0));
 }

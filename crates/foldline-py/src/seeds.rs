@@ -37,10 +37,11 @@ pub fn settle(
     found.map(|point| Solution::new(point, &model.model)).map_err(|why| failure::no_solution(py, why))
 }
 
-type Found<'py> = (Solution, Option<(u32, u32)>, usize, Bound<'py, PyBytes>);
+/// A solution, its ratio, how many samples went there, the share of the uniform ones with its interval, and the first sample.
+type Found<'py> = (Solution, Option<(u32, u32)>, usize, Option<(f64, f64, f64)>, Bound<'py, PyBytes>);
 
-/// The attractors that sampled states reach, each with its ratio, how many went there and the first state that did; then how
-/// many escaped (out of the region in which f is defined, too), got stuck, and had not settled.
+/// The attractors that sampled states reach, each with its ratio, how many went there, the share of the uniform ones and the first state that did;
+/// then how many escaped (out of the region in which f is defined, too), got stuck, and had not settled.
 #[pyfunction]
 pub fn attractors<'py>(
     py: Python<'py>,
@@ -58,7 +59,8 @@ pub fn attractors<'py>(
     })?;
     let found = census.attractors.into_iter().map(|attractor| {
         let example = numbers(py, attractor.example.iter().copied())?;
-        Ok((Solution::new(attractor.point, &model.model), attractor.ratio, attractor.hits, example))
+        let share = attractor.share.map(|share| (share.value(), share.interval()[0], share.interval()[1]));
+        Ok((Solution::new(attractor.point, &model.model), attractor.ratio, attractor.hits, share, example))
     });
     let escaped = census.escaped + census.exits.len();
     Ok((found.collect::<PyResult<_>>()?, (escaped, census.stuck, census.unsettled)))

@@ -217,7 +217,8 @@ impl Context<'_> {
 
     /// Where a trajectory settles.
     fn settled(&self, parameters: &[f64], value: f64, start: &[f64]) -> Option<Response> {
-        stepped_sweep(&self.trial, parameters, self.free, &[value], start, &|_| Verdict::Continue).pop()
+        stepped_sweep(&self.trial, parameters, self.free, &[value], start, &mut |_, _| None, &|_| Verdict::Continue)
+            .pop()
     }
 
     fn seen(&self, known: &Known, at: &Response, met: &[Met]) -> Seen {

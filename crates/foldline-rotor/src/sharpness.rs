@@ -163,5 +163,5 @@ fn settled(law: ContactLaw, constants: &Nondimensional, sharpness: f64, start: &
     let field = OverhungRotor { law };
     let trial = Trial { field: &field, scales: &SCALES, whirl: Some([0, 1]), jobs: 1 };
     let parameters = constants.parameters();
-    stepped_sweep(&trial, &parameters, SHARPNESS, &[sharpness], start, &|_| Verdict::Continue).pop()
+    stepped_sweep(&trial, &parameters, SHARPNESS, &[sharpness], start, &mut |_, _| None, &|_| Verdict::Continue).pop()
 }

@@ -58,7 +58,10 @@ fn a_sweep_down_doubles_and_falls_off_where_the_branch_does() {
         survey_by_simulation(&trial(&field, 2), &sampling(20), &reference(1.0), OMEGA, &[4.5], &|_| Verdict::Continue);
     let start = of_ratio(&found, Some((3, 1))).state.clone();
     let values: Vec<f64> = (0..8).map(|k| 4.5 - 0.05 * k as f64).collect();
-    let responses = stepped_sweep(&trial(&field, 1), &reference(1.0), OMEGA, &values, &start, &|_| Verdict::Continue);
+    let responses =
+        stepped_sweep(&trial(&field, 1), &reference(1.0), OMEGA, &values, &start, &mut |_, _| None, &|_| {
+            Verdict::Continue
+        });
     let seen: Vec<(Motion, u32)> = responses.iter().map(|r| (r.motion, r.multiplicity)).collect();
     // The double loop has a period doubling between 4.25 and 4.3; below 4.2 nothing near it attracts.
     // At 4.2 the doubled cycle attracts, but a step of 0.05 may or may not lead out of its basin.
@@ -76,7 +79,9 @@ fn what_is_neither_at_rest_nor_periodic_is_said_to_be_other() {
     let field = OverhungRotor::default();
     let parameters = Nondimensional { zeta: 0.0, ..Nondimensional::REFERENCE }.parameters();
     let found =
-        stepped_sweep(&trial(&field, 1), &parameters, OMEGA, &[5.0], &[0.5, 0.3, 0.2, 0.1], &|_| Verdict::Continue);
+        stepped_sweep(&trial(&field, 1), &parameters, OMEGA, &[5.0], &[0.5, 0.3, 0.2, 0.1], &mut |_, _| None, &|_| {
+            Verdict::Continue
+        });
     assert_eq!(found[0].motion, Motion::Other);
     let [low, high] = found[0].ranges[RADIUS];
     assert!(low < 0.6 && high > 3.0 && high < 4.0, "{low} {high}");

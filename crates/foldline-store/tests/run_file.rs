@@ -2,8 +2,8 @@
 
 use foldline::contract::{Event, Observer, Verdict};
 use foldline::diagram::{
-    Branch, Cost, Cycle, Diagram, Ending, Family, Kind, Motion, Origin, Point, Response, Responses, Search, Solution,
-    SpecialPoint, Trust,
+    Branch, Cost, Cycle, Diagram, Ending, Family, Kind, Motion, Origin, Point, Response, Responses, Search, Share,
+    Solution, SpecialPoint, Trust,
 };
 use foldline_store::run_file::{Part, Recorder, RunFileError, load, load_part, path_in};
 use foldline_store::study_file::{Study, parse_study};
@@ -115,6 +115,8 @@ fn diagram() -> Diagram {
             vec![[awkward(1), awkward(5)], [awkward(0), awkward(2)]]
         },
         hits: 7,
+        share: Some(Share { hits: 5, of: 9 }),
+        jumped: Some(true),
         state: vec![awkward(4)],
         settled_after: awkward(5),
         error: awkward(0),
@@ -565,7 +567,19 @@ fn what_simulation_saw_can_be_read_by_name_and_a_file_without_it_is_read_too() {
         })
         .unwrap();
     assert_eq!(row, (4, 1.0 / 3.0, 1.0 / 3.0, 2));
-    // As an earlier program left it.
+    // As earlier programs left it: without the columns that came later, then without the tables.
+    let later = ["uniform_hits", "uniform_starts", "jumped"];
+    later
+        .iter()
+        .for_each(|name| connection.execute_batch(&format!("ALTER TABLE responses DROP COLUMN {name}")).unwrap());
+    drop(connection);
+    let back = load(folder.path()).unwrap().diagram;
+    assert!(back.responses.iter().flat_map(|set| &set.responses).all(|r| r.share.is_none() && r.jumped.is_none()));
+    let (recorder, _) = Recorder::resume(folder.path(), &study()).unwrap();
+    record(&diagram(), &recorder);
+    recorder.finish().unwrap();
+    assert_eq!(exactly(&load(folder.path()).unwrap().diagram), exactly(&diagram()));
+    let connection = rusqlite::Connection::open(path_in(folder.path())).unwrap();
     connection.execute_batch("DROP TABLE responses; DROP TABLE response_sets").unwrap();
     drop(connection);
     let back = load(folder.path()).unwrap().diagram;

@@ -1,11 +1,12 @@
 //! The tables of what surveys and sweeps saw.
 
 use super::{Cell, Column, Style, Table};
-use foldline::diagram::{Diagram, Motion, Response, Responses};
+use foldline::diagram::{Diagram, Motion, Response, Responses, Search};
 use foldline::model::Model;
 
 /// One row for each response: set, search, every parameter, motion, ratio, multiplicity, period, the extremes of the outputs,
-/// hits, time until settled, error, and whether a sweep jumped there.
+/// hits, the share of the uniform starts of a survey with its 95 % confidence interval, time until settled, error, and whether a
+/// sweep jumped there.
 pub fn responses(diagram: &Diagram, model: &Model) -> Table {
     let mut columns = words(&["set", "search"]);
     columns.extend(model.parameters.iter().map(|p| column(&p.name, Style::Varying)));
@@ -13,9 +14,10 @@ pub fn responses(diagram: &Diagram, model: &Model) -> Table {
     columns.extend([column("multiplicity", Style::Number), column("period", Style::Number)]);
     let extremes = |name: &str| [format!("{name}_min"), format!("{name}_max")];
     columns.extend(model.outputs.iter().flat_map(|o| extremes(&o.name)).map(|name| column(&name, Style::Number)));
-    columns.extend([column("hits", Style::Number), column("settled_after", Style::Size)]);
+    columns.extend(["hits", "share", "share_low", "share_high"].map(|name| column(name, Style::Number)));
+    columns.push(column("settled_after", Style::Size));
     columns.extend([column("error", Style::Size), column("jump", Style::Word)]);
-    let row = |set: &Responses, response: &Response, jumped: bool| {
+    let row = |set: &Responses, response: &Response, jump: &str| {
         let mut row = vec![Cell::Word(set.name.clone()), Cell::Word(set.search.name().into())];
         let parameter = |k: usize| response.parameters.get(k).map_or(Cell::Empty, |v| Cell::Number(*v));
         row.extend((0..model.parameters.len()).map(parameter));
@@ -27,14 +29,23 @@ pub fn responses(diagram: &Diagram, model: &Model) -> Table {
         let range = |k: usize| response.ranges.get(k).map_or([Cell::Empty, Cell::Empty], |r| r.map(Cell::Number));
         row.extend((n..n + model.outputs.len()).flat_map(range));
         row.push(count(response.hits));
+        let share = response.share.filter(|share| share.of > 0).map(|share| (share.value(), share.interval()));
+        row.extend(share.map_or([Cell::Empty, Cell::Empty, Cell::Empty], |(value, [low, high])| {
+            [value, low, high].map(Cell::Number)
+        }));
         row.push(Cell::Number(response.settled_after));
         row.push(if response.error.is_nan() { Cell::Empty } else { Cell::Number(response.error) });
-        row.push(Cell::Word(if jumped { "jump".into() } else { String::new() }));
+        row.push(Cell::Word(jump.into()));
         row
     };
     let rows = diagram.responses.iter().flat_map(|set| {
         let jumps = jumps(set);
-        set.responses.iter().enumerate().map(move |(k, r)| row(set, r, jumps.contains(&k))).collect::<Vec<_>>()
+        let word = move |k: usize, r: &Response| match (jumps.contains(&k), r.jumped) {
+            (true, _) => "jump",
+            (false, None) if k > 0 && set.search == Search::Sweep => "unknown",
+            _ => "",
+        };
+        set.responses.iter().enumerate().map(move |(k, r)| row(set, r, word(k, r))).collect::<Vec<_>>()
     });
     Table { columns, rows: rows.collect() }
 }
@@ -63,7 +74,7 @@ pub fn summary(diagram: &Diagram, model: &Model) -> Table {
 /// A survey starts anew at every value and does not jump.
 fn jumps(set: &Responses) -> Vec<usize> {
     const FACTOR: f64 = 10.0;
-    if set.search == foldline::diagram::Search::Sweep { set.jumps(FACTOR) } else { Vec::new() }
+    if set.search == Search::Sweep { set.jumps(FACTOR) } else { Vec::new() }
 }
 
 fn words(names: &[&str]) -> Vec<Column> {

@@ -73,6 +73,7 @@ pub(super) fn special_cells(special: &SpecialPoint) -> Vec<Cell> {
 pub(super) fn response_cells(response: &Response, model: &Model) -> Vec<Cell> {
     let (n, outputs) = (model.states.len(), model.outputs.len());
     let (first, second) = response.ratio.unwrap_or((0, 0));
+    let known = |value: Option<usize>| value.map_or(Cell::Integer(-1), count);
     let mut out = vec![
         Cell::Text(response.motion.name().into()),
         Cell::Real(response.value),
@@ -81,6 +82,9 @@ pub(super) fn response_cells(response: &Response, model: &Model) -> Vec<Cell> {
         Cell::Integer(second.into()),
         Cell::Integer(response.multiplicity.into()),
         count(response.hits),
+        known(response.share.map(|share| share.hits)),
+        known(response.share.map(|share| share.of)),
+        known(response.jumped.map(usize::from)),
         Cell::Real(response.settled_after),
         Cell::Real(response.error),
     ];

@@ -1,18 +1,18 @@
 //! What surveys and sweeps saw, as rows, and back.
 //!
-//! **Idea.** A set is written when it is complete, in one transaction. Files of earlier programs lack the tables; they are made
-//! when such a run goes on, and a reader that finds none reads no responses.
+//! **Idea.** A set is written when it is complete, in one transaction. Files of earlier programs lack the tables, or columns that
+//! came later; they are made when such a run goes on, and a reader that finds none reads no responses, or empty columns.
 
 use super::RunFileError;
 use super::bytes::{pack, pack_pairs, unpack, unpack_pairs};
 use super::schema::{Columns, quoted};
-use foldline::diagram::{Motion, Response, Responses, Search};
+use foldline::diagram::{Motion, Response, Responses, Search, Share};
 use foldline::model::Model;
 use rusqlite::types::Value;
 use rusqlite::{Connection, Row, params, params_from_iter};
 use std::path::Path;
 
-const FIRST: [&str; 12] = [
+const FIRST: [&str; 15] = [
     "response_set",
     "number",
     "value",
@@ -24,16 +24,31 @@ const FIRST: [&str; 12] = [
     "hits",
     "settled_after",
     "error",
+    "uniform_hits",
+    "uniform_starts",
+    "jumped",
     "rowid",
 ];
+/// Columns that came later, all of them integers or empty.
+const LATER: [&str; 3] = ["uniform_hits", "uniform_starts", "jumped"];
 const LAST: [&str; 4] = ["parameter_bytes", "state_bytes", "range_bytes", "scalar_bytes"];
 
 fn columns(model: &Model) -> Columns {
     Columns::beside(model, &FIRST.into_iter().chain(LAST).collect::<Vec<_>>())
 }
 
-/// The statements that make the tables where they are missing.
-pub(super) fn create(model: &Model) -> String {
+/// Makes the tables, and the columns that came later, where they are missing.
+pub(super) fn create(connection: &Connection, model: &Model) -> rusqlite::Result<()> {
+    connection.execute_batch(&tables(model))?;
+    let mut statement = connection.prepare("SELECT name FROM pragma_table_info('responses')")?;
+    let known: Vec<String> = statement.query_map([], |row| row.get(0))?.collect::<Result<_, _>>()?;
+    LATER
+        .iter()
+        .filter(|name| !known.iter().any(|own| own == *name))
+        .try_for_each(|name| connection.execute_batch(&format!("ALTER TABLE responses ADD COLUMN {name} INTEGER")))
+}
+
+fn tables(model: &Model) -> String {
     let shown: String = columns(model).names().map(|name| format!("{} REAL, ", quoted(name))).collect();
     format!(
         "CREATE TABLE IF NOT EXISTS response_sets (response_set INTEGER PRIMARY KEY, name TEXT NOT NULL UNIQUE,
@@ -41,6 +56,7 @@ pub(super) fn create(model: &Model) -> String {
          CREATE TABLE IF NOT EXISTS responses (response_set INTEGER NOT NULL REFERENCES response_sets,
              number INTEGER NOT NULL, value REAL, motion TEXT NOT NULL, period REAL, ratio_first INTEGER,
              ratio_second INTEGER, multiplicity INTEGER NOT NULL, hits INTEGER NOT NULL, settled_after REAL, error REAL,
+             uniform_hits INTEGER, uniform_starts INTEGER, jumped INTEGER,
              {shown}
              parameter_bytes BLOB NOT NULL, state_bytes BLOB NOT NULL, range_bytes BLOB NOT NULL,
              scalar_bytes BLOB NOT NULL, PRIMARY KEY (response_set, number));"
@@ -80,6 +96,8 @@ pub(super) fn write(connection: &mut Connection, sql: &str, set: &Responses, sho
 fn values_of(response: &Response, shown: usize) -> Vec<Value> {
     let (first, second) = response.ratio.unzip();
     let integer = |value: Option<u32>| value.map_or(Value::Null, |v| Value::Integer(v.into()));
+    let whole =
+        |value: Option<usize>| value.map_or(Value::Null, |v| Value::Integer(i64::try_from(v).unwrap_or(i64::MAX)));
     let mut values = vec![
         Value::Real(response.value),
         Value::Text(response.motion.name().to_string()),
@@ -87,9 +105,12 @@ fn values_of(response: &Response, shown: usize) -> Vec<Value> {
         integer(first),
         integer(second),
         integer(Some(response.multiplicity)),
-        Value::Integer(i64::try_from(response.hits).unwrap_or(i64::MAX)),
+        whole(Some(response.hits)),
         Value::Real(response.settled_after),
         Value::Real(response.error),
+        whole(response.share.map(|share| share.hits)),
+        whole(response.share.map(|share| share.of)),
+        whole(response.jumped.map(usize::from)),
     ];
     let numbers = response.parameters.iter().chain(response.ranges.as_flattened()).map(|v| Value::Real(*v));
     values.extend(numbers.chain(std::iter::repeat(Value::Null)).take(shown));
@@ -146,6 +167,13 @@ fn response_in(row: &Row) -> Result<Response, String> {
     let numbers =
         |name: &str| unpack(&blob(name)?).ok_or_else(|| format!("{name} has a length that is no multiple of 8"));
     let count = |name: &str| row.get::<_, Option<u32>>(name).map_err(|e| e.to_string());
+    // Columns that came later may be missing.
+    let later = |name: &str| match row.get::<_, Option<i64>>(name) {
+        Err(rusqlite::Error::InvalidColumnName(_)) => Ok(None),
+        Err(error) => Err(error.to_string()),
+        Ok(value) => value.map(|v| usize::try_from(v).map_err(|_| format!("{name} is no count"))).transpose(),
+    };
+    let share = later("uniform_hits")?.zip(later("uniform_starts")?).map(|(hits, of)| Share { hits, of });
     let motion: String = row.get("motion").map_err(|e| e.to_string())?;
     let [value, period, settled_after, error] = numbers("scalar_bytes")?[..] else {
         return Err("scalar_bytes of a response does not have four numbers".to_string());
@@ -161,6 +189,8 @@ fn response_in(row: &Row) -> Result<Response, String> {
         multiplicity: count("multiplicity")?.unwrap_or(1),
         ranges: unpack_pairs(&blob("range_bytes")?).ok_or("range_bytes is no list of pairs")?,
         hits: row.get::<_, i64>("hits").ok().and_then(|n| usize::try_from(n).ok()).ok_or("hits is no count")?,
+        share,
+        jumped: later("jumped")?.map(|jumped| jumped != 0),
         state: numbers("state_bytes")?,
         settled_after,
         error,

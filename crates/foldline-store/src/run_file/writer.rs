@@ -212,7 +212,7 @@ impl Recorder {
             rows.collect::<Result<HashMap<String, i64>, _>>().map_err(failed)?
         };
         let columns = Columns::new(&study.model);
-        connection.execute_batch(&responses::create(&study.model)).map_err(failed)?;
+        responses::create(&connection, &study.model).map_err(failed)?;
         let special = [
             "branch",
             "kind",

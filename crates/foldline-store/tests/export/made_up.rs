@@ -3,7 +3,7 @@
 
 use foldline::contract::{Event, Observer, Verdict};
 use foldline::diagram::{
-    Branch, Cost, Cycle, Ending, Family, Kind, Motion, Origin, Point, Response, Responses, Search, Solution,
+    Branch, Cost, Cycle, Ending, Family, Kind, Motion, Origin, Point, Response, Responses, Search, Share, Solution,
     SpecialPoint, Trust,
 };
 use foldline_store::run_file::Recorder;
@@ -102,6 +102,8 @@ pub fn record(folder: &Path) {
         multiplicity: 1,
         ranges: Vec::new(),
         hits: 7,
+        share: Some(Share { hits: 5, of: 9 }),
+        jumped: Some(true),
         state: vec![awkward(4), awkward(6)],
         settled_after: awkward(5),
         error: awkward(0),

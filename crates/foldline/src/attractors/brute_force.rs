@@ -6,9 +6,9 @@
 
 use super::measure::response;
 use super::settling::{First, Settled, Trial, settle_together};
-use super::{Sampling, driven};
+use super::{Candidate, Sampling, driven};
 use crate::contract::Verdict;
-use crate::diagram::{Motion, Response};
+use crate::diagram::{Motion, Response, Share};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
@@ -19,6 +19,10 @@ const SAME: f64 = 1e-4;
 
 /// Receives the responses at one value as soon as they are known.
 pub type Report<'a> = &'a (dyn Fn(&[Response]) -> Verdict + Sync);
+
+/// Says whether a motion of a sweep, at the parameter values `[k]`, is another solution than the one before; `None` where
+/// that is not known, as with a motion that is neither at rest nor periodic, for which there is no candidate.
+pub type Compare<'a> = &'a mut dyn FnMut(&[f64], Option<&Candidate>) -> Option<bool>;
 
 /// The motions at every one of `values` of the parameter `free`, the others as in `parameters` `[k]`, from the starts of
 /// `sampling`. Values are reported in the order in which they are finished and returned in their own order; of one value the
@@ -51,7 +55,12 @@ pub fn survey_by_simulation(
                 .chunks((BLOCK * n).max(1))
                 .flat_map(|block| settle_together(trial, &own.repeat(block.len() / n), block, First::Rough))
                 .collect();
-            let found = grouped(trial, settled.iter().map(|settled| response(trial, &own, free, settled)).collect());
+            let of = sampling.uniform();
+            let counted = |(number, settled): (usize, &Settled)| Response {
+                share: (of > 0).then_some(Share { hits: Sampling::is_uniform(number).into(), of }),
+                ..response(trial, &own, free, settled).0
+            };
+            let found = grouped(trial, settled.iter().enumerate().map(counted).collect());
             if report(&found) == Verdict::Stop {
                 stop.store(true, Ordering::Relaxed);
             }
@@ -73,6 +82,9 @@ fn grouped(trial: &Trial, all: Vec<Response>) -> Vec<Response> {
         match found.iter_mut().find(|known| agree(trial, known, &response)) {
             Some(known) => {
                 known.hits += 1;
+                if let (Some(known), Some(own)) = (&mut known.share, response.share) {
+                    known.hits += own.hits;
+                }
                 known.settled_after = known.settled_after.max(response.settled_after);
                 // Of a motion without a period each stretch sees a part.
                 if known.motion == Motion::Other {
@@ -110,18 +122,23 @@ fn agree(trial: &Trial, a: &Response, b: &Response) -> bool {
 
 /// A stepped sweep: the motion to which the trajectory from `start` `[n]` settles at the first of `values`, then at each next
 /// value the one to which it settles from its last state. It ends early with a motion that escaped, or where a report says stop.
+/// `compare` tells jumps from steep slopes.
 pub fn stepped_sweep(
     trial: &Trial,
     parameters: &[f64],
     free: usize,
     values: &[f64],
     start: &[f64],
+    compare: Compare,
     report: Report,
 ) -> Vec<Response> {
     if trial.field.forced() {
-        let start = [start, &[1.0, 0.0]].concat();
+        let (start, n) = ([start, &[1.0, 0.0]].concat(), trial.field.dim());
+        let mut compare = |own: &[f64], candidate: Option<&Candidate>| {
+            compare(own, candidate.and_then(|candidate| driven::without_circle(candidate, n)).as_ref())
+        };
         return driven::simulate(trial, report, |trial, report| {
-            stepped_sweep(trial, parameters, free, values, &start, report)
+            stepped_sweep(trial, parameters, free, values, &start, &mut compare, report)
         });
     }
     let mut found: Vec<Response> = Vec::new();
@@ -129,7 +146,8 @@ pub fn stepped_sweep(
     for &value in values {
         own[free] = value;
         let Some(settled) = settle_together(trial, &own, &state, First::Accurate).pop() else { break };
-        let response = response(trial, &own, free, &settled);
+        let (mut response, candidate) = response(trial, &own, free, &settled);
+        response.jumped = compare(&own, candidate.as_ref());
         state.clone_from(&response.state);
         let stopped = report(std::slice::from_ref(&response)) == Verdict::Stop;
         let over = stopped || response.motion == Motion::Escaped;

@@ -1,13 +1,12 @@
 //! From a prediction to a solution.
 //!
 //! **Idea.** A predicted limit of the returns is followed for one period; where it comes back to itself much better than the
-//! trajectory does, the loop is handed to Newton's method, and so is a single turn of what that yields if it repeats itself.
+//! trajectory does, the loop is handed to Newton's method.
 
 use super::orbit::Orbit;
-use super::returns::{MOST_CROSSINGS, Prediction, Returns};
+use super::returns::{Prediction, Returns};
 use super::{Candidate, Polish, Sampling};
 use crate::contract::{Batch, Parameters, VectorField, Verdict};
-use crate::diagram::{Cycle, Solution};
 use crate::simulation::{Integrator, Passage, Step, Tolerance};
 
 /// Steps after which a predicted limit is given up.
@@ -48,15 +47,8 @@ impl Context<'_> {
 
     /// A stable solution near the candidate, as an orbit.
     pub(super) fn polished(&self, candidate: &Candidate) -> Option<Orbit> {
-        let polished = |candidate: &Candidate| (self.polish)(candidate).filter(|point| point.unstable == 0);
-        let point = polished(candidate)?;
-        let once = match &point.solution {
-            Solution::Cycle(cycle) => {
-                primitive(cycle, &self.sampling.scales).and_then(|candidate| polished(&candidate))
-            }
-            Solution::Equilibrium(_) => None,
-        };
-        Some(Orbit::new(once.unwrap_or(point), &self.sampling.scales, self.sampling.whirl))
+        let point = (self.polish)(candidate).filter(|point| point.unstable == 0)?;
+        Some(Orbit::new(point, &self.sampling.scales, self.sampling.whirl))
     }
 
     /// The trajectory from a state over that time: times and states `[time][n]` of its samples. `each` sees every step and
@@ -123,66 +115,4 @@ fn extents(states: &[f64], n: usize) -> Vec<f64> {
         high - low
     };
     (0..n).map(extent).collect()
-}
-
-/// One turn of a cycle that runs several times around nearly the same loop, as a candidate: the cycle may be another one
-/// several times over, or have just doubled its period.
-fn primitive(cycle: &Cycle, scales: &[f64]) -> Option<Candidate> {
-    const COUNT: usize = 240;
-    const PROBES: usize = 24;
-    let n = cycle.dim();
-    let states = cycle.uniform(COUNT);
-    // A component that hardly moves is compared to a part of its size: what it does move is the error of the solution.
-    let size = |i: usize| states.iter().skip(i).step_by(n).fold(0.0, |m: f64, x| m.max(x.abs()));
-    let extent: Vec<f64> =
-        extents(&states, n).iter().enumerate().map(|(i, e)| e.max(0.01 * size(i)).max(1e-6 * scales[i])).collect();
-    let repeats = |turns: usize| {
-        (0..PROBES).map(|k| k as f64 / PROBES as f64).all(|t| {
-            let (here, there) = (cycle.state(t), cycle.state(t + 1.0 / turns as f64));
-            (0..n).all(|i| (here[i] - there[i]).abs() <= 0.01 * extent[i])
-        })
-    };
-    let turns = (2..=MOST_CROSSINGS).rev().find(|&turns| repeats(turns))?;
-    let period = cycle.period / turns as f64;
-    let times = (0..=COUNT).map(|k| period * k as f64 / COUNT as f64).collect();
-    let states = (0..=COUNT).flat_map(|k| cycle.state(k as f64 / (COUNT * turns) as f64)).collect();
-    Some(Candidate::Cycle { period, times, states })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::problem::gauss::Scheme;
-
-    /// The ellipse (cos τ, 2 sin τ), run through `turns` times in time 6, the turns differing by `difference`.
-    fn ellipse(turns: usize, difference: f64) -> Cycle {
-        let intervals = 20 * turns;
-        let mut profile = Vec::new();
-        for j in 0..intervals {
-            for c in &Scheme::new(4).nodes {
-                let t = (j as f64 + c) / intervals as f64;
-                let (slow, fast) = (std::f64::consts::TAU * t, std::f64::consts::TAU * t * turns as f64);
-                profile.extend([fast.cos() + difference * slow.cos(), 2.0 * fast.sin()]);
-            }
-        }
-        let mesh: Vec<f64> = (0..=intervals).map(|j| j as f64 / intervals as f64).collect();
-        Cycle { period: 6.0, forcing_periods: 0, mesh: mesh.into(), degree: 4, profile }
-    }
-
-    #[test]
-    fn a_cycle_run_through_several_times_is_reduced_to_one_turn() {
-        for turns in [2, 3, 7] {
-            let Some(Candidate::Cycle { period, times, states }) = primitive(&ellipse(turns, 0.0), &[1.0; 2]) else {
-                panic!("{turns} turns not seen")
-            };
-            assert_eq!((period, times.last()), (6.0 / turns as f64, Some(&period)));
-            // Degree 4 on 20 intervals: 1e-6.
-            for (t, x) in times.iter().zip(states.chunks(2)) {
-                let angle = std::f64::consts::TAU * t / period;
-                assert!((x[0] - angle.cos()).abs() < 1e-5 && (x[1] - 2.0 * angle.sin()).abs() < 1e-5);
-            }
-        }
-        assert!(primitive(&ellipse(1, 0.0), &[1.0; 2]).is_none());
-        assert!(primitive(&ellipse(2, 0.1), &[1.0; 2]).is_none(), "a cycle of twice the period is not its half");
-    }
 }

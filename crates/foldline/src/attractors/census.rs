@@ -9,7 +9,7 @@ use super::settling::{First, Settled, Trial, settle_together};
 use super::watch::Watch;
 use super::{Attractor, Candidate, Census, Enough, Exit, Polish, Sampling};
 use crate::contract::{VectorField, Verdict};
-use crate::diagram::{Motion, Point, Response};
+use crate::diagram::{Motion, Point, Response, Share};
 use crate::simulation::{Ensemble, Outcome};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -53,6 +53,8 @@ enum Fate {
 struct Reached {
     orbit: Orbit,
     hits: usize,
+    /// Those of them that are distributed uniformly.
+    uniform: usize,
     /// Number of the first of them.
     first: usize,
 }
@@ -93,9 +95,12 @@ pub(super) fn survey(
         let cycle = |known: &Reached| known.orbit.point.solution.period().is_some();
         cycle(a).cmp(&cycle(b)).then(b.hits.cmp(&a.hits)).then(key(a).total_cmp(&key(b)))
     });
+    let of = sampling.uniform();
+    let whole = census.left == 0 && of > 0;
     census.attractors = reached
         .into_iter()
         .map(|known| Attractor {
+            share: whole.then_some(Share { hits: known.uniform, of }),
             example: match known.hits {
                 0 => known.orbit.start().to_vec(),
                 _ => starts[known.first * n..(known.first + 1) * n].to_vec(),
@@ -117,7 +122,7 @@ fn add(watched: Watched, first: usize, reached: &mut Vec<Reached>, census: &mut 
         .into_iter()
         .map(|orbit| {
             reached.iter().position(|known| known.orbit.same(&orbit, tolerance)).unwrap_or_else(|| {
-                reached.push(Reached { orbit, hits: 0, first: 0 });
+                reached.push(Reached { orbit, hits: 0, uniform: 0, first: 0 });
                 reached.len() - 1
             })
         })
@@ -130,6 +135,7 @@ fn add(watched: Watched, first: usize, reached: &mut Vec<Reached>, census: &mut 
                     known.first = first + lane;
                 }
                 known.hits += 1;
+                known.uniform += usize::from(Sampling::is_uniform(first + lane));
             }
             Fate::Unsettled => census.unsettled += 1,
             Fate::Escaped => census.escaped += 1,

@@ -191,7 +191,7 @@ fn without(response: &Response, field: &dyn VectorField) -> Response {
 }
 
 /// A cycle in states with the circle as one without, from the beginning of a period of the forcing on.
-fn without_circle(candidate: &Candidate, n: usize) -> Option<Candidate> {
+pub(super) fn without_circle(candidate: &Candidate, n: usize) -> Option<Candidate> {
     let Candidate::Cycle { period, times, states } = candidate else { return None };
     let whole = period.round();
     if whole < 1.0 || (period - whole).abs() > WHOLE || times.len() < 3 {

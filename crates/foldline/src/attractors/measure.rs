@@ -4,6 +4,7 @@
 //! which is where it returns to the plane across its start; anything else over a number of steps. The stretch is sampled
 //! uniformly in time; extremes are those of quartics through five samples.
 
+use super::Candidate;
 use super::settling::{Settled, Trial};
 use super::spectrum::lines;
 use crate::contract::{Batch, Parameters, Verdict};
@@ -18,8 +19,14 @@ const SAMPLES: usize = 2048;
 /// Steps over which a motion that is neither at rest nor periodic is watched.
 const WATCHED: usize = 20_000;
 
-/// The response to which a trajectory settled, at the parameter values `parameters`, with one hit.
-pub(super) fn response(trial: &Trial, parameters: &[f64], free: usize, settled: &Settled) -> Response {
+/// The response to which a trajectory settled, at the parameter values `parameters`, with one hit; and the motion itself, to be
+/// solved for, unless it is neither at rest nor periodic.
+pub(super) fn response(
+    trial: &Trial,
+    parameters: &[f64],
+    free: usize,
+    settled: &Settled,
+) -> (Response, Option<Candidate>) {
     let mut response = Response {
         value: parameters.get(free).copied().unwrap_or(0.0),
         parameters: parameters.to_vec(),
@@ -29,17 +36,25 @@ pub(super) fn response(trial: &Trial, parameters: &[f64], free: usize, settled: 
         multiplicity: 1,
         ranges: Vec::new(),
         hits: 1,
+        share: None,
+        jumped: None,
         state: settled.state.clone(),
         settled_after: settled.time,
         error: settled.error,
     };
-    match settled.motion {
-        Motion::Escaped => {}
-        Motion::Equilibrium => response.ranges = ranges(trial, parameters, &settled.state),
+    let candidate = match settled.motion {
+        Motion::Escaped => None,
+        Motion::Equilibrium => {
+            response.ranges = ranges(trial, parameters, &settled.state);
+            Some(Candidate::Equilibrium(settled.state.clone()))
+        }
         Motion::Cycle => cycle(trial, parameters, settled, &mut response),
-        Motion::Other => other(trial, parameters, &mut response),
-    }
-    response
+        Motion::Other => {
+            other(trial, parameters, &mut response);
+            None
+        }
+    };
+    (response, candidate)
 }
 
 fn tolerance(trial: &Trial) -> Tolerance {
@@ -47,7 +62,7 @@ fn tolerance(trial: &Trial) -> Tolerance {
 }
 
 /// One period, from the start to where the trajectory comes back through the plane across its velocity there.
-fn cycle(trial: &Trial, parameters: &[f64], settled: &Settled, response: &mut Response) {
+fn cycle(trial: &Trial, parameters: &[f64], settled: &Settled, response: &mut Response) -> Option<Candidate> {
     let n = trial.field.dim();
     let start = &settled.state;
     let mut normal = vec![0.0; n];
@@ -60,7 +75,7 @@ fn cycle(trial: &Trial, parameters: &[f64], settled: &Settled, response: &mut Re
     let spacing = settled.period / SAMPLES as f64;
     if spacing.is_nan() || spacing <= 0.0 {
         response.motion = Motion::Other;
-        return;
+        return None;
     }
     // Long enough for the period to be a little larger than expected.
     let span = [0.0, 1.02 * settled.period];
@@ -80,26 +95,30 @@ fn cycle(trial: &Trial, parameters: &[f64], settled: &Settled, response: &mut Re
     });
     if arrivals.iter().any(|arrival| arrival.outcome.is_lost()) {
         response.motion = Motion::Escaped;
-        return;
+        return None;
     }
     states.truncate(SAMPLES * n);
     response.ranges = ranges(trial, parameters, &states);
-    if let Some((period, state)) = back {
-        let gap = |i: usize| (state[i] - start[i]).abs() / settled.extent[i];
-        response.error = (0..n).map(gap).fold(response.error, f64::max);
-        response.period = Some(period);
-        response.state = state;
-    } else {
+    let Some((period, state)) = back else {
         // It does not come back: what looked settled is not.
         response.motion = Motion::Other;
-        return;
-    }
+        return None;
+    };
+    let gap = |i: usize| (state[i] - start[i]).abs() / settled.extent[i];
+    response.error = (0..n).map(gap).fold(response.error, f64::max);
+    response.period = Some(period);
+    response.state = state;
     if let Some([u, v]) = trial.whirl {
         let z: Vec<Complex64> = states.chunks_exact(n).map(|x| Complex64::new(x[u], x[v])).collect();
         if let Some((ratio, multiplicity)) = lines(z) {
-            (response.ratio, response.multiplicity) = (Some(ratio), multiplicity);
+            (response.ratio, response.multiplicity) = (ratio, multiplicity);
         }
     }
+    let mut times: Vec<f64> = (0..states.len() / n).map(|k| k as f64 * spacing).take_while(|t| *t < period).collect();
+    states.truncate(times.len() * n);
+    times.push(period);
+    states.extend_from_slice(&response.state);
+    Some(Candidate::Cycle { period, times, states })
 }
 
 /// The fraction of the step at which `side` changes sign.

@@ -38,16 +38,16 @@ mod tests;
 mod watch;
 mod window;
 
-pub use brute_force::{Report, stepped_sweep, survey_by_simulation};
+pub use brute_force::{Compare, Report, stepped_sweep, survey_by_simulation};
 pub use census::Lost;
 use census::Pace;
 pub(crate) use census::STEP_LIMIT;
 pub use sampling::Sampling;
 pub use settling::Trial;
-pub use spectrum::{signed_spectrum, spectral_ratio};
+pub use spectrum::{Sense, signed_spectrum, spectral_ratio, whirl_sense};
 
 use crate::contract::VectorField;
-use crate::diagram::Point;
+use crate::diagram::{Point, Share};
 
 /// A stable equilibrium or cycle, and how often it was reached.
 #[derive(Clone, Debug)]
@@ -56,8 +56,12 @@ pub struct Attractor {
     pub point: Point,
     /// Spectral ratio of a cycle such as 2:1, where a whirl plane was named; see [`spectral_ratio`].
     pub ratio: Option<(u32, u32)>,
-    /// How many trajectories went there; 0 where its spectrum says that it attracts, and the survey ended before one did.
+    /// How many trajectories went there; 0 where its spectrum says that it attracts, and the survey ended before one did. Not a
+    /// share of a basin: every fourth trajectory starts nearer to the origin.
     pub hits: usize,
+    /// The share of the trajectories from uniform initial states that went there; `None` where the survey ended before all had
+    /// been followed.
+    pub share: Option<Share>,
     /// `[n]` initial state of the first of them, or where there is none a state of its own.
     pub example: Vec<f64>,
 }
@@ -104,7 +108,7 @@ pub enum Candidate {
     },
 }
 
-/// Computes a candidate exactly; `None` where that does not converge.
+/// Computes a candidate exactly, a cycle over its minimal period; `None` where that does not converge.
 pub type Polish<'a> = &'a (dyn Fn(&Candidate) -> Option<Point> + Sync);
 
 /// Says whether the attractors that count as reached so far (see [`survey_until`]), each with its spectral ratio, are all that is wanted.

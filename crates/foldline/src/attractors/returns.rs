@@ -19,7 +19,7 @@
 use crate::simulation::Step;
 
 /// Largest number of crossings per period that is looked for.
-pub(super) const MOST_CROSSINGS: usize = 16;
+const MOST_CROSSINGS: usize = 16;
 /// The same where a trajectory is followed until it repeats itself.
 const MOST_REPEATED: usize = 40;
 /// Largest m of (1).

@@ -3,7 +3,8 @@
 //! **Idea.** Every component's range is cut into as many strata as there are samples and every stratum is used once, in an
 //! order of its own for each component, so each range is covered evenly whatever the number of components. Every fourth
 //! sample is drawn towards the origin (or the point of the box nearest to it) by a random factor between 1 and 1/100, since
-//! small motions otherwise are rare in a high-dimensional box.
+//! small motions otherwise are rare in a high-dimensional box. The other three are distributed uniformly in the box; the
+//! share of a basin of attraction is that of them alone.
 //!
 //! **Source.** mckay1979 (Latin hypercube); steele2014 (SplitMix64).
 
@@ -30,6 +31,16 @@ pub struct Sampling {
 const SHARE_NEAR_ORIGIN: usize = 4;
 
 impl Sampling {
+    /// Whether the initial state of that number is distributed uniformly in the box, rather than drawn towards the origin.
+    pub fn is_uniform(number: usize) -> bool {
+        number % SHARE_NEAR_ORIGIN != SHARE_NEAR_ORIGIN - 1
+    }
+
+    /// How many initial states are distributed uniformly.
+    pub fn uniform(&self) -> usize {
+        (0..self.samples).filter(|number| Sampling::is_uniform(*number)).count()
+    }
+
     /// The initial states `[samples][n]`.
     pub fn starts(&self) -> Vec<f64> {
         let n = self.ranges.len();
@@ -45,7 +56,10 @@ impl Sampling {
                 starts[s * n + i] = low + place * (high - low);
             }
         }
-        for start in starts.chunks_exact_mut(n.max(1)).skip(SHARE_NEAR_ORIGIN - 1).step_by(SHARE_NEAR_ORIGIN) {
+        for (number, start) in starts.chunks_exact_mut(n.max(1)).enumerate() {
+            if Sampling::is_uniform(number) {
+                continue;
+            }
             let factor = 0.01f64.powf(random.fraction());
             for (x, [low, high]) in start.iter_mut().zip(&self.ranges) {
                 let nearest = 0f64.max(low.min(*high)).min(low.max(*high));

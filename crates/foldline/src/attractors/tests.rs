@@ -164,6 +164,13 @@ fn nodes_share_the_line_between_them() {
         let Solution::Equilibrium(x) = attractor.point.solution else { panic!("a cycle on a line") };
         assert!((x[0].abs() - 1.0).abs() < 1e-9);
         assert_eq!(attractor.hits, if x[0] > 0.0 { positive } else { 60 - positive });
+        // Every fourth start is drawn towards the origin and does not count; the positive part of the box is 3/5.
+        let share = attractor.share.unwrap();
+        let own = |(k, start): &(usize, &f64)| k % 4 != 3 && (**start > 0.0) == (x[0] > 0.0);
+        assert_eq!((share.hits, share.of), (sampling.starts().iter().enumerate().filter(own).count(), 45));
+        let [low, high] = share.interval();
+        let volume = if x[0] > 0.0 { 0.6 } else { 0.4 };
+        assert!(low < volume && volume < high, "{low} {high}");
         assert_eq!(attractor.example[0] > 0.0, x[0] > 0.0);
     }
     let polish = |candidate: &Candidate| shooting::polish(&BISTABLE, &[], candidate);
@@ -221,5 +228,12 @@ fn the_spectrum_is_signed_and_names_the_resonance() {
     // After a period doubling the same lines are multiples of half the frequency.
     assert_eq!(spectral_ratio(&whirling(&[(-2, 1.0), (-4, 0.8), (-1, 0.1), (-3, 0.2)]), [1, 2]), Some((2, 1)));
     assert_eq!(spectral_ratio(&whirling(&[(-1, 1.0), (1, 0.4)]), [1, 2]), None);
+    // A whirl with its harmonics, of the sizes of a whip in journal bearings; and just above the limit.
+    assert_eq!(spectral_ratio(&whirling(&[(-1, 14.5), (-2, 0.05)]), [1, 2]), None);
+    assert_eq!(spectral_ratio(&whirling(&[(-1, 1.0), (-2, 0.098)]), [1, 2]), None);
+    assert_eq!(spectral_ratio(&whirling(&[(-1, 1.0), (-2, 0.102)]), [1, 2]), Some((2, 1)));
+    assert_eq!(whirl_sense(&whirling(&[(0, 5.0), (-1, 1.0), (1, 0.4), (2, 0.8)]), [1, 2]), Some(Sense::Backward));
+    assert_eq!(whirl_sense(&whirling(&[(-1, 0.3), (1, 0.4), (-2, 0.1)]), [1, 2]), Some(Sense::Forward));
+    assert_eq!(whirl_sense(&whirling(&[(-1, 0.4), (1, 0.4)]), [1, 2]), None, "a straight line");
     assert_eq!(spectral_ratio(&single, [1, 7]), None);
 }

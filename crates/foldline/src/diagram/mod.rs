@@ -2,9 +2,11 @@
 
 mod cycle;
 mod response;
+mod share;
 
 pub use cycle::Cycle;
 pub use response::{Motion, Response, Responses, Search};
+pub use share::Share;
 
 use num_complex::Complex64;
 use std::fmt;

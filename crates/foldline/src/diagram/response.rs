@@ -1,5 +1,7 @@
 //! What simulation saw: settled motions, without a branch to lie on.
 
+use super::Share;
+
 /// What a trajectory settled to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Motion {
@@ -46,12 +48,17 @@ pub struct Response {
     pub period: Option<f64>,
     /// Spectral ratio of a cycle, such as 2:1, where the model has a whirl plane.
     pub ratio: Option<(u32, u32)>,
-    /// Over how many turns of its two strongest lines a cycle closes: 2 after a period doubling. 1 if there is no telling.
+    /// Over how many turns of its strong lines a cycle closes: 2 after a period doubling. 1 if there is no telling.
     pub multiplicity: u32,
     /// Smallest and largest value of every state, then of every output: over one period, or over the motion watched.
     pub ranges: Vec<[f64; 2]>,
-    /// How many starts went there.
+    /// How many starts went there. Not a share of a basin: some starts are drawn towards the origin.
     pub hits: usize,
+    /// Of a survey: the share of the starts drawn uniformly that went there; `None` in a sweep.
+    pub share: Option<Share>,
+    /// Of a sweep: whether it is another solution than the motion at the value before, which Newton's method has followed
+    /// to this value; `None` at the first value, where one of the two could not be solved for, and in a survey.
+    pub jumped: Option<bool>,
     /// `[n]` a state of the motion: the last one, from which a sweep goes on.
     pub state: Vec<f64>,
     /// Time until it had settled, that saved by extrapolation not counted.
@@ -111,9 +118,21 @@ pub struct Responses {
 }
 
 impl Responses {
-    /// Indices of the responses of a sweep that differ from the one before by more than a small step of the parameter can
-    /// explain: another motion, ratio or multiplicity, or a change of the largest range beyond `factor` times the median.
+    /// Indices of the responses of a sweep that are other solutions than the one before. Where nothing was solved for, that is a
+    /// motion of another kind. In a set in which it was not asked for at all, as in an old file, see
+    /// [`Responses::steep`].
     pub fn jumps(&self, factor: f64) -> Vec<usize> {
+        if self.responses.iter().all(|response| response.jumped.is_none()) {
+            return self.steep(factor);
+        }
+        let pairs = self.responses.windows(2).enumerate();
+        let jumped = |pair: &[Response]| pair[1].jumped.unwrap_or(pair[0].motion != pair[1].motion);
+        pairs.filter(|(_, pair)| jumped(pair)).map(|(k, _)| k + 1).collect()
+    }
+
+    /// Indices of the responses of a sweep that differ much from the one before: another motion, ratio or multiplicity, or a
+    /// change of the largest range beyond `factor` times the median. On a steep resonance curve that need not be a jump.
+    pub fn steep(&self, factor: f64) -> Vec<usize> {
         // Each quantity relative to its largest value in the sweep.
         let count = self.responses.iter().map(|r| r.ranges.len()).max().unwrap_or(0);
         let largest = |k: usize| {

@@ -7,6 +7,7 @@ use super::direct::{transient, turn};
 use super::{System, symmetry};
 use crate::attractors::{Exit, STEP_LIMIT};
 use crate::contract::{Batch, Parameters};
+use crate::diagram::{Ending, Point};
 use crate::linalg::max_abs;
 
 /// Largest number of states for which conserved combinations are looked for.
@@ -237,6 +238,42 @@ fn combination(w: &[f64], names: &[String]) -> String {
         text += &format!("{factor}{name}");
     }
     text
+}
+
+/// An end of a branch of forced cycles next to a bound of the range at which the forcing has no period, as at frequency zero:
+/// neither the mesh nor the field is at fault there. Any other end as it is.
+pub(super) fn of_forcing(system: &System, free: usize, range: [f64; 2], last: &Point, ending: Ending) -> Ending {
+    // How near the bound is, in widths of the range.
+    const NEAR: f64 = 0.01;
+    let (Ending::MeshTooLarge(text) | Ending::StepTooSmall(text) | Ending::NotFinite(text)) = &ending else {
+        return ending;
+    };
+    let (value, [low, high]) = (last.parameters[free], range);
+    let unit = |at: f64| {
+        let mut parameters = last.parameters.clone();
+        parameters[free] = at;
+        system.field.time_unit(&parameters)
+    };
+    let lost = |bound: &f64| {
+        let unit = unit(*bound);
+        (value - bound).abs() <= NEAR * (high - low) && !(unit > 0.0 && unit.is_finite())
+    };
+    let Some(bound) = range.into_iter().find(lost).filter(|_| system.field.forced()) else { return ending };
+    let inside = bound + NEAR * (if bound == low { high - low } else { low - high });
+    let text = format!(
+        "{}\nlikely cause: the range reaches {bound}, where the forcing has no period; towards it the period, and with it the cycle, \
+         becomes longer than any time of the model ({:.3e} at {value:.3e}, {:.3e} at {inside})\nwhat to do: let the range end \
+         where the forcing still has a period, such as {inside}; the response to a constant force is an equilibrium of a model \
+         without forcing",
+        text.lines().next().unwrap_or_default(),
+        unit(value),
+        unit(inside)
+    );
+    match ending {
+        Ending::MeshTooLarge(_) => Ending::MeshTooLarge(text),
+        Ending::StepTooSmall(_) => Ending::StepTooSmall(text),
+        _ => Ending::NotFinite(text),
+    }
 }
 
 #[cfg(test)]

@@ -1,9 +1,10 @@
 //! A branch of the plan with everything that grows from it.
 
 use super::growth::{self, Beginning, Growth};
+use super::minimal::reduced;
 use super::plan::{BranchPlan, Plan, Start, Switching};
 use super::seeds::Seeds;
-use super::{System, curves, discovery, homotopy, known, switch};
+use super::{System, arrival, curves, discovery, homotopy, known, switch};
 use crate::continuation::Settings;
 use crate::contract::{Event, Observer, Verdict};
 use crate::diagram::{Branch, Diagram, Ending, Family, Kind, Origin, Point, Solution, SpecialPoint};
@@ -288,7 +289,7 @@ impl Work<'_> {
                 self.tell(Event::Note(&parent.name, &format!("{label}: the branch there is {from}, the parent")));
                 continue;
             }
-            if let Some(already) = self.arrives(&parent, special.kind, &special.point) {
+            if let Some(already) = arrival::at(self.system, self.plan.tolerance, &self.branches, &parent, special) {
                 self.tell(Event::Note(
                     &parent.name,
                     &format!("{label}: the branch there is {already}, which ends here"),
@@ -298,7 +299,9 @@ impl Work<'_> {
             let (family, beginning) =
                 match switch::beginning(self.system, &settings, parent.free, self.plan.degree, special) {
                     None => continue,
-                    Some(Ok(found)) => found,
+                    Some(Ok((family, beginning))) => {
+                        (family, self.of_one_turn(&settings, parent.free, special.kind, beginning))
+                    }
                     Some(Err(why)) => {
                         self.tell(Event::Note(&parent.name, &format!("{label}: no branch found to switch to: {why}")));
                         continue;
@@ -331,23 +334,16 @@ impl Work<'_> {
         Some(more)
     }
 
-    /// The branch that ends at this special point of `parent`, having come from another one of the same kind.
-    fn arrives(&self, parent: &Branch, kind: Kind, at: &Point) -> Option<&str> {
-        let value = at.parameters[parent.free];
-        let ends_here = |branch: &&Branch| {
-            let from_parent = matches!(&branch.origin, Origin::Switch { parent: p, .. } if *p == parent.name);
-            let here = branch.ends.iter().flatten().skip(1).any(|end| {
-                matches!(end, Ending::Joined { at, parameter } if *at == kind
-                    && (parameter - value).abs() < 1e3 * self.plan.tolerance * (1.0 + value.abs()))
-            });
-            let period = branch.points.last().and_then(|p| p.solution.period());
-            let fits = match (period, at.solution.period()) {
-                (Some(long), Some(short)) => (long / short - 2.0).abs() < 0.05 || kind != Kind::PeriodDoubling,
-                _ => true,
-            };
-            from_parent && here && fits
-        };
-        self.branches.iter().find(ends_here).map(|b| b.name.as_str())
+    /// The beginning of a branch of cycles that run through one turn. At a branch point a cycle that has bifurcated from another
+    /// one, run through several times, meets just that.
+    fn of_one_turn(&self, settings: &Settings, free: usize, at: Kind, beginning: Beginning) -> Beginning {
+        let (Beginning::Inside(station) | Beginning::Edge { first: station, .. }) = &beginning;
+        let once = (at == Kind::BranchPoint).then(|| reduced(self.system, settings, &station.point)).flatten();
+        let once = once.and_then(|point| {
+            let mut problem = growth::problem_of(self.system, free, self.plan.degree, &point, false);
+            growth::polished(&mut *problem, settings, &point).ok()
+        });
+        once.map_or(beginning, Beginning::Inside)
     }
 }
 

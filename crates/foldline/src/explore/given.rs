@@ -5,6 +5,7 @@
 
 use super::System;
 use super::growth::{first, polished, problem_of, settings};
+use super::minimal::reduced;
 use super::plan::SeedPlan;
 use super::seeds::{bare, near};
 use crate::contract::{Batch, Parameters, VectorField};
@@ -61,7 +62,7 @@ fn along(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle) -> Vec<[f64
     sizes
 }
 
-/// The cycle next to a given one.
+/// The cycle next to a given one, over its minimal period.
 ///
 /// # Errors
 /// What Newton's method met, and by how much the given one fails to satisfy the model.
@@ -86,7 +87,7 @@ pub(super) fn from_cycle(system: &System, seed: &SeedPlan, tolerance: f64, cycle
         Ok(point) => {
             let period = point.solution.period().unwrap_or(0.0);
             if (period - cycle.period).abs() <= NEAR * cycle.period {
-                return Ok(point);
+                return Ok(reduced(system, &settings, &point).unwrap_or(point));
             }
             format!("Newton's method leads from it to a cycle of the period {period:.6} instead of {:.6}", cycle.period)
         }

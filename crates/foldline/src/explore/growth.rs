@@ -1,8 +1,8 @@
 //! One branch, followed to both sides, from its start or from where an earlier run left it.
 
-use super::System;
 use super::counted::Counted;
 use super::symmetry::rotation;
+use super::{System, diagnosis};
 use crate::continuation::corrector::{Plane, parameter_row, settle, station};
 use crate::continuation::{Failure, Follow, Homecoming, Item, Settings, Station, follow};
 use crate::contract::{Event, Examination, Monitor, Observer, Verdict, ZeroProblem};
@@ -382,6 +382,7 @@ impl Growth<'_> {
                     break;
                 }
                 let ending = self.recognised(branch, side, ending);
+                let ending = self.without_period(branch, side, ending);
                 going &= self.end(branch, side, ending);
             }
         }
@@ -485,6 +486,15 @@ impl Growth<'_> {
         let same = |s: &&SpecialPoint| s.kind == Kind::PeriodDoubling && value(&s.point) == value(end);
         let parameter = self.parents.iter().find(same).and_then(|s| value(&s.point))?;
         Some(Ending::Joined { at: Kind::PeriodDoubling, parameter })
+    }
+
+    /// An end next to a bound of the range at which the forcing has no period says so.
+    fn without_period(&self, branch: &Branch, side: usize, ending: Ending) -> Ending {
+        let last = if side == 1 { branch.points.last() } else { branch.points.first() };
+        match last {
+            Some(last) => diagnosis::of_forcing(self.system, branch.free, self.settings.range, last, ending),
+            None => ending,
+        }
     }
 
     /// An end at a special point of the parent gets the accurate parameter of that point; where the special point, as a
@@ -618,12 +628,19 @@ fn collapses<'a>(branch: &Branch, system: &'a System) -> Vec<Box<dyn Monitor + '
         }
     }
     if branch.family == Family::Cycle {
-        all.push(Box::new(collapse::Halves { born: is_doubled(branch) }));
+        all.push(Box::new(collapse::Halves { born: is_doubled(branch) || lasts_evenly(branch) }));
     }
     if branch.family == Family::Cycle && !system.field.forced() {
         all.push(shrinks(system, branch.free, Kind::Hopf));
     }
     all
+}
+
+/// Whether the cycles of a forced model last an even number of its periods: no phase moves, and the halves of two of
+/// them can be compared however much they differ.
+fn lasts_evenly(branch: &Branch) -> bool {
+    let periods = branch.points.first().map_or(0, |point| point.solution.forcing_periods());
+    periods > 0 && periods.is_multiple_of(2)
 }
 
 /// Where cycles shrink to an equilibrium.

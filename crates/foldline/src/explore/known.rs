@@ -1,15 +1,18 @@
 //! Whether a solution lies on a branch that is known already.
 //!
 //! **Idea.** Two solutions at the same parameter values are the same if their periods and the ranges of all states and
-//! outputs agree, up to a reflection under which the model is equivariant. Known branches are asked for their solution at
-//! the parameter value in question: interpolated first, and where that is close, by Newton's method.
+//! outputs agree, up to a reflection under which the model is equivariant. A cycle of a forced model and its copies some periods
+//! of the forcing later have the same ranges, and a branch of cycles that run through a shorter one several times is that of
+//! the shorter one (`minimal`). Known branches are asked for their solution at the parameter value in question: interpolated
+//! first, and where that is close, by Newton's method.
 
 use super::System;
 use super::growth::{Line, polished, problem_of, revived};
+use super::minimal::reduced;
 use crate::continuation::Settings;
 use crate::continuation::locate::{Stretch, passing};
 use crate::contract::Observer;
-use crate::diagram::{Branch, Cost, Kind, Point};
+use crate::diagram::{Branch, Cost, Kind, Point, Solution};
 
 /// Every solution of a branch at a value of its parameter, by increasing position: one for each time that the branch
 /// passes it. Points that are light (see [`Point::is_light`]) are passed over.
@@ -34,12 +37,20 @@ fn between(system: &System, settings: &Settings, branch: &Branch, pair: [&Point;
     found.ok().map(|station| station.point)
 }
 
-/// The points of a branch and its folds: between two of them the parameter is monotonous.
+/// The points of a branch, its folds, and the branch points at which it turns back, as at a pitchfork: between two of them
+/// the parameter is monotonous.
 fn track(branch: &Branch) -> Vec<&Point> {
     let mut track: Vec<&Point> = branch.points.iter().collect();
-    for fold in branch.special.iter().filter(|s| s.kind == Kind::Fold) {
-        let after = track.partition_point(|p| p.position <= fold.point.position);
-        track.insert(after, &fold.point);
+    let value = |point: &Point| point.parameters.get(branch.free).copied().unwrap_or(f64::NAN);
+    for special in branch.special.iter().filter(|s| matches!(s.kind, Kind::Fold | Kind::BranchPoint)) {
+        let after = track.partition_point(|p| p.position <= special.point.position);
+        let (Some(left), Some(right)) = (after.checked_sub(1).and_then(|k| track.get(k)), track.get(after)) else {
+            continue;
+        };
+        let [here, left, right] = [&special.point, left, right].map(value);
+        if special.kind == Kind::Fold || (left - here) * (right - here) > 0.0 {
+            track.insert(after, &special.point);
+        }
     }
     track
 }
@@ -106,6 +117,23 @@ fn least_between(
     Some(if a.1 < b.1 { (a.2, rest) } else { (b.2, rest) })
 }
 
+/// How many times as long one cycle lasts as another, if that is nearly a whole number; else 1.
+fn turns(long: &Point, short: &Point) -> f64 {
+    const NEARLY: f64 = 0.05;
+    let ratio = long.solution.period().zip(short.solution.period()).map_or(1.0, |(long, short)| long / short);
+    if ratio > 1.5 && (ratio - ratio.round()).abs() < NEARLY { ratio.round() } else { 1.0 }
+}
+
+/// A point like another one whose cycle lasts `times` as long, without a profile.
+pub(super) fn lasting(point: &Point, times: f64) -> Point {
+    let mut other = Point { tangent: Vec::new(), ..point.clone() };
+    if let Solution::Cycle(cycle) = &mut other.solution {
+        (cycle.mesh, cycle.profile) = (Vec::new().into(), Vec::new());
+        cycle.period *= times;
+    }
+    other
+}
+
 /// The name of the branch on which `point` lies; points that are light are recalled from the observer.
 pub fn branch_of<'b>(
     system: &System,
@@ -123,7 +151,7 @@ pub fn branch_of<'b>(
             if (a - value) * (b - value) > 0.0 {
                 return false;
             }
-            // From a fold Newton's method would go to either side.
+            // From where the branch turns back Newton's method would go to either side.
             let fold = |point: &Point| branch.special.iter().any(|s| std::ptr::eq(&s.point, point));
             let first = fold(pair[1]) || !fold(pair[0]) && (a - value).abs() < (b - value).abs();
             let nearest = if first { pair[0] } else { pair[1] };
@@ -131,7 +159,8 @@ pub fn branch_of<'b>(
             let close = |other: &Point, tolerance: f64| {
                 system.reflections.iter().any(|r| point.difference(other, &system.scales, r) < tolerance)
             };
-            if !close(nearest, 1e-3 + 1.5 * apart) {
+            let turns = turns(nearest, point);
+            if !close(&lasting(nearest, 1.0 / turns), 1e-3 + 1.5 * apart) {
                 return false;
             }
             let whole = |point: &Point| match point.is_light() {
@@ -141,7 +170,10 @@ pub fn branch_of<'b>(
             let Some(mut guess) = whole(nearest).filter(|point| !point.is_light()) else { return false };
             let mut problem = problem_of(system, free, degree, &guess, false);
             guess.parameters[free] = value;
-            let same = |point: &Point| close(point, 30.0 * settings.tolerance);
+            let same = |found: &Point| {
+                let once = if turns > 1.0 { reduced(system, settings, found) } else { None };
+                close(once.as_ref().unwrap_or(found), 30.0 * settings.tolerance)
+            };
             if polished(&mut *problem, settings, &guess).is_ok_and(|found| same(&found.point)) {
                 return true;
             }

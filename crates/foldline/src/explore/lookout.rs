@@ -1,9 +1,10 @@
 //! What there is at values of a parameter: attractors and equilibria, looked for on several threads.
 
 use super::System;
+use super::choice::summary;
 use super::growth::{polished, setting, settings};
 use super::plan::ExplorePlan;
-use super::seeds::{attractors, bare, sampling, summary};
+use super::seeds::{attractors, bare, sampling};
 use crate::diagram::{Point, Solution};
 use crate::linalg::dot;
 use crate::problem::equilibrium::EquilibriumProblem;
@@ -83,7 +84,7 @@ impl<'l> Lookout<'l> {
         };
         found.sort_by(|a, b| size(a).total_cmp(&size(b)));
         let rests = found.iter().filter(|p| matches!(p.solution, Solution::Equilibrium(_))).count();
-        let said = format!("at {value}: {}; equilibria but for symmetry: {rests}", summary(&census));
+        let said = format!("at {value}: {}; equilibria but for symmetry: {rests}", summary(system, &census));
         Sight { value, unclear: census.unsettled + census.stuck > 0, found: Ok((found, said)) }
     }
 

@@ -21,6 +21,8 @@
 //! | does a solution depend on a parameter that should not matter? | [`mod@persistence`] |
 //! | what does simulation see? | [`responses`] |
 
+mod arrival;
+mod choice;
 mod counted;
 pub mod curves;
 mod diagnosis;
@@ -32,9 +34,11 @@ pub mod growth;
 pub mod homotopy;
 pub mod known;
 mod lookout;
+mod minimal;
 pub mod persistence;
 pub mod plan;
 mod profile;
+mod pursuit;
 pub mod responses;
 mod schedule;
 pub mod seeds;
@@ -43,6 +47,8 @@ mod symmetry;
 pub mod system;
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod tests_identity;
 
 pub use given::mismatch;
 pub use persistence::{Persistence, persistence};

@@ -1,12 +1,14 @@
 //! The surveys and sweeps of a plan.
 //!
 //! **Idea.** A survey shares its values among the threads; sweeps, in which each value waits for the one before, are shared
-//! as a whole. What an earlier run has completed is not repeated.
+//! as a whole. What an earlier run has completed is not repeated. Whether a sweep has jumped is decided by solving for its
+//! motions (`pursuit`).
 
 use super::System;
 use super::plan::{Plan, SurveyPlan, SweepPlan};
+use super::pursuit::Pursuit;
 use super::seeds::{Seeds, sampling};
-use crate::attractors::{Trial, stepped_sweep, survey_by_simulation};
+use crate::attractors::{Candidate, Trial, stepped_sweep, survey_by_simulation};
 use crate::contract::{Event, Observer, Verdict};
 use crate::diagram::{Diagram, Motion, Response, Responses, Search, Solution};
 use std::sync::Mutex;
@@ -122,7 +124,9 @@ fn one_sweep(
     let parameters = plan.seeds.get(*seed).map_or(&point.parameters, |seed| &seed.parameters);
     let count = Count { name, of: values.len(), done: AtomicUsize::new(0), observer };
     let report = |found: &[Response]| count.visited(found);
-    let responses = stepped_sweep(&trial(system, 1), parameters, *free, values, &start, &report);
+    let mut pursuit = Pursuit::new(system, *free, plan.tolerance, plan.degree);
+    let mut compare = |own: &[f64], candidate: Option<&Candidate>| pursuit.leaves(own, candidate);
+    let responses = stepped_sweep(&trial(system, 1), parameters, *free, values, &start, &mut compare, &report);
     let escaped = responses.last().filter(|last| last.motion == Motion::Escaped);
     if let Some(last) = escaped {
         observer.observe(Event::Note(name, &format!("at the value {} the motion {}", last.value, last.fate())));

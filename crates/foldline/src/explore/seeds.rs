@@ -5,17 +5,19 @@
 //! find what they ask for.
 
 use super::System;
+use super::choice::{Choice, is_meant, missing, summary};
 use super::diagnosis::{Seen, next_to_origin, of_no_start};
 use super::direct::{Direct, NEVER, direct};
 use super::given::from_cycle;
 use super::growth::{polished, problem_of, setting, settings};
+use super::minimal::reduced;
 use super::plan::{AttractorKey, BranchPlan, Plan, SeedPlan, SeedSource, Start};
 use super::profile::{first_profile, with_degree};
 use crate::attractors::{self, Attractor, Candidate, Census, Lost, Sampling};
 use crate::continuation::corrector::{Plane, correct, parameter_row};
 use crate::continuation::{Failure, Settings};
 use crate::contract::{Event, Examination, Observer, Unobserved};
-use crate::diagram::{Cost, Diagram, Point, Solution};
+use crate::diagram::{Cost, Cycle, Diagram, Point, Solution};
 use crate::linalg::max_abs;
 use crate::problem::equilibrium::EquilibriumProblem;
 use std::sync::OnceLock;
@@ -85,7 +87,7 @@ impl<'p> Seeds<'p> {
         let (index, census) = &self.censuses[number];
         census.get_or_init(|| {
             let found = census_for(self.system, self.plan, *index, self.jobs);
-            self.observer.observe(Event::Note(&self.plan.seeds[*index].name, &summary(&found)));
+            self.observer.observe(Event::Note(&self.plan.seeds[*index].name, &summary(self.system, &found)));
             found
         })
     }
@@ -99,6 +101,19 @@ impl<'p> Seeds<'p> {
         slot.get_or_init(|| self.found(seed)).clone()
     }
 
+    /// That a given cycle runs through a shorter one several times.
+    fn tell_turns(&self, name: &str, given: &Cycle, found: &Point) {
+        let Some(period) = found.solution.period() else { return };
+        let turns = (given.period / period).round();
+        if turns > 1.0 {
+            let said = format!(
+                "the given cycle of the period {:.6} runs {turns} times through one of the period {period:.6}, which is taken",
+                given.period
+            );
+            self.observer.observe(Event::Note(name, &said));
+        }
+    }
+
     fn found(&self, index: usize) -> Result<Point, String> {
         let (system, plan, seed) = (self.system, self.plan, &self.plan.seeds[index]);
         if !self.needed[index] {
@@ -107,14 +122,22 @@ impl<'p> Seeds<'p> {
         }
         system.repeats(&seed.parameters, &[])?;
         let point = match &seed.source {
-            SeedSource::Cycle(cycle) => from_cycle(system, seed, plan.tolerance, cycle)?,
+            SeedSource::Cycle(cycle) => {
+                let point = from_cycle(system, seed, plan.tolerance, cycle)?;
+                self.tell_turns(&seed.name, cycle, &point);
+                point
+            }
             SeedSource::State(state) => {
                 let tell = |note: &str| _ = self.observer.observe(Event::Note(&seed.name, note));
                 from_state(system, seed, plan, state, self.jobs, &tell)?
             }
             SeedSource::Attractor(key) => {
                 let census = self.census(self.census_of(index).ok_or("no census")?);
-                chosen(census, key).ok_or_else(|| missing(system, seed, census, key))?
+                let choice = Choice::of(system, plan.tolerance, census, key);
+                if let Some(said) = choice.told(system) {
+                    self.observer.observe(Event::Note(&seed.name, &said));
+                }
+                choice.taken().cloned().ok_or_else(|| missing(system, seed, census, key))?
             }
         };
         Ok(with_degree(point, plan.degree))
@@ -181,7 +204,7 @@ fn without_samples(system: &System, plan: &Plan, seed: &SeedPlan, keys: &[&Attra
     if !enough || found.periods > NEVER || !keys.iter().all(|key| is_meant(key, &found.point, ratio)) {
         return None;
     }
-    let attractor = Attractor { ratio, hits: 0, example: cycle.state(0.0), point: found.point };
+    let attractor = Attractor { ratio, hits: 0, share: None, example: cycle.state(0.0), point: found.point };
     Some(Census { attractors: vec![attractor], left: seed.samples, ..Census::default() })
 }
 
@@ -214,7 +237,7 @@ pub(super) fn sampling(system: &System, samples: usize, seed: u64, jobs: usize, 
     }
 }
 
-/// Newton's method at fixed parameters.
+/// Newton's method at fixed parameters; a cycle comes with its minimal period.
 pub(super) fn polish(system: &System, parameters: &[f64], tolerance: f64, candidate: &Candidate) -> Option<Point> {
     let settings = settings(system, tolerance, [f64::NEG_INFINITY, f64::INFINITY], 0);
     let free = 0;
@@ -230,7 +253,8 @@ pub(super) fn polish(system: &System, parameters: &[f64], tolerance: f64, candid
     };
     let guess = near(system, 4, &settings, bare(parameters, solution)).ok()?;
     let mut problem = problem_of(system, free, 4, &guess, false);
-    polished(&mut *problem, &settings, &guess).ok().map(|found| found.point)
+    let found = polished(&mut *problem, &settings, &guess).ok()?.point;
+    Some(reduced(system, &settings, &found).unwrap_or(found))
 }
 
 /// A solution near a candidate, coarsely and on its mesh as it is: a candidate that is not close to one is not worth a finer mesh.
@@ -353,87 +377,4 @@ fn no_start(system: &System, seed: &SeedPlan, state: &[f64], lost: &Lost) -> Str
     let (stuck, all_escaped) = (*lost == Lost::Stuck, *lost == Lost::Escaped);
     let why = of_no_start(system, &seed.parameters, Seen { state: Some(state), stuck, all_escaped, exit, unsettled });
     format!("the trajectory from the given state {what}{why}")
-}
-
-/// Whether a solution is of the type that a key names.
-fn is_meant(key: &AttractorKey, point: &Point, ratio: Option<(u32, u32)>) -> bool {
-    match (key, &point.solution) {
-        (AttractorKey::Equilibrium, solution) => matches!(solution, Solution::Equilibrium(_)),
-        (AttractorKey::Cycle, solution) => matches!(solution, Solution::Cycle(_)),
-        (AttractorKey::Ratio(p, q), _) => ratio == Some((*p, *q)),
-        (AttractorKey::Lasting(periods), solution) => solution.forcing_periods() == *periods,
-    }
-}
-
-/// Of several the equilibrium of smallest norm, or the cycle reached most often.
-fn chosen(census: &Census, key: &AttractorKey) -> Option<Point> {
-    let size = |a: &&Attractor| match &a.point.solution {
-        Solution::Equilibrium(x) => crate::linalg::dot(x, x),
-        Solution::Cycle(_) => f64::INFINITY,
-    };
-    let meant = census.attractors.iter().filter(|a| is_meant(key, &a.point, a.ratio));
-    let found = match key {
-        AttractorKey::Equilibrium => meant.min_by(|a, b| size(a).total_cmp(&size(b))),
-        // They come by falling number of hits.
-        AttractorKey::Cycle | AttractorKey::Ratio(..) | AttractorKey::Lasting(_) => {
-            meant.min_by_key(|a| std::cmp::Reverse(a.hits))
-        }
-    };
-    found.map(|a| a.point.clone())
-}
-
-fn described(attractor: &Attractor) -> String {
-    format!("{} ({})", kind(attractor), attractor.hits)
-}
-
-fn kind(attractor: &Attractor) -> String {
-    match (&attractor.point.solution, attractor.ratio) {
-        (Solution::Equilibrium(_), _) => "equilibrium".to_string(),
-        (Solution::Cycle(cycle), Some((p, q))) => format!("{p}:{q} cycle of period {:.6}", cycle.period),
-        (Solution::Cycle(cycle), None) => format!("cycle of period {:.6}", cycle.period),
-    }
-}
-
-pub(super) fn summary(census: &Census) -> String {
-    if let [found] = &census.attractors[..]
-        && found.hits == 0
-    {
-        let what = kind(found);
-        return format!(
-            "{what} of Newton's method; it attracts, but too slowly for samples to be followed until they have settled there"
-        );
-    }
-    let mut parts: Vec<String> = census.attractors.iter().map(described).collect();
-    if census.unsettled > 0 {
-        parts.push(format!("unsettled ({})", census.unsettled));
-    }
-    if census.escaped > 0 {
-        parts.push(format!("escaped ({})", census.escaped));
-    }
-    if !census.exits.is_empty() {
-        parts.push(format!("left the region in which the vector field is defined ({})", census.exits.len()));
-    }
-    if census.stuck > 0 {
-        parts.push(format!("stuck where steps became too small ({})", census.stuck));
-    }
-    if census.left > 0 {
-        parts.push(format!("left when that was known ({})", census.left));
-    }
-    format!("attractors (samples that went there): {}", parts.join(", "))
-}
-
-fn missing(system: &System, seed: &SeedPlan, census: &Census, key: &AttractorKey) -> String {
-    let wanted = match key {
-        AttractorKey::Equilibrium => "no stable equilibrium".to_string(),
-        AttractorKey::Cycle => "no stable cycle".to_string(),
-        AttractorKey::Ratio(p, q) => format!("no stable {p}:{q} cycle"),
-        AttractorKey::Lasting(periods) => format!("no stable cycle of {periods} periods of the forcing"),
-    };
-    let all_escaped = census.attractors.is_empty() && census.unsettled == 0 && census.escaped > 0;
-    // Of what some samples did where others settled nothing follows.
-    let none = census.attractors.is_empty();
-    let (stuck, unsettled) = (census.stuck > 0, none && census.unsettled > 0);
-    let exit = census.exits.first().filter(|_| none);
-    let why = of_no_start(system, &seed.parameters, Seen { state: None, stuck, all_escaped, exit, unsettled });
-    format!("{wanted} was found; {}{why}", summary(census))
 }

@@ -226,12 +226,11 @@ fn extents(at: &Point, n: usize) -> Vec<f64> {
 /// Inner product of the deviations of both points, relative to that of the reference.
 fn compare(reference: &Point, at: &Point, deviation: impl Fn(&[f64], usize) -> Vec<f64>) -> f64 {
     let (Solution::Cycle(a), Solution::Cycle(b)) = (&reference.solution, &at.solution) else { return 1.0 };
-    let of = |cycle: &Cycle| deviation(&cycle.uniform(SAMPLES), cycle.dim());
-    let da = of(a);
-    let other = if std::ptr::eq(a, b) { None } else { Some(of(b)) };
+    let n = a.dim();
+    let da = deviation(&a.uniform(SAMPLES), n);
+    let other = if std::ptr::eq(a, b) { None } else { Some(deviation(&b.uniform(SAMPLES), n)) };
     let db = other.as_ref().unwrap_or(&da);
     // Components of very different unit must not drown each other.
-    let n = a.dim();
     let mut sums = vec![[0.0; 2]; n];
     for (k, (x, y)) in da.iter().zip(db).enumerate() {
         let sum = &mut sums[k % n];

@@ -1,0 +1,142 @@
+//! Which of the attractors that were found is meant, and how they are told.
+
+use super::System;
+use super::diagnosis::{Seen, of_no_start};
+use super::plan::{AttractorKey, SeedPlan};
+use crate::attractors::{Attractor, Census, whirl_sense};
+use crate::diagram::{Point, Solution};
+
+/// Whether a solution is of the type that a key names.
+pub(super) fn is_meant(key: &AttractorKey, point: &Point, ratio: Option<(u32, u32)>) -> bool {
+    match (key, &point.solution) {
+        (AttractorKey::Equilibrium, solution) => matches!(solution, Solution::Equilibrium(_)),
+        (AttractorKey::Cycle, solution) => matches!(solution, Solution::Cycle(_)),
+        (AttractorKey::Ratio(p, q), _) => ratio == Some((*p, *q)),
+        (AttractorKey::Lasting(periods), solution) => solution.forcing_periods() == *periods,
+    }
+}
+
+/// The attractors that a key may mean.
+pub(super) struct Choice<'c> {
+    /// The one that is taken first: the equilibrium of smallest norm, or the cycle reached most often.
+    meant: Vec<&'c Attractor>,
+}
+
+impl<'c> Choice<'c> {
+    /// Those of a census that a key fits; mirror images of each other count once.
+    pub(super) fn of(system: &System, tolerance: f64, census: &'c Census, key: &AttractorKey) -> Choice<'c> {
+        let size = |a: &Attractor| match &a.point.solution {
+            Solution::Equilibrium(x) => crate::linalg::dot(x, x),
+            Solution::Cycle(_) => f64::INFINITY,
+        };
+        let mut fitting: Vec<&Attractor> =
+            census.attractors.iter().filter(|a| is_meant(key, &a.point, a.ratio)).collect();
+        // Cycles come by falling number of hits.
+        match key {
+            AttractorKey::Equilibrium => fitting.sort_by(|a, b| size(a).total_cmp(&size(b))),
+            AttractorKey::Cycle | AttractorKey::Ratio(..) | AttractorKey::Lasting(_) => {
+                fitting.sort_by_key(|a| std::cmp::Reverse(a.hits));
+            }
+        }
+        let mut meant: Vec<&Attractor> = Vec::new();
+        for attractor in fitting {
+            let image = |other: &&Attractor| {
+                let close =
+                    |r: &Vec<bool>| attractor.point.difference(&other.point, &system.scales, r) < 30.0 * tolerance;
+                system.reflections.iter().any(close)
+            };
+            if !meant.iter().any(image) {
+                meant.push(attractor);
+            }
+        }
+        Choice { meant }
+    }
+
+    pub(super) fn taken(&self) -> Option<&Point> {
+        self.meant.first().map(|attractor| &attractor.point)
+    }
+
+    /// That there is a choice between cycles, and what can be done about it.
+    pub(super) fn told(&self, system: &System) -> Option<String> {
+        let [first, others @ ..] = &self.meant[..] else { return None };
+        if others.is_empty() || first.point.solution.period().is_none() {
+            return None;
+        }
+        let others: Vec<String> = others.iter().map(|other| described(system, other)).collect();
+        Some(format!(
+            "{} fits and is taken as the one reached most often; so do: {}. A state on one of them, as `state = {{ … }}`, takes that one",
+            described(system, first),
+            others.join(", ")
+        ))
+    }
+}
+
+fn described(system: &System, attractor: &Attractor) -> String {
+    format!("{} ({})", kind(system, attractor), attractor.hits)
+}
+
+/// A cycle of a forced model is seen from where its plane of whirling stands; in an autonomous one that may turn with the shaft.
+fn kind(system: &System, attractor: &Attractor) -> String {
+    match (&attractor.point.solution, attractor.ratio) {
+        (Solution::Equilibrium(_), _) => "equilibrium".to_string(),
+        (Solution::Cycle(cycle), Some((p, q))) => format!("{p}:{q} cycle of period {:.6}", cycle.period),
+        (Solution::Cycle(cycle), None) => {
+            let sense = system.whirl.filter(|_| system.field.forced()).and_then(|whirl| whirl_sense(cycle, whirl));
+            let name = sense.map_or("cycle".to_string(), |sense| format!("{} whirl", sense.name()));
+            format!("{name} of period {:.6}", cycle.period)
+        }
+    }
+}
+
+/// What a census found.
+pub(super) fn summary(system: &System, census: &Census) -> String {
+    if let [found] = &census.attractors[..]
+        && found.hits == 0
+    {
+        let what = kind(system, found);
+        return format!(
+            "{what} of Newton's method; it attracts, but too slowly for samples to be followed until they have settled there"
+        );
+    }
+    let mut parts: Vec<String> = census.attractors.iter().map(|attractor| described(system, attractor)).collect();
+    if census.unsettled > 0 {
+        parts.push(format!("unsettled ({})", census.unsettled));
+    }
+    if census.escaped > 0 {
+        parts.push(format!("escaped ({})", census.escaped));
+    }
+    if !census.exits.is_empty() {
+        parts.push(format!("left the region in which the vector field is defined ({})", census.exits.len()));
+    }
+    if census.stuck > 0 {
+        parts.push(format!("stuck where steps became too small ({})", census.stuck));
+    }
+    if census.left > 0 {
+        parts.push(format!("left when that was known ({})", census.left));
+    }
+    format!("attractors (samples that went there): {}", parts.join(", "))
+}
+
+/// That nothing fits a key, what else was found, and what can be done.
+pub(super) fn missing(system: &System, seed: &SeedPlan, census: &Census, key: &AttractorKey) -> String {
+    let wanted = match key {
+        AttractorKey::Equilibrium => "no stable equilibrium".to_string(),
+        AttractorKey::Cycle => "no stable cycle".to_string(),
+        AttractorKey::Ratio(p, q) => format!("no stable {p}:{q} cycle"),
+        AttractorKey::Lasting(periods) => format!("no stable cycle of {periods} periods of the forcing"),
+    };
+    let all_escaped = census.attractors.is_empty() && census.unsettled == 0 && census.escaped > 0;
+    // Of what some samples did where others settled nothing follows.
+    let none = census.attractors.is_empty();
+    let (stuck, unsettled) = (census.stuck > 0, none && census.unsettled > 0);
+    let exit = census.exits.first().filter(|_| none);
+    let why = of_no_start(system, &seed.parameters, Seen { state: None, stuck, all_escaped, exit, unsettled });
+    let unnamed = census.attractors.iter().any(|a| a.point.solution.period().is_some() && a.ratio.is_none());
+    let single = match key {
+        AttractorKey::Ratio(..) if unnamed && system.whirl.is_some() => {
+            "; a cycle without a ratio is a single whirl with its harmonics: attractor = \"cycle\" takes it"
+        }
+        _ => "",
+    };
+    format!("{wanted} was found; {}{single}{why}", summary(system, census))
+}

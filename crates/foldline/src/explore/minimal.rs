@@ -1,0 +1,125 @@
+//! The minimal period of a cycle that was found.
+//!
+//! **Idea.** A cycle run through k times solves the equations of a cycle of the period kT, and whatever looks for cycles finds it
+//! as such too. Collocation on a mesh that is the same for each of the k turns has the symmetry of the model, a shift by
+//! one turn: a cycle run through k times keeps equal turns there, to the accuracy of Newton's method, and one that has
+//! bifurcated from it keeps turns that differ, however close it is. A cycle whose turns look alike is therefore
+//! computed once more on such a mesh.
+//!
+//! **Equations.** With the scale sᵢ of component i, the accuracy ε of Newton's method and the multipliers μ of the cycle, the
+//! trivial one left out:
+//!
+//!   (1)  d = max over t and i of |xᵢ(t + T/k) - xᵢ(t)| / (sᵢ + max |xᵢ|)
+//!   (2)  k turns look alike if d ≤ e^(1/3), e being the error of the cycle: next to a pitchfork, at which one turn
+//!        becomes several, an error e moves the solutions of a³ - λ a = e by e^(1/3) at most, up to a factor near 1
+//!   (3)  on the mesh of equal turns they are equal if d ≤ 10 ε / min |1 - μ|, and ε^(1/3) at most for the same reason;
+//!        where they are not, λ = |1 - μ|/2 and d² is of the size of λ, which is more unless d³ < ε
+//!
+//! **Fails when** the number of turns has a prime factor above 61.
+
+use super::System;
+use super::growth::{polished, problem_of};
+use crate::continuation::Settings;
+use crate::continuation::corrector::{Plane, correct, parameter_row};
+use crate::contract::Examination;
+use crate::diagram::{Cost, Cycle, Mesh, Point, Solution};
+
+/// Numbers of turns that are tried; any other one is a product of them.
+const PRIMES: [usize; 18] = [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53, 59, 61];
+/// Fewer mesh intervals than this do not resolve a turn.
+const FEWEST: usize = 4;
+
+/// The same cycle over its minimal period, that of a forced model being the smallest number of forcing periods; `None` if
+/// the cycle lasts no longer, or is an equilibrium.
+pub(super) fn reduced(system: &System, settings: &Settings, point: &Point) -> Option<Point> {
+    let mut found: Option<Point> = None;
+    while let Some(shorter) = once(system, settings, found.as_ref().unwrap_or(point)) {
+        found = Some(shorter);
+    }
+    found
+}
+
+/// One turn of a cycle run through a prime number of times.
+fn once(system: &System, settings: &Settings, point: &Point) -> Option<Point> {
+    let Solution::Cycle(cycle) = &point.solution else { return None };
+    let whole = |turns: usize| cycle.forcing_periods == 0 || (cycle.forcing_periods as usize).is_multiple_of(turns);
+    let fits = |turns: &usize| whole(*turns) && cycle.intervals() >= FEWEST * turns;
+    PRIMES.into_iter().filter(fits).find_map(|turns| one_of(system, settings, point, cycle, turns))
+}
+
+/// One of `turns` equal turns.
+fn one_of(system: &System, settings: &Settings, point: &Point, cycle: &Cycle, turns: usize) -> Option<Point> {
+    let error = point.trust.discretisation.max(settings.tolerance);
+    if !alike(cycle, &system.scales, turns, error.cbrt()) {
+        return None;
+    }
+    let Cycle { period, forcing_periods, degree, .. } = *cycle;
+    let equal = on_equal_turns(system, settings, point, cycle, turns)?;
+    let accuracy = settings.newton_tolerance();
+    let nearest = point.free_spectrum().iter().fold(1.0, |m: f64, z| m.min((z - 1.0).norm()));
+    let allowed = (10.0 * accuracy / nearest).min(accuracy.cbrt());
+    if !alike(&equal, &system.scales, turns, allowed) {
+        return None;
+    }
+    let intervals = equal.intervals() / turns;
+    let turn = Cycle {
+        period: equal.period / turns as f64,
+        forcing_periods: forcing_periods / turns as u32,
+        mesh: equal.mesh[..=intervals].iter().map(|t| t * turns as f64).collect(),
+        degree,
+        profile: equal.profile[..equal.profile.len() / turns].to_vec(),
+    };
+    let guess = Point { solution: Solution::Cycle(with_whole_end(turn)), ..point.clone() };
+    let found = polished(&mut *problem_of(system, 0, degree, &guess, false), settings, &guess).ok()?.point;
+    // Newton's method may have left for another cycle.
+    let same_period = (found.solution.period()? * turns as f64 - period).abs() <= 30.0 * settings.tolerance * period;
+    let expected = Point { solution: found.solution.clone(), ..point.clone() };
+    let same = same_period && found.difference(&expected, &system.scales, &[]) < 30.0 * settings.tolerance.max(allowed);
+    same.then(|| Point { position: point.position, ..found })
+}
+
+/// The cycle as collocation on a mesh of equal turns has it.
+fn on_equal_turns(system: &System, settings: &Settings, point: &Point, cycle: &Cycle, turns: usize) -> Option<Cycle> {
+    let wide = turns as f64;
+    // Boundaries of the first turn, without one that all but coincides with its end.
+    let close = 0.1 * wide / cycle.intervals() as f64;
+    let mut turn: Vec<f64> = cycle.mesh.iter().map(|t| t * wide).take_while(|t| *t < 1.0 - close).collect();
+    turn.push(1.0);
+    let whole: Vec<f64> = (0..turns).flat_map(|k| turn[1..].iter().map(move |t| (k as f64 + t) / wide)).collect();
+    let equal: Mesh = std::iter::once(0.0).chain(whole).collect();
+    let mut problem = problem_of(system, 0, cycle.degree, point, false);
+    let u = problem.unknowns_of(point);
+    problem.anchor(&u);
+    let mut u = problem.transfer(&u, &cycle.mesh, &equal);
+    problem.set_mesh(&equal);
+    problem.anchor(&u);
+    let plane = Plane { row: parameter_row(u.len()), base: u.clone(), distance: 0.0 };
+    correct(&mut *problem, settings, &plane, &mut u, &mut Cost::default()).ok()?;
+    match problem.point(&u, &[], Examination::default()).solution {
+        Solution::Cycle(equal) => Some(equal),
+        Solution::Equilibrium(_) => None,
+    }
+}
+
+/// Whether the turns of a cycle differ by no more than a share of scale and size of each component, (1).
+fn alike(cycle: &Cycle, scales: &[f64], turns: usize, share: f64) -> bool {
+    let n = cycle.dim();
+    let size =
+        |i: usize| cycle.profile.iter().skip(i).step_by(n).fold(scales[i], |m: f64, x| m.max(scales[i] + x.abs()));
+    let sizes: Vec<f64> = (0..n).map(size).collect();
+    // Boundaries of the mesh lie close together where the motion is fast.
+    cycle.mesh[1..].iter().all(|t| {
+        let (here, there) = (cycle.state(*t), cycle.state(t + 1.0 / turns as f64));
+        (0..n).all(|i| (here[i] - there[i]).abs() <= share * sizes[i])
+    })
+}
+
+/// The last boundary is 1 whatever rounding made of it.
+fn with_whole_end(mut cycle: Cycle) -> Cycle {
+    let mut boundaries = cycle.mesh.to_vec();
+    if let Some(last) = boundaries.last_mut() {
+        *last = 1.0;
+    }
+    cycle.mesh = boundaries.into();
+    cycle
+}

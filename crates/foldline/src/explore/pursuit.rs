@@ -1,0 +1,83 @@
+//! Has a sweep jumped, or is the response merely steep?
+//!
+//! **Idea.** The motion at one value of the parameter is solved for and followed to the next value as a branch. If it gets there
+//! without turning back, and is the motion to which the trajectory has settled there, the two are one solution. If it turns
+//! back on the way, or arrives at another motion, the sweep has jumped. A size alone says nothing: at a sharp resonance
+//! neighbouring values differ by much on one branch.
+//!
+//! **Fails when** one of the two cannot be solved for, or the branch ends on the way; it is not known then.
+
+use super::System;
+use super::growth::{Beginning, Growth, polished, problem_of, settings};
+use super::seeds::polish;
+use crate::attractors::Candidate;
+use crate::contract::Unobserved;
+use crate::diagram::{Branch, Ending, Family, Kind, Origin, Point, Solution};
+
+/// Points after which a branch between two neighbouring values is given up.
+const POINTS: usize = 300;
+
+/// The motion at the last value of a sweep.
+pub(super) struct Pursuit<'p> {
+    system: &'p System<'p>,
+    free: usize,
+    tolerance: f64,
+    degree: usize,
+    last: Option<Point>,
+}
+
+impl<'p> Pursuit<'p> {
+    pub(super) fn new(system: &'p System<'p>, free: usize, tolerance: f64, degree: usize) -> Pursuit<'p> {
+        Pursuit { system, free, tolerance, degree, last: None }
+    }
+
+    /// Whether the motion at the next value is another solution; `None` where that is not known.
+    pub(super) fn leaves(&mut self, parameters: &[f64], candidate: Option<&Candidate>) -> Option<bool> {
+        let point = candidate.and_then(|candidate| polish(self.system, parameters, self.tolerance, candidate));
+        let before = std::mem::replace(&mut self.last, point);
+        let (from, to) = before.as_ref().zip(self.last.as_ref())?;
+        let reached = self.followed(from, to.parameters[self.free])?;
+        Some(reached.is_none_or(|reached| reached.difference(to, &self.system.scales, &[]) > 30.0 * self.tolerance))
+    }
+
+    /// The solution followed to a value of the parameter; nothing where it turns back or ends in another branch on the way,
+    /// `None` where it cannot be followed.
+    fn followed(&self, from: &Point, value: f64) -> Option<Option<Point>> {
+        let start = from.parameters[self.free];
+        let (range, side) = ([start.min(value), start.max(value)], usize::from(value > start));
+        if start == value {
+            return Some(Some(from.clone()));
+        }
+        let settings = settings(self.system, self.tolerance, range, POINTS);
+        let mut problem = problem_of(self.system, self.free, self.degree, from, false);
+        let station = polished(&mut *problem, &settings, from).ok()?;
+        let (name, origin) = ("between two values", Origin::Seed(String::new()));
+        let family = match from.solution {
+            Solution::Equilibrium(_) => Family::Equilibrium,
+            Solution::Cycle(_) => Family::Cycle,
+        };
+        let mut branch = Branch::new(name, family, self.free, origin);
+        let growth = Growth {
+            system: self.system,
+            settings: &settings,
+            degree: self.degree,
+            ties: Vec::new(),
+            sides: [side == 0, side == 1],
+            parents: &[],
+            marks: &[],
+            observer: &Unobserved,
+            whole: false,
+            sparse: false,
+        };
+        growth.begin(&mut branch, Beginning::Inside(station));
+        if branch.special.iter().any(|special| special.kind == Kind::Fold) {
+            return Some(None);
+        }
+        let end = if side == 1 { branch.points.last() } else { branch.points.first() };
+        match branch.ends[side] {
+            Some(Ending::Bound(_)) => Some(end.cloned()),
+            Some(Ending::Joined { .. }) => Some(None),
+            _ => None,
+        }
+    }
+}
