@@ -63,6 +63,10 @@ struct Count<'o> {
 
 impl Count<'_> {
     fn visited(&self, responses: &[Response]) -> Verdict {
+        // Motions that were under way then are wrong.
+        if self.observer.stopping() {
+            return Verdict::Stop;
+        }
         let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
         let value = responses.first().map_or(f64::NAN, |r| r.value);
         self.observer.observe(Event::Visited(self.name, value, done, self.of))
@@ -95,7 +99,7 @@ fn one_sweep(
     let point = match seeds.point(*seed) {
         Ok(point) => point,
         Err(why) => {
-            observer.observe(Event::Note(name, &format!("no start: {why}")));
+            observer.observe(Event::Short(name, &format!("no start: {why}")));
             return None;
         }
     };
@@ -108,6 +112,9 @@ fn one_sweep(
     let report = |found: &[Response]| count.visited(found);
     let responses = stepped_sweep(&trial(system, 1), parameters, *free, values, &start, &report);
     let visited = responses.len();
+    if observer.stopping() {
+        return None;
+    }
     if visited < values.len() && count.done.load(Ordering::Relaxed) < visited {
         let value = responses.last().map_or(f64::NAN, |r| r.value);
         observer.observe(Event::Note(name, &format!("the trajectory escaped at the value {value}")));
