@@ -2,6 +2,7 @@
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
+use std::time::Duration;
 
 /// Numerical continuation and bifurcation analysis.
 ///
@@ -17,7 +18,8 @@ const EXIT_CODES: &str = "Exit codes:
   0  done
   1  something outside failed, such as a full disk
   2  a mistake in what was typed or in a file; the message says where, what and how to put it right
-  3  done, but some branch ended short of what was asked (or the run was stopped; `--resume` goes on)";
+  3  done, but something was not reached: a branch ended short, a switch led nowhere, a change of stability is not explained, samples
+     of an exploration did not settle (or the run was stopped; `--resume` goes on)";
 
 const VERIFY_CODES: &str = "Exit codes:
   0  every number is as accurate as it says
@@ -67,6 +69,9 @@ pub struct Run {
     /// Go on with a run that was stopped or killed
     #[arg(long)]
     pub resume: bool,
+    /// Stop after this time, such as 90s, 10min or 2h, and keep what was found; `--resume` goes on
+    #[arg(long, value_name = "TIME", value_parser = time)]
+    pub time_limit: Option<Duration>,
 }
 
 #[derive(Debug, Args)]
@@ -92,9 +97,12 @@ pub struct Explore {
     /// Seed of the random numbers; the same seed gives the same diagram
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(..=i64::MAX as u64))]
     pub seed: u64,
-    /// No branch is begun once this many points are accepted
-    #[arg(long, value_name = "N", default_value_t = 100_000, value_parser = clap::value_parser!(u32).range(1..=100_000_000))]
-    pub budget: u32,
+    /// No branch is begun once this many points are accepted; a time such as 60s is a time limit
+    #[arg(long, value_name = "N|TIME", default_value = "100000", value_parser = budget)]
+    pub budget: Budget,
+    /// Stop after this time, such as 90s, 10min or 2h, and keep what was found; `--resume` goes on
+    #[arg(long, value_name = "TIME", value_parser = time)]
+    pub time_limit: Option<Duration>,
     /// How many levels of period doubling are followed [default: 2]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(0..=16))]
     pub doublings: Option<u8>,
@@ -115,6 +123,38 @@ pub struct Explore {
     pub print: bool,
 }
 
+/// How much an exploration may do.
+#[derive(Clone, Copy, Debug)]
+pub struct Budget {
+    pub points: u32,
+    pub time: Option<Duration>,
+}
+
+const POINTS: u32 = 100_000;
+
+/// A number of points, or a time.
+fn budget(text: &str) -> Result<Budget, String> {
+    match text.parse::<u32>() {
+        Ok(points @ 1..=100_000_000) => Ok(Budget { points, time: None }),
+        Ok(_) => Err("a number of points from 1 to 100000000, or a time such as 60s".into()),
+        Err(_) => time(text).map(|time| Budget { points: POINTS, time: Some(time) }),
+    }
+}
+
+/// A time such as 90s, 10min or 2h.
+fn time(text: &str) -> Result<Duration, String> {
+    let said = || "a number with s, min or h, such as 90s, 10min or 2h".to_string();
+    let split = text.find(|c: char| !(c.is_ascii_digit() || c == '.')).unwrap_or(text.len());
+    let unit = match text[split..].trim() {
+        "s" => 1.0,
+        "min" => 60.0,
+        "h" => 3600.0,
+        _ => return Err(said()),
+    };
+    let seconds = text[..split].parse::<f64>().map_err(|_| said())? * unit;
+    Duration::try_from_secs_f64(seconds).ok().filter(|time| !time.is_zero()).ok_or_else(said)
+}
+
 #[derive(Debug, Args)]
 pub struct Table {
     /// Folder of the run
@@ -129,7 +169,8 @@ pub struct Table {
     /// One line for each branch, with how it ended
     #[arg(long, group = "what")]
     pub branches: bool,
-    /// Remarks: what was found for each seed, which routes the homotopies took, which switches led to known branches
+    /// Remarks: what was found for each seed, which routes the homotopies took, which switches led to known branches, what was not
+    /// reached
     #[arg(long, group = "what")]
     pub notes: bool,
     /// What surveys and sweeps saw

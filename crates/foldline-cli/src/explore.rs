@@ -24,7 +24,9 @@ pub fn diagram(typed: &Typed) -> Result<Outcome, Failure> {
     }
     let stem = typed.model.file_stem().unwrap_or("model".as_ref());
     let folder = typed.out.clone().unwrap_or_else(|| PathBuf::from("runs").join(format!("explore-{}", stem.display())));
-    carried_out(&study, typed.jobs.map_or_else(processors, usize::from), typed.resume, &folder)
+    let jobs = typed.jobs.map_or_else(processors, usize::from);
+    let limit = typed.time_limit.into_iter().chain(typed.budget.time).min();
+    carried_out(&study, jobs, typed.resume, limit, &folder)
 }
 
 /// The study that does what was typed.
@@ -81,7 +83,7 @@ fn study(typed: &Typed, model: &Model) -> Result<String, Failure> {
     if let Some((name, [low, high])) = connect {
         line(format_args!("connect = {{ {} = [{low:?}, {high:?}] }}", key(&name)));
     }
-    line(format_args!("budget = {}", typed.budget));
+    line(format_args!("budget = {}", typed.budget.points));
     if let Some(depth) = typed.doublings {
         line(format_args!("switch = {{ hopf = 4, branch-point = 4, period-doubling = {depth} }}"));
     }

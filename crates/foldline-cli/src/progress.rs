@@ -7,20 +7,44 @@ use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::collections::HashMap;
 use std::io::{IsTerminal, Write, stderr};
 use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
-/// One living line for each branch that is being followed; where there is no terminal, one line for each that is done.
+/// One live line for each branch that is being followed; where there is no terminal, one line for each that is done, and a reminder
+/// of those under way where nothing else is said for a while.
 pub struct Progress {
     lines: MultiProgress,
     terminal: bool,
     parameters: Vec<String>,
     live: Mutex<HashMap<String, Live>>,
+    /// When the last line was written.
+    said: Mutex<Instant>,
 }
+
+/// Longest silence without a terminal.
+const SILENCE: Duration = Duration::from_secs(8);
 
 struct Live {
     bar: ProgressBar,
     points: usize,
     special: usize,
     ends: Vec<Ending>,
+    /// Where it is.
+    place: String,
+    since: Instant,
+}
+
+impl Live {
+    fn moved(&mut self, place: String) {
+        self.bar.set_message(place.clone());
+        self.bar.tick();
+        (self.place, self.since) = (place, Instant::now());
+    }
+
+    fn still(&self, name: &str) -> String {
+        let seconds = self.since.elapsed().as_secs();
+        let since = if seconds > 1 { format!("   nothing new for {seconds} s") } else { String::new() };
+        format!("still at {name}: {}{since}", self.place.trim())
+    }
 }
 
 impl Progress {
@@ -32,6 +56,7 @@ impl Progress {
             terminal,
             parameters: model.parameters.iter().map(|p| p.name.clone()).collect(),
             live: Mutex::new(HashMap::new()),
+            said: Mutex::new(Instant::now()),
         }
     }
 
@@ -40,13 +65,12 @@ impl Progress {
             Event::Begin(branch) => self.begin(branch),
             Event::Point(branch, point) => self.with(branch, |live| {
                 live.points += 1;
-                live.bar.set_message(self.place(branch, point, live));
-                live.bar.tick();
+                live.moved(self.place(branch, point, live));
             }),
             Event::Special(branch, _) => self.with(branch, |live| live.special += 1),
             Event::SideEnded(branch, _, ending) => self.with(branch, |live| live.ends.push(ending.clone())),
             Event::End(branch) => self.end(branch),
-            Event::Note(branch, note) => self.say(&format!("{branch}: {note}")),
+            Event::Note(branch, note) | Event::Short(branch, note) => self.say(&format!("{branch}: {note}")),
             Event::Visited(name, value, done, of) => self.visited(name, value, done, of),
             Event::Responses(set) => self.responses(set),
         }
@@ -63,15 +87,14 @@ impl Progress {
             bar.set_style(style);
         }
         bar.set_prefix(name.to_string());
-        Live { bar, points, special, ends: Vec::new() }
+        Live { bar, points, special, ends: Vec::new(), place: "at its start".into(), since: Instant::now() }
     }
 
-    /// The living line of a survey or sweep begins at its first value.
+    /// The live line of a survey or sweep begins at its first value.
     fn visited(&self, name: &str, value: f64, done: usize, of: usize) {
         let mut live = self.live.lock().unwrap_or_else(PoisonError::into_inner);
         let line = live.entry(name.to_string()).or_insert_with(|| self.line(name, 0, 0));
-        line.bar.set_message(format!("{done:>5} of {of} values   at {value:.6}"));
-        line.bar.tick();
+        line.moved(format!("{done:>5} of {of} values   at {value:.6}"));
     }
 
     fn responses(&self, set: &Responses) {
@@ -113,7 +136,25 @@ impl Progress {
         ));
     }
 
-    /// Takes the living lines away.
+    /// Says what is under way, if nothing was said for a while.
+    pub fn remind(&self) {
+        let quiet = self.said.lock().unwrap_or_else(PoisonError::into_inner).elapsed() >= SILENCE;
+        if self.terminal || !quiet {
+            return;
+        }
+        let lines: Vec<String> = {
+            let live = self.live.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut lines: Vec<String> = live.iter().map(|(name, live)| live.still(name)).collect();
+            lines.sort();
+            lines
+        };
+        match lines.is_empty() {
+            true => self.say("still looking for first solutions"),
+            false => lines.iter().for_each(|line| self.say(line)),
+        }
+    }
+
+    /// Takes the live lines away.
     pub fn finish(&self) {
         let mut live = self.live.lock().unwrap_or_else(PoisonError::into_inner);
         live.drain().for_each(|(_, line)| line.bar.finish_and_clear());
@@ -121,6 +162,7 @@ impl Progress {
 
     /// A line that stays.
     fn say(&self, line: &str) {
+        *self.said.lock().unwrap_or_else(PoisonError::into_inner) = Instant::now();
         // Progress that cannot be shown is no reason to stop computing.
         let _ = if self.terminal { self.lines.println(line) } else { writeln!(stderr(), "{line}") };
     }

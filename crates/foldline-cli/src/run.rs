@@ -4,19 +4,19 @@ use crate::arguments::Run as Typed;
 use crate::failure::{Failure, Outcome};
 use crate::plot::draw;
 use crate::progress::Progress;
-use crate::table::print_special;
+use crate::table::{print_special, tell_short};
 use foldline::contract::{Event, Observer, Verdict};
 use foldline::diagram::{Branch, Diagram, Point};
 use foldline::explore;
 use foldline_plot::Picture;
 use foldline_store::order::{names, ordered};
 use foldline_store::run_file::Recorder;
-use foldline_store::short;
 use foldline_store::study_file::{Study, parse_study, read_study};
 use std::io::{Write, stderr};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 const STUDY: &str = include_str!("../../../studies/overhung-rotor/bouncing.toml");
 const MODEL: &str = include_str!("../../../models/overhung-rotor.toml");
@@ -28,16 +28,22 @@ pub fn study(typed: &Typed) -> Result<Outcome, Failure> {
         let stem = typed.study.file_stem().unwrap_or("study".as_ref());
         PathBuf::from("runs").join(stem)
     });
-    carried_out(&study, typed.jobs.map_or_else(processors, usize::from), typed.resume, &folder)
+    carried_out(&study, typed.jobs.map_or_else(processors, usize::from), typed.resume, typed.time_limit, &folder)
 }
 
 /// Runs a study into a folder, or goes on with it there.
-pub fn carried_out(study: &Study, jobs: usize, resume: bool, folder: &Path) -> Result<Outcome, Failure> {
+pub fn carried_out(
+    study: &Study,
+    jobs: usize,
+    resume: bool,
+    limit: Option<Duration>,
+    folder: &Path,
+) -> Result<Outcome, Failure> {
     let (recorder, earlier) = match resume {
         true => Recorder::resume(folder, study)?,
         false => (Recorder::create(folder, study)?, Diagram::default()),
     };
-    run(study, jobs, recorder, earlier, folder)
+    run(study, jobs, recorder, earlier, limit, folder)
 }
 
 /// Runs the study that is built in, over an earlier run of it, and draws it.
@@ -46,7 +52,7 @@ pub fn reference_study() -> Result<Outcome, Failure> {
     let study = parse_study(STUDY, "overhung-rotor/bouncing.toml", MODEL, "overhung-rotor.toml")?;
     Recorder::discard(&folder)?;
     let recorder = Recorder::create(&folder, &study)?;
-    let outcome = run(&study, processors(), recorder, Diagram::default(), &folder)?;
+    let outcome = run(&study, processors(), recorder, Diagram::default(), None, &folder)?;
     // What the run still has in memory need not be all of it.
     let diagram = crate::table::read(&folder, foldline_store::run_file::Part::Everything)?.diagram;
     // In full view the peak of contact S, r = 51.7, would press everything else against the axis.
@@ -64,27 +70,39 @@ pub fn processors() -> usize {
     std::thread::available_parallelism().map_or(1, |n| n.get())
 }
 
-fn run(study: &Study, jobs: usize, recorder: Recorder, earlier: Diagram, folder: &Path) -> Result<Outcome, Failure> {
+fn run(
+    study: &Study,
+    jobs: usize,
+    recorder: Recorder,
+    earlier: Diagram,
+    limit: Option<Duration>,
+    folder: &Path,
+) -> Result<Outcome, Failure> {
     let watch = Watch { recorder, progress: Progress::new(&study.model), stop: stop_on_interrupt() };
+    let clock = Clock::new(limit);
     let system = explore::System::of_plan(&study.model, &study.plan);
-    let diagram = explore::run(&system, &study.plan, jobs, earlier, &watch);
+    let diagram = std::thread::scope(|scope| {
+        scope.spawn(|| clock.run(&watch));
+        let _done = Done(&clock);
+        explore::run(&system, &study.plan, jobs, earlier, &watch)
+    });
     watch.progress.finish();
     watch.recorder.finish()?;
 
     let diagram = ordered(diagram, &names(&study.plan));
     print_special(&diagram, &study.model)?;
-    let short = short::lines(&diagram, &study.plan, &study.model);
+    let whole = tell_short(&diagram, &study.plan, &study.model)?;
     let mut err = stderr().lock();
-    short.iter().try_for_each(|line| writeln!(err, "ended short: {}", line.replace('\n', "\n  ")))?;
     if !study.plan.homotopies.is_empty() {
         writeln!(err, "routes: foldline table {} --notes", folder.display())?;
     }
     let stopped = watch.stop.load(Ordering::Relaxed);
+    let why = limit.filter(|_| clock.is_up()).map_or(String::new(), |limit| format!(" at the time limit of {limit:?}"));
     if stopped {
-        writeln!(err, "stopped; go on with --resume --out {}", folder.display())?;
+        writeln!(err, "stopped{why}; go on with --resume --out {}", folder.display())?;
     }
     writeln!(err, "run: {}", folder.display())?;
-    Ok(if short.is_empty() && !stopped { Outcome::Done } else { Outcome::Short })
+    Ok(if whole && !stopped { Outcome::Done } else { Outcome::Short })
 }
 
 /// Records, shows, and stops when asked to.
@@ -98,7 +116,11 @@ impl Observer for Watch {
     fn observe(&self, event: Event) -> Verdict {
         let verdict = self.recorder.observe(event);
         self.progress.show(event);
-        if self.stop.load(Ordering::Relaxed) { Verdict::Stop } else { verdict }
+        if self.stopping() { Verdict::Stop } else { verdict }
+    }
+
+    fn stopping(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
     }
 
     fn stores(&self) -> bool {
@@ -110,7 +132,54 @@ impl Observer for Watch {
     }
 }
 
-/// Set by the first Ctrl-C, after which every branch ends at its next point; the second ends the program, which loses
+/// Stops a run when its time is up, and sees to it that something is said every now and then.
+struct Clock {
+    deadline: Option<Instant>,
+    up: AtomicBool,
+    over: Mutex<bool>,
+    changed: Condvar,
+}
+
+/// Ends the clock, whatever happens to the run.
+struct Done<'c>(&'c Clock);
+
+impl Drop for Done<'_> {
+    fn drop(&mut self) {
+        *self.0.over.lock().unwrap_or_else(PoisonError::into_inner) = true;
+        self.0.changed.notify_all();
+    }
+}
+
+impl Clock {
+    /// How often it looks.
+    const TICK: Duration = Duration::from_millis(200);
+
+    fn new(limit: Option<Duration>) -> Clock {
+        // A limit beyond all time is none.
+        let deadline = limit.and_then(|limit| Instant::now().checked_add(limit));
+        Clock { deadline, up: AtomicBool::new(false), over: Mutex::new(false), changed: Condvar::new() }
+    }
+
+    fn is_up(&self) -> bool {
+        self.up.load(Ordering::Relaxed)
+    }
+
+    fn run(&self, watch: &Watch) {
+        let mut over = self.over.lock().unwrap_or_else(PoisonError::into_inner);
+        while !*over {
+            let now = Instant::now();
+            if self.deadline.is_some_and(|deadline| now >= deadline) && !watch.stop.swap(true, Ordering::Relaxed) {
+                self.up.store(true, Ordering::Relaxed);
+            }
+            watch.progress.remind();
+            let left = self.deadline.map_or(Clock::TICK, |deadline| deadline.saturating_duration_since(now));
+            let pause = left.clamp(Duration::from_millis(1), Clock::TICK);
+            over = self.changed.wait_timeout(over, pause).map_or_else(|e| e.into_inner().0, |(over, _)| over);
+        }
+    }
+}
+
+/// Set by the first Ctrl-C, after which the run ends where it is; the second ends the program, which loses
 /// nothing that was accepted.
 pub fn stop_on_interrupt() -> Arc<AtomicBool> {
     let stop = Arc::new(AtomicBool::new(false));

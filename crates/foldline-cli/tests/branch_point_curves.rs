@@ -150,3 +150,77 @@ fn opens(model: &str, begins: bool) {
         }
     }
 }
+
+/// Cycles of radius p1 and p2 about the origin, of period 1, cross where the two are equal; demo `lcbp` of AUTO-07p.
+const RINGS: &str = "name = \"rings\"\n[parameters]\np1 = 1\np2 = 2\np3 = 0\n[definitions]\nq = \"sqrt(x^2 + y^2)\"\n\
+    g = \"(q - p1)*(q - p2) + p3\"\n[states]\nx = \"-x*g - 2*pi*y\"\ny = \"-y*g + 2*pi*x\"\n";
+
+fn of_rings(curve: &str) -> Diagram {
+    let study = study(
+        RINGS,
+        &format!(
+            "[[seed]]\nname = \"s\"\nstate = {{ x = 2, y = 0 }}\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"p1\"\n\
+             range = [0.5, 5]\n[[curve]]\nname = \"curve\"\nhold = \"branch-point\"\nof = \"b\"\n{curve}\n"
+        ),
+    );
+    run(&System::of_plan(&study.model, &study.plan), &study.plan, 1, Diagram::default(), &Unobserved)
+}
+
+#[test]
+fn branch_points_of_cycles_lie_where_two_radii_agree() {
+    let diagram = of_rings("free = \"p2\"\nrange = [1.2, 4]\nmark = { p2 = 3 }");
+    let curve = diagram.branch("curve").unwrap();
+    for end in &curve.ends {
+        assert!(matches!(end, Some(Ending::Bound(_))), "{end:?}");
+    }
+    assert!(curve.points.len() > 5, "{}", curve.points.len());
+    for point in &curve.points {
+        let [p1, p2] = [0, 1].map(|k| point.parameters[k]);
+        assert!(point.parameters.len() == 3 && (p1 - p2).abs() < 1e-7 * p2, "{p1} {p2}");
+        assert!((point.ranges[0][1] - p2).abs() < 1e-6 && (point.solution.period().unwrap() - 1.0).abs() < 1e-7);
+    }
+    let marks: Vec<f64> =
+        curve.special.iter().filter(|s| s.kind == Kind::Mark).map(|s| s.point.parameters[0]).collect();
+    assert!(marks.len() == 1 && (marks[0] - 3.0).abs() < 1e-6, "{marks:?}");
+}
+
+#[test]
+fn branch_points_of_cycles_that_a_second_parameter_opens_are_not_followed() {
+    // For p3 ≠ 0 the radii no longer cross: they meet in folds, or not at all.
+    let diagram = of_rings("free = \"p3\"\nrange = [-0.2, 0.2]");
+    let curve = diagram.branch("curve").unwrap();
+    let said = curve.ends.iter().flatten().map(|end| end.to_string()).collect::<Vec<_>>();
+    assert!(
+        curve.points.is_empty() && said.iter().all(|end| end.contains("at this value of the second parameter only")),
+        "{said:?}"
+    );
+}
+
+#[test]
+fn the_symmetry_of_lorenz_cycles_breaks_on_a_curve_that_passes_the_branch_points_of_branches() {
+    let lorenz = include_str!("../../../models/lorenz.toml");
+    let cycles = |sigma: f64, rest: &str| {
+        let study = study(
+            lorenz,
+            &format!(
+                "[[seed]]\nname = \"s\"\nattractor = \"cycle\"\nparameters = {{ rho = 350, sigma = {sigma} }}\n\
+                 [[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"rho\"\nrange = [305, 360]\n{rest}"
+            ),
+        );
+        run(&System::of_plan(&study.model, &study.plan), &study.plan, 1, Diagram::default(), &Unobserved)
+    };
+    let rho = |branch: &Branch| {
+        branch.special.iter().find(|s| s.kind == Kind::BranchPoint).unwrap().point.parameters[branch.free]
+    };
+    let curve = "[[curve]]\nname = \"curve\"\nhold = \"branch-point\"\nof = \"b\"\nfree = \"sigma\"\nuntil = 10.2\n\
+        branch-range = [280, 360]\n";
+    let both = cycles(10.0, curve);
+    // Sparrow 1982: the symmetric cycle loses its symmetry at rho = 312.97.
+    assert!((rho(both.branch("b").unwrap()) - 312.97).abs() < 0.01, "{}", rho(both.branch("b").unwrap()));
+    let curve = both.branch("curve").unwrap();
+    let end = curve.points.last().unwrap();
+    let (_, first) = curve.held.unwrap();
+    assert!((end.parameters[curve.free] - 10.2).abs() < 1e-9, "{:?}", curve.ends);
+    let there = rho(cycles(10.2, "").branch("b").unwrap());
+    assert!((end.parameters[first] - there).abs() < 1e-6 * there, "{} {there}", end.parameters[first]);
+}

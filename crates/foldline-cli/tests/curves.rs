@@ -25,6 +25,7 @@ fn with_curve(mut study: Study, hold: Kind, near: f64, second: &str, range: [f64
         free: study.model.parameter_index(second).unwrap(),
         ranges: [study.plan.branches[0].range, range],
         until,
+        marks: Vec::new(),
         max_points: 500,
     };
     study.plan.curves.push(curve);
@@ -386,6 +387,7 @@ fn hopf_points_and_period_doublings_of_the_lure_system() {
             free: study.model.parameter_index("beta").unwrap(),
             ranges: [[0.35, 2.5], [0.7, 1.3]],
             until: Some(beta),
+            marks: Vec::new(),
             max_points: 500,
         });
         let diagram = grown(&study);
@@ -394,4 +396,38 @@ fn hopf_points_and_period_doublings_of_the_lure_system() {
         let last = if beta > 1.0 { curve.points.last() } else { curve.points.first() }.unwrap();
         assert!((last.parameters[0] - alpha).abs() < 1e-8 && last.parameters[1] == beta, "{:?}", last.parameters);
     }
+}
+
+/// Folds of cycles between two generalised Hopf points, through a cusp; demo `abcb` of AUTO-07p (Doedel and Heinemann 1983).
+#[test]
+fn a_curve_of_folds_of_cycles_ends_at_generalised_hopf_points() {
+    let model = "name = \"abc\"\n[parameters]\nD = 0\nalpha = 1\nbeta = 1.55\nB = 8\nS = 0.04\n[definitions]\ne = \"exp(x3)\"\n\
+        [states]\nx1 = \"-x1 + D*(1 - x1)*e\"\nx2 = \"-x2 + D*e*(1 - x1 - S*x2)\"\n\
+        x3 = \"-x3 - beta*x3 + D*B*e*(1 - x1 + alpha*S*x2)\"\n";
+    let diagram = grown(&study(
+        model,
+        "[[seed]]\nname = \"s\"\nstate = { x1 = 0, x2 = 0, x3 = 0 }\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"D\"\n\
+         range = [0, 0.4]\nswitch = { hopf = 1 }\n[[curve]]\nname = \"folds\"\nhold = \"fold\"\nof = \"b/hopf-1\"\nnear = 0.2137\n\
+         free = \"alpha\"\nrange = [0.9, 1.4]\nbranch-range = [0.1, 0.4]\n[[curve]]\nname = \"hopf\"\nhold = \"hopf\"\nof = \"b\"\n\
+         near = 0.2298\nfree = \"alpha\"\nrange = [0.9, 1.4]\nbranch-range = [0.1, 0.6]\n",
+    ));
+    let folds = diagram.branch("folds").unwrap();
+    complete(folds);
+    let mut ends: Vec<f64> = folds
+        .ends
+        .iter()
+        .flatten()
+        .filter_map(|end| match end {
+            Ending::Joined { at: Kind::GeneralisedHopf, parameter } => Some(*parameter),
+            _ => None,
+        })
+        .collect();
+    ends.sort_by(f64::total_cmp);
+    // AUTO ends at 1.09312; the other is on the curve of the Hopf point from which the cycles come. Both by two routes: the first Lyapunov
+    // coefficient vanishes there along curves of Hopf points.
+    let there = diagram.branch("hopf").unwrap();
+    let second = there.special.iter().filter(|s| s.kind == Kind::GeneralisedHopf).map(|s| s.point.parameters[1]);
+    let second = second.reduce(f64::max).unwrap();
+    assert!((second - 1.09312).abs() < 1e-5, "{second}");
+    assert!(ends.len() == 2 && (ends[1] - second).abs() < 1e-5 && (ends[0] - 1.026706).abs() < 1e-4, "{ends:?}");
 }

@@ -106,7 +106,7 @@ impl Diagram {
     fn only(&self, py: Python, branch: usize, name: &str) -> PyResult<Diagram> {
         let mut branch = self.branch(py, branch)?.clone();
         branch.name = name.to_string();
-        let diagram = diagram::Diagram { branches: vec![branch], responses: Vec::new() };
+        let diagram = diagram::Diagram { branches: vec![branch], ..diagram::Diagram::default() };
         Ok(Diagram { diagram: Arc::new(diagram), study: Arc::clone(&self.study), notes: Vec::new() })
     }
 

@@ -65,6 +65,6 @@ pub fn svg(py: Python, of: &Diagram, branches: Vec<usize>, x: &str, y: &str, siz
     let model = &of.study.model;
     let (x, y) = (Some(quantity(py, x, model)?), Some(quantity(py, y, model)?));
     let branches = branches.into_iter().map(|index| of.branch(py, index).cloned()).collect::<PyResult<_>>()?;
-    let shown = diagram::Diagram { branches, responses: Vec::new() };
+    let shown = diagram::Diagram { branches, ..diagram::Diagram::default() };
     Ok(foldline_plot::svg(&shown, model, &Picture { x, y, size: [size.0, size.1], ..Picture::default() }))
 }

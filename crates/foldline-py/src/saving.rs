@@ -15,6 +15,7 @@ pub fn save(folder: &Path, study: &Study, diagram: &Diagram, notes: &[(String, S
     };
     diagram.branches.iter().for_each(|branch| branch_told(&tell, branch));
     notes.iter().for_each(|(about, note)| tell(Event::Note(about, note)));
+    diagram.shortfalls.iter().for_each(|own| tell(Event::Short(&own.about, &own.what)));
     diagram.responses.iter().for_each(|set| tell(Event::Responses(set)));
     recorder.finish()
 }

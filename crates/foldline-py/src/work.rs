@@ -131,13 +131,17 @@ impl Observer for Watch {
             Event::Visited(name, value, done, of) => {
                 seen().place = format!("{name}: {done} of {of} values, at {value:.6}")
             }
-            Event::Note(about, note) => {
+            Event::Note(about, note) | Event::Short(about, note) => {
                 let mut notes = self.notes.lock().unwrap_or_else(PoisonError::into_inner);
                 notes.push((about.to_string(), note.to_string()));
             }
             _ => {}
         }
-        if self.stop.load(Ordering::Relaxed) { Verdict::Stop } else { verdict }
+        if self.stopping() { Verdict::Stop } else { verdict }
+    }
+
+    fn stopping(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
     }
 
     fn stores(&self) -> bool {

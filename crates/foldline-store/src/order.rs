@@ -26,6 +26,7 @@ impl Names<'_> {
         let plan = self.plan;
         let (name, from) = match what {
             Start::Seed(_) => return,
+            Start::EndOfSwitched(index, _) => return self.add(&Start::EndOf(*index)),
             Start::EndOf(index) => (&plan.branches[*index].name, Some(&plan.branches[*index].start)),
             Start::EndOfCurve(index) => (&plan.curves[*index].name, None),
             Start::EndOfHomotopy(index) => (&plan.homotopies[*index].name, Some(&plan.homotopies[*index].start)),

@@ -1,77 +1,123 @@
 //! What of a study was not reached.
 
 use crate::order::leg;
-use foldline::diagram::{Branch, Diagram, Ending, Motion, Point};
-use foldline::explore::Plan;
+use foldline::diagram::{Branch, Diagram, Ending, Kind, Motion, Point, Shortfall};
+use foldline::explore::{HomotopyPlan, Plan, SweepPlan};
 use foldline::model::Model;
 
-/// What of the study was not reached, a line each.
+/// What of the study was not reached, a line each; further lines of one have reasons and cures.
 ///
 /// A homotopy is there as soon as one of its legs is; that others of them turned back is how it found its way.
 pub fn lines(diagram: &Diagram, plan: &Plan, model: &Model) -> Vec<String> {
-    let mut lines = Vec::new();
+    let mut lines = absent(diagram, plan);
+    lines.extend(plan.homotopies.iter().filter_map(|homotopy| not_arrived(diagram, homotopy, model)));
+    for exploration in &plan.explorations {
+        let part = |branch: &Branch| branch.name.strip_prefix(&exploration.name).is_some_and(|n| n.starts_with('/'));
+        if diagram.branches.iter().filter(|b| part(b)).all(|b| b.points.is_empty()) {
+            lines.push(format!("{}: no branch was followed", exploration.name));
+        }
+    }
+    lines.extend(plan.sweeps.iter().filter_map(|sweep| cut_off(diagram, sweep, model)));
+    let targets = targets(plan);
+    for branch in &diagram.branches {
+        let is_leg = plan.homotopies.iter().any(|homotopy| leg(&branch.name, &homotopy.name).is_some());
+        if !is_leg {
+            let target = targets.iter().find(|(name, _)| **name == branch.name).and_then(|(_, target)| *target);
+            lines.extend(ended(branch, target, model));
+        }
+        lines.extend(unexplained(branch, model));
+    }
+    // Where a line says already that something is missing, what is known of it stands behind.
+    for Shortfall { about, what } in &diagram.shortfalls {
+        let own = format!("{about}: it ");
+        match lines.iter_mut().find(|line| line.starts_with(&own)) {
+            Some(line) => *line = format!("{line}\n{what}"),
+            None => lines.push(format!("{about}: {what}")),
+        }
+    }
+    lines
+}
+
+/// Branches and curves by name, with the parameter and value at which each is to end.
+fn targets(plan: &Plan) -> Vec<(&String, Option<(usize, f64)>)> {
     let curves = plan.curves.iter().map(|curve| (&curve.name, curve.until.map(|target| (curve.free, target))));
     let branches = plan.branches.iter().map(|branch| (&branch.name, branch.until.map(|target| (branch.free, target))));
-    let asked: Vec<(&String, Option<(usize, f64)>)> = branches.chain(curves).collect();
-    let never = asked.iter().filter(|(name, _)| diagram.branch(name).is_none());
-    lines.extend(never.map(|(name, _)| format!("{name}: it never began")));
+    branches.chain(curves).collect()
+}
+
+/// What is not there at all.
+fn absent(diagram: &Diagram, plan: &Plan) -> Vec<String> {
+    let targets = targets(plan);
+    let never = targets.iter().filter(|(name, _)| diagram.branch(name).is_none());
     let simulated = plan.surveys.iter().map(|s| &s.name).chain(plan.sweeps.iter().map(|s| &s.name));
     let missing = simulated.filter(|name| diagram.response_set(name).is_none());
-    lines.extend(missing.map(|name| format!("{name}: it is not complete")));
-    let swept = plan.sweeps.iter().filter_map(|sweep| Some((sweep, diagram.response_set(&sweep.name)?)));
-    lines.extend(swept.filter_map(|(sweep, set)| {
-        let last = set.responses.last().filter(|last| last.motion == Motion::Escaped)?;
-        Some(format!(
+    let never = never.map(|(name, _)| format!("{name}: it never began"));
+    never.chain(missing.map(|name| format!("{name}: it is not complete"))).collect()
+}
+
+fn not_arrived(diagram: &Diagram, homotopy: &HomotopyPlan, model: &Model) -> Option<String> {
+    let legs: Vec<&Branch> = diagram.branches.iter().filter(|b| leg(&b.name, &homotopy.name).is_some()).collect();
+    let HomotopyPlan { name, targets, .. } = homotopy;
+    match legs.iter().any(|leg| arrived(leg, targets)) {
+        _ if legs.is_empty() => Some(format!("{name}: it never began")),
+        true => None,
+        false => Some(format!("{name}: it did not arrive at {}", place(targets, model))),
+    }
+}
+
+/// A sweep whose trajectory did not stay bounded to its end.
+fn cut_off(diagram: &Diagram, sweep: &SweepPlan, model: &Model) -> Option<String> {
+    let last = diagram.response_set(&sweep.name)?.responses.last()?;
+    (last.motion == Motion::Escaped).then(|| {
+        format!(
             "{}: at {} the motion {}; the sweep ends there, {} of {} values visited\n\
              likely cause: what was followed ceases to attract, or its basin becomes so narrow that a step of the sweep leads out of it\n\
              what to do: take smaller steps there, or follow the motion as a branch, which passes the point where it ceases to attract",
             sweep.name,
             place(&[(sweep.free, last.value)], model),
             last.fate(),
-            set.responses.len(),
+            diagram.response_set(&sweep.name).map_or(0, |set| set.responses.len()),
             sweep.values.len()
-        ))
-    }));
-    for homotopy in &plan.homotopies {
-        let legs: Vec<&Branch> = diagram.branches.iter().filter(|b| leg(&b.name, &homotopy.name).is_some()).collect();
-        if legs.is_empty() {
-            lines.push(format!("{}: it never began", homotopy.name));
-        } else if !legs.iter().any(|leg| arrived(leg, &homotopy.targets)) {
-            lines.push(format!("{}: it did not arrive at {}", homotopy.name, place(&homotopy.targets, model)));
-        }
-    }
-    for exploration in &plan.explorations {
-        let part = |branch: &Branch| branch.name.strip_prefix(&exploration.name).is_some_and(|n| n.starts_with('/'));
-        let points: usize = diagram.branches.iter().filter(|b| part(b)).map(|b| b.points.len()).sum();
-        match points {
-            0 => lines.push(format!("{}: no branch was followed", exploration.name)),
-            _ if points >= exploration.budget => lines.push(format!(
-                "{}: the budget of {} points is used up; begin again with a larger one",
-                exploration.name, exploration.budget
-            )),
-            _ => {}
-        }
-    }
-    for branch in &diagram.branches {
-        if plan.homotopies.iter().any(|homotopy| leg(&branch.name, &homotopy.name).is_some()) {
-            continue;
-        }
-        let before = lines.len();
-        let short = branch.ends.iter().flatten().filter(|end| !end.complete());
-        lines.extend(short.map(|end| format!("{}: {end}", branch.name)));
-        // A branch that did not begin has not begun on either side.
-        lines.dedup();
-        if branch.ends.iter().all(Option::is_none) {
-            lines.push(format!("{}: it is not finished", branch.name));
-        }
-        let target = asked.iter().find(|(name, _)| **name == branch.name).and_then(|(_, target)| *target);
-        if let Some(target) = target.filter(|target| lines.len() == before && !arrived(branch, &[*target])) {
-            let ends: Vec<String> = branch.ends.iter().flatten().map(Ending::brief).collect();
-            let place = place(&[target], model);
-            lines.push(format!("{}: it did not arrive at {place}; {}", branch.name, ends.join("; ")));
-        }
+        )
+    })
+}
+
+/// How a branch ended short of its target, or otherwise than it should.
+fn ended(branch: &Branch, target: Option<(usize, f64)>, model: &Model) -> Vec<String> {
+    let short = branch.ends.iter().flatten().filter(|end| !end.complete());
+    let mut lines: Vec<String> = short.map(|end| format!("{}: {end}", branch.name)).collect();
+    // A branch that did not begin has not begun on either side.
+    lines.dedup();
+    let whole = lines.is_empty();
+    if branch.ends.iter().all(Option::is_none) {
+        lines.push(format!("{}: it is not finished", branch.name));
+    } else if let Some(target) = target.filter(|target| whole && !arrived(branch, &[*target])) {
+        let ends: Vec<String> = branch.ends.iter().flatten().map(Ending::brief).collect();
+        let place = place(&[target], model);
+        lines.push(format!("{}: it did not arrive at {place}; {}", branch.name, ends.join("; ")));
     }
     lines
+}
+
+/// Changes of stability that no special point explains.
+fn unexplained(branch: &Branch, model: &Model) -> Option<String> {
+    let own = branch.special.iter().filter(|special| special.kind == Kind::Unexplained);
+    let places: Vec<f64> = own.filter_map(|special| special.point.parameters.get(branch.free).copied()).collect();
+    let low = places.iter().copied().reduce(f64::min)?;
+    let high = places.iter().copied().reduce(f64::max)?;
+    let parameter = model.parameters.get(branch.free).map_or("?", |parameter| parameter.name.as_str());
+    let changes = match places.len() {
+        1 => format!("a change of stability at {parameter} = {low:.6} is not explained"),
+        count if low == high => format!("{count} changes of stability at {parameter} = {low:.6} are not explained"),
+        count => {
+            format!("{count} changes of stability from {parameter} = {low:.6} to {high:.6} are not explained")
+        }
+    };
+    Some(format!(
+        "{}: {changes} by a special point\nwhat to do: take the stability next to it as uncertain; `foldline verify` and a smaller tolerance \
+         may tell more",
+        branch.name
+    ))
 }
 
 /// Whether one end of a branch has these values of these parameters. A point at a bound has its value but for rounding.
@@ -95,7 +141,7 @@ fn place(targets: &[(usize, f64)], model: &Model) -> String {
 mod tests {
     use super::*;
     use crate::study_file::{Study, parse_study};
-    use foldline::diagram::{Cost, Family, Kind, Origin, Solution, Trust};
+    use foldline::diagram::{Cost, Family, Origin, Solution, SpecialPoint, Trust};
 
     const MODEL: &str = "name = \"m\"\n[parameters]\nOmega = 1\nkappa = 0\n[states]\nx = \"-x\"\n";
     const STUDY: &str = "model = \"m\"\n[[seed]]\nname = \"s\"\nstate = { x = 0 }\n\
@@ -161,6 +207,41 @@ mod tests {
             "b: it did not arrive at Omega = 4; reached 0",
             "c: step too small: a cusp",
             "b/hopf-1: stopped at the limit of 7 points",
+        ];
+        assert_eq!(found, expected);
+    }
+
+    #[test]
+    fn an_unexplained_change_of_stability_is_short_of_what_was_asked() {
+        let mut found = branch("b", None, Ending::Bound(4.0), [4.0, 0.0]);
+        let special = |kind: Kind, value: f64| SpecialPoint {
+            kind,
+            point: Point { parameters: vec![value, 0.0], ..found.points[0].clone() },
+            unstable_before: 0,
+            unstable_after: 1,
+            error: 1e-8,
+            coefficients: Vec::new(),
+        };
+        let places = [special(Kind::Unexplained, 1.5), special(Kind::Fold, 2.0), special(Kind::Unexplained, 2.5)];
+        found.special.extend(places);
+        let lines = said(vec![found]);
+        let own: Vec<&String> = lines.iter().filter(|line| line.starts_with("b: ")).collect();
+        assert_eq!(own.len(), 1, "{lines:?}");
+        assert!(own[0].starts_with("b: 2 changes of stability from Omega = 1.500000 to 2.500000 are not explained"));
+    }
+
+    #[test]
+    fn what_is_known_of_something_missing_stands_behind_it() {
+        let study = study();
+        let short = |about: &str, what: &str| Shortfall { about: about.into(), what: what.into() };
+        let branches = vec![branch("b", None, Ending::Bound(4.0), [4.0, 0.0])];
+        let shortfalls =
+            vec![short("b", "hopf 2.0 of b: no branch found to switch to"), short("h", "there is nothing")];
+        let found = lines(&Diagram { branches, shortfalls, ..Diagram::default() }, &study.plan, &study.model);
+        let expected = [
+            "c: it never began",
+            "h: it never began\nthere is nothing",
+            "b: hopf 2.0 of b: no branch found to switch to",
         ];
         assert_eq!(found, expected);
     }

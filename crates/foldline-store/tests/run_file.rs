@@ -3,7 +3,7 @@
 use foldline::contract::{Event, Observer, Verdict};
 use foldline::diagram::{
     Branch, Cost, Cycle, Diagram, Ending, Family, Kind, Motion, Origin, Point, Response, Responses, Search, Share,
-    Solution, SpecialPoint, Trust,
+    Shortfall, Solution, SpecialPoint, Trust,
 };
 use foldline_store::run_file::{Part, Recorder, RunFileError, load, load_part, path_in};
 use foldline_store::study_file::{Study, parse_study};
@@ -126,7 +126,11 @@ fn diagram() -> Diagram {
     let sets = [("what attracts", Search::Survey), ("down", Search::Sweep)];
     let sets =
         sets.map(|(name, search)| Responses { name: name.into(), search, free: 2, responses: responses.clone() });
-    Diagram { branches: vec![main, cycles, third, curve], responses: sets.to_vec() }
+    let shortfalls = vec![
+        Shortfall { about: "main".into(), what: "hopf 0.15 of main: no branch found to switch to".into() },
+        Shortfall { about: "third".into(), what: "two\nlines".into() },
+    ];
+    Diagram { branches: vec![main, cycles, third, curve], responses: sets.to_vec(), shortfalls }
 }
 
 fn record(diagram: &Diagram, observer: &dyn Observer) {
@@ -135,6 +139,7 @@ fn record(diagram: &Diagram, observer: &dyn Observer) {
         assert_eq!(observer.observe(Event::Visited(&set.name, 0.5, 1, 4)), Verdict::Continue);
         assert_eq!(observer.observe(Event::Responses(set)), Verdict::Continue);
     });
+    diagram.shortfalls.iter().for_each(|own| _ = observer.observe(Event::Short(&own.about, &own.what)));
     for branch in &diagram.branches {
         let mut bare = branch.clone();
         (bare.points, bare.special, bare.ends) = (Vec::new(), Vec::new(), [None, None]);
@@ -177,7 +182,7 @@ fn exactly(diagram: &Diagram) -> String {
             text += &of_point(&s.point);
         }
     }
-    text += &format!("{:?}", diagram.responses);
+    text += &format!("{:?} {:?}", diagram.responses, diagram.shortfalls);
     text
 }
 

@@ -84,6 +84,7 @@ fn curves_and_homotopies_become_plans() {
         free: 1,
         ranges: [[-1.0, 2.0], [0.5, 3.0]],
         until: Some(2.5),
+        marks: Vec::new(),
         max_points: 5000,
     };
     let doublings = CurvePlan {
@@ -94,6 +95,7 @@ fn curves_and_homotopies_become_plans() {
         free: 2,
         ranges: [[0.5, 1.5], [0.0, 0.5]],
         until: None,
+        marks: Vec::new(),
         max_points: 70,
     };
     assert_eq!(plan.curves, [folds, doublings]);
@@ -153,13 +155,6 @@ fn mistakes_about_what_is_held() {
         ("hold = \"fold\"", "", "[[curve]]", "does not say what is held", "\"hopf\""),
         ("hold = \"fold\"", "hold = 1", "1", "not a text", "text"),
         ("hold = \"period-doubling\"", "hold = \"hopf\"", "\"hopf\"", "cycles have no Hopf points", "torus"),
-        (
-            "hold = \"period-doubling\"",
-            "hold = \"branch-point\"",
-            "\"branch-point\"",
-            "of cycles cannot be held",
-            "torus",
-        ),
         ("near = 0.25", "near = 7", "7", "near mu = 7 there is no point", "branch-range"),
         ("near = 0.25", "neer = 0.25", "neer", "unknown key `neer` in a curve", "did you mean `near`"),
     ]);

@@ -53,6 +53,11 @@ pub trait VectorField: Send + Sync {
     /// `[(n + k_p) × lanes]` (state part first, then all parameters); writes `[n × lanes]`.
     fn directional(&self, at: Batch, directions: &[&[f64]], out: &mut [f64]);
 
+    /// True once the field has no finite values any more because the run is to end: what takes long need not be begun.
+    fn ended(&self) -> bool {
+        false
+    }
+
     /// Whether f depends on time.
     fn forced(&self) -> bool {
         false
@@ -352,9 +357,12 @@ pub enum Event<'a> {
     SideEnded(&'a Branch, usize, &'a Ending),
     /// The branch is complete.
     End(&'a Branch),
-    /// A remark about a branch: a switch that led to a branch already known, a seed that was not found.
+    /// A remark about a branch: a switch that led to a branch already known, what the samples for a seed went to.
     Note(&'a str, &'a str),
-    /// A survey or sweep (its name) has settled at one more value of its parameter: the value, how many are done, of how many.
+    /// Something that was asked for and not reached: the name of a branch, exploration or sweep, and what was not reached and why.
+    Short(&'a str, &'a str),
+    /// A survey or sweep (its name) has settled at one more value of its parameter, or an exploration has sampled there: the value, how
+    /// many are done, of how many.
     Visited(&'a str, f64, usize, usize),
     /// A survey or sweep is complete.
     Responses(&'a Responses),
@@ -373,6 +381,12 @@ pub enum Verdict {
 pub trait Observer: Sync {
     /// Called once per event, from the thread that follows the branch.
     fn observe(&self, event: Event) -> Verdict;
+
+    /// True once everything is to end at once, in the middle of a point too. Called very often, from every thread. What is found after
+    /// that is not observed any more: numbers that were under way are wrong.
+    fn stopping(&self) -> bool {
+        false
+    }
 
     /// Whether [`Observer::recall`] answers. Profiles then need not stay in memory.
     fn stores(&self) -> bool {

@@ -12,8 +12,9 @@ use foldline::model::Model;
 use foldline_store::nearest::suggest;
 use foldline_store::order::{leg, names, ordered};
 use foldline_store::run_file::{Part, load_part};
+use foldline_store::short;
 use foldline_store::study_file::parse_study;
-use std::io::{Write, stdout};
+use std::io::{Write, stderr, stdout};
 use std::path::Path;
 
 /// A rectangle of cells under named columns.
@@ -70,7 +71,18 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
     let mut out = std::io::BufWriter::new(stdout().lock());
     write(&table, typed.format, &mut out)?;
     out.flush()?;
+    if typed.what() == What::Branches && typed.branch.is_none() {
+        tell_short(&run.diagram, &run.plan, &run.model)?;
+    }
     Ok(Outcome::Done)
+}
+
+/// Says on standard error what was not reached; returns whether that is nothing.
+pub fn tell_short(diagram: &Diagram, plan: &Plan, model: &Model) -> std::io::Result<bool> {
+    let lines = short::lines(diagram, plan, model);
+    let mut err = stderr().lock();
+    lines.iter().try_for_each(|line| writeln!(err, "ended short: {}", line.replace('\n', "\n  ")))?;
+    Ok(lines.is_empty())
 }
 
 /// Writes a table in a format.
@@ -112,6 +124,7 @@ pub fn read(folder: &Path, part: Part) -> Result<Run, Failure> {
     let seeds = study.plan.seeds.iter().map(|seed| &seed.name);
     let shown: Vec<&String> = seeds.chain(diagram.branches.iter().map(|b| &b.name)).collect();
     let mut notes = run.notes;
+    notes.extend(diagram.shortfalls.iter().map(|own| (own.about.clone(), format!("ended short: {}", own.what))));
     // Remarks about one thing stay in the order in which they were made.
     notes.sort_by_key(|(about, _)| shown.iter().position(|name| of_name(name, about)).unwrap_or(usize::MAX));
     Ok(Run { model: study.model, plan: study.plan, diagram, notes })

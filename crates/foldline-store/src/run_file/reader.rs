@@ -3,7 +3,7 @@
 use super::bytes::texts_checksum;
 use super::rows::{ending_in, held_in, kind_named, origin_in, point_in};
 use super::{APPLICATION_ID, FORMAT_VERSION, RunFileError, path_in};
-use foldline::diagram::{Branch, Diagram, Family, Point, SpecialPoint};
+use foldline::diagram::{Branch, Diagram, Family, Point, Shortfall, SpecialPoint};
 use rusqlite::{Connection, OpenFlags, Row};
 use std::path::{Path, PathBuf};
 
@@ -230,7 +230,20 @@ pub(super) fn load_diagram(connection: &Connection, path: &Path, part: Part) -> 
         diagram.branches.push(branch);
     }
     diagram.responses = super::responses::load(connection, path)?;
+    diagram.shortfalls = shortfalls(connection, path)?;
     Ok(diagram)
+}
+
+/// What was not reached; files of earlier programs do not say.
+fn shortfalls(connection: &Connection, path: &Path) -> Result<Vec<Shortfall>, RunFileError> {
+    let sql = "SELECT name FROM sqlite_master WHERE type = 'table' AND name = 'shortfalls'";
+    if read(connection, path, sql, &[], |_| Ok(()))?.is_empty() {
+        return Ok(Vec::new());
+    }
+    let text = |row: &Row, name: &str| row.get::<_, String>(name).map_err(|e| e.to_string());
+    read(connection, path, "SELECT about, what FROM shortfalls ORDER BY about, what", &[], |row| {
+        Ok(Shortfall { about: text(row, "about")?, what: text(row, "what")? })
+    })
 }
 
 /// One point, whole.

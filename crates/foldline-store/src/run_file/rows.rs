@@ -240,6 +240,7 @@ pub(super) fn ending_values(ending: &Ending) -> [Value; 4] {
         | Ending::MeshTooLarge(why)
         | Ending::SolutionUnbounded(why)
         | Ending::NotFinite(why)
+        | Ending::GivenUp(why)
         | Ending::NoStart(why) => (Some(why.clone()), None, None, None),
         Ending::PointLimit(points) => (None, None, Some(*points), None),
         Ending::Closed | Ending::Stopped => (None, None, None, None),
@@ -271,6 +272,7 @@ pub(super) fn ending_in(row: &Row) -> Result<Ending, String> {
             Ending::PointLimit(usize::try_from(count).map_err(|e| e.to_string())?)
         }
         "not-finite" => Ending::NotFinite(detail()?),
+        "given-up" => Ending::GivenUp(detail()?),
         "no-start" => Ending::NoStart(detail()?),
         "stopped" => Ending::Stopped,
         other => {

@@ -69,6 +69,11 @@ const LOG: i64 = 4 << 20;
 /// Events between two looks whether the file is still where it was.
 const LOOKS: usize = 16;
 
+/// What was not reached. A run that goes on finds out anew what is out of its reach.
+const SHORTFALLS: &str =
+    "CREATE TABLE IF NOT EXISTS shortfalls (about TEXT NOT NULL, what TEXT NOT NULL, UNIQUE (about, what));
+     DELETE FROM shortfalls;";
+
 /// Device and number of a file.
 type Identity = (u64, u64);
 
@@ -213,6 +218,7 @@ impl Recorder {
         };
         let columns = Columns::new(&study.model);
         responses::create(&connection, &study.model).map_err(failed)?;
+        connection.execute_batch(SHORTFALLS).map_err(failed)?;
         let special = [
             "branch",
             "kind",
@@ -372,6 +378,10 @@ impl Observer for Recorder {
             Event::Note(branch, note) => {
                 let row = [branch, note].map(|text| text.to_string().into()).to_vec();
                 self.write(|state| insert(&state.connection, "INSERT OR IGNORE INTO notes VALUES (?, ?)", row));
+            }
+            Event::Short(about, what) => {
+                let row = [about, what].map(|text| text.to_string().into()).to_vec();
+                self.write(|state| insert(&state.connection, "INSERT OR IGNORE INTO shortfalls VALUES (?, ?)", row));
             }
             Event::Responses(set) => {
                 self.write(|state| responses::write(&mut state.connection, &self.insert_response, set, self.shown));

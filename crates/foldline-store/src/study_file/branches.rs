@@ -10,6 +10,7 @@ use foldline::model::Model;
 use foldline::special::mark::Mark;
 use foldline::special::quantity::Quantity;
 use std::ops::Range;
+use toml::de::DeTable;
 
 pub(super) const KEYS: [&str; 10] =
     ["name", "description", "from", "free", "range", "until", "switch", "mark", "stop", "max-points"];
@@ -28,8 +29,7 @@ pub(super) fn read(
     let origin = origin(walk, item, ground, all);
     let free = free(walk, item, ground.model);
     let switching = table.get("switch").map(|value| switching(walk, value)).unwrap_or_default();
-    let mut marks = marks(walk, table.get("mark"), "`mark`", false, ground.model);
-    marks.extend(self::marks(walk, table.get("stop"), "`stop`", true, ground.model));
+    let marks = marks(walk, table, ground.model);
     let max_points = max_points(walk, item);
     let start_value = origin.as_ref().zip(free).and_then(|((_, at, _), free)| at[free]);
     let bounds = bounds(walk, item, start_value, free.map(|f| ground.model.parameters[f].name.as_str()));
@@ -153,8 +153,15 @@ pub(super) fn range(walk: &mut Walk, value: &Value) -> Option<[f64; 2]> {
     Some([low, high])
 }
 
+/// What `mark` and `stop` of a table say.
+pub(super) fn marks(walk: &mut Walk, table: &DeTable, model: &Model) -> Vec<Mark> {
+    let mut marks = values(walk, table.get("mark"), "`mark`", false, model);
+    marks.extend(values(walk, table.get("stop"), "`stop`", true, model));
+    marks
+}
+
 /// Values of quantities: a number each, or a list.
-fn marks(walk: &mut Walk, value: Option<&Value>, what: &str, stop: bool, model: &Model) -> Vec<Mark> {
+fn values(walk: &mut Walk, value: Option<&Value>, what: &str, stop: bool, model: &Model) -> Vec<Mark> {
     let Some(table) = value.and_then(|value| walk.table(value, what)) else { return Vec::new() };
     let mut marks = Vec::new();
     for (key, value) in table.iter() {

@@ -1,25 +1,38 @@
 //! `[[curve]]`: special points held along a curve in two parameters.
 
-use super::branches::{bounds, free, range, switch_step};
+use super::branches::{bounds, free, marks, range, switch_step};
 use super::items::{Ground, Item, Known, max_points, noun, said_or_further_down, written};
 use crate::nearest::suggest;
 use crate::toml_walk::{Value, Walk};
+use foldline::contract::VectorField;
 use foldline::diagram::{Family, Kind};
 use foldline::explore::{BranchPlan, CurvePlan, Start};
 
-pub(super) const KEYS: [&str; 10] =
-    ["name", "description", "hold", "of", "near", "free", "range", "branch-range", "until", "max-points"];
+pub(super) const KEYS: [&str; 12] = [
+    "name",
+    "description",
+    "hold",
+    "of",
+    "near",
+    "free",
+    "range",
+    "branch-range",
+    "until",
+    "mark",
+    "stop",
+    "max-points",
+];
 const HELD: [Kind; 5] = [Kind::Fold, Kind::BranchPoint, Kind::Hopf, Kind::PeriodDoubling, Kind::Torus];
 
 /// The branch on which the special point lies.
-struct Base {
+pub(super) struct Base {
     /// As the plan names it.
     name: String,
     /// The branch of the plan: this one, or the one from which it is switched to.
-    plan: BranchPlan,
-    beginning: Vec<Option<f64>>,
+    pub(super) plan: BranchPlan,
+    pub(super) beginning: Vec<Option<f64>>,
     /// Equilibria or cycles, if that is known.
-    family: Option<Family>,
+    pub(super) family: Option<Family>,
 }
 
 /// A curve; its plan goes to the items read so far.
@@ -33,12 +46,15 @@ pub(super) fn read(
     let table = item.table;
     walk.only(table, &KEYS, "a curve");
     let base = base(walk, item, ground, all);
-    let hold = hold(walk, item, base.as_ref().and_then(|base| base.family));
+    // A forced model has no equilibria.
+    let forced = ground.model.forced().then_some(Family::Cycle);
+    let hold = hold(walk, item, forced.or(base.as_ref().and_then(|base| base.family)));
     let first = base.as_ref().map(|base| ground.model.parameters[base.plan.free].name.clone());
     let branch_range = branch_range(walk, item, base.as_ref(), first.as_deref());
     let near = near(walk, item, branch_range, first.as_deref());
     let second = second(walk, item, ground, base.as_ref());
     let max_points = max_points(walk, item);
+    let marks = marks(walk, table, ground.model);
     let start = base.as_ref().zip(second).and_then(|(base, second)| base.beginning[second]);
     let second_name = second.map(|index| ground.model.parameters[index].name.as_str());
     // Where the curve starts must be known for a target alone to make a range; of a branch with mistakes it never is.
@@ -61,10 +77,11 @@ pub(super) fn read(
         free,
         ranges: [branch_range, range],
         until,
+        marks,
         max_points,
     });
     let family = match hold {
-        Kind::Hopf | Kind::BranchPoint => Some(Family::Equilibrium),
+        Kind::Hopf => Some(Family::Equilibrium),
         Kind::PeriodDoubling | Kind::Torus => Some(Family::Cycle),
         _ => base.family,
     };
@@ -106,13 +123,13 @@ fn base(walk: &mut Walk, item: &Item, ground: &Ground, all: &[Item]) -> Option<B
     None
 }
 
-fn of_branch(ground: &Ground, known: &Known, index: usize) -> Base {
+pub(super) fn of_branch(ground: &Ground, known: &Known, index: usize) -> Base {
     let plan = ground.items.branches[index].clone();
     Base { name: known.name.clone(), plan, beginning: known.beginning.clone(), family: known.family }
 }
 
 /// The branch itself, or one that is switched to from it, once for each of the steps `/kind-number`.
-fn switched(walk: &mut Walk, value: &Value, mut base: Base, known: &Known, steps: &str) -> Option<Base> {
+pub(super) fn switched(walk: &mut Walk, value: &Value, mut base: Base, known: &Known, steps: &str) -> Option<Base> {
     let (from, name) = (&known.name, format!("{}{steps}", known.name));
     let mut depth = [0; Kind::ALL.len()];
     let mut switching = base.plan.switching.clone();
@@ -157,14 +174,13 @@ fn hold(walk: &mut Walk, item: &Item, family: Option<Family>) -> Option<Kind> {
         return None;
     };
     let wrong = match (kind, family) {
-        (Kind::Hopf, Some(Family::Cycle)) => Some(("cycles have no Hopf points", "fold, period-doubling or torus")),
+        (Kind::Hopf, Some(Family::Cycle)) => {
+            Some(("cycles have no Hopf points", "fold, branch-point, period-doubling or torus"))
+        }
         (Kind::PeriodDoubling | Kind::Torus, Some(Family::Equilibrium)) => Some((
             "equilibria have only folds, branch points and Hopf points",
             "fold, branch-point or hopf, or a branch of cycles",
         )),
-        (Kind::BranchPoint, Some(Family::Cycle)) => {
-            Some(("branch points of cycles cannot be held along a curve", "fold, period-doubling or torus"))
-        }
         _ => None,
     };
     if let Some((message, right)) = wrong {

@@ -105,7 +105,7 @@ fn known_seed(index: usize, seed: &SeedPlan) -> Known {
 pub(super) fn noun(start: &Start) -> &'static str {
     match start {
         Start::Seed(_) => "seed",
-        Start::EndOf(_) => "branch",
+        Start::EndOf(_) | Start::EndOfSwitched(..) => "branch",
         Start::EndOfCurve(_) => "curve",
         Start::EndOfHomotopy(_) => "homotopy",
     }
@@ -135,6 +135,16 @@ pub(super) fn origin(
     if let Some(other) = written(all, &from) {
         said_or_further_down(walk, value.span(), item, other, &from);
         return None;
+    }
+    // A branch that is switched to; where it ends is known but for the parameter in which it is followed.
+    let parent = from.match_indices('/').rev().find_map(|(end, _)| Some((ground.known(&from[..end])?, &from[end..])));
+    if let Some((known, steps)) = parent
+        && let Start::EndOf(index) = known.start
+    {
+        let found = curves::switched(walk, value, curves::of_branch(ground, known, index), known, steps)?;
+        let mut at = found.beginning;
+        at[found.plan.free] = None;
+        return Some((Start::EndOfSwitched(index, from.to_string()), at, found.family));
     }
     let names: Vec<&str> = ground.known.iter().map(|known| known.name.as_str()).collect();
     let message = format!("there is no seed, branch, curve or homotopy \"{from}\"");

@@ -53,6 +53,7 @@ pub fn survey_by_simulation(
             own[free] = value;
             let settled: Vec<Settled> = starts
                 .chunks((BLOCK * n).max(1))
+                .take_while(|_| !trial.field.ended())
                 .flat_map(|block| settle_together(trial, &own.repeat(block.len() / n), block, First::Rough))
                 .collect();
             let of = sampling.uniform();

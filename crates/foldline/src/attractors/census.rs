@@ -75,7 +75,7 @@ pub(super) fn survey(
     let mut reached: Vec<Reached> = Vec::new();
     let mut census = Census::default();
     let (mut taken, mut ended) = (0, false);
-    while taken < blocks.len() && !ended {
+    while taken < blocks.len() && !ended && !field.ended() {
         let round = if taken == 0 { 1 } else { ROUND.min(blocks.len() - taken) };
         for watched in watch_blocks(&context, &blocks[taken..taken + round], &reached, enough) {
             ended = watched.ended;
@@ -229,7 +229,8 @@ fn watch_blocks(context: &Context, blocks: &[&[f64]], reached: &[Reached], enoug
         let mut done = Vec::new();
         loop {
             let block = next.fetch_add(1, Ordering::Relaxed);
-            let Some(starts) = blocks.get(block).filter(|_| block <= last.load(Ordering::Relaxed)) else { return done };
+            let going = block <= last.load(Ordering::Relaxed) && !context.field.ended();
+            let Some(starts) = blocks.get(block).filter(|_| going) else { return done };
             let watched = watch_block(context, starts, reached, enough);
             if watched.ended {
                 last.fetch_min(block, Ordering::Relaxed);

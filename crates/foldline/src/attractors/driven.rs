@@ -74,6 +74,10 @@ impl VectorField for Driven<'_> {
         out.fill(f64::NAN);
     }
 
+    fn ended(&self) -> bool {
+        self.0.ended()
+    }
+
     fn output_count(&self) -> usize {
         self.0.output_count()
     }

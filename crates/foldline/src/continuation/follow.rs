@@ -5,6 +5,7 @@
 //! next step.
 
 use super::Settings;
+use super::allowance::{Allowance, work};
 use super::corrector::{Care, Failure, Station};
 use super::diagnosis::{Past, Tried};
 use super::ends::Homecoming;
@@ -96,6 +97,7 @@ pub fn follow(
     let mut stirred = left.slope().abs() > STANDS;
     let mut stand = (left.parameter(), emitted);
     let mut long = first_period.map(|first| LONG * first);
+    let mut allowance = Allowance::new();
     loop {
         let outward = |bound: f64| (left.parameter() - bound).abs() <= 1e-12 * (1.0 + bound.abs());
         let [low, high] = walk.settings.range;
@@ -149,9 +151,15 @@ pub fn follow(
                         _ => 0.5,
                     };
                     coarse += usize::from(matches!(why, Failure::Mesh(_)));
-                    if step < walk.settings.min_step || coarse == COARSE {
+                    let spent = work(cost.factorisations, &left.mesh);
+                    let used_up = allowance.is_used_up(spent);
+                    if step < walk.settings.min_step || coarse == COARSE || used_up {
                         return match (walk.limit)(&left.point) {
                             Some(limit) => limit,
+                            None if used_up => {
+                                let last = format!("the last step failed because {why}");
+                                allowance.ending(left.parameter(), spent, &last)
+                            }
                             None => walk.short_end(&left, &tried, &why, past),
                         };
                     }
@@ -173,6 +181,11 @@ pub fn follow(
         let factor = factor.min((BENT / between.bent).cbrt()).clamp(0.3, GROWTH);
         step = (length * factor).clamp(walk.settings.min_step, walk.settings.max_step);
         let sideways = if walk.direction > 0.0 { 0 } else { -1 };
+        let strange = walk.settings.stability && is_unexplained(&found);
+        let spent = work(cost.factorisations, &right.mesh);
+        let used_up = allowance.accepted(strange, spent, right.parameter());
+        // As above: an orbit of infinite period is the reason where there is one.
+        let end = end.or(used_up.map(|why| (walk.limit)(&right.point).unwrap_or(why)));
         for item in found {
             let verdict = match item {
                 Found::Special(mut special) => {

@@ -6,6 +6,7 @@
 //! back. What stays unexplained at the end of that is recorded as such: no silent change of stability. Marks are no part of this search:
 //! they are located last, on the pieces that it leaves ([`super::marks`]).
 
+use super::allowance::{ALLOWANCE, work};
 use super::corrector::{Failure, Station, doubted, refine};
 use super::follow::Follow;
 use super::locate::{Located, Stretch, discrepancy, locate};
@@ -235,6 +236,7 @@ impl Follow<'_> {
         }
         let suspicious = suspicious || seen.is_some();
         if depth < DEEPEST
+            && work(cost.factorisations, &left.mesh) < ALLOWANCE
             && (jumps.len() > 1 || !explained || misplaced || misfit.is_some() || (suspicious && jumps.is_empty()))
             && stretch.length.abs() > if short { CLOSEST } else { self.settings.min_step }
         {

@@ -10,6 +10,7 @@
 //! | one step: predicted, corrected, compared with what it comes from | `step` |
 //! | whether a step may be accepted | `judge` |
 //! | why a side ends | `ends` |
+//! | how much work a side may take | `allowance` |
 //! | what lies between two accepted points | [`inspect`] |
 //! | values that were asked for, on the way | `marks` |
 //! | on which side of it a point is | `side` |
@@ -18,6 +19,7 @@
 //!
 //! **Source.** keller1977 (pseudo-arclength); allgower1990 (step length by angle and contraction).
 
+mod allowance;
 pub mod corrector;
 mod diagnosis;
 mod ends;

@@ -528,6 +528,9 @@ pub enum Ending {
     PointLimit(usize),
     /// f is not finite at the start of the branch or beyond its last point.
     NotFinite(String),
+    /// The branch would have cost more work than it shows: a point that needs too many factorisations, or changes of stability without
+    /// explanation at one point after the other.
+    GivenUp(String),
     /// The start did not converge.
     NoStart(String),
     /// A quantity has the value at which the study asks to stop.
@@ -550,6 +553,7 @@ impl Ending {
             Ending::SolutionUnbounded(_) => "solution-unbounded",
             Ending::PointLimit(_) => "point-limit",
             Ending::NotFinite(_) => "not-finite",
+            Ending::GivenUp(_) => "given-up",
             Ending::NoStart(_) => "no-start",
             Ending::Asked(_) => "asked",
             Ending::Stopped => "stopped",
@@ -596,6 +600,7 @@ impl fmt::Display for Ending {
             Ending::SolutionUnbounded(why) => write!(f, "solution without bound: {why}"),
             Ending::PointLimit(points) => write!(f, "stopped at the limit of {points} points"),
             Ending::NotFinite(why) => write!(f, "not finite: {why}"),
+            Ending::GivenUp(why) => write!(f, "given up: {why}"),
             Ending::NoStart(why) => write!(f, "no start: {why}"),
             Ending::Stopped => write!(f, "stopped on request"),
         }
@@ -700,6 +705,17 @@ pub struct Diagram {
     pub branches: Vec<Branch>,
     /// What surveys and sweeps saw.
     pub responses: Vec<Responses>,
+    /// What was asked for and not reached, besides what the ends of branches say.
+    pub shortfalls: Vec<Shortfall>,
+}
+
+/// Something that was asked for and not reached.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Shortfall {
+    /// The name of a branch, exploration or sweep.
+    pub about: String,
+    /// What was not reached, and why.
+    pub what: String,
 }
 
 impl Diagram {

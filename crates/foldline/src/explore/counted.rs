@@ -46,6 +46,10 @@ impl VectorField for Counted<'_> {
         self.field.directional(at, directions, out);
     }
 
+    fn ended(&self) -> bool {
+        self.field.ended()
+    }
+
     fn forced(&self) -> bool {
         self.field.forced()
     }

@@ -8,8 +8,9 @@ use super::growth::{self, Beginning, Growth, Line};
 use super::plan::{CurvePlan, Plan};
 use crate::continuation::{Settings, UNCROSSED};
 use crate::contract::Observer;
-use crate::diagram::{Branch, Ending, Family, Kind, Origin, Point, SpecialPoint};
+use crate::diagram::{Branch, Ending, Origin, Point, SpecialPoint};
 use crate::special::mark::Mark;
+use crate::special::unfolded::{Unfolded, sizes};
 
 /// A special point moves along the branch by more than the error of the solutions; against the tolerance of the plan.
 const SHARPER: f64 = 0.2;
@@ -54,7 +55,7 @@ pub fn follow(
     earlier: Option<&Branch>,
     observer: &dyn Observer,
 ) -> (Branch, bool) {
-    follow_from(system, plan, curve, parent, start(curve, parent), &[], earlier, observer)
+    follow_from(system, plan, curve, parent, start(curve, parent), &curve.marks, earlier, observer)
 }
 
 /// The same from a given special point, with values to mark on the way.
@@ -68,6 +69,9 @@ pub fn follow_from(
     earlier: Option<&Branch>,
     observer: &dyn Observer,
 ) -> (Branch, bool) {
+    let sizes = special.as_ref().map_or(system.scales.clone(), |special| sizes(&special.point, &system.scales));
+    let unfolded = Unfolded::new(system.field, &sizes);
+    let system = &System { unfolded: Some(&unfolded), ..system.clone() };
     let growth = |settings: &Settings, sides: [bool; 2], branch: &mut Branch, beginning: Option<Beginning>| {
         let growth = Growth {
             system,
@@ -102,9 +106,6 @@ pub fn follow_from(
         system.repeats(&special.point.parameters, &[(parent.free, curve.ranges[0]), (curve.free, curve.ranges[1])])?;
         let (settings, sides) = settings(system, plan, curve, parent.free, at);
         let line = Line { held: branch.held, ..Line::new(curve.free) };
-        if parent.family == Family::Cycle && curve.hold == Kind::BranchPoint {
-            return Err(format!("branch points of cycles cannot be held, and {} is a branch of cycles", parent.name));
-        }
         let mut problem = line.problem(system, plan.degree, &special.point);
         let station = growth::polished(&mut *problem, &settings, &special.point).map_err(|why| why.to_string())?;
         // (The tangent tells how fast the equations would have to be added to.)

@@ -34,11 +34,11 @@ use crate::special::quantity::Quantity;
 pub(super) fn explore(work: &mut Work, plan: &ExplorePlan, jobs: usize) -> bool {
     work.budget = plan.budget;
     let lookout = Lookout::new(work.system, plan, work.plan.tolerance);
-    let mut discovery = Discovery { work, plan, named: Vec::new(), unclear: 0 };
+    let mut discovery = Discovery { work, plan, named: Vec::new(), unsettled: 0 };
     // While this thread follows what was found at one value, others look at the next ones.
     let sampled = std::thread::scope(|scope| {
         (1..jobs.min(plan.values)).for_each(|_| drop(scope.spawn(|| while lookout.look() {})));
-        let going = (0..plan.values).all(|index| discovery.exhausted() || discovery.met(lookout.at(index)));
+        let going = (0..plan.values).all(|index| discovery.exhausted() || discovery.met(index, lookout.at(index)));
         lookout.close();
         going
     });
@@ -51,18 +51,21 @@ struct Discovery<'d, 'w> {
     plan: &'d ExplorePlan,
     /// What roots were called, such as `cycle`, once for each of them.
     named: Vec<String>,
-    /// At how many values some samples were not seen to settle, or nothing could be followed.
-    unclear: usize,
+    /// At how many values some samples were not seen to settle.
+    unsettled: usize,
 }
 
 impl Discovery<'_, '_> {
     /// Steps 2 and 3 at one of the values.
-    fn met(&mut self, sight: Sight) -> bool {
+    fn met(&mut self, index: usize, sight: Sight) -> bool {
         let value = sight.value;
-        self.unclear += usize::from(sight.unclear);
+        if !self.work.tell(Event::Visited(&self.plan.name, value, index + 1, self.plan.values)) {
+            return false;
+        }
+        self.unsettled += usize::from(sight.unsettled);
         let (found, said) = match sight.found {
             Ok(found) => found,
-            Err(why) => return self.note(&format!("nothing can be followed from {value}: {why}")),
+            Err(why) => return self.short(&format!("nothing can be followed from {value}: {why}")),
         };
         let origin = Origin::Seed(format!("{}, at {value}", self.plan.name));
         self.note(&said) && found.into_iter().all(|point| self.followed(point, origin.clone()))
@@ -155,6 +158,7 @@ impl Discovery<'_, '_> {
             free: second,
             ranges: [plan.range, range],
             until: None,
+            marks: Vec::new(),
             max_points: plan.max_points,
         };
         let home = Mark { quantity: Quantity::Parameter(second), value: plan.parameters[second], stop: false };
@@ -188,7 +192,7 @@ impl Discovery<'_, '_> {
             Ok(point) => self.followed(point, Origin::EndOf(curve.to_string())),
             Err(why) => {
                 let value = fold.parameters[self.plan.free];
-                self.note(&format!(
+                self.short(&format!(
                     "the fold at {value:.6} that {curve} leads to: no solution beside it was found: {why}"
                 ))
             }
@@ -203,22 +207,30 @@ impl Discovery<'_, '_> {
         self.work.tell(Event::Note(&self.plan.name, text))
     }
 
+    fn short(&self, text: &str) -> bool {
+        self.work.tell(Event::Short(&self.plan.name, text))
+    }
+
     /// What came of it.
     fn told(&self) -> bool {
         let count = |held: bool| self.work.branches.iter().filter(|b| b.held.is_some() == held).count();
         let (branches, curves, points) = (count(false), count(true), self.work.points());
-        let (budget, values, unclear) = (self.plan.budget, self.plan.values, self.unclear);
-        let found = format!("{branches} branches and {curves} curves with {points} points");
-        let done = match self.exhausted() {
-            true => format!("the budget of {budget} is used up, and the diagram may lack branches"),
-            false => "everything that was found is followed".to_string(),
-        };
-        let rest = match unclear {
-            0 => String::new(),
-            _ => format!(
-                "; at {unclear} of {values} values some samples did not settle: tori, chaos and what settles slowly are not followed"
-            ),
-        };
-        self.note(&format!("{found}; {done}{rest}"))
+        let mut going = self.note(&format!("{branches} branches and {curves} curves with {points} points"));
+        if self.exhausted() {
+            let budget = self.plan.budget;
+            going &= self.short(&format!(
+                "the budget of {budget} points is used up, and the diagram may lack branches\nwhat to do: a larger budget"
+            ));
+        }
+        let (values, samples) = (self.plan.values, self.plan.samples);
+        if self.unsettled > 0 {
+            going &= self.short(&format!(
+                "at {} of {values} values some of {samples} samples did not settle: tori, chaos and what settles slowly are not followed\n\
+                 what to do: `foldline attractors` shows more of what there is; a cycle that settles slowly can be followed from a branch at \
+                 larger damping, or from a given state",
+                self.unsettled
+            ));
+        }
+        going
     }
 }

@@ -44,7 +44,11 @@ pub fn weight(plan: &Plan, root: Root) -> usize {
             let depths = kinds.chain(branch.switching.only.iter().map(|(.., depth)| *depth));
             let switched: usize = depths.map(|depth| (1 << depth.min(8)) - 1).sum();
             let curves = (0..plan.curves.len()).filter(|&i| plan.curves[i].of == branch.name);
+            let starts = plan.branches.iter().map(|b| &b.start).chain(plan.homotopies.iter().map(|h| &h.start));
+            let behind =
+                starts.filter(|start| matches!(start, Start::EndOfSwitched(from, _) if *from == index)).count();
             1 + switched
+                + behind
                 + following(Start::EndOf(index))
                 + curves.map(|i| 2 + following(Start::EndOfCurve(i))).sum::<usize>()
         }
@@ -113,7 +117,29 @@ impl Work<'_> {
         }
         let Some(branch) = self.branches.get(first) else { return true };
         let ended = end_of(branch, plan);
-        self.curves(first..self.branches.len()) && self.after(Start::EndOf(index), &plan.name, ended)
+        let last = self.branches.len();
+        self.curves(first..last)
+            && self.after(Start::EndOf(index), &plan.name, ended)
+            && self.after_switched(index, first..last)
+    }
+
+    /// The branches and homotopies that start at the ends of branches that were switched to.
+    fn after_switched(&mut self, index: usize, grown: Range<usize>) -> bool {
+        let plan = self.plan;
+        let starts = plan.branches.iter().map(|b| &b.start).chain(plan.homotopies.iter().map(|h| &h.start));
+        let mut names: Vec<&String> = starts
+            .filter_map(|start| match start {
+                Start::EndOfSwitched(from, name) if *from == index => Some(name),
+                _ => None,
+            })
+            .collect();
+        names.sort();
+        names.dedup();
+        names.into_iter().all(|name| {
+            let own = self.branches[grown.clone()].iter().find(|branch| branch.name == *name);
+            let ended = own.map_or_else(|| Err(format!("no branch {name} was switched to")), end_of_switched);
+            self.after(Start::EndOfSwitched(index, name.clone()), name, ended)
+        })
     }
 
     /// Follows a branch and what is switched to from it. Returns false if the observer wants to stop.
@@ -251,7 +277,7 @@ impl Work<'_> {
         let parent = self.branches[pending.branch].clone();
         let settings = growth::settings(self.system, self.plan.tolerance, plan.range, plan.max_points);
         let mut counts = [0usize; Kind::ALL.len()];
-        let mut more = Vec::new();
+        let (mut more, mut left) = (Vec::new(), Vec::new());
         for special in &parent.special {
             let slot = Kind::ALL.iter().position(|k| *k == special.kind)?;
             counts[slot] += 1;
@@ -261,8 +287,11 @@ impl Work<'_> {
             let parameter = special.point.parameters[parent.free];
             let label = format!("{} {parameter:.6} of {}", special.kind, parent.name);
             if self.points() >= self.budget {
-                self.tell(Event::Note(&parent.name, &format!("{label}: not switched to, since the budget is used up")));
+                left.push(format!("{} {parameter:.6}", special.kind));
                 continue;
+            }
+            if self.observer.stopping() {
+                return None;
             }
             let name = format!("{}/{}-{}", parent.name, special.kind, counts[slot]);
             let origin = Origin::Switch { parent: parent.name.clone(), kind: special.kind, parameter };
@@ -303,7 +332,8 @@ impl Work<'_> {
                         (family, self.of_one_turn(&settings, parent.free, special.kind, beginning))
                     }
                     Some(Err(why)) => {
-                        self.tell(Event::Note(&parent.name, &format!("{label}: no branch found to switch to: {why}")));
+                        let said = format!("{label}: no branch found to switch to: {why}");
+                        self.tell(Event::Short(&parent.name, &said));
                         continue;
                     }
                 };
@@ -331,6 +361,10 @@ impl Work<'_> {
                 return None;
             }
         }
+        if !left.is_empty() {
+            let said = format!("not switched to, since the budget of points is used up: {}", left.join(", "));
+            self.tell(Event::Short(&parent.name, &said));
+        }
         Some(more)
     }
 
@@ -350,6 +384,9 @@ impl Work<'_> {
 /// A branch that could not begin. Returns false if the observer wants to stop.
 pub(super) fn without_start(observer: &dyn Observer, branch: &mut Branch, why: String) -> bool {
     let tell = |event: Event| observer.observe(event) == Verdict::Continue;
+    if observer.stopping() {
+        return false;
+    }
     let mut going = tell(Event::Begin(branch));
     for side in [1, 0] {
         let ending = Ending::NoStart(why.clone());
@@ -357,6 +394,17 @@ pub(super) fn without_start(observer: &dyn Observer, branch: &mut Branch, why: S
         going &= tell(Event::SideEnded(branch, side, &ending));
     }
     going & tell(Event::End(branch))
+}
+
+/// The end at which a branch that was switched to hands over: where it reached a bound or was asked to stop, forward before backward.
+fn end_of_switched(branch: &Branch) -> Result<Point, String> {
+    let ends = [(&branch.ends[1], branch.points.last()), (&branch.ends[0], branch.points.first())];
+    let whole = |end: &Option<Ending>| matches!(end, Some(Ending::Bound(_) | Ending::Asked(_)));
+    let found = ends.into_iter().find_map(|(end, point)| point.filter(|_| whole(end)));
+    found.cloned().ok_or_else(|| {
+        let said: Vec<String> = branch.ends.iter().flatten().map(Ending::brief).collect();
+        format!("branch {} has no end at a bound or a `stop`: {}", branch.name, said.join("; "))
+    })
 }
 
 /// The end at which a planned branch hands over: its target, or its forward bound.

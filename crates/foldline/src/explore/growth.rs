@@ -11,7 +11,9 @@ use crate::problem::{Axis, Setting, Tie, cycle::CycleProblem, equilibrium::Equil
 use crate::special::coefficients::Coefficients;
 use crate::special::connection::Limits;
 use crate::special::mark::Mark;
+use crate::special::on_cycle_branch_points::OnCycleBranchPoints;
 use crate::special::quantity::Quantity;
+use crate::special::unfolded::UnfoldedCycles;
 use crate::special::{self, collapse};
 
 /// Which curve through a point is meant.
@@ -47,6 +49,15 @@ impl Line {
             parameters: point.parameters.clone(),
             axes: both.into_iter().map(|index| self.axis(system, index)).collect(),
         };
+        if let (Some((Kind::BranchPoint, _)), Solution::Cycle(cycle), Some(unfolded)) =
+            (self.held, &point.solution, system.unfolded)
+        {
+            let cycle = mesh::at_least_some(cycle, degree);
+            let own = UnfoldedCycles::setting(&setting, unfolded, &system.scales, &cycle);
+            let condition = OnCycleBranchPoints::new(own.clone(), &cycle);
+            let surface = UnfoldedCycles::new(CycleProblem::like(own, &cycle), setting.parameters.len());
+            return Box::new(Held::new(Box::new(surface), Box::new(condition)));
+        }
         let condition = self
             .held
             .and_then(|(kind, _)| special::condition::condition(kind, setting.clone(), degree, &point.solution));
@@ -381,7 +392,7 @@ impl Growth<'_> {
                 if ending == Ending::Stopped {
                     break;
                 }
-                let ending = self.recognised(branch, side, ending);
+                let ending = self.recognised(branch, side, self.shrunk(branch, side, ending));
                 let ending = self.without_period(branch, side, ending);
                 going &= self.end(branch, side, ending);
             }
@@ -404,7 +415,8 @@ impl Growth<'_> {
         let before = own.get(1).map(|p| (*p).clone());
         let emitted = last.position.unsigned_abs() as usize;
         let counted = Counted::new(self.system.field);
-        let system = System { field: &counted, ..self.system.clone() };
+        let unfolded = self.system.unfolded.map(|own| own.over(&counted));
+        let system = System { field: &counted, unfolded: unfolded.as_ref(), ..self.system.clone() };
         let mut problem = self.line(branch).problem(&system, self.degree, &last);
         let revive = |problem: &mut dyn ZeroProblem, point: &Point| revived(problem, self.settings, point, direction);
         // The special point at which a branch begins is no predecessor: the matrix is singular there.
@@ -412,6 +424,7 @@ impl Growth<'_> {
         let previous = before.and_then(|p| revive(&mut *problem, &p).ok());
         let mut start = match revive(&mut *problem, &last) {
             Ok(start) => start,
+            Err(_) if self.observer.stopping() => return Ending::Stopped,
             Err(why) => return Ending::NoStart(why.to_string()),
         };
         if emitted == 0 {
@@ -453,7 +466,11 @@ impl Growth<'_> {
         let mut before: Vec<&Point> = branch.points.iter().filter(|p| p.position as f64 * direction > 0.0).collect();
         before.sort_by_key(|p| p.position.abs());
         before.into_iter().for_each(|p| walk.leaves_home(p));
-        follow(&mut walk, start, previous, emitted, &mut |item| {
+        let ending = follow(&mut walk, start, previous, emitted, &mut |item| {
+            // What was found while the field had no values any more is nothing.
+            if self.observer.stopping() {
+                return Verdict::Stop;
+            }
             let going = match item {
                 Item::Special(mut special) => {
                     // Where a curve only turns there is none.
@@ -472,7 +489,53 @@ impl Growth<'_> {
                 }
             };
             if going { Verdict::Continue } else { Verdict::Stop }
-        })
+        });
+        // What it would say is no property of the branch then.
+        if self.observer.stopping() { Ending::Stopped } else { ending }
+    }
+
+    /// The end of a curve of folds of cycles that shrink to an equilibrium: by theory that has a Hopf point with a first Lyapunov coefficient
+    /// of zero. Next to it steps get shorter in proportion to the cycles, so the curve ends without passing it, with the reason in
+    /// `ending`. Along the curve both parameters change with the square of the extent, which gives them where that is zero; there the
+    /// equilibrium must have eigenvalues ± 2πi/T.
+    fn shrunk(&self, branch: &Branch, side: usize, ending: Ending) -> Ending {
+        const SMALL: f64 = 0.05;
+        const NEAR: f64 = 1e-2;
+        let given_up = matches!(ending, Ending::StepTooSmall(_) | Ending::GivenUp(_));
+        let Some((Kind::Fold, first)) = branch.held.filter(|_| given_up && branch.family == Family::Cycle) else {
+            return ending;
+        };
+        let (n, system) = (self.system.scales.len(), self.system);
+        let extent = |point: &Point| -> f64 {
+            let states = point.ranges.iter().take(n).zip(&system.scales);
+            states.map(|([low, high], scale)| (high - low) / scale).fold(0.0, f64::max)
+        };
+        let count = branch.points.len();
+        let [last, before] = if side == 1 { [count.wrapping_sub(1), count.wrapping_sub(2)] } else { [0, 1] };
+        let Some((last, before)) = branch.points.get(last).zip(branch.points.get(before)) else { return ending };
+        let largest = branch.points.iter().map(extent).fold(0.0, f64::max);
+        let (a, b) = (extent(last).powi(2), extent(before).powi(2));
+        let Some(period) = last.solution.free_period().filter(|_| a < b && extent(last) < SMALL * largest) else {
+            return ending;
+        };
+        let mut parameters = last.parameters.clone();
+        for k in [first, branch.free] {
+            parameters[k] += a / (b - a) * (last.parameters[k] - before.parameters[k]);
+        }
+        let rest: Vec<f64> = last.averages.iter().take(n).map(|mean| mean[0]).collect();
+        if rest.len() != n {
+            return ending;
+        }
+        let mut problem = EquilibriumProblem::new(setting(system, branch.free, &parameters));
+        let guess = super::seeds::bare(&parameters, Solution::Equilibrium(rest));
+        let Ok(found) = polished(&mut problem, self.settings, &guess) else { return ending };
+        let turns = |z: &num_complex::Complex64| {
+            z.re.abs() < NEAR * z.im.abs() && (z.im * period / std::f64::consts::TAU - 1.0).abs() < NEAR
+        };
+        match found.point.spectrum.iter().any(turns) {
+            true => Ending::Joined { at: Kind::GeneralisedHopf, parameter: parameters[branch.free] },
+            false => ending,
+        }
     }
 
     /// How a side of a doubled branch ended that has its last point, the special point of the parent, but was interrupted before
@@ -535,6 +598,9 @@ impl Growth<'_> {
     }
 
     fn accept(&self, branch: &mut Branch, point: Point) -> bool {
+        if self.observer.stopping() {
+            return false;
+        }
         branch.insert(point.clone());
         let going = self.tell(Event::Point(branch, &point));
         if self.sparse {

@@ -70,7 +70,7 @@ pub fn find(
     let start = match first.cloned().map_or(start, Ok) {
         Ok(start) => start,
         Err(why) => {
-            planner.note(&format!("there is nothing to start from: {why}"));
+            planner.short(&format!("there is nothing to start from: {why}"));
             return Route { legs: Vec::new(), arrived: Err(why), going: planner.going };
         }
     };
@@ -85,7 +85,7 @@ pub fn find(
             }
             (false, false) => "no way was found in these parameters",
         };
-        planner.note(&format!("the goal was not reached: {why}; {verdict}"));
+        planner.short(&format!("the goal was not reached: {why}; {verdict}"));
     }
     Route { legs: planner.legs, arrived, going: planner.going }
 }
@@ -378,6 +378,10 @@ impl Planner<'_> {
         };
         self.legs.push(branch.clone());
         branch
+    }
+
+    fn short(&mut self, text: &str) {
+        self.going &= self.observer.observe(Event::Short(&self.homotopy.name, text)) == Verdict::Continue;
     }
 
     fn note(&mut self, text: &str) {

@@ -14,8 +14,8 @@ use std::sync::{Condvar, Mutex, PoisonError};
 /// What there is at a value of the parameter.
 pub(super) struct Sight {
     pub(super) value: f64,
-    /// Whether some samples were not seen to settle, or nothing can be followed.
-    pub(super) unclear: bool,
+    /// Whether some samples were not seen to settle.
+    pub(super) unsettled: bool,
     /// Solutions, none of which is another one under a symmetry, or why nothing can be followed from there.
     pub(super) found: Result<(Vec<Point>, String), String>,
 }
@@ -67,7 +67,7 @@ impl<'l> Lookout<'l> {
         let mut parameters = plan.parameters.clone();
         parameters[plan.free] = value;
         if let Err(why) = system.repeats(&parameters, &[(plan.free, plan.range)]) {
-            return Sight { value, unclear: true, found: Err(why) };
+            return Sight { value, unsettled: false, found: Err(why) };
         }
         // Other values, other samples: together they say more.
         let random = plan.random.wrapping_add(index as u64);
@@ -85,7 +85,7 @@ impl<'l> Lookout<'l> {
         found.sort_by(|a, b| size(a).total_cmp(&size(b)));
         let rests = found.iter().filter(|p| matches!(p.solution, Solution::Equilibrium(_))).count();
         let said = format!("at {value}: {}; equilibria but for symmetry: {rests}", summary(system, &census));
-        Sight { value, unclear: census.unsettled + census.stuck > 0, found: Ok((found, said)) }
+        Sight { value, unsettled: census.unsettled + census.stuck > 0, found: Ok((found, said)) }
     }
 
     /// Equilibria in the ranges of the states, stable or not.
@@ -97,7 +97,7 @@ impl<'l> Lookout<'l> {
         let settings = settings(system, self.tolerance, [f64::NEG_INFINITY, f64::INFINITY], 0);
         let starts = sampling(system, self.plan.samples, random, 1, self.tolerance).starts();
         let mut found: Vec<Point> = Vec::new();
-        for start in starts.chunks_exact(system.field.dim().max(1)) {
+        for start in starts.chunks_exact(system.field.dim().max(1)).take_while(|_| !system.field.ended()) {
             let mut problem = EquilibriumProblem::new(setting(system, self.plan.free, parameters));
             let guess = bare(parameters, Solution::Equilibrium(start.to_vec()));
             if let Ok(station) = polished(&mut problem, &settings, &guess)
@@ -129,7 +129,7 @@ struct Promise<'s> {
 
 impl Drop for Promise<'_> {
     fn drop(&mut self) {
-        let lost = || Sight { value: f64::NAN, unclear: true, found: Err("looking there failed".into()) };
+        let lost = || Sight { value: f64::NAN, unsettled: false, found: Err("looking there failed".into()) };
         self.slots.put(self.index, self.kept.take().unwrap_or_else(lost));
     }
 }

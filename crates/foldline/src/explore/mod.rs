@@ -9,6 +9,7 @@
 //! | what is asked for? | [`plan`] |
 //! | which vector field, which scales, which symmetries? | [`system`] |
 //! | how often is the vector field evaluated? | `counted` |
+//! | how does a run end at once? | `interrupt` |
 //! | where do first solutions come from? | [`seeds`] |
 //! | what is done first, by which thread? | `schedule` |
 //! | how is one branch followed to both sides, or resumed? | [`growth`] |
@@ -32,6 +33,7 @@ pub mod family;
 pub mod given;
 pub mod growth;
 pub mod homotopy;
+mod interrupt;
 pub mod known;
 mod lookout;
 mod minimal;
@@ -59,12 +61,12 @@ pub use plan::{
 pub use seeds::{attractors, first_solution};
 pub use system::System;
 
-use crate::contract::{Event, Observer, Verdict};
+use crate::contract::Observer;
 use crate::diagram::{Branch, Diagram, Point};
+use interrupt::{Heeded, Interruptible};
 use schedule::{Schedule, Task};
 use seeds::Seeds;
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Carries out a plan with that many threads. `earlier` is what an interrupted run of the same plan has already: finished
 /// sides are kept, unfinished ones are continued from their last point.
@@ -84,7 +86,9 @@ pub fn run_from(
     given: &[(usize, Point)],
     observer: &dyn Observer,
 ) -> Diagram {
-    let observer = &Heeded { observer, stopped: AtomicBool::new(false) };
+    let observer = &Heeded::new(observer);
+    let field = Interruptible::new(system.field, observer);
+    let system = &System { field: &field, ..system.clone() };
     let seeds = Seeds::new(system, plan, jobs, &earlier, given, observer);
     let families = family::roots(plan);
     let done: Vec<Mutex<Vec<Branch>>> = families.iter().map(|_| Mutex::new(Vec::new())).collect();
@@ -95,7 +99,7 @@ pub fn run_from(
                 Task::Census(number) => _ = seeds.census(number),
                 Task::Family(index) => {
                     let branches = family::grow(system, plan, families[index], &seeds, jobs, &earlier, observer);
-                    if observer.stopped.load(Ordering::Relaxed) {
+                    if observer.stopped() {
                         schedule.hurry();
                     }
                     if let Ok(mut slot) = done[index].lock() {
@@ -112,29 +116,5 @@ pub fn run_from(
     });
     let branches = done.into_iter().flat_map(|slot| slot.into_inner().unwrap_or_default()).collect();
     let responses = responses::simulate(system, plan, &seeds, jobs, &earlier, observer);
-    Diagram { branches, responses }
-}
-
-/// An observer, and whether it has asked to stop.
-struct Heeded<'o> {
-    observer: &'o dyn Observer,
-    stopped: AtomicBool,
-}
-
-impl Observer for Heeded<'_> {
-    fn observe(&self, event: Event) -> Verdict {
-        let verdict = self.observer.observe(event);
-        if verdict == Verdict::Stop {
-            self.stopped.store(true, Ordering::Relaxed);
-        }
-        verdict
-    }
-
-    fn stores(&self) -> bool {
-        self.observer.stores()
-    }
-
-    fn recall(&self, branch: &Branch, position: i64) -> Option<Point> {
-        self.observer.recall(branch, position)
-    }
+    Diagram { branches, responses, shortfalls: observer.shortfalls() }
 }

@@ -50,6 +50,8 @@ pub enum Start {
     Seed(usize),
     /// At the end of the branch of that index (its `until`, or its forward bound).
     EndOf(usize),
+    /// At the end of the branch of that name, which is switched to from the branch of that index.
+    EndOfSwitched(usize, String),
     /// At the end of the curve of that index.
     EndOfCurve(usize),
     /// Where the homotopy of that index arrived.
@@ -118,7 +120,7 @@ pub struct BranchPlan {
 pub struct CurvePlan {
     /// Unique name.
     pub name: String,
-    /// What is held: a fold, Hopf, period doubling or torus point.
+    /// What is held: a fold, branch point, Hopf, period doubling or torus point.
     pub hold: Kind,
     /// Name of the branch on which the special point lies: one of the plan, or one switched to from it.
     pub of: String,
@@ -130,6 +132,8 @@ pub struct CurvePlan {
     pub ranges: [[f64; 2]; 2],
     /// Follow only towards this value of the second parameter and stop there; it lies in its range.
     pub until: Option<f64>,
+    /// Values to mark, or to stop at.
+    pub marks: Vec<Mark>,
     /// Limit on the number of points per side.
     pub max_points: usize,
 }

@@ -65,6 +65,10 @@ struct Count<'o> {
 
 impl Count<'_> {
     fn visited(&self, responses: &[Response]) -> Verdict {
+        // Motions that were under way then are wrong.
+        if self.observer.stopping() {
+            return Verdict::Stop;
+        }
         let done = self.done.fetch_add(1, Ordering::Relaxed) + 1;
         let value = responses.first().map_or(f64::NAN, |r| r.value);
         self.observer.observe(Event::Visited(self.name, value, done, self.of))
@@ -113,7 +117,7 @@ fn one_sweep(
     let point = match seeds.point(*seed) {
         Ok(point) => point,
         Err(why) => {
-            observer.observe(Event::Note(name, &format!("no start: {why}")));
+            observer.observe(Event::Short(name, &format!("no start: {why}")));
             return None;
         }
     };
@@ -127,6 +131,9 @@ fn one_sweep(
     let mut pursuit = Pursuit::new(system, *free, plan.tolerance, plan.degree);
     let mut compare = |own: &[f64], candidate: Option<&Candidate>| pursuit.leaves(own, candidate);
     let responses = stepped_sweep(&trial(system, 1), parameters, *free, values, &start, &mut compare, &report);
+    if observer.stopping() {
+        return None;
+    }
     let escaped = responses.last().filter(|last| last.motion == Motion::Escaped);
     if let Some(last) = escaped {
         observer.observe(Event::Note(name, &format!("at the value {} the motion {}", last.value, last.fate())));

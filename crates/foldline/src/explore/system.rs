@@ -4,6 +4,7 @@ use super::plan::{ExplorePlan, Plan};
 use crate::contract::{Batch, Parameters, VectorField};
 use crate::model::Model;
 use crate::model::forcing::unrepeated;
+use crate::special::unfolded::Unfolded;
 
 /// A vector field, its scales, and where to look for attractors.
 #[derive(Clone)]
@@ -23,6 +24,8 @@ pub struct System<'a> {
     /// Coordinate reflections under which the field is equivariant, the identity first; those of a forced field too under which
     /// it is so half a period of the forcing later.
     pub reflections: Vec<Vec<bool>>,
+    /// The field with an amplitude more, where branch points of cycles are to be held.
+    pub(super) unfolded: Option<&'a Unfolded<'a>>,
     /// Of a forced field, for each of these: whether it is equivariant at the same time, and half a period later.
     pub(super) mirrors: Vec<[bool; 2]>,
 }
@@ -39,6 +42,7 @@ impl<'a> System<'a> {
             ranges: vec![[-2.0, 2.0]; n],
             whirl: None,
             reflections: vec![vec![false; n]],
+            unfolded: None,
             mirrors: Vec::new(),
         }
     }

@@ -26,11 +26,13 @@ pub mod hopf;
 pub mod mark;
 pub mod normal_form;
 pub mod on_branch_points;
+pub mod on_cycle_branch_points;
 pub mod on_cycles;
 pub mod on_equilibria;
 pub mod period_doubling;
 pub mod quantity;
 pub mod torus;
+pub mod unfolded;
 
 use crate::contract::{Monitor, VectorField};
 use crate::diagram::{Family, Kind, Point, Solution};

@@ -1,0 +1,154 @@
+//! Ending a run at once.
+//!
+//! **Idea.** An observer that stops a branch is asked once per point. A point, a census or a homotopy can take long, so there is a
+//! second way: once the observer says that it is [stopping](Observer::stopping), the vector field has no finite values any more. Every
+//! Newton iteration, trajectory and test function fails at its next evaluation, wherever it is, and the run unwinds within
+//! milliseconds. What it says on its way out is wrong and reaches nobody: events are dropped from then on, so the run file holds what
+//! was accepted before.
+
+use crate::contract::{Batch, Event, Observer, VectorField, Verdict};
+use crate::diagram::{Branch, Point, Shortfall};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, PoisonError};
+
+/// An observer, whether it has asked to stop, and what was not reached.
+pub(super) struct Heeded<'o> {
+    observer: &'o dyn Observer,
+    stopped: AtomicBool,
+    shortfalls: Mutex<Vec<Shortfall>>,
+}
+
+impl<'o> Heeded<'o> {
+    pub(super) fn new(observer: &'o dyn Observer) -> Heeded<'o> {
+        Heeded { observer, stopped: AtomicBool::new(false), shortfalls: Mutex::default() }
+    }
+
+    /// True once the observer has asked to stop, in one way or the other.
+    pub(super) fn stopped(&self) -> bool {
+        self.stopped.load(Ordering::Relaxed) || self.stopping()
+    }
+
+    /// Everything that was not reached, in an order that does not depend on the threads.
+    pub(super) fn shortfalls(&self) -> Vec<Shortfall> {
+        let mut all = self.shortfalls.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        all.sort();
+        all.dedup();
+        all
+    }
+}
+
+impl Observer for Heeded<'_> {
+    fn observe(&self, event: Event) -> Verdict {
+        if self.stopping() {
+            return Verdict::Stop;
+        }
+        if let Event::Short(about, what) = event {
+            let own = Shortfall { about: about.to_string(), what: what.to_string() };
+            self.shortfalls.lock().unwrap_or_else(PoisonError::into_inner).push(own);
+        }
+        let verdict = self.observer.observe(event);
+        if verdict == Verdict::Stop {
+            self.stopped.store(true, Ordering::Relaxed);
+        }
+        verdict
+    }
+
+    fn stopping(&self) -> bool {
+        self.observer.stopping()
+    }
+
+    fn stores(&self) -> bool {
+        self.observer.stores()
+    }
+
+    fn recall(&self, branch: &Branch, position: i64) -> Option<Point> {
+        self.observer.recall(branch, position)
+    }
+}
+
+/// A vector field that has no finite values once an observer is stopping.
+pub(super) struct Interruptible<'f> {
+    field: &'f dyn VectorField,
+    observer: &'f dyn Observer,
+}
+
+impl<'f> Interruptible<'f> {
+    pub(super) fn new(field: &'f dyn VectorField, observer: &'f dyn Observer) -> Interruptible<'f> {
+        Interruptible { field, observer }
+    }
+
+    /// True where there are no values any more; all of `out` are then made not a number.
+    fn spoilt(&self, out: [&mut [f64]; 3]) -> bool {
+        let ended = self.observer.stopping();
+        if ended {
+            out.into_iter().for_each(|values| values.fill(f64::NAN));
+        }
+        ended
+    }
+}
+
+impl VectorField for Interruptible<'_> {
+    fn dim(&self) -> usize {
+        self.field.dim()
+    }
+
+    fn parameter_count(&self) -> usize {
+        self.field.parameter_count()
+    }
+
+    fn evaluate(&self, at: Batch, f: &mut [f64]) {
+        if !self.spoilt([&mut *f, &mut [], &mut []]) {
+            self.field.evaluate(at, f);
+        }
+    }
+
+    fn linearise(&self, at: Batch, free: &[usize], f: &mut [f64], fx: &mut [f64], fp: &mut [f64]) {
+        if !self.spoilt([&mut *f, &mut *fx, &mut *fp]) {
+            self.field.linearise(at, free, f, fx, fp);
+        }
+    }
+
+    fn directional(&self, at: Batch, directions: &[&[f64]], out: &mut [f64]) {
+        if !self.spoilt([&mut *out, &mut [], &mut []]) {
+            self.field.directional(at, directions, out);
+        }
+    }
+
+    fn ended(&self) -> bool {
+        self.observer.stopping()
+    }
+
+    fn forced(&self) -> bool {
+        self.field.forced()
+    }
+
+    fn time_unit(&self, parameters: &[f64]) -> f64 {
+        self.field.time_unit(parameters)
+    }
+
+    fn output_count(&self) -> usize {
+        self.field.output_count()
+    }
+
+    fn outputs(&self, at: Batch, out: &mut [f64]) {
+        self.field.outputs(at, out);
+    }
+
+    fn switch_count(&self) -> usize {
+        self.field.switch_count()
+    }
+
+    fn evaluate_precisely(&self, states: &[[f64; 2]], parameters: &[[f64; 2]]) -> Option<Vec<[f64; 2]>> {
+        if self.observer.stopping() { None } else { self.field.evaluate_precisely(states, parameters) }
+    }
+
+    fn switches(&self, at: Batch, out: &mut [f64]) {
+        self.field.switches(at, out);
+    }
+
+    fn evaluate_switched(&self, at: Batch, signs: &[f64], f: &mut [f64]) {
+        if !self.spoilt([&mut *f, &mut [], &mut []]) {
+            self.field.evaluate_switched(at, signs, f);
+        }
+    }
+}

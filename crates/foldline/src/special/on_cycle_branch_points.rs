@@ -1,0 +1,451 @@
+//! A branch point of cycles is held.
+//!
+//! **Idea.** As for equilibria ([`super::on_branch_points`]): where branches over λ cross, the variational equation with a column for λ has
+//! two null vectors and a left one. It is bordered by approximate ones, which makes it regular, and what the borders have to add is held
+//! at zero.
+//!
+//! **Equations.** In normalised time, f_x along the cycle, λ a direction in the plane of the two parameters:
+//!
+//! ```text
+//!   (1)  L (v, T₁, ℓ) = v' - T f_x v - T₁ f - ℓ T f_λ,   v(1) = v(0),   ∫⟨f, v⟩ = 0
+//!
+//!   (2)  [ L  d ] [ v_k ]   [ 0   ]                                                   [ 0 … 0  1 ]
+//!        [ C  0 ] [ ·   ] = [ e_k ],  k = 1, 2,      (w*  g₁  g₂) [ L  d ]  =
+//!                                                                 [ C  0 ]
+//!
+//!   (3)  dg_k = -w* (dL) v_k
+//! ```
+//!
+//! A forced cycle has a given period: then T₁ and the integral are left out. That branches cross along a whole curve is not generic, so it
+//! is asked of f + b d(x), of which there always is such a curve ([`super::unfolded`]); where b stays 0 it is one of f.
+//!
+//! **Source.** doedel2003 (cycles); govaerts2000, §3 (bordered matrices) and §6 (branch points).
+//!
+//! **Departures.** d, C and λ are taken anew at every accepted point.
+
+use crate::contract::{Batch, Condition, Parameters};
+use crate::diagram::{Cycle, Kind, Mesh, Point};
+use crate::linalg::condensed::Condensed;
+use crate::linalg::lane::{Eight, Lane};
+use crate::linalg::system::System;
+use crate::linalg::{axpy, dot, max_abs};
+use crate::problem::gauss::Scheme;
+use crate::problem::{Setting, mesh};
+use num_complex::Complex64;
+
+/// A branch point held on cycles.
+pub struct OnCycleBranchPoints<'a> {
+    setting: Setting<'a>,
+    scheme: Scheme,
+    mesh: Mesh,
+    n: usize,
+    forcing_periods: u32,
+    times: Vec<f64>,
+    /// The direction of λ in the last two free parameters.
+    across: [f64; 2],
+    /// Scalars of the bordered system: T₁ where there is one, ℓ, then what d adds; rows: the integral, then both of C.
+    system: System,
+    /// ⟨f, ·⟩ of the integral in (1), at the Gauss points.
+    phase: Vec<f64>,
+    /// d as a profile, and in the integral.
+    left: Vec<f64>,
+    left_phase: f64,
+    /// C: two rows, each a profile, T₁, ℓ.
+    right: [Vec<f64>; 2],
+    /// The last solutions: v_k with their scalars; w.
+    null: [Vec<f64>; 2],
+    adjoint: Vec<f64>,
+    period: f64,
+    parameters: Vec<f64>,
+    states: Vec<f64>,
+    f: Vec<f64>,
+    fx: Vec<f64>,
+    /// f_λ at the Gauss points.
+    along: Vec<f64>,
+}
+
+/// The operator (2), filled with the widest instruction set of the machine.
+struct Fill<'a, 'b, T> {
+    own: &'a OnCycleBranchPoints<'b>,
+    system: Condensed<T>,
+}
+
+impl<T: Lane> pulp::NullaryFnOnce for Fill<'_, '_, T> {
+    type Output = Condensed<T>;
+
+    #[inline(always)]
+    fn call(self) -> Condensed<T> {
+        self.own.filled(self.system)
+    }
+}
+
+impl<'a> OnCycleBranchPoints<'a> {
+    /// For cycles like that one; the last two free parameters of the setting are those of the plane.
+    pub fn new(setting: Setting<'a>, cycle: &Cycle) -> OnCycleBranchPoints<'a> {
+        let (scheme, n) = (Scheme::new(cycle.degree), setting.field.dim());
+        let scalars = 2 + usize::from(cycle.forcing_periods == 0);
+        let mut own = OnCycleBranchPoints {
+            system: System::new(n, &scheme.end, scalars),
+            setting,
+            scheme,
+            mesh: cycle.mesh.clone(),
+            n,
+            forcing_periods: cycle.forcing_periods,
+            times: Vec::new(),
+            across: [1.0, 0.0],
+            phase: Vec::new(),
+            left: Vec::new(),
+            left_phase: 0.3,
+            right: [Vec::new(), Vec::new()],
+            null: [Vec::new(), Vec::new()],
+            adjoint: Vec::new(),
+            period: 1.0,
+            parameters: Vec::new(),
+            states: Vec::new(),
+            f: Vec::new(),
+            fx: Vec::new(),
+            along: Vec::new(),
+        };
+        own.resize();
+        // Any borders will do for the first evaluation unless they are orthogonal to the null vectors.
+        let size = own.profile_size();
+        let wave =
+            |angle: f64, shift: f64| (0..size).map(|k| 0.5 + (k as f64 * angle + shift).sin()).collect::<Vec<f64>>();
+        let rows = [wave(0.017, 1.0), wave(0.031, 2.3)];
+        own.left = wave(0.013, 0.0);
+        own.right = [[&rows[0][..], &[0.3, 0.7]].concat(), [&rows[1][..], &[0.6, -0.4]].concat()];
+        own
+    }
+
+    /// 1 where T₁ and the integral are there.
+    fn first(&self) -> usize {
+        usize::from(self.forcing_periods == 0)
+    }
+
+    fn intervals(&self) -> usize {
+        self.mesh.len() - 1
+    }
+
+    fn lanes(&self) -> usize {
+        self.intervals() * self.scheme.degree
+    }
+
+    fn profile_size(&self) -> usize {
+        self.intervals() * (self.scheme.degree + 1) * self.n
+    }
+
+    fn resize(&mut self) {
+        let (m, lanes) = (self.scheme.degree, self.lanes());
+        self.system.resize(self.intervals());
+        self.states.resize(lanes * self.n, 0.0);
+        self.f.resize(lanes * self.n, 0.0);
+        self.along.resize(lanes * self.n, 0.0);
+        self.fx.resize(lanes * self.n * self.n, 0.0);
+        let mesh = &self.mesh;
+        let time = |lane: usize| {
+            let j = lane / m;
+            f64::from(self.forcing_periods) * (mesh[j] + (mesh[j + 1] - mesh[j]) * self.scheme.nodes[lane % m + 1])
+        };
+        self.times = (0..if self.forcing_periods > 0 { lanes } else { 0 }).map(time).collect();
+        self.phase.clear();
+    }
+
+    fn batch(&self) -> Batch<'_> {
+        let parameters = Parameters::Shared(&self.parameters);
+        Batch { lanes: self.lanes(), states: &self.states, parameters, times: &self.times }
+    }
+
+    /// Every Gauss point: its number, the place of its node in a profile, the length of its interval, its weight.
+    fn each(&self, mut call: impl FnMut(usize, usize, f64, f64)) {
+        let m = self.scheme.degree;
+        for lane in 0..self.lanes() {
+            let h = self.mesh[lane / m + 1] - self.mesh[lane / m];
+            call(lane, (lane / m * (m + 1) + lane % m + 1) * self.n, h, self.scheme.weights[lane % m]);
+        }
+    }
+
+    /// A profile at the Gauss points, `[n × lanes]`, and a change of all parameters there.
+    fn direction(&self, profile: &[f64], parameters: &[f64]) -> Vec<f64> {
+        let lanes = self.lanes();
+        let mut out = vec![0.0; self.n * lanes];
+        self.each(|lane, node, _, _| (0..self.n).for_each(|c| out[c * lanes + lane] = profile[node + c]));
+        out.extend(parameters.iter().flat_map(|p| std::iter::repeat_n(*p, lanes)));
+        out
+    }
+
+    /// A change of λ as one of all parameters.
+    fn spread(&self, change: f64) -> Vec<f64> {
+        let k = self.setting.freedom();
+        let mut all = vec![0.0; k];
+        all[k - 2..].iter_mut().zip(self.across).for_each(|(own, a)| *own = change * a);
+        self.setting.spread(&all)
+    }
+
+    fn linearise(&mut self, u: &[f64]) {
+        let (size, lanes) = (self.profile_size(), self.lanes());
+        self.states = self.direction(&u[..size], &[]);
+        self.period = u[size];
+        self.parameters = self.setting.at(&u[size + 1..]);
+        let (mut f, mut fx, mut along) =
+            (vec![0.0; self.n * lanes], std::mem::take(&mut self.fx), vec![0.0; self.n * lanes]);
+        self.setting.field.linearise(self.batch(), &[], &mut f, &mut fx, &mut []);
+        let lambda = self.direction(&vec![0.0; size], &self.spread(1.0));
+        self.setting.field.directional(self.batch(), &[&lambda], &mut along);
+        (self.f, self.fx, self.along) = (f, fx, along);
+        if self.phase.is_empty() && self.first() == 1 {
+            let (mut phase, mut norm) = (vec![0.0; lanes * self.n], 0.0);
+            self.each(|lane, _, h, weight| {
+                for c in 0..self.n {
+                    let value = self.f[c * lanes + lane] / self.setting.scales[c];
+                    phase[lane * self.n + c] = value / self.setting.scales[c];
+                    norm += h * weight * value * value;
+                }
+            });
+            let scale = 1.0 / norm.sqrt().max(f64::MIN_POSITIVE);
+            phase.iter_mut().for_each(|p| *p *= scale);
+            self.phase = phase;
+        }
+    }
+
+    #[inline(always)]
+    fn filled<T: Lane>(&self, mut system: Condensed<T>) -> Condensed<T> {
+        let (n, m, first, lanes) = (self.n, self.scheme.degree, self.first(), self.lanes());
+        let (inner, q, last, block) = (m * n, first + 2, self.intervals() - 1, (m + 1) * n);
+        let (width, length, size) = (n + q, system.length(), self.profile_size());
+        system.interior.fill(T::default());
+        system.coupling.fill(T::default());
+        system.border.fill(T::default());
+        system.corner.fill(0.0);
+        let slots: Vec<usize> = (0..inner).map(|k| system.slot(k / n, k % n)).collect();
+        for place in 0..length {
+            // Beyond the last interval the solver has intervals of length zero.
+            let interval = |lane: usize| (lane * length + place).min(last);
+            let h = T::each(|lane| match lane * length + place {
+                j if j <= last => self.mesh[j + 1] - self.mesh[j],
+                _ => 0.0,
+            });
+            let ht = h * T::splat(self.period);
+            for (i, c) in (0..m).flat_map(|i| (0..n).map(move |c| (i, c))) {
+                let at_point = |x: &[f64], stride: usize| T::each(|lane| x[(interval(lane) * m + i) * stride]);
+                let at_node = |x: &[f64]| T::each(|lane| x[interval(lane) * block + (i + 1) * n + c]);
+                let slot = slots[i * n + c];
+                let line = &mut system.interior[(place * inner + slot) * inner..][..inner];
+                for k in 0..m {
+                    line[slots[k * n + c]] = T::splat(self.scheme.derivative[i * (m + 1) + k + 1]);
+                }
+                for d in 0..n {
+                    let entry = &mut line[slots[i * n + d]];
+                    *entry = *entry - ht * at_point(&self.fx[(c * n + d) * lanes..], 1);
+                }
+                let right = &mut system.coupling[(place * inner + slot) * width..][..width];
+                right[c] = T::splat(self.scheme.derivative[i * (m + 1)]);
+                if first == 1 {
+                    right[n] = T::splat(-1.0) * h * at_point(&self.f[c * lanes..], 1);
+                }
+                right[n + first] = T::splat(-1.0) * ht * at_point(&self.along[c * lanes..], 1);
+                right[n + first + 1] = h * at_node(&self.left);
+                let weight = h * T::splat(self.scheme.weights[i]);
+                let at = |row: usize| (row * length + place) * block + n + slot;
+                if first == 1 {
+                    system.border[at(0)] = weight * at_point(&self.phase[c..], n);
+                }
+                for (k, row) in self.right.iter().enumerate() {
+                    system.border[at(first + k)] = weight * at_node(row);
+                }
+            }
+        }
+        if first == 1 {
+            system.corner[first + 1] = self.left_phase;
+        }
+        for (k, row) in self.right.iter().enumerate() {
+            let line = &mut system.corner[(first + k) * q..];
+            line[0] = row[size];
+            line[first] = row[size + 1];
+        }
+        system
+    }
+
+    fn evaluated(&mut self, u: &[f64], g: &mut [f64]) -> Option<()> {
+        self.linearise(u);
+        let system = std::mem::replace(&mut self.system, System::new(1, &[1.0, 0.0], 0));
+        self.system = match system {
+            System::Eight(system) => System::Eight(Eight::dispatch(Fill { own: self, system })),
+            System::One(system) => System::One(f64::dispatch(Fill { own: self, system })),
+        };
+        self.system.factorise(1.0).ok()?;
+        let (size, first) = (self.profile_size(), self.first());
+        let total = size + first + 2;
+        let unit = |k: usize| {
+            let mut one = vec![0.0; total];
+            one[k] = 1.0;
+            one
+        };
+        for k in 0..2 {
+            self.null[k] = vec![0.0; total];
+            self.system.solve(&unit(size + first + k), &mut self.null[k]);
+        }
+        self.adjoint = vec![0.0; total];
+        self.system.solve_transposed(&unit(size + first + 1), &mut self.adjoint);
+        g.copy_from_slice(&self.adjoint[size + first..]);
+        let finite = self.null.iter().chain([&self.adjoint]).all(|x| max_abs(x).is_finite());
+        finite.then_some(())
+    }
+
+    /// v_k with T₁ and ℓ, whether there is a T₁ or not.
+    fn parts(&self, k: usize) -> (&[f64], f64, f64) {
+        let (size, first) = (self.profile_size(), self.first());
+        let v = &self.null[k];
+        (&v[..size], if first == 1 { v[size] } else { 0.0 }, v[size + first])
+    }
+
+    /// w as a profile: left ends from the continuity rows, Gauss points from the collocation rows over their weights.
+    fn adjoint_profile(&self) -> Vec<f64> {
+        let (m, n, count) = (self.scheme.degree, self.n, self.intervals());
+        let (w, block) = (&self.adjoint, (m + 1) * n);
+        let mut profile = vec![0.0; count * block];
+        for j in 0..count {
+            let before = if j == 0 { count - 1 } else { j - 1 };
+            for c in 0..n {
+                profile[j * block + c] = w[before * block + c];
+                for i in 0..m {
+                    profile[j * block + (i + 1) * n + c] = w[j * block + (i + 1) * n + c] / self.scheme.weights[i];
+                }
+            }
+        }
+        profile
+    }
+
+    /// The product of two rows (profile, T₁, ℓ) in which lengths are measured.
+    fn product(&self, a: &[f64], b: &[f64]) -> f64 {
+        let size = self.profile_size();
+        let mut sum = a[size] * b[size] / (self.period * self.period) + a[size + 1] * b[size + 1];
+        self.each(|_, node, h, weight| {
+            for c in 0..self.n {
+                sum += h * weight * a[node + c] * b[node + c] / self.setting.scales[c].powi(2);
+            }
+        });
+        sum
+    }
+}
+
+impl Condition for OnCycleBranchPoints<'_> {
+    fn kind(&self) -> Kind {
+        Kind::BranchPoint
+    }
+
+    fn extra(&self) -> usize {
+        0
+    }
+
+    fn equations(&self) -> usize {
+        2
+    }
+
+    fn guess(&self, _point: &Point) -> Vec<f64> {
+        Vec::new()
+    }
+
+    fn face(&mut self, along: &[f64]) {
+        let k = self.setting.freedom();
+        let [first, second] = [k - 2, k - 1].map(|a| self.setting.axes[a].scale);
+        let [a, b] = [along[along.len() - 2] / first, along[along.len() - 1] / second];
+        let length = a.hypot(b);
+        if length > 0.0 {
+            // The null vectors belong to another λ.
+            self.across = [-b / length * first, a / length * second];
+        }
+    }
+
+    fn anchor(&mut self) {
+        if self.adjoint.is_empty() {
+            return;
+        }
+        let (n, size) = (self.n, self.profile_size());
+        let mut rows: Vec<Vec<f64>> = Vec::new();
+        for k in 0..2 {
+            let (v, period, lambda) = self.parts(k);
+            let mut row = [v, &[period, lambda]].concat();
+            for other in &rows {
+                let along = self.product(&row, other);
+                axpy(-along, other, &mut row);
+            }
+            let norm = self.product(&row, &row).sqrt();
+            row.iter_mut().for_each(|x| *x /= norm);
+            rows.push(row);
+        }
+        let adjoint = self.adjoint_profile();
+        let mut norm = 0.0;
+        self.each(|_, node, h, weight| {
+            (0..n).for_each(|c| norm += h * weight * (adjoint[node + c] * self.setting.scales[c]).powi(2));
+        });
+        let phase = if self.first() == 1 { self.adjoint[size] } else { 0.0 };
+        let norm = (norm + phase * phase).sqrt();
+        if !(norm.is_finite() && norm > 0.0 && rows.iter().all(|row| max_abs(row).is_finite())) {
+            return;
+        }
+        for (own, mut row) in self.right.iter_mut().zip(rows) {
+            row[..size].iter_mut().enumerate().for_each(|(k, x)| *x /= self.setting.scales[k % n].powi(2));
+            row[size] /= self.period * self.period;
+            *own = row;
+        }
+        self.left = adjoint.iter().enumerate().map(|(k, w)| w * self.setting.scales[k % n].powi(2) / norm).collect();
+        self.left_phase = phase / norm;
+        self.phase.clear();
+    }
+
+    fn set_mesh(&mut self, mesh: &Mesh) {
+        if *mesh == self.mesh {
+            return;
+        }
+        let size = self.profile_size();
+        let from = std::mem::replace(&mut self.mesh, mesh.clone());
+        self.resize();
+        let carried = |profile: &[f64]| mesh::transferred(profile, self.n, &self.scheme, &from, mesh);
+        let right = [0, 1].map(|k| {
+            let row = &self.right[k];
+            [&carried(&row[..size])[..], &row[size..]].concat()
+        });
+        (self.left, self.right) = (carried(&self.left), right);
+        // Null vectors of another mesh.
+        self.adjoint.clear();
+    }
+
+    fn evaluate(&mut self, u: &[f64], _extra: &[f64], g: &mut [f64]) -> bool {
+        if self.evaluated(u, g).is_none() {
+            self.adjoint.clear();
+            return false;
+        }
+        true
+    }
+
+    fn derivative(&mut self, du: &[f64], _extra: &[f64], dg: &mut [f64]) {
+        let (n, size, lanes) = (self.n, self.profile_size(), self.lanes());
+        let way = self.direction(&du[..size], &self.setting.spread(&du[size + 1..]));
+        let [mut bent, mut moved] = [(); 2].map(|()| vec![0.0; n * lanes]);
+        self.setting.field.directional(self.batch(), &[&way], &mut moved);
+        for (k, value) in dg.iter_mut().enumerate() {
+            let (v, period, lambda) = self.parts(k);
+            let own = self.direction(v, &self.spread(lambda));
+            self.setting.field.directional(self.batch(), &[&own, &way], &mut bent);
+            let mut change = vec![0.0; size];
+            self.each(|lane, node, h, _| {
+                for c in 0..n {
+                    let along: f64 = (0..n).map(|d| self.fx[(c * n + d) * lanes + lane] * v[node + d]).sum();
+                    let along = along + lambda * self.along[c * lanes + lane];
+                    let rate =
+                        du[size] * along + self.period * bent[c * lanes + lane] + period * moved[c * lanes + lane];
+                    change[node + c] = -h * rate;
+                }
+            });
+            *value = -dot(&self.adjoint[..size], &change);
+        }
+    }
+
+    fn held(&self, _extra: &[f64]) -> Vec<Complex64> {
+        vec![Complex64::new(1.0, 0.0)]
+    }
+
+    fn distance(&self, z: Complex64) -> f64 {
+        (z - 1.0).norm()
+    }
+}

@@ -1,0 +1,378 @@
+//! A vector field with an amplitude more, by which it can be given up where branches of cycles cross.
+//!
+//! **Idea.** Where branches cross, cycles with two free parameters form no smooth surface. Those of f(x, λ) + b d(x) with an amplitude b do,
+//! provided that no function in the range of the variational equation equals d along the cycle. A d without any symmetry or structure
+//! will do; where b is 0, f itself has the cycle.
+//!
+//! **Equations.** With sizes s of the states and fixed numbers m, φ:
+//!
+//!   (1)  d_i(x) = s_i Σ_j m_ij sin(x_j / s_j + φ_ij)
+//!
+//! b is the last parameter.
+//!
+//! **Source.** allgower1990, §8 (unfolding of branch points); doedel2003 (cycles).
+
+use crate::contract::{Batch, Examination, Parameters, Singular, VectorField, ZeroProblem};
+use crate::diagram::{Cycle, Mesh, Point, Solution};
+use crate::problem::cycle::CycleProblem;
+use crate::problem::{Axis, Setting};
+use num_complex::Complex64;
+use std::f64::consts::FRAC_PI_2;
+
+/// f + b d, with b as one parameter more.
+#[derive(Clone)]
+pub struct Unfolded<'f> {
+    field: &'f dyn VectorField,
+    sizes: Vec<f64>,
+}
+
+impl<'f> Unfolded<'f> {
+    /// `sizes` `[n]`: how large the states are along the cycles.
+    pub fn new(field: &'f dyn VectorField, sizes: &[f64]) -> Unfolded<'f> {
+        Unfolded { field, sizes: sizes.to_vec() }
+    }
+
+    /// Over another field with the same states.
+    pub fn over<'g>(&self, field: &'g dyn VectorField) -> Unfolded<'g> {
+        Unfolded { field, sizes: self.sizes.clone() }
+    }
+
+    /// The batch without b, and b of a lane.
+    fn parts<'b>(&self, at: Batch<'b>) -> (Batch<'b>, impl Fn(usize) -> f64 + use<'b>) {
+        let (k, lanes) = (self.field.parameter_count(), at.lanes);
+        let parameters = match at.parameters {
+            Parameters::Shared(all) => Parameters::Shared(&all[..k]),
+            Parameters::PerLane(all) => Parameters::PerLane(&all[..k * lanes]),
+        };
+        let amplitude = move |lane: usize| match at.parameters {
+            Parameters::Shared(all) => all[k],
+            Parameters::PerLane(all) => all[k * lanes + lane],
+        };
+        (Batch { parameters, ..at }, amplitude)
+    }
+
+    /// m_ij and φ_ij: numbers without any structure.
+    fn coefficients(i: usize, j: usize) -> (f64, f64) {
+        let number = |a: f64, b: f64| (1.0 + a * i as f64 + b * j as f64).sin();
+        (0.6 + number(1.3, 1.9), 2.0 * number(2.3, 0.7))
+    }
+
+    /// The derivative of d_i along these directions (none for d itself) in a lane: `[n × lanes]`, perhaps with more behind.
+    fn bent(&self, i: usize, lane: usize, at: &Batch, directions: &[&[f64]]) -> f64 {
+        let turn = FRAC_PI_2 * directions.len() as f64;
+        let term = |j: usize| {
+            let (m, phase) = Unfolded::coefficients(i, j);
+            let along: f64 = directions.iter().map(|v| v[j * at.lanes + lane] / self.sizes[j]).product();
+            m * (at.states[j * at.lanes + lane] / self.sizes[j] + phase + turn).sin() * along
+        };
+        self.sizes[i] * (0..self.sizes.len()).map(term).sum::<f64>()
+    }
+
+    fn add(&self, at: &Batch, amplitude: impl Fn(usize) -> f64, f: &mut [f64]) {
+        for i in 0..self.sizes.len() {
+            for lane in 0..at.lanes {
+                f[i * at.lanes + lane] += amplitude(lane) * self.bent(i, lane, at, &[]);
+            }
+        }
+    }
+}
+
+impl VectorField for Unfolded<'_> {
+    fn dim(&self) -> usize {
+        self.field.dim()
+    }
+
+    fn parameter_count(&self) -> usize {
+        self.field.parameter_count() + 1
+    }
+
+    fn evaluate(&self, at: Batch, f: &mut [f64]) {
+        let (own, amplitude) = self.parts(at);
+        self.field.evaluate(own, f);
+        self.add(&at, amplitude, f);
+    }
+
+    fn linearise(&self, at: Batch, free: &[usize], f: &mut [f64], fx: &mut [f64], fp: &mut [f64]) {
+        let (own, amplitude) = self.parts(at);
+        let (n, k, lanes) = (self.dim(), self.field.parameter_count(), at.lanes);
+        let known: Vec<usize> = free.iter().copied().filter(|index| *index < k).collect();
+        let mut given = vec![0.0; n * known.len() * lanes];
+        self.field.linearise(own, &known, f, fx, &mut given);
+        self.add(&at, &amplitude, f);
+        for j in 0..n {
+            for (i, lane) in (0..n).flat_map(|i| (0..lanes).map(move |lane| (i, lane))) {
+                let term = |j: usize| {
+                    let (m, phase) = Unfolded::coefficients(i, j);
+                    m * (at.states[j * lanes + lane] / self.sizes[j] + phase).cos() / self.sizes[j]
+                };
+                fx[(i * n + j) * lanes + lane] += amplitude(lane) * self.sizes[i] * term(j);
+            }
+        }
+        let mut next = 0;
+        for (c, index) in free.iter().enumerate() {
+            let column = |i: usize| (i * free.len() + c) * lanes;
+            for i in 0..n {
+                for lane in 0..lanes {
+                    fp[column(i) + lane] = match *index < k {
+                        true => given[(i * known.len() + next) * lanes + lane],
+                        false => self.bent(i, lane, &at, &[]),
+                    };
+                }
+            }
+            next += usize::from(*index < k);
+        }
+    }
+
+    fn directional(&self, at: Batch, directions: &[&[f64]], out: &mut [f64]) {
+        let (own, amplitude) = self.parts(at);
+        let (n, k, lanes) = (self.dim(), self.field.parameter_count(), at.lanes);
+        let given: Vec<&[f64]> = directions.iter().map(|v| &v[..(n + k) * lanes]).collect();
+        self.field.directional(own, &given, out);
+        for i in 0..n {
+            for lane in 0..lanes {
+                // b d is linear in b.
+                let mut sum = amplitude(lane) * self.bent(i, lane, &at, directions);
+                for (l, v) in directions.iter().enumerate() {
+                    let others: Vec<&[f64]> =
+                        directions.iter().enumerate().filter(|(other, _)| *other != l).map(|(_, v)| *v).collect();
+                    sum += v[(n + k) * lanes + lane] * self.bent(i, lane, &at, &others);
+                }
+                out[i * lanes + lane] += sum;
+            }
+        }
+    }
+
+    fn ended(&self) -> bool {
+        self.field.ended()
+    }
+
+    fn forced(&self) -> bool {
+        self.field.forced()
+    }
+
+    fn time_unit(&self, parameters: &[f64]) -> f64 {
+        self.field.time_unit(&parameters[..self.field.parameter_count()])
+    }
+
+    fn output_count(&self) -> usize {
+        self.field.output_count()
+    }
+
+    fn outputs(&self, at: Batch, out: &mut [f64]) {
+        self.field.outputs(self.parts(at).0, out);
+    }
+
+    fn switch_count(&self) -> usize {
+        self.field.switch_count()
+    }
+
+    fn switches(&self, at: Batch, out: &mut [f64]) {
+        self.field.switches(self.parts(at).0, out);
+    }
+
+    fn evaluate_switched(&self, at: Batch, signs: &[f64], f: &mut [f64]) {
+        let (own, amplitude) = self.parts(at);
+        self.field.evaluate_switched(own, signs, f);
+        self.add(&at, amplitude, f);
+    }
+}
+
+/// Cycles of f + b d: u = (profile, T, b, λ₁, λ₂), points without b.
+pub struct UnfoldedCycles<'a> {
+    cycles: CycleProblem<'a>,
+    parameters: usize,
+    /// T where it was anchored last.
+    period: f64,
+}
+
+impl<'a> UnfoldedCycles<'a> {
+    /// The setting of f as one of f + b d, for cycles like that one.
+    pub fn setting(setting: &Setting, unfolded: &'a Unfolded<'a>, scales: &'a [f64], cycle: &Cycle) -> Setting<'a> {
+        // b is a rate: over a period it changes states by their sizes.
+        let time = if cycle.forcing_periods > 0 { f64::from(cycle.forcing_periods) } else { cycle.period };
+        let k = setting.parameters.len();
+        Setting {
+            field: unfolded,
+            scales,
+            parameters: [&setting.parameters[..], &[0.0]].concat(),
+            axes: [Axis::new(k, 1.0 / time)].into_iter().chain(setting.axes.iter().cloned()).collect(),
+        }
+    }
+
+    /// Cycles in such a setting.
+    pub fn new(cycles: CycleProblem<'a>, parameters: usize) -> UnfoldedCycles<'a> {
+        UnfoldedCycles { cycles, parameters, period: 1.0 }
+    }
+}
+
+impl ZeroProblem for UnfoldedCycles<'_> {
+    fn unknowns(&self) -> usize {
+        self.cycles.unknowns()
+    }
+
+    fn anchor(&mut self, u: &[f64]) {
+        self.period = u[u.len() - 4];
+        self.cycles.anchor(u);
+    }
+
+    fn residual(&mut self, u: &[f64], r: &mut [f64]) -> bool {
+        self.cycles.residual(u, r)
+    }
+
+    fn factorise(&mut self, u: &[f64], rows: &[f64]) -> Result<(), Singular> {
+        self.cycles.factorise(u, rows)
+    }
+
+    fn solve(&mut self, rhs: &[f64], x: &mut [f64]) {
+        self.cycles.solve(rhs, x);
+    }
+
+    fn dot(&self, a: &[f64], b: &[f64]) -> f64 {
+        self.cycles.dot(a, b)
+    }
+
+    fn relative_size(&self, du: &[f64], u: &[f64]) -> f64 {
+        self.cycles.relative_size(du, u)
+    }
+
+    fn mesh(&self) -> Mesh {
+        self.cycles.mesh()
+    }
+
+    fn set_mesh(&mut self, mesh: &Mesh) {
+        self.cycles.set_mesh(mesh);
+    }
+
+    fn transfer(&self, v: &[f64], from: &Mesh, to: &Mesh) -> Vec<f64> {
+        self.cycles.transfer(v, from, to)
+    }
+
+    fn better_mesh(&self, u: &[f64], tolerance: f64) -> Option<Mesh> {
+        self.cycles.better_mesh(u, tolerance)
+    }
+
+    fn coarser_mesh(&self, u: &[f64], tolerance: f64) -> Option<Mesh> {
+        self.cycles.coarser_mesh(u, tolerance)
+    }
+
+    fn finer_mesh(&self) -> Option<Mesh> {
+        self.cycles.finer_mesh()
+    }
+
+    fn denser_mesh(&self) -> Option<Mesh> {
+        self.cycles.denser_mesh()
+    }
+
+    fn examine(&mut self, u: &[f64]) -> Examination {
+        self.cycles.examine(u)
+    }
+
+    fn stability(&mut self, u: &[f64]) -> Examination {
+        self.cycles.stability(u)
+    }
+
+    fn spectrum_error(&mut self, u: &[f64], spectrum: &[Complex64]) -> f64 {
+        self.cycles.spectrum_error(u, spectrum)
+    }
+
+    fn margin(&self, at: &Point) -> f64 {
+        self.cycles.margin(at)
+    }
+
+    /// b over a period, against the sizes of the states. A mesh has no symmetry, so b is known to the error of discretisation only, which
+    /// is a thousand times what Newton's method leaves ([`crate::continuation::Settings::newton_tolerance`]).
+    fn departure(&self, u: &[f64]) -> f64 {
+        1e-3 * (u[u.len() - 3] * self.period).abs()
+    }
+
+    fn point(&self, u: &[f64], tangent: &[f64], examination: Examination) -> Point {
+        let mut point = self.cycles.point(u, tangent, examination);
+        point.parameters.truncate(self.parameters);
+        point
+    }
+
+    fn unknowns_of(&mut self, point: &Point) -> Vec<f64> {
+        self.cycles.unknowns_of(point)
+    }
+
+    fn images(&mut self, beside: &[f64], point: &Point, reflection: &[bool], within: f64) -> Vec<[Vec<f64>; 2]> {
+        self.cycles.images(beside, point, reflection, within)
+    }
+}
+
+/// How large every state is along a solution: its largest absolute value, or its scale where that is larger.
+pub fn sizes(point: &Point, scales: &[f64]) -> Vec<f64> {
+    let mut sizes = scales.to_vec();
+    if let Solution::Cycle(cycle) = &point.solution {
+        let n = sizes.len();
+        cycle.profile.iter().enumerate().for_each(|(k, x)| sizes[k % n] = sizes[k % n].max(x.abs()));
+    }
+    sizes
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::{Definition, Model, ModelSource, Parameter, State};
+
+    fn model() -> Model {
+        Model::compile(ModelSource {
+            name: "two".into(),
+            parameters: vec![Parameter::new("p", 0.4), Parameter::new("q", 0.7)],
+            states: vec![State::new("x"), State::new("y")],
+            equations: vec![Definition::new("x", "p*x - y*q + x*y"), Definition::new("y", "x + sin(p*y)")],
+            ..ModelSource::default()
+        })
+        .unwrap()
+    }
+
+    /// f + b d at one place.
+    fn value(field: &Unfolded, x: [f64; 2], p: [f64; 3]) -> [f64; 2] {
+        let mut f = [0.0; 2];
+        field.evaluate(Batch { lanes: 1, states: &x, parameters: Parameters::Shared(&p), times: &[] }, &mut f);
+        f
+    }
+
+    #[test]
+    fn derivatives_are_those_of_differences() {
+        const STEP: f64 = 1e-5;
+        let model = model();
+        let field = Unfolded::new(&model, &[0.8, 2.0]);
+        let (x, p) = ([0.3, -0.6], [0.4, 0.7, 0.25]);
+        let at = Batch { lanes: 1, states: &x, parameters: Parameters::Shared(&p), times: &[] };
+        let (mut f, mut fx, mut fp) = ([0.0; 2], [0.0; 4], [0.0; 4]);
+        // b first, then q: the columns come in the order asked for.
+        field.linearise(at, &[2, 1], &mut f, &mut fx, &mut fp);
+        f.iter().zip(value(&field, x, p)).for_each(|(a, b)| assert!((a - b).abs() < 1e-15, "{a} {b}"));
+        let directions = [
+            [1.0, 0.0, 0.0, 0.0, 0.0],
+            [0.0, 1.0, 0.0, 0.0, 0.0],
+            [0.0, 0.0, 0.0, 0.0, 1.0],
+            [0.0, 0.0, 0.0, 1.0, 0.0],
+        ];
+        for (d, direction) in directions.iter().enumerate() {
+            let moved = |s: f64| {
+                let x = [x[0] + s * direction[0], x[1] + s * direction[1]];
+                value(&field, x, [p[0] + s * direction[2], p[1] + s * direction[3], p[2] + s * direction[4]])
+            };
+            let (up, down) = (moved(STEP), moved(-STEP));
+            let mut along = [0.0; 2];
+            field.directional(at, &[&direction[..]], &mut along);
+            for i in 0..2 {
+                let slope = (up[i] - down[i]) / (2.0 * STEP);
+                let own = if d < 2 { fx[i * 2 + d] } else { fp[i * 2 + d - 2] };
+                assert!((slope - along[i]).abs() < 1e-8 && (slope - own).abs() < 1e-8, "{d} {i}: {slope} {own}");
+            }
+        }
+        let (v, w) = ([0.3, -0.2, 0.5, 0.1, 0.7], [-0.4, 0.9, 0.2, -0.3, 0.6]);
+        let (mut twice, mut up, mut down) = ([0.0; 2], [0.0; 2], [0.0; 2]);
+        field.directional(at, &[&v[..], &w[..]], &mut twice);
+        for (sign, out) in [(1.0, &mut up), (-1.0, &mut down)] {
+            let s = sign * STEP;
+            let (x, p) = ([x[0] + s * w[0], x[1] + s * w[1]], [p[0] + s * w[2], p[1] + s * w[3], p[2] + s * w[4]]);
+            let at = Batch { lanes: 1, states: &x, parameters: Parameters::Shared(&p), times: &[] };
+            field.directional(at, &[&v[..]], out);
+        }
+        (0..2).for_each(|i| assert!(((up[i] - down[i]) / (2.0 * STEP) - twice[i]).abs() < 1e-8));
+    }
+}
