@@ -1,12 +1,12 @@
 //! A small campaign, and cases that once failed.
 
-use foldline_campaign::campaign;
 use foldline_campaign::cases::{Case, classical};
 use foldline_campaign::report::Report;
 use foldline_campaign::rotor::rotors;
+use foldline_campaign::{LIMIT, campaign};
 
 fn of(cases: &[Case]) -> Report {
-    campaign(cases, 2, &|_, _| ())
+    campaign(cases, 2, LIMIT, &|_, _| ())
 }
 
 #[track_caller]
