@@ -10,21 +10,25 @@ use foldline_store::order::leg;
 /// Exit code of a panic.
 const PANIC: i32 = 101;
 
-/// A sentence and a verdict for each.
+/// A sentence and a verdict for each. Of a study these are always the same sentences, so that counts can be compared.
 pub fn verdicts(run: &Run, outcome: &Outcome) -> Vec<(&'static str, Verdict)> {
-    let crashed = matches!(outcome.end, End::Crashed | End::Code(PANIC));
+    let code = match outcome.end {
+        End::Code(code) if code != PANIC => Ok(code),
+        End::OutOfTime => Err("did not end"),
+        _ => Err("it crashed"),
+    };
+    let by_itself = |judged: &dyn Fn(i32) -> Verdict| code.map_or_else(|why| Verdict::Wrong(why.to_string()), judged);
     let mut list = vec![
-        ("does not crash", Verdict::of(!crashed, || "it crashed".to_string())),
-        ("ends in time", Verdict::of(outcome.end != End::OutOfTime, || "did not end".to_string())),
+        ("does not crash", Verdict::of(code != Err("it crashed"), || "it crashed".to_string())),
+        ("ends in time", Verdict::of(code != Err("did not end"), || "did not end".to_string())),
+        ("exit code", by_itself(&|code| Verdict::of(run.exit.contains(&code), || format!("{code}")))),
     ];
-    if let End::Code(code) = outcome.end {
-        list.push(("exit code", Verdict::of(run.exit.contains(&code), || format!("{code}"))));
-    }
-    if let Some(stored) = &outcome.stored {
-        list.push(("stability is explained", explained(&stored.diagram)));
-        if outcome.end != End::OutOfTime && !crashed {
-            list.push(("exit code tells what is short", told(outcome.end, stored)));
-        }
+    if run.is_a_study() {
+        // What was refused has nothing to explain.
+        let nothing = || by_itself(&|_| Verdict::Right);
+        list.push(("stability is explained", outcome.stored.as_ref().map_or_else(nothing, |s| explained(&s.diagram))));
+        let silent = |code| outcome.stored.as_ref().map_or(Verdict::Right, |stored| told(code, stored));
+        list.push(("exit code tells what is short", by_itself(&silent)));
     }
     list
 }
@@ -42,7 +46,7 @@ fn explained(diagram: &Diagram) -> Verdict {
 }
 
 /// Exit code 0 means that every branch and curve asked for is there and ended where it should, with nothing unexplained on it.
-fn told(end: End, stored: &Stored) -> Verdict {
+fn told(code: i32, stored: &Stored) -> Verdict {
     let on_the_way = |branch: &&Branch| !stored.homotopies.iter().any(|name| leg(&branch.name, name).is_some());
     let short = stored.diagram.branches.iter().filter(on_the_way).find(|branch| {
         branch.ends.iter().any(|end| !end.as_ref().is_some_and(|end| end.complete()))
@@ -50,6 +54,6 @@ fn told(end: End, stored: &Stored) -> Verdict {
     });
     let missing = stored.asked.iter().find(|name| stored.diagram.branch(name).is_none());
     let name = short.map(|branch| &branch.name).or(missing);
-    let silent = end == End::Code(0) && name.is_some();
+    let silent = code == 0 && name.is_some();
     Verdict::of(!silent, || format!("0, though {} is short", name.map_or("", String::as_str)))
 }

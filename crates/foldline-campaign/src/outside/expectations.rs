@@ -149,7 +149,12 @@ impl Run {
     /// Name in the report: the file without its ending, and the command where it is another one.
     pub fn name(&self) -> String {
         let stem = self.file.trim_end_matches(".toml").to_string();
-        if self.command == ["run"] { stem } else { format!("{stem} ({})", self.command.join(" ")) }
+        if self.is_a_study() { stem } else { format!("{stem} ({})", self.command.join(" ")) }
+    }
+
+    /// True if the file is a study that `foldline run` runs.
+    pub fn is_a_study(&self) -> bool {
+        self.command == ["run"]
     }
 }
 
