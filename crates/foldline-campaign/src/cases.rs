@@ -32,6 +32,9 @@ pub struct Case {
     pub first: First,
     /// The one tolerance.
     pub tolerance: f64,
+    /// True where no cycle of the model can come close to an equilibrium that it does not shrink to, so that a period that seems to
+    /// grow without bound is a fault: a canard explosion taken for a homoclinic orbit.
+    pub bounded: bool,
 }
 
 impl Case {
@@ -143,6 +146,7 @@ pub fn classical(starts: usize) -> Vec<Case> {
                 study,
                 first: First::Planned,
                 tolerance: TOLERANCE,
+                bounded: false,
             }
         })
     };

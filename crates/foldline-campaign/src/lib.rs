@@ -7,32 +7,43 @@
 //!
 //! | question | file |
 //! |---|---|
-//! | which problems? | [`cases`], [`rotor`] |
+//! | which problems? | [`cases`], [`rotor`], [`drawn`] |
 //! | how is a branch followed, and from where? | [`routes`] |
 //! | are these the same special points? | [`same`] |
 //! | how large are the errors really? | [`errors`] |
+//! | is every change of stability explained? | [`explained`] |
 //! | what is reported? | [`report`] |
+//! | how long may it take? | [`watch`] |
+//! | problems of others, with right values from elsewhere | [`outside`] |
 
 pub mod cases;
+pub mod drawn;
 pub mod errors;
+pub mod explained;
+pub mod outside;
 pub mod random;
 pub mod report;
 pub mod rotor;
 pub mod routes;
 pub mod same;
+pub mod watch;
 
 use cases::Case;
 use report::Report;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
+use std::time::Duration;
 
 /// The one tolerance.
 pub const TOLERANCE: f64 = 1e-6;
 /// Degree of the collocation polynomials.
 pub const DEGREE: usize = 4;
 
-/// Examines every case, over that many threads; `tell` is called with the report of each as it comes.
-pub fn campaign(cases: &[Case], jobs: usize, tell: &(dyn Fn(usize, &Report) + Sync)) -> Report {
+/// Time that a case may take unless another is given.
+pub const LIMIT: Duration = Duration::from_secs(300);
+
+/// Examines every case, over that many threads and each within `limit`; `tell` is called with the report of each as it comes.
+pub fn campaign(cases: &[Case], jobs: usize, limit: Duration, tell: &(dyn Fn(usize, &Report) + Sync)) -> Report {
     let next = AtomicUsize::new(0);
     let done: Mutex<Vec<(usize, Report)>> = Mutex::new(Vec::new());
     let work = || {
@@ -40,7 +51,7 @@ pub fn campaign(cases: &[Case], jobs: usize, tell: &(dyn Fn(usize, &Report) + Sy
             let index = next.fetch_add(1, Ordering::Relaxed);
             cases.get(index).map(|case| (index, case))
         } {
-            let report = routes::examine(case);
+            let report = routes::examine(case, limit);
             tell(index, &report);
             done.lock().unwrap_or_else(PoisonError::into_inner).push((index, report));
         }

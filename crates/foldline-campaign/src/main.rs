@@ -1,14 +1,18 @@
 //! `foldline-campaign [COUNT] [OPTIONS]`: what `cargo xtask campaign` runs.
 
-use foldline_campaign::{campaign, cases, rotor};
+use foldline_campaign::{LIMIT, campaign, cases, drawn, rotor};
 use std::process::ExitCode;
 
-const USAGE: &str = "foldline-campaign [COUNT] [--from NUMBER] [--classical STARTS] [--only TEXT] [--verbose]
+const USAGE: &str = "foldline-campaign [COUNT] [--random COUNT] [--classical STARTS] [--from NUMBER] [--only TEXT] [--verbose]
   COUNT        how many random rotors, 200 if not said
-  --from       number of the first rotor
+  --random     how many cases of neurons, kinetics, ecology, coupled cells and forced oscillators with random parameters, 240 if
+               not said
+  --from       number of the first rotor and the first of the random cases
   --classical  starts for each classical problem, 5 if not said
   --only       only cases whose name contains TEXT
   --tolerance  instead of 1e-6
+  --limit      seconds for each case, 300 if not said
+  --jobs       threads, one for each core if not said
   --verbose    a line for each case
   --trace      every point of every run";
 
@@ -24,7 +28,9 @@ fn main() -> ExitCode {
 }
 
 fn answer() -> Result<bool, String> {
-    let (mut count, mut from, mut starts, mut only) = (200usize, 0usize, 5usize, String::new());
+    let (mut count, mut from, mut starts, mut random, mut only) = (200usize, 0usize, 5usize, 240usize, String::new());
+    let mut limit = LIMIT;
+    let mut jobs = std::thread::available_parallelism().map_or(1, |n| n.get());
     let (mut verbose, mut trace, mut tolerance) = (false, false, None);
     let mut rest = std::env::args().skip(1);
     while let Some(argument) = rest.next() {
@@ -32,6 +38,9 @@ fn answer() -> Result<bool, String> {
             |what: &str| rest.next().and_then(|text| text.parse().ok()).ok_or_else(|| format!("{what} needs a number"));
         match argument.as_str() {
             "--from" => from = number("--from")?,
+            "--random" => random = number("--random")?,
+            "--limit" => limit = std::time::Duration::from_secs(number("--limit")? as u64),
+            "--jobs" => jobs = number("--jobs")?,
             "--classical" => starts = number("--classical")?,
             "--only" => only = rest.next().ok_or("--only needs a text")?,
             "--tolerance" => tolerance = rest.next().and_then(|t| t.parse().ok()),
@@ -42,13 +51,13 @@ fn answer() -> Result<bool, String> {
     }
     let mut all = rotor::rotors(from..from + count);
     all.extend(cases::classical(starts));
+    all.extend(drawn::drawn(from..from + random));
     all.iter_mut()
         .zip(std::iter::repeat(tolerance))
         .for_each(|(case, own)| case.tolerance = own.unwrap_or(case.tolerance));
     all.retain(|case| case.name.contains(&only));
-    let jobs = std::thread::available_parallelism().map_or(1, |n| n.get());
     let start = std::time::Instant::now();
-    let report = campaign(&all, jobs, &|index, report| {
+    let report = campaign(&all, jobs, limit, &|index, report| {
         if verbose {
             eprintln!(
                 "{:6.1} s  {}: {} branches, {} points",

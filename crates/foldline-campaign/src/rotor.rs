@@ -38,5 +38,5 @@ fn rotor(number: usize) -> Case {
         "rotor {number} (zeta {zeta:.3e}, epsilon {epsilon:.3}, beta {beta:.1}, gamma {gamma:.2}, J_p {polar:.3}, kappa {kappa}, \
          Omega {omega:.3})"
     );
-    Case { name, study, first, tolerance: TOLERANCE }
+    Case { name, study, first, tolerance: TOLERANCE, bounded: false }
 }

@@ -3,14 +3,17 @@
 use crate::DEGREE;
 use crate::cases::{Case, First};
 use crate::errors;
+use crate::explained::unexplained;
 use crate::report::Report;
 use crate::same::differences;
+use crate::watch::Watch;
 use foldline::continuation::Settings;
 use foldline::continuation::corrector::{Plane, settle};
-use foldline::contract::Unobserved;
+use foldline::contract::Observer;
 use foldline::diagram::{Branch, Cost, Diagram, Ending, Family, Kind, Origin, Point, Solution, SpecialPoint};
 use foldline::explore::growth::{Beginning, Growth, is_doubled, polished, problem_of, settings};
 use foldline::explore::{self, System};
+use std::time::Duration;
 
 /// First steps, the middle one being the usual one.
 const FIRST_STEPS: [f64; 2] = [2e-4, 0.2];
@@ -28,21 +31,28 @@ const SAMPLES: usize = 32;
 const CYCLES: usize = 3;
 
 /// Follows everything of one case in every way.
-pub fn examine(case: &Case) -> Report {
+pub fn examine(case: &Case, limit: Duration) -> Report {
+    let watch = Watch::start(limit);
     let mut report = Report { cases: 1, ..Report::default() };
     let system = System::of_plan(case.model(), &case.study.plan);
     let plan = &case.study.plan.branches[0];
     let (free, range) = (plan.free, plan.range);
     match &case.first {
         First::Planned => {
-            let diagram = explore::run(&system, &case.study.plan, 1, Diagram::default(), &Unobserved);
+            let diagram = explore::run(&system, &case.study.plan, 1, Diagram::default(), &watch);
+            // A run that was stopped differs from the others wherever that happened.
+            if watch.over() {
+                unfinished(case, &mut report);
+                return report;
+            }
             for branch in &diagram.branches {
                 let settings = settings(&system, case.tolerance, plan.range, MOST_POINTS);
                 let parents = match &branch.origin {
                     Origin::Switch { parent, .. } => diagram.branch(parent).map_or(&[][..], |parent| &parent.special),
                     _ => &[],
                 };
-                routes(&system, &settings, &case.name, branch, parents, &mut report);
+                let way = Way { system: &system, settings: &settings, watch: &watch, bounded: case.bounded };
+                routes(way, &case.name, branch, parents, &mut report);
             }
         }
         First::Sampled { parameters, to, random } => {
@@ -50,26 +60,50 @@ pub fn examine(case: &Case) -> Report {
             let equilibria = census.attractors.iter().filter(|a| a.point.solution.period().is_none()).take(1);
             let cycles = census.attractors.iter().filter(|a| a.point.solution.period().is_some()).take(CYCLES);
             for (number, attractor) in equilibria.chain(cycles).enumerate() {
-                let Some(start) = brought(&system, case.tolerance, &attractor.point, *to) else {
+                let Some(start) = brought(&system, &watch, case.tolerance, &attractor.point, *to) else {
                     report.not_brought += 1;
                     continue;
                 };
                 let settings = settings(&system, case.tolerance, range, MOST_POINTS);
+                let way = Way { system: &system, settings: &settings, watch: &watch, bounded: case.bounded };
                 let kind = attractor.ratio.map_or(String::new(), |(a, b)| format!(" {a}:{b}"));
                 let name = format!("{number}{kind}");
-                let Some(branch) = followed(&system, &settings, free, &name, &start) else {
+                let Some(branch) = followed(way, free, &name, &start) else {
                     report.differences.push(format!("{}: {name}: the start did not converge", case.name));
                     continue;
                 };
-                routes(&system, &settings, &case.name, &branch, &[], &mut report);
+                routes(way, &case.name, &branch, &[], &mut report);
             }
         }
+    }
+    if watch.over() {
+        unfinished(case, &mut report);
     }
     report
 }
 
+fn unfinished(case: &Case, report: &mut Report) {
+    report.short.push(format!("{}: the case did not end within its time", case.name));
+}
+
+/// What following a branch takes.
+#[derive(Clone, Copy)]
+struct Way<'a> {
+    system: &'a System<'a>,
+    settings: &'a Settings,
+    watch: &'a Watch,
+    /// As [`Case::bounded`].
+    bounded: bool,
+}
+
 /// A solution at another value of a parameter, along a branch in it.
-fn brought(system: &System, tolerance: f64, point: &Point, (index, value): (usize, f64)) -> Option<Point> {
+fn brought(
+    system: &System,
+    watch: &Watch,
+    tolerance: f64,
+    point: &Point,
+    (index, value): (usize, f64),
+) -> Option<Point> {
     let now = point.parameters[index];
     if (now - value).abs() <= 1e-12 * now.abs() {
         return Some(point.clone());
@@ -78,14 +112,15 @@ fn brought(system: &System, tolerance: f64, point: &Point, (index, value): (usiz
     let settings = settings(system, tolerance, range, MOST_POINTS);
     let sides = if value > now { [false, true] } else { [true, false] };
     let way = Branch::new("way", family(point), index, Origin::Seed("way".into()));
-    let branch = grown(system, &settings, way, &[], point, sides)?;
+    let how = Way { system, settings: &settings, watch, bounded: false };
+    let branch = grown(how, way, &[], point, sides)?;
     let ends = [branch.points.first()?, branch.points.last()?];
     ends.into_iter().find(|end| (end.parameters[index] - value).abs() <= 1e-9 * (1.0 + value.abs())).cloned()
 }
 
-fn followed(system: &System, settings: &Settings, free: usize, name: &str, start: &Point) -> Option<Branch> {
+fn followed(way: Way, free: usize, name: &str, start: &Point) -> Option<Branch> {
     let branch = Branch::new(name, family(start), free, Origin::Seed(name.into()));
-    grown(system, settings, branch, &[], start, [true, true])
+    grown(way, branch, &[], start, [true, true])
 }
 
 fn family(point: &Point) -> Family {
@@ -96,8 +131,7 @@ fn family(point: &Point) -> Family {
 }
 
 fn grown(
-    system: &System,
-    settings: &Settings,
+    Way { system, settings, watch, .. }: Way,
     mut branch: Branch,
     parents: &[SpecialPoint],
     start: &Point,
@@ -122,7 +156,7 @@ fn grown(
         ties: Vec::new(),
         sides,
         parents,
-        observer: &Unobserved,
+        observer: watch as &dyn Observer,
         whole: true,
         sparse: false,
     };
@@ -131,18 +165,12 @@ fn grown(
 }
 
 /// Follows a branch again in every way and compares.
-fn routes(
-    system: &System,
-    settings: &Settings,
-    case: &str,
-    base: &Branch,
-    parents: &[SpecialPoint],
-    report: &mut Report,
-) {
+fn routes(way: Way, case: &str, base: &Branch, parents: &[SpecialPoint], report: &mut Report) {
+    let Way { system, settings, watch, bounded } = way;
     let place = format!("{case}: {}", base.name);
     report.branches += 1;
     report.special += base.special.len();
-    count(&place, base, report);
+    count(&place, base, bounded, report);
     let (points, failed) = errors::sampled(system, settings, base, AGAIN);
     report.not_again += failed;
     report
@@ -153,11 +181,16 @@ fn routes(
     let start = base.points.iter().find(|p| p.position == 0);
     let mut compare = |how: &str, settings: &Settings, start: &Point| {
         let again = Branch::new(&base.name, base.family, base.free, base.origin.clone());
-        let Some(other) = grown(system, settings, again, parents, start, [true, true]) else {
+        let way = Way { settings, ..way };
+        let other = grown(way, again, parents, start, [true, true]);
+        if watch.over() {
+            return;
+        }
+        let Some(other) = other else {
             report.differences.push(format!("{place}: {how}: the start did not converge"));
             return;
         };
-        count(&format!("{place}: {how}"), &other, report);
+        count(&format!("{place}: {how}"), &other, bounded, report);
         // What is switched to ends at the special point of its parent, which a branch from inside only knows as nearly.
         let slack = if seeded { 0.0 } else { 10.0 * settings.tolerance };
         let lines = differences(base, &other, slack);
@@ -250,48 +283,26 @@ fn trace(place: &str, branch: &Branch) -> String {
     text
 }
 
-/// Where branches meet is extrapolated, and good to a few digits.
+/// Where branches meet is extrapolated, and good to a few digits; how far a period without bound has grown depends on the last step.
 fn told(end: &Ending) -> String {
     match end {
         Ending::Joined { at, parameter } => format!("joined at {at} {parameter:.3}"),
+        Ending::PeriodUnbounded(_) => end.code().to_string(),
         other => other.to_string(),
     }
 }
 
-fn count(place: &str, branch: &Branch, report: &mut Report) {
+fn count(place: &str, branch: &Branch, bounded: bool, report: &mut Report) {
     report.traces.push(trace(place, branch));
     report.runs += 1;
     report.points += branch.points.len();
     for end in &branch.ends {
         report.ended(end.as_ref().map_or("none", |end| end.code()), 1);
-        let explained = end.as_ref().is_some_and(|e| e.complete() || e.code() == "period-unbounded");
+        let explained = end.as_ref().is_some_and(|e| e.complete() || e.code() == "period-unbounded" && !bounded);
         if !explained {
             let why = end.as_ref().map_or("it was not finished".to_string(), |end| end.brief());
             report.short.push(format!("{place}: {why}"));
         }
     }
-    for special in branch.special.iter().filter(|s| s.kind == Kind::Unexplained) {
-        let value = special.point.parameters[branch.free];
-        report.unexplained.push(format!("{place}: {value:.9}"));
-    }
-    for pair in branch.points.windows(2) {
-        let between = branch.special.iter().filter(|s| s.point.position == pair[0].position);
-        let mut now = pair[0].unstable;
-        for special in between {
-            if special.unstable_before != now {
-                report.unexplained.push(format!("{place}: before {}", special.point.parameters[branch.free]));
-            }
-            now = special.unstable_after;
-        }
-        if now != pair[1].unstable {
-            report.unexplained.push(format!("{place}: silently at {}", pair[1].parameters[branch.free]));
-        }
-    }
-    // A closed branch ends with the solution that it began with.
-    if let [first, .., last] = &branch.points[..]
-        && branch.ends.iter().all(|end| *end == Some(Ending::Closed))
-        && first.unstable != last.unstable
-    {
-        report.unexplained.push(format!("{place}: on closing at {}", last.parameters[branch.free]));
-    }
+    report.unexplained.extend(unexplained(branch).into_iter().map(|line| format!("{place}: {line}")));
 }

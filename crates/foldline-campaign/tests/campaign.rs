@@ -1,12 +1,13 @@
 //! A small campaign, and cases that once failed.
 
-use foldline_campaign::campaign;
 use foldline_campaign::cases::{Case, classical};
+use foldline_campaign::drawn::drawn;
 use foldline_campaign::report::Report;
 use foldline_campaign::rotor::rotors;
+use foldline_campaign::{LIMIT, campaign};
 
 fn of(cases: &[Case]) -> Report {
-    campaign(cases, 2, &|_, _| ())
+    campaign(cases, 2, LIMIT, &|_, _| ())
 }
 
 #[track_caller]
@@ -32,6 +33,14 @@ fn classical_problems_come_out_the_same_however_they_are_followed() {
     let all = classical(1);
     assert!(all.len() >= 11);
     comes_out_the_same(&of(&all));
+}
+
+#[test]
+fn models_of_other_fields_come_out_the_same_however_they_are_followed() {
+    // Populations of neurons, tanks, an isola of equilibria, glycolysis, enrichment, coupled and forced oscillators.
+    let numbers = [3, 4, 5, 7, 9, 10, 15, 17, 19, 20, 21, 22];
+    let cases: Vec<Case> = numbers.into_iter().flat_map(|number| drawn(number..number + 1)).collect();
+    comes_out_the_same(&of(&cases));
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Development tasks: `cargo xtask test | check | python | deny | bench | reproduce | kill | campaign | docs`. What continuous integration runs, and
+//! Development tasks: `cargo xtask test | check | python | deny | bench | reproduce | kill | campaign | outside | docs`. What continuous integration runs, and
 //! nothing else.
 
 mod kill;
@@ -21,8 +21,11 @@ const USAGE: &str = "cargo xtask TASK
               not the one in crates/foldline-reproduce/verdicts.txt, which `reproduce --write` renews
   kill        runs of the reference study killed at random instants, 100 or as many as a number says: each must resume, lose
               no point and find the same special points (docs/book/trust.md)
-  campaign    random rotors and classical problems, 200 and 5 starts of each, or as many as numbers say: each branch followed in several
-              ways must come out the same, and errors must be what is stated (docs/book/trust.md)
+  campaign    random rotors, classical problems, and models of several fields with random parameters, 200, 5 starts of each and 240,
+              or as many as numbers say: each branch followed in several ways must come out the same, and errors must be what is
+              stated (docs/book/trust.md)
+  outside     problems of others with right values from elsewhere, each study in a process with a limit on its time; --quick, --only
+              TEXT, and --write, which renews crates/foldline-campaign/outside/results.txt and the table in docs/book/trust.md
   docs        the documentation of the source, without warnings";
 
 fn main() -> ExitCode {
@@ -42,6 +45,7 @@ fn main() -> ExitCode {
         "reproduce" => reproduce(std::env::args().nth(2).as_deref() == Some("--write")),
         "kill" => kill::test(std::env::args().nth(2).and_then(|times| times.parse().ok()).unwrap_or(100)),
         "campaign" => campaign(&std::env::args().skip(2).collect::<Vec<String>>()),
+        "outside" => outside(&std::env::args().skip(2).collect::<Vec<String>>()),
         "docs" => docs(),
         _ => {
             eprintln!("{USAGE}");
@@ -146,6 +150,16 @@ fn bench(arguments: &[String]) -> bool {
 fn campaign(arguments: &[String]) -> bool {
     let own = ["run", "--release", "--quiet", "--package", "foldline-campaign", "--"];
     cargo(&own.into_iter().chain(arguments.iter().map(String::as_str)).collect::<Vec<&str>>())
+}
+
+/// By the command in a release build.
+fn outside(arguments: &[String]) -> bool {
+    let binary = root().join("target/release/foldline");
+    let binary = binary.to_string_lossy();
+    let own = ["run", "--release", "--quiet", "--package", "foldline-campaign", "--bin", "foldline-outside", "--"];
+    let with = ["--binary", &binary].into_iter().chain(arguments.iter().map(String::as_str));
+    cargo(&["build", "--release", "--quiet", "--package", "foldline-cli"])
+        && cargo(&own.into_iter().chain(with).collect::<Vec<&str>>())
 }
 
 /// Everything from nothing; a figure that fails, a branch that ends short or a verdict that has changed is a failure.

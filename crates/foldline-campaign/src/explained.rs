@@ -1,0 +1,49 @@
+//! Is every change of stability along a branch explained?
+
+use foldline::diagram::{Branch, Ending, Kind};
+
+/// Changes of the unstable count that the special points between do not explain, a sentence each: points of the kind `unexplained`,
+/// counts that differ from one point to the next, and a closed branch that comes back with another count than it began with.
+pub fn unexplained(branch: &Branch) -> Vec<String> {
+    let value = |point: &foldline::diagram::Point| point.parameters.get(branch.free).copied().unwrap_or(f64::NAN);
+    let stated = branch.special.iter().filter(|s| s.kind == Kind::Unexplained);
+    let mut lines: Vec<String> = stated.map(|special| format!("{:.9}", value(&special.point))).collect();
+    for pair in branch.points.windows(2) {
+        let between = branch.special.iter().filter(|s| s.point.position == pair[0].position);
+        let mut now = pair[0].unstable;
+        for special in between {
+            if special.unstable_before != now {
+                lines.push(format!("before {}", value(&special.point)));
+            }
+            now = special.unstable_after;
+        }
+        if now != pair[1].unstable {
+            lines.push(format!("silently at {}", value(&pair[1])));
+        }
+    }
+    if let [first, .., last] = &branch.points[..]
+        && branch.ends.iter().all(|end| *end == Some(Ending::Closed))
+        && first.unstable != last.unstable
+    {
+        lines.push(format!("on closing at {}", value(last)));
+    }
+    lines
+}
+
+/// Special points whose counts on both sides do not fit their kind, a sentence each: a fold and a period doubling change the count by
+/// one, a Hopf and a torus point by pairs, a mark leaves it as it is.
+pub fn misfits(branch: &Branch) -> Vec<String> {
+    let fits = |kind: Kind, change: usize| match kind {
+        Kind::Fold | Kind::PeriodDoubling => change == 1,
+        Kind::Hopf | Kind::Torus => change >= 2 && change.is_multiple_of(2),
+        Kind::Mark => change == 0,
+        _ => true,
+    };
+    let wrong = branch.special.iter().filter(|s| !fits(s.kind, s.unstable_before.abs_diff(s.unstable_after)));
+    wrong
+        .map(|s| {
+            let value = s.point.parameters.get(branch.free).copied().unwrap_or(f64::NAN);
+            format!("{} {}→{} at {value}", s.kind, s.unstable_before, s.unstable_after)
+        })
+        .collect()
+}

@@ -1,0 +1,44 @@
+//! Problems of others, with right values from elsewhere: what `cargo xtask outside` runs.
+//!
+//! **Idea.** Every folder of `outside` holds a problem that somebody else posed (a question in another program's repository, a demo, a
+//! paper, a first try of a new user) and what is right about it, from closed forms, publications or independent computations. Each
+//! study is run by the command itself, in a process of its own with a limit on its time, and what it stored is compared.
+//!
+//! | question | file |
+//! |---|---|
+//! | what is right? | [`expectations`] |
+//! | how is a study run? | [`running`], [`command`] |
+//! | what is the value of a quantity at a point? | [`quantities`] |
+//! | is it what is right? | [`checking`] |
+//! | what holds for every run? | [`always`] |
+//! | what is reported? | [`reporting`] |
+
+pub mod always;
+pub mod checking;
+pub mod command;
+pub mod expectations;
+pub mod quantities;
+pub mod reporting;
+pub mod running;
+
+use expectations::{Problem, Run};
+use reporting::{Line, Verdict};
+use running::Program;
+use std::path::{Path, PathBuf};
+
+/// Folder with the problems.
+pub fn folder() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("outside")
+}
+
+/// Runs one study of a problem and judges it.
+pub fn judged(problem: &Problem, run: &Run, program: &Program) -> Vec<Line> {
+    let outcome = program.run(problem, run);
+    let line =
+        |check: String, verdict: Verdict| Line { problem: problem.name.clone(), run: run.name(), check, verdict };
+    let mut lines: Vec<Line> =
+        always::verdicts(run, &outcome).into_iter().map(|(check, verdict)| line(check.to_string(), verdict)).collect();
+    lines
+        .extend(run.right.iter().map(|right| line(right.check.to_string(), checking::verdict(&right.check, &outcome))));
+    lines
+}

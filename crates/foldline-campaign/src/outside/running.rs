@@ -1,0 +1,116 @@
+//! What a run left, and how a study is run in this process. [`super::command`] runs it by the command.
+
+use super::command::Command;
+use super::expectations::{Problem, Run};
+use foldline::contract::{Event, Observer, Verdict};
+use foldline::diagram::Diagram;
+use foldline::explore::{self, System};
+use foldline::model::Model;
+use foldline_store::short;
+use foldline_store::study_file::{Study, read_study};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::{Mutex, PoisonError};
+
+/// What runs a study.
+#[derive(Clone, Debug)]
+pub enum Program {
+    /// The command, in a process of its own.
+    Command(Command),
+    /// The library, in this process and without a limit on its time.
+    Library,
+}
+
+/// How a run ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum End {
+    /// By itself, with this exit code.
+    Code(i32),
+    /// It was ended when its time was over.
+    OutOfTime,
+    /// By a panic or a signal, or it could not be started.
+    Crashed,
+}
+
+/// What a run left.
+#[derive(Debug)]
+pub struct Outcome {
+    /// How it ended.
+    pub end: End,
+    /// Standard output and standard error.
+    pub said: String,
+    /// What it found, however it ended.
+    pub stored: Option<Stored>,
+}
+
+/// What a run found.
+#[derive(Debug)]
+pub struct Stored {
+    /// Branches and responses.
+    pub diagram: Diagram,
+    /// Remarks: what each is about, and the remark.
+    pub notes: Vec<(String, String)>,
+    /// The model.
+    pub model: Model,
+    /// Names of the branches and curves that the study asks for.
+    pub asked: Vec<String>,
+    /// Names of its homotopies, whose legs may turn back on the way.
+    pub homotopies: Vec<String>,
+}
+
+impl Stored {
+    /// What a run of that study found.
+    pub fn new(study: Study, diagram: Diagram, notes: Vec<(String, String)>) -> Stored {
+        let (branches, curves) = (study.plan.branches.iter(), study.plan.curves.iter());
+        let asked = branches.map(|b| b.name.clone()).chain(curves.map(|c| c.name.clone())).collect();
+        let homotopies = study.plan.homotopies.iter().map(|h| h.name.clone()).collect();
+        Stored { diagram, notes, model: study.model, asked, homotopies }
+    }
+}
+
+impl Program {
+    /// Runs a study.
+    pub fn run(&self, problem: &Problem, run: &Run) -> Outcome {
+        match self {
+            Program::Command(command) => command.run(problem, run),
+            Program::Library => in_process(problem, run),
+        }
+    }
+}
+
+/// Keeps remarks.
+#[derive(Default)]
+struct Notes(Mutex<Vec<(String, String)>>);
+
+impl Observer for Notes {
+    fn observe(&self, event: Event) -> Verdict {
+        if let Event::Note(about, note) = event {
+            self.0.lock().unwrap_or_else(PoisonError::into_inner).push((about.to_string(), note.to_string()));
+        }
+        Verdict::Continue
+    }
+}
+
+/// As `foldline run`, whose exit codes these are.
+fn in_process(problem: &Problem, run: &Run) -> Outcome {
+    let study = match read_study(&problem.folder.join(&run.file)) {
+        Ok(study) => study,
+        Err(found) => {
+            let said = found.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n");
+            return Outcome { end: End::Code(2), said, stored: None };
+        }
+    };
+    let notes = Notes::default();
+    let system = System::of_plan(&study.model, &study.plan);
+    let whole = || explore::run(&system, &study.plan, 1, Diagram::default(), &notes);
+    let Ok(diagram) = catch_unwind(AssertUnwindSafe(whole)) else {
+        return Outcome { end: End::Crashed, said: String::new(), stored: None };
+    };
+    let short = short::lines(&diagram, &study.plan, &study.model);
+    let end = End::Code(if short.is_empty() { 0 } else { 3 });
+    let notes = notes.0.into_inner().unwrap_or_else(PoisonError::into_inner);
+    Outcome {
+        end,
+        said: short.iter().map(|line| line.replace('\n', " ")).collect::<Vec<_>>().join("\n"),
+        stored: Some(Stored::new(study, diagram, notes)),
+    }
+}

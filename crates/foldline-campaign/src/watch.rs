@@ -1,0 +1,29 @@
+//! The time that a case may take.
+
+use foldline::contract::{Event, Observer, Verdict};
+use std::time::{Duration, Instant};
+
+/// Asks every branch of a case to stop once its time is over.
+#[derive(Clone, Copy, Debug)]
+pub struct Watch {
+    start: Instant,
+    limit: Duration,
+}
+
+impl Watch {
+    /// A watch that starts now.
+    pub fn start(limit: Duration) -> Watch {
+        Watch { start: Instant::now(), limit }
+    }
+
+    /// True once the time is over.
+    pub fn over(&self) -> bool {
+        self.start.elapsed() > self.limit
+    }
+}
+
+impl Observer for Watch {
+    fn observe(&self, _event: Event) -> Verdict {
+        if self.over() { Verdict::Stop } else { Verdict::Continue }
+    }
+}
