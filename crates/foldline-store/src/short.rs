@@ -221,6 +221,8 @@ mod tests {
             unstable_after: 1,
             error: 1e-8,
             coefficients: Vec::new(),
+            coefficient_errors: Vec::new(),
+            remark: String::new(),
         };
         let places = [special(Kind::Unexplained, 1.5), special(Kind::Fold, 2.0), special(Kind::Unexplained, 2.5)];
         found.special.extend(places);

@@ -73,15 +73,22 @@ pub(super) fn of_no_start(system: &System, parameters: &[f64], seen: Seen) -> St
 
 /// That a trajectory met the edge of the region in which f is defined.
 fn of_exit(system: &System, exit: &Exit) -> String {
-    let names = system.state_names.iter().zip(&exit.state);
-    let place: Vec<String> = names.map(|(name, value)| format!("{name} = {value:.6}")).collect();
     format!(
         "\nlikely cause: at the time {:.6}, {}, a trajectory meets the edge of the region in which the vector field is defined (a division \
          by zero, a log or a root of something negative)\nwhat to do: write the equation so that it is defined there, or choose another \
          range of the states, another state, or other parameters",
         exit.time,
-        place.join(", ")
+        place(system, &exit.state)
     )
+}
+
+/// A state in words, the first few components of it.
+pub(super) fn place(system: &System, state: &[f64]) -> String {
+    const TOLD: usize = 6;
+    let named = system.state_names.iter().zip(state).take(TOLD);
+    let told: Vec<String> = named.map(|(name, value)| format!("{name} = {value:.6}")).collect();
+    let more = if state.len() > TOLD { ", …" } else { "" };
+    format!("{}{more}", told.join(", "))
 }
 
 /// That solutions come in families.

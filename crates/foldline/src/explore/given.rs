@@ -76,7 +76,9 @@ pub(super) fn from_cycle(system: &System, seed: &SeedPlan, tolerance: f64, cycle
     });
     // One of a family: which parameter has to stay where it is depends on what breaks the family up.
     let found = found.or_else(|why| {
-        let mut free = 0..system.field.parameter_count();
+        const LIKELY: f64 = 0.5;
+        let likely = mismatch(system.field, &seed.parameters, &given.solution).is_some_and(|(_, off)| off < LIKELY);
+        let mut free = 0..if likely { system.field.parameter_count() } else { 0 };
         let of_family = free.find_map(|free| {
             let mut problem = problem_of(system, free, cycle.degree, &given, false);
             first(&mut *problem, &settings, &given).ok()

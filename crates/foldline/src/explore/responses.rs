@@ -94,16 +94,22 @@ fn one_survey(
     complete.then(|| finished(name, Search::Survey, *free, responses, observer))
 }
 
+/// A value without the rounding of the last digits.
+fn rounded(value: f64) -> f64 {
+    format!("{value:.11e}").parse().unwrap_or(value)
+}
+
 /// How many starts escaped at each value, if any did.
 fn escapes(responses: &[Response], starts: usize) -> Option<String> {
     const TOLD: usize = 8;
     let gone: Vec<&Response> = responses.iter().filter(|r| r.motion == Motion::Escaped).collect();
-    let told: Vec<String> = gone.iter().take(TOLD).map(|r| format!("{} at the value {}", r.hits, r.value)).collect();
+    let told = gone.iter().take(TOLD).map(|r| format!("{} at the value {}", r.hits, rounded(r.value)));
+    let told: Vec<String> = told.collect();
     let more = match gone.len().saturating_sub(TOLD) {
         0 => String::new(),
         more => format!(", and some at {more} more values"),
     };
-    (!gone.is_empty()).then(|| format!("of {starts} starts escaped: {}{more}", told.join(", ")))
+    (!gone.is_empty()).then(|| format!("starts that escaped, of {starts}: {}{more}", told.join(", ")))
 }
 
 fn one_sweep(
@@ -136,7 +142,8 @@ fn one_sweep(
     }
     let escaped = responses.last().filter(|last| last.motion == Motion::Escaped);
     if let Some(last) = escaped {
-        observer.observe(Event::Note(name, &format!("at the value {} the motion {}", last.value, last.fate())));
+        observer
+            .observe(Event::Note(name, &format!("at the value {} the motion {}", rounded(last.value), last.fate())));
     }
     let complete = escaped.is_some() || responses.len() == values.len();
     complete.then(|| finished(name, Search::Sweep, *free, responses, observer))

@@ -6,7 +6,7 @@
 
 use super::System;
 use super::choice::{Choice, is_meant, missing, summary};
-use super::diagnosis::{Seen, next_to_origin, of_no_start};
+use super::diagnosis::{Seen, next_to_origin, of_no_start, place};
 use super::direct::{Direct, NEVER, direct};
 use super::given::from_cycle;
 use super::growth::{polished, problem_of, setting, settings};
@@ -357,14 +357,14 @@ fn no_start(system: &System, seed: &SeedPlan, state: &[f64], lost: &Lost) -> Str
                 spans.join(", ")
             )
         }
-        Lost::Unconfirmed { period, .. } if *period > 0.0 => {
-            format!(
-                "settles to a cycle of the period {period:.6}, which Newton's method does not confirm as isolated and stable"
-            )
-        }
-        Lost::Unconfirmed { .. } => {
-            "comes to rest where Newton's method does not find an isolated, stable solution".to_string()
-        }
+        Lost::Unconfirmed { period, state } if *period > 0.0 => format!(
+            "settles to a cycle of the period {period:.6} through {}, which Newton's method does not confirm as isolated and stable",
+            place(system, state)
+        ),
+        Lost::Unconfirmed { state, .. } => format!(
+            "comes to rest at {}, where Newton's method does not find an isolated, stable solution",
+            place(system, state)
+        ),
         Lost::Escaped => "leaves every bound".to_string(),
         Lost::Undefined(_) => "leaves the region in which the vector field is defined".to_string(),
         Lost::Stuck => "cannot be followed: its steps become too small".to_string(),

@@ -218,6 +218,9 @@ impl<'a> Ensemble<'a> {
                 Some(Outcome::Stopped)
             } else if lanes.time[l] == self.limits.end {
                 Some(Outcome::Reached)
+            } else if lanes.h[l] == 0.0 {
+                // f is so large that the step has become nothing, which has no error.
+                Some(Outcome::StepTooSmall)
             } else {
                 too_long
             };

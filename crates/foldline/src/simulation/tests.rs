@@ -202,6 +202,8 @@ fn what_cannot_go_on_says_why() {
     assert!((undefined.state[0] - 1.0).abs() < 1e-6);
     assert_eq!(run(&Native { dim: 1, f: |_, _, f| f[0] = f64::NAN }, 0.0, 100).outcome, Outcome::Undefined);
     assert_eq!(run(&Native { dim: 1, f: |x, _, f| f[0] = -x[0] }, 1.0, 10).outcome, Outcome::StepLimit);
+    // A step of the right length would be shorter than numbers go.
+    assert_eq!(run(&Native { dim: 1, f: |x, _, f| f[0] = 1e305 * x[0] }, 1.0, 1000).outcome, Outcome::StepTooSmall);
     // Constant solutions are integrated in few steps and not for ever.
     let rest = run(&Native { dim: 1, f: |_, _, f| f[0] = 0.0 }, 1.0, 100_000);
     assert_eq!((rest.outcome, rest.state[0]), (Outcome::Reached, 1.0));
