@@ -429,5 +429,5 @@ fn a_curve_of_folds_of_cycles_ends_at_generalised_hopf_points() {
     let second = there.special.iter().filter(|s| s.kind == Kind::GeneralisedHopf).map(|s| s.point.parameters[1]);
     let second = second.reduce(f64::max).unwrap();
     assert!((second - 1.09312).abs() < 1e-5, "{second}");
-    assert!(ends.len() == 2 && (ends[1] - second).abs() < 1e-5 && (ends[0] - 1.026706).abs() < 1e-4, "{ends:?}");
+    assert!(ends.len() == 2 && (ends[1] - second).abs() < 1e-5 && (ends[0] - 1.026706).abs() < 1e-5, "{ends:?}");
 }

@@ -314,7 +314,7 @@ fn help_says_the_exit_codes() {
     assert_eq!(output.status.code(), Some(0));
     says(
         &String::from_utf8_lossy(&output.stdout),
-        &["Exit codes", "2  a mistake", "3  done, but some branch ended short"],
+        &["Exit codes", "2  a mistake", "3  done, but something was not reached"],
     );
 }
 

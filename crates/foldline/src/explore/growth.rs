@@ -501,6 +501,8 @@ impl Growth<'_> {
     fn shrunk(&self, branch: &Branch, side: usize, ending: Ending) -> Ending {
         const SMALL: f64 = 0.05;
         const NEAR: f64 = 1e-2;
+        // Where steps end, the fold is lost in rounding, which shrinks with the square of the extent.
+        const CLEAR: f64 = 10.0;
         let given_up = matches!(ending, Ending::StepTooSmall(_) | Ending::GivenUp(_));
         let Some((Kind::Fold, first)) = branch.held.filter(|_| given_up && branch.family == Family::Cycle) else {
             return ending;
@@ -510,17 +512,22 @@ impl Growth<'_> {
             let states = point.ranges.iter().take(n).zip(&system.scales);
             states.map(|([low, high], scale)| (high - low) / scale).fold(0.0, f64::max)
         };
-        let count = branch.points.len();
-        let [last, before] = if side == 1 { [count.wrapping_sub(1), count.wrapping_sub(2)] } else { [0, 1] };
-        let Some((last, before)) = branch.points.get(last).zip(branch.points.get(before)) else { return ending };
+        let mut inwards: Vec<&Point> = branch.points.iter().collect();
+        if side == 1 {
+            inwards.reverse();
+        }
+        let Some(last) = inwards.first().copied() else { return ending };
+        let clear: Vec<&Point> =
+            inwards.iter().copied().filter(|point| extent(point) >= CLEAR * extent(last)).take(2).collect();
+        let [near, far] = clear[..] else { return ending };
         let largest = branch.points.iter().map(extent).fold(0.0, f64::max);
-        let (a, b) = (extent(last).powi(2), extent(before).powi(2));
+        let (a, b) = (extent(near).powi(2), extent(far).powi(2));
         let Some(period) = last.solution.free_period().filter(|_| a < b && extent(last) < SMALL * largest) else {
             return ending;
         };
-        let mut parameters = last.parameters.clone();
+        let mut parameters = near.parameters.clone();
         for k in [first, branch.free] {
-            parameters[k] += a / (b - a) * (last.parameters[k] - before.parameters[k]);
+            parameters[k] += a / (b - a) * (near.parameters[k] - far.parameters[k]);
         }
         let rest: Vec<f64> = last.averages.iter().take(n).map(|mean| mean[0]).collect();
         if rest.len() != n {
