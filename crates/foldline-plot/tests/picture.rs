@@ -194,6 +194,8 @@ fn a_mark_that_was_asked_for_can_be_seen_in_the_diagram_and_in_the_legend() {
         unstable_after: 0,
         error: 1e-9,
         coefficients: Vec::new(),
+        coefficient_errors: Vec::new(),
+        remark: String::new(),
     });
     let diagram = Diagram { branches: vec![branch], ..Diagram::default() };
     let drawn = svg(&diagram, &model(), &Picture::default());

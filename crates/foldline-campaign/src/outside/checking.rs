@@ -187,7 +187,7 @@ impl Found<'_> {
         let mut found: Vec<Vec<f64>> = Vec::new();
         for pair in self.diagram.branches.iter().filter(|b| b.held.is_none()).flat_map(|b| b.points.windows(2)) {
             let (a, b) = (at(&pair[0]), at(&pair[1]));
-            if !(a * b <= 0.0) || a == b {
+            if a * b > 0.0 || (a * b).is_nan() || a == b {
                 continue;
             }
             let share = a / (a - b);

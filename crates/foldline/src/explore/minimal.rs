@@ -75,7 +75,7 @@ fn one_of(system: &System, settings: &Settings, point: &Point, cycle: &Cycle, tu
     let same_period = (found.solution.period()? * turns as f64 - period).abs() <= 30.0 * settings.tolerance * period;
     let expected = Point { solution: found.solution.clone(), ..point.clone() };
     let same = same_period && found.difference(&expected, &system.scales, &[]) < 30.0 * settings.tolerance.max(allowed);
-    same.then(|| Point { position: point.position, ..found })
+    same.then_some(Point { position: point.position, ..found })
 }
 
 /// The cycle as collocation on a mesh of equal turns has it.

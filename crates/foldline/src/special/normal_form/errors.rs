@@ -78,7 +78,7 @@ impl<'s, 'f> Uncertain<'s, 'f> {
         point.parameters = Setting { parameters: self.at.parameters.clone(), ..self.setting.clone() }.at(&moved);
         for z in &mut point.spectrum {
             // Both of a pair alike.
-            *z = Complex64::new(z.re, z.im * (1.0 + if seed % 2 == 0 { size } else { -size }));
+            *z = Complex64::new(z.re, z.im * (1.0 + if seed.is_multiple_of(2) { size } else { -size }));
         }
         point
     }
