@@ -1,7 +1,7 @@
 //! First solutions where trajectories do not lead to them: light damping, stiff modes, unstable rest, families.
 
 use foldline::contract::{Event, Observer, Verdict};
-use foldline::diagram::{Branch, Diagram, Kind};
+use foldline::diagram::{Branch, Diagram, Kind, SpecialPoint};
 use foldline::explore::{self, System};
 use foldline_store::study_file::parse_study;
 use std::sync::Mutex;
@@ -126,7 +126,9 @@ fn a_family_of_cycles_of_one_energy_each_begins_from_a_given_one() {
     );
     let (diagram, _) = run(model, &seed, &branch);
     let branch = &diagram.branches[0];
-    let marks: Vec<_> = branch.special.iter().filter(|s| s.kind == Kind::Mark).collect();
+    // (The place of the stop is a mark as well.)
+    let meant = |s: &&SpecialPoint| s.kind == Kind::Mark && (s.point.solution.period().unwrap() - period).abs() < 1e-6;
+    let marks: Vec<_> = branch.special.iter().filter(meant).collect();
     let [mark] = &marks[..] else { panic!("{} marks; {:?}", marks.len(), branch.ends) };
     let [low, high] = mark.point.ranges[4];
     assert!((low - 12.1318908).abs() < 1e-5 && (high - 12.1318908).abs() < 1e-5, "{low} {high}");

@@ -99,17 +99,6 @@ impl Follow<'_> {
         if slope < STANDS.max(unseen) { Drift::Spectrum } else { Drift::Slope }
     }
 
-    /// True if the parameter moves by less than the errors of points on both sides of a turn on a curve in two parameters, over a step on which
-    /// a turn would show. Along a degenerate line it stays where it is, and there is one turn of rounding after the other. Branches in one
-    /// parameter have their spectrum to tell.
-    fn rests(&self, ends: [&Station; 2], turn: &Located, length: f64) -> bool {
-        let here = turn.station.parameter();
-        let moved = ends.iter().map(|end| (end.parameter() - here).abs()).fold(0.0, f64::max);
-        !self.settings.stability
-            && length.abs() > WHOLE
-            && moved < UNSEEN * self.settings.tolerance * (1.0 + here.abs())
-    }
-
     /// Everything special between two stations.
     pub fn inspect(
         &mut self,
@@ -184,7 +173,6 @@ impl Follow<'_> {
                 (kind, jump) = (Kind::BranchPoint, 0);
             }
             match found {
-                Ok(found) if kind == Kind::Fold && self.rests([left, right], &found, stretch.length) => {}
                 Ok(found) if monitor.confirms_between([&left.point, &right.point], &found.station.point) => {
                     located.push((kind, jump, found));
                     others.push(monitor.others_unstable(&located[located.len() - 1].2.station.point));
@@ -562,8 +550,6 @@ fn stays_near(now: &[Complex64], then: &[Complex64], length: f64) -> bool {
     length.abs() > LONG && angles.is_some_and(|(now, then)| now + then < NEAR)
 }
 
-/// Shortest step on which a turn of the parameter shows: for a curvature of order 1 it is a hundred times the tolerance then.
-const WHOLE: f64 = 1e-2;
 /// Change of the parameter along a step of at most length 1, in tolerances, that is lost in the errors of both ends.
 const UNSEEN: f64 = 0.2;
 /// Logarithm of a multiplier from which on a whole step does not bring it to 1.
