@@ -168,7 +168,10 @@ impl Follow<'_> {
             if kind == Kind::Fold
                 && self.settings.stability
                 && left.point.unstable == right.point.unstable
-                && found.as_ref().is_ok_and(|found| self.is_mirrored([left, right], &found.station.point))
+                && found.as_ref().is_ok_and(|found| {
+                    self.is_mirrored([left, right], &found.station.point)
+                        || self.is_vertex(&stretch, found.distance, cost)
+                })
             {
                 (kind, jump) = (Kind::BranchPoint, 0);
             }
@@ -199,9 +202,6 @@ impl Follow<'_> {
             kind.has_codimension_two() || double.iter().all(|there| (found.distance - there).abs() > apart)
         });
         located.sort_by(|a, b| a.2.distance.total_cmp(&b.2.distance));
-        if self.settings.stability && left.point.unstable == right.point.unstable {
-            located = self.with_vertex(&stretch, located, cost);
-        }
         let jumps: Vec<usize> = located.iter().map(|(_, jump, _)| *jump).collect();
         let change = left.point.unstable.abs_diff(right.point.unstable);
         // What is located alone must fit in with the rest of its own spectrum; else something lies on the way to it, or beyond.
@@ -305,25 +305,15 @@ impl Follow<'_> {
         out
     }
 
-    /// A branch that leaves another at a pitchfork turns there, and an eigenvalue touches zero and comes back: the place is no fold, at which the
-    /// count changes, and a branch point besides, but one branch point, at which this branch goes on.
-    fn with_vertex(
-        &mut self,
-        stretch: &Stretch,
-        mut located: Vec<(Kind, usize, Located)>,
-        cost: &mut Cost,
-    ) -> Vec<(Kind, usize, Located)> {
-        let is = |wanted: Kind| located.iter().position(|(kind, jump, _)| *kind == wanted && *jump == 1);
-        let (Some(fold), Some(other), 2) = (is(Kind::Fold), is(Kind::BranchPoint), located.len()) else {
-            return located;
-        };
-        let (there, beside) = (located[fold].2.distance, 0.5 * (located[fold].2.distance - located[other].2.distance));
+    /// True if as many are unstable on both sides of a turn, close to it. A branch that leaves another at a pitchfork turns there, and an
+    /// eigenvalue touches zero and comes back: the place is no fold, at which the count changes, but a branch point, at which this branch
+    /// goes on.
+    fn is_vertex(&mut self, stretch: &Stretch, there: f64, cost: &mut Cost) -> bool {
+        const BESIDE: f64 = 0.05;
+        let room = there.abs().min((stretch.length - there).abs());
+        let beside = (BESIDE * stretch.length.abs()).min(0.5 * room);
         let mut count = |s: f64| Some(stretch.at(self.problem, self.settings, s, cost).ok()?.point.unstable);
-        if beside.abs() < CLOSEST || count(there - beside).is_some_and(|before| count(there + beside) == Some(before)) {
-            let (.., found) = located.swap_remove(fold);
-            return vec![(Kind::BranchPoint, 0, found)];
-        }
-        located
+        count(there - beside).is_some_and(|before| count(there + beside) == Some(before))
     }
 
     /// Events that happen together, closer than anything tells apart, as what passes in different parts of a symmetric or a decoupled system:

@@ -32,7 +32,9 @@ impl Share {
         let square = QUANTILE * QUANTILE;
         let middle = (hits + 0.5 * square) / (of + square);
         let half = QUANTILE / (of + square) * (hits * (of - hits) / of + 0.25 * square).sqrt();
-        [(middle - half).max(0.0), (middle + half).min(1.0)]
+        // Rounding must not leave the share itself outside.
+        let share = self.value();
+        [(middle - half).max(0.0).min(share), (middle + half).min(1.0).max(share)]
     }
 }
 
