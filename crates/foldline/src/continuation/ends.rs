@@ -194,6 +194,20 @@ impl Follow<'_> {
         Ok(None)
     }
 
+    /// The meeting with simpler solutions next to which no step leads on: their own place is known, and the deviation from them shrinks as the root
+    /// of the distance from it.
+    pub(super) fn fades(&mut self, before: &Station, here: &Station) -> Option<Ending> {
+        const NEARLY: f64 = 0.3;
+        self.collapses.iter().find_map(|monitor| {
+            let parameter = monitor.meeting(&here.point)?;
+            // How much larger the deviation was at the point before.
+            let larger = monitor.value(&here.point, &before.point);
+            let farther = (before.parameter() - parameter) / (here.parameter() - parameter);
+            let fits = larger > 1.0 && (farther / (larger * larger) - 1.0).abs() < NEARLY;
+            fits.then_some(Ending::Joined { at: monitor.kind(), parameter })
+        })
+    }
+
     /// Takes note of how far the branch has gone from its start, to `here`: whether so far that it can come back. To be told of every
     /// point in the order of travel.
     pub fn leaves_home(&mut self, here: &Point) {

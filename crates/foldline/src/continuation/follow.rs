@@ -98,6 +98,7 @@ pub fn follow(
     let mut stand = (left.parameter(), emitted);
     let mut long = first_period.map(|first| LONG * first);
     let mut allowance = Allowance::new();
+    let mut before: Option<Station> = None;
     loop {
         let outward = |bound: f64| (left.parameter() - bound).abs() <= 1e-12 * (1.0 + bound.abs());
         let [low, high] = walk.settings.range;
@@ -154,8 +155,9 @@ pub fn follow(
                     let spent = work(cost.factorisations, &left.mesh);
                     let used_up = allowance.is_used_up(spent);
                     if step < walk.settings.min_step || coarse == COARSE || used_up {
-                        return match (walk.limit)(&left.point) {
-                            Some(limit) => limit,
+                        let met = before.as_ref().and_then(|before: &Station| walk.fades(before, &left));
+                        return match met.or_else(|| (walk.limit)(&left.point)) {
+                            Some(end) => end,
                             None if used_up => {
                                 let last = format!("the last step failed because {why}");
                                 allowance.ending(left.parameter(), spent, &last)
@@ -247,7 +249,7 @@ pub fn follow(
             long = Some(AGAIN * now);
         }
         trail = Some(walk.trail(&left, between));
-        left = right;
+        before = Some(std::mem::replace(&mut left, right));
     }
 }
 

@@ -105,10 +105,10 @@ impl CycleProblem<'_> {
     pub(super) fn multiplier_error(&self, u: &[f64], spectrum: &[Complex64]) -> f64 {
         self.errors(u);
         if self.is_planar() {
-            // The error of exp(∫ tr f_x), relative to the larger of 1 and itself.
-            let off = self.divergence_error(u);
-            let own = self.trace.exp();
-            return SPECTRUM_SAFE * (off.exp_m1() * own / own.max(1.0)) + SPECTRUM_ROUNDING;
+            // The error of exp(∫ tr f_x), relative to the larger of 1 and itself; and that of the trivial one, where there is one.
+            let (own, off) = (self.trace.exp(), self.divergence_error(u));
+            let trivial = spectrum[..spectrum.len() - 1].iter().fold(0.0, |most: f64, z| most.max((z - 1.0).norm()));
+            return SPECTRUM_SAFE * (off.exp_m1() * own / own.max(1.0) + trivial) + SPECTRUM_ROUNDING;
         }
         let Some(spectra) = self.corrected_multipliers(u) else { return f64::NAN };
         let before = std::iter::once(spectrum).chain(spectra.iter().map(Vec::as_slice));
