@@ -11,7 +11,7 @@ struct Notes(Mutex<Vec<String>>);
 
 impl Observer for Notes {
     fn observe(&self, event: Event) -> Verdict {
-        if let Event::Note("route", text) = event {
+        if let Event::Note("route", text) | Event::Short("route", text) = event {
             self.0.lock().unwrap().push(text.to_string());
         }
         Verdict::Continue

@@ -146,18 +146,23 @@ impl Point {
     /// the parameter does not move along the branch, and a second multiplier is 1 as far as its error tells. On which side of 1 it is computed
     /// means nothing.
     pub fn is_one_of_family(&self) -> bool {
-        let multiplier = self.neutral_multiplier();
-        self.solution.period().is_some() && self.parameter_slope().abs() < STANDS && multiplier.is_some()
+        // The slope comes from the same matrix, and has errors as large.
+        let stands = self.parameter_slope().abs() < STANDS.max(self.neutral_error());
+        self.solution.period().is_some() && stands && self.neutral_multiplier().is_some()
+    }
+
+    /// Distance from 1 at which a multiplier may be 1.
+    fn neutral_error(&self) -> f64 {
+        const ERRORS: f64 = 10.0;
+        let stated = if self.trust.spectrum.is_nan() { 0.0 } else { self.trust.spectrum };
+        ERRORS * stated.max(self.trust.trivial_defect)
     }
 
     /// The multiplier that is 1 as far as its error tells, and closest to that, among those that are not trivial.
     pub(crate) fn neutral_multiplier(&self) -> Option<Complex64> {
-        const ERRORS: f64 = 10.0;
-        let stated = if self.trust.spectrum.is_nan() { 0.0 } else { self.trust.spectrum };
-        let error = ERRORS * stated.max(self.trust.trivial_defect);
         let distance = |z: &Complex64| (z - 1.0).norm();
         let closest = self.free_spectrum().iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
-        (distance(closest) <= error).then_some(*closest)
+        (distance(closest) <= self.neutral_error()).then_some(*closest)
     }
 
     /// How many multipliers are unstable besides one that is 1 as far as its error tells.

@@ -6,8 +6,21 @@ use super::*;
 pub fn polish(field: &Field, parameters: &[f64], candidate: &Candidate) -> Option<Point> {
     match candidate {
         Candidate::Equilibrium(x) => equilibrium(field, parameters, x),
-        Candidate::Cycle { period, states, .. } => cycle(field, parameters, *period, &states[..field.dim]),
+        Candidate::Cycle { period, states, .. } => {
+            let found = cycle(field, parameters, *period, &states[..field.dim])?;
+            (2..=8).rev().find_map(|turns| once(field, parameters, &found, turns)).or(Some(found))
+        }
     }
+}
+
+/// One turn of a cycle, if it is another one run through that many times.
+fn once(field: &Field, parameters: &[f64], found: &Point, turns: u32) -> Option<Point> {
+    let Solution::Cycle(whole) = &found.solution else { return None };
+    let (start, period) = (whole.state(0.0), whole.period / f64::from(turns));
+    let single = cycle(field, parameters, period, &start)?;
+    let Solution::Cycle(own) = &single.solution else { return None };
+    let moved = own.state(0.0).iter().zip(&start).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+    ((own.period - period).abs() < 1e-6 && moved < 1e-6).then_some(single)
 }
 
 fn slope(field: &Field, parameters: &[f64], x: &[f64]) -> Vec<f64> {
