@@ -146,8 +146,7 @@ impl Point {
     /// the parameter does not move along the branch, and a second multiplier is 1 as far as its error tells. On which side of 1 it is computed
     /// means nothing.
     pub fn is_one_of_family(&self) -> bool {
-        // The slope comes from the same matrix, and has errors as large.
-        let stands = self.parameter_slope().abs() < STANDS.max(self.neutral_error());
+        let stands = self.parameter_slope().abs() < STANDS;
         self.solution.period().is_some() && stands && self.neutral_multiplier().is_some()
     }
 
