@@ -81,9 +81,7 @@ def settle(
 ) -> Solution: ...
 def attractors(
     model: Model, parameters: bytes, samples: int, seed: int, tolerance: float, jobs: int
-) -> tuple[
-    list[tuple[Solution, tuple[int, int] | None, int, tuple[float, float, float] | None, bytes]], tuple[int, int, int]
-]: ...
+) -> tuple[list[tuple[Solution, tuple[int, int] | None, int, tuple[float, float, float] | None, bytes]], tuple[int, int, int]]: ...
 def simulate(
     model: Model,
     start: bytes,
