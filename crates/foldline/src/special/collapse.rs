@@ -27,6 +27,13 @@ pub struct Shrinks<'a> {
 }
 
 impl Shrinks<'_> {
+    /// The value of parameter `free` at which the equilibrium inside a cycle has a Hopf point.
+    fn hopf_point(&self, at: &Point) -> Option<f64> {
+        let Solution::Cycle(cycle) = &at.solution else { return None };
+        let mean = Shrinks::mean(&cycle.uniform(SAMPLES), cycle.dim());
+        hopf::lies_near(self.field, &at.parameters, self.free, self.scales, &mean, TAU / cycle.period)
+    }
+
     fn mean(x: &[f64], n: usize) -> Vec<f64> {
         let mut mean = vec![0.0; n];
         x.chunks_exact(n).for_each(|s| crate::linalg::axpy(n as f64 / x.len() as f64, s, &mut mean));
@@ -83,13 +90,12 @@ impl Monitor for Shrinks<'_> {
     }
 
     fn confirms(&self, at: &Point) -> bool {
-        self.meeting(at).is_some()
+        self.hopf_point(at).is_some()
     }
 
     fn meeting(&self, at: &Point) -> Option<f64> {
-        let Solution::Cycle(cycle) = &at.solution else { return None };
-        let mean = Shrinks::mean(&cycle.uniform(SAMPLES), cycle.dim());
-        hopf::lies_near(self.field, &at.parameters, self.free, self.scales, &mean, TAU / cycle.period)
+        // A generalised one lies elsewhere along a curve than the Hopf points of one parameter next to it.
+        self.hopf_point(at).filter(|_| self.at == Kind::Hopf)
     }
 
     fn jump(&self) -> usize {
