@@ -1,10 +1,12 @@
 //! What comes out: points, special points, branches, diagrams. Plain data.
 
 mod cycle;
+mod record;
 mod response;
 mod share;
 
 pub use cycle::Cycle;
+pub use record::{Misfit, Record};
 pub use response::{Motion, Response, Responses, Search};
 pub use share::Share;
 
@@ -372,6 +374,11 @@ pub struct SpecialPoint {
 }
 
 impl SpecialPoint {
+    /// The dimension of the kernel at a branch point: how many eigenvalues are 0 (multipliers 1) there.
+    pub fn kernel(&self) -> usize {
+        self.unstable_before.abs_diff(self.unstable_after).max(1)
+    }
+
     /// A coefficient, unless it is zero within its error.
     fn certain(&self, k: usize) -> Option<f64> {
         let error = self.coefficient_errors.get(k).copied().unwrap_or(0.0);
@@ -684,6 +691,21 @@ impl Branch {
             index += 1;
             index <= 2 || index + 2 > count || point.position == 0
         });
+    }
+
+    /// How many special points of the same kind that were found before this one lie at the very same place: pairs of eigenvalues that pass at
+    /// once.
+    pub fn earlier_there(&self, special: &SpecialPoint) -> usize {
+        let same = |other: &&SpecialPoint| {
+            other.kind == special.kind
+                && other.point.parameters == special.point.parameters
+                && !std::ptr::eq(*other, special)
+        };
+        let own = self.special.iter().position(|other| std::ptr::eq(other, special));
+        // Those of the backward side stand in reverse order.
+        let (first, last) = self.special.split_at(own.unwrap_or(self.special.len()));
+        let earlier = if own.is_some() && special.point.position < 0 { last } else { first };
+        earlier.iter().filter(same).count()
     }
 
     /// Inserts a special point at its position.

@@ -107,6 +107,17 @@ struct Pending {
     switching: Switching,
 }
 
+/// A special point that is left, and how.
+struct Leaving<'l> {
+    plan: &'l BranchPlan,
+    settings: &'l Settings,
+    parent: &'l Branch,
+    special: &'l SpecialPoint,
+    label: String,
+    /// What is switched to from there on.
+    below: Switching,
+}
+
 impl Work<'_> {
     /// Follows a branch of the plan, what is switched to from it, and the branches that start at its end.
     fn planned(&mut self, index: usize, origin: Origin, start: Result<Point, String>) -> bool {
@@ -294,69 +305,13 @@ impl Work<'_> {
                 return None;
             }
             let name = format!("{}/{}-{}", parent.name, special.kind, counts[slot]);
-            let origin = Origin::Switch { parent: parent.name.clone(), kind: special.kind, parameter };
-            // A doubled branch of which there is only the special point begins anew.
-            let begun = |b: &&Branch| b.points.len() > usize::from(growth::is_doubled(b));
-            if let Some(earlier) = self.earlier.branch(&name).filter(begun) {
-                let mut branch = earlier.clone();
-                let going = self.growth(plan, &settings, [true, true], &parent.special).resume(&mut branch);
-                self.branches.push(branch);
-                more.push(Pending {
-                    branch: self.branches.len() - 1,
-                    switching: pending.switching.below(special.kind, counts[slot]),
-                });
-                if !going {
-                    return None;
-                }
-                continue;
-            }
-            // Where a branch that crosses another one started, the other one is its parent.
-            if let Origin::Switch { parent: from, kind: Kind::BranchPoint, parameter: there } = &parent.origin
-                && special.kind == Kind::BranchPoint
-                && (there - parameter).abs() < 1e3 * self.plan.tolerance * (1.0 + there.abs())
-            {
-                self.tell(Event::Note(&parent.name, &format!("{label}: the branch there is {from}, the parent")));
-                continue;
-            }
-            if let Some(already) = arrival::at(self.system, self.plan.tolerance, &self.branches, &parent, special) {
-                self.tell(Event::Note(
-                    &parent.name,
-                    &format!("{label}: the branch there is {already}, which ends here"),
-                ));
-                continue;
-            }
-            let (family, beginning) =
-                match switch::beginning(self.system, &settings, parent.free, self.plan.degree, special) {
-                    None => continue,
-                    Some(Ok((family, beginning))) => {
-                        (family, self.of_one_turn(&settings, parent.free, special.kind, beginning))
-                    }
-                    Some(Err(why)) => {
-                        let said = format!("{label}: no branch found to switch to: {why}");
-                        self.tell(Event::Short(&parent.name, &said));
-                        continue;
-                    }
-                };
-            let first = match &beginning {
-                Beginning::Inside(station) | Beginning::Edge { first: station, .. } => &station.point,
+            let below = pending.switching.below(special.kind, counts[slot]);
+            let leaving = Leaving { plan, settings: &settings, parent: &parent, special, label, below };
+            let kernel = if special.kind == Kind::BranchPoint { special.kernel() } else { 1 };
+            let going = match kernel {
+                1 => self.left(&leaving, name, &mut more),
+                _ => self.left_in_all_directions(&leaving, &name, kernel, &mut more),
             };
-            if let Some(already) = known::branch_of(
-                self.system,
-                &settings,
-                parent.free,
-                self.plan.degree,
-                first,
-                &self.branches,
-                self.observer,
-            ) {
-                self.tell(Event::Note(&parent.name, &format!("{label}: leads to {already}, which is known already")));
-                continue;
-            }
-            let mut branch = Branch::new(name, family, parent.free, origin);
-            let going = self.growth(plan, &settings, [true, true], &parent.special).begin(&mut branch, beginning);
-            self.branches.push(branch);
-            let switching = pending.switching.below(special.kind, counts[slot]);
-            more.push(Pending { branch: self.branches.len() - 1, switching });
             if !going {
                 return None;
             }
@@ -366,6 +321,126 @@ impl Work<'_> {
             self.tell(Event::Short(&parent.name, &said));
         }
         Some(more)
+    }
+
+    /// Follows the branch that leaves a special point. Returns false if the observer wants to stop.
+    fn left(&mut self, at: &Leaving, name: String, more: &mut Vec<Pending>) -> bool {
+        let Leaving { settings, parent, special, label, .. } = at;
+        if let Some(going) = self.resumed(at, &name, more) {
+            return going;
+        }
+        let parameter = special.point.parameters[parent.free];
+        // Where a branch that crosses another one started, the other one is its parent.
+        if let Origin::Switch { parent: from, kind: Kind::BranchPoint, parameter: there } = &parent.origin
+            && special.kind == Kind::BranchPoint
+            && (there - parameter).abs() < 1e3 * self.plan.tolerance * (1.0 + there.abs())
+        {
+            self.tell(Event::Note(&parent.name, &format!("{label}: the branch there is {from}, the parent")));
+            return true;
+        }
+        if let Some(already) = arrival::at(self.system, self.plan.tolerance, &self.branches, parent, special) {
+            self.tell(Event::Note(&parent.name, &format!("{label}: the branch there is {already}, which ends here")));
+            return true;
+        }
+        let pair = parent.earlier_there(special);
+        match switch::beginning(self.system, settings, parent.free, self.plan.degree, special, pair) {
+            None => true,
+            Some(Ok((family, beginning))) => {
+                let beginning = self.of_one_turn(settings, parent.free, special.kind, beginning);
+                self.begun(at, name, family, beginning, more)
+            }
+            Some(Err(why)) => {
+                let said = format!("{label}: no branch found to switch to: {why}");
+                self.tell(Event::Short(&parent.name, &said));
+                true
+            }
+        }
+    }
+
+    /// Follows all branches that leave a branch point with a kernel of several dimensions. Returns false if the observer wants to stop.
+    fn left_in_all_directions(&mut self, at: &Leaving, name: &str, dimension: usize, more: &mut Vec<Pending>) -> bool {
+        // The directions grow as 3^d.
+        const MOST: usize = 4;
+        let Leaving { settings, parent, special, label, .. } = at;
+        if let Origin::Switch { parent: from, kind: Kind::BranchPoint, parameter: there } = &parent.origin
+            && (there - special.point.parameters[parent.free]).abs() < 1e3 * self.plan.tolerance * (1.0 + there.abs())
+        {
+            return self.tell(Event::Note(
+                &parent.name,
+                &format!("{label}: the branches there are those of {from}, the parent"),
+            ));
+        }
+        if dimension > MOST {
+            let said = format!(
+                "{label}: the branches that leave a kernel of dimension {dimension} are not followed: more than {MOST} are too many"
+            );
+            return self.tell(Event::Short(&parent.name, &said));
+        }
+        let found = match switch::crossings(self.system, settings, parent.free, self.plan.degree, special, dimension) {
+            Ok(found) => found,
+            Err(why) => {
+                let said = format!("{label}: no branch found to switch to: {why}");
+                return self.tell(Event::Short(&parent.name, &said));
+            }
+        };
+        let (count, directions) = (found.beginnings.len(), found.directions);
+        let said = match found.continuous {
+            true => format!(
+                "{label}: a kernel of dimension {dimension}, from which a family leaves in every direction; one of it is followed"
+            ),
+            false => format!(
+                "{label}: a kernel of dimension {dimension}; {count} branches found to leave, looked for in {directions} directions"
+            ),
+        };
+        let family = parent.family;
+        self.tell(Event::Note(&parent.name, &said))
+            && found.beginnings.into_iter().enumerate().all(|(index, beginning)| {
+                let own = if index == 0 { name.to_string() } else { format!("{name}-{}", index + 1) };
+                let resumed = self.resumed(at, &own, more);
+                resumed.unwrap_or_else(|| self.begun(at, own, family, beginning, more))
+            })
+    }
+
+    /// Goes on with a branch of that name if an earlier run has it.
+    fn resumed(&mut self, at: &Leaving, name: &str, more: &mut Vec<Pending>) -> Option<bool> {
+        // A doubled branch of which there is only the special point begins anew.
+        let begun = |b: &&Branch| b.points.len() > usize::from(growth::is_doubled(b));
+        let mut branch = self.earlier.branch(name).filter(begun)?.clone();
+        let going = self.growth(at.plan, at.settings, [true, true], &at.parent.special).resume(&mut branch);
+        Some(self.keep(at, branch, going, more))
+    }
+
+    /// Follows a branch from its beginning, unless it is known.
+    fn begun(
+        &mut self,
+        at: &Leaving,
+        name: String,
+        family: Family,
+        beginning: Beginning,
+        more: &mut Vec<Pending>,
+    ) -> bool {
+        let Leaving { plan, settings, parent, special, label, .. } = at;
+        let (Beginning::Inside(station) | Beginning::Edge { first: station, .. }) = &beginning;
+        let (free, degree, first) = (parent.free, self.plan.degree, &station.point);
+        let known = known::branch_of(self.system, settings, free, degree, first, &self.branches, self.observer);
+        // Next to a kernel of several dimensions branches are closer to their parent than tells apart; that they leave it was seen by their direction.
+        let parted = special.kind == Kind::BranchPoint && special.kernel() > 1;
+        if let Some(already) = known.filter(|known| !(parted && *known == parent.name)) {
+            return self
+                .tell(Event::Note(&parent.name, &format!("{label}: leads to {already}, which is known already")));
+        }
+        let parameter = special.point.parameters[free];
+        let origin = Origin::Switch { parent: parent.name.clone(), kind: special.kind, parameter };
+        let mut branch = Branch::new(name, family, free, origin);
+        let going = self.growth(plan, settings, [true, true], &parent.special).begin(&mut branch, beginning);
+        self.keep(at, branch, going, more)
+    }
+
+    /// Keeps a branch that was switched to, to be switched from itself.
+    fn keep(&mut self, at: &Leaving, branch: Branch, going: bool, more: &mut Vec<Pending>) -> bool {
+        self.branches.push(branch);
+        more.push(Pending { branch: self.branches.len() - 1, switching: at.below.clone() });
+        going
     }
 
     /// The beginning of a branch of cycles that run through one turn. At a branch point a cycle that has bifurcated from another

@@ -6,7 +6,7 @@ use super::{System, diagnosis};
 use crate::continuation::corrector::{Plane, parameter_row, settle, station};
 use crate::continuation::{Failure, Follow, Homecoming, Item, Settings, Station, follow};
 use crate::contract::{Event, Examination, Monitor, Observer, Verdict, ZeroProblem};
-use crate::diagram::{Branch, Cost, Ending, Family, Kind, Origin, Point, Solution, SpecialPoint};
+use crate::diagram::{Branch, Cost, Ending, Family, Kind, Misfit, Origin, Point, Record, Solution, SpecialPoint};
 use crate::problem::{Axis, Setting, Tie, cycle::CycleProblem, equilibrium::EquilibriumProblem, held::Held, mesh};
 use crate::special::coefficients::Coefficients;
 use crate::special::connection::Limits;
@@ -273,6 +273,10 @@ pub struct Growth<'g> {
     pub sparse: bool,
 }
 
+/// What to do where the counts of unstable eigenvalues do not fit.
+const CLOSER: &str =
+    "what to do: a smaller tolerance; `foldline verify` looks at the points on both sides by another route";
+
 /// Points at either end of a branch that are always whole: what goes on from there needs them.
 const WHOLE: usize = 3;
 
@@ -466,6 +470,8 @@ impl Growth<'_> {
         let mut before: Vec<&Point> = branch.points.iter().filter(|p| p.position as f64 * direction > 0.0).collect();
         before.sort_by_key(|p| p.position.abs());
         before.into_iter().for_each(|p| walk.leaves_home(p));
+        let mut record = Record::at(&last, side == 1);
+        let recorded = self.settings.stability && branch.held.is_none();
         let ending = follow(&mut walk, start, previous, emitted, &mut |item| {
             // What was found while the field had no values any more is nothing.
             if self.observer.stopping() {
@@ -481,17 +487,47 @@ impl Growth<'_> {
                     }
                     self.place_exactly(&system, branch, &mut special);
                     branch.insert_special(special.clone());
-                    self.tell(Event::Special(branch, &special))
+                    let misfit = record.special(&special);
+                    self.tell(Event::Special(branch, &special)) && (!recorded || self.fits(branch, &special, &misfit))
                 }
                 Item::Point(mut point) => {
                     [point.cost.evaluations, point.cost.linearisations] = counted.take();
-                    self.accept(branch, point)
+                    let before = record.point(&point).filter(|_| recorded);
+                    before.is_none_or(|before| self.unexplained(branch, before, &point)) && self.accept(branch, point)
                 }
             };
             if going { Verdict::Continue } else { Verdict::Stop }
         });
         // What it would say is no property of the branch then.
         if self.observer.stopping() { Ending::Stopped } else { ending }
+    }
+
+    /// Says what does not fit at a special point.
+    fn fits(&self, branch: &Branch, special: &SpecialPoint, misfit: &Misfit) -> bool {
+        let SpecialPoint { kind, unstable_before: before, unstable_after: after, .. } = special;
+        let at = special.point.parameters.get(branch.free).copied().unwrap_or(f64::NAN);
+        let said = match misfit {
+            Misfit { on_arrival: 0, of_change: 0 } => return true,
+            Misfit { on_arrival: 0, .. } => {
+                format!(
+                    "the count of unstable eigenvalues goes from {before} to {after} at the {kind} at {at:.9}, which its kind does not explain"
+                )
+            }
+            _ => format!(
+                "the count of unstable eigenvalues at the {kind} at {at:.9} is not that of the points beside it"
+            ),
+        };
+        self.tell(Event::Short(&branch.name, &format!("{said}\n{CLOSER}")))
+    }
+
+    /// Says that the count of unstable eigenvalues or multipliers has changed on the way to a point, and nothing was found that does it.
+    fn unexplained(&self, branch: &Branch, before: usize, point: &Point) -> bool {
+        let after = point.unstable;
+        let at = point.parameters.get(branch.free).copied().unwrap_or(f64::NAN);
+        let said = format!(
+            "the count of unstable eigenvalues goes from {before} to {after} next to {at:.9}, and no special point was found there"
+        );
+        self.tell(Event::Short(&branch.name, &format!("{said}\n{CLOSER}")))
     }
 
     /// The end of a curve of folds of cycles that shrink to an equilibrium: by theory that has a Hopf point with a first Lyapunov coefficient
@@ -644,6 +680,10 @@ impl Growth<'_> {
     /// Of the normal form.
     fn coefficients(&self, system: &System, branch: &Branch, side: usize, special: &SpecialPoint) -> Coefficients {
         let (line, own) = (self.line(branch), setting(system, branch.free, &special.point.parameters));
+        let dimension = special.kernel();
+        if special.kind == Kind::BranchPoint && dimension > 1 {
+            return Coefficients::none(format!("the kernel has dimension {dimension}"));
+        }
         let free = branch.held.map(|(_, first)| first).into_iter().chain([branch.free]);
         let own = Setting { axes: free.map(|index| line.axis(system, index)).collect(), ..own };
         match &special.point.solution {
@@ -657,7 +697,13 @@ impl Growth<'_> {
                     let gap = |point: &Point| special.point.parameters[branch.free] - point.parameters[branch.free];
                     at.tangent = there.iter().zip(x).map(|(a, b)| a - b).chain(before.map(gap)).collect();
                 }
-                special::normal_form::coefficients(&own, special.kind, &at, special.error)
+                special::normal_form::coefficients(
+                    &own,
+                    special.kind,
+                    &at,
+                    special.error,
+                    branch.earlier_there(special),
+                )
             }
             Solution::Cycle(_) => special::cycle_coefficients::coefficients(special.kind, &own, &special.point),
         }

@@ -64,25 +64,52 @@ impl Monitor for BranchPoint {
 /// The null vector of F_u orthogonal to the tangent at a branch point, of unit length; the problem must be on the mesh of
 /// `u` and anchored there. `None` if there is none.
 pub fn direction(problem: &mut dyn ZeroProblem, u: &[f64], tangent: &[f64]) -> Option<Vec<f64>> {
+    kernel(problem, u, tangent, 1)?.pop()
+}
+
+/// Orthonormal null vectors of F_u orthogonal to the tangent, as many as `dimension` says, by inverse iteration of a subspace.
+/// Conditions as for [`direction`].
+pub fn kernel(problem: &mut dyn ZeroProblem, u: &[f64], tangent: &[f64], dimension: usize) -> Option<Vec<Vec<f64>>> {
     let size = problem.unknowns();
-    // Exactly at the point there may be nothing to factorise; a little beside it the null vector is nearly the same.
+    // Exactly at the point there may be nothing to factorise; a little beside it the null vectors are nearly the same.
     if problem.factorise(u, tangent).is_err() {
         let beside: Vec<f64> = u.iter().zip(tangent).map(|(x, t)| x + 1e-8 * t).collect();
         problem.factorise(&beside, tangent).ok()?;
     }
-    let mut v: Vec<f64> = (0..size).map(|k| ((k * k) as f64 * 0.37 + 0.2).sin()).collect();
+    let start = |j: usize| (0..size).map(|k| ((k * k) as f64 * (0.37 + 0.11 * j as f64) + 0.2).sin()).collect();
+    let mut vectors: Vec<Vec<f64>> = (0..dimension).map(start).collect();
     let mut next = vec![0.0; size];
     for _ in 0..4 {
-        v[size - 1] = 0.0;
-        problem.solve(&v, &mut next);
-        let norm = problem.dot(&next, &next).sqrt();
-        if !(norm.is_finite() && norm > 0.0) {
+        for j in 0..dimension {
+            let (done, rest) = vectors.split_at_mut(j);
+            let v = &mut rest[0];
+            v[size - 1] = 0.0;
+            problem.solve(v, &mut next);
+            if !orthonormalised(problem, &mut next, done, 0.0) {
+                return None;
+            }
+            v.copy_from_slice(&next);
+        }
+    }
+    for j in 0..dimension {
+        let (done, rest) = vectors.split_at_mut(j);
+        let v = &mut rest[0];
+        let along = problem.dot(v, tangent);
+        v.iter_mut().zip(tangent).for_each(|(a, t)| *a -= along * t);
+        if !orthonormalised(problem, v, done, 0.5) {
             return None;
         }
-        v.iter_mut().zip(&next).for_each(|(a, b)| *a = b / norm);
     }
-    let along = problem.dot(&v, tangent);
-    v.iter_mut().zip(tangent).for_each(|(a, t)| *a -= along * t);
-    let norm = problem.dot(&v, &v).sqrt();
-    (norm > 0.5).then(|| v.iter().map(|a| a / norm).collect())
+    Some(vectors)
+}
+
+/// Makes a vector orthogonal to some that are orthonormal, and of unit length. False if it was not longer than `least` then.
+fn orthonormalised(problem: &dyn ZeroProblem, vector: &mut [f64], others: &[Vec<f64>], least: f64) -> bool {
+    for other in others {
+        let along = problem.dot(vector, other);
+        vector.iter_mut().zip(other).for_each(|(a, b)| *a -= along * b);
+    }
+    let norm = problem.dot(vector, vector).sqrt();
+    vector.iter_mut().for_each(|a| *a /= norm);
+    norm.is_finite() && norm > least
 }

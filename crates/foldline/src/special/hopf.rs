@@ -37,7 +37,7 @@ impl Monitor for Hopf {
     }
 
     fn confirms(&self, at: &Point) -> bool {
-        frequency(at).is_some()
+        !frequencies(at).is_empty()
     }
 
     fn jump(&self) -> usize {
@@ -63,11 +63,12 @@ fn balance((a, b): (Complex64, Complex64)) -> Complex64 {
     (a + b) / (f64::MIN_POSITIVE + a.norm() + b.norm())
 }
 
-/// ω of the pair closest to the imaginary axis, if it is there.
-fn frequency(at: &Point) -> Option<f64> {
-    let closest =
-        at.spectrum.iter().filter(|z| z.im > 0.0).min_by(|a, b| (a.re / a.im).abs().total_cmp(&(b.re / b.im).abs()))?;
-    (closest.re.abs() < 1e-4 * closest.im).then_some(closest.im)
+/// ω of the pairs on the imaginary axis, the closest one first.
+pub fn frequencies(at: &Point) -> Vec<f64> {
+    let off = |z: &Complex64| (z.re / z.im).abs();
+    let mut there: Vec<Complex64> = at.spectrum.iter().copied().filter(|z| z.im > 0.0 && off(z) < 1e-4).collect();
+    there.sort_by(|a, b| off(a).total_cmp(&off(b)));
+    there.iter().map(|z| z.im).collect()
 }
 
 /// Newton update, relative, of an equilibrium whose square is rounding.
@@ -148,18 +149,18 @@ fn growth_rate(field: &dyn VectorField, parameters: &[f64], scales: &[f64], x: &
     None
 }
 
-/// Direction of the cycles born at a Hopf point: the profile `[N(m+1)n]` of Re(q e^{2πit}) with max |q_i|/s_i = 1, and the
-/// period 2π/ω. `None` if the point is not a Hopf point.
+/// Direction of the cycles born at a Hopf point with the frequency ω: the profile `[N(m+1)n]` of Re(q e^{2πit}) with max |q_i|/s_i = 1, and
+/// the period 2π/ω. `None` if there is no such.
 pub fn direction(
     field: &dyn VectorField,
     at: &Point,
+    omega: f64,
     scales: &[f64],
     scheme: &Scheme,
     mesh: &Mesh,
 ) -> Option<(Vec<f64>, f64)> {
     let Solution::Equilibrium(x) = &at.solution else { return None };
     let n = x.len();
-    let omega = frequency(at)?;
     let (mut f, mut fx) = (vec![0.0; n], vec![0.0; n * n]);
     field.linearise(
         Batch { lanes: 1, states: x, parameters: Parameters::Shared(&at.parameters), times: &[] },

@@ -1,52 +1,29 @@
 //! Is every change of stability explained?
 
 use super::{Check, Quantity, Verified};
-use crate::diagram::{Branch, Kind};
+use crate::diagram::{Branch, Kind, Record};
 
 /// Along the branch the number of unstable multipliers may change at special points only, by as much as their kind allows.
 pub(super) fn verify(branch: &Branch) -> Verified {
     let mut out = Verified::default();
-    let mut check = |position: i64, special: Option<Kind>, parameter: f64, found: usize, stated: f64| {
+    let mut check = |position: i64, special: Option<Kind>, parameter: f64, found: usize| {
         let (branch, quantity) = (branch.name.clone(), Quantity::Record);
-        out.checks.push(Check {
-            branch,
-            position,
-            special,
-            parameter,
-            quantity,
-            stated: Some(stated),
-            found: found as f64,
-        });
+        let (stated, found) = (Some(0.0), found as f64);
+        out.checks.push(Check { branch, position, special, parameter, quantity, stated, found });
     };
     let value = |parameters: &[f64]| parameters.get(branch.free).copied().unwrap_or(f64::NAN);
     for pair in branch.points.windows(2) {
         let [before, after] = [&pair[0], &pair[1]];
-        let mut count = before.unstable;
+        let mut record = Record::at(before, true);
         for special in branch.special.iter().filter(|special| special.point.position == before.position) {
-            check(
-                before.position,
-                Some(special.kind),
-                value(&special.point.parameters),
-                count.abs_diff(special.unstable_before),
-                0.0,
-            );
-            let change = special.unstable_before.abs_diff(special.unstable_after);
-            let (fits, own) = match special.kind {
-                Kind::Fold | Kind::PeriodDoubling => (change == 1, 1),
-                Kind::Hopf | Kind::Torus => (change == 2, 2),
-                // A pitchfork seen from the branch that ends in it changes nothing; a kernel of several dimensions as much as that.
-                Kind::BranchPoint => (true, 0),
-                _ => (true, 0),
-            };
-            if !fits {
-                check(before.position, Some(special.kind), value(&special.point.parameters), change.abs_diff(own), 0.0);
+            let (at, misfit) = (value(&special.point.parameters), record.special(special));
+            check(before.position, Some(special.kind), at, misfit.on_arrival);
+            if misfit.of_change > 0 {
+                check(before.position, Some(special.kind), at, misfit.of_change);
             }
-            count = special.unstable_after;
         }
-        // Where a family at one value of the parameter begins or ends, a multiplier that was 1 is so no more.
-        let family = before.is_one_of_family() != after.is_one_of_family();
-        let allowed = if family { 1.0 } else { 0.0 };
-        check(before.position, None, value(&after.parameters), count.abs_diff(after.unstable), allowed);
+        let change = record.point(after).map_or(0, |count| count.abs_diff(after.unstable));
+        check(before.position, None, value(&after.parameters), change);
     }
     out
 }

@@ -79,7 +79,8 @@ const PITCHFORK: f64 = 1e-5;
 
 /// The coefficients of the normal form of a special point of that kind, in the order of [`Kind::coefficients`]. `error` is the bound on the
 /// error of the point. Of the setting, the field, the scales of the states and the free parameters count, the last of which is that of the branch.
-pub fn coefficients(setting: &Setting, kind: Kind, at: &Point, error: f64) -> Coefficients {
+/// Where several pairs of eigenvalues are on the imaginary axis at once, those of a Hopf point are those of pair number `pair`.
+pub fn coefficients(setting: &Setting, kind: Kind, at: &Point, error: f64, pair: usize) -> Coefficients {
     if kind.coefficients().is_empty() || !matches!(at.solution, Solution::Equilibrium(_)) {
         return Coefficients::default();
     }
@@ -87,7 +88,7 @@ pub fn coefficients(setting: &Setting, kind: Kind, at: &Point, error: f64) -> Co
     if uncertain.lies_on_a_switch() {
         return Coefficients::none("the equilibrium lies on a switch of the right-hand side");
     }
-    match found(&uncertain, kind) {
+    match found(&uncertain, kind, pair) {
         Ok(found) if found.values.iter().all(|value| value.is_finite()) => found,
         Ok(_) => Coefficients::none("they are not finite"),
         Err(why) => Coefficients::none(why),
@@ -95,9 +96,14 @@ pub fn coefficients(setting: &Setting, kind: Kind, at: &Point, error: f64) -> Co
 }
 
 /// The same where nothing speaks against it, or what does.
-fn found(uncertain: &Uncertain, kind: Kind) -> Result<Coefficients, String> {
+fn found(uncertain: &Uncertain, kind: Kind, pair: usize) -> Result<Coefficients, String> {
     const RESONANCE: &str = "eigenvalues are in a resonance, or have no eigenvectors of their own";
-    let first = |sample: &Sample| frequencies(sample.point).first().copied();
+    // Next to each other on the axis, pairs change places from sample to sample.
+    let own = frequencies(uncertain.at).get(pair).copied();
+    let first = |sample: &Sample| {
+        let off = |omega: &f64| own.map_or(0.0, |own| (omega - own).abs());
+        frequencies(sample.point).into_iter().min_by(|a, b| off(a).total_cmp(&off(b)))
+    };
     let one = |value: Option<f64>| value.map(|value| vec![value]);
     let measured = |formula: &dyn Fn(&Sample) -> Option<Vec<f64>>| uncertain.measured(formula);
     let resonant = || RESONANCE.to_string();
