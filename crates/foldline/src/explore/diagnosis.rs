@@ -1,7 +1,7 @@
-//! Why no first solution was found: what in the vector field makes that likely, and what can be done.
+//! Diagnosis of a failed search for a first solution: the likely cause in the vector field, and a cure.
 //!
-//! **Idea.** f at a few places of the sampling box tells whether some combination of the states never changes. Then no
-//! equilibrium and no cycle is isolated, and Newton's method has nothing to converge to.
+//! **Idea.** Values of f at a few points of the sampling box reveal whether some combination of the states is conserved. Then no
+//! equilibrium or cycle is isolated, and Newton's method does not converge.
 
 use super::direct::{transient, turn};
 use super::{System, symmetry};
@@ -20,13 +20,13 @@ const ROUNDING: f64 = 1e-10;
 pub(super) struct Seen<'a> {
     /// The state that was given, if one was.
     pub state: Option<&'a [f64]>,
-    /// Whether some could not be followed on, their steps having become too small.
+    /// True if some trajectories stopped because their steps became too small.
     pub stuck: bool,
-    /// Whether all left every bound.
+    /// True if all trajectories grew without bound.
     pub all_escaped: bool,
-    /// Where one left the region in which f is defined, if one did.
+    /// Exit of a trajectory that left the region in which f is defined.
     pub exit: Option<&'a Exit>,
-    /// Whether some ran on without coming to anything, or came to something that Newton's method does not confirm.
+    /// True if some trajectories did not settle, or settled to a motion that Newton's method does not confirm.
     pub unsettled: bool,
 }
 
@@ -42,7 +42,7 @@ pub(super) fn of_no_start(system: &System, parameters: &[f64], seen: Seen) -> St
             combination(first, &system.state_names)
         );
     }
-    if seen.state.is_some_and(|state| rests(system, parameters, state)) {
+    if seen.state.is_some_and(|state| is_equilibrium(system, parameters, state)) {
         return "\nlikely cause: the state is an equilibrium, and a singular one: a fold, a branch point or an isolated point, \
                 from which nothing says where a branch leads\nwhat to do: start at another value of the parameter, on one of the \
                 branches that come together there"
@@ -71,7 +71,7 @@ pub(super) fn of_no_start(system: &System, parameters: &[f64], seen: Seen) -> St
     }
 }
 
-/// That a trajectory met the edge of the region in which f is defined.
+/// Cause and cure for a trajectory that reached the boundary of the region in which f is defined.
 fn of_exit(system: &System, exit: &Exit) -> String {
     format!(
         "\nlikely cause: at the time {:.6}, {}, a trajectory meets the edge of the region in which the vector field is defined (a division \
@@ -82,8 +82,9 @@ fn of_exit(system: &System, exit: &Exit) -> String {
     )
 }
 
-/// A state in words, the first few components of it.
+/// The first few components of a state, as text.
 pub(super) fn place(system: &System, state: &[f64]) -> String {
+    /// Components that fit on one line.
     const TOLD: usize = 6;
     let named = system.state_names.iter().zip(state).take(TOLD);
     let told: Vec<String> = named.map(|(name, value)| format!("{name} = {value:.6}")).collect();
@@ -91,7 +92,7 @@ pub(super) fn place(system: &System, state: &[f64]) -> String {
     format!("{}{more}", told.join(", "))
 }
 
-/// That solutions come in families.
+/// Cause and cure if solutions form families, because of a rotational symmetry or a conserved energy.
 fn of_family(system: &System, parameters: &[f64]) -> Option<String> {
     if let Some(pairs) = symmetry::rotation(system, parameters) {
         let name = |state: &usize| system.state_names.get(*state).map_or("?", String::as_str);
@@ -115,8 +116,8 @@ fn of_family(system: &System, parameters: &[f64]) -> Option<String> {
     })
 }
 
-/// That a forced system is damped so lightly that transients outlast every trajectory, as its linearisation at the state or, where none was
-/// given, at the state of the box next to the origin says.
+/// Cause and cure for a forced system so lightly damped that transients outlast every trajectory. The decay rate is that of the
+/// linearisation at the given state or, if none was given, at the state of the sampling box nearest to the origin.
 fn of_slow_decay(system: &System, parameters: &[f64], state: Option<&[f64]>) -> Option<String> {
     let n = system.field.dim();
     if !system.field.forced() {
@@ -147,13 +148,13 @@ fn of_slow_decay(system: &System, parameters: &[f64], state: Option<&[f64]>) -> 
     })
 }
 
-/// The state of the sampling box next to the origin.
+/// The state of the sampling box nearest to the origin.
 pub(super) fn next_to_origin(system: &System) -> Vec<f64> {
     system.ranges.iter().map(|[low, high]| 0.0f64.max(*low).min(*high)).collect()
 }
 
-/// Whether f vanishes at a state.
-fn rests(system: &System, parameters: &[f64], state: &[f64]) -> bool {
+/// True if f vanishes at a state.
+fn is_equilibrium(system: &System, parameters: &[f64], state: &[f64]) -> bool {
     let mut f = vec![0.0; state.len()];
     system
         .field
@@ -247,10 +248,11 @@ fn combination(w: &[f64], names: &[String]) -> String {
     text
 }
 
-/// An end of a branch of forced cycles next to a bound of the range at which the forcing has no period, as at frequency zero:
-/// neither the mesh nor the field is at fault there. Any other end as it is.
+/// Explains the end of a branch of forced cycles next to a bound of the range at which the forcing has no period, such as frequency
+/// zero; neither the mesh nor the field is at fault there. Returns any other end unchanged.
 pub(super) fn of_forcing(system: &System, free: usize, range: [f64; 2], last: &Point, ending: Ending) -> Ending {
-    // How near the bound is, in widths of the range.
+    /// Largest distance from the bound, in widths of the range. With a range of frequencies from 0 the period there is a hundred times
+    /// that at the other bound.
     const NEAR: f64 = 0.01;
     let (Ending::MeshTooLarge(text) | Ending::StepTooSmall(text) | Ending::NotFinite(text)) = &ending else {
         return ending;

@@ -51,7 +51,7 @@ struct Discovery<'d, 'w> {
     plan: &'d ExplorePlan,
     /// What roots were called, such as `cycle`, once for each of them.
     named: Vec<String>,
-    /// At how many values some samples were not seen to settle.
+    /// Number of values at which some samples did not settle.
     unsettled: usize,
 }
 
