@@ -51,8 +51,7 @@ impl Monitor for Passage {
     }
 
     fn confirms(&self, at: &Point) -> bool {
-        /// Largest distance of the critical multiplier from 1. Empirical: multipliers in canard explosions vary so fast along the branch
-        /// that they are located no closer.
+        /// Largest distance of the critical multiplier from 1 (eigenvalue from 0). Empirical, and the same as at branch points.
         const NEAR: f64 = 1e-2;
         at.free_spectrum().iter().any(|z| (z - critical(at)).norm() < NEAR)
     }

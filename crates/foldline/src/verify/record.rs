@@ -34,7 +34,8 @@ pub(super) fn verify(branch: &Branch) -> Verified {
             let (fits, own) = match special.kind {
                 Kind::Fold | Kind::PeriodDoubling => (change == 1, 1),
                 Kind::Hopf | Kind::Torus => (change == 2, 2),
-                // A pitchfork seen from the branch that ends in it changes nothing; a kernel of several dimensions as much as that.
+                // At a pitchfork the count of the bifurcating branch does not change; at a multiple branch point it changes by up to the
+                // dimension of the kernel.
                 Kind::BranchPoint => (true, 0),
                 _ => (true, 0),
             };
@@ -43,7 +44,7 @@ pub(super) fn verify(branch: &Branch) -> Verified {
             }
             count = special.unstable_after;
         }
-        // Where a family at one value of the parameter begins or ends, a multiplier that was 1 is so no more.
+        // At either end of a vertical branch a multiplier changes from 1.
         let family = before.is_one_of_family() != after.is_one_of_family();
         let allowed = if family { 1.0 } else { 0.0 };
         check(before.position, None, value(&after.parameters), count.abs_diff(after.unstable), allowed);

@@ -25,10 +25,10 @@
 //! higher order in (4) to (8) they come from one recursion, see `manifold`.
 //!
 //! All are in the units of the model. The signs of a (fold, branch point) and of a and b together (Bogdanov–Takens) change with that of q; those
-//! of b (branch point), c, l₁, l₂, E and the p do not, and s, θ and δ do not depend on the length of q either. A branch point is a pitchfork where a
-//! is zero within its error, by symmetry that is, and transcritical elsewhere.
+//! of b (branch point), c, l₁, l₂, E and the p do not, and s, θ and δ do not depend on the length of q either. A branch point is a pitchfork if a
+//! is zero within its error, usually by symmetry, otherwise transcritical.
 //!
-//! Every coefficient has an error, see `errors`. A quotient whose divisor is zero within its error is not defined and is left out.
+//! Every coefficient has an error; see `errors`. A quotient whose divisor is zero within its error is undefined and omitted.
 //!
 //! | what | file |
 //! |---|---|
@@ -73,8 +73,8 @@ fn frequencies(at: &Point) -> Vec<f64> {
     pairs.into_iter().map(|z| z.im).collect()
 }
 
-/// Amplitude, as a share of the scales of the states, up to which the cubic term of a branch point outweighs the quadratic one where it
-/// counts as a pitchfork.
+/// Amplitude, as a share of the scales of the states, beyond which the cubic term outweighs the quadratic one at a branch point that counts as a
+/// pitchfork. Empirical: ten times the default tolerance, since a quadratic term smaller than that cannot be seen on the branches.
 const PITCHFORK: f64 = 1e-5;
 
 /// The coefficients of the normal form of a special point of that kind, in the order of [`Kind::coefficients`]. `error` is the bound on the
@@ -94,7 +94,7 @@ pub fn coefficients(setting: &Setting, kind: Kind, at: &Point, error: f64) -> Co
     }
 }
 
-/// The same where nothing speaks against it, or what does.
+/// Computes the coefficients, or returns the reason why they are undefined.
 fn found(uncertain: &Uncertain, kind: Kind) -> Result<Coefficients, String> {
     const RESONANCE: &str = "eigenvalues are in a resonance, or have no eigenvectors of their own";
     let first = |sample: &Sample| frequencies(sample.point).first().copied();
@@ -141,7 +141,7 @@ fn found(uncertain: &Uncertain, kind: Kind) -> Result<Coefficients, String> {
     }
 }
 
-/// The first so many of the values where none of those after them, which are divisors, is zero within its error.
+/// Returns the first `count` values, or an error if one of the divisors that follow them is zero within its error.
 fn divided(mut all: Coefficients, count: usize, divisors: &[&str]) -> Result<Coefficients, String> {
     let zero = |k: &usize| all.values[*k].abs() <= all.errors[*k];
     if let Some((_, name)) = (count..).zip(divisors).find(|(k, _)| zero(k)) {
@@ -152,7 +152,7 @@ fn divided(mut all: Coefficients, count: usize, divisors: &[&str]) -> Result<Coe
     Ok(all)
 }
 
-/// Those of a branch point.
+/// Coefficients of a branch point.
 fn crossing(uncertain: &Uncertain) -> Result<Coefficients, String> {
     const NONE: &str = "no second branch is found to cross there";
     let setting = uncertain.setting;
