@@ -51,7 +51,7 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
     writeln!(
         out,
         "share: of the {uniform} samples drawn uniformly from the ranges of the states, with its 95 % confidence interval; the other {} \
-         are drawn towards the origin and count as hits alone",
+         are drawn towards the origin and count only as hits",
         samples as usize - uniform
     )?;
     Ok(Outcome::Done)

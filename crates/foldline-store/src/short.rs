@@ -71,8 +71,8 @@ fn cut_off(diagram: &Diagram, sweep: &SweepPlan, model: &Model) -> Option<String
     (last.motion == Motion::Escaped).then(|| {
         format!(
             "{}: at {} the motion {}; the sweep ends there, {} of {} values visited\n\
-             likely cause: what was followed ceases to attract, or its basin becomes so narrow that a step of the sweep leads out of it\n\
-             what to do: take smaller steps there, or follow the motion as a branch, which passes the point where it ceases to attract",
+             likely cause: the motion loses stability, or its basin becomes so narrow that a step of the sweep leaves it\n\
+             what to do: use smaller steps there, or follow the motion as a branch, which continues while it is unstable",
             sweep.name,
             place(&[(sweep.free, last.value)], model),
             last.fate(),
@@ -114,8 +114,8 @@ fn unexplained(branch: &Branch, model: &Model) -> Option<String> {
         }
     };
     Some(format!(
-        "{}: {changes} by a special point\nwhat to do: take the stability next to it as uncertain; `foldline verify` and a smaller tolerance \
-         may tell more",
+        "{}: {changes} by a special point\nwhat to do: treat the stability next to it as uncertain; `foldline verify` or a smaller tolerance \
+         may resolve it",
         branch.name
     ))
 }

@@ -54,11 +54,11 @@ impl Allowance {
             return Some(Ending::GivenUp(format!(
                 "up to {at}, stability changes at {IN_A_ROW} points in a row without a special point that explains it\nlikely cause: \
                  multipliers that lie on the unit circle along the whole branch, as in a system with a conserved quantity\nwhat to do: \
-                 read the branch without its stability, or add what breaks the conservation"
+                 disregard the stability of this branch, or add a term that breaks the conservation"
             )));
         }
         if self.is_used_up(work) {
-            return Some(self.ending(at, work, "the point was found at last"));
+            return Some(self.ending(at, work, "the point converged in the end"));
         }
         self.left = (self.left - work + RENEWED).min(ALLOWANCE);
         None
@@ -67,11 +67,12 @@ impl Allowance {
     /// The end of a side whose allowance is used up near the parameter value `at`.
     pub(super) fn ending(&self, at: f64, work: usize, last: &str) -> Ending {
         let before = ALLOWANCE - self.left;
-        let also = if before > 0 { format!(", and those before it {before} more than usual") } else { String::new() };
+        let also =
+            if before > 0 { format!(", and the points before it {before} more than usual") } else { String::new() };
         Ending::GivenUp(format!(
-            "next to {at}, a point took the work of {work} factorisations{also}; {last}\nlikely cause: a place to which ever shorter steps or \
-             finer meshes lead, such as a homoclinic orbit, a canard or a cluster of special points\nwhat to do: end the range or `stop` \
-             before it; a larger tolerance passes it in longer steps"
+            "next to {at}, a point took the work of {work} factorisations{also}; {last}\nlikely cause: ever shorter steps or finer meshes are \
+             needed here, as near a homoclinic orbit, a canard or a cluster of special points\nwhat to do: end the range or `stop` \
+             before it; with a larger tolerance, longer steps may pass it"
         ))
     }
 }
@@ -88,7 +89,7 @@ mod tests {
         assert!(own.is_used_up(1001) && !own.is_used_up(1000));
         let Ending::GivenUp(text) = own.ending(1.5, 1001, "it failed") else { panic!() };
         assert!(text.starts_with(
-            "next to 1.5, a point took the work of 1001 factorisations, and those before it 9000 more than usual; it failed"
+            "next to 1.5, a point took the work of 1001 factorisations, and the points before it 9000 more than usual; it failed"
         ));
     }
 

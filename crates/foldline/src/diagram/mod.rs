@@ -594,7 +594,7 @@ impl fmt::Display for Ending {
             Ending::StepTooSmall(why) => write!(f, "step too small: {why}"),
             Ending::MeshTooLarge(why) => write!(f, "mesh too large: {why}"),
             Ending::PeriodUnbounded(period) => {
-                write!(f, "period grew to {period:.4}, and no equilibrium was found next to the cycle that explains it")
+                write!(f, "period grew to {period:.4}, and no equilibrium near the cycle explains it")
             }
             Ending::Connecting { connection, parameter, period, to } => {
                 let orbit = match connection {
@@ -602,7 +602,7 @@ impl fmt::Display for Ending {
                     Connection::Heteroclinic => "a heteroclinic cycle between the saddles",
                     Connection::SaddleNode => "a saddle-node on the cycle, at",
                 };
-                write!(f, "approaches {orbit} {to} at {parameter:.9}, the period having grown to {period:.4}")
+                write!(f, "approaches {orbit} {to} at {parameter:.9}; the last period is {period:.4}")
             }
             Ending::SolutionUnbounded(why) => write!(f, "solution without bound: {why}"),
             Ending::PointLimit(points) => write!(f, "stopped at the limit of {points} points"),

@@ -64,7 +64,7 @@ impl<'c> Choice<'c> {
         }
         let others: Vec<String> = others.iter().map(|other| described(system, other)).collect();
         Some(format!(
-            "{} fits and is taken as the one reached most often; so do: {}. A state on one of them, as `state = {{ … }}`, takes that one",
+            "{} is used, since most samples reached it; these match as well: {}. To start from one of them, give a state on it as `state = {{ … }}`",
             described(system, first),
             others.join(", ")
         ))
@@ -96,7 +96,7 @@ pub(super) fn summary(system: &System, census: &Census) -> String {
     {
         let what = kind(system, found);
         return format!(
-            "{what} of Newton's method; it attracts, but too slowly for samples to be followed until they have settled there"
+            "{what}, found by Newton's method; it attracts too slowly for samples to settle on it within the step limit"
         );
     }
     let mut parts: Vec<String> = census.attractors.iter().map(|attractor| described(system, attractor)).collect();
@@ -113,7 +113,7 @@ pub(super) fn summary(system: &System, census: &Census) -> String {
         parts.push(format!("stuck where steps became too small ({})", census.stuck));
     }
     if census.left > 0 {
-        parts.push(format!("left when that was known ({})", census.left));
+        parts.push(format!("not needed ({})", census.left));
     }
     format!("attractors (samples that went there): {}", parts.join(", "))
 }

@@ -74,9 +74,9 @@ pub(super) fn of_no_start(system: &System, parameters: &[f64], seen: Seen) -> St
 /// Cause and cure for a trajectory that reached the boundary of the region in which f is defined.
 fn of_exit(system: &System, exit: &Exit) -> String {
     format!(
-        "\nlikely cause: at the time {:.6}, {}, a trajectory meets the edge of the region in which the vector field is defined (a division \
-         by zero, a log or a root of something negative)\nwhat to do: write the equation so that it is defined there, or choose another \
-         range of the states, another state, or other parameters",
+        "\nlikely cause: at the time {:.6}, {}, a trajectory meets the edge of the region in which the vector field is defined (division by \
+         zero, or the logarithm or root of a negative number)\nwhat to do: rewrite the equation so that it is defined there, or change the \
+         ranges of the states, the given state or the parameters",
         exit.time,
         place(system, &exit.state)
     )
@@ -99,19 +99,18 @@ fn of_family(system: &System, parameters: &[f64]) -> Option<String> {
         let turned: Vec<String> = pairs.iter().map(|[a, b]| format!("({}, {})", name(a), name(b))).collect();
         let rest: Vec<String> = pairs.iter().map(|[_, b]| format!("{} = 0", name(b))).collect();
         return Some(format!(
-            "\nlikely cause: the equations stay the same when {} are turned together, so a solution can be turned too: those that this \
-             moves are not isolated but come in families, and Newton's method has nothing to converge to\nwhat to do: if the motion \
-             swings in one direction, take that direction for an axis and start with {}; or write the model in coordinates without \
-             the angle",
+            "\nlikely cause: the equations do not change when {} are turned together, so rotated solutions form families in which none is \
+             isolated, and Newton's method does not converge\nwhat to do: for a motion along a straight line choose that line as an axis and \
+             start with {}; otherwise write the model in coordinates without the angle",
             turned.join(" and "),
             rest.join(", ")
         ));
     }
     symmetry::keeps_energy(system, parameters).then(|| {
-        "\nlikely cause: nothing is damped and the forces have a potential, so the energy never changes: cycles are not isolated but come in \
-         families, one for each energy, and no trajectory settles\nwhat to do: add a small damping to the equations as the free \
-         parameter, give a cycle of the family as `cycle`, or the equilibrium that it surrounds as `state` with a switch at its Hopf \
-         point: the branch at zero damping is the family"
+        "\nlikely cause: nothing is damped and the forces have a potential, so the energy never changes: cycles form a family with one \
+         member per energy, and no trajectory settles\nwhat to do: add a small damping as the free parameter, and start from a cycle of the \
+         family (`cycle`) or from the equilibrium inside it (`state`) with a switch at its Hopf point; the branch at zero damping is the \
+         family"
             .into()
     })
 }
@@ -137,13 +136,12 @@ fn of_slow_decay(system: &System, parameters: &[f64], state: Option<&[f64]>) -> 
     let slow = slowest <= rounding && periods > followed as f64;
     slow.then(|| {
         let lasts = match periods.is_finite() {
-            true => format!("motions next to the state fall by a thousand in some {periods:.1e} periods of the forcing"),
-            false => "motions next to the state do not decay at all".to_string(),
+            true => format!("transients near the state decay by a factor of a thousand in some {periods:.1e} forcing periods"),
+            false => "transients near the state do not decay at all".to_string(),
         };
         format!(
-            "\nlikely cause: light damping: {lasts}, and trajectories are followed for {followed}\nwhat to do: start at a parameter at which \
-             there is more damping, or far from resonance, and follow the solution from there (a homotopy or a branch); or give a state \
-             on the cycle"
+            "\nlikely cause: light damping: {lasts}, and trajectories are integrated for {followed}\nwhat to do: start at parameters with more \
+             damping or far from resonance, and follow the solution from there (a homotopy or a branch); or give a state on the cycle"
         )
     })
 }
@@ -270,10 +268,9 @@ pub(super) fn of_forcing(system: &System, free: usize, range: [f64; 2], last: &P
     let Some(bound) = range.into_iter().find(lost).filter(|_| system.field.forced()) else { return ending };
     let inside = bound + NEAR * (if bound == low { high - low } else { low - high });
     let text = format!(
-        "{}\nlikely cause: the range reaches {bound}, where the forcing has no period; towards it the period, and with it the cycle, \
-         becomes longer than any time of the model ({:.3e} at {value:.3e}, {:.3e} at {inside})\nwhat to do: let the range end \
-         where the forcing still has a period, such as {inside}; the response to a constant force is an equilibrium of a model \
-         without forcing",
+        "{}\nlikely cause: the range reaches {bound}, where the forcing has no period; towards it the period grows without \
+         bound ({:.3e} at {value:.3e}, {:.3e} at {inside})\nwhat to do: end the range where the forcing still has a period, such as \
+         {inside}; the response to a constant force is an equilibrium of the model without forcing",
         text.lines().next().unwrap_or_default(),
         unit(value),
         unit(inside)

@@ -324,8 +324,8 @@ impl Growth<'_> {
         let own = setting(self.system, branch.free, &start.parameters);
         let count = special::cycle_form::switches_passed(&own, start);
         let note = format!(
-            "points of kind {sought} are not looked for: the orbit passes switches of the right-hand side ({count} times at the start), where the \
-             coefficient that vanishes there is not defined"
+            "{sought} points are not searched for: their normal form coefficient is not defined on orbits that pass switches of the right-hand \
+             side (here {count} times at the start)"
         );
         count == 0 || self.tell(Event::Note(&branch.name, &note))
     }

@@ -107,7 +107,7 @@ impl<'p> Seeds<'p> {
         let turns = (given.period / period).round();
         if turns > 1.0 {
             let said = format!(
-                "the given cycle of the period {:.6} runs {turns} times through one of the period {period:.6}, which is taken",
+                "the given cycle of period {:.6} runs {turns} times through a cycle of period {period:.6}, which is used instead",
                 given.period
             );
             self.observer.observe(Event::Note(name, &said));
@@ -315,12 +315,12 @@ fn from_state(
     let next = direct(system, &seed.parameters, plan.tolerance, state);
     if let Some(Direct { point, periods, through, .. }) = next.as_ref().filter(|next| next.through || next.slow) {
         let slowly = match *periods > NEVER {
-            true => "no motion next to it decays".to_string(),
-            false => format!("it attracts so slowly that a transient lasts some {periods:.1e} periods of the forcing"),
+            true => "transients next to it do not decay".to_string(),
+            false => format!("a transient lasts some {periods:.1e} forcing periods"),
         };
         if !through {
             tell(&format!(
-                "the cycle that Newton's method finds from the given state, not the end of a trajectory: {slowly}"
+                "starts from the cycle that Newton's method finds next to the given state, without simulation: {slowly}"
             ));
         }
         return Ok(point.clone());
@@ -353,8 +353,7 @@ fn no_start(system: &System, seed: &SeedPlan, state: &[f64], lost: &Lost) -> Str
             let spans: Vec<String> = names.map(|(name, span)| format!("{name} by {span:.1e}")).collect();
             let more = if extent.len() > TOLD { ", …" } else { "" };
             format!(
-                "settles neither to an equilibrium nor to a cycle: it was followed for a time of {time:.1e}, and at the end still \
-                 moves {}{more}",
+                "settles neither to an equilibrium nor to a cycle: after a time of {time:.1e} it still moves {}{more}",
                 spans.join(", ")
             )
         }

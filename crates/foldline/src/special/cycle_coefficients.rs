@@ -65,7 +65,7 @@ fn found(kind: Kind, setting: &Setting, at: &Point) -> Result<Coefficients, Stri
     let (one, two) = (value(&first)?, value(&second)?);
     let noise = f64::EPSILON * resolved.len() as f64;
     if two.divisor.abs() <= NOTHING + SAFE * (two.divisor.abs() - one.divisor.abs()).abs() {
-        return Err("the period does not change at the fold, but for its error".into());
+        return Err("the change of the period at the fold is zero within its error".into());
     }
     Ok(compared(one, two, noise))
 }

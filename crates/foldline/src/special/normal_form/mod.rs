@@ -96,7 +96,7 @@ pub fn coefficients(setting: &Setting, kind: Kind, at: &Point, error: f64) -> Co
 
 /// Computes the coefficients, or returns the reason why they are undefined.
 fn found(uncertain: &Uncertain, kind: Kind) -> Result<Coefficients, String> {
-    const RESONANCE: &str = "eigenvalues are in a resonance, or have no eigenvectors of their own";
+    const RESONANCE: &str = "eigenvalues are resonant or have no separate eigenvectors";
     let first = |sample: &Sample| frequencies(sample.point).first().copied();
     let one = |value: Option<f64>| value.map(|value| vec![value]);
     let measured = |formula: &dyn Fn(&Sample) -> Option<Vec<f64>>| uncertain.measured(formula);
@@ -119,7 +119,7 @@ fn found(uncertain: &Uncertain, kind: Kind) -> Result<Coefficients, String> {
             let found = measured(&|sample| Some(sample.local.takens()?.to_vec()));
             let vanishes = |(value, error): (&f64, &f64)| value.abs() <= *error;
             let found = found.filter(|found| !found.values.iter().zip(&found.errors).all(vanishes));
-            found.ok_or("a and b are zero within their errors, by a symmetry perhaps".into())
+            found.ok_or("a and b are zero within their errors, perhaps because of a symmetry".into())
         }
         Kind::ZeroHopf => {
             let all = measured(&|sample| Some(sample.local.zero_hopf(first(sample)?)?.to_vec()));
@@ -154,7 +154,7 @@ fn divided(mut all: Coefficients, count: usize, divisors: &[&str]) -> Result<Coe
 
 /// Coefficients of a branch point.
 fn crossing(uncertain: &Uncertain) -> Result<Coefficients, String> {
-    const NONE: &str = "no second branch is found to cross there";
+    const NONE: &str = "no second branch was found to cross there";
     let setting = uncertain.setting;
     let along = tangent(setting, uncertain.at).ok_or("the branch itself turns back there")?;
     let quadratic = uncertain.measured(&|sample| Some(vec![sample.local.fold()?])).ok_or(NONE)?;
