@@ -174,14 +174,17 @@ fn direction(problem: &mut dyn ZeroProblem, u: &[f64]) -> Result<Vec<f64>, Failu
     Ok(row)
 }
 
-/// A solution beside `point` on the curve, which may be a fold: from a fold itself, or from next to one, a branch could not
-/// be told from the other side when it comes back. Goes on until the parameter changes noticeably.
+/// A solution on the curve at some distance from `point`, which may be a fold. A branch that started at or next to a fold could not
+/// recognise its start when it returns. Steps continue until the slope of the parameter is clearly non-zero.
 ///
 /// # Errors
 /// See [`Failure`].
 pub fn beside(problem: &mut dyn ZeroProblem, settings: &Settings, point: &Point) -> Result<Point, Failure> {
+    /// Step lengths in the order of trial: a quarter of the longest step of a branch, then shorter by factors of five. Empirical.
     const DISTANCES: [f64; 4] = [0.05, 0.01, 2e-3, 4e-4];
+    /// Slope of the parameter at which the solution is far enough from a fold. Empirical.
     const SLOPE: f64 = 0.15;
+    /// Most steps: a bound on the work on curves along which the parameter hardly changes.
     const FARTHEST: usize = 12;
     let u = problem.unknowns_of(point);
     problem.anchor(&u);
