@@ -140,7 +140,7 @@ fn of_slow_decay(system: &System, parameters: &[f64], state: Option<&[f64]>) -> 
             false => "transients near the state do not decay at all".to_string(),
         };
         format!(
-            "\nlikely cause: light damping: {lasts}, and trajectories are integrated for {followed}\nwhat to do: start at parameters with more \
+            "\nlikely cause: light damping: {lasts}, and trajectories are integrated for {followed} periods\nwhat to do: start at parameters with more \
              damping or far from resonance, and follow the solution from there (a homotopy or a branch); or give a state on the cycle"
         )
     })
