@@ -32,8 +32,8 @@ pub struct Case {
     pub first: First,
     /// The one tolerance.
     pub tolerance: f64,
-    /// True where no cycle of the model can come close to an equilibrium that it does not shrink to, so that a period that seems to
-    /// grow without bound is a fault: a canard explosion taken for a homoclinic orbit.
+    /// True if no cycle of the model can approach an equilibrium without shrinking to it. A period that seems to grow without bound is
+    /// then a fault: a canard explosion mistaken for a homoclinic orbit.
     pub bounded: bool,
 }
 

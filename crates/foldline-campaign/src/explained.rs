@@ -1,9 +1,9 @@
-//! Is every change of stability along a branch explained?
+//! Unexplained changes of stability along a branch.
 
 use foldline::diagram::{Branch, Ending, Kind};
 
-/// Changes of the unstable count that the special points between do not explain, a sentence each: points of the kind `unexplained`,
-/// counts that differ from one point to the next, and a closed branch that comes back with another count than it began with.
+/// Changes of the unstable count that no special point explains, one line each: points of kind `unexplained`, counts that differ from
+/// one point to the next, and a closed branch that ends with another count than it began with.
 pub fn unexplained(branch: &Branch) -> Vec<String> {
     let value = |point: &foldline::diagram::Point| point.parameters.get(branch.free).copied().unwrap_or(f64::NAN);
     let stated = branch.special.iter().filter(|s| s.kind == Kind::Unexplained);
@@ -30,8 +30,8 @@ pub fn unexplained(branch: &Branch) -> Vec<String> {
     lines
 }
 
-/// Special points whose counts on both sides do not fit their kind, a sentence each: a fold and a period doubling change the count by
-/// one, a Hopf and a torus point by pairs, a mark leaves it as it is.
+/// Special points whose change of the unstable count does not fit their kind, one line each: folds and period doublings change it by
+/// one, Hopf and torus points by pairs, marks not at all.
 pub fn misfits(branch: &Branch) -> Vec<String> {
     let fits = |kind: Kind, change: usize| match kind {
         Kind::Fold | Kind::PeriodDoubling => change == 1,

@@ -14,7 +14,7 @@
 //! | is every change of stability explained? | [`explained`] |
 //! | what is reported? | [`report`] |
 //! | how long may it take? | [`watch`] |
-//! | problems of others, with right values from elsewhere | [`outside`] |
+//! | are published and independent results reproduced? | [`outside`] |
 
 pub mod cases;
 pub mod drawn;
@@ -39,7 +39,7 @@ pub const TOLERANCE: f64 = 1e-6;
 /// Degree of the collocation polynomials.
 pub const DEGREE: usize = 4;
 
-/// Time that a case may take unless another is given.
+/// Default time limit of a case. A factor of safety: 200 rotors together take some 4 minutes of processor time.
 pub const LIMIT: Duration = Duration::from_secs(300);
 
 /// Examines every case, over that many threads and each within `limit`; `tell` is called with the report of each as it comes.

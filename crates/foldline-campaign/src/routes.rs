@@ -40,7 +40,7 @@ pub fn examine(case: &Case, limit: Duration) -> Report {
     match &case.first {
         First::Planned => {
             let diagram = explore::run(&system, &case.study.plan, 1, Diagram::default(), &watch);
-            // A run that was stopped differs from the others wherever that happened.
+            // A stopped run cannot be compared with the others.
             if watch.over() {
                 unfinished(case, &mut report);
                 return report;
@@ -86,13 +86,13 @@ fn unfinished(case: &Case, report: &mut Report) {
     report.short.push(format!("{}: the case did not end within its time", case.name));
 }
 
-/// What following a branch takes.
+/// Common arguments of the functions that follow a branch.
 #[derive(Clone, Copy)]
 struct Way<'a> {
     system: &'a System<'a>,
     settings: &'a Settings,
     watch: &'a Watch,
-    /// As [`Case::bounded`].
+    /// See [`Case::bounded`].
     bounded: bool,
 }
 
@@ -283,7 +283,8 @@ fn trace(place: &str, branch: &Branch) -> String {
     text
 }
 
-/// Where branches meet is extrapolated, and good to a few digits; how far a period without bound has grown depends on the last step.
+/// The end of a branch for comparison. Meeting points of branches are extrapolated, accurate to a few digits; the last value of an unbounded
+/// period depends on the last step.
 fn told(end: &Ending) -> String {
     match end {
         Ending::Joined { at, parameter } => format!("joined at {at} {parameter:.3}"),

@@ -1,4 +1,4 @@
-//! The time that a case may take.
+//! Time limit of a case.
 
 use foldline::contract::{Event, Observer, Verdict};
 use std::time::{Duration, Instant};
@@ -11,7 +11,7 @@ pub struct Watch {
 }
 
 impl Watch {
-    /// A watch that starts now.
+    /// Starts the time limit.
     pub fn start(limit: Duration) -> Watch {
         Watch { start: Instant::now(), limit }
     }

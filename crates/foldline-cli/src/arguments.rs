@@ -123,16 +123,17 @@ pub struct Explore {
     pub print: bool,
 }
 
-/// How much an exploration may do.
+/// Limit on an exploration.
 #[derive(Clone, Copy, Debug)]
 pub struct Budget {
     pub points: u32,
     pub time: Option<Duration>,
 }
 
+/// Default budget of points, as of the argument. Empirical: several hundred branches of a few hundred points each.
 const POINTS: u32 = 100_000;
 
-/// A number of points, or a time.
+/// Parses a number of points or a time.
 fn budget(text: &str) -> Result<Budget, String> {
     match text.parse::<u32>() {
         Ok(points @ 1..=100_000_000) => Ok(Budget { points, time: None }),
@@ -141,7 +142,7 @@ fn budget(text: &str) -> Result<Budget, String> {
     }
 }
 
-/// A time such as 90s, 10min or 2h.
+/// Parses a time such as 90s, 10min or 2h.
 fn time(text: &str) -> Result<Duration, String> {
     let said = || "a number with s, min or h, such as 90s, 10min or 2h".to_string();
     let split = text.find(|c: char| !(c.is_ascii_digit() || c == '.')).unwrap_or(text.len());

@@ -16,7 +16,7 @@ use std::io::{Write, stdout};
 
 const TOLERANCE: f64 = 1e-6;
 
-/// Prints the attractors of a model, how often each was reached, and the share of uniform initial states that went there.
+/// Prints the attractors of a model, the number of hits of each, and its basin fraction.
 pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
     let (model, text) = read_model(&typed.model)?;
     let mut parameters: Vec<f64> = model.parameters.iter().map(|p| p.value).collect();
@@ -51,7 +51,7 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
     writeln!(
         out,
         "share: of the {uniform} samples drawn uniformly from the ranges of the states, with its 95 % confidence interval; the other {} \
-         are drawn towards the origin and count as hits alone",
+         are drawn towards the origin and count only as hits",
         samples as usize - uniform
     )?;
     Ok(Outcome::Done)
@@ -62,7 +62,7 @@ fn line(attractor: &Attractor, model: &Model) -> String {
     let (kind, period) = match &point.solution {
         Solution::Equilibrium(_) => ("equilibrium", "·".to_string()),
         Solution::Cycle(cycle) => {
-            // In an autonomous model the plane may turn with the shaft.
+            // In an autonomous model the whirl plane may turn with the shaft.
             let sense = model.whirl.filter(|_| model.forced()).and_then(|whirl| whirl_sense(cycle, whirl));
             let kind = match (attractor.ratio, sense) {
                 (None, Some(Sense::Forward)) => "forward whirl",

@@ -9,18 +9,18 @@ use std::io::{IsTerminal, Write, stderr};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// One live line for each branch that is being followed; where there is no terminal, one line for each that is done, and a reminder
-/// of those under way where nothing else is said for a while.
+/// Progress on standard error: on a terminal, one live line per branch in progress; otherwise one line per completed branch, and a reminder
+/// of those in progress after a period of silence.
 pub struct Progress {
     lines: MultiProgress,
     terminal: bool,
     parameters: Vec<String>,
     live: Mutex<HashMap<String, Live>>,
-    /// When the last line was written.
+    /// Time of the last line.
     said: Mutex<Instant>,
 }
 
-/// Longest silence without a terminal.
+/// Longest silence without a terminal: eight seconds, so that with the delays of both ticks a line comes at least every ten.
 const SILENCE: Duration = Duration::from_secs(8);
 
 struct Live {
@@ -28,7 +28,7 @@ struct Live {
     points: usize,
     special: usize,
     ends: Vec<Ending>,
-    /// Where it is.
+    /// Its last position.
     place: String,
     since: Instant,
 }
@@ -136,7 +136,7 @@ impl Progress {
         ));
     }
 
-    /// Says what is under way, if nothing was said for a while.
+    /// Reports what is in progress after a period of silence.
     pub fn remind(&self) {
         let quiet = self.said.lock().unwrap_or_else(PoisonError::into_inner).elapsed() >= SILENCE;
         if self.terminal || !quiet {

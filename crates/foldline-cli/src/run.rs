@@ -132,7 +132,7 @@ impl Observer for Watch {
     }
 }
 
-/// Stops a run when its time is up, and sees to it that something is said every now and then.
+/// Stops a run at its time limit, and triggers progress reminders.
 struct Clock {
     deadline: Option<Instant>,
     up: AtomicBool,
@@ -140,7 +140,7 @@ struct Clock {
     changed: Condvar,
 }
 
-/// Ends the clock, whatever happens to the run.
+/// Stops the clock when dropped, even if the run panics.
 struct Done<'c>(&'c Clock);
 
 impl Drop for Done<'_> {
@@ -151,11 +151,11 @@ impl Drop for Done<'_> {
 }
 
 impl Clock {
-    /// How often it looks.
+    /// Interval between checks: short enough for the time limit to act at once to a user, long enough to cost nothing.
     const TICK: Duration = Duration::from_millis(200);
 
     fn new(limit: Option<Duration>) -> Clock {
-        // A limit beyond all time is none.
+        // A limit too large to represent is no limit.
         let deadline = limit.and_then(|limit| Instant::now().checked_add(limit));
         Clock { deadline, up: AtomicBool::new(false), over: Mutex::new(false), changed: Condvar::new() }
     }

@@ -1,4 +1,4 @@
-//! Surveys, sweeps and censuses of random models: whatever trajectories do is data.
+//! Surveys, sweeps and censuses of random models: no behaviour of a trajectory is an error.
 
 use crate::formula::Formula;
 use arbitrary::{Result, Unstructured};
@@ -7,25 +7,28 @@ use foldline::diagram::{Diagram, Motion};
 use foldline::explore::{self, System};
 use foldline_store::study_file::parse_study;
 
+/// States of a model: the fewest for which oscillations are possible.
 const STATES: usize = 2;
+/// Starts of a survey. Small, for many models in little time.
 const STARTS: usize = 3;
+/// Parameter values of surveys and sweeps: the fewest that make a sweep.
 const VALUES: usize = 2;
 
-/// What was seen, so that a test can tell that something was.
+/// Counts of what occurred, so that a test can require some of each.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Seen {
     /// Models that were run, of each kind: free, forced.
     pub run: [usize; 2],
-    /// Starts of surveys that settled, to rest or to a cycle, …
+    /// Starts of surveys that settled to an equilibrium or a cycle.
     pub settled: usize,
-    /// … and that escaped.
+    /// Starts of surveys that escaped.
     pub escaped: usize,
     /// Sweeps that had a start.
     pub swept: usize,
 }
 
-/// Simulates a random model in every way there is. Every start of a survey is accounted for at every value, and a sweep whose seed was found is
-/// there as far as its motion could be followed.
+/// Simulates a random model by survey, sweep and census. Every start of a survey must be accounted for at every value, and a sweep whose seed was
+/// found must extend as far as its motion could be followed.
 pub fn simulation(u: &mut Unstructured, seen: &mut Seen) -> Result<()> {
     let forced: bool = u.arbitrary()?;
     let model = model(u, forced)?;
@@ -36,7 +39,7 @@ pub fn simulation(u: &mut Unstructured, seen: &mut Seen) -> Result<()> {
          [[sweep]]\nname = \"from given\"\nfrom = \"given\"\nfree = \"p\"\nrange = [0.1, 0.6]\ncount = {VALUES}\n\
          [[sweep]]\nname = \"from sampled\"\nfrom = \"sampled\"\nfree = \"p\"\nrange = [0.1, 0.6]\ncount = {VALUES}\n"
     );
-    // A model that is finite nowhere is refused.
+    // A model without any finite value is refused.
     let Ok(study) = parse_study(&study, "s.toml", &model, "m.toml") else { return Ok(()) };
     seen.run[usize::from(forced)] += 1;
     let system = System::of_plan(&study.model, &study.plan);

@@ -35,7 +35,7 @@ pub fn special_layers(branch: &Branch, x: Quantity, y: Quantity, colour: &'stati
         .map(|(kind, known, places)| {
             let layer = Layer::scatter(places, Marker::of(kind), colour);
             match known {
-                // A dot has no outline: hollow it could not be seen.
+                // A dot has no outline and would be invisible if hollow.
                 None if kind == Kind::Mark => layer.wide(MARK).named(kind.name()),
                 None => layer.hollow().named(kind.name()),
                 Some("subcritical") => layer.named(format!("{kind}, subcritical")),
@@ -67,7 +67,7 @@ pub fn diagram_layers(diagram: &Diagram, x: Quantity, y: Quantity) -> Vec<Layer>
     curves.into_iter().chain(specials).collect()
 }
 
-/// Width of a mark that was asked for: smaller than a special point, larger than the curve is wide.
+/// Width of the dot of a mark: smaller than a special point, wider than the curve.
 const MARK: f64 = 2.6;
 
 /// What the legend calls branches that come from a special point of another.

@@ -23,7 +23,7 @@ pub fn axis(name: &str, model: &Model) -> Result<Quantity, String> {
     })
 }
 
-/// The free parameter of most points of branches; the legs of a homotopy, which only lead to them, count where there is nothing
+/// The free parameter of most points of branches. The legs of a homotopy, which only lead to branches, count only if there is nothing
 /// else.
 pub fn default_x(diagram: &Diagram) -> Quantity {
     let followed: Vec<&Branch> = diagram.branches.iter().filter(|branch| !is_leg(branch)).collect();
@@ -34,7 +34,7 @@ pub fn default_x(diagram: &Diagram) -> Quantity {
     Quantity::Parameter(frees.rev().max_by_key(|free| count(*free)).unwrap_or(0))
 }
 
-/// Whether a branch is a leg of a homotopy: the third one of `NAME` is called `NAME/3`.
+/// True if a branch is a leg of a homotopy: the third leg of `NAME` is called `NAME/3`.
 fn is_leg(branch: &Branch) -> bool {
     branch.name.rsplit_once('/').is_some_and(|(_, number)| number.parse::<usize>().is_ok())
 }

@@ -37,11 +37,11 @@ pub fn settle(
     found.map(|point| Solution::new(point, &model.model)).map_err(|why| failure::no_solution(py, why))
 }
 
-/// A solution, its ratio, how many samples went there, the share of the uniform ones with its interval, and the first sample.
+/// A solution, its ratio, the number of hits, the basin fraction with its confidence interval, and the first sample.
 type Found<'py> = (Solution, Option<(u32, u32)>, usize, Option<(f64, f64, f64)>, Bound<'py, PyBytes>);
 
-/// The attractors that sampled states reach, each with its ratio, how many went there, the share of the uniform ones and the first state that did;
-/// then how many escaped (out of the region in which f is defined, too), got stuck, and had not settled.
+/// The attractors that sampled states reach, each with its ratio, number of hits, basin fraction and first sample; then the numbers of samples
+/// that escaped (to infinity or out of the region in which f is defined), got stuck, and did not settle.
 #[pyfunction]
 pub fn attractors<'py>(
     py: Python<'py>,

@@ -215,7 +215,7 @@ impl Context<'_> {
         (motion, followed)
     }
 
-    /// Where a trajectory settles.
+    /// The response to which a trajectory settles.
     fn settled(&self, parameters: &[f64], value: f64, start: &[f64]) -> Option<Response> {
         stepped_sweep(&self.trial, parameters, self.free, &[value], start, &mut |_, _| None, &|_| Verdict::Continue)
             .pop()

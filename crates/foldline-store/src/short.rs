@@ -1,13 +1,13 @@
-//! What of a study was not reached.
+//! Requests of a study that were not fulfilled.
 
 use crate::order::leg;
 use foldline::diagram::{Branch, Diagram, Ending, Kind, Motion, Point, Shortfall};
 use foldline::explore::{HomotopyPlan, Plan, SweepPlan};
 use foldline::model::Model;
 
-/// What of the study was not reached, a line each; further lines of one have reasons and cures.
+/// Messages on everything in the study that was not reached. Further lines of a message contain causes and cures.
 ///
-/// A homotopy is there as soon as one of its legs is; that others of them turned back is how it found its way.
+/// A homotopy has arrived as soon as one of its legs has; legs that turned back are part of its search.
 pub fn lines(diagram: &Diagram, plan: &Plan, model: &Model) -> Vec<String> {
     let mut lines = absent(diagram, plan);
     lines.extend(plan.homotopies.iter().filter_map(|homotopy| not_arrived(diagram, homotopy, model)));
@@ -27,7 +27,7 @@ pub fn lines(diagram: &Diagram, plan: &Plan, model: &Model) -> Vec<String> {
         }
         lines.extend(unexplained(branch, model));
     }
-    // Where a line says already that something is missing, what is known of it stands behind.
+    // A known reason follows the line that reports something missing.
     for Shortfall { about, what } in &diagram.shortfalls {
         let own = format!("{about}: it ");
         match lines.iter_mut().find(|line| line.starts_with(&own)) {
@@ -38,14 +38,14 @@ pub fn lines(diagram: &Diagram, plan: &Plan, model: &Model) -> Vec<String> {
     lines
 }
 
-/// Branches and curves by name, with the parameter and value at which each is to end.
+/// Names of branches and curves, with the parameter and value at which each is to end.
 fn targets(plan: &Plan) -> Vec<(&String, Option<(usize, f64)>)> {
     let curves = plan.curves.iter().map(|curve| (&curve.name, curve.until.map(|target| (curve.free, target))));
     let branches = plan.branches.iter().map(|branch| (&branch.name, branch.until.map(|target| (branch.free, target))));
     branches.chain(curves).collect()
 }
 
-/// What is not there at all.
+/// Messages on branches, curves, surveys and sweeps that are missing altogether.
 fn absent(diagram: &Diagram, plan: &Plan) -> Vec<String> {
     let targets = targets(plan);
     let never = targets.iter().filter(|(name, _)| diagram.branch(name).is_none());
@@ -65,14 +65,14 @@ fn not_arrived(diagram: &Diagram, homotopy: &HomotopyPlan, model: &Model) -> Opt
     }
 }
 
-/// A sweep whose trajectory did not stay bounded to its end.
+/// Message on a sweep whose trajectory escaped before the last value.
 fn cut_off(diagram: &Diagram, sweep: &SweepPlan, model: &Model) -> Option<String> {
     let last = diagram.response_set(&sweep.name)?.responses.last()?;
     (last.motion == Motion::Escaped).then(|| {
         format!(
             "{}: at {} the motion {}; the sweep ends there, {} of {} values visited\n\
-             likely cause: what was followed ceases to attract, or its basin becomes so narrow that a step of the sweep leads out of it\n\
-             what to do: take smaller steps there, or follow the motion as a branch, which passes the point where it ceases to attract",
+             likely cause: the motion loses stability, or its basin becomes so narrow that a step of the sweep leaves it\n\
+             what to do: use smaller steps there, or follow the motion as a branch, which continues while it is unstable",
             sweep.name,
             place(&[(sweep.free, last.value)], model),
             last.fate(),
@@ -82,11 +82,11 @@ fn cut_off(diagram: &Diagram, sweep: &SweepPlan, model: &Model) -> Option<String
     })
 }
 
-/// How a branch ended short of its target, or otherwise than it should.
+/// Messages on a branch that is incomplete or did not reach its target.
 fn ended(branch: &Branch, target: Option<(usize, f64)>, model: &Model) -> Vec<String> {
     let short = branch.ends.iter().flatten().filter(|end| !end.complete());
     let mut lines: Vec<String> = short.map(|end| format!("{}: {end}", branch.name)).collect();
-    // A branch that did not begin has not begun on either side.
+    // Both sides of a branch that did not begin give the same line.
     lines.dedup();
     let whole = lines.is_empty();
     if branch.ends.iter().all(Option::is_none) {
@@ -99,7 +99,7 @@ fn ended(branch: &Branch, target: Option<(usize, f64)>, model: &Model) -> Vec<St
     lines
 }
 
-/// Changes of stability that no special point explains.
+/// Message on changes of stability that no special point explains.
 fn unexplained(branch: &Branch, model: &Model) -> Option<String> {
     let own = branch.special.iter().filter(|special| special.kind == Kind::Unexplained);
     let places: Vec<f64> = own.filter_map(|special| special.point.parameters.get(branch.free).copied()).collect();
@@ -114,13 +114,13 @@ fn unexplained(branch: &Branch, model: &Model) -> Option<String> {
         }
     };
     Some(format!(
-        "{}: {changes} by a special point\nwhat to do: take the stability next to it as uncertain; `foldline verify` and a smaller tolerance \
-         may tell more",
+        "{}: {changes} by a special point\nwhat to do: treat the stability next to it as uncertain; `foldline verify` or a smaller tolerance \
+         may resolve it",
         branch.name
     ))
 }
 
-/// Whether one end of a branch has these values of these parameters. A point at a bound has its value but for rounding.
+/// True if one end of a branch has these parameter values. A point at a bound has its value up to rounding.
 fn arrived(branch: &Branch, targets: &[(usize, f64)]) -> bool {
     const ROUNDING: f64 = 1e-9;
     let there = |point: &Point| {

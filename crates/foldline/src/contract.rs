@@ -53,12 +53,12 @@ pub trait VectorField: Send + Sync {
     /// `[(n + k_p) × lanes]` (state part first, then all parameters); writes `[n × lanes]`.
     fn directional(&self, at: Batch, directions: &[&[f64]], out: &mut [f64]);
 
-    /// True once the field has no finite values any more because the run is to end: what takes long need not be begun.
+    /// True once the run is to end and the field returns NaN: no lengthy computation need be started.
     fn ended(&self) -> bool {
         false
     }
 
-    /// Whether f depends on time.
+    /// True if f depends on time.
     fn forced(&self) -> bool {
         false
     }
@@ -90,9 +90,9 @@ pub trait VectorField: Send + Sync {
     /// The switches: writes `[switch_count × lanes]`.
     fn switches(&self, _at: Batch, _out: &mut [f64]) {}
 
-    /// f as it is where the switches have the given signs (±1, `[switch_count × lanes]`), continued smoothly beyond their
-    /// zeros: writes `[n × lanes]`. Where it cannot be continued, as the root of what is positive on one side only, it is f as
-    /// it is there.
+    /// Evaluates the branch of f that the given signs of the switches select (±1, `[switch_count × lanes]`), continued smoothly beyond
+    /// their zeros; writes `[n × lanes]`. Where that branch is undefined, such as a root of an argument that is positive on one
+    /// side only, the actual value of f is used.
     fn evaluate_switched(&self, at: Batch, _signs: &[f64], f: &mut [f64]) {
         self.evaluate(at, f);
     }
@@ -250,7 +250,8 @@ pub trait Monitor: Send + Sync {
         self.confirms(at)
     }
 
-    /// The value of the parameter at which a branch that comes close at `at` meets simpler solutions, where that can be computed from these.
+    /// Parameter value at which a branch that is close to simpler solutions at `at` meets them; `None` if the simpler solutions do not
+    /// determine it.
     fn meeting(&self, _at: &Point) -> Option<f64> {
         None
     }
@@ -265,8 +266,8 @@ pub trait Monitor: Send + Sync {
         true
     }
 
-    /// The factor of the value that vanishes next to `near`, as it is at `at`. It has the same zero, and its size does not depend on the other
-    /// factors, whose number grows with that of the states. `None` where the value has no factors.
+    /// The factor of the value that vanishes next to `near`, evaluated at `at`. It has the same zero as the value but does not scale
+    /// with the other factors, whose number grows with the number of states. `None` if the value is not a product.
     fn factor(&self, _near: &Point, _at: &Point) -> Option<f64> {
         None
     }
@@ -274,13 +275,13 @@ pub trait Monitor: Send + Sync {
     /// By how much an event of this kind changes the number of unstable eigenvalues or multipliers.
     fn jump(&self) -> usize;
 
-    /// How many times an event of this kind makes as many eigenvalues or multipliers unstable as are at `at`, where only such events do;
-    /// `None` where others do as well.
+    /// Number of events of this kind that account for the unstable eigenvalues or multipliers at `at`. `None` if events of another kind
+    /// change the same ones.
     fn passed(&self, _at: &Point) -> Option<usize> {
         None
     }
 
-    /// The monitor of the same events that reads the spectrum alone, for branches along which the parameter moves by no more than rounding.
+    /// A monitor of the same events that uses the spectrum alone, for branches along which the parameter changes by rounding only.
     fn by_spectrum(&self) -> Option<Box<dyn Monitor>> {
         None
     }
@@ -357,12 +358,12 @@ pub enum Event<'a> {
     SideEnded(&'a Branch, usize, &'a Ending),
     /// The branch is complete.
     End(&'a Branch),
-    /// A remark about a branch: a switch that led to a branch already known, what the samples for a seed went to.
+    /// A remark about a branch or seed, such as a switch that led to a known branch or the attractors that the samples reached.
     Note(&'a str, &'a str),
-    /// Something that was asked for and not reached: the name of a branch, exploration or sweep, and what was not reached and why.
+    /// A request that was not fulfilled: the name of the branch, exploration or sweep, then what was not reached and why.
     Short(&'a str, &'a str),
-    /// A survey or sweep (its name) has settled at one more value of its parameter, or an exploration has sampled there: the value, how
-    /// many are done, of how many.
+    /// A survey or sweep has settled, or an exploration has sampled, at one more parameter value: its name, the value, the number of
+    /// values done, and their total.
     Visited(&'a str, f64, usize, usize),
     /// A survey or sweep is complete.
     Responses(&'a Responses),
@@ -382,8 +383,8 @@ pub trait Observer: Sync {
     /// Called once per event, from the thread that follows the branch.
     fn observe(&self, event: Event) -> Verdict;
 
-    /// True once everything is to end at once, in the middle of a point too. Called very often, from every thread. What is found after
-    /// that is not observed any more: numbers that were under way are wrong.
+    /// True once the run is to end immediately, even in the middle of a point. Called very often and from every thread. No event is
+    /// reported after that, because computations in progress return wrong numbers.
     fn stopping(&self) -> bool {
         false
     }

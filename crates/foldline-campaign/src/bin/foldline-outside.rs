@@ -1,4 +1,4 @@
-//! `foldline-outside --binary PATH [OPTIONS]`: what `cargo xtask outside` runs.
+//! `foldline-outside --binary PATH [OPTIONS]`, the program behind `cargo xtask outside`.
 
 use foldline_campaign::outside::command::Command;
 use foldline_campaign::outside::expectations::{Problem, Run};
@@ -100,7 +100,7 @@ fn answer() -> Result<(), String> {
     changed(&problems, &now)
 }
 
-/// Fewer right values of a problem than in the results that are committed are a failure.
+/// Fails if a check that passes in the committed results no longer does.
 fn changed(problems: &[Problem], now: &str) -> Result<(), String> {
     let known = std::fs::read_to_string(folder().join("results.txt")).unwrap_or_default();
     let right = |line: &&str| line.starts_with("right");

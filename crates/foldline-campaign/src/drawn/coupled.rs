@@ -1,4 +1,4 @@
-//! Coupled cells, some of them alike: symmetries, and branches that break them.
+//! Coupled cells, some of them identical: symmetries and symmetry breaking.
 
 use super::Draw::{Logarithmic, Uniform};
 use super::Problem;

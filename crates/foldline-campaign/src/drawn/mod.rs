@@ -1,7 +1,7 @@
 //! Models of several fields whose parameters are drawn at random.
 //!
-//! **Idea.** Each problem states the model, the range from which each of its parameters is drawn, a start and a branch. The ranges are
-//! those in which the model is used in its field. Even numbers and odd ones, small and large, all come out of one stream per case.
+//! **Idea.** Each problem states the model, the range of each random parameter, a start and a branch. The ranges are those used in the
+//! field of the model. Each case draws all its parameters from a random stream of its own.
 
 mod coupled;
 mod ecology;
@@ -45,7 +45,7 @@ pub struct Problem {
     pub start: &'static str,
     /// Free parameter, range, and where to switch.
     pub branch: &'static str,
-    /// As [`Case::bounded`]: one equilibrium, which is never a saddle.
+    /// See [`Case::bounded`]: the model has a single equilibrium, which is never a saddle.
     pub bounded: bool,
 }
 

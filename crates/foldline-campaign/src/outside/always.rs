@@ -1,4 +1,4 @@
-//! What holds for every run.
+//! Checks that apply to every run.
 
 use super::expectations::Run;
 use super::reporting::Verdict;
@@ -10,7 +10,7 @@ use foldline_store::order::leg;
 /// Exit code of a panic.
 const PANIC: i32 = 101;
 
-/// A sentence and a verdict for each. Of a study these are always the same sentences, so that counts can be compared.
+/// Name and verdict of each check. All studies have the same checks, so that counts can be compared.
 pub fn verdicts(run: &Run, outcome: &Outcome) -> Vec<(&'static str, Verdict)> {
     let code = match outcome.end {
         End::Code(code) if code != PANIC => Ok(code),
@@ -24,7 +24,7 @@ pub fn verdicts(run: &Run, outcome: &Outcome) -> Vec<(&'static str, Verdict)> {
         ("exit code", by_itself(&|code| Verdict::of(run.exit.contains(&code), || format!("{code}")))),
     ];
     if run.is_a_study() {
-        // What was refused has nothing to explain.
+        // A study that was refused has no changes of stability.
         let nothing = || by_itself(&|_| Verdict::Right);
         list.push(("stability is explained", outcome.stored.as_ref().map_or_else(nothing, |s| explained(&s.diagram))));
         let silent = |code| outcome.stored.as_ref().map_or(Verdict::Right, |stored| told(code, stored));
@@ -33,7 +33,7 @@ pub fn verdicts(run: &Run, outcome: &Outcome) -> Vec<(&'static str, Verdict)> {
     list
 }
 
-/// Along every branch in one parameter.
+/// Checks that every change of stability along branches in one parameter is explained.
 fn explained(diagram: &Diagram) -> Verdict {
     let branches = diagram.branches.iter().filter(|branch| branch.held.is_none());
     let lines: Vec<String> = branches
@@ -45,7 +45,8 @@ fn explained(diagram: &Diagram) -> Verdict {
     Verdict::of(lines.is_empty(), || format!("{} changes; {}", lines.len(), lines[0]))
 }
 
-/// Exit code 0 means that every branch and curve asked for is there and ended where it should, with nothing unexplained on it.
+/// Checks that exit code 0 is given only if every requested branch and curve exists, is complete and has no unexplained change of
+/// stability.
 fn told(code: i32, stored: &Stored) -> Verdict {
     let on_the_way = |branch: &&Branch| !stored.homotopies.iter().any(|name| leg(&branch.name, name).is_some());
     let short = stored.diagram.branches.iter().filter(on_the_way).find(|branch| {

@@ -1,4 +1,4 @@
-//! Is it what is right?
+//! Evaluation of checks.
 
 use super::expectations::{At, Check};
 use super::quantities::{quantity, special_quantity};
@@ -7,14 +7,14 @@ use super::running::Outcome;
 use foldline::diagram::{Branch, Diagram, Ending, Kind, Point, Response, SpecialPoint};
 use foldline::model::Model;
 
-/// What was found, and its model.
+/// Result of a run, with its model.
 struct Found<'a> {
     diagram: &'a Diagram,
     model: &'a Model,
     outcome: &'a Outcome,
 }
 
-/// Judges one check by what a run left.
+/// Evaluates one check on the result of a run.
 pub fn verdict(check: &Check, outcome: &Outcome) -> Verdict {
     if let Check::Says { words } = check {
         return Verdict::of(says(outcome, words), || "nothing says so".to_string());
@@ -26,7 +26,7 @@ pub fn verdict(check: &Check, outcome: &Outcome) -> Verdict {
 fn says(outcome: &Outcome, words: &[String]) -> bool {
     let notes = outcome.stored.iter().flat_map(|stored| &stored.notes);
     let notes = notes.map(|(about, note)| format!("{about} {note}"));
-    // A message may go on in further lines, which are indented.
+    // Continuation lines of a message are indented.
     let messages = outcome.said.replace("\n  ", " ");
     let mut lines = messages.lines().map(str::to_string).chain(notes).map(|line| line.to_lowercase());
     lines.any(|line| words.iter().all(|word| line.contains(&word.to_lowercase())))
@@ -72,7 +72,7 @@ impl Found<'_> {
         }
     }
 
-    /// Branches of that name and those switched to from there; all where none is named.
+    /// The branch of that name and all branches switched to from it; every branch if no name is given.
     fn branches<'b>(&'b self, name: &'b Option<String>) -> impl Iterator<Item = &'b Branch> {
         self.diagram.branches.iter().filter(move |branch| {
             name.as_ref().is_none_or(|name| {
@@ -96,7 +96,7 @@ impl Found<'_> {
         self.distance(special, at) <= 1.0
     }
 
-    /// Largest distance from the values, as a multiple of what is allowed.
+    /// Largest deviation from the expected values, as a multiple of the permitted one.
     fn distance(&self, special: &SpecialPoint, at: &At) -> f64 {
         let far = |(name, [value, within]): (&String, &[f64; 2])| match special_quantity(self.model, special, name) {
             Some(found) if !found.is_nan() => (found - value).abs() / within,
@@ -179,8 +179,9 @@ impl Found<'_> {
         Verdict::of(other.is_none(), || other.map_or(String::new(), |p| format!("{} unstable at one", p.unstable)))
     }
 
-    /// Equilibria where the parameter has that value, by linear interpolation, those that differ by signs of states counted once.
+    /// Number of equilibria at a parameter value, by linear interpolation between points; those that differ only by signs of states count once.
     fn solutions(&self, parameter: &str, value: f64) -> usize {
+        /// Relative difference below which equilibria are the same. Empirical: larger than the error of linear interpolation.
         const SAME: f64 = 1e-3;
         let states = self.model.states.len();
         let at = |p: &Point| quantity(self.model, p, parameter).unwrap_or(f64::NAN) - value;

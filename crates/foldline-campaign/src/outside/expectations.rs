@@ -1,11 +1,11 @@
-//! What is right about a problem: `expected.toml` beside its model and its studies.
+//! Expected results of a problem: `expected.toml` beside its model and its studies.
 
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-/// Seconds of processor time that a run may take unless it says otherwise.
+/// Default limit on the processor time of a run, in seconds. A factor of safety over what a run usually takes.
 const SECONDS: u64 = 60;
 
 /// A problem.
@@ -18,34 +18,34 @@ pub struct Problem {
     /// The folder.
     #[serde(skip)]
     pub folder: PathBuf,
-    /// What was asked.
+    /// The question.
     pub question: String,
-    /// Who asked, or posed it.
+    /// Source of the problem.
     pub source: String,
     /// Studies to run.
     #[serde(rename = "run")]
     pub runs: Vec<Run>,
 }
 
-/// A study, and what is right about it.
+/// A study, with its expected results.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Run {
-    /// The study file; or that of a model, for a command that takes one.
+    /// The study file, or the model file for a command that takes one.
     pub file: String,
-    /// Arguments of the command after the file, and before it the command if that is not `run`.
+    /// Subcommand, `run` by default, then its arguments after the file.
     #[serde(default = "run_itself")]
     pub command: Vec<String>,
-    /// Seconds of processor time within which it ends.
+    /// Limit on the processor time, in seconds.
     #[serde(default = "seconds")]
     pub seconds: u64,
-    /// Exit codes that are right: done, or done with something short that is told.
+    /// Permitted exit codes; by default done (0) or ended short (3).
     #[serde(default = "done_or_short")]
     pub exit: Vec<i32>,
-    /// True if it is right today and takes about a second.
+    /// True if every check passes and the run takes about a second.
     #[serde(default)]
     pub quick: bool,
-    /// Single right values.
+    /// Expected values.
     #[serde(default)]
     pub right: Vec<Right>,
 }
@@ -62,25 +62,25 @@ fn done_or_short() -> Vec<i32> {
     vec![0, 3]
 }
 
-/// A right value and how it is known.
+/// An expected value and its source.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Right {
-    /// What must hold.
+    /// The check.
     pub check: Check,
-    /// How it is known.
+    /// Source of the value.
     pub source: String,
 }
 
-/// Quantities, each with its value and the distance from it that is allowed.
+/// Quantities, each with its value and the permitted deviation.
 pub type At = BTreeMap<String, [f64; 2]>;
 
-/// What must hold. `branch` limits it to one branch and what was switched to from there by the name's beginning.
+/// A check. `branch` restricts it to one branch and the branches switched to from it, whose names begin with that of the branch.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 #[allow(missing_docs)] // the fields are what the sentence of the variant says
 pub enum Check {
-    /// A special point of that kind has these values, and the unstable count has these two values on its sides.
+    /// A special point of that kind has these values, with the two given unstable counts on its sides.
     Special {
         kind: String,
         branch: Option<String>,
@@ -95,7 +95,7 @@ pub enum Check {
         #[serde(default)]
         at: At,
     },
-    /// So many special points of that kind, the bounds included.
+    /// The number of special points of that kind lies between the bounds, inclusive.
     Count { kind: String, branch: Option<String>, between: [usize; 2] },
     /// Some point, special or not, has these values.
     Point { branch: Option<String>, at: At },
@@ -106,21 +106,21 @@ pub enum Check {
         #[serde(default)]
         at: At,
     },
-    /// Both sides of one branch joined, at these values of its parameter.
+    /// Both sides of one branch join others at special points of that kind, at these parameter values.
     Joins { kind: String, between: [f64; 2], within: f64 },
-    /// Points with the quantity in the range exist, and have that many unstable eigenvalues or multipliers.
+    /// Points with the quantity in the range exist, and all have the given number of unstable eigenvalues or multipliers.
     Unstable { branch: Option<String>, of: String, range: [f64; 2], is: usize },
-    /// So many solutions where the parameter has that value, those that differ by signs of states counted once.
+    /// Number of solutions at that parameter value; those that differ only by signs of states count once.
     Solutions { parameter: String, value: f64, is: usize },
-    /// So many branches have a point with these values.
+    /// Number of branches that have a point with these values.
     Branches { at: At, is: usize },
-    /// No branch has more points.
+    /// Largest number of points of any branch.
     Points { branch: Option<String>, most: usize },
-    /// The responses of surveys and sweeps are of these motions only, in at least that share of all starts.
+    /// At least that share of all starts of surveys and sweeps settle to one of these motions.
     Settles { set: Option<String>, motions: Vec<String>, share: f64 },
     /// A response of a survey or sweep has these values.
     Response { at: At, motion: String },
-    /// A line of output or notes has all these words.
+    /// One line of the output or notes contains all these words.
     Says { words: Vec<String> },
 }
 
@@ -135,7 +135,7 @@ impl Problem {
         Ok(problem)
     }
 
-    /// Reads every problem in a folder, by name.
+    /// Reads every problem in a folder, sorted by name.
     pub fn all(folder: &Path) -> Result<Vec<Problem>, String> {
         let entries = std::fs::read_dir(folder).map_err(|error| format!("{}: {error}", folder.display()))?;
         let mut folders: Vec<PathBuf> =
@@ -146,7 +146,7 @@ impl Problem {
 }
 
 impl Run {
-    /// Name in the report: the file without its ending, and the command where it is another one.
+    /// Name in the report: the file without extension, followed by the command unless that is `run`.
     pub fn name(&self) -> String {
         let stem = self.file.trim_end_matches(".toml").to_string();
         if self.is_a_study() { stem } else { format!("{stem} ({})", self.command.join(" ")) }

@@ -1,16 +1,16 @@
-//! Problems of others, with right values from elsewhere: what `cargo xtask outside` runs.
+//! External problems with independently known results, run by `cargo xtask outside`.
 //!
-//! **Idea.** Every folder of `outside` holds a problem that somebody else posed (a question in another program's repository, a demo, a
-//! paper, a first try of a new user) and what is right about it, from closed forms, publications or independent computations. Each
-//! study is run by the command itself, in a process of its own with a limit on its time, and what it stored is compared.
+//! **Idea.** Every folder of `outside` holds a problem from elsewhere (a question in another program's repository, a demo, a paper, the
+//! first attempt of a new user) and its expected results, from closed forms, publications or independent computations. Each study
+//! is run by the command in a separate process with a time limit, and the stored results are compared.
 //!
 //! | question | file |
 //! |---|---|
-//! | what is right? | [`expectations`] |
+//! | what is expected? | [`expectations`] |
 //! | how is a study run? | [`running`], [`command`] |
 //! | what is the value of a quantity at a point? | [`quantities`] |
-//! | is it what is right? | [`checking`] |
-//! | what holds for every run? | [`always`] |
+//! | do the results agree? | [`checking`] |
+//! | what is checked for every run? | [`always`] |
 //! | what is reported? | [`reporting`] |
 
 pub mod always;
@@ -31,7 +31,7 @@ pub fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("outside")
 }
 
-/// Runs one study of a problem and judges it.
+/// Runs one study of a problem and evaluates its checks.
 pub fn judged(problem: &Problem, run: &Run, program: &Program) -> Vec<Line> {
     let outcome = program.run(problem, run);
     let line =

@@ -1,4 +1,4 @@
-//! The value of a quantity at a point, by its name.
+//! Values of quantities at a point, by name.
 
 use foldline::diagram::{Point, SpecialPoint};
 use foldline::model::Model;
@@ -26,7 +26,7 @@ pub fn quantity(model: &Model, point: &Point, name: &str) -> Option<f64> {
         _ => (name, "max"),
     };
     let names = model.states.iter().map(|s| &s.name).chain(model.outputs.iter().map(|o| &o.name));
-    // An output with the name of a state counts first: it is what tables show.
+    // An output with the name of a state takes precedence, as in tables.
     let index = names.enumerate().filter(|(_, known)| *known == bare).map(|(k, _)| k).last()?;
     let range = point.ranges.get(index);
     let average = point.averages.get(index);
@@ -38,7 +38,7 @@ pub fn quantity(model: &Model, point: &Point, name: &str) -> Option<f64> {
     }
 }
 
-/// Value of `name` at a special point: besides the above, `nf.NAME` for a coefficient of the normal form.
+/// Value of `name` at a special point: a [`quantity`], or `nf.NAME` for a coefficient of the normal form.
 pub fn special_quantity(model: &Model, special: &SpecialPoint, name: &str) -> Option<f64> {
     match name.strip_prefix("nf.") {
         Some(coefficient) => {

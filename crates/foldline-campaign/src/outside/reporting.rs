@@ -1,19 +1,19 @@
-//! What is reported: a line for each check, and a table with a row for each problem.
+//! The report: one line per check, and a table with one row per problem.
 
 use super::expectations::Problem;
 use std::fmt::Write;
 
-/// Whether a check holds, and if not, what was found.
+/// Verdict on a check.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Verdict {
-    /// It holds.
+    /// The check passes.
     Right,
-    /// It does not.
+    /// The check fails; the text says what was found instead.
     Wrong(String),
 }
 
 impl Verdict {
-    /// Right, or wrong with what `why` says.
+    /// `Right`, or `Wrong` with the text of `why`.
     pub fn of(right: bool, why: impl FnOnce() -> String) -> Verdict {
         if right { Verdict::Right } else { Verdict::Wrong(why()) }
     }
@@ -26,13 +26,13 @@ pub struct Line {
     pub problem: String,
     /// The study.
     pub run: String,
-    /// What must hold.
+    /// Text of the check.
     pub check: String,
-    /// If it does.
+    /// Its verdict.
     pub verdict: Verdict,
 }
 
-/// Every line, wrong ones with what was found.
+/// All lines as text, failed checks with what was found.
 pub fn text(lines: &[Line]) -> String {
     let mut out = String::new();
     for Line { problem, run, check, verdict } in lines {
@@ -44,13 +44,13 @@ pub fn text(lines: &[Line]) -> String {
     out
 }
 
-/// Right and all checks of a problem in a text that [`text`] wrote.
+/// Number of passed checks, and of all checks, of a problem in the output of [`text`].
 pub fn counts(text: &str, problem: &str) -> [usize; 2] {
     let own = text.lines().filter(|line| line.get(7..).is_some_and(|rest| rest.starts_with(&format!("{problem}/"))));
     own.fold([0, 0], |[right, all], line| [right + usize::from(line.starts_with("right")), all + 1])
 }
 
-/// Markdown table: one row a problem, right values before (a text of an earlier version) and now.
+/// Markdown table with one row per problem: checks passed before (by the output of an earlier version) and now.
 pub fn table(problems: &[Problem], before: &str, now: &str) -> String {
     let mut out =
         "| problem | source | checks | right before | right now |\n| --- | --- | ---: | ---: | ---: |\n".to_string();
@@ -65,7 +65,7 @@ pub fn table(problems: &[Problem], before: &str, now: &str) -> String {
     out
 }
 
-/// Replaces what stands between the markers in a page; `None` if they are not there.
+/// Replaces the text between the markers of a page; `None` if the page has no markers.
 pub fn placed(page: &str, table: &str) -> Option<String> {
     const BEGIN: &str = "<!-- outside: begin -->";
     const END: &str = "<!-- outside: end -->";

@@ -1,4 +1,4 @@
-//! What a run left, and how a study is run in this process. [`super::command`] runs it by the command.
+//! Results of a run, and runs within this process; see [`super::command`] for runs of the command.
 
 use super::command::Command;
 use super::expectations::{Problem, Run};
@@ -11,7 +11,7 @@ use foldline_store::study_file::{Study, read_study};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Mutex, PoisonError};
 
-/// What runs a study.
+/// The program that runs a study.
 #[derive(Clone, Debug)]
 pub enum Program {
     /// The command, in a process of its own.
@@ -20,45 +20,45 @@ pub enum Program {
     Library,
 }
 
-/// How a run ended.
+/// End of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum End {
-    /// By itself, with this exit code.
+    /// Exit with this code.
     Code(i32),
-    /// It was ended when its time was over.
+    /// Killed at the time limit.
     OutOfTime,
-    /// By a panic or a signal, or it could not be started.
+    /// Panic, signal or failure to start.
     Crashed,
 }
 
-/// What a run left.
+/// Outcome of a run.
 #[derive(Debug)]
 pub struct Outcome {
-    /// How it ended.
+    /// End of the run.
     pub end: End,
     /// Standard output and standard error.
     pub said: String,
-    /// What it found, however it ended.
+    /// Results stored by then, however the run ended.
     pub stored: Option<Stored>,
 }
 
-/// What a run found.
+/// Results of a run.
 #[derive(Debug)]
 pub struct Stored {
     /// Branches and responses.
     pub diagram: Diagram,
-    /// Remarks: what each is about, and the remark.
+    /// Remarks, each with its subject.
     pub notes: Vec<(String, String)>,
     /// The model.
     pub model: Model,
-    /// Names of the branches and curves that the study asks for.
+    /// Names of the branches and curves that the study requests.
     pub asked: Vec<String>,
-    /// Names of its homotopies, whose legs may turn back on the way.
+    /// Names of its homotopies, whose legs may turn back.
     pub homotopies: Vec<String>,
 }
 
 impl Stored {
-    /// What a run of that study found.
+    /// Results of a run of `study`.
     pub fn new(study: Study, diagram: Diagram, notes: Vec<(String, String)>) -> Stored {
         let (branches, curves) = (study.plan.branches.iter(), study.plan.curves.iter());
         let asked = branches.map(|b| b.name.clone()).chain(curves.map(|c| c.name.clone())).collect();
@@ -90,7 +90,7 @@ impl Observer for Notes {
     }
 }
 
-/// As `foldline run`, whose exit codes these are.
+/// Runs a study like `foldline run`, with the same exit codes.
 fn in_process(problem: &Problem, run: &Run) -> Outcome {
     let study = match read_study(&problem.folder.join(&run.file)) {
         Ok(study) => study,

@@ -5,7 +5,7 @@ use foldline::diagram::{Branch, Cost, Diagram, Origin, Point};
 use foldline::model::Model;
 use foldline::special::quantity::Quantity;
 
-/// Most coefficients that a normal form has.
+/// Largest number of coefficients of a normal form: that of a double Hopf point.
 const COEFFICIENTS: usize = 6;
 
 /// branch, kind, every parameter, period, NAME_max of every output, unstable_before, unstable_after, error, normal_form, and every coefficient

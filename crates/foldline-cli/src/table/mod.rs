@@ -77,7 +77,7 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
     Ok(Outcome::Done)
 }
 
-/// Says on standard error what was not reached; returns whether that is nothing.
+/// Prints what was not reached on standard error; returns true if everything was.
 pub fn tell_short(diagram: &Diagram, plan: &Plan, model: &Model) -> std::io::Result<bool> {
     let lines = short::lines(diagram, plan, model);
     let mut err = stderr().lock();

@@ -50,7 +50,7 @@ const FORCED_NUMBERS: &str = ", forcing_periods";
 /// Likewise, since format 7.
 const AVERAGES: &str = ", average_bytes";
 const OF_SPECIAL: &str = "kind, unstable_before, unstable_after";
-/// Likewise, of special points since format 8.
+/// Columns of special points since format 8.
 const COEFFICIENT_ERRORS: &str = ", coefficient_count, normal_form_remark";
 
 /// Reads the run in `folder`, which may still be growing.
@@ -234,7 +234,7 @@ pub(super) fn load_diagram(connection: &Connection, path: &Path, part: Part) -> 
     Ok(diagram)
 }
 
-/// What was not reached; files of earlier programs do not say.
+/// Requests that were not fulfilled; none in files of earlier programs.
 fn shortfalls(connection: &Connection, path: &Path) -> Result<Vec<Shortfall>, RunFileError> {
     let sql = "SELECT name FROM sqlite_master WHERE type = 'table' AND name = 'shortfalls'";
     if read(connection, path, sql, &[], |_| Ok(()))?.is_empty() {
@@ -269,7 +269,7 @@ pub(super) fn special_in(row: &Row) -> Result<SpecialPoint, String> {
     let count = |name: &str| {
         row.get::<_, i64>(name).ok().and_then(|n| usize::try_from(n).ok()).ok_or_else(|| format!("{name} is no count"))
     };
-    // Rows of versions before 8 have coefficients without errors.
+    // Rows of formats before 8 have coefficients without errors.
     let later = |name: &str| match row.get::<_, Option<i64>>(name) {
         Err(rusqlite::Error::InvalidColumnName(_)) => Ok(None),
         other => other.map_err(|e| e.to_string()),

@@ -1,7 +1,7 @@
-//! What surveys and sweeps saw, as rows, and back.
+//! Results of surveys and sweeps as rows.
 //!
-//! **Idea.** A set is written when it is complete, in one transaction. Files of earlier programs lack the tables, or columns that
-//! came later; they are made when such a run goes on, and a reader that finds none reads no responses, or empty columns.
+//! **Idea.** A set is written when it is complete, in one transaction. Files of earlier programs lack the tables or some columns;
+//! these are added when such a run is resumed, and a reader treats missing tables and columns as empty.
 
 use super::RunFileError;
 use super::bytes::{pack, pack_pairs, unpack, unpack_pairs};
@@ -29,7 +29,7 @@ const FIRST: [&str; 15] = [
     "jumped",
     "rowid",
 ];
-/// Columns that came later, all of them integers or empty.
+/// Columns added later: integers or NULL.
 const LATER: [&str; 3] = ["uniform_hits", "uniform_starts", "jumped"];
 const LAST: [&str; 4] = ["parameter_bytes", "state_bytes", "range_bytes", "scalar_bytes"];
 
@@ -37,7 +37,7 @@ fn columns(model: &Model) -> Columns {
     Columns::beside(model, &FIRST.into_iter().chain(LAST).collect::<Vec<_>>())
 }
 
-/// Makes the tables, and the columns that came later, where they are missing.
+/// Creates missing tables and missing columns.
 pub(super) fn create(connection: &Connection, model: &Model) -> rusqlite::Result<()> {
     connection.execute_batch(&tables(model))?;
     let mut statement = connection.prepare("SELECT name FROM pragma_table_info('responses')")?;

@@ -232,7 +232,7 @@ pub(super) fn ending_values(ending: &Ending) -> [Value; 4] {
             (None, None, None, Some(*value))
         }
         Ending::Joined { at, parameter } => (None, Some(*at), None, Some(*parameter)),
-        // The period to the last bit as well.
+        // The text of the period is exact to the last bit.
         Ending::Connecting { parameter, period, to, .. } => {
             (Some(format!("{period:?} {to}")), None, None, Some(*parameter))
         }

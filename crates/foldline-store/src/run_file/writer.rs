@@ -69,7 +69,7 @@ const LOG: i64 = 4 << 20;
 /// Events between two looks whether the file is still where it was.
 const LOOKS: usize = 16;
 
-/// What was not reached. A run that goes on finds out anew what is out of its reach.
+/// The table of requests that were not fulfilled. A resumed run determines them anew.
 const SHORTFALLS: &str =
     "CREATE TABLE IF NOT EXISTS shortfalls (about TEXT NOT NULL, what TEXT NOT NULL, UNIQUE (about, what));
      DELETE FROM shortfalls;";

@@ -153,7 +153,7 @@ pub(super) fn range(walk: &mut Walk, value: &Value) -> Option<[f64; 2]> {
     Some([low, high])
 }
 
-/// What `mark` and `stop` of a table say.
+/// Reads `mark` and `stop` of a table.
 pub(super) fn marks(walk: &mut Walk, table: &DeTable, model: &Model) -> Vec<Mark> {
     let mut marks = values(walk, table.get("mark"), "`mark`", false, model);
     marks.extend(values(walk, table.get("stop"), "`stop`", true, model));

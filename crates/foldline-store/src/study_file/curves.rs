@@ -46,7 +46,7 @@ pub(super) fn read(
     let table = item.table;
     walk.only(table, &KEYS, "a curve");
     let base = base(walk, item, ground, all);
-    // A forced model has no equilibria.
+    // Solutions of a forced model are cycles.
     let forced = ground.model.forced().then_some(Family::Cycle);
     let hold = hold(walk, item, forced.or(base.as_ref().and_then(|base| base.family)));
     let first = base.as_ref().map(|base| ground.model.parameters[base.plan.free].name.clone());

@@ -20,8 +20,8 @@ const SAME: f64 = 1e-4;
 /// Receives the responses at one value as soon as they are known.
 pub type Report<'a> = &'a (dyn Fn(&[Response]) -> Verdict + Sync);
 
-/// Says whether a motion of a sweep, at the parameter values `[k]`, is another solution than the one before; `None` where
-/// that is not known, as with a motion that is neither at rest nor periodic, for which there is no candidate.
+/// Compares a motion of a sweep, at the parameter values `[k]`, with the one before: `Some(true)` if it is a different solution,
+/// `None` if that is not known, for example because the motion is neither at rest nor periodic and so has no candidate.
 pub type Compare<'a> = &'a mut dyn FnMut(&[f64], Option<&Candidate>) -> Option<bool>;
 
 /// The motions at every one of `values` of the parameter `free`, the others as in `parameters` `[k]`, from the starts of
@@ -122,8 +122,8 @@ fn agree(trial: &Trial, a: &Response, b: &Response) -> bool {
 }
 
 /// A stepped sweep: the motion to which the trajectory from `start` `[n]` settles at the first of `values`, then at each next
-/// value the one to which it settles from its last state. It ends early with a motion that escaped, or where a report says stop.
-/// `compare` tells jumps from steep slopes.
+/// value the one to which it settles from its last state. The sweep ends early at a motion that escapes, or when `report` asks
+/// to stop. `compare` distinguishes jumps from steep slopes.
 pub fn stepped_sweep(
     trial: &Trial,
     parameters: &[f64],

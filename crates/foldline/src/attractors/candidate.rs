@@ -1,7 +1,7 @@
 //! From a prediction to a solution.
 //!
-//! **Idea.** A predicted limit of the returns is followed for one period; where it comes back to itself much better than the
-//! trajectory does, the loop is handed to Newton's method.
+//! **Idea.** A predicted limit of the returns is integrated over one period. If it closes much better than the trajectory does,
+//! Newton's method starts from that loop.
 
 use super::orbit::Orbit;
 use super::returns::{Prediction, Returns};

@@ -34,7 +34,7 @@ const ROUND: usize = 4;
 /// Steps after which a trajectory counts as unsettled: some thousand periods.
 pub(crate) const STEP_LIMIT: usize = 60_000;
 
-/// What became of one trajectory.
+/// Outcome of one trajectory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Fate {
     /// It went to the solution of that index.
@@ -45,7 +45,7 @@ enum Fate {
     Undefined,
     /// Its steps became too small.
     Stuck,
-    /// Nobody waited for it.
+    /// Abandoned early.
     Left,
 }
 
@@ -53,7 +53,7 @@ enum Fate {
 struct Reached {
     orbit: Orbit,
     hits: usize,
-    /// Those of them that are distributed uniformly.
+    /// Number of uniformly distributed samples among them.
     uniform: usize,
     /// Number of the first of them.
     first: usize,
@@ -139,7 +139,7 @@ fn add(watched: Watched, first: usize, reached: &mut Vec<Reached>, census: &mut 
             }
             Fate::Unsettled => census.unsettled += 1,
             Fate::Escaped => census.escaped += 1,
-            // Told by their places.
+            // Counted in `exits`.
             Fate::Undefined => {}
             Fate::Stuck => census.stuck += 1,
             Fate::Left => census.left += 1,
@@ -147,27 +147,26 @@ fn add(watched: Watched, first: usize, reached: &mut Vec<Reached>, census: &mut 
     }
 }
 
-/// What became of a trajectory that led to no attractor.
+/// Outcome of a trajectory that led to no attractor.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Lost {
-    /// It ran on without coming to anything.
+    /// It did not settle within the limit on the number of steps.
     Unsettled {
-        /// How long it was followed, in the time of the model.
+        /// Integration time, in the time units of the model.
         time: f64,
         /// `[n]` extent of its motion at the end.
         extent: Vec<f64>,
         /// `[n]` its last state.
         state: Vec<f64>,
     },
-    /// It settled to a motion that Newton's method does not confirm as an isolated, stable solution. The period of the motion is 0 if
-    /// it is one of rest.
+    /// It settled to a motion that Newton's method does not confirm as an isolated, stable solution.
     Unconfirmed {
-        /// In the time of the model.
+        /// Period in the time units of the model; 0 for a state of rest.
         period: f64,
         /// `[n]` a state of the motion.
         state: Vec<f64>,
     },
-    /// It left every bound.
+    /// A state grew without bound.
     Escaped,
     /// It left the region in which f is defined.
     Undefined(Exit),
@@ -176,7 +175,7 @@ pub enum Lost {
 }
 
 impl Lost {
-    /// A trajectory that was not followed.
+    /// Outcome of a trajectory that was not integrated.
     fn nothing(start: &[f64]) -> Lost {
         Lost::Unsettled { time: 0.0, extent: vec![0.0; start.len()], state: start.to_vec() }
     }
@@ -259,9 +258,9 @@ struct Watched {
     /// The solutions known before, then those found here.
     orbits: Vec<Orbit>,
     fates: Vec<Fate>,
-    /// Of the trajectories that left the region in which f is defined.
+    /// Exits of the trajectories that left the region in which f is defined.
     exits: Vec<Exit>,
-    /// Whether everything has been found.
+    /// True if everything that was asked for has been found.
     ended: bool,
 }
 

@@ -194,7 +194,7 @@ fn without(response: &Response, field: &dyn VectorField) -> Response {
     plain
 }
 
-/// A cycle in states with the circle as one without, from the beginning of a period of the forcing on.
+/// Removes the two states of the circle from a cycle, which then starts at the beginning of a forcing period.
 pub(super) fn without_circle(candidate: &Candidate, n: usize) -> Option<Candidate> {
     let Candidate::Cycle { period, times, states } = candidate else { return None };
     let whole = period.round();
@@ -253,7 +253,7 @@ fn bare(point: &mut Point, n: usize, unit: f64) {
     without_ranges_of_circle(&mut point.ranges, n);
 }
 
-/// Of a motion that escaped no ranges are known.
+/// Removes the ranges of the two states of the circle; a motion that escaped has no ranges.
 fn without_ranges_of_circle(ranges: &mut Vec<[f64; 2]>, n: usize) {
     if ranges.len() >= n + 2 {
         ranges.drain(n..n + 2);

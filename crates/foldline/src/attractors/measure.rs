@@ -19,8 +19,8 @@ const SAMPLES: usize = 2048;
 /// Steps over which a motion that is neither at rest nor periodic is watched.
 const WATCHED: usize = 20_000;
 
-/// The response to which a trajectory settled, at the parameter values `parameters`, with one hit; and the motion itself, to be
-/// solved for, unless it is neither at rest nor periodic.
+/// The response to which a trajectory settled at the parameter values `parameters`, with one hit, and a starting point for
+/// Newton's method if the motion is at rest or periodic.
 pub(super) fn response(
     trial: &Trial,
     parameters: &[f64],
@@ -100,7 +100,7 @@ fn cycle(trial: &Trial, parameters: &[f64], settled: &Settled, response: &mut Re
     states.truncate(SAMPLES * n);
     response.ranges = ranges(trial, parameters, &states);
     let Some((period, state)) = back else {
-        // It does not come back: what looked settled is not.
+        // The trajectory does not return, so it had not settled.
         response.motion = Motion::Other;
         return None;
     };
@@ -145,7 +145,7 @@ fn sample(step: &Step, spacing: f64, states: &mut Vec<f64>, n: usize) {
     }
 }
 
-/// The motion goes on for a while, and its extremes are kept, unless it escapes after all.
+/// Extremes of a motion that is neither at rest nor periodic, over a further integration; none if it escapes.
 fn other(trial: &Trial, parameters: &[f64], response: &mut Response) {
     const PARTS: usize = 4;
     let n = trial.field.dim();

@@ -56,11 +56,11 @@ pub struct Attractor {
     pub point: Point,
     /// Spectral ratio of a cycle such as 2:1, where a whirl plane was named; see [`spectral_ratio`].
     pub ratio: Option<(u32, u32)>,
-    /// How many trajectories went there; 0 where its spectrum says that it attracts, and the survey ended before one did. Not a
-    /// share of a basin: every fourth trajectory starts nearer to the origin.
+    /// Number of trajectories that settled there; 0 if its spectrum shows that it attracts and the survey ended before any
+    /// trajectory reached it. Not a basin fraction: every fourth trajectory starts nearer to the origin.
     pub hits: usize,
-    /// The share of the trajectories from uniform initial states that went there; `None` where the survey ended before all had
-    /// been followed.
+    /// Estimated basin fraction, from the uniformly distributed initial states; `None` if the survey ended before every
+    /// trajectory had been integrated.
     pub share: Option<Share>,
     /// `[n]` initial state of the first of them, or where there is none a state of its own.
     pub example: Vec<f64>,
@@ -73,9 +73,9 @@ pub struct Census {
     pub attractors: Vec<Attractor>,
     /// Trajectories about which nothing could be said within the limit on the number of steps.
     pub unsettled: usize,
-    /// Trajectories whose state grew beyond every measure.
+    /// Number of trajectories whose state grew without bound.
     pub escaped: usize,
-    /// Trajectories that left the region in which f is defined, with the places where they did.
+    /// Exit points of the trajectories that left the region in which f is defined.
     pub exits: Vec<Exit>,
     /// Trajectories whose steps became too small: f jumps, or is too stiff for the method.
     pub stuck: usize,
@@ -83,7 +83,7 @@ pub struct Census {
     pub left: usize,
 }
 
-/// Where a trajectory left the region in which f is defined.
+/// Exit of a trajectory from the region in which f is defined.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Exit {
     /// Time since the start.
@@ -108,7 +108,7 @@ pub enum Candidate {
     },
 }
 
-/// Computes a candidate exactly, a cycle over its minimal period; `None` where that does not converge.
+/// Solves for a candidate by Newton's method, a cycle over its minimal period; `None` if that does not converge.
 pub type Polish<'a> = &'a (dyn Fn(&Candidate) -> Option<Point> + Sync);
 
 /// Says whether the attractors that count as reached so far (see [`survey_until`]), each with its spectral ratio, are all that is wanted.

@@ -18,9 +18,10 @@
 
 use crate::simulation::Step;
 
-/// Largest number of crossings per period that is looked for.
+/// Largest number of crossings per period that is looked for. Empirical: cycles with up to [`MOST_REPEATED`] crossings are found by
+/// following the trajectory until it repeats itself.
 const MOST_CROSSINGS: usize = 16;
-/// The same where a trajectory is followed until it repeats itself.
+/// Largest number of crossings per period for a trajectory that is followed until it repeats itself.
 const MOST_REPEATED: usize = 40;
 /// Largest m of (1).
 const MOST_TERMS: usize = 8;

@@ -3,8 +3,8 @@
 //! **Idea.** Every component's range is cut into as many strata as there are samples and every stratum is used once, in an
 //! order of its own for each component, so each range is covered evenly whatever the number of components. Every fourth
 //! sample is drawn towards the origin (or the point of the box nearest to it) by a random factor between 1 and 1/100, since
-//! small motions otherwise are rare in a high-dimensional box. The other three are distributed uniformly in the box; the
-//! share of a basin of attraction is that of them alone.
+//! small motions otherwise are rare in a high-dimensional box. The other three in four are distributed uniformly in the box;
+//! basin fractions are estimated from them alone.
 //!
 //! **Source.** mckay1979 (Latin hypercube); steele2014 (SplitMix64).
 
@@ -31,12 +31,12 @@ pub struct Sampling {
 const SHARE_NEAR_ORIGIN: usize = 4;
 
 impl Sampling {
-    /// Whether the initial state of that number is distributed uniformly in the box, rather than drawn towards the origin.
+    /// True if initial state `number` is distributed uniformly in the box rather than drawn towards the origin.
     pub fn is_uniform(number: usize) -> bool {
         number % SHARE_NEAR_ORIGIN != SHARE_NEAR_ORIGIN - 1
     }
 
-    /// How many initial states are distributed uniformly.
+    /// Number of initial states that are distributed uniformly.
     pub fn uniform(&self) -> usize {
         (0..self.samples).filter(|number| Sampling::is_uniform(*number)).count()
     }

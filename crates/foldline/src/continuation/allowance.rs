@@ -1,33 +1,35 @@
-//! How much work a side may take.
+//! Limit on the work of one side of a branch.
 //!
-//! **Idea.** Factorisations on a mesh are counted against an allowance that every accepted point renews in part. A place that is hard to pass may
-//! use up what easy points have left; a branch on which every point is hard ends. So the work of a side is bounded by the allowance and
-//! its number of points, whatever happens on it.
+//! **Idea.** Factorisations on a mesh are charged to an allowance, and every accepted point restores part of it. A few hard points may
+//! use what easy points have left over; a branch on which every point is hard ends. The work of a side is therefore bounded by the
+//! allowance and the number of points.
 //!
-//! Next to this, changes of stability without explanation at one point after the other end a side as well: where multipliers lie on
-//! the unit circle for all solutions, rounding changes their count, and nothing that is found there means anything.
+//! A side also ends after several consecutive points with unexplained changes of stability. If multipliers lie on the unit circle
+//! along the whole branch, rounding changes the number of unstable ones, and special points found there are meaningless.
 
 use crate::diagram::{Ending, Mesh};
 
-/// Factorisations that one point may take when nothing was used before. From the longest step, 0.2, to the shortest, 1e-9, lead 28
-/// halvings. A step that fails late takes 8 Newton iterations and then some 30 for its mesh; that makes about 1100. Special points take 60
-/// to 200 each, and up to 14 cuts each to tell them apart: 14 · 200 more. This is twice the sum, rounded up. The hardest point of a completed
-/// branch among the problems of others had taken some 4800.
+/// Factorisations available to one point if none were used before. It takes 28 halvings to get from the longest step, 0.2, to the
+/// shortest, 1e-9. A step that fails late takes 8 Newton iterations and then some 30 factorisations for its mesh: about 1100 in all.
+/// Special points take 60 to 200 each, and up to 14 cuts of the step to separate them: 14 · 200 more. The limit is twice the sum,
+/// rounded up. The hardest point of a completed branch in `cargo xtask outside` took some 4800.
 pub(super) const ALLOWANCE: usize = 10_000;
-/// What an accepted point renews of it: as much as a special point on its step takes. A point without one takes 5 to 7.
+/// Factorisations that an accepted point restores: the cost of one special point on its step. A point without one costs 5 to 7.
 const RENEWED: usize = 200;
-/// Accepted steps in a row, each with a change of stability that nothing explains, until the side ends.
+/// Consecutive accepted steps with an unexplained change of stability after which the side ends. A factor of safety: isolated
+/// unexplained changes must not end a branch.
 const IN_A_ROW: usize = 10;
 
-/// Intervals of a mesh up to which a factorisation counts once; it takes time in proportion to them, and most cycles need fewer.
+/// Intervals per unit of work: a factorisation on a mesh of up to this size counts once, and its cost grows in proportion to the
+/// mesh. Most cycles need fewer intervals.
 const INTERVALS: usize = 1000;
 
-/// Factorisations on a mesh by their size. Without a mesh they cost next to nothing.
+/// Work of a number of factorisations on a mesh. Equilibria have no mesh, and their factorisations count nothing.
 pub(super) fn work(factorisations: usize, mesh: &Mesh) -> usize {
     factorisations * mesh.len().div_ceil(INTERVALS)
 }
 
-/// What is left of it.
+/// Remaining work of a side, and its consecutive unexplained changes of stability.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Allowance {
     left: usize,
@@ -39,37 +41,38 @@ impl Allowance {
         Allowance { left: ALLOWANCE, unexplained: 0 }
     }
 
-    /// True if a point that is still to be found has used it up.
+    /// True if the work spent on the point in progress exceeds the allowance.
     pub(super) fn is_used_up(&self, work: usize) -> bool {
         work > self.left
     }
 
-    /// Takes note of an accepted step up to `at`, which ends the side if it says why. `unexplained` says that stability changes on
-    /// it without explanation.
+    /// Records an accepted step to the parameter value `at`; returns the reason if the side ends there. `unexplained` is true if
+    /// stability changes on the step without explanation.
     pub(super) fn accepted(&mut self, unexplained: bool, work: usize, at: f64) -> Option<Ending> {
         self.unexplained = if unexplained { self.unexplained + 1 } else { 0 };
         if self.unexplained >= IN_A_ROW {
             return Some(Ending::GivenUp(format!(
                 "up to {at}, stability changes at {IN_A_ROW} points in a row without a special point that explains it\nlikely cause: \
                  multipliers that lie on the unit circle along the whole branch, as in a system with a conserved quantity\nwhat to do: \
-                 read the branch without its stability, or add what breaks the conservation"
+                 disregard the stability of this branch, or add a term that breaks the conservation"
             )));
         }
         if self.is_used_up(work) {
-            return Some(self.ending(at, work, "the point was found at last"));
+            return Some(self.ending(at, work, "the point converged in the end"));
         }
         self.left = (self.left - work + RENEWED).min(ALLOWANCE);
         None
     }
 
-    /// How a side ends that has used it up, next to `at`.
+    /// The end of a side whose allowance is used up near the parameter value `at`.
     pub(super) fn ending(&self, at: f64, work: usize, last: &str) -> Ending {
         let before = ALLOWANCE - self.left;
-        let also = if before > 0 { format!(", and those before it {before} more than usual") } else { String::new() };
+        let also =
+            if before > 0 { format!(", and the points before it {before} more than usual") } else { String::new() };
         Ending::GivenUp(format!(
-            "next to {at}, a point took the work of {work} factorisations{also}; {last}\nlikely cause: a place to which ever shorter steps or \
-             finer meshes lead, such as a homoclinic orbit, a canard or a cluster of special points\nwhat to do: end the range or `stop` \
-             before it; a larger tolerance passes it in longer steps"
+            "next to {at}, a point took the work of {work} factorisations{also}; {last}\nlikely cause: ever shorter steps or finer meshes are \
+             needed here, as near a homoclinic orbit, a canard or a cluster of special points\nwhat to do: end the range or `stop` \
+             before it; with a larger tolerance, longer steps may pass it"
         ))
     }
 }
@@ -86,7 +89,7 @@ mod tests {
         assert!(own.is_used_up(1001) && !own.is_used_up(1000));
         let Ending::GivenUp(text) = own.ending(1.5, 1001, "it failed") else { panic!() };
         assert!(text.starts_with(
-            "next to 1.5, a point took the work of 1001 factorisations, and those before it 9000 more than usual; it failed"
+            "next to 1.5, a point took the work of 1001 factorisations, and the points before it 9000 more than usual; it failed"
         ));
     }
 

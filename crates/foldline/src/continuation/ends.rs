@@ -136,10 +136,10 @@ impl Follow<'_> {
         (Some(ending), found)
     }
 
-    /// Whether the step passes the place where the branch meets simpler solutions. If so the step ends a little before it.
-    /// The place itself is not solved for: it is a branch point. Where the simpler solutions do not say where it lies, the deviation
-    /// from them, which grows like the square root of the distance in the parameter, gives the parameter there well enough to
-    /// recognise it.
+    /// Ends the step shortly before the point at which the branch meets simpler solutions, if the step passes such a point.
+    /// The point itself is not solved for, because it is a branch point. Its parameter value comes from the simpler solutions if
+    /// they determine it; otherwise it is extrapolated from the deviation from them, which grows like the square root of the
+    /// distance in the parameter. That is accurate enough to recognise the point.
     pub(super) fn collapsed(
         &mut self,
         left: &Station,
@@ -194,13 +194,15 @@ impl Follow<'_> {
         Ok(None)
     }
 
-    /// The meeting with simpler solutions next to which no step leads on: their own place is known, and the deviation from them shrinks as the root
-    /// of the distance from it.
-    pub(super) fn fades(&mut self, before: &Station, here: &Station) -> Option<Ending> {
+    /// The point, ahead of a step that fails, at which the branch meets simpler solutions. It is accepted if the simpler solutions
+    /// determine its parameter value and the deviation from them shrinks like the square root of the distance to it.
+    pub(super) fn collapse_ahead(&mut self, before: &Station, here: &Station) -> Option<Ending> {
+        /// Relative deviation from the square-root law that is accepted. Empirical: the law holds to first order only, and two
+        /// neighbouring points near the end are compared.
         const NEARLY: f64 = 0.3;
         self.collapses.iter().find_map(|monitor| {
             let parameter = monitor.meeting(&here.point)?;
-            // How much larger the deviation was at the point before.
+            // Ratio of the deviation at the point before to that here.
             let larger = monitor.value(&here.point, &before.point);
             let farther = (before.parameter() - parameter) / (here.parameter() - parameter);
             let fits = larger > 1.0 && (farther / (larger * larger) - 1.0).abs() < NEARLY;

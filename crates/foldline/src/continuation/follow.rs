@@ -30,13 +30,13 @@ pub struct Follow<'w> {
     pub settings: &'w Settings,
     /// What to look for.
     pub monitors: &'w [Box<dyn Monitor + 'w>],
-    /// Values that were asked for; they have no influence on anything else, but for where the branch ends.
+    /// Requested values; they affect nothing but where the branch ends.
     pub marks: &'w [Box<dyn Monitor + 'w>],
     /// Sign changes that end the branch: it has met the branch of simpler solutions that it comes from.
     pub collapses: &'w [Box<dyn Monitor + 'w>],
-    /// The orbit of infinite period to which the branch tends at a point, if the point shows one.
+    /// Returns the orbit of infinite period that the branch approaches, if the cycle at a point shows one.
     pub limit: &'w dyn Fn(&Point) -> Option<Ending>,
-    /// True if solutions come in families because of a continuous symmetry: a multiplier that is 1 within its error is so for that reason.
+    /// True if the model has a continuous symmetry, so that solutions form families and a further multiplier is 1.
     pub symmetric: bool,
     /// +1 towards larger positions, -1 towards smaller.
     pub direction: f64,
@@ -63,9 +63,11 @@ const CROSSING: f64 = 2e-3;
 
 /// Growth of a step over the one before, at most: the prediction is by the cubic through both ends of that.
 const GROWTH: f64 = 2.0;
-/// Growth of the period from which on the branch may tend to an orbit of infinite period …
+/// Growth of the period beyond which an orbit of infinite period is looked for. Empirical: it saves the search on ordinary branches and
+/// decides nothing, because the cycle itself must show the equilibria.
 const LONG: f64 = 3.0;
-/// … which is looked for whenever it has grown by this much more.
+/// Further growth of the period after which the search is repeated. A period grows like the logarithm of the distance to a homoclinic
+/// orbit, so a tenth more is a marked approach; the search costs one pass over the cycle.
 const AGAIN: f64 = 1.1;
 /// Change of the parameter, over so many equilibria, below which it has come to a stand.
 const REST: f64 = 1e-11;
@@ -155,7 +157,7 @@ pub fn follow(
                     let spent = work(cost.factorisations, &left.mesh);
                     let used_up = allowance.is_used_up(spent);
                     if step < walk.settings.min_step || coarse == COARSE || used_up {
-                        let met = before.as_ref().and_then(|before: &Station| walk.fades(before, &left));
+                        let met = before.as_ref().and_then(|before: &Station| walk.collapse_ahead(before, &left));
                         return match met.or_else(|| (walk.limit)(&left.point)) {
                             Some(end) => end,
                             None if used_up => {
@@ -186,7 +188,7 @@ pub fn follow(
         let strange = walk.settings.stability && is_unexplained(&found);
         let spent = work(cost.factorisations, &right.mesh);
         let used_up = allowance.accepted(strange, spent, right.parameter());
-        // As above: an orbit of infinite period is the reason where there is one.
+        // As above, an orbit of infinite period takes precedence as the reason.
         let end = end.or(used_up.map(|why| (walk.limit)(&right.point).unwrap_or(why)));
         for item in found {
             let verdict = match item {
@@ -235,7 +237,7 @@ pub fn follow(
         if let (Some(first), Some(now), Some(next)) = (first_period, right.point.solution.free_period(), long)
             && now > next
         {
-            // The place of a saddle-node is solved for; that of any other orbit is where the parameter comes to a stand.
+            // A saddle-node is solved for; any other orbit of infinite period lies where the parameter converges.
             let placed = |limit: &Ending| {
                 matches!(limit, Ending::Connecting { connection: Connection::SaddleNode, .. })
                     || !walk.moves(&left, &right)
@@ -267,7 +269,8 @@ impl Follow<'_> {
         }
     }
 
-    /// Leaves a multiplier that is 1 for a reason out of the count of unstable ones, whatever its error makes of it.
+    /// Excludes a multiplier that is 1 by structure (a family, a symmetry) from the number of unstable ones: its computed side of 1
+    /// is rounding.
     pub(super) fn count(&self, station: &mut Station) {
         if self.settings.stability && (self.symmetric || station.point.is_one_of_family()) {
             station.point.unstable = station.point.unstable_besides_neutral();
@@ -279,8 +282,8 @@ impl Follow<'_> {
         self.problem.anchor(&station.u);
     }
 
-    /// True if the parameter still moves where the period changes: dλ/d ln T, which tends to zero with the distance from an orbit of
-    /// infinite period, exceeds the tolerance.
+    /// True if the parameter still changes with the period: dλ/d ln T, which tends to zero towards an orbit of infinite period,
+    /// exceeds a tenth of the tolerance.
     fn moves(&self, left: &Station, right: &Station) -> bool {
         let period = |station: &Station| station.point.solution.free_period().unwrap_or(f64::NAN);
         let (change, here) = ((right.parameter() - left.parameter()).abs(), right.parameter().abs());

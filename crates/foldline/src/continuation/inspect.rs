@@ -3,8 +3,8 @@
 //! **Idea.** Every monitor whose sign differs at the two ends is located. The step is cut in two, and each half looked at
 //! in turn, while more than one special point is found in it, while the number of unstable multipliers changes by something
 //! that the special point found does not explain, or while a monitor bends so much that it may have touched zero and come
-//! back. What stays unexplained at the end of that is recorded as such: no silent change of stability. Marks are no part of this search:
-//! they are located last, on the pieces that it leaves ([`super::marks`]).
+//! back. A change of stability that remains unexplained is recorded as such, never passed over. Marks take no part in this search:
+//! they are located last, on the resulting pieces ([`super::marks`]).
 
 use super::allowance::{ALLOWANCE, work};
 use super::corrector::{Failure, Station, doubted, refine};
@@ -24,14 +24,14 @@ pub enum Found {
     Inserted(Box<Station>, f64),
 }
 
-/// What tells folds and branch points between two stations.
+/// Basis on which folds and branch points between two stations are detected.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Drift {
+enum FoldTest {
     /// The slope of the parameter along the branch, and the spectrum.
     Slope,
-    /// The spectrum alone: the slope is lost in rounding.
+    /// The spectrum alone, because the slope is lost in rounding.
     Spectrum,
-    /// Nothing: the parameter stands, and no multiplier passes 1.
+    /// None: the parameter does not change, and no multiplier passes 1.
     None,
 }
 
@@ -62,7 +62,7 @@ pub struct History {
     pub values: Vec<f64>,
     /// Values there, one per mark.
     pub marks: Vec<f64>,
-    /// True if the solution there is one of a family at one value of the parameter.
+    /// True if the solution there belongs to a family at a single parameter value (a vertical branch).
     pub stands: bool,
     /// Eigenvalues or multipliers there.
     pub spectrum: Vec<Complex64>,
@@ -74,29 +74,29 @@ impl Follow<'_> {
         self.monitors.iter().map(|m| m.value(&station.point, &station.point)).collect()
     }
 
-    /// What the change of the parameter says between two stations.
+    /// Selects the test for folds and branch points between two stations.
     ///
-    /// Where the parameter stands and a second multiplier is 1 within its error, as in a family at one value of the parameter, neither the
-    /// sign of that multiplier nor that of the slope means anything; of equilibria every one has an eigenvalue 0 there. Next to an orbit of infinite period the matrix is as
-    /// ill-conditioned as the multipliers are far apart, and rounding reaches farther: there a change of the parameter below the error of
-    /// both points means nothing either, as long as no multiplier comes near 1. In a canard explosion the slope is lost in errors and
-    /// rounding, and a multiplier passes 1 all the same: that is a fold, and the spectrum alone shows where.
+    /// On a vertical branch (a family at a single parameter value) a second multiplier is 1 within its error, and neither its side of 1
+    /// nor the sign of the slope is significant; equilibria have an eigenvalue 0 there. Near an orbit of infinite period the matrix is
+    /// as ill-conditioned as the multipliers are far apart, so rounding reaches further: a change of the parameter below the error of
+    /// both points is not significant either, as long as no multiplier comes near 1. In a canard explosion the slope is lost in
+    /// errors and rounding while a multiplier passes 1. That is a fold, and the spectrum alone locates it.
     ///
-    /// A step that leads out of such a family, as at the amplitude at which a stop is touched, or into it, has one end in it. `stands` says that the
-    /// step before lay in it.
-    fn drift(&self, [left, right]: [&Station; 2], length: f64, stands: bool) -> Drift {
+    /// A step that enters or leaves a vertical branch, for instance at the amplitude at which a stop is first touched, has one end in
+    /// the family. `stands` is true if the preceding step lay in it.
+    fn fold_test(&self, [left, right]: [&Station; 2], length: f64, stands: bool) -> FoldTest {
         let far = |station: &Station| station.point.free_spectrum().iter().all(|z| z.norm().ln().abs() > CRITICAL);
         let certain = left.point.unstable == right.point.unstable && far(left) && far(right);
         let slope = left.slope().abs().max(right.slope().abs());
         let unseen = UNSEEN * self.settings.tolerance;
         if left.mesh.is_empty() {
-            return if slope < STANDS { Drift::None } else { Drift::Slope };
+            return if slope < STANDS { FoldTest::None } else { FoldTest::Slope };
         }
         let family = stands && left.point.is_one_of_family() || right.point.is_one_of_family();
         if certain && slope * length.min(1.0) < unseen || family {
-            return Drift::None;
+            return FoldTest::None;
         }
-        if slope < STANDS.max(unseen) { Drift::Spectrum } else { Drift::Slope }
+        if slope < STANDS.max(unseen) { FoldTest::Spectrum } else { FoldTest::Slope }
     }
 
     /// Everything special between two stations.
@@ -121,8 +121,9 @@ impl Follow<'_> {
         }
         let right = carried.as_ref().unwrap_or(right);
         let (at_left, at_right) = (self.monitored(left), self.monitored(right));
-        let drift = self.drift([left, right], stretch.length.abs(), history.is_some_and(|before| before.stands));
-        let standing = drift == Drift::None;
+        let fold_test =
+            self.fold_test([left, right], stretch.length.abs(), history.is_some_and(|before| before.stands));
+        let standing = fold_test == FoldTest::None;
         let mut located: Vec<(Kind, usize, Located)> = Vec::new();
         let mut others: Vec<Option<usize>> = Vec::new();
         let (mut lost, mut leaps) = (false, false);
@@ -133,14 +134,14 @@ impl Follow<'_> {
                 && located.iter().any(|(kind, jump, _)| *kind == Kind::BranchPoint && *jump == 0);
             let without = match kind {
                 Kind::Fold => standing,
-                Kind::BranchPoint => drift != Drift::Slope,
+                Kind::BranchPoint => fold_test != FoldTest::Slope,
                 _ => false,
             };
             if pitchfork || without {
                 continue;
             }
             let own = &*self.monitors[k];
-            let by_spectrum = own.by_spectrum().filter(|_| drift == Drift::Spectrum);
+            let by_spectrum = own.by_spectrum().filter(|_| fold_test == FoldTest::Spectrum);
             let monitor = by_spectrum.as_deref().unwrap_or(own);
             let values = match &by_spectrum {
                 Some(other) => [left, right].map(|station| other.value(&left.point, &station.point)),
@@ -267,7 +268,7 @@ impl Follow<'_> {
         let known: Vec<(f64, Point)> =
             located.iter().map(|(.., found)| (found.distance, found.station.point.clone())).collect();
         let mut marks = self.marks_on(&stretch, right, history, &known, cost).into_iter().peekable();
-        if !explained && let Some(together) = self.simultaneous(&stretch, right, drift, cost) {
+        if !explained && let Some(together) = self.simultaneous(&stretch, right, fold_test, cost) {
             let count = left.point.unstable as i64;
             let mut out: Vec<Found> = Vec::new();
             for mark in marks {
@@ -305,10 +306,12 @@ impl Follow<'_> {
         out
     }
 
-    /// True if as many are unstable on both sides of a turn, close to it. A branch that leaves another at a pitchfork turns there, and an
-    /// eigenvalue touches zero and comes back: the place is no fold, at which the count changes, but a branch point, at which this branch
-    /// goes on.
+    /// True if the number of unstable eigenvalues or multipliers is the same on both sides of a turning point. A branch born at a
+    /// pitchfork turns there while an eigenvalue touches zero and returns, so the turning point is a branch point rather than a fold,
+    /// at which the number changes.
     fn is_vertex(&mut self, stretch: &Stretch, there: f64, cost: &mut Cost) -> bool {
+        /// Distance of the comparison points, as a share of the step. Empirical: far enough for the eigenvalue to exceed its error,
+        /// near enough to exclude other events.
         const BESIDE: f64 = 0.05;
         let room = there.abs().min((stretch.length - there).abs());
         let beside = (BESIDE * stretch.length.abs()).min(0.5 * room);
@@ -316,14 +319,14 @@ impl Follow<'_> {
         count(there - beside).is_some_and(|before| count(there + beside) == Some(before))
     }
 
-    /// Events that happen together, closer than anything tells apart, as what passes in different parts of a symmetric or a decoupled system:
-    /// what of each kind has become stable or unstable between two points that are one as far as their errors tell. A branch point counts once
-    /// however many eigenvalues pass there, which is the dimension of the kernel.
+    /// Simultaneous events, too close together to be separated, for instance in different parts of a symmetric or decoupled system.
+    /// Between two points that coincide within their errors, the eigenvalues or multipliers of each kind that have changed stability
+    /// are counted. A branch point counts once however many eigenvalues pass: their number is the dimension of the kernel.
     fn simultaneous(
         &mut self,
         stretch: &Stretch,
         right: &Station,
-        drift: Drift,
+        fold_test: FoldTest,
         cost: &mut Cost,
     ) -> Option<Vec<Found>> {
         let ends = self.narrowed(stretch, right, cost);
@@ -332,7 +335,7 @@ impl Follow<'_> {
         if !self.settings.stability || error > self.settings.tolerance {
             return None;
         }
-        let turns = drift == Drift::Spectrum || left.slope() * right.slope() < 0.0;
+        let turns = fold_test == FoldTest::Spectrum || left.slope() * right.slope() < 0.0;
         let mut passed: Vec<(Kind, i64, i64)> = Vec::new();
         for monitor in self.monitors {
             let (Some(before), Some(after)) = (monitor.passed(&left.point), monitor.passed(&right.point)) else {
@@ -349,7 +352,7 @@ impl Follow<'_> {
             }
         }
         let change: i64 = passed.iter().map(|(_, times, jump)| times * jump).sum();
-        // A pair that meets on the real axis off the unit circle is no event at all.
+        // A pair that meets on the real axis off the unit circle is not an event.
         let met = passed
             .iter()
             .any(|(_, times, jump)| *jump == 2 && passed.iter().any(|(_, other, own)| *own == 1 && times * other < 0));
@@ -369,7 +372,8 @@ impl Follow<'_> {
         Some(out)
     }
 
-    /// The ends of a stretch, moved to where the count of unstable ones changes, as close together as can be told apart.
+    /// Brackets the change in the number of unstable eigenvalues or multipliers on a stretch by bisection, as tightly as points can be
+    /// distinguished.
     fn narrowed(&mut self, stretch: &Stretch, right: &Station, cost: &mut Cost) -> [Station; 2] {
         let (mut ends, mut places) = ([stretch.left.clone(), right.clone()], [0.0, stretch.length]);
         let before = stretch.left.point.unstable;
@@ -382,8 +386,8 @@ impl Follow<'_> {
         ends
     }
 
-    /// Whether a branch of asymmetric solutions passes a symmetric one at `at` and goes on as its own mirror image: the point is
-    /// symmetric as far as its ranges tell, and both ends are less so. Along a branch of symmetric solutions all three are.
+    /// True if a branch of asymmetric solutions passes through a symmetric one at `at` and continues as its own mirror image: the
+    /// ranges of `at` are symmetric and those of both ends are less so. Along a branch of symmetric solutions all three are symmetric.
     fn is_mirrored(&self, ends: [&Station; 2], at: &Point) -> bool {
         let images = || self.settings.reflections.iter().filter(|r| r.contains(&true));
         let asymmetry = |point: &Point| {
@@ -540,12 +544,13 @@ fn stays_near(now: &[Complex64], then: &[Complex64], length: f64) -> bool {
     length.abs() > LONG && angles.is_some_and(|(now, then)| now + then < NEAR)
 }
 
-/// Change of the parameter along a step of at most length 1, in tolerances, that is lost in the errors of both ends.
+/// Change of the parameter along a step of length at most 1, in tolerances, that the errors of both ends can produce. Empirical: a share
+/// of the tolerance, which bounds the error of a point.
 const UNSEEN: f64 = 0.2;
-/// Logarithm of a multiplier from which on a whole step does not bring it to 1.
+/// Modulus of the logarithm of a multiplier beyond which one step does not bring it to 1: a factor of e³ = 20, a factor of safety.
 const CRITICAL: f64 = 3.0;
 
-/// Whether jumps of these sizes, each with either sign, lead from one count to the other.
+/// True if jumps of these sizes, each with either sign, lead from one count to the other.
 fn explains(jumps: &[usize], from: i64, to: i64) -> bool {
     let mut reachable = vec![from];
     for &jump in jumps {

@@ -285,7 +285,7 @@ pub fn locate(
     locate_within(problem, settings, stretch, [0.0, stretch.length], monitor, values, cost)
 }
 
-/// As [`locate`], between two distances along the stretch at which the monitor has those values.
+/// Locates a zero between two distances along the stretch at which the monitor has the given values; see [`locate`].
 ///
 /// # Errors
 /// See [`locate`].
@@ -316,16 +316,16 @@ pub(super) fn locate_within(
     // A change of sign without a zero: the two ends lie on different branches.
     let smallest = monitor.value(reference, &coarse.point).abs();
     let largest = values[0].abs().max(values[1].abs());
-    // (Of values that underflow only the sign is known.)
+    // (Only the sign of values that underflow is known.)
     if smallest > JUMP * largest && largest > f64::MIN_POSITIVE {
         return Err(Failure::Unexplained);
     }
     let mut floor = 10.0 * settings.newton_tolerance();
     let (mut tolerance, mut slope) = (0.3 * settings.tolerance, rise);
-    // (A branch that begins at a pitchfork turns where the matrix is singular.)
+    // (Excluded: a branch born at a pitchfork turns where the matrix is singular.)
     if coarse.mesh.is_empty() && !matches!(monitor.kind(), Kind::BranchPoint | Kind::Fold) {
-        (distance, coarse) = sharpened(problem, settings, stretch, monitor, (distance, coarse), cost);
-        floor = unsettled(problem, &coarse).unwrap_or(floor);
+        (distance, coarse) = secant_zero(problem, settings, stretch, monitor, (distance, coarse), cost);
+        floor = solution_error(problem, &coarse).unwrap_or(floor);
     }
     if !monitor.possible(&coarse.point) {
         return Ok(Located { distance, station: coarse, error: floor });
@@ -384,13 +384,13 @@ pub(super) fn locate_within(
     known.map(|(station, error)| Located { distance, station, error }).ok_or(Failure::NotFinite)
 }
 
-/// What vanishes at the zero of a monitor next to `near`: a factor of its value, where that has any.
+/// The factor of a monitor's value that vanishes next to `near`, or the value itself if it has no factors.
 fn vanishing(monitor: &dyn Monitor, stretch: &Stretch, near: &Point, at: &Point) -> f64 {
     monitor.factor(near, at).unwrap_or_else(|| monitor.value(&stretch.left.point, at))
 }
 
-/// The zero as closely as rounding lets it be found, by the secant method, where there is no mesh.
-fn sharpened(
+/// The zero of a monitor along a branch of equilibria, to rounding, by the secant method.
+fn secant_zero(
     problem: &mut dyn ZeroProblem,
     settings: &Settings,
     stretch: &Stretch,
@@ -398,8 +398,11 @@ fn sharpened(
     (distance, found): (f64, Station),
     cost: &mut Cost,
 ) -> (f64, Station) {
+    /// Most iterations. The secant method gains a factor of 1.6 in digits with each, so fewer than ten are needed; the rest is a
+    /// margin.
     const ROUNDS: usize = 12;
-    // So far from the zero the slope is free of rounding, and nearly that at the zero.
+    /// Distance of the first secant, as a share of the stretch: large enough for the difference of the values to exceed rounding
+    /// (1e-16), small enough for the slope to be that at the zero.
     const APART: f64 = 1e-6;
     let near = found.point.clone();
     let own = vanishing(monitor, stretch, &near, &near);
@@ -413,7 +416,7 @@ fn sharpened(
         if better {
             best = (b, value, there);
         }
-        // The first trial is for the slope; after it the values descend until they are rounding.
+        // The first trial yields the slope; the values then decrease until they are rounding.
         let inside = (0.0..=1.0).contains(&(next / stretch.length));
         if !inside || (round > 0 && !better) {
             break;
@@ -423,8 +426,9 @@ fn sharpened(
     (best.0, best.2)
 }
 
-/// What rounding leaves of the error of a solution, relative: one more update of Newton's method, and the spacing of numbers.
-fn unsettled(problem: &mut dyn ZeroProblem, found: &Station) -> Option<f64> {
+/// Relative error of a converged solution by rounding: one more Newton update plus the machine precision, times a factor of safety.
+fn solution_error(problem: &mut dyn ZeroProblem, found: &Station) -> Option<f64> {
+    /// A factor of safety: a single update samples the rounding error once.
     const SAFE: f64 = 10.0;
     let (mut r, mut du) = (vec![0.0; found.u.len()], vec![0.0; found.u.len()]);
     problem.anchor(&found.u);
@@ -437,8 +441,8 @@ fn unsettled(problem: &mut dyn ZeroProblem, found: &Station) -> Option<f64> {
     Some(SAFE * (problem.relative_size(&du, &found.u) + f64::EPSILON)).filter(|error| error.is_finite())
 }
 
-/// How far rounding may have moved the zero of a monitor, in parameter and states, relative: what vanishes there is a parabola so close by,
-/// and what it departs from one is rounding.
+/// Relative error, in parameter and states, of the zero of a monitor by rounding. So close to the zero the vanishing factor is a
+/// parabola to rounding, and the residual of a fitted parabola measures the noise.
 fn noise(
     problem: &mut dyn ZeroProblem,
     settings: &Settings,
@@ -464,7 +468,7 @@ fn noise(
     let bend = moment(&bent) / sum(&|x| bent(x) * bent(x));
     let fitted = |x: f64| mean + slope * x + bend * bent(x);
     let off = PLACES.iter().zip(&values).fold(0.0f64, |most, (x, v)| most.max((v - fitted(*x)).abs()));
-    // Where the parabola has its zero says as much as how far the values are off it.
+    // The zero of the fitted parabola is as informative as the residual of the fit.
     let shift = ((fitted(0.0) / slope).abs() + 2.0 * (off / slope).abs()) * NEAR * stretch.length.abs();
     let rate = found.slope().abs() / (1.0 + found.parameter().abs());
     let error = shift * rate.max(problem.relative_size(&found.tangent, &found.u));
@@ -661,7 +665,7 @@ fn chandrupatla<T>(
         };
         let margin = 0.1 * resolved * width / (b - a).abs();
         t = if t.is_finite() && margin < 0.5 { t.clamp(margin, 1.0 - margin) } else { 0.5 };
-        // What is left is rounding of the values at the ends.
+        // The remaining value is rounding of the values at the ends.
         if fx.abs() < 1e-14 * largest {
             break;
         }

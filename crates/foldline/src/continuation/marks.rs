@@ -1,11 +1,11 @@
-//! Marks: places at which a quantity has a value that was asked for.
+//! Marks: points at which a quantity has a requested value.
 //!
-//! **Idea.** A mark says where to look and nothing about the branch, so it must not change what is found there. Marks are located
-//! on the pieces that the search for special points leaves, and no step is cut on their account. Special points divide a piece:
-//! between two of them the parameter is monotonic, and a sign change of quantity minus value is a mark. A quantity that goes to its
-//! value and back within one piece shows that by the parabola through the last three points.
+//! **Idea.** A mark is a request for output and must not change what is found on the branch. Marks are therefore located on the
+//! pieces into which the search for special points has cut a step, and no step is cut for them. Special points divide a piece:
+//! between two of them the parameter is monotonic, and a sign change of quantity minus value is a mark. The parabola through the
+//! last three points reveals a quantity that reaches its value and returns within one piece.
 //!
-//! **Fails when** a quantity passes its value twice within one piece and neither a special point nor the parabola shows it.
+//! **Fails when** a quantity passes its value twice within one piece and neither a special point nor the parabola reveals it.
 
 use super::corrector::Station;
 use super::follow::Follow;
@@ -14,9 +14,11 @@ use super::locate::{Located, Stretch, discrepancy, locate_within};
 use crate::contract::{Monitor, Sight};
 use crate::diagram::{Cost, Point};
 
-/// Halvings of a bracket in which Newton's method does not get to the mark.
+/// Most bisections of a bracket in which Newton's method fails; 12 of them shorten it by a factor of 4000. Empirical: failures occur
+/// next to singular points, a small part of a step.
 const HALVINGS: usize = 12;
-/// Share of the larger value at the ends of a bracket that is left over where the quantity jumps across its value instead of passing it.
+/// Remaining value after all bisections, as a share of the larger value at the ends of the bracket, above which the quantity jumps across the
+/// requested value. A continuous quantity would be left with 2⁻¹², so the threshold is a factor of safety of 200.
 const JUMPS: f64 = 0.05;
 
 impl Follow<'_> {
@@ -25,8 +27,8 @@ impl Follow<'_> {
         self.marks.iter().map(|mark| mark.value(&station.point, &station.point)).collect()
     }
 
-    /// All marks on an accepted piece that ends at `right`, in the order of travel. `special` has the special points on it, by their
-    /// distance.
+    /// All marks on an accepted piece that ends at `right`, in the order of travel. `special` holds the special points on it with
+    /// their distances.
     pub(super) fn marks_on(
         &mut self,
         stretch: &Stretch,
@@ -43,7 +45,7 @@ impl Follow<'_> {
             let within = special.iter().map(|(distance, point)| (*distance, value(point)));
             let mut known: Vec<(f64, f64)> = [(0.0, first)].into_iter().chain(within).collect();
             known.retain(|(distance, value)| value.is_finite() && (0.0..stretch.length).contains(distance));
-            // A value that is met at the end of a piece, as at a bound, is there; at the beginning it was.
+            // A value met exactly at the end of a piece, as at a bound, counts; at the beginning it was counted before.
             if last == 0.0 && first != 0.0 && !found.iter().any(|other| other.distance == stretch.length) {
                 let error = 10.0 * self.settings.newton_tolerance();
                 found.push(Located { distance: stretch.length, station: right.clone(), error });
@@ -65,8 +67,8 @@ impl Follow<'_> {
         found
     }
 
-    /// The mark between two distances with values of opposite sign; `None` where the quantity jumps across its value. The bracket is
-    /// halved while Newton's method fails.
+    /// The mark between two distances with values of opposite sign; `None` if the quantity jumps across the requested value. The
+    /// bracket is bisected while Newton's method fails.
     fn mark_between(
         &mut self,
         stretch: &Stretch,
@@ -81,7 +83,7 @@ impl Follow<'_> {
             if let Ok(found) = locate_within(self.problem, self.settings, stretch, ends, mark, [low.1, high.1], cost) {
                 return Some(found);
             }
-            // Next to a singular point another share may do.
+            // Next to a singular point another division may succeed.
             let shares = [0.5, 0.43, 0.57].map(|share| low.0 + share * (high.0 - low.0));
             let (distance, there) = shares.into_iter().find_map(|s| {
                 let there = stretch.at(self.problem, self.settings, s, cost).ok()?;
@@ -94,7 +96,7 @@ impl Follow<'_> {
                 (low, seen[0]) = ((distance, value), Some(there));
             }
         }
-        // Closer than this it cannot be told: the nearer end, with the distance of the other as its error.
+        // No closer location is possible: the nearer end, with the distance to the other as its error.
         let [below, above] = seen;
         let (below, above) = (below?, above?);
         let gap = below.parameter() - above.parameter();
@@ -109,9 +111,11 @@ fn differ(a: f64, b: f64) -> bool {
     (a > 0.0) != (b > 0.0)
 }
 
-/// Distance at which a value that has one sign at both ends of a piece may have the other: the extremum of the parabola through the
-/// value before and those at the ends, or the middle where nothing is known of the way before. `None` where it stays away from zero.
+/// Distance at which a value with the same sign at both ends of a piece may have the other sign: the extremum of the parabola through
+/// the previous value and those at the ends, or the middle if there is no previous value. `None` if the parabola stays clear of zero.
 fn turning(before: Option<(f64, &[f64])>, k: usize, [first, last]: [f64; 2], length: f64) -> Option<f64> {
+    /// Extremum of the parabola, as a share of the value at the beginning, below which the piece is examined. A factor of safety for
+    /// the error of the parabola.
     const NEAR: f64 = 0.1;
     if first * last <= 0.0 || !(first * last).is_finite() {
         return None;

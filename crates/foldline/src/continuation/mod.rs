@@ -10,9 +10,9 @@
 //! | one step: predicted, corrected, compared with what it comes from | `step` |
 //! | whether a step may be accepted | `judge` |
 //! | why a side ends | `ends` |
-//! | how much work a side may take | `allowance` |
+//! | limit on the work of a side | `allowance` |
 //! | what lies between two accepted points | [`inspect`] |
-//! | values that were asked for, on the way | `marks` |
+//! | requested values along the way | `marks` |
 //! | on which side of it a point is | `side` |
 //! | zero of a monitor along the curve | [`locate`] |
 //! | the same where branches cross | [`straddle`] |

@@ -14,13 +14,13 @@ use super::{Failure, Settings};
 use crate::contract::{Monitor, ZeroProblem};
 use crate::diagram::Cost;
 
-/// Distances between nodes, as shares of the stretch, in the order in which they are tried; the last two as far as Newton's method still
-/// finds the branch there.
+/// Distances between nodes, as shares of the stretch, in the order of trial; the last two as long as Newton's method still converges
+/// to the branch.
 const SPACINGS: [f64; 5] = [0.25, 0.1, 0.04, 4e-3, 4e-4];
-/// How many of them are enough on a mesh: closer by, its rounding shows.
+/// Number of spacings that suffice on a mesh; at closer ones rounding dominates.
 const ON_A_MESH: usize = 3;
-/// Share of its last change by which an interpolated zero may still be off: the error of a cubic shrinks with the fourth power of the
-/// spacing, by (0.04 / 0.1)⁴.
+/// Error of an interpolated zero as a share of its last change: the error of a cubic shrinks with the fourth power of the spacing, here
+/// by (0.04 / 0.1)⁴.
 const REST: f64 = 0.0256;
 
 /// Share of the values next to the zero that the cubic may add to the parabola: with more the branch does not go smoothly
@@ -45,7 +45,7 @@ pub fn straddle(
     let (mut nodes, mut stations) = ([0.0; 4], Vec::new());
     let mut moved = 0.0;
     for (k, spacing) in SPACINGS.iter().enumerate() {
-        // On a mesh closer nodes show its rounding, and serve only where the interpolation needs them.
+        // On a mesh rounding dominates at closer nodes, which are used only if the interpolation is not yet accurate enough.
         if k == ON_A_MESH
             && !stretch.left.mesh.is_empty()
             && REST * moved * rate(&nodes, &stations) < settings.tolerance
@@ -103,7 +103,7 @@ pub fn straddle(
     Ok(Located { distance: root, station: coarse, error })
 }
 
-/// How fast the point changes along the curve between the inner nodes, in what [`discrepancy`] compares.
+/// Rate of change of the point along the curve between the inner nodes, in the measure of [`discrepancy`].
 fn rate(nodes: &[f64; 4], stations: &[Station]) -> f64 {
     let [_, a, b, _] = stations else { return 0.0 };
     discrepancy(&a.point, &b.point, a.parameter() - b.parameter(), b.parameter()) / (nodes[2] - nodes[1]).abs()

@@ -144,29 +144,30 @@ impl Point {
         self.trust.trivial_defect.max(self.trust.liouville_defect * smallest / SMALL)
     }
 
-    /// True for a cycle of a family at one value of the parameter, as a conservative system has it, or one that is linear up to an amplitude:
-    /// the parameter does not move along the branch, and a second multiplier is 1 as far as its error tells. On which side of 1 it is computed
-    /// means nothing.
+    /// True for a cycle of a family at a single parameter value (a vertical branch), as in a conservative system or one that is linear
+    /// up to some amplitude: the parameter does not change along the branch, and a second multiplier is 1 within its error. The side
+    /// of 1 on which that multiplier is computed is not significant.
     pub fn is_one_of_family(&self) -> bool {
         let stands = self.parameter_slope().abs() < STANDS;
         self.solution.period().is_some() && stands && self.neutral_multiplier().is_some()
     }
 
-    /// Distance from 1 at which a multiplier may be 1.
+    /// Distance from 1 within which a multiplier may be exactly 1.
     fn neutral_error(&self) -> f64 {
+        /// Multiple of the stated error: a factor of safety, since a multiplier at a double eigenvalue 1 is less accurate than others.
         const ERRORS: f64 = 10.0;
         let stated = if self.trust.spectrum.is_nan() { 0.0 } else { self.trust.spectrum };
         ERRORS * stated.max(self.trust.trivial_defect)
     }
 
-    /// The multiplier that is 1 as far as its error tells, and closest to that, among those that are not trivial.
+    /// The non-trivial multiplier closest to 1, if it is 1 within its error.
     pub(crate) fn neutral_multiplier(&self) -> Option<Complex64> {
         let distance = |z: &Complex64| (z - 1.0).norm();
         let closest = self.free_spectrum().iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
         (distance(closest) <= self.neutral_error()).then_some(*closest)
     }
 
-    /// How many multipliers are unstable besides one that is 1 as far as its error tells.
+    /// Number of unstable multipliers, excluding one that is 1 within its error.
     pub(crate) fn unstable_besides_neutral(&self) -> usize {
         let own = usize::from(self.neutral_multiplier().is_some_and(|z| z.norm() > 1.0));
         self.unstable.saturating_sub(own)
@@ -209,7 +210,8 @@ impl Point {
     }
 }
 
-/// Slope of a branch in its parameter below which it does not change along the branch but for rounding.
+/// Slope dλ/ds below which the parameter is constant along a branch up to rounding. Order of magnitude: the machine precision times a
+/// condition number of 1e7.
 pub(crate) const STANDS: f64 = 1e-9;
 
 /// What happens at a special point.
@@ -367,9 +369,9 @@ pub struct SpecialPoint {
     pub error: f64,
     /// Coefficients of the normal form, named by [`Kind::coefficients`]; none where they are not known.
     pub coefficients: Vec<f64>,
-    /// Bounds on the errors of the coefficients; none in files of earlier versions.
+    /// Bounds on the errors of the coefficients; empty in files of earlier versions.
     pub coefficient_errors: Vec<f64>,
-    /// Why there are no coefficients, or why they decide nothing; empty where there is nothing to say.
+    /// Reason why the coefficients are missing or inconclusive; otherwise empty.
     pub remark: String,
 }
 
@@ -379,14 +381,14 @@ impl SpecialPoint {
         self.unstable_before.abs_diff(self.unstable_after).max(1)
     }
 
-    /// A coefficient, unless it is zero within its error.
+    /// Returns coefficient `k` unless it is zero within its error.
     fn certain(&self, k: usize) -> Option<f64> {
         let error = self.coefficient_errors.get(k).copied().unwrap_or(0.0);
         self.coefficients.get(k).copied().filter(|value| value.abs() > error)
     }
 
-    /// True if the solutions that are born there are stable as far as it goes (supercritical), false if they take the stability of those that
-    /// they leave with them (subcritical); `None` where there are no such, or where the coefficient that decides is zero within its error.
+    /// True if the point is supercritical (in the critical directions the bifurcating solutions are stable), false if subcritical; `None`
+    /// if criticality does not apply to the kind or the deciding coefficient is zero within its error.
     fn is_supercritical(&self) -> Option<bool> {
         let decides = match (self.kind, self.coefficients.len()) {
             (Kind::Hopf | Kind::PeriodDoubling | Kind::Torus, 1) => 0,
@@ -396,10 +398,10 @@ impl SpecialPoint {
         self.certain(decides).map(|value| value < 0.0)
     }
 
-    /// `supercritical` or `subcritical` where that is known, `degenerate` where a coefficient that matters is zero within its error, and
-    /// `undetermined` where that error is as large as what the coefficient is made of.
+    /// `supercritical` or `subcritical` if that is known; `degenerate` if a required coefficient is zero within its error; `undetermined`
+    /// if that error is as large as the terms of the coefficient.
     pub fn criticality(&self) -> Option<&'static str> {
-        // Those that must not vanish: a pitchfork has no quadratic term, and oscillations may leave each other alone.
+        // Coefficients that must not vanish: a pitchfork has no quadratic term, and two oscillations may be uncoupled.
         let needed: &[usize] = match (self.kind, self.coefficients.len()) {
             (_, 0) => return None,
             (_, 1) => &[0],
@@ -417,8 +419,8 @@ impl SpecialPoint {
         }
     }
 
-    /// Which of the cases it is that the coefficients tell apart: a branch point is transcritical or a pitchfork, a double Hopf point
-    /// simple where p₁₁ and p₂₂ have the same sign, else difficult.
+    /// Case of the normal form: a branch point is transcritical or a pitchfork; a double Hopf point is simple if p₁₁ and p₂₂ have the same
+    /// sign, otherwise difficult.
     pub fn case(&self) -> Option<&'static str> {
         match (self.kind, self.coefficients.len()) {
             (Kind::BranchPoint, 2) => Some("transcritical"),
@@ -429,8 +431,8 @@ impl SpecialPoint {
         }
     }
 
-    /// Coefficients, case and criticality in words, as `l1 = -0.0123, supercritical`, and the remark. An error is given where the digits
-    /// do not show it.
+    /// Text of the coefficients, case, criticality and remark, such as `l1 = -0.0123, supercritical`. An error is shown if it affects the
+    /// digits printed.
     pub fn normal_form(&self) -> String {
         let named = self.kind.coefficients().iter().zip(&self.coefficients).enumerate();
         let error = |k: usize| self.coefficient_errors.get(k).copied();
@@ -440,8 +442,9 @@ impl SpecialPoint {
     }
 }
 
-/// Five digits, and the error where the last of them is not certain. What is zero within so small an error is 0.
+/// Five digits, and the error if the last digit is uncertain. A value that is zero within a small error prints as 0.
 fn shortly(value: f64, error: Option<f64>) -> String {
+    /// Error below which zero prints without it: half a unit in the last of five decimals.
     const SMALL: f64 = 5e-6;
     let error = error.unwrap_or(0.0);
     let value = if value.abs() <= error && error < SMALL { 0.0 } else { value };
@@ -473,16 +476,16 @@ impl Family {
 /// An orbit of infinite period.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Connection {
-    /// From a saddle back to it.
+    /// Homoclinic orbit to a saddle.
     Homoclinic,
-    /// From one saddle to another, and so on.
+    /// Heteroclinic cycle between saddles.
     Heteroclinic,
-    /// From a saddle-node back to it: saddle-node on an invariant circle.
+    /// Homoclinic orbit to a saddle-node: saddle-node on an invariant circle.
     SaddleNode,
 }
 
 impl Connection {
-    /// Every one.
+    /// All kinds of connection.
     pub const ALL: [Connection; 3] = [Connection::Homoclinic, Connection::Heteroclinic, Connection::SaddleNode];
 
     /// The name used in files and tables.
@@ -520,17 +523,17 @@ pub enum Ending {
     StepTooSmall(String),
     /// The mesh would need more intervals than allowed.
     MeshTooLarge(String),
-    /// The period grew beyond its limit, and no equilibrium was found that explains it.
+    /// The period exceeded its limit, and no nearby equilibrium explains it.
     PeriodUnbounded(f64),
-    /// The cycles tend to an orbit of infinite period.
+    /// The cycles approach an orbit of infinite period.
     Connecting {
-        /// Which kind of orbit it is.
+        /// Kind of orbit.
         connection: Connection,
-        /// Value of the continuation parameter there.
+        /// Value of the continuation parameter at the limit.
         parameter: f64,
         /// Period of the last cycle.
         period: f64,
-        /// The equilibria that it connects.
+        /// States of the equilibria on the orbit.
         to: String,
     },
     /// A state grew beyond every measure while the parameter came to a stand; the sentence says which is the likely cause.
@@ -539,8 +542,8 @@ pub enum Ending {
     PointLimit(usize),
     /// f is not finite at the start of the branch or beyond its last point.
     NotFinite(String),
-    /// The branch would have cost more work than it shows: a point that needs too many factorisations, or changes of stability without
-    /// explanation at one point after the other.
+    /// The work limit was reached (one point or several in succession needed too many factorisations), or stability changed without
+    /// explanation at several consecutive points.
     GivenUp(String),
     /// The start did not converge.
     NoStart(String),
@@ -577,7 +580,7 @@ impl Ending {
         text.lines().next().unwrap_or_default().to_string()
     }
 
-    /// True if the branch ended where it should: at a bound, closed, joined to another branch, or at an orbit of infinite period.
+    /// True if the branch is complete: it ended at a bound or stop, closed, joined another branch, or approached an orbit of infinite period.
     pub fn complete(&self) -> bool {
         use Ending::{Asked, Bound, Closed, Connecting, Joined};
         matches!(self, Bound(_) | Closed | Joined { .. } | Asked(_) | Connecting { .. })
@@ -598,7 +601,7 @@ impl fmt::Display for Ending {
             Ending::StepTooSmall(why) => write!(f, "step too small: {why}"),
             Ending::MeshTooLarge(why) => write!(f, "mesh too large: {why}"),
             Ending::PeriodUnbounded(period) => {
-                write!(f, "period grew to {period:.4}, and no equilibrium was found next to the cycle that explains it")
+                write!(f, "period grew to {period:.4}, and no equilibrium near the cycle explains it")
             }
             Ending::Connecting { connection, parameter, period, to } => {
                 let orbit = match connection {
@@ -606,7 +609,7 @@ impl fmt::Display for Ending {
                     Connection::Heteroclinic => "a heteroclinic cycle between the saddles",
                     Connection::SaddleNode => "a saddle-node on the cycle, at",
                 };
-                write!(f, "approaches {orbit} {to} at {parameter:.9}, the period having grown to {period:.4}")
+                write!(f, "approaches {orbit} {to} at {parameter:.9}; the last period is {period:.4}")
             }
             Ending::SolutionUnbounded(why) => write!(f, "solution without bound: {why}"),
             Ending::PointLimit(points) => write!(f, "stopped at the limit of {points} points"),
@@ -729,13 +732,13 @@ impl Branch {
 pub struct Diagram {
     /// The branches.
     pub branches: Vec<Branch>,
-    /// What surveys and sweeps saw.
+    /// Results of surveys and sweeps.
     pub responses: Vec<Responses>,
-    /// What was asked for and not reached, besides what the ends of branches say.
+    /// Requests that were not fulfilled, in addition to branches that ended short.
     pub shortfalls: Vec<Shortfall>,
 }
 
-/// Something that was asked for and not reached.
+/// A request that was not fulfilled.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Shortfall {
     /// The name of a branch, exploration or sweep.

@@ -11,7 +11,7 @@ pub enum Motion {
     Cycle,
     /// Neither within the limit on the number of steps: chaos, a torus, or an approach too slow to tell.
     Other,
-    /// It ran to infinity or to where f is not defined, or its steps became too small.
+    /// The trajectory ran to infinity or out of the region in which f is defined, or its steps became too small.
     Escaped,
 }
 
@@ -48,16 +48,16 @@ pub struct Response {
     pub period: Option<f64>,
     /// Spectral ratio of a cycle, such as 2:1, where the model has a whirl plane.
     pub ratio: Option<(u32, u32)>,
-    /// Over how many turns of its strong lines a cycle closes: 2 after a period doubling. 1 if there is no telling.
+    /// Number of periods of its strong lines after which a cycle closes: 2 after a period doubling; 1 if unknown.
     pub multiplicity: u32,
     /// Smallest and largest value of every state, then of every output: over one period, or over the motion watched.
     pub ranges: Vec<[f64; 2]>,
-    /// How many starts went there. Not a share of a basin: some starts are drawn towards the origin.
+    /// Number of starts that settled there. Not a basin fraction: some starts are drawn towards the origin.
     pub hits: usize,
-    /// Of a survey: the share of the starts drawn uniformly that went there; `None` in a sweep.
+    /// In a survey, the fraction of uniformly drawn starts that settled there; `None` in a sweep.
     pub share: Option<Share>,
-    /// Of a sweep: whether it is another solution than the motion at the value before, which Newton's method has followed
-    /// to this value; `None` at the first value, where one of the two could not be solved for, and in a survey.
+    /// In a sweep, true if the motion is not the continuation of the one at the previous value; `None` at the first value, if
+    /// the two could not be compared, and in a survey.
     pub jumped: Option<bool>,
     /// `[n]` a state of the motion: the last one, from which a sweep goes on.
     pub state: Vec<f64>,
@@ -68,13 +68,14 @@ pub struct Response {
 }
 
 impl Response {
-    /// How far a state grows at least before a trajectory counts as one that runs to infinity.
+    /// Size of a state beyond which a trajectory counts as running to infinity. A factor of safety: bounded motions stay far below it, and
+    /// exponential growth reaches it soon.
     pub(crate) const UNBOUNDED: f64 = 1e12;
 
-    /// What became of a trajectory that escaped: it ran to infinity, or it could not be followed beyond its last state.
+    /// Outcome of a trajectory that escaped, in words: it ran to infinity, or could not be integrated beyond its last state.
     pub fn fate(&self) -> &'static str {
         match self.state.iter().all(|x| x.abs() < Response::UNBOUNDED) {
-            true => "cannot be followed beyond a state at which f jumps or ceases to be defined",
+            true => "cannot be followed beyond a state at which f jumps or becomes undefined",
             false => "runs to infinity",
         }
     }
@@ -118,8 +119,8 @@ pub struct Responses {
 }
 
 impl Responses {
-    /// Indices of the responses of a sweep that are other solutions than the one before. Where nothing was solved for, that is a
-    /// motion of another kind. In a set in which it was not asked for at all, as in an old file, see
+    /// Indices of the responses of a sweep at which it jumped to a different solution. A response that could not be compared counts
+    /// if its kind of motion differs from the one before. A set without any comparison, as in an old file, falls back on
     /// [`Responses::steep`].
     pub fn jumps(&self, factor: f64) -> Vec<usize> {
         if self.responses.iter().all(|response| response.jumped.is_none()) {
@@ -130,8 +131,9 @@ impl Responses {
         pairs.filter(|(_, pair)| jumped(pair)).map(|(k, _)| k + 1).collect()
     }
 
-    /// Indices of the responses of a sweep that differ much from the one before: another motion, ratio or multiplicity, or a
-    /// change of the largest range beyond `factor` times the median. On a steep resonance curve that need not be a jump.
+    /// Indices of the responses of a sweep that differ strongly from the one before: a different kind of motion, ratio or
+    /// multiplicity, or a change of the largest range beyond `factor` times the median. On a steep resonance curve that need not
+    /// be a jump.
     pub fn steep(&self, factor: f64) -> Vec<usize> {
         // Each quantity relative to its largest value in the sweep.
         let count = self.responses.iter().map(|r| r.ranges.len()).max().unwrap_or(0);

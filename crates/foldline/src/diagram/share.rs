@@ -1,15 +1,15 @@
-//! Shares of basins of attraction.
+//! Basin fractions.
 
-/// 97.5 % quantile of the normal distribution.
+/// 97.5 % quantile of the normal distribution, for two-sided 95 % intervals.
 const QUANTILE: f64 = 1.959_963_984_540_054;
 
-/// The part of initial states, drawn uniformly from the ranges of the states, that went to one motion: an estimate of the
-/// volume of its basin of attraction in that box.
+/// Basin fraction: the fraction of initial states, drawn uniformly from the ranges of the states, that settle to one motion. It
+/// estimates the relative volume of the basin of attraction in that box.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Share {
-    /// Uniform initial states that went there.
+    /// Number of uniform initial states that settled there.
     pub hits: usize,
-    /// All uniform initial states, whatever became of them.
+    /// Number of uniform initial states in total.
     pub of: usize,
 }
 
@@ -19,14 +19,14 @@ impl Share {
         self.hits as f64 / self.of as f64
     }
 
-    /// Its standard error, that of a binomial distribution. It says nothing where none or all went there: see
+    /// Standard error of the estimate, from the binomial distribution. It is 0 and meaningless if none or all settled there; see
     /// [`Share::interval`].
     pub fn error(&self) -> f64 {
         let value = self.value();
         (value * (1.0 - value) / self.of as f64).sqrt()
     }
 
-    /// The interval that holds the true share with a confidence of 95 % (Wilson's score interval; wilson1927).
+    /// The 95 % confidence interval (Wilson's score interval; wilson1927).
     pub fn interval(&self) -> [f64; 2] {
         let (hits, of) = (self.hits as f64, self.of as f64);
         let square = QUANTILE * QUANTILE;

@@ -1,4 +1,4 @@
-//! Which of the attractors that were found is meant, and how they are told.
+//! Selection among the attractors found, and their description in messages.
 
 use super::System;
 use super::diagnosis::{Seen, of_no_start};
@@ -6,7 +6,7 @@ use super::plan::{AttractorKey, SeedPlan};
 use crate::attractors::{Attractor, Census, whirl_sense};
 use crate::diagram::{Point, Solution};
 
-/// Whether a solution is of the type that a key names.
+/// True if a solution is of the type that a key names.
 pub(super) fn is_meant(key: &AttractorKey, point: &Point, ratio: Option<(u32, u32)>) -> bool {
     match (key, &point.solution) {
         (AttractorKey::Equilibrium, solution) => matches!(solution, Solution::Equilibrium(_)),
@@ -16,14 +16,14 @@ pub(super) fn is_meant(key: &AttractorKey, point: &Point, ratio: Option<(u32, u3
     }
 }
 
-/// The attractors that a key may mean.
+/// The attractors that match a key.
 pub(super) struct Choice<'c> {
-    /// The one that is taken first: the equilibrium of smallest norm, or the cycle reached most often.
+    /// In order of preference: equilibria by increasing norm, cycles by decreasing number of hits.
     meant: Vec<&'c Attractor>,
 }
 
 impl<'c> Choice<'c> {
-    /// Those of a census that a key fits; mirror images of each other count once.
+    /// Selects the attractors of a census that match a key; mirror images count once.
     pub(super) fn of(system: &System, tolerance: f64, census: &'c Census, key: &AttractorKey) -> Choice<'c> {
         let size = |a: &Attractor| match &a.point.solution {
             Solution::Equilibrium(x) => crate::linalg::dot(x, x),
@@ -31,7 +31,7 @@ impl<'c> Choice<'c> {
         };
         let mut fitting: Vec<&Attractor> =
             census.attractors.iter().filter(|a| is_meant(key, &a.point, a.ratio)).collect();
-        // Cycles come by falling number of hits.
+        // Cycles by decreasing number of hits.
         match key {
             AttractorKey::Equilibrium => fitting.sort_by(|a, b| size(a).total_cmp(&size(b))),
             AttractorKey::Cycle | AttractorKey::Ratio(..) | AttractorKey::Lasting(_) => {
@@ -56,7 +56,7 @@ impl<'c> Choice<'c> {
         self.meant.first().map(|attractor| &attractor.point)
     }
 
-    /// That there is a choice between cycles, and what can be done about it.
+    /// Note on a choice between several cycles, with a way to select another; `None` if there is no choice.
     pub(super) fn told(&self, system: &System) -> Option<String> {
         let [first, others @ ..] = &self.meant[..] else { return None };
         if others.is_empty() || first.point.solution.period().is_none() {
@@ -64,7 +64,7 @@ impl<'c> Choice<'c> {
         }
         let others: Vec<String> = others.iter().map(|other| described(system, other)).collect();
         Some(format!(
-            "{} fits and is taken as the one reached most often; so do: {}. A state on one of them, as `state = {{ … }}`, takes that one",
+            "{} is used, since most samples reached it; these match as well: {}. To start from one of them, give a state on it as `state = {{ … }}`",
             described(system, first),
             others.join(", ")
         ))
@@ -75,7 +75,8 @@ fn described(system: &System, attractor: &Attractor) -> String {
     format!("{} ({})", kind(system, attractor), attractor.hits)
 }
 
-/// A cycle of a forced model is seen from where its plane of whirling stands; in an autonomous one that may turn with the shaft.
+/// Name of an attractor. The sense of whirl is stated for forced models only: in an autonomous one the whirl plane may turn with the
+/// shaft.
 fn kind(system: &System, attractor: &Attractor) -> String {
     match (&attractor.point.solution, attractor.ratio) {
         (Solution::Equilibrium(_), _) => "equilibrium".to_string(),
@@ -88,14 +89,14 @@ fn kind(system: &System, attractor: &Attractor) -> String {
     }
 }
 
-/// What a census found.
+/// Summary of a census.
 pub(super) fn summary(system: &System, census: &Census) -> String {
     if let [found] = &census.attractors[..]
         && found.hits == 0
     {
         let what = kind(system, found);
         return format!(
-            "{what} of Newton's method; it attracts, but too slowly for samples to be followed until they have settled there"
+            "{what}, found by Newton's method; it attracts too slowly for samples to settle on it within the step limit"
         );
     }
     let mut parts: Vec<String> = census.attractors.iter().map(|attractor| described(system, attractor)).collect();
@@ -112,12 +113,12 @@ pub(super) fn summary(system: &System, census: &Census) -> String {
         parts.push(format!("stuck where steps became too small ({})", census.stuck));
     }
     if census.left > 0 {
-        parts.push(format!("left when that was known ({})", census.left));
+        parts.push(format!("not needed ({})", census.left));
     }
     format!("attractors (samples that went there): {}", parts.join(", "))
 }
 
-/// That nothing fits a key, what else was found, and what can be done.
+/// Message that no attractor matches a key, with what was found instead and what to do.
 pub(super) fn missing(system: &System, seed: &SeedPlan, census: &Census, key: &AttractorKey) -> String {
     let wanted = match key {
         AttractorKey::Equilibrium => "no stable equilibrium".to_string(),
@@ -126,7 +127,7 @@ pub(super) fn missing(system: &System, seed: &SeedPlan, census: &Census, key: &A
         AttractorKey::Lasting(periods) => format!("no stable cycle of {periods} periods of the forcing"),
     };
     let all_escaped = census.attractors.is_empty() && census.unsettled == 0 && census.escaped > 0;
-    // Of what some samples did where others settled nothing follows.
+    // If any sample settled, the fate of the others is not the cause.
     let none = census.attractors.is_empty();
     let (stuck, unsettled) = (census.stuck > 0, none && census.unsettled > 0);
     let exit = census.exits.first().filter(|_| none);

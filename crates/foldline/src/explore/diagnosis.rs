@@ -1,7 +1,7 @@
-//! Why no first solution was found: what in the vector field makes that likely, and what can be done.
+//! Diagnosis of a failed search for a first solution: the likely cause in the vector field, and a cure.
 //!
-//! **Idea.** f at a few places of the sampling box tells whether some combination of the states never changes. Then no
-//! equilibrium and no cycle is isolated, and Newton's method has nothing to converge to.
+//! **Idea.** Values of f at a few points of the sampling box reveal whether some combination of the states is conserved. Then no
+//! equilibrium or cycle is isolated, and Newton's method does not converge.
 
 use super::direct::{transient, turn};
 use super::{System, symmetry};
@@ -20,13 +20,13 @@ const ROUNDING: f64 = 1e-10;
 pub(super) struct Seen<'a> {
     /// The state that was given, if one was.
     pub state: Option<&'a [f64]>,
-    /// Whether some could not be followed on, their steps having become too small.
+    /// True if some trajectories stopped because their steps became too small.
     pub stuck: bool,
-    /// Whether all left every bound.
+    /// True if all trajectories grew without bound.
     pub all_escaped: bool,
-    /// Where one left the region in which f is defined, if one did.
+    /// Exit of a trajectory that left the region in which f is defined.
     pub exit: Option<&'a Exit>,
-    /// Whether some ran on without coming to anything, or came to something that Newton's method does not confirm.
+    /// True if some trajectories did not settle, or settled to a motion that Newton's method does not confirm.
     pub unsettled: bool,
 }
 
@@ -42,7 +42,7 @@ pub(super) fn of_no_start(system: &System, parameters: &[f64], seen: Seen) -> St
             combination(first, &system.state_names)
         );
     }
-    if seen.state.is_some_and(|state| rests(system, parameters, state)) {
+    if seen.state.is_some_and(|state| is_equilibrium(system, parameters, state)) {
         return "\nlikely cause: the state is an equilibrium, and a singular one: a fold, a branch point or an isolated point, \
                 from which nothing says where a branch leads\nwhat to do: start at another value of the parameter, on one of the \
                 branches that come together there"
@@ -71,19 +71,20 @@ pub(super) fn of_no_start(system: &System, parameters: &[f64], seen: Seen) -> St
     }
 }
 
-/// That a trajectory met the edge of the region in which f is defined.
+/// Cause and cure for a trajectory that reached the boundary of the region in which f is defined.
 fn of_exit(system: &System, exit: &Exit) -> String {
     format!(
-        "\nlikely cause: at the time {:.6}, {}, a trajectory meets the edge of the region in which the vector field is defined (a division \
-         by zero, a log or a root of something negative)\nwhat to do: write the equation so that it is defined there, or choose another \
-         range of the states, another state, or other parameters",
+        "\nlikely cause: at the time {:.6}, {}, a trajectory meets the edge of the region in which the vector field is defined (division by \
+         zero, or the logarithm or root of a negative number)\nwhat to do: rewrite the equation so that it is defined there, or change the \
+         ranges of the states, the given state or the parameters",
         exit.time,
         place(system, &exit.state)
     )
 }
 
-/// A state in words, the first few components of it.
+/// The first few components of a state, as text.
 pub(super) fn place(system: &System, state: &[f64]) -> String {
+    /// Components that fit on one line.
     const TOLD: usize = 6;
     let named = system.state_names.iter().zip(state).take(TOLD);
     let told: Vec<String> = named.map(|(name, value)| format!("{name} = {value:.6}")).collect();
@@ -91,32 +92,31 @@ pub(super) fn place(system: &System, state: &[f64]) -> String {
     format!("{}{more}", told.join(", "))
 }
 
-/// That solutions come in families.
+/// Cause and cure if solutions form families, because of a rotational symmetry or a conserved energy.
 fn of_family(system: &System, parameters: &[f64]) -> Option<String> {
     if let Some(pairs) = symmetry::rotation(system, parameters) {
         let name = |state: &usize| system.state_names.get(*state).map_or("?", String::as_str);
         let turned: Vec<String> = pairs.iter().map(|[a, b]| format!("({}, {})", name(a), name(b))).collect();
         let rest: Vec<String> = pairs.iter().map(|[_, b]| format!("{} = 0", name(b))).collect();
         return Some(format!(
-            "\nlikely cause: the equations stay the same when {} are turned together, so a solution can be turned too: those that this \
-             moves are not isolated but come in families, and Newton's method has nothing to converge to\nwhat to do: if the motion \
-             swings in one direction, take that direction for an axis and start with {}; or write the model in coordinates without \
-             the angle",
+            "\nlikely cause: the equations do not change when {} are turned together, so rotated solutions form families in which none is \
+             isolated, and Newton's method does not converge\nwhat to do: for a motion along a straight line choose that line as an axis and \
+             start with {}; otherwise write the model in coordinates without the angle",
             turned.join(" and "),
             rest.join(", ")
         ));
     }
     symmetry::keeps_energy(system, parameters).then(|| {
-        "\nlikely cause: nothing is damped and the forces have a potential, so the energy never changes: cycles are not isolated but come in \
-         families, one for each energy, and no trajectory settles\nwhat to do: add a small damping to the equations as the free \
-         parameter, give a cycle of the family as `cycle`, or the equilibrium that it surrounds as `state` with a switch at its Hopf \
-         point: the branch at zero damping is the family"
+        "\nlikely cause: nothing is damped and the forces have a potential, so the energy never changes: cycles form a family with one \
+         member per energy, and no trajectory settles\nwhat to do: add a small damping as the free parameter, and start from a cycle of the \
+         family (`cycle`) or from the equilibrium inside it (`state`) with a switch at its Hopf point; the branch at zero damping is the \
+         family"
             .into()
     })
 }
 
-/// That a forced system is damped so lightly that transients outlast every trajectory, as its linearisation at the state or, where none was
-/// given, at the state of the box next to the origin says.
+/// Cause and cure for a forced system so lightly damped that transients outlast every trajectory. The decay rate is that of the
+/// linearisation at the given state or, if none was given, at the state of the sampling box nearest to the origin.
 fn of_slow_decay(system: &System, parameters: &[f64], state: Option<&[f64]>) -> Option<String> {
     let n = system.field.dim();
     if !system.field.forced() {
@@ -136,24 +136,23 @@ fn of_slow_decay(system: &System, parameters: &[f64], state: Option<&[f64]>) -> 
     let slow = slowest <= rounding && periods > followed as f64;
     slow.then(|| {
         let lasts = match periods.is_finite() {
-            true => format!("motions next to the state fall by a thousand in some {periods:.1e} periods of the forcing"),
-            false => "motions next to the state do not decay at all".to_string(),
+            true => format!("transients near the state decay by a factor of a thousand in some {periods:.1e} forcing periods"),
+            false => "transients near the state do not decay at all".to_string(),
         };
         format!(
-            "\nlikely cause: light damping: {lasts}, and trajectories are followed for {followed}\nwhat to do: start at a parameter at which \
-             there is more damping, or far from resonance, and follow the solution from there (a homotopy or a branch); or give a state \
-             on the cycle"
+            "\nlikely cause: light damping: {lasts}, and trajectories are integrated for {followed} periods\nwhat to do: start at parameters with more \
+             damping or far from resonance, and follow the solution from there (a homotopy or a branch); or give a state on the cycle"
         )
     })
 }
 
-/// The state of the sampling box next to the origin.
+/// The state of the sampling box nearest to the origin.
 pub(super) fn next_to_origin(system: &System) -> Vec<f64> {
     system.ranges.iter().map(|[low, high]| 0.0f64.max(*low).min(*high)).collect()
 }
 
-/// Whether f vanishes at a state.
-fn rests(system: &System, parameters: &[f64], state: &[f64]) -> bool {
+/// True if f vanishes at a state.
+fn is_equilibrium(system: &System, parameters: &[f64], state: &[f64]) -> bool {
     let mut f = vec![0.0; state.len()];
     system
         .field
@@ -247,10 +246,11 @@ fn combination(w: &[f64], names: &[String]) -> String {
     text
 }
 
-/// An end of a branch of forced cycles next to a bound of the range at which the forcing has no period, as at frequency zero:
-/// neither the mesh nor the field is at fault there. Any other end as it is.
+/// Explains the end of a branch of forced cycles next to a bound of the range at which the forcing has no period, such as frequency
+/// zero; neither the mesh nor the field is at fault there. Returns any other end unchanged.
 pub(super) fn of_forcing(system: &System, free: usize, range: [f64; 2], last: &Point, ending: Ending) -> Ending {
-    // How near the bound is, in widths of the range.
+    /// Largest distance from the bound, in widths of the range. With a range of frequencies from 0 the period there is a hundred times
+    /// that at the other bound.
     const NEAR: f64 = 0.01;
     let (Ending::MeshTooLarge(text) | Ending::StepTooSmall(text) | Ending::NotFinite(text)) = &ending else {
         return ending;
@@ -268,10 +268,9 @@ pub(super) fn of_forcing(system: &System, free: usize, range: [f64; 2], last: &P
     let Some(bound) = range.into_iter().find(lost).filter(|_| system.field.forced()) else { return ending };
     let inside = bound + NEAR * (if bound == low { high - low } else { low - high });
     let text = format!(
-        "{}\nlikely cause: the range reaches {bound}, where the forcing has no period; towards it the period, and with it the cycle, \
-         becomes longer than any time of the model ({:.3e} at {value:.3e}, {:.3e} at {inside})\nwhat to do: let the range end \
-         where the forcing still has a period, such as {inside}; the response to a constant force is an equilibrium of a model \
-         without forcing",
+        "{}\nlikely cause: the range reaches {bound}, where the forcing has no period; towards it the period grows without \
+         bound ({:.3e} at {value:.3e}, {:.3e} at {inside})\nwhat to do: end the range where the forcing still has a period, such as \
+         {inside}; the response to a constant force is an equilibrium of the model without forcing",
         text.lines().next().unwrap_or_default(),
         unit(value),
         unit(inside)

@@ -1,16 +1,17 @@
-//! Cycles of a forced field where transients last too long to wait for.
+//! Cycles of lightly damped forced models, by Newton's method instead of simulation.
 //!
-//! **Idea.** A cycle that lasts one period of the forcing is the solution of a boundary-value problem on a known interval. Newton's method
-//! solves it from the given state at rest, where its first step is the linear response, or from the trajectory over one period. The
-//! multipliers of the cycle say how long a transient lasts. Only where that is longer than trajectories are followed does the cycle
-//! stand for what the trajectory settles to; otherwise the trajectory itself decides, by where it is once all transients have decayed.
+//! **Idea.** A cycle that lasts one forcing period solves a boundary-value problem on a known interval. Newton's method starts from
+//! the given state held constant, for which its first step is the linear response, or from the trajectory over one period. The
+//! multipliers of the cycle determine the length of transients. The cycle replaces the limit of the trajectory only if transients last
+//! longer than trajectories are integrated; otherwise the trajectory decides, once all transients have decayed.
 //!
-//! **Equations.** With μ the largest multiplier, and s steps of the integration per period of the forcing, a transient falls by the factor
+//! **Equations.** With μ the multiplier of largest modulus and s integration steps per forcing period, a transient decays by the factor
 //! [`FALL`] in
 //!
 //!   (1)  N = ln FALL / -ln |μ|   periods, or s N steps.
 //!
-//! **Fails when** Newton's method diverges from both, as close to a resonance, where the linear response is far from the cycle.
+//! **Fails when** Newton's method diverges from both starting points, as it may close to a resonance, where the linear response is far
+//! from the cycle.
 
 use super::System;
 use super::seeds::polish;
@@ -19,29 +20,30 @@ use crate::contract::Verdict;
 use crate::diagram::{Point, Solution};
 use crate::simulation::{Clocked, Integrator, Passage, Tolerance};
 
-/// Fall of a transient after which its limit can be told.
+/// Decay of a transient after which its limit can be recognised. Empirical: the limit is then known to a thousandth of the initial
+/// deviation, enough for Newton's method to start from.
 const FALL: f64 = 1e3;
-/// Accuracy of the trajectory over one period, relative.
+/// Relative accuracy of the trajectory over one period. It is a starting point for Newton's method; the value is the default tolerance.
 const INTEGRATION: f64 = 1e-6;
-/// Samples per step of that trajectory.
+/// Samples per integration step of that trajectory. Empirical: as many as the degree of the collocation polynomials.
 const PARTS: usize = 4;
-/// Periods beyond which a decay cannot be told from none: the accuracy of multipliers.
+/// Number of periods beyond which slow decay cannot be distinguished from none: multipliers are accurate to about 1e-9.
 pub(super) const NEVER: f64 = 1e9;
-/// How well a cycle passes through the given state, relative to scale and size, for the state to lie on it.
+/// Distance from the cycle, relative to scale and size, within which the given state lies on it: the default tolerance.
 const ON: f64 = 1e-6;
 
-/// A cycle of one period of the forcing.
+/// A cycle that lasts one forcing period.
 pub(super) struct Direct {
     pub(super) point: Point,
     /// N of (1).
     pub(super) periods: f64,
     /// True if the cycle passes through the given state.
     pub(super) through: bool,
-    /// True if no trajectory is followed until it has settled there.
+    /// True if the cycle is stable and transients outlast every trajectory.
     pub(super) slow: bool,
 }
 
-/// The cycle of one period of the forcing that Newton's method finds from `state`, if it is stable or passes through the state.
+/// The cycle of one forcing period that Newton's method finds from `state`, if it is stable or passes through the state.
 pub(super) fn direct(system: &System, parameters: &[f64], tolerance: f64, state: &[f64]) -> Option<Direct> {
     if !system.field.forced() {
         return None;
@@ -49,14 +51,16 @@ pub(super) fn direct(system: &System, parameters: &[f64], tolerance: f64, state:
     let (turn, steps) = turn(system, parameters, state)?;
     let candidates = [at_rest(state), turn].into_iter();
     let mut found = candidates.filter_map(|candidate| polish(system, parameters, tolerance, &candidate));
-    found.find_map(|point| judged(system, state, point, steps))
+    found.find_map(|point| classified(system, state, point, steps))
 }
 
 impl Direct {
-    /// True if a trajectory that was followed for so long, in the time of the model, and ended in `state` is on the cycle: transients have
-    /// decayed, and the state lies next to the cycle, measured by the extent of each component.
+    /// True if a trajectory that ended in `state` after `time`, in time units of the model, has settled on the cycle: transients have
+    /// decayed, and the state lies close to the cycle, relative to the extent of each component.
     pub(super) fn ends(&self, time: f64, state: &[f64], unit: f64) -> bool {
+        /// Points of the cycle that are compared. Of a sinusoidal motion they are π/2048 of the extent apart, well below `NEXT`.
         const PLACES: usize = 2048;
+        /// Largest distance, as a share of the extent: a factor of safety of ten over the remaining transient, 1 / [`FALL`].
         const NEXT: f64 = 0.01;
         let Solution::Cycle(cycle) = &self.point.solution else { return false };
         let off = |t: usize| {
@@ -68,8 +72,8 @@ impl Direct {
     }
 }
 
-/// The cycle, if it is of use.
-fn judged(system: &System, state: &[f64], point: Point, steps: usize) -> Option<Direct> {
+/// The cycle with the length of its transients; `None` if it is unstable and does not pass through the given state.
+fn classified(system: &System, state: &[f64], point: Point, steps: usize) -> Option<Direct> {
     let Solution::Cycle(cycle) = &point.solution else { return None };
     let start = cycle.state(0.0);
     let mut sizes = start.iter().zip(state).zip(&system.scales);
@@ -79,18 +83,19 @@ fn judged(system: &System, state: &[f64], point: Point, steps: usize) -> Option<
     (through || point.unstable == 0).then_some(Direct { point, periods, through, slow })
 }
 
-/// N of (1) for the logarithm of |μ|; infinite where nothing decays.
+/// N of (1) for the logarithm of |μ|; infinite without decay.
 pub(super) fn transient(logarithm: f64) -> f64 {
     if logarithm < 0.0 { FALL.ln() / -logarithm } else { f64::INFINITY }
 }
 
-/// The state itself over one period.
+/// The constant state over one period.
 fn at_rest(state: &[f64]) -> Candidate {
+    /// Sample times. Cubic interpolation needs four, and the state is constant.
     const TIMES: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
     Candidate::Cycle { period: 1.0, times: TIMES.to_vec(), states: state.repeat(TIMES.len()) }
 }
 
-/// The trajectory from the state over one period of the forcing, and its steps; `None` if it does not last so long.
+/// The trajectory from the state over one forcing period, and its number of steps; `None` if it ends early.
 pub(super) fn turn(system: &System, parameters: &[f64], state: &[f64]) -> Option<(Candidate, usize)> {
     let n = state.len();
     let field = Clocked(system.field);

@@ -51,7 +51,7 @@ struct Discovery<'d, 'w> {
     plan: &'d ExplorePlan,
     /// What roots were called, such as `cycle`, once for each of them.
     named: Vec<String>,
-    /// At how many values some samples were not seen to settle.
+    /// Number of values at which some samples did not settle.
     unsettled: usize,
 }
 
@@ -219,15 +219,15 @@ impl Discovery<'_, '_> {
         if self.exhausted() {
             let budget = self.plan.budget;
             going &= self.short(&format!(
-                "the budget of {budget} points is used up, and the diagram may lack branches\nwhat to do: a larger budget"
+                "the budget of {budget} points is used up, and the diagram may lack branches\nwhat to do: increase the budget"
             ));
         }
         let (values, samples) = (self.plan.values, self.plan.samples);
         if self.unsettled > 0 {
             going &= self.short(&format!(
-                "at {} of {values} values some of {samples} samples did not settle: tori, chaos and what settles slowly are not followed\n\
-                 what to do: `foldline attractors` shows more of what there is; a cycle that settles slowly can be followed from a branch at \
-                 larger damping, or from a given state",
+                "at {} of {values} values some of {samples} samples did not settle: tori, chaotic attractors and slowly attracting solutions are not \
+                 followed\nwhat to do: examine such a value with `foldline attractors`; a slowly attracting cycle can be reached by a branch \
+                 from larger damping, or from a given state",
                 self.unsettled
             ));
         }

@@ -134,7 +134,7 @@ impl Work<'_> {
             && self.after_switched(index, first..last)
     }
 
-    /// The branches and homotopies that start at the ends of branches that were switched to.
+    /// Follows the branches and homotopies that start at the ends of switched branches.
     fn after_switched(&mut self, index: usize, grown: Range<usize>) -> bool {
         let plan = self.plan;
         let starts = plan.branches.iter().map(|b| &b.start).chain(plan.homotopies.iter().map(|h| &h.start));
@@ -443,8 +443,8 @@ impl Work<'_> {
         going
     }
 
-    /// The beginning of a branch of cycles that run through one turn. At a branch point a cycle that has bifurcated from another
-    /// one, run through several times, meets just that.
+    /// The beginning of a branch with its cycle reduced to the minimal period. At a branch point, a cycle that bifurcated from
+    /// several turns of another meets that other cycle again.
     fn of_one_turn(&self, settings: &Settings, free: usize, at: Kind, beginning: Beginning) -> Beginning {
         let (Beginning::Inside(station) | Beginning::Edge { first: station, .. }) = &beginning;
         let once = (at == Kind::BranchPoint).then(|| reduced(self.system, settings, &station.point)).flatten();
@@ -456,7 +456,7 @@ impl Work<'_> {
     }
 }
 
-/// A branch that could not begin. Returns false if the observer wants to stop.
+/// Reports a branch that could not begin. Returns false if the observer wants to stop.
 pub(super) fn without_start(observer: &dyn Observer, branch: &mut Branch, why: String) -> bool {
     let tell = |event: Event| observer.observe(event) == Verdict::Continue;
     if observer.stopping() {
@@ -471,7 +471,7 @@ pub(super) fn without_start(observer: &dyn Observer, branch: &mut Branch, why: S
     going & tell(Event::End(branch))
 }
 
-/// The end at which a branch that was switched to hands over: where it reached a bound or was asked to stop, forward before backward.
+/// The end of a switched branch at which another one starts: at a bound or requested stop, the forward end first.
 fn end_of_switched(branch: &Branch) -> Result<Point, String> {
     let ends = [(&branch.ends[1], branch.points.last()), (&branch.ends[0], branch.points.first())];
     let whole = |end: &Option<Ending>| matches!(end, Some(Ending::Bound(_) | Ending::Asked(_)));

@@ -65,7 +65,7 @@ fn along(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle) -> Vec<[f64
 /// The cycle next to a given one, over its minimal period.
 ///
 /// # Errors
-/// What Newton's method met, and by how much the given one fails to satisfy the model.
+/// The failure of Newton's method, and the residual of the given cycle.
 pub(super) fn from_cycle(system: &System, seed: &SeedPlan, tolerance: f64, cycle: &Cycle) -> Result<Point, String> {
     const NEAR: f64 = 0.1;
     let given = bare(&seed.parameters, Solution::Cycle(cycle.clone()));
@@ -74,8 +74,10 @@ pub(super) fn from_cycle(system: &System, seed: &SeedPlan, tolerance: f64, cycle
         let mut problem = problem_of(system, 0, cycle.degree, &guess, false);
         polished(&mut *problem, &settings, &guess).map(|found| found.point)
     });
-    // One of a family: which parameter has to stay where it is depends on what breaks the family up.
+    // A cycle of a family: try every parameter as the free one, since any may be the one that destroys the family.
     let found = found.or_else(|why| {
+        /// Relative residual of the given cycle below which the search is worth while. Empirical: a cycle further off is not one of the
+        /// model, and the search takes a factorisation for each parameter.
         const LIKELY: f64 = 0.5;
         let likely = mismatch(system.field, &seed.parameters, &given.solution).is_some_and(|(_, off)| off < LIKELY);
         let mut free = 0..if likely { system.field.parameter_count() } else { 0 };

@@ -124,23 +124,23 @@ pub fn polished(problem: &mut dyn ZeroProblem, settings: &Settings, point: &Poin
     Ok(found)
 }
 
-/// A first solution at the parameters of `point`: [`polished`], or where solutions are not isolated, as with a conserved quantity, the
-/// one of their family next to it.
+/// A first solution at the parameters of `point`: that of [`polished`] or, if solutions are not isolated, as with a conserved quantity,
+/// the nearest member of their family.
 ///
 /// # Errors
-/// That of [`polished`].
+/// See [`polished`].
 pub fn first(problem: &mut dyn ZeroProblem, settings: &Settings, point: &Point) -> Result<Station, Failure> {
     let mesh = problem.mesh();
     polished(problem, settings, point).or_else(|why| {
         problem.set_mesh(&mesh);
-        of_family(problem, settings, point).ok_or(why)
+        family_member(problem, settings, point).ok_or(why)
     })
 }
 
-/// The solution next to `point` of a family at one value of the parameter: that in the hyperplane across the direction of the family.
-/// `None` where the parameter changes on the way to it, so that `point` is next to no family.
-fn of_family(problem: &mut dyn ZeroProblem, settings: &Settings, point: &Point) -> Option<Station> {
-    /// Change of the parameter, in the unknown of the problem, that is rounding and discretisation.
+/// The solution nearest to `point` of a family at a single parameter value, in the hyperplane orthogonal to the family. `None` if the
+/// parameter changes on the way there, in which case there is no family.
+fn family_member(problem: &mut dyn ZeroProblem, settings: &Settings, point: &Point) -> Option<Station> {
+    /// Change of the scaled parameter, in tolerances, that rounding and discretisation can produce: a factor of safety.
     const STAYS: f64 = 10.0;
     let u = problem.unknowns_of(point);
     problem.anchor(&u);
@@ -158,7 +158,7 @@ fn of_family(problem: &mut dyn ZeroProblem, settings: &Settings, point: &Point) 
     Some(found)
 }
 
-/// The direction of the curve at `u`, which is nearly on it.
+/// Tangent of the curve at `u`, a point close to it.
 fn direction(problem: &mut dyn ZeroProblem, u: &[f64]) -> Result<Vec<f64>, Failure> {
     // Any row will do for the first tangent unless it is orthogonal to it.
     let mut row: Vec<f64> = (0..u.len()).map(|k| 0.6 + (k as f64 * 0.0113).sin() + (k as f64 * 1.37).cos()).collect();
@@ -174,14 +174,17 @@ fn direction(problem: &mut dyn ZeroProblem, u: &[f64]) -> Result<Vec<f64>, Failu
     Ok(row)
 }
 
-/// A solution beside `point` on the curve, which may be a fold: from a fold itself, or from next to one, a branch could not
-/// be told from the other side when it comes back. Goes on until the parameter changes noticeably.
+/// A solution on the curve at some distance from `point`, which may be a fold. A branch that started at or next to a fold could not
+/// recognise its start when it returns. Steps continue until the slope of the parameter is clearly non-zero.
 ///
 /// # Errors
 /// See [`Failure`].
 pub fn beside(problem: &mut dyn ZeroProblem, settings: &Settings, point: &Point) -> Result<Point, Failure> {
+    /// Step lengths in the order of trial: a quarter of the longest step of a branch, then shorter by factors of five. Empirical.
     const DISTANCES: [f64; 4] = [0.05, 0.01, 2e-3, 4e-4];
+    /// Slope of the parameter at which the solution is far enough from a fold. Empirical.
     const SLOPE: f64 = 0.15;
+    /// Most steps: a bound on the work on curves along which the parameter hardly changes.
     const FARTHEST: usize = 12;
     let u = problem.unknowns_of(point);
     problem.anchor(&u);
@@ -288,7 +291,7 @@ impl Growth<'_> {
             Beginning::Inside(mut start) => {
                 self.count(branch, &mut start.point);
                 going &= self.accept(branch, Point { position: 0, step: self.settings.first_step, ..start.point });
-                going &= self.say_what_is_left_out(branch);
+                going &= self.note_undefined_coefficient(branch);
                 going &= self.mark_start(branch);
             }
             Beginning::Edge { before, mut first, joined } => {
@@ -305,20 +308,20 @@ impl Growth<'_> {
         self.finish(branch, going)
     }
 
-    /// Leaves a multiplier that is 1 for a reason out of the count of unstable ones at the start of a branch.
+    /// Excludes a multiplier that is 1 by structure from the number of unstable ones at the start of a branch.
     fn count(&self, branch: &Branch, start: &mut Point) {
         if self.settings.stability && (start.is_one_of_family() || self.is_symmetric(branch, start)) {
             start.unstable = start.unstable_besides_neutral();
         }
     }
 
-    /// True if solutions come in families because the model can be turned.
+    /// True if cycles form families because the model has a rotational symmetry.
     fn is_symmetric(&self, branch: &Branch, at: &Point) -> bool {
         branch.family == Family::Cycle && branch.held.is_none() && rotation(self.system, &at.parameters).is_some()
     }
 
-    /// A remark on a curve along which a coefficient that is not defined would have to be looked at.
-    fn say_what_is_left_out(&self, branch: &Branch) -> bool {
+    /// Notes that a curve cannot be searched for points at which a coefficient vanishes, if that coefficient is not defined on it.
+    fn note_undefined_coefficient(&self, branch: &Branch) -> bool {
         let sought = match branch.held {
             Some((Kind::PeriodDoubling, _)) => Kind::GeneralisedPeriodDoubling,
             Some((Kind::Torus, _)) => Kind::Chenciner,
@@ -328,8 +331,8 @@ impl Growth<'_> {
         let own = setting(self.system, branch.free, &start.parameters);
         let count = special::cycle_form::switches_passed(&own, start);
         let note = format!(
-            "points of kind {sought} are not looked for: the orbit passes switches of the right-hand side ({count} times at the start), where the \
-             coefficient that vanishes there is not defined"
+            "{sought} points are not searched for: their normal form coefficient is not defined on orbits that pass switches of the right-hand \
+             side (here {count} times at the start)"
         );
         count == 0 || self.tell(Event::Note(&branch.name, &note))
     }
@@ -396,8 +399,8 @@ impl Growth<'_> {
                 if ending == Ending::Stopped {
                     break;
                 }
-                let ending = self.recognised(branch, side, self.shrunk(branch, side, ending));
-                let ending = self.without_period(branch, side, ending);
+                let ending = self.recognised(branch, side, self.at_generalised_hopf(branch, side, ending));
+                let ending = self.explain_missing_period(branch, side, ending);
                 going &= self.end(branch, side, ending);
             }
         }
@@ -473,7 +476,7 @@ impl Growth<'_> {
         let mut record = Record::at(&last, side == 1);
         let recorded = self.settings.stability && branch.held.is_none();
         let ending = follow(&mut walk, start, previous, emitted, &mut |item| {
-            // What was found while the field had no values any more is nothing.
+            // Discard items found after the field stopped returning values.
             if self.observer.stopping() {
                 return Verdict::Stop;
             }
@@ -498,7 +501,7 @@ impl Growth<'_> {
             };
             if going { Verdict::Continue } else { Verdict::Stop }
         });
-        // What it would say is no property of the branch then.
+        // An interrupted run ends for reasons that are not those of the branch.
         if self.observer.stopping() { Ending::Stopped } else { ending }
     }
 
@@ -530,14 +533,19 @@ impl Growth<'_> {
         self.tell(Event::Short(&branch.name, &format!("{said}\n{CLOSER}")))
     }
 
-    /// The end of a curve of folds of cycles that shrink to an equilibrium: by theory that has a Hopf point with a first Lyapunov coefficient
-    /// of zero. Next to it steps get shorter in proportion to the cycles, so the curve ends without passing it, with the reason in
-    /// `ending`. Along the curve both parameters change with the square of the extent, which gives them where that is zero; there the
-    /// equilibrium must have eigenvalues ± 2πi/T.
-    fn shrunk(&self, branch: &Branch, side: usize, ending: Ending) -> Ending {
+    /// Recognises the end of a curve of folds of cycles at a generalised Hopf point, where the first Lyapunov coefficient vanishes and
+    /// the cycles shrink to an equilibrium. Steps get shorter in proportion to the cycles there, so the curve ends without passing the
+    /// point, for the reason in `ending`. Along the curve both parameters vary linearly with the square of the extent of the cycles, and
+    /// are extrapolated to extent zero; the equilibrium there must have eigenvalues ±2πi/T.
+    fn at_generalised_hopf(&self, branch: &Branch, side: usize, ending: Ending) -> Ending {
+        /// Largest extent of the last cycle, as a share of the largest on the curve. Parameters vary with its square, so the extrapolation
+        /// covers 0.25 % of their variation.
         const SMALL: f64 = 0.05;
+        /// Largest relative real part and error of the frequency of the eigenvalues. Both vary with the square of the extent, so [`SMALL`]
+        /// makes them 0.0025; the rest is a factor of safety.
         const NEAR: f64 = 1e-2;
-        // Where steps end, the fold is lost in rounding, which shrinks with the square of the extent.
+        /// Ratio to the extent of the last cycle of those from which parameters are extrapolated. Where steps end, the fold is lost in
+        /// rounding; its effect decreases with the square of the extent, by a factor of 100 here.
         const CLEAR: f64 = 10.0;
         let given_up = matches!(ending, Ending::StepTooSmall(_) | Ending::GivenUp(_));
         let Some((Kind::Fold, first)) = branch.held.filter(|_| given_up && branch.family == Family::Cycle) else {
@@ -594,8 +602,8 @@ impl Growth<'_> {
         Some(Ending::Joined { at: Kind::PeriodDoubling, parameter })
     }
 
-    /// An end next to a bound of the range at which the forcing has no period says so.
-    fn without_period(&self, branch: &Branch, side: usize, ending: Ending) -> Ending {
+    /// Explains an end next to a bound of the range at which the forcing has no period.
+    fn explain_missing_period(&self, branch: &Branch, side: usize, ending: Ending) -> Ending {
         let last = if side == 1 { branch.points.last() } else { branch.points.first() };
         match last {
             Some(last) => diagnosis::of_forcing(self.system, branch.free, self.settings.range, last, ending),
@@ -677,7 +685,7 @@ impl Growth<'_> {
         }
     }
 
-    /// Of the normal form.
+    /// Coefficients of the normal form of a special point.
     fn coefficients(&self, system: &System, branch: &Branch, side: usize, special: &SpecialPoint) -> Coefficients {
         let (line, own) = (self.line(branch), setting(system, branch.free, &special.point.parameters));
         let dimension = special.kernel();
@@ -747,7 +755,7 @@ fn collapses<'a>(branch: &Branch, system: &'a System) -> Vec<Box<dyn Monitor + '
         }
     }
     if branch.family == Family::Cycle {
-        all.push(Box::new(collapse::Halves { born: is_doubled(branch) || lasts_evenly(branch) }));
+        all.push(Box::new(collapse::Halves { born: is_doubled(branch) || lasts_even_periods(branch) }));
     }
     if branch.family == Family::Cycle && !system.field.forced() {
         all.push(shrinks(system, branch.free, Kind::Hopf));
@@ -755,9 +763,9 @@ fn collapses<'a>(branch: &Branch, system: &'a System) -> Vec<Box<dyn Monitor + '
     all
 }
 
-/// Whether the cycles of a forced model last an even number of its periods: no phase moves, and the halves of two of
-/// them can be compared however much they differ.
-fn lasts_evenly(branch: &Branch) -> bool {
+/// True if the cycles of a forced model last an even number of forcing periods. Their phase is fixed, so the halves of two cycles can
+/// be compared however much the cycles differ.
+fn lasts_even_periods(branch: &Branch) -> bool {
     let periods = branch.points.first().map_or(0, |point| point.solution.forcing_periods());
     periods > 0 && periods.is_multiple_of(2)
 }

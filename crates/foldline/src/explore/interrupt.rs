@@ -1,17 +1,16 @@
-//! Ending a run at once.
+//! Immediate interruption of a run.
 //!
-//! **Idea.** An observer that stops a branch is asked once per point. A point, a census or a homotopy can take long, so there is a
-//! second way: once the observer says that it is [stopping](Observer::stopping), the vector field has no finite values any more. Every
-//! Newton iteration, trajectory and test function fails at its next evaluation, wherever it is, and the run unwinds within
-//! milliseconds. What it says on its way out is wrong and reaches nobody: events are dropped from then on, so the run file holds what
-//! was accepted before.
+//! **Idea.** An observer can stop a branch after each point. A point, a census or a homotopy can take long, so there is a second
+//! way: once the observer is [stopping](Observer::stopping), the vector field returns NaN. Every Newton iteration, trajectory and
+//! test function fails at its next evaluation, and the run unwinds within milliseconds. Results computed meanwhile are wrong, so
+//! events are dropped from then on, and the run file holds what was accepted before.
 
 use crate::contract::{Batch, Event, Observer, VectorField, Verdict};
 use crate::diagram::{Branch, Point, Shortfall};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-/// An observer, whether it has asked to stop, and what was not reached.
+/// An observer, its request to stop, and the shortfalls reported to it.
 pub(super) struct Heeded<'o> {
     observer: &'o dyn Observer,
     stopped: AtomicBool,
@@ -23,12 +22,12 @@ impl<'o> Heeded<'o> {
         Heeded { observer, stopped: AtomicBool::new(false), shortfalls: Mutex::default() }
     }
 
-    /// True once the observer has asked to stop, in one way or the other.
+    /// True once the observer has asked to stop, by a verdict or by [`Observer::stopping`].
     pub(super) fn stopped(&self) -> bool {
         self.stopped.load(Ordering::Relaxed) || self.stopping()
     }
 
-    /// Everything that was not reached, in an order that does not depend on the threads.
+    /// All shortfalls, sorted so that their order does not depend on the threads.
     pub(super) fn shortfalls(&self) -> Vec<Shortfall> {
         let mut all = self.shortfalls.lock().unwrap_or_else(PoisonError::into_inner).clone();
         all.sort();
@@ -66,7 +65,7 @@ impl Observer for Heeded<'_> {
     }
 }
 
-/// A vector field that has no finite values once an observer is stopping.
+/// A vector field that returns NaN once an observer is stopping.
 pub(super) struct Interruptible<'f> {
     field: &'f dyn VectorField,
     observer: &'f dyn Observer,
@@ -77,8 +76,8 @@ impl<'f> Interruptible<'f> {
         Interruptible { field, observer }
     }
 
-    /// True where there are no values any more; all of `out` are then made not a number.
-    fn spoilt(&self, out: [&mut [f64]; 3]) -> bool {
+    /// Fills `out` with NaN and returns true if the run is to end.
+    fn interrupted(&self, out: [&mut [f64]; 3]) -> bool {
         let ended = self.observer.stopping();
         if ended {
             out.into_iter().for_each(|values| values.fill(f64::NAN));
@@ -97,19 +96,19 @@ impl VectorField for Interruptible<'_> {
     }
 
     fn evaluate(&self, at: Batch, f: &mut [f64]) {
-        if !self.spoilt([&mut *f, &mut [], &mut []]) {
+        if !self.interrupted([&mut *f, &mut [], &mut []]) {
             self.field.evaluate(at, f);
         }
     }
 
     fn linearise(&self, at: Batch, free: &[usize], f: &mut [f64], fx: &mut [f64], fp: &mut [f64]) {
-        if !self.spoilt([&mut *f, &mut *fx, &mut *fp]) {
+        if !self.interrupted([&mut *f, &mut *fx, &mut *fp]) {
             self.field.linearise(at, free, f, fx, fp);
         }
     }
 
     fn directional(&self, at: Batch, directions: &[&[f64]], out: &mut [f64]) {
-        if !self.spoilt([&mut *out, &mut [], &mut []]) {
+        if !self.interrupted([&mut *out, &mut [], &mut []]) {
             self.field.directional(at, directions, out);
         }
     }
@@ -147,7 +146,7 @@ impl VectorField for Interruptible<'_> {
     }
 
     fn evaluate_switched(&self, at: Batch, signs: &[f64], f: &mut [f64]) {
-        if !self.spoilt([&mut *f, &mut [], &mut []]) {
+        if !self.interrupted([&mut *f, &mut [], &mut []]) {
             self.field.evaluate_switched(at, signs, f);
         }
     }

@@ -1,10 +1,9 @@
-//! Whether a solution lies on a branch that is known already.
+//! Recognition of solutions that lie on a known branch.
 //!
 //! **Idea.** Two solutions at the same parameter values are the same if their periods and the ranges of all states and
-//! outputs agree, up to a reflection under which the model is equivariant. A cycle of a forced model and its copies some periods
-//! of the forcing later have the same ranges, and a branch of cycles that run through a shorter one several times is that of
-//! the shorter one (`minimal`). Known branches are asked for their solution at the parameter value in question: interpolated
-//! first, and where that is close, by Newton's method.
+//! outputs agree, up to a reflection under which the model is equivariant. A cycle of a forced model and its copies shifted by
+//! forcing periods have the same ranges, and several turns of a shorter cycle count as that cycle (`minimal`). The solution of a
+//! known branch at the parameter value in question is interpolated first and, if that is close, computed by Newton's method.
 
 use super::System;
 use super::growth::{Line, polished, problem_of, revived};
@@ -37,8 +36,8 @@ fn between(system: &System, settings: &Settings, branch: &Branch, pair: [&Point;
     found.ok().map(|station| station.point)
 }
 
-/// The points of a branch, its folds, and the branch points at which it turns back, as at a pitchfork: between two of them
-/// the parameter is monotonous.
+/// The points of a branch, its folds, and the branch points at which it turns back, as at a pitchfork. Between two of them the
+/// parameter is monotonic.
 fn track(branch: &Branch) -> Vec<&Point> {
     let mut track: Vec<&Point> = branch.points.iter().collect();
     let value = |point: &Point| point.parameters.get(branch.free).copied().unwrap_or(f64::NAN);
@@ -117,14 +116,15 @@ fn least_between(
     Some(if a.1 < b.1 { (a.2, rest) } else { (b.2, rest) })
 }
 
-/// How many times as long one cycle lasts as another, if that is nearly a whole number; else 1.
+/// Ratio of the periods of two cycles if it is nearly a whole number, otherwise 1.
 fn turns(long: &Point, short: &Point) -> f64 {
+    /// Largest distance from a whole number. Empirical: it allows for the change of the period along a step of the branch.
     const NEARLY: f64 = 0.05;
     let ratio = long.solution.period().zip(short.solution.period()).map_or(1.0, |(long, short)| long / short);
     if ratio > 1.5 && (ratio - ratio.round()).abs() < NEARLY { ratio.round() } else { 1.0 }
 }
 
-/// A point like another one whose cycle lasts `times` as long, without a profile.
+/// A copy of a point, without profile, with the period multiplied by `times`.
 pub(super) fn lasting(point: &Point, times: f64) -> Point {
     let mut other = Point { tangent: Vec::new(), ..point.clone() };
     if let Solution::Cycle(cycle) = &mut other.solution {
@@ -151,7 +151,7 @@ pub fn branch_of<'b>(
             if (a - value) * (b - value) > 0.0 {
                 return false;
             }
-            // From where the branch turns back Newton's method would go to either side.
+            // From a turning point Newton's method may converge to either side.
             let fold = |point: &Point| branch.special.iter().any(|s| std::ptr::eq(&s.point, point));
             let first = fold(pair[1]) || !fold(pair[0]) && (a - value).abs() < (b - value).abs();
             let nearest = if first { pair[0] } else { pair[1] };

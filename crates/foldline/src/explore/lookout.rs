@@ -14,7 +14,7 @@ use std::sync::{Condvar, Mutex, PoisonError};
 /// What there is at a value of the parameter.
 pub(super) struct Sight {
     pub(super) value: f64,
-    /// Whether some samples were not seen to settle.
+    /// True if some samples did not settle.
     pub(super) unsettled: bool,
     /// Solutions, none of which is another one under a symmetry, or why nothing can be followed from there.
     pub(super) found: Result<(Vec<Point>, String), String>,

@@ -50,7 +50,7 @@ pub enum Start {
     Seed(usize),
     /// At the end of the branch of that index (its `until`, or its forward bound).
     EndOf(usize),
-    /// At the end of the branch of that name, which is switched to from the branch of that index.
+    /// At the end of the branch of that name, to which the plan switches from the branch of that index.
     EndOfSwitched(usize, String),
     /// At the end of the curve of that index.
     EndOfCurve(usize),
@@ -120,7 +120,7 @@ pub struct BranchPlan {
 pub struct CurvePlan {
     /// Unique name.
     pub name: String,
-    /// What is held: a fold, branch point, Hopf, period doubling or torus point.
+    /// Bifurcation that is continued: a fold, branch point, Hopf, period doubling or torus point.
     pub hold: Kind,
     /// Name of the branch on which the special point lies: one of the plan, or one switched to from it.
     pub of: String,

@@ -1,11 +1,12 @@
-//! Trajectories as profiles of cycles, and profiles in polynomials of another degree.
+//! Conversion of trajectories to profiles of cycles, and of profiles to another polynomial degree.
 
 use crate::diagram::{Cycle, Point, Solution};
 use crate::problem::gauss::Scheme;
 
 /// A trajectory over one period as a profile on a mesh with equal arclength per interval.
 pub(super) fn first_profile(scales: &[f64], period: f64, times: &[f64], states: &[f64]) -> Cycle {
-    // Of what moves less only the time counts.
+    /// Smallest motion of a state, as a share of its scale, that contributes to the arclength: below the accuracy of sampling, 1e-6,
+    /// by a factor of safety of a hundred.
     const LEAST: f64 = 1e-8;
     let n = scales.len();
     // A cycle of many turns needs more of them.
@@ -45,7 +46,7 @@ pub(super) fn first_profile(scales: &[f64], period: f64, times: &[f64], states: 
                     cubic(times, states, n, i, k, t * period)
                 };
                 let value = component - t * gap[i];
-                // What has decayed to nothing is nothing.
+                // Rounding of a state that has decayed.
                 profile.push(if value.abs() < f64::EPSILON * scales[i] { 0.0 } else { value });
             }
         }
@@ -72,7 +73,7 @@ fn cubic(times: &[f64], states: &[f64], n: usize, i: usize, k: usize, t: f64) ->
         .sum()
 }
 
-/// The same solution in polynomials of another degree, to be polished again.
+/// The solution in polynomials of another degree, as a starting point for Newton's method.
 pub(super) fn with_degree(mut point: Point, degree: usize) -> Point {
     if let Solution::Cycle(cycle) = &mut point.solution
         && cycle.degree != degree

@@ -1,11 +1,11 @@
-//! Has a sweep jumped, or is the response merely steep?
+//! Distinction between a jump of a sweep and a steep response.
 //!
-//! **Idea.** The motion at one value of the parameter is solved for and followed to the next value as a branch. If it gets there
-//! without turning back, and is the motion to which the trajectory has settled there, the two are one solution. If it turns
-//! back on the way, or arrives at another motion, the sweep has jumped. A size alone says nothing: at a sharp resonance
-//! neighbouring values differ by much on one branch.
+//! **Idea.** The motion at one parameter value is solved for and continued as a branch to the next value. If the branch gets there
+//! without turning back and arrives at the motion to which the trajectory settled, the two are one solution. If it turns back
+//! on the way or arrives at another motion, the sweep has jumped. Size alone does not decide: at a sharp resonance
+//! responses at neighbouring values differ greatly on one branch.
 //!
-//! **Fails when** one of the two cannot be solved for, or the branch ends on the way; it is not known then.
+//! **Fails when** one of the two motions cannot be solved for or the branch ends on the way; the result is then unknown.
 
 use super::System;
 use super::growth::{Beginning, Growth, polished, problem_of, settings};
@@ -14,7 +14,7 @@ use crate::attractors::Candidate;
 use crate::contract::Unobserved;
 use crate::diagram::{Branch, Ending, Family, Kind, Origin, Point, Solution};
 
-/// Points after which a branch between two neighbouring values is given up.
+/// Most points of a branch between two neighbouring values. A factor of safety: a step of a sweep takes a few points.
 const POINTS: usize = 300;
 
 /// The motion at the last value of a sweep.
@@ -31,7 +31,7 @@ impl<'p> Pursuit<'p> {
         Pursuit { system, free, tolerance, degree, last: None }
     }
 
-    /// Whether the motion at the next value is another solution; `None` where that is not known.
+    /// Returns true if the motion at the next value is a different solution; `None` if that is unknown.
     pub(super) fn leaves(&mut self, parameters: &[f64], candidate: Option<&Candidate>) -> Option<bool> {
         let point = candidate.and_then(|candidate| polish(self.system, parameters, self.tolerance, candidate));
         let before = std::mem::replace(&mut self.last, point);
@@ -40,8 +40,8 @@ impl<'p> Pursuit<'p> {
         Some(reached.is_none_or(|reached| reached.difference(to, &self.system.scales, &[]) > 30.0 * self.tolerance))
     }
 
-    /// The solution followed to a value of the parameter; nothing where it turns back or ends in another branch on the way,
-    /// `None` where it cannot be followed.
+    /// The solution continued to a value of the parameter: `Some(None)` if it turns back or joins another branch on the way, `None` if
+    /// it cannot be continued.
     fn followed(&self, from: &Point, value: f64) -> Option<Option<Point>> {
         let start = from.parameters[self.free];
         let (range, side) = ([start.min(value), start.max(value)], usize::from(value > start));

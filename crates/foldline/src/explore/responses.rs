@@ -1,8 +1,8 @@
 //! The surveys and sweeps of a plan.
 //!
 //! **Idea.** A survey shares its values among the threads; sweeps, in which each value waits for the one before, are shared
-//! as a whole. What an earlier run has completed is not repeated. Whether a sweep has jumped is decided by solving for its
-//! motions (`pursuit`).
+//! as a whole. What an earlier run has completed is not repeated. Jumps of a sweep are detected by solving for its motions
+//! (`pursuit`).
 
 use super::System;
 use super::plan::{Plan, SurveyPlan, SweepPlan};
@@ -65,7 +65,7 @@ struct Count<'o> {
 
 impl Count<'_> {
     fn visited(&self, responses: &[Response]) -> Verdict {
-        // Motions that were under way then are wrong.
+        // Motions computed during an interruption are wrong.
         if self.observer.stopping() {
             return Verdict::Stop;
         }
@@ -94,13 +94,14 @@ fn one_survey(
     complete.then(|| finished(name, Search::Survey, *free, responses, observer))
 }
 
-/// A value without the rounding of the last digits.
+/// Rounds a value to 12 digits, which removes the rounding of its computation.
 fn rounded(value: f64) -> f64 {
     format!("{value:.11e}").parse().unwrap_or(value)
 }
 
-/// How many starts escaped at each value, if any did.
+/// Note on the number of starts that escaped at each value, if any did.
 fn escapes(responses: &[Response], starts: usize) -> Option<String> {
+    /// Values that are listed; more would not be read.
     const TOLD: usize = 8;
     let gone: Vec<&Response> = responses.iter().filter(|r| r.motion == Motion::Escaped).collect();
     let told = gone.iter().take(TOLD).map(|r| format!("{} at the value {}", r.hits, rounded(r.value)));
@@ -149,7 +150,7 @@ fn one_sweep(
     complete.then(|| finished(name, Search::Sweep, *free, responses, observer))
 }
 
-/// The set of a survey or sweep that came to its end. One that was stopped on the way is not kept.
+/// Reports and returns the responses of a completed survey or sweep.
 fn finished(name: &str, search: Search, free: usize, responses: Vec<Response>, observer: &dyn Observer) -> Responses {
     let set = Responses { name: name.to_string(), search, free, responses };
     observer.observe(Event::Responses(&set));

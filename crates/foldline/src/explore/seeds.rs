@@ -101,13 +101,13 @@ impl<'p> Seeds<'p> {
         slot.get_or_init(|| self.found(seed)).clone()
     }
 
-    /// That a given cycle runs through a shorter one several times.
+    /// Notes that a given cycle consists of several turns of a shorter one.
     fn tell_turns(&self, name: &str, given: &Cycle, found: &Point) {
         let Some(period) = found.solution.period() else { return };
         let turns = (given.period / period).round();
         if turns > 1.0 {
             let said = format!(
-                "the given cycle of the period {:.6} runs {turns} times through one of the period {period:.6}, which is taken",
+                "the given cycle of period {:.6} runs {turns} times through a cycle of period {period:.6}, which is used instead",
                 given.period
             );
             self.observer.observe(Event::Note(name, &said));
@@ -195,7 +195,7 @@ fn census_for(system: &System, plan: &Plan, index: usize, jobs: usize) -> Census
     })
 }
 
-/// The census where what is asked for is a cycle that attracts so slowly that no sample would be followed until it has settled there.
+/// The census if the requested attractor is a cycle that attracts too slowly for any sample to settle on it within the step limit.
 fn without_samples(system: &System, plan: &Plan, seed: &SeedPlan, keys: &[&AttractorKey]) -> Option<Census> {
     let found = direct(system, &seed.parameters, plan.tolerance, &next_to_origin(system))?;
     let Solution::Cycle(cycle) = &found.point.solution else { return None };
@@ -237,7 +237,7 @@ pub(super) fn sampling(system: &System, samples: usize, seed: u64, jobs: usize, 
     }
 }
 
-/// Newton's method at fixed parameters; a cycle comes with its minimal period.
+/// Solves for a candidate by Newton's method at fixed parameters; a cycle is reduced to its minimal period.
 pub(super) fn polish(system: &System, parameters: &[f64], tolerance: f64, candidate: &Candidate) -> Option<Point> {
     let settings = settings(system, tolerance, [f64::NEG_INFINITY, f64::INFINITY], 0);
     let free = 0;
@@ -286,8 +286,8 @@ pub(super) fn bare(parameters: &[f64], solution: Solution) -> Point {
     }
 }
 
-/// A given state: an equilibrium if Newton's method finds one next to it, the cycle on which it lies or which attracts too slowly to wait
-/// for ([`direct`]), else what the trajectory from it settles to.
+/// The solution for a given state: an equilibrium if Newton's method finds one close by; otherwise a cycle through the state, or one that
+/// attracts too slowly for simulation ([`direct`]); otherwise the limit of the trajectory from the state.
 fn from_state(
     system: &System,
     seed: &SeedPlan,
@@ -315,12 +315,12 @@ fn from_state(
     let next = direct(system, &seed.parameters, plan.tolerance, state);
     if let Some(Direct { point, periods, through, .. }) = next.as_ref().filter(|next| next.through || next.slow) {
         let slowly = match *periods > NEVER {
-            true => "no motion next to it decays".to_string(),
-            false => format!("it attracts so slowly that a transient lasts some {periods:.1e} periods of the forcing"),
+            true => "transients next to it do not decay".to_string(),
+            false => format!("a transient lasts some {periods:.1e} forcing periods"),
         };
         if !through {
             tell(&format!(
-                "the cycle that Newton's method finds from the given state, not the end of a trajectory: {slowly}"
+                "starts from the cycle that Newton's method finds next to the given state, without simulation: {slowly}"
             ));
         }
         return Ok(point.clone());
@@ -329,22 +329,23 @@ fn from_state(
     let polish = |candidate: &Candidate| polish(system, &seed.parameters, plan.tolerance, candidate);
     let settled = attractors::settle(system.field, &seed.parameters, &sampling, state, &polish);
     settled.or_else(|lost| match (found, next) {
-        // A saddle that the trajectory leads to and does not stay at, if that was meant.
+        // A saddle that the trajectory approaches and leaves again, if the state lies close to it.
         (Some((moved, point)), _) if moved < NEAR => Ok(point),
         (_, Some(next)) if has_arrived(system, seed, &next, &lost) => Ok(next.point),
         _ => Err(no_start(system, seed, state, &lost)),
     })
 }
 
-/// Whether a trajectory that does not repeat itself to the accuracy asked for, as where the steps of a stiff model are as long as they can be,
-/// has come to that cycle.
+/// True if a trajectory has reached the cycle although it does not repeat itself to the required accuracy, as in a stiff model whose steps
+/// are limited by stability.
 fn has_arrived(system: &System, seed: &SeedPlan, next: &Direct, lost: &Lost) -> bool {
     let unit = system.field.time_unit(&seed.parameters);
     matches!(lost, Lost::Unsettled { time, state, .. } if next.ends(*time, state, unit))
 }
 
-/// What became of the trajectory from a given state, why, and what can be done.
+/// Message on a trajectory from a given state that led to no solution: its outcome, the cause and a cure.
 fn no_start(system: &System, seed: &SeedPlan, state: &[f64], lost: &Lost) -> String {
+    /// States whose motion is listed; they fit on one line.
     const TOLD: usize = 4;
     let what = match lost {
         Lost::Unsettled { time, extent, .. } => {
@@ -352,8 +353,7 @@ fn no_start(system: &System, seed: &SeedPlan, state: &[f64], lost: &Lost) -> Str
             let spans: Vec<String> = names.map(|(name, span)| format!("{name} by {span:.1e}")).collect();
             let more = if extent.len() > TOLD { ", …" } else { "" };
             format!(
-                "settles neither to an equilibrium nor to a cycle: it was followed for a time of {time:.1e}, and at the end still \
-                 moves {}{more}",
+                "settles neither to an equilibrium nor to a cycle: after a time of {time:.1e} it still moves {}{more}",
                 spans.join(", ")
             )
         }

@@ -1,29 +1,32 @@
-//! Continuous symmetries and conserved energies, which make solutions come in families.
+//! Detection of continuous symmetries and conserved energies, because of which solutions form families.
 //!
-//! **Idea.** A linear map A with f_x(x) A x = A f(x) everywhere turns solutions into solutions: those that it moves are not isolated, and
-//! Newton's method has nothing to converge to. The condition is linear in A; derivatives at a few places of the sampling box decide it.
-//! A mechanical system without damping whose forces have a potential keeps its energy, so its cycles form a family too.
+//! **Idea.** A matrix A with f_x(x) A x = A f(x) for all x generates a symmetry, exp(sA), that maps solutions to solutions. Solutions that
+//! it moves are not isolated, and Newton's method does not converge to them. The condition is linear in A and is imposed at a few
+//! points of the sampling box. An undamped mechanical system whose forces have a potential conserves its energy, so its cycles form a
+//! family too.
 //!
-//! **Equations.** At places x of the box, with τ where the field is forced:
+//! **Equations.** At points x of the box, and at times τ if the field is forced:
 //!
 //! ```text
 //!   (1)  Σ_jk (f_x)_ij A_jk x_k - Σ_k A_ik f_k = 0   for every i
 //!   (2)  x_i' = v_i,  v_i' = g_i(x),  m_i ∂g_i/∂x_k = m_k ∂g_k/∂x_i
 //! ```
 //!
-//! **Fails when** a symmetry is not linear, or the energy is not of the form (2); then nothing is said.
+//! **Fails when** a symmetry is not linear, or the energy is not of the form (2); it then goes undetected.
 
 use super::System;
 use super::diagnosis::null_space;
 use crate::contract::{Batch, Parameters};
 use crate::linalg::max_abs;
 
-/// Most states for which symmetries are looked for: (1) has the square of that many unknowns.
+/// Largest number of states n for which symmetries are looked for. (1) has n² unknowns, so elimination costs n⁶ operations: a million
+/// for ten.
 const MOST: usize = 10;
-/// A difference of derivatives, relative to the largest, that counts as rounding.
+/// Difference of derivatives, relative to the largest, that counts as rounding: a factor of safety of a million over the machine
+/// precision, for derivatives that are sums of large terms.
 const ROUNDING: f64 = 1e-10;
 
-/// The field at one place.
+/// Values of the field at one point of the box.
 struct Place {
     state: Vec<f64>,
     f: Vec<f64>,
@@ -31,7 +34,7 @@ struct Place {
     fx: Vec<f64>,
 }
 
-/// The pairs of states that can be turned together without a change of the equations, if there are any.
+/// The pairs of states whose simultaneous rotation leaves the equations unchanged, if any.
 pub(super) fn rotation(system: &System, parameters: &[f64]) -> Option<Vec<[usize; 2]>> {
     let n = system.field.dim();
     if !(2..=MOST).contains(&n) {
@@ -47,15 +50,15 @@ pub(super) fn rotation(system: &System, parameters: &[f64]) -> Option<Vec<[usize
         row
     };
     let rows: Vec<Vec<f64>> = places.iter().flat_map(|place| (0..n).map(move |i| row(place, i))).collect();
-    // Fewer equations than unknowns say nothing.
+    // Too few equations determine nothing.
     if rows.len() < n * n + n {
         return None;
     }
-    null_space(rows, n * n).iter().find_map(|generator| turned(generator, n))
+    null_space(rows, n * n).iter().find_map(|generator| rotated_pairs(generator, n))
 }
 
-/// The pairs of states that a generator turns; `None` if it is no rotation.
-fn turned(generator: &[f64], n: usize) -> Option<Vec<[usize; 2]>> {
+/// The pairs of states that a generator rotates; `None` if it is not a rotation.
+fn rotated_pairs(generator: &[f64], n: usize) -> Option<Vec<[usize; 2]>> {
     let size = max_abs(generator);
     let entry = |i: usize, j: usize| generator[i * n + j] / size;
     let mut pairs = Vec::new();
@@ -73,7 +76,7 @@ fn turned(generator: &[f64], n: usize) -> Option<Vec<[usize; 2]>> {
     (!pairs.is_empty()).then_some(pairs)
 }
 
-/// True if the system has the form (2): an energy never changes.
+/// True if the system has the form (2) and hence conserves an energy.
 pub(super) fn keeps_energy(system: &System, parameters: &[f64]) -> bool {
     let n = system.field.dim();
     if n < 2 || !n.is_multiple_of(2) || system.field.forced() {
@@ -87,7 +90,7 @@ pub(super) fn keeps_energy(system: &System, parameters: &[f64]) -> bool {
     let size = places.iter().fold(0.0, |m: f64, place| m.max(max_abs(&place.fx)));
     let slope = |place: &Place, of: usize, by: usize| place.fx[of * n + by];
     let undamped = |place: &Place, v: usize, w: usize| slope(place, v, w).abs() <= ROUNDING * size;
-    // The quotient of two masses is read off at the first place.
+    // The ratio of two masses is taken from the first point.
     let potential = |place: &Place, [x, v]: [usize; 2], [y, w]: [usize; 2]| {
         let [here, there] = [slope(place, v, y), slope(place, w, x)];
         let [first, second] = [slope(&places[0], v, y), slope(&places[0], w, x)];
@@ -99,7 +102,7 @@ pub(super) fn keeps_energy(system: &System, parameters: &[f64]) -> bool {
     places.iter().all(|place| pairs.iter().all(|a| pairs.iter().all(|b| each(place, *a, *b))))
 }
 
-/// The coordinates with their velocities, if every state is one or the other.
+/// Pairs of coordinate and velocity; `None` unless every state belongs to one.
 fn pairs(places: &[Place], n: usize) -> Option<Vec<[usize; 2]>> {
     let is_unit =
         |i: usize, j: usize, place: &Place| (0..n).all(|k| place.fx[i * n + k] == f64::from(u8::from(k == j)));
@@ -110,8 +113,9 @@ fn pairs(places: &[Place], n: usize) -> Option<Vec<[usize; 2]>> {
     (all == (0..n).collect::<Vec<_>>()).then_some(pairs)
 }
 
-/// The field at places of the box where it is finite.
+/// Values of the field at points of the box, without those at which it is not finite.
 fn places(system: &System, parameters: &[f64], count: usize) -> Vec<Place> {
+    /// The golden ratio minus 1: its multiples modulo 1 spread evenly.
     const GOLDEN: f64 = 0.618_033_988_749_895;
     let n = system.field.dim();
     let at = |place: usize| {

@@ -24,7 +24,7 @@ pub struct System<'a> {
     /// Coordinate reflections under which the field is equivariant, the identity first; those of a forced field too under which
     /// it is so half a period of the forcing later.
     pub reflections: Vec<Vec<bool>>,
-    /// The field with an amplitude more, where branch points of cycles are to be held.
+    /// The field with its unfolding amplitude, for curves of branch points of cycles.
     pub(super) unfolded: Option<&'a Unfolded<'a>>,
     /// Of a forced field, for each of these: whether it is equivariant at the same time, and half a period later.
     pub(super) mirrors: Vec<[bool; 2]>,

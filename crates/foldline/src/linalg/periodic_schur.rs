@@ -317,8 +317,8 @@ impl Cycle {
         }
     }
 
-    /// The Wilkinson shift divided by the product of the leading diagonal entries; 0 where that quotient is so large that nothing of the
-    /// matrix would be left beside it. Without a shift the large eigenvalues, which are at the wrong end then, move to the other one at once.
+    /// The Wilkinson shift divided by the product of the leading diagonal entries; 0 if the quotient is so large that the matrix would
+    /// vanish beside it in rounding. In that case the large eigenvalues are at the wrong end, and an unshifted step moves them.
     fn relative_shift(&self, low: usize, high: usize) -> C {
         let p = self.p;
         // Trailing 2×2 block of the product of the triangular factors, times e^log.

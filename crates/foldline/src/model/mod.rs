@@ -253,7 +253,7 @@ impl VectorField for Model {
 
     fn evaluate_switched(&self, at: Batch, signs: &[f64], f: &mut [f64]) {
         self.inner.switches.given.run(at, &[signs], &mut [f]);
-        // Beyond its switch a branch need not be defined, as (x - d)^1.5 in front of a contact at d.
+        // A branch may be undefined beyond its switch, for example (x - d)^1.5 before contact at d.
         if f.iter().any(|value| !value.is_finite()) {
             let mut actual = vec![0.0; f.len()];
             self.evaluate(at, &mut actual);

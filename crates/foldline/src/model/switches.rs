@@ -9,9 +9,9 @@
 //! 1. a < b, a ≤ b: s = a - b, true where σ < 0;   min(a, b), max(a, b): s = a - b, the operand that σ selects
 //! 2. |a|: s = a, σ a;   sign(a): s = a, σ;   heaviside(a): s = a, (1 + σ)/2
 //!
-//! **Departures.** A switch that cannot change sign (a radius that is compared with 0) or that depends on parameters only
-//! is none. A comparison for equality holds at isolated instants, where it changes nothing. A branch that is not defined beyond
-//! its switch, such as a root, is not continued: there the branch that the state takes decides ([`super::Model`]).
+//! **Departures.** An expression that cannot change sign (a radius compared with 0) or depends on parameters only is not a
+//! switch. A comparison for equality holds at isolated instants and has no effect. A branch that is undefined beyond its switch,
+//! such as a root, is not continued; the branch that applies at the state is used instead ([`super::Model`]).
 
 use super::graph::{Binary, Graph, Id, Leaf, Node, Unary};
 use super::tape::Tape;

@@ -37,7 +37,7 @@ use pace::Limits;
 
 /// Trajectories that are integrated at a time: enough to keep vector instructions busy, few enough to stay in the cache.
 const WIDTH: usize = 64;
-/// Beyond this multiple of 1 + |start| in any component a trajectory is taken to run to infinity.
+/// Multiple of 1 + |start|, in any component, beyond which a trajectory counts as running to infinity.
 const BOUND: f64 = crate::diagram::Response::UNBOUNDED;
 /// At rest the step grows without end; beyond this length the arithmetic would overflow.
 const LONGEST: f64 = 1e100;
@@ -219,7 +219,7 @@ impl<'a> Ensemble<'a> {
             } else if lanes.time[l] == self.limits.end {
                 Some(Outcome::Reached)
             } else if lanes.h[l] == 0.0 {
-                // f is so large that the step has become nothing, which has no error.
+                // f is so large that the step has underflowed to 0, which has no error.
                 Some(Outcome::StepTooSmall)
             } else {
                 too_long

@@ -56,10 +56,10 @@ pub enum Outcome {
     Reached,
     /// The observer said stop.
     Stopped,
-    /// The state grew beyond every measure.
+    /// The state grew without bound.
     Escaped,
-    /// The trajectory leads out of the region in which f is defined: f is not finite at its start, or every step on from its
-    /// last state, however short, meets one that it is not finite at.
+    /// The trajectory left the region in which f is defined: f is not finite at the start, or at some stage of every step from the
+    /// last state, however short.
     Undefined,
     /// The step fell below the resolution of the time: f jumps where the field names no switch, the trajectory slides along
     /// a switch, or the problem is too stiff here.
@@ -69,7 +69,7 @@ pub enum Outcome {
 }
 
 impl Outcome {
-    /// True if the trajectory could not be followed on, for whatever reason.
+    /// True if the trajectory could not be continued.
     pub fn is_lost(self) -> bool {
         matches!(self, Outcome::Escaped | Outcome::Undefined | Outcome::StepTooSmall)
     }

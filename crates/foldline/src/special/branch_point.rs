@@ -11,13 +11,13 @@ use num_complex::Complex64;
 
 /// An eigenvalue 0 (a multiplier 1) without a fold.
 pub struct BranchPoint {
-    /// True if a multiplier is 1 because of a continuous symmetry. It says nothing of branch points.
+    /// True if a multiplier is 1 because of a continuous symmetry and therefore does not indicate branch points.
     pub symmetric: bool,
 }
 
 impl BranchPoint {
-    /// The multipliers that say something.
-    fn telling(&self, at: &Point) -> Vec<Complex64> {
+    /// The spectrum without a multiplier that is 1 because of a continuous symmetry.
+    fn spectrum_without_symmetry(&self, at: &Point) -> Vec<Complex64> {
         let neutral = at.neutral_multiplier().filter(|_| self.symmetric);
         let mut spectrum = at.free_spectrum().to_vec();
         if let Some(index) = neutral.and_then(|neutral| spectrum.iter().position(|z| *z == neutral)) {
@@ -34,15 +34,16 @@ impl Monitor for BranchPoint {
 
     fn value(&self, _reference: &Point, at: &Point) -> f64 {
         let centre = if matches!(at.solution, Solution::Cycle(_)) { 1.0 } else { 0.0 };
-        at.parameter_slope() * super::distance_product(&self.telling(at), centre)
+        at.parameter_slope() * super::distance_product(&self.spectrum_without_symmetry(at), centre)
     }
 
     fn confirms(&self, at: &Point) -> bool {
         // At a fold, too, the product vanishes; there the tangent has no parameter component.
         let centre = if matches!(at.solution, Solution::Cycle(_)) { 1.0 } else { 0.0 };
         let largest = at.spectrum.iter().map(|z| z.norm()).fold(1e-300, f64::max).min(1.0);
-        let closest = self.telling(at).iter().map(|z| (z - centre).norm()).fold(f64::INFINITY, f64::min);
-        // A single eigenvalue has none to be compared with.
+        let closest =
+            self.spectrum_without_symmetry(at).iter().map(|z| (z - centre).norm()).fold(f64::INFINITY, f64::min);
+        // A single eigenvalue cannot be compared with others.
         (closest < 1e-2 * largest || at.spectrum.len() == 1) && at.parameter_slope().abs() > 1e-6
     }
 
@@ -52,7 +53,7 @@ impl Monitor for BranchPoint {
 
     fn passed(&self, at: &Point) -> Option<usize> {
         let centre = if matches!(at.solution, Solution::Cycle(_)) { 1.0 } else { 0.0 };
-        Some(self.telling(at).iter().filter(|z| z.im == 0.0 && z.re > centre).count())
+        Some(self.spectrum_without_symmetry(at).iter().filter(|z| z.im == 0.0 && z.re > centre).count())
     }
 
     fn others_unstable(&self, at: &Point) -> Option<usize> {

@@ -1,18 +1,18 @@
-//! Coefficients of a normal form with their errors, and why there are none.
+//! Coefficients of a normal form with their errors, or the reason why they are missing.
 
 /// Coefficients of a normal form.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Coefficients {
-    /// Named by [`crate::diagram::Kind::coefficients`].
+    /// Values, in the order of [`crate::diagram::Kind::coefficients`].
     pub values: Vec<f64>,
     /// Bounds on their errors.
     pub errors: Vec<f64>,
-    /// Why there are none, or why they decide nothing; empty where there is nothing to say.
+    /// Reason why the coefficients are missing or inconclusive; otherwise empty.
     pub remark: String,
 }
 
 impl Coefficients {
-    /// No coefficients, for a reason.
+    /// Missing coefficients, with the reason.
     pub fn none(why: impl std::fmt::Display) -> Coefficients {
         Coefficients { remark: format!("no coefficients: {why}"), ..Coefficients::default() }
     }

@@ -94,7 +94,7 @@ impl Monitor for Shrinks<'_> {
     }
 
     fn meeting(&self, at: &Point) -> Option<f64> {
-        // A generalised one lies elsewhere along a curve than the Hopf points of one parameter next to it.
+        // Along a curve in two parameters a generalised Hopf point is not where nearby Hopf points in one parameter are.
         self.hopf_point(at).filter(|_| self.at == Kind::Hopf)
     }
 
@@ -186,7 +186,7 @@ impl Monitor for Halves {
     }
 }
 
-/// What [`compare`] finds of the deviations from the means, by the quadrature of the Gauss points.
+/// The result of [`compare`] for deviations from the means, by Gauss quadrature.
 fn on_one_mesh(a: &Cycle, b: &Cycle, extents: &[f64]) -> f64 {
     let (scheme, n) = (Scheme::of(a.degree), a.dim());
     let block = (a.degree + 1) * n;
@@ -207,11 +207,12 @@ fn on_one_mesh(a: &Cycle, b: &Cycle, extents: &[f64]) -> f64 {
     mean_share(&own, extents)
 }
 
-/// Deviation of a component, as a share of its extent, below which it is noise beside the largest such share.
+/// Relative deviation of a component, compared with the largest one, below which it is noise. Empirical: next to the simpler solution
+/// deviations of symmetric components are errors of the solution, while those that break the symmetry are much larger.
 const NOISE: f64 = 1e-3;
 
-/// Mean over the components of the inner products of two deviations, each relative to the square of the first: `own` has both for
-/// each component. A component that hardly deviates says nothing, and its quotient would be one of rounding errors.
+/// Mean over the components of the inner product of two deviations, relative to the square of the first; `own` holds square and product
+/// for each component. A component that hardly deviates is left out, since its quotient would be one of rounding errors.
 fn mean_share(own: &[[f64; 2]], extents: &[f64]) -> f64 {
     let size = |c: usize| own[c][0] / extents[c].powi(2);
     let largest = (0..own.len()).map(size).fold(f64::MIN_POSITIVE, f64::max);
@@ -223,7 +224,7 @@ fn mean_share(own: &[[f64; 2]], extents: &[f64]) -> f64 {
     total / f64::from(count.max(1))
 }
 
-/// Extents of the states of a cycle, by which their deviations are measured.
+/// Extents of the states of a cycle, the units of their deviations.
 fn extents(at: &Point, n: usize) -> Vec<f64> {
     let of = |c: usize| at.ranges.get(c).map_or(1.0, |[low, high]| (high - low).max(low.abs()).max(high.abs()));
     (0..n).map(|c| of(c).max(f64::MIN_POSITIVE)).collect()

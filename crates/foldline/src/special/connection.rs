@@ -1,12 +1,12 @@
-//! Orbits of infinite period to which a branch of cycles tends.
+//! Orbits of infinite period that a branch of cycles approaches.
 //!
-//! **Idea.** A cycle of long period spends most of it next to an equilibrium if it tends to a homoclinic or heteroclinic orbit. So
-//! the slowest places of the cycle are compared with the equilibria next to them: each must be a saddle, the cycle must come close to it, and
-//! the time spent there must be what the eigenvalues make of that distance. A canard is slow as well, but next to no saddle. Where
-//! there is no equilibrium at all, a saddle-node may just have vanished; the cycle then takes the time that its normal form says.
+//! **Idea.** A cycle close to a homoclinic or heteroclinic orbit spends most of its period near equilibria. The slowest points of the
+//! cycle are therefore compared with nearby equilibria: each must be a saddle, the cycle must pass close to it, and the passage time
+//! must be the one that the eigenvalues predict for that distance. A canard is slow as well, but not near a saddle. If there is no
+//! equilibrium at all, two may just have vanished in a saddle-node; the period then follows from its normal form.
 //!
-//! **Equations.** With d the least distance from a saddle with leading eigenvalues λ_s < 0 < λ_u, R the radius of a ball around it, and at a
-//! saddle-node with null vectors v, w, ⟨w, v⟩ = 1:
+//! **Equations.** With d the least distance from a saddle with leading eigenvalues λ_s < 0 < λ_u, R the radius of a ball around it, and
+//! null vectors v, w, ⟨w, v⟩ = 1, of f_x and its transpose at a saddle-node:
 //!
 //! ```text
 //!   (1)  time in the ball = (1/λ_u + 1/|λ_s|) ln(R/d)
@@ -23,20 +23,23 @@ use crate::problem::gauss::Scheme;
 use crate::stability::eigenvalues;
 use std::f64::consts::PI;
 
-/// Radius of the ball around an equilibrium in which the flow is nearly linear, in units of the extents of the cycle.
+/// Radius of the ball around an equilibrium in which the flow is nearly linear, in units of the extents of the cycle. Order of magnitude:
+/// quadratic terms are then a tenth of the linear ones.
 const BALL: f64 = 0.1;
-/// Least distance, in the same units, of a cycle that tends to a saddle: e⁻² of the ball, so that (1) is more than its errors of order 1.
+/// Largest distance, in the same units, of closest approach to a saddle: e⁻² of the ball. The logarithm in (1) is then at least 2 and
+/// exceeds the neglected terms of order 1.
 const CLOSE: f64 = 0.135 * BALL;
-/// How far the measured time may be off (1) and (3), as a factor: the ball is not small, and the constants beside the logarithm are left out.
+/// Largest ratio between the measured time and (1) or (3). Empirical: the ball is not small, and the constants beside the logarithm are
+/// neglected.
 const FACTOR: f64 = 3.0;
-/// Share of the period that is spent next to equilibria.
+/// Smallest share of the period spent near equilibria. It tends to 1 at the limit; half is a factor of safety.
 const MOST: f64 = 0.5;
-/// Slow places that are looked at.
+/// Largest number of saddles on one heteroclinic cycle. A bound on the work: with more, each takes an eighth of the period or less.
 const PLACES: usize = 8;
-/// Newton iterations.
+/// Most Newton iterations. Convergence to 1e-10 from a tenth of the extent takes about six; the rest is a margin.
 const ITERATIONS: usize = 20;
 
-/// The vector field beside a cycle, measured in the extents of that.
+/// Search for equilibria next to a cycle, with distances in units of its extents.
 pub struct Limits<'a> {
     /// The vector field, which is autonomous.
     pub field: &'a dyn VectorField,
@@ -48,7 +51,7 @@ pub struct Limits<'a> {
     pub tolerance: f64,
 }
 
-/// A node of a cycle: its state, how much of the period it stands for, and its speed.
+/// A node of a cycle: its state, its share of the period (quadrature weight), and its speed.
 struct Node {
     x: Vec<f64>,
     share: f64,
@@ -56,7 +59,7 @@ struct Node {
 }
 
 impl Limits<'_> {
-    /// What the branch tends to at a cycle of long period, if the cycle shows it.
+    /// The orbit of infinite period that a cycle of long period approaches, if any.
     pub fn approached(&self, at: &Point) -> Option<Ending> {
         let Solution::Cycle(cycle) = &at.solution else { return None };
         let n = cycle.dim();
@@ -84,7 +87,7 @@ impl Limits<'_> {
         nodes
     }
 
-    /// The saddles next to which the cycle spends its time.
+    /// Connection of the saddles near which the cycle spends most of its period.
     fn saddles(
         &self,
         period: f64,
@@ -113,7 +116,7 @@ impl Limits<'_> {
         (spent > MOST).then(|| (kind, met.iter().map(|x| place(x)).collect::<Vec<_>>().join(", ")))
     }
 
-    /// The equilibrium next to a state.
+    /// The equilibrium to which Newton's method converges from a state.
     fn equilibrium(&self, beside: &[f64], parameters: &[f64]) -> Option<Vec<f64>> {
         let n = beside.len();
         let (mut x, mut pivots) = (beside.to_vec(), vec![0; n]);
@@ -130,7 +133,7 @@ impl Limits<'_> {
         None
     }
 
-    /// (1) for one passage at that distance; `None` where the equilibrium is no saddle.
+    /// The time (1) of one passage at distance `least`; `None` if the equilibrium is not a saddle.
     fn passage(&self, saddle: &[f64], parameters: &[f64], least: f64) -> Option<f64> {
         let (_, fx) = self.linearised(saddle, parameters);
         let rates = eigenvalues(&fx, saddle.len(), self.scales).into_iter().map(|z| z.re);
@@ -141,7 +144,7 @@ impl Limits<'_> {
         saddle.then(|| (1.0 / unstable + 1.0 / stable) * (BALL / least).ln())
     }
 
-    /// The saddle-node (2) next to the slowest place, if it is as close in the parameter as that is accurate and (3) is the period.
+    /// The saddle-node (2) next to the slowest point, if its parameter value agrees within the tolerance and its period with (3).
     fn saddle_node(
         &self,
         period: f64,
@@ -202,7 +205,8 @@ impl Limits<'_> {
         (time.is_finite() && fits(period, time)).then(|| (Connection::SaddleNode, there, place(&x)))
     }
 
-    /// The null vector of f_x, or of its transpose, by inverse iteration; of unit length in scaled states, if it is not the left one.
+    /// The null vector of f_x, or of its transpose (`left`), by inverse iteration; of unit length in scaled states, the left one in the
+    /// reciprocal scaling.
     fn null_vector(&self, x: &[f64], parameters: &[f64], left: bool) -> Option<Vec<f64>> {
         let n = x.len();
         let (_, mut fx) = self.linearised(x, parameters);
@@ -267,7 +271,7 @@ fn distance(a: &[f64], b: &[f64], extents: &[f64]) -> f64 {
     (0..a.len()).map(|i| ((a[i] - b[i]) / extents[i]).abs()).fold(0.0, f64::max)
 }
 
-/// How often a cycle comes in there.
+/// Number of times that a cycle enters a neighbourhood, at least 1.
 fn passes(nodes: &[Node], near: &dyn Fn(&Node) -> bool) -> f64 {
     let before = nodes.iter().cycle().skip(nodes.len() - 1);
     let entries = nodes.iter().zip(before).filter(|(node, before)| near(node) && !near(before)).count();

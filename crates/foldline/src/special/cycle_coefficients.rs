@@ -1,8 +1,8 @@
 //! Coefficients of normal forms of cycles with their errors.
 //!
-//! **Idea.** A coefficient is computed twice: at the point as it was located, on a mesh on which the second derivatives of f are resolved; and on
-//! a mesh with half as many intervals again, where the cycle and its special point have been solved for together. The two differ by
-//! the error of the place, of the profile, and of the integrals. The second is given, and its error follows from the difference.
+//! **Idea.** A coefficient is computed twice: at the point as it was located, on a mesh that resolves the second derivatives of f; and on
+//! a mesh with half as many intervals again, after solving for cycle and special point together. The two differ by the errors of the
+//! location, of the profile and of the integrals. The second value is returned, with an error derived from the difference.
 //!
 //! **Equations.** With x_j and x_{j+1} the states at the ends of interval j, d = x_{j+1} - x_j, and w a direction:
 //!
@@ -12,11 +12,11 @@
 //!   (2)  F(u) = 0, g(u, σ) = 0:   F_u δ = F, F_u τ = 0;   g_u τ α + g_σ Δσ = g_u δ - g,   Δu = α τ - δ
 //! ```
 //!
-//! (1) vanishes but for the order of the quadrature. Where f_x changes within less than an interval, as at contact that is hardly smoothed, the
-//! Gauss points may all miss it, on any two meshes; (1) does not, and the interval is cut in two until it is small.
+//! (1) vanishes up to the error of the quadrature. If f_x changes within less than an interval, as at contact with little smoothing, all
+//! Gauss points may miss the change on both meshes; (1) detects it, and the interval is bisected until (1) is small.
 //!
-//! If the error of a coefficient goes with the power q of the length of the intervals, that of the second is 1 / (1.5^q - 1) times
-//! the difference: twice it for q = 1, the least that is reckoned with; smooth fields have q = 8.
+//! If the error of a coefficient is of order q in the length of the intervals, that of the second value is 1 / (1.5^q - 1) times the
+//! difference: twice the difference for q = 1, the lowest order expected; smooth fields have q = 8.
 //!
 //! **Source.** govaerts2000, §3 (bordered systems); the test (1) is ours.
 
@@ -31,10 +31,11 @@ use crate::problem::gauss::Scheme;
 use crate::problem::{Setting, mesh};
 use num_complex::Complex64;
 
-/// Error of the second value over the difference of both.
+/// Error of the second value over the difference of both: 1 / (1.5 - 1) for q = 1.
 const SAFE: f64 = 2.0;
 
-/// Share of the terms of a coefficient from which on its error leaves nothing of it known.
+/// Error of a coefficient that is zero within it, as a share of its terms, above which the coefficient is undetermined rather than
+/// degenerate. Empirical: terms that cancel to less than a hundredth are taken for a true zero.
 const UNKNOWN: f64 = 1e-2;
 
 /// The coefficients of a cycle at a special point of that kind. The setting has one free parameter.
@@ -64,12 +65,12 @@ fn found(kind: Kind, setting: &Setting, at: &Point) -> Result<Coefficients, Stri
     let (one, two) = (value(&first)?, value(&second)?);
     let noise = f64::EPSILON * resolved.len() as f64;
     if two.divisor.abs() <= NOTHING + SAFE * (two.divisor.abs() - one.divisor.abs()).abs() {
-        return Err("the period does not change at the fold, but for its error".into());
+        return Err("the change of the period at the fold is zero within its error".into());
     }
     Ok(compared(one, two, noise))
 }
 
-/// The second of two values with its error; `noise` is the relative error of the terms by rounding.
+/// The second of two values, with its error; `noise` is the relative rounding error of the terms.
 fn compared(one: Value, two: Value, noise: f64) -> Coefficients {
     let error = SAFE * (two.value - one.value).abs() + noise * two.terms;
     let unknown = two.value.abs() <= error && error > UNKNOWN * two.terms;
@@ -83,10 +84,13 @@ struct Part {
     states: [Vec<f64>; 2],
 }
 
-/// A mesh with every boundary of that of the cycle, on which (1) is small everywhere; `None` if there is none of a permitted size.
+/// A refinement of the mesh of the cycle on which (1) is small everywhere; `None` if that needs more than the permitted number of
+/// intervals.
 fn resolved(setting: &Setting, at: &Point, cycle: &Cycle) -> Option<Mesh> {
-    // Of the change of f_x over the whole period. A halving more leaves next to nothing, by the order of the quadrature.
+    /// Largest (1), as a share of the change of f_x over the period. One further bisection reduces it to almost nothing, by the order of the
+    /// quadrature.
     const SHARE: f64 = 1e-6;
+    /// Shortest interval, in periods: four digits above the rounding of a mesh boundary.
     const SHORTEST: f64 = 1e-12;
     let scheme = Scheme::of(cycle.degree);
     let state = |t: f64| {
@@ -125,7 +129,7 @@ fn resolved(setting: &Setting, at: &Point, cycle: &Cycle) -> Option<Mesh> {
     Some(done.into())
 }
 
-/// (1) of every part, how much f_x changes over it, and the largest f_x met, in sizes of the states.
+/// (1) for every part, the change of f_x over it, and the largest f_x encountered, in scaled states.
 struct Missed {
     missed: Vec<f64>,
     changes: Vec<f64>,
@@ -134,7 +138,7 @@ struct Missed {
 
 fn missed(setting: &Setting, at: &Point, cycle: &Cycle, scheme: &Scheme, parts: &[Part]) -> Missed {
     let (field, n, lanes, known) = (setting.field, cycle.dim(), parts.len(), at.parameters.len());
-    // The time stands still in the middle: only the change with the state counts.
+    // Time is fixed at the middle of the interval: only the change with the state counts.
     let middle = |part: &Part| f64::from(cycle.forcing_periods) * 0.5 * (part.ends[0] + part.ends[1]);
     let times: Vec<f64> = parts.iter().filter(|_| cycle.forcing_periods > 0).map(middle).collect();
     let spread = |of: &dyn Fn(&Part, usize) -> f64, size: usize| -> Vec<f64> {
@@ -169,12 +173,16 @@ fn missed(setting: &Setting, at: &Point, cycle: &Cycle, scheme: &Scheme, parts: 
     out
 }
 
-/// The special point on another mesh by (2), from `first`, which is `at` on a mesh of its own.
+/// The special point on another mesh by (2), starting from `first`, which is `at` on its refined mesh.
 fn solved(kind: Kind, setting: &Setting, first: &Point, at: &Point, mesh: &Mesh) -> Option<Point> {
+    /// Most iterations. Convergence is quadratic from an error of the tolerance, so three suffice; the rest is a margin.
     const ROUNDS: usize = 6;
+    /// Largest relative update. A factor of safety: the starting point is accurate to the tolerance, and a larger update leads to
+    /// another point.
     const FAR: f64 = 1e-2;
+    /// Relative error after which iteration ends: the smallest tolerance of Newton's method.
     const DONE: f64 = 1e-11;
-    // Error after a step of Newton's method over the square of the error before, that is reckoned with.
+    /// Error after a Newton step over the square of the error before. A factor of safety: in scaled unknowns the ratio is of order 1.
     const CURVED: f64 = 10.0;
     let start = on_mesh(first, mesh)?;
     let (Solution::Cycle(cycle), Solution::Cycle(own)) = (&start.solution, &at.solution) else { return None };
@@ -190,7 +198,7 @@ fn solved(kind: Kind, setting: &Setting, first: &Point, at: &Point, mesh: &Mesh)
     if !Condition::evaluate(&mut condition, &u, &extra, &mut g) {
         return None;
     }
-    // From here on the borders are nearly the null vectors.
+    // The borders are now close to the null vectors.
     condition.anchor();
     problem.anchor(&u);
     let (size, mut before) = (u.len(), f64::INFINITY);
@@ -206,7 +214,7 @@ fn solved(kind: Kind, setting: &Setting, first: &Point, at: &Point, mesh: &Mesh)
         r.fill(0.0);
         r[size - 1] = 1.0;
         problem.solve(&r, &mut tau);
-        let shares = small(&mut condition, &delta, &tau, &g)?;
+        let shares = bordered_update(&mut condition, &delta, &tau, &g)?;
         let update: Vec<f64> = tau.iter().zip(&delta).map(|(t, d)| shares[0] * t - d).collect();
         let length = problem.relative_size(&update, &u);
         if length.is_nan() || length > FAR {
@@ -214,9 +222,9 @@ fn solved(kind: Kind, setting: &Setting, first: &Point, at: &Point, mesh: &Mesh)
         }
         axpy(1.0, &update, &mut u);
         extra.iter_mut().zip(&shares[1..]).for_each(|(x, d)| *x += d);
-        // What is left is about the square of the update; rounding ends the descent, at the latest.
+        // The remaining error is about the square of the update; at the latest, rounding ends the convergence.
         if CURVED * length * length < DONE || length > 0.3 * before {
-            return (length < 1e-2 * FAR).then(|| resumed(&problem, &u, &row, &condition, &extra, at));
+            return (length < 1e-2 * FAR).then(|| as_point(&problem, &u, &row, &condition, &extra, at));
         }
         before = length;
     }
@@ -224,7 +232,7 @@ fn solved(kind: Kind, setting: &Setting, first: &Point, at: &Point, mesh: &Mesh)
 }
 
 /// α and Δσ of (2).
-fn small(condition: &mut OnCycles, delta: &[f64], tau: &[f64], g: &[f64]) -> Option<Vec<f64>> {
+fn bordered_update(condition: &mut OnCycles, delta: &[f64], tau: &[f64], g: &[f64]) -> Option<Vec<f64>> {
     let (count, e) = (g.len(), condition.extra());
     let still = vec![0.0; e];
     let mut column = |along: &[f64], extra: &[f64]| {
@@ -248,8 +256,8 @@ fn small(condition: &mut OnCycles, delta: &[f64], tau: &[f64], g: &[f64]) -> Opt
     Some(right)
 }
 
-/// The point with these unknowns, with what is held in its spectrum.
-fn resumed(
+/// The point with the unknowns `u`, whose spectrum contains the critical multipliers.
+fn as_point(
     problem: &CycleProblem,
     u: &[f64],
     tangent: &[f64],
@@ -259,7 +267,7 @@ fn resumed(
 ) -> Point {
     let mut point = problem.point(u, tangent, Examination::default());
     point.spectrum.clone_from(&at.spectrum);
-    // Of a pair on the circle the angle has changed.
+    // The angle of a pair on the unit circle has changed.
     let angle = extra.first().copied().unwrap_or(0.0);
     let pairs = point.spectrum.iter_mut().filter(|z| z.im != 0.0);
     let nearest: Vec<&mut Complex64> = pairs.filter(|z| condition.distance(**z) < 1e-2).collect();

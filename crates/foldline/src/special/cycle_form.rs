@@ -16,8 +16,8 @@
 //!
 //! **Source.** kuznetsov2005; in the form of bordered equations, govaerts2000, §7.
 //!
-//! **Fails when** the period of free cycles does not change at their fold: (1) has no solution then, and a fold has no coefficient. Where a cycle
-//! passes a switch of a piecewise field, B and C are not all there is: a kink adds impulses.
+//! **Fails when** the period of free cycles does not change at their fold: (1) has no solution, and the fold has no coefficient. It also
+//! fails if a cycle passes a switch of a piecewise field, where the second derivative contains impulses that B and C lack.
 
 use super::normal_form::without_rounding;
 use super::on_cycles::OnCycles;
@@ -30,30 +30,30 @@ use crate::problem::{Setting, mesh};
 /// Share of the null vector of a fold below which a change of the period is the error of collocation.
 pub(super) const NOTHING: f64 = 1e-8;
 
-/// A coefficient as it is on the mesh of the point.
+/// A coefficient computed on the mesh of the point.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Value {
     /// The coefficient.
     pub(super) value: f64,
-    /// The sum of the sizes of its terms.
+    /// Sum of the moduli of its terms.
     pub(super) terms: f64,
-    /// Of a fold of free cycles, the share of the period in the null vector, by which v of (1) is divided; 1 elsewhere.
+    /// For a fold of free cycles, the component of the null vector along the period, by which v of (1) is divided; otherwise 1.
     pub(super) divisor: f64,
 }
 
-/// The coefficient of a cycle at a special point of that kind, for the sake of its sign; `None` for kinds that have none, and where it cannot
-/// be computed or is not defined. The setting has any free parameters.
+/// The coefficient of a cycle at a special point of that kind, without an error, for uses that need its sign only. `None` for kinds without
+/// a coefficient, and if it is not defined or cannot be computed. The setting may have any free parameters.
 pub fn coefficient(kind: Kind, setting: Setting, at: &Point) -> Option<f64> {
     let Solution::Cycle(cycle) = &at.solution else { return None };
     if cycle.intervals() == 0 || switches_passed(&setting, at) > 0 {
         return None;
     }
-    // Higher derivatives of a field change more sharply than the cycle that the mesh was made for.
+    // Higher derivatives of a field vary more sharply than the cycle, to which the mesh is adapted.
     let found = valued(kind, setting, &on_mesh(at, &mesh::denser(&cycle.mesh))?)?;
     (found.divisor.abs() > NOTHING).then_some(found.value)
 }
 
-/// The coefficient on the mesh of the point.
+/// Computes the coefficient on the mesh of the point.
 pub(super) fn valued(kind: Kind, setting: Setting, at: &Point) -> Option<Value> {
     let Solution::Cycle(cycle) = &at.solution else { return None };
     let unit = setting.field.time_unit(&at.parameters);
@@ -80,7 +80,7 @@ pub(super) fn valued(kind: Kind, setting: Setting, at: &Point) -> Option<Value> 
     Some(Value { value: value / unit, terms: terms / unit.abs(), divisor }).filter(|found| found.value.is_finite())
 }
 
-/// The point with its cycle on another mesh.
+/// Transfers the cycle of a point to another mesh.
 pub(super) fn on_mesh(at: &Point, mesh: &Mesh) -> Option<Point> {
     let Solution::Cycle(cycle) = &at.solution else { return None };
     let profile = mesh::transferred(&cycle.profile, cycle.dim(), &Scheme::new(cycle.degree), &cycle.mesh, mesh);
@@ -88,7 +88,7 @@ pub(super) fn on_mesh(at: &Point, mesh: &Mesh) -> Option<Point> {
     Some(Point { solution, ..at.clone() })
 }
 
-/// How often a cycle passes a switch of the field: there its second derivative has a jump of the first to integrate, which no mesh sees.
+/// Number of times that a cycle passes a switch of the field. There the second derivative is an impulse, which no mesh resolves.
 pub(crate) fn switches_passed(setting: &Setting, at: &Point) -> usize {
     let (field, Solution::Cycle(cycle)) = (setting.field, &at.solution) else { return 0 };
     let (n, count) = (cycle.dim(), field.switch_count());
@@ -156,7 +156,7 @@ impl Form<'_, '_> {
         (self.condition.solvability(above) / self.condition.solvability(below)).re
     }
 
-    /// The sum of the ratios, zero where nothing is left of them but the error of collocation, and the sum of their sizes.
+    /// Sum of the ratios, zero if only the error of collocation remains, and sum of their moduli.
     fn total(&self, terms: &[Vec<f64>], below: &[f64]) -> (f64, f64) {
         const SHARE: f64 = 1e-9;
         let terms: Vec<f64> = terms.iter().map(|term| self.ratio(term, below)).collect();

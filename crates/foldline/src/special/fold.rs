@@ -37,8 +37,8 @@ impl Monitor for Fold {
     }
 }
 
-/// A multiplier 1 (an eigenvalue 0): the fold of a branch along which the parameter moves so little that its slope is rounding, as in a canard
-/// explosion.
+/// A multiplier that passes 1 (an eigenvalue that passes 0): the fold of a branch whose parameter slope is lost in rounding, as in a
+/// canard explosion.
 struct Passage;
 
 impl Monitor for Passage {
@@ -51,6 +51,7 @@ impl Monitor for Passage {
     }
 
     fn confirms(&self, at: &Point) -> bool {
+        /// Largest distance of the critical multiplier from 1 (eigenvalue from 0). Empirical, and the same as at branch points.
         const NEAR: f64 = 1e-2;
         at.free_spectrum().iter().any(|z| (z - critical(at)).norm() < NEAR)
     }
@@ -64,7 +65,7 @@ impl Monitor for Passage {
     }
 }
 
-/// The eigenvalue or multiplier at a fold.
+/// Critical value at a fold: eigenvalue 0, multiplier 1.
 fn critical(at: &Point) -> f64 {
     if matches!(at.solution, Solution::Cycle(_)) { 1.0 } else { 0.0 }
 }

@@ -53,7 +53,7 @@ impl Monitor for Hopf {
     }
 }
 
-/// Every two eigenvalues.
+/// All pairs of eigenvalues.
 fn pairs(z: &[Complex64]) -> impl Iterator<Item = (Complex64, Complex64)> + '_ {
     (0..z.len()).flat_map(move |i| (i + 1..z.len()).map(move |j| (z[i], z[j])))
 }
@@ -71,20 +71,21 @@ pub fn frequencies(at: &Point) -> Vec<f64> {
     there.iter().map(|z| z.im).collect()
 }
 
-/// Newton update, relative, of an equilibrium whose square is rounding.
+/// Relative Newton update after which an equilibrium is converged: its square, the error left by quadratic convergence, is rounding.
 const CONVERGED: f64 = 1e-8;
 
-/// First step of the search for a Hopf point, as a share of its reach: next to the root of rounding, below which the difference of two
-/// growth rates is noise.
+/// First step of the search for a Hopf point, as a share of its reach. With [`REACH`] it is 1e-8, the square root of the machine precision,
+/// below which the difference of two growth rates is noise.
 const NEXT: f64 = 1e-6;
-/// How often one of its steps is halved.
+/// Most halvings of one step of the search. Empirical: a step is halved where the equilibrium does not exist, beyond a fold; 2⁻⁸ of it lies
+/// well before the fold.
 const SHORTER: i32 = 8;
 
-/// How far from a small cycle its Hopf point is looked for, relative to 1 + |parameter|.
+/// Largest distance of a Hopf point from a small cycle, relative to 1 + |parameter|.
 const REACH: f64 = 1e-2;
 
-/// The value of parameter `free` at which the equilibrium next to `state` has a Hopf point with a frequency close to `omega`: where the
-/// growth rate of that pair vanishes. `None` if that is not near these parameter values.
+/// Parameter value of the Hopf point of the equilibrium next to `state`: the value of parameter `free` at which the growth rate of the pair
+/// with a frequency close to `omega` vanishes. `None` if there is none near these parameter values.
 pub fn lies_near(
     field: &dyn VectorField,
     parameters: &[f64],
@@ -115,7 +116,7 @@ pub fn lies_near(
         if !next.is_finite() || (next - value).abs() > 10.0 * reach {
             return None;
         }
-        // Beyond a fold of the equilibria there is nothing to be found.
+        // There is no equilibrium beyond a fold: shorten the step.
         let shorter = (0..SHORTER).map(|k| b + (next - b) * 0.5f64.powi(k));
         let (next, rate) = shorter.into_iter().find_map(|at| Some((at, growth(at)?)))?;
         (a, at_a, b, at_b) = (b, at_b, next, rate);
@@ -143,7 +144,7 @@ fn growth_rate(field: &dyn VectorField, parameters: &[f64], scales: &[f64], x: &
             return None;
         }
         x.iter_mut().zip(&f).for_each(|(x, d)| *x -= d);
-        // Newton's method converges quadratically: what is left now is the square of that, or rounding.
+        // Newton's method converges quadratically: the remaining error is the square of the update, or rounding.
         converged = size < CONVERGED;
     }
     None

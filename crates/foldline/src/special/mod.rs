@@ -38,7 +38,7 @@ use crate::contract::{Monitor, VectorField};
 use crate::diagram::{Family, Kind, Point, Solution};
 use num_complex::Complex64;
 
-/// Everything to look for on branches of a family. `symmetric` says that the model has a continuous symmetry.
+/// Monitors for branches of a family. `symmetric` is true if the model has a continuous symmetry.
 pub fn monitors(family: Family, symmetric: bool) -> Vec<Box<dyn Monitor>> {
     let both: [Box<dyn Monitor>; 2] = [Box::new(fold::Fold), Box::new(branch_point::BranchPoint { symmetric })];
     match family {
@@ -68,8 +68,8 @@ fn distance_product(spectrum: &[Complex64], at: f64) -> f64 {
     product(|| spectrum.iter().map(|z| (z - at) / (1.0 + z.norm())))
 }
 
-/// The product of factors of which complex ones come with their conjugates. Where the many factors of a large system underflow together its
-/// sign is right all the same.
+/// Product of factors among which complex ones occur in conjugate pairs. Its sign is correct even if the many factors of a large system
+/// underflow.
 fn product<I: Iterator<Item = Complex64>>(factors: impl Fn() -> I) -> f64 {
     let product = factors().product::<Complex64>().re;
     if product.abs() >= f64::MIN_POSITIVE || product.is_nan() {

@@ -1,8 +1,8 @@
-//! A branch point of cycles is held.
+//! Defining system of branch points of cycles in two parameters.
 //!
 //! **Idea.** As for equilibria ([`super::on_branch_points`]): where branches over λ cross, the variational equation with a column for λ has
-//! two null vectors and a left one. It is bordered by approximate ones, which makes it regular, and what the borders have to add is held
-//! at zero.
+//! two right null vectors and a left one. Bordered by approximations of these it is regular, and its border components vanish exactly at a
+//! branch point.
 //!
 //! **Equations.** In normalised time, f_x along the cycle, λ a direction in the plane of the two parameters:
 //!
@@ -16,12 +16,12 @@
 //!   (3)  dg_k = -w* (dL) v_k
 //! ```
 //!
-//! A forced cycle has a given period: then T₁ and the integral are left out. That branches cross along a whole curve is not generic, so it
-//! is asked of f + b d(x), of which there always is such a curve ([`super::unfolded`]); where b stays 0 it is one of f.
+//! For forced cycles the period is prescribed, and T₁ and the integral are omitted. A curve along which branches cross is not generic, so the
+//! system is posed for f + b d(x), which always has such a curve ([`super::unfolded`]); as long as b stays 0 it is a curve of f.
 //!
 //! **Source.** doedel2003 (cycles); govaerts2000, §3 (bordered matrices) and §6 (branch points).
 //!
-//! **Departures.** d, C and λ are taken anew at every accepted point.
+//! **Departures.** d, C and λ are updated at every accepted point.
 
 use crate::contract::{Batch, Condition, Parameters};
 use crate::diagram::{Cycle, Kind, Mesh, Point};
@@ -33,7 +33,7 @@ use crate::problem::gauss::Scheme;
 use crate::problem::{Setting, mesh};
 use num_complex::Complex64;
 
-/// A branch point held on cycles.
+/// Branch-point condition for cycles.
 pub struct OnCycleBranchPoints<'a> {
     setting: Setting<'a>,
     scheme: Scheme,
@@ -43,7 +43,7 @@ pub struct OnCycleBranchPoints<'a> {
     times: Vec<f64>,
     /// The direction of λ in the last two free parameters.
     across: [f64; 2],
-    /// Scalars of the bordered system: T₁ where there is one, ℓ, then what d adds; rows: the integral, then both of C.
+    /// Bordered system. Scalars: T₁ if the cycle is free, ℓ, the coefficient of d. Rows: the integral, then both rows of C.
     system: System,
     /// ⟨f, ·⟩ of the integral in (1), at the Gauss points.
     phase: Vec<f64>,
@@ -80,7 +80,7 @@ impl<T: Lane> pulp::NullaryFnOnce for Fill<'_, '_, T> {
 }
 
 impl<'a> OnCycleBranchPoints<'a> {
-    /// For cycles like that one; the last two free parameters of the setting are those of the plane.
+    /// The condition on the mesh of `cycle`; the last two free parameters of the setting span the plane.
     pub fn new(setting: Setting<'a>, cycle: &Cycle) -> OnCycleBranchPoints<'a> {
         let (scheme, n) = (Scheme::new(cycle.degree), setting.field.dim());
         let scalars = 2 + usize::from(cycle.forcing_periods == 0);
@@ -117,7 +117,7 @@ impl<'a> OnCycleBranchPoints<'a> {
         own
     }
 
-    /// 1 where T₁ and the integral are there.
+    /// 1 if the system contains T₁ and the integral, otherwise 0.
     fn first(&self) -> usize {
         usize::from(self.forcing_periods == 0)
     }
@@ -155,7 +155,7 @@ impl<'a> OnCycleBranchPoints<'a> {
         Batch { lanes: self.lanes(), states: &self.states, parameters, times: &self.times }
     }
 
-    /// Every Gauss point: its number, the place of its node in a profile, the length of its interval, its weight.
+    /// Calls `call` for every Gauss point with its number, the index of its node in a profile, the length of its interval, and its weight.
     fn each(&self, mut call: impl FnMut(usize, usize, f64, f64)) {
         let m = self.scheme.degree;
         for lane in 0..self.lanes() {
@@ -164,7 +164,7 @@ impl<'a> OnCycleBranchPoints<'a> {
         }
     }
 
-    /// A profile at the Gauss points, `[n × lanes]`, and a change of all parameters there.
+    /// A direction at the Gauss points, `[(n + k) × lanes]`: a profile, then a change of all parameters.
     fn direction(&self, profile: &[f64], parameters: &[f64]) -> Vec<f64> {
         let lanes = self.lanes();
         let mut out = vec![0.0; self.n * lanes];
@@ -173,7 +173,7 @@ impl<'a> OnCycleBranchPoints<'a> {
         out
     }
 
-    /// A change of λ as one of all parameters.
+    /// The change of all parameters for a change of λ.
     fn spread(&self, change: f64) -> Vec<f64> {
         let k = self.setting.freedom();
         let mut all = vec![0.0; k];
@@ -218,7 +218,7 @@ impl<'a> OnCycleBranchPoints<'a> {
         system.corner.fill(0.0);
         let slots: Vec<usize> = (0..inner).map(|k| system.slot(k / n, k % n)).collect();
         for place in 0..length {
-            // Beyond the last interval the solver has intervals of length zero.
+            // The solver pads the mesh with intervals of length zero.
             let interval = |lane: usize| (lane * length + place).min(last);
             let h = T::each(|lane| match lane * length + place {
                 j if j <= last => self.mesh[j + 1] - self.mesh[j],
@@ -291,7 +291,7 @@ impl<'a> OnCycleBranchPoints<'a> {
         finite.then_some(())
     }
 
-    /// v_k with T₁ and ℓ, whether there is a T₁ or not.
+    /// v_k, T₁ (0 for forced cycles) and ℓ.
     fn parts(&self, k: usize) -> (&[f64], f64, f64) {
         let (size, first) = (self.profile_size(), self.first());
         let v = &self.null[k];
@@ -315,7 +315,7 @@ impl<'a> OnCycleBranchPoints<'a> {
         profile
     }
 
-    /// The product of two rows (profile, T₁, ℓ) in which lengths are measured.
+    /// Scaled inner product of two rows (profile, T₁, ℓ).
     fn product(&self, a: &[f64], b: &[f64]) -> f64 {
         let size = self.profile_size();
         let mut sum = a[size] * b[size] / (self.period * self.period) + a[size + 1] * b[size + 1];

@@ -1,8 +1,8 @@
-//! A vector field with an amplitude more, by which it can be given up where branches of cycles cross.
+//! Unfolding of a vector field by an additional amplitude, for curves of branch points of cycles.
 //!
-//! **Idea.** Where branches cross, cycles with two free parameters form no smooth surface. Those of f(x, λ) + b d(x) with an amplitude b do,
-//! provided that no function in the range of the variational equation equals d along the cycle. A d without any symmetry or structure
-//! will do; where b is 0, f itself has the cycle.
+//! **Idea.** Where branches cross, the cycles of f with two free parameters do not form a smooth surface. Those of f(x, λ) + b d(x) with an
+//! unfolding amplitude b do, provided that d along the cycle is not in the range of the variational equation. Any d without symmetry or
+//! structure serves; where b = 0 the cycle is one of f.
 //!
 //! **Equations.** With sizes s of the states and fixed numbers m, φ:
 //!
@@ -19,7 +19,7 @@ use crate::problem::{Axis, Setting};
 use num_complex::Complex64;
 use std::f64::consts::FRAC_PI_2;
 
-/// f + b d, with b as one parameter more.
+/// The vector field f + b d, with b as an additional parameter.
 #[derive(Clone)]
 pub struct Unfolded<'f> {
     field: &'f dyn VectorField,
@@ -27,17 +27,17 @@ pub struct Unfolded<'f> {
 }
 
 impl<'f> Unfolded<'f> {
-    /// `sizes` `[n]`: how large the states are along the cycles.
+    /// Unfolds `field`; `sizes` `[n]` are the sizes of the states along the cycles.
     pub fn new(field: &'f dyn VectorField, sizes: &[f64]) -> Unfolded<'f> {
         Unfolded { field, sizes: sizes.to_vec() }
     }
 
-    /// Over another field with the same states.
+    /// The unfolding of another field with the same states.
     pub fn over<'g>(&self, field: &'g dyn VectorField) -> Unfolded<'g> {
         Unfolded { field, sizes: self.sizes.clone() }
     }
 
-    /// The batch without b, and b of a lane.
+    /// Splits a batch into that of f and the value of b in each lane.
     fn parts<'b>(&self, at: Batch<'b>) -> (Batch<'b>, impl Fn(usize) -> f64 + use<'b>) {
         let (k, lanes) = (self.field.parameter_count(), at.lanes);
         let parameters = match at.parameters {
@@ -51,13 +51,14 @@ impl<'f> Unfolded<'f> {
         (Batch { parameters, ..at }, amplitude)
     }
 
-    /// m_ij and φ_ij: numbers without any structure.
+    /// m_ij and φ_ij: numbers without structure.
     fn coefficients(i: usize, j: usize) -> (f64, f64) {
         let number = |a: f64, b: f64| (1.0 + a * i as f64 + b * j as f64).sin();
         (0.6 + number(1.3, 1.9), 2.0 * number(2.3, 0.7))
     }
 
-    /// The derivative of d_i along these directions (none for d itself) in a lane: `[n × lanes]`, perhaps with more behind.
+    /// The derivative of d_i in a lane along the directions (d_i itself without directions). Only the states, the first `[n × lanes]` of each
+    /// direction, count.
     fn bent(&self, i: usize, lane: usize, at: &Batch, directions: &[&[f64]]) -> f64 {
         let turn = FRAC_PI_2 * directions.len() as f64;
         let term = |j: usize| {
@@ -177,18 +178,18 @@ impl VectorField for Unfolded<'_> {
     }
 }
 
-/// Cycles of f + b d: u = (profile, T, b, λ₁, λ₂), points without b.
+/// The cycle problem of f + b d with unknowns u = (profile, T, b, λ₁, λ₂); its points do not contain b.
 pub struct UnfoldedCycles<'a> {
     cycles: CycleProblem<'a>,
     parameters: usize,
-    /// T where it was anchored last.
+    /// T at the last reference.
     period: f64,
 }
 
 impl<'a> UnfoldedCycles<'a> {
-    /// The setting of f as one of f + b d, for cycles like that one.
+    /// Converts a setting of f to one of f + b d, with b scaled for `cycle`.
     pub fn setting(setting: &Setting, unfolded: &'a Unfolded<'a>, scales: &'a [f64], cycle: &Cycle) -> Setting<'a> {
-        // b is a rate: over a period it changes states by their sizes.
+        // Scale of b: over a period it then changes the states by their sizes.
         let time = if cycle.forcing_periods > 0 { f64::from(cycle.forcing_periods) } else { cycle.period };
         let k = setting.parameters.len();
         Setting {
@@ -199,7 +200,7 @@ impl<'a> UnfoldedCycles<'a> {
         }
     }
 
-    /// Cycles in such a setting.
+    /// The problem of f + b d from its cycle problem; `parameters` is the number of parameters of f.
     pub fn new(cycles: CycleProblem<'a>, parameters: usize) -> UnfoldedCycles<'a> {
         UnfoldedCycles { cycles, parameters, period: 1.0 }
     }
@@ -279,8 +280,8 @@ impl ZeroProblem for UnfoldedCycles<'_> {
         self.cycles.margin(at)
     }
 
-    /// b over a period, against the sizes of the states. A mesh has no symmetry, so b is known to the error of discretisation only, which
-    /// is a thousand times what Newton's method leaves ([`crate::continuation::Settings::newton_tolerance`]).
+    /// The effect of b over a period, relative to the sizes of the states. A mesh breaks symmetries, so b is known only to the error of
+    /// discretisation, a thousand times that of Newton's method ([`crate::continuation::Settings::newton_tolerance`]).
     fn departure(&self, u: &[f64]) -> f64 {
         1e-3 * (u[u.len() - 3] * self.period).abs()
     }
@@ -300,7 +301,7 @@ impl ZeroProblem for UnfoldedCycles<'_> {
     }
 }
 
-/// How large every state is along a solution: its largest absolute value, or its scale where that is larger.
+/// Size of every state along a solution: its largest absolute value, or its scale if that is larger.
 pub fn sizes(point: &Point, scales: &[f64]) -> Vec<f64> {
     let mut sizes = scales.to_vec();
     if let Solution::Cycle(cycle) = &point.solution {

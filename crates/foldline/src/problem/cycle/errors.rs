@@ -105,7 +105,7 @@ impl CycleProblem<'_> {
     pub(super) fn multiplier_error(&self, u: &[f64], spectrum: &[Complex64]) -> f64 {
         self.errors(u);
         if self.is_planar() {
-            // The error of exp(∫ tr f_x), relative to the larger of 1 and itself; and that of the trivial one, where there is one.
+            // The error of exp(∫ tr f_x), relative to the larger of 1 and its value, plus that of the trivial multiplier, if any.
             let (own, off) = (self.trace.exp(), self.divergence_error(u));
             let trivial = spectrum[..spectrum.len() - 1].iter().fold(0.0, |most: f64, z| most.max((z - 1.0).norm()));
             return SPECTRUM_SAFE * (off.exp_m1() * own / own.max(1.0) + trivial) + SPECTRUM_ROUNDING;
@@ -116,7 +116,8 @@ impl CycleProblem<'_> {
         SPECTRUM_SAFE * apart + SPECTRUM_ROUNDING
     }
 
-    /// How far ∫ tr f_x is off: the same at other points of the intervals, along the profile without its estimated error.
+    /// Error of ∫ tr f_x: its difference from the integral over other points of the intervals, along the profile corrected by its
+    /// estimated error.
     fn divergence_error(&self, u: &[f64]) -> f64 {
         let known = self.measured.borrow();
         let Some(known) = known.as_ref() else { return f64::NAN };

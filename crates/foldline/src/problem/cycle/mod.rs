@@ -150,7 +150,7 @@ impl<'a> CycleProblem<'a> {
         self.forcing_periods > 0
     }
 
-    /// True if a single multiplier is not trivial.
+    /// True if there is exactly one non-trivial multiplier.
     fn is_planar(&self) -> bool {
         self.n == if self.is_forced() { 1 } else { 2 }
     }
@@ -430,9 +430,9 @@ impl ZeroProblem for CycleProblem<'_> {
         Some(mesh::denser(&self.mesh))
     }
 
-    // A single multiplier that is not trivial is exp(∫ tr f_x), by Liouville's formula. The integral is as accurate as the profile, where
-    // transitions over intervals are not: a cycle that follows a repelling slow manifold, as a canard does, is smooth there, and the intervals are
-    // as long as that allows, however fast neighbours leave.
+    // A single non-trivial multiplier is exp(∫ tr f_x), by Liouville's formula. The integral is as accurate as the profile; transition
+    // matrices of intervals are not. A canard is smooth along a repelling slow manifold, so its intervals there are long, however fast
+    // neighbouring solutions depart.
     fn stability(&mut self, u: &[f64]) -> Examination {
         let mut found = self.floquet(u);
         let trivial = usize::from(!self.is_forced());

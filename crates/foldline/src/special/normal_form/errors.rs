@@ -1,12 +1,11 @@
 //! Errors of coefficients at equilibria.
 //!
-//! **Idea.** A coefficient is wrong because the point is not exactly where it should be, and because of rounding. Both are repeated with other
-//! errors: the coefficient is computed anew at points that are off by as much as this one may be, with derivatives that are off by what
-//! rounding makes of them, all of either sign, and what that changes is its error. Where such changes would themselves drown in rounding they
-//! are made larger, and their effect smaller by the same factor.
+//! **Idea.** The error of a coefficient has two sources: the error of the point and rounding. Both are sampled. The coefficient is recomputed
+//! at points displaced by the error bound, with derivatives perturbed by their rounding error, all with random signs; the resulting changes
+//! give its error. Displacements that would themselves vanish in rounding are enlarged, and their effect is reduced by the same factor.
 //!
-//! Rounding is measured against states of their characteristic sizes: of a nonlinearity that f, evaluated there, does not show, no coefficient
-//! is known. So the coefficient of a linear system is zero within its error.
+//! Rounding is relative to f at states of their characteristic sizes. A nonlinearity too small to affect f there yields no significant
+//! coefficient, so the coefficient of a linear system is zero within its error.
 //!
 //! **Source.** vignes1993 (errors of either sign at random); higham2002, §9 (backward error of linear systems).
 
@@ -17,31 +16,31 @@ use crate::problem::Setting;
 use crate::special::coefficients::Coefficients;
 use num_complex::Complex64;
 
-/// How often a coefficient is computed anew.
+/// Number of recomputations of a coefficient: with [`SAFE`] enough for the probability stated there.
 const SAMPLES: u64 = 4;
 
-/// Stated error over the largest change seen. The changes are sums with signs at random: that all of four are below a third of their root mean
-/// square has a probability of 0.5 %.
+/// Stated error over the largest observed change. The changes are sums of terms with random signs. The probability that all four are below
+/// a third of their root mean square is 0.5 %.
 const SAFE: f64 = 3.0;
 
-/// Relative size of changes that rounding leaves eight digits of.
+/// Relative size of displacements, of which rounding leaves eight digits: the square root of the machine precision.
 const VISIBLE: f64 = 1e-8;
 
-/// A point of which the place is known only so well.
+/// A point with its error bound.
 pub(super) struct Uncertain<'s, 'f> {
     pub(super) setting: &'s Setting<'f>,
     pub(super) at: &'s Point,
-    /// Of every state and free parameter, relative to its size.
+    /// Error of every state and free parameter, relative to its size.
     error: f64,
     rounding: f64,
     /// `[n]` sizes of the states.
     sizes: Vec<f64>,
-    /// Points as wrong as this one may be, times `larger`.
+    /// Points displaced by the error bound times `larger`.
     others: Vec<Point>,
     larger: f64,
 }
 
-/// What a coefficient is computed from.
+/// Input of the formula for a coefficient.
 pub(super) struct Sample<'a> {
     pub(super) local: Local<'a>,
     pub(super) point: &'a Point,
@@ -77,13 +76,13 @@ impl<'s, 'f> Uncertain<'s, 'f> {
             .collect();
         point.parameters = Setting { parameters: self.at.parameters.clone(), ..self.setting.clone() }.at(&moved);
         for z in &mut point.spectrum {
-            // Both of a pair alike.
+            // Displace both of a pair alike.
             *z = Complex64::new(z.re, z.im * (1.0 + if seed.is_multiple_of(2) { size } else { -size }));
         }
         point
     }
 
-    /// True if a switch of the field has not the same sign at all places where the point may be.
+    /// True if some switch of the field changes sign within the error of the point.
     pub(super) fn lies_on_a_switch(&self) -> bool {
         let field = self.setting.field;
         let signs = |point: &Point| -> Vec<bool> {
@@ -97,14 +96,14 @@ impl<'s, 'f> Uncertain<'s, 'f> {
         self.others.iter().any(|other| signs(other) != own)
     }
 
-    /// The values of a formula with their errors; `None` where it has none.
+    /// The values of a formula with their errors; `None` if it has no value at the point.
     pub(super) fn measured(&self, formula: &dyn Fn(&Sample) -> Option<Vec<f64>>) -> Option<Coefficients> {
         let field = self.setting.field;
         let values = formula(&Sample { local: Local::new(field, self.at)?, point: self.at })?;
         let mut errors = vec![0.0f64; values.len()];
         for (seed, point) in (1..).zip(&self.others) {
             let local = Local::new(field, point)?.shaken(self.rounding * self.larger, &self.sizes, seed);
-            // Where a formula fails for an error as small as this, nothing is known.
+            // If the formula fails for so small a displacement, the error is infinite.
             let other = formula(&Sample { local, point }).unwrap_or_else(|| vec![f64::NAN; values.len()]);
             for (error, (value, other)) in errors.iter_mut().zip(values.iter().zip(&other)) {
                 let change = SAFE * (other - value).abs() / self.larger;

@@ -17,7 +17,7 @@ pub struct Local<'a> {
     noise: Option<Noise>,
 }
 
-/// Errors put on derivatives to see what they do.
+/// Perturbation of derivatives.
 #[derive(Clone)]
 struct Noise {
     /// Relative size.
@@ -29,7 +29,7 @@ struct Noise {
     signs: RefCell<Signs>,
 }
 
-/// A sequence of signs without order, always the same for a seed.
+/// A pseudo-random sequence of signs, reproducible from its seed.
 #[derive(Clone)]
 pub(super) struct Signs(u64);
 
@@ -58,8 +58,8 @@ impl<'a> Local<'a> {
         Some(Local { field, state, parameters: &at.parameters, n, jacobian, noise: None })
     }
 
-    /// The same with errors of either sign on the Jacobian and on all higher derivatives. They are as large as `size` says, relative to the
-    /// largest term of the same component of f in states of the sizes `scales` `[n]`: f rounded there tells nothing smaller apart.
+    /// Perturbs the Jacobian and all higher derivatives with random signs. `size` is relative to the largest term of the same component of f
+    /// at states of the sizes `scales` `[n]`, which is the rounding error of f there.
     pub(super) fn shaken(mut self, size: f64, scales: &[f64], seed: u64) -> Local<'a> {
         let (n, mut signs) = (self.n, Signs::new(seed));
         let largest = |row: &[f64]| row.iter().zip(scales).fold(0.0f64, |most, (a, s)| most.max((a * s).abs()));

@@ -25,10 +25,10 @@
 //! higher order in (4) to (8) they come from one recursion, see `manifold`.
 //!
 //! All are in the units of the model. The signs of a (fold, branch point) and of a and b together (Bogdanov–Takens) change with that of q; those
-//! of b (branch point), c, l₁, l₂, E and the p do not, and s, θ and δ do not depend on the length of q either. A branch point is a pitchfork where a
-//! is zero within its error, by symmetry that is, and transcritical elsewhere.
+//! of b (branch point), c, l₁, l₂, E and the p do not, and s, θ and δ do not depend on the length of q either. A branch point is a pitchfork if a
+//! is zero within its error, usually by symmetry, otherwise transcritical.
 //!
-//! Every coefficient has an error, see `errors`. A quotient whose divisor is zero within its error is not defined and is left out.
+//! Every coefficient has an error; see `errors`. A quotient whose divisor is zero within its error is undefined and omitted.
 //!
 //! | what | file |
 //! |---|---|
@@ -73,8 +73,8 @@ fn frequencies(at: &Point) -> Vec<f64> {
     pairs.into_iter().map(|z| z.im).collect()
 }
 
-/// Amplitude, as a share of the scales of the states, up to which the cubic term of a branch point outweighs the quadratic one where it
-/// counts as a pitchfork.
+/// Amplitude, as a share of the scales of the states, beyond which the cubic term outweighs the quadratic one at a branch point that counts as a
+/// pitchfork. Empirical: ten times the default tolerance, since a quadratic term smaller than that cannot be seen on the branches.
 const PITCHFORK: f64 = 1e-5;
 
 /// The coefficients of the normal form of a special point of that kind, in the order of [`Kind::coefficients`]. `error` is the bound on the
@@ -95,9 +95,9 @@ pub fn coefficients(setting: &Setting, kind: Kind, at: &Point, error: f64, pair:
     }
 }
 
-/// The same where nothing speaks against it, or what does.
+/// Computes the coefficients, or returns the reason why they are undefined.
 fn found(uncertain: &Uncertain, kind: Kind, pair: usize) -> Result<Coefficients, String> {
-    const RESONANCE: &str = "eigenvalues are in a resonance, or have no eigenvectors of their own";
+    const RESONANCE: &str = "eigenvalues are resonant or have no separate eigenvectors";
     // Next to each other on the axis, pairs change places from sample to sample.
     let own = frequencies(uncertain.at).get(pair).copied();
     let first = |sample: &Sample| {
@@ -125,7 +125,7 @@ fn found(uncertain: &Uncertain, kind: Kind, pair: usize) -> Result<Coefficients,
             let found = measured(&|sample| Some(sample.local.takens()?.to_vec()));
             let vanishes = |(value, error): (&f64, &f64)| value.abs() <= *error;
             let found = found.filter(|found| !found.values.iter().zip(&found.errors).all(vanishes));
-            found.ok_or("a and b are zero within their errors, by a symmetry perhaps".into())
+            found.ok_or("a and b are zero within their errors, perhaps because of a symmetry".into())
         }
         Kind::ZeroHopf => {
             let all = measured(&|sample| Some(sample.local.zero_hopf(first(sample)?)?.to_vec()));
@@ -147,7 +147,7 @@ fn found(uncertain: &Uncertain, kind: Kind, pair: usize) -> Result<Coefficients,
     }
 }
 
-/// The first so many of the values where none of those after them, which are divisors, is zero within its error.
+/// Returns the first `count` values, or an error if one of the divisors that follow them is zero within its error.
 fn divided(mut all: Coefficients, count: usize, divisors: &[&str]) -> Result<Coefficients, String> {
     let zero = |k: &usize| all.values[*k].abs() <= all.errors[*k];
     if let Some((_, name)) = (count..).zip(divisors).find(|(k, _)| zero(k)) {
@@ -158,9 +158,9 @@ fn divided(mut all: Coefficients, count: usize, divisors: &[&str]) -> Result<Coe
     Ok(all)
 }
 
-/// Those of a branch point.
+/// Coefficients of a branch point.
 fn crossing(uncertain: &Uncertain) -> Result<Coefficients, String> {
-    const NONE: &str = "no second branch is found to cross there";
+    const NONE: &str = "no second branch was found to cross there";
     let setting = uncertain.setting;
     let along = tangent(setting, uncertain.at).ok_or("the branch itself turns back there")?;
     let quadratic = uncertain.measured(&|sample| Some(vec![sample.local.fold()?])).ok_or(NONE)?;

@@ -18,7 +18,7 @@ impl Local<'_> {
     }
 
     /// a and b of (3), or 0, b and c at a pitchfork. `along` `[n + k]`, in states and parameters, is a direction closer to the
-    /// branch than to the one that crosses it, for one unit of its parameter. `None` where no branches cross.
+    /// branch than to the one that crosses it, per unit of its parameter. `None` if no branches cross.
     pub fn crossing(&self, along: &[f64], pitchfork: bool) -> Option<Vec<f64>> {
         let vectors = self.null_vectors()?;
         // A tangent that was interpolated solves the linear equations only nearly.
@@ -38,12 +38,12 @@ impl Local<'_> {
         (square >= 0.0).then(|| vec![a, square.sqrt().copysign(b)])
     }
 
-    /// ⟨p, q⟩ of null vectors of unit length, which vanishes where the eigenvalue 0 is double.
+    /// ⟨p, q⟩ of null vectors of unit length, which vanishes if the eigenvalue 0 is double.
     pub(super) fn simplicity(&self) -> Option<f64> {
         self.null_vectors().map(|[q, p]| dot(&p, &q))
     }
 
-    /// Whether a ξ² is less than c ξ³ as soon as ξ q is that share of the `scales` `[n]` of the states.
+    /// True if a ξ² is less than c ξ³ at the amplitude ξ at which ξ q is `share` of the `scales` `[n]` of the states.
     pub fn is_pitchfork(&self, scales: &[f64], share: f64) -> Option<bool> {
         let [q, _] = self.null_vectors()?;
         let reach = 1.0 / q.iter().zip(scales).fold(f64::MIN_POSITIVE, |most, (q, s)| most.max((q / s).abs()));
