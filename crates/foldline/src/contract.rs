@@ -186,6 +186,11 @@ pub trait ZeroProblem {
         f64::NAN
     }
 
+    /// True if f or its derivatives jump somewhere: a mesh does not resolve what happens there.
+    fn is_switched(&self) -> bool {
+        false
+    }
+
     /// How far a point is from one at which F_x is singular, in terms of its spectrum: small where another branch may be
     /// close by.
     fn margin(&self, at: &Point) -> f64;

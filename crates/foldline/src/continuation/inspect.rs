@@ -285,7 +285,14 @@ impl Follow<'_> {
             }
             let target = right.point.unstable as i64;
             let next = if index + 1 == total && explained { target } else { step_towards(count, target, jumps[index]) };
-            out.push(Found::Special(self.special(kind, found.station, count, next, found.error)));
+            let rate = if self.problem.is_switched() { self.rate_beside(&found.station) } else { 0.0 };
+            let mut special = self.special(kind, found.station, count, next, found.error);
+            if rate > 0.0 {
+                // Without smoothness a parameter is no more accurate than the profile.
+                let displaced = rate * self.displacement(&stretch, right, &special);
+                special.error = special.error.max(special.point.trust.discretisation) + displaced;
+            }
+            out.push(Found::Special(special));
             count = next;
         }
         for mark in marks {
@@ -400,6 +407,34 @@ impl Follow<'_> {
 
     fn either_confirms(&self, monitor: usize, left: &Station, right: &Station) -> bool {
         self.monitors[monitor].confirms(&left.point) || self.monitors[monitor].confirms(&right.point)
+    }
+
+    /// Relative change of parameter and states for one unit of length along the branch.
+    fn rate_beside(&mut self, at: &Station) -> f64 {
+        self.place(at);
+        let rate = at.slope().abs() / (1.0 + at.parameter().abs());
+        rate.max(self.problem.relative_size(&at.tangent, &at.u))
+    }
+
+    /// How far along the branch a special point may be off since f_x jumps along its cycle: the error of the critical multiplier over the rate at
+    /// which that passes the unit circle. On smooth fields two meshes tell, and folds are where the branch turns, whatever multipliers say.
+    fn displacement(&self, stretch: &Stretch, right: &Station, special: &SpecialPoint) -> f64 {
+        let critical = matches!(special.kind, Kind::PeriodDoubling | Kind::Torus | Kind::BranchPoint);
+        if !critical {
+            return 0.0;
+        }
+        let growth = |z: &Complex64| z.norm().ln();
+        let of = |at: &Point, target: Complex64| {
+            let off = |z: &Complex64| (z - target).norm();
+            at.free_spectrum().iter().copied().min_by(|a, b| off(a).total_cmp(&off(b)))
+        };
+        let point = &special.point;
+        let own = point.free_spectrum().iter().copied().min_by(|a, b| growth(a).abs().total_cmp(&growth(b).abs()));
+        let beside = own.and_then(|own| Some([of(&stretch.left.point, own)?, of(&right.point, own)?]));
+        let Some([before, after]) = beside else { return 0.0 };
+        let rate = (growth(&after) - growth(&before)).abs() / stretch.length.abs();
+        let shift = point.trust.spectrum / rate;
+        if shift.is_finite() { shift } else { 0.0 }
     }
 
     pub(super) fn special(

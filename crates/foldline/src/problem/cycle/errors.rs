@@ -1,6 +1,7 @@
 //! How accurate a cycle is, from its defect and the last factorisation.
 
 use super::CycleProblem;
+use super::crossings::{self, Crossed};
 use crate::contract::{Batch, Parameters, ZeroProblem};
 use crate::linalg::{panel, same};
 use crate::problem::defect::{self, Course, Defect, TOGETHER};
@@ -104,13 +105,14 @@ impl CycleProblem<'_> {
     /// Jacobian changes sharply.
     pub(super) fn multiplier_error(&self, u: &[f64], spectrum: &[Complex64]) -> f64 {
         self.errors(u);
-        if self.is_planar() {
+        let crossed = self.crossed(u);
+        if self.is_planar() && crossed.is_empty() {
             // The error of exp(∫ tr f_x), relative to the larger of 1 and its value, plus that of the trivial multiplier, if any.
             let (own, off) = (self.trace.exp(), self.divergence_error(u));
             let trivial = spectrum[..spectrum.len() - 1].iter().fold(0.0, |most: f64, z| most.max((z - 1.0).norm()));
             return SPECTRUM_SAFE * (off.exp_m1() * own / own.max(1.0) + trivial) + SPECTRUM_ROUNDING;
         }
-        let Some(spectra) = self.corrected_multipliers(u) else { return f64::NAN };
+        let Some(spectra) = self.corrected_multipliers(u, &crossed) else { return f64::NAN };
         let before = std::iter::once(spectrum).chain(spectra.iter().map(Vec::as_slice));
         let apart: f64 = before.zip(&spectra).map(|(one, next)| spectrum_difference(one, next)).sum();
         SPECTRUM_SAFE * apart + SPECTRUM_ROUNDING
@@ -143,7 +145,7 @@ impl CycleProblem<'_> {
 
     /// The multipliers from more accurate transitions, with the Jacobian along the profile, and along the profile without its error; before
     /// either of them those where every second interval is so.
-    fn corrected_multipliers(&self, u: &[f64]) -> Option<[Vec<Complex64>; 4]> {
+    fn corrected_multipliers(&self, u: &[f64], crossed: &[Crossed]) -> Option<[Vec<Complex64>; 4]> {
         let known = self.measured.borrow();
         let known = known.as_ref()?;
         let better: Vec<f64> = u.iter().zip(&known.shift).map(|(u, e)| u - e).collect();
@@ -159,7 +161,9 @@ impl CycleProblem<'_> {
             self.correct(first..first + count, &profiles, &mut transitions, room);
             first += count;
         }
-        let [own, other] = transitions;
+        let [mut own, mut other] = transitions;
+        crossings::replace(&mut own, crossed);
+        crossings::replace(&mut other, &self.crossed(&better));
         let [frames, others] = [u, &better].map(|u| self.frames(u));
         // Those of the even intervals and those of the odd ones, and the frames.
         let courses =
@@ -213,7 +217,7 @@ impl CycleProblem<'_> {
         let size = self.profile_size();
         let scale = self.relative_scale(u);
         let parameters = self.setting.at(&u[size + 1..]);
-        let Defect { local, within, ends, sources, misses } = defect::measure(
+        let Defect { mut local, within, mut ends, sources, mut misses } = defect::measure(
             self.setting.field,
             &parameters,
             &u[..size],
@@ -225,6 +229,14 @@ impl CycleProblem<'_> {
             &scale,
             &mut self.room.borrow_mut().measure,
         );
+        // Where f has a kink the points at which the defect was sampled may all lie on one side of it.
+        for (j, defect) in self.defects_at_crossings(u) {
+            for (i, own) in defect.into_iter().enumerate() {
+                local[j] = local[j].max((own / scale[i]).abs());
+                misses[j * self.n + i] += own - ends[j * self.n + i];
+                ends[j * self.n + i] = own;
+            }
+        }
         let block = (self.scheme.degree + 1) * self.n;
         let mut rhs = vec![0.0; u.len()];
         let inner = self.scheme.degree * self.n;

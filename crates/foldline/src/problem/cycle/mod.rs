@@ -28,6 +28,7 @@
 //! without bound; the continuation recognises both.
 
 mod assembly;
+mod crossings;
 mod errors;
 mod meshes;
 mod phase;
@@ -471,6 +472,10 @@ impl ZeroProblem for CycleProblem<'_> {
 
     fn spectrum_error(&mut self, u: &[f64], spectrum: &[Complex64]) -> f64 {
         self.multiplier_error(u, spectrum)
+    }
+
+    fn is_switched(&self) -> bool {
+        self.setting.field.switch_count() > 0
     }
 
     fn margin(&self, at: &Point) -> f64 {
