@@ -4,6 +4,7 @@
 use foldline::contract::Unobserved;
 use foldline::diagram::{Branch, Diagram, Ending, Kind};
 use foldline::explore::{self, System};
+use foldline::verify;
 use foldline_store::study_file::parse_study;
 
 const TOLERANCE: f64 = 1e-6;
@@ -259,4 +260,25 @@ fn a_saddle_node_on_the_cycle_is_named() {
     let end = diagram.branch("b").unwrap().ends.iter().flatten().find(|end| end.code() == "saddle-node-on-cycle");
     let Some(Ending::Connecting { parameter, .. }) = end else { panic!("{:?}", diagram.branch("b").unwrap().ends) };
     assert!((parameter - 1.0).abs() < 1e-8, "{parameter}");
+}
+
+/// An oscillator with a stop: f_x jumps where it touches. Every error of profiles, ranges and multipliers is what shooting finds, which
+/// integrates from event to event, or more.
+#[test]
+fn errors_of_cycles_with_contact_are_what_they_say() {
+    let model = "name = \"stop\"\n[parameters]\nw = 0.5\nF = 0.3\nc = 0.06\nk = 8\ngap = 0.5\n[forcing]\nfrequency = \"w\"\n[states]\n\
+        x = \"v\"\nv = \"-x - c*v - k*max(x - gap, 0) + F*cos(w*t)\"\n";
+    let text = "model = \"m\"\n[[seed]]\nname = \"s\"\nstate = { x = 0, v = 0 }\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"w\"\n\
+        range = [0.4, 2.6]\nswitch = { period-doubling = 1 }\n";
+    let study = parse_study(text, "study", model, "model").unwrap_or_else(|found| panic!("{found:?}"));
+    let system = System::of_plan(&study.model, &study.plan);
+    let diagram = explore::run(&system, &study.plan, 1, Diagram::default(), &Unobserved);
+    assert!(diagram.branch("b").unwrap().special.len() >= 4 && diagram.branches.len() == 2);
+    let found = verify::verify(&system, &diagram, study.plan.tolerance, None, &|_| true);
+    let own = |check: &&verify::Check| {
+        matches!(check.quantity, verify::Quantity::Profile | verify::Quantity::Range | verify::Quantity::Spectrum)
+    };
+    assert!(found.points > 100 && found.checks.iter().filter(own).count() > 300);
+    let wrong: Vec<String> = found.wrong().filter(own).map(|check| format!("{check:?}")).collect();
+    assert!(wrong.is_empty(), "{wrong:?}");
 }

@@ -198,6 +198,26 @@ fn a_diagram_comes_back_to_the_bit_and_so_do_the_texts() {
     assert_eq!(back.notes.len(), 4);
 }
 
+/// Pairs of eigenvalues that pass the imaginary axis at once.
+#[test]
+fn special_points_of_one_kind_at_one_place_are_all_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let recorder = Recorder::create(folder.path(), &study()).unwrap();
+    let mut branch = Branch::new("pairs", Family::Equilibrium, 0, Origin::Seed("start".into()));
+    branch.insert(point(0, false));
+    recorder.observe(Event::Begin(&branch));
+    recorder.observe(Event::Point(&branch, &branch.points[0]));
+    for before in [0, 2] {
+        let special =
+            SpecialPoint { unstable_before: before, unstable_after: before + 2, ..special(Kind::Hopf, 0, 0.3, false) };
+        branch.insert_special(special.clone());
+        recorder.observe(Event::Special(&branch, &special));
+    }
+    recorder.finish().unwrap();
+    let back = load(folder.path()).unwrap().diagram;
+    assert_eq!(back.branches[0].special.iter().map(|s| s.unstable_before).collect::<Vec<_>>(), [0, 2]);
+}
+
 #[test]
 fn special_points_of_one_step_backwards_are_in_the_order_of_the_branch() {
     let folder = tempfile::tempdir().unwrap();

@@ -80,7 +80,7 @@ pub(super) fn special_row(number: i64, branch: &Branch, special: &SpecialPoint) 
         Value::Integer(number),
         Value::Text(kind.to_string()),
         Value::Integer(position),
-        Value::Blob(key.to_vec()),
+        Value::Blob(key),
         Value::Integer(special.unstable_before as i64),
         Value::Integer(special.unstable_after as i64),
         Value::Real(special.error),
@@ -102,11 +102,15 @@ pub(super) fn end_row(number: i64, side: usize, ending: &Ending) -> Vec<Value> {
     first.into_iter().chain(ending_values(ending)).collect()
 }
 
+/// Bytes of the parameter in a key; in files of earlier versions they are all of it.
+pub(super) const OF_PARAMETER: usize = 8;
+
 /// What tells special points of a branch apart: kind, position, and the bits of the parameter, since two of one kind can lie
-/// between the same two points.
-pub(super) fn key_of(branch: &Branch, special: &SpecialPoint) -> (&'static str, i64, [u8; 8]) {
+/// between the same two points; and the count of unstable eigenvalues, since they can lie at the same place.
+pub(super) fn key_of(branch: &Branch, special: &SpecialPoint) -> (&'static str, i64, Vec<u8>) {
     let parameter = special.point.parameters.get(branch.free).copied().unwrap_or(0.0);
-    (special.kind.name(), special.point.position, parameter.to_le_bytes())
+    let count = special.unstable_before as u64;
+    (special.kind.name(), special.point.position, [parameter.to_le_bytes(), count.to_le_bytes()].concat())
 }
 
 fn mesh_bytes(solution: &Solution) -> Vec<u8> {

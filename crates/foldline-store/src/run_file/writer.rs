@@ -2,7 +2,7 @@
 
 use super::meta::{description, variables};
 use super::reader::{Open, Part, load_diagram, open, point_at, sound};
-use super::rows::{end_row, held_values, key_of, origin_values, point_row, special_row};
+use super::rows::{OF_PARAMETER, end_row, held_values, key_of, origin_values, point_row, special_row};
 use super::schema::{Columns, create, insertion, upgrade};
 use super::{APPLICATION_ID, FORMAT_VERSION, RunFileError, path_in, responses};
 use crate::study_file::Study;
@@ -434,7 +434,7 @@ impl State {
             "DELETE FROM points WHERE branch = ? AND NOT position BETWEEN ? AND ?",
             params![number, reach.0, reach.1],
         )?;
-        let kept: Vec<(&str, i64, [u8; 8])> = branch.special.iter().map(|special| key_of(branch, special)).collect();
+        let kept: Vec<(&str, i64, Vec<u8>)> = branch.special.iter().map(|special| key_of(branch, special)).collect();
         let stored = {
             let mut statement =
                 transaction.prepare("SELECT kind, position, key FROM special_points WHERE branch = ?")?;
@@ -442,7 +442,8 @@ impl State {
             rows.collect::<rusqlite::Result<Vec<(String, i64, Vec<u8>)>>>()?
         };
         for (kind, position, key) in stored {
-            if !kept.iter().any(|(k, p, bytes)| *k == kind && *p == position && bytes[..] == key) {
+            let same = |bytes: &[u8]| bytes == key || (key.len() == OF_PARAMETER && bytes.starts_with(&key));
+            if !kept.iter().any(|(k, p, bytes)| *k == kind && *p == position && same(bytes)) {
                 transaction.execute(
                     "DELETE FROM special_points WHERE branch = ? AND kind = ? AND position = ? AND key = ?",
                     params![number, kind, position, key],

@@ -288,9 +288,7 @@ impl Follow<'_> {
             let rate = if self.problem.is_switched() { self.rate_beside(&found.station) } else { 0.0 };
             let mut special = self.special(kind, found.station, count, next, found.error);
             if rate > 0.0 {
-                // Without smoothness a parameter is no more accurate than the profile.
-                let displaced = rate * self.displacement(&stretch, right, &special);
-                special.error = special.error.max(special.point.trust.discretisation) + displaced;
+                special.error += rate * self.displacement(&stretch, right, &special);
             }
             out.push(Found::Special(special));
             count = next;
@@ -451,6 +449,10 @@ impl Follow<'_> {
                 doubted(self.problem, &mut station);
             }
         }
+        // Without smoothness a parameter is no more accurate than the profile, and two meshes may agree by chance.
+        let least =
+            if self.problem.is_switched() && kind != Kind::Mark { station.point.trust.discretisation } else { 0.0 };
+        let error = error.max(least);
         let (before, after) = if self.direction > 0.0 { (before, after) } else { (after, before) };
         Box::new(SpecialPoint {
             kind,
