@@ -124,6 +124,7 @@ impl Follow<'_> {
         let fold_test =
             self.fold_test([left, right], stretch.length.abs(), history.is_some_and(|before| before.stands));
         let standing = fold_test == FoldTest::None;
+        let conservative = standing && [left, right].iter().all(|end| end.point.is_conservative());
         let mut located: Vec<(Kind, usize, Located)> = Vec::new();
         let mut others: Vec<Option<usize>> = Vec::new();
         let (mut lost, mut leaps) = (false, false);
@@ -134,14 +135,16 @@ impl Follow<'_> {
                 && located.iter().any(|(kind, jump, _)| *kind == Kind::BranchPoint && *jump == 0);
             let without = match kind {
                 Kind::Fold => standing,
-                Kind::BranchPoint => fold_test != FoldTest::Slope,
+                Kind::BranchPoint => fold_test != FoldTest::Slope && !conservative,
+                // The product of a pair is 1 everywhere.
+                Kind::Torus => conservative,
                 _ => false,
             };
             if pitchfork || without {
                 continue;
             }
             let own = &*self.monitors[k];
-            let by_spectrum = own.by_spectrum().filter(|_| fold_test == FoldTest::Spectrum);
+            let by_spectrum = own.by_spectrum().filter(|_| fold_test == FoldTest::Spectrum || conservative);
             let monitor = by_spectrum.as_deref().unwrap_or(own);
             let values = match &by_spectrum {
                 Some(other) => [left, right].map(|station| other.value(&left.point, &station.point)),

@@ -167,10 +167,28 @@ impl Point {
         (distance(closest) <= self.neutral_error()).then_some(*closest)
     }
 
-    /// Number of unstable multipliers, excluding one that is 1 within its error.
+    /// Number of unstable multipliers, excluding one that is 1 within its error, and on a vertical branch all that are on the unit circle within
+    /// their errors: in a conservative system they stay there, and the side on which they are computed is not significant.
     pub(crate) fn unstable_besides_neutral(&self) -> usize {
+        let error = self.neutral_error();
+        if self.is_one_of_family() {
+            return self.free_spectrum().iter().filter(|z| z.norm() > 1.0 + error).count();
+        }
         let own = usize::from(self.neutral_multiplier().is_some_and(|z| z.norm() > 1.0));
         self.unstable.saturating_sub(own)
+    }
+
+    /// True if the multipliers come in reciprocal pairs, as in a conservative system: besides the one that is 1 there are two with the product 1,
+    /// within their errors.
+    pub(crate) fn is_conservative(&self) -> bool {
+        let Some(neutral) = self.neutral_multiplier() else { return false };
+        let mut rest = self.free_spectrum().to_vec();
+        if let Some(own) = rest.iter().position(|z| *z == neutral) {
+            rest.remove(own);
+        }
+        let reciprocal =
+            |a: &Complex64, b: &Complex64| (a * b - 1.0).norm() <= self.neutral_error() * (a.norm() + b.norm());
+        (0..rest.len()).any(|i| rest[i + 1..].iter().any(|other| reciprocal(&rest[i], other)))
     }
 
     /// Largest difference of period and ranges between two points, each relative to its scale (`scales` for the states;

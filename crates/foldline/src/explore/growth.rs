@@ -6,7 +6,9 @@ use super::{System, diagnosis};
 use crate::continuation::corrector::{Plane, parameter_row, settle, station};
 use crate::continuation::{Failure, Follow, Homecoming, Item, Settings, Station, follow};
 use crate::contract::{Event, Examination, Monitor, Observer, Verdict, ZeroProblem};
-use crate::diagram::{Branch, Cost, Ending, Family, Kind, Misfit, Origin, Point, Record, Solution, SpecialPoint};
+use crate::diagram::{
+    Branch, Cost, Ending, Family, Kind, Misfit, Origin, Point, Record, STANDS, Solution, SpecialPoint,
+};
 use crate::problem::{Axis, Setting, Tie, cycle::CycleProblem, equilibrium::EquilibriumProblem, held::Held, mesh};
 use crate::special::coefficients::Coefficients;
 use crate::special::connection::Limits;
@@ -310,7 +312,10 @@ impl Growth<'_> {
 
     /// Excludes a multiplier that is 1 by structure from the number of unstable ones at the start of a branch.
     fn count(&self, branch: &Branch, start: &mut Point) {
-        if self.settings.stability && (start.is_one_of_family() || self.is_symmetric(branch, start)) {
+        // At a small distance from a bifurcation the noise of the parameter is divided by it.
+        let next_to = !starts_inside(branch) && start.parameter_slope().abs() < STANDS / super::switch::DISTANCES[0];
+        let family = start.is_one_of_family() || (next_to && start.solution.period().is_some());
+        if self.settings.stability && (family || self.is_symmetric(branch, start)) {
             start.unstable = start.unstable_besides_neutral();
         }
     }

@@ -18,7 +18,7 @@ use std::f64::consts::TAU;
 
 /// Distances along the direction that are tried, in scaled variables. The shorter ones are for branches on which something
 /// else happens next to their beginning, as with contact, where a branch keeps its first shape only until it grazes.
-const DISTANCES: [f64; 7] = [2e-3, 5e-4, 1e-4, 2e-5, 5e-3, 1e-2, 5e-2];
+pub const DISTANCES: [f64; 7] = [2e-3, 5e-4, 1e-4, 2e-5, 5e-3, 1e-2, 5e-2];
 
 /// The beginning of the branch that leaves `at`, and its family; `None` for kinds at which no branch of equilibria or
 /// cycles leaves. Where several pairs of eigenvalues pass the imaginary axis at once, `pair` says from which one cycles are born.

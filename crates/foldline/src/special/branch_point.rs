@@ -56,9 +56,38 @@ impl Monitor for BranchPoint {
         Some(self.spectrum_without_symmetry(at).iter().filter(|z| z.im == 0.0 && z.re > centre).count())
     }
 
+    fn by_spectrum(&self) -> Option<Box<dyn Monitor>> {
+        Some(Box::new(OfFamily))
+    }
+
     fn others_unstable(&self, at: &Point) -> Option<usize> {
         let centre = if matches!(at.solution, Solution::Cycle(_)) { 1.0 } else { 0.0 };
         super::others_unstable(at, 1, |z| (z - centre).norm())
+    }
+}
+
+/// A pair of multipliers of a conservative system that meets at 1 and leaves the unit circle: another family leaves that one. A further multiplier
+/// is 1 all along the family, and the parameter stands still.
+struct OfFamily;
+
+impl Monitor for OfFamily {
+    fn kind(&self) -> Kind {
+        Kind::BranchPoint
+    }
+
+    fn value(&self, _reference: &Point, at: &Point) -> f64 {
+        super::distance_product(&BranchPoint { symmetric: true }.spectrum_without_symmetry(at), 1.0)
+    }
+
+    fn confirms(&self, at: &Point) -> bool {
+        /// Largest distance of the pair from 1: the root of that of a single multiplier at other branch points, since a pair that meets is as
+        /// sensitive as that.
+        const NEAR: f64 = 0.1;
+        BranchPoint { symmetric: true }.spectrum_without_symmetry(at).iter().any(|z| (z - 1.0).norm() < NEAR)
+    }
+
+    fn jump(&self) -> usize {
+        1
     }
 }
 
