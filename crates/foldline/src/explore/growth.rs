@@ -446,7 +446,8 @@ impl Growth<'_> {
         let (monitors, collapses) = match branch.held {
             None => (special::monitors(branch.family, symmetric), collapses(branch, &system)),
             Some((kind, first)) => {
-                let monitors = special::monitors_where_held(system.field, &system.scales, branch.family, kind);
+                let monitors =
+                    special::monitors_where_held(system.field, &system.scales, branch.family, kind, branch.free);
                 // Folds of cycles shrink to a generalised Hopf point; the Hopf points there lie along the second parameter.
                 let ends = kind == Kind::Fold && branch.family == Family::Cycle && !system.field.forced();
                 (monitors, ends.then(|| shrinks(&system, first, Kind::GeneralisedHopf)).into_iter().collect())

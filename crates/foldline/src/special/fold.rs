@@ -71,7 +71,22 @@ fn critical(at: &Point) -> f64 {
 }
 
 /// The same where something is held along a curve in two parameters, and one of them is to turn alone.
-pub struct Turn;
+pub struct Turn {
+    /// Index of the parameter that turns.
+    pub free: usize,
+}
+
+impl Turn {
+    /// True if the parameter is the same at all three points as far as can be told. Where the equations of the curve are degenerate, as at
+    /// transcritical points, which are no folds but solve the equations of folds, the square of its error is rounding: the root of that
+    /// relative to its size, times a factor of safety.
+    fn stands(&self, ends: [&Point; 2], at: &Point) -> bool {
+        const SAFE: f64 = 10.0;
+        let value = |point: &Point| point.parameters.get(self.free).copied().unwrap_or(f64::NAN);
+        let noise = SAFE * f64::EPSILON.sqrt() * value(ends[0]).abs().max(value(ends[1]).abs());
+        ends.iter().all(|end| (value(end) - value(at)).abs() <= noise)
+    }
+}
 
 impl Monitor for Turn {
     fn kind(&self) -> Kind {
@@ -87,7 +102,7 @@ impl Monitor for Turn {
     }
 
     fn confirms_between(&self, ends: [&Point; 2], at: &Point) -> bool {
-        !parameters_rest(ends, at)
+        !parameters_rest(ends, at) && !self.stands(ends, at)
     }
 
     fn reads(&self) -> Sight {

@@ -51,15 +51,16 @@ pub fn monitors(family: Family, symmetric: bool) -> Vec<Box<dyn Monitor>> {
 }
 
 /// What to look for where a special point of that kind is held along the curve: what takes two parameters to meet, and where the curve
-/// turns back in the second of them.
+/// turns back in the second of them, which has the index `free`.
 pub fn monitors_where_held<'a>(
     field: &'a dyn VectorField,
     scales: &'a [f64],
     family: Family,
     held: Kind,
+    free: usize,
 ) -> Vec<Box<dyn Monitor + 'a>> {
     let mut all = codim_two::monitors(field, scales, family, held);
-    all.push(Box::new(fold::Turn));
+    all.push(Box::new(fold::Turn { free }));
     all
 }
 
