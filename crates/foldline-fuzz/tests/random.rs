@@ -20,11 +20,23 @@ fn tapes_compute_what_the_formulas_say() {
 
 #[test]
 fn whatever_trajectories_do_is_counted() {
-    let mut seen = simulations::Seen::default();
-    for stream in 0..40 {
-        let data = bytes(stream, 2000);
-        let _ = simulations::simulation(&mut Unstructured::new(&data), &mut seen);
-    }
+    let some = |streams: std::ops::Range<u64>| {
+        let mut seen = simulations::Seen::default();
+        for stream in streams {
+            let data = bytes(stream, 2000);
+            let _ = simulations::simulation(&mut Unstructured::new(&data), &mut seen);
+        }
+        seen
+    };
+    let (mut seen, other) = std::thread::scope(|scope| {
+        let first = scope.spawn(|| some(0..20));
+        let second = some(20..40);
+        (first.join().expect("the simulations end"), second)
+    });
+    seen.run.iter_mut().zip(other.run).for_each(|(own, more)| *own += more);
+    seen.settled += other.settled;
+    seen.escaped += other.escaped;
+    seen.swept += other.swept;
     assert!(
         seen.run.iter().all(|run| *run > 5) && seen.settled > 20 && seen.escaped > 20 && seen.swept > 10,
         "{seen:?}"
