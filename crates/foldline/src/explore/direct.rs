@@ -85,7 +85,7 @@ pub(super) fn transient(logarithm: f64) -> f64 {
 }
 
 /// The state itself over one period.
-fn at_rest(state: &[f64]) -> Candidate {
+pub(super) fn at_rest(state: &[f64]) -> Candidate {
     const TIMES: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
     Candidate::Cycle { period: 1.0, times: TIMES.to_vec(), states: state.repeat(TIMES.len()) }
 }

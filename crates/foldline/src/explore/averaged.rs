@@ -1,0 +1,352 @@
+//! Cycles near a resonance of a lightly damped field, from averaged equations.
+//!
+//! **Idea.** Next to a resonance the motion is nearly the response x₀ plus a few modes with slowly changing amplitudes, and what is
+//! stationary for their averaged equations is nearly a cycle, stable or not, isolated or not. These are a few equations, so that zeros can
+//! be looked for from a whole grid of amplitudes and phases. They are starts for Newton's method on the cycle itself, no more.
+//!
+//! **Equations.** With A the mean of f_x along x₀, A q_j = μ_j q_j, p_jᴴ A = μ_j p_jᴴ, p_jᴴ q_j = 1, and ⟨·⟩ the mean over the period 2π/w,
+//!
+//!   (1)  x = x₀ + y,  y = Re Σ_j c_j q_j e^{i k_j w t},  g = f(x₀ + y) - f(x₀) - A y
+//!   (2)  E_j = (i k_j w - μ_j) c_j - 2 p_jᴴ ⟨g e^{-i k_j w t}⟩ = 0
+//!
+//! of one mode in a forced field, where w is that of the forcing over a whole number, and of two in an autonomous one, where w is
+//! unknown and c₁ is real: time may start anywhere.
+//!
+//! The real part of (2) times c̄_j balances the energy that a mode loses to damping against what the nonlinear force brings to it from the
+//! other mode or from the forcing: (3) 2 |p_jᴴ⟨g e^{…}⟩| ≥ |Re μ_j| |c_j|. Starts far from that are not worth Newton's method.
+//!
+//! **Source.** nayfeh1979, chapters 4 and 6 (averaging at external and internal resonances), with the means by quadrature as for
+//! describing functions, so that nothing need be small but damping and detuning.
+//!
+//! **Fails when** the motion is far from a sum of the two modes, as far from the resonance with a hard contact.
+
+use crate::attractors::Candidate;
+use crate::contract::{Batch, Parameters, VectorField};
+use crate::linalg::lu;
+use num_complex::Complex64;
+use std::f64::consts::TAU;
+
+/// Nodes of the mean over a period.
+const NODES: usize = 128;
+/// Amplitudes of the grid of starts, each 1/√2 of the one before; the first fills the ranges of the states.
+const AMPLITUDES: i32 = 17;
+/// Shares of the second of two modes in it.
+const SHARES: [f64; 4] = [0.2, 0.4, 0.6, 0.8];
+/// Phases of the grid.
+const PHASES: u32 = 6;
+/// How many of the starts are corrected, those with the smallest residual.
+const CORRECTED: usize = 48;
+/// How many solutions are kept.
+const KEPT: usize = 4;
+const ROUNDS: usize = 25;
+
+/// A mode of oscillation, its vector as large as half the ranges of the states.
+#[derive(Clone, Debug)]
+pub(super) struct Mode {
+    /// μ.
+    pub(super) rate: Complex64,
+    right: Vec<Complex64>,
+    left: Vec<Complex64>,
+}
+
+impl Mode {
+    /// The mode of the eigenvalue next to `rate` of a matrix `[n × n]`; `halves` are half the ranges of the states.
+    pub(super) fn of(matrix: &[f64], rate: Complex64, halves: &[f64]) -> Option<Mode> {
+        let n = halves.len();
+        // (A - z) (a + ib) as a real system of twice the size; a shift of the size of rounding keeps it regular.
+        let largest = matrix.iter().fold(rate.norm(), |m, a| m.max(a.abs()));
+        let shifted = rate + 1e-14 * largest;
+        let (mut real, mut pivots) = (vec![0.0; 4 * n * n], vec![0; 2 * n]);
+        for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
+            let own = matrix[i * n + j] - if i == j { shifted.re } else { 0.0 };
+            let turned = if i == j { shifted.im } else { 0.0 };
+            real[2 * n * i + j] = own;
+            real[2 * n * (n + i) + n + j] = own;
+            real[2 * n * i + n + j] = turned;
+            real[2 * n * (n + i) + j] = -turned;
+        }
+        lu::factorise(&mut real, 2 * n, &mut pivots).ok()?;
+        let iterated = |transposed: bool| {
+            let mut vector: Vec<f64> = (0..2 * n).map(|k| (1.0 + k as f64).sin()).collect();
+            for _ in 0..3 {
+                match transposed {
+                    false => lu::solve(&real, 2 * n, &pivots, &mut vector, 1),
+                    true => lu::solve_transposed(&real, 2 * n, &pivots, &mut vector),
+                }
+                let size = vector.iter().fold(0.0f64, |m, x| m.max(x.abs()));
+                vector.iter_mut().for_each(|x| *x /= size);
+            }
+            (0..n).map(|i| Complex64::new(vector[i], vector[n + i])).collect::<Vec<_>>()
+        };
+        let (mut right, mut left) = (iterated(false), iterated(true));
+        let size = right.iter().zip(halves).fold(0.0f64, |m, (q, half)| m.max(q.norm() / half));
+        right.iter_mut().for_each(|q| *q /= size);
+        let product: Complex64 = left.iter().zip(&right).map(|(p, q)| p.conj() * q).sum();
+        left.iter_mut().for_each(|p| *p /= product.conj());
+        let sound = right.iter().chain(&left).all(|z| z.is_finite());
+        sound.then_some(Mode { rate, right, left })
+    }
+}
+
+/// Modes that may swing together: each with its order k.
+pub(super) struct Averaged<'a> {
+    field: &'a dyn VectorField,
+    parameters: &'a [f64],
+    jacobian: &'a [f64],
+    modes: Vec<(&'a Mode, u32)>,
+    /// Of a forced field, the periods of the forcing in one of the cycle.
+    turns: Option<u32>,
+    /// x₀ and f(x₀) at the nodes, `[n × nodes]`.
+    states: Vec<f64>,
+    flow: Vec<f64>,
+    times: Vec<f64>,
+    /// e^{i k_j w t} at the nodes.
+    carriers: Vec<Vec<Complex64>>,
+}
+
+/// A zero of (2), or a start for one.
+#[derive(Clone, Debug)]
+struct Swing {
+    amplitudes: Vec<Complex64>,
+    w: f64,
+}
+
+impl Swing {
+    fn size(&self) -> f64 {
+        self.amplitudes.iter().map(|c| c.norm_sqr()).sum::<f64>().sqrt()
+    }
+}
+
+impl<'a> Averaged<'a> {
+    /// `response` gives x₀ at a time, in periods of the forcing if there is one.
+    pub(super) fn new(
+        field: &'a dyn VectorField,
+        parameters: &'a [f64],
+        jacobian: &'a [f64],
+        modes: Vec<(&'a Mode, u32)>,
+        turns: Option<u32>,
+        response: &dyn Fn(f64) -> Vec<f64>,
+    ) -> Averaged<'a> {
+        let n = field.dim();
+        let time = |node: usize| f64::from(turns.unwrap_or(0)) * node as f64 / NODES as f64;
+        let (mut states, mut flow) = (vec![0.0; n * NODES], vec![0.0; n * NODES]);
+        for node in 0..NODES {
+            response(time(node)).iter().enumerate().for_each(|(i, x)| states[i * NODES + node] = *x);
+        }
+        let times = if turns.is_some() { (0..NODES).map(time).collect() } else { Vec::new() };
+        let parameters_of = Parameters::Shared(parameters);
+        field.evaluate(Batch { lanes: NODES, states: &states, parameters: parameters_of, times: &times }, &mut flow);
+        let carrier = |order: u32| {
+            let angle = |node: usize| TAU * f64::from(order) * node as f64 / NODES as f64;
+            (0..NODES).map(|node| Complex64::cis(angle(node))).collect::<Vec<_>>()
+        };
+        let carriers = modes.iter().map(|(_, order)| carrier(*order)).collect();
+        Averaged { field, parameters, jacobian, modes, turns, states, flow, times, carriers }
+    }
+
+    /// Motions that solve (2), as starts for Newton's method on the cycle, and how many starts were corrected.
+    pub(super) fn motions(&self) -> (Vec<Candidate>, usize) {
+        let mut starts: Vec<(f64, Swing)> = self.grid().into_iter().filter_map(|swing| self.rated(swing)).collect();
+        starts.sort_by(|a, b| a.0.total_cmp(&b.0));
+        starts.truncate(CORRECTED);
+        let (count, mut found) = (starts.len(), Vec::<Swing>::new());
+        for (_, start) in starts {
+            if let Some(swing) = self.corrected(start)
+                && !found.iter().any(|other| self.same(other, &swing))
+            {
+                found.push(swing);
+            }
+        }
+        found.truncate(KEPT);
+        (found.iter().map(|swing| self.motion(swing)).collect(), count)
+    }
+
+    /// w next to which it is looked for.
+    fn first_w(&self) -> f64 {
+        let (mode, order) = self.modes[0];
+        self.turns.map_or(mode.rate.im / f64::from(order), |turns| TAU / f64::from(turns))
+    }
+
+    /// The power of a phase that does not depend on where time starts.
+    fn fold(&self) -> u32 {
+        self.turns.unwrap_or(self.modes[0].1)
+    }
+
+    fn grid(&self) -> Vec<Swing> {
+        let w = self.first_w();
+        let mut all = Vec::new();
+        for amplitude in (0..AMPLITUDES).map(|j| 0.5f64.powf(0.5 * f64::from(j))) {
+            for phase in 0..PHASES {
+                let turn = Complex64::cis(TAU * f64::from(phase) / f64::from(PHASES * self.fold()));
+                if self.modes.len() == 1 {
+                    all.push(Swing { amplitudes: vec![amplitude * turn], w });
+                    continue;
+                }
+                all.extend(SHARES.map(|share| {
+                    let amplitudes = vec![(amplitude * (1.0 - share)).into(), amplitude * share * turn];
+                    Swing { amplitudes, w }
+                }));
+            }
+        }
+        all
+    }
+
+    /// A start with the w that suits it best, and its relative residual; `None` where (3) does not hold by far.
+    fn rated(&self, mut swing: Swing) -> Option<(f64, Swing)> {
+        let y = self.deviation(&swing);
+        let x: Vec<f64> = self.states.iter().zip(&y).map(|(a, b)| a + b).collect();
+        let mut f = vec![0.0; x.len()];
+        self.field.evaluate(self.batch(&x), &mut f);
+        let forces = self.forces(&f, &y);
+        let drives = |((c, (mode, _)), force): ((&Complex64, &(&Mode, u32)), &Complex64)| {
+            force.norm() >= 0.5 * mode.rate.re.abs() * c.norm() && force.is_finite()
+        };
+        if !swing.amplitudes.iter().zip(&self.modes).zip(&forces).all(drives) {
+            return None;
+        }
+        let residual = |swing: &Swing| -> Vec<Complex64> { self.residual(swing, &forces) };
+        if self.turns.is_none() {
+            let errors = residual(&swing);
+            let along = |j: usize| Complex64::i() * f64::from(self.modes[j].1) * swing.amplitudes[j];
+            let product: f64 = (0..errors.len()).map(|j| (along(j).conj() * errors[j]).re).sum();
+            swing.w -= product / (0..errors.len()).map(|j| along(j).norm_sqr()).sum::<f64>();
+        }
+        let error = residual(&swing).iter().map(|e| e.norm_sqr()).sum::<f64>().sqrt();
+        (swing.w > 0.0).then_some((error / (swing.w * swing.size()), swing))
+    }
+
+    fn batch<'b>(&'b self, states: &'b [f64]) -> Batch<'b> {
+        Batch { lanes: NODES, states, parameters: Parameters::Shared(self.parameters), times: &self.times }
+    }
+
+    /// y at the nodes.
+    fn deviation(&self, swing: &Swing) -> Vec<f64> {
+        let n = self.field.dim();
+        let mut y = vec![0.0; n * NODES];
+        for ((c, (mode, _)), carrier) in swing.amplitudes.iter().zip(&self.modes).zip(&self.carriers) {
+            for (i, q) in mode.right.iter().enumerate() {
+                let row = &mut y[i * NODES..(i + 1) * NODES];
+                row.iter_mut().zip(carrier).for_each(|(y, e)| *y += (c * q * e).re);
+            }
+        }
+        y
+    }
+
+    /// 2 p_jᴴ ⟨g e^{-i k_j w t}⟩ of each mode.
+    fn forces(&self, f: &[f64], y: &[f64]) -> Vec<Complex64> {
+        let n = self.field.dim();
+        let mut g: Vec<f64> = f.iter().zip(&self.flow).map(|(a, b)| a - b).collect();
+        for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
+            let a = self.jacobian[i * n + j];
+            (0..NODES).for_each(|node| g[i * NODES + node] -= a * y[j * NODES + node]);
+        }
+        let mean = |((mode, _), carrier): (&(&Mode, u32), &Vec<Complex64>)| -> Complex64 {
+            let part = |i: usize| -> Complex64 {
+                g[i * NODES..(i + 1) * NODES].iter().zip(carrier).map(|(g, e)| e.conj() * *g).sum()
+            };
+            (0..n).map(|i| mode.left[i].conj() * part(i)).sum::<Complex64>() * 2.0 / NODES as f64
+        };
+        self.modes.iter().zip(&self.carriers).map(mean).collect()
+    }
+
+    /// (2).
+    fn residual(&self, swing: &Swing, forces: &[Complex64]) -> Vec<Complex64> {
+        let own = |((c, (mode, order)), force): ((&Complex64, &(&Mode, u32)), &Complex64)| {
+            (Complex64::i() * f64::from(*order) * swing.w - mode.rate) * c - force
+        };
+        swing.amplitudes.iter().zip(&self.modes).zip(forces).map(own).collect()
+    }
+
+    /// Newton's method, no step larger than half the amplitudes; `None` unless it converges to a motion of all its modes.
+    fn corrected(&self, mut swing: Swing) -> Option<Swing> {
+        const CONVERGED: f64 = 1e-7;
+        const LEAST: f64 = 1e-2;
+        for _ in 0..ROUNDS {
+            let step = self.step(&swing)?;
+            let (size, w) = (swing.size(), swing.w);
+            let moved = step.size() / size + (step.w / w).abs();
+            let share = (0.5 / moved).min(1.0);
+            swing.amplitudes.iter_mut().zip(&step.amplitudes).for_each(|(c, d)| *c -= share * d);
+            swing.w -= share * step.w;
+            if !(moved.is_finite() && swing.w > 0.0) {
+                return None;
+            }
+            if moved < CONVERGED {
+                let whole = swing.amplitudes.iter().all(|c| c.norm() > LEAST * swing.size());
+                return (whole && swing.size() > LEAST * 0.5f64.powf(0.5 * f64::from(AMPLITUDES))).then_some(swing);
+            }
+        }
+        None
+    }
+
+    /// Newton's step, to be subtracted.
+    fn step(&self, swing: &Swing) -> Option<Swing> {
+        let (n, m) = (self.field.dim(), self.modes.len());
+        let y = self.deviation(swing);
+        let x: Vec<f64> = self.states.iter().zip(&y).map(|(a, b)| a + b).collect();
+        let (mut f, mut fx) = (vec![0.0; n * NODES], vec![0.0; n * n * NODES]);
+        self.field.linearise(self.batch(&x), &[], &mut f, &mut fx, &mut []);
+        let errors = self.residual(swing, &self.forces(&f, &y));
+        // Columns: the parts of each amplitude; w in place of the imaginary part of the first where w is unknown.
+        let mut columns = vec![vec![Complex64::new(0.0, 0.0); m]; 2 * m];
+        for (j, (mode, order)) in self.modes.iter().enumerate() {
+            // p_jᴴ (f_x - A) at the nodes, times e^{-i k_j w t}.
+            for k in 0..n {
+                for node in 0..NODES {
+                    let bent = |i: usize| fx[(i * n + k) * NODES + node] - self.jacobian[i * n + k];
+                    let row: Complex64 = (0..n).map(|i| mode.left[i].conj() * bent(i)).sum();
+                    let row = row * self.carriers[j][node].conj() * 2.0 / NODES as f64;
+                    for (l, (other, _)) in self.modes.iter().enumerate() {
+                        let swung = other.right[k] * self.carriers[l][node];
+                        columns[2 * l][j] -= row * swung.re;
+                        columns[2 * l + 1][j] += row * swung.im;
+                    }
+                }
+            }
+            let own = Complex64::i() * f64::from(*order) * swing.w - mode.rate;
+            columns[2 * j][j] += own;
+            columns[2 * j + 1][j] += Complex64::i() * own;
+        }
+        if self.turns.is_none() {
+            let slope = |j: usize| Complex64::i() * f64::from(self.modes[j].1) * swing.amplitudes[j];
+            columns[1] = (0..m).map(slope).collect();
+        }
+        let (mut matrix, mut pivots) = (vec![0.0; 4 * m * m], vec![0; 2 * m]);
+        for (c, column) in columns.iter().enumerate() {
+            for (j, value) in column.iter().enumerate() {
+                (matrix[2 * j * 2 * m + c], matrix[(2 * j + 1) * 2 * m + c]) = (value.re, value.im);
+            }
+        }
+        let mut step: Vec<f64> = errors.iter().flat_map(|e| [e.re, e.im]).collect();
+        lu::factorise(&mut matrix, 2 * m, &mut pivots).ok()?;
+        lu::solve(&matrix, 2 * m, &pivots, &mut step, 1);
+        let w = if self.turns.is_none() { std::mem::take(&mut step[1]) } else { 0.0 };
+        Some(Swing { amplitudes: step.chunks_exact(2).map(|c| Complex64::new(c[0], c[1])).collect(), w })
+    }
+
+    /// Whether two solutions differ in where time starts only.
+    fn same(&self, a: &Swing, b: &Swing) -> bool {
+        const NEAR: f64 = 1e-3;
+        let phase = |swing: &Swing| {
+            let unit = |j: usize| swing.amplitudes[j] / swing.amplitudes[j].norm();
+            match self.turns {
+                Some(turns) => unit(0).powu(turns),
+                None => unit(0).powu(self.modes[1].1) * unit(1).conj().powu(self.modes[0].1),
+            }
+        };
+        let sizes = a.amplitudes.iter().zip(&b.amplitudes).map(|(a, b)| (a.norm() - b.norm()).abs());
+        sizes.sum::<f64>() < NEAR * a.size() && (phase(a) - phase(b)).norm() < NEAR
+    }
+
+    /// (1) over one period.
+    fn motion(&self, swing: &Swing) -> Candidate {
+        let n = self.field.dim();
+        let y = self.deviation(swing);
+        let period = self.turns.map_or(TAU / swing.w, f64::from);
+        let times = (0..=NODES).map(|node| period * node as f64 / NODES as f64).collect();
+        let nodes = (0..NODES).chain([0]);
+        let state = |node: usize| (0..n).map(move |i| i * NODES + node);
+        let states = nodes.flat_map(state).map(|k| self.states[k] + y[k]).collect();
+        Candidate::Cycle { period, times, states }
+    }
+}
