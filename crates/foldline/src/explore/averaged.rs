@@ -6,17 +6,19 @@
 //!
 //! **Equations.** With A the mean of f_x along x₀, A q_j = μ_j q_j, p_jᴴ A = μ_j p_jᴴ, p_jᴴ q_j = 1, and ⟨·⟩ the mean over the period 2π/w,
 //!
-//!   (1)  x = x₀ + y,  y = Re Σ_j c_j q_j e^{i k_j w t},  g = f(x₀ + y) - f(x₀) - A y
-//!   (2)  E_j = (i k_j w - μ_j) c_j - 2 p_jᴴ ⟨g e^{-i k_j w t}⟩ = 0
+//!   (1)  x = x₀ + y,  y = Re Σ_j c_j q_j e^{i k_j w t}
+//!   (2)  E_j = i k_j w c_j - 2 p_jᴴ ⟨(f(x₀ + y) - f(x₀)) e^{-i k_j w t}⟩ = 0
 //!
 //! of one mode in a forced field, where w is that of the forcing over a whole number, and of two in an autonomous one, where w is
 //! unknown and c₁ is real: time may start anywhere.
 //!
-//! The real part of (2) times c̄_j balances the energy that a mode loses to damping against what the nonlinear force brings to it from the
-//! other mode or from the forcing: (3) 2 |p_jᴴ⟨g e^{…}⟩| ≥ |Re μ_j| |c_j|. Starts far from that are not worth Newton's method.
+//! The mean contains μ_j c_j from A y. What is left of it, by the nonlinear force, must keep up the mode against its damping:
 //!
-//! **Source.** nayfeh1979, chapters 4 and 6 (averaging at external and internal resonances), with the means by quadrature as for
-//! describing functions, so that nothing need be small but damping and detuning.
+//!   (3)  |2 p_jᴴ ⟨…⟩ - μ_j c_j| ≥ |Re μ_j| |c_j|
+//!
+//! Starts that bring less than half of that are not worth Newton's method.
+//!
+//! **Source.** nayfeh1979, chapters 4 and 6: averaging at external and internal resonances; the means by quadrature are ours.
 //!
 //! **Fails when** the motion is far from a sum of the two modes, as far from the resonance with a hard contact.
 
@@ -44,7 +46,7 @@ const ROUNDS: usize = 25;
 #[derive(Clone, Debug)]
 pub(super) struct Mode {
     /// μ.
-    pub(super) rate: Complex64,
+    rate: Complex64,
     right: Vec<Complex64>,
     left: Vec<Complex64>,
 }
@@ -92,7 +94,6 @@ impl Mode {
 pub(super) struct Averaged<'a> {
     field: &'a dyn VectorField,
     parameters: &'a [f64],
-    jacobian: &'a [f64],
     modes: Vec<(&'a Mode, u32)>,
     /// Of a forced field, the periods of the forcing in one of the cycle.
     turns: Option<u32>,
@@ -122,7 +123,6 @@ impl<'a> Averaged<'a> {
     pub(super) fn new(
         field: &'a dyn VectorField,
         parameters: &'a [f64],
-        jacobian: &'a [f64],
         modes: Vec<(&'a Mode, u32)>,
         turns: Option<u32>,
         response: &dyn Fn(f64) -> Vec<f64>,
@@ -141,7 +141,7 @@ impl<'a> Averaged<'a> {
             (0..NODES).map(|node| Complex64::cis(angle(node))).collect::<Vec<_>>()
         };
         let carriers = modes.iter().map(|(_, order)| carrier(*order)).collect();
-        Averaged { field, parameters, jacobian, modes, turns, states, flow, times, carriers }
+        Averaged { field, parameters, modes, turns, states, flow, times, carriers }
     }
 
     /// Motions that solve (2), as starts for Newton's method on the cycle, and how many starts were corrected.
@@ -193,25 +193,26 @@ impl<'a> Averaged<'a> {
 
     /// A start with the w that suits it best, and its relative residual; `None` where (3) does not hold by far.
     fn rated(&self, mut swing: Swing) -> Option<(f64, Swing)> {
-        let y = self.deviation(&swing);
-        let x: Vec<f64> = self.states.iter().zip(&y).map(|(a, b)| a + b).collect();
-        let mut f = vec![0.0; x.len()];
-        self.field.evaluate(self.batch(&x), &mut f);
-        let forces = self.forces(&f, &y);
-        let drives = |((c, (mode, _)), force): ((&Complex64, &(&Mode, u32)), &Complex64)| {
-            force.norm() >= 0.5 * mode.rate.re.abs() * c.norm() && force.is_finite()
-        };
-        if !swing.amplitudes.iter().zip(&self.modes).zip(&forces).all(drives) {
+        let mut f = vec![0.0; self.states.len()];
+        self.field.evaluate(self.batch(&self.place(&swing)), &mut f);
+        let rates = self.rates(&f);
+        let driven = (0..self.modes.len()).all(|j| {
+            let (c, mode) = (swing.amplitudes[j], self.modes[j].0);
+            (rates[j] - mode.rate * c).norm() >= 0.5 * mode.rate.re.abs() * c.norm() && rates[j].is_finite()
+        });
+        if !driven {
             return None;
         }
-        let residual = |swing: &Swing| -> Vec<Complex64> { self.residual(swing, &forces) };
         if self.turns.is_none() {
-            let errors = residual(&swing);
-            let along = |j: usize| Complex64::i() * f64::from(self.modes[j].1) * swing.amplitudes[j];
-            let product: f64 = (0..errors.len()).map(|j| (along(j).conj() * errors[j]).re).sum();
-            swing.w -= product / (0..errors.len()).map(|j| along(j).norm_sqr()).sum::<f64>();
+            let errors = self.residual(&swing, &rates);
+            let (mut product, mut square) = (0.0, 0.0);
+            for (slope, error) in self.slopes(&swing).iter().zip(errors) {
+                product += (slope.conj() * error).re;
+                square += slope.norm_sqr();
+            }
+            swing.w -= product / square;
         }
-        let error = residual(&swing).iter().map(|e| e.norm_sqr()).sum::<f64>().sqrt();
+        let error = self.residual(&swing, &rates).iter().map(|e| e.norm_sqr()).sum::<f64>().sqrt();
         (swing.w > 0.0).then_some((error / (swing.w * swing.size()), swing))
     }
 
@@ -232,29 +233,36 @@ impl<'a> Averaged<'a> {
         y
     }
 
-    /// 2 p_jᴴ ⟨g e^{-i k_j w t}⟩ of each mode.
-    fn forces(&self, f: &[f64], y: &[f64]) -> Vec<Complex64> {
-        let n = self.field.dim();
-        let mut g: Vec<f64> = f.iter().zip(&self.flow).map(|(a, b)| a - b).collect();
-        for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
-            let a = self.jacobian[i * n + j];
-            (0..NODES).for_each(|node| g[i * NODES + node] -= a * y[j * NODES + node]);
-        }
+    /// x at the nodes.
+    fn place(&self, swing: &Swing) -> Vec<f64> {
+        self.states.iter().zip(self.deviation(swing)).map(|(x, y)| x + y).collect()
+    }
+
+    /// 2 p_jᴴ ⟨v e^{-i k_j w t}⟩ of each mode.
+    fn means(&self, v: &[f64]) -> Vec<Complex64> {
         let mean = |((mode, _), carrier): (&(&Mode, u32), &Vec<Complex64>)| -> Complex64 {
-            let part = |i: usize| -> Complex64 {
-                g[i * NODES..(i + 1) * NODES].iter().zip(carrier).map(|(g, e)| e.conj() * *g).sum()
-            };
-            (0..n).map(|i| mode.left[i].conj() * part(i)).sum::<Complex64>() * 2.0 / NODES as f64
+            let part = |row: &[f64]| row.iter().zip(carrier).map(|(v, e)| e.conj() * *v).sum::<Complex64>();
+            let rows = mode.left.iter().zip(v.chunks_exact(NODES));
+            rows.map(|(p, row)| p.conj() * part(row)).sum::<Complex64>() * 2.0 / NODES as f64
         };
         self.modes.iter().zip(&self.carriers).map(mean).collect()
     }
 
+    /// The same of f(x) - f(x₀): how fast each amplitude changes.
+    fn rates(&self, f: &[f64]) -> Vec<Complex64> {
+        let changed: Vec<f64> = f.iter().zip(&self.flow).map(|(a, b)| a - b).collect();
+        self.means(&changed)
+    }
+
     /// (2).
-    fn residual(&self, swing: &Swing, forces: &[Complex64]) -> Vec<Complex64> {
-        let own = |((c, (mode, order)), force): ((&Complex64, &(&Mode, u32)), &Complex64)| {
-            (Complex64::i() * f64::from(*order) * swing.w - mode.rate) * c - force
-        };
-        swing.amplitudes.iter().zip(&self.modes).zip(forces).map(own).collect()
+    fn residual(&self, swing: &Swing, rates: &[Complex64]) -> Vec<Complex64> {
+        self.slopes(swing).iter().zip(rates).map(|(slope, rate)| slope * swing.w - rate).collect()
+    }
+
+    /// Its derivative by w.
+    fn slopes(&self, swing: &Swing) -> Vec<Complex64> {
+        let slope = |(c, (_, order)): (&Complex64, &(&Mode, u32))| Complex64::i() * f64::from(*order) * c;
+        swing.amplitudes.iter().zip(&self.modes).map(slope).collect()
     }
 
     /// Newton's method, no step larger than half the amplitudes; `None` unless it converges to a motion of all its modes.
@@ -281,38 +289,18 @@ impl<'a> Averaged<'a> {
 
     /// Newton's step, to be subtracted.
     fn step(&self, swing: &Swing) -> Option<Swing> {
-        let (n, m) = (self.field.dim(), self.modes.len());
-        let y = self.deviation(swing);
-        let x: Vec<f64> = self.states.iter().zip(&y).map(|(a, b)| a + b).collect();
-        let (mut f, mut fx) = (vec![0.0; n * NODES], vec![0.0; n * n * NODES]);
-        self.field.linearise(self.batch(&x), &[], &mut f, &mut fx, &mut []);
-        let errors = self.residual(swing, &self.forces(&f, &y));
-        // Columns: the parts of each amplitude; w in place of the imaginary part of the first where w is unknown.
-        let mut columns = vec![vec![Complex64::new(0.0, 0.0); m]; 2 * m];
-        for (j, (mode, order)) in self.modes.iter().enumerate() {
-            // p_jᴴ (f_x - A) at the nodes, times e^{-i k_j w t}.
-            for k in 0..n {
-                for node in 0..NODES {
-                    let bent = |i: usize| fx[(i * n + k) * NODES + node] - self.jacobian[i * n + k];
-                    let row: Complex64 = (0..n).map(|i| mode.left[i].conj() * bent(i)).sum();
-                    let row = row * self.carriers[j][node].conj() * 2.0 / NODES as f64;
-                    for (l, (other, _)) in self.modes.iter().enumerate() {
-                        let swung = other.right[k] * self.carriers[l][node];
-                        columns[2 * l][j] -= row * swung.re;
-                        columns[2 * l + 1][j] += row * swung.im;
-                    }
-                }
-            }
-            let own = Complex64::i() * f64::from(*order) * swing.w - mode.rate;
-            columns[2 * j][j] += own;
-            columns[2 * j + 1][j] += Complex64::i() * own;
-        }
-        if self.turns.is_none() {
-            let slope = |j: usize| Complex64::i() * f64::from(self.modes[j].1) * swing.amplitudes[j];
-            columns[1] = (0..m).map(slope).collect();
-        }
+        let m = self.modes.len();
+        let x = self.place(swing);
+        let mut f = vec![0.0; x.len()];
+        self.field.evaluate(self.batch(&x), &mut f);
+        let errors = self.residual(swing, &self.rates(&f));
+        // Real and imaginary part of each amplitude; where time may start anywhere, w in place of the imaginary part of the first.
+        let columns = (0..2 * m).map(|c| match (c, self.turns) {
+            (1, None) => self.slopes(swing),
+            _ => self.column(&x, swing, c),
+        });
         let (mut matrix, mut pivots) = (vec![0.0; 4 * m * m], vec![0; 2 * m]);
-        for (c, column) in columns.iter().enumerate() {
+        for (c, column) in columns.enumerate() {
             for (j, value) in column.iter().enumerate() {
                 (matrix[2 * j * 2 * m + c], matrix[(2 * j + 1) * 2 * m + c]) = (value.re, value.im);
             }
@@ -322,6 +310,18 @@ impl<'a> Averaged<'a> {
         lu::solve(&matrix, 2 * m, &pivots, &mut step, 1);
         let w = if self.turns.is_none() { std::mem::take(&mut step[1]) } else { 0.0 };
         Some(Swing { amplitudes: step.chunks_exact(2).map(|c| Complex64::new(c[0], c[1])).collect(), w })
+    }
+
+    /// The derivative of (2) by a real or an imaginary part of an amplitude, at x.
+    fn column(&self, x: &[f64], swing: &Swing, part: usize) -> Vec<Complex64> {
+        let mut amplitudes = vec![Complex64::new(0.0, 0.0); self.modes.len()];
+        amplitudes[part / 2] = if part.is_multiple_of(2) { 1.0.into() } else { Complex64::i() };
+        let unit = Swing { amplitudes, w: swing.w };
+        let mut direction = self.deviation(&unit);
+        direction.resize(x.len() + self.parameters.len() * NODES, 0.0);
+        let mut bent = vec![0.0; x.len()];
+        self.field.directional(self.batch(x), &[&direction], &mut bent);
+        self.residual(&unit, &self.means(&bent))
     }
 
     /// Whether two solutions differ in where time starts only.

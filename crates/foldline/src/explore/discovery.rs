@@ -117,7 +117,7 @@ impl Discovery<'_, '_> {
             return true;
         }
         let resonances = Resonances { system, plan, tolerance };
-        let (roots, all) = resonances.roots();
+        let (roots, left) = resonances.roots();
         let places: Vec<String> = roots.iter().map(|root| format!("{} at {:.4}", root.name(), root.value)).collect();
         let (known, mut averaged, mut corrected, mut cycles) = (self.named.len(), 0, 0, 0);
         for root in &roots {
@@ -134,7 +134,7 @@ impl Discovery<'_, '_> {
                 }
             }
         }
-        let left = if all > roots.len() { format!("; {} more are left", all - roots.len()) } else { String::new() };
+        let left = if left > 0 { format!("; {left} more are left") } else { String::new() };
         let branches = self.named.len() - known;
         places.is_empty()
             || self.note(&format!(

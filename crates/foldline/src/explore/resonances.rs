@@ -29,11 +29,12 @@ use crate::contract::{Batch, Parameters};
 use crate::diagram::{Point, Solution};
 use crate::problem::equilibrium::EquilibriumProblem;
 use crate::stability::eigenvalues;
+use num_complex::Complex64;
 use std::f64::consts::TAU;
 
 /// Largest whole number in a ratio.
 const ORDER: u32 = 5;
-/// Lightly damped: |Re μ| is no larger share of |Im μ|. An oscillation then falls to less than half in each turn beyond that.
+/// Largest |Re μ| / |Im μ| of a lightly damped mode: with it an oscillation falls to about half in each turn.
 const LIGHT: f64 = 0.1;
 /// Intervals of the range in which a root is looked for.
 const INTERVALS: usize = 64;
@@ -61,8 +62,8 @@ struct Response {
     solution: Solution,
     /// The mean of f_x along it.
     jacobian: Vec<f64>,
-    /// Its lightly damped modes by frequency.
-    modes: Vec<Mode>,
+    /// The eigenvalues μ of its lightly damped modes by frequency.
+    rates: Vec<Complex64>,
 }
 
 /// What was found next to a root at one value, and what it took.
@@ -115,7 +116,7 @@ impl Ratio {
 
     /// (1), relative.
     fn mismatch(&self, response: &Response) -> Option<f64> {
-        let frequency = |index: usize| response.modes.get(index).map(|mode| mode.rate.im);
+        let frequency = |index: usize| response.rates.get(index).map(|rate| rate.im);
         let first = f64::from(self.l) * frequency(self.modes[0])?;
         let second = f64::from(self.k) * self.modes.get(1).map_or(Some(TAU), |index| frequency(*index))?;
         Some((first - second) / (first + second))
@@ -127,40 +128,50 @@ fn coprime(a: u32, b: u32) -> bool {
 }
 
 impl Resonances<'_> {
-    /// Step 2; the number of all of them beside those that are looked at.
+    /// Step 2, and how many more are left.
     pub(super) fn roots(&self) -> (Vec<Root>, usize) {
         let [low, high] = self.plan.range;
         let value = |k: usize| low + (high - low) * k as f64 / INTERVALS as f64;
         let responses: Vec<Option<Response>> = (0..=INTERVALS).map(|k| self.response(value(k))).collect();
-        let count = responses.iter().flatten().map(|response| response.modes.len()).max().unwrap_or(0);
-        let mut roots: Vec<Root> = Vec::new();
+        let count = responses.iter().flatten().map(|response| response.rates.len()).max().unwrap_or(0);
+        let (mut roots, mut left): (Vec<Root>, usize) = (Vec::new(), 0);
         for ratio in Ratio::all(count, self.system.field.forced()) {
             let mismatch = |k: usize| ratio.mismatch(responses[k].as_ref()?);
             for k in 1..=INTERVALS {
-                if let (Some(a), Some(b)) = (mismatch(k - 1), mismatch(k))
-                    && (a < 0.0) != (b < 0.0)
-                    && let Some(value) = self.root(&ratio, [value(k - 1), value(k)], a)
-                {
+                let Some(pair) = mismatch(k - 1).zip(mismatch(k)) else { continue };
+                if (pair.0 < 0.0) == (pair.1 < 0.0) {
+                    continue;
+                }
+                if roots.len() == ROOTS {
+                    left += 1;
+                } else if let Some(value) = self.root(&ratio, [(value(k - 1), pair.0), (value(k), pair.1)]) {
                     roots.push(Root { value, ratio: ratio.clone() });
                 }
             }
         }
-        let all = roots.len();
-        roots.truncate(ROOTS);
-        (roots, all)
+        (roots, left)
     }
 
-    /// The root between two values, the mismatch at the first being `first`; `None` where it jumps, as where the response does.
-    fn root(&self, ratio: &Ratio, [mut a, mut b]: [f64; 2], first: f64) -> Option<f64> {
-        const HALVINGS: usize = 30;
+    /// The root between two values with a mismatch of either sign; `None` where it jumps, as where the response does. By false position,
+    /// where an end that stays counts half.
+    fn root(&self, ratio: &Ratio, [mut a, mut b]: [(f64, f64); 2]) -> Option<f64> {
+        const ROUNDS: usize = 20;
         const ZERO: f64 = 1e-6;
-        let mut last = first;
-        for _ in 0..HALVINGS {
-            let middle = 0.5 * (a + b);
-            last = ratio.mismatch(&self.response(middle)?)?;
-            if (last < 0.0) == (first < 0.0) { a = middle } else { b = middle }
+        for _ in 0..ROUNDS {
+            let value = a.0 - a.1 * (b.0 - a.0) / (b.1 - a.1);
+            let next = (value, ratio.mismatch(&self.response(value)?)?);
+            if next.1.abs() < ZERO {
+                return Some(value);
+            }
+            // The last value is b.
+            if (next.1 < 0.0) == (b.1 < 0.0) {
+                a.1 *= 0.5
+            } else {
+                a = b
+            }
+            b = next;
         }
-        (last.abs() < ZERO).then_some(0.5 * (a + b))
+        None
     }
 
     fn parameters(&self, value: f64) -> Vec<f64> {
@@ -193,12 +204,10 @@ impl Resonances<'_> {
             system.field.linearise(at, &[], &mut f, &mut fx, &mut []);
             jacobian.iter_mut().zip(&fx).for_each(|(mean, own)| *mean += own / places as f64);
         }
-        let halves: Vec<f64> = system.ranges.iter().map(|[low, high]| 0.5 * (high - low)).collect();
         let mut rates = eigenvalues(&jacobian, n, &system.scales);
         rates.retain(|rate| rate.im > 0.0 && rate.re.abs() <= LIGHT * rate.im);
         rates.sort_by(|a, b| a.im.total_cmp(&b.im));
-        let modes = rates.into_iter().filter_map(|rate| Mode::of(&jacobian, rate, &halves)).collect();
-        Some(Response { solution: point.solution, jacobian, modes })
+        Some(Response { solution: point.solution, jacobian, rates })
     }
 
     /// Step 3 at one value.
@@ -207,18 +216,12 @@ impl Resonances<'_> {
         let Some(response) = self.response(value) else { return Yield::default() };
         let forced = self.system.field.forced();
         let orders = if forced { vec![ratio.k] } else { vec![ratio.k, ratio.l] };
-        let modes: Vec<(&Mode, u32)> = ratio
-            .modes
-            .iter()
-            .zip(orders)
-            .filter_map(|(index, order)| Some((response.modes.get(*index)?, order)))
-            .collect();
-        if modes.len() < ratio.modes.len() {
-            return Yield::default();
-        }
+        let halves: Vec<f64> = self.system.ranges.iter().map(|[low, high]| 0.5 * (high - low)).collect();
+        let mode = |index: &usize| Mode::of(&response.jacobian, *response.rates.get(*index)?, &halves);
+        let Some(modes) = ratio.modes.iter().map(mode).collect::<Option<Vec<Mode>>>() else { return Yield::default() };
         let turns = forced.then_some(ratio.l);
         let at = |time: f64| state(&response.solution, time);
-        let averaged = Averaged::new(self.system.field, &parameters, &response.jacobian, modes, turns, &at);
+        let averaged = Averaged::new(self.system.field, &parameters, modes.iter().zip(orders).collect(), turns, &at);
         let (motions, solved) = averaged.motions();
         let cycles = motions.iter().filter_map(|motion| polish(self.system, &parameters, self.tolerance, motion));
         let moving = cycles.filter(|cycle| self.moves(cycle)).collect();
