@@ -350,3 +350,69 @@ impl<'a> Averaged<'a> {
         Candidate::Cycle { period, times, states }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{Averaged, Mode};
+    use crate::attractors::Candidate;
+    use crate::contract::VectorField;
+    use crate::model::forcing::Forcing;
+    use crate::model::{Definition, Forcing, Model, ModelSource, Parameter, State};
+    use num_complex::Complex64;
+    use std::f64::consts::TAU;
+
+    /// x'' + 2ζ x' + x + α x³ = A cos ωt.
+    fn duffing(parameters: [f64; 4]) -> Model {
+        let names = ["omega", "A", "zeta", "alpha"];
+        Model::compile(ModelSource {
+            name: "duffing".into(),
+            parameters: names.iter().zip(parameters).map(|(name, value)| Parameter::new(*name, value)).collect(),
+            states: vec![State::new("x"), State::new("v")],
+            equations: vec![
+                Definition::new("x", "v"),
+                Definition::new("v", "-2*zeta*v - x - alpha*x^3 + A*cos(omega*t)"),
+            ],
+            forcing: Some(Forcing { is_frequency: true, expression: "omega".into() }),
+            ..ModelSource::default()
+        })
+        .unwrap()
+    }
+
+    /// The subharmonic x = B cos ωt + a cos(ωt/3 + φ) of a weak cubic spring, B = A/(1 - ω²), by first-order balance:
+    /// [1 - ω²/9 + α(¾a² + 3/2 B²)]² + (2ζω/3)² = (¾ α a B)². nayfeh1979, §4.1.4.
+    #[test]
+    fn the_subharmonic_of_order_three_of_a_weakly_nonlinear_oscillator() {
+        let (omega, force, zeta, alpha) = (3.02, 8.0, 1e-4, 0.002);
+        let parameters = [omega, force, zeta, alpha];
+        let model = duffing(parameters);
+        let period = TAU / omega;
+        // In time counted in periods.
+        let matrix = [0.0, period, -period, -2.0 * zeta * period];
+        let rate = period * Complex64::new(-zeta, (1.0 - zeta * zeta).sqrt());
+        let mode = Mode::of(&matrix, rate, &[8.0, 8.0]).unwrap();
+        let b = force / (1.0 - omega * omega);
+        let response = |t: f64| vec![b * (TAU * t).cos(), -b * omega * (TAU * t).sin()];
+        let averaged = Averaged::new(&model, &parameters, vec![(&mode, 1)], Some(3), &response);
+        let (motions, _) = averaged.motions();
+        let balance = |a: f64| {
+            let stiff = 1.0 - omega * omega / 9.0 + alpha * (0.75 * a * a + 1.5 * b * b);
+            stiff * stiff + (2.0 * zeta * omega / 3.0).powi(2) - (0.75 * alpha * a * b).powi(2)
+        };
+        let grid: Vec<f64> = (1..8000).map(|k| k as f64 * 1e-3).collect();
+        let expected: Vec<f64> =
+            grid.windows(2).filter(|w| balance(w[0]) * balance(w[1]) < 0.0).map(|w| w[0]).collect();
+        assert!(!expected.is_empty() && model.forced());
+        let mut found: Vec<f64> = motions.iter().map(amplitude).collect();
+        found.sort_by(f64::total_cmp);
+        assert_eq!(found.len(), expected.len(), "{found:?} {expected:?}");
+        assert!(found.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 0.05 * b), "{found:?} {expected:?}");
+    }
+
+    /// That of the part with a third of the frequency of the force.
+    fn amplitude(motion: &Candidate) -> f64 {
+        let Candidate::Cycle { period, times, states } = motion else { return f64::NAN };
+        let last = times.len() - 1;
+        let part = |k: usize| states[2 * k] * Complex64::cis(-TAU * times[k] / period);
+        ((0..last).map(part).sum::<Complex64>() * 2.0 / last as f64).norm()
+    }
+}

@@ -134,6 +134,9 @@ impl Discovery<'_, '_> {
                 }
             }
         }
+        if system.field.ended() {
+            return false;
+        }
         let left = if left > 0 { format!("; {left} more are left") } else { String::new() };
         let branches = self.named.len() - known;
         places.is_empty()

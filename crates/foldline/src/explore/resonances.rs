@@ -243,3 +243,27 @@ fn state(solution: &Solution, time: f64) -> Vec<f64> {
         Solution::Cycle(cycle) => cycle.state(time.rem_euclid(1.0)),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{Ratio, Root};
+
+    #[test]
+    fn ratios_of_small_numbers_come_first_and_each_once() {
+        let pairs = |forced| Ratio::all(2, forced).iter().map(|r| (r.k, r.l)).collect::<Vec<_>>();
+        assert_eq!(pairs(false), [(1, 2), (1, 3), (1, 4), (2, 3), (1, 5), (2, 5), (3, 4), (3, 5), (4, 5)]);
+        let forced = Ratio::all(1, true);
+        assert_eq!(forced.len(), 19);
+        assert!(forced.iter().all(|r| r.modes == [0]) && (forced[0].k, forced[0].l) == (1, 1));
+    }
+
+    #[test]
+    fn values_lie_on_both_sides_of_a_root_inside_the_range() {
+        let ratio = Ratio { modes: vec![0, 1], k: 1, l: 3 };
+        let root = Root { value: 2.0, ratio };
+        let values = root.values([1.95, 11.95]);
+        let offsets: Vec<f64> = values.iter().map(|value| ((value - 2.0) * 1e4).round()).collect();
+        assert_eq!(offsets, [100.0, -100.0, 316.0, -316.0, 1000.0, 3162.0, 10000.0]);
+        assert_eq!(root.name(), "3:1");
+    }
+}
