@@ -1,7 +1,7 @@
 //! Whole diagrams found from a model and a box of parameters: what is known of them must all be there, once.
 
 use foldline::contract::{Event, Observer, Unobserved, Verdict};
-use foldline::diagram::{Branch, Diagram, Ending, Family, Kind, Solution};
+use foldline::diagram::{Branch, Diagram, Ending, Family, Kind, Point, Solution};
 use foldline::explore::{self, SeedPlan, SeedSource, System, first_solution};
 use foldline_store::study_file::{Study, parse_study};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -183,10 +183,12 @@ fn an_isola_next_to_a_resonance_that_no_sample_goes_to() {
     assert_eq!(names(&diagram).iter().filter(|name| name.starts_with("all/3:1")).count(), 1, "{:?}", names(&diagram));
 }
 
-/// That a trajectory which begins a little off the first stable point of a branch settles on the same cycle.
+/// That a trajectory which begins a little off the most stable point of a branch settles on the same cycle.
 #[track_caller]
 fn attracts(study: &Study, branch: &Branch) {
-    let stable = branch.points.iter().find(|point| point.unstable == 0).expect("a stable part");
+    let largest = |point: &Point| point.free_spectrum().iter().fold(0.0f64, |m, z| m.max(z.norm()));
+    let stable = branch.points.iter().min_by(|a, b| largest(a).total_cmp(&largest(b))).unwrap();
+    assert_eq!(stable.unstable, 0);
     let Solution::Cycle(cycle) = &stable.solution else { panic!("no cycle") };
     let state: Vec<f64> = cycle.state(0.0).iter().map(|x| x * 1.001).collect();
     let (source, parameters) = (SeedSource::State(state), stable.parameters.clone());

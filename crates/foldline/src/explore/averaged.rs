@@ -356,7 +356,6 @@ mod tests {
     use super::{Averaged, Mode};
     use crate::attractors::Candidate;
     use crate::contract::VectorField;
-    use crate::model::forcing::Forcing;
     use crate::model::{Definition, Forcing, Model, ModelSource, Parameter, State};
     use num_complex::Complex64;
     use std::f64::consts::TAU;
