@@ -1,8 +1,8 @@
 //! Whole diagrams found from a model and a box of parameters: what is known of them must all be there, once.
 
 use foldline::contract::{Event, Observer, Unobserved, Verdict};
-use foldline::diagram::{Branch, Diagram, Ending, Family, Kind};
-use foldline::explore::{self, System};
+use foldline::diagram::{Branch, Diagram, Ending, Family, Kind, Point, Solution};
+use foldline::explore::{self, SeedPlan, SeedSource, System, first_solution};
 use foldline_store::study_file::{Study, parse_study};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -164,6 +164,66 @@ fn isolated_branches_are_reached_through_a_second_parameter() {
     for name in ["all/equilibrium-1", "all/equilibrium-2"] {
         assert!(branch(&connected, name).ends.iter().all(|end| *end == Some(Ending::Closed)));
     }
+}
+
+/// A lightly damped rotor just above contact, where no sample settles. Another route to the same isola, from a state on it, with
+/// shooting and integration at 1e-12: from 2.2588 to 3.0204, stable from 2.8467 on.
+#[test]
+fn an_isola_next_to_a_resonance_that_no_sample_goes_to() {
+    let light =
+        "parameters = { kappa = 1, zeta = 0.0012634, epsilon = 0.4449, beta = 31.956, K = 479.34, J_p = 0.1876 }";
+    let rest = "free = \"Omega\"\nrange = [2.1, 3.2]\nvalues = 1\nsamples = 4\nswitch = { period-doubling = 0 }";
+    let diagram = explored(ROTOR, &format!("{light}\n{rest}"));
+    let isola = branch(&diagram, "all/3:1-1");
+    assert!(isola.ends.iter().all(|end| *end == Some(Ending::Closed)), "{:?}", isola.ends);
+    let near = |kind: Kind, value: f64| {
+        isola.special.iter().any(|s| s.kind == kind && (s.point.parameters[0] - value).abs() < 5e-5)
+    };
+    assert!(near(Kind::Fold, 2.2588) && near(Kind::Fold, 3.0204) && near(Kind::PeriodDoubling, 2.8467));
+    assert_eq!(names(&diagram).iter().filter(|name| name.starts_with("all/3:1")).count(), 1, "{:?}", names(&diagram));
+}
+
+/// That a trajectory which begins a little off a stable cycle of a branch settles on it: off one of them at least, as basins are narrow.
+#[track_caller]
+fn attracts(study: &Study, branch: &Branch) {
+    let system = System::of_plan(&study.model, &study.plan);
+    let returns = |point: &&Point| {
+        let Solution::Cycle(cycle) = &point.solution else { return false };
+        let state: Vec<f64> = cycle.state(0.0).iter().map(|x| x * 1.001).collect();
+        let (source, parameters) = (SeedSource::State(state), point.parameters.clone());
+        let seed = SeedPlan { name: "off".into(), source, parameters, samples: 1, random: 1 };
+        let settled = first_solution(&system, &seed, 1e-6, 1);
+        settled.is_ok_and(|settled| settled.difference(point, &system.scales, &[]) < 1e-5)
+    };
+    let mut stable = branch.points.iter().filter(|point| point.unstable == 0);
+    assert!(stable.any(|point| returns(&point)), "no trajectory settles on {}", branch.name);
+}
+
+/// An isola of another light rotor.
+#[test]
+fn a_trajectory_stays_on_an_isola_next_to_a_resonance() {
+    let light = "parameters = { kappa = 1, zeta = 0.004, epsilon = 0.5, beta = 20, K = 300, J_p = 0.1 }";
+    let rest = "free = \"Omega\"\nrange = [2, 3]\nvalues = 1\nsamples = 1\nswitch = { period-doubling = 0 }";
+    let study = study(ROTOR, &format!("{light}\n{rest}"));
+    let diagram = run(&study, 2, Diagram::default(), &Unobserved);
+    let isola = branch(&diagram, "all/3:1-1");
+    assert!(isola.ends.iter().all(|end| *end == Some(Ending::Closed)), "{:?}", isola.ends);
+    attracts(&study, isola);
+}
+
+/// A mass that strikes a stop: an isola of cycles that last five periods of the force, next to 5/3 of the frequency of the mass.
+#[test]
+fn a_subharmonic_isola_of_an_impact_oscillator() {
+    const IMPACT: &str = "name = \"impact\"\n[parameters]\nomega = 2\nA = 0.6\nzeta = 0.005\nk = 20\n[forcing]\n\
+        frequency = \"omega\"\n[states.x]\nequation = \"v\"\nrange = [-3, 3]\n[states.v]\n\
+        equation = \"-2*zeta*v - x - if(x > 1, k*(x - 1), 0) + A*cos(omega*t)\"\nrange = [-3, 3]\n";
+    let lines = "free = \"omega\"\nrange = [1.55, 2.2]\nvalues = 1\nsamples = 1\nswitch = { period-doubling = 0 }";
+    let study = study(IMPACT, lines);
+    let diagram = run(&study, 2, Diagram::default(), &Unobserved);
+    let five = |branch: &&Branch| matches!(&branch.points[0].solution, Solution::Cycle(c) if c.forcing_periods == 5);
+    let isola = diagram.branches.iter().find(five).unwrap_or_else(|| panic!("{:?}", names(&diagram)));
+    assert!(isola.ends.iter().all(|end| *end == Some(Ending::Closed)), "{:?}", isola.ends);
+    attracts(&study, isola);
 }
 
 /// Stops after a number of points.

@@ -9,20 +9,23 @@
 //! 1. the values: halves, quarters, eighths of the range and so on, so that the largest gap is looked into first;
 //! 2. at each value (`lookout`): equilibria by growing size, then cycles by falling number of samples that went there;
 //! 3. each of these: on a known branch (`known`), or the start of a new one (`family`);
-//! 4. each fold of each branch, unless a curve has passed it: its curve (`curves`), and a new branch from each fold met there
+//! 4. next to resonances of the linear response of a whirling or forced model (`resonances`), where isolas are that attract few samples:
+//!    cycles from averaged equations, likewise;
+//! 5. each fold of each branch, unless a curve has passed it: its curve (`curves`), and a new branch from each fold met there
 //!    that is not known; folds of these too, until there is no more.
 //!
 //! It ends when all of this is done, or when no new branch may be begun since the budget of points is used up; what was left
 //! undone then is said. The result depends on the number of threads in no way.
 //!
-//! **Fails when** a branch has no stable part at any of the values, no equilibria, no bifurcation that leads to it and no fold
-//! connected with a known one: there is no proof that a diagram is complete.
+//! **Fails when** a branch has no stable part at any of the values, no equilibria, no bifurcation that leads to it, no resonance next to it
+//! and no fold connected with a known one: there is no proof that a diagram is complete.
 
 use super::family::Work;
 use super::growth::settings;
 use super::lookout::{Lookout, Sight};
 use super::plan::{BranchPlan, CurvePlan, ExplorePlan, Start};
 use super::profile::with_degree;
+use super::resonances::Resonances;
 use super::{curves, known};
 use crate::attractors::spectral_ratio;
 use crate::contract::Event;
@@ -42,7 +45,9 @@ pub(super) fn explore(work: &mut Work, plan: &ExplorePlan, jobs: usize) -> bool 
         lookout.close();
         going
     });
-    let going = sampled && plan.connect.is_none_or(|(second, range)| discovery.connected(second, range));
+    let going = sampled
+        && discovery.resonant()
+        && plan.connect.is_none_or(|(second, range)| discovery.connected(second, range));
     going && discovery.told()
 }
 
@@ -106,6 +111,43 @@ impl Discovery<'_, '_> {
     }
 
     /// Step 4.
+    fn resonant(&mut self) -> bool {
+        let (system, plan, tolerance) = (self.work.system, self.plan, self.work.plan.tolerance);
+        if system.whirl.is_none() && !system.field.forced() || self.exhausted() {
+            return true;
+        }
+        let resonances = Resonances { system, plan, tolerance };
+        let (roots, left) = resonances.roots();
+        let places: Vec<String> = roots.iter().map(|root| format!("{} at {:.4}", root.name(), root.value)).collect();
+        let (known, mut averaged, mut corrected, mut cycles) = (self.named.len(), 0, 0, 0);
+        for root in &roots {
+            for value in root.values(plan.range) {
+                if self.exhausted() || system.field.ended() {
+                    break;
+                }
+                let found = resonances.cycles(root, value);
+                (averaged, corrected) = (averaged + found.averaged, corrected + found.corrected);
+                cycles += found.cycles.len();
+                let origin = Origin::Seed(format!("{}, next to {} at {value}", plan.name, root.name()));
+                if !found.cycles.into_iter().all(|point| self.followed(point, origin.clone())) {
+                    return false;
+                }
+            }
+        }
+        if system.field.ended() {
+            return false;
+        }
+        let left = if left > 0 { format!("; {left} more are left") } else { String::new() };
+        let branches = self.named.len() - known;
+        places.is_empty()
+            || self.note(&format!(
+                "resonances of the lightly damped linear response: {}{left}; {averaged} starts of averaged equations lead to {corrected} \
+                 of cycles, {cycles} of which Newton's method makes accurate: {branches} new branches",
+                places.join(", ")
+            ))
+    }
+
+    /// Step 5.
     fn connected(&mut self, second: usize, range: [f64; 2]) -> bool {
         let home = self.plan.parameters[second];
         // Folds that a curve has passed.

@@ -14,7 +14,7 @@
 //! | what is done first, by which thread? | `schedule` |
 //! | how is one branch followed to both sides, or resumed? | [`growth`] |
 //! | what follows from a finished branch? | [`family`] |
-//! | how is a diagram found without being told where anything is? | `discovery`, `lookout` |
+//! | how is a diagram found without being told where anything is? | `discovery`, `lookout`, `resonances`, `averaged` |
 //! | how does one leave a special point on the other branch? | [`switch`] |
 //! | is this branch known already? | [`known`] |
 //! | where does a special point go when a second parameter changes? | [`curves`] |
@@ -23,6 +23,7 @@
 //! | what does simulation see? | [`responses`] |
 
 mod arrival;
+mod averaged;
 mod choice;
 mod counted;
 pub mod curves;
@@ -41,6 +42,7 @@ pub mod persistence;
 pub mod plan;
 mod profile;
 mod pursuit;
+mod resonances;
 pub mod responses;
 mod schedule;
 pub mod seeds;
