@@ -88,14 +88,9 @@ pub(super) fn transient(logarithm: f64) -> f64 {
     if logarithm < 0.0 { FALL.ln() / -logarithm } else { f64::INFINITY }
 }
 
-<<<<<<< HEAD
 /// The constant state over one period.
-fn at_rest(state: &[f64]) -> Candidate {
-    /// Sample times. Cubic interpolation needs four, and the state is constant.
-=======
-/// The state itself over one period.
 pub(super) fn at_rest(state: &[f64]) -> Candidate {
->>>>>>> roots
+    /// Sample times. Cubic interpolation needs four, and the state is constant.
     const TIMES: [f64; 5] = [0.0, 0.25, 0.5, 0.75, 1.0];
     Candidate::Cycle { period: 1.0, times: TIMES.to_vec(), states: state.repeat(TIMES.len()) }
 }
