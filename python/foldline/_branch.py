@@ -266,7 +266,7 @@ class Branch(Sequence[Solution]):
         range: Sequence[float] | None = None,
         mark: Mapping[str, Any] | None = None,
         stop: Mapping[str, Any] | None = None,
-        max_points: int = 5000,
+        max_points: int = 10_000,
         out: str | os.PathLike[str] | None = None,
         jobs: int | None = None,
         progress: bool | Callable[[int, int, str], None] | None = None,

@@ -122,10 +122,11 @@ fn canards_lead_from_hopf_point_to_hopf_point() {
 const CIRCUIT: &str = "name = \"circuit\"\n[parameters]\nnu = -0.9\n[definitions]\nd = \"y - x\"\n[states]\n\
     x = \"(-(0.5 + nu)*x + 0.5*y - 0.328578*x^3 + 0.933578*d^3)/0.6\"\ny = \"0.5*x + 0.1*y - z - 0.933578*d^3\"\nz = \"y\"\n";
 
-/// A fold and a pitchfork of cycles on one step: AUTO-07p, demo tor, at fine settings.
+/// A fold and a pitchfork of cycles on one step: AUTO-07p, demo tor, at fine settings. Further turns on the way to a heteroclinic cycle have such
+/// pairs, closer each time, with stable cycles between them; periods of these at a tolerance of 1e-8.
 #[test]
 fn a_fold_and_a_branch_point_of_symmetric_cycles_on_one_step_are_told_apart() {
-    let branch = "free = \"nu\"\nrange = [-0.9, -0.4]\nswitch = { hopf = 1 }\nstop = { period = 25 }";
+    let branch = "free = \"nu\"\nrange = [-0.9, -0.4]\nswitch = { hopf = 1 }\nstop = { period = 45 }";
     for tolerance in [1e-6, 1e-8] {
         let diagram = run_at(tolerance, CIRCUIT, "state = { x = 0, y = 0, z = 0 }", branch);
         let cycles = diagram.branch("b/hopf-1").unwrap();
@@ -136,6 +137,10 @@ fn a_fold_and_a_branch_point_of_symmetric_cycles_on_one_step_are_told_apart() {
         };
         assert!((at(Kind::Fold, -0.83251414538) - 19.415681454).abs() < 3e-6);
         assert!((at(Kind::BranchPoint, -0.832437931) - 19.63664549).abs() < 3e-6);
+        assert!((at(Kind::BranchPoint, -0.787592846) - 29.310535).abs() < 3e-5);
+        assert!((at(Kind::Fold, -0.787590311) - 29.372974).abs() < 3e-5);
+        assert!((at(Kind::Fold, -0.799899174) - 39.366380).abs() < 3e-5);
+        assert!((at(Kind::BranchPoint, -0.799899143) - 39.381419).abs() < 3e-5);
     }
 }
 

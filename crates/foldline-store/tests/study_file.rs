@@ -85,7 +85,7 @@ fn curves_and_homotopies_become_plans() {
         ranges: [[-1.0, 2.0], [0.5, 3.0]],
         until: Some(2.5),
         marks: Vec::new(),
-        max_points: 5000,
+        max_points: 10_000,
     };
     let doublings = CurvePlan {
         name: "doublings".into(),
@@ -105,7 +105,7 @@ fn curves_and_homotopies_become_plans() {
         targets: vec![(1, 4.0), (2, 0.01)],
         via: 0,
         range: [-1.5, 2.5],
-        max_points: 5000,
+        max_points: 10_000,
     };
     assert_eq!(plan.homotopies, [way]);
     let starts: Vec<&Start> = plan.branches.iter().map(|branch| &branch.start).collect();

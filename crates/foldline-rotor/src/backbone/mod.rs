@@ -179,6 +179,7 @@ pub fn backbone(constants: &Nondimensional, law: ContactLaw, ratio: Ratio, reach
         free: 0,
         home: None,
         homecoming: Homecoming::default(),
+        inspected: 0.0,
     };
     let ending = follow(&mut walk, begun, None, 0, &mut |item| {
         if let Item::Point(point) = item {

@@ -192,7 +192,7 @@ fn refuse_names_of_others(walk: &mut Walk, all: &[Item]) {
 
 /// The limit on the number of points.
 pub(super) fn max_points(walk: &mut Walk, item: &Item) -> usize {
-    const DEFAULT: usize = 5000;
+    const DEFAULT: usize = 10_000;
     let limit = item.table.get("max-points").and_then(|v| walk.integer(v, "`max-points`", 1..=100_000_000));
     limit.map_or(DEFAULT, |points| points as usize)
 }

@@ -46,6 +46,8 @@ pub struct Follow<'w> {
     pub home: Option<&'w Point>,
     /// What is known of the way back there; nothing when a run begins.
     pub homecoming: Homecoming,
+    /// Length of the step that is being inspected: what is significant along it is so on its parts.
+    pub inspected: f64,
 }
 
 /// Steps shorter than this many tolerances begin and end on the same mesh: two meshes agree to the tolerance only.

@@ -121,8 +121,10 @@ impl Follow<'_> {
         }
         let right = carried.as_ref().unwrap_or(right);
         let (at_left, at_right) = (self.monitored(left), self.monitored(right));
-        let fold_test =
-            self.fold_test([left, right], stretch.length.abs(), history.is_some_and(|before| before.stands));
+        if depth == 0 {
+            self.inspected = stretch.length.abs();
+        }
+        let fold_test = self.fold_test([left, right], self.inspected, history.is_some_and(|before| before.stands));
         let standing = fold_test == FoldTest::None;
         let conservative = standing && [left, right].iter().all(|end| end.point.is_conservative());
         let mut located: Vec<(Kind, usize, Located)> = Vec::new();
@@ -173,8 +175,9 @@ impl Follow<'_> {
                 && self.settings.stability
                 && left.point.unstable == right.point.unstable
                 && found.as_ref().is_ok_and(|found| {
+                    // With reflections it is these that tell; a fold next to a branch point looks like a vertex from afar.
                     self.is_mirrored([left, right], &found.station.point)
-                        || self.is_vertex(&stretch, found.distance, cost)
+                        || self.settings.reflections.len() < 2 && self.is_vertex(&stretch, found.distance, cost)
                 })
             {
                 (kind, jump) = (Kind::BranchPoint, 0);
@@ -359,6 +362,9 @@ impl Follow<'_> {
                 passed.push((kind, times, monitor.jump() as i64));
             }
         }
+        if passed.is_empty() && turns && self.is_symmetric(&right.point) {
+            return Some(self.fold_with_pitchfork(right, error));
+        }
         let change: i64 = passed.iter().map(|(_, times, jump)| times * jump).sum();
         // A pair that meets on the real axis off the unit circle is not an event.
         let met = passed
@@ -378,6 +384,22 @@ impl Follow<'_> {
             }
         }
         Some(out)
+    }
+
+    /// A fold of symmetric solutions that leaves the count as it is has a pitchfork beside it, too close to be told apart: next to an orbit of
+    /// infinite period, the multiplier m² of the whole cycle follows from m of half of it, which passes 1 at the fold and -1 at the pitchfork, and
+    /// between them is small.
+    fn fold_with_pitchfork(&mut self, there: &Station, error: f64) -> Vec<Found> {
+        let count = there.point.unstable as i64;
+        let between = if count > 0 { count - 1 } else { 1 };
+        let kinds = [(Kind::Fold, count, between), (Kind::BranchPoint, between, count)];
+        kinds.map(|(kind, a, b)| Found::Special(self.special(kind, there.clone(), a, b, error))).into()
+    }
+
+    /// True if a reflection of the model maps the solution to itself, at another phase perhaps.
+    fn is_symmetric(&self, at: &Point) -> bool {
+        let mut images = self.settings.reflections.iter().filter(|r| r.contains(&true));
+        images.any(|r| at.difference(at, &self.settings.scales, r) < SYMMETRIC)
     }
 
     /// Brackets the change in the number of unstable eigenvalues or multipliers on a stretch by bisection, as tightly as points can be

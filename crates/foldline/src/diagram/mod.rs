@@ -170,8 +170,10 @@ impl Point {
     /// Number of unstable multipliers, excluding one that is 1 within its error, and on a vertical branch all that are on the unit circle within
     /// their errors: in a conservative system they stay there, and the side on which they are computed is not significant.
     pub(crate) fn unstable_besides_neutral(&self) -> usize {
+        /// Error of multipliers above which it says nothing that they are within it of the unit circle, as next to an orbit of infinite period.
+        const UNKNOWN: f64 = 1e-3;
         let error = self.neutral_error();
-        if self.is_one_of_family() {
+        if error < UNKNOWN && self.is_one_of_family() {
             return self.free_spectrum().iter().filter(|z| z.norm() > 1.0 + error).count();
         }
         let own = usize::from(self.neutral_multiplier().is_some_and(|z| z.norm() > 1.0));

@@ -474,6 +474,7 @@ impl Growth<'_> {
             free: branch.free,
             home: home.as_ref(),
             homecoming: Homecoming::default(),
+            inspected: 0.0,
         };
         // A run that goes on may be on its way back already.
         let mut before: Vec<&Point> = branch.points.iter().filter(|p| p.position as f64 * direction > 0.0).collect();
