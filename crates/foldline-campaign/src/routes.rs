@@ -288,7 +288,8 @@ fn trace(place: &str, branch: &Branch) -> String {
 fn told(end: &Ending) -> String {
     match end {
         Ending::Joined { at, parameter } => format!("joined at {at} {parameter:.3}"),
-        Ending::PeriodUnbounded(_) => end.code().to_string(),
+        // How far the period had grown depends on the last steps.
+        Ending::PeriodUnbounded(_) | Ending::Connecting { .. } => end.code().to_string(),
         other => other.to_string(),
     }
 }

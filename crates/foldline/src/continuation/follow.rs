@@ -104,10 +104,8 @@ pub fn follow(
     let mut allowance = Allowance::new();
     let mut before: Option<Station> = None;
     loop {
-        let outward = |bound: f64| (left.parameter() - bound).abs() <= 1e-12 * (1.0 + bound.abs());
-        let [low, high] = walk.settings.range;
-        if (outward(low) && left.slope() < 0.0) || (outward(high) && left.slope() > 0.0) {
-            return Ending::Bound(if left.slope() < 0.0 { low } else { high });
+        if let Some(end) = walk.at_bound(&left, 1e-12) {
+            return end;
         }
         if emitted >= walk.settings.max_points {
             return Ending::PointLimit(emitted);
@@ -159,7 +157,11 @@ pub fn follow(
                     let spent = work(cost.factorisations, &left.mesh);
                     let used_up = allowance.is_used_up(spent);
                     if step < walk.settings.min_step || coarse == COARSE || used_up {
-                        let met = before.as_ref().and_then(|before: &Station| walk.collapse_ahead(before, &left));
+                        // The matrix may be singular at the bound itself: what is left of the way is less than the tolerance.
+                        let met = walk.at_bound(&left, walk.settings.tolerance);
+                        let met = met.or_else(|| {
+                            before.as_ref().and_then(|before: &Station| walk.collapse_ahead(before, &left))
+                        });
                         return match met.or_else(|| (walk.limit)(&left.point)) {
                             Some(end) => end,
                             None if used_up => {
@@ -282,6 +284,13 @@ impl Follow<'_> {
     pub(super) fn place(&mut self, station: &Station) {
         self.problem.set_mesh(&station.mesh);
         self.problem.anchor(&station.u);
+    }
+
+    /// The end at a bound of the range that lies ahead, no farther off than `within`, relative to 1 + |bound|.
+    fn at_bound(&self, here: &Station, within: f64) -> Option<Ending> {
+        let bound = self.settings.range[usize::from(here.slope() > 0.0)];
+        let near = (here.parameter() - bound).abs() <= within * (1.0 + bound.abs());
+        (near && bound.is_finite() && here.slope() != 0.0).then_some(Ending::Bound(bound))
     }
 
     /// True if the parameter still changes with the period: dλ/d ln T, which tends to zero towards an orbit of infinite period,
