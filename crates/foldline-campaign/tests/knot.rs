@@ -161,6 +161,7 @@ fn a_start_among_special_points_that_lie_close_together_is_met_again() {
         free: 0,
         home: Some(&home),
         homecoming: Homecoming::default(),
+        inspected: 0.0,
     };
     let ending = follow(&mut walk, start, None, 0, &mut |item| {
         match item {

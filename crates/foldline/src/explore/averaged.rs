@@ -365,7 +365,7 @@ mod tests {
         let names = ["omega", "A", "zeta", "alpha"];
         Model::compile(ModelSource {
             name: "duffing".into(),
-            parameters: names.iter().zip(parameters).map(|(name, value)| Parameter::new(*name, value)).collect(),
+            parameters: names.iter().zip(parameters).map(|(name, value)| Parameter::new(name, value)).collect(),
             states: vec![State::new("x"), State::new("v")],
             equations: vec![
                 Definition::new("x", "v"),

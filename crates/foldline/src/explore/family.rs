@@ -4,7 +4,7 @@ use super::growth::{self, Beginning, Growth};
 use super::minimal::reduced;
 use super::plan::{BranchPlan, Plan, Start, Switching};
 use super::seeds::Seeds;
-use super::{System, arrival, curves, discovery, homotopy, known, switch};
+use super::{System, arrival, crossings, curves, discovery, homotopy, known, switch};
 use crate::continuation::Settings;
 use crate::contract::{Event, Observer, Verdict};
 use crate::diagram::{Branch, Diagram, Ending, Family, Kind, Origin, Point, Solution, SpecialPoint};
@@ -376,7 +376,8 @@ impl Work<'_> {
             );
             return self.tell(Event::Short(&parent.name, &said));
         }
-        let found = match switch::crossings(self.system, settings, parent.free, self.plan.degree, special, dimension) {
+        let found = match crossings::crossings(self.system, settings, parent.free, self.plan.degree, special, dimension)
+        {
             Ok(found) => found,
             Err(why) => {
                 let said = format!("{label}: no branch found to switch to: {why}");

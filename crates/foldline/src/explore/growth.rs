@@ -1,14 +1,12 @@
 //! One branch, followed to both sides, from its start or from where an earlier run left it.
 
+use super::System;
 use super::counted::Counted;
 use super::symmetry::rotation;
-use super::{System, diagnosis};
 use crate::continuation::corrector::{Plane, parameter_row, settle, station};
 use crate::continuation::{Failure, Follow, Homecoming, Item, Settings, Station, follow};
 use crate::contract::{Event, Examination, Monitor, Observer, Verdict, ZeroProblem};
-use crate::diagram::{
-    Branch, Cost, Ending, Family, Kind, Misfit, Origin, Point, Record, STANDS, Solution, SpecialPoint,
-};
+use crate::diagram::{Branch, Cost, Ending, Family, Kind, Origin, Point, Record, STANDS, Solution, SpecialPoint};
 use crate::problem::{Axis, Setting, Tie, cycle::CycleProblem, equilibrium::EquilibriumProblem, held::Held, mesh};
 use crate::special::coefficients::Coefficients;
 use crate::special::connection::Limits;
@@ -278,10 +276,6 @@ pub struct Growth<'g> {
     pub sparse: bool,
 }
 
-/// What to do where the counts of unstable eigenvalues do not fit.
-const CLOSER: &str =
-    "what to do: a smaller tolerance; `foldline verify` looks at the points on both sides by another route";
-
 /// Points at either end of a branch that are always whole: what goes on from there needs them.
 const WHOLE: usize = 3;
 
@@ -512,150 +506,16 @@ impl Growth<'_> {
         if self.observer.stopping() { Ending::Stopped } else { ending }
     }
 
-    /// Says what does not fit at a special point.
-    fn fits(&self, branch: &Branch, special: &SpecialPoint, misfit: &Misfit) -> bool {
-        let SpecialPoint { kind, unstable_before: before, unstable_after: after, .. } = special;
-        let at = special.point.parameters.get(branch.free).copied().unwrap_or(f64::NAN);
-        let said = match misfit {
-            Misfit { on_arrival: 0, of_change: 0 } => return true,
-            Misfit { on_arrival: 0, .. } => {
-                format!(
-                    "the count of unstable eigenvalues goes from {before} to {after} at the {kind} at {at:.9}, which its kind does not explain"
-                )
-            }
-            _ => format!(
-                "the count of unstable eigenvalues at the {kind} at {at:.9} is not that of the points beside it"
-            ),
-        };
-        self.tell(Event::Short(&branch.name, &format!("{said}\n{CLOSER}")))
-    }
-
-    /// Says that the count of unstable eigenvalues or multipliers has changed on the way to a point, and nothing was found that does it.
-    fn unexplained(&self, branch: &Branch, before: usize, point: &Point) -> bool {
-        let after = point.unstable;
-        let at = point.parameters.get(branch.free).copied().unwrap_or(f64::NAN);
-        let said = format!(
-            "the count of unstable eigenvalues goes from {before} to {after} next to {at:.9}, and no special point was found there"
-        );
-        self.tell(Event::Short(&branch.name, &format!("{said}\n{CLOSER}")))
-    }
-
-    /// Recognises the end of a curve of folds of cycles at a generalised Hopf point, where the first Lyapunov coefficient vanishes and
-    /// the cycles shrink to an equilibrium. Steps get shorter in proportion to the cycles there, so the curve ends without passing the
-    /// point, for the reason in `ending`. Along the curve both parameters vary linearly with the square of the extent of the cycles, and
-    /// are extrapolated to extent zero; the equilibrium there must have eigenvalues ±2πi/T.
-    fn at_generalised_hopf(&self, branch: &Branch, side: usize, ending: Ending) -> Ending {
-        /// Largest extent of the last cycle, as a share of the largest on the curve. Parameters vary with its square, so the extrapolation
-        /// covers 0.25 % of their variation.
-        const SMALL: f64 = 0.05;
-        /// Largest relative real part and error of the frequency of the eigenvalues. Both vary with the square of the extent, so [`SMALL`]
-        /// makes them 0.0025; the rest is a factor of safety.
-        const NEAR: f64 = 1e-2;
-        /// Ratio to the extent of the last cycle of those from which parameters are extrapolated. Where steps end, the fold is lost in
-        /// rounding; its effect decreases with the square of the extent, by a factor of 100 here.
-        const CLEAR: f64 = 10.0;
-        let given_up = matches!(ending, Ending::StepTooSmall(_) | Ending::GivenUp(_));
-        let Some((Kind::Fold, first)) = branch.held.filter(|_| given_up && branch.family == Family::Cycle) else {
-            return ending;
-        };
-        let (n, system) = (self.system.scales.len(), self.system);
-        let extent = |point: &Point| -> f64 {
-            let states = point.ranges.iter().take(n).zip(&system.scales);
-            states.map(|([low, high], scale)| (high - low) / scale).fold(0.0, f64::max)
-        };
-        let mut inwards: Vec<&Point> = branch.points.iter().collect();
-        if side == 1 {
-            inwards.reverse();
-        }
-        let Some(last) = inwards.first().copied() else { return ending };
-        let clear: Vec<&Point> =
-            inwards.iter().copied().filter(|point| extent(point) >= CLEAR * extent(last)).take(2).collect();
-        let [near, far] = clear[..] else { return ending };
-        let largest = branch.points.iter().map(extent).fold(0.0, f64::max);
-        let (a, b) = (extent(near).powi(2), extent(far).powi(2));
-        let Some(period) = last.solution.free_period().filter(|_| a < b && extent(last) < SMALL * largest) else {
-            return ending;
-        };
-        let mut parameters = near.parameters.clone();
-        for k in [first, branch.free] {
-            parameters[k] += a / (b - a) * (near.parameters[k] - far.parameters[k]);
-        }
-        let rest: Vec<f64> = last.averages.iter().take(n).map(|mean| mean[0]).collect();
-        if rest.len() != n {
-            return ending;
-        }
-        let mut problem = EquilibriumProblem::new(setting(system, branch.free, &parameters));
-        let guess = super::seeds::bare(&parameters, Solution::Equilibrium(rest));
-        let Ok(found) = polished(&mut problem, self.settings, &guess) else { return ending };
-        let turns = |z: &num_complex::Complex64| {
-            z.re.abs() < NEAR * z.im.abs() && (z.im * period / std::f64::consts::TAU - 1.0).abs() < NEAR
-        };
-        match found.point.spectrum.iter().any(turns) {
-            true => Ending::Joined { at: Kind::GeneralisedHopf, parameter: parameters[branch.free] },
-            false => ending,
-        }
-    }
-
-    /// How a side of a doubled branch ended that has its last point, the special point of the parent, but was interrupted before
-    /// that was said. The matrix is singular there, so nothing can go on from it.
-    fn at_edge(&self, branch: &Branch, side: usize) -> Option<Ending> {
-        let end = if side == 1 { branch.points.last() } else { branch.points.first() }?;
-        if branch.points.len() < 2 || !is_doubled(branch) {
-            return None;
-        }
-        let value = |point: &Point| point.parameters.get(branch.free).copied();
-        let same = |s: &&SpecialPoint| s.kind == Kind::PeriodDoubling && value(&s.point) == value(end);
-        let parameter = self.parents.iter().find(same).and_then(|s| value(&s.point))?;
-        Some(Ending::Joined { at: Kind::PeriodDoubling, parameter })
-    }
-
-    /// Explains an end next to a bound of the range at which the forcing has no period.
-    fn explain_missing_period(&self, branch: &Branch, side: usize, ending: Ending) -> Ending {
-        let last = if side == 1 { branch.points.last() } else { branch.points.first() };
-        match last {
-            Some(last) => diagnosis::of_forcing(self.system, branch.free, self.settings.range, last, ending),
-            None => ending,
-        }
-    }
-
-    /// An end at a special point of the parent gets the accurate parameter of that point; where the special point, as a
-    /// doubled cycle, is a point of this branch, it becomes the last one.
-    fn recognised(&self, branch: &mut Branch, side: usize, ending: Ending) -> Ending {
-        let Ending::Joined { at, parameter } = ending else { return ending };
-        let free = branch.free;
-        let value = |s: &SpecialPoint| s.point.parameters.get(free).copied().unwrap_or(0.0);
-        let Some(last) = (if side == 1 { branch.points.last() } else { branch.points.first() }) else { return ending };
-        let fits = |s: &&SpecialPoint| {
-            let periods = (last.solution.period(), s.point.solution.period());
-            let right_period = match periods {
-                (Some(long), Some(short)) if at == Kind::PeriodDoubling => (0.5 * long / short - 1.0).abs() < 0.02,
-                _ => true,
-            };
-            s.kind == at && right_period && (value(s) - parameter).abs() < 1e-2 * (1.0 + parameter.abs())
-        };
-        let gap = |s: &SpecialPoint| (value(s) - parameter).abs();
-        let Some(parent) = self.parents.iter().filter(fits).min_by(|a, b| gap(a).total_cmp(&gap(b))) else {
-            return ending;
-        };
-        if at == Kind::PeriodDoubling
-            && let Some(edge) = super::switch::doubled_edge(self.system, branch.free, parent, last)
-        {
-            let position = last.position + if side == 1 { 1 } else { -1 };
-            self.accept(branch, Point { position, ..edge });
-        }
-        Ending::Joined { at, parameter: value(parent) }
-    }
-
     /// The curve of a branch.
     pub fn line(&self, branch: &Branch) -> Line {
         Line { free: branch.free, ties: self.ties.clone(), held: branch.held, doubled: is_doubled(branch) }
     }
 
-    fn tell(&self, event: Event) -> bool {
+    pub(super) fn tell(&self, event: Event) -> bool {
         self.observer.observe(event) == Verdict::Continue
     }
 
-    fn accept(&self, branch: &mut Branch, point: Point) -> bool {
+    pub(super) fn accept(&self, branch: &mut Branch, point: Point) -> bool {
         if self.observer.stopping() {
             return false;
         }

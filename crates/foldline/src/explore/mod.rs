@@ -22,10 +22,12 @@
 //! | does a solution depend on a parameter that should not matter? | [`mod@persistence`] |
 //! | what does simulation see? | [`responses`] |
 
+mod accounts;
 mod arrival;
 mod averaged;
 mod choice;
 mod counted;
+mod crossings;
 pub mod curves;
 mod diagnosis;
 mod direct;
@@ -42,8 +44,9 @@ pub mod persistence;
 pub mod plan;
 mod profile;
 mod pursuit;
+pub mod recognised;
 mod resonances;
-pub mod responses;
+mod responses;
 mod schedule;
 pub mod seeds;
 pub mod switch;

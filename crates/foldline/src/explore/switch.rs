@@ -10,11 +10,9 @@ use crate::continuation::corrector::{Plane, Station, correct, doubted, settle, s
 use crate::continuation::{Failure, Settings};
 use crate::contract::{Examination, ZeroProblem};
 use crate::diagram::{Cost, Cycle, Ending, Family, Kind, Mesh, Point, Solution, SpecialPoint, Trust};
-use crate::linalg::{axpy, dot};
 use crate::problem::cycle::CycleProblem;
 use crate::problem::{gauss::Scheme, mesh};
 use crate::special::{branch_point, hopf, period_doubling};
-use std::f64::consts::TAU;
 
 /// Distances along the direction that are tried, in scaled variables. The shorter ones are for branches on which something
 /// else happens next to their beginning, as with contact, where a branch keeps its first shape only until it grazes.
@@ -270,155 +268,9 @@ fn crossing(
     across(system, settings, free, at, &mut *problem, &u, &vector, &|_, _| {})
 }
 
-/// Branches that cross at a branch point with a kernel of several dimensions.
-pub struct Crossings {
-    /// Their beginnings.
-    pub beginnings: Vec<Beginning>,
-    /// In how many directions they were looked for.
-    pub directions: usize,
-    /// More were found than isolated ones there can be: they form a family, as by a continuous symmetry, of which one is kept.
-    pub continuous: bool,
-}
-
-/// Directions that are tried for each branch that there can be.
-const TRIES: usize = 8;
-
-/// All branches that cross at a branch point with a kernel of `dimension` d.
-///
-/// **Equations.** On the kernel the branches are, to leading order, the solutions of d equations that are quadratic or cubic in the d
-/// amplitudes: by Bézout's theorem
-///
-///   (3)  no more than (3^d - 1)/2 lines, if they are isolated
-///
-/// leave. Newton's method in the hyperplane across a direction finds one of them; directions that cover the sphere evenly find all, each being
-/// approached from a part of it.
-///
-/// # Errors
-/// A sentence that says why there is none.
-pub fn crossings(
-    system: &System,
-    settings: &Settings,
-    free: usize,
-    degree: usize,
-    at: &SpecialPoint,
-    dimension: usize,
-) -> Result<Crossings, String> {
-    // Lines of two branches with a smaller angle between them, cos 0.98 = 11 degrees, are one.
-    const ALIKE: f64 = 0.98;
-    let most = (3usize.pow(dimension as u32) - 1) / 2;
-    let mut problem = problem_of(system, free, degree, &at.point, false);
-    let problem = &mut *problem;
-    let u = problem.unknowns_of(&at.point);
-    problem.anchor(&u);
-    let mesh = problem.mesh();
-    let kernel = branch_point::kernel(problem, &u, &at.point.tangent, dimension)
-        .ok_or_else(|| format!("a kernel of dimension {dimension} was not found"))?;
-    let (mut beginnings, mut lines): (Vec<Beginning>, Vec<Vec<f64>>) = (Vec::new(), Vec::new());
-    let mut why = "no step off the branch leads to another one".to_string();
-    let directions = TRIES * most;
-    for weights in directions_of(dimension, directions) {
-        problem.set_mesh(&mesh);
-        problem.anchor(&u);
-        let mut vector = vec![0.0; u.len()];
-        kernel.iter().zip(&weights).for_each(|(own, weight)| axpy(*weight, own, &mut vector));
-        let improved = |problem: &mut dyn ZeroProblem, guess: &mut [f64]| {
-            if let Some(shift) = shift_along(problem, &u, &at.point.tangent, &kernel, guess) {
-                axpy(shift, &at.point.tangent, guess);
-            }
-        };
-        let found = match across(system, settings, free, at, problem, &u, &vector, &improved) {
-            Ok(found) => found,
-            Err(own) => {
-                why = own;
-                continue;
-            }
-        };
-        let (Beginning::Inside(first) | Beginning::Edge { first, .. }) = &found;
-        let tangent =
-            if mesh.is_empty() { first.tangent.clone() } else { problem.transfer(&first.tangent, &first.mesh, &mesh) };
-        problem.set_mesh(&mesh);
-        problem.anchor(&u);
-        let mut line: Vec<f64> =
-            kernel.iter().chain([&at.point.tangent]).map(|own| problem.dot(&tangent, own)).collect();
-        normalise(&mut line);
-        let along = line[dimension].abs();
-        let known = lines.iter().any(|other| dot(other, &line).abs() > ALIKE);
-        if along < ALIKE && !known {
-            lines.push(line);
-            beginnings.push(found);
-        }
-        if beginnings.len() > most {
-            beginnings.truncate(1);
-            return Ok(Crossings { beginnings, directions, continuous: true });
-        }
-    }
-    if beginnings.is_empty() { Err(why) } else { Ok(Crossings { beginnings, directions, continuous: false }) }
-}
-
-/// Unit vectors in so many dimensions that cover the sphere evenly.
-fn directions_of(dimension: usize, count: usize) -> Vec<Vec<f64>> {
-    // The additive sequence of the root of x^(d+1) = x + 1 has low discrepancy in d dimensions; normal numbers made of pairs of it by the method
-    // of Box and Muller have directions without preference.
-    let pairs = dimension.div_ceil(2);
-    let power = 1.0 / (2.0 * pairs as f64 + 1.0);
-    let root = (0..50).fold(1.5f64, |root, _| (1.0 + root).powf(power));
-    let uniform = |k: usize, j: usize| (0.5 + k as f64 * root.powi(-(j as i32 + 1))).fract();
-    let normal = |k: usize, j: usize| {
-        let (radius, (sin, cos)) = ((-2.0 * uniform(k, j).ln()).sqrt(), (TAU * uniform(k, j + 1)).sin_cos());
-        [radius * cos, radius * sin]
-    };
-    (1..=count)
-        .map(|k| {
-            let mut own: Vec<f64> = (0..pairs).flat_map(|pair| normal(k, 2 * pair)).take(dimension).collect();
-            normalise(&mut own);
-            own
-        })
-        .collect()
-}
-
-fn normalise(x: &mut [f64]) {
-    let norm = dot(x, x).sqrt();
-    x.iter_mut().for_each(|x| *x /= norm);
-}
-
-/// How far along the tangent from `guess`, at some distance from the branch point `u`, the part of the residual in the kernel is least: there
-/// Newton's method is led to the branch that is closest in direction, rather than to the one that attracts it most. The almost singular matrix at
-/// the branch point magnifies just that part.
-fn shift_along(
-    problem: &mut dyn ZeroProblem,
-    u: &[f64],
-    tangent: &[f64],
-    kernel: &[Vec<f64>],
-    guess: &[f64],
-) -> Option<f64> {
-    let size = u.len();
-    let beside: Vec<f64> = u.iter().zip(tangent).map(|(x, t)| x + 1e-8 * t).collect();
-    problem.factorise(&beside, tangent).ok()?;
-    let (mut r, mut x) = (vec![0.0; size], vec![0.0; size]);
-    let mut part = |at: &[f64]| -> Option<Vec<f64>> {
-        if !problem.residual(at, &mut r) {
-            return None;
-        }
-        r[size - 1] = 0.0;
-        problem.solve(&r, &mut x);
-        Some(kernel.iter().map(|own| problem.dot(&x, own)).collect())
-    };
-    let away: Vec<f64> = guess.iter().zip(u).map(|(a, b)| a - b).collect();
-    let at_rest = part(u)?;
-    let here = part(guess)?;
-    let mut moved = guess.to_vec();
-    let distance = dot(&away, &away).sqrt();
-    axpy(distance, tangent, &mut moved);
-    let there = part(&moved)?;
-    let change: Vec<f64> = there.iter().zip(&here).map(|(a, b)| (a - b) / distance).collect();
-    let left: Vec<f64> = here.iter().zip(&at_rest).map(|(a, b)| a - b).collect();
-    let shift = -dot(&left, &change) / dot(&change, &change);
-    shift.is_finite().then(|| shift.clamp(-distance, distance))
-}
-
 /// The branch in the hyperplane across `vector`.
 #[expect(clippy::too_many_arguments, reason = "those of a branch point, and of the step off it")]
-fn across(
+pub(super) fn across(
     system: &System,
     settings: &Settings,
     free: usize,

@@ -46,6 +46,12 @@ pub(super) fn replace(transitions: &mut [f64], crossed: &[Crossed]) {
     }
 }
 
+/// Where a switch vanishes within an interval, as a place in [0, 1], and which.
+struct Cut {
+    at: f64,
+    switch: usize,
+}
+
 /// An interval with the polynomial on it.
 struct Piece<'p> {
     problem: &'p CycleProblem<'p>,
@@ -60,15 +66,15 @@ struct Piece<'p> {
 impl CycleProblem<'_> {
     /// The intervals in which the orbit `u` crosses switches, with their transitions.
     pub(super) fn crossed(&self, u: &[f64]) -> Vec<Crossed> {
-        self.at_crossings(u, &|interval, piece, cuts| Some(Crossed { interval, transition: piece.transition(cuts)? }))
+        self.at_crossings(u, |interval, piece, cuts| Some(Crossed { interval, transition: piece.transition(cuts)? }))
     }
 
     /// (3) for the intervals in which the orbit `u` crosses switches, with their numbers.
     pub(super) fn defects_at_crossings(&self, u: &[f64]) -> Vec<(usize, Vec<f64>)> {
-        self.at_crossings(u, &|interval, piece, cuts| Some((interval, piece.defect(cuts))))
+        self.at_crossings(u, |interval, piece, cuts| Some((interval, piece.defect(cuts))))
     }
 
-    fn at_crossings<R>(&self, u: &[f64], of: &dyn Fn(usize, &Piece, &[(f64, usize)]) -> Option<R>) -> Vec<R> {
+    fn at_crossings<R>(&self, u: &[f64], of: impl Fn(usize, &Piece, &[Cut]) -> Option<R>) -> Vec<R> {
         if self.setting.field.switch_count() == 0 {
             return Vec::new();
         }
@@ -136,7 +142,7 @@ impl Piece<'_> {
     }
 
     /// Where switches vanish, in order, and which.
-    fn cuts(&self) -> Vec<(f64, usize)> {
+    fn cuts(&self) -> Vec<Cut> {
         let at = |s: f64| self.switches(&self.state(s), &self.time(s));
         let mut cuts = Vec::new();
         let mut before = at(0.0);
@@ -149,24 +155,24 @@ impl Piece<'_> {
                     let middle = 0.5 * (a + b);
                     if (at(middle)[k] > 0.0) == (before[k] > 0.0) { a = middle } else { b = middle }
                 }
-                cuts.push((0.5 * (a + b), k));
+                cuts.push(Cut { at: 0.5 * (a + b), switch: k });
             }
             before = after;
         }
-        cuts.sort_by(|a, b| a.0.total_cmp(&b.0));
+        cuts.sort_by(|a, b| a.at.total_cmp(&b.at));
         cuts
     }
 
     /// The transition over the whole interval.
-    fn transition(&self, cuts: &[(f64, usize)]) -> Option<Vec<f64>> {
+    fn transition(&self, cuts: &[Cut]) -> Option<Vec<f64>> {
         let n = self.n();
         let mut transition: Vec<f64> = (0..n * n).map(|k| f64::from(u8::from(k % (n + 1) == 0))).collect();
         let mut begin = 0.0;
-        for (index, end) in cuts.iter().map(|cut| cut.0).chain([1.0]).enumerate() {
+        for (index, end) in cuts.iter().map(|cut| cut.at).chain([1.0]).enumerate() {
             if end > begin {
                 transition = product(&self.part([begin, end])?, &transition, n);
             }
-            if let Some((at, switch)) = cuts.get(index) {
+            if let Some(Cut { at, switch }) = cuts.get(index) {
                 // Signs in the middle of the part before: another switch may vanish at its end.
                 transition = product(&self.saltation(*at, *switch, 0.5 * (begin + at)), &transition, n);
             }
@@ -176,7 +182,7 @@ impl Piece<'_> {
     }
 
     /// (3).
-    fn defect(&self, cuts: &[(f64, usize)]) -> Vec<f64> {
+    fn defect(&self, cuts: &[Cut]) -> Vec<f64> {
         let (n, scheme, field) = (self.n(), &self.problem.scheme, self.problem.setting.field);
         let length = (self.ends[1] - self.ends[0]) * self.period;
         let slope = |s: f64| {
@@ -193,7 +199,7 @@ impl Piece<'_> {
             slope
         };
         let (mut total, mut begin) = (vec![0.0; n], 0.0);
-        for end in cuts.iter().map(|cut| cut.0).chain([1.0]) {
+        for end in cuts.iter().map(|cut| cut.at).chain([1.0]) {
             for (c, weight) in scheme.nodes[1..].iter().zip(&scheme.weights) {
                 let s = begin + (end - begin) * c;
                 let (x, times, mut f) = (self.state(s), self.time(s), vec![0.0; n]);
