@@ -122,7 +122,9 @@ pub fn follow(
                     Found::Special(s) => step <= walk.believed_at(s.kind),
                     Found::Inserted(..) => true,
                 });
-                if believed { Ok((tried, found)) } else { Err(Failure::Unexplained) }
+                let nothing = found.iter().all(|f| matches!(f, Found::Inserted(..)));
+                let jumped = step > CROSSING && nothing && walk.may_jump([&left, &tried.right], history.as_ref(), step);
+                if believed && !jumped { Ok((tried, found)) } else { Err(Failure::Unexplained) }
             });
             match attempt {
                 Ok((_, found))

@@ -549,6 +549,17 @@ impl Follow<'_> {
         Some(found)
     }
 
+    /// True if the step may have gone over to another branch at a pitchfork: on the way there an unstable multiplier went towards 1 so fast that it
+    /// would be well beyond it at the end of the step, and there it is no closer. On the branch itself it touches 1 where the branch turns
+    /// back as its own image, on the one that it meets there it grows again.
+    pub(super) fn may_jump(&self, [left, right]: [&Station; 2], history: Option<&History>, length: f64) -> bool {
+        let (Some(history), true) = (history, self.settings.stability) else { return false };
+        let above = |spectrum: &[Complex64]| above_critical(spectrum, !left.mesh.is_empty());
+        let all = [&history.spectrum, &left.point.spectrum, &right.point.spectrum].map(|spectrum| above(spectrum));
+        let [Some(before), Some(now), Some(then)] = all else { return false };
+        now + WELL * length * (now - before) / history.distance < 0.0 && then > WELL * now
+    }
+
     /// Whether some monitor may have passed zero between the last two of three values and come back: the parabola through them comes
     /// close, or the line through the first two goes on to the other side well before the last.
     fn may_touch(&self, history: &History, left: &[f64], right: &[f64], length: f64) -> bool {
@@ -568,6 +579,15 @@ impl Follow<'_> {
             bend * b > 0.0 && at > 0.0 && at < length && value / b < 0.1
         })
     }
+}
+
+/// How far the real multiplier above 1 that is closest to it is from 1, as a logarithm (the real eigenvalue above 0 from 0).
+fn above_critical(spectrum: &[Complex64], cycle: bool) -> Option<f64> {
+    /// The trivial multiplier is closer.
+    const LEAST: f64 = 1e-4;
+    let real = spectrum.iter().filter(|z| z.im == 0.0).map(|z| z.re);
+    let distances = real.filter(|x| *x > 0.0).map(|x| if cycle { x.ln() } else { x });
+    distances.filter(|d| *d > if cycle { LEAST } else { 0.0 }).min_by(f64::total_cmp)
 }
 
 /// Whether a pair of multipliers may have met on the negative real axis, passed -1 there and come back: the pair is about as far
