@@ -431,3 +431,31 @@ fn a_curve_of_folds_of_cycles_ends_at_generalised_hopf_points() {
     assert!((second - 1.09312).abs() < 1e-5, "{second}");
     assert!(ends.len() == 2 && (ends[1] - second).abs() < 1e-5 && (ends[0] - 1.026706).abs() < 1e-5, "{ends:?}");
 }
+
+/// Torus points of the electronic circuit of the demo `tor` of AUTO-07p shrink to an equilibrium where beta + nu = beta + gamma = 0: the
+/// characteristic polynomial at the origin is λ³ + 0.4 λ there.
+#[test]
+fn a_curve_of_torus_points_ends_at_a_zero_hopf_point() {
+    let model = "name = \"circuit\"\n[parameters]\nnu = -0.65\nbeta = 0.5\ngamma = -0.6\n[definitions]\nd = \"y - x\"\n[states]\n\
+        x = \"(-(beta + nu)*x + beta*y - 0.328578*x^3 + 0.933578*d^3)/0.6\"\n\
+        y = \"beta*x - (beta + gamma)*y - z - 0.933578*d^3\"\nz = \"y\"\n";
+    let diagram = grown(&study(
+        model,
+        "[[seed]]\nname = \"s\"\nstate = { x = 0, y = 0, z = 0 }\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"nu\"\nrange = [-0.9, -0.5]\n\
+         switch = { hopf = 2, branch-point = 1 }\nstop = { period = 15 }\n[[curve]]\nname = \"torus\"\nhold = \"torus\"\n\
+         of = \"b/hopf-1/branch-point-1\"\nfree = \"beta\"\nrange = [0.2, 0.9]\nbranch-range = [-0.99, -0.2]\n",
+    ));
+    let torus = diagram.branch("torus").unwrap();
+    complete(torus);
+    let at = |kind: Kind| {
+        let ends = torus.ends.iter().flatten();
+        let found = ends.filter_map(|end| match end {
+            Ending::Joined { at, parameter } if *at == kind => Some(*parameter),
+            _ => None,
+        });
+        found.collect::<Vec<f64>>()
+    };
+    assert!(matches!(at(Kind::ZeroHopf)[..], [beta] if (beta - 0.6).abs() < 1e-6), "{:?}", torus.ends);
+    assert_eq!(at(Kind::Resonance11).len(), 1, "{:?}", torus.ends);
+    assert!(torus.special.iter().all(|special| special.kind != Kind::Fold), "{:?}", torus.special);
+}

@@ -399,6 +399,7 @@ impl Growth<'_> {
                     break;
                 }
                 let ending = self.recognised(branch, side, self.at_generalised_hopf(branch, side, ending));
+                let ending = self.at_double_hopf(branch, side, ending);
                 let ending = self.explain_missing_period(branch, side, ending);
                 going &= self.end(branch, side, ending);
             }
@@ -442,9 +443,9 @@ impl Growth<'_> {
             Some((kind, first)) => {
                 let monitors =
                     special::monitors_where_held(system.field, &system.scales, branch.family, kind, branch.free);
-                // Folds of cycles shrink to a generalised Hopf point; the Hopf points there lie along the second parameter.
-                let ends = kind == Kind::Fold && branch.family == Family::Cycle && !system.field.forced();
-                (monitors, ends.then(|| shrinks(&system, first, Kind::GeneralisedHopf)).into_iter().collect())
+                // The Hopf points there lie along the second parameter.
+                let at = limit_of_small_cycles(branch, kind).filter(|_| !system.field.forced());
+                (monitors, at.map(|at| shrinks(&system, first, at)).into_iter().collect())
             }
         };
         let marks: Vec<Box<dyn Monitor>> = self.marks.iter().map(|mark| Box::new(*mark) as Box<dyn Monitor>).collect();
@@ -635,6 +636,16 @@ fn collapses<'a>(branch: &Branch, system: &'a System) -> Vec<Box<dyn Monitor + '
 fn lasts_even_periods(branch: &Branch) -> bool {
     let periods = branch.points.first().map_or(0, |point| point.solution.forcing_periods());
     periods > 0 && periods.is_multiple_of(2)
+}
+
+/// The point at which cycles on a curve shrink to an equilibrium: folds at a generalised Hopf point, torus points at a zero-Hopf point, or at a double
+/// Hopf point as [`Growth::at_double_hopf`] finds.
+fn limit_of_small_cycles(branch: &Branch, held: Kind) -> Option<Kind> {
+    match held {
+        Kind::Fold if branch.family == Family::Cycle => Some(Kind::GeneralisedHopf),
+        Kind::Torus => Some(Kind::ZeroHopf),
+        _ => None,
+    }
 }
 
 /// Where cycles shrink to an equilibrium.

@@ -6,6 +6,22 @@ use crate::diagram::{Branch, Ending, Family, Kind, Point, Solution, SpecialPoint
 use crate::problem::equilibrium::EquilibriumProblem;
 
 impl Growth<'_> {
+    /// Tells a double Hopf point, at which a curve of torus points shrinks to an equilibrium, from a zero-Hopf point: there the pair of multipliers
+    /// on the unit circle goes to 1, at a double Hopf point its angle goes to 2π ω₂/ω₁.
+    pub(super) fn at_double_hopf(&self, branch: &Branch, side: usize, ending: Ending) -> Ending {
+        /// Largest angle of the pair that goes to 1. It is proportional to the extent of the cycles, which has fallen by a factor of ten and
+        /// more when the end is recognised; frequencies in a ratio below 0.1/2π would be taken for a zero-Hopf point.
+        const SMALL: f64 = 0.1;
+        let Ending::Joined { at: Kind::ZeroHopf, parameter } = ending else { return ending };
+        let last = if side == 1 { branch.points.last() } else { branch.points.first() };
+        let off = |z: &num_complex::Complex64| z.norm().ln().abs();
+        let pair = last.and_then(|last| {
+            last.free_spectrum().iter().filter(|z| z.im > 0.0).min_by(|a, b| off(a).total_cmp(&off(b))).copied()
+        });
+        let at = if pair.is_some_and(|z| z.arg() > SMALL) { Kind::DoubleHopf } else { Kind::ZeroHopf };
+        Ending::Joined { at, parameter }
+    }
+
     /// Recognises the end of a curve of folds of cycles at a generalised Hopf point, where the first Lyapunov coefficient vanishes and
     /// the cycles shrink to an equilibrium. Steps get shorter in proportion to the cycles there, so the curve ends without passing the
     /// point, for the reason in `ending`. Along the curve both parameters vary linearly with the square of the extent of the cycles, and
