@@ -160,7 +160,8 @@ pub fn follow(
                     let used_up = allowance.is_used_up(spent);
                     if step < walk.settings.min_step || coarse == COARSE || used_up {
                         // The matrix may be singular at the bound itself: what is left of the way is less than the tolerance.
-                        let met = walk.at_bound(&left, walk.settings.tolerance);
+                        let singular = matches!(why, Failure::Singular);
+                        let met = walk.at_bound(&left, walk.settings.tolerance).filter(|_| singular);
                         let met = met.or_else(|| {
                             before.as_ref().and_then(|before: &Station| walk.collapse_ahead(before, &left))
                         });
