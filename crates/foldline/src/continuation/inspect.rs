@@ -439,7 +439,7 @@ impl Follow<'_> {
         rate.max(self.problem.relative_size(&at.tangent, &at.u))
     }
 
-    /// How far along the branch a special point may be off since f_x jumps along its cycle: the error of the critical multiplier over the rate at
+    /// Displacement along the branch of a special point on a cycle along which f_x jumps: the error of the critical multiplier over the rate at
     /// which that passes the unit circle. On smooth fields two meshes tell, and folds are where the branch turns, whatever multipliers say.
     fn displacement(&self, stretch: &Stretch, right: &Station, special: &SpecialPoint) -> f64 {
         let critical = matches!(special.kind, Kind::PeriodDoubling | Kind::Torus | Kind::BranchPoint);
@@ -581,7 +581,7 @@ impl Follow<'_> {
     }
 }
 
-/// How far the real multiplier above 1 that is closest to it is from 1, as a logarithm (the real eigenvalue above 0 from 0).
+/// Logarithm of the smallest real multiplier above 1 (the smallest real eigenvalue above 0).
 fn above_critical(spectrum: &[Complex64], cycle: bool) -> Option<f64> {
     /// The trivial multiplier is closer.
     const LEAST: f64 = 1e-4;

@@ -716,7 +716,7 @@ impl Branch {
         });
     }
 
-    /// How many special points of the same kind that were found before this one lie at the very same place: pairs of eigenvalues that pass at
+    /// Number of special points of the same kind found before this one at the very same place: pairs of eigenvalues that pass at
     /// once.
     pub fn earlier_there(&self, special: &SpecialPoint) -> usize {
         let same = |other: &&SpecialPoint| {

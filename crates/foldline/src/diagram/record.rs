@@ -12,7 +12,7 @@ pub struct Record {
     forwards: bool,
 }
 
-/// What does not fit at a special point, in eigenvalues or multipliers.
+/// Disagreement of a special point with the record, as numbers of eigenvalues or multipliers.
 pub struct Misfit {
     /// Difference between what the branch has on this side of it and what it says itself.
     pub on_arrival: usize,

@@ -36,9 +36,9 @@ const AMPLITUDES: i32 = 17;
 const SHARES: [f64; 4] = [0.2, 0.4, 0.6, 0.8];
 /// Phases of the grid.
 const PHASES: u32 = 6;
-/// How many of the starts are corrected, those with the smallest residual.
+/// Number of starts that are corrected, those with the smallest residual.
 const CORRECTED: usize = 48;
-/// How many solutions are kept.
+/// Largest number of solutions kept.
 const KEPT: usize = 4;
 const ROUNDS: usize = 25;
 
@@ -324,7 +324,7 @@ impl<'a> Averaged<'a> {
         self.residual(&unit, &self.means(&bent))
     }
 
-    /// Whether two solutions differ in where time starts only.
+    /// True if two solutions differ only in the origin of time.
     fn same(&self, a: &Swing, b: &Swing) -> bool {
         const NEAR: f64 = 1e-3;
         let phase = |swing: &Swing| {

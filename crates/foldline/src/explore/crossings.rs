@@ -124,7 +124,7 @@ fn normalise(x: &mut [f64]) {
     x.iter_mut().for_each(|x| *x /= norm);
 }
 
-/// How far along the tangent from `guess`, at some distance from the branch point `u`, the part of the residual in the kernel is least: there
+/// Distance along the tangent from `guess`, near the branch point `u`, at which the part of the residual in the kernel is smallest: there
 /// Newton's method is led to the branch that is closest in direction, rather than to the one that attracts it most. The almost singular matrix at
 /// the branch point magnifies just that part.
 fn shift_along(

@@ -114,7 +114,7 @@ struct Leaving<'l> {
     parent: &'l Branch,
     special: &'l SpecialPoint,
     label: String,
-    /// What is switched to from there on.
+    /// Switching on the branches that leave.
     below: Switching,
 }
 

@@ -66,7 +66,7 @@ struct Response {
     rates: Vec<Complex64>,
 }
 
-/// What was found next to a root at one value, and what it took.
+/// Cycles found next to a root at one value, with the work.
 #[derive(Default)]
 pub(super) struct Yield {
     pub(super) cycles: Vec<Point>,
@@ -228,7 +228,7 @@ impl Resonances<'_> {
         Yield { cycles: moving, averaged: solved, corrected: motions.len() }
     }
 
-    /// Whether it is no equilibrium that Newton's method takes for a cycle.
+    /// True unless Newton's method has found an equilibrium in place of a cycle.
     fn moves(&self, cycle: &Point) -> bool {
         const LEAST: f64 = 1e-3;
         let spans = cycle.ranges.iter().zip(&self.system.scales).map(|([low, high], scale)| (high - low) / scale);

@@ -64,7 +64,7 @@ fn step_off(
     step_off_from(problem, settings, base, direction, sign, distances, expected, &|_, _| {})
 }
 
-/// The same where the first guess, straight ahead, is `improved`.
+/// Like [`step_off`], with the initial guess `improved`.
 #[expect(clippy::too_many_arguments, reason = "those of `step_off` and one more")]
 fn step_off_from(
     problem: &mut dyn ZeroProblem,
