@@ -287,3 +287,20 @@ fn errors_of_cycles_with_contact_are_what_they_say() {
     let wrong: Vec<String> = found.wrong().filter(own).map(|check| format!("{check:?}")).collect();
     assert!(wrong.is_empty(), "{wrong:?}");
 }
+
+/// The second normal mode of two masses (Kerschen et al., Mech. Syst. Signal Process. 23 (2009) 170), begun at the Hopf point of the linear
+/// system: one instability, where a pair of multipliers meets at 1. Half-period shooting has it at the period 4.902862.
+#[test]
+fn a_family_of_cycles_of_one_energy_each_loses_stability_at_one_point() {
+    let model = "name = \"masses\"\n[parameters]\ndelta = -0.005\n[states]\nx1 = \"v1\"\nv1 = \"-2*x1 + x2 - 0.5*x1^3 + delta*v1\"\n\
+                 x2 = \"v2\"\nv2 = \"-2*x2 + x1 + delta*v2\"\n";
+    let branch =
+        "free = \"delta\"\nrange = [-0.01, 0.01]\nswitch = { hopf = 1 }\nstop = { period = 4.85 }\nmax-points = 400";
+    let diagram = run(model, REST, branch);
+    let family = diagram.branch("b/hopf-2").unwrap();
+    let special: Vec<_> = family.special.iter().filter(|s| s.kind != Kind::Mark).collect();
+    let [point] = &special[..] else { panic!("{:?}", told(family)) };
+    let period = point.point.solution.period().unwrap();
+    assert_eq!((point.kind, point.unstable_before, point.unstable_after), (Kind::BranchPoint, 0, 1));
+    assert!((period - 4.902862).abs() < 1e-5, "{period}");
+}

@@ -474,6 +474,7 @@ impl Follow<'_> {
                 doubted(self.problem, &mut station);
             }
         }
+        self.count(&mut station);
         // Without smoothness a parameter is no more accurate than the profile, and two meshes may agree by chance.
         let least =
             if self.problem.is_switched() && kind != Kind::Mark { station.point.trust.discretisation } else { 0.0 };

@@ -173,11 +173,9 @@ impl Point {
         /// Error of multipliers above which it says nothing that they are within it of the unit circle, as next to an orbit of infinite period.
         const UNKNOWN: f64 = 1e-3;
         let error = self.neutral_error();
-        if error < UNKNOWN && self.is_one_of_family() {
-            return self.free_spectrum().iter().filter(|z| z.norm() > 1.0 + error).count();
-        }
-        let own = usize::from(self.neutral_multiplier().is_some_and(|z| z.norm() > 1.0));
-        self.unstable.saturating_sub(own)
+        let circle = if error < UNKNOWN && self.is_one_of_family() { error } else { 0.0 };
+        let own = usize::from(self.neutral_multiplier().is_some_and(|z| z.norm() > 1.0 + circle));
+        self.free_spectrum().iter().filter(|z| z.norm() > 1.0 + circle).count() - own
     }
 
     /// True if the multipliers come in reciprocal pairs, as in a conservative system: besides the one that is 1 there are two with the product 1,
