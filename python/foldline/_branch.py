@@ -37,7 +37,8 @@ class SpecialPoint(Solution):
     unstable_before, unstable_after : int
         Unstable eigenvalues or multipliers on the side of smaller and of larger positions.
     error : float
-        Bound on the error of the parameter, the period and the extremes, relative to 1 + |value|.
+        Bound on the error of the parameter, relative to ``branch.scale`` + |value|, and of the period and the extremes, relative to
+        1 + |value|.
     coefficients : tuple of float
         Of the normal form.
     coefficient_errors : tuple of float
@@ -70,7 +71,8 @@ class SpecialPoint(Solution):
 
     def __repr__(self) -> str:
         form = f", {self.normal_form}" if self.normal_form else ""
-        return f"<{self.kind} of {self.branch.name} at {self.branch.free} = {self.value:.10g} ± {self.error:.1e}{form}>"
+        error = self.error * (self.branch.scale + abs(self.value))
+        return f"<{self.kind} of {self.branch.name} at {self.branch.free} = {self.value:.10g} ± {error:.1e}{form}>"
 
 
 class SpecialPoints(Sequence[SpecialPoint]):
@@ -125,6 +127,8 @@ class Branch(Sequence[Solution]):
         ``"equilibrium"`` or ``"cycle"``.
     free : str
         The parameter of the continuation.
+    scale : float
+        The scale of that parameter: errors are relative to it.
     held : tuple or None
         Of a curve in two parameters: what is held, and the parameter that follows from it.
     origin : tuple
@@ -142,6 +146,7 @@ class Branch(Sequence[Solution]):
         self.name: str = parts["name"]
         self.family: str = parts["family"]
         self.free: str = names[parts["free"]]
+        self.scale: float = parts["scale"]
         held = parts["held"]
         self.held: tuple[str, str] | None = None if held is None else (held[0], names[held[1]])
         self.origin: tuple[str, str, str | None, float | None] = tuple(parts["origin"])

@@ -115,7 +115,9 @@ fn brought(
     let how = Way { system, settings: &settings, watch, bounded: false };
     let branch = grown(how, way, &[], point, sides)?;
     let ends = [branch.points.first()?, branch.points.last()?];
-    ends.into_iter().find(|end| (end.parameters[index] - value).abs() <= 1e-9 * (1.0 + value.abs())).cloned()
+    ends.into_iter()
+        .find(|end| (end.parameters[index] - value).abs() <= 1e-9 * (system.unit(index) + value.abs()))
+        .cloned()
 }
 
 fn followed(way: Way, free: usize, name: &str, start: &Point) -> Option<Branch> {

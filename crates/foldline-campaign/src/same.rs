@@ -5,14 +5,14 @@ use foldline::diagram::{Branch, SpecialPoint};
 /// A special point of one list that the other lacks, or has elsewhere: a sentence each.
 ///
 /// Two are the same if they are of one kind and differ in the parameter by no more than their stated errors together, and the
-/// `slack` of the comparison, relative to 1 + |value|. Special points that lie closer together than their errors cannot be told
+/// `slack` of the comparison, relative to the scale of the parameter + |value|. Special points that lie closer together than their errors cannot be told
 /// apart, nor their order: of those, what is compared is where they are and what they do to stability together.
 pub fn differences(base: &Branch, other: &Branch, slack: f64) -> Vec<String> {
     let free = base.free;
     let value = |special: &SpecialPoint| special.point.parameters.get(free).copied().unwrap_or(f64::NAN);
     let mut left: Vec<&SpecialPoint> = other.special.iter().collect();
     let together = |special: &SpecialPoint, list: &[SpecialPoint]| {
-        let (own, others) = (net(special, &base.special, free), net(special, list, free));
+        let (own, others) = (net(base, special, &base.special), net(base, special, list));
         own.is_some() && own == others
     };
     let mut lines = Vec::new();
@@ -22,7 +22,7 @@ pub fn differences(base: &Branch, other: &Branch, slack: f64) -> Vec<String> {
                 (Some(a), Some(b)) => (a / b).ln().abs(),
                 _ => 0.0,
             };
-            (value(special) - value(candidate)).abs() / (1.0 + value(special).abs()) + period
+            (value(special) - value(candidate)).abs() / base.size(value(special)) + period
         };
         let alike = |candidate: &&SpecialPoint| candidate.kind == special.kind;
         let nearest =
@@ -32,7 +32,7 @@ pub fn differences(base: &Branch, other: &Branch, slack: f64) -> Vec<String> {
             None if together(special, &other.special) => {}
             None => lines.push(format!("{} {at:.9} is missing", special.kind)),
             Some((i, found)) => {
-                let off = (value(found) - at).abs() / (1.0 + at.abs());
+                let off = (value(found) - at).abs() / base.size(at);
                 let allowed = special.error + found.error + slack;
                 if off > 1e3 * allowed {
                     if together(special, &other.special) {
@@ -59,12 +59,12 @@ pub fn differences(base: &Branch, other: &Branch, slack: f64) -> Vec<String> {
 
 /// What the special points of a list that cannot be told apart from `special` do together: the counts of unstable multipliers
 /// on both sides, the smaller first; `None` where there is nothing.
-fn net(special: &SpecialPoint, list: &[SpecialPoint], free: usize) -> Option<[usize; 2]> {
-    let value = |s: &SpecialPoint| s.point.parameters.get(free).copied().unwrap_or(f64::NAN);
+fn net(base: &Branch, special: &SpecialPoint, list: &[SpecialPoint]) -> Option<[usize; 2]> {
+    let value = |s: &SpecialPoint| s.point.parameters.get(base.free).copied().unwrap_or(f64::NAN);
     let period = |s: &SpecialPoint| s.point.solution.period().unwrap_or(1.0);
     let close = |other: &&SpecialPoint| {
         let error = special.error + other.error;
-        let off = (value(special) - value(other)).abs() / (1.0 + value(special).abs());
+        let off = (value(special) - value(other)).abs() / base.size(value(special));
         off <= error && (period(special) / period(other)).ln().abs() <= 10.0 * error
     };
     let near: Vec<&SpecialPoint> = list.iter().filter(close).collect();

@@ -1,7 +1,7 @@
 //! What is seen while a run goes on.
 
 use foldline::contract::Event;
-use foldline::diagram::{Branch, Ending, Point, Responses};
+use foldline::diagram::{Branch, Ending, Point, Responses, Shown};
 use foldline::model::Model;
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::collections::HashMap;
@@ -94,7 +94,7 @@ impl Progress {
     fn visited(&self, name: &str, value: f64, done: usize, of: usize) {
         let mut live = self.live.lock().unwrap_or_else(PoisonError::into_inner);
         let line = live.entry(name.to_string()).or_insert_with(|| self.line(name, 0, 0));
-        line.moved(format!("{done:>5} of {of} values   at {value:.6}"));
+        line.moved(format!("{done:>5} of {of} values   at {:.6}", Shown(value)));
     }
 
     fn responses(&self, set: &Responses) {

@@ -17,7 +17,7 @@ fn special(branch: &Branch) -> Vec<(Kind, f64, f64)> {
     let mut all: Vec<(Kind, f64, f64)> = branch
         .special
         .iter()
-        .map(|s| (s.kind, s.point.parameters[0], s.error * (1.0 + s.point.parameters[0])))
+        .map(|s| (s.kind, s.point.parameters[0], s.error * branch.size(s.point.parameters[0])))
         .collect();
     all.sort_by(|a, b| (a.0, a.1).partial_cmp(&(b.0, b.1)).unwrap());
     all

@@ -58,7 +58,7 @@ fn has(branch: &Branch, kind: &str, omega: f64, period: Option<f64>, r: f64) -> 
         s.kind.name() == kind
             && apart < 1e-6
             // The reference itself is good to about 1e-8.
-            && apart <= s.error * (1.0 + omega) + 2e-8
+            && apart <= s.error * branch.size(omega) + 2e-8
             && period.is_none_or(|t| (s.point.solution.period().unwrap() - t).abs() < 3e-6)
             && (r_max(&s.point.ranges) - r).abs() < 1e-4
     })
@@ -333,7 +333,7 @@ fn the_list_of_special_points_does_not_depend_on_the_tolerance() {
                 let found = other.special.iter().filter(|s| s.kind == exact.kind);
                 let distance = |s: &&foldline::diagram::SpecialPoint| (s.point.parameters[OMEGA] - value).abs();
                 let nearest = found.min_by(|a, b| distance(a).total_cmp(&distance(b))).unwrap();
-                let allowed = (nearest.error + exact.error) * (1.0 + value);
+                let allowed = (nearest.error + exact.error) * branch.size(value);
                 assert!(distance(&nearest) <= allowed, "{} {} {value}: {:?}", branch.name, exact.kind, table(other));
                 assert_eq!(
                     (nearest.unstable_before, nearest.unstable_after),

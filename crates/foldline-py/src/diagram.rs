@@ -137,6 +137,7 @@ fn described<'py>(py: Python<'py>, branch: &Branch) -> PyResult<Bound<'py, PyDic
     parts.set_item("name", &branch.name)?;
     parts.set_item("family", branch.family.name())?;
     parts.set_item("free", branch.free)?;
+    parts.set_item("scale", branch.units[1])?;
     parts.set_item("held", branch.held.map(|(kind, first)| (kind.name(), first)))?;
     let (word, from, kind, parameter) = match &branch.origin {
         Origin::Seed(name) => ("seed", name, None, None),

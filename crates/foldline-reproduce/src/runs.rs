@@ -116,6 +116,13 @@ impl Run {
     pub fn special(&self, name: &str, kind: Kind) -> Result<Vec<&SpecialPoint>, String> {
         Ok(self.branch(name)?.special.iter().filter(|s| s.kind == kind).collect())
     }
+
+    /// The value of a parameter at a special point, and the error of it.
+    pub fn place(&self, index: usize, special: &SpecialPoint) -> [f64; 2] {
+        let value = special.point.parameters[index];
+        let size = self.diagram.branches.iter().find(|branch| branch.free == index).map(|branch| branch.size(value));
+        [value, special.error * size.unwrap_or(1.0 + value.abs())]
+    }
 }
 
 /// The runs of a publication, computed when they are first asked for.

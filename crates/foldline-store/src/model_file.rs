@@ -151,8 +151,12 @@ impl Reader<'_> {
         let before = self.walk.found.len();
         let number = match value.get_ref() {
             DeValue::Table(table) => {
-                self.walk.only(table, &["value", "unit", "description"], &what);
+                self.walk.only(table, &["value", "unit", "description", "scale"], &what);
                 (parameter.unit, parameter.description) = self.labels(table);
+                if let Some(value) = table.get("scale") {
+                    self.places.insert((Item::Parameter(i), Field::Scale), value.span());
+                    parameter.scale = self.walk.number(value, &format!("the scale of `{name}`"));
+                }
                 table.get("value")
             }
             _ => Some(value),

@@ -57,6 +57,7 @@ fn point(position: i64, cycle: bool) -> Point {
             trivial_defect: f64::NAN,
             liouville_defect: 1.0 / 3.0,
             spectrum: 2.0 / 3.0,
+            slope: 2.5e-9,
         },
         cost: Cost { newton: 3, factorisations: 4, rejected: 1, evaluations: 900, linearisations: 700 },
     }
@@ -168,7 +169,7 @@ fn exactly(diagram: &Diagram) -> String {
         };
         let spectrum: Vec<f64> = p.spectrum.iter().flat_map(|z| [z.re, z.im]).collect();
         let t = p.trust;
-        let trust = [t.discretisation, t.residual, t.trivial_defect, t.liouville_defect, t.spectrum, p.step];
+        let trust = [t.discretisation, t.residual, t.trivial_defect, t.liouville_defect, t.spectrum, t.slope, p.step];
         let lists = [&p.parameters[..], &p.tangent, &spectrum, p.ranges.as_flattened(), &trust].map(bits);
         format!("{} {solution} {lists:?} {} {:?}\n", p.position, p.unstable, p.cost)
     }

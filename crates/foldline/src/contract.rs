@@ -119,13 +119,18 @@ pub struct Examination {
     pub trust: Trust,
 }
 
-/// A curve F(u) = 0, F: ℝⁿ⁺ᵏ → ℝⁿ, k = 1. The last k components of `u` are free parameters, the very last is that of the
+/// A curve F(u) = 0, F: ℝⁿ⁺ᵏ → ℝⁿ, k = 1. The last k components of `u` are free parameters over their scales, the very last is that of the
 /// continuation. With k > 1 it is a surface, on which something else must be held to make it a curve.
 ///
 /// The problem may be discretised on a mesh that changes along the curve; vectors always belong to the current mesh.
 pub trait ZeroProblem {
     /// n + k on the current mesh.
     fn unknowns(&self) -> usize;
+
+    /// Value of the continuation parameter for which its unknown, the last component of `u`, is 1.
+    fn unit(&self) -> f64 {
+        1.0
+    }
 
     /// Takes `u` as the reference for phase conditions and scales until the next call.
     fn anchor(&mut self, u: &[f64]);

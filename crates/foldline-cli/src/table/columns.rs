@@ -1,7 +1,7 @@
 //! Which columns the tables have.
 
 use super::{Cell, Column, Style, Table};
-use foldline::diagram::{Branch, Cost, Diagram, Origin, Point};
+use foldline::diagram::{Branch, Cost, Diagram, Origin, Point, Shown};
 use foldline::model::Model;
 use foldline::special::quantity::Quantity;
 
@@ -134,7 +134,7 @@ fn origin(origin: &Origin) -> String {
     match origin {
         Origin::Seed(name) => format!("seed {name}"),
         Origin::EndOf(name) => format!("end of {name}"),
-        Origin::Switch { parent, kind, parameter } => format!("{kind} of {parent} at {parameter:.6}"),
+        Origin::Switch { parent, kind, parameter } => format!("{kind} of {parent} at {:.6}", Shown(*parameter)),
     }
 }
 

@@ -1,7 +1,7 @@
 //! The tables of what surveys and sweeps saw.
 
 use super::{Cell, Column, Style, Table};
-use foldline::diagram::{Diagram, Motion, Response, Responses, Search};
+use foldline::diagram::{Diagram, Motion, Response, Responses, Search, Shown};
 use foldline::model::Model;
 
 /// One row for each response: set, search, every parameter, motion, ratio, multiplicity, period, the extremes of the outputs,
@@ -64,7 +64,7 @@ pub fn summary(diagram: &Diagram, model: &Model) -> Table {
         let mut row = vec![Cell::Word(set.name.clone()), Cell::Word(set.search.name().into()), Cell::Word(free)];
         row.extend([bound(values.first()), bound(values.last()), count(values.len())]);
         row.extend(Motion::ALL.map(|motion| count(set.responses.iter().filter(|r| r.motion == motion).count())));
-        let places: Vec<String> = jumps(set).iter().map(|k| format!("{:.6}", set.responses[*k].value)).collect();
+        let places: Vec<String> = jumps(set).iter().map(|k| format!("{:.6}", Shown(set.responses[*k].value))).collect();
         row.push(Cell::Word(places.join(" ")));
         row
     };

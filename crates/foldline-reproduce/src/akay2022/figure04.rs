@@ -76,8 +76,9 @@ fn folds(flows: &Run, steps: &Run) -> Result<Panel, String> {
 fn first_fold(run: &Run, branch: &str) -> Option<[f64; 3]> {
     let folds = run.special(branch, Kind::Fold).ok()?;
     let first = folds.into_iter().min_by(|a, b| a.point.parameters[OMEGA].total_cmp(&b.point.parameters[OMEGA]))?;
-    let [omega, kappa, ..] = parameters(&first.point);
-    Some([omega, kappa, first.error * (1.0 + omega)])
+    let [_, kappa, ..] = parameters(&first.point);
+    let [omega, error] = run.place(OMEGA, first);
+    Some([omega, kappa, error])
 }
 
 /// Whether the fold curve ends on the fold that the contact branch has.
@@ -127,8 +128,8 @@ fn same(flows: &Run, flow: &str, others: &Run, branch: &str) -> Result<Finding, 
     let mut worst = [0.0_f64, 0.0];
     let mut count = 0;
     for kind in [Kind::Fold, Kind::PeriodDoubling] {
-        let ours = speeds(&flows.special(flow, kind)?);
-        let theirs = speeds(&others.special(branch, kind)?);
+        let ours = speeds(flows, &flows.special(flow, kind)?);
+        let theirs = speeds(others, &others.special(branch, kind)?);
         if ours.len() != theirs.len() {
             return Ok(Finding::fact(false, format!("{} and {} {kind} points", ours.len(), theirs.len())));
         }

@@ -68,7 +68,7 @@ fn window(run: &Run) -> Claim {
         let edge = |name: &str| -> Result<[f64; 2], String> {
             let doublings = run.special(name, Kind::PeriodDoubling)?;
             let top = last(&doublings).ok_or(format!("{name} has no period doubling"))?;
-            Ok([top.point.parameters[OMEGA], top.error * (1.0 + top.point.parameters[OMEGA])])
+            Ok(run.place(OMEGA, top))
         };
         let ([from, e1], [to, e2]) = (edge("contact DL")?, edge("contact SL")?);
         // Counted on the branches themselves, between the period doublings.
@@ -104,8 +104,8 @@ fn doublings(run: &Run) -> Vec<Claim> {
             let first = folds.iter().min_by(|a, b| a.point.parameters[OMEGA].total_cmp(&b.point.parameters[OMEGA]));
             let Some(first) = first else { return Err(format!("{name} has no fold")) };
             holds.push(first.unstable_before.abs_diff(first.unstable_after) == 1);
-            let error = first.error * (1.0 + first.point.parameters[OMEGA]);
-            found.push(format!("{name}: {}", digits(first.point.parameters[OMEGA], error)));
+            let [omega, error] = run.place(OMEGA, first);
+            found.push(format!("{name}: {}", digits(omega, error)));
         }
         Ok(Finding::cases(&holds, found.join(", ")))
     };
@@ -128,8 +128,7 @@ fn closing(run: &Run, far: &Run) -> Vec<Claim> {
         let branch = run.branch(name)?;
         let folds = run.special(name, Kind::Fold)?;
         let top = last(&folds).ok_or(format!("{name} has no fold"))?;
-        let omega = top.point.parameters[OMEGA];
-        let error = top.error * (1.0 + omega);
+        let [omega, error] = run.place(OMEGA, top);
         let open = if closed { !is_closed(branch) } else { top.unstable_before == top.unstable_after };
         let ours = format!(
             "{} at Ω = {}, max r = {:.5}",

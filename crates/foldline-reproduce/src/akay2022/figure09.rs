@@ -128,7 +128,7 @@ fn everything(run: &Run, other: &Run, simulated: &Simulated) -> Result<Panel, St
 fn cascade(run: &Run, family: &str) -> Vec<Claim> {
     let first = format!("contact {family}/period-doubling-1");
     let listed = |name: &str| {
-        let found = speeds(&run.special(name, Kind::PeriodDoubling)?);
+        let found = speeds(run, &run.special(name, Kind::PeriodDoubling)?);
         let worst = found.iter().map(|s| s[1]).fold(0.0, f64::max);
         let list: Vec<String> = found.iter().map(|[at, error]| digits(*at, *error)).collect();
         Ok::<_, String>((found.len(), list.join(", "), worst))
@@ -150,7 +150,7 @@ fn cascade(run: &Run, family: &str) -> Vec<Claim> {
             .collect();
         let list: Vec<String> = ends.iter().map(|at| format!("{at:.6}")).collect();
         // The farther of the ends from the period doubling that it should be.
-        let doublings = speeds(&run.special(&format!("contact {family}"), Kind::PeriodDoubling)?);
+        let doublings = speeds(run, &run.special(&format!("contact {family}"), Kind::PeriodDoubling)?);
         let apart =
             |end: &f64| doublings.iter().map(|[at, error]| (at - end).abs() + error).fold(f64::INFINITY, f64::min);
         let error = ends.iter().map(apart).fold(0.0, f64::max);

@@ -52,10 +52,10 @@ fn straight(run: &Run) -> Claim {
     let finding = || {
         let folds = run.special("cubic SL to 1.5/1", Kind::Fold)?;
         let fold = folds.first().ok_or("the straight run has no fold")?;
-        let value = fold.point.parameters[run.parameter("epsilon")];
+        let [value, error] = run.place(run.parameter("epsilon"), fold);
         let route: Vec<&str> =
             run.notes.iter().filter(|(about, _)| about == "cubic SL to 1.5").map(|(_, note)| note.as_str()).collect();
-        Ok(Finding::number(value, fold.error * (1.0 + value), 1.465, 5e-4).noting(route.join("; ")))
+        Ok(Finding::number(value, error, 1.465, 5e-4).noting(route.join("; ")))
     };
     Claim::decided("12", "At Ω = 5 the cubic SL turns back before ε = 1.5", "1.465", finding())
 }
@@ -114,7 +114,7 @@ fn stable_zones(branch: &Branch) -> Vec<Zone> {
     }
     for s in &branch.special {
         let omega = s.point.parameters[OMEGA];
-        let error = s.error * (1.0 + omega.abs());
+        let error = s.error * branch.size(omega);
         marks.push((s.point.position, true, omega, max_r(&s.point), s.unstable_after == 0, error));
     }
     // A special point lies behind the point of its position.

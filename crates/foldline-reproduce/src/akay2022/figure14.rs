@@ -176,8 +176,8 @@ fn false_piece(run: &Run) -> Claim {
         let folds = run.special(&format!("S {k}"), Kind::Fold)?;
         let below: Vec<&&SpecialPoint> = folds.iter().filter(|f| f.point.parameters[0] < 1.1).collect();
         let [a, b] = below[..] else { return Err(format!("S {k} has {} folds below contact", below.len())) };
-        let error = (a.error + b.error) * (1.0 + a.point.parameters[0]);
-        Ok(((a.point.parameters[0] - b.point.parameters[0]).abs(), max_r(&a.point).max(max_r(&b.point)), error))
+        let ([low, e1], [high, e2]) = (run.place(0, a), run.place(0, b));
+        Ok(((low - high).abs(), max_r(&a.point).max(max_r(&b.point)), e1 + e2))
     };
     let finding = || {
         let ((blunt, r, error), (sharp, _, _)) = (width(30)?, width(90)?);

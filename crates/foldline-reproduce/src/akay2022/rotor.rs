@@ -61,8 +61,8 @@ pub fn stable_at(run: &Run, branch: &str, omega: f64) -> Result<Point, String> {
 }
 
 /// Values of Ω, each with the error of the special point there.
-pub fn speeds(special: &[&SpecialPoint]) -> Vec<[f64; 2]> {
-    special.iter().map(|s| [s.point.parameters[OMEGA], s.error * (1.0 + s.point.parameters[OMEGA].abs())]).collect()
+pub fn speeds(run: &Run, special: &[&SpecialPoint]) -> Vec<[f64; 2]> {
+    special.iter().map(|s| run.place(OMEGA, s)).collect()
 }
 
 /// The special point that lies at the largest Ω.

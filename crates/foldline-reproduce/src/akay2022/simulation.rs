@@ -67,7 +67,7 @@ pub fn claims(run: &Run, simulated: &Simulated) -> Vec<Claim> {
     let mut claims = vec![explained(simulated)];
     claims.extend(parts(&simulated.survey));
     let end = |kind: Kind, name: &str| {
-        let places = speeds(&run.special(name, kind)?);
+        let places = speeds(run, &run.special(name, kind)?);
         Ok(places.iter().map(|[at, _]| *at).fold(f64::NAN, f64::max))
     };
     let deepest = "contact DL/period-doubling-1/period-doubling-1";

@@ -113,6 +113,7 @@ pub(super) fn branch_cells(branch: &Branch, model: &Model, points: u64) -> Vec<C
         parameter(Some(branch.free)),
         kind(branch.held.map(|(kind, _)| kind)),
         parameter(branch.held.map(|(_, follows)| follows)),
+        Cell::Real(branch.units[1]),
         word(origin),
         word(name),
         kind(at_kind),

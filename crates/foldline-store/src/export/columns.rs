@@ -189,7 +189,10 @@ impl Variables {
             text("kind", "what happens there"),
             integer("unstable_before", "number of unstable eigenvalues or multipliers before it"),
             integer("unstable_after", "number of unstable eigenvalues or multipliers behind it"),
-            real("error", "bound on the error of parameter, period and extremes, relative to 1 + |value|"),
+            real(
+                "error",
+                "bound on the error: of the parameter relative to its scale + |value|, of period and extremes relative to 1 + |value|",
+            ),
             text("normal_form", "coefficients of the normal form, and what follows from them, in words"),
         ];
         for name in OWN.iter().filter(|name| name.starts_with("coefficient_")) {
@@ -241,6 +244,7 @@ pub(super) fn of_branch() -> Vec<Column> {
         text("free", "parameter that varies"),
         text("held", "kind of special point held along a curve in two parameters"),
         text("follows", "parameter that follows from the free one on such a curve"),
+        real("scale", "scale of the free parameter, relative to which its errors are stated"),
         text("origin", "seed, end-of another branch, or switch at a special point of another branch"),
         text("origin_name", "name of that seed or branch"),
         text("origin_kind", "kind of that special point"),

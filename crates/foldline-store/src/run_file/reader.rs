@@ -261,7 +261,9 @@ fn branch_in(row: &Row) -> Result<Branch, String> {
     let name: String = row.get("name").map_err(|e| e.to_string())?;
     let free: i64 = row.get("free").map_err(|e| e.to_string())?;
     let free = usize::try_from(free).map_err(|e| e.to_string())?;
-    Ok(Branch { held: held_in(row)?, ..Branch::new(name, family, free, origin_in(row)?) })
+    // Files of version 8 and earlier have none.
+    let units = ["held_unit", "unit"].map(|name| row.get(name).unwrap_or(1.0));
+    Ok(Branch { held: held_in(row)?, units, ..Branch::new(name, family, free, origin_in(row)?) })
 }
 
 pub(super) fn special_in(row: &Row) -> Result<SpecialPoint, String> {

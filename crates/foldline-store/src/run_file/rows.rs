@@ -53,6 +53,7 @@ pub(super) fn values_of(point: &Point, extra: &[f64]) -> Vec<Value> {
         count(point.cost.evaluations),
         count(point.cost.linearisations),
         Value::Real(trust.spectrum),
+        Value::Real(trust.slope),
         degree,
         Value::Integer(i64::from(forcing_periods)),
         Value::Blob(parameters),
@@ -217,6 +218,7 @@ pub(super) fn point_in(row: &Row) -> Result<(Point, Vec<f64>), String> {
             trivial_defect: *trivial_defect,
             liouville_defect: *liouville_defect,
             spectrum: spectrum_error,
+            slope: row.get("slope_error").unwrap_or(0.0),
         },
         cost: Cost {
             newton: count("newton")?,

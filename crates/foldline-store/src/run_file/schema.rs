@@ -62,7 +62,7 @@ const OTHERS: [&str; 11] = [
 ];
 
 /// The columns that a point has in both tables of points, with their types: first those to read, then those to load.
-const POINT_COLUMNS: [(&str, &str); 24] = [
+const POINT_COLUMNS: [(&str, &str); 25] = [
     ("period", "REAL"),
     ("unstable", "INTEGER NOT NULL"),
     ("discretisation", "REAL"),
@@ -75,6 +75,7 @@ const POINT_COLUMNS: [(&str, &str); 24] = [
     ("evaluations", "INTEGER NOT NULL DEFAULT 0"),
     ("linearisations", "INTEGER NOT NULL DEFAULT 0"),
     ("spectrum_error", "REAL"),
+    ("slope_error", "REAL"),
     ("degree", "INTEGER"),
     ("forcing_periods", "INTEGER NOT NULL DEFAULT 0"),
     ("parameter_bytes", "BLOB NOT NULL"),
@@ -99,7 +100,8 @@ pub(super) fn create(columns: &Columns) -> String {
              description TEXT NOT NULL, PRIMARY KEY (class, number));
          CREATE TABLE branches (branch INTEGER PRIMARY KEY, name TEXT NOT NULL UNIQUE, family TEXT NOT NULL,
              free INTEGER NOT NULL, origin TEXT NOT NULL, origin_name TEXT NOT NULL, origin_kind TEXT,
-             origin_parameter REAL, origin_bytes BLOB, held TEXT, follows INTEGER);
+             origin_parameter REAL, origin_bytes BLOB, held TEXT, follows INTEGER,
+             unit REAL NOT NULL, held_unit REAL NOT NULL);
          CREATE TABLE ends (branch INTEGER NOT NULL REFERENCES branches, side INTEGER NOT NULL, code TEXT NOT NULL,
              sentence TEXT NOT NULL, detail TEXT, kind TEXT, count INTEGER, value_bytes BLOB, PRIMARY KEY (branch, side));
          CREATE TABLE points (branch INTEGER NOT NULL REFERENCES branches, position INTEGER NOT NULL, {shown}
@@ -117,7 +119,8 @@ pub(super) fn create(columns: &Columns) -> String {
 ///
 /// Version 1 had no curves in two parameters, version 2 did not count evaluations, version 3 had neither checksums nor errors of
 /// multipliers, version 4 did not know that a solution can be without bound, version 5 had neither forced models nor
-/// normal forms, version 6 no averages, version 7 no errors of coefficients.
+/// normal forms, version 6 no averages, version 7 no errors of coefficients, version 8 neither units of
+/// parameters nor errors of slopes.
 pub(super) fn upgrade(version: i64) -> &'static str {
     match version {
         1 => "ALTER TABLE branches ADD COLUMN held TEXT; ALTER TABLE branches ADD COLUMN follows INTEGER;",
@@ -147,6 +150,12 @@ pub(super) fn upgrade(version: i64) -> &'static str {
         7 => {
             "ALTER TABLE special_points ADD COLUMN coefficient_count INTEGER;
              ALTER TABLE special_points ADD COLUMN normal_form_remark TEXT;"
+        }
+        8 => {
+            "ALTER TABLE branches ADD COLUMN unit REAL NOT NULL DEFAULT 1;
+             ALTER TABLE branches ADD COLUMN held_unit REAL NOT NULL DEFAULT 1;
+             ALTER TABLE points ADD COLUMN slope_error REAL;
+             ALTER TABLE special_points ADD COLUMN slope_error REAL;"
         }
         _ => "",
     }

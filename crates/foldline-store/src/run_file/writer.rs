@@ -417,11 +417,11 @@ impl State {
         // A branch that is there already, from an earlier part of the run, keeps its number.
         transaction.execute(
             "INSERT INTO branches (name, family, free, origin, origin_name, origin_kind, origin_parameter, origin_bytes,
-                 held, follows)
-             VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10)
+                 held, follows, held_unit, unit)
+             VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12)
              ON CONFLICT (name) DO UPDATE SET family = ?2, free = ?3, origin = ?4, origin_name = ?5, origin_kind = ?6,
-                 origin_parameter = ?7, origin_bytes = ?8, held = ?9, follows = ?10",
-            params_from_iter(first.into_iter().chain(origin_values(&branch.origin)).chain(held_values(branch.held))),
+                 origin_parameter = ?7, origin_bytes = ?8, held = ?9, follows = ?10, held_unit = ?11, unit = ?12",
+            params_from_iter(first.into_iter().chain(origin_values(&branch.origin)).chain(held_values(branch.held)).chain(branch.units.map(Value::Real))),
         )?;
         let number: i64 =
             transaction.query_row("SELECT branch FROM branches WHERE name = ?", [&branch.name], |row| row.get(0))?;

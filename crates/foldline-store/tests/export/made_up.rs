@@ -53,6 +53,7 @@ fn point(position: i64, intervals: usize) -> Point {
             trivial_defect: f64::NAN,
             liouville_defect: 1.0 / 3.0,
             spectrum: 2.0 / 3.0,
+            slope: 0.0,
         },
         cost: Cost { newton: 3, factorisations: 4, rejected: 1, evaluations: 900, linearisations: 700 },
     }

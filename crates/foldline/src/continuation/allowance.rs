@@ -7,7 +7,7 @@
 //! A side also ends after several consecutive points with unexplained changes of stability. If multipliers lie on the unit circle
 //! along the whole branch, rounding changes the number of unstable ones, and special points found there are meaningless.
 
-use crate::diagram::{Ending, Mesh};
+use crate::diagram::{Ending, Mesh, Shown};
 
 /// Factorisations available to one point if none were used before. It takes 28 halvings to get from the longest step, 0.2, to the
 /// shortest, 1e-9. A step that fails late takes 8 Newton iterations and then some 30 factorisations for its mesh: about 1100 in all.
@@ -52,9 +52,10 @@ impl Allowance {
         self.unexplained = if unexplained { self.unexplained + 1 } else { 0 };
         if self.unexplained >= IN_A_ROW {
             return Some(Ending::GivenUp(format!(
-                "up to {at}, stability changes at {IN_A_ROW} points in a row without a special point that explains it\nlikely cause: \
+                "up to {}, stability changes at {IN_A_ROW} points in a row without a special point that explains it\nlikely cause: \
                  multipliers that lie on the unit circle along the whole branch, as in a system with a conserved quantity\nwhat to do: \
-                 disregard the stability of this branch, or add a term that breaks the conservation"
+                 disregard the stability of this branch, or add a term that breaks the conservation",
+                Shown(at)
             )));
         }
         if self.is_used_up(work) {
@@ -70,9 +71,10 @@ impl Allowance {
         let also =
             if before > 0 { format!(", and the points before it {before} more than usual") } else { String::new() };
         Ending::GivenUp(format!(
-            "next to {at}, a point took the work of {work} factorisations{also}; {last}\nlikely cause: ever shorter steps or finer meshes are \
+            "next to {}, a point took the work of {work} factorisations{also}; {last}\nlikely cause: ever shorter steps or finer meshes are \
              needed here, as near a homoclinic orbit, a canard or a cluster of special points\nwhat to do: end the range or `stop` \
-             before it; with a larger tolerance, longer steps may pass it"
+             before it; with a larger tolerance, longer steps may pass it",
+            Shown(at)
         ))
     }
 }

@@ -121,7 +121,7 @@ impl Station {
         }
     }
 
-    /// The continuation parameter.
+    /// The unknown λ: the continuation parameter over [`ZeroProblem::unit`].
     pub fn parameter(&self) -> f64 {
         self.u[self.u.len() - 1]
     }

@@ -6,7 +6,7 @@
 
 use super::corrector::{Failure, Station};
 use super::follow::Follow;
-use crate::diagram::{Ending, STANDS};
+use crate::diagram::{Ending, STANDS, Shown};
 
 /// Steps that were given up in a row.
 #[derive(Debug)]
@@ -82,7 +82,7 @@ impl Tried {
             (_, 0) | (0, _) => String::new(),
             (a, b) => format!(" ({a} led elsewhere, Newton's method failed in {b})"),
         };
-        format!("next to {parameter:?}, {steps}{meshes}{counts}; the last failed because {why}")
+        format!("next to {}, {steps}{meshes}{counts}; the last failed because {why}", Shown(parameter))
     }
 }
 
@@ -90,7 +90,7 @@ impl Follow<'_> {
     /// The ending of a side at `left`, beyond which no step led.
     pub(super) fn short_end(&mut self, left: &Station, tried: &Tried, why: &Failure, past: Past) -> Ending {
         let (cause, cure) = self.cause(left, tried, why, past);
-        let said = format!("{}\nlikely cause: {cause}\nwhat to do: {cure}", tried.sentence(why, left.parameter()));
+        let said = format!("{}\nlikely cause: {cause}\nwhat to do: {cure}", tried.sentence(why, self.value(left)));
         match why {
             Failure::Mesh(_) => Ending::MeshTooLarge(said),
             // Whatever the last of the steps failed for.
@@ -183,8 +183,10 @@ impl Follow<'_> {
     /// The ending of a side of equilibria on which the parameter has come to a stand and the solution goes on changing.
     pub(super) fn at_a_stand(&mut self, right: &Station) -> Ending {
         let edge = self.breaks_off(right, self.settings.first_step);
-        let said =
-            format!("the parameter comes to a stand at {:?} while the solution goes on changing", right.parameter());
+        let said = format!(
+            "the parameter comes to a stand at {} while the solution goes on changing",
+            Shown(self.value(right))
+        );
         match edge {
             true => Ending::NotFinite(format!("{said}\nlikely cause: {}\nwhat to do: {}", EDGE.0, EDGE.1)),
             false => Ending::SolutionUnbounded(format!(
@@ -218,8 +220,7 @@ impl Follow<'_> {
             "a state has grown to {:.1e} while the parameter stands at {}\nlikely cause: {cause}\nwhat to do: nothing if \
              that is so; if such sizes are usual, give the state its `scale` in the model file",
             size(now, i),
-            // No -0.
-            (1e9 * right.parameter()).round() / 1e9 + 0.0
+            Shown(self.problem.unit() * ((1e9 * right.parameter()).round() / 1e9))
         )))
     }
 }

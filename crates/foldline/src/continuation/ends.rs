@@ -49,9 +49,10 @@ fn distance(a: &[f64], b: &[f64]) -> f64 {
 impl Follow<'_> {
     /// The bound of a further parameter that this step passes, and the point there.
     pub(super) fn beyond(&mut self, left: &Station, right: &Station, cost: &mut Cost) -> Option<(f64, Station)> {
-        let (index, value) = self.settings.bounds.iter().find_map(|(index, [low, high])| {
+        let (index, value, width) = self.settings.bounds.iter().find_map(|(index, [low, high])| {
             let now = *right.point.parameters.get(*index)?;
-            if now < *low { Some((*index, *low)) } else { (now > *high).then_some((*index, *high)) }
+            let bound = if now < *low { Some(*low) } else { (now > *high).then_some(*high) };
+            bound.map(|bound| (*index, bound, if (high - low).is_finite() { high - low } else { bound.abs() }))
         })?;
         let gap = |station: &Station| station.point.parameters[index] - value;
         if (gap(left) > 0.0) == (gap(right) > 0.0) {
@@ -70,7 +71,7 @@ impl Follow<'_> {
                 inner = (s, miss)
             }
             found = Some(there);
-            if miss.abs() < self.settings.tolerance * (1.0 + value.abs()) {
+            if miss.abs() < self.settings.tolerance * width {
                 break;
             }
         }
@@ -90,7 +91,7 @@ impl Follow<'_> {
     /// What was found in the last step before a branch meets simpler solutions, without what cannot be told from the
     /// meeting itself: there the parameter is stationary and a multiplier is 1 anyway.
     pub(super) fn up_to(&self, meeting: f64, found: Vec<Found>, unstable: usize, right: &mut Station) -> Vec<Found> {
-        let near = 20.0 * self.settings.tolerance * (1.0 + meeting.abs());
+        let near = 20.0 * self.settings.tolerance * (self.problem.unit() + meeting.abs());
         let apart = |value: f64| (value - meeting).abs() > near;
         let mut count = unstable;
         let mut kept = Vec::new();
@@ -100,7 +101,7 @@ impl Follow<'_> {
                     let after = if self.direction > 0.0 { s.unstable_after } else { s.unstable_before };
                     (s.point.parameters.get(self.free).copied().unwrap_or(0.0), after)
                 }
-                Found::Inserted(s, _) => (s.parameter(), s.point.unstable),
+                Found::Inserted(s, _) => (self.value(s), s.point.unstable),
             };
             if !apart(value) {
                 break;
@@ -108,7 +109,7 @@ impl Follow<'_> {
             count = after;
             kept.push(item);
         }
-        if !apart(right.parameter()) {
+        if !apart(self.value(right)) {
             right.point.unstable = count;
         }
         kept
@@ -183,7 +184,7 @@ impl Follow<'_> {
                 return Err(Failure::Singular);
             }
             let share = (monitor.value(&left.point, &near.point) / values[0]).powi(2);
-            let extrapolated = (near.parameter() - share * left.parameter()) / (1.0 - share);
+            let extrapolated = (self.value(&near) - share * self.value(left)) / (1.0 - share);
             let parameter = monitor.meeting(&near.point).unwrap_or(extrapolated);
             return Ok(Some(Step {
                 right: near,
@@ -204,7 +205,7 @@ impl Follow<'_> {
             let parameter = monitor.meeting(&here.point)?;
             // Ratio of the deviation at the point before to that here.
             let larger = monitor.value(&here.point, &before.point);
-            let farther = (before.parameter() - parameter) / (here.parameter() - parameter);
+            let farther = (self.value(before) - parameter) / (self.value(here) - parameter);
             let fits = larger > 1.0 && (farther / (larger * larger) - 1.0).abs() < NEARLY;
             fits.then_some(Ending::Joined { at: monitor.kind(), parameter })
         })
@@ -266,7 +267,7 @@ impl Follow<'_> {
         cost: &mut Cost,
     ) -> Result<Option<Station>, Failure> {
         let value = home.parameters[self.free];
-        let between = (left.parameter() - value) * (right.parameter() - value) <= 0.0;
+        let between = (self.value(left) - value) * (self.value(right) - value) <= 0.0;
         let same_way = home.parameter_slope() * self.direction * (right.slope() + left.slope()) > 0.0;
         let near = |r: &Vec<bool>| right.point.difference(home, &self.settings.scales, r) < 0.5;
         if !(between && same_way && self.settings.reflections.iter().any(near)) {
@@ -414,7 +415,7 @@ impl Follow<'_> {
     /// it is looked at.
     fn features(&self, point: &Point, home: &Point, seen: &[bool]) -> Vec<f64> {
         let value = |p: &Point| p.parameters.get(self.free).copied().unwrap_or(0.0);
-        let mut all = vec![value(point) / (1.0 + value(home).abs())];
+        let mut all = vec![value(point) / (self.problem.unit() + value(home).abs())];
         if let Some(period) = point.solution.period() {
             all.push(period.ln());
         }

@@ -169,7 +169,7 @@ pub fn follow(
                             Some(end) => end,
                             None if used_up => {
                                 let last = format!("the last step failed because {why}");
-                                allowance.ending(left.parameter(), spent, &last)
+                                allowance.ending(walk.value(&left), spent, &last)
                             }
                             None => walk.short_end(&left, &tried, &why, past),
                         };
@@ -194,7 +194,7 @@ pub fn follow(
         let sideways = if walk.direction > 0.0 { 0 } else { -1 };
         let strange = walk.settings.stability && is_unexplained(&found);
         let spent = work(cost.factorisations, &right.mesh);
-        let used_up = allowance.accepted(strange, spent, right.parameter());
+        let used_up = allowance.accepted(strange, spent, walk.value(&right));
         // As above, an orbit of infinite period takes precedence as the reason.
         let end = end.or(used_up.map(|why| (walk.limit)(&right.point).unwrap_or(why)));
         for item in found {
@@ -284,15 +284,26 @@ impl Follow<'_> {
         }
     }
 
+    /// The continuation parameter at a station.
+    pub(super) fn value(&self, station: &Station) -> f64 {
+        self.problem.unit() * station.parameter()
+    }
+
+    /// The range as one of the unknown λ.
+    pub(super) fn bounds(&self) -> [f64; 2] {
+        self.settings.range.map(|bound| bound / self.problem.unit())
+    }
+
     pub(super) fn place(&mut self, station: &Station) {
         self.problem.set_mesh(&station.mesh);
         self.problem.anchor(&station.u);
     }
 
-    /// The end at a bound of the range that lies ahead, no farther off than `within`, relative to 1 + |bound|.
+    /// The end at a bound of the range that lies ahead, no farther off than `within`, relative to the scale of the parameter + |bound|.
     fn at_bound(&self, here: &Station, within: f64) -> Option<Ending> {
         let bound = self.settings.range[usize::from(here.slope() > 0.0)];
-        let near = (here.parameter() - bound).abs() <= within * (1.0 + bound.abs());
+        let unit = self.problem.unit();
+        let near = (here.parameter() - bound / unit).abs() <= within * (1.0 + (bound / unit).abs());
         (near && bound.is_finite() && here.slope() != 0.0).then_some(Ending::Bound(bound))
     }
 

@@ -228,6 +228,7 @@ pub fn passing(
     cost: &mut Cost,
 ) -> Result<Station, Failure> {
     let stretch = Stretch::new(problem, left, right, direction);
+    let value = value / problem.unit();
     let mut s = stretch.distance_to(value);
     let [mut low, mut high] = [(0.0, left.parameter()), (stretch.length, right.parameter())];
     let mut near = None;
@@ -475,7 +476,8 @@ fn noise(
     if error.is_finite() { error } else { 0.0 }
 }
 
-/// Largest difference of parameter, period and ranges, each relative to 1 + |value|.
+/// Largest difference of the parameter, relative to its scale + |value|, and of period and ranges, relative to 1 + |value|. `gap` and
+/// `parameter` are the difference and the value of the unknown λ.
 pub(super) fn discrepancy(a: &Point, b: &Point, gap: f64, parameter: f64) -> f64 {
     let mut largest = gap.abs() / (1.0 + parameter.abs());
     if let (Some(x), Some(y)) = (a.solution.period(), b.solution.period()) {

@@ -153,7 +153,7 @@ impl Follow<'_> {
     fn landing(&mut self, left: &Station, trail: Option<&Trail>, guess: &[f64], step: f64) -> Option<(f64, Vec<f64>)> {
         let last = guess.len() - 1;
         let (here, way) = (left.parameter(), guess[last] - left.parameter());
-        let [low, high] = self.settings.range;
+        let [low, high] = self.bounds();
         let there = here + STRETCHED * way;
         let bound = if there < low { low } else { (there > high).then_some(high)? };
         if left.slope() * way <= 0.0 || (here - bound) * way >= 0.0 {
@@ -229,14 +229,15 @@ impl Follow<'_> {
         if let Some(ended) = self.collapsed(left, &right, cost)? {
             return Ok(ended);
         }
-        let [low, high] = self.settings.range;
+        let [low, high] = self.bounds();
         let bound = match aim {
-            Aim::Value(_) => Some(guess[guess.len() - 1]),
-            Aim::Plane(_) if right.parameter() < low => Some(low),
-            Aim::Plane(_) => (right.parameter() > high).then_some(high),
+            Aim::Value(_) => Some(usize::from(guess[guess.len() - 1] == high)),
+            Aim::Plane(_) if right.parameter() < low => Some(0),
+            Aim::Plane(_) => (right.parameter() > high).then_some(1),
         };
         let (mut end, mut between) = (None, Some(between));
-        if let Some(bound) = bound {
+        if let Some(side) = bound {
+            let bound = self.settings.range[side];
             between = None;
             if let Aim::Plane(_) = aim {
                 right = self.at_parameter(left, &right, bound, cost)?;
@@ -244,7 +245,7 @@ impl Follow<'_> {
             }
             // To the last bit, whatever rounding Newton's method left.
             let last = right.u.len() - 1;
-            right.u[last] = bound;
+            right.u[last] = [low, high][side];
             if let Some(own) = right.point.parameters.get_mut(self.free) {
                 *own = bound;
             }

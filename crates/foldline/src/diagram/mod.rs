@@ -1,11 +1,13 @@
 //! What comes out: points, special points, branches, diagrams. Plain data.
 
 mod cycle;
+mod number;
 mod record;
 mod response;
 mod share;
 
 pub use cycle::Cycle;
+pub use number::Shown;
 pub use record::{Misfit, Record};
 pub use response::{Motion, Response, Responses, Search};
 pub use share::Share;
@@ -71,6 +73,8 @@ pub struct Trust {
     /// Estimated error of the eigenvalues or multipliers, relative to the larger of 1 and their modulus; NaN where it was not
     /// estimated.
     pub spectrum: f64,
+    /// Part of the slope dλ/ds that may be rounding, where more than [`STANDS`]: of a parameter that hardly enters f.
+    pub slope: f64,
 }
 
 /// What a point cost.
@@ -108,7 +112,8 @@ pub struct Point {
     pub parameters: Vec<f64>,
     /// The solution itself.
     pub solution: Solution,
-    /// Unit tangent of the branch (increasing position), in the layout of the unknowns; the last component is the parameter.
+    /// Unit tangent of the branch (increasing position), in the layout of the unknowns; the last component is the change of the parameter over
+    /// its scale ([`Branch::units`]).
     pub tangent: Vec<f64>,
     /// Arclength step with which the next point towards larger |position| will be tried.
     pub step: f64,
@@ -148,7 +153,7 @@ impl Point {
     /// up to some amplitude: the parameter does not change along the branch, and a second multiplier is 1 within its error. The side
     /// of 1 on which that multiplier is computed is not significant.
     pub fn is_one_of_family(&self) -> bool {
-        let stands = self.parameter_slope().abs() < STANDS;
+        let stands = self.parameter_slope().abs() < STANDS.max(self.trust.slope);
         self.solution.period().is_some() && stands && self.neutral_multiplier().is_some()
     }
 
@@ -222,15 +227,17 @@ impl Point {
         matches!(&self.solution, Solution::Cycle(cycle) if cycle.profile.is_empty())
     }
 
-    /// Component of the tangent along the continuation parameter.
+    /// Component of the tangent along the continuation parameter, relative to the scale of that.
     pub fn parameter_slope(&self) -> f64 {
         self.tangent.last().copied().unwrap_or(0.0)
     }
 }
 
-/// Slope dλ/ds below which the parameter is constant along a branch up to rounding. Order of magnitude: the machine precision times a
+/// Slope dλ/ds, λ relative to the scale of the parameter, below which the parameter is constant along a branch up to rounding. Order of magnitude: the machine precision times a
 /// condition number of 1e7.
 pub(crate) const STANDS: f64 = 1e-9;
+/// Slope below which no branch point is told from a fold, and a branch may be one at a single parameter value.
+pub(crate) const FLAT: f64 = 1e-6;
 
 /// What happens at a special point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
@@ -383,7 +390,8 @@ pub struct SpecialPoint {
     pub unstable_before: usize,
     /// Unstable multipliers (eigenvalues) on the side of larger positions.
     pub unstable_after: usize,
-    /// Bound on the error of the parameter, the period and the ranges, relative to 1 + |value|.
+    /// Bound on the error of the parameter, relative to its scale ([`Branch::units`]) + |value|, and of the period and the ranges, relative to
+    /// 1 + |value|.
     pub error: f64,
     /// Coefficients of the normal form, named by [`Kind::coefficients`]; none where they are not known.
     pub coefficients: Vec<f64>,
@@ -608,18 +616,20 @@ impl Ending {
 impl fmt::Display for Ending {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
-            Ending::Bound(value) => write!(f, "reached {value}"),
-            Ending::Asked(value) => write!(f, "stopped where the study asks to, at the value {value}"),
+            Ending::Bound(value) => write!(f, "reached {}", Shown(*value)),
+            Ending::Asked(value) => write!(f, "stopped where the study asks to, at the value {}", Shown(*value)),
             Ending::Closed => write!(f, "closed on itself"),
-            Ending::Joined { at: Kind::Hopf, parameter } => write!(f, "shrank to an equilibrium at {parameter:.6}"),
-            Ending::Joined { at: Kind::PeriodDoubling, parameter } => {
-                write!(f, "became a cycle of half the period at {parameter:.6}")
+            Ending::Joined { at: Kind::Hopf, parameter } => {
+                write!(f, "shrank to an equilibrium at {:.6}", Shown(*parameter))
             }
-            Ending::Joined { at, parameter } => write!(f, "joined another branch at {at} {parameter:.6}"),
+            Ending::Joined { at: Kind::PeriodDoubling, parameter } => {
+                write!(f, "became a cycle of half the period at {:.6}", Shown(*parameter))
+            }
+            Ending::Joined { at, parameter } => write!(f, "joined another branch at {at} {:.6}", Shown(*parameter)),
             Ending::StepTooSmall(why) => write!(f, "step too small: {why}"),
             Ending::MeshTooLarge(why) => write!(f, "mesh too large: {why}"),
             Ending::PeriodUnbounded(period) => {
-                write!(f, "period grew to {period:.4}, and no equilibrium near the cycle explains it")
+                write!(f, "period grew to {:.4}, and no equilibrium near the cycle explains it", Shown(*period))
             }
             Ending::Connecting { connection, parameter, period, to } => {
                 let orbit = match connection {
@@ -627,7 +637,12 @@ impl fmt::Display for Ending {
                     Connection::Heteroclinic => "a heteroclinic cycle between the saddles",
                     Connection::SaddleNode => "a saddle-node on the cycle, at",
                 };
-                write!(f, "approaches {orbit} {to} at {parameter:.9}; the last period is {period:.4}")
+                write!(
+                    f,
+                    "approaches {orbit} {to} at {:.9}; the last period is {:.4}",
+                    Shown(*parameter),
+                    Shown(*period)
+                )
             }
             Ending::SolutionUnbounded(why) => write!(f, "solution without bound: {why}"),
             Ending::PointLimit(points) => write!(f, "stopped at the limit of {points} points"),
@@ -668,6 +683,8 @@ pub struct Branch {
     pub free: usize,
     /// For a curve in two parameters: what is held along it, and the index of the parameter that follows from it.
     pub held: Option<(Kind, usize)>,
+    /// Scale of each free parameter, that which follows first: the last components of the tangents are changes of the parameters over these.
+    pub units: [f64; 2],
     /// Where it comes from.
     pub origin: Origin,
     /// Points by increasing position.
@@ -679,6 +696,16 @@ pub struct Branch {
 }
 
 impl Branch {
+    /// A value of the continuation parameter as messages give it: 0 where less is left of it than any tolerance.
+    pub fn rounded(&self, value: f64) -> f64 {
+        if value.abs() < 1e-9 * self.units[1] { 0.0 } else { value }
+    }
+
+    /// Size of a value of the continuation parameter: its scale + |value|. Errors are relative to it.
+    pub fn size(&self, value: f64) -> f64 {
+        self.units[1] + value.abs()
+    }
+
     /// An empty branch.
     pub fn new(name: impl Into<String>, family: Family, free: usize, origin: Origin) -> Branch {
         Branch {
@@ -686,6 +713,7 @@ impl Branch {
             family,
             free,
             held: None,
+            units: [1.0; 2],
             origin,
             points: Vec::new(),
             special: Vec::new(),

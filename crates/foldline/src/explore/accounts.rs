@@ -2,7 +2,7 @@
 
 use super::growth::Growth;
 use crate::contract::Event;
-use crate::diagram::{Branch, Family, Misfit, Point, SpecialPoint};
+use crate::diagram::{Branch, Family, Misfit, Point, Shown, SpecialPoint};
 
 /// The cure where a number does not fit.
 const CLOSER: &str =
@@ -17,10 +17,10 @@ impl Growth<'_> {
             Misfit { on_arrival: 0, of_change: 0 } => return true,
             Misfit { on_arrival: 0, .. } => {
                 format!(
-                    "the number of unstable {what} changes from {before} to {after} at the {kind} at {at:?}, which its kind does not explain"
+                    "the number of unstable {what} changes from {before} to {after} at the {kind} at {at}, which its kind does not explain"
                 )
             }
-            _ => format!("the number of unstable {what} at the {kind} at {at:?} is not that of the points beside it"),
+            _ => format!("the number of unstable {what} at the {kind} at {at} is not that of the points beside it"),
         };
         self.tell(Event::Short(&branch.name, &format!("{said}\n{CLOSER}")))
     }
@@ -30,7 +30,7 @@ impl Growth<'_> {
     pub(super) fn unexplained(&self, branch: &Branch, before: usize, point: &Point) -> bool {
         let (what, at, after) = (counted(branch), value(branch, point), point.unstable);
         let said = format!(
-            "the number of unstable {what} changes from {before} to {after} next to {at:?}, but no special point was found there"
+            "the number of unstable {what} changes from {before} to {after} next to {at}, but no special point was found there"
         );
         self.tell(Event::Short(&branch.name, &format!("{said}\n{CLOSER}")))
     }
@@ -40,6 +40,6 @@ fn counted(branch: &Branch) -> &'static str {
     if branch.family == Family::Cycle { "multipliers" } else { "eigenvalues" }
 }
 
-fn value(branch: &Branch, point: &Point) -> f64 {
-    point.parameters.get(branch.free).copied().unwrap_or(f64::NAN)
+fn value(branch: &Branch, point: &Point) -> Shown {
+    Shown(branch.rounded(point.parameters.get(branch.free).copied().unwrap_or(f64::NAN)))
 }

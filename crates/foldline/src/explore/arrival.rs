@@ -34,7 +34,7 @@ pub(super) fn at<'b>(
 fn meets(tolerance: f64, parent: &Branch, special: &SpecialPoint, value: f64) -> bool {
     let off = |other: &SpecialPoint| (other.point.parameters[parent.free] - value).abs();
     let mut rivals = parent.special.iter().filter(|other| other.kind == special.kind);
-    off(special) < 1e3 * tolerance * (1.0 + value.abs()) && rivals.all(|other| off(special) <= off(other))
+    off(special) < 1e3 * tolerance * parent.size(value) && rivals.all(|other| off(special) <= off(other))
 }
 
 /// True if the period of a branch agrees with that of the solutions born at the special point.

@@ -8,7 +8,7 @@ use super::growth::{self, Beginning, Growth, Line};
 use super::plan::{CurvePlan, Plan};
 use crate::continuation::{Settings, UNCROSSED};
 use crate::contract::Observer;
-use crate::diagram::{Branch, Ending, Origin, Point, SpecialPoint};
+use crate::diagram::{Branch, Ending, Origin, Point, Shown, SpecialPoint};
 use crate::special::mark::Mark;
 use crate::special::unfolded::{Unfolded, sizes};
 
@@ -27,7 +27,7 @@ pub fn start<'b>(plan: &CurvePlan, branch: &'b Branch) -> Result<&'b SpecialPoin
         None => fitting.min_by_key(|special| special.point.position),
     };
     found.ok_or_else(|| {
-        let others: Vec<String> = branch.special.iter().map(|s| format!("{} {:.6}", s.kind, value(s))).collect();
+        let others: Vec<String> = branch.special.iter().map(|s| format!("{} {:.6}", s.kind, Shown(value(s)))).collect();
         let there = if others.is_empty() { "none at all".into() } else { others.join(", ") };
         format!("{} has no {} point (special points: {there})", branch.name, plan.hold)
     })
@@ -114,8 +114,10 @@ pub fn follow_from(
         {
             let value = special.point.parameters[parent.free];
             return Err(format!(
-                "the branches that cross at {value:.6} do so at this value of the second parameter only\nlikely cause: {}\nwhat to do: {}",
-                UNCROSSED.0, UNCROSSED.1
+                "the branches that cross at {:.6} do so at this value of the second parameter only\nlikely cause: {}\nwhat to do: {}",
+                Shown(value),
+                UNCROSSED.0,
+                UNCROSSED.1
             ));
         }
         Ok((settings, sides, station))
@@ -136,7 +138,7 @@ pub fn end_of(system: &System, plan: &Plan, curve: &CurvePlan, branch: &Branch) 
     let backward = matches!((curve.until, start), (Some(target), Some(value)) if target < value);
     let (ending, point) =
         if backward { (&branch.ends[0], branch.points.first()) } else { (&branch.ends[1], branch.points.last()) };
-    let arrived = |value: f64| curve.until.is_none_or(|target| (value - target).abs() <= 1e-9 * (1.0 + target.abs()));
+    let arrived = |value: f64| curve.until.is_none_or(|target| (value - target).abs() <= 1e-9 * branch.size(target));
     match (ending, point) {
         (Some(Ending::Bound(_)), Some(point)) if arrived(point.parameters[curve.free]) => {
             let first = branch.held.map_or(curve.free, |(_, first)| first);

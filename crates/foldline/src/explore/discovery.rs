@@ -29,7 +29,7 @@ use super::resonances::Resonances;
 use super::{curves, known};
 use crate::attractors::spectral_ratio;
 use crate::contract::Event;
-use crate::diagram::{Branch, Kind, Origin, Point, Solution, SpecialPoint};
+use crate::diagram::{Branch, Kind, Origin, Point, Shown, Solution, SpecialPoint};
 use crate::special::mark::Mark;
 use crate::special::quantity::Quantity;
 
@@ -118,7 +118,8 @@ impl Discovery<'_, '_> {
         }
         let resonances = Resonances { system, plan, tolerance };
         let (roots, left) = resonances.roots();
-        let places: Vec<String> = roots.iter().map(|root| format!("{} at {:.4}", root.name(), root.value)).collect();
+        let places: Vec<String> =
+            roots.iter().map(|root| format!("{} at {:.4}", root.name(), Shown(root.value))).collect();
         let (known, mut averaged, mut corrected, mut cycles) = (self.named.len(), 0, 0, 0);
         for root in &roots {
             for value in root.values(plan.range) {
@@ -163,7 +164,9 @@ impl Discovery<'_, '_> {
                 let (curve, going) = self.fold_curve(&parent, (number + 1, fold), second, range);
                 let met: Vec<Point> = (curve.special.iter())
                     .filter(|s| s.kind == Kind::Mark && s.point.position != 0)
-                    .filter(|s| (s.point.parameters[second] - home).abs() <= 1e-6 * (1.0 + home.abs()))
+                    .filter(|s| {
+                        (s.point.parameters[second] - home).abs() <= 1e-6 * (self.work.system.unit(second) + home.abs())
+                    })
                     .map(|s| s.point.clone())
                     .collect();
                 let name = curve.name.clone();

@@ -7,7 +7,7 @@ use super::seeds::Seeds;
 use super::{System, arrival, crossings, curves, discovery, homotopy, known, switch};
 use crate::continuation::Settings;
 use crate::contract::{Event, Observer, Verdict};
-use crate::diagram::{Branch, Diagram, Ending, Family, Kind, Origin, Point, Solution, SpecialPoint};
+use crate::diagram::{Branch, Diagram, Ending, Family, Kind, Origin, Point, Shown, Solution, SpecialPoint};
 use std::ops::Range;
 
 /// What starts at a seed.
@@ -81,8 +81,7 @@ pub fn grow(
         }
         Root::Exploration(index) => {
             let exploration = &plan.explorations[index];
-            let system = system.in_box(exploration);
-            let mut own = Work { system: &system, plan, earlier, observer, branches: Vec::new(), budget: usize::MAX };
+            let mut own = Work { system, plan, earlier, observer, branches: Vec::new(), budget: usize::MAX };
             discovery::explore(&mut own, exploration, jobs / plan.explorations.len().max(1));
             return own.branches;
         }
@@ -296,9 +295,9 @@ impl Work<'_> {
                 continue;
             }
             let parameter = special.point.parameters[parent.free];
-            let label = format!("{} {parameter:.6} of {}", special.kind, parent.name);
+            let label = format!("{} {:.6} of {}", special.kind, Shown(parent.rounded(parameter)), parent.name);
             if self.points() >= self.budget {
-                left.push(format!("{} {parameter:.6}", special.kind));
+                left.push(format!("{} {:.6}", special.kind, Shown(parent.rounded(parameter))));
                 continue;
             }
             if self.observer.stopping() {
@@ -333,7 +332,7 @@ impl Work<'_> {
         // Where a branch that crosses another one started, the other one is its parent.
         if let Origin::Switch { parent: from, kind: Kind::BranchPoint, parameter: there } = &parent.origin
             && special.kind == Kind::BranchPoint
-            && (there - parameter).abs() < 1e3 * self.plan.tolerance * (1.0 + there.abs())
+            && (there - parameter).abs() < 1e3 * self.plan.tolerance * parent.size(*there)
         {
             self.tell(Event::Note(&parent.name, &format!("{label}: the branch there is {from}, the parent")));
             return true;
@@ -363,7 +362,7 @@ impl Work<'_> {
         const MOST: usize = 4;
         let Leaving { settings, parent, special, label, .. } = at;
         if let Origin::Switch { parent: from, kind: Kind::BranchPoint, parameter: there } = &parent.origin
-            && (there - special.point.parameters[parent.free]).abs() < 1e3 * self.plan.tolerance * (1.0 + there.abs())
+            && (there - special.point.parameters[parent.free]).abs() < 1e3 * self.plan.tolerance * parent.size(*there)
         {
             return self.tell(Event::Note(
                 &parent.name,
@@ -490,7 +489,7 @@ fn end_of(branch: &Branch, plan: &BranchPlan) -> Result<Point, String> {
     let side = if backward { 0 } else { 1 };
     let point = if backward { branch.points.first() } else { branch.points.last() };
     // A branch that turned round may have left its range where it began.
-    let arrived = |value: f64| plan.until.is_none_or(|target| (value - target).abs() <= 1e-9 * (1.0 + target.abs()));
+    let arrived = |value: f64| plan.until.is_none_or(|target| (value - target).abs() <= 1e-9 * branch.size(target));
     match (&branch.ends[side], point) {
         (Some(Ending::Bound(value)), Some(point)) if arrived(*value) => Ok(point.clone()),
         (Some(Ending::Asked(_)), Some(point)) => Ok(point.clone()),

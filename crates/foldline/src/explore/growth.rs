@@ -36,8 +36,10 @@ impl Line {
     }
 
     fn axis(&self, system: &System, index: usize) -> Axis {
-        let scale = system.parameter_scales.get(index).copied().unwrap_or(1.0);
-        Axis { ties: if index == self.free { self.ties.clone() } else { Vec::new() }, ..Axis::new(index, scale) }
+        Axis {
+            ties: if index == self.free { self.ties.clone() } else { Vec::new() },
+            ..Axis::new(index, system.unit(index))
+        }
     }
 
     /// The problem of this curve, on the mesh of `point`, through which it goes.
@@ -92,12 +94,11 @@ pub fn problem_of<'a>(
 
 /// The setting of a system at given parameters.
 pub fn setting<'a>(system: &'a System, free: usize, parameters: &[f64]) -> Setting<'a> {
-    let parameter_scale = system.parameter_scales.get(free).copied().unwrap_or(1.0);
     Setting {
         field: system.field,
         scales: &system.scales,
         parameters: parameters.to_vec(),
-        axes: vec![Axis::new(free, parameter_scale)],
+        axes: vec![Axis::new(free, system.unit(free))],
     }
 }
 
@@ -282,6 +283,7 @@ const WHOLE: usize = 3;
 impl Growth<'_> {
     /// Follows a new branch. Returns false if the observer wants to stop.
     pub fn begin(&self, branch: &mut Branch, beginning: Beginning) -> bool {
+        branch.units = [branch.held.map_or(1.0, |(_, first)| self.system.unit(first)), self.system.unit(branch.free)];
         let mut going = self.tell(Event::Begin(branch));
         match beginning {
             Beginning::Inside(mut start) => {
@@ -448,12 +450,14 @@ impl Growth<'_> {
                 (monitors, at.map(|at| shrinks(&system, first, at)).into_iter().collect())
             }
         };
-        let marks: Vec<Box<dyn Monitor>> = self.marks.iter().map(|mark| Box::new(*mark) as Box<dyn Monitor>).collect();
+        let marks: Vec<Box<dyn Monitor>> =
+            self.marks.iter().map(|mark| Box::new(mark.of_size(system.size_of(mark.quantity))) as _).collect();
         let home = branch.points.iter().find(|p| p.position == 0).filter(|_| branch.ends[0].is_none()).cloned();
         let limits = Limits {
             field: system.field,
             free: branch.free,
             scales: &system.scales,
+            unit: system.unit(branch.free),
             tolerance: self.settings.tolerance,
         };
         let free_cycles = branch.held.is_none() && !system.field.forced();
@@ -538,7 +542,7 @@ impl Growth<'_> {
         let own = self.marks.iter().filter(|mark| mark.quantity == Quantity::Parameter(branch.free));
         let off = |mark: &Mark| (mark.value - special.point.parameters[branch.free]).abs();
         let near =
-            own.filter(|mark| off(mark) <= SAME * (1.0 + mark.value.abs())).min_by(|a, b| off(a).total_cmp(&off(b)));
+            own.filter(|mark| off(mark) <= SAME * branch.size(mark.value)).min_by(|a, b| off(a).total_cmp(&off(b)));
         let Some(mark) = near.filter(|_| special.kind == Kind::Mark && branch.held.is_none()) else { return };
         let mut there = special.point.clone();
         there.parameters[branch.free] = mark.value;
@@ -570,7 +574,8 @@ impl Growth<'_> {
                     && let Some(Solution::Equilibrium(x)) = before.map(|point| &point.solution)
                 {
                     // The tangent there may be one between those of both branches.
-                    let gap = |point: &Point| special.point.parameters[branch.free] - point.parameters[branch.free];
+                    let change = |point: &Point| special.point.parameters[branch.free] - point.parameters[branch.free];
+                    let gap = |point: &Point| change(point) / own.unit();
                     at.tangent = there.iter().zip(x).map(|(a, b)| a - b).chain(before.map(gap)).collect();
                 }
                 special::normal_form::coefficients(
@@ -586,6 +591,10 @@ impl Growth<'_> {
     }
 
     fn end(&self, branch: &mut Branch, side: usize, ending: Ending) -> bool {
+        let ending = match ending {
+            Ending::Joined { at, parameter } => Ending::Joined { at, parameter: branch.rounded(parameter) },
+            other => other,
+        };
         branch.ends[side] = Some(ending.clone());
         self.tell(Event::SideEnded(branch, side, &ending))
     }
@@ -623,7 +632,10 @@ fn collapses<'a>(branch: &Branch, system: &'a System) -> Vec<Box<dyn Monitor + '
         }
     }
     if branch.family == Family::Cycle {
-        all.push(Box::new(collapse::Halves { born: is_doubled(branch) || lasts_even_periods(branch) }));
+        all.push(Box::new(collapse::Halves {
+            scales: &system.scales,
+            born: is_doubled(branch) || lasts_even_periods(branch),
+        }));
     }
     if branch.family == Family::Cycle && !system.field.forced() {
         all.push(shrinks(system, branch.free, Kind::Hopf));
@@ -650,5 +662,5 @@ fn limit_of_small_cycles(branch: &Branch, held: Kind) -> Option<Kind> {
 
 /// Where cycles shrink to an equilibrium.
 fn shrinks<'a>(system: &'a System, free: usize, at: Kind) -> Box<dyn Monitor + 'a> {
-    Box::new(collapse::Shrinks { field: system.field, free, scales: &system.scales, at })
+    Box::new(collapse::Shrinks { field: system.field, free, unit: system.unit(free), scales: &system.scales, at })
 }

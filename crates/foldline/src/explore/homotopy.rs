@@ -21,7 +21,7 @@ use super::plan::{HomotopyPlan, Plan};
 use super::{System, family};
 use crate::continuation::Settings;
 use crate::contract::{Event, Observer, Verdict};
-use crate::diagram::{Branch, Diagram, Ending, Family, Kind, Origin, Point, Solution, SpecialPoint};
+use crate::diagram::{Branch, Diagram, Ending, Family, Kind, Origin, Point, Shown, Solution, SpecialPoint};
 use crate::problem::Tie;
 
 /// Places along the family from which the direct run is tried.
@@ -141,7 +141,7 @@ impl Course {
     }
 
     fn arrives(&self, point: &Point) -> bool {
-        (point.parameters[self.free] - self.to).abs() <= 1e-9 * (1.0 + self.to.abs())
+        (point.parameters[self.free] - self.to).abs() <= 1e-9 * (self.to - self.from).abs()
     }
 }
 
@@ -290,23 +290,24 @@ impl Planner<'_> {
         let end = [curve.points.first(), curve.points.last()].into_iter().flatten().find(|p| course.arrives(p));
         let Some(end) = end else {
             let best = 100.0 * curve.points.iter().map(|p| course.share(p)).fold(0.0, f64::max);
-            let bound = |end: &Ending| matches!(end, Ending::Bound(value) if (value - course.from).abs() < 1e-9);
+            let bound = |end: &Ending| matches!(end, Ending::Bound(value) if (value - course.from).abs() < 1e-9 * (course.to - course.from).abs());
             let turned = curve.ends.iter().flatten().all(|end| bound(end) || *end == Ending::Closed);
             self.open |= !turned;
             let meets = |end: &Point| {
                 let place = end.parameters[via];
-                let here = |s: &SpecialPoint| (s.point.parameters[via] - place).abs() < 1e-4 * (1.0 + place.abs());
+                let size = self.system.unit(via) + place.abs();
+                let here = |s: &SpecialPoint| (s.point.parameters[via] - place).abs() < 1e-4 * size;
                 family.is_some_and(|f| f.special.iter().any(|s| s.kind == Kind::Fold && here(s)))
             };
             let ends = [curve.points.first(), curve.points.last()];
             self.shrinks |= turned && ends.into_iter().flatten().all(meets);
             let how = if turned { "turns back".into() } else { format!("ends short ({})", ending(&curve)) };
-            let why = format!("the fold at {place:.6} {how} after {best:.1} % of the way");
+            let why = format!("the fold at {:.6} {how} after {best:.1} % of the way", Shown(place));
             self.note(&why);
             return Err(why);
         };
         let point = self.beside(end).inspect_err(|why| self.note(why))?;
-        self.note(&format!("arrived along the fold, from {place:.6} to {:.6}", end.parameters[via]));
+        self.note(&format!("arrived along the fold, from {:.6} to {:.6}", Shown(place), Shown(end.parameters[via])));
         Ok(point)
     }
 

@@ -93,7 +93,7 @@ pub fn run_from(
 ) -> Diagram {
     let observer = &Heeded::new(observer);
     let field = Interruptible::new(system.field, observer);
-    let system = &System { field: &field, ..system.clone() };
+    let system = &System { field: &field, ..system.clone() }.in_units_of(&earlier);
     let seeds = Seeds::new(system, plan, jobs, &earlier, given, observer);
     let families = family::roots(plan);
     let done: Vec<Mutex<Vec<Branch>>> = families.iter().map(|_| Mutex::new(Vec::new())).collect();

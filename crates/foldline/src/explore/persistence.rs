@@ -93,7 +93,7 @@ fn decided(branch: &Branch, value: f64, forward: bool, unstable: usize) -> Persi
     if let Some(fold) = if forward { folds.next() } else { folds.next_back() } {
         return Persistence::Vanishes { fold: fold.point.parameters[branch.free] };
     }
-    let arrived = |bound: f64| (bound - value).abs() <= 1e-9 * (1.0 + value.abs());
+    let arrived = |bound: f64| (bound - value).abs() <= 1e-9 * branch.size(value);
     match (&ending, end) {
         (Ending::Bound(bound), Some(end)) if arrived(*bound) => {
             let at = Box::new(end.clone());

@@ -138,7 +138,7 @@ fn exchanges_stability(at: &SpecialPoint, free: usize, found: &Station) -> bool 
     let rising = at.point.parameter_slope() > 0.0;
     let (below, above) =
         if rising { (at.unstable_before, at.unstable_after) } else { (at.unstable_after, at.unstable_before) };
-    let own = if found.parameter() > at.point.parameters[free] { above } else { below };
+    let own = if found.point.parameters[free] > at.point.parameters[free] { above } else { below };
     let fewer = below.min(above);
     found.point.unstable == if own > fewer { fewer } else { fewer + 1 }
 }
@@ -215,6 +215,7 @@ pub fn doubled_edge(system: &System, free: usize, at: &SpecialPoint, next: &Poin
             discretisation: once.trust.discretisation.max(at.error),
             residual: once.trust.residual,
             spectrum: 2.0 * once.trust.spectrum,
+            slope: once.trust.slope,
         },
     };
     Some(problem.point(&base, &tangent, examination))

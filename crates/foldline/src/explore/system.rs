@@ -2,8 +2,11 @@
 
 use super::plan::{ExplorePlan, Plan};
 use crate::contract::{Batch, Parameters, VectorField};
+use crate::diagram::Diagram;
 use crate::model::Model;
+use crate::model::Parameter;
 use crate::model::forcing::unrepeated;
+use crate::special::quantity::Quantity;
 use crate::special::unfolded::Unfolded;
 
 /// A vector field, its scales, and where to look for attractors.
@@ -53,12 +56,7 @@ impl<'a> System<'a> {
         let mut system = System {
             state_names: model.states.iter().map(|s| s.name.clone()).collect(),
             scales: model.states.iter().map(|s| s.scale).collect(),
-            // A parameter that is zero says nothing about its size.
-            parameter_scales: model
-                .parameters
-                .iter()
-                .map(|p| if p.value == 0.0 { 1.0 } else { p.value.abs() })
-                .collect(),
+            parameter_scales: System::sized(model, &Plan::empty(1.0, 1)),
             ranges: model.states.iter().map(|s| s.range).collect(),
             whirl: model.whirl,
             ..System::new(model)
@@ -83,20 +81,51 @@ impl<'a> System<'a> {
             let mut kept = kept.into_iter();
             common.mirrors.retain(|_| kept.next().unwrap_or(true));
         }
-        common
+        System { parameter_scales: System::sized(model, plan), ..common }
     }
 
-    /// The same with sizes of the parameters that fit the box of an exploration: where a model gives a parameter a value that is
-    /// far smaller or larger than the range in which it varies, or none, steps would not fit the range.
-    pub(super) fn in_box(&self, exploration: &ExplorePlan) -> System<'a> {
-        const LEAST: f64 = 0.05;
-        let mut system = self.clone();
-        for (index, [low, high]) in exploration.connect.into_iter().chain([(exploration.free, exploration.range)]) {
-            if let Some(scale) = system.parameter_scales.get_mut(index) {
-                *scale = scale.clamp(LEAST * (high - low), high - low);
+    /// Characteristic size of a parameter.
+    pub fn unit(&self, index: usize) -> f64 {
+        self.parameter_scales.get(index).copied().unwrap_or(1.0)
+    }
+
+    /// Characteristic size of a quantity: that of its parameter or state, 1 for outputs and integrals, 0 for the period, which is itself one.
+    pub(super) fn size_of(&self, quantity: Quantity) -> f64 {
+        let state = |k: usize| self.scales.get(k).copied().unwrap_or(1.0);
+        match quantity {
+            Quantity::Parameter(index) => self.unit(index),
+            Quantity::Smallest(k) | Quantity::Largest(k) | Quantity::Mean(k) | Quantity::Rms(k) => state(k),
+            Quantity::Norm(_) => self.scales.iter().fold(0.0, |most, scale| scale.max(most)),
+            Quantity::Integral(_) => 1.0,
+            Quantity::Period => 0.0,
+        }
+    }
+
+    /// The same with the units in which the tangents of a diagram are, so that its branches can be continued.
+    pub fn in_units_of(mut self, diagram: &Diagram) -> System<'a> {
+        for branch in diagram.branches.iter().filter(|branch| !branch.points.is_empty()) {
+            let held = branch.held.map(|(_, first)| first);
+            for (index, unit) in held.into_iter().chain([branch.free]).zip(&branch.units[usize::from(held.is_none())..])
+            {
+                self.parameter_scales.iter_mut().skip(index).take(1).for_each(|own| *own = *unit);
             }
         }
-        system
+        self
+    }
+
+    /// The size of every parameter `[k]` in a plan: as declared, else |value|, but no less than a quarter of the range in which the plan
+    /// varies it, so that a branch need not take many more steps than the solution asks for, and no more than that range, which a step would
+    /// leave.
+    fn sized(model: &Model, plan: &Plan) -> Vec<f64> {
+        const LEAST: f64 = 0.25;
+        let widths = widths(model, plan);
+        let size = |(own, width): (&Parameter, &f64)| match own.scale {
+            Some(scale) => scale,
+            None if *width > 0.0 => own.value.abs().clamp(LEAST * width, *width),
+            None if own.value == 0.0 => 1.0,
+            None => own.value.abs(),
+        };
+        model.parameters.iter().zip(&widths).map(size).collect()
     }
 
     /// That a forced field repeats itself at these parameters `[k]` and at others, each of them anywhere in its range.
@@ -176,6 +205,32 @@ impl<'a> System<'a> {
         self.reflections.extend(found);
         self.mirrors = mirrors;
     }
+}
+
+/// By how much a plan varies each parameter `[k]`; 0 where it does not.
+fn widths(model: &Model, plan: &Plan) -> Vec<f64> {
+    let mut ends: Vec<[f64; 2]> = vec![[f64::INFINITY, f64::NEG_INFINITY]; model.parameters.len()];
+    let mut reaches = |index: usize, values: [f64; 2]| {
+        for value in values.into_iter().filter(|value| value.is_finite()) {
+            if let Some([low, high]) = ends.get_mut(index) {
+                (*low, *high) = (low.min(value), high.max(value));
+            }
+        }
+    };
+    for branch in &plan.branches {
+        reaches(branch.free, branch.range);
+    }
+    for curve in &plan.curves {
+        reaches(curve.free, curve.ranges[1]);
+    }
+    for homotopy in &plan.homotopies {
+        reaches(homotopy.via, homotopy.range);
+    }
+    for exploration in &plan.explorations {
+        reaches(exploration.free, exploration.range);
+        exploration.connect.into_iter().for_each(|(second, range)| reaches(second, range));
+    }
+    ends.iter().map(|[low, high]| (high - low).max(0.0)).collect()
 }
 
 /// The parameters of an exploration, those that it changes replaced by values inside their ranges.

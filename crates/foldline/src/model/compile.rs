@@ -223,6 +223,10 @@ impl<'a> Check<'a> {
             if !parameter.value.is_finite() {
                 self.report(Item::Parameter(i), Field::Value, "the value is not a finite number", "write a number");
             }
+            if let Some(scale) = parameter.scale.filter(|scale| !(*scale > 0.0 && scale.is_finite())) {
+                let hint = "write the characteristic size of this parameter, a positive number";
+                self.report(Item::Parameter(i), Field::Scale, format!("the scale {scale} is not positive"), hint);
+            }
         }
         for (i, state) in self.source.states.iter().enumerate() {
             if !(state.scale > 0.0 && state.scale.is_finite()) {

@@ -11,6 +11,8 @@ pub struct Parameter {
     pub description: String,
     /// Its value unless a study says otherwise.
     pub value: f64,
+    /// Characteristic size, positive; where none is given it follows from the value and the ranges of a study.
+    pub scale: Option<f64>,
 }
 
 /// A state component.
@@ -87,7 +89,7 @@ pub struct ModelSource {
 impl Parameter {
     /// A parameter without unit and description.
     pub fn new(name: &str, value: f64) -> Parameter {
-        Parameter { name: name.into(), unit: "1".into(), description: String::new(), value }
+        Parameter { name: name.into(), unit: "1".into(), description: String::new(), value, scale: None }
     }
 }
 

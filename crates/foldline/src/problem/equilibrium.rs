@@ -73,6 +73,10 @@ impl ZeroProblem for EquilibriumProblem<'_> {
         self.first() + self.setting.freedom()
     }
 
+    fn unit(&self) -> f64 {
+        self.setting.unit()
+    }
+
     fn anchor(&mut self, u: &[f64]) {
         for (scale, (own, x)) in self.scale.iter_mut().zip(self.setting.scales.iter().zip(u)) {
             *scale = own + x.abs();
@@ -111,11 +115,8 @@ impl ZeroProblem for EquilibriumProblem<'_> {
             for i in 0..n {
                 line[i] = row[i] / (self.scale[i] * self.scale[i] * n as f64);
             }
-            // (b is a relative number.)
-            line[n..first].copy_from_slice(&row[n..first]);
-            for (a, axis) in self.setting.axes.iter().enumerate() {
-                line[first + a] = row[first + a] / (axis.scale * axis.scale);
-            }
+            // (b and λ are relative numbers.)
+            line[n..].copy_from_slice(&row[n..]);
         }
         lu::factorise(&mut self.matrix, size, &mut self.pivots)
     }
@@ -128,14 +129,13 @@ impl ZeroProblem for EquilibriumProblem<'_> {
     fn dot(&self, a: &[f64], b: &[f64]) -> f64 {
         let n = self.n();
         let profile: f64 = (0..n).map(|i| a[i] * b[i] / (self.scale[i] * self.scale[i])).sum();
-        let first = self.first();
-        profile / n as f64 + dot(&a[n..first], &b[n..first]) + self.setting.dot(&a[first..], &b[first..])
+        profile / n as f64 + dot(&a[n..], &b[n..])
     }
 
     fn relative_size(&self, du: &[f64], u: &[f64]) -> f64 {
         let (n, first) = (self.n(), self.first());
         let states = (0..n).map(|i| (du[i] / (self.setting.scales[i] + u[i].abs())).abs());
-        let free = larger(self.setting.relative_size(&du[first..], &u[first..]), max_abs(&du[n..first]));
+        let free = larger(Setting::relative_size(&du[first..], &u[first..]), max_abs(&du[n..first]));
         states.fold(free, larger)
     }
 
@@ -164,9 +164,8 @@ impl ZeroProblem for EquilibriumProblem<'_> {
         let unstable = spectrum.iter().filter(|z| z.re > 0.0).count();
         // Next to where f_x vanishes f still changes with the parameters.
         let free = self.setting.freedom();
-        let by_free = (0..self.n() * free).fold(0.0, |most: f64, k| {
-            most.max((self.fp[k] * self.setting.axes[k % free].scale / self.scale[k / free]).abs())
-        });
+        let by_free =
+            (0..self.n() * free).fold(0.0, |most: f64, k| most.max((self.fp[k] / self.scale[k / free]).abs()));
         let unfolded = self.unfolding.as_ref().map_or(f64::MIN_POSITIVE, |own| own.rate);
         let rate = max_abs(&self.fx).max(1e-6 * by_free).max(unfolded).max(f64::MIN_POSITIVE);
         let residual = (0..n).map(|i| (self.f[i] / (rate * self.scale[i])).abs()).fold(0.0, f64::max);
@@ -209,7 +208,7 @@ impl ZeroProblem for EquilibriumProblem<'_> {
             Solution::Cycle(cycle) => cycle.state(0.0),
         };
         u.resize(self.first(), 0.0);
-        u.extend(self.setting.values_of(point));
+        u.extend(self.setting.unknowns_of(point));
         u
     }
 

@@ -199,6 +199,10 @@ impl ZeroProblem for Held<'_> {
         self.extra() + self.surface.unknowns()
     }
 
+    fn unit(&self) -> f64 {
+        self.surface.unit()
+    }
+
     fn anchor(&mut self, u: &[f64]) {
         let e = self.extra();
         self.surface.anchor(&u[e..]);

@@ -3,10 +3,10 @@
 use crate::contract::{Batch, VectorField};
 use crate::diagram::Point;
 
-/// A free parameter of a curve.
+/// A free parameter p of a curve. Its unknown is λ = p / scale, so that nothing depends on the unit of p.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Axis {
-    /// Index of the parameter; beyond the last one, λ is a number on which nothing depends.
+    /// Index of the parameter; beyond the last one, p is a number on which nothing depends.
     pub index: usize,
     /// Characteristic size.
     pub scale: f64,
@@ -21,14 +21,14 @@ impl Axis {
     }
 }
 
-/// A parameter that follows a free one: p = offset + slope λ.
+/// A parameter q that follows a free one p: q = offset + slope p.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tie {
     /// Index of the parameter that follows.
     pub index: usize,
-    /// Its value at λ = 0.
+    /// Its value at p = 0.
     pub offset: f64,
-    /// dp/dλ.
+    /// dq/dp.
     pub slope: f64,
 }
 
@@ -51,12 +51,18 @@ impl Setting<'_> {
         self.axes.len()
     }
 
-    /// All parameter values with the free ones at `values` `[k]`.
-    pub fn at(&self, values: &[f64]) -> Vec<f64> {
+    /// Value of the last free parameter for which its unknown is 1; that of the continuation.
+    pub fn unit(&self) -> f64 {
+        self.axes.last().map_or(1.0, |axis| axis.scale)
+    }
+
+    /// All parameter values with the free ones at `unknowns` `[k]`.
+    pub fn at(&self, unknowns: &[f64]) -> Vec<f64> {
         let mut all = self.parameters.clone();
-        for (axis, value) in self.axes.iter().zip(values) {
+        for (axis, unknown) in self.axes.iter().zip(unknowns) {
+            let value = axis.scale * unknown;
             if let Some(own) = all.get_mut(axis.index) {
-                *own = *value;
+                *own = value;
             }
             for tie in &axis.ties {
                 if let Some(own) = all.get_mut(tie.index) {
@@ -67,15 +73,17 @@ impl Setting<'_> {
         all
     }
 
-    /// The free parameters `[k]` of a point.
-    pub fn values_of(&self, point: &Point) -> Vec<f64> {
-        self.axes.iter().map(|axis| point.parameters.get(axis.index).copied().unwrap_or(0.0)).collect()
+    /// The unknowns `[k]` at a point.
+    pub fn unknowns_of(&self, point: &Point) -> Vec<f64> {
+        let each = self.axes.iter().map(|axis| point.parameters.get(axis.index).copied().unwrap_or(0.0) / axis.scale);
+        each.collect()
     }
 
-    /// A change `[k]` of the free parameters as one of all parameters.
+    /// A change `[k]` of the unknowns as one of all parameters.
     pub fn spread(&self, change: &[f64]) -> Vec<f64> {
         let mut all = vec![0.0; self.parameters.len()];
-        for (axis, value) in self.axes.iter().zip(change) {
+        for (axis, unknown) in self.axes.iter().zip(change) {
+            let value = axis.scale * unknown;
             if let Some(own) = all.get_mut(axis.index) {
                 *own += value;
             }
@@ -88,19 +96,23 @@ impl Setting<'_> {
         all
     }
 
-    /// f, f_x and the derivatives along the free parameters: `fp` is `[n·k × lanes]`, entry (i, axis) at i·k + axis.
+    /// f, f_x and the derivatives with respect to the unknowns: `fp` is `[n·k × lanes]`, entry (i, axis) at i·k + axis.
     pub fn linearise(&self, batch: Batch, f: &mut [f64], fx: &mut [f64], fp: &mut [f64]) {
         let known = self.parameters.len();
         let plain = self.axes.iter().all(|axis| axis.ties.is_empty() && axis.index < known);
         let mut columns: Vec<(usize, usize, f64)> = Vec::new();
         for (a, axis) in self.axes.iter().enumerate() {
-            let own = [(a, axis.index, 1.0)].into_iter();
-            let tied = axis.ties.iter().map(|tie| (a, tie.index, tie.slope));
+            let own = [(a, axis.index, axis.scale)].into_iter();
+            let tied = axis.ties.iter().map(|tie| (a, tie.index, tie.slope * axis.scale));
             columns.extend(own.chain(tied).filter(|(_, index, _)| *index < known));
         }
         let free: Vec<usize> = columns.iter().map(|(_, index, _)| *index).collect();
         if plain {
             self.field.linearise(batch, &free, f, fx, fp);
+            let (k, scaled) = (self.axes.len(), self.axes.iter().any(|axis| axis.scale != 1.0));
+            for (c, entry) in fp.chunks_exact_mut(batch.lanes).enumerate().filter(|_| scaled) {
+                entry.iter_mut().for_each(|d| *d *= self.axes[c % k].scale);
+            }
             return;
         }
         let (n, k, q, lanes) = (self.field.dim(), self.axes.len(), columns.len(), batch.lanes);
@@ -116,15 +128,9 @@ impl Setting<'_> {
         }
     }
 
-    /// Σ aᵢ bᵢ / scaleᵢ² over the free parameters.
-    pub(super) fn dot(&self, a: &[f64], b: &[f64]) -> f64 {
-        self.axes.iter().zip(a.iter().zip(b)).map(|(axis, (x, y))| x * y / (axis.scale * axis.scale)).sum()
-    }
-
-    /// Largest change of a free parameter against its size, with the scale as the least size.
-    pub(super) fn relative_size(&self, change: &[f64], values: &[f64]) -> f64 {
-        let each = self.axes.iter().zip(change.iter().zip(values));
-        each.map(|(axis, (d, v))| (d / (axis.scale + v.abs())).abs())
-            .fold(0.0, |m: f64, x| if x > m || x.is_nan() { x } else { m })
+    /// Largest change of an unknown against its size, with 1 as the least size.
+    pub(super) fn relative_size(change: &[f64], unknowns: &[f64]) -> f64 {
+        let each = change.iter().zip(unknowns).map(|(d, v)| (d / (1.0 + v.abs())).abs());
+        each.fold(0.0, |m: f64, x| if x > m || x.is_nan() { x } else { m })
     }
 }

@@ -50,8 +50,8 @@ impl Unfolding {
             q.iter().zip(scales).map(|(q, s)| q * s).chain(vec![0.0; setting.parameters.len()]).collect();
         // How fast f_x q changes over the scales: all that there is of f_x where n is 1.
         let mut changes = vec![along.clone()];
-        for (a, axis) in setting.axes.iter().enumerate() {
-            let unit: Vec<f64> = (0..setting.freedom()).map(|k| if k == a { axis.scale } else { 0.0 }).collect();
+        for a in 0..setting.freedom() {
+            let unit: Vec<f64> = (0..setting.freedom()).map(|k| f64::from(u8::from(k == a))).collect();
             changes.push([vec![0.0; n], setting.spread(&unit)].concat());
         }
         let rate = changes.iter().fold(max_abs(&scaled), |most, change| {

@@ -6,7 +6,7 @@
 //!   (2)  F_u φ = 0, φ ⊥ tangent:  direction into the plane that both branches span
 
 use crate::contract::{Monitor, ZeroProblem};
-use crate::diagram::{Kind, Point, Solution};
+use crate::diagram::{FLAT, Kind, Point, Solution};
 use num_complex::Complex64;
 
 /// An eigenvalue 0 (a multiplier 1) without a fold.
@@ -44,7 +44,7 @@ impl Monitor for BranchPoint {
         let closest =
             self.spectrum_without_symmetry(at).iter().map(|z| (z - centre).norm()).fold(f64::INFINITY, f64::min);
         // A single eigenvalue cannot be compared with others.
-        (closest < 1e-2 * largest || at.spectrum.len() == 1) && at.parameter_slope().abs() > 1e-6
+        (closest < 1e-2 * largest || at.spectrum.len() == 1) && at.parameter_slope().abs() > FLAT
     }
 
     fn jump(&self) -> usize {

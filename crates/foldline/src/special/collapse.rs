@@ -20,6 +20,8 @@ pub struct Shrinks<'a> {
     pub field: &'a dyn VectorField,
     /// Index of the parameter along which the Hopf point is looked for.
     pub free: usize,
+    /// Scale of that parameter.
+    pub unit: f64,
     /// `[n]` characteristic sizes of the states.
     pub scales: &'a [f64],
     /// What lies there: a Hopf point, or, on a curve of folds, a generalised one.
@@ -31,7 +33,7 @@ impl Shrinks<'_> {
     fn hopf_point(&self, at: &Point) -> Option<f64> {
         let Solution::Cycle(cycle) = &at.solution else { return None };
         let mean = Shrinks::mean(&cycle.uniform(SAMPLES), cycle.dim());
-        hopf::lies_near(self.field, &at.parameters, self.free, self.scales, &mean, TAU / cycle.period)
+        hopf::lies_near(self.field, &at.parameters, self.free, self.unit, self.scales, &mean, TAU / cycle.period)
     }
 
     fn mean(x: &[f64], n: usize) -> Vec<f64> {
@@ -42,7 +44,9 @@ impl Shrinks<'_> {
 }
 
 /// Difference between the halves of a cycle: vanishes where it becomes a cycle of half the period.
-pub struct Halves {
+pub struct Halves<'a> {
+    /// `[n]` characteristic sizes of the states.
+    pub scales: &'a [f64],
     /// Whether the branch is known to have begun by period doubling. On any other one halves that differ much are not compared.
     pub born: bool,
 }
@@ -50,7 +54,7 @@ pub struct Halves {
 /// Difference between the halves of a cycle, as a share of its extent, up to which they are nearly the same.
 pub const NEARLY: f64 = 0.3;
 
-impl Halves {
+impl Halves<'_> {
     fn comparable(&self, at: &Point) -> bool {
         let Solution::Cycle(cycle) = &at.solution else { return false };
         if self.born {
@@ -81,9 +85,9 @@ impl Monitor for Shrinks<'_> {
             && a.degree == b.degree
             && mesh::same(&a.mesh, &b.mesh)
         {
-            return on_one_mesh(a, b, &extents(reference, a.dim()));
+            return on_one_mesh(a, b, &extents(reference, self.scales));
         }
-        compare(reference, at, |x, n| {
+        compare(reference, at, self.scales, |x, n| {
             let mean = Shrinks::mean(x, n);
             x.iter().enumerate().map(|(k, v)| v - mean[k % n]).collect()
         })
@@ -162,7 +166,7 @@ impl Monitor for Mirrors {
     }
 }
 
-impl Monitor for Halves {
+impl Monitor for Halves<'_> {
     fn kind(&self) -> Kind {
         Kind::PeriodDoubling
     }
@@ -171,7 +175,7 @@ impl Monitor for Halves {
         if !self.comparable(reference) {
             return 1.0;
         }
-        compare(reference, at, |x, _| {
+        compare(reference, at, self.scales, |x, _| {
             let half = x.len() / 2;
             (0..half).map(|k| x[k + half] - x[k]).collect()
         })
@@ -224,14 +228,18 @@ fn mean_share(own: &[[f64; 2]], extents: &[f64]) -> f64 {
     total / f64::from(count.max(1))
 }
 
-/// Extents of the states of a cycle, the units of their deviations.
-fn extents(at: &Point, n: usize) -> Vec<f64> {
+/// Share of its scale that Newton's method may leave of a state that is zero.
+const LEFT: f64 = 1e-8;
+
+/// Extents of the states of a cycle, the units of their deviations. A state that is zero all along, as on an invariant plane, has that of its
+/// errors.
+fn extents(at: &Point, scales: &[f64]) -> Vec<f64> {
     let of = |c: usize| at.ranges.get(c).map_or(1.0, |[low, high]| (high - low).max(low.abs()).max(high.abs()));
-    (0..n).map(|c| of(c).max(f64::MIN_POSITIVE)).collect()
+    scales.iter().enumerate().map(|(c, scale)| of(c).max(LEFT * scale)).collect()
 }
 
 /// Inner product of the deviations of both points, relative to that of the reference.
-fn compare(reference: &Point, at: &Point, deviation: impl Fn(&[f64], usize) -> Vec<f64>) -> f64 {
+fn compare(reference: &Point, at: &Point, scales: &[f64], deviation: impl Fn(&[f64], usize) -> Vec<f64>) -> f64 {
     let (Solution::Cycle(a), Solution::Cycle(b)) = (&reference.solution, &at.solution) else { return 1.0 };
     let n = a.dim();
     let da = deviation(&a.uniform(SAMPLES), n);
@@ -243,5 +251,5 @@ fn compare(reference: &Point, at: &Point, deviation: impl Fn(&[f64], usize) -> V
         let sum = &mut sums[k % n];
         *sum = [sum[0] + x * x, sum[1] + x * y];
     }
-    mean_share(&sums, &extents(reference, n))
+    mean_share(&sums, &extents(reference, scales))
 }

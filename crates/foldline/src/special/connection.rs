@@ -17,7 +17,7 @@
 //! **Source.** kuznetsov2004, §6.1 (passage near a saddle) and §7.1 (saddle-node on an invariant circle).
 
 use crate::contract::{Batch, Parameters, VectorField};
-use crate::diagram::{Connection, Cycle, Ending, Point, Solution};
+use crate::diagram::{Connection, Cycle, Ending, Point, Shown, Solution};
 use crate::linalg::{dot, lu};
 use crate::problem::gauss::Scheme;
 use crate::stability::eigenvalues;
@@ -47,6 +47,8 @@ pub struct Limits<'a> {
     pub free: usize,
     /// `[n]` characteristic sizes of the states.
     pub scales: &'a [f64],
+    /// Scale of that parameter.
+    pub unit: f64,
     /// Relative accuracy of parameters.
     pub tolerance: f64,
 }
@@ -113,7 +115,7 @@ impl Limits<'_> {
             left.retain(|node| !near(node));
         }
         let kind = if met.len() == 1 { Connection::Homoclinic } else { Connection::Heteroclinic };
-        (spent > MOST).then(|| (kind, met.iter().map(|x| place(x)).collect::<Vec<_>>().join(", ")))
+        (spent > MOST).then(|| (kind, met.iter().map(|x| self.place(x)).collect::<Vec<_>>().join(", ")))
     }
 
     /// The equilibrium to which Newton's method converges from a state.
@@ -184,7 +186,7 @@ impl Limits<'_> {
             x.iter_mut().zip(&right).for_each(|(x, d)| *x -= d);
             at[self.free] -= right[n];
             v.iter_mut().zip(&right[n + 1..]).for_each(|(v, d)| *v -= d);
-            let moved = self.relative(&right[..n], &x).max(right[n].abs() / (1.0 + at[self.free].abs()));
+            let moved = self.relative(&right[..n], &x).max(right[n].abs() / (self.unit + at[self.free].abs()));
             if !moved.is_finite() {
                 return None;
             }
@@ -193,7 +195,7 @@ impl Limits<'_> {
             }
         }
         let (there, here) = (at[self.free], parameters[self.free]);
-        let near = (there - here).abs() <= self.tolerance * (1.0 + there.abs());
+        let near = (there - here).abs() <= self.tolerance * (self.unit + there.abs());
         if !near || distance(&x, &slowest.x, extents) > BALL {
             return None;
         }
@@ -202,7 +204,15 @@ impl Limits<'_> {
         let along = self.derivative(&x, &at, &[&self.along_parameter(n)]);
         let product = 0.5 * dot(&w, &along) * dot(&w, &bent) / dot(&w, &v).powi(2);
         let time = PI / (product * (here - there)).sqrt();
-        (time.is_finite() && fits(period, time)).then(|| (Connection::SaddleNode, there, place(&x)))
+        (time.is_finite() && fits(period, time)).then(|| (Connection::SaddleNode, there, self.place(&x)))
+    }
+
+    /// A state in words.
+    fn place(&self, x: &[f64]) -> String {
+        // Of what is zero only rounding is left.
+        let rounded = |(x, scale): (&f64, &f64)| if x.abs() < 1e-9 * scale { 0.0 } else { *x };
+        let all = x.iter().zip(self.scales).map(|pair| format!("{:.6}", Shown(rounded(pair))));
+        format!("({})", all.collect::<Vec<_>>().join(", "))
     }
 
     /// The null vector of f_x, or of its transpose (`left`), by inverse iteration; of unit length in scaled states, the left one in the
@@ -280,10 +290,6 @@ fn passes(nodes: &[Node], near: &dyn Fn(&Node) -> bool) -> f64 {
 
 fn fits(measured: f64, expected: f64) -> bool {
     measured < FACTOR * expected && expected < FACTOR * measured
-}
-
-fn place(x: &[f64]) -> String {
-    format!("({})", x.iter().map(|x| format!("{x:.6}")).collect::<Vec<_>>().join(", "))
 }
 
 #[cfg(test)]

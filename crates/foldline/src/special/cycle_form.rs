@@ -117,7 +117,7 @@ fn evaluated<'a>(kind: Kind, setting: Setting<'a>, at: &Point) -> Option<(OnCycl
     let own = if cycle.forcing_periods > 0 { f64::from(cycle.forcing_periods) } else { cycle.period };
     let mut u = cycle.profile.clone();
     u.push(own);
-    u.extend(setting.values_of(at));
+    u.extend(setting.unknowns_of(at));
     let mut condition = OnCycles::new(kind, setting, cycle)?;
     let extra = condition.guess(at);
     let mut g = vec![0.0; 1 + extra.len()];

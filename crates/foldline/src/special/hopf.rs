@@ -81,7 +81,7 @@ const NEXT: f64 = 1e-6;
 /// well before the fold.
 const SHORTER: i32 = 8;
 
-/// Largest distance of a Hopf point from a small cycle, relative to 1 + |parameter|.
+/// Largest distance of a Hopf point from a small cycle, relative to the scale of the parameter + |parameter|.
 const REACH: f64 = 1e-2;
 
 /// Parameter value of the Hopf point of the equilibrium next to `state`: the value of parameter `free` at which the growth rate of the pair
@@ -90,6 +90,7 @@ pub fn lies_near(
     field: &dyn VectorField,
     parameters: &[f64],
     free: usize,
+    unit: f64,
     scales: &[f64],
     state: &[f64],
     omega: f64,
@@ -105,7 +106,7 @@ pub fn lies_near(
         Some(rate)
     };
     // Secant steps along the parameter: the rate is smooth, and all that counts is whether its zero is close.
-    let reach = REACH * (1.0 + value.abs());
+    let reach = REACH * (unit + value.abs());
     let (mut a, mut b) = (value, value + NEXT * reach);
     let (mut at_a, mut at_b) = (growth(a)?, growth(b)?);
     for _ in 0..20 {

@@ -15,13 +15,26 @@ pub struct Mark {
     pub stop: bool,
 }
 
-impl Monitor for Mark {
+impl Mark {
+    /// The monitor of this mark; `size` is the characteristic size of its quantity.
+    pub fn of_size(self, size: f64) -> Sought {
+        Sought { mark: self, size }
+    }
+}
+
+/// A mark that is looked for.
+pub struct Sought {
+    mark: Mark,
+    size: f64,
+}
+
+impl Monitor for Sought {
     fn kind(&self) -> Kind {
         Kind::Mark
     }
 
     fn value(&self, _reference: &Point, at: &Point) -> f64 {
-        self.quantity.of(at).map_or(f64::NAN, |own| own - self.value)
+        self.mark.quantity.of(at).map_or(f64::NAN, |own| own - self.mark.value)
     }
 
     fn confirms(&self, _at: &Point) -> bool {
@@ -38,7 +51,8 @@ impl Monitor for Mark {
 
     fn ending(&self, at: &Point, _parameter: f64) -> Option<Ending> {
         const SAME: f64 = 1e-4;
-        let own = self.quantity.of(at).is_some_and(|own| (own - self.value).abs() <= SAME * (1.0 + self.value.abs()));
-        (self.stop && own).then_some(Ending::Asked(self.value))
+        let Mark { quantity, value, stop } = self.mark;
+        let own = quantity.of(at).is_some_and(|own| (own - value).abs() <= SAME * (self.size + value.abs()));
+        (stop && own).then_some(Ending::Asked(value))
     }
 }

@@ -125,12 +125,11 @@ impl Condition for OnBranchPoints<'_> {
     }
 
     fn face(&mut self, along: &[f64]) {
-        let [first, second] = [0, 1].map(|a| self.setting.axes[a].scale);
-        let [a, b] = [along[self.n + 1] / first, along[self.n + 2] / second];
+        let [a, b] = [along[self.n + 1], along[self.n + 2]];
         let length = a.hypot(b);
         if length > 0.0 {
             // The null vectors belong to another λ.
-            self.across = [-b / length * first, a / length * second];
+            self.across = [-b / length, a / length];
         }
     }
 

@@ -346,13 +346,11 @@ impl Condition for OnCycleBranchPoints<'_> {
     }
 
     fn face(&mut self, along: &[f64]) {
-        let k = self.setting.freedom();
-        let [first, second] = [k - 2, k - 1].map(|a| self.setting.axes[a].scale);
-        let [a, b] = [along[along.len() - 2] / first, along[along.len() - 1] / second];
+        let [a, b] = [along[along.len() - 2], along[along.len() - 1]];
         let length = a.hypot(b);
         if length > 0.0 {
             // The null vectors belong to another λ.
-            self.across = [-b / length * first, a / length * second];
+            self.across = [-b / length, a / length];
         }
     }
 

@@ -211,6 +211,10 @@ impl ZeroProblem for UnfoldedCycles<'_> {
         self.cycles.unknowns()
     }
 
+    fn unit(&self) -> f64 {
+        self.cycles.unit()
+    }
+
     fn anchor(&mut self, u: &[f64]) {
         self.period = u[u.len() - 4];
         self.cycles.anchor(u);

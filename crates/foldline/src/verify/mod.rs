@@ -154,6 +154,7 @@ pub fn verify(
     sample: Option<usize>,
     kept: &dyn Fn(&Branch) -> bool,
 ) -> Verified {
+    let system = &system.clone().in_units_of(diagram);
     let branches: Vec<&Branch> = diagram.branches.iter().filter(|branch| kept(branch)).collect();
     let all: usize = branches.iter().map(|branch| branch.points.len()).sum();
     let wanted = sample.unwrap_or(all).min(all);
@@ -187,7 +188,7 @@ fn accuracies(tolerance: f64) -> [f64; 2] {
 /// What is free along a branch. The legs of a homotopy change several parameters in proportion.
 fn setting<'a>(system: &'a System, branch: &Branch) -> Setting<'a> {
     let parameters = branch.points.first().map(|point| point.parameters.clone()).unwrap_or_default();
-    let axis = |index: usize| Axis::new(index, system.parameter_scales.get(index).copied().unwrap_or(1.0));
+    let axis = |index: usize| Axis::new(index, system.unit(index));
     let axes = match branch.held {
         Some((_, other)) => vec![axis(other), axis(branch.free)],
         None => match branch.points.iter().map(|p| change(&parameters, &p.parameters)).max_by(larger) {

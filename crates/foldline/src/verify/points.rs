@@ -202,8 +202,9 @@ impl Part<'_> {
         let (n, scales) = (q.len(), self.setting.scales);
         let size = q.iter().zip(scales).fold(f64::MIN_POSITIVE, |most, (q, s)| most.max((q / s).abs()));
         let along: Vec<f64> = q.iter().map(|q| q / size).chain(vec![0.0; self.setting.parameters.len()]).collect();
-        let by_axes = self.setting.axes.iter().enumerate().map(|(a, axis)| {
-            let unit: Vec<f64> = (0..self.setting.freedom()).map(|k| if k == a { axis.scale } else { 0.0 }).collect();
+        let freedom = self.setting.freedom();
+        let by_axes = (0..freedom).map(|a| {
+            let unit: Vec<f64> = (0..freedom).map(|k| f64::from(u8::from(k == a))).collect();
             [vec![0.0; n], self.setting.spread(&unit)].concat()
         });
         by_axes.chain([along.clone()]).fold(max_abs(fx), |most, change| {
@@ -236,7 +237,7 @@ impl Part<'_> {
         let mut line: Vec<f64> = Vec::with_capacity(n * (n + k));
         for i in 0..n {
             line.extend((0..n).map(|j| fx[i * n + j] * scales[j]));
-            line.extend(self.setting.axes.iter().enumerate().map(|(a, axis)| fp[i * k + a] * axis.scale));
+            line.extend_from_slice(&fp[i * k..(i + 1) * k]);
             line.extend(beyond.iter().map(|[_, p]| rate * p[i]));
         }
         let width = n + k + usize::from(beyond.is_some());
@@ -260,7 +261,8 @@ impl Part<'_> {
             let size: f64 = (0..n).map(|j| (fx[i * n + j] * scales[j]).abs()).sum();
             max_abs(&step((0..n).map(|other| if other == i { f64::EPSILON * size } else { 0.0 }).collect()))
         };
-        let moved = (0..n).map(moved).fold(f64::EPSILON, larger);
+        // The parameter is rounded once more where its unknown is multiplied by its scale.
+        let moved = (0..n).map(moved).fold(f64::EPSILON, larger) + 0.5 * f64::EPSILON;
         let (off, rounding) = match self.precisely(point, x, &scales, &step) {
             Some(off) => (off, moved),
             None => (max_abs(&step(f)), moved.max(ROUNDING)),

@@ -75,7 +75,7 @@ impl Orbit {
             shares,
             period: if cycle.forcing_periods > 0 { f64::from(cycle.forcing_periods) } else { cycle.period },
             forced: cycle.forcing_periods > 0,
-            free: setting.values_of(point),
+            free: setting.unknowns_of(point),
             scales,
             intervals,
         })
@@ -98,15 +98,13 @@ impl Orbit {
     }
 
     /// The same moved by a scaled update.
-    pub(super) fn moved(&self, setting: &Setting, update: &[f64]) -> Orbit {
+    pub(super) fn moved(&self, update: &[f64]) -> Orbit {
         let n = self.dim();
         let mut out = self.clone();
         let (nodes, rest) = update.split_at(self.nodes.len());
         out.nodes.iter_mut().zip(nodes).enumerate().for_each(|(at, (x, d))| *x += d * self.scales[at % n]);
         out.period += rest[0] * self.period;
-        for ((value, d), axis) in out.free.iter_mut().zip(&rest[1..]).zip(&setting.axes) {
-            *value += d * axis.scale;
-        }
+        out.free.iter_mut().zip(&rest[1..]).for_each(|(own, d)| *own += d);
         out
     }
 }
@@ -191,7 +189,7 @@ impl Shooting<'_> {
         }
         let scales = self.setting.scales;
         let matrix = (0..n * n).map(|at| scales[at / n] / scales[at % n]);
-        let by_free = (0..n * k).map(|at| scales[at / k.max(1)] / self.setting.axes[at % k.max(1)].scale);
+        let by_free = (0..n * k).map(|at| scales[at / k.max(1)]);
         let clock = self.setting.field.forced().then_some(1.0);
         let absolute = scales.iter().copied().chain(matrix).chain(by_free).chain(clock);
         let absolute = absolute.map(|s| s * self.accuracy).collect();
@@ -259,7 +257,7 @@ impl Shooting<'_> {
                     continue;
                 };
                 let size = update.iter().fold(0.0, |m: f64, d| if d.abs() > m || d.is_nan() { d.abs() } else { m });
-                let next = now.moved(self.setting, &update);
+                let next = now.moved(&update);
                 let stalled = size < STALLED && size > 0.3 * last[i];
                 last[i] = size;
                 if size < ARRIVED || stalled {
@@ -287,8 +285,8 @@ impl Shooting<'_> {
                 line[i * n..(i + 1) * n].copy_from_slice(&flow.transitions[(i * n + r) * n..(i * n + r + 1) * n]);
                 line[next * n + r] -= 1.0;
                 line[inner] = flow.finishes[row] * orbit.shares[i] * orbit.period / scales[r];
-                for (c, axis) in self.setting.axes.iter().enumerate() {
-                    line[inner + 1 + c] = flow.by_free[row * k + c] * axis.scale / scales[r];
+                for c in 0..k {
+                    line[inner + 1 + c] = flow.by_free[row * k + c] / scales[r];
                 }
                 right[row * stride] = -(flow.ends[row] - orbit.nodes[next * n + r]) / scales[r];
             }
@@ -340,7 +338,7 @@ impl Shooting<'_> {
     pub(super) fn between(&self, from: &Orbit, to: &Orbit) -> Vec<f64> {
         let n = from.dim();
         let nodes = from.nodes.iter().zip(&to.nodes).enumerate().map(|(at, (a, b))| (b - a) / from.scales[at % n]);
-        let free = from.free.iter().zip(&to.free).zip(&self.setting.axes).map(|((a, b), axis)| (b - a) / axis.scale);
+        let free = from.free.iter().zip(&to.free).map(|(a, b)| b - a);
         nodes.chain([(to.period - from.period) / from.period]).chain(free).collect()
     }
 }

@@ -59,7 +59,7 @@ pub(super) fn verify(setting: &Setting, branch: &Branch, tolerance: f64) -> Veri
                     parameter,
                     quantity: Quantity::Place,
                     stated: Some(special.error + 1000.0 * accuracy),
-                    found: there.map_or(f64::INFINITY, |there| (there - parameter).abs() / (1.0 + parameter.abs())),
+                    found: there.map_or(f64::INFINITY, |there| place.off(there)),
                 });
             }
             Err(why) => out.undecided.push(undecided(why)),
@@ -109,7 +109,7 @@ impl Place<'_> {
             let parameters: Vec<f64> = around.iter().map(|nearby| nearby.parameter).collect();
             let there = dot(&weights(&nodes, root), &parameters);
             // The distances must agree better than is stated, or than the place is off.
-            let off = (there - self.stated()).abs() / (1.0 + there.abs());
+            let off = self.off(there);
             let close = (AGREEING * self.special.error).max(0.1 * off) + 100.0 * self.accuracy;
             if before.is_some_and(|before| (there - before).abs() < close * (1.0 + there.abs())) {
                 return Ok(Some(there));
@@ -119,9 +119,14 @@ impl Place<'_> {
         if tried && !crossed { Ok(None) } else { Err(why) }
     }
 
-    /// The parameter where the special point says to be.
+    /// Distance of λ = `there` from that, relative to 1 + |λ|.
+    fn off(&self, there: f64) -> f64 {
+        (there - self.stated()).abs() / (1.0 + there.abs())
+    }
+
+    /// The unknown λ where the special point says to be.
     fn stated(&self) -> f64 {
-        self.setting.values_of(&self.special.point)[0]
+        self.setting.unknowns_of(&self.special.point)[0]
     }
 
     fn test(&self, kind: Kind, nearby: &Nearby) -> Option<f64> {
@@ -164,10 +169,10 @@ impl Place<'_> {
                 along.iter_mut().enumerate().for_each(|(at, t)| *t /= base.scales[at % n]);
                 // Of a forced cycle the tangent says nothing about the period, which is given.
                 along.push(if base.forced { 0.0 } else { tangent[size] / base.period });
-                along.push(tangent[size + 1] / self.setting.axes[0].scale);
+                along.push(tangent[size + 1]);
                 normalise(&mut along);
                 let shooting = Shooting { setting: self.setting, accuracy: self.accuracy };
-                let moved = |s: &f64| base.moved(self.setting, &along.iter().map(|t| s * t).collect::<Vec<_>>());
+                let moved = |s: &f64| base.moved(&along.iter().map(|t| s * t).collect::<Vec<_>>());
                 let orbits: Vec<Orbit> = nodes.iter().map(moved).collect();
                 // In the planes through where the iteration begins.
                 let rows: Vec<Vec<Row>> = vec![vec![(along.clone(), 0.0)]; nodes.len()];
@@ -185,23 +190,22 @@ impl Place<'_> {
 
     fn equilibria(&self, x: &[f64], nodes: &[f64; 4]) -> Option<Vec<Nearby>> {
         let n = x.len();
-        let axis = &self.setting.axes[0];
         let scales: Vec<f64> = x.iter().zip(self.setting.scales).map(|(x, s)| x.abs() + s).collect();
         let mut along = self.special.point.tangent.clone();
         if along.len() != n + 1 {
             return None;
         }
-        along.iter_mut().zip(scales.iter().chain([&axis.scale])).for_each(|(t, s)| *t /= s);
+        along.iter_mut().zip(&scales).for_each(|(t, s)| *t /= s);
         normalise(&mut along);
-        let start = self.setting.values_of(&self.special.point)[0];
+        let start = self.setting.unknowns_of(&self.special.point)[0];
         nodes.iter().map(|distance| self.equilibrium(x, start, &scales, &along, *distance)).collect()
     }
 
     fn equilibrium(&self, x: &[f64], start: f64, scales: &[f64], along: &[f64], distance: f64) -> Option<Nearby> {
-        let (n, axis) = (x.len(), &self.setting.axes[0]);
+        let n = x.len();
         let size = n + 1;
         let mut state: Vec<f64> = x.iter().zip(scales).zip(along).map(|((x, s), t)| x + distance * s * t).collect();
-        let mut value = start + distance * axis.scale * along[n];
+        let mut value = start + distance * along[n];
         let mut last = f64::INFINITY;
         for _ in 0..20 {
             let (mut f, mut fx, mut fp) = (vec![0.0; n], vec![0.0; n * n], vec![0.0; n]);
@@ -211,7 +215,7 @@ impl Place<'_> {
             let mut a = Vec::with_capacity(size * size);
             for i in 0..n {
                 a.extend((0..n).map(|j| fx[i * n + j] * scales[j]));
-                a.push(fp[i] * axis.scale);
+                a.push(fp[i]);
             }
             a.extend_from_slice(along);
             let mut right: Vec<f64> = f.iter().flat_map(|f| [-f, 0.0]).chain([0.0, 1.0]).collect();
@@ -232,7 +236,7 @@ impl Place<'_> {
             }
             last = length;
             state.iter_mut().zip(scales).zip(&update).for_each(|((x, s), d)| *x += s * d);
-            value += axis.scale * update[n];
+            value += update[n];
         }
         None
     }

@@ -151,7 +151,7 @@ fn turns(family: &Family) -> Claim {
         let (mut lines, mut off, mut error) = (Vec::new(), vec![Vec::new(); 2], 0.0_f64);
         for level in &family.levels {
             let predicted = turning::speeds(family, level.zeta / level.epsilon)?;
-            let folds = speeds(&level.folds());
+            let folds = speeds(level.run, &level.folds());
             if predicted.is_empty() || predicted.len() != folds.len() {
                 return Err(format!("{} predicted, {} folds at ε = {}", predicted.len(), folds.len(), level.epsilon));
             }

@@ -105,9 +105,7 @@ impl CycleProblem<'_> {
         for (r, row) in rows.chunks_exact(u.len()).enumerate() {
             let corner = &mut corner[(1 + r) * q..(2 + r) * q];
             corner[0] = row[size] / (self.period_scale * self.period_scale);
-            for (a, axis) in self.setting.axes.iter().enumerate() {
-                corner[1 + a] = row[size + 1 + a] / (axis.scale * axis.scale);
-            }
+            corner[1..].copy_from_slice(&row[size + 1..]);
         }
         for (r, row) in rows.chunks_exact(u.len()).enumerate() {
             self.fill_row(1 + r, &row[..size]);

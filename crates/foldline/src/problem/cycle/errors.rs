@@ -3,7 +3,8 @@
 use super::CycleProblem;
 use super::crossings::{self, Crossed};
 use crate::contract::{Batch, Parameters, ZeroProblem};
-use crate::linalg::{panel, same};
+use crate::diagram::{FLAT, STANDS};
+use crate::linalg::{larger, panel, same};
 use crate::problem::defect::{self, Course, Defect, TOGETHER};
 use crate::stability::floquet;
 use num_complex::Complex64;
@@ -96,6 +97,20 @@ impl CycleProblem<'_> {
     pub(super) fn rounding(&self, u: &[f64]) -> f64 {
         self.errors(u);
         self.measured.borrow().as_ref().map_or(0.0, |known| known.rounding)
+    }
+
+    /// Part of dλ/ds that may be rounding: [`STANDS`] if f_λ is as large as f, and more by as much as it is smaller. Where f does not depend on
+    /// λ at all, a branch leads along it.
+    pub(super) fn slope_error(&self) -> f64 {
+        let (n, k) = (self.n, self.setting.freedom());
+        let lanes = self.f.len() / n;
+        let largest = |values: &[f64], row: usize, c: usize| {
+            values[row * lanes..(row + 1) * lanes].iter().fold(0.0, |most: f64, v| larger(most, v.abs()))
+                / self.scale[c]
+        };
+        let f = (0..n).fold(0.0, |most, c| larger(most, largest(&self.f, c, c)));
+        let by_parameter = (0..n).fold(f64::MIN_POSITIVE, |most, c| larger(most, largest(&self.fp, c * k + k - 1, c)));
+        (STANDS * f / by_parameter).clamp(STANDS, FLAT)
     }
 
     /// Estimated error of the multipliers `spectrum` at `u`: they change by it where the transitions of all intervals are made more

@@ -42,7 +42,7 @@ use crate::contract::{Batch, Examination, Parameters, Singular, ZeroProblem};
 use crate::diagram::{Cycle, Mesh, Point, Solution, Trust};
 use crate::linalg::lane::{Eight, Lane};
 use crate::linalg::system::System;
-use crate::linalg::{all_finite, larger, same};
+use crate::linalg::{all_finite, dot, larger, same};
 use crate::stability::floquet::{self, Course, Floquet, Frames};
 use errors::{Measured, Room};
 use num_complex::Complex64;
@@ -325,6 +325,10 @@ impl ZeroProblem for CycleProblem<'_> {
         self.profile_size() + 1 + self.setting.freedom()
     }
 
+    fn unit(&self) -> f64 {
+        self.setting.unit()
+    }
+
     fn anchor(&mut self, u: &[f64]) {
         if same(&self.anchored, u) {
             return;
@@ -377,13 +381,13 @@ impl ZeroProblem for CycleProblem<'_> {
         }
         total / n as f64
             + a[size] * b[size] / (self.period_scale * self.period_scale)
-            + self.setting.dot(&a[size + 1..], &b[size + 1..])
+            + dot(&a[size + 1..], &b[size + 1..])
     }
 
     fn relative_size(&self, du: &[f64], u: &[f64]) -> f64 {
         let size = self.profile_size();
         let scale = self.relative_scale(u);
-        let scalars = (du[size] / u[size]).abs().max(self.setting.relative_size(&du[size + 1..], &u[size + 1..]));
+        let scalars = (du[size] / u[size]).abs().max(Setting::relative_size(&du[size + 1..], &u[size + 1..]));
         self.sizes(du).iter().zip(&scale).map(|(d, s)| d / s).fold(scalars, larger)
     }
 
@@ -467,6 +471,7 @@ impl ZeroProblem for CycleProblem<'_> {
             averages::of_profile(self.setting.field, &parameters, cycle, self.forcing_periods, &self.scheme);
         found.trust.discretisation = SAFE * errors.iter().fold(0.0, |m: f64, e| m.max(*e)) + ROUNDING;
         found.trust.residual = residual;
+        found.trust.slope = self.slope_error();
         found
     }
 
@@ -516,7 +521,7 @@ impl ZeroProblem for CycleProblem<'_> {
             Solution::Equilibrium(x) => (x.iter().copied().cycle().take(self.profile_size()).collect(), 1.0),
         };
         u.push(if self.is_forced() { f64::from(self.forcing_periods) } else { period });
-        u.extend(self.setting.values_of(point));
+        u.extend(self.setting.unknowns_of(point));
         u
     }
 }

@@ -43,7 +43,7 @@ impl CycleProblem<'_> {
         };
         let (states, tangent) = (mirrored(&cycle.profile), mirrored(&point.tangent[..whole]));
         let period = if self.is_forced() { f64::from(self.forcing_periods) } else { cycle.period };
-        let scalars = [&[period][..], &self.setting.values_of(point)].concat();
+        let scalars = [&[period][..], &self.setting.unknowns_of(point)].concat();
         let close = |u: &Vec<f64>| {
             let off: Vec<f64> = u.iter().zip(beside).map(|(a, b)| a - b).collect();
             self.dot(&off, &off) <= within * within

@@ -68,12 +68,8 @@ impl<'s, 'f> Uncertain<'s, 'f> {
         if let Solution::Equilibrium(x) = &mut point.solution {
             x.iter_mut().zip(&self.sizes).for_each(|(x, s)| *x += size * s * signs.next());
         }
-        let free = self.setting.values_of(self.at);
-        let moved: Vec<f64> = free
-            .iter()
-            .zip(&self.setting.axes)
-            .map(|(value, axis)| value + size * (axis.scale + value.abs()) * signs.next())
-            .collect();
+        let free = self.setting.unknowns_of(self.at);
+        let moved: Vec<f64> = free.iter().map(|own| own + size * (1.0 + own.abs()) * signs.next()).collect();
         point.parameters = Setting { parameters: self.at.parameters.clone(), ..self.setting.clone() }.at(&moved);
         for z in &mut point.spectrum {
             // Displace both of a pair alike.

@@ -181,12 +181,11 @@ fn tangent(setting: &Setting, at: &Point) -> Option<Vec<f64>> {
     // A branch that itself turns there has another one as its line of reference.
     const STEEP: f64 = 1e-3;
     let (slope, states) = (at.parameter_slope(), at.tangent.get(..x.len())?);
-    let scale = setting.axes.last()?.scale;
     let sideways = states.iter().zip(setting.scales).fold(0.0f64, |most, (t, s)| most.max((t / s).abs()));
-    if (slope / scale).abs() < STEEP * sideways {
+    if slope.abs() < STEEP * sideways {
         return None;
     }
-    let mut unit = vec![0.0; setting.freedom()];
-    *unit.last_mut()? = 1.0;
-    Some(states.iter().map(|t| t / slope).chain(setting.spread(&unit)).collect())
+    let mut one = vec![0.0; setting.freedom()];
+    *one.last_mut()? = 1.0 / setting.unit();
+    Some(states.iter().map(|t| t / (slope * setting.unit())).chain(setting.spread(&one)).collect())
 }

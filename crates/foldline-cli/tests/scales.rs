@@ -1,0 +1,148 @@
+//! Nothing depends on the units in which a model is written.
+
+use foldline::contract::Unobserved;
+use foldline::diagram::{Branch, Diagram, Kind};
+use foldline::explore::{self, System};
+use foldline_store::study_file::parse_study;
+
+#[track_caller]
+fn run(model: &str, study: &str) -> Diagram {
+    let text = format!("model = \"m\"\n{study}");
+    let study = parse_study(&text, "study", model, "model").unwrap_or_else(|found| panic!("{found:?}"));
+    let system = System::of_plan(&study.model, &study.plan);
+    explore::run(&system, &study.plan, 1, Diagram::default(), &Unobserved)
+}
+
+/// Two branches have the same points and special points, parameter p of the second being `units[p]` times that of the first.
+#[track_caller]
+fn same(one: &Branch, other: &Branch, units: &[f64]) {
+    assert_eq!(one.points.len(), other.points.len(), "{} in units of {units:?}", one.name);
+    let near = |a: f64, b: f64, size: f64| (a - b).abs() <= 1e-6 * size;
+    for (a, b) in one.points.iter().zip(&other.points) {
+        for (k, unit) in units.iter().enumerate() {
+            let (x, y) = (a.parameters[k], b.parameters[k] / unit);
+            assert!(near(x, y, 1.0 + x.abs()), "{} in units of {units:?}: {x} {y}", one.name);
+        }
+        for (x, y) in a.ranges.iter().flatten().zip(b.ranges.iter().flatten()) {
+            assert!(near(*x, *y, 1.0 + x.abs()), "{} in units of {units:?}: {x} {y}", one.name);
+        }
+        assert_eq!(a.unstable, b.unstable);
+    }
+    let kinds = |branch: &Branch| branch.special.iter().map(|s| (s.kind, s.unstable_before)).collect::<Vec<_>>();
+    assert_eq!(kinds(one), kinds(other), "{} in units of {units:?}", one.name);
+    for (a, b) in one.special.iter().zip(&other.special) {
+        let (x, y) = (a.point.parameters[one.free], b.point.parameters[one.free] / units[one.free]);
+        assert!(
+            (x - y).abs() <= (a.error + b.error) * one.size(x),
+            "{} {} in units of {units:?}: {x} {y}",
+            one.name,
+            a.kind
+        );
+        assert!(b.error < 3.0 * a.error + 1e-9 && a.error < 3.0 * b.error + 1e-9, "{} {}", a.error, b.error);
+    }
+    let codes = |branch: &Branch| branch.ends.iter().flatten().map(|end| end.code()).collect::<Vec<_>>();
+    assert_eq!(codes(one), codes(other), "{} in units of {units:?}", one.name);
+}
+
+const UNITS: [f64; 5] = [1e-12, 1e-9, 1e-6, 1e6, 1e12];
+
+fn fold(unit: f64) -> Diagram {
+    let model = format!("name = \"fold\"\n[parameters]\nmu = 0.0\n[states]\nx = \"1 - mu/{unit:e} - x^2\"\n");
+    let [low, high, mark] = [-3.0, 2.0, -1.0].map(|value| value * unit);
+    run(
+        &model,
+        &format!(
+            "[[seed]]\nname = \"rest\"\nstate = {{ x = 1 }}\n[[branch]]\nname = \"b\"\nfrom = \"rest\"\nfree = \"mu\"\n\
+             range = [{low:e}, {high:e}]\nmark = {{ mu = {mark:e} }}\n"
+        ),
+    )
+}
+
+/// x' = 1 - mu/u - x² has a fold at mu = u, whatever u is.
+#[test]
+fn a_fold_is_found_in_any_unit_of_the_parameter_with_the_same_points() {
+    let usual = fold(1.0);
+    let kinds: Vec<Kind> = usual.branches[0].special.iter().map(|s| s.kind).collect();
+    assert_eq!(kinds.iter().filter(|kind| **kind == Kind::Mark).count(), 2);
+    for unit in UNITS {
+        let found = fold(unit);
+        same(&usual.branches[0], &found.branches[0], &[unit]);
+        let fold = found.branches[0].special.iter().find(|s| s.kind == Kind::Fold).unwrap();
+        assert!((fold.point.parameters[0] / unit - 1.0).abs() < 1e-8, "{unit}: {:?}", fold.point.parameters);
+    }
+}
+
+/// A line over a long range takes tens of points.
+#[test]
+fn a_line_takes_as_many_points_as_its_range_is_long_and_not_as_many_as_it_has_units() {
+    for (unit, value) in [(1.0, 0.0), (1.0, 1.0), (1e9, 1e9), (1e-9, 0.0)] {
+        let model = format!("name = \"line\"\n[parameters]\np = {value:e}\n[states]\nx = \"p/{unit:e} - x\"\n");
+        let study = format!(
+            "[[seed]]\nname = \"rest\"\nstate = {{ x = 1 }}\n[[branch]]\nname = \"b\"\nfrom = \"rest\"\nfree = \"p\"\n\
+             range = [0, {:e}]\n",
+            5000.0 * unit
+        );
+        let count = run(&model, &study).branches[0].points.len();
+        assert!(count < 100, "{unit} {value}: {count} points");
+    }
+}
+
+fn neuron(unit: f64, time: f64) -> Diagram {
+    let model = format!(
+        "name = \"FitzHugh-Nagumo\"\n[parameters]\nI = 0.0\na = {a:e}\n[states]\nv = \"v - v^3/3 - w + I/{unit:e}\"\n\
+         w = \"0.08*(v + a/{time:e} - 0.8*w)\"\n",
+        a = 0.7 * time
+    );
+    let [low, high, down, up] = [-0.5 * unit, 2.0 * unit, 0.2 * time, 0.9 * time];
+    run(
+        &model,
+        &format!(
+            "[[seed]]\nname = \"rest\"\nattractor = \"equilibrium\"\n[[branch]]\nname = \"b\"\nfrom = \"rest\"\nfree = \"I\"\n\
+             range = [{low:e}, {high:e}]\nswitch = {{ hopf = 1 }}\n[[curve]]\nname = \"hopf\"\nhold = \"hopf\"\nof = \"b\"\n\
+             free = \"a\"\nrange = [{down:e}, {up:e}]\n"
+        ),
+    )
+}
+
+/// Cycles through two canard explosions, and a curve of Hopf points in two parameters of different units.
+#[test]
+fn cycles_and_curves_are_the_same_in_any_unit_of_their_parameters() {
+    let usual = neuron(1.0, 1.0);
+    let names: Vec<&str> = usual.branches.iter().map(|branch| branch.name.as_str()).collect();
+    assert_eq!(names, ["b", "b/hopf-1", "hopf"]);
+    for (unit, time) in [(1e-9, 1e6), (1e12, 1e-12)] {
+        let found = neuron(unit, time);
+        assert_eq!(found.branches.len(), 3);
+        for (one, other) in usual.branches.iter().zip(&found.branches) {
+            if one.name != "b/hopf-1" {
+                same(one, other, &[unit, time]);
+                continue;
+            }
+            // In an explosion a last bit decides about a step.
+            let places = |branch: &Branch, unit: f64| {
+                let all = branch.special.iter().map(|s| (s.kind, s.point.parameters[0] / unit));
+                all.collect::<Vec<_>>()
+            };
+            let (one, other) = (places(one, 1.0), places(other, unit));
+            assert_eq!(one.len(), other.len(), "{one:?} {other:?}");
+            for (a, b) in one.iter().zip(&other) {
+                assert!(a.0 == b.0 && (a.1 - b.1).abs() < 1e-6, "{one:?} {other:?}");
+            }
+        }
+    }
+}
+
+/// Where the value of a parameter says little about its size, the model says it.
+#[test]
+fn a_declared_scale_is_used_and_one_that_is_not_positive_refused() {
+    let of = |scale: &str| {
+        format!("name = \"line\"\n[parameters]\np = {{ value = 0.0, scale = {scale} }}\n[states]\nx = \"p - x\"\n")
+    };
+    let study = "[[seed]]\nname = \"rest\"\nstate = { x = 0 }\n[[branch]]\nname = \"b\"\nfrom = \"rest\"\nfree = \"p\"\n\
+                 range = [0, 10]\n";
+    let (fine, coarse) = (run(&of("0.1"), study), run(&of("10.0"), study));
+    assert_eq!((fine.branches[0].units[1], coarse.branches[0].units[1]), (0.1, 10.0));
+    assert!(fine.branches[0].points.len() > 5 * coarse.branches[0].points.len());
+    let found = parse_study(&format!("model = \"m\"\n{study}"), "study", &of("-1.0"), "model").unwrap_err();
+    assert!(format!("{found:?}").contains("the scale -1 is not positive"), "{found:?}");
+}
