@@ -146,3 +146,67 @@ fn a_declared_scale_is_used_and_one_that_is_not_positive_refused() {
     let found = parse_study(&format!("model = \"m\"\n{study}"), "study", &of("-1.0"), "model").unwrap_err();
     assert!(format!("{found:?}").contains("the scale -1 is not positive"), "{found:?}");
 }
+
+const SCALES: [f64; 8] = [0.1, 0.2, 0.3, 0.45, 0.5, 0.55, 0.9, 2.0];
+
+/// z² = mu (1 - mu) beside a rotating wave x + i y = exp(i t): pitchforks at 0 and 1. (The rotation that leaves the equations as they are leads
+/// along the wave, so no multiplier is 1 for it.)
+#[test]
+fn pitchforks_beside_a_rotating_wave_are_where_they_are() {
+    for scale in SCALES {
+        let model = format!(
+            "name = \"arc\"\n[parameters]\nmu = {{ value = -0.5, scale = {scale} }}\n[states]\nz = \"mu*(1 - mu)*z - z^3\"\n\
+             x = \"x - y - x*(x^2 + y^2)\"\ny = \"x + y - y*(x^2 + y^2)\"\n"
+        );
+        let found = run(
+            &model,
+            "[[seed]]\nname = \"s\"\nattractor = \"cycle\"\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"mu\"\nrange = [-0.5, 1.5]\n",
+        );
+        let branch = &found.branches[0];
+        let places: Vec<(Kind, f64, f64)> =
+            branch.special.iter().map(|s| (s.kind, s.point.parameters[0], s.error * branch.size(1.0))).collect();
+        let [(Kind::BranchPoint, zero, first), (Kind::BranchPoint, one, second)] = places[..] else {
+            panic!("{scale}: {places:?}")
+        };
+        assert!(zero.abs() <= first && (one - 1.0).abs() <= second && first.max(second) < 1e-6, "{scale}: {places:?}");
+    }
+}
+
+/// AUTO's demo tfc: the third state is zero all along the cycles, which grow from the Hopf point down to the bound.
+#[test]
+fn cycles_on_an_invariant_plane_do_not_shrink_where_they_are_born() {
+    for scale in SCALES {
+        let model = format!(
+            "name = \"tfc\"\n[parameters]\na1 = 5.0\nb1 = 3.0\nd1 = {{ value = 1.1083, scale = {scale} }}\na2 = 0.1\nb2 = 2.0\nd2 = 0.01\n\
+             [states]\nx = \"1 - exp(x) - a1*exp(y)/(1 + b1*exp(x))\"\n\
+             y = \"a1*exp(x)/(1 + b1*exp(x)) - d1 - a2*z/(1 + b2*exp(y))\"\nz = \"z*(a2*exp(y)/(1 + b2*exp(y)) - d2)\"\n"
+        );
+        let found = run(
+            &model,
+            "[[seed]]\nname = \"s\"\nstate = { x = -0.413049, y = -1.59954, z = 0 }\n[[branch]]\nname = \"b\"\nfrom = \"s\"\n\
+             free = \"d1\"\nrange = [0.3, 1.2]\nswitch = { hopf = 1 }\n",
+        );
+        let cycles = found.branch("b/hopf-1").unwrap();
+        let codes: Vec<&str> = cycles.ends.iter().flatten().map(|end| end.code()).collect();
+        assert_eq!(codes, ["joined", "bound"], "{scale}: {:?}", cycles.ends);
+    }
+}
+
+/// The branch that crosses at 0.8219 and its cycles, which begin at 0.671594, are no part of the one that they leave.
+#[test]
+fn a_branch_that_crosses_is_not_taken_for_the_one_that_it_leaves() {
+    for scale in SCALES {
+        let model = format!(
+            "name = \"prey\"\n[parameters]\np = {{ value = 0.1, scale = {scale} }}\n[states]\n\
+             u = \"3*u*(1 - u) - u*v - p*(1 - exp(-5*u))\"\nv = \"-v + 3*u*v\"\n"
+        );
+        let found = run(
+            &model,
+            "[[seed]]\nname = \"s\"\nstate = { u = 0, v = 0 }\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"p\"\nrange = [0.1, 1]\n\
+             switch = { branch-point = 2, hopf = 1 }\n",
+        );
+        let hopf = found.branches.iter().flat_map(|branch| &branch.special).find(|s| s.kind == Kind::Hopf);
+        let place = hopf.map(|hopf| hopf.point.parameters[0]);
+        assert!(place.is_some_and(|place| (place - 0.671593847479).abs() < 1e-8), "{scale}: {place:?}");
+    }
+}

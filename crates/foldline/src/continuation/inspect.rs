@@ -9,7 +9,7 @@
 use super::allowance::{ALLOWANCE, work};
 use super::corrector::{Failure, Station, doubted, refine};
 use super::follow::Follow;
-use super::locate::{Located, Stretch, discrepancy, locate};
+use super::locate::{Located, Stretch, discrepancy, head_along, locate};
 use super::straddle::straddle;
 use crate::contract::Sight;
 use crate::diagram::{Cost, Kind, Point, STANDS, SpecialPoint};
@@ -168,6 +168,11 @@ impl Follow<'_> {
                 {
                     found = Err(Failure::Unexplained);
                 }
+            }
+            if kind == Kind::BranchPoint
+                && let Ok(found) = &mut found
+            {
+                head_along(self.problem, &stretch, found);
             }
             // This branch is the one that leaves another at a pitchfork, and goes on as its own mirror image. (Where something is held,
             // a symmetric solution may as well just turn.)

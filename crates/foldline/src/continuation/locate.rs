@@ -271,6 +271,20 @@ fn turned(problem: &dyn ZeroProblem, tangent: &[f64], expected: &[f64]) -> bool 
     along.abs() < STRAIGHT * (own * other).sqrt()
 }
 
+/// Gives a branch point the direction in which the stretch passes it. The matrix there is singular, so the tangent that it yields may be that of
+/// the branch that crosses, or any between the two.
+pub(super) fn head_along(problem: &mut dyn ZeroProblem, stretch: &Stretch, found: &mut Located) {
+    let station = &mut found.station;
+    let heading = problem.transfer(&stretch.heading(found.distance), &stretch.left.mesh, &station.mesh);
+    problem.set_mesh(&station.mesh);
+    problem.anchor(&station.u);
+    let norm = stretch.length.signum() * problem.dot(&heading, &heading).sqrt();
+    if norm.is_finite() && norm != 0.0 {
+        station.tangent = heading.iter().map(|t| t / norm).collect();
+        station.point.tangent = station.tangent.iter().map(|t| stretch.direction * t).collect();
+    }
+}
+
 /// Finds the zero of `monitor` in `stretch`, whose ends have values of opposite sign.
 ///
 /// # Errors

@@ -2,7 +2,7 @@
 
 use super::System;
 use super::counted::Counted;
-use super::symmetry::rotation;
+use super::symmetry::{is_rotating_wave, rotation};
 use crate::continuation::corrector::{Plane, parameter_row, settle, station};
 use crate::continuation::{Failure, Follow, Homecoming, Item, Settings, Station, follow};
 use crate::contract::{Event, Examination, Monitor, Observer, Verdict, ZeroProblem};
@@ -316,9 +316,12 @@ impl Growth<'_> {
         }
     }
 
-    /// True if cycles form families because the model has a rotational symmetry.
+    /// True if cycles form families because the model has a rotational symmetry that leads from one to another.
     fn is_symmetric(&self, branch: &Branch, at: &Point) -> bool {
-        branch.family == Family::Cycle && branch.held.is_none() && rotation(self.system, &at.parameters).is_some()
+        let wave = |pairs: Vec<[usize; 2]>| is_rotating_wave(self.system, &pairs, at);
+        branch.family == Family::Cycle
+            && branch.held.is_none()
+            && rotation(self.system, &at.parameters).is_some_and(|pairs| !wave(pairs))
     }
 
     /// Notes that a curve cannot be searched for points at which a coefficient vanishes, if that coefficient is not defined on it.

@@ -8,8 +8,8 @@
 use super::System;
 use super::growth::{Line, polished, problem_of, revived};
 use super::minimal::reduced;
+use crate::continuation::Settings;
 use crate::continuation::locate::{Stretch, passing};
-use crate::continuation::{Settings, Station};
 use crate::contract::Observer;
 use crate::diagram::{Branch, Cost, Kind, Point, Solution};
 
@@ -21,11 +21,11 @@ pub fn solutions_at(system: &System, settings: &Settings, branch: &Branch, value
         let [a, b] = [0, 1].map(|k| pair[k].parameters[branch.free] - value);
         a * b < 0.0 || a == 0.0
     });
-    passes.filter_map(|pair| Some(between(system, settings, branch, [pair[0], pair[1]], value)?.point)).collect()
+    passes.filter_map(|pair| between(system, settings, branch, [pair[0], pair[1]], value)).collect()
 }
 
 /// The solution between two neighbouring points of a branch at a value of its parameter; `None` if one of them is light.
-fn between(system: &System, settings: &Settings, branch: &Branch, pair: [&Point; 2], value: f64) -> Option<Station> {
+fn between(system: &System, settings: &Settings, branch: &Branch, pair: [&Point; 2], value: f64) -> Option<Point> {
     if pair.iter().any(|point| point.is_light() || point.tangent.is_empty()) {
         return None;
     }
@@ -33,30 +33,7 @@ fn between(system: &System, settings: &Settings, branch: &Branch, pair: [&Point;
     let left = revived(&mut *problem, settings, pair[0], 1.0).ok()?;
     let right = revived(&mut *problem, settings, pair[1], 1.0).ok()?;
     let found = passing(&mut *problem, settings, [&left, &right], value, 1.0, &mut Cost::default());
-    found.ok()
-}
-
-/// Whether a solution lies on a branch between two neighbouring points, rather than on another one that crosses it there: then its tangent
-/// lies between theirs.
-fn lies_between(system: &System, free: usize, pair: [&Point; 2], found: &Station) -> bool {
-    /// Angle by which tangents between two points may be off the shortest way from one to the other: less than that between two branches that
-    /// are told apart where one leaves the other, whose cosine is 0.95 there.
-    const ASTRAY: f64 = 0.3;
-    let mut problem = problem_of(system, free, 4, &found.point, false);
-    let mesh = |point: &Point| match &point.solution {
-        Solution::Cycle(cycle) => cycle.mesh.clone(),
-        Solution::Equilibrium(_) => Vec::new().into(),
-    };
-    problem.set_mesh(&found.mesh);
-    problem.anchor(&found.u);
-    let [one, other] = pair.map(|point| problem.transfer(&point.tangent, &mesh(point), &found.mesh));
-    let angle = |a: &[f64], b: &[f64]| {
-        let lengths = (problem.dot(a, a) * problem.dot(b, b)).sqrt();
-        (problem.dot(a, b).abs() / lengths).min(1.0).acos()
-    };
-    let way = angle(&one, &found.tangent) + angle(&found.tangent, &other);
-    // The tangent at a point that was imported is not known.
-    way.is_nan() || way < angle(&one, &other) + ASTRAY
+    found.ok().map(|station| station.point)
 }
 
 /// The points of a branch, its folds, and the branch points at which it turns back, as at a pitchfork. Between two of them the
@@ -197,23 +174,12 @@ pub fn branch_of<'b>(
                 let once = if turns > 1.0 { reduced(system, settings, found) } else { None };
                 close(once.as_ref().unwrap_or(found), 30.0 * settings.tolerance)
             };
-            let places = pair[0].position - 1..=pair[1].position;
-            let crossed =
-                branch.special.iter().any(|s| s.kind == Kind::BranchPoint && places.contains(&s.point.position));
-            let ends = [whole(pair[0]), whole(pair[1])];
-            let on_it = |found: &Station| {
-                let stays = match &ends {
-                    [Some(left), Some(right)] if crossed => lies_between(system, free, [left, right], found),
-                    _ => true,
-                };
-                same(&found.point) && stays
-            };
-            if polished(&mut *problem, settings, &guess).is_ok_and(|found| on_it(&found)) {
+            if polished(&mut *problem, settings, &guess).is_ok_and(|found| same(&found.point)) {
                 return true;
             }
             // Where branches cross Newton's method from there may have gone to the other one.
-            let [Some(left), Some(right)] = &ends else { return false };
-            between(system, settings, branch, [left, right], value).is_some_and(|found| on_it(&found))
+            let [Some(left), Some(right)] = [whole(pair[0]), whole(pair[1])] else { return false };
+            between(system, settings, branch, [&left, &right], value).is_some_and(|found| same(&found))
         })
     });
     found.map(|branch| branch.name.as_str())

@@ -282,12 +282,18 @@ pub(super) fn across(
     improved: &dyn Fn(&mut dyn ZeroProblem, &mut [f64]),
 ) -> Result<Beginning, String> {
     let mesh = problem.mesh();
-    // Where the branch one comes from bends, it may meet the hyperplane too; its direction is still nearly that at the point.
+    // Where the branch one comes from bends, it may meet the hyperplane too. The chord from the point then makes half the angle with the
+    // tangent at the point that the tangent there makes; on another branch, which goes through the point as well, it makes the same.
     let (own, own_mesh) = (&at.point.tangent, mesh.clone());
     let leaves = |problem: &dyn ZeroProblem, found: &Station| {
         let tangent = problem.transfer(&found.tangent, &found.mesh, &own_mesh);
-        let lengths = |a: &[f64]| problem.dot(a, a).sqrt();
-        problem.dot(&tangent, own).abs() < 0.95 * lengths(&tangent) * lengths(own)
+        let mut chord = problem.transfer(&found.u, &found.mesh, &own_mesh);
+        chord.iter_mut().zip(u).for_each(|(a, b)| *a -= b);
+        let angle = |a: &[f64]| {
+            let lengths = (problem.dot(a, a) * problem.dot(own, own)).sqrt();
+            (problem.dot(a, own).abs() / lengths).min(1.0).acos()
+        };
+        angle(&tangent) < 1.5 * angle(&chord)
     };
     let one = step_off_from(problem, settings, u, vector, 1.0, &DISTANCES, &leaves, improved)
         .map_err(|why| why.to_string())?;

@@ -17,6 +17,7 @@
 use super::System;
 use super::diagnosis::null_space;
 use crate::contract::{Batch, Parameters};
+use crate::diagram::{Point, Solution};
 use crate::linalg::max_abs;
 
 /// Largest number of states n for which symmetries are looked for. (1) has n² unknowns, so elimination costs n⁶ operations: a million
@@ -57,7 +58,31 @@ pub(super) fn rotation(system: &System, parameters: &[f64]) -> Option<Vec<[usize
     null_space(rows, n * n).iter().find_map(|generator| rotated_pairs(generator, n))
 }
 
-/// The pairs of states that a generator rotates; `None` if it is not a rotation.
+/// Whether a cycle is a rotating wave: it consists of what one of its states becomes under rotation of these pairs. Rotation leads along such a
+/// cycle, not to others.
+pub(super) fn is_rotating_wave(system: &System, pairs: &[[usize; 2]], at: &Point) -> bool {
+    /// Share of f that may have another direction: above the error of a profile.
+    const ASIDE: f64 = 1e-3;
+    let Solution::Cycle(cycle) = &at.solution else { return false };
+    let (n, parameters) = (cycle.dim(), Parameters::Shared(&at.parameters));
+    if cycle.forcing_periods > 0 || n != system.field.dim() || cycle.profile.is_empty() {
+        return false;
+    }
+    // Sums of f², f·Jx and (Jx)², J x being the direction of rotation.
+    let mut sums = [0.0; 3];
+    for x in cycle.profile.chunks_exact(n) {
+        let (mut f, mut turned) = (vec![0.0; n], vec![0.0; n]);
+        system.field.evaluate(Batch { lanes: 1, states: x, parameters, times: &[] }, &mut f);
+        pairs.iter().for_each(|&[i, j]| (turned[i], turned[j]) = (-x[j], x[i]));
+        for ((f, t), scale) in f.iter().zip(&turned).zip(&system.scales) {
+            let (f, t) = (f / scale, t / scale);
+            sums = [sums[0] + f * f, sums[1] + f * t, sums[2] + t * t];
+        }
+    }
+    sums[0] * sums[2] - sums[1] * sums[1] < ASIDE * ASIDE * sums[0] * sums[2]
+}
+
+/// The pairs of states that a generator rotates, all in the same sense; `None` if it is not a rotation.
 fn rotated_pairs(generator: &[f64], n: usize) -> Option<Vec<[usize; 2]>> {
     let size = max_abs(generator);
     let entry = |i: usize, j: usize| generator[i * n + j] / size;
@@ -70,9 +95,12 @@ fn rotated_pairs(generator: &[f64], n: usize) -> Option<Vec<[usize; 2]>> {
             return None;
         }
         if i < j {
-            pairs.push([i, j]);
+            pairs.push(([i, j], entry(i, j)));
         }
     }
+    let sense = pairs.first().map_or(1.0, |(_, sense)| *sense);
+    let pairs: Vec<[usize; 2]> =
+        pairs.into_iter().map(|([i, j], own)| if own * sense > 0.0 { [i, j] } else { [j, i] }).collect();
     (!pairs.is_empty()).then_some(pairs)
 }
 
