@@ -139,10 +139,14 @@ fn grown(
     start: &Point,
     sides: [bool; 2],
 ) -> Option<Branch> {
+    /// Slope below which a point is next to a fold.
+    const STEEP: f64 = 1e-2;
     let mut problem = problem_of(system, branch.free, DEGREE, start, is_doubled(&branch));
+    let turns = start.parameter_slope().abs() < STEEP;
     let mut station = polished(&mut *problem, settings, start);
-    if station.is_err() && !start.tangent.is_empty() {
-        // Next to a fold, or where only the period still changes, the parameter is a bad thing to hold.
+    if (turns || station.is_err()) && !start.tangent.is_empty() {
+        // Next to a fold, or where only the period still changes, the parameter is a bad thing to hold: it may lead to the other side, or to
+        // another branch.
         problem = problem_of(system, branch.free, DEGREE, start, is_doubled(&branch));
         let u = problem.unknowns_of(start);
         problem.anchor(&u);

@@ -74,8 +74,8 @@ fn a_wrong_value_is_called_wrong() {
     is("unstable = { of = 'x', range = [0.1, 3], is = 0 }", true);
     is("unstable = { of = 'x', range = [-3, 3], is = 0 }", false);
     is("unstable = { of = 'x', range = [10, 11], is = 0 }", false);
-    is("solutions = { parameter = 'mu', value = -1e-6, is = 2 }", true);
-    is("solutions = { parameter = 'mu', value = -1e-6, is = 1 }", false);
+    is("solutions = { parameter = 'mu', value = -1e-6, is = 1 }", true);
+    is("solutions = { parameter = 'mu', value = -1e-6, is = 2 }", false);
     is("branches = { at = { mu = [0, 1e-12] }, is = 1 }", true);
     is("branches = { at = { mu = [0, 1e-12] }, is = 2 }", false);
     is("points = { most = 1000 }", true);

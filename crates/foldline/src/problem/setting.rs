@@ -39,7 +39,7 @@ pub struct Setting<'a> {
     pub field: &'a dyn VectorField,
     /// `[n]` characteristic size of each state component, for relative errors.
     pub scales: &'a [f64],
-    /// Values of all parameters; those of free ones are ignored.
+    /// Values of all parameters. Free ones have these values to the last bit at the unknowns that belong to them; elsewhere they are ignored.
     pub parameters: Vec<f64>,
     /// The free parameters, in the order of the unknowns.
     pub axes: Vec<Axis>,
@@ -60,8 +60,11 @@ impl Setting<'_> {
     pub fn at(&self, unknowns: &[f64]) -> Vec<f64> {
         let mut all = self.parameters.clone();
         for (axis, unknown) in self.axes.iter().zip(unknowns) {
-            let value = axis.scale * unknown;
+            let mut value = axis.scale * unknown;
             if let Some(own) = all.get_mut(axis.index) {
+                if *own / axis.scale == *unknown {
+                    value = *own;
+                }
                 *own = value;
             }
             for tie in &axis.ties {
