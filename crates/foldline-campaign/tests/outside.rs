@@ -1,7 +1,7 @@
 //! Problems of others: those that are right and quick come out right, and the checks can tell right from wrong.
 
 use foldline_campaign::outside::expectations::{Check, Problem, Right, Run};
-use foldline_campaign::outside::reporting::{Line, Verdict, counts, placed, text};
+use foldline_campaign::outside::reporting::{Line, Verdict, counts, placed, renewed, text};
 use foldline_campaign::outside::running::Program;
 use foldline_campaign::outside::{folder, judged};
 
@@ -91,8 +91,16 @@ fn results_and_the_table_count_each_problem_for_itself() {
         |problem: &str, verdict: Verdict| Line { problem: problem.into(), run: "r".into(), check: "c".into(), verdict };
     let lines =
         [line("a", Verdict::Right), line("ab", Verdict::Wrong("no".into())), line("a", Verdict::Wrong("no".into()))];
-    let text = text(&lines);
-    assert_eq!([counts(&text, "a"), counts(&text, "ab"), counts(&text, "b")], [[1, 2], [0, 1], [0, 0]]);
+    let all = text(&lines);
+    assert_eq!([counts(&all, "a"), counts(&all, "ab"), counts(&all, "b")], [[1, 2], [0, 1], [0, 0]]);
+    let problems = Problem::all(&folder()).unwrap();
+    let [one, other] = [&problems[0].name, &problems[1].name];
+    let [known, now] = [
+        text(&[line(one, Verdict::Right), line(other, Verdict::Right)]),
+        text(&[line(other, Verdict::Wrong("no".into()))]),
+    ];
+    let both = renewed(&problems, &known, &now);
+    assert_eq!([counts(&both, one), counts(&both, other)], [[1, 1], [0, 1]]);
     let page = "before <!-- outside: begin --> old <!-- outside: end --> after";
     assert_eq!(
         placed(page, "new").as_deref(),

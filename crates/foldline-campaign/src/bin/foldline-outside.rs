@@ -2,7 +2,7 @@
 
 use foldline_campaign::outside::command::Command;
 use foldline_campaign::outside::expectations::{Problem, Run};
-use foldline_campaign::outside::reporting::{Line, Verdict, counts, placed, table, text};
+use foldline_campaign::outside::reporting::{Line, Verdict, counts, placed, renewed, table, text};
 use foldline_campaign::outside::running::Program;
 use foldline_campaign::outside::{folder, judged};
 use std::path::{Path, PathBuf};
@@ -13,7 +13,7 @@ const USAGE: &str = "foldline-outside --binary PATH [--quick] [--only TEXT] [--w
   --quick   only the studies that are right today and take about a second each
   --only    only problems whose name contains TEXT
   --folder  problems of another folder than outside; nothing is written then
-  --write   write outside/results.txt, and the table in docs/book/trust.md
+  --write   write outside/results.txt, and the table in docs/book/trust.md; with --only, what concerns those problems
   --before  write outside/before.txt, with which the table compares";
 
 fn main() -> ExitCode {
@@ -56,7 +56,8 @@ fn asked() -> Result<Asked, String> {
 
 fn answer() -> Result<(), String> {
     let asked = asked()?;
-    let mut problems = Problem::all(asked.folder.as_deref().unwrap_or(&folder()))?;
+    let all = Problem::all(asked.folder.as_deref().unwrap_or(&folder()))?;
+    let mut problems = all.clone();
     problems.retain(|problem| problem.name.contains(&asked.only));
     let out = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../target/outside");
     let program = Program::Command(Command { binary: asked.binary, out });
@@ -83,15 +84,18 @@ fn answer() -> Result<(), String> {
     let before = std::fs::read_to_string(&before_file).unwrap_or_default();
     let shown = table(&problems, &before, &now);
     println!("{shown}");
-    let whole = asked.only.is_empty() && !asked.quick && asked.folder.is_none();
+    let whole = !asked.quick && asked.folder.is_none();
+    let known = std::fs::read_to_string(folder().join("results.txt")).unwrap_or_default();
     match (asked.write, asked.before) {
         (false, false) => {}
         _ if !whole => {
-            return Err("--write and --before need the whole: without --only, --quick and --folder".to_string());
+            return Err("--write and --before need all studies: without --quick and --folder".to_string());
         }
-        (_, true) => saved(&before_file, &now)?,
+        (_, true) => saved(&before_file, &renewed(&all, &before, &now))?,
         (true, false) => {
-            saved(&folder().join("results.txt"), &now)?;
+            let results = renewed(&all, &known, &now);
+            let shown = table(&all, &before, &results);
+            saved(&folder().join("results.txt"), &results)?;
             let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/book/trust.md");
             let old = std::fs::read_to_string(&page).map_err(|error| format!("{}: {error}", page.display()))?;
             saved(&page, &placed(&old, &shown).ok_or("docs/book/trust.md has no markers for the table")?)?;

@@ -44,10 +44,24 @@ pub fn text(lines: &[Line]) -> String {
     out
 }
 
+/// The lines of a problem in the output of [`text`].
+fn of<'t>(text: &'t str, problem: &str) -> impl Iterator<Item = &'t str> {
+    let own = format!("{problem}/");
+    text.lines().filter(move |line| line.get(7..).is_some_and(|rest| rest.starts_with(&own)))
+}
+
+/// The output of [`text`] for all problems, those renewed that there are in `now`.
+pub fn renewed(problems: &[Problem], known: &str, now: &str) -> String {
+    let lines = problems.iter().flat_map(|problem| {
+        let ran = of(now, &problem.name).next().is_some();
+        of(if ran { now } else { known }, &problem.name)
+    });
+    lines.map(|line| format!("{line}\n")).collect()
+}
+
 /// Number of passed checks, and of all checks, of a problem in the output of [`text`].
 pub fn counts(text: &str, problem: &str) -> [usize; 2] {
-    let own = text.lines().filter(|line| line.get(7..).is_some_and(|rest| rest.starts_with(&format!("{problem}/"))));
-    own.fold([0, 0], |[right, all], line| [right + usize::from(line.starts_with("right")), all + 1])
+    of(text, problem).fold([0, 0], |[right, all], line| [right + usize::from(line.starts_with("right")), all + 1])
 }
 
 /// Markdown table with one row per problem: checks passed before (by the output of an earlier version) and now.
