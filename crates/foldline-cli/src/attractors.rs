@@ -5,7 +5,7 @@ use crate::failure::{Failure, Outcome};
 use crate::run::processors;
 use foldline::attractors::{Attractor, Sampling, Sense, whirl_sense};
 use foldline::contract::VectorField;
-use foldline::diagram::Solution;
+use foldline::diagram::{Shown, Solution};
 use foldline::explore::System;
 use foldline::explore::attractors;
 use foldline::model::Model;
@@ -69,13 +69,13 @@ fn line(attractor: &Attractor, model: &Model) -> String {
                 (None, Some(Sense::Backward)) => "backward whirl",
                 _ => "cycle",
             };
-            (kind, format!("{:.9}", cycle.period))
+            (kind, format!("{:.9}", Shown(cycle.period)))
         }
     };
     let ratio = attractor.ratio.map_or("·".to_string(), |(a, b)| format!("{a}:{b}"));
     let range = |r: &[f64; 2]| match r[0] == r[1] {
-        true => format!("{:.6}", r[0]),
-        false => format!("{:.6} … {:.6}", r[0], r[1]),
+        true => format!("{:.6}", Shown(r[0])),
+        false => format!("{:.6} … {:.6}", Shown(r[0]), Shown(r[1])),
     };
     let ranges: String = point.ranges.iter().map(|r| format!("  {:>24}", range(r))).collect();
     let share = attractor.share.map_or("·".to_string(), |share| {

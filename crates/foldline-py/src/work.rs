@@ -7,7 +7,7 @@ use crate::saving::save;
 use crate::solution::Solution;
 use crate::study::Study;
 use foldline::contract::{Event, Observer, Verdict};
-use foldline::diagram::{self, Branch, Point};
+use foldline::diagram::{self, Branch, Point, Shown};
 use foldline::explore;
 use foldline_store::run_file::{Recorder, RunFileError};
 use foldline_store::{short, study_file};
@@ -112,7 +112,12 @@ struct Watch {
 impl Watch {
     fn place(&self, branch: &Branch, point: &Point) -> String {
         let (name, value) = (self.names.get(branch.free), point.parameters.get(branch.free));
-        format!("{} at {} = {:.6}", branch.name, name.map_or("", String::as_str), value.copied().unwrap_or(f64::NAN))
+        format!(
+            "{} at {} = {:.6}",
+            branch.name,
+            name.map_or("", String::as_str),
+            Shown(value.copied().unwrap_or(f64::NAN))
+        )
     }
 }
 
@@ -129,7 +134,7 @@ impl Observer for Watch {
             }
             Event::Special(..) => seen().special += 1,
             Event::Visited(name, value, done, of) => {
-                seen().place = format!("{name}: {done} of {of} values, at {value:.6}")
+                seen().place = format!("{name}: {done} of {of} values, at {:.6}", Shown(value))
             }
             Event::Note(about, note) | Event::Short(about, note) => {
                 let mut notes = self.notes.lock().unwrap_or_else(PoisonError::into_inner);
