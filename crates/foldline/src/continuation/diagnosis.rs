@@ -159,7 +159,7 @@ impl Follow<'_> {
             ),
             _ => (
                 "the solution changes over a much shorter way than the scales of states and parameters suggest".into(),
-                "give each state its `scale` in the model file, and the parameter a value of its typical size",
+                "give each state and the parameter its `scale` in the model file",
             ),
         }
     }
