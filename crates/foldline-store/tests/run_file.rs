@@ -482,11 +482,13 @@ fn numbers_can_be_read_by_name_without_this_program() {
     assert_eq!(row, (3.0 / 7.0, 0.0, 1.0 / 3.0, 1));
 }
 
-/// Makes a file of version 7 of one of version 8.
+/// Makes a file of version 7 of one of version 9.
 const WITHOUT_ERRORS: &str = "
     UPDATE special_points SET scalar_bytes = CAST(substr(scalar_bytes, 1, 80) AS BLOB), numbers_checksum = NULL;
     ALTER TABLE special_points DROP COLUMN coefficient_count;
     ALTER TABLE special_points DROP COLUMN normal_form_remark;
+    ALTER TABLE branches DROP COLUMN unit; ALTER TABLE branches DROP COLUMN held_unit;
+    ALTER TABLE points DROP COLUMN slope_error; ALTER TABLE special_points DROP COLUMN slope_error;
     PRAGMA user_version = 7;";
 
 /// Makes a file of version 3 of one of version 4 to 7, then one of version 2.
@@ -509,6 +511,10 @@ fn without_errors(mut diagram: Diagram) -> Diagram {
         special.coefficient_errors.clear();
         special.remark.clear();
     }
+    for branch in &mut diagram.branches {
+        let special = branch.special.iter_mut().map(|special| &mut special.point);
+        branch.points.iter_mut().chain(special).for_each(|point| point.trust.slope = 0.0);
+    }
     diagram
 }
 
@@ -516,6 +522,8 @@ fn without_errors(mut diagram: Diagram) -> Diagram {
 const VERSION_7: &str = "
     ALTER TABLE special_points DROP COLUMN coefficient_count;
     ALTER TABLE special_points DROP COLUMN normal_form_remark;
+    ALTER TABLE branches DROP COLUMN unit; ALTER TABLE branches DROP COLUMN held_unit;
+    ALTER TABLE points DROP COLUMN slope_error; ALTER TABLE special_points DROP COLUMN slope_error;
     PRAGMA user_version = 7;";
 
 #[test]

@@ -47,6 +47,8 @@ const LATER_NUMBERS: &str = ", evaluations, linearisations";
 const CHECKED_NUMBERS: &str = ", numbers_checksum";
 /// Likewise, since format 6.
 const FORCED_NUMBERS: &str = ", forcing_periods";
+/// Likewise, since format 9.
+const SLOPES: &str = ", slope_error";
 /// Likewise, since format 7.
 const AVERAGES: &str = ", average_bytes";
 const OF_SPECIAL: &str = "kind, unstable_before, unstable_after";
@@ -190,9 +192,14 @@ pub(super) fn load_diagram(connection: &Connection, path: &Path, part: Part) -> 
                 .pragma_query_value(None, "user_version", |row| row.get(0))
                 .map_err(|error| RunFileError::from_sqlite(path, error))?;
             let since = |format: i64, own: &'static str| if version < format { "" } else { own };
-            let later =
-                [since(3, LATER_NUMBERS), since(4, CHECKED_NUMBERS), since(6, FORCED_NUMBERS), since(7, AVERAGES)]
-                    .concat();
+            let later = [
+                since(3, LATER_NUMBERS),
+                since(4, CHECKED_NUMBERS),
+                since(6, FORCED_NUMBERS),
+                since(7, AVERAGES),
+                since(9, SLOPES),
+            ]
+            .concat();
             let numbers = format!("{NUMBERS}{later}");
             (numbers.clone(), format!("{numbers}, {OF_SPECIAL}{}", since(8, COEFFICIENT_ERRORS)))
         }
