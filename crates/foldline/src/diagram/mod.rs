@@ -233,8 +233,8 @@ impl Point {
     }
 }
 
-/// Slope dλ/ds, λ relative to the scale of the parameter, below which the parameter is constant along a branch up to rounding. Order of magnitude: the machine precision times a
-/// condition number of 1e7.
+/// Slope dλ/ds, λ relative to the scale of the parameter, below which the parameter is constant along a branch up to rounding. Order of
+/// magnitude: the machine precision times a condition number of 1e7.
 pub(crate) const STANDS: f64 = 1e-9;
 /// Slope below which no branch point is told from a fold, and a branch may be one at a single parameter value.
 pub(crate) const FLAT: f64 = 1e-6;

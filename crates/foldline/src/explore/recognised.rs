@@ -106,7 +106,7 @@ impl Growth<'_> {
         let Ending::Joined { at, parameter } = ending else { return ending };
         let free = branch.free;
         let value = |s: &SpecialPoint| s.point.parameters.get(free).copied().unwrap_or(0.0);
-        let unit_size = branch.size(parameter);
+        let size = branch.size(parameter);
         let Some(last) = (if side == 1 { branch.points.last() } else { branch.points.first() }) else { return ending };
         let fits = |s: &&SpecialPoint| {
             let periods = (last.solution.period(), s.point.solution.period());
@@ -114,7 +114,7 @@ impl Growth<'_> {
                 (Some(long), Some(short)) if at == Kind::PeriodDoubling => (0.5 * long / short - 1.0).abs() < 0.02,
                 _ => true,
             };
-            s.kind == at && right_period && (value(s) - parameter).abs() < 1e-2 * unit_size
+            s.kind == at && right_period && (value(s) - parameter).abs() < 1e-2 * size
         };
         let gap = |s: &SpecialPoint| (value(s) - parameter).abs();
         let Some(parent) = self.parents.iter().filter(fits).min_by(|a, b| gap(a).total_cmp(&gap(b))) else {

@@ -101,7 +101,7 @@ impl<'a> System<'a> {
         }
     }
 
-    /// The same with the units in which the tangents of a diagram are, so that its branches can be continued.
+    /// Adopts the scales in which the tangents of a diagram are stored, so that its branches can be continued.
     pub fn in_units_of(mut self, diagram: &Diagram) -> System<'a> {
         for branch in diagram.branches.iter().filter(|branch| !branch.points.is_empty()) {
             let held = branch.held.map(|(_, first)| first);
