@@ -12,6 +12,7 @@
 //! | are these the same special points? | [`same`] |
 //! | how large are the errors really? | [`errors`] |
 //! | is every change of stability explained? | [`explained`] |
+//! | do units matter? | [`rescaled`] |
 //! | what is reported? | [`report`] |
 //! | how long may it take? | [`watch`] |
 //! | are published and independent results reproduced? | [`outside`] |
@@ -23,6 +24,7 @@ pub mod explained;
 pub mod outside;
 pub mod random;
 pub mod report;
+pub mod rescaled;
 pub mod rotor;
 pub mod routes;
 pub mod same;

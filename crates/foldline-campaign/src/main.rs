@@ -1,9 +1,9 @@
 //! `foldline-campaign [COUNT] [OPTIONS]`: what `cargo xtask campaign` runs.
 
-use foldline_campaign::{LIMIT, campaign, cases, drawn, rotor};
+use foldline_campaign::{LIMIT, campaign, cases, drawn, rescaled, rotor};
 use std::process::ExitCode;
 
-const USAGE: &str = "foldline-campaign [COUNT] [--random COUNT] [--classical STARTS] [--from NUMBER] [--only TEXT] [--verbose]
+const USAGE: &str = "foldline-campaign [COUNT] [--random COUNT] [--classical STARTS] [--from NUMBER] [--only TEXT] [--rescaled [DRAWS]] [--verbose]
   COUNT        how many random rotors, 200 if not said
   --random     how many cases of neurons, kinetics, ecology, coupled cells and forced oscillators with random parameters, 240 if
                not said
@@ -11,6 +11,8 @@ const USAGE: &str = "foldline-campaign [COUNT] [--random COUNT] [--classical STA
   --classical  starts for each classical problem, 5 if not said
   --only       only cases whose name contains TEXT
   --tolerance  instead of 1e-6
+  --rescaled   instead of that: every case once more with each state, each parameter and the time in units of its own, powers
+               of ten from 1e-12 to 1e12, DRAWS times (1 if not said)
   --limit      seconds for each case, 300 if not said
   --jobs       threads, one for each core if not said
   --verbose    a line for each case
@@ -32,12 +34,17 @@ fn answer() -> Result<bool, String> {
     let mut limit = LIMIT;
     let mut jobs = std::thread::available_parallelism().map_or(1, |n| n.get());
     let (mut verbose, mut trace, mut tolerance) = (false, false, None);
-    let mut rest = std::env::args().skip(1);
+    let mut draws = None;
+    let mut rest = std::env::args().skip(1).peekable();
     while let Some(argument) = rest.next() {
         let mut number =
             |what: &str| rest.next().and_then(|text| text.parse().ok()).ok_or_else(|| format!("{what} needs a number"));
         match argument.as_str() {
             "--from" => from = number("--from")?,
+            "--rescaled" => {
+                let given = rest.next_if(|text| text.parse::<usize>().is_ok());
+                draws = Some(given.and_then(|text| text.parse().ok()).unwrap_or(1));
+            }
             "--random" => random = number("--random")?,
             "--limit" => limit = std::time::Duration::from_secs(number("--limit")? as u64),
             "--jobs" => jobs = number("--jobs")?,
@@ -57,6 +64,13 @@ fn answer() -> Result<bool, String> {
         .for_each(|(case, own)| case.tolerance = own.unwrap_or(case.tolerance));
     all.retain(|case| case.name.contains(&only));
     let start = std::time::Instant::now();
+    if let Some(draws) = draws {
+        let report = rescaled::rescaled(&all, draws, limit, &|report| {
+            report.differences.iter().for_each(|line| eprintln!("{line}"));
+        });
+        print!("{report}");
+        return Ok(report.differences.is_empty());
+    }
     let report = campaign(&all, jobs, limit, &|index, report| {
         if verbose {
             eprintln!(

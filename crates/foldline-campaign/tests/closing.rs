@@ -17,8 +17,10 @@ a = "(r - 1)^2 - y^2 - D^2*p/r"
 b = "2*(r - 1)*y - D^2*x/r"
 [states.x]
 equation = "0.765*a - 0.644*b"
+scale = 1
 [states.y]
 equation = "0.644*a + 0.765*b"
+scale = 1
 "#;
 
 #[test]

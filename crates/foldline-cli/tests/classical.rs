@@ -21,7 +21,7 @@ fn explored(model: &str, seed: &str, branch: &str) -> Diagram {
         "model = \"m\"\ntolerance = {TOLERANCE}\n[[seed]]\nname = \"s\"\n{seed}\n[[branch]]\nname = \"b\"\nfrom = \"s\"\n{branch}\n"
     );
     let study = parse_study(&text, "study", model, "model").unwrap_or_else(|found| panic!("{found:?}"));
-    let system = System::of(&study.model, &study.plan.seeds[0].parameters);
+    let system = System::of_plan(&study.model, &study.plan);
     explore::run(&system, &study.plan, 1, Diagram::default(), &Unobserved)
 }
 

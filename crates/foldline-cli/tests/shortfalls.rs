@@ -29,7 +29,8 @@ fn with_files(files: &[(&str, &str)]) -> tempfile::TempDir {
 
 /// A Hopf point at mu = 0, next to which the right-hand side is not finite: no cycle can be found.
 const SWALLOWED: &str = "name = \"swallowed\"\n[parameters]\nmu = -1\n[definitions]\n\
-    gap = \"if(x^2 + y^2 < 1e-20, 0, log(-x^2 - y^2))\"\n[states]\nx = \"mu*x - y + gap\"\ny = \"x + mu*y\"\n";
+    gap = \"if(x^2 + y^2 < 1e-20, 0, log(-x^2 - y^2))\"\n[states]\n\
+    x = { equation = \"mu*x - y + gap\", scale = 1 }\ny = { equation = \"x + mu*y\", scale = 1 }\n";
 const SWITCHED: &str = "model = \"m.toml\"\n[[seed]]\nname = \"rest\"\nstate = { x = 0, y = 0 }\n\
     [[branch]]\nname = \"steady\"\nfrom = \"rest\"\nfree = \"mu\"\nrange = [-1, 1]\nswitch = { hopf = 1 }\n";
 /// Chaos at these parameters (Lorenz 1963).

@@ -37,7 +37,7 @@ pub fn model(text: &str) -> bool {
     if n > 50 || q > 50 {
         return true;
     }
-    let states: Vec<f64> = model.states.iter().map(|s| 0.3 * s.range[0] + 0.7 * s.range[1]).collect();
+    let states: Vec<f64> = model.ranges().iter().map(|[low, high]| 0.3 * low + 0.7 * high).collect();
     let parameters = model.defaults();
     let free: Vec<usize> = (0..q).collect();
     let at = Batch { lanes: 1, states: &states, parameters: Parameters::Shared(&parameters), times: &[] };

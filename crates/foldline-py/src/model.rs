@@ -54,10 +54,10 @@ impl Model {
         self.model.parameters.iter().map(|p| ((&*p.name, &*p.unit, &*p.description), p.value)).collect()
     }
 
-    /// Name, unit, description, scale and range of each.
+    /// Name, unit, description, and scale and range where the model states them, of each.
     #[getter]
-    fn states(&self) -> Vec<(Named<'_>, f64, (f64, f64))> {
-        let row = |s: &foldline::model::State| (s.scale, (s.range[0], s.range[1]));
+    fn states(&self) -> Vec<(Named<'_>, Option<f64>, Option<(f64, f64)>)> {
+        let row = |s: &foldline::model::State| (s.scale, s.range.map(|[low, high]| (low, high)));
         let named = self.model.states.iter().map(|s| ((&*s.name, &*s.unit, &*s.description), row(s)));
         named.map(|(named, (scale, range))| (named, scale, range)).collect()
     }

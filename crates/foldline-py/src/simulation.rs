@@ -49,7 +49,8 @@ fn course(
     tolerance: f64,
     stop: &AtomicBool,
 ) -> (Vec<f64>, Vec<f64>, Outcome) {
-    let absolute = model.scales().iter().chain([&1.0]).map(|scale| tolerance * scale).collect();
+    let scales = foldline::explore::scales_from(model, start, parameters);
+    let absolute = scales.iter().chain([&1.0]).map(|scale| tolerance * scale).collect();
     let field = Clocked(model);
     let integrator = Integrator::new(&field, parameters, Tolerance { relative: tolerance, absolute });
     let n = model.dim();

@@ -90,9 +90,10 @@ fn failing_everywhere(model: &Model, parameters: &[f64]) -> Option<(usize, Vec<f
 fn probes(model: &Model) -> Vec<Vec<f64>> {
     const COUNT: usize = 16;
     let golden = 0.618_033_988_749_895;
+    let ranges = model.ranges();
     let place = |sample: usize| {
         let share = |i: usize| if sample == COUNT { 0.5 } else { (golden * (1 + sample * (i + 1)) as f64).fract() };
-        model.states.iter().enumerate().map(|(i, s)| s.range[0] + share(i) * (s.range[1] - s.range[0])).collect()
+        ranges.iter().enumerate().map(|(i, [low, high])| low + share(i) * (high - low)).collect()
     };
     (0..=COUNT).map(place).collect()
 }

@@ -50,6 +50,14 @@ pub fn parse_model(text: &str, file: &str) -> Result<Model, Vec<Diagnostic>> {
     }
 }
 
+/// Reads a model text without compiling it; `file` is its name in messages. Mistakes in expressions are not found.
+pub fn parse_source(text: &str, file: &str) -> Result<ModelSource, Vec<Diagnostic>> {
+    let (walk, root) = Walk::parse(text, file)?;
+    let mut reader = Reader { walk, text, places: HashMap::new(), forcing_misspelt: false };
+    let source = reader.source(&root, file);
+    if reader.walk.found.is_empty() { Ok(source) } else { Err(reader.walk.found) }
+}
+
 /// Reads the tables and remembers where everything stands.
 struct Reader<'t> {
     walk: Walk<'t>,
@@ -198,14 +206,11 @@ impl Reader<'_> {
         }
         if let Some(value) = table.get("scale") {
             self.places.insert((Item::State(i), Field::Scale), value.span());
-            state.scale = self.walk.number(value, &format!("the scale of `{name}`")).unwrap_or(1.0);
+            state.scale = self.walk.number(value, &format!("the scale of `{name}`"));
         }
-        // A scale that is not positive is reported as such; the range should not be blamed for it.
-        let reach = if state.scale > 0.0 { 2.0 * state.scale } else { 2.0 };
-        state.range = [-reach, reach];
         if let Some(value) = table.get("range") {
             self.places.insert((Item::State(i), Field::Range), value.span());
-            state.range = self.pair(value, &format!("the range of `{name}`")).unwrap_or(state.range);
+            state.range = self.pair(value, &format!("the range of `{name}`"));
         }
         state
     }

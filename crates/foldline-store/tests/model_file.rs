@@ -35,7 +35,7 @@ fn every_published_model_compiles_and_is_finite() {
         let p = model.defaults();
         // Both ends and the middle of the sampling ranges.
         for share in [0.0, 0.5, 1.0] {
-            let x: Vec<f64> = model.states.iter().map(|s| s.range[0] + share * (s.range[1] - s.range[0])).collect();
+            let x: Vec<f64> = model.ranges().iter().map(|[low, high]| low + share * (high - low)).collect();
             let at = Batch { lanes: 1, states: &x, parameters: Parameters::Shared(&p), times: &[] };
             let (mut f, mut outputs) = (vec![0.0; model.dim()], vec![0.0; model.output_count()]);
             model.evaluate(at, &mut f);
@@ -77,8 +77,9 @@ fn a_model_is_read_in_the_order_of_the_file() {
     assert_eq!(model.name, "oscillator");
     assert_eq!(model.defaults(), [1.5, 2.0]);
     assert_eq!(model.states.iter().map(|s| s.name.as_str()).collect::<Vec<_>>(), ["y", "x"]);
-    assert_eq!((model.states[0].scale, model.states[0].range), (3.0, [-6.0, 6.0]));
-    assert_eq!((model.states[1].scale, model.states[1].range), (1.0, [-1.0, 2.5]));
+    assert_eq!((model.states[0].scale, model.states[0].range), (Some(3.0), None));
+    assert_eq!((model.states[1].scale, model.states[1].range), (None, Some([-1.0, 2.5])));
+    assert_eq!((model.scales(), model.ranges()), (vec![3.0, 0.875], vec![[-6.0, 6.0], [-1.0, 2.5]]));
     assert_eq!(model.states[1].unit, "m");
     assert_eq!(model.outputs[1].unit, "W");
     assert_eq!(model.whirl, Some([1, 0]));

@@ -325,6 +325,11 @@ pub trait Condition {
         self.extra() + 1
     }
 
+    /// Characteristic size of the extra unknowns at the place of the last evaluation.
+    fn extra_scale(&self) -> f64 {
+        1.0
+    }
+
     /// First values `[e]` of the extra unknowns, from the spectrum of a point close to the special one.
     fn guess(&self, point: &Point) -> Vec<f64>;
 

@@ -2,6 +2,7 @@
 
 use super::bytes::texts_checksum;
 use crate::study_file::Study;
+use foldline::explore::state_scales;
 use std::collections::HashMap;
 
 /// What is written down about the run as a whole.
@@ -12,8 +13,12 @@ pub(super) fn description(study: &Study) -> Vec<(&'static str, String)> {
         .iter()
         .map(|s| serde_json::json!({ "name": s.name, "samples": s.samples, "random": s.random, "parameters": s.parameters }))
         .collect();
-    let settings =
-        serde_json::json!({ "tolerance": study.plan.tolerance, "degree": study.plan.degree, "seeds": seeds });
+    let names = study.model.states.iter().map(|state| state.name.clone());
+    let scales: serde_json::Map<String, serde_json::Value> =
+        names.zip(state_scales(&study.model, &study.plan).into_iter().map(Into::into)).collect();
+    let settings = serde_json::json!({
+        "tolerance": study.plan.tolerance, "degree": study.plan.degree, "state_scales": scales, "seeds": seeds
+    });
     vec![
         ("foldline", env!("CARGO_PKG_VERSION").to_string()),
         ("sqlite", rusqlite::version().to_string()),

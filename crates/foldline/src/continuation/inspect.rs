@@ -347,7 +347,13 @@ impl Follow<'_> {
     ) -> Option<Vec<Found>> {
         let ends = self.narrowed(stretch, right, cost);
         let [left, right] = [&ends[0], &ends[1]];
-        let error = discrepancy(&left.point, &right.point, left.parameter() - right.parameter(), right.parameter());
+        let error = discrepancy(
+            &self.settings,
+            &left.point,
+            &right.point,
+            left.parameter() - right.parameter(),
+            right.parameter(),
+        );
         if !self.settings.stability || error > self.settings.tolerance {
             return None;
         }

@@ -382,7 +382,13 @@ pub(super) fn locate_within(
         let (mut fine, off) = relocate(problem, settings, stretch, monitor, &coarse, Some(&finer), &mut slope, cost)?;
         let error = floor
             + off
-            + discrepancy(&coarse.point, &fine.point, coarse.parameter() - fine.parameter(), fine.parameter());
+            + discrepancy(
+                settings,
+                &coarse.point,
+                &fine.point,
+                coarse.parameter() - fine.parameter(),
+                fine.parameter(),
+            );
         let improved = known.as_ref().is_none_or(|(_, e)| error < *e);
         if error <= settings.tolerance {
             doubted(problem, &mut fine);
@@ -490,15 +496,16 @@ fn noise(
     if error.is_finite() { error } else { 0.0 }
 }
 
-/// Largest difference of the parameter, relative to its scale + |value|, and of period and ranges, relative to 1 + |value|. `gap` and
-/// `parameter` are the difference and the value of the unknown λ.
-pub(super) fn discrepancy(a: &Point, b: &Point, gap: f64, parameter: f64) -> f64 {
+/// Largest difference of the parameter and of the extremes of the states, relative to scale + |value|, of the period, relative to that,
+/// and of the extremes of outputs, relative to 1 + |value|. `gap` and `parameter` are the difference and the value of the unknown λ.
+pub(super) fn discrepancy(settings: &Settings, a: &Point, b: &Point, gap: f64, parameter: f64) -> f64 {
     let mut largest = gap.abs() / (1.0 + parameter.abs());
     if let (Some(x), Some(y)) = (a.solution.period(), b.solution.period()) {
-        largest = largest.max((x - y).abs() / (1.0 + y.abs()));
+        largest = largest.max((x - y).abs() / y.abs());
     }
-    for (x, y) in a.ranges.iter().flatten().zip(b.ranges.iter().flatten()) {
-        largest = largest.max((x - y).abs() / (1.0 + y.abs()));
+    let scales = settings.scales.iter().copied().chain(std::iter::repeat(1.0));
+    for ((x, y), scale) in a.ranges.iter().zip(&b.ranges).zip(scales) {
+        x.iter().zip(y).for_each(|(x, y)| largest = largest.max((x - y).abs() / (scale + y.abs())));
     }
     largest
 }

@@ -48,7 +48,7 @@ pub fn straddle(
         // On a mesh rounding dominates at closer nodes, which are used only if the interpolation is not yet accurate enough.
         if k == ON_A_MESH
             && !stretch.left.mesh.is_empty()
-            && REST * moved * rate(&nodes, &stations) < settings.tolerance
+            && REST * moved * rate(settings, &nodes, &stations) < settings.tolerance
         {
             break;
         }
@@ -75,7 +75,7 @@ pub fn straddle(
         return Err(Failure::Unexplained);
     }
     let mut coarse = blend(problem, &nodes, &stations, root, stretch.left, stretch.direction);
-    let floor = 10.0 * settings.newton_tolerance() + REST * moved * rate(&nodes, &stations);
+    let floor = 10.0 * settings.newton_tolerance() + REST * moved * rate(settings, &nodes, &stations);
     let mut error = floor;
     for _ in 0..3 {
         problem.set_mesh(&coarse.mesh);
@@ -94,7 +94,7 @@ pub fn straddle(
         stations = refined;
         let fine = blend(problem, &nodes, &stations, root, stretch.left, stretch.direction);
         let gap = coarse.parameter() - fine.parameter();
-        error = floor + discrepancy(&coarse.point, &fine.point, gap, fine.parameter());
+        error = floor + discrepancy(settings, &coarse.point, &fine.point, gap, fine.parameter());
         coarse = fine;
         if error <= settings.tolerance {
             break;
@@ -104,9 +104,10 @@ pub fn straddle(
 }
 
 /// Rate of change of the point along the curve between the inner nodes, in the measure of [`discrepancy`].
-fn rate(nodes: &[f64; 4], stations: &[Station]) -> f64 {
+fn rate(settings: &Settings, nodes: &[f64; 4], stations: &[Station]) -> f64 {
     let [_, a, b, _] = stations else { return 0.0 };
-    discrepancy(&a.point, &b.point, a.parameter() - b.parameter(), b.parameter()) / (nodes[2] - nodes[1]).abs()
+    discrepancy(settings, &a.point, &b.point, a.parameter() - b.parameter(), b.parameter())
+        / (nodes[2] - nodes[1]).abs()
 }
 
 /// Values at `s` of the Lagrange polynomials of the nodes.

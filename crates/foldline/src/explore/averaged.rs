@@ -25,6 +25,7 @@
 use crate::attractors::Candidate;
 use crate::contract::{Batch, Parameters, VectorField};
 use crate::linalg::lu;
+use crate::linalg::size_in_any_units;
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 
@@ -56,8 +57,7 @@ impl Mode {
     pub(super) fn of(matrix: &[f64], rate: Complex64, halves: &[f64]) -> Option<Mode> {
         let n = halves.len();
         // (A - z) (a + ib) as a real system of twice the size; a shift of the size of rounding keeps it regular.
-        let largest = matrix.iter().fold(rate.norm(), |m, a| m.max(a.abs()));
-        let shifted = rate + 1e-14 * largest;
+        let shifted = rate + 1e-14 * rate.norm().max(size_in_any_units(matrix, n));
         let (mut real, mut pivots) = (vec![0.0; 4 * n * n], vec![0; 2 * n]);
         for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
             let own = matrix[i * n + j] - if i == j { shifted.re } else { 0.0 };

@@ -26,7 +26,7 @@ impl<'c> Choice<'c> {
     /// Selects the attractors of a census that match a key; mirror images count once.
     pub(super) fn of(system: &System, tolerance: f64, census: &'c Census, key: &AttractorKey) -> Choice<'c> {
         let size = |a: &Attractor| match &a.point.solution {
-            Solution::Equilibrium(x) => crate::linalg::dot(x, x),
+            Solution::Equilibrium(x) => system.norm(x),
             Solution::Cycle(_) => f64::INFINITY,
         };
         let mut fitting: Vec<&Attractor> =

@@ -81,10 +81,10 @@ pub fn crossings(
             if mesh.is_empty() { first.tangent.clone() } else { problem.transfer(&first.tangent, &first.mesh, &mesh) };
         problem.set_mesh(&mesh);
         problem.anchor(&u);
-        let mut line: Vec<f64> =
-            kernel.iter().chain([&at.point.tangent]).map(|own| problem.dot(&tangent, own)).collect();
+        // The share along the parent grows with the distance at which the branch was reached, and tells no two apart.
+        let along = problem.dot(&tangent, &at.point.tangent).abs();
+        let mut line: Vec<f64> = kernel.iter().map(|own| problem.dot(&tangent, own)).collect();
         normalise(&mut line);
-        let along = line[dimension].abs();
         let known = lines.iter().any(|other| dot(other, &line).abs() > ALIKE);
         if along < ALIKE && !known {
             lines.push(line);
@@ -137,6 +137,8 @@ fn shift_along(
     let size = u.len();
     let beside: Vec<f64> = u.iter().zip(tangent).map(|(x, t)| x + 1e-8 * t).collect();
     problem.factorise(&beside, tangent).ok()?;
+    let away: Vec<f64> = guess.iter().zip(u).map(|(a, b)| a - b).collect();
+    let distance = problem.dot(&away, &away).sqrt();
     let (mut r, mut x) = (vec![0.0; size], vec![0.0; size]);
     let mut part = |at: &[f64]| -> Option<Vec<f64>> {
         if !problem.residual(at, &mut r) {
@@ -146,11 +148,9 @@ fn shift_along(
         problem.solve(&r, &mut x);
         Some(kernel.iter().map(|own| problem.dot(&x, own)).collect())
     };
-    let away: Vec<f64> = guess.iter().zip(u).map(|(a, b)| a - b).collect();
     let at_rest = part(u)?;
     let here = part(guess)?;
     let mut moved = guess.to_vec();
-    let distance = dot(&away, &away).sqrt();
     axpy(distance, tangent, &mut moved);
     let there = part(&moved)?;
     let change: Vec<f64> = there.iter().zip(&here).map(|(a, b)| (a - b) / distance).collect();

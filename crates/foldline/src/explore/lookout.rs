@@ -6,7 +6,6 @@ use super::growth::{polished, setting, settings};
 use super::plan::ExplorePlan;
 use super::seeds::{attractors, bare, sampling};
 use crate::diagram::{Point, Solution};
-use crate::linalg::dot;
 use crate::problem::equilibrium::EquilibriumProblem;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Condvar, Mutex, PoisonError};
@@ -79,7 +78,7 @@ impl<'l> Lookout<'l> {
             }
         }
         let size = |point: &Point| match &point.solution {
-            Solution::Equilibrium(x) => dot(x, x),
+            Solution::Equilibrium(x) => system.norm(x),
             Solution::Cycle(_) => f64::INFINITY,
         };
         found.sort_by(|a, b| size(a).total_cmp(&size(b)));

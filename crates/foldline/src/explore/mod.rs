@@ -8,6 +8,7 @@
 //! |---|---|
 //! | what is asked for? | [`plan`] |
 //! | which vector field, which scales, which symmetries? | [`system`] |
+//! | how large are the states? | `sizes` |
 //! | how often is the vector field evaluated? | `counted` |
 //! | how does a run end at once? | `interrupt` |
 //! | where do first solutions come from? | [`seeds`] |
@@ -49,6 +50,7 @@ mod resonances;
 mod responses;
 mod schedule;
 pub mod seeds;
+mod sizes;
 pub mod switch;
 mod symmetry;
 pub mod system;
@@ -64,6 +66,7 @@ pub use plan::{
     SweepPlan, Switching,
 };
 pub use seeds::{attractors, first_solution};
+pub use sizes::{scales_from, state_scales};
 pub use system::System;
 
 use crate::contract::Observer;

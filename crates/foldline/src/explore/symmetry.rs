@@ -115,8 +115,9 @@ pub(super) fn keeps_energy(system: &System, parameters: &[f64]) -> bool {
         return false;
     }
     let Some(pairs) = pairs(&places, n) else { return false };
-    let size = places.iter().fold(0.0, |m: f64, place| m.max(max_abs(&place.fx)));
-    let slope = |place: &Place, of: usize, by: usize| place.fx[of * n + by];
+    let slope = |place: &Place, of: usize, by: usize| place.fx[of * n + by] * system.scales[by] / system.scales[of];
+    let entries = |place: &Place| (0..n * n).fold(0.0, |most: f64, k| most.max(slope(place, k / n, k % n).abs()));
+    let size = places.iter().fold(0.0, |most: f64, place| most.max(entries(place)));
     let undamped = |place: &Place, v: usize, w: usize| slope(place, v, w).abs() <= ROUNDING * size;
     // The ratio of two masses is taken from the first point.
     let potential = |place: &Place, [x, v]: [usize; 2], [y, w]: [usize; 2]| {

@@ -1,6 +1,7 @@
 //! A vector field together with what exploring it needs to know.
 
 use super::plan::{ExplorePlan, Plan};
+use super::sizes;
 use crate::contract::{Batch, Parameters, VectorField};
 use crate::diagram::Diagram;
 use crate::model::Model;
@@ -53,16 +54,22 @@ impl<'a> System<'a> {
     /// The system of a model at given parameters, with the scales and ranges of its states and the symmetries that it has
     /// there.
     pub fn of(model: &'a Model, parameters: &[f64]) -> System<'a> {
-        let mut system = System {
-            state_names: model.states.iter().map(|s| s.name.clone()).collect(),
-            scales: model.states.iter().map(|s| s.scale).collect(),
-            parameter_scales: System::sized(model, &Plan::empty(1.0, 1)),
-            ranges: model.states.iter().map(|s| s.range).collect(),
-            whirl: model.whirl,
-            ..System::new(model)
-        };
+        let mut system = System::measured(model, &Plan::empty(1.0, 1), &[sizes::origin(model, parameters)]);
         system.find_reflections(parameters);
         system
+    }
+
+    /// The system without symmetries, states measured by what is met from these places.
+    fn measured(model: &'a Model, plan: &Plan, places: &[sizes::Place]) -> System<'a> {
+        let scales = sizes::of_states(model, places);
+        System {
+            state_names: model.states.iter().map(|s| s.name.clone()).collect(),
+            parameter_scales: System::sized(model, plan),
+            ranges: model.states.iter().zip(&scales).map(|(state, scale)| state.range_at(*scale)).collect(),
+            scales,
+            whirl: model.whirl,
+            ..System::new(model)
+        }
     }
 
     /// The system of a plan. Only a symmetry that holds wherever the plan goes counts: at every seed, and with the
@@ -73,20 +80,30 @@ impl<'a> System<'a> {
         places.extend(plan.seeds.iter().map(|seed| away(plan, &seed.parameters)));
         places.extend(plan.surveys.iter().map(|survey| survey.parameters.clone()));
         places.extend(plan.explorations.iter().map(inside));
-        let mut systems = places.iter().map(|place| System::of(model, place));
-        let Some(mut common) = systems.next() else { return System::new(model) };
+        let measured = System::measured(model, plan, &sizes::places(model, plan));
+        let mut systems = places.iter().map(|place| {
+            let mut there = measured.clone();
+            there.find_reflections(place);
+            there
+        });
+        let Some(mut common) = systems.next() else { return measured };
         for other in systems {
             let kept: Vec<bool> = common.reflections.iter().map(|own| other.reflections.contains(own)).collect();
             common.reflections.retain(|reflection| other.reflections.contains(reflection));
             let mut kept = kept.into_iter();
             common.mirrors.retain(|_| kept.next().unwrap_or(true));
         }
-        System { parameter_scales: System::sized(model, plan), ..common }
+        common
     }
 
     /// Characteristic size of a parameter.
     pub fn unit(&self, index: usize) -> f64 {
         self.parameter_scales.get(index).copied().unwrap_or(1.0)
+    }
+
+    /// Euclidean norm of a state `[n]` in units of the scales.
+    pub(super) fn norm(&self, x: &[f64]) -> f64 {
+        x.iter().zip(&self.scales).map(|(x, scale)| (x / scale).powi(2)).sum::<f64>().sqrt()
     }
 
     /// Characteristic size of a quantity: that of its parameter or state, 1 for outputs and integrals, 0 for the period, which is itself one.

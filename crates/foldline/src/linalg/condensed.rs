@@ -14,6 +14,9 @@
 //!   (4)  Σ_j ⟨p_j, (x_j, X_j)⟩ + D σ = s                     border,     q rows
 //! ```
 //!
+//! Components of very different sizes would be rounded, and pivots chosen, as if all were of one size. With D = diag of a power of two near
+//! the size of each component, what is factorised are D⁻¹ A D, and likewise the other parts: that rounds nothing.
+//!
 //! Condensed: x_{j+1} = G_j x_j + g_j σ + h_j, the links of a [`Chain`]. With W lanes and L = ⌈N / W⌉, interval j is in lane
 //! ⌊j / L⌋ at place j mod L; intervals beyond N have length zero, so that their ends coincide.
 //!
@@ -60,8 +63,12 @@ pub struct Condensed<T> {
     step: Vec<T>,
     condensed_border: Vec<T>,
     pieces: Chain<T>,
-    /// `[n]`: sizes of the components, for the growth of errors.
+    /// `[n]`: sizes of the components over D, for the growth of errors.
     scale: Vec<f64>,
+    /// `[(m + 1) · n]`: D for the left end and the slots of an interval; empty where it is 1.
+    units: Vec<f64>,
+    /// `[n]`: D.
+    own_units: Vec<f64>,
     /// The same where errors do not grow within a piece, and whether that is so.
     products: Compound<T>,
     gentle: bool,
@@ -82,6 +89,7 @@ impl<T: Lane> Condensed<T> {
             end: end.to_vec(),
             nothing: vec![0.0; (m + 1) * n],
             scale: vec![1.0; n],
+            own_units: vec![1.0; n],
             ..Condensed::default()
         };
         let every = vec![true; n * n];
@@ -89,9 +97,20 @@ impl<T: Lane> Condensed<T> {
         system
     }
 
-    /// Says how large the components are, `[n]`.
-    pub fn measure_in(&mut self, scale: &[f64]) {
-        self.scale.copy_from_slice(scale);
+    /// Says how large the components are: characteristic sizes `[n]`, which do not change between factorisations of interest, and the sizes
+    /// `[n]` at present.
+    pub fn measure_in(&mut self, characteristic: &[f64], present: &[f64]) {
+        self.own_units.iter_mut().zip(characteristic).for_each(|(unit, size)| *unit = size.log2().round().exp2());
+        self.scale.iter_mut().zip(present.iter().zip(&self.own_units)).for_each(|(to, (size, unit))| *to = size / unit);
+        self.lay_units();
+    }
+
+    /// Puts D where it is needed.
+    fn lay_units(&mut self) {
+        self.units.clear();
+        if self.own_units.iter().any(|unit| *unit != 1.0) {
+            self.units.extend(self.order.iter().map(|at| self.own_units[at % self.n]));
+        }
     }
 
     /// Says which components the equations of each component contain, `[n × n]`: A is the identity except at (i, c), (k, d) with
@@ -112,6 +131,7 @@ impl<T: Lane> Condensed<T> {
         }
         self.shape = shape;
         self.tidy = false;
+        self.lay_units();
     }
 
     /// Makes A zero at a place, except where [`Condensed::couple`] was told that it may differ from the identity: those entries
@@ -180,6 +200,9 @@ impl<T: Lane> Condensed<T> {
         for (row, line) in to.chunks_exact_mut(n).zip(step.chunks_exact(width)) {
             row.iter_mut().zip(line).for_each(|(x, g)| *x = g.lanes()[lane]);
         }
+        if !self.units.is_empty() {
+            to.iter_mut().enumerate().for_each(|(k, x)| *x *= self.units[k / n] / self.units[k % n]);
+        }
     }
 
     /// Writes how the inner nodes of some intervals follow from their left ends, `[m][n × n][stride]` with an interval for each of the
@@ -189,13 +212,14 @@ impl<T: Lane> Condensed<T> {
         for (k, line) in to.chunks_exact_mut(stride).enumerate() {
             let (row, column) = (k / n, k % n);
             let own = self.slot(row / n, row % n) * width + column;
+            let unit = if self.units.is_empty() { -1.0 } else { -self.units[row % n] / self.units[column] };
             let mut j = piece.start;
             while j < piece.end {
                 let (lane, place) = (j / self.length, j % self.length);
                 let places = self.coupling[own + place * inner * width..].iter().step_by(inner * width);
                 let count = (self.length - place).min(piece.end - j);
                 let to = &mut line[j - piece.start..][..count];
-                to.iter_mut().zip(places).for_each(|(x, c)| *x = -c.lanes()[lane]);
+                to.iter_mut().zip(places).for_each(|(x, c)| *x = unit * c.lanes()[lane]);
                 j += count;
             }
         }
@@ -209,7 +233,7 @@ impl<T: Lane> Condensed<T> {
         T::dispatch(Condense(self))
     }
 
-    /// Eliminates the interval ends after [`Condensed::condense`]; `closure` is κ of (3).
+    /// Eliminates the interval ends, once after each [`Condensed::condense`]; `closure` is κ of (3).
     ///
     /// # Errors
     /// [`Singular`] if the remaining matrix is.
@@ -249,7 +273,20 @@ impl<T: Lane> Condensed<T> {
         out
     }
 
-    /// The way back.
+    /// Multiplies what was dealt by D, or by its inverse.
+    #[inline(always)]
+    fn convert(&self, dealt: &mut [T], inverse: bool) {
+        if self.units.is_empty() {
+            return;
+        }
+        for own in dealt.chunks_exact_mut(self.units.len()) {
+            for (x, unit) in own.iter_mut().zip(&self.units) {
+                *x = *x * T::splat(if inverse { 1.0 / unit } else { *unit });
+            }
+        }
+    }
+
+    /// The way back from [`Condensed::deal`].
     #[inline(always)]
     fn collect(&self, from: &[T], to: &mut [f64], block: usize) {
         let order = &self.order[..block];
@@ -347,6 +384,9 @@ impl<T: Lane> Condensed<T> {
     #[inline(always)]
     pub fn condense_at(&mut self, t: usize, [n, m, q]: [usize; 3]) -> Result<(), Singular> {
         let (inner, width) = (m * n, n + q);
+        if !self.units.is_empty() {
+            self.convert_at(t, [n, m, q]);
+        }
         let Condensed { interior, coupling, pivots, exchanged, step, shape, end, tiles, .. } = self;
         let a = &mut interior[t * inner * inner..(t + 1) * inner * inner];
         let w = &mut coupling[t * inner * width..(t + 1) * inner * width];
@@ -365,6 +405,22 @@ impl<T: Lane> Condensed<T> {
             }
         }
         Ok(())
+    }
+}
+
+impl<T: Lane> Condensed<T> {
+    /// D⁻¹ A D and D⁻¹ (B D, C) for the intervals at place t.
+    fn convert_at(&mut self, t: usize, [n, m, q]: [usize; 3]) {
+        let (inner, width) = (m * n, n + q);
+        let Condensed { interior, coupling, units, .. } = self;
+        let (ends, inside) = units.split_at(n);
+        for (i, own) in inside.iter().enumerate() {
+            let row = &mut interior[(t * inner + i) * inner..][..inner];
+            row.iter_mut().zip(inside).for_each(|(x, unit)| *x = *x * T::splat(unit / own));
+            let row = &mut coupling[(t * inner + i) * width..][..width];
+            let columns = ends.iter().copied().chain(std::iter::repeat(1.0));
+            row.iter_mut().zip(columns).for_each(|(x, unit)| *x = *x * T::splat(unit / own));
+        }
     }
 }
 
@@ -430,6 +486,11 @@ impl<T: Lane> pulp::NullaryFnOnce for Eliminate<'_, T> {
     #[inline(always)]
     fn call(self) -> Self::Output {
         let mut corner = self.0.corner.clone();
+        let (used, block) = (self.0.q * self.0.length * (self.0.m + 1) * self.0.n, (self.0.m + 1) * self.0.n);
+        let Condensed { border, units, .. } = &mut *self.0;
+        for row in border[..used].chunks_exact_mut(block) {
+            row.iter_mut().zip(&*units).for_each(|(x, unit)| *x = *x * T::splat(*unit));
+        }
         let taken = self.0.condense_border();
         corner.iter_mut().zip(&taken).for_each(|(d, t)| *d += total(*t));
         // One lane has the whole cycle in it, which is not to be multiplied out.
@@ -489,7 +550,7 @@ impl<T: Lane> Condensed<T> {
                 last[(n + r) * width + n + c] = corner[k] + total(pieces.corner[k]) + whole.corner[k];
             }
         }
-        lu::factorise(last, width, last_pivots)
+        lu::factorise_even(last, width, last_pivots)
     }
 
     /// Whether the matrix that is left is far from singular.
@@ -593,6 +654,7 @@ impl<T: Lane> Solve<'_, T> {
             true => vec![T::default(); length * block],
             false => system.deal(&rhs[..size], block),
         };
+        system.convert(&mut z, true);
         // Allocated at once.
         let mut room = vec![T::default(); length * n + 2 * n + 2 * q];
         let (h, rest) = room.split_at_mut(length * n);
@@ -649,6 +711,7 @@ impl<T: Lane> Solve<'_, T> {
                 *zi = *zi - dot(&line[..n], &end[..n]) - dot(&line[n..], &scalars[..q]);
             }
         }
+        system.convert(&mut z, false);
         system.collect(&z, x, block);
         x[size..].copy_from_slice(sigma);
     }
@@ -681,6 +744,7 @@ impl<T: Lane> pulp::NullaryFnOnce for SolveTransposed<'_, T> {
         let (width, block) = (n + q, (m + 1) * n);
         let size = intervals * block;
         let mut own = system.deal(&z[..size], block);
+        system.convert(&mut own, false);
         // Interior columns first: what they leave for the interval ends and the scalars.
         let mut ends = vec![T::default(); length * n];
         let mut sigma = vec![T::default(); q];
@@ -734,6 +798,7 @@ impl<T: Lane> pulp::NullaryFnOnce for SolveTransposed<'_, T> {
             }
             system.interior_solve(t, true, &mut out[n..]);
         }
+        system.convert(&mut own, true);
         system.collect(&own, y, block);
         y[size..].copy_from_slice(border);
     }

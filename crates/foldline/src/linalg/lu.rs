@@ -1,29 +1,78 @@
 //! LU factorisation of a small dense matrix.
 //!
-//! **Idea.** Gaussian elimination with row pivoting in place; pivots that vanish against the largest entry of their row are
-//! reported rather than divided by.
+//! **Idea.** Gaussian elimination with row pivoting in place. Which entry of a column is the largest depends on the units of the rows, which
+//! depend on those of the columns: what is compared are the entries of R A C, with R and C diagonal so that the largest entry of every row
+//! and of every column is of size 1. The matrix itself stays as it is, so that nothing is rounded.
+//!
+//! **Equations.** From R = C = 1, with A' = R A C, repeatedly
+//!
+//! ```text
+//!   (1)  R_i ← R_i / √(max_j |A'_ij|),   C_j ← C_j / √(max_i |A'_ij|)
+//! ```
+//!
+//! **Source.** ruiz2001 (the iteration (1)); higham2002, §9.8 (scaling and the choice of pivots).
 
 use crate::contract::Singular;
 
-/// Factorises the row-major n×n matrix `a` in place; `pivots` is `[n]`.
+/// Factorises the row-major n×n matrix `a` in place; `pivots` is `[n]`. Rows and columns may be of any units.
 ///
 /// # Errors
 /// [`Singular`] if a pivot is zero, not finite, or below 1e-300.
 pub fn factorise(a: &mut [f64], n: usize, pivots: &mut [usize]) -> Result<(), Singular> {
+    let mut rows = row_weights(a, n);
+    pivoted(a, n, pivots, &mut rows)
+}
+
+/// The same where all rows and columns are of one unit.
+///
+/// # Errors
+/// As there.
+pub fn factorise_even(a: &mut [f64], n: usize, pivots: &mut [usize]) -> Result<(), Singular> {
+    pivoted(a, n, pivots, &mut vec![1.0; n])
+}
+
+/// R of (1) `[n]`.
+fn row_weights(a: &[f64], n: usize) -> Vec<f64> {
+    /// Each halves the logarithms of what is left.
+    const ROUNDS: usize = 6;
+    let (mut rows, mut columns) = (vec![1.0; n], vec![1.0; n]);
+    for _ in 0..ROUNDS {
+        let (mut largest_in_row, mut largest_in_column) = (vec![0.0f64; n], vec![0.0f64; n]);
+        for (i, row) in a.chunks_exact(n.max(1)).enumerate() {
+            for (j, x) in row.iter().enumerate() {
+                let x = (rows[i] * x * columns[j]).abs();
+                largest_in_row[i] = largest_in_row[i].max(x);
+                largest_in_column[j] = largest_in_column[j].max(x);
+            }
+        }
+        let divide = |weights: &mut [f64], largest: &[f64]| {
+            let proper = weights.iter_mut().zip(largest).filter(|(_, largest)| **largest > 0.0 && largest.is_finite());
+            proper.for_each(|(weight, largest)| *weight /= largest.sqrt());
+        };
+        divide(&mut rows, &largest_in_row);
+        divide(&mut columns, &largest_in_column);
+    }
+    rows
+}
+
+/// Elimination with a weight `[n]` for every row that may become the pivot.
+fn pivoted(a: &mut [f64], n: usize, pivots: &mut [usize], weights: &mut [f64]) -> Result<(), Singular> {
     for k in 0..n {
         let mut p = k;
-        let mut best = a[k * n + k].abs();
+        let mut best = weights[k] * a[k * n + k].abs();
         for i in k + 1..n {
-            let candidate = a[i * n + k].abs();
+            let candidate = weights[i] * a[i * n + k].abs();
             if candidate > best {
                 (p, best) = (i, candidate);
             }
         }
+        let best = a[p * n + k].abs();
         if !(best > 1e-300 && best.is_finite()) {
             return Err(Singular);
         }
         pivots[k] = p;
         if p != k {
+            weights.swap(k, p);
             for c in 0..n {
                 a.swap(k * n + c, p * n + c);
             }

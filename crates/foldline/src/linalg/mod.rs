@@ -23,6 +23,13 @@ pub fn larger(a: f64, b: f64) -> f64 {
     std::hint::select_unpredictable((b > a) | b.is_nan(), b, a)
 }
 
+/// A size of the n×n matrix `a` that does not depend on the units of the components that it maps: the largest of |a_ii| and √|a_ij a_ji|,
+/// or of all entries where these are zero.
+pub fn size_in_any_units(a: &[f64], n: usize) -> f64 {
+    let size = (0..n * n).map(|k| (a[k] * a[k % n * n + k / n]).abs().sqrt()).fold(0.0, larger);
+    if size > 0.0 { size } else { max_abs(a) }
+}
+
 /// Largest absolute value; NaN if any entry is NaN.
 pub fn max_abs(v: &[f64]) -> f64 {
     let (blocks, rest) = v.as_chunks::<8>();

@@ -121,7 +121,7 @@ fn grouped(factors: &[f64], p: usize) -> Vec<f64> {
 pub(crate) fn condition(matrix: &mut [f64], p: usize) -> f64 {
     let mean = (matrix.iter().map(|x| x * x).sum::<f64>() / p as f64).sqrt();
     let mut pivots = vec![0; p];
-    match super::lu::factorise(matrix, p, &mut pivots) {
+    match super::lu::factorise_even(matrix, p, &mut pivots) {
         Ok(()) => (p as f64 * mean.ln() - super::lu::determinant(matrix, p, &pivots).1).exp(),
         Err(_) => f64::INFINITY,
     }
@@ -159,7 +159,7 @@ pub fn log_determinant(grouped: &[f64], p: usize) -> f64 {
     let mut pivots = vec![0; p];
     let of = |factor: &[f64]| {
         let mut lu = factor.to_vec();
-        super::lu::factorise(&mut lu, p, &mut pivots)
+        super::lu::factorise_even(&mut lu, p, &mut pivots)
             .map_or(f64::NEG_INFINITY, |()| super::lu::determinant(&lu, p, &pivots).1)
     };
     grouped.chunks_exact((p * p).max(1)).map(of).sum()

@@ -229,11 +229,11 @@ impl<'a> Check<'a> {
             }
         }
         for (i, state) in self.source.states.iter().enumerate() {
-            if !(state.scale > 0.0 && state.scale.is_finite()) {
+            if let Some(scale) = state.scale.filter(|scale| !(*scale > 0.0 && scale.is_finite())) {
                 let hint = "write the characteristic size of this state, a positive number";
-                self.report(Item::State(i), Field::Scale, format!("the scale {} is not positive", state.scale), hint);
+                self.report(Item::State(i), Field::Scale, format!("the scale {scale} is not positive"), hint);
             }
-            let [low, high] = state.range;
+            let Some([low, high]) = state.range else { continue };
             if !(low.is_finite() && high.is_finite()) {
                 self.report(Item::State(i), Field::Range, "the range is not finite", "write two numbers");
             } else if low >= high {

@@ -120,8 +120,7 @@ impl Model {
     fn wrong_period(&self) -> Option<ModelError> {
         let names: Vec<String> =
             self.states.iter().map(|s| &s.name).chain(self.outputs.iter().map(|o| &o.name)).cloned().collect();
-        let ranges: Vec<[f64; 2]> = self.states.iter().map(|s| s.range).collect();
-        let [message, hint] = forcing::unrepeated(self, &names, &ranges, &self.defaults())?;
+        let [message, hint] = forcing::unrepeated(self, &names, &self.ranges(), &self.defaults())?;
         let (item, field) = (Item::Forcing, Field::Expression);
         Some(ModelError { item, field, name: String::new(), span: None, message, hint })
     }
@@ -146,9 +145,14 @@ impl Model {
         self.parameters.iter().map(|p| p.value).collect()
     }
 
-    /// Characteristic size of every state.
+    /// Characteristic size of every state as far as the model states it, else 1; [`crate::explore::System`] knows more.
     pub fn scales(&self) -> Vec<f64> {
-        self.states.iter().map(|s| s.scale).collect()
+        self.states.iter().map(|s| s.stated_scale().unwrap_or(1.0)).collect()
+    }
+
+    /// Where initial values of every state are sampled, with [`Model::scales`].
+    pub fn ranges(&self) -> Vec<[f64; 2]> {
+        self.states.iter().zip(self.scales()).map(|(state, scale)| state.range_at(scale)).collect()
     }
 
     /// f, then fx row by row, then fp row by row, as [`VectorField::linearise`] orders them.

@@ -24,10 +24,11 @@ pub struct State {
     pub unit: String,
     /// What it is.
     pub description: String,
-    /// Characteristic size, positive: errors and lengths of this component are measured in it.
-    pub scale: f64,
-    /// Smallest and largest initial value when initial states are sampled.
-    pub range: [f64; 2],
+    /// Characteristic size, positive: errors and lengths of this component are measured in it. Where none is given it follows
+    /// from the range, else from the solutions.
+    pub scale: Option<f64>,
+    /// Smallest and largest initial value when initial states are sampled; where none is given, twice the scale to both sides of 0.
+    pub range: Option<[f64; 2]>,
 }
 
 /// A scalar of the state.
@@ -94,9 +95,19 @@ impl Parameter {
 }
 
 impl State {
-    /// A state of size 1, sampled from -2 to 2, without unit and description.
+    /// A state without unit, description, scale and range.
     pub fn new(name: &str) -> State {
-        State { name: name.into(), unit: "1".into(), description: String::new(), scale: 1.0, range: [-2.0, 2.0] }
+        State { name: name.into(), unit: "1".into(), description: String::new(), scale: None, range: None }
+    }
+
+    /// The characteristic size that the model states: the scale, else a quarter of the width of the range.
+    pub fn stated_scale(&self) -> Option<f64> {
+        self.scale.or(self.range.map(|[low, high]| 0.25 * (high - low)))
+    }
+
+    /// Where initial values are sampled if the characteristic size is `scale`.
+    pub fn range_at(&self, scale: f64) -> [f64; 2] {
+        self.range.unwrap_or([-2.0 * scale, 2.0 * scale])
     }
 }
 

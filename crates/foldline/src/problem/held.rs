@@ -219,7 +219,8 @@ impl ZeroProblem for Held<'_> {
         if self.serves(&self.tangents_at, u) {
             self.follow_plane();
         }
-        self.scale.iter_mut().zip(u).for_each(|(s, v)| *s = 1.0 + v.abs());
+        let own = self.condition.extra_scale().max(f64::MIN_POSITIVE);
+        self.scale.iter_mut().zip(u).for_each(|(s, v)| *s = own + v.abs());
     }
 
     fn residual(&mut self, u: &[f64], r: &mut [f64]) -> bool {
@@ -281,7 +282,8 @@ impl ZeroProblem for Held<'_> {
 
     fn relative_size(&self, du: &[f64], u: &[f64]) -> f64 {
         let e = self.extra();
-        let extra = (0..e).map(|i| (du[i] / (1.0 + u[i].abs())).abs());
+        let own = self.condition.extra_scale().max(f64::MIN_POSITIVE);
+        let extra = (0..e).map(|i| (du[i] / (own + u[i].abs())).abs());
         extra.fold(self.surface.relative_size(&du[e..], &u[e..]), |m, x| if x > m || x.is_nan() { x } else { m })
     }
 

@@ -37,7 +37,7 @@ use pace::Limits;
 
 /// Trajectories that are integrated at a time: enough to keep vector instructions busy, few enough to stay in the cache.
 const WIDTH: usize = 64;
-/// Multiple of 1 + |start|, in any component, beyond which a trajectory counts as running to infinity.
+/// Multiple of the largest size + |start|, in any component, beyond which a trajectory counts as running to infinity.
 const BOUND: f64 = crate::diagram::Response::UNBOUNDED;
 /// At rest the step grows without end; beyond this length the arithmetic would overflow.
 const LONGEST: f64 = 1e100;
@@ -274,7 +274,9 @@ impl<'a> Ensemble<'a> {
         self.waiting += 1;
         let start = &self.starts[trajectory * n..(trajectory + 1) * n];
         let own = self.own.get(trajectory * k..(trajectory + 1) * k).unwrap_or(&[]);
-        let bound = BOUND * (1.0 + crate::linalg::max_abs(start));
+        // What the tolerance says about sizes: absolute over relative.
+        let size = crate::linalg::max_abs(&self.tolerance.absolute) / self.tolerance.relative;
+        let bound = BOUND * (size + crate::linalg::max_abs(start));
         self.lanes.set(l, start, own, self.begin, bound);
         Run { trajectory, stuck: 0, done: None, over: false }
     }

@@ -2,7 +2,7 @@
 //!
 //! **Equations.** With τ the parameter component of the tangent and z the eigenvalues (z = λ) or multipliers (z = μ - 1):
 //!
-//!   (1)  τ ∏ z = 0, where folds (both factors change sign) leave no sign change
+//!   (1)  ∏ z / τ = 0, the determinant of F_u with the tangent for a last row but for a factor that is not 0
 //!   (2)  F_u φ = 0, φ ⊥ tangent:  direction into the plane that both branches span
 
 use crate::contract::{Monitor, ZeroProblem};
@@ -34,7 +34,10 @@ impl Monitor for BranchPoint {
 
     fn value(&self, _reference: &Point, at: &Point) -> f64 {
         let centre = if matches!(at.solution, Solution::Cycle(_)) { 1.0 } else { 0.0 };
-        at.parameter_slope() * super::distance_product(&self.spectrum_without_symmetry(at), centre)
+        // At a fold both vanish, not quite at the same place, and the product would change sign twice.
+        let slope = at.parameter_slope();
+        super::distance_product(&self.spectrum_without_symmetry(at), centre)
+            / slope.abs().max(f64::MIN_POSITIVE).copysign(slope)
     }
 
     fn confirms(&self, at: &Point) -> bool {

@@ -161,7 +161,11 @@ impl Monitor for CodimensionTwo<'_> {
             // Where a fold and a branch point meet at a double eigenvalue 0, ⟨p, B(q, q)⟩ vanishes with ⟨p, q⟩.
             Kind::Cusp if at.solution.period().is_none() => {
                 let vectors = Local::new(self.field, at).and_then(|local| local.null_vectors());
-                vectors.is_some_and(|[q, p]| dot(&p, &q).abs() > DOUBLE)
+                // Of unit length in units of the scales.
+                let norm = |v: &[f64], power: i32| {
+                    v.iter().zip(self.scales).map(|(v, s)| (v * s.powi(power)).powi(2)).sum::<f64>().sqrt()
+                };
+                vectors.is_some_and(|[q, p]| dot(&p, &q).abs() > DOUBLE * norm(&q, -1) * norm(&p, 1))
             }
             Kind::DoubleHopf => rest.iter().any(on_axis) && held.iter().all(on_axis),
             Kind::FoldTorus | Kind::FlipTorus if self.held != Kind::Torus => rest.iter().any(on_circle),

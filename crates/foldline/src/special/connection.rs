@@ -220,7 +220,7 @@ impl Limits<'_> {
     fn null_vector(&self, x: &[f64], parameters: &[f64], left: bool) -> Option<Vec<f64>> {
         let n = x.len();
         let (_, mut fx) = self.linearised(x, parameters);
-        let shift = 1e-12 * fx.iter().fold(f64::MIN_POSITIVE, |most, a| most.max(a.abs()));
+        let shift = 1e-12 * crate::linalg::size_in_any_units(&fx, n).max(f64::MIN_POSITIVE);
         (0..n).for_each(|i| fx[i * n + i] += shift);
         let mut pivots = vec![0; n];
         lu::factorise(&mut fx, n, &mut pivots).ok()?;

@@ -47,13 +47,14 @@ pub struct OnBranchPoints<'a> {
 impl<'a> OnBranchPoints<'a> {
     /// In a setting with two free parameters.
     pub fn new(setting: Setting<'a>) -> OnBranchPoints<'a> {
-        let n = setting.field.dim();
+        let (n, scales) = (setting.field.dim(), setting.scales);
+        let scale = |i: usize| scales.get(i).copied().unwrap_or(1.0);
         OnBranchPoints {
             setting,
             n,
             across: [1.0, 0.0],
-            left: (0..n).map(|k| 0.4 + (k as f64 * 1.3).sin()).collect(),
-            right: (0..2 * (n + 1)).map(|k| 0.5 + (k as f64 * 1.7).cos()).collect(),
+            left: (0..n).map(|k| scale(k) * (0.4 + (k as f64 * 1.3).sin())).collect(),
+            right: (0..2 * (n + 1)).map(|k| (0.5 + (k as f64 * 1.7).cos()) / scale(k % (n + 1))).collect(),
             adjoint: Vec::new(),
             null: Vec::new(),
             state: Vec::new(),

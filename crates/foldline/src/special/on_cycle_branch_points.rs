@@ -113,6 +113,9 @@ impl<'a> OnCycleBranchPoints<'a> {
             |angle: f64, shift: f64| (0..size).map(|k| 0.5 + (k as f64 * angle + shift).sin()).collect::<Vec<f64>>();
         let rows = [wave(0.017, 1.0), wave(0.031, 2.3)];
         own.left = wave(0.013, 0.0);
+        own.left.iter_mut().enumerate().for_each(|(k, x)| *x *= own.setting.scales[k % n]);
+        let rows = rows
+            .map(|row| -> Vec<f64> { row.iter().enumerate().map(|(k, x)| x / own.setting.scales[k % n]).collect() });
         own.right = [[&rows[0][..], &[0.3, 0.7]].concat(), [&rows[1][..], &[0.6, -0.4]].concat()];
         own
     }
@@ -216,6 +219,7 @@ impl<'a> OnCycleBranchPoints<'a> {
         system.coupling.fill(T::default());
         system.border.fill(T::default());
         system.corner.fill(0.0);
+        system.measure_in(self.setting.scales, self.setting.scales);
         let slots: Vec<usize> = (0..inner).map(|k| system.slot(k / n, k % n)).collect();
         for place in 0..length {
             // The solver pads the mesh with intervals of length zero.

@@ -90,6 +90,11 @@ impl<'a> OnCycles<'a> {
         let size = condition.profile_size();
         condition.left = wave(size, 0.4, 0.013, [0.0, 1.0]);
         condition.right = wave(size, 0.5, 0.017, [1.0, 0.0]);
+        for k in 0..size {
+            let scale = condition.setting.scales[k % condition.n];
+            condition.left[k] *= scale;
+            condition.right[k] /= scale;
+        }
         Some(condition)
     }
 
@@ -365,6 +370,8 @@ impl<'a> OnCycles<'a> {
         system.coupling.fill(T::default());
         system.border.fill(T::default());
         system.corner.fill(0.0);
+        let sizes: Vec<f64> = (0..parts).map(|c| self.setting.scales[c % self.n]).collect();
+        system.measure_in(&sizes, &sizes);
         let slots: Vec<usize> = (0..m * parts).map(|k| system.slot(k / parts, k % parts)).collect();
         for place in 0..length {
             // Beyond the last interval the solver has intervals of length zero.

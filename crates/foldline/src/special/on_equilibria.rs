@@ -52,14 +52,14 @@ impl<'a> OnEquilibria<'a> {
             _ => return None,
         };
         let n = setting.field.dim();
-        let size = n * width;
+        let (size, scales) = (n * width, setting.scales);
         Some(OnEquilibria {
             setting,
             kind,
             n,
             width,
-            left: (0..size).map(|k| 0.4 + (k as f64 * 1.3).sin()).collect(),
-            right: (0..size).map(|k| 0.5 + (k as f64 * 1.7).cos()).collect(),
+            left: (0..size).map(|k| scales[k % n] * (0.4 + (k as f64 * 1.3).sin())).collect(),
+            right: (0..size).map(|k| (0.5 + (k as f64 * 1.7).cos()) / scales[k % n]).collect(),
             null: Vec::new(),
             adjoint: Vec::new(),
             state: Vec::new(),
@@ -129,6 +129,13 @@ impl Condition for OnEquilibria<'_> {
 
     fn extra(&self) -> usize {
         self.width - 1
+    }
+
+    /// The square of the largest rate of change, since κ is the product of two eigenvalues.
+    fn extra_scale(&self) -> f64 {
+        let (n, scales) = (self.n, self.setting.scales);
+        let rates = self.jacobian.iter().enumerate().map(|(k, a)| (a * scales[k % n] / scales[k / n]).abs());
+        rates.fold(0.0, f64::max).powi(2)
     }
 
     fn guess(&self, point: &Point) -> Vec<f64> {

@@ -173,7 +173,13 @@ impl Part<'_> {
 
     /// How far the solution is, by Newton's method in twice the working precision with the matrix of the stored point: `step` gives the
     /// relative changes of state and free parameters for a residual. `None` where the field cannot be evaluated so.
-    fn precisely(&self, point: &Point, x: &[f64], scales: &[f64], step: &dyn Fn(Vec<f64>) -> Vec<f64>) -> Option<f64> {
+    fn precisely(
+        &self,
+        point: &Point,
+        x: &[f64],
+        [scales, sizes]: [&[f64]; 2],
+        step: &dyn Fn(Vec<f64>) -> Vec<f64>,
+    ) -> Option<f64> {
         let n = x.len();
         let mut states: Vec<[f64; 2]> = x.iter().map(|x| [*x, 0.0]).collect();
         let mut parameters: Vec<[f64; 2]> = point.parameters.iter().map(|p| [*p, 0.0]).collect();
@@ -184,11 +190,11 @@ impl Part<'_> {
             for (i, (state, scale)) in states.iter_mut().zip(scales).enumerate() {
                 state[1] -= update[i] * scale;
             }
-            for (axis, change) in self.setting.axes.iter().zip(&update[n..]) {
+            for ((axis, change), size) in self.setting.axes.iter().zip(&update[n..]).zip(sizes) {
                 let followers = axis.ties.iter().map(|tie| (tie.index, tie.slope));
                 for (index, slope) in std::iter::once((axis.index, 1.0)).chain(followers) {
                     if let Some(own) = parameters.get_mut(index) {
-                        own[1] -= slope * change * axis.scale;
+                        own[1] -= slope * change * axis.scale * size;
                     }
                 }
             }
@@ -222,6 +228,8 @@ impl Part<'_> {
         self.setting.linearise(batch, &mut f, &mut fx, &mut fp);
         out.points += 1;
         let scales: Vec<f64> = x.iter().zip(self.setting.scales).map(|(x, s)| x.abs() + s).collect();
+        // Of the unknowns λ: relative to 1 + |λ|.
+        let sizes: Vec<f64> = self.setting.unknowns_of(point).iter().map(|own| 1.0 + own.abs()).collect();
         let held = self.branch.held.map(|(kind, _)| kind);
         let null = match held {
             Some(Kind::Fold | Kind::BranchPoint) => {
@@ -237,7 +245,7 @@ impl Part<'_> {
         let mut line: Vec<f64> = Vec::with_capacity(n * (n + k));
         for i in 0..n {
             line.extend((0..n).map(|j| fx[i * n + j] * scales[j]));
-            line.extend_from_slice(&fp[i * k..(i + 1) * k]);
+            line.extend(fp[i * k..(i + 1) * k].iter().zip(&sizes).map(|(slope, size)| slope * size));
             line.extend(beyond.iter().map(|[_, p]| rate * p[i]));
         }
         let width = n + k + usize::from(beyond.is_some());
@@ -263,7 +271,7 @@ impl Part<'_> {
         };
         // The parameter is rounded once more where its unknown is multiplied by its scale.
         let moved = (0..n).map(moved).fold(f64::EPSILON, larger) + 0.5 * f64::EPSILON;
-        let (off, rounding) = match self.precisely(point, x, &scales, &step) {
+        let (off, rounding) = match self.precisely(point, x, [&scales, &sizes], &step) {
             Some(off) => (off, moved),
             None => (max_abs(&step(f)), moved.max(ROUNDING)),
         };

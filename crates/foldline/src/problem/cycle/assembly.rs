@@ -84,7 +84,7 @@ impl CycleProblem<'_> {
             *coupled |= !vanishes(entry);
         }
         either!(&mut self.system, s => s.couple(&self.coupled));
-        either!(&mut self.system, s => s.measure_in(&self.scale));
+        either!(&mut self.system, s => s.measure_in(self.setting.scales, &self.scale));
         let linear = Linear {
             n: self.n,
             free: self.setting.freedom(),

@@ -138,7 +138,7 @@ impl<'a> Local<'a> {
     /// Right and left eigenvectors of the eigenvalue closest to z, q of unit length and ⟨p, q⟩ = 1: A q = z q, pᴴ A = z pᴴ.
     pub(super) fn eigenvectors(&self, z: Complex64) -> Option<[Vec<Complex64>; 2]> {
         // A shift of the size of rounding keeps the matrix regular at an eigenvalue.
-        let shift = 1e-14 * max_abs(&self.jacobian).max(z.norm());
+        let shift = 1e-14 * crate::linalg::size_in_any_units(&self.jacobian, self.n).max(z.norm());
         let factors = self.shifted(z + shift, &[], &[])?;
         let mut out = [const { Vec::new() }; 2];
         for (side, vector) in out.iter_mut().enumerate() {
