@@ -37,8 +37,8 @@ class SpecialPoint(Solution):
     unstable_before, unstable_after : int
         Unstable eigenvalues or multipliers on the side of smaller and of larger positions.
     error : float
-        Bound on the error of the parameter, relative to ``branch.scale`` + |value|, and of the period and the extremes, relative to
-        1 + |value|.
+        Bound on the error of the parameter, relative to ``branch.scale`` + |value|, of the extremes of states, relative to their scale +
+        |value|, of the period, relative to that, and of the extremes of outputs, relative to 1 + |value|.
     coefficients : tuple of float
         Of the normal form.
     coefficient_errors : tuple of float

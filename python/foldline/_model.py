@@ -30,7 +30,8 @@ class Model:
     text : str
         The model as a model file has it.
     states, parameters, outputs : dict
-        Names, and what is known about each: `unit` and `description`, of parameters `value`, of states `scale` and `range`.
+        Names, and what is known about each: `unit` and `description`, of parameters `value`, of states `scale` and `range` (`None` where
+        the model does not state them).
     """
 
     def __init__(self, native: _native.Model) -> None:

@@ -210,3 +210,88 @@ fn a_branch_that_crosses_is_not_taken_for_the_one_that_it_leaves() {
         assert!(place.is_some_and(|place| (place - 0.671593847479).abs() < 1e-8), "{scale}: {place:?}");
     }
 }
+
+/// A plate that a voltage draws across a gap (Kolchuzhin, LMGT MEMS component library, set 1), `{x}` and `{v}` being what the model says about
+/// the sizes of its states. Pull-in at V = √(8 k h³ / (27 ε₀ A)), x = h/3.
+fn plate(x: &str, v: &str) -> Diagram {
+    let model = format!(
+        "name = \"plate\"\n[parameters]\nm = 4.658e-7\nd = 2.245e-3\nk = 270.4\narea = 1e-6\ngap = 10e-6\neps0 = 8.8541878128e-12\nV = 0\n\
+         [states]\nx = {{ equation = \"v\"{x} }}\nv = {{ equation = \"(eps0*area*V^2/(2*(gap - x)^2) - k*x - d*v)/m\"{v} }}\n"
+    );
+    run(
+        &model,
+        "[[seed]]\nname = \"rest\"\nstate = { x = 0, v = 0 }\n[[branch]]\nname = \"b\"\nfrom = \"rest\"\nfree = \"V\"\nrange = [0, 150]\n",
+    )
+}
+
+#[test]
+fn a_displacement_in_metres_needs_no_scale() {
+    let voltage = (8.0 * 270.4 * 1e-15 / (27.0 * 8.854_187_812_8e-18f64)).sqrt();
+    let stated = plate(", scale = 1e-6", ", scale = 1e-2");
+    let ranges = plate(", range = [-1e-6, 8e-6]", ", range = [-1e-3, 1e-3]");
+    let met = plate("", "");
+    for diagram in [&stated, &ranges, &met] {
+        let branch = diagram.branch("b").unwrap();
+        let [fold] = &branch.special[..] else {
+            panic!("{:?}", branch.special.iter().map(|s| s.kind).collect::<Vec<_>>())
+        };
+        let value = fold.point.parameters[branch.free];
+        assert!(fold.kind == Kind::Fold && (value - voltage).abs() < 1e-8 * voltage, "{value} {voltage}");
+        assert!((fold.point.ranges[0][0] - 1e-5 / 3.0).abs() < 1e-12);
+        // As many points within a quarter: none costs more than another.
+        let counts = [branch.points.len(), stated.branch("b").unwrap().points.len()];
+        assert!(4 * counts[0] < 5 * counts[1] && 4 * counts[1] < 5 * counts[0], "{counts:?}");
+    }
+}
+
+/// Photons in a laser, n' = (g N - k) n, N' = p - N - 2 g N n, in units of the numbers given: threshold at p = k/g.
+#[test]
+fn a_laser_is_the_same_whether_photons_or_their_number_in_a_volume_are_counted() {
+    let laser = |photons: f64, atoms: f64| {
+        let model = format!(
+            "name = \"laser\"\n[parameters]\np = {{ value = 0.0 }}\n[definitions]\nm = \"n/{photons:e}\"\nM = \"N/{atoms:e}\"\nq = \"p/{atoms:e}\"\n[states]\n\
+             n = \"{photons:e}*(M - 1)*m\"\nN = \"{atoms:e}*(q - M - 2*M*m)\"\n"
+        );
+        let high = 3.0 * atoms;
+        let study = format!(
+            "[[seed]]\nname = \"dark\"\nstate = {{ n = 0, N = 0 }}\n[[branch]]\nname = \"b\"\nfrom = \"dark\"\nfree = \"p\"\n\
+             range = [0, {high:e}]\nswitch = {{ branch-point = 1 }}\n"
+        );
+        run(&model, &study)
+    };
+    let one = laser(1.0, 1.0);
+    assert_eq!(one.branches.len(), 2);
+    for [photons, atoms] in [[1e18, 1e18], [1e18, 1e-6], [1e-9, 1e12]] {
+        let other = laser(photons, atoms);
+        assert_eq!(other.branches.len(), 2);
+        for branch in &one.branches {
+            let there = other.branch(&branch.name).unwrap();
+            assert_eq!(there.points.len(), branch.points.len(), "{} {photons} {atoms}", branch.name);
+            for (a, b) in branch.special.iter().zip(&there.special) {
+                let (x, y) = (a.point.parameters[0], b.point.parameters[0] / atoms);
+                assert!(a.kind == b.kind && (x - y).abs() < 2e-8 * (1.0 + x), "{x} {y}");
+            }
+        }
+    }
+}
+
+/// What a kernel of three dimensions says does not depend on the sizes of the states.
+#[test]
+fn branches_that_leave_together_are_told_apart_at_any_scale() {
+    for scales in [[1.0, 1.0, 1.0], [3.0, 3.0, 3.0], [0.7, 1.0, 1.5]] {
+        let equation =
+            |name: &str, scale: f64| format!("{name} = {{ equation = \"p*{name} - {name}^3\", scale = {scale} }}\n");
+        let states: String = ["x", "y", "z"].iter().zip(scales).map(|(name, scale)| equation(name, scale)).collect();
+        let diagram = run(
+            &format!("name = \"wells\"\n[parameters]\np = -1\n[states]\n{states}"),
+            "[[seed]]\nname = \"s\"\nstate = { x = 0, y = 0, z = 0 }\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"p\"\nrange = [-1, 2]\n\
+             switch = { branch-point = 1 }\n",
+        );
+        let moved = |branch: &Branch| {
+            branch.points.last().unwrap().ranges.iter().map(|r| r[0].abs() > 0.1).collect::<Vec<bool>>()
+        };
+        let found: std::collections::BTreeSet<Vec<bool>> =
+            diagram.branches.iter().filter(|branch| branch.name != "b").map(moved).collect();
+        assert_eq!(found.len(), 7, "{scales:?}: {found:?}");
+    }
+}

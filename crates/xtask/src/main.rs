@@ -23,7 +23,7 @@ const USAGE: &str = "cargo xtask TASK
               no point and find the same special points (docs/book/trust.md)
   campaign    random rotors, classical problems, and models of several fields with random parameters, 200, 5 starts of each and 240,
               or as many as numbers say: each branch followed in several ways must come out the same, and errors must be what is
-              stated (docs/book/trust.md)
+              stated (docs/book/trust.md); with --rescaled the same in units of their own instead
   outside     problems of others with right values from elsewhere, each study in a process with a limit on its time; --quick, --only
               TEXT, and --write, which renews crates/foldline-campaign/outside/results.txt and the table in docs/book/trust.md
   docs        the documentation of the source, without warnings";

@@ -191,7 +191,7 @@ impl Variables {
             integer("unstable_after", "number of unstable eigenvalues or multipliers behind it"),
             real(
                 "error",
-                "bound on the error: of the parameter relative to its scale + |value|, of period and extremes relative to 1 + |value|",
+                "bound on the error: of the parameter and of extremes of states relative to their scale + |value|, of the period relative to that, of extremes of outputs relative to 1 + |value|",
             ),
             text("normal_form", "coefficients of the normal form, and what follows from them, in words"),
         ];

@@ -348,7 +348,7 @@ impl Follow<'_> {
         let ends = self.narrowed(stretch, right, cost);
         let [left, right] = [&ends[0], &ends[1]];
         let error = discrepancy(
-            &self.settings,
+            self.settings,
             &left.point,
             &right.point,
             left.parameter() - right.parameter(),

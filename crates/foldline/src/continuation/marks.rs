@@ -100,7 +100,7 @@ impl Follow<'_> {
         let [below, above] = seen;
         let (below, above) = (below?, above?);
         let gap = below.parameter() - above.parameter();
-        let error = discrepancy(&self.settings, &below.point, &above.point, gap, above.parameter());
+        let error = discrepancy(self.settings, &below.point, &above.point, gap, above.parameter());
         let (distance, value, station) =
             if low.1.abs() < high.1.abs() { (low.0, low.1, below) } else { (high.0, high.1, above) };
         (value.abs() < JUMPS * whole).then_some(Located { distance, station, error })

@@ -390,8 +390,8 @@ pub struct SpecialPoint {
     pub unstable_before: usize,
     /// Unstable multipliers (eigenvalues) on the side of larger positions.
     pub unstable_after: usize,
-    /// Bound on the error of the parameter, relative to its scale ([`Branch::units`]) + |value|, and of the period and the ranges, relative to
-    /// 1 + |value|.
+    /// Bound on the error of the parameter, relative to its scale ([`Branch::units`]) + |value|, of the ranges of states likewise, of the period,
+    /// relative to that, and of the ranges of outputs, relative to 1 + |value|.
     pub error: f64,
     /// Coefficients of the normal form, named by [`Kind::coefficients`]; none where they are not known.
     pub coefficients: Vec<f64>,

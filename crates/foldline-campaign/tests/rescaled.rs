@@ -1,0 +1,15 @@
+//! Diagrams do not depend on the units in which a model is written.
+
+use foldline_campaign::{LIMIT, cases, drawn, rescaled};
+
+#[test]
+fn states_parameters_and_time_in_any_units_give_the_same_diagrams() {
+    let chosen = ["FitzHugh", "Brusselator", "Lorenz equilibria", "predator", "Wilson", "Oregonator", "parametric"];
+    let all = cases::classical(1).into_iter().chain(drawn::drawn(0..24));
+    let cases: Vec<_> = all.filter(|case| chosen.iter().any(|name| case.name.contains(name))).collect();
+    assert!(cases.len() >= chosen.len());
+    let report = rescaled::rescaled(&cases, 1, LIMIT, &|_| {});
+    assert!(report.differences.is_empty(), "{}", report.differences.join("\n"));
+    // Where a step ends depends on rounding in few of them.
+    assert!(report.branches >= 10 && 5 * report.as_many >= 4 * report.branches, "{report}");
+}
