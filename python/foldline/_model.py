@@ -39,7 +39,7 @@ class Model:
         self.name: str = native.name
         self.description: str = native.description
         self.states: dict[str, dict[str, Any]] = {
-            name: {"unit": unit, "description": text, "scale": scale, "range": span} for (name, unit, text), scale, span in native.states
+            name: {"unit": unit, "description": text, "scale": scale, "range": span} for (name, unit, text), (scale, span) in native.states
         }
         self.parameters: dict[str, dict[str, Any]] = {
             name: {"value": value, "unit": unit, "description": text} for (name, unit, text), value in native.parameters

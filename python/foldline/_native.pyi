@@ -10,7 +10,7 @@ class Model:
     name: str
     description: str
     parameters: list[tuple[tuple[str, str, str], float]]
-    states: list[tuple[tuple[str, str, str], float | None, tuple[float, float] | None]]
+    states: list[tuple[tuple[str, str, str], tuple[float | None, tuple[float, float] | None]]]
     outputs: list[tuple[str, str, str]]
     whirl: tuple[int, int] | None
     forced: bool

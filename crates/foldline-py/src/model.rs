@@ -19,6 +19,9 @@ pub struct Model {
     pub file: String,
 }
 
+/// Scale and range, where a model states them.
+type Stated = (Option<f64>, Option<(f64, f64)>);
+
 /// Name, unit, description.
 type Named<'m> = (&'m str, &'m str, &'m str);
 
@@ -56,10 +59,10 @@ impl Model {
 
     /// Name, unit, description, and scale and range where the model states them, of each.
     #[getter]
-    fn states(&self) -> Vec<(Named<'_>, Option<f64>, Option<(f64, f64)>)> {
+    fn states(&self) -> Vec<(Named<'_>, Stated)> {
         let row = |s: &foldline::model::State| (s.scale, s.range.map(|[low, high]| (low, high)));
         let named = self.model.states.iter().map(|s| ((&*s.name, &*s.unit, &*s.description), row(s)));
-        named.map(|(named, (scale, range))| (named, scale, range)).collect()
+        named.collect()
     }
 
     /// Name, unit and description of each.
