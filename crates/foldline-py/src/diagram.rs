@@ -112,15 +112,10 @@ impl Diagram {
 
     /// The solution at the goal of a homotopy.
     fn arrival(&self, homotopy: &str) -> Option<Solution> {
-        const ROUNDING: f64 = 1e-9;
         let plan = self.study.plan.homotopies.iter().find(|plan| plan.name == homotopy)?;
-        let there = |point: &&Point| {
-            let near = |(k, goal): &(usize, f64)| (point.parameters[*k] - goal).abs() <= ROUNDING * (1.0 + goal.abs());
-            plan.targets.iter().all(near)
-        };
-        let legs = self.diagram.branches.iter().filter(|b| leg(&b.name, homotopy).is_some());
+        let mut legs = self.diagram.branches.iter().filter(|b| leg(&b.name, homotopy).is_some());
         // The first leg that is there ended the search.
-        let point = legs.flat_map(|leg| [leg.points.first(), leg.points.last()]).flatten().find(there)?;
+        let point = legs.find_map(|leg| leg.end_at(&plan.targets))?;
         Some(Solution::new(point.clone(), &self.study.model))
     }
 

@@ -1,7 +1,7 @@
 //! Requests of a study that were not fulfilled.
 
 use crate::order::leg;
-use foldline::diagram::{Branch, Diagram, Ending, Kind, Motion, Point, Shortfall};
+use foldline::diagram::{Branch, Diagram, Ending, Kind, Motion, Shortfall};
 use foldline::explore::{HomotopyPlan, Plan, SweepPlan};
 use foldline::model::Model;
 
@@ -58,7 +58,7 @@ fn absent(diagram: &Diagram, plan: &Plan) -> Vec<String> {
 fn not_arrived(diagram: &Diagram, homotopy: &HomotopyPlan, model: &Model) -> Option<String> {
     let legs: Vec<&Branch> = diagram.branches.iter().filter(|b| leg(&b.name, &homotopy.name).is_some()).collect();
     let HomotopyPlan { name, targets, .. } = homotopy;
-    match legs.iter().any(|leg| arrived(leg, targets)) {
+    match legs.iter().any(|leg| leg.end_at(targets).is_some()) {
         _ if legs.is_empty() => Some(format!("{name}: it never began")),
         true => None,
         false => Some(format!("{name}: it did not arrive at {}", place(targets, model))),
@@ -91,7 +91,7 @@ fn ended(branch: &Branch, target: Option<(usize, f64)>, model: &Model) -> Vec<St
     let whole = lines.is_empty();
     if branch.ends.iter().all(Option::is_none) {
         lines.push(format!("{}: it is not finished", branch.name));
-    } else if let Some(target) = target.filter(|target| whole && !arrived(branch, &[*target])) {
+    } else if let Some(target) = target.filter(|target| whole && branch.end_at(&[*target]).is_none()) {
         let ends: Vec<String> = branch.ends.iter().flatten().map(Ending::brief).collect();
         let place = place(&[target], model);
         lines.push(format!("{}: it did not arrive at {place}; {}", branch.name, ends.join("; ")));
@@ -120,18 +120,6 @@ fn unexplained(branch: &Branch, model: &Model) -> Option<String> {
     ))
 }
 
-/// True if one end of a branch has these parameter values. A point at a bound has its value up to rounding.
-fn arrived(branch: &Branch, targets: &[(usize, f64)]) -> bool {
-    const ROUNDING: f64 = 1e-9;
-    let there = |point: &Point| {
-        let near = |(index, goal): &(usize, f64)| {
-            point.parameters.get(*index).is_some_and(|value| (value - goal).abs() <= ROUNDING * (1.0 + goal.abs()))
-        };
-        targets.iter().all(near)
-    };
-    [branch.points.first(), branch.points.last()].into_iter().flatten().any(there)
-}
-
 fn place(targets: &[(usize, f64)], model: &Model) -> String {
     let name = |index: usize| model.parameters.get(index).map_or("?", |parameter| parameter.name.as_str());
     targets.iter().map(|(index, goal)| format!("{} = {goal}", name(*index))).collect::<Vec<_>>().join(", ")
@@ -141,6 +129,7 @@ fn place(targets: &[(usize, f64)], model: &Model) -> String {
 mod tests {
     use super::*;
     use crate::study_file::{Study, parse_study};
+    use foldline::diagram::Point;
     use foldline::diagram::{Cost, Family, Origin, Solution, SpecialPoint, Trust};
 
     const MODEL: &str = "name = \"m\"\n[parameters]\nOmega = 1\nkappa = 0\n[states]\nx = \"-x\"\n";

@@ -701,6 +701,20 @@ impl Branch {
         if value.abs() < 1e-9 * self.units[1] { 0.0 } else { value }
     }
 
+    /// The first or the last point, if it has these values of parameters, given by index, up to the rounding of a value at a bound: relative to
+    /// the largest that the parameter has on the branch.
+    pub fn end_at(&self, targets: &[(usize, f64)]) -> Option<&Point> {
+        const ROUNDING: f64 = 1e-9;
+        let value = |point: &Point, index: usize| point.parameters.get(index).copied().unwrap_or(f64::NAN);
+        let there = |point: &&Point| {
+            targets.iter().all(|(index, goal)| {
+                let size = self.points.iter().fold(goal.abs(), |most, point| most.max(value(point, *index).abs()));
+                (value(point, *index) - goal).abs() <= ROUNDING * size
+            })
+        };
+        [self.points.first(), self.points.last()].into_iter().flatten().find(there)
+    }
+
     /// Size of a value of the continuation parameter: its scale + |value|. Errors are relative to it.
     pub fn size(&self, value: f64) -> f64 {
         self.units[1] + value.abs()
