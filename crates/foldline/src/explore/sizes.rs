@@ -26,8 +26,10 @@ const ACCURACY: f64 = 1e-2;
 /// Steps of a trajectory. From [`ASIDE`] to 1 it takes some 200, and as many to settle; an oscillation that grows by a third in each
 /// period has 100 periods.
 const STEPS: usize = 2000;
-/// Starts at most, each of them once as it is and once aside: with five equations they take 30 ms together.
-const PLACES: usize = 12;
+/// Starts at least and at most, each of them once as it is and once aside, and states of all of them together between these: with five
+/// equations they take 30 ms, with a hundred 0.2 s.
+const PLACES: [usize; 2] = [3, 12];
+const STATES: usize = 240;
 /// Magnitude at which a trajectory runs to infinity.
 const INFINITE: f64 = 1e100;
 /// Change of the extent from the third to the last quarter of a trajectory up to which it has settled.
@@ -92,7 +94,7 @@ pub(super) fn places(model: &Model, plan: &Plan) -> Vec<Place> {
         })
     };
     let all: Vec<Place> = starts.iter().cloned().chain(SHARES.into_iter().flat_map(moved)).collect();
-    all.into_iter().take(PLACES).collect()
+    all.into_iter().take((STATES / model.dim().max(1)).clamp(PLACES[0], PLACES[1])).collect()
 }
 
 /// Characteristic size of every state `[n]`: what the model states, else the largest magnitude that is met from these places, else 1.
