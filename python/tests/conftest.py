@@ -18,10 +18,10 @@ def traced_rotor():
 
     @foldline.model(
         states={
-            "u": dict(range=(-5, 5)),
-            "v": dict(range=(-5, 5)),
-            "du": dict(range=(-15, 15)),
-            "dv": dict(range=(-15, 15)),
+            "u": dict(range=(-5, 5), scale=1),
+            "v": dict(range=(-5, 5), scale=1),
+            "du": dict(range=(-15, 15), scale=1),
+            "dv": dict(range=(-15, 15), scale=1),
         },
         parameters=dict(Omega=5.0, kappa=0.0, zeta=0.01, epsilon=0.353, gamma=0.25, beta=10.0, K=150.0, J_p=0.143, m=0.9),
         outputs=dict(r=lambda s, p: np.hypot(s.u, s.v)),
