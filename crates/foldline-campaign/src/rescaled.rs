@@ -2,13 +2,14 @@
 //!
 //! **Idea.** A diagram must not depend on the units in which a model is written. Every state, every parameter and the time of a case are
 //! multiplied by a power of ten of its own, in the equations, the ranges and the study. What comes out is brought back to the first
-//! units and compared: the same branches with the same ends, and the same special points within the errors that they state.
+//! units and compared: the same branches with the same ends, and the same special points: their parameters and periods within the errors that they
+//! state, their stability, and the eigenvalues of equilibria.
 
 use crate::cases::Case;
 use crate::random::Random;
 use crate::same::differences;
 use crate::watch::Watch;
-use foldline::diagram::{Branch, Diagram, Point, Solution};
+use foldline::diagram::{Branch, Diagram, Point, Solution, SpecialPoint};
 use foldline::explore::{self, Plan, SeedSource, System};
 use foldline::model::{Model, ModelSource};
 use foldline_store::model_file::parse_source;
@@ -18,7 +19,7 @@ use std::time::Duration;
 /// Largest exponent of ten.
 const MOST: i32 = 12;
 
-/// What one unit of each quantity was before.
+/// By what each quantity is multiplied.
 #[derive(Clone, Debug)]
 struct Units {
     states: Vec<f64>,
@@ -106,7 +107,10 @@ fn compared(case: &Case, base: Option<&Diagram>, number: u64, limit: Duration) -
         report.points[1] += found.points.len();
         report.as_many += usize::from(found.points.len() == branch.points.len());
         let back = units.back(found, branch);
-        let lines = differences(branch, &back, 0.0);
+        let mut lines = differences(branch, &back, 0.0);
+        if lines.is_empty() {
+            lines = others(branch, &back);
+        }
         if let Some(first) = lines.first() {
             let more = if lines.len() > 1 { format!(", and {} more", lines.len() - 1) } else { String::new() };
             report.differences.push(format!("{place}: {}: {first}{more}", branch.name));
@@ -121,6 +125,47 @@ fn compared(case: &Case, base: Option<&Diagram>, number: u64, limit: Duration) -
     let new = other.branches.iter().filter(|own| base.branch(&own.name).is_none());
     report.differences.extend(new.map(|own| format!("{place}: {} is new", own.name)));
     report
+}
+
+/// What else differs at special points that are at the same places: the period, the counts of unstable eigenvalues or multipliers, and the
+/// largest eigenvalue.
+fn others(base: &Branch, back: &Branch) -> Vec<String> {
+    /// Factor by which an eigenvalue may be more sensitive than the parameter.
+    const SENSITIVE: f64 = 1e3;
+    let value = |special: &SpecialPoint| special.point.parameters[base.free];
+    let period = |special: &SpecialPoint| special.point.solution.period().unwrap_or(1.0);
+    let modulus = |point: &Point| point.spectrum.iter().fold(0.0, |most: f64, z| most.max(z.norm()));
+    // At a fold of a single state no eigenvalue is left.
+    let size = base.points.iter().map(modulus).fold(0.0, f64::max);
+    let mut lines = Vec::new();
+    for special in &base.special {
+        let off = |other: &&SpecialPoint| {
+            (value(other) - value(special)).abs() / base.size(value(special))
+                + (period(other) / period(special)).ln().abs()
+        };
+        let nearest = back.special.iter().filter(|other| other.kind == special.kind);
+        let Some(other) = nearest.min_by(|a, b| off(a).total_cmp(&off(b))) else { continue };
+        let allowed = special.error + other.error;
+        let place = format!("{} {:.9}", special.kind, value(special));
+        let periods = [special, other].map(period);
+        if (periods[0] / periods[1]).ln().abs() > allowed {
+            lines.push(format!("{place}: the period is {} instead of {}", periods[1], periods[0]));
+        }
+        // A branch may be followed the other way round.
+        let counts = [special, other].map(|own| {
+            let [a, b] = [own.unstable_before, own.unstable_after];
+            [a.min(b), a.max(b)]
+        });
+        if counts[0] != counts[1] {
+            lines.push(format!("{place}: {:?} unstable instead of {:?}", counts[1], counts[0]));
+        }
+        let largest = [special, other].map(|own| modulus(&own.point));
+        let at_rest = special.point.solution.period().is_none();
+        if at_rest && (largest[0] - largest[1]).abs() > (SENSITIVE * allowed).max(1e-9) * size {
+            lines.push(format!("{place}: an eigenvalue of modulus {} instead of {}", largest[1], largest[0]));
+        }
+    }
+    lines
 }
 
 impl fmt::Display for Units {

@@ -26,9 +26,9 @@ const ACCURACY: f64 = 1e-2;
 /// Steps of a trajectory. From [`ASIDE`] to 1 it takes some 200, and as many to settle; an oscillation that grows by a third in each
 /// period has 100 periods.
 const STEPS: usize = 2000;
-/// Starts at least and at most, each of them once as it is and once aside, and states of all of them together between these: with five
-/// equations they take 30 ms, with a hundred 0.2 s.
+/// Starts at least and at most, each of them once as it is and once aside.
 const PLACES: [usize; 2] = [3, 12];
+/// States of all starts together, between these: five equations take 30 ms, a hundred 0.2 s.
 const STATES: usize = 240;
 /// Magnitude at which a trajectory runs to infinity.
 const INFINITE: f64 = 1e100;
