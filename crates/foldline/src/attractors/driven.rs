@@ -13,13 +13,14 @@
 use super::census::Pace;
 use super::{Attractor, Candidate, Census, Enough, Exit, Lost, Polish, Report, Sampling, Trial};
 use crate::contract::{Batch, VectorField};
+use crate::simulation::bordered;
 use crate::diagram::{Cycle, Point, Response, Solution};
 use std::f64::consts::TAU;
 
 /// How far from a whole number of periods of the forcing a motion may last and still be one that repeats with it.
 const WHOLE: f64 = 0.02;
 
-/// (1), for simulation: it has no derivatives.
+/// (1), for simulation: derivatives with respect to τ are left out, as 0.
 pub(super) struct Driven<'a>(pub(super) &'a dyn VectorField);
 
 impl Driven<'_> {
@@ -66,8 +67,30 @@ impl VectorField for Driven<'_> {
         self.circle(at, f);
     }
 
-    fn linearise(&self, _at: Batch, _free: &[usize], f: &mut [f64], fx: &mut [f64], fp: &mut [f64]) {
-        [f, fx, fp].into_iter().for_each(|none| none.fill(f64::NAN));
+    fn linearise(&self, at: Batch, free: &[usize], f: &mut [f64], fx: &mut [f64], fp: &mut [f64]) {
+        let (n, lanes) = (self.n(), at.lanes);
+        let mut inner_fx = vec![0.0; n * n * lanes];
+        let mut inner_fp = vec![0.0; n * free.len() * lanes];
+        self.inner(at, |inner| {
+            self.0.linearise(inner, free, &mut f[..n * lanes], &mut inner_fx, &mut inner_fp);
+        });
+        self.circle(at, f);
+        bordered(&inner_fx, n, 2, lanes, fx);
+        fp.fill(0.0);
+        fp[..inner_fp.len()].copy_from_slice(&inner_fp);
+        let (c, s) = at.states[n * lanes..].split_at(lanes);
+        for l in 0..lanes {
+            let back = 1.0 - c[l] * c[l] - s[l] * s[l];
+            let block = [
+                [back - 2.0 * c[l] * c[l], -2.0 * c[l] * s[l] - TAU],
+                [-2.0 * c[l] * s[l] + TAU, back - 2.0 * s[l] * s[l]],
+            ];
+            for (i, row) in block.iter().enumerate() {
+                for (j, entry) in row.iter().enumerate() {
+                    fx[((n + i) * (n + 2) + n + j) * lanes + l] = *entry;
+                }
+            }
+        }
     }
 
     fn directional(&self, _at: Batch, _directions: &[&[f64]], out: &mut [f64]) {

@@ -14,6 +14,7 @@
 //! from the cycle.
 
 use super::System;
+use super::profile::PARTS;
 use super::seeds::polish;
 use crate::attractors::{Candidate, STEP_LIMIT};
 use crate::contract::Verdict;
@@ -25,8 +26,6 @@ use crate::simulation::{Clocked, Integrator, Passage, Tolerance};
 const FALL: f64 = 1e3;
 /// Relative accuracy of the trajectory over one period. It is a starting point for Newton's method; the value is the default tolerance.
 const INTEGRATION: f64 = 1e-6;
-/// Samples per integration step of that trajectory. Empirical: as many as the degree of the collocation polynomials.
-const PARTS: usize = 4;
 /// Number of periods beyond which slow decay cannot be distinguished from none: multipliers are accurate to about 1e-9.
 pub(super) const NEVER: f64 = 1e9;
 /// Distance from the cycle, relative to scale and size, within which the given state lies on it: the default tolerance.

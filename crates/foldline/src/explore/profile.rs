@@ -2,15 +2,31 @@
 
 use crate::diagram::{Cycle, Point, Solution};
 use crate::problem::gauss::Scheme;
+use crate::problem::mesh::LARGEST;
 
-/// A trajectory over one period as a profile on a mesh with equal arclength per interval.
-pub(super) fn first_profile(scales: &[f64], period: f64, times: &[f64], states: &[f64]) -> Cycle {
+/// Samples per integration step of a trajectory that becomes a profile.
+pub(super) const PARTS: usize = 4;
+
+/// What all intervals of a first mesh have the same share of.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Spread {
+    /// The arclength. Layers get as many intervals as their extent is worth, and the end of a transient along a slow manifold few.
+    Arclength,
+    /// The steps of the integration, whose error control has resolved the ends of transients too.
+    Steps,
+}
+
+/// A trajectory over one period as a profile.
+pub(super) fn first_profile(scales: &[f64], period: f64, times: &[f64], states: &[f64], spread: Spread) -> Cycle {
     /// Smallest motion of a state, as a share of its scale, that contributes to the arclength: below the accuracy of sampling, 1e-6,
     /// by a factor of safety of a hundred.
     const LEAST: f64 = 1e-8;
     let n = scales.len();
     // A cycle of many turns needs more of them.
-    let intervals = (times.len() / 12).clamp(60, 1200);
+    let intervals = match spread {
+        Spread::Arclength => (times.len() / 12).clamp(60, 1200),
+        Spread::Steps => (times.len() / PARTS).clamp(60, LARGEST),
+    };
     let scheme = Scheme::new(4);
     let size: Vec<f64> =
         (0..n).map(|i| states.iter().skip(i).step_by(n).fold(LEAST * scales[i], |m: f64, v| m.max(v.abs()))).collect();
@@ -18,7 +34,10 @@ pub(super) fn first_profile(scales: &[f64], period: f64, times: &[f64], states: 
     let mut length = vec![0.0];
     for k in 1..times.len() {
         let moved: f64 = (0..n).map(|i| ((states[k * n + i] - states[(k - 1) * n + i]) / size[i]).powi(2)).sum();
-        length.push(length[k - 1] + moved.sqrt() + (times[k] - times[k - 1]) / period);
+        length.push(match spread {
+            Spread::Arclength => length[k - 1] + moved.sqrt() + (times[k] - times[k - 1]) / period,
+            Spread::Steps => k as f64,
+        });
     }
     let total = length.last().copied().unwrap_or(1.0);
     let place = |grid: &[f64], values: &[f64], at: f64| -> f64 {

@@ -12,7 +12,7 @@ use super::given::from_cycle;
 use super::growth::{polished, problem_of, setting, settings};
 use super::minimal::reduced;
 use super::plan::{AttractorKey, BranchPlan, Plan, SeedPlan, SeedSource, Start};
-use super::profile::{first_profile, with_degree};
+use super::profile::{Spread, first_profile, with_degree};
 use crate::attractors::{self, Attractor, Candidate, Census, Lost, Sampling};
 use crate::continuation::corrector::{Plane, correct, parameter_row};
 use crate::continuation::{Failure, Settings};
@@ -241,19 +241,23 @@ pub(super) fn sampling(system: &System, samples: usize, seed: u64, jobs: usize, 
 pub(super) fn polish(system: &System, parameters: &[f64], tolerance: f64, candidate: &Candidate) -> Option<Point> {
     let settings = settings(system, tolerance, [f64::NEG_INFINITY, f64::INFINITY], 0);
     let free = 0;
-    let solution = match candidate {
-        Candidate::Equilibrium(x) => Solution::Equilibrium(x.clone()),
-        Candidate::Cycle { period, times, states } => {
-            let mut cycle = first_profile(&system.scales, *period, times, states);
-            if system.field.forced() {
-                cycle.forcing_periods = period.round() as u32;
+    let solved = |spread: Spread| {
+        let solution = match candidate {
+            Candidate::Equilibrium(x) => Solution::Equilibrium(x.clone()),
+            Candidate::Cycle { period, times, states } => {
+                let mut cycle = first_profile(&system.scales, *period, times, states, spread);
+                if system.field.forced() {
+                    cycle.forcing_periods = period.round() as u32;
+                }
+                Solution::Cycle(cycle)
             }
-            Solution::Cycle(cycle)
-        }
+        };
+        let guess = near(system, 4, &settings, bare(parameters, solution)).ok()?;
+        let mut problem = problem_of(system, free, 4, &guess, false);
+        Some(polished(&mut *problem, &settings, &guess).ok()?.point)
     };
-    let guess = near(system, 4, &settings, bare(parameters, solution)).ok()?;
-    let mut problem = problem_of(system, free, 4, &guess, false);
-    let found = polished(&mut *problem, &settings, &guess).ok()?.point;
+    let cycle = matches!(candidate, Candidate::Cycle { .. });
+    let found = solved(Spread::Arclength).or_else(|| if cycle { solved(Spread::Steps) } else { None })?;
     Some(reduced(system, &settings, &found).unwrap_or(found))
 }
 

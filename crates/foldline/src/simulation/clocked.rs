@@ -5,7 +5,8 @@
 
 use crate::contract::{Batch, VectorField};
 
-/// The field as an autonomous one, for simulation: it has no derivatives. An autonomous field gets a clock that it does not read.
+/// The field as an autonomous one, for simulation: derivatives with respect to the time are left out, as 0. An autonomous field gets a
+/// clock that it does not read.
 #[derive(Clone, Copy)]
 pub struct Clocked<'a>(pub &'a dyn VectorField);
 
@@ -23,6 +24,15 @@ impl Clocked<'_> {
     }
 }
 
+/// A matrix `[n·n × lanes]` with `more` rows and columns of zeros besides, `[(n + more)² × lanes]`.
+pub(crate) fn bordered(matrix: &[f64], n: usize, more: usize, lanes: usize, to: &mut [f64]) {
+    to.fill(0.0);
+    for i in 0..n {
+        let row = &matrix[i * n * lanes..][..n * lanes];
+        to[i * (n + more) * lanes..][..n * lanes].copy_from_slice(row);
+    }
+}
+
 impl VectorField for Clocked<'_> {
     fn dim(&self) -> usize {
         self.0.dim() + 1
@@ -36,8 +46,14 @@ impl VectorField for Clocked<'_> {
         self.with_clock(at, f, |inner, own| self.0.evaluate(inner, own));
     }
 
-    fn linearise(&self, _at: Batch, _free: &[usize], f: &mut [f64], fx: &mut [f64], fp: &mut [f64]) {
-        [f, fx, fp].into_iter().for_each(|none| none.fill(f64::NAN));
+    fn linearise(&self, at: Batch, free: &[usize], f: &mut [f64], fx: &mut [f64], fp: &mut [f64]) {
+        let n = self.0.dim();
+        let mut inner_fx = vec![0.0; n * n * at.lanes];
+        let mut inner_fp = vec![0.0; n * free.len() * at.lanes];
+        self.with_clock(at, f, |inner, own| self.0.linearise(inner, free, own, &mut inner_fx, &mut inner_fp));
+        bordered(&inner_fx, n, 1, at.lanes, fx);
+        fp.fill(0.0);
+        fp[..inner_fp.len()].copy_from_slice(&inner_fp);
     }
 
     fn directional(&self, _at: Batch, _directions: &[&[f64]], out: &mut [f64]) {

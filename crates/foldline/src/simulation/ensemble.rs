@@ -15,6 +15,7 @@
 //! | what is computed for all lanes at once? | `lanes` |
 //! | how long is the next step, and the first? | `pace` |
 //! | what happens where f or a derivative jumps? | `switching` |
+//! | which trajectories are stiff, and what becomes of them? | `stiff` |
 //!
 //! **Source.** hairer1993, §II.4 (step control and first step); hairer1996, §IV.2 (the second factor of (1)).
 //!
@@ -26,6 +27,7 @@
 
 mod lanes;
 mod pace;
+mod stiff;
 mod switching;
 
 use super::kink::Kink;
@@ -33,7 +35,8 @@ use super::shortened::Shortened;
 use super::{Arrival, Outcome, Step, Tolerance};
 use crate::contract::{Parameters, VectorField, Verdict};
 use lanes::Lanes;
-use pace::Limits;
+use stiff::Evidence;
+pub(super) use pace::Limits;
 
 /// Trajectories that are integrated at a time: enough to keep vector instructions busy, few enough to stay in the cache.
 const WIDTH: usize = 64;
@@ -67,6 +70,7 @@ struct Run {
     /// How often in succession a switch changed sign without getting on.
     stuck: usize,
     done: Option<Outcome>,
+    stiff: Evidence,
     /// Nothing runs in this lane any more.
     over: bool,
 }
@@ -161,6 +165,7 @@ impl<'a> Ensemble<'a> {
                         self.pass(l, &kink, &mut again);
                     }
                 }
+                self.look_for_stiffness(&mut observe);
                 self.replace_finished();
             }
         }
@@ -180,6 +185,7 @@ impl<'a> Ensemble<'a> {
             from: &lanes.x,
             to: &lanes.next,
             slopes: &lanes.slopes,
+            courses: &[],
             parameters: lanes.parameters(self.parameters),
             signs: &lanes.signs,
         }
@@ -278,7 +284,7 @@ impl<'a> Ensemble<'a> {
         let size = crate::linalg::max_abs(&self.tolerance.absolute) / self.tolerance.relative;
         let bound = BOUND * (size + crate::linalg::max_abs(start));
         self.lanes.set(l, start, own, self.begin, bound);
-        Run { trajectory, stuck: 0, done: None, over: false }
+        Run { trajectory, stuck: 0, done: None, stiff: Evidence::default(), over: false }
     }
 
     /// The first trajectories.

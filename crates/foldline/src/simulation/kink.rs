@@ -17,6 +17,7 @@ use super::shortened::Shortened;
 pub(super) const PLACES: [f64; 4] = [0.25, 0.5, 0.75, 1.0];
 
 /// The first zero: which switch, and the fraction of the step at which.
+#[derive(Clone, Copy)]
 pub(super) struct Kink {
     pub(super) switch: usize,
     pub(super) theta: f64,
@@ -40,6 +41,13 @@ pub(super) fn first(step: &Step, again: &mut Shortened, samples: impl Fn(usize) 
         }
     }
     found
+}
+
+/// What [`first`] asks for, from the sign of a switch in this step and its values at the start and at [`PLACES`].
+pub(super) fn samples(sign: f64, value: impl Fn(usize) -> f64) -> [f64; PLACES.len() + 1] {
+    let values: [f64; PLACES.len() + 1] = std::array::from_fn(|k| sign * value(k));
+    // Rounding may leave a switch that has just changed sign on the wrong side of zero.
+    std::array::from_fn(|k| if k == 0 { values[0].max(0.0) } else { values[k] })
 }
 
 /// Whether a parabola through values like these cannot come near zero.

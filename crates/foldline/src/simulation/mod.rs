@@ -2,7 +2,8 @@
 //!
 //! **Idea.** Trajectories are integrated as a batch: in every sweep each of them advances by one step of its own length, and
 //! the vector field is evaluated once per stage for all. A single trajectory is a batch of one. Where the field names
-//! switches ([`crate::contract::VectorField::switches`]), every step ends at the first of them that changes sign.
+//! switches ([`crate::contract::VectorField::switches`]), every step ends at the first of them that changes sign. A trajectory whose steps
+//! stability keeps short goes on with an implicit method.
 //!
 //! | question | file |
 //! |---|---|
@@ -15,7 +16,9 @@
 mod aligned;
 mod clocked;
 mod ensemble;
+mod implicit;
 mod kink;
+mod radau;
 mod root;
 mod section;
 mod shortened;
@@ -25,9 +28,12 @@ mod tableau;
 mod tests;
 #[cfg(test)]
 mod tests_kinks;
+#[cfg(test)]
+mod tests_stiff;
 mod trajectory;
 
 pub use clocked::Clocked;
+pub(crate) use clocked::bordered;
 pub use ensemble::Ensemble;
 pub use section::{Crossing, Direction, Section};
 pub use step::Step;

@@ -1,6 +1,7 @@
 //! A part of an accepted step, with the full order.
 
 use super::Step;
+use super::step::Course;
 use super::tableau::{A, STAGES};
 use crate::contract::{Batch, Parameters, VectorField};
 
@@ -12,18 +13,33 @@ pub(super) struct Shortened<'a> {
     start: Vec<f64>,
     parameters: Vec<f64>,
     signs: Vec<f64>,
+    /// Length of the step.
+    length: f64,
+    /// Its solution where an implicit method took it: that is as accurate as its end.
+    courses: Vec<Course>,
 }
 
 impl<'a> Shortened<'a> {
     pub(super) fn new(field: &'a dyn VectorField) -> Shortened<'a> {
         let n = field.dim();
         let slopes = std::array::from_fn(|_| vec![0.0; n]);
-        Shortened { field, slopes, start: vec![0.0; n], parameters: Vec::new(), signs: Vec::new() }
+        Shortened {
+            field,
+            slopes,
+            start: vec![0.0; n],
+            parameters: Vec::new(),
+            signs: Vec::new(),
+            length: 0.0,
+            courses: Vec::new(),
+        }
     }
 
     /// Takes the start, parameters and signs of switches from a step.
     pub(super) fn of(&mut self, step: &Step) {
         step.start_into(&mut self.start);
+        self.length = step.length;
+        self.courses.clear();
+        self.courses.extend_from_slice(step.courses);
         (0..self.start.len()).for_each(|i| self.slopes[0][i] = step.slopes[0][i * step.lanes + step.column]);
         let own = |values: &[f64], to: &mut Vec<f64>| {
             to.clear();
@@ -41,6 +57,12 @@ impl<'a> Shortened<'a> {
 
     /// Writes the state a time `h` after the start, by a step of that length; its slopes stay in `slopes` but for the last.
     pub(super) fn state_into(&mut self, h: f64, x: &mut [f64]) {
+        if !self.courses.is_empty() {
+            for (i, x) in x.iter_mut().enumerate() {
+                *x = self.start[i] + self.courses[i].change(h / self.length);
+            }
+            return;
+        }
         for (s, row) in A.iter().enumerate() {
             for i in 0..x.len() {
                 let change: f64 = row.iter().zip(&self.slopes).map(|(a, k)| a * k[i]).sum();

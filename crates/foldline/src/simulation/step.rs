@@ -19,6 +19,8 @@ pub struct Step<'a> {
     pub(super) to: &'a [f64],
     /// `[STAGES][n × lanes]`.
     pub(super) slopes: &'a [Aligned; STAGES],
+    /// `[n]` the solution between the ends where an implicit method took the step, whose `slopes` are those of the ends alone; else empty.
+    pub(super) courses: &'a [Course],
     pub(super) parameters: Parameters<'a>,
     /// `[switches × lanes]` signs of the switches along the step.
     pub(super) signs: &'a [f64],
@@ -96,6 +98,9 @@ impl Step<'_> {
     }
 
     fn component(&self, i: usize) -> Course {
+        if let Some(course) = self.courses.get(i) {
+            return *course;
+        }
         let (h, at) = (self.length, i * self.lanes + self.column);
         let change = self.to[at] - self.from[at];
         let b = h * self.slopes[0][at] - change;
@@ -110,6 +115,17 @@ impl Step<'_> {
 pub(crate) struct Course([f64; 4]);
 
 impl Course {
+    pub(super) fn new(coefficients: [f64; 4]) -> Course {
+        Course(coefficients)
+    }
+
+    /// Up to a fraction `theta` of the step, where the polynomial is a cubic one (D = 0).
+    pub(super) fn shortened(self, theta: f64) -> Course {
+        let [change, b, c, _] = self.0;
+        let end = self.change(theta);
+        Course([end, theta * (change + b) - end, theta.powi(3) * c, 0.0])
+    }
+
     /// The change from the start to a fraction `theta` ∈ [0, 1] of the step.
     pub(crate) fn change(&self, theta: f64) -> f64 {
         let [change, b, c, d] = self.0;

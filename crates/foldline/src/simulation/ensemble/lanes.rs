@@ -8,6 +8,7 @@ use super::super::aligned::Aligned;
 use super::super::kink::PLACES;
 use super::super::tableau::{A, ERROR, STAGES};
 use super::pace::{self, Limits};
+use super::stiff;
 use super::shared_or_own;
 use crate::contract::{Batch, Parameters, VectorField};
 
@@ -46,6 +47,10 @@ pub(super) struct Lanes {
     /// lane without one.
     pub(super) largest: Aligned,
     pub(super) bound: Aligned,
+    /// `[lanes]` length of the step that was tried last.
+    pub(super) taken: Aligned,
+    /// `[lanes]` number of steps tried after which stiffness is looked for.
+    pub(super) look: Aligned,
     /// `[lanes]` steps tried, and those accepted.
     pub(super) tried: Aligned,
     pub(super) steps: Aligned,
@@ -80,6 +85,8 @@ impl Lanes {
             second: of(1),
             largest: of(1),
             bound: of(1),
+            taken: of(1),
+            look: of(1),
             tried: of(1),
             steps: of(1),
             remarkable: of(1),
@@ -101,7 +108,7 @@ impl Lanes {
         start.iter().enumerate().for_each(|(i, x)| self.x[i * self.count + l] = *x);
         own.iter().enumerate().for_each(|(k, p)| self.own[k * self.count + l] = *p);
         (self.time[l], self.bound[l]) = (time, bound);
-        (self.tried[l], self.steps[l]) = (0.0, 0.0);
+        (self.tried[l], self.steps[l], self.look[l]) = (0.0, 0.0, stiff::FIRST_LOOK);
         (self.most[l], self.second[l]) = (pace::MOST, pace::second(0.0));
     }
 
@@ -211,7 +218,7 @@ impl Lanes {
     /// Only these lanes stay.
     pub(super) fn keep(&mut self, kept: &[usize]) {
         let scalars = [&mut self.time, &mut self.h, &mut self.most, &mut self.second, &mut self.bound];
-        let scalars = scalars.into_iter().chain([&mut self.tried, &mut self.steps]);
+        let scalars = scalars.into_iter().chain([&mut self.look, &mut self.tried, &mut self.steps]);
         let of_lanes =
             [&mut self.x, &mut self.slopes[0], &mut self.own, &mut self.signs, &mut self.switches].into_iter();
         for array in of_lanes.chain(scalars) {
@@ -229,7 +236,7 @@ impl Lanes {
         self.slopes.iter_mut().for_each(|k| k.truncate(self.n * self.count));
         [&mut self.next, &mut self.stage].into_iter().for_each(|v| v.truncate(self.n * self.count));
         let scalars = [&mut self.end, &mut self.planned, &mut self.error, &mut self.accepted, &mut self.largest];
-        scalars.into_iter().chain([&mut self.remarkable]).for_each(|v| v.truncate(self.count));
+        scalars.into_iter().chain([&mut self.taken, &mut self.remarkable]).for_each(|v| v.truncate(self.count));
     }
 }
 
@@ -307,7 +314,9 @@ impl pulp::NullaryFnOnce for GoOn<'_, '_> {
 
     #[inline(always)]
     fn call(self) {
-        let Lanes { accepted, end, planned, largest, bound, time, h, tried, steps, remarkable, .. } = self.lanes;
-        pace::go_on(self.limits, [accepted, end, planned, largest, bound], time, h, tried, steps, remarkable);
+        let Lanes { accepted, end, planned, largest, bound, look, time, h, taken, tried, steps, remarkable, .. } =
+            self.lanes;
+        taken.copy_from_slice(h);
+        pace::go_on(self.limits, [accepted, end, planned, largest, bound, look], time, h, tried, steps, remarkable);
     }
 }

@@ -19,14 +19,14 @@ pub(super) const MOST: f64 = 10.0;
 const SMALLEST_BEFORE: f64 = 1e-4;
 
 /// What ends steps and trajectories, the same for all lanes.
-pub(super) struct Limits {
+pub(in crate::simulation) struct Limits {
     /// End of the time span, and the sign of the direction in which it lies.
-    pub(super) end: f64,
-    pub(super) sign: f64,
+    pub(in crate::simulation) end: f64,
+    pub(in crate::simulation) sign: f64,
     /// Longest step.
-    pub(super) longest: f64,
+    pub(in crate::simulation) longest: f64,
     /// Most steps, accepted and rejected.
-    pub(super) steps: f64,
+    pub(in crate::simulation) steps: f64,
 }
 
 impl Limits {
@@ -87,11 +87,12 @@ pub(super) fn judge(
     }
 }
 
-/// Counts the steps, goes to the ends of those that hold, and on to the next length; says which trajectories may have ended.
+/// Counts the steps, goes to the ends of those that hold, and on to the next length; says which trajectories may have ended,
+/// or are to be looked at.
 #[inline(always)]
 pub(super) fn go_on(
     limits: &Limits,
-    [accepted, end, planned, largest, bound]: [&[f64]; 5],
+    [accepted, end, planned, largest, bound, look]: [&[f64]; 6],
     time: &mut [f64],
     h: &mut [f64],
     tried: &mut [f64],
@@ -100,6 +101,7 @@ pub(super) fn go_on(
 ) {
     let count = accepted.len();
     let (end, planned, largest, bound) = (&end[..count], &planned[..count], &largest[..count], &bound[..count]);
+    let look = &look[..count];
     let (time, h, remarkable) = (&mut time[..count], &mut h[..count], &mut remarkable[..count]);
     let (tried, steps) = (&mut tried[..count], &mut steps[..count]);
     for l in 0..count {
@@ -114,7 +116,7 @@ pub(super) fn go_on(
         let last = holds & (planned[l].abs() * 1.01 >= remaining.abs());
         let next = if last { remaining } else { planned[l] };
         let ended =
-            (remaining == 0.0) | (tried[l] >= limits.steps) | too_small(next, now) | escaped(largest[l], bound[l]);
+            (remaining == 0.0) | (tried[l] >= limits.steps) | (tried[l] >= look[l]) | too_small(next, now) | escaped(largest[l], bound[l]);
         remarkable[l] = if ended & (bound[l] > 0.0) { 1.0 } else { 0.0 };
         (time[l], h[l]) = (now, next);
     }

@@ -8,7 +8,7 @@ use super::Ensemble;
 use crate::contract::Batch;
 
 /// Changes of sign without getting on after which a trajectory is taken to slide along a switch.
-const STUCK: usize = 50;
+pub(super) const STUCK: usize = 50;
 
 impl Ensemble<'_> {
     /// The first signs of the switches, those at the start or a little later where a trajectory starts on a zero, and their
@@ -55,9 +55,7 @@ impl Ensemble<'_> {
         let kink = kink::first(&step, again, |switch| {
             let at = switch * lanes + l;
             let value = |k: usize| if k == 0 { self.lanes.switches[at] } else { self.lanes.ahead[k - 1][at] };
-            let values: [f64; PLACES.len() + 1] = std::array::from_fn(|k| self.lanes.signs[at] * value(k));
-            // Rounding may leave a switch that has just changed sign on the wrong side of zero.
-            std::array::from_fn(|k| if k == 0 { values[0].max(0.0) } else { values[k] })
+            kink::samples(self.lanes.signs[at], value)
         })?;
         let mut x = vec![0.0; n];
         again.of(&step);

@@ -1,0 +1,74 @@
+//! Trajectories of stiff fields, with known answers.
+
+use super::*;
+use crate::contract::Verdict;
+use crate::model::{Definition, Model, ModelSource, Parameter, State};
+
+const ACCURACY: f64 = 1e-6;
+
+fn model(states: &[(&str, &str)], parameters: &[(&str, f64)]) -> Model {
+    Model::compile(ModelSource {
+        name: "stiff".into(),
+        parameters: parameters.iter().map(|(name, value)| Parameter::new(name, *value)).collect(),
+        states: states.iter().map(|(name, _)| State::new(name)).collect(),
+        equations: states.iter().map(|(name, equation)| Definition::new(name, equation)).collect(),
+        ..ModelSource::default()
+    })
+    .unwrap()
+}
+
+/// Where trajectories from `start` arrive, with the number of steps.
+fn arrive(model: &Model, start: &[f64], span: [f64; 2], limit: usize) -> Arrival {
+    let n = start.len();
+    let tolerance = Tolerance::uniform(ACCURACY, n);
+    let (parameters, mut seen) = (model.defaults(), span[0]);
+    let arrival = Integrator::new(model, &parameters, tolerance).with_step_limit(limit).trajectory(
+        start,
+        span,
+        &[],
+        &mut |passage| {
+            // Steps follow one another, and end where the next one begins.
+            if let Passage::Step(step) = passage {
+                assert_eq!(step.start_time(), seen);
+                seen = step.end_time();
+            }
+            Verdict::Continue
+        },
+    );
+    assert_eq!(seen, arrival.time);
+    arrival
+}
+
+#[test]
+fn a_slaved_fast_state_costs_no_more_steps_however_fast_it_is() {
+    // x = cos t, and z follows it by 1 / rate: z = (rate² cos t + rate sin t) / (rate² + 1).
+    for rate in [1e3, 1e6, 1e9] {
+        let slaved = model(&[("x", "y"), ("y", "-x"), ("z", "rate*(x - z)")], &[("rate", rate)]);
+        let arrival = arrive(&slaved, &[1.0, 0.0, 1.0], [0.0, 40.0], 4000);
+        assert_eq!(arrival.outcome, Outcome::Reached, "{rate:e}: {} steps", arrival.steps);
+        let (sin, cos) = 40f64.sin_cos();
+        let z = (rate * rate * cos + rate * sin) / (rate * rate + 1.0);
+        for (value, exact) in arrival.state.iter().zip([cos, -sin, z]) {
+            // Errors add up over six periods.
+            assert!((value - exact).abs() < 1e-4, "{rate:e}: {value} instead of {exact}");
+        }
+    }
+}
+
+#[test]
+fn robertson_reaction_comes_to_rest_in_a_flow() {
+    let reaction = model(
+        &[
+            ("a", "k*(1 - a) - 0.04*a + 1e4*b*c"),
+            ("b", "-k*b + 0.04*a - 1e4*b*c - 3e7*b^2"),
+            ("c", "-k*c + 3e7*b^2"),
+        ],
+        &[("k", 0.01)],
+    );
+    for start in [[1.0, 0.0, 0.0], [0.5, 0.5, 0.5], [0.0, 1.0, 0.0], [0.3, 0.9, 0.1]] {
+        let arrival = arrive(&reaction, &start, [0.0, 1e4], 20_000);
+        assert_eq!(arrival.outcome, Outcome::Reached, "{start:?}: {} steps to {}", arrival.steps, arrival.time);
+        let total: f64 = arrival.state.iter().sum();
+        assert!((total - 1.0).abs() < 1e-6, "{start:?}: {:?}", arrival.state);
+    }
+}
