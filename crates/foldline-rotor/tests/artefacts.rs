@@ -38,6 +38,7 @@ fn the_false_unstable_piece_below_contact_is_recognised() {
     let plan = Plan {
         tolerance: 1e-6,
         degree: 4,
+        limits: Default::default(),
         seeds: vec![seed],
         branches: vec![branch],
         curves: Vec::new(),
@@ -81,7 +82,16 @@ fn motions(constants: &Nondimensional) -> Vec<Response> {
     let whirl = Some([0, 1]);
     let trial = Trial { field: &field, scales: &scales, whirl, jobs: 2 };
     let ranges = vec![[-5.0, 5.0], [-5.0, 5.0], [-15.0, 15.0], [-15.0, 15.0]];
-    let sampling = Sampling { ranges, scales: scales.to_vec(), whirl, samples: 24, seed: 1, jobs: 2, tolerance: 1e-6 };
+    let sampling = Sampling {
+        ranges,
+        scales: scales.to_vec(),
+        whirl,
+        samples: 24,
+        seed: 1,
+        jobs: 2,
+        tolerance: 1e-6,
+        limits: Default::default(),
+    };
     let found = survey_by_simulation(&trial, &sampling, &constants.parameters(), 0, &[5.0], &|_| Verdict::Continue);
     let named = |r: &Response| [(2, 1), (3, 1)].contains(&r.ratio.unwrap_or_default()) && r.multiplicity == 1;
     found.into_iter().filter(named).collect()

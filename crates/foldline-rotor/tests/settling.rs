@@ -16,7 +16,16 @@ fn trial(field: &dyn VectorField, jobs: usize) -> Trial<'_> {
 
 fn sampling(samples: usize) -> Sampling {
     let ranges = vec![[-5.0, 5.0], [-5.0, 5.0], [-15.0, 15.0], [-15.0, 15.0]];
-    Sampling { ranges, scales: SCALES.to_vec(), whirl: Some([0, 1]), samples, seed: 1, jobs: 2, tolerance: 1e-6 }
+    Sampling {
+        ranges,
+        scales: SCALES.to_vec(),
+        whirl: Some([0, 1]),
+        samples,
+        seed: 1,
+        jobs: 2,
+        tolerance: 1e-6,
+        limits: Default::default(),
+    }
 }
 
 fn reference(kappa: f64) -> Vec<f64> {

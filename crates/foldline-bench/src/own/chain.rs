@@ -55,6 +55,7 @@ pub fn plan(model: &Model, until: f64, points: usize) -> Plan {
     Plan {
         tolerance: 1e-6,
         degree: 4,
+        limits: Default::default(),
         seeds: vec![seed],
         branches: vec![branch],
         curves: Vec::new(),

@@ -49,7 +49,16 @@ fn version(python: &Path) -> String {
 fn starts() -> Outcome<String> {
     let ranges = vec![[-5.0, 5.0], [-5.0, 5.0], [-15.0, 15.0], [-15.0, 15.0]];
     let samples = CASE[0].parse()?;
-    let sampling = Sampling { ranges, scales: vec![1.0; 4], whirl: None, samples, seed: 1, jobs: 1, tolerance: 1e-6 };
+    let sampling = Sampling {
+        ranges,
+        scales: vec![1.0; 4],
+        whirl: None,
+        samples,
+        seed: 1,
+        jobs: 1,
+        tolerance: 1e-6,
+        limits: Default::default(),
+    };
     let line = |x: &[f64]| format!("{:?} {:?} {:?} {:?}\n", x[0], x[1], x[2], x[3]);
     Ok(sampling.starts().chunks_exact(4).map(line).collect())
 }

@@ -18,6 +18,7 @@ use crate::finite::{check_explorations, check_seeds};
 use crate::model_file::{parse_model, read_model};
 use crate::nearest::suggest;
 use crate::toml_walk::{Value, Walk, read_text, unreadable};
+use foldline::attractors::Limits;
 use foldline::explore::Plan;
 use foldline::model::Model;
 use items::Items;
@@ -41,13 +42,15 @@ pub struct Study {
     pub plan: Plan,
 }
 
-const ROOT_KEYS: [&str; 14] = [
+const ROOT_KEYS: [&str; 16] = [
     "model",
     "title",
     "description",
     "source",
     "tolerance",
     "degree",
+    "max-steps",
+    "max-time",
     "parameters",
     "seed",
     "branch",
@@ -118,6 +121,7 @@ fn parse(
 
     let tolerance = tolerance(&mut walk, &root);
     let degree = root.get("degree").and_then(|v| walk.integer(v, "`degree`", 2..=7)).unwrap_or(4) as usize;
+    let limits = limits(&mut walk, &root);
     let mut defaults: Vec<f64> = model.parameters.iter().map(|p| p.value).collect();
     if let Some(value) = root.get("parameters") {
         override_parameters(&mut walk, value, &model, &mut defaults);
@@ -140,8 +144,23 @@ fn parse(
         return Err(walk.found);
     }
     let seeds = seeds.into_iter().map(|(_, seed)| seed).collect();
-    let plan = Plan { tolerance, degree, seeds, branches, curves, homotopies, explorations, surveys, sweeps };
+    let plan = Plan { tolerance, degree, limits, seeds, branches, curves, homotopies, explorations, surveys, sweeps };
     Ok(Study { file: file.to_string(), text: text.to_string(), model_file, model_text, model, plan })
+}
+
+/// How long trajectories are followed in search of first solutions.
+fn limits(walk: &mut Walk, root: &DeTable) -> Limits {
+    let usual = Limits::default();
+    let steps = root.get("max-steps").and_then(|v| walk.integer(v, "`max-steps`", 1..=10_000_000_000));
+    let time = root.get("max-time").and_then(|v| {
+        let time = walk.number(v, "`max-time`")?;
+        if time > 0.0 {
+            return Some(time);
+        }
+        walk.report(v.span(), "`max-time` is not positive", "give a time in the units of the model");
+        None
+    });
+    Limits { steps: steps.map_or(usual.steps, |n| n as usize), time: time.unwrap_or(usual.time) }
 }
 
 fn model_key<'v, 't>(walk: &mut Walk, root: &'v DeTable<'t>) -> Option<&'v Value<'t>> {

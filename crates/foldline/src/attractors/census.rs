@@ -5,9 +5,10 @@
 
 use super::candidate::Context;
 use super::orbit::Orbit;
+use super::runner::PATIENT;
 use super::settling::{First, Settled, Trial, settle_together};
 use super::watch::Watch;
-use super::{Attractor, Candidate, Census, Enough, Exit, Polish, Sampling};
+use super::{Attractor, Candidate, Census, Enough, Exit, Limits, Polish, Sampling};
 use crate::contract::{VectorField, Verdict};
 use crate::diagram::{Motion, Point, Response, Share};
 use crate::simulation::{Ensemble, Outcome};
@@ -31,8 +32,8 @@ impl Pace {
 
 /// Blocks per round after the first, which is one block; fixed for the same reason.
 const ROUND: usize = 4;
-/// Steps after which a trajectory counts as unsettled: some thousand periods.
-pub(crate) const STEP_LIMIT: usize = 60_000;
+/// Steps after which a trajectory counts as unsettled unless a study says otherwise: some thousand periods.
+pub(super) const STEP_LIMIT: usize = 60_000;
 
 /// Outcome of one trajectory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -203,9 +204,10 @@ pub(super) fn settle(
 
 /// The same by simulation alone, up to the last Newton steps.
 fn patiently(context: &Context, start: &[f64]) -> Result<Point, Lost> {
-    let Sampling { scales, whirl, .. } = context.sampling;
+    let Sampling { scales, whirl, limits, .. } = context.sampling;
+    let limits = Limits { steps: limits.steps.max(PATIENT.steps), ..*limits };
     let trial = Trial { field: context.field, scales, whirl: *whirl, jobs: 1 };
-    let settled = settle_together(&trial, context.parameters, start, First::Accurate).pop();
+    let settled = settle_together(&trial, context.parameters, start, First::Accurate, limits).pop();
     let settled = settled.ok_or(Lost::nothing(start))?;
     let candidate = match settled.motion {
         Motion::Equilibrium => Candidate::Equilibrium(settled.state.clone()),
@@ -278,8 +280,9 @@ fn watch_block(context: &Context, starts: &[f64], reached: &[Reached], enough: E
         let found = orbits.iter().zip(counts).filter(|(_, counts)| *counts);
         enough(&found.map(|(orbit, _)| (&orbit.point, orbit.ratio)).collect::<Vec<_>>())
     };
-    let ensemble = Ensemble::new(context.field, context.parameters, context.tolerance(), starts, [0.0, f64::INFINITY])
-        .with_step_limit(STEP_LIMIT);
+    let Limits { steps, time } = context.sampling.limits;
+    let ensemble = Ensemble::new(context.field, context.parameters, context.tolerance(), starts, [0.0, time])
+        .with_step_limit(steps);
     let arrivals = ensemble.run(&mut |step| {
         if ended {
             return Verdict::Stop;

@@ -11,10 +11,10 @@
 //! ```
 
 use super::census::Pace;
-use super::{Attractor, Candidate, Census, Enough, Exit, Lost, Polish, Report, Sampling, Trial};
+use super::{Attractor, Candidate, Census, Enough, Exit, Limits, Lost, Polish, Report, Sampling, Trial};
 use crate::contract::{Batch, VectorField};
-use crate::simulation::bordered;
 use crate::diagram::{Cycle, Point, Response, Solution};
+use crate::simulation::bordered;
 use std::f64::consts::TAU;
 
 /// How far from a whole number of periods of the forcing a motion may last and still be one that repeats with it.
@@ -133,7 +133,8 @@ pub(super) fn survey(
 ) -> Census {
     let n = field.dim();
     let polish = |candidate: &Candidate| polish(&without_circle(candidate, n)?).and_then(|found| with_circle(found, n));
-    let mut census = super::census::survey(&Driven(field), parameters, &with_clock(sampling), &polish, until);
+    let sampling = with_clock(sampling, field.time_unit(parameters));
+    let mut census = super::census::survey(&Driven(field), parameters, &sampling, &polish, until);
     for Attractor { point, example, .. } in &mut census.attractors {
         bare(point, n, field.time_unit(parameters));
         example.truncate(n);
@@ -154,7 +155,7 @@ pub(super) fn settle(
     let polish = |candidate: &Candidate| polish(&without_circle(candidate, n)?).and_then(|found| with_circle(found, n));
     let start = [start, &[1.0, 0.0]].concat();
     let unit = field.time_unit(parameters);
-    match super::census::settle(&Driven(field), parameters, &with_clock(sampling), &start, &polish) {
+    match super::census::settle(&Driven(field), parameters, &with_clock(sampling, unit), &start, &polish) {
         Ok(mut point) => {
             bare(&mut point, n, unit);
             Ok(point)
@@ -186,10 +187,11 @@ pub(super) fn with_unit_scales(scales: &[f64]) -> Vec<f64> {
     [scales, &[1.0, 1.0]].concat()
 }
 
-/// Every sample begins with a period of the forcing.
-pub(super) fn with_clock(sampling: &Sampling) -> Sampling {
+/// Every sample begins with a period of the forcing, which is the unit of time.
+pub(super) fn with_clock(sampling: &Sampling, unit: f64) -> Sampling {
     let ranges = [&sampling.ranges[..], &[[1.0, 1.0], [0.0, 0.0]]].concat();
-    Sampling { ranges, scales: with_unit_scales(&sampling.scales), ..sampling.clone() }
+    let limits = Limits { time: sampling.limits.time / unit, ..sampling.limits };
+    Sampling { ranges, scales: with_unit_scales(&sampling.scales), limits, ..sampling.clone() }
 }
 
 /// Calls with the trial that (1) is, and gives the responses without the circle.

@@ -41,13 +41,29 @@ mod window;
 pub use brute_force::{Compare, Report, stepped_sweep, survey_by_simulation};
 pub use census::Lost;
 use census::Pace;
-pub(crate) use census::STEP_LIMIT;
+use census::STEP_LIMIT;
 pub use sampling::Sampling;
 pub use settling::Trial;
 pub use spectrum::{Sense, signed_spectrum, spectral_ratio, whirl_sense};
 
 use crate::contract::VectorField;
 use crate::diagram::{Point, Share};
+
+/// How long a trajectory is followed before it counts as unsettled.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
+    /// Integration steps, accepted and rejected.
+    pub steps: usize,
+    /// Time, in the units of the model.
+    pub time: f64,
+}
+
+impl Default for Limits {
+    /// Some thousand periods; any time.
+    fn default() -> Limits {
+        Limits { steps: STEP_LIMIT, time: f64::INFINITY }
+    }
+}
 
 /// A stable equilibrium or cycle, and how often it was reached.
 #[derive(Clone, Debug)]

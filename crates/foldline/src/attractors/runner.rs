@@ -4,6 +4,7 @@
 //! of the motion is taken, and its limit predicted if it is shrinking. Each round has one of three ends: the motion repeats
 //! itself or rests, it has been seen to contract and goes on close to the predicted limit, or its steps are used up.
 
+use super::Limits;
 use super::returns::{Prediction, Returns};
 use super::settling::{First, INTEGRATION, Settled, Trial};
 use super::window::Window;
@@ -34,7 +35,9 @@ const ROUGH: usize = 6144;
 /// Predicted limits that are tried; after those the trajectory is left to itself.
 pub(super) const JUMPS: usize = 8;
 /// Steps of all rounds after which a motion counts as neither at rest nor periodic.
-pub(super) const STEPS: usize = 400_000;
+const STEPS: usize = 400_000;
+/// The usual limits.
+pub(super) const PATIENT: Limits = Limits { steps: STEPS, time: f64::INFINITY };
 /// Predictions from which contraction can be told.
 const SEEN: usize = 12;
 /// Contraction over the predictions of a round: for few of them, and for many.
@@ -46,7 +49,8 @@ pub(super) struct Runner {
     pub(super) start: Vec<f64>,
     parameters: Vec<f64>,
     pub(super) found: Option<Settled>,
-    /// Of all rounds.
+    /// Most steps of all rounds, and those taken.
+    limit: usize,
     pub(super) steps: usize,
     pub(super) time: f64,
     pub(super) extent: Vec<f64>,
@@ -74,13 +78,14 @@ pub(super) struct Runner {
 }
 
 impl Runner {
-    pub(super) fn new(trial: &Trial, start: &[f64], first: First) -> Runner {
+    pub(super) fn new(trial: &Trial, start: &[f64], first: First, limit: usize) -> Runner {
         let n = start.len();
         Runner {
             start: start.to_vec(),
             first,
             parameters: Vec::new(),
             found: None,
+            limit,
             steps: 0,
             time: 0.0,
             extent: trial.scales.to_vec(),
@@ -127,7 +132,7 @@ impl Runner {
         self.x = x;
         // At its low accuracy the first round does not see small motions contract.
         let rough = self.is_rough() && self.steps >= ROUGH;
-        let over = self.found.is_some() || self.next.is_some() || self.steps >= STEPS || rough;
+        let over = self.found.is_some() || self.next.is_some() || self.steps >= self.limit || rough;
         if over { Verdict::Stop } else { Verdict::Continue }
     }
 
@@ -264,10 +269,10 @@ impl Runner {
         self.time += time;
         let extent = self.extent.clone();
         let gone = outcome.is_lost();
-        if self.found.is_none() && !gone && self.steps >= STEPS {
+        if self.found.is_none() && !gone && self.steps >= self.limit {
             self.found = self.nearly();
         }
-        if self.found.is_none() && (gone || self.steps >= STEPS) {
+        if self.found.is_none() && (gone || self.steps >= self.limit) {
             let motion = if gone { Motion::Escaped } else { Motion::Other };
             self.found =
                 Some(Settled { motion, state: state.clone(), period: 0.0, extent, time: self.time, error: f64::NAN });

@@ -8,6 +8,8 @@
 //!
 //! **Source.** mckay1979 (Latin hypercube); steele2014 (SplitMix64).
 
+use super::Limits;
+
 /// What to sample and how carefully.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sampling {
@@ -25,6 +27,8 @@ pub struct Sampling {
     pub jobs: usize,
     /// Accuracy, relative, to which `polish` computes: solutions that agree to it are the same.
     pub tolerance: f64,
+    /// How long every trajectory is followed, in the time of the model.
+    pub limits: Limits,
 }
 
 /// One in this many samples is drawn towards the origin.
@@ -101,6 +105,7 @@ mod tests {
             seed,
             jobs: 1,
             tolerance: 1e-6,
+            limits: Limits::default(),
         }
     }
 

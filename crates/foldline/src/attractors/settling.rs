@@ -15,7 +15,8 @@
 //!
 //! **Fails when** a motion is neither at rest nor periodic, or contracts by less than a thirtieth over some thousand periods.
 
-use super::runner::{JUMPS, Runner, STEPS};
+use super::Limits;
+use super::runner::{JUMPS, Runner};
 use crate::contract::VectorField;
 use crate::diagram::Motion;
 use crate::simulation::{Ensemble, Tolerance};
@@ -59,9 +60,16 @@ pub(super) struct Settled {
 }
 
 /// Follows trajectories together, each at parameters of its own: `parameters` `[count][k]`, `starts` `[count][n]`.
-pub(super) fn settle_together(trial: &Trial, parameters: &[f64], starts: &[f64], first: First) -> Vec<Settled> {
+pub(super) fn settle_together(
+    trial: &Trial,
+    parameters: &[f64],
+    starts: &[f64],
+    first: First,
+    limits: Limits,
+) -> Vec<Settled> {
     let (n, k) = (trial.field.dim(), trial.field.parameter_count());
-    let mut runners: Vec<Runner> = starts.chunks_exact(n).map(|start| Runner::new(trial, start, first)).collect();
+    let mut runners: Vec<Runner> =
+        starts.chunks_exact(n).map(|start| Runner::new(trial, start, first, limits.steps)).collect();
     for round in 0..JUMPS + 2 {
         let open: Vec<usize> = (0..runners.len()).filter(|&r| runners[r].found.is_none()).collect();
         if open.is_empty() {
@@ -71,12 +79,12 @@ pub(super) fn settle_together(trial: &Trial, parameters: &[f64], starts: &[f64],
         let own: Vec<f64> = open.iter().flat_map(|&r| parameters[r * k..(r + 1) * k].to_vec()).collect();
         let relative = INTEGRATION[usize::from(round > 0 || first == First::Accurate)];
         let tolerance = Tolerance { relative, absolute: trial.scales.iter().map(|s| relative * s).collect() };
-        let left = |r: usize| STEPS.saturating_sub(runners[r].steps);
+        let left = |r: usize| limits.steps.saturating_sub(runners[r].steps);
         let limit = open.iter().map(|&r| left(r)).max().unwrap_or(0).max(1);
         open.iter().for_each(|&r| runners[r].begin(parameters[r * k..(r + 1) * k].to_vec()));
         let ensemble = match k {
-            0 => Ensemble::new(trial.field, &[], tolerance, &from, [0.0, f64::INFINITY]),
-            _ => Ensemble::with_own_parameters(trial.field, &own, tolerance, &from, [0.0, f64::INFINITY]),
+            0 => Ensemble::new(trial.field, &[], tolerance, &from, [0.0, limits.time]),
+            _ => Ensemble::with_own_parameters(trial.field, &own, tolerance, &from, [0.0, limits.time]),
         };
         let arrivals =
             ensemble.with_step_limit(limit).run(&mut |step| runners[open[step.trajectory()]].observe(step, trial));

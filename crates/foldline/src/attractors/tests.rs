@@ -14,7 +14,16 @@ use fields::{BISTABLE, CENTRE, ESCAPING, Field, ROTOR, VAN_DER_POL};
 
 fn sampling(ranges: &[[f64; 2]], samples: usize, jobs: usize) -> Sampling {
     let scales = vec![1.0; ranges.len()];
-    Sampling { ranges: ranges.to_vec(), scales, whirl: None, samples, seed: 2, jobs, tolerance: 1e-6 }
+    Sampling {
+        ranges: ranges.to_vec(),
+        scales,
+        whirl: None,
+        samples,
+        seed: 2,
+        jobs,
+        tolerance: 1e-6,
+        limits: Limits::default(),
+    }
 }
 
 /// A box that holds every attractor of the overhung rotor at Ω = 5 (akay, reference constants).

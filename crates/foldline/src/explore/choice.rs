@@ -95,9 +95,14 @@ pub(super) fn summary(system: &System, census: &Census) -> String {
         && found.hits == 0
     {
         let what = kind(system, found);
-        return format!(
-            "{what}, found by Newton's method; it attracts too slowly for samples to settle on it within the step limit"
-        );
+        return match census.unsettled {
+            0 => format!(
+                "{what}, found by Newton's method; it attracts too slowly for samples to settle on it within the step limit"
+            ),
+            n => format!(
+                "{what}, found by Newton's method from the state nearest to the origin; {n} samples did not settle, on it or elsewhere"
+            ),
+        };
     }
     let mut parts: Vec<String> = census.attractors.iter().map(|attractor| described(system, attractor)).collect();
     if census.unsettled > 0 {

@@ -5,7 +5,7 @@
 
 use super::direct::{transient, turn};
 use super::{System, symmetry};
-use crate::attractors::{Exit, STEP_LIMIT};
+use crate::attractors::{Exit, Limits};
 use crate::contract::{Batch, Parameters};
 use crate::diagram::{Ending, Point};
 use crate::linalg::max_abs;
@@ -57,7 +57,7 @@ pub(super) fn of_no_start(system: &System, parameters: &[f64], seen: Seen) -> St
         return why;
     }
     match system.field.switch_count() {
-        0 if stuck => "\nlikely cause: f jumps, or is too stiff for the explicit method that simulates\nwhat to do: give a state \
+        0 if stuck => "\nlikely cause: f jumps, or is too stiff for the method that simulates\nwhat to do: give a state \
                        next to an equilibrium, or milder parameters, and follow from there"
             .into(),
         n if stuck && n > 0 => "\nlikely cause: f jumps where it is not smooth (sign, heaviside, if, comparisons), and trajectories \
@@ -67,8 +67,20 @@ pub(super) fn of_no_start(system: &System, parameters: &[f64], seen: Seen) -> St
         _ if seen.all_escaped => "\nlikely cause: at these parameters nothing attracts from the range of the states\nwhat to do: \
                                   other parameters, another range of the states, or a given state next to the solution"
             .into(),
+        _ if seen.unsettled => format!(
+            "\nlikely cause: a quasi-periodic or chaotic motion, or one that is reached more slowly than trajectories are followed, here for {}\n\
+             what to do: raise the limit in the study, try other parameters or another range of the states, or give a state",
+            limits(system)
+        ),
         _ => "\nwhat to do: more samples, other parameters, another range of the states, or a given state".into(),
     }
+}
+
+/// How long trajectories are followed, with the names of the settings.
+fn limits(system: &System) -> String {
+    let Limits { steps, time } = system.limits;
+    let steps = format!("{steps} integration steps (`max-steps`)");
+    if time.is_finite() { format!("{steps} or a time of {time:e} (`max-time`)") } else { steps }
 }
 
 /// Cause and cure for a trajectory that reached the boundary of the region in which f is defined.
@@ -132,7 +144,7 @@ fn of_slow_decay(system: &System, parameters: &[f64], state: Option<&[f64]>) -> 
     let rounding = ROUNDING * rates.iter().fold(0.0, |m: f64, z| m.max(z.norm()));
     let periods = if slowest.abs() <= rounding { f64::INFINITY } else { transient(slowest) };
     let (_, steps) = turn(system, parameters, state)?;
-    let followed = STEP_LIMIT / steps.max(1);
+    let followed = system.limits.steps / steps.max(1);
     let slow = slowest <= rounding && periods > followed as f64;
     slow.then(|| {
         let lasts = match periods.is_finite() {

@@ -16,7 +16,7 @@
 use super::System;
 use super::profile::PARTS;
 use super::seeds::polish;
-use crate::attractors::{Candidate, STEP_LIMIT};
+use crate::attractors::Candidate;
 use crate::contract::Verdict;
 use crate::diagram::{Point, Solution};
 use crate::simulation::{Clocked, Integrator, Passage, Tolerance};
@@ -78,7 +78,7 @@ fn classified(system: &System, state: &[f64], point: Point, steps: usize) -> Opt
     let mut sizes = start.iter().zip(state).zip(&system.scales);
     let through = sizes.all(|((a, b), scale)| (a - b).abs() <= ON * (scale + b.abs()));
     let periods = transient(point.free_spectrum().iter().fold(0.0, |m: f64, z| m.max(z.norm())).ln());
-    let slow = point.unstable == 0 && periods * steps as f64 > STEP_LIMIT as f64;
+    let slow = point.unstable == 0 && periods * steps as f64 > system.limits.steps as f64;
     (through || point.unstable == 0).then_some(Direct { point, periods, through, slow })
 }
 
@@ -103,7 +103,7 @@ pub(super) fn turn(system: &System, parameters: &[f64], state: &[f64]) -> Option
     let (mut times, mut states) = (vec![0.0], state.to_vec());
     let mut x = vec![0.0; n + 1];
     let start = [state, &[0.0]].concat();
-    let integrator = Integrator::new(&field, parameters, tolerance).with_step_limit(STEP_LIMIT);
+    let integrator = Integrator::new(&field, parameters, tolerance).with_step_limit(system.limits.steps);
     let arrival = integrator.trajectory(&start, [0.0, 1.0], &[], &mut |passage| {
         let Passage::Step(step) = passage else { return Verdict::Continue };
         for part in 1..=PARTS {

@@ -1,5 +1,6 @@
 //! What a study asks for, in terms of the model.
 
+use crate::attractors::Limits;
 use crate::diagram::{Cycle, Kind};
 use crate::special::mark::Mark;
 
@@ -219,6 +220,8 @@ pub struct Plan {
     pub tolerance: f64,
     /// Degree of the collocation polynomials.
     pub degree: usize,
+    /// How long trajectories are followed in search of first solutions.
+    pub limits: Limits,
     /// First solutions.
     pub seeds: Vec<SeedPlan>,
     /// Branches, in the order in which they were written.
@@ -241,6 +244,7 @@ impl Plan {
         Plan {
             tolerance,
             degree,
+            limits: Limits::default(),
             seeds: Vec::new(),
             branches: Vec::new(),
             curves: Vec::new(),

@@ -185,27 +185,38 @@ fn census_for(system: &System, plan: &Plan, index: usize, jobs: usize) -> Census
         SeedSource::State(_) | SeedSource::Cycle(_) => None,
     });
     let keys: Vec<&AttractorKey> = keys.collect();
-    if let Some(found) = without_samples(system, plan, seed, &keys) {
-        return found;
+    let newton = newton_from_rest(system, plan, seed);
+    let wanted = |found: &(Attractor, bool)| keys.iter().all(|key| is_meant(key, &found.0.point, found.0.ratio));
+    let meant = newton.filter(|found| !keys.is_empty() && wanted(found));
+    if let Some((attractor, true)) = meant {
+        return Census { attractors: vec![attractor], left: seed.samples, ..Census::default() };
     }
     let sampling = sampling(system, seed.samples, seed.random, jobs, plan.tolerance);
     let polish = |candidate: &Candidate| polish(system, &seed.parameters, plan.tolerance, candidate);
-    attractors::survey_until(system.field, &seed.parameters, &sampling, &polish, &|reached| {
+    let mut census = attractors::survey_until(system.field, &seed.parameters, &sampling, &polish, &|reached| {
         keys.iter().all(|key| reached.iter().any(|(point, ratio)| is_meant(key, point, *ratio)))
-    })
+    });
+    let met = |key: &&AttractorKey| census.attractors.iter().any(|a| is_meant(key, &a.point, a.ratio));
+    if let Some((attractor, _)) = meant
+        && !keys.iter().all(met)
+    {
+        census.attractors.push(attractor);
+    }
+    census
 }
 
-/// The census if the requested attractor is a cycle that attracts too slowly for any sample to settle on it within the step limit.
-fn without_samples(system: &System, plan: &Plan, seed: &SeedPlan, keys: &[&AttractorKey]) -> Option<Census> {
-    let found = direct(system, &seed.parameters, plan.tolerance, &next_to_origin(system))?;
-    let Solution::Cycle(cycle) = &found.point.solution else { return None };
-    let ratio = system.whirl.and_then(|whirl| attractors::spectral_ratio(cycle, whirl));
-    let enough = found.slow && !keys.is_empty();
-    if !enough || found.periods > NEVER || !keys.iter().all(|key| is_meant(key, &found.point, ratio)) {
+/// The stable cycle of one forcing period that Newton's method finds from the state nearest to the origin; and whether it attracts, but too
+/// slowly for any sample to settle on it within the step limit.
+fn newton_from_rest(system: &System, plan: &Plan, seed: &SeedPlan) -> Option<(Attractor, bool)> {
+    let Direct { point, periods, slow, .. } =
+        direct(system, &seed.parameters, plan.tolerance, &next_to_origin(system))?;
+    let Solution::Cycle(cycle) = &point.solution else { return None };
+    if point.unstable > 0 {
         return None;
     }
-    let attractor = Attractor { ratio, hits: 0, share: None, example: cycle.state(0.0), point: found.point };
-    Some(Census { attractors: vec![attractor], left: seed.samples, ..Census::default() })
+    let ratio = system.whirl.and_then(|whirl| attractors::spectral_ratio(cycle, whirl));
+    let attractor = Attractor { ratio, hits: 0, share: None, example: cycle.state(0.0), point };
+    Some((attractor, slow && periods <= NEVER))
 }
 
 /// Samples initial states, follows each to its attractor, and computes the attractors accurately.
@@ -234,6 +245,7 @@ pub(super) fn sampling(system: &System, samples: usize, seed: u64, jobs: usize, 
         seed,
         jobs,
         tolerance,
+        limits: system.limits,
     }
 }
 

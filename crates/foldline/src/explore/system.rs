@@ -2,6 +2,7 @@
 
 use super::plan::{ExplorePlan, Plan};
 use super::sizes;
+use crate::attractors::Limits;
 use crate::contract::{Batch, Parameters, VectorField};
 use crate::diagram::Diagram;
 use crate::model::Model;
@@ -23,6 +24,8 @@ pub struct System<'a> {
     pub parameter_scales: Vec<f64>,
     /// `[n]` box from which initial states are sampled.
     pub ranges: Vec<[f64; 2]>,
+    /// How long trajectories are followed in search of first solutions.
+    pub limits: Limits,
     /// The two states that form the complex whirl signal, if the model has one.
     pub whirl: Option<[usize; 2]>,
     /// Coordinate reflections under which the field is equivariant, the identity first; those of a forced field too under which
@@ -44,6 +47,7 @@ impl<'a> System<'a> {
             scales: vec![1.0; n],
             parameter_scales: vec![1.0; field.parameter_count()],
             ranges: vec![[-2.0, 2.0]; n],
+            limits: Limits::default(),
             whirl: None,
             reflections: vec![vec![false; n]],
             unfolded: None,
@@ -67,6 +71,7 @@ impl<'a> System<'a> {
             parameter_scales: System::sized(model, plan),
             ranges: model.states.iter().zip(&scales).map(|(state, scale)| state.range_at(*scale)).collect(),
             scales,
+            limits: plan.limits,
             whirl: model.whirl,
             ..System::new(model)
         }

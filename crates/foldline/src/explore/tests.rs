@@ -54,6 +54,7 @@ fn followed(keeps: bool) -> (Branch, Vec<Point>) {
     let plan = Plan {
         tolerance: 1e-6,
         degree: 4,
+        limits: Default::default(),
         seeds: vec![seed],
         branches: vec![branch],
         curves: Vec::new(),

@@ -35,8 +35,8 @@ use super::shortened::Shortened;
 use super::{Arrival, Outcome, Step, Tolerance};
 use crate::contract::{Parameters, VectorField, Verdict};
 use lanes::Lanes;
-use stiff::Evidence;
 pub(super) use pace::Limits;
+use stiff::Evidence;
 
 /// Trajectories that are integrated at a time: enough to keep vector instructions busy, few enough to stay in the cache.
 const WIDTH: usize = 64;

@@ -42,7 +42,7 @@ fn arrive(model: &Model, start: &[f64], span: [f64; 2], limit: usize) -> Arrival
 #[test]
 fn a_slaved_fast_state_costs_no_more_steps_however_fast_it_is() {
     // x = cos t, and z follows it by 1 / rate: z = (rate² cos t + rate sin t) / (rate² + 1).
-    for rate in [1e3, 1e6, 1e9] {
+    for rate in [1e4, 1e6, 1e9] {
         let slaved = model(&[("x", "y"), ("y", "-x"), ("z", "rate*(x - z)")], &[("rate", rate)]);
         let arrival = arrive(&slaved, &[1.0, 0.0, 1.0], [0.0, 40.0], 4000);
         assert_eq!(arrival.outcome, Outcome::Reached, "{rate:e}: {} steps", arrival.steps);
@@ -58,15 +58,11 @@ fn a_slaved_fast_state_costs_no_more_steps_however_fast_it_is() {
 #[test]
 fn robertson_reaction_comes_to_rest_in_a_flow() {
     let reaction = model(
-        &[
-            ("a", "k*(1 - a) - 0.04*a + 1e4*b*c"),
-            ("b", "-k*b + 0.04*a - 1e4*b*c - 3e7*b^2"),
-            ("c", "-k*c + 3e7*b^2"),
-        ],
+        &[("a", "k*(1 - a) - 0.04*a + 1e4*b*c"), ("b", "-k*b + 0.04*a - 1e4*b*c - 3e7*b^2"), ("c", "-k*c + 3e7*b^2")],
         &[("k", 0.01)],
     );
     for start in [[1.0, 0.0, 0.0], [0.5, 0.5, 0.5], [0.0, 1.0, 0.0], [0.3, 0.9, 0.1]] {
-        let arrival = arrive(&reaction, &start, [0.0, 1e4], 20_000);
+        let arrival = arrive(&reaction, &start, [0.0, 1e12], 20_000);
         assert_eq!(arrival.outcome, Outcome::Reached, "{start:?}: {} steps to {}", arrival.steps, arrival.time);
         let total: f64 = arrival.state.iter().sum();
         assert!((total - 1.0).abs() < 1e-6, "{start:?}: {:?}", arrival.state);

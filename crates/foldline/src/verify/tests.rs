@@ -45,6 +45,7 @@ fn computed(model: &Model) -> Diagram {
     let plan = Plan {
         tolerance: 1e-6,
         degree: 4,
+        limits: Default::default(),
         seeds: vec![seed],
         branches: vec![branch],
         curves: Vec::new(),

@@ -34,8 +34,9 @@ impl VectorField for Field {
         }
     }
 
-    fn linearise(&self, _: Batch, _: &[usize], _: &mut [f64], _: &mut [f64], _: &mut [f64]) {
-        unreachable!("sampling needs f only")
+    // Without derivatives the explicit pair follows every trajectory.
+    fn linearise(&self, _: Batch, _: &[usize], _: &mut [f64], fx: &mut [f64], _: &mut [f64]) {
+        fx.fill(f64::NAN);
     }
 
     fn directional(&self, _: Batch, _: &[&[f64]], _: &mut [f64]) {

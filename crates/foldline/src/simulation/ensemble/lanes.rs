@@ -8,8 +8,8 @@ use super::super::aligned::Aligned;
 use super::super::kink::PLACES;
 use super::super::tableau::{A, ERROR, STAGES};
 use super::pace::{self, Limits};
-use super::stiff;
 use super::shared_or_own;
+use super::stiff;
 use crate::contract::{Batch, Parameters, VectorField};
 
 /// The arrays.

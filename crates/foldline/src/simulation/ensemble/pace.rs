@@ -115,8 +115,11 @@ pub(super) fn go_on(
         // A last step a little longer than planned saves a tiny one.
         let last = holds & (planned[l].abs() * 1.01 >= remaining.abs());
         let next = if last { remaining } else { planned[l] };
-        let ended =
-            (remaining == 0.0) | (tried[l] >= limits.steps) | (tried[l] >= look[l]) | too_small(next, now) | escaped(largest[l], bound[l]);
+        let ended = (remaining == 0.0)
+            | (tried[l] >= limits.steps)
+            | (tried[l] >= look[l])
+            | too_small(next, now)
+            | escaped(largest[l], bound[l]);
         remarkable[l] = if ended & (bound[l] > 0.0) { 1.0 } else { 0.0 };
         (time[l], h[l]) = (now, next);
     }
