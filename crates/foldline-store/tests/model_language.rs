@@ -1,8 +1,10 @@
 //! Repetition, functions, second order, masses and tables in model files: each against the same model written out.
 
 use foldline::contract::{Batch, Parameters, VectorField};
+use foldline::explore::SeedSource;
 use foldline::model::Model;
 use foldline_store::model_file::parse_model;
+use foldline_store::study_file::parse_study;
 
 #[track_caller]
 fn model(text: &str) -> Model {
@@ -281,4 +283,43 @@ fn a_parameter_made_of_others_is_a_definition() {
 fn as_many_repeated_states_as_are_allowed() {
     let text = "[states.\"x''\"]\ncount = 500\nbefore = 0\nafter = 0\nequation = 'x[i-1] - 2*x[i] + x[i+1]'\n";
     assert_eq!(model(text).dim(), 1000);
+}
+
+#[test]
+fn a_state_is_given_for_all_elements_or_for_each() {
+    let text = "[states.\"x''\"]\ncount = 3\nperiodic = true\nequation = \"x[i-1] - x[i] - x'[i]\"\n";
+    let study = |state: &str| {
+        let study = format!(
+            "model = \"m.toml\"\n[[seed]]\nname = \"s\"\nstate = {state}\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"p\"\nrange = [0, 1]\n"
+        );
+        parse_study(&study, "s.toml", &format!("[parameters]\np = 0\n{text}"), "m.toml")
+    };
+    let given = |state: &str| match &study(state).unwrap_or_else(|found| panic!("{}", found[0])).plan.seeds[0].source {
+        SeedSource::State(state) => state.clone(),
+        _ => Vec::new(),
+    };
+    assert_eq!(given("{ x = [1, 2, 3], \"x'\" = 0, \"x'[2]\" = 5 }"), [1.0, 0.0, 2.0, 5.0, 3.0, 0.0]);
+    let message = |state: &str| study(state).expect_err(state)[0].message.clone();
+    assert_eq!(message("{ x = [1, 2], \"x'\" = 0 }"), "the state `x` has 3 elements, and 2 values here");
+    assert_eq!(message("{ x = 1 }"), "the state lacks x'[1], x'[2], x'[3]");
+    assert!(message("{ x = \"1\", \"x'\" = 0 }").contains("the state `x`"));
+}
+
+/// Every complete model on the page about model files.
+#[test]
+fn the_examples_of_the_book_are_right() {
+    let page = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/book/model-files.md");
+    let page = std::fs::read_to_string(page).expect("the page is there");
+    let blocks: Vec<&str> = page.split("```toml\n").skip(1).filter_map(|rest| rest.split("```").next()).collect();
+    let complete = |block: &&&str| block.contains("[parameters]") && block.contains("[states");
+    assert_eq!(blocks.iter().filter(complete).map(|block| model(block).dim()).collect::<Vec<_>>(), [2, 80]);
+    // The others lack parameters.
+    let [functions, short, table, mass] = &blocks[2..] else { panic!("{} blocks", blocks.len()) };
+    let parameters = "[parameters]\nk = 1\nk3 = 0.1\nzeta = 0.1\nm = 1\nM = 2\nl = 1\ng = 9.81\n";
+    assert_eq!(
+        model(&format!("{parameters}{functions}[states]\nx = 'hill(x, 1, 2) - spring(x)*stiffness(x)'\n")).dim(),
+        1
+    );
+    assert_eq!([short, table].map(|block| model(&format!("{parameters}{block}")).dim()), [2, 2]);
+    assert_eq!(model(&format!("{parameters}{mass}")).dim(), 4);
 }
