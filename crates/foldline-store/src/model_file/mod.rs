@@ -5,6 +5,7 @@
 
 mod functions;
 mod items;
+mod mass;
 mod repeat;
 mod states;
 

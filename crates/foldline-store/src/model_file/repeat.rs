@@ -105,7 +105,7 @@ impl Reader<'_> {
     }
 
     /// Reports a mistake in an expression of constants at its place in the file.
-    pub(super) fn misread(&mut self, value: &Value, error: ModelError) {
+    pub(super) fn misread(&mut self, value: &Value, error: Box<ModelError>) {
         let place = error.span.and_then(|span| inside(self.text, &value.span(), &span)).unwrap_or(value.span());
         self.walk.report(place, error.message, error.hint);
     }

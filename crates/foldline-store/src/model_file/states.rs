@@ -1,11 +1,10 @@
-//! States with their equations, of first and second order, and the masses that couple them.
+//! States with their equations, of first and second order.
 
 use super::Reader;
-use crate::nearest::suggest;
 use crate::toml_walk::Value;
-use foldline::model::{Definition, Ends, Field, Item, Mass, ModelSource, State};
+use foldline::model::{Definition, Ends, Field, Item, ModelSource, State};
 use std::ops::Range;
-use toml::de::{DeTable, DeValue};
+use toml::de::DeTable;
 
 const KEYS: [&str; 10] =
     ["equation", "unit", "description", "scale", "range", "count", "index", "before", "after", "periodic"];
@@ -90,60 +89,6 @@ impl Reader<'_> {
             _ => {
                 self.walk.report(value.span(), format!("{what} is not a pair of numbers"), "write `[-1.0, 1.0]`");
                 None
-            }
-        }
-    }
-
-    /// The rows of the mass matrix, each a number or a table with an entry for each state that takes part.
-    pub(super) fn mass(&mut self, root: &DeTable, source: &mut ModelSource) {
-        let rows = self.entries(root, "mass");
-        // A row of a state with a velocity is that of its acceleration.
-        let rate = |states: &[State], name: &str| {
-            let velocity = format!("{name}'");
-            let second = states.iter().any(|state| state.name == velocity);
-            if second { velocity } else { name.to_string() }
-        };
-        let known: Vec<String> = source.states.iter().map(|state| state.name.clone()).collect();
-        let known: Vec<&str> = known.iter().map(String::as_str).collect();
-        let mut given: Vec<(String, String, Range<usize>)> = Vec::new();
-        let mut unknown = false;
-        for (name, place, value) in &rows {
-            let entries: Vec<(String, Range<usize>, &Value)> = match value.get_ref() {
-                DeValue::Table(table) => {
-                    let mut own: Vec<_> = table.iter().map(|(k, v)| (k.get_ref().to_string(), k.span(), v)).collect();
-                    own.sort_by_key(|(_, place, _)| place.start);
-                    own
-                }
-                _ => vec![(name.clone(), place.clone(), *value)],
-            };
-            for (own, place) in entries.iter().map(|(own, place, _)| (own, place)).chain([(name, place)]) {
-                if !known.contains(&own.as_str()) {
-                    unknown = true;
-                    self.walk.report(place.clone(), format!("`{own}` is not a state"), suggest(own, &known));
-                }
-            }
-            if unknown {
-                continue;
-            }
-            for (column, place, value) in entries {
-                let item = Item::Mass(source.mass.len());
-                let what = format!("the mass of `{name}` and `{column}`");
-                let expression = self.expression(item, place.clone(), value, &what);
-                let (row, across) = (rate(&source.states, name), rate(&source.states, &column));
-                source.mass.push(Mass { row, column: across, expression });
-                given.push((name.clone(), column, place));
-            }
-            if !given.iter().any(|(row, column, _)| row == name && column == name) {
-                let hint = format!("write `{name} = \"…\"` in its row, the mass that belongs to `{name}` itself");
-                self.walk.report(place.clone(), format!("the row of `{name}` has no mass of its own"), hint);
-            }
-        }
-        for (row, column, place) in given.iter().filter(|_| !unknown) {
-            if row != column && !given.iter().any(|(r, c, _)| r == column && c == row) {
-                let message =
-                    format!("the mass of `{row}` and `{column}` is given, that of `{column}` and `{row}` is not");
-                let hint = "write both, the other one as 0 if the matrix is not symmetric";
-                self.walk.report(place.clone(), message, hint);
             }
         }
     }

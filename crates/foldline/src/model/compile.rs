@@ -209,10 +209,9 @@ fn parse(check: &mut Check, layout: &Layout) -> Parsed {
 /// Solves the equations for the rates where a mass matrix couples them.
 fn couple(check: &mut Check, graph: &mut Graph, layout: &Layout, masses: &[Id], field: &mut [Id]) {
     let source = check.source;
-    let place = |name: &str| {
-        let state = source.states.iter().position(|s| s.name == name)?;
-        source.states[state].repeat.is_none().then(|| layout.states[state].first)
-    };
+    let single = source.states.iter().zip(&layout.states).filter(|(state, _)| state.repeat.is_none());
+    let places: HashMap<&str, usize> = single.map(|(state, spread)| (state.name.as_str(), spread.first)).collect();
+    let place = |name: &str| places.get(name).copied();
     let mut entries: Vec<Entry> = Vec::new();
     for (i, (mass, id)) in source.mass.iter().zip(masses).enumerate() {
         let item = Item::Mass(i);

@@ -17,17 +17,13 @@ use std::cell::Cell;
 /// let n = Constant { name: "n".into(), value: 40.0 };
 /// assert_eq!(constant_value("n + 1", &[n]), Ok(41.0));
 /// ```
-pub fn constant_value(text: &str, constants: &[Constant]) -> Result<f64, ModelError> {
+pub fn constant_value(text: &str, constants: &[Constant]) -> Result<f64, Box<ModelError>> {
     let own = constants.iter().map(|c| (c.name.as_str(), c.value));
     let symbols: Symbols =
         CONSTANTS.into_iter().chain(own).map(|(name, value)| (name, Symbol::Number(value))).collect();
-    value(text, &symbols).map_err(|Complaint { span, message, hint, .. }| ModelError {
-        item: Item::Model,
-        field: Field::Value,
-        name: String::new(),
-        span: Some(span),
-        message,
-        hint,
+    value(text, &symbols).map_err(|Complaint { span, message, hint, .. }| {
+        let (item, field, name) = (Item::Model, Field::Value, String::new());
+        Box::new(ModelError { item, field, name, span: Some(span), message, hint })
     })
 }
 
@@ -35,10 +31,11 @@ fn value(text: &str, symbols: &Symbols) -> Result<f64, Complaint> {
     let expression = Expression::parse(text, &Callables::default())?;
     let mut unknown = None;
     expression.each(&mut |term, span| {
-        if let Term::Name(name) | Term::Element(name, _) = term {
-            if unknown.is_none() && !symbols.contains_key(name.as_str()) {
-                unknown = Some((name.clone(), span.clone()));
-            }
+        if let Term::Name(name) | Term::Element(name, _) = term
+            && unknown.is_none()
+            && !symbols.contains_key(name.as_str())
+        {
+            unknown = Some((name.clone(), span.clone()));
         }
     });
     if let Some((name, span)) = unknown {

@@ -4,9 +4,9 @@
 //! are differentiated on that graph to any order (`derive`), and become tapes (`tape`) that run over all lanes of a batch
 //! (`run`) about as fast as code written by hand, without a compiler.
 //!
-//! Text takes the way `lexer` → `parser` → `compile`: names are laid out (`family`) and checked (`check`), definitions put in order
-//! (`order`), expressions read with their index given (`scope`) and turned into nodes (`lower`). Whatever is wrong with it comes back as a list of [`ModelError`], each
-//! with its place.
+//! Text takes the way `lexer` → `parser` → `compile`: names are laid out (`family`) and checked (`check`, `words`), definitions put in
+//! order (`order`), expressions read with their index given (`scope`) and turned into nodes (`lower`). Whatever is wrong comes back
+//! as a list of [`ModelError`], each with its place.
 
 mod callable;
 mod check;
@@ -35,6 +35,7 @@ mod source;
 mod switches;
 mod table;
 mod tape;
+mod words;
 
 pub use constant::constant_value;
 pub use error::{Field, Item, ModelError};

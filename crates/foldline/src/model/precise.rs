@@ -200,7 +200,7 @@ fn exprel(order: u8, x: TwoFloat) -> TwoFloat {
     for j in (1..=400).map(f64::from) {
         term = divide(term * size, if positive { j } else { m + j }.into());
         let more = divide(term, (j + m + 1.0).into());
-        sum = sum + more;
+        sum += more;
         if more.hi() < 1e-34 * sum.hi() {
             break;
         }

@@ -16,9 +16,10 @@ use super::graph::{Binary, Graph, Id, Node, Unary};
 /// Factors that are looked at; products with more are left as they are.
 const MOST_FACTORS: usize = 16;
 
-/// A product of powers ±1.
+/// A product of powers ±1 with a sign.
 #[derive(Default)]
 struct Factors {
+    negative: bool,
     above: Vec<Id>,
     below: Vec<Id>,
 }
@@ -38,17 +39,26 @@ impl Graph {
             let (exponent, negative) = self.exponential_less_one(*id)?;
             Some((place, exponent, negative))
         })?;
-        let (u, w) = (self.factors(a)?, self.factors(exponent)?);
-        // u = r w for the two factors that vanish together.
-        let pairs =
-            u.above.iter().enumerate().flat_map(|(i, p)| w.above.iter().enumerate().map(move |(j, q)| (i, j, p, q)));
-        let (i, j, ratio) = pairs.into_iter().find_map(|(i, j, p, q)| Some((i, j, self.ratio(*p, *q)?)))?;
-        let without = |list: &[Id], place: usize| -> Vec<Id> {
-            list.iter().enumerate().filter(|(k, _)| *k != place).map(|(_, id)| *id).collect()
-        };
+        let (mut u, w) = (self.factors(a)?, self.factors(exponent)?);
+        // Factors of u that are numbers times factors of w go with them.
+        let (mut ratio, mut left) = (1.0, Vec::new());
+        for q in &w.above {
+            match u.above.iter().enumerate().find_map(|(i, p)| Some((i, self.ratio(*p, *q)?))) {
+                Some((i, own)) => {
+                    u.above.remove(i);
+                    ratio *= own;
+                }
+                None => left.push(*q),
+            }
+        }
+        if left.len() == w.above.len() {
+            return None;
+        }
         // (rest of u / rest of w) / (rest of b), then the relative exponential.
-        let above = [without(&u.above, i), w.below.clone(), below.below.clone()].concat();
-        let under = [without(&w.above, j), u.below.clone(), without(&below.above, place)].concat();
+        let others = below.above.iter().enumerate().filter(|(k, _)| *k != place).map(|(_, id)| *id).collect();
+        let above = [u.above, w.below, below.below].concat();
+        let under = [left, u.below, others].concat();
+        let negative = negative ^ below.negative ^ u.negative ^ w.negative;
         let sign = if negative { -ratio } else { ratio };
         let mut quotient = self.constant(sign);
         for factor in above {
@@ -78,14 +88,14 @@ impl Graph {
     }
 
     /// The factors of a product or quotient.
-    fn factors(&mut self, id: Id) -> Option<Factors> {
+    fn factors(&self, id: Id) -> Option<Factors> {
         let mut factors = Factors::default();
         let mut wait = vec![(id, true)];
         while let Some((id, above)) = wait.pop() {
             match self.node(id) {
                 Node::Unary(Unary::Negate, a) => {
-                    let minus = self.constant(-1.0);
-                    wait.extend([(a, above), (minus, above)]);
+                    factors.negative = !factors.negative;
+                    wait.push((a, above));
                 }
                 Node::Binary(Binary::Multiply, a, b) => wait.extend([(b, above), (a, above)]),
                 Node::Binary(Binary::Divide, a, b) => wait.extend([(b, !above), (a, above)]),
@@ -173,6 +183,7 @@ mod tests {
             ("-k*(v - w)/(exp((w - v)/w) - 1)", 20.0, [10.0, 0.25]),
             ("v/(exp(v) - 1)", 0.0, [1.0, -0.5]),
             ("2*v/expm1(v)", 0.0, [2.0, -1.0]),
+            ("k*(v + 40)/(1 - exp(-k*(v + 40)))", -40.0, [1.0, 0.25]),
             ("k*v/(k*(1 - exp(-2*v))*3)", 0.0, [1.0 / 6.0, 1.0 / 6.0]),
         ];
         for (formula, place, expected) in cases {
