@@ -147,15 +147,15 @@ fn mistakes_with_indices_have_their_place() {
         ("c*v[i]", "c*sum(v, 1)", (14, 46), "`sum` has another form"),
         ("c*v[i]", "c*v(i)", (14, 46), "there is no function `v`"),
         ("count = \"n\"\nequation = \"v[i]\"", "count = \"m\"\nequation = \"v[i]\"", (8, 10), "`m` is not a constant"),
-        ("c = 0.1", "c = 0.1\ni = 3", (8, 1), "the index `i` has the name of something else: it is a parameter"),
+        ("c = 0.1", "c = 0.1\ni = 3", (8, 9), "the index `i` has the name of something else: it is a parameter"),
         ("n = 4", "n = 0", (8, 9), "the count of the state `x` is 0"),
         ("n = 4", "n = -3", (8, 9), "the count of the state `x` is -3"),
         ("n = 4", "n = 2.5", (8, 9), "the count of the state `x` is 2.5"),
         ("n = 4", "n = 1e9", (8, 9), "the model has 2000000000 states, more than 1000"),
         ("n = 4", "n = 1e300", (8, 9), "the count of the state `x` is"),
-        ("before = \"0\"", "before = \"x[0]\"", (11, 11), "definitions that need each other: x[0] → x[0]"),
-        ("before = \"0\"", "periodic = 3", (11, 12), "`periodic` is neither true nor false"),
-        ("before = \"0\"", "periodic = true", (11, 12), "has values beyond its ends"),
+        ("before = \"0\"", "before = \"x[0]\"", (10, 11), "definitions that need each other: x[0] → x[0]"),
+        ("before = \"0\"", "periodic = 3", (10, 12), "`periodic` is neither true nor false"),
+        ("before = \"0\"", "periodic = true", (10, 12), "has values beyond its ends"),
     ];
     for (from, to, place, words) in cases {
         let text = CHAIN.replacen(from, to, 1);

@@ -15,7 +15,7 @@ impl Reader<'_> {
             DeValue::String(text) => match constant_value(text, &source.constants) {
                 Ok(number) => Some(number),
                 Err(error) => {
-                    self.misread(value, error);
+                    self.misread(value, &error);
                     None
                 }
             },

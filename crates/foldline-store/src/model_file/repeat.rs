@@ -47,7 +47,7 @@ impl Reader<'_> {
             DeValue::String(text) => match constant_value(text, constants) {
                 Ok(number) => Some(number),
                 Err(error) => {
-                    self.misread(value, error);
+                    self.misread(value, &error);
                     None
                 }
             },
@@ -105,8 +105,8 @@ impl Reader<'_> {
     }
 
     /// Reports a mistake in an expression of constants at its place in the file.
-    pub(super) fn misread(&mut self, value: &Value, error: Box<ModelError>) {
-        let place = error.span.and_then(|span| inside(self.text, &value.span(), &span)).unwrap_or(value.span());
-        self.walk.report(place, error.message, error.hint);
+    pub(super) fn misread(&mut self, value: &Value, error: &ModelError) {
+        let place = error.span.clone().and_then(|span| inside(self.text, &value.span(), &span)).unwrap_or(value.span());
+        self.walk.report(place, error.message.clone(), error.hint.clone());
     }
 }
