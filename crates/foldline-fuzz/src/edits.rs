@@ -3,7 +3,7 @@
 use arbitrary::{Result, Unstructured};
 
 /// Pieces that have a meaning somewhere, or had better have none.
-const PIECES: [&str; 58] = [
+const PIECES: [&str; 74] = [
     "nan",
     "inf",
     "-inf",
@@ -62,6 +62,22 @@ const PIECES: [&str; 58] = [
     "from = \"x\"",
     "[states]",
     "until = 0",
+    "x[i-1]",
+    "[i+1]",
+    "'",
+    "x''",
+    "sum(j, 1, n, ",
+    "floor(",
+    "mod(",
+    "exprel(",
+    "count = 3\n",
+    "count = 1000000000\n",
+    "before = \"0\"\n",
+    "periodic = true\n",
+    "[constants]\n",
+    "[functions]\n\"f(x)\" = \"x\"\n",
+    "[mass]\nx = 2\n",
+    "[tables.k]\nx = [0, 1]\ny = [1, 2]\n",
 ];
 
 /// The text with a few edits: pieces put in, cut out, doubled, moved.

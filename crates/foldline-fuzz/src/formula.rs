@@ -10,7 +10,7 @@ const SIGN: u8 = 4;
 /// Nothing binds tighter.
 const ATOM: u8 = 6;
 /// Functions of one argument.
-pub const ONE: [&str; 16] = [
+pub const ONE: [&str; 19] = [
     "sqrt",
     "exp",
     "log",
@@ -26,6 +26,9 @@ pub const ONE: [&str; 16] = [
     "abs",
     "sign",
     "heaviside",
+    "log10",
+    "expm1",
+    "asinh",
     "+",
 ];
 /// Functions of two arguments.

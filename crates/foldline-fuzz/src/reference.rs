@@ -142,6 +142,10 @@ fn one(function: &str, a: Dual) -> Dual {
         "abs" => (x.abs(), sign(x)),
         "sign" => (sign(x), 0.0),
         "heaviside" => (0.5 * (1.0 + sign(x)), 0.0),
+        "log10" => (x.log10(), 1.0 / (x * std::f64::consts::LN_10)),
+        "expm1" if x < -600.0 => (f64::NAN, f64::NAN),
+        "expm1" => (x.exp_m1(), x.exp()),
+        "asinh" => (x.asinh(), 1.0 / (1.0 + x * x).sqrt()),
         other => unreachable!("{other}"),
     };
     Dual { value, slope: a.slope.map(|s| product(slope, s)) }

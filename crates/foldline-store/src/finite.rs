@@ -114,7 +114,14 @@ fn complaint(model: &Model, component: usize, state: &[f64], parameters: &[f64])
 /// Where the equation of a state stands in a model text.
 fn equation_span(model_text: &str, state: &str) -> Option<Range<usize>> {
     let root = DeTable::parse(model_text).ok()?.into_inner();
-    let entry = root.get("states")?.get_ref().as_table()?.get(state)?;
+    // An element stands in the equation of all, a velocity in that of the acceleration.
+    let name = state.split('[').next().unwrap_or(state);
+    let acceleration = format!("{}''", name.trim_end_matches('\''));
+    let keys =
+        if name.ends_with('\'') { [acceleration.as_str(), name.trim_end_matches('\'')] } else { [name, &acceleration] };
+    let entries = ["equations", "states"].into_iter().flat_map(|table| keys.map(|key| (table, key)));
+    let mut found = entries.filter_map(|(table, key)| root.get(table)?.get_ref().as_table()?.get(key));
+    let entry = found.next()?;
     let equation = entry.get_ref().as_table().and_then(|table| table.get("equation"));
     Some(equation.map_or(entry.span(), |e| e.span()))
 }

@@ -7,6 +7,7 @@ use crate::toml_walk::{Value, Walk};
 use foldline::contract::VectorField;
 use foldline::explore::{AttractorKey, SeedPlan, SeedSource};
 use foldline::model::Model;
+use std::collections::HashMap;
 use std::ops::Range;
 use toml::de::DeTable;
 
@@ -115,21 +116,48 @@ fn attractor(walk: &mut Walk, value: &Value, model: &Model) -> Option<AttractorK
     }
 }
 
+/// A number for each state; the name of a repeated one stands for all its elements, with one number or a list.
 fn state(walk: &mut Walk, value: &Value, model: &Model) -> Option<Vec<f64>> {
     let table = walk.table(value, "`state`")?;
     let known: Vec<&str> = model.states.iter().map(|s| s.name.as_str()).collect();
-    for key in table.keys() {
+    let places: HashMap<&str, usize> = known.iter().enumerate().map(|(i, name)| (*name, i)).collect();
+    let mut values: Vec<Option<f64>> = vec![None; known.len()];
+    let before = walk.found.len();
+    let mut families = Vec::new();
+    for (key, own) in table {
         let name: &str = key.get_ref();
-        if !known.contains(&name) {
-            let message = format!("the model `{}` has no state `{name}`", model.name);
-            walk.report(key.span(), message, suggest(name, &known));
+        let what = format!("the state `{name}`");
+        if let Some(&i) = places.get(name) {
+            values[i] = walk.number(own, &what);
+            continue;
+        }
+        let elements: Vec<usize> = (1..).map_while(|k| places.get(format!("{name}[{k}]").as_str())).copied().collect();
+        match own.get_ref().as_array() {
+            _ if elements.is_empty() => {
+                let message = format!("the model `{}` has no state `{name}`", model.name);
+                walk.report(key.span(), message, suggest(name, &known));
+            }
+            Some(list) if list.len() != elements.len() => {
+                let message = format!("{what} has {} elements, and {} values here", elements.len(), list.len());
+                walk.report(own.span(), message, "give one value for each, or one number for all");
+            }
+            Some(list) => families.extend(elements.into_iter().zip(list.iter().map(|own| walk.number(own, &what)))),
+            None => {
+                let number = walk.number(own, &what);
+                families.extend(elements.into_iter().map(|i| (i, number)));
+            }
         }
     }
-    let missing: Vec<&str> = known.iter().copied().filter(|name| table.get(*name).is_none()).collect();
+    // An element given by itself counts more.
+    families.into_iter().for_each(|(i, number)| values[i] = values[i].or(number));
+    if walk.found.len() > before {
+        return None;
+    }
+    let missing: Vec<&str> = known.iter().zip(&values).filter(|(_, v)| v.is_none()).map(|(name, _)| *name).collect();
     if !missing.is_empty() {
         let message = format!("the state lacks {}", missing.join(", "));
         walk.report(value.span(), message, format!("give a number for each of {}", known.join(", ")));
         return None;
     }
-    known.iter().map(|name| walk.number(table.get(*name)?, &format!("the state `{name}`"))).collect()
+    values.into_iter().collect()
 }

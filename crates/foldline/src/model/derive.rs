@@ -4,7 +4,7 @@
 //! leaves; the result is again a set of nodes, so sweeping twice gives second derivatives, and so on to any order.
 //!
 //! **Departures.** At points where a function has no derivative a finite value is taken so that it cannot spoil a whole
-//! Jacobian: `abs`, `sign`, `heaviside` and comparisons contribute sign(x), 0, 0 and 0; `hypot` contributes 0 at the origin,
+//! Jacobian: `abs`, `sign`, `heaviside`, `floor` and comparisons contribute sign(x), 0, 0, 0 and 0; `hypot` contributes 0 at the origin,
 //! and `sqrt` and powers below 1 contribute 0 where their argument and its derivative both vanish. Squares of a radius are
 //! rewritten as sums of squares beforehand (see `identities`), so smooth functions of a radius are not affected.
 //! A choice (`if`, `min`, `max`) has the derivative of the branch that is taken, whatever the other one gives.
@@ -104,7 +104,35 @@ impl Graph {
                 self.multiply(factor, product)
             }
             Unary::Abs => self.unary(Unary::Sign, a),
-            Unary::Sign | Unary::Heaviside => return self.constant(0.0),
+            Unary::Log10 | Unary::Log2 => {
+                let base = if op == Unary::Log2 { std::f64::consts::LN_2 } else { std::f64::consts::LN_10 };
+                let base = self.constant(base);
+                let below = self.multiply(base, a);
+                return self.divide(da, below);
+            }
+            Unary::Log1p => {
+                let below = self.add(one, a);
+                return self.divide(da, below);
+            }
+            Unary::Expm1 => self.unary(Unary::Exp, a),
+            Unary::Cbrt => {
+                let (three, square) = (self.constant(3.0), self.integer(y, 2));
+                let below = self.multiply(three, square);
+                return self.divide(da, below);
+            }
+            Unary::Asinh | Unary::Acosh => {
+                let square = self.integer(a, 2);
+                let inside = if op == Unary::Asinh { self.add(square, one) } else { self.subtract(square, one) };
+                let root = self.unary(Unary::Sqrt, inside);
+                return self.divide(da, root);
+            }
+            Unary::Atanh => {
+                let (p, q) = (self.subtract(one, a), self.add(one, a));
+                let below = self.multiply(p, q);
+                return self.divide(da, below);
+            }
+            Unary::Exprel(order) => self.unary(Unary::Exprel(order.saturating_add(1)), a),
+            Unary::Floor | Unary::Sign | Unary::Heaviside => return self.constant(0.0),
         };
         self.multiply(slope, da)
     }

@@ -1,6 +1,7 @@
 //! What can be wrong with a model, said so that it can be put right.
 
-use super::function::{FUNCTIONS, known_elsewhere_as};
+use super::callable::Callables;
+use super::function::known_elsewhere_as;
 use super::nearest::suggest;
 use std::fmt;
 use std::ops::Range;
@@ -24,6 +25,14 @@ pub enum Item {
     Forcing,
     /// The pair of states that forms the complex signal.
     Whirl,
+    /// A constant.
+    Constant(usize),
+    /// A function of the model.
+    Function(usize),
+    /// A table.
+    Table(usize),
+    /// An entry of the mass matrix.
+    Mass(usize),
 }
 
 /// Which field of an item is wrong.
@@ -39,6 +48,14 @@ pub enum Field {
     Scale,
     /// The sampling range of a state.
     Range,
+    /// The number of elements.
+    Count,
+    /// The name of the index.
+    Index,
+    /// The value beyond the first element, by position in the list.
+    Before(usize),
+    /// The value beyond the last element, by position in the list.
+    After(usize),
 }
 
 /// Something wrong with a model.
@@ -69,6 +86,10 @@ impl fmt::Display for ModelError {
             Item::Output(_) => "the output",
             Item::Forcing => "the forcing",
             Item::Whirl => "whirl",
+            Item::Constant(_) => "the constant",
+            Item::Function(_) => "the function",
+            Item::Table(_) => "the table",
+            Item::Mass(_) => "the mass of",
         };
         write!(f, "{part}")?;
         if !self.name.is_empty() {
@@ -98,10 +119,10 @@ impl Complaint {
         Complaint { span, message: message.into(), hint: hint.into(), function: None }
     }
 
-    pub fn unknown_function(name: String, span: Range<usize>) -> Complaint {
+    pub fn unknown_function(name: String, span: Range<usize>, callables: &Callables) -> Complaint {
         let hint = match known_elsewhere_as(&name) {
             Some(advice) => advice.to_string(),
-            None => suggest(&name, &FUNCTIONS.each_ref().map(|f| f.name)),
+            None => suggest(&name, &callables.names()),
         };
         Complaint { span, message: format!("there is no function `{name}`"), hint, function: Some(name) }
     }

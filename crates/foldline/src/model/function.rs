@@ -3,12 +3,14 @@
 use super::graph::{Binary, Graph, Id, Unary};
 
 /// What a function does with its arguments.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug)]
 pub(super) enum Meaning {
     /// A function of one operand.
     One(Unary),
     /// A function of two operands.
     Two(Binary),
+    /// A formula in one or two operands.
+    Made(usize, fn(&mut Graph, Id, Id) -> Id),
     /// `if(condition, a, b)`.
     If,
 }
@@ -30,6 +32,7 @@ impl Function {
         match self.meaning {
             Meaning::One(_) => 1,
             Meaning::Two(_) => 2,
+            Meaning::Made(arity, _) => arity,
             Meaning::If => 3,
         }
     }
@@ -40,6 +43,7 @@ impl Function {
         match self.meaning {
             Meaning::One(op) => graph.unary(op, a),
             Meaning::Two(op) => graph.binary(op, a, b),
+            Meaning::Made(_, make) => make(graph, a, b),
             Meaning::If => graph.select(a, b, c),
         }
     }
@@ -54,7 +58,7 @@ const fn two(name: &'static str, signature: &'static str, op: Binary) -> Functio
 }
 
 /// Every function.
-pub(super) static FUNCTIONS: [Function; 20] = [
+pub(super) static FUNCTIONS: [Function; 33] = [
     one("sqrt", "sqrt(x)", Unary::Sqrt),
     one("exp", "exp(x)", Unary::Exp),
     one("log", "log(x)", Unary::Log),
@@ -74,8 +78,43 @@ pub(super) static FUNCTIONS: [Function; 20] = [
     two("min", "min(a, b)", Binary::Min),
     two("max", "max(a, b)", Binary::Max),
     two("hypot", "hypot(a, b)", Binary::Hypot),
+    one("log10", "log10(x)", Unary::Log10),
+    one("log2", "log2(x)", Unary::Log2),
+    one("log1p", "log1p(x)", Unary::Log1p),
+    one("expm1", "expm1(x)", Unary::Expm1),
+    one("exprel", "exprel(x)", Unary::Exprel(0)),
+    one("cbrt", "cbrt(x)", Unary::Cbrt),
+    one("asinh", "asinh(x)", Unary::Asinh),
+    one("acosh", "acosh(x)", Unary::Acosh),
+    one("atanh", "atanh(x)", Unary::Atanh),
+    one("floor", "floor(x)", Unary::Floor),
+    Function { name: "ceil", signature: "ceil(x)", meaning: Meaning::Made(1, |graph, a, _| ceiling(graph, a)) },
+    Function { name: "round", signature: "round(x)", meaning: Meaning::Made(1, |graph, a, _| nearest(graph, a)) },
+    Function { name: "mod", signature: "mod(a, b)", meaning: Meaning::Made(2, remainder) },
     Function { name: "if", signature: "if(condition, then, else)", meaning: Meaning::If },
 ];
+
+/// -⌊-a⌋.
+fn ceiling(graph: &mut Graph, a: Id) -> Id {
+    let negative = graph.negate(a);
+    let floor = graph.unary(Unary::Floor, negative);
+    graph.negate(floor)
+}
+
+/// ⌊a + ½⌋.
+fn nearest(graph: &mut Graph, a: Id) -> Id {
+    let half = graph.constant(0.5);
+    let sum = graph.add(a, half);
+    graph.unary(Unary::Floor, sum)
+}
+
+/// a - b ⌊a/b⌋, which has the sign of b.
+fn remainder(graph: &mut Graph, a: Id, b: Id) -> Id {
+    let ratio = graph.divide(a, b);
+    let turns = graph.unary(Unary::Floor, ratio);
+    let whole = graph.multiply(b, turns);
+    graph.subtract(a, whole)
+}
 
 /// Named numbers.
 pub(super) const CONSTANTS: [(&str, f64); 1] = [("pi", std::f64::consts::PI)];
@@ -89,8 +128,13 @@ pub(super) fn function(name: &str) -> Option<&'static Function> {
 pub(super) fn known_elsewhere_as(name: &str) -> Option<&'static str> {
     Some(match name {
         "ln" => "write `log(x)`",
-        "log10" => "write `log(x)/log(10)`",
         "pow" | "power" => "write `a^b`",
+        "arsinh" | "arcsinh" => "write `asinh(x)`",
+        "arcosh" | "arccosh" => "write `acosh(x)`",
+        "artanh" | "arctanh" => "write `atanh(x)`",
+        "fmod" | "rem" | "modulo" => "write `mod(a, b)`, which has the sign of b",
+        "ceiling" => "write `ceil(x)`",
+        "trunc" | "fix" | "int" => "write `sign(x)*floor(abs(x))`",
         "arcsin" => "write `asin(x)`",
         "arccos" => "write `acos(x)`",
         "arctan" => "write `atan(x)`",

@@ -3,7 +3,7 @@
 //! **Idea.** A node is looked up before it is made. An operand always has a smaller number than the node that uses it, so
 //! every pass is a loop, never a recursion. Nodes are made through the constructors of `identities`.
 
-use super::kernels;
+use super::{exprel, kernels};
 use std::collections::HashMap;
 
 /// Number of a node.
@@ -50,6 +50,17 @@ pub(super) enum Unary {
     Abs,
     Sign,
     Heaviside,
+    Floor,
+    Log10,
+    Log2,
+    Log1p,
+    Expm1,
+    Cbrt,
+    Asinh,
+    Acosh,
+    Atanh,
+    /// Derivative of that order of (eˣ - 1)/x.
+    Exprel(u8),
 }
 
 /// Functions of two operands.
@@ -92,6 +103,17 @@ impl Unary {
             Unary::Abs => x.abs(),
             Unary::Sign => kernels::sign(x),
             Unary::Heaviside => kernels::heaviside(x),
+            Unary::Floor => x.floor(),
+            Unary::Log10 => x.log10(),
+            Unary::Log2 => x.log2(),
+            Unary::Log1p => x.ln_1p(),
+            Unary::Expm1 => kernels::expm1(x),
+            Unary::Cbrt => x.cbrt(),
+            Unary::Asinh => x.asinh(),
+            Unary::Acosh => x.acosh(),
+            Unary::Atanh => x.atanh(),
+            Unary::Exprel(0) => exprel::exprel(x),
+            Unary::Exprel(order) => exprel::derivative(order, x),
         }
     }
 }

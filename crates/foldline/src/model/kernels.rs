@@ -81,6 +81,17 @@ pub fn tanh(x: f64) -> f64 {
     (m / (m + 2.0)).copysign(x)
 }
 
+/// eˣ - 1, to full relative accuracy next to 0.
+#[inline(always)]
+pub fn expm1(x: f64) -> f64 {
+    // From here on the 1 is lost in rounding, and 2ᵏ may overflow.
+    const LARGE: f64 = 40.0;
+    let (k, r, error) = reduce(limit(x, -44.0, LARGE));
+    let s = power_of_two(k);
+    let m = s * (r + (series(r) + error)) + (s - 1.0);
+    if x > LARGE { exp(x) } else { m }
+}
+
 /// From here on m + 2 of equation 3 is m in rounding, and tanh is ±1: there m > 2⁵⁵.
 const SATURATED: f64 = 19.5;
 
@@ -198,6 +209,7 @@ mod tests {
         }
         for x in sample(30.0) {
             assert!(ulps(tanh(x), x.tanh()) <= 3.0, "tanh {x}: {} {}", tanh(x), x.tanh());
+            assert!(ulps(expm1(x), x.exp_m1()) <= 3.0, "expm1 {x}: {} {}", expm1(x), x.exp_m1());
             let reference = x.cosh().powi(-2);
             // cosh⁻² of the standard library itself carries three roundings.
             assert!(ulps(sech_squared(x), reference) <= 6.0, "sech² {x}: {} {reference}", sech_squared(x));
@@ -220,10 +232,11 @@ mod tests {
         assert_eq!((tanh(1e300), tanh(-1e300)), (1.0, -1.0));
         assert_eq!(tanh(-0.0).to_bits(), (-0.0f64).to_bits());
         assert_eq!(tanh(1e-320), 1e-320);
+        assert_eq!((expm1(1e-320), expm1(-1e3), expm1(1e3)), (1e-320, -1.0, f64::INFINITY));
         assert_eq!(hypot(0.0, 0.0), 0.0);
         assert!((hypot(3e200, 4e200) / 5e200 - 1.0).abs() < 1e-15);
         assert!((hypot(3e-200, 4e-200) / 5e-200 - 1.0).abs() < 1e-15);
-        for f in [exp, tanh, sech_squared, sign, heaviside] {
+        for f in [exp, expm1, tanh, sech_squared, sign, heaviside] {
             assert!(f(f64::NAN).is_nan());
         }
         for f in [hypot, min, max] {

@@ -13,7 +13,7 @@ pub(super) enum Token {
 }
 
 /// Longer symbols first.
-const SYMBOLS: [&str; 14] = ["<=", ">=", "==", "!=", "+", "-", "*", "/", "^", "(", ")", ",", "<", ">"];
+const SYMBOLS: [&str; 16] = ["<=", ">=", "==", "!=", "+", "-", "*", "/", "^", "(", ")", "[", "]", ",", "<", ">"];
 
 /// The words of `text` with their places (bytes).
 pub(super) fn words(text: &str) -> Result<Vec<(Token, Range<usize>)>, Complaint> {
@@ -32,7 +32,9 @@ pub(super) fn words(text: &str) -> Result<Vec<(Token, Range<usize>)>, Complaint>
             words.push((Token::Number(value), at..end));
             at = end;
         } else if first.is_alphabetic() || first == '_' {
-            let length = rest.find(|c: char| !(c.is_alphanumeric() || c == '_')).unwrap_or(rest.len());
+            let letters = rest.find(|c: char| !(c.is_alphanumeric() || c == '_')).unwrap_or(rest.len());
+            // A rate, such as x'.
+            let length = letters + rest[letters..].bytes().take_while(|b| *b == b'\'').count();
             words.push((Token::Name(rest[..length].to_string()), at..at + length));
             at += length;
         } else if rest.starts_with("**") {
@@ -86,9 +88,9 @@ fn glued(number: &str, next: char, rest: &str, span: Range<usize>) -> Complaint 
 fn stray(found: char, at: usize) -> Complaint {
     let hint = match found {
         '=' => "compare with `==`; an equation has only its right-hand side here",
-        '[' | ']' | '{' | '}' => "only round brackets ( ) are used",
+        '{' | '}' => "write round brackets ( ), or square ones for an index, as in `x[i+1]`",
         '&' | '|' => "combine conditions with `*` for and, `max(a, b)` for or",
-        '\'' => "write the derivative of a state as a state of its own",
+        '\'' => "a rate is written `x'`, and `x'[i]` where x has an index",
         '×' | '·' => "write `*` for a product",
         '−' | '–' => "write a plain minus sign `-`",
         _ => "an expression is made of numbers, names, + - * / ^ ( ) , and comparisons",

@@ -4,32 +4,47 @@
 //! are differentiated on that graph to any order (`derive`), and become tapes (`tape`) that run over all lanes of a batch
 //! (`run`) about as fast as code written by hand, without a compiler.
 //!
-//! Text takes the way `lexer` → `parser` → `compile`; whatever is wrong with it comes back as a list of [`ModelError`], each
-//! with its place.
+//! Text takes the way `lexer` → `parser` → `compile`: names are laid out (`family`) and checked (`check`, `words`), definitions put in
+//! order (`order`), expressions read with their index given (`scope`) and turned into nodes (`lower`). Whatever is wrong comes back
+//! as a list of [`ModelError`], each with its place.
 
+mod callable;
+mod check;
 mod compile;
+mod constant;
 mod derive;
 mod error;
+mod exprel;
+mod family;
 pub mod forcing;
 mod function;
 mod graph;
 mod identities;
 pub mod kernels;
 mod lexer;
+mod lower;
+mod mass;
 mod nearest;
+mod order;
 mod parser;
 mod precise;
+mod rates;
 mod run;
+mod scope;
 mod source;
 mod switches;
+mod table;
 mod tape;
+mod words;
 
+pub use constant::constant_value;
 pub use error::{Field, Item, ModelError};
 pub use nearest::{nearest, suggest};
-pub use source::{Definition, Forcing, ModelSource, Output, Parameter, State};
+pub use source::{Constant, Definition, Ends, Forcing, Function, Mass, ModelSource, Output, Parameter, Repeat, State};
+pub use table::{Interpolation, Outside, Table};
 
 use crate::contract::{Batch, Parameters, VectorField};
-use compile::{Compiled, compile};
+use compile::{Compiled, Named, compile};
 use graph::Leaf;
 use std::collections::HashMap;
 use std::ops::Deref;
@@ -99,12 +114,12 @@ impl Deref for Model {
 impl Model {
     /// The model that `source` describes, or everything that is wrong with it.
     pub fn compile(source: ModelSource) -> Result<Model, Vec<ModelError>> {
-        let compiled = compile(&source)?;
+        let (compiled, Named { states, parameters, outputs: output_list }) = compile(&source)?;
         let field = Tape::new(&compiled.graph, &[&compiled.field]);
         let outputs = Tape::new(&compiled.graph, &[&compiled.outputs]);
         let switches = Switches::new(&compiled.graph, &compiled.field);
         let period = compiled.period.map(|period| Tape::new(&compiled.graph, &[&[period]]));
-        let ModelSource { name, description, source, parameters, states, outputs: output_list, .. } = source;
+        let ModelSource { name, description, source, .. } = source;
         let whirl = compiled.whirl;
         let about = About { name, description, source, states, parameters, outputs: output_list, whirl };
         let (linear, directional) = (RwLock::default(), RwLock::default());

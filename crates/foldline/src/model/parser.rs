@@ -7,8 +7,11 @@
 //! 3. product = signed { ( * | / ) signed }
 //! 4. signed = ( + | - ) signed | power
 //! 5. power = atom [ ^ signed ], so -x^2 = -(x^2), x^y^z = x^(y^z), and 2^-1 is allowed
-//! 6. atom = number | name | name ( comparison { , comparison } ) | ( comparison )
+//! 6. atom = number | name | name [ comparison ] | name ( comparison { , comparison } ) | ( comparison )
+//!
+//! `sum(j, first, last, term)` has a name, not a value, in its first place.
 
+use super::callable::{Callables, Callee, SUM};
 use super::error::Complaint;
 use super::function::{Function, function};
 use super::graph::{Binary, Unary};
@@ -17,6 +20,9 @@ use std::ops::Range;
 
 /// Deepest nesting of brackets, signs and powers.
 const DEEPEST: usize = 200;
+
+/// Deepest nesting of sums.
+const DEEPEST_SUM: usize = 8;
 
 /// What a term is; operands are indices of earlier terms.
 #[derive(Clone, Debug)]
@@ -27,6 +33,24 @@ pub(super) enum Term {
     Binary(Binary, usize, usize),
     /// Unused places repeat the first argument.
     Call(&'static Function, [usize; 3]),
+    /// The element of a repeated quantity with that index.
+    Element(String, usize),
+    /// A function of the model.
+    Apply(usize, Vec<usize>),
+    /// A table.
+    Lookup(usize, usize),
+    /// A sum over an index.
+    Sum(Box<Sum>),
+}
+
+/// Σ of a term over an index that runs from `first` to `last`.
+#[derive(Clone, Debug)]
+pub(super) struct Sum {
+    pub index: String,
+    pub index_span: Range<usize>,
+    pub first: usize,
+    pub last: usize,
+    pub term: Expression,
 }
 
 /// A parsed expression: terms, operands before their users; the last one is the whole.
@@ -34,11 +58,13 @@ pub(super) enum Term {
 pub(super) struct Expression {
     pub terms: Vec<Term>,
     pub spans: Vec<Range<usize>>,
+    /// True if it contains an index, a sum or a function of the model.
+    pub composite: bool,
 }
 
 impl Expression {
     /// Parses `text`.
-    pub fn parse(text: &str) -> Result<Expression, Complaint> {
+    pub fn parse(text: &str, callables: &Callables) -> Result<Expression, Complaint> {
         let words = words(text)?;
         if words.is_empty() {
             return Err(Complaint::new(
@@ -47,7 +73,8 @@ impl Expression {
                 "write a formula such as `a*x - x^3`",
             ));
         }
-        let mut parser = Parser { words, at: 0, end: text.len(), depth: 0, out: Expression::default() };
+        let mut parser =
+            Parser { callables, words, at: 0, end: text.len(), depth: 0, sums: 0, out: Expression::default() };
         parser.comparison()?;
         match parser.words.get(parser.at) {
             None => Ok(parser.out),
@@ -55,26 +82,30 @@ impl Expression {
         }
     }
 
-    /// The names it mentions.
-    pub fn names(&self) -> impl Iterator<Item = (&str, Range<usize>)> {
-        self.terms.iter().zip(&self.spans).filter_map(|(term, span)| match term {
-            Term::Name(name) => Some((name.as_str(), span.clone())),
-            _ => None,
-        })
+    /// All terms with their places, those inside sums included.
+    pub fn each(&self, visit: &mut dyn FnMut(&Term, &Range<usize>)) {
+        for (term, span) in self.terms.iter().zip(&self.spans) {
+            visit(term, span);
+            if let Term::Sum(sum) = term {
+                sum.term.each(visit);
+            }
+        }
     }
 }
 
-struct Parser {
+struct Parser<'a> {
+    callables: &'a Callables,
     words: Vec<(Token, Range<usize>)>,
     at: usize,
     end: usize,
     depth: usize,
+    sums: usize,
     out: Expression,
 }
 
 type Parsed = Result<usize, Complaint>;
 
-impl Parser {
+impl Parser<'_> {
     /// The next word if it is one of these symbols; it is consumed.
     fn take(&mut self, symbols: &[&str]) -> Option<(&'static str, Range<usize>)> {
         match self.words.get(self.at) {
@@ -181,8 +212,12 @@ impl Parser {
         match token {
             Token::Number(value) => Ok(self.push(Term::Number(value), span)),
             Token::Name(name) => match self.take(&["("]) {
+                Some((_, open)) if name == SUM => self.series(span, open),
                 Some((_, open)) => self.call(name, span, open),
-                None => Ok(self.push(Term::Name(name), span)),
+                None => match self.take(&["["]) {
+                    Some((_, open)) => self.element(name, span, open),
+                    None => Ok(self.push(Term::Name(name), span)),
+                },
             },
             Token::Symbol("(") => {
                 let inner = self.comparison()?;
@@ -209,18 +244,73 @@ impl Parser {
             },
         };
         let whole = span.start..close.end;
-        let Some(function) = function(&name) else { return Err(Complaint::unknown_function(name, span)) };
-        if arguments.len() != function.arity() {
-            let plural = if function.arity() == 1 { "" } else { "s" };
+        let own = self.callables.get(&name);
+        let (arity, signature) = match (function(&name), own) {
+            (Some(function), _) => (function.arity(), function.signature),
+            (None, Some(own)) => (own.arity, own.signature.as_str()),
+            (None, None) => return Err(Complaint::unknown_function(name, span, self.callables)),
+        };
+        if arguments.len() != arity {
+            let plural = if arity == 1 { "" } else { "s" };
             return Err(Complaint::new(
                 whole,
-                format!("`{name}` takes {} argument{plural}, {} given", function.arity(), arguments.len()),
-                format!("write `{}`", function.signature),
+                format!("`{name}` takes {arity} argument{plural}, {} given", arguments.len()),
+                format!("write `{signature}`"),
             ));
         }
+        let Some(function) = function(&name) else {
+            self.out.composite = true;
+            let term = match own.map(|own| own.callee) {
+                Some(Callee::Table(table)) => Term::Lookup(table, arguments[0]),
+                Some(Callee::Function(number)) => Term::Apply(number, arguments),
+                None => return Err(Complaint::unknown_function(name, span, self.callables)),
+            };
+            return Ok(self.push(term, whole));
+        };
         let first = arguments[0];
         let place = |i: usize| arguments.get(i).copied().unwrap_or(first);
         Ok(self.push(Term::Call(function, [first, place(1), place(2)]), whole))
+    }
+
+    /// The rest of `name[index]`.
+    fn element(&mut self, name: String, span: Range<usize>, open: Range<usize>) -> Parsed {
+        let index = self.comparison()?;
+        let Some((_, close)) = self.take(&["]"]) else {
+            return Err(Complaint::new(open, "this bracket is never closed", "add the missing `]` after the index"));
+        };
+        self.out.composite = true;
+        Ok(self.push(Term::Element(name, index), span.start..close.end))
+    }
+
+    /// The rest of `sum(index, first, last, term)`.
+    fn series(&mut self, span: Range<usize>, open: Range<usize>) -> Parsed {
+        let form = |span: Range<usize>| {
+            let hint = "write the index, where it begins and ends, and the term: `sum(j, 1, n, x[j])`";
+            Complaint::new(span, "`sum` has another form", hint)
+        };
+        let Some((Token::Name(index), index_span)) = self.words.get(self.at).cloned() else {
+            return Err(form(span.start..open.end));
+        };
+        self.at += 1;
+        let comma = |parser: &mut Self| parser.take(&[","]).map(|_| ()).ok_or_else(|| form(span.start..open.end));
+        comma(self)?;
+        let first = self.comparison()?;
+        comma(self)?;
+        let last = self.comparison()?;
+        comma(self)?;
+        self.sums += 1;
+        if self.sums > DEEPEST_SUM {
+            let message = format!("sums are nested more than {DEEPEST_SUM} deep");
+            return Err(Complaint::new(span, message, "give the inner sums names in the definitions"));
+        }
+        let outer = std::mem::take(&mut self.out);
+        self.comparison()?;
+        self.sums -= 1;
+        let term = std::mem::replace(&mut self.out, outer);
+        let close = self.close(&open)?;
+        self.out.composite = true;
+        let sum = Sum { index, index_span, first, last, term };
+        Ok(self.push(Term::Sum(Box::new(sum)), span.start..close.end))
     }
 
     /// The bracket that closes the one at `open`.
@@ -248,7 +338,7 @@ impl Parser {
         let after_value = self.at > 0
             && match &self.words[self.at - 1].0 {
                 Token::Number(_) | Token::Name(_) => true,
-                Token::Symbol(symbol) => *symbol == ")",
+                Token::Symbol(symbol) => matches!(*symbol, ")" | "]"),
             };
         match token {
             Token::Symbol(")") if after_value => {
@@ -261,6 +351,9 @@ impl Parser {
             ),
             Token::Number(_) | Token::Name(_) | Token::Symbol("(") if after_value => {
                 Complaint::new(span, "an operator is missing before this", "write `*` for a product")
+            }
+            Token::Symbol("[") => {
+                Complaint::new(span, "an index belongs to a name", "write it after the name, as in `x[i+1]`")
             }
             Token::Symbol(symbol) => Complaint::new(
                 span,

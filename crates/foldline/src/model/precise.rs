@@ -88,6 +88,27 @@ fn unary(op: Unary, x: TwoFloat) -> TwoFloat {
         Unary::Abs => x.abs(),
         Unary::Sign => sign(),
         Unary::Heaviside => (sign() + 1.0) * 0.5,
+        Unary::Floor => {
+            let whole = x.hi().floor();
+            TwoFloat::from(whole) + if whole == x.hi() { x.lo().floor() } else { 0.0 }
+        }
+        Unary::Log10 => divide(log(x), log(10.0.into())),
+        Unary::Log2 => divide(log(x), twofloat::consts::LN_2),
+        Unary::Log1p => log1p(x),
+        Unary::Expm1 => exp_m1(x),
+        Unary::Cbrt => {
+            let y = TwoFloat::from(x.hi().cbrt());
+            let rest = divide(x - y * y * y, y * y * 3.0);
+            if rest.hi().is_finite() { y + rest } else { y }
+        }
+        Unary::Asinh => {
+            let (size, square) = (x.abs(), x * x);
+            let value = log1p(size + divide(square, (square + 1.0).sqrt() + 1.0));
+            if x < zero { -value } else { value }
+        }
+        Unary::Acosh => log(x + ((x - 1.0) * (x + 1.0)).sqrt()),
+        Unary::Atanh => log1p(divide(x * 2.0, TwoFloat::from(1.0) - x)) * 0.5,
+        Unary::Exprel(order) => exprel(order, x),
     }
 }
 
@@ -156,6 +177,35 @@ fn expm1_small(x: TwoFloat) -> TwoFloat {
     m = (m + 1.0) * r;
     (0..8).for_each(|_| m = m * 2.0 + m * m);
     m
+}
+
+/// log(1 + x), by the series next to 0.
+fn log1p(x: TwoFloat) -> TwoFloat {
+    if x.hi().abs() > 1e-3 {
+        return log(x + 1.0);
+    }
+    let sum = (2..=12).rev().fold(TwoFloat::from(0.0), |sum, n| (TwoFloat::from(1.0) / f64::from(n) - sum) * x);
+    x - sum * x
+}
+
+/// The derivative of that order of (eˣ - 1)/x, as in [`super::exprel`].
+fn exprel(order: u8, x: TwoFloat) -> TwoFloat {
+    let (m, size) = (f64::from(order), x.abs());
+    if size.hi() > m + 2.0 || !size.hi().is_finite() {
+        let first = divide(exp_m1(x), x);
+        return (1..=order).fold(first, |below, k| divide(exp(x) - below * f64::from(k), x));
+    }
+    let positive = x.hi() >= 0.0;
+    let (mut term, mut sum) = (TwoFloat::from(1.0), divide(1.0.into(), (m + 1.0).into()));
+    for j in (1..=400).map(f64::from) {
+        term = divide(term * size, if positive { j } else { m + j }.into());
+        let more = divide(term, (j + m + 1.0).into());
+        sum += more;
+        if more.hi() < 1e-34 * sum.hi() {
+            break;
+        }
+    }
+    if positive { sum } else { sum * exp(x) }
 }
 
 /// From the logarithm y in working precision: x e^-y differs from 1 by rounding, of which the logarithm is a short series.
@@ -245,6 +295,8 @@ mod tests {
             "sin(x) + cos(2*x)*tan(x) - asin(a) + acos(a*x)*atan(x)",
             "sinh(x) - cosh(a) + tanh(3*x) + tanh(-100*x) + tanh(1e-9*x)",
             "abs(a - x) + sign(a - x) + heaviside(x) + max(x, a)*min(x, a) + hypot(x, a)",
+            "floor(3*x) + log10(x) + log2(x) + log1p(a*x) + expm1(x) + cbrt(x) + cbrt(-a)",
+            "asinh(x) - asinh(-a) + acosh(2*x) + atanh(x) + exprel(x) + exprel(-x) + exprel(50*x) + mod(7*x, a)",
             "x^a + a^x + x^7 + x^-3 + atan2(-x, -a) + if(x < a, x, 2*x) + (x >= a) + (x == x)",
         ];
         for formula in formulas {
@@ -277,6 +329,16 @@ mod tests {
             "atan2(x, -a) - atan2(a, x) - 2*atan2(a, a)",
             "a/x*x - a",
             "x^-3*x^2*x - 1",
+            "10^log10(x) - x",
+            "2^log2(x) - x",
+            "log1p(expm1(x)) - x",
+            "expm1(-log1p(x)) + x/(1 + x)",
+            "cbrt(x)^3 - x",
+            "sinh(asinh(x)) - x",
+            "cosh(acosh(1 + x)) - 1 - x",
+            "tanh(atanh(x/4)) - x/4",
+            "x*exprel(x) - expm1(x)",
+            "exprel(-x)*exp(x) - exprel(x)",
         ];
         for formula in identities {
             let model = model(formula);

@@ -298,6 +298,9 @@ fn unary<const W: usize>(op: Unary, to: &Lanes<W>, a: &Lanes<W>, live: usize) {
         Unary::Abs => map(to, a, |x| Unary::Abs.of(x)),
         Unary::Sign => map(to, a, |x| Unary::Sign.of(x)),
         Unary::Heaviside => map(to, a, |x| Unary::Heaviside.of(x)),
+        Unary::Floor => map(to, a, |x| Unary::Floor.of(x)),
+        Unary::Expm1 => map(to, a, |x| Unary::Expm1.of(x)),
+        Unary::Exprel(0) => map(to, a, |x| Unary::Exprel(0).of(x)),
         _ => zip_live(to, a, a, live, |x, _| op.of(x)),
     }
 }

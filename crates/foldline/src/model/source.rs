@@ -1,5 +1,7 @@
 //! A model as it is written: names, numbers and expressions in text.
 
+use super::table::Table;
+
 /// A parameter.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Parameter {
@@ -13,6 +15,10 @@ pub struct Parameter {
     pub value: f64,
     /// Characteristic size, positive; where none is given it follows from the value and the ranges of a study.
     pub scale: Option<f64>,
+    /// Repetition over an index.
+    pub repeat: Option<Repeat>,
+    /// Value of each element of a repeated parameter; all have `value` where the list is empty.
+    pub values: Vec<f64>,
 }
 
 /// A state component.
@@ -29,6 +35,8 @@ pub struct State {
     pub scale: Option<f64>,
     /// Smallest and largest initial value when initial states are sampled; where none is given, twice the scale to both sides of 0.
     pub range: Option<[f64; 2]>,
+    /// Repetition over an index.
+    pub repeat: Option<Repeat>,
 }
 
 /// A scalar of the state.
@@ -42,6 +50,8 @@ pub struct Output {
     pub description: String,
     /// How it is computed.
     pub expression: String,
+    /// Repetition over an index.
+    pub repeat: Option<Repeat>,
 }
 
 /// A name for an expression: an intermediate result, or the right-hand side of the equation of a state.
@@ -50,6 +60,66 @@ pub struct Definition {
     /// The name, or the state.
     pub name: String,
     /// The expression.
+    pub expression: String,
+    /// Repetition over an index; an equation is repeated as its state is.
+    pub repeat: Option<Repeat>,
+}
+
+/// A number that no study changes, usable wherever an expression is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Constant {
+    /// Its name.
+    pub name: String,
+    /// Its value.
+    pub value: f64,
+}
+
+/// A function defined by the model; calls are replaced by its expression.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Function {
+    /// Its name.
+    pub name: String,
+    /// Names of its arguments.
+    pub arguments: Vec<String>,
+    /// Its value.
+    pub expression: String,
+}
+
+/// Repetition of a quantity over an index that runs from 1 to a count.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Repeat {
+    /// Number of elements.
+    pub count: usize,
+    /// Name of the index in expressions.
+    pub index: String,
+    /// Values beyond the first and the last element.
+    pub ends: Ends,
+}
+
+/// Values of a repeated quantity beyond its first and its last element.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Ends {
+    /// Expressions for the elements 0, -1, … and for the elements n + 1, n + 2, …; elements without an expression do not exist.
+    Given {
+        /// Before the first element, nearest first.
+        before: Vec<String>,
+        /// After the last element, nearest first.
+        after: Vec<String>,
+    },
+    /// The first element follows the last.
+    Periodic,
+    /// Time derivatives of the values beyond the ends of the family of that name.
+    RateOf(String),
+}
+
+/// An entry of the matrix M of M dy/dt = f.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mass {
+    /// State whose equation is the row.
+    pub row: String,
+    /// State whose rate the entry multiplies.
+    pub column: String,
+    /// The entry.
     pub expression: String,
 }
 
@@ -71,6 +141,12 @@ pub struct ModelSource {
     pub description: String,
     /// Where it comes from.
     pub source: String,
+    /// Numbers with names.
+    pub constants: Vec<Constant>,
+    /// Functions of the model, in any order.
+    pub functions: Vec<Function>,
+    /// Measured or tabulated functions of one argument.
+    pub tables: Vec<Table>,
     /// Parameters, in the order in which they are numbered.
     pub parameters: Vec<Parameter>,
     /// The forcing, where expressions use the time `t`.
@@ -81,6 +157,8 @@ pub struct ModelSource {
     pub states: Vec<State>,
     /// One equation for each state, in any order.
     pub equations: Vec<Definition>,
+    /// Entries of the matrix that multiplies the rates; rows that are not mentioned are those of the unit matrix.
+    pub mass: Vec<Mass>,
     /// Outputs, in the order in which they are numbered.
     pub outputs: Vec<Output>,
     /// The two states u, v that form the complex signal u + j v.
@@ -90,14 +168,29 @@ pub struct ModelSource {
 impl Parameter {
     /// A parameter without unit and description.
     pub fn new(name: &str, value: f64) -> Parameter {
-        Parameter { name: name.into(), unit: "1".into(), description: String::new(), value, scale: None }
+        Parameter {
+            name: name.into(),
+            unit: "1".into(),
+            description: String::new(),
+            value,
+            scale: None,
+            repeat: None,
+            values: Vec::new(),
+        }
     }
 }
 
 impl State {
     /// A state without unit, description, scale and range.
     pub fn new(name: &str) -> State {
-        State { name: name.into(), unit: "1".into(), description: String::new(), scale: None, range: None }
+        State {
+            name: name.into(),
+            unit: "1".into(),
+            description: String::new(),
+            scale: None,
+            range: None,
+            repeat: None,
+        }
     }
 
     /// The characteristic size that the model states: the scale, else a quarter of the width of the range.
@@ -114,13 +207,49 @@ impl State {
 impl Output {
     /// An output without unit and description.
     pub fn new(name: &str, expression: &str) -> Output {
-        Output { name: name.into(), unit: "1".into(), description: String::new(), expression: expression.into() }
+        Output {
+            name: name.into(),
+            unit: "1".into(),
+            description: String::new(),
+            expression: expression.into(),
+            repeat: None,
+        }
     }
 }
 
 impl Definition {
     /// `name` stands for `expression`.
     pub fn new(name: &str, expression: &str) -> Definition {
-        Definition { name: name.into(), expression: expression.into() }
+        Definition { name: name.into(), expression: expression.into(), repeat: None }
     }
+}
+
+impl Function {
+    /// Name and arguments of a head such as `hill(x, K, n)`; `None` if `head` is not of that form.
+    pub fn head(head: &str) -> Option<(String, Vec<String>)> {
+        let (name, rest) = head.split_once('(')?;
+        let inner = rest.trim_end().strip_suffix(')')?;
+        let arguments: Vec<String> = inner.split(',').map(|a| a.trim().to_string()).collect();
+        let word = |word: &str| !word.is_empty() && word.chars().all(|c| c.is_alphanumeric() || c == '_');
+        let well_formed = word(name.trim()) && arguments.iter().all(|a| word(a));
+        well_formed.then(|| (name.trim().to_string(), arguments))
+    }
+}
+
+impl Repeat {
+    /// Repetition over the index `i` without values beyond the ends.
+    pub fn new(count: usize) -> Repeat {
+        Repeat { count, index: "i".into(), ends: Ends::default() }
+    }
+}
+
+impl Default for Ends {
+    fn default() -> Ends {
+        Ends::Given { before: Vec::new(), after: Vec::new() }
+    }
+}
+
+/// Name of an element of a repeated quantity: `x[3]`.
+pub(super) fn element_name(name: &str, k: i64) -> String {
+    format!("{name}[{k}]")
 }

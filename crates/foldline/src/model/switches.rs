@@ -9,6 +9,8 @@
 //! 1. a < b, a ≤ b: s = a - b, true where σ < 0;   min(a, b), max(a, b): s = a - b, the operand that σ selects
 //! 2. |a|: s = a, σ a;   sign(a): s = a, σ;   heaviside(a): s = a, (1 + σ)/2
 //!
+//! 3. ⌊a⌋: s = sin πa, the integer that is even where σ > 0 and odd where σ < 0, of those nearest to a
+//!
 //! **Departures.** An expression that cannot change sign (a radius compared with 0) or depends on parameters only is not a
 //! switch. A comparison for equality holds at isolated instants and has no effect. A branch that is undefined beyond its switch,
 //! such as a root, is not continued; the branch that applies at the state is used instead ([`super::Model`]).
@@ -36,6 +38,12 @@ impl Switches {
         let (mut switches, mut own) = (Vec::new(), vec![None; reached.len()]);
         for i in (0..reached.len()).filter(|&i| reached[i]) {
             let switch = match graph.node(Id(i as u32)) {
+                // Of one sign between even and odd integers, of the other between odd and even ones.
+                Node::Unary(Unary::Floor, a) if varying[a.at()] => {
+                    let pi = graph.constant(std::f64::consts::PI);
+                    let turns = graph.multiply(pi, a);
+                    Some((graph.unary(Unary::Sin, turns), false))
+                }
                 Node::Unary(Unary::Abs | Unary::Sign | Unary::Heaviside, a) => Some((a, false)),
                 Node::Binary(Binary::Less | Binary::LessOrEqual | Binary::Min | Binary::Max, a, b)
                     if varying[a.at()] || varying[b.at()] =>
@@ -93,6 +101,7 @@ fn with_given_signs(graph: &mut Graph, roots: &[Id], reached: &[bool], own: &[Op
                 match op {
                     Unary::Abs => graph.multiply(sign, at(a)),
                     Unary::Heaviside => graph.unary(op, sign),
+                    Unary::Floor => floor(graph, at(a), sign),
                     _ => sign,
                 }
             }
@@ -114,6 +123,20 @@ fn with_given_signs(graph: &mut Graph, roots: &[Id], reached: &[bool], own: &[Op
         new[i] = rebuilt;
     }
     roots.iter().map(|root| new[root.at()]).collect()
+}
+
+/// The even or odd integer, by the sign, of which `a` is at most ½ below the beginning or beyond the end: 2⌊(a - p + ½)/2⌋ + p.
+fn floor(graph: &mut Graph, a: Id, sign: Id) -> Id {
+    let (half, one) = (graph.constant(0.5), graph.constant(1.0));
+    let step = graph.unary(Unary::Heaviside, sign);
+    let odd = graph.subtract(one, step);
+    let from = graph.subtract(a, odd);
+    let from = graph.add(from, half);
+    let pairs = graph.multiply(half, from);
+    let pairs = graph.unary(Unary::Floor, pairs);
+    let two = graph.constant(2.0);
+    let even = graph.multiply(two, pairs);
+    graph.add(even, odd)
 }
 
 #[cfg(test)]
@@ -142,6 +165,8 @@ mod tests {
             ("if(x > y, x, 0) + if(y > x, y, 0)", 1),
             ("abs(x) + sign(y)", 2),
             ("min(x, p*y)*heaviside(x)", 2),
+            ("floor(x) + x*floor(p)", 1),
+            ("mod(x, 2)", 1),
         ] {
             assert_eq!(model(kinked).switch_count(), count, "{kinked}");
         }
@@ -175,6 +200,8 @@ mod tests {
             "min(x, y)",
             "abs(x) + 2*sign(y)*x",
             "heaviside(x - y)*y",
+            "floor(3*x)*y",
+            "mod(x, 0.5) + ceil(y)",
             "if(x > y, x^2, y) + if(y > x, 3, 4)",
         ];
         for text in cases {

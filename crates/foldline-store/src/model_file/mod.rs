@@ -3,23 +3,33 @@
 //! **Idea.** The file is TOML; its expressions are compiled by [`foldline::model`]. A mistake inside an expression is
 //! carried back to its line and column in the file. The format is described in docs/book/model-files.md.
 
+mod functions;
+mod items;
+mod mass;
+mod repeat;
+mod states;
+
 use crate::diagnostic::Diagnostic;
 use crate::toml_walk::{Value, Walk, read_text, unreadable};
-use foldline::model::{Definition, Field, Forcing, Item, Model, ModelError, ModelSource, Output, Parameter, State};
-use std::collections::HashMap;
+use foldline::model::{Definition, Field, Forcing, Item, Model, ModelError, ModelSource};
+use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 use std::path::Path;
 use toml::de::{DeTable, DeValue};
 
-const ROOT_KEYS: [&str; 10] = [
+const ROOT_KEYS: [&str; 14] = [
     "name",
     "description",
     "source",
+    "constants",
+    "functions",
+    "tables",
     "parameters",
     "forcing",
     "definitions",
     "states",
     "equations",
+    "mass",
     "outputs",
     "whirl",
 ];
@@ -34,8 +44,11 @@ pub fn read_model(path: &Path) -> Result<(Model, String), Vec<Diagnostic>> {
 /// Reads a model text; `file` is its name in messages. Every mistake found is returned.
 pub fn parse_model(text: &str, file: &str) -> Result<Model, Vec<Diagnostic>> {
     let (walk, root) = Walk::parse(text, file)?;
-    let mut reader = Reader { walk, text, places: HashMap::new(), forcing_misspelt: false };
+    let mut reader = Reader::new(walk, text);
     let source = reader.source(&root, file);
+    if reader.incomplete {
+        return Err(reader.walk.found);
+    }
     match Model::compile(source) {
         Ok(model) if reader.walk.found.is_empty() => Ok(model),
         Ok(_) => Err(reader.walk.found),
@@ -53,7 +66,7 @@ pub fn parse_model(text: &str, file: &str) -> Result<Model, Vec<Diagnostic>> {
 /// Reads a model text without compiling it; `file` is its name in messages. Mistakes in expressions are not found.
 pub fn parse_source(text: &str, file: &str) -> Result<ModelSource, Vec<Diagnostic>> {
     let (walk, root) = Walk::parse(text, file)?;
-    let mut reader = Reader { walk, text, places: HashMap::new(), forcing_misspelt: false };
+    let mut reader = Reader::new(walk, text);
     let source = reader.source(&root, file);
     if reader.walk.found.is_empty() { Ok(source) } else { Err(reader.walk.found) }
 }
@@ -64,10 +77,21 @@ struct Reader<'t> {
     text: &'t str,
     places: HashMap<(Item, Field), Range<usize>>,
     forcing_misspelt: bool,
+    /// A count or a state could not be read, which would be missed all over.
+    incomplete: bool,
+    /// States whose accelerations stand under `[equations]`.
+    accelerated: HashSet<String>,
 }
 
 /// The entries of a table in the order of the file.
 type Entries<'v, 't> = Vec<(String, Range<usize>, &'v Value<'t>)>;
+
+impl<'t> Reader<'t> {
+    fn new(walk: Walk<'t>, text: &'t str) -> Reader<'t> {
+        let (places, accelerated) = (HashMap::new(), HashSet::new());
+        Reader { walk, text, places, forcing_misspelt: false, incomplete: false, accelerated }
+    }
+}
 
 impl Reader<'_> {
     fn source(&mut self, root: &DeTable, file: &str) -> ModelSource {
@@ -79,27 +103,38 @@ impl Reader<'_> {
             source: self.prose(root, "source"),
             ..ModelSource::default()
         };
-        for (i, (name, place, value)) in self.entries(root, "parameters").into_iter().enumerate() {
-            self.places.insert((Item::Parameter(i), Field::Name), place);
-            source.parameters.push(self.parameter(i, name, value));
+        for (name, place, value) in self.entries(root, "constants") {
+            self.constant(name, place, value, &mut source);
+        }
+        for (head, place, value) in self.entries(root, "functions") {
+            self.function(&head, place, value, &mut source);
+        }
+        for (name, place, value) in self.entries(root, "tables") {
+            self.table(name, place, value, &mut source);
+        }
+        for (name, place, value) in self.entries(root, "parameters") {
+            self.parameter(name, place, value, &mut source);
         }
         source.forcing = root.get("forcing").and_then(|value| self.forcing(value));
-        for (i, (name, place, value)) in self.entries(root, "definitions").into_iter().enumerate() {
-            let expression = self.expression(Item::Definition(i), place, value, &format!("the definition `{name}`"));
-            source.definitions.push(Definition { name, expression });
+        for (name, place, value) in self.entries(root, "definitions") {
+            self.definition(name, place, value, &mut source);
         }
-        for (i, (name, place, value)) in self.entries(root, "states").into_iter().enumerate() {
-            self.places.insert((Item::State(i), Field::Name), place);
-            let state = self.state(i, name, value, &mut source.equations);
-            source.states.push(state);
+        let equations = self.entries(root, "equations");
+        self.accelerated = equations.iter().filter_map(|(name, ..)| Some(name.strip_suffix("''")?.into())).collect();
+        for (name, place, value) in self.entries(root, "states") {
+            self.state(name, place, value, &mut source);
         }
-        for (name, place, value) in self.entries(root, "equations") {
+        for (name, place, value) in equations {
             let item = Item::Equation(source.equations.len());
             let expression = self.expression(item, place, value, &format!("the equation of `{name}`"));
-            source.equations.push(Definition { name, expression });
+            // The equation of a velocity is that of the acceleration.
+            let name = name.strip_suffix("''").map_or_else(|| name.clone(), |base| format!("{base}'"));
+            source.equations.push(Definition::new(&name, &expression));
         }
+        self.mass(root, &mut source);
         for (i, (name, place, value)) in self.entries(root, "outputs").into_iter().enumerate() {
-            source.outputs.push(self.output(i, name, place, value));
+            let output = self.output(i, name, place, value, &source.constants);
+            source.outputs.push(output);
         }
         source.whirl = root.get("whirl").and_then(|value| self.whirl(value));
         source
@@ -151,102 +186,6 @@ impl Reader<'_> {
         let what = if is_frequency { "the frequency of the forcing" } else { "the period of the forcing" };
         let expression = self.expression(Item::Forcing, own.span(), own, what);
         Some(Forcing { is_frequency, expression })
-    }
-
-    fn parameter(&mut self, i: usize, name: String, value: &Value) -> Parameter {
-        let what = format!("the parameter `{name}`");
-        let mut parameter = Parameter::new(&name, 0.0);
-        let before = self.walk.found.len();
-        let number = match value.get_ref() {
-            DeValue::Table(table) => {
-                self.walk.only(table, &["value", "unit", "description", "scale"], &what);
-                (parameter.unit, parameter.description) = self.labels(table);
-                if let Some(value) = table.get("scale") {
-                    self.places.insert((Item::Parameter(i), Field::Scale), value.span());
-                    parameter.scale = self.walk.number(value, &format!("the scale of `{name}`"));
-                }
-                table.get("value")
-            }
-            _ => Some(value),
-        };
-        match number {
-            Some(number) => {
-                self.places.insert((Item::Parameter(i), Field::Value), number.span());
-                parameter.value = self.walk.number(number, &what).unwrap_or(0.0);
-            }
-            // A misspelt key has been reported, and is probably the missing one.
-            None if self.walk.found.len() > before => {}
-            None => {
-                let place = self.place(Item::Parameter(i), Field::Name);
-                self.walk.report(place, format!("{what} has no value"), format!("write `{name} = {{ value = 1.0 }}`"));
-            }
-        }
-        parameter
-    }
-
-    fn state(&mut self, i: usize, name: String, value: &Value, equations: &mut Vec<Definition>) -> State {
-        let what = format!("the equation of `{name}`");
-        let mut state = State::new(&name);
-        let item = Item::Equation(equations.len());
-        let place = self.place(Item::State(i), Field::Name);
-        let DeValue::Table(table) = value.get_ref() else {
-            let expression = self.expression(item, place, value, &what);
-            equations.push(Definition { name, expression });
-            return state;
-        };
-        let before = self.walk.found.len();
-        self.walk.only(table, &["equation", "unit", "description", "scale", "range"], &format!("the state `{name}`"));
-        let misspelt = self.walk.found.len() > before;
-        (state.unit, state.description) = self.labels(table);
-        if let Some(equation) = table.get("equation") {
-            let expression = self.expression(item, place, equation, &what);
-            equations.push(Definition { name: name.clone(), expression });
-        } else if misspelt {
-            equations.push(Definition { name: name.clone(), expression: "0".into() });
-        }
-        if let Some(value) = table.get("scale") {
-            self.places.insert((Item::State(i), Field::Scale), value.span());
-            state.scale = self.walk.number(value, &format!("the scale of `{name}`"));
-        }
-        if let Some(value) = table.get("range") {
-            self.places.insert((Item::State(i), Field::Range), value.span());
-            state.range = self.pair(value, &format!("the range of `{name}`"));
-        }
-        state
-    }
-
-    /// `[low, high]`.
-    fn pair(&mut self, value: &Value, what: &str) -> Option<[f64; 2]> {
-        match value.get_ref().as_array().map(|list| (list.first(), list.get(1), list.len())) {
-            Some((Some(low), Some(high), 2)) => Some([self.walk.number(low, what)?, self.walk.number(high, what)?]),
-            _ => {
-                self.walk.report(value.span(), format!("{what} is not a pair of numbers"), "write `[-1.0, 1.0]`");
-                None
-            }
-        }
-    }
-
-    fn output(&mut self, i: usize, name: String, place: Range<usize>, value: &Value) -> Output {
-        let what = format!("the output `{name}`");
-        let item = Item::Output(i);
-        let mut output = Output::new(&name, "0");
-        let DeValue::Table(table) = value.get_ref() else {
-            output.expression = self.expression(item, place, value, &what);
-            return output;
-        };
-        let before = self.walk.found.len();
-        self.walk.only(table, &["expression", "unit", "description"], &what);
-        let misspelt = self.walk.found.len() > before;
-        (output.unit, output.description) = self.labels(table);
-        match table.get("expression") {
-            Some(value) => output.expression = self.expression(item, place, value, &what),
-            None if misspelt => {}
-            None => {
-                let hint = format!("write `{name} = \"…\"` or give the table a key `expression`");
-                self.walk.report(place, format!("{what} has no expression"), hint);
-            }
-        }
-        output
     }
 
     /// The text of an expression; one that is no text is reported, and replaced so as not to be reported again.

@@ -1,0 +1,174 @@
+//! Constants, parameters, definitions and outputs.
+
+use super::Reader;
+use crate::toml_walk::Value;
+use foldline::model::{Constant, Definition, Field, Item, ModelSource, Output, Parameter, constant_value};
+use std::ops::Range;
+use toml::de::DeValue;
+
+impl Reader<'_> {
+    /// A number, or an expression of the constants before it.
+    pub(super) fn constant(&mut self, name: String, place: Range<usize>, value: &Value, source: &mut ModelSource) {
+        let what = format!("the constant `{name}`");
+        self.places.insert((Item::Constant(source.constants.len()), Field::Name), place);
+        let number = match value.get_ref() {
+            DeValue::String(text) => match constant_value(text, &source.constants) {
+                Ok(number) => Some(number),
+                Err(error) => {
+                    self.misread(value, &error);
+                    None
+                }
+            },
+            _ => self.walk.number(value, &what),
+        };
+        // A constant may be a count.
+        self.incomplete |= number.is_none();
+        source.constants.push(Constant { name, value: number.unwrap_or(1.0) });
+    }
+
+    /// A number, a list of numbers, or an expression of other parameters, which is a definition.
+    pub(super) fn parameter(&mut self, name: String, place: Range<usize>, value: &Value, source: &mut ModelSource) {
+        let what = format!("the parameter `{name}`");
+        let inner = value.get_ref().as_table().and_then(|table| table.get("value")).unwrap_or(value);
+        if inner.get_ref().as_str().is_some_and(|text| text.trim().parse::<f64>().is_err()) {
+            if let DeValue::Table(table) = value.get_ref() {
+                self.walk.only(table, &["value", "unit", "description"], &what);
+            }
+            let expression = self.expression(Item::Definition(source.definitions.len()), place, inner, &what);
+            source.definitions.push(Definition::new(&name, &expression));
+            return;
+        }
+        let item = Item::Parameter(source.parameters.len());
+        self.places.insert((item, Field::Name), place.clone());
+        let mut parameter = Parameter::new(&name, 0.0);
+        let before = self.walk.found.len();
+        let number = match value.get_ref() {
+            DeValue::Table(table) => {
+                const KEYS: [&str; 10] = [
+                    "value",
+                    "values",
+                    "unit",
+                    "description",
+                    "scale",
+                    "count",
+                    "index",
+                    "before",
+                    "after",
+                    "periodic",
+                ];
+                self.walk.only(table, &KEYS, &what);
+                (parameter.unit, parameter.description) = self.labels(table);
+                if let Some(value) = table.get("scale") {
+                    self.places.insert((item, Field::Scale), value.span());
+                    parameter.scale = self.walk.number(value, &format!("the scale of `{name}`"));
+                }
+                if let Some(values) = table.get("values") {
+                    self.values(item, &mut parameter, values);
+                }
+                let listed = Some(parameter.values.len()).filter(|count| *count > 0);
+                parameter.repeat = self.repeat(item, table, &what, &source.constants, listed);
+                table.get("value").or(table.get("values"))
+            }
+            DeValue::Array(_) => {
+                self.values(item, &mut parameter, value);
+                let listed = Some(parameter.values.len());
+                parameter.repeat = listed.map(foldline::model::Repeat::new);
+                Some(value)
+            }
+            _ => Some(value),
+        };
+        match number {
+            Some(_) if !parameter.values.is_empty() => parameter.value = parameter.values[0],
+            Some(number) if number.get_ref().as_array().is_none() => {
+                self.places.insert((item, Field::Value), number.span());
+                parameter.value = self.walk.number(number, &what).unwrap_or(0.0);
+            }
+            Some(_) => {}
+            // A misspelt key has been reported, and is probably the missing one.
+            None if self.walk.found.len() > before => {}
+            None => {
+                self.walk.report(place, format!("{what} has no value"), format!("write `{name} = {{ value = 1.0 }}`"));
+            }
+        }
+        source.parameters.push(parameter);
+    }
+
+    /// A value for each element.
+    fn values(&mut self, item: Item, parameter: &mut Parameter, value: &Value) {
+        let what = format!("the values of `{}`", parameter.name);
+        self.places.insert((item, Field::Value), value.span());
+        parameter.values = self.numbers(value, &what);
+        if parameter.values.is_empty() {
+            self.incomplete = true;
+        }
+    }
+
+    /// A list of numbers, empty where something is wrong.
+    pub(super) fn numbers(&mut self, value: &Value, what: &str) -> Vec<f64> {
+        let before = self.walk.found.len();
+        let Some(list) = value.get_ref().as_array().filter(|list| !list.is_empty()) else {
+            self.walk.report(value.span(), format!("{what} are not a list of numbers"), "write `[1.0, 2.0, 3.0]`");
+            return Vec::new();
+        };
+        let numbers: Vec<f64> = list.iter().map_while(|own| self.walk.number(own, what)).collect();
+        if self.walk.found.len() > before { Vec::new() } else { numbers }
+    }
+
+    /// An expression, or a table with it.
+    pub(super) fn definition(&mut self, name: String, place: Range<usize>, value: &Value, source: &mut ModelSource) {
+        let what = format!("the definition `{name}`");
+        let item = Item::Definition(source.definitions.len());
+        let mut definition = Definition::new(&name, "0");
+        match value.get_ref() {
+            DeValue::Table(table) => {
+                const KEYS: [&str; 7] = ["expression", "description", "count", "index", "before", "after", "periodic"];
+                let before = self.walk.found.len();
+                self.walk.only(table, &KEYS, &what);
+                let misspelt = self.walk.found.len() > before;
+                self.places.insert((item, Field::Name), place.clone());
+                definition.repeat = self.repeat(item, table, &what, &source.constants, None);
+                match table.get("expression") {
+                    Some(value) => definition.expression = self.expression(item, place, value, &what),
+                    None if misspelt => {}
+                    None => self.no_expression(place, &name, &what),
+                }
+            }
+            _ => definition.expression = self.expression(item, place, value, &what),
+        }
+        source.definitions.push(definition);
+    }
+
+    pub(super) fn output(
+        &mut self,
+        i: usize,
+        name: String,
+        place: Range<usize>,
+        value: &Value,
+        constants: &[Constant],
+    ) -> Output {
+        let what = format!("the output `{name}`");
+        let item = Item::Output(i);
+        let mut output = Output::new(&name, "0");
+        let DeValue::Table(table) = value.get_ref() else {
+            output.expression = self.expression(item, place, value, &what);
+            return output;
+        };
+        let before = self.walk.found.len();
+        self.walk.only(table, &["expression", "unit", "description", "count", "index"], &what);
+        let misspelt = self.walk.found.len() > before;
+        (output.unit, output.description) = self.labels(table);
+        self.places.insert((item, Field::Name), place.clone());
+        output.repeat = self.repeat(item, table, &what, constants, None);
+        match table.get("expression") {
+            Some(value) => output.expression = self.expression(item, place, value, &what),
+            None if misspelt => {}
+            None => self.no_expression(place, &name, &what),
+        }
+        output
+    }
+
+    fn no_expression(&mut self, place: Range<usize>, name: &str, what: &str) {
+        let hint = format!("write `{name} = \"…\"` or give the table a key `expression`");
+        self.walk.report(place, format!("{what} has no expression"), hint);
+    }
+}

@@ -1,0 +1,95 @@
+//! States with their equations, of first and second order.
+
+use super::Reader;
+use crate::toml_walk::Value;
+use foldline::model::{Definition, Ends, Field, Item, ModelSource, State};
+use std::ops::Range;
+use toml::de::DeTable;
+
+const KEYS: [&str; 10] =
+    ["equation", "unit", "description", "scale", "range", "count", "index", "before", "after", "periodic"];
+
+impl Reader<'_> {
+    /// A state and its equation; `x''` stands for two: x, and its velocity `x'`.
+    pub(super) fn state(&mut self, name: String, place: Range<usize>, value: &Value, source: &mut ModelSource) {
+        let base = name.strip_suffix("''").unwrap_or(&name);
+        if base.ends_with('\'') {
+            let own = base.trim_end_matches('\'');
+            self.incomplete = true;
+            let hint = format!("give the acceleration: `\"{own}''\" = \"…\"` declares `{own}` and `{own}'`");
+            return self.walk.report(place, format!("`{name}` is not the name of a state"), hint);
+        }
+        let second = base.len() < name.len() || self.accelerated.contains(base);
+        let item = Item::State(source.states.len());
+        self.places.insert((item, Field::Name), place.clone());
+        let mut state = State::new(base);
+        let (mut velocity, mut misspelt) = (State::new(&format!("{base}'")), false);
+        let table = value.get_ref().as_table();
+        if let Some(table) = table {
+            let before = self.walk.found.len();
+            let known = [&KEYS[..], if second { &["velocity"] } else { &[] }].concat();
+            self.walk.only(table, &known, &format!("the state `{name}`"));
+            misspelt = self.walk.found.len() > before;
+            self.sizes(item, &mut state, table);
+            state.repeat = self.repeat(item, table, &format!("the state `{base}`"), &source.constants, None);
+        }
+        let text = table.map_or(Some(value), |table| table.get("equation"));
+        let own = if second { velocity.name.clone() } else { base.to_string() };
+        if second {
+            let rate = state.repeat.as_ref().map_or_else(|| own.clone(), |repeat| format!("{own}[{}]", repeat.index));
+            let item = Item::Equation(source.equations.len());
+            self.places.insert((item, Field::Name), place.clone());
+            source.equations.push(Definition::new(base, &rate));
+        }
+        let equation = Item::Equation(source.equations.len());
+        if let Some(text) = text {
+            let expression = self.expression(equation, place.clone(), text, &format!("the equation of `{name}`"));
+            source.equations.push(Definition::new(&own, &expression));
+        } else if misspelt {
+            source.equations.push(Definition::new(&own, "0"));
+        }
+        if second {
+            velocity.unit = "1".into();
+            velocity.repeat = state.repeat.clone();
+            let item = Item::State(source.states.len() + 1);
+            self.places.insert((item, Field::Name), place);
+            let table = table.and_then(|table| table.get("velocity")).and_then(|v| self.walk.table(v, "`velocity`"));
+            if let Some(table) = table {
+                let known = ["unit", "description", "scale", "range", "before", "after"];
+                self.walk.only(table, &known, &format!("the velocity of `{base}`"));
+                self.sizes(item, &mut velocity, table);
+            }
+            let given = table.filter(|table| table.get("before").is_some() || table.get("after").is_some());
+            let ends = given.map(|table| self.ends(item, table, &format!("the velocity of `{base}`")));
+            if let Some(repeat) = &mut velocity.repeat {
+                repeat.ends = ends.unwrap_or_else(|| Ends::RateOf(base.to_string()));
+            }
+        }
+        source.states.push(state);
+        source.states.extend(second.then_some(velocity));
+    }
+
+    /// Unit, description, scale and range.
+    fn sizes(&mut self, item: Item, state: &mut State, table: &DeTable) {
+        (state.unit, state.description) = self.labels(table);
+        if let Some(value) = table.get("scale") {
+            self.places.insert((item, Field::Scale), value.span());
+            state.scale = self.walk.number(value, &format!("the scale of `{}`", state.name));
+        }
+        if let Some(value) = table.get("range") {
+            self.places.insert((item, Field::Range), value.span());
+            state.range = self.pair(value, &format!("the range of `{}`", state.name));
+        }
+    }
+
+    /// `[low, high]`.
+    fn pair(&mut self, value: &Value, what: &str) -> Option<[f64; 2]> {
+        match value.get_ref().as_array().map(|list| (list.first(), list.get(1), list.len())) {
+            Some((Some(low), Some(high), 2)) => Some([self.walk.number(low, what)?, self.walk.number(high, what)?]),
+            _ => {
+                self.walk.report(value.span(), format!("{what} is not a pair of numbers"), "write `[-1.0, 1.0]`");
+                None
+            }
+        }
+    }
+}
