@@ -5,6 +5,7 @@
 
 use super::orbit::Orbit;
 use super::returns::{Prediction, Returns};
+use super::settling::INTEGRATION;
 use super::{Candidate, Polish, Sampling};
 use crate::contract::{Batch, Parameters, VectorField, Verdict};
 use crate::simulation::{Integrator, Passage, Step, Tolerance};
@@ -53,8 +54,15 @@ impl Context<'_> {
 
     /// The trajectory from a state over that time: times and states `[time][n]` of its samples. `each` sees every step and
     /// the state at its end.
-    fn sampled(&self, state: &[f64], time: f64, each: &mut dyn FnMut(&Step, &[f64])) -> (Vec<f64>, Vec<f64>) {
-        let integrator = Integrator::new(self.field, self.parameters, self.tolerance()).with_step_limit(FOLLOWED);
+    fn sampled(
+        &self,
+        state: &[f64],
+        time: f64,
+        (accuracy, limit): (f64, usize),
+        each: &mut dyn FnMut(&Step, &[f64]),
+    ) -> (Vec<f64>, Vec<f64>) {
+        let tolerance = Context { accuracy, ..*self }.tolerance();
+        let integrator = Integrator::new(self.field, self.parameters, tolerance).with_step_limit(limit);
         let (mut times, mut states) = (vec![0.0], state.to_vec());
         let mut x = vec![0.0; state.len()];
         integrator.trajectory(state, [0.0, time], &[], &mut |passage| {
@@ -71,9 +79,10 @@ impl Context<'_> {
         (times, states)
     }
 
-    /// The trajectory from a state on a cycle over its period.
+    /// The trajectory from a state on a cycle over its period, as accurate as the one that settled there. (A state that is small along a slow
+    /// manifold and large in between decides how fast a relaxation oscillation gets on.)
     pub(super) fn turn(&self, state: &[f64], period: f64) -> Candidate {
-        let (times, states) = self.sampled(state, period, &mut |_, _| {});
+        let (times, states) = self.sampled(state, period, (INTEGRATION[1], self.sampling.limits.steps), &mut |_, _| {});
         Candidate::Cycle { period, times, states }
     }
 
@@ -94,7 +103,8 @@ impl Context<'_> {
                 }
             }
         };
-        let (mut times, mut states) = self.sampled(&prediction.state, 1.3 * prediction.period, &mut look);
+        let (mut times, mut states) =
+            self.sampled(&prediction.state, 1.3 * prediction.period, (self.accuracy, FOLLOWED), &mut look);
         let (distance, period, end) = back?;
         let kept = times.partition_point(|t| *t < period);
         times.truncate(kept);

@@ -232,12 +232,14 @@ impl<'a> Check<'a> {
             Item::State(_) => name.strip_suffix('\'').unwrap_or(name),
             _ => name,
         };
+        // A sum is told by its bracket from a quantity of that name.
+        let called = matches!(item, Item::Function(_) | Item::Table(_));
         let well_formed = word.starts_with(|c: char| c.is_alphabetic() || c == '_')
             && word.chars().all(|c| c.is_alphanumeric() || c == '_');
         if !well_formed {
             let hint = "a name begins with a letter and goes on with letters, digits and underscores";
             self.report(item, Field::Name, format!("`{name}` is not a name"), hint);
-        } else if function(name).is_some() || name == SUM {
+        } else if function(name).is_some() || called && name == SUM {
             self.report(item, Field::Name, format!("`{name}` is the name of a function"), "choose another name");
         }
     }
