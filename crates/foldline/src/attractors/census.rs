@@ -7,7 +7,7 @@ use super::candidate::Context;
 use super::orbit::Orbit;
 use super::runner::PATIENT;
 use super::settling::{First, Settled, Trial, settle_together};
-use super::watch::Watch;
+use super::watch::{ARRIVED, Watch};
 use super::{Attractor, Candidate, Census, Enough, Exit, Limits, Polish, Sampling};
 use crate::contract::{VectorField, Verdict};
 use crate::diagram::{Motion, Point, Response, Share};
@@ -194,7 +194,7 @@ pub(super) fn settle(
     let mut watched = watch_block(&context, start, &[], &|_| false);
     match watched.fates.first() {
         Some(Fate::Settled(index)) if *index < watched.orbits.len() => Ok(watched.orbits.swap_remove(*index).point),
-        Some(Fate::Unsettled) => patiently(&context, start),
+        Some(Fate::Unsettled) => patiently(&context, start, watched.orbits),
         Some(Fate::Escaped) => Err(Lost::Escaped),
         Some(Fate::Undefined) => Err(watched.exits.pop().map_or(Lost::Escaped, Lost::Undefined)),
         Some(Fate::Stuck) => Err(Lost::Stuck),
@@ -202,13 +202,23 @@ pub(super) fn settle(
     }
 }
 
-/// The same by simulation alone, up to the last Newton steps.
-fn patiently(context: &Context, start: &[f64]) -> Result<Point, Lost> {
+/// The same by simulation alone, up to the last Newton steps. `known` are solutions met on the way, of which none was seen to attract this
+/// trajectory.
+fn patiently(context: &Context, start: &[f64], known: Vec<Orbit>) -> Result<Point, Lost> {
     let Sampling { scales, whirl, limits, .. } = context.sampling;
     let limits = Limits { steps: limits.steps.max(PATIENT.steps), ..*limits };
     let trial = Trial { field: context.field, scales, whirl: *whirl, jobs: 1 };
     let settled = settle_together(&trial, context.parameters, start, First::Accurate, limits).pop();
     let settled = settled.ok_or(Lost::nothing(start))?;
+    let here = |orbit: &Orbit| {
+        let period = orbit.point.solution.period().unwrap_or(0.0);
+        (period - settled.period).abs() <= ARRIVED * settled.period && orbit.distance(&settled.state) <= ARRIVED
+    };
+    if settled.motion == Motion::Cycle
+        && let Some(orbit) = known.into_iter().find(here)
+    {
+        return Ok(orbit.point);
+    }
     let candidate = match settled.motion {
         Motion::Equilibrium => Candidate::Equilibrium(settled.state.clone()),
         Motion::Cycle => context.turn(&settled.state, settled.period),

@@ -7,7 +7,7 @@
 //! the orbit of a cycle being the polygon through its samples.
 
 use super::spectral_ratio;
-use crate::diagram::{Point, Solution};
+use crate::diagram::{Cycle, Point, Solution};
 
 /// Samples of a cycle, doubled until the polygon through them misses it by SAG at most: N samples miss the k-th harmonic by
 /// (πk / N)² / 2 of its amplitude.
@@ -37,6 +37,28 @@ pub(super) struct Orbit {
     coarse: Vec<f64>,
 }
 
+/// s of (1) for the samples `[sample][n]` of a cycle.
+fn half_ranges(states: &[f64], scales: &[f64]) -> Vec<f64> {
+    let half = |(i, scale): (usize, &f64)| {
+        let component = states.iter().skip(i).step_by(scales.len());
+        let [low, high] = component.fold([f64::MAX, f64::MIN], |[low, high], x| [x.min(low), x.max(high)]);
+        (0.5 * (high - low)).max(FLOOR * scale)
+    };
+    scales.iter().enumerate().map(half).collect()
+}
+
+/// Samples `[sample][n]` at equal distances along the mesh of a cycle, which has resolved its jumps: as many per interval as the polynomials have
+/// nodes, and a multiple of the first of [`SAMPLES`].
+fn along_mesh(cycle: &Cycle) -> Vec<f64> {
+    let intervals = cycle.mesh.len() - 1;
+    let count = (cycle.degree * intervals).next_multiple_of(SAMPLES[0]);
+    let time = |k: usize| {
+        let (j, rest) = (k * intervals / count, k * intervals % count);
+        cycle.mesh[j] + (cycle.mesh[j + 1] - cycle.mesh[j]) * rest as f64 / count as f64
+    };
+    (0..count).flat_map(|k| cycle.state(time(k))).collect()
+}
+
 impl Orbit {
     pub(super) fn new(point: Point, scales: &[f64], whirl: Option<[usize; 2]>) -> Orbit {
         let ratio = match &point.solution {
@@ -47,27 +69,27 @@ impl Orbit {
             Solution::Equilibrium(x) => (x.clone(), scales.to_vec()),
             Solution::Cycle(cycle) => {
                 let mut states = cycle.uniform(SAMPLES[0]);
-                let scale: Vec<f64> = scales
-                    .iter()
-                    .enumerate()
-                    .map(|(i, scale)| {
-                        let component = states.iter().skip(i).step_by(scales.len());
-                        let [low, high] =
-                            component.fold([f64::MAX, f64::MIN], |[low, high], x| [x.min(low), x.max(high)]);
-                        (0.5 * (high - low)).max(FLOOR * scale)
-                    })
-                    .collect();
+                let scale = half_ranges(&states, scales);
                 for doubled in std::iter::successors(Some(2 * SAMPLES[0]), |count| Some(2 * count)) {
                     let finer = cycle.uniform(doubled);
-                    let sag = sag(&finer, &scale);
-                    if sag <= SAG || doubled > SAMPLES[1] {
+                    if sag(&finer, &scale) <= SAG {
                         break;
+                    }
+                    if doubled > SAMPLES[1] {
+                        // Jumps too fast for equal times.
+                        let states = along_mesh(cycle);
+                        let scale = half_ranges(&states, scales);
+                        return Orbit::through(point, ratio, scale, states);
                     }
                     states = finer;
                 }
                 (states, scale)
             }
         };
+        Orbit::through(point, ratio, scale, states)
+    }
+
+    fn through(point: Point, ratio: Option<(u32, u32)>, scale: Vec<f64>, states: Vec<f64>) -> Orbit {
         let n = scale.len();
         let every: Vec<&[f64]> = states.chunks_exact(n.max(1)).step_by(STRIDE).collect();
         let group = |group: &[&[f64]]| -> Vec<f64> {

@@ -26,7 +26,7 @@ const CLOSE: f64 = 0.05;
 /// … once the distance has fallen to this fraction of what it was when the approach began.
 const APPROACHED: f64 = 0.5;
 /// Distance at which a trajectory that stays that close is on the solution: the sag of the polygon that stands for it.
-const ARRIVED: f64 = 3e-3;
+pub(super) const ARRIVED: f64 = 3e-3;
 /// A predicted limit settles a trajectory no farther away than this …
 const NEIGHBOURHOOD: f64 = 0.1;
 /// … if it is this much closer to the solution than the trajectory is.
