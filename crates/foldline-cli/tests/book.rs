@@ -200,6 +200,7 @@ fn the_pages_on_bifurcations_quote_what_the_program_prints() {
         }
     }
     pages.push(root().join("docs/book/from-auto.md"));
+    pages.push(root().join("docs/book/when-it-does-not-work.md"));
     let (renew, next) = (std::env::var_os("FOLDLINE_WRITE_BOOK").is_some(), AtomicUsize::new(0));
     let work = || {
         let mut wrong = Vec::new();

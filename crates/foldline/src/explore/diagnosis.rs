@@ -56,6 +56,7 @@ pub(super) fn of_no_start(system: &System, parameters: &[f64], seen: Seen) -> St
     {
         return why;
     }
+    let angles = if seen.unsettled { angles(system, parameters) } else { Vec::new() };
     match system.field.switch_count() {
         0 if stuck => "\nlikely cause: f jumps, or is too stiff for the method that simulates\nwhat to do: give a state \
                        next to an equilibrium, or milder parameters, and follow from there"
@@ -67,6 +68,11 @@ pub(super) fn of_no_start(system: &System, parameters: &[f64], seen: Seen) -> St
         _ if seen.all_escaped => "\nlikely cause: at these parameters nothing attracts from the range of the states\nwhat to do: \
                                   other parameters, another range of the states, or a given state next to the solution"
             .into(),
+        _ if !angles.is_empty() => format!(
+            "\nlikely cause: f has the period 2*pi in {}: motions that go round do not return to where they were, and are not followed\n\
+             what to do: replace the angle by its cosine and sine, so that going round is a cycle (docs/book/when-it-does-not-work.md)",
+            angles.join(", ")
+        ),
         _ if seen.unsettled => format!(
             "\nlikely cause: a quasi-periodic or chaotic motion, or one that is reached more slowly than trajectories are followed, here for {}\n\
              what to do: raise the limit in the study, try other parameters or another range of the states, or give a state",
@@ -74,6 +80,38 @@ pub(super) fn of_no_start(system: &System, parameters: &[f64], seen: Seen) -> St
         ),
         _ => "\nwhat to do: more samples, other parameters, another range of the states, or a given state".into(),
     }
+}
+
+/// Names of the states in which f has the period 2π and on which it depends, seen at a few places of the sampling box.
+fn angles(system: &System, parameters: &[f64]) -> Vec<String> {
+    /// Places, and the share of the largest component of f that counts as no difference.
+    const PLACES: usize = 8;
+    const SAME: f64 = 1e-9;
+    let n = system.field.dim();
+    let f = |x: &[f64], time: f64| -> Vec<f64> {
+        let mut f = vec![0.0; n];
+        let at = Batch { lanes: 1, states: x, parameters: Parameters::Shared(parameters), times: &[time] };
+        let at = if system.field.forced() { at } else { Batch { times: &[], ..at } };
+        system.field.evaluate(at, &mut f);
+        f
+    };
+    let starts = super::seeds::sampling(system, PLACES, 1, 1, 1e-6).starts();
+    let same = |a: &[f64], b: &[f64]| {
+        let size = max_abs(a).max(max_abs(b));
+        size.is_finite() && a.iter().zip(b).all(|(a, b)| (a - b).abs() <= SAME * size)
+    };
+    let is_angle = |i: usize| {
+        let (mut depends, mut repeats) = (false, true);
+        for (k, x) in starts.chunks_exact(n).enumerate() {
+            let time = k as f64 / PLACES as f64;
+            let moved = |by: f64| (0..n).map(|j| x[j] + if j == i { by } else { 0.0 }).collect::<Vec<f64>>();
+            let here = f(x, time);
+            depends |= !same(&here, &f(&moved(1.0), time));
+            repeats &= same(&here, &f(&moved(std::f64::consts::TAU), time));
+        }
+        depends && repeats
+    };
+    (0..n).filter(|&i| is_angle(i)).map(|i| system.state_names[i].clone()).collect()
 }
 
 /// How long trajectories are followed, with the names of the settings.
