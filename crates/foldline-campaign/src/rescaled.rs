@@ -127,7 +127,7 @@ fn compared(case: &Case, base: Option<&Diagram>, number: u64, limit: Duration) -
     report
 }
 
-/// What else differs at special points that are at the same places: the period, the counts of unstable eigenvalues or multipliers, and the
+/// Differences between special points at equal places: the period, the counts of unstable eigenvalues or multipliers, and the
 /// largest eigenvalue.
 fn others(base: &Branch, back: &Branch) -> Vec<String> {
     /// Factor by which an eigenvalue may be more sensitive than the parameter.

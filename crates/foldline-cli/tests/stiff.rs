@@ -88,7 +88,7 @@ fn a_fast_state_beside_a_forced_oscillator_changes_nothing() {
     }
 }
 
-/// What does not settle within the limit says which setting to raise, and does settle with more.
+/// A search that runs into a limit names the setting to raise, and succeeds once it is raised.
 #[test]
 fn limits_are_told_and_can_be_raised() {
     // A focus that turns a hundred times while it shrinks by e.

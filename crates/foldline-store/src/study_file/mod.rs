@@ -148,7 +148,7 @@ fn parse(
     Ok(Study { file: file.to_string(), text: text.to_string(), model_file, model_text, model, plan })
 }
 
-/// How long trajectories are followed in search of first solutions.
+/// Limits on trajectories in the search for first solutions.
 fn limits(walk: &mut Walk, root: &DeTable) -> Limits {
     let usual = Limits::default();
     let steps = root.get("max-steps").and_then(|v| walk.integer(v, "`max-steps`", 1..=10_000_000_000));

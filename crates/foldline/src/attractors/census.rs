@@ -202,7 +202,7 @@ pub(super) fn settle(
     }
 }
 
-/// The same by simulation alone, up to the last Newton steps. `known` are solutions met on the way, of which none was seen to attract this
+/// The attractor by simulation alone, up to the last Newton steps. `known` are solutions met on the way, of which none was seen to attract this
 /// trajectory.
 fn patiently(context: &Context, start: &[f64], known: Vec<Orbit>) -> Result<Point, Lost> {
     let Sampling { scales, whirl, limits, .. } = context.sampling;

@@ -49,7 +49,7 @@ pub use spectrum::{Sense, signed_spectrum, spectral_ratio, whirl_sense};
 use crate::contract::VectorField;
 use crate::diagram::{Point, Share};
 
-/// How long a trajectory is followed before it counts as unsettled.
+/// Limits beyond which a trajectory counts as unsettled.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
     /// Integration steps, accepted and rejected.

@@ -27,7 +27,7 @@ pub struct Sampling {
     pub jobs: usize,
     /// Accuracy, relative, to which `polish` computes: solutions that agree to it are the same.
     pub tolerance: f64,
-    /// How long every trajectory is followed, in the time of the model.
+    /// Limits on every trajectory, in the time of the model.
     pub limits: Limits,
 }
 

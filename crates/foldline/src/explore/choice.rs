@@ -132,9 +132,11 @@ pub(super) fn missing(system: &System, seed: &SeedPlan, census: &Census, key: &A
         AttractorKey::Lasting(periods) => format!("no stable cycle of {periods} periods of the forcing"),
     };
     let all_escaped = census.attractors.is_empty() && census.unsettled == 0 && census.escaped > 0;
-    // If any sample settled, the fate of the others is not the cause.
+    // If any sample settled to what is sought, the fate of the others is not the cause.
     let none = census.attractors.is_empty();
-    let (stuck, unsettled) = (census.stuck > 0, none && census.unsettled > 0);
+    let rest_only =
+        *key != AttractorKey::Equilibrium && census.attractors.iter().all(|a| a.point.solution.period().is_none());
+    let (stuck, unsettled) = (census.stuck > 0, (none || rest_only) && census.unsettled > 0);
     let exit = census.exits.first().filter(|_| none);
     let why = of_no_start(system, &seed.parameters, Seen { state: None, stuck, all_escaped, exit, unsettled });
     let unnamed = census.attractors.iter().any(|a| a.point.solution.period().is_some() && a.ratio.is_none());

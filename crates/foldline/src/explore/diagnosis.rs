@@ -114,7 +114,7 @@ fn angles(system: &System, parameters: &[f64]) -> Vec<String> {
     (0..n).filter(|&i| is_angle(i)).map(|i| system.state_names[i].clone()).collect()
 }
 
-/// How long trajectories are followed, with the names of the settings.
+/// The limits on trajectories as text, with the names of the settings.
 fn limits(system: &System) -> String {
     let Limits { steps, time } = system.limits;
     let steps = format!("{steps} integration steps (`max-steps`)");

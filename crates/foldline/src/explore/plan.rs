@@ -220,7 +220,7 @@ pub struct Plan {
     pub tolerance: f64,
     /// Degree of the collocation polynomials.
     pub degree: usize,
-    /// How long trajectories are followed in search of first solutions.
+    /// Limits on trajectories in the search for first solutions.
     pub limits: Limits,
     /// First solutions.
     pub seeds: Vec<SeedPlan>,

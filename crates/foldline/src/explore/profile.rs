@@ -7,7 +7,7 @@ use crate::problem::mesh::LARGEST;
 /// Samples per integration step of a trajectory that becomes a profile.
 pub(super) const PARTS: usize = 4;
 
-/// What all intervals of a first mesh have the same share of.
+/// Quantity that a first mesh distributes equally over its intervals.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Spread {
     /// The arclength. Layers get as many intervals as their extent is worth, and the end of a transient along a slow manifold few.

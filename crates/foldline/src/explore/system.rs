@@ -24,7 +24,7 @@ pub struct System<'a> {
     pub parameter_scales: Vec<f64>,
     /// `[n]` box from which initial states are sampled.
     pub ranges: Vec<[f64; 2]>,
-    /// How long trajectories are followed in search of first solutions.
+    /// Limits on trajectories in the search for first solutions.
     pub limits: Limits,
     /// The two states that form the complex whirl signal, if the model has one.
     pub whirl: Option<[usize; 2]>,

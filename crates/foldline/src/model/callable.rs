@@ -7,7 +7,7 @@ use std::collections::HashMap;
 /// The name of a sum over an index.
 pub(super) const SUM: &str = "sum";
 
-/// What a call refers to, by position in the source.
+/// Target of a call, by position in the source.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Callee {
     Function(usize),
@@ -57,7 +57,7 @@ impl Callables {
         FUNCTIONS.iter().map(|f| f.name).chain([SUM]).chain(own).collect()
     }
 
-    /// How the function of that name is written.
+    /// Signature of the function of that name.
     pub fn signature(&self, name: &str) -> Option<&str> {
         match (function(name), self.own.get(name)) {
             (Some(function), _) => Some(function.signature),

@@ -23,7 +23,7 @@ impl Spread {
     }
 }
 
-/// What the elements of a family are.
+/// Kind of the elements of a family.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Kind {
     State,
@@ -39,9 +39,9 @@ pub(super) struct Family<'a> {
     pub item: Item,
     pub spread: Spread,
     pub repeat: &'a Repeat,
-    /// First piece of the values before the first element, and how many there are.
+    /// First piece of the values before the first element, and their number.
     pub before: (usize, usize),
-    /// The same after the last element.
+    /// First piece of the values after the last element, and their number.
     pub after: (usize, usize),
 }
 

@@ -1,4 +1,4 @@
-//! What must be made before what: definitions, values beyond ends, functions.
+//! Order of evaluation of definitions, values beyond ends and functions.
 
 use super::check::Check;
 use super::error::{Complaint, Field, Item};
@@ -13,7 +13,7 @@ const LONGEST_CIRCLE: usize = 12;
 /// Deepest nesting of functions that call functions.
 const DEEPEST_CALL: usize = 50;
 
-/// What each thing uses, with the places.
+/// Uses of each item, with their places.
 type Uses = Vec<Vec<(usize, Range<usize>)>>;
 
 /// An order in which each uses only earlier ones, or the circle that prevents it: its members, and the last use.

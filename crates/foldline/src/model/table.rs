@@ -54,7 +54,7 @@ struct Piece {
 }
 
 impl Table {
-    /// What is wrong with the points, and what would be right.
+    /// Message and hint on a mistake in the points; `None` if they are right.
     pub(super) fn mistake(&self) -> Option<[String; 2]> {
         let Table { x, y, .. } = self;
         let turned = x.windows(2).position(|pair| pair[0] >= pair[1]);

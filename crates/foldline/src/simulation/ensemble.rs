@@ -67,7 +67,7 @@ pub struct Ensemble<'a> {
 #[derive(Clone, Debug)]
 struct Run {
     trajectory: usize,
-    /// How often in succession a switch changed sign without getting on.
+    /// Successive sign changes of a switch without progress.
     stuck: usize,
     done: Option<Outcome>,
     stiff: Evidence,

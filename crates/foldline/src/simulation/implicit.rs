@@ -26,7 +26,7 @@ pub(super) struct Implicit<'a> {
     pub(super) time: f64,
     /// Length of the step to try.
     pub(super) h: f64,
-    /// How often in succession a switch changed sign without getting on.
+    /// Successive sign changes of a switch without progress.
     pub(super) stuck: usize,
 }
 

@@ -43,7 +43,7 @@ pub(super) fn first(step: &Step, again: &mut Shortened, samples: impl Fn(usize) 
     found
 }
 
-/// What [`first`] asks for, from the sign of a switch in this step and its values at the start and at [`PLACES`].
+/// Samples for [`first`], from the sign of a switch in this step and its values at the start and at [`PLACES`].
 pub(super) fn samples(sign: f64, value: impl Fn(usize) -> f64) -> [f64; PLACES.len() + 1] {
     let values: [f64; PLACES.len() + 1] = std::array::from_fn(|k| sign * value(k));
     // Rounding may leave a switch that has just changed sign on the wrong side of zero.

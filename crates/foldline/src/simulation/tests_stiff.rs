@@ -68,3 +68,26 @@ fn robertson_reaction_comes_to_rest_in_a_flow() {
         assert!((total - 1.0).abs() < 1e-6, "{start:?}: {:?}", arrival.state);
     }
 }
+
+#[test]
+fn implicit_steps_end_where_a_switch_changes_sign() {
+    // z follows |x| by 1e-6, x = cos t. On [0, 40] cos t has 13 zeros.
+    let kinked = model(&[("x", "y"), ("y", "-x"), ("z", "rate*(abs(x) - z)")], &[("rate", 1e6)]);
+    let (parameters, mut zeros) = (kinked.defaults(), Vec::new());
+    let integrator = Integrator::new(&kinked, &parameters, Tolerance::uniform(ACCURACY, 3)).with_step_limit(4000);
+    let arrival = integrator.trajectory(&[1.0, 0.0, 1.0], [0.0, 40.0], &[], &mut |passage| {
+        if let Passage::Step(step) = passage
+            && step.end(0).abs() < 1e-8
+        {
+            zeros.push(step.end_time());
+        }
+        Verdict::Continue
+    });
+    assert_eq!(arrival.outcome, Outcome::Reached, "{} steps to {}", arrival.steps, arrival.time);
+    assert_eq!(zeros.len(), 13, "{zeros:?}");
+    for (k, time) in zeros.iter().enumerate() {
+        let exact = (k as f64 + 0.5) * std::f64::consts::PI;
+        assert!((time - exact).abs() < 1e-4, "{time} instead of {exact}");
+    }
+    assert!((arrival.state[2] - 40f64.cos().abs()).abs() < 1e-4, "{:?}", arrival.state);
+}

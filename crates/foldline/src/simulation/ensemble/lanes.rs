@@ -20,7 +20,10 @@ pub(super) struct Lanes {
     /// `[n × lanes]`.
     pub(super) x: Aligned,
     pub(super) next: Aligned,
+    /// State at the stage that is evaluated; after a sweep, that of the last but one.
     pub(super) stage: Aligned,
+    /// States at which switches are looked at; empty where there are none.
+    pub(super) sampled: Aligned,
     pub(super) slopes: [Aligned; STAGES],
     /// `[k × lanes]` where every trajectory has parameters of its own, else empty.
     own: Aligned,
@@ -70,6 +73,7 @@ impl Lanes {
             x: of(n),
             next: of(n),
             stage: of(n),
+            sampled: of(if switches > 0 { n } else { 0 }),
             slopes: std::array::from_fn(|_| of(n)),
             own: of(own),
             signs: of(switches),
@@ -234,7 +238,7 @@ impl Lanes {
         self.count = kept.len();
         self.ahead.iter_mut().for_each(|values| values.truncate(self.signs.len()));
         self.slopes.iter_mut().for_each(|k| k.truncate(self.n * self.count));
-        [&mut self.next, &mut self.stage].into_iter().for_each(|v| v.truncate(self.n * self.count));
+        [&mut self.next, &mut self.stage, &mut self.sampled].into_iter().for_each(|v| v.truncate(self.n * self.count));
         let scalars = [&mut self.end, &mut self.planned, &mut self.error, &mut self.accepted, &mut self.largest];
         scalars.into_iter().chain([&mut self.taken, &mut self.remarkable]).for_each(|v| v.truncate(self.count));
     }

@@ -38,11 +38,11 @@ impl Ensemble<'_> {
         for (place, theta) in PLACES.into_iter().enumerate() {
             for l in 0..lanes {
                 self.step_of(l).state_into(theta, &mut x);
-                (0..n).for_each(|i| self.lanes.stage[i * lanes + l] = x[i]);
+                (0..n).for_each(|i| self.lanes.sampled[i * lanes + l] = x[i]);
             }
             let mut ahead = std::mem::take(&mut self.lanes.ahead[place]);
             let parameters = self.lanes.parameters(self.parameters);
-            self.field.switches(Batch { lanes, states: &self.lanes.stage, parameters, times: &[] }, &mut ahead);
+            self.field.switches(Batch { lanes, states: &self.lanes.sampled, parameters, times: &[] }, &mut ahead);
             self.lanes.ahead[place] = ahead;
         }
     }
