@@ -56,7 +56,13 @@ impl Reader<'_> {
         let whole = number.filter(|n| n.fract() == 0.0 && (1.0..=MOST).contains(n));
         if let (Some(number), None) = (number, whole) {
             let message = format!("the count of {what} is {number}");
-            self.walk.report(value.span(), message, "a count is a whole number from 1 upwards");
+            let hint = match number > MOST {
+                true => {
+                    "reduce it: a model has at most 1000 states, and 100000 parameters, definitions and outputs each"
+                }
+                false => "a count is a whole number from 1 upwards",
+            };
+            self.walk.report(value.span(), message, hint);
         }
         self.incomplete |= whole.is_none();
         whole.map(|number| number as usize)

@@ -290,7 +290,13 @@ impl<'a> Check<'a> {
             match place.get(equation.name.as_str()).copied() {
                 None => {
                     let message = format!("an equation for `{}`, which is not a declared state", equation.name);
-                    self.report(Item::Equation(i), Field::Name, message, suggest(&equation.name, &states));
+                    let hint = match equation.name.strip_suffix('\'') {
+                        Some(state) => {
+                            format!("an acceleration declares its state: write `\"{state}''\" = \"…\"` under [states]")
+                        }
+                        None => suggest(&equation.name, &states),
+                    };
+                    self.report(Item::Equation(i), Field::Name, message, hint);
                 }
                 Some(state) if equation_of[state].is_some() => {
                     let message = format!("a second equation for the state `{}`", equation.name);
