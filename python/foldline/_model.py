@@ -30,8 +30,8 @@ class Model:
     text : str
         The model as a model file has it.
     states, parameters, outputs : dict
-        Names, and what is known about each: `unit` and `description`, of parameters `value`, of states `scale` and `range` (`None` where
-        the model does not state them).
+        Names, and what is known about each: `unit` and `description`, of parameters `value`, of states `scale`, `range` and, of
+        angles, `period` (`None` where the model does not state them).
     """
 
     def __init__(self, native: _native.Model) -> None:
@@ -39,7 +39,8 @@ class Model:
         self.name: str = native.name
         self.description: str = native.description
         self.states: dict[str, dict[str, Any]] = {
-            name: {"unit": unit, "description": text, "scale": scale, "range": span} for (name, unit, text), (scale, span) in native.states
+            name: {"unit": unit, "description": text, "scale": scale, "range": span, "period": turn}
+            for (name, unit, text), (scale, span, turn) in native.states
         }
         self.parameters: dict[str, dict[str, Any]] = {
             name: {"value": value, "unit": unit, "description": text} for (name, unit, text), value in native.parameters
@@ -322,7 +323,7 @@ def model(
         The right-hand side of d/dt of every state.
     states : str, list or mapping
         Names, in order: ``"u v du dv"``. A mapping gives `range` (where initial states are sampled), `scale` (characteristic size),
-        `unit` and `description` of each: ``{"u": dict(range=(-5, 5)), "v": None}``.
+        `period` (of an angle), `unit` and `description` of each: ``{"u": dict(range=(-5, 5)), "phi": dict(period="2*pi")}``.
     parameters : mapping
         Names with values, or with tables of `value`, `unit` and `description`.
     definitions : mapping

@@ -22,6 +22,7 @@ fn point(position: i64, omega: f64, r: f64, unstable: usize, cycle: bool) -> Poi
             mesh: vec![0.0, 1.0].into(),
             degree: 1,
             profile: vec![0.0; 4],
+            gain: Vec::new(),
         }),
         false => Solution::Equilibrium(vec![r, 0.0]),
     };

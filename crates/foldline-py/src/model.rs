@@ -20,7 +20,7 @@ pub struct Model {
 }
 
 /// Scale and range, where a model states them.
-type Stated = (Option<f64>, Option<(f64, f64)>);
+type Stated = (Option<f64>, Option<(f64, f64)>, Option<f64>);
 
 /// Name, unit, description.
 type Named<'m> = (&'m str, &'m str, &'m str);
@@ -57,10 +57,10 @@ impl Model {
         self.model.parameters.iter().map(|p| ((&*p.name, &*p.unit, &*p.description), p.value)).collect()
     }
 
-    /// Name, unit, description, and scale and range where the model states them, of each.
+    /// Name, unit, description, and scale, range and period where the model states them, of each.
     #[getter]
     fn states(&self) -> Vec<(Named<'_>, Stated)> {
-        let row = |s: &foldline::model::State| (s.scale, s.range.map(|[low, high]| (low, high)));
+        let row = |s: &foldline::model::State| (s.scale, s.range.map(|[low, high]| (low, high)), s.period);
         let named = self.model.states.iter().map(|s| ((&*s.name, &*s.unit, &*s.description), row(s)));
         named.collect()
     }

@@ -61,8 +61,18 @@ type Run<'a> = &'a dyn Fn(&dyn VectorField, &Nondimensional, &[f64], f64, f64) -
 fn starts(samples: usize) -> Vec<f64> {
     let ranges = vec![[-5.0, 5.0], [-5.0, 5.0], [-15.0, 15.0], [-15.0, 15.0]];
     let scales = vec![1.0; 4];
-    Sampling { ranges, scales, whirl: None, samples, seed: 1, jobs: 1, tolerance: 1e-6, limits: Default::default() }
-        .starts()
+    Sampling {
+        ranges,
+        scales,
+        whirl: None,
+        samples,
+        seed: 1,
+        jobs: 1,
+        tolerance: 1e-6,
+        limits: Default::default(),
+        given: None,
+    }
+    .starts()
 }
 
 fn ensemble(

@@ -91,6 +91,7 @@ fn motions(constants: &Nondimensional) -> Vec<Response> {
         jobs: 2,
         tolerance: 1e-6,
         limits: Default::default(),
+        given: None,
     };
     let found = survey_by_simulation(&trial, &sampling, &constants.parameters(), 0, &[5.0], &|_| Verdict::Continue);
     let named = |r: &Response| [(2, 1), (3, 1)].contains(&r.ratio.unwrap_or_default()) && r.multiplicity == 1;

@@ -183,7 +183,14 @@ fn reference(rotor: &OverhungRotor, ratio: Ratio) -> Point {
     let mesh: Vec<f64> = (0..=40).map(|j| f64::from(j) / 40.0).collect();
     Point {
         parameters: parameters.to_vec(),
-        solution: Solution::Cycle(Cycle { period, forcing_periods: 0, mesh: mesh.into(), degree: 4, profile }),
+        solution: Solution::Cycle(Cycle {
+            period,
+            forcing_periods: 0,
+            mesh: mesh.into(),
+            degree: 4,
+            profile,
+            gain: Vec::new(),
+        }),
         ..computed(&CUBIC, ContactLaw::Tanh, ratio, 4.0, 0.01).points[0].point.clone()
     }
 }

@@ -25,6 +25,7 @@ fn sampling(samples: usize) -> Sampling {
         jobs: 2,
         tolerance: 1e-6,
         limits: Default::default(),
+        given: None,
     }
 }
 

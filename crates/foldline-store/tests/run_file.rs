@@ -37,6 +37,7 @@ fn point(position: i64, cycle: bool) -> Point {
             mesh: mesh.into(),
             degree: 4,
             profile: list(2 * 5, 3),
+            gain: Vec::new(),
         })
     } else {
         Solution::Equilibrium(list(1, 5))
@@ -482,12 +483,13 @@ fn numbers_can_be_read_by_name_without_this_program() {
     assert_eq!(row, (3.0 / 7.0, 0.0, 1.0 / 3.0, 1));
 }
 
-/// Makes a file of version 7 of one of version 9.
+/// Makes a file of version 7 of one of version 10.
 const WITHOUT_ERRORS: &str = "
     UPDATE special_points SET scalar_bytes = CAST(substr(scalar_bytes, 1, 80) AS BLOB), numbers_checksum = NULL;
     ALTER TABLE special_points DROP COLUMN coefficient_count;
     ALTER TABLE special_points DROP COLUMN normal_form_remark;
     ALTER TABLE branches DROP COLUMN unit; ALTER TABLE branches DROP COLUMN held_unit;
+    ALTER TABLE points DROP COLUMN gain_bytes; ALTER TABLE special_points DROP COLUMN gain_bytes;
     ALTER TABLE points DROP COLUMN slope_error; ALTER TABLE special_points DROP COLUMN slope_error;
     PRAGMA user_version = 7;";
 
@@ -523,6 +525,7 @@ const VERSION_7: &str = "
     ALTER TABLE special_points DROP COLUMN coefficient_count;
     ALTER TABLE special_points DROP COLUMN normal_form_remark;
     ALTER TABLE branches DROP COLUMN unit; ALTER TABLE branches DROP COLUMN held_unit;
+    ALTER TABLE points DROP COLUMN gain_bytes; ALTER TABLE special_points DROP COLUMN gain_bytes;
     ALTER TABLE points DROP COLUMN slope_error; ALTER TABLE special_points DROP COLUMN slope_error;
     PRAGMA user_version = 7;";
 

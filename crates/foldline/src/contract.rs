@@ -68,6 +68,13 @@ pub trait VectorField: Send + Sync {
         1.0
     }
 
+    /// `[n]` the period of f in each state: finite for an angle, infinite for others. Empty where no state is an angle.
+    ///
+    /// States that differ by whole periods are one, and an orbit closes where it comes back to such a copy of its start.
+    fn periods(&self) -> &[f64] {
+        &[]
+    }
+
     /// How many scalar outputs the model defines besides its states.
     fn output_count(&self) -> usize {
         0

@@ -115,7 +115,7 @@ fn cycle(numbers: &[f64], n: usize, intervals: usize, degree: usize, period: f64
             profile.extend((0..n).map(value));
         }
     }
-    Cycle { period, forcing_periods: 0, mesh: mesh.into(), degree, profile }
+    Cycle { period, forcing_periods: 0, mesh: mesh.into(), degree, profile, gain: Vec::new() }
 }
 
 /// Writes a cycle as the file from which AUTO reads a first profile: time and states, both ends included.

@@ -58,6 +58,7 @@ fn starts() -> Outcome<String> {
         jobs: 1,
         tolerance: 1e-6,
         limits: Default::default(),
+        given: None,
     };
     let line = |x: &[f64]| format!("{:?} {:?} {:?} {:?}\n", x[0], x[1], x[2], x[3]);
     Ok(sampling.starts().chunks_exact(4).map(line).collect())

@@ -116,7 +116,7 @@ impl BackboneProblem {
         if let (Outcome::Reached, Some(last)) = (arrival.outcome, mesh.last_mut()) {
             *last = 1.0;
         }
-        Cycle { period, forcing_periods: 0, mesh: mesh.into(), degree: DEGREE, profile }
+        Cycle { period, forcing_periods: 0, mesh: mesh.into(), degree: DEGREE, profile, gain: Vec::new() }
     }
 }
 

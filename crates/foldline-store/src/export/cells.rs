@@ -127,7 +127,8 @@ pub(super) fn branch_cells(branch: &Branch, model: &Model, points: u64) -> Vec<C
     out
 }
 
-/// A profile as it is exported: normalised times `[k]` and states `[k][n]`. At the end of the period the first state is repeated.
+/// A profile as it is exported: normalised times `[k]` and states `[k][n]`. At the end of the period the first state is repeated, plus what
+/// angles gain.
 pub(super) fn profile(point: &Point) -> Option<(Vec<f64>, Vec<f64>)> {
     let Solution::Cycle(cycle) = &point.solution else { return None };
     let scheme = Scheme::new(cycle.degree);
@@ -136,6 +137,7 @@ pub(super) fn profile(point: &Point) -> Option<(Vec<f64>, Vec<f64>)> {
         times.extend(scheme.nodes.iter().map(|c| ends[0] + c * (ends[1] - ends[0])));
     }
     times.extend(cycle.mesh.last());
-    let first = &cycle.profile[..cycle.dim().min(cycle.profile.len())];
-    Some((times, [&cycle.profile[..], first].concat()))
+    let mut end = cycle.profile[..cycle.dim().min(cycle.profile.len())].to_vec();
+    end.iter_mut().zip(&cycle.gain).for_each(|(x, gain)| *x += gain);
+    Some((times, [&cycle.profile[..], &end].concat()))
 }

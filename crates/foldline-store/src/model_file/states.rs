@@ -2,12 +2,12 @@
 
 use super::Reader;
 use crate::toml_walk::Value;
-use foldline::model::{Definition, Ends, Field, Item, ModelSource, State};
+use foldline::model::{Definition, Ends, Field, Item, ModelSource, State, constant_value};
 use std::ops::Range;
-use toml::de::DeTable;
+use toml::de::{DeTable, DeValue};
 
-const KEYS: [&str; 10] =
-    ["equation", "unit", "description", "scale", "range", "count", "index", "before", "after", "periodic"];
+const KEYS: [&str; 11] =
+    ["equation", "unit", "description", "scale", "range", "period", "count", "index", "before", "after", "periodic"];
 
 impl Reader<'_> {
     /// A state and its equation; `x''` stands for two: x, and its velocity `x'`.
@@ -31,6 +31,7 @@ impl Reader<'_> {
             self.walk.only(table, &known, &format!("the state `{name}`"));
             misspelt = self.walk.found.len() > before;
             self.sizes(item, &mut state, table);
+            state.period = table.get("period").and_then(|value| self.period(item, &state.name, value, source));
             state.repeat = self.repeat(item, table, &format!("the state `{base}`"), &source.constants, None);
         }
         let text = table.map_or(Some(value), |table| table.get("equation"));
@@ -79,6 +80,21 @@ impl Reader<'_> {
         if let Some(value) = table.get("range") {
             self.places.insert((item, Field::Range), value.span());
             state.range = self.pair(value, &format!("the range of `{}`", state.name));
+        }
+    }
+
+    /// The period of an angle: a number, or an expression of constants.
+    fn period(&mut self, item: Item, name: &str, value: &Value, source: &ModelSource) -> Option<f64> {
+        self.places.insert((item, Field::Period), value.span());
+        match value.get_ref() {
+            DeValue::String(text) => match constant_value(text, &source.constants) {
+                Ok(number) => Some(number),
+                Err(error) => {
+                    self.misread(value, &error);
+                    None
+                }
+            },
+            _ => self.walk.number(value, &format!("the period of `{name}`")),
         }
     }
 

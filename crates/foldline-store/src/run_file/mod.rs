@@ -30,7 +30,7 @@ use std::path::{Path, PathBuf};
 
 /// The version of the format written here. A file of a newer version is refused; a change that older readers would
 /// misunderstand raises it.
-pub const FORMAT_VERSION: i64 = 9;
+pub const FORMAT_VERSION: i64 = 10;
 
 /// Marks an SQLite file as a run file ("fold" in ASCII).
 pub const APPLICATION_ID: i64 = 0x666f_6c64;

@@ -51,6 +51,8 @@ const FORCED_NUMBERS: &str = ", forcing_periods";
 const SLOPES: &str = ", slope_error";
 /// Likewise, since format 7.
 const AVERAGES: &str = ", average_bytes";
+/// Likewise, since format 10.
+const GAINS: &str = ", gain_bytes";
 const OF_SPECIAL: &str = "kind, unstable_before, unstable_after";
 /// Columns of special points since format 8.
 const COEFFICIENT_ERRORS: &str = ", coefficient_count, normal_form_remark";
@@ -198,6 +200,7 @@ pub(super) fn load_diagram(connection: &Connection, path: &Path, part: Part) -> 
                 since(6, FORCED_NUMBERS),
                 since(7, AVERAGES),
                 since(9, SLOPES),
+                since(10, GAINS),
             ]
             .concat();
             let numbers = format!("{NUMBERS}{later}");

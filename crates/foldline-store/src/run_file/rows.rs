@@ -26,18 +26,20 @@ pub(super) fn values_of(point: &Point, extra: &[f64]) -> Vec<Value> {
         trust.spectrum,
     ];
     scalars.extend_from_slice(extra);
+    let gain = pack(point.solution.gain());
     let light = [
         pack(&point.parameters),
         pack_complex(&point.spectrum),
         pack_pairs(&point.ranges),
         pack(&scalars),
         pack_pairs(&point.averages),
+        gain.clone(),
     ];
     let heavy = [pack(profile), mesh_bytes(&point.solution), pack(&point.tangent)];
     let forcing_periods = point.solution.forcing_periods();
     let counts = [point.unstable, forcing_periods as usize];
     let checksums = [numbers_checksum(point.position, counts, &light), checksum(&heavy)];
-    let [parameters, spectrum, ranges, scalars, averages] = light;
+    let [parameters, spectrum, ranges, scalars, averages, _] = light;
     let [profile, mesh, tangent] = heavy;
     let mesh = if degree == Value::Null { Value::Null } else { Value::Blob(mesh) };
     values.extend([
@@ -56,6 +58,7 @@ pub(super) fn values_of(point: &Point, extra: &[f64]) -> Vec<Value> {
         Value::Real(trust.slope),
         degree,
         Value::Integer(i64::from(forcing_periods)),
+        if gain.is_empty() { Value::Null } else { Value::Blob(gain) },
         Value::Blob(parameters),
         Value::Blob(profile),
         mesh,
@@ -155,8 +158,8 @@ pub(super) fn point_in(row: &Row) -> Result<(Point, Vec<f64>), String> {
         _ => count(name),
     };
     let position: i64 = row.get("position").map_err(|e| e.to_string())?;
-    // Those before version 7 had none, and their checksum was that of nothing.
-    let average_bytes = || match row.get::<_, Option<Vec<u8>>>("average_bytes") {
+    // Averages since version 7, gains since version 10; without them their checksum is that of nothing.
+    let newer_bytes = |name: &str| match row.get::<_, Option<Vec<u8>>>(name) {
         Err(rusqlite::Error::InvalidColumnName(_)) => Ok(Vec::new()),
         other => other.map(Option::unwrap_or_default).map_err(|e| e.to_string()),
     };
@@ -168,7 +171,8 @@ pub(super) fn point_in(row: &Row) -> Result<(Point, Vec<f64>), String> {
     let of_numbers = stated("numbers_checksum")?;
     if let Some(stated) = of_numbers {
         let light = ["parameter_bytes", "spectrum_bytes", "range_bytes", "scalar_bytes"].map(blob);
-        let light = light.into_iter().chain([average_bytes()]).collect::<Result<Vec<_>, _>>()?;
+        let light =
+            light.into_iter().chain(["average_bytes", "gain_bytes"].map(newer_bytes)).collect::<Result<Vec<_>, _>>()?;
         if numbers_checksum(position, [count("unstable")?, later("forcing_periods")?], &light) != stated {
             return Err(format!("the numbers of the point at position {position} do not have their checksum"));
         }
@@ -199,7 +203,8 @@ pub(super) fn point_in(row: &Row) -> Result<(Point, Vec<f64>), String> {
                 return Err("solution_bytes and mesh_bytes do not belong together".to_string());
             }
             let forcing_periods = u32::try_from(later("forcing_periods")?).map_err(|e| e.to_string())?;
-            Solution::Cycle(Cycle { period: *period, forcing_periods, mesh: mesh.into(), degree, profile })
+            let gain = unpack(&newer_bytes("gain_bytes")?).ok_or("gain_bytes is no list of numbers")?;
+            Solution::Cycle(Cycle { period: *period, forcing_periods, mesh: mesh.into(), degree, profile, gain })
         }
     };
     let point = Point {
@@ -211,7 +216,7 @@ pub(super) fn point_in(row: &Row) -> Result<(Point, Vec<f64>), String> {
         spectrum: unpack_complex(&blob("spectrum_bytes")?).ok_or("spectrum_bytes is no list of pairs")?,
         unstable: count("unstable")?,
         ranges: unpack_pairs(&blob("range_bytes")?).ok_or("range_bytes is no list of pairs")?,
-        averages: unpack_pairs(&average_bytes()?).ok_or("average_bytes is no list of pairs")?,
+        averages: unpack_pairs(&newer_bytes("average_bytes")?).ok_or("average_bytes is no list of pairs")?,
         trust: Trust {
             discretisation: *discretisation,
             residual: *residual,

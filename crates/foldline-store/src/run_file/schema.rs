@@ -62,7 +62,7 @@ const OTHERS: [&str; 11] = [
 ];
 
 /// The columns that a point has in both tables of points, with their types: first those to read, then those to load.
-const POINT_COLUMNS: [(&str, &str); 25] = [
+const POINT_COLUMNS: [(&str, &str); 26] = [
     ("period", "REAL"),
     ("unstable", "INTEGER NOT NULL"),
     ("discretisation", "REAL"),
@@ -78,6 +78,7 @@ const POINT_COLUMNS: [(&str, &str); 25] = [
     ("slope_error", "REAL"),
     ("degree", "INTEGER"),
     ("forcing_periods", "INTEGER NOT NULL DEFAULT 0"),
+    ("gain_bytes", "BLOB"),
     ("parameter_bytes", "BLOB NOT NULL"),
     ("solution_bytes", "BLOB NOT NULL"),
     ("mesh_bytes", "BLOB"),
@@ -120,7 +121,7 @@ pub(super) fn create(columns: &Columns) -> String {
 /// Version 1 had no curves in two parameters, version 2 did not count evaluations, version 3 had neither checksums nor errors of
 /// multipliers, version 4 did not know that a solution can be without bound, version 5 had neither forced models nor
 /// normal forms, version 6 no averages, version 7 no errors of coefficients, version 8 neither units of
-/// parameters nor errors of slopes.
+/// parameters nor errors of slopes, version 9 no angles.
 pub(super) fn upgrade(version: i64) -> &'static str {
     match version {
         1 => "ALTER TABLE branches ADD COLUMN held TEXT; ALTER TABLE branches ADD COLUMN follows INTEGER;",
@@ -156,6 +157,10 @@ pub(super) fn upgrade(version: i64) -> &'static str {
              ALTER TABLE branches ADD COLUMN held_unit REAL NOT NULL DEFAULT 1;
              ALTER TABLE points ADD COLUMN slope_error REAL;
              ALTER TABLE special_points ADD COLUMN slope_error REAL;"
+        }
+        9 => {
+            "ALTER TABLE points ADD COLUMN gain_bytes BLOB;
+             ALTER TABLE special_points ADD COLUMN gain_bytes BLOB;"
         }
         _ => "",
     }

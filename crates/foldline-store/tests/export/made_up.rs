@@ -35,6 +35,7 @@ fn point(position: i64, intervals: usize) -> Point {
             mesh: ends.into(),
             degree: 2,
             profile: list(intervals * 3 * 2, position as usize),
+            gain: Vec::new(),
         }),
     };
     Point {

@@ -4,6 +4,7 @@
 //! sweep lets one trajectory settle at the first value and starts at each next one from the last state before. Neither
 //! knows of branches: a motion is recorded as the trajectory shows it (`settling`, `measure`).
 
+use super::angles::{self, Rolled};
 use super::measure::response;
 use super::runner::PATIENT;
 use super::settling::{First, Settled, Trial, settle_together};
@@ -36,6 +37,9 @@ pub fn survey_by_simulation(
     values: &[f64],
     report: Report,
 ) -> Vec<Response> {
+    if let Some(rolled) = Rolled::new(trial.field) {
+        return angles::survey_by_simulation(&rolled, trial, sampling, (parameters, free, values), report);
+    }
     if trial.field.forced() {
         let sampling = driven::with_clock(sampling, 1.0);
         return driven::simulate(trial, report, |trial, report| {
@@ -134,6 +138,9 @@ pub fn stepped_sweep(
     compare: Compare,
     report: Report,
 ) -> Vec<Response> {
+    if let Some(rolled) = Rolled::new(trial.field) {
+        return angles::stepped_sweep(&rolled, trial, (parameters, free, values), start, compare, report);
+    }
     if trial.field.forced() {
         let (start, n) = ([start, &[1.0, 0.0]].concat(), trial.field.dim());
         let mut compare = |own: &[f64], candidate: Option<&Candidate>| {

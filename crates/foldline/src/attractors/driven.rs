@@ -191,7 +191,10 @@ pub(super) fn with_unit_scales(scales: &[f64]) -> Vec<f64> {
 pub(super) fn with_clock(sampling: &Sampling, unit: f64) -> Sampling {
     let ranges = [&sampling.ranges[..], &[[1.0, 1.0], [0.0, 0.0]]].concat();
     let limits = Limits { time: sampling.limits.time / unit, ..sampling.limits };
-    Sampling { ranges, scales: with_unit_scales(&sampling.scales), limits, ..sampling.clone() }
+    let n = sampling.scales.len();
+    let begin = |starts: &Vec<f64>| starts.chunks_exact(n).flat_map(|x| [x, &[1.0, 0.0]].concat()).collect();
+    let given = sampling.given.as_ref().map(begin);
+    Sampling { ranges, scales: with_unit_scales(&sampling.scales), limits, given, ..sampling.clone() }
 }
 
 /// Calls with the trial that (1) is, and gives the responses without the circle.

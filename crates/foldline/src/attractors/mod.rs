@@ -14,7 +14,7 @@
 //! 7. the same solution found in several blocks is one attractor, named by its spectral ratio (`census`, `spectrum`); where
 //!    only some types are wanted, no more blocks are followed than it takes to find them.
 //!
-//! A forced field is sampled as an autonomous one with two states more (`driven`).
+//! A forced field is sampled as an autonomous one with two states more (`driven`), an angle as a point of a circle (`angles`).
 //!
 //! Beside this stands simulation that solves no equation for the motions it finds (`brute_force`, `settling`, `runner`, `measure`), to be
 //! compared with branches.
@@ -22,6 +22,7 @@
 //! **Fails when** an attractor is neither an equilibrium nor a cycle (its trajectories count as unsettled), or attracts so
 //! slowly that the returns do not contract measurably within the limit on the number of steps.
 
+mod angles;
 mod brute_force;
 mod candidate;
 mod census;
@@ -38,6 +39,8 @@ mod tests;
 mod watch;
 mod window;
 
+use angles::Rolled;
+pub(crate) use angles::gained;
 pub use brute_force::{Compare, Report, stepped_sweep, survey_by_simulation};
 pub use census::Lost;
 use census::Pace;
@@ -160,6 +163,9 @@ fn survey_at(
     polish: Polish,
     until: (Pace, Enough),
 ) -> Census {
+    if let Some(rolled) = Rolled::new(field) {
+        return angles::survey(&rolled, parameters, sampling, polish, until);
+    }
     match field.forced() {
         true => driven::survey(field, parameters, sampling, polish, until),
         false => census::survey(field, parameters, sampling, polish, until),
@@ -175,6 +181,9 @@ pub fn settle(
     start: &[f64],
     polish: Polish,
 ) -> Result<Point, Lost> {
+    if let Some(rolled) = Rolled::new(field) {
+        return angles::settle(&rolled, parameters, sampling, start, polish);
+    }
     match field.forced() {
         true => driven::settle(field, parameters, sampling, start, polish),
         false => census::settle(field, parameters, sampling, start, polish),

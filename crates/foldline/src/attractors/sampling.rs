@@ -29,6 +29,8 @@ pub struct Sampling {
     pub tolerance: f64,
     /// Limits on every trajectory, in the time of the model.
     pub limits: Limits,
+    /// `[samples][n]` the initial states, where they are not drawn from the ranges.
+    pub given: Option<Vec<f64>>,
 }
 
 /// One in this many samples is drawn towards the origin.
@@ -47,6 +49,9 @@ impl Sampling {
 
     /// The initial states `[samples][n]`.
     pub fn starts(&self) -> Vec<f64> {
+        if let Some(given) = &self.given {
+            return given.clone();
+        }
         let n = self.ranges.len();
         let mut random = SplitMix64(self.seed);
         let mut starts = vec![0.0; self.samples * n];
@@ -106,6 +111,7 @@ mod tests {
             jobs: 1,
             tolerance: 1e-6,
             limits: Limits::default(),
+            given: None,
         }
     }
 

@@ -23,6 +23,7 @@ fn sampling(ranges: &[[f64; 2]], samples: usize, jobs: usize) -> Sampling {
         jobs,
         tolerance: 1e-6,
         limits: Limits::default(),
+        given: None,
     }
 }
 
@@ -218,7 +219,7 @@ fn whirling(lines: &[(i32, f64)]) -> Cycle {
             profile.extend([0.0, z.re, z.im]);
         }
     }
-    Cycle { period: 3.0, forcing_periods: 0, mesh: mesh.into(), degree: 6, profile }
+    Cycle { period: 3.0, forcing_periods: 0, mesh: mesh.into(), degree: 6, profile, gain: Vec::new() }
 }
 
 #[test]

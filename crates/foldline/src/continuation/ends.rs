@@ -269,7 +269,7 @@ impl Follow<'_> {
         let value = home.parameters[self.free];
         let between = (self.value(left) - value) * (self.value(right) - value) <= 0.0;
         let same_way = home.parameter_slope() * self.direction * (right.slope() + left.slope()) > 0.0;
-        let near = |r: &Vec<bool>| right.point.difference(home, &self.settings.scales, r) < 0.5;
+        let near = |r: &Vec<bool>| right.point.difference(home, self.settings.measure(), r) < 0.5;
         if !(between && same_way && self.settings.reflections.iter().any(near)) {
             return Ok(None);
         }

@@ -410,7 +410,7 @@ impl Follow<'_> {
     /// True if a reflection of the model maps the solution to itself, at another phase perhaps.
     fn is_symmetric(&self, at: &Point) -> bool {
         let mut images = self.settings.reflections.iter().filter(|r| r.contains(&true));
-        images.any(|r| at.difference(at, &self.settings.scales, r) < SYMMETRIC)
+        images.any(|r| at.difference(at, self.settings.measure(), r) < SYMMETRIC)
     }
 
     /// Brackets the change in the number of unstable eigenvalues or multipliers on a stretch by bisection, as tightly as points can be
@@ -432,7 +432,7 @@ impl Follow<'_> {
     fn is_mirrored(&self, ends: [&Station; 2], at: &Point) -> bool {
         let images = || self.settings.reflections.iter().filter(|r| r.contains(&true));
         let asymmetry = |point: &Point| {
-            images().map(|r| point.difference(point, &self.settings.scales, r)).fold(f64::INFINITY, f64::min)
+            images().map(|r| point.difference(point, self.settings.measure(), r)).fold(f64::INFINITY, f64::min)
         };
         let here = asymmetry(at);
         let least = 2.0 * here.max(self.settings.tolerance);

@@ -32,6 +32,7 @@ mod side;
 mod step;
 pub mod straddle;
 
+use crate::diagram::Measure;
 pub use corrector::{Failure, Station};
 pub(crate) use diagnosis::UNCROSSED;
 pub use ends::Homecoming;
@@ -73,11 +74,18 @@ pub struct Settings {
     pub reflections: Vec<Vec<bool>>,
     /// `[n]` characteristic sizes of the states.
     pub scales: Vec<f64>,
+    /// `[n]` periods of the states that are angles; see [`crate::contract::VectorField::periods`].
+    pub periods: Vec<f64>,
     /// In how many places the right-hand side is not smooth; for the diagnosis of ends.
     pub kinks: usize,
 }
 
 impl Settings {
+    /// How solutions are compared.
+    pub(crate) fn measure(&self) -> Measure<'_> {
+        Measure { scales: &self.scales, periods: &self.periods }
+    }
+
     /// Settings for a tolerance and a parameter range.
     pub fn new(tolerance: f64, range: [f64; 2], scales: &[f64]) -> Settings {
         Settings {
@@ -95,6 +103,7 @@ impl Settings {
             max_newton: 8,
             reflections: vec![vec![false; scales.len()]],
             scales: scales.to_vec(),
+            periods: Vec::new(),
             kinks: 0,
         }
     }

@@ -7,7 +7,7 @@ use crate::problem::gauss::Scheme;
 ///
 /// On interval j the polynomial is given by its values at the left end and at the m Gauss points, so the profile is laid
 /// out `[interval][node 0..=m][component]`; node 0 is the left end. The orbit closes: the right end of the last interval
-/// is the left end of the first.
+/// is the left end of the first, or where angles turn, that plus `gain`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cycle {
     /// T, in the time unit of the model.
@@ -20,6 +20,8 @@ pub struct Cycle {
     pub degree: usize,
     /// `[N · (m + 1) · n]` values.
     pub profile: Vec<f64>,
+    /// `[n]` x(T) - x(0), a whole number of turns of each state that is an angle and 0 for the others; empty where no angle turns.
+    pub gain: Vec<f64>,
 }
 
 impl Cycle {
@@ -48,7 +50,7 @@ impl Cycle {
             }
         }
         let mesh: Vec<f64> = times.iter().copied().step_by(through).collect();
-        Some(Cycle { period, forcing_periods: 0, mesh: mesh.into(), degree: scheme.degree, profile })
+        Some(Cycle { period, forcing_periods: 0, mesh: mesh.into(), degree: scheme.degree, profile, gain: Vec::new() })
     }
 
     /// N.
@@ -61,7 +63,12 @@ impl Cycle {
         self.profile.len() / (self.intervals() * (self.degree + 1)).max(1)
     }
 
-    /// The state `[n]` at normalised time `t` (taken modulo 1).
+    /// True if an angle has turned after a period.
+    pub fn turns(&self) -> bool {
+        !self.gain.is_empty()
+    }
+
+    /// The state `[n]` at normalised time `t`, also outside of [0, 1].
     pub fn state(&self, t: f64) -> Vec<f64> {
         let mut x = vec![0.0; self.dim()];
         self.state_into(Scheme::of(self.degree), t, &mut x);
@@ -91,9 +98,11 @@ impl Cycle {
     }
 
     pub(crate) fn state_into(&self, scheme: &Scheme, t: f64, x: &mut [f64]) {
-        let t = t - t.floor();
+        let periods = t.floor();
+        let t = t - periods;
         let j = self.mesh.partition_point(|&b| b <= t).clamp(1, self.intervals()) - 1;
         self.state_within(scheme, j, t, x);
+        x.iter_mut().zip(&self.gain).for_each(|(x, gain)| *x += periods * gain);
     }
 }
 

@@ -28,7 +28,34 @@ pub enum Solution {
     Cycle(Cycle),
 }
 
+/// How solutions are compared.
+#[derive(Clone, Copy, Debug)]
+pub struct Measure<'a> {
+    /// `[n]` characteristic sizes of the states.
+    pub scales: &'a [f64],
+    /// `[n]` periods of the states that are angles; see [`crate::contract::VectorField::periods`].
+    pub periods: &'a [f64],
+}
+
 impl Solution {
+    /// What each state gains over a period, where angles turn; else nothing.
+    pub fn gain(&self) -> &[f64] {
+        match self {
+            Solution::Cycle(cycle) => &cycle.gain,
+            Solution::Equilibrium(_) => &[],
+        }
+    }
+
+    /// True if angles turn as often as those of another one of which some states are `mirrored`.
+    fn turns_like(&self, other: &Solution, mirrored: &dyn Fn(usize) -> bool) -> bool {
+        let (own, theirs) = (self.gain(), other.gain());
+        let of = |gain: &[f64], i: usize| gain.get(i).copied().unwrap_or(0.0);
+        (0..own.len().max(theirs.len())).all(|i| {
+            let theirs = if mirrored(i) { -of(theirs, i) } else { of(theirs, i) };
+            (of(own, i) - theirs).abs() <= 1e-9 * theirs.abs()
+        })
+    }
+
     /// The period of a cycle.
     pub fn period(&self) -> Option<f64> {
         match self {
@@ -199,14 +226,23 @@ impl Point {
     /// Largest difference of period and ranges between two points, each relative to its scale (`scales` for the states;
     /// outputs and period by their own size). `reflection[i]` says that the other point is seen with state i negated.
     /// Infinite if one is an equilibrium and the other a cycle.
-    pub fn difference(&self, other: &Point, scales: &[f64], reflection: &[bool]) -> f64 {
+    pub fn difference(&self, other: &Point, measure: Measure, reflection: &[bool]) -> f64 {
+        let Measure { scales, periods } = measure;
+        let mirrored = |i: usize| reflection.get(i).copied().unwrap_or(false);
+        if !self.solution.turns_like(&other.solution, &mirrored) {
+            return f64::INFINITY;
+        }
         let mut largest: f64 = match (self.solution.period(), other.solution.period()) {
             (Some(a), Some(b)) => ((a - b) / a.abs().max(b.abs())).abs(),
             (None, None) => 0.0,
             _ => return f64::INFINITY,
         };
         for (i, (a, b)) in self.ranges.iter().zip(&other.ranges).enumerate() {
-            let b = if reflection.get(i).copied().unwrap_or(false) { [-b[1], -b[0]] } else { *b };
+            let mut b = if mirrored(i) { [-b[1], -b[0]] } else { *b };
+            if let Some(period) = periods.get(i).filter(|period| period.is_finite()) {
+                let copies = period * (0.5 * (a[0] + a[1] - b[0] - b[1]) / period).round();
+                b = b.map(|b| b + copies);
+            }
             let size = a[0].abs().max(a[1].abs()).max(b[0].abs()).max(b[1].abs());
             let scale = scales.get(i).copied().unwrap_or(f64::MIN_POSITIVE) + size;
             largest = largest.max((a[0] - b[0]).abs() / scale).max((a[1] - b[1]).abs() / scale);

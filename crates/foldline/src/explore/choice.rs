@@ -42,7 +42,7 @@ impl<'c> Choice<'c> {
         for attractor in fitting {
             let image = |other: &&Attractor| {
                 let close =
-                    |r: &Vec<bool>| attractor.point.difference(&other.point, &system.scales, r) < 30.0 * tolerance;
+                    |r: &Vec<bool>| attractor.point.difference(&other.point, system.measure(), r) < 30.0 * tolerance;
                 system.reflections.iter().any(close)
             };
             if !meant.iter().any(image) {

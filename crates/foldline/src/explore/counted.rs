@@ -58,6 +58,10 @@ impl VectorField for Counted<'_> {
         self.field.time_unit(parameters)
     }
 
+    fn periods(&self) -> &[f64] {
+        self.field.periods()
+    }
+
     fn output_count(&self) -> usize {
         self.field.output_count()
     }

@@ -69,8 +69,9 @@ pub(super) fn of_no_start(system: &System, parameters: &[f64], seen: Seen) -> St
                                   other parameters, another range of the states, or a given state next to the solution"
             .into(),
         _ if !angles.is_empty() => format!(
-            "\nlikely cause: f has the period 2*pi in {}: motions that go round do not return to where they were, and are not followed\n\
-             what to do: replace the angle by its cosine and sine, so that going round is a cycle (docs/book/when-it-does-not-work.md)",
+            "\nlikely cause: f has the period 2*pi in {}: motions that go round do not return to where they were\n\
+             what to do: say that {0} is an angle, with `period = \"2*pi\"` in the model, so that going round is a cycle \
+             (docs/book/when-it-does-not-work.md)",
             angles.join(", ")
         ),
         _ if seen.unsettled => format!(
@@ -111,7 +112,8 @@ fn angles(system: &System, parameters: &[f64]) -> Vec<String> {
         }
         depends && repeats
     };
-    (0..n).filter(|&i| is_angle(i)).map(|i| system.state_names[i].clone()).collect()
+    let declared = |i: usize| system.field.periods().get(i).is_some_and(|period| period.is_finite());
+    (0..n).filter(|&i| !declared(i) && is_angle(i)).map(|i| system.state_names[i].clone()).collect()
 }
 
 /// The limits on trajectories as text, with the names of the settings.

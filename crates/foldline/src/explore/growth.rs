@@ -105,7 +105,14 @@ pub fn setting<'a>(system: &'a System, free: usize, parameters: &[f64]) -> Setti
 /// The settings of a branch.
 pub fn settings(system: &System, tolerance: f64, range: [f64; 2], max_points: usize) -> Settings {
     let usual = Settings::new(tolerance, range, &system.scales);
-    Settings { reflections: system.reflections.clone(), max_points, kinks: system.field.switch_count(), ..usual }
+    let periods = system.field.periods().to_vec();
+    Settings {
+        reflections: system.reflections.clone(),
+        periods,
+        max_points,
+        kinks: system.field.switch_count(),
+        ..usual
+    }
 }
 
 /// A solution made accurate at fixed parameters, as a station whose tangent points towards larger parameter values.

@@ -155,9 +155,9 @@ pub fn branch_of<'b>(
             let fold = |point: &Point| branch.special.iter().any(|s| std::ptr::eq(&s.point, point));
             let first = fold(pair[1]) || !fold(pair[0]) && (a - value).abs() < (b - value).abs();
             let nearest = if first { pair[0] } else { pair[1] };
-            let apart = pair[0].difference(pair[1], &system.scales, &[]);
+            let apart = pair[0].difference(pair[1], system.measure(), &[]);
             let close = |other: &Point, tolerance: f64| {
-                system.reflections.iter().any(|r| point.difference(other, &system.scales, r) < tolerance)
+                system.reflections.iter().any(|r| point.difference(other, system.measure(), r) < tolerance)
             };
             let turns = turns(nearest, point);
             if !close(&lasting(nearest, 1.0 / turns), 1e-3 + 1.5 * apart) {

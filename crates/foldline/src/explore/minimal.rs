@@ -41,7 +41,10 @@ pub(super) fn reduced(system: &System, settings: &Settings, point: &Point) -> Op
 /// One turn of a cycle that consists of a prime number of equal turns.
 fn reduced_once(system: &System, settings: &Settings, point: &Point) -> Option<Point> {
     let Solution::Cycle(cycle) = &point.solution else { return None };
-    let whole = |turns: usize| cycle.forcing_periods == 0 || (cycle.forcing_periods as usize).is_multiple_of(turns);
+    let of_angles = |turns: usize| turned_whole(system.field.periods(), &cycle.gain, turns);
+    let whole = |turns: usize| {
+        of_angles(turns) && (cycle.forcing_periods == 0 || (cycle.forcing_periods as usize).is_multiple_of(turns))
+    };
     let fits = |turns: &usize| whole(*turns) && cycle.intervals() >= FEWEST * turns;
     PRIMES.into_iter().filter(fits).find_map(|turns| one_turn(system, settings, point, cycle, turns))
 }
@@ -67,14 +70,24 @@ fn one_turn(system: &System, settings: &Settings, point: &Point, cycle: &Cycle, 
         mesh: equal.mesh[..=intervals].iter().map(|t| t * turns as f64).collect(),
         degree,
         profile: equal.profile[..equal.profile.len() / turns].to_vec(),
+        gain: equal.gain.iter().map(|gain| gain / turns as f64).collect(),
     };
     let guess = Point { solution: Solution::Cycle(with_exact_end(turn)), ..point.clone() };
     let found = polished(&mut *problem_of(system, 0, degree, &guess, false), settings, &guess).ok()?.point;
     // Newton's method may have converged to another cycle.
     let same_period = (found.solution.period()? * turns as f64 - period).abs() <= 30.0 * settings.tolerance * period;
     let expected = Point { solution: found.solution.clone(), ..point.clone() };
-    let same = same_period && found.difference(&expected, &system.scales, &[]) < 30.0 * settings.tolerance.max(allowed);
+    let same =
+        same_period && found.difference(&expected, system.measure(), &[]) < 30.0 * settings.tolerance.max(allowed);
     same.then_some(Point { position: point.position, ..found })
+}
+
+/// True if a share of the cycle is a whole number of turns of every angle.
+fn turned_whole(periods: &[f64], gain: &[f64], share: usize) -> bool {
+    periods.iter().zip(gain).all(|(period, gain)| {
+        let turns = gain / (period * share as f64);
+        (turns - turns.round()).abs() < 1e-9
+    })
 }
 
 /// The cycle solved by collocation on a mesh that is the same for every turn.
@@ -109,7 +122,10 @@ fn turns_agree(cycle: &Cycle, scales: &[f64], turns: usize, share: f64) -> bool 
     // Mesh boundaries are dense where the motion is fast.
     cycle.mesh[1..].iter().all(|t| {
         let (here, there) = (cycle.state(*t), cycle.state(t + 1.0 / turns as f64));
-        (0..n).all(|i| (here[i] - there[i]).abs() <= share * sizes[i])
+        (0..n).all(|i| {
+            let gained = cycle.gain.get(i).map_or(0.0, |gain| gain / turns as f64);
+            (here[i] + gained - there[i]).abs() <= share * sizes[i]
+        })
     })
 }
 

@@ -17,7 +17,16 @@ pub(super) enum Spread {
 }
 
 /// A trajectory over one period as a profile.
-pub(super) fn first_profile(scales: &[f64], period: f64, times: &[f64], states: &[f64], spread: Spread) -> Cycle {
+///
+/// `gain` `[n]` is what angles gain over the period; empty where none does.
+pub(super) fn first_profile(
+    scales: &[f64],
+    gain: Vec<f64>,
+    period: f64,
+    times: &[f64],
+    states: &[f64],
+    spread: Spread,
+) -> Cycle {
     /// Smallest motion of a state, as a share of its scale, that contributes to the arclength: below the accuracy of sampling, 1e-6,
     /// by a factor of safety of a hundred.
     const LEAST: f64 = 1e-8;
@@ -54,7 +63,8 @@ pub(super) fn first_profile(scales: &[f64], period: f64, times: &[f64], states: 
         .collect();
     // The ends of a trajectory over one period do not quite agree: the gap is spread over the period.
     let count = times.len();
-    let gap: Vec<f64> = (0..n).map(|i| states[(count - 1) * n + i] - states[i]).collect();
+    let gained = |i: usize| gain.get(i).copied().unwrap_or(0.0);
+    let gap: Vec<f64> = (0..n).map(|i| states[(count - 1) * n + i] - states[i] - gained(i)).collect();
     let mut profile = Vec::with_capacity(intervals * 5 * n);
     for pair in mesh.windows(2) {
         for c in &scheme.nodes {
@@ -70,7 +80,7 @@ pub(super) fn first_profile(scales: &[f64], period: f64, times: &[f64], states: 
             }
         }
     }
-    Cycle { period, forcing_periods: 0, mesh: mesh.into(), degree: 4, profile }
+    Cycle { period, forcing_periods: 0, mesh: mesh.into(), degree: 4, profile, gain }
 }
 
 /// Cubic interpolation of component i through the four samples around interval k-1…k.

@@ -246,6 +246,7 @@ pub(super) fn sampling(system: &System, samples: usize, seed: u64, jobs: usize, 
         jobs,
         tolerance,
         limits: system.limits,
+        given: None,
     }
 }
 
@@ -257,7 +258,10 @@ pub(super) fn polish(system: &System, parameters: &[f64], tolerance: f64, candid
         let solution = match candidate {
             Candidate::Equilibrium(x) => Solution::Equilibrium(x.clone()),
             Candidate::Cycle { period, times, states } => {
-                let mut cycle = first_profile(&system.scales, *period, times, states, spread);
+                let n = system.field.dim();
+                let last = states.rchunks_exact(n).next().unwrap_or(&states[..n]);
+                let gain = attractors::gained(system.field.periods(), &states[..n], last);
+                let mut cycle = first_profile(&system.scales, gain, *period, times, states, spread);
                 if system.field.forced() {
                     cycle.forcing_periods = period.round() as u32;
                 }

@@ -171,7 +171,7 @@ fn coarsened(cycle: &Cycle) -> Cycle {
     }
     let mesh: Mesh = cycle.mesh.iter().copied().step_by(2).collect();
     let profile = mesh::transferred(&cycle.profile, cycle.dim(), &Scheme::new(cycle.degree), &cycle.mesh, &mesh);
-    Cycle { mesh, profile, ..*cycle }
+    Cycle { mesh, profile, ..cycle.clone() }
 }
 
 /// The problem of doubled cycles at a period doubling, the cycle run through twice, and the direction of the new branch.
@@ -305,7 +305,7 @@ pub(super) fn across(
             gap < 1e-6 * (1.0 + one.parameter().abs())
                 && images
                     .into_iter()
-                    .any(|r| one.point.difference(&other.point, &system.scales, r) < 30.0 * settings.tolerance)
+                    .any(|r| one.point.difference(&other.point, system.measure(), r) < 30.0 * settings.tolerance)
         });
     if symmetric {
         // The other arm is the mirror image of this one.

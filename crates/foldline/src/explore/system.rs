@@ -5,6 +5,7 @@ use super::sizes;
 use crate::attractors::Limits;
 use crate::contract::{Batch, Parameters, VectorField};
 use crate::diagram::Diagram;
+use crate::diagram::Measure;
 use crate::model::Model;
 use crate::model::Parameter;
 use crate::model::forcing::unrepeated;
@@ -38,6 +39,11 @@ pub struct System<'a> {
 }
 
 impl<'a> System<'a> {
+    /// How its solutions are compared.
+    pub fn measure(&self) -> Measure<'_> {
+        Measure { scales: &self.scales, periods: self.field.periods() }
+    }
+
     /// A system whose scales are all 1 and whose initial states come from [-2, 2]ⁿ.
     pub fn new(field: &'a dyn VectorField) -> System<'a> {
         let n = field.dim();

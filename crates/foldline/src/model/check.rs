@@ -265,6 +265,10 @@ impl<'a> Check<'a> {
                 let hint = "write the characteristic size of this state, a positive number";
                 self.report(Item::State(i), Field::Scale, format!("the scale {scale} is not positive"), hint);
             }
+            if let Some(period) = state.period.filter(|period| !(*period > 0.0 && period.is_finite())) {
+                let hint = "write the period of the angle, a positive number such as \"2*pi\" or 360";
+                self.report(Item::State(i), Field::Period, format!("the period {period} is not positive"), hint);
+            }
             let Some([low, high]) = state.range else { continue };
             if !(low.is_finite() && high.is_finite()) {
                 self.report(Item::State(i), Field::Range, "the range is not finite", "write two numbers");

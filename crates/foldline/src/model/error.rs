@@ -48,6 +48,8 @@ pub enum Field {
     Scale,
     /// The sampling range of a state.
     Range,
+    /// The period of a state that is an angle.
+    Period,
     /// The number of elements.
     Count,
     /// The name of the index.

@@ -8,6 +8,7 @@
 //! order (`order`), expressions read with their index given (`scope`) and turned into nodes (`lower`). Whatever is wrong comes back
 //! as a list of [`ModelError`], each with its place.
 
+mod angles;
 mod callable;
 mod check;
 mod compile;
@@ -97,6 +98,8 @@ struct Inner {
     compiled: Compiled,
     field: Tape,
     period: Option<Tape>,
+    /// `[n]` of the states, or nothing; see [`VectorField::periods`].
+    periods: Vec<f64>,
     outputs: Tape,
     switches: Switches,
     linear: RwLock<HashMap<Vec<usize>, Arc<Tape>>>,
@@ -114,6 +117,8 @@ impl Deref for Model {
 impl Model {
     /// The model that `source` describes, or everything that is wrong with it.
     pub fn compile(source: ModelSource) -> Result<Model, Vec<ModelError>> {
+        let item_of = |(i, state): (usize, &State)| vec![i; family::count(&state.repeat)];
+        let items: Vec<usize> = source.states.iter().enumerate().flat_map(item_of).collect();
         let (compiled, Named { states, parameters, outputs: output_list }) = compile(&source)?;
         let field = Tape::new(&compiled.graph, &[&compiled.field]);
         let outputs = Tape::new(&compiled.graph, &[&compiled.outputs]);
@@ -123,9 +128,13 @@ impl Model {
         let whirl = compiled.whirl;
         let about = About { name, description, source, states, parameters, outputs: output_list, whirl };
         let (linear, directional) = (RwLock::default(), RwLock::default());
-        let inner = Inner { about, compiled, field, period, outputs, switches, linear, directional };
+        let periods = match about.states.iter().any(|state| state.period.is_some()) {
+            true => about.states.iter().map(|state| state.period.unwrap_or(f64::INFINITY)).collect(),
+            false => Vec::new(),
+        };
+        let inner = Inner { about, compiled, field, period, periods, outputs, switches, linear, directional };
         let model = Model { inner: Arc::new(inner) };
-        match model.wrong_period() {
+        match model.wrong_period().or_else(|| angles::no_angle(&model, &items)) {
             Some(error) => Err(vec![error]),
             None => Ok(model),
         }
@@ -234,6 +243,10 @@ impl VectorField for Model {
             period.run(at, &[], &mut [&mut unit]);
         }
         unit[0]
+    }
+
+    fn periods(&self) -> &[f64] {
+        &self.inner.periods
     }
 
     fn evaluate(&self, at: Batch, f: &mut [f64]) {

@@ -35,6 +35,8 @@ pub struct State {
     pub scale: Option<f64>,
     /// Smallest and largest initial value when initial states are sampled; where none is given, twice the scale to both sides of 0.
     pub range: Option<[f64; 2]>,
+    /// For an angle its period: states that differ by whole periods are one.
+    pub period: Option<f64>,
     /// Repetition over an index.
     pub repeat: Option<Repeat>,
 }
@@ -189,18 +191,21 @@ impl State {
             description: String::new(),
             scale: None,
             range: None,
+            period: None,
             repeat: None,
         }
     }
 
-    /// The characteristic size that the model states: the scale, else a quarter of the width of the range.
+    /// The characteristic size that the model states: the scale, else a radian of an angle, else a quarter of the width of the range.
     pub fn stated_scale(&self) -> Option<f64> {
-        self.scale.or(self.range.map(|[low, high]| 0.25 * (high - low)))
+        let radian = self.period.map(|period| period / std::f64::consts::TAU);
+        self.scale.or(radian).or(self.range.map(|[low, high]| 0.25 * (high - low)))
     }
 
-    /// Where initial values are sampled if the characteristic size is `scale`.
+    /// Where initial values are sampled if the characteristic size is `scale`: in the range, else over a whole turn of an angle.
     pub fn range_at(&self, scale: f64) -> [f64; 2] {
-        self.range.unwrap_or([-2.0 * scale, 2.0 * scale])
+        let half = self.period.map_or(2.0 * scale, |period| 0.5 * period);
+        self.range.unwrap_or([-half, half])
     }
 }
 

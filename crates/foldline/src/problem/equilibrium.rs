@@ -202,6 +202,20 @@ impl ZeroProblem for EquilibriumProblem<'_> {
         }
     }
 
+    fn images(&mut self, beside: &[f64], point: &Point, reflection: &[bool], within: f64) -> Vec<[Vec<f64>; 2]> {
+        let [mut u, mut tangent] = [self.unknowns_of(point), point.tangent.clone()];
+        if [u.len(), tangent.len()] != [beside.len(); 2] {
+            return Vec::new();
+        }
+        for i in (0..self.n()).filter(|i| reflection.get(*i).copied().unwrap_or(false)) {
+            (u[i], tangent[i]) = (-u[i], -tangent[i]);
+        }
+        let n = self.n();
+        self.setting.nearest_copy(&mut u[..n], &beside[..n]);
+        let off: Vec<f64> = u.iter().zip(beside).map(|(a, b)| a - b).collect();
+        if self.dot(&off, &off) <= within * within { vec![[u, tangent]] } else { Vec::new() }
+    }
+
     fn unknowns_of(&mut self, point: &Point) -> Vec<f64> {
         let mut u = match &point.solution {
             Solution::Equilibrium(x) => x.clone(),

@@ -229,7 +229,7 @@ pub fn transferred(profile: &[f64], n: usize, scheme: &Scheme, from: &Mesh, to: 
 /// The cycle, or where it has no mesh one like it of that degree on a uniform one, whose profile is not known.
 pub fn at_least_some(cycle: &Cycle, degree: usize) -> Cycle {
     match cycle.intervals() {
-        0 => Cycle { mesh: uniform(20), degree, profile: Vec::new(), ..*cycle },
+        0 => Cycle { mesh: uniform(20), degree, profile: Vec::new(), ..cycle.clone() },
         _ => cycle.clone(),
     }
 }

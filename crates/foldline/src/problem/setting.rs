@@ -46,6 +46,20 @@ pub struct Setting<'a> {
 }
 
 impl Setting<'_> {
+    /// The period of a state that is an angle.
+    pub fn period(&self, state: usize) -> Option<f64> {
+        self.field.periods().get(state).copied().filter(|period| period.is_finite())
+    }
+
+    /// Moves states `[count][n]` together by whole periods of the angles, so that the first is next to `beside` `[n]`.
+    pub fn nearest_copy(&self, states: &mut [f64], beside: &[f64]) {
+        let n = beside.len();
+        for (c, period) in self.field.periods().iter().enumerate().filter(|(_, period)| period.is_finite()) {
+            let copies = period * ((beside[c] - states[c]) / period).round();
+            states[c..].iter_mut().step_by(n).for_each(|x| *x += copies);
+        }
+    }
+
     /// How many parameters are free.
     pub fn freedom(&self) -> usize {
         self.axes.len()

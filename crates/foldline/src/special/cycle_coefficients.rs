@@ -299,7 +299,7 @@ mod tests {
         let places =
             mesh.windows(2).flat_map(|pair| scheme.nodes.iter().map(move |c| pair[0] + c * (pair[1] - pair[0])));
         let profile = places.flat_map(|t| [(TAU * t).cos(), (TAU * t).sin()]).collect();
-        let cycle = Cycle { period: TAU, forcing_periods: 0, mesh, degree, profile };
+        let cycle = Cycle { period: TAU, forcing_periods: 0, mesh, degree, profile, gain: Vec::new() };
         let point = Point {
             position: 0,
             parameters: model.defaults(),

@@ -84,7 +84,7 @@ pub(super) fn valued(kind: Kind, setting: Setting, at: &Point) -> Option<Value> 
 pub(super) fn on_mesh(at: &Point, mesh: &Mesh) -> Option<Point> {
     let Solution::Cycle(cycle) = &at.solution else { return None };
     let profile = mesh::transferred(&cycle.profile, cycle.dim(), &Scheme::new(cycle.degree), &cycle.mesh, mesh);
-    let solution = Solution::Cycle(Cycle { mesh: mesh.clone(), profile, ..*cycle });
+    let solution = Solution::Cycle(Cycle { mesh: mesh.clone(), profile, ..cycle.clone() });
     Some(Point { solution, ..at.clone() })
 }
 
@@ -258,6 +258,7 @@ mod tests {
                 mesh: mesh.clone(),
                 degree,
                 profile,
+                gain: Vec::new(),
             }),
             tangent: Vec::new(),
             step: 0.0,

@@ -44,8 +44,11 @@ impl Monitor for PeriodDoubling {
 pub fn doubled(cycle: &Cycle, direction: &[f64]) -> (Cycle, Vec<f64>) {
     let half: Vec<f64> = cycle.mesh.iter().map(|t| 0.5 * t).collect();
     let mesh: Mesh = half.iter().copied().chain(half[1..].iter().map(|t| 0.5 + t)).collect();
-    let profile = [&cycle.profile[..], &cycle.profile[..]].concat();
+    let mut profile = [&cycle.profile[..], &cycle.profile[..]].concat();
+    let second = profile[cycle.profile.len()..].chunks_exact_mut(cycle.dim());
+    second.for_each(|x| x.iter_mut().zip(&cycle.gain).for_each(|(x, gain)| *x += gain));
+    let gain = cycle.gain.iter().map(|gain| 2.0 * gain).collect();
     let perturbation = direction.iter().copied().chain(direction.iter().map(|v| -v)).collect();
     let (period, forcing_periods) = (2.0 * cycle.period, 2 * cycle.forcing_periods);
-    (Cycle { period, forcing_periods, mesh, degree: cycle.degree, profile }, perturbation)
+    (Cycle { period, forcing_periods, mesh, degree: cycle.degree, profile, gain }, perturbation)
 }

@@ -155,6 +155,10 @@ impl VectorField for Unfolded<'_> {
         self.field.time_unit(&parameters[..self.field.parameter_count()])
     }
 
+    fn periods(&self) -> &[f64] {
+        self.field.periods()
+    }
+
     fn output_count(&self) -> usize {
         self.field.output_count()
     }

@@ -136,7 +136,10 @@ impl Part<'_> {
     /// may be off by what the error of the states, passed on to them, makes of it too.
     fn range_difference(&self, point: &Point, ranges: &[[f64; 2]], stated: f64, passed_on: &[f64]) -> (f64, f64) {
         let n = self.system.scales.len();
-        let each = point.ranges.iter().zip(ranges).enumerate().map(|(c, (a, b))| {
+        // An angle that turns takes all values.
+        let turns = |c: usize| point.solution.gain().get(c).is_some_and(|gain| *gain != 0.0);
+        let pairs = point.ranges.iter().zip(ranges).enumerate().filter(|(c, _)| !turns(*c));
+        let each = pairs.map(|(c, (a, b))| {
             let size = a[0].abs().max(a[1].abs()).max(f64::MIN_POSITIVE);
             let scale = self.system.scales.get(c).copied().unwrap_or(0.0) + size;
             let own = if c < n { 0.0 } else { passed_on[c - n] / scale };

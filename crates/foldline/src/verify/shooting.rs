@@ -53,6 +53,8 @@ pub(super) struct Orbit {
     pub(super) free: Vec<f64>,
     /// `[n]`: scale of the model and largest value of each component.
     pub(super) scales: Vec<f64>,
+    /// `[n]` what angles gain over the cycle; empty where none turns.
+    pub(super) gain: Vec<f64>,
     /// Mesh interval at which each segment begins, `[K]`.
     pub(super) intervals: Vec<usize>,
 }
@@ -77,6 +79,7 @@ impl Orbit {
             forced: cycle.forcing_periods > 0,
             free: setting.unknowns_of(point),
             scales,
+            gain: cycle.gain.clone(),
             intervals,
         })
     }
@@ -288,7 +291,8 @@ impl Shooting<'_> {
                 for c in 0..k {
                     line[inner + 1 + c] = flow.by_free[row * k + c] / scales[r];
                 }
-                right[row * stride] = -(flow.ends[row] - orbit.nodes[next * n + r]) / scales[r];
+                let turned = if next == 0 { orbit.gain.get(r).copied().unwrap_or(0.0) } else { 0.0 };
+                right[row * stride] = -(flow.ends[row] - turned - orbit.nodes[next * n + r]) / scales[r];
             }
         }
         let line = &mut a[inner * size..(inner + 1) * size];

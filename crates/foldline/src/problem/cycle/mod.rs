@@ -8,9 +8,11 @@
 //!
 //! ```text
 //!   (1)  X_{j,i} - x_j - h_j T Σ_k a_ik f(X_{j,k}, λ) = 0               i = 1…m, j = 0…N-1
-//!   (2)  x_{j+1} - Σ_k e_k X_{j,k} = 0,   x_N = x_0                     X_{j,0} = x_j
+//!   (2)  x_{j+1} - Σ_k e_k X_{j,k} = 0,   x_N = x_0 + g                 X_{j,0} = x_j
 //!   (3)  Σ_j h_j Σ_i b_i ⟨X_{j,i} - X̃_{j,i}, X̃'_{j,i}⟩ = 0              phase, with reference X̃
 //! ```
+//!
+//! with g = 0, or whole periods of those states that are angles and turn.
 //!
 //! A forced field has f(X, λ, τ) with its time τ in periods of the forcing. A cycle lasts a given number q of them, and instead of (3)
 //!
@@ -66,6 +68,8 @@ pub struct CycleProblem<'a> {
     halves: bool,
     /// q of (4); 0 where the field is autonomous.
     forcing_periods: u32,
+    /// `[n]` x_N - x_0 where angles turn; see [`Cycle::gain`].
+    gain: Vec<f64>,
     /// `[L][m][W]`: τ_{j,i}, nothing where the field is autonomous.
     times: Vec<f64>,
     /// X̃' / s² at the Gauss points, `[L][m][n][W]`, normalised to unit length, and ⟨X̃, X̃'⟩ in that weight.
@@ -117,6 +121,7 @@ impl<'a> CycleProblem<'a> {
             n,
             halves: false,
             forcing_periods: 0,
+            gain: Vec::new(),
             times: Vec::new(),
             phase: Vec::new(),
             phase_offset: 0.0,
@@ -138,10 +143,11 @@ impl<'a> CycleProblem<'a> {
         problem
     }
 
-    /// Cycles like that one: with polynomials of its degree, on its mesh, over as many periods of the forcing.
+    /// Cycles like that one: with polynomials of its degree, on its mesh, over as many periods of the forcing and turns of angles.
     pub fn like(setting: Setting<'a>, cycle: &Cycle) -> CycleProblem<'a> {
         let mut problem = CycleProblem::new(setting, cycle.degree, &cycle.mesh);
         problem.forcing_periods = cycle.forcing_periods;
+        problem.gain = cycle.gain.clone();
         problem.arrange();
         problem
     }
@@ -230,6 +236,9 @@ impl<'a> CycleProblem<'a> {
 
     fn relative_scale(&self, u: &[f64]) -> Vec<f64> {
         let mut sizes = self.sizes(u);
+        // Angles have one size, whatever their copy.
+        let angles = sizes.iter_mut().zip(self.setting.field.periods()).filter(|(_, period)| period.is_finite());
+        angles.for_each(|(size, period)| *size = 0.5 * period);
         sizes.iter_mut().zip(self.setting.scales).for_each(|(size, scale)| *size += scale);
         sizes
     }
@@ -469,6 +478,11 @@ impl ZeroProblem for CycleProblem<'_> {
         found.ranges = extremes::of_profile(self.setting.field, &parameters, cycle, self.forcing_periods, &self.scheme);
         found.averages =
             averages::of_profile(self.setting.field, &parameters, cycle, self.forcing_periods, &self.scheme);
+        // An angle that turns takes all values, and has no mean.
+        for (c, gain) in self.gain.iter().enumerate().filter(|(_, gain)| **gain != 0.0) {
+            let half = 0.5 * self.setting.field.periods().get(c).copied().unwrap_or(*gain).abs();
+            (found.ranges[c], found.averages[c]) = ([-half, half], [f64::NAN; 2]);
+        }
         found.trust.discretisation = SAFE * errors.iter().fold(0.0, |m: f64, e| m.max(*e)) + ROUNDING;
         found.trust.residual = residual;
         found.trust.slope = self.slope_error();
@@ -498,6 +512,7 @@ impl ZeroProblem for CycleProblem<'_> {
                 mesh: self.mesh.clone(),
                 degree: self.scheme.degree,
                 profile: u[..size].to_vec(),
+                gain: self.gain.clone(),
             }),
             parameters,
             tangent: tangent.to_vec(),

@@ -34,14 +34,19 @@ impl CycleProblem<'_> {
         if cycle.degree != self.scheme.degree || point.tangent.len() + size != whole + beside.len() {
             return Vec::new();
         }
-        let mirrored = |profile: &[f64]| -> Cycle {
-            let mut profile = profile.to_vec();
+        let mirrored = |profile: &[f64], gain: &[f64]| -> Cycle {
+            let (mut profile, mut gain) = (profile.to_vec(), gain.to_vec());
             for c in (0..n).filter(|c| reflection.get(*c).copied().unwrap_or(false)) {
                 profile[c..].iter_mut().step_by(n).for_each(|v| *v = -*v);
+                gain.get_mut(c).into_iter().for_each(|v| *v = -*v);
             }
-            Cycle { profile, ..cycle.clone() }
+            Cycle { profile, gain, ..cycle.clone() }
         };
-        let (states, tangent) = (mirrored(&cycle.profile), mirrored(&point.tangent[..whole]));
+        let states = mirrored(&cycle.profile, &cycle.gain);
+        let tangent = mirrored(&point.tangent[..whole], &[]);
+        if states.gain != self.gain {
+            return Vec::new();
+        }
         let period = if self.is_forced() { f64::from(self.forcing_periods) } else { cycle.period };
         let scalars = [&[period][..], &self.setting.unknowns_of(point)].concat();
         let close = |u: &Vec<f64>| {
@@ -60,7 +65,8 @@ impl CycleProblem<'_> {
             return Vec::new();
         }
         let images = self.shifts(&beside[..size], &states, room.sqrt()).into_iter().map(|shift| {
-            let u = [&self.moved(&states, shift)[..], &scalars].concat();
+            let mut u = [&self.moved(&states, shift)[..], &scalars].concat();
+            self.setting.nearest_copy(&mut u[..size], &beside[..n]);
             [u, [&self.moved(&tangent, shift)[..], &point.tangent[whole..]].concat()]
         });
         images.filter(|[u, _]| close(u)).collect()
@@ -83,7 +89,10 @@ impl CycleProblem<'_> {
         };
         let pairs = moments(x, &self.mesh).into_iter().zip(moments(&y.profile, &y.mesh));
         let off = |(a, b): ([f64; 2], [f64; 2])| (a[0] - b[0]).powi(2) + (a[1] - b[1]).powi(2);
-        pairs.zip(&self.scale).map(|(pair, scale)| off(pair) / (scale * scale)).sum::<f64>() / self.n as f64
+        // Means of angles depend on their copy.
+        let angle = |c: usize| self.setting.period(c).is_some();
+        let off = |(c, (pair, scale)): (usize, (_, &f64))| if angle(c) { 0.0 } else { off(pair) / (scale * scale) };
+        pairs.zip(&self.scale).enumerate().map(off).sum::<f64>() / self.n as f64
     }
 
     /// The profile of `y` on the mesh of this problem, later by θ.
@@ -109,7 +118,13 @@ impl CycleProblem<'_> {
             cycle.uniform(places).iter().zip(self.scale.iter().cycle()).map(|(v, scale)| v / scale).collect()
         };
         let (a, b) = (scaled(&here), scaled(y));
-        let between = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>();
+        let periods: Vec<f64> =
+            (0..n).map(|c| self.setting.period(c).unwrap_or(f64::INFINITY) / self.scale[c]).collect();
+        let plain = periods.iter().all(|period| period.is_infinite());
+        let between = |a: &[f64], b: &[f64]| match plain {
+            true => a.iter().zip(b).map(|(a, b)| (a - b) * (a - b)).sum::<f64>(),
+            false => a.iter().zip(b).zip(periods.iter().cycle()).map(|((a, b), p)| nearest(a - b, *p).powi(2)).sum(),
+        };
         let apart = |k: usize| {
             let (before, after) = a.split_at((places - k) * n);
             between(before, &b[k * n..]) + between(after, &b[..k * n])
@@ -172,13 +187,20 @@ impl CycleProblem<'_> {
                 for c in 0..n {
                     let rate = row.iter().zip(block[c..].iter().step_by(n)).map(|(d, v)| d * v).sum::<f64>() / h;
                     let weight = self.scheme.weights[i - 1] * h / self.scale[c].powi(2);
-                    g += weight * (other[c] - block[i * n + c]) * rate;
+                    let off = other[c] - block[i * n + c];
+                    let off = self.setting.period(c).map_or(off, |period| nearest(off, period));
+                    g += weight * off * rate;
                     slope += weight * rate * rate;
                 }
             }
         }
         (g, slope)
     }
+}
+
+/// A difference of angles between their nearest copies.
+fn nearest(off: f64, period: f64) -> f64 {
+    if period.is_finite() { off - period * (off / period).round() } else { off }
 }
 
 #[cfg(test)]
@@ -206,7 +228,7 @@ mod tests {
             .flat_map(|j| scheme.nodes.iter().map(move |c| (j as f64 + c) / intervals as f64).collect::<Vec<_>>());
         let turned = times.map(|t| std::f64::consts::TAU * (t + phase));
         let profile = turned.flat_map(|a| [a.sin() + 0.5 * (3.0 * a).sin(), a.cos()]).collect();
-        Cycle { period: 2.0, forcing_periods: 0, mesh: mesh::uniform(intervals), degree: 4, profile }
+        Cycle { period: 2.0, forcing_periods: 0, mesh: mesh::uniform(intervals), degree: 4, profile, gain: Vec::new() }
     }
 
     #[test]
@@ -218,7 +240,8 @@ mod tests {
         let times = (0..90)
             .flat_map(|j| Scheme::new(4).nodes.into_iter().map(move |c| std::f64::consts::TAU * (j as f64 + c) / 90.0));
         let profile = times.flat_map(|a| [(3.0 * a).sin() + 1e-3 * a.sin(), (3.0 * a).cos()]).collect();
-        let turns = Cycle { period: 2.0, forcing_periods: 0, mesh: mesh::uniform(90), degree: 4, profile };
+        let turns =
+            Cycle { period: 2.0, forcing_periods: 0, mesh: mesh::uniform(90), degree: 4, profile, gain: Vec::new() };
         let mut problem = CycleProblem::like(setting, &turns);
         let beside: Vec<f64> = turns.profile.iter().copied().chain([2.0, 1.0]).collect();
         problem.anchor(&beside);

@@ -136,6 +136,9 @@ impl<T: Lane> Defects<'_, '_, T> {
                 }
                 let next = if j + 1 == count { 0 } else { (j + 1) * block };
                 own[..n].iter_mut().zip(&u[next..next + n]).for_each(|(to, x)| *to += x);
+                if j + 1 == count {
+                    own.iter_mut().zip(&problem.gain).for_each(|(to, gain)| *to += gain);
+                }
             }
         }
         phase.lanes().iter().sum()

@@ -1,0 +1,62 @@
+//! States that are declared to be angles.
+//!
+//! **Idea.** A solution may be moved by a whole period of an angle only if f repeats itself there. That is seen at a few places: an
+//! analytic function that repeats itself at all of them repeats itself everywhere, but for coincidence.
+
+use super::error::{Field, Item, ModelError};
+use super::{Batch, Model, Parameters};
+use crate::contract::VectorField;
+
+/// Places at which f is compared, and the share of its size that counts as no difference: rounding of a sine at some turns.
+const PLACES: usize = 12;
+const SAME: f64 = 1e-9;
+
+/// A state that is said to be an angle, over whose period f does not repeat itself. `items`: `[n]` which state of the source each is.
+pub(super) fn no_angle(model: &Model, items: &[usize]) -> Option<ModelError> {
+    let n = model.dim();
+    let f = |x: &[f64], parameters: &[f64], time: &[f64]| -> Vec<f64> {
+        let mut f = vec![0.0; n];
+        let times = if model.forced() { time } else { &[] };
+        model.evaluate(Batch { lanes: 1, states: x, parameters: Parameters::Shared(parameters), times }, &mut f);
+        f
+    };
+    let ranges = model.ranges();
+    // Shares of the golden ratio, another one for each component.
+    let share = |place: usize, i: usize| ((place + 1) as f64 * 0.618_033_988_749_895 * (1.0 + i as f64).sqrt()).fract();
+    for (c, period) in model.periods().iter().copied().enumerate().filter(|(_, period)| period.is_finite()) {
+        for place in 0..PLACES {
+            let x: Vec<f64> = ranges.iter().enumerate().map(|(i, [a, b])| a + share(place, i) * (b - a)).collect();
+            // Parameters that are 0 or 1 may hide a term.
+            let parameters: Vec<f64> = (model.parameters.iter().enumerate())
+                .map(|(i, p)| if place % 2 == 0 { p.value } else { p.value * (0.75 + 0.5 * share(place, n + i)) })
+                .collect();
+            let mut moved = x.clone();
+            moved[c] += period;
+            let time = [share(place, 2 * n)];
+            let (here, there) = (f(&x, &parameters, &time), f(&moved, &parameters, &time));
+            let size = here.iter().chain(&there).fold(0.0, |m: f64, v| m.max(v.abs()));
+            let other = |i: &usize| (here[*i] - there[*i]).abs() > SAME * size;
+            if !size.is_finite() {
+                continue;
+            }
+            if let Some(i) = (0..n).find(other) {
+                let (name, of) = (&model.states[c].name, &model.states[i].name);
+                return Some(ModelError {
+                    item: Item::State(items.get(c).copied().unwrap_or(0)),
+                    field: Field::Period,
+                    name: name.clone(),
+                    span: None,
+                    message: format!(
+                        "`{name}` is said to be an angle of period {period}, but the rate of `{of}` is {} at `{name}` = {:.6} and {} a \
+                         period later",
+                        here[i], x[c], there[i]
+                    ),
+                    hint: format!(
+                        "let `{name}` enter the equations only through functions of that period, or leave `period` out"
+                    ),
+                });
+            }
+        }
+    }
+    None
+}
