@@ -210,7 +210,16 @@ class Branch(Sequence[Solution]):
         """What ``branch[name]`` knows."""
         model = self.diagram.model
         extremes = [f"{name}_{side}" for name in [*model.outputs, *model.states] for side in ("min", "max")]
-        return ["position", *model.parameters, "period", *extremes, "unstable", *TRUST, *WORK, "step", "forcing_periods"]
+        turns = [f"{name}_turns" for name, state in model.states.items() if state["period"]]
+        return ["position", *model.parameters, "period", *turns, *extremes, "unstable", *TRUST, *WORK, "step", "forcing_periods"]
+
+    @cached_property
+    def _turns(self) -> dict[str, Integers]:
+        """NAME_turns of every state that is an angle: how often it turns over a cycle, shape (points,)."""
+        gain = floats(self._column("gain")).reshape(self._count, -1)
+        angles = [(k, name, state["period"]) for k, (name, state) in enumerate(self.diagram.model.states.items()) if state["period"]]
+        none = np.zeros(self._count, dtype=np.int64)
+        return {f"{name}_turns": np.rint(gain[:, k] / turn).astype(np.int64) if gain.size else none for k, name, turn in angles}
 
     def _by_name(self, name: str) -> Floats | Integers:
         model = self.diagram.model
@@ -223,6 +232,8 @@ class Branch(Sequence[Solution]):
                 return self.ranges[:, variables.index(own), side]
         if name == "period":
             return self.period
+        if name in self._turns:
+            return self._turns[name]
         if name in ("position", "unstable", "forcing_periods", *WORK):
             return integers(self._column(name))
         if name in (*TRUST, "step"):

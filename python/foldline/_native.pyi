@@ -10,7 +10,7 @@ class Model:
     name: str
     description: str
     parameters: list[tuple[tuple[str, str, str], float]]
-    states: list[tuple[tuple[str, str, str], tuple[float | None, tuple[float, float] | None]]]
+    states: list[tuple[tuple[str, str, str], tuple[float | None, tuple[float, float] | None, float | None]]]
     outputs: list[tuple[str, str, str]]
     whirl: tuple[int, int] | None
     forced: bool
@@ -27,6 +27,7 @@ class Solution:
     family: str
     period: float | None
     forcing_periods: int
+    turns: list[tuple[str, int]]
     unstable: int
     trust: tuple[float, float, float, float, float]
     ratio: tuple[int, int] | None

@@ -52,6 +52,11 @@ class Solution:
         return self._native.period
 
     @property
+    def turns(self) -> dict[str, int]:
+        """How often each state that is an angle turns over the cycle, with its sign."""
+        return dict(self._native.turns)
+
+    @property
     def forcing_periods(self) -> int:
         """How many periods of the forcing a cycle lasts; 0 where there is none."""
         return self._native.forcing_periods

@@ -174,6 +174,13 @@ fn column<'py>(
             let rows: Vec<Vec<f64>> = points.iter().map(padded).collect();
             counted(py, 2 * count * width, rows.into_iter().flatten())
         }
+        "gain" => {
+            let width = points.iter().map(|p| p.solution.gain().len()).max().unwrap_or(0);
+            let row =
+                |p: &&Point| p.solution.gain().iter().copied().chain(std::iter::repeat(0.0)).take(width).collect();
+            let rows: Vec<Vec<f64>> = points.iter().map(row).collect();
+            counted(py, count * width, rows.into_iter().flatten())
+        }
         "period" => number(|p| p.solution.period().unwrap_or(f64::NAN)),
         "step" => number(|p| p.step),
         "unstable" => whole(|p| p.unstable),

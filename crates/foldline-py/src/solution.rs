@@ -63,6 +63,13 @@ impl Solution {
         self.point.unstable
     }
 
+    /// How often each state that is an angle turns over the cycle.
+    #[getter]
+    fn turns(&self) -> Vec<(&str, i64)> {
+        let of = |(k, period): (usize, f64)| (&*self.model.states[k].name, self.point.solution.turns(k, period));
+        self.model.angles().map(of).collect()
+    }
+
     /// `[k]`.
     fn parameters<'py>(&self, py: Python<'py>) -> Array<'py> {
         numbers(py, self.point.parameters.iter().copied())

@@ -14,6 +14,7 @@ pub fn special(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) -> bool)
     let mut columns = vec![column("branch", Style::Word), column("kind", Style::Word)];
     columns.extend(parameter_columns(diagram, model, kept));
     columns.push(column("period", Style::Number));
+    columns.extend(turn_columns(model));
     columns.extend(output_columns(model));
     columns.extend([column("unstable_before", Style::Number), column("unstable_after", Style::Number)]);
     columns.push(column("error", Style::Size));
@@ -43,6 +44,7 @@ pub fn points(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) -> bool) 
     let mut columns = vec![column("branch", Style::Word), column("position", Style::Number)];
     columns.extend(parameter_columns(diagram, model, kept));
     columns.push(column("period", Style::Number));
+    columns.extend(turn_columns(model));
     columns.extend(output_columns(model));
     columns.extend(model.outputs.iter().map(|o| column(&format!("{}_min", o.name), Style::Number)));
     let extremes = |name: &str| [format!("{name}_max"), format!("{name}_min")];
@@ -130,6 +132,11 @@ pub fn notes(notes: &[(String, String)], name: Option<&str>) -> Table {
     Table { columns, rows }
 }
 
+/// NAME_turns of every state that is an angle: how often it turns over a cycle.
+fn turn_columns(model: &Model) -> impl Iterator<Item = Column> {
+    model.angles().map(|(k, _)| column(&format!("{}_turns", model.states[k].name), Style::Number))
+}
+
 fn origin(origin: &Origin) -> String {
     match origin {
         Origin::Seed(name) => format!("seed {name}"),
@@ -156,7 +163,11 @@ fn place_cells(point: &Point, model: &Model) -> Vec<Cell> {
         (0..model.parameters.len()).map(|k| point.parameters.get(k).map_or(Cell::Empty, |v| Cell::Number(*v)));
     let period = point.solution.period().map_or(Cell::Empty, Cell::Number);
     let n = model.states.len();
-    parameters.chain([period]).chain((n..n + model.outputs.len()).map(|k| extreme(point, k, 1))).collect()
+    let turns = model.angles().map(|(k, turn)| match point.solution.period() {
+        Some(_) => Cell::Count(point.solution.turns(k, turn)),
+        None => Cell::Empty,
+    });
+    parameters.chain([period]).chain(turns).chain((n..n + model.outputs.len()).map(|k| extreme(point, k, 1))).collect()
 }
 
 fn extreme(point: &Point, variable: usize, end: usize) -> Cell {

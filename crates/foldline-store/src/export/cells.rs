@@ -32,6 +32,7 @@ pub(super) fn point_cells(point: &Point, model: &Model, cycles: bool) -> Vec<Cel
     out.extend(padded(&point.parameters, model.parameters.len()));
     out.push(point.solution.period().map_or(Cell::Empty, Cell::Real));
     out.push(Cell::Integer(point.solution.forcing_periods().into()));
+    out.extend(model.angles().map(|(k, period)| Cell::Integer(point.solution.turns(k, period))));
     out.extend(padded(point.ranges.as_flattened(), 2 * (n + outputs)));
     let of = |quantity: Quantity| quantity.of(point).map_or(Cell::Empty, Cell::Real);
     out.extend((0..n + outputs).flat_map(|k| [of(Quantity::Mean(k)), of(Quantity::Rms(k))]));

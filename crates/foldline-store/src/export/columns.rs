@@ -39,6 +39,7 @@ fn text(name: &str, description: &str) -> Column {
 /// The columns of a model.
 pub(super) struct Variables {
     parameters: Vec<Column>,
+    turns: Vec<Column>,
     ranges: Vec<Column>,
     averages: Vec<Column>,
     states: Vec<Column>,
@@ -132,9 +133,15 @@ impl Variables {
                 averages.push(labelled(&format!("{name}{ending}"), unit, text));
             }
         }
+        let turn = |(k, _): (usize, f64)| {
+            let name = &model.states[k].name;
+            let own = labelled(&format!("{name}_turns"), "1", format!("how often {name} turns over a cycle"));
+            Column { class: Class::Integer, ..own }
+        };
+        let turns = model.angles().map(turn).collect();
         let states = model.states.iter();
         let states = states.map(|s| labelled(&s.name, &s.unit, described(&s.name, &s.description))).collect();
-        Variables { parameters, ranges, averages, states }
+        Variables { parameters, turns, ranges, averages, states }
     }
 
     /// The states of an equilibrium, or of a profile.
@@ -153,6 +160,7 @@ impl Variables {
         out.extend_from_slice(&self.parameters);
         out.push(real("period", "period of a cycle"));
         out.push(integer("forcing_periods", "periods of the forcing that a cycle lasts, 0 where there is none"));
+        out.extend_from_slice(&self.turns);
         out.extend_from_slice(&self.ranges);
         out.extend_from_slice(&self.averages);
         if !cycles {

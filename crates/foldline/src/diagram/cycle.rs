@@ -90,6 +90,25 @@ impl Cycle {
         out
     }
 
+    /// The state `[n]` at the end of the period, by the last polynomial.
+    pub(crate) fn end(&self) -> Vec<f64> {
+        let mut x = vec![0.0; self.dim()];
+        self.state_within(Scheme::of(self.degree), self.intervals() - 1, 1.0, &mut x);
+        x
+    }
+
+    /// Like [`Cycle::uniform`], without the turns of angles: what they gain is taken away in proportion to time.
+    pub(crate) fn level(&self, count: usize) -> Vec<f64> {
+        let mut out = self.uniform(count);
+        if self.turns() {
+            for (s, x) in out.chunks_exact_mut(self.dim()).enumerate() {
+                let t = s as f64 / count as f64;
+                x.iter_mut().zip(&self.gain).for_each(|(x, gain)| *x -= t * gain);
+            }
+        }
+        out
+    }
+
     /// The state at time `t` in interval j.
     fn state_within(&self, scheme: &Scheme, j: usize, t: f64, x: &mut [f64]) {
         let s = (t - self.mesh[j]) / (self.mesh[j + 1] - self.mesh[j]);

@@ -46,6 +46,11 @@ impl Solution {
         }
     }
 
+    /// How often a state that is an angle of that period turns over a cycle, with its sign; 0 for an equilibrium.
+    pub fn turns(&self, state: usize, period: f64) -> i64 {
+        self.gain().get(state).map_or(0, |gain| (gain / period).round() as i64)
+    }
+
     /// True if angles turn as often as those of another one of which some states are `mirrored`.
     fn turns_like(&self, other: &Solution, mirrored: &dyn Fn(usize) -> bool) -> bool {
         let (own, theirs) = (self.gain(), other.gain());

@@ -9,6 +9,7 @@ use crate::attractors::{Exit, Limits};
 use crate::contract::{Batch, Parameters};
 use crate::diagram::{Ending, Point};
 use crate::linalg::max_abs;
+use crate::special::connection::in_first_turn;
 
 /// Largest number of states for which conserved combinations are looked for.
 const MOST: usize = 64;
@@ -138,7 +139,8 @@ fn of_exit(system: &System, exit: &Exit) -> String {
 pub(super) fn place(system: &System, state: &[f64]) -> String {
     /// Components that fit on one line.
     const TOLD: usize = 6;
-    let named = system.state_names.iter().zip(state).take(TOLD);
+    let state = in_first_turn(system.field.periods(), state);
+    let named = system.state_names.iter().zip(&state).take(TOLD);
     let told: Vec<String> = named.map(|(name, value)| format!("{name} = {value:.6}")).collect();
     let more = if state.len() > TOLD { ", …" } else { "" };
     format!("{}{more}", told.join(", "))

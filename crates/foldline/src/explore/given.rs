@@ -8,6 +8,7 @@ use super::growth::{first, polished, problem_of, settings};
 use super::minimal::reduced;
 use super::plan::SeedPlan;
 use super::seeds::{bare, near};
+use crate::attractors::gained;
 use crate::contract::{Batch, Parameters, VectorField};
 use crate::diagram::{Cycle, Point, Solution};
 use crate::problem::gauss::Scheme;
@@ -68,6 +69,8 @@ fn along(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle) -> Vec<[f64
 /// The failure of Newton's method, and the residual of the given cycle.
 pub(super) fn from_cycle(system: &System, seed: &SeedPlan, tolerance: f64, cycle: &Cycle) -> Result<Point, String> {
     const NEAR: f64 = 0.1;
+    let gain = gained(system.field.periods(), &cycle.profile[..cycle.dim()], &cycle.end());
+    let cycle = &Cycle { gain, ..cycle.clone() };
     let given = bare(&seed.parameters, Solution::Cycle(cycle.clone()));
     let settings = settings(system, tolerance, [f64::NEG_INFINITY, f64::INFINITY], 0);
     let found = near(system, cycle.degree, &settings, given.clone()).and_then(|guess| {

@@ -636,6 +636,7 @@ fn collapses<'a>(branch: &Branch, system: &'a System) -> Vec<Box<dyn Monitor + '
                 all.push(Box::new(collapse::Mirrors {
                     reflection: reflection.clone(),
                     scales: system.scales.clone(),
+                    periods: system.field.periods().to_vec(),
                     half,
                 }));
             }

@@ -159,6 +159,11 @@ impl Model {
         self.states.iter().position(|s| s.name == name)
     }
 
+    /// Index and period of every state that is an angle.
+    pub fn angles(&self) -> impl Iterator<Item = (usize, f64)> {
+        self.states.iter().enumerate().filter_map(|(i, state)| Some((i, state.period?)))
+    }
+
     /// Position of the output of that name.
     pub fn output_index(&self, name: &str) -> Option<usize> {
         self.outputs.iter().position(|o| o.name == name)

@@ -32,7 +32,7 @@ impl Shrinks<'_> {
     /// The value of parameter `free` at which the equilibrium inside a cycle has a Hopf point.
     fn hopf_point(&self, at: &Point) -> Option<f64> {
         let Solution::Cycle(cycle) = &at.solution else { return None };
-        let mean = Shrinks::mean(&cycle.uniform(SAMPLES), cycle.dim());
+        let mean = Shrinks::mean(&cycle.level(SAMPLES), cycle.dim());
         hopf::lies_near(self.field, &at.parameters, self.free, self.unit, self.scales, &mean, TAU / cycle.period)
     }
 
@@ -69,6 +69,7 @@ impl Halves<'_> {
                 let t = k as f64 / SAMPLES as f64;
                 cycle.state_into(scheme, t, &mut one);
                 cycle.state_into(scheme, t + 0.5, &mut other);
+                other.iter_mut().zip(&cycle.gain).for_each(|(x, gain)| *x -= 0.5 * gain);
                 let mut pairs = one.iter().zip(&other).zip(&at.ranges);
                 pairs.all(|((x, y), [low, high])| (x - y).abs() <= NEARLY * (high - low))
             })
@@ -114,6 +115,8 @@ pub struct Mirrors {
     pub reflection: Vec<bool>,
     /// `[n]` characteristic sizes of the states.
     pub scales: Vec<f64>,
+    /// `[n]` periods of the states that are angles; see [`crate::contract::VectorField::periods`].
+    pub periods: Vec<f64>,
     /// Whether the symmetric cycle goes over into itself after half a period.
     pub half: bool,
 }
@@ -126,10 +129,16 @@ impl Mirrors {
     fn parts(&self, point: &Point) -> (Vec<f64>, Vec<f64>) {
         let (x, n) = match &point.solution {
             Solution::Equilibrium(x) => (x.clone(), x.len()),
-            Solution::Cycle(cycle) => (cycle.uniform(SAMPLES), cycle.dim()),
+            Solution::Cycle(cycle) => (cycle.level(SAMPLES), cycle.dim()),
         };
         let shift = if self.half && x.len() > n { x.len() / 2 } else { 0 };
-        let image = |k: usize| if self.reflection[k % n] { -x[k] } else { x[k] };
+        let mean = |c: usize| x.iter().skip(c).step_by(n).sum::<f64>() * n as f64 / x.len() as f64;
+        let mut twice: Vec<f64> = vec![0.0; n];
+        for (c, period) in self.periods.iter().enumerate().filter(|(_, period)| period.is_finite()) {
+            // An angle is as far from half a turn as its image, in the next copy.
+            twice[c] = period * (2.0 * mean(c) / period).round();
+        }
+        let image = |k: usize| if self.reflection[k % n] { twice[k % n] - x[k] } else { x[k] };
         let left = (0..x.len()).map(|k| x[(k + shift) % x.len()] - image(k)).collect();
         (x, left)
     }
@@ -243,8 +252,8 @@ fn extents(at: &Point, scales: &[f64]) -> Vec<f64> {
 fn compare(reference: &Point, at: &Point, scales: &[f64], deviation: impl Fn(&[f64], usize) -> Vec<f64>) -> f64 {
     let (Solution::Cycle(a), Solution::Cycle(b)) = (&reference.solution, &at.solution) else { return 1.0 };
     let n = a.dim();
-    let da = deviation(&a.uniform(SAMPLES), n);
-    let other = if std::ptr::eq(a, b) { None } else { Some(deviation(&b.uniform(SAMPLES), n)) };
+    let da = deviation(&a.level(SAMPLES), n);
+    let other = if std::ptr::eq(a, b) { None } else { Some(deviation(&b.level(SAMPLES), n)) };
     let db = other.as_ref().unwrap_or(&da);
     // Components of very different unit must not drown each other.
     let mut sums = vec![[0.0; 2]; n];

@@ -60,6 +60,15 @@ struct Node {
     speed: f64,
 }
 
+/// The copy of a state in which angles are between minus and plus half their period.
+pub(crate) fn in_first_turn(periods: &[f64], x: &[f64]) -> Vec<f64> {
+    let mut x = x.to_vec();
+    for (x, period) in x.iter_mut().zip(periods).filter(|(_, period)| period.is_finite()) {
+        *x -= period * (*x / period).round();
+    }
+    x
+}
+
 impl Limits<'_> {
     /// The orbit of infinite period that a cycle of long period approaches, if any.
     pub fn approached(&self, at: &Point) -> Option<Ending> {
@@ -102,10 +111,10 @@ impl Limits<'_> {
         for _ in 0..PLACES {
             let Some(slowest) = left.iter().min_by(|a, b| a.speed.total_cmp(&b.speed)) else { break };
             let Some(saddle) = self.equilibrium(&slowest.x, parameters) else { break };
-            let near = |node: &Node| distance(&node.x, &saddle, extents) < BALL;
+            let near = |node: &Node| self.apart(&node.x, &saddle, extents) < BALL;
             let inside: Vec<&Node> = left.iter().copied().filter(|node| near(node)).collect();
             let share: f64 = inside.iter().map(|node| node.share).sum();
-            let least = inside.iter().map(|node| distance(&node.x, &saddle, extents)).fold(f64::INFINITY, f64::min);
+            let least = inside.iter().map(|node| self.apart(&node.x, &saddle, extents)).fold(f64::INFINITY, f64::min);
             let passage = self.passage(&saddle, parameters, least);
             if !(least < CLOSE && passage.is_some_and(|time| fits(share * period, time * passes(nodes, &near)))) {
                 break;
@@ -196,7 +205,7 @@ impl Limits<'_> {
         }
         let (there, here) = (at[self.free], parameters[self.free]);
         let near = (there - here).abs() <= self.tolerance * (self.unit + there.abs());
-        if !near || distance(&x, &slowest.x, extents) > BALL {
+        if !near || self.apart(&x, &slowest.x, extents) > BALL {
             return None;
         }
         let w = self.null_vector(&x, &at, true)?;
@@ -207,8 +216,18 @@ impl Limits<'_> {
         (time.is_finite() && fits(period, time)).then(|| (Connection::SaddleNode, there, self.place(&x)))
     }
 
+    /// The distance of two states, of angles between their nearest copies.
+    fn apart(&self, a: &[f64], b: &[f64], extents: &[f64]) -> f64 {
+        let mut near = a.to_vec();
+        for (c, period) in self.field.periods().iter().enumerate().filter(|(_, period)| period.is_finite()) {
+            near[c] -= period * ((a[c] - b[c]) / period).round();
+        }
+        distance(&near, b, extents)
+    }
+
     /// A state in words.
     fn place(&self, x: &[f64]) -> String {
+        let x = &in_first_turn(self.field.periods(), x);
         // Of what is zero only rounding is left.
         let rounded = |(x, scale): (&f64, &f64)| if x.abs() < 1e-9 * scale { 0.0 } else { *x };
         let all = x.iter().zip(self.scales).map(|pair| format!("{:.6}", Shown(rounded(pair))));

@@ -82,6 +82,7 @@ impl CycleProblem<'_> {
             let t = 0.5 * (k as f64 + 0.3) / PLACES as f64;
             state(t, x);
             state(t + 0.5, y);
+            y.iter_mut().zip(&self.gain).for_each(|(y, gain)| *y -= 0.5 * gain);
             for c in 0..self.n {
                 apart[c] = apart[c].max((x[c] - y[c]).abs());
                 lowest[c] = lowest[c].min(x[c].min(y[c]));

@@ -31,7 +31,7 @@ pub(super) struct Uncertain<'s, 'f> {
     pub(super) setting: &'s Setting<'f>,
     pub(super) at: &'s Point,
     /// Error of every state and free parameter, relative to its size.
-    error: f64,
+    pub(super) error: f64,
     rounding: f64,
     /// `[n]` sizes of the states.
     sizes: Vec<f64>,

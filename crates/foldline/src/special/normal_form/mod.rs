@@ -164,13 +164,14 @@ fn crossing(uncertain: &Uncertain) -> Result<Coefficients, String> {
     let setting = uncertain.setting;
     let along = tangent(setting, uncertain.at).ok_or("the branch itself turns back there")?;
     let quadratic = uncertain.measured(&|sample| Some(vec![sample.local.fold()?])).ok_or(NONE)?;
-    let nearly =
-        Local::new(setting.field, uncertain.at).and_then(|local| local.is_pitchfork(setting.scales, PITCHFORK));
+    // On the branch that turns back, where the parameter is off by ε the state is off by √ε, and a by as many times c.
+    let share = PITCHFORK.max(uncertain.error.sqrt());
+    let nearly = Local::new(setting.field, uncertain.at).and_then(|local| local.is_pitchfork(setting.scales, share));
     let pitchfork = nearly == Some(true) || quadratic.values[0].abs() <= quadratic.errors[0];
     let mut found = uncertain.measured(&|sample| sample.local.crossing(&along, pitchfork)).ok_or(NONE)?;
     if pitchfork {
-        // By symmetry it is 0.
-        found.errors[0] = quadratic.errors[0];
+        // By symmetry it is 0, or no more than was seen.
+        found.errors[0] = quadratic.errors[0] + quadratic.values[0].abs();
     }
     Ok(found)
 }
