@@ -79,7 +79,7 @@ impl Page {
         all
     }
 
-    /// What a command says: the table, and which branches ended short.
+    /// What a command says: the table, and which branches ended short; or why it is refused.
     fn answer(&self, command: &str) -> Vec<String> {
         let run = Command::new(env!("CARGO_BIN_EXE_foldline"))
             .args(command.split(' '))
@@ -87,6 +87,10 @@ impl Page {
             .output()
             .unwrap();
         let said = String::from_utf8(run.stderr).unwrap();
+        if said.starts_with("error: ") {
+            assert_eq!(run.status.code(), Some(2), "{}: foldline {command}\n{said}", self.name);
+            return said.lines().map(|line| line.trim_end().to_string()).collect();
+        }
         let short: Vec<&str> = said.lines().skip_while(|line| !line.starts_with("ended short: ")).collect();
         let code = if short.is_empty() { 0 } else { 3 };
         assert_eq!(run.status.code(), Some(code), "{}: foldline {command}\n{said}", self.name);

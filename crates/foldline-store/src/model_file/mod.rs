@@ -8,6 +8,7 @@ mod items;
 mod mass;
 mod repeat;
 mod states;
+mod totals;
 
 use crate::diagnostic::Diagnostic;
 use crate::toml_walk::{Value, Walk, read_text, unreadable};
@@ -17,7 +18,7 @@ use std::ops::Range;
 use std::path::Path;
 use toml::de::{DeTable, DeValue};
 
-const ROOT_KEYS: [&str; 14] = [
+const ROOT_KEYS: [&str; 15] = [
     "name",
     "description",
     "source",
@@ -30,6 +31,7 @@ const ROOT_KEYS: [&str; 14] = [
     "states",
     "equations",
     "mass",
+    "totals",
     "outputs",
     "whirl",
 ];
@@ -132,6 +134,9 @@ impl Reader<'_> {
             source.equations.push(Definition::new(&name, &expression));
         }
         self.mass(root, &mut source);
+        for (name, place, value) in self.entries(root, "totals") {
+            self.total(name, place, value, &mut source);
+        }
         for (i, (name, place, value)) in self.entries(root, "outputs").into_iter().enumerate() {
             let output = self.output(i, name, place, value, &source.constants);
             source.outputs.push(output);

@@ -20,7 +20,7 @@ use crate::nearest::suggest;
 use crate::toml_walk::{Value, Walk, read_text, unreadable};
 use foldline::attractors::Limits;
 use foldline::explore::Plan;
-use foldline::model::Model;
+use foldline::model::{Model, conserved, in_words};
 use items::Items;
 use std::path::{Path, PathBuf};
 use toml::de::DeTable;
@@ -136,6 +136,9 @@ fn parse(
     let sweeps = responses::sweeps(&mut walk, &root, &model, &seeds, &taken);
     let taken: Vec<&str> = taken.into_iter().chain(sweeps.iter().map(|s| s.name.as_str())).collect();
     let explorations = explorations::read(&mut walk, &root, &model, &defaults, &taken);
+    if walk.found.is_empty() && !(branches.is_empty() && homotopies.is_empty() && explorations.is_empty()) {
+        check_totals(&mut walk, &root, &model);
+    }
     if walk.found.is_empty() {
         check_seeds(&mut walk, &seeds, &model, &model_text, &model_file);
         check_explorations(&mut walk, &explorations, &model, &model_text, &model_file);
@@ -146,6 +149,24 @@ fn parse(
     let seeds = seeds.into_iter().map(|(_, seed)| seed).collect();
     let plan = Plan { tolerance, degree, limits, seeds, branches, curves, homotopies, explorations, surveys, sweeps };
     Ok(Study { file: file.to_string(), text: text.to_string(), model_file, model_text, model, plan })
+}
+
+/// Reports sums of states that keep their values: no solution is isolated, and none can be continued.
+fn check_totals(walk: &mut Walk, root: &DeTable, model: &Model) {
+    let names: Vec<String> = model.states.iter().map(|state| state.name.clone()).collect();
+    let kept: Vec<String> = conserved(model).iter().map(|c| in_words(c, &names)).collect();
+    if kept.is_empty() {
+        return;
+    }
+    let (verb, each) = if kept.len() == 1 { ("keeps its value", "it") } else { ("keep their values", "each") };
+    let message = format!(
+        "{} {verb} along every solution: solutions form families, and none can be followed by itself",
+        kept.join(" and ")
+    );
+    let entry = |(i, sum): (usize, &String)| format!("T{} = {{ sum = \"{sum}\", value = … }}", i + 1);
+    let entries: Vec<String> = kept.iter().enumerate().map(entry).collect();
+    let hint = format!("say in the model which value {each} has: a table `[totals]` with {}", entries.join(", "));
+    walk.report(root.get("model").map_or(0..0, |value| value.span()), message, hint);
 }
 
 /// Limits on trajectories in the search for first solutions.

@@ -35,6 +35,9 @@ pub(super) fn read(
             override_parameters(walk, value, model, &mut parameters);
         }
         let meant = source(walk, table, &span, model, degree);
+        if let (SeedSource::State(state), Some(value)) = (&meant, table.get("state")) {
+            totals_of(walk, value, table.get("parameters"), model, state, &mut parameters);
+        }
         let source = lasting(walk, table, meant, model);
         let samples = table.get("samples").and_then(|v| walk.integer(v, "`samples`", 1..=1_000_000));
         let random = table.get("random").and_then(|v| walk.integer(v, "`random`", 0..=u64::MAX));
@@ -84,6 +87,46 @@ fn lasting(walk: &mut Walk, table: &DeTable, source: SeedSource, model: &Model) 
     periods.map_or(source, |periods| SeedSource::Attractor(AttractorKey::Lasting(periods as u32)))
 }
 
+/// Totals at a state that gives the states that follow from them too; others keep their values.
+fn totals_of(
+    walk: &mut Walk,
+    value: &Value,
+    given: Option<&Value>,
+    model: &Model,
+    state: &[f64],
+    parameters: &mut [f64],
+) {
+    let Some(table) = value.get_ref().as_table() else { return };
+    let mut followers: HashMap<&str, f64> = HashMap::new();
+    for total in &model.totals {
+        if let Some(own) = table.get(total.instead_of.as_str()) {
+            let number = walk.number(own, &format!("the state `{}`", total.instead_of));
+            followers.extend(number.map(|number| (total.instead_of.as_str(), number)));
+        }
+    }
+    for total in model.totals.iter().filter(|total| followers.contains_key(total.instead_of.as_str())) {
+        let of = |name: &str| followers.get(name).copied().or_else(|| Some(state[model.state_index(name)?]));
+        let terms: Option<Vec<f64>> = total.terms.iter().map(|(name, c)| Some(c * of(name)?)).collect();
+        let name = &model.parameters[total.parameter].name;
+        let Some(terms) = terms else {
+            let missing: Vec<&str> =
+                total.terms.iter().map(|(name, _)| name.as_str()).filter(|name| of(name).is_none()).collect();
+            let hint = format!("give {} too, or leave `{}` out", missing.join(", "), total.instead_of);
+            walk.report(value.span(), format!("the total `{name}` does not follow from this state"), hint);
+            continue;
+        };
+        let (sum, size) = (terms.iter().sum::<f64>(), terms.iter().map(|t| t.abs()).sum::<f64>());
+        let stated =
+            given.and_then(|given| given.get_ref().as_table()).is_some_and(|given| given.contains_key(name.as_str()));
+        let own = &mut parameters[total.parameter];
+        if stated && (*own - sum).abs() > 1e-9 * size {
+            let message = format!("the total `{name}` is {sum} at this state, and {own} under `parameters`");
+            walk.report(value.span(), message, format!("leave `{name}` or `{}` out", total.instead_of));
+        }
+        *own = sum;
+    }
+}
+
 fn attractor(walk: &mut Walk, value: &Value, model: &Model) -> Option<AttractorKey> {
     let text = walk.string(value, "`attractor`")?;
     let ratio = text.split_once(':').and_then(|(a, b)| Some((a.trim().parse().ok()?, b.trim().parse().ok()?)));
@@ -127,6 +170,10 @@ fn state(walk: &mut Walk, value: &Value, model: &Model) -> Option<Vec<f64>> {
     for (key, own) in table {
         let name: &str = key.get_ref();
         let what = format!("the state `{name}`");
+        // What follows from a total is looked at with that.
+        if model.totals.iter().any(|total| total.instead_of == name) {
+            continue;
+        }
         if let Some(&i) = places.get(name) {
             values[i] = walk.number(own, &what);
             continue;

@@ -9,10 +9,9 @@ use crate::attractors::{Exit, Limits};
 use crate::contract::{Batch, Parameters};
 use crate::diagram::{Ending, Point};
 use crate::linalg::max_abs;
+use crate::model::{conserved_at, in_words, shifts};
 use crate::special::connection::in_first_turn;
 
-/// Largest number of states for which conserved combinations are looked for.
-const MOST: usize = 64;
 /// Size, relative to the largest, below which what is left of a column is rounding.
 const ROUNDING: f64 = 1e-10;
 
@@ -34,14 +33,8 @@ pub(super) struct Seen<'a> {
 /// Lines that say a likely cause and a cure, to be put after what happened.
 pub(super) fn of_no_start(system: &System, parameters: &[f64], seen: Seen) -> String {
     let stuck = seen.stuck;
-    let conserved = conserved(system, parameters);
-    if let [first, rest @ ..] = &conserved[..] {
-        let more = if rest.is_empty() { String::new() } else { format!(", and {} more", rest.len()) };
-        return format!(
-            "\nlikely cause: {}{more} never changes, whatever the state: solutions are not isolated but come in families\n\
-             what to do: eliminate one state by its conserved combination, and make the conserved value a parameter",
-            combination(first, &system.state_names)
-        );
+    if let Some(why) = of_laws(system, parameters) {
+        return why;
     }
     if seen.state.is_some_and(|state| is_equilibrium(system, parameters, state)) {
         return "\nlikely cause: the state is an equilibrium, and a singular one: a fold, a branch point or an isolated point, \
@@ -214,90 +207,24 @@ fn is_equilibrium(system: &System, parameters: &[f64], state: &[f64]) -> bool {
     f.iter().zip(&system.scales).all(|(v, scale)| v.abs() <= ROUNDING * scale)
 }
 
-/// Combinations wᵀx that never change, wᵀf = 0 at every place tried: each `[n]`, its smallest entry ±1.
-fn conserved(system: &System, parameters: &[f64]) -> Vec<Vec<f64>> {
-    let n = system.field.dim();
-    if n > MOST {
-        return Vec::new();
+/// Cause and cure if the states can be shifted together, or a sum of them keeps its value.
+pub(super) fn of_laws(system: &System, parameters: &[f64]) -> Option<String> {
+    let names = &system.state_names;
+    if let [shift, ..] = &shifts(system.field)[..] {
+        return Some(format!(
+            "\nlikely cause: f does not change when {} are shifted together: solutions are not isolated but come in families\n\
+             what to do: describe them relative to one of them, which leaves one state out",
+            shift.iter().zip(names).filter(|(s, _)| **s != 0.0).map(|(_, name)| &**name).collect::<Vec<_>>().join(", ")
+        ));
     }
-    let golden = 0.618_033_988_749_895;
-    let mut rows: Vec<Vec<f64>> = Vec::new();
-    for place in 1..=4 * n + 8 {
-        let share = |i: usize| (golden * (place * (i + 2)) as f64 + 0.17 * (i * i) as f64).fract();
-        let state: Vec<f64> = system.ranges.iter().enumerate().map(|(i, [a, b])| a + share(i) * (b - a)).collect();
-        let mut f = vec![0.0; n];
-        system.field.evaluate(
-            Batch { lanes: 1, states: &state, parameters: Parameters::Shared(parameters), times: &[] },
-            &mut f,
-        );
-        if f.iter().all(|v| v.is_finite()) {
-            rows.push(f);
-        }
-    }
-    // Too few places say nothing.
-    if rows.len() < 2 * n + 4 { Vec::new() } else { null_space(rows, n) }
-}
-
-/// The vectors w with `row`·w = 0 for all rows, by elimination with complete pivoting; empty where there is none.
-pub(super) fn null_space(mut rows: Vec<Vec<f64>>, n: usize) -> Vec<Vec<f64>> {
-    let sizes: Vec<f64> = (0..n).map(|j| rows.iter().fold(0.0f64, |m, row| m.max(row[j].abs()))).collect();
-    let sizes: Vec<f64> = sizes.iter().map(|&s| if s > 0.0 { s } else { 1.0 }).collect();
-    rows.iter_mut().for_each(|row| row.iter_mut().zip(&sizes).for_each(|(v, s)| *v /= s));
-    let mut columns: Vec<usize> = (0..n).collect();
-    let mut rank = 0;
-    while rank < n.min(rows.len()) {
-        let places = (rank..rows.len()).flat_map(|i| (rank..n).map(move |j| (i, j)));
-        let Some((i, j)) =
-            places.max_by(|a, b| rows[a.0][columns[a.1]].abs().total_cmp(&rows[b.0][columns[b.1]].abs()))
-        else {
-            break;
-        };
-        let pivot = rows[i][columns[j]];
-        if pivot.abs() < ROUNDING {
-            break;
-        }
-        rows.swap(rank, i);
-        columns.swap(rank, j);
-        let top = rows[rank].clone();
-        for row in rows.iter_mut().skip(rank + 1) {
-            let factor = row[columns[rank]] / pivot;
-            row.iter_mut().zip(&top).for_each(|(v, t)| *v -= factor * t);
-        }
-        rank += 1;
-    }
-    let mut found = Vec::new();
-    for free in rank..n {
-        let mut w = vec![0.0; n];
-        w[columns[free]] = 1.0;
-        for k in (0..rank).rev() {
-            let sum: f64 = (k + 1..n).map(|j| rows[k][columns[j]] * w[columns[j]]).sum();
-            w[columns[k]] = -sum / rows[k][columns[k]];
-        }
-        w.iter_mut().zip(&sizes).for_each(|(v, s)| *v /= s);
-        let largest = max_abs(&w);
-        let smallest = w.iter().filter(|v| v.abs() > 1e-6 * largest).fold(f64::INFINITY, |m, v| m.min(v.abs()));
-        let first = w.iter().find(|v| v.abs() > 1e-6 * largest).map_or(1.0, |v| v.signum());
-        found.push(w.iter().map(|v| if v.abs() > 1e-6 * largest { first * v / smallest } else { 0.0 }).collect());
-    }
-    found
-}
-
-/// w as a sum, such as `x + 2 y`.
-fn combination(w: &[f64], names: &[String]) -> String {
-    let mut text = String::new();
-    for (i, value) in w.iter().enumerate().filter(|(_, v)| **v != 0.0) {
-        let name = names.get(i).map_or("?", String::as_str);
-        let rounded = (value.abs() * 1e6).round() / 1e6;
-        let factor = if rounded == 1.0 { String::new() } else { format!("{rounded} ") };
-        text += match (text.is_empty(), *value < 0.0) {
-            (true, false) => "",
-            (true, true) => "-",
-            (false, false) => " + ",
-            (false, true) => " - ",
-        };
-        text += &format!("{factor}{name}");
-    }
-    text
+    let kept = conserved_at(system.field, parameters, &[], &system.ranges);
+    let [first, rest @ ..] = &kept[..] else { return None };
+    let more = if rest.is_empty() { String::new() } else { format!(", and {} more", rest.len()) };
+    Some(format!(
+        "\nlikely cause: {}{more} never changes, whatever the state: solutions are not isolated but come in families\n\
+         what to do: give its value under `[totals]` of the model, or eliminate one state by it",
+        in_words(first, names)
+    ))
 }
 
 /// Explains the end of a branch of forced cycles next to a bound of the range at which the forcing has no period, such as frequency
@@ -333,24 +260,5 @@ pub(super) fn of_forcing(system: &System, free: usize, range: [f64; 2], last: &P
         Ending::MeshTooLarge(_) => Ending::MeshTooLarge(text),
         Ending::StepTooSmall(_) => Ending::StepTooSmall(text),
         _ => Ending::NotFinite(text),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn conserved_combinations_are_found_and_none_where_there_is_none() {
-        // x + y/2 - z is conserved by (a, 2b, a + b), and nothing by (a, b, a b).
-        let places: Vec<[f64; 2]> = (1..20).map(|k| [(k as f64).sin(), (0.7 * (k * k) as f64).cos()]).collect();
-        let rows = places.iter().map(|[a, b]| vec![*a, 2.0 * b, a + b]).collect();
-        let found = null_space(rows, 3);
-        assert_eq!(found.len(), 1);
-        let names = ["x", "y", "z"].map(String::from);
-        assert_eq!(combination(&found[0], &names), "2 x + y - 2 z");
-        let rows = places.iter().map(|[a, b]| vec![*a, *b, a * b]).collect();
-        assert!(null_space(rows, 3).is_empty());
-        assert_eq!(null_space(vec![vec![0.0]; 9], 1), vec![vec![1.0]]);
     }
 }

@@ -6,7 +6,7 @@
 
 use super::System;
 use super::choice::{Choice, is_meant, missing, summary};
-use super::diagnosis::{Seen, next_to_origin, of_no_start, place};
+use super::diagnosis::{Seen, next_to_origin, of_laws, of_no_start, place};
 use super::direct::{Direct, NEVER, direct};
 use super::given::from_cycle;
 use super::growth::{polished, problem_of, setting, settings};
@@ -132,6 +132,9 @@ impl<'p> Seeds<'p> {
                 from_state(system, seed, plan, state, self.jobs, &tell)?
             }
             SeedSource::Attractor(key) => {
+                if let Some(why) = in_families(system, seed) {
+                    return Err(format!("no equilibrium is isolated{why}"));
+                }
                 let census = self.census(self.census_of(index).ok_or("no census")?);
                 let choice = Choice::of(system, plan.tolerance, census, key);
                 if let Some(said) = choice.told(system) {
@@ -167,13 +170,20 @@ fn share(a: &SeedPlan, b: &SeedPlan) -> bool {
 fn sampled(system: &System, plan: &Plan, needed: &[bool]) -> Vec<usize> {
     let mut first: Vec<usize> = Vec::new();
     for (index, seed) in plan.seeds.iter().enumerate() {
-        let sampled = matches!(seed.source, SeedSource::Attractor(_));
+        let sampled = matches!(seed.source, SeedSource::Attractor(_)) && in_families(system, seed).is_none();
         let repeats = system.repeats(&seed.parameters, &[]).is_ok();
         if needed[index] && sampled && repeats && !first.iter().any(|other| share(&plan.seeds[*other], seed)) {
             first.push(index);
         }
     }
     first
+}
+
+/// Cause and cure, without a sample, where no equilibrium that a seed could mean is isolated. Cycles may be, where a symmetry only moves them
+/// along themselves.
+fn in_families(system: &System, seed: &SeedPlan) -> Option<String> {
+    let equilibrium = seed.source == SeedSource::Attractor(AttractorKey::Equilibrium);
+    if equilibrium { of_laws(system, &seed.parameters) } else { None }
 }
 
 /// The census for a seed. It ends early once it has what all seeds of the plan ask for that share it, needed or not: what a seed means

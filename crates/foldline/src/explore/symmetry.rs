@@ -15,10 +15,10 @@
 //! **Fails when** a symmetry is not linear, or the energy is not of the form (2); it then goes undetected.
 
 use super::System;
-use super::diagnosis::null_space;
 use crate::contract::{Batch, Parameters};
 use crate::diagram::{Point, Solution};
 use crate::linalg::max_abs;
+use crate::model::null_space;
 
 /// Largest number of states n for which symmetries are looked for. (1) has n² unknowns, so elimination costs n⁶ operations: a million
 /// for ten.
@@ -55,7 +55,7 @@ pub(super) fn rotation(system: &System, parameters: &[f64]) -> Option<Vec<[usize
     if rows.len() < n * n + n {
         return None;
     }
-    null_space(rows, n * n).iter().find_map(|generator| rotated_pairs(generator, n))
+    null_space(rows.concat(), n * n).iter().find_map(|generator| rotated_pairs(generator, n))
 }
 
 /// Whether a cycle is a rotating wave: it consists of what one of its states becomes under rotation of these pairs. Rotation leads along such a

@@ -348,6 +348,7 @@ fn name_of(source: &ModelSource, item: Item) -> &str {
         Item::Function(i) => &source.functions[i].name,
         Item::Table(i) => &source.tables[i].name,
         Item::Mass(i) => &source.mass[i].row,
+        Item::Total(i) => &source.totals[i].name,
         Item::Whirl | Item::Forcing => "",
     }
 }

@@ -33,6 +33,8 @@ pub enum Item {
     Table(usize),
     /// An entry of the mass matrix.
     Mass(usize),
+    /// A conserved total.
+    Total(usize),
 }
 
 /// Which field of an item is wrong.
@@ -92,6 +94,7 @@ impl fmt::Display for ModelError {
             Item::Function(_) => "the function",
             Item::Table(_) => "the table",
             Item::Mass(_) => "the mass of",
+            Item::Total(_) => "the total",
         };
         write!(f, "{part}")?;
         if !self.name.is_empty() {

@@ -22,6 +22,7 @@ mod function;
 mod graph;
 mod identities;
 pub mod kernels;
+mod laws;
 mod lexer;
 mod lower;
 mod mass;
@@ -36,13 +37,19 @@ mod source;
 mod switches;
 mod table;
 mod tape;
+mod totals;
 mod words;
 
 pub use constant::constant_value;
 pub use error::{Field, Item, ModelError};
+pub(crate) use laws::null_space;
+pub use laws::{conserved, conserved_at, in_words, shifts};
 pub use nearest::{nearest, suggest};
-pub use source::{Constant, Definition, Ends, Forcing, Function, Mass, ModelSource, Output, Parameter, Repeat, State};
+pub use source::{
+    Constant, Definition, Ends, Forcing, Function, Mass, ModelSource, Output, Parameter, Repeat, State, Total,
+};
 pub use table::{Interpolation, Outside, Table};
+pub use totals::Kept;
 
 use crate::contract::{Batch, Parameters, VectorField};
 use compile::{Compiled, Named, compile};
@@ -86,6 +93,8 @@ pub struct About {
     pub states: Vec<State>,
     /// Parameters, numbered as in the vector field.
     pub parameters: Vec<Parameter>,
+    /// Conserved totals, which are parameters.
+    pub totals: Vec<Kept>,
     /// Outputs, numbered as in the vector field.
     pub outputs: Vec<Output>,
     /// The two states u, v that form the complex signal u + j v.
@@ -117,6 +126,7 @@ impl Deref for Model {
 impl Model {
     /// The model that `source` describes, or everything that is wrong with it.
     pub fn compile(source: ModelSource) -> Result<Model, Vec<ModelError>> {
+        let (source, totals) = if source.totals.is_empty() { (source, Vec::new()) } else { totals::reduced(source)? };
         let item_of = |(i, state): (usize, &State)| vec![i; family::count(&state.repeat)];
         let items: Vec<usize> = source.states.iter().enumerate().flat_map(item_of).collect();
         let (compiled, Named { states, parameters, outputs: output_list }) = compile(&source)?;
@@ -126,7 +136,7 @@ impl Model {
         let period = compiled.period.map(|period| Tape::new(&compiled.graph, &[&[period]]));
         let ModelSource { name, description, source, .. } = source;
         let whirl = compiled.whirl;
-        let about = About { name, description, source, states, parameters, outputs: output_list, whirl };
+        let about = About { name, description, source, states, parameters, totals, outputs: output_list, whirl };
         let (linear, directional) = (RwLock::default(), RwLock::default());
         let periods = match about.states.iter().any(|state| state.period.is_some()) {
             true => about.states.iter().map(|state| state.period.unwrap_or(f64::INFINITY)).collect(),

@@ -161,10 +161,43 @@ pub struct ModelSource {
     pub equations: Vec<Definition>,
     /// Entries of the matrix that multiplies the rates; rows that are not mentioned are those of the unit matrix.
     pub mass: Vec<Mass>,
+    /// Sums of states that keep their values.
+    pub totals: Vec<Total>,
     /// Outputs, in the order in which they are numbered.
     pub outputs: Vec<Output>,
     /// The two states u, v that form the complex signal u + j v.
     pub whirl: Option<[String; 2]>,
+}
+
+/// A sum of states that keeps its value, which is a parameter.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Total {
+    /// Its name.
+    pub name: String,
+    /// Its unit; `1` where it has none.
+    pub unit: String,
+    /// What it is.
+    pub description: String,
+    /// Its value.
+    pub value: f64,
+    /// The states times numbers.
+    pub sum: String,
+    /// The state that follows from it; where none is named, the largest of the sum.
+    pub instead_of: Option<String>,
+}
+
+impl Total {
+    /// A total without unit and description.
+    pub fn new(name: &str, sum: &str, value: f64) -> Total {
+        Total {
+            name: name.into(),
+            unit: "1".into(),
+            description: String::new(),
+            value,
+            sum: sum.into(),
+            instead_of: None,
+        }
+    }
 }
 
 impl Parameter {
