@@ -273,6 +273,7 @@ def model(
     frequency: Any = None,
     period: Any = None,
     whirl: str | Sequence[str] | None = None,
+    totals: Mapping[str, Mapping[str, Any]] | None = None,
     name: str = "model",
     description: str = "",
 ) -> Model: ...
@@ -334,6 +335,8 @@ def model(
         Of the forcing, angular, where equations depend on the time `t`.
     whirl : str or pair
         The two states of the complex signal from whose spectrum cycles are named 2:1, 3:1 …
+    totals : mapping
+        Sums of states that keep their values, which become parameters: ``{"T": dict(sum="x + 2*y", value=1.0)}``.
     name, description : str
         By default those of the function.
 
@@ -362,7 +365,7 @@ def model(
         if not isinstance(path, (str, os.PathLike)):
             raise TypeError('@foldline.model needs brackets with the states: @foldline.model(states="x y")')
         return Model(_native.Model.read(os.fspath(path)))
-    parts = Parts(states, equations, parameters, definitions, outputs, frequency, period, whirl)
+    parts = Parts(states, equations, parameters, definitions, outputs, frequency, period, whirl, totals)
     if equations is not None:
         return _compiled(parts.text(equations, name or "model", description or ""), name)
 

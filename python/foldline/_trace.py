@@ -67,6 +67,7 @@ class Parts:
         frequency: Any,
         period: Any,
         whirl: str | Sequence[str] | None,
+        totals: Mapping[str, Mapping[str, Any]] | None,
     ) -> None:
         if states is None:
             states = list(equations or {})
@@ -80,6 +81,7 @@ class Parts:
         self.outputs = dict(outputs or {})
         self.forcing = {"frequency": frequency, "period": period}
         self.whirl = whirl.replace(",", " ").split() if isinstance(whirl, str) else whirl
+        self.totals = dict(totals or {})
         self.arguments = (Symbols("state", list(self.states)), Symbols("parameter", list(self.parameters)), Symbol("t"))
 
     def trace(self, function: Callable[..., Any]) -> dict[str, Any]:
@@ -120,6 +122,7 @@ class Parts:
         # The equations of states that there are not: the reader says so.
         extra = {state: text for state, text in own_equations.items() if state not in self.states}
         lines += _table("equations", extra)
+        lines += _table("totals", self.totals)
         lines += _table("outputs", outputs)
         return "\n".join(lines) + "\n"
 
