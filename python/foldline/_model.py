@@ -11,7 +11,7 @@ from typing import Any, overload
 import numpy as np
 
 from . import _native
-from ._arrays import finite, floats, pairs, processors, raw, tolerable, whole
+from ._arrays import finite, floats, limits, pairs, processors, raw, tolerable, whole
 from ._simulation import Trajectory, simulated
 from ._solution import Attractor, Attractors, Solution
 from ._trace import Expressions, Parameters, Parts, States
@@ -32,6 +32,8 @@ class Model:
     states, parameters, outputs : dict
         Names, and what is known about each: `unit` and `description`, of parameters `value`, of states `scale` and `range` (`None` where
         the model does not state them).
+    time : str
+        Unit of time; empty where it is not known.
     """
 
     def __init__(self, native: _native.Model) -> None:
@@ -44,6 +46,7 @@ class Model:
         self.parameters: dict[str, dict[str, Any]] = {
             name: {"value": value, "unit": unit, "description": text} for (name, unit, text), value in native.parameters
         }
+        self.time: str = native.time
         self.outputs: dict[str, dict[str, Any]] = {name: {"unit": unit, "description": text} for name, unit, text in native.outputs}
 
     @property
@@ -108,6 +111,8 @@ class Model:
         random: int = 1,
         tolerance: float = 1e-6,
         jobs: int | None = None,
+        max_steps: int | None = None,
+        max_time: float | None = None,
     ) -> Solution:
         """A first solution: what `[[seed]]` means in a study.
 
@@ -127,6 +132,8 @@ class Model:
             The one relative tolerance.
         jobs : int, optional
             Threads; by default as many as there are processors.
+        max_steps, max_time : optional
+            Integration steps, and time, after which a trajectory counts as unsettled.
 
         Returns
         -------
@@ -141,7 +148,7 @@ class Model:
         state = b"" if isinstance(start, str) else raw(self.state(start))
         values = self._values(parameters)
         counts = whole("samples", samples), whole("random", random, 0)
-        found = _native.settle(self._native, attractor, state, values, *counts, tolerable(tolerance), processors(jobs))
+        found = _native.settle(self._native, attractor, state, values, *counts, tolerable(tolerance), processors(jobs), limits(max_steps, max_time))
         return Solution(found, self)
 
     def attractors(
@@ -152,6 +159,8 @@ class Model:
         seed: int = 1,
         tolerance: float = 1e-6,
         jobs: int | None = None,
+        max_steps: int | None = None,
+        max_time: float | None = None,
     ) -> Attractors:
         """Where sampled initial states settle: stable equilibria and cycles, and how many went to each.
 
@@ -167,6 +176,8 @@ class Model:
             The one relative tolerance.
         jobs : int, optional
             Threads; by default as many as there are processors.
+        max_steps, max_time : optional
+            As for `settle`.
 
         Returns
         -------
@@ -175,7 +186,8 @@ class Model:
             uniformly from the ranges, with a confidence interval; `hits` counts those drawn towards the origin too.
         """
         counts = whole("samples", samples), whole("seed", seed, 0)
-        found, lost = _native.attractors(self._native, self._values(parameters), *counts, tolerable(tolerance), processors(jobs))
+        how = tolerable(tolerance), processors(jobs), limits(max_steps, max_time)
+        found, lost = _native.attractors(self._native, self._values(parameters), *counts, *how)
         each = [Attractor(own, self, ratio, hits, share, floats(example)) for own, ratio, hits, share, example in found]
         return Attractors(each, samples, *lost)
 

@@ -4,7 +4,7 @@
 
 use crate::arguments::Explore as Typed;
 use crate::failure::{Failure, Outcome};
-use crate::run::{carried_out, processors};
+use crate::run::{Way, carried_out, limited, processors};
 use foldline::model::Model;
 use foldline_store::model_file::read_model;
 use foldline_store::nearest::suggest;
@@ -18,15 +18,16 @@ pub fn diagram(typed: &Typed) -> Result<Outcome, Failure> {
     let (model, model_text) = read_model(&typed.model)?;
     let text = study(typed, &model)?;
     let study = parse_study(&text, "explore.toml", &model_text, &typed.model.display().to_string())?;
+    let study = limited(study, &typed.limits)?;
     if typed.print {
-        write!(stdout().lock(), "# `model` is relative to the folder in which this study lies.\n{text}")?;
+        write!(stdout().lock(), "# `model` is relative to the folder in which this study lies.\n{}", study.text)?;
         return Ok(Outcome::Done);
     }
     let stem = typed.model.file_stem().unwrap_or("model".as_ref());
     let folder = typed.out.clone().unwrap_or_else(|| PathBuf::from("runs").join(format!("explore-{}", stem.display())));
     let jobs = typed.jobs.map_or_else(processors, usize::from);
     let limit = typed.time_limit.into_iter().chain(typed.budget.time).min();
-    carried_out(&study, jobs, typed.resume, limit, &folder)
+    carried_out(&study, &Way { jobs, resume: typed.resume, limit, units: &typed.unit, folder: &folder })
 }
 
 /// The study that does what was typed.
