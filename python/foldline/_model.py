@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import os
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, overload
@@ -15,6 +16,7 @@ from ._arrays import finite, floats, limits, pairs, processors, raw, tolerable, 
 from ._simulation import Trajectory, simulated
 from ._solution import Attractor, Attractors, Solution
 from ._trace import Expressions, Parameters, Parts, States
+from ._write import value
 
 Path_ = str | os.PathLike[str]
 
@@ -284,6 +286,8 @@ def model(
     frequency: Any = None,
     period: Any = None,
     whirl: str | Sequence[str] | None = None,
+    time: str | None = None,
+    units: str | None = None,
     name: str = "model",
     description: str = "",
 ) -> Model: ...
@@ -299,6 +303,8 @@ def model(
     frequency: Any = None,
     period: Any = None,
     whirl: str | Sequence[str] | None = None,
+    time: str | None = None,
+    units: str | None = None,
     name: str | None = None,
     description: str | None = None,
 ) -> Callable[[Callable[..., Any]], Model]: ...
@@ -316,6 +322,8 @@ def model(
     frequency: Any = None,
     period: Any = None,
     whirl: str | Sequence[str] | None = None,
+    time: str | None = None,
+    units: str | None = None,
     name: str | None = None,
     description: str | None = None,
 ) -> Model | Callable[[Callable[..., Any]], Model]:
@@ -345,6 +353,10 @@ def model(
         Of the forcing, angular, where equations depend on the time `t`.
     whirl : str or pair
         The two states of the complex signal from whose spectrum cycles are named 2:1, 3:1 …
+    time : str
+        Unit of time; by default it follows from the other units.
+    units : str
+        ``"labels"`` leaves units unchecked.
     name, description : str
         By default those of the function.
 
@@ -372,18 +384,27 @@ def model(
     if path is not None:
         if not isinstance(path, (str, os.PathLike)):
             raise TypeError('@foldline.model needs brackets with the states: @foldline.model(states="x y")')
-        return Model(_native.Model.read(os.fspath(path)))
+        return _told(Model(_native.Model.read(os.fspath(path))))
+    stated = {key: own for key, own in (("time", time), ("units", units)) if own is not None}
+    head = "".join(f"{key} = {value(own)}\n" for key, own in stated.items())
     parts = Parts(states, equations, parameters, definitions, outputs, frequency, period, whirl)
     if equations is not None:
-        return _compiled(parts.text(equations, name or "model", description or ""), name)
+        return _compiled(head + parts.text(equations, name or "model", description or ""), name)
 
     def traced(function: Callable[..., Any]) -> Model:
         own = name or str(getattr(function, "__name__", "model"))
         text = (inspect.getdoc(function) or "") if description is None else description
-        return _compiled(parts.text(parts.trace(function), own, text), own)
+        return _compiled(head + parts.text(parts.trace(function), own, text), own)
 
     return traced
 
 
 def _compiled(text: str, name: str | None) -> Model:
-    return Model(_native.Model.parse(text, f"<model {name}>" if name else "<model>"))
+    return _told(Model(_native.Model.parse(text, f"<model {name}>" if name else "<model>")))
+
+
+def _told(made: Model) -> Model:
+    """Warns of what is doubtful about the units."""
+    for remark in made._native.remarks:
+        warnings.warn(remark, UserWarning, stacklevel=4)
+    return made

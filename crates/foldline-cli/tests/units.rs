@@ -35,8 +35,8 @@ fn models_whose_units_contradict_each_other_are_refused_with_place_and_both_unit
         (spring(r#"{ equation = "v", unit = "mm" }"#, r#"{ equation = "0", unit = "m/s" }"#), "m.toml:5:19", ["mm/s", "m/s"]),
         (spring(plain, r#"{ equation = "-k*x", unit = "m/s" }"#), "m.toml:6:19", ["m/s^2", "N"]),
         (spring(plain, right) + "[outputs]\nF = { expression = \"k*x\", unit = \"J\" }\n", "m.toml:8:21", ["J", "N"]),
-        (spring(plain, right) + "[outputs]\nF = \"k*x + m*v\"\n", "m.toml:8:13", ["N", "kg m/s"]),
-        (spring(plain, right) + "[outputs]\nF = \"sin(x)\"\n", "m.toml:8:11", ["sin", "rad"]),
+        (spring(plain, right) + "[outputs]\nF = \"k*x + m*v\"\n", "m.toml:8:12", ["N", "kg m/s"]),
+        (spring(plain, right) + "[outputs]\nF = \"sin(x)\"\n", "m.toml:8:10", ["sin", "rad"]),
         (spring(plain, right) + "[outputs]\nF = \"if(x > m, 1, 0)\"\n", "m.toml:8:13", ["m", "kg"]),
         (spring(r#"{ equation = "v", unit = "m", range = ["-5 mm", "5 s"] }"#, right), "m.toml:5:53", ["in s", "to m"]),
         (
@@ -267,7 +267,7 @@ fn a_run_is_read_in_any_unit() {
     for (wish, said) in [
         ("Omega=kg", "the dimensions differ"),
         ("Omega", "no `=`"),
-        ("Om=rpm", "did you mean `Omega`"),
+        ("Omeg=rpm", "did you mean `Omega`"),
         ("X=orders:Omega", "the dimensions differ"),
         ("Omega=orders:speed", "no parameter"),
     ] {
@@ -296,7 +296,7 @@ fn values_of_a_study_have_to_fit_the_units_of_the_model() {
             "s.toml:4:20",
             "kg, which cannot be converted to N",
         ),
-        ("attractor = \"cycle\"", "state = { x = \"1 mm\", \"x'\" = \"fast\" }", "s.toml:4:31", "neither a number"),
+        ("attractor = \"cycle\"", "state = { x = \"1 mm\", \"x'\" = \"fast\" }", "s.toml:4:30", "neither a number"),
     ] {
         std::fs::write(folder.join("s.toml"), SPEED.replace(from, to)).unwrap();
         let run = foldline(folder, &["check", "s.toml"]);
@@ -325,7 +325,7 @@ fn surveys_and_sweeps_obey_the_limits_on_trajectories() {
         csv.lines().skip(1).map(|line| line.split(',').nth(column).unwrap().to_string()).collect()
     };
     let free = motions("s.toml", "free", &[]);
-    assert!(free.iter().all(|motion| motion == "rest"), "{free:?}");
+    assert!(free.iter().all(|motion| motion == "equilibrium"), "{free:?}");
     for (study, out, more) in [
         ("s.toml", "time", &["--max-time", "0.3"][..]),
         ("s.toml", "steps", &["--max-steps", "3"]),

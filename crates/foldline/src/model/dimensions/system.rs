@@ -87,8 +87,10 @@ impl System {
         let mut known: Vec<(String, Form)> =
             units.declared.iter().map(|(_, text, unit)| (text.clone(), Form::of(unit))).collect();
         known.retain(|(text, _)| !matches!(text.as_str(), "1" | "-" | ""));
-        let rates: Vec<String> = known.iter().map(|(text, _)| format!("{text}/{time}")).collect();
-        known.extend(rates.into_iter().chain(TOLD.map(String::from)).map(|text| {
+        // mV/ms before its value in base units, m/s^2 before m/s/s.
+        let rates = known.iter().map(|(text, _)| format!("{text}/{time}"));
+        let (long, rates): (Vec<String>, Vec<String>) = rates.partition(|text| text.matches('/').count() > 1);
+        known.extend(rates.into_iter().chain(TOLD.map(String::from)).chain(long).map(|text| {
             let form = Form::of(&Unit::read(&text));
             (text, form)
         }));
@@ -178,7 +180,12 @@ impl System {
 
     /// True if a unit follows from declared ones alone: what contradicts it is wrong, however the rest of the model is meant.
     pub fn is_firm(&self, form: &Form) -> bool {
-        form.powers.keys().all(|key| !matches!(key, Key::Quantity(k) if !self.quantities[*k].firm))
+        form.powers.keys().all(|key| match key {
+            Key::Quantity(k) => self.quantities[*k].firm,
+            // A number that is taken for a quantity may be meant otherwise.
+            Key::Number(_) => self.solved.get(key).is_none_or(|own| own.dimension().next().is_none()),
+            Key::Base(_) => true,
+        })
     }
 
     /// Numbers whose units cancel: one alone is pure. Of several the last follows from the others, which may still turn out to carry
