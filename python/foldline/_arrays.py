@@ -57,6 +57,13 @@ def tolerable(tolerance: float, least: float = 1e-10, most: float = 1e-4) -> flo
     return float(tolerance)
 
 
+def limits(steps: int | None, time: float | None) -> tuple[int | None, float | None]:
+    """Limits on trajectories, as far as they are given."""
+    if time is not None and not time > 0:
+        raise InputError(f"max_time = {time!r} is not allowed\n  help: a positive time in the units of the model")
+    return None if steps is None else whole("max_steps", steps), None if time is None else float(time)
+
+
 def finite(name: str, values: Any) -> Floats:
     """Numbers, all of them finite."""
     array: Floats = np.asarray(values, dtype=np.float64)

@@ -315,7 +315,17 @@ class Branch(Sequence[Solution]):
         own = {"range": range, "mark": mark, "stop": stop, "max-points": max_points}
         return switched(self, point, depth, own, out=out, jobs=jobs, progress=progress)
 
-    def plot(self, ax: Any = None, x: str | None = None, y: str | None = None, **style: Any) -> list[Any]:
+    def _shown(self, unit: Mapping[str, str] | None) -> Branch:
+        return self if not unit else self.diagram._shown(unit).branches[self._index]
+
+    def plot(
+        self,
+        ax: Any = None,
+        x: str | None = None,
+        y: str | None = None,
+        unit: Mapping[str, str] | None = None,
+        **style: Any,
+    ) -> list[Any]:
         """Draws the branch: stable pieces solid, unstable ones dashed, special points as marks.
 
         Parameters
@@ -323,6 +333,8 @@ class Branch(Sequence[Solution]):
         ax : matplotlib axes, optional
         x, y : str, optional
             Columns; by default the free parameter, and the largest value of the first output.
+        unit : mapping, optional
+            Units in which quantities are shown, as for `Diagram.plot`.
         **style
             For the lines, such as ``color="black"``.
 
@@ -332,7 +344,7 @@ class Branch(Sequence[Solution]):
         """
         from ._plot import branch
 
-        return branch(self, ax, x, y, style)
+        return branch(self._shown(unit), ax, x, y, style)
 
     def plotly(self, x: str | None = None, y: str | None = None) -> Any:
         """An interactive figure of this branch; see `Diagram.plotly`."""
@@ -340,11 +352,11 @@ class Branch(Sequence[Solution]):
 
         return figure([self], x, y)
 
-    def to_pandas(self) -> pandas.DataFrame:
-        """A table with a row for each point and the columns of `foldline table --points`."""
+    def to_pandas(self, unit: Mapping[str, str] | None = None) -> pandas.DataFrame:
+        """A table with a row for each point and the columns of `foldline table --points`; `unit` as for `plot`."""
         from ._tables import branches_frame
 
-        return branches_frame([self])
+        return branches_frame([self._shown(unit)])
 
     def to_xarray(self) -> xarray.Dataset:
         """A data set over the dimensions `point`, `eigenvalue` and `variable`."""

@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from . import _native
+from ._arrays import whole
 from ._branch import Branch, SpecialPoint
 from ._diagram import Diagram, Homotopy
 from ._errors import InputError, NoSolution
@@ -47,6 +48,8 @@ def run(
     out: Path | None = None,
     jobs: int | None = None,
     resume: bool = False,
+    max_steps: int | None = None,
+    max_time: float | str | None = None,
     progress: Progress = None,
 ) -> Diagram:
     """Runs a study.
@@ -64,6 +67,9 @@ def run(
         How many branches are followed at a time; by default as many as there are processors.
     resume : bool
         Go on with the run in `out`.
+    max_steps, max_time : optional
+        Integration steps, and time, after which a trajectory counts as unsettled; they replace those of the study. A time may have a
+        unit: ``"20 ms"``.
     progress : bool or callable, optional
         Whether a bar is shown; by default in terminals and notebooks where tqdm is installed. A function is called with the number of
         points, of special points, and the place of the last one.
@@ -92,6 +98,7 @@ def run(
         own = _native.Study.read(os.fspath(study))
     else:
         own = _native.Study.parse(text_of(study), os.fspath(study), model._native)
+    own = own.limited(None if max_steps is None else whole("max_steps", max_steps), None if max_time is None else str(max_time))
     return carried_out(own, Diagram, model, out=out, jobs=jobs, resume=resume, progress=progress)
 
 
@@ -304,6 +311,8 @@ def explore(
     out: Path | None = None,
     jobs: int | None = None,
     resume: bool = False,
+    max_steps: int | None = None,
+    max_time: float | str | None = None,
     progress: Progress = None,
 ) -> Diagram:
     """Finds the whole diagram of a model in a range of a parameter, without being told where anything is.
@@ -331,7 +340,7 @@ def explore(
         How many levels of period doubling are followed; by default 2.
     tolerance : float
         The one relative tolerance.
-    out, jobs, resume, progress
+    out, jobs, resume, max_steps, max_time, progress
         As for `run`.
 
     Returns
@@ -343,5 +352,6 @@ def explore(
             "budget": budget}  # fmt: skip
     if doublings is not None:
         item["switch"] = {"hopf": 4, "branch-point": 4, "period-doubling": doublings}
-    study = parsed({"tolerance": tolerance, "explore": [cleaned(item)]}, model)
+    own = {"tolerance": tolerance, "max-steps": max_steps, "max-time": max_time, "explore": [cleaned(item)]}
+    study = parsed({key: value for key, value in own.items() if value is not None}, model)
     return carried_out(study, Diagram, model, out=out, jobs=jobs, resume=resume, progress=progress)

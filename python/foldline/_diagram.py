@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -98,7 +98,18 @@ class Diagram:
     def __len__(self) -> int:
         return len(self.branches)
 
-    def plot(self, ax: Any = None, x: str | None = None, y: str | None = None, curves: bool = False) -> list[Any]:
+    def _shown(self, unit: Mapping[str, str] | None) -> Diagram:
+        """The same diagram with some quantities in other units, to be shown; nothing starts from it."""
+        return self if not unit else Diagram(self._native.in_units(list(unit.items())))
+
+    def plot(
+        self,
+        ax: Any = None,
+        x: str | None = None,
+        y: str | None = None,
+        curves: bool = False,
+        unit: Mapping[str, str] | None = None,
+    ) -> list[Any]:
         """Draws all branches: stable pieces solid, unstable ones dashed, special points as marks.
 
         Parameters
@@ -108,6 +119,8 @@ class Diagram:
             Columns; by default the free parameter, and the largest value of the first output.
         curves : bool
             Curves in two parameters, in their plane, instead of the branches.
+        unit : mapping, optional
+            Units in which quantities are shown: ``{"Omega": "rpm", "r": "mm"}``; ``"orders:Omega"`` divides a frequency by a speed.
 
         Returns
         -------
@@ -115,7 +128,7 @@ class Diagram:
         """
         from ._plot import diagram
 
-        return diagram(self, ax, x, y, curves)
+        return diagram(self._shown(unit), ax, x, y, curves)
 
     def plotly(self, x: str | None = None, y: str | None = None) -> Any:
         """An interactive figure; a point tells its parameters, its period, its multipliers and its error.
@@ -133,11 +146,11 @@ class Diagram:
 
         return figure([own for own in self if own.held is None] or list(self), x, y)
 
-    def to_pandas(self) -> pandas.DataFrame:
-        """A table with a row for each point of each branch and the columns of `foldline table --points`."""
+    def to_pandas(self, unit: Mapping[str, str] | None = None) -> pandas.DataFrame:
+        """A table with a row for each point of each branch and the columns of `foldline table --points`; `unit` as for `plot`."""
         from ._tables import branches_frame
 
-        return branches_frame(list(self))
+        return branches_frame(list(self._shown(unit)))
 
     def to_xarray(self) -> xarray.Dataset:
         """A data set over the dimensions `point`, `eigenvalue` and `variable`."""

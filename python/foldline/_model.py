@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import os
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, overload
@@ -11,10 +12,11 @@ from typing import Any, overload
 import numpy as np
 
 from . import _native
-from ._arrays import finite, floats, pairs, processors, raw, tolerable, whole
+from ._arrays import finite, floats, limits, pairs, processors, raw, tolerable, whole
 from ._simulation import Trajectory, simulated
 from ._solution import Attractor, Attractors, Solution
 from ._trace import Expressions, Parameters, Parts, States
+from ._write import value
 
 Path_ = str | os.PathLike[str]
 
@@ -32,6 +34,8 @@ class Model:
     states, parameters, outputs : dict
         Names, and what is known about each: `unit` and `description`, of parameters `value`, of states `scale`, `range` and, of
         angles, `period` (`None` where the model does not state them).
+    time : str
+        Unit of time; empty where it is not known.
     """
 
     def __init__(self, native: _native.Model) -> None:
@@ -45,6 +49,7 @@ class Model:
         self.parameters: dict[str, dict[str, Any]] = {
             name: {"value": value, "unit": unit, "description": text} for (name, unit, text), value in native.parameters
         }
+        self.time: str = native.time
         self.outputs: dict[str, dict[str, Any]] = {name: {"unit": unit, "description": text} for name, unit, text in native.outputs}
 
     @property
@@ -109,6 +114,8 @@ class Model:
         random: int = 1,
         tolerance: float = 1e-6,
         jobs: int | None = None,
+        max_steps: int | None = None,
+        max_time: float | None = None,
     ) -> Solution:
         """A first solution: what `[[seed]]` means in a study.
 
@@ -128,6 +135,8 @@ class Model:
             The one relative tolerance.
         jobs : int, optional
             Threads; by default as many as there are processors.
+        max_steps, max_time : optional
+            Integration steps, and time, after which a trajectory counts as unsettled.
 
         Returns
         -------
@@ -142,7 +151,7 @@ class Model:
         state = b"" if isinstance(start, str) else raw(self.state(start))
         values = self._values(parameters)
         counts = whole("samples", samples), whole("random", random, 0)
-        found = _native.settle(self._native, attractor, state, values, *counts, tolerable(tolerance), processors(jobs))
+        found = _native.settle(self._native, attractor, state, values, *counts, tolerable(tolerance), processors(jobs), limits(max_steps, max_time))
         return Solution(found, self)
 
     def attractors(
@@ -153,6 +162,8 @@ class Model:
         seed: int = 1,
         tolerance: float = 1e-6,
         jobs: int | None = None,
+        max_steps: int | None = None,
+        max_time: float | None = None,
     ) -> Attractors:
         """Where sampled initial states settle: stable equilibria and cycles, and how many went to each.
 
@@ -168,6 +179,8 @@ class Model:
             The one relative tolerance.
         jobs : int, optional
             Threads; by default as many as there are processors.
+        max_steps, max_time : optional
+            As for `settle`.
 
         Returns
         -------
@@ -176,7 +189,8 @@ class Model:
             uniformly from the ranges, with a confidence interval; `hits` counts those drawn towards the origin too.
         """
         counts = whole("samples", samples), whole("seed", seed, 0)
-        found, lost = _native.attractors(self._native, self._values(parameters), *counts, tolerable(tolerance), processors(jobs))
+        how = tolerable(tolerance), processors(jobs), limits(max_steps, max_time)
+        found, lost = _native.attractors(self._native, self._values(parameters), *counts, *how)
         each = [Attractor(own, self, ratio, hits, share, floats(example)) for own, ratio, hits, share, example in found]
         return Attractors(each, samples, *lost)
 
@@ -274,6 +288,8 @@ def model(
     period: Any = None,
     whirl: str | Sequence[str] | None = None,
     totals: Mapping[str, Mapping[str, Any]] | None = None,
+    time: str | None = None,
+    units: str | None = None,
     name: str = "model",
     description: str = "",
 ) -> Model: ...
@@ -289,6 +305,8 @@ def model(
     frequency: Any = None,
     period: Any = None,
     whirl: str | Sequence[str] | None = None,
+    time: str | None = None,
+    units: str | None = None,
     name: str | None = None,
     description: str | None = None,
 ) -> Callable[[Callable[..., Any]], Model]: ...
@@ -306,6 +324,8 @@ def model(
     frequency: Any = None,
     period: Any = None,
     whirl: str | Sequence[str] | None = None,
+    time: str | None = None,
+    units: str | None = None,
     name: str | None = None,
     description: str | None = None,
 ) -> Model | Callable[[Callable[..., Any]], Model]:
@@ -337,6 +357,10 @@ def model(
         The two states of the complex signal from whose spectrum cycles are named 2:1, 3:1 …
     totals : mapping
         Sums of states that keep their values, which become parameters: ``{"T": dict(sum="x + 2*y", value=1.0)}``.
+    time : str
+        Unit of time; by default it follows from the other units.
+    units : str
+        ``"labels"`` leaves units unchecked.
     name, description : str
         By default those of the function.
 
@@ -364,18 +388,27 @@ def model(
     if path is not None:
         if not isinstance(path, (str, os.PathLike)):
             raise TypeError('@foldline.model needs brackets with the states: @foldline.model(states="x y")')
-        return Model(_native.Model.read(os.fspath(path)))
+        return _told(Model(_native.Model.read(os.fspath(path))))
+    stated = {key: own for key, own in (("time", time), ("units", units)) if own is not None}
+    head = "".join(f"{key} = {value(own)}\n" for key, own in stated.items())
     parts = Parts(states, equations, parameters, definitions, outputs, frequency, period, whirl, totals)
     if equations is not None:
-        return _compiled(parts.text(equations, name or "model", description or ""), name)
+        return _compiled(head + parts.text(equations, name or "model", description or ""), name)
 
     def traced(function: Callable[..., Any]) -> Model:
         own = name or str(getattr(function, "__name__", "model"))
         text = (inspect.getdoc(function) or "") if description is None else description
-        return _compiled(parts.text(parts.trace(function), own, text), own)
+        return _compiled(head + parts.text(parts.trace(function), own, text), own)
 
     return traced
 
 
 def _compiled(text: str, name: str | None) -> Model:
-    return Model(_native.Model.parse(text, f"<model {name}>" if name else "<model>"))
+    return _told(Model(_native.Model.parse(text, f"<model {name}>" if name else "<model>")))
+
+
+def _told(made: Model) -> Model:
+    """Warns of what is doubtful about the units."""
+    for remark in made._native.remarks:
+        warnings.warn(remark, UserWarning, stacklevel=4)
+    return made

@@ -19,7 +19,7 @@ from ._progress import Progress, shown
 from ._solution import Solution
 
 Path = str | os.PathLike[str]
-Range = Sequence[float]
+Range = Sequence[float | str]
 
 #: What the seed is called at which something starts.
 START = "the given solution"
@@ -45,16 +45,21 @@ def _depth() -> int:
     return depth
 
 
+def _end(value: float | str) -> float | str:
+    """A number, or a text such as "500 rpm", which the reader of studies understands."""
+    return value if isinstance(value, str) else float(value)
+
+
 def cleaned(item: Mapping[str, Any]) -> dict[str, Any]:
     """Without what was not said; names with hyphens, as files have them; numbers, where files have numbers."""
     kept = {key: value for key, value in item.items() if value is not None}
     for key in ("range", "branch-range"):
         if key in kept:
-            kept[key] = [float(end) for end in kept[key]]
+            kept[key] = [_end(end) for end in kept[key]]
     if "switch" in kept:
         kept["switch"] = {str(kind).replace("_", "-"): depth for kind, depth in kept["switch"].items()}
     if "connect" in kept:
-        kept["connect"] = {name: [float(end) for end in ends] for name, ends in kept["connect"].items()}
+        kept["connect"] = {name: [_end(end) for end in ends] for name, ends in kept["connect"].items()}
     return kept
 
 

@@ -72,6 +72,23 @@ pub struct Run {
     /// Stop after this time, such as 90s, 10min or 2h, and keep what was found; `--resume` goes on
     #[arg(long, value_name = "TIME", value_parser = time)]
     pub time_limit: Option<Duration>,
+    #[command(flatten)]
+    pub limits: Limits,
+    /// Show a parameter, state, output or `period` in another unit, or a frequency in orders of a speed, as in omega=orders:Omega; may be
+    /// given several times
+    #[arg(long, value_name = "NAME=UNIT")]
+    pub unit: Vec<String>,
+}
+
+/// Limits on trajectories.
+#[derive(Clone, Debug, Args)]
+pub struct Limits {
+    /// Integration steps after which a trajectory counts as unsettled; replaces `max-steps` of the study
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=10_000_000_000))]
+    pub max_steps: Option<u64>,
+    /// The same as a time, in the units of the model or with a unit such as "20 ms"; replaces `max-time`
+    #[arg(long, value_name = "TIME")]
+    pub max_time: Option<String>,
 }
 
 #[derive(Debug, Args)]
@@ -121,6 +138,12 @@ pub struct Explore {
     /// Print the study that does the same, and do nothing else
     #[arg(long)]
     pub print: bool,
+    #[command(flatten)]
+    pub limits: Limits,
+    /// Show a parameter, state, output or `period` in another unit, or a frequency in orders of a speed, as in omega=orders:Omega; may be
+    /// given several times
+    #[arg(long, value_name = "NAME=UNIT")]
+    pub unit: Vec<String>,
 }
 
 /// Limit on an exploration.
@@ -183,6 +206,10 @@ pub struct Table {
     /// How the table is written
     #[arg(long, value_enum, default_value_t = Format::Text)]
     pub format: Format,
+    /// Show a parameter, state, output or `period` in another unit, or a frequency in orders of a speed, as in omega=orders:Omega; may be
+    /// given several times
+    #[arg(long, value_name = "NAME=UNIT")]
+    pub unit: Vec<String>,
 }
 
 /// Which table.
@@ -256,6 +283,10 @@ pub struct Plot {
     /// Title above the axes
     #[arg(long, value_name = "TEXT")]
     pub title: Option<String>,
+    /// Show a parameter, state, output or `period` in another unit, or a frequency in orders of a speed, as in omega=orders:Omega; may be
+    /// given several times
+    #[arg(long, value_name = "NAME=UNIT")]
+    pub unit: Vec<String>,
     /// Picture to write; the ending says which kind
     #[arg(short, long = "output", value_name = "FILE.svg|png|pdf")]
     pub output: PathBuf,
@@ -278,6 +309,10 @@ pub struct Export {
     /// Leave out the profiles of cycles, which make up nearly all of a run
     #[arg(long)]
     pub no_profiles: bool,
+    /// Show a parameter, state, output or `period` in another unit, or a frequency in orders of a speed, as in omega=orders:Omega; may be
+    /// given several times
+    #[arg(long, value_name = "NAME=UNIT")]
+    pub unit: Vec<String>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

@@ -3,9 +3,11 @@
 use crate::arguments::Check as Typed;
 use crate::failure::{Failure, Outcome};
 use foldline::model::Model;
+use foldline::units::Unit;
 use foldline_store::finite::never_finite;
 use foldline_store::model_file::read_model;
 use foldline_store::study_file::{is_study, read_study};
+use std::collections::BTreeSet;
 use std::io::{Write, stdout};
 
 /// Says that a file is right, or fails with everything that is wrong with it.
@@ -15,6 +17,7 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
     let text = std::fs::read_to_string(file).unwrap_or_default();
     let verdict = if is_study(&text) {
         let study = read_study(file)?;
+        remarks(&study.model)?;
         let plan = &study.plan;
         let mut parts = vec![many(plan.seeds.len(), "seed"), many(plan.branches.len(), "branch")];
         let others = [
@@ -31,10 +34,27 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
         if let Some(found) = never_finite(&model, &parameters, &text, &file.display().to_string()) {
             return Err(vec![found].into());
         }
+        remarks(&model)?;
         described(&model)
     };
     writeln!(stdout(), "{} is right: {verdict}", file.display())?;
     Ok(Outcome::Done)
+}
+
+/// Says what is doubtful about the units, and which of them are not known.
+fn remarks(model: &Model) -> std::io::Result<()> {
+    let mut out = stdout();
+    model.remarks.iter().try_for_each(|remark| writeln!(out, "{remark}"))?;
+    let parameters = model.parameters.iter().map(|p| &p.unit);
+    let units = parameters.chain(model.states.iter().map(|s| &s.unit)).chain(model.outputs.iter().map(|o| &o.unit));
+    let units: BTreeSet<&String> = units.collect();
+    let foreign: BTreeSet<String> =
+        units.into_iter().flat_map(|unit| Unit::read(unit).foreign().map(str::to_string).collect::<Vec<_>>()).collect();
+    if foreign.is_empty() {
+        return Ok(());
+    }
+    let names: Vec<String> = foreign.into_iter().map(|name| format!("`{name}`")).collect();
+    writeln!(out, "note: units that are not known, each a unit of its own: {}", names.join(", "))
 }
 
 fn described(model: &Model) -> String {

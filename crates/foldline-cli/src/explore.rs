@@ -4,8 +4,9 @@
 
 use crate::arguments::Explore as Typed;
 use crate::failure::{Failure, Outcome};
-use crate::run::{carried_out, processors};
+use crate::run::{Way, carried_out, limited, processors};
 use foldline::model::Model;
+use foldline::units::{Unit, quantity};
 use foldline_store::model_file::read_model;
 use foldline_store::nearest::suggest;
 use foldline_store::study_file::parse_study;
@@ -18,15 +19,16 @@ pub fn diagram(typed: &Typed) -> Result<Outcome, Failure> {
     let (model, model_text) = read_model(&typed.model)?;
     let text = study(typed, &model)?;
     let study = parse_study(&text, "explore.toml", &model_text, &typed.model.display().to_string())?;
+    let study = limited(study, &typed.limits)?;
     if typed.print {
-        write!(stdout().lock(), "# `model` is relative to the folder in which this study lies.\n{text}")?;
+        write!(stdout().lock(), "# `model` is relative to the folder in which this study lies.\n{}", study.text)?;
         return Ok(Outcome::Done);
     }
     let stem = typed.model.file_stem().unwrap_or("model".as_ref());
     let folder = typed.out.clone().unwrap_or_else(|| PathBuf::from("runs").join(format!("explore-{}", stem.display())));
     let jobs = typed.jobs.map_or_else(processors, usize::from);
     let limit = typed.time_limit.into_iter().chain(typed.budget.time).min();
-    carried_out(&study, jobs, typed.resume, limit, &folder)
+    carried_out(&study, &Way { jobs, resume: typed.resume, limit, units: &typed.unit, folder: &folder })
 }
 
 /// The study that does what was typed.
@@ -97,11 +99,11 @@ fn ranged(option: &str, typed: &str, model: &Model) -> Result<(String, [f64; 2])
     let (name, ends) = typed.split_once('=').ok_or_else(|| said("there is no `=`", &example))?;
     let (low, high) = ends.split_once(':').ok_or_else(|| said("there is no `:` between two values", &example))?;
     let name = parameter(name.trim(), model).map_err(|(message, cure)| said(&message, &cure))?;
-    let [low, high] = [low, high].map(|end| end.trim().parse::<f64>().ok().filter(|v| v.is_finite()));
+    let [low, high] = [low, high].map(|end| measured(end, &name, model));
     match (low, high) {
         (Some(low), Some(high)) if low < high => Ok((name, [low, high])),
         (Some(_), Some(_)) => Err(said("the first value is not smaller than the second", &example)),
-        _ => Err(said("an end is not a finite number", &example)),
+        _ => Err(said("an end is neither a finite number nor a quantity in a unit of the parameter", &example)),
     }
 }
 
@@ -111,8 +113,22 @@ fn valued(typed: &str, model: &Model) -> Result<(String, f64), Failure> {
     let example = "write --set NAME=VALUE, for example --set Omega=5";
     let (name, value) = typed.split_once('=').ok_or_else(|| said("there is no `=`", example))?;
     let name = parameter(name.trim(), model).map_err(|(message, cure)| said(&message, &cure))?;
-    let value = value.trim().parse::<f64>().ok().filter(|v| v.is_finite());
-    value.map(|value| (name, value)).ok_or_else(|| said("the value is not a finite number", example))
+    let value = measured(value, &name, model);
+    value
+        .map(|value| (name, value))
+        .ok_or_else(|| said("the value is neither a finite number nor a quantity in a unit of the parameter", example))
+}
+
+/// A number, or a number with a unit such as `500 rpm`, in the unit of a parameter.
+fn measured(text: &str, parameter: &str, model: &Model) -> Option<f64> {
+    let number = match (quantity(text), model.parameter_index(parameter)) {
+        (Some(written), Some(index)) => {
+            let own = Unit::read(&model.parameters[index].unit);
+            Unit::read(&written.unit).convert(written.value, &own).ok()
+        }
+        _ => text.trim().parse().ok(),
+    };
+    number.filter(|value: &f64| value.is_finite())
 }
 
 fn parameter(name: &str, model: &Model) -> Result<String, (String, String)> {

@@ -2,7 +2,7 @@
 
 use crate::arguments::{Export as Typed, ExportFormat};
 use crate::failure::{Failure, Outcome};
-use crate::table::asked_for;
+use crate::table::{asked_for, conversion};
 use foldline_store::export::{Export, ExportError, Format};
 use std::io::{Write, stderr};
 
@@ -14,6 +14,9 @@ pub fn write(typed: &Typed) -> Result<Outcome, Failure> {
         let kept = typed.branch.iter().map(|name| asked_for(&export.diagram, Some(name)));
         let kept = kept.collect::<Result<Vec<_>, Failure>>()?;
         export.keep(|branch| kept.iter().any(|kept| kept(branch)));
+    }
+    if let Some(conversion) = conversion(export.model(), &typed.unit)? {
+        export.show_in(conversion);
     }
     let (format, name) = match typed.format {
         ExportFormat::Csv => (Format::Csv, "csv"),

@@ -77,7 +77,7 @@ fn chosen<'s>(sources: &'s [Source], labels: &[i64]) -> Result<Vec<(&'s Source, 
 
 /// label, what it is, the free parameters, period, mesh.
 fn listed(chosen: &[(&Source, &Labelled)]) -> Table {
-    let column = |name: &str, style: Style| Column { name: name.to_string(), style };
+    let column = Column::new;
     let mut free: Vec<(usize, String)> = Vec::new();
     for (source, solution) in chosen {
         // The period has a column of its own.

@@ -2,7 +2,7 @@
 
 use crate::arguments::Plot as Typed;
 use crate::failure::{Failure, Outcome};
-use crate::table::{Run, read};
+use crate::table::{Run, conversion, read};
 use foldline::diagram::{Branch, Diagram};
 use foldline::model::Model;
 use foldline_plot::{Picture, Quantity, pdf, png, svg};
@@ -14,7 +14,10 @@ const SCALE: f32 = 2.0;
 
 /// Writes a picture of a run.
 pub fn write(typed: &Typed) -> Result<Outcome, Failure> {
-    let Run { model, diagram, .. } = read(&typed.folder, Part::Numbers)?;
+    let Run { mut model, mut diagram, .. } = read(&typed.folder, Part::Numbers)?;
+    if let Some(conversion) = conversion(&model, &typed.unit)? {
+        (diagram, model) = (conversion.diagram(diagram), conversion.model().clone());
+    }
     let axis = |option: &str, name: &Option<String>| {
         let quantity = name.as_ref().map(|name| {
             let unknown = |choices| Failure::typed(format!("--{option}: there is no quantity \"{name}\""), choices);

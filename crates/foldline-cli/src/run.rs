@@ -1,10 +1,10 @@
 //! `foldline run`: a study from its file to its table.
 
-use crate::arguments::Run as Typed;
+use crate::arguments::{Limits, Run as Typed};
 use crate::failure::{Failure, Outcome};
 use crate::plot::draw;
 use crate::progress::Progress;
-use crate::table::{print_special, tell_short};
+use crate::table::{conversion, print_special, tell_short};
 use foldline::contract::{Event, Observer, Verdict};
 use foldline::diagram::{Branch, Diagram, Point};
 use foldline::explore;
@@ -23,36 +23,56 @@ const MODEL: &str = include_str!("../../../models/overhung-rotor.toml");
 
 /// Runs a study file.
 pub fn study(typed: &Typed) -> Result<Outcome, Failure> {
-    let study = read_study(&typed.study)?;
+    let study = limited(read_study(&typed.study)?, &typed.limits)?;
     let folder = typed.out.clone().unwrap_or_else(|| {
         let stem = typed.study.file_stem().unwrap_or("study".as_ref());
         PathBuf::from("runs").join(stem)
     });
-    carried_out(&study, typed.jobs.map_or_else(processors, usize::from), typed.resume, typed.time_limit, &folder)
+    let way = Way {
+        jobs: typed.jobs.map_or_else(processors, usize::from),
+        resume: typed.resume,
+        limit: typed.time_limit,
+        units: &typed.unit,
+        folder: &folder,
+    };
+    carried_out(&study, &way)
+}
+
+/// The study with the limits that were typed.
+pub fn limited(study: Study, limits: &Limits) -> Result<Study, Failure> {
+    Ok(study.limited(limits.max_steps, limits.max_time.as_deref())?)
+}
+
+/// How a study is carried out.
+pub struct Way<'w> {
+    pub jobs: usize,
+    pub resume: bool,
+    pub limit: Option<Duration>,
+    /// What is shown in other units, as typed.
+    pub units: &'w [String],
+    pub folder: &'w Path,
 }
 
 /// Runs a study into a folder, or goes on with it there.
-pub fn carried_out(
-    study: &Study,
-    jobs: usize,
-    resume: bool,
-    limit: Option<Duration>,
-    folder: &Path,
-) -> Result<Outcome, Failure> {
-    let (recorder, earlier) = match resume {
-        true => Recorder::resume(folder, study)?,
-        false => (Recorder::create(folder, study)?, Diagram::default()),
+pub fn carried_out(study: &Study, way: &Way) -> Result<Outcome, Failure> {
+    // Mistakes in what is to be shown are told before anything is computed.
+    conversion(&study.model, way.units)?;
+    study.model.remarks.iter().try_for_each(|remark| writeln!(stderr(), "{remark}"))?;
+    let (recorder, earlier) = match way.resume {
+        true => Recorder::resume(way.folder, study)?,
+        false => (Recorder::create(way.folder, study)?, Diagram::default()),
     };
-    run(study, jobs, recorder, earlier, limit, folder)
+    run(study, recorder, earlier, way)
 }
 
 /// Runs the study that is built in, over an earlier run of it, and draws it.
 pub fn reference_study() -> Result<Outcome, Failure> {
     let folder = Path::new("runs").join("bouncing");
     let study = parse_study(STUDY, "overhung-rotor/bouncing.toml", MODEL, "overhung-rotor.toml")?;
+    let way = Way { jobs: processors(), resume: false, limit: None, units: &[], folder: &folder };
     Recorder::discard(&folder)?;
     let recorder = Recorder::create(&folder, &study)?;
-    let outcome = run(&study, processors(), recorder, Diagram::default(), None, &folder)?;
+    let outcome = run(&study, recorder, Diagram::default(), &way)?;
     // What the run still has in memory need not be all of it.
     let diagram = crate::table::read(&folder, foldline_store::run_file::Part::Everything)?.diagram;
     // In full view the peak of contact S, r = 51.7, would press everything else against the axis.
@@ -70,14 +90,8 @@ pub fn processors() -> usize {
     std::thread::available_parallelism().map_or(1, |n| n.get())
 }
 
-fn run(
-    study: &Study,
-    jobs: usize,
-    recorder: Recorder,
-    earlier: Diagram,
-    limit: Option<Duration>,
-    folder: &Path,
-) -> Result<Outcome, Failure> {
+fn run(study: &Study, recorder: Recorder, earlier: Diagram, way: &Way) -> Result<Outcome, Failure> {
+    let Way { jobs, limit, folder, .. } = *way;
     let watch = Watch { recorder, progress: Progress::new(&study.model), stop: stop_on_interrupt() };
     let clock = Clock::new(limit);
     let system = explore::System::of_plan(&study.model, &study.plan);
@@ -90,7 +104,10 @@ fn run(
     watch.recorder.finish()?;
 
     let diagram = ordered(diagram, &names(&study.plan));
-    print_special(&diagram, &study.model)?;
+    match conversion(&study.model, way.units)? {
+        Some(conversion) => print_special(&conversion.diagram(diagram.clone()), conversion.model())?,
+        None => print_special(&diagram, &study.model)?,
+    }
     let whole = tell_short(&diagram, &study.plan, &study.model)?;
     let mut err = stderr().lock();
     if !study.plan.homotopies.is_empty() {

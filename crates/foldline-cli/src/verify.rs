@@ -30,7 +30,7 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
 }
 
 fn listed(checks: &[&Check]) -> Table {
-    let column = |name: &str, style| Column { name: name.to_string(), style };
+    let column = Column::new;
     let columns = vec![
         column("branch", Style::Word),
         column("position", Style::Number),

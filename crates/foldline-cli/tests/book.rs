@@ -101,7 +101,7 @@ impl Page {
 
     /// The pictures shown on the page.
     fn pictures(&self) -> Vec<&str> {
-        let shown = self.lines.iter().filter_map(|line| line.split_once("](../../images/")?.1.split_once(')'));
+        let shown = self.lines.iter().filter_map(|line| line.split_once("images/")?.1.split_once(')'));
         shown.map(|(name, _)| name).collect()
     }
 }
@@ -205,6 +205,7 @@ fn the_pages_on_bifurcations_quote_what_the_program_prints() {
     }
     pages.push(root().join("docs/book/from-auto.md"));
     pages.push(root().join("docs/book/when-it-does-not-work.md"));
+    pages.push(root().join("docs/book/units.md"));
     let (renew, next) = (std::env::var_os("FOLDLINE_WRITE_BOOK").is_some(), AtomicUsize::new(0));
     let work = || {
         let mut wrong = Vec::new();

@@ -59,7 +59,7 @@ pub fn label(quantity: Quantity, model: &Model) -> String {
         Quantity::Parameter(index) => {
             (model.parameters.get(index).map_or(("", ""), |p| (p.name.as_str(), p.unit.as_str())), "")
         }
-        Quantity::Period => (("period", ""), ""),
+        Quantity::Period => (("period", model.time.as_str()), ""),
         Quantity::Norm(_) => (("rms of the state", ""), ""),
         Quantity::Smallest(index) => (variable(index).unwrap_or_default(), "min "),
         Quantity::Largest(index) => (variable(index).unwrap_or_default(), "max "),

@@ -5,11 +5,12 @@ use crate::failure;
 use crate::saving::save;
 use crate::solution::Solution;
 use crate::study::Study;
+use foldline::converted::Conversion;
 use foldline::diagram::{self, Branch, Ending, Origin, Point, Share};
 use foldline_store::order::{leg, names, ordered};
 use foldline_store::run_file::load;
 use foldline_store::short;
-use foldline_store::study_file::{self, parse_study};
+use foldline_store::study_file::{self, parse_study_of_run};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use std::path::PathBuf;
@@ -45,7 +46,8 @@ impl Diagram {
     #[staticmethod]
     fn load(py: Python, folder: PathBuf) -> PyResult<Diagram> {
         let run = py.detach(|| load(&folder)).map_err(|error| failure::of_run_file(py, &error))?;
-        let study = py.detach(|| parse_study(&run.study_text, &run.study_file, &run.model_text, &run.model_file));
+        let study =
+            py.detach(|| parse_study_of_run(&run.study_text, &run.study_file, &run.model_text, &run.model_file));
         let study = study.map_err(|found| failure::of_text(py, &found))?;
         Ok(Diagram::new(run.diagram, Arc::new(study), run.notes))
     }
@@ -59,6 +61,15 @@ impl Diagram {
     /// The study.
     fn study(&self) -> Study {
         Study { study: Arc::clone(&self.study) }
+    }
+
+    /// The diagram and its model with some quantities in other units, `(name, unit)`, to be shown.
+    fn in_units(&self, py: Python, units: Vec<(String, String)>) -> PyResult<Diagram> {
+        let refused = |[message, cure]: [String; 2]| failure::of_argument(py, message, cure);
+        let conversion = Conversion::new(&self.study.model, &units).map_err(refused)?;
+        let diagram = Arc::new(conversion.diagram((*self.diagram).clone()));
+        let study = study_file::Study { model: conversion.model().clone(), ..(*self.study).clone() };
+        Ok(Diagram { diagram, study: Arc::new(study), notes: self.notes.clone() })
     }
 
     /// What of the study was not reached.

@@ -71,6 +71,18 @@ impl Model {
         self.model.outputs.iter().map(|o| (&*o.name, &*o.unit, &*o.description)).collect()
     }
 
+    /// Unit of time, and so of periods; empty where it is not known.
+    #[getter]
+    fn time(&self) -> &str {
+        &self.model.time
+    }
+
+    /// What is doubtful about the units.
+    #[getter]
+    fn remarks(&self) -> Vec<String> {
+        self.model.remarks.clone()
+    }
+
     /// Indices of the two states of the complex signal.
     #[getter]
     fn whirl(&self) -> Option<(usize, usize)> {

@@ -12,7 +12,7 @@ use pyo3::types::PyBytes;
 
 /// The solution that an attractor's name (`equilibrium`, `cycle`, `2:1`) or a state `[n]` means.
 #[pyfunction]
-#[pyo3(signature = (model, attractor, state, parameters, samples, random, tolerance, jobs))]
+#[pyo3(signature = (model, attractor, state, parameters, samples, random, tolerance, jobs, limits))]
 pub fn settle(
     py: Python,
     model: &Model,
@@ -23,6 +23,7 @@ pub fn settle(
     random: u64,
     tolerance: f64,
     jobs: usize,
+    limits: (Option<usize>, Option<f64>),
 ) -> PyResult<Solution> {
     let parameters = checked(py, model, parameters)?;
     let source = match attractor {
@@ -32,7 +33,7 @@ pub fn settle(
     let seed = SeedPlan { name: "start".into(), source, parameters, samples, random };
     let own = model.model.clone();
     let (found, _) = patiently(py, None, &mut |_| Ok(()), move || {
-        explore::first_solution(&System::of(&own, &seed.parameters), &seed, tolerance, jobs)
+        explore::first_solution(&limited(System::of(&own, &seed.parameters), limits), &seed, tolerance, jobs)
     })?;
     found.map(|point| Solution::new(point, &model.model)).map_err(|why| failure::no_solution(py, why))
 }
@@ -51,11 +52,19 @@ pub fn attractors<'py>(
     seed: u64,
     tolerance: f64,
     jobs: usize,
+    limits: (Option<usize>, Option<f64>),
 ) -> PyResult<(Vec<Found<'py>>, (usize, usize, usize))> {
     let parameters = checked(py, model, parameters)?;
     let own = model.model.clone();
     let (census, _) = patiently(py, None, &mut |_| Ok(()), move || {
-        explore::attractors(&System::of(&own, &parameters), &parameters, samples, seed, jobs, tolerance)
+        explore::attractors(
+            &limited(System::of(&own, &parameters), limits),
+            &parameters,
+            samples,
+            seed,
+            jobs,
+            tolerance,
+        )
     })?;
     let found = census.attractors.into_iter().map(|attractor| {
         let example = numbers(py, attractor.example.iter().copied())?;
@@ -64,6 +73,13 @@ pub fn attractors<'py>(
     });
     let escaped = census.escaped + census.exits.len();
     Ok((found.collect::<PyResult<_>>()?, (escaped, census.stuck, census.unsettled)))
+}
+
+/// The system with other limits on trajectories, where they are given: steps and time.
+fn limited<'a>(mut system: System<'a>, (steps, time): (Option<usize>, Option<f64>)) -> System<'a> {
+    system.limits.steps = steps.unwrap_or(system.limits.steps);
+    system.limits.time = time.unwrap_or(system.limits.time);
+    system
 }
 
 /// The parameters, at which the model must be finite somewhere.

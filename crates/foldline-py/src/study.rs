@@ -30,6 +30,12 @@ impl Study {
         study.map(|study| Study { study: Arc::new(study) }).map_err(|found| failure::of_text(py, &found))
     }
 
+    /// The study with other limits on trajectories, which become part of its text.
+    fn limited(&self, py: Python, steps: Option<u64>, time: Option<String>) -> PyResult<Study> {
+        let study = (*self.study).clone().limited(steps, time.as_deref());
+        study.map(|study| Study { study: Arc::new(study) }).map_err(|found| failure::of_text(py, &found))
+    }
+
     #[getter]
     fn text(&self) -> &str {
         &self.study.text

@@ -110,7 +110,13 @@ pub enum Seen {
 /// Compares a survey or sweep of `simulated` with every branch of `followed` that has the same parameters, with that many threads.
 pub fn compare(simulated: &Run, set: &Responses, followed: &[&Run], jobs: usize) -> Agreement {
     let system = System::of_plan(&simulated.study.model, &simulated.study.plan);
-    let trial = Trial { field: system.field, scales: &system.scales, whirl: system.whirl, jobs: 1 };
+    let trial = Trial {
+        field: system.field,
+        scales: &system.scales,
+        whirl: system.whirl,
+        jobs: 1,
+        limits: foldline::attractors::Limits::patient(),
+    };
     let context = Context { system: &system, trial, free: set.free, followed };
     let groups: Vec<&[Response]> = set.responses.chunk_by(|a, b| a.value == b.value).collect();
     let (next, done) = (AtomicUsize::new(0), Mutex::new(Vec::new()));

@@ -161,7 +161,13 @@ pub fn smallest_sharpness(constants: &Nondimensional, motions: &[Response], acce
 
 fn settled(law: ContactLaw, constants: &Nondimensional, sharpness: f64, start: &[f64]) -> Option<Response> {
     let field = OverhungRotor { law };
-    let trial = Trial { field: &field, scales: &SCALES, whirl: Some([0, 1]), jobs: 1 };
+    let trial = Trial {
+        field: &field,
+        scales: &SCALES,
+        whirl: Some([0, 1]),
+        jobs: 1,
+        limits: foldline::attractors::Limits::patient(),
+    };
     let parameters = constants.parameters();
     stepped_sweep(&trial, &parameters, SHARPNESS, &[sharpness], start, &mut |_, _| None, &|_| Verdict::Continue).pop()
 }

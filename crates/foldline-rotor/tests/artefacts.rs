@@ -80,7 +80,8 @@ fn motions(constants: &Nondimensional) -> Vec<Response> {
     let field = OverhungRotor { law: ContactLaw::Piecewise };
     let scales = [1.0; 4];
     let whirl = Some([0, 1]);
-    let trial = Trial { field: &field, scales: &scales, whirl, jobs: 2 };
+    let trial =
+        Trial { field: &field, scales: &scales, whirl, jobs: 2, limits: foldline::attractors::Limits::patient() };
     let ranges = vec![[-5.0, 5.0], [-5.0, 5.0], [-15.0, 15.0], [-15.0, 15.0]];
     let sampling = Sampling {
         ranges,

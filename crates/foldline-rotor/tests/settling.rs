@@ -11,7 +11,7 @@ const OMEGA: usize = 0;
 const RADIUS: usize = 4;
 
 fn trial(field: &dyn VectorField, jobs: usize) -> Trial<'_> {
-    Trial { field, scales: &SCALES, whirl: Some([0, 1]), jobs }
+    Trial { field, scales: &SCALES, whirl: Some([0, 1]), jobs, limits: foldline::attractors::Limits::patient() }
 }
 
 fn sampling(samples: usize) -> Sampling {

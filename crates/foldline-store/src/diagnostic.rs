@@ -23,6 +23,13 @@ pub struct Diagnostic {
     pub hint: Option<String>,
 }
 
+impl Diagnostic {
+    /// As a remark, on which nothing is refused.
+    pub fn as_note(&self) -> String {
+        self.to_string().replacen("error:", "note:", 1)
+    }
+}
+
 impl fmt::Display for Diagnostic {
     /// In the form that compilers use; the last line has no line end.
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {

@@ -2,6 +2,7 @@
 
 use crate::diagnostic::Diagnostic;
 use crate::nearest::suggest;
+use foldline::units::{self, Unit};
 use std::io::Read;
 use std::ops::Range;
 use std::path::Path;
@@ -78,6 +79,42 @@ impl<'t> Walk<'t> {
                 None
             }
         }
+    }
+
+    /// A number, or a number with a unit such as `"0.3 mm"`, which is converted to `unit`.
+    pub(crate) fn quantity(&mut self, value: &Value, what: &str, unit: &str) -> Option<f64> {
+        let Some(written) = value.get_ref().as_str().and_then(units::quantity) else {
+            if value.get_ref().as_str().is_some() {
+                let message = format!("{what} is neither a number nor a number with a unit");
+                self.report(
+                    value.span(),
+                    message,
+                    "write a number, or one with its unit in quotes, such as \"0.3 mm\"",
+                );
+                return None;
+            }
+            return self.number(value, what);
+        };
+        let (from, to) = (Unit::read(&written.unit), Unit::read(unit));
+        let found = from.convert(written.value, &to);
+        if let Err(why) = found {
+            let declared = !matches!(unit, "" | "1" | "-");
+            let (message, hint) = match declared {
+                true => {
+                    let message = format!("{what} is in {}, which cannot be converted to {unit}: {why}", written.unit);
+                    (message, format!("give it in {unit}, or in a unit of the same dimension"))
+                }
+                false => {
+                    let message = format!("{what} is in {}, and the model states no unit for it", written.unit);
+                    (
+                        message,
+                        format!("state it in the model, as in `unit = \"{}\"`, or give a plain number", written.unit),
+                    )
+                }
+            };
+            self.report(value.span(), message, hint);
+        }
+        found.ok()
     }
 
     /// An integer within `allowed`.

@@ -183,3 +183,56 @@ fn the_first_model_of_the_book_is_right() {
         assert!((found - period * expected).abs() < 1e-14, "{f:?}");
     }
 }
+
+#[test]
+fn values_with_units_are_converted_and_expressions_are_left_alone() {
+    let text = r#"
+[constants]
+V0 = "40 mV"
+n = "2*3"
+[parameters]
+beta = 2.0
+K = "15*beta"
+d = { value = "0.3 mm", unit = "m" }
+speed = "2670 rpm"
+k = { values = ["1 kN/m", 2000], unit = "N/m" }
+[states.x]
+equation = "-x*speed*V0/V0*n"
+unit = "m"
+range = ["-2 mm", "0.5 cm"]
+scale = "1 mm"
+"#;
+    let model = parse_model(text, "model.toml").unwrap_or_else(|found| panic!("{}", found[0]));
+    let value = |name: &str| model.parameters.iter().find(|p| p.name == name).map(|p| (p.value, p.unit.as_str()));
+    assert_eq!(value("d"), Some((3e-4, "m")));
+    assert_eq!(value("speed"), Some((2670.0, "rpm")));
+    assert_eq!([value("k[1]"), value("k[2]")], [Some((1000.0, "N/m")), Some((2000.0, "N/m"))]);
+    assert_eq!(value("K"), None);
+    assert_eq!((model.states[0].range, model.states[0].scale), (Some([-2e-3, 5e-3]), Some(1e-3)));
+    // A forgotten star makes no unit.
+    let forgotten = "[parameters]\nbeta = 2\nK = \"15 beta\"\n[states]\nx = \"-x\"\n";
+    let ((line, column), _, message) = only(forgotten);
+    assert_eq!((line, column), (3, 5));
+    assert!(message.contains("`15*beta`"), "{message}");
+}
+
+#[test]
+fn the_unit_of_time_follows_from_the_others() {
+    let model = |head: &str, body: &str| parse_model(&format!("{head}\n[states]\n{body}"), "model.toml");
+    let time = |head: &str, body: &str| model(head, body).unwrap_or_else(|found| panic!("{}", found[0])).time.clone();
+    let leak = "[parameters]\ntau = { value = 5, unit = \"ms\" }";
+    assert_eq!(time(leak, "v = { equation = \"-v/tau\", unit = \"mV\" }"), "ms");
+    assert_eq!(time("", "v = \"-v\""), "");
+    assert_eq!(time("time = \"h\"", "v = \"-v\""), "h");
+    let wrong = model("time = \"kg\"", "v = \"-v\"").unwrap_err();
+    assert!(wrong[0].message.contains("no unit of time"), "{}", wrong[0]);
+}
+
+/// A run of a program that did not check units.
+#[test]
+fn runs_whose_units_contradict_each_other_are_still_read() {
+    let model = "[parameters]\np = 0\n[states]\nx = { equation = \"v\", unit = \"m\" }\nv = { equation = \"p - x\", unit = \"kg\" }\n";
+    let study = "model = \"m.toml\"\n[[seed]]\nname = \"s\"\nstate = { x = 0, v = 0 }\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"p\"\nrange = [0, 1]\n";
+    assert!(foldline_store::study_file::parse_study(study, "s.toml", model, "m.toml").is_err());
+    assert!(foldline_store::study_file::parse_study_of_run(study, "s.toml", model, "m.toml").is_ok());
+}

@@ -11,6 +11,7 @@
 //! | what must a model, a curve, a monitor be able to do? | [`contract`] |
 //! | what comes out? | [`diagram`] |
 //! | how is a model written, evaluated, differentiated? | [`model`] |
+//! | which units are there, and how are they converted? | [`units`] |
 //! | how does a trajectory run? | [`simulation`] |
 //! | what is the curve? | [`problem`] |
 //! | how do we walk it? | [`continuation`] |
@@ -19,10 +20,12 @@
 //! | where do first solutions come from? | [`attractors`] |
 //! | how does a whole diagram come about? | [`explore`] |
 //! | is it right? | [`verify`] |
+//! | what is it in other units? | [`converted`] |
 
 pub mod attractors;
 pub mod continuation;
 pub mod contract;
+pub mod converted;
 pub mod diagram;
 pub mod explore;
 pub mod linalg;
@@ -31,4 +34,5 @@ pub mod problem;
 pub mod simulation;
 pub mod special;
 pub mod stability;
+pub mod units;
 pub mod verify;

@@ -13,7 +13,7 @@ const COEFFICIENTS: usize = 6;
 pub fn special(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) -> bool) -> Table {
     let mut columns = vec![column("branch", Style::Word), column("kind", Style::Word)];
     columns.extend(parameter_columns(diagram, model, kept));
-    columns.push(column("period", Style::Number));
+    columns.push(Column::in_unit("period", Style::Number, &model.time));
     columns.extend(turn_columns(model));
     columns.extend(output_columns(model));
     columns.extend([column("unstable_before", Style::Number), column("unstable_after", Style::Number)]);
@@ -43,15 +43,17 @@ pub fn special(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) -> bool)
 pub fn points(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) -> bool) -> Table {
     let mut columns = vec![column("branch", Style::Word), column("position", Style::Number)];
     columns.extend(parameter_columns(diagram, model, kept));
-    columns.push(column("period", Style::Number));
+    columns.push(Column::in_unit("period", Style::Number, &model.time));
     columns.extend(turn_columns(model));
     columns.extend(output_columns(model));
-    columns.extend(model.outputs.iter().map(|o| column(&format!("{}_min", o.name), Style::Number)));
-    let extremes = |name: &str| [format!("{name}_max"), format!("{name}_min")];
-    columns.extend(model.states.iter().flat_map(|s| extremes(&s.name)).map(|name| column(&name, Style::Number)));
-    let averages = |name: &String| [format!("{name}_mean"), format!("{name}_rms")];
-    let channels = model.outputs.iter().map(|o| &o.name).chain(model.states.iter().map(|s| &s.name));
-    columns.extend(channels.flat_map(averages).map(|name| column(&name, Style::Number)));
+    columns.extend(model.outputs.iter().map(|o| Column::in_unit(&format!("{}_min", o.name), Style::Number, &o.unit)));
+    let ended = |name: &str, unit: &str, endings: [&str; 2]| {
+        endings.map(|ending| Column::in_unit(&format!("{name}_{ending}"), Style::Number, unit))
+    };
+    columns.extend(model.states.iter().flat_map(|s| ended(&s.name, &s.unit, ["max", "min"])));
+    let outputs = model.outputs.iter().map(|o| (&o.name, &o.unit));
+    let channels = outputs.chain(model.states.iter().map(|s| (&s.name, &s.unit)));
+    columns.extend(channels.flat_map(|(name, unit)| ended(name, unit, ["mean", "rms"])));
     columns.push(column("unstable", Style::Number));
     let sizes = ["discretisation", "residual", "trivial_defect", "liouville_defect", "spectrum_error"];
     columns.extend(sizes.map(|name| column(name, Style::Size)));
@@ -150,11 +152,11 @@ fn parameter_columns(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) ->
     let shown = || diagram.branches.iter().filter(|b| kept(b));
     let varies = |index: usize| shown().any(|b| b.free == index || b.held.is_some_and(|(_, follows)| follows == index));
     let style = |index: usize| if varies(index) { Style::Number } else { Style::Varying };
-    model.parameters.iter().enumerate().map(|(index, p)| column(&p.name, style(index))).collect()
+    model.parameters.iter().enumerate().map(|(index, p)| Column::in_unit(&p.name, style(index), &p.unit)).collect()
 }
 
 fn output_columns(model: &Model) -> impl Iterator<Item = Column> {
-    model.outputs.iter().map(|o| column(&format!("{}_max", o.name), Style::Number))
+    model.outputs.iter().map(|o| Column::in_unit(&format!("{}_max", o.name), Style::Number, &o.unit))
 }
 
 /// Every parameter, the period, the largest value of every output.
@@ -175,7 +177,7 @@ fn extreme(point: &Point, variable: usize, end: usize) -> Cell {
 }
 
 fn column(name: &str, style: Style) -> Column {
-    Column { name: name.to_string(), style }
+    Column::new(name, style)
 }
 
 fn count(value: usize) -> Cell {

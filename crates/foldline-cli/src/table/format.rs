@@ -20,7 +20,8 @@ pub fn text(table: &Table, out: &mut impl Write) -> Result<()> {
         }
         let decimals = decimals(&cells);
         let texts: Vec<String> = cells.iter().map(|cell| shown(cell, column.style, decimals)).collect();
-        let all = || std::iter::once(&column.name).chain(&texts);
+        let head = column.head();
+        let all = || std::iter::once(&head).chain(&texts);
         let width = all().map(|text| text.chars().count()).max().unwrap_or(0);
         for (line, text) in lines.iter_mut().zip(all()) {
             if !line.is_empty() {
@@ -56,6 +57,7 @@ fn shown(cell: &Cell, style: Style, decimals: Option<usize>) -> String {
         (Cell::Empty, ..) => "·".to_string(),
         (Cell::Word(word), ..) => word.lines().next().unwrap_or_default().to_string(),
         (Cell::Count(count), ..) => count.to_string(),
+        (Cell::Number(value), _, None) | (Cell::Number(value), Style::Size, _) if *value == 0.0 => "0".to_string(),
         (Cell::Number(value), Style::Size, _) => format!("{value:.1e}"),
         (Cell::Number(value), _, Some(decimals)) => without_sign_of_zero(format!("{value:.decimals$}")),
         (Cell::Number(value), _, None) => format!("{value:.9e}"),
@@ -138,7 +140,7 @@ mod tests {
     use super::*;
 
     fn table() -> Table {
-        let column = |name: &str, style| Column { name: name.into(), style };
+        let column = Column::new;
         let columns = vec![
             column("branch", Style::Word),
             column("K", Style::Varying),
@@ -181,6 +183,16 @@ mod tests {
         let [short, long] = [short, long].map(|bytes| String::from_utf8(bytes).unwrap());
         assert!(short.contains("it ended ") && !short.contains("likely"), "{short}");
         assert!(long.contains("it ended; likely cause: a cusp,"), "{long}");
+    }
+
+    #[test]
+    fn zero_among_powers_of_ten_is_a_plain_zero() {
+        let columns = vec![Column::in_unit("x_max", Style::Number, "m"), Column::new("error", Style::Size)];
+        let rows = [1e-12, 0.0].map(|x| vec![Cell::Number(x), Cell::Number(0.0)]);
+        let mut out = Vec::new();
+        text(&Table { columns, rows: rows.into() }, &mut out).unwrap();
+        let expected = "      x_max [m]  error\n1.000000000e-12      0\n              0      0\n";
+        assert_eq!(String::from_utf8(out).unwrap(), expected);
     }
 
     #[test]

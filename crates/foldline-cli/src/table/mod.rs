@@ -6,6 +6,7 @@ mod responses;
 
 use crate::arguments::{Format, Table as Typed, What};
 use crate::failure::{Failure, Outcome};
+use foldline::converted::Conversion;
 use foldline::diagram::{Branch, Diagram};
 use foldline::explore::plan::Plan;
 use foldline::model::Model;
@@ -13,7 +14,7 @@ use foldline_store::nearest::suggest;
 use foldline_store::order::{leg, names, ordered};
 use foldline_store::run_file::{Part, load_part};
 use foldline_store::short;
-use foldline_store::study_file::parse_study;
+use foldline_store::study_file::parse_study_of_run;
 use std::io::{Write, stderr, stdout};
 use std::path::Path;
 
@@ -27,6 +28,25 @@ pub struct Table {
 pub struct Column {
     pub name: String,
     pub style: Style,
+    /// Shown behind the name in text; empty where there is none.
+    pub unit: String,
+}
+
+impl Column {
+    pub fn new(name: &str, style: Style) -> Column {
+        Column { name: name.to_string(), style, unit: String::new() }
+    }
+
+    /// A column of numbers in a unit.
+    pub fn in_unit(name: &str, style: Style, unit: &str) -> Column {
+        let unit = if matches!(unit, "" | "1" | "-") { "" } else { unit };
+        Column { unit: unit.to_string(), ..Column::new(name, style) }
+    }
+
+    /// Name and unit.
+    pub fn head(&self) -> String {
+        if self.unit.is_empty() { self.name.clone() } else { format!("{} [{}]", self.name, self.unit) }
+    }
 }
 
 /// How a column is shown as text.
@@ -61,11 +81,15 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
     };
     let run = read(&typed.folder, part)?;
     let kept = asked_for(&run.diagram, typed.branch.as_deref())?;
+    let conversion = conversion(&run.model, &typed.unit)?;
+    let shown = conversion.as_ref().map(|own| own.diagram(run.diagram.clone()));
+    let (diagram, model) =
+        (shown.as_ref().unwrap_or(&run.diagram), conversion.as_ref().map_or(&run.model, |own| own.model()));
     let table = match typed.what() {
-        What::Points => columns::points(&run.diagram, &run.model, &kept),
-        What::Branches => columns::branches(&run.diagram, &run.model, &kept),
-        What::Special => columns::special(&run.diagram, &run.model, &kept),
-        What::Responses => responses::responses(&run.diagram, &run.model),
+        What::Points => columns::points(diagram, model, &kept),
+        What::Branches => columns::branches(diagram, model, &kept),
+        What::Special => columns::special(diagram, model, &kept),
+        What::Responses => responses::responses(diagram, model),
         What::Notes => columns::notes(&run.notes, typed.branch.as_deref()),
     };
     let mut out = std::io::BufWriter::new(stdout().lock());
@@ -75,6 +99,23 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
         tell_short(&run.diagram, &run.plan, &run.model)?;
     }
     Ok(Outcome::Done)
+}
+
+/// The units asked for with `--unit NAME=UNIT`; `None` without any.
+pub fn conversion(model: &Model, typed: &[String]) -> Result<Option<Conversion>, Failure> {
+    let one = |text: &String| match text.split_once('=') {
+        Some((name, unit)) if !unit.trim().is_empty() => Ok((name.trim().to_string(), unit.trim().to_string())),
+        _ => Err(Failure::typed(
+            format!("--unit {text}: there is no `=` with a unit behind it"),
+            "write --unit NAME=UNIT, for example --unit Omega=rpm",
+        )),
+    };
+    let wanted = typed.iter().map(one).collect::<Result<Vec<_>, Failure>>()?;
+    if wanted.is_empty() {
+        return Ok(None);
+    }
+    let refused = |[message, cure]: [String; 2]| Failure::typed(format!("--unit: {message}"), cure);
+    Conversion::new(model, &wanted).map(Some).map_err(refused)
 }
 
 /// Prints what was not reached on standard error; returns true if everything was.
@@ -119,7 +160,7 @@ pub struct Run {
 /// The run in a folder, as much of it as is asked for.
 pub fn read(folder: &Path, part: Part) -> Result<Run, Failure> {
     let run = load_part(folder, part)?;
-    let study = parse_study(&run.study_text, &run.study_file, &run.model_text, &run.model_file)?;
+    let study = parse_study_of_run(&run.study_text, &run.study_file, &run.model_text, &run.model_file)?;
     let diagram = ordered(run.diagram, &names(&study.plan));
     let seeds = study.plan.seeds.iter().map(|seed| &seed.name);
     let shown: Vec<&String> = seeds.chain(diagram.branches.iter().map(|b| &b.name)).collect();

@@ -2,20 +2,22 @@
 
 use super::{Cell, Column, Style, Table};
 use foldline::diagram::{Diagram, Motion, Response, Responses, Search, Shown};
-use foldline::model::Model;
+use foldline::model::{Model, Output};
 
 /// One row for each response: set, search, every parameter, motion, ratio, multiplicity, period, the extremes of the outputs,
 /// hits, the share of the uniform starts of a survey with its 95 % confidence interval, time until settled, error, and whether a
 /// sweep jumped there.
 pub fn responses(diagram: &Diagram, model: &Model) -> Table {
     let mut columns = words(&["set", "search"]);
-    columns.extend(model.parameters.iter().map(|p| column(&p.name, Style::Varying)));
+    columns.extend(model.parameters.iter().map(|p| Column::in_unit(&p.name, Style::Varying, &p.unit)));
     columns.extend(words(&["motion", "ratio"]));
-    columns.extend([column("multiplicity", Style::Number), column("period", Style::Number)]);
-    let extremes = |name: &str| [format!("{name}_min"), format!("{name}_max")];
-    columns.extend(model.outputs.iter().flat_map(|o| extremes(&o.name)).map(|name| column(&name, Style::Number)));
+    columns.extend([column("multiplicity", Style::Number), Column::in_unit("period", Style::Number, &model.time)]);
+    let extremes = |own: &Output| {
+        ["min", "max"].map(|end| Column::in_unit(&format!("{}_{end}", own.name), Style::Number, &own.unit))
+    };
+    columns.extend(model.outputs.iter().flat_map(extremes));
     columns.extend(["hits", "share", "share_low", "share_high"].map(|name| column(name, Style::Number)));
-    columns.push(column("settled_after", Style::Size));
+    columns.push(Column::in_unit("settled_after", Style::Size, &model.time));
     columns.extend([column("error", Style::Size), column("jump", Style::Word)]);
     let row = |set: &Responses, response: &Response, jump: &str| {
         let mut row = vec![Cell::Word(set.name.clone()), Cell::Word(set.search.name().into())];
@@ -82,7 +84,7 @@ fn words(names: &[&str]) -> Vec<Column> {
 }
 
 fn column(name: &str, style: Style) -> Column {
-    Column { name: name.to_string(), style }
+    Column::new(name, style)
 }
 
 fn count(value: usize) -> Cell {

@@ -43,6 +43,8 @@ pub(super) struct Variables {
     ranges: Vec<Column>,
     averages: Vec<Column>,
     states: Vec<Column>,
+    /// Unit of time; empty where it is not known.
+    time: String,
 }
 
 /// What columns and dimensions of ours are called, in any of the tables and groups.
@@ -141,7 +143,7 @@ impl Variables {
         let turns = model.angles().map(turn).collect();
         let states = model.states.iter();
         let states = states.map(|s| labelled(&s.name, &s.unit, described(&s.name, &s.description))).collect();
-        Variables { parameters, turns, ranges, averages, states }
+        Variables { parameters, turns, ranges, averages, states, time: model.time.clone() }
     }
 
     /// The states of an equilibrium, or of a profile.
@@ -158,7 +160,7 @@ impl Variables {
     pub(super) fn of_point(&self, cycles: bool) -> Vec<Column> {
         let mut out = vec![integer("position", "place on the branch, 0 at the start")];
         out.extend_from_slice(&self.parameters);
-        out.push(real("period", "period of a cycle"));
+        out.push(Column { unit: self.time.clone(), ..real("period", "period of a cycle") });
         out.push(integer("forcing_periods", "periods of the forcing that a cycle lasts, 0 where there is none"));
         out.extend_from_slice(&self.turns);
         out.extend_from_slice(&self.ranges);

@@ -19,8 +19,10 @@ mod tables;
 use crate::diagnostic::Diagnostic;
 use crate::order::{names, ordered};
 use crate::run_file::{Part, Reading, RunFileError};
-use crate::study_file::{Study, parse_study};
-use foldline::diagram::{Branch, Diagram};
+use crate::study_file::{Study, parse_study_of_run};
+use foldline::converted::Conversion;
+use foldline::diagram::{Branch, Diagram, Point};
+use foldline::model::Model;
 use std::fmt;
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -75,6 +77,7 @@ impl std::error::Error for ExportError {}
 pub struct Export {
     reading: Reading,
     study: Study,
+    conversion: Option<Conversion>,
     /// What is exported, in the order in which it is listed: branches with their special points and ends, without points.
     pub diagram: Diagram,
     /// Whether the profiles of cycles are exported too.
@@ -90,10 +93,29 @@ impl Export {
         let reading = Reading::open(folder)?;
         reading.sound()?;
         let run = reading.recorded(Part::Special)?;
-        let study = parse_study(&run.study_text, &run.study_file, &run.model_text, &run.model_file);
+        let study = parse_study_of_run(&run.study_text, &run.study_file, &run.model_text, &run.model_file);
         let study = study.map_err(ExportError::Study)?;
         let diagram = ordered(run.diagram, &names(&study.plan));
-        Ok(Export { reading, study, diagram, profiles: true })
+        Ok(Export { reading, study, conversion: None, diagram, profiles: true })
+    }
+
+    /// The model, with the units in which it is shown.
+    pub fn model(&self) -> &Model {
+        self.conversion.as_ref().map_or(&self.study.model, |own| own.model())
+    }
+
+    /// Exports quantities in other units.
+    pub fn show_in(&mut self, conversion: Conversion) {
+        self.diagram = conversion.diagram(std::mem::take(&mut self.diagram));
+        self.conversion = Some(conversion);
+    }
+
+    /// A point as it is exported.
+    fn shown(&self, mut point: Point) -> Point {
+        if let Some(conversion) = &self.conversion {
+            conversion.point(&mut point);
+        }
+        point
     }
 
     /// Leaves out all branches but those for which `kept` holds, and what was found by simulation.

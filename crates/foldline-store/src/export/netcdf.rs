@@ -24,7 +24,7 @@ struct Numbers {
 /// Writes the file.
 pub(super) fn write(export: &Export, path: &Path) -> Result<Vec<PathBuf>, ExportError> {
     let (growing, file) = Growing::create(path)?;
-    let variables = Variables::new(&export.study.model);
+    let variables = Variables::new(export.model());
     let (plan, mut numbers) = planned(export, &variables)?;
     let mut laid = plan.lay(file).map_err(|error| growing.failed(error))?;
     let failed = |error| growing.failed(error);
@@ -34,14 +34,16 @@ pub(super) fn write(export: &Export, path: &Path) -> Result<Vec<PathBuf>, Export
         }
         columns.iter_mut().try_for_each(|c| c.flush(&mut laid)).map_err(failed)?;
     }
-    let model = &export.study.model;
+    let model = export.model();
     for (branch, [points, special]) in export.diagram.branches.iter().zip(&mut numbers.branches) {
         let cycles = points.nodes > 0;
         export.reading.each_point(&branch.name, |point| {
+            let point = export.shown(point);
             points.add(&point, point_cells(&point, model, cycles), &mut laid).map_err(failed)
         })?;
         let cycles = special.nodes > 0;
-        export.reading.each_special(&branch.name, |found| {
+        export.reading.each_special(&branch.name, |mut found| {
+            found.point = export.shown(found.point);
             let cells = [point_cells(&found.point, model, cycles), special_cells(&found)].concat();
             special.add(&found.point, cells, &mut laid).map_err(failed)
         })?;
@@ -66,7 +68,7 @@ fn planned(export: &Export, variables: &Variables) -> Result<(Plan, Numbers), Ex
     let names = branches.iter().map(|b| &b.name).chain(sets.iter().map(|set| &set.name));
     let groups: Vec<String> = names.map(|name| free_name(group_name(name), &mut taken)).collect();
     if !branches.is_empty() {
-        let model = &export.study.model;
+        let model = export.model();
         let rows = branches.iter().zip(&extents).zip(&groups).map(|((branch, [points, _]), group)| {
             let mut row = branch_cells(branch, model, points.points);
             row.push(Cell::Text(group.clone()));
@@ -151,7 +153,7 @@ fn responses(
     name: &str,
 ) -> Option<(Vec<Growth>, Vec<Vec<Cell>>)> {
     let group = plan.group(ROOT, name);
-    let model = &export.study.model;
+    let model = export.model();
     plan.text(group, "set", &set.name);
     plan.text(group, "search", set.search.name());
     plan.text(group, "free", model.parameters.get(set.free).map_or("", |p| p.name.as_str()));
@@ -169,7 +171,7 @@ fn branch_groups(
     name: &str,
 ) -> [Group; 2] {
     let group = plan.group(ROOT, name);
-    for (column, cell) in of_branch().iter().zip(branch_cells(branch, &export.study.model, points.points)) {
+    for (column, cell) in of_branch().iter().zip(branch_cells(branch, export.model(), points.points)) {
         match cell {
             Cell::Text(text) => plan.text(group, &column.name, &text),
             Cell::Integer(value) => plan.integer(group, &column.name, value),

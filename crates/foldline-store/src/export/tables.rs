@@ -18,7 +18,7 @@ pub(super) type Begin = dyn Fn(&Path, &str, &[Column]) -> Result<Box<dyn Rows>, 
 
 /// Writes all tables that have rows, and `branches`, `points` and `special_points` in any case.
 pub(super) fn write(export: &Export, folder: &Path, begin: &Begin) -> Result<Vec<PathBuf>, ExportError> {
-    let variables = Variables::new(&export.study.model);
+    let variables = Variables::new(export.model());
     let mut done = vec![branches(export, folder, begin)?];
     done.extend(points(export, folder, begin, &variables)?);
     if !export.diagram.responses.is_empty() {
@@ -31,14 +31,14 @@ fn branches(export: &Export, folder: &Path, begin: &Begin) -> Result<PathBuf, Ex
     let mut table = begin(folder, "branches", &of_branch())?;
     for branch in &export.diagram.branches {
         let [extent, _] = export.reading.extents(&branch.name)?;
-        table.row(&branch_cells(branch, &export.study.model, extent.points))?;
+        table.row(&branch_cells(branch, export.model(), extent.points))?;
     }
     table.finish()
 }
 
 /// The tables of points and special points, and those of their profiles where there are any.
 fn points(export: &Export, folder: &Path, begin: &Begin, variables: &Variables) -> Result<Vec<PathBuf>, ExportError> {
-    let (model, branches) = (&export.study.model, &export.diagram.branches);
+    let (model, branches) = (export.model(), &export.diagram.branches);
     let (mut width, mut cycles) = (0, [false; 2]);
     for branch in branches {
         for (k, extent) in export.reading.extents(&branch.name)?.into_iter().enumerate() {
@@ -60,6 +60,7 @@ fn points(export: &Export, folder: &Path, begin: &Begin, variables: &Variables) 
     };
     for branch in branches {
         export.reading.each_point(&branch.name, |point| {
+            let point = export.shown(point);
             table.row(&cells(&branch.name, &point, model, width))?;
             profile_rows(&mut profiles, &branch.name, point.position, &point)
         })?;
@@ -76,7 +77,8 @@ fn points(export: &Export, folder: &Path, begin: &Begin, variables: &Variables) 
     };
     for branch in branches {
         let mut number = 0;
-        export.reading.each_special(&branch.name, |special| {
+        export.reading.each_special(&branch.name, |mut special| {
+            special.point = export.shown(special.point);
             let mut row = cells(&branch.name, &special.point, model, width);
             row.extend(special_cells(&special));
             table.row(&row)?;
@@ -145,7 +147,7 @@ fn responses(export: &Export, folder: &Path, begin: &Begin, variables: &Variable
         unit: String::new(),
         description: description.into(),
     };
-    let model = &export.study.model;
+    let model = export.model();
     let first = [
         word("set", "name of the survey or sweep"),
         word("search", "survey or sweep"),

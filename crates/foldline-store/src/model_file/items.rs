@@ -3,6 +3,7 @@
 use super::Reader;
 use crate::toml_walk::Value;
 use foldline::model::{Constant, Definition, Field, Item, ModelSource, Output, Parameter, constant_value};
+use foldline::units::quantity;
 use std::ops::Range;
 use toml::de::DeValue;
 
@@ -11,7 +12,12 @@ impl Reader<'_> {
     pub(super) fn constant(&mut self, name: String, place: Range<usize>, value: &Value, source: &mut ModelSource) {
         let what = format!("the constant `{name}`");
         self.places.insert((Item::Constant(source.constants.len()), Field::Name), place);
+        let mut unit = "1".to_string();
         let number = match value.get_ref() {
+            DeValue::String(text) if quantity(text).is_some() => {
+                let item = Item::Constant(source.constants.len());
+                self.measure(item, value, &what, &mut unit)
+            }
             DeValue::String(text) => match constant_value(text, &source.constants) {
                 Ok(number) => Some(number),
                 Err(error) => {
@@ -23,14 +29,15 @@ impl Reader<'_> {
         };
         // A constant may be a count.
         self.incomplete |= number.is_none();
-        source.constants.push(Constant { name, value: number.unwrap_or(1.0) });
+        source.constants.push(Constant { name, unit, value: number.unwrap_or(1.0) });
     }
 
     /// A number, a list of numbers, or an expression of other parameters, which is a definition.
     pub(super) fn parameter(&mut self, name: String, place: Range<usize>, value: &Value, source: &mut ModelSource) {
         let what = format!("the parameter `{name}`");
         let inner = value.get_ref().as_table().and_then(|table| table.get("value")).unwrap_or(value);
-        if inner.get_ref().as_str().is_some_and(|text| text.trim().parse::<f64>().is_err()) {
+        let expression = |text: &str| text.trim().parse::<f64>().is_err() && quantity(text).is_none();
+        if inner.get_ref().as_str().is_some_and(expression) {
             if let DeValue::Table(table) = value.get_ref() {
                 self.walk.only(table, &["value", "unit", "description"], &what);
             }
@@ -57,11 +64,7 @@ impl Reader<'_> {
                     "periodic",
                 ];
                 self.walk.only(table, &KEYS, &what);
-                (parameter.unit, parameter.description) = self.labels(table);
-                if let Some(value) = table.get("scale") {
-                    self.places.insert((item, Field::Scale), value.span());
-                    parameter.scale = self.walk.number(value, &format!("the scale of `{name}`"));
-                }
+                (parameter.unit, parameter.description) = self.labels(item, table);
                 if let Some(values) = table.get("values") {
                     self.values(item, &mut parameter, values);
                 }
@@ -81,7 +84,7 @@ impl Reader<'_> {
             Some(_) if !parameter.values.is_empty() => parameter.value = parameter.values[0],
             Some(number) if number.get_ref().as_array().is_none() => {
                 self.places.insert((item, Field::Value), number.span());
-                parameter.value = self.walk.number(number, &what).unwrap_or(0.0);
+                parameter.value = self.measure(item, number, &what, &mut parameter.unit).unwrap_or(0.0);
             }
             Some(_) => {}
             // A misspelt key has been reported, and is probably the missing one.
@@ -90,6 +93,10 @@ impl Reader<'_> {
                 self.walk.report(place, format!("{what} has no value"), format!("write `{name} = {{ value = 1.0 }}`"));
             }
         }
+        if let Some(value) = value.get_ref().as_table().and_then(|table| table.get("scale")) {
+            self.places.insert((item, Field::Scale), value.span());
+            parameter.scale = self.measure(item, value, &format!("the scale of `{name}`"), &mut parameter.unit);
+        }
         source.parameters.push(parameter);
     }
 
@@ -97,7 +104,7 @@ impl Reader<'_> {
     fn values(&mut self, item: Item, parameter: &mut Parameter, value: &Value) {
         let what = format!("the values of `{}`", parameter.name);
         self.places.insert((item, Field::Value), value.span());
-        parameter.values = self.numbers(value, &what);
+        parameter.values = self.measures(item, value, &what, &mut parameter.unit);
         if parameter.values.is_empty() {
             self.incomplete = true;
         }
@@ -105,12 +112,26 @@ impl Reader<'_> {
 
     /// A list of numbers, empty where something is wrong.
     pub(super) fn numbers(&mut self, value: &Value, what: &str) -> Vec<f64> {
+        self.listed(value, what, |reader, own| reader.walk.number(own, what))
+    }
+
+    /// A list of numbers that may have units.
+    fn measures(&mut self, item: Item, value: &Value, what: &str, unit: &mut String) -> Vec<f64> {
+        self.listed(value, what, |reader, own| reader.measure(item, own, what, unit))
+    }
+
+    fn listed(
+        &mut self,
+        value: &Value,
+        what: &str,
+        mut read: impl FnMut(&mut Self, &Value) -> Option<f64>,
+    ) -> Vec<f64> {
         let before = self.walk.found.len();
         let Some(list) = value.get_ref().as_array().filter(|list| !list.is_empty()) else {
             self.walk.report(value.span(), format!("{what} are not a list of numbers"), "write `[1.0, 2.0, 3.0]`");
             return Vec::new();
         };
-        let numbers: Vec<f64> = list.iter().map_while(|own| self.walk.number(own, what)).collect();
+        let numbers: Vec<f64> = list.iter().map_while(|own| read(self, own)).collect();
         if self.walk.found.len() > before { Vec::new() } else { numbers }
     }
 
@@ -156,7 +177,7 @@ impl Reader<'_> {
         let before = self.walk.found.len();
         self.walk.only(table, &["expression", "unit", "description", "count", "index"], &what);
         let misspelt = self.walk.found.len() > before;
-        (output.unit, output.description) = self.labels(table);
+        (output.unit, output.description) = self.labels(item, table);
         self.places.insert((item, Field::Name), place.clone());
         output.repeat = self.repeat(item, table, &what, constants, None);
         match table.get("expression") {

@@ -9,6 +9,7 @@ mod mass;
 mod repeat;
 mod states;
 mod totals;
+mod units;
 
 use crate::diagnostic::Diagnostic;
 use crate::toml_walk::{Value, Walk, read_text, unreadable};
@@ -18,10 +19,12 @@ use std::ops::Range;
 use std::path::Path;
 use toml::de::{DeTable, DeValue};
 
-const ROOT_KEYS: [&str; 15] = [
+const ROOT_KEYS: [&str; 17] = [
     "name",
     "description",
     "source",
+    "time",
+    "units",
     "constants",
     "functions",
     "tables",
@@ -45,14 +48,23 @@ pub fn read_model(path: &Path) -> Result<(Model, String), Vec<Diagnostic>> {
 
 /// Reads a model text; `file` is its name in messages. Every mistake found is returned.
 pub fn parse_model(text: &str, file: &str) -> Result<Model, Vec<Diagnostic>> {
+    parse(text, file, true)
+}
+
+/// Reads the model text of a run, whose units may be those of a program that did not check them.
+pub(crate) fn parse_model_of_run(text: &str, file: &str) -> Result<Model, Vec<Diagnostic>> {
+    parse(text, file, false)
+}
+
+fn parse(text: &str, file: &str, refuse_units: bool) -> Result<Model, Vec<Diagnostic>> {
     let (walk, root) = Walk::parse(text, file)?;
     let mut reader = Reader::new(walk, text);
     let source = reader.source(&root, file);
     if reader.incomplete {
         return Err(reader.walk.found);
     }
-    match Model::compile(source) {
-        Ok(model) if reader.walk.found.is_empty() => Ok(model),
+    match Model::compile(source.clone()) {
+        Ok(model) if reader.walk.found.is_empty() => reader.with_units(model, &source, file, refuse_units),
         Ok(_) => Err(reader.walk.found),
         Err(errors) => {
             let told = |error: &ModelError| !(reader.forcing_misspelt && error.item == Item::Forcing);
@@ -83,6 +95,10 @@ struct Reader<'t> {
     incomplete: bool,
     /// States whose accelerations stand under `[equations]`.
     accelerated: HashSet<String>,
+    /// Items that state a unit.
+    measured: HashSet<Item>,
+    /// True if units are labels that nothing is checked against.
+    labels_only: bool,
 }
 
 /// The entries of a table in the order of the file.
@@ -90,8 +106,9 @@ type Entries<'v, 't> = Vec<(String, Range<usize>, &'v Value<'t>)>;
 
 impl<'t> Reader<'t> {
     fn new(walk: Walk<'t>, text: &'t str) -> Reader<'t> {
-        let (places, accelerated) = (HashMap::new(), HashSet::new());
-        Reader { walk, text, places, forcing_misspelt: false, incomplete: false, accelerated }
+        let (places, accelerated, measured) = (HashMap::new(), HashSet::new(), HashSet::new());
+        let (forcing_misspelt, incomplete, labels_only) = (false, false, false);
+        Reader { walk, text, places, forcing_misspelt, incomplete, accelerated, measured, labels_only }
     }
 }
 
@@ -103,6 +120,7 @@ impl Reader<'_> {
             name: root.get("name").and_then(|v| self.walk.string(v, "`name`")).unwrap_or(stem),
             description: self.prose(root, "description"),
             source: self.prose(root, "source"),
+            time: self.time(root),
             ..ModelSource::default()
         };
         for (name, place, value) in self.entries(root, "constants") {
@@ -162,12 +180,6 @@ impl Reader<'_> {
         }
     }
 
-    /// Unit and description.
-    fn labels(&mut self, table: &DeTable) -> (String, String) {
-        let unit = table.get("unit").and_then(|value| self.walk.string(value, "`unit`"));
-        (unit.unwrap_or_else(|| "1".into()), self.prose(table, "description"))
-    }
-
     /// `frequency` or `period`, one of the two.
     fn forcing(&mut self, value: &Value) -> Option<Forcing> {
         let table = self.walk.table(value, "`forcing`")?;
@@ -225,10 +237,13 @@ impl Reader<'_> {
         known(field).or_else(|| known(Field::Name)).unwrap_or(0..0)
     }
 
-    fn report(&mut self, error: ModelError) {
+    fn place_of(&self, error: &ModelError) -> Range<usize> {
         let place = self.place(error.item, error.field);
-        let place = error.span.and_then(|span| inside(self.text, &place, &span)).unwrap_or(place);
-        self.walk.report(place, error.message, error.hint);
+        error.span.as_ref().and_then(|span| inside(self.text, &place, span)).unwrap_or(place)
+    }
+
+    fn report(&mut self, error: ModelError) {
+        self.walk.report(self.place_of(&error), error.message, error.hint);
     }
 }
 

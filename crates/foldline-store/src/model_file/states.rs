@@ -50,7 +50,6 @@ impl Reader<'_> {
             source.equations.push(Definition::new(&own, "0"));
         }
         if second {
-            velocity.unit = "1".into();
             velocity.repeat = state.repeat.clone();
             let item = Item::State(source.states.len() + 1);
             self.places.insert((item, Field::Name), place);
@@ -72,14 +71,14 @@ impl Reader<'_> {
 
     /// Unit, description, scale and range.
     fn sizes(&mut self, item: Item, state: &mut State, table: &DeTable) {
-        (state.unit, state.description) = self.labels(table);
+        (state.unit, state.description) = self.labels(item, table);
         if let Some(value) = table.get("scale") {
             self.places.insert((item, Field::Scale), value.span());
-            state.scale = self.walk.number(value, &format!("the scale of `{}`", state.name));
+            state.scale = self.measure(item, value, &format!("the scale of `{}`", state.name), &mut state.unit);
         }
         if let Some(value) = table.get("range") {
             self.places.insert((item, Field::Range), value.span());
-            state.range = self.pair(value, &format!("the range of `{}`", state.name));
+            state.range = self.pair(item, value, &format!("the range of `{}`", state.name), &mut state.unit);
         }
     }
 
@@ -99,9 +98,11 @@ impl Reader<'_> {
     }
 
     /// `[low, high]`.
-    fn pair(&mut self, value: &Value, what: &str) -> Option<[f64; 2]> {
+    fn pair(&mut self, item: Item, value: &Value, what: &str, unit: &mut String) -> Option<[f64; 2]> {
         match value.get_ref().as_array().map(|list| (list.first(), list.get(1), list.len())) {
-            Some((Some(low), Some(high), 2)) => Some([self.walk.number(low, what)?, self.walk.number(high, what)?]),
+            Some((Some(low), Some(high), 2)) => {
+                Some([self.measure(item, low, what, unit)?, self.measure(item, high, what, unit)?])
+            }
             _ => {
                 self.walk.report(value.span(), format!("{what} is not a pair of numbers"), "write `[-1.0, 1.0]`");
                 None

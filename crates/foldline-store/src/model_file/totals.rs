@@ -22,7 +22,7 @@ impl Reader<'_> {
             let hint = "write `{ sum = \"x + y\", value = 1.0 }`, with the value that the sum has";
             return self.walk.report(place, format!("{what} lacks its sum or its value"), hint);
         };
-        let (unit, description) = self.labels(table);
+        let (unit, description) = self.labels(item, table);
         let sum = self.expression(item, place, sum, &format!("the sum of {what}"));
         let number = self.walk.number(number, &format!("the value of {what}"));
         self.incomplete |= number.is_none();

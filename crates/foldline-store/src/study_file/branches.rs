@@ -6,7 +6,7 @@ use crate::nearest::suggest;
 use crate::toml_walk::{Value, Walk};
 use foldline::diagram::Kind;
 use foldline::explore::{BranchPlan, Start, Switching};
-use foldline::model::Model;
+use foldline::model::{Model, Parameter};
 use foldline::special::mark::Mark;
 use foldline::special::quantity::Quantity;
 use std::ops::Range;
@@ -32,7 +32,7 @@ pub(super) fn read(
     let marks = marks(walk, table, ground.model);
     let max_points = max_points(walk, item);
     let start_value = origin.as_ref().zip(free).and_then(|((_, at, _), free)| at[free]);
-    let bounds = bounds(walk, item, start_value, free.map(|f| ground.model.parameters[f].name.as_str()));
+    let bounds = bounds(walk, item, start_value, free.map(|f| &ground.model.parameters[f]));
     let (name, (start, beginning, family), free, (range, until)) = (name?, origin?, free?, bounds?);
     let mut end = beginning.clone();
     end[free] = until;
@@ -81,14 +81,15 @@ pub(super) fn bounds(
     walk: &mut Walk,
     item: &Item,
     start: Option<f64>,
-    free: Option<&str>,
+    free: Option<&Parameter>,
 ) -> Option<([f64; 2], Option<f64>)> {
     let (what, table) = (item.what, item.table);
-    let free = free.unwrap_or("the free parameter");
-    let until = table.get("until").map(|value| (value.span(), walk.number(value, "`until`")));
+    let unit = free.map_or("", |own| &own.unit);
+    let free = free.map_or("the free parameter", |own| &own.name);
+    let until = table.get("until").map(|value| (value.span(), walk.quantity(value, "`until`", unit)));
     let range = match (table.get("range"), &until) {
         (Some(value), _) => {
-            let range = range(walk, value)?;
+            let range = range(walk, value, unit)?;
             contains_start(walk, what, value.span(), range, start, free);
             range
         }
@@ -130,13 +131,13 @@ pub(super) fn contains_start(
     }
 }
 
-/// A pair of numbers, the smaller first.
-pub(super) fn range(walk: &mut Walk, value: &Value) -> Option<[f64; 2]> {
+/// A pair of numbers in a unit, the smaller first.
+pub(super) fn range(walk: &mut Walk, value: &Value, unit: &str) -> Option<[f64; 2]> {
     let Some(list) = value.get_ref().as_array().filter(|list| list.len() == 2) else {
         walk.report(value.span(), "the range is not a pair of numbers", "write `range = [smallest, largest]`");
         return None;
     };
-    let ends: Vec<f64> = list.iter().filter_map(|end| walk.number(end, "an end of the range")).collect();
+    let ends: Vec<f64> = list.iter().filter_map(|end| walk.quantity(end, "an end of the range", unit)).collect();
     let [low, high] = ends[..] else { return None };
     if low > high {
         walk.report(
@@ -166,13 +167,24 @@ fn values(walk: &mut Walk, value: Option<&Value>, what: &str, stop: bool, model:
     let mut marks = Vec::new();
     for (key, value) in table.iter() {
         let Some(quantity) = quantity(walk, key.get_ref(), key.span(), model) else { continue };
+        let unit = unit_of(quantity, model);
         let values: Vec<f64> = match value.get_ref().as_array() {
-            Some(list) => list.iter().filter_map(|one| walk.number(one, "a value")).collect(),
-            None => walk.number(value, "the value").into_iter().collect(),
+            Some(list) => list.iter().filter_map(|one| walk.quantity(one, "a value", unit)).collect(),
+            None => walk.quantity(value, "the value", unit).into_iter().collect(),
         };
         marks.extend(values.into_iter().map(|value| Mark { quantity, value, stop }));
     }
     marks
+}
+
+/// The unit of a quantity of a branch; empty where it has none of its own.
+fn unit_of(quantity: Quantity, model: &Model) -> &str {
+    match quantity {
+        Quantity::Parameter(k) => &model.parameters[k].unit,
+        Quantity::Period => &model.time,
+        Quantity::Smallest(k) | Quantity::Largest(k) | Quantity::Mean(k) | Quantity::Rms(k) => model.channel_unit(k),
+        Quantity::Integral(_) | Quantity::Norm(_) => "",
+    }
 }
 
 /// A quantity of a branch by its name.

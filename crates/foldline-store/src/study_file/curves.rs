@@ -7,6 +7,7 @@ use crate::toml_walk::{Value, Walk};
 use foldline::contract::VectorField;
 use foldline::diagram::{Family, Kind};
 use foldline::explore::{BranchPlan, CurvePlan, Start};
+use foldline::model::Parameter;
 
 pub(super) const KEYS: [&str; 12] = [
     "name",
@@ -49,21 +50,22 @@ pub(super) fn read(
     // Solutions of a forced model are cycles.
     let forced = ground.model.forced().then_some(Family::Cycle);
     let hold = hold(walk, item, forced.or(base.as_ref().and_then(|base| base.family)));
-    let first = base.as_ref().map(|base| ground.model.parameters[base.plan.free].name.clone());
-    let branch_range = branch_range(walk, item, base.as_ref(), first.as_deref());
-    let near = near(walk, item, branch_range, first.as_deref());
+    let first = base.as_ref().map(|base| &ground.model.parameters[base.plan.free]);
+    let branch_range = branch_range(walk, item, base.as_ref(), first);
+    let near = near(walk, item, branch_range, first);
     let second = second(walk, item, ground, base.as_ref());
     let max_points = max_points(walk, item);
     let marks = marks(walk, table, ground.model);
     let start = base.as_ref().zip(second).and_then(|(base, second)| base.beginning[second]);
-    let second_name = second.map(|index| ground.model.parameters[index].name.as_str());
+    let own = second.map(|index| &ground.model.parameters[index]);
+    let second_name = own.map(|own| own.name.as_str());
     // Where the curve starts must be known for a target alone to make a range; of a branch with mistakes it never is.
     let placed = start.is_some() || base.is_none() || second.is_none();
     if let (true, None, false) = (table.get("until").is_some(), table.get("range"), placed) {
         let message = format!("at which {} the curve starts is not known beforehand", second_name.unwrap_or("value"));
         walk.report(item.span.clone(), message, "add the `range` of this parameter");
     }
-    let bounds = bounds(walk, item, start, second_name);
+    let bounds = bounds(walk, item, start, own);
     let (name, base, hold, branch_range) = (name?, base?, hold?, branch_range?);
     let (free, (range, until)) = (second?, bounds?);
     let mut end = base.beginning.clone();
@@ -190,12 +192,12 @@ fn hold(walk: &mut Walk, item: &Item, family: Option<Family>) -> Option<Kind> {
 }
 
 /// The part of the branch's parameter in which the curve is followed.
-fn branch_range(walk: &mut Walk, item: &Item, base: Option<&Base>, first: Option<&str>) -> Option<[f64; 2]> {
+fn branch_range(walk: &mut Walk, item: &Item, base: Option<&Base>, first: Option<&Parameter>) -> Option<[f64; 2]> {
     let whole = base.map(|base| base.plan.range);
     let Some(value) = item.table.get("branch-range") else { return whole };
-    let narrow = range(walk, value)?;
+    let narrow = range(walk, value, first.map_or("", |own| &own.unit))?;
     if let Some([low, high]) = whole.filter(|[low, high]| narrow[1] < *low || narrow[0] > *high) {
-        let first = first.unwrap_or("its parameter");
+        let first = first.map_or("its parameter", |own| &own.name);
         let message =
             format!("the branch is followed in {first} from {low} to {high} only, so no curve starts in this range");
         walk.report(value.span(), message, format!("a range that overlaps [{low}, {high}]"));
@@ -204,11 +206,11 @@ fn branch_range(walk: &mut Walk, item: &Item, base: Option<&Base>, first: Option
 }
 
 /// The value near which the special point lies; `None` inside if it was not said.
-fn near(walk: &mut Walk, item: &Item, range: Option<[f64; 2]>, first: Option<&str>) -> Option<Option<f64>> {
+fn near(walk: &mut Walk, item: &Item, range: Option<[f64; 2]>, first: Option<&Parameter>) -> Option<Option<f64>> {
     let Some(value) = item.table.get("near") else { return Some(None) };
-    let near = walk.number(value, "`near`")?;
+    let near = walk.quantity(value, "`near`", first.map_or("", |own| &own.unit))?;
     if let Some([low, high]) = range.filter(|[low, high]| near < *low || near > *high) {
-        let first = first.unwrap_or("the parameter of the branch");
+        let first = first.map_or("the parameter of the branch", |own| &own.name);
         let message =
             format!("near {first} = {near} there is no point of the curve: it stays between {low} and {high}");
         walk.report(value.span(), message, "a value within the range, or a wider `branch-range`");

@@ -50,7 +50,7 @@ pub(super) fn read(
         }
         let item = Item { what: "exploration", span: span.clone(), table };
         let free = free(walk, &item, model);
-        let range = own_range(walk, table, &span);
+        let range = own_range(walk, table, &span, free.map_or("", |k| &model.parameters[k].unit));
         let whole = |walk: &mut Walk, key: &str, usual: usize| {
             let given = table.get(key).and_then(|v| walk.integer(v, &format!("`{key}`"), 1..=100_000_000));
             given.map_or(usual, |n| n as usize)
@@ -87,13 +87,13 @@ pub(super) fn read(
     found
 }
 
-fn own_range(walk: &mut Walk, table: &DeTable, span: &Range<usize>) -> Option<[f64; 2]> {
+fn own_range(walk: &mut Walk, table: &DeTable, span: &Range<usize>, unit: &str) -> Option<[f64; 2]> {
     let Some(value) = table.get("range") else {
         let hint = "add a line such as `range = [0.5, 12]`";
         walk.report(span.clone(), "this exploration does not say in which range of its parameter it looks", hint);
         return None;
     };
-    range(walk, value)
+    range(walk, value, unit)
 }
 
 /// What an exploration finds is named `NAME/…`.
@@ -130,7 +130,7 @@ fn connect(
         let message = format!("`{name}` is the free parameter already");
         walk.report(key.span(), message, "name a second parameter, in which folds are followed");
     }
-    let ends = range(walk, ends)?;
+    let ends = range(walk, ends, &model.parameters[index].unit)?;
     let own = parameters[index];
     if !(ends[0]..=ends[1]).contains(&own) {
         let message = format!("the exploration is at {name} = {own}, outside this range");

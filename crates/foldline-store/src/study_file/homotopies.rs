@@ -54,7 +54,7 @@ fn targets(walk: &mut Walk, item: &Item, model: &Model, start: Option<&[Option<f
         let name: &str = key.get_ref();
         match model.parameter_index(name) {
             Some(index) => {
-                let number = walk.number(value, &format!("the parameter `{name}`"));
+                let number = walk.quantity(value, &format!("the parameter `{name}`"), &model.parameters[index].unit);
                 targets.extend(number.map(|number| (index, number)));
             }
             None => unknown_parameter(walk, key.span(), name, model),
@@ -113,7 +113,7 @@ fn via_range(
         walk.report(item.span.clone(), message, "add a line such as `range = [0.5, 12]`");
         return None;
     };
-    let range = range(walk, value)?;
+    let range = range(walk, value, via.map_or("", |k| &model.parameters[k].unit))?;
     let start = via.zip(start).and_then(|(via, start)| start[via]);
     contains_start(walk, item.what, value.span(), range, start, name);
     Some(range)

@@ -15,7 +15,7 @@ mod seeds;
 
 use crate::diagnostic::Diagnostic;
 use crate::finite::{check_explorations, check_seeds};
-use crate::model_file::{parse_model, read_model};
+use crate::model_file::{parse_model, parse_model_of_run, read_model};
 use crate::nearest::suggest;
 use crate::toml_walk::{Value, Walk, read_text, unreadable};
 use foldline::attractors::Limits;
@@ -102,6 +102,60 @@ pub fn parse_study(text: &str, file: &str, model_text: &str, model_file: &str) -
     })
 }
 
+/// Reads the texts of a run: as [`parse_study`], but units that contradict each other are let through. A run of a program that
+/// did not check them is as readable as any other.
+pub fn parse_study_of_run(
+    text: &str,
+    file: &str,
+    model_text: &str,
+    model_file: &str,
+) -> Result<Study, Vec<Diagnostic>> {
+    parse(text, file, |walk, root| {
+        model_key(walk, root)?;
+        let found = parse_model_of_run(model_text, model_file);
+        found
+            .map_err(|mut found| walk.found.append(&mut found))
+            .ok()
+            .map(|model| (model_file.into(), model_text.into(), model))
+    })
+}
+
+impl Study {
+    /// The study with other limits on trajectories, which become part of its text: a run tells how it was computed. A time is a
+    /// number, or a number with a unit.
+    ///
+    /// # Errors
+    /// What is wrong with them.
+    pub fn limited(self, steps: Option<u64>, time: Option<&str>) -> Result<Study, Vec<Diagnostic>> {
+        let number = |text: &str| text.trim().parse::<f64>().ok().filter(|v| v.is_finite());
+        let time = time.map(|text| number(text).map_or_else(|| format!("{text:?}"), |value| format!("{value:?}")));
+        let steps = steps.map(|steps| ("max-steps", steps.to_string()));
+        let settings: Vec<_> = steps.into_iter().chain(time.map(|time| ("max-time", time))).collect();
+        if settings.is_empty() {
+            return Ok(self);
+        }
+        let text = with_settings(&self.text, &settings);
+        parse_study(&text, &self.file, &self.model_text, &self.model_file)
+    }
+}
+
+/// A study text with settings at its top, `(key, value)`, in place of those that it has.
+fn with_settings(text: &str, settings: &[(&str, String)]) -> String {
+    let (root, _) = DeTable::parse_recoverable(text);
+    let mut edits: Vec<(std::ops::Range<usize>, String)> = Vec::new();
+    let mut lines = String::new();
+    for (key, value) in settings {
+        match root.get_ref().get(*key) {
+            Some(own) => edits.push((own.span(), value.clone())),
+            None => lines.push_str(&format!("{key} = {value}\n")),
+        }
+    }
+    edits.sort_by_key(|(span, _)| std::cmp::Reverse(span.start));
+    let mut text = text.to_string();
+    edits.into_iter().for_each(|(span, value)| text.replace_range(span, &value));
+    format!("{lines}{text}")
+}
+
 /// Whether a text says what to compute rather than how a system moves: it names a model, or
 /// something to compute.
 pub fn is_study(text: &str) -> bool {
@@ -121,7 +175,7 @@ fn parse(
 
     let tolerance = tolerance(&mut walk, &root);
     let degree = root.get("degree").and_then(|v| walk.integer(v, "`degree`", 2..=7)).unwrap_or(4) as usize;
-    let limits = limits(&mut walk, &root);
+    let [limits, simulation] = limits(&mut walk, &root, &model.time);
     let mut defaults: Vec<f64> = model.parameters.iter().map(|p| p.value).collect();
     if let Some(value) = root.get("parameters") {
         override_parameters(&mut walk, value, &model, &mut defaults);
@@ -147,7 +201,19 @@ fn parse(
         return Err(walk.found);
     }
     let seeds = seeds.into_iter().map(|(_, seed)| seed).collect();
-    let plan = Plan { tolerance, degree, limits, seeds, branches, curves, homotopies, explorations, surveys, sweeps };
+    let plan = Plan {
+        tolerance,
+        degree,
+        limits,
+        simulation,
+        seeds,
+        branches,
+        curves,
+        homotopies,
+        explorations,
+        surveys,
+        sweeps,
+    };
     Ok(Study { file: file.to_string(), text: text.to_string(), model_file, model_text, model, plan })
 }
 
@@ -169,19 +235,19 @@ fn check_totals(walk: &mut Walk, root: &DeTable, model: &Model) {
     walk.report(root.get("model").map_or(0..0, |value| value.span()), message, hint);
 }
 
-/// Limits on trajectories in the search for first solutions.
-fn limits(walk: &mut Walk, root: &DeTable) -> Limits {
-    let usual = Limits::default();
+/// Limits on trajectories in the search for first solutions, and in surveys and sweeps.
+fn limits(walk: &mut Walk, root: &DeTable, unit: &str) -> [Limits; 2] {
     let steps = root.get("max-steps").and_then(|v| walk.integer(v, "`max-steps`", 1..=10_000_000_000));
     let time = root.get("max-time").and_then(|v| {
-        let time = walk.number(v, "`max-time`")?;
+        let time = walk.quantity(v, "`max-time`", unit)?;
         if time > 0.0 {
             return Some(time);
         }
         walk.report(v.span(), "`max-time` is not positive", "give a time in the units of the model");
         None
     });
-    Limits { steps: steps.map_or(usual.steps, |n| n as usize), time: time.unwrap_or(usual.time) }
+    [Limits::default(), Limits::patient()]
+        .map(|usual| Limits { steps: steps.map_or(usual.steps, |n| n as usize), time: time.unwrap_or(usual.time) })
 }
 
 fn model_key<'v, 't>(walk: &mut Walk, root: &'v DeTable<'t>) -> Option<&'v Value<'t>> {
@@ -211,7 +277,9 @@ fn override_parameters(walk: &mut Walk, value: &Value, model: &Model, values: &m
         let name: &str = key.get_ref();
         match model.parameter_index(name) {
             Some(index) => {
-                if let Some(number) = walk.number(value, &format!("the parameter `{name}`")) {
+                if let Some(number) =
+                    walk.quantity(value, &format!("the parameter `{name}`"), &model.parameters[index].unit)
+                {
                     values[index] = number;
                 }
             }

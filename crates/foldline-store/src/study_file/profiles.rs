@@ -26,7 +26,7 @@ pub(super) fn cycle(walk: &mut Walk, value: &Value, model: &Model, degree: usize
         return None;
     }
     let place = table.get("period")?;
-    let period = walk.number(place, "`period`")?;
+    let period = walk.quantity(place, "`period`", &model.time)?;
     if period <= 0.0 {
         walk.report(
             place.span(),
@@ -37,7 +37,7 @@ pub(super) fn cycle(walk: &mut Walk, value: &Value, model: &Model, degree: usize
     }
     let through = table.get("through").and_then(|v| walk.integer(v, "`through`", 1..=12)).unwrap_or(1) as usize;
     let place = table.get("times")?;
-    let times = list(walk, place, "`times`")?;
+    let times = list(walk, place, "`times`", "")?;
     if let Some(k) = times.windows(2).position(|pair| pair[0] >= pair[1]) {
         let hint = "normalised times increase from 0 at the start to 1 at the end of the period";
         walk.report(
@@ -85,7 +85,7 @@ fn states(walk: &mut Walk, value: &Value, model: &Model, count: usize) -> Option
     let mut out = vec![0.0; count * known.len()];
     for (i, name) in known.iter().enumerate() {
         let place = table.get(*name)?;
-        let values = list(walk, place, &format!("the state `{name}`"))?;
+        let values = list(walk, place, &format!("the state `{name}`"), &model.states[i].unit)?;
         if values.len() != count {
             let message = format!("the state `{name}` has {} values where there are {count} times", values.len());
             walk.report(place.span(), message, "give a value for each time, that at the end of the period too");
@@ -96,9 +96,9 @@ fn states(walk: &mut Walk, value: &Value, model: &Model, count: usize) -> Option
     Some(out)
 }
 
-fn list(walk: &mut Walk, value: &Value, what: &str) -> Option<Vec<f64>> {
+fn list(walk: &mut Walk, value: &Value, what: &str, unit: &str) -> Option<Vec<f64>> {
     match value.get_ref().as_array() {
-        Some(values) if values.len() > 1 => values.iter().map(|v| walk.number(v, what)).collect(),
+        Some(values) if values.len() > 1 => values.iter().map(|v| walk.quantity(v, what, unit)).collect(),
         Some(_) => {
             walk.report(
                 value.span(),

@@ -35,7 +35,7 @@ pub(super) fn surveys(
             override_parameters(walk, value, model, &mut parameters);
         }
         let free = free(walk, &Item { what: "survey", span: span.clone(), table }, model);
-        let values = values(walk, table, &span, "survey", true);
+        let values = values(walk, table, &span, ("survey", unit_of(free, model)), true);
         let starts = table.get("starts").and_then(|v| walk.integer(v, "`starts`", 1..=MOST));
         let random = table.get("random").and_then(|v| walk.integer(v, "`random`", 0..=u64::MAX)).unwrap_or(RANDOM);
         let (Some(name), Some(free), Some(values)) = (name, free, values) else { continue };
@@ -59,7 +59,7 @@ pub(super) fn sweeps(
         let name = unique_name(walk, table, &span, "sweep", &taken.iter().copied().chain(own).collect::<Vec<_>>());
         let seed = seed(walk, table, &span, seeds);
         let free = free(walk, &Item { what: "sweep", span: span.clone(), table }, model);
-        let values = values(walk, table, &span, "sweep", false);
+        let values = values(walk, table, &span, ("sweep", unit_of(free, model)), false);
         let (Some(name), Some(seed), Some(free), Some(values)) = (name, seed, free, values) else { continue };
         sweeps.push(SweepPlan { name, seed, free, values });
     }
@@ -82,12 +82,23 @@ fn seed(walk: &mut Walk, table: &DeTable, span: &Range<usize>, seeds: &[(Range<u
     found
 }
 
+/// The unit of the free parameter.
+fn unit_of(free: Option<usize>, model: &Model) -> &str {
+    free.map_or("", |k| &model.parameters[k].unit)
+}
+
 /// The values of the free parameter: a list, or a range cut into equal parts; `rising` says that the range must not fall.
-fn values(walk: &mut Walk, table: &DeTable, span: &Range<usize>, what: &str, rising: bool) -> Option<Vec<f64>> {
+fn values(
+    walk: &mut Walk,
+    table: &DeTable,
+    span: &Range<usize>,
+    (what, unit): (&str, &str),
+    rising: bool,
+) -> Option<Vec<f64>> {
     match (table.get("values"), table.get("range"), table.get("count")) {
-        (Some(value), None, None) => list(walk, value),
+        (Some(value), None, None) => list(walk, value, unit),
         (None, Some(range), Some(count)) => {
-            let ends = pair(walk, range, rising);
+            let ends = pair(walk, range, unit, rising);
             let count = walk.integer(count, "`count`", 2..=MOST);
             let ([from, to], count) = (ends?, count?);
             let last = count - 1;
@@ -122,22 +133,22 @@ fn values(walk: &mut Walk, table: &DeTable, span: &Range<usize>, what: &str, ris
     }
 }
 
-fn list(walk: &mut Walk, value: &Value) -> Option<Vec<f64>> {
+fn list(walk: &mut Walk, value: &Value, unit: &str) -> Option<Vec<f64>> {
     let Some(list) = value.get_ref().as_array().filter(|list| !list.is_empty()) else {
         walk.report(value.span(), "`values` is not a list of numbers", "write `values = [3, 3.5, 4]`");
         return None;
     };
-    let numbers: Vec<Option<f64>> = list.iter().map(|v| walk.number(v, "a value")).collect();
+    let numbers: Vec<Option<f64>> = list.iter().map(|v| walk.quantity(v, "a value", unit)).collect();
     numbers.into_iter().collect()
 }
 
-fn pair(walk: &mut Walk, value: &Value, rising: bool) -> Option<[f64; 2]> {
+fn pair(walk: &mut Walk, value: &Value, unit: &str, rising: bool) -> Option<[f64; 2]> {
     let Some(list) = value.get_ref().as_array().filter(|list| list.len() == 2) else {
         let hint = if rising { "write `range = [smallest, largest]`" } else { "write `range = [first, last]`" };
         walk.report(value.span(), "the range is not a pair of numbers", hint);
         return None;
     };
-    let ends: Vec<f64> = list.iter().filter_map(|end| walk.number(end, "an end of the range")).collect();
+    let ends: Vec<f64> = list.iter().filter_map(|end| walk.quantity(end, "an end of the range", unit)).collect();
     let [from, to] = ends[..] else { return None };
     if from == to {
         walk.report(value.span(), "the range is empty", "two different numbers");

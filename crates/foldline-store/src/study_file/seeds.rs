@@ -175,10 +175,11 @@ fn state(walk: &mut Walk, value: &Value, model: &Model) -> Option<Vec<f64>> {
             continue;
         }
         if let Some(&i) = places.get(name) {
-            values[i] = walk.number(own, &what);
+            values[i] = walk.quantity(own, &what, &model.states[i].unit);
             continue;
         }
         let elements: Vec<usize> = (1..).map_while(|k| places.get(format!("{name}[{k}]").as_str())).copied().collect();
+        let unit = elements.first().map_or("", |i| &model.states[*i].unit);
         match own.get_ref().as_array() {
             _ if elements.is_empty() => {
                 let message = format!("the model `{}` has no state `{name}`", model.name);
@@ -188,9 +189,11 @@ fn state(walk: &mut Walk, value: &Value, model: &Model) -> Option<Vec<f64>> {
                 let message = format!("{what} has {} elements, and {} values here", elements.len(), list.len());
                 walk.report(own.span(), message, "give one value for each, or one number for all");
             }
-            Some(list) => families.extend(elements.into_iter().zip(list.iter().map(|own| walk.number(own, &what)))),
+            Some(list) => {
+                families.extend(elements.into_iter().zip(list.iter().map(|own| walk.quantity(own, &what, unit))))
+            }
             None => {
-                let number = walk.number(own, &what);
+                let number = walk.quantity(own, &what, unit);
                 families.extend(elements.into_iter().map(|i| (i, number)));
             }
         }

@@ -409,7 +409,7 @@ fn simulate(
     run: impl FnOnce(&Trial, Report) -> Vec<Response>,
 ) -> Vec<Response> {
     let scales = rolled.around_scales(trial.scales);
-    let own = Trial { field: rolled, scales: &scales, whirl: trial.whirl, jobs: trial.jobs };
+    let own = Trial { field: rolled, scales: &scales, ..*trial };
     let plain = |found: &[Response]| -> Vec<Response> { found.iter().map(|r| rolled.response(r)).collect() };
     let found = run(&own, &|found| report(&plain(found)));
     plain(&found)

@@ -6,7 +6,6 @@
 
 use super::angles::{self, Rolled};
 use super::measure::response;
-use super::runner::PATIENT;
 use super::settling::{First, Settled, Trial, settle_together};
 use super::{Candidate, Sampling, driven};
 use crate::contract::Verdict;
@@ -59,7 +58,9 @@ pub fn survey_by_simulation(
             let settled: Vec<Settled> = starts
                 .chunks((BLOCK * n).max(1))
                 .take_while(|_| !trial.field.ended())
-                .flat_map(|block| settle_together(trial, &own.repeat(block.len() / n), block, First::Rough, PATIENT))
+                .flat_map(|block| {
+                    settle_together(trial, &own.repeat(block.len() / n), block, First::Rough, trial.limits_at(&own))
+                })
                 .collect();
             let of = sampling.uniform();
             let counted = |(number, settled): (usize, &Settled)| Response {
@@ -154,7 +155,9 @@ pub fn stepped_sweep(
     let (mut own, mut state) = (parameters.to_vec(), start.to_vec());
     for &value in values {
         own[free] = value;
-        let Some(settled) = settle_together(trial, &own, &state, First::Accurate, PATIENT).pop() else { break };
+        let Some(settled) = settle_together(trial, &own, &state, First::Accurate, trial.limits_at(&own)).pop() else {
+            break;
+        };
         let (mut response, candidate) = response(trial, &own, free, &settled);
         response.jumped = compare(&own, candidate.as_ref());
         state.clone_from(&response.state);

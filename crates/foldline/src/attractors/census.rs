@@ -207,7 +207,7 @@ pub(super) fn settle(
 fn patiently(context: &Context, start: &[f64], known: Vec<Orbit>) -> Result<Point, Lost> {
     let Sampling { scales, whirl, limits, .. } = context.sampling;
     let limits = Limits { steps: limits.steps.max(PATIENT.steps), ..*limits };
-    let trial = Trial { field: context.field, scales, whirl: *whirl, jobs: 1 };
+    let trial = Trial { field: context.field, scales, whirl: *whirl, jobs: 1, limits };
     let settled = settle_together(&trial, context.parameters, start, First::Accurate, limits).pop();
     let settled = settled.ok_or(Lost::nothing(start))?;
     let here = |orbit: &Orbit| {

@@ -97,6 +97,10 @@ impl VectorField for Driven<'_> {
         out.fill(f64::NAN);
     }
 
+    fn time_unit(&self, parameters: &[f64]) -> f64 {
+        self.0.time_unit(parameters)
+    }
+
     fn ended(&self) -> bool {
         self.0.ended()
     }
@@ -204,7 +208,7 @@ pub(super) fn simulate(
     run: impl FnOnce(&Trial, Report) -> Vec<Response>,
 ) -> Vec<Response> {
     let (driven, scales) = (Driven(trial.field), with_unit_scales(trial.scales));
-    let own = Trial { field: &driven, scales: &scales, whirl: trial.whirl, jobs: trial.jobs };
+    let own = Trial { field: &driven, scales: &scales, whirl: trial.whirl, jobs: trial.jobs, limits: trial.limits };
     let plain = |found: &[Response]| -> Vec<Response> { found.iter().map(|r| without(r, trial.field)).collect() };
     let found = run(&own, &|found| report(&plain(found)));
     plain(&found)

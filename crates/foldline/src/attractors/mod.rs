@@ -45,6 +45,7 @@ pub use brute_force::{Compare, Report, stepped_sweep, survey_by_simulation};
 pub use census::Lost;
 use census::Pace;
 use census::STEP_LIMIT;
+use runner::PATIENT;
 pub use sampling::Sampling;
 pub use settling::Trial;
 pub use spectrum::{Sense, signed_spectrum, spectral_ratio, whirl_sense};
@@ -59,6 +60,13 @@ pub struct Limits {
     pub steps: usize,
     /// Time, in the units of the model.
     pub time: f64,
+}
+
+impl Limits {
+    /// The usual limits of surveys and sweeps, which have no other way to a motion than to wait for it.
+    pub fn patient() -> Limits {
+        PATIENT
+    }
 }
 
 impl Default for Limits {

@@ -44,6 +44,15 @@ pub struct Trial<'a> {
     pub whirl: Option<[usize; 2]>,
     /// Threads; no result depends on it.
     pub jobs: usize,
+    /// Limits on each trajectory of a survey or sweep.
+    pub limits: Limits,
+}
+
+impl Trial<'_> {
+    /// Those limits in the time of the field at these parameters.
+    pub(super) fn limits_at(&self, parameters: &[f64]) -> Limits {
+        Limits { time: self.limits.time / self.field.time_unit(parameters), ..self.limits }
+    }
 }
 
 /// Where a trajectory got to.
@@ -82,9 +91,14 @@ pub(super) fn settle_together(
         let left = |r: usize| limits.steps.saturating_sub(runners[r].steps);
         let limit = open.iter().map(|&r| left(r)).max().unwrap_or(0).max(1);
         open.iter().for_each(|&r| runners[r].begin(parameters[r * k..(r + 1) * k].to_vec()));
+        // A trajectory that has used up its time does not begin another round.
+        let time = open.iter().map(|&r| limits.time - runners[r].time).fold(0.0, f64::max);
+        if time <= 0.0 {
+            break;
+        }
         let ensemble = match k {
-            0 => Ensemble::new(trial.field, &[], tolerance, &from, [0.0, limits.time]),
-            _ => Ensemble::with_own_parameters(trial.field, &own, tolerance, &from, [0.0, limits.time]),
+            0 => Ensemble::new(trial.field, &[], tolerance, &from, [0.0, time]),
+            _ => Ensemble::with_own_parameters(trial.field, &own, tolerance, &from, [0.0, time]),
         };
         let arrivals =
             ensemble.with_step_limit(limit).run(&mut |step| runners[open[step.trajectory()]].observe(step, trial));

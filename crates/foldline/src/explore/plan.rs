@@ -222,6 +222,8 @@ pub struct Plan {
     pub degree: usize,
     /// Limits on trajectories in the search for first solutions.
     pub limits: Limits,
+    /// Limits on each trajectory of surveys and sweeps.
+    pub simulation: Limits,
     /// First solutions.
     pub seeds: Vec<SeedPlan>,
     /// Branches, in the order in which they were written.
@@ -245,6 +247,7 @@ impl Plan {
             tolerance,
             degree,
             limits: Limits::default(),
+            simulation: Limits::patient(),
             seeds: Vec::new(),
             branches: Vec::new(),
             curves: Vec::new(),

@@ -51,8 +51,8 @@ pub fn simulate(
     found
 }
 
-fn trial<'a>(system: &'a System, jobs: usize) -> Trial<'a> {
-    Trial { field: system.field, scales: &system.scales, whirl: system.whirl, jobs }
+fn trial<'a>(system: &'a System, plan: &Plan, jobs: usize) -> Trial<'a> {
+    Trial { field: system.field, scales: &system.scales, whirl: system.whirl, jobs, limits: plan.simulation }
 }
 
 /// Reports one value after the other as done.
@@ -86,7 +86,7 @@ fn one_survey(
     let sampling = sampling(system, *starts, *random, jobs, plan.tolerance);
     let count = Count { name, of: values.len(), done: AtomicUsize::new(0), observer };
     let report = |found: &[Response]| count.visited(found);
-    let responses = survey_by_simulation(&trial(system, jobs), &sampling, parameters, *free, values, &report);
+    let responses = survey_by_simulation(&trial(system, plan, jobs), &sampling, parameters, *free, values, &report);
     let complete = count.done.load(Ordering::Relaxed) >= values.len();
     if let Some(note) = escapes(&responses, *starts).filter(|_| complete) {
         observer.observe(Event::Note(name, &note));
@@ -137,7 +137,7 @@ fn one_sweep(
     let report = |found: &[Response]| count.visited(found);
     let mut pursuit = Pursuit::new(system, *free, plan.tolerance, plan.degree);
     let mut compare = |own: &[f64], candidate: Option<&Candidate>| pursuit.leaves(own, candidate);
-    let responses = stepped_sweep(&trial(system, 1), parameters, *free, values, &start, &mut compare, &report);
+    let responses = stepped_sweep(&trial(system, plan, 1), parameters, *free, values, &start, &mut compare, &report);
     if observer.stopping() {
         return None;
     }

@@ -55,6 +55,7 @@ fn followed(keeps: bool) -> (Branch, Vec<Point>) {
         tolerance: 1e-6,
         degree: 4,
         limits: Default::default(),
+        simulation: crate::attractors::Limits::patient(),
         seeds: vec![seed],
         branches: vec![branch],
         curves: Vec::new(),

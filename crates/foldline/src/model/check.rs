@@ -336,7 +336,7 @@ impl<'a> Check<'a> {
     }
 }
 
-fn name_of(source: &ModelSource, item: Item) -> &str {
+pub(super) fn name_of(source: &ModelSource, item: Item) -> &str {
     match item {
         Item::Model => &source.name,
         Item::Parameter(i) => &source.parameters[i].name,

@@ -14,7 +14,7 @@ use std::cell::Cell;
 ///
 /// ```
 /// use foldline::model::{Constant, constant_value};
-/// let n = Constant { name: "n".into(), value: 40.0 };
+/// let n = Constant::new("n", 40.0);
 /// assert_eq!(constant_value("n + 1", &[n]), Ok(41.0));
 /// ```
 pub fn constant_value(text: &str, constants: &[Constant]) -> Result<f64, Box<ModelError>> {

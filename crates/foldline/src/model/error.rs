@@ -44,6 +44,8 @@ pub enum Field {
     Name,
     /// Its expression.
     Expression,
+    /// Its unit.
+    Unit,
     /// The value of a parameter.
     Value,
     /// The characteristic size of a state.

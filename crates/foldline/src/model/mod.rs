@@ -5,7 +5,7 @@
 //! (`run`) about as fast as code written by hand, without a compiler.
 //!
 //! Text takes the way `lexer` → `parser` → `compile`: names are laid out (`family`) and checked (`check`, `words`), definitions put in
-//! order (`order`), expressions read with their index given (`scope`) and turned into nodes (`lower`). Whatever is wrong comes back
+//! order (`order`), expressions read with their index given (`scope`) and turned into nodes (`lower`). Units are checked apart from that (`dimensions`). Whatever is wrong comes back
 //! as a list of [`ModelError`], each with its place.
 
 mod angles;
@@ -14,6 +14,7 @@ mod check;
 mod compile;
 mod constant;
 mod derive;
+mod dimensions;
 mod error;
 mod exprel;
 mod family;
@@ -41,6 +42,7 @@ mod totals;
 mod words;
 
 pub use constant::constant_value;
+pub use dimensions::{TAKEN_AS, UnitReport, check_units};
 pub use error::{Field, Item, ModelError};
 pub(crate) use laws::null_space;
 pub use laws::{conserved, conserved_at, in_words, shifts};
@@ -50,6 +52,8 @@ pub use source::{
 };
 pub use table::{Interpolation, Outside, Table};
 pub use totals::Kept;
+
+pub(crate) use source::element_of;
 
 use crate::contract::{Batch, Parameters, VectorField};
 use compile::{Compiled, Named, compile};
@@ -77,6 +81,7 @@ use tape::Tape;
 /// ```
 #[derive(Clone, Debug)]
 pub struct Model {
+    about: Arc<About>,
     inner: Arc<Inner>,
 }
 
@@ -99,11 +104,14 @@ pub struct About {
     pub outputs: Vec<Output>,
     /// The two states u, v that form the complex signal u + j v.
     pub whirl: Option<[usize; 2]>,
+    /// Unit of time, and so of periods; empty where it is not known.
+    pub time: String,
+    /// What is doubtful about the units, in words.
+    pub remarks: Vec<String>,
 }
 
 #[derive(Debug)]
 struct Inner {
-    about: About,
     compiled: Compiled,
     field: Tape,
     period: Option<Tape>,
@@ -119,7 +127,7 @@ impl Deref for Model {
     type Target = About;
 
     fn deref(&self) -> &About {
-        &self.inner.about
+        &self.about
     }
 }
 
@@ -134,16 +142,18 @@ impl Model {
         let outputs = Tape::new(&compiled.graph, &[&compiled.outputs]);
         let switches = Switches::new(&compiled.graph, &compiled.field);
         let period = compiled.period.map(|period| Tape::new(&compiled.graph, &[&[period]]));
-        let ModelSource { name, description, source, .. } = source;
-        let whirl = compiled.whirl;
-        let about = About { name, description, source, states, parameters, totals, outputs: output_list, whirl };
+        let ModelSource { name, description, source, time, .. } = source;
+        let (whirl, remarks) = (compiled.whirl, Vec::new());
+        let outputs_of = output_list;
+        let about =
+            About { name, description, source, states, parameters, totals, outputs: outputs_of, whirl, time, remarks };
         let (linear, directional) = (RwLock::default(), RwLock::default());
         let periods = match about.states.iter().any(|state| state.period.is_some()) {
             true => about.states.iter().map(|state| state.period.unwrap_or(f64::INFINITY)).collect(),
             false => Vec::new(),
         };
-        let inner = Inner { about, compiled, field, period, periods, outputs, switches, linear, directional };
-        let model = Model { inner: Arc::new(inner) };
+        let inner = Inner { compiled, field, period, periods, outputs, switches, linear, directional };
+        let model = Model { about: Arc::new(about), inner: Arc::new(inner) };
         match model.wrong_period().or_else(|| angles::no_angle(&model, &items)) {
             Some(error) => Err(vec![error]),
             None => Ok(model),
@@ -157,6 +167,28 @@ impl Model {
         let [message, hint] = forcing::unrepeated(self, &names, &self.ranges(), &self.defaults())?;
         let (item, field) = (Item::Forcing, Field::Expression);
         Some(ModelError { item, field, name: String::new(), span: None, message, hint })
+    }
+
+    /// The same model with other labels: unit of time, and remarks.
+    pub fn with_time(mut self, time: &str, remarks: Vec<String>) -> Model {
+        let about = Arc::make_mut(&mut self.about);
+        (about.time, about.remarks) = (time.to_string(), remarks);
+        self
+    }
+
+    /// The same model with other units as labels, by name; `period` is the time. Its numbers stay as they are.
+    pub(crate) fn labelled(&self, units: &[(String, String)]) -> Model {
+        let mut model = self.clone();
+        let about = Arc::make_mut(&mut model.about);
+        for (name, unit) in units {
+            about.parameters.iter_mut().filter(|own| own.name == *name).for_each(|own| own.unit = unit.clone());
+            about.states.iter_mut().filter(|own| own.name == *name).for_each(|own| own.unit = unit.clone());
+            about.outputs.iter_mut().filter(|own| own.name == *name).for_each(|own| own.unit = unit.clone());
+            if name == "period" {
+                about.time = unit.clone();
+            }
+        }
+        model
     }
 
     /// Position of the parameter of that name.
@@ -177,6 +209,14 @@ impl Model {
     /// Position of the output of that name.
     pub fn output_index(&self, name: &str) -> Option<usize> {
         self.outputs.iter().position(|o| o.name == name)
+    }
+
+    /// The unit of a state or, behind the states, of an output; empty where there is neither.
+    pub fn channel_unit(&self, index: usize) -> &str {
+        match index.checked_sub(self.states.len()) {
+            None => self.states.get(index).map_or("", |own| &own.unit),
+            Some(output) => self.outputs.get(output).map_or("", |own| &own.unit),
+        }
     }
 
     /// The value of every parameter.

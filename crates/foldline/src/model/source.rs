@@ -72,6 +72,8 @@ pub struct Definition {
 pub struct Constant {
     /// Its name.
     pub name: String,
+    /// Its unit; `1` where it has none.
+    pub unit: String,
     /// Its value.
     pub value: f64,
 }
@@ -143,6 +145,8 @@ pub struct ModelSource {
     pub description: String,
     /// Where it comes from.
     pub source: String,
+    /// Unit of time; empty where the model does not state it.
+    pub time: String,
     /// Numbers with names.
     pub constants: Vec<Constant>,
     /// Functions of the model, in any order.
@@ -285,6 +289,18 @@ impl Default for Ends {
     fn default() -> Ends {
         Ends::Given { before: Vec::new(), after: Vec::new() }
     }
+}
+
+impl Constant {
+    /// A constant without unit.
+    pub fn new(name: &str, value: f64) -> Constant {
+        Constant { name: name.into(), unit: "1".into(), value }
+    }
+}
+
+/// Name of the repeated quantity of which `x[3]` is an element: `x`.
+pub(crate) fn element_of(name: &str) -> Option<&str> {
+    name.split_once('[').map(|(family, _)| family)
 }
 
 /// Name of an element of a repeated quantity: `x[3]`.

@@ -1,0 +1,123 @@
+//! Units of a model: where they are stated, values that carry one, and what their check has found.
+
+use super::Reader;
+use crate::diagnostic::Diagnostic;
+use crate::toml_walk::{Value, diagnose};
+use foldline::model::{Field, Item, Model, ModelError, ModelSource, TAKEN_AS, UnitReport, check_units};
+use foldline::units::{self, Unit};
+use toml::de::DeTable;
+
+/// Doubts that are told one by one.
+const DOUBTS: usize = 3;
+/// Numbers with implied units that are listed.
+const TOLD: usize = 12;
+
+impl Reader<'_> {
+    /// The unit of time at the top, and `units = "labels"`.
+    pub(super) fn time(&mut self, root: &DeTable) -> String {
+        if let Some(value) = root.get("units") {
+            self.labels_only = value.get_ref().as_str() == Some("labels");
+            if !matches!(value.get_ref().as_str(), Some("labels" | "checked")) {
+                let hint = "write `units = \"labels\"`, which leaves units unchecked, or leave the key out";
+                self.walk.report(value.span(), "`units` is neither \"checked\" nor \"labels\"", hint);
+            }
+        }
+        let Some(value) = root.get("time") else { return String::new() };
+        let Some(text) = self.walk.string(value, "`time`") else { return String::new() };
+        let unit = Unit::read(&text);
+        if !unit.is_number() && unit.convert(1.0, &Unit::read("s")).is_err() {
+            let hint = "write a unit of time such as `time = \"ms\"`, or `time = \"1\"` where it is a pure number";
+            self.walk.report(value.span(), format!("`time` is in {text}, which is no unit of time"), hint);
+        }
+        text
+    }
+
+    /// The unit that a table states for an item, and the description.
+    pub(super) fn labels(&mut self, item: Item, table: &DeTable) -> (String, String) {
+        let unit = table.get("unit").and_then(|value| {
+            self.places.insert((item, Field::Unit), value.span());
+            self.walk.string(value, "`unit`")
+        });
+        if unit.is_some() {
+            self.measured.insert(item);
+        }
+        (unit.unwrap_or_else(|| "1".into()), self.prose(table, "description"))
+    }
+
+    /// A number, or a number with a unit: converted to the unit of the item, or stating it where it has none.
+    pub(super) fn measure(&mut self, item: Item, value: &Value, what: &str, unit: &mut String) -> Option<f64> {
+        let Some(written) = value.get_ref().as_str().and_then(units::quantity) else {
+            return self.walk.number(value, what);
+        };
+        if self.measured.contains(&item) {
+            return self.walk.quantity(value, what, unit);
+        }
+        let foreign: Vec<String> = Unit::read(&written.unit).foreign().map(str::to_string).collect();
+        if let Some(name) = foreign.first() {
+            let message =
+                format!("{what} is a number with the unit `{}`, and `{name}` is no unit that is known", written.unit);
+            let hint = format!(
+                "write a product with a star, `{}*{name}`, or state the unit with `unit = \"…\"`",
+                written.value
+            );
+            self.walk.report(value.span(), message, hint);
+            return None;
+        }
+        self.measured.insert(item);
+        self.places.insert((item, Field::Unit), value.span());
+        *unit = written.unit;
+        Some(written.value)
+    }
+
+    /// The model with the unit of its time, or what is wrong with its units.
+    pub(super) fn with_units(
+        mut self,
+        model: Model,
+        source: &ModelSource,
+        file: &str,
+        refuse: bool,
+    ) -> Result<Model, Vec<Diagnostic>> {
+        if self.labels_only {
+            return Ok(model);
+        }
+        let report = check_units(source, &|item| self.measured.contains(&item));
+        let time = report.time.clone().unwrap_or_default();
+        if refuse && !report.errors.is_empty() {
+            report.errors.into_iter().for_each(|error| self.report(error));
+            self.walk.found.sort_by_key(|diagnostic| (diagnostic.line, diagnostic.column));
+            return Err(self.walk.found);
+        }
+        let remarks = if refuse { self.remarks(&report, file) } else { Vec::new() };
+        Ok(model.with_time(&time, remarks))
+    }
+
+    /// What is doubtful about the units.
+    fn remarks(&self, report: &UnitReport, file: &str) -> Vec<String> {
+        let placed = |error: &ModelError, message: String, hint: String| {
+            diagnose(file, self.text, self.place_of(error), message, hint).as_note()
+        };
+        let doubts = report.doubts.iter().take(DOUBTS);
+        let mut remarks: Vec<String> = doubts.map(|own| placed(own, own.message.clone(), own.hint.clone())).collect();
+        if let Some(more @ 1..) = report.doubts.len().checked_sub(DOUBTS) {
+            remarks.push(format!("note: and {more} more places where the units do not fit"));
+        }
+        if let Some(first) = report.numbers.first() {
+            let mut told: Vec<&str> = Vec::new();
+            for own in &report.numbers {
+                let quantity = own.message.split_once(TAKEN_AS).map_or(own.message.as_str(), |(_, quantity)| quantity);
+                if !told.contains(&quantity) {
+                    told.push(quantity);
+                }
+            }
+            let more = match told.len().saturating_sub(TOLD) {
+                0 => String::new(),
+                more => format!(", and {more} more"),
+            };
+            told.truncate(TOLD);
+            let message = format!("numbers in formulas stand for quantities with a unit: {}{more}", told.join(", "));
+            let hint = "if that is meant, nothing has to be done; a number with its unit can be written under [constants], as in `V0 = \"40 mV\"`";
+            remarks.push(placed(first, message, hint.into()));
+        }
+        remarks
+    }
+}
