@@ -39,6 +39,7 @@ fn the_false_unstable_piece_below_contact_is_recognised() {
         tolerance: 1e-6,
         degree: 4,
         limits: Default::default(),
+        simulation: foldline::attractors::Limits::patient(),
         seeds: vec![seed],
         branches: vec![branch],
         curves: Vec::new(),
