@@ -23,9 +23,7 @@
 use super::floquet::{Course, Floquet};
 use crate::linalg::dense::{VECTORS, random};
 use crate::linalg::periodic_schur::{self, CONDITION};
-use faer::linalg::matmul::matmul;
-use faer::prelude::*;
-use faer::{Accum, Mat, MatMut, MatRef, Par};
+use foldline_dense::{Factored, Mat, MatRef, multiply};
 use num_complex::Complex64;
 
 /// Rounding error up to which the product is formed: a tenth of what is stated for rounding.
@@ -83,11 +81,7 @@ impl Split {
 
     /// log |det (F_N ⋯ F_1)|.
     fn log_determinant(&self) -> f64 {
-        let of = |f: MatRef<f64>| {
-            let lu = f.partial_piv_lu();
-            (0..self.p).map(|i| lu.U()[(i, i)].abs().ln()).sum::<f64>()
-        };
-        self.factors().map(of).sum()
+        self.factors().map(|f| Factored::new(f).log_determinant()).sum()
     }
 
     /// Eigenvalues of F_N ⋯ F_1 by decreasing modulus, if they can be computed.
@@ -141,7 +135,7 @@ impl Split {
         let start = random(p);
         let (mut image, mut inverse) = (start.clone(), start.clone());
         for (j, f) in self.factors().enumerate() {
-            let lu = f.partial_piv_lu();
+            let lu = Factored::new(f);
             let carried = |image: &Mat<f64>, inverse: &Mat<f64>| {
                 let mut to = Mat::zeros(p, VECTORS);
                 multiply(to.as_mut(), f, image.as_ref());
@@ -169,11 +163,6 @@ fn rows(a: MatRef<f64>) -> impl Iterator<Item = f64> {
     (0..rows * columns).map(move |k| a[(k / columns, k % columns)])
 }
 
-/// to = a b.
-fn multiply(to: MatMut<f64>, a: MatRef<f64>, b: MatRef<f64>) {
-    matmul(to, Accum::Replace, a, b, 1.0, Par::Seq);
-}
-
 /// (3) of row-major p×p.
 fn moduli(f: &[f64], p: usize) -> f64 {
     let (mut columns, mut row_sum) = (vec![0.0; p], 0.0f64);
@@ -186,14 +175,14 @@ fn moduli(f: &[f64], p: usize) -> f64 {
 
 /// (4): the root of the mean square of the entries of A w, for w of [`random`] vectors.
 fn size(image: &Mat<f64>) -> f64 {
-    image.norm_l2() / ((image.nrows() * image.ncols()) as f64).sqrt()
+    foldline_dense::norm(image) / ((image.nrows() * image.ncols()) as f64).sqrt()
 }
 
 /// Eigenvalues of one matrix by decreasing modulus, those of a pair together.
 fn eigenvalues(a: MatRef<f64>) -> Option<Vec<Complex64>> {
-    let mut found = a.eigenvalues().ok()?;
+    let mut found = foldline_dense::eigenvalues(a)?;
     found.sort_by(|a, b| b.norm().total_cmp(&a.norm()));
-    found.iter().all(|z| z.is_finite()).then_some(found)
+    Some(found)
 }
 
 /// Q_{j+1}ᵀ g Q_j with reflections 1 - v vᵀ; `sums` is room for n.
