@@ -56,6 +56,7 @@ pub fn plan(model: &Model, until: f64, points: usize) -> Plan {
         tolerance: 1e-6,
         degree: 4,
         limits: Default::default(),
+        simulation: foldline::attractors::Limits::patient(),
         seeds: vec![seed],
         branches: vec![branch],
         curves: Vec::new(),

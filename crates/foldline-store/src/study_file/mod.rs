@@ -175,8 +175,7 @@ fn parse(
 
     let tolerance = tolerance(&mut walk, &root);
     let degree = root.get("degree").and_then(|v| walk.integer(v, "`degree`", 2..=7)).unwrap_or(4) as usize;
-    let [limits, simulation] =
-        [Limits::default(), Limits::patient()].map(|usual| limits(&mut walk, &root, &model.time, usual));
+    let [limits, simulation] = limits(&mut walk, &root, &model.time);
     let mut defaults: Vec<f64> = model.parameters.iter().map(|p| p.value).collect();
     if let Some(value) = root.get("parameters") {
         override_parameters(&mut walk, value, &model, &mut defaults);
@@ -215,8 +214,8 @@ fn parse(
     Ok(Study { file: file.to_string(), text: text.to_string(), model_file, model_text, model, plan })
 }
 
-/// Limits on trajectories, where the study states them.
-fn limits(walk: &mut Walk, root: &DeTable, unit: &str, usual: Limits) -> Limits {
+/// Limits on trajectories in the search for first solutions, and in surveys and sweeps.
+fn limits(walk: &mut Walk, root: &DeTable, unit: &str) -> [Limits; 2] {
     let steps = root.get("max-steps").and_then(|v| walk.integer(v, "`max-steps`", 1..=10_000_000_000));
     let time = root.get("max-time").and_then(|v| {
         let time = walk.quantity(v, "`max-time`", unit)?;
@@ -226,7 +225,8 @@ fn limits(walk: &mut Walk, root: &DeTable, unit: &str, usual: Limits) -> Limits 
         walk.report(v.span(), "`max-time` is not positive", "give a time in the units of the model");
         None
     });
-    Limits { steps: steps.map_or(usual.steps, |n| n as usize), time: time.unwrap_or(usual.time) }
+    [Limits::default(), Limits::patient()]
+        .map(|usual| Limits { steps: steps.map_or(usual.steps, |n| n as usize), time: time.unwrap_or(usual.time) })
 }
 
 fn model_key<'v, 't>(walk: &mut Walk, root: &'v DeTable<'t>) -> Option<&'v Value<'t>> {

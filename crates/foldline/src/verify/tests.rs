@@ -46,6 +46,7 @@ fn computed(model: &Model) -> Diagram {
         tolerance: 1e-6,
         degree: 4,
         limits: Default::default(),
+        simulation: crate::attractors::Limits::patient(),
         seeds: vec![seed],
         branches: vec![branch],
         curves: Vec::new(),
