@@ -183,7 +183,7 @@ impl<'a> Walk<'a> {
         let [own, other] = [&forms[a], &forms[b]];
         match op {
             Binary::Multiply => own.plus(other, 1.0),
-            Binary::Divide => Form { any: own.any, ..own.plus(&Form { any: false, ..other.clone() }, -1.0) },
+            Binary::Divide => own.plus(other, -1.0),
             Binary::Power => match defaults[b] {
                 Some(power) => own.raised(power),
                 // The exponent is an element of a repeated parameter, or varies.
