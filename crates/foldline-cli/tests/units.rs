@@ -37,7 +37,7 @@ fn models_whose_units_contradict_each_other_are_refused_with_place_and_both_unit
         (spring(plain, right) + "[outputs]\nF = { expression = \"k*x\", unit = \"J\" }\n", "m.toml:8:21", ["J", "N"]),
         (spring(plain, right) + "[outputs]\nF = \"k*x + m*v\"\n", "m.toml:8:12", ["N", "kg m/s"]),
         (spring(plain, right) + "[outputs]\nF = \"sin(x)\"\n", "m.toml:8:10", ["sin", "rad"]),
-        (spring(plain, right) + "[outputs]\nF = \"if(x > m, 1, 0)\"\n", "m.toml:8:13", ["m", "kg"]),
+        (spring(plain, right) + "[outputs]\nF = \"if(x > m, 1, 0)\"\n", "m.toml:8:9", ["m", "kg"]),
         (spring(r#"{ equation = "v", unit = "m", range = ["-5 mm", "5 s"] }"#, right), "m.toml:5:53", ["in s", "to m"]),
         (
             "[parameters]\nf = { value = 5, unit = \"Hz\" }\na = { value = 1, unit = \"m/s\" }\n[forcing]\nfrequency = \"f\"\n\
