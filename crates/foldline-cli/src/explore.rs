@@ -103,7 +103,7 @@ fn ranged(option: &str, typed: &str, model: &Model) -> Result<(String, [f64; 2])
     match (low, high) {
         (Some(low), Some(high)) if low < high => Ok((name, [low, high])),
         (Some(_), Some(_)) => Err(said("the first value is not smaller than the second", &example)),
-        _ => Err(said("an end is neither a finite number nor a quantity in a unit of the parameter", &example)),
+        _ => Err(said("an end is not a finite number, nor a quantity in a unit of the parameter", &example)),
     }
 }
 
@@ -116,7 +116,7 @@ fn valued(typed: &str, model: &Model) -> Result<(String, f64), Failure> {
     let value = measured(value, &name, model);
     value
         .map(|value| (name, value))
-        .ok_or_else(|| said("the value is neither a finite number nor a quantity in a unit of the parameter", example))
+        .ok_or_else(|| said("the value is not a finite number, nor a quantity in a unit of the parameter", example))
 }
 
 /// A number, or a number with a unit such as `500 rpm`, in the unit of a parameter.

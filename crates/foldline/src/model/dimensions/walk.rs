@@ -211,10 +211,10 @@ impl<'a> Walk<'a> {
             "sign" | "heaviside" => Form::default(),
             "min" | "max" | "hypot" | "mod" => self.alike(body, [a, b], forms, "compared"),
             "atan2" => {
-                self.alike(body, [a, b], forms, "divided to an angle");
+                self.alike(body, [a, b], forms, "compared");
                 Form::default()
             }
-            "if" => self.alike(body, [b, c], forms, "alternatives of one quantity"),
+            "if" => self.alike(body, [b, c], forms, "alternatives"),
             name => {
                 let angle = matches!(name, "sin" | "cos" | "tan");
                 self.pure(body, a, &forms[a], angle, &format!("the argument of {name}"));
@@ -237,7 +237,7 @@ impl<'a> Walk<'a> {
             let text = |k: usize| body.text.get(spans[k].clone()).unwrap_or_default().to_string();
             let units = [own, other].map(|form| self.system.shown(form));
             let message =
-                format!("`{}` is in {} and `{}` in {}: they are not {done}", text(a), units[0], text(b), units[1]);
+                format!("`{}` is in {} and `{}` in {}: they cannot be {done}", text(a), units[0], text(b), units[1]);
             let both = format!("{} {}", text(a), text(b));
             let inferred = self.system.inferred(&self.mentioned(&both));
             self.tell(outcome, &residual, place, message, &inferred);
