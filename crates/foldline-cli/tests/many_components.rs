@@ -83,6 +83,5 @@ fn bifurcations_among_strongly_damped_components_are_where_they_are_known_to_be(
         assert!(!clear || point.unstable == unstable, "{} at {mu}", point.unstable);
         assert_eq!(point.spectrum.len(), 47);
         assert!(off(point) <= point.trust.spectrum, "{:e} off at {mu}, stated {:e}", off(point), point.trust.spectrum);
-        assert!(point.trust.liouville_defect < 1e-6, "{:e}", point.trust.liouville_defect);
     }
 }

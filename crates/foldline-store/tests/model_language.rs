@@ -287,7 +287,7 @@ fn as_many_repeated_states_as_are_allowed() {
 
 #[test]
 fn a_state_is_given_for_all_elements_or_for_each() {
-    let text = "[states.\"x''\"]\ncount = 3\nperiodic = true\nequation = \"x[i-1] - x[i] - x'[i]\"\n";
+    let text = "[states.\"x''\"]\ncount = 3\nperiodic = true\nequation = \"x[i-1] - 2*x[i] - x'[i]\"\n";
     let study = |state: &str| {
         let study = format!(
             "model = \"m.toml\"\n[[seed]]\nname = \"s\"\nstate = {state}\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"p\"\nrange = [0, 1]\n"

@@ -12,7 +12,7 @@ use num_complex::Complex64;
 use std::path::Path;
 
 // K and k differ in a capital only; `step` and `node` are names of our own.
-const MODEL: &str = "name = \"made up\"\n[parameters]\nK = { value = 1.0, unit = \"N/m\", description = \"gain, größer als 0\" }\n\
+const MODEL: &str = "name = \"made up\"\nunits = \"labels\"\n[parameters]\nK = { value = 1.0, unit = \"N/m\", description = \"gain, größer als 0\" }\n\
     k = 2.0\nstep = 0.5\n[states.x]\nequation = \"K*x - k*x^3\"\n[states.node]\nequation = \"-step*node\"\n\
     [outputs]\nr = \"abs(x)\"\n";
 const STUDY: &str = "model = \"made-up.toml\"\n[[seed]]\nname = \"start\"\nstate = { x = 0.1, node = 0 }\n\
