@@ -374,7 +374,7 @@ fn what_explore_is_told() {
     says(&told(&["--free", "mi=0:1"]), &["no parameter `mi`", "did you mean `mu`"]);
     says(&told(&["--free", "mu"]), &["there is no `=`", "--free NAME=LOW:HIGH"]);
     says(&told(&["--free", "mu=1"]), &["no `:` between two values"]);
-    says(&told(&["--free", "mu=1:x"]), &["an end is neither a finite number nor a quantity"]);
+    says(&told(&["--free", "mu=1:x"]), &["an end is not a finite number"]);
     says(&told(&["--free", "mu=1:0"]), &["not smaller than the second"]);
     says(&told(&["--free", "mu=0:1", "--set", "kappa"]), &["there is no `=`"]);
     says(&told(&["--free", "mu=0:1", "--connect", "mu=0:1"]), &["that is the parameter of --free"]);

@@ -135,9 +135,9 @@ impl Model {
     /// The model that `source` describes, or everything that is wrong with it.
     pub fn compile(source: ModelSource) -> Result<Model, Vec<ModelError>> {
         let (source, totals) = if source.totals.is_empty() { (source, Vec::new()) } else { totals::reduced(source)? };
+        let (compiled, Named { states, parameters, outputs: output_list }) = compile(&source)?;
         let item_of = |(i, state): (usize, &State)| vec![i; family::count(&state.repeat)];
         let items: Vec<usize> = source.states.iter().enumerate().flat_map(item_of).collect();
-        let (compiled, Named { states, parameters, outputs: output_list }) = compile(&source)?;
         let field = Tape::new(&compiled.graph, &[&compiled.field]);
         let outputs = Tape::new(&compiled.graph, &[&compiled.outputs]);
         let switches = Switches::new(&compiled.graph, &compiled.field);
