@@ -194,7 +194,7 @@ fn a_given_rotation_closes_a_turn_later() {
 fn a_state_over_whose_period_f_does_not_repeat_itself_is_refused() {
     let model = "[parameters]\nk = 1.0\n[states.x]\nequation = \"v\"\nperiod = \"2*pi\"\n\
                  [states]\nv = \"-sin(x) - 0.1*k*x\"\n";
-    let found = foldline_store::model_file::parse_model(model, "model").err().expect("a mistake");
+    let Err(found) = foldline_store::model_file::parse_model(model, "model") else { panic!("a mistake") };
     let text = format!("{found:?}");
     assert!(text.contains("said to be an angle") && text.contains("`x`"), "{text}");
 }

@@ -230,7 +230,8 @@ impl VectorField for Rolled<'_> {
         self.field.linearise(Batch { states: &states, ..at }, free, &mut f[..n * lanes], &mut own, &mut of_free);
         let rates: Vec<f64> = f[..n * lanes].to_vec();
         self.circles(at, f);
-        (fx.fill(0.0), fp.fill(0.0));
+        fx.fill(0.0);
+        fp.fill(0.0);
         for l in 0..lanes {
             // Derivatives of each f_i by c and s instead of θ, then of z' instead of θ'.
             let mut row = vec![0.0; all];

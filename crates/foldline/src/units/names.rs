@@ -98,7 +98,7 @@ static KNOWN: &[Known] = &[
     scaled(&["eV"], [1.602176634e-19, 1.0], ENERGY),
     scaled(&["cal"], [4.184, 1.0], ENERGY),
     scaled(&["Wh"], [3600.0, 1.0], ENERGY),
-    fixed(&["hp"], [745.69987158227022, 1.0], POWER),
+    fixed(&["hp"], [745.699_871_582_270_2, 1.0], POWER),
     fixed(&["PS"], [735.49875, 1.0], POWER),
     scaled(&["P", "poise"], [1.0, 10.0], &[("kg", 1.0), ("m", -1.0), ("s", -1.0)]),
     scaled(&["St", "stokes"], [1.0, 10_000.0], &[("m", 2.0), ("s", -1.0)]),
