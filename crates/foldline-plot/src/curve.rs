@@ -63,10 +63,20 @@ pub fn stretches(branch: &Branch, x: Quantity, y: Quantity) -> Vec<Vec<Vertex>> 
     }
     let closed = branch.ends.iter().flatten().any(|end| *end == Ending::Closed);
     if let (true, Some(first)) = (closed, branch.points.first()) {
-        vertices.push(place(first, x, y).map(|at| (at, stable)));
+        let home = place(first, x, y).filter(|home| !is_another_copy(&vertices, *home));
+        vertices.push(home.map(|at| (at, stable)));
     }
     let parts = vertices.split(Option::is_none);
     parts.map(|stretch| stretch.iter().flatten().copied().collect()).filter(|s: &Vec<Vertex>| !s.is_empty()).collect()
+}
+
+/// True if a branch that closes round a circle comes back to a copy of its start, an angle a whole turn away: the step that closes it would be
+/// longer than any other by far. (The start lies within one step of the last point.)
+fn is_another_copy(vertices: &[Option<Vertex>], home: [f64; 2]) -> bool {
+    const FAR: f64 = 4.0;
+    let known: Vec<[f64; 2]> = vertices.iter().flatten().map(|(at, _)| *at).collect();
+    let longest = |axis: usize| known.windows(2).fold(0.0, |m: f64, w| m.max((w[1][axis] - w[0][axis]).abs()));
+    known.last().is_some_and(|last| (0..2).any(|axis| (last[axis] - home[axis]).abs() > FAR * longest(axis)))
 }
 
 /// For each pair of neighbours the vertices in between that make the polyline a smooth curve through all given vertices:

@@ -146,6 +146,19 @@ fn a_closed_branch_is_drawn_closed() {
     assert_eq!(pieces[0].vertices.first(), pieces.last().unwrap().vertices.last());
 }
 
+/// Equilibria sin(r) = p with r an angle: the branch closes round the circle, a whole turn from where it began.
+#[test]
+fn a_branch_that_closes_round_a_circle_is_not_drawn_back_across_it() {
+    let mut branch = Branch::new("round", Family::Equilibrium, 0, Origin::Seed("start".into()));
+    for k in 0..60 {
+        let r = std::f64::consts::TAU * k as f64 / 60.0;
+        branch.insert(point(k, r.sin(), r, 0, false));
+    }
+    branch.ends = [Some(Ending::Closed), Some(Ending::Closed)];
+    let drawn = curve::stretches(&branch, Quantity::Parameter(0), Quantity::Largest(2));
+    assert_eq!(drawn.iter().map(Vec::len).collect::<Vec<_>>(), [60]);
+}
+
 #[test]
 fn equilibria_have_no_place_on_an_axis_of_periods() {
     assert!(curve::pieces(&peak("cubic S", 1.0), Quantity::Parameter(0), Quantity::Period, [12.0, 6.0]).is_empty());
