@@ -1,6 +1,5 @@
 //! Is it stable? Eigenvalues of equilibria, Floquet multipliers of cycles.
 
-mod explicit;
 pub mod floquet;
 mod reduction;
 
