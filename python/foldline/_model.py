@@ -151,7 +151,9 @@ class Model:
         state = b"" if isinstance(start, str) else raw(self.state(start))
         values = self._values(parameters)
         counts = whole("samples", samples), whole("random", random, 0)
-        found = _native.settle(self._native, attractor, state, values, *counts, tolerable(tolerance), processors(jobs), limits(max_steps, max_time))
+        found = _native.settle(
+            self._native, attractor, state, values, *counts, tolerable(tolerance), processors(jobs), limits(max_steps, max_time)
+        )
         return Solution(found, self)
 
     def attractors(
@@ -189,8 +191,10 @@ class Model:
             uniformly from the ranges, with a confidence interval; `hits` counts those drawn towards the origin too.
         """
         counts = whole("samples", samples), whole("seed", seed, 0)
-        how = tolerable(tolerance), processors(jobs), limits(max_steps, max_time)
-        found, lost = _native.attractors(self._native, self._values(parameters), *counts, *how)
+        own_limits = limits(max_steps, max_time)
+        found, lost = _native.attractors(
+            self._native, self._values(parameters), *counts, tolerable(tolerance), processors(jobs), own_limits
+        )
         each = [Attractor(own, self, ratio, hits, share, floats(example)) for own, ratio, hits, share, example in found]
         return Attractors(each, samples, *lost)
 
@@ -305,6 +309,7 @@ def model(
     frequency: Any = None,
     period: Any = None,
     whirl: str | Sequence[str] | None = None,
+    totals: Mapping[str, Mapping[str, Any]] | None = None,
     time: str | None = None,
     units: str | None = None,
     name: str | None = None,
@@ -324,6 +329,7 @@ def model(
     frequency: Any = None,
     period: Any = None,
     whirl: str | Sequence[str] | None = None,
+    totals: Mapping[str, Mapping[str, Any]] | None = None,
     time: str | None = None,
     units: str | None = None,
     name: str | None = None,
