@@ -164,7 +164,7 @@ impl Places<'_> {
                 let size = SIZES[k % SIZES.len()];
                 x.iter_mut()
                     .enumerate()
-                    .for_each(|(i, x)| *x *= if (k / SIZES.len() + i) % 2 == 0 { size } else { -size });
+                    .for_each(|(i, x)| *x *= if (k / SIZES.len() + i).is_multiple_of(2) { size } else { -size });
             }
             self.keeps([x, parameters, times], c)
         })
