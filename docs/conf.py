@@ -1,0 +1,71 @@
+"""The documentation site. `cargo xtask site` builds it.
+
+The source directory is the root of the repository, so that every link between pages, models and notebooks is the same on the site and in
+the repository. The native half of the package is replaced by a stand-in: nothing has to be compiled.
+"""
+
+import os
+import sys
+import tomllib
+
+ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+sys.path.insert(0, os.path.join(ROOT, "python"))
+
+with open(os.path.join(ROOT, "Cargo.toml"), "rb") as file:
+    release = tomllib.load(file)["workspace"]["package"]["version"]
+with open(os.path.join(ROOT, "pyproject.toml"), "rb") as file:
+    REPOSITORY = tomllib.load(file)["project"].get("urls", {}).get("Repository", "")
+
+project = "foldline"
+author = "The foldline authors"
+project_copyright = author
+version = release
+language = "en"
+
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+root_doc = "docs/index"
+include_patterns = ["docs/**", "python/notebooks/**", "ARCHITECTURE.md", "CHANGELOG.md", "CONTRIBUTING.md"]
+exclude_patterns = ["**/.*", ".*", "target", "crates", "fuzz", "benches", "runs", "out", "**/.ipynb_checkpoints", "docs/images", "docs/schema"]
+templates_path = []
+
+# Messages of the program name pages by their path, as in docs/book/units.md; headings have the anchors that they have in the repository.
+myst_heading_anchors = 4
+myst_enable_extensions = ["attrs_inline", "colon_fence"]
+myst_links_external_new_tab = False
+suppress_warnings = []
+highlight_language = "none"
+
+# Notebooks keep the outputs that are stored in them; python/tests/test_notebooks.py compares these with new ones.
+nb_execution_mode = "off"
+
+autodoc_mock_imports = ["foldline._native"]
+autodoc_member_order = "bysource"
+autodoc_typehints = "none"
+napoleon_google_docstring = False
+napoleon_use_rtype = False
+add_module_names = False
+
+html_theme = "furo"
+html_title = f"foldline {release}"
+html_static_path = ["site/static"]
+html_css_files = ["site.css"]
+html_extra_path = ["site/extra"]
+html_show_sourcelink = False
+html_copy_source = False
+html_theme_options = {
+    "source_repository": REPOSITORY,
+    "source_branch": "main",
+    "source_directory": "",
+    "top_of_page_buttons": [],
+}
+
+
+def add_children(app, docname, source):
+    """Puts the page of each bifurcation below the overview in the navigation; the overview itself stays plain Markdown."""
+    if docname == "docs/book/bifurcations":
+        source[0] += "\n```{toctree}\n:hidden:\n:glob:\n\nbifurcations/*\n```\n"
+
+
+def setup(app):
+    """Connects what is above."""
+    app.connect("source-read", add_children)
