@@ -8,11 +8,16 @@ use std::time::Duration;
 ///
 /// `foldline new oscillator` writes a model and a study to begin with.
 #[derive(Debug, Parser)]
-#[command(name = "foldline", version, after_help = EXIT_CODES, max_term_width = 110)]
+#[command(name = "foldline", version, after_help = BEGIN, max_term_width = 110)]
 pub struct Arguments {
     #[command(subcommand)]
     pub command: Option<Command>,
 }
+
+const BEGIN: &str =
+    "To begin: `foldline new oscillator` writes a commented model and study. `foldline COMMAND --help` says more.
+
+Exit codes: 0 done, 1 something outside failed, 2 a mistake in the input, 3 done except for what the messages name";
 
 const EXIT_CODES: &str = "Exit codes:
   0  done
