@@ -35,11 +35,10 @@ pub fn contradictions(texts: &[Text]) -> Vec<String> {
             );
         }
     }
-    match (latest(text("CHANGELOG.md")), cited(text("CITATION.cff"))) {
-        (Some(latest), Some(cited)) if latest == cited => {}
-        (latest, cited) => found.push(format!(
-            "CITATION.cff: version and date {cited:?} are not those of the latest release in CHANGELOG.md, {latest:?}"
-        )),
+    let [released, cited] = [latest(text("CHANGELOG.md")), cited(text("CITATION.cff"))]
+        .map(|release| release.map_or("none".to_string(), |(version, date)| format!("{version} of {date}")));
+    if released != cited || released == "none" {
+        found.push(format!("CITATION.cff: the release is {cited}, but the latest one in CHANGELOG.md is {released}"));
     }
     found
 }
