@@ -3,8 +3,10 @@
 use crate::root;
 use crate::tree::{Text, texts};
 
-/// The file whose only line is the address of the repository.
-const ADDRESS: &str = "docs/repository.txt";
+/// The file that defines the address of the repository, in the line that begins with [`KEY`].
+const ADDRESS: &str = "pyproject.toml";
+
+const KEY: &str = "Repository = ";
 
 /// The address until there is one.
 const PLACEHOLDER: &str = "https://example.org/foldline";
@@ -14,10 +16,11 @@ const WITH_ADDRESS: [&str; 5] =
     ["CHANGELOG.md", "CITATION.cff", "CODE_OF_CONDUCT.md", "SECURITY.md", ".github/ISSUE_TEMPLATE/config.yml"];
 
 fn address() -> String {
-    std::fs::read_to_string(root().join(ADDRESS)).unwrap_or_default().trim().to_string()
+    let text = std::fs::read_to_string(root().join(ADDRESS)).unwrap_or_default();
+    text.lines().find_map(|line| line.strip_prefix(KEY)).map_or("", |value| value.trim_matches('"')).to_string()
 }
 
-/// Reports files whose address is not that of `docs/repository.txt`, and a version or date in CITATION.cff that is not that of the
+/// Reports files whose address is not that of pyproject.toml, and a version or date in CITATION.cff that is not that of the
 /// latest release in CHANGELOG.md.
 pub fn contradictions(texts: &[Text]) -> Vec<String> {
     let mut found = Vec::new();
@@ -72,7 +75,7 @@ pub fn move_to(new: &str) -> bool {
         eprintln!("{}", text.name);
         std::fs::write(root().join(&text.name), text.text.replace(&old, new)).is_ok()
     });
-    changed && std::fs::write(root().join(ADDRESS), format!("{new}\n")).is_ok()
+    changed && address() == new
 }
 
 #[cfg(test)]

@@ -43,8 +43,8 @@ fn collect(folder: &Path, prefix: &str, found: &mut Vec<Text>) {
         let name = format!("{prefix}{own}");
         let path = entry.path();
         if path.is_dir() {
-            // Build products, runs, environments and caches.
-            let skipped = ["target", "runs", "out", "__pycache__", "node_modules", "site"].contains(&own.as_str());
+            // Build products, runs and caches.
+            let skipped = ["target", "runs", "out"].contains(&name.as_str()) || own == "__pycache__";
             if !skipped && (own == ".github" || !own.starts_with('.')) {
                 collect(&path, &format!("{name}/"), found);
             }
