@@ -24,15 +24,13 @@ language = "en"
 
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 root_doc = "docs/index"
-include_patterns = ["docs/**", "python/notebooks/**", "ARCHITECTURE.md", "CHANGELOG.md", "CONTRIBUTING.md"]
+include_patterns = ["docs/**", "python/notebooks/**", "*.md"]
 exclude_patterns = ["**/.*", ".*", "target", "crates", "fuzz", "benches", "runs", "out", "**/.ipynb_checkpoints", "docs/images", "docs/schema"]
 templates_path = []
 
 # Messages of the program name pages by their path, as in docs/book/units.md; headings have the anchors that they have in the repository.
 myst_heading_anchors = 4
 myst_enable_extensions = ["attrs_inline", "colon_fence"]
-myst_links_external_new_tab = False
-suppress_warnings = []
 highlight_language = "none"
 
 # Notebooks keep the outputs that are stored in them; python/tests/test_notebooks.py compares these with new ones.
@@ -44,6 +42,8 @@ autodoc_typehints = "none"
 napoleon_google_docstring = False
 napoleon_use_rtype = False
 add_module_names = False
+# Single backticks in docstrings are code.
+default_role = "code"
 
 html_theme = "furo"
 html_title = f"foldline {release}"
@@ -60,12 +60,22 @@ html_theme_options = {
 }
 
 
+# Pages that the overviews in these files link to, put below them in the navigation. The overviews themselves stay plain Markdown.
+CHILDREN = {"docs/book/bifurcations": "bifurcations/*", "docs/decisions/README": "0*"}
+
+
 def add_children(app, docname, source):
-    """Puts the page of each bifurcation below the overview in the navigation; the overview itself stays plain Markdown."""
-    if docname == "docs/book/bifurcations":
-        source[0] += "\n```{toctree}\n:hidden:\n:glob:\n\nbifurcations/*\n```\n"
+    """Adds the pages below an overview."""
+    if docname in CHILDREN:
+        source[0] += f"\n```{{toctree}}\n:hidden:\n:glob:\n\n{CHILDREN[docname]}\n```\n"
+
+
+def escape_bars(app, what, name, obj, options, lines):
+    """Keeps |value| in a docstring from being read as a substitution."""
+    lines[:] = [line.replace("|value|", "\\|value\\|") for line in lines]
 
 
 def setup(app):
     """Connects what is above."""
     app.connect("source-read", add_children)
+    app.connect("autodoc-process-docstring", escape_bars, priority=400)
