@@ -34,6 +34,7 @@ fn the_pages_on_bifurcations_quote_what_the_program_prints() {
         }
     }
     pages.push(root().join("docs/book/from-auto.md"));
+    pages.push(root().join("docs/book/how-to.md"));
     pages.push(root().join("docs/book/when-it-does-not-work.md"));
     pages.push(root().join("docs/book/units.md"));
     let renew = std::env::var_os("FOLDLINE_WRITE_BOOK").is_some();
