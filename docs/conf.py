@@ -41,6 +41,9 @@ autodoc_member_order = "bysource"
 autodoc_typehints = "none"
 napoleon_google_docstring = False
 napoleon_use_rtype = False
+# Attributes of a class are a list, not entries of their own; several classes have attributes of one name.
+napoleon_use_ivar = True
+suppress_warnings = ["ref.python"]
 add_module_names = False
 # Single backticks in docstrings are code.
 default_role = "code"
