@@ -9,7 +9,13 @@ import sys
 import tomllib
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-sys.path.insert(0, os.path.join(ROOT, "python"))
+HERE = "docs/"
+sys.path[:0] = [os.path.join(ROOT, "python"), os.path.join(ROOT, "docs", "site")]
+
+import bibliography  # noqa: E402
+
+with open(os.path.join(ROOT, "docs", "references.bib"), encoding="utf-8") as file:
+    SOURCES = file.read()
 
 with open(os.path.join(ROOT, "Cargo.toml"), "rb") as file:
     release = tomllib.load(file)["workspace"]["package"]["version"]
@@ -23,14 +29,14 @@ version = release
 language = "en"
 
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
-root_doc = "docs/index"
+root_doc = HERE + "index"
 include_patterns = ["docs/**", "python/notebooks/**", "*.md"]
 exclude_patterns = ["**/.*", ".*", "target", "crates", "fuzz", "benches", "runs", "out", "**/.ipynb_checkpoints", "docs/images", "docs/schema"]
 templates_path = []
 
 # Messages of the program name pages by their path, as in docs/book/units.md; headings have the anchors that they have in the repository.
 myst_heading_anchors = 4
-myst_enable_extensions = ["attrs_inline", "colon_fence"]
+myst_enable_extensions = ["deflist"]
 highlight_language = "none"
 
 # Notebooks keep the outputs that are stored in them; python/tests/test_notebooks.py compares these with new ones.
@@ -64,13 +70,22 @@ html_theme_options = {
 
 
 # Pages that the overviews in these files link to, put below them in the navigation. The overviews themselves stay plain Markdown.
-CHILDREN = {"docs/book/bifurcations": "bifurcations/*", "docs/decisions/README": "0*"}
+CHILDREN = {HERE + "book/bifurcations": "bifurcations/*", HERE + "decisions/README": "0*"}
 
 
 def add_children(app, docname, source):
     """Adds the pages below an overview."""
     if docname in CHILDREN:
         source[0] += f"\n```{{toctree}}\n:hidden:\n:glob:\n\n{CHILDREN[docname]}\n```\n"
+
+
+def add_references(app, docname, source):
+    """Makes the page of references, and links to it from lines that name sources."""
+    if docname == HERE + "reference/references":
+        source[0] += bibliography.page(SOURCES)
+    elif docname.startswith(HERE):
+        lines = source[0].split("\n")
+        source[0] = "\n".join(bibliography.linked(line, SOURCES) if line.startswith("Source: ") else line for line in lines)
 
 
 def escape_bars(app, what, name, obj, options, lines):
@@ -81,4 +96,5 @@ def escape_bars(app, what, name, obj, options, lines):
 def setup(app):
     """Connects what is above."""
     app.connect("source-read", add_children)
+    app.connect("source-read", add_references)
     app.connect("autodoc-process-docstring", escape_bars, priority=400)
