@@ -15,19 +15,23 @@ from conftest import ROOT
 
 def examples(path):
     with open(os.path.join(ROOT, path), encoding="utf-8") as file:
-        # A block of text right below an example is what it prints.
-        return re.findall(r"```python\n(.*?)```(?:\n\n```text\n(.*?)```)?", file.read(), flags=re.DOTALL)
+        page = file.read()
+    # A block of TOML may begin with the name of its file; a block of text right below an example is what it prints.
+    files = re.findall(r"```toml\n# (\S+\.toml)\n(.*?)```", page, flags=re.DOTALL)
+    return files, re.findall(r"```python\n(.*?)```(?:\n\n```text\n(.*?)```)?", page, flags=re.DOTALL)
 
 
-PAGES = ["README.md", *(os.path.join("docs", "book", page) for page in ("python.md", "tutorial-rotor.md"))]
+PAGES = ["README.md", *(os.path.join("docs", "book", page) for page in ("first-model.md", "python.md", "tutorial-rotor.md"))]
 
 
 @pytest.mark.parametrize("path", PAGES)
 def test_examples_run_and_end_in_a_picture(path, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     os.symlink(os.path.join(ROOT, "models"), "models")
-    found = examples(path)
+    files, found = examples(path)
     assert found
+    for name, text in files:
+        (tmp_path / name).write_text(text, encoding="utf-8")
     for number, (text, printed) in enumerate(found):
         pyplot.close("all")
         capsys.readouterr()
