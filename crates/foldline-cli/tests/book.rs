@@ -212,6 +212,7 @@ fn the_pages_on_bifurcations_quote_what_the_program_prints() {
         "tutorial-neuron",
         "tutorial-rotor",
         "units",
+        "what-foldline-does-not-do",
         "when-it-does-not-work",
     ];
     pages.extend(others.map(|page| root().join(format!("docs/book/{page}.md"))));
