@@ -99,10 +99,10 @@ impl Page {
         lines.map(|line| line.trim_end().to_string()).collect()
     }
 
-    /// The pictures shown on the page.
+    /// Pictures shown on the page that its commands draw. These are SVG files; others are not checked.
     fn pictures(&self) -> Vec<&str> {
         let shown = self.lines.iter().filter_map(|line| line.split_once("images/")?.1.split_once(')'));
-        shown.map(|(name, _)| name).collect()
+        shown.map(|(name, _)| name).filter(|name| name.ends_with(".svg")).collect()
     }
 }
 
@@ -216,6 +216,7 @@ fn the_pages_on_bifurcations_quote_what_the_program_prints() {
         "when-it-does-not-work",
     ];
     pages.extend(others.map(|page| root().join(format!("docs/book/{page}.md"))));
+    pages.push(root().join("README.md"));
     let (renew, next) = (std::env::var_os("FOLDLINE_WRITE_BOOK").is_some(), AtomicUsize::new(0));
     let work = || {
         let mut wrong = Vec::new();
