@@ -15,6 +15,13 @@ pub fn multiply(to: MatMut<f64>, a: MatRef<f64>, b: MatRef<f64>) {
     matmul(to, Accum::Replace, a, b, 1.0, Par::Seq);
 }
 
+/// `a` `b`.
+pub fn product(a: &Mat<f64>, b: &Mat<f64>) -> Mat<f64> {
+    let mut to = Mat::zeros(a.nrows(), b.ncols());
+    multiply(to.as_mut(), a.as_ref(), b.as_ref());
+    to
+}
+
 /// Eigenvalues of a square matrix in no order; `None` if they could not be computed.
 pub fn eigenvalues(a: MatRef<f64>) -> Option<Vec<Complex64>> {
     a.eigenvalues().ok().filter(|found| found.iter().all(|z| z.is_finite()))
@@ -34,6 +41,11 @@ impl Factored {
     pub fn log_determinant(&self) -> f64 {
         let u = self.0.U();
         (0..u.nrows()).map(|i| u[(i, i)].abs().ln()).sum()
+    }
+
+    /// The solution of `a x = b`.
+    pub fn solve(&self, b: &Mat<f64>) -> Mat<f64> {
+        self.0.solve(b)
     }
 
     /// The solution of `aᵀ x = b`.
