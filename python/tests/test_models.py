@@ -176,7 +176,7 @@ def test_wrong_arguments_are_answered_with_the_cure(brusselator):
         brusselator.settle(parameters={"b": 3})
     with pytest.raises(foldline.InputError, match="has no state `z`"):
         brusselator.settle({"z": 3})
-    with pytest.raises(foldline.InputError, match="is no attractor"):
+    with pytest.raises(foldline.InputError, match="is not an attractor"):
         brusselator.settle("torus")
     with pytest.raises(foldline.NoSolution, match="no stable cycle was found"):
         brusselator.settle("cycle")

@@ -2,6 +2,7 @@
 
 use crate::arguments::Attractors as Typed;
 use crate::failure::{Failure, Outcome};
+use crate::progress::SignOfLife;
 use crate::run::processors;
 use foldline::attractors::{Attractor, Sampling, Sense, whirl_sense};
 use foldline::contract::VectorField;
@@ -24,6 +25,7 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
     if let Some(found) = never_finite(&model, &parameters, &text, &typed.model.display().to_string()) {
         return Err(vec![found].into());
     }
+    let working = SignOfLife::of("sampling");
     let census = attractors(
         &System::of(&model, &parameters),
         &parameters,
@@ -32,26 +34,31 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
         processors(),
         TOLERANCE,
     );
+    drop(working);
 
     let mut out = stdout().lock();
     let names = model.states.iter().map(|s| &s.name).chain(model.outputs.iter().map(|o| &o.name));
-    let heads: String = names.map(|name| format!("  {:>24}", format!("{name} from … to"))).collect();
+    let heads: String = names.map(|name| format!("  {:>24}", format!("{name} min … max"))).collect();
     writeln!(out, "{:<14} {:>6} {:>6} {:>20} {:>14}{heads}", "attractor", "ratio", "hits", "share", "period")?;
     for attractor in &census.attractors {
         writeln!(out, "{}", line(attractor, &model))?;
     }
     let samples = typed.samples;
-    let stuck = if census.stuck > 0 { format!(", {} stuck", census.stuck) } else { String::new() };
+    let stuck = if census.stuck > 0 {
+        format!(", {} stopped because the step size became too small", census.stuck)
+    } else {
+        String::new()
+    };
     let exits = match &census.exits[..] {
         [] => String::new(),
-        exits => format!(", {} left the region in which f is defined", exits.len()),
+        exits => format!(", {} left the region where the vector field is defined", exits.len()),
     };
-    writeln!(out, "{samples} samples, {} escaped{exits}{stuck}, {} not settled", census.escaped, census.unsettled)?;
+    writeln!(out, "{samples} samples: {} escaped{exits}{stuck}, {} not settled", census.escaped, census.unsettled)?;
     let uniform = (0..samples as usize).filter(|number| Sampling::is_uniform(*number)).count();
     writeln!(
         out,
-        "share: of the {uniform} samples drawn uniformly from the ranges of the states, with its 95 % confidence interval; the other {} \
-         are drawn towards the origin and count only as hits",
+        "share: fraction of the {uniform} samples drawn uniformly from the ranges of the states, with its 95 % \
+         confidence interval; the other {} samples are drawn towards the origin and count only as hits",
         samples as usize - uniform
     )?;
     Ok(Outcome::Done)
@@ -89,7 +96,7 @@ fn line(attractor: &Attractor, model: &Model) -> String {
 fn assign(assignment: &str, model: &Model, parameters: &mut [f64]) -> Result<(), Failure> {
     let said = |message: String, cure: &str| Failure::typed(format!("--set {assignment}: {message}"), cure);
     let Some((name, value)) = assignment.split_once('=') else {
-        return Err(said("there is no `=`".into(), "write --set NAME=VALUE, for example --set Omega=5"));
+        return Err(said("`=` is missing".into(), "write --set NAME=VALUE, for example --set Omega=5"));
     };
     let (name, value) = (name.trim(), value.trim());
     let Some(index) = model.parameter_index(name) else {
@@ -99,7 +106,7 @@ fn assign(assignment: &str, model: &Model, parameters: &mut [f64]) -> Result<(),
     };
     match value.parse::<f64>() {
         Ok(number) if number.is_finite() => parameters[index] = number,
-        _ => return Err(said(format!("`{value}` is not a finite number"), "a number such as 5, 0.25 or 1e-6")),
+        _ => return Err(said(format!("`{value}` is not a finite number"), "give a number such as 5, 0.25 or 1e-6")),
     }
     Ok(())
 }

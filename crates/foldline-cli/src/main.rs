@@ -12,6 +12,7 @@ mod progress;
 mod reproduce;
 mod run;
 mod table;
+mod verbosity;
 mod verify;
 
 use arguments::{Arguments, Command};
@@ -32,6 +33,7 @@ fn main() -> ExitCode {
 }
 
 fn answer(arguments: Arguments) -> Result<Outcome, Failure> {
+    verbosity::choose(arguments.quiet, arguments.verbose);
     match arguments.command {
         None => run::reference_study(),
         Some(Command::Run(typed)) => run::study(&typed),

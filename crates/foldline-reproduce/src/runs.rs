@@ -241,7 +241,7 @@ impl<'r> Runs<'r> {
         watch.recorder.finish().map_err(|error| error.to_string())?;
         let seconds = start.elapsed().as_secs_f64();
         if self.stop.load(Ordering::Relaxed) {
-            return Err("it was stopped; the same command goes on".into());
+            return Err("it was stopped; repeat the same command to continue".into());
         }
         let mark = format!("{name}\n{seconds}\n");
         std::fs::write(folder.join(FINISHED), mark).map_err(|error| format!("{}: {error}", folder.display()))?;
@@ -296,7 +296,7 @@ fn quick(plan: &mut Plan, tolerance: f64) {
     plan.tolerance = tolerance;
 }
 
-/// Records, tells how a simulation gets on, and stops when asked to.
+/// Records, reports the progress of simulations, and stops when asked to.
 struct Watch<'w> {
     recorder: Recorder,
     stop: &'w AtomicBool,
@@ -329,5 +329,9 @@ impl Observer for Watch<'_> {
         }
         let verdict = self.recorder.observe(event);
         if self.stop.load(Ordering::Relaxed) { Verdict::Stop } else { verdict }
+    }
+
+    fn stopping(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
     }
 }
