@@ -55,6 +55,8 @@ pub enum RunFileError {
     Newer(PathBuf, i64),
     /// A run cannot be resumed because its study or model (named here) has changed.
     Changed(PathBuf, &'static str),
+    /// The run is complete and its profiles have been removed, from which it would go on.
+    Thinned(PathBuf),
     /// The file contradicts itself; the sentence says where.
     Damaged(PathBuf, String),
     /// Another run is writing there.
@@ -123,6 +125,12 @@ impl fmt::Display for RunFileError {
                 f,
                 "{} has format {version}, but this foldline reads formats up to {FORMAT_VERSION}\n  help: use a \
                  newer foldline",
+                path.display()
+            ),
+            RunFileError::Thinned(path) => write!(
+                f,
+                "{} is complete and keeps only part of its profiles (`store` in the study), so it cannot be resumed\n  help: `--out DIR` \
+                 begins a new run",
                 path.display()
             ),
             RunFileError::Changed(path, what) => write!(

@@ -6,7 +6,7 @@ use crate::nearest::suggest;
 use crate::toml_walk::{Value, Walk};
 use foldline::diagram::{Kind, Shown};
 use foldline::explore::{BranchPlan, Start, Switching};
-use foldline::model::{Model, Parameter};
+use foldline::model::{Model, Parameter, unsupported};
 use foldline::special::mark::Mark;
 use foldline::special::quantity::Quantity;
 use std::ops::Range;
@@ -223,11 +223,16 @@ pub(super) fn switching(walk: &mut Walk, value: &Value) -> Switching {
                 }
             }
             None => {
-                let message = match Kind::from_name(name) {
-                    Some(_) => format!("no branch of equilibria or cycles starts at a {name} point"),
-                    None => format!("\"{name}\" is not a kind of special point at which branches can be switched"),
+                let (message, hint) = match (unsupported(name), Kind::from_name(name)) {
+                    (Some(kind), _) => (format!("`switch` at {name}: {}", kind.message), kind.instead.to_string()),
+                    (None, Some(_)) => {
+                        (format!("no branch of equilibria or cycles starts at a {name} point"), suggest(name, &names))
+                    }
+                    (None, None) => {
+                        (format!("\"{name}\" is not a kind of special point at which branches can be switched"), suggest(name, &names))
+                    }
                 };
-                walk.report(key.span(), message, suggest(name, &names));
+                walk.report(key.span(), message, hint);
             }
         }
     }

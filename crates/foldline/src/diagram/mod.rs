@@ -38,6 +38,14 @@ pub struct Measure<'a> {
 }
 
 impl Solution {
+    /// False if only the numbers of a cycle were kept, and not its profile.
+    pub fn is_stored(&self) -> bool {
+        match self {
+            Solution::Cycle(cycle) => !cycle.profile.is_empty(),
+            Solution::Equilibrium(_) => true,
+        }
+    }
+
     /// What each state gains over a period, where angles turn; else nothing.
     pub fn gain(&self) -> &[f64] {
         match self {
@@ -405,6 +413,27 @@ impl Kind {
             Kind::DoubleTorus => "double-torus",
             Kind::Mark => "mark",
             Kind::Unexplained => "unexplained",
+        }
+    }
+
+    /// The name in a text: "Hopf", "period doubling".
+    pub fn title(self) -> &'static str {
+        match self {
+            Kind::BranchPoint => "branch point",
+            Kind::Hopf => "Hopf",
+            Kind::PeriodDoubling => "period doubling",
+            Kind::BogdanovTakens => "Bogdanov–Takens",
+            Kind::ZeroHopf => "zero-Hopf",
+            Kind::GeneralisedHopf => "generalised Hopf",
+            Kind::DoubleHopf => "double Hopf",
+            Kind::GeneralisedPeriodDoubling => "generalised period doubling",
+            Kind::Chenciner => "Chenciner",
+            Kind::Resonance11 => "1:1 resonance",
+            Kind::Resonance12 => "1:2 resonance",
+            Kind::Resonance13 => "1:3 resonance",
+            Kind::Resonance14 => "1:4 resonance",
+            Kind::DoubleTorus => "double torus",
+            other => other.name(),
         }
     }
 
