@@ -6,7 +6,7 @@ use std::time::Duration;
 
 /// Numerical continuation and bifurcation analysis of ordinary differential equations.
 ///
-/// `foldline new oscillator` writes a model and a study to begin with.
+/// To begin, `foldline new oscillator` writes a model and a study.
 #[derive(Debug, Parser)]
 #[command(name = "foldline", version, after_help = EXIT_CODES, max_term_width = 110)]
 pub struct Arguments {
@@ -35,7 +35,7 @@ const VERIFY_CODES: &str = "Exit codes:
 
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Write a commented model and study to begin with
+    /// Write a commented model and study as a starting point
     New(New),
     /// Run a study and print its special points
     #[command(after_help = EXIT_CODES)]
@@ -193,7 +193,7 @@ fn time(text: &str) -> Result<Duration, String> {
 
 #[derive(Debug, Args)]
 pub struct New {
-    /// What to begin with [default: a list of what there is]
+    /// Template; without it, the templates are listed
     #[arg(value_name = "TEMPLATE", conflicts_with = "study")]
     pub template: Option<String>,
     /// Write a study for this model instead
@@ -209,19 +209,19 @@ pub struct Simulate {
     /// Model file
     #[arg(value_name = "MODEL.toml")]
     pub model: PathBuf,
-    /// Change a parameter; may be given several times
+    /// Set a parameter; can be repeated
     #[arg(long = "set", value_name = "NAME=VALUE")]
     pub set: Vec<String>,
-    /// Initial value of a state; may be given several times [default: three quarters of its range]
+    /// Initial value of a state; can be repeated [default: at three quarters of its range]
     #[arg(long = "start", value_name = "NAME=VALUE,...", allow_hyphen_values = true)]
     pub start: Vec<String>,
-    /// Length of the trajectory, in the units of the model or with a unit such as "20 ms"
+    /// Length of the trajectory, in the time unit of the model or with a unit such as "20 ms"
     #[arg(long, value_name = "TIME", conflicts_with = "periods")]
     pub time: Option<String>,
-    /// Length in periods of the forcing [default for a forced model: 20]
+    /// Length in forcing periods [default for a forced model: 20]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub periods: Option<u32>,
-    /// Interval of time between rows; `period` samples once in each period of the forcing [default: 200 rows]
+    /// Time between rows; `period` gives one row per forcing period [default: 200 rows]
     #[arg(long, value_name = "TIME")]
     pub every: Option<String>,
     /// States and outputs to show [default: all of them; in a picture, the states]
@@ -233,13 +233,13 @@ pub struct Simulate {
     /// Relative tolerance of the integrator
     #[arg(long, value_name = "X", default_value_t = 1e-8, value_parser = accuracy)]
     pub tolerance: f64,
-    /// Integration steps after which the trajectory ends
+    /// Maximum number of integration steps
     #[arg(long, value_name = "N", default_value_t = 10_000_000, value_parser = clap::value_parser!(u64).range(1..))]
     pub max_steps: u64,
-    /// How the table is written
+    /// Format of the table
     #[arg(long, value_enum, default_value_t = Format::Text)]
     pub format: Format,
-    /// Draw a picture instead; the ending says which kind
+    /// Draw a picture instead; the file extension sets the format
     #[arg(short, long = "output", value_name = "FILE.svg|png|pdf")]
     pub output: Option<PathBuf>,
 }
@@ -247,7 +247,7 @@ pub struct Simulate {
 /// Parses a tolerance of the integrator.
 fn accuracy(text: &str) -> Result<f64, String> {
     let number = text.parse::<f64>().ok().filter(|x| (1e-13..=1e-2).contains(x));
-    number.ok_or_else(|| "a number from 1e-13 to 1e-2".into())
+    number.ok_or_else(|| "expected a number from 1e-13 to 1e-2".into())
 }
 
 #[derive(Debug, Args)]

@@ -5,8 +5,8 @@
 use crate::arguments::Explore as Typed;
 use crate::failure::{Failure, Outcome};
 use crate::run::{Way, carried_out, limited, processors};
-use foldline::diagram::Shown;
 use crate::values::{measured, parameter, valued};
+use foldline::diagram::Shown;
 use foldline::model::Model;
 use foldline_store::model_file::read_model;
 use foldline_store::study_file::parse_study;

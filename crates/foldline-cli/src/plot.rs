@@ -3,13 +3,13 @@
 use crate::arguments::Plot as Typed;
 use crate::failure::{Failure, Outcome};
 use crate::table::{Run, conversion, read};
+use crate::verbosity::report;
 use foldline::diagram::{Branch, Diagram};
 use foldline::model::Model;
 use foldline_plot::quantity::{default_x, default_y, label};
 use foldline_plot::responses::value;
 use foldline_plot::{Picture, Quantity, pdf, png, svg};
 use foldline_store::run_file::Part;
-use std::io::{Write, stderr};
 use std::path::Path;
 
 /// Pixels for each unit of the SVG.
@@ -50,7 +50,7 @@ fn undrawn(diagram: &Diagram, model: &Model, axes: [Quantity; 2]) -> std::io::Re
         let names: Vec<&str> = sets.map(|set| set.name.as_str()).collect();
         if !names.is_empty() {
             let (names, axis) = (names.join(", "), label(axis, model));
-            writeln!(stderr(), "note: not drawn, as simulation gives no value of \"{axis}\": {names}")?;
+            report(format_args!("note: not drawn, because simulations have no \"{axis}\": {names}"))?;
         }
     }
     Ok(())

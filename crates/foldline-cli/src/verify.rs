@@ -70,7 +70,7 @@ fn summary(verified: &Verified, wrong: usize, out: &mut impl Write) -> std::io::
     if verified.removed > 0 {
         writeln!(
             out,
-            "{} points not computed again: their profiles were not stored (`store` in the study)",
+            "{} points not recomputed: their profiles were not stored (`store` in the study)",
             verified.removed
         )?;
     }
@@ -80,7 +80,7 @@ fn summary(verified: &Verified, wrong: usize, out: &mut impl Write) -> std::io::
         if !ratios.is_empty() {
             let within = ratios.iter().filter(|ratio| **ratio <= 1.0).count();
             let share = 100.0 * within as f64 / ratios.len() as f64;
-            writeln!(out, "{:10} {:6} compared, {share:5.1} % within the stated error", quantity.name(), ratios.len())?;
+            writeln!(out, "{:11} {:6} compared, {share:5.1} % within the stated error", quantity.name(), ratios.len())?;
         }
         let mut free: Vec<f64> = of(quantity).filter(|check| check.stated.is_none()).map(|check| check.found).collect();
         free.sort_by(f64::total_cmp);
@@ -89,7 +89,7 @@ fn summary(verified: &Verified, wrong: usize, out: &mut impl Write) -> std::io::
             let count = free.len();
             writeln!(
                 out,
-                "{name:10} {count:6} compared, no stated error; median difference {half:.1e}, largest {most:.1e}"
+                "{name:11} {count:6} compared, no stated error; median difference {half:.1e}, largest {most:.1e}"
             )?;
         }
     }

@@ -68,5 +68,5 @@ fn the_reference_run_is_right_and_what_is_changed_in_it_is_found() {
     let wrong = foldline(&["verify", &run, "--sample", "10"]);
     let said = text(&wrong.stdout);
     assert_eq!(wrong.status.code(), Some(3), "{said}");
-    assert!(said.lines().nth(1).unwrap().contains("period-doubling") && said.contains("place"), "{said}");
+    assert!(said.lines().nth(1).unwrap().contains("period-doubling") && said.contains("location"), "{said}");
 }

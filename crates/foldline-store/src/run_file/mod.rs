@@ -129,8 +129,8 @@ impl fmt::Display for RunFileError {
             ),
             RunFileError::Thinned(path) => write!(
                 f,
-                "{} is complete and keeps only part of its profiles (`store` in the study), so it cannot be resumed\n  help: `--out DIR` \
-                 begins a new run",
+                "{} is complete and keeps only part of its profiles (`store` in the study), so it cannot be \
+                 resumed\n  help: start a new run with `--out DIR`",
                 path.display()
             ),
             RunFileError::Changed(path, what) => write!(

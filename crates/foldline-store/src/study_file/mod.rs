@@ -243,10 +243,10 @@ fn a_model(walk: &mut Walk, root: &DeTable, file: &str) {
     let parameters = root.get("parameters").and_then(|value| value.get_ref().as_table());
     let first = parameters.and_then(|table| table.keys().min_by_key(|key| key.span().start));
     let (place, name) = first.map_or((0..0, "mu"), |key| (key.span(), key.get_ref()));
-    let message = "this file is a model, not a study: it does not say what to compute";
+    let message = "this file is a model, not a study";
     let hint = format!(
-        "`foldline explore {file} --free {name}=LOW:HIGH` finds its bifurcation diagram, `foldline simulate {file}` integrates it; \
-         `foldline new --study {file}` writes a study to begin with"
+        "compute its bifurcation diagram with `foldline explore {file} --free {name}=LOW:HIGH`, integrate it with \
+         `foldline simulate {file}`, or write a study for it with `foldline new --study {file}`"
     );
     walk.report(place, message, hint);
 }
