@@ -218,14 +218,13 @@ impl Variables {
             text("motion", "equilibrium, cycle, other or escaped"),
             real("value", "value of the free parameter"),
             real("period", "period of a cycle"),
-            integer("ratio_first", "of the spectral ratio of a cycle, 0 where there is none"),
-            integer("ratio_second", "of the spectral ratio of a cycle, 0 where there is none"),
+            integer("ratio_first", "first number of the spectral ratio of a cycle, 0 if there is none"),
+            integer("ratio_second", "second number of the spectral ratio of a cycle, 0 if there is none"),
             integer("multiplicity", "number of turns of its strongest spectral lines after which a cycle closes"),
             integer("hits", "number of starts that settled there, including those drawn towards the origin"),
             integer(
                 "uniform_hits",
-                "number of starts drawn uniformly from the ranges that settled there; -1 in a \
-                                     sweep",
+                "number of starts drawn uniformly from the ranges that settled there; -1 in a sweep",
             ),
             integer("uniform_starts", "number of starts drawn uniformly from the ranges; -1 in a sweep"),
             integer("jumped", "1 if the sweep left the solution of the previous value, 0 if not, -1 if unknown"),

@@ -40,7 +40,7 @@ impl Check<'_> {
                     Some(Symbol::Family(_)) => {
                         let message = format!("`{name}` is repeated over an index");
                         let hint = format!(
-                            "say which element: `{name}[i]`, `{name}[1]`; add up with `sum(j, 1, n, {name}[j])`"
+                            "give the element: `{name}[i]`, `{name}[1]`; add them up with `sum(j, 1, n, {name}[j])`"
                         );
                         Complaint::new(span.clone(), message, hint)
                     }
