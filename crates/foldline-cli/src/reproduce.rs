@@ -34,8 +34,10 @@ pub fn publication(typed: &Typed) -> Result<Outcome, Failure> {
     made.failures.iter().try_for_each(|line| writeln!(stderr(), "failed: {line}"))?;
     if made.stopped {
         writeln!(stderr(), "stopped; repeat the same command to continue")?;
+    } else {
+        report(format_args!("{}", made.summary()))?;
     }
-    report(format_args!("{}\nreport: {}", made.summary(), made.report.display()))?;
+    report(format_args!("report: {}", made.report.display()))?;
     Ok(if made.failures.is_empty() && !made.stopped { Outcome::Done } else { Outcome::Short })
 }
 

@@ -241,7 +241,7 @@ impl<'r> Runs<'r> {
         watch.recorder.finish().map_err(|error| error.to_string())?;
         let seconds = start.elapsed().as_secs_f64();
         if self.stop.load(Ordering::Relaxed) {
-            return Err("it was stopped; repeat the same command to continue".into());
+            return Err("stopped".into());
         }
         let mark = format!("{name}\n{seconds}\n");
         std::fs::write(folder.join(FINISHED), mark).map_err(|error| format!("{}: {error}", folder.display()))?;
