@@ -8,7 +8,7 @@ use std::time::Duration;
 ///
 /// To begin, `foldline new oscillator` writes a model and a study.
 #[derive(Debug, Parser)]
-#[command(name = "foldline", version, after_help = EXIT_CODES, max_term_width = 110)]
+#[command(name = "foldline", version, after_help = BEGIN, max_term_width = 110)]
 pub struct Arguments {
     #[command(subcommand)]
     pub command: Option<Command>,
@@ -19,6 +19,11 @@ pub struct Arguments {
     #[arg(short, long, global = true)]
     pub verbose: bool,
 }
+
+const BEGIN: &str =
+    "To begin: `foldline new oscillator` writes a commented model and study. `foldline COMMAND --help` says more.
+
+Exit codes: 0 done, 1 something outside failed, 2 a mistake in the input, 3 done except for what the messages name";
 
 const EXIT_CODES: &str = "Exit codes:
   0  success

@@ -62,7 +62,9 @@ fn start(typed: &Typed, model: &Model) -> Result<Vec<f64>, Failure> {
     let given = states(&typed.start, model)?;
     let within = |i: usize| {
         let [low, high] = model.states[i].range_at(1.0);
-        0.25 * low + 0.75 * high
+        let value = 0.25 * low + 0.75 * high;
+        // Any value there would do: a short one is easier to repeat.
+        format!("{value:.2e}").parse().unwrap_or(value)
     };
     let missing = given.iter().enumerate().filter(|(_, value)| value.is_none());
     let assumed: Vec<String> = missing.map(|(i, _)| format!("{}={}", model.states[i].name, within(i))).collect();

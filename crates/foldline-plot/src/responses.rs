@@ -45,8 +45,7 @@ fn set_layers(set: &Responses, x: Quantity, y: Quantity, colour: &'static str) -
             layers.push(Layer::curve(&line(set, &at), colour).wide(0.8));
             let every = repeating.len().div_ceil(MARKS).max(1);
             let marked = repeating.into_iter().step_by(every).collect();
-            layers
-                .push(Layer::scatter(marked, marker, colour).wide(2.8).hollow().named(format!("{} ({way})", set.name)));
+            layers.push(Layer::scatter(marked, marker, colour).wide(2.8).hollow().named(title(&set.name, way)));
         }
         _ => layers.push(Layer::scatter(repeating, Marker::Circle, colour).wide(2.4).hollow().named(set.name.clone())),
     }
@@ -57,10 +56,15 @@ fn set_layers(set: &Responses, x: Quantity, y: Quantity, colour: &'static str) -
     layers
 }
 
+/// The name of a sweep with its direction, unless that is the name.
+fn title(name: &str, way: &str) -> String {
+    if name.to_lowercase().contains(way) { format!("{name} (sweep)") } else { format!("{name} (sweep {way})") }
+}
+
 /// The mark of a sweep by its direction, and its words.
 fn direction(set: &Responses) -> Option<(Marker, &'static str)> {
     let (first, last) = (set.responses.first()?.value, set.responses.last()?.value);
-    Some(if last >= first { (Marker::Triangle, "sweep up") } else { (Marker::Nabla, "sweep down") })
+    Some(if last >= first { (Marker::Triangle, "up") } else { (Marker::Nabla, "down") })
 }
 
 /// The line of a sweep, interrupted at its jumps.
