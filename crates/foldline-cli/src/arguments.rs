@@ -5,8 +5,6 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 /// Numerical continuation and bifurcation analysis of ordinary differential equations.
-///
-/// To begin, `foldline new oscillator` writes a model and a study.
 #[derive(Debug, Parser)]
 #[command(name = "foldline", version, after_help = BEGIN, max_term_width = 110)]
 pub struct Arguments {
@@ -15,15 +13,15 @@ pub struct Arguments {
     /// Print only tables, errors and what was not reached
     #[arg(short, long, global = true, conflicts_with = "verbose")]
     pub quiet: bool,
-    /// Also report every special point as it is found, and likely cause and cure as soon as a branch ends early
+    /// Also report special points as they are found, and why each branch ends
     #[arg(short, long, global = true)]
     pub verbose: bool,
 }
 
 const BEGIN: &str =
-    "To begin: `foldline new oscillator` writes a commented model and study. `foldline COMMAND --help` says more.
+    "To begin: `foldline new oscillator` writes a commented model and study. `foldline COMMAND --help` describes a command.
 
-Exit codes: 0 done, 1 something outside failed, 2 a mistake in the input, 3 done except for what the messages name";
+Exit codes: 0 success, 1 failure outside foldline, 2 error in the input, 3 finished but incomplete, as the messages say";
 
 const EXIT_CODES: &str = "Exit codes:
   0  success
