@@ -8,7 +8,7 @@ use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::collections::HashMap;
 use std::io::{IsTerminal, stderr};
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -205,16 +205,22 @@ fn target(terminal: bool) -> ProgressDrawTarget {
     }
 }
 
-/// Sign of life of a command that has nothing to report until it is done: a live line on a terminal, otherwise a line every few seconds.
-/// Ends when dropped.
+/// Sign of life of a command that reports little: a live line on a terminal, otherwise a line after a period of silence. Ends when
+/// dropped.
 pub struct SignOfLife {
     bar: ProgressBar,
+    terminal: bool,
+    /// Time of the last line.
+    said: Arc<Mutex<Instant>>,
     /// Dropped to end the thread.
     ended: Option<Sender<()>>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl SignOfLife {
+    /// Interval between looks at the clock: short against the silence allowed.
+    const TICK: Duration = Duration::from_millis(500);
+
     /// Begins to report what is being done, such as `verifying`.
     pub fn of(what: &str) -> SignOfLife {
         let terminal = stderr().is_terminal();
@@ -223,19 +229,34 @@ impl SignOfLife {
             bar.set_style(style);
         }
         bar.set_message(what.to_string());
-        let (ended, over) = channel();
+        let start = Instant::now();
+        let said = Arc::new(Mutex::new(start));
+        let mut own = SignOfLife { bar, terminal, said: Arc::clone(&said), ended: None, thread: None };
         if terminal {
-            bar.enable_steady_tick(Duration::from_millis(200));
-            return SignOfLife { bar, ended: None, thread: None };
+            own.bar.enable_steady_tick(SignOfLife::TICK);
+            return own;
         }
-        let (what, start) = (what.to_string(), Instant::now());
-        let thread = std::thread::spawn(move || {
-            while over.recv_timeout(SILENCE) == Err(RecvTimeoutError::Timeout) {
-                // Progress that cannot be shown is no reason to stop computing.
-                let _ = report(format_args!("{what}: {} s so far", start.elapsed().as_secs()));
+        let (ended, over) = channel();
+        let what = what.to_string();
+        own.ended = Some(ended);
+        own.thread = Some(std::thread::spawn(move || {
+            while over.recv_timeout(SignOfLife::TICK) == Err(RecvTimeoutError::Timeout) {
+                let mut said = said.lock().unwrap_or_else(PoisonError::into_inner);
+                if said.elapsed() >= SILENCE {
+                    *said = Instant::now();
+                    // Progress that cannot be shown is no reason to stop computing.
+                    let _ = report(format_args!("{what}: {} s so far", start.elapsed().as_secs()));
+                }
             }
-        });
-        SignOfLife { bar, ended: Some(ended), thread: Some(thread) }
+        }));
+        own
+    }
+
+    /// A line that stays.
+    pub fn say(&self, line: &str) {
+        *self.said.lock().unwrap_or_else(PoisonError::into_inner) = Instant::now();
+        // Progress that cannot be shown is no reason to stop computing.
+        let _ = if self.terminal { self.bar.suspend(|| report(line)) } else { report(line) };
     }
 }
 

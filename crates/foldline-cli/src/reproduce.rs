@@ -2,6 +2,7 @@
 
 use crate::arguments::Reproduce as Typed;
 use crate::failure::{Failure, Outcome};
+use crate::progress::SignOfLife;
 use crate::run::{processors, stop_on_interrupt};
 use crate::verbosity::report;
 use foldline_reproduce::{FigurePlan, PUBLICATIONS, Publication, Request, reproduce};
@@ -18,6 +19,7 @@ pub fn publication(typed: &Typed) -> Result<Outcome, Failure> {
         )
     })?;
     let stop = stop_on_interrupt();
+    let working = SignOfLife::of("computing");
     let request = Request {
         publication,
         figures: chosen(publication, &typed.figure)?,
@@ -25,12 +27,10 @@ pub fn publication(typed: &Typed) -> Result<Outcome, Failure> {
         jobs: typed.jobs.map_or_else(processors, usize::from),
         tolerance: None,
         stop: &stop,
-        // Progress that cannot be shown is no reason to stop computing.
-        say: &|line| {
-            let _ = report(line);
-        },
+        say: &|line| working.say(line),
     };
     let made = reproduce(&request).map_err(|error| unwritable(&request.out, &error))?;
+    drop(working);
     made.failures.iter().try_for_each(|line| writeln!(stderr(), "failed: {line}"))?;
     if made.stopped {
         writeln!(stderr(), "stopped; repeat the same command to continue")?;
