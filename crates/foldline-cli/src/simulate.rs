@@ -11,7 +11,7 @@ use foldline::contract::VectorField;
 use foldline::explore::course::{Course, Way, course};
 use foldline::model::Model;
 use foldline::simulation::Outcome as Ending;
-use foldline_plot::{Axis, Figure, Layer, LegendPlace, Panel, figure_svg, palette};
+use foldline_plot::{Axis, Figure, Layer, LegendPlace, Marker, Panel, figure_svg, palette};
 use foldline_store::finite::never_finite;
 use foldline_store::model_file::read_model;
 use foldline_store::nearest::suggest;
@@ -199,7 +199,11 @@ impl Shown<'_> {
         let at = |k: usize| across.map_or(self.course.times[k], |own| self.value(own, k));
         let layer = |(i, own): (usize, &Variable)| {
             let points: Vec<[f64; 2]> = (0..self.course.times.len()).map(|k| [at(k), self.value(*own, k)]).collect();
-            let layer = Layer::curve(&points, palette::nth(i)).smooth();
+            // Samples once in each period do not lie on a curve.
+            let layer = match typed.every.as_deref() {
+                Some("period") => Layer::scatter(points, Marker::Dot, palette::nth(i)).wide(1.6),
+                _ => Layer::curve(&points, palette::nth(i)).smooth(),
+            };
             if shown.len() > 1 { layer.named(label(self.head(*own))) } else { layer }
         };
         let panel = Panel {

@@ -3,7 +3,7 @@
 //! **Idea.** `DIR/run.sqlite` holds the study and the model verbatim, the settings, and every accepted point, special point
 //! and ending at the moment it is accepted. Each is one statement, hence one transaction: after a kill at any instant the
 //! file holds a prefix of the run, and [`Recorder::resume`] goes on from it. Of several threads one writes at a time, and the
-//! others leave it their points (docs/decisions/0026).
+//! others leave it their points (docs/decisions/0026-queued-writes.md).
 //!
 //! * Write-ahead log, so that others can read while the run goes on; `synchronous = NORMAL`, which loses nothing when the
 //!   process is killed and at most the last points, never the consistency, when the power fails.

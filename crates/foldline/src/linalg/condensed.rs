@@ -848,14 +848,14 @@ impl<T: Lane> pulp::NullaryFnOnce for SolveTransposed<'_, T> {
 mod tests {
     use super::super::lane::Eight;
     use super::*;
-    use faer::prelude::Solve as _;
+    use foldline_general::{Factored, Mat};
 
     /// Equations (1)–(4) as one dense matrix.
-    fn dense<T: Lane>(s: &Condensed<T>, closure: f64) -> faer::Mat<f64> {
+    fn dense<T: Lane>(s: &Condensed<T>, closure: f64) -> Mat<f64> {
         let (n, inner, q, count) = (s.n, s.m * s.n, s.q, s.intervals);
         let (block, width) = (n + inner, n + q);
         let size = count * block + q;
-        let mut a = faer::Mat::zeros(size, size);
+        let mut a = Mat::zeros(size, size);
         for j in 0..count {
             let (lane, t) = (j / s.length, j % s.length);
             let row = j * block;
@@ -968,7 +968,7 @@ mod tests {
         }
         let rhs = fill(&mut system, strength);
         let matrix = dense(&system, closure);
-        let column = faer::Mat::from_fn(rhs.len(), 1, |i, _| rhs[i]);
+        let column = Mat::from_fn(rhs.len(), 1, |i, _| rhs[i]);
         system.condense().unwrap();
         system.eliminate(closure).unwrap();
         // A right-hand side that is zero but for the scalars, too.
@@ -978,9 +978,10 @@ mod tests {
         system.solve(&rhs, &mut x);
         system.solve_transposed(&rhs, &mut y);
         system.solve(&alone, &mut z);
-        let reference = matrix.partial_piv_lu().solve(&column);
-        let transposed = matrix.transpose().to_owned().partial_piv_lu().solve(&column);
-        let of_border = matrix.partial_piv_lu().solve(&faer::Mat::from_fn(rhs.len(), 1, |i, _| border(i)));
+        let factored = Factored::new(matrix.as_ref());
+        let reference = factored.solve(&column);
+        let transposed = Factored::new(matrix.transpose()).solve(&column);
+        let of_border = factored.solve(&Mat::from_fn(rhs.len(), 1, |i, _| border(i)));
         for i in 0..rhs.len() {
             let what = format!("{n} components, {intervals} intervals in {} lanes, component {i}", T::COUNT);
             let near = |x: f64, reference: f64| (x - reference).abs() < 1e-9 * (1.0 + reference.abs());

@@ -163,14 +163,17 @@ mod tests {
     use super::*;
     use crate::linalg::dense::MANY;
     use crate::problem::gauss::Scheme;
+    use foldline_general::{Mat, product};
 
     /// exp(A), by its series.
-    fn exponential(a: &faer::Mat<f64>) -> faer::Mat<f64> {
-        let mut term = faer::Mat::<f64>::identity(a.nrows(), a.nrows());
+    fn exponential(a: &Mat<f64>) -> Mat<f64> {
+        let n = a.nrows();
+        let mut term = Mat::<f64>::identity(n, n);
         let mut sum = term.clone();
         for k in 1..30 {
-            term = &term * a * faer::Scale(1.0 / f64::from(k));
-            sum += &term;
+            let next = product(&term, a);
+            term = Mat::from_fn(n, n, |i, j| next[(i, j)] / f64::from(k));
+            sum = Mat::from_fn(n, n, |i, j| sum[(i, j)] + term[(i, j)]);
         }
         sum
     }
@@ -182,7 +185,7 @@ mod tests {
         let scheme = Scheme::new(4);
         let (m, sampling) = (scheme.degree, Sampling::new(&scheme));
         let entry = |c: usize, d: usize| if c.abs_diff(d) < 2 { ((3 * c + 5 * d) as f64).sin() } else { 0.0 };
-        let exact = exponential(&faer::Mat::from_fn(n, n, |c, d| h * entry(c, d)));
+        let exact = exponential(&Mat::from_fn(n, n, |c, d| h * entry(c, d)));
         for pattern in [vec![true; n * n], (0..n * n).map(|k| (k / n).abs_diff(k % n) < 2).collect::<Vec<bool>>()] {
             let mut system = Condensed::<f64>::new(n, &scheme.end, 1);
             system.couple(&pattern);
