@@ -59,12 +59,17 @@ fn listed(checks: &[&Check]) -> Table {
     Table { columns, rows: checks.iter().map(row).collect() }
 }
 
+/// A number with its noun.
+fn counted(count: usize, noun: &str) -> String {
+    if count == 1 { format!("1 {noun}") } else { format!("{count} {noun}s") }
+}
+
 fn summary(verified: &Verified, wrong: usize, out: &mut impl Write) -> std::io::Result<()> {
     writeln!(
         out,
-        "{} points and {} special points recomputed: {} comparisons, {wrong} outside the stated error",
-        verified.points,
-        verified.special,
+        "{} and {} recomputed: {} comparisons, {wrong} outside the stated error",
+        counted(verified.points, "point"),
+        counted(verified.special, "special point"),
         verified.checks.len()
     )?;
     if verified.removed > 0 {
