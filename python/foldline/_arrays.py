@@ -46,14 +46,14 @@ def processors(jobs: int | None) -> int:
 def whole(name: str, value: int, least: int = 1) -> int:
     """A whole number that is not too small."""
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
-        raise InputError(f"{name} = {value!r} is not allowed\n  help: a whole number from {least} on")
+        raise InputError(f"{name} = {value!r} is not allowed\n  help: a whole number from {least} upwards")
     return int(value)
 
 
 def tolerable(tolerance: float, least: float = 1e-10, most: float = 1e-4) -> float:
     """A tolerance within its bounds."""
     if not least <= tolerance <= most:
-        raise InputError(f"the tolerance {tolerance:g} is out of bounds\n  help: a number from {least:g} to {most:g}")
+        raise InputError(f"the tolerance {tolerance:g} is out of range\n  help: a number from {least:g} to {most:g}")
     return float(tolerance)
 
 

@@ -92,7 +92,7 @@ def run(
     """
     if isinstance(study, Mapping):
         if model is None:
-            raise InputError("a study that is a dictionary names no model\n  help: foldline.run(study, model)")
+            raise InputError("a study given as a dictionary needs a model\n  help: foldline.run(study, model)")
         own = parsed(dict(study), model)
     elif model is None:
         own = _native.Study.read(os.fspath(study))
@@ -185,7 +185,7 @@ def follow(
 def switched(branch: Branch, point: SpecialPoint, depth: int, own: Mapping[str, Any], **options: Any) -> Branch:
     """The branch that leaves another one at a special point."""
     if not isinstance(point, SpecialPoint) or point.branch.name != branch.name:
-        raise InputError(f"{point!r} is no special point of {branch.name}\n  help: one of branch.special")
+        raise InputError(f"{point!r} is not a special point of {branch.name}\n  help: one of branch.special")
     check_ordinary(branch, "switched from")
     name = f"{branch.name}/{point.kind}-{point.number}"
     study, start = going_on(branch, {**own, "switch": {f"{point.kind}-{point.number}": depth}})
@@ -235,7 +235,7 @@ def hold(
         With `held`, and points of codimension two among its special points.
     """
     if not isinstance(point, SpecialPoint):
-        raise InputError(f"{point!r} is no special point\n  help: one of branch.special")
+        raise InputError(f"{point!r} is not a special point\n  help: one of branch.special")
     branch = point.branch
     check_ordinary(branch, "held on")
     own = name or f"{point.kind} of {branch.name} over {free}"

@@ -33,7 +33,7 @@ def text_of(study: Path) -> str:
             return file.read()
     except (OSError, UnicodeDecodeError) as error:
         cure = "check the spelling of the path; relative paths start at the current folder"
-        raise InputError(f"the study file {os.fspath(study)} cannot be read: {error}\n  help: {cure}") from error
+        raise InputError(f"cannot read the study file {os.fspath(study)}: {error}\n  help: {cure}") from error
 
 
 def _depth() -> int:
@@ -66,12 +66,12 @@ def cleaned(item: Mapping[str, Any]) -> dict[str, Any]:
 def check_solution(start: Any) -> None:
     if not isinstance(start, Solution):
         cure = "model.settle(...), one of model.attractors(), or a point of a branch, such as branch[-1]"
-        raise InputError(f"{start!r} is no solution to start from\n  help: {cure}")
+        raise InputError(f"{start!r} is not a solution to start from\n  help: {cure}")
 
 
 def check_ordinary(branch: Branch, what: str) -> None:
     if branch.held is not None or branch.diagram._native.study().is_leg(branch.name):
-        noun = "curve in two parameters" if branch.held is not None else "run of a homotopy"
+        noun = "two-parameter curve" if branch.held is not None else "leg of a homotopy"
         raise InputError(f"{branch.name} is a {noun}, which cannot be {what}\n  help: follow a branch from one of its points")
 
 
@@ -126,7 +126,7 @@ def carried_out(
     if jobs is not None:
         whole("jobs", jobs)
     if resume and folder is None:
-        raise InputError('resume=True goes on with a run in a folder, and none is given\n  help: out="runs/study"')
+        raise InputError('resume=True continues a run in a folder, but no folder is given\n  help: out="runs/study"')
     known = None if earlier is None else native_only(earlier)
     seeds = {} if given is None else {START: given._native}
     with shown(progress) as show:

@@ -136,7 +136,7 @@ def failing(s, p):
         (branching, "if s.x > 1:", "foldline.where"),
         (foreign, "return math.sin(s.x)", "functions of numpy"),
         (stored, "out[0] = s.x", "np.array"),
-        (rounded, "return s.x % 1.0", "leave it out"),
+        (rounded, "return s.x % 1.0", "remove it"),
         (unknown, "return p.nu * s.x", "there is no parameter `nu`"),
         (failing, "return s.x.missing()", "AttributeError"),
     ],
@@ -176,7 +176,7 @@ def test_wrong_arguments_are_answered_with_the_cure(brusselator):
         brusselator.settle(parameters={"b": 3})
     with pytest.raises(foldline.InputError, match="has no state `z`"):
         brusselator.settle({"z": 3})
-    with pytest.raises(foldline.InputError, match="is no attractor"):
+    with pytest.raises(foldline.InputError, match="is not an attractor"):
         brusselator.settle("torus")
     with pytest.raises(foldline.NoSolution, match="no stable cycle was found"):
         brusselator.settle("cycle")
@@ -190,9 +190,9 @@ def test_wrong_arguments_are_answered_with_the_cure(brusselator):
             brusselator.simulate([1.0, 1.0], span, times=times)
     with pytest.raises(foldline.InputError, match="cannot be read"):
         foldline.run("nowhere.toml", brusselator)
-    with pytest.raises(foldline.InputError, match="none is given"):
+    with pytest.raises(foldline.InputError, match="no folder is given"):
         foldline.run({"survey": [{"name": "s", "free": "B", "values": [1]}]}, brusselator, resume=True)
-    with pytest.raises(foldline.InputError, match="is no solution to start from"):
+    with pytest.raises(foldline.InputError, match="is not a solution to start from"):
         foldline.follow(brusselator, "B", (0.5, 4))
 
 

@@ -91,7 +91,7 @@ impl Page {
             assert_eq!(run.status.code(), Some(2), "{}: foldline {command}\n{said}", self.name);
             return said.lines().map(|line| line.trim_end().to_string()).collect();
         }
-        let short: Vec<&str> = said.lines().skip_while(|line| !line.starts_with("ended short: ")).collect();
+        let short: Vec<&str> = said.lines().skip_while(|line| !line.starts_with("incomplete: ")).collect();
         let code = if short.is_empty() { 0 } else { 3 };
         assert_eq!(run.status.code(), Some(code), "{}: foldline {command}\n{said}", self.name);
         let table = String::from_utf8(run.stdout).unwrap();

@@ -688,7 +688,7 @@ impl fmt::Display for Ending {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
             Ending::Bound(value) => write!(f, "reached {}", Shown(*value)),
-            Ending::Asked(value) => write!(f, "stopped where the study asks to, at the value {}", Shown(*value)),
+            Ending::Asked(value) => write!(f, "stopped at the requested value {}", Shown(*value)),
             Ending::Closed => write!(f, "closed on itself"),
             Ending::Joined { at: Kind::Hopf, parameter } => {
                 write!(f, "shrank to an equilibrium at {:.6}", Shown(*parameter))
@@ -697,29 +697,29 @@ impl fmt::Display for Ending {
                 write!(f, "became a cycle of half the period at {:.6}", Shown(*parameter))
             }
             Ending::Joined { at, parameter } => write!(f, "joined another branch at {at} {:.6}", Shown(*parameter)),
-            Ending::StepTooSmall(why) => write!(f, "step too small: {why}"),
+            Ending::StepTooSmall(why) => write!(f, "step size too small: {why}"),
             Ending::MeshTooLarge(why) => write!(f, "mesh too large: {why}"),
             Ending::PeriodUnbounded(period) => {
-                write!(f, "period grew to {:.4}, and no equilibrium near the cycle explains it", Shown(*period))
+                write!(
+                    f,
+                    "the period grew beyond its limit, to {:.4}, with no equilibrium near the cycle to explain \
+                           it",
+                    Shown(*period)
+                )
             }
             Ending::Connecting { connection, parameter, period, to } => {
                 let orbit = match connection {
                     Connection::Homoclinic => "an orbit homoclinic to the saddle",
                     Connection::Heteroclinic => "a heteroclinic cycle between the saddles",
-                    Connection::SaddleNode => "a saddle-node on the cycle, at",
+                    Connection::SaddleNode => "an orbit homoclinic to the saddle-node",
                 };
-                write!(
-                    f,
-                    "approaches {orbit} {to} at {:.9}; the last period is {:.4}",
-                    Shown(*parameter),
-                    Shown(*period)
-                )
+                write!(f, "approaches {orbit} {to} at {:.9}; last period {:.4}", Shown(*parameter), Shown(*period))
             }
-            Ending::SolutionUnbounded(why) => write!(f, "solution without bound: {why}"),
+            Ending::SolutionUnbounded(why) => write!(f, "solution unbounded: {why}"),
             Ending::PointLimit(points) => write!(f, "stopped at the limit of {points} points"),
-            Ending::NotFinite(why) => write!(f, "not finite: {why}"),
+            Ending::NotFinite(why) => write!(f, "vector field not finite: {why}"),
             Ending::GivenUp(why) => write!(f, "given up: {why}"),
-            Ending::NoStart(why) => write!(f, "no start: {why}"),
+            Ending::NoStart(why) => write!(f, "no starting solution: {why}"),
             Ending::Stopped => write!(f, "stopped on request"),
         }
     }

@@ -28,7 +28,7 @@ const LONGEST: usize = 64;
 pub fn suggest(word: &str, candidates: &[&str]) -> String {
     let Some(candidate) = nearest(word, candidates.iter().copied()) else {
         return match candidates.get(..LISTED) {
-            _ if candidates.is_empty() => "there is none to choose from".to_string(),
+            _ if candidates.is_empty() => "none is defined".to_string(),
             None => format!("one of: {}", candidates.join(", ")),
             Some(first) => format!("one of: {}, and {} more", first.join(", "), candidates.len() - LISTED),
         };
