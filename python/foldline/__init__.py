@@ -15,10 +15,12 @@ from importlib.metadata import version as _version
 from ._branch import Branch, SpecialPoint, SpecialPoints
 from ._compute import explore, follow, hold, homotopy, open, rescued, run
 from ._diagram import Diagram, Homotopy
-from ._errors import EndedShort, Error, InputError, Interrupted, NoSolution, RunFileError, TraceError
+from ._errors import ArgumentError, EndedShort, Error, InputError, Interrupted, NoSolution, RunFileError, TraceError
 from ._model import Model, model
+from ._responses import Responses, Survey, Sweep
 from ._simulation import Trajectory
 from ._solution import Attractor, Attractors, Solution
+from ._sweeps import survey, sweep
 from ._symbols import where
 
 try:
@@ -27,6 +29,7 @@ except _NotFound:
     __version__ = "unknown"
 
 __all__ = [
+    "ArgumentError",
     "Attractor",
     "Attractors",
     "Branch",
@@ -38,10 +41,13 @@ __all__ = [
     "Interrupted",
     "Model",
     "NoSolution",
+    "Responses",
     "RunFileError",
     "Solution",
     "SpecialPoint",
     "SpecialPoints",
+    "Survey",
+    "Sweep",
     "TraceError",
     "Trajectory",
     "explore",
@@ -52,6 +58,8 @@ __all__ = [
     "open",
     "rescued",
     "run",
+    "survey",
+    "sweep",
     "where",
 ]
 

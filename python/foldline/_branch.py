@@ -285,6 +285,7 @@ class Branch(Sequence[Solution]):
         max_points: int = 10_000,
         out: str | os.PathLike[str] | None = None,
         jobs: int | None = None,
+        resume: bool = False,
         progress: bool | Callable[[int, int, str], None] | None = None,
     ) -> Branch:
         """Follows the branch that leaves this one at a Hopf point, branch point or period doubling.
@@ -313,7 +314,7 @@ class Branch(Sequence[Solution]):
         from ._compute import switched
 
         own = {"range": range, "mark": mark, "stop": stop, "max-points": max_points}
-        return switched(self, point, depth, own, out=out, jobs=jobs, progress=progress)
+        return switched(self, point, depth, own, out=out, jobs=jobs, resume=resume, progress=progress)
 
     def _shown(self, unit: Mapping[str, str] | None) -> Branch:
         return self if not unit else self.diagram._shown(unit).branches[self._index]

@@ -7,13 +7,11 @@ from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from . import _native
-from ._arrays import floats
 from ._branch import Branch, SpecialPoints
 from ._errors import NoSolution
 from ._model import Model
+from ._responses import Survey, Sweep, made
 from ._solution import Solution
 
 if TYPE_CHECKING:
@@ -77,9 +75,19 @@ class Diagram:
         return self._native.short()
 
     @cached_property
-    def responses(self) -> dict[str, dict[str, Any]]:
-        """What surveys and sweeps saw: for each a table of columns, arrays of shape (responses,)."""
-        return {own["name"]: _response(own, self.model) for own in self._native.responses()}
+    def responses(self) -> dict[str, Survey | Sweep]:
+        """The surveys and sweeps of the study by name: tables of columns, arrays of shape (responses,)."""
+        return {own["name"]: made(self, own) for own in self._native.responses()}
+
+    @property
+    def sweeps(self) -> list[Sweep]:
+        """The sweeps of the study."""
+        return [own for own in self.responses.values() if isinstance(own, Sweep)]
+
+    @property
+    def surveys(self) -> list[Survey]:
+        """The surveys of the study."""
+        return [own for own in self.responses.values() if isinstance(own, Survey)]
 
     def __getitem__(self, key: str | int) -> Branch:
         if isinstance(key, int):
@@ -211,17 +219,3 @@ class Homotopy(Diagram):
     def route(self) -> list[str]:
         """Which way it took, in sentences."""
         return [note for about, note in self.notes if about == self.name]
-
-
-def _response(own: dict[str, Any], model: Model) -> dict[str, Any]:
-    numbers = {key: floats(own[key]) for key in ("value", "period", "share", "share_low", "share_high", "settled_after", "error")}
-    count = len(numbers["value"])
-    parameters = floats(own["parameters"]).reshape(count, -1)
-    ranges = floats(own["ranges"]).reshape(count, -1, 2)
-    table: dict[str, Any] = {name: parameters[:, k] for k, name in enumerate(model.parameters)} if count else {}
-    for k, name in enumerate([*model.states, *model.outputs] if count else []):
-        table[f"{name}_min"], table[f"{name}_max"] = ranges[:, k, 0], ranges[:, k, 1]
-    words = {key: np.array(own[key]) for key in ("motion", "multiplicity", "hits")}
-    words["jumped"] = np.array(own["jumped"], dtype=object)
-    ratios = ["" if pair is None else f"{pair[0]}:{pair[1]}" for pair in own["ratio"]]
-    return {**numbers, **words, "ratio": np.array(ratios), **table}

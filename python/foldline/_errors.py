@@ -30,6 +30,10 @@ class InputError(Error, ValueError):
         self.diagnostics = []
 
 
+class ArgumentError(InputError, TypeError):
+    """An argument of the wrong kind, such as a model where a solution is needed. The message shows the right call."""
+
+
 class TraceError(InputError):
     """The function of a model does something that cannot be compiled."""
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import builtins
 import os
 import sys
 import warnings
@@ -10,7 +9,8 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from . import _native, _write
-from ._arrays import whole
+from ._arguments import end
+from ._arrays import tolerable, whole
 from ._branch import Branch, native_only
 from ._diagram import Diagram
 from ._errors import EndedShort, InputError, Interrupted, NoSolution
@@ -27,15 +27,6 @@ START = "the given solution"
 RESCUED: list[Any] = []
 
 
-def text_of(study: Path) -> str:
-    try:
-        with builtins.open(study, encoding="utf-8") as file:
-            return file.read()
-    except (OSError, UnicodeDecodeError) as error:
-        cure = "check the spelling of the path; relative paths start at the current folder"
-        raise InputError(f"the study file {os.fspath(study)} cannot be read: {error}\n  help: {cure}") from error
-
-
 def _depth() -> int:
     """How many calls below the user's code the caller is."""
     inner = os.path.dirname(os.path.abspath(__file__))
@@ -45,28 +36,17 @@ def _depth() -> int:
     return depth
 
 
-def _end(value: float | str) -> float | str:
-    """A number, or a text such as "500 rpm", which the reader of studies understands."""
-    return value if isinstance(value, str) else float(value)
-
-
 def cleaned(item: Mapping[str, Any]) -> dict[str, Any]:
     """Without what was not said; names with hyphens, as files have them; numbers, where files have numbers."""
     kept = {key: value for key, value in item.items() if value is not None}
     for key in ("range", "branch-range"):
         if key in kept:
-            kept[key] = [_end(end) for end in kept[key]]
+            kept[key] = [end("the range", own) for own in kept[key]]
     if "switch" in kept:
         kept["switch"] = {str(kind).replace("_", "-"): depth for kind, depth in kept["switch"].items()}
     if "connect" in kept:
-        kept["connect"] = {name: [_end(end) for end in ends] for name, ends in kept["connect"].items()}
+        kept["connect"] = {name: [end("the range", own) for own in ends] for name, ends in kept["connect"].items()}
     return kept
-
-
-def check_solution(start: Any) -> None:
-    if not isinstance(start, Solution):
-        cure = "model.settle(...), one of model.attractors(), or a point of a branch, such as branch[-1]"
-        raise InputError(f"{start!r} is no solution to start from\n  help: {cure}")
 
 
 def check_ordinary(branch: Branch, what: str) -> None:
@@ -84,7 +64,7 @@ def study_from(start: Solution, tolerance: float, degree: int, **items: Any) -> 
     """A study with one seed, whose solution is known."""
     state = dict(zip(start.model.states, start.state.tolist(), strict=True))
     seed = {"name": START, "state": state, "parameters": start.parameters}
-    return parsed({"tolerance": float(tolerance), "degree": degree, "seed": [seed], **items}, start.model)
+    return parsed({"tolerance": tolerable(tolerance), "degree": degree, "seed": [seed], **items}, start.model)
 
 
 def going_on(branch: Branch, own: Mapping[str, Any], **items: Any) -> tuple[_native.Study, Solution]:

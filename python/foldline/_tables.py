@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     import xarray
 
     from ._branch import Branch, SpecialPoints
+    from ._responses import Responses
     from ._simulation import Trajectory
     from ._solution import Attractors, Solution
 
@@ -137,6 +138,14 @@ def trajectory_dataset(trajectory: Trajectory) -> xarray.Dataset:
     data = {name: ("t", trajectory[name], _about(trajectory.model, name)) for name in names}
     found: xarray.Dataset = _xarray().Dataset(data, {"t": trajectory.t}, {"ending": trajectory.ending})
     return found
+
+
+def responses_frame(found: Responses, left_out: Sequence[str]) -> pandas.DataFrame:
+    """A row for each response."""
+    first = [name for name in ("value", "motion", "ratio", "multiplicity", "period") if name in found]
+    rest = [name for name in found if name not in first and name not in left_out]
+    frame: pandas.DataFrame = _pandas().DataFrame({name: found[name] for name in [*first, *rest]})
+    return frame
 
 
 def attractors_frame(found: Attractors) -> pandas.DataFrame:

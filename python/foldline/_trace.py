@@ -86,6 +86,7 @@ class Parts:
 
     def trace(self, function: Callable[..., Any]) -> dict[str, Any]:
         """The equations that a function returns."""
+        refuse_other_signatures(function, list(self.states))
         found = _called(function, self.arguments)
         place = _defined(function)
         if isinstance(found, Mapping):
@@ -143,13 +144,44 @@ def _table(name: str, entries: Mapping[str, Any]) -> list[str]:
 
 
 def _positional(function: Callable[..., Any]) -> list[inspect.Parameter]:
-    kinds = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
-    return [own for own in inspect.signature(function).parameters.values() if own.kind in kinds and own.default is own.empty]
+    return [own for own in inspect.signature(function).parameters.values() if own.kind in _IN_ORDER and own.default is own.empty]
 
 
 def _defined(function: Callable[..., Any]) -> tuple[str, int] | None:
     code = getattr(function, "__code__", None)
     return (code.co_filename, code.co_firstlineno) if code else None
+
+
+#: How functions call the time.
+_TIME = ("t", "time", "_t")
+
+
+def refuse_other_signatures(function: Callable[..., Any], states: Sequence[str] = (), own: str = "") -> None:
+    """Refuses a right-hand side written for SciPy, f(t, y) or f(y, t), and shows how it becomes a model."""
+    try:
+        names = [parameter.name for parameter in inspect.signature(function).parameters.values() if parameter.kind in _IN_ORDER]
+    except (TypeError, ValueError):
+        return
+    if len(names) < 2 or (names[0] in _TIME) == (names[1] in _TIME):
+        return
+    first = names[0] in _TIME
+    caller = "scipy.integrate.solve_ivp" if first else "scipy.integrate.odeint"
+    name = own or getattr(function, "__name__", "f")
+    name = "f" if name == "<lambda>" else name
+    more = names[2:]
+    given = f", parameters=dict({', '.join(f'{extra}=1.0' for extra in more)})" if more else ""
+    passed = ", ".join([*(("0.0", "s") if first else ("s", "0.0")), *(f"p.{extra}" for extra in more)])
+    listed = " ".join(states) or "x y"
+    raise refused(
+        f"the function takes ({', '.join(names)}), as {caller} calls it; a model takes the states, the parameters and, if it is forced, "
+        "the time",
+        f"write `def {name}(s, p):`, or `def {name}(s, p, t):` with frequency=... if the equations depend on time; or wrap the function as "
+        f'it is: foldline.model(states="{listed}"{given})(lambda s, p: {name}({passed}))',
+        _defined(function),
+    )
+
+
+_IN_ORDER = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
 
 
 def _called(function: Callable[..., Any], arguments: Sequence[Any]) -> Any:
