@@ -245,10 +245,11 @@ def made(diagram: Diagram, parts: Mapping[str, Any]) -> Survey | Sweep:
 def _table(own: Mapping[str, Any], model: Model) -> dict[str, Any]:
     numbers = {key: floats(own[key]) for key in _NUMBERS}
     count = len(numbers["value"])
-    parameters = floats(own["parameters"]).reshape(count, -1)
-    ranges = floats(own["ranges"]).reshape(count, -1, 2)
-    table: dict[str, Any] = {name: parameters[:, k] for k, name in enumerate(model.parameters)} if count else {}
-    for k, name in enumerate([*model.states, *model.outputs] if count else []):
+    variables = [*model.states, *model.outputs]
+    parameters = floats(own["parameters"]).reshape(count, len(model.parameters))
+    ranges = floats(own["ranges"]).reshape(count, len(variables), 2)
+    table: dict[str, Any] = {name: parameters[:, k] for k, name in enumerate(model.parameters)}
+    for k, name in enumerate(variables):
         table[f"{name}_min"], table[f"{name}_max"] = ranges[:, k, 0], ranges[:, k, 1]
     words = {key: np.array(own[key]) for key in ("motion", "multiplicity", "hits")}
     words["jumped"] = np.array(own["jumped"], dtype=object)
