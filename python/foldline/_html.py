@@ -15,6 +15,7 @@ from ._plot import quantities
 if TYPE_CHECKING:
     from ._diagram import Diagram
     from ._model import Model
+    from ._responses import Responses
     from ._solution import Attractors, Solution
 
 #: Rows of a table that are shown; the rest is counted.
@@ -126,6 +127,24 @@ def attractors(found: Attractors) -> str:
     rows = "".join(f"<tr><td>{'</td><td>'.join(row)}</td></tr>" for row in cells)
     head = "<tr><th>hits</th><th>share of uniform</th><th>attractor</th></tr>"
     return f"<div><table>{head}{rows}</table><p>{escape(repr(found).splitlines()[-1])}</p></div>"
+
+
+def responses(own: Responses) -> str:
+    """A line about a survey or sweep, and its first rows."""
+    names = ["value", "motion", *(f"{name}_max" for name in [*own.model.states, *own.model.outputs][:6])]
+    names += ["share"] if "share" in own and np.isfinite(own["share"]).any() else ["jumped"]
+    count = len(own.values)
+    rows = [[_cell(own[name][k]) for name in names] for k in range(min(count, _MOST))]
+    head = "".join(f"<th>{escape(own.free if name == 'value' else name)}</th>" for name in names)
+    body = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
+    more = f"<p>and {count - _MOST} more</p>" if count > _MOST else ""
+    return f"<div><p>{escape(repr(own))}</p><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>{more}</div>"
+
+
+def _cell(value: object) -> str:
+    if isinstance(value, (float, np.floating)):
+        return "" if np.isnan(value) else f"{value:.8g}"
+    return {True: "jump", False: "", None: ""}.get(value, str(value)) if value is None or isinstance(value, bool) else str(value)
 
 
 def model(own: Model) -> str:

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, Union
 
 import numpy as np
 
 from . import _native
+from ._arguments import suggestion, wrong_kind
 from ._arrays import Floats, floats
 from ._errors import InputError
+from ._responses import Sweep
 
 if TYPE_CHECKING:
     from ._branch import Branch, SpecialPoint
     from ._diagram import Diagram
     from ._model import Model
+    from ._responses import Responses
     from ._solution import Solution
 
 #: Told apart with every common kind of colour vision (Okabe and Ito); the same as in the pictures of the command line.
@@ -73,12 +76,14 @@ def size(branches: Sequence[Branch], x: str, y: str) -> tuple[float, float]:
     return spans[0], spans[1]
 
 
-def branch(own: Branch, ax: Any, x: str | None, y: str | None, style: dict[str, Any]) -> list[Any]:
-    """Draws one branch."""
+def branch(own: Branch, ax: Any, x: str | None, y: str | None, style: dict[str, Any], seen: Seen) -> list[Any]:
+    """Draws one branch, and what simulation saw on top of it."""
+    given = listed(seen)
     axes = axes_or_new(ax)
     across, up = quantities([own], x, y) if own.held is None else (x or own.held[1], y or own.free)
     artists = _lines(axes, own, across, up, size([own], across, up), {"color": COLOURS[0], "label": own.name, **style})
     artists += _marks(axes, own, across, up, artists[0].get_color() if artists else COLOURS[0], set())
+    artists += overlaid(axes, given, across, up)
     axes.set_xlabel(label(across, own.diagram.model))
     axes.set_ylabel(label(up, own.diagram.model))
     return artists
@@ -109,10 +114,13 @@ def _marks(axes: Any, own: Branch, x: str, y: str, colour: Any, named: set[str])
     return artists
 
 
-def diagram(own: Diagram, ax: Any, x: str | None, y: str | None, curves: bool) -> list[Any]:
-    """Draws all branches of a diagram, a colour for each that was not switched to."""
-    axes = axes_or_new(ax)
+def diagram(own: Diagram, ax: Any, x: str | None, y: str | None, curves: bool, seen: Seen) -> list[Any]:
+    """Draws all branches of a diagram, a colour for each that was not switched to, and its surveys and sweeps on top of them."""
     shown = [branch for branch in own if (branch.held is not None) == curves and len(branch)]
+    given = listed(seen) if seen is not None else [] if curves else list(own.responses.values())
+    if not shown and given:
+        return _simulated(axes_or_new(ax), given, x, y)
+    axes = axes_or_new(ax)
     if not shown:
         cure = "it has curves in two parameters only: curves=True" if len(own) and not curves else "follow a branch first"
         raise InputError(f"there is nothing to draw\n  help: {cure}")
@@ -130,6 +138,7 @@ def diagram(own: Diagram, ax: Any, x: str | None, y: str | None, curves: bool) -
     named: set[str] = set()
     for branch in shown:
         artists += _marks(axes, branch, across, up, COLOURS[roots.index(_root(own, branch.name)) % len(COLOURS)], named)
+    artists += overlaid(axes, [one for one in given if seen is not None or (one.free == across and up in one)], across, up)
     axes.set_xlabel(label(across, own.model))
     axes.set_ylabel(label(up, own.model))
     if len(roots) <= 14:
@@ -146,6 +155,150 @@ def _root(own: Diagram, name: str) -> str:
             break
         name = origin[1]
     return name
+
+
+# What simulation saw.
+
+#: Surveys and sweeps, one or several.
+Seen = Union["Responses", Sequence["Responses"], None]
+#: Of surveys and sweeps: dark enough for a print in grey, and no colour of a branch.
+_INK = "#333333"
+#: Marks that point where a sweep goes, filled upwards and hollow downwards.
+_ARROWS = {"up": (">", _INK, "→"), "down": ("<", "white", "←")}
+#: Marks of the motions of a survey.
+_MOTIONS = {"equilibrium": "s", "cycle": "o", "other": "_"}
+
+
+def listed(seen: Seen) -> list[Responses]:
+    """Surveys and sweeps as a list."""
+    from ._responses import Responses
+
+    if seen is None:
+        return []
+    found = [seen] if isinstance(seen, Responses) else seen
+    if isinstance(found, (str, Mapping)) or not isinstance(found, Iterable):
+        raise wrong_kind("surveys and sweeps are needed", seen, 'sweeps=foldline.sweep(start, "omega", (0.5, 4))')
+    own = list(found)
+    for one in own:
+        if not isinstance(one, Responses):
+            raise wrong_kind("surveys and sweeps are needed", one, 'sweeps=[foldline.sweep(start, "omega", (0.5, 4))]')
+    return own
+
+
+def responses(own: Responses, ax: Any, y: str | None, style: dict[str, Any]) -> list[Any]:
+    """Draws one survey or sweep."""
+    return _simulated(axes_or_new(ax), [own], None, y, style)
+
+
+def _simulated(axes: Any, shown: Sequence[Responses], x: str | None, y: str | None, style: Mapping[str, Any] | None = None) -> list[Any]:
+    """Draws surveys and sweeps without a branch."""
+    first = shown[0]
+    model = first.model
+    across = x or first.free
+    up = y or f"{next(iter(model.outputs), None) or next(iter(model.states))}_max"
+    artists = overlaid(axes, [one for one in shown if one is first or one.free == across], across, up, style)
+    axes.set_xlabel(label(across, model))
+    axes.set_ylabel(_name(up, model))
+    if not isinstance(first, Sweep):
+        axes.legend(fontsize="small")
+    return artists
+
+
+def _name(column: str, model: Model) -> str:
+    words = {"share": "basin fraction", "hits": "initial states that settled there", "settled_after": "time until settled"}
+    return words.get(column) or label(column, model)
+
+
+def overlaid(axes: Any, shown: Sequence[Responses], x: str, y: str, style: Mapping[str, Any] | None = None) -> list[Any]:
+    """Draws surveys and sweeps over what is there."""
+    artists: list[Any] = []
+    legs = 0
+    for own in shown:
+        for column in (x, y):
+            if column not in own:
+                raise InputError(f"`{own.name}` has no quantity `{column}`\n  help: {suggestion(column, own.columns)}")
+        if isinstance(own, Sweep):
+            legs += len(own.legs)
+    for own in shown:
+        if isinstance(own, Sweep):
+            artists += _swept(axes, own, x, y, legs <= 2, style or {})
+        else:
+            artists += _surveyed(axes, own, x, y, style or {})
+    return artists
+
+
+def _swept(axes: Any, own: Sweep, x: str, y: str, room: bool, style: Mapping[str, Any]) -> list[Any]:
+    """A sweep: marks that point in its direction, joined by lines; jumps dotted."""
+    across, up = own[x], own[y]
+    jumped = [k for k, jump in enumerate(own.jumped) if jump is True]
+    artists: list[Any] = []
+    for number, (direction, leg) in enumerate(own.legs):
+        mark, face, arrow = _ARROWS[direction]
+        colour = style.get("color", _INK)
+        # The value at which it turns back is marked once.
+        places = leg if number == 0 else leg[1:]
+        common = {"color": colour, "markerfacecolor": colour if face == _INK else face, "markersize": 4.5, "zorder": 4}
+        name = f"{own.name} {arrow}"
+        given = {key: value for key, value in style.items() if key != "color"}
+        artists += axes.plot(across[places], up[places], **{"marker": mark, "linestyle": "none", "label": name, **common, **given})
+        for piece in np.split(leg, [k for k, index in enumerate(leg) if index in jumped and k]):
+            artists += axes.plot(across[piece], up[piece], color=colour, linewidth=0.7, label="_", zorder=3)
+        if room and len(leg) > 1:
+            artists.append(_direct(axes, across, up, leg, own.legs, direction, f"{direction} {arrow}", colour))
+    for k in jumped:
+        ends = (across[k - 1 : k + 1], up[k - 1 : k + 1])
+        artists += axes.plot(*ends, color=style.get("color", _INK), linewidth=0.9, linestyle=":", label="_", zorder=3)
+    artists += _spread(axes, own, x, y, style.get("color", _INK))
+    return artists
+
+
+def _direct(axes: Any, across: Any, up: Any, leg: Any, legs: Any, direction: str, text: str, colour: Any) -> Any:
+    """A label at the place of a leg that is farthest from the other legs, or at its largest value."""
+    others = [index for _, own in legs if own is not leg for index in own]
+    heights = up[leg]
+    if others:
+        nearest = [others[int(np.argmin(np.abs(across[others] - across[k])))] for k in leg]
+        apart = heights - up[nearest]
+        k = int(np.nanargmax(np.abs(apart))) if np.isfinite(apart).any() else 0
+        above = bool(apart[k] > 0)
+    else:
+        k, above = int(np.nanargmax(heights)) if np.isfinite(heights).any() else 0, True
+    place = (float(across[leg[k]]), float(heights[k]))
+    aside = {"up": "right", "down": "left"}[direction] if others else "center"
+    return axes.annotate(text, place, (-6 if aside == "right" else 6 if aside == "left" else 0, 6 if above else -6), textcoords="offset points",
+        fontsize="small", color=colour, ha=aside, va="bottom" if above else "top", zorder=5)  # fmt: skip
+
+
+def _surveyed(axes: Any, own: Responses, x: str, y: str, style: Mapping[str, Any]) -> list[Any]:
+    """A survey: a mark for each motion, one shape for each type; basin fractions with their confidence intervals."""
+    across, up = own[x], own[y]
+    colour = style.get("color", _INK)
+    artists: list[Any] = []
+    for motion in dict.fromkeys(own.motion.tolist()):
+        chosen = (own.motion == motion) & np.isfinite(up.astype(float))
+        if not chosen.any():
+            continue
+        mark = {"marker": _MOTIONS.get(motion, "x"), "linestyle": "none", "color": colour, "markerfacecolor": "none", "markersize": 4.5,
+                "zorder": 4, "label": f"{own.name}: {motion}", **style}  # fmt: skip
+        if y == "share":
+            low, high = own["share_low"][chosen], own["share_high"][chosen]
+            spans = np.maximum([up[chosen] - low, high - up[chosen]], 0)
+            bars = axes.errorbar(across[chosen], up[chosen], yerr=spans, elinewidth=0.8, capsize=2, **mark)
+            artists.append(bars)
+        else:
+            artists += axes.plot(across[chosen], up[chosen], **mark)
+    artists += _spread(axes, own, x, y, colour)
+    return artists
+
+
+def _spread(axes: Any, own: Responses, x: str, y: str, colour: Any) -> list[Any]:
+    """The range of every motion that does not repeat, as a bar from its smallest to its largest value."""
+    name = y.removesuffix("_max").removesuffix("_min")
+    chosen = own.motion == "other"
+    if not chosen.any() or f"{name}_min" not in own.columns:
+        return []
+    low, high = own[f"{name}_min"][chosen], own[f"{name}_max"][chosen]
+    return [axes.vlines(own[x][chosen], low, high, color=colour, linewidth=0.8, alpha=0.5, zorder=2)]
 
 
 def solution(own: Solution, axes: Any) -> dict[str, list[Any]]:

@@ -322,9 +322,9 @@ def _function(name: str, inputs: tuple[Any, ...]) -> Any:
 
 
 def where(condition: Any, a: Any, b: Any) -> Any:
-    """`a` where the condition holds, else `b`: what `if(condition, a, b)` is in a model file.
+    """Returns `a` where the condition holds and `b` elsewhere, for use in the function of a model: `if(condition, a, b)` in a model file.
 
-    The derivative is that of the branch that is taken, even where the other one is undefined, so a single point may be left
+    The derivative is that of the alternative taken, even if the other one is undefined there. A singular point can thus be left
     out: ``foldline.where(r > 0, f(r)/r, 0)``.
 
     Parameters
@@ -332,12 +332,21 @@ def where(condition: Any, a: Any, b: Any) -> Any:
     condition : symbol or bool
         A comparison, or comparisons combined with ``&`` and ``|``.
     a, b : symbol or float
-        Both are traced.
+        The two alternatives. Both are traced.
 
     Returns
     -------
     symbol
-        With plain numbers in all places, a number.
+        A number if all arguments are numbers.
+
+    Examples
+    --------
+    >>> import foldline
+    >>> @foldline.model(states="x", parameters=dict(k=4.0))
+    ... def stop(s, p):
+    ...     return -foldline.where(s.x > 1, p.k * (s.x - 1), 0.0)
+    >>> stop([[0.5], [1.5]]).ravel().tolist()
+    [0.0, -2.0]
     """
     if not any(isinstance(value, (Symbol, np.ndarray)) for value in (condition, a, b)):
         return a if condition else b
