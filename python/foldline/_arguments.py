@@ -178,6 +178,15 @@ def end(name: str, value: Any) -> End:
     raise ArgumentError(f"{name} has the string {value!r}\n  help: a number, {plain:g}, or one with its unit, such as '500 rpm'")
 
 
+def call_of(function: str, free: Any, range: Any = None) -> str:
+    """A call as it should be, with `{}` for its first argument; what was given right is kept."""
+    given = range if isinstance(range, (tuple, list)) and len(range) == 2 else (0.5, 4)
+    numbers = all(isinstance(own, Real) and not isinstance(own, bool) for own in given)
+    ends = ", ".join(f"{float(own):g}" for own in given) if numbers else "0.5, 4"
+    name = free if isinstance(free, str) else "a"
+    return f'foldline.{function}({{}}, "{name.translate({123: None, 125: None})}", ({ends}))'
+
+
 def check_range(range: Any, call: str, missing: str = "", ordered: bool = True) -> list[End] | None:
     """A pair of ends, the smaller one first; `call` is the right call with `{}` for the pair."""
     if range is None:

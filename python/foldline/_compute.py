@@ -12,6 +12,7 @@ from typing import Any
 
 from . import _native
 from ._arguments import (
+    call_of,
     check_free,
     check_marks,
     check_model,
@@ -302,8 +303,7 @@ def follow(
     >>> bool(branch["mu"].max() == 2)
     True
     """
-    shown = f'foldline.follow({{}}, "{free}", (0.5, 4))' if isinstance(free, str) else 'foldline.follow({}, "a", (0.5, 4))'
-    check_solution(start, shown)
+    check_solution(start, call_of("follow", free, range))
     check_free(free, start.model, "foldline.follow(start, {}, (0.5, 4))")
     missing = f"the range of `{free}` is missing" if until is None else ""
     ends = check_range(range, f'foldline.follow(start, "{free}", {{}})', missing)
@@ -392,8 +392,7 @@ def hold(
     >>> [point.kind for point in curve.special]
     ['cusp']
     """
-    shown = f'foldline.hold({{}}, "{free}", (0, 1))' if isinstance(free, str) else 'foldline.hold({}, "a", (0, 1))'
-    check_point(point, shown)
+    check_point(point, call_of("hold", free, range))
     branch = point.branch
     check_ordinary(branch, "continued in two parameters")
     check_free(free, point.model, "foldline.hold(point, {}, (0, 1))", [branch.free])
@@ -548,8 +547,7 @@ def explore(
     >>> [(point.kind, round(point["h"], 4)) for point in diagram.special]
     [('fold', -0.3849), ('fold', 0.3849)]
     """
-    shown = f'foldline.explore({{}}, "{free}", (0.5, 4))' if isinstance(free, str) else 'foldline.explore({}, "a", (0.5, 4))'
-    check_model(model, shown)
+    check_model(model, call_of("explore", free, range))
     check_free(free, model, "foldline.explore(model, {}, (0.5, 4))")
     ends = check_range(range, f'foldline.explore(model, "{free}", {{}})', f"the range of `{free}` is missing")
     check_parameters("parameters", parameters, model)
@@ -564,7 +562,11 @@ def explore(
             "connect": dict(connect) if connect else None, "budget": whole("budget", budget)}  # fmt: skip
     if doublings is not None:
         item["switch"] = {"hopf": 4, "branch-point": 4, "period-doubling": whole("doublings", doublings, 0)}
-    own = {"tolerance": tolerable(tolerance), "max-steps": None if max_steps is None else whole("max_steps", max_steps),
-           "max-time": None if max_time is None else end("max_time", max_time), "explore": [cleaned(item)]}
+    own = {
+        "tolerance": tolerable(tolerance),
+        "max-steps": None if max_steps is None else whole("max_steps", max_steps),
+        "max-time": None if max_time is None else end("max_time", max_time),
+        "explore": [cleaned(item)],
+    }
     study = parsed({key: value for key, value in own.items() if value is not None}, model)
     return carried_out(study, Diagram, model, out=out, jobs=jobs, resume=resume, progress=progress)

@@ -221,7 +221,9 @@ class Model:
             raise InputError(f"the simulation failed: {told}\n  help: one that reaches its end, or a state: model.settle(sol.y[:, -1])")
         if states.ndim != 2 or states.shape[0] != len(self.states) or not states.shape[1]:
             shape = f"the simulation has an array y of shape {states.shape}, and the model `{self.name}` has {len(self.states)} states"
-            raise InputError(f"{shape}\n  help: shape ({len(self.states)}, times), as solve_ivp returns it, in the order {', '.join(self.states)}")
+            raise InputError(
+                f"{shape}\n  help: shape ({len(self.states)}, times), as solve_ivp returns it, in the order {', '.join(self.states)}"
+            )
         return states[:, -1], float(times[-1])
 
     def _at_phase_zero(self, state: Any, time: float, parameters: Mapping[str, float]) -> Any:

@@ -162,9 +162,11 @@ def _root(own: Diagram, name: str) -> str:
 #: Surveys and sweeps, one or several.
 Seen = Union["Responses", Sequence["Responses"], None]
 #: Of surveys and sweeps: dark enough for a print in grey, and no colour of a branch.
-_INK = "#333333"
+INK = "#333333"
 #: Marks that point where a sweep goes, filled upwards and hollow downwards.
-_ARROWS = {"up": (">", _INK, "→"), "down": ("<", "white", "←")}
+_ARROWS = {"up": (">", 3.5, "→"), "down": ("<", 6.0, "←")}
+#: Legs of sweeps that are labelled where they run; more are told in the legend alone.
+_ROOM = 2
 #: Marks of the motions of a survey.
 _MOTIONS = {"equilibrium": "s", "cycle": "o", "other": "_"}
 
@@ -196,83 +198,91 @@ def _simulated(axes: Any, shown: Sequence[Responses], x: str | None, y: str | No
     model = first.model
     across = x or first.free
     up = y or f"{next(iter(model.outputs), None) or next(iter(model.states))}_max"
-    artists = overlaid(axes, [one for one in shown if one is first or one.free == across], across, up, style)
+    artists = overlaid(axes, [one for one in shown if one is first or one.free == across], across, up, style, joined=True)
     axes.set_xlabel(label(across, model))
-    axes.set_ylabel(_name(up, model))
+    axes.set_ylabel(named(up, model))
     if not isinstance(first, Sweep):
         axes.legend(fontsize="small")
     return artists
 
 
-def _name(column: str, model: Model) -> str:
+def named(column: str, model: Model) -> str:
     words = {"share": "basin fraction", "hits": "initial states that settled there", "settled_after": "time until settled"}
     return words.get(column) or label(column, model)
 
 
-def overlaid(axes: Any, shown: Sequence[Responses], x: str, y: str, style: Mapping[str, Any] | None = None) -> list[Any]:
-    """Draws surveys and sweeps over what is there."""
+def check_columns(own: Responses, *columns: str) -> None:
+    """Refuses a quantity that a survey or sweep does not have."""
+    for column in columns:
+        if column not in own:
+            raise InputError(f"`{own.name}` has no quantity `{column}`\n  help: {suggestion(column, own.columns)}")
+
+
+def overlaid(
+    axes: Any, shown: Sequence[Responses], x: str, y: str, style: Mapping[str, Any] | None = None, joined: bool = False
+) -> list[Any]:
+    """Draws surveys and sweeps over what is there; `joined` by lines where nothing is there."""
     artists: list[Any] = []
     legs = 0
     for own in shown:
-        for column in (x, y):
-            if column not in own:
-                raise InputError(f"`{own.name}` has no quantity `{column}`\n  help: {suggestion(column, own.columns)}")
-        if isinstance(own, Sweep):
-            legs += len(own.legs)
+        check_columns(own, x, y)
+        legs += len(own.legs) if isinstance(own, Sweep) else 0
     for own in shown:
         if isinstance(own, Sweep):
-            artists += _swept(axes, own, x, y, legs <= 2, style or {})
+            artists += _swept(axes, own, (x, y), legs <= _ROOM, joined, style or {})
         else:
             artists += _surveyed(axes, own, x, y, style or {})
     return artists
 
 
-def _swept(axes: Any, own: Sweep, x: str, y: str, room: bool, style: Mapping[str, Any]) -> list[Any]:
-    """A sweep: marks that point in its direction, joined by lines; jumps dotted."""
-    across, up = own[x], own[y]
+def _swept(axes: Any, own: Sweep, quantities: tuple[str, str], room: bool, joined: bool, style: Mapping[str, Any]) -> list[Any]:
+    """A sweep: marks that point in its direction; jumps dotted."""
+    across, up = (own[name] for name in quantities)
+    legs = own.legs
     jumped = [k for k, jump in enumerate(own.jumped) if jump is True]
+    colour = style.get("color", INK)
     artists: list[Any] = []
-    for number, (direction, leg) in enumerate(own.legs):
-        mark, face, arrow = _ARROWS[direction]
-        colour = style.get("color", _INK)
+    for number, (direction, leg) in enumerate(legs):
+        mark, size, arrow = _ARROWS[direction]
         # The value at which it turns back is marked once.
         places = leg if number == 0 else leg[1:]
-        common = {"color": colour, "markerfacecolor": colour if face == _INK else face, "markersize": 4.5, "zorder": 4}
-        name = f"{own.name} {arrow}"
-        given = {key: value for key, value in style.items() if key != "color"}
-        artists += axes.plot(across[places], up[places], **{"marker": mark, "linestyle": "none", "label": name, **common, **given})
-        for piece in np.split(leg, [k for k, index in enumerate(leg) if index in jumped and k]):
+        looks = {"marker": mark, "linestyle": "none", "markersize": size, "markeredgewidth": 0.8, "zorder": 4, "color": colour}
+        looks["markerfacecolor"] = colour if direction == "up" else "none"
+        artists += axes.plot(across[places], up[places], **{**looks, "label": f"{own.name} {arrow}", **style})
+        for piece in np.split(leg, [k for k, index in enumerate(leg) if index in jumped and k]) if joined else ():
             artists += axes.plot(across[piece], up[piece], color=colour, linewidth=0.7, label="_", zorder=3)
         if room and len(leg) > 1:
-            artists.append(_direct(axes, across, up, leg, own.legs, direction, f"{direction} {arrow}", colour))
+            others = np.array([index for _, other in legs if other is not leg for index in other], dtype=int)
+            artists.append(_direct(axes, across, up, (leg, others), direction, f"{direction} {arrow}", colour))
     for k in jumped:
         ends = (across[k - 1 : k + 1], up[k - 1 : k + 1])
-        artists += axes.plot(*ends, color=style.get("color", _INK), linewidth=0.9, linestyle=":", label="_", zorder=3)
-    artists += _spread(axes, own, x, y, style.get("color", _INK))
-    return artists
+        artists += axes.plot(*ends, color=colour, linewidth=0.9, linestyle=":", label="_", zorder=3)
+    return artists + _spread(axes, own, *quantities, colour)
 
 
-def _direct(axes: Any, across: Any, up: Any, leg: Any, legs: Any, direction: str, text: str, colour: Any) -> Any:
-    """A label at the place of a leg that is farthest from the other legs, or at its largest value."""
-    others = [index for _, own in legs if own is not leg for index in own]
+def _direct(axes: Any, across: Any, up: Any, indices: tuple[Any, Any], direction: str, text: str, colour: Any) -> Any:
+    """A label where a leg is farthest from the other legs, or at its largest value if there is no other."""
+    leg, others = indices
     heights = up[leg]
-    if others:
-        nearest = [others[int(np.argmin(np.abs(across[others] - across[k])))] for k in leg]
-        apart = heights - up[nearest]
-        k = int(np.nanargmax(np.abs(apart))) if np.isfinite(apart).any() else 0
-        above = bool(apart[k] > 0)
+    if others.size:
+        nearest = others[np.argmin(np.abs(across[others][None, :] - across[leg][:, None]), axis=1)]
+        apart = np.nan_to_num(heights - up[nearest])
     else:
-        k, above = int(np.nanargmax(heights)) if np.isfinite(heights).any() else 0, True
-    place = (float(across[leg[k]]), float(heights[k]))
-    aside = {"up": "right", "down": "left"}[direction] if others else "center"
-    return axes.annotate(text, place, (-6 if aside == "right" else 6 if aside == "left" else 0, 6 if above else -6), textcoords="offset points",
-        fontsize="small", color=colour, ha=aside, va="bottom" if above else "top", zorder=5)  # fmt: skip
+        apart = np.nan_to_num(heights - np.nanmin(heights)) if np.isfinite(heights).any() else np.zeros(len(leg))
+    k = int(np.argmax(np.abs(apart)))
+    # On the side from which the sweep comes, because beyond there is often a jump; and where the curve is not on that side.
+    before = max(k - 1, 0)
+    above = bool(heights[before] <= heights[k])
+    side, aside = {"up": ("right", -6), "down": ("left", 6)}[direction]
+    offset = (aside, 4 if above else -4)
+    look = {"fontsize": "small", "color": colour, "ha": side, "va": "bottom" if above else "top", "zorder": 5}
+    return axes.annotate(text, (float(across[leg[k]]), float(heights[k])), offset, textcoords="offset points", **look)
 
 
 def _surveyed(axes: Any, own: Responses, x: str, y: str, style: Mapping[str, Any]) -> list[Any]:
     """A survey: a mark for each motion, one shape for each type; basin fractions with their confidence intervals."""
     across, up = own[x], own[y]
-    colour = style.get("color", _INK)
+    colour = style.get("color", INK)
     artists: list[Any] = []
     for motion in dict.fromkeys(own.motion.tolist()):
         chosen = (own.motion == motion) & np.isfinite(up.astype(float))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -163,7 +164,7 @@ class Sweep(Responses):
         if not len(steps):
             return [("up", np.arange(len(values)))]
         turns = [0, *(np.flatnonzero(np.diff(steps) != 0) + 1).tolist(), len(values) - 1]
-        pieces = zip(turns[:-1], turns[1:], strict=True)
+        pieces = pairwise(turns)
         return [("up" if steps[first] >= 0 else "down", np.arange(first, last + 1)) for first, last in pieces]
 
     def _left_out(self) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ._arguments import check_free, check_model, check_parameters, check_range, check_solution, end
+from ._arguments import call_of, check_free, check_model, check_parameters, check_range, check_solution, end
 from ._arrays import finite, tolerable, whole
 from ._diagram import Diagram
 from ._errors import ArgumentError, InputError, NoSolution
@@ -85,9 +85,8 @@ def sweep(
     >>> foldline.sweep(model.settle([-1.3]), "h", (-1, 1), 9, back=True)
     <sweep sweep of h: 17 values of h, -1 → 1 → -1; jumps: 0.25 → 0.5; -0.25 → -0.5>
     """
-    shown = f'foldline.sweep({{}}, "{free}", (0.5, 4))' if isinstance(free, str) else 'foldline.sweep({}, "a", (0.5, 4))'
     if not isinstance(start, Model):
-        check_solution(start, shown)
+        check_solution(start, call_of("sweep", free, range))
     model = start if isinstance(start, Model) else start.model
     check_free(free, model, "foldline.sweep(start, {}, (0.5, 4))")
     check_parameters("parameters", parameters, model)
@@ -173,8 +172,7 @@ def survey(
     >>> foldline.survey(model, "h", (-1, 1), 3, starts=16)
     <survey survey of h: 3 values of h, -1 … 1; 4 × equilibrium>
     """
-    shown = f'foldline.survey({{}}, "{free}", (0.5, 4))' if isinstance(free, str) else 'foldline.survey({}, "a", (0.5, 4))'
-    check_model(model, shown)
+    check_model(model, call_of("survey", free, range))
     check_free(free, model, "foldline.survey(model, {}, (0.5, 4))")
     check_parameters("parameters", parameters, model)
     visited = _visited(free, "foldline.survey(model", range, count, values, back=False, ordered=True)
