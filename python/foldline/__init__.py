@@ -20,6 +20,7 @@ from ._model import Model, model
 from ._responses import Responses, Survey, Sweep
 from ._simulation import Trajectory
 from ._solution import Attractor, Attractors, Solution
+from ._strobe import Strobe, strobe
 from ._sweeps import survey, sweep
 from ._symbols import where
 
@@ -46,6 +47,7 @@ __all__ = [
     "Solution",
     "SpecialPoint",
     "SpecialPoints",
+    "Strobe",
     "Survey",
     "Sweep",
     "TraceError",
@@ -58,6 +60,7 @@ __all__ = [
     "open",
     "rescued",
     "run",
+    "strobe",
     "survey",
     "sweep",
     "where",

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
     from ._diagram import Diagram
     from ._responses import Responses
+    from ._strobe import Strobe
 
 TRUST = ("discretisation", "residual", "trivial_defect", "liouville_defect", "spectrum_error")
 WORK = ("newton", "factorisations", "rejected", "evaluations", "linearisations")
@@ -57,7 +58,7 @@ class SpecialPoint(Solution):
     >>> model = foldline.model(equations={"x": "mu - x^2"}, parameters={"mu": 1.0})
     >>> branch = foldline.follow(model.settle([1.0]), "mu", (-1, 2))
     >>> point = branch.special[0]
-    >>> point.kind, point.value, point.unstable_before, point.unstable_after
+    >>> point.kind, round(point.value, 6), point.unstable_before, point.unstable_after
     ('fold', 0.0, 1, 0)
     """
 
@@ -171,10 +172,8 @@ class Branch(Sequence[Solution]):
     >>> import foldline
     >>> model = foldline.model(equations={"x": "mu - x^2"}, parameters={"mu": 1.0})
     >>> branch = foldline.follow(model.settle([1.0]), "mu", (-1, 2))
-    >>> branch
-    <branch equilibrium over mu: ...
-    branch               kind  mu  unstable    error  normal form
-    equilibrium over mu  fold   0     1 → 0  0.0e+00  a = 1
+    >>> branch.name, branch.family, branch.free
+    ('equilibrium over mu', 'equilibrium', 'mu')
     >>> bool(abs(branch["x"]**2 - branch["mu"]).max() < 1e-9)
     True
     """
@@ -377,6 +376,7 @@ class Branch(Sequence[Solution]):
         y: str | None = None,
         unit: Mapping[str, str] | None = None,
         sweeps: Responses | Sequence[Responses] | None = None,
+        strobe: Strobe | None = None,
         **style: Any,
     ) -> list[Any]:
         """Draws the branch with matplotlib: stable parts solid, unstable ones dashed, special points as marks.
@@ -391,6 +391,9 @@ class Branch(Sequence[Solution]):
             Units in which quantities are shown, as for `Diagram.plot`.
         sweeps : Sweep, Survey or list of them, optional
             Drawn over the branch. Marks of a sweep point in its direction, filled upwards and hollow downwards; jumps are dotted.
+        strobe : Strobe, optional
+            Stroboscopic points, drawn under the branch. The branch is then drawn as its states at the start of each forcing period, and `y`
+            names a state or output; by default the first state.
         **style
             For the lines, such as ``color="black"``.
 
@@ -405,7 +408,7 @@ class Branch(Sequence[Solution]):
         """
         from ._plot import branch
 
-        return branch(self._shown(unit), ax, x, y, style, shown_in(sweeps, unit))
+        return branch(self._shown(unit), ax, x, y, style, shown_in(sweeps, unit), strobe)
 
     def plotly(
         self,

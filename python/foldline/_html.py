@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from html import escape
 from typing import TYPE_CHECKING
@@ -9,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from . import _native
-from ._branch import Branch, SpecialPoints, branch_text_of
+from ._branch import Branch, SpecialPoint, SpecialPoints, branch_text_of
 from ._plot import quantities
 
 if TYPE_CHECKING:
@@ -38,11 +39,20 @@ def _cells(points: SpecialPoints) -> tuple[list[str], list[list[str]]]:
     forms = any(own.normal_form for own in shown)
     rows = []
     for own in shown:
-        numbers = [own[name] for name in [*varying, *(["period"] if cycles else []), *(f"{n}_max" for n in outputs)]]
+        numbers = [_significant(own, name) for name in [*varying, *(["period"] if cycles else []), *(f"{n}_max" for n in outputs)]]
         row = [own.branch.name, own.kind, *("" if np.isnan(v) else f"{v:.10g}" for v in numbers)]
         row += [f"{own.unstable_before} → {own.unstable_after}", f"{own.error:.1e}"]
         rows.append([*row, *([own.normal_form] if forms else [])])
     return [*names, *(["normal form"] if forms else [])], rows
+
+
+def _significant(own: SpecialPoint, name: str) -> float:
+    """A quantity; of the parameter of the branch without the digits that lie far below its error."""
+    value = own[name]
+    error = own.error * (own.branch.scale + abs(value))
+    if name != own.branch.free or not 0 < error < 1:
+        return value
+    return round(value, 2 - math.floor(math.log10(error))) + 0.0
 
 
 def special_text(points: SpecialPoints) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any, Union
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from . import _native
 from ._arguments import suggestion, wrong_kind
 from ._arrays import Floats, floats
-from ._errors import InputError
+from ._errors import ArgumentError, InputError
 from ._responses import Sweep
 
 if TYPE_CHECKING:
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from ._model import Model
     from ._responses import Responses
     from ._solution import Solution
+    from ._strobe import Strobe
 
 #: Told apart with every common kind of colour vision (Okabe and Ito); the same as in the pictures of the command line.
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
@@ -76,9 +78,14 @@ def size(branches: Sequence[Branch], x: str, y: str) -> tuple[float, float]:
     return spans[0], spans[1]
 
 
-def branch(own: Branch, ax: Any, x: str | None, y: str | None, style: dict[str, Any], seen: Seen) -> list[Any]:
+def branch(own: Branch, ax: Any, x: str | None, y: str | None, style: dict[str, Any], seen: Seen, points: Any = None) -> list[Any]:
     """Draws one branch, and what simulation saw on top of it."""
     given = listed(seen)
+    if points is not None:
+        if given:
+            cure = "draw them in two pictures: sweeps show extremes, stroboscopic points the state at the start of a forcing period"
+            raise ArgumentError(f"both sweeps and stroboscopic points are given\n  help: {cure}")
+        return _stroboscopic(own, points, ax, y, style)
     axes = axes_or_new(ax)
     across, up = quantities([own], x, y) if own.held is None else (x or own.held[1], y or own.free)
     artists = _lines(axes, own, across, up, size([own], across, up), {"color": COLOURS[0], "label": own.name, **style})
@@ -277,6 +284,56 @@ def _direct(axes: Any, across: Any, up: Any, indices: tuple[Any, Any], direction
     offset = (aside, 4 if above else -4)
     look = {"fontsize": "small", "color": colour, "ha": side, "va": "bottom" if above else "top", "zorder": 5}
     return axes.annotate(text, (float(across[leg[k]]), float(heights[k])), offset, textcoords="offset points", **look)
+
+
+def strobe(own: Strobe, ax: Any, y: str | None, style: Mapping[str, Any]) -> list[Any]:
+    """Draws stroboscopic points over the parameter."""
+    axes = axes_or_new(ax)
+    name = y or next(iter(own.model.states))
+    known = [*own.model.states, *own.model.outputs]
+    if name not in known:
+        raise InputError(f"there is no state or output `{name}`\n  help: {suggestion(name, known)}")
+    heights = own[name]
+    across = np.repeat(own.values, heights.shape[1])
+    look = {"marker": ".", "linestyle": "none", "color": INK, "markersize": 2, "label": "simulation", "zorder": 2, **style}
+    artists: list[Any] = axes.plot(across, heights.ravel(), **look)
+    axes.set_xlabel(label(own.free, own.model))
+    axes.set_ylabel(f"{_variable(name, own.model)} at the start of a forcing period")
+    return artists
+
+
+def _stroboscopic(own: Branch, points: Any, ax: Any, y: str | None, style: dict[str, Any]) -> list[Any]:
+    """A branch of forced cycles as its states at the start of each forcing period, over stroboscopic points of simulation."""
+    from ._strobe import Strobe
+
+    if not isinstance(points, Strobe):
+        raise wrong_kind("stroboscopic points are needed", points, 'strobe=foldline.strobe(start, "omega", (0.5, 4))')
+    if own.family != "cycle" or not own.diagram.model.forced or own.held is not None or own.free != points.free:
+        cure = f"a branch of cycles of a forced model over `{points.free}`"
+        raise InputError(f"the branch `{own.name}` cannot be drawn with these points\n  help: {cure}")
+    name = y or next(iter(points.model.states))
+    axes = axes_or_new(ax)
+    artists = strobe(points, axes, name, {"color": "#777777"})
+    images = np.array([_images(solution, name) for solution in own]).reshape(len(own), -1)
+    look: dict[str, Any] = {"color": COLOURS[0], "label": own.name, **style}
+    stable, across = own.stable, own[own.free]
+    changes = [0, *(np.flatnonzero(stable[1:] != stable[:-1]) + 1).tolist(), len(own)]
+    for image in images.T:
+        for first, last in pairwise(changes):
+            piece = slice(max(first - 1, 0), last)
+            artists += axes.plot(across[piece], image[piece], **{"linestyle": "-" if stable[first] else "--", "zorder": 3, **look})
+            look["label"] = "_"
+    for point in own.special:
+        mark = {"marker": MARKS[_native.marker(point.kind)], "linestyle": "none", "color": look["color"], "markersize": 5, "zorder": 4}
+        face = look["color"] if point.criticality == "subcritical" else "white"
+        heights = _images(point, name)
+        artists += axes.plot([point.value] * len(heights), heights, markerfacecolor=face, label="_", **mark)
+    return artists
+
+
+def _images(solution: Solution, name: str) -> Floats:
+    """A state or output of a forced cycle at the start of each of its forcing periods."""
+    return solution.uniform(max(solution.forcing_periods, 1))[name]
 
 
 def _surveyed(axes: Any, own: Responses, x: str, y: str, style: Mapping[str, Any]) -> list[Any]:

@@ -189,7 +189,7 @@ class Survey(Responses):
     >>> import foldline
     >>> model = foldline.model(equations={"x": "h + x - x^3"}, states={"x": dict(range=(-2, 2))}, parameters={"h": 0.0})
     >>> survey = foldline.survey(model, "h", values=[0, 1], starts=16)
-    >>> survey.at(0)["x_max"].round(6).tolist()
+    >>> survey.at(0)["x_max"].round(4).tolist()
     [-1.0, 1.0]
     >>> survey.at(1)["share"].tolist()
     [1.0]

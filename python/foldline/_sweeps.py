@@ -90,7 +90,7 @@ def sweep(
     model = start if isinstance(start, Model) else start.model
     check_free(free, model, "foldline.sweep(start, {}, (0.5, 4))")
     check_parameters("parameters", parameters, model)
-    visited = _visited(free, "foldline.sweep(start", range, count, values, back, ordered=False)
+    steps = visited(free, "foldline.sweep(start", range, count, values, back, ordered=False)
     own = name or f"sweep of {free}"
     fixed = {key: end(key, value) for key, value in (parameters or {}).items()}
     seed: dict[str, Any] = {"name": START}
@@ -101,8 +101,8 @@ def sweep(
         seed["parameters"] = {**start.parameters, **fixed}
     else:
         seed["attractor"] = "cycle" if model.forced else "equilibrium"
-        seed["parameters"] = {**fixed, free: visited["range"][0] if "range" in visited else visited["values"][0]}
-    item = {"name": own, "from": START, "free": free, **visited}
+        seed["parameters"] = {**fixed, free: steps["range"][0] if "range" in steps else steps["values"][0]}
+    item = {"name": own, "from": START, "free": free, **steps}
     options: dict[str, Any] = {"given": given, "out": out, "jobs": jobs, "resume": resume, "progress": progress}
     found = _found(model, own, tolerance, (max_steps, max_time), {"seed": [seed], "sweep": [item]}, options)
     assert isinstance(found, Sweep)
@@ -175,10 +175,10 @@ def survey(
     check_model(model, call_of("survey", free, range))
     check_free(free, model, "foldline.survey(model, {}, (0.5, 4))")
     check_parameters("parameters", parameters, model)
-    visited = _visited(free, "foldline.survey(model", range, count, values, back=False, ordered=True)
+    steps = visited(free, "foldline.survey(model", range, count, values, back=False, ordered=True)
     own = name or f"survey of {free}"
     fixed = {key: end(key, value) for key, value in (parameters or {}).items()}
-    item = {"name": own, "parameters": fixed or None, "free": free, **visited, "starts": whole("starts", starts),
+    item = {"name": own, "parameters": fixed or None, "free": free, **steps, "starts": whole("starts", starts),
             "random": whole("random", random, 0)}  # fmt: skip
     options: dict[str, Any] = {"out": out, "jobs": jobs, "resume": resume, "progress": progress}
     found = _found(model, own, 1e-6, (max_steps, max_time), {"survey": [item]}, options)
@@ -186,7 +186,7 @@ def survey(
     return found
 
 
-def _visited(free: str, call: str, range: Any, count: Any, values: Any, back: bool, ordered: bool) -> dict[str, Any]:
+def visited(free: str, call: str, range: Any, count: Any, values: Any, back: bool, ordered: bool) -> dict[str, Any]:
     """The values that are visited, as a study states them."""
     if values is not None:
         if range is not None:
@@ -202,11 +202,11 @@ def _visited(free: str, call: str, range: Any, count: Any, values: Any, back: bo
     number = whole("count", count, 2)
     if pair is None or not back:
         return {"range": pair, "count": number}
-    there = _between(pair, number)
+    there = between(pair, number)
     return {"values": [*there, *there[-2::-1]]}
 
 
-def _between(pair: Sequence[float | str], count: int) -> list[float | str]:
+def between(pair: Sequence[float | str], count: int) -> list[Any]:
     """Equally spaced values from the first to the last, in the unit that both carry."""
     parts = [re.fullmatch(r"\s*([-+\d.eE]+)\s*(\S.*?)?\s*", str(own)) for own in pair]
     units = [None if part is None else part[2] for part in parts]

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from ._responses import Responses
     from ._simulation import Trajectory
     from ._solution import Attractors, Solution
+    from ._strobe import Strobe
 
 
 def _pandas() -> Any:
@@ -145,6 +146,15 @@ def responses_frame(found: Responses, left_out: Sequence[str]) -> pandas.DataFra
     first = [name for name in ("value", "motion", "ratio", "multiplicity", "period") if name in found]
     rest = [name for name in found if name not in first and name not in left_out]
     frame: pandas.DataFrame = _pandas().DataFrame({name: found[name] for name in [*first, *rest]})
+    return frame
+
+
+def strobe_frame(found: Strobe) -> pandas.DataFrame:
+    """A row for each stroboscopic point."""
+    count, periods = found.states.shape[:2]
+    names = [*found.model.states, *found.model.outputs]
+    first = {found.free: np.repeat(found.values, periods), "period_number": np.tile(np.arange(1, periods + 1), count)}
+    frame: pandas.DataFrame = _pandas().DataFrame({**first, **{name: found[name].ravel() for name in names}})
     return frame
 
 
