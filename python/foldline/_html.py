@@ -143,7 +143,7 @@ def responses(own: Responses) -> str:
     """A line about a survey or sweep, and its first rows."""
     names = ["value", "motion", *(f"{name}_max" for name in [*own.model.states, *own.model.outputs][:6])]
     names += ["share"] if "share" in own and np.isfinite(own["share"]).any() else ["jumped"]
-    count = len(own.values)
+    count = len(own.value)
     rows = [[_cell(own[name][k]) for name in names] for k in range(min(count, _MOST))]
     head = "".join(f"<th>{escape(own.free if name == 'value' else name)}</th>" for name in names)
     body = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)

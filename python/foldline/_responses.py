@@ -47,7 +47,7 @@ class Responses(Mapping[str, Any]):
         return self.diagram.model
 
     @property
-    def values(self) -> Any:
+    def value(self) -> Any:
         """Value of the parameter at each response, shape (responses,), in the unit of the model."""
         return self._table["value"]
 
@@ -80,7 +80,7 @@ class Responses(Mapping[str, Any]):
         return iter(self._table)
 
     def __len__(self) -> int:
-        """Number of columns, as of any mapping; ``len(found.values)`` is the number of responses."""
+        """Number of columns, as of any mapping; ``len(found.value)`` is the number of responses."""
         return len(self._table)
 
     def _left_out(self) -> tuple[str, ...]:
@@ -150,7 +150,7 @@ class Sweep(Responses):
     def jumps(self) -> Floats:
         """Values before and after each jump, shape (jumps, 2)."""
         at = [k for k, own in enumerate(self.jumped) if own is True]
-        values = self.values
+        values = self.value
         return np.array([[values[k - 1], values[k]] for k in at], dtype=np.float64).reshape(-1, 2)
 
     @property
@@ -159,7 +159,7 @@ class Sweep(Responses):
 
         A value at which the sweep turns back belongs to both pieces.
         """
-        values = self.values
+        values = self.value
         steps = np.sign(np.diff(values))
         if not len(steps):
             return [("up", np.arange(len(values)))]
@@ -171,7 +171,7 @@ class Sweep(Responses):
         return ("hits", "share", "share_low", "share_high")
 
     def __repr__(self) -> str:
-        values = self.values
+        values = self.value
         if not len(values):
             return f"<sweep {self.name}: no responses>"
         route = " → ".join(f"{values[own[0]]:.6g}" for _, own in self.legs) + f" → {values[-1]:.6g}"
@@ -223,8 +223,8 @@ class Survey(Responses):
         dict of arrays, shape (motions,)
             The columns; motions are ordered as in the table, the most frequent first.
         """
-        nearest = self.values[np.argmin(np.abs(self.values - value))] if len(self.values) else np.nan
-        chosen = self.values == nearest
+        nearest = self.value[np.argmin(np.abs(self.value - value))] if len(self.value) else np.nan
+        chosen = self.value == nearest
         return {name: column[chosen] for name, column in self._table.items()}
 
     def _left_out(self) -> tuple[str, ...]:
@@ -233,7 +233,7 @@ class Survey(Responses):
     def __repr__(self) -> str:
         motions = {str(name): int(np.count_nonzero(self.motion == name)) for name in dict.fromkeys(self.motion.tolist())}
         told = ", ".join(f"{count} × {name}" for name, count in motions.items()) or "no responses"
-        values = np.unique(self.values)
+        values = np.unique(self.value)
         span = f", {values[0]:.6g} … {values[-1]:.6g}" if len(values) else ""
         return f"<survey {self.name}: {len(values)} values of {self.free}{span}; {told}>"
 

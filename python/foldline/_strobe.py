@@ -206,12 +206,12 @@ def _recorded(
         states.append(track.states)
         outputs.append(track.outputs)
         state = track.states[-1]
-    width = kept, len(model.states)
+    count = len(states)
     return Strobe(
         model,
         free,
-        np.array(values[: len(states)], dtype=np.float64),
-        np.array(states, dtype=np.float64).reshape(-1, *width),
-        np.array(outputs, dtype=np.float64).reshape(-1, kept, len(model.outputs)),
+        np.array(values[:count], dtype=np.float64),
+        np.array(states, dtype=np.float64).reshape(count, kept, len(model.states)),
+        np.array(outputs, dtype=np.float64).reshape(count, kept, len(model.outputs)),
         ending,
     )

@@ -33,8 +33,8 @@ def test_a_sweep_there_and_back_jumps_beyond_both_folds(loop):
     assert loop.jumps.round(9).tolist() == [[0.3, 0.4], [-0.3, -0.4]]
     assert [direction for direction, _ in loop.legs] == ["up", "down"]
     up, down = (leg for _, leg in loop.legs)
-    assert np.allclose(loop.values[up], np.linspace(-1, 1, 21))
-    assert np.allclose(loop.values[down], np.linspace(1, -1, 21))
+    assert np.allclose(loop.value[up], np.linspace(-1, 1, 21))
+    assert np.allclose(loop.value[down], np.linspace(1, -1, 21))
     # Every response is an equilibrium.
     assert np.abs(loop["h"] + loop["x"] - loop["x"] ** 3).max() < 1e-6
     assert set(loop.motion) == {"equilibrium"}
@@ -75,11 +75,11 @@ def test_an_output_with_a_corner_is_no_jump():
 
 
 def test_a_survey_has_attractors_with_basin_fractions(survey):
-    assert np.unique(survey.values).tolist() == [-1.0, -0.5, 0.0, 0.5, 1.0]
+    assert np.unique(survey.value).tolist() == [-1.0, -0.5, 0.0, 0.5, 1.0]
     middle = survey.at(0.01)
     assert middle["value"].tolist() == [0.0, 0.0]
     assert sorted(middle["x_max"]) == pytest.approx([-1.0, 1.0], abs=1e-5)
-    for value in np.unique(survey.values):
+    for value in np.unique(survey.value):
         own = survey.at(value)
         assert own["hits"].sum() == 16
         assert own["share"].sum() == pytest.approx(1, abs=1e-12)
@@ -106,7 +106,7 @@ def test_starts_that_escape_have_no_ranges_and_leave_those_of_others_alone():
 
 def test_sweeps_and_surveys_are_tables_and_runs(loop, survey, tmp_path):
     frame = loop.to_pandas()
-    assert len(frame) == len(loop.values)
+    assert len(frame) == len(loop.value)
     assert "hits" not in frame and "jumped" in frame
     assert (frame["x_max"].to_numpy() == loop["x_max"]).all()
     frame = survey.to_pandas()
@@ -119,7 +119,7 @@ def test_sweeps_and_surveys_are_tables_and_runs(loop, survey, tmp_path):
     assert "jumps: 0.3 → 0.4; -0.3 → -0.4" in repr(loop)
     assert "6 × equilibrium" in repr(survey)
     for own in (loop, survey):
-        assert own._repr_html_().count("<tr>") == min(len(own.values), 40) + 1
+        assert own._repr_html_().count("<tr>") == min(len(own.value), 40) + 1
     with pytest.raises(KeyError, match="did you mean `x_max`"):
         loop["x_maxx"]
 
@@ -152,7 +152,7 @@ def test_sweeps_and_surveys_are_drawn_over_branches(cusp, loop, survey):
     assert sorted(own.get_xdata().round(9).tolist() for own in jumps) == [[-0.3, -0.4], [0.3, 0.4]]
     assert [own.get_text() for own in both if hasattr(own, "get_text")] == ["up →", "down ←"]
     (marks,) = (own for own in lines if own.get_marker() == "s")
-    assert len(marks.get_xdata()) == len(survey.values)
+    assert len(marks.get_xdata()) == len(survey.value)
     with pytest.raises(foldline.InputError, match="has no quantity `x_mean`"):
         loop.plot(y="x_mean")
 
