@@ -314,14 +314,21 @@ def _stroboscopic(own: Branch, points: Any, ax: Any, y: str | None, style: dict[
     name = y or next(iter(points.model.states))
     axes = axes_or_new(ax)
     artists = strobe(points, axes, name, {"color": "#777777"})
-    images = np.array([_images(solution, name) for solution in own]).reshape(len(own), -1)
     look: dict[str, Any] = {"color": COLOURS[0], "label": own.name, **style}
-    stable, across = own.stable, own[own.free]
-    changes = [0, *(np.flatnonzero(stable[1:] != stable[:-1]) + 1).tolist(), len(own)]
+    # Points and special points in order; a special point lies behind the point of its position.
+    rows = [(k, float(own[own.free][n]), own[n], bool(own.stable[n])) for n, k in enumerate(own.position.tolist())]
+    rows += [(point._native.position + 0.5, point.value, point, point.unstable_after == 0) for point in own.special]
+    rows.sort(key=lambda row: row[0])
+    across = np.array([row[1] for row in rows])
+    images = np.array([_images(row[2], name) for row in rows]).reshape(len(rows), -1)
+    stable = np.array([row[3] for row in rows])
+    changes = [0, *(np.flatnonzero(stable[1:] != stable[:-1]) + 1).tolist(), len(rows) - 1]
     for image in images.T:
+        smooth = _rounded(across, image)
         for first, last in pairwise(changes):
-            piece = slice(max(first - 1, 0), last)
-            artists += axes.plot(across[piece], image[piece], **{"linestyle": "-" if stable[first] else "--", "zorder": 3, **look})
+            piece = slice(first * _FINE, last * _FINE + 1)
+            line = {"linestyle": "-" if stable[first] else "--", "zorder": 3, **look}
+            artists += axes.plot(*(values[piece] for values in smooth), **line)
             look["label"] = "_"
     for point in own.special:
         mark = {"marker": MARKS[_native.marker(point.kind)], "linestyle": "none", "color": look["color"], "markersize": 5, "zorder": 4}
@@ -329,6 +336,30 @@ def _stroboscopic(own: Branch, points: Any, ax: Any, y: str | None, style: dict[
         heights = _images(point, name)
         artists += axes.plot([point.value] * len(heights), heights, markerfacecolor=face, label="_", **mark)
     return artists
+
+
+#: Vertices of a rounded curve from one point to the next.
+_FINE = 8
+
+
+def _rounded(x: Floats, y: Floats) -> tuple[Floats, Floats]:
+    """A smooth curve through points, with `_FINE` vertices from each to the next."""
+    if len(x) < 3:
+        places = np.arange((len(x) - 1) * _FINE + 1) / _FINE
+        return np.interp(places, np.arange(len(x)), x), np.interp(places, np.arange(len(x)), y)
+    scale = [float(np.ptp(values)) or 1.0 for values in (x, y)]
+    # The square root of the distance keeps the curve from looping where points are unevenly spaced.
+    steps = np.sqrt(np.hypot(np.diff(x) / scale[0], np.diff(y) / scale[1]))
+    at = np.concatenate([[0.0], np.cumsum(np.maximum(steps, 1e-9))])
+    share = np.arange(_FINE) / _FINE
+    weights = (2 * share**3 - 3 * share**2 + 1, share**3 - 2 * share**2 + share, 3 * share**2 - 2 * share**3, share**3 - share**2)
+    found = []
+    for values in (x, y):
+        slope, length = np.gradient(values, at), np.diff(at)[:, None]
+        ends = (values[:-1, None], slope[:-1, None] * length, values[1:, None], slope[1:, None] * length)
+        curve = sum((own * weight[None, :] for own, weight in zip(ends, weights, strict=True)), np.zeros((len(x) - 1, _FINE)))
+        found.append(np.append(curve.ravel(), values[-1]))
+    return found[0], found[1]
 
 
 def _images(solution: Solution, name: str) -> Floats:
