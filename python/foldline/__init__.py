@@ -66,6 +66,6 @@ __all__ = [
     "where",
 ]
 
-# Where they are to be imported from, and how tracebacks call them.
+# The module from which they are imported, which tracebacks show.
 for _class in [own for own in map(globals().get, __all__) if isinstance(own, type)]:
     _class.__module__ = __name__

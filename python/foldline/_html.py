@@ -1,4 +1,4 @@
-"""How results show themselves: text in terminals, a small diagram with a table in notebooks."""
+"""Display of results: text in terminals, a small diagram with a table in notebooks."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from ._responses import Responses
     from ._solution import Attractors, Solution
 
-#: Rows of a table that are shown; the rest is counted.
+#: Largest number of rows shown; the rest is counted.
 _MOST = 40
 #: Width and height of the picture.
 _SIZE = (640.0, 360.0)
@@ -71,13 +71,13 @@ def special_text(points: SpecialPoints) -> str:
 
 
 def branch_text(branch: Branch) -> str:
-    """What `repr` says of a branch."""
+    """Text of a branch for `repr`."""
     table = f"\n{special_text(branch.special)}" if len(branch.special) else ""
     return f"<branch {branch_text_of(branch)}>{table}"
 
 
 def diagram_text(own: Diagram) -> str:
-    """What `repr` says of a diagram."""
+    """Text of a diagram for `repr`."""
     points = sum(len(branch) for branch in own)
     head = f"<diagram of {own.model.name}: {len(own)} branches, {points} points, {len(own.special)} special points>"
     return "\n".join([head, *(f"  {branch_text_of(branch)}" for branch in own)])
@@ -101,7 +101,7 @@ def branches(shown: Sequence[Branch], caption: str) -> str:
 
 
 def diagram(own: Diagram) -> str:
-    """The same for a whole diagram."""
+    """A small picture of a whole diagram and the table of its special points."""
     ordinary = [branch for branch in own if branch.held is None] or list(own)
     lines = "<br>".join(escape(line) for line in diagram_text(own).splitlines()[1 : _MOST + 1])
     special = special_table(own.special)

@@ -22,9 +22,9 @@ if TYPE_CHECKING:
     from ._solution import Solution
     from ._strobe import Strobe
 
-#: Told apart with every common kind of colour vision (Okabe and Ito); the same as in the pictures of the command line.
+#: Distinguishable with all common types of colour vision (Okabe and Ito), as in the pictures of the command line.
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
-#: Of matplotlib, by the shapes that the command line draws.
+#: Markers of matplotlib for the shapes that the command line draws.
 MARKS = {"circle": "o", "square": "s", "diamond": "D", "triangle": "^", "nabla": "v", "cross": "x", "plus": "+", "star": "*", "dot": "."}
 
 
@@ -69,7 +69,7 @@ def pieces(branch: Branch, x: str, y: str, scale: tuple[float, float]) -> Iterat
 
 
 def size(branches: Sequence[Branch], x: str, y: str) -> tuple[float, float]:
-    """How large branches are in both directions together."""
+    """Extent of all branches together in both directions."""
     spans = []
     for name in (x, y):
         values = np.concatenate([branch[name] for branch in branches])
@@ -79,7 +79,7 @@ def size(branches: Sequence[Branch], x: str, y: str) -> tuple[float, float]:
 
 
 def branch(own: Branch, ax: Any, x: str | None, y: str | None, style: dict[str, Any], seen: Seen, points: Any = None) -> list[Any]:
-    """Draws one branch, and what simulation saw on top of it."""
+    """Draws one branch, and results of simulation on top of it."""
     given = listed(seen)
     if points is not None:
         if given:
@@ -164,11 +164,11 @@ def _root(own: Diagram, name: str) -> str:
     return name
 
 
-# What simulation saw.
+# Results of simulation.
 
 #: Surveys and sweeps, one or several.
 Seen = Union["Responses", Sequence["Responses"], None]
-#: Of surveys and sweeps: dark enough for a print in grey, and no colour of a branch.
+#: Colour of surveys and sweeps: dark enough for a print in grey, and not used for branches.
 INK = "#333333"
 #: Marks that point where a sweep goes, filled upwards and hollow downwards.
 _ARROWS = {"up": (">", 3.5, "→"), "down": ("<", 6.0, "←")}

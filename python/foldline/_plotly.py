@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from ._model import Model
     from ._responses import Responses
 
-#: Of plotly, by the shapes that the command line draws.
+#: Symbols of plotly for the shapes that the command line draws.
 _SYMBOLS = {
     "circle": "circle",
     "square": "square",
@@ -33,7 +33,7 @@ _SYMBOLS = {
 
 
 def figure(branches: Sequence[Branch], x: str | None, y: str | None, seen: Seen = None, diagram: Diagram | None = None) -> Any:
-    """Lines with hover for points, marks for special points and for what simulation saw."""
+    """Lines with hover for points, marks for special points and for results of simulation."""
     try:
         from plotly import graph_objects
     except ImportError as error:

@@ -1,4 +1,4 @@
-"""How a question becomes a study, and how a study is carried out."""
+"""Studies made of single questions, and their execution."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from ._solution import Solution
 Path = str | os.PathLike[str]
 Range = Sequence[float | str]
 
-#: What the seed is called at which something starts.
+#: Name of the seed at which something starts.
 START = "the given solution"
-#: What the last computation that was interrupted had found.
+#: Partial result of the last computation that was interrupted.
 RESCUED: list[Any] = []
 
 
 def _depth() -> int:
-    """How many calls below the user's code the caller is."""
+    """Number of calls between the user's code and the caller."""
     inner = os.path.dirname(os.path.abspath(__file__))
     frame, depth = sys._getframe(1).f_back, 2
     while frame is not None and os.path.dirname(os.path.abspath(frame.f_code.co_filename)) == inner:
@@ -37,7 +37,7 @@ def _depth() -> int:
 
 
 def cleaned(item: Mapping[str, Any]) -> dict[str, Any]:
-    """Without what was not said; names with hyphens, as files have them; numbers, where files have numbers."""
+    """Returns an item of a study without the keys that were not given; kinds of special points with hyphens, as in files."""
     kept = {key: value for key, value in item.items() if value is not None}
     for key in ("range", "branch-range"):
         if key in kept:
@@ -118,7 +118,7 @@ def carried_out(
         partial = diagram[of] if of is not None and of in diagram else diagram
         RESCUED[:] = [partial]
         raise Interrupted(partial) from None
-    # That a branch ended short from which another one is switched to is known already.
+    # A branch that is switched from has warned already.
     known_short = f"{earlier.name}:" if earlier is not None else "\0"
     for line in short:
         if not line.startswith(known_short):

@@ -1,4 +1,4 @@
-"""From a function, or from expressions, to the text of a model file."""
+"""Text of a model file from a function or from expressions."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class Symbols(Sequence[Any]):
 
 
 class Parts:
-    """What a model is made of, on its way to text."""
+    """Parts of a model, and their text."""
 
     def __init__(
         self,
@@ -120,7 +120,7 @@ class Parts:
         for state, about in self.states.items():
             equation = {"equation": own_equations[state]} if state in own_equations else {}
             lines += _table(f"states.{_write.key(state)}", {**equation, **about})
-        # The equations of states that there are not: the reader says so.
+        # Equations of unknown states: the reader reports them.
         extra = {state: text for state, text in own_equations.items() if state not in self.states}
         lines += _table("equations", extra)
         lines += _table("totals", self.totals)
@@ -152,7 +152,7 @@ def _defined(function: Callable[..., Any]) -> tuple[str, int] | None:
     return (code.co_filename, code.co_firstlineno) if code else None
 
 
-#: How functions call the time.
+#: Names of the time in functions written for SciPy.
 _TIME = ("t", "time", "_t")
 
 
@@ -185,7 +185,7 @@ _IN_ORDER = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_
 
 
 def _called(function: Callable[..., Any], arguments: Sequence[Any]) -> Any:
-    """What a function returns for symbols: for as many of them as it takes."""
+    """Calls a function with as many symbols as it takes, and returns its result."""
     count = len(_positional(function))
     if not 1 <= count <= len(arguments):
         cure = "write `def f(s, p):`, or `def f(s, p, t):` for a forced model: states, parameters, time"

@@ -30,7 +30,7 @@ def test_examples_run(name):
     found = doctest.testmod(module, optionflags=doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE)
     assert found.failed == 0
     if name in ("foldline", "foldline._compute", "foldline._model", "foldline._sweeps"):
-        assert found.attempted > 5
+        assert found.attempted > 2
 
 
 def test_everything_public_is_documented():
