@@ -69,18 +69,18 @@ def _simulated(graph_objects: Any, given: Sequence[Responses], x: str | None, y:
     first = given[0]
     across, up = x or first.free, y or f"{next(iter(first.model.outputs), None) or next(iter(first.model.states))}_max"
     picture = graph_objects.Figure()
-    for trace in _overlaid(graph_objects, [own for own in given if own is first or own.free == across], across, up):
+    for trace in _overlaid(graph_objects, [own for own in given if own is first or own.free == across], across, up, joined=True):
         picture.add_trace(trace)
     return _laid_out(picture, across, up, first.model)
 
 
 #: Marks that point where a sweep goes, filled upwards and hollow downwards.
-_ARROWS = {"up": ("triangle-right", "→"), "down": ("triangle-left-open", "←")}
+_ARROWS = {"up": ("triangle-right", 6, "→"), "down": ("triangle-left-open", 10, "←")}
 _MOTIONS = {"equilibrium": "square-open", "cycle": "circle-open", "other": "line-ew-open"}
 
 
-def _overlaid(graph_objects: Any, given: Sequence[Responses], x: str, y: str) -> list[Any]:
-    """Surveys and sweeps; jumps are dotted."""
+def _overlaid(graph_objects: Any, given: Sequence[Responses], x: str, y: str, joined: bool = False) -> list[Any]:
+    """Surveys and sweeps; jumps are dotted, other steps are drawn if `joined`."""
     traces: list[Any] = []
     for own in given:
         check_columns(own, x, y)
@@ -93,12 +93,14 @@ def _overlaid(graph_objects: Any, given: Sequence[Responses], x: str, y: str) ->
             continue
         jumped = {k for k, jump in enumerate(own.jumped) if jump is True}
         for number, (direction, leg) in enumerate(own.legs):
-            symbol, arrow = _ARROWS[direction]
+            symbol, large, arrow = _ARROWS[direction]
             name = f"{own.name}, {direction} {arrow}"
             # The value at which it turns back is marked once.
-            mark = {"symbol": symbol, "color": INK, "size": 8}
+            mark = {"symbol": symbol, "color": INK, "size": large}
             traces.append(_seen(graph_objects, own, leg if number == 0 else leg[1:], across, up, mark, name, "markers"))
             for first, second in zip(leg[:-1].tolist(), leg[1:].tolist(), strict=True):
+                if not joined and second not in jumped:
+                    continue
                 line = {"color": INK, "width": 1, "dash": "dot" if second in jumped else "solid"}
                 ends = {"x": [across[first], across[second]], "y": [up[first], up[second]]}
                 shown = {"mode": "lines", "line": line, "hoverinfo": "skip", "showlegend": False, "legendgroup": name}
@@ -165,7 +167,11 @@ def _marks(graph_objects: Any, own: Branch, x: str, y: str, colour: str) -> list
     traces = []
     for kind in dict.fromkeys(point.kind for point in own.special):
         chosen = own.special[kind]
-        style = {"symbol": _SYMBOLS[_native.marker(kind)], "color": colour, "size": 9, "line": {"width": 1, "color": "white"}}
+        symbol = _SYMBOLS[_native.marker(kind)]
+        # Hollow; subcritical ones filled. The dot of a mark is filled as well.
+        filled = symbol == "circle-dot"
+        symbols = [symbol if filled or point.criticality == "subcritical" else f"{symbol}-open" for point in chosen]
+        style = {"symbol": symbols, "color": colour, "size": 9, "line": {"width": 1.5}}
         traces.append(
             graph_objects.Scatter(
                 x=[p[x] for p in chosen],
