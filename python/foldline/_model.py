@@ -571,7 +571,8 @@ def _read(path: Any, more: bool) -> Model:
         if callable(path):
             refuse_other_signatures(path)
             cure = '@foldline.model(states="x y", parameters=dict(a=1.0)) above the function, or foldline.model(states="x y")(function)'
-            raise ArgumentError(f"the decorator needs the names of the states\n  help: {cure}")
+            what = "a function is given in place of a path" if more else "the decorator needs the names of the states"
+            raise ArgumentError(f"{what}\n  help: {cure}")
         if isinstance(path, Mapping):
             raise wrong_kind("the path of a model file is needed", path, 'foldline.model(equations={"x": "y", "y": "-x"})')
         raise wrong_kind("the path of a model file is needed", path, 'foldline.model("model.toml")')

@@ -85,6 +85,7 @@ def calls(brusselator, rest, steady):
         "sweeps that are none": (lambda: steady.plot(sweeps=[rest]), argument, "surveys and sweeps are needed"),
         "nothing for a model": (lambda: foldline.model(), argument, "needs a file, equations or states"),
         "function for a path": (lambda: foldline.model(lambda s, p: s), argument, 'foldline.model(states="x y")(function)'),
+        "function before states": (lambda: foldline.model(lambda s, p: s, states="x"), argument, "in place of a path"),
         "equations as path": (lambda: foldline.model({"x": "-x"}), argument, "foldline.model(equations="),
         "model as path": (lambda: foldline.model(brusselator), argument, "a model already"),
     }
