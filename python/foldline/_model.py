@@ -392,6 +392,9 @@ class Model:
                 what = f"the state {missing[0]} has" if len(missing) == 1 else f"the states {', '.join(missing)} have"
                 raise InputError(f"{what} no value\n  help: {cure}")
             values = [number(name, values[name]) for name in self.states]
+        if is_branch(values) or is_model(values) or isinstance(values, Solution):
+            cure = {"Branch": "branch[-1].state", "Model": "one number for each state"}.get(type(values).__name__, "solution.state")
+            raise wrong_kind("a state is needed", values, cure)
         array = finite("the state", values)
         if array.ndim != 1:
             self._fitting(array)

@@ -67,6 +67,7 @@ def calls(brusselator, rest, steady):
         "state as text": (lambda: brusselator.settle({"x": "1", "y": 2}), argument, "x = 1"),
         "states as texts": (lambda: brusselator.settle(["1", "2"]), argument, "not real numbers"),
         "state of a table": (lambda: brusselator.settle(np.ones((3, 2))), value, "states[-1]"),
+        "simulated from a branch": (lambda: brusselator.simulate(steady, 5), argument, "branch[-1].state"),
         "settled at a branch": (lambda: brusselator.settle(steady), argument, "model.settle(branch[-1])"),
         "kind for point": (lambda: steady.switch("hopf"), argument, "branch.special['hopf'][0]"),
         "points for point": (lambda: steady.switch(steady.special), argument, 'branch.special["hopf"][0]'),
