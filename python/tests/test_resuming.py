@@ -50,8 +50,10 @@ def test_resuming_a_run_that_has_not_begun_begins_it(brusselator, steady, tmp_pa
     branch = foldline.follow(rest, "B", (0.5, 4), out=tmp_path / "branch", resume=True)
     assert (branch.parameters == steady.parameters).all()
     hopf = steady.special["hopf"][0]
-    cycles = steady.switch(hopf, out=tmp_path / "cycles", resume=True)
+    counts = []
+    cycles = steady.switch(hopf, out=tmp_path / "cycles", resume=True, progress=lambda points, *_: counts.append(points))
     # The branch that is known is stored, not computed again.
+    assert counts[-1] == len(cycles)
     assert (cycles.diagram[steady.name]["newton"] == steady["newton"]).all()
     again = steady.switch(hopf, out=tmp_path / "cycles", resume=True)
     assert (again["period"] == cycles["period"]).all()
