@@ -246,7 +246,7 @@ def _swept(axes: Any, own: Sweep, quantities: tuple[str, str], room: bool, joine
     """A sweep: marks that point in its direction; jumps dotted."""
     across, up = (own[name] for name in quantities)
     legs = own.legs
-    jumped = [k for k, jump in enumerate(own.jumped) if jump is True]
+    jumped = own._jumps
     colour = style.get("color", INK)
     artists: list[Any] = []
     for number, (direction, leg) in enumerate(legs):

@@ -91,7 +91,7 @@ def _overlaid(graph_objects: Any, given: Sequence[Responses], x: str, y: str, jo
                 mark = {"symbol": _MOTIONS.get(motion, "x"), "color": INK, "size": 8, "line": {"width": 1.5}}
                 traces.append(_seen(graph_objects, own, places, across, up, mark, f"{own.name}: {motion}", "markers"))
             continue
-        jumped = {k for k, jump in enumerate(own.jumped) if jump is True}
+        jumped = set(own._jumps)
         for number, (direction, leg) in enumerate(own.legs):
             symbol, large, arrow = _ARROWS[direction]
             name = f"{own.name}, {direction} {arrow}"
@@ -121,7 +121,7 @@ def _response_text(own: Responses, k: int) -> str:
     period = "" if np.isnan(own["period"][k]) else f" of period {own['period'][k]:.8g}"
     told = [own.name, ", ".join(values), f"{ratio}{own.motion[k]}{period}"]
     if isinstance(own, Sweep):
-        told += ["jumped"] if own.jumped[k] is True else []
+        told += ["jumped"] if k in own._jumps else []
     elif not np.isnan(own["share"][k]):
         told.append(f"basin fraction {own['share'][k]:.3f} ({own['share_low'][k]:.3f} … {own['share_high'][k]:.3f})")
     return "<br>".join(told)

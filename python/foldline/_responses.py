@@ -40,6 +40,7 @@ class Responses(Mapping[str, Any]):
         self.name: str = parts["name"]
         self.free: str = list(diagram.model.parameters)[parts["free"]]
         self._table = _table(parts, diagram.model)
+        self._jumps: list[int] = parts["jumps"]
 
     @property
     def model(self) -> Model:
@@ -148,10 +149,12 @@ class Sweep(Responses):
 
     @property
     def jumps(self) -> Floats:
-        """Values before and after each jump, shape (jumps, 2)."""
-        at = [k for k, own in enumerate(self.jumped) if own is True]
+        """Values before and after each jump, shape (jumps, 2).
+
+        If the two motions could not be compared, a change of the type of motion counts as a jump.
+        """
         values = self.value
-        return np.array([[values[k - 1], values[k]] for k in at], dtype=np.float64).reshape(-1, 2)
+        return np.array([[values[k - 1], values[k]] for k in self._jumps], dtype=np.float64).reshape(-1, 2)
 
     @property
     def legs(self) -> list[tuple[str, Integers]]:
@@ -176,7 +179,7 @@ class Sweep(Responses):
             return f"<sweep {self.name}: no responses>"
         route = " → ".join(f"{values[own[0]]:.6g}" for _, own in self.legs) + f" → {values[-1]:.6g}"
         jumps = "; ".join(f"{before:.6g} → {after:.6g}" for before, after in self.jumps) or "none"
-        unknown = sum(own is None for own in self.jumped[1:])
+        unknown = sum(own is None for k, own in enumerate(self.jumped) if k and k not in self._jumps)
         doubt = f"; {unknown} not compared" if unknown else ""
         return f"<sweep {self.name}: {len(values)} values of {self.free}, {route}; jumps: {jumps}{doubt}>"
 
