@@ -150,7 +150,8 @@ impl Model {
 }
 
 /// The known name nearest to a word, or a list of the names that there are, in words.
-#[pyfunction(name = "suggest")]
+#[pyfunction]
+#[pyo3(name = "suggest")]
 pub fn suggested(word: &str, known: Vec<String>) -> String {
     suggest(word, &known.iter().map(String::as_str).collect::<Vec<_>>())
 }
