@@ -95,13 +95,14 @@ def test_starts_that_escape_have_no_ranges_and_leave_those_of_others_alone():
     assert np.isnan(survey.at(-1)["x_max"]).all()
     one = survey.at(1)
     found = dict(zip(one["motion"], one["x_max"], strict=True))
-    assert found["equilibrium"] == pytest.approx(1, abs=1e-6)
+    # Simulation counts as settled at about a millionth.
+    assert found["equilibrium"] == pytest.approx(1, abs=1e-5)
     assert np.isnan(found["escaped"])
     assert survey.to_pandas()["x_max"].notna().sum() == (survey.motion == "equilibrium").sum()
     assert survey.plot()
     down = foldline.sweep(model.settle([1.0]), "mu", (1, -1), 5)
     assert down.motion[-1] == "escaped"
-    assert down["x_max"][0] == pytest.approx(1, abs=1e-6)
+    assert down["x_max"][0] == pytest.approx(1, abs=1e-5)
 
 
 def test_sweeps_and_surveys_are_tables_and_runs(loop, survey, tmp_path):
@@ -219,7 +220,11 @@ def test_stroboscopic_points_are_drawn_under_a_branch(linear):
     branch = foldline.follow(linear.settle("cycle"), "w", (0.5, 2))
     dots, line = branch.plot(strobe=points)
     assert len(dots.get_xdata()) == 15
-    assert np.allclose(line.get_ydata(), 1 / (1 + line.get_xdata() ** 2), atol=1e-5)
+    across, up = line.get_xdata(), line.get_ydata()
+    # At the points of the branch; between them the curve is rounded.
+    assert across[::8].tolist() == branch["w"].tolist()
+    assert np.allclose(up[::8], 1 / (1 + across[::8] ** 2), atol=1e-5)
+    assert np.allclose(up, 1 / (1 + across**2), atol=5e-3)
     assert "start of a forcing period" in line.axes.get_ylabel()
     assert len(points.plot(y="twice")) == 1
     with pytest.raises(foldline.InputError, match="no state or output `y`"):
