@@ -497,6 +497,6 @@ def native_only(branch: Branch) -> _native.Diagram:
 
 def shown_in(sweeps: Any, unit: Mapping[str, str] | None) -> Any:
     """Surveys and sweeps with some quantities in other units."""
-    from ._plot import listed
+    from ._overlay import listed
 
     return [own.diagram._shown(unit).responses[own.name] for own in listed(sweeps)] if unit and sweeps is not None else sweeps

@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import _native
+from ._axes import COLOURS, label
 from ._errors import InputError
-from ._plot import COLOURS, INK, Seen, _root, check_columns, label, listed, named, pieces, quantities, size
+from ._overlay import INK, Seen, check_columns, listed, named
+from ._plot import _root, pieces, quantities, size
 from ._responses import Sweep
 
 if TYPE_CHECKING:

@@ -115,7 +115,7 @@ class Responses(Mapping[str, Any]):
         -------
         list of matplotlib artists
         """
-        from ._plot import responses
+        from ._overlay import responses
 
         return responses(self, ax, y, style)
 

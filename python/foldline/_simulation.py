@@ -99,7 +99,7 @@ class Trajectory:
         -------
         list of matplotlib lines
         """
-        from ._plot import axes_or_new
+        from ._axes import axes_or_new
 
         axes = axes_or_new(ax)
         lines = [line for name in names or list(self.model.states) for line in axes.plot(self.t, self[name], label=name)]

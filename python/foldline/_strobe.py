@@ -97,7 +97,7 @@ class Strobe:
         -------
         list of matplotlib artists
         """
-        from ._plot import strobe
+        from ._overlay import strobe
 
         return strobe(self, ax, y, style)
 
