@@ -47,7 +47,7 @@ def processors(jobs: int | None) -> int:
 def whole(name: str, value: int, least: int = 1) -> int:
     """Returns a whole number, which must not be smaller than `least`."""
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
-        raise InputError(f"{name} = {value!r} is not allowed\n  help: a whole number from {least} on")
+        raise InputError(f"{name} = {value!r} is not allowed\n  help: a whole number from {least} upwards")
     return int(value)
 
 
@@ -55,7 +55,7 @@ def tolerable(tolerance: float, least: float = 1e-10, most: float = 1e-4) -> flo
     """Returns a tolerance, which must lie within its bounds."""
     own = number("tolerance", tolerance)
     if not least <= own <= most:
-        raise InputError(f"the tolerance {own:g} is out of bounds\n  help: a number from {least:g} to {most:g}")
+        raise InputError(f"the tolerance {own:g} is out of range\n  help: a number from {least:g} to {most:g}")
     return own
 
 

@@ -191,7 +191,7 @@ class Branch(Sequence[Solution]):
         self.origin: tuple[str, str, str | None, float | None] = tuple(parts["origin"])
         self._count: int = parts["points"]
         self._ends: list[tuple[str, str, bool] | None] = parts["ends"]
-        self.ends: tuple[str, str] = tuple("not finished" if end is None else end[1] for end in self._ends)  # type: ignore[assignment]
+        self.ends: tuple[str, str] = tuple("unfinished" if end is None else end[1] for end in self._ends)  # type: ignore[assignment]
 
     @property
     def complete(self) -> bool:

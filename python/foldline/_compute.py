@@ -169,7 +169,7 @@ def _study(study: Any, given: Any) -> _native.Study:
             own = model(own)
         if own is None:
             cure = "foldline.run(study, model), or a key `model` with a model or the path of a model file"
-            raise InputError(f"the study is a dictionary that names no model\n  help: {cure}")
+            raise InputError(f"a study given as a dictionary needs a model\n  help: {cure}")
         check_model(own, 'foldline.run({{**study, "model": {}}})')
         return parsed(dict(study), own)
     if not isinstance(study, (str, os.PathLike)):

@@ -72,5 +72,5 @@ class Interrupted(KeyboardInterrupt):
     """
 
     def __init__(self, partial: Diagram | Branch | Trajectory) -> None:
-        super().__init__("stopped on request; what was computed until then is in the attribute `partial`, and in foldline.rescued()")
+        super().__init__("stopped on request; the results so far are in the attribute `partial` and in foldline.rescued()")
         self.partial = partial

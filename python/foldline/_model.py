@@ -405,7 +405,7 @@ class Model:
 
     def _fitting(self, states: Any) -> None:
         if states.ndim == 0 or states.shape[-1] != len(self.states):
-            message = f"the model `{self.name}` has {len(self.states)} states, and an array of shape {states.shape} was given"
+            message = f"the model `{self.name}` has {len(self.states)} states, but an array of shape {states.shape} was given"
             raise InputError(f"{message}\n  help: one number for each of {', '.join(self.states)}")
 
     def _values(self, given: Mapping[str, float] | None) -> bytes:

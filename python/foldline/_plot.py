@@ -99,7 +99,7 @@ def diagram(own: Diagram, ax: Any, x: str | None, y: str | None, curves: bool, s
         return simulated(axes_or_new(ax), given, x, y)
     axes = axes_or_new(ax)
     if not shown:
-        cure = "it has curves in two parameters only: curves=True" if len(own) and not curves else "follow a branch first"
+        cure = "there are only two-parameter curves: use curves=True" if len(own) and not curves else "follow a branch first"
         raise InputError(f"there is nothing to draw\n  help: {cure}")
     held = shown[0].held
     across, up = (x or held[1], y or shown[0].free) if held is not None else quantities(shown, x, y)

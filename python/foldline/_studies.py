@@ -51,7 +51,7 @@ def cleaned(item: Mapping[str, Any]) -> dict[str, Any]:
 
 def check_ordinary(branch: Branch, what: str) -> None:
     if branch.held is not None or branch.diagram._native.study().is_leg(branch.name):
-        noun = "curve in two parameters" if branch.held is not None else "run of a homotopy"
+        noun = "two-parameter curve" if branch.held is not None else "leg of a homotopy"
         raise InputError(f"{branch.name} is a {noun}, which cannot be {what}\n  help: follow a branch from one of its points")
 
 
@@ -106,7 +106,7 @@ def carried_out(
     if jobs is not None:
         whole("jobs", jobs)
     if resume and folder is None:
-        raise InputError('resume=True goes on with a run in a folder, and none is given\n  help: out="runs/study"')
+        raise InputError('resume=True continues a run in a folder, but no folder is given\n  help: out="runs/study"')
     known = None if earlier is None else native_only(earlier)
     seeds = {} if given is None else {START: given._native}
     with shown(progress) as show:

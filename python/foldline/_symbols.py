@@ -62,7 +62,7 @@ def _place() -> tuple[str, int] | None:
 
 def _needs_number(what: str) -> TraceError:
     return refused(
-        f"{what} needs a number, and the model is traced with symbols",
+        f"{what} needs a number, but the model is traced with symbols",
         "use the functions of numpy instead of those of math; collect values with np.array([...]) or a list, not by assignment into "
         "an array of numbers",
     )
@@ -162,7 +162,7 @@ class Symbol:
 
     def __bool__(self) -> bool:
         raise refused(
-            "the model branches on a value that is not known while it is traced",
+            "the model branches on a value that is unknown while it is traced",
             "write foldline.where(condition, a, b) instead of `if`, `and`, `or`, `while` and chained comparisons; & and | combine "
             "conditions; np.minimum and np.maximum, of single values, replace min and max",
         )
@@ -180,23 +180,23 @@ class Symbol:
         raise _needs_number("a complex number")
 
     def __mod__(self, other: Any) -> Any:
-        raise refused("`%` jumps, and is no operation of a model", "sin and cos of an angle need no reduction; leave it out")
+        raise refused("`%` is discontinuous and not available in a model", "remove it: sin and cos of an angle need no reduction")
 
     __rmod__ = __mod__
 
     def __floordiv__(self, other: Any) -> Any:
-        raise refused("`//` jumps, and is no operation of a model", "write `/`, or foldline.where for steps")
+        raise refused("`//` is discontinuous and not available in a model", "write `/`, or foldline.where for steps")
 
     __rfloordiv__ = __floordiv__
 
     def __round__(self, digits: int | None = None) -> Any:
-        raise refused("round jumps, and is no operation of a model", "leave it out, or write foldline.where for steps")
+        raise refused("round is discontinuous and not available in a model", "remove it, or write foldline.where for steps")
 
     # NumPy.
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Any:
         if method != "__call__" or any(value is not None for key, value in options.items() if key in ("out", "where")):
-            raise refused(f"np.{ufunc.__name__}.{method} cannot be traced", "write the operation out, one value after the other")
+            raise refused(f"np.{ufunc.__name__}.{method} cannot be traced", "write out the operation for each value")
         if any(isinstance(value, np.ndarray) and value.ndim > 0 for value in inputs):
             each = np.frompyfunc(lambda *own: _function(ufunc.__name__, own), len(inputs), 1)
             return each(*(_boxed(value) for value in inputs))
@@ -250,13 +250,13 @@ def operand(value: Any) -> Operand:
     if isinstance(value, (bool, int, float, np.bool_, np.integer, np.floating)):
         number = float(value)
         if not np.isfinite(number):
-            raise refused(f"{number} is not a finite number", "models are made of finite numbers")
+            raise refused(f"{number} is not a finite number", "use finite numbers")
         return number
     if type(value).__module__.split(".")[0] == "sympy":
         from ._sympy import converted
 
         return converted(value)
-    raise refused(f"{value!r} is no value of a model", "a real number, a state, a parameter, or an expression of them")
+    raise refused(f"{value!r} cannot be used in a model", "a real number, a state, a parameter, or an expression of them")
 
 
 def _operator(op: str, a: Any, b: Any) -> Any:
@@ -318,7 +318,7 @@ def _function(name: str, inputs: tuple[Any, ...]) -> Any:
         case "logical_not":
             return Symbol("-", (1.0, _condition(values[0])))
     known = sorted([*_ONE, *_TWO, "square", "heaviside"])
-    raise refused(f"`{name}` is no function of a model", f"write it with + - * / **, foldline.where and {', '.join(known)}")
+    raise refused(f"`{name}` is not available in a model", f"write it with + - * / **, foldline.where and {', '.join(known)}")
 
 
 def where(condition: Any, a: Any, b: Any) -> Any:

@@ -21,7 +21,7 @@ def text_of(path: Path, what: str) -> str:
         with open(path, encoding="utf-8") as file:
             return file.read()
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"the {what} file {os.fspath(path)} cannot be read: {error}\n  help: a text file in UTF-8") from error
+        raise InputError(f"cannot read the {what} file {os.fspath(path)}: {error}\n  help: a text file in UTF-8") from error
 
 
 def is_text(given: Any) -> bool:
@@ -55,9 +55,9 @@ def check_file(path: Path, what: str) -> None:
     if os.path.exists(own):
         raise InputError(f"{own} cannot be read: it is a folder\n  help: the path of a {what} file")
     folder, name = os.path.split(os.path.abspath(own))
-    message = f"the {what} file {own} cannot be read: there is no such file in {folder}"
+    message = f"cannot read the {what} file {own}: there is no such file in {folder}"
     if not os.path.isdir(folder):
-        raise InputError(f"the {what} file {own} cannot be read: there is no folder {folder}\n  help: {_RELATIVE} {os.getcwd()}")
+        raise InputError(f"cannot read the {what} file {own}: there is no folder {folder}\n  help: {_RELATIVE} {os.getcwd()}")
     files = sorted(file for file in os.listdir(folder) if file.endswith(".toml"))
     near = suggestion(name, files)
     near = near if near.startswith("did you mean") else "check the spelling of the path"

@@ -196,7 +196,7 @@ def _called(function: Callable[..., Any], arguments: Sequence[Any]) -> Any:
         raise
     except Exception as error:
         raise TraceError(
-            f"the function of the model cannot be traced: {type(error).__name__}: {error}{shown(_failed(error))}\n"
+            f"the model function cannot be traced: {type(error).__name__}: {error}{shown(_failed(error))}\n"
             "  = help: it is called once with symbols; use arithmetic, functions of numpy and foldline.where"
         ) from error
 

@@ -178,7 +178,7 @@ def test_a_missing_file_is_answered_with_the_one_that_is_there(brusselator, tmp_
     monkeypatch.chdir(tmp_path)
     brusselator.save("brusselator.toml")
     for make, what in ((foldline.model, "model"), (foldline.run, "study")):
-        with pytest.raises(foldline.InputError, match=f"the {what} file brussellator.toml cannot be read") as refusal:
+        with pytest.raises(foldline.InputError, match=f"cannot read the {what} file brussellator.toml") as refusal:
             make("brussellator.toml")
         assert "did you mean `brusselator.toml`?" in str(refusal.value)
         assert str(tmp_path) in str(refusal.value)

@@ -136,7 +136,7 @@ def failing(s, p):
         (branching, "if s.x > 1:", "foldline.where"),
         (foreign, "return math.sin(s.x)", "functions of numpy"),
         (stored, "out[0] = s.x", "np.array"),
-        (rounded, "return s.x % 1.0", "leave it out"),
+        (rounded, "return s.x % 1.0", "remove it"),
         (unknown, "return p.nu * s.x", "there is no parameter `nu`"),
         (failing, "return s.x.missing()", "AttributeError"),
     ],
@@ -188,9 +188,9 @@ def test_wrong_arguments_are_answered_with_the_cure(brusselator):
     for span, times in ((float("nan"), None), (1.0, [0.5, 2.0]), (1.0, [0.5, 0.2]), (1.0, [float("inf")])):
         with pytest.raises(foldline.InputError, match="help: "):
             brusselator.simulate([1.0, 1.0], span, times=times)
-    with pytest.raises(foldline.InputError, match="cannot be read"):
+    with pytest.raises(foldline.InputError, match="cannot read the study file"):
         foldline.run("nowhere.toml", brusselator)
-    with pytest.raises(foldline.InputError, match="none is given"):
+    with pytest.raises(foldline.InputError, match="no folder is given"):
         foldline.run({"survey": [{"name": "s", "free": "B", "values": [1]}]}, brusselator, resume=True)
     with pytest.raises(foldline.InputError, match="the start must be a solution"):
         foldline.follow(brusselator, "B", (0.5, 4))

@@ -4,15 +4,20 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// Numerical continuation and bifurcation analysis.
+/// Numerical continuation and bifurcation analysis of ordinary differential equations.
 ///
-/// Without a command the reference study is run: the bouncing cycles of an overhung rotor.
+/// `foldline new oscillator` writes a model and a study to begin with.
 #[derive(Debug, Parser)]
-#[command(name = "foldline", version, after_help = EXIT_CODES, max_term_width = 110)]
+#[command(name = "foldline", version, after_help = BEGIN, max_term_width = 110)]
 pub struct Arguments {
     #[command(subcommand)]
     pub command: Option<Command>,
 }
+
+const BEGIN: &str =
+    "To begin: `foldline new oscillator` writes a commented model and study. `foldline COMMAND --help` says more.
+
+Exit codes: 0 done, 1 something outside failed, 2 a mistake in the input, 3 done except for what the messages name";
 
 const EXIT_CODES: &str = "Exit codes:
   0  done
@@ -29,12 +34,17 @@ const VERIFY_CODES: &str = "Exit codes:
 
 #[derive(Debug, Subcommand)]
 pub enum Command {
+    /// Write a commented model and study to begin with
+    New(New),
     /// Run a study and print its special points
     #[command(after_help = EXIT_CODES)]
     Run(Run),
     /// Find the whole diagram of a model in a box of parameters, without being told where anything is
     #[command(after_help = EXIT_CODES)]
     Explore(Explore),
+    /// Integrate a model from one initial state; print the trajectory, or draw it
+    #[command(after_help = EXIT_CODES)]
+    Simulate(Simulate),
     /// Print what a run has found
     Table(Table),
     /// Compute the solutions of a run again in another way and compare
@@ -177,6 +187,65 @@ fn time(text: &str) -> Result<Duration, String> {
     };
     let seconds = text[..split].parse::<f64>().map_err(|_| said())? * unit;
     Duration::try_from_secs_f64(seconds).ok().filter(|time| !time.is_zero()).ok_or_else(said)
+}
+
+#[derive(Debug, Args)]
+pub struct New {
+    /// What to begin with [default: a list of what there is]
+    #[arg(value_name = "TEMPLATE", conflicts_with = "study")]
+    pub template: Option<String>,
+    /// Write a study for this model instead
+    #[arg(long, value_name = "MODEL.toml")]
+    pub study: Option<PathBuf>,
+    /// Folder for the files [default: TEMPLATE, or that of the model]
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+}
+
+#[derive(Debug, Args)]
+pub struct Simulate {
+    /// Model file
+    #[arg(value_name = "MODEL.toml")]
+    pub model: PathBuf,
+    /// Change a parameter; may be given several times
+    #[arg(long = "set", value_name = "NAME=VALUE")]
+    pub set: Vec<String>,
+    /// Initial value of a state; may be given several times [default: three quarters of its range]
+    #[arg(long = "start", value_name = "NAME=VALUE,...", allow_hyphen_values = true)]
+    pub start: Vec<String>,
+    /// Length of the trajectory, in the units of the model or with a unit such as "20 ms"
+    #[arg(long, value_name = "TIME", conflicts_with = "periods")]
+    pub time: Option<String>,
+    /// Length in periods of the forcing [default for a forced model: 20]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    pub periods: Option<u32>,
+    /// Interval of time between rows; `period` samples once in each period of the forcing [default: 200 rows]
+    #[arg(long, value_name = "TIME")]
+    pub every: Option<String>,
+    /// States and outputs to show [default: all of them; in a picture, the states]
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
+    pub show: Vec<String>,
+    /// Horizontal axis of a picture: a state or an output [default: the time]
+    #[arg(long, value_name = "NAME", requires = "output")]
+    pub x: Option<String>,
+    /// Relative tolerance of the integrator
+    #[arg(long, value_name = "X", default_value_t = 1e-8, value_parser = accuracy)]
+    pub tolerance: f64,
+    /// Integration steps after which the trajectory ends
+    #[arg(long, value_name = "N", default_value_t = 10_000_000, value_parser = clap::value_parser!(u64).range(1..))]
+    pub max_steps: u64,
+    /// How the table is written
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    pub format: Format,
+    /// Draw a picture instead; the ending says which kind
+    #[arg(short, long = "output", value_name = "FILE.svg|png|pdf")]
+    pub output: Option<PathBuf>,
+}
+
+/// Parses a tolerance of the integrator.
+fn accuracy(text: &str) -> Result<f64, String> {
+    let number = text.parse::<f64>().ok().filter(|x| (1e-13..=1e-2).contains(x));
+    number.ok_or_else(|| "a number from 1e-13 to 1e-2".into())
 }
 
 #[derive(Debug, Args)]

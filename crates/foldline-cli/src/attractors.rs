@@ -3,6 +3,7 @@
 use crate::arguments::Attractors as Typed;
 use crate::failure::{Failure, Outcome};
 use crate::run::processors;
+use crate::values::parameters;
 use foldline::attractors::{Attractor, Sampling, Sense, whirl_sense};
 use foldline::contract::VectorField;
 use foldline::diagram::{Shown, Solution};
@@ -11,7 +12,6 @@ use foldline::explore::attractors;
 use foldline::model::Model;
 use foldline_store::finite::never_finite;
 use foldline_store::model_file::read_model;
-use foldline_store::nearest::suggest;
 use std::io::{Write, stdout};
 
 const TOLERANCE: f64 = 1e-6;
@@ -19,8 +19,7 @@ const TOLERANCE: f64 = 1e-6;
 /// Prints the attractors of a model, the number of hits of each, and its basin fraction.
 pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
     let (model, text) = read_model(&typed.model)?;
-    let mut parameters: Vec<f64> = model.parameters.iter().map(|p| p.value).collect();
-    typed.set.iter().try_for_each(|assignment| assign(assignment, &model, &mut parameters))?;
+    let parameters = parameters(&typed.set, &model)?;
     if let Some(found) = never_finite(&model, &parameters, &text, &typed.model.display().to_string()) {
         return Err(vec![found].into());
     }
@@ -83,23 +82,4 @@ fn line(attractor: &Attractor, model: &Model) -> String {
         format!("{:.3} [{low:.3}, {high:.3}]", share.value())
     });
     format!("{kind:<14} {ratio:>6} {:>6} {share:>20} {period:>14}{ranges}", attractor.hits)
-}
-
-/// Carries out `NAME=VALUE`.
-fn assign(assignment: &str, model: &Model, parameters: &mut [f64]) -> Result<(), Failure> {
-    let said = |message: String, cure: &str| Failure::typed(format!("--set {assignment}: {message}"), cure);
-    let Some((name, value)) = assignment.split_once('=') else {
-        return Err(said("there is no `=`".into(), "write --set NAME=VALUE, for example --set Omega=5"));
-    };
-    let (name, value) = (name.trim(), value.trim());
-    let Some(index) = model.parameter_index(name) else {
-        let known: Vec<&str> = model.parameters.iter().map(|p| p.name.as_str()).collect();
-        let message = format!("the model `{}` has no parameter `{name}`", model.name);
-        return Err(said(message, &suggest(name, &known)));
-    };
-    match value.parse::<f64>() {
-        Ok(number) if number.is_finite() => parameters[index] = number,
-        _ => return Err(said(format!("`{value}` is not a finite number"), "a number such as 5, 0.25 or 1e-6")),
-    }
-    Ok(())
 }

@@ -5,10 +5,9 @@
 use crate::arguments::Explore as Typed;
 use crate::failure::{Failure, Outcome};
 use crate::run::{Way, carried_out, limited, processors};
+use crate::values::{measured, parameter, valued};
 use foldline::model::Model;
-use foldline::units::{Unit, quantity};
 use foldline_store::model_file::read_model;
-use foldline_store::nearest::suggest;
 use foldline_store::study_file::parse_study;
 use std::fmt::Write as _;
 use std::io::{Write as _, stdout};
@@ -98,43 +97,12 @@ fn ranged(option: &str, typed: &str, model: &Model) -> Result<(String, [f64; 2])
     let example = format!("write {option} NAME=LOW:HIGH, for example {option} Omega=0.5:12");
     let (name, ends) = typed.split_once('=').ok_or_else(|| said("there is no `=`", &example))?;
     let (low, high) = ends.split_once(':').ok_or_else(|| said("there is no `:` between two values", &example))?;
-    let name = parameter(name.trim(), model).map_err(|(message, cure)| said(&message, &cure))?;
-    let [low, high] = [low, high].map(|end| measured(end, &name, model));
+    let index = parameter(name.trim(), model).map_err(|(message, cure)| said(&message, &cure))?;
+    let own = &model.parameters[index];
+    let [low, high] = [low, high].map(|end| measured(end, &own.unit));
     match (low, high) {
-        (Some(low), Some(high)) if low < high => Ok((name, [low, high])),
+        (Some(low), Some(high)) if low < high => Ok((own.name.clone(), [low, high])),
         (Some(_), Some(_)) => Err(said("the first value is not smaller than the second", &example)),
         _ => Err(said("an end is not a finite number, nor a quantity in a unit of the parameter", &example)),
     }
-}
-
-/// `NAME=VALUE`.
-fn valued(typed: &str, model: &Model) -> Result<(String, f64), Failure> {
-    let said = |message: &str, cure: &str| Failure::typed(format!("--set {typed}: {message}"), cure);
-    let example = "write --set NAME=VALUE, for example --set Omega=5";
-    let (name, value) = typed.split_once('=').ok_or_else(|| said("there is no `=`", example))?;
-    let name = parameter(name.trim(), model).map_err(|(message, cure)| said(&message, &cure))?;
-    let value = measured(value, &name, model);
-    value
-        .map(|value| (name, value))
-        .ok_or_else(|| said("the value is not a finite number, nor a quantity in a unit of the parameter", example))
-}
-
-/// A number, or a number with a unit such as `500 rpm`, in the unit of a parameter.
-fn measured(text: &str, parameter: &str, model: &Model) -> Option<f64> {
-    let number = match (quantity(text), model.parameter_index(parameter)) {
-        (Some(written), Some(index)) => {
-            let own = Unit::read(&model.parameters[index].unit);
-            Unit::read(&written.unit).convert(written.value, &own).ok()
-        }
-        _ => text.trim().parse().ok(),
-    };
-    number.filter(|value: &f64| value.is_finite())
-}
-
-fn parameter(name: &str, model: &Model) -> Result<String, (String, String)> {
-    if model.parameter_index(name).is_some() {
-        return Ok(name.to_string());
-    }
-    let known: Vec<&str> = model.parameters.iter().map(|p| p.name.as_str()).collect();
-    Err((format!("the model `{}` has no parameter `{name}`", model.name), suggest(name, &known)))
 }

@@ -7,11 +7,14 @@ mod explore;
 mod export;
 mod failure;
 mod import_auto;
+mod new;
 mod plot;
 mod progress;
 mod reproduce;
 mod run;
+mod simulate;
 mod table;
+mod values;
 mod verify;
 
 use arguments::{Arguments, Command};
@@ -33,9 +36,11 @@ fn main() -> ExitCode {
 
 fn answer(arguments: Arguments) -> Result<Outcome, Failure> {
     match arguments.command {
-        None => run::reference_study(),
+        None => run::reference_study_or_help(),
         Some(Command::Run(typed)) => run::study(&typed),
         Some(Command::Explore(typed)) => explore::diagram(&typed),
+        Some(Command::New(typed)) => new::write(&typed),
+        Some(Command::Simulate(typed)) => simulate::trajectory(&typed),
         Some(Command::Table(typed)) => table::print(&typed),
         Some(Command::Verify(typed)) => verify::print(&typed),
         Some(Command::Plot(typed)) => plot::write(&typed),

@@ -5,8 +5,11 @@ use crate::failure::{Failure, Outcome};
 use crate::table::{Run, conversion, read};
 use foldline::diagram::{Branch, Diagram};
 use foldline::model::Model;
+use foldline_plot::quantity::{default_x, default_y, label};
+use foldline_plot::responses::value;
 use foldline_plot::{Picture, Quantity, pdf, png, svg};
 use foldline_store::run_file::Part;
+use std::io::{Write, stderr};
 use std::path::Path;
 
 /// Pixels for each unit of the SVG.
@@ -35,7 +38,22 @@ pub fn write(typed: &Typed) -> Result<Outcome, Failure> {
         ..Picture::default()
     };
     draw(&diagram, &model, &picture, &typed.output)?;
+    let axes = [picture.x.unwrap_or_else(|| default_x(&diagram)), picture.y.unwrap_or_else(|| default_y(&model))];
+    undrawn(&diagram, &model, axes)?;
     Ok(Outcome::Done)
+}
+
+/// Names the surveys and sweeps that have no value of what an axis shows.
+fn undrawn(diagram: &Diagram, model: &Model, axes: [Quantity; 2]) -> std::io::Result<()> {
+    for axis in axes {
+        let sets = diagram.responses.iter().filter(|set| set.responses.iter().all(|r| value(axis, r).is_none()));
+        let names: Vec<&str> = sets.map(|set| set.name.as_str()).collect();
+        if !names.is_empty() {
+            let (names, axis) = (names.join(", "), label(axis, model));
+            writeln!(stderr(), "note: not drawn, as simulation gives no value of \"{axis}\": {names}")?;
+        }
+    }
+    Ok(())
 }
 
 /// What is drawn: the branches, or the curves in two parameters if they are asked for; where both axes are parameters, both.
@@ -60,19 +78,24 @@ fn shown(
         return Err(Failure::typed("--curves: the curves of the run do not have the same two parameters", cure));
     }
     diagram.branches.retain(|branch| branch.held.is_some());
+    diagram.responses.clear();
     Ok((diagram, Some(first)))
 }
 
-/// Writes a picture; the ending of the file says which kind.
-pub fn draw(diagram: &Diagram, model: &Model, picture: &Picture, output: &Path) -> Result<(), Failure> {
+/// Writes a picture of a diagram; the ending of the file says which kind.
+pub fn draw(diagram: &Diagram, model: &Model, shown: &Picture, output: &Path) -> Result<(), Failure> {
+    picture(&svg(diagram, model, shown), output)
+}
+
+/// Writes a picture given as SVG; the ending of the file says which kind.
+pub fn picture(svg: &str, output: &Path) -> Result<(), Failure> {
     let render =
         |result: Result<Vec<u8>, foldline_plot::RenderError>| result.map_err(|e| Failure::Outside(e.to_string()));
-    let drawn = || svg(diagram, model, picture);
     let ending = output.extension().and_then(|e| e.to_str()).unwrap_or("").to_lowercase();
     let bytes = match ending.as_str() {
-        "svg" => drawn().into_bytes(),
-        "png" => render(png(&drawn(), SCALE))?,
-        "pdf" => render(pdf(&drawn()))?,
+        "svg" => svg.as_bytes().to_vec(),
+        "png" => render(png(svg, SCALE))?,
+        "pdf" => render(pdf(svg))?,
         _ => {
             let message = format!("{}: this kind of picture is not known", output.display());
             return Err(Failure::typed(message, "a file name that ends in .svg, .png or .pdf"));

@@ -1,25 +1,26 @@
 //! `foldline run`: a study from its file to its table.
 
-use crate::arguments::{Limits, Run as Typed};
+use crate::arguments::{Arguments, Limits, Run as Typed};
 use crate::failure::{Failure, Outcome};
 use crate::plot::draw;
 use crate::progress::Progress;
 use crate::table::{conversion, print_special, tell_short};
+use clap::CommandFactory;
 use foldline::contract::{Event, Observer, Verdict};
 use foldline::diagram::{Branch, Diagram, Point};
 use foldline::explore;
 use foldline_plot::Picture;
 use foldline_store::order::{names, ordered};
 use foldline_store::run_file::Recorder;
-use foldline_store::study_file::{Study, parse_study, read_study};
-use std::io::{Write, stderr};
+use foldline_store::study_file::{Study, read_study};
+use std::io::{Write, stderr, stdout};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-const STUDY: &str = include_str!("../../../studies/overhung-rotor/bouncing.toml");
-const MODEL: &str = include_str!("../../../models/overhung-rotor.toml");
+/// The reference study, in a clone of the repository.
+const REFERENCE: &str = "studies/overhung-rotor/bouncing.toml";
 
 /// Runs a study file.
 pub fn study(typed: &Typed) -> Result<Outcome, Failure> {
@@ -65,10 +66,20 @@ pub fn carried_out(study: &Study, way: &Way) -> Result<Outcome, Failure> {
     run(study, recorder, earlier, way)
 }
 
-/// Runs the study that is built in, over an earlier run of it, and draws it.
-pub fn reference_study() -> Result<Outcome, Failure> {
+/// In a clone of the repository, runs the reference study; elsewhere prints the help.
+pub fn reference_study_or_help() -> Result<Outcome, Failure> {
+    let reference = Path::new(REFERENCE);
+    if reference.is_file() {
+        return reference_study(reference);
+    }
+    writeln!(stdout(), "{}", Arguments::command().render_help())?;
+    Ok(Outcome::Done)
+}
+
+/// Runs the reference study, over an earlier run of it, and draws it.
+fn reference_study(file: &Path) -> Result<Outcome, Failure> {
     let folder = Path::new("runs").join("bouncing");
-    let study = parse_study(STUDY, "overhung-rotor/bouncing.toml", MODEL, "overhung-rotor.toml")?;
+    let study = read_study(file)?;
     let way = Way { jobs: processors(), resume: false, limit: None, units: &[], folder: &folder };
     Recorder::discard(&folder)?;
     let recorder = Recorder::create(&folder, &study)?;

@@ -64,6 +64,13 @@ fn summary(verified: &Verified, wrong: usize, out: &mut impl Write) -> std::io::
         verified.special,
         verified.checks.len()
     )?;
+    if verified.removed > 0 {
+        writeln!(
+            out,
+            "{} points not computed again: their profiles were not stored (`store` in the study)",
+            verified.removed
+        )?;
+    }
     let of = |quantity: Quantity| verified.checks.iter().filter(move |check| check.quantity == quantity);
     for quantity in Quantity::ALL {
         let ratios: Vec<f64> = of(quantity).filter_map(Check::ratio).collect();

@@ -29,7 +29,9 @@ fn blocks(document: &str, kind: &str) -> Vec<String> {
 /// A folder with the model and the study of a document.
 fn desk(document: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
-    let [model, study] = &blocks(document, "toml")[..] else { panic!("{document} has a model and a study") };
+    let found = blocks(document, "toml");
+    let model = found.iter().find(|block| block.contains("name = \"Brusselator\"")).expect("a model");
+    let study = found.iter().find(|block| block.contains("model = \"brusselator.toml\"")).expect("a study");
     std::fs::write(folder.path().join("brusselator.toml"), model).unwrap();
     std::fs::write(folder.path().join("study.toml"), study).unwrap();
     folder

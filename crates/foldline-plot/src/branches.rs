@@ -36,10 +36,10 @@ pub fn special_layers(branch: &Branch, x: Quantity, y: Quantity, colour: &'stati
             let layer = Layer::scatter(places, Marker::of(kind), colour);
             match known {
                 // A dot has no outline and would be invisible if hollow.
-                None if kind == Kind::Mark => layer.wide(MARK).named(kind.name()),
-                None => layer.hollow().named(kind.name()),
-                Some("subcritical") => layer.named(format!("{kind}, subcritical")),
-                Some(known) => layer.hollow().named(format!("{kind}, {known}")),
+                None if kind == Kind::Mark => layer.wide(MARK).named(kind.title()),
+                None => layer.hollow().named(kind.title()),
+                Some("subcritical") => layer.named(format!("{}, subcritical", kind.title())),
+                Some(known) => layer.hollow().named(format!("{}, {known}", kind.title())),
             }
         })
         .collect()
@@ -65,6 +65,32 @@ pub fn diagram_layers(diagram: &Diagram, x: Quantity, y: Quantity) -> Vec<Layer>
     // What branches off is named last.
     curves.sort_by_key(|layer| layer.name.as_deref() == Some(LIGHTER));
     curves.into_iter().chain(specials).collect()
+}
+
+/// A label for each branch that was not switched to, beside the curve where there is room: curves are told apart without their colours
+/// then. Nothing for a single one, or for more than the legend names.
+pub fn label_layers(diagram: &Diagram, x: Quantity, y: Quantity) -> Vec<Layer> {
+    let roots: Vec<&Branch> = diagram.branches.iter().filter(|branch| root(diagram, branch).1 == 0).collect();
+    if !(2..=MOST).contains(&roots.len()) {
+        return Vec::new();
+    }
+    let label = |(k, branch): (usize, &&Branch)| {
+        let vertices: Vec<[f64; 2]> = stretches(branch, x, y).into_iter().flatten().map(|(place, _)| place).collect();
+        Layer::label(from_the_middle(&vertices), shortened(&branch.name), nth(k))
+    };
+    roots.iter().enumerate().map(label).collect()
+}
+
+/// The places, those in the middle of the list first.
+fn from_the_middle(places: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    let mut order: Vec<usize> = (0..places.len()).collect();
+    order.sort_by_key(|k| k.abs_diff(places.len() / 2));
+    order.into_iter().map(|k| places[k]).collect()
+}
+
+/// The number of branches that were not switched to, each of which has a colour of its own.
+pub fn root_count(diagram: &Diagram) -> usize {
+    diagram.branches.iter().filter(|branch| root(diagram, branch).1 == 0).count()
 }
 
 /// Width of the dot of a mark: smaller than a special point, wider than the curve.

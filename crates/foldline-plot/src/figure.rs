@@ -212,6 +212,13 @@ pub enum Shape {
     Horizontal(f64),
     /// A shaded stretch of the x axis.
     Band([f64; 2]),
+    /// A text beside one of several places, where there is room for it; left out where there is none.
+    Label {
+        /// The places, the better ones first.
+        places: Vec<[f64; 2]>,
+        /// The text.
+        text: String,
+    },
     /// A text beside a place, where it hides least.
     Note {
         /// The place.
@@ -319,6 +326,20 @@ impl Layer {
     /// A text beside a place.
     pub fn note(at: [f64; 2], text: impl Into<String>) -> Layer {
         Layer::new(GREY, Shape::Note { at, text: text.into() })
+    }
+
+    /// A text beside one of several places, if there is room.
+    pub fn label(places: Vec<[f64; 2]>, text: impl Into<String>, colour: &'static str) -> Layer {
+        Layer::new(colour, Shape::Label { places, text: text.into() })
+    }
+
+    /// True if a curve or a set of marks has no places.
+    pub fn is_empty(&self) -> bool {
+        match &self.shape {
+            Shape::Curve { stretches, .. } => stretches.is_empty(),
+            Shape::Scatter { points, .. } => points.is_empty(),
+            _ => false,
+        }
     }
 
     /// With a line in the legend.

@@ -46,7 +46,7 @@ impl Legend {
     }
 
     fn named(&mut self, panel: &Panel, frame: &Frame) {
-        for layer in panel.layers.iter().filter(|l| is_empty(l) || is_visible(l, frame)) {
+        for layer in panel.layers.iter().filter(|l| l.is_empty() || is_visible(l, frame)) {
             let Some(name) = &layer.name else { continue };
             match self.entries.iter_mut().find(|(known, _)| known == name) {
                 Some((_, sample)) if sample.colour != layer.colour => sample.colour = GREY,
@@ -148,14 +148,6 @@ fn entry(out: &mut String, left: f64, y: f64, name: &str, layer: &Layer) {
         }
     }
     text_at(out, left + SAMPLE + GAP, y, name);
-}
-
-fn is_empty(layer: &Layer) -> bool {
-    match &layer.shape {
-        Shape::Curve { stretches, .. } => stretches.is_empty(),
-        Shape::Scatter { points, .. } => points.is_empty(),
-        _ => false,
-    }
 }
 
 /// Whether something of a layer lies within the axes.

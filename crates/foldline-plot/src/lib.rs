@@ -20,6 +20,7 @@ pub mod palette;
 pub mod quantity;
 #[cfg(feature = "render")]
 mod render;
+pub mod responses;
 mod scale;
 mod texts;
 pub mod ticks;
@@ -32,3 +33,4 @@ pub use page::{Picture, svg};
 pub use quantity::{axis, label};
 #[cfg(feature = "render")]
 pub use render::{RenderError, pdf, png};
+pub use responses::response_layers;

@@ -1,9 +1,10 @@
 //! The picture of one diagram.
 
-use crate::branches::diagram_layers;
+use crate::branches::{diagram_layers, label_layers, root_count};
 use crate::compose::figure_svg;
 use crate::figure::{Axis, Figure, LegendPlace, Panel};
 use crate::quantity::{default_x, default_y, label};
+use crate::responses::response_layers;
 use foldline::diagram::Diagram;
 use foldline::model::Model;
 use foldline::special::quantity::Quantity;
@@ -37,8 +38,11 @@ pub fn svg(diagram: &Diagram, model: &Model, picture: &Picture) -> String {
     let [wide, high] = picture.window.map_or([None, None], |[x0, x1, y0, y1]| [Some([x0, x1]), Some([y0, y1])]);
     let [width, height] = picture.size;
     let title = if picture.title.is_some() { 31.0 } else { 0.0 };
+    let mut layers = diagram_layers(diagram, x, y);
+    layers.extend(response_layers(diagram, x, y, root_count(diagram)));
+    layers.extend(label_layers(diagram, x, y));
     let panel = Panel {
-        layers: diagram_layers(diagram, x, y),
+        layers,
         legend: LegendPlace::Beside,
         height: height - 28.0 - title,
         ..Panel::new("", "", axis(x, wide), axis(y, high))

@@ -19,12 +19,14 @@ pub(crate) struct Painter<'f> {
     marks: String,
     /// Texts that are placed once all curves are known: anchor, text, colour, gap.
     waiting: Vec<([f64; 2], String, &'static str, f64)>,
+    /// Texts that are left out where there is no room: anchors, text, colour.
+    optional: Vec<(Vec<[f64; 2]>, String, &'static str)>,
 }
 
 impl<'f> Painter<'f> {
     pub fn new(frame: &'f Frame) -> Painter<'f> {
         let page = Occupied::new(frame.area);
-        Painter { frame, page, lines: String::new(), marks: String::new(), waiting: Vec::new() }
+        Painter { frame, page, lines: String::new(), marks: String::new(), waiting: Vec::new(), optional: Vec::new() }
     }
 
     pub fn layer(&mut self, layer: &Layer) {
@@ -51,6 +53,11 @@ impl<'f> Painter<'f> {
                 self.path(&ends, layer.dashed);
             }
             Shape::Band(ends) => self.band(*ends, layer.colour),
+            Shape::Label { places, text } => {
+                let seen = places.iter().map(|at| self.frame.units(*at)).filter(|at| self.frame.holds(*at));
+                let anchors = seen.map(|at| self.frame.at(at)).collect();
+                self.optional.push((anchors, text.clone(), layer.colour));
+            }
             Shape::Note { at, text } => {
                 let at = self.frame.units(*at);
                 if self.frame.holds(at) {
@@ -159,8 +166,14 @@ impl<'f> Painter<'f> {
         out.push_str(&self.marks);
         let mut texts = String::new();
         legend(&mut self.page, out);
+        let mut placed = Vec::new();
         for (anchor, text, colour, gap) in std::mem::take(&mut self.waiting) {
-            let area = self.page.beside(anchor, &text, NOTE, gap);
+            placed.push((self.page.beside(anchor, &text, NOTE, gap), text, colour));
+        }
+        for (anchors, text, colour) in std::mem::take(&mut self.optional) {
+            placed.extend(self.page.with_room(&anchors, &text, NOTE, 4.0).map(|area| (area, text, colour)));
+        }
+        for (area, text, colour) in placed {
             let (x, y) = (0.5 * (area.left + area.right), 0.5 * (area.top + area.bottom) + 0.36 * NOTE);
             let text = escaped(&text);
             // White behind the letters keeps them legible where a curve has to pass.

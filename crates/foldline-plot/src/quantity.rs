@@ -24,8 +24,11 @@ pub fn axis(name: &str, model: &Model) -> Result<Quantity, String> {
 }
 
 /// The free parameter of most points of branches. The legs of a homotopy, which only lead to branches, count only if there is nothing
-/// else.
+/// else. Where there are no branches, the parameter of the first survey or sweep.
 pub fn default_x(diagram: &Diagram) -> Quantity {
+    if let ([], Some(set)) = (&diagram.branches[..], diagram.responses.first()) {
+        return Quantity::Parameter(set.free);
+    }
     let followed: Vec<&Branch> = diagram.branches.iter().filter(|branch| !is_leg(branch)).collect();
     let counted = if followed.is_empty() { diagram.branches.iter().collect() } else { followed };
     let count = |free: usize| counted.iter().filter(|b| b.free == free).map(|b| b.points.len()).sum::<usize>();
@@ -73,7 +76,7 @@ pub fn label(quantity: Quantity, model: &Model) -> String {
 }
 
 /// `Omega` → `Ω`, `omega_n` → `ω_n`.
-fn with_greek(name: &str) -> String {
+pub fn with_greek(name: &str) -> String {
     const LETTERS: [(&str, &str); 24] = [
         ("alpha", "α"),
         ("beta", "β"),

@@ -67,25 +67,42 @@ impl Occupied {
         100.0 * outside.max(0.0) + 10.0 * boxes + 12.0 * ink
     }
 
+    /// The box of a text beside the first of `anchors` where it hides nothing; it is taken. `None` where there is no room.
+    pub fn with_room(&mut self, anchors: &[[f64; 2]], text: &str, size: f64, gap: f64) -> Option<Area> {
+        let free = |anchor: &[f64; 2]| {
+            let (cost, area) = self.best_beside(*anchor, text, size, gap, 1);
+            (self.hidden(&area) == 0.0).then_some((cost, area))
+        };
+        let (_, area) = anchors.iter().find_map(free)?;
+        self.take(area);
+        Some(area)
+    }
+
     /// The box of a text beside `anchor`, `gap` away; it is taken.
     pub fn beside(&mut self, anchor: [f64; 2], text: &str, size: f64, gap: f64) -> Area {
+        let (_, area) = self.best_beside(anchor, text, size, gap, 5);
+        self.take(area);
+        area
+    }
+
+    /// The box beside `anchor`, in so many rings around it, that hides least, and its cost.
+    fn best_beside(&self, anchor: [f64; 2], text: &str, size: f64, gap: f64, rings: usize) -> (f64, Area) {
         let (w, h) = (width(text, size) + 2.0, 1.15 * size);
         let towards = [(1, 0), (1, -1), (1, 1), (0, -1), (0, 1), (-1, -1), (-1, 1), (-1, 0)];
         let mut best = (f64::INFINITY, Area::around(anchor, 0.0));
-        for ring in 0..5 {
-            let reach = gap + 9.0 * f64::from(ring);
+        for ring in (0..rings).map(|ring| ring as f64) {
+            let reach = gap + 9.0 * ring;
             for (order, (dx, dy)) in towards.into_iter().enumerate() {
                 let x = anchor[0] + f64::from(dx) * (reach + 0.5 * w);
                 let y = anchor[1] + f64::from(dy) * (reach + 0.5 * h);
                 let area = Area { left: x - 0.5 * w, right: x + 0.5 * w, top: y - 0.5 * h, bottom: y + 0.5 * h };
-                let cost = self.hidden(&area) + 6.0 * f64::from(ring) + 0.3 * order as f64;
+                let cost = self.hidden(&area) + 6.0 * ring + 0.3 * order as f64;
                 if cost < best.0 {
                     best = (cost, area);
                 }
             }
         }
-        self.take(best.1);
-        best.1
+        best
     }
 
     /// The box of that size, at the border of the axes, that hides least; it is taken.

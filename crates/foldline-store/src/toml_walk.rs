@@ -2,6 +2,7 @@
 
 use crate::diagnostic::Diagnostic;
 use crate::nearest::suggest;
+use foldline::model::unsupported;
 use foldline::units::{self, Unit};
 use std::io::Read;
 use std::ops::Range;
@@ -52,8 +53,12 @@ impl<'t> Walk<'t> {
     pub(crate) fn only(&mut self, table: &DeTable, known: &[&str], whose: &str) {
         for key in table.keys() {
             let name: &str = key.get_ref();
-            if !known.contains(&name) {
-                self.report(key.span(), format!("unknown key `{name}` in {whose}"), suggest(name, known));
+            if known.contains(&name) {
+                continue;
+            }
+            match unsupported(name) {
+                Some(kind) => self.report(key.span(), format!("`{name}` in {whose}: {}", kind.message), kind.instead),
+                None => self.report(key.span(), format!("unknown key `{name}` in {whose}"), suggest(name, known)),
             }
         }
     }
@@ -183,7 +188,8 @@ impl<'t> Walk<'t> {
     }
 
     fn wrong_type(&mut self, value: &Value, found: &str, what: &str, wanted: &str) {
-        self.report(value.span(), format!("{what} is a {found}, not {wanted}"), format!("write {wanted}"));
+        let article = if found.starts_with(['a', 'e', 'i', 'o', 'u']) { "an" } else { "a" };
+        self.report(value.span(), format!("{what} is {article} {found}, not {wanted}"), format!("write {wanted}"));
     }
 }
 

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// What became of the runs.
+/// Outcomes of the runs.
 #[derive(Default)]
 struct Counts {
     killed: usize,
@@ -16,7 +16,7 @@ struct Counts {
     failed: usize,
 }
 
-/// Kills and resumes the reference study so many times.
+/// Kills and resumes the reference study the given number of times.
 pub fn test(times: usize) -> bool {
     if !cargo(&["build", "--release", "--quiet", "--package", "foldline-cli"]) {
         return false;
@@ -70,7 +70,7 @@ impl Place {
         self.command(folder, resume).status().is_ok_and(|status| status.success())
     }
 
-    /// The lines of a table without its heading; none if there is no run.
+    /// Lines of a table without its heading; empty if there is no run.
     fn table(&self, folder: &Path, what: &str) -> Vec<String> {
         let output = Command::new(&self.program).arg("table").arg(folder).args([what, "--format", "csv"]).output();
         let text = output.map(|output| String::from_utf8_lossy(&output.stdout).into_owned()).unwrap_or_default();
@@ -105,7 +105,7 @@ impl Place {
     }
 }
 
-/// Whether two rows are the same special point within their stated errors: branch, kind, parameter first, error and normal form last.
+/// True if two rows are the same special point within their stated errors: branch, kind, parameter first, error and normal form last.
 fn same(a: &str, b: &str) -> bool {
     let number = |text: Option<&str>| text.and_then(|text| text.parse::<f64>().ok()).unwrap_or(f64::NAN);
     // A normal form in which there is a comma is quoted.

@@ -1,17 +1,25 @@
-//! Development tasks: `cargo xtask test | check | python | deny | bench | reproduce | kill | campaign | outside | docs`. What continuous integration runs, and
-//! nothing else.
+//! Development tasks: what continuous integration runs, and nothing else. `cargo xtask` lists them.
 
+mod environment;
+mod invariants;
 mod kill;
+mod links;
+mod phrases;
 mod python;
 mod readers;
+mod release;
+mod spelling;
+mod tree;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 use std::time::Instant;
 
 const USAGE: &str = "cargo xtask TASK
-  test        format, clippy without warnings, references, every test of the workspace and of the Python package, dependencies
+  test        format, clippy without warnings, references, words, every test of the workspace and of the Python package, dependencies
   check       the same without the tests and the dependencies
+  words       spelling, links, phrasing and the invariants of ARCHITECTURE.md; with --all phrases in files that are not revised yet too
+  address     replaces the address of the repository everywhere: cargo xtask address https://HOST/PATH
   python      the wheel of the Python package, its formatter, type checker and tests in an environment under target; where there is no
               Python that is said
   deny        licences, sources and advisories of the dependencies by cargo-deny, which is installed under target if it is not there
@@ -39,6 +47,8 @@ fn main() -> ExitCode {
                 && deny()
         }
         "check" => check(),
+        "words" => words(std::env::args().nth(2).as_deref() == Some("--all")),
+        "address" => release::move_to(&std::env::args().nth(2).unwrap_or_default()),
         "python" => python::test(),
         "deny" => deny(),
         "bench" => bench(&std::env::args().skip(2).collect::<Vec<String>>()),
@@ -59,9 +69,27 @@ fn check() -> bool {
     cargo(&["fmt", "--all", "--check"])
         && cargo(&["clippy", "--workspace", "--all-targets", "--quiet", "--", "-D", "warnings"])
         && references()
+        && words(false)
 }
 
-/// cargo-deny, which is the newest version that was tried; building it without optimisation takes a third of the time.
+/// Checks spelling, links, phrasing, invariants of the source tree, and that address and version agree. With `all` it also lists
+/// phrases in files that have not been revised yet.
+fn words(all: bool) -> bool {
+    let texts = tree::texts();
+    let phrases = phrases::hits(&texts);
+    let (failing, others): (Vec<_>, Vec<_>) = phrases.into_iter().partition(|hit| hit.fails);
+    let mut faults = links::broken(&texts);
+    faults.extend(invariants::broken(&texts));
+    faults.extend(release::contradictions(&texts));
+    faults.extend(failing.into_iter().map(|hit| hit.message));
+    faults.iter().for_each(|fault| eprintln!("{fault}"));
+    if all {
+        others.iter().for_each(|hit| eprintln!("not revised yet: {}", hit.message));
+    }
+    spelling::right() && faults.is_empty()
+}
+
+/// Checks dependencies with cargo-deny, in the newest version that was tried. Building it without optimisation takes a third of the time.
 fn deny() -> bool {
     const VERSION: &str = "0.20.2";
     let tools = root().join("target/tools");
@@ -95,7 +123,7 @@ fn docs() -> bool {
     run(Command::new(cargo_path()).args(["doc", "--workspace", "--no-deps"]).env("RUSTDOCFLAGS", "-D warnings"))
 }
 
-/// Whether every key that a line `**Source.**` cites is in docs/references.bib.
+/// Returns true if docs/references.bib has every key that a line `**Source.**` cites.
 fn references() -> bool {
     let root = root();
     let bibliography = std::fs::read_to_string(root.join("docs/references.bib")).unwrap_or_default();
@@ -118,7 +146,7 @@ fn references() -> bool {
     complete
 }
 
-/// A name followed by a year.
+/// True for a name followed by a year.
 fn is_key(word: &str) -> bool {
     let name = word.trim_end_matches(|c: char| c.is_ascii_digit());
     name.len() > 2 && word.len() == name.len() + 4 && name.chars().all(|c| c.is_ascii_lowercase())
@@ -135,7 +163,7 @@ fn collect(folder: &Path, files: &mut Vec<PathBuf>) {
     }
 }
 
-/// The command and the examples that the benchmarks run, then the benchmarks, which write benches/results/DATE.md.
+/// Builds the command and the examples, then runs the benchmarks, which write benches/results/DATE.md.
 fn bench(arguments: &[String]) -> bool {
     let build = ["build", "--release", "--quiet", "--package", "foldline-cli", "--package", "foldline-rotor"];
     let own = ["run", "--release", "--quiet", "--package", "foldline-bench", "--"];
@@ -146,13 +174,13 @@ fn bench(arguments: &[String]) -> bool {
     cargo(&[&build[..], &["--bins", "--examples"]].concat()) && cargo(&[&arguments[..], write].concat())
 }
 
-/// In a release build; the options are those of the program.
+/// Runs the campaign in a release build, with the options of that program.
 fn campaign(arguments: &[String]) -> bool {
     let own = ["run", "--release", "--quiet", "--package", "foldline-campaign", "--"];
     cargo(&own.into_iter().chain(arguments.iter().map(String::as_str)).collect::<Vec<&str>>())
 }
 
-/// By the command in a release build.
+/// Runs the independent problems with a release build of the command.
 fn outside(arguments: &[String]) -> bool {
     let binary = root().join("target/release/foldline");
     let binary = binary.to_string_lossy();
@@ -162,7 +190,7 @@ fn outside(arguments: &[String]) -> bool {
         && cargo(&own.into_iter().chain(with).collect::<Vec<&str>>())
 }
 
-/// Everything from nothing; a figure that fails, a branch that ends short or a verdict that has changed is a failure.
+/// Reproduces the reference publication from scratch. Fails if a figure fails, a branch ends short or a verdict has changed.
 fn reproduce(write: bool) -> bool {
     if !cargo(&["build", "--release", "--quiet", "--package", "foldline-cli"]) {
         return false;
@@ -177,7 +205,7 @@ fn reproduce(write: bool) -> bool {
     made && verdicts(&out.join("verdicts.txt"), write)
 }
 
-/// Whether the verdicts are those known; with `write` they become the known ones.
+/// Returns true if the verdicts equal the stored ones; with `write` stores them instead.
 fn verdicts(found: &Path, write: bool) -> bool {
     let known = root().join("crates/foldline-reproduce/verdicts.txt");
     if write {

@@ -7,8 +7,8 @@ use std::process::Command;
 
 const REQUIREMENTS: &str = "python/tests/requirements.txt";
 
-/// Builds the wheel, installs it into an environment of its own under target, and runs formatter, type checker and tests there.
-/// The environment is made anew when its requirements change.
+/// Builds the wheel, installs it into a separate environment under target, and runs formatter, type checker and tests there.
+/// The environment is rebuilt when its requirements change.
 pub fn test() -> bool {
     let Some((python, version)) = interpreter() else {
         eprintln!("the Python package NOT tested: there is no python3 of version 3.10 or later");
@@ -33,7 +33,7 @@ pub fn test() -> bool {
         && environment.runs("pytest", ["--quiet", "python/tests"].map(OsStr::new))
 }
 
-/// What to call, and its version.
+/// Name and version of the Python interpreter.
 fn interpreter() -> Option<(String, String)> {
     let tried = std::env::var("PYTHON").into_iter().chain(["python3".to_string(), "python".to_string()]);
     tried.into_iter().find_map(|name| {
@@ -64,7 +64,7 @@ impl Environment {
         (made && std::fs::write(&stamp, wanted).is_ok()).then_some(environment)
     }
 
-    /// Whether one of its programs succeeds.
+    /// Runs a program of the environment and returns true if it succeeds.
     fn runs<'a>(&self, program: &str, arguments: impl IntoIterator<Item = &'a OsStr>) -> bool {
         let arguments: Vec<&OsStr> = arguments.into_iter().collect();
         let shown: Vec<_> = arguments.iter().map(|argument| argument.to_string_lossy()).collect();
@@ -81,7 +81,7 @@ impl Environment {
     }
 }
 
-/// The one wheel in a folder.
+/// Path of the only wheel in a folder.
 fn wheel(folder: &Path) -> Option<PathBuf> {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
     entries.into_iter().find(|path| path.extension().is_some_and(|ending| ending == "whl"))

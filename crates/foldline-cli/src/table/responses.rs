@@ -2,10 +2,13 @@
 
 use super::{Cell, Column, Style, Table};
 use foldline::diagram::{Diagram, Motion, Response, Responses, Search, Shown};
-use foldline::model::{Model, Output};
+use foldline::model::{Model, Output, State};
 
-/// One row for each response: set, search, every parameter, motion, ratio, multiplicity, period, the extremes of the outputs,
-/// hits, the share of the uniform starts of a survey with its 95 % confidence interval, time until settled, error, and whether a
+/// Most states whose extremes are shown beside those of outputs.
+const SHOWN: usize = 4;
+
+/// One row for each response: set, search, every parameter, motion, ratio, multiplicity, period, the extremes of outputs and
+/// states, hits, the share of the uniform starts of a survey with its 95 % confidence interval, time until settled, error, and whether a
 /// sweep jumped there.
 pub fn responses(diagram: &Diagram, model: &Model) -> Table {
     let mut columns = words(&["set", "search"]);
@@ -16,6 +19,11 @@ pub fn responses(diagram: &Diagram, model: &Model) -> Table {
         ["min", "max"].map(|end| Column::in_unit(&format!("{}_{end}", own.name), Style::Number, &own.unit))
     };
     columns.extend(model.outputs.iter().flat_map(extremes));
+    // Of large models with outputs a reader wants the outputs.
+    let style = if model.outputs.is_empty() || model.states.len() <= SHOWN { Style::Number } else { Style::Exact };
+    let of_state =
+        |own: &State| ["min", "max"].map(|end| Column::in_unit(&format!("{}_{end}", own.name), style, &own.unit));
+    columns.extend(model.states.iter().flat_map(of_state));
     columns.extend(["hits", "share", "share_low", "share_high"].map(|name| column(name, Style::Number)));
     columns.push(Column::in_unit("settled_after", Style::Size, &model.time));
     columns.extend([column("error", Style::Size), column("jump", Style::Word)]);
@@ -29,7 +37,7 @@ pub fn responses(diagram: &Diagram, model: &Model) -> Table {
         row.push(response.period.map_or(Cell::Empty, Cell::Number));
         let n = model.states.len();
         let range = |k: usize| response.ranges.get(k).map_or([Cell::Empty, Cell::Empty], |r| r.map(Cell::Number));
-        row.extend((n..n + model.outputs.len()).flat_map(range));
+        row.extend((n..n + model.outputs.len()).chain(0..n).flat_map(range));
         row.push(count(response.hits));
         let share = response.share.filter(|share| share.of > 0).map(|share| (share.value(), share.interval()));
         row.extend(share.map_or([Cell::Empty, Cell::Empty, Cell::Empty], |(value, [low, high])| {

@@ -13,7 +13,7 @@ mod units;
 
 use crate::diagnostic::Diagnostic;
 use crate::toml_walk::{Value, Walk, read_text, unreadable};
-use foldline::model::{Definition, Field, Forcing, Item, Model, ModelError, ModelSource};
+use foldline::model::{Definition, Field, Forcing, Item, Model, ModelError, ModelSource, unsupported};
 use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 use std::path::Path;
@@ -57,7 +57,13 @@ pub(crate) fn parse_model_of_run(text: &str, file: &str) -> Result<Model, Vec<Di
 }
 
 fn parse(text: &str, file: &str, refuse_units: bool) -> Result<Model, Vec<Diagnostic>> {
-    let (walk, root) = Walk::parse(text, file)?;
+    let (mut walk, root) = Walk::parse(text, file)?;
+    if let Some(named) = root.get("model") {
+        let message = "this file is a study, not a model";
+        let model = named.get_ref().as_str().map_or(String::new(), |model| format!("; its model is `{model}`"));
+        walk.report(named.span(), message, format!("run it with `foldline run {file}`{model}"));
+        return Err(walk.found);
+    }
     let mut reader = Reader::new(walk, text);
     let source = reader.source(&root, file);
     if reader.incomplete {
@@ -182,6 +188,13 @@ impl Reader<'_> {
 
     /// `frequency` or `period`, one of the two.
     fn forcing(&mut self, value: &Value) -> Option<Forcing> {
+        let several = |value: &Value| value.get_ref().as_array().is_some();
+        let listed = several(value) || value.get_ref().as_table().is_some_and(|t| t.values().any(several));
+        if let Some(kind) = unsupported("frequencies").filter(|_| listed) {
+            self.forcing_misspelt = true;
+            self.walk.report(value.span(), kind.message, kind.instead);
+            return Some(Forcing { is_frequency: false, expression: "1".into() });
+        }
         let table = self.walk.table(value, "`forcing`")?;
         let before = self.walk.found.len();
         self.walk.only(table, &["frequency", "period"], "`forcing`");

@@ -3,7 +3,7 @@
 //! **Idea.** `DIR/run.sqlite` holds the study and the model verbatim, the settings, and every accepted point, special point
 //! and ending at the moment it is accepted. Each is one statement, hence one transaction: after a kill at any instant the
 //! file holds a prefix of the run, and [`Recorder::resume`] goes on from it. Of several threads one writes at a time, and the
-//! others leave it their points (docs/decisions/0026).
+//! others leave it their points (docs/decisions/0026-queued-writes.md).
 //!
 //! * Write-ahead log, so that others can read while the run goes on; `synchronous = NORMAL`, which loses nothing when the
 //!   process is killed and at most the last points, never the consistency, when the power fails.
@@ -55,6 +55,8 @@ pub enum RunFileError {
     Newer(PathBuf, i64),
     /// A run cannot be resumed because its study or model (named here) has changed.
     Changed(PathBuf, &'static str),
+    /// The run is complete and its profiles have been removed, from which it would go on.
+    Thinned(PathBuf),
     /// The file contradicts itself; the sentence says where.
     Damaged(PathBuf, String),
     /// Another run is writing there.
@@ -119,6 +121,12 @@ impl fmt::Display for RunFileError {
             RunFileError::Newer(path, version) => write!(
                 f,
                 "{} has format {version}, newer than the format {FORMAT_VERSION} known here\n  help: use a newer foldline",
+                path.display()
+            ),
+            RunFileError::Thinned(path) => write!(
+                f,
+                "{} is complete and keeps only part of its profiles (`store` in the study), so it cannot be resumed\n  help: `--out DIR` \
+                 begins a new run",
                 path.display()
             ),
             RunFileError::Changed(path, what) => write!(

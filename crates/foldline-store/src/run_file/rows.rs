@@ -199,7 +199,9 @@ pub(super) fn point_in(row: &Row) -> Result<(Point, Vec<f64>), String> {
             let mesh = if whole { numbers("mesh_bytes")? } else { Vec::new() };
             let degree = count("degree")?;
             let nodes = mesh.len().saturating_sub(1) * (degree + 1);
-            if whole && (nodes == 0 || profile.len() % nodes != 0) {
+            // Both are empty where the profile has been removed.
+            let removed = mesh.is_empty() && profile.is_empty();
+            if whole && !removed && (nodes == 0 || profile.len() % nodes != 0) {
                 return Err("solution_bytes and mesh_bytes do not belong together".to_string());
             }
             let forcing_periods = u32::try_from(later("forcing_periods")?).map_err(|e| e.to_string())?;

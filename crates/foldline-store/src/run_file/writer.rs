@@ -5,7 +5,7 @@ use super::reader::{Open, Part, load_diagram, open, point_at, sound};
 use super::rows::{OF_PARAMETER, end_row, held_values, key_of, origin_values, point_row, special_row};
 use super::schema::{Columns, create, insertion, upgrade};
 use super::{APPLICATION_ID, FORMAT_VERSION, RunFileError, path_in, responses};
-use crate::study_file::Study;
+use crate::study_file::{Store, Study};
 use foldline::contract::{Event, Observer, Verdict};
 use foldline::diagram::{Branch, Diagram, Ending, Point};
 use rusqlite::types::Value;
@@ -31,6 +31,7 @@ pub struct Recorder {
     insert_response: String,
     /// How many parameters and extremes the tables show by name.
     shown: usize,
+    store: Store,
     /// Of the branches that have begun.
     numbers: Mutex<HashMap<String, i64>>,
     /// Whether [`State::failure`] is there: to be told without waiting for who writes.
@@ -68,6 +69,9 @@ const LOG: i64 = 4 << 20;
 
 /// Events between two looks whether the file is still where it was.
 const LOOKS: usize = 16;
+
+/// The entry that says that profiles have been removed.
+const THINNED: &str = "profiles removed";
 
 /// The table of requests that were not fulfilled. A resumed run determines them anew.
 const SHORTFALLS: &str =
@@ -165,6 +169,12 @@ impl Recorder {
         if text("study")? != study.text {
             return Err(RunFileError::Changed(path, "study"));
         }
+        let thinned = "SELECT count(*) FROM meta WHERE key = ?";
+        match connection.query_row(thinned, [THINNED], |row| row.get::<_, i64>(0)) {
+            Ok(0) => {}
+            Ok(_) => return Err(RunFileError::Thinned(path)),
+            Err(error) => return Err(RunFileError::from_sqlite(&path, error)),
+        }
         connection.pragma_update(None, "journal_mode", "WAL").map_err(|e| RunFileError::from_sqlite(&path, e))?;
         modernise(&mut connection).map_err(|e| RunFileError::from_sqlite(&path, e))?;
         let mut diagram = load_diagram(&connection, &path, Part::Everything)?;
@@ -236,6 +246,7 @@ impl Recorder {
             insert_special: insertion("special_points", &special, &columns),
             insert_response: responses::insert(&study.model),
             shown: columns.names().count(),
+            store: study.store,
             numbers: Mutex::new(numbers),
             failed: AtomicBool::new(false),
             waiting: Mutex::default(),
@@ -256,6 +267,7 @@ impl Recorder {
         if identity(&self.path) != state.file {
             return Err(RunFileError::Vanished(self.path));
         }
+        thin(&state.connection, self.store).map_err(|error| RunFileError::from_sqlite(&self.path, error))?;
         // One file that needs no others, unless someone is reading it just now.
         let _ = state.connection.pragma_update(None, "journal_mode", "DELETE");
         state.connection.close().map_err(|(_, error)| RunFileError::from_sqlite(&self.path, error))?;
@@ -399,6 +411,29 @@ impl Observer for Recorder {
         let number = self.number_of(&branch.name)?;
         self.with_file(|state| point_at(&state.connection, number, position))
     }
+}
+
+/// Removes the profiles that a study does not want to keep, if the run is complete: one that can be resumed needs them.
+fn thin(connection: &Connection, store: Store) -> rusqlite::Result<()> {
+    let every = match store {
+        Store::All | Store::Every(1) => return Ok(()),
+        Store::Special => None,
+        Store::Every(k) => i64::try_from(k).ok(),
+    };
+    let ended = "SELECT count(*) FROM ends WHERE code <> 'stopped'";
+    let sides: i64 = connection.query_row("SELECT 2*count(*) FROM branches", [], |row| row.get(0))?;
+    if connection.query_row(ended, [], |row| row.get::<_, i64>(0))? < sides {
+        return Ok(());
+    }
+    connection.execute(
+        "UPDATE points SET solution_bytes = x'', mesh_bytes = x'', tangent_bytes = x'', solution_checksum = NULL
+         WHERE mesh_bytes IS NOT NULL AND (?1 IS NULL OR position % ?1 <> 0)
+             AND position <> (SELECT min(position) FROM points AS own WHERE own.branch = points.branch)
+             AND position <> (SELECT max(position) FROM points AS own WHERE own.branch = points.branch)",
+        params![every],
+    )?;
+    connection.execute("INSERT OR REPLACE INTO meta VALUES (?, 'true')", [THINNED])?;
+    connection.execute_batch("VACUUM")
 }
 
 fn insert(connection: &Connection, sql: &str, values: Vec<Value>) -> rusqlite::Result<()> {

@@ -6,7 +6,7 @@ use crate::nearest::suggest;
 use crate::toml_walk::{Value, Walk};
 use foldline::diagram::Kind;
 use foldline::explore::{BranchPlan, Start, Switching};
-use foldline::model::{Model, Parameter};
+use foldline::model::{Model, Parameter, unsupported};
 use foldline::special::mark::Mark;
 use foldline::special::quantity::Quantity;
 use std::ops::Range;
@@ -218,11 +218,16 @@ pub(super) fn switching(walk: &mut Walk, value: &Value) -> Switching {
                 }
             }
             None => {
-                let message = match Kind::from_name(name) {
-                    Some(_) => format!("no branch of equilibria or cycles begins at a {name} point"),
-                    None => format!("\"{name}\" is no kind of special point to branch off at"),
+                let (message, hint) = match (unsupported(name), Kind::from_name(name)) {
+                    (Some(kind), _) => (format!("`switch` at {name}: {}", kind.message), kind.instead.to_string()),
+                    (None, Some(_)) => {
+                        (format!("no branch of equilibria or cycles begins at a {name} point"), suggest(name, &names))
+                    }
+                    (None, None) => {
+                        (format!("\"{name}\" is no kind of special point to branch off at"), suggest(name, &names))
+                    }
                 };
-                walk.report(key.span(), message, suggest(name, &names));
+                walk.report(key.span(), message, hint);
             }
         }
     }

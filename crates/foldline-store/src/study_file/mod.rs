@@ -40,9 +40,24 @@ pub struct Study {
     pub model: Model,
     /// What to compute.
     pub plan: Plan,
+    /// Which profiles stay in the run file.
+    pub store: Store,
 }
 
-const ROOT_KEYS: [&str; 16] = [
+/// Of which points of cycles the profile stays in the run file when the run is complete. Special points and the ends of branches always
+/// keep theirs, and every point keeps its numbers.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Store {
+    /// Every point.
+    #[default]
+    All,
+    /// Special points and ends of branches only.
+    Special,
+    /// Every k-th point besides.
+    Every(u64),
+}
+
+const ROOT_KEYS: [&str; 17] = [
     "model",
     "title",
     "description",
@@ -51,6 +66,7 @@ const ROOT_KEYS: [&str; 16] = [
     "degree",
     "max-steps",
     "max-time",
+    "store",
     "parameters",
     "seed",
     "branch",
@@ -174,11 +190,16 @@ fn parse(
     load: impl FnOnce(&mut Walk, &DeTable) -> Option<(String, String, Model)>,
 ) -> Result<Study, Vec<Diagnostic>> {
     let (mut walk, root) = Walk::parse(text, file)?;
+    if !is_study(text) && (root.contains_key("states") || root.contains_key("equations")) {
+        a_model(&mut walk, &root, file);
+        return Err(walk.found);
+    }
     walk.only(&root, &ROOT_KEYS, "the study");
     let Some((model_file, model_text, model)) = load(&mut walk, &root) else { return Err(walk.found) };
 
     let tolerance = tolerance(&mut walk, &root);
     let degree = root.get("degree").and_then(|v| walk.integer(v, "`degree`", 2..=7)).unwrap_or(4) as usize;
+    let store = root.get("store").map_or(Store::All, |value| store(&mut walk, value));
     let [limits, simulation] = limits(&mut walk, &root, &model.time);
     let mut defaults: Vec<f64> = model.parameters.iter().map(|p| p.value).collect();
     if let Some(value) = root.get("parameters") {
@@ -218,7 +239,20 @@ fn parse(
         surveys,
         sweeps,
     };
-    Ok(Study { file: file.to_string(), text: text.to_string(), model_file, model_text, model, plan })
+    Ok(Study { file: file.to_string(), text: text.to_string(), model_file, model_text, model, plan, store })
+}
+
+/// Reports a model file where a study was expected, with what can be done with it.
+fn a_model(walk: &mut Walk, root: &DeTable, file: &str) {
+    let parameters = root.get("parameters").and_then(|value| value.get_ref().as_table());
+    let first = parameters.and_then(|table| table.keys().min_by_key(|key| key.span().start));
+    let (place, name) = first.map_or((0..0, "mu"), |key| (key.span(), key.get_ref()));
+    let message = "this file is a model, not a study: it does not say what to compute";
+    let hint = format!(
+        "`foldline explore {file} --free {name}=LOW:HIGH` finds its bifurcation diagram, `foldline simulate {file}` integrates it; \
+         `foldline new --study {file}` writes a study to begin with"
+    );
+    walk.report(place, message, hint);
 }
 
 /// Reports sums of states that keep their values: no solution is isolated, and none can be continued.
@@ -237,6 +271,20 @@ fn check_totals(walk: &mut Walk, root: &DeTable, model: &Model) {
     let entries: Vec<String> = kept.iter().enumerate().map(entry).collect();
     let hint = format!("say in the model which value {each} has: a table `[totals]` with {}", entries.join(", "));
     walk.report(root.get("model").map_or(0..0, |value| value.span()), message, hint);
+}
+
+/// Which profiles are stored: `"all"`, `"special"`, or a number k for every k-th point.
+fn store(walk: &mut Walk, value: &Value) -> Store {
+    const HINT: &str = "\"all\", \"special\" for special points and ends only, or a number k for every k-th point";
+    match value.get_ref().as_str() {
+        Some("all") => Store::All,
+        Some("special") => Store::Special,
+        Some(other) => {
+            walk.report(value.span(), format!("`store` cannot be \"{other}\""), HINT);
+            Store::All
+        }
+        None => walk.integer(value, "`store`", 1..=1_000_000).map_or(Store::All, Store::Every),
+    }
 }
 
 /// Limits on trajectories in the search for first solutions, and in surveys and sweeps.

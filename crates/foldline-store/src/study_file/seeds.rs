@@ -6,7 +6,7 @@ use crate::nearest::suggest;
 use crate::toml_walk::{Value, Walk};
 use foldline::contract::VectorField;
 use foldline::explore::{AttractorKey, SeedPlan, SeedSource};
-use foldline::model::Model;
+use foldline::model::{Model, unsupported};
 use std::collections::HashMap;
 use std::ops::Range;
 use toml::de::DeTable;
@@ -148,12 +148,12 @@ fn attractor(walk: &mut Walk, value: &Value, model: &Model) -> Option<AttractorK
             Some(AttractorKey::Ratio(a, b))
         }
         _ => {
-            let message = format!("\"{text}\" is no attractor");
-            walk.report(
-                value.span(),
-                message,
-                "\"equilibrium\", \"cycle\", or a ratio of whole numbers such as \"2:1\"",
-            );
+            let hint = "\"equilibrium\", \"cycle\", or a ratio of whole numbers such as \"2:1\"";
+            let (message, hint) = match unsupported(&text) {
+                Some(kind) => (format!("the attractor \"{text}\": {}", kind.message), kind.instead),
+                None => (format!("\"{text}\" is no attractor"), hint),
+            };
+            walk.report(value.span(), message, hint);
             None
         }
     }

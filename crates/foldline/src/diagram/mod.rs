@@ -38,6 +38,14 @@ pub struct Measure<'a> {
 }
 
 impl Solution {
+    /// False if only the numbers of a cycle were kept, and not its profile.
+    pub fn is_stored(&self) -> bool {
+        match self {
+            Solution::Cycle(cycle) => !cycle.profile.is_empty(),
+            Solution::Equilibrium(_) => true,
+        }
+    }
+
     /// What each state gains over a period, where angles turn; else nothing.
     pub fn gain(&self) -> &[f64] {
         match self {
@@ -228,8 +236,9 @@ impl Point {
         (0..rest.len()).any(|i| rest[i + 1..].iter().any(|other| reciprocal(&rest[i], other)))
     }
 
-    /// Largest difference of period and ranges between two points, each relative to its scale (`scales` for the states;
-    /// outputs and period by their own size). `reflection[i]` says that the other point is seen with state i negated.
+    /// Largest difference of the period and the ranges of the states between two points, each relative to its scale plus size, the
+    /// period to its size. Outputs do not count: they follow from the states, and one that is a small difference (the force of a contact
+    /// that has just begun) is less accurate than they are. `reflection[i]` says that the other point is seen with state i negated.
     /// Infinite if one is an equilibrium and the other a cycle.
     pub fn difference(&self, other: &Point, measure: Measure, reflection: &[bool]) -> f64 {
         let Measure { scales, periods } = measure;
@@ -242,14 +251,14 @@ impl Point {
             (None, None) => 0.0,
             _ => return f64::INFINITY,
         };
-        for (i, (a, b)) in self.ranges.iter().zip(&other.ranges).enumerate() {
+        for (i, ((a, b), scale)) in self.ranges.iter().zip(&other.ranges).zip(scales).enumerate() {
             let mut b = if mirrored(i) { [-b[1], -b[0]] } else { *b };
             if let Some(period) = periods.get(i).filter(|period| period.is_finite()) {
                 let copies = period * (0.5 * (a[0] + a[1] - b[0] - b[1]) / period).round();
                 b = b.map(|b| b + copies);
             }
             let size = a[0].abs().max(a[1].abs()).max(b[0].abs()).max(b[1].abs());
-            let scale = scales.get(i).copied().unwrap_or(f64::MIN_POSITIVE) + size;
+            let scale = scale + size;
             largest = largest.max((a[0] - b[0]).abs() / scale).max((a[1] - b[1]).abs() / scale);
         }
         largest
@@ -405,6 +414,27 @@ impl Kind {
             Kind::DoubleTorus => "double-torus",
             Kind::Mark => "mark",
             Kind::Unexplained => "unexplained",
+        }
+    }
+
+    /// The name in a text: "Hopf", "period doubling".
+    pub fn title(self) -> &'static str {
+        match self {
+            Kind::BranchPoint => "branch point",
+            Kind::Hopf => "Hopf",
+            Kind::PeriodDoubling => "period doubling",
+            Kind::BogdanovTakens => "Bogdanov–Takens",
+            Kind::ZeroHopf => "zero-Hopf",
+            Kind::GeneralisedHopf => "generalised Hopf",
+            Kind::DoubleHopf => "double Hopf",
+            Kind::GeneralisedPeriodDoubling => "generalised period doubling",
+            Kind::Chenciner => "Chenciner",
+            Kind::Resonance11 => "1:1 resonance",
+            Kind::Resonance12 => "1:2 resonance",
+            Kind::Resonance13 => "1:3 resonance",
+            Kind::Resonance14 => "1:4 resonance",
+            Kind::DoubleTorus => "double torus",
+            other => other.name(),
         }
     }
 

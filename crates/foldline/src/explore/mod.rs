@@ -28,6 +28,7 @@ mod arrival;
 mod averaged;
 mod choice;
 mod counted;
+pub mod course;
 mod crossings;
 pub mod curves;
 mod diagnosis;

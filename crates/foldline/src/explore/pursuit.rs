@@ -37,13 +37,7 @@ impl<'p> Pursuit<'p> {
         let before = std::mem::replace(&mut self.last, point);
         let (from, to) = before.as_ref().zip(self.last.as_ref())?;
         let reached = self.followed(from, to.parameters[self.free])?;
-        // Outputs follow from the states. The smallest value of one with a corner, such as |x|, depends on the mesh and would look like a jump.
-        let states = |point: &Point| Point {
-            ranges: point.ranges[..self.system.field.dim().min(point.ranges.len())].to_vec(),
-            ..point.clone()
-        };
-        let apart = |reached: &Point| states(reached).difference(&states(to), self.system.measure(), &[]);
-        Some(reached.is_none_or(|reached| apart(&reached) > 30.0 * self.tolerance))
+        Some(reached.is_none_or(|reached| reached.difference(to, self.system.measure(), &[]) > 30.0 * self.tolerance))
     }
 
     /// The solution continued to a value of the parameter: `Some(None)` if it turns back or joins another branch on the way, `None` if

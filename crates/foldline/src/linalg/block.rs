@@ -7,7 +7,7 @@
 //!
 //! **Source.** Threshold pivoting: duff2017, §5.2.
 
-use super::lane::{Lane, dot, subtract};
+use super::lane::{Eight, Lane, dot, subtract};
 use super::shape::{Shape, Step};
 use super::tile::{self, subtract_product};
 use crate::contract::Singular;
@@ -437,6 +437,52 @@ fn solve_in_blocks<T: Lane>(a: &[T], n: usize, b: &mut [T], shape: &Shape, m: us
     }
 }
 
+/// Solves for eight right-hand sides at once, `[n]`, with the factors of one matrix.
+#[inline(always)]
+pub fn solve_columns(a: &[f64], n: usize, pivots: &[u32], exchanged: bool, b: &mut [Eight], shape: &Shape) {
+    if exchanged {
+        (0..n).for_each(|k| b.swap(k, pivots[k] as usize));
+    }
+    if exchanged || shape.is_plain() {
+        for k in 1..n {
+            b[k] = image(b[k], &a[k * n..k * n + k], &b[..k]);
+        }
+        for k in (0..n).rev() {
+            b[k] = image(b[k], &a[k * n + k + 1..(k + 1) * n], &b[k + 1..n]) * Eight::splat(a[k * n + k]);
+        }
+        return;
+    }
+    let m = shape.nodes;
+    for (p, step) in shape.steps.iter().enumerate() {
+        for k in p * m..(p + 1) * m {
+            let line = &a[k * n..(k + 1) * n];
+            for q in step.left.iter().map(|q| q * m) {
+                b[k] = image(b[k], &line[q..q + m], &b[q..q + m]);
+            }
+            if step.own {
+                b[k] = image(b[k], &line[p * m..k], &b[p * m..k]);
+            }
+        }
+    }
+    for (p, step) in shape.steps.iter().enumerate().rev() {
+        for k in (p * m..(p + 1) * m).rev() {
+            let line = &a[k * n..(k + 1) * n];
+            for q in step.right.iter().map(|q| q * m) {
+                b[k] = image(b[k], &line[q..q + m], &b[q..q + m]);
+            }
+            if step.own {
+                b[k] = image(b[k], &line[k + 1..(p + 1) * m], &b[k + 1..(p + 1) * m]) * Eight::splat(line[k]);
+            }
+        }
+    }
+}
+
+/// y - a · x.
+#[inline(always)]
+fn image(y: Eight, a: &[f64], x: &[Eight]) -> Eight {
+    a.iter().zip(x).fold(y, |sum, (a, x)| sum - Eight::splat(*a) * *x)
+}
+
 /// Solves aᵀ x = b for one right-hand side `[n]` in place.
 #[inline(always)]
 pub fn solve_transposed<T: Lane>(a: &[T], n: usize, pivots: &[u32], exchanged: bool, b: &mut [T], shape: &Shape) {
@@ -504,7 +550,6 @@ fn swap_lanes<T: Lane>(b: &mut [T], k: usize, pivots: &[u32]) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::lane::Eight;
     use super::*;
 
     /// Eight matrices, every second of which has its large entries beside the diagonal, against the scalar factorisation.

@@ -12,12 +12,15 @@
 //! ```
 //!
 //! (2) is the covariance of what independent errors at x_0 … x_j, as large as the scales S of the components, become at x_{j+1}: its diagonal bounds
-//! how much of them grows, from wherever to wherever, also where growth and decay follow each other and P shows neither.
+//! how much of them grows, from wherever to wherever, also where growth and decay follow each other and P shows neither. Of many components it
+//! costs more than the products do: random errors e_{j+1} = G_j e_j + S r, r = ±1, are carried along instead, and their mean squares are estimates
+//! of that diagonal.
 //!
 //! **Source.** Compactification, ascher1995, §7.2, which is unstable without a bound on the growth.
 //!
 //! **Fails when** that bound is passed; [`Compound::multiply`] says so, and the caller takes the chain.
 
+use super::dense::{MANY, VECTORS, signs};
 use super::lane::{Lane, add, dot, subtract};
 use super::tile::piece;
 
@@ -45,6 +48,9 @@ impl<T: Lane> Compound<T> {
     /// (1) and (2) for the links `[L][n × (n + q)]`, (G_j, g_j), with the scales `[n]`; false where errors may grow too much.
     #[inline(always)]
     pub fn multiply(&mut self, links: &[T], scale: &[f64], n: usize, q: usize) -> bool {
+        if T::COUNT == 1 && n >= MANY {
+            return self.multiply_large(links, scale, n, q);
+        }
         let Compound { products, spread, room } = self;
         let (width, size) = (n + q, n * (n + q));
         spread.fill(T::default());
@@ -75,6 +81,27 @@ impl<T: Lane> Compound<T> {
                 if !spread[i * (n + 1)].all(square, |entry, square| entry <= GROWTH * square) {
                     return false;
                 }
+            }
+        }
+        true
+    }
+
+    /// [`Compound::multiply`] where a matrix fills the vectors by itself.
+    fn multiply_large(&mut self, links: &[T], scale: &[f64], n: usize, q: usize) -> bool {
+        let (width, size) = (n + q, n * (n + q));
+        if random_errors_grow(links, scale, n, q) {
+            return false;
+        }
+        for (j, link) in links.chunks_exact(size).enumerate() {
+            let (before, own) = self.products.split_at_mut(j * size);
+            let own = &mut own[..size];
+            let Some(last) = before.rchunks_exact(size).next() else {
+                own.copy_from_slice(link);
+                continue;
+            };
+            T::multiply((own, width), (link, width), (last, width), [n, n, width]);
+            for (row, to) in link.chunks_exact(width).zip(own.chunks_exact_mut(width)) {
+                add(T::splat(1.0), &row[n..], &mut to[n..]);
             }
         }
         true
@@ -178,6 +205,25 @@ impl<T: Lane> Compound<T> {
             }
         }
     }
+}
+
+/// Whether the mean squares of random errors pass [`GROWTH`] at any node.
+fn random_errors_grow<T: Lane>(links: &[T], scale: &[f64], n: usize, q: usize) -> bool {
+    let width = n + q;
+    let mut sign = signs();
+    let mut drawn = |s: &f64| T::splat(s * sign());
+    let mut errors: Vec<T> = (0..n * VECTORS).map(|k| drawn(&scale[k / VECTORS])).collect();
+    let mut next = errors.clone();
+    links.chunks_exact(n * width).any(|link| {
+        T::multiply((&mut next, VECTORS), (link, width), (&errors, VECTORS), [n, n, VECTORS]);
+        std::mem::swap(&mut next, &mut errors);
+        errors.chunks_exact_mut(VECTORS).zip(scale).any(|(row, s)| {
+            row.iter_mut().for_each(|e| *e = *e + drawn(s));
+            let limit = T::splat(GROWTH * VECTORS as f64 * s * s);
+            // Not a number is not small either.
+            !dot(row, row).all(limit, |sum, limit| sum <= limit)
+        })
+    })
 }
 
 /// to += row · matrix, all of whose columns `to` has.

@@ -26,7 +26,8 @@
 
 use super::chain::{Chain, Links};
 use super::compound::Compound;
-use super::lane::{Lane, add, dot, intact, subtract};
+use super::dense::MANY;
+use super::lane::{Eight, Lane, add, dot, intact, subtract};
 use super::shape::Shape;
 use super::{block, lu, tile};
 use crate::contract::Singular;
@@ -412,14 +413,53 @@ impl<T: Lane> Condensed<T> {
     /// D⁻¹ A D and D⁻¹ (B D, C) for the intervals at place t.
     fn convert_at(&mut self, t: usize, [n, m, q]: [usize; 3]) {
         let (inner, width) = (m * n, n + q);
-        let Condensed { interior, coupling, units, .. } = self;
-        let (ends, inside) = units.split_at(n);
-        for (i, own) in inside.iter().enumerate() {
-            let row = &mut interior[(t * inner + i) * inner..][..inner];
-            row.iter_mut().zip(inside).for_each(|(x, unit)| *x = *x * T::splat(unit / own));
-            let row = &mut coupling[(t * inner + i) * width..][..width];
-            let columns = ends.iter().copied().chain(std::iter::repeat(1.0));
-            row.iter_mut().zip(columns).for_each(|(x, unit)| *x = *x * T::splat(unit / own));
+        let Condensed { interior, coupling, units, shape, own_units, .. } = self;
+        let ends = &units[..n];
+        for c in 0..n {
+            let (own, first) = (own_units[c], shape.slot(0, c));
+            let rows = &mut interior[(t * inner + first) * inner..][..m * inner];
+            let others = (0..n).filter(|d| *d != c && own_units[*d] != own && shape.pattern()[c * n + d]);
+            for (d, unit) in others.map(|d| (shape.slot(0, d), own_units[d] / own)) {
+                let entries = rows.chunks_exact_mut(inner).flat_map(|row| &mut row[d..d + m]);
+                entries.for_each(|x| *x = *x * T::splat(unit));
+            }
+            for row in coupling[(t * inner + first) * width..][..m * width].chunks_exact_mut(width) {
+                let columns = ends.iter().copied().chain(std::iter::repeat(1.0));
+                row.iter_mut().zip(columns).for_each(|(x, unit)| *x = *x * T::splat(unit / own));
+            }
+        }
+    }
+}
+
+impl Condensed<f64> {
+    /// Eight columns from `first` on of how the inner nodes of interval j follow from its left end, `[m][n]`, once it is condensed.
+    #[inline(always)]
+    pub fn inner_columns(&self, j: usize, first: usize, to: &mut [Eight]) {
+        let (n, width, inner) = (self.n, self.n + self.q, self.m * self.n);
+        let rows = &self.coupling[j * inner * width..(j + 1) * inner * width];
+        for (k, to) in to.iter_mut().enumerate() {
+            let (slot, own) = (self.slot(k / n, k % n), self.own_units[k % n]);
+            let row = &rows[slot * width + first..slot * width + n];
+            *to = Eight::default();
+            for ((to, x), unit) in to.lanes_mut().iter_mut().zip(row).zip(&self.own_units[first..]) {
+                *to = -x * (own / unit);
+            }
+        }
+    }
+
+    /// Solves with the interior of interval j for eight right-hand sides, `[m][n]`, in place.
+    #[inline(always)]
+    pub fn solve_inner_columns(&self, j: usize, x: &mut [Eight]) {
+        let (n, inner) = (self.n, self.m * self.n);
+        let mut slots = vec![Eight::default(); inner];
+        for (k, x) in x.iter().enumerate() {
+            slots[self.slot(k / n, k % n)] = *x * Eight::splat(1.0 / self.own_units[k % n]);
+        }
+        let a = &self.interior[j * inner * inner..(j + 1) * inner * inner];
+        let pivots = &self.pivots[j * inner..(j + 1) * inner];
+        block::solve_columns(a, inner, pivots, self.exchanged[j], &mut slots, &self.shape);
+        for (k, x) in x.iter_mut().enumerate() {
+            *x = slots[self.slot(k / n, k % n)] * Eight::splat(self.own_units[k % n]);
         }
     }
 }
@@ -493,8 +533,8 @@ impl<T: Lane> pulp::NullaryFnOnce for Eliminate<'_, T> {
         }
         let taken = self.0.condense_border();
         corner.iter_mut().zip(&taken).for_each(|(d, t)| *d += total(*t));
-        // One lane has the whole cycle in it, which is not to be multiplied out.
-        if T::COUNT > 1 && self.0.reduced(&corner, true).is_ok() && self.0.is_settled() {
+        // One lane has the whole cycle in it. Few components are not worth multiplying that out.
+        if (T::COUNT > 1 || self.0.n >= MANY) && self.0.reduced(&corner, true).is_ok() && self.0.is_settled() {
             return Ok(());
         }
         self.0.reduced(&corner, false)
@@ -808,14 +848,14 @@ impl<T: Lane> pulp::NullaryFnOnce for SolveTransposed<'_, T> {
 mod tests {
     use super::super::lane::Eight;
     use super::*;
-    use faer::prelude::Solve as _;
+    use foldline_general::{Factored, Mat};
 
     /// Equations (1)–(4) as one dense matrix.
-    fn dense<T: Lane>(s: &Condensed<T>, closure: f64) -> faer::Mat<f64> {
+    fn dense<T: Lane>(s: &Condensed<T>, closure: f64) -> Mat<f64> {
         let (n, inner, q, count) = (s.n, s.m * s.n, s.q, s.intervals);
         let (block, width) = (n + inner, n + q);
         let size = count * block + q;
-        let mut a = faer::Mat::zeros(size, size);
+        let mut a = Mat::zeros(size, size);
         for j in 0..count {
             let (lane, t) = (j / s.length, j % s.length);
             let row = j * block;
@@ -928,7 +968,7 @@ mod tests {
         }
         let rhs = fill(&mut system, strength);
         let matrix = dense(&system, closure);
-        let column = faer::Mat::from_fn(rhs.len(), 1, |i, _| rhs[i]);
+        let column = Mat::from_fn(rhs.len(), 1, |i, _| rhs[i]);
         system.condense().unwrap();
         system.eliminate(closure).unwrap();
         // A right-hand side that is zero but for the scalars, too.
@@ -938,9 +978,10 @@ mod tests {
         system.solve(&rhs, &mut x);
         system.solve_transposed(&rhs, &mut y);
         system.solve(&alone, &mut z);
-        let reference = matrix.partial_piv_lu().solve(&column);
-        let transposed = matrix.transpose().to_owned().partial_piv_lu().solve(&column);
-        let of_border = matrix.partial_piv_lu().solve(&faer::Mat::from_fn(rhs.len(), 1, |i, _| border(i)));
+        let factored = Factored::new(matrix.as_ref());
+        let reference = factored.solve(&column);
+        let transposed = Factored::new(matrix.transpose()).solve(&column);
+        let of_border = factored.solve(&Mat::from_fn(rhs.len(), 1, |i, _| border(i)));
         for i in 0..rhs.len() {
             let what = format!("{n} components, {intervals} intervals in {} lanes, component {i}", T::COUNT);
             let near = |x: f64, reference: f64| (x - reference).abs() < 1e-9 * (1.0 + reference.abs());
@@ -949,6 +990,53 @@ mod tests {
             assert!(near(z[i], of_border[(i, 0)]), "{what}, border alone");
         }
         system.gentle
+    }
+
+    #[test]
+    fn many_components_are_multiplied_together_where_errors_do_not_grow() {
+        for (intervals, q, closure) in [(1, 2, 1.0), (5, 1, -1.0), (9, 2, 1.0)] {
+            for n in [MANY, MANY + 7] {
+                assert!(agrees::<f64>(n, intervals, q, closure, 30.0), "{n} components, {intervals} intervals");
+            }
+        }
+        assert!(!agrees::<f64>(MANY, 9, 2, 1.0, 1.0), "weak diagonals: errors grow");
+    }
+
+    /// A x = b for eight columns against A x = b for each of them.
+    #[test]
+    fn columns_are_solved_as_they_are_alone() {
+        for (strength, q) in [(3.0, 1), (0.1, 1), (3.0, 2)] {
+            let mut s = empty::<f64>(20, 3, q);
+            s.measure_in(&(0..20).map(|k| f64::from(1 << (k % 5))).collect::<Vec<_>>(), &[1.0; 20]);
+            fill(&mut s, strength);
+            s.condense().unwrap();
+            let inner = s.m * s.n;
+            let mut x: Vec<Eight> = (0..inner).map(|k| Eight::each(|lane| ((7 * k + lane) as f64).sin())).collect();
+            let alone: Vec<Vec<f64>> = (0..8)
+                .map(|lane| {
+                    let mut own = vec![0.0; s.n + inner];
+                    (0..inner).for_each(|k| own[s.n + s.slot(k / s.n, k % s.n)] = x[k].0[lane]);
+                    s.convert(&mut own, true);
+                    s.interior_solve(1, false, &mut own[s.n..]);
+                    s.convert(&mut own, false);
+                    (0..inner).map(|k| own[s.n + s.slot(k / s.n, k % s.n)]).collect()
+                })
+                .collect();
+            s.solve_inner_columns(1, &mut x);
+            for (k, x) in x.iter().enumerate() {
+                for lane in 0..8 {
+                    let expected = alone[lane][k];
+                    assert!((x.0[lane] - expected).abs() < 1e-10 * (1.0 + expected.abs()), "{k} in lane {lane}");
+                }
+            }
+            let (mut columns, mut all) = (vec![Eight::default(); inner], vec![0.0; s.m * s.n * s.n]);
+            s.inner_columns(1, 16, &mut columns);
+            s.inner(1..2, 1, &mut all);
+            for (k, x) in columns.iter().enumerate() {
+                assert_eq!(x.0[..4], all[k * s.n + 16..(k + 1) * s.n]);
+                assert_eq!(x.0[4..], [0.0; 4]);
+            }
+        }
     }
 
     #[test]

@@ -35,6 +35,15 @@ pub trait Lane: Copy + Default + Send + Sync + Add<Output = Self> + Sub<Output =
     /// Whether something holds for the numbers of every lane.
     fn all(self, other: Self, holds: impl Fn(f64, f64) -> bool) -> bool;
 
+    /// C = A B for large matrices; arguments as those of [`super::dense::multiply`].
+    fn multiply(c: (&mut [Self], usize), a: (&[Self], usize), b: (&[Self], usize), [rows, depth, columns]: [usize; 3]) {
+        for i in 0..rows {
+            let row = &mut c.0[i * c.1..][..columns];
+            row.fill(Self::default());
+            (0..depth).for_each(|k| add(a.0[i * a.1 + k], &b.0[k * b.1..][..columns], row));
+        }
+    }
+
     /// Runs work compiled for the widest instruction set of the machine.
     fn dispatch<R>(work: impl pulp::NullaryFnOnce<Output = R>) -> R {
         pulp::Arch::new().dispatch(work)
@@ -43,6 +52,10 @@ pub trait Lane: Copy + Default + Send + Sync + Add<Output = Self> + Sub<Output =
 
 impl Lane for f64 {
     const COUNT: usize = 1;
+
+    fn multiply(c: (&mut [f64], usize), a: (&[f64], usize), b: (&[f64], usize), sizes: [usize; 3]) {
+        super::dense::multiply(c, a, b, sizes);
+    }
 
     #[inline(always)]
     fn splat(x: f64) -> f64 {

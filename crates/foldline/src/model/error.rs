@@ -3,6 +3,7 @@
 use super::callable::Callables;
 use super::function::known_elsewhere_as;
 use super::nearest::suggest;
+use super::unsupported::unsupported;
 use std::fmt;
 use std::ops::Range;
 
@@ -127,10 +128,12 @@ impl Complaint {
     }
 
     pub fn unknown_function(name: String, span: Range<usize>, callables: &Callables) -> Complaint {
-        let hint = match known_elsewhere_as(&name) {
-            Some(advice) => advice.to_string(),
-            None => suggest(&name, &callables.names()),
+        let nothing = format!("there is no function `{name}`");
+        let (message, hint) = match (known_elsewhere_as(&name), unsupported(&name)) {
+            (Some(advice), _) => (nothing, advice.to_string()),
+            (None, Some(kind)) => (format!("{nothing}: {}", kind.message), kind.instead.to_string()),
+            (None, None) => (nothing, suggest(&name, &callables.names())),
         };
-        Complaint { span, message: format!("there is no function `{name}`"), hint, function: Some(name) }
+        Complaint { span, message, hint, function: Some(name) }
     }
 }

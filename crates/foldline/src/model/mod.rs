@@ -39,6 +39,7 @@ mod switches;
 mod table;
 mod tape;
 mod totals;
+mod unsupported;
 mod words;
 
 pub use constant::constant_value;
@@ -52,6 +53,7 @@ pub use source::{
 };
 pub use table::{Interpolation, Outside, Table};
 pub use totals::Kept;
+pub use unsupported::{Unsupported, unsupported};
 
 pub(crate) use source::element_of;
 

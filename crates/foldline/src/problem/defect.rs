@@ -16,6 +16,9 @@
 //!
 //! **Source.** The role of the defect: enright2000.
 
+mod columns;
+pub use columns::correct_in_columns;
+
 use super::gauss::{Scheme, gauss_legendre};
 use crate::contract::{Batch, Parameters, VectorField};
 use crate::diagram::Mesh;

@@ -13,9 +13,13 @@
 //!
 //! **Source.** lust2001; (2) is Liouville's formula.
 
+use super::explicit;
 use super::reduction::{self, Reduced};
-use crate::linalg::periodic_schur;
+use crate::linalg::{dense::MANY, periodic_schur};
 use num_complex::Complex64;
+
+/// Error of multipliers that is stated for rounding, relative to the larger of 1 and their modulus.
+pub const ROUNDING: f64 = 1e-9;
 
 /// Multipliers and how far they can be trusted.
 #[derive(Clone, Debug, Default)]
@@ -24,7 +28,7 @@ pub struct Floquet {
     pub multipliers: Vec<Complex64>,
     /// How many of the others, the free ones, lie outside the unit circle.
     pub unstable: usize,
-    /// log of the product of all moduli.
+    /// log of the product of all moduli; NaN where it was not computed: of several courses of many components at once.
     pub log_product: f64,
 }
 
@@ -59,6 +63,10 @@ pub fn one(course: Course, scale: &[f64]) -> Floquet {
 /// frames are along the flow measured in them. Nothing where there are more courses, or transitions are missing.
 pub fn several<const K: usize>(courses: [Course; K], scale: &[f64]) -> Option<[Floquet; K]> {
     let n = scale.len();
+    if n >= MANY {
+        reduction::intervals(&courses, n)?;
+        return Some(courses.map(|course| explicit::multipliers(course, scale, K == 1)));
+    }
     let mut reduced = reduction::reduced(&courses, scale)?.into_iter();
     Some(courses.map(|course| {
         let trivial = usize::from(course.frames.is_some());
@@ -135,6 +143,7 @@ fn product(a: &[f64], b: &[f64], n: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use foldline_general::{Mat, product};
 
     /// Numbers between -1 and 1.
     fn numbers(count: usize, seed: f64) -> Vec<f64> {
@@ -161,8 +170,9 @@ mod tests {
 
     /// Eigenvalues of the product of the transitions, even ones from one list and odd ones from another.
     fn reference(transitions: [&[f64]; 2], count: usize, n: usize) -> Vec<Complex64> {
-        let of = |j: usize| faer::Mat::from_fn(n, n, |i, k| transitions[j % 2][(j * n + i) * n + k]);
-        (1..count).fold(of(0), |product, j| of(j) * product).eigenvalues().unwrap()
+        let of = |j: usize| Mat::from_fn(n, n, |i, k| transitions[j % 2][(j * n + i) * n + k]);
+        let all = (1..count).fold(of(0), |before, j| product(&of(j), &before));
+        foldline_general::eigenvalues(all.as_ref()).unwrap()
     }
 
     /// Each of one list is one of the other, the largest first.
@@ -181,7 +191,7 @@ mod tests {
 
     #[test]
     fn several_spectra_agree_with_products_that_are_multiplied_out() {
-        for (n, count) in [(1, 3), (2, 1), (2, 9), (3, 4), (4, 1), (4, 7), (4, 8), (4, 19), (5, 11)] {
+        for (n, count) in [(1, 3), (2, 1), (2, 9), (3, 4), (4, 1), (4, 7), (4, 8), (4, 19), (5, 11), (33, 2), (36, 3)] {
             let ((own, flow), (other, _)) = (carried(count, n, 0.45), carried(count, n, 1.9));
             let frames = Frames::along(&flow, n);
             let what = format!("n = {n}, {count} intervals");
@@ -190,6 +200,7 @@ mod tests {
             let found = several([a, b, c], &vec![1.0; n]).unwrap();
             for (found, course) in found.iter().zip([a, b, c]) {
                 assert!((found.multipliers[0] - 1.0).norm() < 1e-9, "{what}: {:?}", found.multipliers);
+                assert_eq!(found.unstable, found.multipliers[1..].iter().filter(|z| z.norm() > 1.0).count(), "{what}");
                 assert_same(&found.multipliers, &reference(course.transitions, count, n), &what);
             }
             // One in eight pieces, and without the direction of the flow.

@@ -1,5 +1,6 @@
 //! Is it stable? Eigenvalues of equilibria, Floquet multipliers of cycles.
 
+mod explicit;
 pub mod floquet;
 mod reduction;
 

@@ -24,19 +24,22 @@ pub struct Reduced {
     pub log: f64,
 }
 
-/// Reduces up to eight courses at a time; `scale` `[n]` as in [`super::floquet::several`].
-pub fn reduced(courses: &[Course], scale: &[f64]) -> Option<Vec<Reduced>> {
-    let (n, first) = (scale.len(), courses.first()?);
+/// Number of intervals of courses that can be treated together, if they can: up to eight, as many transitions in each, frames in all or none.
+pub(super) fn intervals(courses: &[Course], n: usize) -> Option<usize> {
+    let first = courses.first()?;
     let count = first.transitions[0].len().checked_div(n * n)?;
-    let framed = first.frames.is_some();
     let alike = |course: &Course| {
         let long = course.transitions.iter().all(|list| list.len() >= count * n * n);
         let fitting = course.frames.is_none_or(|frames| frames.count(n) == count);
-        long && fitting && course.frames.is_some() == framed
+        long && fitting && course.frames.is_some() == first.frames.is_some()
     };
-    if courses.len() > Eight::COUNT || count == 0 || !courses.iter().all(alike) {
-        return None;
-    }
+    (courses.len() <= Eight::COUNT && count > 0 && courses.iter().all(alike)).then_some(count)
+}
+
+/// Reduces up to eight courses at a time; `scale` `[n]` as in [`super::floquet::several`].
+pub fn reduced(courses: &[Course], scale: &[f64]) -> Option<Vec<Reduced>> {
+    let count = intervals(courses, scale.len())?;
+    let framed = courses.first()?.frames.is_some();
     let pieces = Eight::COUNT / courses.len();
     let mut lanes: [Reduced; 8] = Default::default();
     Eight::dispatch(Reduction { courses, scale, pieces, count, framed, lanes: &mut lanes });

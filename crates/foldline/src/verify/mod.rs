@@ -129,6 +129,8 @@ pub struct Verified {
     pub points: usize,
     /// How many special points were located again.
     pub special: usize,
+    /// Number of points without a stored profile, which were not computed again.
+    pub removed: usize,
 }
 
 impl Verified {
@@ -137,6 +139,7 @@ impl Verified {
         self.undecided.append(&mut other.undecided);
         self.points += other.points;
         self.special += other.special;
+        self.removed += other.removed;
     }
 
     /// Comparisons that show something wrong.
@@ -156,16 +159,21 @@ pub fn verify(
 ) -> Verified {
     let system = &system.clone().in_units_of(diagram);
     let branches: Vec<&Branch> = diagram.branches.iter().filter(|branch| kept(branch)).collect();
-    let all: usize = branches.iter().map(|branch| branch.points.len()).sum();
+    // Points whose profile has been removed cannot be computed again.
+    let stored = |branch: &Branch| -> Vec<usize> {
+        (0..branch.points.len()).filter(|i| branch.points[*i].solution.is_stored()).collect()
+    };
+    let all: usize = branches.iter().map(|branch| stored(branch).len()).sum();
     let wanted = sample.unwrap_or(all).min(all);
     let mut out = Verified::default();
     let mut seen = 0;
     for branch in branches {
+        let candidates = stored(branch);
+        out.removed += branch.points.len() - candidates.len();
         // Point number i of all is taken where i · wanted / all changes.
-        let chosen: Vec<usize> = (0..branch.points.len())
-            .filter(|i| ((seen + i + 1) * wanted) / all.max(1) > ((seen + i) * wanted) / all.max(1))
-            .collect();
-        seen += branch.points.len();
+        let taken = |i: usize| ((seen + i + 1) * wanted) / all.max(1) > ((seen + i) * wanted) / all.max(1);
+        let chosen: Vec<usize> = (0..candidates.len()).filter(|i| taken(*i)).map(|i| candidates[i]).collect();
+        seen += candidates.len();
         let setting = setting(system, branch);
         out.add(points::verify(system, &setting, branch, &chosen, tolerance));
         out.add(special::verify(&setting, branch, tolerance));

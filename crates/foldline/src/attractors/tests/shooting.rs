@@ -1,6 +1,7 @@
 //! Newton's method by shooting with difference quotients: slow and simple, to polish candidates independently of collocation.
 
 use super::*;
+use foldline_general::{Factored, Mat, eigenvalues};
 
 /// The solution near a candidate, with its stability.
 pub fn polish(field: &Field, parameters: &[f64], candidate: &Candidate) -> Option<Point> {
@@ -30,7 +31,7 @@ fn slope(field: &Field, parameters: &[f64], x: &[f64]) -> Vec<f64> {
 }
 
 /// The matrix of central difference quotients of `g`.
-fn jacobian(x: &[f64], g: impl Fn(&[f64]) -> Option<Vec<f64>>) -> Option<faer::Mat<f64>> {
+fn jacobian(x: &[f64], g: impl Fn(&[f64]) -> Option<Vec<f64>>) -> Option<Mat<f64>> {
     let n = x.len();
     let mut columns = Vec::new();
     for j in 0..n {
@@ -43,18 +44,13 @@ fn jacobian(x: &[f64], g: impl Fn(&[f64]) -> Option<Vec<f64>>) -> Option<faer::M
         let (plus, minus) = (shifted(1.0)?, shifted(-1.0)?);
         columns.push((0..n).map(|i| (plus[i] - minus[i]) / (2.0 * h)).collect::<Vec<_>>());
     }
-    Some(faer::Mat::from_fn(n, n, |i, j| columns[j][i]))
+    Some(Mat::from_fn(n, n, |i, j| columns[j][i]))
 }
 
 /// Solves a x = b.
-fn solved(a: &faer::Mat<f64>, b: &[f64]) -> Vec<f64> {
-    use faer::prelude::*;
-    let x = a.partial_piv_lu().solve(faer::Mat::from_fn(b.len(), 1, |i, _| b[i]));
+fn solved(a: &Mat<f64>, b: &[f64]) -> Vec<f64> {
+    let x = Factored::new(a.as_ref()).solve(&Mat::from_fn(b.len(), 1, |i, _| b[i]));
     (0..b.len()).map(|i| x[(i, 0)]).collect()
-}
-
-fn eigenvalues(a: &faer::Mat<f64>) -> Option<Vec<Complex64>> {
-    Some(a.eigenvalues().ok()?.into_iter().map(|z| Complex64::new(z.re, z.im)).collect())
 }
 
 fn equilibrium(field: &Field, parameters: &[f64], start: &[f64]) -> Option<Point> {
@@ -64,7 +60,7 @@ fn equilibrium(field: &Field, parameters: &[f64], start: &[f64]) -> Option<Point
         let dx = solved(&a, &slope(field, parameters, &x));
         x.iter_mut().zip(&dx).for_each(|(x, d)| *x -= d);
         if dx.iter().all(|d| d.abs() < 1e-10) {
-            let spectrum = eigenvalues(&a)?;
+            let spectrum = eigenvalues(a.as_ref())?;
             let unstable = spectrum.iter().filter(|z| z.re > 0.0).count();
             let ranges = x.iter().map(|x| [*x, *x]).collect();
             return Some(point(Solution::Equilibrium(x), spectrum, unstable, ranges));
@@ -81,7 +77,7 @@ fn cycle(field: &Field, parameters: &[f64], period: f64, start: &[f64]) -> Optio
         let end = integrator.state_after(&x, [0.0, period])?;
         let monodromy = jacobian(&x, |x| integrator.state_after(x, [0.0, period]))?;
         let (here, there) = (slope(field, parameters, &x), slope(field, parameters, &end));
-        let bordered = faer::Mat::from_fn(n + 1, n + 1, |i, j| match (i < n, j < n) {
+        let bordered = Mat::from_fn(n + 1, n + 1, |i, j| match (i < n, j < n) {
             (true, true) => monodromy[(i, j)] - if i == j { 1.0 } else { 0.0 },
             (true, false) => there[i],
             (false, true) => here[j],
@@ -96,7 +92,7 @@ fn cycle(field: &Field, parameters: &[f64], period: f64, start: &[f64]) -> Optio
             return None;
         }
         if d.iter().all(|d| d.abs() < 1e-8) {
-            let mut spectrum = eigenvalues(&monodromy)?;
+            let mut spectrum = eigenvalues(monodromy.as_ref())?;
             spectrum.sort_by(|a, b| (a - 1.0).norm().total_cmp(&(b - 1.0).norm()));
             let unstable = spectrum[1..].iter().filter(|z| z.norm() > 1.0 + 1e-7).count();
             let cycle = profile(&integrator, &x, period)?;

@@ -4,6 +4,9 @@ use super::CycleProblem;
 use super::crossings::{self, Crossed};
 use crate::contract::{Batch, Parameters, ZeroProblem};
 use crate::diagram::{FLAT, STANDS};
+use crate::linalg::condensed::Condensed;
+use crate::linalg::dense::MANY;
+use crate::linalg::system::System;
 use crate::linalg::{larger, panel, same};
 use crate::problem::defect::{self, Course, Defect, TOGETHER};
 use crate::stability::floquet;
@@ -12,8 +15,6 @@ use std::ops::Range;
 
 /// Stated error of multipliers over the estimated one.
 const SPECTRUM_SAFE: f64 = 4.0;
-/// What rounding adds.
-const SPECTRUM_ROUNDING: f64 = 1e-9;
 
 /// Each multiplier against the nearest of the other list that is left, the largest first: the largest difference, relative to
 /// the larger of 1 and the modulus.
@@ -30,6 +31,9 @@ fn spectrum_difference(spectrum: &[Complex64], other: &[Complex64]) -> f64 {
     }
     most
 }
+
+/// Intervals of many components that are looked at together: Jacobians of more would take more room than the system itself.
+const FEW: usize = 8;
 
 /// Error of an interval that rounding alone may leave, relative. Those of all intervals add up.
 const ROUNDING: f64 = 0.5 * f64::EPSILON;
@@ -62,7 +66,6 @@ impl Room {
         self.own.resize(n * lanes, 0.0);
         self.states.resize(n * lanes, 0.0);
         self.f.resize(n * lanes, 0.0);
-        self.nodes.resize(m * square * count, 0.0);
         self.jacobians.iter_mut().for_each(|fx| fx.resize(square * lanes, 0.0));
         self.gains.iter_mut().for_each(|gains| gains.resize(square * count, 0.0));
     }
@@ -125,12 +128,12 @@ impl CycleProblem<'_> {
             // The error of exp(∫ tr f_x), relative to the larger of 1 and its value, plus that of the trivial multiplier, if any.
             let (own, off) = (self.trace.exp(), self.divergence_error(u));
             let trivial = spectrum[..spectrum.len() - 1].iter().fold(0.0, |most: f64, z| most.max((z - 1.0).norm()));
-            return SPECTRUM_SAFE * (off.exp_m1() * own / own.max(1.0) + trivial) + SPECTRUM_ROUNDING;
+            return SPECTRUM_SAFE * (off.exp_m1() * own / own.max(1.0) + trivial) + floquet::ROUNDING;
         }
         let Some(spectra) = self.corrected_multipliers(u, &crossed) else { return f64::NAN };
         let before = std::iter::once(spectrum).chain(spectra.iter().map(Vec::as_slice));
         let apart: f64 = before.zip(&spectra).map(|(one, next)| spectrum_difference(one, next)).sum();
-        SPECTRUM_SAFE * apart + SPECTRUM_ROUNDING
+        SPECTRUM_SAFE * apart + floquet::ROUNDING
     }
 
     /// Error of ∫ tr f_x: its difference from the integral over other points of the intervals, along the profile corrected by its
@@ -172,7 +175,8 @@ impl CycleProblem<'_> {
         while first < self.intervals() {
             // No short piece at the end.
             let left = self.intervals() - first;
-            let count = if left < 3 * TOGETHER / 2 { left } else { TOGETHER };
+            let together = if self.in_columns().is_some() { FEW } else { TOGETHER };
+            let count = if left < 3 * together / 2 { left } else { together };
             self.correct(first..first + count, &profiles, &mut transitions, room);
             first += count;
         }
@@ -210,7 +214,6 @@ impl CycleProblem<'_> {
             let batch = Batch { lanes, states, parameters: Parameters::Shared(&parameters), times: &times };
             self.setting.field.linearise(batch, &[], f, fx, &mut []);
         }
-        self.system.inner(piece.clone(), count, nodes);
         let lengths = profiles
             .each_ref()
             .map(|profile| -> Vec<f64> { mesh.windows(2).map(|pair| (pair[1] - pair[0]) * profile.u[size]).collect() });
@@ -219,12 +222,26 @@ impl CycleProblem<'_> {
             Course { jacobians: &jacobians[0], lengths: &lengths[0], gains: more },
             Course { jacobians: &jacobians[1], lengths: &lengths[1], gains: less },
         ];
-        defect::correct(&self.sampling, nodes, courses, n);
+        if let Some(system) = self.in_columns() {
+            defect::correct_in_columns(&self.sampling, system, piece.clone(), courses, n);
+        } else {
+            nodes.resize(m * square * count, 0.0);
+            self.system.inner(piece.clone(), count, nodes);
+            defect::correct(&self.sampling, nodes, courses, n);
+        }
         for (transitions, gains) in [(own, more), (other, less)] {
             let own = transitions[piece.start * square..piece.end * square].chunks_exact_mut(square);
             for (j, own) in own.enumerate() {
                 own.iter_mut().zip(gains[j..].iter().step_by(count)).for_each(|(g, gain)| *g += gain);
             }
+        }
+    }
+
+    /// The system where intervals are so large that each is corrected column by column.
+    fn in_columns(&self) -> Option<&Condensed<f64>> {
+        match &self.system {
+            System::One(system) if self.n >= MANY => Some(system),
+            _ => None,
         }
     }
 

@@ -1,0 +1,148 @@
+//! Words for problems that are not solved here, and for settings of other programs that have no counterpart.
+//!
+//! **Idea.** A key, a value or a function with such a name is a question. The answer names the kind of problem and says what to
+//! do instead, here or with another program.
+
+/// Something that is not supported.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Unsupported {
+    /// States that it is not supported, in words of the field.
+    pub message: &'static str,
+    /// What to do instead.
+    pub instead: &'static str,
+}
+
+/// A kind of problem: the words that ask for it, in small letters without `-`, `_` and a final `s`.
+type Kind = (&'static [&'static str], &'static str, &'static str);
+
+const KINDS: [Kind; 15] = [
+    (
+        &["map", "iterate", "iteration", "discrete", "discretetime"],
+        "maps are not supported: states obey differential equations",
+        "where the map samples a flow, give the flow: its fixed points are then cycles; for a map of its own use MatContM or PyDSTool",
+    ),
+    (
+        &["reset", "jump", "event", "guard", "impact", "restitution", "hybrid", "transition"],
+        "states that jump (resets, impacts with a coefficient of restitution) are not supported",
+        "write the contact as a stiff force, such as k*max(x - gap, 0) with damping while in contact; its switching is located exactly. \
+         For resets proper use COCO or TC-HAT",
+    ),
+    (
+        &["boundary", "boundarie", "boundarycondition", "bc", "bvp"],
+        "boundary-value problems other than cycles are not supported",
+        "use AUTO-07p or COCO for them",
+    ),
+    (
+        &["integralcondition", "integralconstraint", "constraint", "algebraic", "dae"],
+        "algebraic conditions beside the differential equations are not supported",
+        "solve the condition for a variable under [definitions], or give that variable a fast equation of its own, such as \
+         eps*z' = g(x, z)",
+    ),
+    (
+        &["delay", "lag", "delayed", "history", "dde"],
+        "delay differential equations are not supported",
+        "approximate the delay by a chain of states, z1' = n/tau*(x - z1), z2' = n/tau*(z1 - z2), …, with `count` for its length; for \
+         an exact delay use DDE-BIFTOOL or knut",
+    ),
+    (
+        &["torus", "tori", "quasiperiodic", "invarianttorus"],
+        "invariant tori are not computed",
+        "torus bifurcations of cycles are located, and continued in two parameters by [[curve]]; what follows them shows in a [[survey]] \
+         or [[sweep]]. For tori as branches use COCO or CoSTAR",
+    ),
+    (
+        &["homoclinic", "heteroclinic", "connection", "connectingorbit", "homcont"],
+        "connecting orbits are not continued by themselves",
+        "a branch of cycles that approaches one ends there and names it, with the parameter; for curves of them use AUTO-07p (HomCont) or \
+         MATCONT",
+    ),
+    (
+        &["frequencie", "secondfrequency", "frequency2"],
+        "two forcing frequencies are not supported",
+        "where their ratio is m:n, state the common period, as in `period = \"2*pi*n/omega\"`; the response is then a cycle",
+    ),
+    (
+        &["noise", "stochastic", "diffusion", "sde", "wiener"],
+        "random forcing is not supported: the equations are deterministic",
+        "study the deterministic part here, and simulate with noise in another program",
+    ),
+    (
+        &["pde", "space", "spatial", "laplacian"],
+        "partial differential equations are not supported as such",
+        "discretise in space with a repeated state (`count`); up to about a hundred states are practical. For more use BifurcationKit or \
+         pde2path",
+    ),
+    (
+        &["initial", "initialcondition", "initialvalue", "initialstate", "ic", "x0", "y0"],
+        "initial conditions do not belong to this table",
+        "give a first state in the study, as in [[seed]] with `state = { x = 1, v = 0 }`, or its `range` in the model, from which initial \
+         states are sampled",
+    ),
+    (
+        &["ds", "dsmin", "dsmax", "step", "stepsize", "maxstep", "minstep", "initialstep", "maxstepsize", "iad"],
+        "step sizes of the continuation cannot be set",
+        "they follow from `tolerance`; leave this out",
+    ),
+    (
+        &["ntst", "ncol", "mesh", "meshinterval", "collocationpoint", "nmx"],
+        "meshes cannot be set",
+        "they adapt to `tolerance`; `degree` sets the order of collocation, and `max-points` the length of a branch",
+    ),
+    (
+        &[
+            "dt",
+            "timestep",
+            "solver",
+            "integrator",
+            "method",
+            "rtol",
+            "atol",
+            "reltol",
+            "abstol",
+            "epsl",
+            "epsu",
+            "epss",
+        ],
+        "the method and its tolerances cannot be set one by one",
+        "everything follows from `tolerance`; leave this out",
+    ),
+    (
+        &["jacobian", "jac", "derivative", "gradient"],
+        "derivatives need not be given",
+        "they are computed exactly from the equations; leave this out",
+    ),
+];
+
+/// What a word that is not known here asks for, if that is not supported.
+pub fn unsupported(word: &str) -> Option<Unsupported> {
+    let plain: String = word.to_lowercase().chars().filter(|c| !matches!(c, '-' | '_' | ' ')).collect();
+    let stem = plain.strip_suffix('s').unwrap_or(&plain);
+    KINDS
+        .iter()
+        .find(|(words, ..)| words.iter().any(|own| *own == stem || *own == plain))
+        .map(|(_, message, instead)| Unsupported { message, instead })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_are_recognised_in_every_spelling() {
+        for word in
+            ["delay", "delays", "Delays", "boundary-conditions", "boundary_conditions", "DSMAX", "ds", "tori", "events"]
+        {
+            assert!(unsupported(word).is_some(), "{word}");
+        }
+        for word in ["name", "state", "range", "switches", "x"] {
+            assert!(unsupported(word).is_none(), "{word}");
+        }
+    }
+
+    #[test]
+    fn no_word_stands_for_two_things() {
+        let words: Vec<&str> = KINDS.iter().flat_map(|(words, ..)| words.iter().copied()).collect();
+        let distinct: std::collections::HashSet<&str> = words.iter().copied().collect();
+        assert_eq!(words.len(), distinct.len());
+    }
+}
