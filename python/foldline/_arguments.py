@@ -74,7 +74,7 @@ def is_branch(value: Any) -> TypeGuard[Branch]:
 def check_solution(start: Any, call: str) -> None:
     """Refuses what is no solution; `call` is the right call with `{}` for the solution."""
     if is_solution(start):
-        start.check_stored()
+        start._check_stored()
         return
     from ._diagram import Diagram
     from ._simulation import Trajectory

@@ -244,7 +244,7 @@ class Model:
         if list(start.model.states) != list(self.states):
             shown = f"the solution has the states {', '.join(start.model.states)}"
             raise InputError(f"{shown}, the model `{self.name}` has {', '.join(self.states)}\n  help: a solution of this model")
-        start.check_stored()
+        start._check_stored()
 
     def _given(self, known: Mapping[str, float], given: Any) -> dict[str, float]:
         check_parameters("parameters", given, self)

@@ -134,20 +134,8 @@ class Solution:
         """States at the times `t`, shape (N (m + 1), n); shape (1, n) for an equilibrium."""
         return self.profile.reshape(-1, len(self.model.states)) if self.is_cycle else self.state[None, :]
 
-    def check_stored(self) -> None:
-        """Refuses a cycle of which the run file kept the numbers, but not the profile.
-
-        Raises
-        ------
-        InputError
-            If there is no profile.
-
-        Examples
-        --------
-        >>> import foldline
-        >>> model = foldline.model(equations={"x": "mu - x^2"}, parameters={"mu": 1.0})
-        >>> model.settle([1.0]).check_stored()
-        """
+    def _check_stored(self) -> None:
+        """Refuses a cycle of which the run file kept the numbers, but not the profile."""
         if self.is_cycle and not self.state.size:
             cure = 'a special point or an end of its branch, whose profiles are kept; or run the study with store = "all"'
             raise InputError(f"the profile of this cycle was not stored\n  help: {cure}")
@@ -176,7 +164,7 @@ class Solution:
         import numpy as np
 
         count = whole("count", count)
-        self.check_stored()
+        self._check_stored()
         names = [*self.model.states, *self.model.outputs]
         rows = floats(self._native.uniform(count)).reshape(-1, len(names))
         times = np.arange(len(rows), dtype=np.float64) * np.float64((self.period or 0.0) / count)
@@ -198,7 +186,7 @@ class Solution:
             Amplitudes in the unit of the states u and v.
         """
         count = whole("count", count)
-        self.check_stored()
+        self._check_stored()
         frequencies, amplitudes = self._native.signed_spectrum(count)
         return floats(frequencies), complexes(amplitudes)
 
