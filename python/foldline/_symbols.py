@@ -18,7 +18,7 @@ from ._errors import TraceError
 
 Operand = Union["Symbol", float]
 
-#: Functions of NumPy with one operand that have another name in the model language, or the same.
+#: Functions of NumPy with one operand, and their names in the model language.
 _ONE = {
     "sqrt": "sqrt", "exp": "exp", "log": "log", "sin": "sin", "cos": "cos", "tan": "tan", "arcsin": "asin", "arccos": "acos",
     "arctan": "atan", "sinh": "sinh", "cosh": "cosh", "tanh": "tanh", "absolute": "abs", "fabs": "abs", "sign": "sign",
@@ -30,7 +30,7 @@ _OPERATORS = {
 }  # fmt: skip
 COMPARISONS = ("<", "<=", ">", ">=", "==", "!=")
 
-#: Packages whose frames are not the user's.
+#: Folders whose frames are not user code.
 _INNER = tuple(os.path.dirname(os.path.abspath(p)) + os.sep for p in (__file__, np.__file__ or __file__))
 
 
@@ -62,7 +62,7 @@ def _place() -> tuple[str, int] | None:
 
 def _needs_number(what: str) -> TraceError:
     return refused(
-        f"{what} needs a number, and the model is traced with symbols",
+        f"{what} needs a number, but the model is traced with symbols",
         "use the functions of numpy instead of those of math; collect values with np.array([...]) or a list, not by assignment into "
         "an array of numbers",
     )
@@ -158,11 +158,11 @@ class Symbol:
     def __invert__(self) -> Symbol:
         return Symbol("-", (1.0, _condition(self)))
 
-    # What needs a number now.
+    # Operations that need a number.
 
     def __bool__(self) -> bool:
         raise refused(
-            "the model branches on a value that is not known while it is traced",
+            "the model branches on a value that is unknown while it is traced",
             "write foldline.where(condition, a, b) instead of `if`, `and`, `or`, `while` and chained comparisons; & and | combine "
             "conditions; np.minimum and np.maximum, of single values, replace min and max",
         )
@@ -180,23 +180,23 @@ class Symbol:
         raise _needs_number("a complex number")
 
     def __mod__(self, other: Any) -> Any:
-        raise refused("`%` jumps, and is no operation of a model", "sin and cos of an angle need no reduction; leave it out")
+        raise refused("`%` is discontinuous and not available in a model", "remove it: sin and cos of an angle need no reduction")
 
     __rmod__ = __mod__
 
     def __floordiv__(self, other: Any) -> Any:
-        raise refused("`//` jumps, and is no operation of a model", "write `/`, or foldline.where for steps")
+        raise refused("`//` is discontinuous and not available in a model", "write `/`, or foldline.where for steps")
 
     __rfloordiv__ = __floordiv__
 
     def __round__(self, digits: int | None = None) -> Any:
-        raise refused("round jumps, and is no operation of a model", "leave it out, or write foldline.where for steps")
+        raise refused("round is discontinuous and not available in a model", "remove it, or write foldline.where for steps")
 
     # NumPy.
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **options: Any) -> Any:
         if method != "__call__" or any(value is not None for key, value in options.items() if key in ("out", "where")):
-            raise refused(f"np.{ufunc.__name__}.{method} cannot be traced", "write the operation out, one value after the other")
+            raise refused(f"np.{ufunc.__name__}.{method} cannot be traced", "write out the operation for each value")
         if any(isinstance(value, np.ndarray) and value.ndim > 0 for value in inputs):
             each = np.frompyfunc(lambda *own: _function(ufunc.__name__, own), len(inputs), 1)
             return each(*(_boxed(value) for value in inputs))
@@ -213,7 +213,7 @@ class Symbol:
             "write it with + - * / **, foldline.where and the elementary functions of numpy",
         )
 
-    # What NumPy calls for the elements of an array of objects; the table below has the functions of one operand.
+    # Methods that NumPy calls for the elements of an array of objects; functions of one operand are found by __getattr__.
 
     def hypot(self, other: Any) -> Any:
         return _function("hypot", (self, other))
@@ -250,13 +250,13 @@ def operand(value: Any) -> Operand:
     if isinstance(value, (bool, int, float, np.bool_, np.integer, np.floating)):
         number = float(value)
         if not np.isfinite(number):
-            raise refused(f"{number} is not a finite number", "models are made of finite numbers")
+            raise refused(f"{number} is not a finite number", "use finite numbers")
         return number
     if type(value).__module__.split(".")[0] == "sympy":
         from ._sympy import converted
 
         return converted(value)
-    raise refused(f"{value!r} is no value of a model", "a real number, a state, a parameter, or an expression of them")
+    raise refused(f"{value!r} cannot be used in a model", "a real number, a state, a parameter, or an expression of them")
 
 
 def _operator(op: str, a: Any, b: Any) -> Any:
@@ -318,13 +318,13 @@ def _function(name: str, inputs: tuple[Any, ...]) -> Any:
         case "logical_not":
             return Symbol("-", (1.0, _condition(values[0])))
     known = sorted([*_ONE, *_TWO, "square", "heaviside"])
-    raise refused(f"`{name}` is no function of a model", f"write it with + - * / **, foldline.where and {', '.join(known)}")
+    raise refused(f"`{name}` is not available in a model", f"write it with + - * / **, foldline.where and {', '.join(known)}")
 
 
 def where(condition: Any, a: Any, b: Any) -> Any:
-    """`a` where the condition holds, else `b`: what `if(condition, a, b)` is in a model file.
+    """Returns `a` where the condition holds and `b` elsewhere, for use in the function of a model: `if(condition, a, b)` in a model file.
 
-    The derivative is that of the branch that is taken, even where the other one is undefined, so a single point may be left
+    The derivative is that of the alternative taken, even if the other one is undefined there. A singular point can thus be left
     out: ``foldline.where(r > 0, f(r)/r, 0)``.
 
     Parameters
@@ -332,12 +332,21 @@ def where(condition: Any, a: Any, b: Any) -> Any:
     condition : symbol or bool
         A comparison, or comparisons combined with ``&`` and ``|``.
     a, b : symbol or float
-        Both are traced.
+        The two alternatives. Both are traced.
 
     Returns
     -------
     symbol
-        With plain numbers in all places, a number.
+        A number if all arguments are numbers.
+
+    Examples
+    --------
+    >>> import foldline
+    >>> @foldline.model(states="x", parameters=dict(k=4.0))
+    ... def stop(s, p):
+    ...     return foldline.where(s.x > 1, p.k * (1 - s.x), 0.0)
+    >>> stop([[0.5], [1.5]]).ravel().tolist()
+    [0.0, -2.0]
     """
     if not any(isinstance(value, (Symbol, np.ndarray)) for value in (condition, a, b)):
         return a if condition else b

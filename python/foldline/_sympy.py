@@ -71,7 +71,7 @@ def _one(node: Any, done: dict[Any, Operand]) -> Operand:
     if name == "Heaviside" and len(node.args) == 2 and float(node.args[1]) == 0.5:
         return Symbol("heaviside", parts[:1])
     raise refused(
-        f"`{node}` of SymPy is no expression of a model",
+        f"the SymPy expression `{node}` cannot be used in a model",
         "expand it, with .doit() or .rewrite(), into sums, products, powers, Piecewise and elementary functions",
     )
 
@@ -96,7 +96,9 @@ def _piecewise(node: Any, done: dict[Any, Operand]) -> Operand:
     pairs = [(done[pair.args[0]], done[pair.args[1]]) for pair in node.args]
     value, condition = pairs.pop()
     if isinstance(condition, Symbol) or condition != 1.0:
-        raise refused(f"`{node}` of SymPy is undefined where none of its conditions holds", "end the Piecewise with a pair (value, True)")
+        raise refused(
+            f"the SymPy expression `{node}` is undefined where none of its conditions holds", "end the Piecewise with a pair (value, True)"
+        )
     for own, when in reversed(pairs):
         value = Symbol("if", (when, own, value))
     return value

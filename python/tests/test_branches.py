@@ -78,7 +78,7 @@ def test_a_run_is_saved_and_opened_to_the_last_bit(steady, tmp_path):
             assert np.array_equal(a[column], b[column], equal_nan=True), column
         assert [repr(point) for point in a.special] == [repr(point) for point in b.special]
     assert (again[cycles.name][3].profile == cycles[3].profile).all()
-    with pytest.raises(foldline.RunFileError, match="exists already"):
+    with pytest.raises(foldline.RunFileError, match="already exists"):
         cycles.save(tmp_path / "run")
     # What was saved can be gone on from.
     curve = foldline.hold(again[steady.name].special[0], "A", (0.9, 1.1))
@@ -96,10 +96,33 @@ def test_a_run_in_a_folder_is_the_run_in_memory(brusselator, tmp_path):
         assert (a.parameters == b.parameters).all()
     resumed = foldline.run(study, brusselator, out=tmp_path / "run", resume=True)
     assert len(resumed.special) == 1
-    with pytest.raises(foldline.RunFileError, match="`resume=True` goes on with it"):
+    with pytest.raises(foldline.RunFileError, match="continue this run with `resume=True`"):
         foldline.run(study, brusselator, out=tmp_path / "run")
     switched = on_disk["steady"].switch(on_disk["steady"].special[0], out=tmp_path / "switched")
     assert (switched["period"] == foldline.open(tmp_path / "switched")[switched.name]["period"]).all()
+
+
+def test_a_cycle_without_its_profile_is_refused_as_a_start(brusselator, tmp_path):
+    """A run may keep the profiles of special points and ends alone; the numbers of all others are there."""
+    study = {
+        "store": "special",
+        "seed": [{"name": "rest", "attractor": "equilibrium"}],
+        "branch": [{"name": "steady", "from": "rest", "free": "B", "range": [0.5, 4], "switch": {"hopf": 1}}],
+    }
+    cycles = foldline.run(study, brusselator, out=tmp_path / "run")["steady/hopf-1"]
+    light = cycles[len(cycles) // 2]
+    assert light.is_cycle and light.period > 0
+    for use in (
+        lambda: foldline.follow(light, "A", (0.8, 1.2)),
+        lambda: foldline.sweep(light, "A", (0.8, 1.2)),
+        lambda: brusselator.settle(light),
+        lambda: brusselator.simulate(light, 1.0),
+        light.uniform,
+        light.plot,
+    ):
+        with pytest.raises(foldline.InputError, match="the profile of this cycle was not stored"):
+            use()
+    assert foldline.follow(cycles[-1], "A", (0.9, 1.1)).complete
 
 
 def test_exploring_finds_the_equilibrium_and_the_cycles(brusselator):

@@ -70,5 +70,5 @@ def _values(model):
 
 
 def test_time_without_a_forcing_is_refused():
-    with pytest.raises(foldline.InputError, match="time is `t` where the model says"):
+    with pytest.raises(foldline.InputError, match="`t` is defined only for a forced model"):
         foldline.model(states="x")(lambda s, p, t: np.cos(t) - s.x)

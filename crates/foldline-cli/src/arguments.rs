@@ -5,62 +5,66 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 /// Numerical continuation and bifurcation analysis of ordinary differential equations.
-///
-/// `foldline new oscillator` writes a model and a study to begin with.
 #[derive(Debug, Parser)]
 #[command(name = "foldline", version, after_help = BEGIN, max_term_width = 110)]
 pub struct Arguments {
     #[command(subcommand)]
     pub command: Option<Command>,
+    /// Print only tables, errors and what was not reached
+    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    pub quiet: bool,
+    /// Also report special points as they are found, and why each branch ends
+    #[arg(short, long, global = true)]
+    pub verbose: bool,
 }
 
 const BEGIN: &str =
-    "To begin: `foldline new oscillator` writes a commented model and study. `foldline COMMAND --help` says more.
+    "To begin: `foldline new oscillator` writes a commented model and study. `foldline COMMAND --help` describes a command.
 
-Exit codes: 0 done, 1 something outside failed, 2 a mistake in the input, 3 done except for what the messages name";
+Exit codes: 0 success, 1 failure outside foldline, 2 error in the input, 3 finished but incomplete, as the messages say";
 
 const EXIT_CODES: &str = "Exit codes:
-  0  done
-  1  something outside failed, such as a full disk
-  2  a mistake in what was typed or in a file; the message says where, what and how to put it right
-  3  done, but something was not reached: a branch ended short, a switch led nowhere, a change of stability is not explained, samples
-     of an exploration did not settle (or the run was stopped; `--resume` goes on)";
+  0  success
+  1  failure outside foldline, such as a full disk
+  2  error in the command line or in a file; the message says where, what and how to fix it
+  3  finished, but incomplete: a branch ended early, no branch was found at a switch, a change of stability is
+     unexplained, samples of an exploration did not settle, or the run was stopped (continue it with `--resume`)";
 
 const VERIFY_CODES: &str = "Exit codes:
-  0  every number is as accurate as it says
-  1  something outside failed
-  2  a mistake in what was typed, or no run in the folder
-  3  some number is worse than its stated error";
+  0  every number is as accurate as stated
+  1  failure outside foldline
+  2  error in the command line, or no run in the folder
+  3  some number differs by more than its stated error";
 
 #[derive(Debug, Subcommand)]
 pub enum Command {
-    /// Write a commented model and study to begin with
+    /// Write a commented model and study as a starting point
     New(New),
     /// Run a study and print its special points
     #[command(after_help = EXIT_CODES)]
     Run(Run),
-    /// Find the whole diagram of a model in a box of parameters, without being told where anything is
+    /// Compute the bifurcation diagram of a model over a range of a parameter, with no starting solutions given
     #[command(after_help = EXIT_CODES)]
     Explore(Explore),
     /// Integrate a model from one initial state; print the trajectory, or draw it
     #[command(after_help = EXIT_CODES)]
     Simulate(Simulate),
-    /// Print what a run has found
+    /// Print the results of a run
     Table(Table),
-    /// Compute the solutions of a run again in another way and compare
+    /// Recompute the solutions of a run by an independent method and compare
     #[command(after_help = VERIFY_CODES)]
     Verify(Verify),
     /// Draw the bifurcation diagram of a run
     Plot(Plot),
-    /// Write a run as CSV, Parquet or NetCDF for other programs
+    /// Export a run as CSV, Parquet or NetCDF
     Export(Export),
-    /// List the solutions in files of AUTO-07p, or make a study that starts from them
+    /// List the solutions in AUTO-07p files, or write a study that starts from them
     ImportAuto(ImportAuto),
-    /// Sample initial states of a model and list where they settle
+    /// Sample initial states of a model and list the attractors they reach
     Attractors(Attractors),
-    /// Say whether a model or study file is right, and if not where and why
+    /// Check a model or study file for errors
     Check(Check),
-    /// Compute the figures and claims of a publication again
+    /// Recompute the figures and claims of a publication
     #[command(after_help = EXIT_CODES)]
     Reproduce(Reproduce),
 }
@@ -70,22 +74,22 @@ pub struct Run {
     /// Study file
     #[arg(value_name = "STUDY.toml")]
     pub study: PathBuf,
-    /// Folder for the run [default: runs/NAME OF THE STUDY]
+    /// Folder for the run [default: runs/NAME for NAME.toml]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// How many branches are followed at a time [default: number of processors]
+    /// Number of branches followed in parallel [default: number of processors]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub jobs: Option<u16>,
-    /// Go on with a run that was stopped or killed
+    /// Continue a run that was stopped or killed
     #[arg(long)]
     pub resume: bool,
-    /// Stop after this time, such as 90s, 10min or 2h, and keep what was found; `--resume` goes on
+    /// Stop after this time, such as 90s, 10min or 2h, keeping all results; continue with `--resume`
     #[arg(long, value_name = "TIME", value_parser = time)]
     pub time_limit: Option<Duration>,
     #[command(flatten)]
     pub limits: Limits,
-    /// Show a parameter, state, output or `period` in another unit, or a frequency in orders of a speed, as in omega=orders:Omega; may be
-    /// given several times
+    /// Show a parameter, state, output or `period` in another unit, or a frequency in orders of a speed, as in
+    /// omega=orders:Omega; can be repeated
     #[arg(long, value_name = "NAME=UNIT")]
     pub unit: Vec<String>,
 }
@@ -93,10 +97,11 @@ pub struct Run {
 /// Limits on trajectories.
 #[derive(Clone, Debug, Args)]
 pub struct Limits {
-    /// Integration steps after which a trajectory counts as unsettled; replaces `max-steps` of the study
+    /// Number of integration steps after which a trajectory counts as not settled; overrides `max-steps` of the study
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=10_000_000_000))]
     pub max_steps: Option<u64>,
-    /// The same as a time, in the units of the model or with a unit such as "20 ms"; replaces `max-time`
+    /// Integration time after which a trajectory counts as not settled, in the time unit of the model or with a unit such
+    /// as "20 ms"; overrides `max-time` of the study
     #[arg(long, value_name = "TIME")]
     pub max_time: Option<String>,
 }
@@ -106,52 +111,52 @@ pub struct Explore {
     /// Model file
     #[arg(value_name = "MODEL.toml")]
     pub model: PathBuf,
-    /// The parameter that varies, and its range
+    /// Free parameter and its range
     #[arg(long, value_name = "NAME=LOW:HIGH", allow_hyphen_values = true)]
     pub free: String,
-    /// Change another parameter
+    /// Set another parameter; can be repeated
     #[arg(long = "set", value_name = "NAME=VALUE")]
     pub set: Vec<String>,
-    /// Follow folds in a second parameter too, to branches that nothing else leads to
+    /// Also continue folds in a second parameter, to reach branches that nothing else leads to
     #[arg(long, value_name = "NAME=LOW:HIGH", allow_hyphen_values = true)]
     pub connect: Option<String>,
-    /// At how many values of the parameter attractors and equilibria are looked for
+    /// Number of parameter values at which to search for attractors and equilibria
     #[arg(long, value_name = "N", default_value_t = 15, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub values: u32,
-    /// How many initial states at each
+    /// Number of initial states at each of these values
     #[arg(long, value_name = "N", default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
     pub samples: u32,
-    /// Seed of the random numbers; the same seed gives the same diagram
+    /// Random seed; the same seed gives the same diagram
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u64).range(..=i64::MAX as u64))]
     pub seed: u64,
-    /// No branch is begun once this many points are accepted; a time such as 60s is a time limit
+    /// Start no new branch after this many points; a time such as 60s sets a time limit instead
     #[arg(long, value_name = "N|TIME", default_value = "100000", value_parser = budget)]
     pub budget: Budget,
-    /// Stop after this time, such as 90s, 10min or 2h, and keep what was found; `--resume` goes on
+    /// Stop after this time, such as 90s, 10min or 2h, keeping all results; continue with `--resume`
     #[arg(long, value_name = "TIME", value_parser = time)]
     pub time_limit: Option<Duration>,
-    /// How many levels of period doubling are followed [default: 2]
+    /// Number of successive period doublings to follow [default: 2]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(0..=16))]
     pub doublings: Option<u8>,
-    /// The one tolerance, from 1e-10 to 1e-4
+    /// Tolerance, from 1e-10 to 1e-4
     #[arg(long, value_name = "X", default_value_t = 1e-6)]
     pub tolerance: f64,
-    /// Folder for the run [default: runs/explore-NAME OF THE MODEL FILE]
+    /// Folder for the run [default: runs/explore-NAME for NAME.toml]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// Threads [default: number of processors]
+    /// Number of threads [default: number of processors]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub jobs: Option<u16>,
-    /// Go on with an exploration that was stopped or killed
+    /// Continue an exploration that was stopped or killed
     #[arg(long)]
     pub resume: bool,
-    /// Print the study that does the same, and do nothing else
+    /// Print the equivalent study file and exit
     #[arg(long)]
     pub print: bool,
     #[command(flatten)]
     pub limits: Limits,
-    /// Show a parameter, state, output or `period` in another unit, or a frequency in orders of a speed, as in omega=orders:Omega; may be
-    /// given several times
+    /// Show a parameter, state, output or `period` in another unit, or a frequency in orders of a speed, as in
+    /// omega=orders:Omega; can be repeated
     #[arg(long, value_name = "NAME=UNIT")]
     pub unit: Vec<String>,
 }
@@ -170,14 +175,14 @@ const POINTS: u32 = 100_000;
 fn budget(text: &str) -> Result<Budget, String> {
     match text.parse::<u32>() {
         Ok(points @ 1..=100_000_000) => Ok(Budget { points, time: None }),
-        Ok(_) => Err("a number of points from 1 to 100000000, or a time such as 60s".into()),
+        Ok(_) => Err("expected a number of points from 1 to 100000000, or a time such as 60s".into()),
         Err(_) => time(text).map(|time| Budget { points: POINTS, time: Some(time) }),
     }
 }
 
 /// Parses a time such as 90s, 10min or 2h.
 fn time(text: &str) -> Result<Duration, String> {
-    let said = || "a number with s, min or h, such as 90s, 10min or 2h".to_string();
+    let said = || "expected a number with s, min or h, such as 90s, 10min or 2h".to_string();
     let split = text.find(|c: char| !(c.is_ascii_digit() || c == '.')).unwrap_or(text.len());
     let unit = match text[split..].trim() {
         "s" => 1.0,
@@ -191,7 +196,7 @@ fn time(text: &str) -> Result<Duration, String> {
 
 #[derive(Debug, Args)]
 pub struct New {
-    /// What to begin with [default: a list of what there is]
+    /// Template; without it, the templates are listed
     #[arg(value_name = "TEMPLATE", conflicts_with = "study")]
     pub template: Option<String>,
     /// Write a study for this model instead
@@ -207,19 +212,19 @@ pub struct Simulate {
     /// Model file
     #[arg(value_name = "MODEL.toml")]
     pub model: PathBuf,
-    /// Change a parameter; may be given several times
+    /// Set a parameter; can be repeated
     #[arg(long = "set", value_name = "NAME=VALUE")]
     pub set: Vec<String>,
-    /// Initial value of a state; may be given several times [default: three quarters of its range]
+    /// Initial value of a state; can be repeated [default: at three quarters of its range]
     #[arg(long = "start", value_name = "NAME=VALUE,...", allow_hyphen_values = true)]
     pub start: Vec<String>,
-    /// Length of the trajectory, in the units of the model or with a unit such as "20 ms"
+    /// Length of the trajectory, in the time unit of the model or with a unit such as "20 ms"
     #[arg(long, value_name = "TIME", conflicts_with = "periods")]
     pub time: Option<String>,
-    /// Length in periods of the forcing [default for a forced model: 20]
+    /// Length in forcing periods [default for a forced model: 20]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     pub periods: Option<u32>,
-    /// Interval of time between rows; `period` samples once in each period of the forcing [default: 200 rows]
+    /// Time between rows; `period` gives one row per forcing period [default: 200 rows]
     #[arg(long, value_name = "TIME")]
     pub every: Option<String>,
     /// States and outputs to show [default: all of them; in a picture, the states]
@@ -231,13 +236,13 @@ pub struct Simulate {
     /// Relative tolerance of the integrator
     #[arg(long, value_name = "X", default_value_t = 1e-8, value_parser = accuracy)]
     pub tolerance: f64,
-    /// Integration steps after which the trajectory ends
+    /// Maximum number of integration steps
     #[arg(long, value_name = "N", default_value_t = 10_000_000, value_parser = clap::value_parser!(u64).range(1..))]
     pub max_steps: u64,
-    /// How the table is written
+    /// Format of the table
     #[arg(long, value_enum, default_value_t = Format::Text)]
     pub format: Format,
-    /// Draw a picture instead; the ending says which kind
+    /// Draw a picture instead; the file extension sets the format
     #[arg(short, long = "output", value_name = "FILE.svg|png|pdf")]
     pub output: Option<PathBuf>,
 }
@@ -245,7 +250,7 @@ pub struct Simulate {
 /// Parses a tolerance of the integrator.
 fn accuracy(text: &str) -> Result<f64, String> {
     let number = text.parse::<f64>().ok().filter(|x| (1e-13..=1e-2).contains(x));
-    number.ok_or_else(|| "a number from 1e-13 to 1e-2".into())
+    number.ok_or_else(|| "expected a number from 1e-13 to 1e-2".into())
 }
 
 #[derive(Debug, Args)]
@@ -253,30 +258,30 @@ pub struct Table {
     /// Folder of the run
     #[arg(value_name = "DIR")]
     pub folder: PathBuf,
-    /// Special points (the default)
+    /// Special points (default)
     #[arg(long, group = "what")]
     pub special: bool,
-    /// Every accepted point, with multipliers and accuracy
+    /// All accepted points, with multipliers and accuracy
     #[arg(long, group = "what")]
     pub points: bool,
-    /// One line for each branch, with how it ended
+    /// One line per branch, with how it ended
     #[arg(long, group = "what")]
     pub branches: bool,
-    /// Remarks: what was found for each seed, which routes the homotopies took, which switches led to known branches, what was not
+    /// Notes: what was found for each seed, the routes of the homotopies, switches that led to known branches, what was not
     /// reached
     #[arg(long, group = "what")]
     pub notes: bool,
-    /// What surveys and sweeps saw
+    /// Results of surveys and sweeps
     #[arg(long, group = "what")]
     pub responses: bool,
     /// Only this branch, or the legs of this homotopy
     #[arg(long, value_name = "NAME")]
     pub branch: Option<String>,
-    /// How the table is written
+    /// Format of the table
     #[arg(long, value_enum, default_value_t = Format::Text)]
     pub format: Format,
-    /// Show a parameter, state, output or `period` in another unit, or a frequency in orders of a speed, as in omega=orders:Omega; may be
-    /// given several times
+    /// Show a parameter, state, output or `period` in another unit, or a frequency in orders of a speed, as in
+    /// omega=orders:Omega; can be repeated
     #[arg(long, value_name = "NAME=UNIT")]
     pub unit: Vec<String>,
 }
@@ -305,11 +310,11 @@ impl Table {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Format {
-    /// Aligned columns; parameters that do not change are left out
+    /// Aligned columns, without parameters that do not change
     Text,
-    /// Comma-separated, every digit
+    /// Comma-separated values, full precision
     Csv,
-    /// A list of objects, every digit
+    /// List of objects, full precision
     Json,
 }
 
@@ -318,16 +323,16 @@ pub struct Verify {
     /// Folder of the run
     #[arg(value_name = "DIR")]
     pub folder: PathBuf,
-    /// Compute at most so many points again, spread evenly; special points always are [default: all]
+    /// Recompute at most N points, spread evenly, and all special points [default: all points]
     #[arg(long, value_name = "N")]
     pub sample: Option<usize>,
     /// Only this branch, or the legs of this homotopy
     #[arg(long, value_name = "NAME")]
     pub branch: Option<String>,
-    /// How many of the worst comparisons are listed
+    /// Number of worst comparisons to list
     #[arg(long, value_name = "N", default_value_t = 20)]
     pub worst: usize,
-    /// How the table is written
+    /// Format of the table
     #[arg(long, value_enum, default_value_t = Format::Text)]
     pub format: Format,
 }
@@ -337,26 +342,27 @@ pub struct Plot {
     /// Folder of the run
     #[arg(value_name = "DIR")]
     pub folder: PathBuf,
-    /// Horizontal axis: a parameter, `period`, `norm`, or a state or output with _max, _min, _mean, _rms or _integral behind its name [default: the free parameter]
+    /// Horizontal axis: a parameter, `period`, `norm`, or a state or output followed by _max, _min, _mean, _rms or _integral
+    /// [default: the free parameter]
     #[arg(long, value_name = "NAME")]
     pub x: Option<String>,
-    /// Vertical axis [default: the largest value of the first output]
+    /// Vertical axis, as for --x [default: the maximum of the first output]
     #[arg(long, value_name = "NAME")]
     pub y: Option<String>,
-    /// Draw the curves in two parameters, in their plane, instead of the branches
+    /// Draw the two-parameter curves in their plane instead of the branches
     #[arg(long)]
     pub curves: bool,
-    /// Part of the diagram to show
+    /// Limits of the axes
     #[arg(long, value_name = "x0,x1,y0,y1", allow_hyphen_values = true)]
     pub window: Option<String>,
-    /// Title above the axes
+    /// Title of the picture
     #[arg(long, value_name = "TEXT")]
     pub title: Option<String>,
-    /// Show a parameter, state, output or `period` in another unit, or a frequency in orders of a speed, as in omega=orders:Omega; may be
-    /// given several times
+    /// Show a parameter, state, output or `period` in another unit, or a frequency in orders of a speed, as in
+    /// omega=orders:Omega; can be repeated
     #[arg(long, value_name = "NAME=UNIT")]
     pub unit: Vec<String>,
-    /// Picture to write; the ending says which kind
+    /// Picture to write; the file extension sets the format
     #[arg(short, long = "output", value_name = "FILE.svg|png|pdf")]
     pub output: PathBuf,
 }
@@ -366,49 +372,49 @@ pub struct Export {
     /// Folder of the run
     #[arg(value_name = "DIR")]
     pub folder: PathBuf,
-    /// What is written
+    /// Format
     #[arg(long, value_enum)]
     pub format: ExportFormat,
     /// Folder for the tables, or NetCDF file [default: DIR/csv, DIR/parquet, DIR/run.nc]
     #[arg(long, value_name = "PATH")]
     pub out: Option<PathBuf>,
-    /// Only this branch, or the legs of this homotopy; may be given several times [default: everything]
+    /// Only this branch, or the legs of this homotopy; can be repeated [default: everything]
     #[arg(long, value_name = "NAME")]
     pub branch: Vec<String>,
-    /// Leave out the profiles of cycles, which make up nearly all of a run
+    /// Leave out the profiles of cycles, which are nearly all of the data
     #[arg(long)]
     pub no_profiles: bool,
-    /// Show a parameter, state, output or `period` in another unit, or a frequency in orders of a speed, as in omega=orders:Omega; may be
-    /// given several times
+    /// Show a parameter, state, output or `period` in another unit, or a frequency in orders of a speed, as in
+    /// omega=orders:Omega; can be repeated
     #[arg(long, value_name = "NAME=UNIT")]
     pub unit: Vec<String>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum ExportFormat {
-    /// A folder of tables with comma-separated values, every digit
+    /// Folder of tables with comma-separated values, full precision
     Csv,
-    /// The same tables as Parquet files
+    /// Folder of tables as Parquet files
     Parquet,
-    /// One NetCDF-4 file with a group for each branch
+    /// One NetCDF-4 file with a group per branch
     Netcdf,
 }
 
 #[derive(Debug, Args)]
 pub struct ImportAuto {
-    /// Files s.NAME of AUTO; b.NAME and c.NAME beside or among them tell the names of states and parameters
+    /// AUTO files s.NAME; b.NAME and c.NAME, given or in the same folder, supply the names of states and parameters
     #[arg(value_name = "FILE", required = true)]
     pub files: Vec<PathBuf>,
-    /// Model of the same equations; without it the solutions are listed
+    /// Model with the same equations; without it, the solutions are only listed
     #[arg(long, value_name = "MODEL.toml")]
     pub model: Option<PathBuf>,
-    /// Only the solution with this label; may be given several times [default: all of them]
+    /// Only the solution with this label; can be repeated [default: all]
     #[arg(long, value_name = "N", allow_negative_numbers = true)]
     pub label: Vec<i64>,
-    /// Which parameters of AUTO are which of the model's, where their names do not say it
+    /// Names of AUTO's parameters in the model, where the files do not give them
     #[arg(long, value_name = "1=NAME,...", value_delimiter = ',')]
     pub parameters: Vec<String>,
-    /// Which states of AUTO are which of the model's, where neither their names nor their order say it
+    /// Names of AUTO's states in the model, where neither the files nor the order gives them
     #[arg(long, value_name = "1=NAME,...", value_delimiter = ',')]
     pub states: Vec<String>,
     /// Study to write [default: NAME.toml, for the first s.NAME]
@@ -421,13 +427,13 @@ pub struct Attractors {
     /// Model file
     #[arg(value_name = "MODEL.toml")]
     pub model: PathBuf,
-    /// Change a parameter
+    /// Set a parameter; can be repeated
     #[arg(long = "set", value_name = "NAME=VALUE")]
     pub set: Vec<String>,
-    /// How many initial states
+    /// Number of initial states
     #[arg(long, value_name = "N", default_value_t = 128, value_parser = clap::value_parser!(u32).range(1..))]
     pub samples: u32,
-    /// Seed of the random numbers; the same seed gives the same table
+    /// Random seed; the same seed gives the same table
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
 }
@@ -441,16 +447,16 @@ pub struct Check {
 
 #[derive(Debug, Args)]
 pub struct Reproduce {
-    /// Which publication
+    /// Name of the publication
     #[arg(value_name = "PUBLICATION")]
     pub publication: String,
-    /// Only this figure; may be given several times [default: all of them]
+    /// Only this figure; can be repeated [default: all]
     #[arg(long, value_name = "N")]
     pub figure: Vec<String>,
-    /// Folder for the runs, the figures and the report [default: reproduced/PUBLICATION]
+    /// Folder for runs, figures and report [default: reproduced/PUBLICATION]
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
-    /// How many branches are followed at a time [default: number of processors]
+    /// Number of branches followed in parallel [default: number of processors]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
     pub jobs: Option<u16>,
 }

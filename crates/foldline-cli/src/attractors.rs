@@ -2,6 +2,7 @@
 
 use crate::arguments::Attractors as Typed;
 use crate::failure::{Failure, Outcome};
+use crate::progress::SignOfLife;
 use crate::run::processors;
 use crate::values::parameters;
 use foldline::attractors::{Attractor, Sampling, Sense, whirl_sense};
@@ -23,6 +24,7 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
     if let Some(found) = never_finite(&model, &parameters, &text, &typed.model.display().to_string()) {
         return Err(vec![found].into());
     }
+    let working = SignOfLife::of("sampling");
     let census = attractors(
         &System::of(&model, &parameters),
         &parameters,
@@ -31,26 +33,31 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
         processors(),
         TOLERANCE,
     );
+    drop(working);
 
     let mut out = stdout().lock();
     let names = model.states.iter().map(|s| &s.name).chain(model.outputs.iter().map(|o| &o.name));
-    let heads: String = names.map(|name| format!("  {:>24}", format!("{name} from … to"))).collect();
+    let heads: String = names.map(|name| format!("  {:>24}", format!("{name} min … max"))).collect();
     writeln!(out, "{:<14} {:>6} {:>6} {:>20} {:>14}{heads}", "attractor", "ratio", "hits", "share", "period")?;
     for attractor in &census.attractors {
         writeln!(out, "{}", line(attractor, &model))?;
     }
     let samples = typed.samples;
-    let stuck = if census.stuck > 0 { format!(", {} stuck", census.stuck) } else { String::new() };
+    let stuck = if census.stuck > 0 {
+        format!(", {} stopped because the step size became too small", census.stuck)
+    } else {
+        String::new()
+    };
     let exits = match &census.exits[..] {
         [] => String::new(),
-        exits => format!(", {} left the region in which f is defined", exits.len()),
+        exits => format!(", {} left the region where the vector field is defined", exits.len()),
     };
-    writeln!(out, "{samples} samples, {} escaped{exits}{stuck}, {} not settled", census.escaped, census.unsettled)?;
+    writeln!(out, "{samples} samples: {} escaped{exits}{stuck}, {} not settled", census.escaped, census.unsettled)?;
     let uniform = (0..samples as usize).filter(|number| Sampling::is_uniform(*number)).count();
     writeln!(
         out,
-        "share: of the {uniform} samples drawn uniformly from the ranges of the states, with its 95 % confidence interval; the other {} \
-         are drawn towards the origin and count only as hits",
+        "share: fraction of the {uniform} samples drawn uniformly from the ranges of the states, with its 95 % \
+         confidence interval; the other {} samples are drawn towards the origin and count only as hits",
         samples as usize - uniform
     )?;
     Ok(Outcome::Done)

@@ -37,7 +37,7 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
         remarks(&model)?;
         described(&model)
     };
-    writeln!(stdout(), "{} is right: {verdict}", file.display())?;
+    writeln!(stdout(), "{} is valid: {verdict}", file.display())?;
     Ok(Outcome::Done)
 }
 
@@ -54,7 +54,7 @@ fn remarks(model: &Model) -> std::io::Result<()> {
         return Ok(());
     }
     let names: Vec<String> = foreign.into_iter().map(|name| format!("`{name}`")).collect();
-    writeln!(out, "note: units that are not known, each a unit of its own: {}", names.join(", "))
+    writeln!(out, "note: unknown units, each treated as a unit of its own: {}", names.join(", "))
 }
 
 fn described(model: &Model) -> String {

@@ -6,6 +6,7 @@ use crate::arguments::Explore as Typed;
 use crate::failure::{Failure, Outcome};
 use crate::run::{Way, carried_out, limited, processors};
 use crate::values::{measured, parameter, valued};
+use foldline::diagram::Shown;
 use foldline::model::Model;
 use foldline_store::model_file::read_model;
 use foldline_store::study_file::parse_study;
@@ -20,7 +21,7 @@ pub fn diagram(typed: &Typed) -> Result<Outcome, Failure> {
     let study = parse_study(&text, "explore.toml", &model_text, &typed.model.display().to_string())?;
     let study = limited(study, &typed.limits)?;
     if typed.print {
-        write!(stdout().lock(), "# `model` is relative to the folder in which this study lies.\n{}", study.text)?;
+        write!(stdout().lock(), "# The path of `model` is relative to the folder of this study.\n{}", study.text)?;
         return Ok(Outcome::Done);
     }
     let stem = typed.model.file_stem().unwrap_or("model".as_ref());
@@ -36,33 +37,40 @@ fn study(typed: &Typed, model: &Model) -> Result<String, Failure> {
     let connect = typed.connect.as_ref().map(|text| ranged("--connect", text, model)).transpose()?;
     if !(1e-10..=1e-4).contains(&typed.tolerance) {
         return Err(Failure::typed(
-            format!("--tolerance {}: it is out of bounds", typed.tolerance),
-            "a number from 1e-10 to 1e-4",
+            format!("--tolerance {}: out of range", typed.tolerance),
+            "give a number from 1e-10 to 1e-4",
         ));
     }
     let mut set: Vec<(String, f64)> = Vec::new();
     for text in &typed.set {
         let (name, value) = valued(text, model)?;
         if name == free.0 {
-            let message = format!("--set {text}: that is the parameter of --free, which varies");
-            return Err(Failure::typed(message, "leave it out"));
+            let message = format!("--set {text}: this is the free parameter, whose range is given by --free");
+            return Err(Failure::typed(message, "remove this --set"));
         }
         // The last one counts.
         set.retain(|(other, _)| *other != name);
         set.push((name, value));
     }
     if let Some((name, _)) = connect.as_ref().filter(|(name, _)| *name == free.0) {
-        let message = format!("--connect {name}: that is the parameter of --free");
-        return Err(Failure::typed(message, "name a second parameter, in which folds are followed"));
+        let message = format!("--connect {name}: this is already the parameter of --free");
+        return Err(Failure::typed(message, "name a second parameter, in which folds are continued"));
     }
     if let Some((name, [low, high])) = &connect {
         let given = set.iter().find(|(other, _)| other == name).map(|(_, value)| *value);
         let own = model.parameter_index(name).map(|index| model.parameters[index].value);
         let own = given.or(own).unwrap_or(*low);
         if !(*low..=*high).contains(&own) {
-            let message =
-                format!("--connect {name}={low}:{high}: the diagram is at {name} = {own}, outside this range");
-            return Err(Failure::typed(message, format!("a range that contains {own}, or another --set {name}=VALUE")));
+            let own = Shown(own);
+            let message = format!(
+                "--connect {name}={}:{}: the diagram is at {name} = {own}, outside this range",
+                Shown(*low),
+                Shown(*high)
+            );
+            return Err(Failure::typed(
+                message,
+                format!("give a range that contains {own}, or another --set {name}=VALUE"),
+            ));
         }
     }
     let quoted = |text: &str| serde_json::Value::from(text).to_string();
@@ -95,14 +103,14 @@ fn study(typed: &Typed, model: &Model) -> Result<String, Failure> {
 fn ranged(option: &str, typed: &str, model: &Model) -> Result<(String, [f64; 2]), Failure> {
     let said = |message: &str, cure: &str| Failure::typed(format!("{option} {typed}: {message}"), cure);
     let example = format!("write {option} NAME=LOW:HIGH, for example {option} Omega=0.5:12");
-    let (name, ends) = typed.split_once('=').ok_or_else(|| said("there is no `=`", &example))?;
-    let (low, high) = ends.split_once(':').ok_or_else(|| said("there is no `:` between two values", &example))?;
+    let (name, ends) = typed.split_once('=').ok_or_else(|| said("`=` is missing", &example))?;
+    let (low, high) = ends.split_once(':').ok_or_else(|| said("`:` is missing between two values", &example))?;
     let index = parameter(name.trim(), model).map_err(|(message, cure)| said(&message, &cure))?;
     let own = &model.parameters[index];
     let [low, high] = [low, high].map(|end| measured(end, &own.unit));
     match (low, high) {
         (Some(low), Some(high)) if low < high => Ok((own.name.clone(), [low, high])),
         (Some(_), Some(_)) => Err(said("the first value is not smaller than the second", &example)),
-        _ => Err(said("an end is not a finite number, nor a quantity in a unit of the parameter", &example)),
+        _ => Err(said("an end is neither a finite number nor a quantity in a unit of the parameter", &example)),
     }
 }

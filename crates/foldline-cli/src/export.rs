@@ -3,8 +3,8 @@
 use crate::arguments::{Export as Typed, ExportFormat};
 use crate::failure::{Failure, Outcome};
 use crate::table::{asked_for, conversion};
+use crate::verbosity::report;
 use foldline_store::export::{Export, ExportError, Format};
-use std::io::{Write, stderr};
 
 /// Writes a run in another format and says where.
 pub fn write(typed: &Typed) -> Result<Outcome, Failure> {
@@ -33,7 +33,7 @@ pub fn write(typed: &Typed) -> Result<Outcome, Failure> {
         return Err(Failure::typed(message, "name a folder; each table becomes a file in it"));
     }
     for file in export.write(format, &out)? {
-        writeln!(stderr(), "written: {}", file.display())?;
+        report(format_args!("wrote {}", file.display()))?;
     }
     Ok(Outcome::Done)
 }

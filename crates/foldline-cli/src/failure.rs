@@ -74,7 +74,7 @@ impl From<std::io::Error> for Failure {
     fn from(error: std::io::Error) -> Failure {
         match error.kind() {
             ErrorKind::BrokenPipe => Failure::NoReader,
-            _ => Failure::Outside(format!("the output cannot be written: {error}")),
+            _ => Failure::Outside(format!("cannot write the output: {error}")),
         }
     }
 }

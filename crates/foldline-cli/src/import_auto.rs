@@ -3,10 +3,11 @@
 use crate::arguments::{Format, ImportAuto as Typed};
 use crate::failure::{Failure, Outcome};
 use crate::table::{Cell, Column, Style, Table, write as write_table};
+use crate::verbosity::report;
 use foldline_store::auto::{Chosen, Complaint, Labelled, Mapping, Names, read_solutions, study};
 use foldline_store::model_file::read_model;
 use foldline_store::study_file::parse_study;
-use std::io::{Write, stderr, stdout};
+use std::io::stdout;
 use std::path::{Path, PathBuf};
 
 /// A file of solutions, and what the files beside it tell.
@@ -36,14 +37,14 @@ fn sources(files: &[PathBuf]) -> Result<Vec<Source>, Failure> {
         files.iter().partition(|file| begins(file, &["b.", "c.", "fort.7", "fort.2"]));
     if solved.is_empty() {
         return Err(Failure::typed(
-            "no file of solutions was given",
-            "give s.NAME, or fort.8; b.NAME and c.NAME only tell names",
+            "no solution file was given",
+            "give s.NAME or fort.8; b.NAME and c.NAME supply only names",
         ));
     }
     let mut given = Names::default();
     for file in named {
         let text = std::fs::read_to_string(file).map_err(|error| {
-            Failure::typed(format!("{} cannot be read: {error}", file.display()), "check the spelling of the path")
+            Failure::typed(format!("cannot read {}: {error}", file.display()), "check the spelling of the path")
         })?;
         given = given.or(Names::of(&text));
     }
@@ -128,25 +129,22 @@ fn written(typed: &Typed, model_path: &Path, chosen: &[(&Source, &Labelled)]) ->
     }
     let output = typed.output.clone().unwrap_or_else(|| PathBuf::from(format!("{}.toml", stem(&files[0]))));
     if output.exists() && typed.output.is_none() {
-        let message = format!("{} exists already", output.display());
-        return Err(Failure::typed(message, "name the study with `--output`, which is then replaced"));
+        let message = format!("{} already exists", output.display());
+        return Err(Failure::typed(
+            message,
+            "give the name of the study with `--output`; an existing file of that \
+                                            name is overwritten",
+        ));
     }
     let text = study(&model, &named_from(&output, model_path)?, &all)?;
     // What is written can be read, or something is wrong that the user should see now.
     parse_study(&text, &output.display().to_string(), &model_text, &model_path.display().to_string())?;
     std::fs::write(&output, text).map_err(|error| {
-        Failure::typed(
-            format!("{} cannot be written: {error}", output.display()),
-            "a file in a folder you may write to",
-        )
+        Failure::typed(format!("cannot write {}: {error}", output.display()), "choose a file in a writable folder")
     })?;
-    writeln!(
-        stderr(),
-        "written: {} with {}",
-        output.display(),
-        if all.len() == 1 { "1 seed".into() } else { format!("{} seeds", all.len()) }
-    )?;
-    writeln!(stderr(), "next: foldline run {}", output.display())?;
+    let seeds = if all.len() == 1 { "1 seed".into() } else { format!("{} seeds", all.len()) };
+    report(format_args!("wrote {} with {seeds}", output.display()))?;
+    report(format_args!("next: foldline run {}", output.display()))?;
     Ok(Outcome::Done)
 }
 
@@ -169,8 +167,8 @@ fn assignments(option: &str, typed: &[String]) -> Result<Vec<(usize, String)>, F
         Some((number.trim().parse().ok().filter(|n| *n > 0)?, name.trim().to_string()))
     };
     let pairs = typed.iter().map(|text| {
-        let cure = format!("AUTO's number, `=` and the name in the model, as in --{option} 1=mu,2=nu");
-        one(text).ok_or_else(|| Failure::typed(format!("--{option} {text}: this is no pair"), cure))
+        let cure = format!("give AUTO's number, `=` and the name in the model, as in --{option} 1=mu,2=nu");
+        one(text).ok_or_else(|| Failure::typed(format!("--{option} {text}: not a pair NUMBER=NAME"), cure))
     });
     pairs.collect()
 }

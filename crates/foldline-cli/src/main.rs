@@ -15,6 +15,7 @@ mod run;
 mod simulate;
 mod table;
 mod values;
+mod verbosity;
 mod verify;
 
 use arguments::{Arguments, Command};
@@ -35,6 +36,7 @@ fn main() -> ExitCode {
 }
 
 fn answer(arguments: Arguments) -> Result<Outcome, Failure> {
+    verbosity::choose(arguments.quiet, arguments.verbose);
     match arguments.command {
         None => run::reference_study_or_help(),
         Some(Command::Run(typed)) => run::study(&typed),

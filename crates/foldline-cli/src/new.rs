@@ -45,7 +45,7 @@ const TEMPLATES: [Template; 4] = [
     ),
     template!(
         "neuron",
-        "a Morris-Lecar neuron: rest, firing, and where it begins in two parameters",
+        "a Morris-Lecar neuron: rest, firing, and the onset of firing in two parameters",
         "-o firing.png --y V_max"
     ),
     template!("chain", "a driven chain of masses: repetition, resonances", "-o chain.png --y tip_max"),
@@ -62,11 +62,11 @@ pub fn write(typed: &Typed) -> Result<Outcome, Failure> {
 
 fn list() -> Result<Outcome, Failure> {
     let mut out = stdout().lock();
-    writeln!(out, "templates, for `foldline new TEMPLATE`:")?;
+    writeln!(out, "templates for `foldline new TEMPLATE`:")?;
     for own in &TEMPLATES {
         writeln!(out, "  {:<11} {}", own.name, own.about)?;
     }
-    writeln!(out, "`foldline new --study MODEL.toml` writes a study for a model that you have")?;
+    writeln!(out, "`foldline new --study MODEL.toml` writes a study for an existing model")?;
     Ok(Outcome::Done)
 }
 
@@ -79,7 +79,7 @@ fn template(name: &str, folder: Option<&Path>) -> Result<Outcome, Failure> {
     let files = [("model.toml", own.model), ("study.toml", own.study)].map(|(file, text)| (folder.join(file), text));
     create(&files)?;
     let mut out = stdout().lock();
-    writeln!(out, "written: {}, {}", files[0].0.display(), files[1].0.display())?;
+    writeln!(out, "wrote {} and {}", files[0].0.display(), files[1].0.display())?;
     let at = if folder == Path::new(".") { String::new() } else { format!("cd {}\n  ", folder.display()) };
     writeln!(out, "next:\n  {at}foldline run study.toml\n  foldline plot runs/study {}", own.plot)?;
     Ok(Outcome::Done)
@@ -98,10 +98,10 @@ fn study_of(file: &Path, folder: Option<&Path>) -> Result<Outcome, Failure> {
     let text = study_text(&model, &named)?;
     create(&[(target.clone(), &text)])?;
     let mut out = stdout().lock();
-    writeln!(out, "written: {}", target.display())?;
+    writeln!(out, "wrote {}", target.display())?;
     writeln!(
         out,
-        "next: adapt the range, then\n  foldline run {}\n  foldline plot runs/study -o diagram.png",
+        "next: adjust the range, then\n  foldline run {}\n  foldline plot runs/study -o diagram.png",
         target.display()
     )?;
     Ok(Outcome::Done)
@@ -110,8 +110,8 @@ fn study_of(file: &Path, folder: Option<&Path>) -> Result<Outcome, Failure> {
 /// A study with one branch in the first parameter.
 fn study_text(model: &Model, file: &Path) -> Result<String, Failure> {
     let Some(free) = model.parameters.first() else {
-        let message = "the model has no parameter that a branch could vary";
-        return Err(Failure::typed(message, "give it one, as in `[parameters]` with `mu = 1`"));
+        let message = "the model has no parameter in which to follow a branch";
+        return Err(Failure::typed(message, "add one, such as `mu = 1` under `[parameters]`"));
     };
     let quoted = |text: &str| serde_json::Value::from(text).to_string();
     let around = |value: f64| match value {
@@ -121,33 +121,33 @@ fn study_text(model: &Model, file: &Path) -> Result<String, Failure> {
     };
     let [low, high] = around(free.value);
     let (attractor, switch, found) = match model.forced() {
-        true => ("cycle", "period-doubling = 1", "the cycle that the motion settles to"),
-        false => ("equilibrium", "hopf = 1", "the equilibrium that the motion settles to"),
+        true => ("cycle", "period-doubling = 1", "the cycle that trajectories reach"),
+        false => ("equilibrium", "hopf = 1", "the equilibrium that trajectories reach"),
     };
     let (model, free) = (quoted(&file.display().to_string()), quoted(&free.name));
     Ok(format!(
-        "# What to compute; the keys are described in docs/book/study-files.md.\n\nmodel = {model}\n\n\
-         # A first solution: {found} at the values of the model.\n\
-         [[seed]]\nname = \"first\"\nattractor = \"{attractor}\"\n\n\
-         # It is followed over a parameter, stable and unstable, and so is what branches off.\n\
-         [[branch]]\nname = \"main\"\nfrom = \"first\"\nfree = {free}\nrange = [{low:?}, {high:?}]\nswitch = {{ {switch} }}\n"
+        "# What to compute; the keys are described in docs/book/study-files.md.\n\nmodel = {model}\n\n# A first \
+         solution: {found} at the values of the model.\n[[seed]]\nname = \"first\"\nattractor = \"{attractor}\"\n\n# \
+         The solution is followed in a parameter, stable or not, and so are the branches that bifurcate from \
+         it.\n[[branch]]\nname = \"main\"\nfrom = \"first\"\nfree = {free}\nrange = [{low:?}, {high:?}]\nswitch = {{ \
+         {switch} }}\n"
     ))
 }
 
 /// Writes new files; refuses if one of them exists, before any is written.
 fn create(files: &[(PathBuf, &str)]) -> Result<(), Failure> {
     if let Some((file, _)) = files.iter().find(|(file, _)| file.exists()) {
-        let message = format!("{} exists, and is not overwritten", file.display());
+        let message = format!("{} already exists and is not overwritten", file.display());
         return Err(Failure::typed(message, "choose another folder with --out"));
     }
     for (file, text) in files {
         let refused = |error: std::io::Error| {
-            let cure = "a folder you may write to, with --out";
+            let cure = "choose a writable folder with --out";
             match error.kind() {
                 ErrorKind::PermissionDenied | ErrorKind::NotADirectory | ErrorKind::AlreadyExists => {
-                    Failure::typed(format!("{} cannot be written: {error}", file.display()), cure)
+                    Failure::typed(format!("cannot write {}: {error}", file.display()), cure)
                 }
-                _ => Failure::Outside(format!("{} cannot be written: {error}", file.display())),
+                _ => Failure::Outside(format!("cannot write {}: {error}", file.display())),
             }
         };
         if let Some(folder) = file.parent().filter(|folder| !folder.as_os_str().is_empty()) {

@@ -3,13 +3,13 @@
 use crate::arguments::Plot as Typed;
 use crate::failure::{Failure, Outcome};
 use crate::table::{Run, conversion, read};
+use crate::verbosity::report;
 use foldline::diagram::{Branch, Diagram};
 use foldline::model::Model;
 use foldline_plot::quantity::{default_x, default_y, label};
 use foldline_plot::responses::value;
 use foldline_plot::{Picture, Quantity, pdf, png, svg};
 use foldline_store::run_file::Part;
-use std::io::{Write, stderr};
 use std::path::Path;
 
 /// Pixels for each unit of the SVG.
@@ -50,7 +50,7 @@ fn undrawn(diagram: &Diagram, model: &Model, axes: [Quantity; 2]) -> std::io::Re
         let names: Vec<&str> = sets.map(|set| set.name.as_str()).collect();
         if !names.is_empty() {
             let (names, axis) = (names.join(", "), label(axis, model));
-            writeln!(stderr(), "note: not drawn, as simulation gives no value of \"{axis}\": {names}")?;
+            report(format_args!("note: not drawn, because simulations have no \"{axis}\": {names}"))?;
         }
     }
     Ok(())
@@ -71,11 +71,11 @@ fn shown(
     }
     let planes: Vec<[usize; 2]> = diagram.branches.iter().filter_map(Branch::plane).collect();
     let Some(first) = planes.first().copied() else {
-        return Err(Failure::typed("--curves: the run has no curve in two parameters", "leave --curves out"));
+        return Err(Failure::typed("--curves: the run has no two-parameter curves", "remove --curves"));
     };
     if axes.iter().any(Option::is_none) && planes.iter().any(|plane| *plane != first) {
-        let cure = "say with --x and --y which ones to draw";
-        return Err(Failure::typed("--curves: the curves of the run do not have the same two parameters", cure));
+        let cure = "choose the plane to draw with --x and --y";
+        return Err(Failure::typed("--curves: the curves of the run lie in different parameter planes", cure));
     }
     diagram.branches.retain(|branch| branch.held.is_some());
     diagram.responses.clear();
@@ -97,28 +97,25 @@ pub fn picture(svg: &str, output: &Path) -> Result<(), Failure> {
         "png" => render(png(svg, SCALE))?,
         "pdf" => render(pdf(svg))?,
         _ => {
-            let message = format!("{}: this kind of picture is not known", output.display());
-            return Err(Failure::typed(message, "a file name that ends in .svg, .png or .pdf"));
+            let message = format!("{}: unknown picture format", output.display());
+            return Err(Failure::typed(message, "give a file name that ends in .svg, .png or .pdf"));
         }
     };
     std::fs::write(output, bytes).map_err(|error| {
-        Failure::typed(
-            format!("{} cannot be written: {error}", output.display()),
-            "a file in a folder you may write to",
-        )
+        Failure::typed(format!("cannot write {}: {error}", output.display()), "choose a file in a writable folder")
     })
 }
 
 fn window(text: &str) -> Result<[f64; 4], Failure> {
-    let cure = "four numbers such as --window 0.5,12,0,10: x from 0.5 to 12, y from 0 to 10";
+    let cure = "give four numbers such as --window 0.5,12,0,10: x from 0.5 to 12, y from 0 to 10";
     let numbers: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse::<f64>()).collect();
     match numbers.as_deref() {
         Ok([x0, x1, y0, y1]) if [x0, x1, y0, y1].iter().all(|v| v.is_finite()) => {
             if x0 >= x1 || y0 >= y1 {
-                return Err(Failure::typed(format!("--window {text}: the wrong way round, or empty"), cure));
+                return Err(Failure::typed(format!("--window {text}: a range is empty or the wrong way round"), cure));
             }
             Ok([*x0, *x1, *y0, *y1])
         }
-        _ => Err(Failure::typed(format!("--window {text}: this is not a window"), cure)),
+        _ => Err(Failure::typed(format!("--window {text}: not four numbers"), cure)),
     }
 }

@@ -1,16 +1,19 @@
 //! What is seen while a run goes on.
 
+use crate::verbosity::{Verbosity, report, verbosity};
 use foldline::contract::Event;
-use foldline::diagram::{Branch, Ending, Point, Responses, Shown};
+use foldline::diagram::{Branch, Ending, Point, Responses, Shown, SpecialPoint};
 use foldline::model::Model;
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use std::collections::HashMap;
-use std::io::{IsTerminal, Write, stderr};
-use std::sync::{Mutex, PoisonError};
+use std::io::{IsTerminal, stderr};
+use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 /// Progress on standard error: on a terminal, one live line per branch in progress; otherwise one line per completed branch, and a reminder
-/// of those in progress after a period of silence.
+/// of those in progress after a period of silence. A quiet command shows nothing.
 pub struct Progress {
     lines: MultiProgress,
     terminal: bool,
@@ -42,7 +45,7 @@ impl Live {
 
     fn still(&self, name: &str) -> String {
         let seconds = self.since.elapsed().as_secs();
-        let since = if seconds > 1 { format!("   nothing new for {seconds} s") } else { String::new() };
+        let since = if seconds > 1 { format!(", no new point for {seconds} s") } else { String::new() };
         format!("still at {name}: {}{since}", self.place.trim())
     }
 }
@@ -50,9 +53,8 @@ impl Live {
 impl Progress {
     pub fn new(model: &Model) -> Progress {
         let terminal = stderr().is_terminal();
-        let target = if terminal { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
         Progress {
-            lines: MultiProgress::with_draw_target(target),
+            lines: MultiProgress::with_draw_target(target(terminal)),
             terminal,
             parameters: model.parameters.iter().map(|p| p.name.clone()).collect(),
             live: Mutex::new(HashMap::new()),
@@ -67,12 +69,25 @@ impl Progress {
                 live.points += 1;
                 live.moved(self.place(branch, point, live));
             }),
-            Event::Special(branch, _) => self.with(branch, |live| live.special += 1),
+            Event::Special(branch, special) => {
+                self.with(branch, |live| live.special += 1);
+                self.special(branch, special);
+            }
             Event::SideEnded(branch, _, ending) => self.with(branch, |live| live.ends.push(ending.clone())),
             Event::End(branch) => self.end(branch),
             Event::Note(branch, note) | Event::Short(branch, note) => self.say(&format!("{branch}: {note}")),
             Event::Visited(name, value, done, of) => self.visited(name, value, done, of),
             Event::Responses(set) => self.responses(set),
+        }
+    }
+
+    /// A verbose command reports every special point.
+    fn special(&self, branch: &Branch, special: &SpecialPoint) {
+        if verbosity() == Verbosity::Verbose {
+            let form = special.normal_form();
+            let form = if form.is_empty() { form } else { format!(", {form}") };
+            let at = self.parameters_at(branch, &special.point).join(", ");
+            self.say(&format!("{}: {} at {at}{form}", branch.name, special.kind));
         }
     }
 
@@ -87,7 +102,7 @@ impl Progress {
             bar.set_style(style);
         }
         bar.set_prefix(name.to_string());
-        Live { bar, points, special, ends: Vec::new(), place: "at its start".into(), since: Instant::now() }
+        Live { bar, points, special, ends: Vec::new(), place: "starting".into(), since: Instant::now() }
     }
 
     /// The live line of a survey or sweep begins at its first value.
@@ -101,7 +116,7 @@ impl Progress {
         if let Some(live) = self.live.lock().unwrap_or_else(PoisonError::into_inner).remove(&set.name) {
             live.bar.finish_and_clear();
         }
-        self.say(&format!("{:<28} {:>5} motions met by the {}", set.name, set.responses.len(), set.search.name()));
+        self.say(&format!("{:<28} {:>5} responses from the {}", set.name, set.responses.len(), set.search.name()));
     }
 
     fn with(&self, branch: &Branch, change: impl FnOnce(&mut Live)) {
@@ -111,22 +126,36 @@ impl Progress {
     }
 
     fn place(&self, branch: &Branch, point: &Point, live: &Live) -> String {
+        let at: Vec<String> = self.parameters_at(branch, point).into_iter().map(|text| format!("{text:<18}")).collect();
+        let special = if live.special > 0 { format!(", {} special", live.special) } else { String::new() };
+        format!("{:>5} points{special}   {} step size {:.1e}", live.points, at.join(" "), point.step)
+    }
+
+    /// Each parameter that varies along a branch, with its value at a point.
+    fn parameters_at(&self, branch: &Branch, point: &Point) -> Vec<String> {
         let at = |index: usize| {
             let name = self.parameters.get(index).map_or("", String::as_str);
-            format!("{name} = {:<10.6}", point.parameters.get(index).copied().unwrap_or(f64::NAN))
+            format!("{name} = {:.6}", Shown(point.parameters.get(index).copied().unwrap_or(f64::NAN)))
         };
-        let places: Vec<String> =
-            [Some(branch.free), branch.held.map(|(_, follows)| follows)].into_iter().flatten().map(at).collect();
-        let special = if live.special > 0 { format!(", {} special", live.special) } else { String::new() };
-        format!("{:>5} points{special}   {} step {:.1e}", live.points, places.join(" "), point.step)
+        [Some(branch.free), branch.held.map(|(_, follows)| follows)].into_iter().flatten().map(at).collect()
     }
 
     fn end(&self, branch: &Branch) {
         let live = self.live.lock().unwrap_or_else(PoisonError::into_inner).remove(&branch.name);
         let Some(live) = live else { return };
         live.bar.finish_and_clear();
-        let mut ends: Vec<String> = live.ends.iter().map(Ending::brief).collect();
+        // A side that ended in an earlier run is not told of again.
+        let known: Vec<&Ending> = branch.ends.iter().flatten().collect();
+        let known = if known.is_empty() { live.ends.iter().collect() } else { known };
+        let text = |end: &&Ending| match verbosity() {
+            Verbosity::Verbose => end.to_string().replace('\n', "\n  "),
+            Verbosity::Normal | Verbosity::Quiet => end.brief(),
+        };
+        let mut ends: Vec<String> = known.iter().map(text).collect();
         ends.dedup();
+        if ends.is_empty() {
+            ends.push("unfinished".into());
+        }
         self.say(&format!(
             "{:<28} {:>5} points, {} special: {}",
             branch.name,
@@ -149,7 +178,7 @@ impl Progress {
             lines
         };
         match lines.is_empty() {
-            true => self.say("still looking for first solutions"),
+            true => self.say("searching for starting solutions"),
             false => lines.iter().for_each(|line| self.say(line)),
         }
     }
@@ -164,6 +193,79 @@ impl Progress {
     fn say(&self, line: &str) {
         *self.said.lock().unwrap_or_else(PoisonError::into_inner) = Instant::now();
         // Progress that cannot be shown is no reason to stop computing.
-        let _ = if self.terminal { self.lines.println(line) } else { writeln!(stderr(), "{line}") };
+        let _ = if self.terminal { self.lines.println(line) } else { report(line) };
+    }
+}
+
+/// Where live lines are drawn: on a terminal, unless the command is quiet.
+fn target(terminal: bool) -> ProgressDrawTarget {
+    match terminal && verbosity() != Verbosity::Quiet {
+        true => ProgressDrawTarget::stderr(),
+        false => ProgressDrawTarget::hidden(),
+    }
+}
+
+/// Sign of life of a command that reports little: a live line on a terminal, otherwise a line after a period of silence. Ends when
+/// dropped.
+pub struct SignOfLife {
+    bar: ProgressBar,
+    terminal: bool,
+    /// Time of the last line.
+    said: Arc<Mutex<Instant>>,
+    /// Dropped to end the thread.
+    ended: Option<Sender<()>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl SignOfLife {
+    /// Interval between looks at the clock: short against the silence allowed.
+    const TICK: Duration = Duration::from_millis(500);
+
+    /// Begins to report what is being done, such as `verifying`.
+    pub fn of(what: &str) -> SignOfLife {
+        let terminal = stderr().is_terminal();
+        let bar = ProgressBar::with_draw_target(None, target(terminal));
+        if let Ok(style) = ProgressStyle::with_template("{spinner} {msg} {elapsed}") {
+            bar.set_style(style);
+        }
+        bar.set_message(what.to_string());
+        let start = Instant::now();
+        let said = Arc::new(Mutex::new(start));
+        let mut own = SignOfLife { bar, terminal, said: Arc::clone(&said), ended: None, thread: None };
+        if terminal {
+            own.bar.enable_steady_tick(SignOfLife::TICK);
+            return own;
+        }
+        let (ended, over) = channel();
+        let what = what.to_string();
+        own.ended = Some(ended);
+        own.thread = Some(std::thread::spawn(move || {
+            while over.recv_timeout(SignOfLife::TICK) == Err(RecvTimeoutError::Timeout) {
+                let mut said = said.lock().unwrap_or_else(PoisonError::into_inner);
+                if said.elapsed() >= SILENCE {
+                    *said = Instant::now();
+                    // Progress that cannot be shown is no reason to stop computing.
+                    let _ = report(format_args!("{what}: {} s so far", start.elapsed().as_secs()));
+                }
+            }
+        }));
+        own
+    }
+
+    /// A line that stays.
+    pub fn say(&self, line: &str) {
+        *self.said.lock().unwrap_or_else(PoisonError::into_inner) = Instant::now();
+        // Progress that cannot be shown is no reason to stop computing.
+        let _ = if self.terminal { self.bar.suspend(|| report(line)) } else { report(line) };
+    }
+}
+
+impl Drop for SignOfLife {
+    fn drop(&mut self) {
+        self.bar.finish_and_clear();
+        drop(self.ended.take());
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
     }
 }

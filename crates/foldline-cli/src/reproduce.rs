@@ -2,7 +2,9 @@
 
 use crate::arguments::Reproduce as Typed;
 use crate::failure::{Failure, Outcome};
+use crate::progress::SignOfLife;
 use crate::run::{processors, stop_on_interrupt};
+use crate::verbosity::report;
 use foldline_reproduce::{FigurePlan, PUBLICATIONS, Publication, Request, reproduce};
 use std::io::{Write, stderr};
 use std::path::Path;
@@ -17,6 +19,7 @@ pub fn publication(typed: &Typed) -> Result<Outcome, Failure> {
         )
     })?;
     let stop = stop_on_interrupt();
+    let working = SignOfLife::of("computing");
     let request = Request {
         publication,
         figures: chosen(publication, &typed.figure)?,
@@ -24,18 +27,17 @@ pub fn publication(typed: &Typed) -> Result<Outcome, Failure> {
         jobs: typed.jobs.map_or_else(processors, usize::from),
         tolerance: None,
         stop: &stop,
-        // Progress that cannot be shown is no reason to stop computing.
-        say: &|line| {
-            let _ = writeln!(stderr(), "{line}");
-        },
+        say: &|line| working.say(line),
     };
     let made = reproduce(&request).map_err(|error| unwritable(&request.out, &error))?;
-    let mut err = stderr().lock();
-    made.failures.iter().try_for_each(|line| writeln!(err, "failed: {line}"))?;
+    drop(working);
+    made.failures.iter().try_for_each(|line| writeln!(stderr(), "failed: {line}"))?;
     if made.stopped {
-        writeln!(err, "stopped; the same command goes on")?;
+        writeln!(stderr(), "stopped; repeat the same command to continue")?;
+    } else {
+        report(format_args!("{}", made.summary()))?;
     }
-    writeln!(err, "{}\nreport: {}", made.summary(), made.report.display())?;
+    report(format_args!("report: {}", made.report.display()))?;
     Ok(if made.failures.is_empty() && !made.stopped { Outcome::Done } else { Outcome::Short })
 }
 
@@ -54,5 +56,5 @@ fn chosen(publication: &'static Publication, wanted: &[String]) -> Result<Vec<&'
 }
 
 fn unwritable(out: &Path, error: &std::io::Error) -> Failure {
-    Failure::typed(format!("{} cannot be written to: {error}", out.display()), "choose another folder with --out DIR")
+    Failure::typed(format!("cannot write to {}: {error}", out.display()), "choose another folder with --out DIR")
 }

@@ -5,6 +5,7 @@ use crate::failure::{Failure, Outcome};
 use crate::plot::draw;
 use crate::progress::Progress;
 use crate::table::{conversion, print_special, tell_short};
+use crate::verbosity::report;
 use clap::CommandFactory;
 use foldline::contract::{Event, Observer, Verdict};
 use foldline::diagram::{Branch, Diagram, Point};
@@ -58,7 +59,7 @@ pub struct Way<'w> {
 pub fn carried_out(study: &Study, way: &Way) -> Result<Outcome, Failure> {
     // Mistakes in what is to be shown are told before anything is computed.
     conversion(&study.model, way.units)?;
-    study.model.remarks.iter().try_for_each(|remark| writeln!(stderr(), "{remark}"))?;
+    study.model.remarks.iter().try_for_each(report)?;
     let (recorder, earlier) = match way.resume {
         true => Recorder::resume(way.folder, study)?,
         false => (Recorder::create(way.folder, study)?, Diagram::default()),
@@ -91,7 +92,7 @@ fn reference_study(file: &Path) -> Result<Outcome, Failure> {
     for name in ["diagram.svg", "diagram.png"] {
         let file = folder.join(name);
         draw(&diagram, &study.model, &picture, &file)?;
-        writeln!(stderr(), "picture: {}", file.display())?;
+        report(format_args!("picture: {}", file.display()))?;
     }
     Ok(outcome)
 }
@@ -120,16 +121,15 @@ fn run(study: &Study, recorder: Recorder, earlier: Diagram, way: &Way) -> Result
         None => print_special(&diagram, &study.model)?,
     }
     let whole = tell_short(&diagram, &study.plan, &study.model)?;
-    let mut err = stderr().lock();
     if !study.plan.homotopies.is_empty() {
-        writeln!(err, "routes: foldline table {} --notes", folder.display())?;
+        report(format_args!("routes of the homotopies: foldline table {} --notes", folder.display()))?;
     }
     let stopped = watch.stop.load(Ordering::Relaxed);
     let why = limit.filter(|_| clock.is_up()).map_or(String::new(), |limit| format!(" at the time limit of {limit:?}"));
     if stopped {
-        writeln!(err, "stopped{why}; go on with --resume --out {}", folder.display())?;
+        writeln!(stderr(), "stopped{why}; continue with --resume --out {}", folder.display())?;
     }
-    writeln!(err, "run: {}", folder.display())?;
+    report(format_args!("run: {}", folder.display()))?;
     Ok(if whole && !stopped { Outcome::Done } else { Outcome::Short })
 }
 
@@ -216,6 +216,8 @@ pub fn stop_on_interrupt() -> Arc<AtomicBool> {
         if asked.swap(true, Ordering::Relaxed) {
             std::process::exit(130);
         }
+        // An answer that cannot be shown is no reason to go on.
+        let _ = writeln!(stderr(), "stopping; press Ctrl-C again to quit at once");
     };
     // Without a handler Ctrl-C ends the program at once, and --resume goes on all the same.
     let _ = ctrlc::set_handler(handler);

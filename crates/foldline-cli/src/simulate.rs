@@ -6,6 +6,7 @@ use crate::plot::picture;
 use crate::run::stop_on_interrupt;
 use crate::table::{Cell, Column, Style, Table, write};
 use crate::values::{measured, parameters, states};
+use crate::verbosity::report;
 use foldline::contract::VectorField;
 use foldline::explore::course::{Course, Way, course};
 use foldline::model::Model;
@@ -68,7 +69,10 @@ fn start(typed: &Typed, model: &Model) -> Result<Vec<f64>, Failure> {
     let missing = given.iter().enumerate().filter(|(_, value)| value.is_none());
     let assumed: Vec<String> = missing.map(|(i, _)| format!("{}={}", model.states[i].name, within(i))).collect();
     if !assumed.is_empty() {
-        writeln!(stderr(), "note: initial values taken from the ranges of the states: --start {}", assumed.join(","))?;
+        report(format_args!(
+            "note: initial values chosen from the ranges of the states: --start {}",
+            assumed.join(",")
+        ))?;
     }
     Ok(given.into_iter().enumerate().map(|(i, value)| value.unwrap_or_else(|| within(i))).collect())
 }
@@ -80,13 +84,13 @@ fn end(typed: &Typed, model: &Model, parameters: &[f64]) -> Result<f64, Failure>
         (Some(text), _) => match measured(text, &model.time).filter(|t| *t > 0.0) {
             Some(time) => Ok(time),
             None => Err(Failure::typed(
-                format!("--time {text}: this is not a positive time"),
-                "a number in the units of the model, or one with a unit such as \"20 ms\"",
+                format!("--time {text}: not a positive time"),
+                "give a number in the time unit of the model, or one with a unit such as \"20 ms\"",
             )),
         },
         (None, Some(count)) if model.forced() => Ok(f64::from(count) * period()),
         (None, Some(_)) => Err(Failure::typed(
-            "--periods: the model has no forcing whose periods could be counted",
+            "--periods: the model has no forcing, so no forcing periods",
             "give the time, as in --time 100",
         )),
         (None, None) if model.forced() => Ok(PERIODS * period()),
@@ -101,15 +105,15 @@ fn times(typed: &Typed, model: &Model, parameters: &[f64], end: f64) -> Result<V
         Some("period") if model.forced() => model.time_unit(parameters),
         Some(text) => measured(text, &model.time).filter(|t| *t > 0.0).ok_or_else(|| {
             let cure =
-                "a positive number in the units of the model, or `period` for once in each period of the forcing";
-            Failure::typed(format!("--every {text}: this is not an interval of time"), cure)
+                "give a positive number in the time unit of the model, or `period` for one row per forcing period";
+            Failure::typed(format!("--every {text}: not a time interval"), cure)
         })?,
     };
     // Rounding must not lose the last time.
     let count = (end / every * (1.0 + 4.0 * f64::EPSILON)).floor();
     if count > MOST_ROWS {
-        let message = format!("{count:.0} rows were asked for, more than {MOST_ROWS:.0}");
-        return Err(Failure::typed(message, "a larger interval --every, or a shorter time"));
+        let message = format!("this makes {count:.0} rows; the limit is {MOST_ROWS:.0}");
+        return Err(Failure::typed(message, "give a larger interval with --every, or a shorter time"));
     }
     Ok((0..=count as usize).map(|k| (k as f64 * every).min(end)).collect())
 }
@@ -219,10 +223,11 @@ fn ended(course: &Course, end: f64, model: &Model) -> Result<Outcome, Failure> {
         Ending::Stopped => "it was stopped",
         Ending::Escaped => "a state grew without bound",
         Ending::Undefined => {
-            "f is not finite beyond this state: the trajectory leaves the region in which the equations are defined"
+            "f is not finite beyond this state: the trajectory leaves the region where the equations are defined"
         }
         Ending::StepTooSmall => {
-            "the step size fell below the resolution of the time: the equations jump where no switch is named, or are too stiff here"
+            "the step size became too small: the equations are discontinuous without a switching point, or too stiff \
+             here"
         }
         Ending::StepLimit => "the limit on the number of steps was reached (--max-steps)",
     };
@@ -230,6 +235,6 @@ fn ended(course: &Course, end: f64, model: &Model) -> Result<Outcome, Failure> {
     let from = course.states.len().saturating_sub(n);
     let state: Vec<String> =
         model.states.iter().zip(&course.states[from..]).map(|(s, v)| format!("{} = {v:.6}", s.name)).collect();
-    writeln!(stderr(), "ended short: {why}; last shown t = {last:.6} of {end:.6}, {}", state.join(", "))?;
+    writeln!(stderr(), "incomplete: {why}; last point t = {last:.6} of {end:.6}, {}", state.join(", "))?;
     Ok(Outcome::Short)
 }

@@ -46,15 +46,15 @@ fn assignment(option: &str, typed: &str, noun: &str, named: &[Named], model: &Mo
     let said = |message: &str, cure: &str| Failure::typed(format!("{option} {typed}: {message}"), cure);
     let example = named.first().map_or("x", |(name, _)| name);
     let example = format!("write {option} NAME=VALUE, for example {option} {example}=5");
-    let (name, value) = typed.split_once('=').ok_or_else(|| said("there is no `=`", &example))?;
+    let (name, value) = typed.split_once('=').ok_or_else(|| said("`=` is missing", &example))?;
     let (name, value) = (name.trim(), value.trim());
     let Some((_, unit)) = named.iter().find(|(own, _)| *own == name) else {
         let known: Vec<&str> = named.iter().map(|(name, _)| *name).collect();
         return Err(said(&format!("the model `{}` has no {noun} `{name}`", model.name), &suggest(name, &known)));
     };
     let unreadable = || {
-        let message = format!("`{value}` is not a finite number, nor a quantity in a unit of the {noun}");
-        said(&message, "a number such as 5, 0.25 or 1e-6, or one with a unit such as \"0.3 mm\"")
+        let message = format!("`{value}` is neither a finite number nor a quantity in a unit of the {noun}");
+        said(&message, "give a number such as 5, 0.25 or 1e-6, or one with a unit such as \"0.3 mm\"")
     };
     Ok((name.to_string(), measured(value, unit).ok_or_else(unreadable)?))
 }

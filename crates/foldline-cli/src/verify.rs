@@ -2,6 +2,7 @@
 
 use crate::arguments::{Format, Verify as Typed};
 use crate::failure::{Failure, Outcome};
+use crate::progress::SignOfLife;
 use crate::table::{self, Cell, Column, Style, Table};
 use foldline::explore::System;
 use foldline::verify::{Check, Quantity, Verified, verify};
@@ -14,7 +15,9 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
     let run = table::read(&typed.folder, Part::Everything)?;
     let kept = table::asked_for(&run.diagram, typed.branch.as_deref())?;
     let system = System::of_plan(&run.model, &run.plan);
+    let working = SignOfLife::of("verifying");
     let verified = verify(&system, &run.diagram, run.plan.tolerance, typed.sample, &kept);
+    drop(working);
     let mut out = std::io::BufWriter::new(stdout().lock());
     let worst: Vec<&Check> = verified.checks.iter().filter(|check| check.found != 0.0).take(typed.worst).collect();
     if !worst.is_empty() {
@@ -56,18 +59,23 @@ fn listed(checks: &[&Check]) -> Table {
     Table { columns, rows: checks.iter().map(row).collect() }
 }
 
+/// A number with its noun.
+fn counted(count: usize, noun: &str) -> String {
+    if count == 1 { format!("1 {noun}") } else { format!("{count} {noun}s") }
+}
+
 fn summary(verified: &Verified, wrong: usize, out: &mut impl Write) -> std::io::Result<()> {
     writeln!(
         out,
-        "{} points and {} special points computed again: {} comparisons, {wrong} worse than stated",
-        verified.points,
-        verified.special,
+        "{} and {} recomputed: {} comparisons, {wrong} outside the stated error",
+        counted(verified.points, "point"),
+        counted(verified.special, "special point"),
         verified.checks.len()
     )?;
     if verified.removed > 0 {
         writeln!(
             out,
-            "{} points not computed again: their profiles were not stored (`store` in the study)",
+            "{} points not recomputed: their profiles were not stored (`store` in the study)",
             verified.removed
         )?;
     }
@@ -77,12 +85,7 @@ fn summary(verified: &Verified, wrong: usize, out: &mut impl Write) -> std::io::
         if !ratios.is_empty() {
             let within = ratios.iter().filter(|ratio| **ratio <= 1.0).count();
             let share = 100.0 * within as f64 / ratios.len() as f64;
-            writeln!(
-                out,
-                "{:10} {:6} compared, {share:5.1} % within the error that is stated",
-                quantity.name(),
-                ratios.len()
-            )?;
+            writeln!(out, "{:11} {:6} compared, {share:5.1} % within the stated error", quantity.name(), ratios.len())?;
         }
         let mut free: Vec<f64> = of(quantity).filter(|check| check.stated.is_none()).map(|check| check.found).collect();
         free.sort_by(f64::total_cmp);
@@ -91,14 +94,14 @@ fn summary(verified: &Verified, wrong: usize, out: &mut impl Write) -> std::io::
             let count = free.len();
             writeln!(
                 out,
-                "{name:10} {count:6} compared, no error is stated; half of them differ by less than {half:.1e}, the worst by {most:.1e}"
+                "{name:11} {count:6} compared, no stated error; median difference {half:.1e}, largest {most:.1e}"
             )?;
         }
     }
     let mut reasons: BTreeMap<&str, usize> = BTreeMap::new();
     verified.undecided.iter().for_each(|undecided| *reasons.entry(undecided.why).or_default() += 1);
     for (why, count) in reasons {
-        writeln!(out, "{count} not decided: {why}")?;
+        writeln!(out, "{count} undecided: {why}")?;
     }
     Ok(())
 }

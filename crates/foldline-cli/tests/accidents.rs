@@ -134,7 +134,10 @@ fn a_truncated_file_is_called_damaged() {
             let output = foldline(&[command, folder.path().join("run").to_str().unwrap()]);
             let message = said(&output);
             assert_eq!(output.status.code(), Some(2), "{length}: {message}");
-            assert!(message.contains("damaged") || message.contains("is not a run file"), "{length}: {message}");
+            assert!(
+                message.contains("damaged") || message.contains("is not a foldline run file"),
+                "{length}: {message}"
+            );
         }
         let output = run(folder.path(), &["--resume"]);
         // A file of length zero is a run that was killed before it had written anything.
@@ -162,7 +165,7 @@ fn a_flipped_bit_is_noticed_or_does_no_harm() {
         let output = foldline(&["verify", whole]);
         let message = said(&output);
         if output.status.code() != Some(0) {
-            let known = ["damaged", "is not a run file", "newer than the format"];
+            let known = ["damaged", "is not a foldline run file", "but this foldline reads formats up to"];
             assert!(known.iter().any(|words| message.contains(words)), "byte {place}: {message}");
             noticed += 1;
             continue;
@@ -182,7 +185,7 @@ fn an_interrupt_ends_the_run_at_its_next_point_and_says_how_to_go_on() {
     let done = Command::new("kill").args(["-INT", &first.id().to_string()]).status().unwrap();
     assert!(done.success());
     let message = said(&first.wait_with_output().unwrap());
-    assert!(message.contains("stopped; go on with --resume --out"), "{message}");
+    assert!(message.contains("stopped; continue with --resume --out"), "{message}");
     let stored = points(&out);
     let resumed = begun(&out).arg("--resume").output().unwrap();
     assert_eq!(resumed.status.code(), Some(0), "{}", said(&resumed));

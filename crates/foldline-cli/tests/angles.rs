@@ -196,5 +196,5 @@ fn a_state_over_whose_period_f_does_not_repeat_itself_is_refused() {
                  [states]\nv = \"-sin(x) - 0.1*k*x\"\n";
     let Err(found) = foldline_store::model_file::parse_model(model, "model") else { panic!("a mistake") };
     let text = format!("{found:?}");
-    assert!(text.contains("said to be an angle") && text.contains("`x`"), "{text}");
+    assert!(text.contains("declared as an angle") && text.contains("`x`"), "{text}");
 }

@@ -80,7 +80,7 @@ fn every_template_runs_completely_and_has_what_its_study_speaks_of() {
         let table = printed(&own, &["run", "study.toml"]);
         says(&table, pieces);
         // Nothing of it is overwritten.
-        says(&refused(folder.path(), &["new", name]), &["model.toml exists", "--out"]);
+        says(&refused(folder.path(), &["new", name]), &["model.toml already exists", "--out"]);
     }
     says(&refused(folder.path(), &["new", "rotr"]), &["no template `rotr`", "did you mean `rotor`?"]);
 }
@@ -120,7 +120,7 @@ fn a_trajectory_that_ends_early_says_where_and_why() {
     let folder = with("blow-up.toml", "[states.x]\nequation = \"x^2\"\nrange = [0, 1]\n");
     let output = foldline(folder.path(), &["simulate", "blow-up.toml", "--start", "x=1", "--time", "2"]);
     assert_eq!(output.status.code(), Some(3));
-    says(&words(&output.stderr), &["ended short", "grew without bound", "of 2.0"]);
+    says(&words(&output.stderr), &["incomplete: ", "grew without bound", "of 2.0"]);
 }
 
 #[test]
@@ -131,10 +131,10 @@ fn what_is_typed_to_simulate_is_checked() {
     says(&told(&["--periods", "3"]), &["no forcing", "--time"]);
     says(&told(&["--time", "3 kg"]), &["--time 3 kg", "not a positive time"]);
     says(&told(&["--time", "3", "--start", "y=1"]), &["no state `y`", "one of"]);
-    says(&told(&["--time", "3", "--start", "x=one"]), &["`one` is not a finite number"]);
+    says(&told(&["--time", "3", "--start", "x=one"]), &["`one` is neither a finite number"]);
     says(&told(&["--time", "3", "--show", "enrgy"]), &["enrgy", "did you mean `energy`?"]);
     says(&told(&["--time", "3", "--every", "1e-12"]), &["rows", "a larger interval"]);
-    says(&told(&["--time", "3", "--every", "period"]), &["not an interval of time"]);
+    says(&told(&["--time", "3", "--every", "period"]), &["not a time interval"]);
 }
 
 #[test]
@@ -214,7 +214,7 @@ fn profiles_that_are_not_wanted_leave_the_run_file() {
     let (all, few, third) = (run("all", "\"all\""), run("few", "\"special\""), run("third", "3"));
     assert!(few.0 < all.0 / 2 && few.0 < third.0 && third.0 < all.0, "{} {} {}", all.0, few.0, third.0);
     assert_eq!((&all.1, &all.2), (&few.1, &few.2), "every point keeps its numbers");
-    says(&printed(&own, &["verify", "few"]), &["profiles were not stored", "special points computed again"]);
+    says(&printed(&own, &["verify", "few"]), &["profiles were not stored", "special points recomputed"]);
     printed(&own, &["plot", "few", "-o", "picture.svg"]);
     printed(&own, &["export", "few", "--format", "csv"]);
     let output = foldline(&own, &["run", "study.toml", "--out", "third", "--resume"]);

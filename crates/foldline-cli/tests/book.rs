@@ -1,7 +1,7 @@
-//! Every example of the pages on bifurcations, and of those for who comes from another program, is run, and what they quote is what the program prints.
+//! Runs the examples of the book: the pages on bifurcations, the tutorials and some others. What they quote must be what the program prints.
 //!
-//! On these pages a block of TOML begins with the name of its file, and a block `console` holds commands and what they answer. Where that has
-//! changed and is meant to, `FOLDLINE_WRITE_BOOK=1 cargo test -p foldline-cli --test book` renews the answers and the pictures.
+//! On these pages each block of TOML begins with the name of its file, and each block `console` holds commands and their output. After an intended
+//! change, `FOLDLINE_WRITE_BOOK=1 cargo test -p foldline-cli --test book` renews outputs and pictures.
 
 mod pages;
 
@@ -33,10 +33,21 @@ fn the_pages_on_bifurcations_quote_what_the_program_prints() {
             );
         }
     }
-    pages.push(root().join("docs/book/from-auto.md"));
-    pages.push(root().join("docs/book/how-to.md"));
-    pages.push(root().join("docs/book/when-it-does-not-work.md"));
-    pages.push(root().join("docs/book/units.md"));
+    let others = [
+        "endings",
+        "exploring",
+        "first-model",
+        "from-auto",
+        "how-to",
+        "tutorial-forced-oscillator",
+        "tutorial-neuron",
+        "tutorial-rotor",
+        "units",
+        "what-foldline-does-not-do",
+        "when-it-does-not-work",
+    ];
+    pages.extend(others.map(|page| root().join(format!("docs/book/{page}.md"))));
+    pages.push(root().join("README.md"));
     let renew = std::env::var_os("FOLDLINE_WRITE_BOOK").is_some();
     let wrong = check_all(&pages, open, renew);
     assert!(

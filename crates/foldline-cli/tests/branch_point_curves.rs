@@ -191,7 +191,7 @@ fn branch_points_of_cycles_that_a_second_parameter_opens_are_not_followed() {
     let curve = diagram.branch("curve").unwrap();
     let said = curve.ends.iter().flatten().map(|end| end.to_string()).collect::<Vec<_>>();
     assert!(
-        curve.points.is_empty() && said.iter().all(|end| end.contains("at this value of the second parameter only")),
+        curve.points.is_empty() && said.iter().all(|end| end.contains("only for this value of the second parameter")),
         "{said:?}"
     );
 }

@@ -118,7 +118,7 @@ fn where_an_orbit_passes_a_switch_there_are_no_coefficients_and_the_table_says_w
     let passes = grown(&turning_back("*if(x > 0.2, 1, 0.8)"), BACK);
     let [fold] = of_kind(passes.branch("b").unwrap(), Kind::Fold)[..] else { panic!("one fold") };
     assert!((fold.point.parameters[0] + 1.0).abs() < 1e-4);
-    assert_eq!(fold.normal_form(), "no coefficients: the orbit passes 2 switches of the right-hand side");
+    assert_eq!(fold.normal_form(), "no coefficients: the orbit crosses 2 switching points of the right-hand side");
     assert_eq!(fold.criticality(), None);
     let misses = grown(&turning_back("*if(x > 7, 0.8, 1)"), BACK);
     let [fold] = of_kind(misses.branch("b").unwrap(), Kind::Fold)[..] else { panic!("one fold") };

@@ -84,9 +84,12 @@ fn files_of_auto_are_listed() {
     assert_eq!(rows[7][1..], ["5", "7", "UZ", "mark", "cycle", "0.119340466", "2.999998142", "2", "20", "4"], "{text}");
     let cases: [(&[&str], &str); 5] = [
         (&["import-auto", "s.none"], "the solution file cannot be read"),
-        (&["import-auto", &auto("b.ab")], "no file of solutions was given"),
+        (&["import-auto", &auto("b.ab")], "no solution file was given"),
         (&["import-auto", &auto("s.ab"), "--label", "9"], "one of 1, 2, 3, 4, 5, 6"),
-        (&["import-auto", &auto("s.ab"), "--model", MODEL, "--parameters", "p1"], "--parameters p1: this is no pair"),
+        (
+            &["import-auto", &auto("s.ab"), "--model", MODEL, "--parameters", "p1"],
+            "--parameters p1: not a pair NUMBER=NAME",
+        ),
         (&["import-auto", &auto("s.ab"), "--model", MODEL, "--states", "1=x"], "--states: the model has no \"x\""),
     ];
     for (arguments, message) in cases {

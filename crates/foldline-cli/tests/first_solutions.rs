@@ -45,9 +45,10 @@ fn a_resonator_of_high_quality_needs_no_transient() {
     let model = "[parameters]\nw = 0.99\nQ = 1e5\nF = 1e-6\n[forcing]\nfrequency = \"w\"\n[states]\n\
                  x = { equation = \"v\", range = [-0.1, 0.1], scale = 0.1 }\n\
                  v = { equation = \"-v/Q - x - x^3 + F*cos(w*t)\", range = [-0.1, 0.1], scale = 0.1 }\n";
-    for (seed, told) in
-        [("attractor = \"cycle\"", "too slowly for samples"), ("state = { x = 0, v = 0 }", "a transient lasts some 2.")]
-    {
+    for (seed, told) in [
+        ("attractor = \"cycle\"", "too slowly for samples"),
+        ("state = { x = 0, v = 0 }", "a transient lasts about 2."),
+    ] {
         let (diagram, notes) = run(model, seed, "free = \"w\"\nrange = [0.98, 1.02]");
         assert!(notes.contains(told), "{seed}: {notes}");
         let folds = places(&diagram.branches[0], Kind::Fold);

@@ -151,12 +151,12 @@ fn what_is_wrong_with_a_forcing_is_said_where_it_stands() {
         (
             "[forcing]\nfrequency = \"w\"",
             "-x + cos(1.5*w*t)",
-            "the equation of `x` does not repeat itself after the period 3.14159",
+            "the equation of `x` does not have the forcing period 3.14159",
         ),
         (
             "[forcing]\nfrequency = \"w\"\n[outputs]\no = \"x*cos(w*t/2)\"",
             "-x + cos(w*t)",
-            "the output `o` does not repeat itself after the period 3.14159",
+            "the output `o` does not have the forcing period 3.14159",
         ),
         ("[forcing]\nfrequency = \"x\"", "-x + cos(w*t)", "the forcing depends on `x`, which is a state"),
         ("[forcing]\nfrequency = \"t\"", "-x + cos(w*t)", "the forcing depends on `t`, which is the time"),
@@ -164,7 +164,7 @@ fn what_is_wrong_with_a_forcing_is_said_where_it_stands() {
         ("[forcing]\nfrequency = \"w\"\nperiod = \"w\"", "-x", "both a frequency and a period"),
         ("[forcing]", "-x", "no frequency and no period"),
         ("[forcing]\nfrequenzy = \"w\"", "-x", "did you mean `frequency`"),
-        ("[forcing]\nfrequency = \"w\"", "-x + cos(w*time)", "time is called `t`"),
+        ("[forcing]\nfrequency = \"w\"", "-x + cos(w*time)", "the time is `t`"),
         (
             "[forcing]\nfrequency = \"w\"\n[definitions]\nt = \"1\"",
             "-x",
@@ -192,7 +192,7 @@ fn a_branch_on_which_the_forcing_does_not_repeat_itself_is_refused() {
         let diagram = explore::run(&system, &study.plan, 1, Diagram::default(), &Unobserved);
         let end = diagram.branches[0].ends[1].as_ref().unwrap();
         assert_eq!(end.code(), code, "{free}: {end}");
-        assert!(code == "bound" || end.to_string().contains("does not repeat itself"), "{end}");
+        assert!(code == "bound" || end.to_string().contains("does not have the forcing period"), "{end}");
     }
     // A frequency that changes its sign on the way has no period there.
     let model = "[parameters]\nomega = 0.8\nA = 0.1\n[forcing]\nfrequency = \"omega\"\n[states.x]\nequation = \"-x + A*cos(omega*t)\"\n";
@@ -238,7 +238,7 @@ fn a_cycle_of_a_stated_number_of_periods_of_the_forcing() {
     };
     let free = "[parameters]\nomega = 5.0\n[states]\nx = \"omega - x\"\n";
     let said = refused(free, "attractor = \"cycle\"\nperiods = 3");
-    assert!(said.contains("no forcing whose periods"), "{said}");
+    assert!(said.contains("no forcing, so no forcing periods"), "{said}");
     let said = refused(DUFFING, "state = { x = 0, v = 0 }\nperiods = 3");
     assert!(said.contains("goes with `attractor = \"cycle\"`"), "{said}");
 }

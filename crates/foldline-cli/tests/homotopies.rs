@@ -63,7 +63,7 @@ fn where_the_direct_run_turns_back_the_fold_leads_on() {
     // At Omega = 5 the family folds short of 1.5.
     let fold = diagram.branches[0].special.iter().find(|s| s.kind == Kind::Fold).unwrap();
     assert!((fold.point.parameters[3] - 1.465).abs() < 2e-3, "{}", fold.point.parameters[3]);
-    assert!(notes.last().unwrap().starts_with("arrived along the fold"), "{notes:?}");
+    assert!(notes.last().unwrap().starts_with("reached the goal along the fold curve"), "{notes:?}");
     let (curve, end) = (&diagram.branches[1], diagram.branches[1].points.first().unwrap());
     assert_eq!(curve.held, Some((Kind::Fold, 0)));
     assert!((end.parameters[2] - 1e-5).abs() < 1e-15 && (end.parameters[3] - 1.5).abs() < 1e-12);
@@ -73,7 +73,7 @@ fn where_the_direct_run_turns_back_the_fold_leads_on() {
 #[test]
 fn a_family_that_shrinks_to_a_point_on_the_way_is_said_not_to_be_connected() {
     let (diagram, notes) = route("3:1", &[("zeta", 0.3)]);
-    assert!(notes.last().unwrap().ends_with("it is not connected to it"), "{notes:?}");
+    assert!(notes.last().unwrap().ends_with("it is not connected to the goal"), "{notes:?}");
     // The isola shrinks to a point at the same damping, whichever of its folds is followed there.
     let tips: Vec<f64> = diagram
         .branches

@@ -110,7 +110,7 @@ fn the_files_that_the_others_spoil_are_right() {
     for file in ["pendulum.toml", "study.toml"] {
         let output = desk.foldline(&["check", file]);
         assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
-        says(&String::from_utf8_lossy(&output.stdout), &[file, "is right", "pendulum"]);
+        says(&String::from_utf8_lossy(&output.stdout), &[file, "is valid", "pendulum"]);
     }
 }
 
@@ -143,9 +143,9 @@ fn unknown_origin_and_an_origin_further_down() {
     );
     let above = "[[branch]]\nname = \"early\"\nfrom = \"main\"\nfree = \"kappa\"\nrange = [0, 2]\n";
     let message = desk.study("[[branch]]\n", &format!("{above}[[branch]]\n"));
-    says(&message, &["study.toml:10:8", "\"main\" is not known yet", "written above it"]);
+    says(&message, &["study.toml:10:8", "\"main\" is defined further down", "defined above it"]);
     let own = desk.study("\"rest\"\nfree", "\"main\"\nfree");
-    says(&own, &["\"main\" is not known yet", "written above it"]);
+    says(&own, &["\"main\" is defined further down", "defined above it"]);
 }
 
 #[test]
@@ -157,7 +157,7 @@ fn names_used_twice() {
 #[test]
 fn tolerance_out_of_bounds_or_no_number() {
     let desk = Desk::new();
-    says(&desk.study("1e-6", "0.5"), &["study.toml:2:13", "5e-1 is out of bounds", "from 1e-10 to 1e-4"]);
+    says(&desk.study("1e-6", "0.5"), &["study.toml:2:13", "5e-1 is out of range", "from 1e-10 to 1e-4"]);
     says(&desk.study("1e-6", "\"small\""), &["study.toml:2:13", "not a number", "write a number"]);
     says(&desk.study("1e-6", "nan"), &["study.toml:2:13", "not a finite number"]);
 }
@@ -172,13 +172,16 @@ fn keys_and_kinds_that_do_not_exist() {
     let switch = desk.study("range = [-1, 2]", "range = [-1, 2]\nswitch = { period-dubling = 2 }");
     says(&switch, &["study.toml:13:12", "\"period-dubling\"", "did you mean `period-doubling`"]);
     let fold = desk.study("range = [-1, 2]", "range = [-1, 2]\nswitch = { fold = 1 }");
-    says(&fold, &["no branch of equilibria or cycles begins at a fold", "hopf"]);
+    says(&fold, &["no branch of equilibria or cycles starts at a fold", "hopf"]);
 }
 
 #[test]
 fn seeds_that_say_too_little_or_too_much() {
     let desk = Desk::new();
-    says(&desk.study("state = { x = 0.7, y = 0 }", ""), &["study.toml:4:1", "which solution it means", "attractor = "]);
+    says(
+        &desk.study("state = { x = 0.7, y = 0 }", ""),
+        &["study.toml:4:1", "this seed names no solution", "attractor = "],
+    );
     says(&desk.study(", y = 0 }", " }"), &["study.toml:6:9", "lacks y", "x, y"]);
     says(&desk.study("y = 0 }", "y = 0, z = 1 }"), &["study.toml:6:27", "no state `z`"]);
     says(
@@ -194,7 +197,7 @@ fn several_mistakes_are_said_at_once() {
     let desk = Desk::new();
     desk.write("study.toml", &STUDY.replace("1e-6", "1").replace("[-1, 2]", "[2, -1]").replace("\"mu\"", "\"nu\""));
     let message = desk.refused(&["check", "study.toml"]);
-    says(&message, &["out of bounds", "wrong way round", "no parameter `nu`"]);
+    says(&message, &["out of range", "wrong way round", "no parameter `nu`"]);
 }
 
 #[test]
@@ -204,7 +207,7 @@ fn curves_and_homotopies_in_which_something_is_wrong() {
                  [[homotopy]]\nname = \"way\"\nfrom = \"rest\"\nto = { kappa = 3 }\nvia = \"mu\"\nrange = [-1, 2]\n";
     desk.write("more.toml", &STUDY.replace("range = [-1, 2]\n", added));
     let output = desk.foldline(&["check", "more.toml"]);
-    says(&String::from_utf8_lossy(&output.stdout), &["is right", "1 seed, 1 branch, 1 curve, 1 homotopy"]);
+    says(&String::from_utf8_lossy(&output.stdout), &["is valid", "1 seed, 1 branch, 1 curve, 1 homotopy"]);
 
     let spoilt = |piece: &str, by: &str| desk.study("range = [-1, 2]\n", &added.replacen(piece, by, 1));
     says(&spoilt("\"fold\"", "\"fld\""), &["study.toml:16:8", "\"fld\"", "did you mean `fold`"]);
@@ -276,9 +279,9 @@ fn a_folder_with_a_run_in_it_is_not_overwritten() {
     desk.write("run/run.sqlite", "precious");
     says(
         &desk.refused(&["run", "study.toml", "--out", "run"]),
-        &["run.sqlite exists already", "--resume", "--out DIR"],
+        &["run.sqlite already exists", "--resume", "--out DIR"],
     );
-    says(&desk.refused(&["run", "study.toml", "--out", "run", "--resume"]), &["not a run file"]);
+    says(&desk.refused(&["run", "study.toml", "--out", "run", "--resume"]), &["not a foldline run file"]);
     assert_eq!(std::fs::read_to_string(desk.path("run/run.sqlite")).unwrap(), "precious");
 }
 
@@ -294,7 +297,7 @@ fn settings_of_attractors() {
     let desk = Desk::new();
     let set = |assignment: &str| desk.refused(&["attractors", "pendulum.toml", "--set", assignment]);
     says(&set("kapa=1"), &["--set kapa=1", "no parameter `kapa`", "did you mean `kappa`"]);
-    says(&set("kappa"), &["--set kappa", "no `=`", "NAME=VALUE"]);
+    says(&set("kappa"), &["--set kappa", "`=` is missing", "NAME=VALUE"]);
     says(&set("kappa=much"), &["`much` is not a finite number", "a number such as"]);
     desk.refused(&["attractors", "pendulum.toml", "--samples", "0"]);
 }
@@ -314,7 +317,7 @@ fn help_says_the_exit_codes() {
     assert_eq!(output.status.code(), Some(0));
     says(
         &String::from_utf8_lossy(&output.stdout),
-        &["Exit codes", "2  a mistake", "3  done, but something was not reached"],
+        &["Exit codes", "2  error in the command line or in a file", "3  finished, but incomplete"],
     );
 }
 
@@ -352,18 +355,18 @@ fn explorations() {
     let explored = |lines: &str| desk.study("[[branch]]", &format!("[[explore]]\n{lines}\n[[branch]]"));
     let right = "name = \"all\"\nfree = \"mu\"\nrange = [0, 1]\n";
     says(&explored("free = \"mu\"\nrange = [0, 1]"), &["this exploration has no name"]);
-    says(&explored("name = \"all\"\nfree = \"mu\""), &["in which range", "range = [0.5, 12]"]);
+    says(&explored("name = \"all\"\nfree = \"mu\""), &["this exploration has no `range`", "range = [0.5, 12]"]);
     says(&explored(&right.replace("mu", "my")), &["no parameter `my`", "did you mean `mu`"]);
     says(&explored(&right.replace("all", "main")), &["\"main\" is used twice"]);
     let inside = "name = \"main/hopf-1\"\nfree = \"mu\"\nrange = [0, 1]\n";
-    says(&explored(inside), &["could be called like \"main\""]);
-    says(&explored(&format!("{right}connect = {{ mu = [0, 1] }}")), &["`mu` is the free parameter already"]);
+    says(&explored(inside), &["could have the same name as \"main\""]);
+    says(&explored(&format!("{right}connect = {{ mu = [0, 1] }}")), &["`mu` is already the free parameter"]);
     says(&explored(&format!("{right}connect = {{ kappa = [2, 3] }}")), &["at kappa = 1", "a range that contains 1"]);
-    says(&explored(&format!("{right}connect = {{ }}")), &["names not exactly one parameter"]);
+    says(&explored(&format!("{right}connect = {{ }}")), &["must name exactly one parameter"]);
     says(&explored(&format!("{right}values = 0")), &["`values`"]);
     says(
         &explored(&format!("{right}switch = {{ fold = 1 }}")),
-        &["no branch of equilibria or cycles begins at a fold"],
+        &["no branch of equilibria or cycles starts at a fold"],
     );
 }
 
@@ -372,15 +375,15 @@ fn what_explore_is_told() {
     let desk = Desk::new();
     let told = |arguments: &[&str]| desk.refused(&[&["explore", "pendulum.toml"], arguments].concat());
     says(&told(&["--free", "mi=0:1"]), &["no parameter `mi`", "did you mean `mu`"]);
-    says(&told(&["--free", "mu"]), &["there is no `=`", "--free NAME=LOW:HIGH"]);
-    says(&told(&["--free", "mu=1"]), &["no `:` between two values"]);
-    says(&told(&["--free", "mu=1:x"]), &["an end is not a finite number"]);
+    says(&told(&["--free", "mu"]), &["`=` is missing", "--free NAME=LOW:HIGH"]);
+    says(&told(&["--free", "mu=1"]), &["`:` is missing between two values"]);
+    says(&told(&["--free", "mu=1:x"]), &["an end is neither a finite number"]);
     says(&told(&["--free", "mu=1:0"]), &["not smaller than the second"]);
-    says(&told(&["--free", "mu=0:1", "--set", "kappa"]), &["there is no `=`"]);
-    says(&told(&["--free", "mu=0:1", "--connect", "mu=0:1"]), &["that is the parameter of --free"]);
+    says(&told(&["--free", "mu=0:1", "--set", "kappa"]), &["`=` is missing"]);
+    says(&told(&["--free", "mu=0:1", "--connect", "mu=0:1"]), &["this is already the parameter of --free"]);
     says(&told(&["--free", "mu=0:1", "--connect", "kappa=2:3"]), &["at kappa = 1", "a range that contains 1"]);
     says(&told(&["--free", "mu=0:1", "--tolerance", "1"]), &["tolerance", "1e-10 to 1e-4"]);
-    says(&told(&["--free", "mu=0:1", "--set", "mu=1"]), &["that is the parameter of --free"]);
+    says(&told(&["--free", "mu=0:1", "--set", "mu=1"]), &["this is the free parameter"]);
     let few = desk.foldline(&["explore", "pendulum.toml", "--free", "mu=-1:2", "--budget", "5", "--out", "few"]);
     says(&String::from_utf8_lossy(&few.stderr), &["the budget of 5 points is used up"]);
     assert_eq!(few.status.code(), Some(3));

@@ -29,7 +29,9 @@ fn blocks(document: &str, kind: &str) -> Vec<String> {
 /// A folder with the model and the study of a document.
 fn desk(document: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
-    let [model, study] = &blocks(document, "toml")[..] else { panic!("{document} has a model and a study") };
+    let found = blocks(document, "toml");
+    let model = found.iter().find(|block| block.contains("name = \"Brusselator\"")).expect("a model");
+    let study = found.iter().find(|block| block.contains("model = \"brusselator.toml\"")).expect("a study");
     std::fs::write(folder.path().join("brusselator.toml"), model).unwrap();
     std::fs::write(folder.path().join("study.toml"), study).unwrap();
     folder
@@ -112,7 +114,7 @@ fn a_branch_that_ends_short_is_exit_code_3_and_said() {
     let output = foldline(desk.path(), &["run", "short.toml"]);
     let said = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(3), "{said}");
-    assert!(said.contains("ended short: steady: stopped at the limit of 2 points"), "{said}");
+    assert!(said.contains("incomplete: steady: stopped at the limit of 2 points"), "{said}");
 }
 
 #[test]
@@ -128,8 +130,8 @@ fn a_branch_that_turns_round_before_its_target_is_short_and_nothing_starts_at_it
     let output = foldline(folder.path(), &["run", "study.toml"]);
     let said = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(3), "{said}");
-    assert!(said.contains("ended short: down: it did not arrive at mu = -1; reached 2"), "{said}");
-    assert!(said.contains("ended short: on: no start: branch down did not get to its end"), "{said}");
+    assert!(said.contains("incomplete: down: it did not reach mu = -1; reached 2"), "{said}");
+    assert!(said.contains("incomplete: on: no starting solution: the branch down did not reach its end"), "{said}");
 }
 
 #[test]
@@ -141,7 +143,7 @@ fn a_seed_that_is_not_found_is_exit_code_3_and_said() {
     let output = foldline(desk.path(), &["run", "none.toml"]);
     let said = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(3), "{said}");
-    assert!(said.contains("ended short: steady"), "{said}");
+    assert!(said.contains("incomplete: steady"), "{said}");
 }
 
 #[test]
@@ -259,7 +261,7 @@ fn attractors_are_listed_with_their_hits() {
     assert!(cycle.lines().any(|line| line.starts_with("cycle") && line.contains(" 7.156919")), "{cycle}");
     // All of the twelve uniform ones: Wilson's interval begins at 12 / (12 + 1.96²).
     assert!(cycle.contains("1.000 [0.758, 1.000]"), "{cycle}");
-    assert!(cycle.contains("share: of the 12 samples drawn uniformly"), "{cycle}");
+    assert!(cycle.contains("share: fraction of the 12 samples drawn uniformly"), "{cycle}");
     let again = printed(desk.path(), &["attractors", "brusselator.toml", "--samples", "16", "--set", "B=3"], 0);
     assert_eq!(cycle, again);
 }
@@ -296,8 +298,8 @@ fn names_that_a_run_does_not_have() {
     refused(&["plot", "runs/study", "-o", "a.jpg"], &["a.jpg", ".svg, .png or .pdf"]);
     refused(&["plot", "runs/study", "-o", "no/such/a.svg"], &["no/such/a.svg cannot be written"]);
     refused(&["plot", "runs/study", "--window", "2,1,0,1", "-o", "a.svg"], &["--window 2,1,0,1", "wrong way round"]);
-    refused(&["plot", "runs/study", "--window", "1,2", "-o", "a.svg"], &["not a window", "four numbers"]);
-    refused(&["run", "study.toml"], &["exists already", "--resume"]);
+    refused(&["plot", "runs/study", "--window", "1,2", "-o", "a.svg"], &["not four numbers", "four numbers"]);
+    refused(&["run", "study.toml"], &["already exists", "--resume"]);
     let study = std::fs::read_to_string(desk.path().join("study.toml")).unwrap();
     std::fs::write(desk.path().join("study.toml"), study.replace("4]", "5]")).unwrap();
     refused(&["run", "study.toml", "--resume"], &["the study has changed", "--out DIR"]);

@@ -17,8 +17,8 @@ fn said(output: &Output) -> String {
 /// The lines that say what was not reached, with those that belong to them.
 fn short(output: &Output) -> Vec<String> {
     let text = said(output);
-    let first = text.lines().skip_while(|line| !line.starts_with("ended short: "));
-    first.take_while(|line| line.starts_with("ended short: ") || line.starts_with("  ")).map(str::to_string).collect()
+    let first = text.lines().skip_while(|line| !line.starts_with("incomplete: "));
+    first.take_while(|line| line.starts_with("incomplete: ") || line.starts_with("  ")).map(str::to_string).collect()
 }
 
 fn with_files(files: &[(&str, &str)]) -> tempfile::TempDir {
@@ -42,13 +42,16 @@ fn a_switch_that_was_asked_for_and_failed_is_said_again_by_resume_and_table() {
     let first = foldline(folder.path(), &["run", "s.toml", "--jobs", "1", "--out", "run"]);
     let lines = short(&first);
     assert_eq!(first.status.code(), Some(3), "{}", said(&first));
-    assert!(lines[0].starts_with("ended short: steady: hopf 0.000000 of steady: no branch found"), "{lines:?}");
+    assert!(
+        lines[0].starts_with("incomplete: steady: hopf 0.000000 of steady: no bifurcating branch found"),
+        "{lines:?}"
+    );
     let again = foldline(folder.path(), &["run", "s.toml", "--jobs", "1", "--resume", "--out", "run"]);
     assert_eq!((again.status.code(), short(&again)), (Some(3), lines.clone()));
     let branches = foldline(folder.path(), &["table", "run", "--branches"]);
     assert_eq!(short(&branches), lines);
     let notes = foldline(folder.path(), &["table", "run", "--notes"]);
-    assert!(String::from_utf8_lossy(&notes.stdout).contains("ended short: hopf 0.000000 of steady"));
+    assert!(String::from_utf8_lossy(&notes.stdout).contains("incomplete: hopf 0.000000 of steady"));
 }
 
 #[test]
@@ -58,7 +61,10 @@ fn an_exploration_whose_samples_do_not_settle_says_so_now_and_when_resumed() {
     let first = foldline(folder.path(), &[&typed[..], &["--doublings", "0", "--out", "run"]].concat());
     let lines = short(&first);
     assert_eq!(first.status.code(), Some(3), "{}", said(&first));
-    assert!(lines.iter().any(|line| line.contains("at 1 of 1 values some of 4 samples did not settle")), "{lines:?}");
+    assert!(
+        lines.iter().any(|line| line.contains("at 1 of 1 parameter values, some of the 4 samples did not settle")),
+        "{lines:?}"
+    );
     let again = foldline(folder.path(), &[&typed[..], &["--doublings", "0", "--out", "run", "--resume"]].concat());
     assert_eq!((again.status.code(), short(&again)), (Some(3), lines));
 }
@@ -110,10 +116,10 @@ fn an_interrupt_ends_a_run_in_the_middle_of_a_census() {
     let output = child.wait_with_output().unwrap();
     let text = said(&output);
     assert_eq!(output.status.code(), Some(3), "{text}");
-    assert!(text.contains("stopped; go on with --resume"), "{text}");
+    assert!(text.contains("stopped; continue with --resume"), "{text}");
     // On a quiet machine some milliseconds; the census itself would last for hours.
     assert!(asked.elapsed() < Duration::from_secs(30), "{:?}", asked.elapsed());
-    assert!(!text.contains("attractors ("), "what was under way is not told: {text}");
+    assert!(!text.contains("outcome of the samples: "), "what was under way is not told: {text}");
 }
 
 #[test]
@@ -122,8 +128,8 @@ fn a_run_whose_time_is_up_says_where_it_is_meanwhile_and_how_to_go_on() {
     let output = endless(folder.path(), &["--budget", "11s"]).output().unwrap();
     let text = said(&output);
     assert_eq!(output.status.code(), Some(3), "{text}");
-    assert!(text.contains("still looking for first solutions"), "{text}");
-    assert!(text.contains("stopped at the time limit of 11s; go on with --resume --out run"), "{text}");
+    assert!(text.contains("searching for starting solutions"), "{text}");
+    assert!(text.contains("stopped at the time limit of 11s; continue with --resume --out run"), "{text}");
 }
 
 #[test]

@@ -34,7 +34,7 @@ fn what_is_not_switched_to_is_no_start() {
     let text =
         |from: &str| format!("{STUDY}[[branch]]\nname = \"b\"\nfrom = \"{from}\"\nfree = \"A\"\nrange = [0.8, 2]\n");
     for (from, message) in [
-        ("steady/period-doubling-1", "does not switch that far at period-doubling points"),
+        ("steady/period-doubling-1", "does not go that far at period-doubling points"),
         ("steady/first", "no branch that leaves"),
         ("other/hopf-1", "there is no seed, branch, curve or homotopy"),
     ] {

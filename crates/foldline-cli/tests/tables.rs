@@ -198,5 +198,5 @@ fn curves_that_a_run_does_not_have_cannot_be_drawn() {
     let output = foldline(folder.path(), &["plot", "run", "--curves", "-o", "a.svg"]);
     let said = String::from_utf8_lossy(&output.stderr);
     assert_eq!(output.status.code(), Some(2), "{said}");
-    assert!(said.contains("no curve in two parameters") && said.contains("leave --curves out"), "{said}");
+    assert!(said.contains("no two-parameter curves") && said.contains("remove --curves"), "{said}");
 }

@@ -52,7 +52,7 @@ range = [4e-4, 6e-4]
 #[test]
 fn totals_are_named_before_anything_is_computed_and_followed_where_they_are_given() {
     let Err(found) = study(NETWORK, STEADY) else { panic!("families") };
-    assert!(found.contains("X1 + X2 and X3 + X4 + X5 + X6 keep their values"), "{found}");
+    assert!(found.contains("X1 + X2 and X3 + X4 + X5 + X6 are conserved"), "{found}");
     // The seed says which values the totals have.
     let totals = "[totals]\nTa = { sum = \"X1 + X2\", value = 1, instead-of = \"X2\" }\n\
                   Tb = { sum = \"X3 + X4 + X5 + X6\", value = 1, instead-of = \"X3\" }\n";

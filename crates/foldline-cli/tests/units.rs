@@ -266,7 +266,7 @@ fn a_run_is_read_in_any_unit() {
 
     for (wish, said) in [
         ("Omega=kg", "the dimensions differ"),
-        ("Omega", "no `=`"),
+        ("Omega", "`=` and a unit are missing"),
         ("Omeg=rpm", "did you mean `Omega`"),
         ("X=orders:Omega", "the dimensions differ"),
         ("Omega=orders:speed", "no parameter"),

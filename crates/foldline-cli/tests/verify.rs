@@ -23,7 +23,7 @@ fn the_reference_run_is_right_and_what_is_changed_in_it_is_found() {
     let said = text(&right.stdout);
     assert_eq!(right.status.code(), Some(0), "{said}");
     let summary = said.lines().find(|line| line.contains("computed again")).unwrap();
-    assert!(summary.contains(" 0 worse than stated"), "{said}");
+    assert!(summary.contains(" 0 outside the stated error"), "{said}");
     let counts: Vec<usize> = summary.split_whitespace().filter_map(|word| word.parse().ok()).collect();
     let [points, special, comparisons, ..] = counts[..] else { panic!("{summary}") };
     assert!(points > 480 && special == 24 && comparisons > 4 * points, "{summary}");
@@ -68,5 +68,5 @@ fn the_reference_run_is_right_and_what_is_changed_in_it_is_found() {
     let wrong = foldline(&["verify", &run, "--sample", "10"]);
     let said = text(&wrong.stdout);
     assert_eq!(wrong.status.code(), Some(3), "{said}");
-    assert!(said.lines().nth(1).unwrap().contains("period-doubling") && said.contains("place"), "{said}");
+    assert!(said.lines().nth(1).unwrap().contains("period-doubling") && said.contains("location"), "{said}");
 }

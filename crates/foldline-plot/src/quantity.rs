@@ -16,10 +16,7 @@ pub fn axis(name: &str, model: &Model) -> Result<Quantity, String> {
         let parameters = model.parameters.iter().map(|p| p.name.as_str());
         let variables = model.states.iter().map(|s| &s.name).chain(model.outputs.iter().map(|o| &o.name));
         let names: Vec<&str> = parameters.chain(variables.map(String::as_str)).chain(["period", "norm"]).collect();
-        format!(
-            "one of: {}; or a state or output with _max, _min, _mean, _rms or _integral behind it",
-            names.join(", ")
-        )
+        format!("one of: {}; or a state or output followed by _max, _min, _mean, _rms or _integral", names.join(", "))
     })
 }
 

@@ -53,5 +53,5 @@ pub fn of_run_file(py: Python, error: &RunFileError) -> PyErr {
 
 /// A mistake of the program itself.
 pub fn internal(py: Python, what: String) -> PyErr {
-    raised(py, "Error", format!("a mistake of foldline itself: {what}"))
+    raised(py, "Error", format!("internal error in foldline: {what}"))
 }

@@ -98,19 +98,22 @@ fn key(py: Python, model: &Model, name: &str) -> PyResult<AttractorKey> {
     match (name, ratio) {
         ("equilibrium", _) if model.model.forced() => said(
             "the model is forced and has no equilibria".into(),
-            "use \"cycle\": where there is a forcing nothing is at rest",
+            "use \"cycle\": the response to forcing is a cycle",
         ),
         ("equilibrium", _) => Ok(AttractorKey::Equilibrium),
         ("cycle", _) => Ok(AttractorKey::Cycle),
         (_, Some((a, b))) if a > 0 && b > 0 => match model.model.whirl {
             Some(_) => Ok(AttractorKey::Ratio(a, b)),
             None => said(
-                format!("the ratio \"{name}\" needs a whirling motion, which this model does not name"),
+                format!(
+                    "the ratio \"{name}\" needs the two states of a whirling motion, which this model does not \
+                         name"
+                ),
                 "name its two states, as in whirl=\"u v\", or ask for a \"cycle\"",
             ),
         },
         _ => said(
-            format!("\"{name}\" is no attractor"),
+            format!("\"{name}\" is not an attractor"),
             "\"equilibrium\", \"cycle\", or a ratio of whole numbers such as \"2:1\"",
         ),
     }

@@ -72,7 +72,7 @@ impl Reproduced {
             (self.claims.iter().filter(|c| c.check == check).count(), counts.join(", "))
         };
         let ((claims, theirs), (checks, ours)) = (counted(false), counted(true));
-        format!("{claims} claims of the study: {theirs}; {checks} checks of ours: {ours}")
+        format!("{claims} claims of the publication: {theirs}; {checks} additional checks: {ours}")
     }
 }
 
@@ -107,7 +107,7 @@ pub fn reproduce(request: &Request) -> io::Result<Reproduced> {
             Err(why) => Err(why),
         };
         match &made {
-            Ok(_) => (request.say)(&format!("figure {} is drawn", plan.name)),
+            Ok(_) => (request.say)(&format!("figure {} done", plan.name)),
             Err(why) => (request.say)(&format!("figure {}: {why}", plan.name)),
         }
         figures.push(Drawn { plan, made });

@@ -24,23 +24,23 @@ pub fn html(publication: &Publication, figures: &[Drawn], runs: &Runs, failures:
     let title = escaped(publication.title);
     let _ = write!(
         out,
-        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">\
-         <meta name=\"viewport\" content=\"width=device-width\"><title>{title}</title>\n<style>{STYLE}</style></head><body>\n\
-         <h1>{title}, computed again</h1>\n"
+        "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" \
+         content=\"width=device-width\"><title>{title}</title>\n<style>{STYLE}</style></head><body>\n<h1>{title}: \
+         recomputed</h1>\n"
     );
     let claims: Vec<&Claim> =
         figures.iter().filter_map(|f| f.made.as_ref().ok()).flat_map(|(_, m)| &m.claims).collect();
     summary(&mut out, &claims, runs, seconds);
     if !failures.is_empty() {
-        out.push_str("<h2>What failed or ended short</h2>\n<ul>\n");
+        out.push_str("<h2>Failed or incomplete</h2>\n<ul>\n");
         for line in failures {
             let _ = writeln!(out, "<li>{}</li>", escaped(line));
         }
         out.push_str("</ul>\n");
     }
     let (own, theirs): (Vec<&Claim>, Vec<&Claim>) = claims.iter().copied().partition(|claim| claim.check);
-    table_of_claims(&mut out, "Claims of the study", "Study", &theirs);
-    table_of_claims(&mut out, "Checks of ours, and what goes beyond the study", "Expected", &own);
+    table_of_claims(&mut out, "Claims of the publication", "Study", &theirs);
+    table_of_claims(&mut out, "Additional checks and results", "Expected", &own);
     for figure in figures {
         let (name, title) = (escaped(figure.plan.name), escaped(figure.plan.title));
         let _ = writeln!(out, "<h2 id=\"figure-{name}\">Figure {name}: {title}</h2>");
@@ -50,7 +50,7 @@ pub fn html(publication: &Publication, figures: &[Drawn], runs: &Runs, failures:
                 let _ = writeln!(out, "<figure>\n{svg}<figcaption>{caption}</figcaption></figure>");
             }
             Err(why) => {
-                let _ = writeln!(out, "<p>It could not be made: {}</p>", escaped(why));
+                let _ = writeln!(out, "<p>This figure could not be made: {}</p>", escaped(why));
             }
         }
     }
@@ -93,8 +93,8 @@ fn summary(out: &mut String, claims: &[&Claim], runs: &Runs, seconds: f64) {
     };
     let _ = writeln!(
         out,
-        "<p>foldline {VERSION}; relative tolerance {}; runs {computing:.1} s, this report {seconds:.1} s. \
-         Claims of the study: {}. Checks of ours: {}.</p>",
+        "<p>foldline {VERSION}; relative tolerance {}; runs {computing:.1} s, this report {seconds:.1} s. Claims of \
+         the publication: {}. Additional checks: {}.</p>",
         if tolerances.is_empty() { "·".into() } else { tolerances.join(", ") },
         counted(false),
         counted(true)

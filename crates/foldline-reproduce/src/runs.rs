@@ -64,7 +64,7 @@ impl Run {
         let branch =
             self.diagram.branch(name).ok_or_else(|| format!("{}: there is no branch {name}", self.study.file))?;
         if branch.points.is_empty() {
-            let why = branch.ends.iter().flatten().next().map_or("no reason is known".into(), ToString::to_string);
+            let why = branch.ends.iter().flatten().next().map_or("no reason was recorded".into(), ToString::to_string);
             return Err(format!("{}: the branch {name} has no points: {why}", self.study.file));
         }
         Ok(branch)
@@ -106,7 +106,7 @@ impl Run {
     /// It is not there.
     pub fn responses(&self, name: &str) -> Result<&Responses, String> {
         let found = self.diagram.response_set(name);
-        found.ok_or_else(|| format!("{}: the simulation {name} is not complete", self.study.file))
+        found.ok_or_else(|| format!("{}: the simulation {name} is incomplete", self.study.file))
     }
 
     /// The special points of that kind on a branch.
@@ -167,7 +167,7 @@ impl<'r> Runs<'r> {
         match self.done.get(name) {
             Some(Ok(run)) => Ok(run),
             Some(Err(why)) => Err(format!("the run {name} failed: {why}")),
-            None => Err(format!("the run {name} was not asked for")),
+            None => Err(format!("the run {name} was not requested")),
         }
     }
 
@@ -219,7 +219,7 @@ impl<'r> Runs<'r> {
             s if s < 90.0 => format!("{s:.0} s"),
             s => format!("{:.0} min", s / 60.0),
         };
-        format!(" (runs to go: {}, about {time})", self.ahead.len())
+        format!(" ({} runs left, about {time})", self.ahead.len())
     }
 
     fn carried_out(&self, plan: &StudyPlan) -> Result<Run, String> {
@@ -241,7 +241,7 @@ impl<'r> Runs<'r> {
         watch.recorder.finish().map_err(|error| error.to_string())?;
         let seconds = start.elapsed().as_secs_f64();
         if self.stop.load(Ordering::Relaxed) {
-            return Err("it was stopped; the same command goes on".into());
+            return Err("stopped".into());
         }
         let mark = format!("{name}\n{seconds}\n");
         std::fs::write(folder.join(FINISHED), mark).map_err(|error| format!("{}: {error}", folder.display()))?;
@@ -296,7 +296,7 @@ fn quick(plan: &mut Plan, tolerance: f64) {
     plan.tolerance = tolerance;
 }
 
-/// Records, tells how a simulation gets on, and stops when asked to.
+/// Records, reports the progress of simulations, and stops when asked to.
 struct Watch<'w> {
     recorder: Recorder,
     stop: &'w AtomicBool,
@@ -318,7 +318,7 @@ impl Watch<'_> {
         *told = now;
         // The time began with the first value.
         let left = now.duration_since(*begun).as_secs_f64() * (of - done) as f64 / done.max(2).saturating_sub(1) as f64;
-        (self.say)(&format!("  {name}: {done} of {of} values, about {left:.0} s to go"));
+        (self.say)(&format!("  {name}: {done} of {of} values, about {left:.0} s left"));
     }
 }
 
@@ -329,5 +329,9 @@ impl Observer for Watch<'_> {
         }
         let verdict = self.recorder.observe(event);
         if self.stop.load(Ordering::Relaxed) { Verdict::Stop } else { verdict }
+    }
+
+    fn stopping(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
     }
 }

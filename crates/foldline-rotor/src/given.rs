@@ -135,7 +135,7 @@ fn read<const N: usize>(table: &[(&str, &str, Allowed); N], pairs: &[(&str, &str
             continue;
         };
         if std::mem::replace(&mut given[k], true) {
-            let cure = "keep one of the two".into();
+            let cure = "remove one of the two".into();
             found.push(Mistake { place, cause: format!("`{name}` is given twice"), cure });
             continue;
         }
@@ -145,7 +145,14 @@ fn read<const N: usize>(table: &[(&str, &str, Allowed); N], pairs: &[(&str, &str
         }
     }
     for ((name, unit, _), _) in table.iter().zip(&given).filter(|(_, given)| !**given) {
-        let cure = if *unit == "1" { "give a plain number".into() } else { format!("give it in {unit} or the like") };
+        let cure = if *unit == "1" {
+            "give a plain number".into()
+        } else {
+            format!(
+                "give it in {unit} or a \
+                                        compatible unit"
+            )
+        };
         found.push(Mistake { place: (*name).into(), cause: "it is missing".into(), cure });
     }
     if found.is_empty() { Ok(values) } else { Err(found) }
@@ -162,8 +169,8 @@ fn out_of_range(table: &[(&str, &str, Allowed)], values: &[f64]) -> Vec<Mistake>
         let unit = if unit == "1" { String::new() } else { format!(" {unit}") };
         (!fits || !value.is_finite()).then(|| Mistake {
             place: format!("{name} = {value}{unit}"),
-            cause: "no rotor has such a value".into(),
-            cure: format!("{name} is {wanted}"),
+            cause: "this value is physically impossible".into(),
+            cure: format!("{name} must be {wanted}"),
         })
     });
     judged.collect()

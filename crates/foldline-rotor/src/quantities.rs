@@ -223,8 +223,8 @@ impl Nondimensional {
         let wrong =
             measures.iter().filter(|(_, value)| !(*value > 0.0 && value.is_finite())).map(|(name, value)| Mistake {
                 place: format!("{name} = {value}"),
-                cause: "no rotor has such a measure".into(),
-                cure: format!("{name} is greater than 0"),
+                cause: "this value is physically impossible".into(),
+                cure: format!("{name} must be greater than 0"),
             });
         let wrong: Vec<Mistake> = wrong.collect();
         if !wrong.is_empty() {

@@ -86,7 +86,7 @@ impl Unit {
                 return Err(mistake("a factor is missing".into(), "write it as in `N/m`"));
             }
             if index > 0 && factors.len() > 1 {
-                let cause = format!("`/{}` can be read in two ways", part.trim());
+                let cause = format!("`/{}` is ambiguous", part.trim());
                 return Err(mistake(cause, "put all products before the first `/`, as in `N s/m`"));
             }
             for factor in factors {
@@ -95,7 +95,8 @@ impl Unit {
                 })?;
                 let one = of_symbol(symbol).ok_or_else(|| {
                     let known =
-                        "known are m, g, t, s, min, N, Hz, rpm, rad, deg, rev and the prefixes n, µ, m, c, k, M, G";
+                        "the known units are m, g, t, s, min, N, Hz, rpm, rad, deg and rev, with the prefixes n, µ, \
+                         m, c, k, M and G";
                     mistake(format!("`{symbol}` is not a known unit"), known)
                 })?;
                 unit = unit.times(one, if divided { -power } else { power });
@@ -156,7 +157,7 @@ pub fn quantity(name: &str, text: &str, unit: &str) -> Result<f64, Mistake> {
     let example = match unit {
         "" | "1" => "give a plain number, as in `0.25`".to_string(),
         "rad/s" => "give a speed as in `500 rad/s`, `80 Hz` or `4800 rpm`".to_string(),
-        _ => format!("give a number with a unit of the kind {unit}, as in `2.5 {unit}`"),
+        _ => format!("give a number with a unit compatible with {unit}, as in `2.5 {unit}`"),
     };
     let trimmed = text.trim();
     let Some((value, rest)) = leading_number(trimmed) else {
@@ -167,7 +168,7 @@ pub fn quantity(name: &str, text: &str, unit: &str) -> Result<f64, Mistake> {
         let cause = match rest.trim() {
             "" => format!("it has no unit, but is measured in {unit}"),
             rest if unit.is_empty() || unit == "1" => format!("it has the unit {rest}, but is a plain number"),
-            rest => format!("{rest} does not measure the same as {unit}"),
+            rest => format!("{rest} does not have the dimension of {unit}"),
         };
         return Err(Mistake { place, cause, cure: example });
     }
@@ -219,12 +220,12 @@ mod tests {
     #[test]
     fn what_is_not_a_value_of_that_kind_is_refused_with_a_cure() {
         for (text, unit, cause) in [
-            ("0.5 kg", "m", "does not measure the same"),
+            ("0.5 kg", "m", "does not have the dimension"),
             ("0.5", "m", "no unit"),
-            ("50 1/s", "rad/s", "does not measure the same"),
+            ("50 1/s", "rad/s", "does not have the dimension"),
             ("3 mm", "1", "plain number"),
             ("3 furlong", "m", "not a known unit"),
-            ("2 N/m s", "N s/m", "two ways"),
+            ("2 N/m s", "N s/m", "is ambiguous"),
             ("2 N//m", "N/m", "missing"),
             ("2 m^x", "m", "whole-number power"),
             ("inf m", "m", "finite number"),

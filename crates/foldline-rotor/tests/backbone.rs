@@ -320,7 +320,7 @@ fn what_has_no_backbone_is_refused() {
     assert!(refused(&CUBIC, 1, 0, &reach).contains("power"));
     assert!(refused(&CUBIC, 4, 2, &reach).contains("lowest terms"));
     assert!(refused(&CUBIC, 7, 6, &reach).contains("no speed"));
-    assert!(refused(&CUBIC, 2, 1, &Reach { speeds: [4.0, 10.0], ..reach }).contains("not inside"));
+    assert!(refused(&CUBIC, 2, 1, &Reach { speeds: [4.0, 10.0], ..reach }).contains("lies outside"));
     assert!(refused(&CUBIC, 2, 1, &Reach { radius: f64::NAN, ..reach }).contains("positive"));
     assert!(refused(&Nondimensional { gamma: f64::NAN, ..CUBIC }, 2, 1, &reach).contains("not the root"));
 }

@@ -80,9 +80,12 @@ fn nondimensional_constants_are_read_and_checked_too() {
     let pairs: Vec<(&str, &str)> = names.into_iter().zip(good).collect();
     let found = Nondimensional::given(&pairs).unwrap();
     assert_eq!(found.parameters(), [5.0, 1.0, 1e-5, 1.5, 0.25, 10.0, 150.0, 0.143, 0.9]);
-    for (at, text, cause) in
-        [(2, "0.01 kg", "plain number"), (1, "1.5", "no rotor"), (8, "1.2", "above 1"), (7, "0.5", "no rigid body")]
-    {
+    for (at, text, cause) in [
+        (2, "0.01 kg", "plain number"),
+        (1, "1.5", "physically impossible"),
+        (8, "1.2", "above 1"),
+        (7, "0.5", "no rigid body"),
+    ] {
         let mut pairs = pairs.clone();
         pairs[at].1 = text;
         let mistakes = Nondimensional::given(&pairs).unwrap_err();
@@ -102,10 +105,10 @@ fn what_no_rotor_has_is_refused() {
         );
         mistakes.iter().map(|m| m.to_string()).collect::<Vec<_>>().join("\n")
     };
-    assert_eq!(refused("c", "-0.5 mm"), "c = -0.0005 m: no rotor has such a value; c is greater than 0");
+    assert_eq!(refused("c", "-0.5 mm"), "c = -0.0005 m: this value is physically impossible; c must be greater than 0");
     assert_eq!(
         refused("c", "0.5 g"),
-        "c = `0.5 g`: g does not measure the same as m; give a number with a unit of the kind m, as in `2.5 m`"
+        "c = `0.5 g`: g does not have the dimension of m; give a number with a unit compatible with m, as in `2.5 m`"
     );
     assert!(refused("omega", "80 1/s").ends_with("give a speed as in `500 rad/s`, `80 Hz` or `4800 rpm`"));
     assert!(refused("kappa", "1.5").contains("from 0 to 1"));

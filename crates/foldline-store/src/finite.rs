@@ -8,8 +8,8 @@ use foldline::model::Model;
 use std::ops::Range;
 use toml::de::DeTable;
 
-const CURE: &str = "look for a division by zero, or a log or sqrt of something negative; or change the parameters or the \
-                    sampling `range` of the states";
+const CURE: &str = "check for a division by zero, or a log or sqrt of a negative number; or change the parameters or \
+                    the sampling `range` of the states";
 
 /// A complaint, placed at the equation, if f is finite nowhere in the sampling range of the states.
 pub fn never_finite(model: &Model, parameters: &[f64], model_text: &str, model_file: &str) -> Option<Diagnostic> {

@@ -1,7 +1,7 @@
 //! Requests of a study that were not fulfilled.
 
 use crate::order::leg;
-use foldline::diagram::{Branch, Diagram, Ending, Kind, Motion, Shortfall};
+use foldline::diagram::{Branch, Diagram, Ending, Kind, Motion, Shortfall, Shown};
 use foldline::explore::{HomotopyPlan, Plan, SweepPlan};
 use foldline::model::Model;
 
@@ -51,17 +51,17 @@ fn absent(diagram: &Diagram, plan: &Plan) -> Vec<String> {
     let never = targets.iter().filter(|(name, _)| diagram.branch(name).is_none());
     let simulated = plan.surveys.iter().map(|s| &s.name).chain(plan.sweeps.iter().map(|s| &s.name));
     let missing = simulated.filter(|name| diagram.response_set(name).is_none());
-    let never = never.map(|(name, _)| format!("{name}: it never began"));
-    never.chain(missing.map(|name| format!("{name}: it is not complete"))).collect()
+    let never = never.map(|(name, _)| format!("{name}: it was not started"));
+    never.chain(missing.map(|name| format!("{name}: it is incomplete"))).collect()
 }
 
 fn not_arrived(diagram: &Diagram, homotopy: &HomotopyPlan, model: &Model) -> Option<String> {
     let legs: Vec<&Branch> = diagram.branches.iter().filter(|b| leg(&b.name, &homotopy.name).is_some()).collect();
     let HomotopyPlan { name, targets, .. } = homotopy;
     match legs.iter().any(|leg| leg.end_at(targets).is_some()) {
-        _ if legs.is_empty() => Some(format!("{name}: it never began")),
+        _ if legs.is_empty() => Some(format!("{name}: it was not started")),
         true => None,
-        false => Some(format!("{name}: it did not arrive at {}", place(targets, model))),
+        false => Some(format!("{name}: it did not reach {}", place(targets, model))),
     }
 }
 
@@ -70,9 +70,9 @@ fn cut_off(diagram: &Diagram, sweep: &SweepPlan, model: &Model) -> Option<String
     let last = diagram.response_set(&sweep.name)?.responses.last()?;
     (last.motion == Motion::Escaped).then(|| {
         format!(
-            "{}: at {} the motion {}; the sweep ends there, {} of {} values visited\n\
-             likely cause: the motion loses stability, or its basin becomes so narrow that a step of the sweep leaves it\n\
-             what to do: use smaller steps there, or follow the motion as a branch, which continues while it is unstable",
+            "{}: at {} the motion {}; the sweep ends there, after {} of {} values\nlikely cause: the motion loses \
+             stability, or its basin becomes narrower than a step of the sweep\nwhat to do: use smaller steps there, \
+             or follow the motion as a branch, which includes unstable parts",
             sweep.name,
             place(&[(sweep.free, last.value)], model),
             last.fate(),
@@ -90,11 +90,11 @@ fn ended(branch: &Branch, target: Option<(usize, f64)>, model: &Model) -> Vec<St
     lines.dedup();
     let whole = lines.is_empty();
     if branch.ends.iter().all(Option::is_none) {
-        lines.push(format!("{}: it is not finished", branch.name));
+        lines.push(format!("{}: it is unfinished", branch.name));
     } else if let Some(target) = target.filter(|target| whole && branch.end_at(&[*target]).is_none()) {
         let ends: Vec<String> = branch.ends.iter().flatten().map(Ending::brief).collect();
         let place = place(&[target], model);
-        lines.push(format!("{}: it did not arrive at {place}; {}", branch.name, ends.join("; ")));
+        lines.push(format!("{}: it did not reach {place}; {}", branch.name, ends.join("; ")));
     }
     lines
 }
@@ -114,15 +114,15 @@ fn unexplained(branch: &Branch, model: &Model) -> Option<String> {
         }
     };
     Some(format!(
-        "{}: {changes} by a special point\nwhat to do: treat the stability next to it as uncertain; `foldline verify` or a smaller tolerance \
-         may resolve it",
+        "{}: {changes} by a special point\nwhat to do: treat the stability there as uncertain; `foldline verify` or \
+         a smaller tolerance may resolve it",
         branch.name
     ))
 }
 
 fn place(targets: &[(usize, f64)], model: &Model) -> String {
     let name = |index: usize| model.parameters.get(index).map_or("?", |parameter| parameter.name.as_str());
-    targets.iter().map(|(index, goal)| format!("{} = {goal}", name(*index))).collect::<Vec<_>>().join(", ")
+    targets.iter().map(|(index, goal)| format!("{} = {}", name(*index), Shown(*goal))).collect::<Vec<_>>().join(", ")
 }
 
 #[cfg(test)]
@@ -179,8 +179,8 @@ mod tests {
     }
 
     #[test]
-    fn what_is_absent_never_began() {
-        assert_eq!(said(Vec::new()), ["b: it never began", "c: it never began", "h: it never began"]);
+    fn what_is_absent_was_not_started() {
+        assert_eq!(said(Vec::new()), ["b: it was not started", "c: it was not started", "h: it was not started"]);
     }
 
     #[test]
@@ -192,9 +192,9 @@ mod tests {
             branch("b/hopf-1", None, Ending::PointLimit(7), [1.0, 0.0]),
         ]);
         let expected = [
-            "h: it did not arrive at kappa = 1",
-            "b: it did not arrive at Omega = 4; reached 0",
-            "c: step too small: a cusp",
+            "h: it did not reach kappa = 1",
+            "b: it did not reach Omega = 4; reached 0",
+            "c: step size too small: a cusp",
             "b/hopf-1: stopped at the limit of 7 points",
         ];
         assert_eq!(found, expected);
@@ -226,13 +226,12 @@ mod tests {
         let study = study();
         let short = |about: &str, what: &str| Shortfall { about: about.into(), what: what.into() };
         let branches = vec![branch("b", None, Ending::Bound(4.0), [4.0, 0.0])];
-        let shortfalls =
-            vec![short("b", "hopf 2.0 of b: no branch found to switch to"), short("h", "there is nothing")];
+        let shortfalls = vec![short("b", "hopf 2.0 of b: no bifurcating branch found"), short("h", "there is nothing")];
         let found = lines(&Diagram { branches, shortfalls, ..Diagram::default() }, &study.plan, &study.model);
         let expected = [
-            "c: it never began",
-            "h: it never began\nthere is nothing",
-            "b: hopf 2.0 of b: no branch found to switch to",
+            "c: it was not started",
+            "h: it was not started\nthere is nothing",
+            "b: hopf 2.0 of b: no bifurcating branch found",
         ];
         assert_eq!(found, expected);
     }

@@ -110,10 +110,13 @@ impl<'t> Walk<'t> {
                     (message, format!("give it in {unit}, or in a unit of the same dimension"))
                 }
                 false => {
-                    let message = format!("{what} is in {}, and the model states no unit for it", written.unit);
+                    let message = format!("{what} is in {}, but the model gives no unit for it", written.unit);
                     (
                         message,
-                        format!("state it in the model, as in `unit = \"{}\"`, or give a plain number", written.unit),
+                        format!(
+                            "add the unit to the model, as in `unit = \"{}\"`, or give a plain number",
+                            written.unit
+                        ),
                     )
                 }
             };
@@ -131,7 +134,7 @@ impl<'t> Walk<'t> {
         match u64::from_str_radix(&integer.as_str().replace('_', ""), integer.radix()) {
             Ok(number) if allowed.contains(&number) => Some(number),
             _ => {
-                let message = format!("{what} is {}, out of bounds", integer.as_str());
+                let message = format!("{what} is {}, out of range", integer.as_str());
                 let hint = match *allowed.end() {
                     u64::MAX => format!("an integer from {} upwards", allowed.start()),
                     end => format!("an integer from {} to {end}", allowed.start()),
@@ -146,12 +149,12 @@ impl<'t> Walk<'t> {
     pub(crate) fn string(&mut self, value: &Value, what: &str) -> Option<String> {
         match value.get_ref().as_str() {
             Some("") => {
-                self.report(value.span(), format!("{what} is empty"), "write something between the quotes");
+                self.report(value.span(), format!("{what} is empty"), "write text between the quotes");
                 None
             }
             Some(text) => Some(text.to_string()),
             None => {
-                self.wrong_type(value, value.get_ref().type_str(), what, "a text in quotes");
+                self.wrong_type(value, value.get_ref().type_str(), what, "text in quotes");
                 None
             }
         }
@@ -188,9 +191,18 @@ impl<'t> Walk<'t> {
     }
 
     fn wrong_type(&mut self, value: &Value, found: &str, what: &str, wanted: &str) {
-        let article = if found.starts_with(['a', 'e', 'i', 'o', 'u']) { "an" } else { "a" };
-        self.report(value.span(), format!("{what} is {article} {found}, not {wanted}"), format!("write {wanted}"));
+        self.report(
+            value.span(),
+            format!("{what} is {}, not {wanted}", with_article(found)),
+            format!("write {wanted}"),
+        );
     }
+}
+
+/// The noun with its indefinite article: `a table`, `an array`.
+pub(crate) fn with_article(noun: &str) -> String {
+    let article = if noun.starts_with(['a', 'e', 'i', 'o', 'u']) { "an" } else { "a" };
+    format!("{article} {noun}")
 }
 
 /// A diagnostic for a byte range of a text. Of a long line, the part around the place is shown; characters that would do

@@ -225,7 +225,7 @@ fn the_unit_of_time_follows_from_the_others() {
     assert_eq!(time("", "v = \"-v\""), "");
     assert_eq!(time("time = \"h\"", "v = \"-v\""), "h");
     let wrong = model("time = \"kg\"", "v = \"-v\"").unwrap_err();
-    assert!(wrong[0].message.contains("no unit of time"), "{}", wrong[0]);
+    assert!(wrong[0].message.contains("not a unit of time"), "{}", wrong[0]);
 }
 
 /// A run of a program that did not check units.

@@ -125,7 +125,7 @@ fn a_neighbour_that_does_not_exist_is_refused() {
     assert_eq!(place, (13, 34));
     assert_eq!(message, "there is no `x[0]`: `x` has elements 1 to 4, at i = 1");
     assert!(
-        hint.starts_with("state its value: `before = \"0\"` where it is fixed, `before = \"x[1]\"` at a free end"),
+        hint.starts_with("give its value: `before = \"0\"` if it is fixed, `before = \"x[1]\"` at a free end"),
         "{hint}"
     );
     let (_, message, hint) = mistake(&CHAIN.replace("x[i+1]", "x[i+2]"));
@@ -139,21 +139,26 @@ fn mistakes_with_indices_have_their_place() {
         ("2*x[i]", "2*x", (14, 27), "`x` is repeated over an index"),
         ("c*v[i]", "c[i]*v[i]", (14, 44), "`c` has no index"),
         ("c*v[i]", "c*v[i", (14, 47), "this bracket is never closed"),
-        ("c*v[i]", "c*v[i/2]", (14, 46), "the index of `v` is 0.5, not a whole number"),
-        ("c*v[i]", "c*v[k]", (14, 46), "the index of `v` is not known before the model runs"),
+        ("c*v[i]", "c*v[i/2]", (14, 46), "the index of `v` is 0.5, not an integer"),
+        ("c*v[i]", "c*v[k]", (14, 46), "the index of `v` depends on a quantity that varies"),
         ("c*v[i]", "c*[i]", (14, 46), "an index belongs to a name"),
-        ("c*v[i]", "c*sum(j, 1, k, v[j])", (14, 50), "the ends of this sum are not two whole numbers"),
-        ("c*v[i]", "c*sum(i, 1, 4, v[i])", (14, 50), "the index `i` of this sum has a meaning already: it is an index"),
-        ("c*v[i]", "c*sum(v, 1)", (14, 46), "`sum` has another form"),
+        ("c*v[i]", "c*sum(j, 1, k, v[j])", (14, 50), "the limits of this sum are not two integers"),
+        (
+            "c*v[i]",
+            "c*sum(i, 1, 4, v[i])",
+            (14, 50),
+            "the index `i` of this sum has a name that is already in use: it is an index",
+        ),
+        ("c*v[i]", "c*sum(v, 1)", (14, 46), "`sum` is not written correctly"),
         ("c*v[i]", "c*v(i)", (14, 46), "there is no function `v`"),
         ("count = \"n\"\nequation = \"v[i]\"", "count = \"m\"\nequation = \"v[i]\"", (8, 10), "`m` is not a constant"),
-        ("c = 0.1", "c = 0.1\ni = 3", (8, 9), "the index `i` has the name of something else: it is a parameter"),
+        ("c = 0.1", "c = 0.1\ni = 3", (8, 9), "the index `i` has a name that is already in use: it is a parameter"),
         ("n = 4", "n = 0", (8, 9), "the count of the state `x` is 0"),
         ("n = 4", "n = -3", (8, 9), "the count of the state `x` is -3"),
         ("n = 4", "n = 2.5", (8, 9), "the count of the state `x` is 2.5"),
-        ("n = 4", "n = 1e9", (8, 9), "the model has 2000000000 states, more than 1000"),
+        ("n = 4", "n = 1e9", (8, 9), "the model has 2000000000 states; the limit is 1000"),
         ("n = 4", "n = 1e300", (8, 9), "the count of the state `x` is"),
-        ("before = \"0\"", "before = \"x[0]\"", (10, 11), "definitions that need each other: x[0] → x[0]"),
+        ("before = \"0\"", "before = \"x[0]\"", (10, 11), "circular definitions: x[0] → x[0]"),
         ("before = \"0\"", "periodic = 3", (10, 12), "`periodic` is neither true nor false"),
         ("before = \"0\"", "periodic = true", (10, 12), "has values beyond its ends"),
     ];
@@ -168,9 +173,9 @@ fn mistakes_with_indices_have_their_place() {
 #[test]
 fn repetition_without_measure_is_refused() {
     let text = "[states.x]\ncount = 1000\nequation = 'sum(j, 1, 1000, sum(k, 1, 1000, sum(l, 1, 1000, sin(x[j]*x[k]*x[l]))))'\n";
-    assert_eq!(mistake(text).1, "repetition, sums and functions make more than four million terms");
+    assert_eq!(mistake(text).1, "repeated equations, sums and functions expand to more than four million terms");
     let text = "[states]\nx = 'sum(j, 1, 900000000, x)'\n";
-    assert_eq!(mistake(text).1, "repetition, sums and functions make more than four million terms");
+    assert_eq!(mistake(text).1, "repeated equations, sums and functions expand to more than four million terms");
     let deep = format!("[states]\nx = '{}x{}'\n", "sum(j, 1, 1, ".repeat(5000), ")".repeat(5000));
     assert!(!parse_model(&deep, "m").expect_err("too deep").is_empty());
     let indices = format!("[states.x]\ncount = 1\nequation = '{}1{}'\n", "x[".repeat(5000), "]".repeat(5000));
@@ -179,7 +184,7 @@ fn repetition_without_measure_is_refused() {
     (1..40).for_each(|k| text += &format!("\"f{k}(x)\" = 'f{}(x) + f{}(2*x)'\n", k - 1, k - 1));
     assert_eq!(
         mistake(&(text + "[states]\nx = 'f39(x)'\n")).1,
-        "repetition, sums and functions make more than four million terms"
+        "repeated equations, sums and functions expand to more than four million terms"
     );
 }
 
@@ -197,16 +202,16 @@ fn mistakes_with_functions_have_their_place() {
     model(text);
     let cases = [
         ("f(x, 1)", "f(x)", (5, 6), "`f` takes 2 arguments, 1 given"),
-        ("z^2", "f(z, z)", (3, 11), "functions that call each other: f → g → f"),
-        ("z^2", "g(z)", (3, 11), "functions that call each other: g → g"),
+        ("z^2", "f(z, z)", (3, 11), "circular function calls: f → g → f"),
+        ("z^2", "g(z)", (3, 11), "circular function calls: g → g"),
         ("z^2", "w^2", (3, 11), "unknown name `w`"),
         ("f(x, 1)", "h(x, 1)", (5, 6), "there is no function `h`"),
         ("f(x, 1)", "f*x", (5, 6), "unknown name `f`"),
-        ("\"g(z)\"", "\"g\"", (3, 1), "`g` is not a function with its arguments"),
-        ("\"g(z)\"", "\"g()\"", (3, 1), "`g()` is not a function with its arguments"),
-        ("\"g(z)\"", "\"g(z, z)\"", (3, 1), "two arguments are called `z`"),
+        ("\"g(z)\"", "\"g\"", (3, 1), "`g` is not a function name with arguments"),
+        ("\"g(z)\"", "\"g()\"", (3, 1), "`g()` is not a function name with arguments"),
+        ("\"g(z)\"", "\"g(z, z)\"", (3, 1), "two arguments have the name `z`"),
         ("\"g(z)\"", "\"sin(z)\"", (3, 1), "`sin` is the name of a function"),
-        ("\"g(z)\"", "\"x(z)\"", (5, 1), "the name `x` is used twice: it is a function already"),
+        ("\"g(z)\"", "\"x(z)\"", (5, 1), "the name `x` is already taken by a function"),
     ];
     for (from, to, place, words) in cases {
         let found = parse_model(&text.replacen(from, to, 1), "model.toml").expect_err(to);
@@ -253,9 +258,11 @@ fn masses_couple_equations() {
     same(text, long);
     same("[states]\nx = 'y'\ny = '-x'\n[mass]\ny = 4\n", "[states]\nx = 'y'\ny = '-x/4'\n");
     let (place, message, _) = mistake(&text.replace("th = { x = 'm*l*cos(th)', th", "th = { th"));
-    assert_eq!((place.0, message.as_str()), (9, "the mass of `x` and `th` is given, that of `th` and `x` is not"));
+    assert_eq!((place.0, message.as_str()), (9, "the mass of `x` and `th` is given, but that of `th` and `x` is not"));
     let singular = text.replace("th = 'm*l^2'", "th = 0").replace("m*l*cos(th)", "0");
-    assert!(mistake(&singular).1.starts_with("the mass matrix has no diagonal entry left for `th'`"));
+    assert!(
+        mistake(&singular).1.starts_with("the mass matrix is singular: elimination leaves no diagonal entry for `th'`")
+    );
     assert_eq!(mistake(&text.replace("\nth = {", "\ny = {")).1, "`y` is not a state");
 }
 
@@ -267,7 +274,7 @@ fn tables_are_functions() {
     same(&held, "[states]\nx = '-if(x < 0, 0, if(x < 1, 2*x, if(x < 3, 2 + (x - 1)/2, 3))) + 0 + 3'\ny = '2.5'\n");
     assert_eq!((model(text).switch_count(), model(&held).switch_count()), (1, 3));
     assert!(mistake(&text.replace("[0, 1, 3]", "[0, 3, 1]")).1.contains("do not increase: 3 is followed by 1"));
-    assert_eq!(mistake(&text.replace("[0, 1, 3]", "[0, 1]")).1, "the table has 2 values `x` and 3 values `y`");
+    assert_eq!(mistake(&text.replace("[0, 1, 3]", "[0, 1]")).1, "the table has 2 `x` values and 3 `y` values");
     assert_eq!(mistake(&text.replace("[0, 1, 3]", "3")).0, (2, 5));
     assert!(mistake(&text.replace("[states]", "interpolation = 'spline'\n[states]")).1.contains("neither"));
 }
@@ -300,7 +307,7 @@ fn a_state_is_given_for_all_elements_or_for_each() {
     };
     assert_eq!(given("{ x = [1, 2, 3], \"x'\" = 0, \"x'[2]\" = 5 }"), [1.0, 0.0, 2.0, 5.0, 3.0, 0.0]);
     let message = |state: &str| study(state).expect_err(state)[0].message.clone();
-    assert_eq!(message("{ x = [1, 2], \"x'\" = 0 }"), "the state `x` has 3 elements, and 2 values here");
+    assert_eq!(message("{ x = [1, 2], \"x'\" = 0 }"), "the state `x` has 3 elements, but 2 values are given");
     assert_eq!(message("{ x = 1 }"), "the state lacks x'[1], x'[2], x'[3]");
     assert!(message("{ x = \"1\", \"x'\" = 0 }").contains("the state `x`"));
 }

@@ -48,12 +48,12 @@ fn a_study_may_simulate_only() {
 fn mistakes_are_answered_with_place_and_cure() {
     let cases: [(&str, &str, &[&str]); 11] = [
         ("range = [-1, 2]", "range = [2, -1]", &["study.toml:12:9", "the wrong way round", "write [-1, 2]"]),
-        ("count = 4\nstarts", "starts", &["study.toml:12:9", "how many values", "count = 101"]),
-        ("starts = 8", "starts = 0", &["study.toml:14:10", "out of bounds"]),
+        ("count = 4\nstarts", "starts", &["study.toml:12:9", "has no `count`, the number of values", "count = 101"]),
+        ("starts = 8", "starts = 0", &["study.toml:14:10", "out of range"]),
         ("range = [-1, 2]\ncount = 4\n", "", &["this survey has no values", "values = [3, 3.5, 4]"]),
         ("count = 4\nstarts", "count = 4\nvalues = [1]\nstarts", &["both `values` and a `range`"]),
         ("from = \"start\"", "from = \"stat\"", &["study.toml:18:8", "no seed \"stat\"", "did you mean `start`"]),
-        ("from = \"start\"\n", "", &["this sweep does not say where it starts"]),
+        ("from = \"start\"\n", "", &["this sweep has no `from`"]),
         ("name = \"down\"", "name = \"many\"", &["study.toml:17:8", "used twice"]),
         ("free = \"mu\"\nparameters", "free = \"nu\"\nparameters", &["study.toml:10:8", "nu", "mu"]),
         ("free = \"mu\"\nrange = [2", "range = [2", &["this sweep has no free parameter"]),

@@ -129,7 +129,7 @@ fn diagram() -> Diagram {
     let sets =
         sets.map(|(name, search)| Responses { name: name.into(), search, free: 2, responses: responses.clone() });
     let shortfalls = vec![
-        Shortfall { about: "main".into(), what: "hopf 0.15 of main: no branch found to switch to".into() },
+        Shortfall { about: "main".into(), what: "hopf 0.15 of main: no bifurcating branch found".into() },
         Shortfall { about: "third".into(), what: "two\nlines".into() },
     ];
     Diagram { branches: vec![main, cycles, third, curve], responses: sets.to_vec(), shortfalls }
@@ -643,7 +643,7 @@ fn what_cannot_be_continued_is_refused_with_the_reason_and_the_cure() {
     let folder = tempfile::tempdir().unwrap();
     Recorder::create(folder.path(), &study()).unwrap().finish().unwrap();
     let exists = refusal(Recorder::create(folder.path(), &study()));
-    assert!(exists.contains("exists already") && exists.contains("--resume"), "{exists}");
+    assert!(exists.contains("already exists") && exists.contains("--resume"), "{exists}");
 
     let other = Study { text: STUDY.replace("2]", "3]"), ..study() };
     let changed = refusal(Recorder::resume(folder.path(), &other));
@@ -659,6 +659,6 @@ fn what_cannot_be_continued_is_refused_with_the_reason_and_the_cure() {
     assert!(newer.contains("format 99") && newer.contains("newer foldline"), "{newer}");
 
     std::fs::write(path_in(folder.path()), "not a database, but long enough to be taken for one").unwrap();
-    assert!(refusal(load(folder.path())).contains("is not a run file"));
+    assert!(refusal(load(folder.path())).contains("is not a foldline run file"));
     assert!(refusal(load(Path::new("/nowhere/at/all"))).contains("there is no run file"));
 }

@@ -204,15 +204,15 @@ impl Conversion {
 
 /// How a quantity is shown in `unit`, and the label of that.
 fn shown(model: &Model, name: &str, declared: &str, unit: &str) -> Result<(Shown, String), Refusal> {
-    let lacks = |name: &str| [format!("{name} has no unit in the model"), "declare it there: `unit = \"…\"`".into()];
+    let lacks =
+        |name: &str| [format!("{name} has no unit in the model"), "declare it in the model: `unit = \"…\"`".into()];
     let refused = |from: &str, to: &str, why: Mismatch| {
         let hint = match why {
             Mismatch::Dimension => format!("choose a unit of the same dimension as {from}"),
             Mismatch::Turns => {
-                "say `rad/s` in the model where an angular frequency is meant, `Hz` or `rpm` where turns are counted"
-                    .into()
+                "in the model, use `rad/s` for an angular frequency and `Hz` or `rpm` for revolutions per time".into()
             }
-            Mismatch::Zero => "give differences of temperature in K on both sides".into(),
+            Mismatch::Zero => "use K on both sides for temperature differences".into(),
         };
         [format!("{name} is in {from} and cannot be shown in {to}: {why}"), hint]
     };
@@ -220,7 +220,7 @@ fn shown(model: &Model, name: &str, declared: &str, unit: &str) -> Result<(Shown
     if let Some(reference) = unit.strip_prefix("orders:") {
         let Some(index) = model.parameter_index(reference) else {
             let known: Vec<&str> = model.parameters.iter().map(|p| p.name.as_str()).collect();
-            return Err([format!("orders of `{reference}`, which is no parameter"), suggest(reference, &known)]);
+            return Err([format!("orders of `{reference}`: it is not a parameter"), suggest(reference, &known)]);
         };
         let other = &model.parameters[index].unit;
         let label = format!("orders of {reference}");

@@ -106,7 +106,7 @@ pub fn conversion(model: &Model, typed: &[String]) -> Result<Option<Conversion>,
     let one = |text: &String| match text.split_once('=') {
         Some((name, unit)) if !unit.trim().is_empty() => Ok((name.trim().to_string(), unit.trim().to_string())),
         _ => Err(Failure::typed(
-            format!("--unit {text}: there is no `=` with a unit behind it"),
+            format!("--unit {text}: `=` and a unit are missing"),
             "write --unit NAME=UNIT, for example --unit Omega=rpm",
         )),
     };
@@ -122,7 +122,7 @@ pub fn conversion(model: &Model, typed: &[String]) -> Result<Option<Conversion>,
 pub fn tell_short(diagram: &Diagram, plan: &Plan, model: &Model) -> std::io::Result<bool> {
     let lines = short::lines(diagram, plan, model);
     let mut err = stderr().lock();
-    lines.iter().try_for_each(|line| writeln!(err, "ended short: {}", line.replace('\n', "\n  ")))?;
+    lines.iter().try_for_each(|line| writeln!(err, "incomplete: {}", line.replace('\n', "\n  ")))?;
     Ok(lines.is_empty())
 }
 
@@ -165,7 +165,7 @@ pub fn read(folder: &Path, part: Part) -> Result<Run, Failure> {
     let seeds = study.plan.seeds.iter().map(|seed| &seed.name);
     let shown: Vec<&String> = seeds.chain(diagram.branches.iter().map(|b| &b.name)).collect();
     let mut notes = run.notes;
-    notes.extend(diagram.shortfalls.iter().map(|own| (own.about.clone(), format!("ended short: {}", own.what))));
+    notes.extend(diagram.shortfalls.iter().map(|own| (own.about.clone(), format!("incomplete: {}", own.what))));
     // Remarks about one thing stay in the order in which they were made.
     notes.sort_by_key(|(about, _)| shown.iter().position(|name| of_name(name, about)).unwrap_or(usize::MAX));
     Ok(Run { model: study.model, plan: study.plan, diagram, notes })

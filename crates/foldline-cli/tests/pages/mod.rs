@@ -86,7 +86,7 @@ impl Page {
             assert_eq!(run.status.code(), Some(2), "{}: foldline {command}\n{said}", self.name);
             return said.lines().map(|line| line.trim_end().to_string()).collect();
         }
-        let short: Vec<&str> = said.lines().skip_while(|line| !line.starts_with("ended short: ")).collect();
+        let short: Vec<&str> = said.lines().skip_while(|line| !line.starts_with("incomplete: ")).collect();
         let code = if short.is_empty() { 0 } else { 3 };
         assert_eq!(run.status.code(), Some(code), "{}: foldline {command}\n{said}", self.name);
         let table = String::from_utf8(run.stdout).unwrap();
@@ -94,11 +94,11 @@ impl Page {
         lines.map(|line| line.trim_end().to_string()).collect()
     }
 
-    /// The pictures shown on the page.
+    /// The pictures shown on the page that its commands draw: SVG files. Others are not checked.
     fn pictures(&self) -> Vec<&str> {
         let shown = self.lines.iter().filter(|line| line.starts_with("!["));
         let targets = shown.filter_map(|line| line.split_once("](")?.1.strip_suffix(')'));
-        targets.filter_map(|target| target.rsplit('/').next()).collect()
+        targets.filter_map(|target| target.rsplit('/').next()).filter(|name| name.ends_with(".svg")).collect()
     }
 }
 

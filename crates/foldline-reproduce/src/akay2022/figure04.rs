@@ -122,7 +122,7 @@ fn reached(flows: &Run, sampled: &Run, label: &str, family: &str, [x0, x1, y0, y
 fn same(flows: &Run, flow: &str, others: &Run, branch: &str) -> Result<Finding, String> {
     for branch in [flows.branch(flow)?, others.branch(branch)?] {
         if let Some(short) = branch.ends.iter().flatten().find(|end| !end.complete()) {
-            return Err(format!("{} ended short: {short}", branch.name));
+            return Err(format!("{} is incomplete: {short}", branch.name));
         }
     }
     let mut worst = [0.0_f64, 0.0];

@@ -89,7 +89,7 @@ fn survey(simulated: &Simulated) -> [Layer; 2] {
     let dot = |points: Vec<[f64; 2]>, name: &str| Layer::scatter(points, Marker::Circle, GREY).wide(2.6).named(name);
     let met = simulated.survey.met.iter().map(|met| place(&met.motion)).collect();
     let missed = simulated.missed().map(|stable| [stable.value, max_r(&stable.point)]).collect();
-    [dot(met, "met from many starts"), dot(missed, "met only from beside it").hollow()]
+    [dot(met, "reached from many starts"), dot(missed, "reached only from nearby starts").hollow()]
 }
 
 fn place(motion: &Response) -> [f64; 2] {
@@ -113,7 +113,7 @@ fn swept(run: &Run, simulated: &Simulated) -> Result<Panel, String> {
 
 /// (e): everything that simulation met, over everything that was followed.
 fn everything(run: &Run, other: &Run, simulated: &Simulated) -> Result<Panel, String> {
-    let mut panel = empty("(e)", "everything that attracts in that window", [3.2, 5.2, 0.2, 3.6]);
+    let mut panel = empty("(e)", "all attractors in this window", [3.2, 5.2, 0.2, 3.6]);
     panel.span = 2;
     panel = panel.zooming(SL, "(c)");
     for branch in other.diagram.branches.iter().filter(|b| !b.points.is_empty()) {

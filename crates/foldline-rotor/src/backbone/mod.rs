@@ -194,7 +194,7 @@ pub fn backbone(constants: &Nondimensional, law: ContactLaw, ratio: Ratio, reach
 fn root(constants: &Nondimensional, ratio: Ratio, reach: &Reach, place: &str) -> Result<f64, Mistake> {
     let mistake = |cause: String, cure: String| Mistake { place: place.to_string(), cause, cure };
     if ratio.forward < 1 {
-        let cause = "damping takes power from both lines or none".to_string();
+        let cause = "damping takes power from both lines or from none".to_string();
         return Err(mistake(cause, "give n:m with 1 ≤ m < n, such as 2:1".to_string()));
     }
     let forward = ratio.forward.unsigned_abs();
@@ -209,8 +209,11 @@ fn root(constants: &Nondimensional, ratio: Ratio, reach: &Reach, place: &str) ->
     })?;
     let [low, high] = reach.speeds;
     if !(low < root && root < high && reach.radius > 0.0) {
-        let cause = format!("its root Omega = {root:.6} is not inside {low} to {high}, or the radius is not positive");
-        return Err(mistake(cause, "choose a range of speeds with the root in it, and a positive radius".to_string()));
+        let cause = format!("its root Omega = {root:.6} lies outside {low} to {high}, or the radius is not positive");
+        return Err(mistake(
+            cause,
+            "choose a range of speeds that contains the root, and a positive radius".to_string(),
+        ));
     }
     Ok(root)
 }

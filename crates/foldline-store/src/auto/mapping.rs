@@ -42,10 +42,11 @@ impl Mapping {
     ) -> Result<Mapping, Complaint> {
         if dim != model.dim() {
             let (own, theirs) = (counted(model.dim()), counted(dim));
-            let message = format!("the model {} has {own}, the solution {theirs}", model.name);
+            let message = format!("the model {} has {own}, but the solution has {theirs}", model.name);
             return Err(complaint(
                 message,
-                "give the model of the same equations; a forcing that AUTO computes with two more states is not the same",
+                "give a model with the same states; forcing that AUTO generates with two extra states is not the \
+                 same as forcing in the model",
             ));
         }
         let known: Vec<&str> = model.parameters.iter().map(|p| p.name.as_str()).collect();
@@ -65,13 +66,19 @@ impl Mapping {
             None => {
                 let lacking: Vec<&str> =
                     (0..known.len()).filter(|i| typed[*i].or(named[*i]).is_none()).map(|i| known[i]).collect();
-                let message = format!("which of AUTO's states is {} is not known", lacking.join(", "));
-                return Err(complaint(message, format!("say it, as in `--states 1={}`", known[0])));
+                let message = format!("the number of {} among AUTO's states is unknown", lacking.join(", "));
+                return Err(complaint(message, format!("give it, as in `--states 1={}`", known[0])));
             }
         };
         if (1..=dim).any(|number| !states.contains(&number)) {
-            let message = format!("AUTO's states are numbered 1 to {dim}, and each is one of the model's");
-            return Err(complaint(message, format!("say which, as in `--states 1={}`", known[0])));
+            let message = format!(
+                "`--states` does not match each of AUTO's states, 1 to {dim}, to a state of the \
+                                   model"
+            );
+            return Err(complaint(
+                message,
+                format!("give a different number for each state, as in `--states 1={}`", known[0]),
+            ));
         }
         Ok(Mapping { parameters, states })
     }

@@ -8,7 +8,7 @@ use crate::diagnostic::Diagnostic;
 use crate::toml_walk::diagnose;
 use std::ops::Range;
 
-const HINT: &str = "give the file that AUTO writes as s.NAME or fort.8";
+const HINT: &str = "give the file that AUTO wrote as s.NAME or fort.8";
 
 /// A text, and how far it is read.
 pub(super) struct Reader<'t> {
@@ -68,12 +68,8 @@ impl<'t> Reader<'t> {
         if body.end > self.lines.len() {
             let (there, rows) = (self.lines.len() - body.start, head.rows);
             let message =
-                format!("the file ends within the solution labelled {label}: {there} of its {rows} lines are there");
-            return Err(self.mistake(
-                head.place,
-                message,
-                "copy the file again, whole, or remove this solution from it",
-            ));
+                format!("the file ends inside the solution labelled {label}, after {there} of its {rows} lines");
+            return Err(self.mistake(head.place, message, "copy the complete file again, or remove this solution"));
         }
         let words: Vec<Range<usize>> = self.words(body.clone()).collect();
         let wanted = times.checked_mul(columns).and_then(|n| n.checked_add(head.free)?.checked_add(head.parameters));
@@ -83,11 +79,7 @@ impl<'t> Reader<'t> {
                 words.len(),
                 head.parameters
             );
-            return Err(self.mistake(
-                head.place,
-                message,
-                "the file was changed, or cut within its lines; copy it again",
-            ));
+            return Err(self.mistake(head.place, message, "the file was edited or truncated; copy it again"));
         }
         let (mut moments, mut states) = (Vec::with_capacity(times), Vec::with_capacity(times * (columns - 1)));
         for (k, word) in words[..times * columns].iter().enumerate() {
@@ -118,13 +110,13 @@ impl<'t> Reader<'t> {
         for word in self.words(self.next..self.next + 1) {
             let text = &self.text[word.clone()];
             integers.push(text.parse::<i64>().map_err(|_| {
-                let message = format!("\"{text}\" is not an integer; a solution begins with a line of them");
+                let message = format!("\"{text}\" is not an integer; a solution begins with a line of integers");
                 self.mistake(word, message, HINT)
             })?);
         }
         let [branch, _, kind, label, free, _, times, columns, rows, intervals, degree, parameters, ..] = integers[..]
         else {
-            let message = format!("a solution begins with 12 or 16 integers, here are {}", integers.len());
+            let message = format!("a solution begins with 12 or 16 integers; this line has {}", integers.len());
             return Err(self.mistake(place, message, HINT));
         };
         let size = |what: &str, value: i64, least: i64| match usize::try_from(value) {
@@ -169,7 +161,7 @@ impl<'t> Reader<'t> {
         let text = &self.text[word.clone()];
         text.parse().ok().filter(|index| *index > 0).ok_or_else(|| {
             let message = format!("\"{text}\" is not the number of a parameter");
-            self.mistake(word.clone(), message, "here stand the numbers of the free parameters, from 1 on")
+            self.mistake(word.clone(), message, "this line lists the numbers of the free parameters, counted from 1")
         })
     }
 

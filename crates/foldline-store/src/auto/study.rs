@@ -55,7 +55,7 @@ fn parameters(model: &Model, one: &Chosen) -> Result<Vec<f64>, Complaint> {
         values[k] = *one.solution.parameters.get(number.wrapping_sub(1)).ok_or_else(|| {
             let (name, count) = (&model.parameters[k].name, one.solution.parameters.len());
             complaint(
-                format!("{name} is to be PAR({number}), but the solution has {count} parameters"),
+                format!("{name} is assigned to PAR({number}), but the solution has only {count} parameters"),
                 "give another number in `--parameters`",
             )
         })?;
@@ -72,11 +72,11 @@ fn written(model: &Model, one: &Chosen, name: &str, values: &[f64]) -> Result<St
         let number = first.unwrap_or(1);
         let known = model.parameters.first().map_or("NAME", |p| p.name.as_str());
         let message = format!(
-            "the free parameter of the solution labelled {label} is PAR({number}), and which of the model's that is is not known"
+            "the solution labelled {label} has the free parameter PAR({number}), whose name in the model is unknown"
         );
         return Err(complaint(
             message,
-            format!("say it, as in `--parameters {number}={known}`, or give the file c.NAME or b.NAME that names it"),
+            format!("name it, as in `--parameters {number}={known}`, or add the file c.NAME or b.NAME that names it"),
         ));
     };
     // AUTO's state that is the i-th of the model.
@@ -105,7 +105,7 @@ fn written(model: &Model, one: &Chosen, name: &str, values: &[f64]) -> Result<St
         let (name, value) = (key(&parameter.name), decimal(values[k]));
         match one.mapping.parameters[k] {
             Some(number) => drop(writeln!(out, "{name} = {value} # PAR({number})")),
-            None => drop(writeln!(out, "# {name} = {value} # as in the model; AUTO's files do not have this name")),
+            None => drop(writeln!(out, "# {name} = {value} # as in the model; not named in AUTO's files")),
         }
     }
     let states = model.states.iter().zip(&one.mapping.states);
@@ -117,7 +117,7 @@ fn written(model: &Model, one: &Chosen, name: &str, values: &[f64]) -> Result<St
     let around = [value - 0.5 * value.abs().max(1.0), value + 0.5 * value.abs().max(1.0)];
     let (range, whose) = match one.names.range.filter(|[low, high]| (*low..=*high).contains(&value)) {
         Some(range) => (range, "RL0 and RL1"),
-        None => (around, "change it to what is wanted"),
+        None => (around, "edit as needed"),
     };
     let [low, high] = range.map(decimal);
     let _ = writeln!(
@@ -133,7 +133,7 @@ fn written(model: &Model, one: &Chosen, name: &str, values: &[f64]) -> Result<St
 fn equilibrium(model: &Model, solution: &Labelled, state: &[f64]) -> Result<(String, Solution), Complaint> {
     let label = solution.label;
     if model.forced() {
-        let message = format!("the solution labelled {label} is an equilibrium, and the model is forced and has none");
+        let message = format!("the solution labelled {label} is an equilibrium, but a forced model has no equilibria");
         return Err(complaint(message, "give a model without forcing"));
     }
     if !matches!(solution.problem, None | Some(0 | 1 | 11)) {
@@ -149,10 +149,10 @@ fn equilibrium(model: &Model, solution: &Labelled, state: &[f64]) -> Result<(Str
 fn cycle(model: &Model, solution: &Labelled, states: &[f64]) -> Result<(String, Solution), Complaint> {
     let (label, n, count) = (solution.label, model.dim(), solution.times.len());
     if model.forced() {
-        let message = format!("the solution labelled {label} is a cycle, and the model is forced");
+        let message = format!("the solution labelled {label} is a cycle, but the model is forced");
         return Err(complaint(
             message,
-            "a cycle of a forced model is found by `attractor = \"cycle\"` or `state = { … }`; see the book",
+            "in a study of a forced model, start with `attractor = \"cycle\"` or `state = { … }`; see the book",
         ));
     }
     if !matches!(solution.problem, None | Some(2)) {
@@ -169,18 +169,22 @@ fn cycle(model: &Model, solution: &Labelled, states: &[f64]) -> Result<(String, 
             );
             return Err(complaint(
                 message,
-                "only equilibria and cycles are imported, no boundary-value problems or connecting orbits",
+                "only equilibria and cycles can be imported, not boundary-value problems or connecting orbits",
             ));
         }
     }
     let period = solution.period().filter(|period| *period > 0.0).ok_or_else(|| {
         let message = format!("the solution labelled {label} has no positive period in PAR(11)");
-        complaint(message, "only equilibria and cycles are imported, no boundary-value problems or connecting orbits")
+        complaint(
+            message,
+            "only equilibria and cycles can be imported, not boundary-value problems or connecting \
+                            orbits",
+        )
     })?;
     let unordered = || {
         complaint(
             format!("the times of the solution labelled {label} do not increase from 0 to 1"),
-            "copy the file again; AUTO writes them so",
+            "copy the file again; AUTO writes increasing times",
         )
     };
     let given = Cycle::given(period, &solution.times, states, solution.degree, DEGREE).ok_or_else(unordered)?;
@@ -202,13 +206,15 @@ fn other_kind(solution: &Labelled) -> Complaint {
 /// Whether the model has this solution.
 fn held_against(model: &Model, values: &[f64], solution: &Labelled, given: &Solution) -> Result<(), Complaint> {
     let label = solution.label;
-    let hint = "give the model of the same equations, and say which of AUTO's numbers is which with `--parameters 1=NAME,…` and `--states 1=NAME,…`";
+    let hint = "give a model with the same equations, and assign AUTO's numbers with `--parameters 1=NAME,…` and \
+                `--states 1=NAME,…`";
     match mismatch(model, values, given) {
         Some((_, share)) if share <= LARGEST_MISMATCH => Ok(()),
         Some((component, share)) => {
             let name = &model.states[component].name;
             let message = format!(
-                "the solution labelled {label} does not satisfy the model: the equation of `{name}` is off by {share:.1e} of its size"
+                "the solution labelled {label} does not satisfy the model: the relative residual of the equation of \
+                 `{name}` is {share:.1e}"
             );
             Err(complaint(message, hint))
         }

@@ -137,7 +137,7 @@ impl Variables {
         }
         let turn = |(k, _): (usize, f64)| {
             let name = &model.states[k].name;
-            let own = labelled(&format!("{name}_turns"), "1", format!("how often {name} turns over a cycle"));
+            let own = labelled(&format!("{name}_turns"), "1", format!("turns of {name} per cycle"));
             Column { class: Class::Integer, ..own }
         };
         let turns = model.angles().map(turn).collect();
@@ -158,10 +158,10 @@ impl Variables {
 
     /// Of a point: what is one number each. `cycles` says that the states are not among them.
     pub(super) fn of_point(&self, cycles: bool) -> Vec<Column> {
-        let mut out = vec![integer("position", "place on the branch, 0 at the start")];
+        let mut out = vec![integer("position", "position on the branch, 0 at the start")];
         out.extend_from_slice(&self.parameters);
         out.push(Column { unit: self.time.clone(), ..real("period", "period of a cycle") });
-        out.push(integer("forcing_periods", "periods of the forcing that a cycle lasts, 0 where there is none"));
+        out.push(integer("forcing_periods", "forcing periods per cycle, 0 without forcing"));
         out.extend_from_slice(&self.turns);
         out.extend_from_slice(&self.ranges);
         out.extend_from_slice(&self.averages);
@@ -171,23 +171,20 @@ impl Variables {
         out.extend([
             integer("unstable", "number of unstable eigenvalues or multipliers"),
             real("discretisation", "estimated discretisation error, relative"),
-            real("residual", "of the equations after the last Newton step, relative"),
+            real("residual", "relative residual of the equations after the last Newton step"),
             real("trivial_defect", "distance from 1 of the multiplier that is 1 in exact arithmetic"),
             real(
                 "liouville_defect",
-                "difference of log of the product of the multipliers and the integral of the trace",
+                "difference between the log of the product of the multipliers and the integral of the trace",
             ),
-            real(
-                "spectrum_error",
-                "estimated error of eigenvalues or multipliers, relative to the larger of 1 and their modulus",
-            ),
-            real("step", "arclength with which the next point was to be tried"),
-            integer("newton", "Newton iterations since the point before"),
-            integer("factorisations", "matrices factorised since the point before"),
-            integer("rejected", "steps rejected since the point before"),
-            integer("evaluations", "points at which the vector field was evaluated since the point before"),
-            integer("linearisations", "points at which its derivatives were evaluated since the point before"),
-            integer("degree", "of the collocation polynomials, 0 for equilibria"),
+            real("spectrum_error", "estimated error of eigenvalues or multipliers, relative to max(1, modulus)"),
+            real("step", "arclength step to be tried for the next point"),
+            integer("newton", "Newton iterations since the previous point"),
+            integer("factorisations", "matrices factorised since the previous point"),
+            integer("rejected", "steps rejected since the previous point"),
+            integer("evaluations", "evaluations of the vector field since the previous point"),
+            integer("linearisations", "evaluations of its derivatives since the previous point"),
+            integer("degree", "degree of the collocation polynomials, 0 for equilibria"),
             integer("intervals", "mesh intervals, 0 for equilibria"),
         ]);
         out
@@ -196,14 +193,14 @@ impl Variables {
     /// Of a special point, besides that.
     pub(super) fn of_special() -> Vec<Column> {
         let mut out = vec![
-            text("kind", "what happens there"),
+            text("kind", "kind of special point"),
             integer("unstable_before", "number of unstable eigenvalues or multipliers before it"),
-            integer("unstable_after", "number of unstable eigenvalues or multipliers behind it"),
+            integer("unstable_after", "number of unstable eigenvalues or multipliers after it"),
             real(
                 "error",
                 "bound on the error: of the parameter and of extremes of states relative to their scale + |value|, of the period relative to that, of extremes of outputs relative to 1 + |value|",
             ),
-            text("normal_form", "coefficients of the normal form, and what follows from them, in words"),
+            text("normal_form", "coefficients of the normal form and what follows from them, as text"),
         ];
         for name in OWN.iter().filter(|name| name.starts_with("coefficient_")) {
             let text = match name.ends_with("_error") {
@@ -219,20 +216,20 @@ impl Variables {
     pub(super) fn of_response(&self) -> Vec<Column> {
         let mut out = vec![
             text("motion", "equilibrium, cycle, other or escaped"),
-            real("value", "of the parameter that varies"),
+            real("value", "value of the free parameter"),
             real("period", "period of a cycle"),
-            integer("ratio_first", "of the spectral ratio of a cycle, 0 where there is none"),
-            integer("ratio_second", "of the spectral ratio of a cycle, 0 where there is none"),
-            integer("multiplicity", "over how many turns of its strongest lines a cycle closes"),
-            integer("hits", "how many starts went there, those drawn towards the origin included"),
-            integer("uniform_hits", "how many of the starts drawn uniformly from the ranges went there; -1 in a sweep"),
-            integer("uniform_starts", "how many starts were drawn uniformly from the ranges; -1 in a sweep"),
+            integer("ratio_first", "first number of the spectral ratio of a cycle, 0 if there is none"),
+            integer("ratio_second", "second number of the spectral ratio of a cycle, 0 if there is none"),
+            integer("multiplicity", "number of turns of its strongest spectral lines after which a cycle closes"),
+            integer("hits", "number of starts that settled there, including those drawn towards the origin"),
             integer(
-                "jumped",
-                "1 where a sweep has left the solution of the value before, 0 where not, -1 where it is not known",
+                "uniform_hits",
+                "number of starts drawn uniformly from the ranges that settled there; -1 in a sweep",
             ),
-            real("settled_after", "time until it had settled"),
-            real("error", "by how much the motion fails to repeat itself, relative to its extent"),
+            integer("uniform_starts", "number of starts drawn uniformly from the ranges; -1 in a sweep"),
+            integer("jumped", "1 if the sweep left the solution of the previous value, 0 if not, -1 if unknown"),
+            real("settled_after", "settling time"),
+            real("error", "deviation of the motion from periodicity, relative to its extent"),
         ];
         out.extend_from_slice(&self.parameters);
         out.extend_from_slice(&self.ranges);
@@ -251,17 +248,17 @@ pub(super) fn of_branch() -> Vec<Column> {
     vec![
         text("branch", "name of the branch"),
         text("family", "equilibrium or cycle"),
-        text("free", "parameter that varies"),
-        text("held", "kind of special point held along a curve in two parameters"),
-        text("follows", "parameter that follows from the free one on such a curve"),
+        text("free", "free parameter"),
+        text("held", "kind of special point continued along a two-parameter curve"),
+        text("follows", "second parameter of such a curve, which follows from the free one"),
         real("scale", "scale of the free parameter, relative to which its errors are stated"),
         text("origin", "seed, end-of another branch, or switch at a special point of another branch"),
         text("origin_name", "name of that seed or branch"),
         text("origin_kind", "kind of that special point"),
         real("origin_parameter", "value of the parameter at that special point"),
-        text("backward_end", "how the backward side ended, in a word"),
+        text("backward_end", "code of how the backward side ended"),
         text("backward_sentence", "how the backward side ended"),
-        text("forward_end", "how the forward side ended, in a word"),
+        text("forward_end", "code of how the forward side ended"),
         text("forward_sentence", "how the forward side ended"),
         integer("points", "number of points"),
         integer("special", "number of special points"),

@@ -139,7 +139,7 @@ impl Planned<'_> {
                 name: "normalised_time".into(),
                 class: Class::Real,
                 unit: String::new(),
-                description: "time over period, from 0 to 1".into(),
+                description: "time divided by the period, from 0 to 1".into(),
             };
             out.profile.push(self.variable(plan, group, &time, &[points, nodes], &[]));
             let beside = [self.along.clone(), vec![time.name]].concat();

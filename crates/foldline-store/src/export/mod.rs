@@ -64,7 +64,7 @@ impl fmt::Display for ExportError {
             }
             ExportError::Output(path, error) => write!(
                 f,
-                "{} cannot be written: {error}\n  help: make room there, or choose another place with `--out PATH`",
+                "{} cannot be written: {error}\n  help: free some space there, or write elsewhere with `--out PATH`",
                 path.display()
             ),
         }

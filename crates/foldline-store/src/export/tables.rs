@@ -119,9 +119,9 @@ fn profile_columns(name: &Column, variables: &Variables, index: &str) -> Vec<Col
     };
     let mut columns = vec![
         name.clone(),
-        own(index, Class::Integer, "which point of the branch"),
-        own("node", Class::Integer, "number within the profile, from 0"),
-        own("normalised_time", Class::Real, "time over period, from 0 to 1"),
+        own(index, Class::Integer, "position of the point on the branch"),
+        own("node", Class::Integer, "index within the profile, from 0"),
+        own("normalised_time", Class::Real, "time divided by the period, from 0 to 1"),
     ];
     columns.extend_from_slice(variables.states());
     columns
@@ -148,11 +148,8 @@ fn responses(export: &Export, folder: &Path, begin: &Begin, variables: &Variable
         description: description.into(),
     };
     let model = export.model();
-    let first = [
-        word("set", "name of the survey or sweep"),
-        word("search", "survey or sweep"),
-        word("free", "parameter that varies"),
-    ];
+    let first =
+        [word("set", "name of the survey or sweep"), word("search", "survey or sweep"), word("free", "free parameter")];
     let mut table = begin(folder, "responses", &[&first[..], &variables.of_response()].concat())?;
     for set in &export.diagram.responses {
         let free = model.parameters.get(set.free).map_or("", |p| p.name.as_str());

@@ -11,8 +11,8 @@ impl Reader<'_> {
     pub(super) fn function(&mut self, head: &str, place: Range<usize>, value: &Value, source: &mut ModelSource) {
         let item = Item::Function(source.functions.len());
         let Some((name, arguments)) = Function::head(head) else {
-            let hint = "write name and arguments in quotes, as in `\"hill(x, K, n)\" = \"x^n/(K^n + x^n)\"`";
-            return self.walk.report(place, format!("`{head}` is not a function with its arguments"), hint);
+            let hint = "write the name and its arguments in quotes, as in `\"hill(x, K, n)\" = \"x^n/(K^n + x^n)\"`";
+            return self.walk.report(place, format!("`{head}` is not a function name with arguments"), hint);
         };
         let expression = self.expression(item, place, value, &format!("the function `{name}`"));
         source.functions.push(Function { name, arguments, expression });
@@ -32,7 +32,7 @@ impl Reader<'_> {
             }
             None => {
                 let hint = format!("write `{key} = [0.0, 1.0, 2.0]`");
-                self.walk.report(place.clone(), format!("{what} has no values `{key}`"), hint);
+                self.walk.report(place.clone(), format!("{what} has no `{key}` values"), hint);
                 Vec::new()
             }
         };

@@ -19,12 +19,12 @@ impl Reader<'_> {
             entries.iter().map(|(row, column, ..)| (row.as_str(), column.as_str())).collect();
         for (row, column, place, _) in &entries {
             if !given.contains(&(row, row)) {
-                let hint = format!("write `{row} = \"…\"` in its row, the mass that belongs to `{row}` itself");
-                self.walk.report(place.clone(), format!("the row of `{row}` has no mass of its own"), hint);
+                let hint = format!("add `{row} = \"…\"` to the row, the diagonal entry of the mass matrix");
+                self.walk.report(place.clone(), format!("the row of `{row}` has no diagonal entry"), hint);
             } else if !given.contains(&(column, row)) {
                 let message =
-                    format!("the mass of `{row}` and `{column}` is given, that of `{column}` and `{row}` is not");
-                let hint = "write both, the other one as 0 if the matrix is not symmetric";
+                    format!("the mass of `{row}` and `{column}` is given, but that of `{column}` and `{row}` is not");
+                let hint = "give both; one of them may be 0 if the matrix is not symmetric";
                 self.walk.report(place.clone(), message, hint);
             }
         }

@@ -207,7 +207,7 @@ impl Reader<'_> {
             (both, _) => {
                 let message =
                     if both.is_some() { "both a frequency and a period" } else { "no frequency and no period" };
-                let hint = "say either `frequency = \"…\"`, the angular one, or `period = \"…\"`";
+                let hint = "give either `frequency = \"…\"` (angular) or `period = \"…\"`";
                 self.walk.report(value.span(), format!("the forcing has {message}"), hint);
                 return None;
             }

@@ -25,8 +25,8 @@ impl Reader<'_> {
         let Some(count) = count else {
             for key in ["index", "before", "after", "periodic"] {
                 if let Some(value) = table.get(key) {
-                    let message = format!("{what} has `{key}`, and no `count`");
-                    self.walk.report(value.span(), message, "say how many there are: `count = 40`");
+                    let message = format!("{what} has `{key}`, but no `count`");
+                    self.walk.report(value.span(), message, "give the number of elements: `count = 40`");
                 }
             }
             return None;
@@ -58,9 +58,10 @@ impl Reader<'_> {
             let message = format!("the count of {what} is {number}");
             let hint = match number > MOST {
                 true => {
-                    "reduce it: a model has at most 1000 states, and 100000 parameters, definitions and outputs each"
+                    "reduce it: a model can have up to 1000 states, and up to 100000 each of parameters, definitions \
+                     and outputs"
                 }
-                false => "a count is a whole number from 1 upwards",
+                false => "a count is a positive integer",
             };
             self.walk.report(value.span(), message, hint);
         }
@@ -77,8 +78,8 @@ impl Reader<'_> {
             }
             Some((span, Some(true))) => {
                 if table.get("before").is_some() || table.get("after").is_some() {
-                    let message = format!("{what} is periodic and has values beyond its ends");
-                    self.walk.report(span, message, "keep `periodic = true`, or `before` and `after`");
+                    let message = format!("{what} is periodic, but also has values beyond its ends");
+                    self.walk.report(span, message, "keep either `periodic = true`, or `before` and `after`");
                 }
                 return Ends::Periodic;
             }

@@ -19,7 +19,7 @@ impl Reader<'_> {
         self.walk.only(table, &KEYS, &what);
         let (Some(sum), Some(number)) = (table.get("sum"), table.get("value")) else {
             self.incomplete = true;
-            let hint = "write `{ sum = \"x + y\", value = 1.0 }`, with the value that the sum has";
+            let hint = "write `{ sum = \"x + y\", value = 1.0 }`, with the value of the sum";
             return self.walk.report(place, format!("{what} lacks its sum or its value"), hint);
         };
         let (unit, description) = self.labels(item, table);

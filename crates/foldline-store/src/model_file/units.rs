@@ -18,7 +18,7 @@ impl Reader<'_> {
         if let Some(value) = root.get("units") {
             self.labels_only = value.get_ref().as_str() == Some("labels");
             if !matches!(value.get_ref().as_str(), Some("labels" | "checked")) {
-                let hint = "write `units = \"labels\"`, which leaves units unchecked, or leave the key out";
+                let hint = "write `units = \"labels\"` to leave units unchecked, or remove the key";
                 self.walk.report(value.span(), "`units` is neither \"checked\" nor \"labels\"", hint);
             }
         }
@@ -26,8 +26,8 @@ impl Reader<'_> {
         let Some(text) = self.walk.string(value, "`time`") else { return String::new() };
         let unit = Unit::read(&text);
         if !unit.is_number() && unit.convert(1.0, &Unit::read("s")).is_err() {
-            let hint = "write a unit of time such as `time = \"ms\"`, or `time = \"1\"` where it is a pure number";
-            self.walk.report(value.span(), format!("`time` is in {text}, which is no unit of time"), hint);
+            let hint = "write a unit of time such as `time = \"ms\"`, or `time = \"1\"` if time is a pure number";
+            self.walk.report(value.span(), format!("`time` is in {text}, which is not a unit of time"), hint);
         }
         text
     }
@@ -55,9 +55,9 @@ impl Reader<'_> {
         let foreign: Vec<String> = Unit::read(&written.unit).foreign().map(str::to_string).collect();
         if let Some(name) = foreign.first() {
             let message =
-                format!("{what} is a number with the unit `{}`, and `{name}` is no unit that is known", written.unit);
+                format!("{what} is a number with the unit `{}`, but `{name}` is not a known unit", written.unit);
             let hint = format!(
-                "write a product with a star, `{}*{name}`, or state the unit with `unit = \"…\"`",
+                "write a product with a star, `{}*{name}`, or give the unit with `unit = \"…\"`",
                 written.value
             );
             self.walk.report(value.span(), message, hint);
@@ -99,7 +99,7 @@ impl Reader<'_> {
         let doubts = report.doubts.iter().take(DOUBTS);
         let mut remarks: Vec<String> = doubts.map(|own| placed(own, own.message.clone(), own.hint.clone())).collect();
         if let Some(more @ 1..) = report.doubts.len().checked_sub(DOUBTS) {
-            remarks.push(format!("note: and {more} more places where the units do not fit"));
+            remarks.push(format!("note: {more} more places where units do not match"));
         }
         if let Some(first) = report.numbers.first() {
             let mut told: Vec<&str> = Vec::new();
@@ -115,7 +115,8 @@ impl Reader<'_> {
             };
             told.truncate(TOLD);
             let message = format!("numbers in formulas stand for quantities with a unit: {}{more}", told.join(", "));
-            let hint = "if that is meant, nothing has to be done; a number with its unit can be written under [constants], as in `V0 = \"40 mV\"`";
+            let hint = "if this is intended, nothing needs to be done; a number with its unit can be written under \
+                        [constants], as in `V0 = \"40 mV\"`";
             remarks.push(placed(first, message, hint.into()));
         }
         remarks

@@ -86,9 +86,7 @@ impl RunFileError {
                 | Utf8Error(..)
         );
         match error.sqlite_error_code() {
-            _ if unlike_written => {
-                RunFileError::Damaged(path, format!("something in it is not as it was written ({error})"))
-            }
+            _ if unlike_written => RunFileError::Damaged(path, format!("its contents are inconsistent ({error})")),
             Some(DatabaseCorrupt | NotADatabase) => RunFileError::Damaged(path, format!("SQLite finds {error}")),
             Some(DiskFull) => RunFileError::Full(path),
             Some(DatabaseBusy | DatabaseLocked) => RunFileError::Busy(path),
@@ -101,32 +99,38 @@ impl fmt::Display for RunFileError {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
             RunFileError::Missing(path) => {
-                write!(f, "there is no run file {}\n  help: give the folder that `foldline run` wrote", path.display())
+                write!(
+                    f,
+                    "there is no run file {}\n  help: give the folder of a run, as written by `foldline run` \
+                           or `foldline explore`",
+                    path.display()
+                )
             }
             RunFileError::Exists(path) => write!(
                 f,
-                "{} exists already\n  help: `--resume` goes on with it, `--out DIR` writes elsewhere",
+                "{} already exists\n  help: continue this run with `--resume`, or write elsewhere with `--out DIR`",
                 path.display()
             ),
             RunFileError::Folder(path, error) => write!(
                 f,
-                "the folder {} cannot be written to: {error}\n  help: choose a folder you may write to with `--out DIR`",
+                "cannot write to the folder {}: {error}\n  help: choose a writable folder with `--out DIR`",
                 path.display()
             ),
             RunFileError::Foreign(path) => write!(
                 f,
-                "{} is not a run file of foldline\n  help: move it away, or write elsewhere with `--out DIR`",
+                "{} is not a foldline run file\n  help: move it away, or write elsewhere with `--out DIR`",
                 path.display()
             ),
             RunFileError::Newer(path, version) => write!(
                 f,
-                "{} has format {version}, newer than the format {FORMAT_VERSION} known here\n  help: use a newer foldline",
+                "{} has format {version}, but this foldline reads formats up to {FORMAT_VERSION}\n  help: use a \
+                 newer foldline",
                 path.display()
             ),
             RunFileError::Thinned(path) => write!(
                 f,
-                "{} is complete and keeps only part of its profiles (`store` in the study), so it cannot be resumed\n  help: `--out DIR` \
-                 begins a new run",
+                "{} is complete and keeps only part of its profiles (`store` in the study), so it cannot be \
+                 resumed\n  help: start a new run with `--out DIR`",
                 path.display()
             ),
             RunFileError::Changed(path, what) => write!(
@@ -138,8 +142,8 @@ impl fmt::Display for RunFileError {
             RunFileError::Damaged(path, what) => {
                 write!(
                     f,
-                    "{path} is damaged: {what}\n  help: bring it back from a copy, or start a new run with `--out DIR`; `sqlite3 {path} \
-                     .recover` shows what can still be read",
+                    "{path} is damaged: {what}\n  help: restore it from a backup, or start a new run with `--out \
+                     DIR`; `sqlite3 {path} .recover` shows what can still be read",
                     path = path.display()
                 )
             }
@@ -150,19 +154,20 @@ impl fmt::Display for RunFileError {
             ),
             RunFileError::Full(path) => write!(
                 f,
-                "there is no space left to write {}\n  help: everything accepted until then is stored; make room and go on with \
-                 `--resume`",
+                "no space left to write {}\n  help: all points accepted so far are stored; free some space and \
+                 continue with `--resume`",
                 path.display()
             ),
             RunFileError::Vanished(path) => write!(
                 f,
-                "{} was deleted, moved or replaced while the run was writing to it, and the run has stopped\n  help: leave the \
-                 folder in peace while a run lasts; if it was moved, `--resume --out DIR` goes on there",
+                "{} was deleted, moved or replaced while the run was writing to it; the run has stopped\n  help: do \
+                 not touch the folder during a run; if it was moved, continue there with `--resume --out DIR`",
                 path.display()
             ),
             RunFileError::Database(path, error) => write!(
                 f,
-                "{}: {error}\n  help: check permissions, quotas and the disk; what was accepted before is stored, `--resume` goes on",
+                "{}: {error}\n  help: check permissions, quotas and the disk; all points accepted so far are stored, \
+                 and `--resume` continues the run",
                 path.display()
             ),
         }

@@ -279,7 +279,10 @@ fn branch_in(row: &Row) -> Result<Branch, String> {
 pub(super) fn special_in(row: &Row) -> Result<SpecialPoint, String> {
     let (point, extra) = point_in(row)?;
     let count = |name: &str| {
-        row.get::<_, i64>(name).ok().and_then(|n| usize::try_from(n).ok()).ok_or_else(|| format!("{name} is no count"))
+        row.get::<_, i64>(name)
+            .ok()
+            .and_then(|n| usize::try_from(n).ok())
+            .ok_or_else(|| format!("{name} is not a count"))
     };
     // Rows of formats before 8 have coefficients without errors.
     let later = |name: &str| match row.get::<_, Option<i64>>(name) {

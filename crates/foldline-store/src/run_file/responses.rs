@@ -165,13 +165,13 @@ fn set_in(row: &Row) -> Result<(i64, Responses), String> {
 fn response_in(row: &Row) -> Result<Response, String> {
     let blob = |name: &str| row.get::<_, Vec<u8>>(name).map_err(|e| e.to_string());
     let numbers =
-        |name: &str| unpack(&blob(name)?).ok_or_else(|| format!("{name} has a length that is no multiple of 8"));
+        |name: &str| unpack(&blob(name)?).ok_or_else(|| format!("{name} has a length that is not a multiple of 8"));
     let count = |name: &str| row.get::<_, Option<u32>>(name).map_err(|e| e.to_string());
     // Columns that came later may be missing.
     let later = |name: &str| match row.get::<_, Option<i64>>(name) {
         Err(rusqlite::Error::InvalidColumnName(_)) => Ok(None),
         Err(error) => Err(error.to_string()),
-        Ok(value) => value.map(|v| usize::try_from(v).map_err(|_| format!("{name} is no count"))).transpose(),
+        Ok(value) => value.map(|v| usize::try_from(v).map_err(|_| format!("{name} is not a count"))).transpose(),
     };
     let share = later("uniform_hits")?.zip(later("uniform_starts")?).map(|(hits, of)| Share { hits, of });
     let motion: String = row.get("motion").map_err(|e| e.to_string())?;
@@ -187,8 +187,8 @@ fn response_in(row: &Row) -> Result<Response, String> {
         period: has_period.then_some(period),
         ratio: count("ratio_first")?.zip(count("ratio_second")?),
         multiplicity: count("multiplicity")?.unwrap_or(1),
-        ranges: unpack_pairs(&blob("range_bytes")?).ok_or("range_bytes is no list of pairs")?,
-        hits: row.get::<_, i64>("hits").ok().and_then(|n| usize::try_from(n).ok()).ok_or("hits is no count")?,
+        ranges: unpack_pairs(&blob("range_bytes")?).ok_or("range_bytes is not a list of pairs")?,
+        hits: row.get::<_, i64>("hits").ok().and_then(|n| usize::try_from(n).ok()).ok_or("hits is not a count")?,
         share,
         jumped: later("jumped")?.map(|jumped| jumped != 0),
         state: numbers("state_bytes")?,

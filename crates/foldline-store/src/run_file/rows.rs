@@ -148,9 +148,12 @@ pub(super) fn point_in(row: &Row) -> Result<(Point, Vec<f64>), String> {
     let whole = row.as_ref().column_index("solution_bytes").is_ok();
     let blob = |name: &str| row.get::<_, Vec<u8>>(name).map_err(|e| e.to_string());
     let numbers =
-        |name: &str| unpack(&blob(name)?).ok_or_else(|| format!("{name} has a length that is no multiple of 8"));
+        |name: &str| unpack(&blob(name)?).ok_or_else(|| format!("{name} has a length that is not a multiple of 8"));
     let count = |name: &str| {
-        row.get::<_, i64>(name).ok().and_then(|n| usize::try_from(n).ok()).ok_or_else(|| format!("{name} is no count"))
+        row.get::<_, i64>(name)
+            .ok()
+            .and_then(|n| usize::try_from(n).ok())
+            .ok_or_else(|| format!("{name} is not a count"))
     };
     // Columns that version 2 had not.
     let later = |name: &str| match row.get::<_, i64>(name) {
@@ -205,7 +208,7 @@ pub(super) fn point_in(row: &Row) -> Result<(Point, Vec<f64>), String> {
                 return Err("solution_bytes and mesh_bytes do not belong together".to_string());
             }
             let forcing_periods = u32::try_from(later("forcing_periods")?).map_err(|e| e.to_string())?;
-            let gain = unpack(&newer_bytes("gain_bytes")?).ok_or("gain_bytes is no list of numbers")?;
+            let gain = unpack(&newer_bytes("gain_bytes")?).ok_or("gain_bytes is not a list of numbers")?;
             Solution::Cycle(Cycle { period: *period, forcing_periods, mesh: mesh.into(), degree, profile, gain })
         }
     };
@@ -215,10 +218,10 @@ pub(super) fn point_in(row: &Row) -> Result<(Point, Vec<f64>), String> {
         solution,
         tangent: if whole { numbers("tangent_bytes")? } else { Vec::new() },
         step: *step,
-        spectrum: unpack_complex(&blob("spectrum_bytes")?).ok_or("spectrum_bytes is no list of pairs")?,
+        spectrum: unpack_complex(&blob("spectrum_bytes")?).ok_or("spectrum_bytes is not a list of pairs")?,
         unstable: count("unstable")?,
-        ranges: unpack_pairs(&blob("range_bytes")?).ok_or("range_bytes is no list of pairs")?,
-        averages: unpack_pairs(&newer_bytes("average_bytes")?).ok_or("average_bytes is no list of pairs")?,
+        ranges: unpack_pairs(&blob("range_bytes")?).ok_or("range_bytes is not a list of pairs")?,
+        averages: unpack_pairs(&newer_bytes("average_bytes")?).ok_or("average_bytes is not a list of pairs")?,
         trust: Trust {
             discretisation: *discretisation,
             residual: *residual,

@@ -4,7 +4,7 @@ use super::items::{Ground, Item, Known, max_points, origin};
 use super::unknown_parameter;
 use crate::nearest::suggest;
 use crate::toml_walk::{Value, Walk};
-use foldline::diagram::Kind;
+use foldline::diagram::{Kind, Shown};
 use foldline::explore::{BranchPlan, Start, Switching};
 use foldline::model::{Model, Parameter, unsupported};
 use foldline::special::mark::Mark;
@@ -99,7 +99,7 @@ pub(super) fn bounds(
         }
         (None, Some((_, None))) => return None,
         (None, None) => {
-            let message = format!("this {what} has neither a `range` nor a value to run `until`");
+            let message = format!("this {what} has neither `range` nor `until`");
             walk.report(item.span.clone(), message, "add a line such as `range = [0.5, 12]`");
             return None;
         }
@@ -107,10 +107,15 @@ pub(super) fn bounds(
     let Some((at, target)) = until else { return Some((range, None)) };
     let target = target?;
     if target < range[0] || target > range[1] {
-        let message = format!("the target {target} is outside the range from {} to {}", range[0], range[1]);
+        let message = format!(
+            "the target {} is outside the range from {} to {}",
+            Shown(target),
+            Shown(range[0]),
+            Shown(range[1])
+        );
         walk.report(at, message, "a value within the range");
     } else if start == Some(target) {
-        let message = format!("the {what} already starts at {free} = {target}");
+        let message = format!("the {what} already starts at {free} = {target}", target = Shown(target));
         walk.report(at, message, "a target other than the start");
     }
     Some((range, Some(target)))
@@ -126,8 +131,8 @@ pub(super) fn contains_start(
     parameter: &str,
 ) {
     if let Some(start) = start.filter(|s| *s < range[0] || *s > range[1]) {
-        let message = format!("the {what} starts at {parameter} = {start}, outside its range");
-        walk.report(at, message, format!("a range that contains {start}, or another start"));
+        let message = format!("the {what} starts at {parameter} = {start}, outside its range", start = Shown(start));
+        walk.report(at, message, format!("a range that contains {start}, or another start", start = Shown(start)));
     }
 }
 
@@ -142,8 +147,8 @@ pub(super) fn range(walk: &mut Walk, value: &Value, unit: &str) -> Option<[f64; 
     if low > high {
         walk.report(
             value.span(),
-            format!("the range from {low} to {high} is the wrong way round"),
-            format!("write [{high}, {low}]"),
+            format!("the range from {low} to {high} is the wrong way round", low = Shown(low), high = Shown(high)),
+            format!("write [{high}, {low}]", low = Shown(low), high = Shown(high)),
         );
         return None;
     }
@@ -193,7 +198,7 @@ fn quantity(walk: &mut Walk, name: &str, span: Range<usize>, model: &Model) -> O
     if found.is_none() {
         let all = Quantity::names(model);
         let known: Vec<&str> = all.iter().map(String::as_str).collect();
-        walk.report(span, format!("`{name}` is no quantity of a branch"), suggest(name, &known));
+        walk.report(span, format!("`{name}` is not a quantity of a branch"), suggest(name, &known));
     }
     found
 }
@@ -221,11 +226,12 @@ pub(super) fn switching(walk: &mut Walk, value: &Value) -> Switching {
                 let (message, hint) = match (unsupported(name), Kind::from_name(name)) {
                     (Some(kind), _) => (format!("`switch` at {name}: {}", kind.message), kind.instead.to_string()),
                     (None, Some(_)) => {
-                        (format!("no branch of equilibria or cycles begins at a {name} point"), suggest(name, &names))
+                        (format!("no branch of equilibria or cycles starts at a {name} point"), suggest(name, &names))
                     }
-                    (None, None) => {
-                        (format!("\"{name}\" is no kind of special point to branch off at"), suggest(name, &names))
-                    }
+                    (None, None) => (
+                        format!("\"{name}\" is not a kind of special point at which branches can be switched"),
+                        suggest(name, &names),
+                    ),
                 };
                 walk.report(key.span(), message, hint);
             }

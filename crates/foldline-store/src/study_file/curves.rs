@@ -3,9 +3,9 @@
 use super::branches::{bounds, free, marks, range, switch_step};
 use super::items::{Ground, Item, Known, max_points, noun, said_or_further_down, written};
 use crate::nearest::suggest;
-use crate::toml_walk::{Value, Walk};
+use crate::toml_walk::{Value, Walk, with_article};
 use foldline::contract::VectorField;
-use foldline::diagram::{Family, Kind};
+use foldline::diagram::{Family, Kind, Shown};
 use foldline::explore::{BranchPlan, CurvePlan, Start};
 use foldline::model::Parameter;
 
@@ -62,7 +62,10 @@ pub(super) fn read(
     // Where the curve starts must be known for a target alone to make a range; of a branch with mistakes it never is.
     let placed = start.is_some() || base.is_none() || second.is_none();
     if let (true, None, false) = (table.get("until").is_some(), table.get("range"), placed) {
-        let message = format!("at which {} the curve starts is not known beforehand", second_name.unwrap_or("value"));
+        let message = format!(
+            "the value of {} at the start of the curve is not known in advance",
+            second_name.unwrap_or("value")
+        );
         walk.report(item.span.clone(), message, "add the `range` of this parameter");
     }
     let bounds = bounds(walk, item, start, own);
@@ -93,7 +96,7 @@ pub(super) fn read(
 
 fn base(walk: &mut Walk, item: &Item, ground: &Ground, all: &[Item]) -> Option<Base> {
     let Some(value) = item.table.get("of") else {
-        let message = "this curve does not say on which branch its special point lies";
+        let message = "this curve has no `of`, the branch on which its special point lies";
         walk.report(item.span.clone(), message, "add a line such as `of = \"name of a branch\"`");
         return None;
     };
@@ -104,8 +107,8 @@ fn base(walk: &mut Walk, item: &Item, ground: &Ground, all: &[Item]) -> Option<B
         return match known.start {
             Start::EndOf(index) => switched(walk, value, of_branch(ground, known, index), known, rest),
             _ => {
-                let (short, noun) = (&known.name, noun(&known.start));
-                let message = format!("\"{short}\" is a {noun}, and the special point of a curve lies on a branch");
+                let (short, noun) = (&known.name, with_article(noun(&known.start)));
+                let message = format!("\"{short}\" is {noun}, but the special point of a curve lies on a branch");
                 walk.report(
                     value.span(),
                     message,
@@ -137,14 +140,16 @@ pub(super) fn switched(walk: &mut Walk, value: &Value, mut base: Base, known: &K
     let mut switching = base.plan.switching.clone();
     for step in steps.split('/').skip(1) {
         let Some((kind, number)) = switch_step(step) else {
-            let message = format!("no branch that leaves \"{from}\" is called \"{name}\"");
+            let message = format!("no branch that leaves \"{from}\" is named \"{name}\"");
             walk.report(value.span(), message, format!("a name such as \"{from}/period-doubling-1\""));
             return None;
         };
         depth[kind as usize] += 1;
         if switching.at_point(kind, number) == 0 {
-            let message =
-                format!("\"{name}\" will not be followed: \"{from}\" does not switch that far at {kind} points");
+            let message = format!(
+                "\"{name}\" will not be followed: `switch` of \"{from}\" does not go that far at {kind} \
+                         points"
+            );
             let right = format!("give the branch \"{from}\" a line `switch = {{ {kind} = {} }}`", depth[kind as usize]);
             walk.report(value.span(), message, right);
             return None;
@@ -162,15 +167,15 @@ pub(super) fn switched(walk: &mut Walk, value: &Value, mut base: Base, known: &K
 fn hold(walk: &mut Walk, item: &Item, family: Option<Family>) -> Option<Kind> {
     let Some(value) = item.table.get("hold") else {
         let names = HELD.map(|kind| format!("\"{kind}\""));
-        let message = "this curve does not say what is held along it";
+        let message = "this curve has no `hold`, the kind of special point to continue";
         walk.report(item.span.clone(), message, format!("add `hold = …` with one of {}", names.join(", ")));
         return None;
     };
     let name = walk.string(value, "`hold`")?;
     let Some(kind) = Kind::from_name(&name).filter(|kind| HELD.contains(kind)) else {
         let message = match Kind::from_name(&name) {
-            Some(_) => format!("a point of the kind {name} cannot be held along a curve"),
-            None => format!("\"{name}\" is no kind of special point that can be held"),
+            Some(_) => format!("a point of the kind {name} cannot be continued in two parameters"),
+            None => format!("\"{name}\" is not a kind of special point that can be continued"),
         };
         walk.report(value.span(), message, suggest(&name, &HELD.map(Kind::name)));
         return None;
@@ -198,9 +203,16 @@ fn branch_range(walk: &mut Walk, item: &Item, base: Option<&Base>, first: Option
     let narrow = range(walk, value, first.map_or("", |own| &own.unit))?;
     if let Some([low, high]) = whole.filter(|[low, high]| narrow[1] < *low || narrow[0] > *high) {
         let first = first.map_or("its parameter", |own| &own.name);
-        let message =
-            format!("the branch is followed in {first} from {low} to {high} only, so no curve starts in this range");
-        walk.report(value.span(), message, format!("a range that overlaps [{low}, {high}]"));
+        let message = format!(
+            "the branch is followed in {first} from {low} to {high} only, so no curve starts in this range",
+            low = Shown(low),
+            high = Shown(high)
+        );
+        walk.report(
+            value.span(),
+            message,
+            format!("a range that overlaps [{low}, {high}]", low = Shown(low), high = Shown(high)),
+        );
     }
     Some(narrow)
 }
@@ -211,8 +223,12 @@ fn near(walk: &mut Walk, item: &Item, range: Option<[f64; 2]>, first: Option<&Pa
     let near = walk.quantity(value, "`near`", first.map_or("", |own| &own.unit))?;
     if let Some([low, high]) = range.filter(|[low, high]| near < *low || near > *high) {
         let first = first.map_or("the parameter of the branch", |own| &own.name);
-        let message =
-            format!("near {first} = {near} there is no point of the curve: it stays between {low} and {high}");
+        let message = format!(
+            "`near` is {first} = {near}, but the curve stays between {low} and {high}",
+            near = Shown(near),
+            low = Shown(low),
+            high = Shown(high)
+        );
         walk.report(value.span(), message, "a value within the range, or a wider `branch-range`");
     }
     Some(Some(near))
@@ -223,7 +239,7 @@ fn second(walk: &mut Walk, item: &Item, ground: &Ground, base: Option<&Base>) ->
     let second = free(walk, item, ground.model)?;
     if let Some((base, value)) = base.zip(item.table.get("free")).filter(|(base, _)| base.plan.free == second) {
         let name = &ground.model.parameters[second].name;
-        let message = format!("{name} is the parameter of the branch \"{}\" already", base.name);
+        let message = format!("{name} is already the free parameter of the branch \"{}\"", base.name);
         let other = ground.model.parameters.iter().find(|parameter| parameter.name != *name);
         let right = match other {
             Some(other) => format!("a second parameter of the model, such as `{}`", other.name),

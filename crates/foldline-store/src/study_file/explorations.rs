@@ -4,7 +4,7 @@ use super::branches::{free, range, switching};
 use super::items::{Item, max_points};
 use super::{override_parameters, unique_name, unknown_parameter};
 use crate::toml_walk::{Value, Walk};
-use foldline::diagram::Kind;
+use foldline::diagram::{Kind, Shown};
 use foldline::explore::{ExplorePlan, Switching};
 use foldline::model::Model;
 use std::ops::Range;
@@ -90,7 +90,7 @@ pub(super) fn read(
 fn own_range(walk: &mut Walk, table: &DeTable, span: &Range<usize>, unit: &str) -> Option<[f64; 2]> {
     let Some(value) = table.get("range") else {
         let hint = "add a line such as `range = [0.5, 12]`";
-        walk.report(span.clone(), "this exploration does not say in which range of its parameter it looks", hint);
+        walk.report(span.clone(), "this exploration has no `range` of its free parameter", hint);
         return None;
     };
     range(walk, value, unit)
@@ -101,7 +101,7 @@ fn refuse_name_of_part(walk: &mut Walk, table: &DeTable, name: Option<&str>, tak
     let Some((name, value)) = name.zip(table.get("name")) else { return };
     let within = |a: &str, b: &str| a.strip_prefix(b).is_some_and(|rest| rest.starts_with('/'));
     if let Some(other) = taken.iter().find(|other| within(other, name) || within(name, other)) {
-        let message = format!("what the exploration \"{name}\" finds could be called like \"{other}\"");
+        let message = format!("a branch found by the exploration \"{name}\" could have the same name as \"{other}\"");
         walk.report(value.span(), message, "give it another name, without a `/` if possible");
     }
 }
@@ -118,7 +118,7 @@ fn connect(
     let mut entries = table.iter();
     let (Some((key, ends)), None) = (entries.next(), entries.next()) else {
         let hint = "write `connect = { kappa = [0, 1] }`";
-        walk.report(value.span(), "`connect` names not exactly one parameter", hint);
+        walk.report(value.span(), "`connect` must name exactly one parameter", hint);
         return None;
     };
     let name: &str = key.get_ref();
@@ -127,14 +127,14 @@ fn connect(
         return None;
     };
     if free == Some(index) {
-        let message = format!("`{name}` is the free parameter already");
-        walk.report(key.span(), message, "name a second parameter, in which folds are followed");
+        let message = format!("`{name}` is already the free parameter");
+        walk.report(key.span(), message, "name a second parameter, in which folds are continued");
     }
     let ends = range(walk, ends, &model.parameters[index].unit)?;
     let own = parameters[index];
     if !(ends[0]..=ends[1]).contains(&own) {
-        let message = format!("the exploration is at {name} = {own}, outside this range");
-        walk.report(value.span(), message, format!("a range that contains {own}"));
+        let message = format!("the exploration runs at {name} = {own}, outside this range", own = Shown(own));
+        walk.report(value.span(), message, format!("a range that contains {own}", own = Shown(own)));
     }
     Some((index, ends))
 }

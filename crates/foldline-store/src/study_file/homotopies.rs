@@ -39,7 +39,7 @@ pub(super) fn read(
 fn targets(walk: &mut Walk, item: &Item, model: &Model, start: Option<&[Option<f64>]>) -> Option<Vec<(usize, f64)>> {
     let example = model.parameters.first().map_or("mu", |p| p.name.as_str());
     let Some(value) = item.table.get("to") else {
-        let message = "this homotopy has no goal";
+        let message = "this homotopy has no `to`, the goal";
         walk.report(item.span.clone(), message, format!("add a line such as `to = {{ {example} = 1.0 }}`"));
         return None;
     };
@@ -64,7 +64,7 @@ fn targets(walk: &mut Walk, item: &Item, model: &Model, start: Option<&[Option<f
         return None;
     }
     if start.is_some_and(|start| targets.iter().all(|(index, goal)| start[*index] == Some(*goal))) {
-        walk.report(value.span(), "the homotopy starts at its goal already", "a goal other than the start");
+        walk.report(value.span(), "the homotopy already starts at its goal", "a goal other than the start");
     }
     targets.sort_by_key(|(index, _)| *index);
     Some(targets)
@@ -75,10 +75,11 @@ fn via(walk: &mut Walk, item: &Item, model: &Model, targets: Option<&[(usize, f6
     let aimed = |index: usize| targets.is_some_and(|targets| targets.iter().any(|(target, _)| *target == index));
     let other = model.parameters.iter().enumerate().find(|(index, _)| !aimed(*index));
     let Some(value) = item.table.get("via") else {
-        let message = "this homotopy does not say in which parameter it may move on the way";
+        let message = "this homotopy has no `via`, the parameter that it may vary on the way";
         let right = match other {
             Some((_, other)) => format!("add a line such as `via = \"{}\"`, and its `range`", other.name),
-            None => "every parameter of the model is part of the goal; leave one out and move in it".to_string(),
+            None => "every parameter of the model is part of the goal; remove one from `to` and use it for `via`"
+                .to_string(),
         };
         walk.report(item.span.clone(), message, right);
         return None;
@@ -89,10 +90,10 @@ fn via(walk: &mut Walk, item: &Item, model: &Model, targets: Option<&[(usize, f6
         return None;
     };
     if aimed(index) {
-        let message = format!("{name} is part of the goal, so it cannot be what the homotopy moves in on the way");
+        let message = format!("{name} is part of the goal, so it cannot also be `via`");
         let right = format!(
-            "leave {name} out of `to`, and bring it to its value by a branch from where the homotopy arrives, or move in \
-             another parameter"
+            "remove {name} from `to`, and reach its value with a branch from the end of the homotopy; or choose \
+             another parameter for `via`"
         );
         walk.report(value.span(), message, right);
         return None;
@@ -109,7 +110,7 @@ fn via_range(
 ) -> Option<[f64; 2]> {
     let name = via.map_or("the parameter `via`", |index| model.parameters[index].name.as_str());
     let Some(value) = item.table.get("range") else {
-        let message = format!("this homotopy does not say how far {name} may go");
+        let message = format!("this homotopy has no `range` for {name}");
         walk.report(item.span.clone(), message, "add a line such as `range = [0.5, 12]`");
         return None;
     };

@@ -120,7 +120,7 @@ pub(super) fn origin(
 ) -> Option<(Start, Vec<Option<f64>>, Option<Family>)> {
     let what = item.what;
     let Some(value) = item.table.get("from") else {
-        let message = format!("this {what} does not say where it starts");
+        let message = format!("this {what} has no `from`, its start");
         walk.report(item.span.clone(), message, "add `from = \"name of a seed, branch, curve or homotopy\"`");
         return None;
     };
@@ -128,7 +128,7 @@ pub(super) fn origin(
     if let Some(known) = ground.known(&from) {
         if known.end.is_none() {
             let message = format!("the curve \"{from}\" has no `until`, so nothing can start at its end");
-            walk.report(value.span(), message, "add to the curve a value of its second parameter to run `until`");
+            walk.report(value.span(), message, "add `until` to the curve, a value of its second parameter");
         }
         return known.end.clone().map(|end| (known.start.clone(), end, known.family));
     }
@@ -155,10 +155,10 @@ pub(super) fn origin(
 /// Reports a reference to an item that stands further down. Of one further up something is wrong, which has been said.
 pub(super) fn said_or_further_down(walk: &mut Walk, at: Range<usize>, item: &Item, other: &Item, name: &str) {
     if other.span.start >= item.span.start {
-        let message = format!("the {} \"{name}\" is not known yet at this place", other.what);
+        let message = format!("the {} \"{name}\" is defined further down", other.what);
         let right = match item.what {
-            "curve" => "a curve stands below the branch on which its special point lies; move it below it".to_string(),
-            what => format!("a {what} starts from a seed, or from something written above it"),
+            "curve" => "move the curve below the branch on which its special point lies".to_string(),
+            what => format!("start the {what} from a seed, or from something defined above it"),
         };
         walk.report(at, message, right);
     }
@@ -183,8 +183,8 @@ fn refuse_names_of_others(walk: &mut Walk, all: &[Item]) {
             };
             if taken {
                 let whose = &name[..name.len() - rest.len() - 1];
-                let message = format!("\"{name}\" is what a part of the {} \"{whose}\" will be called", other.what);
-                walk.report(value.span(), message, "give this one another name");
+                let message = format!("the name \"{name}\" is reserved for a part of the {} \"{whose}\"", other.what);
+                walk.report(value.span(), message, "choose another name");
             }
         }
     }

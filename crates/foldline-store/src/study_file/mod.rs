@@ -81,8 +81,12 @@ const ROOT_KEYS: [&str; 17] = [
 pub fn read_study(path: &Path) -> Result<Study, Vec<Diagnostic>> {
     let file = path.display().to_string();
     let text = read_text(path).map_err(|error| vec![unreadable(&file, "the study file", &error)])?;
-    let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
-    parse(&text, &file, |walk, root| {
+    parse_study_in(&text, &file, path.parent().unwrap_or(Path::new("")))
+}
+
+/// Reads a study text and the model that it names by a path relative to `folder`. Every mistake found is returned.
+pub fn parse_study_in(text: &str, file: &str, folder: &Path) -> Result<Study, Vec<Diagnostic>> {
+    parse(text, file, |walk, root| {
         let value = model_key(walk, root)?;
         let named = walk.string(value, "`model`")?;
         let model_path = simplified(&folder.join(named));
@@ -243,10 +247,10 @@ fn a_model(walk: &mut Walk, root: &DeTable, file: &str) {
     let parameters = root.get("parameters").and_then(|value| value.get_ref().as_table());
     let first = parameters.and_then(|table| table.keys().min_by_key(|key| key.span().start));
     let (place, name) = first.map_or((0..0, "mu"), |key| (key.span(), key.get_ref()));
-    let message = "this file is a model, not a study: it does not say what to compute";
+    let message = "this file is a model, not a study";
     let hint = format!(
-        "`foldline explore {file} --free {name}=LOW:HIGH` finds its bifurcation diagram, `foldline simulate {file}` integrates it; \
-         `foldline new --study {file}` writes a study to begin with"
+        "compute its bifurcation diagram with `foldline explore {file} --free {name}=LOW:HIGH`, integrate it with \
+         `foldline simulate {file}`, or write a study for it with `foldline new --study {file}`"
     );
     walk.report(place, message, hint);
 }
@@ -258,14 +262,15 @@ fn check_totals(walk: &mut Walk, root: &DeTable, model: &Model) {
     if kept.is_empty() {
         return;
     }
-    let (verb, each) = if kept.len() == 1 { ("keeps its value", "it") } else { ("keep their values", "each") };
+    let (verb, each) =
+        if kept.len() == 1 { ("is conserved", "its value") } else { ("are conserved", "the value of each") };
     let message = format!(
-        "{} {verb} along every solution: solutions form families, and none can be followed by itself",
+        "{} {verb}: solutions are not isolated but form families, so none of them can be continued",
         kept.join(" and ")
     );
     let entry = |(i, sum): (usize, &String)| format!("T{} = {{ sum = \"{sum}\", value = … }}", i + 1);
     let entries: Vec<String> = kept.iter().enumerate().map(entry).collect();
-    let hint = format!("say in the model which value {each} has: a table `[totals]` with {}", entries.join(", "));
+    let hint = format!("prescribe {each} in the model: add a table `[totals]` with {}", entries.join(", "));
     walk.report(root.get("model").map_or(0..0, |value| value.span()), message, hint);
 }
 
@@ -301,7 +306,7 @@ fn limits(walk: &mut Walk, root: &DeTable, unit: &str) -> [Limits; 2] {
 fn model_key<'v, 't>(walk: &mut Walk, root: &'v DeTable<'t>) -> Option<&'v Value<'t>> {
     let value = root.get("model");
     if value.is_none() {
-        walk.report(0..0, "the study names no model", "add a line such as `model = \"../models/lorenz.toml\"`");
+        walk.report(0..0, "the study has no `model`", "add a line such as `model = \"../models/lorenz.toml\"`");
     }
     value
 }
@@ -312,7 +317,7 @@ fn tolerance(walk: &mut Walk, root: &DeTable) -> f64 {
     let Some(value) = root.get("tolerance") else { return DEFAULT };
     let Some(tolerance) = walk.number(value, "`tolerance`") else { return DEFAULT };
     if !(1e-10..=1e-4).contains(&tolerance) {
-        let message = format!("the tolerance {tolerance:e} is out of bounds");
+        let message = format!("the tolerance {tolerance:e} is out of range");
         walk.report(value.span(), message, "a number from 1e-10 to 1e-4; 1e-6 is the default");
     }
     tolerance

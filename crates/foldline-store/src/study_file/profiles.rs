@@ -1,7 +1,7 @@
 //! `cycle` of a seed: a cycle that was computed or measured elsewhere.
 
 use crate::nearest::suggest;
-use crate::toml_walk::{Value, Walk};
+use crate::toml_walk::{Value, Walk, with_article};
 use foldline::contract::VectorField;
 use foldline::diagram::Cycle;
 use foldline::model::Model;
@@ -11,8 +11,7 @@ pub(super) const KEYS: [&str; 4] = ["period", "through", "times", "states"];
 /// The cycle, in polynomials of degree `degree`.
 pub(super) fn cycle(walk: &mut Walk, value: &Value, model: &Model, degree: usize) -> Option<Cycle> {
     if model.forced() {
-        let hint =
-            "use `attractor = \"cycle\"` or `state = { … }`: a given cycle does not say where in the forcing it begins";
+        let hint = "use `attractor = \"cycle\"` or `state = { … }`: a given cycle has no phase relative to the forcing";
         walk.report(value.span(), "the model is forced, and a seed cannot be a given `cycle`", hint);
         return None;
     }
@@ -53,14 +52,15 @@ pub(super) fn cycle(walk: &mut Walk, value: &Value, model: &Model, degree: usize
         return None;
     }
     if !(times.len() - 1).is_multiple_of(through) {
-        let message = format!("{} steps of time are no multiple of `through`, {through}", times.len() - 1);
-        walk.report(place.span(), message, "leave `through` out, or give the nodes of every mesh interval");
+        let message =
+            format!("the number of time steps, {}, is not a multiple of `through`, {through}", times.len() - 1);
+        walk.report(place.span(), message, "remove `through`, or give the nodes of every mesh interval");
         return None;
     }
     let states = states(walk, table.get("states")?, model, times.len())?;
     let found = Cycle::given(period, &times, &states, through, degree);
     if found.is_none() {
-        walk.report(value.span(), "these times and states make no cycle", "a state for each time, from 0 to 1");
+        walk.report(value.span(), "these times and states do not form a cycle", "a state for each time, from 0 to 1");
     }
     found
 }
@@ -88,7 +88,7 @@ fn states(walk: &mut Walk, value: &Value, model: &Model, count: usize) -> Option
         let values = list(walk, place, &format!("the state `{name}`"), &model.states[i].unit)?;
         if values.len() != count {
             let message = format!("the state `{name}` has {} values where there are {count} times", values.len());
-            walk.report(place.span(), message, "give a value for each time, that at the end of the period too");
+            walk.report(place.span(), message, "give a value for each time, including the end of the period");
             return None;
         }
         values.iter().enumerate().for_each(|(k, v)| out[k * known.len() + i] = *v);
@@ -102,7 +102,7 @@ fn list(walk: &mut Walk, value: &Value, what: &str, unit: &str) -> Option<Vec<f6
         Some(_) => {
             walk.report(
                 value.span(),
-                format!("{what} has less than two numbers"),
+                format!("{what} has fewer than two numbers"),
                 "a list of numbers such as [0, 0.5, 1]",
             );
             None
@@ -111,7 +111,7 @@ fn list(walk: &mut Walk, value: &Value, what: &str, unit: &str) -> Option<Vec<f6
             let found = value.get_ref().type_str();
             walk.report(
                 value.span(),
-                format!("{what} is a {found}, not a list"),
+                format!("{what} is {}, not a list", with_article(found)),
                 "a list of numbers such as [0, 0.5, 1]",
             );
             None

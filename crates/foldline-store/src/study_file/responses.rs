@@ -68,7 +68,7 @@ pub(super) fn sweeps(
 
 fn seed(walk: &mut Walk, table: &DeTable, span: &Range<usize>, seeds: &[(Range<usize>, SeedPlan)]) -> Option<usize> {
     let Some(value) = table.get("from") else {
-        let message = "this sweep does not say where it starts";
+        let message = "this sweep has no `from`, its starting seed";
         walk.report(span.clone(), message, "add `from = \"name of a seed\"`");
         return None;
     };
@@ -116,13 +116,13 @@ fn values(
             Some((0..count).map(value).collect())
         }
         (None, Some(range), None) => {
-            let message = format!("this {what} does not say how many values of its range it visits");
+            let message = format!("this {what} has no `count`, the number of values in its range");
             walk.report(range.span(), message, "add a line such as `count = 101`");
             None
         }
         (Some(value), ..) => {
             let message = format!("this {what} has both `values` and a `range` or `count`");
-            walk.report(value.span(), message, "keep `values`, or `range` and `count`");
+            walk.report(value.span(), message, "keep either `values`, or `range` and `count`");
             None
         }
         (None, None, _) => {

@@ -5,6 +5,7 @@ use super::{override_parameters, unique_name};
 use crate::nearest::suggest;
 use crate::toml_walk::{Value, Walk};
 use foldline::contract::VectorField;
+use foldline::diagram::Shown;
 use foldline::explore::{AttractorKey, SeedPlan, SeedSource};
 use foldline::model::{Model, unsupported};
 use std::collections::HashMap;
@@ -56,16 +57,21 @@ fn source(walk: &mut Walk, table: &DeTable, span: &Range<usize>, model: &Model, 
         (None, None, None) => {
             let hint =
                 "add `attractor = \"equilibrium\"`, `\"cycle\"` or a ratio such as `\"2:1\"`, or `state = { … }`";
-            walk.report(span.clone(), "this seed does not say which solution it means", hint);
+            walk.report(span.clone(), "this seed names no solution", hint);
             None
         }
         (Some(value), Some(_), _) => {
             let message = "this seed has both an `attractor` and a `state`";
-            walk.report(value.span(), message, "keep one: an attractor is searched for, a state is settled from");
+            walk.report(
+                value.span(),
+                message,
+                "keep one: `attractor` searches by sampling, `state` starts from the \
+                                                given state",
+            );
             None
         }
         (_, _, Some(value)) => {
-            let message = "this seed has a `cycle` and something else besides";
+            let message = "this seed has a `cycle` and another start";
             walk.report(value.span(), message, "keep one of `cycle`, `attractor` and `state`");
             None
         }
@@ -78,11 +84,11 @@ fn lasting(walk: &mut Walk, table: &DeTable, source: SeedSource, model: &Model) 
     let Some(value) = table.get("periods") else { return source };
     let periods = walk.integer(value, "`periods`", 1..=10_000);
     if !model.forced() {
-        let hint = "leave `periods` out: the period of a cycle follows from the equations";
-        walk.report(value.span(), "the model has no forcing whose periods could be counted", hint);
+        let hint = "remove `periods`: the period of a cycle follows from the equations";
+        walk.report(value.span(), "the model has no forcing, so no forcing periods", hint);
     } else if source != SeedSource::Attractor(AttractorKey::Cycle) {
         let message = "`periods` goes with `attractor = \"cycle\"`";
-        walk.report(value.span(), message, "leave `periods` out, or write `attractor = \"cycle\"`");
+        walk.report(value.span(), message, "remove `periods`, or write `attractor = \"cycle\"`");
     }
     periods.map_or(source, |periods| SeedSource::Attractor(AttractorKey::Lasting(periods as u32)))
 }
@@ -111,8 +117,8 @@ fn totals_of(
         let Some(terms) = terms else {
             let missing: Vec<&str> =
                 total.terms.iter().map(|(name, _)| name.as_str()).filter(|name| of(name).is_none()).collect();
-            let hint = format!("give {} too, or leave `{}` out", missing.join(", "), total.instead_of);
-            walk.report(value.span(), format!("the total `{name}` does not follow from this state"), hint);
+            let hint = format!("give {} too, or remove `{}`", missing.join(", "), total.instead_of);
+            walk.report(value.span(), format!("the total `{name}` cannot be computed from this state"), hint);
             continue;
         };
         let (sum, size) = (terms.iter().sum::<f64>(), terms.iter().map(|t| t.abs()).sum::<f64>());
@@ -120,8 +126,12 @@ fn totals_of(
             given.and_then(|given| given.get_ref().as_table()).is_some_and(|given| given.contains_key(name.as_str()));
         let own = &mut parameters[total.parameter];
         if stated && (*own - sum).abs() > 1e-9 * size {
-            let message = format!("the total `{name}` is {sum} at this state, and {own} under `parameters`");
-            walk.report(value.span(), message, format!("leave `{name}` or `{}` out", total.instead_of));
+            let message = format!(
+                "the total `{name}` is {sum} at this state, and {own} under `parameters`",
+                sum = Shown(sum),
+                own = Shown(*own)
+            );
+            walk.report(value.span(), message, format!("remove `{name}` or `{}`", total.instead_of));
         }
         *own = sum;
     }
@@ -133,7 +143,7 @@ fn attractor(walk: &mut Walk, value: &Value, model: &Model) -> Option<AttractorK
     match (text.as_str(), ratio) {
         ("equilibrium", _) => {
             if model.forced() {
-                let hint = "use `attractor = \"cycle\"`: where there is a forcing nothing is at rest";
+                let hint = "use `attractor = \"cycle\"`: the response to forcing is a cycle";
                 walk.report(value.span(), "the model is forced and has no equilibria", hint);
             }
             Some(AttractorKey::Equilibrium)
@@ -141,7 +151,10 @@ fn attractor(walk: &mut Walk, value: &Value, model: &Model) -> Option<AttractorK
         ("cycle", _) => Some(AttractorKey::Cycle),
         (_, Some((a, b))) if a > 0 && b > 0 => {
             if model.whirl.is_none() {
-                let message = format!("the ratio \"{text}\" needs a whirling motion, which this model does not name");
+                let message = format!(
+                    "the ratio \"{text}\" needs the two states of a whirling motion, which this \
+                                       model does not name"
+                );
                 let hint = "add `whirl = [\"u\", \"v\"]` to the model file, or use `attractor = \"cycle\"`";
                 walk.report(value.span(), message, hint);
             }
@@ -151,7 +164,7 @@ fn attractor(walk: &mut Walk, value: &Value, model: &Model) -> Option<AttractorK
             let hint = "\"equilibrium\", \"cycle\", or a ratio of whole numbers such as \"2:1\"";
             let (message, hint) = match unsupported(&text) {
                 Some(kind) => (format!("the attractor \"{text}\": {}", kind.message), kind.instead),
-                None => (format!("\"{text}\" is no attractor"), hint),
+                None => (format!("\"{text}\" is not an attractor"), hint),
             };
             walk.report(value.span(), message, hint);
             None
@@ -186,7 +199,7 @@ fn state(walk: &mut Walk, value: &Value, model: &Model) -> Option<Vec<f64>> {
                 walk.report(key.span(), message, suggest(name, &known));
             }
             Some(list) if list.len() != elements.len() => {
-                let message = format!("{what} has {} elements, and {} values here", elements.len(), list.len());
+                let message = format!("{what} has {} elements, but {} values are given", elements.len(), list.len());
                 walk.report(own.span(), message, "give one value for each, or one number for all");
             }
             Some(list) => {

@@ -73,7 +73,7 @@ fn spoilt_files_are_answered_with_a_place_and_a_cure() {
     let cut = lines[..60].join("\n");
     let row = lines[..40].iter().chain(&lines[41..]).copied().collect::<Vec<_>>().join("\n") + "\n\n";
     let cases: [(&str, String, usize, &str); 7] = [
-        ("cut", cut, 1, "the file ends within the solution labelled 7: 59 of its 166 lines are there"),
+        ("cut", cut, 1, "the file ends inside the solution labelled 7, after 59 of its 166 lines"),
         ("a row is missing", row, 83, "\"1.8978541499E+000\" is not the number of a parameter"),
         ("no solution", "\n\n".into(), 1, "there is no solution in this file"),
         ("another file", BRANCH.into(), 1, "\"0.0000E+00\" is not an integer"),
@@ -138,16 +138,26 @@ fn what_does_not_fit_is_said() {
             &renamed,
             &named,
             [&[], &[]],
-            "the free parameter of the solution labelled 7 is PAR(1), and which of the model's that is",
+            "the solution labelled 7 has the free parameter PAR(1), whose name in the model is unknown",
         ),
         (&renamed, &bare, [&[(1, "DA")], &[]], "--parameters: the model has no \"DA\""),
-        (&own, &bare, [&[(1, "p1")], &[(1, "u2")]], "which of AUTO's states is u1 is not known"),
-        (&own, &bare, [&[(1, "p1")], &[(1, "u2"), (1, "u1")]], "numbered 1 to 2"),
-        (&own, &bare, [&[(1, "p1"), (40, "p2")], &[]], "p2 is to be PAR(40), but the solution has 12 parameters"),
-        (&swapped, &named, [&[], &[]], "does not satisfy the model: the equation of"),
-        (&other, &bare, [&[(1, "p1")], &[]], "does not satisfy the model: the equation of `u2` is off by"),
-        (&three, &named, [&[], &[]], "has 3 states, the solution 2 states"),
-        (&forced, &named, [&[], &[]], "is a cycle, and the model is forced"),
+        (&own, &bare, [&[(1, "p1")], &[(1, "u2")]], "the number of u1 among AUTO's states is unknown"),
+        (&own, &bare, [&[(1, "p1")], &[(1, "u2"), (1, "u1")]], "does not match each of AUTO's states, 1 to 2"),
+        (
+            &own,
+            &bare,
+            [&[(1, "p1"), (40, "p2")], &[]],
+            "p2 is assigned to PAR(40), but the solution has only 12 parameters",
+        ),
+        (&swapped, &named, [&[], &[]], "does not satisfy the model: the relative residual of the equation of"),
+        (
+            &other,
+            &bare,
+            [&[(1, "p1")], &[]],
+            "does not satisfy the model: the relative residual of the equation of `u2` is",
+        ),
+        (&three, &named, [&[], &[]], "has 3 states, but the solution has 2 states"),
+        (&forced, &named, [&[], &[]], "is a cycle, but the model is forced"),
     ];
     for (model, names, pairs, message) in cases {
         let found = imported(model, CYCLES, names, pairs).unwrap_err();
@@ -173,13 +183,13 @@ fn mistakes_in_a_given_cycle_are_answered_with_place_and_cure() {
         ("period = 2", "period = 0", "s.toml:4:20: the period is not positive"),
         ("[0, 0.5, 1]", "[0, 1, 0.5]", "s.toml:4:31: the times do not increase: 1 is followed by 0.5"),
         ("[0, 0.5, 1]", "[0, 0.5, 2]", "s.toml:4:31: the times do not run from 0 to 1"),
-        ("[0, 0.5, 1]", "[1]", "less than two numbers"),
+        ("[0, 0.5, 1]", "[1]", "fewer than two numbers"),
         ("u1 = [0, 1, 0]", "u1 = [0, 1]", "the state `u1` has 2 values where there are 3 times"),
         ("u1 = [0, 1, 0], ", "", "the states lack u1"),
         ("u1 =", "v1 =", "has no state `v1`"),
-        ("period = 2", "period = 2, through = 4", "2 steps of time are no multiple of `through`, 4"),
+        ("period = 2", "period = 2, through = 4", "the number of time steps, 2, is not a multiple of `through`, 4"),
         ("period = 2, ", "", "s.toml:4:9: the cycle lacks period"),
-        ("cycle =", "attractor = \"cycle\"\ncycle =", "something else besides"),
+        ("cycle =", "attractor = \"cycle\"\ncycle =", "another start"),
     ];
     for (piece, by, message) in cases {
         let found = parse_study(&right.replacen(piece, by, 1), "s.toml", MODEL, "m.toml").unwrap_err();

@@ -18,8 +18,8 @@
 //! **Source.** akay, §2, where the profile is resampled for the same reason: meshes are not uniform.
 
 use crate::diagram::Cycle;
+use foldline_general::fourier;
 use num_complex::Complex64;
-use rustfft::FftPlanner;
 
 /// Samples for naming; lines beyond ±512 are not among the two strongest of any motion that is resolved.
 const COUNT: usize = 1024;
@@ -37,7 +37,7 @@ pub fn signed_spectrum(cycle: &Cycle, whirl: [usize; 2], count: usize) -> Vec<(f
     }
     let mut z: Vec<Complex64> =
         cycle.uniform(count).chunks_exact(n).map(|x| Complex64::new(x[whirl[0]], x[whirl[1]])).collect();
-    FftPlanner::new().plan_fft_forward(count).process(&mut z);
+    fourier(&mut z);
     let half = count as i64 / 2;
     (-half..half).map(|k| (k as f64 / cycle.period, z[k.rem_euclid(count as i64) as usize] / count as f64)).collect()
 }
@@ -92,7 +92,7 @@ fn sampled(cycle: &Cycle, whirl: [usize; 2]) -> Vec<Complex64> {
 }
 
 fn transformed(mut z: Vec<Complex64>) -> Vec<Complex64> {
-    FftPlanner::new().plan_fft_forward(z.len()).process(&mut z);
+    fourier(&mut z);
     z
 }
 

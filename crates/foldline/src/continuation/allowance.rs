@@ -52,14 +52,15 @@ impl Allowance {
         self.unexplained = if unexplained { self.unexplained + 1 } else { 0 };
         if self.unexplained >= IN_A_ROW {
             return Some(Ending::GivenUp(format!(
-                "up to {}, stability changes at {IN_A_ROW} points in a row without a special point that explains it\nlikely cause: \
-                 multipliers that lie on the unit circle along the whole branch, as in a system with a conserved quantity\nwhat to do: \
-                 disregard the stability of this branch, or add a term that breaks the conservation",
+                "stability changed at {IN_A_ROW} consecutive points up to {} with no special point to explain \
+                 it\nlikely cause: multipliers on the unit circle along the whole branch, as in a conservative \
+                 system\nwhat to do: ignore the stability of this branch, or add a term that breaks the conservation \
+                 law, such as a small damping",
                 Shown(at)
             )));
         }
         if self.is_used_up(work) {
-            return Some(self.ending(at, work, "the point converged in the end"));
+            return Some(self.ending(at, work, "it converged in the end"));
         }
         self.left = (self.left - work + RENEWED).min(ALLOWANCE);
         None
@@ -68,12 +69,16 @@ impl Allowance {
     /// The end of a side whose allowance is used up near the parameter value `at`.
     pub(super) fn ending(&self, at: f64, work: usize, last: &str) -> Ending {
         let before = ALLOWANCE - self.left;
-        let also =
-            if before > 0 { format!(", and the points before it {before} more than usual") } else { String::new() };
+        let also = if before > 0 {
+            format!(", and the points before it took {before} more than usual")
+        } else {
+            String::new()
+        };
         Ending::GivenUp(format!(
-            "next to {}, a point took the work of {work} factorisations{also}; {last}\nlikely cause: ever shorter steps or finer meshes are \
-             needed here, as near a homoclinic orbit, a canard or a cluster of special points\nwhat to do: end the range or `stop` \
-             before it; with a larger tolerance, longer steps may pass it",
+            "near {}, one point took the work of {work} factorisations{also}; {last}\nlikely cause: ever shorter \
+             steps or finer meshes are needed here, as near a homoclinic orbit, a canard or a cluster of special \
+             points\nwhat to do: end the range before this point, or set a `stop` there; with a larger tolerance, \
+             longer steps may pass it",
             Shown(at)
         ))
     }
@@ -91,7 +96,7 @@ mod tests {
         assert!(own.is_used_up(1001) && !own.is_used_up(1000));
         let Ending::GivenUp(text) = own.ending(1.5, 1001, "it failed") else { panic!() };
         assert!(text.starts_with(
-            "next to 1.5, a point took the work of 1001 factorisations, and the points before it 9000 more than usual; it failed"
+            "near 1.5, one point took the work of 1001 factorisations, and the points before it took 9000 more than usual; it failed"
         ));
     }
 

@@ -61,27 +61,32 @@ impl std::fmt::Display for Failure {
                 write!(f, ")")
             }
             Failure::Elsewhere { angle, miss } => {
-                write!(f, "the branch turns too sharply (by {angle:.2} rad, {miss:.2} of a step off the prediction)")
+                write!(
+                    f,
+                    "the branch turns too sharply within a step (by {angle:.2} rad; the point lies {miss:.2} \
+                           of a step from the prediction)"
+                )
             }
             Failure::Bent { miss, allowed } => {
                 let miss = miss * allowed;
                 write!(
                     f,
-                    "the branch bends too much within the step (midway it lies {miss:.1e} of a step beside the cubic \
-                     between both ends, where {allowed:.1e} is allowed)"
+                    "the branch bends too much within a step (its midpoint lies {miss:.1e} of a step from the cubic \
+                     through both ends; the limit is {allowed:.1e})"
                 )
             }
             Failure::NotBack { .. } => {
                 write!(
                     f,
-                    "another branch, or the other arm of a cusp, is so close that the same step backwards leads there"
+                    "the same step taken backwards does not return: another branch, or the other side of a cusp, is \
+                     very close"
                 )
             }
-            Failure::Unexplained => write!(f, "stability changes without a special point that explains it"),
+            Failure::Unexplained => write!(f, "stability changes with no special point to explain it"),
             Failure::Spectrum => write!(f, "the eigenvalues or multipliers could not be computed"),
-            Failure::Remeshed(mesh) => write!(f, "the mesh keeps changing ({} intervals)", mesh.len().max(1) - 1),
-            Failure::Departed => write!(f, "the branches that crossed no longer do"),
-            Failure::Mesh(error) => write!(f, "the error estimate stays at {error:.1e} on the largest mesh"),
+            Failure::Remeshed(mesh) => write!(f, "the mesh does not settle ({} intervals)", mesh.len().max(1) - 1),
+            Failure::Departed => write!(f, "the branches no longer cross"),
+            Failure::Mesh(error) => write!(f, "the estimated error is still {error:.1e} on the finest mesh"),
         }
     }
 }

@@ -34,17 +34,18 @@ type Cause = (String, &'static str);
 
 /// f that is not defined everywhere.
 const EDGE: (&str, &str) = (
-    "the solution reaches the edge of the region in which the vector field is defined (a division by zero, a log or a \
-     root of something negative)",
-    "if that edge belongs to the problem, the branch ends here; otherwise write the equation so that it is defined on the \
-     way, or end the range before",
+    "the solution reaches the boundary of the region where the vector field is defined (division by zero, log or \
+     root of a negative number)",
+    "if this boundary is part of the problem, the branch ends here; otherwise rewrite the equation so that it stays \
+     defined, or end the range earlier",
 );
 
 /// Branches that cross for one value of a second parameter.
 pub(crate) const UNCROSSED: (&str, &str) = (
-    "the second parameter breaks what makes branches cross: a symmetry, or a solution that is always there",
-    "take a second parameter that keeps it; or follow the branch at another value of this one, where a fold is left of the \
-     branch point, and hold that",
+    "the second parameter destroys what makes the branches cross: a symmetry, or a solution that exists for all \
+     parameter values",
+    "choose a second parameter that preserves it; or follow the branch at another value of this parameter, where a \
+     fold replaces the branch point, and continue that fold",
 );
 
 /// Growth of the period that makes an orbit of infinite period likely.
@@ -70,19 +71,19 @@ impl Tried {
 
     fn sentence(&self, why: &Failure, parameter: f64) -> String {
         let steps = match self.steps {
-            0 | 1 => format!("one step of {:.1e} was tried", self.longest),
-            n => format!("{n} steps from {:.1e} down to {:.1e} were tried", self.longest, self.shortest),
+            0 | 1 => format!("one step of {:.1e} failed", self.longest),
+            n => format!("{n} steps of {:.1e} down to {:.1e} failed", self.longest, self.shortest),
         };
         let meshes = match self.intervals {
             [_, 0] => String::new(),
-            [few, many] if few == many => format!(" on {few} intervals"),
-            [few, many] => format!(" on {few} to {many} intervals"),
+            [few, many] if few == many => format!(" on {few} mesh intervals"),
+            [few, many] => format!(" on {few} to {many} mesh intervals"),
         };
         let counts = match (self.elsewhere, self.diverged) {
             (_, 0) | (0, _) => String::new(),
-            (a, b) => format!(" ({a} led elsewhere, Newton's method failed in {b})"),
+            (a, b) => format!(" ({a} left the branch, Newton's method failed in {b})"),
         };
-        format!("next to {}, {steps}{meshes}{counts}; the last failed because {why}", Shown(parameter))
+        format!("near {}, {steps}{meshes}{counts}; the last one because {why}", Shown(parameter))
     }
 }
 
@@ -111,55 +112,60 @@ impl Follow<'_> {
         if grown > GROWN {
             return (
                 format!(
-                    "the period has grown {grown:.1} times and most of it passes next to an equilibrium: a homoclinic or \
-                     heteroclinic orbit is near, at which the branch ends"
+                    "the period has grown by a factor of {grown:.1}, most of it spent near an equilibrium: the \
+                     branch ends at a homoclinic or heteroclinic orbit close by"
                 ),
-                "take the value of the parameter here as that of the orbit, or end the range before",
+                "take the parameter value here as that of the orbit, or end the range earlier",
             );
         }
         if !past.moved && left.slope().abs() < STANDS {
             return (
-                "the parameter has not moved since the branch began: a family of solutions at one value of it, as a system \
-                 with a conserved quantity has them"
+                "the parameter has not changed since the start of the branch: the solutions form a family at one \
+                 parameter value, as in a conservative system"
                     .into(),
-                "add a small damping and follow it to zero, or take a parameter that the family depends on",
+                "add a small damping and continue it to zero, or choose a parameter on which the family depends",
             );
         }
         match self.settings.kinks {
             0 => {}
             n => {
-                let places = if n == 1 { "one place".to_string() } else { format!("{n} places") };
+                let places = if n == 1 { "a non-smooth term".to_string() } else { format!("{n} non-smooth terms") };
                 return (
                     format!(
-                        "the right-hand side is not smooth in {places} (abs, sign, heaviside, min, max, if, comparisons), \
-                         and the solution meets one of them here"
+                        "the right-hand side has {places} (abs, sign, heaviside, min, max, if, comparisons), and the \
+                         solution reaches a switching point here"
                     ),
-                    "replace them by smooth functions with a sharpness, such as tanh(s*x) for sign(x) or \
-                     sqrt(x^2 + 1/s^2) for abs(x), and follow the solution to the sharpness needed",
+                    "use a smooth function with a sharpness parameter, such as tanh(s*x) for sign(x) or sqrt(x^2 + \
+                     1/s^2) for abs(x), and continue the solution in s to the sharpness needed",
                 );
             }
         }
         match why {
             Failure::Mesh(_) => (
-                "a layer in time too thin for any mesh allowed here: a relaxation oscillation that is very stiff, a canard, \
-                 or a contact that is nearly a jump"
+                "the solution changes too fast in time for any mesh allowed: a very stiff relaxation oscillation, a \
+                 canard, or a contact that is nearly a jump"
                     .into(),
-                "ask for a larger tolerance or a higher degree, or make the stiff term milder and follow it back",
+                "set a larger tolerance or a higher degree; or soften the stiff term, and continue the solution back \
+                 to its full value",
             ),
             Failure::Unexplained => (
-                "another branch passes closer than the tolerance tells apart, or a multiplier that matters is not resolved"
+                "another branch is closer than the tolerance can distinguish, or a critical multiplier is not \
+                 resolved"
                     .into(),
-                "ask for a smaller tolerance",
+                "set a smaller tolerance",
             ),
             Failure::Singular | Failure::Elsewhere { .. } | Failure::Bent { .. } | Failure::NotBack { .. } => (
-                "the solutions form no smooth curve here: a cusp, an isolated point, or branches that meet in a way that \
-                 one parameter and the symmetries of the model do not explain"
+                "the solutions do not form a smooth curve here: a cusp, an isolated point, or branches that meet in \
+                 a way that one parameter and the symmetries of the model do not explain"
                     .into(),
-                "change another parameter a little, which opens such a point, and follow the branches on both sides of it",
+                "change another parameter slightly, which unfolds such a point, and follow the branches on both \
+                 sides of it",
             ),
             _ => (
-                "the solution changes over a much shorter way than the scales of states and parameters suggest".into(),
-                "give each state and the parameter its `scale` in the model file",
+                "the solution changes over a much shorter distance than the scales of the states and the parameter \
+                 suggest"
+                    .into(),
+                "give each state and the parameter a `scale` in the model file",
             ),
         }
     }
@@ -183,14 +189,12 @@ impl Follow<'_> {
     /// The ending of a side of equilibria on which the parameter has come to a stand and the solution goes on changing.
     pub(super) fn at_a_stand(&mut self, right: &Station) -> Ending {
         let edge = self.breaks_off(right, self.settings.first_step);
-        let said = format!(
-            "the parameter comes to a stand at {} while the solution goes on changing",
-            Shown(self.value(right))
-        );
+        let said = format!("the parameter converges to {} while the solution keeps changing", Shown(self.value(right)));
         match edge {
             true => Ending::NotFinite(format!("{said}\nlikely cause: {}\nwhat to do: {}", EDGE.0, EDGE.1)),
             false => Ending::SolutionUnbounded(format!(
-                "{said}\nlikely cause: the branch has an asymptote there\nwhat to do: nothing if that is so"
+                "{said}\nlikely cause: the branch has an asymptote there\nwhat to do: nothing, if an asymptote is \
+                 expected there"
             )),
         }
     }
@@ -211,14 +215,15 @@ impl Follow<'_> {
             return None;
         }
         let cause = match past.moved {
-            true => "the branch has an asymptote there: solutions run to infinity at a finite value of the parameter",
-            false => {
-                "a family of solutions at one value of the parameter, as a system with a conserved quantity has them"
+            true => {
+                "the branch has an asymptote there: the solution grows without bound as the parameter approaches \
+                     a finite value"
             }
+            false => "the solutions form a family at one parameter value, as in a conservative system",
         };
         Some(Ending::SolutionUnbounded(format!(
-            "a state has grown to {:.1e} while the parameter stands at {}\nlikely cause: {cause}\nwhat to do: nothing if \
-             that is so; if such sizes are usual, give the state its `scale` in the model file",
+            "a state has grown to {:.1e} while the parameter stays at {}\nlikely cause: {cause}\nwhat to do: \
+             nothing, if that is expected; if such values are normal, give the state a `scale` in the model file",
             size(now, i),
             Shown(self.problem.unit() * ((1e9 * right.parameter()).round() / 1e9))
         )))

@@ -236,8 +236,9 @@ impl Point {
         (0..rest.len()).any(|i| rest[i + 1..].iter().any(|other| reciprocal(&rest[i], other)))
     }
 
-    /// Largest difference of period and ranges between two points, each relative to its scale (`scales` for the states;
-    /// outputs and period by their own size). `reflection[i]` says that the other point is seen with state i negated.
+    /// Largest difference of the period and the ranges of the states between two points, each relative to its scale plus size, the
+    /// period to its size. Outputs do not count: they follow from the states, and one that is a small difference (the force of a contact
+    /// that has just begun) is less accurate than they are. `reflection[i]` says that the other point is seen with state i negated.
     /// Infinite if one is an equilibrium and the other a cycle.
     pub fn difference(&self, other: &Point, measure: Measure, reflection: &[bool]) -> f64 {
         let Measure { scales, periods } = measure;
@@ -250,14 +251,14 @@ impl Point {
             (None, None) => 0.0,
             _ => return f64::INFINITY,
         };
-        for (i, (a, b)) in self.ranges.iter().zip(&other.ranges).enumerate() {
+        for (i, ((a, b), scale)) in self.ranges.iter().zip(&other.ranges).zip(scales).enumerate() {
             let mut b = if mirrored(i) { [-b[1], -b[0]] } else { *b };
             if let Some(period) = periods.get(i).filter(|period| period.is_finite()) {
                 let copies = period * (0.5 * (a[0] + a[1] - b[0] - b[1]) / period).round();
                 b = b.map(|b| b + copies);
             }
             let size = a[0].abs().max(a[1].abs()).max(b[0].abs()).max(b[1].abs());
-            let scale = scales.get(i).copied().unwrap_or(f64::MIN_POSITIVE) + size;
+            let scale = scale + size;
             largest = largest.max((a[0] - b[0]).abs() / scale).max((a[1] - b[1]).abs() / scale);
         }
         largest
@@ -687,7 +688,7 @@ impl fmt::Display for Ending {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         match self {
             Ending::Bound(value) => write!(f, "reached {}", Shown(*value)),
-            Ending::Asked(value) => write!(f, "stopped where the study asks to, at the value {}", Shown(*value)),
+            Ending::Asked(value) => write!(f, "stopped at the requested value {}", Shown(*value)),
             Ending::Closed => write!(f, "closed on itself"),
             Ending::Joined { at: Kind::Hopf, parameter } => {
                 write!(f, "shrank to an equilibrium at {:.6}", Shown(*parameter))
@@ -696,29 +697,29 @@ impl fmt::Display for Ending {
                 write!(f, "became a cycle of half the period at {:.6}", Shown(*parameter))
             }
             Ending::Joined { at, parameter } => write!(f, "joined another branch at {at} {:.6}", Shown(*parameter)),
-            Ending::StepTooSmall(why) => write!(f, "step too small: {why}"),
+            Ending::StepTooSmall(why) => write!(f, "step size too small: {why}"),
             Ending::MeshTooLarge(why) => write!(f, "mesh too large: {why}"),
             Ending::PeriodUnbounded(period) => {
-                write!(f, "period grew to {:.4}, and no equilibrium near the cycle explains it", Shown(*period))
+                write!(
+                    f,
+                    "the period grew beyond its limit, to {:.4}, with no equilibrium near the cycle to explain \
+                           it",
+                    Shown(*period)
+                )
             }
             Ending::Connecting { connection, parameter, period, to } => {
                 let orbit = match connection {
                     Connection::Homoclinic => "an orbit homoclinic to the saddle",
                     Connection::Heteroclinic => "a heteroclinic cycle between the saddles",
-                    Connection::SaddleNode => "a saddle-node on the cycle, at",
+                    Connection::SaddleNode => "an orbit homoclinic to the saddle-node",
                 };
-                write!(
-                    f,
-                    "approaches {orbit} {to} at {:.9}; the last period is {:.4}",
-                    Shown(*parameter),
-                    Shown(*period)
-                )
+                write!(f, "approaches {orbit} {to} at {:.9}; last period {:.4}", Shown(*parameter), Shown(*period))
             }
-            Ending::SolutionUnbounded(why) => write!(f, "solution without bound: {why}"),
+            Ending::SolutionUnbounded(why) => write!(f, "solution unbounded: {why}"),
             Ending::PointLimit(points) => write!(f, "stopped at the limit of {points} points"),
-            Ending::NotFinite(why) => write!(f, "not finite: {why}"),
+            Ending::NotFinite(why) => write!(f, "vector field not finite: {why}"),
             Ending::GivenUp(why) => write!(f, "given up: {why}"),
-            Ending::NoStart(why) => write!(f, "no start: {why}"),
+            Ending::NoStart(why) => write!(f, "no starting solution: {why}"),
             Ending::Stopped => write!(f, "stopped on request"),
         }
     }

@@ -75,8 +75,8 @@ impl Response {
     /// Outcome of a trajectory that escaped, in words: it ran to infinity, or could not be integrated beyond its last state.
     pub fn fate(&self) -> &'static str {
         match self.state.iter().all(|x| x.abs() < Response::UNBOUNDED) {
-            true => "cannot be followed beyond a state at which f jumps or becomes undefined",
-            false => "runs to infinity",
+            true => "cannot be integrated past a state at which f jumps or is undefined",
+            false => "grows without bound",
         }
     }
 }

@@ -6,7 +6,7 @@ use crate::diagram::{Branch, Family, Misfit, Point, Shown, SpecialPoint};
 
 /// The cure where a number does not fit.
 const CLOSER: &str =
-    "what to do: a smaller tolerance; `foldline verify` checks the points on both sides by another method";
+    "what to do: use a smaller tolerance; `foldline verify` checks the points on both sides by another method";
 
 impl Growth<'_> {
     /// Reports a special point that does not fit the record. Returns false if the observer wants to stop.
@@ -17,10 +17,14 @@ impl Growth<'_> {
             Misfit { on_arrival: 0, of_change: 0 } => return true,
             Misfit { on_arrival: 0, .. } => {
                 format!(
-                    "the number of unstable {what} changes from {before} to {after} at the {kind} at {at}, which its kind does not explain"
+                    "the number of unstable {what} changes from {before} to {after} at the {kind} at {at}, \
+                     which a point of this kind does not explain"
                 )
             }
-            _ => format!("the number of unstable {what} at the {kind} at {at} is not that of the points beside it"),
+            _ => format!(
+                "the number of unstable {what} at the {kind} at {at} does not match the neighbouring \
+                          points"
+            ),
         };
         self.tell(Event::Short(&branch.name, &format!("{said}\n{CLOSER}")))
     }
@@ -30,7 +34,8 @@ impl Growth<'_> {
     pub(super) fn unexplained(&self, branch: &Branch, before: usize, point: &Point) -> bool {
         let (what, at, after) = (counted(branch), value(branch, point), point.unstable);
         let said = format!(
-            "the number of unstable {what} changes from {before} to {after} next to {at}, but no special point was found there"
+            "the number of unstable {what} changes from {before} to {after} near {at}, but no special point was \
+             found there"
         );
         self.tell(Event::Short(&branch.name, &format!("{said}\n{CLOSER}")))
     }

@@ -64,7 +64,8 @@ impl<'c> Choice<'c> {
         }
         let others: Vec<String> = others.iter().map(|other| described(system, other)).collect();
         Some(format!(
-            "{} is used, since most samples reached it; these match as well: {}. To start from one of them, give a state on it as `state = {{ … }}`",
+            "{} is used, because most samples reached it; also matching: {}. To start from one of those, give a \
+             state on it: `state = {{ … }}`",
             described(system, first),
             others.join(", ")
         ))
@@ -97,30 +98,31 @@ pub(super) fn summary(system: &System, census: &Census) -> String {
         let what = kind(system, found);
         return match census.unsettled {
             0 => format!(
-                "{what}, found by Newton's method; it attracts too slowly for samples to settle on it within the step limit"
+                "{what}, found by Newton's method; it attracts too slowly for samples to settle within the step limit"
             ),
             n => format!(
-                "{what}, found by Newton's method from the state nearest to the origin; {n} samples did not settle, on it or elsewhere"
+                "{what}, found by Newton's method from the state nearest to the origin; {n} samples did not settle \
+                 anywhere"
             ),
         };
     }
     let mut parts: Vec<String> = census.attractors.iter().map(|attractor| described(system, attractor)).collect();
     if census.unsettled > 0 {
-        parts.push(format!("unsettled ({})", census.unsettled));
+        parts.push(format!("not settled ({})", census.unsettled));
     }
     if census.escaped > 0 {
         parts.push(format!("escaped ({})", census.escaped));
     }
     if !census.exits.is_empty() {
-        parts.push(format!("left the region in which the vector field is defined ({})", census.exits.len()));
+        parts.push(format!("left the region where the vector field is defined ({})", census.exits.len()));
     }
     if census.stuck > 0 {
-        parts.push(format!("stuck where steps became too small ({})", census.stuck));
+        parts.push(format!("stopped because the step size became too small ({})", census.stuck));
     }
     if census.left > 0 {
         parts.push(format!("not needed ({})", census.left));
     }
-    format!("attractors (samples that went there): {}", parts.join(", "))
+    format!("outcome of the samples: {}", parts.join(", "))
 }
 
 /// Message that no attractor matches a key, with what was found instead and what to do.
@@ -129,7 +131,7 @@ pub(super) fn missing(system: &System, seed: &SeedPlan, census: &Census, key: &A
         AttractorKey::Equilibrium => "no stable equilibrium".to_string(),
         AttractorKey::Cycle => "no stable cycle".to_string(),
         AttractorKey::Ratio(p, q) => format!("no stable {p}:{q} cycle"),
-        AttractorKey::Lasting(periods) => format!("no stable cycle of {periods} periods of the forcing"),
+        AttractorKey::Lasting(periods) => format!("no stable cycle of {periods} forcing periods"),
     };
     let all_escaped = census.attractors.is_empty() && census.unsettled == 0 && census.escaped > 0;
     // If any sample settled to what is sought, the fate of the others is not the cause.
@@ -142,7 +144,7 @@ pub(super) fn missing(system: &System, seed: &SeedPlan, census: &Census, key: &A
     let unnamed = census.attractors.iter().any(|a| a.point.solution.period().is_some() && a.ratio.is_none());
     let single = match key {
         AttractorKey::Ratio(..) if unnamed && system.whirl.is_some() => {
-            "; a cycle without a ratio is a single whirl with its harmonics: attractor = \"cycle\" takes it"
+            "; a cycle without a ratio is a single whirl with its harmonics: select it with attractor = \"cycle\""
         }
         _ => "",
     };

@@ -55,9 +55,9 @@ pub fn crossings(
     problem.anchor(&u);
     let mesh = problem.mesh();
     let kernel = branch_point::kernel(problem, &u, &at.point.tangent, dimension)
-        .ok_or_else(|| format!("a kernel of dimension {dimension} was not found"))?;
+        .ok_or_else(|| format!("no null space of dimension {dimension} was found"))?;
     let (mut beginnings, mut lines): (Vec<Beginning>, Vec<Vec<f64>>) = (Vec::new(), Vec::new());
-    let mut why = "no step off the branch leads to another one".to_string();
+    let mut why = "no step off the branch led to another branch".to_string();
     let directions = TRIES * most;
     for weights in directions_of(dimension, directions) {
         problem.set_mesh(&mesh);

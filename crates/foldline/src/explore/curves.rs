@@ -28,8 +28,8 @@ pub fn start<'b>(plan: &CurvePlan, branch: &'b Branch) -> Result<&'b SpecialPoin
     };
     found.ok_or_else(|| {
         let others: Vec<String> = branch.special.iter().map(|s| format!("{} {:.6}", s.kind, Shown(value(s)))).collect();
-        let there = if others.is_empty() { "none at all".into() } else { others.join(", ") };
-        format!("{} has no {} point (special points: {there})", branch.name, plan.hold)
+        let there = if others.is_empty() { "none".into() } else { others.join(", ") };
+        format!("the branch {} has no {} point (its special points: {there})", branch.name, plan.hold)
     })
 }
 
@@ -114,7 +114,8 @@ pub fn follow_from(
         {
             let value = special.point.parameters[parent.free];
             return Err(format!(
-                "the branches that cross at {:.6} do so at this value of the second parameter only\nlikely cause: {}\nwhat to do: {}",
+                "the branches cross at {:.6} only for this value of the second parameter\nlikely cause: {}\nwhat to \
+                 do: {}",
                 Shown(value),
                 UNCROSSED.0,
                 UNCROSSED.1
@@ -144,8 +145,8 @@ pub fn end_of(system: &System, plan: &Plan, curve: &CurvePlan, branch: &Branch) 
             let first = branch.held.map_or(curve.free, |(_, first)| first);
             leaving(system, plan, first, point)
         }
-        (Some(other), _) => Err(format!("the curve {} did not get to its end: {other}", curve.name)),
-        _ => Err(format!("the curve {} was not finished", curve.name)),
+        (Some(other), _) => Err(format!("the curve {} did not reach its end: {other}", curve.name)),
+        _ => Err(format!("the curve {} is unfinished", curve.name)),
     }
 }
 

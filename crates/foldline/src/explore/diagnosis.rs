@@ -7,7 +7,7 @@ use super::direct::{transient, turn};
 use super::{System, symmetry};
 use crate::attractors::{Exit, Limits};
 use crate::contract::{Batch, Parameters};
-use crate::diagram::{Ending, Point};
+use crate::diagram::{Ending, Point, Shown};
 use crate::linalg::max_abs;
 use crate::model::{conserved_at, in_words, shifts};
 use crate::special::connection::in_first_turn;
@@ -37,9 +37,9 @@ pub(super) fn of_no_start(system: &System, parameters: &[f64], seen: Seen) -> St
         return why;
     }
     if seen.state.is_some_and(|state| is_equilibrium(system, parameters, state)) {
-        return "\nlikely cause: the state is an equilibrium, and a singular one: a fold, a branch point or an isolated point, \
-                from which nothing says where a branch leads\nwhat to do: start at another value of the parameter, on one of the \
-                branches that come together there"
+        return "\nlikely cause: the state is a singular equilibrium (a fold, a branch point or an isolated point), \
+                where the direction of the branch is undefined\nwhat to do: start at another parameter value, on one \
+                of the branches that meet there"
             .into();
     }
     if let Some(why) = seen.exit.map(|exit| of_exit(system, exit)) {
@@ -52,28 +52,34 @@ pub(super) fn of_no_start(system: &System, parameters: &[f64], seen: Seen) -> St
     }
     let angles = if seen.unsettled { angles(system, parameters) } else { Vec::new() };
     match system.field.switch_count() {
-        0 if stuck => "\nlikely cause: f jumps, or is too stiff for the method that simulates\nwhat to do: give a state \
-                       next to an equilibrium, or milder parameters, and follow from there"
+        0 if stuck => "\nlikely cause: f is discontinuous, or too stiff for the integrator\nwhat to do: give a state \
+                       near an equilibrium, or start at less extreme parameter values and follow the solution from \
+                       there"
             .into(),
-        n if stuck && n > 0 => "\nlikely cause: f jumps where it is not smooth (sign, heaviside, if, comparisons), and trajectories \
-                       slide along the jump, as with dry friction\nwhat to do: replace the jump by a smooth step such as \
-                       tanh(s*x), and follow the solution to the sharpness needed"
+        n if stuck && n > 0 => "\nlikely cause: f is discontinuous (sign, heaviside, if, comparisons), and \
+                                trajectories slide along the discontinuity, as with dry friction\nwhat to do: \
+                                replace the jump by a smooth step such as tanh(s*x), and continue the solution in s \
+                                to the sharpness needed"
             .into(),
-        _ if seen.all_escaped => "\nlikely cause: at these parameters nothing attracts from the range of the states\nwhat to do: \
-                                  other parameters, another range of the states, or a given state next to the solution"
+        _ if seen.all_escaped => "\nlikely cause: at these parameter values no attractor can be reached from the \
+                                  ranges of the states\nwhat to do: change the parameters or the ranges of the \
+                                  states, or give a state near the solution"
             .into(),
         _ if !angles.is_empty() => format!(
-            "\nlikely cause: f has the period 2*pi in {}: motions that go round do not return to where they were\n\
-             what to do: say that {0} is an angle, with `period = \"2*pi\"` in the model, so that going round is a cycle \
-             (docs/book/when-it-does-not-work.md)",
+            "\nlikely cause: f has the period 2*pi in {}: a rotation never returns to its starting state\nwhat to \
+             do: declare {0} as an angle, with `period = \"2*pi\"` in the model, so that a full rotation counts as a \
+             cycle (docs/book/when-it-does-not-work.md)",
             angles.join(", ")
         ),
         _ if seen.unsettled => format!(
-            "\nlikely cause: a quasi-periodic or chaotic motion, or one that is reached more slowly than trajectories are followed, here for {}\n\
-             what to do: raise the limit in the study, try other parameters or another range of the states, or give a state",
+            "\nlikely cause: a quasi-periodic or chaotic motion, or slow attraction: trajectories are limited to \
+             {}\nwhat to do: raise the limit in the study, change the parameters or the ranges of the states, or \
+             give a state",
             limits(system)
         ),
-        _ => "\nwhat to do: more samples, other parameters, another range of the states, or a given state".into(),
+        _ => {
+            "\nwhat to do: use more samples, change the parameters or the ranges of the states, or give a state".into()
+        }
     }
 }
 
@@ -120,9 +126,9 @@ fn limits(system: &System) -> String {
 /// Cause and cure for a trajectory that reached the boundary of the region in which f is defined.
 fn of_exit(system: &System, exit: &Exit) -> String {
     format!(
-        "\nlikely cause: at the time {:.6}, {}, a trajectory meets the edge of the region in which the vector field is defined (division by \
-         zero, or the logarithm or root of a negative number)\nwhat to do: rewrite the equation so that it is defined there, or change the \
-         ranges of the states, the given state or the parameters",
+        "\nlikely cause: at time {:.6}, {}, a trajectory leaves the region where the vector field is defined \
+         (division by zero, log or root of a negative number)\nwhat to do: rewrite the equation so that it is \
+         defined there, or change the ranges of the states, the given state or the parameters",
         exit.time,
         place(system, &exit.state)
     )
@@ -146,18 +152,19 @@ fn of_family(system: &System, parameters: &[f64]) -> Option<String> {
         let turned: Vec<String> = pairs.iter().map(|[a, b]| format!("({}, {})", name(a), name(b))).collect();
         let rest: Vec<String> = pairs.iter().map(|[_, b]| format!("{} = 0", name(b))).collect();
         return Some(format!(
-            "\nlikely cause: the equations do not change when {} are turned together, so rotated solutions form families in which none is \
-             isolated, and Newton's method does not converge\nwhat to do: for a motion along a straight line choose that line as an axis and \
-             start with {}; otherwise write the model in coordinates without the angle",
+            "\nlikely cause: the equations are invariant under a common rotation of {}: solutions form families, \
+             none of them is isolated, and Newton's method does not converge\nwhat to do: for a motion along a \
+             straight line, choose that line as an axis and start with {}; otherwise write the model in coordinates \
+             without the angle",
             turned.join(" and "),
             rest.join(", ")
         ));
     }
     symmetry::keeps_energy(system, parameters).then(|| {
-        "\nlikely cause: nothing is damped and the forces have a potential, so the energy never changes: cycles form a family with one \
-         member per energy, and no trajectory settles\nwhat to do: add a small damping as the free parameter, and start from a cycle of the \
-         family (`cycle`) or from the equilibrium inside it (`state`) with a switch at its Hopf point; the branch at zero damping is the \
-         family"
+        "\nlikely cause: there is no damping and the forces derive from a potential, so energy is conserved: cycles \
+         form a family with one member per energy, and no trajectory settles\nwhat to do: add a small damping as the \
+         free parameter, and start from a cycle of the family (`cycle`) or from the equilibrium inside it (`state`) \
+         with a switch at its Hopf point; the branch at zero damping is the family"
             .into()
     })
 }
@@ -183,12 +190,16 @@ fn of_slow_decay(system: &System, parameters: &[f64], state: Option<&[f64]>) -> 
     let slow = slowest <= rounding && periods > followed as f64;
     slow.then(|| {
         let lasts = match periods.is_finite() {
-            true => format!("transients near the state decay by a factor of a thousand in some {periods:.1e} forcing periods"),
-            false => "transients near the state do not decay at all".to_string(),
+            true => format!(
+                "transients near the state take about {periods:.1e} forcing periods to decay by a factor \
+                             of a thousand"
+            ),
+            false => "transients near the state do not decay".to_string(),
         };
         format!(
-            "\nlikely cause: light damping: {lasts}, and trajectories are integrated for {followed} periods\nwhat to do: start at parameters with more \
-             damping or far from resonance, and follow the solution from there (a homotopy or a branch); or give a state on the cycle"
+            "\nlikely cause: light damping: {lasts}, but trajectories are integrated for only {followed} \
+             periods\nwhat to do: start with more damping or far from resonance, and follow the solution from there \
+             (a homotopy or a branch); or give a state on the cycle"
         )
     })
 }
@@ -212,8 +223,8 @@ pub(super) fn of_laws(system: &System, parameters: &[f64]) -> Option<String> {
     let names = &system.state_names;
     if let [shift, ..] = &shifts(system.field)[..] {
         return Some(format!(
-            "\nlikely cause: f does not change when {} are shifted together: solutions are not isolated but come in families\n\
-             what to do: describe them relative to one of them, which leaves one state out",
+            "\nlikely cause: f is unchanged when {} are shifted together: solutions are not isolated but form \
+             families\nwhat to do: measure these states relative to one of them, which removes one state",
             shift.iter().zip(names).filter(|(s, _)| **s != 0.0).map(|(_, name)| &**name).collect::<Vec<_>>().join(", ")
         ));
     }
@@ -221,8 +232,8 @@ pub(super) fn of_laws(system: &System, parameters: &[f64]) -> Option<String> {
     let [first, rest @ ..] = &kept[..] else { return None };
     let more = if rest.is_empty() { String::new() } else { format!(", and {} more", rest.len()) };
     Some(format!(
-        "\nlikely cause: {}{more} never changes, whatever the state: solutions are not isolated but come in families\n\
-         what to do: give its value under `[totals]` of the model, or eliminate one state by it",
+        "\nlikely cause: {}{more} is conserved: solutions are not isolated but form families\nwhat to do: prescribe \
+         its value under `[totals]` in the model, or use it to eliminate one state",
         in_words(first, names)
     ))
 }
@@ -248,10 +259,12 @@ pub(super) fn of_forcing(system: &System, free: usize, range: [f64; 2], last: &P
     };
     let Some(bound) = range.into_iter().find(lost).filter(|_| system.field.forced()) else { return ending };
     let inside = bound + NEAR * (if bound == low { high - low } else { low - high });
+    let shown = Shown(inside);
     let text = format!(
-        "{}\nlikely cause: the range reaches {bound}, where the forcing has no period; towards it the period grows without \
-         bound ({:.3e} at {value:.3e}, {:.3e} at {inside})\nwhat to do: end the range where the forcing still has a period, such as \
-         {inside}; the response to a constant force is an equilibrium of the model without forcing",
+        "{}\nlikely cause: the range extends to {bound}, where the forcing has no period; the period grows without \
+         bound towards it ({:.3e} at {value:.3e}, {:.3e} at {shown})\nwhat to do: end the range where the forcing \
+         still has a period, such as {shown}; the response to a constant force is an equilibrium of the model \
+         without forcing",
         text.lines().next().unwrap_or_default(),
         unit(value),
         unit(inside)

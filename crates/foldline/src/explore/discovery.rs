@@ -70,9 +70,9 @@ impl Discovery<'_, '_> {
         self.unsettled += usize::from(sight.unsettled);
         let (found, said) = match sight.found {
             Ok(found) => found,
-            Err(why) => return self.short(&format!("nothing can be followed from {value}: {why}")),
+            Err(why) => return self.short(&format!("no branch can start at {}: {why}", Shown(value))),
         };
-        let origin = Origin::Seed(format!("{}, at {value}", self.plan.name));
+        let origin = Origin::Seed(format!("{}, at {}", self.plan.name, Shown(value)));
         self.note(&said) && found.into_iter().all(|point| self.followed(point, origin.clone()))
     }
 
@@ -129,7 +129,7 @@ impl Discovery<'_, '_> {
                 let found = resonances.cycles(root, value);
                 (averaged, corrected) = (averaged + found.averaged, corrected + found.corrected);
                 cycles += found.cycles.len();
-                let origin = Origin::Seed(format!("{}, next to {} at {value}", plan.name, root.name()));
+                let origin = Origin::Seed(format!("{}, near {} at {}", plan.name, root.name(), Shown(value)));
                 if !found.cycles.into_iter().all(|point| self.followed(point, origin.clone())) {
                     return false;
                 }
@@ -138,12 +138,13 @@ impl Discovery<'_, '_> {
         if system.field.ended() {
             return false;
         }
-        let left = if left > 0 { format!("; {left} more are left") } else { String::new() };
+        let left = if left > 0 { format!("; {left} more were not examined") } else { String::new() };
         let branches = self.named.len() - known;
         places.is_empty()
             || self.note(&format!(
-                "resonances of the lightly damped linear response: {}{left}; {averaged} starts of averaged equations lead to {corrected} \
-                 of cycles, {cycles} of which Newton's method makes accurate: {branches} new branches",
+                "resonances of the lightly damped linear response: {}{left}; {averaged} solutions of averaged \
+                 equations gave {corrected} approximate cycles, Newton's method converged for {cycles} of them: \
+                 {branches} new branches",
                 places.join(", ")
             ))
     }
@@ -238,7 +239,7 @@ impl Discovery<'_, '_> {
             Err(why) => {
                 let value = fold.parameters[self.plan.free];
                 self.short(&format!(
-                    "the fold at {value:.6} that {curve} leads to: no solution beside it was found: {why}"
+                    "no solution was found beside the fold at {value:.6}, to which {curve} leads: {why}"
                 ))
             }
         }
@@ -264,15 +265,17 @@ impl Discovery<'_, '_> {
         if self.exhausted() {
             let budget = self.plan.budget;
             going &= self.short(&format!(
-                "the budget of {budget} points is used up, and the diagram may lack branches\nwhat to do: increase the budget"
+                "the budget of {budget} points is used up, so the diagram may lack branches\nwhat to do: increase \
+                 the budget"
             ));
         }
         let (values, samples) = (self.plan.values, self.plan.samples);
         if self.unsettled > 0 {
             going &= self.short(&format!(
-                "at {} of {values} values some of {samples} samples did not settle: tori, chaotic attractors and slowly attracting solutions are not \
-                 followed\nwhat to do: examine such a value with `foldline attractors`; a slowly attracting cycle can be reached by a branch \
-                 from larger damping, or from a given state",
+                "at {} of {values} parameter values, some of the {samples} samples did not settle: tori, chaotic \
+                 attractors and slowly attracting solutions are not followed\nwhat to do: examine such a value with \
+                 `foldline attractors`; to reach a slowly attracting cycle, follow a branch from larger damping or \
+                 start from a given state",
                 self.unsettled
             ));
         }

@@ -147,7 +147,7 @@ impl Work<'_> {
         names.dedup();
         names.into_iter().all(|name| {
             let own = self.branches[grown.clone()].iter().find(|branch| branch.name == *name);
-            let ended = own.map_or_else(|| Err(format!("no branch {name} was switched to")), end_of_switched);
+            let ended = own.map_or_else(|| Err(format!("no switch led to a branch {name}")), end_of_switched);
             self.after(Start::EndOfSwitched(index, name.clone()), name, ended)
         })
     }
@@ -237,7 +237,12 @@ impl Work<'_> {
         let mut branch = Branch::new(&plan.name, family, plan.free, origin);
         let begun = start.and_then(|point| {
             let value = point.parameters.get(plan.free).copied().unwrap_or(0.0);
-            let name = format!("the start {value} lies outside the range {:?}", plan.range);
+            let name = format!(
+                "the start {} lies outside the range [{}, {}]",
+                Shown(value),
+                Shown(plan.range[0]),
+                Shown(plan.range[1])
+            );
             let inside = plan.until.is_some() || (plan.range[0] <= value && value <= plan.range[1]);
             self.system.repeats(&point.parameters, &[(plan.free, plan.range)])?;
             let (settings, sides) = self.growth_settings(plan, &point);
@@ -316,7 +321,7 @@ impl Work<'_> {
             }
         }
         if !left.is_empty() {
-            let said = format!("not switched to, since the budget of points is used up: {}", left.join(", "));
+            let said = format!("no branch switching, because the budget of points is used up: {}", left.join(", "));
             self.tell(Event::Short(&parent.name, &said));
         }
         Some(more)
@@ -334,11 +339,11 @@ impl Work<'_> {
             && special.kind == Kind::BranchPoint
             && (there - parameter).abs() < 1e3 * self.plan.tolerance * parent.size(*there)
         {
-            self.tell(Event::Note(&parent.name, &format!("{label}: the branch there is {from}, the parent")));
+            self.tell(Event::Note(&parent.name, &format!("{label}: leads back to the parent branch {from}")));
             return true;
         }
         if let Some(already) = arrival::at(self.system, self.plan.tolerance, &self.branches, parent, special) {
-            self.tell(Event::Note(&parent.name, &format!("{label}: the branch there is {already}, which ends here")));
+            self.tell(Event::Note(&parent.name, &format!("{label}: leads to {already}, which ends here")));
             return true;
         }
         let pair = parent.earlier_there(special);
@@ -349,7 +354,7 @@ impl Work<'_> {
                 self.begun(at, name, family, beginning, more)
             }
             Some(Err(why)) => {
-                let said = format!("{label}: no branch found to switch to: {why}");
+                let said = format!("{label}: no bifurcating branch found: {why}");
                 self.tell(Event::Short(&parent.name, &said));
                 true
             }
@@ -366,12 +371,13 @@ impl Work<'_> {
         {
             return self.tell(Event::Note(
                 &parent.name,
-                &format!("{label}: the branches there are those of {from}, the parent"),
+                &format!("{label}: its branches are those of the parent branch {from}"),
             ));
         }
         if dimension > MOST {
             let said = format!(
-                "{label}: the branches that leave a kernel of dimension {dimension} are not followed: more than {MOST} are too many"
+                "{label}: its branches are not followed, because its null space has dimension {dimension}; the limit \
+                 is {MOST}"
             );
             return self.tell(Event::Short(&parent.name, &said));
         }
@@ -379,17 +385,19 @@ impl Work<'_> {
         {
             Ok(found) => found,
             Err(why) => {
-                let said = format!("{label}: no branch found to switch to: {why}");
+                let said = format!("{label}: no bifurcating branch found: {why}");
                 return self.tell(Event::Short(&parent.name, &said));
             }
         };
         let (count, directions) = (found.beginnings.len(), found.directions);
         let said = match found.continuous {
             true => format!(
-                "{label}: a kernel of dimension {dimension}, from which a family leaves in every direction; one of it is followed"
+                "{label}: null space of dimension {dimension}, with a bifurcating branch in every direction; one of \
+                 them is followed"
             ),
             false => format!(
-                "{label}: a kernel of dimension {dimension}; {count} branches found to leave, looked for in {directions} directions"
+                "{label}: null space of dimension {dimension}; {count} bifurcating branches found, searched for in \
+                 {directions} directions"
             ),
         };
         let family = parent.family;
@@ -426,8 +434,7 @@ impl Work<'_> {
         // Next to a kernel of several dimensions branches are closer to their parent than tells apart; that they leave it was seen by their direction.
         let parted = special.kind == Kind::BranchPoint && special.kernel() > 1;
         if let Some(already) = known.filter(|known| !(parted && *known == parent.name)) {
-            return self
-                .tell(Event::Note(&parent.name, &format!("{label}: leads to {already}, which is known already")));
+            return self.tell(Event::Note(&parent.name, &format!("{label}: leads to {already}, already known")));
         }
         let parameter = special.point.parameters[free];
         let origin = Origin::Switch { parent: parent.name.clone(), kind: special.kind, parameter };
@@ -478,7 +485,7 @@ fn end_of_switched(branch: &Branch) -> Result<Point, String> {
     let found = ends.into_iter().find_map(|(end, point)| point.filter(|_| whole(end)));
     found.cloned().ok_or_else(|| {
         let said: Vec<String> = branch.ends.iter().flatten().map(Ending::brief).collect();
-        format!("branch {} has no end at a bound or a `stop`: {}", branch.name, said.join("; "))
+        format!("the branch {} did not end at a bound or a `stop`: {}", branch.name, said.join("; "))
     })
 }
 
@@ -493,7 +500,7 @@ fn end_of(branch: &Branch, plan: &BranchPlan) -> Result<Point, String> {
     match (&branch.ends[side], point) {
         (Some(Ending::Bound(value)), Some(point)) if arrived(*value) => Ok(point.clone()),
         (Some(Ending::Asked(_)), Some(point)) => Ok(point.clone()),
-        (Some(other), _) => Err(format!("branch {} did not get to its end: {other}", plan.name)),
-        _ => Err(format!("branch {} was not finished", plan.name)),
+        (Some(other), _) => Err(format!("the branch {} did not reach its end: {other}", plan.name)),
+        _ => Err(format!("the branch {} is unfinished", plan.name)),
     }
 }

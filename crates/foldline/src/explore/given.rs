@@ -96,20 +96,21 @@ pub(super) fn from_cycle(system: &System, seed: &SeedPlan, tolerance: f64, cycle
             if (period - cycle.period).abs() <= NEAR * cycle.period {
                 return Ok(reduced(system, &settings, &point).unwrap_or(point));
             }
-            format!("Newton's method leads from it to a cycle of the period {period:.6} instead of {:.6}", cycle.period)
+            format!("Newton's method converges to a cycle of period {period:.6} instead of {:.6}", cycle.period)
         }
         Err(failure) => failure.to_string(),
     };
     let off = match mismatch(system.field, &seed.parameters, &given.solution) {
         Some((component, share)) => {
             let name = system.state_names.get(component).map_or("", String::as_str);
-            format!("on it the equation of {name} is off by {share:.2} of its size")
+            format!("relative residual of the equation of {name}: {share:.2}")
         }
         None => "the equations are not finite on it".to_string(),
     };
     Err(format!(
-        "no cycle was found next to the given one: {why}\nlikely cause: it is too far from any, or belongs to other equations or \
-         parameters: {off}\nwhat to do: compare the equations, and which state and parameter is which; or give more states of it"
+        "no cycle was found near the given one: {why}\nlikely cause: the given cycle is too inaccurate, or belongs \
+         to other equations or parameter values ({off})\nwhat to do: compare the equations, the parameter values and \
+         the order of the states; or give the cycle at more times"
     ))
 }
 
@@ -193,6 +194,6 @@ mod tests {
         assert!(found.ranges[..2].iter().all(|[low, high]| (low + 1.0).abs() < 1e-6 && (high - 1.0).abs() < 1e-6));
         let wrong = given(1.0, TAU, 12, 1);
         let said = from_cycle(&system, &seed(&wrong), 1e-8, &wrong).unwrap_err();
-        assert!(said.contains("no cycle was found next to the given one") && said.contains("likely cause"), "{said}");
+        assert!(said.contains("no cycle was found near the given one") && said.contains("likely cause"), "{said}");
     }
 }

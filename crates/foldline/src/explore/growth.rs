@@ -342,8 +342,8 @@ impl Growth<'_> {
         let own = setting(self.system, branch.free, &start.parameters);
         let count = special::cycle_form::switches_passed(&own, start);
         let note = format!(
-            "{sought} points are not searched for: their normal form coefficient is not defined on orbits that pass switches of the right-hand \
-             side (here {count} times at the start)"
+            "{sought} points are not searched for: their normal form coefficient is undefined on orbits that cross \
+             switching points of the right-hand side ({count} crossings at the start)"
         );
         count == 0 || self.tell(Event::Note(&branch.name, &note))
     }
@@ -572,7 +572,7 @@ impl Growth<'_> {
         let (line, own) = (self.line(branch), setting(system, branch.free, &special.point.parameters));
         let dimension = special.kernel();
         if special.kind == Kind::BranchPoint && dimension > 1 {
-            return Coefficients::none(format!("the kernel has dimension {dimension}"));
+            return Coefficients::none(format!("the null space has dimension {dimension}"));
         }
         let free = branch.held.map(|(_, first)| first).into_iter().chain([branch.free]);
         let own = Setting { axes: free.map(|index| line.axis(system, index)).collect(), ..own };

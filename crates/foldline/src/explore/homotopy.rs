@@ -70,7 +70,7 @@ pub fn find(
     let start = match first.cloned().map_or(start, Ok) {
         Ok(start) => start,
         Err(why) => {
-            planner.short(&format!("there is nothing to start from: {why}"));
+            planner.short(&format!("no starting solution: {why}"));
             return Route { legs: Vec::new(), arrived: Err(why), going: planner.going };
         }
     };
@@ -79,11 +79,12 @@ pub fn find(
         && planner.going
     {
         let verdict = match (planner.open, planner.shrinks) {
-            (true, _) => "some run left the range or was lost, so there may be a way outside",
+            (true, _) => "some runs left the range or ended early, so there may be a path outside it",
             (false, true) => {
-                "the folds of the family meet on the way, where it shrinks to a point: it is not connected to it"
+                "the folds of the family meet before the goal, where the family shrinks to a point: it is not \
+                 connected to the goal"
             }
-            (false, false) => "no way was found in these parameters",
+            (false, false) => "no path was found in these parameters",
         };
         planner.short(&format!("the goal was not reached: {why}; {verdict}"));
     }
@@ -152,7 +153,7 @@ impl Planner<'_> {
         if together.is_ok() || !self.going || targets.len() < 2 {
             return together;
         }
-        self.note("together the parameters do not get there; one after the other");
+        self.note("changing the parameters together did not reach the goal; trying one after the other");
         let mut here = start;
         for target in &targets {
             here = self.towards(&here, std::slice::from_ref(target))?;
@@ -185,7 +186,7 @@ impl Planner<'_> {
             let [low, high] = self.homotopy.range;
             let inside = |point: &Point| (low..=high).contains(&point.parameters[self.homotopy.via]);
             let Some(point) = point.ok().filter(inside) else { break };
-            self.note(&format!("{:.0} % of the way are covered; on from there", 100.0 * covered));
+            self.note(&format!("{:.0} % of the way covered; continuing from there", 100.0 * covered));
             here = point;
         }
         Err(tried.join("; then "))
@@ -202,18 +203,19 @@ impl Planner<'_> {
     fn steps_from(&mut self, here: &Point, course: &Course) -> Result<Point, String> {
         let via = self.homotopy.via;
         let place = here.parameters[via];
+        let from = Shown(place);
         let direct = self.direct(here, course);
         if let Some(point) = self.arrival(&direct, course) {
-            self.note(&format!("arrived by a direct run at {place}"));
+            self.note(&format!("reached the goal by a direct run at {from}"));
             return Ok(point);
         }
         let turned = direct.special.iter().find(|s| s.kind == Kind::Fold).cloned();
         let mut tried = match &turned {
             Some(fold) => {
                 let share = 100.0 * course.share(&fold.point);
-                vec![format!("the direct run at {place} turns back at a fold after {share:.1} % of the way")]
+                vec![format!("the direct run at {from} turned back at a fold after {share:.1} % of the way")]
             }
-            None => vec![format!("the direct run at {place} ends: {}", ending(&direct))],
+            None => vec![format!("the direct run at {from} ended: {}", ending(&direct))],
         };
         self.note(&tried[0].clone());
         let turned_none = turned.is_none();
@@ -232,7 +234,7 @@ impl Planner<'_> {
             let at = point.parameters[via];
             let run = self.direct(&point, course);
             if let Some(point) = self.arrival(&run, course) {
-                self.note(&format!("arrived by a direct run after moving from {place} to {at:.6}"));
+                self.note(&format!("reached the goal by a direct run after moving from {from} to {:.6}", Shown(at)));
                 return Ok(point);
             }
             if !self.going {
@@ -240,7 +242,11 @@ impl Planner<'_> {
             }
         }
         let [low, high] = self.homotopy.range;
-        tried.push(format!("direct runs from other places between {low} and {high} do not arrive either"));
+        tried.push(format!(
+            "direct runs from other points between {} and {} did not reach the goal either",
+            Shown(low),
+            Shown(high)
+        ));
         for fold in family.special.iter().filter(|s| s.kind == Kind::Fold) {
             match self.along(fold, &family.name, course, Some(&family)) {
                 Ok(point) => return Ok(point),
@@ -301,13 +307,17 @@ impl Planner<'_> {
             };
             let ends = [curve.points.first(), curve.points.last()];
             self.shrinks |= turned && ends.into_iter().flatten().all(meets);
-            let how = if turned { "turns back".into() } else { format!("ends short ({})", ending(&curve)) };
-            let why = format!("the fold at {:.6} {how} after {best:.1} % of the way", Shown(place));
+            let how = if turned { "turned back".into() } else { format!("ended early ({})", ending(&curve)) };
+            let why = format!("the curve of the fold at {:.6} {how} after {best:.1} % of the way", Shown(place));
             self.note(&why);
             return Err(why);
         };
         let point = self.beside(end).inspect_err(|why| self.note(why))?;
-        self.note(&format!("arrived along the fold, from {:.6} to {:.6}", Shown(place), Shown(end.parameters[via])));
+        self.note(&format!(
+            "reached the goal along the fold curve, from {:.6} to {:.6}",
+            Shown(place),
+            Shown(end.parameters[via])
+        ));
         Ok(point)
     }
 

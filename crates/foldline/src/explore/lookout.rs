@@ -5,7 +5,7 @@ use super::choice::summary;
 use super::growth::{polished, setting, settings};
 use super::plan::ExplorePlan;
 use super::seeds::{attractors, bare, sampling};
-use crate::diagram::{Point, Solution};
+use crate::diagram::{Point, Shown, Solution};
 use crate::problem::equilibrium::EquilibriumProblem;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Condvar, Mutex, PoisonError};
@@ -83,7 +83,7 @@ impl<'l> Lookout<'l> {
         };
         found.sort_by(|a, b| size(a).total_cmp(&size(b)));
         let rests = found.iter().filter(|p| matches!(p.solution, Solution::Equilibrium(_))).count();
-        let said = format!("at {value}: {}; equilibria but for symmetry: {rests}", summary(system, &census));
+        let said = format!("at {}: {}; equilibria up to symmetry: {rests}", Shown(value), summary(system, &census));
         Sight { value, unsettled: census.unsettled + census.stuck > 0, found: Ok((found, said)) }
     }
 
@@ -128,7 +128,7 @@ struct Promise<'s> {
 
 impl Drop for Promise<'_> {
     fn drop(&mut self) {
-        let lost = || Sight { value: f64::NAN, unsettled: false, found: Err("looking there failed".into()) };
+        let lost = || Sight { value: f64::NAN, unsettled: false, found: Err("the search at this value failed".into()) };
         self.slots.put(self.index, self.kept.take().unwrap_or_else(lost));
     }
 }

@@ -104,13 +104,13 @@ fn escapes(responses: &[Response], starts: usize) -> Option<String> {
     /// Values that are listed; more would not be read.
     const TOLD: usize = 8;
     let gone: Vec<&Response> = responses.iter().filter(|r| r.motion == Motion::Escaped).collect();
-    let told = gone.iter().take(TOLD).map(|r| format!("{} at the value {}", r.hits, rounded(r.value)));
+    let told = gone.iter().take(TOLD).map(|r| format!("{} at {}", r.hits, rounded(r.value)));
     let told: Vec<String> = told.collect();
     let more = match gone.len().saturating_sub(TOLD) {
         0 => String::new(),
         more => format!(", and some at {more} more values"),
     };
-    (!gone.is_empty()).then(|| format!("starts that escaped, of {starts}: {}{more}", told.join(", ")))
+    (!gone.is_empty()).then(|| format!("starts that escaped (of {starts}): {}{more}", told.join(", ")))
 }
 
 fn one_sweep(
@@ -124,7 +124,7 @@ fn one_sweep(
     let point = match seeds.point(*seed) {
         Ok(point) => point,
         Err(why) => {
-            observer.observe(Event::Short(name, &format!("no start: {why}")));
+            observer.observe(Event::Short(name, &format!("no starting solution: {why}")));
             return None;
         }
     };
@@ -143,8 +143,7 @@ fn one_sweep(
     }
     let escaped = responses.last().filter(|last| last.motion == Motion::Escaped);
     if let Some(last) = escaped {
-        observer
-            .observe(Event::Note(name, &format!("at the value {} the motion {}", rounded(last.value), last.fate())));
+        observer.observe(Event::Note(name, &format!("at {} the motion {}", rounded(last.value), last.fate())));
     }
     let complete = escaped.is_some() || responses.len() == values.len();
     complete.then(|| finished(name, Search::Sweep, *free, responses, observer))

@@ -107,7 +107,8 @@ impl<'p> Seeds<'p> {
         let turns = (given.period / period).round();
         if turns > 1.0 {
             let said = format!(
-                "the given cycle of period {:.6} runs {turns} times through a cycle of period {period:.6}, which is used instead",
+                "the given cycle of period {:.6} is {turns} turns of a cycle of period {period:.6}, which is used \
+                 instead",
                 given.period
             );
             self.observer.observe(Event::Note(name, &said));
@@ -135,7 +136,7 @@ impl<'p> Seeds<'p> {
                 if let Some(why) = in_families(system, seed) {
                     return Err(format!("no equilibrium is isolated{why}"));
                 }
-                let census = self.census(self.census_of(index).ok_or("no census")?);
+                let census = self.census(self.census_of(index).ok_or("no samples were taken")?);
                 let choice = Choice::of(system, plan.tolerance, census, key);
                 if let Some(said) = choice.told(system) {
                     self.observer.observe(Event::Note(&seed.name, &said));
@@ -345,12 +346,13 @@ fn from_state(
     let next = direct(system, &seed.parameters, plan.tolerance, state);
     if let Some(Direct { point, periods, through, .. }) = next.as_ref().filter(|next| next.through || next.slow) {
         let slowly = match *periods > NEVER {
-            true => "transients next to it do not decay".to_string(),
-            false => format!("a transient lasts some {periods:.1e} forcing periods"),
+            true => "transients near it do not decay".to_string(),
+            false => format!("a transient lasts about {periods:.1e} forcing periods"),
         };
         if !through {
             tell(&format!(
-                "starts from the cycle that Newton's method finds next to the given state, without simulation: {slowly}"
+                "starting from the cycle that Newton's method finds near the given state, without simulation: \
+                 {slowly}"
             ));
         }
         return Ok(point.clone());
@@ -383,21 +385,22 @@ fn no_start(system: &System, seed: &SeedPlan, state: &[f64], lost: &Lost) -> Str
             let spans: Vec<String> = names.map(|(name, span)| format!("{name} by {span:.1e}")).collect();
             let more = if extent.len() > TOLD { ", …" } else { "" };
             format!(
-                "settles neither to an equilibrium nor to a cycle: after a time of {time:.1e} it still moves {}{more}",
+                "settles neither to an equilibrium nor to a cycle: after time {time:.1e} it still varies in {}{more}",
                 spans.join(", ")
             )
         }
         Lost::Unconfirmed { period, state } if *period > 0.0 => format!(
-            "settles to a cycle of the period {period:.6} through {}, which Newton's method does not confirm as isolated and stable",
+            "settles to a cycle of period {period:.6} through {}, which Newton's method does not confirm as isolated \
+             and stable",
             place(system, state)
         ),
         Lost::Unconfirmed { state, .. } => format!(
-            "comes to rest at {}, where Newton's method does not find an isolated, stable solution",
+            "comes to rest at {}, where Newton's method finds no isolated, stable solution",
             place(system, state)
         ),
-        Lost::Escaped => "leaves every bound".to_string(),
-        Lost::Undefined(_) => "leaves the region in which the vector field is defined".to_string(),
-        Lost::Stuck => "cannot be followed: its steps become too small".to_string(),
+        Lost::Escaped => "grows without bound".to_string(),
+        Lost::Undefined(_) => "leaves the region where the vector field is defined".to_string(),
+        Lost::Stuck => "cannot be integrated: the step size becomes too small".to_string(),
     };
     let exit = match lost {
         Lost::Undefined(exit) => Some(exit),

@@ -152,7 +152,7 @@ fn doubled(
 ) -> Result<Beginning, String> {
     let leave = |cycle: &Cycle, distances: &[f64]| {
         let (mut problem, base, direction) =
-            double(system, free, at, cycle).ok_or("no vector of period doubling was found")?;
+            double(system, free, at, cycle).ok_or("no eigenvector of the multiplier -1 was found")?;
         let expected = |_: &dyn ZeroProblem, found: &Station| exchanges_stability(at, free, found);
         step_off(&mut problem, settings, &base, &direction, 1.0, distances, &expected).map_err(|why| why.to_string())
     };
@@ -232,16 +232,16 @@ fn born(
     // Frequencies closer than this, relative, have one eigenspace as far as inverse iteration can tell.
     const SAME: f64 = 1e-6;
     let all = hopf::frequencies(&at.point);
-    let omega = *all.get(pair).ok_or("no oscillating eigenvector was found")?;
+    let omega = *all.get(pair).ok_or("no eigenvector of an imaginary pair of eigenvalues was found")?;
     if pair > 0 && all[..pair].iter().any(|other| (other / omega - 1.0).abs() < SAME) {
         return Err(format!(
-            "two pairs of eigenvalues have the same frequency {omega:.6}, and only one branch of cycles is looked for there"
+            "two pairs of eigenvalues have the same frequency {omega:.6}; only one branch of cycles is searched for there"
         ));
     }
     let mesh = mesh::uniform(20);
     let scheme = Scheme::new(degree);
     let (mut direction, period) = hopf::direction(system.field, &at.point, omega, &system.scales, &scheme, &mesh)
-        .ok_or("no oscillating eigenvector was found")?;
+        .ok_or("no eigenvector of an imaginary pair of eigenvalues was found")?;
     direction.extend([0.0, 0.0]);
     let mut problem = CycleProblem::new(setting(system, free, &at.point.parameters), degree, &mesh);
     let mut base = problem.unknowns_of(&at.point);

@@ -4,8 +4,7 @@ use super::plan::{ExplorePlan, Plan};
 use super::sizes;
 use crate::attractors::Limits;
 use crate::contract::{Batch, Parameters, VectorField};
-use crate::diagram::Diagram;
-use crate::diagram::Measure;
+use crate::diagram::{Diagram, Measure, Shown};
 use crate::model::Model;
 use crate::model::Parameter;
 use crate::model::forcing::unrepeated;
@@ -171,11 +170,15 @@ impl<'a> System<'a> {
             let senseless = share > 0.0 && self.field.time_unit(&there) <= 0.0;
             let wrong = unrepeated(self.field, &self.state_names, &self.ranges, &there).filter(|_| !senseless);
             if let Some([message, hint]) = wrong {
-                let moved: Vec<String> = moving.iter().map(|(k, _)| format!("{}", there[*k])).collect();
+                let moved: Vec<String> = moving.iter().map(|(k, _)| Shown(there[*k]).to_string()).collect();
                 let place = if moved.is_empty() {
                     String::new()
                 } else {
-                    format!(", with {} for what varies", moved.join(" and "))
+                    format!(
+                        ", with the free parameter{} at {}",
+                        if moved.len() == 1 { "" } else { "s" },
+                        moved.join(" and ")
+                    )
                 };
                 return Err(format!("{message}{place}: {hint}"));
             }

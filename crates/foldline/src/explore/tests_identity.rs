@@ -245,6 +245,6 @@ fn a_range_that_reaches_frequency_zero_is_said_to_be_the_cause() {
     let found = followed(&model, start, branch([0.0, 2.0], &[])).remove(0);
     assert_eq!(found.ends[1], Some(Ending::Bound(2.0)));
     let said = found.ends[0].as_ref().unwrap().to_string();
-    assert!(said.contains("the range reaches 0, where the forcing has no period"), "{said}");
+    assert!(said.contains("the range extends to 0, where the forcing has no period"), "{said}");
     assert!(said.lines().count() == 3 && said.contains("what to do"), "{said}");
 }

@@ -848,7 +848,7 @@ impl<T: Lane> pulp::NullaryFnOnce for SolveTransposed<'_, T> {
 mod tests {
     use super::super::lane::Eight;
     use super::*;
-    use foldline_dense::{Factored, Mat};
+    use foldline_general::{Factored, Mat};
 
     /// Equations (1)–(4) as one dense matrix.
     fn dense<T: Lane>(s: &Condensed<T>, closure: f64) -> Mat<f64> {

@@ -3,7 +3,7 @@
 //! The kernels of this module serve small blocks. From [`MANY`] components on a general library multiplies faster than they do.
 
 use super::lane::{Eight, Lane};
-use foldline_dense::{Mat, MatMut, MatRef};
+use foldline_general::{Mat, MatMut, MatRef};
 
 /// Components of a model from which on this is used. Measured on chains of oscillators: with 20 components kernels for small blocks are faster by a
 /// quarter, with 40 slower by a tenth.
@@ -18,7 +18,7 @@ pub fn multiply(c: (&mut [f64], usize), a: (&[f64], usize), b: (&[f64], usize), 
     let to = MatMut::from_column_major_slice_with_stride_mut(c.0, columns, rows, c.1);
     let a = MatRef::from_column_major_slice_with_stride(a.0, depth, rows, a.1);
     let b = MatRef::from_column_major_slice_with_stride(b.0, columns, depth, b.1);
-    foldline_dense::multiply(to, b, a);
+    foldline_general::multiply(to, b, a);
 }
 
 /// Random signs, always the same, by xorshift. Their covariance is the identity.

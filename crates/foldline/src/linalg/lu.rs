@@ -188,7 +188,7 @@ pub fn determinant(a: &[f64], n: usize, pivots: &[usize]) -> (f64, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use foldline_dense::{Factored, Mat};
+    use foldline_general::{Factored, Mat};
 
     #[test]
     fn agrees_with_an_independent_library() {

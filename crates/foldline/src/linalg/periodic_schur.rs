@@ -448,7 +448,7 @@ mod tests {
 
     /// Eigenvalues of a matrix `[p × p]` from a library that shares nothing with this module.
     fn independent(a: &[f64], p: usize) -> Vec<C> {
-        foldline_dense::eigenvalues(foldline_dense::Mat::from_fn(p, p, |i, j| a[i * p + j]).as_ref()).unwrap()
+        foldline_general::eigenvalues(foldline_general::Mat::from_fn(p, p, |i, j| a[i * p + j]).as_ref()).unwrap()
     }
 
     #[test]

@@ -47,12 +47,12 @@ pub(super) fn no_angle(model: &Model, items: &[usize]) -> Option<ModelError> {
                     name: name.clone(),
                     span: None,
                     message: format!(
-                        "`{name}` is said to be an angle of period {period}, but the rate of `{of}` is {} at `{name}` = {:.6} and {} a \
-                         period later",
+                        "`{name}` is declared as an angle of period {period}, but the rate of `{of}` is {} at \
+                         `{name}` = {:.6} and {} one period later",
                         here[i], x[c], there[i]
                     ),
                     hint: format!(
-                        "let `{name}` enter the equations only through functions of that period, or leave `period` out"
+                        "let `{name}` enter the equations only through functions of that period, or remove `period`"
                     ),
                 });
             }

@@ -44,9 +44,12 @@ impl<'a> Check<'a> {
         let Complaint { span, message, mut hint, function } = complaint;
         if let Some((name, symbol)) = function.and_then(|f| Some((f.clone(), *self.symbols.get(f.as_str())?))) {
             hint = match symbol {
-                Symbol::Family(_) => format!("an index stands in square brackets: `{name}[…]`"),
+                Symbol::Family(_) => format!("write the index in square brackets: `{name}[…]`"),
                 _ => format!("`{name}` is {}; write a product with a star: `{name}*(…)`", symbol.article()),
             };
+            if matches!(symbol, Symbol::State(_)) {
+                hint += ". A value at another time, `x(t - tau)`, makes a delay equation, which is not supported";
+            }
         }
         let name = name_of(self.source, item).to_string();
         self.errors.push(ModelError { item, field, name, span: Some(span), message, hint });
@@ -64,10 +67,10 @@ impl<'a> Check<'a> {
             ("functions", source.functions.len(), MOST),
         ];
         for (what, count, most) in counts.into_iter().filter(|(_, count, most)| count > most) {
-            let message = format!("the model has {count} {what}, more than {most}");
+            let message = format!("the model has {count} {what}; the limit is {most}");
             let hint = match what {
-                "states" => "use a coarser discretisation or fewer modes: the matrices here are dense in the states",
-                _ => "leave out what is not needed",
+                "states" => "use a coarser discretisation or fewer modes: foldline uses dense matrices",
+                _ => "remove those that are not needed",
             };
             // At the count that alone is too large, if there is one.
             let large = self.repeats().find(|(_, repeat)| repeat.count > most).map(|(item, _)| item);
@@ -76,7 +79,7 @@ impl<'a> Check<'a> {
         }
         let empty: Vec<Item> = self.repeats().filter(|(_, r)| r.count == 0).map(|(item, _)| item).collect();
         for item in empty {
-            self.report(item, Field::Count, "a count of 0", "an index runs from 1 to the count: write 1 or more");
+            self.report(item, Field::Count, "a count of 0", "a count is at least 1");
         }
     }
 
@@ -122,7 +125,7 @@ impl<'a> Check<'a> {
         for (name, item, symbol) in declared {
             self.identifier(name, item);
             if self.callables.get(name).is_some() {
-                let message = format!("the name `{name}` is used twice: it is a function already");
+                let message = format!("the name `{name}` is already taken by a function");
                 self.report(item, Field::Name, message, "choose another name");
             }
             match self.symbols.get(name) {
@@ -142,7 +145,7 @@ impl<'a> Check<'a> {
                         },
                         other => other.article(),
                     };
-                    let message = format!("the name `{name}` is used twice: it is {earlier} already");
+                    let message = format!("the name `{name}` is used twice: it is already {earlier}");
                     self.report(item, Field::Name, message, "parameters, states and definitions need different names");
                 }
                 None => {
@@ -157,18 +160,21 @@ impl<'a> Check<'a> {
             match self.symbols.get(name) {
                 Some(symbol @ (Symbol::State(_) | Symbol::Parameter(_))) => {
                     let message = format!("the output `{name}` has the name of {}", symbol.article());
-                    self.report(item, Field::Name, message, "choose another name; states are recorded anyway");
+                    self.report(item, Field::Name, message, "choose another name; states are stored anyway");
                 }
-                _ if !seen.insert(name) => {
-                    self.report(item, Field::Name, format!("the output `{name}` exists twice"), "remove one of the two")
-                }
+                _ if !seen.insert(name) => self.report(
+                    item,
+                    Field::Name,
+                    format!("the output `{name}` is defined twice"),
+                    "remove one of the two",
+                ),
                 _ => {}
             }
         }
         self.functions();
         self.indices();
         if source.states.is_empty() {
-            self.report(Item::Model, Field::Name, "the model has no state", "declare at least one state");
+            self.report(Item::Model, Field::Name, "the model has no states", "declare at least one state");
         }
     }
 
@@ -194,7 +200,12 @@ impl<'a> Check<'a> {
         for (name, item) in functions.chain(tables) {
             self.identifier(name, item);
             if !seen.insert(name) {
-                self.report(item, Field::Name, format!("the function `{name}` exists twice"), "remove one of the two");
+                self.report(
+                    item,
+                    Field::Name,
+                    format!("the function `{name}` is defined twice"),
+                    "remove one of the two",
+                );
             }
         }
         for (i, function) in source.functions.iter().enumerate() {
@@ -202,7 +213,7 @@ impl<'a> Check<'a> {
             for argument in &function.arguments {
                 self.identifier(argument, Item::Function(i));
                 if !seen.insert(argument) {
-                    let message = format!("two arguments are called `{argument}`");
+                    let message = format!("two arguments have the name `{argument}`");
                     self.report(Item::Function(i), Field::Name, message, "give each argument its own name");
                 }
             }
@@ -220,8 +231,9 @@ impl<'a> Check<'a> {
             let index = repeat.index.as_str();
             self.identifier(index, item);
             if let Some(symbol) = self.symbols.get(index) {
-                let message = format!("the index `{index}` has the name of something else: it is {}", symbol.article());
-                self.report(item, Field::Index, message, "call the index otherwise, for example `index = \"j\"`");
+                let message =
+                    format!("the index `{index}` has a name that is already in use: it is {}", symbol.article());
+                self.report(item, Field::Index, message, "choose another index, for example `index = \"j\"`");
             }
         }
     }
@@ -237,7 +249,7 @@ impl<'a> Check<'a> {
         let well_formed = word.starts_with(|c: char| c.is_alphabetic() || c == '_')
             && word.chars().all(|c| c.is_alphanumeric() || c == '_');
         if !well_formed {
-            let hint = "a name begins with a letter and goes on with letters, digits and underscores";
+            let hint = "a name starts with a letter, followed by letters, digits and underscores";
             self.report(item, Field::Name, format!("`{name}` is not a name"), hint);
         } else if function(name).is_some() || called && name == SUM {
             self.report(item, Field::Name, format!("`{name}` is the name of a function"), "choose another name");
@@ -256,17 +268,17 @@ impl<'a> Check<'a> {
                 self.report(Item::Parameter(i), Field::Value, "the value is not a finite number", "write a number");
             }
             if let Some(scale) = parameter.scale.filter(|scale| !(*scale > 0.0 && scale.is_finite())) {
-                let hint = "write the characteristic size of this parameter, a positive number";
+                let hint = "give the typical size of this parameter, a positive number";
                 self.report(Item::Parameter(i), Field::Scale, format!("the scale {scale} is not positive"), hint);
             }
         }
         for (i, state) in self.source.states.iter().enumerate() {
             if let Some(scale) = state.scale.filter(|scale| !(*scale > 0.0 && scale.is_finite())) {
-                let hint = "write the characteristic size of this state, a positive number";
+                let hint = "give the typical size of this state, a positive number";
                 self.report(Item::State(i), Field::Scale, format!("the scale {scale} is not positive"), hint);
             }
             if let Some(period) = state.period.filter(|period| !(*period > 0.0 && period.is_finite())) {
-                let hint = "write the period of the angle, a positive number such as \"2*pi\" or 360";
+                let hint = "give the period of the angle, a positive number such as \"2*pi\" or 360";
                 self.report(Item::State(i), Field::Period, format!("the period {period} is not positive"), hint);
             }
             let Some([low, high]) = state.range else { continue };
@@ -310,7 +322,7 @@ impl<'a> Check<'a> {
             }
         }
         for (i, name) in states.iter().enumerate().filter(|(i, _)| equation_of[*i].is_none()) {
-            let hint = format!("say how it changes in time: the right-hand side of d{name}/dt");
+            let hint = format!("give its rate of change: the right-hand side of d{name}/dt");
             self.report(Item::State(i), Field::Expression, format!("the state `{name}` has no equation"), hint);
         }
         equation_of

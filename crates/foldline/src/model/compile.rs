@@ -131,8 +131,8 @@ pub(super) fn compile(source: &ModelSource) -> Result<(Compiled, Named), Vec<Mod
         check.complain(item, field, complaint);
     }
     if scope.exhausted() {
-        let message = "repetition, sums and functions make more than four million terms";
-        let hint = "reduce a count, or give what is computed again and again a name in the definitions";
+        let message = "repeated equations, sums and functions expand to more than four million terms";
+        let hint = "reduce a count, or name repeated subexpressions in the definitions";
         check.report(Item::Model, Field::Name, message, hint);
     }
     if check.errors.is_empty() {
@@ -219,23 +219,22 @@ fn couple(check: &mut Check, graph: &mut Graph, layout: &Layout, masses: &[Id], 
             (Some(row), Some(column)) => entries.push((row, column, *id)),
             _ => {
                 let message =
-                    format!("the mass of `{}` and `{}`, which are not two single states", mass.row, mass.column);
-                let hint = "masses couple single states; divide the equations of repeated ones by their mass";
+                    format!("a mass couples `{}` and `{}`, which are not two single states", mass.row, mass.column);
+                let hint = "masses couple single states only; divide the equations of repeated states by their mass";
                 check.report(item, Field::Name, message, hint);
             }
         }
     }
     let rows: std::collections::HashSet<usize> = entries.iter().map(|(row, ..)| *row).collect();
     if rows.len() > MOST_COUPLED {
-        let message = format!("{} equations are coupled by masses, more than {MOST_COUPLED}", rows.len());
-        return check.report(Item::Mass(0), Field::Name, message, "use modes of the system as states");
+        let message = format!("{} equations are coupled by masses; the limit is {MOST_COUPLED}", rows.len());
+        return check.report(Item::Mass(0), Field::Name, message, "use modal coordinates as states");
     }
     if let (true, Err(row)) = (check.errors.is_empty(), mass::solve(graph, &entries, field)) {
         let own = source.mass.iter().position(|m| place(&m.row) == Some(row)).unwrap_or(0);
         let name = &source.mass[own].row;
-        let message = format!("the mass matrix has no diagonal entry left for `{name}`: its determinant is zero there");
-        let hint =
-            "every state needs a mass of its own; put the equations in another order if only the diagonal is empty";
+        let message = format!("the mass matrix is singular: elimination leaves no diagonal entry for `{name}`");
+        let hint = "give every state a mass; if only its diagonal entry is zero, reorder the equations";
         check.complain(Item::Mass(own), Field::Expression, Complaint::new(0..0, message, hint));
     }
 }

@@ -41,7 +41,7 @@ fn value(text: &str, symbols: &Symbols) -> Result<f64, Complaint> {
     if let Some((name, span)) = unknown {
         let mut known: Vec<&str> = symbols.keys().copied().collect();
         known.sort();
-        let hint = format!("only numbers and [constants] are known here; {}", suggest(&name, &known));
+        let hint = format!("only numbers and [constants] are allowed here; {}", suggest(&name, &known));
         return Err(Complaint::new(span, format!("`{name}` is not a constant"), hint));
     }
     let layout = Layout::default();

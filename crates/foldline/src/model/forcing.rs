@@ -20,7 +20,7 @@ pub fn unrepeated(
     let unit = field.time_unit(parameters);
     if !(unit > 0.0 && unit.is_finite()) {
         let message = format!("the period of the forcing is {unit}");
-        return Some([message, "a period, and a frequency, is a positive number".into()]);
+        return Some([message, "the period or frequency must be positive".into()]);
     }
     let at = |time: f64, states: &[f64]| {
         let (mut f, mut g) = (vec![0.0; n], vec![0.0; outputs]);
@@ -47,13 +47,10 @@ pub fn unrepeated(
                 };
                 let time = time * unit;
                 let message = format!(
-                    "{own} does not repeat itself after the period {unit} of the forcing: it is {a:.6} at t = {time:.6} and {b:.6} one \
+                    "{own} does not have the forcing period {unit}: it is {a:.6} at t = {time:.6} and {b:.6} one \
                      period later, in the same state"
                 );
-                return Some([
-                    message,
-                    "say the frequency or period that all that depends on `t` has in common".into(),
-                ]);
+                return Some([message, "give a frequency or period common to everything that depends on `t`".into()]);
             }
         }
     }

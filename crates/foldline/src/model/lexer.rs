@@ -93,7 +93,7 @@ fn stray(found: char, at: usize) -> Complaint {
         '\'' => "a rate is written `x'`, and `x'[i]` where x has an index",
         '×' | '·' => "write `*` for a product",
         '−' | '–' => "write a plain minus sign `-`",
-        _ => "an expression is made of numbers, names, + - * / ^ ( ) , and comparisons",
+        _ => "an expression consists of numbers, names, + - * / ^ ( ) , and comparisons",
     };
     Complaint::new(at..at + found.len_utf8(), format!("unexpected character `{found}`"), hint)
 }

@@ -94,9 +94,9 @@ impl<'a> Lowering<'a> {
         });
         if unknown.get() {
             let message =
-                "the velocity beyond this end is not known: the value there depends on a state without a velocity";
+                "the velocity beyond this end is unknown: the value there depends on a state without a velocity";
             let key = if matches!(field, Field::Before(_)) { "before" } else { "after" };
-            let hint = format!("state it: `velocity = {{ {key} = \"…\" }}`");
+            let hint = format!("give it: `velocity = {{ {key} = \"…\" }}`");
             self.found.push((item, field, Complaint::new(0..0, message, hint)));
         }
         rate.first().copied().unwrap_or(zero)

@@ -84,8 +84,8 @@ impl Check<'_> {
             Ok(order) => order,
             Err((members, span)) => {
                 let names = members.iter().map(|i| self.source.functions[*i].name.clone()).collect();
-                let message = format!("functions that call each other: {}", chain(names));
-                let hint = "break the circle: a function is replaced by its expression, which must come to an end";
+                let message = format!("circular function calls: {}", chain(names));
+                let hint = "break the cycle: functions are expanded in place and cannot be recursive";
                 let last = Item::Function(members[members.len() - 1]);
                 return self.complain(last, Field::Expression, Complaint::new(span, message, hint));
             }
@@ -94,7 +94,7 @@ impl Check<'_> {
         for i in order {
             depth[i] = 1 + uses[i].iter().map(|(j, _)| depth[*j]).max().unwrap_or(0);
             if depth[i] == DEEPEST_CALL + 1 {
-                let message = format!("functions that call functions more than {DEEPEST_CALL} deep");
+                let message = format!("function calls nested more than {DEEPEST_CALL} deep");
                 self.report(Item::Function(i), Field::Name, message, "write the inner ones as definitions");
             }
         }
@@ -123,8 +123,8 @@ impl Check<'_> {
             Err((members, span)) => {
                 let names = members.iter().map(|i| layout.piece_name(self.source, *i)).collect();
                 let last = &layout.pieces[members[members.len() - 1]];
-                let message = format!("definitions that need each other: {}", chain(names));
-                let hint = "break the circle; only a state may depend on itself";
+                let message = format!("circular definitions: {}", chain(names));
+                let hint = "break the cycle; only a state may depend on itself";
                 self.complain(last.item, last.field, Complaint::new(span, message, hint));
                 Vec::new()
             }

@@ -175,7 +175,7 @@ impl Parser<'_> {
             return Err(Complaint::new(
                 span,
                 format!("the expression is nested more than {DEEPEST} deep"),
-                "give inner parts a name in the definitions",
+                "name the inner parts in the definitions",
             ));
         }
         let parsed = match self.take(&["+", "-"]) {
@@ -285,8 +285,8 @@ impl Parser<'_> {
     /// The rest of `sum(index, first, last, term)`.
     fn series(&mut self, span: Range<usize>, open: Range<usize>) -> Parsed {
         let form = |span: Range<usize>| {
-            let hint = "write the index, where it begins and ends, and the term: `sum(j, 1, n, x[j])`";
-            Complaint::new(span, "`sum` has another form", hint)
+            let hint = "write the index, its first and last value, and the term: `sum(j, 1, n, x[j])`";
+            Complaint::new(span, "`sum` is not written correctly", hint)
         };
         let Some((Token::Name(index), index_span)) = self.words.get(self.at).cloned() else {
             return Err(form(span.start..open.end));
@@ -301,7 +301,7 @@ impl Parser<'_> {
         self.sums += 1;
         if self.sums > DEEPEST_SUM {
             let message = format!("sums are nested more than {DEEPEST_SUM} deep");
-            return Err(Complaint::new(span, message, "give the inner sums names in the definitions"));
+            return Err(Complaint::new(span, message, "name the inner sums in the definitions"));
         }
         let outer = std::mem::take(&mut self.out);
         self.comparison()?;
@@ -322,7 +322,7 @@ impl Parser<'_> {
             None => Err(Complaint::new(
                 open.clone(),
                 "this bracket is never closed",
-                "add the missing `)`, at the latest at the end of the expression",
+                "add the missing `)` before the end of the expression",
             )),
             Some((Token::Symbol(","), span)) => Err(Complaint::new(
                 span.clone(),
@@ -342,7 +342,7 @@ impl Parser<'_> {
             };
         match token {
             Token::Symbol(")") if after_value => {
-                Complaint::new(span, "this bracket closes nothing", "remove it, or add the missing `(`")
+                Complaint::new(span, "this bracket has no opening bracket", "remove it, or add the missing `(`")
             }
             Token::Symbol(",") if after_value => Complaint::new(
                 span,

@@ -170,8 +170,8 @@ impl<'a> Scope<'a> {
         match bound(sum.first).zip(bound(sum.last)) {
             Some((first, last)) => Ok(first as i64..=last as i64),
             None => {
-                let hint = "where a sum begins and ends is made of numbers, constants and indices";
-                Err(Complaint::new(sum.index_span.clone(), "the ends of this sum are not two whole numbers", hint))
+                let hint = "the limits of a sum may contain only numbers, constants and indices";
+                Err(Complaint::new(sum.index_span.clone(), "the limits of this sum are not two integers", hint))
             }
         }
     }
@@ -190,13 +190,13 @@ impl<'a> Scope<'a> {
         };
         let family = &self.layout.families[*family];
         let Some(index) = index else {
-            let message = format!("the index of `{name}` is not known before the model runs");
-            let hint = "an index is made of numbers, constants and the index of the equation, as in `x[i+1]`";
+            let message = format!("the index of `{name}` depends on a quantity that varies");
+            let hint = "an index may contain only numbers, constants and the index of the equation, as in `x[i+1]`";
             return Err(Complaint::new(span.clone(), message, hint));
         };
         if index.fract() != 0.0 || index.abs() > 1e9 {
-            let message = format!("the index of `{name}` is {index}, not a whole number");
-            let hint = "make it one, for example with `floor(…)`";
+            let message = format!("the index of `{name}` is {index}, not an integer");
+            let hint = "make it an integer, for example with `floor(…)`";
             return Err(Complaint::new(span.clone(), message, hint));
         }
         self.place(family, index as i64).ok_or_else(|| outside(family, index as i64, span, locals))
@@ -302,11 +302,11 @@ fn outside(family: &Family, index: i64, span: &Range<usize>, locals: &[Local]) -
     };
     let hint = match (family.kind, given) {
         (Kind::State, 0) => format!(
-            "state its value: `{key} = \"0\"` where it is fixed, `{key} = \"{}\"` at a free end, `periodic = true` in a ring; \
-             or leave it out with `if(i …, …, …)`",
+            "give its value: `{key} = \"0\"` if it is fixed, `{key} = \"{}\"` at a free end, `periodic = true` in a \
+             ring; or leave it out with `if(i …, …, …)`",
             element_name(name, next as i64)
         ),
-        (_, 0) => format!("state its value with `{key} = \"…\"`, or `periodic = true` in a ring"),
+        (_, 0) => format!("give its value with `{key} = \"…\"`, or `periodic = true` in a ring"),
         (_, given) => format!("`{key}` gives {given}; list one more, nearest first: `{key} = [\"…\", \"…\"]`"),
     };
     Complaint::new(span.clone(), message, hint)

@@ -59,19 +59,19 @@ impl Table {
         let Table { x, y, .. } = self;
         let turned = x.windows(2).position(|pair| pair[0] >= pair[1]);
         if x.len() != y.len() {
-            let message = format!("the table has {} values `x` and {} values `y`", x.len(), y.len());
+            let message = format!("the table has {} `x` values and {} `y` values", x.len(), y.len());
             Some([message, "give one `y` for each `x`".into()])
         } else if x.len() < 2 {
-            Some([format!("the table has {} points", x.len()), "give two points at least".into()])
+            Some([format!("the table has {} points", x.len()), "give at least two points".into()])
         } else if x.len() > MOST_POINTS {
-            let message = format!("the table has {} points, more than {MOST_POINTS}", x.len());
+            let message = format!("the table has {} points; the limit is {MOST_POINTS}", x.len());
             Some([message, "keep the points that matter, or fit a formula".into()])
         } else if x.iter().chain(y).any(|v| !v.is_finite()) {
             Some(["a value of the table is not a finite number".into(), "write numbers".into()])
         } else {
             let at = turned?;
-            let message = format!("the values `x` do not increase: {} is followed by {}", x[at], x[at + 1]);
-            Some([message, "sort the points by `x` and keep one of equal ones".into()])
+            let message = format!("the `x` values do not increase: {} is followed by {}", x[at], x[at + 1]);
+            Some([message, "sort the points by `x` and remove duplicates".into()])
         }
     }
 

@@ -91,17 +91,17 @@ fn sums(whole: &Model, source: &ModelSource) -> Result<Vec<Vec<f64>>, Vec<ModelE
             (of(&x, i) - terms.iter().sum::<f64>()).abs() <= 1e-12 * size
         });
         if !linear || row.iter().all(|c| *c == 0.0) {
-            let message = format!("`{}` is no sum of states times numbers", source.totals[i].sum);
+            let message = format!("`{}` is not a linear combination of states", source.totals[i].sum);
             let hint = "write a sum such as \"x + 2*y\"".into();
             found.push(complaint(source, i, Field::Expression, message, hint));
         } else if !laws::keeps_its_value(whole, &row) {
             let names: Vec<String> = whole.states.iter().map(|state| state.name.clone()).collect();
             let kept: Vec<String> = laws::conserved(whole).iter().map(|c| laws::in_words(c, &names)).collect();
             let hint = match kept.is_empty() {
-                true => "no sum of states keeps its value here: leave `totals` out".to_string(),
-                false => format!("these do: {}", kept.join(", ")),
+                true => "no sum of states is conserved here: remove `totals`".to_string(),
+                false => format!("conserved: {}", kept.join(", ")),
             };
-            let message = format!("`{}` does not keep its value", source.totals[i].sum);
+            let message = format!("`{}` is not conserved", source.totals[i].sum);
             found.push(complaint(source, i, Field::Expression, message, hint));
         }
         rows.push(row);
@@ -130,10 +130,11 @@ fn followers(source: &ModelSource, whole: &Model, rows: &[Vec<f64>]) -> Result<V
         };
         let Some(found) = found else {
             let message = match &total.instead_of {
-                Some(name) => format!("`{name}` cannot follow from `{}`", total.name),
-                None => format!("no state can follow from `{}`", total.name),
+                Some(name) => format!("`{name}` cannot be computed from `{}`", total.name),
+                None => format!("no state can be computed from `{}`", total.name),
             };
-            let hint = "it takes a state of the sum that is no element of a family, has no velocity, no mass coupling and no other total";
+            let hint = "it must be a state of the sum that is not an element of a family, has no velocity and no \
+                        mass coupling, and belongs to no other total";
             let field = if total.instead_of.is_some() { Field::Name } else { Field::Expression };
             return Err(vec![complaint(source, i, field, message, hint.into())]);
         };
@@ -232,7 +233,7 @@ mod tests {
     #[test]
     fn what_changes_is_no_total() {
         let found = Model::compile(source(&[("E", "e + 2*c", 1.0)])).err().unwrap();
-        assert!(found[0].message.contains("does not keep its value") && found[0].hint.contains("e + c"), "{found:?}");
+        assert!(found[0].message.contains("is not conserved") && found[0].hint.contains("e + c"), "{found:?}");
         let found = Model::compile(source(&[("E", "e*c", 1.0)])).err().unwrap();
         assert!(found[0].message.contains("no sum of states"), "{found:?}");
         let found = Model::compile(source(&[("E", "e + c", 1.0), ("F", "2*e + 2*c", 1.0)])).err().unwrap();

@@ -19,24 +19,25 @@ const KINDS: [Kind; 15] = [
     (
         &["map", "iterate", "iteration", "discrete", "discretetime"],
         "maps are not supported: states obey differential equations",
-        "where the map samples a flow, give the flow: its fixed points are then cycles; for a map of its own use MatContM or PyDSTool",
+        "if the map samples a flow, give the flow, whose cycles are the fixed points; for other maps use MatContM or \
+         PyDSTool",
     ),
     (
         &["reset", "jump", "event", "guard", "impact", "restitution", "hybrid", "transition"],
         "states that jump (resets, impacts with a coefficient of restitution) are not supported",
-        "write the contact as a stiff force, such as k*max(x - gap, 0) with damping while in contact; its switching is located exactly. \
-         For resets proper use COCO or TC-HAT",
+        "model the contact as a stiff force, such as k*max(x - gap, 0), with damping while in contact; switching is \
+         located exactly. For true resets use COCO or TC-HAT",
     ),
     (
         &["boundary", "boundarie", "boundarycondition", "bc", "bvp"],
         "boundary-value problems other than cycles are not supported",
-        "use AUTO-07p or COCO for them",
+        "use AUTO-07p or COCO",
     ),
     (
         &["integralcondition", "integralconstraint", "constraint", "algebraic", "dae"],
-        "algebraic conditions beside the differential equations are not supported",
-        "solve the condition for a variable under [definitions], or give that variable a fast equation of its own, such as \
-         eps*z' = g(x, z)",
+        "algebraic equations are not supported",
+        "solve the equation for a variable under [definitions], or give that variable a fast differential equation, \
+         such as eps*z' = g(x, z)",
     ),
     (
         &["delay", "lag", "delayed", "history", "dde"],
@@ -47,41 +48,42 @@ const KINDS: [Kind; 15] = [
     (
         &["torus", "tori", "quasiperiodic", "invarianttorus"],
         "invariant tori are not computed",
-        "torus bifurcations of cycles are located, and continued in two parameters by [[curve]]; what follows them shows in a [[survey]] \
-         or [[sweep]]. For tori as branches use COCO or CoSTAR",
+        "torus bifurcations of cycles are located, and continued in two parameters with [[curve]]; motions on tori \
+         appear in a [[survey]] or [[sweep]]. To continue tori use COCO or CoSTAR",
     ),
     (
         &["homoclinic", "heteroclinic", "connection", "connectingorbit", "homcont"],
-        "connecting orbits are not continued by themselves",
-        "a branch of cycles that approaches one ends there and names it, with the parameter; for curves of them use AUTO-07p (HomCont) or \
-         MATCONT",
+        "connecting orbits cannot be continued",
+        "a branch of cycles that approaches one ends there and reports it with its parameter value; to continue it \
+         in two parameters use AUTO-07p (HomCont) or MATCONT",
     ),
     (
         &["frequencie", "secondfrequency", "frequency2"],
         "two forcing frequencies are not supported",
-        "where their ratio is m:n, state the common period, as in `period = \"2*pi*n/omega\"`; the response is then a cycle",
+        "if their ratio is m:n, give the common period, as in `period = \"2*pi*n/omega\"`; the response is then a \
+         cycle",
     ),
     (
         &["noise", "stochastic", "diffusion", "sde", "wiener"],
         "random forcing is not supported: the equations are deterministic",
-        "study the deterministic part here, and simulate with noise in another program",
+        "study the deterministic part here; simulate with noise in another program",
     ),
     (
         &["pde", "space", "spatial", "laplacian"],
-        "partial differential equations are not supported as such",
+        "partial differential equations are not supported",
         "discretise in space with a repeated state (`count`); up to about a hundred states are practical. For more use BifurcationKit or \
          pde2path",
     ),
     (
         &["initial", "initialcondition", "initialvalue", "initialstate", "ic", "x0", "y0"],
         "initial conditions do not belong to this table",
-        "give a first state in the study, as in [[seed]] with `state = { x = 1, v = 0 }`, or its `range` in the model, from which initial \
-         states are sampled",
+        "give an initial state in the study, as in [[seed]] with `state = { x = 1, v = 0 }`, or a `range` of each \
+         state in the model, from which initial states are sampled",
     ),
     (
         &["ds", "dsmin", "dsmax", "step", "stepsize", "maxstep", "minstep", "initialstep", "maxstepsize", "iad"],
         "step sizes of the continuation cannot be set",
-        "they follow from `tolerance`; leave this out",
+        "they follow from `tolerance`; remove this",
     ),
     (
         &["ntst", "ncol", "mesh", "meshinterval", "collocationpoint", "nmx"],
@@ -103,13 +105,13 @@ const KINDS: [Kind; 15] = [
             "epsu",
             "epss",
         ],
-        "the method and its tolerances cannot be set one by one",
-        "everything follows from `tolerance`; leave this out",
+        "the method and its tolerances cannot be set individually",
+        "they follow from `tolerance`; remove this",
     ),
     (
         &["jacobian", "jac", "derivative", "gradient"],
         "derivatives need not be given",
-        "they are computed exactly from the equations; leave this out",
+        "they are computed exactly from the equations; remove this",
     ),
 ];
 

@@ -40,7 +40,7 @@ impl Check<'_> {
                     Some(Symbol::Family(_)) => {
                         let message = format!("`{name}` is repeated over an index");
                         let hint = format!(
-                            "say which element: `{name}[i]`, `{name}[1]`; add up with `sum(j, 1, n, {name}[j])`"
+                            "give the element: `{name}[i]`, `{name}[1]`; add them up with `sum(j, 1, n, {name}[j])`"
                         );
                         Complaint::new(span.clone(), message, hint)
                     }
@@ -64,7 +64,11 @@ impl Check<'_> {
                     let taken = self.symbols.get(sum.index.as_str()).map(|symbol| symbol.article());
                     let taken = taken.or(locals.contains(&sum.index.as_str()).then_some("an index"));
                     let Some(taken) = taken else { continue };
-                    let message = format!("the index `{}` of this sum has a meaning already: it is {taken}", sum.index);
+                    let message = format!(
+                        "the index `{}` of this sum has a name that is already in use: it is \
+                                           {taken}",
+                        sum.index
+                    );
                     Complaint::new(sum.index_span.clone(), message, "use another letter for the index of the sum")
                 }
                 _ => continue,
@@ -78,28 +82,30 @@ impl Check<'_> {
         let counted = matches!(name, "n" | "N") && self.repeats().next().is_some();
         let hint = match self.callables.signature(name) {
             Some(signature) => format!("`{name}` is a function: write `{signature}`"),
-            None if name == "time" && self.symbols.contains_key(TIME) => "time is called `t`".into(),
+            None if name == "time" && self.symbols.contains_key(TIME) => "the time is `t`".into(),
             None if name == TIME || name == "time" => {
-                "time is `t` where the model says how long a period of its forcing is: [forcing] with \
-                 `frequency = \"…\"` (angular) or `period = \"…\"`"
+                "`t` is defined only for a forced model: give [forcing] with `frequency = \"…\"` (angular) or \
+                 `period = \"…\"`"
                     .into()
             }
             None if name.ends_with("''") => {
-                "an acceleration is what its equation says it is; give that expression a name in the definitions".into()
+                "an acceleration cannot be used in an expression; name its right-hand side in the definitions".into()
             }
             None if name.ends_with('\'') => {
                 let base = name.trim_end_matches('\'');
                 format!(
-                    "`{base}'` exists where the acceleration of `{base}` is given: `\"{base}''\" = \"…\"` under [states]"
+                    "`{base}'` exists only if the acceleration of `{base}` is given: `\"{base}''\" = \"…\"` under \
+                     [states]"
                 )
             }
             None if repeated() => {
                 format!(
-                    "`{name}` is an index, known only in what has a `count`; elsewhere write a number, as in `x[1]`"
+                    "`{name}` is an index, defined only in items with a `count`; elsewhere write a number, as in \
+                     `x[1]`"
                 )
             }
             None if counted => {
-                format!("give the count a name: `{name} = 40` under [constants], and `count = \"{name}\"`")
+                format!("define it as a constant: `{name} = 40` under [constants], and `count = \"{name}\"`")
             }
             None => {
                 let mut known: Vec<&str> = self.symbols.keys().copied().collect();
@@ -110,7 +116,7 @@ impl Check<'_> {
         match self.source.outputs.iter().any(|output| output.name == name) {
             true => {
                 let message = format!("`{name}` is an output, which cannot be used in an expression");
-                let hint = "give the expression a name in the definitions and use that";
+                let hint = "name the expression in the definitions and use that";
                 Complaint::new(span, message, hint)
             }
             false => Complaint::new(span, format!("unknown name `{name}`"), hint),
@@ -191,7 +197,7 @@ impl Check<'_> {
         }
         if let Some((name, what, span)) = wrong {
             let message = format!("the forcing depends on `{name}`, which is {what}");
-            let hint = "its frequency or period is made of numbers and parameters";
+            let hint = "its frequency or period may contain only numbers and parameters";
             self.complain(Item::Forcing, Field::Expression, Complaint::new(span, message, hint));
         }
     }

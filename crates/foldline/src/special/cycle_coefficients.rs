@@ -49,15 +49,15 @@ pub fn coefficients(kind: Kind, setting: &Setting, at: &Point) -> Coefficients {
 fn found(kind: Kind, setting: &Setting, at: &Point) -> Result<Coefficients, String> {
     let Solution::Cycle(cycle) = &at.solution else { return Ok(Coefficients::default()) };
     if cycle.intervals() == 0 {
-        return Err("the profile of the cycle is not known".into());
+        return Err("the profile of the cycle is missing".into());
     }
     match switches_passed(setting, at) {
         0 => {}
-        1 => return Err("the orbit passes a switch of the right-hand side".into()),
-        count => return Err(format!("the orbit passes {count} switches of the right-hand side")),
+        1 => return Err("the orbit crosses a switching point of the right-hand side".into()),
+        count => return Err(format!("the orbit crosses {count} switching points of the right-hand side")),
     }
     let resolved =
-        resolved(setting, at, cycle).ok_or("derivatives of the right-hand side change too sharply to be resolved")?;
+        resolved(setting, at, cycle).ok_or("the derivatives of the right-hand side vary too sharply to be resolved")?;
     let value = |at: &Point| valued(kind, setting.clone(), at).ok_or("its equations could not be solved");
     let first = on_mesh(at, &resolved).ok_or("its mesh could not be refined")?;
     let second = solved(kind, setting, &first, at, &mesh::denser(&resolved));
@@ -74,7 +74,7 @@ fn found(kind: Kind, setting: &Setting, at: &Point) -> Result<Coefficients, Stri
 fn compared(one: Value, two: Value, noise: f64) -> Coefficients {
     let error = SAFE * (two.value - one.value).abs() + noise * two.terms;
     let unknown = two.value.abs() <= error && error > UNKNOWN * two.terms;
-    let remark = if unknown { "two meshes agree on no digit of it" } else { "" };
+    let remark = if unknown { "the results on two meshes agree in no digit" } else { "" };
     Coefficients { values: vec![two.value], errors: vec![error], remark: remark.into() }
 }
 

@@ -23,7 +23,7 @@
 use super::floquet::{Course, Floquet};
 use crate::linalg::dense::{VECTORS, random};
 use crate::linalg::periodic_schur::{self, CONDITION};
-use foldline_dense::{Factored, Mat, MatRef, multiply};
+use foldline_general::{Factored, Mat, MatRef, multiply};
 use num_complex::Complex64;
 
 /// Rounding error up to which the product is formed: a tenth of what is stated for rounding.
@@ -177,12 +177,12 @@ fn moduli(f: &[f64], p: usize) -> f64 {
 
 /// (4): the root of the mean square of the entries of A w, for w of [`random`] vectors.
 fn size(image: &Mat<f64>) -> f64 {
-    foldline_dense::norm(image) / ((image.nrows() * image.ncols()) as f64).sqrt()
+    foldline_general::norm(image) / ((image.nrows() * image.ncols()) as f64).sqrt()
 }
 
 /// Eigenvalues of one matrix by decreasing modulus, those of a pair together.
 fn eigenvalues(a: MatRef<f64>) -> Option<Vec<Complex64>> {
-    let mut found = foldline_dense::eigenvalues(a)?;
+    let mut found = foldline_general::eigenvalues(a)?;
     found.sort_by(|a, b| b.norm().total_cmp(&a.norm()));
     Some(found)
 }

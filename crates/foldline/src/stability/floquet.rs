@@ -143,7 +143,7 @@ fn product(a: &[f64], b: &[f64], n: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use foldline_dense::{Mat, product};
+    use foldline_general::{Mat, product};
 
     /// Numbers between -1 and 1.
     fn numbers(count: usize, seed: f64) -> Vec<f64> {
@@ -172,7 +172,7 @@ mod tests {
     fn reference(transitions: [&[f64]; 2], count: usize, n: usize) -> Vec<Complex64> {
         let of = |j: usize| Mat::from_fn(n, n, |i, k| transitions[j % 2][(j * n + i) * n + k]);
         let all = (1..count).fold(of(0), |before, j| product(&of(j), &before));
-        foldline_dense::eigenvalues(all.as_ref()).unwrap()
+        foldline_general::eigenvalues(all.as_ref()).unwrap()
     }
 
     /// Each of one list is one of the other, the largest first.

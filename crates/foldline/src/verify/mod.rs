@@ -67,8 +67,8 @@ impl Quantity {
             Quantity::Range => "range",
             Quantity::Spectrum => "spectrum",
             Quantity::Stability => "stability",
-            Quantity::Place => "place",
-            Quantity::Record => "record",
+            Quantity::Place => "location",
+            Quantity::Record => "consistency",
         }
     }
 }

@@ -111,7 +111,7 @@ impl Part<'_> {
             let (Some(path), Solution::Cycle(cycle)) = (paths.next(), &point.solution) else { continue };
             let off = shooting.between(orbit, &solved.orbit);
             if max_abs(&off) > ELSEWHERE[usize::from(self.branch.held.is_some())] {
-                out.undecided.push(self.undecided(point, "shooting leads to another solution"));
+                out.undecided.push(self.undecided(point, "shooting converged to another solution"));
                 continue;
             }
             out.points += 1;

@@ -101,7 +101,7 @@ impl Place<'_> {
                 continue;
             };
             crossed = true;
-            why = "what different distances say about it does not agree";
+            why = "estimates from different distances disagree";
             let root = zero(&nodes, &values);
             if bend(&nodes, &values, root) > SMOOTH * values[1].abs().max(values[2].abs()) {
                 continue;

@@ -38,7 +38,7 @@ impl Plan {
             if let Some(message) = messages.iter().find(|message| message.bytes.len() > LARGEST_MESSAGE) {
                 let name = &self.objects[id].name;
                 let size = message.bytes.len();
-                return Err(Error::other(format!("\"{name}\" takes {size} bytes where HDF5 allows {LARGEST_MESSAGE}")));
+                return Err(Error::other(format!("\"{name}\" takes {size} bytes; HDF5 allows {LARGEST_MESSAGE}")));
             }
             places.objects[id] = take(messages::header(&messages).len() as u64);
         }
@@ -162,7 +162,7 @@ impl Laid {
     pub fn put(&mut self, id: Id, first: u64, bytes: &[u8]) -> Result<()> {
         let at = 8 * first;
         if at + bytes.len() as u64 > self.sizes[id] {
-            return Err(Error::other("the run has changed while it was exported"));
+            return Err(Error::other("the run changed during the export"));
         }
         self.file.seek(SeekFrom::Start(self.data[id] + at))?;
         self.file.write_all(bytes)

@@ -1,7 +1,7 @@
 //! Newton's method by shooting with difference quotients: slow and simple, to polish candidates independently of collocation.
 
 use super::*;
-use foldline_dense::{Factored, Mat, eigenvalues};
+use foldline_general::{Factored, Mat, eigenvalues};
 
 /// The solution near a candidate, with its stability.
 pub fn polish(field: &Field, parameters: &[f64], candidate: &Candidate) -> Option<Point> {

@@ -96,7 +96,7 @@ impl<'a> Walk<'a> {
             return;
         }
         let [own, other] = [self.system.shown(&form), self.system.shown(&goal)];
-        let message = format!("{what} is in {other}, and this is in {own}");
+        let message = format!("{what} is in {other}, but this is in {own}");
         let inferred = self.system.inferred(&self.mentioned(text));
         let time = match goal.clock() != 0.0 && self.source.time.is_empty() && self.system.differs_in_time(&residual) {
             true => {
@@ -256,7 +256,7 @@ impl<'a> Walk<'a> {
             return;
         }
         let wanted = if angle { "an angle in rad" } else { "a pure number" };
-        let message = format!("{what} is in {}; it has to be {wanted}", self.system.shown(form));
+        let message = format!("{what} is in {}, but must be {wanted}", self.system.shown(form));
         let text = body.text.get(place.span.clone()).unwrap_or_default();
         let inferred = self.system.inferred(&self.mentioned(text));
         self.tell(outcome, form, place, message, &inferred);
@@ -269,7 +269,7 @@ impl<'a> Walk<'a> {
         let outcome = self.system.settle(&residual, false, &place, body.from);
         if !matches!(outcome, Outcome::Holds) {
             let [own, other] = [own, other].map(|form| self.system.shown(form));
-            let message = format!("{what} is in {own}, and elsewhere in {other}");
+            let message = format!("{what} is in {own} here, but in {other} elsewhere");
             self.tell(outcome, &residual, place, message, "");
         }
     }

@@ -163,7 +163,7 @@ mod tests {
     use super::*;
     use crate::linalg::dense::MANY;
     use crate::problem::gauss::Scheme;
-    use foldline_dense::{Mat, product};
+    use foldline_general::{Mat, product};
 
     /// exp(A), by its series.
     fn exponential(a: &Mat<f64>) -> Mat<f64> {

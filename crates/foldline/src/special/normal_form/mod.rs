@@ -86,7 +86,7 @@ pub fn coefficients(setting: &Setting, kind: Kind, at: &Point, error: f64, pair:
     }
     let uncertain = Uncertain::new(setting, at, error);
     if uncertain.lies_on_a_switch() {
-        return Coefficients::none("the equilibrium lies on a switch of the right-hand side");
+        return Coefficients::none("the equilibrium lies on a switching point of the right-hand side");
     }
     match found(&uncertain, kind, pair) {
         Ok(found) if found.values.iter().all(|value| value.is_finite()) => found,
@@ -97,7 +97,7 @@ pub fn coefficients(setting: &Setting, kind: Kind, at: &Point, error: f64, pair:
 
 /// Computes the coefficients, or returns the reason why they are undefined.
 fn found(uncertain: &Uncertain, kind: Kind, pair: usize) -> Result<Coefficients, String> {
-    const RESONANCE: &str = "eigenvalues are resonant or have no separate eigenvectors";
+    const RESONANCE: &str = "the eigenvalues are resonant or lack independent eigenvectors";
     // Next to each other on the axis, pairs change places from sample to sample.
     let own = frequencies(uncertain.at).get(pair).copied();
     let first = |sample: &Sample| {

@@ -1,12 +1,14 @@
-//! Large dense matrices: what `foldline` takes of a general library.
+//! General numerics: what `foldline` takes of libraries.
 //!
-//! The library is generic in everything; used here at one type only, its kernels are compiled once and not with every change of `foldline`.
+//! **Idea.** The libraries are generic in everything. Used here at one type only, their kernels are compiled once: not with every change of
+//! `foldline`, and not once more for its tests.
 
 use faer::linalg::matmul::matmul;
 use faer::linalg::solvers::PartialPivLu;
 use faer::prelude::*;
 use faer::{Accum, Par};
 use num_complex::Complex64;
+use rustfft::FftPlanner;
 
 pub use faer::{Mat, MatMut, MatRef};
 
@@ -57,4 +59,9 @@ impl Factored {
 /// The root of the sum of the squares of all entries.
 pub fn norm(a: &Mat<f64>) -> f64 {
     a.norm_l2()
+}
+
+/// Replaces samples by their discrete Fourier transform, X_k = Σ_j x_j exp(-2πi jk/N), without a factor.
+pub fn fourier(samples: &mut [Complex64]) {
+    FftPlanner::new().plan_fft_forward(samples.len()).process(samples);
 }
