@@ -14,6 +14,7 @@ HERE = "docs/"
 sys.path[:0] = [os.path.join(ROOT, "python"), os.path.join(ROOT, "docs", "site")]
 
 import bibliography  # noqa: E402
+from pygments.lexers.special import TextLexer  # noqa: E402
 from sphinx.ext.napoleon import Config, NumpyDocstring  # noqa: E402
 
 with open(os.path.join(ROOT, "docs", "references.bib"), encoding="utf-8") as file:
@@ -112,6 +113,8 @@ def read_numpy_style(app, what, name, obj, options, lines):
 
 def setup(app):
     """Connects what is above."""
+    # Tables that a command prints are no shell script: no word in them is coloured.
+    app.add_lexer("console", TextLexer)
     app.connect("source-read", add_children)
     app.connect("source-read", add_references)
     app.connect("autodoc-process-docstring", read_numpy_style)
