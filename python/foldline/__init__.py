@@ -15,10 +15,13 @@ from importlib.metadata import version as _version
 from ._branch import Branch, SpecialPoint, SpecialPoints
 from ._compute import explore, follow, hold, homotopy, open, rescued, run
 from ._diagram import Diagram, Homotopy
-from ._errors import EndedShort, Error, InputError, Interrupted, NoSolution, RunFileError, TraceError
+from ._errors import ArgumentError, EndedShort, Error, InputError, Interrupted, NoSolution, RunFileError, TraceError
 from ._model import Model, model
+from ._responses import Responses, Survey, Sweep
 from ._simulation import Trajectory
 from ._solution import Attractor, Attractors, Solution
+from ._strobe import Strobe, strobe
+from ._sweeps import survey, sweep
 from ._symbols import where
 
 try:
@@ -27,6 +30,7 @@ except _NotFound:
     __version__ = "unknown"
 
 __all__ = [
+    "ArgumentError",
     "Attractor",
     "Attractors",
     "Branch",
@@ -38,10 +42,14 @@ __all__ = [
     "Interrupted",
     "Model",
     "NoSolution",
+    "Responses",
     "RunFileError",
     "Solution",
     "SpecialPoint",
     "SpecialPoints",
+    "Strobe",
+    "Survey",
+    "Sweep",
     "TraceError",
     "Trajectory",
     "explore",
@@ -52,9 +60,12 @@ __all__ = [
     "open",
     "rescued",
     "run",
+    "strobe",
+    "survey",
+    "sweep",
     "where",
 ]
 
-# Where they are to be imported from, and how tracebacks call them.
+# The module from which they are imported, which tracebacks show.
 for _class in [own for own in map(globals().get, __all__) if isinstance(own, type)]:
     _class.__module__ = __name__

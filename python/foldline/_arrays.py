@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ._errors import InputError
+from ._arguments import check_parameters, number
+from ._errors import ArgumentError, InputError
 
 Floats = npt.NDArray[np.float64]
 Integers = npt.NDArray[np.int64]
@@ -17,7 +18,7 @@ Complexes = npt.NDArray[np.complex128]
 
 
 def floats(raw: bytes, *shape: int) -> Floats:
-    """Numbers in the given shape."""
+    """Returns numbers in the given shape."""
     array = np.frombuffer(raw, dtype=np.float64)
     return array.reshape(shape) if shape else array
 
@@ -39,39 +40,57 @@ def raw(values: Any) -> bytes:
 
 
 def processors(jobs: int | None) -> int:
-    """How many threads are meant."""
+    """Number of threads."""
     return whole("jobs", jobs) if jobs is not None else (os.cpu_count() or 1)
 
 
 def whole(name: str, value: int, least: int = 1) -> int:
-    """A whole number that is not too small."""
+    """Returns a whole number, which must not be smaller than `least`."""
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
         raise InputError(f"{name} = {value!r} is not allowed\n  help: a whole number from {least} upwards")
     return int(value)
 
 
 def tolerable(tolerance: float, least: float = 1e-10, most: float = 1e-4) -> float:
-    """A tolerance within its bounds."""
-    if not least <= tolerance <= most:
-        raise InputError(f"the tolerance {tolerance:g} is out of range\n  help: a number from {least:g} to {most:g}")
-    return float(tolerance)
+    """Returns a tolerance, which must lie within its bounds."""
+    own = number("tolerance", tolerance)
+    if not least <= own <= most:
+        raise InputError(f"the tolerance {own:g} is out of range\n  help: a number from {least:g} to {most:g}")
+    return own
 
 
 def limits(steps: int | None, time: float | None) -> tuple[int | None, float | None]:
-    """Limits on trajectories, as far as they are given."""
+    """Limits on trajectories, or `None` for those that are not given."""
+    time = None if time is None else number("max_time", time)
     if time is not None and not time > 0:
         raise InputError(f"max_time = {time!r} is not allowed\n  help: a positive time in the units of the model")
     return None if steps is None else whole("max_steps", steps), None if time is None else float(time)
 
 
+def real(name: str, values: Any) -> Floats:
+    """Real numbers as an array of floats."""
+    try:
+        given = np.asarray(values)
+        # NumPy would read the digits of strings, and drop imaginary parts.
+        array: Floats = given.astype(np.float64) if given.dtype.kind not in "USc" else _refused(given)
+    except (TypeError, ValueError) as error:
+        raise ArgumentError(f"{name} has values that are not real numbers: {values!r}\n  help: numbers such as 5, 0.25 or 1e-6") from error
+    return array
+
+
 def finite(name: str, values: Any) -> Floats:
-    """Numbers, all of them finite."""
-    array: Floats = np.asarray(values, dtype=np.float64)
+    """Real numbers, all of them finite."""
+    array = real(name, values)
     if not np.isfinite(array).all():
         raise InputError(f"{name} has values that are not finite\n  help: numbers such as 5, 0.25 or 1e-6")
     return array
 
 
+def _refused(given: Any) -> Floats:
+    raise TypeError(given.dtype.name)
+
+
 def pairs(values: Mapping[str, Any] | None) -> list[tuple[str, float]]:
     """Names with numbers."""
-    return [(str(name), float(value)) for name, value in (values or {}).items()]
+    check_parameters("parameters", values)
+    return [(str(name), number(str(name), value)) for name, value in (values or {}).items()]

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 
 from . import _native
+from ._arguments import suggestion
 from ._arrays import Complexes, Floats, Integers, complexes, floats, integers
 from ._solution import Solution
 
@@ -18,36 +19,47 @@ if TYPE_CHECKING:
     import xarray
 
     from ._diagram import Diagram
+    from ._responses import Responses
+    from ._strobe import Strobe
 
 TRUST = ("discretisation", "residual", "trivial_defect", "liouville_defect", "spectrum_error")
 WORK = ("newton", "factorisations", "rejected", "evaluations", "linearisations")
 
 
 class SpecialPoint(Solution):
-    """A located special point: a solution, and what happens there.
+    """A located special point: a solution, and the bifurcation there.
 
     Attributes
     ----------
     kind : str
         ``"fold"``, ``"hopf"``, ``"period-doubling"`` …
     number : int
-        Of the special points of this kind on its branch, from 1 at the side of smaller positions.
+        Number among the special points of this kind on the branch, counted from 1 at the side of smaller positions.
     branch : Branch
-        On which it lies.
+        Branch on which it lies.
     unstable_before, unstable_after : int
-        Unstable eigenvalues or multipliers on the side of smaller and of larger positions.
+        Number of unstable eigenvalues or multipliers on the side of smaller and of larger positions.
     error : float
-        Bound on the error of the parameter, relative to ``branch.scale`` + |value|, of the extremes of states, relative to their scale +
-        |value|, of the period, relative to that, and of the extremes of outputs, relative to 1 + |value|.
+        Error bound. It holds for the parameter, relative to ``branch.scale`` + |value|; for the extremes of states, relative to their
+        scale + |value|; for the period, relative to the period; and for the extremes of outputs, relative to 1 + |value|.
     coefficients : tuple of float
-        Of the normal form.
+        Coefficients of the normal form.
     coefficient_errors : tuple of float
-        Bounds on the errors of the coefficients.
+        Error bounds of the coefficients.
     criticality : str or None
-        ``"supercritical"`` or ``"subcritical"`` where that is known, ``"degenerate"`` where a coefficient that matters is zero within its
-        error, ``"undetermined"`` where the error is as large as what the coefficient is made of.
+        ``"supercritical"`` or ``"subcritical"`` if known; ``"degenerate"`` if a decisive coefficient is zero within its error;
+        ``"undetermined"`` if the error is as large as the terms of which the coefficient is the sum.
     normal_form : str
-        Coefficients and criticality in words, or why there are none.
+        Coefficients and criticality in words, or the reason why there are none.
+
+    Examples
+    --------
+    >>> import foldline
+    >>> model = foldline.model(equations={"x": "mu - x^2"}, parameters={"mu": 1.0})
+    >>> branch = foldline.follow(model.settle([1.0]), "mu", (-1, 2))
+    >>> point = branch.special[0]
+    >>> point.kind, round(point.value, 6), point.unstable_before, point.unstable_after
+    ('fold', 0.0, 1, 0)
     """
 
     def __init__(self, branch: Branch, index: int, number: int, row: Any) -> None:
@@ -66,7 +78,7 @@ class SpecialPoint(Solution):
 
     @property
     def value(self) -> float:
-        """Of the parameter of the branch."""
+        """Value of the parameter of the branch, in the unit of the model."""
         return self[self.branch.free]
 
     def __repr__(self) -> str:
@@ -76,7 +88,16 @@ class SpecialPoint(Solution):
 
 
 class SpecialPoints(Sequence[SpecialPoint]):
-    """Special points in order: ``points[0]``, or those of one kind, ``points["fold"]``."""
+    """Special points in order: ``points[0]``, or those of one kind, ``points["fold"]``.
+
+    Examples
+    --------
+    >>> import foldline
+    >>> model = foldline.model(equations={"x": "mu - x^2"}, parameters={"mu": 1.0})
+    >>> branch = foldline.follow(model.settle([1.0]), "mu", (-1, 2))
+    >>> len(branch.special), len(branch.special["fold"]), len(branch.special["hopf"])
+    (1, 1, 0)
+    """
 
     def __init__(self, found: Sequence[SpecialPoint]) -> None:
         self._found = list(found)
@@ -99,7 +120,13 @@ class SpecialPoints(Sequence[SpecialPoint]):
         return iter(self._found)
 
     def to_pandas(self) -> pandas.DataFrame:
-        """The table of special points, as `foldline table --special` has it."""
+        """Returns a table with a row for each special point, with the columns of `foldline table --special`.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Quantities are in the units of the model.
+        """
         from ._tables import special_frame
 
         return special_frame(self)
@@ -116,27 +143,39 @@ class SpecialPoints(Sequence[SpecialPoint]):
 
 
 class Branch(Sequence[Solution]):
-    """A curve of solutions in one parameter, or in two with a special point held.
+    """A curve of solutions in one parameter, or a bifurcation curve in two.
 
-    ``branch["Omega"]`` and ``branch["r_max"]`` are columns, ``branch[0]`` and ``branch[-1]`` solutions.
+    ``branch["Omega"]`` and ``branch["r_max"]`` are columns, arrays of shape (points,). ``branch[0]`` and ``branch[-1]`` are solutions.
+    Arrays cannot be written to; copy one to change it.
 
     Attributes
     ----------
     name : str
+        Name of the branch.
     family : str
         ``"equilibrium"`` or ``"cycle"``.
     free : str
-        The parameter of the continuation.
+        Name of the continuation parameter.
     scale : float
-        The scale of that parameter: errors are relative to it.
+        Scale of that parameter, to which errors are relative.
     held : tuple or None
-        Of a curve in two parameters: what is held, and the parameter that follows from it.
+        For a bifurcation curve: the kind of bifurcation, and the name of the other parameter.
     origin : tuple
-        Where it comes from: ``("seed", name, None, None)``, ``("end", name, None, None)`` or ``("switch", parent, kind, value)``.
+        Where the branch comes from: ``("seed", name, None, None)``, ``("end", name, None, None)`` or ``("switch", parent, kind, value)``.
     ends : tuple of str
-        How the side of smaller and the side of larger positions ended.
+        Why the branch ended on the side of smaller and on the side of larger positions.
     diagram : Diagram
-        To which it belongs.
+        Diagram to which the branch belongs.
+
+    Examples
+    --------
+    >>> import foldline
+    >>> model = foldline.model(equations={"x": "mu - x^2"}, parameters={"mu": 1.0})
+    >>> branch = foldline.follow(model.settle([1.0]), "mu", (-1, 2))
+    >>> branch.name, branch.family, branch.free
+    ('equilibrium over mu', 'equilibrium', 'mu')
+    >>> bool(abs(branch["x"]**2 - branch["mu"]).max() < 1e-9)
+    True
     """
 
     def __init__(self, diagram: Diagram, index: int, parts: Mapping[str, Any]) -> None:
@@ -156,12 +195,12 @@ class Branch(Sequence[Solution]):
 
     @property
     def complete(self) -> bool:
-        """Whether both sides ended where they should: at a bound, closed, or joined to another branch."""
+        """True if both sides ended as intended: at a bound, closed on itself, or joined to another branch."""
         return all(end is not None and end[2] for end in self._ends)
 
     @property
     def stopped(self) -> bool:
-        """Whether it was interrupted."""
+        """True if the branch was interrupted."""
         return any(end is None or end[0] == "stopped" for end in self._ends)
 
     # Columns.
@@ -171,43 +210,43 @@ class Branch(Sequence[Solution]):
 
     @cached_property
     def position(self) -> Integers:
-        """Place on the branch, shape (points,): 0 at the start, counting up forwards and down backwards."""
+        """Number of each point along the branch, shape (points,): 0 at the start, positive on one side, negative on the other."""
         return integers(self._column("position"))
 
     @cached_property
     def parameters(self) -> Floats:
-        """Every parameter of every point, shape (points, k)."""
+        """All k parameters at each point, shape (points, k), in the units of the model."""
         return floats(self._column("parameters"), self._count, -1) if self._count else np.empty((0, 0))
 
     @cached_property
     def ranges(self) -> Floats:
-        """Smallest and largest value of every state, then of every output, shape (points, n + outputs, 2)."""
+        """Smallest and largest value of every state, then of every output, shape (points, n + outputs, 2), in the units of the model."""
         return floats(self._column("ranges"), self._count, -1, 2) if self._count else np.empty((0, 0, 2))
 
     @cached_property
     def spectrum(self) -> Complexes:
-        """Eigenvalues or Floquet multipliers, shape (points, n); the trivial multiplier first where there is one."""
+        """Eigenvalues (per time unit) or Floquet multipliers, shape (points, n). The trivial multiplier of an unforced cycle comes first."""
         return complexes(self._column("spectrum"), self._count, -1) if self._count else np.empty((0, 0), dtype=complex)
 
     @cached_property
     def unstable(self) -> Integers:
-        """How many eigenvalues or multipliers are unstable, shape (points,)."""
+        """Number of unstable eigenvalues or multipliers at each point, shape (points,)."""
         return integers(self._column("unstable"))
 
     @property
     def stable(self) -> np.ndarray[Any, np.dtype[np.bool_]]:
-        """Whether none is, shape (points,)."""
+        """True at each stable point, shape (points,)."""
         found: np.ndarray[Any, np.dtype[np.bool_]] = self.unstable == 0
         return found
 
     @cached_property
     def period(self) -> Floats:
-        """Periods in the time unit of the model, shape (points,); NaN for equilibria."""
+        """Period at each point, shape (points,), in the time unit of the model; NaN for equilibria."""
         return floats(self._column("period"))
 
     @property
     def columns(self) -> list[str]:
-        """What ``branch[name]`` knows."""
+        """Names of the columns: those that ``branch[name]`` accepts."""
         model = self.diagram.model
         extremes = [f"{name}_{side}" for name in [*model.outputs, *model.states] for side in ("min", "max")]
         turns = [f"{name}_turns" for name, state in model.states.items() if state["period"]]
@@ -215,7 +254,7 @@ class Branch(Sequence[Solution]):
 
     @cached_property
     def _turns(self) -> dict[str, Integers]:
-        """NAME_turns of every state that is an angle: how often it turns over a cycle, shape (points,)."""
+        """Turns of every state that is an angle over a cycle, as NAME_turns, shape (points,)."""
         gain = floats(self._column("gain")).reshape(self._count, -1)
         angles = [(k, name, state["period"]) for k, (name, state) in enumerate(self.diagram.model.states.items()) if state["period"]]
         none = np.zeros(self._count, dtype=np.int64)
@@ -238,7 +277,7 @@ class Branch(Sequence[Solution]):
             return integers(self._column(name))
         if name in (*TRUST, "step"):
             return floats(self._column(name))
-        raise KeyError(f"{name}: one of {', '.join(self.columns)}")
+        raise KeyError(f"{name}: {suggestion(name, self.columns)}")
 
     @overload
     def __getitem__(self, index: int) -> Solution: ...
@@ -261,7 +300,7 @@ class Branch(Sequence[Solution]):
 
     @cached_property
     def special(self) -> SpecialPoints:
-        """The special points, by position."""
+        """Special points in the order of their positions."""
         seen: dict[str, int] = {}
         found = []
         for index, row in enumerate(self.diagram._native.special(self._index)):
@@ -271,7 +310,7 @@ class Branch(Sequence[Solution]):
 
     @property
     def switched(self) -> list[Branch]:
-        """The branches of the diagram that leave this one at its special points."""
+        """Branches of the diagram that leave this one at its special points."""
         return [own for own in self.diagram if own.origin[:2] == ("switch", self.name) and own.held is None]
 
     def switch(
@@ -285,6 +324,7 @@ class Branch(Sequence[Solution]):
         max_points: int = 10_000,
         out: str | os.PathLike[str] | None = None,
         jobs: int | None = None,
+        resume: bool = False,
         progress: bool | Callable[[int, int, str], None] | None = None,
     ) -> Branch:
         """Follows the branch that leaves this one at a Hopf point, branch point or period doubling.
@@ -292,28 +332,39 @@ class Branch(Sequence[Solution]):
         Parameters
         ----------
         point : SpecialPoint
-            Of this branch.
+            Special point of this branch.
         depth : int
-            At how many levels it is switched on, at points of the same kind of the new branch.
+            Number of levels of switching, at points of the same kind on the new branches.
         range : pair, optional
-            Smallest and largest value of the parameter; by default those of this branch.
-        mark, stop, max_points, out, jobs, progress
-            As for `foldline.follow`.
+            Smallest and largest value of the parameter; by default the range of this branch.
+        mark, stop, max_points, out, jobs, resume, progress
+            As for `foldline.follow`. The folder `out` receives this branch as well.
 
         Returns
         -------
         Branch
-            In a diagram with this one.
+            In a diagram together with this branch.
 
         Raises
         ------
+        ArgumentError, InputError
+            If `point` is no special point of this branch, or a value is not allowed.
         NoSolution
-            Where no branch leaves there, or one that is known already; the message says which.
+            If no branch leaves there, or only one that is known already; the message says which.
+
+        Examples
+        --------
+        >>> import foldline
+        >>> model = foldline.model(equations={"x": "mu*x - x^3"}, parameters={"mu": -1.0})
+        >>> trivial = foldline.follow(model.settle([0.0]), "mu", (-1, 1))
+        >>> pair = trivial.switch(trivial.special["branch-point"][0])
+        >>> bool(abs(pair["x"]**2 - pair["mu"]).max() < 1e-6)
+        True
         """
         from ._compute import switched
 
         own = {"range": range, "mark": mark, "stop": stop, "max-points": max_points}
-        return switched(self, point, depth, own, out=out, jobs=jobs, progress=progress)
+        return switched(self, point, depth, own, out=out, jobs=jobs, resume=resume, progress=progress)
 
     def _shown(self, unit: Mapping[str, str] | None) -> Branch:
         return self if not unit else self.diagram._shown(unit).branches[self._index]
@@ -324,48 +375,97 @@ class Branch(Sequence[Solution]):
         x: str | None = None,
         y: str | None = None,
         unit: Mapping[str, str] | None = None,
+        sweeps: Responses | Sequence[Responses] | None = None,
+        strobe: Strobe | None = None,
         **style: Any,
     ) -> list[Any]:
-        """Draws the branch: stable pieces solid, unstable ones dashed, special points as marks.
+        """Draws the branch with matplotlib: stable parts solid, unstable ones dashed, special points as marks.
 
         Parameters
         ----------
         ax : matplotlib axes, optional
+            By default a new figure.
         x, y : str, optional
-            Columns; by default the free parameter, and the largest value of the first output.
+            Columns; by default the free parameter, and the largest value of the first output, or of the first state if there is no output.
         unit : mapping, optional
             Units in which quantities are shown, as for `Diagram.plot`.
+        sweeps : Sweep, Survey or list of them, optional
+            Drawn over the branch. Marks of a sweep point in its direction, filled upwards and hollow downwards; jumps are dotted.
+        strobe : Strobe, optional
+            Stroboscopic points, drawn under the branch. The branch is then drawn as its states at the start of each forcing period, and `y`
+            names a state or output; by default the first state.
         **style
             For the lines, such as ``color="black"``.
 
         Returns
         -------
         list of matplotlib artists
+
+        Raises
+        ------
+        InputError
+            If a quantity or unit is unknown.
         """
         from ._plot import branch
 
-        return branch(self._shown(unit), ax, x, y, style)
+        return branch(self._shown(unit), ax, x, y, style, shown_in(sweeps, unit), strobe)
 
-    def plotly(self, x: str | None = None, y: str | None = None) -> Any:
-        """An interactive figure of this branch; see `Diagram.plotly`."""
+    def plotly(
+        self,
+        x: str | None = None,
+        y: str | None = None,
+        sweeps: Responses | Sequence[Responses] | None = None,
+    ) -> Any:
+        """Draws the branch as an interactive figure.
+
+        Parameters
+        ----------
+        x, y, sweeps
+            As for `plot`.
+
+        Returns
+        -------
+        plotly.graph_objects.Figure
+        """
         from ._plotly import figure
 
-        return figure([self], x, y)
+        return figure([self], x, y, sweeps)
 
     def to_pandas(self, unit: Mapping[str, str] | None = None) -> pandas.DataFrame:
-        """A table with a row for each point and the columns of `foldline table --points`; `unit` as for `plot`."""
+        """Returns a table with a row for each point, with the columns of `foldline table --points`.
+
+        Parameters
+        ----------
+        unit : mapping, optional
+            Units in which quantities are given, as for `plot`; by default those of the model.
+
+        Returns
+        -------
+        pandas.DataFrame
+        """
         from ._tables import branches_frame
 
         return branches_frame([self._shown(unit)])
 
     def to_xarray(self) -> xarray.Dataset:
-        """A data set over the dimensions `point`, `eigenvalue` and `variable`."""
+        """Returns a data set over the dimensions `point`, `eigenvalue` and `variable`.
+
+        Returns
+        -------
+        xarray.Dataset
+        """
         from ._tables import branches_dataset
 
         return branches_dataset([self])
 
     def save(self, folder: str | os.PathLike[str]) -> None:
-        """Writes the diagram of the branch as a run; see `Diagram.save`."""
+        """Writes the diagram of the branch to a run file.
+
+        Parameters
+        ----------
+        folder : path
+            As for `Diagram.save`.
+        """
         self.diagram.save(folder)
 
     def __repr__(self) -> str:
@@ -393,3 +493,10 @@ def branch_text_of(branch: Branch) -> str:
 def native_only(branch: Branch) -> _native.Diagram:
     """A diagram of this branch alone."""
     return branch.diagram._native.only(branch._index, branch.name)
+
+
+def shown_in(sweeps: Any, unit: Mapping[str, str] | None) -> Any:
+    """Surveys and sweeps with some quantities in other units."""
+    from ._overlay import listed
+
+    return [own.diagram._shown(unit).responses[own.name] for own in listed(sweeps)] if unit and sweeps is not None else sweeps

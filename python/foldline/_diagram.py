@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from . import _native
-from ._arrays import floats
-from ._branch import Branch, SpecialPoints
+from ._arguments import suggestion
+from ._branch import Branch, SpecialPoints, shown_in
 from ._errors import NoSolution
 from ._model import Model
+from ._responses import Responses, Survey, Sweep, made
 from ._solution import Solution
 
 if TYPE_CHECKING:
@@ -22,14 +21,25 @@ if TYPE_CHECKING:
 
 
 class Diagram:
-    """What a study has found: branches by name, ``diagram["contact SL"]``, or in the order of the study.
+    """The result of a study: branches by name, ``diagram["contact SL"]``, or in the order of the study.
 
-    A run that was written to a folder is read from there when it is first looked at.
+    A run in a folder is read when it is first looked at.
 
     Attributes
     ----------
     folder : str or None
-        Where the run is written, if it is.
+        Folder of the run, if there is one.
+
+    Examples
+    --------
+    >>> import foldline
+    >>> model = foldline.model(equations={"x": "mu - x^2"}, parameters={"mu": 1.0})
+    >>> branch = foldline.follow(model.settle([1.0]), "mu", (-1, 2))
+    >>> branch.diagram
+    <diagram of model: 1 branches, ...
+      equilibrium over mu: ...
+    >>> [own.name for own in branch.diagram]
+    ['equilibrium over mu']
     """
 
     def __init__(
@@ -48,38 +58,48 @@ class Diagram:
 
     @cached_property
     def model(self) -> Model:
-        """The model of the study."""
+        """Model of the study."""
         return self._model or Model(self._native.study().model())
 
     @property
     def study(self) -> str:
-        """The study, as a study file has it."""
+        """Text of the study, as a study file has it."""
         return self._native.study().text
 
     @cached_property
     def branches(self) -> list[Branch]:
-        """Every branch, in the order of the study."""
+        """All branches, in the order of the study."""
         return [Branch(self, index, parts) for index, parts in enumerate(self._native.branches())]
 
     @cached_property
     def special(self) -> SpecialPoints:
-        """The special points of all branches."""
+        """Special points of all branches."""
         return SpecialPoints([point for branch in self for point in branch.special])
 
     @property
     def notes(self) -> list[tuple[str, str]]:
-        """What each remark is about, and the remark: what was found for a seed, which route a homotopy took."""
+        """Notes of the run as pairs of a name and a sentence: what was found for a seed, which path a homotopy took."""
         return list(self._native.notes)
 
     @property
     def short(self) -> list[str]:
-        """What of the study was not reached, a line each."""
+        """Requests of the study that were not fulfilled, one line each."""
         return self._native.short()
 
     @cached_property
-    def responses(self) -> dict[str, dict[str, Any]]:
-        """What surveys and sweeps saw: for each a table of columns, arrays of shape (responses,)."""
-        return {own["name"]: _response(own, self.model) for own in self._native.responses()}
+    def responses(self) -> dict[str, Survey | Sweep]:
+        """The surveys and sweeps of the study by name: tables of columns, arrays of shape (responses,)."""
+        return {own["name"]: made(self, own) for own in self._native.responses()}
+
+    @property
+    def sweeps(self) -> list[Sweep]:
+        """The sweeps of the study."""
+        return [own for own in self.responses.values() if isinstance(own, Sweep)]
+
+    @property
+    def surveys(self) -> list[Survey]:
+        """The surveys of the study."""
+        return [own for own in self.responses.values() if isinstance(own, Survey)]
 
     def __getitem__(self, key: str | int) -> Branch:
         if isinstance(key, int):
@@ -87,7 +107,7 @@ class Diagram:
         for branch in self.branches:
             if branch.name == key:
                 return branch
-        raise KeyError(f"{key}: one of {', '.join(branch.name for branch in self.branches)}")
+        raise KeyError(f"{key}: {suggestion(str(key), [branch.name for branch in self.branches])}")
 
     def __contains__(self, name: object) -> bool:
         return any(branch.name == name for branch in self.branches)
@@ -99,7 +119,7 @@ class Diagram:
         return len(self.branches)
 
     def _shown(self, unit: Mapping[str, str] | None) -> Diagram:
-        """The same diagram with some quantities in other units, to be shown; nothing starts from it."""
+        """The diagram with some quantities in other units, for display only."""
         return self if not unit else Diagram(self._native.in_units(list(unit.items())))
 
     def plot(
@@ -109,34 +129,49 @@ class Diagram:
         y: str | None = None,
         curves: bool = False,
         unit: Mapping[str, str] | None = None,
+        sweeps: Responses | Sequence[Responses] | None = None,
     ) -> list[Any]:
-        """Draws all branches: stable pieces solid, unstable ones dashed, special points as marks.
+        """Draws all branches with matplotlib: stable parts solid, unstable ones dashed, special points as marks.
 
         Parameters
         ----------
         ax : matplotlib axes, optional
+            By default a new figure.
         x, y : str, optional
-            Columns; by default the free parameter, and the largest value of the first output.
+            Columns; by default the free parameter, and the largest value of the first output, or of the first state if there is no output.
         curves : bool
-            Curves in two parameters, in their plane, instead of the branches.
+            Draw the bifurcation curves in the plane of their two parameters instead of the branches.
         unit : mapping, optional
             Units in which quantities are shown: ``{"Omega": "rpm", "r": "mm"}``; ``"orders:Omega"`` divides a frequency by a speed.
+        sweeps : Sweep, Survey or list of them, optional
+            Drawn over the branches; by default those of the study. An empty list draws none. Marks of a sweep point in its direction,
+            filled upwards and hollow downwards; jumps are dotted. The marks of a survey tell equilibria (squares) from cycles (circles).
 
         Returns
         -------
         list of matplotlib artists
+
+        Raises
+        ------
+        InputError
+            If a quantity or unit is unknown, or there is nothing to draw.
         """
         from ._plot import diagram
 
-        return diagram(self._shown(unit), ax, x, y, curves)
+        return diagram(self._shown(unit), ax, x, y, curves, shown_in(sweeps, unit))
 
-    def plotly(self, x: str | None = None, y: str | None = None) -> Any:
-        """An interactive figure; a point tells its parameters, its period, its multipliers and its error.
+    def plotly(
+        self,
+        x: str | None = None,
+        y: str | None = None,
+        sweeps: Responses | Sequence[Responses] | None = None,
+    ) -> Any:
+        """Draws all branches as an interactive figure. The pointer shows parameters, period, multipliers and error of a point.
 
         Parameters
         ----------
-        x, y : str, optional
-            Columns, as for `plot`.
+        x, y, sweeps
+            As for `plot`.
 
         Returns
         -------
@@ -144,16 +179,33 @@ class Diagram:
         """
         from ._plotly import figure
 
-        return figure([own for own in self if own.held is None] or list(self), x, y)
+        shown = [own for own in self if own.held is None] or list(self)
+        return figure(shown, x, y, sweeps, self)
 
     def to_pandas(self, unit: Mapping[str, str] | None = None) -> pandas.DataFrame:
-        """A table with a row for each point of each branch and the columns of `foldline table --points`; `unit` as for `plot`."""
+        """Returns a table with a row for each point of each branch, with the columns of `foldline table --points`.
+
+        Parameters
+        ----------
+        unit : mapping, optional
+            Units in which quantities are given, as for `plot`; by default those of the model.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Special points are in ``diagram.special.to_pandas()``, surveys and sweeps in ``diagram.responses[name].to_pandas()``.
+        """
         from ._tables import branches_frame
 
         return branches_frame(list(self._shown(unit)))
 
     def to_xarray(self) -> xarray.Dataset:
-        """A data set over the dimensions `point`, `eigenvalue` and `variable`."""
+        """Returns a data set over the dimensions `point`, `eigenvalue` and `variable`.
+
+        Returns
+        -------
+        xarray.Dataset
+        """
         from ._tables import branches_dataset
 
         return branches_dataset(list(self))
@@ -164,7 +216,12 @@ class Diagram:
         Parameters
         ----------
         folder : path
-            Made if it is not there; one that has a run in it already is refused.
+            Folder for the run; it is made if needed.
+
+        Raises
+        ------
+        RunFileError
+            If the folder holds a run already or cannot be written to.
         """
         self._native.save(os.fspath(folder))
 
@@ -180,7 +237,16 @@ class Diagram:
 
 
 class Homotopy(Diagram):
-    """A family brought to other parameter values: the runs on its way, and where it arrived."""
+    """The result of `foldline.homotopy`: a solution carried to new parameter values, and the branches on the way.
+
+    Examples
+    --------
+    >>> import foldline
+    >>> cusp = foldline.model(equations={"x": "h + r*x - x^3"}, parameters={"h": 1.0, "r": 1.0})
+    >>> found = foldline.homotopy(cusp.settle([1.3]), {"h": 0.5}, "r", (-1, 2))
+    >>> found.arrived
+    True
+    """
 
     name: str = "homotopy"
 
@@ -191,37 +257,23 @@ class Homotopy(Diagram):
 
     @property
     def arrived(self) -> bool:
-        """Whether some way got through."""
+        """True if a path reached the target."""
         return self._arrival is not None
 
     @property
     def end(self) -> Solution:
-        """The solution at the goal.
+        """The solution at the target.
 
         Raises
         ------
         NoSolution
-            Where no way got through; the message tells the ways that were tried.
+            If no path reached the target; the message lists the paths that were tried.
         """
         if self._arrival is None:
-            raise NoSolution("\n".join(note for _, note in self.notes) or "the goal was not reached")
+            raise NoSolution("\n".join(note for _, note in self.notes) or "the target was not reached")
         return self._arrival
 
     @property
     def route(self) -> list[str]:
-        """Which way it took, in sentences."""
+        """Path that was taken, in sentences."""
         return [note for about, note in self.notes if about == self.name]
-
-
-def _response(own: dict[str, Any], model: Model) -> dict[str, Any]:
-    numbers = {key: floats(own[key]) for key in ("value", "period", "share", "share_low", "share_high", "settled_after", "error")}
-    count = len(numbers["value"])
-    parameters = floats(own["parameters"]).reshape(count, -1)
-    ranges = floats(own["ranges"]).reshape(count, -1, 2)
-    table: dict[str, Any] = {name: parameters[:, k] for k, name in enumerate(model.parameters)} if count else {}
-    for k, name in enumerate([*model.states, *model.outputs] if count else []):
-        table[f"{name}_min"], table[f"{name}_max"] = ranges[:, k, 0], ranges[:, k, 1]
-    words = {key: np.array(own[key]) for key in ("motion", "multiplicity", "hits")}
-    words["jumped"] = np.array(own["jumped"], dtype=object)
-    ratios = ["" if pair is None else f"{pair[0]}:{pair[1]}" for pair in own["ratio"]]
-    return {**numbers, **words, "ratio": np.array(ratios), **table}

@@ -1,4 +1,4 @@
-"""What can go wrong, with the sentences of the command line."""
+"""Exceptions and warnings, with the messages of the command line."""
 
 from __future__ import annotations
 
@@ -11,16 +11,28 @@ if TYPE_CHECKING:
 
 
 class Error(Exception):
-    """Everything that foldline raises, but for `Interrupted`."""
+    """Base class of all exceptions of foldline except `Interrupted`.
+
+    Examples
+    --------
+    >>> import foldline
+    >>> model = foldline.model(equations={"x": "mu - x^2"}, parameters={"mu": 1.0})
+    >>> try:
+    ...     foldline.follow(model, "mu", (-1, 2))
+    ... except foldline.Error as error:
+    ...     print(error)
+    the start must be a solution, but got a model
+      help: find a first solution: foldline.follow(model.settle(), "mu", (-1, 2))
+    """
 
 
 class InputError(Error, ValueError):
-    """A mistake in a text or an argument: where, what, and what would be right.
+    """A mistake in a text or an argument. The message says where, what, and what would be right.
 
     Attributes
     ----------
     diagnostics : list of dict
-        Of mistakes in texts: file, line, column, message and hint of each.
+        For mistakes in texts: file, line, column, message and hint of each. Empty for mistakes in arguments.
     """
 
     diagnostics: list[dict[str, Any]]
@@ -30,29 +42,33 @@ class InputError(Error, ValueError):
         self.diagnostics = []
 
 
+class ArgumentError(InputError, TypeError):
+    """An argument of the wrong kind, such as a model where a solution is needed. The message shows the right call."""
+
+
 class TraceError(InputError):
-    """The function of a model does something that cannot be compiled."""
+    """The function of a model does something that cannot be compiled. The message shows the line and a remedy."""
 
 
 class NoSolution(Error):
-    """There is nothing to start from, or nothing was found."""
+    """Nothing was found to start from, or a branch did not begin. The message says why."""
 
 
 class RunFileError(Error):
-    """A run file cannot be made, read or continued."""
+    """A run file cannot be made, read or resumed."""
 
 
 class EndedShort(UserWarning):
-    """A branch ended before it got to where it was asked to go."""
+    """Warning that a branch ended before it reached the end of its range."""
 
 
 class Interrupted(KeyboardInterrupt):
-    """Ctrl-C ended a computation; what was computed until then is kept.
+    """Ctrl-C ended a computation. The results so far are kept.
 
     Attributes
     ----------
     partial : Diagram, Branch or Trajectory
-        What there is. Branches that were not finished end as "stopped on request". `foldline.rescued()` returns it too.
+        The results so far. Unfinished branches end as "stopped on request". `foldline.rescued()` returns them too.
     """
 
     def __init__(self, partial: Diagram | Branch | Trajectory) -> None:

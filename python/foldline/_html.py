@@ -1,7 +1,8 @@
-"""How results show themselves: text in terminals, a small diagram with a table in notebooks."""
+"""Display of results: text in terminals, a small diagram with a table in notebooks."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from html import escape
 from typing import TYPE_CHECKING
@@ -9,15 +10,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from . import _native
-from ._branch import Branch, SpecialPoints, branch_text_of
+from ._branch import Branch, SpecialPoint, SpecialPoints, branch_text_of
 from ._plot import quantities
 
 if TYPE_CHECKING:
     from ._diagram import Diagram
     from ._model import Model
+    from ._responses import Responses
     from ._solution import Attractors, Solution
 
-#: Rows of a table that are shown; the rest is counted.
+#: Largest number of rows shown; the rest is counted.
 _MOST = 40
 #: Width and height of the picture.
 _SIZE = (640.0, 360.0)
@@ -37,11 +39,20 @@ def _cells(points: SpecialPoints) -> tuple[list[str], list[list[str]]]:
     forms = any(own.normal_form for own in shown)
     rows = []
     for own in shown:
-        numbers = [own[name] for name in [*varying, *(["period"] if cycles else []), *(f"{n}_max" for n in outputs)]]
+        numbers = [_significant(own, name) for name in [*varying, *(["period"] if cycles else []), *(f"{n}_max" for n in outputs)]]
         row = [own.branch.name, own.kind, *("" if np.isnan(v) else f"{v:.10g}" for v in numbers)]
         row += [f"{own.unstable_before} → {own.unstable_after}", f"{own.error:.1e}"]
         rows.append([*row, *([own.normal_form] if forms else [])])
     return [*names, *(["normal form"] if forms else [])], rows
+
+
+def _significant(own: SpecialPoint, name: str) -> float:
+    """A quantity; of the parameter of the branch without the digits that lie far below its error."""
+    value = own[name]
+    error = own.error * (own.branch.scale + abs(value))
+    if name != own.branch.free or not 0 < error < 1:
+        return value
+    return round(value, 2 - math.floor(math.log10(error))) + 0.0
 
 
 def special_text(points: SpecialPoints) -> str:
@@ -60,13 +71,13 @@ def special_text(points: SpecialPoints) -> str:
 
 
 def branch_text(branch: Branch) -> str:
-    """What `repr` says of a branch."""
+    """Text of a branch for `repr`."""
     table = f"\n{special_text(branch.special)}" if len(branch.special) else ""
     return f"<branch {branch_text_of(branch)}>{table}"
 
 
 def diagram_text(own: Diagram) -> str:
-    """What `repr` says of a diagram."""
+    """Text of a diagram for `repr`."""
     points = sum(len(branch) for branch in own)
     head = f"<diagram of {own.model.name}: {len(own)} branches, {points} points, {len(own.special)} special points>"
     return "\n".join([head, *(f"  {branch_text_of(branch)}" for branch in own)])
@@ -90,7 +101,7 @@ def branches(shown: Sequence[Branch], caption: str) -> str:
 
 
 def diagram(own: Diagram) -> str:
-    """The same for a whole diagram."""
+    """A small picture of a whole diagram and the table of its special points."""
     ordinary = [branch for branch in own if branch.held is None] or list(own)
     lines = "<br>".join(escape(line) for line in diagram_text(own).splitlines()[1 : _MOST + 1])
     special = special_table(own.special)
@@ -126,6 +137,24 @@ def attractors(found: Attractors) -> str:
     rows = "".join(f"<tr><td>{'</td><td>'.join(row)}</td></tr>" for row in cells)
     head = "<tr><th>hits</th><th>share of uniform</th><th>attractor</th></tr>"
     return f"<div><table>{head}{rows}</table><p>{escape(repr(found).splitlines()[-1])}</p></div>"
+
+
+def responses(own: Responses) -> str:
+    """A line about a survey or sweep, and its first rows."""
+    names = ["value", "motion", *(f"{name}_max" for name in [*own.model.states, *own.model.outputs][:6])]
+    names += ["share"] if "share" in own and np.isfinite(own["share"]).any() else ["jumped"]
+    count = len(own.value)
+    rows = [[_cell(own[name][k]) for name in names] for k in range(min(count, _MOST))]
+    head = "".join(f"<th>{escape(own.free if name == 'value' else name)}</th>" for name in names)
+    body = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
+    more = f"<p>and {count - _MOST} more</p>" if count > _MOST else ""
+    return f"<div><p>{escape(repr(own))}</p><table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>{more}</div>"
+
+
+def _cell(value: object) -> str:
+    if isinstance(value, (float, np.floating)):
+        return "" if np.isnan(value) else f"{value:.8g}"
+    return {True: "jump", False: "", None: ""}.get(value, str(value)) if value is None or isinstance(value, bool) else str(value)
 
 
 def model(own: Model) -> str:

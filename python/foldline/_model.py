@@ -1,4 +1,4 @@
-"""Models three ways: a file, strings, a Python function traced once. All become the same text, and the same tape."""
+"""Models from a file, from expressions, or from a Python function that is traced once. All three become the same text and the same tape."""
 
 from __future__ import annotations
 
@@ -12,30 +12,39 @@ from typing import Any, overload
 import numpy as np
 
 from . import _native
-from ._arrays import finite, floats, limits, pairs, processors, raw, tolerable, whole
+from ._arguments import check_parameters, is_branch, is_model, number, suggestion, wrong_kind
+from ._arrays import Floats, finite, floats, limits, pairs, processors, raw, real, tolerable, whole
+from ._errors import ArgumentError, InputError
 from ._simulation import Trajectory, simulated
 from ._solution import Attractor, Attractors, Solution
-from ._trace import Expressions, Parameters, Parts, States
+from ._texts import check_file, is_text
+from ._trace import Expressions, Parameters, Parts, States, refuse_other_signatures
 from ._write import value
 
 Path_ = str | os.PathLike[str]
 
 
 class Model:
-    """A compiled model: parameters, states with their equations, outputs.
+    """A compiled model: parameters, states with their equations, and outputs.
 
     Made by `foldline.model`. A model does not change.
 
     Attributes
     ----------
     name, description : str
-    text : str
-        The model as a model file has it.
+        Name and description of the model.
     states, parameters, outputs : dict
-        Names, and what is known about each: `unit` and `description`, of parameters `value`, of states `scale`, `range` and, of
-        angles, `period` (`None` where the model does not state them).
+        A dictionary for each name with its `unit` and `description`; for parameters also `value`, for states `scale`, `range` and, for
+        angles, `period`. An entry that the model does not state is `None`.
     time : str
-        Unit of time; empty where it is not known.
+        Unit of time; empty if it is not known.
+
+    Examples
+    --------
+    >>> import foldline
+    >>> model = foldline.model(equations={"x": "y", "y": "-k*x"}, parameters={"k": dict(value=2.0, unit="1/s^2")})
+    >>> list(model.states), model.parameters["k"]["value"]
+    (['x', 'y'], 2.0)
     """
 
     def __init__(self, native: _native.Model) -> None:
@@ -54,21 +63,21 @@ class Model:
 
     @property
     def text(self) -> str:
-        """The model as a model file has it."""
+        """The text of the model as a model file."""
         return self._native.text
 
     @property
     def forced(self) -> bool:
-        """Whether the equations depend on time."""
+        """True if the equations depend on time."""
         return self._native.forced
 
     def save(self, path: Path_) -> None:
-        """Writes the model to a model file, for the command line or for later.
+        """Writes the model to a model file.
 
         Parameters
         ----------
         path : path
-            The file; one that is there is replaced.
+            Path of the file. An existing file is replaced.
         """
         Path(path).write_text(self.text, encoding="utf-8")
 
@@ -80,24 +89,32 @@ class Model:
         *,
         outputs: bool = False,
     ) -> np.ndarray[Any, np.dtype[np.float64]]:
-        """The right-hand side at states, or the outputs there.
+        """Evaluates the right-hand side, or the outputs, at one state or several.
 
         Parameters
         ----------
         state : array, shape (n,) or (points, n)
-            In the units of the states.
+            States in their units.
         parameters : mapping, optional
             Values that replace those of the model.
         t : float or array, shape (points,)
-            Time, of a forced model.
+            Time, in the time unit of the model; used if the model is forced.
         outputs : bool
-            The outputs instead of the derivatives.
+            If True, the outputs are returned instead of the time derivatives.
 
         Returns
         -------
         array, shape (n,) or (points, n); with `outputs` (outputs,) or (points, outputs)
+            Derivatives in the units of the states per time unit of the model.
+
+        Examples
+        --------
+        >>> import foldline
+        >>> model = foldline.model(equations={"x": "y", "y": "-x"})
+        >>> model([1.0, 2.0]).tolist()
+        [2.0, -1.0]
         """
-        states = np.asarray(state, dtype=float)
+        states = real("the state", state)
         self._fitting(states)
         rows = states.reshape(-1, len(self.states))
         times = np.broadcast_to(np.asarray(t, dtype=float), (len(rows),)) if self.forced else np.empty(0)
@@ -107,7 +124,7 @@ class Model:
 
     def settle(
         self,
-        start: str | Mapping[str, float] | Sequence[float] = "equilibrium",
+        start: str | Mapping[str, float] | Sequence[float] | Solution | Trajectory | Any = "equilibrium",
         *,
         parameters: Mapping[str, float] | None = None,
         samples: int = 128,
@@ -117,26 +134,33 @@ class Model:
         max_steps: int | None = None,
         max_time: float | None = None,
     ) -> Solution:
-        """A first solution: what `[[seed]]` means in a study.
+        """Finds a first solution, as `[[seed]]` does in a study.
 
         Parameters
         ----------
-        start : str, mapping or sequence
-            ``"equilibrium"``: the equilibrium of smallest norm; ``"cycle"``: the cycle reached most often; ``"2:1"``: the cycle with
-            this spectral ratio of its whirling motion. A value for every state: an equilibrium near it, else what the trajectory
-            from there settles to.
+        start : str, mapping, sequence, Solution, Trajectory or result of SciPy
+            What is sought, or where to begin.
+
+            * ``"equilibrium"``: the equilibrium of smallest norm. ``"cycle"``: the cycle that most initial states reach. ``"2:1"``: the
+              cycle with this spectral ratio of its whirling motion.
+            * A state: ``{"x": 2, "y": 0}`` or ``[2, 0]``, one number for each state in its unit. An equilibrium near it is taken; if there is
+              none, the attractor to which the trajectory from there settles.
+            * A `Trajectory`, or what `scipy.integrate.solve_ivp` returned: begins at its last state. With a forced model, that state is
+              first carried on to the start of the next forcing period.
+            * A `Solution`: begins at its state, with its parameters.
         parameters : mapping, optional
-            Values that replace those of the model.
+            Values that replace those of the model, or of the solution. Those of a simulation elsewhere are not known here and
+            must be given.
         samples : int
-            How many initial states to sample, at most.
+            Largest number of initial states to sample.
         random : int
             Seed of the random numbers; the same seed gives the same sample.
         tolerance : float
-            The one relative tolerance.
+            Relative tolerance, from 1e-10 to 1e-4.
         jobs : int, optional
-            Threads; by default as many as there are processors.
+            Number of threads; by default the number of processors.
         max_steps, max_time : optional
-            Integration steps, and time, after which a trajectory counts as unsettled.
+            Number of integration steps, and time in the unit of the model, after which a trajectory counts as unsettled.
 
         Returns
         -------
@@ -144,17 +168,87 @@ class Model:
 
         Raises
         ------
+        ArgumentError
+            If `start` is none of these; the message shows the right call.
+        InputError
+            If a state or parameter is unknown or missing, or a value is not allowed.
         NoSolution
-            Where nothing of that kind was found; the message says what was.
+            If nothing of that kind was found; the message says what was.
+
+        Examples
+        --------
+        >>> import foldline
+        >>> model = foldline.model(equations={"x": "mu - x^2"}, parameters={"mu": 4.0})
+        >>> float(model.settle({"x": 1.0}).state[0])
+        2.0
+        >>> float(model.settle([1.0], parameters={"mu": 9.0}).state[0])
+        3.0
         """
+        given = self._given(start.parameters if isinstance(start, Solution) else {}, parameters)
+        values = self._values(given)
         attractor = start if isinstance(start, str) else None
-        state = b"" if isinstance(start, str) else raw(self.state(start))
-        values = self._values(parameters)
+        state = b"" if isinstance(start, str) else raw(self._beginning(start, given))
         counts = whole("samples", samples), whole("random", random, 0)
         found = _native.settle(
             self._native, attractor, state, values, *counts, tolerable(tolerance), processors(jobs), limits(max_steps, max_time)
         )
         return Solution(found, self)
+
+    def _beginning(self, start: Any, parameters: Mapping[str, float]) -> Any:
+        """The state at which `settle` begins, shape (n,)."""
+        if isinstance(start, Solution):
+            self._own(start)
+            return start.state
+        if isinstance(start, Trajectory):
+            if start.model.states.keys() != self.states.keys():
+                shown = f"the trajectory has the states {', '.join(start.model.states)}"
+                raise InputError(f"{shown}, the model `{self.name}` has {', '.join(self.states)}\n  help: a trajectory of this model")
+            if not len(start):
+                raise InputError("the trajectory has no times\n  help: one with at least one time")
+            return self._at_phase_zero(start.states[-1], float(start.t[-1]), parameters)
+        if hasattr(start, "t") and hasattr(start, "y"):
+            return self._at_phase_zero(*self._integrated(start), parameters)
+        if is_model(start) or is_branch(start) or callable(start) or start is None:
+            cure = f"model.settle(), model.settle({{{', '.join(f'{name!r}: 0.0' for name in self.states)}}})"
+            raise wrong_kind("a state, or the name of an attractor, is needed", start, f"{cure}, or model.settle(branch[-1])")
+        return self.state(start)
+
+    def _integrated(self, found: Any) -> tuple[Floats, float]:
+        """The last state and time of a result of `scipy.integrate.solve_ivp`."""
+        times, states = finite("the times of the simulation", found.t), finite("the simulation", found.y)
+        if not getattr(found, "success", True):
+            told = getattr(found, "message", "it did not reach the end of its time span")
+            raise InputError(f"the simulation failed: {told}\n  help: one that reaches its end, or a state: model.settle(sol.y[:, -1])")
+        if states.ndim != 2 or states.shape[0] != len(self.states) or not states.shape[1]:
+            shape = f"the simulation has an array y of shape {states.shape}, and the model `{self.name}` has {len(self.states)} states"
+            raise InputError(
+                f"{shape}\n  help: shape ({len(self.states)}, times), as solve_ivp returns it, in the order {', '.join(self.states)}"
+            )
+        return states[:, -1], float(times[-1])
+
+    def _at_phase_zero(self, state: Any, time: float, parameters: Mapping[str, float]) -> Any:
+        """The state that follows at the next start of a forcing period; the state itself where there is no forcing."""
+        if not self.forced:
+            return state
+        period = self._native.time_unit(self._values(parameters))
+        left = -time % period
+        if left <= 1e-9 * period or period - left <= 1e-9 * period:
+            return state
+        track = self.simulate(list(state), (time, time + left), parameters=parameters)
+        if track.ending != "reached":
+            raise InputError(f"the trajectory cannot be carried on to the next forcing period: {track.ending}\n  help: another state")
+        return track.states[-1]
+
+    def _own(self, start: Solution) -> None:
+        """Refuses a solution of a model with other states."""
+        if list(start.model.states) != list(self.states):
+            shown = f"the solution has the states {', '.join(start.model.states)}"
+            raise InputError(f"{shown}, the model `{self.name}` has {', '.join(self.states)}\n  help: a solution of this model")
+        start._check_stored()
+
+    def _given(self, known: Mapping[str, float], given: Any) -> dict[str, float]:
+        check_parameters("parameters", given, self)
+        return {**{name: value for name, value in known.items() if name in self.parameters}, **(given or {})}
 
     def attractors(
         self,
@@ -167,28 +261,40 @@ class Model:
         max_steps: int | None = None,
         max_time: float | None = None,
     ) -> Attractors:
-        """Where sampled initial states settle: stable equilibria and cycles, and how many went to each.
+        """Samples initial states and returns the equilibria and cycles to which they settle.
 
         Parameters
         ----------
         parameters : mapping, optional
             Values that replace those of the model.
         samples : int
-            How many initial states, from the ranges of the states; every fourth of them is drawn towards the origin.
+            Number of initial states, drawn from the ranges of the states; every fourth of them is drawn towards the origin.
         seed : int
             Seed of the random numbers; the same seed gives the same table.
         tolerance : float
-            The one relative tolerance.
+            Relative tolerance, from 1e-10 to 1e-4.
         jobs : int, optional
-            Threads; by default as many as there are processors.
+            Number of threads; by default the number of processors.
         max_steps, max_time : optional
             As for `settle`.
 
         Returns
         -------
         Attractors
-            A sequence of solutions with `hits`, `share`, `ratio` and `example`. `share` is that of the initial states drawn
-            uniformly from the ranges, with a confidence interval; `hits` counts those drawn towards the origin too.
+            A sequence of solutions with `hits`, `share`, `ratio` and `example`. `share` is the basin fraction, estimated from the
+            initial states drawn uniformly from the ranges, with a confidence interval; `hits` also counts those drawn towards the origin.
+
+        Raises
+        ------
+        ArgumentError, InputError
+            As for `settle`.
+
+        Examples
+        --------
+        >>> import foldline
+        >>> model = foldline.model(equations={"x": "x - x^3"}, states={"x": dict(range=(-2, 2))})
+        >>> [round(float(own.state[0]), 6) for own in model.attractors(samples=16)]
+        [-1.0, 1.0]
         """
         counts = whole("samples", samples), whole("seed", seed, 0)
         own_limits = limits(max_steps, max_time)
@@ -207,51 +313,99 @@ class Model:
         parameters: Mapping[str, float] | None = None,
         tolerance: float = 1e-8,
     ) -> Trajectory:
-        """The trajectory from a state.
+        """Integrates the equations from a state.
 
         Parameters
         ----------
         start : Solution, mapping or sequence
-            A value for every state, or a solution, whose parameters are taken too.
+            One number for each state, or a solution, whose parameters are used too.
         span : float or pair
-            How long, or from when to when, in the time unit of the model; it may run backwards.
+            Duration, or first and last time, in the time unit of the model. The last time may be the smaller one.
         times : array, shape (times,), optional
-            When the state is wanted, within the span and growing in its direction; by default at the ends of the steps.
+            Times at which the state is returned, within the span and in its direction; by default the ends of the integration steps.
         parameters : mapping, optional
             Values that replace those of the model, or of the solution.
         tolerance : float
-            Error of a step, relative to the state and to its scale.
+            Error of a step, relative to the state and to its scale, from 1e-14 to 0.1.
 
         Returns
         -------
         Trajectory
             `t`, shape (times,); `states`, shape (times, n); `outputs`, shape (times, outputs); `ending`.
+
+        Raises
+        ------
+        ArgumentError, InputError
+            As for `settle`.
+        Interrupted
+            After Ctrl-C, with the trajectory so far in `partial`.
+
+        Examples
+        --------
+        >>> import foldline
+        >>> model = foldline.model(equations={"x": "-x"})
+        >>> track = model.simulate([1.0], 1.0, times=[0.0, 1.0])
+        >>> track.states.round(6).tolist()
+        [[1.0], [0.367879]]
         """
-        given = {**(start.parameters if isinstance(start, Solution) else {}), **(parameters or {})}
+        given = self._given(start.parameters if isinstance(start, Solution) else {}, parameters)
+        if isinstance(start, Solution):
+            self._own(start)
         state = start.state if isinstance(start, Solution) else self.state(start)
-        ends = (0.0, float(span)) if isinstance(span, (int, float)) else (float(span[0]), float(span[1]))
+        if isinstance(span, (tuple, list, np.ndarray)):
+            if len(span) != 2:
+                raise ArgumentError(f"the span has {len(span)} values\n  help: a duration, or a pair (first, last)")
+            ends = number("the span", span[0]), number("the span", span[1])
+        else:
+            ends = 0.0, number("the span", span)
         return simulated(self, state, ends, times, self._values(given), tolerable(tolerance, 1e-14, 1e-1))
 
     def state(self, values: Mapping[str, float] | Sequence[float]) -> Any:
-        """A state by names or in order, as an array of shape (n,)."""
-        if isinstance(values, Mapping):
-            unknown = [name for name in values if name not in self.states]
-            missing = [name for name in self.states if name not in values]
-            if unknown or missing:
-                what = f"has no state `{unknown[0]}`" if unknown else f"has states without a value: {', '.join(missing)}"
-                from ._errors import InputError
+        """Returns a state, given by names or in order, as an array.
 
-                cure = f"give a number for each of {', '.join(self.states)}"
-                raise InputError(f"the model `{self.name}` {what}\n  help: {cure}")
-            values = [values[name] for name in self.states]
+        Parameters
+        ----------
+        values : mapping or sequence
+            One number for each state, in its unit.
+
+        Returns
+        -------
+        array, shape (n,)
+
+        Raises
+        ------
+        ArgumentError, InputError
+            If a value is no number, or a state is unknown or missing.
+
+        Examples
+        --------
+        >>> import foldline
+        >>> foldline.model(equations={"x": "y", "y": "-x"}).state({"y": 2, "x": 1}).tolist()
+        [1.0, 2.0]
+        """
+        if isinstance(values, Mapping):
+            cure = f"one number for each of {', '.join(self.states)}"
+            for name in values:
+                if name not in self.states:
+                    raise InputError(f"the model `{self.name}` has no state `{name}`\n  help: {suggestion(str(name), self.states)}")
+            missing = [name for name in self.states if name not in values]
+            if missing:
+                what = f"the state {missing[0]} has" if len(missing) == 1 else f"the states {', '.join(missing)} have"
+                raise InputError(f"{what} no value\n  help: {cure}")
+            values = [number(name, values[name]) for name in self.states]
+        if is_branch(values) or is_model(values) or isinstance(values, Solution):
+            cure = {"Branch": "branch[-1].state", "Model": "one number for each state"}.get(type(values).__name__, "solution.state")
+            raise wrong_kind("a state is needed", values, cure)
         array = finite("the state", values)
+        if array.ndim != 1:
+            self._fitting(array)
+            cure = "a single state, such as the last row: states[-1]"
+            raise InputError(f"a single state is needed, and an array of shape {array.shape} was given\n  help: {cure}")
         self._fitting(array)
         return array
 
     def _fitting(self, states: Any) -> None:
         if states.ndim == 0 or states.shape[-1] != len(self.states):
-            from ._errors import InputError
-
             message = f"the model `{self.name}` has {len(self.states)} states, but an array of shape {states.shape} was given"
             raise InputError(f"{message}\n  help: one number for each of {', '.join(self.states)}")
 
@@ -335,52 +489,53 @@ def model(
     name: str | None = None,
     description: str | None = None,
 ) -> Model | Callable[[Callable[..., Any]], Model]:
-    """A model from a file, from expressions, or from a function.
+    """Makes a model from a file, from expressions, or from a function.
 
     ``foldline.model("rotor.toml")`` reads a model file. ``foldline.model(equations={"x": "y", "y": "-x"})`` takes text or
-    expressions of SymPy. ``@foldline.model(states="x y")`` stands above a function of states, parameters and, where the model is
-    forced, time; the function is called once, with symbols, and compiled. There is no Python in the computation whichever way
-    is taken.
+    expressions of SymPy. ``@foldline.model(states="x y")`` above a function of the states, the parameters and, if the model is
+    forced, the time calls the function once, with symbols, and compiles it. In all three cases no Python runs during a computation.
 
     Parameters
     ----------
-    path : path
-        A model file, alone.
+    path : path or str
+        The path of a model file, or the text of one, which has line breaks. No other argument is allowed beside it.
     equations : mapping
-        The right-hand side of d/dt of every state.
+        The time derivative of every state.
     states : str, list or mapping
-        Names, in order: ``"u v du dv"``. A mapping gives `range` (where initial states are sampled), `scale` (characteristic size),
+        Names in order: ``"u v du dv"``. A mapping gives `range` (where initial states are sampled), `scale` (characteristic size),
         `period` (of an angle), `unit` and `description` of each: ``{"u": dict(range=(-5, 5)), "phi": dict(period="2*pi")}``.
     parameters : mapping
-        Names with values, or with tables of `value`, `unit` and `description`.
+        Names with values, or with dictionaries of `value`, `unit` and `description`.
     definitions : mapping
-        Names for intermediate expressions, where equations are text.
+        Names for intermediate expressions, for use in equations that are text.
     outputs : mapping
-        Scalars of the state: names with expressions or functions.
+        Scalar functions of the state: names with expressions or functions.
     frequency, period : str, symbol or function of p
-        Of the forcing, angular, where equations depend on the time `t`.
+        Angular frequency, or period, of the forcing if the equations depend on the time `t`. One of the two.
     whirl : str or pair
         The two states of the complex signal from whose spectrum cycles are named 2:1, 3:1 …
     totals : mapping
-        Sums of states that keep their values, which become parameters: ``{"T": dict(sum="x + 2*y", value=1.0)}``.
+        Conserved sums of states, which become parameters: ``{"T": dict(sum="x + 2*y", value=1.0)}``.
     time : str
         Unit of time; by default it follows from the other units.
     units : str
         ``"labels"`` leaves units unchecked.
     name, description : str
-        By default those of the function.
+        By default the name and the docstring of the function.
 
     Returns
     -------
     Model
-        Or, without a file and equations, what makes a model of the function below it.
+        Without `path` and `equations`, a decorator that makes a `Model` of a function.
 
     Raises
     ------
+    ArgumentError
+        If the decorator stands without brackets, or a function is given in place of a path; the message shows the right call.
     InputError
-        With every mistake, its place and what would be right.
+        With every mistake, its place and what would be right. Also if the file is missing.
     TraceError
-        Where the function does something that cannot be compiled, with its line and the remedy.
+        If the function does something that cannot be compiled, with the line and a remedy; and if it takes ``(t, y)``, as SciPy calls it.
 
     Examples
     --------
@@ -392,9 +547,12 @@ def model(
     <model van_der_pol: states x y; mu=1.5>
     """
     if path is not None:
-        if not isinstance(path, (str, os.PathLike)):
-            raise TypeError('@foldline.model needs brackets with the states: @foldline.model(states="x y")')
-        return _told(Model(_native.Model.read(os.fspath(path))))
+        return _read(path, equations is not None or states is not None)
+    if equations is None and states is None:
+        shown = 'foldline.model("model.toml"), foldline.model(equations={"x": "y", "y": "-x"}), or @foldline.model(states="x y")'
+        raise ArgumentError(f"a model needs a file, equations or states\n  help: {shown}")
+    if equations is not None and not isinstance(equations, Mapping):
+        raise wrong_kind("equations must be a dictionary", equations, 'equations={"x": "y", "y": "-x"}')
     stated = {key: own for key, own in (("time", time), ("units", units)) if own is not None}
     head = "".join(f"{key} = {value(own)}\n" for key, own in stated.items())
     parts = Parts(states, equations, parameters, definitions, outputs, frequency, period, whirl, totals)
@@ -407,6 +565,27 @@ def model(
         return _compiled(head + parts.text(parts.trace(function), own, text), own)
 
     return traced
+
+
+def _read(path: Any, more: bool) -> Model:
+    """The model of a file or text, alone."""
+    if is_model(path):
+        raise wrong_kind("the path of a model file is needed", path, "it is a model already: use it as it is")
+    if not isinstance(path, (str, os.PathLike)):
+        if callable(path):
+            refuse_other_signatures(path)
+            cure = '@foldline.model(states="x y", parameters=dict(a=1.0)) above the function, or foldline.model(states="x y")(function)'
+            what = "a function is given in place of a path" if more else "the decorator needs the names of the states"
+            raise ArgumentError(f"{what}\n  help: {cure}")
+        if isinstance(path, Mapping):
+            raise wrong_kind("the path of a model file is needed", path, 'foldline.model(equations={"x": "y", "y": "-x"})')
+        raise wrong_kind("the path of a model file is needed", path, 'foldline.model("model.toml")')
+    if more:
+        raise ArgumentError("both a path and equations or states are given\n  help: a path alone, or equations alone")
+    if is_text(path):
+        return _compiled(str(path), None)
+    check_file(path, "model")
+    return _told(Model(_native.Model.read(os.fspath(path))))
 
 
 def _compiled(text: str, name: str | None) -> Model:

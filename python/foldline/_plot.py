@@ -1,4 +1,4 @@
-"""Pictures with matplotlib, which is imported only here."""
+"""Pictures of branches, diagrams and solutions with matplotlib."""
 
 from __future__ import annotations
 
@@ -9,39 +9,14 @@ import numpy as np
 
 from . import _native
 from ._arrays import Floats, floats
-from ._errors import InputError
+from ._axes import COLOURS, MARKS, axes_or_new, label, new_figure, variable
+from ._errors import ArgumentError, InputError
+from ._overlay import Seen, listed, overlaid, simulated, stroboscopic
 
 if TYPE_CHECKING:
     from ._branch import Branch, SpecialPoint
     from ._diagram import Diagram
-    from ._model import Model
     from ._solution import Solution
-
-#: Told apart with every common kind of colour vision (Okabe and Ito); the same as in the pictures of the command line.
-COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
-#: Of matplotlib, by the shapes that the command line draws.
-MARKS = {"circle": "o", "square": "s", "diamond": "D", "triangle": "^", "nabla": "v", "cross": "x", "plus": "+", "star": "*", "dot": "."}
-
-
-def axes_or_new(ax: Any) -> Any:
-    """The axes given, or new ones."""
-    if ax is not None:
-        return ax
-    try:
-        from matplotlib import pyplot
-    except ImportError as error:
-        raise ImportError("pictures need matplotlib: pip install matplotlib") from error
-    return pyplot.subplots(layout="constrained")[1]
-
-
-def label(name: str, model: Model) -> str:
-    """An axis label: Greek names as letters, the unit in brackets where there is one."""
-    return _native.label(model._native, name)
-
-
-def _variable(name: str, model: Model) -> str:
-    """The label of a state or output itself, not of its largest value."""
-    return label(f"{name}_max", model).removeprefix("max ")
 
 
 def quantities(branches: Sequence[Branch], x: str | None, y: str | None) -> tuple[str, str]:
@@ -64,7 +39,7 @@ def pieces(branch: Branch, x: str, y: str, scale: tuple[float, float]) -> Iterat
 
 
 def size(branches: Sequence[Branch], x: str, y: str) -> tuple[float, float]:
-    """How large branches are in both directions together."""
+    """Extent of all branches together in both directions."""
     spans = []
     for name in (x, y):
         values = np.concatenate([branch[name] for branch in branches])
@@ -73,12 +48,19 @@ def size(branches: Sequence[Branch], x: str, y: str) -> tuple[float, float]:
     return spans[0], spans[1]
 
 
-def branch(own: Branch, ax: Any, x: str | None, y: str | None, style: dict[str, Any]) -> list[Any]:
-    """Draws one branch."""
+def branch(own: Branch, ax: Any, x: str | None, y: str | None, style: dict[str, Any], seen: Seen, points: Any = None) -> list[Any]:
+    """Draws one branch, and results of simulation on top of it."""
+    given = listed(seen)
+    if points is not None:
+        if given:
+            cure = "draw them in two pictures: sweeps show extremes, stroboscopic points the state at the start of a forcing period"
+            raise ArgumentError(f"both sweeps and stroboscopic points are given\n  help: {cure}")
+        return stroboscopic(own, points, ax, y, style)
     axes = axes_or_new(ax)
     across, up = quantities([own], x, y) if own.held is None else (x or own.held[1], y or own.free)
     artists = _lines(axes, own, across, up, size([own], across, up), {"color": COLOURS[0], "label": own.name, **style})
     artists += _marks(axes, own, across, up, artists[0].get_color() if artists else COLOURS[0], set())
+    artists += overlaid(axes, given, across, up)
     axes.set_xlabel(label(across, own.diagram.model))
     axes.set_ylabel(label(up, own.diagram.model))
     return artists
@@ -109,10 +91,13 @@ def _marks(axes: Any, own: Branch, x: str, y: str, colour: Any, named: set[str])
     return artists
 
 
-def diagram(own: Diagram, ax: Any, x: str | None, y: str | None, curves: bool) -> list[Any]:
-    """Draws all branches of a diagram, a colour for each that was not switched to."""
-    axes = axes_or_new(ax)
+def diagram(own: Diagram, ax: Any, x: str | None, y: str | None, curves: bool, seen: Seen) -> list[Any]:
+    """Draws all branches of a diagram, a colour for each that was not switched to, and its surveys and sweeps on top of them."""
     shown = [branch for branch in own if (branch.held is not None) == curves and len(branch)]
+    given = listed(seen) if seen is not None else [] if curves else list(own.responses.values())
+    if not shown and given:
+        return simulated(axes_or_new(ax), given, x, y)
+    axes = axes_or_new(ax)
     if not shown:
         cure = "there are only two-parameter curves: use curves=True" if len(own) and not curves else "follow a branch first"
         raise InputError(f"there is nothing to draw\n  help: {cure}")
@@ -130,6 +115,7 @@ def diagram(own: Diagram, ax: Any, x: str | None, y: str | None, curves: bool) -
     named: set[str] = set()
     for branch in shown:
         artists += _marks(axes, branch, across, up, COLOURS[roots.index(_root(own, branch.name)) % len(COLOURS)], named)
+    artists += overlaid(axes, [one for one in given if seen is not None or (one.free == across and up in one)], across, up)
     axes.set_xlabel(label(across, own.model))
     axes.set_ylabel(label(up, own.model))
     if len(roots) <= 14:
@@ -154,23 +140,12 @@ def solution(own: Solution, axes: Any) -> dict[str, list[Any]]:
     if own.is_cycle and not own.signed_spectrum(2)[0].size:
         names.remove("spectrum")
     if axes is None:
-        axes_or_new_figure = _figure(len(names))
-        axes = axes_or_new_figure
+        axes = new_figure(len(names))
     panels = list(np.ravel(axes))
     if len(panels) < len(names):
         raise InputError(f"{len(panels)} axes were given for {len(names)} panels\n  help: one for each of {', '.join(names)}")
     draw = {"orbit": _orbit, "series": _series, "spectrum": _spectrum, "multipliers": _multipliers}
     return {name: draw[name](panel, own) for name, panel in zip(names, panels, strict=False)}
-
-
-def _figure(count: int) -> Any:
-    try:
-        from matplotlib import pyplot
-    except ImportError as error:
-        raise ImportError("pictures need matplotlib: pip install matplotlib") from error
-    rows, columns = (2, 2) if count > 3 else (1, count)
-    _, panels = pyplot.subplots(rows, columns, layout="constrained", figsize=(4 * columns, 3.4 * rows))
-    return panels
 
 
 def _orbit(axes: Any, own: Solution) -> list[Any]:
@@ -180,8 +155,8 @@ def _orbit(axes: Any, own: Solution) -> list[Any]:
     track = own.uniform(2048)
     closed = [np.append(track[name], track[name][:1]) for name in pair]
     artists: list[Any] = axes.plot(*closed, color=COLOURS[0])
-    axes.set_xlabel(_variable(pair[0], own.model))
-    axes.set_ylabel(_variable(pair[1], own.model))
+    axes.set_xlabel(variable(pair[0], own.model))
+    axes.set_ylabel(variable(pair[1], own.model))
     if whirl is not None:
         axes.set_aspect("equal", "datalim")
     return artists
@@ -197,7 +172,7 @@ def _series(axes: Any, own: Solution) -> list[Any]:
     if len(names) > 1:
         axes.legend(fontsize="small")
     else:
-        axes.set_ylabel(_variable(names[0], own.model))
+        axes.set_ylabel(variable(names[0], own.model))
     return artists
 
 

@@ -8,13 +8,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import _native
+from ._axes import COLOURS, label
 from ._errors import InputError
-from ._plot import COLOURS, _root, label, pieces, quantities, size
+from ._overlay import INK, Seen, check_columns, listed, named
+from ._plot import _root, pieces, quantities, size
+from ._responses import Sweep
 
 if TYPE_CHECKING:
     from ._branch import Branch
+    from ._diagram import Diagram
+    from ._model import Model
+    from ._responses import Responses
 
-#: Of plotly, by the shapes that the command line draws.
+#: Symbols of plotly for the shapes that the command line draws.
 _SYMBOLS = {
     "circle": "circle",
     "square": "square",
@@ -28,13 +34,16 @@ _SYMBOLS = {
 }
 
 
-def figure(branches: Sequence[Branch], x: str | None, y: str | None) -> Any:
-    """Lines with hover for points, marks for special points."""
+def figure(branches: Sequence[Branch], x: str | None, y: str | None, seen: Seen = None, diagram: Diagram | None = None) -> Any:
+    """Lines with hover for points, marks for special points and for results of simulation."""
     try:
         from plotly import graph_objects
     except ImportError as error:
         raise ImportError("interactive pictures need plotly: pip install plotly") from error
     shown = [branch for branch in branches if len(branch)]
+    given = listed(seen) if seen is not None or diagram is None else list(diagram.responses.values())
+    if not shown and given:
+        return _simulated(graph_objects, given, x, y)
     if not shown:
         raise InputError("there is nothing to draw\n  help: follow a branch first")
     held = shown[0].held
@@ -46,9 +55,78 @@ def figure(branches: Sequence[Branch], x: str | None, y: str | None) -> Any:
         colour = COLOURS[roots.index(_root(own.diagram, own.name)) % len(COLOURS)]
         for trace in (*_lines(graph_objects, own, across, up, scale, colour), *_marks(graph_objects, own, across, up, colour)):
             picture.add_trace(trace)
-    model = shown[0].diagram.model
-    picture.update_layout(xaxis_title=label(across, model), yaxis_title=label(up, model), template="plotly_white", hovermode="closest")
+    drawn = [own for own in given if seen is not None or (own.free == across and up in own)]
+    for trace in _overlaid(graph_objects, drawn, across, up):
+        picture.add_trace(trace)
+    return _laid_out(picture, across, up, shown[0].diagram.model)
+
+
+def _laid_out(picture: Any, x: str, y: str, model: Model) -> Any:
+    picture.update_layout(xaxis_title=label(x, model), yaxis_title=named(y, model), template="plotly_white", hovermode="closest")
     return picture
+
+
+def _simulated(graph_objects: Any, given: Sequence[Responses], x: str | None, y: str | None) -> Any:
+    """Surveys and sweeps without a branch."""
+    first = given[0]
+    across, up = x or first.free, y or f"{next(iter(first.model.outputs), None) or next(iter(first.model.states))}_max"
+    picture = graph_objects.Figure()
+    for trace in _overlaid(graph_objects, [own for own in given if own is first or own.free == across], across, up, joined=True):
+        picture.add_trace(trace)
+    return _laid_out(picture, across, up, first.model)
+
+
+#: Marks that point where a sweep goes, filled upwards and hollow downwards.
+_ARROWS = {"up": ("triangle-right", 6, "→"), "down": ("triangle-left-open", 10, "←")}
+_MOTIONS = {"equilibrium": "square-open", "cycle": "circle-open", "other": "line-ew-open"}
+
+
+def _overlaid(graph_objects: Any, given: Sequence[Responses], x: str, y: str, joined: bool = False) -> list[Any]:
+    """Surveys and sweeps; jumps are dotted, other steps are drawn if `joined`."""
+    traces: list[Any] = []
+    for own in given:
+        check_columns(own, x, y)
+        across, up = own[x], own[y]
+        if not isinstance(own, Sweep):
+            for motion in dict.fromkeys(own.motion.tolist()):
+                places = np.flatnonzero((own.motion == motion) & np.isfinite(up.astype(float)))
+                mark = {"symbol": _MOTIONS.get(motion, "x"), "color": INK, "size": 8, "line": {"width": 1.5}}
+                traces.append(_seen(graph_objects, own, places, across, up, mark, f"{own.name}: {motion}", "markers"))
+            continue
+        jumped = set(own._jumps)
+        for number, (direction, leg) in enumerate(own.legs):
+            symbol, large, arrow = _ARROWS[direction]
+            name = f"{own.name}, {direction} {arrow}"
+            # The value at which it turns back is marked once.
+            mark = {"symbol": symbol, "color": INK, "size": large}
+            traces.append(_seen(graph_objects, own, leg if number == 0 else leg[1:], across, up, mark, name, "markers"))
+            for first, second in zip(leg[:-1].tolist(), leg[1:].tolist(), strict=True):
+                if not joined and second not in jumped:
+                    continue
+                line = {"color": INK, "width": 1, "dash": "dot" if second in jumped else "solid"}
+                ends = {"x": [across[first], across[second]], "y": [up[first], up[second]]}
+                shown = {"mode": "lines", "line": line, "hoverinfo": "skip", "showlegend": False, "legendgroup": name}
+                traces.append(graph_objects.Scatter(**ends, **shown))
+    return traces
+
+
+def _seen(graph_objects: Any, own: Responses, places: Any, across: Any, up: Any, mark: Any, name: str, mode: str) -> Any:
+    texts = [_response_text(own, int(k)) for k in places]
+    told = {"mode": mode, "marker": mark, "text": texts, "hoverinfo": "text", "name": name, "legendgroup": name}
+    return graph_objects.Scatter(x=across[places], y=up[places], **told)
+
+
+def _response_text(own: Responses, k: int) -> str:
+    """A response in words: its values, its motion, its basin fraction or its jump."""
+    values = [f"{name} = {own[name][k]:.8g}" for name in own.model.parameters]
+    ratio = f"{own['ratio'][k]} " if own["ratio"][k] else ""
+    period = "" if np.isnan(own["period"][k]) else f" of period {own['period'][k]:.8g}"
+    told = [own.name, ", ".join(values), f"{ratio}{own.motion[k]}{period}"]
+    if isinstance(own, Sweep):
+        told += ["jumped"] if k in own._jumps else []
+    elif not np.isnan(own["share"][k]):
+        told.append(f"basin fraction {own['share'][k]:.3f} ({own['share_low'][k]:.3f} … {own['share_high'][k]:.3f})")
+    return "<br>".join(told)
 
 
 def _lines(graph_objects: Any, own: Branch, x: str, y: str, scale: tuple[float, float], colour: str) -> list[Any]:
@@ -91,7 +169,11 @@ def _marks(graph_objects: Any, own: Branch, x: str, y: str, colour: str) -> list
     traces = []
     for kind in dict.fromkeys(point.kind for point in own.special):
         chosen = own.special[kind]
-        style = {"symbol": _SYMBOLS[_native.marker(kind)], "color": colour, "size": 9, "line": {"width": 1, "color": "white"}}
+        symbol = _SYMBOLS[_native.marker(kind)]
+        # Hollow; subcritical ones filled. The dot of a mark is filled as well.
+        filled = symbol == "circle-dot"
+        symbols = [symbol if filled or point.criticality == "subcritical" else f"{symbol}-open" for point in chosen]
+        style = {"symbol": symbols, "color": colour, "size": 9, "line": {"width": 1.5}}
         traces.append(
             graph_objects.Scatter(
                 x=[p[x] for p in chosen],

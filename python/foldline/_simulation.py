@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import _native
+from ._arguments import suggestion
 from ._arrays import Floats, finite, floats, raw
 from ._errors import InputError, Interrupted
 
@@ -18,17 +19,29 @@ if TYPE_CHECKING:
 
 
 class Trajectory:
-    """A trajectory.
+    """A trajectory: the result of `Model.simulate`. ``track["x"]`` is a state or output over time, shape (times,).
 
     Attributes
     ----------
+    model : Model
+        Model that was integrated.
     t : array, shape (times,)
-        Times, in the unit of the model.
+        Times, in the time unit of the model.
     states : array, shape (times, n)
+        States in their units.
     outputs : array, shape (times, outputs)
+        Outputs in their units.
     ending : str
-        ``"reached"``, ``"escaped"``, ``"undefined"`` (it leads out of the region in which f is defined),
-        ``"step-too-small"`` or ``"stopped"``.
+        ``"reached"``, ``"escaped"``, ``"undefined"`` (the trajectory left the region in which f is defined),
+        ``"step-too-small"``, ``"step-limit"`` or ``"stopped"``.
+
+    Examples
+    --------
+    >>> import foldline
+    >>> model = foldline.model(equations={"x": "y", "y": "-x"})
+    >>> track = model.simulate({"x": 1, "y": 0}, 6.283185307179586, times=[0.0, 6.283185307179586])
+    >>> track["x"].round(6).tolist(), track.ending
+    ([1.0, 1.0], 'reached')
     """
 
     def __init__(self, model: Model, t: Floats, states: Floats, outputs: Floats, ending: str) -> None:
@@ -39,42 +52,54 @@ class Trajectory:
         self.ending = ending
 
     def __getitem__(self, name: str) -> Floats:
-        """A state or output by name, shape (times,)."""
+        """Returns a state or output over time, shape (times,)."""
         for names, values in ((self.model.states, self.states), (self.model.outputs, self.outputs)):
             if name in names:
                 column: Floats = values[:, list(names).index(name)]
                 return column
-        raise KeyError(f"{name}: one of {', '.join([*self.model.states, *self.model.outputs])}")
+        raise KeyError(f"{name}: {suggestion(str(name), [*self.model.states, *self.model.outputs])}")
 
     def __len__(self) -> int:
         return len(self.t)
 
     def to_pandas(self) -> pandas.DataFrame:
-        """A table with a row for each time."""
+        """Returns a table with a row for each time.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Columns `t`, every state and every output, in the units of the model.
+        """
         from ._tables import trajectory_frame
 
         return trajectory_frame(self)
 
     def to_xarray(self) -> xarray.Dataset:
-        """A data set over the dimension `t`."""
+        """Returns a data set over the dimension `t`.
+
+        Returns
+        -------
+        xarray.Dataset
+        """
         from ._tables import trajectory_dataset
 
         return trajectory_dataset(self)
 
     def plot(self, ax: Any = None, names: list[str] | None = None) -> list[Any]:
-        """Draws states, or outputs, over time.
+        """Draws states or outputs over time with matplotlib.
 
         Parameters
         ----------
         ax : matplotlib axes, optional
+            By default a new figure.
         names : list of str, optional
-            By default every state.
+            Names of states and outputs; by default every state.
 
         Returns
         -------
         list of matplotlib lines
         """
-        from ._plot import axes_or_new
+        from ._axes import axes_or_new
 
         axes = axes_or_new(ax)
         lines = [line for name in names or list(self.model.states) for line in axes.plot(self.t, self[name], label=name)]

@@ -7,7 +7,9 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, overload
 
 from . import _native
-from ._arrays import Complexes, Floats, complexes, floats
+from ._arguments import suggestion
+from ._arrays import Complexes, Floats, complexes, floats, whole
+from ._errors import InputError
 
 if TYPE_CHECKING:
     import pandas
@@ -17,14 +19,25 @@ if TYPE_CHECKING:
 
 
 class Solution:
-    """An equilibrium or a cycle (periodic orbit) at given parameters, with its stability and how far it can be trusted.
+    """An equilibrium or a cycle (periodic orbit) at given parameters, with its stability and error estimates.
 
-    ``solution["Omega"]`` is a parameter, ``solution["r_max"]`` an extreme of a state or output (``solution["r"]`` the largest),
+    ``solution["Omega"]`` is a parameter, ``solution["r_max"]`` an extreme of a state or output (``solution["r"]`` the largest value),
     ``solution["period"]`` the period.
 
     Attributes
     ----------
     model : Model
+        Model that the solution satisfies.
+
+    Examples
+    --------
+    >>> import foldline
+    >>> model = foldline.model(equations={"x": "y", "y": "-x - 0.2*y"})
+    >>> rest = model.settle([0.1, 0.0])
+    >>> rest.family, rest.stable, rest.unstable
+    ('equilibrium', True, 0)
+    >>> rest.spectrum.real.round(6).tolist()
+    [-0.1, -0.1]
     """
 
     def __init__(self, native: _native.Solution, model: Model) -> None:
@@ -38,122 +51,142 @@ class Solution:
 
     @property
     def is_cycle(self) -> bool:
-        """Whether it is a cycle."""
+        """True for a cycle."""
         return self.family == "cycle"
 
     @cached_property
     def parameters(self) -> dict[str, float]:
-        """Every parameter of the model."""
+        """Values of all parameters of the model, in its units."""
         return dict(zip(self.model.parameters, floats(self._native.parameters()).tolist(), strict=True))
 
     @property
     def period(self) -> float | None:
-        """The period of a cycle, in the time unit of the model."""
+        """Period of a cycle, in the time unit of the model; None for an equilibrium."""
         return self._native.period
 
     @property
     def turns(self) -> dict[str, int]:
-        """How often each state that is an angle turns over the cycle, with its sign."""
+        """Number of turns of each state that is an angle over the cycle, with its sign."""
         return dict(self._native.turns)
 
     @property
     def forcing_periods(self) -> int:
-        """How many periods of the forcing a cycle lasts; 0 where there is none."""
+        """Number of forcing periods that a cycle lasts; 0 if the model is not forced."""
         return self._native.forcing_periods
 
     @property
     def unstable(self) -> int:
-        """How many eigenvalues or multipliers are unstable."""
+        """Number of unstable eigenvalues or multipliers."""
         return self._native.unstable
 
     @property
     def stable(self) -> bool:
-        """Whether none is."""
+        """True if no eigenvalue or multiplier is unstable."""
         return self.unstable == 0
 
     @cached_property
     def state(self) -> Floats:
-        """The equilibrium, or the first state of the cycle, shape (n,)."""
+        """The equilibrium, or the first state of the cycle, shape (n,). A forced cycle begins with a forcing period."""
         return floats(self._native.state())
 
     @cached_property
     def spectrum(self) -> Complexes:
-        """Eigenvalues of an equilibrium, Floquet multipliers of a cycle (the trivial one first where it is not forced), shape (n,)."""
+        """Eigenvalues of an equilibrium (per time unit), or Floquet multipliers of a cycle, shape (n,). The trivial multiplier comes first."""
         return complexes(self._native.spectrum())
 
     @cached_property
     def ranges(self) -> dict[str, tuple[float, float]]:
-        """Smallest and largest value of every state and output."""
+        """Smallest and largest value of every state and output, in the units of the model."""
         rows = floats(self._native.ranges()).reshape(-1, 2).tolist()
         names = [*self.model.states, *self.model.outputs]
         return {name: (low, high) for name, (low, high) in zip(names, rows, strict=False)}
 
     @property
     def trust(self) -> dict[str, float]:
-        """How far it can be trusted: `discretisation`, `residual`, `trivial_defect`, `liouville_defect`, `spectrum_error`."""
+        """Error estimates: `discretisation`, `residual`, `trivial_defect`, `liouville_defect`, `spectrum_error`."""
         names = ("discretisation", "residual", "trivial_defect", "liouville_defect", "spectrum_error")
         return dict(zip(names, self._native.trust, strict=True))
 
     @property
     def ratio(self) -> tuple[int, int] | None:
-        """The ratio of the two strongest spectral lines of a whirling cycle, such as (2, 1); None where one outweighs all others."""
+        """Ratio of the two strongest spectral lines of a whirling cycle, such as (2, 1); None if one line outweighs all others."""
         return self._native.ratio
 
     @cached_property
     def mesh(self) -> Floats:
-        """Boundaries of the N mesh intervals of a cycle in normalised time, shape (N + 1,)."""
+        """Boundaries of the N mesh intervals of a cycle, shape (N + 1,), in fractions of the period."""
         return floats(self._native.mesh())
 
     @cached_property
     def profile(self) -> Floats:
-        """A cycle as it was computed, shape (N, m + 1, n): on each interval its left end and its m Gauss points."""
+        """Collocation values of a cycle, shape (N, m + 1, n): on each mesh interval the left end and the m Gauss points."""
         values, degree = self._native.profile()
         return floats(values, -1, degree + 1, len(self.model.states)) if degree else floats(values)
 
     @cached_property
     def t(self) -> Floats:
-        """Times of the nodes of the profile, shape (N (m + 1),), in the unit of the model."""
+        """Times of the nodes of the profile, shape (N (m + 1),), in the time unit of the model."""
         times = floats(self._native.node_times())
         return times * (self.period or 0.0)
 
     @property
     def states(self) -> Floats:
-        """The states at the times `t`, shape (N (m + 1), n); of an equilibrium shape (1, n)."""
+        """States at the times `t`, shape (N (m + 1), n); shape (1, n) for an equilibrium."""
         return self.profile.reshape(-1, len(self.model.states)) if self.is_cycle else self.state[None, :]
 
+    def _check_stored(self) -> None:
+        """Refuses a cycle of which the run file kept the numbers, but not the profile."""
+        if self.is_cycle and not self.state.size:
+            cure = 'a special point or an end of its branch, whose profiles are kept; or run the study with store = "all"'
+            raise InputError(f"the profile of this cycle was not stored\n  help: {cure}")
+
     def uniform(self, count: int = 1024) -> dict[str, Floats]:
-        """A cycle at uniformly spaced times over one period, the end point excluded.
+        """Returns a cycle at uniformly spaced times over one period, the end point excluded.
 
         Parameters
         ----------
         count : int
+            Number of times.
 
         Returns
         -------
         dict of arrays, shape (count,)
-            `t`, every state, every output.
+            `t`, every state and every output, in the units of the model. For an equilibrium the arrays are empty.
+
+        Examples
+        --------
+        >>> import foldline
+        >>> model = foldline.model(equations={"x": "cos(w*t) - x"}, parameters={"w": 1.0}, frequency="w")
+        >>> track = model.settle("cycle").uniform(4)
+        >>> track["x"].round(4).tolist()
+        [0.5, 0.5, -0.5, -0.5]
         """
         import numpy as np
 
+        count = whole("count", count)
+        self._check_stored()
         names = [*self.model.states, *self.model.outputs]
         rows = floats(self._native.uniform(count)).reshape(-1, len(names))
         times = np.arange(len(rows), dtype=np.float64) * np.float64((self.period or 0.0) / count)
         return {"t": times, **{name: rows[:, k] for k, name in enumerate(names)}}
 
     def signed_spectrum(self, count: int = 1024) -> tuple[Floats, Complexes]:
-        """The two-sided spectrum of the whirling motion u + jv: forward whirl at positive frequencies, backward at negative ones.
+        """Returns the two-sided spectrum of the whirling motion u + jv: forward whirl at positive frequencies, backward at negative ones.
 
         Parameters
         ----------
         count : int
-            How many samples, and lines.
+            Number of samples, and of spectral lines.
 
         Returns
         -------
         frequencies : array, shape (count,)
-            In cycles per time unit of the model; empty where the model names no whirl.
+            Frequencies in cycles per time unit of the model; empty if the model names no whirl.
         amplitudes : complex array, shape (count,)
+            Amplitudes in the unit of the states u and v.
         """
+        count = whole("count", count)
+        self._check_stored()
         frequencies, amplitudes = self._native.signed_spectrum(count)
         return floats(frequencies), complexes(amplitudes)
 
@@ -168,34 +201,46 @@ class Solution:
         for ending, side in (("_max", 1), ("_min", 0)):
             if name.endswith(ending) and name[: -len(ending)] in self.ranges:
                 return self.ranges[name[: -len(ending)]][side]
-        raise KeyError(f"{name}: a parameter, `period`, or NAME_max or NAME_min of {', '.join(self.ranges)}")
+        known = [*self.parameters, "period", *(f"{own}_{side}" for own in self.ranges for side in ("max", "min"))]
+        raise KeyError(f"{name}: {suggestion(str(name), known)}")
 
     def to_pandas(self) -> pandas.DataFrame:
-        """A cycle as a table with a row for each node of its profile; an equilibrium as one row."""
+        """Returns a table with a row for each node of the profile of a cycle; an equilibrium has one row.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Columns `t`, every state and every output, in the units of the model.
+        """
         from ._tables import solution_frame
 
         return solution_frame(self)
 
     def to_xarray(self) -> xarray.Dataset:
-        """The same as a data set over the dimension `t`."""
+        """Returns a data set over the dimension `t`.
+
+        Returns
+        -------
+        xarray.Dataset
+        """
         from ._tables import solution_dataset
 
         return solution_dataset(self)
 
     def plot(self, axes: Any = None) -> dict[str, list[Any]]:
-        """Draws a cycle: its orbit, its time series, its signed spectrum, its multipliers on the unit circle.
+        """Draws a cycle with matplotlib: orbit, time series, signed spectrum, and multipliers on the unit circle.
 
-        An equilibrium is drawn as its eigenvalues.
+        For an equilibrium its eigenvalues are drawn.
 
         Parameters
         ----------
         axes : sequence of matplotlib axes, optional
-            One for each panel; by default a figure of its own.
+            One for each panel; by default a new figure.
 
         Returns
         -------
         dict
-            The artists of `orbit`, `series`, `spectrum` and `multipliers`.
+            Artists of the panels `orbit`, `series`, `spectrum` (if the model names a whirl) and `multipliers`.
         """
         from ._plot import solution
 
@@ -219,18 +264,25 @@ class Solution:
 
 
 class Attractor(Solution):
-    """A stable solution, and how often it was reached.
+    """A stable solution that sampled initial states reached.
 
     Attributes
     ----------
     hits : int
-        How many initial states went there. This is not a share of a basin of attraction: every fourth initial state is drawn
-        towards the origin.
+        Number of initial states that settled there. It is no basin fraction, because every fourth initial state is drawn towards
+        the origin.
     share : tuple of three floats
-        The share of the initial states drawn uniformly from the ranges that went there, and its 95 % confidence interval
-        (Wilson).
+        Basin fraction, estimated from the initial states drawn uniformly from the ranges, and its 95 % confidence interval (Wilson).
     example : array, shape (n,)
-        The first of them.
+        The first initial state that settled there.
+
+    Examples
+    --------
+    >>> import foldline
+    >>> model = foldline.model(equations={"x": "x - x^3"}, states={"x": dict(range=(-2, 2))})
+    >>> left, right = model.attractors(samples=16)
+    >>> left.hits + right.hits, left.share[0] + right.share[0]
+    (16, 1.0)
     """
 
     def __init__(
@@ -250,18 +302,31 @@ class Attractor(Solution):
 
     @property
     def ratio(self) -> tuple[int, int] | None:
-        """The ratio of the two strongest spectral lines of a whirling cycle, such as (2, 1); None where one outweighs all others."""
+        """Ratio of the two strongest spectral lines of a whirling cycle, such as (2, 1); None if one line outweighs all others."""
         return self._ratio
 
 
 class Attractors(Sequence[Attractor]):
-    """Where sampled initial states settled.
+    """The attractors that sampled initial states reached: a sequence, the most frequent first.
 
     Attributes
     ----------
-    samples, escaped, stuck, unsettled : int
-        How many initial states there were, and how many ran to infinity or out of the region in which f is defined, could not be
-        followed, or did not settle.
+    samples : int
+        Number of initial states.
+    escaped : int
+        Number of those that ran to infinity or left the region in which f is defined.
+    stuck : int
+        Number of those that could not be followed.
+    unsettled : int
+        Number of those that did not settle.
+
+    Examples
+    --------
+    >>> import foldline
+    >>> model = foldline.model(equations={"x": "x - x^3"}, states={"x": dict(range=(-2, 2))})
+    >>> found = model.attractors(samples=16)
+    >>> len(found), found.samples, found.escaped, found.unsettled
+    (2, 16, 0, 0)
     """
 
     def __init__(self, found: list[Attractor], samples: int, escaped: int, stuck: int, unsettled: int) -> None:
@@ -285,7 +350,13 @@ class Attractors(Sequence[Attractor]):
         return iter(self._found)
 
     def to_pandas(self) -> pandas.DataFrame:
-        """A table with a row for each."""
+        """Returns a table with a row for each attractor.
+
+        Returns
+        -------
+        pandas.DataFrame
+            `family`, `ratio`, `hits`, `share` with its confidence interval, `period`, and the extremes of every state and output.
+        """
         from ._tables import attractors_frame
 
         return attractors_frame(self)

@@ -1,8 +1,7 @@
-"""How a question becomes a study, and how a study is carried out."""
+"""Studies made of single questions, and their execution."""
 
 from __future__ import annotations
 
-import builtins
 import os
 import sys
 import warnings
@@ -10,7 +9,8 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from . import _native, _write
-from ._arrays import whole
+from ._arguments import end
+from ._arrays import tolerable, whole
 from ._branch import Branch, native_only
 from ._diagram import Diagram
 from ._errors import EndedShort, InputError, Interrupted, NoSolution
@@ -21,23 +21,14 @@ from ._solution import Solution
 Path = str | os.PathLike[str]
 Range = Sequence[float | str]
 
-#: What the seed is called at which something starts.
+#: Name of the seed at which something starts.
 START = "the given solution"
-#: What the last computation that was interrupted had found.
+#: Partial result of the last computation that was interrupted.
 RESCUED: list[Any] = []
 
 
-def text_of(study: Path) -> str:
-    try:
-        with builtins.open(study, encoding="utf-8") as file:
-            return file.read()
-    except (OSError, UnicodeDecodeError) as error:
-        cure = "check the spelling of the path; relative paths start at the current folder"
-        raise InputError(f"cannot read the study file {os.fspath(study)}: {error}\n  help: {cure}") from error
-
-
 def _depth() -> int:
-    """How many calls below the user's code the caller is."""
+    """Number of calls between the user's code and the caller."""
     inner = os.path.dirname(os.path.abspath(__file__))
     frame, depth = sys._getframe(1).f_back, 2
     while frame is not None and os.path.dirname(os.path.abspath(frame.f_code.co_filename)) == inner:
@@ -45,28 +36,17 @@ def _depth() -> int:
     return depth
 
 
-def _end(value: float | str) -> float | str:
-    """A number, or a text such as "500 rpm", which the reader of studies understands."""
-    return value if isinstance(value, str) else float(value)
-
-
 def cleaned(item: Mapping[str, Any]) -> dict[str, Any]:
-    """Without what was not said; names with hyphens, as files have them; numbers, where files have numbers."""
+    """Returns an item of a study without the keys that were not given; kinds of special points with hyphens, as in files."""
     kept = {key: value for key, value in item.items() if value is not None}
     for key in ("range", "branch-range"):
         if key in kept:
-            kept[key] = [_end(end) for end in kept[key]]
+            kept[key] = [end("the range", own) for own in kept[key]]
     if "switch" in kept:
         kept["switch"] = {str(kind).replace("_", "-"): depth for kind, depth in kept["switch"].items()}
     if "connect" in kept:
-        kept["connect"] = {name: [_end(end) for end in ends] for name, ends in kept["connect"].items()}
+        kept["connect"] = {name: [end("the range", own) for own in ends] for name, ends in kept["connect"].items()}
     return kept
-
-
-def check_solution(start: Any) -> None:
-    if not isinstance(start, Solution):
-        cure = "model.settle(...), one of model.attractors(), or a point of a branch, such as branch[-1]"
-        raise InputError(f"{start!r} is not a solution to start from\n  help: {cure}")
 
 
 def check_ordinary(branch: Branch, what: str) -> None:
@@ -84,7 +64,7 @@ def study_from(start: Solution, tolerance: float, degree: int, **items: Any) -> 
     """A study with one seed, whose solution is known."""
     state = dict(zip(start.model.states, start.state.tolist(), strict=True))
     seed = {"name": START, "state": state, "parameters": start.parameters}
-    return parsed({"tolerance": float(tolerance), "degree": degree, "seed": [seed], **items}, start.model)
+    return parsed({"tolerance": tolerable(tolerance), "degree": degree, "seed": [seed], **items}, start.model)
 
 
 def going_on(branch: Branch, own: Mapping[str, Any], **items: Any) -> tuple[_native.Study, Solution]:
@@ -138,7 +118,7 @@ def carried_out(
         partial = diagram[of] if of is not None and of in diagram else diagram
         RESCUED[:] = [partial]
         raise Interrupted(partial) from None
-    # That a branch ended short from which another one is switched to is known already.
+    # A branch that is switched from has warned already.
     known_short = f"{earlier.name}:" if earlier is not None else "\0"
     for line in short:
         if not line.startswith(known_short):

@@ -18,7 +18,7 @@ from ._errors import TraceError
 
 Operand = Union["Symbol", float]
 
-#: Functions of NumPy with one operand that have another name in the model language, or the same.
+#: Functions of NumPy with one operand, and their names in the model language.
 _ONE = {
     "sqrt": "sqrt", "exp": "exp", "log": "log", "sin": "sin", "cos": "cos", "tan": "tan", "arcsin": "asin", "arccos": "acos",
     "arctan": "atan", "sinh": "sinh", "cosh": "cosh", "tanh": "tanh", "absolute": "abs", "fabs": "abs", "sign": "sign",
@@ -30,7 +30,7 @@ _OPERATORS = {
 }  # fmt: skip
 COMPARISONS = ("<", "<=", ">", ">=", "==", "!=")
 
-#: Packages whose frames are not the user's.
+#: Folders whose frames are not user code.
 _INNER = tuple(os.path.dirname(os.path.abspath(p)) + os.sep for p in (__file__, np.__file__ or __file__))
 
 
@@ -158,7 +158,7 @@ class Symbol:
     def __invert__(self) -> Symbol:
         return Symbol("-", (1.0, _condition(self)))
 
-    # What needs a number now.
+    # Operations that need a number.
 
     def __bool__(self) -> bool:
         raise refused(
@@ -213,7 +213,7 @@ class Symbol:
             "write it with + - * / **, foldline.where and the elementary functions of numpy",
         )
 
-    # What NumPy calls for the elements of an array of objects; the table below has the functions of one operand.
+    # Methods that NumPy calls for the elements of an array of objects; functions of one operand are found by __getattr__.
 
     def hypot(self, other: Any) -> Any:
         return _function("hypot", (self, other))
@@ -322,9 +322,9 @@ def _function(name: str, inputs: tuple[Any, ...]) -> Any:
 
 
 def where(condition: Any, a: Any, b: Any) -> Any:
-    """`a` where the condition holds, else `b`: what `if(condition, a, b)` is in a model file.
+    """Returns `a` where the condition holds and `b` elsewhere, for use in the function of a model: `if(condition, a, b)` in a model file.
 
-    The derivative is that of the branch that is taken, even where the other one is undefined, so a single point may be left
+    The derivative is that of the alternative taken, even if the other one is undefined there. A singular point can thus be left
     out: ``foldline.where(r > 0, f(r)/r, 0)``.
 
     Parameters
@@ -332,12 +332,21 @@ def where(condition: Any, a: Any, b: Any) -> Any:
     condition : symbol or bool
         A comparison, or comparisons combined with ``&`` and ``|``.
     a, b : symbol or float
-        Both are traced.
+        The two alternatives. Both are traced.
 
     Returns
     -------
     symbol
-        With plain numbers in all places, a number.
+        A number if all arguments are numbers.
+
+    Examples
+    --------
+    >>> import foldline
+    >>> @foldline.model(states="x", parameters=dict(k=4.0))
+    ... def stop(s, p):
+    ...     return foldline.where(s.x > 1, p.k * (1 - s.x), 0.0)
+    >>> stop([[0.5], [1.5]]).ravel().tolist()
+    [0.0, -2.0]
     """
     if not any(isinstance(value, (Symbol, np.ndarray)) for value in (condition, a, b)):
         return a if condition else b

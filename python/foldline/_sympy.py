@@ -96,7 +96,9 @@ def _piecewise(node: Any, done: dict[Any, Operand]) -> Operand:
     pairs = [(done[pair.args[0]], done[pair.args[1]]) for pair in node.args]
     value, condition = pairs.pop()
     if isinstance(condition, Symbol) or condition != 1.0:
-        raise refused(f"the SymPy expression `{node}` is undefined where none of its conditions holds", "end the Piecewise with a pair (value, True)")
+        raise refused(
+            f"the SymPy expression `{node}` is undefined where none of its conditions holds", "end the Piecewise with a pair (value, True)"
+        )
     for own, when in reversed(pairs):
         value = Symbol("if", (when, own, value))
     return value

@@ -12,8 +12,10 @@ if TYPE_CHECKING:
     import xarray
 
     from ._branch import Branch, SpecialPoints
+    from ._responses import Responses
     from ._simulation import Trajectory
     from ._solution import Attractors, Solution
+    from ._strobe import Strobe
 
 
 def _pandas() -> Any:
@@ -137,6 +139,23 @@ def trajectory_dataset(trajectory: Trajectory) -> xarray.Dataset:
     data = {name: ("t", trajectory[name], _about(trajectory.model, name)) for name in names}
     found: xarray.Dataset = _xarray().Dataset(data, {"t": trajectory.t}, {"ending": trajectory.ending})
     return found
+
+
+def responses_frame(found: Responses, left_out: Sequence[str]) -> pandas.DataFrame:
+    """A row for each response."""
+    first = [name for name in ("value", "motion", "ratio", "multiplicity", "period") if name in found]
+    rest = [name for name in found if name not in first and name not in left_out]
+    frame: pandas.DataFrame = _pandas().DataFrame({name: found[name] for name in [*first, *rest]})
+    return frame
+
+
+def strobe_frame(found: Strobe) -> pandas.DataFrame:
+    """A row for each stroboscopic point."""
+    count, periods = found.states.shape[:2]
+    names = [*found.model.states, *found.model.outputs]
+    first = {found.free: np.repeat(found.values, periods), "period_number": np.tile(np.arange(1, periods + 1), count)}
+    frame: pandas.DataFrame = _pandas().DataFrame({**first, **{name: found[name].ravel() for name in names}})
+    return frame
 
 
 def attractors_frame(found: Attractors) -> pandas.DataFrame:

@@ -1,4 +1,4 @@
-"""From a function, or from expressions, to the text of a model file."""
+"""Text of a model file from a function or from expressions."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ class Symbols(Sequence[Any]):
 
 
 class Parts:
-    """What a model is made of, on its way to text."""
+    """Parts of a model, and their text."""
 
     def __init__(
         self,
@@ -86,6 +86,7 @@ class Parts:
 
     def trace(self, function: Callable[..., Any]) -> dict[str, Any]:
         """The equations that a function returns."""
+        refuse_other_signatures(function, list(self.states))
         found = _called(function, self.arguments)
         place = _defined(function)
         if isinstance(found, Mapping):
@@ -119,7 +120,7 @@ class Parts:
         for state, about in self.states.items():
             equation = {"equation": own_equations[state]} if state in own_equations else {}
             lines += _table(f"states.{_write.key(state)}", {**equation, **about})
-        # The equations of states that there are not: the reader says so.
+        # Equations of unknown states: the reader reports them.
         extra = {state: text for state, text in own_equations.items() if state not in self.states}
         lines += _table("equations", extra)
         lines += _table("totals", self.totals)
@@ -143,8 +144,7 @@ def _table(name: str, entries: Mapping[str, Any]) -> list[str]:
 
 
 def _positional(function: Callable[..., Any]) -> list[inspect.Parameter]:
-    kinds = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
-    return [own for own in inspect.signature(function).parameters.values() if own.kind in kinds and own.default is own.empty]
+    return [own for own in inspect.signature(function).parameters.values() if own.kind in _IN_ORDER and own.default is own.empty]
 
 
 def _defined(function: Callable[..., Any]) -> tuple[str, int] | None:
@@ -152,8 +152,40 @@ def _defined(function: Callable[..., Any]) -> tuple[str, int] | None:
     return (code.co_filename, code.co_firstlineno) if code else None
 
 
+#: Names of the time in functions written for SciPy.
+_TIME = ("t", "time", "_t")
+
+
+def refuse_other_signatures(function: Callable[..., Any], states: Sequence[str] = (), own: str = "") -> None:
+    """Refuses a right-hand side written for SciPy, f(t, y) or f(y, t), and shows how it becomes a model."""
+    try:
+        names = [parameter.name for parameter in inspect.signature(function).parameters.values() if parameter.kind in _IN_ORDER]
+    except (TypeError, ValueError):
+        return
+    if len(names) < 2 or (names[0] in _TIME) == (names[1] in _TIME):
+        return
+    first = names[0] in _TIME
+    caller = "scipy.integrate.solve_ivp" if first else "scipy.integrate.odeint"
+    name = own or getattr(function, "__name__", "f")
+    name = "f" if name == "<lambda>" else name
+    more = names[2:]
+    given = f", parameters=dict({', '.join(f'{extra}=1.0' for extra in more)})" if more else ""
+    passed = ", ".join([*(("0.0", "s") if first else ("s", "0.0")), *(f"p.{extra}" for extra in more)])
+    listed = " ".join(states) or "x y"
+    raise refused(
+        f"the function takes ({', '.join(names)}), as {caller} calls it; a model takes the states, the parameters and, if it is forced, "
+        "the time",
+        f"write `def {name}(s, p):`, or `def {name}(s, p, t):` with frequency=... if the equations depend on time; or wrap the function as "
+        f'it is: foldline.model(states="{listed}"{given})(lambda s, p: {name}({passed}))',
+        _defined(function),
+    )
+
+
+_IN_ORDER = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
+
+
 def _called(function: Callable[..., Any], arguments: Sequence[Any]) -> Any:
-    """What a function returns for symbols: for as many of them as it takes."""
+    """Calls a function with as many symbols as it takes, and returns its result."""
     count = len(_positional(function))
     if not 1 <= count <= len(arguments):
         cure = "write `def f(s, p):`, or `def f(s, p, t):` for a forced model: states, parameters, time"

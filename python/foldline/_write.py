@@ -152,7 +152,7 @@ def value(own: Any) -> str:
     if isinstance(own, (int, np.integer)):
         return str(int(own))
     if isinstance(own, (float, np.floating)):
-        # Infinities and what is not a number are words of TOML too; that they are wrong there is said by the reader.
+        # Infinities and NaN are words of TOML too; the reader reports them.
         return repr(float(own))
     if isinstance(own, str):
         return json.dumps(own, ensure_ascii=False)

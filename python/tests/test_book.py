@@ -1,14 +1,11 @@
 """What the README and the book show in Python runs as it stands there, and prints what stands below it."""
 
-import doctest
 import os
 import re
 import runpy
 
 import pytest
 from matplotlib import pyplot
-
-import foldline
 
 from conftest import ROOT
 
@@ -46,10 +43,3 @@ def test_examples_run_and_end_in_a_picture(path, tmp_path, monkeypatch, capsys):
         if kept:
             figure.savefig(os.path.join(kept, f"{os.path.basename(path)}-{number}.png"), dpi=110)
     pyplot.close("all")
-
-
-@pytest.mark.parametrize("module", [foldline, foldline._model])
-def test_examples_in_docstrings(module):
-    found = doctest.testmod(module)
-    assert found.attempted > 0
-    assert found.failed == 0

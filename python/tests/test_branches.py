@@ -102,6 +102,29 @@ def test_a_run_in_a_folder_is_the_run_in_memory(brusselator, tmp_path):
     assert (switched["period"] == foldline.open(tmp_path / "switched")[switched.name]["period"]).all()
 
 
+def test_a_cycle_without_its_profile_is_refused_as_a_start(brusselator, tmp_path):
+    """A run may keep the profiles of special points and ends alone; the numbers of all others are there."""
+    study = {
+        "store": "special",
+        "seed": [{"name": "rest", "attractor": "equilibrium"}],
+        "branch": [{"name": "steady", "from": "rest", "free": "B", "range": [0.5, 4], "switch": {"hopf": 1}}],
+    }
+    cycles = foldline.run(study, brusselator, out=tmp_path / "run")["steady/hopf-1"]
+    light = cycles[len(cycles) // 2]
+    assert light.is_cycle and light.period > 0
+    for use in (
+        lambda: foldline.follow(light, "A", (0.8, 1.2)),
+        lambda: foldline.sweep(light, "A", (0.8, 1.2)),
+        lambda: brusselator.settle(light),
+        lambda: brusselator.simulate(light, 1.0),
+        light.uniform,
+        light.plot,
+    ):
+        with pytest.raises(foldline.InputError, match="the profile of this cycle was not stored"):
+            use()
+    assert foldline.follow(cycles[-1], "A", (0.9, 1.1)).complete
+
+
 def test_exploring_finds_the_equilibrium_and_the_cycles(brusselator):
     diagram = foldline.explore(brusselator, "B", (0.5, 4), values=3, samples=8)
     assert [own.family for own in diagram] == ["equilibrium", "cycle"]

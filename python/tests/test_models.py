@@ -188,11 +188,11 @@ def test_wrong_arguments_are_answered_with_the_cure(brusselator):
     for span, times in ((float("nan"), None), (1.0, [0.5, 2.0]), (1.0, [0.5, 0.2]), (1.0, [float("inf")])):
         with pytest.raises(foldline.InputError, match="help: "):
             brusselator.simulate([1.0, 1.0], span, times=times)
-    with pytest.raises(foldline.InputError, match="cannot be read"):
+    with pytest.raises(foldline.InputError, match="cannot read the study file"):
         foldline.run("nowhere.toml", brusselator)
     with pytest.raises(foldline.InputError, match="no folder is given"):
         foldline.run({"survey": [{"name": "s", "free": "B", "values": [1]}]}, brusselator, resume=True)
-    with pytest.raises(foldline.InputError, match="is not a solution to start from"):
+    with pytest.raises(foldline.InputError, match="the start must be a solution"):
         foldline.follow(brusselator, "B", (0.5, 4))
 
 
@@ -217,3 +217,60 @@ def test_simulation_ends_where_the_solution_is_known():
     assert np.abs(back.states[-1] - [1, 0]).max() < 1e-7
     assert list(track.to_pandas().columns) == ["t", "x", "y"]
     assert track.to_xarray()["x"].dims == ("t",)
+
+
+@pytest.fixture(scope="module")
+def duffing():
+    @foldline.model(states="x v", parameters=dict(zeta=0.1, A=0.3, omega=1.2), frequency="omega")
+    def duffing(s, p, t):
+        return s.v, p.A * np.cos(p.omega * t) - 2 * p.zeta * s.v - s.x - s.x**3
+
+    return duffing
+
+
+def test_a_model_settles_from_a_state_in_any_form(brusselator):
+    at = {"B": 3.0}
+    named = brusselator.settle({"y": 0, "x": 2}, parameters=at)
+    for form in ([2, 0], (2.0, 0.0), np.array([2, 0])):
+        assert brusselator.settle(form, parameters=at).period == named.period
+    track = brusselator.simulate({"x": 2, "y": 0}, 40, parameters=at)
+    assert brusselator.settle(track, parameters=at).period == pytest.approx(named.period, rel=1e-6)
+    # From a solution its parameters are taken, unless others are given.
+    assert brusselator.settle(named).period == pytest.approx(named.period, rel=1e-6)
+    other = brusselator.settle(named, parameters={"B": 3.1})
+    assert other["B"] == 3.1
+    assert other.period > named.period
+
+
+def test_a_simulation_of_scipy_settles(brusselator):
+    integrate = pytest.importorskip("scipy.integrate")
+    at = {"B": 3.0}
+    sol = integrate.solve_ivp(lambda t, y: brusselator(y, at), (0, 40), [2.0, 0.0], rtol=1e-8, atol=1e-8)
+    cycle = brusselator.settle(sol, parameters=at)
+    assert cycle.is_cycle
+    assert cycle.period == pytest.approx(brusselator.settle([2, 0], parameters=at).period, rel=1e-6)
+    lorenz = foldline.model(equations={"x": "y", "y": "-x", "z": "-z"})
+    with pytest.raises(foldline.InputError, match=r"an array y of shape \(2, .*has 3 states"):
+        lorenz.settle(sol)
+    failed = integrate.solve_ivp(lambda t, y: y**2, (0, 2), [1.0, 1.0])
+    assert not failed.success
+    with pytest.raises(foldline.InputError, match="the simulation failed"):
+        brusselator.settle(failed)
+
+
+def test_a_forced_simulation_is_carried_on_to_the_start_of_a_period(duffing):
+    """At omega = 1.5 two cycles attract: a state at the wrong phase may lead to the other one."""
+    integrate = pytest.importorskip("scipy.integrate")
+    at = {"omega": 1.5, "A": 0.3, "zeta": 0.05}
+    period = 2 * np.pi / 1.5
+    large, small = (duffing.settle(state, parameters=at) for state in ([1.4, 0.0], [-0.2, 0.0]))
+    assert large["x_max"] > 2 * small["x_max"]
+    assert duffing._beginning([1.0, 0.0], at).tolist() == [1.0, 0.0]
+    for cycle in (large, small):
+        for share in (0.25, 0.5, 0.75):
+            end = (3 + share) * period
+            sol = integrate.solve_ivp(lambda t, y: duffing(y, at, t), (0, end), cycle.state, rtol=1e-10, atol=1e-10)
+            assert np.abs(duffing._beginning(sol, at) - cycle.state).max() < 1e-6
+            assert duffing.settle(sol, parameters=at)["x_max"] == pytest.approx(cycle["x_max"], rel=1e-6)
+            track = duffing.simulate(cycle, end, tolerance=1e-10)
+            assert np.abs(duffing._beginning(track, at) - cycle.state).max() < 1e-6

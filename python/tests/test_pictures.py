@@ -91,6 +91,13 @@ def test_an_interactive_figure_tells_everything_on_hover(cycles):
     assert cycles.plotly().data
 
 
+def test_special_points_are_hollow_and_marks_are_dots(brusselator):
+    pytest.importorskip("plotly")
+    branch = foldline.follow(brusselator.settle(), "B", (0.5, 4), mark={"B": 1.0})
+    symbols = {trace.name: list(trace.marker.symbol) for trace in branch.plotly().data if trace.name in ("hopf", "mark")}
+    assert symbols == {"hopf": ["diamond-open"], "mark": ["circle-dot"]}
+
+
 def test_trajectories_are_drawn(brusselator):
     track = brusselator.simulate([1.0, 1.0], 5)
     assert len(track.plot()) == 2

@@ -5,6 +5,7 @@ use crate::failure;
 use crate::saving::save;
 use crate::solution::Solution;
 use crate::study::Study;
+use foldline::contract::VectorField;
 use foldline::converted::Conversion;
 use foldline::diagram::{self, Branch, Ending, Origin, Point, Share};
 use foldline_store::order::{leg, names, ordered};
@@ -132,9 +133,13 @@ impl Diagram {
 
     /// What surveys and sweeps saw: one table each.
     fn responses<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
-        self.diagram.responses.iter().map(|set| responses(py, set)).collect()
+        let variables = self.study.model.dim() + self.study.model.output_count();
+        self.diagram.responses.iter().map(|set| responses(py, set, variables)).collect()
     }
 }
+
+/// Change of a response, in medians, that counts as a jump in runs of old versions, which did not compare motions.
+const STEEP: f64 = 10.0;
 
 type SpecialRow = (&'static str, usize, usize, f64, (Vec<f64>, Vec<f64>), Option<&'static str>, String);
 
@@ -211,7 +216,8 @@ fn column<'py>(
     }
 }
 
-fn responses<'py>(py: Python<'py>, set: &diagram::Responses) -> PyResult<Bound<'py, PyDict>> {
+/// The columns of a survey or sweep of a model with so many states and outputs, `variables`.
+fn responses<'py>(py: Python<'py>, set: &diagram::Responses, variables: usize) -> PyResult<Bound<'py, PyDict>> {
     let (parts, all) = (PyDict::new(py), &set.responses);
     let number = |of: fn(&diagram::Response) -> f64| numbers(py, all.iter().map(of));
     parts.set_item("name", &set.name)?;
@@ -230,11 +236,16 @@ fn responses<'py>(py: Python<'py>, set: &diagram::Responses) -> PyResult<Bound<'
     parts.set_item("share_low", share(|share| share.interval()[0])?)?;
     parts.set_item("share_high", share(|share| share.interval()[1])?)?;
     parts.set_item("jumped", all.iter().map(|r| r.jumped).collect::<Vec<_>>())?;
+    let swept = set.search == diagram::Search::Sweep;
+    parts.set_item("jumps", if swept { set.jumps(STEEP) } else { Vec::new() })?;
     let width = all.first().map_or(0, |r| r.parameters.len());
     let parameters = all.iter().flat_map(|r| r.parameters.iter().copied());
     parts.set_item("parameters", counted(py, all.len() * width, parameters)?)?;
-    let width = all.first().map_or(0, |r| 2 * r.ranges.len());
-    let ranges = all.iter().flat_map(|r| r.ranges.as_flattened().iter().copied());
-    parts.set_item("ranges", counted(py, all.len() * width, ranges)?)?;
+    // Motions that escaped have no ranges.
+    let row = |r: &diagram::Response| {
+        (0..variables).map(|k| r.ranges.get(k).copied().unwrap_or([f64::NAN; 2])).collect::<Vec<_>>()
+    };
+    let ranges = all.iter().flat_map(row).flatten();
+    parts.set_item("ranges", counted(py, 2 * all.len() * variables, ranges)?)?;
     Ok(parts)
 }

@@ -33,7 +33,7 @@ mod _native {
     #[pymodule_export]
     use crate::diagram::Diagram;
     #[pymodule_export]
-    use crate::model::Model;
+    use crate::model::{Model, suggested};
     #[pymodule_export]
     use crate::pictures::{label, marker, pieces, svg};
     #[pymodule_export]

@@ -149,6 +149,13 @@ impl Model {
     }
 }
 
+/// The known name nearest to a word, or a list of the names that there are, in words.
+#[pyfunction]
+#[pyo3(name = "suggest")]
+pub fn suggested(word: &str, known: Vec<String>) -> String {
+    suggest(word, &known.iter().map(String::as_str).collect::<Vec<_>>())
+}
+
 /// The outputs at states `[lanes][n]`, with times in periods of the forcing: `[lanes][outputs]`.
 pub fn outputs_at(model: &foldline::model::Model, states: &[f64], parameters: &[f64], times: &[f64]) -> Vec<f64> {
     batched(model.dim(), model.output_count(), states, parameters, times, |at, out| model.outputs(at, out))

@@ -3,9 +3,9 @@
 use crate::failure;
 use crate::model::Model;
 use foldline_store::order::leg;
-use foldline_store::study_file::{self, parse_study, read_study};
+use foldline_store::study_file::{self, parse_study, parse_study_in, read_study};
 use pyo3::prelude::*;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// A study, and the model that it is about.
@@ -20,6 +20,13 @@ impl Study {
     #[staticmethod]
     fn parse(py: Python, text: &str, file: &str, model: &Model) -> PyResult<Study> {
         let study = py.detach(|| parse_study(text, file, &model.text, &model.file));
+        study.map(|study| Study { study: Arc::new(study) }).map_err(|found| failure::of_text(py, &found))
+    }
+
+    /// Reads a text and the model that it names by a path relative to the current folder; `file` is its name in messages.
+    #[staticmethod]
+    fn parse_text(py: Python, text: &str, file: &str) -> PyResult<Study> {
+        let study = py.detach(|| parse_study_in(text, file, Path::new("")));
         study.map(|study| Study { study: Arc::new(study) }).map_err(|found| failure::of_text(py, &found))
     }
 

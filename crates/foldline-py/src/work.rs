@@ -9,7 +9,7 @@ use crate::study::Study;
 use foldline::contract::{Event, Observer, Verdict};
 use foldline::diagram::{self, Branch, Point, Shown};
 use foldline::explore;
-use foldline_store::run_file::{Recorder, RunFileError};
+use foldline_store::run_file::{Recorder, RunFileError, path_in};
 use foldline_store::{short, study_file};
 use pyo3::prelude::*;
 use std::collections::HashMap;
@@ -83,7 +83,8 @@ fn recorded(
     known: Option<&diagram::Diagram>,
     resume: bool,
 ) -> Result<(Recorder, diagram::Diagram), RunFileError> {
-    if resume {
+    // A run that was to be resumed but had not begun begins with what is known.
+    if resume && (known.is_none() || path_in(folder).exists()) {
         return Recorder::resume(folder, study);
     }
     match known {

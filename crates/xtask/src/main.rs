@@ -1,6 +1,7 @@
 //! Development tasks: what continuous integration runs, and nothing else. `cargo xtask` lists them.
 
 mod environment;
+mod gallery;
 mod invariants;
 mod kill;
 mod links;
@@ -8,6 +9,7 @@ mod phrases;
 mod python;
 mod readers;
 mod release;
+mod site;
 mod spelling;
 mod tree;
 
@@ -34,7 +36,9 @@ const USAGE: &str = "cargo xtask TASK
               stated (docs/book/trust.md); with --rescaled the same in units of their own instead
   outside     problems of others with right values from elsewhere, each study in a process with a limit on its time; --quick, --only
               TEXT, and --write, which renews crates/foldline-campaign/outside/results.txt and the table in docs/book/trust.md
-  docs        the documentation of the source, without warnings";
+  docs        the documentation of the source, without warnings
+  site        the documentation site in target/site, without warnings; with what `docs` has made, if it has run
+  gallery     every example of docs/gallery again; renews tables, pictures and run times";
 
 fn main() -> ExitCode {
     let task = std::env::args().nth(1).unwrap_or_default();
@@ -57,6 +61,8 @@ fn main() -> ExitCode {
         "campaign" => campaign(&std::env::args().skip(2).collect::<Vec<String>>()),
         "outside" => outside(&std::env::args().skip(2).collect::<Vec<String>>()),
         "docs" => docs(),
+        "site" => site::build(),
+        "gallery" => gallery::renew(),
         _ => {
             eprintln!("{USAGE}");
             false

@@ -28,6 +28,8 @@ pub fn test() -> bool {
         && environment.runs("ruff", ["format", "--quiet", "--check", "python"].map(OsStr::new))
         && environment.runs("ruff", ["check", "--quiet", "python"].map(OsStr::new))
         && environment.runs("mypy", ["--no-error-summary", "python/foldline"].map(OsStr::new))
+        // In a wheel of its own, but it needs Node.js; where that is missing its wheel fetches it.
+        && environment.runs("pyright", ["--level", "error"].map(OsStr::new))
         && environment.runs("pytest", ["--quiet", "python/tests"].map(OsStr::new))
 }
 

@@ -228,9 +228,10 @@ pub(super) fn switching(walk: &mut Walk, value: &Value) -> Switching {
                     (None, Some(_)) => {
                         (format!("no branch of equilibria or cycles starts at a {name} point"), suggest(name, &names))
                     }
-                    (None, None) => {
-                        (format!("\"{name}\" is not a kind of special point at which branches can be switched"), suggest(name, &names))
-                    }
+                    (None, None) => (
+                        format!("\"{name}\" is not a kind of special point at which branches can be switched"),
+                        suggest(name, &names),
+                    ),
                 };
                 walk.report(key.span(), message, hint);
             }

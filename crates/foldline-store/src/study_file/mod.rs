@@ -81,8 +81,12 @@ const ROOT_KEYS: [&str; 17] = [
 pub fn read_study(path: &Path) -> Result<Study, Vec<Diagnostic>> {
     let file = path.display().to_string();
     let text = read_text(path).map_err(|error| vec![unreadable(&file, "the study file", &error)])?;
-    let folder = path.parent().unwrap_or(Path::new("")).to_path_buf();
-    parse(&text, &file, |walk, root| {
+    parse_study_in(&text, &file, path.parent().unwrap_or(Path::new("")))
+}
+
+/// Reads a study text and the model that it names by a path relative to `folder`. Every mistake found is returned.
+pub fn parse_study_in(text: &str, file: &str, folder: &Path) -> Result<Study, Vec<Diagnostic>> {
+    parse(text, file, |walk, root| {
         let value = model_key(walk, root)?;
         let named = walk.string(value, "`model`")?;
         let model_path = simplified(&folder.join(named));

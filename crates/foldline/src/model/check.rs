@@ -47,6 +47,9 @@ impl<'a> Check<'a> {
                 Symbol::Family(_) => format!("write the index in square brackets: `{name}[…]`"),
                 _ => format!("`{name}` is {}; write a product with a star: `{name}*(…)`", symbol.article()),
             };
+            if matches!(symbol, Symbol::State(_)) {
+                hint += ". A value at another time, `x(t - tau)`, makes a delay equation, which is not supported";
+            }
         }
         let name = name_of(self.source, item).to_string();
         self.errors.push(ModelError { item, field, name, span: Some(span), message, hint });

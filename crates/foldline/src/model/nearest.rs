@@ -7,7 +7,8 @@ pub fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) ->
     if length > LONGEST {
         return None;
     }
-    let allowed = (length / 3).max(1);
+    // A single letter resembles every other.
+    let allowed = if length < 2 { 0 } else { (length / 3).max(1) };
     candidates
         .into_iter()
         .filter(|candidate| candidate.chars().count().abs_diff(length) <= allowed)
@@ -85,7 +86,8 @@ mod tests {
             "did you mean `\u{3bc}`? `\u{b5}` is U+00B5, `\u{3bc}` is U+03BC"
         );
         assert!(suggest("\u{b5}", &["x", "\u{3bc}"]).starts_with("did you mean `\u{3bc}`?"));
-        assert_eq!(suggest("y", &["x"]), "did you mean `x`?");
+        assert_eq!(suggest("X", &["y", "x"]), "did you mean `x`?");
+        assert_eq!(suggest("y", &["x"]), "one of: x");
     }
 
     #[test]

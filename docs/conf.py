@@ -1,0 +1,100 @@
+"""The documentation site. `cargo xtask site` builds it.
+
+The source directory is the root of the repository, so that every link between pages, models and notebooks is the same on the site and in
+the repository. The native half of the package is replaced by a stand-in: nothing has to be compiled.
+"""
+
+import os
+import sys
+import tomllib
+
+ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+HERE = "docs/"
+sys.path[:0] = [os.path.join(ROOT, "python"), os.path.join(ROOT, "docs", "site")]
+
+import bibliography  # noqa: E402
+
+with open(os.path.join(ROOT, "docs", "references.bib"), encoding="utf-8") as file:
+    SOURCES = file.read()
+
+with open(os.path.join(ROOT, "Cargo.toml"), "rb") as file:
+    release = tomllib.load(file)["workspace"]["package"]["version"]
+with open(os.path.join(ROOT, "pyproject.toml"), "rb") as file:
+    REPOSITORY = tomllib.load(file)["project"].get("urls", {}).get("Repository", "")
+
+project = "foldline"
+author = "The foldline authors"
+project_copyright = author
+version = release
+language = "en"
+
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+root_doc = HERE + "index"
+include_patterns = ["docs/**", "python/notebooks/**", "*.md"]
+exclude_patterns = ["**/.*", ".*", "target", "crates", "fuzz", "benches", "runs", "out", "**/.ipynb_checkpoints", "docs/images", "docs/schema"]
+templates_path = []
+
+# Messages of the program name pages by their path, as in docs/book/units.md; headings have the anchors that they have in the repository.
+myst_heading_anchors = 4
+myst_enable_extensions = ["deflist"]
+highlight_language = "none"
+
+# Notebooks keep the outputs that are stored in them; python/tests/test_notebooks.py compares these with new ones.
+nb_execution_mode = "off"
+
+autodoc_mock_imports = ["foldline._native"]
+autodoc_member_order = "bysource"
+autodoc_typehints = "none"
+napoleon_google_docstring = False
+napoleon_use_rtype = False
+# Attributes of a class are a list, not entries of their own; several classes have attributes of one name.
+napoleon_use_ivar = True
+suppress_warnings = ["ref.python"]
+add_module_names = False
+# Single backticks in docstrings are code.
+default_role = "code"
+
+html_theme = "furo"
+html_title = f"foldline {release}"
+html_static_path = ["site/static"]
+html_css_files = ["site.css"]
+html_extra_path = ["site/extra"]
+html_show_sourcelink = False
+html_copy_source = False
+html_theme_options = {
+    "source_repository": REPOSITORY,
+    "source_branch": "main",
+    "source_directory": "",
+    "top_of_page_buttons": [],
+}
+
+
+# Pages that the overviews in these files link to, put below them in the navigation. The overviews themselves stay plain Markdown.
+CHILDREN = {HERE + "book/bifurcations": "bifurcations/*", HERE + "decisions/README": "0*"}
+
+
+def add_children(app, docname, source):
+    """Adds the pages below an overview."""
+    if docname in CHILDREN:
+        source[0] += f"\n```{{toctree}}\n:hidden:\n:glob:\n\n{CHILDREN[docname]}\n```\n"
+
+
+def add_references(app, docname, source):
+    """Makes the page of references, and links to it from lines that name sources."""
+    if docname == HERE + "reference/references":
+        source[0] += bibliography.page(SOURCES)
+    elif docname.startswith(HERE):
+        lines = source[0].split("\n")
+        source[0] = "\n".join(bibliography.linked(line, SOURCES) if line.startswith("Source: ") else line for line in lines)
+
+
+def escape_bars(app, what, name, obj, options, lines):
+    """Keeps |value| in a docstring from being read as a substitution."""
+    lines[:] = [line.replace("|value|", "\\|value\\|") for line in lines]
+
+
+def setup(app):
+    """Connects what is above."""
+    app.connect("source-read", add_children)
+    app.connect("source-read", add_references)
+    app.connect("autodoc-process-docstring", escape_bars, priority=400)
