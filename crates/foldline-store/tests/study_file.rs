@@ -254,7 +254,7 @@ fn mistakes_about_homotopies() {
         ("via = \"mu\"", "via = \"zeta\"", "\"zeta\"", "zeta is part of the goal", "leave zeta out"),
         ("via = \"mu\"", "via = \"my\"", "\"my\"", "no parameter `my`", "mu"),
         ("via = \"mu\"", "", "[[homotopy]]", "has no `via`, the parameter that it may vary", "via = \"mu\""),
-        ("range = [-1.5, 2.5]", "", "[[homotopy]]", "how far mu may go", "range = "),
+        ("range = [-1.5, 2.5]", "", "[[homotopy]]", "has no `range` for mu", "range = "),
         ("[-1.5, 2.5]", "[1, 1]", "[1, 1]", "the range is empty", "different"),
     ]);
     let found = mistake(
