@@ -6,6 +6,7 @@ the repository. The native half of the package is replaced by a stand-in: nothin
 
 import os
 import sys
+
 import tomllib
 
 ROOT = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
@@ -13,6 +14,7 @@ HERE = "docs/"
 sys.path[:0] = [os.path.join(ROOT, "python"), os.path.join(ROOT, "docs", "site")]
 
 import bibliography  # noqa: E402
+from sphinx.ext.napoleon import Config, NumpyDocstring  # noqa: E402
 
 with open(os.path.join(ROOT, "docs", "references.bib"), encoding="utf-8") as file:
     SOURCES = file.read()
@@ -28,10 +30,22 @@ project_copyright = author
 version = release
 language = "en"
 
-extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
+extensions = ["myst_nb", "sphinx.ext.autodoc"]
 root_doc = HERE + "index"
 include_patterns = ["docs/**", "python/notebooks/**", "*.md"]
-exclude_patterns = ["**/.*", ".*", "target", "crates", "fuzz", "benches", "runs", "out", "**/.ipynb_checkpoints", "docs/images", "docs/schema"]
+exclude_patterns = [
+    "**/.*",
+    ".*",
+    "target",
+    "crates",
+    "fuzz",
+    "benches",
+    "runs",
+    "out",
+    "**/.ipynb_checkpoints",
+    "docs/images",
+    "docs/schema",
+]
 templates_path = []
 
 # Messages of the program name pages by their path, as in docs/book/units.md; headings have the anchors that they have in the repository.
@@ -45,10 +59,7 @@ nb_execution_mode = "off"
 autodoc_mock_imports = ["foldline._native"]
 autodoc_member_order = "bysource"
 autodoc_typehints = "none"
-napoleon_google_docstring = False
-napoleon_use_rtype = False
-# Attributes of a class are a list, not entries of their own; several classes have attributes of one name.
-napoleon_use_ivar = True
+# Several classes have attributes of one name.
 suppress_warnings = ["ref.python"]
 add_module_names = False
 # Single backticks in docstrings are code.
@@ -88,8 +99,14 @@ def add_references(app, docname, source):
         source[0] = "\n".join(bibliography.linked(line, SOURCES) if line.startswith("Source: ") else line for line in lines)
 
 
-def escape_bars(app, what, name, obj, options, lines):
-    """Keeps |value| in a docstring from being read as a substitution."""
+STYLE = Config(napoleon_google_docstring=False, napoleon_use_ivar=True, napoleon_use_rtype=False)
+
+
+def read_numpy_style(app, what, name, obj, options, lines):
+    """Turns sections of docstrings into lists. Docstrings of properties are left as they are: a colon in them does not end a type."""
+    if what not in ("property", "attribute", "data"):
+        lines[:] = NumpyDocstring(lines, STYLE, app, what, name, obj, options).lines()
+    # Not a substitution.
     lines[:] = [line.replace("|value|", "\\|value\\|") for line in lines]
 
 
@@ -97,4 +114,4 @@ def setup(app):
     """Connects what is above."""
     app.connect("source-read", add_children)
     app.connect("source-read", add_references)
-    app.connect("autodoc-process-docstring", escape_bars, priority=400)
+    app.connect("autodoc-process-docstring", read_numpy_style)

@@ -4,8 +4,19 @@ import re
 
 ENTRY = re.compile(r"@\w+\{(\w+),\n(.*?)\n\}", re.S)
 FIELD = re.compile(r"(\w+)\s*=\s*\{(.*?)\},?\s*(?=\n\s*\w+\s*=|\Z)", re.S)
-ACCENTS = {r'{\"o}': "ö", r'{\"a}': "ä", r'{\"u}': "ü", r'\"o': "ö", r'\"a': "ä", r'\"u': "ü", r"{\^i}": "î", r"{\'E}": "É", r"\'E": "É", r"\'e": "é"}
-ACCENTS |= {r"\'{e}": "é", r"\'{a}": "á", r"\'a": "á", r"\&": "&", "--": "–", "~": " ", "\\": ""}
+ACCENTS = {
+    r"{\"o}": "ö",
+    r"{\"a}": "ä",
+    r"{\"u}": "ü",
+    r"\"o": "ö",
+    r"\"a": "ä",
+    r"\"u": "ü",
+    r"{\^i}": "î",
+    r"{\'E}": "É",
+    r"\'E": "É",
+    r"\'e": "é",
+}
+ACCENTS |= {r"\'{e}": "é", r"\`e": "è", r"\`{e}": "è", r"\'{a}": "á", r"\'a": "á", r"\&": "&", "--": "–", "~": " ", "\\": ""}
 
 
 def plain(text):
@@ -26,10 +37,19 @@ def entries(bibliography):
     found = {}
     for key, body in ENTRY.findall(bibliography):
         field = dict(FIELD.findall(body))
-        where = [plain(field[name]) for name in ("journal", "booktitle", "publisher", "institution", "organization", "howpublished") if name in field]
+        where = [
+            plain(field[name])
+            for name in ("journal", "booktitle", "publisher", "institution", "organization", "howpublished")
+            if name in field
+        ]
         if "volume" in field:
             where[:1] = [f"{where[0]} {plain(field['volume'])}"] if where else [plain(field["volume"])]
-        parts = [names(field.get("author", field.get("organization", ""))), f"*{plain(field.get('title', ''))}*", *where, plain(field.get("pages", ""))]
+        parts = [
+            names(field.get("author", field.get("organization", ""))),
+            f"*{plain(field.get('title', ''))}*",
+            *where,
+            plain(field.get("pages", "")),
+        ]
         text = ", ".join(part for part in parts if part) + f" ({field.get('year', '')})."
         if "doi" in field:
             text += f" [doi:{field['doi']}](https://doi.org/{field['doi']})"
@@ -39,7 +59,7 @@ def entries(bibliography):
 
 def page(bibliography):
     """The page."""
-    return "".join(f'\n({key})=\n{key}\n: {text}\n' for key, text in entries(bibliography).items())
+    return "".join(f"\n({key})=\n{key}\n: {text}\n" for key, text in entries(bibliography).items())
 
 
 def linked(line, bibliography):
