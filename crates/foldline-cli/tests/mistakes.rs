@@ -213,7 +213,10 @@ fn curves_and_homotopies_in_which_something_is_wrong() {
     says(&spoilt("\"fold\"", "\"fld\""), &["study.toml:16:8", "\"fld\"", "did you mean `fold`"]);
     says(&spoilt("\"main\"", "\"rest\""), &["study.toml:17:6", "\"rest\" is a seed", "lies on a branch"]);
     says(&spoilt("free = \"kappa\"", "free = \"mu\""), &["study.toml:18:8", "already", "such as `kappa`"]);
-    says(&spoilt("via = \"mu\"", "via = \"kappa\""), &["study.toml:25:7", "part of the goal", "remove kappa from `to`"]);
+    says(
+        &spoilt("via = \"mu\"", "via = \"kappa\""),
+        &["study.toml:25:7", "part of the goal", "remove kappa from `to`"],
+    );
     let both = spoilt("kappa = 3 }\nvia = \"mu\"", "kapa = 3 }\nvia = \"nu\"");
     says(&both, &["study.toml:24:8", "did you mean `kappa`", "study.toml:25:7", "no parameter `nu`"]);
 }
