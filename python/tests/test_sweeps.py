@@ -100,7 +100,7 @@ def test_starts_that_escape_have_no_ranges_and_leave_those_of_others_alone():
     assert np.isnan(found["escaped"])
     assert survey.to_pandas()["x_max"].notna().sum() == (survey.motion == "equilibrium").sum()
     assert survey.plot()
-    with pytest.warns(foldline.EndedShort, match="the motion runs to infinity") as warned:
+    with pytest.warns(foldline.EndedShort, match="the motion grows without bound") as warned:
         down = foldline.sweep(model.settle([1.0]), "mu", (1, -1), 5)
     assert {own.filename for own in warned} == {__file__}
     assert down.motion[-1] == "escaped"

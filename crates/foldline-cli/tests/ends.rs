@@ -95,7 +95,7 @@ fn a_conserved_combination() {
     // 2 x + mu y at mu = 1 alone.
     let states = [("x", "mu*(y - x^2)"), ("y", "2*(x^2 - y)")];
     Case { parameters: MU, states: &states, seed: "state = { x = 0.5, y = 0.25 }", range: [0.5, 2.0], more: "" }
-        .ends(&["no start", "likely cause: 2*x + y never changes", "eliminate one state"]);
+        .ends(&["no start", "likely cause: 2*x + y is conserved", "eliminate one state"]);
 }
 
 /// At mu = 0 the oscillator is conservative and linear: cycles of all sizes.

@@ -115,7 +115,7 @@ fn exports_are_written_where_they_are_wanted() {
     {
         let output = foldline(here, &["export", "run", "--format", format]);
         assert_eq!(output.status.code(), Some(0), "{}", said(&output));
-        assert!(said(&output).contains(&format!("written: {written}")) && here.join(written).is_file());
+        assert!(said(&output).contains(&format!("wrote {written}")) && here.join(written).is_file());
     }
     let only = foldline(here, &["export", "run", "--format", "csv", "--branch", "b", "--out", "only"]);
     assert_eq!(only.status.code(), Some(0), "{}", said(&only));

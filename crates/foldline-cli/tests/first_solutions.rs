@@ -102,7 +102,7 @@ fn a_swing_that_can_be_turned_is_said_to_be_one_of_a_family() {
     let (off, _) = run(&model, "state = { x = 0.3, y = 0.1, vx = 0, vy = 0 }", branch);
     let end = off.branches[0].ends[1].as_ref().unwrap().to_string();
     assert!(
-        end.contains("(x, y) and (vx, vy) are turned together") && end.contains("start with y = 0, vy = 0"),
+        end.contains("a common rotation of (x, y) and (vx, vy)") && end.contains("start with y = 0, vy = 0"),
         "{end}"
     );
     let (on, _) = run(&model, "state = { x = 0.3, y = 0, vx = 0, vy = 0 }", branch);

@@ -213,7 +213,10 @@ fn curves_and_homotopies_in_which_something_is_wrong() {
     says(&spoilt("\"fold\"", "\"fld\""), &["study.toml:16:8", "\"fld\"", "did you mean `fold`"]);
     says(&spoilt("\"main\"", "\"rest\""), &["study.toml:17:6", "\"rest\" is a seed", "lies on a branch"]);
     says(&spoilt("free = \"kappa\"", "free = \"mu\""), &["study.toml:18:8", "already", "such as `kappa`"]);
-    says(&spoilt("via = \"mu\"", "via = \"kappa\""), &["study.toml:25:7", "part of the goal", "leave kappa out"]);
+    says(
+        &spoilt("via = \"mu\"", "via = \"kappa\""),
+        &["study.toml:25:7", "part of the goal", "remove kappa from `to`"],
+    );
     let both = spoilt("kappa = 3 }\nvia = \"mu\"", "kapa = 3 }\nvia = \"nu\"");
     says(&both, &["study.toml:24:8", "did you mean `kappa`", "study.toml:25:7", "no parameter `nu`"]);
 }
@@ -298,7 +301,7 @@ fn settings_of_attractors() {
     let set = |assignment: &str| desk.refused(&["attractors", "pendulum.toml", "--set", assignment]);
     says(&set("kapa=1"), &["--set kapa=1", "no parameter `kapa`", "did you mean `kappa`"]);
     says(&set("kappa"), &["--set kappa", "`=` is missing", "NAME=VALUE"]);
-    says(&set("kappa=much"), &["`much` is not a finite number", "a number such as"]);
+    says(&set("kappa=much"), &["`much` is neither a finite number", "a number such as"]);
     desk.refused(&["attractors", "pendulum.toml", "--samples", "0"]);
 }
 
@@ -317,7 +320,7 @@ fn help_says_the_exit_codes() {
     assert_eq!(output.status.code(), Some(0));
     says(
         &String::from_utf8_lossy(&output.stdout),
-        &["Exit codes", "2  error in the command line or in a file", "3  finished, but incomplete"],
+        &["Exit codes", "2 error in the input", "3 finished but incomplete"],
     );
 }
 

@@ -181,7 +181,7 @@ c = { equation = "k*(1 - hill(c, K, n)) - d*c", unit = "cells/ml", range = [0, 1
         let (code, said) = checked(model);
         assert_eq!(code, Some(0), "{model}\n{said}");
         assert!(!said.contains("stand for"), "{said}");
-        assert_eq!(said.contains("not known"), model.contains("cells"), "{said}");
+        assert_eq!(said.contains("unknown units"), model.contains("cells"), "{said}");
     }
     // Some units only, and a mass of 1 that is not written: said, not refused.
     let (code, said) = checked(&format!("{SPRING}x = \"v\"\nv = \"-k*x/m\"\ny = \"w\"\nw = \"-k*y\"\n"));
@@ -269,7 +269,7 @@ fn a_run_is_read_in_any_unit() {
         ("Omega", "`=` and a unit are missing"),
         ("Omeg=rpm", "did you mean `Omega`"),
         ("X=orders:Omega", "the dimensions differ"),
-        ("Omega=orders:speed", "no parameter"),
+        ("Omega=orders:speed", "not a parameter"),
     ] {
         let run = foldline(folder, &["table", "run", "--unit", wish]);
         let message = String::from_utf8(run.stderr).unwrap();

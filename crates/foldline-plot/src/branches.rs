@@ -97,7 +97,7 @@ pub fn root_count(diagram: &Diagram) -> usize {
 const MARK: f64 = 2.6;
 
 /// What the legend calls branches that come from a special point of another.
-const LIGHTER: &str = "bifurcating branches";
+const LIGHTER: &str = "branching off";
 
 /// As many branches as the legend has room for.
 const MOST: usize = 14;

@@ -159,9 +159,9 @@ fn mistakes_about_what_is_held() {
         ),
         ("hold = \"fold\"", "hold = \"cusp\"", "\"cusp\"", "cusp cannot be continued", "torus"),
         ("hold = \"fold\"", "", "[[curve]]", "has no `hold`", "\"hopf\""),
-        ("hold = \"fold\"", "hold = 1", "1", "not a text", "text"),
+        ("hold = \"fold\"", "hold = 1", "1", "not text", "text"),
         ("hold = \"period-doubling\"", "hold = \"hopf\"", "\"hopf\"", "cycles have no Hopf points", "torus"),
-        ("near = 0.25", "near = 7", "7", "near mu = 7 there is no point", "branch-range"),
+        ("near = 0.25", "near = 7", "7", "`near` is mu = 7, but the curve stays between", "branch-range"),
         ("near = 0.25", "neer = 0.25", "neer", "unknown key `neer` in a curve", "did you mean `near`"),
     ]);
     let text = STUDY.replace("state = { x = 0.7, y = 0 }", "attractor = \"equilibrium\"");
@@ -251,10 +251,10 @@ fn mistakes_about_homotopies() {
             "already starts at its goal",
             "other than",
         ),
-        ("via = \"mu\"", "via = \"zeta\"", "\"zeta\"", "zeta is part of the goal", "leave zeta out"),
+        ("via = \"mu\"", "via = \"zeta\"", "\"zeta\"", "zeta is part of the goal", "remove zeta from"),
         ("via = \"mu\"", "via = \"my\"", "\"my\"", "no parameter `my`", "mu"),
         ("via = \"mu\"", "", "[[homotopy]]", "has no `via`, the parameter that it may vary", "via = \"mu\""),
-        ("range = [-1.5, 2.5]", "", "[[homotopy]]", "how far mu may go", "range = "),
+        ("range = [-1.5, 2.5]", "", "[[homotopy]]", "has no `range` for mu", "range = "),
         ("[-1.5, 2.5]", "[1, 1]", "[1, 1]", "the range is empty", "different"),
     ]);
     let found = mistake(

@@ -206,7 +206,8 @@ fn a_given_profile_of_several_turns_starts_a_branch_of_one() {
         let found = run(&System::of_plan(&model, &plan), &plan, 1, Diagram::default(), &notes).branches;
         let period = found[0].points[0].solution.period().unwrap();
         assert!((period - 0.5 * TAU).abs() < 1e-6, "{turns} turns: {period}");
-        let said = notes.0.into_inner().unwrap().iter().any(|note| note.contains(&format!("runs {turns} times")));
+        let said =
+            notes.0.into_inner().unwrap().iter().any(|note| note.contains(&format!("is {turns} turns of a cycle")));
         assert_eq!(said, turns > 1);
     }
 }

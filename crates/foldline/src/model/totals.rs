@@ -235,7 +235,7 @@ mod tests {
         let found = Model::compile(source(&[("E", "e + 2*c", 1.0)])).err().unwrap();
         assert!(found[0].message.contains("is not conserved") && found[0].hint.contains("e + c"), "{found:?}");
         let found = Model::compile(source(&[("E", "e*c", 1.0)])).err().unwrap();
-        assert!(found[0].message.contains("no sum of states"), "{found:?}");
+        assert!(found[0].message.contains("not a linear combination of states"), "{found:?}");
         let found = Model::compile(source(&[("E", "e + c", 1.0), ("F", "2*e + 2*c", 1.0)])).err().unwrap();
         assert!(found[0].message.contains("do not determine"), "{found:?}");
     }

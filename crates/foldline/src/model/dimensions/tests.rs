@@ -106,8 +106,8 @@ fn units_without_a_declared_one_are_not_checked() {
 
 #[test]
 fn functions_of_pure_numbers_refuse_lengths() {
-    refused("p w\ns x m = y\ns y = w*y*sin(x)", ["sin", " m;"]);
-    refused("p w\ns x m = y\ns y = w*y*exp(x)", ["exp", " m;"]);
+    refused("p w\ns x m = y\ns y = w*y*sin(x)", ["sin", " m, but must be"]);
+    refused("p w\ns x m = y\ns y = w*y*exp(x)", ["exp", " m, but must be"]);
     refused("p L m\np d mm\ns x m = y\ns y m/s = y^2*tanh(x/d)/L", ["tanh", "1000"]);
 }
 
