@@ -113,7 +113,12 @@ fn run(study: &Study, recorder: Recorder, earlier: Diagram, way: &Way) -> Result
         explore::run(&system, &study.plan, jobs, earlier, &watch)
     });
     watch.progress.finish();
-    watch.recorder.finish()?;
+    let stopped = watch.stop.load(Ordering::Relaxed);
+    if stopped {
+        watch.recorder.finish()?
+    } else {
+        watch.recorder.complete()?
+    }
 
     let diagram = ordered(diagram, &names(&study.plan));
     match conversion(&study.model, way.units)? {
@@ -124,7 +129,6 @@ fn run(study: &Study, recorder: Recorder, earlier: Diagram, way: &Way) -> Result
     if !study.plan.homotopies.is_empty() {
         report(format_args!("routes of the homotopies: foldline table {} --notes", folder.display()))?;
     }
-    let stopped = watch.stop.load(Ordering::Relaxed);
     let why = limit.filter(|_| clock.is_up()).map_or(String::new(), |limit| format!(" at the time limit of {limit:?}"));
     if stopped {
         writeln!(stderr(), "stopped{why}; continue with --resume --out {}", folder.display())?;

@@ -57,7 +57,8 @@ pub fn run(
         let system = explore::System::of_plan(&own.model, &own.plan);
         let diagram = explore::run_from(&system, &own.plan, jobs, earlier, &given, &watch);
         drop(system);
-        let stored = watch.recorder.map(Recorder::finish);
+        let close = if watch.stop.load(Ordering::Relaxed) { Recorder::finish } else { Recorder::complete };
+        let stored = watch.recorder.map(close);
         (diagram, watch.notes.into_inner().unwrap_or_else(PoisonError::into_inner), stored)
     };
     let mut show = |py: Python| match &progress {

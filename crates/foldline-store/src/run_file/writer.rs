@@ -256,8 +256,18 @@ impl Recorder {
         })
     }
 
-    /// Closes the file. The error is the first one met while recording.
+    /// Closes the file of a run that has nothing left to do: profiles that its study does not want to keep are removed. The error is
+    /// the first one met while recording.
+    pub fn complete(self) -> Result<(), RunFileError> {
+        self.closed(self.store)
+    }
+
+    /// Closes the file of a run that can be resumed. The error is the first one met while recording.
     pub fn finish(self) -> Result<(), RunFileError> {
+        self.closed(Store::All)
+    }
+
+    fn closed(self, store: Store) -> Result<(), RunFileError> {
         // Nothing waits unless a thread was cut off.
         self.with_file(|_| ());
         let state = self.state.into_inner().unwrap_or_else(PoisonError::into_inner);
@@ -267,7 +277,7 @@ impl Recorder {
         if identity(&self.path) != state.file {
             return Err(RunFileError::Vanished(self.path));
         }
-        thin(&state.connection, self.store).map_err(|error| RunFileError::from_sqlite(&self.path, error))?;
+        thin(&state.connection, store).map_err(|error| RunFileError::from_sqlite(&self.path, error))?;
         // One file that needs no others, unless someone is reading it just now.
         let _ = state.connection.pragma_update(None, "journal_mode", "DELETE");
         state.connection.close().map_err(|(_, error)| RunFileError::from_sqlite(&self.path, error))?;
@@ -413,18 +423,13 @@ impl Observer for Recorder {
     }
 }
 
-/// Removes the profiles that a study does not want to keep, if the run is complete: one that can be resumed needs them.
+/// Removes the profiles that a study does not want to keep.
 fn thin(connection: &Connection, store: Store) -> rusqlite::Result<()> {
     let every = match store {
         Store::All | Store::Every(1) => return Ok(()),
         Store::Special => None,
         Store::Every(k) => i64::try_from(k).ok(),
     };
-    let ended = "SELECT count(*) FROM ends WHERE code <> 'stopped'";
-    let sides: i64 = connection.query_row("SELECT 2*count(*) FROM branches", [], |row| row.get(0))?;
-    if connection.query_row(ended, [], |row| row.get::<_, i64>(0))? < sides {
-        return Ok(());
-    }
     connection.execute(
         "UPDATE points SET solution_bytes = x'', mesh_bytes = x'', tangent_bytes = x'', solution_checksum = NULL
          WHERE mesh_bytes IS NOT NULL AND (?1 IS NULL OR position % ?1 <> 0)
