@@ -239,7 +239,7 @@ fn a_finished_homotopy_and_curve_resume_without_doing_anything() {
     let first = printed(desk.path(), &["run", "study.toml"], 0);
     let table = |what: &str| printed(desk.path(), &["table", "runs/study", what, "--format", "csv"], 0);
     let before = ["--points", "--branches", "--notes"].map(table);
-    assert!(before[2].contains("way,arrived"), "{}", before[2]);
+    assert!(before[2].contains("way,reached the goal"), "{}", before[2]);
     // On the curve and on the branch at the goal, B = 1 + A²; tolerance 1e-6 relative to 1 + B.
     for point in rows(&table("--points")).iter().filter(|row| row("branch") == "onset") {
         let [a, b] = ["A", "B"].map(|name| point(name).parse::<f64>().unwrap());
@@ -296,7 +296,7 @@ fn names_that_a_run_does_not_have() {
     refused(&["table", "runs/study", "--branch", "stedy"], &["no branch \"stedy\"", "did you mean `steady`"]);
     refused(&["plot", "runs/study", "--y", "z", "-o", "a.svg"], &["--y: there is no quantity \"z\"", "_max", "period"]);
     refused(&["plot", "runs/study", "-o", "a.jpg"], &["a.jpg", ".svg, .png or .pdf"]);
-    refused(&["plot", "runs/study", "-o", "no/such/a.svg"], &["no/such/a.svg cannot be written"]);
+    refused(&["plot", "runs/study", "-o", "no/such/a.svg"], &["cannot write no/such/a.svg"]);
     refused(&["plot", "runs/study", "--window", "2,1,0,1", "-o", "a.svg"], &["--window 2,1,0,1", "wrong way round"]);
     refused(&["plot", "runs/study", "--window", "1,2", "-o", "a.svg"], &["not four numbers", "four numbers"]);
     refused(&["run", "study.toml"], &["already exists", "--resume"]);

@@ -22,7 +22,7 @@ fn the_reference_run_is_right_and_what_is_changed_in_it_is_found() {
     let right = foldline(&["verify", &run]);
     let said = text(&right.stdout);
     assert_eq!(right.status.code(), Some(0), "{said}");
-    let summary = said.lines().find(|line| line.contains("computed again")).unwrap();
+    let summary = said.lines().find(|line| line.contains("recomputed")).unwrap();
     assert!(summary.contains(" 0 outside the stated error"), "{said}");
     let counts: Vec<usize> = summary.split_whitespace().filter_map(|word| word.parse().ok()).collect();
     let [points, special, comparisons, ..] = counts[..] else { panic!("{summary}") };

@@ -101,7 +101,7 @@ fn names_that_clash() {
 #[test]
 fn nothing_at_all() {
     for text in ["", "\n\n", "[states]\n", "[parameters]\n", "\u{feff}", "states = {}\n"] {
-        assert_eq!(mistake(text).1, "the model has no state", "{text:?}");
+        assert_eq!(mistake(text).1, "the model has no states", "{text:?}");
     }
     assert_eq!(mistake("[states]\nx = \"\"\n").1, "the equation of `x` is empty");
     assert_eq!(mistake("[states]\nx = \"   \"\n").1, "the expression is empty");

@@ -259,7 +259,8 @@ impl Recorder {
     /// Closes the file of a run that has nothing left to do: profiles that its study does not want to keep are removed. The error is
     /// the first one met while recording.
     pub fn complete(self) -> Result<(), RunFileError> {
-        self.closed(self.store)
+        let store = self.store;
+        self.closed(store)
     }
 
     /// Closes the file of a run that can be resumed. The error is the first one met while recording.
