@@ -93,4 +93,4 @@ def test_a_family_is_brought_to_contact(rotor):
     found = foldline.homotopy(start, {"kappa": 1.0}, "Omega", (0.5, 12))
     assert found.arrived
     assert found.end["kappa"] == 1.0
-    assert found.route[-1].startswith("arrived")
+    assert found.route[-1].startswith("reached the goal")
