@@ -130,7 +130,7 @@ fn figure_11_contact_cycles_begin_at_the_contact_radius_and_come_from_the_cubic_
 fn figure_12_the_straight_run_turns_back_and_the_program_finds_another_way() {
     let (made, _folder) = figures(&["12"]);
     let fold = claim(&made, "turns back");
-    assert!(near(numbers(fold)[0], 1.465178, 1e-5) && fold.note.contains("arrived"), "{fold:?}");
+    assert!(near(numbers(fold)[0], 1.465178, 1e-5) && fold.note.contains("reached the goal"), "{fold:?}");
     for family in ["SL", "DL"] {
         assert_eq!(claim(&made, &format!("S and {family} connect")).verdict, Verdict::Refined);
     }
