@@ -38,9 +38,14 @@ def test_a_branch_that_was_killed_resumes(start, tmp_path):
     whole = foldline.follow(start, "Omega", (0.5, 12), tolerance=1e-9)
     assert 0 < len(kept) < len(whole)
     assert resumed.complete
+    # What was in the file stays as it was. Beyond it step sizes may differ, depending on the instant of the kill; the curve does not.
+    stays = np.isin(resumed["position"], kept["position"])
     for column in ("position", "Omega", "period", "r_max", "unstable"):
-        assert np.array_equal(resumed[column], whole[column]), column
-    assert [repr(point) for point in resumed.special] == [repr(point) for point in whole.special]
+        assert np.array_equal(resumed[column][stays], kept[column]), column
+    assert [resumed[0]["Omega"], resumed[-1]["Omega"]] == [whole[0]["Omega"], whole[-1]["Omega"]]
+    assert [point.kind for point in resumed.special] == [point.kind for point in whole.special]
+    for own, other in zip(resumed.special, whole.special, strict=True):
+        assert own.value == pytest.approx(other.value, rel=1e-9, abs=1e-9), "the tolerance of both"
     with pytest.raises(foldline.RunFileError, match="study"):
         foldline.follow(start, "Omega", (0.5, 11), resume=True, **again)
 

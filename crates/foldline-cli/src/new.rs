@@ -16,7 +16,7 @@ struct Template {
     about: &'static str,
     model: &'static str,
     study: &'static str,
-    /// How its picture is made.
+    /// Options of `foldline plot` for its picture.
     plot: &'static str,
 }
 
@@ -121,16 +121,20 @@ fn study_text(model: &Model, file: &Path) -> Result<String, Failure> {
     };
     let [low, high] = around(free.value);
     let (attractor, switch, found) = match model.forced() {
-        true => ("cycle", "period-doubling = 1", "the cycle that trajectories reach"),
-        false => ("equilibrium", "hopf = 1", "the equilibrium that trajectories reach"),
+        true => ("cycle", "period-doubling = 1", "the cycle that trajectories reach at the values of the model"),
+        false => (
+            "equilibrium",
+            "hopf = 1",
+            "the equilibrium that trajectories reach at the values of the model; if they oscillate there, write \"cycle\"",
+        ),
     };
     let (model, free) = (quoted(&file.display().to_string()), quoted(&free.name));
     Ok(format!(
-        "# What to compute; the keys are described in docs/book/study-files.md.\n\nmodel = {model}\n\n# A first \
-         solution: {found} at the values of the model.\n[[seed]]\nname = \"first\"\nattractor = \"{attractor}\"\n\n# \
-         The solution is followed in a parameter, stable or not, and so are the branches that bifurcate from \
-         it.\n[[branch]]\nname = \"main\"\nfrom = \"first\"\nfree = {free}\nrange = [{low:?}, {high:?}]\nswitch = {{ \
-         {switch} }}\n"
+        "# What to compute; the keys are described in docs/book/study-files.md.\n\nmodel = {model}\n\n\
+         # A first solution: {found}.\n[[seed]]\nname = \"first\"\nattractor = \"{attractor}\"\n\n\
+         # The solution is followed in a parameter, stable or not, and so are the branches that bifurcate from it.\n\
+         [[branch]]\nname = \"main\"\nfrom = \"first\"\nfree = {free}\nrange = [{low:?}, {high:?}]\n\
+         switch = {{ {switch} }}\n"
     ))
 }
 

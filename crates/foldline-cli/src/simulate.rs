@@ -77,7 +77,7 @@ fn start(typed: &Typed, model: &Model) -> Result<Vec<f64>, Failure> {
     Ok(given.into_iter().enumerate().map(|(i, value)| value.unwrap_or_else(|| within(i))).collect())
 }
 
-/// How long the trajectory is.
+/// Length of the trajectory.
 fn end(typed: &Typed, model: &Model, parameters: &[f64]) -> Result<f64, Failure> {
     let period = || model.time_unit(parameters);
     match (&typed.time, typed.periods) {
@@ -136,7 +136,7 @@ fn named(name: &str, option: &str, model: &Model) -> Result<Variable, Failure> {
     })
 }
 
-/// What is shown: the variables that were typed, or all of them in a table, and the states in a picture.
+/// Variables to show: those that were typed; otherwise all of them in a table, and the states in a picture.
 fn columns(typed: &Typed, model: &Model) -> Result<Vec<Variable>, Failure> {
     if !typed.show.is_empty() {
         return typed.show.iter().map(|name| named(name, "show", model)).collect();

@@ -5,7 +5,7 @@ use foldline::model::Model;
 use foldline::units::{Unit, quantity};
 use foldline_store::nearest::suggest;
 
-/// What can be given a value: a name, and its unit.
+/// Name and unit of something that can be given a value.
 type Named<'m> = (&'m str, &'m str);
 
 /// `NAME=VALUE` of a parameter.
@@ -71,7 +71,7 @@ pub fn measured(text: &str, unit: &str) -> Option<f64> {
 /// The position of a parameter of the model.
 ///
 /// # Errors
-/// What is wrong with the name, and what would be right.
+/// The mistake in the name, and its correction.
 pub fn parameter(name: &str, model: &Model) -> Result<usize, (String, String)> {
     let known = || model.parameters.iter().map(|p| p.name.as_str()).collect::<Vec<_>>();
     let unknown = || (format!("the model `{}` has no parameter `{name}`", model.name), suggest(name, &known()));

@@ -1,4 +1,4 @@
-//! How much a command reports on standard error.
+//! Amount of reporting on standard error.
 
 use std::io::{Result, Write, stderr};
 use std::sync::OnceLock;

@@ -69,8 +69,7 @@ fn direction(set: &Responses) -> Option<(Marker, &'static str)> {
 
 /// The line of a sweep, interrupted at its jumps.
 fn line(set: &Responses, at: &dyn Fn(&Response) -> Option<[f64; 2]>) -> Vec<[f64; 2]> {
-    const FACTOR: f64 = 10.0;
-    let jumps = set.jumps(FACTOR);
+    let jumps = set.jumps();
     let nowhere = [f64::NAN; 2];
     let place = |(k, r): (usize, &Response)| {
         let gap = jumps.contains(&k).then_some(nowhere);

@@ -138,9 +138,6 @@ impl Diagram {
     }
 }
 
-/// Change of a response, in medians, that counts as a jump in runs of old versions, which did not compare motions.
-const STEEP: f64 = 10.0;
-
 type SpecialRow = (&'static str, usize, usize, f64, (Vec<f64>, Vec<f64>), Option<&'static str>, String);
 
 fn described<'py>(py: Python<'py>, branch: &Branch) -> PyResult<Bound<'py, PyDict>> {
@@ -237,7 +234,7 @@ fn responses<'py>(py: Python<'py>, set: &diagram::Responses, variables: usize) -
     parts.set_item("share_high", share(|share| share.interval()[1])?)?;
     parts.set_item("jumped", all.iter().map(|r| r.jumped).collect::<Vec<_>>())?;
     let swept = set.search == diagram::Search::Sweep;
-    parts.set_item("jumps", if swept { set.jumps(STEEP) } else { Vec::new() })?;
+    parts.set_item("jumps", if swept { set.jumps() } else { Vec::new() })?;
     let width = all.first().map_or(0, |r| r.parameters.len());
     let parameters = all.iter().flat_map(|r| r.parameters.iter().copied());
     parts.set_item("parameters", counted(py, all.len() * width, parameters)?)?;

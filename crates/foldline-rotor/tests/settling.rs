@@ -80,7 +80,7 @@ fn a_sweep_down_doubles_and_falls_off_where_the_branch_does() {
     assert!(seen[6] == twice || seen[6] == rest);
     assert_eq!(seen[7], rest);
     let set = Responses { name: "down".into(), search: Search::Sweep, free: OMEGA, responses };
-    assert_eq!(set.jumps(10.0), [5, if seen[6] == rest { 6 } else { 7 }]);
+    assert_eq!(set.jumps(), [5, if seen[6] == rest { 6 } else { 7 }]);
 }
 
 #[test]

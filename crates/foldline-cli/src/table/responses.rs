@@ -83,8 +83,7 @@ pub fn summary(diagram: &Diagram, model: &Model) -> Table {
 
 /// A survey starts anew at every value and does not jump.
 fn jumps(set: &Responses) -> Vec<usize> {
-    const FACTOR: f64 = 10.0;
-    if set.search == Search::Sweep { set.jumps(FACTOR) } else { Vec::new() }
+    if set.search == Search::Sweep { set.jumps() } else { Vec::new() }
 }
 
 fn words(names: &[&str]) -> Vec<Column> {

@@ -74,7 +74,7 @@ impl Page {
         all
     }
 
-    /// What a command says: the table, and which branches ended short; or why it is refused.
+    /// Output of a command: the table and the list of what is incomplete; or the reason for a refusal.
     fn answer(&self, command: &str) -> Vec<String> {
         let run = Command::new(env!("CARGO_BIN_EXE_foldline"))
             .args(command.split(' '))
@@ -110,7 +110,7 @@ fn number(word: &str) -> Option<(f64, Option<i32>)> {
     Some((value, Some(decimals).filter(|_| !word.contains('e'))))
 }
 
-/// Whether two lines say the same: the same words, and numbers that agree to the digits printed or the error that stands beside them.
+/// True if two lines agree: the same words, and numbers that agree to the digits printed or the error that stands beside them.
 pub fn same(quoted: &str, found: &str) -> bool {
     let words = |line: &str| line.split_whitespace().map(str::to_string).collect::<Vec<_>>();
     let (quoted, found) = (words(quoted), words(found));
@@ -129,7 +129,7 @@ pub fn same(quoted: &str, found: &str) -> bool {
         })
 }
 
-/// What is written in a picture.
+/// Texts in a picture.
 fn labels(picture: &Path) -> Vec<String> {
     let text = std::fs::read_to_string(picture).unwrap_or_else(|e| panic!("{}: {e}", picture.display()));
     text.split("<text").skip(1).filter_map(|t| Some(t.split_once('>')?.1.split_once('<')?.0.to_string())).collect()

@@ -186,7 +186,9 @@ impl Runner {
             let extent = trial.scales.to_vec();
             // Half way between the extremes of what is left of the motion.
             let state = (0..x.len()).map(|i| 0.5 * (window.high[i] + window.low[i])).collect();
-            self.found = Some(Settled { motion: Motion::Equilibrium, state, period: 0.0, extent, time, error: size });
+            // Long steps can stand still beside the equilibrium, by as much as the integrator tolerates.
+            let error = size.max(INTEGRATION[usize::from(!self.is_rough())]);
+            self.found = Some(Settled { motion: Motion::Equilibrium, state, period: 0.0, extent, time, error });
             return;
         }
         self.sizes.push(size);

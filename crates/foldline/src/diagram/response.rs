@@ -63,7 +63,8 @@ pub struct Response {
     pub state: Vec<f64>,
     /// Time until it had settled, that saved by extrapolation not counted.
     pub settled_after: f64,
-    /// By how much the motion fails to repeat itself, relative to its extent.
+    /// Of a cycle, by how much it fails to repeat itself, relative to its extent. Of an equilibrium, what is left of the motion, and at least
+    /// the tolerance of the integration, relative to scale plus size.
     pub error: f64,
 }
 
@@ -119,12 +120,16 @@ pub struct Responses {
 }
 
 impl Responses {
+    /// Change of a range, relative to the median change of the sweep, that counts as a jump in files that do not say where a sweep
+    /// jumped. Order of magnitude: a smooth response changes by a few times the median.
+    const STEEP: f64 = 10.0;
+
     /// Indices of the responses of a sweep at which it jumped to a different solution. A response that could not be compared counts
     /// if its kind of motion differs from the one before. A set without any comparison, as in an old file, falls back on
     /// [`Responses::steep`].
-    pub fn jumps(&self, factor: f64) -> Vec<usize> {
+    pub fn jumps(&self) -> Vec<usize> {
         if self.responses.iter().all(|response| response.jumped.is_none()) {
-            return self.steep(factor);
+            return self.steep(Responses::STEEP);
         }
         let pairs = self.responses.windows(2).enumerate();
         let jumped = |pair: &[Response]| pair[1].jumped.unwrap_or(pair[0].motion != pair[1].motion);

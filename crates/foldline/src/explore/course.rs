@@ -65,7 +65,7 @@ pub fn course(
     Course { times, states: record.states, outputs, outcome: arrival.outcome }
 }
 
-/// What has been kept of a trajectory.
+/// Recorded part of a trajectory.
 struct Record {
     n: usize,
     wanted: Option<Vec<f64>>,

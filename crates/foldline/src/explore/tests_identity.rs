@@ -219,7 +219,7 @@ fn swept(model: &Model, parameters: &[f64], values: Vec<f64>) -> (Vec<f64>, Vec<
     let plan = Plan { seeds: vec![start], sweeps: vec![sweep], ..Plan::empty(1e-6, 4) };
     let found = run(&System::of_plan(model, &plan), &plan, 1, Diagram::default(), &Unobserved).responses.remove(0);
     let jumped = found.responses.iter().map(|response| response.jumped).collect();
-    (found.jumps(10.0).into_iter().map(|k| values[k]).collect(), jumped)
+    (found.jumps().into_iter().map(|k| values[k]).collect(), jumped)
 }
 
 #[test]

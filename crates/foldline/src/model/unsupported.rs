@@ -8,7 +8,7 @@
 pub struct Unsupported {
     /// States that it is not supported, in words of the field.
     pub message: &'static str,
-    /// What to do instead.
+    /// Alternative.
     pub instead: &'static str,
 }
 
@@ -115,7 +115,7 @@ const KINDS: [Kind; 15] = [
     ),
 ];
 
-/// What a word that is not known here asks for, if that is not supported.
+/// The unsupported kind of problem that an unknown word asks for, if any.
 pub fn unsupported(word: &str) -> Option<Unsupported> {
     let plain: String = word.to_lowercase().chars().filter(|c| !matches!(c, '-' | '_' | ' ')).collect();
     let stem = plain.strip_suffix('s').unwrap_or(&plain);
