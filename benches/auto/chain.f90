@@ -1,7 +1,7 @@
-! A chain of coupled van der Pol oscillators for AUTO-07p, as in crates/foldline-bench/src/own/chain.rs, with every
-! derivative written out.
+! Chain of coupled van der Pol oscillators for AUTO-07p, as in crates/foldline-bench/src/own/chain.rs, with analytical
+! derivatives.
 !
-! PAR(1) mu, PAR(2) coupling c, PAR(3) detuning delta; PAR(11) the period. U = x_1, y_1, x_2, y_2, ...
+! PAR(1) mu, PAR(2) coupling c, PAR(3) detuning delta; PAR(11) period. U = x_1, y_1, x_2, y_2, ...
 
       SUBROUTINE FUNC(NDIM,U,ICP,PAR,IJAC,F,DFDU,DFDP)
       IMPLICIT NONE

@@ -1,7 +1,7 @@
-! The overhung rotor of models/overhung-rotor.toml for AUTO-07p, with every derivative written out.
+! Overhung rotor of models/overhung-rotor.toml for AUTO-07p, with analytical derivatives.
 !
 ! PAR(1) Omega, PAR(2) kappa, PAR(3) zeta, PAR(4) epsilon, PAR(5) gamma, PAR(6) beta, PAR(7) K, PAR(8) J_p, PAR(9) m;
-! PAR(11) the period. U = u, v, u', v'.
+! PAR(11) period. U = u, v, u', v'.
 
       SUBROUTINE FUNC(NDIM,U,ICP,PAR,IJAC,F,DFDU,DFDP)
       IMPLICIT NONE

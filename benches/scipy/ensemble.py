@@ -2,9 +2,9 @@
 
 usage: ensemble.py METHOD TIME TOLERANCE KAPPA each|together < STARTS
 
-STARTS has one initial state u v u' v' in a line. With `each` every trajectory is a problem of its own; with `together` all of
-them are one problem with a common step. Prints processor seconds, evaluations of the right-hand side for one trajectory each,
-and the final states, one in a line.
+STARTS has one initial state u v u' v' per line. With `each`, every trajectory is a separate problem; with `together`, all of
+them form one problem with a common step. Prints the processor time in seconds, the number of evaluations of the right-hand side
+per trajectory, and the final states, one per line.
 """
 
 import math
@@ -23,7 +23,7 @@ LINEAR = 1 - (1 - J_P) * OMEGA * OMEGA
 
 
 def plain(kappa):
-    """One trajectory, in plain numbers, which Python computes faster than arrays of four."""
+    """Right-hand side of one trajectory in plain numbers, which Python computes faster than arrays of four."""
     cubic, ring = (1 - kappa) * GAMMA, 0.5 * kappa * BETA
 
     def f(_, state):
@@ -42,7 +42,7 @@ def plain(kappa):
 
 
 def stacked(kappa):
-    """All trajectories, in arrays: u of all, v of all, and so on."""
+    """Right-hand side of all trajectories, stacked by component: u of all, v of all, and so on."""
     cubic, ring = (1 - kappa) * GAMMA, 0.5 * kappa * BETA
 
     def f(_, state):

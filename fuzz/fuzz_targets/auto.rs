@@ -1,4 +1,4 @@
-//! Any text as a file of solutions of AUTO-07p.
+//! Arbitrary text as a solution file of AUTO-07p.
 #![no_main]
 
 use foldline_fuzz::texts::{AUTO_MODEL, solution_file};

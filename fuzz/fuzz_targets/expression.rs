@@ -1,4 +1,4 @@
-//! Any text as an expression.
+//! Arbitrary text as an expression.
 #![no_main]
 
 libfuzzer_sys::fuzz_target!(|text: &str| {

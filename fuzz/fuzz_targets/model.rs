@@ -1,4 +1,4 @@
-//! Any text as a model file.
+//! Arbitrary text as a model file.
 #![no_main]
 
 libfuzzer_sys::fuzz_target!(|text: &str| {

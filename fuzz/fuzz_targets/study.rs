@@ -1,4 +1,4 @@
-//! Any text as a study file of a small model.
+//! Arbitrary text as a study file of a small model.
 #![no_main]
 
 const MODEL: &str = include_str!("../../models/overhung-rotor.toml");

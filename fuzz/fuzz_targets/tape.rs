@@ -1,7 +1,7 @@
-//! Random models against a plain evaluation of their formulas.
+//! Random models, compared with the reference evaluation of their formulas.
 #![no_main]
 
 libfuzzer_sys::fuzz_target!(|data: &[u8]| {
-    // Bytes that end too early make no model.
+    // Too few bytes give no model.
     let _ = foldline_fuzz::tapes::tape(&mut arbitrary::Unstructured::new(data));
 });

@@ -1,4 +1,4 @@
-"""Checks of arguments. Each mistake is answered with the call that would be right."""
+"""Checks of arguments. Messages about mistakes show the right call."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ End = float | str
 
 
 def described(value: Any) -> str:
-    """A value in a user's words, with its article."""
+    """Describes a value in a user's words, with an article."""
     from ._branch import Branch, SpecialPoint, SpecialPoints
     from ._diagram import Diagram
     from ._model import Model
@@ -41,12 +41,12 @@ def described(value: Any) -> str:
 
 
 def wrong_kind(what: str, value: Any, cure: str) -> ArgumentError:
-    """The exception for an argument of another kind than the one that is needed."""
+    """Returns the exception for an argument of the wrong kind."""
     return ArgumentError(f"{what}, but got {described(value)}\n  help: {cure}")
 
 
 def suggestion(word: str, known: Iterable[str]) -> str:
-    """The known name nearest to a word, or a list of those that there are."""
+    """Suggests the known name nearest to a word, or lists all known names."""
     return _native.suggest(word, list(known))
 
 
@@ -72,7 +72,7 @@ def is_branch(value: Any) -> TypeGuard[Branch]:
 
 
 def check_solution(start: Any, call: str) -> None:
-    """Refuses what is no solution; `call` is the right call with `{}` for the solution."""
+    """Refuses anything but a solution; `call` is the right call with `{}` for the solution."""
     if is_solution(start):
         start._check_stored()
         return
@@ -96,7 +96,7 @@ def check_solution(start: Any, call: str) -> None:
 
 
 def check_model(value: Any, call: str) -> None:
-    """Refuses what is no model; `call` is the right call with `{}` for the model."""
+    """Refuses anything but a model; `call` is the right call with `{}` for the model."""
     if is_model(value):
         return
     if is_solution(value):
@@ -113,7 +113,7 @@ def check_model(value: Any, call: str) -> None:
 
 
 def check_point(point: Any, call: str, branch: Branch | None = None) -> None:
-    """Refuses what is no special point, or none of the branch; `call` is the right call with `{}` for the point."""
+    """Refuses anything but a special point (of the branch, if given); `call` is the right call with `{}` for the point."""
     from ._branch import SpecialPoint, SpecialPoints
 
     if not isinstance(point, SpecialPoint):
@@ -131,7 +131,7 @@ def check_point(point: Any, call: str, branch: Branch | None = None) -> None:
 
 
 def check_free(free: Any, model: Model, call: str, taken: Sequence[str] = ()) -> None:
-    """Refuses what names no parameter; `call` is the right call with `{}` for the name."""
+    """Refuses anything but the name of a parameter; `call` is the right call with `{}` for the name."""
     names = [name for name in model.parameters if name not in taken]
     if not names:
         none = "no parameter" if not taken else f"no parameter but {', '.join(taken)}"
@@ -150,7 +150,7 @@ def check_free(free: Any, model: Model, call: str, taken: Sequence[str] = ()) ->
 
 
 def number(name: str, value: Any) -> float:
-    """A number that is no text."""
+    """Returns a number; refuses text."""
     if isinstance(value, Real) and not isinstance(value, bool):
         return float(value)
     if isinstance(value, np.ndarray) and value.ndim == 0 and value.dtype.kind in "iuf":
@@ -169,7 +169,7 @@ def _unquoted(name: str, text: str) -> str:
 
 
 def end(name: str, value: Any) -> End:
-    """A number, or a text with a number and its unit."""
+    """Returns a number, or a text with a number and its unit."""
     if not isinstance(value, str):
         return number(name, value)
     try:
@@ -180,7 +180,7 @@ def end(name: str, value: Any) -> End:
 
 
 def call_of(function: str, free: Any, range: Any = None) -> str:
-    """A call as it should be, with `{}` for its first argument; what was given right is kept."""
+    """The right call, with `{}` for its first argument; correct arguments are kept."""
     given = range if isinstance(range, (tuple, list)) and len(range) == 2 else (0.5, 4)
     numbers = all(isinstance(own, Real) and not isinstance(own, bool) for own in given)
     ends = ", ".join(f"{float(own):g}" for own in given) if numbers else "0.5, 4"
@@ -189,7 +189,7 @@ def call_of(function: str, free: Any, range: Any = None) -> str:
 
 
 def check_range(range: Any, call: str, missing: str = "", ordered: bool = True) -> list[End] | None:
-    """A pair of ends, the smaller one first; `call` is the right call with `{}` for the pair."""
+    """Returns a pair of ends, the smaller one first; `call` is the right call with `{}` for the pair."""
     if range is None:
         if missing:
             raise ArgumentError(f"{missing}\n  help: {call.format('(0.5, 4)')}, the smallest and the largest value")
@@ -213,7 +213,7 @@ def check_range(range: Any, call: str, missing: str = "", ordered: bool = True) 
 
 
 def check_within(start: Solution, free: str, ends: Sequence[End] | None) -> None:
-    """Refuses a range without the value at which a branch starts."""
+    """Refuses a range that does not contain the value at which a branch starts."""
     value = start.parameters[free]
     if ends is None or isinstance(ends[0], str) or isinstance(ends[1], str) or ends[0] <= value <= ends[1]:
         return
@@ -223,17 +223,17 @@ def check_within(start: Solution, free: str, ends: Sequence[End] | None) -> None
 
 
 def check_switch(switch: Any) -> None:
-    """Refuses what does not give a depth for each kind of special point."""
+    """Refuses anything but a mapping of kinds of special points to depths."""
     _check_table(switch, "switch", '{"hopf": 1, "period-doubling": 2}', lambda own: f'{{"{own}": 1}}')
 
 
 def check_marks(name: str, marks: Any) -> None:
-    """Refuses what does not give values of quantities."""
+    """Refuses anything but a mapping of quantities to values."""
     _check_table(marks, name, '{"x_max": 2.0}', lambda own: f'{{"{own}": 2.0}}')
 
 
 def check_parameters(name: str, values: Any, model: Model | None = None) -> None:
-    """Refuses what does not give numbers to names."""
+    """Refuses anything but a mapping of names to numbers."""
     first = next(iter(model.parameters), "a") if model is not None else "a"
     _check_table(values, name, f'{{"{first}": 1.0}}', lambda own: f'{{"{own}": 1.0}}')
 

@@ -1,4 +1,4 @@
-"""Bytes of the native half as arrays. The arrays are views of these bytes, and cannot be written to."""
+"""Bytes from the native half as arrays. The arrays are read-only views of these bytes."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ def floats(raw: bytes, *shape: int) -> Floats:
 
 
 def integers(raw: bytes) -> Integers:
-    """Whole numbers."""
+    """Returns whole numbers."""
     return np.frombuffer(raw, dtype=np.int64)
 
 
 def complexes(raw: bytes, *shape: int) -> Complexes:
-    """Complex numbers in the given shape."""
+    """Returns complex numbers in the given shape."""
     array = np.frombuffer(raw, dtype=np.complex128)
     return array.reshape(shape) if shape else array
 
 
 def raw(values: Any) -> bytes:
-    """Numbers as bytes."""
+    """Returns numbers as bytes."""
     return np.ascontiguousarray(values, dtype=np.float64).tobytes()
 
 
@@ -60,7 +60,7 @@ def tolerable(tolerance: float, least: float = 1e-10, most: float = 1e-4) -> flo
 
 
 def limits(steps: int | None, time: float | None) -> tuple[int | None, float | None]:
-    """Limits on trajectories, or `None` for those that are not given."""
+    """Returns limits on trajectories; `None` for those not given."""
     time = None if time is None else number("max_time", time)
     if time is not None and not time > 0:
         raise InputError(f"max_time = {time!r} is not allowed\n  help: a positive time in the units of the model")
@@ -68,7 +68,7 @@ def limits(steps: int | None, time: float | None) -> tuple[int | None, float | N
 
 
 def real(name: str, values: Any) -> Floats:
-    """Real numbers as an array of floats."""
+    """Returns real numbers as an array of floats."""
     try:
         given = np.asarray(values)
         # NumPy would read the digits of strings, and drop imaginary parts.
@@ -79,7 +79,7 @@ def real(name: str, values: Any) -> Floats:
 
 
 def finite(name: str, values: Any) -> Floats:
-    """Real numbers, all of them finite."""
+    """Returns real numbers, all of which must be finite."""
     array = real(name, values)
     if not np.isfinite(array).all():
         raise InputError(f"{name} has values that are not finite\n  help: numbers such as 5, 0.25 or 1e-6")
@@ -91,6 +91,6 @@ def _refused(given: Any) -> Floats:
 
 
 def pairs(values: Mapping[str, Any] | None) -> list[tuple[str, float]]:
-    """Names with numbers."""
+    """Returns pairs of names and numbers."""
     check_parameters("parameters", values)
     return [(str(name), number(str(name), value)) for name, value in (values or {}).items()]

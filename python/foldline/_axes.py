@@ -24,18 +24,18 @@ def _pyplot() -> Any:
 
 
 def axes_or_new(ax: Any) -> Any:
-    """The axes given, or new ones."""
+    """Returns the given axes, or new ones."""
     return ax if ax is not None else _pyplot().subplots(layout="constrained")[1]
 
 
 def new_figure(count: int) -> Any:
-    """The axes of a new figure of so many panels."""
+    """Returns the axes of a new figure with `count` panels."""
     rows, columns = (2, 2) if count > 3 else (1, count)
     return _pyplot().subplots(rows, columns, layout="constrained", figsize=(4 * columns, 3.4 * rows))[1]
 
 
 def label(name: str, model: Model) -> str:
-    """An axis label: Greek names as letters, the unit in brackets where there is one."""
+    """An axis label: Greek names as letters, the unit in brackets if there is one."""
     return _native.label(model._native, name)
 
 

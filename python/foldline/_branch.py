@@ -254,7 +254,7 @@ class Branch(Sequence[Solution]):
 
     @cached_property
     def _turns(self) -> dict[str, Integers]:
-        """Turns of every state that is an angle over a cycle, as NAME_turns, shape (points,)."""
+        """Number of turns over a cycle of every state that is an angle, as NAME_turns, shape (points,)."""
         gain = floats(self._column("gain")).reshape(self._count, -1)
         angles = [(k, name, state["period"]) for k, (name, state) in enumerate(self.diagram.model.states.items()) if state["period"]]
         none = np.zeros(self._count, dtype=np.int64)
@@ -348,9 +348,9 @@ class Branch(Sequence[Solution]):
         Raises
         ------
         ArgumentError, InputError
-            If `point` is no special point of this branch, or a value is not allowed.
+            If `point` is not a special point of this branch, or a value is not allowed.
         NoSolution
-            If no branch leaves there, or only one that is known already; the message says which.
+            If no branch leaves there, or only a known one; the message says which.
 
         Examples
         --------
@@ -480,7 +480,7 @@ class Branch(Sequence[Solution]):
 
 
 def branch_text_of(branch: Branch) -> str:
-    """One line about a branch."""
+    """Describes a branch in one line."""
     held = f", {branch.held[0]} held, {branch.held[1]} following" if branch.held else ""
     span = ""
     if len(branch):
@@ -491,12 +491,12 @@ def branch_text_of(branch: Branch) -> str:
 
 
 def native_only(branch: Branch) -> _native.Diagram:
-    """A diagram of this branch alone."""
+    """Returns a diagram of this branch alone."""
     return branch.diagram._native.only(branch._index, branch.name)
 
 
 def shown_in(sweeps: Any, unit: Mapping[str, str] | None) -> Any:
-    """Surveys and sweeps with some quantities in other units."""
+    """Returns surveys and sweeps with some quantities in other units."""
     from ._overlay import listed
 
     return [own.diagram._shown(unit).responses[own.name] for own in listed(sweeps)] if unit and sweeps is not None else sweeps

@@ -1,6 +1,6 @@
-"""Computations: studies, and single questions that are turned into studies.
+"""Computations: studies, and single calls that are turned into studies.
 
-Every question is written as a study and read by the reader of study files. Names, defaults and messages are therefore those of the
+Every call is written as a study and read by the reader of study files. Names, defaults and messages are therefore those of the
 command line, and every result can be saved as a run.
 """
 
@@ -154,13 +154,13 @@ def run(
 
 
 def _named(study: Any) -> Model | None:
-    """The model object that a dictionary names."""
+    """Returns the model object in a dictionary."""
     own = study.get("model") if isinstance(study, Mapping) else None
     return own if is_model(own) else None
 
 
 def _study(study: Any, given: Any) -> _native.Study:
-    """The study that the argument of `run` means."""
+    """Returns the study given by the argument of `run`."""
     if given is not None:
         check_model(given, "foldline.run(study, {})")
     if isinstance(study, Mapping):

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 class Diagram:
     """The result of a study: branches by name, ``diagram["contact SL"]``, or in the order of the study.
 
-    A run in a folder is read when it is first looked at.
+    A run in a folder is read on first access.
 
     Attributes
     ----------
@@ -119,7 +119,7 @@ class Diagram:
         return len(self.branches)
 
     def _shown(self, unit: Mapping[str, str] | None) -> Diagram:
-        """The diagram with some quantities in other units, for display only."""
+        """Returns the diagram with some quantities in other units, for display only."""
         return self if not unit else Diagram(self._native.in_units(list(unit.items())))
 
     def plot(
@@ -216,7 +216,7 @@ class Diagram:
         Parameters
         ----------
         folder : path
-            Folder for the run; it is made if needed.
+            Folder for the run; it is created if needed.
 
         Raises
         ------
@@ -275,5 +275,5 @@ class Homotopy(Diagram):
 
     @property
     def route(self) -> list[str]:
-        """Path that was taken, in sentences."""
+        """Path taken, in sentences."""
         return [note for about, note in self.notes if about == self.name]

@@ -27,7 +27,7 @@ class Error(Exception):
 
 
 class InputError(Error, ValueError):
-    """A mistake in a text or an argument. The message says where, what, and what would be right.
+    """A mistake in a text or an argument. The message gives the place, the cause and a remedy.
 
     Attributes
     ----------

@@ -26,7 +26,7 @@ _SIZE = (640.0, 360.0)
 
 
 def _cells(points: SpecialPoints) -> tuple[list[str], list[list[str]]]:
-    """Columns and rows of special points. Parameters that are the same everywhere are left out."""
+    """Returns columns and rows of special points, without constant parameters."""
     shown = list(points)
     if not shown:
         return [], []
@@ -47,7 +47,7 @@ def _cells(points: SpecialPoints) -> tuple[list[str], list[list[str]]]:
 
 
 def _significant(own: SpecialPoint, name: str) -> float:
-    """A quantity; of the parameter of the branch without the digits that lie far below its error."""
+    """Returns a quantity; the parameter of the branch is rounded to digits that its error justifies."""
     value = own[name]
     error = own.error * (own.branch.scale + abs(value))
     if name != own.branch.free or not 0 < error < 1:
@@ -56,7 +56,7 @@ def _significant(own: SpecialPoint, name: str) -> float:
 
 
 def special_text(points: SpecialPoints) -> str:
-    """A table in aligned columns."""
+    """Writes a table in aligned columns."""
     names, rows = _cells(points)
     if not rows:
         return "no special points"
@@ -109,7 +109,7 @@ def diagram(own: Diagram) -> str:
 
 
 def _picture(shown: Sequence[Branch]) -> str:
-    """The picture that the command line draws, smaller."""
+    """Draws the picture of the command line, smaller."""
     drawn = [branch for branch in shown if len(branch)]
     if not drawn:
         return ""
@@ -120,7 +120,7 @@ def _picture(shown: Sequence[Branch]) -> str:
 
 
 def solution(own: Solution) -> str:
-    """A table of what is known about a solution."""
+    """A table of the properties of a solution."""
     rows = [*((name, f"{value:.10g}") for name, value in own.parameters.items())]
     rows += [(name, f"{low:.8g} … {high:.8g}") for name, (low, high) in own.ranges.items()]
     what = "multipliers" if own.is_cycle else "eigenvalues"

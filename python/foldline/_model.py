@@ -1,4 +1,4 @@
-"""Models from a file, from expressions, or from a Python function that is traced once. All three become the same text and the same tape."""
+"""Models from a file, from expressions, or from a Python function that is traced once. All three give the same text and tape."""
 
 from __future__ import annotations
 
@@ -139,7 +139,7 @@ class Model:
         Parameters
         ----------
         start : str, mapping, sequence, Solution, Trajectory or result of SciPy
-            What is sought, or where to begin.
+            The solution sought, or a start.
 
             * ``"equilibrium"``: the equilibrium of smallest norm. ``"cycle"``: the cycle that most initial states reach. ``"2:1"``: the
               cycle with this spectral ratio of its whirling motion.
@@ -173,7 +173,7 @@ class Model:
         InputError
             If a state or parameter is unknown or missing, or a value is not allowed.
         NoSolution
-            If nothing of that kind was found; the message says what was.
+            If nothing of that kind was found; the message lists what was.
 
         Examples
         --------
@@ -195,7 +195,7 @@ class Model:
         return Solution(found, self)
 
     def _beginning(self, start: Any, parameters: Mapping[str, float]) -> Any:
-        """The state at which `settle` begins, shape (n,)."""
+        """Returns the state at which `settle` begins, shape (n,)."""
         if isinstance(start, Solution):
             self._own(start)
             return start.state
@@ -214,7 +214,7 @@ class Model:
         return self.state(start)
 
     def _integrated(self, found: Any) -> tuple[Floats, float]:
-        """The last state and time of a result of `scipy.integrate.solve_ivp`."""
+        """Returns the last state and time of a result of `scipy.integrate.solve_ivp`."""
         times, states = finite("the times of the simulation", found.t), finite("the simulation", found.y)
         if not getattr(found, "success", True):
             told = getattr(found, "message", "it did not reach the end of its time span")
@@ -227,7 +227,7 @@ class Model:
         return states[:, -1], float(times[-1])
 
     def _at_phase_zero(self, state: Any, time: float, parameters: Mapping[str, float]) -> Any:
-        """The state that follows at the next start of a forcing period; the state itself where there is no forcing."""
+        """Integrates to the next start of a forcing period; returns the state itself if there is no forcing."""
         if not self.forced:
             return state
         period = self._native.time_unit(self._values(parameters))
@@ -568,7 +568,7 @@ def model(
 
 
 def _read(path: Any, more: bool) -> Model:
-    """The model of a file or text, alone."""
+    """Reads the model of a file or text, which must be the only argument."""
     if is_model(path):
         raise wrong_kind("the path of a model file is needed", path, "it is a model already: use it as it is")
     if not isinstance(path, (str, os.PathLike)):
@@ -593,7 +593,7 @@ def _compiled(text: str, name: str | None) -> Model:
 
 
 def _told(made: Model) -> Model:
-    """Warns of what is doubtful about the units."""
+    """Warns of doubtful units."""
     for remark in made._native.remarks:
         warnings.warn(remark, UserWarning, stacklevel=4)
     return made

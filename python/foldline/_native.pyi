@@ -1,4 +1,4 @@
-"""The half of the package that is written in Rust. Arrays are handed over as bytes."""
+"""The half of the package that is written in Rust. Arrays are passed as bytes."""
 
 import os
 from collections.abc import Callable, Mapping

@@ -26,9 +26,9 @@ if TYPE_CHECKING:
 Seen = Union["Responses", Sequence["Responses"], None]
 #: Colour of surveys and sweeps: dark enough for a print in grey, and not used for branches.
 INK = "#333333"
-#: Marks that point where a sweep goes, filled upwards and hollow downwards.
+#: Marks that point in the direction of a sweep, filled upwards and hollow downwards.
 _ARROWS = {"up": (">", 3.5, "→"), "down": ("<", 6.0, "←")}
-#: Legs of sweeps that are labelled where they run; more are told in the legend alone.
+#: Maximum number of legs of sweeps labelled beside their curves; more are named in the legend only.
 _ROOM = 2
 #: Marks of the motions of a survey.
 _MOTIONS = {"equilibrium": "s", "cycle": "o", "other": "_"}
@@ -84,7 +84,7 @@ def check_columns(own: Responses, *columns: str) -> None:
 def overlaid(
     axes: Any, shown: Sequence[Responses], x: str, y: str, style: Mapping[str, Any] | None = None, joined: bool = False
 ) -> list[Any]:
-    """Draws surveys and sweeps over what is there; `joined` by lines where nothing is there."""
+    """Draws surveys and sweeps over existing curves; `joined` by lines if there are none."""
     artists: list[Any] = []
     legs = 0
     for own in shown:
@@ -99,7 +99,7 @@ def overlaid(
 
 
 def _swept(axes: Any, own: Sweep, quantities: tuple[str, str], room: bool, joined: bool, style: Mapping[str, Any]) -> list[Any]:
-    """A sweep: marks that point in its direction; jumps dotted."""
+    """Draws a sweep with marks that point in its direction and dotted jumps."""
     across, up = (own[name] for name in quantities)
     legs = own.legs
     jumped = own._jumps
@@ -107,7 +107,7 @@ def _swept(axes: Any, own: Sweep, quantities: tuple[str, str], room: bool, joine
     artists: list[Any] = []
     for number, (direction, leg) in enumerate(legs):
         mark, size, arrow = _ARROWS[direction]
-        # The value at which it turns back is marked once.
+        # The value at which the sweep turns back is marked once.
         places = leg if number == 0 else leg[1:]
         looks = {"marker": mark, "linestyle": "none", "markersize": size, "markeredgewidth": 0.8, "zorder": 4, "color": colour}
         looks["markerfacecolor"] = colour if direction == "up" else "none"
@@ -124,7 +124,7 @@ def _swept(axes: Any, own: Sweep, quantities: tuple[str, str], room: bool, joine
 
 
 def _direct(axes: Any, across: Any, up: Any, indices: tuple[Any, Any], direction: str, text: str, colour: Any) -> Any:
-    """A label where a leg is farthest from the other legs, or at its largest value if there is no other."""
+    """Draws a label where a leg is farthest from the other legs, or at its largest value if it is the only leg."""
     leg, others = indices
     heights = up[leg]
     if others.size:
@@ -133,7 +133,7 @@ def _direct(axes: Any, across: Any, up: Any, indices: tuple[Any, Any], direction
     else:
         apart = np.nan_to_num(heights - np.nanmin(heights)) if np.isfinite(heights).any() else np.zeros(len(leg))
     k = int(np.argmax(np.abs(apart)))
-    # On the side from which the sweep comes, because beyond there is often a jump; and where the curve is not on that side.
+    # Place the label on the side from which the sweep comes, since a jump often follows, and off the curve.
     before = max(k - 1, 0)
     above = bool(heights[before] <= heights[k])
     side, aside = {"up": ("right", -6), "down": ("left", 6)}[direction]
@@ -159,7 +159,7 @@ def strobe(own: Strobe, ax: Any, y: str | None, style: Mapping[str, Any]) -> lis
 
 
 def stroboscopic(own: Branch, points: Any, ax: Any, y: str | None, style: dict[str, Any]) -> list[Any]:
-    """A branch of forced cycles as its states at the start of each forcing period, over stroboscopic points of simulation."""
+    """Draws a branch of forced cycles as its states at the start of each forcing period, over stroboscopic points."""
     from ._strobe import Strobe
 
     if not isinstance(points, Strobe):
@@ -171,7 +171,7 @@ def stroboscopic(own: Branch, points: Any, ax: Any, y: str | None, style: dict[s
     axes = axes_or_new(ax)
     artists = strobe(points, axes, name, {"color": "#777777"})
     look: dict[str, Any] = {"color": COLOURS[0], "label": own.name, **style}
-    # Points and special points in order; a special point lies behind the point of its position.
+    # Points and special points in order; a special point lies after the point of its position.
     rows = [(k, float(own[own.free][n]), own[n], bool(own.stable[n])) for n, k in enumerate(own.position.tolist())]
     rows += [(point._native.position + 0.5, point.value, point, point.unstable_after == 0) for point in own.special]
     rows.sort(key=lambda row: row[0])
@@ -194,12 +194,12 @@ def stroboscopic(own: Branch, points: Any, ax: Any, y: str | None, style: dict[s
     return artists
 
 
-#: Vertices of a rounded curve from one point to the next.
+#: Number of vertices of a rounded curve from one point to the next.
 _FINE = 8
 
 
 def _rounded(x: Floats, y: Floats) -> tuple[Floats, Floats]:
-    """A smooth curve through points, with `_FINE` vertices from each to the next."""
+    """Returns a smooth curve through points, with `_FINE` vertices from each to the next."""
     if len(x) < 3:
         places = np.arange((len(x) - 1) * _FINE + 1) / _FINE
         return np.interp(places, np.arange(len(x)), x), np.interp(places, np.arange(len(x)), y)
@@ -219,12 +219,12 @@ def _rounded(x: Floats, y: Floats) -> tuple[Floats, Floats]:
 
 
 def _images(solution: Solution, name: str) -> Floats:
-    """A state or output of a forced cycle at the start of each of its forcing periods."""
+    """Returns a state or output of a forced cycle at the start of each of its forcing periods."""
     return solution.uniform(max(solution.forcing_periods, 1))[name]
 
 
 def _surveyed(axes: Any, own: Responses, x: str, y: str, style: Mapping[str, Any]) -> list[Any]:
-    """A survey: a mark for each motion, one shape for each type; basin fractions with their confidence intervals."""
+    """Draws a survey: a mark for each motion, shaped by its type; basin fractions with their confidence intervals."""
     across, up = own[x], own[y]
     colour = style.get("color", INK)
     artists: list[Any] = []
@@ -246,7 +246,7 @@ def _surveyed(axes: Any, own: Responses, x: str, y: str, style: Mapping[str, Any
 
 
 def _spread(axes: Any, own: Responses, x: str, y: str, colour: Any) -> list[Any]:
-    """The range of every motion that does not repeat, as a bar from its smallest to its largest value."""
+    """Draws the range of every motion that does not repeat, as a bar from its smallest to its largest value."""
     name = y.removesuffix("_max").removesuffix("_min")
     chosen = own.motion == "other"
     if not chosen.any() or f"{name}_min" not in own.columns:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 
 def quantities(branches: Sequence[Branch], x: str | None, y: str | None) -> tuple[str, str]:
-    """The columns that are drawn."""
+    """Returns the columns to draw."""
     model = branches[0].diagram.model
     first = next(iter(model.outputs), None) or next(iter(model.states))
     free = [own.free for own in branches]
@@ -33,13 +33,13 @@ def quantities(branches: Sequence[Branch], x: str | None, y: str | None) -> tupl
 
 
 def pieces(branch: Branch, x: str, y: str, scale: tuple[float, float]) -> Iterator[tuple[Floats, Floats, bool]]:
-    """Pieces of one stability; the change lies exactly at the special point, and between the points the curve is rounded."""
+    """Yields pieces of uniform stability. They change exactly at special points; between points the curve is rounded."""
     for stable, across, up in _native.pieces(branch.diagram._native, branch._index, x, y, scale):
         yield floats(across), floats(up), stable
 
 
 def size(branches: Sequence[Branch], x: str, y: str) -> tuple[float, float]:
-    """Extent of all branches together in both directions."""
+    """Returns the extent of all branches together in both directions."""
     spans = []
     for name in (x, y):
         values = np.concatenate([branch[name] for branch in branches])
@@ -76,7 +76,7 @@ def _lines(axes: Any, own: Branch, x: str, y: str, scale: tuple[float, float], s
 
 
 def _marks(axes: Any, own: Branch, x: str, y: str, colour: Any, named: set[str]) -> list[Any]:
-    """Special points, hollow, subcritical ones filled; each sort is named once."""
+    """Draws special points, hollow or, if subcritical, filled; each sort is named once."""
     sorts: dict[tuple[str, str | None], list[SpecialPoint]] = {}
     for point in own.special:
         sorts.setdefault((point.kind, point.criticality), []).append(point)
@@ -92,7 +92,7 @@ def _marks(axes: Any, own: Branch, x: str, y: str, colour: Any, named: set[str])
 
 
 def diagram(own: Diagram, ax: Any, x: str | None, y: str | None, curves: bool, seen: Seen) -> list[Any]:
-    """Draws all branches of a diagram, a colour for each that was not switched to, and its surveys and sweeps on top of them."""
+    """Draws all branches of a diagram, with one colour per branch not reached by switching, and its surveys and sweeps on top of them."""
     shown = [branch for branch in own if (branch.held is not None) == curves and len(branch)]
     given = listed(seen) if seen is not None else [] if curves else list(own.responses.values())
     if not shown and given:
@@ -124,7 +124,7 @@ def diagram(own: Diagram, ax: Any, x: str | None, y: str | None, curves: bool, s
 
 
 def _root(own: Diagram, name: str) -> str:
-    """The branch from which others are switched to, directly or not."""
+    """Returns the branch from which another was reached by switching, directly or not."""
     origins = {branch.name: branch.origin for branch in own if branch.held is None}
     for _ in range(len(origins)):
         origin = origins.get(name)
@@ -196,7 +196,7 @@ def _multipliers(axes: Any, own: Solution) -> list[Any]:
     else:
         artists.append(axes.axvline(0, color="#9a9a9a", linewidth=1))
     values = own.spectrum
-    # The trivial multiplier, which is 1 but for rounding, comes first where there is one.
+    # The trivial multiplier, 1 up to rounding, comes first if there is one.
     trivial = 1 if own.is_cycle and not own.forcing_periods else 0
     size = np.abs(values[trivial:]) if own.is_cycle else values.real
     outside = np.zeros(len(values), dtype=bool)

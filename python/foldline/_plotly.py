@@ -35,7 +35,7 @@ _SYMBOLS = {
 
 
 def figure(branches: Sequence[Branch], x: str | None, y: str | None, seen: Seen = None, diagram: Diagram | None = None) -> Any:
-    """Lines with hover for points, marks for special points and for results of simulation."""
+    """Draws lines with hover text for points, and marks for special points and results of simulation."""
     try:
         from plotly import graph_objects
     except ImportError as error:
@@ -67,7 +67,7 @@ def _laid_out(picture: Any, x: str, y: str, model: Model) -> Any:
 
 
 def _simulated(graph_objects: Any, given: Sequence[Responses], x: str | None, y: str | None) -> Any:
-    """Surveys and sweeps without a branch."""
+    """Draws surveys and sweeps without a branch."""
     first = given[0]
     across, up = x or first.free, y or f"{next(iter(first.model.outputs), None) or next(iter(first.model.states))}_max"
     picture = graph_objects.Figure()
@@ -76,13 +76,13 @@ def _simulated(graph_objects: Any, given: Sequence[Responses], x: str | None, y:
     return _laid_out(picture, across, up, first.model)
 
 
-#: Marks that point where a sweep goes, filled upwards and hollow downwards.
+#: Marks that point in the direction of a sweep, filled upwards and hollow downwards.
 _ARROWS = {"up": ("triangle-right", 6, "→"), "down": ("triangle-left-open", 10, "←")}
 _MOTIONS = {"equilibrium": "square-open", "cycle": "circle-open", "other": "line-ew-open"}
 
 
 def _overlaid(graph_objects: Any, given: Sequence[Responses], x: str, y: str, joined: bool = False) -> list[Any]:
-    """Surveys and sweeps; jumps are dotted, other steps are drawn if `joined`."""
+    """Draws surveys and sweeps; jumps are dotted, other steps are drawn if `joined`."""
     traces: list[Any] = []
     for own in given:
         check_columns(own, x, y)
@@ -97,7 +97,7 @@ def _overlaid(graph_objects: Any, given: Sequence[Responses], x: str, y: str, jo
         for number, (direction, leg) in enumerate(own.legs):
             symbol, large, arrow = _ARROWS[direction]
             name = f"{own.name}, {direction} {arrow}"
-            # The value at which it turns back is marked once.
+            # The value at which the sweep turns back is marked once.
             mark = {"symbol": symbol, "color": INK, "size": large}
             traces.append(_seen(graph_objects, own, leg if number == 0 else leg[1:], across, up, mark, name, "markers"))
             for first, second in zip(leg[:-1].tolist(), leg[1:].tolist(), strict=True):
@@ -117,7 +117,7 @@ def _seen(graph_objects: Any, own: Responses, places: Any, across: Any, up: Any,
 
 
 def _response_text(own: Responses, k: int) -> str:
-    """A response in words: its values, its motion, its basin fraction or its jump."""
+    """Describes a response: its values, its motion, its basin fraction or its jump."""
     values = [f"{name} = {own[name][k]:.8g}" for name in own.model.parameters]
     ratio = f"{own['ratio'][k]} " if own["ratio"][k] else ""
     period = "" if np.isnan(own["period"][k]) else f" of period {own['period'][k]:.8g}"
@@ -130,7 +130,7 @@ def _response_text(own: Responses, k: int) -> str:
 
 
 def _lines(graph_objects: Any, own: Branch, x: str, y: str, scale: tuple[float, float], colour: str) -> list[Any]:
-    """The curve, solid where it is stable, dashed where not, and its points, which are seen when the pointer is at them."""
+    """Draws the curve, solid where stable and dashed where unstable, and its points, which show when the pointer is on them."""
     common = {"legendgroup": own.name, "name": own.name}
     traces: list[Any] = []
     for across, up, stable in pieces(own, x, y, scale):

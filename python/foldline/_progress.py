@@ -22,7 +22,7 @@ def _watched() -> bool:
 
 @contextmanager
 def shown(progress: Progress) -> Iterator[Callable[[int, int, str], None] | None]:
-    """Yields the function to be called with points, special points and the place of the last one; `None` if nothing is shown."""
+    """Yields the function to be called with points, special points and the position of the last one; `None` if nothing is shown."""
     if callable(progress):
         yield progress
         return
@@ -30,7 +30,7 @@ def shown(progress: Progress) -> Iterator[Callable[[int, int, str], None] | None
     if not wanted or importlib.util.find_spec("tqdm") is None:
         yield None
         return
-    # A short computation needs no bar, unless one was asked for.
+    # A short computation needs no bar, unless one was requested.
     bar = _bar(0.5 if progress is None else 0.0)
     try:
         yield lambda points, special, place: _show(bar, points, special, place)

@@ -67,7 +67,7 @@ class Responses(Mapping[str, Any]):
         return list(self._table)
 
     def __getitem__(self, name: str) -> Any:
-        """A column by name; the name of a state or output alone means its largest value."""
+        """Returns a column by name; the name of a state or output alone means its largest value."""
         if name in self._table:
             return self._table[name]
         if f"{name}_max" in self._table:
@@ -242,7 +242,7 @@ class Survey(Responses):
 
 
 def made(diagram: Diagram, parts: Mapping[str, Any]) -> Survey | Sweep:
-    """The survey or sweep of which the native half hands over the columns."""
+    """Returns the survey or sweep with the columns from the native half."""
     return Sweep(diagram, parts) if parts["search"] == "sweep" else Survey(diagram, parts)
 
 

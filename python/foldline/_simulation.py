@@ -113,7 +113,7 @@ class Trajectory:
 
 
 def simulated(model: Model, state: Any, span: tuple[float, float], times: Any, parameters: bytes, tolerance: float) -> Trajectory:
-    """Integrates; Ctrl-C ends it, and is raised again."""
+    """Integrates a trajectory; Ctrl-C ends it and is raised again."""
     finite("the time span", span)
     wanted = None if times is None else raw(_within(finite("times", times).ravel(), span))
     (t, states, outputs, ending), interrupt = _native.simulate(model._native, raw(state), span, wanted, parameters, tolerance)
@@ -126,7 +126,7 @@ def simulated(model: Model, state: Any, span: tuple[float, float], times: Any, p
 
 
 def _within(times: Floats, span: tuple[float, float]) -> Floats:
-    """Times in the direction of the span and, but for rounding, within it."""
+    """Returns times that are in the direction of the span and, up to rounding, within it."""
     low, high = sorted(span)
     steps = np.diff(times) * (1.0 if span[1] >= span[0] else -1.0)
     room = 1e-12 * max(abs(low), abs(high))

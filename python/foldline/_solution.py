@@ -135,7 +135,7 @@ class Solution:
         return self.profile.reshape(-1, len(self.model.states)) if self.is_cycle else self.state[None, :]
 
     def _check_stored(self) -> None:
-        """Refuses a cycle of which the run file kept the numbers, but not the profile."""
+        """Refuses a cycle whose profile was not stored in the run file."""
         if self.is_cycle and not self.state.size:
             cure = 'a special point or an end of its branch, whose profiles are kept; or run the study with store = "all"'
             raise InputError(f"the profile of this cycle was not stored\n  help: {cure}")
@@ -269,7 +269,7 @@ class Attractor(Solution):
     Attributes
     ----------
     hits : int
-        Number of initial states that settled there. It is no basin fraction, because every fourth initial state is drawn towards
+        Number of initial states that settled there. It is not a basin fraction, because every fourth initial state is drawn towards
         the origin.
     share : tuple of three floats
         Basin fraction, estimated from the initial states drawn uniformly from the ranges, and its 95 % confidence interval (Wilson).
@@ -316,7 +316,7 @@ class Attractors(Sequence[Attractor]):
     escaped : int
         Number of those that ran to infinity or left the region in which f is defined.
     stuck : int
-        Number of those that could not be followed.
+        Number of those that could not be integrated.
     unsettled : int
         Number of those that did not settle.
 

@@ -1,4 +1,4 @@
-"""Studies made of single questions, and their execution."""
+"""Studies made from single calls, and their execution."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from ._solution import Solution
 Path = str | os.PathLike[str]
 Range = Sequence[float | str]
 
-#: Name of the seed at which something starts.
+#: Name of the seed for a given solution.
 START = "the given solution"
 #: Partial result of the last computation that was interrupted.
 RESCUED: list[Any] = []
@@ -37,7 +37,7 @@ def _depth() -> int:
 
 
 def cleaned(item: Mapping[str, Any]) -> dict[str, Any]:
-    """Returns an item of a study without the keys that were not given; kinds of special points with hyphens, as in files."""
+    """Returns an item of a study without the keys not given, and with hyphens in kinds of special points, as in files."""
     kept = {key: value for key, value in item.items() if value is not None}
     for key in ("range", "branch-range"):
         if key in kept:
@@ -61,14 +61,14 @@ def parsed(tables: dict[str, Any], model: Model) -> _native.Study:
 
 
 def study_from(start: Solution, tolerance: float, degree: int, **items: Any) -> _native.Study:
-    """A study with one seed, whose solution is known."""
+    """Returns a study with one seed, whose solution is known."""
     state = dict(zip(start.model.states, start.state.tolist(), strict=True))
     seed = {"name": START, "state": state, "parameters": start.parameters}
     return parsed({"tolerance": tolerable(tolerance), "degree": degree, "seed": [seed], **items}, start.model)
 
 
 def going_on(branch: Branch, own: Mapping[str, Any], **items: Any) -> tuple[_native.Study, Solution]:
-    """A study that has a finished branch already, with what is said about it now."""
+    """Returns a study that contains a finished branch, with new settings for it."""
     study = branch.diagram._native.study()
     start = branch[int((branch.position == 0).argmax())]
     span = own.get("range") or study.range_of(branch.name)
@@ -118,7 +118,7 @@ def carried_out(
         partial = diagram[of] if of is not None and of in diagram else diagram
         RESCUED[:] = [partial]
         raise Interrupted(partial) from None
-    # A branch that is switched from has warned already.
+    # The branch switched from has already given its warning.
     known_short = f"{earlier.name}:" if earlier is not None else "\0"
     for line in short:
         if not line.startswith(known_short):

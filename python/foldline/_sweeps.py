@@ -187,7 +187,7 @@ def survey(
 
 
 def visited(free: str, call: str, range: Any, count: Any, values: Any, back: bool, ordered: bool) -> dict[str, Any]:
-    """The values that are visited, as a study states them."""
+    """Returns the values to visit, as a study states them."""
     if values is not None:
         if range is not None:
             raise ArgumentError(f"both a range and values are given\n  help: {call}, {free!r}, values=[1.0, 1.5, 2.0])")
@@ -207,7 +207,7 @@ def visited(free: str, call: str, range: Any, count: Any, values: Any, back: boo
 
 
 def between(pair: Sequence[float | str], count: int) -> list[Any]:
-    """Equally spaced values from the first to the last, in the unit that both carry."""
+    """Returns equally spaced values from the first to the last, in the unit of both."""
     parts = [re.fullmatch(r"\s*([-+\d.eE]+)\s*(\S.*?)?\s*", str(own)) for own in pair]
     units = [None if part is None else part[2] for part in parts]
     if None in parts or units[0] != units[1]:
@@ -220,7 +220,7 @@ def between(pair: Sequence[float | str], count: int) -> list[Any]:
 def _found(
     model: Model, name: str, tolerance: float, limits: tuple[Any, Any], tables: Mapping[str, Any], options: Mapping[str, Any]
 ) -> Responses:
-    """The survey or sweep that a study asks for."""
+    """Runs a study and returns its survey or sweep."""
     steps, time = limits
     head: dict[str, Any] = {"tolerance": tolerable(tolerance)}
     head.update({} if steps is None else {"max-steps": whole("max_steps", steps)})

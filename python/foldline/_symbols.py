@@ -1,7 +1,7 @@
 """Symbolic operands, with which the function of a model is called once.
 
-A symbol is a node of an expression. Arithmetic and the functions of NumPy make new nodes; whatever needs a number now is refused,
-with the line where it happened and what to write instead.
+A symbol is a node of an expression. Arithmetic and the functions of NumPy make new nodes. Operations that need a number are refused,
+with the line of the code and a remedy.
 """
 
 from __future__ import annotations
@@ -35,12 +35,12 @@ _INNER = tuple(os.path.dirname(os.path.abspath(p)) + os.sep for p in (__file__, 
 
 
 def refused(message: str, cure: str, place: tuple[str, int] | None = None) -> TraceError:
-    """The exception for an operation that cannot be traced, at the line of the user's code that does it."""
+    """Returns the exception for an operation that cannot be traced, with the line of the user's code."""
     return TraceError(f"{message}{shown(place or _place())}\n  = help: {cure}")
 
 
 def shown(place: tuple[str, int] | None) -> str:
-    """A place in source code, as the command line shows it."""
+    """Shows a place in source code as the command line does."""
     if place is None:
         return ""
     file, number = place
@@ -241,7 +241,7 @@ def _boxed(value: Any) -> Any:
 
 
 def operand(value: Any) -> Operand:
-    """A symbol, or a number as Python writes it."""
+    """Returns a symbol, or a number as Python writes it."""
     if isinstance(value, Symbol):
         return value
     if isinstance(value, np.ndarray) and value.ndim == 0:

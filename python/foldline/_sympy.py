@@ -16,7 +16,7 @@ _RELATIONS = {
 
 
 def converted(expression: Any) -> Operand:
-    """The symbol of an expression of SymPy; names stand for the states and parameters that are called so."""
+    """Returns the symbol of a SymPy expression; names stand for the states and parameters of that name."""
     done: dict[Any, Operand] = {}
     stack: list[tuple[Any, bool]] = [(expression, False)]
     while stack:
@@ -77,7 +77,7 @@ def _one(node: Any, done: dict[Any, Operand]) -> Operand:
 
 
 def _chain(node: Any, parts: tuple[Operand, ...]) -> Operand:
-    """A sum with its negative terms subtracted, a product with its negative powers divided by."""
+    """Writes a sum with negative terms subtracted, or a product with negative powers as divisions."""
     whole: Operand | None = None
     minus, sign = ("-", "+") if node.is_Add else ("/", "*")
     below: list[Operand] = []

@@ -1,4 +1,4 @@
-"""Files and texts: which of the two a string is, and what is wrong with a path."""
+"""Files and texts: telling them apart, and checking paths."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _RELATIVE = "relative paths start at the current folder,"
 
 
 def text_of(path: Path, what: str) -> str:
-    """The text of a file; `what` it is, in messages."""
+    """Returns the text of a file, called `what` in messages."""
     check_file(path, what)
     try:
         with open(path, encoding="utf-8") as file:
@@ -32,21 +32,21 @@ def is_text(given: Any) -> bool:
 
 
 def is_model_text(text: str) -> bool:
-    """True for the text of a model: it has states, and nothing that a study has."""
+    """True for the text of a model: it has states, and no part of a study."""
     return re.search(r"^\s*\[states\b", text, re.MULTILINE) is not None and with_model(text, "") != text
 
 
 def with_model(text: str, file: str) -> str:
-    """The text of a study with the file of its model at its top, if it names none."""
+    """Returns the text of a study, with the file of its model added at the top if it names none."""
     head = re.split(r"^\s*\[", text, maxsplit=1, flags=re.MULTILINE)[0]
     if re.search(r"""^\s*["']?model["']?\s*=""", head, re.MULTILINE):
         return text
-    # Lines keep their numbers where the text begins with an empty one.
+    # Line numbers are unchanged if the text begins with an empty line.
     return f"model = {_write.value(file)}\n{text.removeprefix(chr(10))}"
 
 
 def check_file(path: Path, what: str) -> None:
-    """Refuses the path of a file that is not there."""
+    """Refuses the path of a missing file."""
     own = os.fspath(path)
     if os.path.isfile(own):
         return

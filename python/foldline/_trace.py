@@ -85,7 +85,7 @@ class Parts:
         self.arguments = (Symbols("state", list(self.states)), Symbols("parameter", list(self.parameters)), Symbol("t"))
 
     def trace(self, function: Callable[..., Any]) -> dict[str, Any]:
-        """The equations that a function returns."""
+        """Returns the equations of a function."""
         refuse_other_signatures(function, list(self.states))
         found = _called(function, self.arguments)
         place = _defined(function)
@@ -101,7 +101,7 @@ class Parts:
         return dict(zip(self.states, values, strict=True))
 
     def text(self, equations: Expressions, name: str, description: str) -> str:
-        """The text of a model file."""
+        """Returns the text of a model file."""
         groups = [self.definitions, dict(equations), self.outputs, {k: v for k, v in self.forcing.items() if v is not None}]
         for group in groups:
             group.update({key: self._expression(value) for key, value in group.items()})
@@ -120,7 +120,7 @@ class Parts:
         for state, about in self.states.items():
             equation = {"equation": own_equations[state]} if state in own_equations else {}
             lines += _table(f"states.{_write.key(state)}", {**equation, **about})
-        # Equations of unknown states: the reader reports them.
+        # Equations of unknown states are reported by the reader.
         extra = {state: text for state, text in own_equations.items() if state not in self.states}
         lines += _table("equations", extra)
         lines += _table("totals", self.totals)
@@ -128,7 +128,7 @@ class Parts:
         return "\n".join(lines) + "\n"
 
     def _expression(self, value: Any) -> str | Operand:
-        """An expression as text or symbol; a function is called."""
+        """Returns an expression as text or symbol; calls a function."""
         if isinstance(value, str):
             return value
         if callable(value) and not isinstance(value, Symbol) and type(value).__module__.split(".")[0] != "sympy":
@@ -202,7 +202,7 @@ def _called(function: Callable[..., Any], arguments: Sequence[Any]) -> Any:
 
 
 def _failed(error: Exception) -> tuple[str, int] | None:
-    """The innermost line of the user's code in a traceback."""
+    """Returns the innermost line of the user's code in a traceback."""
     trace = error.__traceback__
     place = None
     inner = (os.path.dirname(os.path.abspath(__file__)), os.path.dirname(os.path.abspath(np.__file__ or "")), sys.prefix)

@@ -1,4 +1,4 @@
-"""Expressions and tables as text: what the readers of the command line read."""
+"""Expressions and tables as text for the readers of the command line."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ import numpy as np
 
 from ._symbols import COMPARISONS, Operand, Symbol
 
-# From the loosest to the tightest.
+# Binding strength, from loosest to tightest.
 _COMPARISON, _SUM, _PRODUCT, _SIGNED, _POWER, _ATOM = range(6)
 #: Deeper nesting than this becomes a definition; the reader refuses 200.
 _DEEPEST = 60
 
-#: Text, how tightly it binds, how deeply brackets are nested in it.
+#: Text, its binding strength, and the depth of nested brackets in it.
 _Piece = tuple[str, int, int]
 
 
 def number(value: float) -> str:
-    """A number such that reading it gives the same one to the last bit."""
+    """Writes a number that reads back to the last bit."""
     text = repr(float(value))
     return text[:-2] if text.endswith(".0") else text
 
@@ -69,7 +69,7 @@ def _is_leaf(value: Operand) -> bool:
 
 
 class Writer:
-    """Writes expressions that share parts: what is used more than once gets a name and stands in the definitions.
+    """Writes expressions that share parts: a part used more than once becomes a named definition.
 
     Parameters
     ----------
@@ -81,11 +81,11 @@ class Writer:
         self.definitions: dict[str, str] = {}
         self._taken = set(taken)
         self._pieces: dict[int, _Piece] = {}
-        # Nodes are told apart by identity, so they must live as long as this does.
+        # Nodes are identified by their address, so they must live as long as this object.
         self._kept: list[Symbol] = []
 
     def write(self, roots: Sequence[Operand]) -> list[str]:
-        """The texts of expressions."""
+        """Returns the texts of expressions."""
         order, uses = _nodes(roots)
         for node in order:
             parts = [self._of(part) for part in node.operands]
@@ -110,7 +110,7 @@ class Writer:
 
 
 def _nodes(roots: Sequence[Operand]) -> tuple[list[Symbol], dict[int, int]]:
-    """The nodes with operands below some roots, operands first, and how often each is used."""
+    """Returns the nodes with operands below some roots, operands first, and the number of uses of each."""
     order: list[Symbol] = []
     uses: dict[int, int] = {}
     stack: list[tuple[Operand, bool]] = [(root, False) for root in reversed(roots)]
@@ -129,7 +129,7 @@ def _nodes(roots: Sequence[Operand]) -> tuple[list[Symbol], dict[int, int]]:
 
 
 def written(value: Operand) -> str:
-    """One expression, with parts that it shares in front of it."""
+    """Writes one expression, preceded by its shared parts."""
     writer = Writer(())
     text = writer.write([value])[0]
     return ", ".join([*(f"{name} = {own}" for name, own in writer.definitions.items()), text])
@@ -141,18 +141,18 @@ _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
 
 def key(name: str) -> str:
-    """A key as TOML wants it."""
+    """Writes a key in TOML."""
     return name if _BARE.fullmatch(name) else json.dumps(name, ensure_ascii=False)
 
 
 def value(own: Any) -> str:
-    """A value as TOML wants it."""
+    """Writes a value in TOML."""
     if isinstance(own, (bool, np.bool_)):
         return "true" if own else "false"
     if isinstance(own, (int, np.integer)):
         return str(int(own))
     if isinstance(own, (float, np.floating)):
-        # Infinities and NaN are words of TOML too; the reader reports them.
+        # TOML has words for infinities and NaN; the reader reports them.
         return repr(float(own))
     if isinstance(own, str):
         return json.dumps(own, ensure_ascii=False)
@@ -164,7 +164,7 @@ def value(own: Any) -> str:
 
 
 def study(tables: Mapping[str, Any]) -> str:
-    """The text of a study: plain keys, then its lists of tables in the order in which they are given."""
+    """Writes the text of a study: plain keys, then its lists of tables in the given order."""
     lists = ("seed", "branch", "curve", "homotopy", "explore", "survey", "sweep")
     lines = [f"{key(name)} = {value(own)}" for name, own in tables.items() if name not in lists]
     for name, items in tables.items():

@@ -1,4 +1,4 @@
-"""Models that several tests use."""
+"""Models shared by several tests."""
 
 import os
 

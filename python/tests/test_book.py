@@ -1,4 +1,4 @@
-"""What the README and the book show in Python runs as it stands there, and prints what stands below it."""
+"""The Python examples of the README and the book run unchanged and print the quoted output."""
 
 import os
 import re
@@ -13,7 +13,7 @@ from conftest import ROOT
 def examples(path):
     with open(os.path.join(ROOT, path), encoding="utf-8") as file:
         page = file.read()
-    # A block of TOML may begin with the name of its file; a block of text right below an example is what it prints.
+    # A block of TOML may begin with the name of its file; a block of text right below an example is its output.
     files = re.findall(r"```toml\n# (\S+\.toml)\n(.*?)```", page, flags=re.DOTALL)
     return files, re.findall(r"```python\n(.*?)```(?:\n\n```text\n(.*?)```)?", page, flags=re.DOTALL)
 

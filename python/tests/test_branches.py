@@ -6,8 +6,8 @@ import pytest
 import foldline
 
 
-def test_the_brusselator_has_its_hopf_point_where_theory_says(steady):
-    """At B = 1 + A², with the first Lyapunov coefficient negative."""
+def test_the_brusselator_has_its_hopf_point_at_the_theoretical_value(steady):
+    """B = 1 + A², and the first Lyapunov coefficient is negative."""
     (hopf,) = steady.special
     assert hopf.kind == "hopf"
     assert hopf["B"] == pytest.approx(2.0, abs=2 * hopf.error)
@@ -17,7 +17,7 @@ def test_the_brusselator_has_its_hopf_point_where_theory_says(steady):
     assert steady.complete
 
 
-def test_a_hopf_point_is_switched_from_and_held(steady):
+def test_a_hopf_point_can_be_switched_at_and_continued(steady):
     hopf = steady.special["hopf"][0]
     cycles = steady.switch(hopf)
     assert cycles.family == "cycle"
@@ -28,7 +28,7 @@ def test_a_hopf_point_is_switched_from_and_held(steady):
     assert np.allclose(curve["B"], 1 + curve["A"] ** 2, rtol=1e-7)
 
 
-def test_a_point_of_a_branch_starts_another_one_in_another_parameter(steady):
+def test_a_point_of_a_branch_starts_a_branch_in_another_parameter(steady):
     hopf = steady.special[0]
     cycles = steady.switch(hopf)
     start = cycles[-1]
@@ -39,7 +39,7 @@ def test_a_point_of_a_branch_starts_another_one_in_another_parameter(steady):
 
 
 def test_an_unstable_cycle_starts_a_branch(brusselator):
-    """Which no simulation would reach: it is taken as it is, not settled again."""
+    """No simulation would reach it: it is used as given, not settled again."""
     lorenz = foldline.model(
         equations={"x": "sigma*(y - x)", "y": "x*(rho - z) - y", "z": "x*y - beta*z"},
         parameters=dict(sigma=10.0, rho=20.0, beta=8 / 3),
@@ -54,8 +54,8 @@ def test_an_unstable_cycle_starts_a_branch(brusselator):
     assert home.period == pytest.approx(saddle.period, rel=1e-6)
 
 
-def test_only_the_special_point_that_is_meant_is_switched_at():
-    """A cusp with two folds has none to switch at; the pitchfork x' = mu x - x³ and its mirror at mu = 2 have a branch point each."""
+def test_only_the_given_special_point_is_switched_at():
+    """x' = mu (mu - 2) x - x³ has a pitchfork at mu = 0 and another one at mu = 2."""
     model = foldline.model(equations={"x": "mu*(mu - 2)*x - x^3"}, parameters=dict(mu=1.0))
     both = foldline.follow(model.settle([0.0]), "mu", (-1, 3), switch={"branch-point": 1})
     one = foldline.follow(model.settle([0.0]), "mu", (-1, 3), switch={"branch-point-2": 1})
@@ -66,7 +66,7 @@ def test_only_the_special_point_that_is_meant_is_switched_at():
     assert np.allclose(np.abs(other["x"]), np.sqrt(np.maximum(other["mu"] * (other["mu"] - 2), 0)), atol=1e-5)
 
 
-def test_a_run_is_saved_and_opened_to_the_last_bit(steady, tmp_path):
+def test_a_saved_run_is_opened_to_the_last_bit(steady, tmp_path):
     cycles = steady.switch(steady.special[0])
     cycles.save(tmp_path / "run")
     again = foldline.open(tmp_path / "run")
@@ -80,12 +80,12 @@ def test_a_run_is_saved_and_opened_to_the_last_bit(steady, tmp_path):
     assert (again[cycles.name][3].profile == cycles[3].profile).all()
     with pytest.raises(foldline.RunFileError, match="already exists"):
         cycles.save(tmp_path / "run")
-    # What was saved can be gone on from.
+    # A saved run can be continued.
     curve = foldline.hold(again[steady.name].special[0], "A", (0.9, 1.1))
     assert np.allclose(curve["B"], 1 + curve["A"] ** 2, rtol=1e-7)
 
 
-def test_a_run_in_a_folder_is_the_run_in_memory(brusselator, tmp_path):
+def test_a_run_in_a_folder_equals_the_run_in_memory(brusselator, tmp_path):
     study = {
         "seed": [{"name": "rest", "attractor": "equilibrium"}],
         "branch": [{"name": "steady", "from": "rest", "free": "B", "range": [0.5, 4], "switch": {"hopf": 1}}],
@@ -103,7 +103,7 @@ def test_a_run_in_a_folder_is_the_run_in_memory(brusselator, tmp_path):
 
 
 def test_a_cycle_without_its_profile_is_refused_as_a_start(brusselator, tmp_path):
-    """A run may keep the profiles of special points and ends alone; the numbers of all others are there."""
+    """A run may store the profiles of special points and ends only; the numbers of all other points are kept."""
     study = {
         "store": "special",
         "seed": [{"name": "rest", "attractor": "equilibrium"}],
@@ -132,7 +132,7 @@ def test_exploring_finds_the_equilibrium_and_the_cycles(brusselator):
     assert diagram.notes
 
 
-def test_a_branch_that_ends_short_is_warned_about(brusselator):
+def test_a_branch_that_ends_short_gives_a_warning(brusselator):
     with pytest.warns(foldline.EndedShort, match="limit of 3 points") as warned:
         branch = foldline.follow(brusselator.settle(), "B", (0.5, 4), max_points=3)
     assert {own.filename for own in warned} == {__file__}
@@ -150,7 +150,7 @@ def test_surveys_and_sweeps_are_tables(brusselator):
     assert table["x_max"].shape == (2,)
 
 
-def test_tables_and_data_sets(steady, brusselator):
+def test_results_convert_to_tables_and_data_sets(steady, brusselator):
     frame = steady.to_pandas()
     assert len(frame) == len(steady)
     assert (frame["B"].to_numpy() == steady["B"]).all()
@@ -171,7 +171,7 @@ def test_tables_and_data_sets(steady, brusselator):
     assert "8 samples, 0 escaped, 0 not settled" in repr(attractors)
 
 
-def test_what_things_say_of_themselves(steady, brusselator):
+def test_results_have_informative_representations(steady, brusselator):
     diagram = steady.switch(steady.special[0]).diagram
     assert "1 special; reached 0.5; reached 4" in repr(steady)
     assert "supercritical" in repr(steady.special)

@@ -1,4 +1,4 @@
-"""Wrong calls are answered with the right one; a study is told apart as path, text or tables."""
+"""Messages about wrong calls show the right one; a study may be a path, a text or tables."""
 
 import os
 import pathlib
@@ -30,7 +30,7 @@ def rest(brusselator):
 
 @pytest.fixture(scope="module")
 def calls(brusselator, rest, steady):
-    """Wrong calls by name: the call, the exception, and words of the message."""
+    """Wrong calls by name: the call, the exception, and parts of the message."""
     (hopf,) = steady.special
     follow, hold, argument, value = foldline.follow, foldline.hold, foldline.ArgumentError, foldline.InputError
     return {
@@ -92,7 +92,7 @@ def calls(brusselator, rest, steady):
     }
 
 
-def test_wrong_calls_are_answered_with_the_right_one(calls):
+def test_messages_about_wrong_calls_show_the_right_one(calls):
     wrong = []
     for name, (call, kind, words) in calls.items():
         try:
@@ -104,12 +104,12 @@ def test_wrong_calls_are_answered_with_the_right_one(calls):
     assert not wrong
 
 
-def test_errors_are_those_of_python_too():
+def test_errors_are_also_the_usual_python_exceptions():
     assert issubclass(foldline.ArgumentError, (foldline.Error, TypeError)) and issubclass(foldline.ArgumentError, TypeError)
     assert issubclass(foldline.InputError, foldline.Error) and issubclass(foldline.InputError, ValueError)
 
 
-def test_a_column_that_is_not_there_is_answered_with_the_nearest(steady, rest):
+def test_a_message_about_an_unknown_column_suggests_the_nearest(steady, rest):
     with pytest.raises(KeyError, match="did you mean `x_max`"):
         steady["x_maxx"]
     with pytest.raises(KeyError, match="did you mean `y_min`"):
@@ -145,7 +145,7 @@ def test_the_wrapping_that_the_message_shows_works():
     assert model([1.0, 4.0]).tolist() == right_hand_side(0.0, [1.0, 4.0], 2.0, 3.0)
 
 
-def test_a_study_is_a_path_a_text_or_tables(brusselator, tmp_path, monkeypatch):
+def test_a_study_may_be_a_path_a_text_or_tables(brusselator, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     brusselator.save("brusselator.toml")
     pathlib.Path("study.toml").write_text(f'model = "brusselator.toml"{STUDY}', encoding="utf-8")
@@ -168,13 +168,13 @@ def test_a_study_is_a_path_a_text_or_tables(brusselator, tmp_path, monkeypatch):
     assert first.special[0].kind == "hopf"
     for other in others:
         assert (other.parameters == first.parameters).all()
-    # What was run from a text is a run like any other.
+    # A run from a text is a run like any other.
     runs[3].save("run")
     assert (foldline.open("run")["steady"].parameters == first.parameters).all()
     assert (foldline.model(brusselator.text)([1.0, 2.0]) == brusselator([1.0, 2.0])).all()
 
 
-def test_a_missing_file_is_answered_with_the_one_that_is_there(brusselator, tmp_path, monkeypatch):
+def test_a_message_about_a_missing_file_suggests_an_existing_one(brusselator, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     brusselator.save("brusselator.toml")
     for make, what in ((foldline.model, "model"), (foldline.run, "study")):
@@ -193,7 +193,7 @@ def test_a_missing_file_is_answered_with_the_one_that_is_there(brusselator, tmp_
         foldline.run("run")
 
 
-def test_mistakes_in_the_text_of_a_study_are_told_with_their_line(brusselator):
+def test_mistakes_in_the_text_of_a_study_are_reported_with_their_line(brusselator):
     with pytest.raises(foldline.InputError) as refusal:
         foldline.run(STUDY.replace('"B"', '"b"'), brusselator)
     assert "<study>:9:8" in str(refusal.value)

@@ -11,7 +11,7 @@ import foldline
 
 PUBLIC = [getattr(foldline, name) for name in foldline.__all__]
 MODULES = ["foldline", *(f"foldline.{own.name}" for own in pkgutil.iter_modules(foldline.__path__) if own.name != "_native")]
-#: What needs no example: exceptions, and methods that draw, convert or store, whose examples would show nothing.
+#: Names that need no example: methods that draw, convert or store, whose examples would show nothing.
 QUIET = ("plot", "plotly", "to_pandas", "to_xarray", "save", "signed_spectrum", "at")
 
 
@@ -38,7 +38,7 @@ def test_everything_public_is_documented():
     assert not missing
 
 
-def test_parameters_returns_and_examples_are_there():
+def test_docstrings_have_parameters_returns_and_examples():
     wrong = []
     for name, part in members():
         if not inspect.isfunction(part):

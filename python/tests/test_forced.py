@@ -40,14 +40,14 @@ def test_the_resonance_has_two_folds_between_which_it_is_unstable(duffing):
     assert (branch.stable == ~between).all()
 
 
-def test_a_stable_point_is_where_simulation_settles(duffing):
+def test_simulation_settles_to_a_stable_point(duffing):
     branch = foldline.follow(duffing.settle("cycle"), "omega", (0.5, 1))
     point = branch[-1]
     track = duffing.simulate(point, 3 * point.period, times=[3 * point.period])
     assert np.abs(track.states[-1] - point.state).max() < 1e-5
 
 
-def test_the_same_as_the_file_of_the_model():
+def test_a_traced_model_agrees_with_the_model_file():
     model = foldline.model(os.path.join(ROOT, "models", "duffing-forced.toml"))
     again = foldline.model(equations=_equations(model), parameters=_values(model), frequency="omega")
     places = np.random.default_rng(2).normal(size=(20, 2))

@@ -1,4 +1,4 @@
-"""Ctrl-C, the interpreter's lock, and what is imported."""
+"""Ctrl-C, the interpreter's lock, and imports."""
 
 import _thread
 import os
@@ -18,7 +18,7 @@ STUDY = os.path.join(ROOT, "studies", "overhung-rotor", "bouncing.toml")
 
 @pytest.fixture(autouse=True)
 def heeded():
-    """Ctrl-C raises: a shell has what it starts in the background ignore it."""
+    """Makes Ctrl-C raise an exception, which processes started in the background by a shell ignore by default."""
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
     signal.signal(signal.SIGINT, before)
@@ -35,7 +35,7 @@ def long_study(tmp_path_factory):
 
 
 def interrupting(points):
-    """A progress that presses Ctrl-C once when so many points are there, and what it saw."""
+    """Returns a progress function that presses Ctrl-C once after a number of points, and the calls it received."""
     seen = []
 
     def show(count, special, place):
@@ -46,7 +46,7 @@ def interrupting(points):
     return show, seen
 
 
-def test_ctrl_c_stops_at_the_next_point_and_keeps_what_is_there(long_study):
+def test_ctrl_c_stops_at_the_next_point_and_keeps_earlier_results(long_study):
     show, seen = interrupting(1)
     with pytest.raises(foldline.Interrupted) as interrupt:
         foldline.run(long_study, progress=show)
@@ -102,13 +102,13 @@ def test_progress_counts_the_points(steady, brusselator):
     assert last[-1] == (len(branch), 1)
 
 
-def test_a_bar_is_shown_where_it_is_asked_for(brusselator, capfd):
+def test_a_bar_is_shown_on_request(brusselator, capfd):
     pytest.importorskip("tqdm")
     foldline.follow(brusselator.settle(), "B", (0.5, 4), progress=True)
     assert "1 special" in capfd.readouterr().err
 
 
-def test_nothing_heavy_is_imported_until_it_is_used():
+def test_heavy_packages_are_imported_on_first_use():
     code = (
         "import sys, foldline\n"
         "m = foldline.model(equations={'x': 'mu - x^2'}, parameters={'mu': 1.0})\n"

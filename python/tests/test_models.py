@@ -1,4 +1,4 @@
-"""Models three ways, and what is refused."""
+"""Models from files, expressions and functions, and refused input."""
 
 import os
 import pickle
@@ -15,7 +15,7 @@ PLACES = np.random.default_rng(1).normal(scale=2.0, size=(200, 4))
 
 
 @pytest.mark.parametrize("kappa", [0.0, 0.3, 1.0])
-def test_a_traced_function_is_the_model_file_to_the_last_bit(rotor, rotor_file, kappa):
+def test_a_traced_function_equals_the_model_file_to_the_last_bit(rotor, rotor_file, kappa):
     at = {"kappa": kappa}
     assert (rotor(PLACES, at) == rotor_file(PLACES, at)).all()
     assert (rotor(PLACES, at, outputs=True) == rotor_file(PLACES, at, outputs=True)).all()
@@ -38,7 +38,7 @@ def test_strings_symbols_and_functions_give_the_same_tape():
     assert (by_text(states) == by_function(states)).all()
 
 
-def test_every_function_of_numpy_that_is_traced_is_that_function():
+def test_every_traced_numpy_function_has_its_value():
     positive = {"sqrt", "log", "log10", "log2", "reciprocal"}
     small = {"arcsin", "arccos"}
     one = [
@@ -75,7 +75,7 @@ def test_conditions_arrays_and_constants_are_traced():
         assert np.allclose(model([x, y]), plain(x, y), rtol=1e-13, atol=1e-13)
 
 
-def test_long_sums_and_deep_nesting_are_written_so_that_they_can_be_read():
+def test_long_sums_and_deep_nesting_can_be_read_back():
     @foldline.model(states="x")
     def model(s, p):
         total, deep = 0.0, s.x
@@ -90,7 +90,7 @@ def test_long_sums_and_deep_nesting_are_written_so_that_they_can_be_read():
     assert model([0.3])[0] == pytest.approx(total + deep, rel=1e-13)
 
 
-def test_sympy_piecewise_and_rationals():
+def test_sympy_piecewise_and_rationals_are_converted():
     sympy = pytest.importorskip("sympy")
     x = sympy.Symbol("x")
     expression = sympy.Piecewise((sympy.sqrt(x) / 3 - sympy.Rational(2, 7) / (1 + x**2), x > 1), (sympy.pi * x, True))
@@ -141,7 +141,7 @@ def failing(s, p):
         (failing, "return s.x.missing()", "AttributeError"),
     ],
 )
-def test_what_cannot_be_traced_is_refused_with_the_line_and_the_remedy(function, line, words):
+def test_untraceable_operations_are_refused_with_line_and_remedy(function, line, words):
     with pytest.raises(foldline.TraceError) as refusal:
         foldline.model(states="x", parameters=dict(mu=1.0))(function)
     message = str(refusal.value)
@@ -156,7 +156,7 @@ def test_a_wrong_number_of_equations_is_refused():
         foldline.model(states="x y")(lambda s, p: s.x)
 
 
-def test_a_mistake_in_a_model_file_is_told_as_on_the_command_line(tmp_path):
+def test_a_mistake_in_a_model_file_is_reported_as_on_the_command_line(tmp_path):
     file = tmp_path / "wrong.toml"
     file.write_text('[parameters]\nmu = 1\n[states]\nx = "tahn(y)"\ny = "-x + nu"\n')
     with pytest.raises(foldline.InputError) as refusal:
@@ -171,7 +171,7 @@ def test_a_mistake_in_a_model_file_is_told_as_on_the_command_line(tmp_path):
         assert told.stderr.strip() == message.strip()
 
 
-def test_wrong_arguments_are_answered_with_the_cure(brusselator):
+def test_messages_about_wrong_arguments_give_the_remedy(brusselator):
     with pytest.raises(foldline.InputError, match=r"has no parameter `b`(.|\n)*help"):
         brusselator.settle(parameters={"b": 3})
     with pytest.raises(foldline.InputError, match="has no state `z`"):
@@ -205,7 +205,7 @@ def test_a_model_is_saved_read_and_pickled(brusselator, tmp_path):
         assert (model([1.0, 2.0]) == brusselator([1.0, 2.0])).all()
 
 
-def test_simulation_ends_where_the_solution_is_known():
+def test_simulation_agrees_with_the_exact_solution():
     model = foldline.model(equations={"x": "y", "y": "-x"})
     times = np.linspace(0, 2 * np.pi, 9)
     track = model.simulate({"x": 1, "y": 0}, 2 * np.pi, times=times, tolerance=1e-10)
@@ -235,14 +235,14 @@ def test_a_model_settles_from_a_state_in_any_form(brusselator):
         assert brusselator.settle(form, parameters=at).period == named.period
     track = brusselator.simulate({"x": 2, "y": 0}, 40, parameters=at)
     assert brusselator.settle(track, parameters=at).period == pytest.approx(named.period, rel=1e-6)
-    # From a solution its parameters are taken, unless others are given.
+    # A solution provides its parameters, unless others are given.
     assert brusselator.settle(named).period == pytest.approx(named.period, rel=1e-6)
     other = brusselator.settle(named, parameters={"B": 3.1})
     assert other["B"] == 3.1
     assert other.period > named.period
 
 
-def test_a_simulation_of_scipy_settles(brusselator):
+def test_a_result_of_scipy_can_be_settled(brusselator):
     integrate = pytest.importorskip("scipy.integrate")
     at = {"B": 3.0}
     sol = integrate.solve_ivp(lambda t, y: brusselator(y, at), (0, 40), [2.0, 0.0], rtol=1e-8, atol=1e-8)
@@ -258,7 +258,7 @@ def test_a_simulation_of_scipy_settles(brusselator):
         brusselator.settle(failed)
 
 
-def test_a_forced_simulation_is_carried_on_to_the_start_of_a_period(duffing):
+def test_a_forced_simulation_is_continued_to_the_start_of_a_period(duffing):
     """At omega = 1.5 two cycles attract: a state at the wrong phase may lead to the other one."""
     integrate = pytest.importorskip("scipy.integrate")
     at = {"omega": 1.5, "A": 0.3, "zeta": 0.05}

@@ -1,4 +1,4 @@
-"""The notebooks run, from the first cell to the last, and the results stored in them are those of the program.
+"""The notebooks run from the first cell to the last, and their stored results agree with the program.
 
 ``FOLDLINE_WRITE_NOTEBOOKS=1 pytest python/tests/test_notebooks.py`` stores new ones.
 """
@@ -10,7 +10,7 @@ import pytest
 from conftest import ROOT
 
 FOLDER = os.path.join(ROOT, "python", "notebooks")
-# Where along a branch its points lie depends on the last digits of the machine's elementary functions.
+# The positions of points along a branch depend on the last digits of the machine's elementary functions.
 RELATIVE = 1e-4
 
 
@@ -43,7 +43,7 @@ def number(word):
 
 
 def same(stored, found):
-    """Whether two results have the same words and, to the accuracy of the machine, the same numbers."""
+    """True if two results have the same words and, to the accuracy of the machine, the same numbers."""
     stored, found = stored.split(), found.split()
     return len(stored) == len(found) and all(map(agree, stored, found))
 
@@ -54,7 +54,7 @@ def agree(a, b):
         return a == b
     if "." not in a + b and "e" not in a + b:
         return x == y
-    # Error estimates have a size, not digits.
+    # Of error estimates only the magnitude matters.
     small = max(abs(x), abs(y)) < 1e-5
     return abs(x - y) < 1e-9 or (small and abs(x) < 10 * abs(y) and abs(y) < 10 * abs(x)) or abs(x - y) <= RELATIVE * abs(x)
 
@@ -76,7 +76,7 @@ def test_notebook(name, tmp_path):
         assert same(old, new), f"stored:\n{old}\nnow:\n{new}"
 
 
-def test_results_are_the_same_to_their_accuracy():
+def test_results_are_compared_to_their_accuracy():
     row = "<hopf of steady at B = 2 ± 2e-15, l1 = -0.50000>  0 → 2  1.4e-08"
     assert same(row, "<hopf of steady at B = 2 ± 4e-15, l1 = -0.50001>  0 → 2  2.4e-08")
     for other in (

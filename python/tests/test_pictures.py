@@ -1,4 +1,4 @@
-"""Pictures: which lines are drawn, and what they return."""
+"""Pictures: the lines drawn, and the values returned."""
 
 import numpy as np
 import pytest
@@ -68,7 +68,7 @@ def test_a_cycle_is_drawn_in_panels(cycles, rotor):
     drawn = sum(len(line.get_xdata()) for line in panels["multipliers"][1:])
     assert drawn == len(whirling.spectrum)
     assert panels["orbit"][0].axes.get_xlabel() == "u"
-    # Nothing is unstable, whatever side of 1 the trivial multiplier is on.
+    # No multiplier is unstable, whichever side of 1 the trivial one is on.
     assert len(panels["multipliers"][-1].get_xdata()) == whirling.unstable == 0
 
 
@@ -76,7 +76,7 @@ def test_an_equilibrium_is_drawn_as_its_eigenvalues(steady):
     assert list(steady[0].plot()) == ["multipliers"]
 
 
-def test_an_interactive_figure_tells_everything_on_hover(cycles):
+def test_an_interactive_figure_shows_details_on_hover(cycles):
     pytest.importorskip("plotly")
     figure = cycles.diagram.plotly()
     names = [trace.name for trace in figure.data]

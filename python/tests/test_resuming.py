@@ -1,4 +1,4 @@
-"""Branches that were killed go on where they stopped."""
+"""Branches that were killed resume where they stopped."""
 
 import subprocess
 import sys
@@ -10,7 +10,7 @@ import foldline
 
 from conftest import ROOT, traced_rotor
 
-#: A process that ends itself, without any tidying, as soon as points are there.
+#: A process that ends itself without cleaning up once points are stored.
 KILLED = """
 import os, sys
 sys.path.insert(0, {tests!r})
@@ -38,7 +38,7 @@ def test_a_branch_that_was_killed_resumes(start, tmp_path):
     whole = foldline.follow(start, "Omega", (0.5, 12), tolerance=1e-9)
     assert 0 < len(kept) < len(whole)
     assert resumed.complete
-    # What was in the file stays as it was. Beyond it step sizes may differ, depending on the instant of the kill; the curve does not.
+    # Stored points are unchanged. Beyond them step sizes may depend on the moment of the kill; the curve does not.
     stays = np.isin(resumed["position"], kept["position"])
     for column in ("position", "Omega", "period", "r_max", "unstable"):
         assert np.array_equal(resumed[column][stays], kept[column]), column
@@ -50,14 +50,14 @@ def test_a_branch_that_was_killed_resumes(start, tmp_path):
         foldline.follow(start, "Omega", (0.5, 11), resume=True, **again)
 
 
-def test_resuming_a_run_that_has_not_begun_begins_it(brusselator, steady, tmp_path):
+def test_resuming_a_run_that_has_not_begun_starts_it(brusselator, steady, tmp_path):
     rest = brusselator.settle()
     branch = foldline.follow(rest, "B", (0.5, 4), out=tmp_path / "branch", resume=True)
     assert (branch.parameters == steady.parameters).all()
     hopf = steady.special["hopf"][0]
     counts = []
     cycles = steady.switch(hopf, out=tmp_path / "cycles", resume=True, progress=lambda points, *_: counts.append(points))
-    # The branch that is known is stored, not computed again.
+    # The known branch is stored, not recomputed.
     assert counts[-1] == len(cycles)
     assert (cycles.diagram[steady.name]["newton"] == steady["newton"]).all()
     again = steady.switch(hopf, out=tmp_path / "cycles", resume=True)

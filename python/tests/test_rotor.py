@@ -1,4 +1,4 @@
-"""The rotor: a traced function and the model file give the same, to the last digit."""
+"""The rotor: a traced function and the model file give the same results to the last digit."""
 
 import os
 
@@ -42,13 +42,13 @@ def test_special_points_are_the_same_to_the_last_digit(traced, from_file):
         assert (a.spectrum == b.spectrum).all()
 
 
-def test_folds_lie_where_the_reference_study_has_them(traced):
-    """The figures of crates/foldline-cli/tests: contact SL turns at 3.35261 and 10.34062."""
+def test_folds_agree_with_the_reference_study(traced):
+    """The values of crates/foldline-cli/tests: contact SL has folds at 3.35261 and 10.34062."""
     folds = sorted(point["Omega"] for point in traced["contact SL"].special["fold"])
     assert np.allclose(folds, [3.352613, 10.340617], atol=2e-6)
 
 
-def test_a_branch_is_followed_and_switched_from_by_hand(rotor, traced):
+def test_a_branch_is_followed_and_switched_by_single_calls(rotor, traced):
     start = rotor.settle("2:1", parameters={"kappa": 1}, samples=48)
     assert start.ratio == (2, 1)
     branch = foldline.follow(start, "Omega", (0.5, 12))
@@ -88,7 +88,7 @@ def test_the_file_of_a_study_runs_with_any_model(rotor):
         assert (a.parameters == b.parameters).all()
 
 
-def test_a_family_is_brought_to_contact(rotor):
+def test_a_family_is_carried_to_contact(rotor):
     start = rotor.settle("2:1")
     found = foldline.homotopy(start, {"kappa": 1.0}, "Omega", (0.5, 12))
     assert found.arrived

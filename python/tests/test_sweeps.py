@@ -15,7 +15,7 @@ def closed():
 
 @pytest.fixture(scope="module")
 def cusp():
-    """x' = h + x - x³ turns at h = ±2/√27 = ±0.3849."""
+    """x' = h + x - x³ has folds at h = ±2/√27 = ±0.3849."""
     return foldline.model(equations={"x": "h + x - x^3"}, states={"x": dict(range=(-2, 2))}, parameters={"h": -1.0})
 
 
@@ -53,7 +53,7 @@ def test_a_sweep_of_a_model_starts_at_its_first_value(cusp):
     assert foldline.sweep(cusp, "h", (-1, 1), 21).jumps.round(9).tolist() == [[0.3, 0.4]]
 
 
-def test_an_output_with_a_corner_is_no_jump():
+def test_an_output_with_a_corner_makes_no_jump():
     """|x| has its smallest value at a corner, which every mesh meets a little differently."""
 
     @foldline.model(
@@ -78,7 +78,7 @@ def test_a_survey_has_attractors_with_basin_fractions(survey):
     assert np.unique(survey.value).tolist() == [-1.0, -0.5, 0.0, 0.5, 1.0]
     middle = survey.at(0.01)
     assert middle["value"].tolist() == [0.0, 0.0]
-    # Stated relative to scale plus size, here 1 + 1.
+    # The error is relative to scale plus size, here 1 + 1.
     assert (np.abs(np.sort(middle["x_max"]) - [-1.0, 1.0]) <= 2 * middle["error"].max()).all()
     assert 0 < middle["error"].max() <= 1e-6
     for value in np.unique(survey.value):
@@ -89,15 +89,15 @@ def test_a_survey_has_attractors_with_basin_fractions(survey):
     assert (low <= survey.share[:, 0]).all() and (survey.share[:, 0] <= high).all()
 
 
-def test_starts_that_escape_have_no_ranges_and_leave_those_of_others_alone():
-    """x' = mu - x² has no attractor below mu = 0; above, what starts below -√mu escapes and the rest goes to √mu."""
+def test_escaping_starts_have_no_ranges_and_do_not_affect_those_of_others():
+    """x' = mu - x² has no attractor below mu = 0; above it, starts below -√mu escape and the others go to √mu."""
     model = foldline.model(equations={"x": "mu - x^2"}, states={"x": dict(range=(-3, 3))}, parameters={"mu": 1.0})
     survey = foldline.survey(model, "mu", (-1, 1), 3, starts=16)
     assert survey.at(-1)["motion"].tolist() == ["escaped"]
     assert np.isnan(survey.at(-1)["x_max"]).all()
     one = survey.at(1)
     found = dict(zip(one["motion"], one["x_max"], strict=True))
-    # Stated relative to scale plus size, here 1.5 + 1.
+    # The error is relative to scale plus size, here 1.5 + 1.
     error = np.nanmax(one["error"])
     assert 0 < error <= 1e-6
     assert abs(found["equilibrium"] - 1) <= 2.5 * error
@@ -111,7 +111,7 @@ def test_starts_that_escape_have_no_ranges_and_leave_those_of_others_alone():
     assert abs(down["x_max"][0] - 1) <= 2.5 * down["error"][0] <= 2.5e-9
 
 
-def test_sweeps_and_surveys_are_tables_and_runs(loop, survey, tmp_path):
+def test_sweeps_and_surveys_convert_to_tables_and_runs(loop, survey, tmp_path):
     frame = loop.to_pandas()
     assert len(frame) == len(loop.value)
     assert "hits" not in frame and "jumped" in frame
@@ -131,7 +131,7 @@ def test_sweeps_and_surveys_are_tables_and_runs(loop, survey, tmp_path):
         loop["x_maxx"]
 
 
-def test_values_carry_units():
+def test_values_may_have_units():
     model = foldline.model(
         equations={"x": "h - k*x"},
         parameters={"h": dict(value=1.0, unit="mm/s"), "k": dict(value=1.0, unit="1/s")},
@@ -152,7 +152,7 @@ def test_sweeps_and_surveys_are_drawn_over_branches(cusp, loop, survey):
     lines = [own for own in both[len(alone) :] if hasattr(own, "get_xdata")]
     up, down = (own for own in lines if own.get_marker() in "<>")
     assert (up.get_marker(), down.get_marker()) == (">", "<")
-    # In print without colours the directions are told apart by the filling of their marks, too.
+    # In print without colours the directions differ by the filling of their marks.
     assert up.get_markerfacecolor() != "none" and down.get_markerfacecolor() == "none"
     assert [len(up.get_xdata()), len(down.get_xdata())] == [21, 20]
     jumps = [own for own in lines if own.get_linestyle() == ":"]
@@ -209,7 +209,7 @@ def linear():
     return foldline.model(equations={"x": "cos(w*t) - x"}, parameters={"w": 1.0}, frequency="w", outputs={"twice": "2*x"})
 
 
-def test_stroboscopic_points_lie_where_the_motion_is_known(linear):
+def test_stroboscopic_points_agree_with_a_known_motion(linear):
     points = foldline.strobe(linear, "w", (1, 2), 5, periods=3, transient=20, back=True)
     assert points.values.tolist() == [1.0, 1.25, 1.5, 1.75, 2.0, 1.75, 1.5, 1.25, 1.0]
     assert np.allclose(points["x"], 1 / (1 + points.values**2)[:, None], atol=1e-6)

@@ -1,7 +1,7 @@
-//! Time and memory of another program.
+//! Time and memory used by another program.
 //!
-//! **Idea.** The system tells a process what all of its children took together, and the memory of the largest. So each
-//! program is run by a copy of this one that has no other child.
+//! **Idea.** The system reports the total time of all children of a process, and the memory of the largest. Each
+//! program is therefore run by a copy of this one that has no other child.
 
 use crate::Outcome;
 use nix::sys::resource::{UsageWho, getrusage};
@@ -9,22 +9,22 @@ use std::path::Path;
 use std::process::{Command, ExitCode, Stdio};
 use std::time::Instant;
 
-/// What a program took.
+/// Resources used by a program.
 #[derive(Clone, Copy, Debug)]
 pub struct Usage {
-    /// Processor seconds, those of the system included.
+    /// Processor time in seconds, including that of the system.
     pub cpu: f64,
-    /// Seconds that passed.
+    /// Wall time in seconds.
     pub wall: f64,
     /// Largest resident memory in MB (10⁶ bytes).
     pub memory: f64,
 }
 
-/// What marks the line of numbers among the output of the program.
+/// Prefix of the line of numbers in the output of the program.
 const MARK: &str = "foldline-bench took";
 
-/// Runs a program in a folder; what it took, and its standard output. An exit code other than 0 or one of `allowed` is an
-/// error.
+/// Runs a program in a folder and returns the resources used and its standard output. An exit code other than 0 or one
+/// of `allowed` is an error.
 pub fn run(program: &Path, arguments: &[&str], folder: &Path, allowed: &[i32]) -> Outcome<(Usage, String)> {
     let out = Command::new(std::env::current_exe()?)
         .arg("measure")
@@ -44,7 +44,7 @@ pub fn run(program: &Path, arguments: &[&str], folder: &Path, allowed: &[i32]) -
     Ok((Usage { cpu, wall, memory }, text.into_owned()))
 }
 
-/// What the copy does: runs the command, and says what it took on standard error.
+/// Runs the command in the copy of this program and prints the resources used on standard error.
 pub fn measured(command: &[String]) -> ExitCode {
     let Some((program, arguments)) = command.split_first() else { return ExitCode::FAILURE };
     let start = Instant::now();

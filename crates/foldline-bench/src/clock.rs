@@ -1,8 +1,8 @@
-//! Processor time of this process, and what is made of several measurements.
+//! Processor time of this process, and statistics of several measurements.
 
 use nix::time::{ClockId, clock_gettime};
 
-/// Processor seconds of all threads of this process so far.
+/// Returns the processor time in seconds of all threads of this process so far.
 pub fn seconds() -> f64 {
     match clock_gettime(ClockId::CLOCK_PROCESS_CPUTIME_ID) {
         Ok(time) => time.tv_sec() as f64 + 1e-9 * time.tv_nsec() as f64,
@@ -10,14 +10,14 @@ pub fn seconds() -> f64 {
     }
 }
 
-/// Processor seconds that a call takes, and what it returns.
+/// Returns the processor time in seconds that a call takes, and its result.
 pub fn timed<T>(call: impl FnOnce() -> T) -> (f64, T) {
     let start = seconds();
     let value = call();
     (seconds() - start, value)
 }
 
-/// Processor seconds of one call: the best of five rounds, each long enough for the clock.
+/// Returns the processor time in seconds of one call: the best of five rounds, each long enough for the clock.
 pub fn best(mut call: impl FnMut()) -> f64 {
     const ROUND: f64 = 0.02;
     let (first, ()) = timed(&mut call);
@@ -25,7 +25,7 @@ pub fn best(mut call: impl FnMut()) -> f64 {
     (0..5).map(|_| timed(|| (0..count).for_each(|_| call())).0 / count as f64).fold(f64::INFINITY, f64::min)
 }
 
-/// The middle one; the mean of the middle two of an even number.
+/// Returns the median; for an even number of values, the mean of the middle two.
 pub fn median(values: &[f64]) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -35,12 +35,12 @@ pub fn median(values: &[f64]) -> f64 {
     }
 }
 
-/// The smallest one.
+/// Returns the smallest value.
 pub fn least(values: &[f64]) -> f64 {
     values.iter().copied().fold(f64::INFINITY, f64::min)
 }
 
-/// The exponent b of the power law y = a xᵇ that fits best in logarithms.
+/// Returns the exponent b of the least-squares fit of y = a xᵇ in logarithms.
 pub fn exponent(x: &[f64], y: &[f64]) -> f64 {
     let logs: Vec<(f64, f64)> = x.iter().zip(y).map(|(x, y)| (x.ln(), y.ln())).collect();
     let n = logs.len() as f64;
@@ -54,14 +54,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_power_law_has_its_exponent() {
+    fn the_exponent_of_a_power_law_is_recovered() {
         let x = [50.0, 100.0, 200.0, 800.0];
         let y = x.map(|v: f64| 3e-6 * v.powf(1.2));
         assert!((exponent(&x, &y) - 1.2).abs() < 1e-12);
     }
 
     #[test]
-    fn the_median_is_in_the_middle() {
+    fn the_median_is_the_middle_value() {
         assert_eq!(median(&[3.0, 1.0, 2.0]), 2.0);
         assert_eq!(median(&[4.0, 1.0, 2.0, 3.0]), 2.5);
     }

@@ -1,9 +1,9 @@
-//! On what, when and from which source a report was made.
+//! Machine, date and source version of a report.
 
 use crate::workplace::Workplace;
 use std::process::Command;
 
-/// Lines of a Markdown list.
+/// Returns a Markdown list that describes the machine and the source version.
 pub fn described(place: &Workplace) -> String {
     let said = |program: &str, arguments: &[&str]| {
         let out = Command::new(program).args(arguments).current_dir(&place.root).output();
@@ -31,7 +31,7 @@ pub fn described(place: &Workplace) -> String {
     )
 }
 
-/// Today, as 2026-03-01.
+/// Returns today's date in the form 2026-03-01.
 pub fn date() -> Option<String> {
     let out = Command::new("date").arg("+%F").output().ok()?;
     Some(String::from_utf8_lossy(&out.stdout).trim().to_string()).filter(|date| date.len() == 10)

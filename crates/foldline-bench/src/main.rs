@@ -1,12 +1,12 @@
-//! Benchmarks of foldline, alone and beside other programs: what `cargo xtask bench` runs.
+//! Benchmarks of foldline alone and in comparison with other programs, run by `cargo xtask bench`.
 //!
-//! **Idea.** Every number is processor time of one process or thread, so that a busy machine disturbs it little; what is
-//! compared is measured in turn, in one run on one machine, and compared as the median of the ratios. Nothing here looks
-//! inside the program: cases use the public interface or the command.
+//! **Idea.** Times are processor times of one process or thread, which a busy machine affects little. Programs that are
+//! compared are measured alternately, in one run on one machine; the result is the median of the ratios. All cases use
+//! the public interface or the command.
 //!
 //! | question | file |
 //! |---|---|
-//! | how is time taken, in this process and of another? | [`clock`], [`child`] |
+//! | how is time measured, in this process and in another? | [`clock`], [`child`] |
 //! | which machine is this? | [`machine`] |
 //! | what is reported, and how? | [`report`] |
 //! | which cases are there? | [`own`], [`peers`] |
@@ -30,11 +30,11 @@ const USAGE: &str = "foldline-bench [--peers] [--only PART] [--quick] [--write]
   --quick      fewer repetitions, no instruction counts
   --write      write the report to benches/results/DATE.md";
 
-/// What `foldline` allocates with.
+/// Allocator of the command `foldline`.
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 
-/// Whatever goes wrong ends the benchmark with a sentence.
+/// Result whose error ends the benchmark with a message.
 type Outcome<T> = Result<T, Box<dyn std::error::Error>>;
 
 fn main() -> ExitCode {
@@ -71,7 +71,7 @@ fn bench(arguments: &[String]) -> Outcome<()> {
     }
     for (name, part) in parts.into_iter().filter(|(name, _)| name.contains(&only)) {
         eprintln!("{name}");
-        // A part that fails says so in the report; the others go on.
+        // A failed part is noted in the report; the others continue.
         let text = part(&place).unwrap_or_else(|error| format!("Not measured: {error}\n"));
         report.add(name, &text);
     }

@@ -1,16 +1,16 @@
-//! The report: parts with tables, in Markdown.
+//! Report in Markdown: parts with tables.
 
 use crate::workplace::Workplace;
 use crate::{Outcome, machine};
 use std::path::PathBuf;
 
-/// A report that grows; every part is shown when it is added.
+/// Report; every part is printed when it is added.
 pub struct Report {
     text: String,
 }
 
 impl Report {
-    /// Begins with the machine.
+    /// Begins a report with the description of the machine.
     pub fn new(machine: String) -> Report {
         let text = format!("# Benchmarks\n\nHow they are made: docs/book/benchmarks.md.\n\n{machine}");
         println!("{text}");
@@ -35,32 +35,32 @@ impl Report {
     }
 }
 
-/// A table in Markdown.
+/// Table in Markdown.
 pub struct Table {
     columns: usize,
     text: String,
 }
 
 impl Table {
-    /// The heads of the columns; the first is a name, the others are numbers.
+    /// Begins a table with the given column headings; the first column is a name, the others are numbers.
     pub fn new(heads: &[&str]) -> Table {
         let rule: Vec<&str> = heads.iter().enumerate().map(|(k, _)| if k == 0 { "---" } else { "---:" }).collect();
         Table { columns: heads.len(), text: format!("| {} |\n| {} |\n", heads.join(" | "), rule.join(" | ")) }
     }
 
-    /// One more row; missing cells stay empty.
+    /// Adds a row; missing cells stay empty.
     pub fn row<S: AsRef<str>>(&mut self, cells: &[S]) {
         let cells = (0..self.columns).map(|k| cells.get(k).map_or("", |cell| cell.as_ref()));
         self.text.push_str(&format!("| {} |\n", cells.collect::<Vec<_>>().join(" | ")));
     }
 
-    /// The text.
+    /// Returns the table as text.
     pub fn text(&self) -> &str {
         &self.text
     }
 }
 
-/// Seconds with a fitting unit and three digits.
+/// Formats a time in seconds with a suitable unit and three digits.
 pub fn time(seconds: f64) -> String {
     let (value, unit) = match seconds {
         s if s < 1e-3 => (s * 1e6, "µs"),
@@ -70,7 +70,7 @@ pub fn time(seconds: f64) -> String {
     format!("{} {unit}", digits(value))
 }
 
-/// Three significant digits without an exponent.
+/// Formats a number with three significant digits and no exponent.
 pub fn digits(value: f64) -> String {
     let places = if !value.is_finite() || value == 0.0 { 0 } else { 2 - value.abs().log10().floor() as i32 };
     format!("{value:.*}", places.clamp(0, 9) as usize)

@@ -1,4 +1,4 @@
-//! The rotor and its first cycles, as every part uses them.
+//! Overhung rotor and its first cycles, shared by all parts.
 
 use crate::Outcome;
 use crate::workplace::Workplace;
@@ -9,14 +9,14 @@ use foldline::explore::{self, Plan, Switching, System};
 use foldline::problem::cycle::CycleProblem;
 use foldline_store::study_file::{Study, read_study};
 
-/// The study of figure 7.
+/// Study of figure 7.
 pub const FIGURE_7: &str = "studies/overhung-rotor/bouncing.toml";
-/// The single loop of the cubic rotor from Ω = 5 to 10.
+/// Study of the single loop of the cubic rotor from Ω = 5 to 10.
 pub const SINGLE_LOOP: &str = "benches/studies/cubic-single-loop.toml";
-/// Index of Ω.
+/// Index of the parameter Ω.
 pub const OMEGA: usize = 0;
 
-/// A study of the repository.
+/// Reads a study of the repository.
 pub fn study(place: &Workplace, name: &str) -> Outcome<Study> {
     read_study(&place.study(name)).map_err(|found| {
         let lines: Vec<String> = found.iter().map(|diagnostic| diagnostic.to_string()).collect();
@@ -24,13 +24,14 @@ pub fn study(place: &Workplace, name: &str) -> Outcome<Study> {
     })
 }
 
-/// The first point of every branch of a study that starts at a seed, as what an interrupted run has: a run that goes on
-/// from there samples no attractors.
+/// Returns the diagram of an interrupted run with only the first point of every branch that starts at a seed. A run
+/// that continues from it samples no attractors.
 pub fn beginnings(study: &Study) -> Diagram {
     beginnings_at(study, study.plan.tolerance)
 }
 
-/// The same as accurate as `tolerance`: a closed branch does not find back to a start that is less accurate than itself.
+/// Returns the first points with accuracy `tolerance`. A closed branch does not close at a start that is less accurate
+/// than the branch itself.
 pub fn beginnings_at(study: &Study, tolerance: f64) -> Diagram {
     let mut plan = Plan { tolerance, ..study.plan.clone() };
     for branch in &mut plan.branches {
@@ -41,23 +42,23 @@ pub fn beginnings_at(study: &Study, tolerance: f64) -> Diagram {
     diagram
 }
 
-/// Carries out a plan on one thread.
+/// Runs a plan on one thread.
 pub fn run(study: &Study, plan: &Plan, earlier: Diagram) -> Diagram {
     explore::run(&System::of_plan(&study.model, plan), plan, 1, earlier, &Unobserved)
 }
 
-/// The point at which a branch begins.
+/// Returns the first point of a branch.
 pub fn first(branch: &Branch) -> Outcome<&Point> {
     let first = branch.points.iter().find(|point| point.position == 0);
     first.ok_or_else(|| format!("{} has no first point", branch.name).into())
 }
 
-/// The largest value of the first output.
+/// Returns the largest value of the first output.
 pub fn r_max(point: &Point, states: usize) -> f64 {
     point.ranges.get(states).map_or(f64::NAN, |range| range[1])
 }
 
-/// The same cycle at the same parameters, as accurate as `tolerance`.
+/// Recomputes a cycle at the same parameters with accuracy `tolerance`.
 pub fn refined(system: &System, point: &Point, tolerance: f64) -> Outcome<Point> {
     let settings = settings(system, tolerance, [f64::NEG_INFINITY, f64::INFINITY], 0);
     let mut problem = problem_of(system, OMEGA, 4, point, false);
@@ -65,7 +66,8 @@ pub fn refined(system: &System, point: &Point, tolerance: f64) -> Outcome<Point>
     Ok(found.point)
 }
 
-/// A cycle on another mesh, as unknowns of the problem there, the free parameter being `free`.
+/// Transfers a cycle to another mesh. Returns the boundary-value problem on that mesh, with the free parameter `free`,
+/// and its unknowns.
 pub fn on_mesh<'a>(
     system: &'a System,
     point: &Point,

@@ -1,50 +1,50 @@
-//! Which problems.
+//! Problems of the campaign.
 
 use crate::TOLERANCE;
 use crate::random::Random;
 use foldline::model::Model;
 use foldline_store::study_file::{Study, parse_study};
 
-/// Where the first solutions of a case come from.
+/// Source of the first solutions of a case.
 #[derive(Clone, Debug)]
 pub enum First {
-    /// Everything that a plan with one branch of its own finds, what is switched to included.
+    /// All branches found by a plan with one branch, including those reached by branch switching.
     Planned,
-    /// What sampling finds at these parameters, brought to this value of the parameter of that index.
+    /// Attractors found by sampling initial conditions, then continued to another value of one parameter.
     Sampled {
-        /// Every parameter `[k]` where samples are taken.
+        /// Values of all parameters `[k]` at which samples are taken.
         parameters: Vec<f64>,
-        /// Index of the parameter that changes then, and its value in the end.
+        /// Index of the parameter that is changed afterwards, and its final value.
         to: (usize, f64),
         /// Seed of the random numbers.
         random: u64,
     },
 }
 
-/// A problem.
+/// Problem of the campaign.
 #[derive(Clone, Debug)]
 pub struct Case {
-    /// What it is called in the report.
+    /// Name in the report.
     pub name: String,
-    /// The study: model, range, what to switch to.
+    /// Study: model, range, branch switching.
     pub study: Study,
-    /// Where first solutions come from.
+    /// Source of the first solutions.
     pub first: First,
-    /// The one tolerance.
+    /// Relative tolerance.
     pub tolerance: f64,
-    /// True if no cycle of the model can approach an equilibrium without shrinking to it. A period that seems to grow without bound is
-    /// then a fault: a canard explosion mistaken for a homoclinic orbit.
+    /// True if no cycle of the model can approach an equilibrium without shrinking to it. A period that seems to grow
+    /// without bound is then an error: a canard explosion mistaken for a homoclinic orbit.
     pub bounded: bool,
 }
 
 impl Case {
-    /// The model.
+    /// Returns the model.
     pub fn model(&self) -> &Model {
         &self.study.model
     }
 }
 
-/// A model, its text, and the lines of the tables `seed` and `branch`, in which `{}` of the seed stands for a value between
+/// Name, model text, and lines of the tables `seed` and `branch`. `{}` in the seed stands for a random value between
 /// the two bounds.
 struct Classical {
     name: &'static str,
@@ -134,7 +134,7 @@ const CLASSICAL: &[Classical] = &[
     },
 ];
 
-/// The classical problems, each with so many different starts.
+/// Returns the classical problems, each with `starts` different starts.
 pub fn classical(starts: usize) -> Vec<Case> {
     let each = |k: usize| {
         CLASSICAL.iter().enumerate().map(move |(i, problem)| {
@@ -153,10 +153,10 @@ pub fn classical(starts: usize) -> Vec<Case> {
     (0..starts).flat_map(each).collect()
 }
 
-/// A study of one branch, "b".
+/// Returns a study with one branch, "b".
 ///
 /// # Panics
-/// Where the texts are wrong: they are part of this program.
+/// If the texts, which are part of this program, are not a valid study.
 pub fn study(model: &str, seed: &str, branch: &str) -> Study {
     let text = format!(
         "model = \"m\"\ntolerance = {TOLERANCE}\n[[seed]]\nname = \"s\"\n{seed}\n[[branch]]\nname = \"b\"\nfrom = \"s\"\n{branch}\n"

@@ -1,7 +1,7 @@
-//! How large are the errors really?
+//! True errors of points.
 //!
-//! **Idea.** The point is computed again for a thousandth of the tolerance, in the hyperplane through it across the branch, so that it
-//! does not move along the branch meanwhile.
+//! **Idea.** A point is recomputed with a thousandth of the tolerance in the hyperplane through it that is normal to
+//! the branch, so that it does not move along the branch.
 
 use crate::DEGREE;
 use foldline::continuation::Settings;
@@ -10,37 +10,37 @@ use foldline::diagram::{Branch, Cost, Point, Solution};
 use foldline::explore::System;
 use foldline::explore::growth::problem_of;
 
-/// How much finer the second computation is.
+/// Tolerance of the second computation, relative to the first.
 const FINER: f64 = 1e-3;
-/// Places along a cycle at which two are compared.
+/// Number of times in a period at which two cycles are compared.
 const PLACES: usize = 400;
 
-/// Intervals from which on a point is not computed again.
+/// Number of mesh intervals from which on a point is not recomputed.
 const MOST: usize = 800;
 
-/// A point's stated and true error.
+/// Stated and true error of a point.
 #[derive(Clone, Debug)]
 pub struct Honesty {
-    /// Where, for the report.
+    /// Description of the point for the report.
     pub place: String,
-    /// What the point states.
+    /// Stated relative error of the solution: discretisation error plus residual.
     pub stated: f64,
-    /// The largest difference of profile, period and extreme values, relative.
+    /// Largest relative difference of profile, period and extrema.
     pub found: f64,
-    /// The largest difference of a multiplier, relative to the larger of 1 and its size.
+    /// Largest difference of a multiplier, relative to the larger of 1 and its modulus.
     pub multipliers: f64,
-    /// What the point states about its multipliers.
+    /// Stated error of the multipliers.
     pub stated_multipliers: f64,
 }
 
-/// Computes up to `count` cycles of a branch again. Those that do not converge are left out and counted.
+/// Recomputes up to `count` cycles of a branch. Returns their errors, and the number of cycles that did not converge.
 pub fn sampled(system: &System, settings: &Settings, branch: &Branch, count: usize) -> (Vec<Honesty>, usize) {
     let fine = Settings { tolerance: FINER * settings.tolerance, ..settings.clone() };
     let all = branch.points.len();
     let chosen = (0..count.min(all)).map(|k| &branch.points[(2 * k + 1) * all / (2 * count.min(all))]);
     let mut failed = 0;
     let mut out = Vec::new();
-    // Next to an orbit of infinite period a mesh for a thousandth of the tolerance is out of reach.
+    // Near an orbit of infinite period, a mesh for a thousandth of the tolerance would be too large.
     let reachable = |point: &&Point| match &point.solution {
         Solution::Cycle(cycle) => !point.tangent.is_empty() && cycle.intervals() < MOST,
         Solution::Equilibrium(_) => false,
@@ -66,7 +66,7 @@ fn compared(system: &System, branch: &Branch, point: &Point, better: &Point) -> 
     let sizes: Vec<f64> = (0..n).map(|i| size(i) + system.scales[i]).collect();
     let profile = x.iter().zip(&y).enumerate().fold(0.0f64, |most, (k, (a, b))| most.max((a - b).abs() / sizes[k % n]));
     let period = (a.period / b.period).ln().abs();
-    // The stated error is one of states and period; outputs follow from them.
+    // The stated error covers states and period only; outputs follow from them.
     let ranges = point
         .ranges
         .iter()
@@ -90,7 +90,7 @@ fn compared(system: &System, branch: &Branch, point: &Point, better: &Point) -> 
     })
 }
 
-/// Each multiplier against the nearest of the other list that is left.
+/// Largest difference of a multiplier, each paired with the nearest one still unpaired, starting with the largest.
 fn spectrum_difference(point: &Point, better: &Point) -> f64 {
     let mut left: Vec<_> = better.spectrum.clone();
     let mut most = 0.0f64;

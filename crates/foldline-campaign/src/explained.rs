@@ -2,8 +2,9 @@
 
 use foldline::diagram::{Branch, Ending, Kind};
 
-/// Changes of the unstable count that no special point explains, one line each: points of kind `unexplained`, counts that differ from
-/// one point to the next, and a closed branch that ends with another count than it began with.
+/// Returns the changes of the number of unstable eigenvalues or multipliers that no special point explains, one line
+/// each: points of kind `unexplained`, numbers that differ from one point to the next, and a closed branch whose first
+/// and last number differ.
 pub fn unexplained(branch: &Branch) -> Vec<String> {
     let value = |point: &foldline::diagram::Point| point.parameters.get(branch.free).copied().unwrap_or(f64::NAN);
     let stated = branch.special.iter().filter(|s| s.kind == Kind::Unexplained);
@@ -30,8 +31,9 @@ pub fn unexplained(branch: &Branch) -> Vec<String> {
     lines
 }
 
-/// Special points whose change of the unstable count does not fit their kind, one line each: folds and period doublings change it by
-/// one, Hopf and torus points by pairs, marks not at all.
+/// Returns the special points at which the number of unstable eigenvalues or multipliers changes in a way that does not
+/// fit their kind, one line each. Folds and period doublings change it by one, Hopf and torus points by pairs, marks
+/// not at all.
 pub fn misfits(branch: &Branch) -> Vec<String> {
     let fits = |kind: Kind, change: usize| match kind {
         Kind::Fold | Kind::PeriodDoubling => change == 1,

@@ -1,18 +1,18 @@
-//! A campaign: many problems, each branch followed several times, and what must not depend on how.
+//! Campaign: many problems, whose branches are continued in several ways with results that must agree.
 //!
-//! **Idea.** A branch is a set of solutions. Where it is entered and how long the first step is must change neither its special
-//! points nor its ends. So each branch is followed from its start with first steps over three decades, and again from
-//! two of its own points, and the special points are compared within the errors they state. Some of its points are computed
-//! anew for a thousandth of the tolerance, which shows what their errors really are.
+//! **Idea.** A branch is a set of solutions, so its special points and ends must depend neither on the starting point
+//! nor on the first step size. Each branch is therefore continued from its start with first steps over three decades,
+//! and again from points on it. The special points are compared within their stated errors. Some points are recomputed
+//! with a thousandth of the tolerance to measure their true errors.
 //!
 //! | question | file |
 //! |---|---|
 //! | which problems? | [`cases`], [`rotor`], [`drawn`] |
-//! | how is a branch followed, and from where? | [`routes`] |
-//! | are these the same special points? | [`same`] |
-//! | how large are the errors really? | [`errors`] |
+//! | how is a branch continued, and from where? | [`routes`] |
+//! | do two runs have the same special points? | [`same`] |
+//! | how large are the true errors? | [`errors`] |
 //! | is every change of stability explained? | [`explained`] |
-//! | do units matter? | [`rescaled`] |
+//! | do results depend on units? | [`rescaled`] |
 //! | what is reported? | [`report`] |
 //! | how long may it take? | [`watch`] |
 //! | are published and independent results reproduced? | [`outside`] |
@@ -36,15 +36,16 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
-/// The one tolerance.
+/// Relative tolerance of every case.
 pub const TOLERANCE: f64 = 1e-6;
 /// Degree of the collocation polynomials.
 pub const DEGREE: usize = 4;
 
-/// Default time limit of a case. A factor of safety: 200 rotors together take some 4 minutes of processor time.
+/// Default time limit of a case, a generous safety margin: 200 rotors together take about 4 minutes of processor time.
 pub const LIMIT: Duration = Duration::from_secs(300);
 
-/// Examines every case, over that many threads and each within `limit`; `tell` is called with the report of each as it comes.
+/// Examines every case on `jobs` threads, each within `limit`. `tell` is called with the index and report of each case
+/// as it finishes.
 pub fn campaign(cases: &[Case], jobs: usize, limit: Duration, tell: &(dyn Fn(usize, &Report) + Sync)) -> Report {
     let next = AtomicUsize::new(0);
     let done: Mutex<Vec<(usize, Report)>> = Mutex::new(Vec::new());

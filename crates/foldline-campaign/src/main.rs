@@ -1,4 +1,4 @@
-//! `foldline-campaign [COUNT] [OPTIONS]`: what `cargo xtask campaign` runs.
+//! `foldline-campaign [COUNT] [OPTIONS]`, the program behind `cargo xtask campaign`.
 
 use foldline_campaign::{LIMIT, campaign, cases, drawn, rescaled, rotor};
 use std::process::ExitCode;

@@ -1,13 +1,13 @@
-//! Random numbers that are the same on every machine.
+//! Reproducible random numbers, identical on every machine.
 //!
 //! **Source.** steele2014 (splitmix).
 
-/// A stream of random numbers.
+/// Stream of random numbers.
 #[derive(Clone, Debug)]
 pub struct Random(u64);
 
 impl Random {
-    /// The stream of that number.
+    /// Returns the stream with the given number.
     pub fn new(stream: u64) -> Random {
         let mut random = Random(stream.wrapping_mul(0xd134_2543_de82_ef95));
         random.next();
@@ -22,12 +22,12 @@ impl Random {
         z ^ (z >> 31)
     }
 
-    /// Uniform in [low, high).
+    /// Returns a random number uniform in [low, high).
     pub fn uniform(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * (self.next() >> 11) as f64 / (1u64 << 53) as f64
     }
 
-    /// Its logarithm is uniform.
+    /// Returns a random number in [low, high) whose logarithm is uniform.
     pub fn logarithmic(&mut self, low: f64, high: f64) -> f64 {
         self.uniform(low.ln(), high.ln()).exp()
     }

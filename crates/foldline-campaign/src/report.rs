@@ -1,41 +1,41 @@
-//! What is reported.
+//! Report of a campaign.
 
 use crate::errors::Honesty;
 use std::fmt;
 
-/// Counts, and what failed.
+/// Counts and failures.
 #[derive(Clone, Debug, Default)]
 pub struct Report {
-    /// Problems.
+    /// Number of cases.
     pub cases: usize,
-    /// Branches.
+    /// Number of branches.
     pub branches: usize,
-    /// Times that a branch was followed.
+    /// Number of continuation runs.
     pub runs: usize,
-    /// Accepted points.
+    /// Number of accepted points.
     pub points: usize,
-    /// Special points of the branches, each once.
+    /// Number of special points on the branches, each counted once.
     pub special: usize,
-    /// Solutions that could not be brought to the parameters of the case.
+    /// Number of solutions that could not be carried to the parameters of the case.
     pub not_brought: usize,
-    /// Sides that ended, by the code of the ending.
+    /// Number of sides that ended, by the code of the ending.
     pub endings: Vec<(String, usize)>,
-    /// Sides that ended short: where, and why.
+    /// Sides that ended short, one line each with the reason.
     pub short: Vec<String>,
-    /// Runs with other special points or ends than the first one: a line for each difference.
+    /// Differences in special points or ends between a run and the first one, one line each.
     pub differences: Vec<String>,
-    /// Changes of stability without explanation.
+    /// Unexplained changes of stability, one line each.
     pub unexplained: Vec<String>,
-    /// Points that were computed again.
+    /// Errors of the points that were recomputed.
     pub honesty: Vec<Honesty>,
-    /// Points that could not be computed again.
+    /// Number of points that could not be recomputed.
     pub not_again: usize,
-    /// The special points of every run, for those who look closer.
+    /// Points and special points of every run, for inspection.
     pub traces: Vec<String>,
 }
 
 impl Report {
-    /// Adds another one.
+    /// Adds another report.
     pub fn add(&mut self, mut other: Report) {
         self.cases += other.cases;
         self.branches += other.branches;
@@ -52,7 +52,7 @@ impl Report {
         self.traces.append(&mut other.traces);
     }
 
-    /// Counts sides that ended like that.
+    /// Counts sides that ended with the given code.
     pub fn ended(&mut self, code: &str, count: usize) {
         match self.endings.iter_mut().find(|(known, _)| known == code) {
             Some((_, total)) => *total += count,
@@ -60,13 +60,13 @@ impl Report {
         }
     }
 
-    /// Whether everything came out as it should.
+    /// True without differences, unexplained changes of stability and sides that ended short.
     pub fn good(&self) -> bool {
         self.differences.is_empty() && self.unexplained.is_empty() && self.short.is_empty()
     }
 
-    /// Shares of the points that were computed again whose true error is at most the stated one, and whose stated one is at
-    /// most 100 times the true one.
+    /// Returns two fractions of the recomputed points: those whose true error is at most the stated one, and those
+    /// whose stated error is at most 100 times the true one.
     pub fn shares(&self) -> [f64; 2] {
         let all = self.honesty.len().max(1) as f64;
         let count = |kept: &dyn Fn(&Honesty) -> bool| self.honesty.iter().filter(|h| kept(h)).count() as f64 / all;

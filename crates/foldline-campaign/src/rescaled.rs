@@ -1,9 +1,9 @@
-//! The same problems in other units.
+//! Invariance of diagrams under changes of units.
 //!
-//! **Idea.** A diagram must not depend on the units in which a model is written. Every state, every parameter and the time of a case are
-//! multiplied by a power of ten of its own, in the equations, the ranges and the study. What comes out is brought back to the first
-//! units and compared: the same branches with the same ends, and the same special points: their parameters and periods within the errors that they
-//! state, their stability, and the eigenvalues of equilibria.
+//! **Idea.** A diagram must not depend on the units in which a model is written. Every state, every parameter and the
+//! time of a case are multiplied by powers of ten, in the equations, the ranges and the study. The result is converted
+//! back to the original units and compared: branches and their ends, parameters and periods of special points within
+//! their stated errors, stability, and eigenvalues of equilibria.
 
 use crate::cases::Case;
 use crate::random::Random;
@@ -19,7 +19,7 @@ use std::time::Duration;
 /// Largest exponent of ten.
 const MOST: i32 = 12;
 
-/// By what each quantity is multiplied.
+/// Factors by which the quantities are multiplied.
 #[derive(Clone, Debug)]
 struct Units {
     states: Vec<f64>,
@@ -27,20 +27,20 @@ struct Units {
     time: f64,
 }
 
-/// What came out.
+/// Result of the comparison.
 #[derive(Clone, Debug, Default)]
 pub struct Report {
-    /// Cases in other units.
+    /// Number of cases in other units.
     pub cases: usize,
-    /// Branches in the first units.
+    /// Number of branches in the original units.
     pub branches: usize,
-    /// Of those, with as many points in the other units.
+    /// Number of branches with the same number of points in the other units.
     pub as_many: usize,
-    /// Points in the first and in the other units.
+    /// Number of points in the original and in the other units.
     pub points: [usize; 2],
-    /// Special points in the first units.
+    /// Number of special points in the original units.
     pub special: usize,
-    /// What differs.
+    /// Differences, one line each.
     pub differences: Vec<String>,
 }
 
@@ -66,7 +66,7 @@ impl fmt::Display for Report {
     }
 }
 
-/// Every case in `draws` sets of random units.
+/// Runs every case in `draws` sets of random units and compares the results with those in the original units.
 pub fn rescaled(cases: &[Case], draws: usize, limit: Duration, tell: &dyn Fn(&Report)) -> Report {
     let mut whole = Report::default();
     for (number, case) in cases.iter().enumerate() {
@@ -127,15 +127,15 @@ fn compared(case: &Case, base: Option<&Diagram>, number: u64, limit: Duration) -
     report
 }
 
-/// Differences between special points at equal places: the period, the counts of unstable eigenvalues or multipliers, and the
-/// largest eigenvalue.
+/// Returns differences between matching special points: in the period, the numbers of unstable eigenvalues or
+/// multipliers, and the largest eigenvalue.
 fn others(base: &Branch, back: &Branch) -> Vec<String> {
     /// Factor by which an eigenvalue may be more sensitive than the parameter.
     const SENSITIVE: f64 = 1e3;
     let value = |special: &SpecialPoint| special.point.parameters[base.free];
     let period = |special: &SpecialPoint| special.point.solution.period().unwrap_or(1.0);
     let modulus = |point: &Point| point.spectrum.iter().fold(0.0, |most: f64, z| most.max(z.norm()));
-    // At a fold of a single state no eigenvalue is left.
+    // Relative to the whole branch, because at a fold of a scalar equation the only eigenvalue vanishes.
     let size = base.points.iter().map(modulus).fold(0.0, f64::max);
     let mut lines = Vec::new();
     for special in &base.special {
@@ -151,7 +151,7 @@ fn others(base: &Branch, back: &Branch) -> Vec<String> {
         if (periods[0] / periods[1]).ln().abs() > allowed {
             lines.push(format!("{place}: the period is {} instead of {}", periods[1], periods[0]));
         }
-        // A branch may be followed the other way round.
+        // A branch may be traversed in the opposite direction.
         let counts = [special, other].map(|own| {
             let [a, b] = [own.unstable_before, own.unstable_after];
             [a.min(b), a.max(b)]
@@ -179,14 +179,14 @@ impl Units {
         let mut random = Random::new(340_000 + number);
         let mut power = || 10f64.powi(random.uniform(f64::from(-MOST), f64::from(MOST + 1)).floor() as i32);
         let mut states: Vec<f64> = model.states.iter().map(|_| power()).collect();
-        // The two states of a complex signal have one unit.
+        // The two states of a complex signal share a unit.
         if let Some([u, v]) = model.whirl {
             states[v] = states[u];
         }
         Units { states, parameters: model.parameters.iter().map(|_| power()).collect(), time: power() }
     }
 
-    /// The model in these units.
+    /// Returns the model in these units.
     fn model(&self, text: &str) -> Model {
         let source = parse_source(text, "model").unwrap_or_else(|found| panic!("{text}\n{found:?}"));
         let factor = |name: &str| {
@@ -232,7 +232,7 @@ impl Units {
         new
     }
 
-    /// A branch in the first units, in which it is `base`.
+    /// Converts a branch back to the original units, in which it is `base`.
     fn back(&self, branch: &Branch, base: &Branch) -> Branch {
         let mut new = branch.clone();
         new.units = base.units;
@@ -259,13 +259,13 @@ impl Units {
     }
 }
 
-/// An expression in which every name that has a `factor` stands for what it was, over that.
+/// Divides every name in an expression that has a `factor` by that factor.
 fn replaced(expression: &str, factor: &dyn Fn(&str) -> Option<f64>) -> String {
     let mut new = String::new();
     let mut rest = expression;
     while let Some(first) = rest.chars().next() {
         let starts = first.is_alphabetic() || first == '_';
-        // A number takes its exponent with it.
+        // A number includes its exponent.
         let belongs = |c: char| c.is_alphanumeric() || c == '_' || (!starts && c == '.');
         let length = match starts || first.is_ascii_digit() || first == '.' {
             true => rest.find(|c| !belongs(c)).unwrap_or(rest.len()),

@@ -5,12 +5,13 @@ use crate::cases::{Case, First, study};
 use crate::random::Random;
 
 const MODEL: &str = include_str!("../../../models/overhung-rotor.toml");
-/// Damping below which samples take long to settle: solutions are found with this much, and brought to less.
+/// Damping below which samples take long to settle. Solutions are found at this damping and then carried to a smaller
+/// one.
 const SETTLING: f64 = 0.01;
 
-/// Rotors number `numbers.start` to `numbers.end - 1`: damping over four decades, unbalance from a twentieth to twice the
-/// clearance, contact stiffness from 1 to 50 with a sharpness of 15 times that, even numbers with the cubic spring and odd ones
-/// with the ring.
+/// Returns the rotors with the given numbers: damping over four decades, unbalance from a twentieth of the clearance to
+/// twice the clearance, contact stiffness from 1 to 50 with a sharpness of 15 times the stiffness. Even numbers have
+/// the cubic spring, odd ones the ring.
 pub fn rotors(numbers: std::ops::Range<usize>) -> Vec<Case> {
     numbers.map(rotor).collect()
 }

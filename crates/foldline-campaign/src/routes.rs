@@ -1,4 +1,4 @@
-//! How a branch is followed, and from where.
+//! Repeated continuation of a branch from different starts and with different first steps.
 
 use crate::DEGREE;
 use crate::cases::{Case, First};
@@ -15,22 +15,22 @@ use foldline::explore::growth::{Beginning, Growth, is_doubled, polished, problem
 use foldline::explore::{self, System};
 use std::time::Duration;
 
-/// First steps, the middle one being the usual one.
+/// First steps, one below and one above the default.
 const FIRST_STEPS: [f64; 2] = [2e-4, 0.2];
-/// Where along a branch it is entered again, as shares of its points.
+/// Points from which a branch is continued again, as fractions of its number of points.
 const ENTRANCES: [f64; 2] = [0.23, 0.81];
-/// Slope of a branch of cycles in its parameter below which it is not entered.
+/// Parameter component of the tangent below which a branch of cycles is not entered.
 const STANDS: f64 = 1e-7;
-/// Points per side at which a run gives up.
+/// Limit on the number of points per side.
 const MOST_POINTS: usize = 4000;
-/// How many points of a branch are computed again.
+/// Number of points of a branch that are recomputed.
 const AGAIN: usize = 8;
-/// Samples from which first solutions come.
+/// Number of samples in the search for first solutions.
 const SAMPLES: usize = 32;
-/// Cycles per case.
+/// Largest number of cycles per case.
 const CYCLES: usize = 3;
 
-/// Follows everything of one case in every way.
+/// Continues all branches of a case in every way.
 pub fn examine(case: &Case, limit: Duration) -> Report {
     let watch = Watch::start(limit);
     let mut report = Report { cases: 1, ..Report::default() };
@@ -86,7 +86,7 @@ fn unfinished(case: &Case, report: &mut Report) {
     report.short.push(format!("{}: the case did not end within its time", case.name));
 }
 
-/// Common arguments of the functions that follow a branch.
+/// Common arguments of the functions that continue a branch.
 #[derive(Clone, Copy)]
 struct Way<'a> {
     system: &'a System<'a>,
@@ -96,7 +96,7 @@ struct Way<'a> {
     bounded: bool,
 }
 
-/// A solution at another value of a parameter, along a branch in it.
+/// Continues a solution to another value of a parameter.
 fn brought(
     system: &System,
     watch: &Watch,
@@ -139,14 +139,14 @@ fn grown(
     start: &Point,
     sides: [bool; 2],
 ) -> Option<Branch> {
-    /// Slope below which a point is next to a fold.
+    /// Parameter component of the tangent below which a point is near a fold.
     const STEEP: f64 = 1e-2;
     let mut problem = problem_of(system, branch.free, DEGREE, start, is_doubled(&branch));
     let turns = start.parameter_slope().abs() < STEEP;
     let mut station = polished(&mut *problem, settings, start);
     if (turns || station.is_err()) && !start.tangent.is_empty() {
-        // Next to a fold, or where only the period still changes, the parameter is a bad thing to hold: it may lead to the other side, or to
-        // another branch.
+        // Near a fold, or where only the period still changes, the parameter must not be fixed: the correction could
+        // lead to the other side of the fold or to another branch.
         problem = problem_of(system, branch.free, DEGREE, start, is_doubled(&branch));
         let u = problem.unknowns_of(start);
         problem.anchor(&u);
@@ -170,7 +170,7 @@ fn grown(
     Some(branch)
 }
 
-/// Follows a branch again in every way and compares.
+/// Continues a branch again in every way and compares the results.
 fn routes(way: Way, case: &str, base: &Branch, parents: &[SpecialPoint], report: &mut Report) {
     let Way { system, settings, watch, bounded } = way;
     let place = format!("{case}: {}", base.name);
@@ -182,7 +182,7 @@ fn routes(way: Way, case: &str, base: &Branch, parents: &[SpecialPoint], report:
     report
         .honesty
         .extend(points.into_iter().map(|h| errors::Honesty { place: format!("{place} at {}", h.place), ..h }));
-    // A branch that was switched to begins where another ends, and cannot be entered in other ways but from inside.
+    // A switched branch begins at a special point of its parent, so it can be re-entered only from its interior.
     let seeded = matches!(base.origin, Origin::Seed(_));
     let start = base.points.iter().find(|p| p.position == 0);
     let mut compare = |how: &str, settings: &Settings, start: &Point| {
@@ -197,7 +197,8 @@ fn routes(way: Way, case: &str, base: &Branch, parents: &[SpecialPoint], report:
             return;
         };
         count(&format!("{place}: {how}"), &other, bounded, report);
-        // What is switched to ends at the special point of its parent, which a branch from inside only knows as nearly.
+        // A switched branch ends at a special point of its parent. Continuation from the interior locates that end less
+        // accurately.
         let slack = if seeded { 0.0 } else { 10.0 * settings.tolerance };
         let lines = differences(base, &other, slack);
         if let Some(first) = lines.first() {
@@ -217,14 +218,14 @@ fn routes(way: Way, case: &str, base: &Branch, parents: &[SpecialPoint], report:
             compare(&format!("first step {first_step}"), &settings, start);
         }
     }
-    // Where a period without bound is all that still changes, the parameter says nothing about where one is.
+    // If only the unbounded period still changes, the parameter does not determine the position on the branch.
     let stands = |p: &Point| p.solution.period().is_some() && p.parameter_slope().abs() < STANDS;
     let fits = |p: &&Point| p.position != 0 && !p.is_light() && !stands(p);
     let mut starts: Vec<&Point> = ENTRANCES
         .iter()
         .filter_map(|share| base.points.get((share * base.points.len() as f64) as usize).filter(fits))
         .collect();
-    // Next to a fold a branch that comes back does not pass the value that the parameter had in the beginning.
+    // If the start is at a fold, a returning branch may not reach the parameter value of the start again.
     if base.special.iter().any(|special| special.kind == Kind::Fold) {
         let slope = |p: &&Point| p.parameter_slope().abs();
         starts.extend(base.points.iter().filter(fits).min_by(|a, b| slope(a).total_cmp(&slope(b))));
@@ -236,14 +237,14 @@ fn routes(way: Way, case: &str, base: &Branch, parents: &[SpecialPoint], report:
     }
 }
 
-/// Codes of both ends, in a fixed order: a branch entered the other way round has them exchanged.
+/// Codes of both ends, sorted, because a branch traversed in the opposite direction has them exchanged.
 fn codes(branch: &Branch) -> Vec<String> {
     let mut codes: Vec<String> = branch.ends.iter().map(|end| end.as_ref().map_or("none".to_string(), told)).collect();
     codes.sort();
     codes
 }
 
-/// Everything about one run, a line for each point and special point.
+/// Formats a run with one line per point and special point.
 fn trace(place: &str, branch: &Branch) -> String {
     use std::fmt::Write;
     let mut text = format!("== {place}: {:?}\n", branch.ends);
@@ -289,12 +290,12 @@ fn trace(place: &str, branch: &Branch) -> String {
     text
 }
 
-/// The end of a branch for comparison. Meeting points of branches are extrapolated, accurate to a few digits; the last value of an unbounded
-/// period depends on the last step.
+/// Formats the end of a branch for comparison. Points where branches meet are extrapolated and accurate to a few digits
+/// only; the last value of an unbounded period depends on the last step.
 fn told(end: &Ending) -> String {
     match end {
         Ending::Joined { at, parameter } => format!("joined at {at} {parameter:.3}"),
-        // How far the period had grown depends on the last steps.
+        // The last period depends on the last steps.
         Ending::PeriodUnbounded(_) | Ending::Connecting { .. } => end.code().to_string(),
         other => other.to_string(),
     }

@@ -1,12 +1,13 @@
-//! Are these the same special points?
+//! Comparison of the special points of two runs.
 
 use foldline::diagram::{Branch, SpecialPoint};
 
-/// A special point of one list that the other lacks, or has elsewhere: a sentence each.
+/// Returns one line per special point that one branch lacks or has at another parameter.
 ///
-/// Two are the same if they are of one kind and differ in the parameter by no more than their stated errors together, and the
-/// `slack` of the comparison, relative to the scale of the parameter + |value|. Special points that lie closer together than their errors cannot be told
-/// apart, nor their order: of those, what is compared is where they are and what they do to stability together.
+/// Two special points match if they are of one kind and their parameters differ by at most the sum of their stated
+/// errors and `slack`, relative to the scale of the parameter + |value|. Special points closer together than their
+/// errors cannot be distinguished, nor can their order. Of such a cluster, position and joint effect on stability are
+/// compared.
 pub fn differences(base: &Branch, other: &Branch, slack: f64) -> Vec<String> {
     let free = base.free;
     let value = |special: &SpecialPoint| special.point.parameters.get(free).copied().unwrap_or(f64::NAN);
@@ -57,8 +58,8 @@ pub fn differences(base: &Branch, other: &Branch, slack: f64) -> Vec<String> {
     lines
 }
 
-/// What the special points of a list that cannot be told apart from `special` do together: the counts of unstable multipliers
-/// on both sides, the smaller first; `None` where there is nothing.
+/// Joint effect on stability of the special points in a list that cannot be distinguished from `special`: the numbers
+/// of unstable eigenvalues or multipliers on both sides, the smaller first; `None` if there is no such point.
 fn net(base: &Branch, special: &SpecialPoint, list: &[SpecialPoint]) -> Option<[usize; 2]> {
     let value = |s: &SpecialPoint| s.point.parameters.get(base.free).copied().unwrap_or(f64::NAN);
     let period = |s: &SpecialPoint| s.point.solution.period().unwrap_or(1.0);

@@ -3,7 +3,7 @@
 use foldline::contract::{Event, Observer, Verdict};
 use std::time::{Duration, Instant};
 
-/// Asks every branch of a case to stop once its time is over.
+/// Observer that stops every branch of a case once its time is over.
 #[derive(Clone, Copy, Debug)]
 pub struct Watch {
     start: Instant,

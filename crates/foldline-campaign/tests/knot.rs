@@ -1,8 +1,10 @@
-//! Special points closer together than the error of the solutions between which they lie, and a start among them.
+//! Clusters of bifurcations: special points closer together than the error of the solutions between them, and a start
+//! among them.
 //!
-//! 6:1 cycles of rotor 103 of the campaign, at a damping of 8.6e-5. At Ω = 2.545785651 a fold, a torus point 6e-8 and a period
-//! doubling 1.2e-6 of arclength behind it; at Ω = 2.545853802 a fold and a doubling 1.4e-8 behind it. Two meshes of the one
-//! tolerance differ by 3e-8 there. The order is that of runs at a tolerance of 3e-9.
+//! 6:1 cycles of rotor 103 of the campaign, at a damping of 8.6e-5. At Ω = 2.545785651 there is a fold, followed by a
+//! torus point at 6e-8 and a period doubling at 1.2e-6 in arclength; at Ω = 2.545853802 a fold, followed by a period
+//! doubling at 1.4e-8. Solutions on two meshes for the same tolerance differ by 3e-8 there. The expected order is that
+//! of runs with a tolerance of 3e-9.
 
 use foldline::continuation::{Follow, Homecoming, Item, Settings, Station, follow};
 use foldline::contract::{Unobserved, Verdict};
@@ -16,7 +18,7 @@ use foldline_campaign::cases::{Case, First};
 use foldline_campaign::rotor::rotors;
 use foldline_campaign::{DEGREE, TOLERANCE};
 
-/// A cycle: Ω, the period, a state (u, v, du, dv).
+/// Cycle: Ω, the period, a state (u, v, u', v').
 struct Place(f64, f64, [f64; 4]);
 
 const BESIDE_THREE: Place = Place(
@@ -24,7 +26,7 @@ const BESIDE_THREE: Place = Place(
     23.046254354806077,
     [-1.0940053313824278, -0.1800891969289397, -1.0447578512023208, 0.5358191036516666],
 );
-/// Between the torus point and the doubling.
+/// Cycle between the torus point and the period doubling.
 const AMONG_THREE: Place = Place(
     2.545785657,
     23.046256891,
@@ -36,7 +38,7 @@ const BESIDE_TWO: Place = Place(
     [-1.0715173051038271, -0.1902244753196616, -1.1122295901786816, 0.42947526248533147],
 );
 
-/// The cycle as a trajectory has it, on the mesh of its steps.
+/// Integrates a trajectory over one period and returns the cycle on the mesh of the integration steps.
 fn sampled(system: &System, case: &Case, Place(omega, period, state): &Place) -> Point {
     let First::Sampled { parameters, to: (index, value), .. } = &case.first else { unreachable!("a rotor is sampled") };
     let mut parameters = parameters.clone();
@@ -100,7 +102,8 @@ fn grown(system: &System, settings: &Settings, start: Station) -> Branch {
     branch
 }
 
-/// Kinds and counts of the special points, which must say of every change of the count where it happens.
+/// Returns kinds and numbers of unstable multipliers of the special points. Asserts that they explain every change of
+/// that number.
 #[track_caller]
 fn told(branch: &Branch) -> Vec<(Kind, usize, usize)> {
     let mut count = branch.points[0].unstable;
@@ -117,7 +120,7 @@ fn told(branch: &Branch) -> Vec<(Kind, usize, usize)> {
 }
 
 #[test]
-fn special_points_closer_together_than_meshes_agree_are_told_apart() {
+fn special_points_closer_together_than_the_discretisation_error_are_resolved() {
     let case = &rotors(103..104)[0];
     let system = System::of_plan(case.model(), &case.study.plan);
     let three = [(Kind::Fold, 1, 2), (Kind::Torus, 2, 0), (Kind::PeriodDoubling, 0, 1)];
@@ -135,11 +138,12 @@ fn special_points_closer_together_than_meshes_agree_are_told_apart() {
 }
 
 #[test]
-fn a_start_among_special_points_that_lie_close_together_is_met_again() {
+fn a_branch_started_within_a_cluster_of_special_points_closes() {
     let case = &rotors(103..104)[0];
     let system = System::of_plan(case.model(), &case.study.plan);
     let settings = settings(&system, TOLERANCE, [0.5, 12.0], 14);
-    // From far in front of the knot, where Ω falls; behind its fold, where the start is, it rises. Travel is towards smaller positions.
+    // Continuation begins far before the cluster, where Ω decreases. After the fold, where the start is, Ω increases.
+    // The direction is that of decreasing positions.
     let beside = grown(&system, &settings, station(&system, &settings, &sampled(&system, case, &BESIDE_THREE)));
     let ends = [&beside.points[0], &beside.points[beside.points.len() - 1]];
     let far = ends.into_iter().find(|end| end.free_spectrum()[0].re > 0.0).unwrap();

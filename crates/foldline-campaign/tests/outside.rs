@@ -1,4 +1,4 @@
-//! Problems of others: those that are right and quick come out right, and the checks can tell right from wrong.
+//! External problems: the quick ones pass, and the checks distinguish right from wrong values.
 
 use foldline_campaign::outside::expectations::{Check, Problem, Right, Run};
 use foldline_campaign::outside::reporting::{Line, Verdict, counts, placed, renewed, text};
@@ -6,7 +6,7 @@ use foldline_campaign::outside::running::Program;
 use foldline_campaign::outside::{folder, judged};
 
 #[test]
-fn quick_problems_of_others_come_out_right() {
+fn quick_external_problems_pass_all_checks() {
     let problems = Problem::all(&folder()).expect("the problems can be read");
     let mut wrong = Vec::new();
     let mut checks = 0;
@@ -23,7 +23,7 @@ fn quick_problems_of_others_come_out_right() {
 }
 
 #[test]
-fn every_right_value_has_a_source_and_every_run_its_files() {
+fn every_expected_value_has_a_source_and_every_run_its_files() {
     for problem in Problem::all(&folder()).expect("the problems can be read") {
         assert!(
             !problem.source.is_empty() && !problem.question.is_empty() && !problem.runs.is_empty(),
@@ -37,7 +37,7 @@ fn every_right_value_has_a_source_and_every_run_its_files() {
     }
 }
 
-/// The fold of x' = 1 - mu/s - x² at s = 1e-6, with one check.
+/// Evaluates one check on the fold of x' = 1 - mu/s - x² at s = 1e-6.
 fn fold_with(check: &str) -> Line {
     let mut problem = Problem::read(&folder().join("fold-at-any-scale")).expect("it can be read");
     let run = problem.runs.iter().find(|run| run.file == "s-1e-6.toml").expect("it is there").clone();
@@ -54,7 +54,7 @@ fn is(check: &str, right: bool) {
 }
 
 #[test]
-fn a_wrong_value_is_called_wrong() {
+fn wrong_values_fail_their_checks() {
     is("special = { kind = 'fold', at = { mu = [1e-6, 1e-13] }, changes = [1, 0] }", true);
     is("special = { kind = 'fold', at = { mu = [1.001e-6, 1e-13] } }", false);
     is("special = { kind = 'fold', at = { mu = [1e-6, 1e-13] }, changes = [0, 2] }", false);
@@ -86,7 +86,7 @@ fn a_wrong_value_is_called_wrong() {
 }
 
 #[test]
-fn results_and_the_table_count_each_problem_for_itself() {
+fn results_and_the_table_count_each_problem_separately() {
     let line =
         |problem: &str, verdict: Verdict| Line { problem: problem.into(), run: "r".into(), check: "c".into(), verdict };
     let lines =

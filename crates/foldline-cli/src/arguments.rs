@@ -1,4 +1,4 @@
-//! What can be typed.
+//! Command-line arguments.
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
@@ -168,7 +168,7 @@ pub struct Budget {
     pub time: Option<Duration>,
 }
 
-/// Default budget of points, as of the argument. Empirical: several hundred branches of a few hundred points each.
+/// Default budget of points. Empirical: several hundred branches of a few hundred points each.
 const POINTS: u32 = 100_000;
 
 /// Parses a number of points or a time.
@@ -286,7 +286,7 @@ pub struct Table {
     pub unit: Vec<String>,
 }
 
-/// Which table.
+/// Table to print.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum What {
     Special,

@@ -1,4 +1,4 @@
-//! `foldline attractors`: where sampled initial states settle.
+//! `foldline attractors`: the attractors reached from sampled initial states.
 
 use crate::arguments::Attractors as Typed;
 use crate::failure::{Failure, Outcome};
@@ -17,7 +17,7 @@ use std::io::{Write, stdout};
 
 const TOLERANCE: f64 = 1e-6;
 
-/// Prints the attractors of a model, the number of hits of each, and its basin fraction.
+/// Prints the attractors of a model, each with its number of hits and its basin fraction.
 pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
     let (model, text) = read_model(&typed.model)?;
     let parameters = parameters(&typed.set, &model)?;

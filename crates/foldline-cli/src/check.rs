@@ -1,4 +1,4 @@
-//! `foldline check`: is a model or study right?
+//! `foldline check`: checks a model or study file.
 
 use crate::arguments::Check as Typed;
 use crate::failure::{Failure, Outcome};
@@ -10,10 +10,10 @@ use foldline_store::study_file::{is_study, read_study};
 use std::collections::BTreeSet;
 use std::io::{Write, stdout};
 
-/// Says that a file is right, or fails with everything that is wrong with it.
+/// Confirms that a file is correct, or fails with every mistake found in it.
 pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
     let file = &typed.file;
-    // A file that cannot be read is answered by the reader of models, which says why.
+    // If the file cannot be read, the model reader reports why.
     let text = std::fs::read_to_string(file).unwrap_or_default();
     let verdict = if is_study(&text) {
         let study = read_study(file)?;
@@ -41,7 +41,7 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
     Ok(Outcome::Done)
 }
 
-/// Says what is doubtful about the units, and which of them are not known.
+/// Reports doubtful and unknown units.
 fn remarks(model: &Model) -> std::io::Result<()> {
     let mut out = stdout();
     model.remarks.iter().try_for_each(|remark| writeln!(out, "{remark}"))?;

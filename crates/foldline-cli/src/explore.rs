@@ -1,6 +1,6 @@
-//! `foldline explore`: the whole diagram of a model, from a box of parameters.
+//! `foldline explore`: the whole bifurcation diagram of a model over a box of parameters.
 //!
-//! What was typed becomes a study with one `[[explore]]`, which is run, recorded and resumed like any other.
+//! The arguments become a study with one `[[explore]]` table, which is run, recorded and resumed like any other.
 
 use crate::arguments::Explore as Typed;
 use crate::failure::{Failure, Outcome};
@@ -31,7 +31,7 @@ pub fn diagram(typed: &Typed) -> Result<Outcome, Failure> {
     carried_out(&study, &Way { jobs, resume: typed.resume, limit, units: &typed.unit, folder: &folder })
 }
 
-/// The study that does what was typed.
+/// Study equivalent to the arguments.
 fn study(typed: &Typed, model: &Model) -> Result<String, Failure> {
     let free = ranged("--free", &typed.free, model)?;
     let connect = typed.connect.as_ref().map(|text| ranged("--connect", text, model)).transpose()?;
@@ -48,7 +48,7 @@ fn study(typed: &Typed, model: &Model) -> Result<String, Failure> {
             let message = format!("--set {text}: this is the free parameter, whose range is given by --free");
             return Err(Failure::typed(message, "remove this --set"));
         }
-        // The last one counts.
+        // The last value given counts.
         set.retain(|(other, _)| *other != name);
         set.push((name, value));
     }
@@ -99,7 +99,7 @@ fn study(typed: &Typed, model: &Model) -> Result<String, Failure> {
     Ok(text)
 }
 
-/// `NAME=LOW:HIGH`.
+/// Parses `NAME=LOW:HIGH`.
 fn ranged(option: &str, typed: &str, model: &Model) -> Result<(String, [f64; 2]), Failure> {
     let said = |message: &str, cure: &str| Failure::typed(format!("{option} {typed}: {message}"), cure);
     let example = format!("write {option} NAME=LOW:HIGH, for example {option} Omega=0.5:12");

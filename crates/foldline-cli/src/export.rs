@@ -1,4 +1,4 @@
-//! `foldline export`: a run for other programs.
+//! `foldline export`: a run in the formats of other programs.
 
 use crate::arguments::{Export as Typed, ExportFormat};
 use crate::failure::{Failure, Outcome};
@@ -6,7 +6,7 @@ use crate::table::{asked_for, conversion};
 use crate::verbosity::report;
 use foldline_store::export::{Export, ExportError, Format};
 
-/// Writes a run in another format and says where.
+/// Writes a run in another format and reports the path.
 pub fn write(typed: &Typed) -> Result<Outcome, Failure> {
     let mut export = Export::open(&typed.folder)?;
     export.profiles = !typed.no_profiles;

@@ -1,4 +1,4 @@
-//! How a command can end.
+//! Outcomes of a command.
 
 use foldline_store::diagnostic::Diagnostic;
 use foldline_store::run_file::RunFileError;
@@ -6,37 +6,37 @@ use std::fmt::Display;
 use std::io::{ErrorKind, Write};
 use std::process::ExitCode;
 
-/// A command that did what was asked.
+/// Result of a command that ran to its end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// All of it.
+    /// Everything requested was done.
     Done,
-    /// Except that some branch ended short.
+    /// Some branches ended short.
     Short,
-    /// And found something wrong with a run.
+    /// A run was found to be wrong.
     Wrong,
 }
 
-/// A command that could not.
+/// Reason why a command failed.
 #[derive(Debug)]
 pub enum Failure {
     /// Mistakes in files, each with its place.
     Files(Vec<Diagnostic>),
-    /// A mistake in what was typed, or in the state of a folder; the message says the cure.
+    /// A mistake on the command line or in the state of a folder; the message includes the remedy.
     Typed(String),
-    /// Something outside failed.
+    /// A failure outside the program.
     Outside(String),
-    /// The reader of the output has gone.
+    /// The reader of the output has closed it.
     NoReader,
 }
 
 impl Failure {
-    /// A mistake, and what would be right.
+    /// A mistake on the command line, and its remedy.
     pub fn typed(message: impl Display, cure: impl Display) -> Failure {
         Failure::Typed(format!("{message}\n  help: {cure}"))
     }
 
-    /// Says what is wrong on standard error.
+    /// Reports the failure on standard error.
     pub fn report(self) -> ExitCode {
         let (text, code) = match self {
             Failure::Files(found) => {
@@ -47,7 +47,7 @@ impl Failure {
             Failure::Outside(message) => (format!("error: {message}"), 1),
             Failure::NoReader => return ExitCode::SUCCESS,
         };
-        // If standard error is gone too, the exit code alone has to say it.
+        // If standard error is closed too, only the exit code can report the failure.
         let _ = writeln!(std::io::stderr(), "{text}");
         ExitCode::from(code)
     }

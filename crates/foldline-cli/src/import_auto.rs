@@ -1,4 +1,4 @@
-//! `foldline import-auto`: the solutions in files of AUTO-07p as a table, or as a study that starts from them.
+//! `foldline import-auto`: solutions from AUTO-07p files as a table, or as a study that starts from them.
 
 use crate::arguments::{Format, ImportAuto as Typed};
 use crate::failure::{Failure, Outcome};
@@ -10,7 +10,7 @@ use foldline_store::study_file::parse_study;
 use std::io::stdout;
 use std::path::{Path, PathBuf};
 
-/// A file of solutions, and what the files beside it tell.
+/// A file of solutions, with the names found in the files beside it.
 struct Source {
     path: PathBuf,
     solutions: Vec<Labelled>,
@@ -31,7 +31,7 @@ pub fn answer(typed: &Typed) -> Result<Outcome, Failure> {
     }
 }
 
-/// Each file of solutions with the names from files that were given, or that lie beside it.
+/// Files of solutions, with names from the files given or from those in the same folder.
 fn sources(files: &[PathBuf]) -> Result<Vec<Source>, Failure> {
     let (named, solved): (Vec<&PathBuf>, Vec<&PathBuf>) =
         files.iter().partition(|file| begins(file, &["b.", "c.", "fort.7", "fort.2"]));
@@ -65,7 +65,7 @@ fn begins(file: &Path, prefixes: &[&str]) -> bool {
     prefixes.iter().any(|prefix| name.starts_with(prefix))
 }
 
-/// The solutions with these labels, all where there are none.
+/// Solutions with these labels; all solutions if there are no labels.
 fn chosen<'s>(sources: &'s [Source], labels: &[i64]) -> Result<Vec<(&'s Source, &'s Labelled)>, Failure> {
     let all: Vec<_> = sources.iter().flat_map(|source| source.solutions.iter().map(move |s| (source, s))).collect();
     if let Some(label) = labels.iter().find(|label| all.iter().all(|(_, s)| s.label != **label)) {
@@ -76,7 +76,7 @@ fn chosen<'s>(sources: &'s [Source], labels: &[i64]) -> Result<Vec<(&'s Source, 
     Ok(all.into_iter().filter(|(_, s)| labels.is_empty() || labels.contains(&s.label)).collect())
 }
 
-/// label, what it is, the free parameters, period, mesh.
+/// Table of solutions: label, type, free parameters, period, mesh.
 fn listed(chosen: &[(&Source, &Labelled)]) -> Table {
     let column = Column::new;
     let mut free: Vec<(usize, String)> = Vec::new();
@@ -137,7 +137,7 @@ fn written(typed: &Typed, model_path: &Path, chosen: &[(&Source, &Labelled)]) ->
         ));
     }
     let text = study(&model, &named_from(&output, model_path)?, &all)?;
-    // What is written can be read, or something is wrong that the user should see now.
+    // Reads the study back: a mistake in it should be reported now, not when it is run.
     parse_study(&text, &output.display().to_string(), &model_text, &model_path.display().to_string())?;
     std::fs::write(&output, text).map_err(|error| {
         Failure::typed(format!("cannot write {}: {error}", output.display()), "choose a file in a writable folder")
@@ -153,14 +153,14 @@ fn stem(file: &str) -> String {
     name.strip_prefix("s.").unwrap_or(&name).to_string()
 }
 
-/// The path of the model as a study at `output` has to name it.
+/// Path of the model as a study at `output` must name it.
 fn named_from(output: &Path, model: &Path) -> Result<String, Failure> {
     let beside = output.parent().is_none_or(|folder| folder.as_os_str().is_empty());
     let path = if beside || model.is_absolute() { model.to_path_buf() } else { std::path::absolute(model)? };
     Ok(path.display().to_string())
 }
 
-/// `1=p1` and so on.
+/// Parses assignments such as `1=p1`.
 fn assignments(option: &str, typed: &[String]) -> Result<Vec<(usize, String)>, Failure> {
     let one = |text: &String| {
         let (number, name) = text.split_once('=')?;

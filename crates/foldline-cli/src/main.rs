@@ -1,4 +1,4 @@
-//! The command `foldline`: what was typed → what is planned → run → table.
+//! The command `foldline`: arguments → plan → run → table.
 
 mod arguments;
 mod attractors;
@@ -23,7 +23,7 @@ use clap::Parser;
 use failure::{Failure, Outcome};
 use std::process::ExitCode;
 
-/// Meshes change size all the time: what is given back is kept for the next one, and not asked of the system again.
+/// Meshes change size all the time; this allocator reuses freed memory instead of returning it to the system.
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 

@@ -1,4 +1,4 @@
-//! `foldline new`: a commented model and study to begin with.
+//! `foldline new`: a commented model and study as a starting point.
 
 use crate::arguments::New as Typed;
 use crate::failure::{Failure, Outcome};
@@ -10,7 +10,7 @@ use std::fs::OpenOptions;
 use std::io::{ErrorKind, Write, stdout};
 use std::path::{Path, PathBuf};
 
-/// A model and a study of it.
+/// A model with a study of it.
 struct Template {
     name: &'static str,
     about: &'static str,
@@ -51,7 +51,7 @@ const TEMPLATES: [Template; 4] = [
     template!("chain", "a driven chain of masses: repetition, resonances", "-o chain.png --y tip_max"),
 ];
 
-/// Writes the files of a template, or a study for a model; without either lists what there is.
+/// Writes the files of a template, or a study for a model; without either, lists the templates.
 pub fn write(typed: &Typed) -> Result<Outcome, Failure> {
     match (&typed.template, &typed.study) {
         (Some(name), _) => template(name, typed.out.as_deref()),
@@ -89,7 +89,7 @@ fn study_of(file: &Path, folder: Option<&Path>) -> Result<Outcome, Failure> {
     let (model, _) = read_model(file)?;
     let beside = file.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let folder = folder.unwrap_or(beside);
-    // As the study sees it: by its name beside it, else by its full path.
+    // The study names a model in its own folder by file name, any other by full path.
     let named = match (std::path::absolute(beside)? == std::path::absolute(folder)?, file.file_name()) {
         (true, Some(name)) => PathBuf::from(name),
         _ => std::path::absolute(file)?,
@@ -138,7 +138,7 @@ fn study_text(model: &Model, file: &Path) -> Result<String, Failure> {
     ))
 }
 
-/// Writes new files; refuses if one of them exists, before any is written.
+/// Writes new files; writes none if one of them already exists.
 fn create(files: &[(PathBuf, &str)]) -> Result<(), Failure> {
     if let Some((file, _)) = files.iter().find(|(file, _)| file.exists()) {
         let message = format!("{} already exists and is not overwritten", file.display());

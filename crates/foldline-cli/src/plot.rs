@@ -1,4 +1,4 @@
-//! `foldline plot`: the diagram of a run as a picture.
+//! `foldline plot`: the bifurcation diagram of a run as a picture.
 
 use crate::arguments::Plot as Typed;
 use crate::failure::{Failure, Outcome};
@@ -43,7 +43,7 @@ pub fn write(typed: &Typed) -> Result<Outcome, Failure> {
     Ok(Outcome::Done)
 }
 
-/// Names the surveys and sweeps that have no value of what an axis shows.
+/// Reports the surveys and sweeps that have no value for the quantity on an axis.
 fn undrawn(diagram: &Diagram, model: &Model, axes: [Quantity; 2]) -> std::io::Result<()> {
     for axis in axes {
         let sets = diagram.responses.iter().filter(|set| set.responses.iter().all(|r| value(axis, r).is_none()));
@@ -56,8 +56,8 @@ fn undrawn(diagram: &Diagram, model: &Model, axes: [Quantity; 2]) -> std::io::Re
     Ok(())
 }
 
-/// What is drawn: the branches, or the curves in two parameters if they are asked for; where both axes are parameters, both.
-/// And the parameters of the plane of the curves, if they are asked for.
+/// Selects the branches to draw, or the curves in two parameters with `--curves`; both if both axes are parameters.
+/// With `--curves`, also returns the parameter plane of the curves.
 fn shown(
     mut diagram: Diagram,
     curves: bool,
@@ -82,12 +82,12 @@ fn shown(
     Ok((diagram, Some(first)))
 }
 
-/// Writes a picture of a diagram; the ending of the file says which kind.
+/// Writes a picture of a diagram in the format given by the file extension.
 pub fn draw(diagram: &Diagram, model: &Model, shown: &Picture, output: &Path) -> Result<(), Failure> {
     picture(&svg(diagram, model, shown), output)
 }
 
-/// Writes a picture given as SVG; the ending of the file says which kind.
+/// Writes an SVG picture in the format given by the file extension.
 pub fn picture(svg: &str, output: &Path) -> Result<(), Failure> {
     let render =
         |result: Result<Vec<u8>, foldline_plot::RenderError>| result.map_err(|e| Failure::Outside(e.to_string()));

@@ -1,4 +1,4 @@
-//! What is seen while a run goes on.
+//! Progress reports during a run.
 
 use crate::verbosity::{Verbosity, report, verbosity};
 use foldline::contract::Event;
@@ -12,8 +12,8 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-/// Progress on standard error: on a terminal, one live line per branch in progress; otherwise one line per completed branch, and a reminder
-/// of those in progress after a period of silence. A quiet command shows nothing.
+/// Progress on standard error: on a terminal, one live line per branch in progress; otherwise one line per completed
+/// branch, and a reminder of those in progress after a period of silence. A quiet command shows nothing.
 pub struct Progress {
     lines: MultiProgress,
     terminal: bool,
@@ -23,7 +23,8 @@ pub struct Progress {
     said: Mutex<Instant>,
 }
 
-/// Longest silence without a terminal: eight seconds, so that with the delays of both ticks a line comes at least every ten.
+/// Longest silence without a terminal: eight seconds, so that with the delays of both ticks a line comes at least every
+/// ten.
 const SILENCE: Duration = Duration::from_secs(8);
 
 struct Live {
@@ -81,7 +82,7 @@ impl Progress {
         }
     }
 
-    /// A verbose command reports every special point.
+    /// Reports a special point if the command is verbose.
     fn special(&self, branch: &Branch, special: &SpecialPoint) {
         if verbosity() == Verbosity::Verbose {
             let form = special.normal_form();
@@ -105,7 +106,7 @@ impl Progress {
         Live { bar, points, special, ends: Vec::new(), place: "starting".into(), since: Instant::now() }
     }
 
-    /// The live line of a survey or sweep begins at its first value.
+    /// Shows the live line of a survey or sweep from its first value on.
     fn visited(&self, name: &str, value: f64, done: usize, of: usize) {
         let mut live = self.live.lock().unwrap_or_else(PoisonError::into_inner);
         let line = live.entry(name.to_string()).or_insert_with(|| self.line(name, 0, 0));
@@ -131,7 +132,7 @@ impl Progress {
         format!("{:>5} points{special}   {} step size {:.1e}", live.points, at.join(" "), point.step)
     }
 
-    /// Each parameter that varies along a branch, with its value at a point.
+    /// Parameters that vary along a branch, with their values at a point.
     fn parameters_at(&self, branch: &Branch, point: &Point) -> Vec<String> {
         let at = |index: usize| {
             let name = self.parameters.get(index).map_or("", String::as_str);
@@ -144,7 +145,7 @@ impl Progress {
         let live = self.live.lock().unwrap_or_else(PoisonError::into_inner).remove(&branch.name);
         let Some(live) = live else { return };
         live.bar.finish_and_clear();
-        // A side that ended in an earlier run is not told of again.
+        // Sides that ended in an earlier run have already been reported.
         let known: Vec<&Ending> = branch.ends.iter().flatten().collect();
         let known = if known.is_empty() { live.ends.iter().collect() } else { known };
         let text = |end: &&Ending| match verbosity() {
@@ -165,7 +166,7 @@ impl Progress {
         ));
     }
 
-    /// Reports what is in progress after a period of silence.
+    /// Reports the branches in progress after a period of silence.
     pub fn remind(&self) {
         let quiet = self.said.lock().unwrap_or_else(PoisonError::into_inner).elapsed() >= SILENCE;
         if self.terminal || !quiet {
@@ -183,21 +184,21 @@ impl Progress {
         }
     }
 
-    /// Takes the live lines away.
+    /// Removes the live lines.
     pub fn finish(&self) {
         let mut live = self.live.lock().unwrap_or_else(PoisonError::into_inner);
         live.drain().for_each(|(_, line)| line.bar.finish_and_clear());
     }
 
-    /// A line that stays.
+    /// Prints a line that stays.
     fn say(&self, line: &str) {
         *self.said.lock().unwrap_or_else(PoisonError::into_inner) = Instant::now();
-        // Progress that cannot be shown is no reason to stop computing.
+        // A failure to show progress must not stop the computation.
         let _ = if self.terminal { self.lines.println(line) } else { report(line) };
     }
 }
 
-/// Where live lines are drawn: on a terminal, unless the command is quiet.
+/// Target of the live lines: standard error if it is a terminal and the command is not quiet.
 fn target(terminal: bool) -> ProgressDrawTarget {
     match terminal && verbosity() != Verbosity::Quiet {
         true => ProgressDrawTarget::stderr(),
@@ -205,8 +206,8 @@ fn target(terminal: bool) -> ProgressDrawTarget {
     }
 }
 
-/// Sign of life of a command that reports little: a live line on a terminal, otherwise a line after a period of silence. Ends when
-/// dropped.
+/// Sign of life during a long silent step: a live line on a terminal, otherwise a line after a period of silence. It
+/// ends when dropped.
 pub struct SignOfLife {
     bar: ProgressBar,
     terminal: bool,
@@ -218,10 +219,10 @@ pub struct SignOfLife {
 }
 
 impl SignOfLife {
-    /// Interval between looks at the clock: short against the silence allowed.
+    /// Interval between checks of the clock; short compared with the silence allowed.
     const TICK: Duration = Duration::from_millis(500);
 
-    /// Begins to report what is being done, such as `verifying`.
+    /// Starts to report `what` is being done, such as `verifying`.
     pub fn of(what: &str) -> SignOfLife {
         let terminal = stderr().is_terminal();
         let bar = ProgressBar::with_draw_target(None, target(terminal));
@@ -244,7 +245,7 @@ impl SignOfLife {
                 let mut said = said.lock().unwrap_or_else(PoisonError::into_inner);
                 if said.elapsed() >= SILENCE {
                     *said = Instant::now();
-                    // Progress that cannot be shown is no reason to stop computing.
+                    // A failure to show progress must not stop the computation.
                     let _ = report(format_args!("{what}: {} s so far", start.elapsed().as_secs()));
                 }
             }
@@ -252,10 +253,10 @@ impl SignOfLife {
         own
     }
 
-    /// A line that stays.
+    /// Prints a line that stays.
     pub fn say(&self, line: &str) {
         *self.said.lock().unwrap_or_else(PoisonError::into_inner) = Instant::now();
-        // Progress that cannot be shown is no reason to stop computing.
+        // A failure to show progress must not stop the computation.
         let _ = if self.terminal { self.bar.suspend(|| report(line)) } else { report(line) };
     }
 }

@@ -1,4 +1,4 @@
-//! `foldline reproduce`: a publication computed again.
+//! `foldline reproduce`: recomputes a publication.
 
 use crate::arguments::Reproduce as Typed;
 use crate::failure::{Failure, Outcome};
@@ -9,7 +9,7 @@ use foldline_reproduce::{FigurePlan, PUBLICATIONS, Publication, Request, reprodu
 use std::io::{Write, stderr};
 use std::path::Path;
 
-/// Computes figures, claims and the report.
+/// Recomputes figures and claims and writes the report.
 pub fn publication(typed: &Typed) -> Result<Outcome, Failure> {
     let publication = PUBLICATIONS.iter().find(|p| p.name == typed.publication).ok_or_else(|| {
         let known: Vec<&str> = PUBLICATIONS.iter().map(|p| p.name).collect();

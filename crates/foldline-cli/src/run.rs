@@ -1,4 +1,4 @@
-//! `foldline run`: a study from its file to its table.
+//! `foldline run`: runs a study file and prints its table.
 
 use crate::arguments::{Arguments, Limits, Run as Typed};
 use crate::failure::{Failure, Outcome};
@@ -40,24 +40,24 @@ pub fn study(typed: &Typed) -> Result<Outcome, Failure> {
     carried_out(&study, &way)
 }
 
-/// The study with the limits that were typed.
+/// The study with the limits given on the command line.
 pub fn limited(study: Study, limits: &Limits) -> Result<Study, Failure> {
     Ok(study.limited(limits.max_steps, limits.max_time.as_deref())?)
 }
 
-/// How a study is carried out.
+/// Options for carrying out a study.
 pub struct Way<'w> {
     pub jobs: usize,
     pub resume: bool,
     pub limit: Option<Duration>,
-    /// What is shown in other units, as typed.
+    /// Units for display, as given on the command line.
     pub units: &'w [String],
     pub folder: &'w Path,
 }
 
-/// Runs a study into a folder, or goes on with it there.
+/// Runs a study in a folder, or resumes it there.
 pub fn carried_out(study: &Study, way: &Way) -> Result<Outcome, Failure> {
-    // Mistakes in what is to be shown are told before anything is computed.
+    // Reports mistakes in the units for display before anything is computed.
     conversion(&study.model, way.units)?;
     study.model.remarks.iter().try_for_each(report)?;
     let (recorder, earlier) = match way.resume {
@@ -77,7 +77,7 @@ pub fn reference_study_or_help() -> Result<Outcome, Failure> {
     Ok(Outcome::Done)
 }
 
-/// Runs the reference study, over an earlier run of it, and draws it.
+/// Runs the reference study, replacing any earlier run of it, and draws it.
 fn reference_study(file: &Path) -> Result<Outcome, Failure> {
     let folder = Path::new("runs").join("bouncing");
     let study = read_study(file)?;
@@ -85,9 +85,9 @@ fn reference_study(file: &Path) -> Result<Outcome, Failure> {
     Recorder::discard(&folder)?;
     let recorder = Recorder::create(&folder, &study)?;
     let outcome = run(&study, recorder, Diagram::default(), &way)?;
-    // What the run still has in memory need not be all of it.
+    // The run may hold only part of its points in memory.
     let diagram = crate::table::read(&folder, foldline_store::run_file::Part::Everything)?.diagram;
-    // In full view the peak of contact S, r = 51.7, would press everything else against the axis.
+    // At full scale the peak of contact S, r = 51.7, would squeeze everything else against the axis.
     let picture = Picture { window: Some([0.5, 12.0, 0.0, 11.0]), ..Picture::default() };
     for name in ["diagram.svg", "diagram.png"] {
         let file = folder.join(name);
@@ -97,7 +97,7 @@ fn reference_study(file: &Path) -> Result<Outcome, Failure> {
     Ok(outcome)
 }
 
-/// As many branches at a time as there are processors.
+/// Number of processors: the default number of branches followed in parallel.
 pub fn processors() -> usize {
     std::thread::available_parallelism().map_or(1, |n| n.get())
 }
@@ -137,7 +137,7 @@ fn run(study: &Study, recorder: Recorder, earlier: Diagram, way: &Way) -> Result
     Ok(if whole && !stopped { Outcome::Done } else { Outcome::Short })
 }
 
-/// Records, shows, and stops when asked to.
+/// Records points, shows progress, and stops the run on request.
 struct Watch {
     recorder: Recorder,
     progress: Progress,
@@ -183,7 +183,7 @@ impl Drop for Done<'_> {
 }
 
 impl Clock {
-    /// Interval between checks: short enough for the time limit to act at once to a user, long enough to cost nothing.
+    /// Interval between checks: short enough for the time limit to seem immediate, long enough to cost nothing.
     const TICK: Duration = Duration::from_millis(200);
 
     fn new(limit: Option<Duration>) -> Clock {
@@ -211,8 +211,8 @@ impl Clock {
     }
 }
 
-/// Set by the first Ctrl-C, after which the run ends where it is; the second ends the program, which loses
-/// nothing that was accepted.
+/// Flag set by the first Ctrl-C, after which the run ends at its next point. The second ends the program at once and
+/// loses no accepted point.
 pub fn stop_on_interrupt() -> Arc<AtomicBool> {
     let stop = Arc::new(AtomicBool::new(false));
     let asked = Arc::clone(&stop);
@@ -220,10 +220,10 @@ pub fn stop_on_interrupt() -> Arc<AtomicBool> {
         if asked.swap(true, Ordering::Relaxed) {
             std::process::exit(130);
         }
-        // An answer that cannot be shown is no reason to go on.
+        // The run stops even if this message cannot be shown.
         let _ = writeln!(stderr(), "stopping; press Ctrl-C again to quit at once");
     };
-    // Without a handler Ctrl-C ends the program at once, and --resume goes on all the same.
+    // Without a handler Ctrl-C ends the program at once, and --resume still continues the run.
     let _ = ctrlc::set_handler(handler);
     stop
 }

@@ -18,14 +18,14 @@ use foldline_store::nearest::suggest;
 use std::io::{BufWriter, Write, stderr, stdout};
 use std::sync::atomic::Ordering;
 
-/// Rows of a table without `--every`.
+/// Number of rows of a table without `--every`.
 const ROWS: f64 = 200.0;
-/// Most rows: more would be a mistake.
+/// Maximum number of rows; a request for more would be a mistake.
 const MOST_ROWS: f64 = 1e7;
-/// Periods of a forced model without `--time`.
+/// Length in periods, for a forced model without `--time`.
 const PERIODS: f64 = 20.0;
 
-/// Integrates from one initial state; prints the trajectory, or draws it.
+/// Integrates from one initial state, and prints or draws the trajectory.
 pub fn trajectory(typed: &Typed) -> Result<Outcome, Failure> {
     let (model, text) = read_model(&typed.model)?;
     let parameters = parameters(&typed.set, &model)?;
@@ -42,7 +42,7 @@ pub fn trajectory(typed: &Typed) -> Result<Outcome, Failure> {
         steps: usize::try_from(typed.max_steps).unwrap_or(usize::MAX),
         stop: &|| stop.load(Ordering::Relaxed),
     };
-    // A picture shows every step.
+    // A picture without `--every` shows every step.
     let wanted = if typed.output.is_some() && typed.every.is_none() { None } else { Some(&times[..]) };
     let found = course(&model, &start, [0.0, end], wanted, &parameters, &way);
     let shown = Shown { model: &model, course: &found, columns };
@@ -57,13 +57,14 @@ pub fn trajectory(typed: &Typed) -> Result<Outcome, Failure> {
     ended(&found, end, &model)
 }
 
-/// The initial state. A state that was not typed starts at three quarters of its range, which is said: its middle is often at rest.
+/// Initial state. A state without a value starts at three quarters of its range, and this is reported; the midpoint is
+/// often an equilibrium.
 fn start(typed: &Typed, model: &Model) -> Result<Vec<f64>, Failure> {
     let given = states(&typed.start, model)?;
     let within = |i: usize| {
         let [low, high] = model.states[i].range_at(1.0);
         let value = 0.25 * low + 0.75 * high;
-        // Any value there would do: a short one is easier to repeat.
+        // Any value there would do; a short one is easier to repeat.
         format!("{value:.2e}").parse().unwrap_or(value)
     };
     let missing = given.iter().enumerate().filter(|(_, value)| value.is_none());
@@ -98,7 +99,7 @@ fn end(typed: &Typed, model: &Model, parameters: &[f64]) -> Result<f64, Failure>
     }
 }
 
-/// The times at which the trajectory is printed.
+/// Times at which the trajectory is printed.
 fn times(typed: &Typed, model: &Model, parameters: &[f64], end: f64) -> Result<Vec<f64>, Failure> {
     let every = match typed.every.as_deref() {
         None => end / ROWS,
@@ -136,7 +137,7 @@ fn named(name: &str, option: &str, model: &Model) -> Result<Variable, Failure> {
     })
 }
 
-/// Variables to show: those that were typed; otherwise all of them in a table, and the states in a picture.
+/// Variables to show: those given; by default all of them in a table, and the states in a picture.
 fn columns(typed: &Typed, model: &Model) -> Result<Vec<Variable>, Failure> {
     if !typed.show.is_empty() {
         return typed.show.iter().map(|name| named(name, "show", model)).collect();
@@ -146,7 +147,7 @@ fn columns(typed: &Typed, model: &Model) -> Result<Vec<Variable>, Failure> {
     Ok(states.chain(outputs).collect())
 }
 
-/// A trajectory and what of it is shown.
+/// A trajectory and the part of it to show.
 struct Shown<'s> {
     model: &'s Model,
     course: &'s Course,
@@ -183,7 +184,7 @@ impl Shown<'_> {
         Table { columns, rows: self.course.times.iter().enumerate().map(row).collect() }
     }
 
-    /// The variables over the time, or over another variable.
+    /// Figure of the variables against time, or against another variable.
     fn figure(&self, typed: &Typed) -> Result<String, Failure> {
         let across = typed.x.as_ref().map(|name| named(name, "x", self.model)).transpose()?;
         let label = |[name, unit]: [&str; 2]| match unit {
@@ -199,7 +200,7 @@ impl Shown<'_> {
         let at = |k: usize| across.map_or(self.course.times[k], |own| self.value(own, k));
         let layer = |(i, own): (usize, &Variable)| {
             let points: Vec<[f64; 2]> = (0..self.course.times.len()).map(|k| [at(k), self.value(*own, k)]).collect();
-            // Samples once in each period do not lie on a curve.
+            // Samples taken once per period do not lie on a curve.
             let layer = match typed.every.as_deref() {
                 Some("period") => Layer::scatter(points, Marker::Dot, palette::nth(i)).wide(1.6),
                 _ => Layer::curve(&points, palette::nth(i)).smooth(),
@@ -215,7 +216,7 @@ impl Shown<'_> {
     }
 }
 
-/// Says how a trajectory ended that did not reach its end.
+/// Reports why a trajectory ended early.
 fn ended(course: &Course, end: f64, model: &Model) -> Result<Outcome, Failure> {
     let last = course.times.last().copied().unwrap_or(0.0);
     let why = match course.outcome {

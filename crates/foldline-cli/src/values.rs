@@ -1,4 +1,4 @@
-//! Values of parameters and states, as typed.
+//! Values of parameters and states given on the command line.
 
 use crate::failure::Failure;
 use foldline::model::Model;
@@ -8,12 +8,12 @@ use foldline_store::nearest::suggest;
 /// Name and unit of something that can be given a value.
 type Named<'m> = (&'m str, &'m str);
 
-/// `NAME=VALUE` of a parameter.
+/// Parses `NAME=VALUE` for a parameter.
 pub fn valued(typed: &str, model: &Model) -> Result<(String, f64), Failure> {
     assignment("--set", typed, "parameter", &named_parameters(model), model)
 }
 
-/// The parameters of a model, with those that were typed as `NAME=VALUE` changed.
+/// Parameter values of a model, with those given as `NAME=VALUE` replaced.
 pub fn parameters(typed: &[String], model: &Model) -> Result<Vec<f64>, Failure> {
     let mut values: Vec<f64> = model.parameters.iter().map(|p| p.value).collect();
     for assignment in typed {
@@ -25,7 +25,7 @@ pub fn parameters(typed: &[String], model: &Model) -> Result<Vec<f64>, Failure> 
     Ok(values)
 }
 
-/// The states that were typed as `NAME=VALUE`, separated by commas or one by one; `None` for the others.
+/// States given as `NAME=VALUE`, separated by commas or one by one; `None` for the others.
 pub fn states(typed: &[String], model: &Model) -> Result<Vec<Option<f64>>, Failure> {
     let named: Vec<Named> = model.states.iter().map(|s| (s.name.as_str(), s.unit.as_str())).collect();
     let mut values = vec![None; model.states.len()];
@@ -59,7 +59,7 @@ fn assignment(option: &str, typed: &str, noun: &str, named: &[Named], model: &Mo
     Ok((name.to_string(), measured(value, unit).ok_or_else(unreadable)?))
 }
 
-/// A number, or a number with a unit such as `500 rpm`, in this unit.
+/// Value in the unit `unit` of a number that may have its own unit, such as `500 rpm`.
 pub fn measured(text: &str, unit: &str) -> Option<f64> {
     let number = match quantity(text) {
         Some(written) => Unit::read(&written.unit).convert(written.value, &Unit::read(unit)).ok(),
@@ -68,7 +68,7 @@ pub fn measured(text: &str, unit: &str) -> Option<f64> {
     number.filter(|value: &f64| value.is_finite())
 }
 
-/// The position of a parameter of the model.
+/// Index of a parameter of the model.
 ///
 /// # Errors
 /// The mistake in the name, and its correction.

@@ -1,17 +1,17 @@
-//! Amount of reporting on standard error.
+//! Verbosity of the reports on standard error.
 
 use std::io::{Result, Write, stderr};
 use std::sync::OnceLock;
 
-/// Amount of reports on standard error. Standard output does not depend on it.
+/// Verbosity of the reports on standard error. Standard output does not depend on it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Verbosity {
-    /// Errors and what was not reached.
+    /// Errors and incomplete results.
     Quiet,
-    /// Progress, notes and written files too.
+    /// Also progress, notes and files written.
     #[default]
     Normal,
-    /// Special points as they are found, and causes and cures of early ends, too.
+    /// Also special points as they are found, and the causes and cures of early ends.
     Verbose,
 }
 

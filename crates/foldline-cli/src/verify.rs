@@ -1,4 +1,4 @@
-//! `foldline verify`: is a run right?
+//! `foldline verify`: recomputes a run by an independent method.
 
 use crate::arguments::{Format, Verify as Typed};
 use crate::failure::{Failure, Outcome};
@@ -10,7 +10,7 @@ use foldline_store::run_file::Part;
 use std::collections::BTreeMap;
 use std::io::{Write, stdout};
 
-/// Computes the run in a folder again and prints the worst comparisons, and a summary.
+/// Verifies the run in a folder, and prints the worst comparisons and a summary.
 pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
     let run = table::read(&typed.folder, Part::Everything)?;
     let kept = table::asked_for(&run.diagram, typed.branch.as_deref())?;

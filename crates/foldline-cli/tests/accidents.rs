@@ -1,4 +1,4 @@
-//! What can happen to a run file: each time a clear message, and nothing lost that was stored.
+//! Accidents to a run file: each gives a clear message, and nothing that was stored is lost.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
@@ -18,7 +18,7 @@ fn said(output: &Output) -> String {
     text
 }
 
-/// A study that takes a while, begun in `folder`.
+/// Starts a study that takes a while in `folder`.
 fn begun(folder: &Path) -> Command {
     begun_with(folder, "1")
 }
@@ -33,7 +33,7 @@ fn begun_with(folder: &Path, jobs: &str) -> Command {
     command
 }
 
-/// Waits until `ready`; a minute is more than enough.
+/// Waits until `ready` returns true; a minute is more than enough.
 fn until(mut ready: impl FnMut() -> bool) {
     let start = Instant::now();
     while !ready() {
@@ -47,7 +47,7 @@ fn points(folder: &Path) -> usize {
     String::from_utf8_lossy(&output.stdout).lines().count().saturating_sub(1)
 }
 
-/// A small finished run in a new folder.
+/// Returns a new folder with a small finished run.
 fn finished() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let model = "name = \"m\"\n[parameters]\nmu = -0.5\n[states]\nx = \"mu - x^2 + 0*y\"\ny = \"-y\"\n";
@@ -66,7 +66,7 @@ fn run(folder: &Path, more: &[&str]) -> Output {
 }
 
 #[test]
-fn a_second_run_into_the_same_folder_is_refused_while_the_first_writes() {
+fn a_second_run_in_the_same_folder_is_refused_while_the_first_writes() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("run");
     let mut first = begun(&out).spawn().unwrap();
@@ -77,13 +77,13 @@ fn a_second_run_into_the_same_folder_is_refused_while_the_first_writes() {
     assert!(message.contains("another run is writing") && message.contains("--out DIR"), "{message}");
     first.kill().unwrap();
     first.wait().unwrap();
-    // The lock went with it.
+    // The killed process has released its lock.
     let third = begun(&out).arg("--resume").output().unwrap();
     assert_eq!(third.status.code(), Some(0), "{}", said(&third));
 }
 
 #[test]
-fn a_folder_that_is_deleted_during_the_run_ends_it_with_a_message() {
+fn deleting_the_folder_during_a_run_ends_it_with_a_message() {
     for jobs in ["1", "3"] {
         let folder = tempfile::tempdir().unwrap();
         let out = folder.path().join("run");
@@ -99,11 +99,11 @@ fn a_folder_that_is_deleted_during_the_run_ends_it_with_a_message() {
 
 #[cfg(unix)]
 #[test]
-fn a_disk_that_refuses_ends_the_run_and_what_was_stored_stays() {
+fn a_write_error_ends_the_run_and_keeps_the_stored_points() {
     for jobs in ["1", "3"] {
         let folder = tempfile::tempdir().unwrap();
         let out = folder.path().join("run");
-        // Files may become 3000 blocks of 1024 bytes long, no longer.
+        // Files may grow to 3000 blocks of 1024 bytes and no further.
         let script = "trap '' XFSZ; ulimit -f 3000; \
             exec \"$0\" run studies/overhung-rotor/bouncing.toml --jobs \"$1\" --out \"$2\"";
         let output = Command::new("bash")
@@ -124,7 +124,7 @@ fn a_disk_that_refuses_ends_the_run_and_what_was_stored_stays() {
 }
 
 #[test]
-fn a_truncated_file_is_called_damaged() {
+fn a_truncated_file_is_reported_as_damaged() {
     let folder = finished();
     let file = folder.path().join("run/run.sqlite");
     let bytes = std::fs::read(&file).unwrap();
@@ -140,13 +140,13 @@ fn a_truncated_file_is_called_damaged() {
             );
         }
         let output = run(folder.path(), &["--resume"]);
-        // A file of length zero is a run that was killed before it had written anything.
+        // A file of length zero belongs to a run that was killed before it had written anything.
         assert_eq!(output.status.code(), Some(if length == 0 { 0 } else { 2 }), "{length}: {}", said(&output));
     }
 }
 
 #[test]
-fn a_flipped_bit_is_noticed_or_does_no_harm() {
+fn a_flipped_bit_is_detected_or_harmless() {
     let folder = finished();
     let file = folder.path().join("run/run.sqlite");
     let whole = folder.path().join("run");
@@ -177,7 +177,7 @@ fn a_flipped_bit_is_noticed_or_does_no_harm() {
 
 #[cfg(unix)]
 #[test]
-fn an_interrupt_ends_the_run_at_its_next_point_and_says_how_to_go_on() {
+fn an_interrupt_ends_the_run_at_its_next_point_and_says_how_to_continue() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("run");
     let first = begun(&out).spawn().unwrap();

@@ -1,4 +1,4 @@
-//! States that are angles: motions that go round, copies that are one, branches that close round the circle.
+//! States that are angles: rotations, copies of one solution a full turn apart, branches that close around the circle.
 
 use foldline::contract::Unobserved;
 use foldline::diagram::{Branch, Diagram, Ending, Kind, Motion, Solution};
@@ -26,7 +26,7 @@ fn branch<'d>(diagram: &'d Diagram, name: &str) -> &'d Branch {
     found
 }
 
-/// Places of the special points of that kind, sorted.
+/// Positions of the special points of that kind, sorted.
 fn places(branch: &Branch, kind: Kind) -> Vec<f64> {
     let own = branch.special.iter().filter(|s| s.kind == kind);
     let mut places: Vec<f64> = own.map(|s| s.point.parameters[branch.free]).collect();
@@ -44,9 +44,9 @@ fn assert_places(branch: &Branch, kind: Kind, expected: &[f64], within: f64) {
 const MACHINE: &str = "[parameters]\nP = 0.5\nD = 0.2\nK = 1.0\n[states.delta]\nequation = \"w\"\nperiod = \"2*pi\"\n\
                        [states.w]\nequation = \"P - D*w - K*sin(delta)\"\nrange = [-3, 3]\n";
 
-/// Asynchronous running of a machine against an infinite bus. Periods by a Runge-Kutta method of order 8 at 1e-11.
+/// Asynchronous running of a machine connected to an infinite bus. Periods by a Runge-Kutta method of order 8 at 1e-11.
 #[test]
-fn a_machine_runs_asynchronously_and_its_synchronous_states_close_round_the_circle() {
+fn an_asynchronous_machine_runs_and_its_synchronous_states_close_around_the_circle() {
     let found = run(
         MACHINE,
         "[[seed]]\nname = \"runs\"\nattractor = \"cycle\"\n[[seed]]\nname = \"rests\"\nattractor = \"equilibrium\"\n\
@@ -69,7 +69,7 @@ fn a_machine_runs_asynchronously_and_its_synchronous_states_close_round_the_circ
 
 /// Adler's equation: T = 2π / √(w² - 1), from a saddle-node on the circle at w = 1.
 #[test]
-fn adler_s_equation_has_one_running_motion_and_one_loop_of_rest() {
+fn adlers_equation_has_one_rotation_and_one_closed_branch_of_equilibria() {
     let found = run(
         "[parameters]\nw = 1.5\n[states.x]\nequation = \"w - sin(x)\"\nperiod = \"2*pi\"\n",
         "[[explore]]\nname = \"all\"\nfree = \"w\"\nrange = [0, 3]\n",
@@ -78,14 +78,14 @@ fn adler_s_equation_has_one_running_motion_and_one_loop_of_rest() {
     for point in &branch(&found, "all/cycle-1").points {
         let (w, period) = (point.parameters[0], point.solution.period().unwrap());
         let expected = TAU / ((w - 1.0) * (w + 1.0)).sqrt();
-        // Next to the saddle-node the period magnifies the error of w.
+        // Near the saddle-node the period magnifies the error of w.
         let error = point.trust.discretisation + 1e-14 / (w - 1.0);
         assert!((period / expected - 1.0).abs() < error, "{w}: {period}, {expected}, {error:e}");
     }
     assert_places(branch(&found, "all/equilibrium-1"), Kind::Fold, &[1.0], 1e-7);
 }
 
-/// The first step of a driven Josephson junction, as it is and with the cosine and sine of the phase as states.
+/// The first step of a driven Josephson junction, in the phase itself and in its cosine and sine.
 #[test]
 fn a_locked_rotation_is_the_same_on_the_cylinder_and_embedded() {
     let parameters = "[forcing]\nfrequency = \"om\"\n[parameters]\nI = 1.1\nom = 1.0\nA = 1.0\nD = 0.7\n";
@@ -103,7 +103,7 @@ fn a_locked_rotation_is_the_same_on_the_cylinder_and_embedded() {
     let [one, other] = [angle, embedded].map(|model| run(&model, text));
     let [one, other] = [branch(&one, "b"), branch(&other, "b")];
     let Solution::Cycle(cycle) = &one.points[0].solution else { panic!("no cycle") };
-    // One turn in each period of the forcing.
+    // One turn per forcing period.
     assert_eq!(cycle.gain, [TAU * f64::from(cycle.forcing_periods), 0.0]);
     let folds = places(one, Kind::Fold);
     assert_eq!(folds.len(), 2, "{:?}", one.ends);
@@ -112,10 +112,10 @@ fn a_locked_rotation_is_the_same_on_the_cylinder_and_embedded() {
     assert!(one.ends.iter().flatten().any(|end| *end == Ending::Closed), "{:?}", one.ends);
 }
 
-/// A bead on a rotating hoop, its angle measured from the top, so that the symmetric state at the bottom is half a turn, where an angle is its
-/// own mirror image in the next copy. The pitchfork is at W = 1.
+/// A bead on a rotating hoop, its angle measured from the top. The symmetric state at the bottom is then half a turn,
+/// an angle that is its own mirror image up to a full turn. The pitchfork is at W = 1.
 #[test]
-fn half_a_turn_is_symmetric() {
+fn an_equilibrium_at_half_a_turn_is_symmetric() {
     let found = run(
         "[parameters]\nW = 0.5\nD = 0.3\n[states.th]\nequation = \"v\"\nperiod = \"2*pi\"\n\
          [states.v]\nequation = \"-D*v + sin(th)*(1 + W^2*cos(th))\"\nrange = [-2, 2]\n",
@@ -132,9 +132,10 @@ fn half_a_turn_is_symmetric() {
     }
 }
 
-/// On its own branch, which turns back there, a pitchfork is not located as well as a in its normal form would need.
+/// On its own branch, which turns back there, a pitchfork is located less accurately than the coefficient a of its
+/// normal form needs.
 #[test]
-fn a_pitchfork_on_the_branch_that_turns_back_is_one() {
+fn a_pitchfork_is_recognised_on_the_branch_that_turns_back() {
     let found = run(
         "[parameters]\nW = 1.6\n[states]\nx = \"v\"\nv = \"-0.3*v - sin(x)*(1 - W^2*cos(x))\"\n",
         "[[seed]]\nname = \"tilted\"\nstate = { x = 1.17, v = 0 }\n\
@@ -147,7 +148,7 @@ fn a_pitchfork_on_the_branch_that_turns_back_is_one() {
 
 /// Surveys and sweeps of a machine that runs or stands still.
 #[test]
-fn simulation_sees_running_and_resting_machines() {
+fn simulation_finds_running_and_resting_machines() {
     let found = run(
         MACHINE,
         "[[seed]]\nname = \"sync\"\nattractor = \"equilibrium\"\n\
@@ -167,9 +168,9 @@ fn simulation_sees_running_and_resting_machines() {
     assert_eq!(of("up").last().and_then(|r| r.jumped), Some(true));
 }
 
-/// A cycle that is given, with a phase that runs far from the first turn.
+/// A given cycle whose phase goes far beyond the first turn.
 #[test]
-fn a_given_rotation_closes_a_turn_later() {
+fn a_given_rotation_closes_after_a_full_turn() {
     // At a large torque the machine runs at nearly the constant speed P / D.
     let speed = 5.0 / 0.2;
     let times: Vec<String> = (0..=40).map(|k| format!("{}", k as f64 / 40.0)).collect();
@@ -191,7 +192,7 @@ fn a_given_rotation_closes_a_turn_later() {
 }
 
 #[test]
-fn a_state_over_whose_period_f_does_not_repeat_itself_is_refused() {
+fn an_angle_whose_period_is_not_a_period_of_f_is_refused() {
     let model = "[parameters]\nk = 1.0\n[states.x]\nequation = \"v\"\nperiod = \"2*pi\"\n\
                  [states]\nv = \"-sin(x) - 0.1*k*x\"\n";
     let Err(found) = foldline_store::model_file::parse_model(model, "model") else { panic!("a mistake") };

@@ -1,4 +1,5 @@
-//! The first ten minutes: `foldline new`, `foldline simulate`, files taken for one another, and words for what is not supported.
+//! The first ten minutes: `foldline new`, `foldline simulate`, confused file types, and messages for unsupported
+//! features.
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -11,7 +12,7 @@ fn words(bytes: &[u8]) -> String {
     String::from_utf8_lossy(bytes).into_owned()
 }
 
-/// Output of a command that must succeed.
+/// Returns the output of a command that must succeed.
 #[track_caller]
 fn printed(folder: &Path, arguments: &[&str]) -> String {
     let output = foldline(folder, arguments);
@@ -19,7 +20,7 @@ fn printed(folder: &Path, arguments: &[&str]) -> String {
     words(&output.stdout)
 }
 
-/// The message of a command that must fail with exit code 2.
+/// Returns the message of a command that must fail with exit code 2.
 #[track_caller]
 fn refused(folder: &Path, arguments: &[&str]) -> String {
     let output = foldline(folder, arguments);
@@ -62,13 +63,14 @@ fn with(name: &str, text: &str) -> tempfile::TempDir {
 }
 
 #[test]
-fn every_template_runs_completely_and_has_what_its_study_speaks_of() {
+fn every_template_runs_completely_and_finds_what_its_study_announces() {
     let folder = tempfile::tempdir().unwrap();
     let list = printed(folder.path(), &["new"]);
     let expected: [(&str, &[&str]); 4] = [
         ("oscillator", &["resonance  fold", "jumps      cusp", "up    sweep", "down  sweep"]),
         ("rotor", &["unbalance response  fold", "run-up    sweep", "run-down  sweep"]),
-        // Rinzel and Ermentrout (1998): rest loses its stability at 93.86 and regains it at 212.02, both subcritically.
+        // Rinzel and Ermentrout (1998): the rest state loses its stability at 93.86 and regains it at 212.02, both
+        // subcritically.
         ("neuron", &["hopf   93.85", "hopf  212.01", "subcritical", "rest/hopf-1  fold"]),
         ("chain", &["response  fold", "up   sweep"]),
     ];
@@ -79,7 +81,7 @@ fn every_template_runs_completely_and_has_what_its_study_speaks_of() {
         printed(&own, &["check", "model.toml"]);
         let table = printed(&own, &["run", "study.toml"]);
         says(&table, pieces);
-        // Nothing of it is overwritten.
+        // Existing files are not overwritten.
         says(&refused(folder.path(), &["new", name]), &["model.toml already exists", "--out"]);
     }
     says(&refused(folder.path(), &["new", "rotr"]), &["no template `rotr`", "did you mean `rotor`?"]);
@@ -93,7 +95,7 @@ fn a_study_is_written_for_a_model() {
 }
 
 #[test]
-fn a_trajectory_is_that_of_the_equations() {
+fn a_trajectory_solves_the_equations() {
     let folder = with("spring.toml", LINEAR);
     let arguments =
         ["simulate", "spring.toml", "--start", "x=1,v=0", "--time", "3 s", "--every", "500 ms", "--format", "csv"];
@@ -103,7 +105,7 @@ fn a_trajectory_is_that_of_the_equations() {
     let rows: Vec<Vec<f64>> = lines.map(|line| line.split(',').map(|cell| cell.parse().unwrap()).collect()).collect();
     assert_eq!(rows.iter().map(|row| row[0]).collect::<Vec<_>>(), [0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0]);
     for row in rows {
-        // x = cos 2 t, with the tolerance 1e-8 for each unit of time that passes.
+        // x = cos 2t, to the tolerance 1e-8 per unit of time.
         assert!((row[1] - (2.0 * row[0]).cos()).abs() < 1e-6, "{row:?}");
         assert!((row[3] - 4.0).abs() < 1e-5, "{row:?}");
     }
@@ -124,7 +126,7 @@ fn a_trajectory_that_ends_early_says_where_and_why() {
 }
 
 #[test]
-fn what_is_typed_to_simulate_is_checked() {
+fn arguments_of_simulate_are_checked() {
     let folder = with("spring.toml", LINEAR);
     let told = |more: &[&str]| refused(folder.path(), &[&["simulate", "spring.toml"], more].concat());
     says(&told(&[]), &["length", "--time 100"]);
@@ -158,7 +160,7 @@ fn a_model_and_a_study_are_told_apart() {
 }
 
 #[test]
-fn what_is_not_supported_is_said_in_words() {
+fn unsupported_features_are_explained() {
     let folder = with("spring.toml", LINEAR);
     let study = |line: &str| {
         let text = format!(
@@ -192,14 +194,14 @@ fn what_is_not_supported_is_said_in_words() {
 }
 
 #[test]
-fn help_is_printed_where_there_is_no_reference_study() {
+fn help_is_printed_without_a_reference_study() {
     let folder = tempfile::tempdir().unwrap();
     says(&printed(folder.path(), &[]), &["Usage", "simulate", "explore"]);
     assert!(!folder.path().join("runs").exists());
 }
 
 #[test]
-fn profiles_that_are_not_wanted_leave_the_run_file() {
+fn unwanted_profiles_are_removed_from_the_run_file() {
     let folder = tempfile::tempdir().unwrap();
     printed(folder.path(), &["new", "neuron"]);
     let own = folder.path().join("neuron");

@@ -1,14 +1,16 @@
-//! Runs the examples of the book: the pages on bifurcations, the tutorials and some others. What they quote must be what the program prints.
+//! Runs the examples of the book: the pages on bifurcations, the tutorials and some others. Their quotations must match
+//! the program.
 //!
-//! On these pages each block of TOML begins with the name of its file, and each block `console` holds commands and their output. After an intended
-//! change, `FOLDLINE_WRITE_BOOK=1 cargo test -p foldline-cli --test book` renews outputs and pictures.
+//! On these pages each TOML block begins with the name of its file, and each `console` block holds commands and their
+//! output. After an intended change, `FOLDLINE_WRITE_BOOK=1 cargo test -p foldline-cli --test book` renews outputs and
+//! pictures.
 
 mod pages;
 
 use pages::{Page, check_all, desk, keys, root, same};
 use std::path::{Path, PathBuf};
 
-/// Opens a page of the book. The files that it shows lie beside the folder of models.
+/// Opens a page of the book. The files that it shows are placed beside the folder of models.
 fn open(path: &Path) -> Page {
     let desk = desk();
     let place = desk.path().to_path_buf();
@@ -59,7 +61,7 @@ fn the_pages_on_bifurcations_quote_what_the_program_prints() {
 }
 
 #[test]
-fn lines_are_the_same_to_the_digits_and_errors_that_they_state() {
+fn lines_match_to_their_stated_digits_and_errors() {
     let quoted = "b  torus  0.697166666  2  8.1e-7  d = -0.16628, supercritical";
     assert!(same(quoted, "b torus  0.697166999  2  7.0e-7  d = -0.16628, supercritical"));
     for other in [

@@ -15,7 +15,7 @@ fn grown(model: &str, rest: &str) -> Diagram {
     let study = study(model, rest);
     let system = System::of_plan(&study.model, &study.plan);
     let diagram = run(&system, &study.plan, 1, Diagram::default(), &Unobserved);
-    // What is right by a closed form must not be called wrong, nor left undecided, by the program itself.
+    // Verification must not call wrong, or leave undecided, what a closed form shows to be right.
     let verified = verify(&system, &diagram, study.plan.tolerance, None, &|branch| branch.held.is_some());
     assert!(verified.wrong().next().is_none(), "{:?}", verified.wrong().next());
     let points = verified.undecided.iter().filter(|undecided| undecided.special.is_none());
@@ -23,7 +23,8 @@ fn grown(model: &str, rest: &str) -> Diagram {
     diagram
 }
 
-/// Every point of the curve satisfies `defect` = 0, a function of the branch's parameter and the second one; both sides end at bounds.
+/// Asserts that every point of the curve satisfies `defect` = 0, a function of the branch's parameter and the second
+/// one, and that both sides end at bounds.
 fn satisfies(curve: &Branch, points: usize, defect: impl Fn(f64, f64) -> f64) {
     for end in &curve.ends {
         assert!(matches!(end, Some(Ending::Bound(_))), "{end:?}");
@@ -37,7 +38,7 @@ fn satisfies(curve: &Branch, points: usize, defect: impl Fn(f64, f64) -> f64) {
     }
 }
 
-/// Kinds and places of what lies on the curve, by increasing second parameter.
+/// Asserts kinds and positions of the special points on the curve, by increasing second parameter.
 fn lies_on(curve: &Branch, expected: &[(Kind, f64, f64)]) {
     let (_, first) = curve.held.unwrap();
     let mut found: Vec<_> = curve
@@ -55,9 +56,10 @@ fn lies_on(curve: &Branch, expected: &[(Kind, f64, f64)]) {
 
 const PLAN: &str = "[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"mu\"\nrange = [-3, 3]\n[[curve]]\nname = \"curve\"\nhold = \"branch-point\"\nof = \"b\"\nfree = \"q\"\n";
 
-/// x = 0, y = q mu is always a solution; x gets its quadratic term from y as well, as -1 + 2 q, and a cubic one where that vanishes.
+/// x = 0, y = q mu is always a solution. The quadratic coefficient of x is -1 + 2q, partly by way of y; where it
+/// vanishes, a cubic term remains.
 #[test]
-fn transcritical_points_pass_a_pitchfork() {
+fn a_curve_of_transcritical_points_passes_a_pitchfork() {
     let model =
         "[parameters]\nmu = 0.2\nq = 0.3\n[states]\nx = \"x*(mu - 1 - x + y)\"\ny = \"q*mu - y + 2*q*x - x^2\"\n";
     let seed = "[[seed]]\nname = \"s\"\nstate = { x = 0, y = 0.06 }\n";
@@ -65,13 +67,14 @@ fn transcritical_points_pass_a_pitchfork() {
     let curve = diagram.branch("curve").unwrap();
     satisfies(curve, 8, |mu, q| mu * (1.0 + q) - 1.0);
     lies_on(curve, &[(Kind::Cusp, 2.0 / 3.0, 0.5)]);
-    // (ξ = √2 x; the slave y - q mu = x - x² leaves -x³.)
+    // (ξ = √2 x; the slaved y - q mu = x - x² leaves -x³.)
     assert!((curve.special[0].coefficients[0] + 0.5).abs() < 1e-7, "{}", curve.special[0].normal_form());
 }
 
-/// With one state there is nothing but the null vector: f_x and the derivatives along both parameters vanish together.
+/// With one state the null space is the whole state space: f_x and the derivatives along both parameters vanish
+/// together.
 #[test]
-fn a_single_state_is_enough() {
+fn branch_points_of_a_single_state_are_followed() {
     let model = "[parameters]\nmu = -1\nq = 0.4\n[states]\nx = \"1e3*((mu - q^2)*x - x^2)\"\n";
     let seed = "[[seed]]\nname = \"s\"\nstate = { x = 0 }\n";
     let diagram = grown(model, &format!("{seed}{PLAN}range = [-1, 1]\n"));
@@ -88,11 +91,12 @@ fn convection_begins_at_the_same_rayleigh_number_for_every_fluid() {
     let diagram = grown(model, &format!("{text}{curve}"));
     let curve = diagram.branch("curve").unwrap();
     satisfies(curve, 5, |rho, _| rho - 1.0);
-    // Pitchforks all of them: the quadratic coefficient is rounding, and its signs are no cusps.
+    // All of them are pitchforks: the quadratic coefficient is rounding error, and its sign changes are not cusps.
     assert!(curve.special.is_empty());
 }
 
-/// A pitchfork at q = mu² - ½, which turns back in q; beside it a real eigenvalue becomes 0 at mu = -0.4 and a pair crosses at mu = 0.3.
+/// Pitchforks on the curve q = mu² - ½, which turns back in q. Besides, a real eigenvalue vanishes at mu = -0.4 and a
+/// pair crosses the imaginary axis at mu = 0.3.
 #[test]
 fn pitchforks_turn_back_and_meet_other_bifurcations() {
     let model = "[parameters]\nmu = -1.1\nq = 0.4\n[states]\nx = \"(q - mu^2 + 0.5)*x - x^3 + 0.2*x*u\"\nw = \"(mu + 0.4)*w + x - w^3\"\nu = \"(mu - 0.3)*u - 2*v + x^2\"\nv = \"2*u + (mu - 0.3)*v - v*u^2\"\n";
@@ -104,8 +108,8 @@ fn pitchforks_turn_back_and_meet_other_bifurcations() {
     lies_on(curve, &[(Kind::Fold, 0.0, -0.5), (Kind::ZeroHopf, 0.3, -0.41), (Kind::BogdanovTakens, -0.4, -0.34)]);
 }
 
-/// p₁ = 3/5 where the prey appear; where the predators do, at u = 1/p₄, p₁ (1 - e^{-5/p₄}) = 3 (1 - 1/p₄)/p₄. There the curve also goes over
-/// the fold of the prey alone, u = 0.411161560751.
+/// p₁ = 3/5 where the prey appear, and p₁ (1 - e^{-5/p₄}) = 3 (1 - 1/p₄)/p₄ where the predators appear, at u = 1/p₄.
+/// The latter curve also passes the fold of the prey alone, u = 0.411161560751.
 #[test]
 fn prey_and_predators_appear_along_two_curves() {
     let model = include_str!("../../../models/predator-prey.toml");
@@ -125,10 +129,10 @@ fn prey_and_predators_appear_along_two_curves() {
     assert!((1.0 / double[0].point.parameters[1] - 0.411161560751).abs() < 1e-11);
 }
 
-/// Away from q = 0 the crossing opens: there is a branch point at one value of q, and no curve of them. Where it opens like q³, one begins, and
-/// ends as soon as that shows.
+/// Away from q = 0 the crossing opens: a branch point exists at one value of q only, and there is no curve of them.
+/// Where it opens like q³, a curve begins and ends as soon as the opening is noticeable.
 #[test]
-fn there_is_no_curve_where_branches_no_longer_cross() {
+fn a_curve_ends_where_branches_no_longer_cross() {
     for (opening, begins) in [("0.1*q", false), ("-0.3*q^2", true), ("0.1*q^3", true)] {
         let model = format!("[parameters]\nmu = -1\nq = 0\n[states]\nx = \"mu*x - x^2 + {opening}\"\n");
         opens(&model, begins);
@@ -185,8 +189,8 @@ fn branch_points_of_cycles_lie_where_two_radii_agree() {
 }
 
 #[test]
-fn branch_points_of_cycles_that_a_second_parameter_opens_are_not_followed() {
-    // For p3 ≠ 0 the radii no longer cross: they meet in folds, or not at all.
+fn branch_points_of_cycles_that_a_second_parameter_unfolds_are_not_followed() {
+    // For p3 ≠ 0 the branches of the two radii no longer cross: they meet in folds or not at all.
     let diagram = of_rings("free = \"p3\"\nrange = [-0.2, 0.2]");
     let curve = diagram.branch("curve").unwrap();
     let said = curve.ends.iter().flatten().map(|end| end.to_string()).collect::<Vec<_>>();
@@ -197,7 +201,7 @@ fn branch_points_of_cycles_that_a_second_parameter_opens_are_not_followed() {
 }
 
 #[test]
-fn the_symmetry_of_lorenz_cycles_breaks_on_a_curve_that_passes_the_branch_points_of_branches() {
+fn a_curve_of_symmetry_breaking_of_lorenz_cycles_passes_the_branch_points_of_branches() {
     let lorenz = include_str!("../../../models/lorenz.toml");
     let cycles = |sigma: f64, rest: &str| {
         let study = study(

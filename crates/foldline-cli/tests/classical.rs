@@ -1,4 +1,5 @@
-//! Classical problems whose special points are known: in closed form, or from another continuation code at fine settings.
+//! Classical problems whose special points are known in closed form, or from another continuation code at fine
+//! settings.
 
 use foldline::contract::Unobserved;
 use foldline::diagram::{Branch, Diagram, Ending, Kind, Solution, SpecialPoint};
@@ -14,7 +15,7 @@ const STUART_LANDAU: &str = include_str!("../../../models/stuart-landau.toml");
 /// Tolerance of every run here unless said otherwise; errors are relative to 1 + |value|.
 const TOLERANCE: f64 = 1e-6;
 
-/// A study of one branch "b", run to its diagram. `seed` and `branch` are the lines of its two tables.
+/// Runs a study of one branch "b" and returns its diagram. `seed` and `branch` are the lines of its two tables.
 #[track_caller]
 fn explored(model: &str, seed: &str, branch: &str) -> Diagram {
     let text = format!(
@@ -35,7 +36,8 @@ fn parameter(branch: &Branch, special: &SpecialPoint) -> f64 {
     special.point.parameters[branch.free]
 }
 
-/// The special points of a branch are exactly these, by increasing parameter; parameters to `error`, relative to 1 + |value|.
+/// Asserts that the special points of a branch are exactly these, by increasing parameter; parameters to `error`,
+/// relative to 1 + |value|.
 #[track_caller]
 fn has(branch: &Branch, expected: &[(Kind, f64)], error: f64) -> Vec<SpecialPoint> {
     let mut found = branch.special.clone();
@@ -83,7 +85,7 @@ fn lorenz_cycles_double_their_period_as_rho_falls() {
         "attractor = \"cycle\"\nparameters = { rho = 280 }",
         "free = \"rho\"\nrange = [212, 300]\nswitch = { period-doubling = 2 }",
     );
-    // Other continuation code, good to the digits given.
+    // Another continuation code, to the digits given.
     let cascade = [
         ("b", 229.40670856, 0.48086682, 1e-7),
         ("b/period-doubling-1", 218.21012777, 0.98794894, 1e-7),
@@ -109,7 +111,7 @@ fn lure_cycles_are_born_at_a_hopf_point_and_double() {
     let cycle = branch(&diagram, "b/hopf-1");
     joined(cycle, 0, Kind::Hopf, 1.0, 1e-8);
     period_is(cycle.points[0].solution.period(), std::f64::consts::TAU, 1e-4);
-    // Other continuation code.
+    // Another continuation code.
     let found = has(cycle, &[(Kind::PeriodDoubling, 0.6303020062)], 1e-7);
     period_is(found[0].point.solution.period(), 6.3640713394, TOLERANCE);
     let found = has(branch(&diagram, "b/hopf-1/period-doubling-1"), &[(Kind::PeriodDoubling, 0.57962984090)], 1e-7);
@@ -117,7 +119,7 @@ fn lure_cycles_are_born_at_a_hopf_point_and_double() {
 }
 
 #[test]
-fn brusselator_oscillates_beyond_b_equal_one_plus_a_squared_in_both_directions() {
+fn brusselator_oscillates_beyond_b_equal_one_plus_a_squared_whichever_parameter_varies() {
     // Closed form: B = 1 + A², period 2π/A.
     for (a, b, free, hopf, range) in [(1.0, 1.0, "B", 2.0, "[0.5, 4]"), (2.0, 3.0, "A", 2f64.sqrt(), "[1.1, 3]")] {
         let diagram = explored(
@@ -127,7 +129,7 @@ fn brusselator_oscillates_beyond_b_equal_one_plus_a_squared_in_both_directions()
         );
         let rest = branch(&diagram, "b");
         let found = has(rest, &[(Kind::Hopf, hopf)], 1e-8);
-        // Oscillation is beyond the point in B and before it in A.
+        // Cycles exist beyond the point in B and before it in A.
         let stable_first = free == "B";
         assert_eq!((found[0].unstable_before, found[0].unstable_after), if stable_first { (0, 2) } else { (2, 0) });
         let cycle = branch(&diagram, "b/hopf-1");
@@ -145,7 +147,7 @@ fn van_der_pol_cycle_relaxes() {
     let diagram = explored(VAN_DER_POL, "attractor = \"cycle\"", line);
     let cycle = branch(&diagram, "b");
     ends(cycle, ["bound", "bound"]);
-    // Other continuation code, and integration by Radau's method at 1e-12: period and amplitude.
+    // Another continuation code, and integration by Radau's method at 1e-12: period and amplitude.
     let last = &cycle.points[cycle.points.len() - 1];
     for (point, period, amplitude) in [
         (&cycle.points[0], 6.66328686, 2.00861986),
@@ -159,7 +161,7 @@ fn van_der_pol_cycle_relaxes() {
 }
 
 #[test]
-fn stuart_landau_is_what_its_closed_form_says() {
+fn stuart_landau_cycles_match_their_closed_form() {
     let diagram = explored(
         STUART_LANDAU,
         "state = { x = 0, y = 0 }\nparameters = { growth = -1 }",
@@ -202,7 +204,7 @@ fn a_cubic_has_two_folds() {
 }
 
 #[test]
-fn fitzhugh_nagumo_cycles_span_from_one_hopf_point_to_the_other() {
+fn fitzhugh_nagumo_cycles_lead_from_one_hopf_point_to_the_other() {
     let model = include_str!("../../../models/fitzhugh-nagumo.toml");
     let diagram = explored(
         model,
@@ -216,7 +218,7 @@ fn fitzhugh_nagumo_cycles_span_from_one_hopf_point_to_the_other() {
     let Solution::Equilibrium(x) = &found[1].point.solution else { panic!("an equilibrium") };
     assert!(near(x[0], 0.954521404218, 1e-8) && near(x[1], -0.664629718493, 1e-8), "{x:?}");
     let cycle = branch(&diagram, "b/hopf-1");
-    // Born and lost subcritically; two runs of the same branch from either end would meet the same fold mirrored.
+    // Born and lost subcritically; starting the branch from either end would give the mirror images of the same folds.
     assert_eq!(cycle.special.len(), 2);
     assert!(near(parameter(cycle, &cycle.special[0]), -parameter(cycle, &cycle.special[1]), 1e-6));
     joined(cycle, 0, Kind::Hopf, -hopf, 1e-8);
@@ -225,18 +227,18 @@ fn fitzhugh_nagumo_cycles_span_from_one_hopf_point_to_the_other() {
 }
 
 #[test]
-fn lorenz_rolls_leave_rest_at_a_pitchfork_and_oscillate_up_to_a_homoclinic_orbit() {
+fn lorenz_rolls_appear_at_a_pitchfork_and_their_cycles_end_at_a_homoclinic_orbit() {
     let diagram = explored(
         LORENZ,
         "state = { x = 0, y = 0, z = 0 }\nparameters = { rho = 0.5 }",
         "free = \"rho\"\nrange = [0.2, 40]\nswitch = { branch-point = 1, hopf = 1 }",
     );
-    // Closed form: pitchfork at 1, Hopf at σ(σ + b + 3)/(σ - b - 1).
+    // Closed form: pitchfork at 1, Hopf point at σ(σ + b + 3)/(σ - b - 1).
     let (sigma, b) = (10.0, 8.0 / 3.0);
     let hopf = sigma * (sigma + b + 3.0) / (sigma - b - 1.0);
     let found = has(branch(&diagram, "b"), &[(Kind::BranchPoint, 1.0)], 1e-8);
     assert_eq!((found[0].unstable_before, found[0].unstable_after), (0, 1));
-    // One arm; the other one is its mirror image.
+    // Only one half of the pitchfork branch; the other is its mirror image.
     assert_eq!(diagram.branches.len(), 3);
     let arm = branch(&diagram, "b/branch-point-1");
     joined(arm, 0, Kind::BranchPoint, 1.0, 1e-8);
@@ -247,7 +249,7 @@ fn lorenz_rolls_leave_rest_at_a_pitchfork_and_oscillate_up_to_a_homoclinic_orbit
     let found = has(arm, &[(Kind::Hopf, hopf)], 1e-8);
     let Solution::Equilibrium(x) = &found[0].point.solution else { panic!("an equilibrium") };
     assert!(near(x[0].abs(), 7.9560197, 1e-7) && near(x[2], 23.7368437, 1e-6), "{x:?}");
-    // Subcritical: unstable cycles below. Period at the Hopf point in closed form; the homoclinic orbit from other
+    // Subcritical: unstable cycles below. Period at the Hopf point in closed form; homoclinic orbit from another
     // continuation code, to the digits given.
     let cycle = branch(&diagram, "b/branch-point-1/hopf-1");
     period_is(cycle.points[0].solution.period(), 0.65283033, 1e-4);
@@ -263,8 +265,8 @@ fn a_symmetric_lorenz_cycle_loses_its_symmetry_at_a_branch_point() {
         let seed = format!("attractor = \"cycle\"\nparameters = {{ rho = {seed} }}");
         explored(LORENZ, &seed, &format!("free = \"rho\"\nrange = {range}\nswitch = {{ branch-point = 1 }}"))
     };
-    // From the symmetric side, where it is stable. The digits are this program's own, for want of others; that both sides
-    // give the same place is the check.
+    // From the symmetric side, where it is stable. No independent digits are known; the check is that both sides
+    // give the same value.
     let diagram = along("330", "[300, 340]");
     let found = has(branch(&diagram, "b"), &[(Kind::BranchPoint, 312.97353)], 1e-7);
     assert_eq!((found[0].unstable_before, found[0].unstable_after), (1, 0));
@@ -272,7 +274,8 @@ fn a_symmetric_lorenz_cycle_loses_its_symmetry_at_a_branch_point() {
     let arm = branch(&diagram, "b/branch-point-1");
     ends(arm, ["joined", "bound"]);
     assert!(arm.special.is_empty() && arm.points.iter().all(|p| p.unstable == 0));
-    // From the other side: the arm goes on as its mirror image, and the symmetric cycle is found at the same place.
+    // From the other side: the asymmetric branch continues as its mirror image, and the symmetric cycle is found at the
+    // same value.
     let other = along("305", "[300, 340]");
     let place = |branch: &Branch| branch.special[0].point.parameters[branch.free];
     assert!(near(place(branch(&other, "b")), place(branch(&diagram, "b")), 3e-5));
@@ -284,7 +287,7 @@ fn a_symmetric_lorenz_cycle_loses_its_symmetry_at_a_branch_point() {
 }
 
 #[test]
-fn predator_and_prey_branch_twice_and_turn_and_oscillate() {
+fn predator_and_prey_have_two_branch_points_a_fold_and_cycles() {
     let model = "name = \"Predator and prey\"\n[parameters]\np = 0.1\n[states]\nu = \"3*u*(1 - u) - u*v - p*(1 - exp(-5*u))\"\nv = \"-v + 3*u*v\"\n";
     let diagram = explored(
         model,
@@ -303,7 +306,7 @@ fn predator_and_prey_branch_twice_and_turn_and_oscillate() {
     assert!(near(x[0], 1.0 / 3.0, 1e-8) && near(x[1], 0.36576154, 1e-8), "{x:?}");
     let omega = found[0].point.spectrum.iter().map(|z| z.im).fold(0.0, f64::max);
     assert!(near(omega, 0.60478222, 1e-7), "{omega}");
-    // Cycles up to a heteroclinic orbit, without anything else on the way.
+    // Cycles up to a heteroclinic orbit, with no special points on the way.
     let cycle = branch(&diagram, &format!("{}/hopf-1", both.name));
     ends(cycle, ["joined", "heteroclinic"]);
     assert!(cycle.special.is_empty());
@@ -311,11 +314,11 @@ fn predator_and_prey_branch_twice_and_turn_and_oscillate() {
 }
 
 #[test]
-fn the_ab_reaction_turns_twice_and_its_cycles_end_at_a_homoclinic_orbit() {
+fn the_ab_reaction_has_two_folds_and_its_cycles_end_at_a_homoclinic_orbit() {
     let model = "name = \"AB\"\n[parameters]\np = 0.05\n[states]\nu = \"-u + p*(1 - u)*exp(v)\"\nv = \"-v + 14*p*(1 - u)*exp(v) - 2*v\"\n";
     let diagram =
         explored(model, "state = { u = 0.05, v = 0.3 }", "free = \"p\"\nrange = [0.01, 0.2]\nswitch = { hopf = 1 }");
-    // Other continuation code, 6 to 7 digits; the end of the cycles likewise.
+    // Another continuation code, 6 to 7 digits, also for the end of the cycles.
     has(branch(&diagram, "b"), &[(Kind::Fold, 0.08893185), (Kind::Fold, 0.1057390), (Kind::Hopf, 0.1308998)], 3e-7);
     let cycle = branch(&diagram, "b/hopf-1");
     ends(cycle, ["joined", "homoclinic"]);
@@ -328,8 +331,8 @@ fn a_cycle_of_the_langford_system_becomes_a_torus() {
     let model = "name = \"Langford\"\n[parameters]\nlambda = 0.5\n[states]\nx = \"(z - 0.7)*x - 3.5*y\"\ny = \"3.5*x + (z - 0.7)*y\"\nz = \"0.6 + lambda*z - z^3/3 - (x^2 + y^2)*(1 + 0.25*z)\"\n";
     let diagram = explored(model, "attractor = \"cycle\"", "free = \"lambda\"\nrange = [0.1, 1.5]");
     let cycle = branch(&diagram, "b");
-    // Closed form. With r² = x² + y² the cycle is the equilibrium z = 0.7 of r' = (z - 0.7) r, z' = g(r, z); the torus is
-    // its Hopf point, where ∂g/∂z = lambda - z² - r²/4 = 0 and ω² = 2.35 r².
+    // Closed form. With r² = x² + y² the cycle is the equilibrium z = 0.7 of r' = (z - 0.7) r, z' = g(r, z); the torus
+    // bifurcation is its Hopf point, where ∂g/∂z = lambda - z² - r²/4 = 0 and ω² = 2.35 r².
     let z: f64 = 0.7;
     let share = 1.0 + 0.25 * z;
     let lambda = (z * z + 0.25 * (0.6 - z.powi(3) / 3.0) / share) / (1.0 - 0.25 * z / share);
@@ -338,7 +341,7 @@ fn a_cycle_of_the_langford_system_becomes_a_torus() {
     assert_eq!((found[0].unstable_before, found[0].unstable_after), (0, 2));
     let period = std::f64::consts::TAU / 3.5;
     period_is(found[0].point.solution.period(), period, TOLERANCE);
-    // The pair itself: exp(±iωT).
+    // The multiplier pair: exp(±iωT).
     let pair = &found[0].point.spectrum[1..];
     for multiplier in pair {
         assert!((multiplier.norm() - 1.0).abs() < 1e-5, "{pair:?}");
@@ -354,7 +357,7 @@ fn a_cycle_of_the_langford_system_becomes_a_torus() {
 #[test]
 fn van_der_pol_cycle_crosses_the_circles_of_the_harmonic_oscillator() {
     let diagram = explored(VAN_DER_POL, "attractor = \"cycle\"", "free = \"mu\"\nrange = [-1, 1]");
-    // At mu = 0 every circle is a cycle; that of amplitude 2 continues to either side, and mu -> -mu reverses time.
+    // At mu = 0 every circle is a cycle; that of amplitude 2 continues to both sides, and mu -> -mu reverses time.
     let cycle = branch(&diagram, "b");
     let found = has(cycle, &[(Kind::BranchPoint, 0.0)], TOLERANCE);
     assert!(near(found[0].point.ranges[0][1], 2.0, TOLERANCE));
@@ -365,7 +368,7 @@ fn van_der_pol_cycle_crosses_the_circles_of_the_harmonic_oscillator() {
 }
 
 #[test]
-fn an_arm_between_two_pitchforks_joins_both() {
+fn one_branch_connects_two_pitchforks() {
     // Closed form: z² = mu (1 - mu) between the pitchforks at 0 and 1; once for equilibria, once beside an oscillation.
     let rest = "name = \"Arc\"\n[parameters]\nmu = -0.5\n[states]\nz = \"mu*(1 - mu)*z - z^3\"\n";
     let cycle = "name = \"Arc\"\n[parameters]\nmu = -0.5\n[states]\nz = \"mu*(1 - mu)*z - z^3\"\nx = \"x - y - x*(x^2 + y^2)\"\ny = \"x + y - y*(x^2 + y^2)\"\n";
@@ -375,7 +378,7 @@ fn an_arm_between_two_pitchforks_joins_both() {
         let arm = branch(&diagram, "b/branch-point-1");
         joined(arm, 0, Kind::BranchPoint, 0.0, 1e-6);
         joined(arm, 1, Kind::BranchPoint, 1.0, 1e-6);
-        // The slope of the parameter changes sign nowhere: the arm is a graph over mu, and it is stable.
+        // The branch is a graph over mu, without folds, and it is stable.
         assert!(arm.special.is_empty(), "{:?}", arm.special.iter().map(|s| s.kind).collect::<Vec<_>>());
         for point in &arm.points {
             let mu = point.parameters[arm.free];
@@ -388,9 +391,9 @@ fn an_arm_between_two_pitchforks_joins_both() {
 }
 
 #[test]
-fn a_crossing_is_left_although_newtons_method_ends_on_either_branch_next_to_it() {
-    // mu x - x³ + e = 0 are two curves where e is not 0, as it never is to rounding: within e^⅔ of 0 the one from the left turns into what
-    // crosses it. Points there say nothing of either.
+fn a_branch_continues_past_a_crossing_next_to_which_newtons_method_ends_on_either_branch() {
+    // mu x - x³ + e = 0 is two separate curves for e ≠ 0, and rounding always makes e ≠ 0: within e^⅔ of 0 the branch
+    // from the left turns into the one that crosses it. Points there belong clearly to neither.
     for offset in ["0", "1e-15", "1e-14", "-1e-13", "1e-12"] {
         let model = format!("[parameters]\nmu = -1\n[states]\nx = \"y\"\ny = \"-y + mu*x - x^3 + {offset}\"\n");
         let diagram = explored(
@@ -413,7 +416,7 @@ fn a_crossing_is_left_although_newtons_method_ends_on_either_branch_next_to_it()
 
 /// On the line x = p, and on the cycles of the van der Pol oscillator.
 #[test]
-fn marks_lie_at_the_values_asked_for_and_a_branch_stops_there() {
+fn marks_lie_at_the_requested_values_and_a_stop_ends_the_branch() {
     let model = "[parameters]\np = 0.5\n[states.x]\nequation = \"p - x\"\n[outputs]\nsquare = \"x^2\"\n";
     let diagram = explored(
         model,
@@ -429,7 +432,7 @@ fn marks_lie_at_the_values_asked_for_and_a_branch_stops_there() {
         sorted.len() == expected.len() && sorted.iter().zip(expected).all(|(a, b)| near(*a, b, 1e-8)),
         "{sorted:?}"
     );
-    // Those of the parameter itself to the last bit.
+    // Marks of the parameter itself are exact to the last bit.
     assert!(places.contains(&0.25) && places.contains(&1.0), "{places:?}");
     ends(line, ["asked", "asked"]);
     let reach = [line.points.first(), line.points.last()].map(|p| p.unwrap().parameters[0]);
@@ -445,13 +448,13 @@ fn marks_lie_at_the_values_asked_for_and_a_branch_stops_there() {
         let found = cycles.special.iter().find(|s| (parameter(cycles, s) == 10.0) == at);
         found.unwrap_or_else(|| panic!("{:?}", cycles.special.len()))
     });
-    // A separate code, good to the digits given.
+    // A separate code, to the digits given.
     period_is(at_ten.point.solution.period(), 19.07836957, TOLERANCE);
     period_is(long.point.solution.period(), 10.0, 2.0 * TOLERANCE);
     assert!(near(at_ten.point.ranges[0][1], 2.01428536, TOLERANCE));
 }
 
-/// Closed form of the defining equations; both Hopf points are subcritical, and sit between the folds and outside them.
+/// Closed form of the defining equations; both Hopf points are subcritical, one between the folds and one outside them.
 #[test]
 fn co_oxidation_has_two_folds_and_two_subcritical_hopf_points() {
     let diagram = explored(
@@ -471,7 +474,8 @@ fn co_oxidation_has_two_folds_and_two_subcritical_hopf_points() {
     }
 }
 
-/// A conservative oscillator has a cycle of every amplitude, all at the same value of a damping: elliptic integrals for x'' + x + x³ = 0.
+/// A conservative oscillator has a cycle of every amplitude, all at the same value of a damping parameter: elliptic
+/// integrals for x'' + x + x³ = 0.
 #[test]
 fn a_conservative_oscillator_has_the_periods_of_its_elliptic_integrals() {
     let diagram = explored(
@@ -484,15 +488,16 @@ fn a_conservative_oscillator_has_the_periods_of_its_elliptic_integrals() {
     for (amplitude, period) in [(1.0, 4.76802203), (2.0, 3.17972332)] {
         let found = marks.iter().find(|s| near(s.point.ranges[0][1], amplitude, TOLERANCE)).unwrap();
         assert!(parameter(family, found).abs() < TOLERANCE);
-        // The period changes by 2 where the amplitude changes by 1.
+        // The period changes by 2 when the amplitude changes by 1.
         period_is(found.point.solution.period(), period, 3.0 * TOLERANCE);
     }
 }
 
 #[test]
-fn averages_over_a_cycle() {
+fn averages_over_a_cycle_match_closed_forms() {
     use foldline::special::quantity::Quantity;
-    // A circle of radius r: means 0, root mean squares r/√2, norm r, and the output r itself; 2π r over a period.
+    // A circle of radius r: means 0, root mean squares r/√2, norm r, and the output r itself; its integral over a
+    // period is 2πr.
     let line = "attractor = \"cycle\"\nparameters = { growth = 1 }";
     let diagram =
         explored(STUART_LANDAU, line, "free = \"growth\"\nrange = [0.25, 4]\nmark = { x_rms = 0.5, norm = 1.5 }");
@@ -506,13 +511,14 @@ fn averages_over_a_cycle() {
         assert!(near(of(Quantity::Norm(2)), r, 1e-8) && near(of(Quantity::Mean(2)), r, 1e-8));
         assert!(near(of(Quantity::Integral(2)), std::f64::consts::TAU * r, TOLERANCE));
     }
-    // Parts: along a cycle of x'' = μ (1 - x²) x' - x the mean of (x x')' and of x x' (1 - x²) is 0, so that those of x'² and x² agree.
+    // Integration by parts: along a cycle of x'' = μ (1 - x²) x' - x the means of (x x')' and x x' (1 - x²) vanish, so
+    // those of x'² and x² agree.
     let diagram = explored(VAN_DER_POL, "attractor = \"cycle\"", "free = \"mu\"\nrange = [0.5, 4]");
     for point in &branch(&diagram, "b").points {
         let [x, v] = [0, 1].map(|k| Quantity::Rms(k).of(point).unwrap());
         assert!(x > 1.0 && near(v, x, TOLERANCE), "{x} {v}");
     }
-    // At rest all are the value itself, and there is no period to integrate over.
+    // For an equilibrium all of them are the value itself, and there is no period to integrate over.
     let diagram = explored(
         STUART_LANDAU,
         "state = { x = 0, y = 0 }\nparameters = { growth = -1 }",

@@ -1,5 +1,5 @@
-//! Every coefficient of a normal form has an error that is neither too small nor useless, and says nothing where it is not defined; and Hopf
-//! points are where they are whatever the number of states.
+//! Every coefficient of a normal form has an error that is neither too small nor uselessly large, and none where the
+//! coefficient is undefined. Hopf points are equally accurate for any number of states.
 
 use foldline::contract::Unobserved;
 use foldline::diagram::{Branch, Diagram, Kind, SpecialPoint};
@@ -16,7 +16,8 @@ fn of_kind(branch: &Branch, kind: Kind) -> Vec<&SpecialPoint> {
     branch.special.iter().filter(|special| special.kind == kind).collect()
 }
 
-/// The first coefficient is within its error of `known`, which is no more than that share of it.
+/// Asserts that the first coefficient is within its error of `known`, and that this error is at most
+/// `largest` times |`known`|.
 fn honest(point: &SpecialPoint, known: f64, largest: f64) {
     let ([value, ..], [error, ..]) = (&point.coefficients[..], &point.coefficient_errors[..]) else {
         panic!("no coefficient: {}", point.normal_form())
@@ -25,8 +26,9 @@ fn honest(point: &SpecialPoint, known: f64, largest: f64) {
     assert!(*error <= largest * known.abs(), "{value:?} ± {error:e}");
 }
 
-/// Brusselators in a row, A = 2, B = 5.45, between walls at their state of rest, which is A, B/A everywhere. The Laplacian has the eigenvalues
-/// -4 sin²(kπ/2(N+1)), and a pair passes where B - 1 - A² = (D_x + D_y) (N+1)²/L² 4 sin²(…).
+/// Brusselators in a row, A = 2, B = 5.45, between walls held at the equilibrium A, B/A. The Laplacian has the
+/// eigenvalues -4 sin²(kπ/2(N+1)), and a pair crosses the imaginary axis where
+/// B - 1 - A² = (D_x + D_y) (N+1)²/L² 4 sin²(…).
 #[test]
 fn hopf_points_of_many_states_are_as_accurate_as_those_of_two() {
     for cells in [1usize, 3, 8] {
@@ -64,8 +66,8 @@ fn hopf_points_of_many_states_are_as_accurate_as_those_of_two() {
     }
 }
 
-/// An oscillator at radius 1 beside a plane: z' = (p + iω) z + c z |z|² + g z (ρ² - 1), ρ' = ρ (k (1 - ρ²) + |z|²). With ∫ |v|² dt = 1 over a
-/// period, d = (c + g/k) 2/T.
+/// An oscillator of radius 1 beside a plane: z' = (p + iω) z + c z |z|² + g z (ρ² - 1), ρ' = ρ (k (1 - ρ²) + |z|²).
+/// With ∫ |v|² dt = 1 over a period, d = (c + g/k) 2/T.
 #[test]
 fn a_torus_point_has_an_honest_error() {
     let (c, g, k) = (0.2, 0.6, 0.75);
@@ -90,7 +92,8 @@ fn branch(attractor: &str, [from, to]: [f64; 2]) -> String {
     )
 }
 
-/// ρ' = ρ (p + 2 ρ² - ρ⁴), φ' = 1 + (ρ² - 1)/2: a fold of cycles at p = -1, ρ = 1, with a = 4, and a Hopf point at p = 0.
+/// ρ' = ρ (p + 2 ρ² - ρ⁴), φ' = 1 + (ρ² - 1)/2: a fold of cycles at p = -1, ρ = 1, with a = 4, and a Hopf point
+/// at p = 0.
 fn turning_back(angle: &str) -> String {
     format!(
         "[parameters]\np = 0.5\n[definitions]\ngrow = \"p + 2*(x^2 + y^2) - (x^2 + y^2)^2\"\nturn = \"1 + 0.5*(x^2 + y^2 - 1){angle}\"\n\
@@ -113,8 +116,8 @@ fn a_fold_of_cycles_has_an_honest_error_and_so_has_the_hopf_point_at_its_end() {
 }
 
 #[test]
-fn where_an_orbit_passes_a_switch_there_are_no_coefficients_and_the_table_says_why() {
-    // The angle alone knows the switch: the fold stays where it is.
+fn an_orbit_across_a_switch_has_no_coefficients_and_the_table_says_why() {
+    // Only the angle depends on the switch, so the fold stays where it is.
     let passes = grown(&turning_back("*if(x > 0.2, 1, 0.8)"), BACK);
     let [fold] = of_kind(passes.branch("b").unwrap(), Kind::Fold)[..] else { panic!("one fold") };
     assert!((fold.point.parameters[0] + 1.0).abs() < 1e-4);
@@ -125,8 +128,8 @@ fn where_an_orbit_passes_a_switch_there_are_no_coefficients_and_the_table_says_w
     honest(fold, 4.0, 1e-5);
 }
 
-/// Competition of three with cyclic symmetry: at α + β = 2 cycles fill a surface, and l₁ is 0 (may1975). And the free vibration of a rotor with
-/// a cubic stiffness that no number of this size shows.
+/// Competition of three species with cyclic symmetry: at α + β = 2 cycles fill a surface, and l₁ is 0 (may1975). And
+/// the free vibration of a rotor whose cubic stiffness is too small to show in numbers of this size.
 #[test]
 fn a_coefficient_that_is_zero_within_its_error_decides_nothing() {
     let competition = "[parameters]\nalpha = 0.5\nbeta = 1.3\n[states]\nx = \"x*(1 - x - alpha*y - beta*z)\"\ny = \"y*(1 - beta*x - y - alpha*z)\"\nz = \"z*(1 - alpha*x - beta*y - z)\"\n";
@@ -143,7 +146,7 @@ fn a_coefficient_that_is_zero_within_its_error_decides_nothing() {
     }
 }
 
-/// On the plane ξ = 0, which is invariant, nothing drives ξ: c of the zero-Hopf point is 0, and what is divided by it is not defined.
+/// Nothing drives ξ on the invariant plane ξ = 0: c of the zero-Hopf point is 0, and quotients by it are undefined.
 #[test]
 fn a_zero_hopf_point_on_an_invariant_plane_has_no_coefficients() {
     let model = "[parameters]\np = -0.5\nq = -0.3\n[states]\nx = \"p*x + x^2 - x*(y^2 + z^2)\"\ny = \"(q + x)*y - z - y*(y^2 + z^2)\"\nz = \"y + (q + x)*z\"\n";

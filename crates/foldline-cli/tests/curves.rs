@@ -7,7 +7,7 @@ use foldline::special::normal_form::Local;
 use foldline_store::study_file::{Study, parse_study};
 
 const ROTOR: &str = include_str!("../../../models/overhung-rotor.toml");
-/// The tolerance of a study that does not state one.
+/// Default tolerance of a study.
 const TOLERANCE: f64 = 1e-6;
 
 fn study(model: &str, rest: &str) -> Study {
@@ -15,7 +15,8 @@ fn study(model: &str, rest: &str) -> Study {
         .unwrap_or_else(|found| panic!("{}", found[0]))
 }
 
-/// The study with one curve more: what is held of the branch "b", next to which value, and the second parameter.
+/// Adds a curve to the study and runs it: kind of the point continued on branch "b", the parameter value it is close
+/// to, and the second parameter.
 fn with_curve(mut study: Study, hold: Kind, near: f64, second: &str, range: [f64; 2], until: Option<f64>) -> Diagram {
     let curve = CurvePlan {
         name: "curve".into(),
@@ -42,8 +43,8 @@ fn complete(branch: &Branch) {
     }
 }
 
-/// Every point of the curve satisfies `defect` = 0, a function of the branch's parameter and the second one, to
-/// the tolerance.
+/// Asserts that every point of the curve satisfies `defect` = 0, a function of the branch's parameter and the second
+/// one, to the tolerance.
 fn satisfies(diagram: &Diagram, points: usize, defect: impl Fn(f64, f64) -> f64) {
     let curve = diagram.branch("curve").unwrap();
     complete(curve);
@@ -56,12 +57,12 @@ fn satisfies(diagram: &Diagram, points: usize, defect: impl Fn(f64, f64) -> f64)
 }
 
 #[test]
-fn folds_of_equilibria_go_round_the_cusp() {
+fn a_curve_of_folds_of_equilibria_passes_the_cusp() {
     let model = "name = \"Cusp\"\n[parameters]\nmu = -1\nlambda = 1\n[states]\nx = \"mu + lambda*x - x^3\"\n";
     let branch = "[[seed]]\nname = \"s\"\nstate = { x = -1.3247 }\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"mu\"\nrange = [-2, 2]\n";
     let diagram = with_curve(study(model, branch), Kind::Fold, 0.4, "lambda", [-1.0, 2.0], None);
     satisfies(&diagram, 10, |mu, lambda| 27.0 * mu * mu - 4.0 * lambda.powi(3));
-    // Both arms of the cusp belong to the same curve: it turns back in lambda, at the cusp.
+    // Both sides of the cusp belong to the same curve, which turns back in lambda at the cusp.
     let curve = diagram.branch("curve").unwrap();
     let [only] = &curve.special[..] else { panic!("{:?}", curve.special.len()) };
     // x' = mu + lambda x - x³ is its own normal form, and its quadratic terms vanish there.
@@ -72,7 +73,7 @@ fn folds_of_equilibria_go_round_the_cusp() {
     assert!(mu(curve.points.first()) * mu(curve.points.last()) < 0.0);
 }
 
-/// What lies on the curve, by increasing second parameter; a closed curve is followed once.
+/// Asserts the special points on the curve, by increasing second parameter; a closed curve is followed once.
 fn lies_on(diagram: &Diagram, expected: &[(Kind, f64, f64)]) {
     let curve = diagram.branch("curve").unwrap();
     complete(curve);
@@ -91,7 +92,7 @@ fn lies_on(diagram: &Diagram, expected: &[(Kind, f64, f64)]) {
 
 /// Published values; all from Newton's method on the defining equations.
 #[test]
-fn curves_of_co_oxidation_have_their_points_of_codimension_two() {
+fn curves_of_co_oxidation_have_the_published_codimension_two_points() {
     use Kind::{BogdanovTakens, Cusp, Fold, GeneralisedHopf, Hopf};
     let model = include_str!("../../../models/co-oxidation.toml");
     let branch = "[[seed]]\nname = \"s\"\nattractor = \"equilibrium\"\nparameters = { q2 = 0.9 }\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"q2\"\nrange = [0.5, 3]\n";
@@ -99,7 +100,7 @@ fn curves_of_co_oxidation_have_their_points_of_codimension_two() {
     let folds = with_curve(study(model, branch), Fold, 1.05, "k", [0.0, 2.0], None);
     let [a, b] = takens.map(|(q, k)| (BogdanovTakens, q, k));
     lies_on(&folds, &[(Cusp, 1.0064083297, 0.3559912732), a, b]);
-    // From either Hopf point: the curve ends on that of the folds at both sides, with a turn in k on its way.
+    // From either Hopf point the curve ends on the fold curve at both sides, with a turn in k on the way.
     for near in [1.04, 1.06] {
         let hopf = with_curve(study(model, branch), Hopf, near, "k", [0.0, 2.0], None);
         let curve = hopf.branch("curve").unwrap();
@@ -108,7 +109,7 @@ fn curves_of_co_oxidation_have_their_points_of_codimension_two() {
             [(0.8913189808, 0.2324873542), (0.9242550152, 0.3058792675)].map(|(q, k)| (GeneralisedHopf, q, k));
         let turn = (Fold, turn.point.parameters[1], turn.point.parameters[6]);
         lies_on(&hopf, &[turn, generalised[0], generalised[1], a, b]);
-        // Where the curve turns in k is its lowest point, which its own points surround.
+        // The curve turns in k at its lowest point, which its own points surround.
         let lowest = curve.points.iter().map(|p| p.parameters[6]).fold(f64::INFINITY, f64::min);
         assert!(turn.2 <= lowest + 1e-9 && lowest - turn.2 < 1e-2, "{} {lowest}", turn.2);
         // Between the two generalised Hopf points the first Lyapunov coefficient has the other sign.
@@ -123,7 +124,7 @@ fn curves_of_co_oxidation_have_their_points_of_codimension_two() {
 }
 
 #[test]
-fn folds_of_the_a_to_b_reaction_have_a_cusp_and_meet_the_hopf_points() {
+fn folds_of_the_a_to_b_reaction_have_a_cusp_and_meet_the_hopf_curve() {
     let model = include_str!("../../../models/ab-reaction.toml");
     let branch = "[[seed]]\nname = \"s\"\nattractor = \"equilibrium\"\nparameters = { p1 = 0.05 }\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"p1\"\nrange = [0.05, 1]\n";
     let folds = with_curve(study(model, branch), Kind::Fold, 0.1, "p3", [1.5, 6.0], None);
@@ -134,7 +135,7 @@ fn folds_of_the_a_to_b_reaction_have_a_cusp_and_meet_the_hopf_points() {
         assert_eq!(found.len(), 1, "{:?}", all.iter().map(|s| s.kind).collect::<Vec<_>>());
         [&found[0].point.parameters[..], &found[0].coefficients].concat()
     };
-    // Both curves, by conditions of their own, meet at one point with one normal form.
+    // The two curves have different defining systems, and meet at one point with one normal form.
     let (one, other) = (takens(&folds), takens(&hopf));
     assert!(
         one.iter().zip(&other).all(|(a, b)| (a.abs() - b.abs()).abs() < 1e-6 * (1.0 + a.abs())),
@@ -146,7 +147,7 @@ fn folds_of_the_a_to_b_reaction_have_a_cusp_and_meet_the_hopf_points() {
     assert!((p1 - (-2f64).exp()).abs() < 1e-8 && (p3 - 2.5).abs() < 1e-8, "{p1} {p3}");
 }
 
-/// x' = beta + x² + s (y² + z²), with a pair of frequency 1 that grows like mu + c x: the normal form of an eigenvalue 0 with a pair, whose
+/// x' = beta + x² + s (y² + z²), with a pair of frequency 1 that grows like mu + c x: the zero-Hopf normal form, whose
 /// curves of folds (beta = 0) and Hopf points (beta = -mu²) touch at the origin.
 #[test]
 fn folds_and_hopf_points_meet_at_a_zero_hopf_point() {
@@ -160,8 +161,8 @@ fn folds_and_hopf_points_meet_at_a_zero_hopf_point() {
     assert_eq!(kinds, [Kind::ZeroHopf]);
 }
 
-/// r' = r (mu + nu r² - r⁴): folds of cycles at mu = -nu²/4, r² = nu/2, up to the generalised Hopf point at the origin. The period changes
-/// with the radius, or does not change at the folds, or at one of them.
+/// r' = r (mu + nu r² - r⁴): folds of cycles at mu = -nu²/4, r² = nu/2, up to the generalised Hopf point at the origin.
+/// The period varies with the radius, or is stationary at all folds, or at one of them.
 #[test]
 fn folds_of_cycles_end_at_a_generalised_hopf_point() {
     for turn in ["1 + square", "1", "1 + (square - 0.25)^2"] {
@@ -187,7 +188,7 @@ fn folds_of_cycles_end_at_a_generalised_hopf_point() {
     }
 }
 
-/// Two oscillators, each with a growth rate of its own in which both parameters have a part.
+/// Two oscillators, each with a growth rate that depends on both parameters.
 #[test]
 fn two_curves_of_hopf_points_cross_at_a_double_hopf_point() {
     let model = "[parameters]\np = -1\nq = -0.4\n[states]\na = \"(p + q)*a - b - a*(a^2 + b^2)\"\nb = \"a + (p + q)*b\"\nc = \"(p - q + 0.1*a)*c - 2.3*d\"\nd = \"2.3*c + (p - q)*d - d*c^2\"\n";
@@ -196,7 +197,8 @@ fn two_curves_of_hopf_points_cross_at_a_double_hopf_point() {
         let hopf = with_curve(study(model, branch), Kind::Hopf, near, "q", [-1.0, 1.0], None);
         satisfies(&hopf, 4, |p, q| p - slope * q);
         lies_on(&hopf, &[(Kind::DoubleHopf, 0.0, 0.0)]);
-        // r' = -r³/8 for c and d, which are faster, and -r³/2 for a and b; r² = 2 |w|². What a adds to c averages out.
+        // r' = -r³/8 for c and d, which are faster, and -r³/2 for a and b; r² = 2 |w|². The coupling of a into c
+        // averages out.
         let double = &hopf.branch("curve").unwrap().special[0];
         let expected = [-0.25, 0.0, 0.0, -1.0, 0.0, 0.0];
         let off = double.coefficients.iter().zip(expected).map(|(own, known)| (own - known).abs());
@@ -232,7 +234,7 @@ fn the_fold_of_the_single_loop_leads_from_the_cubic_spring_to_contact() {
     let flow = with_curve(cubic.clone(), Kind::Fold, 3.4, "kappa", [0.0, 1.0], Some(1.0));
     let curve = flow.branch("curve").unwrap();
     complete(curve);
-    // It begins at the fold of the run in Omega and ends at that of the contact branch.
+    // The curve begins at the fold of the run in Omega and ends at that of the contact branch.
     let fold = |diagram: &Diagram| {
         let special = &diagram.branch("b").unwrap().special;
         special.iter().filter(|s| s.kind == Kind::Fold).map(|s| s.point.parameters[0]).reduce(f64::min).unwrap()
@@ -247,8 +249,8 @@ fn the_fold_of_the_single_loop_leads_from_the_cubic_spring_to_contact() {
     assert!(curve.points.iter().all(|p| p.trust.discretisation < TOLERANCE));
 }
 
-/// The two cusps lie 4e-4 apart in speed, and in the second one the curve turns within 1e-4 of its length: there its arms are so close
-/// that steps went over from one to the other, or back the way they came.
+/// The two cusps lie 4e-4 apart in speed, and at the second one the curve turns within 1e-4 of its length. Its two
+/// sides are so close there that steps used to jump from one to the other, or turn back.
 #[test]
 fn the_fold_of_the_double_loop_passes_two_narrow_cusps() {
     let branch = "[[seed]]\nname = \"s\"\nattractor = \"3:1\"\nparameters = { Omega = 5, kappa = 0 }\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"Omega\"\nrange = [0.5, 12]\n";
@@ -260,7 +262,7 @@ fn the_fold_of_the_double_loop_passes_two_narrow_cusps() {
         assert_eq!(curve.points.last().unwrap().parameters[1], 1.0, "at {tolerance:e}");
         let found: Vec<Kind> = curve.special.iter().map(|s| s.kind).collect();
         assert_eq!(found, [Kind::Cusp; 2], "at {tolerance:e}");
-        // As a run at a tolerance of 1e-7 has them; parameters at a cusp are known better than its cycle.
+        // Values of a run at a tolerance of 1e-7; parameters at a cusp are more accurate than its cycle.
         for (special, expected) in curve.special.iter().zip([[2.763550064, 0.739588323], [2.763881635, 0.539289978]]) {
             for (value, expected) in special.point.parameters.iter().zip(expected) {
                 assert!((value - expected).abs() < tolerance + 1e-8, "{value} at {tolerance:e}, not {expected}");
@@ -270,7 +272,7 @@ fn the_fold_of_the_double_loop_passes_two_narrow_cusps() {
 }
 
 #[test]
-fn period_doublings_over_the_damping_pass_those_of_another_damping() {
+fn a_curve_of_period_doublings_passes_those_of_runs_at_other_damping() {
     let at = |zeta: f64| {
         format!(
             "[[seed]]\nname = \"s\"\nattractor = \"2:1\"\nsamples = 48\nparameters = {{ Omega = 5, kappa = 1, zeta = {zeta} }}\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"Omega\"\nrange = [3, 6]\n"
@@ -286,8 +288,8 @@ fn period_doublings_over_the_damping_pass_those_of_another_damping() {
     assert!(gap < TOLERANCE, "{gap:.1e} from {:?}", arrived.parameters);
 }
 
-/// Blocks that do not know of each other, forced with the period 3: one that doubles its period where its rate vanishes, one with a
-/// torus where its rate does, one with a fold at q = 0. The cycle is zero but for that.
+/// Uncoupled blocks, forced with the period 3: one that doubles its period where its rate vanishes, one with a
+/// torus where its rate does, one with a fold at q = 0. The cycle is zero otherwise.
 fn forced(blocks: &[(&str, &str)]) -> String {
     let mut text = String::from(
         "[parameters]\np = -0.4\nq = -0.3\n[forcing]\nperiod = \"3\"\n[definitions]\ncos1 = \"cos(2*pi*t/3)\"\nsin1 = \"sin(2*pi*t/3)\"\n",
@@ -316,7 +318,7 @@ fn forced(blocks: &[(&str, &str)]) -> String {
 }
 
 #[test]
-fn curves_of_cycles_have_their_points_of_codimension_two() {
+fn curves_of_cycle_bifurcations_have_their_codimension_two_points() {
     use Kind::{
         Chenciner, DoubleTorus, FlipTorus, FoldFlip, FoldTorus, GeneralisedPeriodDoubling, PeriodDoubling, Torus,
     };
@@ -343,7 +345,8 @@ fn curves_of_cycles_have_their_points_of_codimension_two() {
     }
 }
 
-/// Folds and torus points of the entrained van der Pol oscillator end at the same 1:1 resonance, found by conditions of their own.
+/// Folds and torus points of the entrained van der Pol oscillator end at the same 1:1 resonance, found by different
+/// defining systems.
 #[test]
 fn torus_points_of_the_forced_van_der_pol_oscillator_end_on_its_folds() {
     let model = include_str!("../../../models/van-der-pol-forced.toml");
@@ -369,14 +372,14 @@ fn torus_points_of_the_forced_van_der_pol_oscillator_end_on_its_folds() {
     place(&tori, Kind::Resonance14);
 }
 
-/// Closed form: Hopf points at αβ = 1; period doublings as another continuation code has them.
+/// Closed form: Hopf points at αβ = 1; period doublings from another continuation code.
 #[test]
-fn hopf_points_and_period_doublings_of_the_lure_system() {
+fn curves_of_hopf_points_and_period_doublings_of_the_lure_system() {
     let model = include_str!("../../../models/lure.toml");
     let branch = "[[seed]]\nname = \"s\"\nstate = { x = 0, y = 0, z = 0 }\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"alpha\"\nrange = [0.35, 2.5]\nswitch = { hopf = 1 }\n";
     let hopf = with_curve(study(model, branch), Kind::Hopf, 1.0, "beta", [0.5, 1.6], None);
     satisfies(&hopf, 4, |alpha, beta| alpha * beta - 1.0);
-    // One study for each of the published values: the curve stops there.
+    // One study for each published value, at which the curve stops.
     for (beta, alpha) in [(1.2, 0.48096156567), (0.8, 0.81012451210)] {
         let mut study = study(model, branch);
         study.plan.curves.push(CurvePlan {
@@ -398,7 +401,8 @@ fn hopf_points_and_period_doublings_of_the_lure_system() {
     }
 }
 
-/// Folds of cycles between two generalised Hopf points, through a cusp; demo `abcb` of AUTO-07p (Doedel and Heinemann 1983).
+/// Folds of cycles between two generalised Hopf points, through a cusp; demo `abcb` of AUTO-07p (Doedel and
+/// Heinemann 1983).
 #[test]
 fn a_curve_of_folds_of_cycles_ends_at_generalised_hopf_points() {
     let model = "name = \"abc\"\n[parameters]\nD = 0\nalpha = 1\nbeta = 1.55\nB = 8\nS = 0.04\n[definitions]\ne = \"exp(x3)\"\n\
@@ -423,8 +427,8 @@ fn a_curve_of_folds_of_cycles_ends_at_generalised_hopf_points() {
         })
         .collect();
     ends.sort_by(f64::total_cmp);
-    // AUTO ends at 1.09312; the other is on the curve of the Hopf point from which the cycles come. Both by two routes: the first Lyapunov
-    // coefficient vanishes there along curves of Hopf points.
+    // AUTO ends at 1.09312; the other end is on the curve of the Hopf point at which the cycles are born. Both by a
+    // second route: the first Lyapunov coefficient vanishes there along curves of Hopf points.
     let there = diagram.branch("hopf").unwrap();
     let second = there.special.iter().filter(|s| s.kind == Kind::GeneralisedHopf).map(|s| s.point.parameters[1]);
     let second = second.reduce(f64::max).unwrap();
@@ -432,8 +436,8 @@ fn a_curve_of_folds_of_cycles_ends_at_generalised_hopf_points() {
     assert!(ends.len() == 2 && (ends[1] - second).abs() < 1e-5 && (ends[0] - 1.026706).abs() < 1e-5, "{ends:?}");
 }
 
-/// Torus points of the electronic circuit of the demo `tor` of AUTO-07p shrink to an equilibrium where beta + nu = beta + gamma = 0: the
-/// characteristic polynomial at the origin is λ³ + 0.4 λ there.
+/// Torus points of the electronic circuit of the demo `tor` of AUTO-07p shrink to an equilibrium where
+/// beta + nu = beta + gamma = 0: the characteristic polynomial at the origin is λ³ + 0.4 λ there.
 #[test]
 fn a_curve_of_torus_points_ends_at_a_zero_hopf_point() {
     let model = "name = \"circuit\"\n[parameters]\nnu = -0.65\nbeta = 0.5\ngamma = -0.6\n[definitions]\nd = \"y - x\"\n[states]\n\

@@ -1,4 +1,4 @@
-//! Models that cannot be followed on, each ending with the reason, the likely cause, and what can be done.
+//! Models whose branches cannot be continued: each run ends with the reason, the likely cause and a remedy.
 
 use std::process::Command;
 
@@ -14,7 +14,7 @@ struct Case<'a> {
 }
 
 impl Case<'_> {
-    /// Exit code and what is said to the user at the end of the run.
+    /// Exit code, and what the user is told at the end of the run.
     fn run(&self) -> (Option<i32>, String) {
         let folder = tempfile::tempdir().unwrap();
         let mut model = String::from("[parameters]\n");
@@ -34,7 +34,7 @@ impl Case<'_> {
         (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
     }
 
-    /// The run ends short, and says all of these.
+    /// Asserts that the run ends short and mentions all of these.
     #[track_caller]
     fn ends(&self, pieces: &[&str]) {
         let (code, said) = self.run();
@@ -43,11 +43,11 @@ impl Case<'_> {
             assert!(said.contains(piece), "{piece:?} is missing in\n{said}");
         }
         assert!(said.contains("\n  what to do: ") || said.contains("period grew"), "{said}");
-        // Once, and not for each side.
+        // Reported once, not for each side.
         assert_eq!(said.matches("incomplete: ").count(), 1, "{said}");
     }
 
-    /// The study is refused before anything is computed, and the message says all of these.
+    /// Asserts that the study is refused before anything is computed, and that the message contains all of these.
     #[track_caller]
     fn is_refused(&self, pieces: &[&str]) {
         let (code, said) = self.run();
@@ -61,7 +61,7 @@ impl Case<'_> {
 const MU: &[(&str, f64)] = &[("mu", 1.0)];
 
 #[test]
-fn f_is_not_finite_beyond_a_state() {
+fn a_branch_ends_where_f_is_not_finite_beyond_a_state() {
     let states = [("x", "mu - 0.5*sqrt(1 - x) - x")];
     Case { parameters: MU, states: &states, seed: "state = { x = 0.6 }", range: [0.0, 4.0], more: "" }.ends(&[
         "vector field not finite: near 1.0000",
@@ -70,37 +70,37 @@ fn f_is_not_finite_beyond_a_state() {
 }
 
 #[test]
-fn f_is_not_finite_beyond_a_value_of_the_parameter() {
+fn a_branch_ends_where_f_is_not_finite_beyond_a_parameter_value() {
     let states = [("x", "log(mu) - x")];
     Case { parameters: MU, states: &states, seed: "state = { x = 0 }", range: [-1.0, 2.0], more: "" }
         .ends(&["vector field not finite: the parameter converges to", "the boundary of the region"]);
 }
 
 #[test]
-fn an_asymptote() {
+fn a_branch_ends_at_an_asymptote() {
     let states = [("x", "mu*x - 1")];
     Case { parameters: MU, states: &states, seed: "state = { x = 1 }", range: [-1.0, 1.0], more: "" }
         .ends(&["solution unbounded: a state has grown to", "the branch has an asymptote there"]);
 }
 
-/// x₁' = mu (y - x), y' = mu (x - y): the Jacobian is singular everywhere.
+/// x' = 2 mu (y - x), y' = mu (x - y): the Jacobian is singular everywhere.
 #[test]
-fn a_conserved_combination() {
+fn a_conserved_combination_of_states_is_named() {
     let states = [("x", "2*mu*(y - x)"), ("y", "mu*(x - y)")];
     Case { parameters: MU, states: &states, seed: "state = { x = 0.5, y = 0.5 }", range: [0.5, 2.0], more: "" }
         .is_refused(&["x + 2*y is conserved", "T1 = { sum = \"x + 2*y\", value = … }"]);
     let states = [("x", "0*mu")];
     Case { parameters: MU, states: &states, seed: "state = { x = 0.5 }", range: [0.5, 2.0], more: "" }
         .is_refused(&["x is conserved"]);
-    // 2 x + mu y at mu = 1 alone.
+    // 2x + mu y is conserved at every mu, but 2x + y only at mu = 1.
     let states = [("x", "mu*(y - x^2)"), ("y", "2*(x^2 - y)")];
     Case { parameters: MU, states: &states, seed: "state = { x = 0.5, y = 0.25 }", range: [0.5, 2.0], more: "" }
         .ends(&["no start", "likely cause: 2*x + y is conserved", "eliminate one state"]);
 }
 
-/// At mu = 0 the oscillator is conservative and linear: cycles of all sizes.
+/// At mu = 0 the oscillator is conservative and linear: it has cycles of all sizes.
 #[test]
-fn a_family_of_cycles_at_one_value_of_the_parameter() {
+fn a_family_of_cycles_at_one_parameter_value_is_recognised() {
     let parameters = [("mu", -0.5)];
     let states = [("x", "y"), ("y", "mu*y - x")];
     let more = "switch = { hopf = 1 }";
@@ -110,7 +110,7 @@ fn a_family_of_cycles_at_one_value_of_the_parameter() {
 
 /// The cycles from the Hopf point at mu = 1 end at the homoclinic orbit of the saddle (1, 0), near mu = 5/7.
 #[test]
-fn a_homoclinic_orbit() {
+fn a_branch_of_cycles_ends_at_a_homoclinic_orbit() {
     let parameters = [("mu", 1.5)];
     let states = [("x", "y"), ("y", "-1 + mu*y + x^2 + x*y")];
     let more = "switch = { hopf = 1 }";
@@ -120,9 +120,9 @@ fn a_homoclinic_orbit() {
     assert!(code == Some(0) && said.contains("approaches an orbit homoclinic to the saddle (1.000000, "), "{said}");
 }
 
-/// The same branch of cycles from its other end: it shrinks to the equilibrium, which is where it should end.
+/// The branch of cycles from its other end: it shrinks to the equilibrium, and should end there.
 #[test]
-fn a_hopf_point_reached_from_its_cycles() {
+fn a_branch_of_cycles_ends_at_its_hopf_point() {
     let states = [("x", "mu*x - y - x*(x^2 + y^2)"), ("y", "x + mu*y - y*(x^2 + y^2)")];
     let case = Case { parameters: MU, states: &states, seed: "attractor = \"cycle\"", range: [-1.0, 1.5], more: "" };
     let (code, said) = case.run();
@@ -131,7 +131,7 @@ fn a_hopf_point_reached_from_its_cycles() {
 }
 
 #[test]
-fn a_corner() {
+fn a_branch_ends_at_a_corner() {
     let states = [("x", "mu - abs(x)")];
     Case { parameters: MU, states: &states, seed: "state = { x = 1 }", range: [-1.0, 2.0], more: "" }.ends(&[
         "step size too small",
@@ -141,7 +141,7 @@ fn a_corner() {
 }
 
 #[test]
-fn trajectories_that_slide() {
+fn sliding_trajectories_are_explained() {
     let parameters = [("c", 0.05)];
     let states = [("x", "v"), ("v", "-x - c*v + 0.3*sign(0.5 - v)*(1 + 0.5*exp(-abs(v - 0.5)))")];
     Case { parameters: &parameters, states: &states, seed: "attractor = \"cycle\"", range: [0.0, 1.0], more: "" }.ends(
@@ -154,14 +154,14 @@ fn trajectories_that_slide() {
 }
 
 #[test]
-fn nothing_attracts() {
+fn a_seed_without_attractor_is_explained() {
     let states = [("x", "1 + x^2 + mu^2")];
     Case { parameters: MU, states: &states, seed: "attractor = \"equilibrium\"", range: [-1.0, 2.0], more: "" }
         .ends(&["escaped (128)", "no attractor can be reached from the ranges of the states"]);
 }
 
 #[test]
-fn an_isolated_point_and_a_cusp() {
+fn an_isolated_point_and_a_cusp_end_a_branch() {
     let parameters = [("mu", 0.0)];
     let states = [("x", "-x^2 - mu^2")];
     Case { parameters: &parameters, states: &states, seed: "state = { x = 0 }", range: [-1.0, 1.0], more: "" }
@@ -172,15 +172,15 @@ fn an_isolated_point_and_a_cusp() {
 }
 
 #[test]
-fn a_trajectory_that_leaves_the_region_of_definition() {
+fn trajectories_that_leave_the_domain_of_definition_are_explained() {
     let states = [("x", "v"), ("v", "-mu*v/10 - sqrt(x)")];
     let exit = ["leaves the region where the vector field is defined", "likely cause: at time", "x = 0.000000"];
     Case { parameters: MU, states: &states, seed: "state = { x = 1, v = 0 }", range: [0.5, 2.0], more: "" }.ends(&exit);
 }
 
-/// Two masses on springs without damping: no trajectory settles, and the reason is the energy.
+/// Two masses on springs without damping: no trajectory settles, because energy is conserved.
 #[test]
-fn an_energy_that_never_changes() {
+fn conserved_energy_is_named_as_the_reason_for_not_settling() {
     let parameters = [("delta", 0.0)];
     let states = [("x", "v"), ("y", "w"), ("v", "-2*x + y - 0.5*x^3 + delta*v"), ("w", "-2*y + x + delta*w")];
     let seed = "state = { x = 1, y = 0.5, v = 0, w = 0 }";

@@ -1,4 +1,4 @@
-//! Doors to other programs: exports as a user asks for them, and branches that start from files of AUTO-07p.
+//! Import and export: exports as a user requests them, and branches that start from files of AUTO-07p.
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -45,7 +45,7 @@ fn same(a: &[(String, f64, f64, f64)], b: &[(String, f64, f64, f64)]) {
 }
 
 #[test]
-fn what_starts_from_auto_is_what_is_found_without_it() {
+fn branches_started_from_auto_match_those_found_without_it() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     let own = format!(
@@ -71,7 +71,7 @@ fn what_starts_from_auto_is_what_is_found_without_it() {
 }
 
 #[test]
-fn files_of_auto_are_listed() {
+fn solutions_in_auto_files_are_listed() {
     let folder = tempfile::tempdir().unwrap();
     let listed = foldline(folder.path(), &["import-auto", &auto("s.ab"), &auto("s.ab-cycles")]);
     let text = String::from_utf8_lossy(&listed.stdout).into_owned();
@@ -100,7 +100,7 @@ fn files_of_auto_are_listed() {
 }
 
 #[test]
-fn exports_are_written_where_they_are_wanted() {
+fn exports_are_written_to_the_requested_place() {
     let folder = tempfile::tempdir().unwrap();
     let here = folder.path();
     let study = format!(

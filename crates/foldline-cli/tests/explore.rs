@@ -1,4 +1,4 @@
-//! Whole diagrams found from a model and a box of parameters: what is known of them must all be there, once.
+//! Whole diagrams found from a model and a box of parameters: every known branch and special point must be there, once.
 
 use foldline::contract::{Event, Observer, Unobserved, Verdict};
 use foldline::diagram::{Branch, Diagram, Ending, Family, Kind, Point, Solution};
@@ -12,8 +12,9 @@ const LURE: &str = include_str!("../../../models/lure.toml");
 const PREDATOR: &str = include_str!("../../../models/predator-prey.toml");
 const DUFFING: &str = include_str!("../../../models/duffing-forced.toml");
 
-/// Level set m(λ) = α + (x - λ/3)² of a function with m = -(λ² - 1)(λ² - 4): two closed curves around λ = ±3/2 where α is zero, whose
-/// folds at λ = ±1, ±2 all lie on the curve α = m(λ), which has maxima 9/4 at λ² = 5/2 and a minimum -4 at 0.
+/// Level set m(λ) = α + (x - λ/3)² of the function m = -(λ² - 1)(λ² - 4). At α = 0 it is two closed curves around
+/// λ = ±3/2, whose folds at λ = ±1, ±2 all lie on the curve α = m(λ), which has maxima 9/4 at λ² = 5/2 and a minimum
+/// -4 at 0.
 const ISOLAS: &str = "name = \"isolas\"\n[parameters]\nlambda = 1.5\nalpha = 0\n\
     [states.x]\nequation = \"-(lambda^2 - 1)*(lambda^2 - 4) - alpha - (x - lambda/3)^2\"\nrange = [-4, 4]\n";
 
@@ -64,7 +65,7 @@ fn has(branch: &Branch, kind: Kind, value: f64) -> bool {
 }
 
 #[test]
-fn the_rotor_with_a_cubic_spring() {
+fn the_diagram_of_the_rotor_with_a_cubic_spring_is_complete() {
     let diagram = explored(ROTOR, "parameters = { kappa = 0 }\nfree = \"Omega\"\nrange = [0.5, 12]");
     // Lower and upper synchronous motion, SL and DL. Independent codes: shooting and collocation at fine settings.
     assert_eq!(names(&diagram), ["all/equilibrium-1", "all/equilibrium-2", "all/2:1-1", "all/3:1-1"]);
@@ -75,7 +76,7 @@ fn the_rotor_with_a_cubic_spring() {
 }
 
 #[test]
-fn the_rotor_with_contact() {
+fn the_diagram_of_the_rotor_with_contact_is_complete() {
     let diagram = explored(ROTOR, "parameters = { kappa = 1 }\nfree = \"Omega\"\nrange = [0.5, 12]");
     let (sl, dl) = (branch(&diagram, "all/2:1-1"), branch(&diagram, "all/3:1-1"));
     for branch in [sl, dl] {
@@ -111,7 +112,7 @@ fn equilibria_that_cross_are_each_followed_once() {
 }
 
 #[test]
-fn lorenz_from_rest_to_its_homoclinic_orbit() {
+fn lorenz_is_followed_from_rest_to_its_homoclinic_orbit() {
     let diagram = explored(LORENZ, "free = \"rho\"\nrange = [0.5, 30]");
     let hopf = 10.0 * (10.0 + 8.0 / 3.0 + 3.0) / (10.0 - 8.0 / 3.0 - 1.0);
     agree(&diagram, &[(Kind::BranchPoint, 1.0), (Kind::Hopf, hopf)], 1e-8);
@@ -121,7 +122,7 @@ fn lorenz_from_rest_to_its_homoclinic_orbit() {
 }
 
 #[test]
-fn lorenz_with_the_doublings_and_the_loss_of_symmetry_of_its_cycles() {
+fn period_doublings_and_symmetry_breaking_of_lorenz_cycles_are_found() {
     let diagram = explored(LORENZ, "free = \"rho\"\nrange = [180, 350]\nvalues = 7");
     let found = special(&diagram);
     let there = |kind: Kind, value: f64| found.iter().any(|(k, v)| *k == kind && (v - value).abs() < 1e-6 * value);
@@ -130,7 +131,7 @@ fn lorenz_with_the_doublings_and_the_loss_of_symmetry_of_its_cycles() {
 }
 
 #[test]
-fn a_cascade_from_rest() {
+fn a_period_doubling_cascade_is_found_from_rest() {
     let diagram = explored(LURE, "free = \"alpha\"\nrange = [0.5, 1.5]\nvalues = 3");
     let expected = [
         (Kind::Hopf, 1.0),
@@ -142,7 +143,7 @@ fn a_cascade_from_rest() {
 }
 
 #[test]
-fn a_forced_oscillator() {
+fn the_diagram_of_a_forced_oscillator_is_complete() {
     let diagram = explored(DUFFING, "parameters = { A = 0.06 }\nfree = \"omega\"\nrange = [0.8, 1.6]\nvalues = 3");
     agree(&diagram, &[(Kind::Fold, 1.1214097673), (Kind::Fold, 1.3786856804)], 1e-8);
     assert_eq!(names(&diagram), ["all/cycle-1"]);
@@ -166,10 +167,10 @@ fn isolated_branches_are_reached_through_a_second_parameter() {
     }
 }
 
-/// A lightly damped rotor just above contact, where no sample settles. Another route to the same isola, from a state on it, with
-/// shooting and integration at 1e-12: from 2.2588 to 3.0204, stable from 2.8467 on.
+/// A lightly damped rotor just above contact, where no sample settles. A second route to the same isola, from a state
+/// on it by shooting and integration at 1e-12, gives 2.2588 to 3.0204, stable from 2.8467 on.
 #[test]
-fn an_isola_next_to_a_resonance_that_no_sample_goes_to() {
+fn an_isola_that_no_sample_reaches_is_found() {
     let light =
         "parameters = { kappa = 1, zeta = 0.0012634, epsilon = 0.4449, beta = 31.956, K = 479.34, J_p = 0.1876 }";
     let rest = "free = \"Omega\"\nrange = [2.1, 3.2]\nvalues = 1\nsamples = 4\nswitch = { period-doubling = 0 }";
@@ -183,7 +184,8 @@ fn an_isola_next_to_a_resonance_that_no_sample_goes_to() {
     assert_eq!(names(&diagram).iter().filter(|name| name.starts_with("all/3:1")).count(), 1, "{:?}", names(&diagram));
 }
 
-/// That a trajectory which begins a little off a stable cycle of a branch settles on it: off one of them at least, as basins are narrow.
+/// Asserts that a trajectory started slightly off a stable cycle of a branch settles on it, for at least one cycle, as
+/// basins are narrow.
 #[track_caller]
 fn attracts(study: &Study, branch: &Branch) {
     let system = System::of_plan(&study.model, &study.plan);
@@ -201,7 +203,7 @@ fn attracts(study: &Study, branch: &Branch) {
 
 /// An isola of another light rotor.
 #[test]
-fn a_trajectory_stays_on_an_isola_next_to_a_resonance() {
+fn trajectories_settle_on_an_isola_near_a_resonance() {
     let light = "parameters = { kappa = 1, zeta = 0.004, epsilon = 0.5, beta = 20, K = 300, J_p = 0.1 }";
     let rest = "free = \"Omega\"\nrange = [2, 3]\nvalues = 1\nsamples = 1\nswitch = { period-doubling = 0 }";
     let study = study(ROTOR, &format!("{light}\n{rest}"));
@@ -211,9 +213,10 @@ fn a_trajectory_stays_on_an_isola_next_to_a_resonance() {
     attracts(&study, isola);
 }
 
-/// A mass that strikes a stop: an isola of cycles that last five periods of the force, next to 5/3 of the frequency of the mass.
+/// A mass that strikes a stop has an isola of cycles of five forcing periods, near 5/3 of the natural frequency of the
+/// mass.
 #[test]
-fn a_subharmonic_isola_of_an_impact_oscillator() {
+fn a_subharmonic_isola_of_an_impact_oscillator_is_found() {
     const IMPACT: &str = "name = \"impact\"\n[parameters]\nomega = 2\nA = 0.6\nzeta = 0.005\nk = 20\n[forcing]\n\
         frequency = \"omega\"\n[states.x]\nequation = \"v\"\nrange = [-3, 3]\n[states.v]\n\
         equation = \"-2*zeta*v - x - if(x > 1, k*(x - 1), 0) + A*cos(omega*t)\"\nrange = [-3, 3]\n";
@@ -226,7 +229,7 @@ fn a_subharmonic_isola_of_an_impact_oscillator() {
     attracts(&study, isola);
 }
 
-/// Stops after a number of points.
+/// Observer that stops the run after a number of points.
 struct Impatient {
     left: AtomicUsize,
 }
@@ -245,7 +248,7 @@ impl Observer for Impatient {
 }
 
 #[test]
-fn the_same_diagram_for_any_number_of_threads_and_after_interruptions() {
+fn the_diagram_does_not_depend_on_threads_or_interruptions() {
     let study = study(ISOLAS, "free = \"lambda\"\nrange = [-3, 6]\nvalues = 3\nconnect = { alpha = [-6, 3] }");
     let whole = run(&study, 1, Diagram::default(), &Unobserved);
     let told = |diagram: &Diagram| {
@@ -266,13 +269,13 @@ fn the_same_diagram_for_any_number_of_threads_and_after_interruptions() {
 }
 
 #[test]
-fn a_budget_ends_it() {
+fn a_budget_ends_an_exploration() {
     let few = explored(PREDATOR, "free = \"p1\"\nrange = [0.1, 1]\nbudget = 50");
     let points: usize = few.branches.iter().map(|b| b.points.len()).sum();
     assert!(points >= 50 && few.branches.len() == 2, "{points} on {:?}", names(&few));
 }
 
-/// A parameter in metres: two isolas whose folds lie 1e-4 of it apart and have the same state.
+/// A parameter in metres: two isolas whose folds have the same state and differ by a fraction 1e-4 of the parameter.
 #[test]
 fn folds_of_a_small_parameter_are_told_apart() {
     let model = "name = \"small\"\n[parameters]\nl = 1e-3\na = 0\n[states.x]\nequation = \
@@ -281,7 +284,7 @@ fn folds_of_a_small_parameter_are_told_apart() {
     agree(&explored(model, lines), &[1e-3, 1.15e-3, 1.2e-3, 1.35e-3].map(|l| (Kind::Fold, l)), 1e-9);
 }
 
-/// A parameter that the model gives no value, in a range of thousands.
+/// A parameter without a value in the model, over a range of thousands.
 #[test]
 fn steps_fit_the_range_whatever_the_value_in_the_model() {
     let model = "name = \"wide\"\n[parameters]\nmu = 0\n[states.x]\nequation = \"mu + 300*x - x^3\"\nrange = [-50, 50]\nscale = 20\n";

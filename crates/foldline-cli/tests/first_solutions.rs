@@ -1,4 +1,4 @@
-//! First solutions where trajectories do not lead to them: light damping, stiff modes, unstable rest, families.
+//! First solutions where trajectories do not lead to them: light damping, stiff modes, unstable equilibria, families.
 
 use foldline::contract::{Event, Observer, Verdict};
 use foldline::diagram::{Branch, Diagram, Kind, SpecialPoint};
@@ -6,7 +6,7 @@ use foldline::explore::{self, System};
 use foldline_store::study_file::parse_study;
 use std::sync::Mutex;
 
-/// What was noted.
+/// Observer that collects the notes of a run.
 #[derive(Default)]
 struct Notes(Mutex<Vec<String>>);
 
@@ -19,7 +19,7 @@ impl Observer for Notes {
     }
 }
 
-/// The diagram of one branch in the parameter `free`, and the notes.
+/// Runs one branch in the parameter `free`; returns the diagram and the notes.
 #[track_caller]
 fn run(model: &str, seed: &str, branch: &str) -> (Diagram, String) {
     let study =
@@ -38,8 +38,9 @@ fn places(branch: &Branch, kind: Kind) -> Vec<f64> {
     found
 }
 
-/// A resonator of quality 1e5, whose transients last 2e5 periods. The lower fold is that of harmonic balance with 7 harmonics; the upper one lies next
-/// to the peak of the backbone, where expansion in the amplitude gives 1.003714.
+/// A resonator of quality factor 1e5, whose transients last 2e5 periods. The lower fold is from harmonic balance with 7
+/// harmonics; the upper one lies next to the peak of the backbone, for which an expansion in the amplitude
+/// gives 1.003714.
 #[test]
 fn a_resonator_of_high_quality_needs_no_transient() {
     let model = "[parameters]\nw = 0.99\nQ = 1e5\nF = 1e-6\n[forcing]\nfrequency = \"w\"\n[states]\n\
@@ -57,8 +58,8 @@ fn a_resonator_of_high_quality_needs_no_transient() {
     }
 }
 
-/// Three uncoupled linear modes of which the fastest oscillates 43 times per period of the forcing: an explicit method takes its steps for that one, and
-/// never repeats itself to its accuracy.
+/// Three uncoupled linear modes, the fastest of which oscillates 43 times per forcing period. An explicit method takes
+/// its steps for that one, and its solution never repeats itself to its accuracy.
 #[test]
 fn stiff_modes_that_decay_do_not_hide_the_response() {
     let stiffness = [90000.0, 3240000.0, 116640000.0f64];
@@ -74,10 +75,10 @@ fn stiff_modes_that_decay_do_not_hide_the_response() {
     assert!((point.ranges[0][1] / amplitude - 1.0).abs() < 1e-6, "{:?} {amplitude}", point.ranges[0]);
 }
 
-/// Rest of a parametrically excited oscillator in the middle of its first tongue: unstable, and given as such. To first order in ε = 0.2 the tongue ends
-/// where (1 - w²/4)² + (0.02 w)² = (ε/2)².
+/// The unstable rest state of a parametrically excited oscillator in the middle of its first tongue, given as a start.
+/// To first order in ε = 0.2 the tongue ends where (1 - w²/4)² + (0.02 w)² = (ε/2)².
 #[test]
-fn unstable_rest_that_is_given_is_followed() {
+fn a_given_unstable_equilibrium_is_followed() {
     let model = "[parameters]\nw = 2.0\n[forcing]\nfrequency = \"w\"\n[states]\nx = \"v\"\nv = \"-0.04*v - (1 + 0.2*cos(w*t) + x^2)*x\"\n";
     let (diagram, notes) = run(model, "state = { x = 0, v = 0 }", "free = \"w\"\nrange = [1.7, 2.3]");
     let branch = &diagram.branches[0];
@@ -89,9 +90,9 @@ fn unstable_rest_that_is_given_is_followed() {
     assert!(tongue.len() == 2 && (0..2).all(|k| (tongue[k] - expected[k]).abs() < 0.01), "{tongue:?} {expected:?}");
 }
 
-/// A spherical oscillator swings in any plane. Off the axes its cycle is one of a circle of cycles.
+/// A spherical oscillator swings in any plane. Off the axes its cycle belongs to a circle of cycles.
 #[test]
-fn a_swing_that_can_be_turned_is_said_to_be_one_of_a_family() {
+fn a_cycle_that_can_be_rotated_is_reported_as_one_of_a_family() {
     let axis = |own: &str| format!("-0.04*v{own} - (1 + 0.2*cos(w*t) + x^2 + y^2)*{own}");
     let model = format!(
         "[parameters]\nw = 2.0\n[forcing]\nfrequency = \"w\"\n[states]\nx = \"vx\"\ny = \"vy\"\nvx = \"{}\"\nvy = \"{}\"\n",
@@ -109,10 +110,11 @@ fn a_swing_that_can_be_turned_is_said_to_be_one_of_a_family() {
     assert!(on.branches[0].points.len() > 2, "{:?}", on.branches[0].ends);
 }
 
-/// The first nonlinear normal mode of two masses, one with a cubic spring. Half-period shooting has it at the frequency 1.2185534 with the energy
-/// 12.1318908. It begins from a cosine of the linear mode, which is off by some thousandths.
+/// The first nonlinear normal mode of two masses, one with a cubic spring. Half-period shooting gives the frequency
+/// 1.2185534 at the energy 12.1318908. The branch starts from a cosine of the linear mode, which is off by a few
+/// thousandths.
 #[test]
-fn a_family_of_cycles_of_one_energy_each_begins_from_a_given_one() {
+fn a_family_of_cycles_parametrised_by_energy_starts_from_a_given_cycle() {
     let model = "[parameters]\ndelta = 0.0\n[states]\nx1 = \"v1\"\nx2 = \"v2\"\nv1 = \"-2*x1 + x2 - 0.5*x1^3 + delta*v1\"\n\
                  v2 = \"-2*x2 + x1 + delta*v2\"\n[outputs]\nenergy = \"v1^2/2 + v2^2/2 + x1^2 + x2^2 - x1*x2 + x1^4/8\"\n";
     let times: Vec<f64> = (0..=40).map(|k| f64::from(k) / 40.0).collect();
@@ -127,7 +129,7 @@ fn a_family_of_cycles_of_one_energy_each_begins_from_a_given_one() {
     );
     let (diagram, _) = run(model, &seed, &branch);
     let branch = &diagram.branches[0];
-    // (The place of the stop is a mark as well.)
+    // (The position of the stop is a mark as well.)
     let meant = |s: &&SpecialPoint| s.kind == Kind::Mark && (s.point.solution.period().unwrap() - period).abs() < 1e-6;
     let marks: Vec<_> = branch.special.iter().filter(meant).collect();
     let [mark] = &marks[..] else { panic!("{} marks; {:?}", marks.len(), branch.ends) };

@@ -1,4 +1,5 @@
-//! Forced models: the time `t` in the equations, cycles that last a number of periods of the forcing, and their stability.
+//! Forced models: the time `t` in the equations, cycles that last a given number of forcing periods, and their
+//! stability.
 
 use foldline::contract::Unobserved;
 use foldline::diagram::{Branch, Diagram, Kind, Solution};
@@ -9,7 +10,7 @@ use foldline_store::study_file::parse_study;
 
 const DUFFING: &str = include_str!("../../../models/duffing-forced.toml");
 const VAN_DER_POL: &str = include_str!("../../../models/van-der-pol-forced.toml");
-/// x'' + 2 zeta x' + x = A cos(omega t), about which everything is known.
+/// The linear oscillator x'' + 2 zeta x' + x = A cos(omega t), whose response is known in closed form.
 const LINEAR: &str = "[parameters]\nomega = 0.8\nA = 0.5\nzeta = 0.05\n[forcing]\nfrequency = \"omega\"\n[states.x]\nequation = \
                       \"v\"\n[states.v]\nequation = \"-2*zeta*v - x + A*cos(omega*t)\"\n[outputs]\nsum = \"x + 3*A*cos(omega*t)\"\n";
 
@@ -19,7 +20,7 @@ fn run(model: &str, text: &str) -> Diagram {
     let study = parse_study(&text, "study", model, "model").unwrap_or_else(|found| panic!("{found:?}"));
     let system = System::of_plan(&study.model, &study.plan);
     let diagram = explore::run(&system, &study.plan, 1, Diagram::default(), &Unobserved);
-    // A second route to every number: shooting, which knows of the forcing by its own means.
+    // A second route to every number: shooting, with its own treatment of the forcing.
     let verified = verify::verify(&system, &diagram, study.plan.tolerance, None, &|_| true);
     let worse: Vec<_> = verified.wrong().collect();
     assert!(worse.is_empty() && verified.points > 20, "{} points: {worse:?}", verified.points);
@@ -55,11 +56,11 @@ fn a_linear_oscillator_responds_as_in_the_textbook() {
         let amplitude = a / re.hypot(im);
         let error = point.trust.discretisation * (1.0 + amplitude);
         assert!((point.ranges[0][1] - amplitude).abs() < error, "{omega}: {:?} {amplitude}", point.ranges);
-        // x(0) is the part in phase with the force, and the output sees the same time as the equations.
+        // x(0) is the component in phase with the force, and the output sees the same time as the equations.
         assert!((cycle.state(0.0)[0] - a * re / (re * re + im * im)).abs() < error);
         let sum = (re / (re * re + im * im) + 3.0).hypot(im / (re * re + im * im)) * a;
         assert!((point.ranges[2][1] - sum).abs() < error, "{omega}: {:?} {sum}", point.ranges);
-        // Both multipliers have the modulus exp(-zeta T), and the argument of the damped oscillation.
+        // Both multipliers have modulus exp(-zeta T), and the argument of the damped oscillation.
         assert_eq!((point.spectrum.len(), point.unstable), (2, 0));
         for z in &point.spectrum {
             let angle = (period * (1.0 - zeta * zeta).sqrt()).cos();
@@ -69,9 +70,9 @@ fn a_linear_oscillator_responds_as_in_the_textbook() {
     }
 }
 
-/// Folds and cusp as two other codes have them, which agree to 2e-9.
+/// Folds and cusp from two other codes, which agree to 2e-9.
 #[test]
-fn the_resonance_of_duffing_has_its_folds_and_their_curve_its_cusp() {
+fn the_duffing_resonance_has_its_folds_and_their_curve_its_cusp() {
     let strong = "[[seed]]\nname = \"strong seed\"\nattractor = \"cycle\"\nparameters = { omega = 0.8, A = 0.06 }\nsamples = 16\n\
                   [[branch]]\nname = \"strong\"\nfrom = \"strong seed\"\nfree = \"omega\"\nrange = [0.5, 2]\n";
     let weak = one_branch(
@@ -87,7 +88,7 @@ fn the_resonance_of_duffing_has_its_folds_and_their_curve_its_cusp() {
     let [cusp] = &folds.special[..] else { panic!("{:?}", folds.special.len()) };
     let [omega, a, _] = cusp.point.parameters[..] else { panic!("three parameters") };
     assert!((omega - 1.0351991393).abs() < 5e-9 && (a - 0.0120510724).abs() < 5e-9, "{omega} {a}");
-    // Both arms of the curve pass the folds of the strong branch.
+    // Both sides of the cusp on the curve pass the folds of the strong branch.
     for fold in &of("strong").special {
         let [omega, a, _] = fold.point.parameters[..] else { panic!("three parameters") };
         let passes = folds.points.windows(2).any(|pair| {
@@ -99,9 +100,9 @@ fn the_resonance_of_duffing_has_its_folds_and_their_curve_its_cusp() {
     }
 }
 
-/// Another continuation code, good to the digits given.
+/// Another continuation code, to the digits given.
 #[test]
-fn a_forced_van_der_pol_oscillator_falls_out_of_step_at_a_fold_or_a_torus() {
+fn a_forced_van_der_pol_oscillator_loses_entrainment_at_a_fold_or_a_torus() {
     let text = |frequency: f64| {
         one_branch(
             &format!("attractor = \"cycle\"\nparameters = {{ s = 1, Omega = {frequency} }}\nsamples = 16"),
@@ -114,9 +115,10 @@ fn a_forced_van_der_pol_oscillator_falls_out_of_step_at_a_fold_or_a_torus() {
     has(&torus.branches[0], &[(Kind::Torus, 0.76153714404)], 2e-8);
 }
 
-/// A spring that softens under a force, as a ship that rolls in waves: the cycle doubles its period, and so does the doubled one.
+/// A softening spring under a force, as for a ship that rolls in waves: the cycle doubles its period, and so does the
+/// doubled one.
 #[test]
-fn forced_cycles_double_their_period_and_begin_with_the_forcing() {
+fn forced_cycles_double_their_period_and_last_whole_forcing_periods() {
     let model = "[parameters]\nA = 0.1\nomega = 0.85\nzeta = 0.05\n[forcing]\nperiod = \"2*pi/omega\"\n[states.x]\nequation = \
                  \"v\"\nrange = [-0.5, 0.5]\n[states.v]\nequation = \"-2*zeta*v - x + x^2 + A*sin(omega*t)\"\nrange = [-0.5, 0.5]\n";
     let diagram = run(
@@ -140,7 +142,7 @@ fn forced_cycles_double_their_period_and_begin_with_the_forcing() {
 }
 
 #[test]
-fn what_is_wrong_with_a_forcing_is_said_where_it_stands() {
+fn mistakes_in_a_forcing_are_reported_in_place() {
     let told = |forcing: &str, equation: &str| {
         let text = format!("[parameters]\nw = 2.0\n{forcing}\n[states.x]\nequation = \"{equation}\"\n");
         let found = parse_model(&text, "m.toml").expect_err("the model is wrong");
@@ -172,15 +174,15 @@ fn what_is_wrong_with_a_forcing_is_said_where_it_stands() {
         ),
     ] {
         let found = told(forcing, equation);
-        // One mistake is told once.
+        // Each mistake is reported once.
         assert_eq!(found.matches("error").count(), 1, "{forcing} {equation}:\n{found}");
         assert!(found.contains(expected), "{forcing} {equation}:\n{found}");
     }
 }
 
-/// Two frequencies that agree by default do so at the default only.
+/// Two frequencies that agree at the default parameter values agree nowhere else.
 #[test]
-fn a_branch_on_which_the_forcing_does_not_repeat_itself_is_refused() {
+fn a_branch_along_which_the_forcing_is_not_periodic_is_refused() {
     let model = "[parameters]\nomega = 0.8\nw2 = 0.8\nA = 0.1\n[forcing]\nfrequency = \"omega\"\n[states.x]\nequation = \
                  \"-x + A*cos(omega*t) + A*sin(w2*t)\"\n";
     for (free, range, code) in
@@ -194,7 +196,7 @@ fn a_branch_on_which_the_forcing_does_not_repeat_itself_is_refused() {
         assert_eq!(end.code(), code, "{free}: {end}");
         assert!(code == "bound" || end.to_string().contains("does not have the forcing period"), "{end}");
     }
-    // A frequency that changes its sign on the way has no period there.
+    // A frequency that changes sign within the range has no period there.
     let model = "[parameters]\nomega = 0.8\nA = 0.1\n[forcing]\nfrequency = \"omega\"\n[states.x]\nequation = \"-x + A*cos(omega*t)\"\n";
     let text = one_branch("attractor = \"cycle\"\nsamples = 8", "free = \"omega\"\nrange = [-0.5, 1]");
     let study = parse_study(&format!("model = \"m\"\n{text}"), "study", model, "model").unwrap();
@@ -205,10 +207,11 @@ fn a_branch_on_which_the_forcing_does_not_repeat_itself_is_refused() {
     assert!(!branch.ends[0].as_ref().unwrap().complete() && branch.special.is_empty());
 }
 
-/// Rest of a parametrically forced oscillator, approached in slow oscillations, is a cycle of one period of the forcing and loses its
-/// stability by period doubling. Mathieu's equation with damping: near eps = 4 zeta, here with its next terms from shooting.
+/// The rest state of a parametrically forced oscillator is approached by slow oscillations. It is a cycle of one
+/// forcing period and loses stability by period doubling. Damped Mathieu equation: near eps = 4 zeta, here with the
+/// next terms from shooting.
 #[test]
-fn rest_under_parametric_forcing_doubles_its_period() {
+fn the_rest_state_under_parametric_forcing_doubles_its_period() {
     let model = "[parameters]\nomega = 2\neps = 0\nzeta = 0.02\n[forcing]\nfrequency = \"omega\"\n[states.x]\nequation = \
                  \"v\"\n[states.v]\nequation = \"-2*zeta*v - (1 + eps*cos(omega*t))*x - x^3\"\n";
     let text = one_branch("attractor = \"cycle\"\nsamples = 8", "free = \"eps\"\nrange = [0, 0.2]");
@@ -221,9 +224,10 @@ fn rest_under_parametric_forcing_doubles_its_period() {
     assert!((special.point.parameters[1] - 0.08).abs() < 1e-4, "{:?}", special.point.parameters);
 }
 
-/// At ω = 5, A = 10 most samples of the hardening oscillator follow the forcing, and a few swing once in three of its periods.
+/// At ω = 5, A = 10 most samples of the hardening oscillator follow the forcing, and a few oscillate once in three
+/// forcing periods.
 #[test]
-fn a_cycle_of_a_stated_number_of_periods_of_the_forcing() {
+fn a_cycle_of_a_stated_number_of_forcing_periods_is_found() {
     let seed = "attractor = \"cycle\"\nperiods = 3\nparameters = { A = 10, omega = 5 }\nsamples = 64";
     let diagram = run(DUFFING, &one_branch(seed, "free = \"omega\"\nrange = [3.5, 8]"));
     for point in &diagram.branches[0].points {

@@ -1,4 +1,4 @@
-//! Every example of the gallery is run, and its page quotes what the program prints.
+//! Runs every example of the gallery; its page must quote what the program prints.
 //!
 //! `cargo xtask gallery` renews tables, pictures and run times.
 
@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Instant;
 
-/// Opens the page of an example. Its files lie where they lie in the repository, as seen from the models.
+/// Opens the page of an example. Relative to the models, its files lie where they lie in the repository.
 fn open(folder: &Path) -> Page {
     let desk = desk();
     let place = desk.path().join("docs/gallery").join(folder.file_name().unwrap());
@@ -17,7 +17,7 @@ fn open(folder: &Path) -> Page {
     Page::open(&folder.join("index.md"), desk, place, folder.to_path_buf())
 }
 
-/// The folders of the gallery, in the order of their names.
+/// The folders of the gallery, sorted by name.
 fn examples() -> Vec<PathBuf> {
     let entries = std::fs::read_dir(root().join("docs/gallery")).unwrap().map(|entry| entry.unwrap().path());
     let mut folders: Vec<PathBuf> = entries.filter(|path| path.is_dir()).collect();
@@ -56,7 +56,7 @@ fn every_example_is_in_the_overview_and_its_sources_are_known() {
     }
 }
 
-/// Runs an example on one thread and writes its time and its counts to its page.
+/// Runs an example on one thread and records its time and work counters on its page.
 fn note_cost(folder: &Path) {
     let out = tempfile::tempdir().unwrap();
     let run = out.path().join("run");

@@ -1,4 +1,4 @@
-//! Families brought to other parameter values: directly, along a fold, and not at all.
+//! Solution families carried to other parameter values: directly, along a fold curve, and not at all.
 
 use foldline::contract::{Event, Observer, Verdict};
 use foldline::diagram::{Diagram, Kind};
@@ -18,7 +18,7 @@ impl Observer for Notes {
     }
 }
 
-/// The runs of a homotopy from the cubic rotor at Omega = 5, and what was said about them.
+/// The runs of a homotopy from the cubic rotor at Omega = 5, and the notes about them.
 fn route(attractor: &str, targets: &[(&str, f64)]) -> (Diagram, Vec<String>) {
     let model = include_str!("../../../models/overhung-rotor.toml");
     let seed = format!(
@@ -42,7 +42,7 @@ fn route(attractor: &str, targets: &[(&str, f64)]) -> (Diagram, Vec<String>) {
 }
 
 #[test]
-fn both_cycles_go_to_contact_directly() {
+fn both_cycles_reach_contact_directly() {
     for (attractor, period) in [("2:1", 1.0), ("3:1", 1.0)] {
         let (diagram, notes) = route(attractor, &[("kappa", 1.0), ("zeta", 1e-5)]);
         assert_eq!(diagram.branches.len(), 1, "{notes:?}");
@@ -58,7 +58,7 @@ fn both_cycles_go_to_contact_directly() {
 }
 
 #[test]
-fn where_the_direct_run_turns_back_the_fold_leads_on() {
+fn the_fold_curve_is_used_where_the_direct_run_turns_back() {
     let (diagram, notes) = route("2:1", &[("zeta", 1e-5), ("epsilon", 1.5)]);
     // At Omega = 5 the family folds short of 1.5.
     let fold = diagram.branches[0].special.iter().find(|s| s.kind == Kind::Fold).unwrap();
@@ -71,10 +71,10 @@ fn where_the_direct_run_turns_back_the_fold_leads_on() {
 }
 
 #[test]
-fn a_family_that_shrinks_to_a_point_on_the_way_is_said_not_to_be_connected() {
+fn a_family_that_shrinks_to_a_point_on_the_way_is_reported_as_not_connected() {
     let (diagram, notes) = route("3:1", &[("zeta", 0.3)]);
     assert!(notes.last().unwrap().ends_with("it is not connected to the goal"), "{notes:?}");
-    // The isola shrinks to a point at the same damping, whichever of its folds is followed there.
+    // The isola shrinks to a point at the same damping whichever fold is followed.
     let tips: Vec<f64> = diagram
         .branches
         .iter()

@@ -1,4 +1,5 @@
-//! zeta = 1e-5: multipliers crowd the unit circle, other branches pass close by, and cycles pass equilibria closely.
+//! zeta = 1e-5: multipliers crowd near the unit circle, other branches pass close by, and cycles pass equilibria
+//! closely.
 
 use foldline::contract::Unobserved;
 use foldline::diagram::{Branch, Diagram, Ending, Kind};
@@ -24,7 +25,7 @@ fn special(branch: &Branch) -> Vec<(Kind, f64, f64)> {
 }
 
 #[test]
-fn a_cycle_that_passes_an_equilibrium_closely_goes_on() {
+fn a_branch_of_cycles_continues_past_a_near_equilibrium() {
     let diagram = explored(
         "[[branch]]\nname = \"z\"\nfrom = \"SL\"\nfree = \"zeta\"\nuntil = 1e-5\n\
          [[branch]]\nname = \"b\"\nfrom = \"z\"\nfree = \"Omega\"\nrange = [0.5, 12]\n",
@@ -38,7 +39,7 @@ fn a_cycle_that_passes_an_equilibrium_closely_goes_on() {
 }
 
 #[test]
-fn a_branch_with_close_neighbours_is_the_same_wherever_it_is_begun() {
+fn a_branch_with_close_neighbours_is_the_same_from_any_start() {
     let diagram = explored(
         "[[homotopy]]\nname = \"h\"\nfrom = \"DL\"\nto = { kappa = 1, zeta = 1e-5 }\nvia = \"Omega\"\nrange = [0.5, 12]\n\
          [[branch]]\nname = \"b\"\nfrom = \"h\"\nfree = \"Omega\"\nrange = [0.5, 12]\n\
@@ -57,7 +58,8 @@ fn a_branch_with_close_neighbours_is_the_same_wherever_it_is_begun() {
     }
 }
 
-/// Of another route (through the folds in epsilon and zeta at lower speeds) and other tolerances, to the digits given.
+/// Values from another route (through the folds in epsilon and zeta at lower speeds) and at other tolerances, to the
+/// digits given.
 #[test]
 fn a_large_unbalance_leaves_two_folds_on_one_step_and_torus_points_next_to_folds() {
     let model = include_str!("../../../models/overhung-rotor.toml");
@@ -73,12 +75,14 @@ fn a_large_unbalance_leaves_two_folds_on_one_step_and_torus_points_next_to_folds
             assert!(found.0 == expected.0 && (found.1 - expected.1).abs() < 1e-7 + found.2, "{found:?} {expected:?}");
         }
     };
-    // Another branch passes so close at 9.4354 that rounding of 1e-15 is magnified by 1e7, which finer meshes do not mend.
+    // Another branch passes so close at 9.4354 that rounding of 1e-15 is magnified by 1e7, which finer meshes cannot
+    // improve.
     let beside =
         diagram.branch("contact SL").unwrap().points.iter().filter(|p| (p.parameters[0] - 9.4354).abs() < 1e-4);
     let meshes: Vec<usize> = beside.map(|point| point.solution.mesh().len()).collect();
     assert!(meshes.len() > 10 && meshes.iter().all(|count| *count < 400), "{meshes:?}");
-    // On the way there a third multiplier is 1 at these, where errors of 5e-9 take two that meet apart by 1e-4.
+    // On the way there, a third multiplier is 1 at these values; near them, errors of 5e-9 split a double multiplier by
+    // 1e-4.
     let meetings = diagram.branch("contact DL to 1.5/2").unwrap().special.iter();
     let mut meetings: Vec<f64> =
         meetings.filter(|s| s.kind == Kind::Resonance11).map(|s| s.point.parameters[0]).collect();

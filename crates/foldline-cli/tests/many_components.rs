@@ -1,4 +1,4 @@
-//! Cycles with so many components that their multipliers come from another route than those of a few.
+//! Cycles with many components, whose multipliers are computed by a different method than those of a few.
 
 use foldline::contract::Unobserved;
 use foldline::diagram::{Diagram, Kind, Point};
@@ -7,9 +7,10 @@ use foldline_store::study_file::parse_study;
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 
-/// The unit circle, run through in 2π, beside a plane that turns half as fast, one that turns by itself, a line, and forty components that
-/// decay by up to 115 orders of magnitude in a period. All multipliers are known: those of the first plane are -e^(2π (mu - 0.05)) and -e^(-2π), those of
-/// the second e^(2π (mu - 0.15 ± 0.3 i)), that of the line e^(2π (mu - 0.25)), and the others e^(-4π), e^(-2π (k + 2)).
+/// The unit circle, with period 2π, beside a plane that turns half as fast, one that turns at a rate of its own, a
+/// line, and forty components that decay by up to 115 orders of magnitude in a period. All multipliers are known: those
+/// of the first plane are -e^(2π (mu - 0.05)) and -e^(-2π), those of the second e^(2π (mu - 0.15 ± 0.3 i)), that of the
+/// line e^(2π (mu - 0.25)), and the others e^(-4π), e^(-2π (k + 2)).
 const MODEL: &str = r#"
 name = "Known multipliers"
 
@@ -54,14 +55,14 @@ fn exact(mu: f64) -> Vec<Complex64> {
     all
 }
 
-/// Largest distance of an exact multiplier from the nearest one of the point, relative to the larger of 1 and its modulus.
+/// Largest distance of an exact multiplier from the nearest computed one, relative to the larger of 1 and its modulus.
 fn off(point: &Point) -> f64 {
     let nearest = |z: Complex64| point.spectrum.iter().map(|w| (w - z).norm()).fold(f64::INFINITY, f64::min);
     exact(point.parameters[0]).into_iter().map(|z| nearest(z) / z.norm().max(1.0)).fold(0.0, f64::max)
 }
 
 #[test]
-fn bifurcations_among_strongly_damped_components_are_where_they_are_known_to_be() {
+fn bifurcations_among_strongly_damped_components_are_at_their_known_values() {
     let diagram = explored();
     let branch = diagram.branch("b").unwrap();
     let mut found: Vec<_> = branch.special.iter().collect();

@@ -1,4 +1,4 @@
-//! Marks say where to look. They change nothing of what is found.
+//! Marks request solutions at given values and change nothing else in the result.
 
 use foldline::contract::Unobserved;
 use foldline::diagram::{Branch, Cost, Diagram, Ending, Kind};
@@ -18,7 +18,7 @@ fn grown(model: &str, study: &str) -> Diagram {
     explore::run(&System::of_plan(&study.model, &study.plan), &study.plan, 1, Diagram::default(), &Unobserved)
 }
 
-/// Everything that is known of a branch but its marks and the work that it took, every number to the last bit.
+/// Everything known of a branch except its marks and the work done, every number to the last bit.
 fn unmarked(branch: &Branch) -> String {
     let mut branch = branch.clone();
     branch.special.retain(|special| special.kind != Kind::Mark);
@@ -35,7 +35,8 @@ fn marks(branch: &Branch, index: usize) -> Vec<f64> {
     branch.special.iter().filter(|s| s.kind == Kind::Mark).map(|s| s.point.parameters[index]).collect()
 }
 
-/// Follows a study as it is, and with a line of marks added to its last table, and compares; returns what was found with marks.
+/// Runs a study without and with a line of marks added to its last table, and asserts that the branches agree; returns
+/// the marked diagram.
 #[track_caller]
 fn compared(model: &str, study: &str, line: &str, at_least: usize) -> Diagram {
     let [plain, marked] = [grown(model, study), grown(model, &format!("{study}{line}\n"))];
@@ -49,7 +50,7 @@ fn compared(model: &str, study: &str, line: &str, at_least: usize) -> Diagram {
 }
 
 #[test]
-fn a_mark_next_to_a_hopf_point_hides_nothing_of_the_branch_born_there() {
+fn a_mark_next_to_a_hopf_point_does_not_affect_the_branch_born_there() {
     let marked = compared(FOOD_CHAIN, FOOD_CHAIN_STUDY, "mark = { d1 = [0.75, 0.8, 0.83, 0.84, 0.9] }", 8);
     let cycles = marked.branch("b/hopf-1").unwrap();
     let at = cycles.special.iter().find(|s| s.point.parameters[2] == 0.75).unwrap();
@@ -58,7 +59,7 @@ fn a_mark_next_to_a_hopf_point_hides_nothing_of_the_branch_born_there() {
 }
 
 #[test]
-fn marks_of_all_quantities_leave_equilibria_and_cycles_as_they_are() {
+fn marks_of_all_quantities_leave_equilibria_and_cycles_unchanged() {
     let brusselator = include_str!("../../../models/brusselator.toml");
     let study = "[[seed]]\nname = \"s\"\nstate = { x = 1, y = 1 }\nparameters = { A = 1, B = 1 }\n\
         [[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"B\"\nrange = [0.5, 4]\nswitch = { hopf = 1 }\n";
@@ -75,7 +76,7 @@ fn marks_of_all_quantities_leave_equilibria_and_cycles_as_they_are() {
 }
 
 #[test]
-fn marks_leave_a_cascade_as_it_is() {
+fn marks_leave_a_cascade_unchanged() {
     let lorenz = include_str!("../../../models/lorenz.toml");
     let study = "[[seed]]\nname = \"s\"\nattractor = \"cycle\"\nparameters = { rho = 280 }\n\
         [[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"rho\"\nrange = [212, 300]\nswitch = { period-doubling = 1 }\n";
@@ -83,7 +84,7 @@ fn marks_leave_a_cascade_as_it_is() {
 }
 
 #[test]
-fn marks_leave_the_folds_of_a_forced_oscillator_as_they_are() {
+fn marks_leave_the_folds_of_a_forced_oscillator_unchanged() {
     let duffing = include_str!("../../../models/duffing-forced.toml");
     let study = "[[seed]]\nname = \"s\"\nattractor = \"cycle\"\nparameters = { omega = 0.4 }\nsamples = 8\n\
         [[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"omega\"\nrange = [0.4, 2.5]\n";
@@ -93,8 +94,8 @@ fn marks_leave_the_folds_of_a_forced_oscillator_as_they_are() {
 }
 
 #[test]
-fn a_value_on_both_sides_of_a_fold_is_marked_twice_though_no_step_ends_in_between() {
-    // x' = p - x²: the fold at p = 0 is turned in one step, and p = 1e-5 lies on both sides of it at x = ± 3.2e-3.
+fn a_value_on_both_sides_of_a_fold_within_one_step_is_marked_twice() {
+    // x' = p - x²: the fold at p = 0 is passed in one step, and p = 1e-5 lies on both sides of it at x = ± 3.2e-3.
     let model = "name = \"fold\"\n[parameters]\np = 1\n[states]\nx = \"p - x^2\"\n";
     let study = "[[seed]]\nname = \"s\"\nstate = { x = 1 }\n\
         [[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"p\"\nrange = [-1, 2]\n";
@@ -108,7 +109,7 @@ fn a_value_on_both_sides_of_a_fold_is_marked_twice_though_no_step_ends_in_betwee
 }
 
 #[test]
-fn a_stop_ends_a_branch_that_is_the_same_up_to_there() {
+fn a_stop_truncates_a_branch_without_changing_it() {
     let [plain, stopped] = [
         grown(FOOD_CHAIN, FOOD_CHAIN_STUDY),
         grown(FOOD_CHAIN, &format!("{FOOD_CHAIN_STUDY}stop = {{ d1 = 0.75 }}\n")),

@@ -1,4 +1,4 @@
-//! Every mistake of the input is answered with its place, what is wrong and what would be right, and exit code 2.
+//! Every mistake in the input is reported with its place, cause and remedy, and exit code 2.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -41,7 +41,7 @@ struct Desk {
 }
 
 impl Desk {
-    /// A folder with a model and a study in which nothing is wrong.
+    /// Returns a folder with a correct model and study.
     fn new() -> Desk {
         let desk = Desk { folder: tempfile::tempdir().unwrap() };
         desk.write("pendulum.toml", MODEL);
@@ -61,7 +61,7 @@ impl Desk {
         Command::new(env!("CARGO_BIN_EXE_foldline")).args(arguments).current_dir(self.folder.path()).output().unwrap()
     }
 
-    /// The message of a command that must fail with exit code 2.
+    /// Returns the message of a command that must fail with exit code 2.
     fn refused(&self, arguments: &[&str]) -> String {
         let output = self.foldline(arguments);
         let message = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -70,12 +70,12 @@ impl Desk {
         message
     }
 
-    /// As above, for the study with one piece of it replaced.
+    /// Returns the message for the study with one piece of it replaced.
     fn study(&self, piece: &str, by: &str) -> String {
         self.refuse_changed("study.toml", STUDY, piece, by)
     }
 
-    /// As above, for the model.
+    /// Returns the message for the model with one piece of it replaced.
     fn model(&self, piece: &str, by: &str) -> String {
         self.refuse_changed("pendulum.toml", MODEL, piece, by)
     }
@@ -105,7 +105,7 @@ fn says(message: &str, pieces: &[&str]) {
 }
 
 #[test]
-fn the_files_that_the_others_spoil_are_right() {
+fn the_unmodified_files_are_correct() {
     let desk = Desk::new();
     for file in ["pendulum.toml", "study.toml"] {
         let output = desk.foldline(&["check", file]);
@@ -115,7 +115,7 @@ fn the_files_that_the_others_spoil_are_right() {
 }
 
 #[test]
-fn unknown_parameter() {
+fn an_unknown_parameter_is_refused() {
     let desk = Desk::new();
     says(&desk.study("free = \"mu\"", "free = \"nu\""), &["study.toml:11:8", "no parameter `nu`", "did you mean `mu`"]);
     let overrides = desk.study("tolerance = 1e-6", "parameters = { kapa = 3 }");
@@ -123,19 +123,19 @@ fn unknown_parameter() {
 }
 
 #[test]
-fn range_the_wrong_way_round() {
+fn a_reversed_range_is_refused() {
     let message = Desk::new().study("[-1, 2]", "[2, -1]");
     says(&message, &["study.toml:12:9", "wrong way round", "write [-1, 2]"]);
 }
 
 #[test]
-fn range_that_does_not_contain_the_start() {
+fn a_range_that_does_not_contain_the_start_is_refused() {
     let message = Desk::new().study("[-1, 2]", "[1, 2]");
     says(&message, &["study.toml:12:9", "starts at mu = 0.5, outside its range", "a range that contains 0.5"]);
 }
 
 #[test]
-fn unknown_origin_and_an_origin_further_down() {
+fn an_unknown_origin_and_one_further_down_are_refused() {
     let desk = Desk::new();
     says(
         &desk.study("\"rest\"\nfree", "\"test\"\nfree"),
@@ -149,13 +149,13 @@ fn unknown_origin_and_an_origin_further_down() {
 }
 
 #[test]
-fn names_used_twice() {
+fn duplicate_names_are_refused() {
     let message = Desk::new().study("name = \"main\"", "name = \"rest\"");
     says(&message, &["study.toml:9:8", "\"rest\" is used twice", "a name of its own"]);
 }
 
 #[test]
-fn tolerance_out_of_bounds_or_no_number() {
+fn a_tolerance_that_is_out_of_bounds_or_no_number_is_refused() {
     let desk = Desk::new();
     says(&desk.study("1e-6", "0.5"), &["study.toml:2:13", "5e-1 is out of range", "from 1e-10 to 1e-4"]);
     says(&desk.study("1e-6", "\"small\""), &["study.toml:2:13", "not a number", "write a number"]);
@@ -163,7 +163,7 @@ fn tolerance_out_of_bounds_or_no_number() {
 }
 
 #[test]
-fn keys_and_kinds_that_do_not_exist() {
+fn unknown_keys_and_kinds_are_refused() {
     let desk = Desk::new();
     says(
         &desk.study("tolerance =", "tolerence ="),
@@ -176,7 +176,7 @@ fn keys_and_kinds_that_do_not_exist() {
 }
 
 #[test]
-fn seeds_that_say_too_little_or_too_much() {
+fn under_and_overspecified_seeds_are_refused() {
     let desk = Desk::new();
     says(
         &desk.study("state = { x = 0.7, y = 0 }", ""),
@@ -193,7 +193,7 @@ fn seeds_that_say_too_little_or_too_much() {
 }
 
 #[test]
-fn several_mistakes_are_said_at_once() {
+fn several_mistakes_are_reported_at_once() {
     let desk = Desk::new();
     desk.write("study.toml", &STUDY.replace("1e-6", "1").replace("[-1, 2]", "[2, -1]").replace("\"mu\"", "\"nu\""));
     let message = desk.refused(&["check", "study.toml"]);
@@ -201,7 +201,7 @@ fn several_mistakes_are_said_at_once() {
 }
 
 #[test]
-fn curves_and_homotopies_in_which_something_is_wrong() {
+fn mistakes_in_curves_and_homotopies_are_reported() {
     let desk = Desk::new();
     let added = "range = [-1, 2]\n\n[[curve]]\nname = \"folds\"\nhold = \"fold\"\nof = \"main\"\nfree = \"kappa\"\nuntil = 2\n\n\
                  [[homotopy]]\nname = \"way\"\nfrom = \"rest\"\nto = { kappa = 3 }\nvia = \"mu\"\nrange = [-1, 2]\n";
@@ -222,7 +222,7 @@ fn curves_and_homotopies_in_which_something_is_wrong() {
 }
 
 #[test]
-fn files_that_are_not_there_or_not_toml() {
+fn files_that_are_missing_or_not_toml_are_reported() {
     let desk = Desk::new();
     says(&desk.refused(&["run", "nowhere.toml"]), &["nowhere.toml", "cannot be read", "path"]);
     says(&desk.refused(&["check", "nowhere.toml"]), &["nowhere.toml", "cannot be read"]);
@@ -238,7 +238,7 @@ fn files_that_are_not_there_or_not_toml() {
 }
 
 #[test]
-fn models_with_mistakes_are_refused_at_the_place_in_the_model() {
+fn mistakes_in_a_model_are_reported_in_place() {
     let desk = Desk::new();
     let at = "pendulum.toml:13:";
     says(&desk.model("mu*x", "nu*x"), &[at, "nu", "mu"]);
@@ -248,7 +248,7 @@ fn models_with_mistakes_are_refused_at_the_place_in_the_model() {
 }
 
 #[test]
-fn a_model_that_is_not_a_number_at_the_start() {
+fn a_model_that_is_not_finite_at_the_start_is_refused() {
     let desk = Desk::new();
     desk.write("pendulum.toml", &MODEL.replace("mu*x - kappa*x^3 - y", "log(-1 - x^2)"));
     let pieces = ["pendulum.toml:13:12", "`y` is not finite at x = ", "mu = 0.5", "log or sqrt"];
@@ -258,7 +258,7 @@ fn a_model_that_is_not_a_number_at_the_start() {
 }
 
 #[test]
-fn a_state_at_which_the_model_is_not_a_number() {
+fn a_seed_state_at_which_the_model_is_not_finite_is_refused() {
     let desk = Desk::new();
     desk.write("pendulum.toml", &MODEL.replace("mu*x - kappa*x^3 - y", "sqrt(1 - x) - y"));
     desk.write("study.toml", &STUDY.replace("x = 0.7", "x = 1.5"));
@@ -267,7 +267,7 @@ fn a_state_at_which_the_model_is_not_a_number() {
 }
 
 #[test]
-fn a_folder_that_cannot_be_written_to() {
+fn a_folder_that_cannot_be_written_to_is_reported() {
     let desk = Desk::new();
     desk.write("occupied", "a file, not a folder");
     for out in ["occupied", "occupied/below"] {
@@ -276,7 +276,7 @@ fn a_folder_that_cannot_be_written_to() {
 }
 
 #[test]
-fn a_folder_with_a_run_in_it_is_not_overwritten() {
+fn a_folder_with_a_run_is_not_overwritten() {
     let desk = Desk::new();
     std::fs::create_dir(desk.path("run")).unwrap();
     desk.write("run/run.sqlite", "precious");
@@ -289,14 +289,14 @@ fn a_folder_with_a_run_in_it_is_not_overwritten() {
 }
 
 #[test]
-fn tables_and_plots_of_what_is_not_there() {
+fn tables_and_plots_of_missing_runs_are_refused() {
     let desk = Desk::new();
     says(&desk.refused(&["table", "nowhere"]), &["there is no run file nowhere/run.sqlite", "foldline run"]);
     says(&desk.refused(&["plot", "nowhere", "-o", "a.svg"]), &["there is no run file"]);
 }
 
 #[test]
-fn settings_of_attractors() {
+fn arguments_of_attractors_are_checked() {
     let desk = Desk::new();
     let set = |assignment: &str| desk.refused(&["attractors", "pendulum.toml", "--set", assignment]);
     says(&set("kapa=1"), &["--set kapa=1", "no parameter `kapa`", "did you mean `kappa`"]);
@@ -306,7 +306,7 @@ fn settings_of_attractors() {
 }
 
 #[test]
-fn words_that_are_not_commands() {
+fn unknown_commands_are_refused() {
     let desk = Desk::new();
     says(&desk.refused(&["rum", "study.toml"]), &["run"]);
     desk.refused(&["run"]);
@@ -315,7 +315,7 @@ fn words_that_are_not_commands() {
 }
 
 #[test]
-fn help_says_the_exit_codes() {
+fn help_lists_the_exit_codes() {
     let output = Desk::new().foldline(&["--help"]);
     assert_eq!(output.status.code(), Some(0));
     says(
@@ -325,7 +325,7 @@ fn help_says_the_exit_codes() {
 }
 
 #[test]
-fn the_studies_of_this_repository_are_right() {
+fn the_studies_of_this_repository_are_correct() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     for study in ["bouncing", "homotopy"] {
         let file = root.join(format!("studies/overhung-rotor/{study}.toml"));
@@ -335,7 +335,7 @@ fn the_studies_of_this_repository_are_right() {
 }
 
 #[test]
-fn the_curves_and_homotopies_of_the_book_are_right() {
+fn the_curves_and_homotopies_of_the_book_are_correct() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let page = std::fs::read_to_string(root.join("docs/book/study-files.md")).unwrap();
     let blocks: Vec<&str> = page.split("```toml\n").skip(1).filter_map(|rest| rest.split("```").next()).collect();
@@ -353,7 +353,7 @@ fn the_curves_and_homotopies_of_the_book_are_right() {
 }
 
 #[test]
-fn explorations() {
+fn mistakes_in_explorations_are_reported() {
     let desk = Desk::new();
     let explored = |lines: &str| desk.study("[[branch]]", &format!("[[explore]]\n{lines}\n[[branch]]"));
     let right = "name = \"all\"\nfree = \"mu\"\nrange = [0, 1]\n";
@@ -374,7 +374,7 @@ fn explorations() {
 }
 
 #[test]
-fn what_explore_is_told() {
+fn arguments_of_explore_are_checked() {
     let desk = Desk::new();
     let told = |arguments: &[&str]| desk.refused(&[&["explore", "pendulum.toml"], arguments].concat());
     says(&told(&["--free", "mi=0:1"]), &["no parameter `mi`", "did you mean `mu`"]);
@@ -390,7 +390,7 @@ fn what_explore_is_told() {
     let few = desk.foldline(&["explore", "pendulum.toml", "--free", "mu=-1:2", "--budget", "5", "--out", "few"]);
     says(&String::from_utf8_lossy(&few.stderr), &["the budget of 5 points is used up"]);
     assert_eq!(few.status.code(), Some(3));
-    // What it prints is a study that does the same.
+    // The printed study gives the same result.
     let printed = desk.foldline(&["explore", "pendulum.toml", "--free", "mu=-1:2", "--values", "3", "--print"]);
     desk.write("all.toml", &String::from_utf8_lossy(&printed.stdout));
     let [own, other] = [

@@ -1,4 +1,4 @@
-//! Coefficients of normal forms in whole runs: against published numbers, and against what the solutions around do.
+//! Normal form coefficients in whole runs, against published numbers and against neighbouring solutions.
 
 use foldline::contract::Unobserved;
 use foldline::diagram::{Branch, Diagram, Kind, SpecialPoint};
@@ -23,7 +23,7 @@ fn close(own: f64, known: f64, relative: f64) {
     assert!((own - known).abs() < relative * known.abs(), "{own} {known}");
 }
 
-/// Numbers that BifurcationKit has in its tests of this model, to four digits: l₂ without the factor 1/ω.
+/// Numbers from the tests of this model in BifurcationKit, to four digits: l₂ without the factor 1/ω.
 #[test]
 fn co_oxidation_has_the_published_coefficients() {
     let model = include_str!("../../../models/co-oxidation.toml");
@@ -47,8 +47,9 @@ fn co_oxidation_has_the_published_coefficients() {
     close(lower.coefficients[0] * omega(lower), -9322.74711 / 12.0, 1e-4);
 }
 
-/// The same for Lorenz's model of 1984 with a wave more. For zero-Hopf and double Hopf points no publication gives numbers; they come out the
-/// same on both curves that meet there, which know one eigenvalue or pair exactly, and another one as it is computed.
+/// Lorenz's model of 1984 with an additional wave, also from BifurcationKit. No numbers are published for zero-Hopf and
+/// double Hopf points; they agree on the two curves that meet there, each of which treats one eigenvalue or pair
+/// exactly and computes the other.
 #[test]
 fn the_extended_model_of_lorenz_has_the_published_coefficients() {
     let model = "[parameters]\nF = 3\nT = 0.04\n[states]\nX = \"-Y^2 - Z^2 - 0.25*X + 0.25*F - 0.987*U^2\"\nY = \"X*Y - X*Z - Y + 0.25\"\nZ = \"X*Y + X*Z - Z\"\nU = \"-1.04*U + 0.987*U*X + T\"\n";
@@ -62,7 +63,7 @@ fn the_extended_model_of_lorenz_has_the_published_coefficients() {
     let found = of_kind(folds, Kind::BogdanovTakens);
     let takens = found.iter().map(|s| (s.coefficients[0].abs(), s.coefficients[1].abs()));
     assert!(takens.into_iter().any(|(a, b)| (a - 0.21442).abs() < 1e-4 && (b - 0.60651).abs() < 1e-4));
-    // The model does not change with the signs of U and T, and neither do its zero-Hopf points.
+    // The model is symmetric under sign changes of U and T, and so are its zero-Hopf points.
     let second = diagram.branch("second").unwrap();
     let zero = [of_kind(folds, Kind::ZeroHopf), of_kind(second, Kind::ZeroHopf)].concat();
     let double = [of_kind(hopf, Kind::DoubleHopf), of_kind(second, Kind::DoubleHopf)].concat();
@@ -75,10 +76,10 @@ fn the_extended_model_of_lorenz_has_the_published_coefficients() {
     }
 }
 
-/// Cycles near a generalised Hopf point turn back where l₁² = 4 l₂ growth / ω, to leading order: the coefficient of the fold against that of
-/// the equilibrium, for a system whose l₂ comes from quadratic and cubic terms alone.
+/// Cycles near a generalised Hopf point turn back where l₁² = 4 l₂ growth / ω, to leading order: the coefficient of the
+/// fold against that of the equilibrium, for a system whose l₂ comes from quadratic and cubic terms alone.
 #[test]
-fn cycles_turn_back_where_the_second_lyapunov_coefficient_says() {
+fn cycles_turn_back_as_the_second_lyapunov_coefficient_predicts() {
     let model = |q: f64| {
         format!(
             "[parameters]\np = -0.1\nq = {q:?}\n[states]\nu = \"p*u - v + 0.7*u*v + 0.4*u^2 + q*u*(u^2 + v^2)\"\nv = \"u + p*v - 0.5*u^2 + 0.3*v^2\"\n"
@@ -89,7 +90,7 @@ fn cycles_turn_back_where_the_second_lyapunov_coefficient_says() {
     let points = grown(&model(0.0), &format!("{branch}{curve}"));
     let [generalised] = of_kind(points.branch("c").unwrap(), Kind::GeneralisedHopf)[..] else { panic!("one point") };
     let (at, second) = (generalised.point.parameters[1], generalised.coefficients[0]);
-    // l₁ must have the sign that l₂ has not, for cycles to turn.
+    // Cycles turn back only if l₁ and l₂ have opposite signs.
     let ratio = |distance: f64| {
         let diagram = grown(&model(at - second.signum() * distance), &format!("{branch}switch = {{ hopf = 1 }}\n"));
         let [hopf] = of_kind(diagram.branch("b").unwrap(), Kind::Hopf)[..] else { panic!("one Hopf point") };
@@ -99,13 +100,13 @@ fn cycles_turn_back_where_the_second_lyapunov_coefficient_says() {
         // The growth rate is p.
         fold.point.parameters[0] / (first * first / (4.0 * second))
     };
-    // What terms of higher order add is proportional to the distance.
+    // Terms of higher order contribute in proportion to the distance.
     let (far, near) = (ratio(0.02), ratio(0.01));
     assert!((near - 1.0).abs() < 0.6 * (far - 1.0).abs() && (near - 1.0).abs() < 0.1, "{far} {near}");
     assert!((2.0 * near - far - 1.0).abs() < 0.05 * (near - 1.0).abs() + 1e-3, "{far} {near}");
 }
 
-/// On the centre manifold of the state of rest, which is z = xy/b to leading order: b = σ/(1 + σ), c = -σ/(2 b (1 + σ)).
+/// On the centre manifold of the rest state, z = xy/b to leading order: b = σ/(1 + σ), c = -σ/(2 b (1 + σ)).
 #[test]
 fn convection_begins_at_a_supercritical_pitchfork() {
     let model = include_str!("../../../models/lorenz.toml");
@@ -117,7 +118,8 @@ fn convection_begins_at_a_supercritical_pitchfork() {
     assert!(point.normal_form().ends_with("pitchfork, supercritical"), "{}", point.normal_form());
 }
 
-/// u' = u (3 (1 - u) - v) - p (1 - e^{-5u}) at u = v = 0: the eigenvalue is 3 - 5 p, and the quadratic coefficient ½ (25 p - 6).
+/// u' = u (3 (1 - u) - v) - p (1 - e^{-5u}) at u = v = 0: the eigenvalue is 3 - 5 p, and the quadratic coefficient ½
+/// (25 p - 6).
 #[test]
 fn prey_appear_at_a_transcritical_point() {
     let model = include_str!("../../../models/predator-prey.toml");
@@ -127,7 +129,7 @@ fn prey_appear_at_a_transcritical_point() {
     let [a, b] = point.coefficients[..] else { panic!("transcritical: {}", point.normal_form()) };
     assert!((a.abs() - 4.5).abs() < 1e-7 && (b + 5.0).abs() < 1e-7, "{}", point.normal_form());
     assert!(point.normal_form().ends_with("transcritical") && point.criticality().is_none());
-    // Along the other branch the eigenvalue passes 0 the other way.
+    // Along the other branch the eigenvalue passes 0 in the opposite direction.
     let [same] = of_kind(diagram.branch("b/branch-point-1").unwrap(), Kind::BranchPoint)[..] else {
         panic!("the same")
     };

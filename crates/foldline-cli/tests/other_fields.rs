@@ -1,5 +1,5 @@
-//! Problems of other fields whose stability changes are easily lost: canards, events close together, symmetries, families at one value
-//! of the parameter. Right values are closed forms or come from the source that each test names.
+//! Problems from other fields whose stability changes are easily missed: canards, nearby bifurcations, symmetries,
+//! families at one parameter value. Reference values are closed forms or come from the source that each test names.
 
 use foldline::contract::Unobserved;
 use foldline::diagram::{Branch, Diagram, Ending, Kind};
@@ -9,7 +9,7 @@ use foldline_store::study_file::parse_study;
 
 const TOLERANCE: f64 = 1e-6;
 
-/// A study of one branch "b", run to its diagram.
+/// Runs a study of one branch "b" and returns its diagram.
 #[track_caller]
 fn followed(tolerance: f64, model: &str, seed: &str, branch: &str) -> Diagram {
     let text = format!(
@@ -20,7 +20,7 @@ fn followed(tolerance: f64, model: &str, seed: &str, branch: &str) -> Diagram {
     explore::run(&system, &study.plan, 1, Diagram::default(), &Unobserved)
 }
 
-/// The same, with every change of stability explained.
+/// Runs a study of one branch "b" and asserts that every change of stability is explained.
 #[track_caller]
 fn run_at(tolerance: f64, model: &str, seed: &str, branch: &str) -> Diagram {
     let diagram = followed(tolerance, model, seed, branch);
@@ -33,7 +33,8 @@ fn run(model: &str, seed: &str, branch: &str) -> Diagram {
     run_at(TOLERANCE, model, seed, branch)
 }
 
-/// Between neighbouring points the count of unstable multipliers changes by what the special points between them say; no change is unexplained.
+/// Asserts that between neighbouring points the number of unstable multipliers changes as the special points between
+/// them say.
 #[track_caller]
 fn is_explained(branch: &Branch) {
     assert!(branch.special.iter().all(|s| s.kind != Kind::Unexplained), "{}: {:?}", branch.name, told(branch));
@@ -54,7 +55,7 @@ fn told(branch: &Branch) -> Vec<(Kind, f64, usize, usize)> {
     branch.special.iter().map(|s| (s.kind, value(&s.point), s.unstable_before, s.unstable_after)).collect()
 }
 
-/// The special points of a branch by increasing parameter are these, each within `error` and no farther off than it states.
+/// Asserts the special points of a branch by increasing parameter, each within `error` and within its stated error.
 #[track_caller]
 fn has(diagram: &Diagram, name: &str, expected: &[(Kind, f64, [usize; 2])], error: f64) {
     let names: Vec<&str> = diagram.branches.iter().map(|b| b.name.as_str()).collect();
@@ -84,8 +85,8 @@ fn fitzhugh_nagumo(epsilon: f64) -> String {
     )
 }
 
-/// The cycles born at two subcritical Hopf points become stable in a canard explosion, in which the current stands still to twelve
-/// digits. Values: integration with DOP853 from both sides of the explosion.
+/// The cycles born at two subcritical Hopf points become stable in a canard explosion, along which the current is
+/// constant to twelve digits. Values: integration with DOP853 from both sides of the explosion.
 #[test]
 fn folds_in_canard_explosions_are_found() {
     let branch = "free = \"I\"\nrange = [-0.5, 2]\nswitch = { hopf = 1 }";
@@ -98,8 +99,8 @@ fn folds_in_canard_explosions_are_found() {
     }
 }
 
-/// x' = y - x³/3 + x, y' = eps (a - x): one equilibrium, no saddle, so no homoclinic orbit. The cycles lead from a = -1 to a = 1 through two
-/// explosions at ±(1 - eps/8 - 3 eps²/32 - 173 eps³/1024), with periods past 460 on the way.
+/// x' = y - x³/3 + x, y' = eps (a - x): one equilibrium, no saddle, so no homoclinic orbit. The cycles lead from a = -1
+/// to a = 1 through two explosions at ±(1 - eps/8 - 3 eps²/32 - 173 eps³/1024), with periods above 460 on the way.
 #[test]
 fn canards_lead_from_hopf_point_to_hopf_point() {
     for epsilon in [0.1, 0.05, 0.01f64] {
@@ -122,8 +123,9 @@ fn canards_lead_from_hopf_point_to_hopf_point() {
 const CIRCUIT: &str = "name = \"circuit\"\n[parameters]\nnu = -0.9\n[definitions]\nd = \"y - x\"\n[states]\n\
     x = \"(-(0.5 + nu)*x + 0.5*y - 0.328578*x^3 + 0.933578*d^3)/0.6\"\ny = \"0.5*x + 0.1*y - z - 0.933578*d^3\"\nz = \"y\"\n";
 
-/// A fold and a pitchfork of cycles on one step: AUTO-07p, demo tor, at fine settings. Further turns on the way to a heteroclinic cycle have such
-/// pairs, closer each time, with stable cycles between them; periods of these at a tolerance of 1e-8.
+/// A fold and a pitchfork of cycles on one step: AUTO-07p, demo tor, at fine settings. Further turns towards a
+/// heteroclinic cycle have such pairs, closer each time, with stable cycles between them; their periods are from a run
+/// at a tolerance of 1e-8.
 #[test]
 fn a_fold_and_a_branch_point_of_symmetric_cycles_on_one_step_are_told_apart() {
     let branch = "free = \"nu\"\nrange = [-0.9, -0.4]\nswitch = { hopf = 1 }\nstop = { period = 45 }";
@@ -148,7 +150,7 @@ const CHAIN: &str = "name = \"food chain\"\n[parameters]\nd1 = 1.1083\nd2 = 0.01
     x = \"1 - exp(x) - 5*exp(y)/(1 + 3*exp(x))\"\ny = \"5*exp(x)/(1 + 3*exp(x)) - d1 - 0.1*z/(1 + 2*exp(y))\"\n\
     z = \"z*(0.1*exp(y)/(1 + 2*exp(y)) - d2)\"\n";
 
-/// Cycles of three species vanish at a Hopf point next to a fold of the equilibria; AUTO-07p, demo tfc.
+/// Cycles of three species shrink to a Hopf point next to a fold of equilibria; AUTO-07p, demo tfc.
 #[test]
 fn cycles_that_shrink_to_an_equilibrium_next_to_its_fold_end_there() {
     let seed = "state = { x = -1.0, y = -1.2, z = 0 }\nparameters = { d1 = 0.75, d2 = 0.05 }";
@@ -163,7 +165,7 @@ fn cycles_that_shrink_to_an_equilibrium_next_to_its_fold_end_there() {
     assert!(at(0.017340743), "{ends:?}");
 }
 
-/// Two states that can be exchanged: a pitchfork at 1/2 without a change of sign in any state.
+/// Two states that can be exchanged: a pitchfork at 1/2 at which no state changes sign.
 #[test]
 fn a_pitchfork_under_a_permutation_is_one_branch_point_on_both_branches() {
     let model = "name = \"swap\"\n[parameters]\nmu = 0\n[states]\na = \"1 - a + mu*(a - b) - (a - b)^3\"\n\
@@ -174,9 +176,9 @@ fn a_pitchfork_under_a_permutation_is_one_branch_point_on_both_branches() {
     has(&diagram, "b/branch-point-1", &[(Kind::BranchPoint, 0.5, [0, 0])], 1e-8);
 }
 
-/// Three double wells that do not know of each other: a kernel of dimension three.
+/// Three uncoupled double wells: a three-dimensional kernel.
 #[test]
-fn eigenvalues_that_pass_together_are_one_branch_point() {
+fn eigenvalues_that_vanish_together_are_one_branch_point() {
     let model =
         "name = \"wells\"\n[parameters]\np = -1\n[states]\nx = \"p*x - x^3\"\ny = \"p*y - y^3\"\nz = \"p*z - z^3\"\n";
     let diagram = run(model, "state = { x = 0, y = 0, z = 0 }", "free = \"p\"\nrange = [-1, 2]");
@@ -185,7 +187,7 @@ fn eigenvalues_that_pass_together_are_one_branch_point() {
 
 /// Two oscillators with different frequencies and the same threshold, mu = 0.
 #[test]
-fn hopf_points_of_two_pairs_at_once_are_both_named() {
+fn simultaneous_hopf_points_of_two_pairs_are_both_named() {
     let pair = |u: &str, v: &str, w: f64| {
         format!("{u} = \"mu*{u} - {w}*{v} - {u}*({u}^2 + {v}^2)\"\n{v} = \"{w}*{u} + mu*{v} - {v}*({u}^2 + {v}^2)\"\n")
     };
@@ -195,8 +197,8 @@ fn hopf_points_of_two_pairs_at_once_are_both_named() {
     has(&diagram, "b", &[(Kind::Hopf, 0.0, [0, 2]), (Kind::Hopf, 0.0, [2, 4])], 1e-8);
 }
 
-/// An absorber tuned to half the frequency: the doubled branch has states that do not deviate from half the period at all. The result must not depend
-/// on where steps fall.
+/// An absorber tuned to half the frequency: on the doubled branch some states still repeat exactly after half the
+/// period. The result must not depend on the positions of the steps.
 #[test]
 fn a_doubled_branch_ends_at_both_its_doublings_whatever_the_tolerance() {
     let model = "name = \"absorber\"\n[parameters]\nw = 1.9\n[forcing]\nfrequency = \"w\"\n[states]\n\
@@ -216,7 +218,7 @@ fn a_doubled_branch_ends_at_both_its_doublings_whatever_the_tolerance() {
     }
 }
 
-/// Linear until the stop is left: the doubled branches stand vertically up to there.
+/// Linear until the stop is touched: the doubled branches are vertical up to there.
 #[test]
 fn a_branch_that_is_vertical_up_to_contact_has_no_folds_on_the_way() {
     let model = "name = \"stop\"\n[parameters]\nw = 1.98\n[forcing]\nfrequency = \"w\"\n[states]\n\
@@ -230,7 +232,8 @@ fn a_branch_that_is_vertical_up_to_contact_has_no_folds_on_the_way() {
     }
 }
 
-/// alpha + beta = 2: the Hopf point is degenerate, and a vertical family of cycles leads to a heteroclinic cycle between three saddles.
+/// alpha + beta = 2: the Hopf point is degenerate, and a vertical family of cycles leads to a heteroclinic cycle
+/// between three saddles.
 #[test]
 fn a_vertical_family_ends_at_its_heteroclinic_cycle() {
     let model = "name = \"competition\"\n[parameters]\nalpha = 0.5\n[states]\nx = \"x*(1 - x - alpha*y - 1.3*z)\"\n\
@@ -240,9 +243,9 @@ fn a_vertical_family_ends_at_its_heteroclinic_cycle() {
     assert_eq!(ends(&diagram, "b/hopf-1"), ["heteroclinic", "joined"]);
 }
 
-/// A spherical oscillator that swings in a plane: a multiplier is 1 because the plane can be turned.
+/// A spherical oscillator that swings in a plane: a multiplier is 1 because the plane can be rotated.
 #[test]
-fn a_rotation_makes_no_branch_points() {
+fn rotational_symmetry_makes_no_branch_points() {
     let force = |own: &str| format!("-0.04*v{own} - (1 + 0.2*cos(w*t) + x^2 + y^2)*{own}");
     let model = format!(
         "name = \"spherical\"\n[parameters]\nw = 2.0\n[forcing]\nfrequency = \"w\"\n[states]\nx = \"vx\"\ny = \"vy\"\nvx = \"{}\"\nvy = \"{}\"\n",
@@ -267,11 +270,11 @@ fn a_saddle_node_on_the_cycle_is_named() {
     assert!((parameter - 1.0).abs() < 1e-8, "{parameter}");
 }
 
-/// An oscillator with a stop: f_x jumps where it touches. Every error of profiles, ranges and multipliers is what shooting finds, which
-/// integrates from event to event, or more. (With other scales steps fall elsewhere, and the doubled branch may break up where it begins: its
-/// meshes have no boundaries at the contacts.)
+/// An oscillator with a stop: f_x jumps where it touches. Every error of profiles, ranges and multipliers is at least
+/// that found by shooting, which integrates from event to event. (With other scales the steps are different, and the
+/// doubled branch may break up at its start: its meshes have no boundaries at the contacts.)
 #[test]
-fn errors_of_cycles_with_contact_are_what_they_say() {
+fn stated_errors_of_cycles_with_contact_are_reliable() {
     let model = "name = \"stop\"\n[parameters]\nw = { value = 0.5, scale = 0.5 }\nF = 0.3\nc = 0.06\nk = 8\ngap = 0.5\n[forcing]\nfrequency = \"w\"\n[states]\n\
         x = \"v\"\nv = \"-x - c*v - k*max(x - gap, 0) + F*cos(w*t)\"\n";
     let text = "model = \"m\"\n[[seed]]\nname = \"s\"\nstate = { x = 0, v = 0 }\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"w\"\n\
@@ -289,10 +292,11 @@ fn errors_of_cycles_with_contact_are_what_they_say() {
     assert!(wrong.is_empty(), "{wrong:?}");
 }
 
-/// The second normal mode of two masses (Kerschen et al., Mech. Syst. Signal Process. 23 (2009) 170), begun at the Hopf point of the linear
-/// system: one instability, where a pair of multipliers meets at 1. Half-period shooting has it at the period 4.902862.
+/// The second normal mode of two masses (Kerschen et al., Mech. Syst. Signal Process. 23 (2009) 170), started at the
+/// Hopf point of the linear system: stability is lost once, where a pair of multipliers meets at 1. Half-period
+/// shooting gives the period 4.902862 there.
 #[test]
-fn a_family_of_cycles_of_one_energy_each_loses_stability_at_one_point() {
+fn a_family_of_cycles_parametrised_by_energy_loses_stability_at_one_point() {
     let model = "name = \"masses\"\n[parameters]\ndelta = -0.005\n[states]\nx1 = \"v1\"\nv1 = \"-2*x1 + x2 - 0.5*x1^3 + delta*v1\"\n\
                  x2 = \"v2\"\nv2 = \"-2*x2 + x1 + delta*v2\"\n";
     let branch =

@@ -1,4 +1,4 @@
-//! A study that only simulates, through the command.
+//! A study that only simulates, run by the command.
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -54,7 +54,7 @@ fn radius(mu: f64) -> f64 {
 }
 
 #[test]
-fn surveys_and_sweeps_are_run_listed_and_not_repeated() {
+fn surveys_and_sweeps_are_run_once_and_listed() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("model.toml"), MODEL).unwrap();
     std::fs::write(folder.path().join("study.toml"), STUDY).unwrap();
@@ -70,7 +70,7 @@ fn surveys_and_sweeps_are_run_listed_and_not_repeated() {
     let rows: Vec<Vec<&str>> = lines.collect();
     let of = |set: &'static str| rows.iter().filter(move |row| row[0] == set);
 
-    // Below the fold rest alone attracts, above the Hopf point the cycle alone, both in between.
+    // Only the rest state attracts below the fold, only the cycle above the Hopf point, and both in between.
     let met: Vec<(String, String)> = of("what attracts").map(|row| (cell(row, "mu"), cell(row, "motion"))).collect();
     let mut expected = [("-0.5", "equilibrium"), ("-0.1", "equilibrium"), ("-0.1", "cycle"), ("0.4", "cycle")]
         .map(|(a, b)| (a.to_string(), b.to_string()))
@@ -83,7 +83,7 @@ fn surveys_and_sweeps_are_run_listed_and_not_repeated() {
     assert_eq!(sorted(met), expected);
     let hits: f64 = of("what attracts").map(|row| number(row, "hits")).sum();
     assert_eq!(hits, 36.0);
-    // Of twelve starts at each value nine are uniform, and each of them went somewhere.
+    // Nine of the twelve starts at each value are uniform, and each of them settled somewhere.
     for mu in ["-0.5", "-0.1", "0.4"] {
         let own = of("what attracts").filter(|row| cell(row, "mu") == mu);
         let shares: Vec<[f64; 3]> =
@@ -97,7 +97,7 @@ fn surveys_and_sweeps_are_run_listed_and_not_repeated() {
     }
     assert!(of("down").all(|row| cell(row, "share").is_empty()));
     for row in rows.iter().filter(|row| cell(row, "motion") == "cycle") {
-        // The cycle settles until its returns agree to 1e-7, and attracts at least like e^(-0.1 t).
+        // A cycle counts as settled when its returns agree to 1e-7, and it attracts at least like e^(-0.1 t).
         assert!((number(row, "R_max") - radius(number(row, "mu"))).abs() < 1e-5, "{row:?}");
         assert!((number(row, "period") - std::f64::consts::PI).abs() < 1e-6, "{row:?}");
     }
@@ -116,7 +116,7 @@ fn surveys_and_sweeps_are_run_listed_and_not_repeated() {
     assert_eq!(printed(folder.path(), &["table", "runs/study", "--responses", "--format", "csv"]), csv);
 }
 
-/// The escape equation: x = 1 + y gives y'' + 0.1 y' + y + y² = lam sin(0.81 t) with the edge of its well at y = -1.
+/// The escape equation: x = 1 + y gives y'' + 0.1 y' + y + y² = lam sin(0.81 t), with the edge of its well at y = -1.
 fn escape(force: &str, forcing: &str) -> String {
     format!(
         "[parameters]\nw = 0.81\nlam = 0.05\n{forcing}[states]\nx = {{ equation = \"v\", range = [-1, 2] }}\n\
@@ -156,10 +156,11 @@ fn every_start_that_escapes_is_counted() {
     }
 }
 
-/// Under a slowly growing force the motion in the well escapes for good. Thompson (1989, Proc. R. Soc. A 421) has it at a force of 0.109 for the
-/// frequency 0.85, and lower ones towards the optimum next to 0.8, which no motion in the well survives beyond 0.1.
+/// Under a slowly growing force the motion in the well finally escapes. Thompson (1989, Proc. R. Soc. A 421) gives a
+/// force of 0.109 at the frequency 0.85, and lower ones towards the optimum near 0.8, where no motion in the well
+/// survives beyond 0.1.
 #[test]
-fn a_sweep_ends_where_its_motion_escapes_and_keeps_the_rest() {
+fn a_sweep_ends_where_its_motion_escapes_and_keeps_earlier_values() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(folder.path().join("m.toml"), escape(FORCED[0], FORCED[1])).unwrap();
     let study = "model = \"m.toml\"\n[[seed]]\nname = \"s\"\nattractor = \"cycle\"\n[[sweep]]\nname = \"up\"\nfrom = \"s\"\nfree = \"lam\"\n\

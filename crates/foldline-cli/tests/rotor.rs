@@ -1,8 +1,8 @@
 //! The bouncing diagram of the overhung rotor against reference numbers, closed forms and identities.
 //!
-//! **Source.** The tables in `reference/` come from a separate code: single shooting with an adaptive Runge–Kutta pair 5(4)
-//! at a relative tolerance of 1e-12 with variational equations; about 1e-8 in Omega, 1e-5 in r_max. Closed forms and
-//! identities follow from the equations of motion (akay2024) by balance of power and torque.
+//! **Source.** The tables in `reference/` come from a separate code: single shooting with an adaptive Runge–Kutta pair
+//! 5(4) at a relative tolerance of 1e-12 with variational equations; about 1e-8 in Omega, 1e-5 in r_max. Closed forms
+//! and identities follow from the equations of motion (akay2024) by balance of power and torque.
 
 use foldline::contract::{Event, Observer, Unobserved, Verdict};
 use foldline::diagram::{Branch, Diagram, Ending, Kind, Solution};
@@ -38,7 +38,7 @@ fn tight() -> &'static Diagram {
     DIAGRAM.get_or_init(|| computed(1e-9))
 }
 
-/// Rows of a reference table, comments and heading left out.
+/// Rows of a reference table, without comments and heading.
 fn reference(name: &str) -> Vec<Vec<String>> {
     let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/reference").join(name);
     let text = std::fs::read_to_string(file).unwrap();
@@ -46,18 +46,18 @@ fn reference(name: &str) -> Vec<Vec<String>> {
     rows.map(|l| l.split(',').map(str::to_string).collect()).collect()
 }
 
-/// max r: the output comes after the four states.
+/// Maximum of r: the output comes after the four states.
 fn r_max(ranges: &[[f64; 2]]) -> f64 {
     ranges[4][1]
 }
 
-/// Whether a special point of that kind is at these reference values.
+/// True if there is a special point of that kind at these reference values.
 fn has(branch: &Branch, kind: &str, omega: f64, period: Option<f64>, r: f64) -> bool {
     branch.special.iter().any(|s| {
         let apart = (s.point.parameters[OMEGA] - omega).abs();
         s.kind.name() == kind
             && apart < 1e-6
-            // The reference itself is good to about 1e-8.
+            // The reference itself is accurate to about 1e-8.
             && apart <= s.error * branch.size(omega) + 2e-8
             && period.is_none_or(|t| (s.point.solution.period().unwrap() - t).abs() < 3e-6)
             && (r_max(&s.point.ranges) - r).abs() < 1e-4
@@ -81,9 +81,9 @@ fn every_reference_special_point_is_found() {
     assert_eq!(checked, 7);
 }
 
-/// A slowdown without a clock: how much work each branch takes.
+/// Detects a slowdown without a clock, by the work that each branch takes.
 #[test]
-fn the_work_is_that_of_the_table() {
+fn the_work_matches_the_reference_table() {
     let mut found = "branch,points,newton,factorisations,rejected,evaluations,linearisations\n".to_string();
     for branch in &diagram().branches {
         let cost = branch.cost();
@@ -113,7 +113,7 @@ fn table(branch: &Branch) -> Vec<(Kind, f64, f64)> {
     branch.special.iter().map(|s| (s.kind, s.point.parameters[OMEGA], s.error)).collect()
 }
 
-/// The isola of contact SL walked the other way round, and the open branches from their other end.
+/// Follows the isola of contact SL in the opposite direction, and the open branches from their other end.
 #[test]
 fn the_other_direction_gives_the_same_special_points() {
     let study = study(1e-6);
@@ -121,7 +121,7 @@ fn the_other_direction_gives_the_same_special_points() {
     for name in ["contact SL", "contact DL", "cubic DL", "cubic SL", "cubic S", "contact S"] {
         let known = diagram().branch(name).unwrap();
         let settings = growth::settings(&system, 1e-6, [0.5, 12.0], 5000);
-        // Closed branches start at the same point and go backwards; open ones start at an end.
+        // Closed branches start at the same point in the opposite direction; open ones start at an end.
         let closed = known.ends[1] == Some(Ending::Closed);
         let start = if closed { known.points.iter().find(|p| p.position == 0).unwrap() } else { &known.points[0] };
         let mut problem = growth::problem_of(&system, OMEGA, 4, start, false);
@@ -168,13 +168,14 @@ fn the_reference_tables_of_whole_branches_are_matched() {
         assert!(rows.len() > 250);
         for row in &rows {
             let [omega, period, r, unstable] = [0, 1, 2, 3].map(|k| row[k].parse::<f64>().unwrap());
-            // The study ends there, the table goes on.
+            // The study ends there, while the table goes on.
             if omega > 12.0 {
                 continue;
             }
             let found = known::solutions_at(&system, &settings, branch, omega);
             let matched = found.iter().any(|p| {
-                // Next to a fold the period changes with the square root of Omega, whose last digit in the table counts.
+                // Near a fold the period changes like the square root of Omega, so the last digit of Omega in the table
+                // matters.
                 let slack = 1e-6 + 1e-9 / p.tangent.last().unwrap().abs().max(1e-9);
                 (p.solution.period().unwrap() - period).abs() < slack * period
                     && (r_max(&p.ranges) - r).abs() < 1e-4 * (1.0 + r)
@@ -199,13 +200,13 @@ fn synchronous_responses_satisfy_their_closed_form() {
             let g = (1.0 - kappa) * gamma * r * r + kappa * contact;
             let force = m * epsilon * w * w;
             let left = r * ((1.0 - (1.0 - j_p) * w * w + g).powi(2) + (2.0 * zeta * w).powi(2)).sqrt();
-            // Newton leaves 1e-9 in r; next to contact K = 150 makes the force that much steeper.
+            // Newton's method leaves an error of 1e-9 in r; next to contact, K = 150 magnifies the residual force.
             let steep =
                 1.0 + r * (beta + gamma * r * r) + 0.5 * beta * k * kappa * (1.0 - (k * (r - 1.0)).tanh().powi(2));
             assert!((left - force).abs() < 1e-8 * (force + steep), "{name} at {w}, r = {r}: {left} against {force}");
         }
     }
-    // Paper of the study, corrected: the three responses of the cubic rotor at Omega = 5.
+    // Publication of the study, corrected: the three responses of the cubic rotor at Omega = 5.
     let study = study(1e-6);
     let system = System::of_plan(&study.model, &study.plan);
     let settings = growth::settings(&system, 1e-6, [0.5, 12.0], 5000);
@@ -293,8 +294,8 @@ fn stability_never_changes_silently() {
 }
 
 #[test]
-fn nothing_is_reported_that_is_not_there() {
-    // The cubic SL branch has its fold and nothing else up to Omega = 12 on either side of it.
+fn no_spurious_special_points_are_reported() {
+    // The cubic SL branch has its fold and no other special point on either side up to Omega = 12.
     assert_eq!(table(diagram().branch("cubic SL").unwrap()).len(), 1);
     assert_eq!(table(diagram().branch("cubic S").unwrap()).len(), 1);
     assert!(table(diagram().branch("cubic S resonant").unwrap()).is_empty());
@@ -312,7 +313,7 @@ fn every_branch_ends_where_it_should() {
     }
 }
 
-/// The same special points at every tolerance, each within its stated error of those at the tightest.
+/// Special points are the same at every tolerance, each within its stated error of those at the tightest.
 #[test]
 fn the_list_of_special_points_does_not_depend_on_the_tolerance() {
     let loose = computed(1e-4);
@@ -356,7 +357,7 @@ fn the_result_does_not_depend_on_the_number_of_threads() {
     }
 }
 
-/// Stops after a number of points.
+/// Observer that stops the run after a number of points.
 struct Impatient(AtomicUsize);
 
 impl Observer for Impatient {
@@ -369,13 +370,13 @@ impl Observer for Impatient {
 }
 
 #[test]
-fn a_run_that_is_stopped_anywhere_goes_on_to_the_same_diagram() {
+fn a_run_stopped_anywhere_resumes_to_the_same_diagram() {
     let mut study = study(1e-6);
     study.plan.branches.retain(|b| b.name == "contact SL");
     let system = System::of_plan(&study.model, &study.plan);
     let whole = explore::run(&system, &study.plan, 1, Diagram::default(), &Unobserved);
-    // Anywhere along them, and next to where the doubled branches begin and end: with their special points alone, and with those at
-    // both ends but without the word that they are ends.
+    // Anywhere along the branches, and near the start and the end of the doubled branches: with their special points
+    // alone, and with those at both ends but without the record that they are ends.
     let mut places = vec![1, 17, 40];
     let mut before = 0;
     for branch in &whole.branches {
@@ -386,7 +387,7 @@ fn a_run_that_is_stopped_anywhere_goes_on_to_the_same_diagram() {
     for points in places {
         let mut earlier =
             explore::run(&system, &study.plan, 1, Diagram::default(), &Impatient(AtomicUsize::new(points)));
-        // A run that was killed knows of no ending.
+        // A run that was killed has recorded no endings.
         for branch in &mut earlier.branches {
             branch.ends.iter_mut().for_each(|end| *end = end.take().filter(|e| *e != Ending::Stopped));
         }
@@ -437,11 +438,11 @@ fn a_homotopy_reaches_the_lightly_damped_rotor() {
     assert_eq!(table(branch).len(), 1);
 }
 
-/// Such cycles attract so few states that sampling does not find them; states on them come from long simulations.
+/// Such cycles attract so few states that sampling misses them; states on them come from long simulations.
 #[test]
 fn states_on_cycles_of_many_turns_lead_to_them() {
     let model = include_str!("../../../models/overhung-rotor.toml");
-    // Speed, state, period over that of one turn of the 3:1 or 4:1 cycle at that speed is about 3, 4 and 5.
+    // Speed, state, and period relative to one turn of the 3:1 or 4:1 cycle at that speed: about 3, 4 and 5.
     for (omega, state, period) in [
         (3.99, "u = -1.194, v = -0.046, du = -2.112, dv = -1.438", 12.114265),
         (4.11, "u = -1.695, v = -1.616, du = -5.755, dv = 2.337", 15.713851),

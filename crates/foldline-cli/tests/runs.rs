@@ -1,4 +1,4 @@
-//! Whole runs through the command, of models whose bifurcations are known in closed form, and the examples of the book.
+//! Whole runs of the command, for models whose bifurcations are known in closed form, and the examples of the book.
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
@@ -11,7 +11,7 @@ fn foldline(folder: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_foldline")).args(arguments).current_dir(folder).output().unwrap()
 }
 
-/// Standard output of a command that ends with that code.
+/// Returns the standard output of a command that must end with that code.
 #[track_caller]
 fn printed(folder: &Path, arguments: &[&str], code: i32) -> String {
     let output = foldline(folder, arguments);
@@ -19,14 +19,14 @@ fn printed(folder: &Path, arguments: &[&str], code: i32) -> String {
     String::from_utf8(output.stdout).unwrap()
 }
 
-/// The code blocks of a kind in a document.
+/// The code blocks of one language in a document.
 fn blocks(document: &str, kind: &str) -> Vec<String> {
     let text = std::fs::read_to_string(root().join(document)).unwrap();
     let fence = format!("```{kind}\n");
     text.split(&fence).skip(1).filter_map(|rest| Some(rest.split_once("```")?.0.to_string())).collect()
 }
 
-/// A folder with the model and the study of a document.
+/// Returns a folder with the model and the study of a document.
 fn desk(document: &str) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let found = blocks(document, "toml");
@@ -52,7 +52,7 @@ fn rows(csv: &str) -> Vec<impl Fn(&str) -> String + use<>> {
 }
 
 #[test]
-fn the_first_models_of_readme_and_book_show_their_hopf_point() {
+fn the_first_models_of_readme_and_book_have_their_hopf_point() {
     for document in ["README.md", "docs/book/first-model.md"] {
         let desk = desk(document);
         printed(desk.path(), &["check", "brusselator.toml"], 0);
@@ -78,7 +78,7 @@ fn the_first_models_of_readme_and_book_show_their_hopf_point() {
 }
 
 #[test]
-fn points_come_with_multipliers_and_their_accuracy() {
+fn points_are_listed_with_multipliers_and_accuracy() {
     let desk = desk("README.md");
     printed(desk.path(), &["run", "study.toml"], 0);
     let arguments = ["table", "runs/study", "--points", "--branch", "steady", "--format", "json"];
@@ -98,7 +98,7 @@ fn points_come_with_multipliers_and_their_accuracy() {
     let cycles: Vec<_> = rows(&csv).into_iter().filter(|row| row("branch") != "steady").collect();
     assert!(cycles.len() > 5);
     for row in cycles {
-        // The first multiplier is the trivial one; the defects are what is left of exact arithmetic.
+        // The first multiplier is the trivial one; its defect is the error of the computation.
         let first = row("multipliers").split(' ').next().unwrap().trim_end_matches("+0.0j").parse::<f64>().unwrap();
         assert!((first - 1.0).abs() < 1e-4, "{first}");
         assert!(row("discretisation").parse::<f64>().unwrap() < 1e-5);
@@ -107,7 +107,7 @@ fn points_come_with_multipliers_and_their_accuracy() {
 }
 
 #[test]
-fn a_branch_that_ends_short_is_exit_code_3_and_said() {
+fn a_branch_that_ends_short_is_reported_with_exit_code_3() {
     let desk = desk("README.md");
     let study = std::fs::read_to_string(desk.path().join("study.toml")).unwrap();
     std::fs::write(desk.path().join("short.toml"), study.replace("range", "max-points = 2, range")).unwrap();
@@ -118,9 +118,9 @@ fn a_branch_that_ends_short_is_exit_code_3_and_said() {
 }
 
 #[test]
-fn a_branch_that_turns_round_before_its_target_is_short_and_nothing_starts_at_its_end() {
+fn a_branch_that_turns_before_its_target_is_short_and_nothing_starts_at_its_end() {
     let folder = tempfile::tempdir().unwrap();
-    // x = ±sqrt(mu): the way to mu = -1 leads over the fold at 0 back to mu = 2.
+    // x = ±sqrt(mu): towards mu = -1 the branch passes the fold at 0 and returns to mu = 2.
     let model = "name = \"fold\"\n[parameters]\nmu = 1\nh = 0\n[states.x]\nequation = \"mu - x^2 + h\"\n";
     let study = "model = \"model.toml\"\n[[seed]]\nname = \"start\"\nstate = { x = 1 }\n\
                  [[branch]]\nname = \"down\"\nfrom = \"start\"\nfree = \"mu\"\nrange = [-1, 2]\nuntil = -1\n\
@@ -135,10 +135,10 @@ fn a_branch_that_turns_round_before_its_target_is_short_and_nothing_starts_at_it
 }
 
 #[test]
-fn a_seed_that_is_not_found_is_exit_code_3_and_said() {
+fn a_seed_that_is_not_found_is_reported_with_exit_code_3() {
     let desk = desk("README.md");
     let study = std::fs::read_to_string(desk.path().join("study.toml")).unwrap();
-    // At B = 1.5 the equilibrium attracts everything.
+    // At B = 1.5 the equilibrium attracts every state.
     std::fs::write(desk.path().join("none.toml"), study.replace("\"equilibrium\"", "\"cycle\"")).unwrap();
     let output = foldline(desk.path(), &["run", "none.toml"]);
     let said = String::from_utf8_lossy(&output.stderr);
@@ -172,8 +172,9 @@ fn a_run_cut_off_between_transactions_resumes_without_losing_a_point() {
         std::fs::create_dir(desk.path().join(&out)).unwrap();
         let file = desk.path().join(&out).join("run.sqlite");
         std::fs::copy(desk.path().join("whole/run.sqlite"), &file).unwrap();
-        // Rows are written in the order in which they were accepted: cutting the later ones off is what a kill does. A special
-        // point lies between its position and the next, of which the one further from the start was accepted after it.
+        // Rows are stored in the order of acceptance, so cutting off the last ones has the effect of a kill. A special
+        // point lies between its position and the next; of these two points, the one further from the start was
+        // accepted after it.
         let cut = rusqlite::Connection::open(&file).unwrap();
         cut.execute_batch(&format!(
             "CREATE TEMP TABLE lost AS SELECT rowid AS r, branch, position FROM points ORDER BY rowid LIMIT -1 OFFSET {kept};
@@ -190,7 +191,8 @@ fn a_run_cut_off_between_transactions_resumes_without_losing_a_point() {
         let after = table(&out, "--points");
         let lost: Vec<&str> = before.lines().filter(|line| !after.lines().any(|other| other == *line)).collect();
         assert!(lost.is_empty(), "accepted points lost after {kept} of {count}: {lost:?}");
-        // The step after a resumption need not be the one that would have been taken: equal to the tolerance, 1e-6 relative.
+        // The first step after resuming may differ from the original one, so results agree to the tolerance, 1e-6
+        // relative.
         let (found, expected) = (special(&out), special("whole"));
         assert_eq!(found.len(), expected.len(), "{found:?} after {kept} of {count}");
         for (a, b) in found.iter().zip(&expected) {
@@ -200,7 +202,7 @@ fn a_run_cut_off_between_transactions_resumes_without_losing_a_point() {
 }
 
 #[test]
-fn a_closed_branch_that_was_killed_between_its_two_ends_is_not_followed_once_more() {
+fn a_closed_branch_killed_between_its_two_ends_is_not_followed_again() {
     let desk = tempfile::tempdir().unwrap();
     // Equilibria on the unit circle.
     let model = "name = \"m\"\n[parameters]\nmu = 0\n[states]\nx = \"1 - mu^2 - x^2\"\n";
@@ -240,7 +242,7 @@ fn a_finished_homotopy_and_curve_resume_without_doing_anything() {
     let table = |what: &str| printed(desk.path(), &["table", "runs/study", what, "--format", "csv"], 0);
     let before = ["--points", "--branches", "--notes"].map(table);
     assert!(before[2].contains("way,reached the goal"), "{}", before[2]);
-    // On the curve and on the branch at the goal, B = 1 + A²; tolerance 1e-6 relative to 1 + B.
+    // B = 1 + A² on the curve and on the branch at the goal; tolerance 1e-6 relative to 1 + B.
     for point in rows(&table("--points")).iter().filter(|row| row("branch") == "onset") {
         let [a, b] = ["A", "B"].map(|name| point(name).parse::<f64>().unwrap());
         assert!((b - 1.0 - a * a).abs() < 1e-6 * (1.0 + b), "{a} {b}");
@@ -259,7 +261,7 @@ fn attractors_are_listed_with_their_hits() {
     let cycle = printed(desk.path(), &["attractors", "brusselator.toml", "--samples", "16", "--set", "B=3"], 0);
     // The period at A = 1, B = 3 is 7.1569199 by the classical Runge–Kutta method with step 5e-4.
     assert!(cycle.lines().any(|line| line.starts_with("cycle") && line.contains(" 7.156919")), "{cycle}");
-    // All of the twelve uniform ones: Wilson's interval begins at 12 / (12 + 1.96²).
+    // All twelve uniform starts: Wilson's interval begins at 12 / (12 + 1.96²).
     assert!(cycle.contains("1.000 [0.758, 1.000]"), "{cycle}");
     assert!(cycle.contains("share: fraction of the 12 samples drawn uniformly"), "{cycle}");
     let again = printed(desk.path(), &["attractors", "brusselator.toml", "--samples", "16", "--set", "B=3"], 0);
@@ -267,7 +269,7 @@ fn attractors_are_listed_with_their_hits() {
 }
 
 #[test]
-fn a_reader_that_leaves_early_is_no_error() {
+fn a_reader_that_closes_early_is_no_error() {
     let desk = desk("README.md");
     printed(desk.path(), &["run", "study.toml"], 0);
     let mut child = Command::new(env!("CARGO_BIN_EXE_foldline"))
@@ -284,7 +286,7 @@ fn a_reader_that_leaves_early_is_no_error() {
 }
 
 #[test]
-fn names_that_a_run_does_not_have() {
+fn unknown_names_in_a_run_are_refused() {
     let desk = desk("README.md");
     printed(desk.path(), &["run", "study.toml"], 0);
     let refused = |arguments: &[&str], pieces: &[&str]| {
@@ -306,7 +308,7 @@ fn names_that_a_run_does_not_have() {
 }
 
 #[test]
-fn tables_are_the_same_bytes_for_any_number_of_threads_and_every_time() {
+fn tables_are_byte_identical_for_any_number_of_threads_and_every_time() {
     let folder = tempfile::tempdir().unwrap();
     let study = root().join("studies/overhung-rotor/bouncing.toml");
     let tables = |name: &str, jobs: &str| {

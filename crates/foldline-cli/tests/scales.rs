@@ -1,4 +1,4 @@
-//! Nothing depends on the units in which a model is written.
+//! Results do not depend on the units in which a model is written.
 
 use foldline::contract::Unobserved;
 use foldline::diagram::{Branch, Diagram, Kind};
@@ -13,7 +13,8 @@ fn run(model: &str, study: &str) -> Diagram {
     explore::run(&system, &study.plan, 1, Diagram::default(), &Unobserved)
 }
 
-/// Two branches have the same points and special points, parameter p of the second being `units[p]` times that of the first.
+/// Asserts that two branches have the same points and special points, where parameter p of the second is `units[p]`
+/// times that of the first.
 #[track_caller]
 fn same(one: &Branch, other: &Branch, units: &[f64]) {
     assert_eq!(one.points.len(), other.points.len(), "{} in units of {units:?}", one.name);
@@ -58,9 +59,9 @@ fn fold(unit: f64) -> Diagram {
     )
 }
 
-/// x' = 1 - mu/u - x² has a fold at mu = u, whatever u is.
+/// x' = 1 - mu/u - x² has a fold at mu = u for every u.
 #[test]
-fn a_fold_is_found_in_any_unit_of_the_parameter_with_the_same_points() {
+fn a_fold_is_found_with_the_same_points_in_any_unit_of_the_parameter() {
     let usual = fold(1.0);
     let kinds: Vec<Kind> = usual.branches[0].special.iter().map(|s| s.kind).collect();
     assert_eq!(kinds.iter().filter(|kind| **kind == Kind::Mark).count(), 2);
@@ -72,9 +73,9 @@ fn a_fold_is_found_in_any_unit_of_the_parameter_with_the_same_points() {
     }
 }
 
-/// A line over a long range takes tens of points.
+/// A long straight branch takes tens of points.
 #[test]
-fn a_line_takes_as_many_points_as_its_range_is_long_and_not_as_many_as_it_has_units() {
+fn a_straight_branch_takes_few_points_in_any_unit() {
     for (unit, value) in [(1.0, 0.0), (1.0, 1.0), (1e9, 1e9), (1e-9, 0.0)] {
         let model = format!("name = \"line\"\n[parameters]\np = {value:e}\n[states]\nx = \"p/{unit:e} - x\"\n");
         let study = format!(
@@ -118,7 +119,7 @@ fn cycles_and_curves_are_the_same_in_any_unit_of_their_parameters() {
                 same(one, other, &[unit, time]);
                 continue;
             }
-            // In an explosion a last bit decides about a step.
+            // In a canard explosion a rounding error decides the steps.
             let places = |branch: &Branch, unit: f64| {
                 let all = branch.special.iter().map(|s| (s.kind, s.point.parameters[0] / unit));
                 all.collect::<Vec<_>>()
@@ -132,7 +133,7 @@ fn cycles_and_curves_are_the_same_in_any_unit_of_their_parameters() {
     }
 }
 
-/// Where the value of a parameter says little about its size, the model says it.
+/// A scale may be declared where the value of a parameter says little about its size.
 #[test]
 fn a_declared_scale_is_used_and_one_that_is_not_positive_refused() {
     let of = |scale: &str| {
@@ -149,10 +150,10 @@ fn a_declared_scale_is_used_and_one_that_is_not_positive_refused() {
 
 const SCALES: [f64; 8] = [0.1, 0.2, 0.3, 0.45, 0.5, 0.55, 0.9, 2.0];
 
-/// z² = mu (1 - mu) beside a rotating wave x + i y = exp(i t): pitchforks at 0 and 1. (The rotation that leaves the equations as they are leads
-/// along the wave, so no multiplier is 1 for it.)
+/// z² = mu (1 - mu) beside a rotating wave x + i y = exp(i t): pitchforks at 0 and 1. (The rotation that leaves the
+/// equations invariant acts along the wave, so it makes no multiplier 1.)
 #[test]
-fn pitchforks_beside_a_rotating_wave_are_where_they_are() {
+fn pitchforks_beside_a_rotating_wave_are_located_exactly() {
     for scale in SCALES {
         let model = format!(
             "name = \"arc\"\n[parameters]\nmu = {{ value = -0.5, scale = {scale} }}\n[states]\nz = \"mu*(1 - mu)*z - z^3\"\n\
@@ -172,9 +173,9 @@ fn pitchforks_beside_a_rotating_wave_are_where_they_are() {
     }
 }
 
-/// AUTO's demo tfc: the third state is zero all along the cycles, which grow from the Hopf point down to the bound.
+/// AUTO's demo tfc: the third state vanishes along the cycles, which grow from the Hopf point down to the bound.
 #[test]
-fn cycles_on_an_invariant_plane_do_not_shrink_where_they_are_born() {
+fn cycles_on_an_invariant_plane_do_not_end_where_they_are_born() {
     for scale in SCALES {
         let model = format!(
             "name = \"tfc\"\n[parameters]\na1 = 5.0\nb1 = 3.0\nd1 = {{ value = 1.1083, scale = {scale} }}\na2 = 0.1\nb2 = 2.0\nd2 = 0.01\n\
@@ -192,9 +193,9 @@ fn cycles_on_an_invariant_plane_do_not_shrink_where_they_are_born() {
     }
 }
 
-/// The branch that crosses at 0.8219 and its cycles, which begin at 0.671594, are no part of the one that they leave.
+/// The branch that crosses at 0.8219, and its cycles from 0.671594 on, are kept apart from the branch that they leave.
 #[test]
-fn a_branch_that_crosses_is_not_taken_for_the_one_that_it_leaves() {
+fn a_crossing_branch_is_not_mistaken_for_the_one_it_leaves() {
     for scale in SCALES {
         let model = format!(
             "name = \"prey\"\n[parameters]\np = {{ value = 0.1, scale = {scale} }}\n[states]\n\
@@ -211,8 +212,8 @@ fn a_branch_that_crosses_is_not_taken_for_the_one_that_it_leaves() {
     }
 }
 
-/// A plate that a voltage draws across a gap (Kolchuzhin, LMGT MEMS component library, set 1), `{x}` and `{v}` being what the model says about
-/// the sizes of its states. Pull-in at V = √(8 k h³ / (27 ε₀ A)), x = h/3.
+/// A plate attracted by a voltage across a gap (Kolchuzhin, LMGT MEMS component library, set 1), with `{x}` and `{v}`
+/// the statements of the model about the sizes of its states. Pull-in at V = √(8 k h³ / (27 ε₀ A)), x = h/3.
 fn plate(x: &str, v: &str) -> Diagram {
     let model = format!(
         "name = \"plate\"\n[parameters]\nm = 4.658e-7\nd = 2.245e-3\nk = 270.4\narea = 1e-6\ngap = 10e-6\neps0 = 8.8541878128e-12\nV = 0\n\
@@ -238,15 +239,15 @@ fn a_displacement_in_metres_needs_no_scale() {
         let value = fold.point.parameters[branch.free];
         assert!(fold.kind == Kind::Fold && (value - voltage).abs() < 1e-8 * voltage, "{value} {voltage}");
         assert!((fold.point.ranges[0][0] - 1e-5 / 3.0).abs() < 1e-12);
-        // As many points within a quarter: none costs more than another.
+        // The numbers of points agree within a quarter, so no variant costs more.
         let counts = [branch.points.len(), stated.branch("b").unwrap().points.len()];
         assert!(4 * counts[0] < 5 * counts[1] && 4 * counts[1] < 5 * counts[0], "{counts:?}");
     }
 }
 
-/// Photons in a laser, n' = (g N - k) n, N' = p - N - 2 g N n, in units of the numbers given: threshold at p = k/g.
+/// Photons in a laser, n' = (g N - k) n, N' = p - N - 2 g N n, in given units of the numbers; threshold at p = k/g.
 #[test]
-fn a_laser_is_the_same_whether_photons_or_their_number_in_a_volume_are_counted() {
+fn a_laser_is_the_same_in_any_unit_of_the_photon_number() {
     let laser = |photons: f64, atoms: f64| {
         let model = format!(
             "name = \"laser\"\n[parameters]\np = {{ value = 0.0 }}\n[definitions]\nm = \"n/{photons:e}\"\nM = \"N/{atoms:e}\"\nq = \"p/{atoms:e}\"\n[states]\n\
@@ -275,9 +276,9 @@ fn a_laser_is_the_same_whether_photons_or_their_number_in_a_volume_are_counted()
     }
 }
 
-/// What a kernel of three dimensions says does not depend on the sizes of the states.
+/// Branches from a three-dimensional kernel do not depend on the sizes of the states.
 #[test]
-fn branches_that_leave_together_are_told_apart_at_any_scale() {
+fn branches_from_one_point_are_distinguished_at_any_scale() {
     for scales in [[1.0, 1.0, 1.0], [3.0, 3.0, 3.0], [0.7, 1.0, 1.5]] {
         let equation =
             |name: &str, scale: f64| format!("{name} = {{ equation = \"p*{name} - {name}^3\", scale = {scale} }}\n");

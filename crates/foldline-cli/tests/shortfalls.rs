@@ -1,4 +1,4 @@
-//! What was asked for and not reached is said, with exit code 3, now and when a finished run is resumed or read.
+//! Unreached parts of a study are reported with exit code 3, both now and when a finished run is resumed or read.
 
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
@@ -14,7 +14,7 @@ fn said(output: &Output) -> String {
     text
 }
 
-/// The lines that say what was not reached, with those that belong to them.
+/// The lines that report what was not reached, with their continuation lines.
 fn short(output: &Output) -> Vec<String> {
     let text = said(output);
     let first = text.lines().skip_while(|line| !line.starts_with("incomplete: "));
@@ -27,17 +27,17 @@ fn with_files(files: &[(&str, &str)]) -> tempfile::TempDir {
     folder
 }
 
-/// A Hopf point at mu = 0, next to which the right-hand side is not finite: no cycle can be found.
+/// A Hopf point at mu = 0, next to which the right-hand side is not finite, so that no cycle can be found.
 const SWALLOWED: &str = "name = \"swallowed\"\n[parameters]\nmu = -1\n[definitions]\n\
     gap = \"if(x^2 + y^2 < 1e-20, 0, log(-x^2 - y^2))\"\n[states]\n\
     x = { equation = \"mu*x - y + gap\", scale = 1 }\ny = { equation = \"x + mu*y\", scale = 1 }\n";
 const SWITCHED: &str = "model = \"m.toml\"\n[[seed]]\nname = \"rest\"\nstate = { x = 0, y = 0 }\n\
     [[branch]]\nname = \"steady\"\nfrom = \"rest\"\nfree = \"mu\"\nrange = [-1, 1]\nswitch = { hopf = 1 }\n";
-/// Chaos at these parameters (Lorenz 1963).
+/// Chaotic at these parameters (Lorenz 1963).
 const LORENZ: &str = include_str!("../../../models/lorenz.toml");
 
 #[test]
-fn a_switch_that_was_asked_for_and_failed_is_said_again_by_resume_and_table() {
+fn a_requested_switch_that_failed_is_reported_again_by_resume_and_table() {
     let folder = with_files(&[("m.toml", SWALLOWED), ("s.toml", SWITCHED)]);
     let first = foldline(folder.path(), &["run", "s.toml", "--jobs", "1", "--out", "run"]);
     let lines = short(&first);
@@ -55,7 +55,7 @@ fn a_switch_that_was_asked_for_and_failed_is_said_again_by_resume_and_table() {
 }
 
 #[test]
-fn an_exploration_whose_samples_do_not_settle_says_so_now_and_when_resumed() {
+fn samples_that_do_not_settle_are_reported_now_and_when_resumed() {
     let folder = with_files(&[("lorenz.toml", LORENZ)]);
     let typed = ["explore", "lorenz.toml", "--free", "rho=27.9:28.1", "--values", "1", "--samples", "4", "--jobs", "1"];
     let first = foldline(folder.path(), &[&typed[..], &["--doublings", "0", "--out", "run"]].concat());
@@ -70,8 +70,8 @@ fn an_exploration_whose_samples_do_not_settle_says_so_now_and_when_resumed() {
 }
 
 #[test]
-fn a_branch_that_is_known_already_is_only_a_remark() {
-    // The pitchfork at mu = 0: both of its branch points lead to branches that are there.
+fn a_switch_to_a_known_branch_is_only_a_remark() {
+    // The pitchfork at mu = 0: both of its branch points lead to known branches.
     let model = "name = \"m\"\n[parameters]\nmu = -1\n[states]\nx = \"mu*x - x^3\"\n";
     let study = "model = \"m.toml\"\n[[seed]]\nname = \"s\"\nstate = { x = 0 }\n\
         [[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"mu\"\nrange = [-1, 1]\nswitch = { branch-point = 2 }\n";
@@ -101,7 +101,7 @@ fn endless(folder: &Path, more: &[&str]) -> Command {
 
 #[cfg(unix)]
 #[test]
-fn an_interrupt_ends_a_run_in_the_middle_of_a_census() {
+fn an_interrupt_ends_a_run_during_sampling() {
     let folder = with_files(&[("lorenz.toml", LORENZ)]);
     let child = endless(folder.path(), &[]).spawn().unwrap();
     let file = folder.path().join("run/run.sqlite");
@@ -117,13 +117,13 @@ fn an_interrupt_ends_a_run_in_the_middle_of_a_census() {
     let text = said(&output);
     assert_eq!(output.status.code(), Some(3), "{text}");
     assert!(text.contains("stopped; continue with --resume"), "{text}");
-    // On a quiet machine some milliseconds; the census itself would last for hours.
+    // A few milliseconds on a quiet machine; the sampling itself would take hours.
     assert!(asked.elapsed() < Duration::from_secs(30), "{:?}", asked.elapsed());
     assert!(!text.contains("outcome of the samples: "), "what was under way is not told: {text}");
 }
 
 #[test]
-fn a_run_whose_time_is_up_says_where_it_is_meanwhile_and_how_to_go_on() {
+fn a_run_at_its_time_limit_reports_its_progress_and_how_to_continue() {
     let folder = with_files(&[("lorenz.toml", LORENZ)]);
     let output = endless(folder.path(), &["--budget", "11s"]).output().unwrap();
     let text = said(&output);
@@ -133,7 +133,7 @@ fn a_run_whose_time_is_up_says_where_it_is_meanwhile_and_how_to_go_on() {
 }
 
 #[test]
-fn times_have_a_unit() {
+fn time_limits_need_a_unit() {
     let folder = with_files(&[("lorenz.toml", LORENZ)]);
     for wrong in ["60", "-1s", "1 day", "0s", "s"] {
         let typed = ["explore", "lorenz.toml", "--free", "rho=1:2", "--print"];

@@ -1,5 +1,5 @@
-//! First solutions of stiff models. Each is compared with the same solution reached by continuation from where the model is not stiff, or
-//! with one known in closed form.
+//! First solutions of stiff models, each compared with the same solution continued from parameters where the model is
+//! not stiff, or with a closed form.
 
 use foldline::contract::Unobserved;
 use foldline::diagram::{Branch, Diagram, Kind, Solution};
@@ -43,7 +43,7 @@ fn a_relaxation_oscillation_is_found_where_it_is_stiff() {
     assert!((there / reached - 1.0).abs() < 1e-6, "{there} and {reached}");
 }
 
-/// Robertson's reaction in a flow of rate k: a stiff node, which samples reach from anywhere.
+/// Robertson's reaction in a flow of rate k: a stiff node that samples reach from anywhere.
 #[test]
 fn a_stiff_node_is_found_from_samples() {
     let found = run(
@@ -55,7 +55,7 @@ fn a_stiff_node_is_found_from_samples() {
     );
     for point in &branch(&found, "b").points {
         let Solution::Equilibrium(x) = &point.solution else { panic!("a cycle") };
-        // The total is kept, and the second and third equation can be solved for a and c.
+        // The total is conserved, and the second and third equations can be solved for a and c.
         assert!((x.iter().sum::<f64>() - 1.0).abs() < 1e-6);
         let (k, b) = (point.parameters[0], x[1]);
         let c = 3e7 * b * b / k;
@@ -64,7 +64,7 @@ fn a_stiff_node_is_found_from_samples() {
     }
 }
 
-/// A forced oscillator beside a fast state that follows it: folds as without that state.
+/// A forced oscillator beside a fast state that follows it: its folds are those without that state.
 #[test]
 fn a_fast_state_beside_a_forced_oscillator_changes_nothing() {
     let [alone, beside] = ["", "z = \"-1e6*(z - x^2)\"\n"].map(|fast| {
@@ -90,8 +90,8 @@ fn a_fast_state_beside_a_forced_oscillator_changes_nothing() {
 
 /// A search that runs into a limit names the setting to raise, and succeeds once it is raised.
 #[test]
-fn limits_are_told_and_can_be_raised() {
-    // A focus that turns a hundred times while it shrinks by e.
+fn a_search_that_hits_a_limit_names_it_and_succeeds_once_it_is_raised() {
+    // A focus that turns a hundred times while it decays by a factor e.
     let model =
         "[parameters]\np = 0\n[states]\nx = \"20*y - 0.2*x*(1 + p)\"\ny = \"-20*x - 0.2*y\"\nz = \"-z + x*y\"\n";
     let study = |limits: &str| {

@@ -1,4 +1,4 @@
-//! What leaves a special point: all branches that do, and what starts at the ends of those.
+//! Switching at special points: all branches that leave them, and computations that start at the ends of those.
 
 use foldline::contract::Unobserved;
 use foldline::diagram::{Diagram, Ending, Family, Kind, Origin};
@@ -10,7 +10,7 @@ const STUDY: &str = "model = \"m\"\n[[seed]]\nname = \"s\"\nstate = { x = 1, y =
     [[branch]]\nname = \"steady\"\nfrom = \"s\"\nfree = \"B\"\nrange = [0.5, 3]\nswitch = { hopf = 1 }\n";
 
 #[test]
-fn the_cycles_born_at_a_hopf_point_go_on_in_another_parameter() {
+fn cycles_born_at_a_hopf_point_are_continued_in_another_parameter() {
     let text =
         format!("{STUDY}[[branch]]\nname = \"in A\"\nfrom = \"steady/hopf-1\"\nfree = \"A\"\nrange = [0.8, 2]\n");
     let study = parse_study(&text, "study", MODEL, "model").unwrap_or_else(|found| panic!("{}", found[0]));
@@ -30,7 +30,7 @@ fn the_cycles_born_at_a_hopf_point_go_on_in_another_parameter() {
 }
 
 #[test]
-fn what_is_not_switched_to_is_no_start() {
+fn branches_not_switched_to_cannot_be_starts() {
     let text =
         |from: &str| format!("{STUDY}[[branch]]\nname = \"b\"\nfrom = \"{from}\"\nfree = \"A\"\nrange = [0.8, 2]\n");
     for (from, message) in [
@@ -52,8 +52,8 @@ fn followed(model: &str, states: &str, kind: &str) -> Diagram {
     run(&System::of_plan(&study.model, &study.plan), &study.plan, 1, Diagram::default(), &Unobserved)
 }
 
-/// Three pitchforks that know nothing of each other: at p = 0 a kernel of dimension 3. With rp = √p the equilibria are (±rp or 0, ±rp or 0, ±rp
-/// or 0), of which seven are no images of each other.
+/// Three uncoupled pitchforks: at p = 0 a three-dimensional kernel. With rp = √p the equilibria are (±rp or 0, ±rp or
+/// 0, ±rp or 0), of which seven are not images of each other.
 #[test]
 fn all_branches_leave_a_kernel_of_three_dimensions() {
     let model =
@@ -73,8 +73,8 @@ fn all_branches_leave_a_kernel_of_three_dimensions() {
     assert_eq!(found.len(), 7, "{found:?}");
 }
 
-/// The symmetry of a triangle: x' = px + 0.3 z̄² - z|z|² has three lines of equilibria with z = r e^{2πik/3}, p + 0.3 r - r² = 0, each with its fold at
-/// p = -0.0225.
+/// The symmetry of a triangle: x' = px + 0.3 z̄² - z|z|² has three lines of equilibria with z = r e^{2πik/3},
+/// p + 0.3 r - r² = 0, each with a fold at p = -0.0225.
 #[test]
 fn three_branches_cross_by_the_symmetry_of_a_triangle() {
     let model = "name = \"triangle\"\n[parameters]\np = -1\n[states]\nx = \"p*x - x*(x^2 + y^2) + 0.3*x^2 - 0.3*y^2\"\n\
@@ -89,14 +89,14 @@ fn three_branches_cross_by_the_symmetry_of_a_triangle() {
         })
         .collect();
     angles.sort_by(f64::total_cmp);
-    // Two of them are mirror images, of which one may be left out as known.
+    // Two of them are mirror images, one of which may be left out as known.
     assert!(angles == [0.0, 120.0] || angles == [0.0, 240.0] || angles == [0.0, 120.0, 240.0], "{angles:?}");
 }
 
-/// Two pairs of eigenvalues pass the imaginary axis at once: cycles of either frequency are born, and their coefficients are those of either
-/// oscillator by itself, -2/ω.
+/// Two pairs of eigenvalues cross the imaginary axis together: cycles of both frequencies are born, and their
+/// coefficients are those of each oscillator by itself, -2/ω.
 #[test]
-fn cycles_of_both_frequencies_leave_two_hopf_points_at_one_place() {
+fn cycles_of_both_frequencies_leave_coinciding_hopf_points() {
     let model = "name = \"pairs\"\n[parameters]\np = -1\n[states]\na = \"p*a - b - a*(a^2 + b^2) - 0.3*a*(c^2 + d^2)\"\n\
         b = \"a + p*b - b*(a^2 + b^2) - 0.3*b*(c^2 + d^2)\"\nc = \"p*c - 1.7*d - c*(c^2 + d^2) - 0.5*c*(a^2 + b^2)\"\n\
         d = \"1.7*c + p*d - d*(c^2 + d^2) - 0.5*d*(a^2 + b^2)\"\n";

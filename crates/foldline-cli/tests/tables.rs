@@ -1,4 +1,4 @@
-//! Tables and pictures of a made-up run with curves in two parameters and a homotopy.
+//! Tables and pictures of a synthetic run with curves in two parameters and a homotopy.
 
 use foldline::contract::{Event, Observer};
 use foldline::diagram::{Branch, Cost, Ending, Family, Kind, Origin, Point, Solution, SpecialPoint, Trust};
@@ -57,7 +57,7 @@ fn branch(name: &str, free: usize, held: Option<(Kind, usize)>, origin: Origin, 
     branch
 }
 
-/// The folder of a run in which the fold of `main` at Omega = 2 is held while kappa goes to 1.
+/// Returns the folder of a run in which the fold of `main` at Omega = 2 is continued while kappa goes to 1.
 fn run() -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let study = parse_study(STUDY, "study.toml", MODEL, "made-up.toml").unwrap();
@@ -79,7 +79,7 @@ fn run() -> tempfile::TempDir {
     folds.insert_special(fold(1, [2.5, 0.5]));
     let first = branch("way/1", 1, None, Origin::Seed("start".into()), &[[1.0, 0.0], [1.0, 0.75], [1.0, 0.25]]);
     let second = branch("way/2", 1, None, Origin::EndOf("way/1".into()), &[[3.0, 0.0], [3.0, 1.0]]);
-    // In an order in which they might have been finished.
+    // In an order in which they may have finished.
     for branch in [&first, &folds, &second, &main] {
         let bare = Branch { points: Vec::new(), special: Vec::new(), ends: [None, None], ..branch.clone() };
         recorder.observe(Event::Begin(&bare));
@@ -119,7 +119,7 @@ fn special_points_of_a_curve_have_both_parameters() {
                     main    fold  2.000000000  0.000000000  3.000000000                0               1  1.0e-9\n\
                     folds   fold  2.500000000  0.500000000  3.000000000                0               1  1.0e-9\n";
     assert_eq!(text, expected);
-    // Also where the curve is the only thing shown, and of a branch in Omega only Omega.
+    // Both also appear if the curve is shown alone, but a branch in Omega shows Omega only.
     let only = |name: &str| printed(folder.path(), &["table", "run", "--branch", name]);
     assert_eq!(
         words(&only("folds"))[..7],
@@ -137,7 +137,7 @@ fn words(text: &str) -> Vec<&str> {
 }
 
 #[test]
-fn branches_are_listed_behind_what_they_come_from_and_curves_with_both_parameters() {
+fn branches_are_listed_after_their_origin_and_curves_with_both_parameters() {
     let folder = run();
     let rows: serde_json::Value =
         serde_json::from_str(&printed(folder.path(), &["table", "run", "--branches", "--format", "json"])).unwrap();
@@ -150,12 +150,12 @@ fn branches_are_listed_behind_what_they_come_from_and_curves_with_both_parameter
     assert_eq!(rows[1]["origin"], "fold of main at 2.000000");
     let legs = printed(folder.path(), &["table", "run", "--branches", "--branch", "way"]);
     assert!(legs.contains("way/1") && legs.contains("way/2") && !legs.contains("main"), "{legs}");
-    // Without a curve there is nothing to say about a second parameter.
+    // Without a curve there is no second parameter to show.
     assert!(!legs.contains("held") && !legs.contains("follows"), "{legs}");
 }
 
 #[test]
-fn the_route_of_a_homotopy_is_told_in_its_order() {
+fn the_path_of_a_homotopy_is_reported_in_order() {
     let folder = run();
     let notes = printed(folder.path(), &["table", "run", "--notes", "--format", "csv"]);
     let expected = "about,note\nstart,1 equilibrium\nway,at Omega = 1 the run in kappa turns back at 0.75\n\
@@ -165,7 +165,7 @@ fn the_route_of_a_homotopy_is_told_in_its_order() {
     assert_eq!(of_way.lines().count(), 3, "{of_way}");
 }
 
-/// The titles of the groups of a picture: the names of what is drawn.
+/// Titles of the groups in a picture: the names of what is drawn.
 fn drawn(folder: &Path, arguments: &[&str]) -> (Vec<String>, String) {
     printed(folder, &[&["plot", "run", "-o", "a.svg"], arguments].concat());
     let svg = std::fs::read_to_string(folder.join("a.svg")).unwrap();
@@ -174,7 +174,7 @@ fn drawn(folder: &Path, arguments: &[&str]) -> (Vec<String>, String) {
 }
 
 #[test]
-fn pictures_show_the_branches_or_the_curves_in_their_plane() {
+fn pictures_show_branches_or_two_parameter_curves() {
     let folder = run();
     let (names, svg) = drawn(folder.path(), &[]);
     assert_eq!(names, ["main", "way/1", "way/2"]);

@@ -1,4 +1,4 @@
-//! Sums of states that keep their values: what is continued at given values of them.
+//! Conserved sums of states: continuation at given values of them.
 
 use foldline::contract::Unobserved;
 use foldline::diagram::{Diagram, Kind};
@@ -16,8 +16,8 @@ fn run(model: &str, text: &str) -> Diagram {
     explore::run(&system, &study.plan, 1, Diagram::default(), &Unobserved)
 }
 
-/// Six species and nine reactions, with rate constants from 1e-10 to 1e9. The right value is the zero of the real part of the eigenvalues of the
-/// Jacobian without two of the states.
+/// Six species and nine reactions, with rate constants from 1e-10 to 1e9. The reference value is the zero of the real
+/// part of the eigenvalues of the Jacobian without two of the states.
 const NETWORK: &str = "
 [parameters]
 k1 = 2.8384448207706775e-9
@@ -50,10 +50,10 @@ range = [4e-4, 6e-4]
 ";
 
 #[test]
-fn totals_are_named_before_anything_is_computed_and_followed_where_they_are_given() {
+fn totals_are_named_before_a_run_and_used_where_they_are_given() {
     let Err(found) = study(NETWORK, STEADY) else { panic!("families") };
     assert!(found.contains("X1 + X2 and X3 + X4 + X5 + X6 are conserved"), "{found}");
-    // The seed says which values the totals have.
+    // The seed gives the values of the totals.
     let totals = "[totals]\nTa = { sum = \"X1 + X2\", value = 1, instead-of = \"X2\" }\n\
                   Tb = { sum = \"X3 + X4 + X5 + X6\", value = 1, instead-of = \"X3\" }\n";
     let diagram = run(&format!("{NETWORK}{totals}"), STEADY);
@@ -66,7 +66,7 @@ fn totals_are_named_before_anything_is_computed_and_followed_where_they_are_give
 const PAIR: &str = "[parameters]\nk = 1\n[states]\nx = \"-k*x^2 + y\"\ny = \"k*x^2 - y\"\n";
 
 #[test]
-fn a_total_is_a_parameter_that_branches_vary() {
+fn a_total_is_a_parameter_that_branches_may_vary() {
     let model = format!("{PAIR}[totals]\nT = {{ sum = \"x + y\", value = 2 }}\n");
     let text = "[[seed]]\nname = \"s\"\nattractor = \"equilibrium\"\n\
                 [[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"T\"\nrange = [0.5, 6]\nmark = { T = 6 }\n";
@@ -75,7 +75,7 @@ fn a_total_is_a_parameter_that_branches_vary() {
         // x² + x = T.
         let (total, x) = (point.parameters[1], point.ranges[0][0]);
         assert!((x * x + x - total).abs() < 1e-6, "{x} {total}");
-        // The state that follows is an output.
+        // The eliminated state is an output.
         assert!((point.ranges[1][0] - (total - x)).abs() < 1e-6);
     }
 }

@@ -1,4 +1,5 @@
-//! Units from outside: what is refused and what passes, values with units, results in other units, limits on trajectories.
+//! Units in files and arguments: which are refused and which pass, values with units, results in other units, limits on
+//! trajectories.
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -13,7 +14,7 @@ fn printed(folder: &Path, arguments: &[&str]) -> String {
     String::from_utf8(run.stdout).unwrap()
 }
 
-/// What `foldline check` says of a model: exit code and both streams.
+/// Returns the exit code of `foldline check` on a model, and both streams.
 fn checked(model: &str) -> (Option<i32>, String) {
     let desk = tempfile::tempdir().unwrap();
     std::fs::write(desk.path().join("m.toml"), model).unwrap();
@@ -24,9 +25,9 @@ fn checked(model: &str) -> (Option<i32>, String) {
 const SPRING: &str =
     "[parameters]\nk = { value = 100.0, unit = \"N/m\" }\nm = { value = 1.0, unit = \"kg\" }\n[states]\n";
 
-/// Each with the place and the two units of the message.
+/// Each is refused with its place and the two units in the message.
 #[test]
-fn models_whose_units_contradict_each_other_are_refused_with_place_and_both_units() {
+fn contradictory_units_are_refused_with_place_and_both_units() {
     let spring = |x: &str, v: &str| format!("{SPRING}x = {x}\nv = {v}\n");
     let plain = r#"{ equation = "v", unit = "m" }"#;
     let right = r#"{ equation = "-k*x/m", unit = "m/s" }"#;
@@ -60,16 +61,16 @@ fn models_whose_units_contradict_each_other_are_refused_with_place_and_both_unit
         assert!(said.contains(place) && said.contains("= help: "), "{model}\n{said}");
         let first = said.lines().next().unwrap();
         assert!(units.iter().all(|unit| first.contains(unit)), "{first}");
-        // The way out leaves everything as it was; what is converted still has to fit.
+        // With units as mere labels nothing is checked, but converted values still have to fit.
         let (code, said) = checked(&format!("units = \"labels\"\n{model}"));
         assert_eq!(code, Some(if model.contains("5 s\"") { 2 } else { 0 }), "{said}");
     }
 }
 
 #[test]
-fn right_models_of_several_fields_pass() {
+fn correct_models_of_several_fields_pass() {
     let cases = [
-        // Mechanics: a cart with a pendulum, masses coupled.
+        // Mechanics: a cart with a pendulum, coupled masses.
         r#"
 [parameters]
 M = { value = 2.0, unit = "kg" }
@@ -85,7 +86,7 @@ c = 1.0
 x = { x = "M + m", phi = "m*l*cos(phi)" }
 phi = { x = "m*l*cos(phi)", phi = "m*l^2" }
 "#,
-        // A chain of springs with a stiffness for each.
+        // A chain of springs, each with its own stiffness.
         r#"
 [constants]
 n = 3
@@ -164,7 +165,7 @@ T = { value = 350, unit = "K" }
 [states]
 c = { equation = "q/V*(cf - c) - k0*exp(-1000*E/(R*T))*c", unit = "mol/l", range = [0, 1] }
 "#,
-        // Biology: names that are not known, and a Hill function with its exponent as a parameter.
+        // Biology: unknown unit names, and a Hill function whose exponent is a parameter.
         r#"
 [functions]
 "hill(x, K, n)" = "x^n/(K^n + x^n)"
@@ -183,7 +184,7 @@ c = { equation = "k*(1 - hill(c, K, n)) - d*c", unit = "cells/ml", range = [0, 1
         assert!(!said.contains("stand for"), "{said}");
         assert_eq!(said.contains("unknown units"), model.contains("cells"), "{said}");
     }
-    // Some units only, and a mass of 1 that is not written: said, not refused.
+    // Units for some quantities only, and an unwritten mass of 1: reported, not refused.
     let (code, said) = checked(&format!("{SPRING}x = \"v\"\nv = \"-k*x/m\"\ny = \"w\"\nw = \"-k*y\"\n"));
     assert!(code == Some(0) && said.contains("note: ") && said.contains("m.toml:8:6"), "{said}");
 }
@@ -225,7 +226,7 @@ fn amplitude(omega: f64) -> f64 {
 }
 
 #[test]
-fn a_run_is_read_in_any_unit() {
+fn a_run_is_shown_in_any_unit() {
     let desk = tempfile::tempdir().unwrap();
     let folder = desk.path();
     std::fs::write(folder.join("mount.toml"), MOUNT).unwrap();
@@ -250,7 +251,7 @@ fn a_run_is_read_in_any_unit() {
     assert!((number(&shown, "X_max") / (1e3 * amplitude(omega)) - 1.0).abs() < 1e-6);
     assert!((number(&shown, "period") - 1e3 / 3.0).abs() < 1e-9);
     assert!((number(&shown, "order_max") / (20.0 / omega) - 1.0).abs() < 1e-9);
-    // Relative, and so the same.
+    // The error is relative and therefore unchanged.
     assert_eq!(number(&own, "error"), number(&shown, "error"));
     let branches = printed(folder, &["table", "run", "--branches", "--format", "csv", "--unit", "Omega=rpm"]);
     assert!(branches.contains("100") && branches.contains("200"), "{branches}");
@@ -276,14 +277,14 @@ fn a_run_is_read_in_any_unit() {
         assert_eq!(run.status.code(), Some(2), "{message}");
         assert!(message.contains(said), "{wish}: {message}");
     }
-    // A wish that cannot be met is refused before anything is computed.
+    // A unit that does not fit is refused before anything is computed.
     let run = foldline(folder, &["run", "speed.toml", "--out", "other", "--unit", "Omega=kg"]);
     assert_eq!(run.status.code(), Some(2));
     assert!(!folder.join("other").exists());
 }
 
 #[test]
-fn values_of_a_study_have_to_fit_the_units_of_the_model() {
+fn values_in_a_study_must_fit_the_units_of_the_model() {
     let desk = tempfile::tempdir().unwrap();
     let folder = desk.path();
     std::fs::write(folder.join("mount.toml"), MOUNT).unwrap();
@@ -334,7 +335,7 @@ fn surveys_and_sweeps_obey_the_limits_on_trajectories() {
         let found = motions(study, out, more);
         assert!(!found.is_empty() && found.iter().any(|motion| motion == "other"), "{out}: {found:?}");
     }
-    // What was typed belongs to the run.
+    // The limits given on the command line belong to the run.
     let run = foldline(folder, &["run", "s.toml", "--out", "time", "--resume"]);
     assert_eq!(run.status.code(), Some(2));
     let run = foldline(folder, &["run", "s.toml", "--out", "time", "--resume", "--max-time", "0.3"]);

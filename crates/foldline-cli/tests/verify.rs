@@ -1,4 +1,4 @@
-//! `foldline verify` on the reference study as it is, and with numbers changed in its file.
+//! `foldline verify` on the reference study, unmodified and with numbers changed in its file.
 
 use std::path::Path;
 use std::process::{Command, Output};
@@ -12,13 +12,13 @@ fn text(bytes: &[u8]) -> String {
 }
 
 #[test]
-fn the_reference_run_is_right_and_what_is_changed_in_it_is_found() {
+fn the_reference_run_is_verified_and_changes_to_it_are_detected() {
     let folder = tempfile::tempdir().unwrap();
     let study = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../studies/overhung-rotor/bouncing.toml");
     let run = folder.path().join("run").to_string_lossy().into_owned();
     assert!(foldline(&["run", &study.to_string_lossy(), "--out", &run]).status.success());
 
-    // Every point: that it is right, and how much was looked at.
+    // Every point: the verdict, and the number of points checked.
     let right = foldline(&["verify", &run]);
     let said = text(&right.stdout);
     assert_eq!(right.status.code(), Some(0), "{said}");
@@ -36,7 +36,7 @@ fn the_reference_run_is_right_and_what_is_changed_in_it_is_found() {
     assert!(ratios.len() == 9 && ratios.is_sorted_by(|a, b| a >= b), "{sample}");
     assert!(sample.lines().skip(1).all(|line| line.starts_with("cubic SL,")), "{sample}");
 
-    // A special point that says to be elsewhere than it is.
+    // A special point moved away from its true position.
     let file = rusqlite::Connection::open(Path::new(&run).join("run.sqlite")).unwrap();
     let sql =
         "SELECT rowid, position, unstable, parameter_bytes, spectrum_bytes, range_bytes, scalar_bytes, average_bytes
@@ -52,11 +52,11 @@ fn the_reference_run_is_right_and_what_is_changed_in_it_is_found() {
     bytes[..8].copy_from_slice(&moved.to_le_bytes());
     let change = "UPDATE special_points SET parameter_bytes = ? WHERE rowid = ?";
     file.execute(change, rusqlite::params![lists[0], row]).unwrap();
-    // The checksum tells that someone has been there …
+    // The checksum detects the change …
     let spoilt = foldline(&["verify", &run, "--sample", "10"]);
     let said = text(&spoilt.stderr);
     assert!(spoilt.status.code() == Some(2) && said.contains("do not have their checksum"), "{said}");
-    // … unless they put it right, as docs/book/run-file.md says.
+    // … unless it is updated too, as docs/book/run-file.md describes.
     let words = lists.concat().chunks_exact(8).map(|w| u64::from_le_bytes(w.try_into().unwrap())).collect::<Vec<u64>>();
     let sum = counts.map(|count| count as u64).iter().chain(&words).fold(0xcbf2_9ce4_8422_2325u64, |h, word| {
         let h = (h ^ word).wrapping_mul(0x0100_0000_01b3);

@@ -1,8 +1,8 @@
-//! Texts that are nearly right.
+//! Random edits of valid texts.
 
 use arbitrary::{Result, Unstructured};
 
-/// Pieces that have a meaning somewhere, or had better have none.
+/// Pieces of text that have a meaning in some format, or must be rejected.
 const PIECES: [&str; 74] = [
     "nan",
     "inf",
@@ -80,7 +80,7 @@ const PIECES: [&str; 74] = [
     "[tables.k]\nx = [0, 1]\ny = [1, 2]\n",
 ];
 
-/// The text with a few edits: pieces put in, cut out, doubled, moved.
+/// Applies a few edits to a text: insertion, deletion, duplication and replacement of pieces.
 pub fn edited(u: &mut Unstructured, text: &str) -> Result<String> {
     let mut text = text.to_string();
     for _ in 0..u.int_in_range(1..=6u8)? {
@@ -109,7 +109,7 @@ pub fn edited(u: &mut Unstructured, text: &str) -> Result<String> {
     Ok(text)
 }
 
-/// A short range on the boundaries of characters.
+/// Returns a short random range that begins and ends at character boundaries.
 fn range(u: &mut Unstructured, text: &str) -> Result<(usize, usize)> {
     let boundary = |at: usize| (0..=at.min(text.len())).rev().find(|&at| text.is_char_boundary(at)).unwrap_or(0);
     let from = boundary(u.int_in_range(0..=text.len())?);
@@ -117,7 +117,7 @@ fn range(u: &mut Unstructured, text: &str) -> Result<(usize, usize)> {
     Ok((from, to))
 }
 
-/// The line around `at`, its end included.
+/// Returns the range of the line around `at`, including its line end.
 fn line(text: &str, at: usize) -> (usize, usize) {
     let first = text[..at].rfind('\n').map_or(0, |end| end + 1);
     (first, text[at..].find('\n').map_or(text.len(), |end| at + end + 1))

@@ -1,13 +1,13 @@
-//! Formulas of the model language as trees, and how they are written.
+//! Random formulas of the model language as trees, and their text.
 
 use arbitrary::{Result, Unstructured};
 
-/// Operators in infix form, with how tightly they bind.
+/// Infix operators with their precedence.
 pub const OPERATORS: [(&str, u8); 11] =
     [("<", 1), ("<=", 1), (">", 1), (">=", 1), ("==", 1), ("!=", 1), ("+", 2), ("-", 2), ("*", 3), ("/", 3), ("^", 5)];
-/// How tightly a sign binds.
+/// Precedence of a sign.
 const SIGN: u8 = 4;
-/// Nothing binds tighter.
+/// Highest precedence: numbers, names and function calls.
 const ATOM: u8 = 6;
 /// Functions of one argument.
 pub const ONE: [&str; 19] = [
@@ -33,30 +33,30 @@ pub const ONE: [&str; 19] = [
 ];
 /// Functions of two arguments.
 pub const TWO: [&str; 4] = ["atan2", "min", "max", "hypot"];
-/// Constants that are worth trying beside random ones.
+/// Constants that are tried in addition to random ones.
 const NUMBERS: [f64; 14] = [0.0, 1.0, 2.0, 3.0, 0.5, 1.5, 7.0, 0.25, 10.0, 1e-8, 1e8, 0.1, 1e300, 1e-300];
 
-/// A formula.
+/// Formula.
 #[derive(Clone, Debug)]
 pub enum Formula {
-    /// A number that is not negative.
+    /// Non-negative number.
     Number(f64),
-    /// Something that has a name; which, counted over states, parameters and definitions.
+    /// Name, by its index in the list of states, parameters and definitions.
     Name(usize),
     /// -a.
     Negative(Box<Formula>),
-    /// a operator b; the operator by its place in [`OPERATORS`].
+    /// a operator b, with the index of the operator in [`OPERATORS`].
     Infix(usize, Box<[Formula; 2]>),
-    /// A function of one argument by its place in [`ONE`]; the last is the sign +.
+    /// Function of one argument, by its index in [`ONE`]; the last is the sign +.
     One(usize, Box<Formula>),
-    /// A function of two arguments by its place in [`TWO`].
+    /// Function of two arguments, by its index in [`TWO`].
     Two(usize, Box<[Formula; 2]>),
     /// `if(condition, a, b)`.
     If(Box<[Formula; 3]>),
 }
 
 impl Formula {
-    /// A formula over `names` names, at most `depth` deep.
+    /// Returns a random formula in `names` names, of depth at most `depth`.
     pub fn random(u: &mut Unstructured, names: usize, depth: usize) -> Result<Formula> {
         if depth == 0 || u.is_empty() {
             return Ok(match u.ratio(1u8, 3u8)? {
@@ -67,7 +67,7 @@ impl Formula {
         let inner = |u: &mut Unstructured| Formula::random(u, names, depth - 1);
         Ok(match u.int_in_range(0..=9u8)? {
             0 => Formula::Negative(Box::new(inner(u)?)),
-            // Comparisons less often than arithmetic.
+            // Comparisons are rarer than arithmetic.
             n @ 1..=5 => {
                 let operators = if n == 1 { 0..OPERATORS.len() } else { 6..OPERATORS.len() };
                 Formula::Infix(u.int_in_range(operators.start..=operators.end - 1)?, Box::new([inner(u)?, inner(u)?]))
@@ -78,12 +78,12 @@ impl Formula {
         })
     }
 
-    /// The formula as text, with no more brackets than needed or a few more; `name` writes a name.
+    /// Appends the formula as text to `out`, with the necessary parentheses and a few more; `name` formats a name.
     pub fn write(&self, u: &mut Unstructured, name: &dyn Fn(usize) -> String, out: &mut String) -> Result<()> {
         self.write_within(u, name, 0, out)
     }
 
-    /// In brackets where it binds less tightly than `least`.
+    /// Appends the formula in parentheses if its precedence is lower than `least`.
     fn write_within(
         &self,
         u: &mut Unstructured,
@@ -121,7 +121,7 @@ impl Formula {
             }
             Formula::Infix(operator, operands) => {
                 let (symbol, strength) = OPERATORS[*operator];
-                // Sums and products of the same strength lean to the left, powers to the right, comparisons to neither.
+                // Sums and products are left-associative, powers right-associative, comparisons neither.
                 let (left, right) = match strength {
                     1 => (2, 2),
                     5 => (ATOM, SIGN),
@@ -153,7 +153,7 @@ impl Formula {
     }
 }
 
-/// A number that is finite and not negative.
+/// Returns a finite, non-negative number.
 fn number(u: &mut Unstructured) -> Result<f64> {
     Ok(match u.ratio(7u8, 8u8)? {
         true => *u.choose(&NUMBERS)?,

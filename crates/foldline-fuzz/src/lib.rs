@@ -1,8 +1,8 @@
-//! What must hold for any input.
+//! Properties that must hold for any input.
 //!
-//! **Idea.** Each property takes bytes and makes of them an input that is nearly right: a formula, a model file, a study
-//! file or a file of AUTO-07p of this repository in which a few things were changed. It panics where something does not hold. The tests call it
-//! with the same random bytes every time; the fuzzer, in the folder `fuzz`, searches for bytes that reach new code.
+//! **Idea.** Each property turns bytes into a nearly valid input: a random formula, or a model, study or AUTO-07p file
+//! of this repository with a few changes. It panics if a property is violated. The tests use reproducible random bytes;
+//! the fuzzer in the folder `fuzz` searches for bytes that reach new code.
 
 pub mod edits;
 pub mod formula;
@@ -11,7 +11,7 @@ pub mod simulations;
 pub mod tapes;
 pub mod texts;
 
-/// Bytes that are the same every time; `stream` says which.
+/// Returns reproducible random bytes of the given stream.
 ///
 /// **Source.** steele2014 (splitmix).
 pub fn bytes(stream: u64, length: usize) -> Vec<u8> {

@@ -1,42 +1,44 @@
-//! The value and the derivative of a formula, the slow and plain way.
+//! Reference evaluation of a formula and its derivative, slow and simple.
 //!
-//! **Idea.** Recursion over the tree, value and derivative together. How far roundings reach is found by experiment: every
-//! operation may change its result in the thirteenth digit, and the spread of several such runs is what rounding could do.
+//! **Idea.** Recursion over the tree, with value and derivative together. The effect of rounding is measured: every
+//! operation perturbs its result in the thirteenth digit, and the spread of several such runs estimates the rounding
+//! error.
 
 use crate::formula::{Formula, ONE, OPERATORS, TWO};
 
-/// A value and its derivative; `None` where it does not depend on anything that moves.
+/// Value and derivative of a formula.
 #[derive(Clone, Copy, Debug)]
 pub struct Dual {
-    /// The value.
+    /// Value.
     pub value: f64,
-    /// The derivative.
+    /// Derivative; `None` if the value does not depend on the variable of differentiation.
     pub slope: Option<f64>,
 }
 
-/// Whether a number is in the range in which roundings are relative.
+/// True if a number is zero or in the range in which rounding errors are relative.
 fn sound(x: f64) -> bool {
     x == 0.0 || (1e-280..1e280).contains(&x.abs())
 }
 
-/// A product of which nothing is left though its factors are not zero is not sound.
+/// Returns the product, or NaN if it underflows to zero.
 fn product(a: f64, b: f64) -> f64 {
     if a * b == 0.0 && a != 0.0 && b != 0.0 { f64::NAN } else { a * b }
 }
 
-/// How much an operation may change its result.
+/// Relative perturbation of the result of an operation.
 const WOBBLE: f64 = 1e-13;
 
-/// An evaluation.
+/// Evaluation of formulas.
 pub struct Reference<'a> {
-    /// What the names stand for, in the order of their numbers.
+    /// Values of the names, in the order of their indices.
     pub names: &'a [Dual],
-    /// State of the random numbers that disturb the operations; 0: they are not disturbed.
+    /// State of the random numbers that perturb the operations; 0 for no perturbation.
     pub disturbed: u64,
 }
 
 impl Reference<'_> {
-    /// The formula; `None` where something on the way is not finite or too small for a rounding to be a rounding.
+    /// Evaluates a formula; `None` if an intermediate result is not finite or so small that rounding errors are not
+    /// relative.
     pub fn of(&mut self, formula: &Formula) -> Option<Dual> {
         let dual = self.plain(formula)?;
         let sound = sound(dual.value) && dual.slope.is_none_or(sound);
@@ -46,7 +48,7 @@ impl Reference<'_> {
         })
     }
 
-    /// Whether the formula depends on something that moves.
+    /// True if the formula depends on the variable of differentiation.
     fn moves(&self, formula: &Formula) -> bool {
         match formula {
             Formula::Number(_) => false,
@@ -86,7 +88,7 @@ impl Reference<'_> {
             }
             Formula::Two(i, list) => {
                 let (a, b) = (self.of(&list[0])?, self.of(&list[1])?);
-                // On its cut atan2 goes by the sign of a zero, which formulas do not keep.
+                // On its branch cut, atan2 depends on the sign of zero, which formulas do not preserve.
                 if TWO[*i] == "atan2" && a.value == 0.0 && b.value <= 0.0 {
                     return None;
                 }
@@ -101,7 +103,7 @@ impl Reference<'_> {
     }
 }
 
-/// The value of a formula in which no name occurs.
+/// Returns the value of a formula without names.
 fn constant(formula: &Formula) -> Option<f64> {
     fn named(formula: &Formula) -> bool {
         match formula {
@@ -116,7 +118,7 @@ fn constant(formula: &Formula) -> Option<f64> {
     if named(formula) { None } else { value(formula) }
 }
 
-/// A choice at rest, between things of which one moves, has the derivative 0.
+/// Result of a choice. A constant chosen among values of which one is variable has the derivative 0.
 fn chosen(taken: Dual, moves: bool) -> Dual {
     Dual { slope: taken.slope.or(moves.then_some(0.0)), ..taken }
 }
@@ -155,7 +157,7 @@ fn sign(x: f64) -> f64 {
     if x == 0.0 { 0.0 } else { x.signum() }
 }
 
-/// p da + q db; a part without slope is left out.
+/// Returns the derivative p da + q db with its value; terms without derivative are left out.
 fn combined(value: f64, (p, a): (f64, Dual), (q, b): (f64, Dual)) -> Dual {
     let parts = [a.slope.map(|s| product(p, s)), b.slope.map(|s| product(q, s))];
     let slope = parts.into_iter().flatten().reduce(|x, y| x + y);
@@ -180,7 +182,7 @@ fn two(function: &str, a: Dual, b: Dual) -> Dual {
     }
 }
 
-/// `whole` is the exponent where it is a constant.
+/// Applies an infix operator; `whole` is the exponent if it is constant.
 fn infix(symbol: &str, a: Dual, b: Dual, whole: Option<f64>) -> Dual {
     let (x, y) = (a.value, b.value);
     let truth = |holds: bool| Dual { value: f64::from(u8::from(holds)), slope: None };

@@ -1,4 +1,4 @@
-//! Surveys, sweeps and censuses of random models: no behaviour of a trajectory is an error.
+//! Simulations of random models: no behaviour of a trajectory is an error.
 
 use crate::formula::Formula;
 use arbitrary::{Result, Unstructured};
@@ -7,28 +7,29 @@ use foldline::diagram::{Diagram, Motion};
 use foldline::explore::{self, System};
 use foldline_store::study_file::parse_study;
 
-/// States of a model: the fewest for which oscillations are possible.
+/// Number of states of a model: the smallest for which oscillations are possible.
 const STATES: usize = 2;
-/// Starts of a survey. Small, for many models in little time.
+/// Number of starts of a survey. Small, so that many models run in little time.
 const STARTS: usize = 3;
-/// Parameter values of surveys and sweeps: the fewest that make a sweep.
+/// Number of parameter values of surveys and sweeps: the smallest for a sweep.
 const VALUES: usize = 2;
 
-/// Counts of what occurred, so that a test can require some of each.
+/// Counts of the outcomes, so that a test can require some of each.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Seen {
-    /// Models that were run, of each kind: free, forced.
+    /// Number of models run: autonomous, forced.
     pub run: [usize; 2],
-    /// Starts of surveys that settled to an equilibrium or a cycle.
+    /// Number of starts of surveys that settled to an equilibrium or a cycle.
     pub settled: usize,
-    /// Starts of surveys that escaped.
+    /// Number of starts of surveys that escaped.
     pub escaped: usize,
-    /// Sweeps that had a start.
+    /// Number of sweeps that were started.
     pub swept: usize,
 }
 
-/// Simulates a random model by survey, sweep and census. Every start of a survey must be accounted for at every value, and a sweep whose seed was
-/// found must extend as far as its motion could be followed.
+/// Simulates a random model by survey, sweep and sampling of initial conditions. Every start of a survey must be
+/// accounted for at every value, and a sweep whose seed was found must extend to its last value unless the motion
+/// escapes.
 pub fn simulation(u: &mut Unstructured, seen: &mut Seen) -> Result<()> {
     let forced: bool = u.arbitrary()?;
     let model = model(u, forced)?;
@@ -39,7 +40,7 @@ pub fn simulation(u: &mut Unstructured, seen: &mut Seen) -> Result<()> {
          [[sweep]]\nname = \"from given\"\nfrom = \"given\"\nfree = \"p\"\nrange = [0.1, 0.6]\ncount = {VALUES}\n\
          [[sweep]]\nname = \"from sampled\"\nfrom = \"sampled\"\nfree = \"p\"\nrange = [0.1, 0.6]\ncount = {VALUES}\n"
     );
-    // A model without any finite value is refused.
+    // A model that is finite nowhere is rejected.
     let Ok(study) = parse_study(&study, "s.toml", &model, "m.toml") else { return Ok(()) };
     seen.run[usize::from(forced)] += 1;
     let system = System::of_plan(&study.model, &study.plan);
@@ -68,7 +69,7 @@ pub fn simulation(u: &mut Unstructured, seen: &mut Seen) -> Result<()> {
     Ok(())
 }
 
-/// The text of a model, half of them damped oscillators with a random force.
+/// Returns the text of a random model; half of the models are damped oscillators with a random force.
 fn model(u: &mut Unstructured, forced: bool) -> Result<String> {
     let oscillator = u.arbitrary()?;
     let name = |i: usize| ["x0", "x1", "p", "cos(w*t)"][i].to_string();

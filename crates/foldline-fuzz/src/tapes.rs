@@ -1,4 +1,4 @@
-//! Tapes compute what the formulas say, in every form of a batch, and so do their derivatives.
+//! Comparison of tapes and their derivatives with the reference evaluation, in every form of a batch.
 
 use crate::formula::Formula;
 use crate::reference::{Dual, Reference};
@@ -10,19 +10,19 @@ const STATES: usize = 2;
 const PARAMETERS: usize = 2;
 const DEFINITIONS: usize = 3;
 const LANES: usize = 5;
-/// A difference of that many spreads is more than rounding.
+/// Multiple of the spread above which a difference is more than rounding.
 const SPREADS: f64 = 30.0;
 
-/// What was seen, so that a test can tell that something was.
+/// Counts of comparisons, so that a test can require a minimum.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Seen {
-    /// Values compared with the reference.
+    /// Number of values compared with the reference.
     pub values: usize,
-    /// Derivatives compared with the reference.
+    /// Number of derivatives compared with the reference.
     pub slopes: usize,
 }
 
-/// Writes a random model, compiles it, and compares value and derivatives with the reference at random places.
+/// Writes a random model, compiles it, and compares value and derivatives with the reference at random points.
 pub fn tape(u: &mut Unstructured) -> Result<Seen> {
     let leaves = STATES + PARAMETERS;
     let mut formulas: Vec<Formula> = Vec::new();
@@ -40,7 +40,7 @@ pub fn tape(u: &mut Unstructured) -> Result<Seen> {
         formula.write(u, &name, &mut text)?;
         texts.push(text);
     }
-    // Definitions may stand in any order.
+    // Definitions may be given in any order.
     let definitions: Vec<Definition> =
         (0..DEFINITIONS).rev().map(|i| Definition::new(&name(leaves + i), &texts[i])).collect();
     let source = ModelSource {
@@ -109,7 +109,7 @@ pub fn tape(u: &mut Unstructured) -> Result<Seen> {
     Ok(seen)
 }
 
-/// Equal, or both not a number.
+/// True if the numbers are equal or both NaN.
 fn same(a: f64, b: f64) -> bool {
     a == b || (a.is_nan() && b.is_nan())
 }
@@ -122,7 +122,8 @@ fn coordinate(u: &mut Unstructured) -> Result<f64> {
     })
 }
 
-/// A component of f and its derivative by a leaf, and how far rounding may take both; `None` where it is not finite.
+/// Returns a component of f with its derivative with respect to a leaf, and the spread of both due to rounding. `None`
+/// if it is not finite or if rounding dominates.
 fn expected(formulas: &[Formula], component: usize, place: &[f64], leaf: usize) -> Option<(Dual, Dual)> {
     let run = |disturbed: u64| -> Option<Dual> {
         let mut names: Vec<Dual> = Vec::new();
@@ -137,7 +138,7 @@ fn expected(formulas: &[Formula], component: usize, place: &[f64], leaf: usize) 
             dual
         };
         for definition in &formulas[..DEFINITIONS] {
-            // One that is not finite may not be needed.
+            // A definition that is not finite may be unused.
             let dual = of(definition, &names).unwrap_or(Dual { value: f64::NAN, slope: Some(f64::NAN) });
             names.push(dual);
         }
@@ -151,7 +152,7 @@ fn expected(formulas: &[Formula], component: usize, place: &[f64], leaf: usize) 
         spread.value = spread.value.max((other.value - exact.value).abs());
         spread.slope = spread.slope.map(|s| s.max(apart));
     }
-    // Where rounding decides, the spread of a few runs says little.
+    // If rounding dominates, the spread of a few runs is not reliable.
     let decided = |x: f64, spread: f64| spread <= 1e-6 * x.abs();
     let clear = decided(exact.value, spread.value) && decided(exact.slope.unwrap_or(0.0), spread.slope.unwrap_or(0.0));
     clear.then_some((exact, spread))

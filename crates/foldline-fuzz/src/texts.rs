@@ -1,4 +1,5 @@
-//! Whatever a file holds: a model, a study, solutions of AUTO, or mistakes with their places.
+//! Arbitrary texts as files: each is read as a model, a study or AUTO-07p solutions, or rejected with the positions of
+//! its mistakes.
 
 use foldline::contract::{Batch, Parameters, VectorField};
 use foldline::model::Model;
@@ -8,7 +9,7 @@ use foldline_store::model_file::parse_model;
 use foldline_store::study_file::{Study, parse_study};
 use std::path::{Path, PathBuf};
 
-/// Every message is short enough to be read, and stands at a place of its file.
+/// Asserts that every message is short and refers to a position in its file.
 fn sound(found: &[Diagnostic], texts: &[(&str, &str)]) {
     assert!(!found.is_empty() && found.len() <= 101, "{} mistakes", found.len());
     for diagnostic in found {
@@ -24,7 +25,7 @@ fn sound(found: &[Diagnostic], texts: &[(&str, &str)]) {
     }
 }
 
-/// A model text is read or refused; one that is read can be evaluated and differentiated. Whether it was read.
+/// Reads a model text, and evaluates and differentiates the model. Returns false if the text is rejected.
 pub fn model(text: &str) -> bool {
     let model = match parse_model(text, "m.toml") {
         Ok(model) => model,
@@ -51,7 +52,7 @@ pub fn model(text: &str) -> bool {
     true
 }
 
-/// A study text with a model that is right is read or refused.
+/// Reads a study text with a valid model; `None` if it is rejected.
 pub fn study(text: &str, model_text: &str) -> Option<Study> {
     match parse_study(text, "s.toml", model_text, "m.toml") {
         Ok(study) => Some(study),
@@ -62,8 +63,9 @@ pub fn study(text: &str, model_text: &str) -> Option<Study> {
     }
 }
 
-/// A text as a file of solutions of AUTO-07p is read or refused, at a place within it; what is read has as many states as it says. A
-/// solution that is read with a model makes a study that is right, or is refused with a reason. What was read, if it was.
+/// Reads a text as a solution file of AUTO-07p and checks the number of states. Each solution must give a valid study
+/// or be rejected with a reason. Returns the number of solutions; `None` if the text is rejected, at a position within
+/// it.
 pub fn solution_file(text: &str, model: &Model) -> Option<usize> {
     let found = match solutions(text, "s.auto") {
         Ok(found) => found,
@@ -86,10 +88,10 @@ pub fn solution_file(text: &str, model: &Model) -> Option<usize> {
     Some(found.len())
 }
 
-/// The model of the files of AUTO-07p among the tests.
+/// Model of the AUTO-07p files among the tests.
 pub const AUTO_MODEL: &str = include_str!("../../../models/ab-reaction.toml");
 
-/// The texts of the files in a folder of this repository and the folders in it.
+/// Returns the texts of the files in a folder of this repository and its subfolders.
 pub fn corpus(folder: &str) -> Vec<(PathBuf, String)> {
     let mut found = Vec::new();
     collect(&Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(folder), &mut found);
@@ -108,7 +110,7 @@ fn collect(folder: &Path, found: &mut Vec<(PathBuf, String)>) {
     }
 }
 
-/// A text as the right-hand side of an equation is read or refused, at a place within it.
+/// Compiles a text as the right-hand side of an equation. It must be accepted or rejected at a position within it.
 pub fn expression(text: &str) {
     use foldline::model::{Definition, Model, ModelSource, Parameter, State};
     let source = ModelSource {

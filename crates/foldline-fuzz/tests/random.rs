@@ -1,4 +1,4 @@
-//! The properties, for the same random inputs every time.
+//! Properties checked on reproducible random inputs.
 
 use arbitrary::Unstructured;
 use foldline_fuzz::edits::edited;
@@ -6,7 +6,7 @@ use foldline_fuzz::tapes::{Seen, tape};
 use foldline_fuzz::{bytes, simulations, texts};
 
 #[test]
-fn tapes_compute_what_the_formulas_say() {
+fn tapes_agree_with_the_reference_evaluation() {
     let mut seen = Seen::default();
     for stream in 0..3000 {
         let data = bytes(stream, 2000);
@@ -19,7 +19,7 @@ fn tapes_compute_what_the_formulas_say() {
 }
 
 #[test]
-fn whatever_trajectories_do_is_counted() {
+fn every_trajectory_is_accounted_for() {
     let some = |streams: std::ops::Range<u64>| {
         let mut seen = simulations::Seen::default();
         for stream in streams {
@@ -44,7 +44,7 @@ fn whatever_trajectories_do_is_counted() {
 }
 
 #[test]
-fn model_files_are_read_or_refused_with_a_place() {
+fn model_files_are_read_or_rejected_with_a_position() {
     let corpus = texts::corpus("models");
     let (mut read, mut refused) = (0, 0);
     for (stream, (_, text)) in (0..6000).zip(corpus.iter().cycle()) {
@@ -56,11 +56,11 @@ fn model_files_are_read_or_refused_with_a_place() {
 }
 
 #[test]
-fn study_files_are_read_or_refused_with_a_place() {
+fn study_files_are_read_or_rejected_with_a_position() {
     let all = texts::corpus("studies");
     let models = texts::corpus("models");
     let (_, rotor) = models.iter().find(|(path, _)| path.ends_with("overhung-rotor.toml")).expect("the rotor");
-    // Those of this model: others are refused as they are.
+    // Only studies of this model; others would be rejected even without edits.
     let corpus: Vec<_> = all.into_iter().filter(|(_, text)| texts::study(text, rotor).is_some()).collect();
     let (mut read, mut refused) = (0, 0);
     for (stream, (_, text)) in (0..3000).zip(corpus.iter().cycle()) {
@@ -72,7 +72,7 @@ fn study_files_are_read_or_refused_with_a_place() {
 }
 
 #[test]
-fn files_of_auto_are_read_or_refused_with_a_place() {
+fn auto_files_are_read_or_rejected_with_a_position() {
     let mut corpus = texts::corpus("crates/foldline-store/tests/auto");
     corpus.retain(|(path, _)| path.file_name().is_some_and(|name| name.to_string_lossy().starts_with("s.")));
     let model = foldline_store::model_file::parse_model(texts::AUTO_MODEL, "m.toml").expect("the model is right");

@@ -1,7 +1,7 @@
-//! General numerics: what `foldline` takes of libraries.
+//! Dense matrices and Fourier transforms that `foldline` takes from libraries.
 //!
-//! **Idea.** The libraries are generic in everything. Used here at one type only, their kernels are compiled once: not with every change of
-//! `foldline`, and not once more for its tests.
+//! **Idea.** These libraries are generic. This crate instantiates them for the one type used, so that their kernels are
+//! compiled once, and not again with every change of `foldline` or for its tests.
 
 use faer::linalg::matmul::matmul;
 use faer::linalg::solvers::PartialPivLu;
@@ -12,29 +12,29 @@ use rustfft::FftPlanner;
 
 pub use faer::{Mat, MatMut, MatRef};
 
-/// `to` = `a` `b`.
+/// Writes the product `a b` to `to`.
 pub fn multiply(to: MatMut<f64>, a: MatRef<f64>, b: MatRef<f64>) {
     matmul(to, Accum::Replace, a, b, 1.0, Par::Seq);
 }
 
-/// `a` `b`.
+/// The product `a b`.
 pub fn product(a: &Mat<f64>, b: &Mat<f64>) -> Mat<f64> {
     let mut to = Mat::zeros(a.nrows(), b.ncols());
     multiply(to.as_mut(), a.as_ref(), b.as_ref());
     to
 }
 
-/// Eigenvalues of a square matrix in no order; `None` if they could not be computed.
+/// Eigenvalues of a square matrix, unordered; `None` if they could not be computed.
 pub fn eigenvalues(a: MatRef<f64>) -> Option<Vec<Complex64>> {
     a.eigenvalues().ok().filter(|found| found.iter().all(|z| z.is_finite()))
 }
 
-/// A factorised square matrix.
+/// LU factors of a square matrix.
 #[derive(Debug)]
 pub struct Factored(PartialPivLu<f64>);
 
 impl Factored {
-    /// Factorises with row exchanges.
+    /// Factorises with partial pivoting.
     pub fn new(a: MatRef<f64>) -> Factored {
         Factored(a.partial_piv_lu())
     }
@@ -56,12 +56,12 @@ impl Factored {
     }
 }
 
-/// The root of the sum of the squares of all entries.
+/// Frobenius norm.
 pub fn norm(a: &Mat<f64>) -> f64 {
     a.norm_l2()
 }
 
-/// Replaces samples by their discrete Fourier transform, X_k = Σ_j x_j exp(-2πi jk/N), without a factor.
+/// Replaces samples by their unnormalised discrete Fourier transform, X_k = Σ_j x_j exp(-2πi jk/N).
 pub fn fourier(samples: &mut [Complex64]) {
     FftPlanner::new().plan_fft_forward(samples.len()).process(samples);
 }

@@ -6,22 +6,22 @@ use crate::palette::nth;
 use foldline::diagram::{Branch, Diagram, Kind, Origin};
 use foldline::special::quantity::Quantity;
 
-/// A branch in one colour: solid where it is stable, dashed where not, and its special points, hollow and named by their
-/// kind. The curve comes first.
+/// Layers of a branch in one colour, the curve first: solid where stable, dashed where unstable, with its special
+/// points hollow and named by their kind.
 pub fn branch_layers(branch: &Branch, x: Quantity, y: Quantity, colour: &'static str) -> Vec<Layer> {
     let mut layers = vec![branch_curve(branch, x, y, colour)];
     layers.extend(special_layers(branch, x, y, colour));
     layers
 }
 
-/// A branch without its special points.
+/// Layer of a branch without its special points.
 pub fn branch_curve(branch: &Branch, x: Quantity, y: Quantity, colour: &'static str) -> Layer {
     let shape = Shape::Curve { stretches: stretches(branch, x, y), rounded: true, stability: true };
     Layer { shape, ..Layer::curve(&[], colour) }
 }
 
-/// The special points of a branch, a layer for each kind, and where that is known one each for those at which stable solutions are born
-/// (supercritical, hollow) and for the others (subcritical, filled).
+/// Layers of the special points of a branch, one for each kind. Where the criticality is known, supercritical points
+/// (stable solutions are born) are hollow and subcritical ones filled, each in a layer of their own.
 pub fn special_layers(branch: &Branch, x: Quantity, y: Quantity, colour: &'static str) -> Vec<Layer> {
     let all = marks(branch, x, y);
     let of = |kind: Kind, own: Option<&str>| -> Vec<[f64; 2]> {
@@ -45,8 +45,8 @@ pub fn special_layers(branch: &Branch, x: Quantity, y: Quantity, colour: &'stati
         .collect()
 }
 
-/// All branches: a colour for each that was not switched to, the others in the colour of the one they come from, thinner
-/// and lighter. Curves first, marks on top of them.
+/// Layers of all branches, marks above curves. Each branch that was not switched to has a colour; the others have the
+/// colour of the branch they come from, thinner and lighter.
 pub fn diagram_layers(diagram: &Diagram, x: Quantity, y: Quantity) -> Vec<Layer> {
     let roots: Vec<&Branch> = diagram.branches.iter().filter(|branch| root(diagram, branch).1 == 0).collect();
     let (mut curves, mut specials) = (Vec::new(), Vec::new());
@@ -62,13 +62,13 @@ pub fn diagram_layers(diagram: &Diagram, x: Quantity, y: Quantity) -> Vec<Layer>
         curves.push(curve);
         specials.extend(special_layers(branch, x, y, nth(index)));
     }
-    // What branches off is named last.
+    // The entry for branches that branch off goes last.
     curves.sort_by_key(|layer| layer.name.as_deref() == Some(LIGHTER));
     curves.into_iter().chain(specials).collect()
 }
 
-/// A label for each branch that was not switched to, beside the curve where there is room: curves are told apart without their colours
-/// then. Nothing for a single one, or for more than the legend names.
+/// Labels beside the curves where there is room, one for each branch that was not switched to, so that curves can be
+/// told apart without their colours. None for a single branch, or for more than the legend names.
 pub fn label_layers(diagram: &Diagram, x: Quantity, y: Quantity) -> Vec<Layer> {
     let roots: Vec<&Branch> = diagram.branches.iter().filter(|branch| root(diagram, branch).1 == 0).collect();
     if !(2..=MOST).contains(&roots.len()) {
@@ -81,14 +81,14 @@ pub fn label_layers(diagram: &Diagram, x: Quantity, y: Quantity) -> Vec<Layer> {
     roots.iter().enumerate().map(label).collect()
 }
 
-/// The places, those in the middle of the list first.
+/// The positions, starting from the middle of the list.
 fn from_the_middle(places: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let mut order: Vec<usize> = (0..places.len()).collect();
     order.sort_by_key(|k| k.abs_diff(places.len() / 2));
     order.into_iter().map(|k| places[k]).collect()
 }
 
-/// The number of branches that were not switched to, each of which has a colour of its own.
+/// Number of branches that were not switched to, each of which has its own colour.
 pub fn root_count(diagram: &Diagram) -> usize {
     diagram.branches.iter().filter(|branch| root(diagram, branch).1 == 0).count()
 }
@@ -96,13 +96,13 @@ pub fn root_count(diagram: &Diagram) -> usize {
 /// Width of the dot of a mark: smaller than a special point, wider than the curve.
 const MARK: f64 = 2.6;
 
-/// What the legend calls branches that come from a special point of another.
+/// Legend entry of branches that start at a special point of another branch.
 const LIGHTER: &str = "branching off";
 
-/// As many branches as the legend has room for.
+/// Maximum number of branches in the legend.
 const MOST: usize = 14;
 
-/// A name that leaves room for the diagram.
+/// Shortens a name to leave room for the diagram.
 fn shortened(name: &str) -> String {
     const LONGEST: usize = 32;
     match name.char_indices().nth(LONGEST) {
@@ -111,13 +111,13 @@ fn shortened(name: &str) -> String {
     }
 }
 
-/// The branch at the root of this one, and how many switches lie between them.
+/// Root of a branch, and the number of switches between them.
 pub fn root<'d>(diagram: &'d Diagram, branch: &'d Branch) -> (&'d Branch, usize) {
     let mut at = branch;
-    // Names are unique, so a chain longer than the list of branches would go round in circles.
+    // Names are unique, so a chain longer than the list of branches would be a loop.
     for depth in 0..diagram.branches.len() {
         let Origin::Switch { parent, .. } = &at.origin else { return (at, depth) };
-        // A curve in two parameters is nobody's side branch.
+        // A curve in two parameters is not a side branch.
         if at.held.is_some() {
             return (at, depth);
         }

@@ -1,4 +1,4 @@
-//! Where everything stands on the page.
+//! Layout of a figure on the page.
 
 use crate::figure::{Figure, LegendPlace, Panel};
 use crate::font::{FAMILY, width};
@@ -13,7 +13,7 @@ const MARGIN: f64 = 14.0;
 const BETWEEN: f64 = 18.0;
 const TITLE: f64 = 17.0;
 
-/// A figure as SVG.
+/// Renders a figure as SVG.
 pub fn figure_svg(figure: &Figure) -> String {
     let mut frames: Vec<Frame> = figure.panels.iter().map(Frame::of).collect();
     let top = MARGIN + if figure.title.is_some() { TITLE + 14.0 } else { 0.0 };
@@ -33,7 +33,7 @@ pub fn figure_svg(figure: &Figure) -> String {
          font-family=\"{FAMILY}\" font-size=\"{SIZE}\" fill=\"#222\">\n<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n"
     );
     if let Some(title) = &figure.title {
-        // A title that does not fit is set smaller.
+        // A title that is too wide is set smaller.
         let size = TITLE * (room / width(title, TITLE)).min(1.0);
         let _ = writeln!(
             out,
@@ -52,7 +52,7 @@ pub fn figure_svg(figure: &Figure) -> String {
     out
 }
 
-/// Puts the panels on the page, row by row, axes below each other aligned. Returns where the last row ends.
+/// Places the panels row by row, with axes in a column aligned. Returns the bottom of the last row.
 fn arrange(figure: &Figure, frames: &mut [Frame], top: f64) -> f64 {
     let columns = figure.columns.max(1);
     let column = (figure.width - 2.0 * MARGIN - BETWEEN * (columns - 1) as f64) / columns as f64;
@@ -92,7 +92,7 @@ fn arrange(figure: &Figure, frames: &mut [Frame], top: f64) -> f64 {
     y + row
 }
 
-/// A frame of which only the range matters.
+/// Frame used only for its range.
 fn provisional(frame: &Frame, panel: &Panel) -> Frame {
     let mut frame = frame.clone();
     frame.place(Area { left: 0.0, right: 400.0, top: 0.0, bottom: 300.0 }, panel.equal);

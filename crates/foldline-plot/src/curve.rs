@@ -1,27 +1,27 @@
-//! From a branch to polylines of one stability each, and marks.
+//! Branches as marks and polylines of uniform stability.
 
 use crate::figure::Vertex;
 use crate::quantity::drawn;
 use foldline::diagram::{Branch, Ending, Kind, Point};
 use foldline::special::quantity::Quantity;
 
-/// A piece of a branch along which the stability does not change.
+/// A piece of a branch of uniform stability.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Piece {
-    /// Whether it is stable.
+    /// True if the piece is stable.
     pub stable: bool,
-    /// Its vertices, in the units of the axes.
+    /// Vertices, in the units of the axes.
     pub vertices: Vec<[f64; 2]>,
 }
 
-/// The pieces of a branch, cut exactly where a special point changes the stability. A point without a value (the period
-/// of an equilibrium, say) interrupts the curve. Between its vertices the curve is rounded (see [`rounded`]), lengths being
-/// measured in `scale`, the sizes of the axes.
+/// Pieces of a branch, cut exactly where a special point changes the stability. A point without a value (such as the
+/// period of an equilibrium) interrupts the curve. Between vertices the curve is rounded (see [`rounded`]), with
+/// lengths measured in `scale`, the sizes of the axes.
 pub fn pieces(branch: &Branch, x: Quantity, y: Quantity, scale: [f64; 2]) -> Vec<Piece> {
     cut(&stretches(branch, x, y), Some(scale))
 }
 
-/// The pieces of one style each of curves given by their vertices, rounded where a scale is given.
+/// Pieces of uniform style of curves given by their vertices, rounded if a scale is given.
 pub fn cut(stretches: &[Vec<Vertex>], scale: Option<[f64; 2]>) -> Vec<Piece> {
     let mut pieces: Vec<Piece> = Vec::new();
     for curve in stretches {
@@ -44,15 +44,15 @@ pub fn cut(stretches: &[Vec<Vertex>], scale: Option<[f64; 2]>) -> Vec<Piece> {
     pieces
 }
 
-/// The vertices of a branch, points and special points in their order, interrupted where a point has no value; each with
-/// whether the stretch that leads to it is stable.
+/// Vertices of a branch, points and special points in order, interrupted where a point has no value; each with the
+/// stability of the segment that leads to it.
 pub fn stretches(branch: &Branch, x: Quantity, y: Quantity) -> Vec<Vec<Vertex>> {
     let mut vertices: Vec<Option<Vertex>> = Vec::new();
-    // Stability of the stretch that leads to the next vertex.
+    // Stability of the segment that leads to the next vertex.
     let mut stable = true;
     let mut specials = branch.special.iter().peekable();
     for point in &branch.points {
-        // Where no special point says more, a stretch with an unstable end is drawn unstable.
+        // In a branch without special points, a segment with an unstable end is drawn unstable.
         let silent = branch.special.is_empty() && point.unstable > 0;
         vertices.push(place(point, x, y).map(|at| (at, stable && !silent)));
         stable = point.unstable == 0;
@@ -70,8 +70,8 @@ pub fn stretches(branch: &Branch, x: Quantity, y: Quantity) -> Vec<Vec<Vertex>> 
     parts.map(|stretch| stretch.iter().flatten().copied().collect()).filter(|s: &Vec<Vertex>| !s.is_empty()).collect()
 }
 
-/// True if a branch that closes round a circle comes back to a copy of its start, an angle a whole turn away: the step that closes it would be
-/// longer than any other by far. (The start lies within one step of the last point.)
+/// True if a branch that closes around a circle returns to a copy of its start, a full turn away: the segment that
+/// closes it would be much longer than any other. (The start lies within one step of the last point.)
 fn is_another_copy(vertices: &[Option<Vertex>], home: [f64; 2]) -> bool {
     const FAR: f64 = 4.0;
     let known: Vec<[f64; 2]> = vertices.iter().flatten().map(|(at, _)| *at).collect();
@@ -79,12 +79,12 @@ fn is_another_copy(vertices: &[Option<Vertex>], home: [f64; 2]) -> bool {
     known.last().is_some_and(|last| (0..2).any(|axis| (last[axis] - home[axis]).abs() > FAR * longest(axis)))
 }
 
-/// For each pair of neighbours the vertices in between that make the polyline a smooth curve through all given vertices:
-/// cubic Hermite pieces over the chord length, with the slopes of parabolas through three vertices. A polyline that ends
+/// For each segment, the vertices to insert so that the polyline becomes a smooth curve through all given vertices:
+/// cubic Hermite pieces over the chord length, with slopes from parabolas through three vertices. A polyline that ends
 /// where it began is smooth there too.
 pub fn rounded(vertices: &[[f64; 2]], scale: [f64; 2]) -> Vec<Vec<[f64; 2]>> {
     const SHORTEST: f64 = 0.004;
-    // The direction between two places closer than this, a pixel, may be rounding error.
+    // The direction between two points closer than this, a pixel, may be rounding error.
     const NEAR: f64 = 0.001;
     let chord = |a: [f64; 2], b: [f64; 2]| ((b[0] - a[0]) / scale[0]).hypot((b[1] - a[1]) / scale[1]);
     let chords: Vec<f64> = vertices.windows(2).map(|w| chord(w[0], w[1])).collect();
@@ -116,7 +116,7 @@ pub fn rounded(vertices: &[[f64; 2]], scale: [f64; 2]) -> Vec<Vec<[f64; 2]>> {
     let piece = |k: usize| {
         let h = chords[k];
         let (a, b) = (vertices[k], vertices[k + 1]);
-        // A chord that is short on the page, or no number, stays straight.
+        // A chord that is short on the page, or not finite, stays straight.
         let parts = if h.is_finite() { (h / SHORTEST).ceil().clamp(1.0, 24.0) as usize } else { 1 };
         let inner = (1..parts).map(|s| {
             let t = s as f64 / parts as f64;
@@ -131,7 +131,7 @@ pub fn rounded(vertices: &[[f64; 2]], scale: [f64; 2]) -> Vec<Vec<[f64; 2]>> {
     (0..chords.len()).map(piece).collect()
 }
 
-/// The special points of a branch that can be drawn: what they are, super- or subcritical where that is known, and where.
+/// Special points of a branch that can be drawn: kind, criticality where known, position.
 pub fn marks(branch: &Branch, x: Quantity, y: Quantity) -> Vec<(Kind, Option<&'static str>, [f64; 2])> {
     branch.special.iter().filter_map(|s| Some((s.kind, s.criticality(), place(&s.point, x, y)?))).collect()
 }
@@ -140,7 +140,7 @@ fn place(point: &Point, x: Quantity, y: Quantity) -> Option<[f64; 2]> {
     Some([drawn(x, point)?, drawn(y, point)?])
 }
 
-/// The parts of a polyline within a window `[x0, x1, y0, y1]`.
+/// Parts of a polyline within a window `[x0, x1, y0, y1]`.
 pub fn clipped(vertices: &[[f64; 2]], window: [f64; 4]) -> Vec<Vec<[f64; 2]>> {
     let mut parts: Vec<Vec<[f64; 2]>> = Vec::new();
     for pair in vertices.windows(2) {
@@ -153,7 +153,7 @@ pub fn clipped(vertices: &[[f64; 2]], window: [f64; 4]) -> Vec<Vec<[f64; 2]>> {
     parts
 }
 
-/// The part of a segment within a window (Liang and Barsky).
+/// Part of a segment within a window (Liang and Barsky).
 fn clipped_segment(a: [f64; 2], b: [f64; 2], window: [f64; 4]) -> Option<[[f64; 2]; 2]> {
     let (mut enter, mut leave) = (0.0_f64, 1.0_f64);
     for axis in 0..2 {
@@ -171,7 +171,7 @@ fn clipped_segment(a: [f64; 2], b: [f64; 2], window: [f64; 4]) -> Option<[[f64; 
         }
     }
     let at = |t: f64| [a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])];
-    // An end that lies inside is kept exactly, so that neighbouring parts join.
+    // An end inside the window is kept exactly, so that neighbouring parts join.
     (enter <= leave).then(|| [if enter == 0.0 { a } else { at(enter) }, if leave == 1.0 { b } else { at(leave) }])
 }
 
@@ -180,7 +180,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_line_that_leaves_and_comes_back_is_two_parts_that_end_on_the_border() {
+    fn a_line_that_leaves_the_window_and_returns_is_cut_at_its_border() {
         let line = [[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [0.0, 1.0]];
         let parts = clipped(&line, [-1.0, 1.0, -1.0, 2.0]);
         assert_eq!(parts, vec![vec![[0.0, 0.0], [1.0, 0.0]], vec![[1.0, 1.0], [0.0, 1.0]]]);
@@ -199,7 +199,7 @@ mod tests {
     }
 
     #[test]
-    fn a_vertex_that_is_there_twice_but_for_rounding_makes_no_kink() {
+    fn vertices_equal_up_to_rounding_make_no_kink() {
         let at = |t: f64| [t, t * t];
         let once: Vec<[f64; 2]> = (0..=8).map(|k| at(k as f64 / 8.0)).collect();
         let mut twice = once.clone();
@@ -212,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn a_line_that_passes_by_is_not_there() {
+    fn a_line_outside_the_window_is_left_out() {
         assert!(clipped(&[[2.0, 0.0], [0.0, 3.0]], [0.0, 1.0, 0.0, 1.0]).is_empty());
     }
 }

@@ -1,7 +1,8 @@
-//! What a figure consists of: panels of layers, as plain data.
+//! Figures as plain data: panels of layers.
 //!
-//! **Idea.** A [`Figure`] is a grid of [`Panel`]s; a panel has two axes and [`Layer`]s, drawn in their order (bands first,
-//! texts last). Coordinates are those of the axes; what is not finite, or not positive on a logarithmic axis, is left out.
+//! **Idea.** A [`Figure`] is a grid of [`Panel`]s; a panel has two axes and [`Layer`]s, drawn in their order (bands
+//! first, texts last). Coordinates are those of the axes; values that are not finite, or not positive on a logarithmic
+//! axis, are left out.
 
 use crate::palette::{GREY, PALE};
 use foldline::diagram::Kind;
@@ -9,15 +10,15 @@ use foldline::diagram::Kind;
 /// Panels in rows.
 #[derive(Clone, Debug)]
 pub struct Figure {
-    /// Written above everything.
+    /// Title above all panels.
     pub title: Option<String>,
-    /// In reading order.
+    /// Panels in reading order.
     pub panels: Vec<Panel>,
-    /// Columns of the grid.
+    /// Number of columns of the grid.
     pub columns: usize,
     /// Width of the page, in units of the SVG; text is 13 units high.
     pub width: f64,
-    /// Whether one legend for all panels stands below them.
+    /// True if one legend for all panels stands below them.
     pub legend: bool,
 }
 
@@ -28,7 +29,7 @@ impl Default for Figure {
 }
 
 impl Figure {
-    /// A figure of panels in columns with one legend below.
+    /// Returns a figure of panels in columns with one legend below.
     pub fn grid(title: impl Into<String>, columns: usize, panels: Vec<Panel>) -> Figure {
         Figure { title: Some(title.into()), panels, columns, legend: true, ..Figure::default() }
     }
@@ -37,30 +38,30 @@ impl Figure {
 /// Axes with layers.
 #[derive(Clone, Debug)]
 pub struct Panel {
-    /// Set in bold before the title: `(a)`.
+    /// Label in bold before the title, such as `(a)`.
     pub label: String,
-    /// Written above the axes.
+    /// Title above the axes.
     pub title: String,
     /// Horizontal axis.
     pub x: Axis,
     /// Vertical axis.
     pub y: Axis,
-    /// What is drawn.
+    /// Layers, drawn in this order.
     pub layers: Vec<Layer>,
-    /// Rectangles that another panel shows.
+    /// Rectangles shown in detail by other panels.
     pub zooms: Vec<Zoom>,
-    /// Whether this panel has a legend of its own.
+    /// Position of the panel's own legend, if it has one.
     pub legend: LegendPlace,
-    /// Whether a unit is as long on both axes; the range of one axis grows where it has to.
+    /// True if units have equal length on both axes; the range of one axis is extended as needed.
     pub equal: bool,
-    /// Columns it extends over.
+    /// Number of columns it spans.
     pub span: usize,
-    /// Height with labels, in units of the SVG.
+    /// Height including labels, in units of the SVG.
     pub height: f64,
 }
 
 impl Panel {
-    /// An empty panel.
+    /// Returns an empty panel.
     pub fn new(label: impl Into<String>, title: impl Into<String>, x: Axis, y: Axis) -> Panel {
         Panel {
             label: label.into(),
@@ -76,35 +77,35 @@ impl Panel {
         }
     }
 
-    /// With this layer on top.
+    /// Adds this layer on top.
     pub fn with(mut self, layer: Layer) -> Panel {
         self.layers.push(layer);
         self
     }
 
-    /// With these layers on top.
+    /// Adds these layers on top.
     pub fn with_all(mut self, layers: impl IntoIterator<Item = Layer>) -> Panel {
         self.layers.extend(layers);
         self
     }
 
-    /// With the outline of a window `[x0, x1, y0, y1]` that the panel of that label shows.
+    /// Adds the outline of a window `[x0, x1, y0, y1]` that the panel with that label shows.
     pub fn zooming(mut self, window: [f64; 4], label: impl Into<String>) -> Panel {
         self.zooms.push(Zoom { window, label: label.into() });
         self
     }
 
-    /// With units of equal length.
+    /// Makes units equally long on both axes.
     pub fn equal(mut self) -> Panel {
         self.equal = true;
         self
     }
 }
 
-/// Where the legend of a panel stands.
+/// Position of the legend of a panel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LegendPlace {
-    /// Nowhere.
+    /// No legend.
     None,
     /// In the corner of the axes where it hides least.
     Inside,
@@ -115,81 +116,81 @@ pub enum LegendPlace {
 /// An axis.
 #[derive(Clone, Debug, Default)]
 pub struct Axis {
-    /// Written along it.
+    /// Label along the axis.
     pub label: String,
-    /// From where to where; what the layers need if absent.
+    /// Lower and upper limit; chosen to fit the layers if absent.
     pub range: Option<[f64; 2]>,
-    /// Whether it is logarithmic.
+    /// True if the axis is logarithmic.
     pub log: bool,
 }
 
 impl Axis {
-    /// A linear axis as long as needed.
+    /// Returns a linear axis whose range fits the layers.
     pub fn new(label: impl Into<String>) -> Axis {
         Axis { label: label.into(), range: None, log: false }
     }
 
-    /// From `low` to `high`.
+    /// Sets the range.
     pub fn from(mut self, low: f64, high: f64) -> Axis {
         self.range = Some([low, high]);
         self
     }
 
-    /// Logarithmic.
+    /// Makes the axis logarithmic.
     pub fn log(mut self) -> Axis {
         self.log = true;
         self
     }
 }
 
-/// A rectangle `[x0, x1, y0, y1]`, drawn with the label of the panel that shows it.
+/// Rectangle drawn with the label of the panel that shows it in detail.
 #[derive(Clone, Debug)]
 pub struct Zoom {
     /// `[x0, x1, y0, y1]`.
     pub window: [f64; 4],
-    /// `(b)`.
+    /// Label of that panel, such as `(b)`.
     pub label: String,
 }
 
-/// A vertex, and whether the stretch that leads to it is solid.
+/// A vertex, and true if the segment that leads to it is solid.
 pub type Vertex = ([f64; 2], bool);
 
-/// Something drawn in one colour. Layers of one name share a line of the legend; where their colours differ it is grey.
+/// Shape drawn in one colour. Layers of one name share a legend entry, which is grey if their colours differ.
 #[derive(Clone, Debug)]
 pub struct Layer {
-    /// What the legend calls it; it is not there without a name.
+    /// Name in the legend; without one the layer has no entry.
     pub name: Option<String>,
-    /// An SVG colour; [`crate::palette`] has some.
+    /// SVG colour; [`crate::palette`] has some.
     pub colour: &'static str,
-    /// Width of lines, size of marks.
+    /// Width of lines, or size of marks.
     pub width: f64,
-    /// From 0, invisible, to 1.
+    /// Opacity, from 0 (invisible) to 1.
     pub opacity: f64,
-    /// Whether lines without a style of their own are dashed.
+    /// True if lines without a style of their own are dashed.
     pub dashed: bool,
-    /// What it is.
+    /// Shape of the layer.
     pub shape: Shape,
 }
 
-/// What a layer is.
+/// Shape of a layer.
 #[derive(Clone, Debug)]
 pub enum Shape {
-    /// A curve in stretches, which may be rounded through its vertices (see [`crate::curve::rounded`]).
+    /// Curve in segments, optionally rounded through its vertices (see [`crate::curve::rounded`]).
     Curve {
-        /// Stretches without interruption.
+        /// Segments without interruption.
         stretches: Vec<Vec<Vertex>>,
-        /// Whether it is drawn as a smooth curve.
+        /// True if drawn as a smooth curve.
         rounded: bool,
-        /// Whether solid means stable; the legend then says so.
+        /// True if solid means stable, as the legend then says.
         stability: bool,
     },
     /// Marks.
     Scatter {
-        /// Where.
+        /// Positions.
         points: Vec<[f64; 2]>,
         /// Their shape.
         marker: Marker,
-        /// Filled with the colour, or with white.
+        /// True if filled with the colour, false if filled with white.
         filled: bool,
     },
     /// A circle.
@@ -199,36 +200,36 @@ pub enum Shape {
         /// Its radius, in units of the axes.
         radius: f64,
     },
-    /// Lines from zero (from the bottom of a logarithmic axis) to each place, with a text at its end.
+    /// Lines from zero (from the bottom of a logarithmic axis) to each point, with a text at the end.
     Stems {
-        /// The ends.
+        /// End points.
         peaks: Vec<[f64; 2]>,
-        /// A text for each of them, or none.
+        /// Text for each end, or none at all.
         labels: Vec<String>,
     },
-    /// A line across, at this x.
+    /// Vertical line across the axes at this x.
     Vertical(f64),
-    /// A line across, at this y.
+    /// Horizontal line across the axes at this y.
     Horizontal(f64),
-    /// A shaded stretch of the x axis.
+    /// Shaded interval of the x axis.
     Band([f64; 2]),
-    /// A text beside one of several places, where there is room for it; left out where there is none.
+    /// Text beside one of several points where there is room for it; left out if there is none.
     Label {
-        /// The places, the better ones first.
+        /// Candidate points, best first.
         places: Vec<[f64; 2]>,
         /// The text.
         text: String,
     },
-    /// A text beside a place, where it hides least.
+    /// Text beside a point, placed where it hides least.
     Note {
-        /// The place.
+        /// The point.
         at: [f64; 2],
         /// The text.
         text: String,
     },
 }
 
-/// The shape of a mark.
+/// Shape of a mark.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Marker {
     /// ○
@@ -247,12 +248,12 @@ pub enum Marker {
     Plus,
     /// ✳
     Star,
-    /// A small dot.
+    /// Small dot.
     Dot,
 }
 
 impl Marker {
-    /// The mark of a special point.
+    /// Returns the mark of a special point.
     pub fn of(kind: Kind) -> Marker {
         match kind {
             Kind::Fold => Marker::Circle,
@@ -260,7 +261,7 @@ impl Marker {
             Kind::Hopf => Marker::Diamond,
             Kind::PeriodDoubling => Marker::Square,
             Kind::Torus => Marker::Triangle,
-            // On curves in two parameters, where none of the above lie.
+            // On curves in two parameters only, where none of the kinds above lie.
             Kind::Cusp => Marker::Nabla,
             Kind::BogdanovTakens | Kind::Resonance11 => Marker::Plus,
             Kind::ZeroHopf | Kind::FoldTorus | Kind::Resonance13 => Marker::Triangle,
@@ -278,12 +279,13 @@ impl Layer {
         Layer { name: None, colour, width: 1.6, opacity: 1.0, dashed: false, shape }
     }
 
-    /// A polyline; a place that is not finite interrupts it.
+    /// Returns a polyline; a point that is not finite interrupts it.
     pub fn curve(points: &[[f64; 2]], colour: &'static str) -> Layer {
         Layer::masked(points, &[], colour)
     }
 
-    /// A polyline that is dashed on its way to each place whose mask is false. A missing mask is true.
+    /// Returns a polyline whose segment to a point is dashed if the mask of that point is false. A missing mask is
+    /// true.
     pub fn masked(points: &[[f64; 2]], solid: &[bool], colour: &'static str) -> Layer {
         let vertex = |k: usize| (points[k], solid.get(k).copied().unwrap_or(true));
         let vertices: Vec<Vertex> = (0..points.len()).map(vertex).collect();
@@ -292,48 +294,48 @@ impl Layer {
         Layer::new(colour, Shape::Curve { stretches, rounded: false, stability: !solid.is_empty() })
     }
 
-    /// Marks, filled.
+    /// Returns filled marks.
     pub fn scatter(points: Vec<[f64; 2]>, marker: Marker, colour: &'static str) -> Layer {
         let width = if marker == Marker::Dot { 1.2 } else { 4.0 };
         Layer { width, ..Layer::new(colour, Shape::Scatter { points, marker, filled: true }) }
     }
 
-    /// A circle.
+    /// Returns a circle.
     pub fn circle(centre: [f64; 2], radius: f64, colour: &'static str) -> Layer {
         Layer { width: 1.1, ..Layer::new(colour, Shape::Circle { centre, radius }) }
     }
 
-    /// Stems with a text at each end; an empty text is none.
+    /// Returns stems with a text at each end; an empty text is left out.
     pub fn stems(peaks: Vec<[f64; 2]>, labels: Vec<String>, colour: &'static str) -> Layer {
         Layer::new(colour, Shape::Stems { peaks, labels })
     }
 
-    /// A thin line across at this x.
+    /// Returns a thin vertical line across the axes at this x.
     pub fn vertical(x: f64) -> Layer {
         Layer { width: 1.0, dashed: true, ..Layer::new(PALE, Shape::Vertical(x)) }
     }
 
-    /// A thin line across at this y.
+    /// Returns a thin horizontal line across the axes at this y.
     pub fn horizontal(y: f64) -> Layer {
         Layer { width: 1.0, dashed: true, ..Layer::new(PALE, Shape::Horizontal(y)) }
     }
 
-    /// A shaded stretch of the x axis.
+    /// Returns a shaded interval of the x axis.
     pub fn band(from: f64, to: f64, colour: &'static str) -> Layer {
         Layer { opacity: 0.13, ..Layer::new(colour, Shape::Band([from, to])) }
     }
 
-    /// A text beside a place.
+    /// Returns a text beside a point.
     pub fn note(at: [f64; 2], text: impl Into<String>) -> Layer {
         Layer::new(GREY, Shape::Note { at, text: text.into() })
     }
 
-    /// A text beside one of several places, if there is room.
+    /// Returns a text beside one of several points, if there is room.
     pub fn label(places: Vec<[f64; 2]>, text: impl Into<String>, colour: &'static str) -> Layer {
         Layer::new(colour, Shape::Label { places, text: text.into() })
     }
 
-    /// True if a curve or a set of marks has no places.
+    /// True if a curve or a set of marks has no points.
     pub fn is_empty(&self) -> bool {
         match &self.shape {
             Shape::Curve { stretches, .. } => stretches.is_empty(),
@@ -342,31 +344,31 @@ impl Layer {
         }
     }
 
-    /// With a line in the legend.
+    /// Adds an entry in the legend.
     pub fn named(mut self, name: impl Into<String>) -> Layer {
         self.name = Some(name.into());
         self
     }
 
-    /// In this colour.
+    /// Sets the colour.
     pub fn coloured(mut self, colour: &'static str) -> Layer {
         self.colour = colour;
         self
     }
 
-    /// With lines of this width or marks of this size.
+    /// Sets the width of lines or the size of marks.
     pub fn wide(mut self, width: f64) -> Layer {
         self.width = width;
         self
     }
 
-    /// With this opacity.
+    /// Sets the opacity.
     pub fn faint(mut self, opacity: f64) -> Layer {
         self.opacity = opacity;
         self
     }
 
-    /// Dashed all along.
+    /// Makes all lines dashed.
     pub fn dashed(mut self) -> Layer {
         self.dashed = true;
         if let Shape::Curve { stretches, .. } = &mut self.shape {
@@ -375,7 +377,7 @@ impl Layer {
         self
     }
 
-    /// Marks with white inside.
+    /// Fills marks with white.
     pub fn hollow(mut self) -> Layer {
         if let Shape::Scatter { filled, .. } = &mut self.shape {
             *filled = false;
@@ -383,7 +385,7 @@ impl Layer {
         self
     }
 
-    /// A smooth curve through the vertices instead of a polyline.
+    /// Draws a smooth curve through the vertices instead of a polyline.
     pub fn smooth(mut self) -> Layer {
         if let Shape::Curve { rounded, .. } = &mut self.shape {
             *rounded = true;

@@ -1,14 +1,14 @@
-//! The font of the pictures, DejaVu Sans, and how wide a text is in it.
+//! DejaVu Sans, the font of the pictures, and the width of texts in it.
 
 use std::sync::LazyLock;
 use ttf_parser::Face;
 
-/// The font families an SVG asks for, best first.
+/// Font families requested by an SVG, best first.
 pub const FAMILY: &str = "DejaVu Sans, Verdana, sans-serif";
 
 static FACE: LazyLock<Option<Face<'static>>> = LazyLock::new(|| Face::parse(dejavu::sans::regular(), 0).ok());
 
-/// The width of a text at a font size, in the same unit.
+/// Width of a text at a font size, in the same unit.
 pub fn width(text: &str, size: f64) -> f64 {
     const UNKNOWN: f64 = 0.6;
     let Some(face) = FACE.as_ref() else { return UNKNOWN * size * text.chars().count() as f64 };

@@ -9,7 +9,7 @@ use std::fmt::Write;
 /// Room for the label of an axis.
 pub(crate) const LABEL: f64 = 22.0;
 
-/// The axes of a panel: where they stand, and which values they show.
+/// Axes of a panel: position on the page and range of values.
 #[derive(Clone, Debug)]
 pub(crate) struct Frame {
     pub area: Area,
@@ -18,14 +18,14 @@ pub(crate) struct Frame {
 }
 
 impl Frame {
-    /// The scales of a panel, not yet on the page.
+    /// Returns the scales of a panel, not yet placed on the page.
     pub fn of(panel: &Panel) -> Frame {
         let [x, y] = extent(panel);
         let nowhere = Area { left: 0.0, right: 1.0, top: 0.0, bottom: 1.0 };
         Frame { area: nowhere, x: Scale::new(&panel.x, x), y: Scale::new(&panel.y, y) }
     }
 
-    /// Puts the axes on the page; with `equal`, the axis that has room to spare gets a longer range.
+    /// Places the axes on the page; with `equal`, the axis with room to spare gets a longer range.
     pub fn place(&mut self, area: Area, equal: bool) {
         self.area = area;
         let [w, h] = self.size();
@@ -36,7 +36,7 @@ impl Frame {
             (scale.low, scale.high) = (middle - 0.5 * more, middle + 0.5 * more);
         }
         self.divide_y(h);
-        // Fewer ticks until the labels stand apart.
+        // Reduces the number of ticks until labels no longer overlap.
         let mut wanted = (w / 52.0).max(1.0) as usize;
         self.x.divide(wanted);
         while wanted > 1
@@ -47,7 +47,7 @@ impl Frame {
         }
     }
 
-    /// The ticks of the vertical axis, whose labels decide how much room there is for the horizontal one.
+    /// Sets the ticks of the vertical axis, whose labels determine the width left for the horizontal one.
     pub fn divide_y(&mut self, height: f64) {
         self.y.divide((height / 45.0).max(2.0) as usize);
     }
@@ -56,35 +56,35 @@ impl Frame {
         [self.area.right - self.area.left, self.area.bottom - self.area.top]
     }
 
-    /// `[x0, x1, y0, y1]` in axis units.
+    /// Window `[x0, x1, y0, y1]` in axis units.
     pub fn window(&self) -> [f64; 4] {
         [self.x.low, self.x.high, self.y.low, self.y.high]
     }
 
-    /// A place in axis units.
+    /// Converts a point to axis units.
     pub fn units(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         [self.x.units(x), self.y.units(y)]
     }
 
-    /// Whether a place in axis units is inside.
+    /// True if a point in axis units is inside.
     pub fn holds(&self, [x, y]: [f64; 2]) -> bool {
         let [x0, x1, y0, y1] = self.window();
         (x0..=x1).contains(&x) && (y0..=y1).contains(&y)
     }
 
-    /// The place on the page of a place in axis units.
+    /// Position on the page of a point in axis units.
     pub fn at(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let [w, h] = self.size();
         [self.area.left + self.x.share(x) * w, self.area.bottom - self.y.share(y) * h]
     }
 
-    /// The visible parts, on the page, of a polyline in axis units.
+    /// Visible parts, on the page, of a polyline in axis units.
     pub fn visible(&self, vertices: &[[f64; 2]]) -> Vec<Vec<[f64; 2]>> {
         let parts = clipped(vertices, self.window());
         parts.into_iter().map(|part| part.into_iter().map(|p| self.at(p)).collect()).collect()
     }
 
-    /// The grid, behind everything.
+    /// Draws the grid, behind everything else.
     pub fn grid(&self, out: &mut String) {
         let Area { left, right, top, bottom } = self.area;
         out.push_str("<g stroke=\"#e8e8e8\" stroke-width=\"0.8\">\n");
@@ -99,7 +99,7 @@ impl Frame {
         out.push_str("</g>\n");
     }
 
-    /// The frame, its ticks, and what is written at them.
+    /// Draws the frame with its ticks and labels.
     pub fn axes(&self, out: &mut String, panel: &Panel) {
         let Area { left, right, top, bottom } = self.area;
         let [w, h] = self.size();
@@ -151,14 +151,14 @@ impl Frame {
     }
 }
 
-/// The smallest ranges, in axis units, that hold every layer; `None` where there is nothing.
+/// Smallest ranges, in axis units, that contain every layer; `None` for an empty panel.
 fn extent(panel: &Panel) -> [Option<[f64; 2]>; 2] {
     let (x, y) = (Scale::new(&panel.x, None), Scale::new(&panel.y, None));
     let mut ranges = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
     let within = |scale: &Scale, stated: bool, v: f64| !stated || (scale.low..=scale.high).contains(&v);
     for place in panel.layers.iter().flat_map(places) {
         let [u, v] = [x.units(place[0]), y.units(place[1])];
-        // Where one range is stated, what lies outside it says nothing about the other.
+        // Points outside a stated range of one axis do not affect the other.
         let seen = within(&x, panel.x.range.is_some(), u) && within(&y, panel.y.range.is_some(), v);
         if u.is_finite() && v.is_finite() && seen {
             for (range, value) in ranges.iter_mut().zip([u, v]) {
@@ -169,7 +169,7 @@ fn extent(panel: &Panel) -> [Option<[f64; 2]>; 2] {
     ranges.map(|[low, high]| (low <= high).then_some([low, high]))
 }
 
-/// The places that a layer needs to show.
+/// Points that must be visible for a layer to be shown.
 fn places(layer: &Layer) -> Vec<[f64; 2]> {
     match &layer.shape {
         Shape::Curve { stretches, .. } => stretches.iter().flatten().map(|(place, _)| *place).collect(),

@@ -1,4 +1,4 @@
-//! What the colours, line styles and marks mean.
+//! Legend of colours, line styles and marks.
 
 use crate::figure::{Layer, LegendPlace, Panel, Shape};
 use crate::font::width;
@@ -13,21 +13,21 @@ const SAMPLE: f64 = 26.0;
 const GAP: f64 = 8.0;
 const BETWEEN: f64 = 22.0;
 
-/// A list of samples with names: named layers, then the line styles where they mean stability.
+/// List of samples with names: named layers, then the line styles where they indicate stability.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Legend {
     entries: Vec<(String, Layer)>,
 }
 
 impl Legend {
-    /// What can be seen in a panel. A layer without places that has a name is listed too.
+    /// Returns the legend of the layers visible in a panel. A named layer without points is listed too.
     pub fn of(panel: &Panel, frame: &Frame) -> Legend {
         let mut legend = Legend::default();
         legend.add(panel, frame);
         legend
     }
 
-    /// What can be seen in any of the panels, in one legend.
+    /// Returns one legend for the layers visible in any of the panels.
     pub fn shared<'p>(panels: impl Iterator<Item = (&'p Panel, &'p Frame)>) -> Legend {
         let mut legend = Legend::default();
         let mut stability = [false; 2];
@@ -72,20 +72,20 @@ impl Legend {
         self.entries.is_empty()
     }
 
-    /// Width and height as one column.
+    /// Width and height when set as one column.
     pub fn size(&self) -> [f64; 2] {
         let widest = self.entries.iter().map(|(name, _)| width(name, SIZE)).fold(0.0, f64::max);
         [SAMPLE + GAP + widest, LINE * self.entries.len() as f64]
     }
 
-    /// Draws it as one column.
+    /// Draws the legend as one column.
     pub fn column(&self, out: &mut String, left: f64, top: f64) {
         for (k, (name, layer)) in self.entries.iter().enumerate() {
             entry(out, left, top + (k as f64 + 0.5) * LINE, name, layer);
         }
     }
 
-    /// The entries in rows no wider than `room`.
+    /// Entries in rows no wider than `room`.
     fn rows(&self, room: f64) -> Vec<Vec<&(String, Layer)>> {
         let mut rows: Vec<Vec<&(String, Layer)>> = vec![Vec::new()];
         let mut used = 0.0;
@@ -103,12 +103,12 @@ impl Legend {
         rows
     }
 
-    /// The height as rows no wider than `room`.
+    /// Height when set in rows no wider than `room`.
     pub fn height_in_rows(&self, room: f64) -> f64 {
         if self.is_empty() { 0.0 } else { LINE * self.rows(room).len() as f64 }
     }
 
-    /// Draws it as centred rows.
+    /// Draws the legend as centred rows.
     pub fn in_rows(&self, out: &mut String, left: f64, top: f64, room: f64) {
         for (k, row) in self.rows(room).into_iter().enumerate() {
             let total: f64 = row.iter().map(|(name, _)| entry_width(name) + BETWEEN).sum::<f64>() - BETWEEN;
@@ -150,7 +150,7 @@ fn entry(out: &mut String, left: f64, y: f64, name: &str, layer: &Layer) {
     text_at(out, left + SAMPLE + GAP, y, name);
 }
 
-/// Whether something of a layer lies within the axes.
+/// True if part of a layer lies within the axes.
 fn is_visible(layer: &Layer, frame: &Frame) -> bool {
     match &layer.shape {
         Shape::Curve { stretches, .. } => stretches.iter().any(|stretch| {
@@ -163,7 +163,7 @@ fn is_visible(layer: &Layer, frame: &Frame) -> bool {
     }
 }
 
-/// Whether stable and unstable stretches of curves whose style says so are seen.
+/// True if stable, and unstable, segments are visible of curves whose style shows stability.
 fn styles(panel: &Panel, frame: &Frame) -> [bool; 2] {
     let mut seen = [false; 2];
     for layer in &panel.layers {

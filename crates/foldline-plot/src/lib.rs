@@ -1,11 +1,11 @@
 //! Bifurcation diagrams and other figures as SVG, PNG and PDF.
 //!
 //! **Idea.** A figure is plain data: panels with axes and layers ([`figure`]). Branches become layers ([`branches`],
-//! [`curve`]) once it is known what the axes show ([`quantity`]); then everything gets its place on the page
-//! ([`figure_svg`]). The page is SVG; PNG and PDF are made from it with the embedded font, so they look alike everywhere.
+//! [`curve`]) once the axes are known ([`quantity`]); then everything is placed on the page ([`figure_svg`]). The page
+//! is SVG; PNG and PDF are made from it with the embedded font, so they look alike everywhere.
 //!
-//! Stable pieces are solid, unstable ones dashed, and the change lies exactly at the special point. A branch that comes
-//! from a special point of another has its colour, lighter.
+//! Stable pieces are solid, unstable ones dashed, and the change lies exactly at the special point. A branch that
+//! starts at a special point of another has its colour, lighter.
 
 pub mod branches;
 mod compose;

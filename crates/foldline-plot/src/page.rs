@@ -1,4 +1,4 @@
-//! The picture of one diagram.
+//! Picture of one diagram.
 
 use crate::branches::{diagram_layers, label_layers, root_count};
 use crate::compose::figure_svg;
@@ -9,16 +9,16 @@ use foldline::diagram::Diagram;
 use foldline::model::Model;
 use foldline::special::quantity::Quantity;
 
-/// What is to be drawn.
+/// Contents and size of a picture.
 #[derive(Clone, Debug)]
 pub struct Picture {
-    /// Horizontal axis; the free parameter if absent.
+    /// Horizontal axis; by default the free parameter.
     pub x: Option<Quantity>,
-    /// Vertical axis; the largest value of the first output if absent.
+    /// Vertical axis; by default the largest value of the first output.
     pub y: Option<Quantity>,
-    /// `[x0, x1, y0, y1]`; everything if absent.
+    /// Window `[x0, x1, y0, y1]`; by default everything.
     pub window: Option<[f64; 4]>,
-    /// Written above the axes.
+    /// Title above the axes.
     pub title: Option<String>,
     /// Width and height in units of the SVG.
     pub size: [f64; 2],
@@ -30,7 +30,7 @@ impl Default for Picture {
     }
 }
 
-/// The picture of a diagram as SVG.
+/// Renders a diagram as SVG.
 pub fn svg(diagram: &Diagram, model: &Model, picture: &Picture) -> String {
     let x = picture.x.unwrap_or_else(|| default_x(diagram));
     let y = picture.y.unwrap_or_else(|| default_y(model));

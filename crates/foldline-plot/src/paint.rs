@@ -1,4 +1,4 @@
-//! Layers become SVG.
+//! Layers as SVG.
 
 use crate::curve::cut;
 use crate::figure::{Layer, Marker, Shape, Zoom};
@@ -7,19 +7,19 @@ use crate::scale::SIZE;
 use crate::texts::{Area, Occupied, escaped};
 use std::fmt::Write;
 
-/// Dashes and gaps of unstable curves and of lines that refer to something.
+/// Dashes and gaps of unstable curves and reference lines.
 pub(crate) const DASHES: &str = "5 3.5";
 const NOTE: f64 = 12.0;
 
-/// Everything of a panel but its axes and legend: lines first, marks over them, texts last.
+/// Contents of a panel except its axes and legend: lines first, marks over them, texts last.
 pub(crate) struct Painter<'f> {
     pub frame: &'f Frame,
     pub page: Occupied,
     lines: String,
     marks: String,
-    /// Texts that are placed once all curves are known: anchor, text, colour, gap.
+    /// Texts to place once all curves are known: anchor, text, colour, gap.
     waiting: Vec<([f64; 2], String, &'static str, f64)>,
-    /// Texts that are left out where there is no room: anchors, text, colour.
+    /// Texts to leave out if there is no room: anchors, text, colour.
     optional: Vec<(Vec<[f64; 2]>, String, &'static str)>,
 }
 
@@ -83,7 +83,7 @@ impl<'f> Painter<'f> {
         }
     }
 
-    /// The visible part of a polyline in axis units.
+    /// Draws the visible part of a polyline in axis units.
     fn path(&mut self, vertices: &[[f64; 2]], dashed: bool) {
         let dashes = if dashed { format!(" stroke-dasharray=\"{DASHES}\"") } else { String::new() };
         for part in self.frame.visible(vertices) {
@@ -148,7 +148,7 @@ impl<'f> Painter<'f> {
         }
     }
 
-    /// The outline of a window that another panel shows, with the label of that panel.
+    /// Draws the outline of a window that another panel shows, with the label of that panel.
     pub fn zoom(&mut self, zoom: &Zoom) {
         let [x0, x1, y0, y1] = zoom.window;
         let corners = [[x0, y0], [x1, y0], [x1, y1], [x0, y1], [x0, y0]].map(|p| self.frame.units(p));
@@ -160,7 +160,7 @@ impl<'f> Painter<'f> {
         }
     }
 
-    /// The curves and marks as SVG, then the texts, where they hide least.
+    /// Writes curves and marks as SVG, then the texts where they hide least.
     pub fn finish(mut self, out: &mut String, legend: impl FnOnce(&mut Occupied, &mut String)) {
         out.push_str(&self.lines);
         out.push_str(&self.marks);
@@ -176,7 +176,7 @@ impl<'f> Painter<'f> {
         for (area, text, colour) in placed {
             let (x, y) = (0.5 * (area.left + area.right), 0.5 * (area.top + area.bottom) + 0.36 * NOTE);
             let text = escaped(&text);
-            // White behind the letters keeps them legible where a curve has to pass.
+            // White behind the letters keeps them legible where a curve passes through.
             let _ = writeln!(
                 texts,
                 "<text x=\"{x:.2}\" y=\"{y:.2}\" text-anchor=\"middle\" font-size=\"{NOTE}\" stroke=\"#fff\" \
@@ -188,7 +188,7 @@ impl<'f> Painter<'f> {
     }
 }
 
-/// A mark as large as the layer is wide.
+/// Draws a mark of the size given by the layer's width.
 pub(crate) fn mark(out: &mut String, marker: Marker, [x, y]: [f64; 2], layer: &Layer, filled: bool) {
     let (size, colour) = (layer.width / 4.0, layer.colour);
     let shape = match marker {
@@ -212,7 +212,7 @@ pub(crate) fn mark(out: &mut String, marker: Marker, [x, y]: [f64; 2], layer: &L
     );
 }
 
-/// A text with its vertical middle at `y`.
+/// Writes a text vertically centred at `y`.
 pub(crate) fn text_at(out: &mut String, x: f64, y: f64, text: &str) {
     let _ = writeln!(out, "<text x=\"{x:.2}\" y=\"{:.2}\">{}</text>", y + 0.36 * SIZE, escaped(text));
 }

@@ -1,4 +1,4 @@
-//! Colours that are told apart with every common kind of colour vision.
+//! Colours that can be told apart with every common kind of colour vision.
 //!
 //! **Source.** okabe2008.
 
@@ -20,10 +20,10 @@ pub const BLACK: &str = "#000000";
 pub const YELLOW: &str = "#f0e442";
 /// Dark grey: text, and legend samples that stand for several colours.
 pub const GREY: &str = "#444444";
-/// Light grey: references behind the curves.
+/// Light grey: reference lines behind the curves.
 pub const PALE: &str = "#9a9a9a";
 
-/// The k-th colour, beginning again after the last.
+/// Returns the k-th colour, starting again after the last.
 pub fn nth(k: usize) -> &'static str {
     [BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, BLACK, YELLOW][k % 8]
 }

@@ -1,13 +1,13 @@
-//! What an axis shows.
+//! Quantities on the axes.
 
 use foldline::diagram::{Branch, Diagram, Point};
 use foldline::model::Model;
 use foldline::special::quantity::Quantity;
 
-/// The quantity of that name: one of [`Quantity::named`], or a state or output, which means its largest value.
+/// Returns the quantity of that name: one of [`Quantity::named`], or a state or output, which means its largest value.
 ///
 /// # Errors
-/// What there is.
+/// The names that exist.
 pub fn axis(name: &str, model: &Model) -> Result<Quantity, String> {
     let output = || model.output_index(name).map(|index| model.states.len() + index);
     let bare = || model.state_index(name).or_else(output).map(Quantity::Largest);
@@ -20,8 +20,9 @@ pub fn axis(name: &str, model: &Model) -> Result<Quantity, String> {
     })
 }
 
-/// The free parameter of most points of branches. The legs of a homotopy, which only lead to branches, count only if there is nothing
-/// else. Where there are no branches, the parameter of the first survey or sweep.
+/// Default horizontal axis: the free parameter of most points of branches. The runs of a homotopy, which only lead to
+/// branches, count only if there are no branches besides. Without any branch, it is the parameter of the first survey
+/// or sweep.
 pub fn default_x(diagram: &Diagram) -> Quantity {
     if let ([], Some(set)) = (&diagram.branches[..], diagram.responses.first()) {
         return Quantity::Parameter(set.free);
@@ -30,26 +31,26 @@ pub fn default_x(diagram: &Diagram) -> Quantity {
     let counted = if followed.is_empty() { diagram.branches.iter().collect() } else { followed };
     let count = |free: usize| counted.iter().filter(|b| b.free == free).map(|b| b.points.len()).sum::<usize>();
     let frees = counted.iter().map(|b| b.free);
-    // Of equally many the first: max_by_key would take the last.
+    // Ties go to the first parameter: max_by_key would take the last.
     Quantity::Parameter(frees.rev().max_by_key(|free| count(*free)).unwrap_or(0))
 }
 
-/// True if a branch is a leg of a homotopy: the third leg of `NAME` is called `NAME/3`.
+/// True if a branch is a run of a homotopy: the third run of `NAME` is called `NAME/3`.
 fn is_leg(branch: &Branch) -> bool {
     branch.name.rsplit_once('/').is_some_and(|(_, number)| number.parse::<usize>().is_ok())
 }
 
-/// The largest value of the first output, or of the first state where there is no output.
+/// Default vertical axis: the largest value of the first output, or of the first state if there is no output.
 pub fn default_y(model: &Model) -> Quantity {
     Quantity::Largest(if model.outputs.is_empty() { 0 } else { model.states.len() })
 }
 
-/// The value at a point, if it has one that can be drawn.
+/// Value at a point, if it exists and can be drawn.
 pub fn drawn(quantity: Quantity, point: &Point) -> Option<f64> {
     quantity.of(point).filter(|value| value.is_finite())
 }
 
-/// The axis label: Greek names as letters, the unit in brackets where there is one.
+/// Axis label: Greek names as letters, the unit in brackets if there is one.
 pub fn label(quantity: Quantity, model: &Model) -> String {
     let variable = |index: usize| match index.checked_sub(model.states.len()) {
         None => model.states.get(index).map(|s| (s.name.as_str(), s.unit.as_str())),
@@ -65,14 +66,14 @@ pub fn label(quantity: Quantity, model: &Model) -> String {
         Quantity::Largest(index) => (variable(index).unwrap_or_default(), "max "),
         Quantity::Mean(index) => (variable(index).unwrap_or_default(), "mean "),
         Quantity::Rms(index) => (variable(index).unwrap_or_default(), "rms "),
-        // In the unit of the variable times time, which has no name.
+        // Its unit, that of the variable times time, has no name.
         Quantity::Integral(index) => ((variable(index).unwrap_or_default().0, ""), "integral of "),
     };
     let unit = if matches!(unit, "" | "1" | "-") { String::new() } else { format!(" [{unit}]") };
     format!("{front}{}{unit}", with_greek(name))
 }
 
-/// `Omega` → `Ω`, `omega_n` → `ω_n`.
+/// Replaces Greek names by letters: `Omega` → `Ω`, `omega_n` → `ω_n`.
 pub fn with_greek(name: &str) -> String {
     const LETTERS: [(&str, &str); 24] = [
         ("alpha", "α"),

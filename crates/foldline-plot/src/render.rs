@@ -1,10 +1,10 @@
-//! SVG to PNG and PDF.
+//! Conversion of SVG to PNG and PDF.
 
 use resvg::{tiny_skia, usvg};
 use std::fmt;
 use std::sync::Arc;
 
-/// The picture could not be rendered.
+/// Reason why a picture could not be rendered.
 #[derive(Clone, Debug)]
 pub struct RenderError(String);
 
@@ -24,7 +24,7 @@ fn tree(svg: &str) -> Result<usvg::Tree, RenderError> {
     usvg::Tree::from_str(svg, &options).map_err(|e| RenderError(e.to_string()))
 }
 
-/// A PNG, `scale` pixels for each unit of the SVG.
+/// Renders a PNG with `scale` pixels per unit of the SVG.
 pub fn png(svg: &str, scale: f32) -> Result<Vec<u8>, RenderError> {
     let tree = tree(svg)?;
     let size = tree.size().to_int_size().scale_by(scale).ok_or_else(|| RenderError("it has no size".into()))?;
@@ -34,7 +34,7 @@ pub fn png(svg: &str, scale: f32) -> Result<Vec<u8>, RenderError> {
     pixels.encode_png().map_err(|e| RenderError(e.to_string()))
 }
 
-/// A PDF of one page with text that can be searched.
+/// Renders a one-page PDF whose text can be searched.
 pub fn pdf(svg: &str) -> Result<Vec<u8>, RenderError> {
     let (conversion, page) = (svg2pdf::ConversionOptions::default(), svg2pdf::PageOptions::default());
     svg2pdf::to_pdf(&tree(svg)?, conversion, page).map_err(|e| RenderError(e.to_string()))

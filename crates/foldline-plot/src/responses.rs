@@ -1,7 +1,7 @@
-//! Surveys and sweeps as layers, to be drawn over the branches.
+//! Surveys and sweeps as layers drawn over the branches.
 //!
-//! **Idea.** A sweep is a thin line with marks that point the way it went: △ while the parameter rises, ▽ while it falls; the line is
-//! interrupted where it jumped. The motions of a survey are dots. Motions that repeat themselves are hollow marks, others
+//! **Idea.** A sweep is a thin line with marks that show its direction: △ while the parameter rises, ▽ while it falls;
+//! the line is interrupted at jumps. The motions of a survey are dots. Periodic motions are hollow marks, others
 //! (chaos, tori) small filled ones. Escaped trajectories are not drawn.
 
 use crate::figure::{Layer, Marker};
@@ -9,17 +9,18 @@ use crate::palette::nth;
 use foldline::diagram::{Diagram, Motion, Response, Responses, Search};
 use foldline::special::quantity::Quantity;
 
-/// Marks along a sweep: more would run into each other.
+/// Maximum number of marks along a sweep; more would overlap.
 const MARKS: usize = 60;
 
-/// The layers of all surveys and sweeps, the first in the colour after `taken` others; nothing for quantities of which simulation
-/// knows no value (see [`value`]).
+/// Layers of all surveys and sweeps, starting with the colour after `taken` others. Empty for quantities of which
+/// simulation has no value (see [`value`]).
 pub fn response_layers(diagram: &Diagram, x: Quantity, y: Quantity, taken: usize) -> Vec<Layer> {
     let sets = diagram.responses.iter().enumerate();
     sets.flat_map(|(k, set)| set_layers(set, x, y, nth(taken + k))).collect()
 }
 
-/// The value of a quantity of a settled motion: a parameter, the period, the smallest or largest value of a state or output.
+/// Value of a quantity for a settled motion: a parameter, the period, the smallest or largest value of a state or
+/// output.
 pub fn value(quantity: Quantity, response: &Response) -> Option<f64> {
     let found = match quantity {
         Quantity::Parameter(k) => response.parameters.get(k).copied(),
@@ -56,18 +57,18 @@ fn set_layers(set: &Responses, x: Quantity, y: Quantity, colour: &'static str) -
     layers
 }
 
-/// The name of a sweep with its direction, unless that is the name.
+/// Name of a sweep followed by its direction, unless the name is the direction.
 fn title(name: &str, way: &str) -> String {
     if name.to_lowercase().contains(way) { format!("{name} (sweep)") } else { format!("{name} (sweep {way})") }
 }
 
-/// The mark of a sweep by its direction, and its words.
+/// Mark of a sweep for its direction, and the direction in words.
 fn direction(set: &Responses) -> Option<(Marker, &'static str)> {
     let (first, last) = (set.responses.first()?.value, set.responses.last()?.value);
     Some(if last >= first { (Marker::Triangle, "up") } else { (Marker::Nabla, "down") })
 }
 
-/// The line of a sweep, interrupted at its jumps.
+/// Line of a sweep, interrupted at its jumps.
 fn line(set: &Responses, at: &dyn Fn(&Response) -> Option<[f64; 2]>) -> Vec<[f64; 2]> {
     let jumps = set.jumps();
     let nowhere = [f64::NAN; 2];
@@ -104,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn a_sweep_points_its_way_and_is_interrupted_at_its_jumps() {
+    fn a_sweep_shows_its_direction_and_is_interrupted_at_its_jumps() {
         let up = set_layers(&set(&[1.0, 2.0, 3.0, 4.0], 2), Quantity::Parameter(0), Quantity::Largest(0), "red");
         let Shape::Curve { stretches, .. } = &up[0].shape else { panic!("a line comes first") };
         assert_eq!(stretches.iter().map(Vec::len).collect::<Vec<_>>(), [2, 2]);

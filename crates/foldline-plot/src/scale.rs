@@ -1,24 +1,24 @@
-//! One axis: where values stand along it, its ticks and their labels.
+//! One axis: positions of values, ticks and their labels.
 
 use crate::figure::Axis;
 use crate::font::width;
 use crate::ticks::{labels, ticks};
 
-/// Font size of everything that is no title.
+/// Font size of everything but titles.
 pub(crate) const SIZE: f64 = 13.0;
 
-/// An axis whose range is known, in *axis units*: the values themselves, or their decimal logarithms.
+/// Axis with a known range, in *axis units*: the values themselves, or their decimal logarithms.
 #[derive(Clone, Debug)]
 pub(crate) struct Scale {
     pub low: f64,
     pub high: f64,
     pub log: bool,
-    /// Places in axis units, and what is written there (nothing at minor ticks).
+    /// Positions in axis units, and labels (empty at minor ticks).
     pub ticks: Vec<(f64, String)>,
 }
 
 impl Scale {
-    /// The range stated, or one with room around `extent` (axis units), which may be empty.
+    /// Returns the stated range, or one with room around `extent` (axis units), which may be empty.
     pub fn new(axis: &Axis, extent: Option<[f64; 2]>) -> Scale {
         let units = |v: f64| if axis.log { v.log10() } else { v };
         let stated = axis.range.map(|range| range.map(units)).filter(|[a, b]| a < b && (b - a).is_finite());
@@ -26,7 +26,7 @@ impl Scale {
         Scale { low, high, log: axis.log, ticks: Vec::new() }
     }
 
-    /// The place of a value in axis units; NaN where it has none.
+    /// Position of a value in axis units; NaN if it has none.
     pub fn units(&self, value: f64) -> f64 {
         match self.log {
             true if value > 0.0 => value.log10(),
@@ -35,7 +35,7 @@ impl Scale {
         }
     }
 
-    /// The share of the axis before a place in axis units.
+    /// Fraction of the axis that lies before a position in axis units.
     pub fn share(&self, units: f64) -> f64 {
         (units - self.low) / (self.high - self.low)
     }
@@ -50,7 +50,7 @@ impl Scale {
         places.iter().copied().zip(labels(&places)).collect()
     }
 
-    /// Powers of ten, every second or third where they would be many, with the multiples in between as minor ticks.
+    /// Powers of ten, or every second or third of them if there are many, with the multiples in between as minor ticks.
     fn powers(&self, wanted: usize) -> Vec<(f64, String)> {
         let (first, last) = ((self.low - 1e-9).ceil() as i32, (self.high + 1e-9).floor() as i32);
         if last <= first {
@@ -69,13 +69,13 @@ impl Scale {
         all
     }
 
-    /// The width of the widest label.
+    /// Width of the widest label.
     pub fn widest(&self) -> f64 {
         self.ticks.iter().map(|(_, text)| width(text, SIZE)).fold(0.0, f64::max)
     }
 }
 
-/// `10³`.
+/// Writes a power of ten, such as `10³`.
 fn power_of_ten(k: i32) -> String {
     let raised = |c: char| match c {
         '-' => '⁻',
@@ -105,7 +105,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_logarithmic_axis_has_powers_of_ten_and_no_place_for_zero() {
+    fn a_logarithmic_axis_has_powers_of_ten_and_no_position_for_zero() {
         let mut scale = Scale::new(&Axis::new("").from(1e-4, 1e2).log(), None);
         scale.divide(8);
         let texts: Vec<&str> = scale.ticks.iter().map(|(_, t)| t.as_str()).filter(|t| !t.is_empty()).collect();

@@ -1,7 +1,7 @@
-//! Where texts stand so that they hide nothing.
+//! Placement of texts where they hide nothing.
 //!
-//! **Idea.** What is drawn already is known as *ink*, points along the curves, and as boxes of other texts and marks. For a
-//! new text places around its anchor are tried, and the one that hides least is taken.
+//! **Idea.** Anything already drawn is known as *ink*, points along the curves, and as boxes of other texts and marks.
+//! For a new text, positions around its anchor are tried and the one that hides least is chosen.
 
 use crate::font::width;
 
@@ -30,7 +30,7 @@ impl Area {
     }
 }
 
-/// What a panel has on it.
+/// Occupied parts of a panel.
 #[derive(Clone, Debug)]
 pub(crate) struct Occupied {
     /// The axes.
@@ -48,7 +48,7 @@ impl Occupied {
         self.boxes.push(area);
     }
 
-    /// Notes a polyline on the page, a point every few units.
+    /// Records a polyline on the page, a point every few units.
     pub fn draw(&mut self, line: &[[f64; 2]]) {
         const EVERY: f64 = 3.0;
         for pair in line.windows(2) {
@@ -59,7 +59,7 @@ impl Occupied {
         }
     }
 
-    /// How much a box would hide.
+    /// Amount of ink that a box would hide.
     fn hidden(&self, area: &Area) -> f64 {
         let outside = (area.right - area.left) * (area.bottom - area.top) - area.overlap(&self.frame);
         let boxes: f64 = self.boxes.iter().map(|b| area.overlap(b)).sum();
@@ -67,7 +67,7 @@ impl Occupied {
         100.0 * outside.max(0.0) + 10.0 * boxes + 12.0 * ink
     }
 
-    /// The box of a text beside the first of `anchors` where it hides nothing; it is taken. `None` where there is no room.
+    /// Reserves a box for a text beside the first of `anchors` where it hides nothing; `None` if there is no room.
     pub fn with_room(&mut self, anchors: &[[f64; 2]], text: &str, size: f64, gap: f64) -> Option<Area> {
         let free = |anchor: &[f64; 2]| {
             let (cost, area) = self.best_beside(*anchor, text, size, gap, 1);
@@ -78,14 +78,14 @@ impl Occupied {
         Some(area)
     }
 
-    /// The box of a text beside `anchor`, `gap` away; it is taken.
+    /// Reserves a box for a text beside `anchor`, `gap` away.
     pub fn beside(&mut self, anchor: [f64; 2], text: &str, size: f64, gap: f64) -> Area {
         let (_, area) = self.best_beside(anchor, text, size, gap, 5);
         self.take(area);
         area
     }
 
-    /// The box beside `anchor`, in so many rings around it, that hides least, and its cost.
+    /// The box beside `anchor`, in the given number of rings around it, that hides least, and its cost.
     fn best_beside(&self, anchor: [f64; 2], text: &str, size: f64, gap: f64, rings: usize) -> (f64, Area) {
         let (w, h) = (width(text, size) + 2.0, 1.15 * size);
         let towards = [(1, 0), (1, -1), (1, 1), (0, -1), (0, 1), (-1, -1), (-1, 1), (-1, 0)];
@@ -105,7 +105,7 @@ impl Occupied {
         best
     }
 
-    /// The box of that size, at the border of the axes, that hides least; it is taken.
+    /// Reserves the box of that size, at the border of the axes, that hides least.
     pub fn at_the_border(&mut self, w: f64, h: f64, inset: f64) -> Area {
         let Area { left, right, top, bottom } = self.frame;
         let (columns, rows) = (5, 5);
@@ -119,7 +119,7 @@ impl Occupied {
             let x = left + inset + share(i, columns) * (right - left - 2.0 * inset - w);
             let y = top + inset + share(j, rows) * (bottom - top - 2.0 * inset - h);
             let area = Area { left: x, right: x + w, top: y, bottom: y + h };
-            // Corners first where nothing speaks against them.
+            // Prefers corners among equals.
             let corner = (i == 0 || i + 1 == columns) && (j == 0 || j + 1 == rows);
             let cost = self.hidden(&area) + if corner { 0.0 } else { 5.0 };
             if cost < best.0 {
@@ -131,7 +131,7 @@ impl Occupied {
     }
 }
 
-/// A text that may stand in an SVG.
+/// Escapes a text for SVG.
 pub(crate) fn escaped(text: &str) -> String {
     let allowed = text.chars().filter(|c| !c.is_control() || c.is_whitespace());
     let escape = |c: char| match c {
@@ -149,7 +149,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_text_keeps_away_from_curves_and_from_other_texts() {
+    fn texts_avoid_curves_and_other_texts() {
         let frame = Area { left: 0.0, right: 300.0, top: 0.0, bottom: 200.0 };
         let mut page = Occupied::new(frame);
         page.draw(&[[100.0, 100.0], [300.0, 100.0]]);

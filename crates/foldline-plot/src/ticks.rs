@@ -1,6 +1,6 @@
 //! Round numbers along an axis.
 
-/// Ticks from `low` to `high`, a multiple of 1, 2 or 5 times a power of ten apart, about `wanted` of them.
+/// About `wanted` ticks from `low` to `high`, spaced by 1, 2 or 5 times a power of ten.
 pub fn ticks(low: f64, high: f64, wanted: usize) -> Vec<f64> {
     let raw = (high - low) / wanted.max(1) as f64;
     if !raw.is_normal() || raw < 0.0 || raw < 1e-13 * low.abs().max(high.abs()) {
@@ -13,7 +13,7 @@ pub fn ticks(low: f64, high: f64, wanted: usize) -> Vec<f64> {
     (0..=(last - first).max(0.0) as usize).map(|k| (first + k as f64) * step).collect()
 }
 
-/// The labels of ticks: as many decimals as the ticks need, powers of ten where numbers would be long.
+/// Labels of ticks with as many decimals as needed, or powers of ten where numbers would be long.
 pub fn labels(ticks: &[f64]) -> Vec<String> {
     let largest = ticks.iter().fold(0.0_f64, |m, t| m.max(t.abs()));
     let step = ticks.windows(2).map(|w| w[1] - w[0]).fold(f64::INFINITY, f64::min);

@@ -49,7 +49,7 @@ fn spectrum() -> Panel {
 }
 
 #[test]
-fn every_kind_of_layer_is_drawn_and_nothing_leaves_the_page() {
+fn every_kind_of_layer_is_drawn_within_the_page() {
     let figure = Figure::grid("Everything <there> is", 2, vec![curves(), zoom(), orbit(), spectrum()]);
     let text = figure_svg(&figure);
     let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR"));
@@ -69,7 +69,7 @@ fn every_kind_of_layer_is_drawn_and_nothing_leaves_the_page() {
     }
 }
 
-/// The amount by which a shape is longer in one direction, on a panel that is not square.
+/// The extents of a circle agree in both directions, on a panel that is not square.
 #[test]
 fn a_circle_is_round_where_units_are_equal() {
     let panel = Panel::new("", "", Axis::new("").from(-1.5, 1.5), Axis::new("").from(-1.5, 1.5)).equal();
@@ -92,7 +92,7 @@ fn a_circle_is_round_where_units_are_equal() {
 }
 
 #[test]
-fn what_is_not_finite_is_left_out() {
+fn values_that_are_not_finite_are_left_out() {
     let points = [[0.0, 1.0], [1.0, f64::NAN], [2.0, 1.0], [3.0, f64::INFINITY], [4.0, 2.0], [5.0, 3.0]];
     for axis in [Axis::new(""), Axis::new("").log()] {
         let panel = Panel::new("", "", axis.clone(), axis).with(Layer::curve(&points, BLUE)).with(Layer::scatter(

@@ -41,7 +41,7 @@ fn point(position: i64, omega: f64, r: f64, unstable: usize, cycle: bool) -> Poi
     }
 }
 
-/// A resonance peak: amplitude 1/sqrt((1 - s²)² + c²) leaning over, s the position along the curve.
+/// A resonance peak that leans over: amplitude 1/sqrt((1 - s²)² + c²), with s the position along the curve.
 fn peak(name: &str, scale: f64) -> Branch {
     let mut branch = Branch::new(name, Family::Equilibrium, 0, Origin::Seed("start".into()));
     let at = |t: f64| {
@@ -146,9 +146,9 @@ fn a_closed_branch_is_drawn_closed() {
     assert_eq!(pieces[0].vertices.first(), pieces.last().unwrap().vertices.last());
 }
 
-/// Equilibria sin(r) = p with r an angle: the branch closes round the circle, a whole turn from where it began.
+/// Equilibria sin(r) = p with r an angle: the branch closes around the circle, a full turn from where it began.
 #[test]
-fn a_branch_that_closes_round_a_circle_is_not_drawn_back_across_it() {
+fn a_branch_that_closes_around_a_circle_is_not_drawn_back_across_it() {
     let mut branch = Branch::new("round", Family::Equilibrium, 0, Origin::Seed("start".into()));
     for k in 0..60 {
         let r = std::f64::consts::TAU * k as f64 / 60.0;
@@ -160,17 +160,18 @@ fn a_branch_that_closes_round_a_circle_is_not_drawn_back_across_it() {
 }
 
 #[test]
-fn equilibria_have_no_place_on_an_axis_of_periods() {
+fn equilibria_are_not_drawn_against_the_period() {
     assert!(curve::pieces(&peak("cubic S", 1.0), Quantity::Parameter(0), Quantity::Period, [12.0, 6.0]).is_empty());
 }
 
 #[test]
-fn the_three_kinds_of_picture_are_what_their_names_say() {
+fn each_format_is_written_as_its_file_extension_says() {
     let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR"));
     let picture = Picture { title: Some("Made up: cubic & contact".into()), ..Picture::default() };
     let text = svg(&diagram(), &model(), &picture);
     assert!(text.contains("max r") && text.contains("Ω") && text.contains("cubic &amp; contact"));
-    // Two peaks and two closed branches change stability twice and five times, the doubled branch never at a special point.
+    // Two peaks and two closed branches change stability twice and five times, the doubled branch never at a special
+    // point.
     assert!(text.matches("stroke-dasharray").count() > 4, "there are unstable pieces and a sample in the legend");
     let pixels = png(&text, 1.5).unwrap();
     assert_eq!(&pixels[1..4], b"PNG");
@@ -182,7 +183,7 @@ fn the_three_kinds_of_picture_are_what_their_names_say() {
 }
 
 #[test]
-fn a_window_holds_every_coordinate_and_an_empty_diagram_has_axes() {
+fn all_coordinates_lie_in_the_window_and_an_empty_diagram_has_axes() {
     let window = Some([4.0, 6.0, 3.0, 5.0]);
     let text = svg(&diagram(), &model(), &Picture { window, ..Picture::default() });
     std::fs::write(std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("window.png"), png(&text, 1.0).unwrap())
@@ -198,7 +199,7 @@ fn a_window_holds_every_coordinate_and_an_empty_diagram_has_axes() {
 }
 
 #[test]
-fn a_mark_that_was_asked_for_can_be_seen_in_the_diagram_and_in_the_legend() {
+fn requested_marks_are_visible_in_diagram_and_legend() {
     let mut branch = peak("curve", 1.0);
     let special = point(50, 3.5, 1.2, 0, false);
     branch.insert_special(SpecialPoint {
@@ -213,7 +214,7 @@ fn a_mark_that_was_asked_for_can_be_seen_in_the_diagram_and_in_the_legend() {
     });
     let diagram = Diagram { branches: vec![branch], ..Diagram::default() };
     let drawn = svg(&diagram, &model(), &Picture::default());
-    // A dot has no outline; white on white would be nothing.
+    // A dot has no outline, so white on white would be invisible.
     let dots: Vec<&str> = drawn.lines().filter(|line| line.contains("stroke=\"none\"/></g>")).collect();
     assert_eq!(dots.len(), 2, "in the diagram and in the legend");
     assert!(dots.iter().all(|dot| !dot.contains("fill=\"#fff\"")), "{dots:?}");
@@ -221,7 +222,7 @@ fn a_mark_that_was_asked_for_can_be_seen_in_the_diagram_and_in_the_legend() {
 }
 
 #[test]
-fn the_legs_of_a_homotopy_do_not_decide_what_the_axis_shows() {
+fn homotopy_runs_do_not_determine_the_axis() {
     let mut legs: Vec<Branch> = ["way/1", "way/2", "way/10"].map(|name| peak(name, 1.0)).to_vec();
     legs.iter_mut().for_each(|leg| leg.free = 7);
     let only = Diagram { branches: legs.clone(), ..Diagram::default() };

@@ -1,4 +1,4 @@
-//! What came out: branches as columns, solutions one by one.
+//! Results: branches as columns, solutions one by one.
 
 use crate::bytes::{counted, integers, numbers, parts};
 use crate::failure;
@@ -17,24 +17,24 @@ use pyo3::types::{PyBytes, PyDict};
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// A diagram with the study that it answers.
+/// A diagram with its study.
 #[pyclass(frozen, module = "foldline._native")]
 pub struct Diagram {
     pub diagram: Arc<diagram::Diagram>,
     pub study: Arc<study_file::Study>,
-    /// What a remark is about, and the remark.
+    /// Subject of each remark, and the remark.
     #[pyo3(get)]
     pub notes: Vec<(String, String)>,
 }
 
 impl Diagram {
-    /// In the order of the study.
+    /// Returns the diagram with its branches in the order of the study.
     pub fn new(diagram: diagram::Diagram, study: Arc<study_file::Study>, notes: Vec<(String, String)>) -> Diagram {
         let diagram = Arc::new(ordered(diagram, &names(&study.plan)));
         Diagram { diagram, study, notes }
     }
 
-    /// The branch of that number.
+    /// Branch with that index.
     pub fn branch(&self, py: Python, index: usize) -> PyResult<&Branch> {
         let found = self.diagram.branches.get(index);
         found.ok_or_else(|| failure::internal(py, format!("there is no branch {index}")))
@@ -43,7 +43,7 @@ impl Diagram {
 
 #[pymethods]
 impl Diagram {
-    /// The run in a folder.
+    /// Loads the run in a folder.
     #[staticmethod]
     fn load(py: Python, folder: PathBuf) -> PyResult<Diagram> {
         let run = py.detach(|| load(&folder)).map_err(|error| failure::of_run_file(py, &error))?;
@@ -53,18 +53,18 @@ impl Diagram {
         Ok(Diagram::new(run.diagram, Arc::new(study), run.notes))
     }
 
-    /// Writes it as a run, into a folder that has none.
+    /// Writes the diagram as a run into a folder without a run.
     fn save(&self, py: Python, folder: PathBuf) -> PyResult<()> {
         let saved = py.detach(|| save(&folder, &self.study, &self.diagram, &self.notes));
         saved.map_err(|error| failure::of_run_file(py, &error))
     }
 
-    /// The study.
+    /// Study of the diagram.
     fn study(&self) -> Study {
         Study { study: Arc::clone(&self.study) }
     }
 
-    /// The diagram and its model with some quantities in other units, `(name, unit)`, to be shown.
+    /// Returns the diagram and its model with some quantities in other units, `(name, unit)`, for display.
     fn in_units(&self, py: Python, units: Vec<(String, String)>) -> PyResult<Diagram> {
         let refused = |[message, cure]: [String; 2]| failure::of_argument(py, message, cure);
         let conversion = Conversion::new(&self.study.model, &units).map_err(refused)?;
@@ -73,17 +73,17 @@ impl Diagram {
         Ok(Diagram { diagram, study: Arc::new(study), notes: self.notes.clone() })
     }
 
-    /// What of the study was not reached.
+    /// Unreached parts of the study.
     fn short(&self) -> Vec<String> {
         short::lines(&self.diagram, &self.study.plan, &self.study.model)
     }
 
-    /// What each branch is.
+    /// Description of each branch.
     fn branches<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
         self.diagram.branches.iter().map(|branch| described(py, branch)).collect()
     }
 
-    /// A column of the points of a branch, or of its special points: an array's bytes.
+    /// Column of the points or special points of a branch, as the bytes of an array.
     fn column<'py>(&self, py: Python<'py>, branch: usize, special: bool, name: &str) -> PyResult<Bound<'py, PyBytes>> {
         let branch = self.branch(py, branch)?;
         let points: Vec<&Point> = match special {
@@ -93,7 +93,8 @@ impl Diagram {
         column(py, &points, branch, special, name)
     }
 
-    /// Kind, unstable before and after, error, coefficients, their errors, criticality and normal form of each special point of a branch.
+    /// Kind, unstable before and after, error, coefficients, their errors, criticality and normal form of each special
+    /// point of a branch.
     fn special(&self, py: Python, branch: usize) -> PyResult<Vec<SpecialRow>> {
         let row = |s: &diagram::SpecialPoint| {
             let (before, after) = (s.unstable_before, s.unstable_after);
@@ -114,7 +115,7 @@ impl Diagram {
         Ok(Solution::new(point.clone(), &self.study.model))
     }
 
-    /// Only one branch, to be told to a computation that goes on from it.
+    /// Returns a diagram of one branch only, as the start of a computation that continues it.
     fn only(&self, py: Python, branch: usize, name: &str) -> PyResult<Diagram> {
         let mut branch = self.branch(py, branch)?.clone();
         branch.name = name.to_string();
@@ -122,16 +123,16 @@ impl Diagram {
         Ok(Diagram { diagram: Arc::new(diagram), study: Arc::clone(&self.study), notes: Vec::new() })
     }
 
-    /// The solution at the goal of a homotopy.
+    /// Solution at the target of a homotopy.
     fn arrival(&self, homotopy: &str) -> Option<Solution> {
         let plan = self.study.plan.homotopies.iter().find(|plan| plan.name == homotopy)?;
         let mut legs = self.diagram.branches.iter().filter(|b| leg(&b.name, homotopy).is_some());
-        // The first leg that is there ended the search.
+        // The first run that reached the target ended the search.
         let point = legs.find_map(|leg| leg.end_at(&plan.targets))?;
         Some(Solution::new(point.clone(), &self.study.model))
     }
 
-    /// What surveys and sweeps saw: one table each.
+    /// Results of surveys and sweeps, one table each.
     fn responses<'py>(&self, py: Python<'py>) -> PyResult<Vec<Bound<'py, PyDict>>> {
         let variables = self.study.model.dim() + self.study.model.output_count();
         self.diagram.responses.iter().map(|set| responses(py, set, variables)).collect()
@@ -181,7 +182,7 @@ fn column<'py>(
             counted(py, count * width, points.iter().flat_map(|p| p.ranges.as_flattened().iter().copied()))
         }
         "spectrum" => {
-            // What of a spectrum could not be computed is not a number.
+            // Multipliers that could not be computed are NaN.
             let width = points.iter().map(|p| p.spectrum.len()).max().unwrap_or(0);
             let padded = |p: &&Point| parts(&p.spectrum).chain(std::iter::repeat(f64::NAN)).take(2 * width).collect();
             let rows: Vec<Vec<f64>> = points.iter().map(padded).collect();
@@ -213,7 +214,7 @@ fn column<'py>(
     }
 }
 
-/// The columns of a survey or sweep of a model with so many states and outputs, `variables`.
+/// Columns of a survey or sweep of a model with `variables` states and outputs.
 fn responses<'py>(py: Python<'py>, set: &diagram::Responses, variables: usize) -> PyResult<Bound<'py, PyDict>> {
     let (parts, all) = (PyDict::new(py), &set.responses);
     let number = |of: fn(&diagram::Response) -> f64| numbers(py, all.iter().map(of));

@@ -1,4 +1,4 @@
-//! Mistakes as exceptions of the package, with the sentences of the command line.
+//! Mistakes as exceptions of the package, with the messages of the command line.
 //!
 //! The exceptions are classes of `foldline._errors`.
 
@@ -13,12 +13,12 @@ fn raised(py: Python, class: &str, message: String) -> PyErr {
     made.map_or_else(|error| error, PyErr::from_value)
 }
 
-/// Mistakes in a text: a model, a study.
+/// Exception for mistakes in a text: a model or a study.
 pub fn of_text(py: Python, found: &[Diagnostic]) -> PyErr {
     let texts: Vec<String> = found.iter().map(|d| d.to_string().trim_end().to_string()).collect();
     let error = raised(py, "InputError", texts.join("\n\n"));
     let list: PyResult<Vec<Bound<PyDict>>> = found.iter().map(|d| described(py, d)).collect();
-    // The message says it all; the parts are for those who want to show them otherwise.
+    // The message is complete; the parts are for programs that display mistakes in their own way.
     let _ = list.and_then(|list| error.value(py).setattr("diagnostics", list));
     error
 }
@@ -33,25 +33,25 @@ fn described<'py>(py: Python<'py>, found: &Diagnostic) -> PyResult<Bound<'py, Py
     Ok(parts)
 }
 
-/// A mistake in an argument, and what would be right.
+/// Exception for a mistake in an argument, with its remedy.
 pub fn of_argument(py: Python, message: impl Display, cure: impl Display) -> PyErr {
     raised(py, "InputError", format!("{message}\n  help: {cure}"))
 }
 
-/// Nothing to start from.
+/// Exception if there is no solution to start from.
 pub fn no_solution(py: Python, why: String) -> PyErr {
     raised(py, "NoSolution", why)
 }
 
-/// A run file that cannot be made, read or continued.
+/// Exception for a run file that cannot be made, read or continued.
 pub fn of_run_file(py: Python, error: &RunFileError) -> PyErr {
-    // What the command calls `--out DIR` and `--resume` are arguments here.
+    // `--out DIR` and `--resume` of the command are arguments here.
     let message =
         error.to_string().replace("`--resume`", "`resume=True`").replace("--resume --out DIR", "resume=True, out=DIR");
     raised(py, "RunFileError", message.replace("`--out DIR`", "`out=DIR`"))
 }
 
-/// A mistake of the program itself.
+/// Exception for a mistake in the program itself.
 pub fn internal(py: Python, what: String) -> PyErr {
     raised(py, "Error", format!("internal error in foldline: {what}"))
 }

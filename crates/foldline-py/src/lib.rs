@@ -1,17 +1,17 @@
 //! The half of the Python package `foldline` that is written in Rust: `foldline._native`.
 //!
-//! **Idea.** A door as thin as the command line. Text goes in and is read by `foldline-store`, so that mistakes are answered with the
-//! same sentences; what comes out is handed over as bytes, from which NumPy makes arrays without a further copy. The half in
-//! `python/foldline` gives all this names, defaults and pictures. Neither holds mathematics.
+//! **Idea.** An interface as thin as the command line. Text is read by `foldline-store`, so that mistakes are reported
+//! in the same words; results are returned as bytes, from which NumPy makes arrays without a further copy. The half in
+//! `python/foldline` adds names, defaults and pictures. Neither half contains mathematics.
 //!
 //! | question | file |
 //! |---|---|
-//! | how is a model read, how does a trajectory run? | `model`, `simulation` |
-//! | what is to be computed? | `study` |
-//! | how is it computed, without the interpreter's lock, and stopped? | `work`, `patience` |
-//! | what came out? | `diagram`, `solution` |
+//! | how is a model read, how is a trajectory integrated? | `model`, `simulation` |
+//! | what is computed? | `study` |
+//! | how is it computed without the interpreter's lock, and interrupted? | `work`, `patience` |
+//! | what are the results? | `diagram`, `solution` |
 //! | how is it drawn? | `pictures` |
-//! | as which exceptions do mistakes arrive? | `failure` |
+//! | which exceptions report mistakes? | `failure` |
 
 mod bytes;
 mod diagram;

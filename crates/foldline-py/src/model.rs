@@ -1,4 +1,4 @@
-//! A model, read from text.
+//! Models read from text.
 
 use crate::bytes::{numbers, read};
 use crate::failure;
@@ -9,7 +9,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use std::path::PathBuf;
 
-/// A model and the text from which it was read.
+/// A model and its text.
 #[pyclass(frozen, module = "foldline._native")]
 pub struct Model {
     pub model: foldline::model::Model,
@@ -19,7 +19,7 @@ pub struct Model {
     pub file: String,
 }
 
-/// Scale and range, where a model states them.
+/// Scale, range and period, where a model states them.
 type Stated = (Option<f64>, Option<(f64, f64)>, Option<f64>);
 
 /// Name, unit, description.
@@ -27,14 +27,14 @@ type Named<'m> = (&'m str, &'m str, &'m str);
 
 #[pymethods]
 impl Model {
-    /// Reads a text; `file` is its name in messages.
+    /// Reads a model from text; `file` is its name in messages.
     #[staticmethod]
     fn parse(py: Python, text: String, file: String) -> PyResult<Model> {
         let model = py.detach(|| parse_model(&text, &file)).map_err(|found| failure::of_text(py, &found))?;
         Ok(Model { model, text, file })
     }
 
-    /// Reads a file.
+    /// Reads a model file.
     #[staticmethod]
     fn read(py: Python, path: PathBuf) -> PyResult<Model> {
         let (model, text) = py.detach(|| read_model(&path)).map_err(|found| failure::of_text(py, &found))?;
@@ -51,13 +51,13 @@ impl Model {
         &self.model.description
     }
 
-    /// Name, unit, description and value of each.
+    /// Name, unit, description and value of each parameter.
     #[getter]
     fn parameters(&self) -> Vec<(Named<'_>, f64)> {
         self.model.parameters.iter().map(|p| ((&*p.name, &*p.unit, &*p.description), p.value)).collect()
     }
 
-    /// Name, unit, description, and scale, range and period where the model states them, of each.
+    /// Name, unit and description of each state, with scale, range and period where the model states them.
     #[getter]
     fn states(&self) -> Vec<(Named<'_>, Stated)> {
         let row = |s: &foldline::model::State| (s.scale, s.range.map(|[low, high]| (low, high)), s.period);
@@ -65,19 +65,19 @@ impl Model {
         named.collect()
     }
 
-    /// Name, unit and description of each.
+    /// Name, unit and description of each output.
     #[getter]
     fn outputs(&self) -> Vec<Named<'_>> {
         self.model.outputs.iter().map(|o| (&*o.name, &*o.unit, &*o.description)).collect()
     }
 
-    /// Unit of time, and so of periods; empty where it is not known.
+    /// Unit of time, and hence of periods; empty if it is not known.
     #[getter]
     fn time(&self) -> &str {
         &self.model.time
     }
 
-    /// What is doubtful about the units.
+    /// Doubts about the units.
     #[getter]
     fn remarks(&self) -> Vec<String> {
         self.model.remarks.clone()
@@ -94,12 +94,12 @@ impl Model {
         self.model.forced()
     }
 
-    /// The period of the forcing at parameters `[k]`; 1 where there is none.
+    /// Period of the forcing at parameters `[k]`; 1 for an unforced model.
     fn time_unit(&self, parameters: &[u8]) -> f64 {
         self.model.time_unit(&read(parameters))
     }
 
-    /// Every parameter `[k]`, some of them replaced by name.
+    /// Values of all parameters `[k]`, some of them replaced by name.
     fn values<'py>(&self, py: Python<'py>, given: Vec<(String, f64)>) -> PyResult<Bound<'py, PyBytes>> {
         let mut values = self.model.defaults();
         for (name, value) in given {
@@ -113,8 +113,8 @@ impl Model {
         numbers(py, values.into_iter())
     }
 
-    /// The right-hand side in the time of the model, or the outputs, at points `[lanes][n]` with parameters `[k]` and, of a forced
-    /// model, times `[lanes]`: `[lanes][n]` or `[lanes][outputs]`.
+    /// Evaluates the right-hand side in the time of the model, or the outputs, at points `[lanes][n]` with parameters
+    /// `[k]` and, for a forced model, times `[lanes]`: returns `[lanes][n]` or `[lanes][outputs]`.
     fn evaluate<'py>(
         &self,
         py: Python<'py>,
@@ -139,7 +139,7 @@ impl Model {
 }
 
 impl Model {
-    /// The parameter of that name.
+    /// Index of the parameter of that name.
     pub fn index(&self, py: Python, name: &str) -> PyResult<usize> {
         self.model.parameter_index(name).ok_or_else(|| {
             let known: Vec<&str> = self.model.parameters.iter().map(|p| p.name.as_str()).collect();
@@ -149,14 +149,14 @@ impl Model {
     }
 }
 
-/// The known name nearest to a word, or a list of the names that there are, in words.
+/// Suggests the known name nearest to a word, or lists the known names, in words.
 #[pyfunction]
 #[pyo3(name = "suggest")]
 pub fn suggested(word: &str, known: Vec<String>) -> String {
     suggest(word, &known.iter().map(String::as_str).collect::<Vec<_>>())
 }
 
-/// The outputs at states `[lanes][n]`, with times in periods of the forcing: `[lanes][outputs]`.
+/// Outputs at states `[lanes][n]`, with times in forcing periods: `[lanes][outputs]`.
 pub fn outputs_at(model: &foldline::model::Model, states: &[f64], parameters: &[f64], times: &[f64]) -> Vec<f64> {
     batched(model.dim(), model.output_count(), states, parameters, times, |at, out| model.outputs(at, out))
 }

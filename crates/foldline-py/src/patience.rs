@@ -1,8 +1,8 @@
 //! Waiting for a computation without holding the interpreter's lock.
 //!
-//! **Idea.** The computation has a thread of its own. The thread that called looks a few times a second whether Ctrl-C was pressed,
-//! and shows how far the computation is. The first Ctrl-C asks it to stop at the next point; the second, or the first where
-//! nothing can be asked, leaves it to itself.
+//! **Idea.** The computation has a thread of its own. A few times a second the calling thread checks for Ctrl-C
+//! and shows progress. The first Ctrl-C asks the computation to stop at the next point. The second, or the first if
+//! the computation cannot be stopped, abandons it.
 
 use crate::failure;
 use pyo3::prelude::*;
@@ -14,10 +14,10 @@ use std::time::Duration;
 
 const LOOK: Duration = Duration::from_millis(100);
 
-/// The result of `work`, and the exception of the Ctrl-C that stopped it, if one did.
+/// Returns the result of `work`, and the exception of the Ctrl-C that stopped it, if one did.
 ///
 /// # Errors
-/// The exception where the computation could not be stopped, or one of `show`.
+/// The exception of Ctrl-C if the computation was abandoned, or one of `show`.
 pub fn patiently<T: Send + 'static>(
     py: Python,
     stop: Option<&AtomicBool>,
@@ -27,7 +27,7 @@ pub fn patiently<T: Send + 'static>(
     let (sender, receiver) = channel();
     let receiver = Mutex::new(receiver);
     std::thread::spawn(move || {
-        // Nobody may be there any more to receive it.
+        // The receiver may be gone.
         let _ = sender.send(catch_unwind(AssertUnwindSafe(work)));
     });
     let mut interrupt = None;

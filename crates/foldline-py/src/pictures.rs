@@ -1,4 +1,4 @@
-//! Curves for pictures, by the rules of the command line's pictures.
+//! Curves for pictures, by the rules of the pictures of the command line.
 
 use crate::bytes::numbers;
 use crate::diagram::Diagram;
@@ -15,13 +15,13 @@ fn quantity(py: Python, name: &str, model: &foldline::model::Model) -> PyResult<
     named.map_err(|known| failure::of_argument(py, format!("there is no quantity `{name}`"), known))
 }
 
-/// The label of an axis: Greek names as letters, the unit in brackets where there is one.
+/// Axis label: Greek names as letters, the unit in brackets if there is one.
 #[pyfunction]
 pub fn label(py: Python, model: &Model, name: &str) -> PyResult<String> {
     Ok(foldline_plot::label(quantity(py, name, &model.model)?, &model.model))
 }
 
-/// The shape of the mark for a kind of special point.
+/// Shape of the mark for a kind of special point.
 #[pyfunction]
 pub fn marker(kind: &str) -> &'static str {
     match Kind::from_name(kind).map_or(Marker::Dot, Marker::of) {
@@ -39,8 +39,8 @@ pub fn marker(kind: &str) -> &'static str {
 
 type Piece<'py> = (bool, Bound<'py, PyBytes>, Bound<'py, PyBytes>);
 
-/// The pieces of a branch of one stability each, cut exactly at special points: whether it is stable, abscissas and ordinates.
-/// They are rounded between the points, lengths being measured in `scale`, the sizes of the axes.
+/// Pieces of uniform stability of a branch, cut exactly at special points: stability, abscissas and ordinates.
+/// They are rounded between points, with lengths measured in `scale`, the sizes of the axes.
 #[pyfunction]
 pub fn pieces<'py>(
     py: Python<'py>,
@@ -59,7 +59,7 @@ pub fn pieces<'py>(
     pieces.iter().map(|piece| Ok((piece.stable, column(piece, 0)?, column(piece, 1)?))).collect()
 }
 
-/// A picture of some branches as SVG.
+/// Renders some branches as SVG.
 #[pyfunction]
 pub fn svg(py: Python, of: &Diagram, branches: Vec<usize>, x: &str, y: &str, size: (f64, f64)) -> PyResult<String> {
     let model = &of.study.model;

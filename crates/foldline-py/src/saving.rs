@@ -1,4 +1,4 @@
-//! A finished diagram as a run file.
+//! Finished diagrams as run files.
 
 use foldline::contract::{Event, Observer};
 use foldline::diagram::{Branch, Diagram};
@@ -6,10 +6,10 @@ use foldline_store::run_file::{Recorder, RunFileError};
 use foldline_store::study_file::Study;
 use std::path::Path;
 
-/// Writes a diagram into a folder that has no run yet, by telling it as it was told when it was computed.
+/// Writes a diagram into a folder without a run by replaying its events.
 pub fn save(folder: &Path, study: &Study, diagram: &Diagram, notes: &[(String, String)]) -> Result<(), RunFileError> {
     let recorder = Recorder::create(folder, study)?;
-    // What cannot be written `finish` says.
+    // Write errors are reported by `finish`.
     let tell = |event: Event| {
         recorder.observe(event);
     };

@@ -1,4 +1,4 @@
-//! First solutions: where states settle.
+//! First solutions, found where states settle.
 
 use crate::bytes::{numbers, read};
 use crate::failure;
@@ -10,7 +10,7 @@ use foldline_store::finite::never_finite;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
-/// The solution that an attractor's name (`equilibrium`, `cycle`, `2:1`) or a state `[n]` means.
+/// Finds the solution for an attractor's name (`equilibrium`, `cycle`, `2:1`) or from a state `[n]`.
 #[pyfunction]
 #[pyo3(signature = (model, attractor, state, parameters, samples, random, tolerance, jobs, limits))]
 pub fn settle(
@@ -41,8 +41,9 @@ pub fn settle(
 /// A solution, its ratio, the number of hits, the basin fraction with its confidence interval, and the first sample.
 type Found<'py> = (Solution, Option<(u32, u32)>, usize, Option<(f64, f64, f64)>, Bound<'py, PyBytes>);
 
-/// The attractors that sampled states reach, each with its ratio, number of hits, basin fraction and first sample; then the numbers of samples
-/// that escaped (to infinity or out of the region in which f is defined), got stuck, and did not settle.
+/// Finds the attractors that sampled states reach, each with its ratio, number of hits, basin fraction and first
+/// sample; then the numbers of samples that escaped (to infinity or out of the domain of f), got stuck, and did not
+/// settle.
 #[pyfunction]
 pub fn attractors<'py>(
     py: Python<'py>,
@@ -75,14 +76,14 @@ pub fn attractors<'py>(
     Ok((found.collect::<PyResult<_>>()?, (escaped, census.stuck, census.unsettled)))
 }
 
-/// The system with other limits on trajectories, where they are given: steps and time.
+/// Returns the system with other limits on trajectories if they are given: steps and time.
 fn limited<'a>(mut system: System<'a>, (steps, time): (Option<usize>, Option<f64>)) -> System<'a> {
     system.limits.steps = steps.unwrap_or(system.limits.steps);
     system.limits.time = time.unwrap_or(system.limits.time);
     system
 }
 
-/// The parameters, at which the model must be finite somewhere.
+/// Returns the parameters after checking that the model is finite there for some state.
 fn checked(py: Python, model: &Model, parameters: &[u8]) -> PyResult<Vec<f64>> {
     let parameters = read(parameters);
     match never_finite(&model.model, &parameters, &model.text, &model.file) {

@@ -12,8 +12,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 type Course<'py> = (Bound<'py, PyBytes>, Bound<'py, PyBytes>, Bound<'py, PyBytes>, &'static str);
 
-/// The trajectory from `start` `[n]` over a time span: times, states `[time][n]`, outputs `[time][outputs]`, and why it ended. It
-/// is given at `times` if there are any, which grow in the direction of the span, else at the ends of its steps.
+/// Integrates from `start` `[n]` over a time span: returns times, states `[time][n]`, outputs `[time][outputs]`, and
+/// the reason for its end. Output is at `times`, in the direction of the span, or at the ends of the steps if there are
+/// none.
 #[pyfunction]
 pub fn simulate<'py>(
     py: Python<'py>,

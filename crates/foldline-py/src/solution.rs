@@ -1,4 +1,4 @@
-//! A solution: an equilibrium or a cycle at given parameters.
+//! Solutions: equilibria and cycles at given parameters.
 
 use crate::bytes::{counted, integers, numbers, parts};
 use crate::model::outputs_at;
@@ -10,7 +10,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 use std::sync::Arc;
 
-/// A computed point, and the model that it solves.
+/// A computed point with its model.
 #[pyclass(frozen, module = "foldline._native")]
 pub struct Solution {
     pub point: Arc<Point>,
@@ -30,7 +30,7 @@ impl Solution {
     }
 }
 
-/// An array's bytes.
+/// Bytes of an array.
 type Array<'py> = PyResult<Bound<'py, PyBytes>>;
 
 #[pymethods]
@@ -63,19 +63,19 @@ impl Solution {
         self.point.unstable
     }
 
-    /// How often each state that is an angle turns over the cycle.
+    /// Number of turns over the cycle of each state that is an angle.
     #[getter]
     fn turns(&self) -> Vec<(&str, i64)> {
         let of = |(k, period): (usize, f64)| (&*self.model.states[k].name, self.point.solution.turns(k, period));
         self.model.angles().map(of).collect()
     }
 
-    /// `[k]`.
+    /// Parameters `[k]`.
     fn parameters<'py>(&self, py: Python<'py>) -> Array<'py> {
         numbers(py, self.point.parameters.iter().copied())
     }
 
-    /// `[n]` the equilibrium, or the first state of the cycle.
+    /// Equilibrium, or first state of the cycle, `[n]`.
     fn state<'py>(&self, py: Python<'py>) -> Array<'py> {
         let state = match &self.point.solution {
             diagram::Solution::Equilibrium(x) => &x[..],
@@ -89,38 +89,38 @@ impl Solution {
         counted(py, 2 * self.point.spectrum.len(), parts(&self.point.spectrum))
     }
 
-    /// `[n + outputs][2]`.
+    /// Ranges of states and outputs, `[n + outputs][2]`.
     fn ranges<'py>(&self, py: Python<'py>) -> Array<'py> {
         numbers(py, self.point.ranges.as_flattened().iter().copied())
     }
 
-    /// Discretisation, residual, trivial defect, Liouville defect, error of the spectrum.
+    /// Error estimates: discretisation, residual, trivial defect, Liouville defect, error of the spectrum.
     #[getter]
     fn trust(&self) -> (f64, f64, f64, f64, f64) {
         let t = &self.point.trust;
         (t.discretisation, t.residual, t.trivial_defect, t.liouville_defect, t.spectrum)
     }
 
-    /// Newton iterations, factorisations, rejected steps, evaluations, linearisations.
+    /// Work: Newton iterations, factorisations, rejected steps, evaluations, linearisations.
     fn cost<'py>(&self, py: Python<'py>) -> Array<'py> {
         let c = &self.point.cost;
         let all = [c.newton, c.factorisations, c.rejected, c.evaluations, c.linearisations];
         integers(py, all.into_iter().map(|count| count as i64))
     }
 
-    /// `[N + 1]` boundaries of the mesh in normalised time.
+    /// Boundaries of the mesh in normalised time, `[N + 1]`.
     fn mesh<'py>(&self, py: Python<'py>) -> Array<'py> {
         numbers(py, self.cycle().map_or(&[][..], |cycle| &cycle.mesh).iter().copied())
     }
 
-    /// `[N][m + 1][n]`, and m.
+    /// Profile `[N][m + 1][n]`, and m.
     fn profile<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyBytes>, usize)> {
         let cycle = self.cycle();
         let values = numbers(py, cycle.map_or(&[][..], |cycle| &cycle.profile).iter().copied())?;
         Ok((values, cycle.map_or(0, |cycle| cycle.degree)))
     }
 
-    /// `[N (m + 1)]` normalised times of the nodes of the profile.
+    /// Normalised times of the nodes of the profile, `[N (m + 1)]`.
     fn node_times<'py>(&self, py: Python<'py>) -> Array<'py> {
         let Some(cycle) = self.cycle() else { return numbers(py, [].into_iter()) };
         let scheme = Scheme::new(cycle.degree);
@@ -128,7 +128,8 @@ impl Solution {
         numbers(py, cycle.mesh.windows(2).flat_map(on).collect::<Vec<f64>>().into_iter())
     }
 
-    /// `[count][n + outputs]` at `count` uniformly spaced times over one period, the end point excluded.
+    /// States and outputs `[count][n + outputs]` at `count` uniformly spaced times over one period, the end point
+    /// excluded.
     fn uniform<'py>(&self, py: Python<'py>, count: usize) -> Array<'py> {
         let Some(cycle) = self.cycle() else { return numbers(py, [].into_iter()) };
         let (n, m) = (self.model.dim(), self.model.output_count());
@@ -142,7 +143,8 @@ impl Solution {
         counted(py, count * (n + m), (0..count).flat_map(row).copied())
     }
 
-    /// Frequencies, and real and imaginary parts of the amplitudes, of the whirling motion; empty where the model names none.
+    /// Frequencies, and real and imaginary parts of the amplitudes, of the whirling motion; empty if the model names
+    /// none.
     fn signed_spectrum<'py>(
         &self,
         py: Python<'py>,
@@ -154,7 +156,7 @@ impl Solution {
         Ok((numbers(py, lines.iter().map(|(frequency, _)| *frequency))?, amplitudes))
     }
 
-    /// The ratio of its two strongest lines, such as 2:1.
+    /// Ratio of the two strongest lines, such as 2:1.
     #[getter]
     fn ratio(&self) -> Option<(u32, u32)> {
         spectral_ratio(self.cycle()?, self.model.whirl?)

@@ -1,4 +1,4 @@
-//! What is to be computed.
+//! Studies: descriptions of computations.
 
 use crate::failure;
 use crate::model::Model;
@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// A study, and the model that it is about.
+/// A study with its model.
 #[pyclass(frozen, module = "foldline._native")]
 pub struct Study {
     pub study: Arc<study_file::Study>,
@@ -16,28 +16,29 @@ pub struct Study {
 
 #[pymethods]
 impl Study {
-    /// Reads a text about a model; `file` is its name in messages.
+    /// Reads a study for a given model from text; `file` is its name in messages.
     #[staticmethod]
     fn parse(py: Python, text: &str, file: &str, model: &Model) -> PyResult<Study> {
         let study = py.detach(|| parse_study(text, file, &model.text, &model.file));
         study.map(|study| Study { study: Arc::new(study) }).map_err(|found| failure::of_text(py, &found))
     }
 
-    /// Reads a text and the model that it names by a path relative to the current folder; `file` is its name in messages.
+    /// Reads a study from text, and the model that it names by a path relative to the current folder; `file` is its
+    /// name in messages.
     #[staticmethod]
     fn parse_text(py: Python, text: &str, file: &str) -> PyResult<Study> {
         let study = py.detach(|| parse_study_in(text, file, Path::new("")));
         study.map(|study| Study { study: Arc::new(study) }).map_err(|found| failure::of_text(py, &found))
     }
 
-    /// Reads a file and the model that it names.
+    /// Reads a study file and the model that it names.
     #[staticmethod]
     fn read(py: Python, path: PathBuf) -> PyResult<Study> {
         let study = py.detach(|| read_study(&path));
         study.map(|study| Study { study: Arc::new(study) }).map_err(|found| failure::of_text(py, &found))
     }
 
-    /// The study with other limits on trajectories, which become part of its text.
+    /// Returns the study with other limits on trajectories, which become part of its text.
     fn limited(&self, py: Python, steps: Option<u64>, time: Option<String>) -> PyResult<Study> {
         let study = (*self.study).clone().limited(steps, time.as_deref());
         study.map(|study| Study { study: Arc::new(study) }).map_err(|found| failure::of_text(py, &found))
@@ -63,13 +64,13 @@ impl Study {
         self.study.plan.degree
     }
 
-    /// Its model; the values of the parameters are those of the model's text.
+    /// Model of the study, with the parameter values of the model's text.
     fn model(&self) -> Model {
         let study = &self.study;
         Model { model: study.model.clone(), text: study.model_text.clone(), file: study.model_file.clone() }
     }
 
-    /// The range in which a branch of that name is followed, as far as the study says it.
+    /// Range of the branch of that name, if the study states it.
     fn range_of(&self, branch: &str) -> Option<(f64, f64)> {
         let plan = &self.study.plan;
         let within = |name: &str| branch == name || branch.strip_prefix(name).is_some_and(|rest| rest.starts_with('/'));
@@ -80,7 +81,7 @@ impl Study {
         longest.map(|(_, [low, high])| (low, high))
     }
 
-    /// Whether that branch is a leg of a homotopy.
+    /// True if that branch is a run of a homotopy.
     fn is_leg(&self, branch: &str) -> bool {
         self.study.plan.homotopies.iter().any(|homotopy| leg(branch, &homotopy.name).is_some())
     }

@@ -1,4 +1,4 @@
-//! Carrying out a study.
+//! Execution of studies.
 
 use crate::diagram::Diagram;
 use crate::failure;
@@ -17,12 +17,12 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
-/// The diagram that a study asks for, what of the study was not reached, and the exception of the Ctrl-C that ended it early, if
-/// one did.
+/// Runs a study; returns the diagram, the unreached parts of the study, and the exception of the Ctrl-C that ended it
+/// early, if one did.
 ///
-/// `given` are solutions for seeds by name, `earlier` what is known already. With a `folder` every point is written there as it is
-/// accepted, and the diagram is not returned: it is to be loaded. `progress` is called with the number of points and special points and
-/// the place of the last point, a few times a second.
+/// `given` holds solutions for seeds by name, `earlier` known results. With a `folder` every point is written there as
+/// it is accepted, and the diagram is not returned but can be loaded. `progress` is called with the numbers of points
+/// and special points and the place of the last point, a few times a second.
 #[pyfunction]
 #[pyo3(signature = (study, given, earlier, folder, jobs, resume, progress))]
 pub fn run(
@@ -77,14 +77,14 @@ pub fn run(
     }
 }
 
-/// The recorder of a folder, and what is known there.
+/// Returns the recorder of a folder, and the results stored there.
 fn recorded(
     folder: &Path,
     study: &study_file::Study,
     known: Option<&diagram::Diagram>,
     resume: bool,
 ) -> Result<(Recorder, diagram::Diagram), RunFileError> {
-    // A run that was to be resumed but had not begun begins with what is known.
+    // Resuming a run that had not begun starts one with the known results.
     if resume && (known.is_none() || path_in(folder).exists()) {
         return Recorder::resume(folder, study);
     }
@@ -94,7 +94,7 @@ fn recorded(
     }
 }
 
-/// How far it is.
+/// Progress.
 #[derive(Clone, Default)]
 struct Seen {
     points: usize,
@@ -102,7 +102,7 @@ struct Seen {
     place: String,
 }
 
-/// Records, remembers what is shown, and stops when asked to.
+/// Records points, keeps the progress to show, and stops on request.
 struct Watch {
     recorder: Option<Recorder>,
     stop: Arc<AtomicBool>,

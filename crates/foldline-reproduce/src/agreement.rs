@@ -1,17 +1,18 @@
-//! Do simulation and continuation agree?
+//! Agreement between simulation and continuation.
 //!
-//! **Idea.** Every motion that a survey met is looked for among the solutions of the branches at that value of the parameter,
-//! and every stable solution among the motions. A stable solution that sampling missed is simulated from its own state, moved
-//! aside by [`ASIDE`]: if the trajectory comes back, the solution attracts, and only its basin was too small for the sample. A
-//! motion that had not settled is followed on.
+//! **Idea.** Every motion found by a survey is looked up among the solutions of the branches at that parameter value,
+//! and every stable solution among the motions. A stable solution that sampling missed is simulated from its own state,
+//! displaced by [`ASIDE`]: if the trajectory returns, the solution attracts and only its basin was too small for the
+//! sample. A motion that had not settled is integrated further.
 //!
-//! **Equations.** A trajectory that fails to repeat itself by e, relative to the extent X_i of component i, is
+//! **Equations.** A trajectory that repeats itself with an error e, relative to the extent X_i of component i, is
 //!
 //!   (1)  e X_i / (1 - ρ^k) + 10⁻⁷ (s_i + |x_i|)
 //!
-//! away from a cycle run through k times whose largest multiplier but the trivial one has the modulus ρ; the second part, with the
-//! scale s_i, is the error of the integration. One that rests is e (s_i + |x_i|) away from the equilibrium. To this comes the error
-//! of the branch, its tolerance or estimated discretisation error times s_i + |x_i|. Both together never allow more than 10⁻³.
+//! away from a cycle traversed k times whose largest nontrivial multiplier has the modulus ρ; the second part, with the
+//! scale s_i, is the integration error. A trajectory at rest is e (s_i + |x_i|) away from the equilibrium. The error of
+//! the branch is added: its tolerance or estimated discretisation error times s_i + |x_i|. Together they never allow
+//! more than 10⁻³.
 //!
 //! **Fails when** a motion contracts so slowly that (1) reaches that limit: it then counts as unexplained.
 
@@ -24,45 +25,46 @@ use foldline::explore::{System, growth, known};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// By how much a start is moved away from a solution, relative to scale and size; if it does not come back, a tenth of that. To
-/// count as settled the trajectory has to come a hundred times closer.
+/// Displacement of a start from a solution, relative to scale and size; if it does not return, a tenth of that. To
+/// count as settled, the trajectory must come a hundred times closer.
 pub const ASIDE: f64 = 1e-4;
-/// How often a motion that has not settled is followed on.
+/// Maximum number of times that an unsettled motion is integrated further.
 const FOLLOWED: usize = 6;
 const INTEGRATION: f64 = 1e-7;
 const LARGEST: f64 = 1e-3;
-/// Turns of a branch's cycle that a trajectory may take to repeat itself: close to a period doubling it is two for long.
+/// Maximum number of turns of a branch's cycle after which a trajectory may repeat itself; close to a period doubling
+/// it needs two for a long time.
 const TURNS: i32 = 4;
-/// A motion that is farther from every solution, in units of what (1) allows, is not said to be near one.
+/// A motion farther than this from every solution, in units of the allowance in (1), is not described as near one.
 const NEARLY: f64 = 30.0;
 
-/// What a survey and branches say about each other.
+/// Mutual coverage of a survey and branches.
 #[derive(Clone, Debug, Default)]
 pub struct Agreement {
-    /// Every motion that was met.
+    /// Every motion found by the survey.
     pub met: Vec<Met>,
     /// Every stable solution of a branch at the values of the survey.
     pub stable: Vec<Stable>,
 }
 
-/// A motion that was met.
+/// A motion found by the survey.
 #[derive(Clone, Debug)]
 pub struct Met {
-    /// The motion; one that had not settled as it became when it was followed on.
+    /// The motion; if it had not settled, its continuation.
     pub motion: Response,
-    /// How often it was followed on.
+    /// Number of times it was integrated further.
     pub followed: usize,
-    /// The closest solution of its kind.
+    /// Closest solution of the same type.
     pub nearest: Option<Place>,
 }
 
 impl Met {
-    /// The solution that it is.
+    /// Solution that the motion represents.
     pub fn on(&self) -> Option<&Place> {
         self.nearest.as_ref().filter(|place| place.apart <= 1.0)
     }
 
-    /// Whether it lies on a stable part of a branch.
+    /// True if it lies on a stable part of a branch.
     pub fn is_explained(&self) -> bool {
         self.on().is_some_and(|place| place.stable)
     }
@@ -73,11 +75,11 @@ impl Met {
 pub struct Place {
     /// Name of the branch.
     pub branch: String,
-    /// Whether the solution is stable there.
+    /// True if the solution is stable.
     pub stable: bool,
-    /// Turns of the solution for which the trajectory was watched.
+    /// Number of turns of the solution over which the trajectory was compared.
     pub turns: i32,
-    /// Largest difference of period and ranges, as a part of what (1) allows.
+    /// Largest difference of period and ranges, as a fraction of the allowance in (1).
     pub apart: f64,
 }
 
@@ -90,24 +92,25 @@ pub struct Stable {
     pub value: f64,
     /// The solution.
     pub point: Point,
-    /// How simulation saw it.
+    /// Evidence from simulation.
     pub seen: Seen,
 }
 
-/// How simulation saw a stable solution.
+/// Evidence from simulation for a stable solution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Seen {
-    /// So many starts of the survey went there.
+    /// This number of starts of the survey settled there.
     Sampled(usize),
-    /// No start of the survey did, a trajectory that began close to it did.
+    /// No start of the survey settled there, but a trajectory started close by did.
     FromNearby,
-    /// A trajectory that began close to it neither rests nor is seen to repeat itself; long cycles may not be recognised.
+    /// A trajectory started close by neither rests nor repeats itself; long cycles may not be recognised.
     Unsettled,
-    /// Not at all: the trajectory that began close to it went somewhere else.
+    /// None: the trajectory started close by went elsewhere.
     Never,
 }
 
-/// Compares a survey or sweep of `simulated` with every branch of `followed` that has the same parameters, with that many threads.
+/// Compares a survey or sweep of `simulated` with every branch of `followed` at the same parameters, using `jobs`
+/// threads.
 pub fn compare(simulated: &Run, set: &Responses, followed: &[&Run], jobs: usize) -> Agreement {
     let system = System::of_plan(&simulated.study.model, &simulated.study.plan);
     let trial = Trial {
@@ -149,7 +152,7 @@ struct Context<'a> {
     followed: &'a [&'a Run],
 }
 
-/// A solution of a branch, and the tolerance with which it was computed.
+/// A solution of a branch, and the tolerance of its computation.
 struct Known<'a> {
     branch: &'a Branch,
     point: Point,
@@ -157,13 +160,13 @@ struct Known<'a> {
 }
 
 impl Context<'_> {
-    /// The motions of one value; `both` says that the stable solutions are asked for too.
+    /// Compares the motions at one value, and if `both` also the stable solutions.
     fn at_value(&self, group: &[Response], both: bool) -> Agreement {
         let Some(first) = group.first() else { return Agreement::default() };
         let known = self.solutions(first, false);
         let mut met: Vec<Met> = group.iter().map(|response| self.explained(response, &known)).collect();
         if met.iter().any(|m| !m.is_explained()) {
-            // On an unstable part, then?
+            // If not on a stable part, perhaps on an unstable one.
             let all = self.solutions(first, true);
             for m in met.iter_mut().filter(|m| !m.is_explained()) {
                 m.nearest = self.nearest(&m.motion, &all);
@@ -179,8 +182,8 @@ impl Context<'_> {
         Agreement { stable: stable.collect(), met }
     }
 
-    /// The solutions of every branch at the parameters of a response, without the parts that are certainly unstable unless asked
-    /// for.
+    /// Solutions of every branch at the parameters of a response; parts that are certainly unstable are included only
+    /// if `unstable`.
     fn solutions(&self, response: &Response, unstable: bool) -> Vec<Known<'_>> {
         let same = |point: &Point| {
             let pairs = point.parameters.iter().zip(&response.parameters).enumerate();
@@ -203,14 +206,14 @@ impl Context<'_> {
         found
     }
 
-    /// A motion with the solution that it is.
+    /// Pairs a motion with its closest solution.
     fn explained(&self, response: &Response, known: &[Known]) -> Met {
         let (motion, followed) = self.followed_on(response.clone());
         let nearest = self.nearest(&motion, known);
         Met { motion, followed, nearest }
     }
 
-    /// What becomes of a motion that has not settled, and how often it had to be followed on.
+    /// Integrates an unsettled motion further; returns the motion and the number of integrations.
     fn followed_on(&self, mut motion: Response) -> (Response, usize) {
         let mut followed = 0;
         while motion.motion == Motion::Other && followed < FOLLOWED {
@@ -221,7 +224,7 @@ impl Context<'_> {
         (motion, followed)
     }
 
-    /// The response to which a trajectory settles.
+    /// Response to which a trajectory settles.
     fn settled(&self, parameters: &[f64], value: f64, start: &[f64]) -> Option<Response> {
         stepped_sweep(&self.trial, parameters, self.free, &[value], start, &mut |_, _| None, &|_| Verdict::Continue)
             .pop()
@@ -238,7 +241,7 @@ impl Context<'_> {
             Solution::Cycle(cycle) => cycle.state(0.0),
         };
         let mut seen = Seen::Never;
-        // Close to where a cycle begins or doubles its period its basin is very narrow.
+        // Near its birth or a period doubling, a cycle has a very narrow basin.
         for aside in [ASIDE, 0.1 * ASIDE] {
             let start = solution.iter().zip(&self.system.scales).map(|(x, scale)| x + aside * (scale + x.abs()));
             let start: Vec<f64> = start.collect();
@@ -254,14 +257,15 @@ impl Context<'_> {
         seen
     }
 
-    /// The closest solution.
+    /// Closest solution to a motion.
     fn nearest(&self, motion: &Response, known: &[Known]) -> Option<Place> {
         let near = known.iter().filter_map(|k| self.apart(motion, k).map(|(turns, apart)| (k, turns, apart)));
         let (k, turns, apart) = near.min_by(|a, b| a.2.total_cmp(&b.2))?;
         Some(Place { branch: k.branch.name.clone(), stable: k.point.unstable == 0, turns, apart })
     }
 
-    /// Turns, and the difference as a part of what (1) allows; `None` between motions of two kinds.
+    /// Number of turns, and the difference as a fraction of the allowance in (1); `None` for motions of different
+    /// types.
     fn apart(&self, motion: &Response, known: &Known) -> Option<(i32, f64)> {
         let accuracy = known.tolerance.max(known.point.trust.discretisation) + INTEGRATION;
         let (turns, doubt, mut apart) = match (motion.period, known.point.solution.period()) {
@@ -285,8 +289,8 @@ impl Context<'_> {
     }
 }
 
-/// The parts of a branch, two neighbouring points each, that pass a value; without those whose ends are both unstable unless asked
-/// for, and unless a special point lies between them.
+/// Pairs of neighbouring points of a branch that enclose a value. Pairs that are unstable at both ends are included
+/// only if `unstable`, or if a special point lies between them.
 fn passing(branch: &Branch, value: f64, unstable: bool) -> Vec<Branch> {
     let pairs = branch.points.windows(2).map(|pair| {
         let between =
@@ -308,8 +312,8 @@ fn passing(branch: &Branch, value: f64, unstable: bool) -> Vec<Branch> {
 }
 
 impl Agreement {
-    /// The motions on no branch, or on an unstable part of one, alike ones together: what they are, at how many values from where to
-    /// where, and how many starts went there.
+    /// Motions on no branch, or on an unstable part of one, grouped by likeness: description, number and range of
+    /// values, number of starts.
     pub fn unexplained(&self) -> Vec<String> {
         let mut groups: Vec<(String, Vec<&Response>)> = Vec::new();
         for met in self.met.iter().filter(|m| !m.is_explained()) {
@@ -338,7 +342,7 @@ impl Agreement {
     }
 }
 
-/// `4:1`, `4:1 closing after 3 turns`, `not settled`.
+/// Describes a motion: `4:1`, `4:1 closing after 3 turns`, `not settled`.
 pub fn described(motion: &Response) -> String {
     match (motion.motion, motion.ratio, motion.multiplicity) {
         (Motion::Cycle, Some((p, q)), 1) => format!("{p}:{q}"),

@@ -1,20 +1,20 @@
-//! Claims of a publication, and what the computed numbers say about them.
+//! Claims of a publication and their verdicts.
 //!
-//! **Idea.** A claim is decided by a [`Finding`]: a number with its error, or a fact that holds or does not. The verdict follows
-//! from these alone. What could not be computed decides nothing.
+//! **Idea.** A claim is decided by a [`Finding`]: a number with its error, or a fact that holds or does not. The
+//! verdict follows from these alone. A number that could not be computed decides nothing.
 
 use std::fmt;
 
-/// What the numbers say about a claim.
+/// Verdict on a claim.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
-    /// The same, as far as the publication is precise.
+    /// The numbers agree to the precision of the publication.
     Agrees,
-    /// The same, and more can be said: more digits, or the conditions under which it holds.
+    /// The numbers agree, and more is known: more digits, or the conditions under which the claim holds.
     Refined,
-    /// Not the same.
+    /// The numbers differ.
     Contradicted,
-    /// It could not be computed well enough.
+    /// The numbers could not be computed well enough.
     NotDecided,
 }
 
@@ -22,7 +22,7 @@ impl Verdict {
     /// Every verdict.
     pub const ALL: [Verdict; 4] = [Verdict::Agrees, Verdict::Refined, Verdict::Contradicted, Verdict::NotDecided];
 
-    /// In words.
+    /// Name in words.
     pub fn name(self) -> &'static str {
         match self {
             Verdict::Agrees => "agrees",
@@ -44,24 +44,25 @@ impl fmt::Display for Verdict {
 pub struct Claim {
     /// The figure it belongs to.
     pub figure: &'static str,
-    /// What is claimed, in our words.
+    /// The claim, reworded.
     pub statement: String,
-    /// What the publication gives: a number, or that it holds.
+    /// Value in the publication: a number, or that the claim holds.
     pub study: String,
-    /// What was computed.
+    /// Computed value.
     pub ours: String,
-    /// Estimated error of what was computed; `None` where it is no number.
+    /// Estimated error of the computed value; `None` if it is no number.
     pub error: Option<f64>,
-    /// What follows.
+    /// Verdict.
     pub verdict: Verdict,
-    /// What should be known about it.
+    /// Remark.
     pub note: String,
-    /// Whether it is ours, a check or an extension, rather than the publication's.
+    /// True if it is an additional check or extension, not a claim of the publication.
     pub check: bool,
 }
 
 impl Claim {
-    /// Something that the publication does not claim: a check of ours, or what goes beyond; `expected` is what should come out.
+    /// Returns a statement that the publication does not make: a check, or an extension; `expected` is the expected
+    /// result.
     pub fn check(
         figure: &'static str,
         statement: impl Into<String>,
@@ -71,7 +72,7 @@ impl Claim {
         Claim { check: true, ..Claim::decided(figure, statement, expected, finding) }
     }
 
-    /// A claim decided by what was found; an error is the reason why nothing was.
+    /// Returns a claim decided by a finding; an error gives the reason why there is none.
     pub fn decided(
         figure: &'static str,
         statement: impl Into<String>,
@@ -96,31 +97,31 @@ impl Claim {
         }
     }
 
-    /// With a remark, after what the finding says.
+    /// Adds a remark after that of the finding.
     pub fn noting(mut self, note: &str) -> Claim {
         self.note = if self.note.is_empty() { note.into() } else { format!("{}. {note}", self.note) };
         self
     }
 }
 
-/// What was found about a claim.
+/// Computed evidence on a claim.
 #[derive(Clone, Debug)]
 pub struct Finding {
     /// In words or digits.
     pub ours: String,
     /// Estimated error of a number.
     pub error: Option<f64>,
-    /// What follows for the claim.
+    /// Verdict on the claim.
     pub verdict: Verdict,
     /// A remark.
     pub note: String,
 }
 
 impl Finding {
-    /// A number `ours` ± `error` against a number that the publication gives as precisely as `reading`.
+    /// Compares a number `ours` ± `error` with a number that the publication gives to the precision `reading`.
     ///
-    /// Farther apart than both uncertainties together: contradicted. Otherwise it agrees; and where our error is less than a
-    /// hundredth of the reading, more digits are known than before: refined.
+    /// If they differ by more than both uncertainties together, the claim is contradicted. Otherwise they agree; if the
+    /// error is less than a hundredth of the reading, more digits are known than before and the claim is refined.
     pub fn number(ours: f64, error: f64, study: f64, reading: f64) -> Finding {
         let apart = (ours - study).abs();
         let verdict = match (apart.is_finite() && error.is_finite(), apart <= reading + error) {
@@ -134,7 +135,7 @@ impl Finding {
         Finding { ours: digits(ours, error), error: Some(error), verdict, note: String::new() }
     }
 
-    /// A quantity that should vanish: whether `ours` is at most `bound`, which the tolerance of the run allows.
+    /// A quantity that should vanish: tests if `ours` is at most `bound`, the tolerance of the run.
     pub fn vanishing(ours: f64, bound: f64) -> Finding {
         let verdict = match ours.is_finite() {
             false => Verdict::NotDecided,
@@ -144,19 +145,19 @@ impl Finding {
         Finding { ours: format!("{ours:.1e}"), error: Some(bound), verdict, note: String::new() }
     }
 
-    /// A fact, with the numbers that show it.
+    /// A fact, with the numbers that support it.
     pub fn fact(holds: bool, ours: String) -> Finding {
         let verdict = if holds { Verdict::Agrees } else { Verdict::Contradicted };
         Finding { ours, error: None, verdict, note: String::new() }
     }
 
-    /// A fact that more can be said about: it holds, under conditions or more precisely than claimed.
+    /// A fact that holds with qualifications: under conditions, or more precisely than claimed.
     pub fn qualified(holds: bool, ours: String) -> Finding {
         let verdict = if holds { Verdict::Refined } else { Verdict::Contradicted };
         Finding { ours, error: None, verdict, note: String::new() }
     }
 
-    /// A fact that is claimed of several cases: one in which it does not hold contradicts it.
+    /// A fact claimed of several cases; one counterexample contradicts it.
     pub fn cases(holds: &[bool], ours: String) -> Finding {
         let verdict = match (holds.is_empty(), holds.iter().all(|h| *h)) {
             (true, _) => Verdict::NotDecided,
@@ -166,13 +167,13 @@ impl Finding {
         Finding { ours, error: None, verdict, note: String::new() }
     }
 
-    /// With the error of the numbers in it.
+    /// Sets the error of the numbers.
     pub fn within(mut self, error: f64) -> Finding {
         self.error = Some(error);
         self
     }
 
-    /// With a remark.
+    /// Adds a remark.
     pub fn noting(mut self, note: impl Into<String>) -> Finding {
         self.note = note.into();
         self
@@ -203,13 +204,13 @@ mod tests {
     }
 
     #[test]
-    fn what_failed_decides_nothing() {
+    fn failures_decide_nothing() {
         let claim = Claim::decided("7", "it holds", "yes", Err("no branch".into()));
         assert_eq!((claim.verdict, claim.note.as_str()), (Verdict::NotDecided, "no branch"));
     }
 
     #[test]
-    fn as_many_digits_as_the_error_leaves() {
+    fn numbers_have_as_many_digits_as_the_error_justifies() {
         assert_eq!(digits(10.340617138, 2e-7), "10.3406171");
         assert_eq!(digits(51.7, 3.0), "52");
     }

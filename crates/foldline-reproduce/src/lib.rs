@@ -1,16 +1,17 @@
-//! Published studies computed again, figure by figure and claim by claim.
+//! Published studies recomputed, figure by figure and claim by claim.
 //!
-//! **Idea.** A [`Publication`] lists figures; each says which studies it needs and how it is made from their runs, and decides
-//! claims. [`reproduce`] runs what is needed, reusing what is there ([`runs`]), draws, compares ([`claims`]) and writes a report
-//! ([`report`]). Numbers of the publication appear only where a claim is compared with them: nothing computed depends on them.
+//! **Idea.** A [`Publication`] lists figures. Each names the studies it needs, is made from their runs, and decides
+//! claims. [`reproduce`] runs the missing studies and reuses the others ([`runs`]), draws, compares ([`claims`]) and
+//! writes a report ([`report`]). Numbers of the publication appear only where a claim is compared with them; no
+//! computation depends on them.
 //!
 //! | question | file |
 //! |---|---|
-//! | what belongs to a publication? | [`publication`] |
+//! | which studies and figures belong to a publication? | [`publication`] |
 //! | how does a study become a run, once for all figures? | [`runs`] |
-//! | does the publication say the same? | [`claims`] |
-//! | do simulation and continuation say the same? | [`agreement`] |
-//! | what is written in the end? | [`report`] |
+//! | do the results agree with the publication? | [`claims`] |
+//! | do simulation and continuation agree? | [`agreement`] |
+//! | which report is written at the end? | [`report`] |
 //! | how is figure N made? | `akay2022/figureNN.rs` |
 
 pub mod agreement;
@@ -33,38 +34,38 @@ use std::time::Instant;
 /// Every publication that can be reproduced.
 pub const PUBLICATIONS: &[Publication] = &[akay2022::PUBLICATION];
 
-/// What is asked for.
+/// A request to reproduce figures of a publication.
 pub struct Request<'r> {
-    /// Which publication.
+    /// The publication.
     pub publication: &'static Publication,
-    /// Which of its figures.
+    /// Its figures to reproduce.
     pub figures: Vec<&'static FigurePlan>,
     /// Folder for runs, figures and report.
     pub out: PathBuf,
-    /// How many branches are followed at a time.
+    /// Number of branches followed in parallel.
     pub jobs: usize,
-    /// Another tolerance than the studies state: a coarse one for a quick look.
+    /// Tolerance that replaces that of the studies: a coarse one for a quick look.
     pub tolerance: Option<f64>,
-    /// Set from outside to end early; what is computed until then is kept.
+    /// Set from outside to end early; results so far are kept.
     pub stop: &'r AtomicBool,
     /// Receives progress, a line at a time.
     pub say: &'r (dyn Fn(&str) + Sync),
 }
 
-/// What came of it.
+/// Result of a reproduction.
 pub struct Reproduced {
     /// The report.
     pub report: PathBuf,
-    /// Every claim that was decided, or could not be.
+    /// Every claim of the figures made, decided or not.
     pub claims: Vec<Claim>,
-    /// What failed, a line each.
+    /// Failures, one line each.
     pub failures: Vec<String>,
-    /// Whether it was ended from outside.
+    /// True if it was ended from outside.
     pub stopped: bool,
 }
 
 impl Reproduced {
-    /// How many claims have which verdict, in a line.
+    /// Number of claims per verdict, in one line.
     pub fn summary(&self) -> String {
         let counted = |check: bool| {
             let of = |verdict: Verdict| self.claims.iter().filter(|c| c.check == check && c.verdict == verdict).count();
@@ -78,14 +79,14 @@ impl Reproduced {
 
 /// A figure of the report.
 pub struct Drawn {
-    /// Which.
+    /// Plan of the figure.
     pub plan: &'static FigurePlan,
-    /// The figure as SVG, the text below it, and its claims; or why there is none.
+    /// The figure as SVG, its caption and its claims; or the reason why there is none.
     pub made: Result<(String, Made), String>,
 }
 
-/// Computes figures and claims, and writes `figure-NN.svg`, `figure-NN.png`, `report.html` and `verdicts.txt`. A figure that fails does not
-/// keep the others from being made.
+/// Computes figures and claims, and writes `figure-NN.svg`, `figure-NN.png`, `report.html` and `verdicts.txt`. A figure
+/// that fails does not affect the others.
 ///
 /// # Errors
 /// The folder cannot be written to.
@@ -117,7 +118,7 @@ pub fn reproduce(request: &Request) -> io::Result<Reproduced> {
     let stopped = request.stop.load(Ordering::Relaxed);
     let seconds = start.elapsed().as_secs_f64();
     let page = report::html(request.publication, &figures, &runs, &failures, seconds);
-    // A report on some of the figures does not replace that on all of them.
+    // A report on some of the figures does not replace the report on all of them.
     let some: Vec<&str> = request.figures.iter().map(|figure| figure.name).collect();
     let whole = some.len() == request.publication.figures.len();
     let name = if whole { "report.html".into() } else { format!("report-figure-{}.html", some.join("-")) };
@@ -129,13 +130,13 @@ pub fn reproduce(request: &Request) -> io::Result<Reproduced> {
     Ok(Reproduced { report, claims, failures, stopped })
 }
 
-/// A line for each claim: figure, verdict, statement, separated by tabs. Numbers change from machine to machine in their last
-/// digits; these lines should not.
+/// One line per claim: figure, verdict, statement, separated by tabs. Unlike the last digits of the numbers, these
+/// lines should not vary between machines.
 pub fn verdicts(claims: &[Claim]) -> String {
     claims.iter().map(|claim| format!("{}\t{}\t{}\n", claim.figure, claim.verdict, claim.statement)).collect()
 }
 
-/// Writes the SVG and the PNG; the inner error says why the PNG could not be made.
+/// Writes the SVG and the PNG; the inner error gives the reason why the PNG could not be made.
 fn write_pictures(request: &Request, plan: &FigurePlan, svg: &str) -> io::Result<Result<(), String>> {
     const SCALE: f32 = 2.0;
     let file = |ending: &str| request.out.join(format!("{}.{ending}", plan.file_stem()));

@@ -1,4 +1,4 @@
-//! What belongs to a publication: studies, and figures made from their runs.
+//! Publications: studies, and figures made from their runs.
 
 use crate::claims::Claim;
 use crate::runs::Runs;
@@ -6,30 +6,30 @@ use foldline_plot::Figure;
 
 /// A publication.
 pub struct Publication {
-    /// Its key in docs/references.bib, or the name by which it is asked for.
+    /// Key in docs/references.bib, or the name given on the command line.
     pub name: &'static str,
     /// Authors and title.
     pub title: &'static str,
-    /// Every study that a figure may need.
+    /// All studies that a figure may need.
     pub studies: &'static [StudyPlan],
-    /// Its figures, in their order.
+    /// Figures in their order.
     pub figures: &'static [FigurePlan],
 }
 
 impl Publication {
-    /// The figure of that name; leading zeros do not count.
+    /// Returns the figure of that name; leading zeros do not count.
     pub fn figure(&self, name: &str) -> Option<&'static FigurePlan> {
         let plain = name.trim_start_matches('0');
         self.figures.iter().find(|figure| figure.name == plain)
     }
 
-    /// The study of that name.
+    /// Returns the study of that name.
     pub fn study(&self, name: &str) -> Option<&'static StudyPlan> {
         self.studies.iter().find(|study| study.name == name)
     }
 }
 
-/// A study that is built in.
+/// A built-in study.
 pub struct StudyPlan {
     /// Name of its folder among the runs.
     pub name: &'static str,
@@ -39,7 +39,7 @@ pub struct StudyPlan {
     pub text: &'static str,
     /// Name of the file of its model.
     pub model_file: &'static str,
-    /// The text of its model.
+    /// Text of its model.
     pub model: &'static str,
     /// Nominal computing time in seconds, for the estimate of what remains; the measured speed scales it.
     pub weight: f64,
@@ -47,18 +47,18 @@ pub struct StudyPlan {
 
 /// A figure.
 pub struct FigurePlan {
-    /// `7`
+    /// Number or name of the figure, such as `7`.
     pub name: &'static str,
-    /// What it shows.
+    /// Title.
     pub title: &'static str,
     /// Names of the studies it needs.
     pub runs: &'static [&'static str],
-    /// Makes it; the error says why it cannot be made.
+    /// Makes the figure; the error gives the reason why it cannot be made.
     pub make: fn(&Runs) -> Result<Made, String>,
 }
 
 impl FigurePlan {
-    /// `figure-07`, or the name of a figure without a number.
+    /// Stem of its file names: `figure-07`, or the name of a figure without a number.
     pub fn file_stem(&self) -> String {
         match self.name.parse::<u32>() {
             Ok(number) => format!("figure-{number:02}"),
@@ -71,9 +71,9 @@ impl FigurePlan {
 pub struct Made {
     /// The picture as plain data.
     pub figure: Figure,
-    /// What is to be seen, in a few sentences. An empty line ends a paragraph; a paragraph of lines with cells separated by tabs is
-    /// a table, its first line the head.
+    /// Description in a few sentences. An empty line ends a paragraph; a paragraph of lines with cells separated by
+    /// tabs is a table whose first line is the head.
     pub caption: String,
-    /// The claims that its numbers decide.
+    /// Claims decided by its numbers.
     pub claims: Vec<Claim>,
 }

@@ -1,4 +1,4 @@
-//! The report: one HTML page that needs nothing else.
+//! The report: one self-contained HTML page.
 
 use crate::Drawn;
 use crate::claims::{Claim, Verdict};
@@ -18,7 +18,7 @@ figcaption{color:#444;font-size:.9rem}
 .not-decided{color:#666}tr{break-inside:avoid}thead{display:table-header-group}
 @media print{body{max-width:none;margin:0;font-size:10pt}h2{break-after:avoid}}";
 
-/// The page: summary, claims, figures, runs, failures.
+/// Writes the page: summary, claims, figures, runs, failures.
 pub fn html(publication: &Publication, figures: &[Drawn], runs: &Runs, failures: &[String], seconds: f64) -> String {
     let mut out = String::new();
     let title = escaped(publication.title);
@@ -59,7 +59,7 @@ pub fn html(publication: &Publication, figures: &[Drawn], runs: &Runs, failures:
     out
 }
 
-/// Paragraphs, of which those with tabs are tables.
+/// Writes a caption as paragraphs; those with tabs become tables.
 fn caption(text: &str) -> String {
     let part = |part: &str| {
         if !part.contains('\t') {

@@ -1,8 +1,8 @@
-//! Studies become runs: each once, recorded, reused by every figure and by later calls.
+//! Runs of studies: each computed once, recorded, and reused by every figure and by later calls.
 //!
-//! **Idea.** The run of a study lies in `OUT/runs/NAME`, as `foldline run` records it. Beside it `finished` says which program
-//! version computed it and how long that took. A run of the same study text, model text and version that is finished is read
-//! back; one that is not is resumed; any other is thrown away and computed again.
+//! **Idea.** The run of a study is stored in `OUT/runs/NAME`, as by `foldline run`. Beside it, `finished` records which
+//! program version computed it and how long that took. A finished run of the same study text, model text and version is
+//! read back; an unfinished one is resumed; any other is discarded and recomputed.
 
 mod tables;
 
@@ -25,10 +25,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// The version of this program.
+/// Version of this program.
 pub const VERSION: &str = env!("CARGO_PKG_VERSION");
 
-/// The version and a fingerprint of the program file: another build may compute other numbers.
+/// Version and fingerprint of the program file, since another build may give other numbers.
 pub(crate) fn build() -> &'static str {
     static BUILD: OnceLock<String> = OnceLock::new();
     BUILD.get_or_init(|| {
@@ -39,27 +39,27 @@ pub(crate) fn build() -> &'static str {
     })
 }
 
-/// A study that was run.
+/// A completed run of a study.
 pub struct Run {
     /// The study with its model and plan.
     pub study: Study,
-    /// Everything found.
+    /// Results.
     pub diagram: Diagram,
     /// Computing time in seconds, in this call or an earlier one.
     pub seconds: f64,
-    /// Whether it was there already.
+    /// True if the run existed already.
     pub reused: bool,
-    /// What of the study was not reached, a line each.
+    /// Unreached parts of the study, one line each.
     pub short: Vec<String>,
-    /// Remarks: what they are about, and what was noticed.
+    /// Remarks: subject and text.
     pub notes: Vec<(String, String)>,
 }
 
 impl Run {
-    /// The branch of that name.
+    /// Returns the branch of that name.
     ///
     /// # Errors
-    /// It is not there, or has no points; the sentence says why.
+    /// The branch is missing or has no points; the message gives the reason.
     pub fn branch(&self, name: &str) -> Result<&Branch, String> {
         let branch =
             self.diagram.branch(name).ok_or_else(|| format!("{}: there is no branch {name}", self.study.file))?;
@@ -70,12 +70,12 @@ impl Run {
         Ok(branch)
     }
 
-    /// Index of a parameter; the first one if the model has none of that name.
+    /// Index of a parameter; 0 if the model has none of that name.
     pub fn parameter(&self, name: &str) -> usize {
         self.study.model.parameter_index(name).unwrap_or(0)
     }
 
-    /// Every solution of a branch at a value of its parameter, corrected there, by increasing position.
+    /// Returns every solution of a branch at a value of its parameter, corrected there, by increasing position.
     ///
     /// # Errors
     /// There is no such branch, or it has no solution there.
@@ -88,7 +88,7 @@ impl Run {
         if found.is_empty() { Err(format!("the branch {name} has no solution at {value}")) } else { Ok(found) }
     }
 
-    /// The solution of a branch at which a quantity is least, and a bound on the error of the quantity.
+    /// Returns the solution of a branch that minimises a quantity, and a bound on the error of the minimum.
     ///
     /// # Errors
     /// There is no such branch.
@@ -100,16 +100,16 @@ impl Run {
         known::least(&system, &settings, branch, quantity).ok_or_else(|| format!("the branch {name} has no points"))
     }
 
-    /// The survey or sweep of that name.
+    /// Returns the survey or sweep of that name.
     ///
     /// # Errors
-    /// It is not there.
+    /// There is none.
     pub fn responses(&self, name: &str) -> Result<&Responses, String> {
         let found = self.diagram.response_set(name);
         found.ok_or_else(|| format!("{}: the simulation {name} is incomplete", self.study.file))
     }
 
-    /// The special points of that kind on a branch.
+    /// Returns the special points of that kind on a branch.
     ///
     /// # Errors
     /// There is no such branch.
@@ -117,7 +117,7 @@ impl Run {
         Ok(self.branch(name)?.special.iter().filter(|s| s.kind == kind).collect())
     }
 
-    /// The value of a parameter at a special point, and the error of it.
+    /// Value of a parameter at a special point, and its error.
     pub fn place(&self, index: usize, special: &SpecialPoint) -> [f64; 2] {
         let value = special.point.parameters[index];
         let size = self.diagram.branches.iter().find(|branch| branch.free == index).map(|branch| branch.size(value));
@@ -125,7 +125,7 @@ impl Run {
     }
 }
 
-/// The runs of a publication, computed when they are first asked for.
+/// Runs of a publication, computed on first request.
 pub struct Runs<'r> {
     publication: &'static Publication,
     folder: PathBuf,
@@ -133,15 +133,15 @@ pub struct Runs<'r> {
     tolerance: Option<f64>,
     stop: &'r AtomicBool,
     say: &'r (dyn Fn(&str) + Sync),
-    /// Weights of what is still to be run.
+    /// Weights of the studies still to run.
     ahead: BTreeMap<&'static str, f64>,
-    /// Nominal and measured seconds of what was computed.
+    /// Nominal and measured seconds of completed runs.
     pace: [f64; 2],
     done: BTreeMap<&'static str, Result<Run, String>>,
 }
 
 impl<'r> Runs<'r> {
-    /// For what is asked, nothing computed yet.
+    /// Returns the runs for a request, with nothing computed yet.
     pub fn new(request: &Request<'r>) -> Runs<'r> {
         let publication = request.publication;
         let needed = |study: &&StudyPlan| request.figures.iter().any(|figure| figure.runs.contains(&study.name));
@@ -159,10 +159,10 @@ impl<'r> Runs<'r> {
         }
     }
 
-    /// The run of that name.
+    /// Returns the run of that name.
     ///
     /// # Errors
-    /// It failed; the sentence says why.
+    /// The run failed; the message gives the reason.
     pub fn run(&self, name: &str) -> Result<&Run, String> {
         match self.done.get(name) {
             Some(Ok(run)) => Ok(run),
@@ -171,17 +171,17 @@ impl<'r> Runs<'r> {
         }
     }
 
-    /// How many threads may be used.
+    /// Number of threads to use.
     pub fn jobs(&self) -> usize {
         self.jobs
     }
 
-    /// All runs by name, failed ones with the reason.
+    /// All runs by name; failed ones with the reason.
     pub fn all(&self) -> impl Iterator<Item = (&'static str, &Result<Run, String>)> {
         self.done.iter().map(|(name, run)| (*name, run))
     }
 
-    /// What failed, or ended short, a line each.
+    /// Runs that failed or ended short, one line each.
     pub fn failures(&self) -> Vec<String> {
         let lines = |(name, run): (&str, &Result<Run, String>)| match run {
             Ok(run) => run.short.iter().map(|line| format!("run {name}: {line}")).collect(),
@@ -190,7 +190,7 @@ impl<'r> Runs<'r> {
         self.all().flat_map(lines).collect()
     }
 
-    /// Makes sure that a run is there, or known to have failed.
+    /// Computes a run, unless it exists or is known to have failed.
     pub fn compute(&mut self, name: &'static str) {
         if self.done.contains_key(name) || self.stop.load(Ordering::Relaxed) {
             return;
@@ -210,7 +210,7 @@ impl<'r> Runs<'r> {
         self.done.insert(name, run);
     }
 
-    /// How long what is ahead will take, at the pace of what was computed.
+    /// Estimate of the time left, at the measured speed.
     fn estimate(&self) -> String {
         let speed = if self.pace[0] > 0.0 { self.pace[1] / self.pace[0] } else { 1.0 };
         let seconds = speed * self.ahead.values().sum::<f64>();
@@ -258,7 +258,8 @@ fn whole(study: Study, diagram: Diagram, notes: Vec<(String, String)>, seconds: 
     Run { study, diagram, seconds, reused, short, notes }
 }
 
-/// A finished run of the same texts under that name, which holds version and tolerance, and how long it took.
+/// Returns a finished run of the same texts under that name, which includes version and tolerance, and its computing
+/// time.
 fn finished(folder: &Path, study: &Study, name: &str) -> Option<(Recorded, f64)> {
     let mark = std::fs::read_to_string(folder.join(FINISHED)).ok()?;
     let (of, seconds) = mark.split_once('\n')?;
@@ -267,13 +268,13 @@ fn finished(folder: &Path, study: &Study, name: &str) -> Option<(Recorded, f64)>
     same.then_some((recorded, seconds.trim().parse().ok()?))
 }
 
-/// A recorder over an unfinished run of the same texts, or over a new one.
+/// Returns a recorder for an unfinished run of the same texts, or for a new one.
 fn opened(folder: &Path, study: &Study) -> Result<(Recorder, Diagram), RunFileError> {
     let marked = folder.join(FINISHED);
     if !marked.exists() {
         match Recorder::resume(folder, study) {
             Ok(opened) => return Ok(opened),
-            // Another study, another model, or nothing at all: a new run.
+            // Another study, another model, or no usable run: start a new one.
             Err(RunFileError::Missing(_) | RunFileError::Changed(..) | RunFileError::Damaged(..)) => {}
             Err(error) => return Err(error),
         }
@@ -285,7 +286,8 @@ fn opened(folder: &Path, study: &Study) -> Result<(Recorder, Diagram), RunFileEr
     }
 }
 
-/// Another tolerance; a coarser one asks for a quick look, for which surveys visit every twelfth value from fewer starts.
+/// Sets another tolerance. A coarser one means a quick look, for which surveys visit every twelfth value with fewer
+/// starts.
 fn quick(plan: &mut Plan, tolerance: f64) {
     if tolerance > plan.tolerance {
         for survey in &mut plan.surveys {
@@ -296,17 +298,17 @@ fn quick(plan: &mut Plan, tolerance: f64) {
     plan.tolerance = tolerance;
 }
 
-/// Records, reports the progress of simulations, and stops when asked to.
+/// Records points, reports the progress of simulations, and stops on request.
 struct Watch<'w> {
     recorder: Recorder,
     stop: &'w AtomicBool,
     say: &'w (dyn Fn(&str) + Sync),
-    /// Of every survey and sweep: when it began, and when it was last told of.
+    /// Start and last report of every survey and sweep.
     pace: Mutex<BTreeMap<String, [Instant; 2]>>,
 }
 
 impl Watch<'_> {
-    /// A line every few seconds.
+    /// Reports progress every few seconds.
     fn visited(&self, name: &str, done: usize, of: usize) {
         const BETWEEN: Duration = Duration::from_secs(3);
         let mut pace = self.pace.lock().unwrap_or_else(PoisonError::into_inner);
@@ -316,7 +318,7 @@ impl Watch<'_> {
             return;
         }
         *told = now;
-        // The time began with the first value.
+        // The clock started with the first value.
         let left = now.duration_since(*begun).as_secs_f64() * (of - done) as f64 / done.max(2).saturating_sub(1) as f64;
         (self.say)(&format!("  {name}: {done} of {of} values, about {left:.0} s left"));
     }

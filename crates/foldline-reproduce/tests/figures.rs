@@ -1,13 +1,13 @@
-//! One test for each figure, on the numbers that decide what it shows.
+//! One test per figure, on the numbers that decide its claims.
 //!
-//! The studies are run as the command runs them, at a coarse tolerance, each into a folder of its own.
+//! The studies are run as by the command, at a coarse tolerance, each in a folder of its own.
 
 use foldline_reproduce::akay2022::PUBLICATION;
 use foldline_reproduce::{Claim, Reproduced, Request, Verdict, reproduce};
 use std::sync::atomic::AtomicBool;
 use tempfile::TempDir;
 
-/// What comes of some figures, computed at a tolerance of 1e-5.
+/// Reproduces some figures at a tolerance of 1e-5.
 fn figures(names: &[&str]) -> (Reproduced, TempDir) {
     let folder = tempfile::tempdir().unwrap();
     let made = again(names, &folder, 1e-5);
@@ -32,7 +32,7 @@ fn claim<'m>(made: &'m Reproduced, words: &str) -> &'m Claim {
     found.unwrap_or_else(|| panic!("no claim about {words}: {:?}", made.claims))
 }
 
-/// The numbers in what was computed.
+/// Numbers in the computed value of a claim.
 fn numbers(claim: &Claim) -> Vec<f64> {
     let parts = claim.ours.split(|c: char| !c.is_ascii_digit() && c != '.' && c != '-');
     parts.filter_map(|part| part.trim_end_matches('.').parse().ok()).collect()
@@ -48,12 +48,12 @@ fn figure_3_the_smoothed_ring_pulls_as_much_as_its_formula_says() {
     let found = numbers(claim(&made, "β = 10, K = 150"));
     // -0.139232 β/K at 1 - 0.639232/K, of which six decimals are printed.
     assert!(near(found[0], -0.139232 / 15.0, 1e-6) && near(found[1], 1.0 - 0.639232 / 150.0, 1e-6), "{found:?}");
-    // The error falls with K² and K = 15 β makes less than 1e-4 of it; the double loop with β = 6 is not there.
+    // The error falls like 1/K², and K = 15 β makes it less than 1e-4. There is no double loop with β = 6.
     let errors = claim(&made, "sharp enough");
     assert!(errors.verdict == Verdict::Refined && errors.ours.matches("e-").count() == 3, "{errors:?}");
     let enough = numbers(claim(&made, "as exact for SL"));
     assert!(near(enough[0], 56.8, 3.0), "{enough:?}");
-    // A second call reads the table.
+    // A second call reads the table back.
     let table = folder.path().join("runs/sharpness.table");
     let written = std::fs::metadata(&table).unwrap().modified().unwrap();
     again(&["3"], &folder, 1e-5);
@@ -70,7 +70,7 @@ fn figure_4_both_flows_reach_the_sampled_branch() {
 }
 
 #[test]
-fn figures_5_6_and_7_from_one_run() {
+fn figures_5_6_and_7_are_made_from_one_run() {
     let (made, folder) = figures(&["5", "6", "7"]);
     for family in ["SL", "DL"] {
         assert_eq!(claim(&made, &format!("lines of {family}")).verdict, Verdict::Agrees);
@@ -78,7 +78,7 @@ fn figures_5_6_and_7_from_one_run() {
         let standing = claim(&made, &format!("In the inertial frame {family}"));
         assert!(standing.verdict == Verdict::Refined && standing.ours.contains("forward; "), "{standing:?}");
     }
-    // Period doublings from an independent code: shooting at 1e-12.
+    // Period doublings from an independent code (shooting at 1e-12).
     let window = claim(&made, "window");
     let found = numbers(window);
     assert!(near(found[0], 4.269067, 1e-4) && near(found[1], 4.862412, 1e-4), "{window:?}");
@@ -90,7 +90,7 @@ fn figures_5_6_and_7_from_one_run() {
     assert!(near(numbers(fold)[0], 3.556166, 1e-5), "{fold:?}");
     assert_eq!(claim(&made, "cubic spring S stays").verdict, Verdict::Agrees);
     assert!(made.claims.iter().filter(|c| c.check && c.figure == "7").all(|c| c.verdict == Verdict::Agrees));
-    // A second call computes nothing again.
+    // A second call computes nothing.
     let report = std::fs::read_to_string(&made.report).unwrap();
     assert!(!report.contains("(earlier)") && report.contains("contradicted"));
     assert!(!report.contains("src=") && !report.contains("href=\"http"), "the report needs nothing else");
@@ -120,7 +120,7 @@ fn figure_11_contact_cycles_begin_at_the_contact_radius_and_come_from_the_cubic_
     for family in ["SL", "DL"] {
         let lowest = claim(&made, &format!("{family} reaches down"));
         assert_eq!(lowest.verdict, Verdict::Refined, "{lowest:?}");
-        // A tolerance as large as the damping may leave branches short, which decides nothing.
+        // At a tolerance as large as the damping, branches may end short, which decides nothing.
         let brought = claim(&made, &format!("Cubic {family} is brought"));
         assert_ne!(brought.verdict, Verdict::Contradicted, "{brought:?}");
     }
@@ -141,16 +141,16 @@ fn figure_13_there_is_a_second_stable_zone_of_the_double_loop() {
     let (made, _folder) = figures(&["13"]);
     let zone = claim(&made, "second stable zone");
     let found = numbers(zone);
-    // Between a torus point and a fold, of which the coarse tolerance leaves three digits.
+    // Between a torus point and a fold, known to three digits at the coarse tolerance.
     assert!(zone.verdict == Verdict::Refined && near(found[0], 6.279, 2e-3) && near(found[1], 6.335, 2e-3), "{zone:?}");
 }
 
 #[test]
-fn figure_14_what_is_false_shrinks_with_the_switch() {
-    // At 1e-5 the branches next to contact are not told apart at zeta = 1e-5.
+fn figure_14_artefacts_shrink_with_the_width_of_the_switch() {
+    // At 1e-5, neighbouring branches near contact are not distinguished at zeta = 1e-5.
     let folder = tempfile::tempdir().unwrap();
     let made = again(&["14"], &folder, 1e-6);
-    // Stretches that vanish as K grows: on S they begin at its folds, at the widths that the folds themselves have.
+    // Stretches that vanish as K grows: on S they begin at its folds, with the widths of the folds themselves.
     let found = numbers(claim(&made, "S at β = 6, K = 30 has points"));
     assert!(near(found[0], 0.90675, 1e-5) && near(found[1], 0.9224, 1e-3), "{found:?}");
     let sharp = claim(&made, "No point of contact S in figure 7");
@@ -162,7 +162,7 @@ fn figure_14_what_is_false_shrinks_with_the_switch() {
 }
 
 #[test]
-fn a_run_that_was_stopped_is_told_and_gone_on_with() {
+fn a_stopped_run_is_reported_and_resumed() {
     let folder = tempfile::tempdir().unwrap();
     let stop = AtomicBool::new(true);
     let request = Request {

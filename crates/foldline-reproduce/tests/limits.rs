@@ -23,7 +23,7 @@ fn rooted(kappa: f64, ratio: Ratio) -> Backbone {
         .unwrap()
 }
 
-/// Folds of a branch by growing Ω.
+/// Folds of a branch by increasing Ω.
 fn folds(branch: &Branch) -> Vec<f64> {
     let mut found: Vec<f64> =
         branch.special.iter().filter(|s| s.kind == Kind::Fold).map(|s| s.point.parameters[0]).collect();
@@ -38,7 +38,7 @@ fn forced_cycles_tend_to_the_backbones() {
     let diagram: Diagram = explore::run(&system, &study.plan, 2, Diagram::default(), &Unobserved);
     let branch = |name: &str| diagram.branch(name).unwrap();
     for (name, ratio, power) in [("SL", Ratio::SINGLE_LOOP, 1), ("DL", Ratio::DOUBLE_LOOP, 2)] {
-        // The backbone at Ω = 5, where its reach ends.
+        // The backbone up to Ω = 5.
         let reach = Reach { speeds: [0.5, 5.0], radius: 30.0, tolerance: 1e-7 };
         let limit =
             backbone(&Nondimensional::REFERENCE, ContactLaw::Tanh, ratio, &reach).unwrap().points.pop().unwrap();
@@ -53,7 +53,7 @@ fn forced_cycles_tend_to_the_backbones() {
         // The next power of ε changes it by a hundredth; the tolerance of the run is 1e-5 of a period.
         assert!((order - f64::from(power)).abs() < 0.05, "{name}: {order}");
     }
-    // Contact SL is closed, and its last fold lies where the backbone loses its forced cycles, to first order in ε.
+    // Contact SL is closed, and its last fold is where the backbone loses its forced cycles, to first order in ε.
     let found = rooted(1.0, Ratio::SINGLE_LOOP);
     for (part, zeta, epsilon) in [("1/2", 0.0025, 0.1765), ("1/4", 0.000625, 0.08825)] {
         let branch = branch(&format!("contact SL {part}"));
@@ -63,7 +63,7 @@ fn forced_cycles_tend_to_the_backbones() {
         assert!((foretold[1][0] - computed[1]).abs() < 2e-3, "{foretold:?} {computed:?}");
         assert!((foretold[0][0] - computed[0]).abs() < 1e-2, "{foretold:?} {computed:?}");
     }
-    // Cubic DL turns back at both ends, which hardly move: ζ/ε² is kept.
+    // Cubic DL turns back at both ends, which hardly move, because ζ/ε² is constant.
     let [whole, half] = ["1/2", "1/4"].map(|part| folds(branch(&format!("cubic DL {part}"))));
     assert!(whole.len() == 2 && half.len() == 2);
     assert!((0..2).all(|k| (whole[k] - half[k]).abs() < 0.05), "{whole:?} {half:?}");

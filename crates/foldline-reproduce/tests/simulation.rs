@@ -1,4 +1,4 @@
-//! Figure 9: simulation and continuation say the same, at a coarse tolerance and with a thin survey.
+//! Figure 9: agreement of simulation and continuation, at a coarse tolerance and with a sparse survey.
 
 use foldline_reproduce::akay2022::PUBLICATION;
 use foldline_reproduce::{Claim, Reproduced, Request, Verdict, reproduce};
@@ -29,11 +29,11 @@ fn numbers(claim: &Claim) -> Vec<f64> {
 }
 
 #[test]
-fn what_simulation_meets_was_followed_and_the_sweeps_fall_off_where_dl_ends() {
+fn simulated_motions_lie_on_branches_and_sweeps_jump_where_dl_ends() {
     let (folder, said) = (tempfile::tempdir().unwrap(), Mutex::new(Vec::new()));
     let made = figure_9(&folder, &said);
     assert!(made.failures.is_empty(), "{:?}", made.failures);
-    // Period doublings from an independent code: shooting at 1e-12.
+    // Period doublings from an independent code (shooting at 1e-12).
     assert!((numbers(claim(&made, "branch of SL doubles again"))[1] - 4.628842).abs() < 1e-4);
     assert!((numbers(claim(&made, "branch of DL doubles again"))[1] - 4.199325).abs() < 1e-4);
     let every = claim(&made, "Every motion");
@@ -47,7 +47,7 @@ fn what_simulation_meets_was_followed_and_the_sweeps_fall_off_where_dl_ends() {
     let ([u0, u1], [d0, d1]) = ([0, 1].map(|k| numbers(up)[k]), [0, 1].map(|k| numbers(down)[k]));
     assert!(up.verdict == Verdict::Refined && 6.08 < u0 && u0 < u1 && u0 < 6.16581, "{up:?}");
     assert!(down.verdict == Verdict::Refined && d1 < d0 && d0 > 4.19 && d1 < 4.27, "{down:?}");
-    // A second call simulates nothing again.
+    // A second call simulates nothing.
     said.lock().unwrap().clear();
     let report = std::fs::read_to_string(figure_9(&folder, &said).report).unwrap();
     assert!(said.lock().unwrap().iter().all(|line| !line.contains("values")), "{said:?}");

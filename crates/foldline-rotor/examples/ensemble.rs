@@ -1,12 +1,13 @@
-//! How fast many trajectories of the overhung rotor are integrated, beside a plain loop over one after the other:
+//! Speed of integration of many trajectories of the overhung rotor, compared with a plain loop over the trajectories:
 //! `cargo run --release -p foldline-rotor --example ensemble -- SAMPLES TIME TOLERANCE [KAPPA]`
 //!
-//! Prints for the ensemble with the model's text, the ensemble with the field written in Rust, and the plain loop with the right-hand side
-//! written by hand and everything constant taken out of it: the best of several runs in seconds on one thread, the steps of all
-//! trajectories, accepted and rejected, and the median over the trajectories of the largest error at the end. The three use the same
-//! method, step control, tolerance, starts and parameters (those of models/overhung-rotor.toml with kappa = 1). Then, as the limit for any such
-//! program on this machine, the same for as many steps of one length with eight trajectories in lanes: no step control, no end, nobody
-//! who watches.
+//! Prints three cases: the ensemble with the text model, the ensemble with the field written in Rust, and the plain
+//! loop with a right-hand side written by hand with all constants precomputed. Each row gives the best of several runs
+//! in seconds on one thread, the number of steps of all trajectories, accepted and rejected, and the median over the
+//! trajectories of the largest error at the end. All use one method, step control, tolerance, set of starts and
+//! parameters (those of models/overhung-rotor.toml with kappa = 1). The last row is the limit for any such program on
+//! this machine: as many steps of fixed length with eight trajectories in lanes, without step control, end condition or
+//! observer.
 
 use foldline::attractors::Sampling;
 use foldline::contract::VectorField;
@@ -55,7 +56,7 @@ fn main() -> Result<(), String> {
     Ok(())
 }
 
-/// Final states and all steps.
+/// Final states and the total number of steps.
 type Run<'a> = &'a dyn Fn(&dyn VectorField, &Nondimensional, &[f64], f64, f64) -> (Vec<[f64; 4]>, usize);
 
 fn starts(samples: usize) -> Vec<f64> {
@@ -111,7 +112,7 @@ fn at<const N: usize>(x: &[f64; 4], h: f64, terms: [(f64, &[f64; 4]); N]) -> [f6
     std::array::from_fn(|i| x[i] + h * terms.iter().map(|(a, k)| a * k[i]).sum::<f64>())
 }
 
-/// Dormand and Prince's pair 5(4) (hairer1993, §II.5) with the step control of the ensemble, one trajectory after the other.
+/// Dormand–Prince pair 5(4) (hairer1993, §II.5) with the step control of the ensemble, one trajectory after the other.
 fn scalar(
     _: &dyn VectorField,
     p: &Nondimensional,
@@ -178,7 +179,7 @@ fn integrate(p: &Constants, start: [f64; 4], end: f64, tolerance: f64) -> ([f64;
     (x, steps)
 }
 
-/// Steps of length h, so many from each of the starts, eight of them side by side; how many steps that were.
+/// Takes `steps` steps of length h from each start, eight trajectories side by side; returns the total number of steps.
 fn lanes(p: &Nondimensional, starts: &[f64], steps: usize, h: f64, tolerance: f64) -> usize {
     let constants = Constants::of(p);
     let groups = starts.chunks_exact(4 * Eight::COUNT);
@@ -190,7 +191,7 @@ fn lanes(p: &Nondimensional, starts: &[f64], steps: usize, h: f64, tolerance: f6
     count
 }
 
-/// One number for each of eight trajectories, four times.
+/// Four numbers for each of eight trajectories.
 type Lanes = [Eight; 4];
 
 struct Trial<'c> {
@@ -238,8 +239,8 @@ impl pulp::NullaryFnOnce for Trial<'_> {
     }
 }
 
-/// x + h Σ a k. In operations of whole lanes and plain loops here and below: what would be a function of its own, as the `map` of an array,
-/// is compiled without the vector instructions.
+/// x + h Σ a k. Here and below, operations on whole lanes and plain loops: a function of its own, such as the `map` of
+/// an array, would be compiled without vector instructions.
 #[inline(always)]
 fn ahead<const N: usize>(x: &Lanes, h: Eight, terms: [(f64, &Lanes); N]) -> Lanes {
     let mut out = *x;
@@ -253,7 +254,7 @@ fn ahead<const N: usize>(x: &Lanes, h: Eight, terms: [(f64, &Lanes); N]) -> Lane
     out
 }
 
-/// The middle one of the largest errors of each trajectory.
+/// Median over the trajectories of the largest error.
 fn median_error(found: &[[f64; 4]], exact: &[[f64; 4]]) -> f64 {
     let error = |(a, b): (&[f64; 4], &[f64; 4])| (0..4).fold(0.0, |m: f64, i| m.max((a[i] - b[i]).abs()));
     let mut errors: Vec<f64> = found.iter().zip(exact).map(error).collect();

@@ -1,4 +1,5 @@
-//! How long the rotor takes per lane, written as text and by hand: `cargo run --release -p foldline-rotor --example field_speed`.
+//! Time per lane of the rotor as text and written by hand:
+//! `cargo run --release -p foldline-rotor --example field_speed`.
 //!
 //! Each row is the best of many repetitions, in nanoseconds per lane.
 
@@ -22,7 +23,7 @@ fn nanoseconds(lanes: usize, mut run: impl FnMut()) -> f64 {
     best
 }
 
-/// f, f and its Jacobian in states and Ω, outputs, second derivative.
+/// Times of f, of f with its Jacobian in states and Ω, of outputs, and of a second derivative.
 fn speeds(field: &dyn VectorField, states: &[f64], parameters: &[f64]) -> [f64; 4] {
     let lanes = states.len() / 4;
     let at = Batch { lanes, states, parameters: Parameters::Shared(parameters), times: &[] };

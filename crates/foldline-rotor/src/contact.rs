@@ -1,4 +1,4 @@
-//! Laws of contact with the ring.
+//! Contact laws of the ring.
 //!
 //! **Equations.** The ring pushes back with the force r h(r) along -U/r. With g = r - 1:
 //!
@@ -13,7 +13,7 @@ use crate::jet::Jet;
 /// The x > 0 at which ½ (tanh(-x) + 1) (-x) is smallest: 2x = 1 + e^{-2x}.
 const DEEPEST: f64 = 0.639_232_271_380_537;
 
-/// How the ring takes up force.
+/// Law of the ring force.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum ContactLaw {
     /// A spring switched on by a hyperbolic tangent.
@@ -39,18 +39,20 @@ pub struct Stiffness {
 }
 
 impl ContactLaw {
-    /// h and its derivatives at radius `r`, stiffness `beta` and sharpness `k`; all 0 at r = 0, where the switch is closed.
+    /// h and its derivatives at radius `r`, stiffness `beta` and sharpness `k`; all 0 at r = 0, where there is no
+    /// contact.
     pub fn stiffness(self, r: f64, beta: f64, k: f64) -> Stiffness {
         self.stiffness_touching(r, beta, k, r > 1.0)
     }
 
-    /// The same with the contact of [`ContactLaw::Piecewise`] closed or open as `touching` says, whatever the radius.
+    /// h and its derivatives, with the contact of [`ContactLaw::Piecewise`] closed or open as `touching` says, for any
+    /// radius.
     pub(crate) fn stiffness_touching(self, r: f64, beta: f64, k: f64, touching: bool) -> Stiffness {
         if r <= 0.0 {
             return Stiffness::default();
         }
         let gap = r - 1.0;
-        // The force for β = 1, and its derivatives by r and K.
+        // Force for β = 1, and its derivatives with respect to r and K.
         let (force, by_radius, by_sharpness) = match self {
             ContactLaw::Tanh => {
                 let s = 0.5 * ((k * gap).tanh() + 1.0);
@@ -79,7 +81,7 @@ impl ContactLaw {
         r * self.stiffness(r, beta, k).value
     }
 
-    /// The switch of the law, and its limit for K → ∞: the share of the ring's stiffness that is in force at radius `r`, that is
+    /// Switch of the law, and its limit for K → ∞: the fraction of the ring's stiffness in force at radius `r`, that is
     /// ½ (tanh(K g) + 1) or the logistic function of 2K g (which are equal), or 0 and 1.
     pub fn switch(self, r: f64, k: f64) -> f64 {
         match self {
@@ -88,7 +90,7 @@ impl ContactLaw {
         }
     }
 
-    /// The deepest pull of the law below contact, as radius and (negative) force; `None` where it never pulls.
+    /// Deepest pull of the law below contact, as radius and (negative) force; `None` for a law that never pulls.
     pub fn pull(self, beta: f64, k: f64) -> Option<[f64; 2]> {
         match self {
             ContactLaw::Tanh => Some([1.0 - DEEPEST / k, -DEEPEST * (1.0 - DEEPEST.tanh()) * 0.5 * beta / k]),
@@ -96,14 +98,14 @@ impl ContactLaw {
         }
     }
 
-    /// The switch and the force against the radius, `count` points from `range[0]` to `range[1]`: radius, switch, force.
+    /// Switch and force against radius at `count` points from `range[0]` to `range[1]`: radius, switch, force.
     pub fn curve(self, beta: f64, k: f64, range: [f64; 2], count: usize) -> Vec<[f64; 3]> {
         let spacing = (range[1] - range[0]) / (count.max(2) - 1) as f64;
         let radius = |i: usize| range[0] + i as f64 * spacing;
         (0..count).map(radius).map(|r| [r, self.switch(r, k), self.force(r, beta, k)]).collect()
     }
 
-    /// The model file, in models/, that has this law.
+    /// Name of the file in models/ with this law.
     pub fn model_file(self) -> &'static str {
         match self {
             ContactLaw::Tanh => "overhung-rotor.toml",
@@ -112,7 +114,7 @@ impl ContactLaw {
         }
     }
 
-    /// h for jets.
+    /// Evaluates h for jets.
     pub(crate) fn jet(self, r: &Jet, beta: &Jet, k: &Jet) -> Jet {
         let gap = r.plus(-1.0);
         let force = match self {
@@ -141,18 +143,18 @@ mod tests {
             .map(|i| (ContactLaw::Tanh.force(radius(i), beta, k), radius(i)))
             .fold((0.0, 0.0), |best: (f64, f64), next| if next.0 < best.0 { next } else { best });
         assert!((lowest.0 + 0.139232 * beta / k).abs() < 1e-6 * beta / k, "{lowest:?}");
-        // The scan has a step of 2e-5/K, and near a minimum the value says little about the place.
+        // The scan has a step of 2e-5/K, and near a minimum the value determines the position poorly.
         assert!((lowest.1 - (1.0 - 0.639232 / k)).abs() < 3e-5 / k, "{lowest:?}");
         let [r, force] = ContactLaw::Tanh.pull(beta, k).unwrap();
         assert!((r - lowest.1).abs() < 3e-5 / k && (force - lowest.0).abs() < 1e-9 * beta / k, "{r} {force}");
-        // There the force r h(r) is stationary: h + r h′ = 0, but for the rounding of 1 - r, which K multiplies.
+        // There the force r h(r) is stationary: h + r h′ = 0, up to the rounding of 1 - r magnified by K.
         let h = ContactLaw::Tanh.stiffness(r, beta, k);
         assert!((h.value + r * h.by_radius).abs() < 1e-15 * beta * k, "{h:?}");
         assert_eq!(ContactLaw::Softplus.pull(beta, k), None);
     }
 
     #[test]
-    fn the_curve_of_a_law_has_its_switch_and_its_force() {
+    fn the_curve_of_a_law_lists_its_switch_and_its_force() {
         for law in [ContactLaw::Tanh, ContactLaw::Softplus, ContactLaw::Piecewise] {
             let curve = law.curve(6.0, 90.0, [0.9, 1.1], 201);
             assert_eq!((curve.len(), curve[0][0]), (201, 0.9));
@@ -161,7 +163,7 @@ mod tests {
             assert!(curve.windows(2).all(|pair| pair[1][1] >= pair[0][1]));
             assert!((curve[200][2] - 0.6).abs() < 1e-7, "{law:?}: β g at g = 0.1, {:?}", curve[200]);
         }
-        // Softplus is the integral of the switch: the slope of the force over β.
+        // Softplus is the integral of the switch: the slope of the force divided by β.
         let slope = |r: f64| {
             let h = ContactLaw::Softplus.stiffness(r, 6.0, 90.0);
             (h.value + r * h.by_radius) / 6.0

@@ -1,4 +1,4 @@
-//! The vector field, its derivatives by hand.
+//! The vector field of the rotor with hand-written derivatives.
 
 use crate::contact::ContactLaw;
 use crate::jet::Jet;
@@ -6,10 +6,10 @@ use crate::lanes::{self, Constants};
 use crate::quantities::Nondimensional;
 use foldline::contract::{Batch, Parameters, VectorField};
 
-/// The rotor without dimensions: states u, v, u′, v′; parameters Ω, κ, ζ, ε, γ, β, K, J_p, m; output r.
+/// Nondimensional rotor: states u, v, u′, v′; parameters Ω, κ, ζ, ε, γ, β, K, J_p, m; output r.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct OverhungRotor {
-    /// How the ring takes up force.
+    /// Law of the ring force.
     pub law: ContactLaw,
 }
 
@@ -37,7 +37,7 @@ impl OverhungRotor {
         ]
     }
 
-    /// Total returning force over displacement, in the rotating frame.
+    /// Total restoring force over displacement, in the rotating frame.
     fn stiffness(&self, u: f64, v: f64, p: &Nondimensional, touching: bool) -> f64 {
         let square = u * u + v * v;
         let contact = self.law.stiffness_touching(square.sqrt(), p.beta, p.sharpness, touching).value;
@@ -89,7 +89,7 @@ impl OverhungRotor {
         }
     }
 
-    /// f for jets.
+    /// Evaluates f for jets.
     fn jets(&self, x: [Jet; 4], p: [Jet; 9]) -> [Jet; 4] {
         let [u, v, du, dv] = x;
         let [omega, kappa, zeta, epsilon, gamma, beta, sharpness, polar, mass] = p;

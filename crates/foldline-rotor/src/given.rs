@@ -1,4 +1,4 @@
-//! Constants as people give them: by name, with units, checked before anything is computed from them.
+//! Constants as users give them: by name, with units, checked before anything is computed from them.
 //!
 //! **Fails when** a name is unknown, missing or given twice, a unit does not fit, or no rotor has such a value. Every
 //! [`Mistake`] is reported, not only the first.
@@ -7,7 +7,7 @@ use crate::quantities::{Nondimensional, Si};
 use crate::units::{Mistake, quantity};
 use foldline::model::suggest;
 
-/// Which values a constant can have.
+/// Values that a constant may have.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Allowed {
     /// Greater than 0.
@@ -22,7 +22,7 @@ enum Allowed {
 
 use Allowed::{Any, NotNegative, Positive, Share};
 
-/// The constants of models/overhung-rotor-si.toml in their order: name, unit, allowed values.
+/// Constants of models/overhung-rotor-si.toml in their order: name, unit, allowed values.
 const SI: [(&str, &str, Allowed); 14] = [
     ("omega", "rad/s", NotNegative),
     ("kappa", "1", Share),
@@ -40,7 +40,7 @@ const SI: [(&str, &str, Allowed); 14] = [
     ("k_s", "N/m", NotNegative),
 ];
 
-/// The same of models/overhung-rotor.toml.
+/// Constants of models/overhung-rotor.toml in their order: name, unit, allowed values.
 const NONDIMENSIONAL: [(&str, &str, Allowed); 9] = [
     ("Omega", "1", NotNegative),
     ("kappa", "1", Share),
@@ -54,18 +54,18 @@ const NONDIMENSIONAL: [(&str, &str, Allowed); 9] = [
 ];
 
 impl Si {
-    /// The constants from pairs of name and value with unit, such as `("c", "0.5 mm")`, in any order; the names are those of
-    /// models/overhung-rotor-si.toml, and all fourteen are required.
+    /// Returns the constants from pairs of name and value with unit, such as `("c", "0.5 mm")`, in any order; the names
+    /// are those of models/overhung-rotor-si.toml, and all fourteen are required.
     ///
     /// # Errors
-    /// Every mistake, in the order of the pairs, then what is missing or does not fit together.
+    /// Every mistake, in the order of the pairs, then missing and inconsistent constants.
     pub fn given(pairs: &[(&str, &str)]) -> Result<Si, Vec<Mistake>> {
         let si = Si::from_parameters(read(&SI, pairs)?);
         si.check()?;
         Ok(si)
     }
 
-    /// Whether a rotor can have these constants.
+    /// Checks that a rotor can have these constants.
     ///
     /// # Errors
     /// Every mistake.
@@ -83,8 +83,8 @@ impl Si {
 }
 
 impl Nondimensional {
-    /// The constants from pairs of name and value, such as `("zeta", "0.01")`, in any order; the names are those of
-    /// models/overhung-rotor.toml, and all nine are required.
+    /// Returns the constants from pairs of name and value, such as `("zeta", "0.01")`, in any order; the names are
+    /// those of models/overhung-rotor.toml, and all nine are required.
     ///
     /// # Errors
     /// As for [`Si::given`].
@@ -94,7 +94,7 @@ impl Nondimensional {
         Ok(constants)
     }
 
-    /// Whether a rotor can have these constants.
+    /// Checks that a rotor can have these constants.
     ///
     /// # Errors
     /// Every mistake.
@@ -121,7 +121,7 @@ impl Nondimensional {
     }
 }
 
-/// The values of all constants in their order.
+/// Values of all constants in their order.
 fn read<const N: usize>(table: &[(&str, &str, Allowed); N], pairs: &[(&str, &str)]) -> Result<[f64; N], Vec<Mistake>> {
     let mut values = [f64::NAN; N];
     let mut given = [false; N];

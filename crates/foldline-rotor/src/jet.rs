@@ -1,4 +1,4 @@
-//! Directional derivatives of any order by arithmetic with nilpotent numbers.
+//! Directional derivatives of any order by arithmetic on numbers with nilpotent parts.
 //!
 //! **Idea.** Numbers with parts ε₁, …, ε_k, εᵢ² = 0, have one coefficient for each set of directions; evaluated at
 //! x + Σ εᵢ dᵢ, the coefficient of ε₁⋯ε_k of f is Dᵏf[d₁, …, d_k] exactly.
@@ -43,7 +43,7 @@ impl Jet {
         Jet(self.0.iter().map(|c| c * number).collect())
     }
 
-    /// φ of this, given φ⁽ʲ⁾/j! at its value for j = 0, …, k.
+    /// φ of this number, given φ⁽ʲ⁾/j! at its value for j = 0, …, k.
     fn compose(&self, taylor: &[f64]) -> Jet {
         let mut rest = self.clone();
         rest.0[0] = 0.0;

@@ -1,14 +1,15 @@
 //! The vector field for eight trajectories at a time, with the contact law of the study.
 //!
-//! **Idea.** What parameters alone decide is computed once; the rest runs in whole vectors, compiled for the widest instruction set of the
-//! machine. So an ensemble of a field written in Rust runs as fast as this machine allows.
+//! **Idea.** Terms that depend on parameters alone are computed once; the rest runs in whole vectors, compiled for the
+//! widest instruction set of the machine. An ensemble of a field written in Rust then runs as fast as the machine
+//! allows.
 
 use crate::quantities::Nondimensional;
 use foldline::contract::Batch;
 use foldline::linalg::lane::{Eight, Lane};
 use foldline::model::kernels;
 
-/// What f needs of the parameters.
+/// Combinations of the parameters that f needs.
 #[derive(Clone, Copy, Debug)]
 pub struct Constants {
     /// m ε Ω².
@@ -30,7 +31,7 @@ pub struct Constants {
 }
 
 impl Constants {
-    /// Those of parameters.
+    /// Returns the constants for these parameters.
     pub fn of(p: &Nondimensional) -> Constants {
         Constants {
             forcing: p.mass * p.epsilon * p.omega * p.omega,
@@ -44,7 +45,7 @@ impl Constants {
         }
     }
 
-    /// f of eight states. For use within [`Lane::dispatch`].
+    /// Evaluates f at eight states. For use within [`Lane::dispatch`].
     #[inline(always)]
     pub fn slopes(&self, [u, v, du, dv]: [Eight; 4]) -> [Eight; 4] {
         let (gyroscopic, damping) = (Eight::splat(self.gyroscopic), Eight::splat(self.damping));
@@ -52,7 +53,7 @@ impl Constants {
         let square = u * u + v * v;
         let r = square.map(f64::sqrt);
         let switch = kernels::tanhs(Eight::splat(self.sharpness) * (r - one)) + one;
-        // Far below contact the switch is zero, so the radius 0 may be left out.
+        // Far below contact the switch is zero, so the value at r = 0 does not matter.
         let share = r.map(|r| if r > 0.0 { 1.0 - 1.0 / r } else { 0.0 });
         let contact = Eight::splat(self.ring) * switch * share;
         let stiffness = Eight::splat(self.linear) + Eight::splat(self.cubic) * square + contact;
@@ -62,7 +63,7 @@ impl Constants {
     }
 }
 
-/// f of all lanes of a batch with these constants.
+/// Evaluates f in all lanes of a batch with these constants.
 pub(crate) fn evaluate(constants: &Constants, at: Batch, f: &mut [f64]) {
     Eight::dispatch(Evaluate { constants, at, f });
 }
@@ -88,7 +89,7 @@ impl pulp::NullaryFnOnce for Evaluate<'_, '_> {
             }
         }
         if whole < lanes {
-            // Lanes that are not there repeat the last one.
+            // Missing lanes repeat the last one.
             let of = |i: usize| Eight::each(|k| states[i * lanes + (whole + k).min(lanes - 1)]);
             let slopes = constants.slopes([of(0), of(1), of(2), of(3)]);
             for i in 0..4 {
@@ -105,9 +106,9 @@ mod tests {
     use crate::quantities::Nondimensional;
     use foldline::contract::{Batch, Parameters, VectorField};
 
-    /// In lanes and one by one, within rounding; a lane does not depend on how many there are.
+    /// Lanes agree with single evaluations to rounding; a lane does not depend on the number of lanes.
     #[test]
-    fn lanes_are_the_field_of_each() {
+    fn lanes_agree_with_single_evaluations() {
         let rotor = OverhungRotor { law: ContactLaw::Tanh };
         for kappa in [0.0, 0.3, 1.0] {
             let p = Nondimensional { omega: 4.3, kappa, ..Nondimensional::REFERENCE };

@@ -1,15 +1,16 @@
-//! Overhung rotor with a cubic spring and a snubber ring: what is special to it, beside its text models.
+//! Overhung rotor with a cubic spring and a snubber ring: functions specific to it, in addition to its text models.
 //!
-//! **Idea.** The rotor of models/overhung-rotor.toml once more as Rust: faster where only this model matters, and an
-//! independent yardstick for models that are written as text. Around it, what an engineer asks of a rotor and no general program
-//! knows: units, natural frequencies in both frames, the names of bouncing motions, and where they come from.
+//! **Idea.** The rotor of models/overhung-rotor.toml written in Rust: faster where only this model matters, and an
+//! independent reference for models written as text. Added to it are questions that an engineer asks of a rotor and
+//! that a general program cannot answer: units, natural frequencies in both frames, the names of bouncing motions, and
+//! their origin.
 //!
 //! | question | answer |
 //! |---|---|
-//! | which numbers without dimensions belong to my rotor, and back? | [`Si::given`], [`Nondimensional`], [`Nondimensional::to_si`] |
+//! | which nondimensional constants belong to my rotor, and back? | [`Si::given`], [`Nondimensional`], [`Nondimensional::to_si`] |
 //! | where are the natural frequencies, and where in the ratio n:m? | [`campbell()`], [`Ratio::speed`], [`resonances`] |
-//! | what does a cycle consist of, and is it balanced? | [`Spectrum`] |
-//! | how does the ring take up force? | [`ContactLaw`] |
+//! | which lines does a cycle have, and is it balanced? | [`Spectrum`] |
+//! | what is the force of the ring? | [`ContactLaw`] |
 //! | where do bouncing cycles come from as damping and unbalance vanish? | [`backbone()`] |
 //!
 //! ```
@@ -29,7 +30,8 @@
 //!
 //! **Source.** akay2024, section 2.
 //!
-//! **Departures.** Length is measured in the clearance *at the disc*, U = V/(c a/b), and γ = k₃c²/k_r; the print has c and b².
+//! **Departures.** Length is measured in units of the clearance *at the disc*, U = V/(c a/b), and γ = k₃c²/k_r; the
+//! publication has c and b².
 
 mod backbone;
 mod campbell;

@@ -1,10 +1,10 @@
-//! The constants of the rotor, with dimensions and without, and the way from one to the other.
+//! Dimensional and nondimensional constants of the rotor, and the conversion between them.
 //!
 //! **Equations.** With I = I_d + m_d a², ω_n² = k_r b²/I, c̄ = c a/b:
 //!
 //! 1. Ω = ω/ω_n, J_p = I_p/I, m = m_d a²/I, ζ = c_r b²/(2 I ω_n), β = k_s/k_r, γ = k_3 c²/k_r, ε = e/c̄
 //! 2. displacements over c̄, times by 1/ω_n, velocities over c̄ ω_n
-//! 3. The way back needs what the numbers without dimensions do not say, the [`Scale`] a, b, c, I, ω_n:
+//! 3. The inverse needs what the nondimensional constants leave open, the [`Scale`] a, b, c, I, ω_n:
 //!    k_r = I ω_n²/b², m_d = m I/a², I_d = (1 - m) I, and the others from 1.
 //!
 //! **Source.** akay2024, section 2.
@@ -44,7 +44,7 @@ pub struct Si {
     pub ring_stiffness: f64,
 }
 
-/// The units in which the constants without dimensions are numbers.
+/// Scales of the nondimensional constants.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scale {
     /// a, pivot to disc, m.
@@ -77,7 +77,7 @@ impl Scale {
     }
 }
 
-/// Constants without dimensions.
+/// Nondimensional constants.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Nondimensional {
     /// Ω = ω/ω_n.
@@ -106,7 +106,7 @@ impl Si {
         self.diametral_inertia + self.mass * self.disc_distance.powi(2)
     }
 
-    /// ω_n = sqrt(k_r b²/I), rad/s: the unit of speed, and of time its reciprocal.
+    /// ω_n = sqrt(k_r b²/I), rad/s: the unit of speed; its reciprocal is the unit of time.
     pub fn pivot_frequency(&self) -> f64 {
         (self.stiffness * self.spring_distance.powi(2) / self.pivot_inertia()).sqrt()
     }
@@ -116,7 +116,7 @@ impl Si {
         self.clearance * self.disc_distance / self.spring_distance
     }
 
-    /// Everything that the constants without dimensions leave open.
+    /// Returns the scales that the nondimensional constants leave open.
     pub fn scale(&self) -> Scale {
         Scale {
             disc_distance: self.disc_distance,
@@ -127,7 +127,7 @@ impl Si {
         }
     }
 
-    /// The constants from values in the order of models/overhung-rotor-si.toml.
+    /// Returns the constants from values in the order of models/overhung-rotor-si.toml.
     pub fn from_parameters(p: [f64; 14]) -> Si {
         let [speed, kappa, sharpness, mass, eccentricity, disc_distance, spring_distance, ..] = p;
         let [.., clearance, diametral_inertia, polar_inertia, stiffness, damping, cubic_stiffness, ring_stiffness] = p;
@@ -149,7 +149,7 @@ impl Si {
         }
     }
 
-    /// The values in the order of models/overhung-rotor-si.toml.
+    /// Returns the values in the order of models/overhung-rotor-si.toml.
     pub fn parameters(&self) -> [f64; 14] {
         [
             self.speed,
@@ -188,7 +188,7 @@ impl From<&Si> for Nondimensional {
 }
 
 impl Nondimensional {
-    /// The constants of the reference study at Ω = 5, with the cubic spring.
+    /// Constants of the reference study at Ω = 5, with the cubic spring.
     pub const REFERENCE: Nondimensional = Nondimensional {
         omega: 5.0,
         kappa: 0.0,
@@ -201,18 +201,18 @@ impl Nondimensional {
         mass: 0.9,
     };
 
-    /// The values in the order of models/overhung-rotor.toml.
+    /// Returns the values in the order of models/overhung-rotor.toml.
     pub fn parameters(&self) -> [f64; 9] {
         [self.omega, self.kappa, self.zeta, self.epsilon, self.gamma, self.beta, self.sharpness, self.polar, self.mass]
     }
 
-    /// The constants from values in the order of models/overhung-rotor.toml.
+    /// Returns the constants from values in the order of models/overhung-rotor.toml.
     pub fn from_parameters(p: [f64; 9]) -> Nondimensional {
         let [omega, kappa, zeta, epsilon, gamma, beta, sharpness, polar, mass] = p;
         Nondimensional { omega, kappa, zeta, epsilon, gamma, beta, sharpness, polar, mass }
     }
 
-    /// The rotor in SI units that has these constants at this scale.
+    /// Returns the rotor in SI units that has these constants at this scale.
     ///
     /// # Errors
     /// Every mistake, if no rotor has these constants or the scale is not positive and finite.

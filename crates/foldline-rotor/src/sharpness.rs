@@ -1,22 +1,23 @@
-//! How sharp must the smoothed contact be?
+//! Sharpness required of the smoothed contact.
 //!
-//! **Idea.** The motion to which the rotor settles is simulated with the piecewise law, every step ending where contact begins
-//! or ends, and with the tanh law for several K. The difference between the two is the error that smoothing makes. It falls
-//! with K, and the smallest K whose error is acceptable is found by bisection, each K tried by simulation.
+//! **Idea.** The settled motion of the rotor is simulated with the piecewise law, where every step ends at the
+//! beginning or end of contact, and with the tanh law for several K. The difference between the two is the smoothing
+//! error. It falls with K, and the smallest K with an acceptable error is found by bisection, simulating each K.
 //!
-//! **Equations.** With r̂ the largest radius, T the period and c_k the lines of u + jv, of the piecewise law without and of the
-//! smoothed law with an index K:
+//! **Equations.** With r̂ the largest radius, T the period and c_k the lines of u + jv, without an index for the
+//! piecewise law and with the index K for the smoothed law:
 //!
 //! 1. e(K) = max( |r̂_K - r̂|/r̂, |T_K - T|/T, max_k ||c_k|_K - |c_k|| / max_k |c_k| )
-//! 2. log e ≈ log e₁ - p log K, in the sense of least squares
+//! 2. log e ≈ log e₁ - p log K, by least squares
 //!
-//! Smoothing changes the force in a layer of width 1/K by an amount of order β/K, so p is 2 where contact is met at speed.
-//! Amplitudes are compared because a motion settles with any phase, and the phase of a line depends on it.
+//! Smoothing changes the force in a layer of width 1/K by an amount of order β/K, so p is 2 where contact is met at
+//! nonzero speed. Amplitudes are compared because a motion settles with an arbitrary phase, on which the phases of its
+//! lines depend.
 //!
 //! **Source.** akay2024, where K = 150 for β = 10 and K = 90 for β = 6 are chosen by such a comparison.
 //!
-//! **Fails when** the motion settles by less than the accuracy asked for, or is no attractor of the smoothed rotor; the latter is
-//! an error without bound.
+//! **Fails when** the motion settles less accurately than requested, or is not an attractor of the smoothed rotor; the
+//! error is then infinite.
 
 use crate::{ContactLaw, Nondimensional, OverhungRotor};
 use foldline::attractors::{Trial, stepped_sweep};
@@ -26,14 +27,15 @@ use foldline::simulation::{Integrator, Passage, Tolerance};
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 
-/// Place of K and of the radius among parameters and ranges.
+/// Position of K and of the radius among parameters and ranges.
 const SHARPNESS: usize = 6;
 const RADIUS: usize = 4;
 const SCALES: [f64; 4] = [1.0; 4];
-/// Lines k = -ORDERS … ORDERS are compared; those of the motions in question fall below 1e-3 of the strongest before.
+/// Lines k = -ORDERS … ORDERS are compared; those of the motions considered fall below 1e-3 of the strongest within
+/// this range.
 const ORDERS: i64 = 12;
-/// Samples over a period. A kink of the acceleration leaves lines that fall like k⁻⁴, so the line that is folded onto order k
-/// by sampling is that of order 512 and weaker than 1e-10.
+/// Samples per period. A kink in the acceleration leaves lines that fall like k⁻⁴, so the line aliased onto order k
+/// by sampling has an order near 512 and is weaker than 1e-10.
 const SAMPLES: usize = 512;
 
 /// The error of the tanh law at one K.
@@ -50,18 +52,18 @@ pub struct SmoothingError {
 }
 
 impl SmoothingError {
-    /// e of 1.
+    /// e of equation 1.
     pub fn largest(&self) -> f64 {
         self.radius.max(self.period).max(self.lines)
     }
 }
 
-/// What the rotor with the piecewise law settles to from `start`, at constants whose K does not count.
+/// Settled motion of the rotor with the piecewise law from `start`, at constants whose K is ignored.
 pub fn exact_motion(constants: &Nondimensional, start: [f64; 4]) -> Option<Response> {
     settled(ContactLaw::Piecewise, constants, constants.sharpness, &start)
 }
 
-/// The error at every one of `sharpness`, for the motion `exact` of the piecewise law.
+/// Errors at each of `sharpness`, for the motion `exact` of the piecewise law.
 pub fn smoothing_errors(constants: &Nondimensional, exact: &Response, sharpness: &[f64]) -> Vec<SmoothingError> {
     let exact = Exact::of(constants, exact);
     sharpness.iter().map(|k| exact.error(constants, *k)).collect()
@@ -123,8 +125,8 @@ fn lines(law: ContactLaw, constants: &Nondimensional, motion: &Response) -> Vec<
     (-ORDERS..=ORDERS).map(line).collect()
 }
 
-/// Equation 2: the power p and e₁, the error at K = 1, from those errors that are finite and above `floor`, the accuracy of the
-/// motions; `None` for fewer than two.
+/// Fits equation 2: the power p, and e₁, the error at K = 1, from the errors that are finite and above `floor`, the
+/// accuracy of the motions; `None` for fewer than two.
 pub fn fitted_power(errors: &[SmoothingError], floor: f64) -> Option<(f64, f64)> {
     let known = errors.iter().map(|e| [e.sharpness, e.largest()]);
     let logs: Vec<[f64; 2]> =
@@ -136,8 +138,8 @@ pub fn fitted_power(errors: &[SmoothingError], floor: f64) -> Option<(f64, f64)>
     (logs.len() >= 2 && spread > 0.0).then(|| (-slope, (y - slope * x).exp()))
 }
 
-/// The smallest K, to a hundredth, whose error is at most `acceptable` for all of `motions` of the piecewise law, and the
-/// errors of the motion that needs it there; `None` where no K up to 10⁴ β serves.
+/// Smallest K, to a hundredth, whose error is at most `acceptable` for all of `motions` of the piecewise law, and the
+/// errors of the motion that requires it; `None` if no K up to 10⁴ β is sufficient.
 pub fn smallest_sharpness(constants: &Nondimensional, motions: &[Response], acceptable: f64) -> Option<(f64, f64)> {
     let motions: Vec<Exact> = motions.iter().map(|motion| Exact::of(constants, motion)).collect();
     let worst = |k: f64| motions.iter().map(|m| m.error(constants, k).largest()).fold(0.0, f64::max);

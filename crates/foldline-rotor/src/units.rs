@@ -1,7 +1,7 @@
-//! Units of measurement: a number with its unit, as it is written, in SI.
+//! Units of measurement: converts numbers with units, as written by users, to SI.
 //!
-//! **Idea.** A unit is a product of powers of known symbols; it has a size in SI and a dimension. A value is accepted where
-//! its dimension is the one that is asked for. Angle counts as a dimension of its own, because a speed in rad/s and one in
+//! **Idea.** A unit is a product of powers of known symbols; it has a size in SI and a dimension. A value is accepted
+//! if its dimension is the requested one. Angle counts as a dimension of its own, because a speed in rad/s and one in
 //! Hz differ by 2π and "1/s" does not say which of the two is meant.
 //!
 //! **Fails when** the unit is unknown or ambiguous, or has another dimension; the answer is a [`Mistake`].
@@ -9,14 +9,14 @@
 use std::f64::consts::{PI, TAU};
 use std::fmt;
 
-/// What is wrong with a value: place, cause, cure.
+/// Mistake in a value: place, cause, cure.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Mistake {
-    /// Where: the name of the constant and what was given for it.
+    /// Name of the constant, and the value given for it.
     pub place: String,
-    /// What is wrong there.
+    /// Description of the mistake.
     pub cause: String,
-    /// What would be right.
+    /// Suggested correction.
     pub cure: String,
 }
 
@@ -44,16 +44,16 @@ pub struct Dimension {
 /// Size in SI (with rad for angles) and dimension of a unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Unit {
-    /// How many SI units one of it is.
+    /// Size in SI units.
     pub size: f64,
-    /// What it measures.
+    /// Dimension of the unit.
     pub dimension: Dimension,
 }
 
 const PREFIXES: [(&str, f64); 9] =
     [("n", 1e-9), ("u", 1e-6), ("µ", 1e-6), ("μ", 1e-6), ("m", 1e-3), ("c", 1e-2), ("k", 1e3), ("M", 1e6), ("G", 1e9)];
 
-/// Symbol, size, exponents of kg, m, s, rad, and whether it takes prefixes.
+/// Symbol, size, exponents of kg, m, s, rad, and true if it takes prefixes.
 const SYMBOLS: [(&str, f64, [i32; 4], bool); 12] = [
     ("m", 1.0, [0, 1, 0, 0], true),
     ("g", 1e-3, [1, 0, 0, 0], true),
@@ -70,7 +70,7 @@ const SYMBOLS: [(&str, f64, [i32; 4], bool); 12] = [
 ];
 
 impl Unit {
-    /// The unit that `text` names, such as `N s/m`, `kg·mm²`, `rpm`; nothing at all is the unit 1. Every `/` divides by the one
+    /// Parses a unit such as `N s/m`, `kg·mm²`, `rpm`; an empty text is the unit 1. Every `/` divides by the one
     /// factor that follows it.
     ///
     /// # Errors
@@ -120,7 +120,7 @@ impl Unit {
     }
 }
 
-/// `m^2`, `m²` and `m` as symbol and power.
+/// Splits a factor such as `m^2`, `m²` or `m` into symbol and power.
 fn split_power(factor: &str) -> Option<(&str, i32)> {
     if let Some((symbol, power)) = factor.split_once('^') {
         return power.parse().ok().filter(|p: &i32| p.abs() <= 9).map(|p| (symbol, p));
@@ -147,10 +147,10 @@ fn of_symbol(symbol: &str) -> Option<Unit> {
     })
 }
 
-/// The value of `text`, a number followed by its unit, in `unit` (which is written in SI). `name` is for the place of a mistake.
+/// Value of `text`, a number followed by its unit, in `unit` (which is in SI). `name` is for the place of a mistake.
 ///
 /// # Errors
-/// A [`Mistake`] if there is no finite number, or its unit does not measure the same as `unit`.
+/// A [`Mistake`] if there is no finite number, or if its unit differs in dimension from `unit`.
 pub fn quantity(name: &str, text: &str, unit: &str) -> Result<f64, Mistake> {
     let place = format!("{name} = `{text}`");
     let wanted = Unit::parse(unit)?;
@@ -172,11 +172,11 @@ pub fn quantity(name: &str, text: &str, unit: &str) -> Result<f64, Mistake> {
         };
         return Err(Mistake { place, cause, cure: example });
     }
-    // One division: exact where the two units are the same.
+    // One division: exact if the two units are equal.
     Ok(value * (given.size / wanted.size))
 }
 
-/// The longest beginning that is a finite number, and the rest.
+/// Longest prefix that is a finite number, and the rest.
 fn leading_number(text: &str) -> Option<(f64, &str)> {
     if !text.starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c)) {
         return None;
@@ -197,7 +197,7 @@ mod tests {
     }
 
     #[test]
-    fn units_of_one_kind_are_converted() {
+    fn units_of_one_dimension_are_converted() {
         close("0.5 mm", "m", 0.5e-3);
         close("-3.5e+2µm", "m", -3.5e-4);
         close("250 g", "kg", 0.25);
@@ -218,7 +218,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_not_a_value_of_that_kind_is_refused_with_a_cure() {
+    fn invalid_values_are_refused_with_a_cure() {
         for (text, unit, cause) in [
             ("0.5 kg", "m", "does not have the dimension"),
             ("0.5", "m", "no unit"),

@@ -1,4 +1,4 @@
-//! What a small sharpness makes up, and which sharpness is enough.
+//! Artefacts of a small sharpness, and the sharpness that is sufficient.
 
 use foldline::attractors::{Sampling, Trial, survey_by_simulation};
 use foldline::contract::{Unobserved, Verdict};
@@ -19,7 +19,7 @@ fn the_false_unstable_piece_below_contact_is_recognised() {
     let parameters = constants.parameters().to_vec();
     let seed = SeedPlan {
         name: "S".into(),
-        // Free of contact: r = mεΩ²/(1 - (1 - J_p)Ω²) = 0.165.
+        // Without contact: r = mεΩ²/(1 - (1 - J_p)Ω²) = 0.165.
         source: SeedSource::State(vec![0.165, 0.0, 0.0, 0.0]),
         parameters,
         samples: 1,
@@ -51,7 +51,7 @@ fn the_false_unstable_piece_below_contact_is_recognised() {
     let system = System::new(&field);
     let diagram = explore::run(&system, &plan, 1, Diagram::default(), &Unobserved);
     let branch = &diagram.branches[0];
-    // Small sharpness makes S fold twice below contact, with an unstable piece in between; the law has nothing there.
+    // At small sharpness S folds twice below contact, with an unstable piece in between; the exact law has neither.
     let folds: Vec<f64> = branch.special.iter().map(|s| s.point.ranges[4][1]).collect();
     assert!(folds.len() == 2 && folds.iter().all(|r| (0.9..1.0).contains(r)), "{folds:?}");
     let mut unstable = 0;
@@ -60,8 +60,8 @@ fn the_false_unstable_piece_below_contact_is_recognised() {
         let fate = persistence(&system, 1e-6, 4, point, SHARPNESS, 90.0, 2000);
         match fate {
             Persistence::Vanishes { fold } => assert!(fold > 30.0 && fold < 90.0 && r > 0.9 && r < 1.0, "{r} {fold}"),
-            // What survives below contact is the free motion at K = 90 to the pull of the tanh law, 0.14 β/K = 0.01 at most
-            // over a stiffness of 0.3 there.
+            // The solution that survives below contact is the free motion, up to the pull of the tanh law at K = 90: at
+            // most 0.14 β/K = 0.01 over a stiffness of 0.3 there.
             Persistence::Survives(at) => assert!(point.unstable == 0 && (at.ranges[4][1] - r).abs() < 0.1, "{r}"),
             other => panic!("{r}: {other:?}"),
         }
@@ -76,7 +76,7 @@ fn the_false_unstable_piece_below_contact_is_recognised() {
     assert_eq!([0.5, 0.96, 1.02].map(fate), [false, true, false]);
 }
 
-/// The 2:1 and 3:1 motions of the piecewise law at Ω = 5 that the starts lead to.
+/// The 2:1 and 3:1 motions of the piecewise law at Ω = 5 reached from given starts.
 fn motions(constants: &Nondimensional) -> Vec<Response> {
     let field = OverhungRotor { law: ContactLaw::Piecewise };
     let scales = [1.0; 4];
@@ -101,7 +101,7 @@ fn motions(constants: &Nondimensional) -> Vec<Response> {
 }
 
 #[test]
-fn the_error_of_smoothing_falls_with_the_square_of_the_sharpness() {
+fn the_smoothing_error_falls_with_the_square_of_the_sharpness() {
     let mut published = Vec::new();
     for (beta, expected) in [(10.0, 2), (6.0, 1)] {
         let constants = Nondimensional { kappa: 1.0, beta, ..Nondimensional::REFERENCE };
@@ -110,7 +110,7 @@ fn the_error_of_smoothing_falls_with_the_square_of_the_sharpness() {
         for motion in &motions {
             let exact = exact_motion(&constants, motion.state.clone().try_into().unwrap()).unwrap();
             let errors = smoothing_errors(&constants, &exact, &[6.0, 15.0, 30.0].map(|times| times * beta));
-            // Five times sharper: 25 times more exact. The motions are settled to some 1e-7.
+            // Five times the sharpness reduces the error by 25. The motions are settled to about 1e-7.
             let gain = errors[0].largest() / errors[2].largest();
             assert!((15.0..40.0).contains(&gain), "{gain} {errors:?}");
             assert!(errors.iter().all(|e| e.lines > 0.0 && e.lines < 1e-3 && e.period < e.lines), "{errors:?}");
@@ -119,9 +119,9 @@ fn the_error_of_smoothing_falls_with_the_square_of_the_sharpness() {
             published.push(errors[1].largest());
         }
         let (sharpness, error) = smallest_sharpness(&constants, &motions, 1e-3).unwrap();
-        // Found by bisection to a hundredth; the error goes with the square.
+        // Found by bisection to a hundredth; the error goes like the square.
         assert!(error <= 1e-3 && error > 0.95e-3, "K = {sharpness}: {error}");
     }
-    // K = 15 β, the choice of akay2024, makes no error that a picture would show.
+    // K = 15 β, the choice of akay2024, makes no error visible in a picture.
     assert!(published.iter().all(|e| *e < 1e-4), "{published:?}");
 }

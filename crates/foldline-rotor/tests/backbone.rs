@@ -1,4 +1,4 @@
-//! Conservative backbones: their roots and limits, the same orbits by quadrature, and forced cycles that tend to them.
+//! Conservative backbones: their roots and limits, their orbits by quadrature, and forced cycles that tend to them.
 
 use foldline::contract::Unobserved;
 use foldline::diagram::{Branch, Cycle, Family, Kind, Origin, Point, Solution};
@@ -33,14 +33,15 @@ fn cubic_backbones_are_rooted_at_the_linear_resonance() {
         let near = &found.points[0];
         assert!(near.r_max < 1.1e-3 && (near.speed - found.root).abs() < 1e-6);
         let further = found.points.iter().find(|p| p.r_max > 0.02).unwrap();
-        // The next term is of order r² ~ 1e-3, relative; the speeds are good to 1e-10, a part in 1e4 of their difference from the root.
+        // The next term is of relative order r² ~ 1e-3; the speeds are accurate to 1e-10, a part in 1e4 of their
+        // difference from the root.
         assert!((rate(further) / rate(near) - 1.0).abs() < 1e-2, "{} {}", rate(near), rate(further));
         assert_eq!(spectrum(further).name(), format!("{}:1", ratio.backward));
     }
 }
 
-/// Below r = 1 nothing is felt; then the speeds lie inside (Ω_n, sqrt(1 + β) Ω_n), and the distance from the upper end halves
-/// when the radius doubles, because β (1 - 1/r) is what is felt of β.
+/// Below r = 1 contact is not felt; above it the speeds lie inside (Ω_n, sqrt(1 + β) Ω_n), and the distance from the
+/// upper end halves when the radius doubles, because the effective stiffness is β (1 - 1/r).
 #[test]
 fn contact_backbones_fill_the_contact_interval() {
     for ratio in RATIOS {
@@ -63,10 +64,10 @@ fn contact_backbones_fill_the_contact_interval() {
     }
 }
 
-/// The pull of the tanh law just below contact softens the rotor: its backbones leave the contact interval at the lower end, the less the
-/// sharper the switch.
+/// The pull of the tanh law just below contact softens the rotor: its backbones leave the contact interval at the lower
+/// end, less so for a sharper switch.
 #[test]
-fn the_pull_of_the_tanh_law_leads_out_of_the_contact_interval() {
+fn the_pull_of_the_tanh_law_moves_backbones_out_of_the_contact_interval() {
     let lowest = |law, ratio, sharpness| {
         let found = computed(&Nondimensional { sharpness, ..CONTACT }, law, ratio, 4.0, 1.1);
         found.points.iter().map(|p| p.speed - found.root).fold(f64::INFINITY, f64::min)
@@ -79,10 +80,10 @@ fn the_pull_of_the_tanh_law_leads_out_of_the_contact_interval() {
     }
 }
 
-/// The power that goes into an orbit comes out again, as far as its integration is accurate: a tenth of the tolerance, and a
-/// hundredth of it less than a thirtieth of that.
+/// The net power over an orbit vanishes to the accuracy of its integration: a tenth of the tolerance, and a
+/// tolerance smaller by a hundred leaves a thirtieth of that or less.
 #[test]
-fn orbits_balance_power_to_the_tolerance_that_is_asked_for() {
+fn orbits_balance_power_to_the_requested_tolerance() {
     for (constants, ratio) in [(CUBIC, RATIOS[0]), (CUBIC, RATIOS[1]), (CONTACT, RATIOS[0]), (CONTACT, RATIOS[1])] {
         let largest = |tolerance: f64| {
             let reach = Reach { speeds: [0.5, 8.0], radius: 4.0, tolerance };
@@ -109,16 +110,16 @@ fn orbits_close() {
             );
             let start = cycle.state(0.0);
             let end = integrator.state_after(&start, [0.0, p.period]).unwrap();
-            // A tolerance of 1e-7 for the half turn, of which there are up to four.
+            // A tolerance of 1e-7 per half radial period, of which there are up to four.
             assert!(end.iter().zip(&start).all(|(a, b)| (a - b).abs() < 1e-6 * p.r_max), "{start:?} {end:?}");
         }
     }
 }
 
-/// T_r, A and the power by quadrature over s = r² between its turning values: s = mean + half cos ψ makes the integrands periodic
-/// and smooth, so that equal steps converge exponentially.
+/// T_r, A and the power by quadrature over s = r² between its turning values. With s = mean + half cos ψ the integrands
+/// are periodic and smooth, so the trapezoidal rule converges exponentially.
 #[test]
-fn cubic_orbits_by_quadrature() {
+fn cubic_orbits_agree_with_quadrature() {
     for ratio in RATIOS {
         let found = computed(&CUBIC, ContactLaw::Tanh, ratio, 10.0, 30.0);
         for p in found.points.iter().step_by(6) {
@@ -131,7 +132,7 @@ fn cubic_orbits_by_quadrature() {
             let energy = 0.25 * gamma * ((low + high) * third - low * high);
             let (mut period, mut turn, mut power) = (0.0, 0.0, 0.0);
             const STEPS: usize = 2000;
-            // The sign of L = r² (θ′ + g) at the turning point.
+            // Sign of L = r² (θ′ + g) at the turning point.
             let sense = match &p.point.solution {
                 Solution::Cycle(cycle) => {
                     let x = cycle.state(0.0);
@@ -161,7 +162,7 @@ fn cubic_orbits_by_quadrature() {
     }
 }
 
-/// A cycle of the reference study at Ω = 5, from a point of it.
+/// A cycle of the reference study at Ω = 5, continued from one of its points.
 fn reference(rotor: &OverhungRotor, ratio: Ratio) -> Point {
     let (period, start) = match ratio {
         Ratio::SINGLE_LOOP => (2.0147198658, [0.15353773, 2.35231575, 11.1670571, -0.46452523]),
@@ -195,7 +196,7 @@ fn reference(rotor: &OverhungRotor, ratio: Ratio) -> Point {
     }
 }
 
-/// The branch through `point` in one parameter, to both sides.
+/// The branch through `point` in one parameter, in both directions.
 fn followed(rotor: &OverhungRotor, point: &Point, free: usize, range: [f64; 2]) -> Branch {
     let mut system = System::new(rotor);
     system.scales = vec![1.0, 1.0, 3.0, 3.0];
@@ -221,7 +222,7 @@ fn followed(rotor: &OverhungRotor, point: &Point, free: usize, range: [f64; 2]) 
     branch
 }
 
-/// The forced branch in ε at Ω = 5 and that ζ, from the reference study.
+/// The forced branch in ε at Ω = 5 with that ζ, from the reference study.
 fn in_unbalance(rotor: &OverhungRotor, ratio: Ratio, zeta: f64) -> Branch {
     let damped = followed(rotor, &reference(rotor, ratio), 2, [zeta, 0.01]);
     let by_damping = |a: &&Point, b: &&Point| a.parameters[2].total_cmp(&b.parameters[2]);
@@ -237,7 +238,7 @@ fn at(rotor: &OverhungRotor, branch: &Branch, epsilon: f64) -> Vec<Point> {
     known::solutions_at(&system, &settings, branch, epsilon)
 }
 
-/// SL: the distance from the backbone halves with ε, at constant ζ far below the damping limit.
+/// SL: the distance from the backbone is proportional to ε, at constant ζ far below the damping limit.
 #[test]
 fn forced_single_loops_tend_to_the_backbone() {
     let rotor = OverhungRotor::default();
@@ -260,17 +261,17 @@ fn forced_single_loops_tend_to_the_backbone() {
         .collect();
     for pair in gaps.windows(2) {
         for k in 0..3 {
-            // The second order of ε is a few per cent of the first here.
+            // The second-order term in ε is a few per cent of the first here.
             assert!((pair[0][k] / pair[1][k] - 2.0).abs() < 0.1, "{gaps:?}");
         }
     }
     assert!(gaps[2][0].abs() < 0.01 && gaps[2][2].abs() < 1e-3, "{gaps:?}");
 }
 
-/// DL: symmetric under half a turn, so that the period differs by the square of ε only, and the branch turns back where ζ is a
-/// multiple of ε².
+/// DL is symmetric under half a turn, so the period differs only by the square of ε, and the branch turns back where ζ
+/// is a multiple of ε².
 #[test]
-fn forced_double_loops_tend_to_the_backbone_and_turn_back_at_a_square() {
+fn forced_double_loops_tend_to_the_backbone_and_turn_back_where_damping_is_quadratic_in_unbalance() {
     let rotor = OverhungRotor::default();
     let limit = computed(&CUBIC, ContactLaw::Tanh, Ratio::DOUBLE_LOOP, 5.0, 30.0).points.pop().unwrap();
     let fold = |branch: &Branch| {
@@ -294,10 +295,10 @@ fn forced_double_loops_tend_to_the_backbone_and_turn_back_at_a_square() {
     (0..2).for_each(|k| assert!((wide[k] / narrow[k] - 4.0).abs() < 0.2, "{wide:?} {narrow:?}"));
 }
 
-/// Contact SL is an isola, at ζ = 0.01 and ε = 0.353 between folds at 3.352613 and 10.340617: where the backbone loses its forced
-/// cycles. That is a statement of first order in ε and ζ, and holds better where ε is small against r_max.
+/// Contact SL is an isola, for ζ = 0.01 and ε = 0.353 between folds at 3.352613 and 10.340617: there the backbone loses
+/// its forced cycles. This holds to first order in ε and ζ, and better where ε is small compared with r_max.
 #[test]
-fn the_damping_limit_foretells_where_the_contact_branch_closes() {
+fn the_damping_limit_predicts_where_the_contact_branch_closes() {
     let found = computed(&CONTACT, ContactLaw::Tanh, Ratio::SINGLE_LOOP, 12.0, 30.0);
     let ends = found.turning_points(CONTACT.zeta / CONTACT.epsilon);
     assert_eq!(ends.len(), 2, "{ends:?}");
@@ -309,7 +310,7 @@ fn the_damping_limit_foretells_where_the_contact_branch_closes() {
 }
 
 #[test]
-fn what_has_no_backbone_is_refused() {
+fn ratios_without_a_backbone_are_refused() {
     let reach = Reach { speeds: [0.5, 10.0], radius: 2.0, tolerance: 1e-6 };
     let refused = |constants: &Nondimensional, backward, forward, reach: &Reach| {
         let mistake = backbone(constants, ContactLaw::Tanh, Ratio { backward, forward }, reach).unwrap_err();

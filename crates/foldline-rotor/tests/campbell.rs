@@ -45,20 +45,20 @@ fn without_damping_the_closed_form_is_the_characteristic_equation() {
                 assert!((lambda - closed.rotating[k]).abs() < 1e-13 * (1.0 + lambda.abs()));
                 assert!((found.inertial[k] - closed.inertial[k]).abs() < 1e-13 * (1.0 + found.speed));
             }
-            // Seen from the ground, one mode whirls forward at every speed and the other backward.
+            // In the inertial frame one mode whirls forward at every speed and the other backward.
             assert!(found.inertial[0] > 0.0 && found.inertial[1] < 0.0);
         }
     }
 }
 
-/// 2:1 and 3:1 to the ten digits of an independent computation, and the ratio itself for all others.
+/// 2:1 and 3:1 against ten digits of an independent computation, and the ratio itself for all others.
 #[test]
-fn resonance_speeds() {
+fn resonance_speeds_match_an_independent_computation() {
     let close = |a: f64, b: f64| (a - b).abs() < 5e-10;
     assert!(close(Ratio::SINGLE_LOOP.speed(POLAR, 1.0).unwrap(), 3.320848274));
     assert!(close(Ratio::DOUBLE_LOOP.speed(POLAR, 1.0).unwrap(), 2.180021683));
     let all = resonances(POLAR, 1.0, 7);
-    // 17 pairs n > m ≥ 1 up to 7 have no common divisor; for 7:6 J_p = 0.143 is just above the limit 1/7.
+    // 17 pairs n > m ≥ 1 up to 7 are coprime; for 7:6 J_p = 0.143 is just above the limit 1/7.
     assert_eq!(all.len(), 16);
     assert!(!all.iter().any(|(ratio, _)| ratio.backward == 7 && ratio.forward == 6));
     for (ratio, speed) in all {
@@ -74,7 +74,7 @@ fn resonance_speeds() {
 }
 
 #[test]
-fn a_ratio_exists_below_its_limit_of_the_polar_inertia_only() {
+fn a_ratio_exists_only_below_its_limit_of_polar_inertia() {
     assert_eq!([Ratio::SINGLE_LOOP, Ratio::DOUBLE_LOOP].map(Ratio::polar_limit), [0.5, 2.0 / 3.0]);
     for ratio in [Ratio::SINGLE_LOOP, Ratio::DOUBLE_LOOP, Ratio { backward: 5, forward: 3 }] {
         let limit = ratio.polar_limit();
@@ -91,7 +91,7 @@ fn a_ratio_exists_below_its_limit_of_the_polar_inertia_only() {
 }
 
 #[test]
-fn with_the_ring_always_touched_the_picture_scales() {
+fn the_contact_interval_scales_with_the_root_of_the_stiffness() {
     let beta = Nondimensional::REFERENCE.beta;
     let [low, high] = Ratio::SINGLE_LOOP.contact_interval(POLAR, beta).unwrap();
     assert!((high / low - (1.0 + beta).sqrt()).abs() < 1e-14);

@@ -1,4 +1,4 @@
-//! The constants with units, in both directions.
+//! Conversion of constants with units, in both directions.
 
 use foldline_rotor::{Nondimensional, Scale, Si};
 use foldline_store::model_file::read_model;
@@ -25,13 +25,13 @@ const DRAWING: [(&str, &str); 14] = [
 fn close(found: &[f64], expected: &[f64]) {
     assert_eq!(found.len(), expected.len());
     for (a, b) in found.iter().zip(expected) {
-        // A handful of roundings each.
+        // A few rounding errors each.
         assert!((a - b).abs() <= 16.0 * f64::EPSILON * b.abs(), "{found:?} {expected:?}");
     }
 }
 
 #[test]
-fn a_drawing_is_the_model_file_is_the_reference() {
+fn drawing_model_file_and_reference_agree() {
     let si = Si::given(&DRAWING).unwrap();
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models/overhung-rotor-si.toml");
     let (model, _) = read_model(&path).unwrap();
@@ -46,7 +46,7 @@ fn a_drawing_is_the_model_file_is_the_reference() {
 }
 
 #[test]
-fn speeds_may_be_given_in_turns() {
+fn speeds_may_be_given_in_revolutions() {
     for (text, speed) in [("3000 rpm", 100.0), ("50 Hz", 100.0), ("50 rev/s", 100.0)] {
         let pairs = DRAWING.map(|(name, value)| if name == "omega" { (name, text) } else { (name, value) });
         close(&[Si::given(&pairs).unwrap().speed], &[speed * std::f64::consts::PI]);
@@ -54,10 +54,10 @@ fn speeds_may_be_given_in_turns() {
 }
 
 #[test]
-fn there_and_back() {
+fn conversion_there_and_back_is_the_identity() {
     let si = Si::given(&DRAWING).unwrap();
     close(&Nondimensional::from(&si).to_si(&si.scale()).unwrap().parameters(), &si.parameters());
-    // And from the other side, at any scale.
+    // In the opposite direction, at any scale.
     let scale = Scale {
         disc_distance: 0.31,
         spring_distance: 0.17,
@@ -93,9 +93,9 @@ fn nondimensional_constants_are_read_and_checked_too() {
     }
 }
 
-/// Every mistake is named with place, cause and cure, and all of them at once.
+/// Every mistake is reported with place, cause and cure, and all of them at once.
 #[test]
-fn what_no_rotor_has_is_refused() {
+fn impossible_constants_are_refused() {
     let refused = |name: &str, text: &'static str| {
         let pairs = DRAWING.map(|(known, value)| if known == name { (known, text) } else { (known, value) });
         let mistakes = Si::given(&pairs).unwrap_err();

@@ -1,4 +1,4 @@
-//! Simulation that knows of no branches, on the rotor.
+//! Simulation of the rotor without knowledge of branches.
 
 use foldline::attractors::{Sampling, Trial, stepped_sweep, survey_by_simulation};
 use foldline::contract::{VectorField, Verdict};
@@ -37,7 +37,7 @@ fn of_ratio(found: &[Response], ratio: Option<(u32, u32)>) -> &Response {
     found.iter().find(|r| r.ratio == ratio && r.multiplicity == 1).unwrap_or_else(|| panic!("no {ratio:?}"))
 }
 
-/// Period and largest radius at Ω = 5 of an independent continuation code, to the digits given there.
+/// Period and largest radius at Ω = 5 from an independent continuation code, to the digits given.
 #[test]
 fn settled_motions_agree_with_continuation() {
     let field = OverhungRotor::default();
@@ -52,7 +52,7 @@ fn settled_motions_agree_with_continuation() {
         assert_eq!(found.iter().map(|r| r.hits).sum::<usize>(), 20);
         assert!(found.iter().all(|r| r.motion != Motion::Other && r.error < 1e-6), "{found:?}");
         let single = of_ratio(&found, Some((2, 1)));
-        // A cycle settles until its returns agree to 1e-7, of a distance that shrinks by e^(-0.02) from one to the next.
+        // A cycle settles when its returns agree to 1e-7, at a distance that shrinks by e^(-0.02) from one to the next.
         assert!((single.period.unwrap() - period).abs() < 1e-6, "{:?}", single.period);
         assert!((single.ranges[RADIUS][1] - highest).abs() < 5e-6, "{:?}", single.ranges[RADIUS]);
         // Closed form of the synchronous response; with contact the pull of the tanh law is 1e-80 there.
@@ -62,7 +62,7 @@ fn settled_motions_agree_with_continuation() {
 }
 
 #[test]
-fn a_sweep_down_doubles_and_falls_off_where_the_branch_does() {
+fn a_downward_sweep_doubles_and_jumps_where_the_branch_does() {
     let field = OverhungRotor::default();
     let found =
         survey_by_simulation(&trial(&field, 2), &sampling(20), &reference(1.0), OMEGA, &[4.5], &|_| Verdict::Continue);
@@ -73,8 +73,8 @@ fn a_sweep_down_doubles_and_falls_off_where_the_branch_does() {
             Verdict::Continue
         });
     let seen: Vec<(Motion, u32)> = responses.iter().map(|r| (r.motion, r.multiplicity)).collect();
-    // The double loop has a period doubling between 4.25 and 4.3; below 4.2 nothing near it attracts.
-    // At 4.2 the doubled cycle attracts, but a step of 0.05 may or may not lead out of its basin.
+    // The double loop has a period doubling between 4.25 and 4.3, and no attractor near it below 4.2.
+    // At 4.2 the doubled cycle attracts, but a step of 0.05 may leave its basin.
     let (once, twice, rest) = ((Motion::Cycle, 1), (Motion::Cycle, 2), (Motion::Equilibrium, 1));
     assert_eq!(seen[..6], [once, once, once, once, once, twice]);
     assert!(seen[6] == twice || seen[6] == rest);
@@ -84,8 +84,8 @@ fn a_sweep_down_doubles_and_falls_off_where_the_branch_does() {
 }
 
 #[test]
-fn what_is_neither_at_rest_nor_periodic_is_said_to_be_other() {
-    // Without damping nothing settles: the motion stays on a torus.
+fn motion_that_is_neither_steady_nor_periodic_is_classified_as_other() {
+    // Without damping the motion stays on a torus and never settles.
     let field = OverhungRotor::default();
     let parameters = Nondimensional { zeta: 0.0, ..Nondimensional::REFERENCE }.parameters();
     let found =
@@ -97,7 +97,8 @@ fn what_is_neither_at_rest_nor_periodic_is_said_to_be_other() {
     assert!(low < 0.6 && high > 3.0 && high < 4.0, "{low} {high}");
 }
 
-/// Largest error of the state after 30 time units, at tolerance 1e-6, 1e-8 and 1e-10 against 1e-13, over several starts.
+/// Largest error of the state after 30 time units, at tolerance 1e-6, 1e-8 and 1e-10 against 1e-13, over several
+/// starts.
 #[test]
 fn the_error_of_the_piecewise_rotor_is_proportional_to_the_tolerance() {
     let field = OverhungRotor { law: ContactLaw::Piecewise };

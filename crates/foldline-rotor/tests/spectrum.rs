@@ -29,7 +29,7 @@ fn cycle(base: f64, lines: &[(i32, f64, f64)]) -> Cycle {
 }
 
 #[test]
-fn lines_have_their_place_and_their_whirl_in_both_frames() {
+fn lines_have_the_right_frequency_and_whirl_in_both_frames() {
     let (base, speed) = (1.7, 5.0);
     let spectrum = Spectrum::of(&cycle(base, &[(-1, 2.0, 0.3), (-4, 1.0, 0.0), (0, 0.4, 0.2), (2, 1e-3, 0.0)]), speed);
     assert_eq!(spectrum.name(), "4:1");
@@ -45,13 +45,13 @@ fn lines_have_their_place_and_their_whirl_in_both_frames() {
     assert!((rotating[0].amplitude - num_complex::Complex64::from_polar(2.0, 0.3)).norm() < 1e-12, "{rotating:?}");
     assert_eq!(spectrum.peaks(Frame::Rotating, 1e-4).len(), 4, "the faint line counts at a lower share");
     assert_eq!(spectrum.amplitude(1_000_000).norm(), 0.0);
-    // A line that stands still in the room.
+    // A line at rest in the inertial frame.
     let spectrum = Spectrum::of(&cycle(base, &[(-2, 1.0, 0.0), (-1, 0.5, 0.0)]), 2.0 * base);
     assert_eq!(spectrum.peaks(Frame::Inertial, 0.9)[0].whirl, Whirl::Static);
 }
 
 #[test]
-fn the_lines_carry_all_of_the_motion() {
+fn the_lines_satisfy_parsevals_identity() {
     let cycle = cycle(2.3, &[(-1, 1.0, 0.0), (-2, 0.6, 1.0), (0, 0.2, 0.5)]);
     let square = mean_square(&cycle);
     assert!((square - (1.0 + 0.36 + 0.04)).abs() < 1e-12, "{square}");
@@ -59,12 +59,12 @@ fn the_lines_carry_all_of_the_motion() {
 }
 
 #[test]
-fn balances_are_sums_over_lines() {
-    // Two lines in balance of power: w(w - Ω)a² + 2w(2w - Ω)b² = 0.
+fn power_and_torque_balances_are_sums_over_lines() {
+    // Two lines that balance power: w(w - Ω)a² + 2w(2w - Ω)b² = 0.
     let (base, speed, zeta): (f64, f64, f64) = (3.0, 5.0, 0.01);
     let second = ((speed - base) / (2.0 * (2.0 * base - speed))).sqrt();
     let swirl = (speed - base) + (speed - 2.0 * base) * second * second;
-    // And of torque: m ε Ω² Im c₀ = -2ζ (swirl + Ω |c₀|²), with c₀ imaginary: a quadratic equation.
+    // And torque: m ε Ω² Im c₀ = -2ζ (swirl + Ω |c₀|²), with c₀ imaginary: a quadratic equation.
     let unbalance: f64 = 0.3;
     let force = unbalance * speed * speed;
     let mean = ((force * force - 16.0 * zeta * zeta * speed * swirl).sqrt() - force) / (4.0 * zeta * speed);

@@ -1,4 +1,4 @@
-//! The rotor written as text, without and with dimensions, against the one written by hand.
+//! The rotor as text, nondimensional and in SI units, against the one written by hand.
 
 use foldline::contract::{Batch, Parameters, VectorField};
 use foldline::model::Model;
@@ -37,7 +37,7 @@ fn scattered(from: usize, count: usize) -> Vec<f64> {
     (from..from + count).map(|i| 2.0 * (i as f64 * 0.618_033_988_749_894_9).fract() - 1.0).collect()
 }
 
-/// States at radii around contact, so that every part of the contact law is met.
+/// States at radii around contact that exercise every part of the contact law.
 fn states(lanes: usize) -> Vec<f64> {
     let s = scattered(1, 4 * lanes);
     let radius = |l: usize| if l.is_multiple_of(2) { 1.0 + 0.02 * s[l] } else { 2.0 * s[l].abs() };
@@ -61,7 +61,7 @@ fn assert_close(found: &[f64], expected: &[f64], tolerance: f64, what: &str) {
 }
 
 #[test]
-fn text_and_hand_agree_in_values_and_derivatives() {
+fn text_and_hand_written_model_agree_in_values_and_derivatives() {
     const LANES: usize = 53;
     let (model, native) = (text("overhung-rotor.toml"), OverhungRotor::default());
     assert_eq!(model.defaults(), Nondimensional::REFERENCE.parameters());
@@ -90,15 +90,16 @@ fn text_and_hand_agree_in_values_and_derivatives() {
             let (mut found, mut expected) = (vec![0.0; 4 * LANES], vec![0.0; 4 * LANES]);
             model.directional(at, &directions, &mut found);
             native.directional(at, &directions, &mut expected);
-            // Near contact derivatives of order k grow like Kᵏ and are sums of terms of that size.
+            // Near contact, derivatives of order k grow like Kᵏ and are sums of terms of that size.
             assert_close(&found, &expected, 1e-12, &format!("order {order}, kappa {kappa}"));
         }
     }
 }
 
-/// The other contact laws, each as text and by hand, around contact and at a sharpness where exponentials would overflow.
+/// Each of the other contact laws as text and by hand, around contact and at a sharpness where exponentials would
+/// overflow.
 #[test]
-fn the_contact_laws_as_text_are_those_by_hand() {
+fn contact_laws_as_text_agree_with_those_by_hand() {
     const LANES: usize = 53;
     let x = states(LANES);
     let free: Vec<usize> = (0..9).collect();
@@ -113,7 +114,7 @@ fn the_contact_laws_as_text_are_those_by_hand() {
             model.linearise(at, &free, &mut f, &mut fx, &mut fp);
             native.linearise(at, &free, &mut f_native, &mut fx_native, &mut fp_native);
             let what = format!("{law:?} K = {sharpness}");
-            // K multiplies the rounding of r - 1.
+            // K magnifies the rounding of r - 1.
             let tolerance = 1e-15 * sharpness;
             assert_close(&f, &f_native, tolerance, &what);
             assert_close(&fx, &fx_native, tolerance, &what);
@@ -167,9 +168,9 @@ fn the_si_constants_are_the_reference_constants() {
     assert!((SI.disc_clearance() - 1e-3).abs() < 1e-18 && (SI.pivot_frequency() - 100.0).abs() < 1e-12);
 }
 
-/// V = c̄ U and d/dt = ω_n d/dτ carry one model into the other.
+/// The scalings V = c̄ U and d/dt = ω_n d/dτ map one model to the other.
 #[test]
-fn the_model_with_dimensions_is_the_model_without() {
+fn the_si_model_is_equivalent_to_the_nondimensional_model() {
     const LANES: usize = 53;
     let (si, nondimensional) = (text("overhung-rotor-si.toml"), text("overhung-rotor.toml"));
     assert_eq!(si.defaults(), SI.parameters());
@@ -190,14 +191,14 @@ fn the_model_with_dimensions_is_the_model_without() {
             &mut expected,
         );
         let found: Vec<f64> = (0..4 * LANES).map(|i| found[i] / (units[i / LANES] * frequency)).collect();
-        // The switch multiplies the rounding of the radius by K.
+        // The switch magnifies the rounding of the radius by K.
         assert_close(&found, &expected, 1e-13, "f");
     }
 }
 
-/// At rest and without a circle to touch, everything is finite, first derivatives included.
+/// At rest at the centre, where r = 0, values and derivatives are finite.
 #[test]
-fn the_centre_is_an_ordinary_point() {
+fn values_and_derivatives_are_finite_at_the_centre() {
     for name in [
         "overhung-rotor.toml",
         "overhung-rotor-si.toml",
@@ -222,10 +223,11 @@ fn the_centre_is_an_ordinary_point() {
     }
 }
 
-/// r² [(a + γ r²)² + (2ζΩ)²] = F² has three roots at Ω = 5 (closed form of the synchronous response); the equilibrium follows
-/// from the radius. The radii are given to eight decimals, and f grows by at most a + 3γr² ≈ 85 per unit of radius.
+/// r² [(a + γ r²)² + (2ζΩ)²] = F² has three roots at Ω = 5 (closed form of the synchronous response); the equilibrium
+/// follows from the radius. The radii are given to eight decimals, and f grows by at most a + 3γr² ≈ 85 per unit
+/// radius.
 #[test]
-fn synchronous_response_in_closed_form() {
+fn the_synchronous_response_matches_its_closed_form() {
     let model = text("overhung-rotor.toml");
     let p = Nondimensional::REFERENCE;
     for r in [0.38958073, 8.83900624, 9.22606067] {
@@ -242,9 +244,9 @@ fn synchronous_response_in_closed_form() {
     }
 }
 
-/// Two stable cycles of the reference study at Ω = 5, computed with another code (a point to eight decimals, and the period):
-/// the flow brings each point back to itself. The classical Runge–Kutta method with 4000 steps errs by less than 1e-8 here, and
-/// both cycles attract, so the decimals of the point are the limit.
+/// Two stable cycles of the reference study at Ω = 5, computed with another code (a point to eight decimals, and the
+/// period). The flow returns each point to itself. The classical Runge–Kutta method with 4000 steps errs by less than
+/// 1e-8 here, and both cycles attract, so the accuracy is limited by the decimals of the point.
 #[test]
 fn known_cycles_return_to_their_start() {
     let (model, p) = (text("overhung-rotor.toml"), Nondimensional::REFERENCE.parameters());

@@ -1,44 +1,44 @@
-//! What is wrong with an input file: place, cause, cure.
+//! Mistakes in input files: position, cause and cure.
 
 use std::fmt;
 
 /// One mistake in an input file.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Diagnostic {
-    /// The file, as it was named.
+    /// File name as the user gave it.
     pub file: String,
     /// Line, from 1.
     pub line: usize,
     /// Column in characters, from 1.
     pub column: usize,
-    /// The line of the file, or the part of it around the place.
+    /// Line of the file, or the part of it around the mistake.
     pub snippet: String,
-    /// How many characters of the snippet stand before the place.
+    /// Number of characters of the snippet before the mistake.
     pub mark: usize,
-    /// How many characters of the snippet are meant.
+    /// Number of characters of the snippet that are marked.
     pub length: usize,
-    /// What is wrong.
+    /// The mistake.
     pub message: String,
-    /// What would be right.
+    /// Suggested correction.
     pub hint: Option<String>,
 }
 
 impl Diagnostic {
-    /// As a remark, on which nothing is refused.
+    /// Formats the diagnostic as a note; a note does not reject the file.
     pub fn as_note(&self) -> String {
         self.to_string().replacen("error:", "note:", 1)
     }
 }
 
 impl fmt::Display for Diagnostic {
-    /// In the form that compilers use; the last line has no line end.
+    /// Formats the diagnostic as compilers do, without a trailing newline.
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
         let number = self.line.to_string();
         let margin = " ".repeat(number.len());
         writeln!(f, "error: {}", self.message)?;
         write!(f, "{margin}--> {}:{}:{}", self.file, self.line, self.column)?;
         if !self.snippet.is_empty() {
-            // Tabs are kept in front of the mark, so that it stands under its place however wide they are shown.
+            // Tabs are kept in front of the mark, so that it lines up whatever the tab width.
             let before = self.snippet.chars().take(self.mark);
             let indent: String = before.map(|c| if c == '\t' { '\t' } else { ' ' }).collect();
             let marks = "^".repeat(self.length.max(1));
@@ -58,7 +58,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_mark_stands_under_the_place() {
+    fn the_mark_is_printed_under_the_mistake() {
         let diagnostic = Diagnostic {
             file: "rotor.toml".into(),
             line: 12,

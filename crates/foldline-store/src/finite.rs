@@ -1,4 +1,4 @@
-//! A model that is not finite where it is to start is a mistake of the input, said before any computation.
+//! Check before any computation that the vector field is finite where a study starts.
 
 use crate::diagnostic::Diagnostic;
 use crate::toml_walk::{Walk, diagnose};
@@ -11,15 +11,16 @@ use toml::de::DeTable;
 const CURE: &str = "check for a division by zero, or a log or sqrt of a negative number; or change the parameters or \
                     the sampling `range` of the states";
 
-/// A complaint, placed at the equation, if f is finite nowhere in the sampling range of the states.
+/// Returns a diagnostic at the equation if f is finite at no probe of the sampling range of the states.
 pub fn never_finite(model: &Model, parameters: &[f64], model_text: &str, model_file: &str) -> Option<Diagnostic> {
     let (component, state) = failing_everywhere(model, parameters)?;
     let message = complaint(model, component, &state, parameters);
     Some(at_equation(model, component, message, model_text, model_file))
 }
 
-/// Reports the first seed at which f is not finite: at its state, or, for one that is searched for, anywhere in the sampling
-/// range. The others mostly fail for the same reason.
+/// Reports the first seed at which f is not finite. A given state or cycle is checked at its first point; for an
+/// attractor that must be searched for, f must be finite at one probe of the sampling range. Only the first failing
+/// seed is reported, because the others usually fail for the same reason.
 pub(crate) fn check_seeds(
     walk: &mut Walk,
     seeds: &[(Range<usize>, SeedPlan)],
@@ -45,7 +46,7 @@ pub(crate) fn check_seeds(
     }
 }
 
-/// Reports explorations in whose ranges the vector field is finite nowhere, as far as a few probes tell.
+/// Reports the first exploration in whose range f is finite at none of three parameter values.
 pub(crate) fn check_explorations(walk: &mut Walk, explorations: &[ExplorePlan], model: &Model, text: &str, file: &str) {
     const SHARES: [f64; 3] = [0.5, 0.25, 0.75];
     for exploration in explorations {
@@ -70,14 +71,14 @@ fn at_equation(model: &Model, component: usize, message: String, model_text: &st
     diagnose(model_file, model_text, place, message, CURE.to_string())
 }
 
-/// The first component of f that is not finite at a state.
+/// Returns the first component of f that is not finite at a state.
 fn not_finite(model: &Model, state: &[f64], parameters: &[f64]) -> Option<usize> {
     let mut f = vec![0.0; model.dim()];
     model.evaluate(Batch { lanes: 1, states: state, parameters: Parameters::Shared(parameters), times: &[] }, &mut f);
     f.iter().position(|v| !v.is_finite())
 }
 
-/// The last of the probes and the component of f that is not finite there, if f is finite at none of them.
+/// If f is finite at no probe, returns the last probe and the component of f that is not finite there.
 fn failing_everywhere(model: &Model, parameters: &[f64]) -> Option<(usize, Vec<f64>)> {
     let mut last = None;
     for state in probes(model) {
@@ -86,7 +87,7 @@ fn failing_everywhere(model: &Model, parameters: &[f64]) -> Option<(usize, Vec<f
     last
 }
 
-/// Places spread over the sampling range: its middle last, before it a lattice that avoids round numbers.
+/// States spread over the sampling range: a lattice that avoids round numbers, and the midpoint last.
 fn probes(model: &Model) -> Vec<Vec<f64>> {
     const COUNT: usize = 16;
     let golden = 0.618_033_988_749_895;
@@ -111,10 +112,10 @@ fn complaint(model: &Model, component: usize, state: &[f64], parameters: &[f64])
     )
 }
 
-/// Where the equation of a state stands in a model text.
+/// Position of the equation of a state in a model text.
 fn equation_span(model_text: &str, state: &str) -> Option<Range<usize>> {
     let root = DeTable::parse(model_text).ok()?.into_inner();
-    // An element stands in the equation of all, a velocity in that of the acceleration.
+    // An array element shares the equation of its array; a velocity belongs to the equation of its acceleration.
     let name = state.split('[').next().unwrap_or(state);
     let acceleration = format!("{}''", name.trim_end_matches('\''));
     let keys =

@@ -1,8 +1,9 @@
-//! Bytes to types and back: model files and study files in, the run file in and out.
+//! File input and output: model and study files are read, run files are read and written.
 //!
-//! **Idea.** The mathematics knows no files. Here a study text becomes a plan ([`study_file`]), a model text a model
-//! ([`model_file`]), and a growing diagram a database that survives being killed ([`run_file`]), from which other formats follow ([`export`]). Whatever is wrong with
-//! a text is said with its place ([`diagnostic`]).
+//! **Idea.** The mathematics is independent of files. Here a study file is parsed into a plan ([`study_file`]) and a
+//! model file into a model ([`model_file`]). A growing diagram is stored in a database that survives a crash
+//! ([`run_file`]) and can be exported to other formats ([`export`]). Every mistake in a text is reported with its
+//! position ([`diagnostic`]).
 
 pub mod auto;
 pub mod diagnostic;

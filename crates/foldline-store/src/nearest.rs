@@ -1,3 +1,3 @@
-//! "Did you mean …?"
+//! Suggestions for misspelt names.
 
 pub use foldline::model::{nearest, suggest};

@@ -1,11 +1,11 @@
-//! The order in which branches are listed.
+//! Order in which branches are listed.
 
 use foldline::diagram::{Branch, Diagram, Origin};
 use foldline::explore::{Plan, Start};
 use std::cmp::Ordering;
 
-/// The names of what a study asks for: branches, curves and homotopies as it lists them, each behind what it starts from; then
-/// explorations.
+/// Names of the branches, curves and homotopies of a study in the order of the file, each after the one it starts from;
+/// then the names of the explorations.
 pub fn names(plan: &Plan) -> Vec<String> {
     let mut names = Names { plan, found: Vec::new() };
     (0..plan.branches.len()).for_each(|index| names.add(&Start::EndOf(index)));
@@ -21,7 +21,8 @@ struct Names<'p> {
 }
 
 impl Names<'_> {
-    /// Adds what stands at that place of the plan, behind what it starts from. Nothing starts from what comes later.
+    /// Adds the name of a start, after the names it starts from. The recursion ends because starts refer only to
+    /// earlier entries of the plan.
     fn add(&mut self, what: &Start) {
         let plan = self.plan;
         let (name, from) = match what {
@@ -38,21 +39,23 @@ impl Names<'_> {
     }
 }
 
-/// The number of a leg of that homotopy, if the name is that of one: `NAME/3` is the third.
+/// Returns the number of a run of a homotopy: 3 for `NAME/3`. `None` if the name belongs to no run of this homotopy.
 pub fn leg(name: &str, homotopy: &str) -> Option<usize> {
     name.strip_prefix(homotopy)?.strip_prefix('/')?.parse().ok()
 }
 
-/// Whether the name is that of a first branch of that exploration: `NAME/cycle-3` is its third cycle.
+/// True if the name denotes a branch that an exploration started: `NAME/cycle-3` is its third cycle.
 fn is_finding(name: &str, exploration: &str) -> bool {
     let rest = name.strip_prefix(exploration).and_then(|rest| rest.strip_prefix('/'));
     rest.and_then(|rest| rest.rsplit_once('-'))
         .is_some_and(|(kind, number)| !kind.contains('/') && number.parse::<usize>().is_ok())
 }
 
-/// The branches of a diagram in an order that does not depend on how the work was shared out: those of the study in the
-/// order of its [`names`], each followed by the branches that come from it, by the parameter at which they do, and by the
-/// curves in two parameters that begin on it; the legs of a homotopy as they were tried; what an exploration found as it was found.
+/// Sorts the branches of a diagram into an order that does not depend on the scheduling of the threads.
+///
+/// The branches of the study come in the order of its [`names`]. Each is followed by its child branches, sorted by
+/// parameter, and then by the two-parameter curves that begin on it. Homotopy runs and findings of an exploration stay
+/// in the order in which they were computed.
 pub fn ordered(mut diagram: Diagram, study: &[String]) -> Diagram {
     let legs =
         |branch: &Branch| study.iter().enumerate().find_map(|(place, name)| Some((place, leg(&branch.name, name)?)));
@@ -60,7 +63,7 @@ pub fn ordered(mut diagram: Diagram, study: &[String]) -> Diagram {
         Origin::Switch { parent, .. } if legs(branch).is_none() => Some(parent.clone()),
         _ => None,
     };
-    // What an exploration finds keeps its order: one after the other was found.
+    // Findings of an exploration keep the order in which they were found.
     let found = |branch: &Branch| {
         let first = !matches!(branch.origin, Origin::Switch { .. });
         study.iter().position(|name| first && is_finding(&branch.name, name)).map(|place| (place, 0))
@@ -80,7 +83,7 @@ pub fn ordered(mut diagram: Diagram, study: &[String]) -> Diagram {
         let by_name = || if found(a).is_some() && found(b).is_some() { Ordering::Equal } else { a.name.cmp(&b.name) };
         (c, p).cmp(&(d, q)).then(x.total_cmp(&y)).then_with(by_name)
     });
-    // A branch is listed once its parent is; what is left over at last has no parent in the diagram.
+    // A branch is listed once its parent is. The remaining branches have no parent in the diagram.
     while !waiting.is_empty() {
         let (mut children, others): (Vec<Branch>, Vec<Branch>) = match diagram.branches.last() {
             Some(_) => waiting.into_iter().partition(|b| parent(b).is_some_and(|p| diagram.branch(&p).is_some())),
@@ -92,7 +95,7 @@ pub fn ordered(mut diagram: Diagram, study: &[String]) -> Diagram {
             diagram.branches.push(waiting.remove(next.unwrap_or(0)));
             continue;
         }
-        // Siblings stand in order behind their parent, each before what comes from it.
+        // Siblings follow their parent in order, each before its own children.
         for child in children.drain(..).rev() {
             let at = diagram.branches.iter().position(|b| Some(&b.name) == parent(&child).as_ref());
             diagram.branches.insert(at.map_or(diagram.branches.len(), |at| at + 1), child);
@@ -112,7 +115,7 @@ mod tests {
     }
 
     #[test]
-    fn children_follow_their_parent_by_parameter_whatever_the_order_of_work() {
+    fn children_follow_their_parent_by_parameter_in_any_order_of_computation() {
         let root = |name: &str| Branch::new(name, Family::Cycle, 0, Origin::Seed(String::new()));
         let expected = ["a", "a1", "a1x", "a2", "b", "b1"];
         let branches = [
@@ -133,7 +136,7 @@ mod tests {
     }
 
     #[test]
-    fn curves_and_the_legs_of_a_homotopy_follow_what_they_come_from() {
+    fn curves_and_homotopy_runs_follow_the_branch_they_start_from() {
         let curve = |parent: &str, name: &str| Branch { held: Some((Kind::Fold, 1)), ..from(parent, name, 3.0) };
         let end_of = |parent: &str, name: &str| Branch::new(name, Family::Cycle, 0, Origin::EndOf(parent.into()));
         let root = |name: &str| Branch::new(name, Family::Cycle, 0, Origin::Seed(String::new()));
@@ -160,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn what_an_exploration_finds_keeps_its_order() {
+    fn findings_of_an_exploration_keep_their_order() {
         let root = |name: &str| Branch::new(name, Family::Cycle, 0, Origin::Seed(String::new()));
         let names = ["all/equilibrium-1", "all/equilibrium-1/hopf-1", "all/cycle-2", "all/3:1-1", "all/2:1-1"];
         let mut branches: Vec<Branch> = names.map(root).to_vec();
@@ -172,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn a_circle_of_parents_is_listed_too() {
+    fn branches_that_are_parents_of_each_other_are_listed() {
         let diagram = Diagram { branches: vec![from("b", "a", 0.0), from("a", "b", 0.0)], ..Diagram::default() };
         assert_eq!(ordered(diagram, &[]).branches.len(), 2);
     }

@@ -5,9 +5,10 @@ use foldline::diagram::{Branch, Diagram, Ending, Kind, Motion, Shortfall, Shown}
 use foldline::explore::{HomotopyPlan, Plan, SweepPlan};
 use foldline::model::Model;
 
-/// Messages on everything in the study that was not reached. Further lines of a message contain causes and cures.
+/// Returns one message per request of the study that was not fulfilled. Further lines of a message give causes and
+/// cures.
 ///
-/// A homotopy has arrived as soon as one of its legs has; legs that turned back are part of its search.
+/// A homotopy has arrived as soon as one of its runs has; runs that turned back are part of its search.
 pub fn lines(diagram: &Diagram, plan: &Plan, model: &Model) -> Vec<String> {
     let mut lines = absent(diagram, plan);
     lines.extend(plan.homotopies.iter().filter_map(|homotopy| not_arrived(diagram, homotopy, model)));
@@ -27,7 +28,7 @@ pub fn lines(diagram: &Diagram, plan: &Plan, model: &Model) -> Vec<String> {
         }
         lines.extend(unexplained(branch, model));
     }
-    // A known reason follows the line that reports something missing.
+    // A known reason is appended to the line that reports the missing item.
     for Shortfall { about, what } in &diagram.shortfalls {
         let own = format!("{about}: it ");
         match lines.iter_mut().find(|line| line.starts_with(&own)) {
@@ -38,7 +39,7 @@ pub fn lines(diagram: &Diagram, plan: &Plan, model: &Model) -> Vec<String> {
     lines
 }
 
-/// Names of branches and curves, with the parameter and value at which each is to end.
+/// Names of branches and curves, with the target parameter and value of each.
 fn targets(plan: &Plan) -> Vec<(&String, Option<(usize, f64)>)> {
     let curves = plan.curves.iter().map(|curve| (&curve.name, curve.until.map(|target| (curve.free, target))));
     let branches = plan.branches.iter().map(|branch| (&branch.name, branch.until.map(|target| (branch.free, target))));
@@ -142,7 +143,7 @@ mod tests {
         parse_study(STUDY, "study", MODEL, "model").unwrap()
     }
 
-    /// A branch that ended at these values of Omega and kappa.
+    /// Branch with one point, at these values of Omega and kappa, and the given ending.
     fn branch(name: &str, held: Option<(Kind, usize)>, ending: Ending, at: [f64; 2]) -> Branch {
         let mut branch = Branch { held, ..Branch::new(name, Family::Equilibrium, 0, Origin::Seed("s".into())) };
         branch.insert(Point {
@@ -168,7 +169,7 @@ mod tests {
     }
 
     #[test]
-    fn what_arrived_is_not_complained_about_whatever_happened_on_the_way() {
+    fn requests_that_were_fulfilled_give_no_message() {
         let found = said(vec![
             branch("b", None, Ending::Bound(4.0), [4.0 + 1e-15, 0.0]),
             branch("c", Some((Kind::Fold, 0)), Ending::Bound(0.5), [2.0, 0.5]),
@@ -179,12 +180,12 @@ mod tests {
     }
 
     #[test]
-    fn what_is_absent_was_not_started() {
+    fn missing_branches_are_reported_as_not_started() {
         assert_eq!(said(Vec::new()), ["b: it was not started", "c: it was not started", "h: it was not started"]);
     }
 
     #[test]
-    fn an_end_elsewhere_than_at_the_target_is_short() {
+    fn an_end_away_from_the_target_is_reported() {
         let found = said(vec![
             branch("b", None, Ending::Bound(0.0), [0.0, 0.0]),
             branch("c", Some((Kind::Fold, 0)), Ending::StepTooSmall("a cusp".into()), [2.0, 0.4]),
@@ -201,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn an_unexplained_change_of_stability_is_short_of_what_was_asked() {
+    fn an_unexplained_change_of_stability_is_reported() {
         let mut found = branch("b", None, Ending::Bound(4.0), [4.0, 0.0]);
         let special = |kind: Kind, value: f64| SpecialPoint {
             kind,
@@ -222,7 +223,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_known_of_something_missing_stands_behind_it() {
+    fn a_known_reason_follows_the_message_on_a_missing_item() {
         let study = study();
         let short = |about: &str, what: &str| Shortfall { about: about.into(), what: what.into() };
         let branches = vec![branch("b", None, Ending::Bound(4.0), [4.0, 0.0])];

@@ -1,4 +1,4 @@
-//! Walking a TOML text while collecting everything that is wrong with it, each with its place.
+//! Traversal of a TOML text that collects every mistake with its position.
 
 use crate::diagnostic::Diagnostic;
 use crate::nearest::suggest;
@@ -10,17 +10,18 @@ use std::path::Path;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// Mistakes that are noted in one file.
+/// Largest number of mistakes reported for one file.
 const MOST: usize = 100;
-/// Longest file that is read, in bytes.
+/// Largest file that is read, in bytes.
 const LARGEST: u64 = 64 << 20;
-/// Characters of a message, a hint and a line of the file that are shown.
+/// Length in characters to which messages are cut. Hints may be twice as long; the parts of a line are cut to fractions
+/// of it.
 const LONGEST: usize = 400;
 
-/// A value with its place in the text.
+/// Value with its position in the text.
 pub(crate) type Value<'t> = Spanned<DeValue<'t>>;
 
-/// A text being read, and what was found wrong with it so far.
+/// Text being read, and the mistakes found so far.
 pub(crate) struct Walk<'t> {
     file: &'t str,
     text: &'t str,
@@ -28,7 +29,7 @@ pub(crate) struct Walk<'t> {
 }
 
 impl<'t> Walk<'t> {
-    /// The text and its root table; a text that is not TOML is answered with the parser's own complaint and place.
+    /// Parses a text and returns its root table. If it is not TOML, returns the parser's message and position.
     pub(crate) fn parse(text: &'t str, file: &'t str) -> Result<(Walk<'t>, DeTable<'t>), Vec<Diagnostic>> {
         let mut walk = Walk { file, text, found: Vec::new() };
         match DeTable::parse(text) {
@@ -41,7 +42,7 @@ impl<'t> Walk<'t> {
         }
     }
 
-    /// Notes a mistake; those after the first hundred are passed over.
+    /// Records a mistake; those after the first [`MOST`] are dropped.
     pub(crate) fn report(&mut self, span: Range<usize>, message: impl Into<String>, hint: impl Into<String>) {
         if self.found.len() == MOST {
             return;
@@ -63,7 +64,7 @@ impl<'t> Walk<'t> {
         }
     }
 
-    /// A finite number, integer or decimal.
+    /// Reads a finite number, integer or decimal.
     pub(crate) fn number(&mut self, value: &Value, what: &str) -> Option<f64> {
         let text = match value.get_ref() {
             DeValue::Integer(integer) if integer.radix() == 10 => integer.as_str(),
@@ -86,7 +87,7 @@ impl<'t> Walk<'t> {
         }
     }
 
-    /// A number, or a number with a unit such as `"0.3 mm"`, which is converted to `unit`.
+    /// Reads a number, or a number with a unit such as `"0.3 mm"`, which is converted to `unit`.
     pub(crate) fn quantity(&mut self, value: &Value, what: &str, unit: &str) -> Option<f64> {
         let Some(written) = value.get_ref().as_str().and_then(units::quantity) else {
             if value.get_ref().as_str().is_some() {
@@ -125,7 +126,7 @@ impl<'t> Walk<'t> {
         found.ok()
     }
 
-    /// An integer within `allowed`.
+    /// Reads an integer within `allowed`.
     pub(crate) fn integer(&mut self, value: &Value, what: &str, allowed: std::ops::RangeInclusive<u64>) -> Option<u64> {
         let DeValue::Integer(integer) = value.get_ref() else {
             self.wrong_type(value, value.get_ref().type_str(), what, "an integer");
@@ -145,7 +146,7 @@ impl<'t> Walk<'t> {
         }
     }
 
-    /// A text that is not empty.
+    /// Reads a non-empty string.
     pub(crate) fn string(&mut self, value: &Value, what: &str) -> Option<String> {
         match value.get_ref().as_str() {
             Some("") => {
@@ -160,7 +161,7 @@ impl<'t> Walk<'t> {
         }
     }
 
-    /// A table, `None` with a complaint if it is something else.
+    /// Reads a table; reports any other type and returns `None`.
     pub(crate) fn table<'v, 'x>(&mut self, value: &'v Value<'x>, what: &str) -> Option<&'v DeTable<'x>> {
         let table = value.get_ref().as_table();
         if table.is_none() {
@@ -169,7 +170,7 @@ impl<'t> Walk<'t> {
         table
     }
 
-    /// The tables of a list `[[what]]`; an absent list is empty.
+    /// Reads the tables of a list `[[what]]`; an absent list is empty.
     pub(crate) fn tables<'v, 'x>(&mut self, root: &'v DeTable<'x>, what: &str) -> Vec<(Range<usize>, &'v DeTable<'x>)> {
         let Some(value) = root.get(what) else { return Vec::new() };
         let tables = value.get_ref().as_array().map(|list| {
@@ -205,8 +206,8 @@ pub(crate) fn with_article(noun: &str) -> String {
     format!("{article} {noun}")
 }
 
-/// A diagnostic for a byte range of a text. Of a long line, the part around the place is shown; characters that would do
-/// something to a terminal are written as their code points.
+/// Returns a diagnostic for a byte range of a text. Of a long line, the part around the range is shown. Terminal
+/// control characters are written as their code points.
 pub(crate) fn diagnose(file: &str, text: &str, span: Range<usize>, message: String, hint: String) -> Diagnostic {
     let boundary = |at: usize| (0..=at.min(text.len())).rev().find(|&at| text.is_char_boundary(at)).unwrap_or(0);
     let start = boundary(span.start);
@@ -234,7 +235,7 @@ pub(crate) fn diagnose(file: &str, text: &str, span: Range<usize>, message: Stri
     }
 }
 
-/// At most `most` characters of `text`.
+/// Cuts a text to at most `most` characters and marks the cut with `…`.
 fn shortened(text: &str, most: usize) -> String {
     match text.char_indices().nth(most) {
         Some((end, _)) => format!("{}…", &text[..end]),
@@ -242,7 +243,7 @@ fn shortened(text: &str, most: usize) -> String {
     }
 }
 
-/// The text with control characters, and those that turn the direction of writing or have no width, as code points.
+/// Replaces control, zero-width and bidirectional formatting characters by their code points.
 fn visible(text: &str) -> String {
     let hidden = |c: char| {
         let invisible =
@@ -255,7 +256,7 @@ fn visible(text: &str) -> String {
     text.chars().map(|c| if hidden(c) { c.escape_unicode().to_string() } else { c.to_string() }).collect()
 }
 
-/// The text of a file, unless it is too long to be one of ours or no text.
+/// Reads a text file; fails if it is longer than [`LARGEST`] or not UTF-8.
 pub(crate) fn read_text(path: &Path) -> std::io::Result<String> {
     let mut text = String::new();
     let length = std::fs::File::open(path)?.take(LARGEST + 1).read_to_string(&mut text)?;
@@ -265,7 +266,7 @@ pub(crate) fn read_text(path: &Path) -> std::io::Result<String> {
     }
 }
 
-/// A diagnostic about a whole file that could not be read.
+/// Returns a diagnostic for a file that could not be read.
 pub(crate) fn unreadable(file: &str, what: &str, error: &std::io::Error) -> Diagnostic {
     let hint = match error.kind() {
         std::io::ErrorKind::NotFound => "check the spelling of the path; relative paths start at the current folder",
@@ -281,7 +282,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn of_a_long_line_the_part_around_the_place_is_shown() {
+    fn the_part_around_the_mistake_is_shown_of_a_long_line() {
         let text = format!("a = 1\n{}bad{}\n", "x".repeat(5000), "y".repeat(5000));
         let at = 6 + 5000;
         let d = diagnose("f", &text, at..at + 3, "m".repeat(10_000), "h".into());
@@ -291,7 +292,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_terminal_would_obey_is_written_as_code_points() {
+    fn terminal_control_characters_are_written_as_code_points() {
         let text = "x = \u{1b}[31m\u{202e}y";
         let d = diagnose("f", text, 4..5, format!("unexpected {}", '\u{1b}'), "h".into());
         assert_eq!(d.snippet, "x = \\u{1b}[31m\\u{202e}y");

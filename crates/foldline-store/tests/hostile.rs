@@ -1,4 +1,4 @@
-//! Files that nobody would write by hand: endless, huge, deep, circular, or made of letters that mislead.
+//! Hostile input files: endless, huge, deeply nested, circular, or with misleading characters.
 
 use foldline_store::diagnostic::Diagnostic;
 use foldline_store::model_file::{parse_model, read_model};
@@ -8,7 +8,7 @@ fn refused(text: &str) -> Vec<Diagnostic> {
     parse_model(text, "m.toml").expect_err("a model with mistakes")
 }
 
-/// The only mistake: line, message and hint.
+/// Returns line, message and hint of the only mistake.
 #[track_caller]
 fn mistake(text: &str) -> (usize, String, String) {
     let found = refused(text);
@@ -30,15 +30,15 @@ fn a_million_states() {
 }
 
 #[test]
-fn as_many_states_as_are_allowed() {
+fn the_largest_allowed_number_of_states() {
     let mut text = String::from("[states]\n");
     (0..1000).for_each(|i| writeln!(text, "x{i} = \"x{} - x{i}^3\"", (i + 1) % 1000).unwrap());
     assert_eq!(parse_model(&text, "m.toml").unwrap().states.len(), 1000);
 }
 
-/// Each definition needs the one after it in the file.
+/// Each definition depends on the next one in the file.
 #[test]
-fn a_long_chain_of_definitions_the_wrong_way_round() {
+fn a_long_chain_of_definitions_in_reverse_order() {
     let mut text = String::from("[states]\nx = \"d0\"\n[definitions]\n");
     (0..50_000).for_each(|i| writeln!(text, "d{i} = \"d{} + x\"", i + 1).unwrap());
     writeln!(text, "d50000 = \"-x\"").unwrap();
@@ -46,7 +46,7 @@ fn a_long_chain_of_definitions_the_wrong_way_round() {
 }
 
 #[test]
-fn a_long_circle_of_definitions() {
+fn a_long_cycle_of_definitions() {
     let mut text = String::from("[states]\nx = \"d0\"\n[definitions]\n");
     (0..50_000).for_each(|i| writeln!(text, "d{i} = \"d{} + x\"", (i + 1) % 50_000).unwrap());
     let (_, message, _) = mistake(&text);
@@ -54,7 +54,7 @@ fn a_long_circle_of_definitions() {
 }
 
 #[test]
-fn brackets_signs_and_tables_nested_without_end() {
+fn deeply_nested_brackets_signs_and_tables() {
     for text in ["(".repeat(100_000), "-".repeat(100_000) + "x", "sin(".repeat(100_000), "x^".repeat(100_000) + "x"] {
         let (line, message, hint) = mistake(&with_equation(&text));
         assert_eq!((line, message.as_str()), (4, "the expression is nested more than 200 deep"));
@@ -70,7 +70,7 @@ fn an_expression_of_many_terms() {
 }
 
 #[test]
-fn a_thousand_mistakes_are_not_all_said() {
+fn a_thousand_mistakes_are_not_all_reported() {
     let mut text = String::from("[states]\n");
     (0..900).for_each(|i| writeln!(text, "x{i} = \"y{i} + z{i}*w{i}\"").unwrap());
     assert_eq!(refused(&text).len(), 100);
@@ -99,7 +99,7 @@ fn names_that_clash() {
 }
 
 #[test]
-fn nothing_at_all() {
+fn an_empty_file() {
     for text in ["", "\n\n", "[states]\n", "[parameters]\n", "\u{feff}", "states = {}\n"] {
         assert_eq!(mistake(text).1, "the model has no states", "{text:?}");
     }
@@ -108,7 +108,7 @@ fn nothing_at_all() {
 }
 
 #[test]
-fn numbers_that_are_none() {
+fn invalid_numbers() {
     for number in ["nan", "inf", "-inf", "1e999", "-1e309"] {
         let (line, message, _) = mistake(&format!("[parameters]\na = {number}\n[states]\nx = \"-x\"\n"));
         assert_eq!((line, message.as_str()), (2, "the parameter `a` is not a finite number"), "{number}");
@@ -123,14 +123,14 @@ fn numbers_that_are_none() {
 
 #[test]
 fn letters_that_look_alike() {
-    // The micro sign, as keyboards have it, for the Greek letter.
+    // The micro sign found on keyboards instead of the Greek letter.
     let (_, message, hint) = mistake("[parameters]\n\"\u{3bc}\" = 1.0\n[states]\nx = \"\u{b5}*x\"\n");
     assert_eq!(message, "unknown name `\u{b5}`");
     assert_eq!(hint, "did you mean `\u{3bc}`? `\u{b5}` is U+00B5, `\u{3bc}` is U+03BC");
 }
 
 #[test]
-fn what_a_terminal_would_obey_is_shown_and_not_sent() {
+fn terminal_control_characters_are_escaped() {
     for text in
         ["[states]\n\"\\u001b[2J\" = \"1\"\n", "[states]\nx = \"-x\u{202e}\"\n", "[states]\nx = \"-x \\u0000\"\n"]
     {
@@ -142,7 +142,7 @@ fn what_a_terminal_would_obey_is_shown_and_not_sent() {
 
 #[cfg(unix)]
 #[test]
-fn a_file_without_end_and_a_file_that_is_no_text() {
+fn an_endless_file_and_a_binary_file() {
     let found = read_model(std::path::Path::new("/dev/zero")).expect_err("no model");
     assert!(found[0].message.contains("longer than 64 MiB"), "{}", found[0]);
     let folder = tempfile::tempdir().unwrap();

@@ -1,4 +1,4 @@
-//! Model files: the published ones compile and are finite where they start, and mistakes are pointed at in the file.
+//! Model files: the published ones compile and are finite where they start; mistakes are reported with their position.
 
 use foldline::contract::{Batch, Parameters, VectorField};
 use foldline_store::diagnostic::Diagnostic;
@@ -12,7 +12,7 @@ fn mistakes(text: &str) -> Vec<Diagnostic> {
     }
 }
 
-/// The only mistake: its line and column, the words it points at, and the whole message.
+/// Returns line and column, the marked words, and the whole message of the only mistake.
 fn only(text: &str) -> ((usize, usize), String, String) {
     let found = mistakes(text);
     assert_eq!(found.len(), 1, "{found:?}");
@@ -113,12 +113,12 @@ fn a_mistake_in_an_expression_is_shown_at_its_column() {
     assert_eq!((place, words.as_str()), ((21, 11), "("));
     assert!(message.contains("never closed"));
 
-    // In a text of several lines, and after characters of more than one byte.
+    // In a multi-line text, and after multi-byte characters.
     let text = "[states]\nx = '''\n\n  1 +\n  größe'''\n";
     assert_eq!(only(text).0, (5, 3));
     let text = "[parameters]\n\"ψ\" = 1\n[states]\nx = \"ψ*ψ*q\"\n";
     assert_eq!((only(text).0, only(text).1), ((4, 10), "q".to_string()));
-    // Where escapes shift the text, the whole string is meant.
+    // If escapes shift the text, the whole string is marked.
     let text = "[states]\nx = \"1 + \\u0071\"\n";
     assert_eq!((only(text).0, only(text).1), ((2, 5), "\"1 + \\u0071\"".to_string()));
 }
@@ -126,7 +126,7 @@ fn a_mistake_in_an_expression_is_shown_at_its_column() {
 #[test]
 fn mistakes_outside_expressions_are_shown_too() {
     let cases = [
-        // what is replaced, by what, place, words, part of the message
+        // replaced text, replacement, position, words, part of the message
         ("value = 1.5", "valeu = 1.5", (5, 8), "valeu", "did you mean `value`?"),
         ("scale = 3.0", "scale = -3.0", (13, 9), "-3.0", "is not positive"),
         ("[-1, 2.5]", "[2.5, -1]", (17, 9), "[2.5, -1]", "wrong way round"),
@@ -152,7 +152,7 @@ fn mistakes_outside_expressions_are_shown_too() {
 }
 
 #[test]
-fn all_mistakes_are_said_in_the_order_of_the_file() {
+fn all_mistakes_are_reported_in_the_order_of_the_file() {
     let text =
         OSCILLATOR.replace("k*x", "k*xx").replace("hypot(x, y)", "hypto(x, y)").replace("unit = \"m\"", "uint = \"m\"");
     let lines: Vec<usize> = mistakes(&text).iter().map(|d| d.line).collect();
@@ -160,12 +160,12 @@ fn all_mistakes_are_said_in_the_order_of_the_file() {
 }
 
 #[test]
-fn a_file_that_is_not_there_is_named() {
+fn a_missing_file_is_named() {
     let Err(found) = read_model(Path::new("no/such/model.toml")) else { panic!("there is no such file") };
     assert!(found[0].message.contains("cannot be read") && found[0].file.contains("model.toml"), "{}", found[0]);
 }
 
-/// The forced oscillator of the book, whose equations are per period of the forcing.
+/// Forced oscillator of the book, whose time is measured in forcing periods.
 #[test]
 fn the_first_model_of_the_book_is_right() {
     let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/book/model-files.md");
@@ -209,7 +209,7 @@ scale = "1 mm"
     assert_eq!([value("k[1]"), value("k[2]")], [Some((1000.0, "N/m")), Some((2000.0, "N/m"))]);
     assert_eq!(value("K"), None);
     assert_eq!((model.states[0].range, model.states[0].scale), (Some([-2e-3, 5e-3]), Some(1e-3)));
-    // A forgotten star makes no unit.
+    // A missing multiplication sign does not make a unit.
     let forgotten = "[parameters]\nbeta = 2\nK = \"15 beta\"\n[states]\nx = \"-x\"\n";
     let ((line, column), _, message) = only(forgotten);
     assert_eq!((line, column), (3, 5));
@@ -228,7 +228,7 @@ fn the_unit_of_time_follows_from_the_others() {
     assert!(wrong[0].message.contains("not a unit of time"), "{}", wrong[0]);
 }
 
-/// A run of a program that did not check units.
+/// Run of an earlier version that did not check units.
 #[test]
 fn runs_whose_units_contradict_each_other_are_still_read() {
     let model = "[parameters]\np = 0\n[states]\nx = { equation = \"v\", unit = \"m\" }\nv = { equation = \"p - x\", unit = \"kg\" }\n";

@@ -1,4 +1,5 @@
-//! Repetition, functions, second order, masses and tables in model files: each against the same model written out.
+//! Repetition, functions, second-order equations, masses and tables in model files, each compared with the same model
+//! written out in full.
 
 use foldline::contract::{Batch, Parameters, VectorField};
 use foldline::explore::SeedSource;
@@ -11,7 +12,7 @@ fn model(text: &str) -> Model {
     parse_model(text, "model.toml").unwrap_or_else(|found| panic!("{}", found[0]))
 }
 
-/// f at a state that is different in every component.
+/// Evaluates f at a state with different components.
 fn field(model: &Model) -> Vec<f64> {
     let n = model.dim();
     let states: Vec<f64> = (0..n).map(|i| (1.3 * i as f64 + 0.4).sin()).collect();
@@ -34,7 +35,7 @@ fn same(short: &str, long: &str) {
     }
 }
 
-/// Line, column, message and hint of the only mistake.
+/// Returns line, column, message and hint of the only mistake.
 #[track_caller]
 fn mistake(text: &str) -> ((usize, usize), String, String) {
     let found = parse_model(text, "model.toml").expect_err("a model with a mistake");
@@ -134,7 +135,7 @@ fn a_neighbour_that_does_not_exist_is_refused() {
 }
 
 #[test]
-fn mistakes_with_indices_have_their_place() {
+fn mistakes_with_indices_are_reported_with_position() {
     let cases = [
         ("2*x[i]", "2*x", (14, 27), "`x` is repeated over an index"),
         ("c*v[i]", "c[i]*v[i]", (14, 44), "`c` has no index"),
@@ -171,7 +172,7 @@ fn mistakes_with_indices_have_their_place() {
 }
 
 #[test]
-fn repetition_without_measure_is_refused() {
+fn excessive_repetition_is_rejected() {
     let text = "[states.x]\ncount = 1000\nequation = 'sum(j, 1, 1000, sum(k, 1, 1000, sum(l, 1, 1000, sin(x[j]*x[k]*x[l]))))'\n";
     assert_eq!(mistake(text).1, "repeated equations, sums and functions expand to more than four million terms");
     let text = "[states]\nx = 'sum(j, 1, 900000000, x)'\n";
@@ -197,7 +198,7 @@ fn functions_are_replaced_by_their_expressions() {
 }
 
 #[test]
-fn mistakes_with_functions_have_their_place() {
+fn mistakes_with_functions_are_reported_with_position() {
     let text = "[functions]\n\"f(x, y)\" = 'x + g(y)'\n\"g(z)\" = 'z^2'\n[states]\nx = 'f(x, 1)'\n";
     model(text);
     let cases = [
@@ -235,7 +236,7 @@ fn accelerations_declare_a_state_and_its_velocity() {
 }
 
 #[test]
-fn velocities_beyond_the_ends_are_the_rates_of_what_is_there() {
+fn velocities_beyond_the_ends_are_the_derivatives_of_the_states_there() {
     let text = "[parameters]\nw = 2.0\nY = 0.3\n[forcing]\nfrequency = 'w'\n[states.\"x''\"]\ncount = 2\n\
                 before = 'Y*sin(w*t)'\nafter = '2*x[2]'\n\
                 equation = \"x[i-1] - 2*x[i] + x[i+1] + 0.1*(x'[i-1] - 2*x'[i] + x'[i+1])\"\n";
@@ -248,7 +249,7 @@ fn velocities_beyond_the_ends_are_the_rates_of_what_is_there() {
     same(ring, long);
 }
 
-/// A pendulum on a cart.
+/// Pendulum on a cart.
 #[test]
 fn masses_couple_equations() {
     let text = "[parameters]\nM = 2.0\nm = 0.5\nl = 0.8\n[states]\n\"x''\" = \"m*l*sin(th)*th'^2 - x\"\n\"th''\" = \"-9.81*m*l*sin(th)\"\n\
@@ -280,14 +281,14 @@ fn tables_are_functions() {
 }
 
 #[test]
-fn a_parameter_made_of_others_is_a_definition() {
+fn a_parameter_computed_from_others_is_a_definition() {
     let text = "[parameters]\nm = 2.0\nk = 8.0\nw0 = \"sqrt(k/m)\"\n[states]\nx = 'v'\nv = '-w0^2*x'\n";
     same(text, "[states]\nx = 'v'\nv = '-4*x'\n");
     assert_eq!(model(text).parameters.len(), 2);
 }
 
 #[test]
-fn as_many_repeated_states_as_are_allowed() {
+fn the_largest_allowed_number_of_repeated_states() {
     let text = "[states.\"x''\"]\ncount = 500\nbefore = 0\nafter = 0\nequation = 'x[i-1] - 2*x[i] + x[i+1]'\n";
     assert_eq!(model(text).dim(), 1000);
 }
@@ -312,7 +313,7 @@ fn a_state_is_given_for_all_elements_or_for_each() {
     assert!(message("{ x = \"1\", \"x'\" = 0 }").contains("the state `x`"));
 }
 
-/// Every complete model on the page about model files.
+/// All complete models on the page about model files.
 #[test]
 fn the_examples_of_the_book_are_right() {
     let page = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/book/model-files.md");
@@ -320,7 +321,7 @@ fn the_examples_of_the_book_are_right() {
     let blocks: Vec<&str> = page.split("```toml\n").skip(1).filter_map(|rest| rest.split("```").next()).collect();
     let complete = |block: &&&str| block.contains("[parameters]") && block.contains("[states");
     assert_eq!(blocks.iter().filter(complete).map(|block| model(block).dim()).collect::<Vec<_>>(), [2, 80]);
-    // The others lack parameters.
+    // The other models lack parameters.
     let [functions, short, table, mass] = &blocks[2..] else { panic!("{} blocks", blocks.len()) };
     let parameters = "[parameters]\nk = 1\nk3 = 0.1\nzeta = 0.1\nm = 1\nM = 2\nl = 1\ng = 9.81\n";
     assert_eq!(

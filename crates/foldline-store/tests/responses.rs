@@ -1,4 +1,4 @@
-//! Surveys and sweeps in study files: what they become, and what is said about mistakes.
+//! Surveys and sweeps in study files: plans, and diagnostics for mistakes.
 
 use foldline_store::study_file::{Study, parse_study};
 
@@ -45,7 +45,7 @@ fn a_study_may_simulate_only() {
 }
 
 #[test]
-fn mistakes_are_answered_with_place_and_cure() {
+fn mistakes_are_reported_with_position_and_cure() {
     let cases: [(&str, &str, &[&str]); 11] = [
         ("range = [-1, 2]", "range = [2, -1]", &["study.toml:12:9", "the wrong way round", "write [-1, 2]"]),
         ("count = 4\nstarts", "starts", &["study.toml:12:9", "has no `count`, the number of values", "count = 101"]),

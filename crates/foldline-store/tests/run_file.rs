@@ -1,4 +1,4 @@
-//! The run file: what goes in comes out to the bit, a kill loses nothing, and other files are told apart.
+//! Run file: round trips are exact to the bit, a kill loses nothing, and other files are recognised.
 
 use foldline::contract::{Event, Observer, Verdict};
 use foldline::diagram::{
@@ -12,7 +12,7 @@ use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-// K and k: SQLite does not tell them apart in column names.
+// K and k: column names in SQLite are case-insensitive.
 const MODEL: &str = "name = \"pitchfork\"\n[parameters]\nmu = 1.0\nK = 2.0\nk = 0.0\n\
     [states.x]\nequation = \"mu*x - K*x^3 + k\"\n[outputs]\nr = \"abs(x)\"\n";
 const STUDY: &str = "model = \"pitchfork.toml\"\n[[seed]]\nname = \"start\"\nstate = { x = 0.1 }\n\
@@ -22,7 +22,7 @@ fn study() -> Study {
     parse_study(STUDY, "study.toml", MODEL, "pitchfork.toml").expect("the study is right")
 }
 
-/// Numbers that a decimal or an SQLite REAL column would not keep: NaN, -0, infinities, subnormals, 1/3.
+/// Numbers that a decimal or an SQLite REAL column would not preserve: NaN, -0, infinities, subnormals, 1/3.
 fn awkward(k: usize) -> f64 {
     [f64::NAN, -0.0, f64::INFINITY, f64::NEG_INFINITY, 5e-324, 1.0 / 3.0, -1.0e300, 0.1 + 0.2][k % 8]
 }
@@ -82,7 +82,7 @@ fn special(kind: Kind, position: i64, parameter: f64, cycle: bool) -> SpecialPoi
 fn diagram() -> Diagram {
     let mut main = Branch::new("main", Family::Equilibrium, 0, Origin::Seed("start".into()));
     (-2..=3).for_each(|k| main.insert(point(k, false)));
-    // Two of one kind between the same two points are two.
+    // Two special points of one kind between the same two points are kept apart.
     main.insert_special(special(Kind::Hopf, 1, 0.15, false));
     main.insert_special(special(Kind::Hopf, 1, 0.16, false));
     main.ends = [Some(Ending::Bound(-1.0)), Some(Ending::Stopped)];
@@ -110,7 +110,7 @@ fn diagram() -> Diagram {
         period: ratio.map(|_| awkward(7)),
         ratio,
         multiplicity: 2,
-        // Nothing is known about the ranges of a motion that escaped.
+        // A motion that escaped has no ranges.
         ranges: if motion == Motion::Escaped {
             Vec::new()
         } else {
@@ -136,7 +136,7 @@ fn diagram() -> Diagram {
 }
 
 fn record(diagram: &Diagram, observer: &dyn Observer) {
-    // A set that is written again replaces itself.
+    // A set that is written again replaces the earlier one.
     diagram.responses.iter().chain(&diagram.responses).for_each(|set| {
         assert_eq!(observer.observe(Event::Visited(&set.name, 0.5, 1, 4)), Verdict::Continue);
         assert_eq!(observer.observe(Event::Responses(set)), Verdict::Continue);
@@ -156,7 +156,7 @@ fn record(diagram: &Diagram, observer: &dyn Observer) {
     }
 }
 
-/// A text in which every number stands with its bits, so that NaN equals NaN and 0 differs from -0.
+/// Formats a diagram with the bits of every number, so that NaN equals NaN and 0 differs from -0.
 fn exactly(diagram: &Diagram) -> String {
     fn bits(values: &[f64]) -> Vec<u64> {
         values.iter().map(|v| v.to_bits()).collect()
@@ -200,7 +200,7 @@ fn a_diagram_comes_back_to_the_bit_and_so_do_the_texts() {
     assert_eq!(back.notes.len(), 4);
 }
 
-/// Pairs of eigenvalues that pass the imaginary axis at once.
+/// Pairs of eigenvalues that cross the imaginary axis at the same point.
 #[test]
 fn special_points_of_one_kind_at_one_place_are_all_kept() {
     let folder = tempfile::tempdir().unwrap();
@@ -241,7 +241,7 @@ fn special_points_of_one_step_backwards_are_in_the_order_of_the_branch() {
     assert_eq!(order(&load(folder.path()).unwrap().diagram.branches[0]), [0.1, 0.2, 0.3, 0.4]);
 }
 
-/// The diagram without what [`Part::Numbers`] leaves out.
+/// Removes from a diagram what [`Part::Numbers`] leaves out.
 fn numbers_of(mut diagram: Diagram) -> Diagram {
     let strip = |point: &mut Point| {
         point.tangent.clear();
@@ -258,7 +258,7 @@ fn numbers_of(mut diagram: Diagram) -> Diagram {
 }
 
 #[test]
-fn a_part_of_a_run_is_the_whole_without_the_rest() {
+fn a_part_of_a_run_equals_that_part_of_the_whole() {
     let folder = tempfile::tempdir().unwrap();
     let recorder = Recorder::create(folder.path(), &study()).unwrap();
     record(&diagram(), &recorder);
@@ -272,7 +272,7 @@ fn a_part_of_a_run_is_the_whole_without_the_rest() {
 }
 
 #[test]
-fn the_recorder_recalls_what_it_was_told() {
+fn the_recorder_recalls_recorded_points() {
     let folder = tempfile::tempdir().unwrap();
     let recorder = Recorder::create(folder.path(), &study()).unwrap();
     record(&diagram(), &recorder);
@@ -302,7 +302,7 @@ fn threads_that_record_at_once_lose_nothing_and_recall_their_own() {
                 let special = special(Kind::Torus, position, position as f64, true);
                 branch.insert_special(special.clone());
                 recorder.observe(Event::Special(&branch, &special));
-                // While the others write.
+                // While the other threads write.
                 let recalled = recorder.recall(&branch, position - 1).expect("it was recorded");
                 assert_eq!(format!("{recalled:?}"), format!("{:?}", branch.points[position as usize - 1]));
             }
@@ -326,7 +326,7 @@ fn threads_that_record_at_once_lose_nothing_and_recall_their_own() {
 }
 
 #[test]
-fn a_thread_goes_on_while_another_writes_but_not_without_end() {
+fn a_thread_queues_points_while_another_writes_up_to_a_limit() {
     let folder = tempfile::tempdir().unwrap();
     let recorder = Recorder::create(folder.path(), &study()).unwrap();
     let mut branches = ["a", "b"].map(|name| Branch::new(name, Family::Cycle, 0, Origin::Seed("start".into())));
@@ -334,7 +334,7 @@ fn a_thread_goes_on_while_another_writes_but_not_without_end() {
         recorder.observe(Event::Begin(branch));
         (0..40).for_each(|position| branch.insert(point(position, true)));
     }
-    // Someone else has the file: who writes first waits for him.
+    // Another connection has the file locked, so the first writer waits.
     let other = rusqlite::Connection::open(path_in(folder.path())).unwrap();
     other.execute_batch("BEGIN IMMEDIATE").unwrap();
     let stored = || -> i64 { other.query_row("SELECT count(*) FROM points", [], |row| row.get(0)).unwrap() };
@@ -352,12 +352,12 @@ fn a_thread_goes_on_while_another_writes_but_not_without_end() {
         while handed_in.load(Ordering::SeqCst) < 16 && start.elapsed().as_secs() < 5 {
             std::thread::yield_now();
         }
-        // One waits in its first point, the other in its seventeenth, whosever point is being written.
+        // One thread waits in its first point, the other in its seventeenth, whichever point is being written.
         std::thread::sleep(std::time::Duration::from_millis(50));
         assert_eq!((handed_in.load(Ordering::SeqCst), stored()), (16, 0));
         other.execute_batch("COMMIT").unwrap();
     });
-    // No call is under way any more: a process that is killed now has everything in its file, in order.
+    // No call is in progress any more: if the process is killed now, everything is in the file, in order.
     assert_eq!(stored(), 80);
     let mut rows = other.prepare("SELECT position FROM points WHERE branch = ? ORDER BY rowid").unwrap();
     for branch in 1..=2 {
@@ -367,7 +367,7 @@ fn a_thread_goes_on_while_another_writes_but_not_without_end() {
 }
 
 #[test]
-fn no_row_is_left_behind_however_two_threads_meet() {
+fn no_row_is_lost_in_any_interleaving_of_two_threads() {
     const POINTS: i64 = 4;
     let folder = tempfile::tempdir().unwrap();
     let recorder = Recorder::create(folder.path(), &study()).unwrap();
@@ -390,7 +390,7 @@ fn no_row_is_left_behind_however_two_threads_meet() {
                     }
                     if round % 2 == 0 {
                         recorder.observe(Event::SideEnded(&branch, 1, &Ending::Closed));
-                        // What comes before an end is there when it has been said.
+                        // All points before an ending are in the file once the ending has been observed.
                         assert_eq!(count(points, name), POINTS, "{name}");
                     }
                 });
@@ -404,11 +404,11 @@ fn no_row_is_left_behind_however_two_threads_meet() {
 }
 
 #[test]
-fn a_killed_run_resumes_with_everything_it_had_accepted_and_repetition_changes_nothing() {
+fn a_killed_run_resumes_with_all_accepted_points_and_repeated_resumption_changes_nothing() {
     let folder = tempfile::tempdir().unwrap();
     let recorder = Recorder::create(folder.path(), &study()).unwrap();
     record(&diagram(), &recorder);
-    // A killed process closes nothing: its log stays beside the file, as it does for this copy.
+    // A killed process does not close the file: its log remains next to it, as it does for this copy.
     let copy = tempfile::tempdir().unwrap();
     for file in std::fs::read_dir(folder.path()).unwrap() {
         let file = file.unwrap();
@@ -425,11 +425,11 @@ fn a_killed_run_resumes_with_everything_it_had_accepted_and_repetition_changes_n
 }
 
 #[test]
-fn what_a_resumed_branch_does_not_go_on_from_is_forgotten_so_that_it_is_not_found_twice() {
+fn points_from_which_a_resumed_branch_does_not_continue_are_deleted() {
     let folder = tempfile::tempdir().unwrap();
     let recorder = Recorder::create(folder.path(), &study()).unwrap();
     record(&diagram(), &recorder);
-    // The special points of the last step are located once more, with other rounding errors.
+    // The special points of the last step are located again, with other rounding errors.
     let mut main = diagram().branches.remove(0);
     main.points.retain(|p| p.position <= 2);
     main.special.truncate(1);
@@ -483,7 +483,7 @@ fn numbers_can_be_read_by_name_without_this_program() {
     assert_eq!(row, (3.0 / 7.0, 0.0, 1.0 / 3.0, 1));
 }
 
-/// Makes a file of version 7 of one of version 10.
+/// Converts a file from version 10 to version 7.
 const WITHOUT_ERRORS: &str = "
     UPDATE special_points SET scalar_bytes = CAST(substr(scalar_bytes, 1, 80) AS BLOB), numbers_checksum = NULL;
     ALTER TABLE special_points DROP COLUMN coefficient_count;
@@ -493,7 +493,7 @@ const WITHOUT_ERRORS: &str = "
     ALTER TABLE points DROP COLUMN slope_error; ALTER TABLE special_points DROP COLUMN slope_error;
     PRAGMA user_version = 7;";
 
-/// Makes a file of version 3 of one of version 4 to 7, then one of version 2.
+/// Converts a file of version 4 to 7 to version 3, then to version 2.
 const WITHOUT_COUNTERS: &str = "
     ALTER TABLE points DROP COLUMN average_bytes; ALTER TABLE special_points DROP COLUMN average_bytes;
     ALTER TABLE points DROP COLUMN forcing_periods; ALTER TABLE special_points DROP COLUMN forcing_periods;
@@ -520,7 +520,7 @@ fn without_errors(mut diagram: Diagram) -> Diagram {
     diagram
 }
 
-/// Makes a file of version 7 of one that has no errors of coefficients.
+/// Converts a file without errors of coefficients to version 7.
 const VERSION_7: &str = "
     ALTER TABLE special_points DROP COLUMN coefficient_count;
     ALTER TABLE special_points DROP COLUMN normal_form_remark;
@@ -533,7 +533,7 @@ const VERSION_7: &str = "
 fn a_file_whose_coefficients_have_no_errors_is_read_and_resumed() {
     let folder = tempfile::tempdir().unwrap();
     let recorder = Recorder::create(folder.path(), &study()).unwrap();
-    // What a row of version 7 has, its checksum included.
+    // Contents of a row of version 7, including its checksum.
     record(&without_errors(diagram()), &recorder);
     recorder.finish().unwrap();
     rusqlite::Connection::open(path_in(folder.path())).unwrap().execute_batch(VERSION_7).unwrap();
@@ -596,7 +596,7 @@ fn a_file_of_the_first_version_is_read_and_resumed() {
 }
 
 #[test]
-fn what_simulation_saw_can_be_read_by_name_and_a_file_without_it_is_read_too() {
+fn responses_can_be_read_by_name_and_files_without_them_are_read_too() {
     let folder = tempfile::tempdir().unwrap();
     let recorder = Recorder::create(folder.path(), &study()).unwrap();
     record(&diagram(), &recorder);
@@ -611,7 +611,7 @@ fn what_simulation_saw_can_be_read_by_name_and_a_file_without_it_is_read_too() {
         })
         .unwrap();
     assert_eq!(row, (4, 1.0 / 3.0, 1.0 / 3.0, 2));
-    // As earlier programs left it: without the columns that came later, then without the tables.
+    // As written by earlier versions: without the later columns, then without the tables.
     let later = ["uniform_hits", "uniform_starts", "jumped"];
     later
         .iter()
@@ -639,7 +639,7 @@ fn refusal(result: Result<impl Sized, RunFileError>) -> String {
 }
 
 #[test]
-fn what_cannot_be_continued_is_refused_with_the_reason_and_the_cure() {
+fn runs_that_cannot_be_resumed_are_rejected_with_reason_and_cure() {
     let folder = tempfile::tempdir().unwrap();
     Recorder::create(folder.path(), &study()).unwrap().finish().unwrap();
     let exists = refusal(Recorder::create(folder.path(), &study()));

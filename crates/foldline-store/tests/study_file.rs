@@ -1,4 +1,4 @@
-//! Curves and homotopies in a study: what is read, and what is said about mistakes.
+//! Curves and homotopies in a study: plans, and diagnostics for mistakes.
 
 use foldline::diagram::Kind;
 use foldline::explore::{CurvePlan, HomotopyPlan, Start};
@@ -7,7 +7,7 @@ use foldline_store::study_file::{Study, parse_study};
 const MODEL: &str = "name = \"pendulum\"\n[parameters]\nmu = 0.5\nkappa = 1\nzeta = 0.1\n[states]\nx = \"y\"\n\
     y = \"mu*x - kappa*x^3 - zeta*y\"\n";
 
-/// In which nothing is wrong.
+/// Study without mistakes.
 const STUDY: &str = r#"model = "pendulum.toml"
 
 [[seed]]
@@ -110,7 +110,7 @@ fn curves_and_homotopies_become_plans() {
     assert_eq!(plan.homotopies, [way]);
     let starts: Vec<&Start> = plan.branches.iter().map(|branch| &branch.start).collect();
     assert_eq!(starts, [&Start::Seed(0), &Start::Seed(1), &Start::EndOfCurve(0), &Start::EndOfHomotopy(0)]);
-    // Where the homotopy arrives is known, so a target alone says the range.
+    // The end of the homotopy is known, so a target alone defines the range.
     assert_eq!((plan.branches[3].range, plan.branches[3].until), ([0.01, 0.2], Some(0.2)));
 }
 
@@ -121,7 +121,7 @@ fn a_homotopy_alone_is_a_study() {
     assert_eq!(read(text).plan.homotopies[0].start, Start::Seed(0));
 }
 
-/// The one mistake of the study with a piece of it replaced: the text of the place, the message, the hint.
+/// Replaces a piece of the study and returns its only mistake: the marked text, the message, the hint.
 #[track_caller]
 fn mistake(piece: &str, by: &str) -> [String; 3] {
     assert_eq!(STUDY.matches(piece).count(), 1, "{piece:?} must stand once in the study");
@@ -135,7 +135,7 @@ fn mistake(piece: &str, by: &str) -> [String; 3] {
     [place, found.message.clone(), found.hint.clone().unwrap_or_default()]
 }
 
-/// Piece, replacement, place, part of the message, part of the hint.
+/// Piece, replacement, marked text, part of the message, part of the hint.
 type Case = (&'static str, &'static str, &'static str, &'static str, &'static str);
 
 #[track_caller]
@@ -148,7 +148,7 @@ fn all_are_said(cases: &[Case]) {
 }
 
 #[test]
-fn mistakes_about_what_is_held() {
+fn mistakes_about_the_kind_of_special_point_of_a_curve() {
     all_are_said(&[
         (
             "hold = \"fold\"",
@@ -265,7 +265,7 @@ fn mistakes_about_homotopies() {
 }
 
 #[test]
-fn mistakes_about_names_and_about_what_a_branch_starts_from() {
+fn mistakes_about_names_and_starts_of_branches() {
     all_are_said(&[
         (
             "name = \"goal\"",
@@ -288,7 +288,7 @@ fn mistakes_about_names_and_about_what_a_branch_starts_from() {
 }
 
 #[test]
-fn all_mistakes_are_said_at_once_in_the_order_of_the_text() {
+fn all_mistakes_are_reported_at_once_in_the_order_of_the_text() {
     let text =
         STUDY.replace("near = 0.25", "near = 7").replace("kappa = 4", "kapa = 4").replace("[-1, 1.5]", "[1.5, -1]");
     let found = parse_study(&text, "study.toml", MODEL, "pendulum.toml").unwrap_err();
@@ -296,7 +296,7 @@ fn all_mistakes_are_said_at_once_in_the_order_of_the_text() {
 }
 
 #[test]
-fn nothing_starts_at_the_end_of_a_curve_that_has_none() {
+fn nothing_starts_at_the_end_of_a_curve_without_a_target() {
     let found = parse_study(&STUDY.replace("until = 2.5\n", ""), "study.toml", MODEL, "pendulum.toml").unwrap_err();
     assert_eq!(found.iter().map(|d| d.line).collect::<Vec<_>>(), [43, 50], "{found:?}");
     for mistake in found {
@@ -305,7 +305,7 @@ fn nothing_starts_at_the_end_of_a_curve_that_has_none() {
 }
 
 #[test]
-fn one_special_point_is_switched_at_and_its_branch_has_curves() {
+fn switching_at_one_special_point_gives_a_branch_with_curves() {
     let text = STUDY.replace("{ period-doubling = 2 }", "{ period-doubling-1 = 1, hopf = 1 }");
     let cycles = read(&text).plan.branches[1].clone();
     assert_eq!(cycles.switching.only, [(Kind::PeriodDoubling, 1, 1)]);

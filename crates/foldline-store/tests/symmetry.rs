@@ -1,4 +1,4 @@
-//! Which symmetries of a model count in a study.
+//! Symmetries of a model that remain in a study.
 
 use foldline::explore::System;
 use foldline_store::study_file::parse_study;
@@ -12,13 +12,13 @@ fn reflections(branch: &str) -> usize {
 }
 
 #[test]
-fn a_symmetry_that_the_free_parameter_breaks_is_none() {
+fn a_symmetry_broken_by_the_free_parameter_is_dropped() {
     assert_eq!(reflections("free = \"mu\"\nrange = [-1, 2]\n"), 2);
     assert_eq!(reflections("free = \"h\"\nrange = [-1, 1]\n"), 1);
 }
 
 #[test]
-fn nor_is_one_that_a_curve_or_a_homotopy_breaks() {
+fn a_symmetry_broken_by_a_curve_or_a_homotopy_is_dropped() {
     let branch = "free = \"mu\"\nrange = [-1, 2]\n";
     let curve = "[[curve]]\nname = \"c\"\nhold = \"fold\"\nof = \"b\"\n";
     assert_eq!(reflections(&format!("{branch}{curve}free = \"h\"\nrange = [-1, 1]\n")), 1);

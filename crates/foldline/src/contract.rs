@@ -1,7 +1,7 @@
-//! The public traits: what a model, a curve, a monitor and an observer must be able to do.
+//! The public traits: what a model, a curve, a monitor and an observer must provide.
 //!
-//! **Idea.** Everything else in the crate is written against these few object-safe traits, so a model may be text, traced
-//! code or native Rust, and a curve may be an equilibrium, a cycle or a problem nobody has thought of yet.
+//! **Idea.** The rest of the crate is written against these few object-safe traits. A model may therefore be text,
+//! traced code or native Rust, and a curve may consist of equilibria, cycles or solutions of a new kind of problem.
 
 use crate::diagram::{Branch, Ending, Kind, Mesh, Point, Responses, SpecialPoint, Trust};
 use num_complex::Complex64;
@@ -18,20 +18,21 @@ pub enum Parameters<'a> {
 /// Points at which a vector field is evaluated together, component-major (structure of arrays).
 #[derive(Clone, Copy, Debug)]
 pub struct Batch<'a> {
-    /// How many points.
+    /// Number of points.
     pub lanes: usize,
     /// `[dim × lanes]`: component `i` of lane `l` at `i * lanes + l`.
     pub states: &'a [f64],
     /// Parameter values.
     pub parameters: Parameters<'a>,
-    /// `[lanes]` where the field is forced: the time of each point in periods of the forcing. Empty where it is autonomous.
+    /// `[lanes]` for a forced field: the time of each point in forcing periods. Empty for an autonomous field.
     pub times: &'a [f64],
 }
 
 /// A vector field x' = f(x, p), x ∈ ℝⁿ, p ∈ ℝᵏ, with exact derivatives, evaluated for a batch of points at once.
 ///
-/// A forced field has x' = f(x, p, τ) where τ is time counted in periods of the forcing, and x' the change per such period: f has
-/// the period 1 in τ whatever the parameters are. What one unit of τ is in the time of the model is [`VectorField::time_unit`].
+/// A forced field is x' = f(x, p, τ), where τ is time in forcing periods and x' the change per forcing period. f has
+/// period 1 in τ for all parameter values. [`VectorField::time_unit`] is the length of one unit of τ in the time of the
+/// model.
 ///
 /// All arrays are component-major over the lanes of the batch: a quantity with components `c` stores lane `l` at
 /// `c * lanes + l`.
@@ -45,15 +46,15 @@ pub trait VectorField: Send + Sync {
     /// f: writes `[n × lanes]`.
     fn evaluate(&self, at: Batch, f: &mut [f64]);
 
-    /// f and its first derivatives: `f` is `[n × lanes]`, `fx` is `[n·n × lanes]` (entry ∂fᵢ/∂xⱼ is component `i * n + j`),
-    /// `fp` is `[n·q × lanes]` with q = `free.len()` (entry ∂fᵢ/∂p_{free\[c\]} is component `i * q + c`).
+    /// f and its first derivatives: `f` is `[n × lanes]`, `fx` is `[n·n × lanes]` (entry ∂fᵢ/∂xⱼ is component
+    /// `i * n + j`), `fp` is `[n·q × lanes]` with q = `free.len()` (entry ∂fᵢ/∂p_{free\[c\]} is component `i * q + c`).
     fn linearise(&self, at: Batch, free: &[usize], f: &mut [f64], fx: &mut [f64], fp: &mut [f64]);
 
-    /// The multilinear derivative Dᵏf[d₁, …, dₖ] in states and parameters, k = `directions.len()` ≥ 1: each direction is
+    /// Multilinear derivative Dᵏf[d₁, …, dₖ] in states and parameters, k = `directions.len()` ≥ 1. Each direction is
     /// `[(n + k_p) × lanes]` (state part first, then all parameters); writes `[n × lanes]`.
     fn directional(&self, at: Batch, directions: &[&[f64]], out: &mut [f64]);
 
-    /// True once the run is to end and the field returns NaN: no lengthy computation need be started.
+    /// True once the run is to end and the field returns NaN, so that no lengthy computation should be started.
     fn ended(&self) -> bool {
         false
     }
@@ -63,19 +64,20 @@ pub trait VectorField: Send + Sync {
         false
     }
 
-    /// The unit of the field's time in that of the model: 1, or the period of the forcing at parameters `[k]`.
+    /// Length of one unit of the field's time in the time of the model: 1, or the forcing period at parameters `[k]`.
     fn time_unit(&self, _parameters: &[f64]) -> f64 {
         1.0
     }
 
-    /// `[n]` the period of f in each state: finite for an angle, infinite for others. Empty where no state is an angle.
+    /// `[n]` periods of f in each state: finite for an angle, infinite for other states. Empty if no state is an angle.
     ///
-    /// States that differ by whole periods are one, and an orbit closes where it comes back to such a copy of its start.
+    /// States that differ by whole periods are identified, and an orbit closes when it returns to such a copy of its
+    /// start.
     fn periods(&self) -> &[f64] {
         &[]
     }
 
-    /// How many scalar outputs the model defines besides its states.
+    /// Number of scalar outputs that the model defines besides its states.
     fn output_count(&self) -> usize {
         0
     }
@@ -83,23 +85,25 @@ pub trait VectorField: Send + Sync {
     /// The outputs: writes `[output_count × lanes]`.
     fn outputs(&self, _at: Batch, _out: &mut [f64]) {}
 
-    /// How many switches the field has: scalars at whose zeros f or one of its derivatives jumps. 0 where it is smooth.
+    /// Number of switching functions: scalars at whose zeros f or one of its derivatives jumps. 0 if the field is
+    /// smooth.
     fn switch_count(&self) -> usize {
         0
     }
 
-    /// f `[n]` at one point in twice the working precision: states `[n]`, parameters `[k]` and results are sums of two numbers,
-    /// the larger first. `None` where f is not finite, or the field cannot do that. For checks; it may be slow.
+    /// f `[n]` at one point in twice the working precision. States `[n]`, parameters `[k]` and results are sums of two
+    /// numbers, the larger first. `None` if f is not finite or the field does not support this. Meant for checks; it
+    /// may be slow.
     fn evaluate_precisely(&self, _states: &[[f64; 2]], _parameters: &[[f64; 2]]) -> Option<Vec<[f64; 2]>> {
         None
     }
 
-    /// The switches: writes `[switch_count × lanes]`.
+    /// The switching functions: writes `[switch_count × lanes]`.
     fn switches(&self, _at: Batch, _out: &mut [f64]) {}
 
-    /// Evaluates the branch of f that the given signs of the switches select (±1, `[switch_count × lanes]`), continued smoothly beyond
-    /// their zeros; writes `[n × lanes]`. Where that branch is undefined, such as a root of an argument that is positive on one
-    /// side only, the actual value of f is used.
+    /// Evaluates the branch of f selected by the given signs of the switching functions (±1, `[switch_count × lanes]`),
+    /// continued smoothly beyond their zeros; writes `[n × lanes]`. Where that branch is undefined, such as a root
+    /// whose argument is positive on one side only, the actual value of f is used.
     fn evaluate_switched(&self, at: Batch, _signs: &[f64], f: &mut [f64]) {
         self.evaluate(at, f);
     }
@@ -109,14 +113,14 @@ pub trait VectorField: Send + Sync {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Singular;
 
-/// What a curve knows about the stability of one of its points, and how far that can be trusted.
+/// Stability of a point on a curve, and the accuracy of the point.
 #[derive(Clone, Debug, Default)]
 pub struct Examination {
-    /// Eigenvalues of an equilibrium; Floquet multipliers of a cycle, the trivial one first where there is one.
+    /// Eigenvalues of an equilibrium, or Floquet multipliers of a cycle with the trivial one, if any, first.
     pub spectrum: Vec<Complex64>,
-    /// How many trivial ones there are: 1 for cycles of an autonomous field, else 0.
+    /// Number of trivial multipliers: 1 for cycles of an autonomous field, else 0.
     pub trivial: usize,
-    /// How many of them are unstable (the trivial one never counts).
+    /// Number of unstable eigenvalues or multipliers (the trivial one never counts).
     pub unstable: usize,
     /// Smallest and largest value of every state, then of every output.
     pub ranges: Vec<[f64; 2]>,
@@ -126,29 +130,31 @@ pub struct Examination {
     pub trust: Trust,
 }
 
-/// A curve F(u) = 0, F: ℝⁿ⁺ᵏ → ℝⁿ, k = 1. The last k components of `u` are free parameters over their scales, the very last is that of the
-/// continuation. With k > 1 it is a surface, on which something else must be held to make it a curve.
+/// A curve F(u) = 0, F: ℝⁿ⁺ᵏ → ℝⁿ, k = 1. The last k components of `u` are free parameters divided by their scales; the
+/// very last is the continuation parameter. With k > 1 the solutions form a surface, and further conditions are needed
+/// to select a curve on it.
 ///
-/// The problem may be discretised on a mesh that changes along the curve; vectors always belong to the current mesh.
+/// The problem may be discretised on a mesh that changes along the curve. Vectors always belong to the current mesh.
 pub trait ZeroProblem {
     /// n + k on the current mesh.
     fn unknowns(&self) -> usize;
 
-    /// Value of the continuation parameter for which its unknown, the last component of `u`, is 1.
+    /// Value of the continuation parameter at which the corresponding unknown, the last component of `u`, equals 1.
     fn unit(&self) -> f64 {
         1.0
     }
 
-    /// Takes `u` as the reference for phase conditions and scales until the next call.
+    /// Uses `u` as the reference for phase conditions and scales until the next call.
     fn anchor(&mut self, u: &[f64]);
 
-    /// F(u): writes n values (the last k of the n + k slots are left alone). Returns false if f is not finite there.
+    /// Evaluates F(u): writes n values and leaves the last k of the n + k slots alone. Returns false if f is not finite
+    /// there.
     fn residual(&mut self, u: &[f64], r: &mut [f64]) -> bool;
 
-    /// Factorises the matrix [F_u(u); rows]: `rows` is `[k][n + k]`, each row acts through [`ZeroProblem::dot`].
+    /// Factorises the matrix [F_u(u); rows]. `rows` is `[k][n + k]`; each row acts through [`ZeroProblem::dot`].
     fn factorise(&mut self, u: &[f64], rows: &[f64]) -> Result<(), Singular>;
 
-    /// Solves with the last factorisation. `rhs` and `x` have n + k components, the last k of `rhs` being those of the rows.
+    /// Solves with the last factorisation. `rhs` and `x` have n + k components; the last k of `rhs` belong to the rows.
     fn solve(&mut self, rhs: &[f64], x: &mut [f64]);
 
     /// Inner product in scaled variables, in which lengths along the curve are measured.
@@ -157,7 +163,7 @@ pub trait ZeroProblem {
     /// Size of an update relative to the scale of each component: max |Δuᵢ| / (scaleᵢ + max |uᵢ|).
     fn relative_size(&self, du: &[f64], u: &[f64]) -> f64;
 
-    /// The current mesh; empty for problems that have none.
+    /// The current mesh; empty for problems without a mesh.
     fn mesh(&self) -> Mesh;
 
     /// Moves the problem to another mesh.
@@ -166,54 +172,58 @@ pub trait ZeroProblem {
     /// Carries a vector from one mesh to another.
     fn transfer(&self, v: &[f64], from: &Mesh, to: &Mesh) -> Vec<f64>;
 
-    /// The mesh on which `u` would meet `tolerance`, or `None` where it does on the current one. The last factorisation must
+    /// A mesh on which `u` would meet `tolerance`, or `None` if it does on the current one. The last factorisation must
     /// be one near `u` on the current mesh.
     fn better_mesh(&self, u: &[f64], tolerance: f64) -> Option<Mesh>;
 
-    /// A mesh with fewer intervals, where less than half of them would do for `tolerance`; asked like
+    /// A mesh with fewer intervals, if fewer than half of them suffice for `tolerance`. The conditions are those of
     /// [`ZeroProblem::better_mesh`].
     fn coarser_mesh(&self, _u: &[f64], _tolerance: f64) -> Option<Mesh> {
         None
     }
 
-    /// A mesh with every interval halved; `None` for problems that have none.
+    /// The current mesh with every interval halved; `None` for problems without a mesh.
     fn finer_mesh(&self) -> Option<Mesh>;
 
-    /// A mesh that is finer everywhere, with half as many intervals again: enough to see the error of the current one.
+    /// A mesh that is finer everywhere, with 1.5 times as many intervals: enough to reveal the error of the current
+    /// one.
     fn denser_mesh(&self) -> Option<Mesh> {
         self.finer_mesh()
     }
 
-    /// Stability and trust at `u`, for which [`ZeroProblem::factorise`] was called last.
+    /// Stability and accuracy at `u`, where [`ZeroProblem::factorise`] was called last.
     fn examine(&mut self, u: &[f64]) -> Examination;
 
-    /// The stability alone, of [`ZeroProblem::examine`], where that is cheaper: what belongs to the spectrum, the rest as it comes.
+    /// The spectral part of [`ZeroProblem::examine`], where that is cheaper to compute; the other fields need not be
+    /// set.
     fn stability(&mut self, u: &[f64]) -> Examination {
         self.examine(u)
     }
 
-    /// Estimated error of the spectrum at `u`, relative to the larger of 1 and each modulus; `spectrum` is what
-    /// [`ZeroProblem::examine`] found there. The last factorisation must be one near `u` on the current mesh, and stays.
+    /// Estimated error of the spectrum at `u`, relative to the larger of 1 and each modulus. `spectrum` is the result
+    /// of [`ZeroProblem::examine`] there. The last factorisation must be one near `u` on the current mesh, and is kept.
     fn spectrum_error(&mut self, _u: &[f64], _spectrum: &[Complex64]) -> f64 {
         f64::NAN
     }
 
-    /// True if f or its derivatives jump somewhere: a mesh does not resolve what happens there.
+    /// True if f or its derivatives jump somewhere, which no mesh resolves.
     fn is_switched(&self) -> bool {
         false
     }
 
-    /// How far a point is from one at which F_x is singular, in terms of its spectrum: small where another branch may be
-    /// close by.
+    /// Distance of a point from one with singular F_x, measured by its spectrum. It is small where another branch may
+    /// be close.
     fn margin(&self, at: &Point) -> f64;
 
-    /// How far `u`, which solves equations that were added to, is from solving those that were given, relative: 0 where nothing is added.
+    /// Relative residual of the original equations at `u`, which solves an unfolded system; 0 if no unfolding terms are
+    /// present.
     fn departure(&self, _u: &[f64]) -> f64 {
         0.0
     }
 
-    /// Along a curve of folds, a smooth function whose sign tells the two arms of a cusp apart, at a solution `u` on the current mesh. It
-    /// may be compared until the next call of [`ZeroProblem::anchor`].
+    /// Cusp test function along a curve of folds: a smooth function at a solution `u` on the current mesh whose sign
+    /// distinguishes the two fold curves that meet at a cusp. Values are comparable until the next call of
+    /// [`ZeroProblem::anchor`].
     fn arm(&mut self, _u: &[f64]) -> Option<f64> {
         None
     }
@@ -221,12 +231,13 @@ pub trait ZeroProblem {
     /// `u` as plain data.
     fn point(&self, u: &[f64], tangent: &[f64], examination: Examination) -> Point;
 
-    /// The unknowns of a point, the mesh being that of the point.
+    /// The unknowns of a point. The current mesh must be that of the point.
     fn unknowns_of(&mut self, point: &Point) -> Vec<f64>;
 
-    /// Unknowns and tangent of a point as it can be seen no farther than `within` from `beside`: on the current mesh, on which `beside`
-    /// is, in that reflection (state i negated where it says so), in every phase that is close where a solution has one. None where
-    /// it is farther, or does not belong to this problem.
+    /// Copies (unknowns and tangent) of a point under `reflection` (state i negated where it is true) and, for a
+    /// solution with free phase, under all phase shifts that bring it close to `beside`. They are on the current mesh,
+    /// as is `beside`. Empty if no copy is within `within` of `beside`, or if the point does not belong to this
+    /// problem.
     fn images(&mut self, beside: &[f64], point: &Point, reflection: &[bool], within: f64) -> Vec<[Vec<f64>; 2]> {
         let mut seen = [self.unknowns_of(point), point.tangent.clone()];
         for (i, _) in reflection.iter().enumerate().filter(|(_, negated)| **negated) {
@@ -240,189 +251,195 @@ pub trait ZeroProblem {
     }
 }
 
-/// What of a point is looked at beside its solution and its parameters.
+/// Level of detail at which a point is computed, besides its solution and parameters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Sight {
-    /// Its tangent.
+    /// With its tangent.
     Tangent,
-    /// Its tangent and its spectrum.
+    /// With its tangent and spectrum.
     Stability,
-    /// All that is ever known of it.
+    /// With everything that a stored point contains.
     Everything,
 }
 
-/// A scalar along the branch whose sign change between two points is a special point.
+/// A scalar test function along the branch; a change of its sign between two points indicates a special point.
 pub trait Monitor: Send + Sync {
-    /// What is found where the sign changes.
+    /// Kind of special point at which the sign changes.
     fn kind(&self) -> Kind;
 
     /// The value at `at`; `reference` is the accepted point from which the step under inspection starts.
     fn value(&self, reference: &Point, at: &Point) -> f64;
 
-    /// Whether the located zero is an event of this kind (and not, say, a neutral saddle).
+    /// True if the located zero is an event of this kind (and not, say, a neutral saddle).
     fn confirms(&self, at: &Point) -> bool;
 
-    /// The same with a look at the points `ends` between which the zero was located.
+    /// Confirms the event as in [`Monitor::confirms`], given also the points `ends` between which the zero was located.
     fn confirms_between(&self, _ends: [&Point; 2], at: &Point) -> bool {
         self.confirms(at)
     }
 
-    /// Parameter value at which a branch that is close to simpler solutions at `at` meets them; `None` if the simpler solutions do not
-    /// determine it.
+    /// Parameter value at which a branch that is close to simpler solutions at `at` meets them; `None` if the simpler
+    /// solutions do not determine it.
     fn meeting(&self, _at: &Point) -> Option<f64> {
         None
     }
 
-    /// On what of a point the value depends, and whether it is confirmed.
+    /// Level of detail that the value and its confirmation need.
     fn reads(&self) -> Sight {
         Sight::Stability
     }
 
-    /// Whether `at`, which is close to the zero but not there yet, leaves it possible that the zero will be confirmed.
+    /// True if the zero may still be confirmed, judging by the nearby point `at`.
     fn possible(&self, _at: &Point) -> bool {
         true
     }
 
-    /// The factor of the value that vanishes next to `near`, evaluated at `at`. It has the same zero as the value but does not scale
-    /// with the other factors, whose number grows with the number of states. `None` if the value is not a product.
+    /// The factor of the value that vanishes next to `near`, evaluated at `at`. It has the same zero as the value but
+    /// does not scale with the other factors, whose number grows with the number of states. `None` if the value is not
+    /// a product.
     fn factor(&self, _near: &Point, _at: &Point) -> Option<f64> {
         None
     }
 
-    /// By how much an event of this kind changes the number of unstable eigenvalues or multipliers.
+    /// Change in the number of unstable eigenvalues or multipliers at an event of this kind.
     fn jump(&self) -> usize;
 
-    /// Number of events of this kind that account for the unstable eigenvalues or multipliers at `at`. `None` if events of another kind
-    /// change the same ones.
+    /// Number of events of this kind that account for the unstable eigenvalues or multipliers at `at`. `None` if events
+    /// of another kind change the same ones.
     fn passed(&self, _at: &Point) -> Option<usize> {
         None
     }
 
-    /// A monitor of the same events that uses the spectrum alone, for branches along which the parameter changes by rounding only.
+    /// A monitor of the same events that uses the spectrum alone, for branches along which the parameter changes by
+    /// rounding only.
     fn by_spectrum(&self) -> Option<Box<dyn Monitor>> {
         None
     }
 
-    /// How the branch ends at a located event, if it does; `parameter` is that of the continuation there.
+    /// The way in which the branch ends at a located event, if it does. `parameter` is the continuation parameter
+    /// there.
     fn ending(&self, _at: &Point, _parameter: f64) -> Option<Ending> {
         None
     }
 
-    /// How many eigenvalues or multipliers are unstable at a located event besides those that pass there: on one side of it the count is
-    /// this, on the other this with the jump. `None` where some are too close to neutral to say.
+    /// Number of unstable eigenvalues or multipliers at a located event, not counting the critical ones. The count on
+    /// one side of the event is this number, on the other side this number plus the jump. `None` if some are too close
+    /// to neutral to decide.
     fn others_unstable(&self, _at: &Point) -> Option<usize> {
         None
     }
 }
 
-/// The extra unknowns and equations that hold a special point: e unknowns (such as a frequency) and e + 1 scalar equations
-/// g = 0, or more by the number of unknowns that the surface has besides two parameters. A surface of solutions with one of them held is a
-/// two-parameter curve.
+/// Defining system of a bifurcation curve: e extra unknowns (such as a frequency) and e + 1 scalar equations g = 0, or
+/// more if the surface has unknowns besides two parameters (one equation each). Together with the equations of the
+/// surface they define a two-parameter curve.
 ///
 /// Vectors `u` are those of the surface, a [`ZeroProblem`] with two free parameters.
 pub trait Condition {
-    /// What is held.
+    /// Kind of bifurcation that is continued.
     fn kind(&self) -> Kind;
 
-    /// e.
+    /// e, the number of extra unknowns.
     fn extra(&self) -> usize;
 
-    /// How many equations there are.
+    /// Number of equations.
     fn equations(&self) -> usize {
         self.extra() + 1
     }
 
-    /// Characteristic size of the extra unknowns at the place of the last evaluation.
+    /// Characteristic size of the extra unknowns at the point of the last evaluation.
     fn extra_scale(&self) -> f64 {
         1.0
     }
 
-    /// First values `[e]` of the extra unknowns, from the spectrum of a point close to the special one.
+    /// Initial values `[e]` of the extra unknowns, from the spectrum of a point close to the bifurcation.
     fn guess(&self, point: &Point) -> Vec<f64>;
 
-    /// Takes the null vectors of the last evaluation as reference until the next call.
+    /// Uses the null vectors of the last evaluation as reference until the next call.
     fn anchor(&mut self);
 
-    /// Learns which way the curve goes, in the unknowns of the surface.
+    /// Sets the direction of the curve, in the unknowns of the surface.
     fn face(&mut self, _along: &[f64]) {}
 
     /// Moves to another mesh.
     fn set_mesh(&mut self, mesh: &Mesh);
 
-    /// g: writes all its values. Returns false if they are not finite there.
+    /// Evaluates g. Returns false if its values are not finite there.
     fn evaluate(&mut self, u: &[f64], extra: &[f64], g: &mut [f64]) -> bool;
 
-    /// The derivative of g along (`du`, `extra`) at the place of the last evaluation: writes as many values.
+    /// Derivative of g along (`du`, `extra`) at the point of the last evaluation; writes as many values as g has.
     fn derivative(&mut self, du: &[f64], extra: &[f64], dg: &mut [f64]);
 
-    /// Where folds are held, the null vector found at the last evaluation, as a direction in the unknowns of the surface.
+    /// For curves of folds, the null vector at the last evaluation, as a direction in the unknowns of the surface.
     fn null_direction(&self) -> Option<Vec<f64>> {
         None
     }
 
-    /// The eigenvalues or multipliers that are held, as the extra unknowns say.
+    /// The critical eigenvalues or multipliers, given the extra unknowns.
     fn held(&self, extra: &[f64]) -> Vec<Complex64>;
 
-    /// How far an eigenvalue or multiplier is from where one is held.
+    /// Distance of an eigenvalue or multiplier from the critical position.
     fn distance(&self, z: Complex64) -> f64;
 }
 
-/// What happens while a diagram grows.
+/// An event during the computation of a diagram.
 #[derive(Clone, Copy, Debug)]
 pub enum Event<'a> {
     /// A branch begins; it has no points yet, or those of an earlier run that is being resumed.
     Begin(&'a Branch),
-    /// A point was found; [`Point::position`] says where on the branch it belongs.
+    /// A point was found; [`Point::position`] is its position on the branch.
     Point(&'a Branch, &'a Point),
-    /// A special point was located behind the last point of its side.
+    /// A special point was located, after the last point reported on its side.
     Special(&'a Branch, &'a SpecialPoint),
     /// One side of the branch ended; side 0 is backward, 1 forward.
     SideEnded(&'a Branch, usize, &'a Ending),
     /// The branch is complete.
     End(&'a Branch),
-    /// A remark about a branch or seed, such as a switch that led to a known branch or the attractors that the samples reached.
+    /// A remark about a branch or seed, such as a switch that led to a known branch or the attractors that the samples
+    /// reached.
     Note(&'a str, &'a str),
-    /// A request that was not fulfilled: the name of the branch, exploration or sweep, then what was not reached and why.
+    /// A request that was not fulfilled: the name of the branch, exploration or sweep, then what was not reached and
+    /// why.
     Short(&'a str, &'a str),
-    /// A survey or sweep has settled, or an exploration has sampled, at one more parameter value: its name, the value, the number of
-    /// values done, and their total.
+    /// A survey or sweep has settled, or an exploration has sampled, at one more parameter value: its name, the value,
+    /// the number of values done, and their total.
     Visited(&'a str, f64, usize, usize),
     /// A survey or sweep is complete.
     Responses(&'a Responses),
 }
 
-/// What an observer wants.
+/// The observer's decision.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
-    /// Go on.
+    /// Continue the branch.
     Continue,
-    /// End the branch at this point, keeping everything.
+    /// End the branch at this point and keep everything.
     Stop,
 }
 
-/// Receives everything as it happens: progress, storage and live plots hang here.
+/// Receives events as they occur, for progress display, storage and live plots.
 pub trait Observer: Sync {
     /// Called once per event, from the thread that follows the branch.
     fn observe(&self, event: Event) -> Verdict;
 
-    /// True once the run is to end immediately, even in the middle of a point. Called very often and from every thread. No event is
-    /// reported after that, because computations in progress return wrong numbers.
+    /// True once the run is to end immediately, even in the middle of a point. Called very often and from every thread.
+    /// No event is reported after that, because computations in progress return wrong numbers.
     fn stopping(&self) -> bool {
         false
     }
 
-    /// Whether [`Observer::recall`] answers. Profiles then need not stay in memory.
+    /// True if [`Observer::recall`] returns stored points, so that profiles need not stay in memory.
     fn stores(&self) -> bool {
         false
     }
 
-    /// The point at `position` of a branch, as it was observed.
+    /// The point at `position` of a branch, as reported.
     fn recall(&self, _branch: &Branch, _position: i64) -> Option<Point> {
         None
     }
 }
 
-/// An observer that lets everything pass.
+/// An observer that ignores all events.
 pub struct Unobserved;
 
 impl Observer for Unobserved {

@@ -1,8 +1,8 @@
-//! A diagram in other units, to be shown.
+//! Conversion of a diagram to other units, for display.
 //!
-//! **Idea.** Every number with a unit that a diagram states is multiplied by a factor: parameters, extremes, averages, profiles,
-//! periods, bounds at which branches ended. Errors are relative to scale + |value|, so they are the same in every unit. Coefficients of normal forms, and
-//! sentences, stay in the units of the model.
+//! **Idea.** Every number with a unit in a diagram is multiplied by a factor: parameters, extremes, averages, profiles,
+//! periods, bounds at which branches ended. Errors are relative to scale + |value| and do not depend on the unit.
+//! Normal-form coefficients and messages stay in the units of the model.
 //!
 //! **Equations.** An *order* is a frequency over a reference speed, q/Ω, both in the same unit.
 
@@ -10,14 +10,14 @@ use crate::diagram::{Branch, Diagram, Ending, Origin, Point, Response, Solution}
 use crate::model::{Model, element_of, suggest};
 use crate::units::{Mismatch, Unit};
 
-/// What a quantity is shown as.
+/// The unit in which a quantity is shown.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Shown {
-    /// As the model has it.
+    /// The unit of the model.
     Own,
-    /// Multiplied by a fraction.
+    /// Multiplied by the fraction numerator / denominator.
     By([f64; 2]),
-    /// Multiplied by a fraction and divided by the parameter of that index.
+    /// Multiplied by a fraction and divided by the parameter with this index.
     Orders([f64; 2], usize),
 }
 
@@ -32,7 +32,7 @@ impl Shown {
         }
     }
 
-    /// A value where the parameters are not known: orders have none.
+    /// Converts a value for which the parameters are unknown; orders become NaN.
     fn alone(&self, value: f64) -> f64 {
         self.of(value, &[])
     }
@@ -48,14 +48,15 @@ pub struct Conversion {
     model: Model,
 }
 
-/// What is wrong with a wish for a unit, and what would be right.
+/// An error message and a hint on how to fix it.
 pub type Refusal = [String; 2];
 
 impl Conversion {
-    /// Shows the quantities of `wanted` (names of parameters, states, outputs, or `period`) in those units, or as `orders:NAME`.
+    /// Conversion that shows the quantities in `wanted` (names of parameters, states, outputs, or `period`) in the
+    /// given units, or as `orders:NAME`.
     ///
     /// # Errors
-    /// What cannot be shown so.
+    /// If a name is unknown or its unit cannot be converted to the requested one.
     pub fn new(model: &Model, wanted: &[(String, String)]) -> Result<Conversion, Refusal> {
         let channels = model.states.len() + model.outputs.len();
         let mut own = Conversion {
@@ -72,7 +73,7 @@ impl Conversion {
         Ok(own)
     }
 
-    /// The model with the units that are shown.
+    /// The model, labelled with the units shown.
     pub fn model(&self) -> &Model {
         &self.model
     }
@@ -114,7 +115,7 @@ impl Conversion {
         Err([format!("the model `{}` has no quantity `{name}`", model.name), suggest(name, &names)])
     }
 
-    /// The diagram in these units.
+    /// Converts a diagram to these units.
     pub fn diagram(&self, mut diagram: Diagram) -> Diagram {
         diagram.branches.iter_mut().for_each(|branch| self.branch(branch));
         // The parent of a switch lies in the same diagram; its free parameter is what the origin quotes.
@@ -154,7 +155,7 @@ impl Conversion {
         }
     }
 
-    /// A point in these units.
+    /// Converts a point to these units.
     pub fn point(&self, point: &mut Point) {
         let at = point.parameters.clone();
         self.values(&mut point.parameters, &at);
@@ -194,7 +195,7 @@ impl Conversion {
     fn ranges(&self, ranges: &mut [[f64; 2]], at: &[f64]) {
         for (range, how) in ranges.iter_mut().zip(&self.channels) {
             *range = range.map(|value| how.of(value, at));
-            // Orders of a shaft that turns backwards.
+            // Dividing by a negative speed exchanges minimum and maximum.
             if range[0] > range[1] {
                 range.swap(0, 1);
             }
@@ -202,7 +203,7 @@ impl Conversion {
     }
 }
 
-/// How a quantity is shown in `unit`, and the label of that.
+/// Conversion of a quantity to `unit`, and the label of that unit.
 fn shown(model: &Model, name: &str, declared: &str, unit: &str) -> Result<(Shown, String), Refusal> {
     let lacks =
         |name: &str| [format!("{name} has no unit in the model"), "declare it in the model: `unit = \"…\"`".into()];

@@ -1,24 +1,26 @@
 //! Numerical continuation and bifurcation analysis of ordinary differential equations.
 //!
-//! **Idea.** A bifurcation diagram is a set of curves of equilibria and of cycles (periodic orbits), each point with its
-//! stability and an estimate of how far it can be trusted, and every bifurcation between two points located. This crate
-//! computes such diagrams. It holds the mathematics only: no files, no clock, no printing.
+//! **Idea.** A bifurcation diagram is a set of curves of equilibria and of cycles (periodic orbits). Each point comes
+//! with its
+//! stability and an estimate of its accuracy, and every bifurcation between two points is located. This crate computes
+//! such
+//! diagrams. It contains only the mathematics: no files, no clock, no printing.
 //!
 //! Read it in this order:
 //!
 //! | question | module |
 //! |---|---|
-//! | what must a model, a curve, a monitor be able to do? | [`contract`] |
-//! | what comes out? | [`diagram`] |
+//! | what must a model, a curve, a monitor provide? | [`contract`] |
+//! | what is the result? | [`diagram`] |
 //! | how is a model written, evaluated, differentiated? | [`model`] |
 //! | which units are there, and how are they converted? | [`units`] |
-//! | how does a trajectory run? | [`simulation`] |
-//! | what is the curve? | [`problem`] |
-//! | how do we walk it? | [`continuation`] |
+//! | how is a trajectory computed? | [`simulation`] |
+//! | which equations define the curve? | [`problem`] |
+//! | how is it followed? | [`continuation`] |
 //! | is it stable? | [`stability`] |
 //! | what happened there? | [`special`] |
 //! | where do first solutions come from? | [`attractors`] |
-//! | how does a whole diagram come about? | [`explore`] |
+//! | how is a whole diagram assembled? | [`explore`] |
 //! | is it right? | [`verify`] |
 //! | what is it in other units? | [`converted`] |
 

@@ -4,8 +4,8 @@ use crate::{root, run};
 use std::path::PathBuf;
 use std::process::Command;
 
-/// Makes the environment `name` if it does not have exactly these packages, and returns the folder of its programs. `None` if
-/// Python or the packages are not available.
+/// Creates the environment `name` unless it has exactly these packages, and returns the folder of its programs. `None`
+/// if Python or the packages are not available.
 pub fn ready(name: &str, packages: &[&str]) -> Option<PathBuf> {
     let folder = root().join("target/tools").join(name);
     let programs = folder.join(if cfg!(windows) { "Scripts" } else { "bin" });
@@ -14,7 +14,7 @@ pub fn ready(name: &str, packages: &[&str]) -> Option<PathBuf> {
     if std::fs::read_to_string(&complete).is_ok_and(|there| there == wanted) {
         return Some(programs);
     }
-    // An environment with other packages, if there is one.
+    // Removes an environment with other packages.
     let _ = std::fs::remove_dir_all(&folder);
     let install = ["-m", "pip", "install", "--quiet", "--disable-pip-version-check"];
     let made = run(Command::new("python3").args(["-m", "venv"]).arg(&folder))

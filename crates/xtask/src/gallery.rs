@@ -1,9 +1,9 @@
-//! The gallery: every example is run again, and its page gets the new table, picture, run time and counts.
+//! Gallery: runs every example again and updates table, picture, run time and counts on its page.
 
 use crate::{cargo_path, root, run};
 use std::process::Command;
 
-/// Renews the pages in docs/gallery, in a release build, on one thread.
+/// Updates the pages in docs/gallery with a release build on one thread.
 pub fn renew() -> bool {
     let test = ["test", "--release", "--quiet", "--package", "foldline-cli", "--test", "gallery"];
     eprintln!("renewing {}", root().join("docs/gallery").display());

@@ -1,4 +1,4 @@
-//! Invariants of the source tree that ARCHITECTURE.md states and no compiler checks.
+//! Invariants of the source tree stated in ARCHITECTURE.md, which the compiler does not check.
 
 use crate::tree::Text;
 
@@ -8,7 +8,7 @@ const MODULES: &[(&str, &[&str])] = &[
     ("continuation", &["contract", "diagram", "linalg"]),
     ("contract", &["diagram"]),
     ("converted", &["diagram", "model", "units"]),
-    // The nodes of a mesh interval.
+    // For the nodes of a mesh interval.
     ("diagram", &["problem"]),
     (
         "explore",
@@ -25,7 +25,7 @@ const MODULES: &[(&str, &[&str])] = &[
             "stability",
         ],
     ),
-    // The error of a singular matrix.
+    // For the error of a singular matrix.
     ("linalg", &["contract"]),
     ("model", &["contract", "linalg", "units"]),
     // `problem::cycle::meshes` uses the test of collapse to an equilibrium.
@@ -67,12 +67,12 @@ const OUTSIDE: [&str; 12] = [
     "serde",
 ];
 
-/// The traits of `contract`.
+/// Traits of `contract`.
 const TRAITS: [&str; 5] = ["VectorField", "ZeroProblem", "Monitor", "Condition", "Observer"];
 
 const SOURCE: &str = "crates/foldline/src/";
 
-/// Reports what contradicts the invariants.
+/// Returns a message for each violation of an invariant.
 pub fn broken(texts: &[Text]) -> Vec<String> {
     let mut found = Vec::new();
     for text in texts.iter().filter(|text| text.name.starts_with(SOURCE) && text.is(&["rs"])) {
@@ -115,7 +115,7 @@ pub fn broken(texts: &[Text]) -> Vec<String> {
     found
 }
 
-/// Lines of code with their numbers, without comments and tests.
+/// Returns the lines of code with their numbers, without comments and tests.
 fn product(text: &Text) -> impl Iterator<Item = (usize, &str)> {
     let tests = text.name.rsplit('/').any(|part| part.starts_with("tests"));
     let end = text.text.find("#[cfg(test)]\nmod tests {").unwrap_or(text.text.len());
@@ -124,7 +124,7 @@ fn product(text: &Text) -> impl Iterator<Item = (usize, &str)> {
     code.filter(move |_| !tests)
 }
 
-/// Modules that a line names after `crate::`, alone or in braces.
+/// Returns the modules that a line names after `crate::`, alone or in braces.
 fn modules_in(code: &str) -> Vec<&str> {
     let name = |text: &str| text.find(|c: char| !c.is_alphanumeric() && c != '_').unwrap_or(text.len());
     let mut found = Vec::new();
@@ -147,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_module_may_not_use_is_reported_with_its_line() {
+    fn a_forbidden_module_is_reported_with_its_line() {
         let source = "//! Idea.\nuse crate::explore::System;\n";
         let expected = "crates/foldline/src/continuation/x.rs:2: continuation does not use explore";
         let found = found("crates/foldline/src/continuation/x.rs", source);
@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn input_and_output_are_reported_and_comments_and_tests_are_not() {
+    fn input_and_output_are_reported_except_in_comments_and_tests() {
         assert_eq!(found("crates/foldline/src/units/x.rs", "use std::fs;\n").len(), 1);
         assert_eq!(
             found("crates/foldline/src/units/x.rs", "// std::fs\n#[cfg(test)]\nmod tests {\nuse std::fs;\n"),

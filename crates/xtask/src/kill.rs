@@ -1,4 +1,4 @@
-//! `cargo xtask kill`: runs that are killed at random instants must resume, lose nothing and end as if nothing had happened.
+//! `cargo xtask kill`: runs killed at random times must resume without loss and end like an undisturbed run.
 
 use crate::{cargo, root};
 use std::collections::BTreeSet;
@@ -22,7 +22,7 @@ pub fn test(times: usize) -> bool {
         return false;
     }
     let place = Place { program: root().join("target/release/foldline"), out: root().join("target/killed") };
-    // That of an earlier call, if there is one.
+    // Removes the folder of an earlier call.
     let _ = std::fs::remove_dir_all(&place.out);
     let start = Instant::now();
     let whole = place.out.join("whole");
@@ -33,7 +33,7 @@ pub fn test(times: usize) -> bool {
     let (span, expected) = (start.elapsed(), place.table(&whole, "--special"));
     let (mut counts, mut random) = (Counts::default(), 0x9e37_79b9_7f4a_7c15u64);
     for k in 0..times {
-        // xorshift (Marsaglia): any spread of instants will do.
+        // xorshift (Marsaglia); any distribution of times is sufficient.
         random ^= random << 13;
         random ^= random >> 7;
         random ^= random << 17;
@@ -70,7 +70,7 @@ impl Place {
         self.command(folder, resume).status().is_ok_and(|status| status.success())
     }
 
-    /// Lines of a table without its heading; empty if there is no run.
+    /// Returns the lines of a table without its heading; empty if there is no run.
     fn table(&self, folder: &Path, what: &str) -> Vec<String> {
         let output = Command::new(&self.program).arg("table").arg(folder).args([what, "--format", "csv"]).output();
         let text = output.map(|output| String::from_utf8_lossy(&output.stdout).into_owned()).unwrap_or_default();
@@ -81,7 +81,7 @@ impl Place {
         let mut child = self.command(folder, false).spawn().map_err(|error| error.to_string())?;
         std::thread::sleep(after);
         counts.after_the_end += usize::from(matches!(child.try_wait(), Ok(Some(_))));
-        // It may have ended in the meantime.
+        // The process may have ended in the meantime.
         let _ = child.kill();
         child.wait().map_err(|error| error.to_string())?;
         counts.killed += 1;
@@ -105,10 +105,11 @@ impl Place {
     }
 }
 
-/// True if two rows are the same special point within their stated errors: branch, kind, parameter first, error and normal form last.
+/// True if two rows denote the same special point within their stated errors. A row begins with branch, kind and
+/// parameter and ends with error and normal form.
 fn same(a: &str, b: &str) -> bool {
     let number = |text: Option<&str>| text.and_then(|text| text.parse::<f64>().ok()).unwrap_or(f64::NAN);
-    // A normal form in which there is a comma is quoted.
+    // A normal form that contains a comma is quoted.
     let error = |row: &str| {
         let end = if row.ends_with('"') { row.rfind(",\"") } else { row.rfind(',') };
         number(row[..end.unwrap_or(row.len())].rsplit(',').next())

@@ -5,8 +5,8 @@ use crate::tree::Text;
 use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
-/// Reports each relative link whose file or anchor does not exist, and each path of this repository that is mentioned and does
-/// not exist.
+/// Returns a message for each relative link whose file or anchor does not exist, and for each mentioned path of this
+/// repository that does not exist.
 pub fn broken(texts: &[Text]) -> Vec<String> {
     let pages: Vec<&Text> = texts.iter().filter(|text| text.is(&["md"])).collect();
     let anchors: HashMap<&str, HashSet<String>> =
@@ -34,7 +34,7 @@ pub fn broken(texts: &[Text]) -> Vec<String> {
     found
 }
 
-/// The reason why a target cannot be followed from a page, if there is one.
+/// Returns the reason why a target cannot be reached from a page, if any.
 fn fault(page: &str, target: &str, anchors: &HashMap<&str, HashSet<String>>) -> Option<&'static str> {
     let outside = ["http://", "https://", "mailto:"].iter().any(|scheme| target.starts_with(scheme));
     if outside {
@@ -49,7 +49,7 @@ fn fault(page: &str, target: &str, anchors: &HashMap<&str, HashSet<String>>) -> 
     (!known).then_some("the page has no such heading")
 }
 
-/// A path relative to the folder of a page, as a path from the root.
+/// Converts a path relative to the folder of a page to a path from the root.
 fn joined(page: &str, path: &str) -> String {
     let mut parts: Vec<&str> = page.split('/').collect();
     parts.pop();
@@ -63,7 +63,7 @@ fn joined(page: &str, path: &str) -> String {
     parts.join("/")
 }
 
-/// Anchors of a page: those of its headings as GitHub and mdBook form them, and explicit ones.
+/// Returns the anchors of a page: those of its headings, as GitHub and mdBook form them, and explicit ones.
 fn anchors(text: &str) -> HashSet<String> {
     let mut found = HashSet::new();
     let mut seen: HashMap<String, usize> = HashMap::new();
@@ -82,7 +82,7 @@ fn anchors(text: &str) -> HashSet<String> {
     found
 }
 
-/// The anchor of a heading: lower case, hyphens for spaces, no punctuation; of a link its text.
+/// Returns the anchor of a heading: lower case, hyphens for spaces, no punctuation, links replaced by their text.
 fn slug(title: &str) -> String {
     let mut plain = String::new();
     let mut rest = title;
@@ -95,7 +95,7 @@ fn slug(title: &str) -> String {
     kept.flat_map(char::to_lowercase).map(|c| if c == ' ' { '-' } else { c }).collect()
 }
 
-/// Targets of links and images of a page, and of its link definitions, each with its offset.
+/// Returns the targets of links, images and link definitions of a page, each with its offset.
 fn targets(text: &str) -> Vec<(usize, &str)> {
     let mut found = Vec::new();
     for (offset, line) in outside_fences(text) {
@@ -111,7 +111,7 @@ fn targets(text: &str) -> Vec<(usize, &str)> {
     found
 }
 
-/// Lines outside fenced code, each with its offset.
+/// Returns the lines outside fenced code, each with its offset.
 fn outside_fences(text: &str) -> impl Iterator<Item = (usize, &str)> {
     let (mut offset, mut fenced) = (0, false);
     text.split_inclusive('\n').filter_map(move |line| {
@@ -123,7 +123,7 @@ fn outside_fences(text: &str) -> impl Iterator<Item = (usize, &str)> {
     })
 }
 
-/// Paths that begin with `folder`, each with its offset.
+/// Returns the paths that begin with `folder`, each with its offset.
 fn mentions<'t>(text: &'t str, folder: &'t str) -> impl Iterator<Item = (usize, &'t str)> {
     let part = |c: char| c.is_ascii_alphanumeric() || ['_', '.', '/', '-'].contains(&c);
     text.match_indices(folder).filter_map(move |(at, _)| {
@@ -132,14 +132,14 @@ fn mentions<'t>(text: &'t str, folder: &'t str) -> impl Iterator<Item = (usize, 
         }
         let end = text[at..].find(|c| !part(c)).map_or(text.len(), |length| at + length);
         let path = text[at..end].trim_end_matches(['.', '/', '-']);
-        // A name in capitals stands for others, and so does a name that goes on with a bracket or an ellipsis.
+        // A name in capitals is a placeholder, and so is a name followed by a bracket or an ellipsis.
         let stands_for_others = path.split(['/', '.']).any(|name| name == "DATE" || name.contains("NN"))
             || text[end..].starts_with(['*', '<', '{', '…']);
         (!stands_for_others).then_some((at, path))
     })
 }
 
-/// Returns true if there is a file or folder of this path, or one whose name begins with it and a hyphen.
+/// True if a file or folder has this path, or a name that begins with it and a hyphen.
 fn exists(path: &str) -> bool {
     let place = root().join(path);
     if place.exists() {
@@ -154,7 +154,7 @@ fn exists(path: &str) -> bool {
     std::fs::read_dir(folder).into_iter().flatten().flatten().any(|entry| begins(&entry.path()))
 }
 
-/// Returns true if there is a file of this path relative to the page.
+/// True if a file exists at this path relative to the page.
 fn beside(page: &str, path: &str) -> bool {
     root().join(joined(page, path)).exists()
 }

@@ -1,4 +1,4 @@
-//! Development tasks: what continuous integration runs, and nothing else. `cargo xtask` lists them.
+//! Development tasks. `cargo xtask` lists them; continuous integration runs nothing else.
 
 mod environment;
 mod gallery;
@@ -78,8 +78,8 @@ fn check() -> bool {
         && words(false)
 }
 
-/// Checks spelling, links, phrasing, invariants of the source tree, and that address and version agree. With `all` it also lists
-/// phrases in files that have not been revised yet.
+/// Checks spelling, links, phrasing, invariants of the source tree, and that address and version agree. With `all`,
+/// also lists phrases in files that have not been revised yet.
 fn words(all: bool) -> bool {
     let texts = tree::texts();
     let phrases = phrases::hits(&texts);
@@ -95,7 +95,8 @@ fn words(all: bool) -> bool {
     spelling::right() && faults.is_empty()
 }
 
-/// Checks dependencies with cargo-deny, in the newest version that was tried. Building it without optimisation takes a third of the time.
+/// Checks dependencies with cargo-deny, in the newest version that was tested. It is built without optimisation, which
+/// takes a third of the time.
 fn deny() -> bool {
     const VERSION: &str = "0.20.2";
     let tools = root().join("target/tools");
@@ -117,7 +118,8 @@ fn deny() -> bool {
         passed &= run(Command::new(&program).args(["--log-level", "error", "check", "--allow", "warnings"]).args(what));
     };
     check(&["licenses", "bans", "sources"]);
-    // Advisories are kept in a repository; without a way to it there is nothing to compare with, and that is said.
+    // The advisory database is a remote repository. If it cannot be reached, a message says that advisories were not
+    // checked.
     match Command::new(&program).current_dir(root()).args(["--log-level", "off", "fetch", "db"]).output() {
         Ok(output) if output.status.success() => check(&["advisories"]),
         _ => eprintln!("advisories NOT checked: their database cannot be reached from here"),
@@ -129,7 +131,7 @@ fn docs() -> bool {
     run(Command::new(cargo_path()).args(["doc", "--workspace", "--no-deps"]).env("RUSTDOCFLAGS", "-D warnings"))
 }
 
-/// Returns true if docs/references.bib has every key that a line `**Source.**` cites.
+/// True if docs/references.bib has every key that a line `**Source.**` cites.
 fn references() -> bool {
     let root = root();
     let bibliography = std::fs::read_to_string(root.join("docs/references.bib")).unwrap_or_default();
@@ -174,19 +176,19 @@ fn bench(arguments: &[String]) -> bool {
     let build = ["build", "--release", "--quiet", "--package", "foldline-cli", "--package", "foldline-rotor"];
     let own = ["run", "--release", "--quiet", "--package", "foldline-bench", "--"];
     let arguments: Vec<&str> = own.into_iter().chain(arguments.iter().map(String::as_str)).collect();
-    // A selection of parts is for looking at; only the whole is a result.
+    // Only a complete run is published; a selection of parts is for inspection.
     let whole = !arguments.contains(&"--only") && !arguments.contains(&"--quick");
     let write: &[&str] = if whole { &["--write"] } else { &[] };
     cargo(&[&build[..], &["--bins", "--examples"]].concat()) && cargo(&[&arguments[..], write].concat())
 }
 
-/// Runs the campaign in a release build, with the options of that program.
+/// Runs the campaign in a release build; the options are those of `foldline-campaign`.
 fn campaign(arguments: &[String]) -> bool {
     let own = ["run", "--release", "--quiet", "--package", "foldline-campaign", "--"];
     cargo(&own.into_iter().chain(arguments.iter().map(String::as_str)).collect::<Vec<&str>>())
 }
 
-/// Runs the independent problems with a release build of the command.
+/// Runs the external problems with a release build of the command.
 fn outside(arguments: &[String]) -> bool {
     let binary = root().join("target/release/foldline");
     let binary = binary.to_string_lossy();
@@ -196,13 +198,14 @@ fn outside(arguments: &[String]) -> bool {
         && cargo(&own.into_iter().chain(with).collect::<Vec<&str>>())
 }
 
-/// Reproduces the reference publication from scratch. Fails if a figure fails, a branch ends short or a verdict has changed.
+/// Reproduces the reference publication from scratch. Fails if a figure fails, a branch ends short or a verdict has
+/// changed.
 fn reproduce(write: bool) -> bool {
     if !cargo(&["build", "--release", "--quiet", "--package", "foldline-cli"]) {
         return false;
     }
     let out = root().join("target/reproduced");
-    // The folder of an earlier call, if there is one.
+    // Removes the folder of an earlier call.
     let _ = std::fs::remove_dir_all(&out);
     let start = Instant::now();
     let program = root().join("target/release/foldline");
@@ -211,7 +214,7 @@ fn reproduce(write: bool) -> bool {
     made && verdicts(&out.join("verdicts.txt"), write)
 }
 
-/// Returns true if the verdicts equal the stored ones; with `write` stores them instead.
+/// True if the verdicts equal the stored ones. With `write`, stores them instead.
 fn verdicts(found: &Path, write: bool) -> bool {
     let known = root().join("crates/foldline-reproduce/verdicts.txt");
     if write {

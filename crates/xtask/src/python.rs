@@ -1,4 +1,4 @@
-//! `cargo xtask python`: the wheel of the Python package, and its tests in an environment that has nothing else.
+//! `cargo xtask python`: builds the wheel of the Python package and tests it in a separate environment.
 
 use crate::{root, run};
 use std::ffi::OsStr;
@@ -7,8 +7,8 @@ use std::process::Command;
 
 const REQUIREMENTS: &str = "python/tests/requirements.txt";
 
-/// Builds the wheel, installs it into a separate environment under target, and runs formatter, type checker and tests there.
-/// The environment is rebuilt when its requirements change.
+/// Builds the wheel, installs it into a separate environment under target, and runs formatter, type checker and tests
+/// there. The environment is rebuilt when its requirements change.
 pub fn test() -> bool {
     let Some((python, version)) = interpreter() else {
         eprintln!("the Python package NOT tested: there is no python3 of version 3.10 or later");
@@ -17,7 +17,7 @@ pub fn test() -> bool {
     let home = root().join("target/python");
     let Some(environment) = Environment::ready(&python, &version, &home) else { return false };
     let wheels = home.join("wheels");
-    // Those of an earlier call.
+    // Removes the wheels of an earlier call.
     let _ = std::fs::remove_dir_all(&wheels);
     let build = [OsStr::new("build"), "--quiet".as_ref(), "--out".as_ref(), wheels.as_ref()];
     environment.runs("maturin", build)
@@ -28,12 +28,12 @@ pub fn test() -> bool {
         && environment.runs("ruff", ["format", "--quiet", "--check", "python"].map(OsStr::new))
         && environment.runs("ruff", ["check", "--quiet", "python"].map(OsStr::new))
         && environment.runs("mypy", ["--no-error-summary", "python/foldline"].map(OsStr::new))
-        // In a wheel of its own, but it needs Node.js; where that is missing its wheel fetches it.
+        // pyright needs Node.js; if that is missing, the wheel of pyright downloads it.
         && environment.runs("pyright", ["--level", "error"].map(OsStr::new))
         && environment.runs("pytest", ["--quiet", "python/tests"].map(OsStr::new))
 }
 
-/// Name and version of the Python interpreter.
+/// Returns name and version of the Python interpreter.
 fn interpreter() -> Option<(String, String)> {
     let tried = std::env::var("PYTHON").into_iter().chain(["python3".to_string(), "python".to_string()]);
     tried.into_iter().find_map(|name| {
@@ -73,7 +73,7 @@ impl Environment {
         let paths = std::iter::once(self.programs.clone()).chain(std::env::split_paths(&found));
         let path = std::env::join_paths(paths).unwrap_or(found);
         let mut command = Command::new(self.programs.join(program));
-        // Another environment that is active here is not meant.
+        // Ignores another environment that is active here.
         for name in ["PYTHONPATH", "VIRTUAL_ENV", "CONDA_PREFIX"] {
             command.env_remove(name);
         }
@@ -81,7 +81,7 @@ impl Environment {
     }
 }
 
-/// Path of the only wheel in a folder.
+/// Returns the path of the only wheel in a folder.
 fn wheel(folder: &Path) -> Option<PathBuf> {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten().map(|entry| entry.path());
     entries.into_iter().find(|path| path.extension().is_some_and(|ending| ending == "whl"))

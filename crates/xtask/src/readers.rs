@@ -2,7 +2,7 @@
 
 use crate::environment;
 
-/// The newest versions that were tried. xarray brings numpy and pandas with it.
+/// Newest versions that were tested. xarray depends on numpy and pandas.
 const PACKAGES: [&str; 5] =
     ["xarray==2026.9.0", "netCDF4==1.7.5.1.post1", "h5netcdf==1.8.2", "h5py==3.16.0", "pyarrow==26.0.1"];
 

@@ -1,14 +1,14 @@
-//! Address and version of the project, each stated in several files that must agree.
+//! Agreement of the files that state address and version of the project.
 
 use crate::root;
 use crate::tree::{Text, texts};
 
-/// The file that defines the address of the repository, in the line that begins with [`KEY`].
+/// File that defines the address of the repository, in the line that begins with [`KEY`].
 const ADDRESS: &str = "pyproject.toml";
 
 const KEY: &str = "Repository = ";
 
-/// The address until there is one.
+/// Address used before the repository has one.
 const PLACEHOLDER: &str = "https://example.org/foldline";
 
 /// Files that state the address.
@@ -20,8 +20,8 @@ fn address() -> String {
     text.lines().find_map(|line| line.strip_prefix(KEY)).map_or("", |value| value.trim_matches('"')).to_string()
 }
 
-/// Reports files whose address is not that of pyproject.toml, and a version or date in CITATION.cff that is not that of the
-/// latest release in CHANGELOG.md.
+/// Returns messages on files whose address differs from that in pyproject.toml, and on a version or date in
+/// CITATION.cff that differs from that of the latest release in CHANGELOG.md.
 pub fn contradictions(texts: &[Text]) -> Vec<String> {
     let mut found = Vec::new();
     let address = address();
@@ -46,7 +46,7 @@ pub fn contradictions(texts: &[Text]) -> Vec<String> {
     found
 }
 
-/// Version and date of the first release in a changelog.
+/// Returns version and date of the first release in a changelog.
 fn latest(changelog: &str) -> Option<(String, String)> {
     changelog.lines().filter_map(|line| line.strip_prefix("## [")).find_map(|line| {
         let (version, date) = line.split_once("] - ")?;
@@ -54,7 +54,7 @@ fn latest(changelog: &str) -> Option<(String, String)> {
     })
 }
 
-/// Version and date in a citation file.
+/// Returns version and date in a citation file.
 fn cited(citation: &str) -> Option<(String, String)> {
     let field = |name: &str| {
         let value = citation.lines().find_map(|line| line.strip_prefix(name))?;

@@ -1,21 +1,22 @@
-//! The documentation site: Sphinx on the pages of the repository. Nothing is compiled for it.
+//! Documentation site, built by Sphinx from the pages of the repository. Nothing is compiled for it.
 
 use crate::{environment, root, run};
 use std::path::Path;
 use std::process::Command;
 
-/// The newest versions that were tried.
+/// Newest versions that were tested.
 const PACKAGES: [&str; 5] =
     ["furo==2025.12.19", "myst-nb==1.4.0", "myst-parser==5.2.0", "numpy>=1.24", "sphinx==9.0.4"];
 
-/// Builds the site into `target/site`. A warning is a failure. The documentation of the crates is copied there if it has been built.
+/// Builds the site in `target/site`; warnings are failures. The documentation of the crates is copied there if it has
+/// been built.
 pub fn build() -> bool {
     let Some(programs) = environment::ready("site", &PACKAGES) else {
         eprintln!("the site needs Python 3.11 or later and a package index");
         return false;
     };
     let html = root().join("target/site");
-    // Pages that no longer exist.
+    // Removes pages that no longer exist.
     let _ = std::fs::remove_dir_all(&html);
     let sphinx = ["-m", "sphinx", "--fail-on-warning", "--keep-going", "--quiet", "--conf-dir", "docs", "."];
     if !run(Command::new(programs.join("python")).args(sphinx).arg(&html)) {
@@ -31,7 +32,7 @@ pub fn build() -> bool {
     copied
 }
 
-/// Copies a folder with everything in it.
+/// Copies a folder with its contents.
 fn copy(from: &Path, to: &Path) -> std::io::Result<()> {
     std::fs::create_dir_all(to)?;
     for entry in std::fs::read_dir(from)? {

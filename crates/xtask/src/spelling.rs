@@ -1,13 +1,14 @@
-//! Spelling, by codespell with the settings in `.codespellrc`.
+//! Spelling check by codespell with the settings in `.codespellrc`.
 
 use crate::environment;
 use crate::root;
 use std::process::Command;
 
-/// The newest version that was tried.
+/// Newest version that was tested.
 const PACKAGE: [&str; 1] = ["codespell==2.4.3"];
 
-/// Checks the spelling of the repository. Without Python or a package index it says that spelling was not checked.
+/// Checks the spelling of the repository. Without Python or a package index, a message says that spelling was not
+/// checked.
 pub fn right() -> bool {
     let Some(programs) = environment::ready("codespell", &PACKAGE) else {
         eprintln!("spelling NOT checked: codespell cannot be installed here");

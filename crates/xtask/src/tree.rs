@@ -3,31 +3,31 @@
 use crate::root;
 use std::path::Path;
 
-/// A text file with its path from the root, with forward slashes.
+/// Text file with its path from the root, with forward slashes.
 pub struct Text {
     pub name: String,
     pub text: String,
 }
 
 impl Text {
-    /// Returns true if the name ends in one of the extensions.
+    /// True if the name ends in one of the extensions.
     pub fn is(&self, extensions: &[&str]) -> bool {
         self.name.rsplit_once('.').is_some_and(|(_, extension)| extensions.contains(&extension))
     }
 
-    /// Returns true if the file is one of the paths, lies in one of them, or starts with one of them.
+    /// True if the path of the file starts with one of the given paths.
     pub fn lies_in(&self, paths: &[&str]) -> bool {
         paths.iter().any(|path| self.name.starts_with(path))
     }
 
-    /// Name and line of the byte at `offset`.
+    /// Returns name and line of the byte at `offset`.
     pub fn place(&self, offset: usize) -> String {
         let line = self.text[..offset].bytes().filter(|&byte| byte == b'\n').count() + 1;
         format!("{}:{line}", self.name)
     }
 }
 
-/// Reads every text file that is written by hand, in the order of their names.
+/// Reads all handwritten text files, sorted by name.
 pub fn texts() -> Vec<Text> {
     let mut found = Vec::new();
     collect(&root(), "", &mut found);
@@ -43,7 +43,7 @@ fn collect(folder: &Path, prefix: &str, found: &mut Vec<Text>) {
         let name = format!("{prefix}{own}");
         let path = entry.path();
         if path.is_dir() {
-            // Build products, runs and caches.
+            // Skips build products, runs and caches.
             let skipped = ["target", "runs", "out"].contains(&name.as_str()) || own == "__pycache__";
             if !skipped && (own == ".github" || !own.starts_with('.')) {
                 collect(&path, &format!("{name}/"), found);

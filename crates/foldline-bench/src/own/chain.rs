@@ -1,11 +1,11 @@
-//! A chain of coupled van der Pol oscillators of any length.
+//! Chain of coupled van der Pol oscillators of any length.
 //!
 //! **Equations.** N oscillators, n = 2N states, free ends (x₀ = x₁, x_{N+1} = x_N):
 //!
 //!   (1)  x_i'' - μ (1 - x_i²) x_i' + (1 + δ i/N) x_i = c (x_{i+1} - 2 x_i + x_{i-1}),   i = 1…N
 //!
-//! The detuning δ keeps the oscillators from being copies of each other; the coupling c locks them to one frequency. The
-//! same equations stand in benches/auto/chain.f90.
+//! The detuning δ makes the oscillators different; the coupling c synchronises them. benches/auto/chain.f90 has the
+//! same equations.
 
 use crate::Outcome;
 use foldline::contract::Unobserved;
@@ -17,7 +17,7 @@ use foldline_store::model_file::parse_model;
 /// Values of μ, c, δ.
 pub const PARAMETERS: [(&str, f64); 3] = [("mu", 1.0), ("c", 0.5), ("delta", 0.1)];
 
-/// The chain as a model text.
+/// Returns the chain as a model text.
 fn text(oscillators: usize) -> String {
     let mut text = format!("name = \"chain of {oscillators}\"\n[parameters]\n");
     PARAMETERS.iter().for_each(|(name, value)| text.push_str(&format!("{name} = {value:?}\n")));
@@ -31,13 +31,13 @@ fn text(oscillators: usize) -> String {
     text
 }
 
-/// The chain with n states.
+/// Returns the chain with n states.
 pub fn model(states: usize) -> Outcome<Model> {
     parse_model(&text(states / 2), "chain.toml")
         .map_err(|found| found.iter().map(|d| d.to_string()).collect::<Vec<_>>().join("\n").into())
 }
 
-/// The plan of its branch in μ from 1 to `until`, at most `points` points.
+/// Returns the plan of its branch in μ from 1 to `until`, with at most `points` points.
 pub fn plan(model: &Model, until: f64, points: usize) -> Plan {
     let parameters = model.defaults();
     let state = (0..model.states.len()).map(|i| if i % 2 == 0 { 2.0 } else { 0.0 }).collect();
@@ -67,7 +67,7 @@ pub fn plan(model: &Model, until: f64, points: usize) -> Plan {
     }
 }
 
-/// The locked cycle at μ = 1.
+/// Returns the synchronised cycle at μ = 1.
 pub fn cycle(model: &Model, system: &System) -> Outcome<Point> {
     let diagram = explore::run(system, &plan(model, 2.0, 0), 1, Diagram::default(), &Unobserved);
     let branch = diagram.branches.first().ok_or("the chain has no branch")?;

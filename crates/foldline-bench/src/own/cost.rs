@@ -1,4 +1,4 @@
-//! Cost of Newton's method and of judging a point against the size of the problem.
+//! Cost of a Newton iteration and of the examination of a point as functions of the size of the problem.
 
 use super::chain;
 use crate::report::{Table, digits, time};
@@ -9,14 +9,14 @@ use foldline::diagram::{Branch, Point, Solution};
 use foldline::explore::System;
 use foldline::problem::mesh;
 
-/// Seconds for one Newton iteration (residual, Jacobian, factorisation, solution) and for the examination of a point
-/// (multipliers, error estimate, extremes), on a uniform mesh.
+/// Returns the times in seconds of one Newton iteration (residual, Jacobian, factorisation, solution) and of the
+/// examination of a point (multipliers, error estimate, extrema), on a uniform mesh.
 pub fn measured(system: &System, point: &Point, free: usize, intervals: usize) -> Outcome<(f64, f64)> {
     let (mut problem, mut u) = rotor::on_mesh(system, point, free, &mesh::uniform(intervals))?;
     let size = u.len();
     let (mut r, mut du, mut row) = (vec![0.0; size], vec![0.0; size], vec![0.0; size]);
     row[size - 1] = 1.0;
-    // Onto the cycle of this mesh first, where repeated iterations stay.
+    // Converges first to the cycle on this mesh, so that repeated iterations stay there.
     for _ in 0..4 {
         iterate(&mut problem, &mut u, &row, &mut r, &mut du)?;
     }
@@ -29,8 +29,8 @@ pub fn measured(system: &System, point: &Point, free: usize, intervals: usize) -
     Ok((newton, examination))
 }
 
-/// Seconds for the Newton iterations of a branch and nothing else: those with a new matrix and those with one that was kept, each
-/// timed at the points that were found, on their meshes.
+/// Returns the time in seconds of the Newton iterations of a branch alone. Iterations with a new matrix and those with
+/// a kept one are timed separately at each point on its mesh.
 pub fn newton_of(system: &System, branch: &Branch, free: usize) -> Outcome<f64> {
     let mut total = 0.0;
     for point in branch.points.iter().filter(|point| point.position != 0) {
@@ -56,7 +56,7 @@ pub fn newton_of(system: &System, branch: &Branch, free: usize) -> Outcome<f64> 
 fn iterate(problem: &mut dyn ZeroProblem, u: &mut [f64], row: &[f64], r: &mut [f64], du: &mut [f64]) -> Outcome<()> {
     let last = r.len() - 1;
     problem.residual(u, r);
-    // The parameter stays.
+    // Keeps the parameter fixed.
     r[last] = 0.0;
     problem.factorise(u, row).map_err(|_| "singular matrix")?;
     problem.solve(r, du);
@@ -64,7 +64,7 @@ fn iterate(problem: &mut dyn ZeroProblem, u: &mut [f64], row: &[f64], r: &mut [f
     Ok(())
 }
 
-/// The rotor on 50 to 3200 intervals.
+/// Measures the rotor on 50 to 3200 intervals.
 pub fn intervals(place: &Workplace) -> Outcome<String> {
     let study = rotor::study(place, rotor::SINGLE_LOOP)?;
     let system = System::of_plan(&study.model, &study.plan);
@@ -77,7 +77,7 @@ pub fn intervals(place: &Workplace) -> Outcome<String> {
         let (iteration, examination) = measured(&system, point, rotor::OMEGA, count)?;
         table.row(&[count.to_string(), time(iteration), time(iteration / count as f64), time(examination)]);
         newton.push(iteration);
-        // A point takes about three iterations and one examination.
+        // A point needs about three iterations and one examination.
         all.push(3.0 * iteration + examination);
     }
     let x = counts.map(|count| count as f64);
@@ -92,10 +92,10 @@ pub fn intervals(place: &Workplace) -> Outcome<String> {
     ))
 }
 
-/// Lengths of the chain.
+/// Numbers of states of the chain.
 pub const STATES: [usize; 5] = [4, 8, 16, 32, 64];
 
-/// The chain with 4 to 64 states on 100 intervals.
+/// Measures the chain with 4 to 64 states on 100 intervals.
 pub fn states(_place: &Workplace) -> Outcome<String> {
     let mut table = Table::new(&["states n", "Newton iteration", "over n³", "examination of a point"]);
     let (mut times, mut all) = (Vec::new(), Vec::new());

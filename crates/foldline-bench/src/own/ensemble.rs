@@ -1,4 +1,4 @@
-//! Many trajectories at once against a plain loop over them.
+//! Integration of many trajectories at once compared with a plain loop over them.
 
 use crate::Outcome;
 use crate::clock;
@@ -6,11 +6,12 @@ use crate::report::{Table, digits, time};
 use crate::workplace::Workplace;
 use std::process::Command;
 
-/// How many trajectories, for how long, at which tolerance.
+/// Number of trajectories, final time, tolerance.
 const CASE: [&str; 3] = ["256", "100", "1e-6"];
 
-/// Seconds (of wall time, the best of five runs), steps and median error of the ensemble with the model's text and with the field in Rust, of the scalar loop, and of the loop over lanes that
-/// is the limit.
+/// Returns wall time in seconds (the best of five runs), number of steps and median error of four programs: the
+/// ensemble with the model text, the ensemble with the field in Rust, the scalar loop, and the loop over lanes that is
+/// the limit.
 pub fn measured(place: &Workplace, case: [&str; 3]) -> Outcome<[[f64; 3]; 4]> {
     let program = place.root.join("target/release/examples/ensemble");
     let out = Command::new(&program).args(case).current_dir(&place.root).output();
@@ -24,9 +25,9 @@ pub fn measured(place: &Workplace, case: [&str; 3]) -> Outcome<[[f64; 3]; 4]> {
     Ok([line("text ")?, line("rust ")?, line("scalar ")?, line("lanes ")?])
 }
 
-/// Repeats the comparison.
+/// Repeats the comparison and reports medians.
 pub fn alone(place: &Workplace) -> Outcome<String> {
-    // Text, Rust and lanes against the plain loop.
+    // Ratios of the plain loop to text, Rust and lanes.
     let mut ratios = [const { Vec::new() }; 3];
     let mut rows = [const { Vec::new() }; 4];
     for _ in 0..place.repetitions() {

@@ -1,4 +1,4 @@
-//! The whole of figure 7, and its branch that is compared with others most often.
+//! Figure 7 as a whole, and the single loop of the cubic rotor.
 
 use crate::report::{Table, digits, time};
 use crate::workplace::Workplace;
@@ -12,7 +12,7 @@ use std::hint::black_box;
 use std::path::Path;
 use std::process::Command;
 
-/// Time, instructions, memory and work of the study on one thread.
+/// Measures time, instructions, memory and work of the study on one thread.
 pub fn whole(place: &Workplace) -> Outcome<String> {
     let out = place.scratch("figure7")?;
     let study = place.study(rotor::FIGURE_7);
@@ -28,7 +28,7 @@ pub fn whole(place: &Workplace) -> Outcome<String> {
     let (cpu, wall, memory) = (all(|u| u.cpu), all(|u| u.wall), all(|u| u.memory));
     let diagram = run_file::load(&out.join("0"))?.diagram;
 
-    // Its parts by themselves, in this process.
+    // The parts alone, in this process.
     let study = rotor::study(place, rotor::FIGURE_7)?;
     let starts = rotor::beginnings(&study);
     let again = || 0..place.repetitions().min(5);
@@ -55,8 +55,9 @@ pub fn whole(place: &Workplace) -> Outcome<String> {
     Ok(format!("{}\n{special} special points.\n\n{}", table.text(), work(&diagram)))
 }
 
-/// Processor time of what every cycle of a diagram cannot do without, by itself: as many residuals, factorisations and solutions as its counters
-/// say, on its own mesh (some were on finer ones), and one examination.
+/// Returns the processor times in seconds of the indispensable work for every cycle of a diagram: the residuals,
+/// factorisations and solutions that its counters state, on its own mesh (some were on finer ones), and one
+/// examination.
 fn repeated(study: &Study, diagram: &Diagram) -> Outcome<[f64; 2]> {
     let system = System::of_plan(&study.model, &study.plan);
     let mut total = [0.0; 2];
@@ -67,7 +68,7 @@ fn repeated(study: &Study, diagram: &Diagram) -> Outcome<[f64; 2]> {
         row[u.len() - 1] = 1.0;
         total[0] += clock::timed(|| {
             for _ in 0..point.cost.factorisations {
-                // Next to a fold the matrix of that row is singular, which takes as long.
+                // Near a fold the matrix with this row is nearly singular, but its factorisation takes as long.
                 let _ = black_box(problem.factorise(&u, &row));
             }
             for _ in 0..point.cost.newton {
@@ -76,7 +77,7 @@ fn repeated(study: &Study, diagram: &Diagram) -> Outcome<[f64; 2]> {
             }
         })
         .0;
-        // A first point has no counters of its own.
+        // A first point has no counters, so its matrix may not have been factorised yet.
         let _ = problem.factorise(&u, &row);
         total[1] += clock::timed(|| {
             let found = problem.examine(&u);
@@ -87,7 +88,7 @@ fn repeated(study: &Study, diagram: &Diagram) -> Outcome<[f64; 2]> {
     Ok(total)
 }
 
-/// The counters of every branch.
+/// Returns a table of the counters of every branch.
 pub fn work(diagram: &Diagram) -> String {
     let mut table = Table::new(&["branch", "points", "special", "Newton iterations", "factorisations", "rejected"]);
     let mut total = [0; 5];
@@ -105,7 +106,7 @@ fn row_of(name: &str, counts: &[usize]) -> Vec<String> {
     std::iter::once(name.to_string()).chain(counts.iter().map(usize::to_string)).collect()
 }
 
-/// Instructions of the whole run under callgrind.
+/// Counts the instructions of the whole run with callgrind.
 fn instructions(place: &Workplace, out: &Path) -> Outcome<String> {
     if place.quick {
         return Ok("not counted".into());
@@ -129,7 +130,7 @@ fn instructions(place: &Workplace, out: &Path) -> Outcome<String> {
     }
 }
 
-/// The single loop of the cubic rotor between Ω = 5 and 10, from a given first cycle.
+/// Measures the single loop of the cubic rotor between Ω = 5 and 10, from a given first cycle.
 pub fn single_loop(place: &Workplace) -> Outcome<String> {
     let study = rotor::study(place, rotor::SINGLE_LOOP)?;
     let starts = rotor::beginnings(&study);

@@ -1,10 +1,10 @@
-//! What needs no foreign code.
+//! Benchmarks that need no other program.
 //!
 //! | part | file |
 //! |---|---|
-//! | the whole of figure 7, and one branch of it | [`figure7`] |
+//! | figure 7 as a whole, and the single loop | [`figure7`] |
 //! | parts of an iteration | [`parts`] |
-//! | cost of an iteration against the size of the problem | [`cost`], [`chain`] |
+//! | cost of an iteration as a function of the size of the problem | [`cost`], [`chain`] |
 //! | two threads, ensembles, memory of a long branch, start-up | [`threads`], [`ensemble`], [`stream`], [`startup`] |
 
 pub mod chain;
@@ -18,7 +18,7 @@ mod threads;
 
 use crate::workplace::Part;
 
-/// The parts, in the order of the report.
+/// Parts in the order of the report.
 pub const PARTS: [(&str, Part); 9] = [
     ("Figure 7", figure7::whole),
     ("Cubic single loop from 5 to 10", figure7::single_loop),

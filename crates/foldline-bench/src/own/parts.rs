@@ -1,4 +1,4 @@
-//! Where the linear algebra of a Newton iteration goes: its parts one by one, on a system of the shape of the rotor's.
+//! Times of the parts of the linear algebra in a Newton iteration, on a system of the shape of the rotor's.
 
 use crate::report::{Table, digits, time};
 use crate::workplace::Workplace;
@@ -12,10 +12,10 @@ const DEGREE: usize = 4;
 const SCALARS: usize = 2;
 const INTERVALS: usize = 100;
 
-/// Which rates depend on which states: two positions, their velocities, and accelerations that depend on everything.
+/// Pattern of the Jacobian: two positions with their velocities, and accelerations that depend on all states.
 const COUPLED: [u8; STATES * STATES] = [0, 0, 1, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1, 1];
 
-/// The parts.
+/// Measures the parts.
 pub fn timed(_place: &Workplace) -> Outcome<String> {
     let (mut system, rhs) = filled();
     let (interior, coupling) = (system.interior.clone(), system.coupling.clone());
@@ -63,10 +63,12 @@ pub fn timed(_place: &Workplace) -> Outcome<String> {
     ))
 }
 
-/// Sums and products for one block: the two positions have the identity as their own block.
+/// Returns the number of additions and multiplications for one block. The diagonal blocks of the two positions are
+/// identities.
 fn operations_of_a_block() -> f64 {
     let (m, scalars) = (DEGREE as f64, SCALARS as f64);
-    // Each position from both velocities, with its velocity's column, its left end and the scalars; then the dense rest.
+    // Elimination of each position from both velocities, with the columns of its velocity, its left end and the
+    // scalars; then the dense remainder.
     let positions = 2.0 * 2.0 * m * m * (m + 1.0 + scalars) * 2.0;
     let rest = 2.0 * m;
     let right = STATES as f64 + scalars;
@@ -76,10 +78,10 @@ fn operations_of_a_block() -> f64 {
 }
 
 const ROUNDS: usize = 2000;
-/// Sixteen registers hold so many chains and what they are multiplied with.
+/// Number of chains; with their operands they fit into sixteen registers.
 const CHAINS: usize = 12;
 
-/// What the processor can do: products and sums a second, in chains that do not wait for each other.
+/// Returns the peak rate of multiplications and additions per second, in independent chains.
 fn peak<const FUSED: bool>() -> f64 {
     let arch = pulp::Arch::new();
     let lanes = arch.dispatch(Peak::<false>(0)).1;
@@ -89,7 +91,8 @@ fn peak<const FUSED: bool>() -> f64 {
     (2 * ROUNDS * CHAINS * lanes) as f64 / seconds
 }
 
-/// So many rounds; gives a sum, so that nothing is left out, and the lanes of a vector.
+/// Loop with the given number of rounds. Returns a sum, so that the compiler cannot remove the loop, and the number of
+/// lanes of a vector.
 struct Peak<const FUSED: bool>(usize);
 
 impl<const FUSED: bool> pulp::WithSimd for Peak<FUSED> {
@@ -108,7 +111,7 @@ impl<const FUSED: bool> pulp::WithSimd for Peak<FUSED> {
     }
 }
 
-/// A system like that of collocation in Runge–Kutta form: the identity and something small.
+/// Returns a system like that of collocation in Runge–Kutta form: the identity plus small entries.
 fn filled() -> (Condensed<Eight>, Vec<f64>) {
     let mut system = Condensed::<Eight>::new(STATES, &[1.0, 0.2, 0.3, 0.3, 0.2], SCALARS);
     system.couple(&COUPLED.map(|x| x == 1));

@@ -1,10 +1,10 @@
-//! How long a question about a finished run takes.
+//! Response time of a query on a finished run.
 
 use crate::report::{Table, time};
 use crate::workplace::Workplace;
 use crate::{Outcome, child, clock, rotor};
 
-/// `foldline table` on the run of figure 7.
+/// Measures `foldline table` on the run of figure 7.
 pub fn table(place: &Workplace) -> Outcome<String> {
     let out = place.scratch("startup")?;
     let folder = out.join("run").to_string_lossy().into_owned();

@@ -1,10 +1,10 @@
-//! Memory of a branch of 100,000 points that goes to its run file.
+//! Memory used by a branch of 100,000 points written to a run file.
 
 use crate::report::{Table, digits, time};
 use crate::workplace::Workplace;
 use crate::{Outcome, child};
 
-/// The same branch with 1,000, 10,000 and 100,000 points.
+/// Measures one branch with 1,000, 10,000 and 100,000 points.
 pub fn long_branch(place: &Workplace) -> Outcome<String> {
     let out = place.scratch("stream")?;
     let mut table = Table::new(&["points", "largest resident memory", "processor time", "run file"]);
@@ -20,7 +20,7 @@ pub fn long_branch(place: &Workplace) -> Outcome<String> {
         std::fs::write(&study, own.replace("../../models/stuart-landau.toml", &model.to_string_lossy()))?;
         let folder = out.join(points.to_string());
         let arguments = ["run", &study.to_string_lossy(), "--jobs", "1", "--out", &folder.to_string_lossy()];
-        // It ends at the limit of points: exit code 3.
+        // The branch ends at the limit on points: exit code 3.
         let (usage, _) = child::run(&place.foldline(), &arguments, &place.root, &[3])?;
         let size = std::fs::metadata(folder.join("run.sqlite"))?.len() as f64 * 1e-6;
         table.row(&[

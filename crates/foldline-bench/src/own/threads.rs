@@ -1,13 +1,13 @@
-//! Two threads against one.
+//! Speed-up by two threads.
 
 use crate::report::{Table, digits, time};
 use crate::workplace::Workplace;
 use crate::{Outcome, child, clock, rotor};
 
-/// Eighteen branches, curves of special points among them.
+/// Study with eighteen branches, including curves in two parameters.
 const FLOWS: &str = "studies/akay2022/flows.toml";
 
-/// Two studies with one and with two jobs in turn.
+/// Measures two studies with one and with two jobs.
 pub fn two(place: &Workplace) -> Outcome<String> {
     let head = ["study", "jobs", "wall time, best", "wall time, median", "processor time, median"];
     let (mut table, mut gains) = (Table::new(&head), Vec::new());
@@ -36,7 +36,7 @@ pub fn two(place: &Workplace) -> Outcome<String> {
     ))
 }
 
-/// A study with one job and with two, as often as the benchmark repeats.
+/// Runs a study with one job and with two jobs alternately, for the number of repetitions of the benchmark.
 fn in_turn(place: &Workplace, study: &str) -> Outcome<[Vec<child::Usage>; 2]> {
     let out = place.scratch("threads")?;
     let path = place.study(study);

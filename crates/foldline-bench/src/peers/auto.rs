@@ -1,8 +1,8 @@
-//! AUTO-07p as Debian packages it: installed, compiled with our equations, run.
+//! Debian's AUTO-07p: installation, compilation with our equations, runs.
 //!
-//! **Idea.** The Python interface of AUTO only prepares files for a compiled program. That program is run directly, so that
-//! nothing but its Fortran is measured: `fort.2` has the constants, `start.dat` or `fort.3` the start, `fort.7` to `fort.9`
-//! the results.
+//! **Idea.** The Python interface of AUTO only prepares files for a compiled program. That program is run directly, so
+//! that only its Fortran code is measured: `fort.2` contains the constants, `start.dat` or `fort.3` the start, `fort.7`
+//! to `fort.9` the results.
 
 use super::auto_files::{Row, constants, iterations, rows};
 use crate::workplace::Workplace;
@@ -10,30 +10,30 @@ use crate::{Outcome, child};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Where Debian puts the compiled parts of AUTO.
+/// Folder of the compiled parts of AUTO in Debian.
 const LIBRARY: &str = "/usr/lib/auto-07p/lib";
-/// Flags of the equations and of the link; AUTO's own parts were compiled by Debian with -O2.
+/// Flags for compiling the equations and for linking. Debian compiled AUTO's own parts with -O2.
 const FLAGS: [&str; 2] = ["-O3", "-march=native"];
 
-/// A compiled problem and the folder in which it runs.
+/// Compiled problem and the folder in which it runs.
 pub struct Auto {
     folder: PathBuf,
     program: PathBuf,
     template: String,
 }
 
-/// What a run gave.
+/// Result of a run.
 pub struct Answer {
-    /// Processor seconds, start of the process and output included.
+    /// Processor time in seconds, including start-up and output.
     pub cpu: f64,
     /// Points of all branches.
     pub rows: Vec<Row>,
-    /// Newton iterations, where IID = 2 asked for them.
+    /// Number of Newton iterations, if printed with IID = 2.
     pub iterations: usize,
 }
 
 impl Auto {
-    /// Installs AUTO where it is missing, and compiles the equations `name` of benches/auto.
+    /// Installs AUTO if it is missing, and compiles the equations `name` of benches/auto.
     pub fn new(place: &Workplace, name: &str, folder: &str) -> Outcome<Auto> {
         install()?;
         let folder = place.scratch(folder)?;
@@ -57,7 +57,7 @@ impl Auto {
         Ok(Auto { folder, program, template })
     }
 
-    /// Which AUTO it is, and how it was compiled.
+    /// Returns the version of AUTO and how it was compiled.
     pub fn version() -> String {
         let first = |program: &str, arguments: &[&str]| {
             let out = Command::new(program).args(arguments).output();
@@ -72,17 +72,17 @@ impl Auto {
         )
     }
 
-    /// The file from which a first profile is read.
+    /// Returns the path of the file from which the first profile is read.
     pub fn start(&self) -> PathBuf {
         self.folder.join("start.dat")
     }
 
-    /// The solutions of the last run.
+    /// Reads the solutions of the last run.
     pub fn solutions(&self) -> Outcome<String> {
         Ok(std::fs::read_to_string(self.folder.join("fort.8"))?)
     }
 
-    /// Runs with constants that differ from benches/auto/c.rotor as stated.
+    /// Runs with the constants of benches/auto/c.rotor and the given changes.
     pub fn run(&self, changes: &[(&str, &str)]) -> Outcome<Answer> {
         std::fs::write(self.folder.join("fort.2"), constants(&self.template, changes)?)?;
         for old in ["fort.7", "fort.8", "fort.9"].map(|name| self.folder.join(name)).iter().filter(|f| f.exists()) {
@@ -93,7 +93,7 @@ impl Auto {
         Ok(Answer { cpu: usage.cpu, rows: rows(&read("fort.7")), iterations: iterations(&read("fort.9")) })
     }
 
-    /// The same from the solution with a label in the text of a `fort.8`.
+    /// Runs from a labelled solution in the text of a `fort.8`.
     pub fn run_from(&self, solutions: &str, label: usize, changes: &[(&str, &str)]) -> Outcome<Answer> {
         std::fs::write(self.folder.join("fort.3"), solutions)?;
         let label = label.to_string();
@@ -101,14 +101,14 @@ impl Auto {
     }
 }
 
-/// Installs what is missing, or says how.
+/// Installs what is missing, or reports how to install it.
 fn install() -> Outcome<()> {
     let there = || Path::new(LIBRARY).exists() && Command::new("gfortran").arg("--version").output().is_ok();
     if there() {
         return Ok(());
     }
     eprintln!("apt-get install auto-07p gfortran");
-    // Whether it worked is seen by what is there afterwards.
+    // Success is judged by the files that exist afterwards.
     let _ = Command::new("apt-get").args(["install", "-y", "auto-07p", "gfortran"]).output();
     if there() { Ok(()) } else { Err("AUTO-07p is missing: on Debian, `apt-get install auto-07p gfortran`".into()) }
 }

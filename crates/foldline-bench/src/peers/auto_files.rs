@@ -1,25 +1,25 @@
-//! The files of AUTO-07p: constants in, points and solutions out.
+//! Files of AUTO-07p: constants are written, points and solutions read.
 
 use crate::Outcome;
 use foldline::diagram::{Cycle, Solution};
 use foldline::problem::gauss::Scheme;
 use std::path::Path;
 
-/// A point of `fort.7`.
+/// Point in `fort.7`.
 #[derive(Clone, Copy, Debug)]
 pub struct Row {
-    /// 5 fold, 6 branch point, 7 period doubling, 8 torus, -4 user's value, 9 end, -9 no convergence; 1 to 3 fold, branch
-    /// point and Hopf of equilibria; 0 regular.
+    /// Solution type: 5 fold, 6 branch point, 7 period doubling, 8 torus, -4 user value, 9 end, -9 no convergence; for
+    /// equilibria 1 branch point, 2 fold, 3 Hopf; 0 regular.
     pub kind: i64,
-    /// Label of its solution in `fort.8`, or 0.
+    /// Label of the solution in `fort.8`, or 0.
     pub label: usize,
-    /// The continuation parameter.
+    /// Continuation parameter.
     pub parameter: f64,
-    /// The last column: the period of a cycle.
+    /// Last column: the period of a cycle.
     pub period: f64,
 }
 
-/// The template with some values replaced. Every name must occur in it.
+/// Returns the template with some values replaced. Every name must occur in it.
 pub fn constants(template: &str, changes: &[(&str, &str)]) -> Outcome<String> {
     let name_of = |line: &str| line.split_once('=').map(|(name, _)| name.trim().to_string());
     for (name, _) in changes {
@@ -34,12 +34,12 @@ pub fn constants(template: &str, changes: &[(&str, &str)]) -> Outcome<String> {
     Ok(template.lines().filter(|line| !line.starts_with('#')).map(line).collect())
 }
 
-/// The points of a `fort.7`.
+/// Reads the points of a `fort.7`.
 pub fn rows(text: &str) -> Vec<Row> {
     let row = |line: &str| {
         let words: Vec<&str> = line.split_whitespace().collect();
         let whole = |k: usize| words.get(k).and_then(|word| word.parse::<i64>().ok());
-        // Heads of columns have no number of a branch.
+        // Lines with column headings have branch number 0.
         whole(0).filter(|branch| *branch != 0)?;
         Some(Row {
             kind: match whole(2)? {
@@ -54,7 +54,8 @@ pub fn rows(text: &str) -> Vec<Row> {
     text.lines().filter_map(row).collect()
 }
 
-/// Newton iterations in a `fort.9` written with IID = 2: lines with branch, point, iteration (from 0), parameter and norm.
+/// Counts the Newton iterations in a `fort.9` written with IID = 2: lines with branch, point, iteration (from 0),
+/// parameter and norm.
 pub fn iterations(text: &str) -> usize {
     let is_iteration = |line: &&str| {
         let words: Vec<&str> = line.split_whitespace().collect();
@@ -66,7 +67,7 @@ pub fn iterations(text: &str) -> usize {
     text.lines().filter(is_iteration).count()
 }
 
-/// Numbers such as 5.0E+00 or, with three digits of exponent and no letter, 1.0-101.
+/// Reads a number such as 5.0E+00 or, with a three-digit exponent and no letter, 1.0-101.
 fn number(word: &str) -> Option<f64> {
     word.parse().ok().or_else(|| {
         let sign = word.rfind(['+', '-']).filter(|at| *at > 0)?;
@@ -74,7 +75,7 @@ fn number(word: &str) -> Option<f64> {
     })
 }
 
-/// The labelled solutions of a `fort.8`: label, value of the first parameter, solution. Equilibria are left out.
+/// Reads the labelled cycles of a `fort.8`: label, value of the first parameter, solution. Equilibria are left out.
 pub fn cycles(text: &str) -> Vec<(usize, f64, Solution)> {
     let lines: Vec<&str> = text.lines().collect();
     let (mut found, mut at) = (Vec::new(), 0);
@@ -92,7 +93,7 @@ pub fn cycles(text: &str) -> Vec<(usize, f64, Solution)> {
         let n = width - 1;
         let values = numbers.len().checked_sub(parameters).map(|first| &numbers[first..]);
         let (Some(values), true) = (values, nodes == intervals * degree + 1 && nodes > 1) else { continue };
-        // After the nodes come indices and directions of the free parameters and the direction of every node.
+        // The nodes are followed by indices and directions of the free parameters and the direction at every node.
         if numbers.len() == nodes * width + 2 * free + nodes * n + parameters {
             found.push((label, values[0], Solution::Cycle(cycle(&numbers, n, intervals, degree, values[10]))));
         }
@@ -100,7 +101,7 @@ pub fn cycles(text: &str) -> Vec<(usize, f64, Solution)> {
     found
 }
 
-/// Polynomials through equally spaced nodes as polynomials through Gauss points.
+/// Converts polynomials through equally spaced nodes to polynomials through Gauss points.
 fn cycle(numbers: &[f64], n: usize, intervals: usize, degree: usize, period: f64) -> Cycle {
     let row = |node: usize| &numbers[node * (n + 1)..(node + 1) * (n + 1)];
     let mesh: Vec<f64> = (0..=intervals).map(|j| row(j * degree)[0]).collect();
@@ -118,7 +119,7 @@ fn cycle(numbers: &[f64], n: usize, intervals: usize, degree: usize, period: f64
     Cycle { period, forcing_periods: 0, mesh: mesh.into(), degree, profile, gain: Vec::new() }
 }
 
-/// Writes a cycle as the file from which AUTO reads a first profile: time and states, both ends included.
+/// Writes the file from which AUTO reads the first profile: times and states of a cycle, including both ends.
 pub fn write_start(cycle: &Cycle, file: &Path) -> Outcome<()> {
     let (n, nodes) = (cycle.dim(), Scheme::new(cycle.degree).nodes);
     let mut text = String::new();

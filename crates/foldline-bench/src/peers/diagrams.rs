@@ -1,12 +1,12 @@
-//! Target: all of figure 7.
+//! Comparison with AUTO-07p on all of figure 7.
 //!
-//! **Idea.** AUTO follows the branches that foldline follows, from the same first solutions: to both sides, or once round
-//! where the branch is closed, and from period doublings to the doubled branches and those doubled again. What has to be
-//! known for that, such as after how many points a closed branch has come round, it is told for nothing: a first run finds
-//! it out and only a second one is timed. Several meshes, largest steps and tolerances of special points are tried; what counts is the
-//! setting at which most special points are found, the fastest if there are several, and that at which most are found as accurately as
-//! foldline finds them. Then every branch gets the setting that suits it by itself. Both codes are measured against a run of foldline at
-//! a tolerance a thousand times smaller.
+//! **Idea.** AUTO continues the branches that foldline continues, from the same first solutions: to both sides, or once
+//! around a closed branch, and through two levels of period doubling. Information that AUTO needs for this, such as the
+//! number of points after which a closed branch returns, is free: a first run provides it, and only a second run is
+//! timed. Several meshes, largest steps and tolerances of special points are tried. Reported are the setting that finds
+//! most special points, the fastest if there are several, and the setting that finds most of them as accurately as
+//! foldline. Then each branch gets its own best setting. Both codes are compared with a run of foldline at a tolerance
+//! a thousand times smaller.
 
 use super::auto::Auto;
 use super::auto_files::{Row, write_start};
@@ -27,18 +27,18 @@ const STEPS: [(&str, &str); 7] = [
     ("1", "1e-5"),
     ("1", "1e-8"),
 ];
-/// Length of a branch of cycles, in the largest of the usual steps, after which AUTO has surely been round or never will be …
+/// Limit on the length of a branch of cycles; by then AUTO has returned to the start or never will.
 const FAR: f64 = 50.0;
-/// … and of one of equilibria, which reaches large amplitudes …
+/// Limit on the length of a branch of equilibria, which reaches large amplitudes.
 const FARTHER: f64 = 400.0;
-/// … and points that are enough where steps are long.
+/// Smallest limit on the number of points, for long steps.
 const LEAST: usize = 2500;
 
-/// The largest tolerance that a study may have: what it finds is compared with what AUTO finds too.
+/// Largest tolerance of a study; its results are compared with those of AUTO too.
 const LOOSE: f64 = 1e-4;
-/// The tolerance of what both are compared with.
+/// Tolerance of the reference run.
 const EXACT: f64 = 1e-9;
-/// Seconds from which on a setting is not repeated so often.
+/// Time in seconds above which a setting is repeated less often.
 const LONG: f64 = 20.0;
 
 /// NTST, DSMAX and EPSS.
@@ -62,19 +62,19 @@ impl std::fmt::Display for Setting {
     }
 }
 
-/// Everything that AUTO does at one setting.
+/// All runs of AUTO at one setting.
 struct Tour<'t> {
     auto: &'t Auto,
     setting: Setting,
     cpu: f64,
     points: usize,
-    /// Name of the branch of the plan, and a special point found from there.
+    /// Special points, each with the name of the branch of the plan from which it was found.
     special: Vec<(String, Row)>,
-    /// Of each branch of the plan, with what grows from it, the seconds.
+    /// Time in seconds of each branch of the plan, including its child branches.
     parts: Vec<(String, f64)>,
 }
 
-/// One run of AUTO: its constants, and where it starts.
+/// Run of AUTO: its constants and its start.
 struct Run<'r> {
     changes: Vec<(&'r str, String)>,
     from: Option<(&'r str, usize)>,
@@ -88,7 +88,7 @@ impl Run<'_> {
 }
 
 impl Tour<'_> {
-    /// Runs without counting the time.
+    /// Runs AUTO without adding to the totals.
     fn tried(&self, run: &Run) -> Outcome<(f64, Vec<Row>)> {
         let changes: Vec<(&str, &str)> = run.changes.iter().map(|(name, value)| (*name, value.as_str())).collect();
         let answer = match run.from {
@@ -98,7 +98,7 @@ impl Tour<'_> {
         Ok((answer.cpu, answer.rows))
     }
 
-    /// Runs and counts.
+    /// Runs AUTO and adds time, points and special points to the totals.
     fn counted(&mut self, name: &str, run: &Run) -> Outcome<Vec<Row>> {
         let (cpu, rows) = self.tried(run)?;
         self.cpu += cpu;
@@ -107,7 +107,7 @@ impl Tour<'_> {
         Ok(rows)
     }
 
-    /// Points after which a branch is given up.
+    /// Returns the limit on the number of points for a branch of the given length.
     fn limit(&self, length: f64) -> usize {
         let step: f64 = self.setting.step.parse().unwrap_or(1.0);
         ((length / step) as usize).max(LEAST)
@@ -123,7 +123,7 @@ impl Tour<'_> {
         ]
     }
 
-    /// A branch of the plan and what grows from it.
+    /// Continues a branch of the plan and its child branches.
     fn branch(&mut self, branch: &Branch) -> Outcome<()> {
         let start = rotor::first(branch)?;
         let [omega, kappa] = [start.parameters[0], start.parameters[1]];
@@ -150,7 +150,7 @@ impl Tour<'_> {
                 Some(period) => lap(&self.tried(&run)?.1, start.parameters[0], period),
                 None => None,
             };
-            // Counted once more, up to where it came round.
+            // Timed in a second run, up to the point at which the branch closed.
             let run = match lap {
                 Some(points) => run.with(&[("NMX", points.to_string())]),
                 None => run,
@@ -167,17 +167,17 @@ impl Tour<'_> {
         Ok(())
     }
 
-    /// The branches that begin at period doublings, to that depth.
+    /// Continues the branches that begin at period doublings, down to the given depth.
     fn doubled(&mut self, name: &str, solutions: &str, rows: &[Row], depth: usize) -> Outcome<()> {
         let mut ends: Vec<f64> = Vec::new();
         for row in rows.iter().filter(|row| kind_of(row) == Some(Kind::PeriodDoubling) && row.label > 0) {
-            // The other end of a branch followed before.
+            // Skips the other end of a branch continued before.
             if ends.iter().any(|end| (end - row.parameter).abs() < 1e-2) {
                 continue;
             }
             let mut changes = self.common();
-            // Twice as long a cycle, twice as many intervals. The branch ends where it meets its parent again. Parameters that are
-            // given would replace those of the solution.
+            // The period doubles, and so does the number of intervals. The branch ends where it meets its parent again.
+            // PAR is empty, because given parameters would replace those of the solution.
             changes.extend([
                 ("PAR", "{}".into()),
                 ("ISW", "-1".into()),
@@ -196,7 +196,7 @@ impl Tour<'_> {
     }
 }
 
-/// After how many points a closed branch has come round to where it started.
+/// Returns the number of points after which a closed branch has returned to its start.
 fn lap(rows: &[Row], start: f64, period: f64) -> Option<usize> {
     let rising = rows.get(1)?.parameter > start;
     let home = |pair: &[Row]| {
@@ -206,7 +206,7 @@ fn lap(rows: &[Row], start: f64, period: f64) -> Option<usize> {
     rows.windows(2).skip(5).position(home).map(|at| at + 7)
 }
 
-/// The kind of special point that a row is.
+/// Returns the kind of special point of a row.
 fn kind_of(row: &Row) -> Option<Kind> {
     match row.kind {
         2 | 5 => Some(Kind::Fold),
@@ -217,7 +217,7 @@ fn kind_of(row: &Row) -> Option<Kind> {
     }
 }
 
-/// Where a special point is, as a row of AUTO.
+/// Converts a special point to a row of AUTO.
 fn row_of(kind: Kind, point: &Point) -> Option<Row> {
     let codes = [(Kind::Fold, 5), (Kind::Hopf, 3), (Kind::PeriodDoubling, 7), (Kind::Torus, 8)];
     let (_, code) = codes.into_iter().find(|(known, _)| *known == kind)?;
@@ -225,7 +225,7 @@ fn row_of(kind: Kind, point: &Point) -> Option<Row> {
     Some(Row { kind: code, label: 0, parameter: point.parameters[rotor::OMEGA], period })
 }
 
-/// The special points of a diagram, each with the name of the branch of the plan from which it was found.
+/// Returns the special points of a diagram, each with the name of the branch of the plan from which it was found.
 fn special_of(diagram: &Diagram) -> Vec<(String, Row)> {
     let of = |branch: &Branch| {
         let root = branch.name.split('/').next().unwrap_or("").to_string();
@@ -235,22 +235,22 @@ fn special_of(diagram: &Diagram) -> Vec<(String, Row)> {
     diagram.branches.iter().flat_map(of).collect()
 }
 
-/// What has been found of the special points of a diagram.
+/// Match of the special points that were found with those of a diagram.
 #[derive(Clone, Copy, Default)]
 struct Matched {
     found: usize,
-    /// How many of them with an Ω as accurate as was asked for.
+    /// Number of matches whose Ω has the requested accuracy.
     accurate: usize,
-    /// How many of them are period doublings.
+    /// Number of matches that are period doublings.
     doublings: usize,
-    /// Special points that are not in the diagram.
+    /// Number of special points that are not in the diagram.
     other: usize,
-    /// By how much the parameters of those found are off at most, relative.
+    /// Largest relative error of the parameter among the matches.
     error: f64,
 }
 
-/// Each special point of the diagram is found once at most, and by the nearest one. `of` limits this to what grows from a branch
-/// of the plan.
+/// Pairs special points with those of the diagram, nearest first, each at most once. `of` restricts them to one branch
+/// of the plan and its child branches.
 fn matched(exact: &Diagram, special: &[(String, Row)], tolerance: f64, of: Option<&str>) -> Matched {
     let root = |name: &str| name.split('/').next().unwrap_or("").to_string();
     let meant = |name: &str| of.is_none_or(|of| of == name);
@@ -294,7 +294,7 @@ fn tour<'t>(auto: &'t Auto, starts: &Diagram, setting: Setting) -> Outcome<Tour<
     Ok(tour)
 }
 
-/// The setting with most special points, and of several the fastest: found, seconds, setting.
+/// Setting that finds most special points, the fastest if there are several: number found, seconds, setting.
 #[derive(Clone, Copy, Default)]
 struct Best(Option<(usize, f64, Setting)>);
 
@@ -306,7 +306,7 @@ impl Best {
     }
 }
 
-/// Both codes.
+/// Runs and compares both codes.
 pub fn compared(place: &Workplace) -> Outcome<String> {
     let study = rotor::study(place, rotor::FIGURE_7)?;
     let starts = rotor::beginnings(&study);
@@ -346,7 +346,7 @@ pub fn compared(place: &Workplace) -> Outcome<String> {
         [name, points, found, accurate, doublings, other, format!("{:.0e}", one.error), time(seconds), ratio]
     };
     let (mut any, mut accurate) = (Best::default(), Best::default());
-    // For each branch by itself.
+    // Best setting for each branch alone.
     let mut suited = vec![Best::default(); starts.branches.len()];
     for setting in Setting::all() {
         let name = format!("AUTO, {setting}");

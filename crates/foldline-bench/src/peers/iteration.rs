@@ -1,8 +1,9 @@
-//! Target: one Newton iteration on the same mesh.
+//! Comparison with AUTO-07p of one Newton iteration on the same mesh.
 //!
-//! **Idea.** The two codes discretise alike, so at equal mesh they are equally accurate and differ in time only. AUTO is
-//! asked for the same 100 or fewer points with a loose and with a tight accuracy of Newton's method; the additional time over
-//! the additional iterations is the cost of an iteration, free of everything else that AUTO does.
+//! **Idea.** Both codes use the same discretisation, so on equal meshes they are equally accurate and differ only in
+//! time. AUTO computes the same points (100 or fewer) with a loose and with a tight convergence criterion. The
+//! additional time divided by the number of additional iterations is the cost of an iteration, without any other work
+//! of AUTO.
 
 use super::auto::Auto;
 use super::auto_files::write_start;
@@ -13,11 +14,12 @@ use crate::{Outcome, clock, rotor as rotors};
 use foldline::diagram::{Point, Solution};
 use foldline::explore::System;
 
-/// Constants of both runs: no detection of anything, steps of one length, every iteration with a new Jacobian.
+/// Constants of both runs: no detection of special points, no mesh or step adaptation, a new Jacobian in every
+/// iteration.
 const PLAIN: [(&str, &str); 6] =
     [("ILP", "0"), ("ISP", "0"), ("IAD", "0"), ("IADS", "0"), ("NWTN", "20"), ("ITNW", "20")];
 
-/// AUTO's seconds for one iteration, over `points` points.
+/// Returns AUTO's time in seconds for one iteration, measured over `points` points.
 fn of_auto(auto: &Auto, changes: &[(&str, &str)], points: usize) -> Outcome<f64> {
     let points = points.to_string();
     let run = |accuracy: &str, diagnostics: &str| {
@@ -39,7 +41,7 @@ fn write(auto: &Auto, point: &Point) -> Outcome<()> {
     }
 }
 
-/// The two codes in turn: seconds of each, and the median of the ratios.
+/// Runs the two codes alternately. Returns the median time in seconds of each, and the median of the ratios.
 fn in_turn(
     repetitions: usize,
     mut ours: impl FnMut() -> Outcome<f64>,
@@ -55,7 +57,7 @@ fn in_turn(
     Ok([clock::median(&own), clock::median(&other), clock::median(&ratios)])
 }
 
-/// The cubic rotor, 4 states, 100 intervals, degree 4.
+/// Compares both codes on the cubic rotor: 4 states, 100 intervals, degree 4.
 pub fn rotor(place: &Workplace) -> Outcome<String> {
     let study = rotors::study(place, rotors::SINGLE_LOOP)?;
     let system = System::of_plan(&study.model, &study.plan);
@@ -78,7 +80,7 @@ pub fn rotor(place: &Workplace) -> Outcome<String> {
     ))
 }
 
-/// Chains with 4 to 64 states, 100 intervals, degree 4.
+/// Compares both codes on chains with 4 to 64 states: 100 intervals, degree 4.
 pub fn chains(place: &Workplace) -> Outcome<String> {
     let auto = Auto::new(place, "chain", "auto-chain")?;
     let mut table = Table::new(&["states n", "foldline", "AUTO", "times as fast"]);
@@ -91,7 +93,7 @@ pub fn chains(place: &Workplace) -> Outcome<String> {
             chain::PARAMETERS.iter().enumerate().map(|(k, (_, value))| format!("{}: {value:?}", k + 1)).collect();
         let (states, values) = (n.to_string(), format!("{{{}}}", values.join(", ")));
         let changes = [("NDIM", &*states), ("PAR", &values), ("DS", "0.2"), ("DSMAX", "0.5")];
-        // AUTO needs the time of n³ too.
+        // AUTO's cost grows as n³ too, so longer chains get fewer points.
         let points = (800 / n).clamp(8, 100);
         let [own, other, ratio] = in_turn(
             if n > 16 { 3 } else { place.repetitions() },

@@ -1,4 +1,4 @@
-//! Other programs: AUTO-07p and SciPy.
+//! Comparisons with other programs: AUTO-07p and SciPy.
 //!
 //! | question | file |
 //! |---|---|
@@ -6,7 +6,7 @@
 //! | one Newton iteration at equal mesh, for the rotor and for chains | [`iteration`] |
 //! | one branch at equal accuracy | [`single_loop`] |
 //! | all of figure 7 | [`diagrams`] |
-//! | ensembles beside SciPy | [`scipy`] |
+//! | ensembles, compared with SciPy | [`scipy`] |
 
 mod auto;
 mod auto_files;
@@ -17,7 +17,7 @@ mod single_loop;
 
 use crate::workplace::Part;
 
-/// The parts, in the order of the report.
+/// Parts in the order of the report.
 pub const PARTS: [(&str, Part); 5] = [
     ("AUTO-07p: one Newton iteration at equal mesh", iteration::rotor),
     ("AUTO-07p: chains", iteration::chains),

@@ -1,9 +1,9 @@
-//! Target: an ensemble against SciPy's `solve_ivp`.
+//! Comparison of an ensemble with SciPy's `solve_ivp`.
 //!
-//! **Idea.** The same initial states, time and tolerance (relative and absolute); SciPy integrates each trajectory by itself,
-//! which is what its interface is for, or all of them as one large problem with a common step. The errors at the end are those
-//! against a run at a tolerance 10⁴ times smaller, of SciPy by its own DOP853, of foldline by itself: medians over the
-//! trajectories, since near contact some of them are lost for every method.
+//! **Idea.** Initial states, time and tolerance (relative and absolute) are the same. SciPy integrates each trajectory
+//! separately, as its interface is meant to be used, or all of them as one large problem with a common step. Final
+//! errors are relative to a run with a tolerance 10⁴ times smaller, by SciPy's DOP853 for SciPy and by foldline for
+//! foldline. They are medians over the trajectories, because near contact some trajectories diverge for every method.
 
 use crate::own::ensemble::measured;
 use crate::report::{Table, digits, time};
@@ -14,12 +14,12 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-/// Fewer trajectories than foldline alone is measured with: SciPy takes its time.
+/// Number of trajectories, final time, tolerance. Fewer trajectories than for foldline alone, because SciPy is slow.
 const CASE: [&str; 3] = ["32", "20", "1e-6"];
-/// The ring in full.
+/// Value of κ for which the contact ring acts fully.
 const KAPPA: &str = "1";
 
-/// A Python with SciPy: one in `target`, made where it is missing.
+/// Returns a Python interpreter with SciPy from an environment in `target`, which is created if it is missing.
 fn python(place: &Workplace) -> Outcome<PathBuf> {
     let folder = place.root.join("target/bench-python");
     let python = folder.join("bin/python");
@@ -38,14 +38,14 @@ fn python(place: &Workplace) -> Outcome<PathBuf> {
     }
 }
 
-/// Of Python and SciPy.
+/// Returns the versions of Python and SciPy.
 fn version(python: &Path) -> String {
     let asked = "import platform, scipy, numpy; print('Python', platform.python_version() + ', SciPy', scipy.__version__ + ', NumPy', numpy.__version__)";
     let out = Command::new(python).args(["-c", asked]).output();
     out.map_or(String::new(), |out| String::from_utf8_lossy(&out.stdout).trim().to_string())
 }
 
-/// The initial states of the example `ensemble`, one in a line: those that the reference study samples.
+/// Returns the initial states of the example `ensemble`, one per line: those sampled by the reference study.
 fn starts() -> Outcome<String> {
     let ranges = vec![[-5.0, 5.0], [-5.0, 5.0], [-15.0, 15.0], [-15.0, 15.0]];
     let samples = CASE[0].parse()?;
@@ -64,7 +64,7 @@ fn starts() -> Outcome<String> {
     Ok(sampling.starts().chunks_exact(4).map(line).collect())
 }
 
-/// Seconds, evaluations for one trajectory, final states.
+/// Runs SciPy. Returns the time in seconds, the number of evaluations per trajectory, and the final states.
 fn scipy(python: &Path, place: &Workplace, case: [&str; 3], starts: &str) -> Outcome<(f64, f64, Vec<[f64; 4]>)> {
     let [method, tolerance, way] = case;
     let mut child = Command::new(python)
@@ -83,7 +83,7 @@ fn scipy(python: &Path, place: &Workplace, case: [&str; 3], starts: &str) -> Out
     Ok((seconds, calls, lines.filter_map(|x| x.try_into().ok()).collect()))
 }
 
-/// Both codes in turn.
+/// Measures both codes alternately.
 pub fn compared(place: &Workplace) -> Outcome<String> {
     let python = python(place)?;
     let starts = starts()?;
@@ -132,7 +132,7 @@ pub fn compared(place: &Workplace) -> Outcome<String> {
     ))
 }
 
-/// The median over the trajectories of the largest difference of a state.
+/// Returns the median over the trajectories of the largest difference of a state.
 fn error(ends: &[[f64; 4]], exact: &[[f64; 4]]) -> f64 {
     let largest = |(a, b): (&[f64; 4], &[f64; 4])| a.iter().zip(b).map(|(x, y)| (x - y).abs()).fold(0.0, f64::max);
     clock::median(&ends.iter().zip(exact).map(largest).collect::<Vec<f64>>())

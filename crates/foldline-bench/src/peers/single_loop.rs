@@ -1,9 +1,10 @@
-//! Target: one branch at equal accuracy.
+//! Comparison with AUTO-07p on one branch at equal accuracy.
 //!
-//! **Idea.** Every point of either code is computed again, at the same Ω, at a tolerance of 1e-10; the differences of period
-//! and largest radius are its errors. AUTO is given the mesh and the largest step with which it is fastest among those with which the
-//! larger of its two errors is not larger than that of foldline, then the degree and the first step too: at the tolerance of the
-//! study, a looser and a tighter one, for a single accuracy might happen to suit one of the two.
+//! **Idea.** Every point of either code is recomputed at the same Ω with a tolerance of 1e-10; the differences in
+//! period and largest radius are its errors. AUTO gets the mesh and the largest step for which it is fastest among
+//! those for which the larger of its two errors does not exceed that of foldline; then degree and first step are chosen
+//! in the same way. The comparison is made at the tolerance of the study, a looser and a tighter one, because a single
+//! accuracy might favour one of the codes.
 
 use super::auto::{Answer, Auto};
 use super::auto_files::{cycles, write_start};
@@ -16,24 +17,24 @@ use foldline::explore::{Plan, System};
 use foldline::problem::extremes;
 use foldline::problem::gauss::Scheme;
 
-/// NCOL.
+/// Values of NCOL.
 const DEGREES: [&str; 4] = ["4", "5", "6", "7"];
-/// NTST.
+/// Values of NTST.
 const INTERVALS: [&str; 21] = [
     "10", "12", "15", "20", "25", "30", "35", "40", "45", "50", "60", "70", "75", "80", "85", "90", "95", "100", "120",
     "150", "200",
 ];
-/// What somebody would begin with who does not know how many intervals are needed.
+/// Setting that a user would begin with who does not know the number of intervals needed.
 const USUAL: Setting = Setting { degree: "4", intervals: "100", first: "0.1", step: "0.2" };
-/// DS and DSMAX.
+/// Values of DS and DSMAX.
 const STEPS: [(&str, &str); 8] =
     [("0.1", "0.2"), ("0.1", "1"), ("0.1", "3"), ("0.1", "10"), ("1", "1"), ("1", "3"), ("1", "10"), ("3", "10")];
-/// What tolerances of foldline are compared; the study has the second.
+/// Tolerances of foldline that are compared; the study has the second.
 const TOLERANCES: [f64; 3] = [1e-4, 1e-6, 1e-8];
-/// Index of the output r among states and outputs.
+/// Index of the output r in the list of states and outputs.
 const RADIUS: usize = 4;
 
-/// Largest relative error of the period and of the largest radius.
+/// Returns the largest relative errors of the period and of the largest radius.
 pub fn errors<'p>(system: &System, points: impl Iterator<Item = &'p Point>) -> Outcome<[f64; 2]> {
     let mut worst = [0.0f64; 2];
     for point in points {
@@ -47,12 +48,12 @@ pub fn errors<'p>(system: &System, points: impl Iterator<Item = &'p Point>) -> O
     Ok(worst)
 }
 
-/// The points that a branch has found: not the first one, which is given.
+/// Returns the points computed along a branch, without the given first one.
 fn found_points(branch: &Branch) -> impl Iterator<Item = &Point> {
     branch.points.iter().filter(|point| point.position != 0)
 }
 
-/// A solution of AUTO as a point, as far as errors need it.
+/// Converts a solution of AUTO to a point that has what [`errors`] needs.
 fn point(system: &System, like: &Point, omega: f64, solution: Solution) -> Point {
     let mut parameters = like.parameters.clone();
     parameters[rotor::OMEGA] = omega;
@@ -65,7 +66,7 @@ fn point(system: &System, like: &Point, omega: f64, solution: Solution) -> Point
     Point { parameters, solution, ranges, ..like.clone() }
 }
 
-/// What AUTO is given.
+/// Constants given to AUTO.
 #[derive(Clone, Copy)]
 struct Setting {
     degree: &'static str,
@@ -81,7 +82,7 @@ impl Setting {
         DEGREES.into_iter().flat_map(meshes)
     }
 
-    /// Whether only the mesh and the largest step are chosen, with the usual degree and first step.
+    /// True if only the mesh and the largest step are chosen, with the usual degree and first step.
     fn is_plain(self) -> bool {
         self.degree == USUAL.degree && self.first == USUAL.first
     }
@@ -92,7 +93,7 @@ impl Setting {
     }
 }
 
-/// A way to run AUTO that gets to the end.
+/// Setting with which AUTO reaches the end of the branch, and its result.
 #[derive(Clone, Copy)]
 struct Choice {
     setting: Setting,
@@ -108,12 +109,12 @@ impl Choice {
     }
 }
 
-/// Whether a run got to the end of the branch.
+/// True if a run reached the end of the branch.
 fn arrived(answer: &Answer) -> bool {
     answer.rows.last().is_some_and(|row| row.kind == -4 && (row.parameter - 10.0).abs() <= 1e-4)
 }
 
-/// One way, with its errors; `None` where AUTO leaves the branch.
+/// Runs AUTO with one setting and measures its errors; `None` if AUTO leaves the branch.
 fn tried(auto: &Auto, system: &System, like: &Point, setting: Setting) -> Outcome<Option<Choice>> {
     let own = setting.constants();
     let answer = auto.run(&[&own[..], &[("NPR", "1"), ("IID", "2")]].concat())?;
@@ -121,7 +122,7 @@ fn tried(auto: &Auto, system: &System, like: &Point, setting: Setting) -> Outcom
     if found.len() != answer.rows.len() {
         return Err(format!("{} of {} solutions of AUTO were read", found.len(), answer.rows.len()).into());
     }
-    // The first point is the start as AUTO reads it, between whose values it draws straight lines; no Newton's method.
+    // The first point is left out: it is the given start, interpolated linearly by AUTO without Newton iterations.
     let points: Vec<Point> = found.into_iter().skip(1).map(|(_, omega, s)| point(system, like, omega, s)).collect();
     let Ok(errors) = errors(system, points.iter()) else { return Ok(None) };
     let times: Vec<f64> = (0..3).map(|_| auto.run(&own).map(|a| a.cpu)).collect::<Outcome<_>>()?;
@@ -129,7 +130,7 @@ fn tried(auto: &Auto, system: &System, like: &Point, setting: Setting) -> Outcom
     Ok(Some(Choice { setting, cpu: clock::median(&times), errors, points, iterations }))
 }
 
-/// For each of the errors that are allowed the fastest way to stay below it.
+/// Returns, for each allowed error, the fastest setting that stays below it.
 fn fastest(
     auto: &Auto,
     system: &System,
@@ -140,7 +141,7 @@ fn fastest(
     let mut best: Vec<Option<Choice>> = vec![None; allowed.len()];
     for setting in among.iter().copied() {
         let answer = auto.run(&setting.constants())?;
-        // Errors take longer than the run: only where it may be faster than what is there.
+        // Measuring errors takes longer than the run, so it is done only for settings that may be the fastest.
         let faster = |best: &Option<Choice>| best.is_none_or(|best| answer.cpu < 1.1 * best.cpu);
         if !arrived(&answer) || !best.iter().any(faster) {
             continue;
@@ -155,8 +156,8 @@ fn fastest(
     Ok(best)
 }
 
-/// Both codes in turn, each with what it takes to start and for a first point: seconds of foldline, of AUTO, then of the starts, and the
-/// ratio without those.
+/// Runs both codes alternately. Returns median times in seconds: of foldline, of AUTO, of foldline's start-up with a
+/// first point, of AUTO's; and the median ratio of the times without start-up.
 fn in_turn(
     auto: &Auto,
     setting: Setting,
@@ -167,7 +168,7 @@ fn in_turn(
     let changes = setting.constants();
     let mut all = [const { Vec::new() }; 5];
     for _ in 0..repetitions {
-        // The first run after a pause is not the same: AUTO's start is taken off.
+        // The first run after a pause is slower, so it is not timed.
         own();
         let ours = clock::timed(&mut own).0;
         let our_start = clock::timed(&mut own_start).0;
@@ -180,7 +181,7 @@ fn in_turn(
     Ok(all.map(|values| clock::median(&values)))
 }
 
-/// Both codes in turn.
+/// Compares both codes.
 pub fn compared(place: &Workplace) -> Outcome<String> {
     let study = rotor::study(place, rotor::SINGLE_LOOP)?;
     let system = System::of_plan(&study.model, &study.plan);
@@ -218,7 +219,8 @@ pub fn compared(place: &Workplace) -> Outcome<String> {
     let (mut said, mut net, mut newton) = (Vec::new(), 0.0, 0.0);
     for (k, tolerance) in TOLERANCES.into_iter().enumerate() {
         let meant = tolerance == study.plan.tolerance;
-        // Many, since each is short beside the time for which something else slows the machine down.
+        // Many repetitions, because each is short compared with the periods during which other work slows the machine
+        // down.
         let repetitions = if meant { 12 * place.repetitions() } else { 3 * place.repetitions() };
         let plan = plan(tolerance);
         let mut none = plan.clone();

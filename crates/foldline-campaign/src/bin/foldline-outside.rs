@@ -104,7 +104,7 @@ fn answer() -> Result<(), String> {
     changed(&problems, &now)
 }
 
-/// Fails if a check that passes in the committed results no longer does.
+/// Fails if a check that passes in the committed results no longer passes.
 fn changed(problems: &[Problem], now: &str) -> Result<(), String> {
     let known = std::fs::read_to_string(folder().join("results.txt")).unwrap_or_default();
     let right = |line: &&str| line.starts_with("right");

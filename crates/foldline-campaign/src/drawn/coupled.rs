@@ -4,7 +4,7 @@ use super::Draw::{Logarithmic, Uniform};
 use super::Problem;
 
 pub const PROBLEMS: &[Problem] = &[
-    // Two tanks that exchange both species: in phase, in antiphase, and one cell more active than the other.
+    // Two tanks that exchange both species: in-phase and antiphase states, and states with one cell more active.
     Problem {
         name: "two Brusselators",
         model: r#"
@@ -24,7 +24,7 @@ y2 = { equation = "B*x2 - x2^2*y2 + ratio*D*(y1 - y2)", range = [0, 5] }
         branch: "free = \"B\"\nrange = [0.5, 8]\nswitch = { hopf = 1, branch-point = 1 }\nmax-points = 1500",
         bounded: false,
     },
-    // Coupled in the voltage.
+    // Coupled through the voltage.
     Problem {
         name: "two FitzHugh-Nagumo cells",
         model: r#"
@@ -45,7 +45,7 @@ w2 = { equation = "eps*(v2 + a - b*w2)", range = [-1, 2] }
         branch: "free = \"I\"\nrange = [-0.5, 1.2]\nswitch = { hopf = 1 }\nmax-points = 1500",
         bounded: false,
     },
-    // Coupled by a spring k and a damper c: in phase from mu = 0, in antiphase from mu = 2 c.
+    // Coupled by a spring k and a damper c: in-phase cycles from mu = 0, antiphase cycles from mu = 2 c.
     Problem {
         name: "two van der Pol oscillators",
         model: r#"

@@ -1,10 +1,10 @@
-//! Populations.
+//! Population dynamics.
 
 use super::Draw::{Logarithmic, Uniform};
 use super::Problem;
 
 pub const PROBLEMS: &[Problem] = &[
-    // Prey alone, both, cycles: the paradox of enrichment. Minima fall exponentially with the capacity.
+    // Prey alone, coexistence, cycles: the paradox of enrichment. Minima decrease exponentially with the capacity.
     Problem {
         name: "Rosenzweig-MacArthur",
         model: r#"
@@ -22,7 +22,7 @@ y = { equation = "y*(e*x/(1 + x) - d)", range = [0, 4] }
         branch: "free = \"K\"\nrange = [0.1, 6]\nswitch = { branch-point = 1, hopf = 1 }",
         bounded: false,
     },
-    // Saturation alpha and competition among the predators delta.
+    // alpha is the saturation, delta the competition among predators.
     Problem {
         name: "Bazykin",
         model: r#"
@@ -45,7 +45,7 @@ y = { equation = "-gamma*y + x*y/(1 + alpha*x) - delta*y^2", range = [0, 5] }
         branch: "free = \"alpha\"\nrange = [0.02, 1.2]\nswitch = { hopf = 1, branch-point = 1 }",
         bounded: false,
     },
-    // Food chain of three levels, the last a hundred times slower.
+    // Food chain with three levels, the top one much slower.
     Problem {
         name: "food chain",
         model: r#"

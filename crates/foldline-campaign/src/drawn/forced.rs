@@ -40,7 +40,7 @@ v = { equation = "F*cos(w*t) - 2*zeta*v - x + x^3", range = [-1, 1] }
         branch: "free = \"w\"\nrange = [0.4, 1.6]\nswitch = { branch-point = 1, period-doubling = 1 }\nmax-points = 1500",
         bounded: false,
     },
-    // Two wells, started in one of them.
+    // Double well, started in one of the wells.
     Problem {
         name: "Duffing, two wells",
         model: r#"
@@ -59,7 +59,7 @@ v = { equation = "F*cos(w*t) - 2*zeta*v + x - x^3", range = [-2, 2] }
         branch: "free = \"w\"\nrange = [0.6, 2.6]\nswitch = { period-doubling = 1 }\nmax-points = 1500",
         bounded: false,
     },
-    // A well with one exit.
+    // Potential well with escape on one side.
     Problem {
         name: "Helmholtz",
         model: r#"
@@ -78,7 +78,7 @@ v = { equation = "F*cos(w*t) - 2*zeta*v - x + x^2", range = [-0.5, 0.5] }
         branch: "free = \"w\"\nrange = [0.4, 1.6]\nswitch = { period-doubling = 1 }\nmax-points = 1500",
         bounded: false,
     },
-    // Rest becomes unstable at two period doublings; p > 4 zeta in the whole range.
+    // The rest state is unstable between two period doublings, because p > 4 zeta in the whole range.
     Problem {
         name: "parametric excitation",
         model: r#"
@@ -103,7 +103,7 @@ v = { equation = "-2*zeta*v - (1 + p*cos(w*t))*x - k*x^3", range = [-1, 1] }
         branch: "free = \"w\"\nrange = [1.2, 2.8]\nswitch = { period-doubling = 1 }\nmax-points = 1500",
         bounded: false,
     },
-    // Locked to the forcing at the start; tori and folds where it is lost.
+    // Entrained by the forcing at the start; entrainment is lost at torus points and folds.
     Problem {
         name: "van der Pol, forced",
         model: r#"
@@ -122,7 +122,7 @@ v = { equation = "F*cos(w*t) + mu*(1 - x^2)*v - x", range = [-3, 3] }
         branch: "free = \"w\"\nrange = [0.5, 1.8]\nswitch = { period-doubling = 1 }\nmax-points = 1500",
         bounded: false,
     },
-    // A pendulum to third order, with a static load that breaks the symmetry and a pulsating support.
+    // Pendulum to third order, with a static load that breaks the symmetry and a pulsating support.
     Problem {
         name: "pendulum to third order",
         model: r#"

@@ -1,10 +1,10 @@
-//! Chemical reactions: stirred tanks and oscillators.
+//! Chemical kinetics: stirred tanks and oscillators.
 
 use super::Draw::{Logarithmic, Uniform};
 use super::Problem;
 
 pub const PROBLEMS: &[Problem] = &[
-    // Hopf at B = 1 + A^2.
+    // Hopf point at B = 1 + A^2.
     Problem {
         name: "Brusselator",
         model: r#"
@@ -20,7 +20,7 @@ y = { equation = "B*x - x^2*y", range = [0, 6] }
         branch: "free = \"B\"\nrange = [0.3, 8]\nswitch = { hopf = 1 }",
         bounded: true,
     },
-    // Exothermic first-order reaction: B heat of reaction, beta cooling, g activation energy.
+    // Exothermic first-order reaction: heat of reaction B, cooling beta, activation energy g.
     Problem {
         name: "stirred tank",
         model: r#"
@@ -45,7 +45,7 @@ y = { equation = "-y + B*k - beta*y", range = [0, 12], scale = 4 }
         branch: "free = \"Da\"\nrange = [0.001, 0.6]\nswitch = { hopf = 1 }",
         bounded: false,
     },
-    // Two variables; q and eps make the cycles stiff.
+    // Two-variable form; small q and eps make the cycles stiff.
     Problem {
         name: "Oregonator",
         model: r#"
@@ -62,7 +62,7 @@ z = { equation = "x - z", range = [0, 0.5] }
         branch: "free = \"f\"\nrange = [0.25, 3]\nswitch = { hopf = 1 }",
         bounded: true,
     },
-    // The equilibria with product form an isola in the feed rate.
+    // The non-trivial equilibria form an isola in the feed rate.
     Problem {
         name: "Gray-Scott",
         model: r#"
@@ -78,7 +78,7 @@ v = { equation = "u*v^2 - (F + k)*v", range = [0, 0.5] }
         branch: "free = \"F\"\nrange = [1e-4, 0.3]\nswitch = { hopf = 1 }",
         bounded: false,
     },
-    // Below ku = 1/8 one family of cycles joins two Hopf points, stiff for small ku.
+    // Below ku = 1/8 one family of cycles connects two Hopf points; it is stiff for small ku.
     Problem {
         name: "autocatalator",
         model: r#"
@@ -94,7 +94,7 @@ b = { equation = "ku*a + a*b^2 - b", range = [0, 3] }
         branch: "free = \"mu\"\nrange = [0.01, 1.5]\nswitch = { hopf = 1 }",
         bounded: true,
     },
-    // Glycolysis: one family of cycles between two Hopf points for a < 1/8.
+    // Glycolysis: for a < 1/8 one family of cycles connects two Hopf points.
     Problem {
         name: "Selkov",
         model: r#"

@@ -1,7 +1,7 @@
 //! Models of several fields whose parameters are drawn at random.
 //!
-//! **Idea.** Each problem states the model, the range of each random parameter, a start and a branch. The ranges are those used in the
-//! field of the model. Each case draws all its parameters from a random stream of its own.
+//! **Idea.** Each problem states the model, the range of each random parameter, a start and a branch. The ranges are
+//! those used in the field of the model. Each case draws all its parameters from a random stream of its own.
 
 mod coupled;
 mod ecology;
@@ -13,7 +13,7 @@ use crate::TOLERANCE;
 use crate::cases::{Case, First, study};
 use crate::random::Random;
 
-/// A parameter and the distribution from which it is drawn.
+/// Parameter and the distribution from which it is drawn.
 #[derive(Clone, Copy, Debug)]
 pub enum Draw {
     /// Uniform between the two bounds.
@@ -31,8 +31,8 @@ impl Draw {
     }
 }
 
-/// A model, the ranges of its parameters, and the lines of the tables `seed` and `branch`. `{name}` in the seed stands for the value
-/// drawn for that parameter.
+/// Model, ranges of its parameters, and lines of the tables `seed` and `branch`. `{name}` in the seed stands for the
+/// value drawn for that parameter.
 #[derive(Clone, Copy, Debug)]
 pub struct Problem {
     /// Name in the report.
@@ -49,14 +49,14 @@ pub struct Problem {
     pub bounded: bool,
 }
 
-/// Every problem, field by field.
+/// Returns every problem, field by field.
 pub fn problems() -> impl Iterator<Item = &'static Problem> {
     [neurons::PROBLEMS, kinetics::PROBLEMS, ecology::PROBLEMS, coupled::PROBLEMS, forced::PROBLEMS]
         .into_iter()
         .flatten()
 }
 
-/// Case `number`: the problems take turns.
+/// Returns the cases with the given numbers; consecutive numbers cycle through the problems.
 pub fn drawn(numbers: std::ops::Range<usize>) -> Vec<Case> {
     let all: Vec<&Problem> = problems().collect();
     numbers.map(|number| all[number % all.len()].case(number)).collect()
@@ -88,8 +88,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_problem_is_a_valid_study_wherever_its_parameters_fall() {
-        // `study` panics where a text is wrong, parameters outside their declared names included.
+    fn every_problem_is_a_valid_study_for_all_drawn_parameters() {
+        // `study` panics on an invalid text, such as one with undeclared parameters.
         let count = problems().count();
         let cases = drawn(0..20 * count);
         assert!(count >= 20 && cases.len() == 20 * count);

@@ -1,10 +1,10 @@
-//! Excitable membranes and populations of neurons.
+//! Excitable membranes and neural populations.
 
 use super::Draw::{Logarithmic, Uniform};
 use super::Problem;
 
 pub const PROBLEMS: &[Problem] = &[
-    // Time scales apart by up to 50: canard explosions next to the Hopf points.
+    // Time scales separated by a factor of up to 50: canard explosions next to the Hopf points.
     Problem {
         name: "FitzHugh-Nagumo in the current",
         model: r#"
@@ -27,7 +27,7 @@ w = { equation = "eps*(v + a - b*w)", range = [-1, 2] }
         branch: "free = \"I\"\nrange = [-0.5, 2.5]\nswitch = { hopf = 1 }",
         bounded: true,
     },
-    // Millivolts and microamperes. V3 and phi decide between the two classes of excitability.
+    // Millivolts and microamperes. V3 and phi determine the class of excitability.
     Problem {
         name: "Morris-Lecar",
         model: r#"
@@ -55,7 +55,7 @@ w = { equation = "phi*(n - w)*cosh((V - V3)/(2*V4))", range = [0, 1] }
         branch: "free = \"I\"\nrange = [-20, 300]\nswitch = { hopf = 1 }",
         bounded: false,
     },
-    // r is the ratio of time scales of bursting.
+    // r is the ratio of the time scales.
     Problem {
         name: "Hindmarsh-Rose",
         model: r#"
@@ -79,7 +79,7 @@ z = { equation = "r*(s*(x - x0) - z)", range = [0, 4] }
         branch: "free = \"I\"\nrange = [-1, 8]\nswitch = { hopf = 1 }\nmax-points = 1500",
         bounded: false,
     },
-    // Excitatory and inhibitory populations; refractory terms left out.
+    // Excitatory and inhibitory populations, with unit refractory coefficients.
     Problem {
         name: "Wilson-Cowan",
         model: r#"

@@ -10,7 +10,7 @@ use foldline_store::order::leg;
 /// Exit code of a panic.
 const PANIC: i32 = 101;
 
-/// Name and verdict of each check. All studies have the same checks, so that counts can be compared.
+/// Returns name and verdict of each check. All studies have the same checks, so that their numbers can be compared.
 pub fn verdicts(run: &Run, outcome: &Outcome) -> Vec<(&'static str, Verdict)> {
     let code = match outcome.end {
         End::Code(code) if code != PANIC => Ok(code),
@@ -24,7 +24,7 @@ pub fn verdicts(run: &Run, outcome: &Outcome) -> Vec<(&'static str, Verdict)> {
         ("exit code", by_itself(&|code| Verdict::of(run.exit.contains(&code), || format!("{code}")))),
     ];
     if run.is_a_study() {
-        // A study that was refused has no changes of stability.
+        // A rejected study has no changes of stability.
         let nothing = || by_itself(&|_| Verdict::Right);
         list.push(("stability is explained", outcome.stored.as_ref().map_or_else(nothing, |s| explained(&s.diagram))));
         let silent = |code| outcome.stored.as_ref().map_or(Verdict::Right, |stored| told(code, stored));
@@ -33,7 +33,7 @@ pub fn verdicts(run: &Run, outcome: &Outcome) -> Vec<(&'static str, Verdict)> {
     list
 }
 
-/// Checks that every change of stability along branches in one parameter is explained.
+/// Checks that every change of stability along one-parameter branches is explained.
 fn explained(diagram: &Diagram) -> Verdict {
     let branches = diagram.branches.iter().filter(|branch| branch.held.is_none());
     let lines: Vec<String> = branches
@@ -45,8 +45,8 @@ fn explained(diagram: &Diagram) -> Verdict {
     Verdict::of(lines.is_empty(), || format!("{} changes; {}", lines.len(), lines[0]))
 }
 
-/// Checks that exit code 0 is given only if every requested branch and curve exists, is complete and has no unexplained change of
-/// stability.
+/// Checks that the exit code is 0 only if every requested branch and curve exists, is complete, and has no unexplained
+/// change of stability.
 fn told(code: i32, stored: &Stored) -> Verdict {
     let on_the_way = |branch: &&Branch| !stored.homotopies.iter().any(|name| leg(&branch.name, name).is_some());
     let short = stored.diagram.branches.iter().filter(on_the_way).find(|branch| {

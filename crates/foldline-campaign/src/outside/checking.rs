@@ -72,7 +72,8 @@ impl Found<'_> {
         }
     }
 
-    /// The branch of that name and all branches switched to from it; every branch if no name is given.
+    /// Returns the branch of the given name and all branches reached from it by switching, or every branch if `name` is
+    /// `None`.
     fn branches<'b>(&'b self, name: &'b Option<String>) -> impl Iterator<Item = &'b Branch> {
         self.diagram.branches.iter().filter(move |branch| {
             name.as_ref().is_none_or(|name| {
@@ -96,7 +97,7 @@ impl Found<'_> {
         self.distance(special, at) <= 1.0
     }
 
-    /// Largest deviation from the expected values, as a multiple of the permitted one.
+    /// Returns the largest deviation from the expected values, as a multiple of the permitted one.
     fn distance(&self, special: &SpecialPoint, at: &At) -> f64 {
         let far = |(name, [value, within]): (&String, &[f64; 2])| match special_quantity(self.model, special, name) {
             Some(found) if !found.is_nan() => (found - value).abs() / within,
@@ -179,9 +180,11 @@ impl Found<'_> {
         Verdict::of(other.is_none(), || other.map_or(String::new(), |p| format!("{} unstable at one", p.unstable)))
     }
 
-    /// Number of equilibria at a parameter value, by linear interpolation between points; those that differ only by signs of states count once.
+    /// Counts the equilibria at a parameter value by linear interpolation between points. Equilibria that differ only
+    /// in the signs of states count once.
     fn solutions(&self, parameter: &str, value: f64) -> usize {
-        /// Relative difference below which equilibria are the same. Empirical: larger than the error of linear interpolation.
+        /// Relative difference below which equilibria are equal. Empirical: larger than the error of linear
+        /// interpolation.
         const SAME: f64 = 1e-3;
         let states = self.model.states.len();
         let at = |p: &Point| quantity(self.model, p, parameter).unwrap_or(f64::NAN) - value;

@@ -1,4 +1,4 @@
-//! Runs of the command in a separate process with a limit on its processor time.
+//! Runs of the command in a separate process with limited processor time.
 
 use super::expectations::{Problem, Run};
 use super::running::{End, Outcome, Stored};
@@ -9,10 +9,10 @@ use std::path::{Path, PathBuf};
 use std::process::{self, Child, ExitStatus, Stdio};
 use std::time::{Duration, Instant};
 
-/// Wall-clock limit per second of the processor-time limit: a factor of safety for a machine under load.
+/// Ratio of the wall-clock limit to the processor-time limit: a safety factor for a machine under load.
 const WALL: u32 = 10;
 
-/// The command, and the folder for its runs.
+/// Command, and the folder for its runs.
 #[derive(Clone, Debug)]
 pub struct Command {
     /// Path of the binary.
@@ -22,7 +22,7 @@ pub struct Command {
 }
 
 impl Command {
-    /// Runs a study in a new folder and reads back what was stored, however the run ended.
+    /// Runs a study in a new folder and reads back the stored results, however the run ended.
     pub fn run(&self, problem: &Problem, run: &Run) -> Outcome {
         let folder = self.out.join(&problem.name).join(run.name().replace([' ', '(', ')'], "_"));
         let _ = std::fs::remove_dir_all(&folder);
@@ -51,7 +51,7 @@ impl Command {
     }
 }
 
-/// The command with a limit on its processor time, if the system supports one.
+/// Returns the command with a limit on its processor time, if the system supports one.
 #[cfg(unix)]
 fn limited(words: &[String], seconds: u64) -> process::Command {
     let mut command = process::Command::new("sh");
@@ -85,7 +85,7 @@ fn ended(mut child: Child, limit: Duration) -> End {
 #[cfg(unix)]
 fn signalled(status: ExitStatus) -> End {
     use std::os::unix::process::ExitStatusExt;
-    // SIGXCPU, and SIGKILL where the hard limit comes first.
+    // SIGXCPU, or SIGKILL if the hard limit is reached first.
     if matches!(status.signal(), Some(9 | 24)) { End::OutOfTime } else { End::Crashed }
 }
 

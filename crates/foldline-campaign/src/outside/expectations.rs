@@ -1,24 +1,24 @@
-//! Expected results of a problem: `expected.toml` beside its model and its studies.
+//! Expected results of a problem: `expected.toml`, next to its model and its studies.
 
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-/// Default limit on the processor time of a run, in seconds. A factor of safety over what a run usually takes.
+/// Default limit on the processor time of a run, in seconds, well above the usual time.
 const SECONDS: u64 = 60;
 
-/// A problem.
+/// External problem.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Problem {
     /// Name of its folder.
     #[serde(skip)]
     pub name: String,
-    /// The folder.
+    /// Path of its folder.
     #[serde(skip)]
     pub folder: PathBuf,
-    /// The question.
+    /// Question that the problem answers.
     pub question: String,
     /// Source of the problem.
     pub source: String,
@@ -27,13 +27,13 @@ pub struct Problem {
     pub runs: Vec<Run>,
 }
 
-/// A study, with its expected results.
+/// Study with its expected results.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct Run {
-    /// The study file, or the model file for a command that takes one.
+    /// Study file, or model file for a command that takes one.
     pub file: String,
-    /// Subcommand, `run` by default, then its arguments after the file.
+    /// Subcommand, `run` by default, followed by the arguments that come after the file.
     #[serde(default = "run_itself")]
     pub command: Vec<String>,
     /// Limit on the processor time, in seconds.
@@ -62,11 +62,11 @@ fn done_or_short() -> Vec<i32> {
     vec![0, 3]
 }
 
-/// An expected value and its source.
+/// Expected value and its source.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Right {
-    /// The check.
+    /// Check to evaluate.
     pub check: Check,
     /// Source of the value.
     pub source: String,
@@ -75,12 +75,14 @@ pub struct Right {
 /// Quantities, each with its value and the permitted deviation.
 pub type At = BTreeMap<String, [f64; 2]>;
 
-/// A check. `branch` restricts it to one branch and the branches switched to from it, whose names begin with that of the branch.
+/// Check. `branch` restricts it to one branch and those reached from it by branch switching, whose names begin with its
+/// own.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
-#[allow(missing_docs)] // the fields are what the sentence of the variant says
+#[allow(missing_docs)] // the fields are explained by the sentence of the variant
 pub enum Check {
-    /// A special point of that kind has these values, with the two given unstable counts on its sides.
+    /// A special point of this kind has these values, and the given numbers of unstable eigenvalues or multipliers on
+    /// its sides.
     Special {
         kind: String,
         branch: Option<String>,
@@ -88,35 +90,37 @@ pub enum Check {
         at: At,
         changes: Option<[usize; 2]>,
     },
-    /// No special point of that kind has these values.
+    /// No special point of this kind has these values.
     Absent {
         kind: String,
         branch: Option<String>,
         #[serde(default)]
         at: At,
     },
-    /// The number of special points of that kind lies between the bounds, inclusive.
+    /// The number of special points of this kind lies between the bounds, inclusive.
     Count { kind: String, branch: Option<String>, between: [usize; 2] },
     /// Some point, special or not, has these values.
     Point { branch: Option<String>, at: At },
-    /// A side of the branch ended with that code, and its last point (or, where it joined, the parameter) has these values.
+    /// A side of the branch ended with this code, and its last point (if it joined another branch, the parameter there)
+    /// has these values.
     Ends {
         branch: Option<String>,
         code: String,
         #[serde(default)]
         at: At,
     },
-    /// Both sides of one branch join others at special points of that kind, at these parameter values.
+    /// Both sides of one branch join others at special points of this kind, at these parameter values.
     Joins { kind: String, between: [f64; 2], within: f64 },
-    /// Points with the quantity in the range exist, and all have the given number of unstable eigenvalues or multipliers.
+    /// Points with the quantity in the range exist, and all have the given number of unstable eigenvalues or
+    /// multipliers.
     Unstable { branch: Option<String>, of: String, range: [f64; 2], is: usize },
-    /// Number of solutions at that parameter value; those that differ only by signs of states count once.
+    /// Number of equilibria at this parameter value; those that differ only in the signs of states count once.
     Solutions { parameter: String, value: f64, is: usize },
     /// Number of branches that have a point with these values.
     Branches { at: At, is: usize },
     /// Largest number of points of any branch.
     Points { branch: Option<String>, most: usize },
-    /// At least that share of all starts of surveys and sweeps settle to one of these motions.
+    /// At least this fraction of all starts of surveys and sweeps settle to one of these motions.
     Settles { set: Option<String>, motions: Vec<String>, share: f64 },
     /// A response of a survey or sweep has these values.
     Response { at: At, motion: String },
@@ -125,7 +129,7 @@ pub enum Check {
 }
 
 impl Problem {
-    /// Reads the problem in that folder.
+    /// Reads the problem in a folder.
     pub fn read(folder: &Path) -> Result<Problem, String> {
         let file = folder.join("expected.toml");
         let text = std::fs::read_to_string(&file).map_err(|error| format!("{}: {error}", file.display()))?;
@@ -152,7 +156,7 @@ impl Run {
         if self.is_a_study() { stem } else { format!("{stem} ({})", self.command.join(" ")) }
     }
 
-    /// True if the file is a study that `foldline run` runs.
+    /// True if the run is that of a study by `foldline run`.
     pub fn is_a_study(&self) -> bool {
         self.command == ["run"]
     }

@@ -1,8 +1,9 @@
 //! External problems with independently known results, run by `cargo xtask outside`.
 //!
-//! **Idea.** Every folder of `outside` holds a problem from elsewhere (a question in another program's repository, a demo, a paper, the
-//! first attempt of a new user) and its expected results, from closed forms, publications or independent computations. Each study
-//! is run by the command in a separate process with a time limit, and the stored results are compared.
+//! **Idea.** Every folder of `outside` holds a problem from elsewhere (a question in the repository of another program,
+//! a demo, a paper, the first attempt of a new user) and its expected results, from closed forms, publications or
+//! independent computations. Each study is run by the command in a separate process with a time limit, and the stored
+//! results are compared.
 //!
 //! | question | file |
 //! |---|---|

@@ -3,9 +3,9 @@
 use foldline::diagram::{Point, SpecialPoint};
 use foldline::model::Model;
 
-/// Value of `name` at a point: a parameter, `period`, `NAME_max`, `NAME_min`, `NAME_mean` or `NAME_rms` of a state or output (a bare state
-/// is its largest value), `multiplier_K` (the K-th largest modulus of the free spectrum), `omega` (imaginary part of the pair nearest to
-/// the imaginary axis), `unstable`.
+/// Returns the value of `name` at a point: a parameter, `period`, `NAME_max`, `NAME_min`, `NAME_mean` or `NAME_rms` of
+/// a state or output (a bare name is its largest value), `multiplier_K` (K-th largest modulus of the free spectrum),
+/// `omega` (imaginary part of the pair nearest to the imaginary axis), or `unstable`.
 pub fn quantity(model: &Model, point: &Point, name: &str) -> Option<f64> {
     if let Some(k) = model.parameters.iter().position(|p| p.name == name) {
         return point.parameters.get(k).copied();
@@ -38,7 +38,7 @@ pub fn quantity(model: &Model, point: &Point, name: &str) -> Option<f64> {
     }
 }
 
-/// Value of `name` at a special point: a [`quantity`], or `nf.NAME` for a coefficient of the normal form.
+/// Returns the value of `name` at a special point: a [`quantity`], or `nf.NAME` for a coefficient of the normal form.
 pub fn special_quantity(model: &Model, special: &SpecialPoint, name: &str) -> Option<f64> {
     match name.strip_prefix("nf.") {
         Some(coefficient) => {

@@ -1,4 +1,4 @@
-//! The report: one line per check, and a table with one row per problem.
+//! Report: one line per check, and a table with one row per problem.
 
 use super::expectations::Problem;
 use std::fmt::Write;
@@ -13,26 +13,26 @@ pub enum Verdict {
 }
 
 impl Verdict {
-    /// `Right`, or `Wrong` with the text of `why`.
+    /// Returns `Right`, or `Wrong` with the text of `why`.
     pub fn of(right: bool, why: impl FnOnce() -> String) -> Verdict {
         if right { Verdict::Right } else { Verdict::Wrong(why()) }
     }
 }
 
-/// A check of a run.
+/// Check of a run with its verdict.
 #[derive(Clone, Debug)]
 pub struct Line {
-    /// The problem.
+    /// Name of the problem.
     pub problem: String,
-    /// The study.
+    /// Name of the run.
     pub run: String,
     /// Text of the check.
     pub check: String,
-    /// Its verdict.
+    /// Verdict.
     pub verdict: Verdict,
 }
 
-/// All lines as text, failed checks with what was found.
+/// Formats all lines; failed checks include what was found instead.
 pub fn text(lines: &[Line]) -> String {
     let mut out = String::new();
     for Line { problem, run, check, verdict } in lines {
@@ -44,13 +44,13 @@ pub fn text(lines: &[Line]) -> String {
     out
 }
 
-/// The lines of a problem in the output of [`text`].
+/// Returns the lines of a problem in the output of [`text`].
 fn of<'t>(text: &'t str, problem: &str) -> impl Iterator<Item = &'t str> {
     let own = format!("{problem}/");
     text.lines().filter(move |line| line.get(7..).is_some_and(|rest| rest.starts_with(&own)))
 }
 
-/// The output of [`text`] for all problems, those renewed that there are in `now`.
+/// Returns the lines of all problems, from `now` for problems that were run and from `known` for the others.
 pub fn renewed(problems: &[Problem], known: &str, now: &str) -> String {
     let lines = problems.iter().flat_map(|problem| {
         let ran = of(now, &problem.name).next().is_some();
@@ -59,12 +59,13 @@ pub fn renewed(problems: &[Problem], known: &str, now: &str) -> String {
     lines.map(|line| format!("{line}\n")).collect()
 }
 
-/// Number of passed checks, and of all checks, of a problem in the output of [`text`].
+/// Returns the number of passed checks and of all checks of a problem in the output of [`text`].
 pub fn counts(text: &str, problem: &str) -> [usize; 2] {
     of(text, problem).fold([0, 0], |[right, all], line| [right + usize::from(line.starts_with("right")), all + 1])
 }
 
-/// Markdown table with one row per problem: checks passed before (by the output of an earlier version) and now.
+/// Returns a Markdown table with one row per problem: checks passed before (in the output of an earlier version) and
+/// now.
 pub fn table(problems: &[Problem], before: &str, now: &str) -> String {
     let mut out =
         "| problem | source | checks | right before | right now |\n| --- | --- | ---: | ---: | ---: |\n".to_string();

@@ -11,7 +11,7 @@ use foldline_store::study_file::{Study, read_study};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Mutex, PoisonError};
 
-/// The program that runs a study.
+/// Program that runs a study.
 #[derive(Clone, Debug)]
 pub enum Program {
     /// The command, in a process of its own.
@@ -23,7 +23,7 @@ pub enum Program {
 /// End of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum End {
-    /// Exit with this code.
+    /// Exited with this code.
     Code(i32),
     /// Killed at the time limit.
     OutOfTime,
@@ -47,18 +47,18 @@ pub struct Outcome {
 pub struct Stored {
     /// Branches and responses.
     pub diagram: Diagram,
-    /// Remarks, each with its subject.
+    /// Notes, each with its subject.
     pub notes: Vec<(String, String)>,
     /// The model.
     pub model: Model,
     /// Names of the branches and curves that the study requests.
     pub asked: Vec<String>,
-    /// Names of its homotopies, whose legs may turn back.
+    /// Names of its homotopies, whose runs may turn back.
     pub homotopies: Vec<String>,
 }
 
 impl Stored {
-    /// Results of a run of `study`.
+    /// Collects the results of a run of `study`.
     pub fn new(study: Study, diagram: Diagram, notes: Vec<(String, String)>) -> Stored {
         let (branches, curves) = (study.plan.branches.iter(), study.plan.curves.iter());
         let asked = branches.map(|b| b.name.clone()).chain(curves.map(|c| c.name.clone())).collect();
@@ -77,7 +77,7 @@ impl Program {
     }
 }
 
-/// Keeps remarks.
+/// Observer that collects notes.
 #[derive(Default)]
 struct Notes(Mutex<Vec<(String, String)>>);
 

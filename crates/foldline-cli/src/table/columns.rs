@@ -1,4 +1,4 @@
-//! Which columns the tables have.
+//! Columns of the tables.
 
 use super::{Cell, Column, Style, Table};
 use foldline::diagram::{Branch, Cost, Diagram, Origin, Point, Shown};
@@ -8,8 +8,8 @@ use foldline::special::quantity::Quantity;
 /// Largest number of coefficients of a normal form: that of a double Hopf point.
 const COEFFICIENTS: usize = 6;
 
-/// branch, kind, every parameter, period, NAME_max of every output, unstable_before, unstable_after, error, normal_form, and every coefficient
-/// with its error.
+/// Table of special points: branch, kind, every parameter, period, NAME_max of every output, unstable_before,
+/// unstable_after, error, normal_form, and every coefficient with its error.
 pub fn special(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) -> bool) -> Table {
     let mut columns = vec![column("branch", Style::Word), column("kind", Style::Word)];
     columns.extend(parameter_columns(diagram, model, kept));
@@ -39,7 +39,8 @@ pub fn special(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) -> bool)
     Table { columns, rows }
 }
 
-/// As above for every accepted point, and position, the extremes of the states, averages, multipliers (eigenvalues), accuracy, work.
+/// Table of all accepted points: branch, position, every parameter, period, extremes and averages of states and
+/// outputs, accuracy, work, and multipliers (eigenvalues).
 pub fn points(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) -> bool) -> Table {
     let mut columns = vec![column("branch", Style::Word), column("position", Style::Number)];
     columns.extend(parameter_columns(diagram, model, kept));
@@ -83,15 +84,15 @@ pub fn points(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) -> bool) 
     Table { columns, rows }
 }
 
-/// What was counted, in the order of [`work`].
+/// Names of the work counters, in the order of [`work`].
 const WORK: [&str; 5] = ["newton", "factorisations", "rejected", "evaluations", "linearisations"];
 
 fn work(cost: Cost) -> [usize; 5] {
     [cost.newton, cost.factorisations, cost.rejected, cost.evaluations, cost.linearisations]
 }
 
-/// One row for each branch: where it comes from, how far it reaches, how its two sides ended, what it cost. Of a curve in
-/// two parameters, what is held along it, and how far it reaches in the parameter that follows too.
+/// Table of branches: origin, range, ends of both sides, work. A curve in two parameters also shows the point continued
+/// and the range of its second parameter.
 pub fn branches(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) -> bool) -> Table {
     let words = ["branch", "family", "held", "free", "follows", "origin"].map(|name| column(name, Style::Word));
     let numbers = ["from", "to", "follows_from", "follows_to", "points", "special"].into_iter().chain(WORK);
@@ -119,14 +120,14 @@ pub fn branches(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) -> bool
     Table { columns, rows: diagram.branches.iter().filter(|b| kept(b)).map(row).collect() }
 }
 
-/// The smallest and the largest value of a parameter along a branch.
+/// Smallest and largest value of a parameter along a branch.
 fn reach(branch: &Branch, parameter: Option<usize>) -> [Cell; 2] {
     let values = || parameter.into_iter().flat_map(|k| branch.points.iter().filter_map(move |p| p.parameters.get(k)));
     let bounds = [values().copied().reduce(f64::min), values().copied().reduce(f64::max)];
     bounds.map(|bound| bound.map_or(Cell::Empty, Cell::Number))
 }
 
-/// What each remark is about, and the remark; only those about `name` if there is one.
+/// Table of remarks, each with its subject; only those about `name` if given.
 pub fn notes(notes: &[(String, String)], name: Option<&str>) -> Table {
     let columns = ["about", "note"].map(|name| column(name, Style::Word)).into();
     let shown = notes.iter().filter(|(about, _)| name.is_none_or(|name| name == about));
@@ -134,7 +135,7 @@ pub fn notes(notes: &[(String, String)], name: Option<&str>) -> Table {
     Table { columns, rows }
 }
 
-/// NAME_turns of every state that is an angle: how often it turns over a cycle.
+/// Columns NAME_turns: number of turns over a cycle of each state that is an angle.
 fn turn_columns(model: &Model) -> impl Iterator<Item = Column> {
     model.angles().map(|(k, _)| column(&format!("{}_turns", model.states[k].name), Style::Number))
 }
@@ -147,7 +148,7 @@ fn origin(origin: &Origin) -> String {
     }
 }
 
-/// Those of the parameters that vary along a branch are shown even where there is one row only.
+/// Columns of the parameters. Those that vary along a branch are shown even if there is only one row.
 fn parameter_columns(diagram: &Diagram, model: &Model, kept: &dyn Fn(&Branch) -> bool) -> Vec<Column> {
     let shown = || diagram.branches.iter().filter(|b| kept(b));
     let varies = |index: usize| shown().any(|b| b.free == index || b.held.is_some_and(|(_, follows)| follows == index));
@@ -159,7 +160,7 @@ fn output_columns(model: &Model) -> impl Iterator<Item = Column> {
     model.outputs.iter().map(|o| Column::in_unit(&format!("{}_max", o.name), Style::Number, &o.unit))
 }
 
-/// Every parameter, the period, the largest value of every output.
+/// Cells of every parameter, the period and the maximum of every output.
 fn place_cells(point: &Point, model: &Model) -> Vec<Cell> {
     let parameters =
         (0..model.parameters.len()).map(|k| point.parameters.get(k).map_or(Cell::Empty, |v| Cell::Number(*v)));

@@ -6,7 +6,7 @@ use std::io::{Result, Write};
 
 const DIGITS: i32 = 10;
 
-/// Aligned columns under their names; one with nothing in it is left out.
+/// Writes aligned columns under their names, leaving out empty ones.
 pub fn text(table: &Table, out: &mut impl Write) -> Result<()> {
     if table.rows.is_empty() {
         return writeln!(out, "none");
@@ -35,13 +35,14 @@ pub fn text(table: &Table, out: &mut impl Write) -> Result<()> {
     lines.iter().try_for_each(|line| writeln!(out, "{}", line.trim_end()))
 }
 
-/// Whether all cells are the same number.
+/// True if all cells are the same number.
 fn constant(cells: &[&Cell]) -> bool {
     let number = |cell: &Cell| if let Cell::Number(v) = cell { Some(v.to_bits()) } else { None };
     cells.windows(2).all(|pair| number(pair[0]) == number(pair[1]))
 }
 
-/// Decimals that give the largest number of a column ten significant digits; `None` where only powers of ten serve.
+/// Number of decimals that gives the largest number of a column ten significant digits; `None` if powers of ten are
+/// needed.
 fn decimals(cells: &[&Cell]) -> Option<usize> {
     let size = |cell: &&Cell| if let Cell::Number(v) = cell { Some(v.abs()) } else { None };
     let largest = cells.iter().filter_map(size).filter(|v| v.is_finite()).fold(0.0, f64::max);
@@ -69,7 +70,7 @@ fn shown(cell: &Cell, style: Style, decimals: Option<usize>) -> String {
     }
 }
 
-/// -0.000 is 0.000 to the digits shown.
+/// Writes a number that rounds to zero without its minus sign.
 fn without_sign_of_zero(text: String) -> String {
     match text.strip_prefix('-') {
         Some(rest) if rest.chars().all(|c| c == '0' || c == '.') => rest.to_string(),
@@ -77,8 +78,8 @@ fn without_sign_of_zero(text: String) -> String {
     }
 }
 
-/// Comma-separated values (RFC 4180) with every digit. A spectrum is one cell: its numbers as `re+imj`, separated by
-/// spaces, as Python's `complex` reads them.
+/// Writes comma-separated values (RFC 4180) in full precision. A spectrum is one cell: its numbers as `re+imj`,
+/// separated by spaces, as Python's `complex` reads them.
 pub fn csv(table: &Table, out: &mut impl Write) -> Result<()> {
     let names: Vec<String> = table.columns.iter().map(|c| quoted(&c.name)).collect();
     writeln!(out, "{}", names.join(","))?;
@@ -94,7 +95,7 @@ fn exact(cell: &Cell) -> String {
         Cell::Empty => String::new(),
         Cell::Word(word) => word.replace('\n', "; "),
         Cell::Count(count) => count.to_string(),
-        // The shortest decimal that reads back as the same number, with an exponent where it would be long.
+        // Shortest decimal that reads back as the same number, with an exponent if it would be long.
         Cell::Number(value) => format!("{value:?}"),
         Cell::Spectrum(values) => {
             let one =
@@ -108,7 +109,7 @@ fn quoted(text: &str) -> String {
     if text.contains([',', '"', '\n', '\r']) { format!("\"{}\"", text.replace('"', "\"\"")) } else { text.to_string() }
 }
 
-/// A list of objects. A spectrum is a list of pairs `[re, im]`; what is not finite is null.
+/// Writes a list of objects. A spectrum is a list of pairs `[re, im]`; non-finite numbers are null.
 pub fn json(table: &Table, out: &mut impl Write) -> Result<()> {
     writeln!(out, "[")?;
     for (k, row) in table.rows.iter().enumerate() {
@@ -166,7 +167,7 @@ mod tests {
     }
 
     #[test]
-    fn text_is_aligned_and_leaves_out_what_does_not_change() {
+    fn text_is_aligned_and_omits_constant_columns() {
         let expected = "branch            Omega   error  multipliers\n\
                         contact SL  10.34061714  1.5e-9  1.000000 -0.500000-0.000000i\n\
                         a \"b\", c     0.33333333  1.5e-9  1.000000 -0.500000-0.000000i\n";
@@ -174,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn of_a_text_of_several_lines_the_first_is_shown_and_the_rest_follows_where_everything_is_written() {
+    fn a_cell_of_several_lines_shows_only_the_first_in_text_and_all_in_csv() {
         let mut table = table();
         table.rows[0][0] = Cell::Word("it ended\nlikely cause: a cusp".into());
         let (mut short, mut long) = (Vec::new(), Vec::new());

@@ -1,4 +1,4 @@
-//! `foldline table`: what a run has found.
+//! `foldline table`: the results of a run.
 
 mod columns;
 mod format;
@@ -28,7 +28,7 @@ pub struct Table {
 pub struct Column {
     pub name: String,
     pub style: Style,
-    /// Shown behind the name in text; empty where there is none.
+    /// Shown after the name in text; empty if there is none.
     pub unit: String,
 }
 
@@ -49,18 +49,18 @@ impl Column {
     }
 }
 
-/// How a column is shown as text.
+/// Style of a column in text.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Style {
     /// Left-aligned.
     Word,
     /// Right-aligned, ten significant digits.
     Number,
-    /// As `Number`, but left out where every row has the same.
+    /// As `Number`, but left out if every row has the same value.
     Varying,
-    /// A small quantity of which only the size matters: 1.2e-9.
+    /// A small quantity of which only the magnitude matters: 1.2e-9.
     Size,
-    /// Left out: for programs, not for readers.
+    /// Left out of text; for programs, not for readers.
     Exact,
 }
 
@@ -101,7 +101,7 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
     Ok(Outcome::Done)
 }
 
-/// The units asked for with `--unit NAME=UNIT`; `None` without any.
+/// Units given with `--unit NAME=UNIT`; `None` without any.
 pub fn conversion(model: &Model, typed: &[String]) -> Result<Option<Conversion>, Failure> {
     let one = |text: &String| match text.split_once('=') {
         Some((name, unit)) if !unit.trim().is_empty() => Ok((name.trim().to_string(), unit.trim().to_string())),
@@ -118,7 +118,7 @@ pub fn conversion(model: &Model, typed: &[String]) -> Result<Option<Conversion>,
     Conversion::new(model, &wanted).map(Some).map_err(refused)
 }
 
-/// Prints what was not reached on standard error; returns true if everything was.
+/// Reports unreached parts of the study on standard error; returns true if there are none.
 pub fn tell_short(diagram: &Diagram, plan: &Plan, model: &Model) -> std::io::Result<bool> {
     let lines = short::lines(diagram, plan, model);
     let mut err = stderr().lock();
@@ -126,7 +126,7 @@ pub fn tell_short(diagram: &Diagram, plan: &Plan, model: &Model) -> std::io::Res
     Ok(lines.is_empty())
 }
 
-/// Writes a table in a format.
+/// Writes a table in the given format.
 pub fn write(table: &Table, format: Format, out: &mut impl Write) -> std::io::Result<()> {
     match format {
         Format::Text => format::text(table, out),
@@ -135,7 +135,7 @@ pub fn write(table: &Table, format: Format, out: &mut impl Write) -> std::io::Re
     }
 }
 
-/// Prints the special points as text, and a line for what each survey and sweep saw.
+/// Prints the special points as text, and a line for each survey and sweep.
 pub fn print_special(diagram: &Diagram, model: &Model) -> Result<(), Failure> {
     let mut out = std::io::BufWriter::new(stdout().lock());
     if diagram.responses.is_empty() || !diagram.branches.is_empty() {
@@ -153,11 +153,11 @@ pub struct Run {
     pub model: Model,
     pub plan: Plan,
     pub diagram: Diagram,
-    /// What each remark is about, and the remark.
+    /// Subject of each remark, and the remark.
     pub notes: Vec<(String, String)>,
 }
 
-/// The run in a folder, as much of it as is asked for.
+/// Reads as much of the run in a folder as `part` asks for.
 pub fn read(folder: &Path, part: Part) -> Result<Run, Failure> {
     let run = load_part(folder, part)?;
     let study = parse_study_of_run(&run.study_text, &run.study_file, &run.model_text, &run.model_file)?;
@@ -166,12 +166,12 @@ pub fn read(folder: &Path, part: Part) -> Result<Run, Failure> {
     let shown: Vec<&String> = seeds.chain(diagram.branches.iter().map(|b| &b.name)).collect();
     let mut notes = run.notes;
     notes.extend(diagram.shortfalls.iter().map(|own| (own.about.clone(), format!("incomplete: {}", own.what))));
-    // Remarks about one thing stay in the order in which they were made.
+    // Remarks on one subject stay in the order in which they were made.
     notes.sort_by_key(|(about, _)| shown.iter().position(|name| of_name(name, about)).unwrap_or(usize::MAX));
     Ok(Run { model: study.model, plan: study.plan, diagram, notes })
 }
 
-/// Which branches are meant by a name that was typed: all without one.
+/// Selects the branches meant by a name given on the command line; all of them without a name.
 pub fn asked_for<'n>(diagram: &Diagram, name: Option<&'n str>) -> Result<impl Fn(&Branch) -> bool + use<'n>, Failure> {
     let kept = move |branch: &Branch| name.is_none_or(|name| of_name(&branch.name, name));
     if let Some(name) = name.filter(|_| !diagram.branches.iter().any(kept)) {
@@ -181,7 +181,7 @@ pub fn asked_for<'n>(diagram: &Diagram, name: Option<&'n str>) -> Result<impl Fn
     Ok(kept)
 }
 
-/// Whether a branch goes by that name: its own, or that of the homotopy of which it is a leg.
+/// True if a branch has that name, or is a run of the homotopy of that name.
 fn of_name(branch: &str, name: &str) -> bool {
     branch == name || leg(branch, name).is_some()
 }

@@ -1,15 +1,15 @@
-//! The tables of what surveys and sweeps saw.
+//! Tables of surveys and sweeps.
 
 use super::{Cell, Column, Style, Table};
 use foldline::diagram::{Diagram, Motion, Response, Responses, Search, Shown};
 use foldline::model::{Model, Output, State};
 
-/// Most states whose extremes are shown beside those of outputs.
+/// Maximum number of states whose extremes are shown beside those of outputs.
 const SHOWN: usize = 4;
 
-/// One row for each response: set, search, every parameter, motion, ratio, multiplicity, period, the extremes of outputs and
-/// states, hits, the share of the uniform starts of a survey with its 95 % confidence interval, time until settled, error, and whether a
-/// sweep jumped there.
+/// Table with one row per response: set, search, every parameter, motion, ratio, multiplicity, period, the extremes of
+/// outputs and states, hits, the share of the uniform starts of a survey with its 95 % confidence interval, time until
+/// settled, error, and whether a sweep jumped there.
 pub fn responses(diagram: &Diagram, model: &Model) -> Table {
     let mut columns = words(&["set", "search"]);
     columns.extend(model.parameters.iter().map(|p| Column::in_unit(&p.name, Style::Varying, &p.unit)));
@@ -19,7 +19,7 @@ pub fn responses(diagram: &Diagram, model: &Model) -> Table {
         ["min", "max"].map(|end| Column::in_unit(&format!("{}_{end}", own.name), Style::Number, &own.unit))
     };
     columns.extend(model.outputs.iter().flat_map(extremes));
-    // Of large models with outputs a reader wants the outputs.
+    // For large models with outputs, the outputs are of interest.
     let style = if model.outputs.is_empty() || model.states.len() <= SHOWN { Style::Number } else { Style::Exact };
     let of_state =
         |own: &State| ["min", "max"].map(|end| Column::in_unit(&format!("{}_{end}", own.name), style, &own.unit));
@@ -60,7 +60,7 @@ pub fn responses(diagram: &Diagram, model: &Model) -> Table {
     Table { columns, rows: rows.collect() }
 }
 
-/// One row for each set: what it varied, how many values it visited, what it met, where it jumped.
+/// Table with one row per set: what it varied, how many values it visited, which motions it met, where it jumped.
 pub fn summary(diagram: &Diagram, model: &Model) -> Table {
     let mut columns = words(&["set", "search", "free"]);
     columns.extend(["from", "to", "values"].map(|name| column(name, Style::Number)));
@@ -81,7 +81,7 @@ pub fn summary(diagram: &Diagram, model: &Model) -> Table {
     Table { columns, rows: diagram.responses.iter().map(row).collect() }
 }
 
-/// A survey starts anew at every value and does not jump.
+/// Positions of the jumps of a sweep. A survey takes new starts at every value and does not jump.
 fn jumps(set: &Responses) -> Vec<usize> {
     if set.search == Search::Sweep { set.jumps() } else { Vec::new() }
 }

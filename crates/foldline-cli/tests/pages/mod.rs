@@ -1,4 +1,4 @@
-//! Pages whose examples are run, and whose quotations are what the program prints.
+//! Pages whose examples are run, and whose quotations must match what the program prints.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -8,7 +8,7 @@ pub fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
-/// A page, line by line, with the folder in which its commands run and the one in which its pictures are kept.
+/// A page as lines, with the folder in which its commands run and the one in which its pictures are kept.
 pub struct Page {
     path: PathBuf,
     name: String,
@@ -18,14 +18,14 @@ pub struct Page {
     pictures: PathBuf,
 }
 
-/// A command of a page, and the lines below it that are its answer.
+/// A command on a page, and the lines below it that quote its output.
 struct Quoted {
     command: String,
     answer: std::ops::Range<usize>,
 }
 
 impl Page {
-    /// Opens a page whose commands run in `place`, a folder on the desk, and whose pictures are kept in `pictures`.
+    /// Opens a page whose commands run in `place`, a folder inside `desk`, and whose pictures are kept in `pictures`.
     pub fn open(path: &Path, desk: tempfile::TempDir, place: PathBuf, pictures: PathBuf) -> Page {
         let text = std::fs::read_to_string(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
         let name = path.strip_prefix(root()).unwrap_or(path).display().to_string();
@@ -33,14 +33,14 @@ impl Page {
         Page { path: path.to_path_buf(), name, lines, _desk: desk, place, pictures }
     }
 
-    /// The lines inside the blocks of a kind.
+    /// Line ranges inside the blocks of one language.
     fn blocks(&self, kind: &str) -> Vec<std::ops::Range<usize>> {
         let fence = format!("```{kind}");
         let begins = self.lines.iter().enumerate().filter(|(_, line)| **line == fence).map(|(k, _)| k + 1);
         begins.map(|k| k..k + self.lines[k..].iter().position(|line| line == "```").unwrap()).collect()
     }
 
-    /// Writes the files; returns the names of the studies among them.
+    /// Writes the files of the page; returns the names of the studies among them.
     fn lay_out(&self) -> Vec<String> {
         let mut studies = Vec::new();
         for block in self.blocks("toml") {
@@ -74,7 +74,7 @@ impl Page {
         all
     }
 
-    /// Output of a command: the table and the list of what is incomplete; or the reason for a refusal.
+    /// Output of a command: its table and the list of incomplete parts, or the reason for a refusal.
     fn answer(&self, command: &str) -> Vec<String> {
         let run = Command::new(env!("CARGO_BIN_EXE_foldline"))
             .args(command.split(' '))
@@ -94,7 +94,7 @@ impl Page {
         lines.map(|line| line.trim_end().to_string()).collect()
     }
 
-    /// The pictures shown on the page that its commands draw: SVG files. Others are not checked.
+    /// The SVG pictures shown on the page that its commands draw. Other pictures are not checked.
     fn pictures(&self) -> Vec<&str> {
         let shown = self.lines.iter().filter(|line| line.starts_with("!["));
         let targets = shown.filter_map(|line| line.split_once("](")?.1.strip_suffix(')'));
@@ -102,7 +102,7 @@ impl Page {
     }
 }
 
-/// The number of a word, and how many decimals it has; `None` for those with an exponent.
+/// Number in a word, and its number of decimals; no number of decimals with an exponent.
 fn number(word: &str) -> Option<(f64, Option<i32>)> {
     let word = word.trim_matches(|c: char| ",:;()=".contains(c));
     let value = word.parse::<f64>().ok()?;
@@ -110,7 +110,7 @@ fn number(word: &str) -> Option<(f64, Option<i32>)> {
     Some((value, Some(decimals).filter(|_| !word.contains('e'))))
 }
 
-/// True if two lines agree: the same words, and numbers that agree to the digits printed or the error that stands beside them.
+/// True if two lines agree: the same words, and numbers equal to the printed digits or to the error stated beside them.
 pub fn same(quoted: &str, found: &str) -> bool {
     let words = |line: &str| line.split_whitespace().map(str::to_string).collect::<Vec<_>>();
     let (quoted, found) = (words(quoted), words(found));
@@ -123,7 +123,7 @@ pub fn same(quoted: &str, found: &str) -> bool {
                 let unit = if decimals == 0 { 0.0 } else { 10f64.powi(-decimals) };
                 (a - b).abs() <= (1.01 * unit).max(error * (1.0 + a.abs()) * f64::from(decimals.min(1)))
             }
-            // An error, of which the size is what matters.
+            // Of an error only the magnitude matters.
             (Some((a, None)), Some((b, None))) => a / b < 10.0 && b / a < 10.0,
             _ => a == b,
         })
@@ -135,7 +135,7 @@ fn labels(picture: &Path) -> Vec<String> {
     text.split("<text").skip(1).filter_map(|t| Some(t.split_once('>')?.1.split_once('<')?.0.to_string())).collect()
 }
 
-/// The keys of docs/references.bib that the last line of a page cites: names followed by a year.
+/// Keys of docs/references.bib cited in the last line of a page: names followed by a year.
 pub fn keys(page: &Path) -> Vec<String> {
     let text = std::fs::read_to_string(page).unwrap();
     let last = text.lines().last().unwrap_or_default();
@@ -144,7 +144,7 @@ pub fn keys(page: &Path) -> Vec<String> {
     words.filter(|word| word.len() > 6 && word.ends_with(|c: char| c.is_ascii_digit())).map(str::to_string).collect()
 }
 
-/// Runs the examples of a page; what is not as quoted.
+/// Runs the examples of a page; returns the differences from its quotations.
 pub fn check(mut page: Page, renew: bool) -> Vec<String> {
     let (studies, quoted, mut wrong) = (page.lay_out(), page.quoted(), Vec::new());
     assert!(!quoted.is_empty(), "{} has no example", page.name);
@@ -196,7 +196,7 @@ pub fn copy(from: &Path, to: &Path) {
     }
 }
 
-/// Opens and checks every page, two at a time; returns what is not as quoted.
+/// Opens and checks every page, two at a time; returns the differences from their quotations.
 pub fn check_all(pages: &[PathBuf], open: fn(&Path) -> Page, renew: bool) -> Vec<String> {
     let next = AtomicUsize::new(0);
     let work = || {

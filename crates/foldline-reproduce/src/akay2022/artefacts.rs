@@ -1,33 +1,33 @@
-//! Which solutions of a smoothed contact rotor exist only because the smoothing is what it is.
+//! Solutions of a smoothed contact rotor that exist only because of the smoothing.
 //!
-//! **Idea.** Every point of a branch is followed in K alone, to a much larger K. The points from which K turns back before form
-//! stretches; where neighbours differ, the end of the stretch between them is found by bisection along the branch.
-//! Next to a fold, from which K may turn back at once, the branch is tried on both sides of the fold.
+//! **Idea.** Every point of a branch is continued in K alone to a much larger K. The points whose curve in K turns back
+//! before form stretches; between neighbours that differ, the end of the stretch is found by bisection along the
+//! branch. Since a curve may turn back at once from a fold, the branch is tested on both sides of each fold.
 //!
-//! **Fails when** a stretch is shorter than the distance of two neighbouring points and has no fold.
+//! **Fails when** a stretch is shorter than the distance between two neighbouring points and has no fold.
 
 use super::rotor::{OMEGA, max_r};
 use crate::runs::{Run, Runs, Table, in_parallel};
 use foldline::diagram::{Branch, Kind, Origin, Point};
 use foldline::explore::{Persistence, System, growth, known, persistence};
 
-/// Place of K among the parameters.
+/// Position of K among the parameters.
 pub const SHARPNESS: usize = 6;
-/// Points of a curve in K.
+/// Maximum number of points of a curve in K.
 const MOST: usize = 4000;
-/// How close to a fold the branch is tried, as a share of the way to the next point.
+/// Distance from a fold at which the branch is tested, as a fraction of the way to the next point.
 const BESIDE: f64 = 0.02;
-/// Halvings of the distance of two points, in Ω.
+/// Number of halvings of the interval between two points, in Ω.
 const HALVINGS: usize = 12;
 
-/// A stretch of a branch whose points vanish.
+/// Part of a branch whose points vanish.
 #[derive(Clone, Debug, Default)]
 pub struct Stretch {
     /// Ω and max r, from end to end.
     pub places: Vec<[f64; 2]>,
-    /// The smallest and the largest K up to which its points exist.
+    /// Smallest and largest K up to which its points exist.
     pub until: [f64; 2],
-    /// Folds of the branch on it.
+    /// Number of folds of the branch on it.
     pub folds: usize,
 }
 
@@ -38,23 +38,23 @@ impl Stretch {
         values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], v| [low.min(v), high.max(v)])
     }
 
-    /// How much of Ω it covers.
+    /// Extent in Ω.
     pub fn width(&self) -> f64 {
         let [low, high] = self.range(0);
         high - low
     }
 }
 
-/// What becomes of the points of a branch.
+/// Fates of the points of a branch.
 #[derive(Clone, Debug, Default)]
 pub struct Fates {
-    /// Where points vanish, in the order of the branch.
+    /// Stretches of vanishing points, in the order of the branch.
     pub stretches: Vec<Stretch>,
-    /// How many points were followed.
+    /// Number of points tested.
     pub tested: usize,
-    /// How many of them get another stability.
+    /// Number of points whose stability changes.
     pub changed: usize,
-    /// How many could not be followed to the end.
+    /// Number of points that could not be followed to the end.
     pub undecided: usize,
 }
 
@@ -74,7 +74,7 @@ impl Fates {
         self.stretches.iter().map(words).collect::<Vec<_>>().join("; ")
     }
 
-    /// How many points were looked at, in words.
+    /// Number of points tested, in words.
     pub fn tested_in_words(&self) -> String {
         let others = match (self.changed, self.undecided) {
             (0, 0) => String::new(),
@@ -84,7 +84,7 @@ impl Fates {
     }
 }
 
-/// The fates of the points of a branch as K goes `to` another value.
+/// Determines the fates of the points of a branch as K goes `to` another value.
 ///
 /// # Errors
 /// There is no such branch.
@@ -96,7 +96,7 @@ pub fn fates(runs: &Runs, run: &Run, name: &str, to: f64) -> Result<Fates, Strin
     Ok(read(&table))
 }
 
-/// Why a point is in the list, and what becomes of it.
+/// Fate of a point, or the mark of a fold in the list of points.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Fate {
     Survives,
@@ -136,7 +136,7 @@ impl<'s> Search<'s> {
         }
     }
 
-    /// The solution at that Ω between two points without a fold between them.
+    /// Solution at that Ω between two points without a fold between them.
     fn between(&self, a: &Point, b: &Point, omega: f64) -> Option<Point> {
         let mut part = Branch::new("part", self.branch.family, self.branch.free, Origin::Seed(String::new()));
         part.points = vec![a.clone(), b.clone()];
@@ -145,7 +145,7 @@ impl<'s> Search<'s> {
         known::solutions_at(&self.system, &settings, &part, omega).pop()
     }
 
-    /// Points and folds of the branch in their order, with two more points next to each fold.
+    /// Points and folds of the branch in order, with two additional points next to each fold.
     fn nodes(&self) -> Vec<(Point, bool)> {
         let mut track: Vec<(&Point, bool)> = self.branch.points.iter().map(|p| (p, false)).collect();
         for fold in self.branch.special.iter().filter(|s| s.kind == Kind::Fold) {
@@ -170,7 +170,7 @@ impl<'s> Search<'s> {
         nodes
     }
 
-    /// The last place where points vanish on the way from `a`, which does, to `b`, which does not.
+    /// Last position at which points vanish on the way from `a`, which vanishes, to `b`, which does not.
     fn end(&self, a: &Point, b: &Point) -> [f64; 2] {
         let (mut inside, mut outside) = (a.clone(), b.clone());
         for _ in 0..HALVINGS {
@@ -186,8 +186,8 @@ fn place(point: &Point) -> [f64; 2] {
     [point.parameters[OMEGA], max_r(point)]
 }
 
-/// The first row counts; each other row is a place on a stretch: its number, Ω, max r, K of a point that was followed or not a
-/// number, and 1 for a fold.
+/// Table of results. The first row holds the counts. Each other row is a point on a stretch: number of the stretch, Ω,
+/// max r, K up to which the point exists or NaN, and 1 for a fold.
 fn table(search: &Search, jobs: usize) -> Table {
     let nodes = search.nodes();
     let fates = in_parallel(jobs, &nodes, |(point, fold)| if *fold { Fate::Fold } else { search.fate(point) });
@@ -198,7 +198,7 @@ fn table(search: &Search, jobs: usize) -> Table {
     let mut row = |number: f64, [omega, r]: [f64; 2], k: f64, fold: bool| {
         rows.push(vec![number, omega, r, k, f64::from(u8::from(fold))]);
     };
-    // Fate and index of the point before, and the fold between it and this one.
+    // Fate and index of the previous point, and the fold between it and the current one.
     let (mut before, mut fold): (Option<usize>, Option<usize>) = (None, None);
     for k in 0..nodes.len() {
         if fates[k] == Fate::Fold {
@@ -244,7 +244,7 @@ fn read(table: &[Vec<f64>]) -> Fates {
                 let Some(stretch) = fates.stretches.last_mut() else { continue };
                 stretch.places.push([omega, r]);
                 stretch.folds += usize::from(fold > 0.5);
-                // Not a number leaves both as they are.
+                // NaN leaves both unchanged.
                 stretch.until = [stretch.until[0].min(until), stretch.until[1].max(until)];
             }
             _ => {}

@@ -1,4 +1,4 @@
-//! Figure 3: the smoothed contact law: its switch, the force next to contact, and how sharp it must be.
+//! Figure 3: the smoothed contact law: its switch, the force near contact, and the sharpness required.
 
 use super::rotor::FAMILIES;
 use super::sharpness::{Choice, Comparison, PUBLISHED, choice};
@@ -13,7 +13,7 @@ use std::fmt::Write;
 pub const PLAN: FigurePlan =
     FigurePlan { name: "3", title: "the smoothed contact law and the choice of K", runs: &["diagrams"], make };
 
-/// β and K: the reference, the softer ring as validated, and the softer ring with a switch that is too blunt.
+/// β and K: the reference, the softer ring as validated, and the softer ring with an insufficient sharpness.
 const LAWS: [(f64, f64, &str); 3] = [(10.0, 150.0, BLUE), (6.0, 90.0, PURPLE), (6.0, 30.0, ORANGE)];
 
 fn make(runs: &Runs) -> Result<Made, String> {
@@ -29,7 +29,7 @@ fn make(runs: &Runs) -> Result<Made, String> {
     Ok(Made { figure: Figure::grid("Smoothed contact", 2, panels), caption: caption(&choice), claims })
 }
 
-/// The switch and the force.
+/// Panels of the switch and the force.
 fn law() -> [Panel; 2] {
     let radius = |k: usize| 0.9 + 0.2 * k as f64 / 800.0;
     let along = |f: &dyn Fn(f64) -> f64, from: usize, to: usize| -> Vec<[f64; 2]> {
@@ -52,7 +52,7 @@ fn law() -> [Panel; 2] {
     [switch, force.with(Layer::vertical(1.0))]
 }
 
-/// The error of every motion over K.
+/// Panel of the error of every motion against K.
 fn errors(choice: &Choice, label: &str, beta: f64, published: f64) -> Panel {
     let axes = (Axis::new("K").from(10.0, 2000.0).log(), Axis::new("relative error").from(1e-7, 0.01).log());
     let mut panel = Panel::new(label, format!("error of smoothing, β = {beta}, Ω = 5"), axes.0, axes.1);
@@ -103,7 +103,7 @@ fn caption(choice: &Choice) -> String {
     text
 }
 
-/// Whether the published K are sharp enough: no motion is farther off than a curve is wide in print, a thousandth.
+/// Claim that the published K are sharp enough: no error exceeds the width of a printed curve, a thousandth.
 fn acceptable(choice: &Choice) -> Claim {
     let finding = || {
         let (mut list, mut worst) = (Vec::new(), 0.0_f64);
@@ -126,12 +126,12 @@ fn acceptable(choice: &Choice) -> Claim {
     Claim::decided("3", "K = 150 for β = 10 and K = 90 for β = 6 are sharp enough", "yes", finding())
 }
 
-/// Whether K = 15 β is as exact for the softer ring as for the harder one.
+/// Claim that K = 15 β is as accurate for the softer ring as for the harder one.
 fn equivalent(choice: &Choice) -> Claim {
     let finding = || {
         let [k, error] = choice.equivalent.ok_or("no K was found")?;
         let taken = PUBLISHED[1].1;
-        // The search ends at a hundredth.
+        // The search is accurate to a hundredth.
         let uncertain = 0.01 * k;
         let note = format!(
             "both errors are then {}; K = 15 β errs on the safe side for a softer ring",
@@ -143,7 +143,7 @@ fn equivalent(choice: &Choice) -> Claim {
     Claim::decided("3", statement, "yes", finding())
 }
 
-/// The largest pull, found by narrowing down.
+/// Claim on the largest pull, found by narrowing down an interval.
 fn pull(beta: f64, k: f64) -> Claim {
     let force = |r: f64| ContactLaw::Tanh.force(r, beta, k);
     let (mut low, mut high) = (1.0 - 2.0 / k, 1.0);

@@ -1,4 +1,4 @@
-//! Figure 4: ways from the cubic to the contact rotor.
+//! Figure 4: paths from the cubic to the contact rotor.
 
 use super::rotor::{MAX_R, OMEGA, SPEED, max_r, parameters, speeds};
 use crate::claims::{Claim, Finding, digits};
@@ -58,7 +58,7 @@ fn over_kappa(flows: &Run) -> Result<Panel, String> {
     Ok(panel)
 }
 
-/// The lower folds as curves in both parameters, and where runs in Ω alone find that of SL.
+/// Panel of the lower folds as curves in both parameters, with the fold of SL found by runs in Ω alone.
 fn folds(flows: &Run, steps: &Run) -> Result<Panel, String> {
     let names = steps.study.plan.branches.iter().map(|b| b.name.clone()).filter(|name| name.starts_with("SL "));
     let places: Vec<[f64; 2]> = names.filter_map(|name| first_fold(steps, &name)).map(|[w, k, _]| [k, w]).collect();
@@ -72,7 +72,7 @@ fn folds(flows: &Run, steps: &Run) -> Result<Panel, String> {
     Ok(panel.with(Layer::scatter(places, Marker::Circle, GREY).hollow().named("folds of runs in Ω")))
 }
 
-/// The fold at the lowest Ω: Ω, κ and the error of Ω.
+/// Fold at the lowest Ω: Ω, κ and the error of Ω.
 fn first_fold(run: &Run, branch: &str) -> Option<[f64; 3]> {
     let folds = run.special(branch, Kind::Fold).ok()?;
     let first = folds.into_iter().min_by(|a, b| a.point.parameters[OMEGA].total_cmp(&b.point.parameters[OMEGA]))?;
@@ -81,7 +81,7 @@ fn first_fold(run: &Run, branch: &str) -> Option<[f64; 3]> {
     Some([omega, kappa, error])
 }
 
-/// Whether the fold curve ends on the fold that the contact branch has.
+/// Claim that the fold curve ends at the fold of the contact branch.
 fn through(flows: &Run, sampled: &Run, family: &str) -> Claim {
     let finding = || {
         let curve = flows.branch(&format!("{family} fold"))?;
@@ -118,7 +118,7 @@ fn reached(flows: &Run, sampled: &Run, label: &str, family: &str, [x0, x1, y0, y
     Ok(panel.with(Layer::scatter(places, Marker::Dot, GREY).wide(2.0).named("sampled")))
 }
 
-/// Whether a flow ends on the branch that another run has: it has the same special points.
+/// Finding that a flow ends on the branch of another run: it has the same special points.
 fn same(flows: &Run, flow: &str, others: &Run, branch: &str) -> Result<Finding, String> {
     for branch in [flows.branch(flow)?, others.branch(branch)?] {
         if let Some(short) = branch.ends.iter().flatten().find(|end| !end.complete()) {
@@ -149,7 +149,7 @@ fn flow(name: &str, flows: &Run, sampled: &Run, family: &str) -> Claim {
     Claim::decided("4", format!("Flow ({name}) reaches contact {family}"), "yes", finding)
 }
 
-/// A homotopy whose route the program chose.
+/// Claim on a homotopy whose path the program chose.
 pub fn chosen(figure: &'static str, flows: &Run, set: &str, family: &str, others: &Run) -> Claim {
     let homotopy = format!("{set} {family} to contact");
     let about = flows.notes.iter().filter(|(about, _)| *about == homotopy);

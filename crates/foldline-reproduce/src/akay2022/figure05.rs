@@ -1,4 +1,5 @@
-//! Figure 5: the orbits of SL and DL at Ω = 5 with contact, in the rotating frame, and their signed spectra in both frames.
+//! Figure 5: the orbits of SL and DL at Ω = 5 with contact, in the rotating frame, and their signed spectra in both
+//! frames.
 
 use super::orbits::{cycle, multiple, orbit, orbit_panel, stems};
 use super::rotor::{colour, stable_at};
@@ -64,7 +65,7 @@ fn panel(label: &str, title: &str, peaks: &[Line], colour: &'static str) -> Pane
     Panel { height: 300.0, ..panel.with(Layer::vertical(0.0)).with(stems(peaks, colour, peaks.len())) }
 }
 
-/// A row for each line: its order, its amplitude, and its frequency and whirl in both frames.
+/// Writes one row per line: order, amplitude, and frequency and whirl in both frames.
 fn table(out: &mut String, spectrum: &Spectrum) {
     let inertial = spectrum.peaks(Frame::Inertial, SHARE);
     for (line, standing) in spectrum.peaks(Frame::Rotating, SHARE).iter().zip(inertial) {
@@ -96,7 +97,7 @@ fn strongest(family: &str, spectrum: &Spectrum, wanted: [i64; 2], error: f64) ->
     Claim::decided("5", format!("The strongest lines of {family}"), study, Ok(finding))
 }
 
-/// In which sense the two strongest whirling lines turn for a standing observer.
+/// Claim on the senses of rotation of the two strongest whirling lines in the inertial frame.
 fn standing(family: &str, spectrum: &Spectrum, error: f64) -> Claim {
     let lines: Vec<Line> =
         spectrum.peaks(Frame::Inertial, SHARE).into_iter().filter(|l| l.order != 0).take(2).collect();

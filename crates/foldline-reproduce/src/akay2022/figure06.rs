@@ -42,7 +42,7 @@ fn make(runs: &Runs) -> Result<Made, String> {
     })
 }
 
-/// How often the orbit crosses itself in a period: a polygon's sides that are no neighbours are compared in pairs.
+/// Number of self-intersections of the orbit in a period: non-adjacent sides of a polygon are compared in pairs.
 fn crossings(cycle: &Cycle) -> usize {
     const SIDES: usize = 600;
     let n = cycle.dim().max(2);

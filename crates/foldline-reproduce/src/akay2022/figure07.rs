@@ -1,4 +1,4 @@
-//! Figure 7: bifurcation diagrams with the cubic spring and with contact, and whether the branches close.
+//! Figure 7: bifurcation diagrams with the cubic spring and with contact, and closure of the branches.
 
 use super::identities;
 use super::rotor::{MAX_R, OMEGA, colour, is_closed, last, max_r, over_speed, parameters};
@@ -45,7 +45,7 @@ fn make(runs: &Runs) -> Result<Made, String> {
     })
 }
 
-/// The branches of one law, period-doubled ones thinner.
+/// Layers of the branches of one law, with period-doubled ones thinner.
 fn layers(run: &Run, law: &str) -> Vec<Layer> {
     let mut layers = Vec::new();
     for branch in run.diagram.branches.iter().filter(|b| b.name.starts_with(law)) {
@@ -57,12 +57,12 @@ fn layers(run: &Run, law: &str) -> Vec<Layer> {
             layers.extend(over_speed(branch, family, MAX_R));
         }
     }
-    // Curves first, marks on top; the thin ones are named last.
+    // Curves first, marks on top; the thin ones come last in the legend.
     layers.sort_by_key(|layer| (matches!(layer.shape, Shape::Scatter { .. }), layer.width < 1.1));
     layers
 }
 
-/// The speeds at which SL is unstable and DL stable, in place of the window around 4.4 to 4.8 that is claimed.
+/// Claim on the speeds at which SL is unstable and DL stable, against the window around 4.4 to 4.8 of the publication.
 fn window(run: &Run) -> Claim {
     let finding = || {
         let edge = |name: &str| -> Result<[f64; 2], String> {
@@ -71,7 +71,7 @@ fn window(run: &Run) -> Claim {
             Ok(run.place(OMEGA, top))
         };
         let ([from, e1], [to, e2]) = (edge("contact DL")?, edge("contact SL")?);
-        // Counted on the branches themselves, between the period doublings.
+        // Checked on the branches themselves, between the period doublings.
         let unstable = |name: &str, at: f64| Ok::<bool, String>(run.at(name, at)?.iter().all(|p| p.unstable > 0));
         let mut holds = from < 4.4 && to > 4.8;
         for at in [4.4, 4.6, 4.8] {
@@ -115,7 +115,7 @@ fn doublings(run: &Run) -> Vec<Claim> {
     ]
 }
 
-/// Whether S and SL stay open.
+/// Claims that S and SL stay open.
 fn closing(run: &Run, far: &Run) -> Vec<Claim> {
     let reached = |branch: &Branch, bound: f64| branch.ends.iter().flatten().any(|e| *e == Ending::Bound(bound));
     let cubic = |name: &str| {
@@ -143,7 +143,7 @@ fn closing(run: &Run, far: &Run) -> Vec<Claim> {
         let both = upper.ends.iter().flatten().chain(far.branch("cubic S resonant")?.ends.iter().flatten());
         let at_100 = both.filter(|e| **e == Ending::Bound(100.0)).count();
         let ours = format!("{at_100} of 3 arms of S reach Ω = 100");
-        // S exists with three radii at every speed beyond its fold as long as ζ < (mε/2) sqrt(γ/(1-J_p)).
+        // S has three radii at every speed beyond its fold as long as ζ < (mε/2) sqrt(γ/(1-J_p)).
         let [_, _, _, epsilon, gamma, _, _, j_p, m] = parameters(&upper.points[0]);
         let limit = 0.5 * m * epsilon * (gamma / (1.0 - j_p)).sqrt();
         Ok(Finding::fact(at_100 == 3, ours).noting(format!("in closed form: open for ζ < {limit:.6}")))
@@ -158,7 +158,7 @@ fn closing(run: &Run, far: &Run) -> Vec<Claim> {
     ]
 }
 
-/// Identities that do not depend on how the cycles were computed.
+/// Identities that do not depend on the method by which the cycles were computed.
 fn checks(run: &Run) -> Vec<Claim> {
     let tolerance = run.study.plan.tolerance;
     let (defects, cycles) = identities::of_cycles(run.diagram.branches.iter());

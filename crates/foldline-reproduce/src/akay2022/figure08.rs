@@ -1,4 +1,4 @@
-//! Figure 8: the lowest part of SL on the way from cubic to contact stiffness.
+//! Figure 8: the lowest part of SL on the path from cubic to contact stiffness.
 
 use super::rotor::{MAX_R, SPEED, least_radius, parameters};
 use crate::claims::{Claim, Finding, digits};

@@ -1,4 +1,4 @@
-//! Figure 9: period-doubled branches of the contact rotor, and what simulation meets of them.
+//! Figure 9: period-doubled branches of the contact rotor, and the motions found by simulation.
 
 use super::rotor::{MAX_R, SPEED, max_r, over_speed, speeds};
 use super::simulation::{self, Simulated};
@@ -53,7 +53,7 @@ fn empty(label: &str, title: &str, [x0, x1, y0, y1]: [f64; 4]) -> Panel {
     Panel { height: 400.0, ..Panel::new(label, title, axes.0, axes.1) }
 }
 
-/// A family with the branches of twice and four times its period, marks last.
+/// Layers of a family with the branches of two and four times its period, marks last.
 fn family(run: &Run, family: &str, marks: bool) -> Result<Vec<Layer>, String> {
     let root = run.branch(&format!("contact {family}"))?;
     let mut layers = over_speed(root, family, MAX_R);
@@ -77,14 +77,14 @@ fn doubled(run: &Run, label: &str, name: &str, window: [f64; 4]) -> Result<Panel
     Ok(empty(label, name, window).with_all(family(run, name, true)?).with(Layer::horizontal(1.0)))
 }
 
-/// (c): SL as simulation from many starts sees it.
+/// (c): SL as sampled by simulation from many starts.
 fn sampled(run: &Run, simulated: &Simulated) -> Result<Panel, String> {
     let panel = empty("(c)", "SL, simulated from many starts", SL).with_all(family(run, "SL", true)?);
     let [met, missed] = survey(simulated);
     Ok(panel.with(Layer::horizontal(1.0)).with(missed).with(met))
 }
 
-/// What the survey met, and what only a start beside it did.
+/// Layers of the motions found by the survey, and of those reached only from a nearby start.
 fn survey(simulated: &Simulated) -> [Layer; 2] {
     let dot = |points: Vec<[f64; 2]>, name: &str| Layer::scatter(points, Marker::Circle, GREY).wide(2.6).named(name);
     let met = simulated.survey.met.iter().map(|met| place(&met.motion)).collect();
@@ -111,7 +111,7 @@ fn swept(run: &Run, simulated: &Simulated) -> Result<Panel, String> {
     Ok(panel)
 }
 
-/// (e): everything that simulation met, over everything that was followed.
+/// (e): everything found by simulation, drawn over all branches.
 fn everything(run: &Run, other: &Run, simulated: &Simulated) -> Result<Panel, String> {
     let mut panel = empty("(e)", "all attractors in this window", [3.2, 5.2, 0.2, 3.6]);
     panel.span = 2;
@@ -149,7 +149,7 @@ fn cascade(run: &Run, family: &str) -> Vec<Claim> {
             })
             .collect();
         let list: Vec<String> = ends.iter().map(|at| format!("{at:.6}")).collect();
-        // The farther of the ends from the period doubling that it should be.
+        // The end farther from the corresponding period doubling counts.
         let doublings = speeds(run, &run.special(&format!("contact {family}"), Kind::PeriodDoubling)?);
         let apart =
             |end: &f64| doublings.iter().map(|[at, error]| (at - end).abs() + error).fold(f64::INFINITY, f64::min);

@@ -1,4 +1,4 @@
-//! Figures 10 and 11: next to no damping.
+//! Figures 10 and 11: almost no damping.
 
 use super::figure04::chosen;
 use super::rotor::{FAMILIES, MAX_R, least_radius, over_speed};

@@ -1,4 +1,4 @@
-//! Figures 12 and 13: next to no damping and a large unbalance.
+//! Figures 12 and 13: almost no damping and a large unbalance.
 
 use super::figure04::chosen;
 use super::figure10::diagrams;
@@ -47,7 +47,7 @@ fn contact(runs: &Runs) -> Result<Made, String> {
     })
 }
 
-/// The straight run turns back; of ε and ζ, which change together, only ε matters there.
+/// Claim that the straight run turns back. ε and ζ change together, but only ε matters there.
 fn straight(run: &Run) -> Claim {
     let finding = || {
         let folds = run.special("cubic SL to 1.5/1", Kind::Fold)?;
@@ -60,8 +60,8 @@ fn straight(run: &Run) -> Claim {
     Claim::decided("12", "At Ω = 5 the cubic SL turns back before ε = 1.5", "1.465", finding())
 }
 
-/// How close a family of cycles comes to S, measured by how much the radius varies along the cycle. Only at a Hopf point can
-/// cycles end on S: everywhere else a neighbourhood of S, however small, has none.
+/// Claim on the distance of a family of cycles from S, measured by the variation of the radius along the cycle. Cycles
+/// can end on S only at a Hopf point; any other point of S has a neighbourhood without cycles.
 fn connects(figure: &'static str, run: &Run, law: &str, family: &str) -> Claim {
     let finding = || {
         let [variation, omega] =
@@ -77,7 +77,7 @@ fn connects(figure: &'static str, run: &Run, law: &str, family: &str) -> Claim {
     Claim::decided(figure, format!("S and {family} connect, or nearly so"), "yes", finding())
 }
 
-/// A stable stretch of DL at smaller radii than the main one, at the same speeds.
+/// Claim on a stable part of DL at smaller radii than the main one, at the same speeds.
 fn second_zone(run: &Run) -> Claim {
     let finding = || {
         let zones = stable_zones(run.branch("contact DL")?);
@@ -96,17 +96,17 @@ fn second_zone(run: &Run) -> Claim {
     Claim::decided("13", "DL has a second stable zone below the main one", "yes", finding())
 }
 
-/// A stable stretch of a branch.
+/// A stable part of a branch.
 struct Zone {
     /// Smallest and largest Ω.
     speed: [f64; 2],
     /// Smallest and largest max r.
     radius: [f64; 2],
-    /// The error of the special points at its ends, in Ω.
+    /// Error in Ω of the special points at its ends.
     error: f64,
 }
 
-/// The stable stretches of a branch, from one change of stability to the next.
+/// Stable parts of a branch, each from one change of stability to the next.
 fn stable_zones(branch: &Branch) -> Vec<Zone> {
     let mut marks: Vec<(i64, bool, f64, f64, bool, f64)> = Vec::new();
     for p in &branch.points {
@@ -117,7 +117,7 @@ fn stable_zones(branch: &Branch) -> Vec<Zone> {
         let error = s.error * branch.size(omega);
         marks.push((s.point.position, true, omega, max_r(&s.point), s.unstable_after == 0, error));
     }
-    // A special point lies behind the point of its position.
+    // A special point lies after the point of its position.
     marks.sort_by_key(|m| (m.0, m.1));
     let ends = [marks.first().is_some_and(|m| m.4), marks.last().is_some_and(|m| m.4)];
     let mut zones: Vec<Zone> = Vec::new();
@@ -134,7 +134,7 @@ fn stable_zones(branch: &Branch) -> Vec<Zone> {
         }
         open = stable;
     }
-    // A closed branch that begins inside a zone has met it twice.
+    // A closed branch that begins inside a zone has traversed it in two parts.
     if zones.len() > 1 && ends == [true, true] && is_closed(branch) {
         let first = zones.remove(0);
         if let Some(last) = zones.last_mut() {

@@ -1,4 +1,4 @@
-//! Figure 14: what a contact law that is too smooth invents.
+//! Figure 14: artefacts of a contact law that is too smooth.
 
 use super::artefacts::{Fates, fates};
 use super::rotor::{MAX_R, SPEED, least_radius, max_r};
@@ -14,7 +14,7 @@ pub const PLAN: FigurePlan =
     FigurePlan { name: "14", title: "artefacts of a small K", runs: &["blunt-contact", "diagrams"], make };
 
 const SHARPNESS: [(u32, &str); 2] = [(90, BLUE), (30, VERMILION)];
-/// Ten times the K that the study takes for β = 6 and for β = 10.
+/// Ten times the K of the study for β = 6 and for β = 10.
 const SHARP: [f64; 2] = [900.0, 1500.0];
 
 fn make(runs: &Runs) -> Result<Made, String> {
@@ -38,7 +38,7 @@ fn make(runs: &Runs) -> Result<Made, String> {
     Ok(Made { figure: Figure::grid("A switch that is too blunt", 2, panels), caption: caption(&all), claims })
 }
 
-/// What vanishes, as a broad band below the curve.
+/// Layers of the vanishing parts, as a broad band below the curve.
 fn band(all: &[(String, Fates)], name: &str) -> Vec<Layer> {
     let stretches = all.iter().filter(|(of, _)| of == name).flat_map(|(_, fates)| &fates.stretches);
     let drawn = stretches.map(|s| Layer::curve(&s.places, ORANGE).wide(9.0).faint(0.45).named("vanishes as K grows"));
@@ -128,7 +128,7 @@ fn caption(all: &[&(String, Fates)]) -> String {
     text
 }
 
-/// Claims on what a small K makes up, and whether the K of the study does not.
+/// Claims on the artefacts of a small K, and on their absence at the K of the study.
 fn recognised(all: &[(String, Fates)]) -> Vec<Claim> {
     let of = |name: &str| all.iter().find(|(of, _)| of == name).map(|(_, fates)| fates);
     let below = |name: &str| {
@@ -144,7 +144,7 @@ fn recognised(all: &[(String, Fates)]) -> Vec<Claim> {
         Ok(Finding::qualified(width(after) < 0.5 * width(before), ours)
             .noting(format!("with K = 90: {}", after.in_words())))
     };
-    // SL with K = 90 is not followed down to where these points lie, so their own fate decides.
+    // SL with K = 90 is not followed down to these points, so their own fate decides.
     let gone = |blunt: &str| {
         let fates = of(blunt).ok_or("it was not followed")?;
         let until = fates.stretches.iter().map(|s| s.until[1]).fold(0.0, f64::max);
@@ -160,7 +160,7 @@ fn recognised(all: &[(String, Fates)]) -> Vec<Claim> {
 }
 
 fn of_figure_7(name: &str, fates: &Fates) -> Claim {
-    // One point that vanishes decides, whatever becomes of the others.
+    // A single vanishing point decides, whatever the fates of the others.
     let holds = fates.stretches.is_empty() && fates.changed == 0;
     let finding = match (holds, fates.undecided) {
         (true, 1..) => Err("too few points could be followed".to_string()),
@@ -188,7 +188,8 @@ fn false_piece(run: &Run) -> Claim {
     Claim::decided("14", "With β = 6, K = 30 S has a kink and a false unstable piece below contact", "yes", finding())
 }
 
-/// How far SL reaches below contact, where the ring is not there: with a sharper switch less far, as the width 1/K.
+/// Claim on the reach of SL below contact, where the ring is absent: the reach shrinks like the width 1/K of the
+/// switch.
 fn false_family(run: &Run) -> Claim {
     let lowest = |k: u32| least_radius(run, &format!("light SL {k}"));
     let finding = || {

@@ -1,4 +1,4 @@
-//! What every cycle and every synchronous response of the rotor must satisfy, whatever the computation.
+//! Identities satisfied by every cycle and every synchronous response of the rotor, independent of the computation.
 //!
 //! **Equations.** With U = Σ c_k e^{jkwτ} in the rotating frame:
 //!
@@ -15,8 +15,8 @@ use super::rotor::{max_r, parameters};
 use foldline::diagram::{Branch, Cycle, Point, Solution};
 use foldline::problem::gauss::Scheme;
 
-/// The largest defect of I1, I2, I3 and I4, each relative to the sum of its terms, on all cycles of some branches; and how many
-/// cycles there were.
+/// Largest defects of I1, I2, I3 and I4, each relative to the sum of its terms, over all cycles of some branches; and
+/// the number of cycles.
 pub fn of_cycles<'b>(branches: impl Iterator<Item = &'b Branch>) -> ([f64; 4], usize) {
     let (mut largest, mut count) = ([0.0_f64; 4], 0);
     for point in branches.flat_map(|branch| &branch.points) {
@@ -56,8 +56,8 @@ fn averages(cycle: &Cycle) -> [f64; 4] {
     sums
 }
 
-/// The largest defect of the closed form on the points of a branch of synchronous responses, as an error of r: the residual over
-/// the forcing and the steepness of the left side.
+/// Largest defect of the closed form over the points of a branch of synchronous responses, as an error of r: the
+/// residual over the forcing and the steepness of the left side.
 pub fn of_synchronous(branch: &Branch) -> f64 {
     let defect = |point: &Point| {
         let [w, kappa, zeta, epsilon, gamma, beta, k, j_p, m] = parameters(point);

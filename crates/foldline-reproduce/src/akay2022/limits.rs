@@ -1,8 +1,8 @@
-//! The limit of vanishing unbalance and damping, which the study leaves for later: natural frequencies, the backbones rooted where
-//! they are in the ratio n:1, and the forced cycles that tend to them.
+//! The limit of vanishing unbalance and damping, which the publication leaves open: natural frequencies, the backbones
+//! rooted where they are in the ratio n:1, and the forced cycles that tend to them.
 //!
-//! **Idea.** With ε the damping falls as ε², so that every branch goes on to exist: SL needs ζ/ε below a limit, DL needs ζ/ε²
-//! below one. What is left in the limit is the backbone of `foldline_rotor::backbone`.
+//! **Idea.** The damping falls like ε² with the unbalance ε, so that every branch continues to exist: SL needs ζ/ε
+//! below a limit, DL needs ζ/ε² below one. What remains in the limit is the backbone of `foldline_rotor::backbone`.
 
 mod claims;
 mod panels;
@@ -18,17 +18,18 @@ use foldline_rotor::{Backbone, ContactLaw, Nondimensional, Ratio, Reach, backbon
 pub const PLAN: FigurePlan =
     FigurePlan { name: "limits", title: "vanishing unbalance and damping", runs: &["diagrams", "limits"], make };
 
-/// The parts of the reference unbalance, as the branches of the study `limits` are named; the first is the reference itself.
+/// Fractions of the reference unbalance, as in the branch names of the study `limits`; the first is the reference
+/// itself.
 const PARTS: [&str; 4] = ["", " 1/2", " 1/4", " 1/8"];
 
-/// One kind of cycle under one law: its backbone, and its branches by falling unbalance.
+/// One type of cycle under one law: its backbone, and its branches by decreasing unbalance.
 struct Family<'r> {
     law: &'static str,
     name: &'static str,
     ratio: Ratio,
     /// The constants of the reference.
     constants: Nondimensional,
-    /// The Ω at which its cycles are compared with the backbone.
+    /// Ω at which its cycles are compared with the backbone.
     compared: f64,
     backbone: Backbone,
     levels: Vec<Level<'r>>,
@@ -53,12 +54,12 @@ impl<'r> Family<'r> {
         let levels = PARTS.iter().map(level).collect::<Result<Vec<Level>, String>>()?;
         let constants = Nondimensional::from_parameters(parameters(&levels[0].branch.points[0]));
         let backbone = rooted(&constants, ContactLaw::Tanh, ratio)?;
-        // At 5 the smallest unbalance still moves contact SL by a quarter of what it dips into the ring.
+        // At Ω = 5 the smallest unbalance still changes contact SL by a quarter of its penetration of the ring.
         let compared = if law == "contact" && name == "SL" { 8.0 } else { 5.0 };
         Ok(Family { law, name, ratio, constants, compared, backbone, levels })
     }
 
-    /// `cubic SL`
+    /// Title such as `cubic SL`.
     fn title(&self) -> String {
         format!("{} {}", self.law, self.name)
     }
@@ -69,12 +70,12 @@ impl<'r> Family<'r> {
 }
 
 impl<'r> Level<'r> {
-    /// Every cycle at that Ω.
+    /// All cycles at that Ω.
     fn at(&self, omega: f64) -> Result<Vec<Point>, String> {
         self.run.at(&self.branch.name, omega)
     }
 
-    /// Its folds by growing Ω.
+    /// Folds by increasing Ω.
     fn folds(&self) -> Vec<&'r SpecialPoint> {
         let mut folds: Vec<&SpecialPoint> = self.branch.special.iter().filter(|s| s.kind == Kind::Fold).collect();
         folds.sort_by(|a, b| a.point.parameters[OMEGA].total_cmp(&b.point.parameters[OMEGA]));
@@ -82,7 +83,7 @@ impl<'r> Level<'r> {
     }
 }
 
-/// The backbone as far as a forced branch of the figure reaches.
+/// Backbone over the range of a forced branch of the figure.
 fn rooted(constants: &Nondimensional, law: ContactLaw, ratio: Ratio) -> Result<Backbone, String> {
     let reach = Reach { speeds: [0.5, 12.0], radius: 60.0, tolerance: 1e-8 };
     backbone(constants, law, ratio, &reach).map_err(|mistake| mistake.to_string())

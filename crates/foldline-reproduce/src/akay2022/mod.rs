@@ -24,7 +24,7 @@ use crate::publication::{FigurePlan, Publication, StudyPlan};
 
 const MODEL: &str = include_str!("../../../../models/overhung-rotor.toml");
 
-/// A study of this publication: its name, its file and its weight.
+/// Defines a study of this publication by its name, file and weight.
 macro_rules! study {
     ($name:literal, $weight:literal) => {
         StudyPlan {

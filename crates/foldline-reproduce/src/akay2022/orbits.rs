@@ -9,10 +9,10 @@ use foldline_rotor::Line;
 pub const WHIRL: [usize; 2] = [0, 1];
 const SAMPLES: usize = 1024;
 
-/// The cycle of a point.
+/// Returns the cycle of a point.
 ///
 /// # Errors
-/// It is an equilibrium.
+/// The point is an equilibrium.
 pub fn cycle(point: &Point) -> Result<&Cycle, String> {
     match &point.solution {
         Solution::Cycle(cycle) => Ok(cycle),
@@ -20,7 +20,7 @@ pub fn cycle(point: &Point) -> Result<&Cycle, String> {
     }
 }
 
-/// The orbit in the plane of u and v, closed.
+/// Closed orbit in the (u, v) plane.
 pub fn orbit(cycle: &Cycle, colour: &'static str) -> Layer {
     let n = cycle.dim();
     let states = cycle.uniform(SAMPLES);
@@ -36,14 +36,14 @@ pub fn contact_circle() -> Layer {
     circle
 }
 
-/// An empty panel for orbits with the contact circle in it.
+/// Returns an empty panel for orbits, with the contact circle.
 pub fn orbit_panel(label: &str, title: &str, reach: f64) -> Panel {
     let axis = |name: &str| Axis::new(name).from(-reach, reach);
     let panel = Panel::new(label, title, axis("u"), axis("v")).equal();
     Panel { height: 420.0, ..panel.with(contact_circle()) }
 }
 
-/// `−2w`.
+/// Multiple of w in text, such as `−2w`.
 pub fn multiple(k: i64) -> String {
     match k {
         0 => "0".into(),
@@ -54,7 +54,7 @@ pub fn multiple(k: i64) -> String {
     }
 }
 
-/// Lines of a spectrum as stems over the angular frequency, the first ones labelled with their multiple.
+/// Spectral lines as stems over the angular frequency, the first ones labelled with their multiple.
 pub fn stems(lines: &[Line], colour: &'static str, labelled: usize) -> Layer {
     let label = |(k, line): (usize, &Line)| if k < labelled { multiple(line.order) } else { String::new() };
     let labels = lines.iter().enumerate().map(label).collect();

@@ -1,4 +1,4 @@
-//! The choice of K: how far the smoothed rotor is from the piecewise one.
+//! The choice of K: error of the smoothed rotor relative to the piecewise one.
 
 use super::orbits::cycle;
 use super::rotor::stable_at;
@@ -9,66 +9,66 @@ use foldline_rotor::{
     Nondimensional, SmoothingError, exact_motion, fitted_power, smallest_sharpness, smoothing_errors,
 };
 
-/// The speed at which motions are compared.
+/// Speed at which motions are compared.
 pub const SPEED: f64 = 5.0;
-/// β with the K that the study takes for it.
+/// β with the K used for it in the study.
 pub const PUBLISHED: [(f64, f64); 2] = [(10.0, 150.0), (6.0, 90.0)];
-/// Errors for which the smallest K is sought.
+/// Errors for which the smallest K is determined.
 pub const ACCEPTABLE: [f64; 2] = [1e-3, 1e-4];
 /// K in units of β.
 const TIMES: [f64; 9] = [2.0, 3.0, 5.0, 8.0, 15.0, 25.0, 40.0, 70.0, 120.0];
 const FAMILIES: [&str; 2] = ["SL", "DL"];
-/// Place of β among the parameters.
+/// Position of β among the parameters.
 const BETA: usize = 5;
 
-/// A motion of the piecewise rotor, and how far the smoothed one is from it.
+/// Errors of the smoothed rotor for one motion of the piecewise rotor.
 #[derive(Clone, Debug)]
 pub struct Comparison {
     /// β.
     pub beta: f64,
     /// `SL` or `DL`.
     pub family: &'static str,
-    /// By growing K.
+    /// Errors by increasing K.
     pub errors: Vec<SmoothingError>,
-    /// How well the motions had settled.
+    /// Accuracy to which the motions had settled.
     pub floor: f64,
 }
 
 impl Comparison {
-    /// The power with which the error falls.
+    /// Power of K with which the error falls.
     pub fn power(&self) -> Option<f64> {
         fitted_power(&self.errors, 30.0 * self.floor).map(|(power, _)| power)
     }
 
-    /// The errors at that K, if it is one of those compared.
+    /// Errors at that K, if it is among those compared.
     pub fn at(&self, k: f64) -> Option<SmoothingError> {
         self.errors.iter().copied().find(|e| (e.sharpness - k).abs() < 1e-9 * k)
     }
 }
 
-/// Everything about the choice of K.
+/// All results on the choice of K.
 #[derive(Clone, Debug, Default)]
 pub struct Choice {
-    /// Every motion that exists.
+    /// Comparisons for every motion that exists.
     pub comparisons: Vec<Comparison>,
     /// β, acceptable error, the smallest K for all motions, and its error.
     pub smallest: Vec<[f64; 4]>,
-    /// The K at the second β that is as exact for SL as the published K at the first, and its error.
+    /// K at the second β that is as accurate for SL as the published K at the first, and its error.
     pub equivalent: Option<[f64; 2]>,
-    /// Motions that do not exist at some β: the family, β, and the β at which it vanishes as β goes there.
+    /// Motions that do not exist at some β: the family, that β, and the β at which it vanishes on the way.
     pub missing: Vec<(&'static str, f64, f64)>,
 }
 
-/// Computed from the contact cycles of a run, or read back.
+/// Returns the choice computed from the contact cycles of a run, or read back.
 ///
 /// # Errors
-/// A cycle is not there, or the simulation settles to something else.
+/// A cycle is missing, or the simulation settles to another motion.
 pub fn choice(runs: &Runs, run: &Run) -> Result<Choice, String> {
     let of = format!("{SPEED} {PUBLISHED:?} {ACCEPTABLE:?} {TIMES:?} {} {}", run.study.text, run.study.model_text);
     runs.table("sharpness", &of, || computed(run, runs.jobs())).map(|table| read(&table))
 }
 
-/// The cycle of a family at another β, or the β beyond which there is none.
+/// Cycle of a family at another β, or the β beyond which it does not exist.
 fn start(run: &Run, family: &str, beta: f64) -> Result<Result<Point, f64>, String> {
     let point = stable_at(run, &format!("contact {family}"), SPEED)?;
     let system = System::of_plan(&run.study.model, &run.study.plan);
@@ -81,7 +81,7 @@ fn start(run: &Run, family: &str, beta: f64) -> Result<Result<Point, f64>, Strin
     }
 }
 
-/// Rows begin with their kind: 0 an error, 1 a smallest K, 2 the equivalent K, 3 what is missing.
+/// Computes the table. Rows begin with their kind: 0 an error, 1 a smallest K, 2 the equivalent K, 3 a missing motion.
 fn computed(run: &Run, jobs: usize) -> Result<Table, String> {
     let cases: Vec<(usize, f64)> = PUBLISHED.iter().flat_map(|(beta, _)| [(0, *beta), (1, *beta)]).collect();
     let compared = in_parallel(jobs, &cases, |(family, beta)| compared(run, *family, *beta));

@@ -1,4 +1,4 @@
-//! What the simulations of figure 9 decide: whether they meet what was followed, and nothing else.
+//! Claims decided by the simulations of figure 9: that they find the motions on the branches, and no others.
 
 use super::rotor::{OMEGA, speeds};
 use crate::agreement::{Agreement, Met, Seen, Stable, compare};
@@ -9,32 +9,32 @@ use foldline::diagram::{Kind, Motion, Responses, Search};
 const FIGURE: &str = "9";
 const DL: &str = "contact DL";
 
-/// Whether a motion lies on DL or on what comes from it by period doubling.
+/// True if a motion lies on DL or on a branch that arises from it by period doubling.
 fn on_dl(met: &Met) -> bool {
     met.on().is_some_and(|place| place.branch.starts_with(DL))
 }
 
-/// The survey and the sweeps, compared with the branches.
+/// Survey and sweeps, compared with the branches.
 pub struct Simulated {
-    /// From many starts.
+    /// Survey from many starts.
     pub survey: Agreement,
     /// DL swept up.
     pub up: Agreement,
     /// DL swept down.
     pub down: Agreement,
-    /// DL at the first speed at which each sweep is no longer on it, up and down: whether it still attracts there.
+    /// DL at the first speed at which each sweep, up and down, has left it: evidence on its attraction there.
     pub left: [Vec<Stable>; 2],
-    /// Starts at each speed of the survey.
+    /// Number of starts at each speed of the survey.
     pub starts: usize,
-    /// Speeds of the survey.
+    /// Number of speeds of the survey.
     pub speeds: usize,
 }
 
 impl Simulated {
-    /// Compares the simulations of `run` with the branches of `followed`; the first of them holds S, SL and DL.
+    /// Compares the simulations of `run` with the branches of `followed`, the first of which holds S, SL and DL.
     ///
     /// # Errors
-    /// A simulation is not there.
+    /// A simulation is missing.
     pub fn of(run: &Run, followed: &[&Run], jobs: usize) -> Result<Simulated, String> {
         let first = followed.get(..1).unwrap_or_default();
         let swept = |name: &str| Ok::<_, String>(compare(run, run.responses(name)?, first, jobs));
@@ -56,13 +56,13 @@ impl Simulated {
         })
     }
 
-    /// Stable solutions that no start of the survey reached, but one beside them did.
+    /// Stable solutions reached only from a nearby start, not by the survey.
     pub fn missed(&self) -> impl Iterator<Item = &Stable> {
         self.survey.stable.iter().filter(|stable| stable.seen == Seen::FromNearby)
     }
 }
 
-/// What the simulations decide; `run` holds the branches.
+/// Claims decided by the simulations; `run` holds the branches.
 pub fn claims(run: &Run, simulated: &Simulated) -> Vec<Claim> {
     let mut claims = vec![explained(simulated)];
     claims.extend(parts(&simulated.survey));
@@ -78,7 +78,7 @@ pub fn claims(run: &Run, simulated: &Simulated) -> Vec<Claim> {
     claims
 }
 
-/// Whether every motion that was met lies on a stable part of a branch.
+/// Claim that every motion found lies on a stable part of a branch.
 fn explained(simulated: &Simulated) -> Claim {
     let met = &simulated.survey.met;
     let holds: Vec<bool> = met.iter().map(Met::is_explained).collect();
@@ -96,7 +96,7 @@ fn explained(simulated: &Simulated) -> Claim {
         note.push_str(&format!(". Met by simulation, not among the branches: {}", others.join("; ")));
     }
     let ours = format!("{count} of {} motions", holds.len());
-    // A motion on no branch shows that there are more families than were followed, not that simulation and branches disagree.
+    // A motion on no branch shows that further families exist, not that simulation and branches disagree.
     let finding = match count == holds.len() {
         true => Finding::cases(&holds, ours),
         false => Finding::qualified(2 * count > holds.len(), ours),
@@ -110,7 +110,7 @@ fn explained(simulated: &Simulated) -> Claim {
     )
 }
 
-/// Whether the stable solutions of each branch are met, a claim for each branch.
+/// Claims, one per branch, that its stable solutions are found by the survey.
 fn parts(survey: &Agreement) -> Vec<Claim> {
     let mut names: Vec<&str> = survey.stable.iter().map(|s| s.branch.as_str()).collect();
     names.sort_unstable();
@@ -149,8 +149,8 @@ fn parts(survey: &Agreement) -> Vec<Claim> {
     names.into_iter().map(claim).collect()
 }
 
-/// Where a sweep leaves DL, against where DL ends. It may leave earlier: a step of the speed can throw it out of a basin that gets
-/// narrower, which shows where DL at the new speed attracts what starts beside it. It cannot stay longer.
+/// Claim on the speed at which a sweep leaves DL, against the end of DL. The sweep may leave earlier, if a step of the
+/// speed leads out of a narrowing basin; DL at the new speed then still attracts nearby starts. It cannot stay longer.
 fn fall(direction: &str, met: &[Met], left: &[Stable], what: &str, end: Result<f64, String>) -> Claim {
     let finding = || {
         let end = end?;

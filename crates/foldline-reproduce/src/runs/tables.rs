@@ -1,8 +1,8 @@
-//! Tables of numbers that a figure computes itself, kept beside the runs.
+//! Tables of numbers computed by a figure itself, kept beside the runs.
 //!
-//! **Idea.** `OUT/runs/NAME.table` begins with a line that says what it was computed from: version, tolerance and a fingerprint of
-//! the rest. A table whose first line is the same is read back, any other is computed again. Numbers are written so that
-//! they are read back exactly.
+//! **Idea.** The first line of `OUT/runs/NAME.table` identifies the input: version, tolerance and a fingerprint of
+//! the rest. A table whose first line matches is read back; any other is recomputed. Numbers are written so that
+//! they read back exactly.
 
 use super::{Runs, build};
 use std::fmt::Write;
@@ -12,11 +12,11 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 pub type Table = Vec<Vec<f64>>;
 
 impl Runs<'_> {
-    /// The table of that name, computed unless it is there. `of` is everything that it depends on besides the version and
-    /// the tolerance.
+    /// Returns the table of that name, computing it if needed. `of` identifies everything it depends on besides the
+    /// version and the tolerance.
     ///
     /// # Errors
-    /// What `compute` fails with, or the table cannot be written.
+    /// The error of `compute`, or that the table cannot be written.
     pub fn table(
         &self,
         name: &str,
@@ -49,14 +49,14 @@ fn written(table: &[Vec<f64>], head: &str) -> String {
     text
 }
 
-/// The rows below a first line that is as expected; `None` for any other file.
+/// Rows below the expected first line; `None` for any other file.
 fn parsed(text: &str, head: &str) -> Option<Table> {
     let mut lines = text.lines();
     (lines.next()? == head).then_some(())?;
     lines.map(|line| line.split(' ').map(|cell| cell.parse().ok()).collect()).collect()
 }
 
-/// Every result of `compute`, in the order of `items`, computed by that many threads.
+/// Results of `compute` in the order of `items`, computed by `jobs` threads.
 pub fn in_parallel<T: Sync, R: Send>(jobs: usize, items: &[T], compute: impl Fn(&T) -> R + Sync) -> Vec<R> {
     use std::sync::Mutex;
     use std::sync::atomic::{AtomicUsize, Ordering};
@@ -84,7 +84,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_table_is_read_back_exactly_and_only_under_its_own_head() {
+    fn a_table_is_read_back_exactly_and_only_under_its_own_first_line() {
         let table = vec![vec![0.1, -1e-300, f64::INFINITY], vec![1.0 / 3.0]];
         let text = written(&table, "head");
         assert_eq!(parsed(&text, "head"), Some(table));
@@ -93,7 +93,7 @@ mod tests {
     }
 
     #[test]
-    fn results_keep_the_order_of_what_they_were_computed_from() {
+    fn results_keep_the_order_of_their_items() {
         let items: Vec<usize> = (0..50).collect();
         assert_eq!(in_parallel(4, &items, |k| k * k), items.iter().map(|k| k * k).collect::<Vec<_>>());
     }

@@ -1,6 +1,7 @@
-//! The rotor without damping and unbalance, with the energy that damping would take and with derivatives by the start.
+//! The rotor without damping and unbalance, with the work that damping would dissipate and derivatives with respect to
+//! the start.
 //!
-//! **Equations.** States x = (u, v, u′, v′) and P, of which a column ∂/∂s for s = r₀, v₀, Ω each, where the start is
+//! **Equations.** States x = (u, v, u′, v′) and P, each with columns ∂/∂s for s = r₀, v₀, Ω, where the start is
 //! x = (r₀, 0, 0, v₀), P = 0:
 //!
 //! 1. x′ = f(x, Ω) of [`OverhungRotor`] at ζ = ε = 0, (∂x/∂s)′ = f_x ∂x/∂s + f_s
@@ -12,9 +13,9 @@ use crate::field::OverhungRotor;
 use crate::quantities::Nondimensional;
 use foldline::contract::{Batch, Parameters, VectorField};
 
-/// x and P.
+/// Length of x and P.
 pub const ORBIT: usize = 5;
-/// ∂/∂r₀, ∂/∂v₀, ∂/∂Ω.
+/// Number of columns: ∂/∂r₀, ∂/∂v₀, ∂/∂Ω.
 const COLUMNS: usize = 3;
 
 /// Equations 1 and 2 as a vector field; its only parameter is Ω.
@@ -25,13 +26,13 @@ pub struct Flow {
 }
 
 impl Flow {
-    /// With the derivatives, or without.
+    /// Returns the flow with or without derivatives.
     pub fn new(rotor: OverhungRotor, constants: Nondimensional, derivatives: bool) -> Flow {
         let constants = Nondimensional { zeta: 0.0, epsilon: 0.0, ..constants };
         Flow { rotor, constants, columns: if derivatives { COLUMNS } else { 0 } }
     }
 
-    /// The start `[5 (1 + columns)]` with turning point r₀ and speed v₀ across.
+    /// Initial values `[5 (1 + columns)]` for the turning point r₀ with transverse speed v₀.
     pub fn start(&self, r0: f64, v0: f64) -> Vec<f64> {
         let mut x = vec![0.0; self.dim()];
         (x[0], x[3]) = (r0, v0);
@@ -42,15 +43,15 @@ impl Flow {
         x
     }
 
-    /// Errors that count as nothing for an orbit of size r₀.
+    /// Absolute tolerances for an orbit of size r₀.
     pub fn absolute(&self, tolerance: f64, r0: f64) -> Vec<f64> {
-        // What a column is divided by: r₀ and v₀ are of size r₀, and Ω of size 1.
+        // Divisors of the columns: r₀ and v₀ are of size r₀, and Ω of size 1.
         let by = [1.0, r0, r0, 1.0];
         let size = |i: usize| if i % ORBIT == ORBIT - 1 { r0 * r0 } else { r0 };
         (0..self.dim()).map(|i| tolerance * size(i) / by[i / ORBIT]).collect()
     }
 
-    /// x′ and P′ of one orbit, with its columns.
+    /// Evaluates x′ and P′ of one orbit, with its columns.
     pub fn slope(&self, x: &[f64], omega: f64, slope: &mut [f64]) {
         let constants = Nondimensional { omega, ..self.constants };
         let state = [x[0], x[1], x[2], x[3]];
@@ -101,7 +102,7 @@ impl VectorField for Flow {
         }
     }
 
-    /// Only integrated, never linearised: its derivatives are among its states. Not a number, so that no use of them goes unnoticed.
+    /// Never needed, because the derivatives are among the states. Returns NaN so that any use would be noticed.
     fn linearise(&self, at: Batch, _free: &[usize], f: &mut [f64], fx: &mut [f64], fp: &mut [f64]) {
         self.evaluate(at, f);
         fx.fill(f64::NAN);

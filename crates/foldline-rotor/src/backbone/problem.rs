@@ -1,14 +1,14 @@
 //! The backbone as a curve F(u) = 0.
 //!
-//! **Equations.** u = (r₀, v₀, T_h, Ω): a turning point of the radius at r₀ > 0 with speed v₀ across, half a radial period, the
-//! rotor speed. With x and P after the time T_h from (r₀, 0, 0, v₀), d = n - m, z = u + jv, a = πm/d:
+//! **Equations.** u = (r₀, v₀, T_h, Ω): a turning point of the radius at r₀ > 0 with transverse speed v₀, half a radial
+//! period, the rotor speed. With x and P after the time T_h from (r₀, 0, 0, v₀), d = n - m, z = u + jv, a = πm/d:
 //!
 //! 1. Im(z e^{ja}) = 0: the next turning point lies on a line of symmetry of the closed orbit
-//! 2. Re(z′ e^{ja}) = 0: and it is one
+//! 2. Re(z′ e^{ja}) = 0: the point reached is a turning point
 //! 3. P = 0: power
 //!
-//! An orbit is its own mirror image at every turning point, so half a radial period says everything. F_u (3 × 4) is exact: its columns
-//! are integrated along.
+//! An orbit is its own mirror image at every turning point, so half a radial period determines it. F_u (3 × 4) is
+//! exact: its columns are integrated along with the orbit.
 
 use super::flow::{Flow, ORBIT};
 use crate::campbell::Ratio;
@@ -20,16 +20,16 @@ use foldline::linalg::lu;
 use foldline::problem::{extremes, gauss::Scheme};
 use foldline::simulation::{Integrator, Outcome, Passage, Tolerance};
 
-/// Unknowns.
+/// Number of unknowns.
 const SIZE: usize = 4;
-/// Degree of the profile of a stored orbit: that of the integrator, whose steps are its mesh.
+/// Degree of the profile of a stored orbit: the order of the integrator, whose steps are its mesh.
 const DEGREE: usize = 5;
-/// Relative change of the speed that is as long a step as the whole of the radius.
+/// Relative change of speed whose step length equals that of a relative change of radius by 1.
 const SPEED_SHARE: f64 = 0.1;
-/// Tolerance of the mesh against that of the values on it.
+/// Tolerance of the mesh relative to that of the values on it.
 const LOOSER: f64 = 1e2;
 
-/// See the module.
+/// Backbone as a continuation problem (see the module).
 pub struct BackboneProblem {
     rotor: OverhungRotor,
     constants: Nondimensional,
@@ -42,7 +42,7 @@ pub struct BackboneProblem {
 }
 
 impl BackboneProblem {
-    /// The problem at these constants; ζ, ε and Ω of them are ignored. Orbits are integrated to `tolerance`.
+    /// Returns the problem at these constants, of which ζ, ε and Ω are ignored. Orbits are integrated to `tolerance`.
     pub fn new(rotor: OverhungRotor, constants: Nondimensional, ratio: Ratio, tolerance: f64) -> BackboneProblem {
         BackboneProblem {
             rotor,
@@ -56,12 +56,12 @@ impl BackboneProblem {
         }
     }
 
-    /// d, radial periods in a period.
+    /// d, the number of radial periods in a period.
     fn radial_periods(&self) -> f64 {
         f64::from(self.ratio.backward) - f64::from(self.ratio.forward)
     }
 
-    /// x, P and perhaps their derivatives after the time T_h.
+    /// x, P and optionally their derivatives after the time T_h.
     fn half(&self, u: &[f64], derivatives: bool) -> Option<(Flow, Vec<f64>)> {
         let flow = Flow::new(self.rotor, self.constants, derivatives);
         if !(u[0] > 0.0 && u[2] > 0.0 && u.iter().all(|x| x.is_finite())) {
@@ -72,7 +72,7 @@ impl BackboneProblem {
         Some((flow, end))
     }
 
-    /// Equations 1 to 3, or what their derivatives are of a column, divided by their sizes.
+    /// Residuals of equations 1 to 3, or their derivatives for a column, divided by their scales.
     fn equations(&self, column: &[f64]) -> [f64; 3] {
         let angle = std::f64::consts::PI * f64::from(self.ratio.forward) / self.radial_periods();
         let (sin, cos) = angle.sin_cos();
@@ -91,7 +91,8 @@ impl BackboneProblem {
     /// The whole closed orbit on the mesh of the integrator's steps.
     fn cycle(&self, u: &[f64]) -> Cycle {
         let (parameters, period) = (self.at(u[3]).parameters(), 2.0 * self.radial_periods() * u[2]);
-        // The steps of a looser integration are a mesh on which polynomials of its order serve; the values on it are exact.
+        // The steps of a looser integration are a sufficient mesh for polynomials of its order; the values on it are
+        // accurate.
         let integrator = |tolerance: f64| {
             let accuracy = Tolerance { relative: tolerance, absolute: vec![tolerance * u[0]; 4] };
             Integrator::new(&self.rotor, &parameters, accuracy).with_longest_step(period / 40.0)
@@ -126,8 +127,8 @@ impl ZeroProblem for BackboneProblem {
     }
 
     fn anchor(&mut self, u: &[f64]) {
-        // Relative in everything: a backbone may cover several orders of magnitude in radius. The speed counts for more, or steps would
-        // pass over what the onset of contact does to it within a radius of 1/K.
+        // All scales are relative, since a backbone may cover several orders of magnitude in radius. Speed has more
+        // weight; otherwise steps would pass over the effect of the onset of contact within a radius of 1/K.
         self.scale = [u[0], u[1].abs() + u[0], u[2], SPEED_SHARE * (1.0 + u[3].abs())];
     }
 
@@ -183,7 +184,8 @@ impl ZeroProblem for BackboneProblem {
         None
     }
 
-    /// Without a spectrum: the set of orbits around one of a backbone is of more than one dimension, and its multipliers are all 1.
+    /// Returns no spectrum: the orbits near a backbone form a family of more than one dimension, whose multipliers are
+    /// all 1.
     fn examine(&mut self, u: &[f64]) -> Examination {
         let cycle = self.cycle(u);
         let parameters = self.at(u[3]).parameters();
@@ -198,7 +200,7 @@ impl ZeroProblem for BackboneProblem {
         Examination { ranges, trust: Trust { residual, ..Trust::default() }, ..Examination::default() }
     }
 
-    /// There is no spectrum to tell it from, and no other backbone close by but at a root.
+    /// There is no spectrum to measure it by, and no other backbone is close except at a root.
     fn margin(&self, _at: &Point) -> f64 {
         f64::INFINITY
     }

@@ -1,16 +1,16 @@
-//! Which of AUTO's numbers is which of the model's names.
+//! Assignment of AUTO's state and parameter numbers to the names of the model.
 
 use super::Names;
 use crate::nearest::suggest;
 use foldline::contract::VectorField;
 use foldline::model::Model;
 
-/// Something that does not fit, and what would.
+/// Mismatch between an AUTO solution and the model.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Complaint {
-    /// What does not fit.
+    /// The mismatch.
     pub message: String,
-    /// What would.
+    /// Suggested correction.
     pub hint: String,
 }
 
@@ -18,21 +18,22 @@ pub(super) fn complaint(message: impl Into<String>, hint: impl Into<String>) -> 
     Complaint { message: message.into(), hint: hint.into() }
 }
 
-/// Which of AUTO's states and parameters is which of the model's.
+/// AUTO's numbers of the states and parameters of a model.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Mapping {
-    /// For each parameter of the model its number in AUTO, from 1; `None` for one that keeps its value.
+    /// AUTO's number of each model parameter, from 1; `None` for a parameter that keeps its default.
     pub parameters: Vec<Option<usize>>,
-    /// For each state of the model its number in AUTO, from 1.
+    /// AUTO's number of each model state, from 1.
     pub states: Vec<usize>,
 }
 
 impl Mapping {
-    /// By the names of the files, except where `parameters` and `states` give the number of a name of the model. States without
-    /// names come in their order.
+    /// Assigns numbers by the names in AUTO's files. `parameters` and `states` take precedence; they pair a number with
+    /// a name of the model. If no state is named, states are assigned in their order.
     ///
     /// # Errors
-    /// If a name is not one of the model, or if there is no telling.
+    /// If `dim` differs from the dimension of the model, if the model lacks a given name, or if the states are not matched
+    /// one to one.
     pub fn new(
         model: &Model,
         names: &Names,
@@ -88,7 +89,7 @@ fn counted(states: usize) -> String {
     if states == 1 { "1 state".into() } else { format!("{states} states") }
 }
 
-/// For each known name its number.
+/// Returns for each known name the number given to it.
 fn numbered(known: &[&str], typed: &[(usize, String)], option: &str) -> Result<Vec<Option<usize>>, Complaint> {
     let mut out = vec![None; known.len()];
     for (number, name) in typed {

@@ -1,13 +1,13 @@
-//! What AUTO-07p has computed, as a starting point.
+//! Import of AUTO-07p solutions as starting points.
 //!
-//! **Idea.** A file `s.NAME` holds labelled solutions ([`solutions`]): equilibria, or cycles as values at the mesh points of a
-//! collocation like ours and between them, evenly spaced. `c.NAME` and `b.NAME` tell how states and parameters are called and how
-//! far the branch was to go ([`Names`]). [`study`] makes of a solution a study of our own, in which it is a seed.
+//! **Idea.** A file `s.NAME` holds labelled solutions ([`solutions`]): equilibria, and cycles as values at the mesh
+//! points and at evenly spaced points between them. `c.NAME` and `b.NAME` give the names of states and parameters and
+//! the range of the branch ([`Names`]). [`study`] writes a study in which each chosen solution is a seed.
 //!
-//! **Source.** doedel2019, chapter 6 for the kinds; the layout of the numbers is that of files which AUTO-07p 0.9.2 has written
-//! (tests/auto).
+//! **Source.** doedel2019, chapter 6 for the solution types; the layout of the numbers is that of files written by
+//! AUTO-07p 0.9.2 (tests/auto).
 //!
-//! **Departures.** The direction of a branch, which stands behind each solution, is not used: it follows from the model.
+//! **Departures.** The branch direction stored with each solution is not used: it follows from the model.
 
 mod mapping;
 mod names;

@@ -1,23 +1,23 @@
-//! How states and parameters are called, and how far the branch was to go, from `c.NAME` or `b.NAME`.
+//! Names of states and parameters, and the range of the branch, from `c.NAME` or `b.NAME`.
 //!
-//! **Idea.** Both have lines such as `parnames = {1: 'p1', 11: 'PERIOD'}`. What else there is, and files of versions that
-//! had no names, are passed over: nothing depends on names that cannot be typed too.
+//! **Idea.** Both files have lines such as `parnames = {1: 'p1', 11: 'PERIOD'}`. Everything else is ignored. Files of
+//! older versions have no names; the user can give them on the command line instead.
 
 use super::reader::number;
 
-/// What is known besides the solutions.
+/// Names and range that accompany the solutions.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Names {
-    /// Number from 1 and name of parameters.
+    /// Number, from 1, and name of each named parameter.
     pub parameters: Vec<(usize, String)>,
-    /// Number from 1 and name of states.
+    /// Number, from 1, and name of each named state.
     pub states: Vec<(usize, String)>,
     /// RL0 and RL1, the range of the first free parameter.
     pub range: Option<[f64; 2]>,
 }
 
 impl Names {
-    /// What the text of a file `c.NAME` or `b.NAME` tells.
+    /// Reads the text of a file `c.NAME` or `b.NAME`.
     pub fn of(text: &str) -> Names {
         let mut names = Names::default();
         let mut range = [None; 2];
@@ -37,14 +37,14 @@ impl Names {
         if let ["0", low, high, _, _] = first[..] {
             range = [number(low), number(high)];
         }
-        // Huge ones mean none.
+        // AUTO writes a missing bound as the largest double.
         let bound = |value: Option<f64>| value.filter(|v| v.abs() < 1e300);
         names.range =
             bound(range[0]).zip(bound(range[1])).map(|(low, high)| [low, high]).filter(|[low, high]| low < high);
         names
     }
 
-    /// These, and where they say nothing those.
+    /// Fills missing entries from `other`.
     pub fn or(self, other: Names) -> Names {
         Names {
             parameters: if self.parameters.is_empty() { other.parameters } else { self.parameters },
@@ -54,7 +54,7 @@ impl Names {
     }
 }
 
-/// `{1: 'a', 2: "b"}`, or `['a', 'b']`, numbered from 1.
+/// Reads `{1: 'a', 2: "b"}`, or `['a', 'b']`, whose entries are numbered from 1.
 fn dictionary(text: &str) -> Vec<(usize, String)> {
     let mut found = Vec::new();
     let mut rest = text;

@@ -1,7 +1,8 @@
-//! Reading solutions.
+//! Reader of AUTO-07p solution files.
 //!
-//! **Idea.** A solution is a line of integers, of which the ninth says how many lines follow: for each mesh point the
-//! normalised time and the states, then which parameters are free, the direction of the branch, and all parameters.
+//! **Idea.** A solution begins with a line of integers; the ninth is the number of lines that follow. These contain the
+//! normalised time and the states at each mesh point, the numbers of the free parameters, the branch direction, and all
+//! parameters.
 
 use super::Labelled;
 use crate::diagnostic::Diagnostic;
@@ -10,7 +11,7 @@ use std::ops::Range;
 
 const HINT: &str = "give the file that AUTO wrote as s.NAME or fort.8";
 
-/// A text, and how far it is read.
+/// Text, and the line from which it is read next.
 pub(super) struct Reader<'t> {
     text: &'t str,
     file: &'t str,
@@ -18,7 +19,7 @@ pub(super) struct Reader<'t> {
     next: usize,
 }
 
-/// The integers with which a solution begins, as far as they are of use.
+/// Integers at the beginning of a solution, without the unused ones.
 struct Head {
     place: Range<usize>,
     label: i64,
@@ -34,7 +35,7 @@ struct Head {
     parameters: usize,
 }
 
-/// The mistake, alone.
+/// One diagnostic, in a list as the callers return it.
 type Mistake = Vec<Diagnostic>;
 
 impl<'t> Reader<'t> {
@@ -47,7 +48,7 @@ impl<'t> Reader<'t> {
         Reader { text, file, lines: text.split_inclusive('\n').map(line).collect(), next: 0 }
     }
 
-    /// Goes to the next line that is not empty; whether there is one.
+    /// Advances to the next line that is not empty. Returns false at the end of the text.
     pub(super) fn skip_to_solution(&mut self) -> bool {
         while self.lines.get(self.next).is_some_and(|line| self.text[line.clone()].trim().is_empty()) {
             self.next += 1;
@@ -55,12 +56,12 @@ impl<'t> Reader<'t> {
         self.next < self.lines.len()
     }
 
-    /// The answer to a file without solutions.
+    /// Diagnostic for a file without solutions.
     pub(super) fn empty(&self) -> Mistake {
         self.mistake(0..0, "there is no solution in this file".into(), HINT)
     }
 
-    /// The solution that begins at the next line.
+    /// Reads the solution that begins at the next line.
     pub(super) fn solution(&mut self) -> Result<Labelled, Mistake> {
         let head = self.head()?;
         let (label, times, columns) = (head.label, head.times, head.columns);
@@ -147,7 +148,7 @@ impl<'t> Reader<'t> {
         Ok(head)
     }
 
-    /// Where the words of some lines stand.
+    /// Positions of the words of some lines.
     fn words(&self, lines: Range<usize>) -> impl Iterator<Item = Range<usize>> + use<'_, 't> {
         let start = self.text.as_ptr() as usize;
         let of_line = |line: &Range<usize>| self.text[line.clone()].split_ascii_whitespace();
@@ -178,7 +179,7 @@ impl<'t> Reader<'t> {
     }
 }
 
-/// A number as Fortran writes it: with D for E, and without either where the exponent has three digits.
+/// Reads a number in Fortran notation: with D for E, or with neither if the exponent has three digits.
 pub(super) fn number(word: &str) -> Option<f64> {
     if !word.starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c)) {
         return None;

@@ -1,18 +1,18 @@
-//! Labelled solutions.
+//! Labelled solutions of AUTO-07p.
 
 use super::reader::Reader;
 use crate::diagnostic::Diagnostic;
 use crate::toml_walk::{read_text, unreadable};
 use std::path::Path;
 
-/// A solution of a file `s.NAME`.
+/// Solution in a file `s.NAME`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Labelled {
-    /// Its label.
+    /// Label.
     pub label: i64,
-    /// The number of its branch.
+    /// Number of the branch.
     pub branch: i64,
-    /// AUTO's number for what it is.
+    /// AUTO's solution type, the ITP of the file.
     pub kind: i64,
     /// Numbers of the free parameters, from 1.
     pub free: Vec<usize>,
@@ -36,17 +36,17 @@ impl Labelled {
         self.states.len() / self.times.len().max(1)
     }
 
-    /// Whether it is a cycle or another solution over time.
+    /// True for a cycle or another solution over time.
     pub fn lasts(&self) -> bool {
         self.times.len() > 1
     }
 
-    /// PAR(11), the period of a cycle.
+    /// Returns PAR(11), the period of a cycle.
     pub fn period(&self) -> Option<f64> {
         self.parameters.get(10).copied().filter(|_| self.lasts())
     }
 
-    /// AUTO's two letters and the name of the kind here; `None` for a solution that is nothing special.
+    /// Returns AUTO's two-letter code and the name used here; `None` for a regular solution.
     pub fn named(&self) -> Option<(&'static str, &'static str)> {
         let found = match self.kind {
             -21 | -31 => ("BT", "bogdanov-takens"),
@@ -61,7 +61,7 @@ impl Labelled {
             23 | 83 => ("LTR", "fold-torus"),
             77 | 87 => ("PTR", "flip-torus"),
             88 => ("TTR", "double-torus"),
-            // Along a curve in two parameters there are ten times the kind of that curve besides.
+            // On a curve in two parameters, AUTO adds ten times the type of the curve.
             kind => return Labelled::of_one_parameter(kind),
         };
         Some(found)
@@ -72,7 +72,7 @@ impl Labelled {
             1 | 6 => ("BP", "branch-point"),
             2 | 5 => ("LP", "fold"),
             3 => ("HB", "hopf"),
-            // Without the sign it is a solution that was written because it was its turn.
+            // A positive 4 marks a regular solution written at the print interval NPR.
             4 if kind < 0 => ("UZ", "mark"),
             7 => ("PD", "period-doubling"),
             8 => ("TR", "torus"),
@@ -83,20 +83,20 @@ impl Labelled {
     }
 }
 
-/// Reads a file of solutions.
+/// Reads a solution file.
 ///
 /// # Errors
-/// The place of the first thing that is not as AUTO writes it.
+/// The first deviation from AUTO's format, with its position, or an unreadable file.
 pub fn read_solutions(path: &Path) -> Result<Vec<Labelled>, Vec<Diagnostic>> {
     let file = path.display().to_string();
     let text = read_text(path).map_err(|error| vec![unreadable(&file, "the solution file", &error)])?;
     solutions(&text, &file)
 }
 
-/// The solutions in a text; `file` is its name in messages.
+/// Reads the solutions in a text; `file` is its name in messages.
 ///
 /// # Errors
-/// The place of the first thing that is not as AUTO writes it.
+/// The first deviation from AUTO's format, with its position.
 pub fn solutions(text: &str, file: &str) -> Result<Vec<Labelled>, Vec<Diagnostic>> {
     let mut reader = Reader::new(text, file);
     let mut found = Vec::new();

@@ -1,4 +1,4 @@
-//! A study that starts from solutions of AUTO.
+//! Study that starts from AUTO-07p solutions.
 
 use super::mapping::{Complaint, Mapping, complaint};
 use super::{Labelled, Names};
@@ -8,32 +8,33 @@ use foldline::explore::mismatch;
 use foldline::model::Model;
 use std::fmt::Write;
 
-/// Degree of the polynomials in which a cycle is held against the model.
+/// Degree of the polynomials with which the residual of a cycle is evaluated.
 const DEGREE: usize = 4;
-/// By how much a solution may fail to satisfy the equations, relative to their size.
+/// Largest accepted residual of the equations, relative to their size.
 const LARGEST_MISMATCH: f64 = 1e-2;
-/// What the last state of a cycle may differ from the first, relative to the extent.
+/// Largest accepted difference between the last and first state of a cycle, relative to the extent of the component.
 const LARGEST_GAP: f64 = 1e-3;
 
-/// A solution that was chosen, and what belongs to it.
+/// Chosen solution, with the names and numbers that belong to it.
 pub struct Chosen<'a> {
-    /// The file it is from, for people.
+    /// Name of its file, for the description of the seed.
     pub file: &'a str,
     /// The solution.
     pub solution: &'a Labelled,
-    /// What is known about its branch.
+    /// Names and range of its branch.
     pub names: &'a Names,
-    /// Which of its numbers is which.
+    /// Numbers of the states and parameters of the model.
     pub mapping: Mapping,
 }
 
-/// The text of a study in which each of the solutions is a seed, and a branch starts from it.
+/// Returns the text of a study in which each solution is a seed from which a branch starts.
 ///
-/// `model_file` is the path of the model as the study has to name it. Every solution is held against the equations.
+/// `model_file` is the path of the model as it is to appear in the study. Every solution is checked against the
+/// equations.
 ///
 /// # Errors
-/// If a solution is of another kind than equilibrium and cycle, if its free parameter is none of the model, or if the model
-/// does not have this solution.
+/// If a solution is neither an equilibrium nor a cycle, if its free parameter is not assigned to one of the model, or if
+/// it does not satisfy the equations of the model.
 pub fn study(model: &Model, model_file: &str, chosen: &[Chosen]) -> Result<String, Complaint> {
     let mut out = format!("# Starting points computed by AUTO-07p.\nmodel = {}\n", quoted(model_file));
     let mut taken: Vec<String> = Vec::new();
@@ -47,7 +48,7 @@ pub fn study(model: &Model, model_file: &str, chosen: &[Chosen]) -> Result<Strin
     Ok(out)
 }
 
-/// Every parameter of the model.
+/// Values of all parameters of the model.
 fn parameters(model: &Model, one: &Chosen) -> Result<Vec<f64>, Complaint> {
     let mut values = model.defaults();
     for (k, number) in one.mapping.parameters.iter().enumerate() {
@@ -79,7 +80,7 @@ fn written(model: &Model, one: &Chosen, name: &str, values: &[f64]) -> Result<St
             format!("name it, as in `--parameters {number}={known}`, or add the file c.NAME or b.NAME that names it"),
         ));
     };
-    // AUTO's state that is the i-th of the model.
+    // Value of the i-th state of the model at a node.
     let of = |node: usize, i: usize| solution.states[node * solution.dim() + one.mapping.states[i] - 1];
     let n = model.dim();
     let nodes: Vec<f64> = (0..solution.times.len())
@@ -93,7 +94,7 @@ fn written(model: &Model, one: &Chosen, name: &str, values: &[f64]) -> Result<St
     held_against(model, values, solution, &given)?;
     let kind = solution.named().map_or(String::new(), |(letters, word)| format!(" ({letters}: {word})"));
     let mut out = String::new();
-    // Writing to a text cannot fail.
+    // Writing to a string cannot fail.
     let _ = writeln!(
         out,
         "\n[[seed]]\nname = {}\ndescription = {}",
@@ -203,7 +204,7 @@ fn other_kind(solution: &Labelled) -> Complaint {
     complaint(message, "equilibria (IPS = 1) and cycles (IPS = 2) can be imported")
 }
 
-/// Whether the model has this solution.
+/// Checks that a solution satisfies the equations of the model.
 fn held_against(model: &Model, values: &[f64], solution: &Labelled, given: &Solution) -> Result<(), Complaint> {
     let label = solution.label;
     let hint = "give a model with the same equations, and assign AUTO's numbers with `--parameters 1=NAME,…` and \
@@ -228,7 +229,7 @@ fn listed(out: &mut String, name: &str, values: impl Iterator<Item = f64>) {
     let _ = write!(out, "{name} = [\n{}]\n", lines.concat());
 }
 
-/// The shortest decimal that reads back as the same number, which is a number of TOML.
+/// Returns the shortest decimal that reads back as the same number, in TOML syntax.
 fn decimal(value: f64) -> String {
     format!("{value:?}")
 }

@@ -1,11 +1,11 @@
-//! What stands in the columns.
+//! Contents of the exported tables.
 
 use foldline::diagram::{Branch, Kind, Origin, Point, Response, Solution, SpecialPoint};
 use foldline::model::Model;
 use foldline::problem::gauss::Scheme;
 use foldline::special::quantity::Quantity;
 
-/// What stands in a column.
+/// Contents of one cell.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Cell {
     Text(String),
@@ -14,7 +14,7 @@ pub(super) enum Cell {
     Empty,
 }
 
-/// As many as any normal form has.
+/// Largest number of coefficients of a normal form.
 const COEFFICIENTS: usize = 6;
 
 fn count(n: usize) -> Cell {
@@ -128,8 +128,8 @@ pub(super) fn branch_cells(branch: &Branch, model: &Model, points: u64) -> Vec<C
     out
 }
 
-/// A profile as it is exported: normalised times `[k]` and states `[k][n]`. At the end of the period the first state is repeated, plus what
-/// angles gain.
+/// Returns an exported profile: normalised times `[k]` and states `[k][n]`. The last state is the first one, with each
+/// angle increased by its gain over the period.
 pub(super) fn profile(point: &Point) -> Option<(Vec<f64>, Vec<f64>)> {
     let Solution::Cycle(cycle) = &point.solution else { return None };
     let scheme = Scheme::new(cycle.degree);

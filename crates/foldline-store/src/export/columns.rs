@@ -1,9 +1,9 @@
-//! What is exported of a point, by the names that all formats share.
+//! Columns of the exported tables, with the names that all formats share.
 
 use crate::run_file::{Columns, free_name};
 use foldline::model::Model;
 
-/// What the cells of a column are.
+/// Type of the cells of a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Class {
     Text,
@@ -11,7 +11,7 @@ pub(super) enum Class {
     Real,
 }
 
-/// A column of a table, or a variable.
+/// Column of a table, or variable of a NetCDF group.
 #[derive(Clone, Debug)]
 pub(super) struct Column {
     pub(super) name: String,
@@ -36,18 +36,18 @@ fn text(name: &str, description: &str) -> Column {
     column(name, Class::Text, description)
 }
 
-/// The columns of a model.
+/// Columns that depend on the model.
 pub(super) struct Variables {
     parameters: Vec<Column>,
     turns: Vec<Column>,
     ranges: Vec<Column>,
     averages: Vec<Column>,
     states: Vec<Column>,
-    /// Unit of time; empty where it is not known.
+    /// Unit of time; empty if unknown.
     time: String,
 }
 
-/// What columns and dimensions of ours are called, in any of the tables and groups.
+/// Reserved names of columns and dimensions, in all tables and groups.
 const OWN: &[&str] = &[
     "branch",
     "position",
@@ -146,17 +146,17 @@ impl Variables {
         Variables { parameters, turns, ranges, averages, states, time: model.time.clone() }
     }
 
-    /// The states of an equilibrium, or of a profile.
+    /// Columns of the states of an equilibrium or of a profile.
     pub(super) fn states(&self) -> &[Column] {
         &self.states
     }
 
-    /// What the columns of these parameters are called.
+    /// Column names of the given parameters.
     pub(super) fn names_of(&self, parameters: &[usize]) -> Vec<String> {
         parameters.iter().filter_map(|k| self.parameters.get(*k)).map(|column| column.name.clone()).collect()
     }
 
-    /// Of a point: what is one number each. `cycles` says that the states are not among them.
+    /// Scalar columns of a point. If `cycles` is true, the states are left out; they are in the profile.
     pub(super) fn of_point(&self, cycles: bool) -> Vec<Column> {
         let mut out = vec![integer("position", "position on the branch, 0 at the start")];
         out.extend_from_slice(&self.parameters);
@@ -190,7 +190,7 @@ impl Variables {
         out
     }
 
-    /// Of a special point, besides that.
+    /// Further columns of a special point.
     pub(super) fn of_special() -> Vec<Column> {
         let mut out = vec![
             text("kind", "kind of special point"),
@@ -212,7 +212,7 @@ impl Variables {
         out
     }
 
-    /// Of what simulation saw.
+    /// Columns of a response found by simulation.
     pub(super) fn of_response(&self) -> Vec<Column> {
         let mut out = vec![
             text("motion", "equilibrium, cycle, other or escaped"),
@@ -243,7 +243,7 @@ fn described(name: &str, description: &str) -> String {
     if line.is_empty() { name.to_string() } else { line }
 }
 
-/// What there is to say about a branch.
+/// Columns of a branch.
 pub(super) fn of_branch() -> Vec<Column> {
     vec![
         text("branch", "name of the branch"),

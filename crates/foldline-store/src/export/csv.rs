@@ -38,7 +38,8 @@ impl Rows for Csv {
                     self.line.push('"');
                 }
                 Cell::Text(text) => self.line.push_str(text),
-                // Writing to a text cannot fail. The shortest decimal that reads back as the same number.
+                // Writing to a string cannot fail. `{:?}` gives the shortest decimal that reads back as the same
+                // number.
                 Cell::Integer(value) => drop(write!(self.line, "{value}")),
                 Cell::Real(value) => drop(write!(self.line, "{value:?}")),
             }

@@ -1,4 +1,4 @@
-//! The points of a branch as variables of a NetCDF group.
+//! Points of a branch as variables of a NetCDF group.
 
 use super::cells::{Cell, profile};
 use super::columns::{Class, Column, Variables};
@@ -6,10 +6,10 @@ use super::hdf5::{Element, Id, Laid, Plan};
 use crate::run_file::Extent;
 use foldline::diagram::Point;
 
-/// Bytes of a variable that are written at a time.
+/// Number of bytes of a variable that are buffered before they are written.
 const PIECE: usize = 1 << 16;
 
-/// A variable whose elements come one after the other.
+/// Variable whose elements are appended one after the other.
 pub(super) struct Growth {
     id: Id,
     class: Class,
@@ -43,14 +43,14 @@ impl Growth {
     }
 }
 
-/// The variables of the points, or of the special points, of a branch.
+/// Variables of the points, or of the special points, of a branch.
 #[derive(Default)]
 pub(super) struct Group {
     scalars: Vec<Growth>,
     spectrum: Vec<Growth>,
     modes: usize,
     profile: Vec<Growth>,
-    /// 0 where there are no profiles.
+    /// Number of nodes of a profile; 0 without profiles.
     pub(super) nodes: usize,
 }
 
@@ -73,16 +73,16 @@ pub(super) fn text_of(cell: &Cell) -> String {
     if let Cell::Text(text) = cell { text.clone() } else { String::new() }
 }
 
-/// What the groups of a branch have in common.
+/// Settings shared by the groups of a branch.
 pub(super) struct Planned<'v> {
     pub(super) variables: &'v Variables,
-    /// Names of the parameters that vary along it.
+    /// Names of the parameters that vary along the branch.
     pub(super) along: Vec<String>,
     pub(super) profiles: bool,
 }
 
 impl Planned<'_> {
-    /// `more` columns behind those that every point has, with `rows` for those of them that are texts.
+    /// Plans the variables of a group: the columns of every point, then `more`, whose text cells are taken from `rows`.
     pub(super) fn group(
         &self,
         plan: &mut Plan,
@@ -98,7 +98,7 @@ impl Planned<'_> {
         let cycles = self.profiles && extent.nodes > 0;
         let mut out = Group::default();
         let mut columns = self.variables.of_point(cycles);
-        // The place on the branch is that by which points are found.
+        // The position on the branch is the coordinate of the point dimension.
         let numbered = dimensions[0] == "point";
         let points = plan.dimension(group, dimensions[0], extent.points, numbered.then_some(Element::Integer));
         if numbered {
@@ -132,7 +132,7 @@ impl Planned<'_> {
             }
         }
         if cycles {
-            // At the end of the period stands the first state again.
+            // The first state is repeated at the end of the period.
             out.nodes = extent.nodes as usize + 1;
             let nodes = plan.dimension(group, dimensions[1], out.nodes as u64, None);
             let time = Column {
@@ -150,7 +150,7 @@ impl Planned<'_> {
         out
     }
 
-    /// A variable of numbers, against which others are drawn by default.
+    /// Plans a numeric variable; `beside` names the variables against which it is plotted by default.
     fn variable(&self, plan: &mut Plan, group: Id, column: &Column, over: &[Id], beside: &[String]) -> Growth {
         let id = plan.variable(group, &column.name, element(column.class), over);
         describe(plan, id, column);
@@ -162,7 +162,7 @@ impl Planned<'_> {
 }
 
 impl Group {
-    /// Adds the numbers of a point to the end of every variable.
+    /// Appends the numbers of a point to every variable.
     pub(super) fn add(&mut self, point: &Point, cells: Vec<Cell>, laid: &mut Laid) -> std::io::Result<()> {
         self.scalars.iter_mut().zip(&cells).try_for_each(|(growth, cell)| growth.add(cell, laid))?;
         let cell = |value: Option<f64>| value.map_or(Cell::Empty, Cell::Real);

@@ -1,11 +1,11 @@
-//! A run for other programs: CSV, Parquet, NetCDF.
+//! Export of a run to CSV, Parquet and NetCDF.
 //!
-//! **Idea.** What is written follows from the `columns`, which all formats share: the same names, units and descriptions. The
-//! points of a branch pass one after the other ([`Reading::each_point`]), so that no run is too long. CSV and Parquet have a
-//! file for each table (`tables`); NetCDF has a group for each branch (`netcdf`), in a file whose places are laid out
-//! before any number is written ([`hdf5`]). Everything is described in docs/book/exports.md.
+//! **Idea.** All formats share the names, units and descriptions in `columns`. The points of a branch are read one at a
+//! time ([`Reading::each_point`]), so the length of a run is not limited by memory. CSV and Parquet have one file per
+//! table (`tables`). NetCDF has one group per branch (`netcdf`), in a file whose layout is fixed before any number is
+//! written ([`hdf5`]). The formats are described in docs/book/exports.md.
 //!
-//! **Departures.** A file is written under another name, and takes its own when it is complete.
+//! **Departures.** A file is written under a temporary name and renamed when it is complete.
 
 mod cells;
 mod columns;
@@ -27,23 +27,23 @@ use std::fmt;
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
-/// What is written.
+/// Format of the export.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
-    /// A folder of files with comma-separated values.
+    /// Folder of files with comma-separated values.
     Csv,
-    /// A folder of Parquet files.
+    /// Folder of Parquet files.
     Parquet,
     /// One NetCDF-4 file.
     NetCdf,
 }
 
-/// Why a run could not be exported.
+/// Reason why a run could not be exported.
 #[derive(Debug)]
 pub enum ExportError {
     /// The run could not be read.
     Run(RunFileError),
-    /// Study or model within the run make no sense.
+    /// The study or the model stored in the run is invalid.
     Study(Vec<Diagnostic>),
     /// The file or folder cannot be written.
     Output(PathBuf, std::io::Error),
@@ -73,22 +73,22 @@ impl fmt::Display for ExportError {
 
 impl std::error::Error for ExportError {}
 
-/// A run that is to be exported.
+/// Run to be exported.
 pub struct Export {
     reading: Reading,
     study: Study,
     conversion: Option<Conversion>,
-    /// What is exported, in the order in which it is listed: branches with their special points and ends, without points.
+    /// Exported branches in the order in which they are listed, with their special points and ends but without points.
     pub diagram: Diagram,
-    /// Whether the profiles of cycles are exported too.
+    /// True if the profiles of cycles are exported too.
     pub profiles: bool,
 }
 
 impl Export {
-    /// Opens the run in a folder and has the whole file checked.
+    /// Opens the run in a folder and checks the whole file.
     ///
     /// # Errors
-    /// If it cannot be read.
+    /// If the file cannot be read or is damaged, or if its study or model is invalid.
     pub fn open(folder: &Path) -> Result<Export, ExportError> {
         let reading = Reading::open(folder)?;
         reading.sound()?;
@@ -99,18 +99,18 @@ impl Export {
         Ok(Export { reading, study, conversion: None, diagram, profiles: true })
     }
 
-    /// The model, with the units in which it is shown.
+    /// Returns the model in the units of the export.
     pub fn model(&self) -> &Model {
         self.conversion.as_ref().map_or(&self.study.model, |own| own.model())
     }
 
-    /// Exports quantities in other units.
+    /// Exports quantities in the units of `conversion`.
     pub fn show_in(&mut self, conversion: Conversion) {
         self.diagram = conversion.diagram(std::mem::take(&mut self.diagram));
         self.conversion = Some(conversion);
     }
 
-    /// A point as it is exported.
+    /// Returns a point in the units of the export.
     fn shown(&self, mut point: Point) -> Point {
         if let Some(conversion) = &self.conversion {
             conversion.point(&mut point);
@@ -118,13 +118,13 @@ impl Export {
         point
     }
 
-    /// Leaves out all branches but those for which `kept` holds, and what was found by simulation.
+    /// Keeps only the branches for which `kept` returns true. Results of simulations are dropped.
     pub fn keep(&mut self, kept: impl Fn(&Branch) -> bool) {
         self.diagram.branches.retain(|branch| kept(branch));
         self.diagram.responses.clear();
     }
 
-    /// Writes to a folder, which is made where it does not exist, or to a file. Returns the files written.
+    /// Writes to a folder, or for NetCDF to a file. Missing folders are created. Returns the files written.
     ///
     /// # Errors
     /// If the run cannot be read, or `out` cannot be written.
@@ -141,7 +141,7 @@ impl Export {
     }
 }
 
-/// A file that gets its name when it is complete.
+/// File that gets its final name when it is complete.
 struct Growing {
     path: PathBuf,
     meanwhile: PathBuf,
@@ -167,7 +167,7 @@ impl Growing {
 }
 
 impl Drop for Growing {
-    /// What was not finished is of no use; after a rename there is nothing left.
+    /// Removes an unfinished file. After the rename there is no file left to remove.
     fn drop(&mut self) {
         let _ = std::fs::remove_file(&self.meanwhile);
     }

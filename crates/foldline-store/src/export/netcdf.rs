@@ -1,8 +1,8 @@
-//! One NetCDF-4 file with a group for each branch.
+//! NetCDF-4 file with one group per branch.
 //!
-//! **Idea.** Of every branch it is known beforehand how many points it has and how large they are, so the whole file is laid out
-//! first. Then the points pass, and each adds its numbers to the end of every variable. Profiles have different meshes; they
-//! are filled up with NaN to the length of the longest one of the branch.
+//! **Idea.** The number and size of the points of every branch are known beforehand, so the whole file is laid out
+//! first. Then each point is appended to every variable. Profiles have different meshes; they are padded with NaN to
+//! the length of the longest one of the branch.
 //!
 //! **Source.** unidata2024; eaton2023 for the names of attributes (`units`, `long_name`, `coordinates`).
 
@@ -15,7 +15,7 @@ use crate::run_file::{Extent, free_name};
 use foldline::diagram::{Branch, Responses};
 use std::path::{Path, PathBuf};
 
-/// What comes after the plan: the numbers of tables that are in memory, and the groups of points.
+/// Numbers written after the layout is fixed: tables held in memory, and the groups of points.
 struct Numbers {
     tables: Vec<(Vec<Growth>, Vec<Vec<Cell>>)>,
     branches: Vec<[Group; 2]>,
@@ -80,7 +80,7 @@ fn planned(export: &Export, variables: &Variables) -> Result<(Plan, Numbers), Ex
             unit: String::new(),
             description: "name of its group in this file".into(),
         };
-        // The dimension has the name that the first column would have.
+        // The first column would have the name of the dimension.
         let mut columns = own;
         columns[0].name = "name".into();
         columns.push(group);
@@ -95,7 +95,7 @@ fn planned(export: &Export, variables: &Variables) -> Result<(Plan, Numbers), Ex
     Ok((plan, numbers))
 }
 
-/// What the file is about.
+/// Adds the attributes that describe the file.
 fn about(export: &Export, plan: &mut Plan) {
     let study = &export.study;
     plan.text(ROOT, "Conventions", "CF-1.11");
@@ -108,7 +108,8 @@ fn about(export: &Export, plan: &mut Plan) {
     plan.text(ROOT, "model_text", &study.model_text);
 }
 
-/// A name that NetCDF allows: no `/`, which would be a group in a group, nothing unprintable, a letter, digit or `_` in front.
+/// Returns a valid NetCDF name: without `/`, which would denote a nested group, without control characters, and
+/// beginning with a letter, a digit or `_`.
 fn group_name(name: &str) -> String {
     let allowed = |c: char| {
         if c == '/' {
@@ -124,7 +125,7 @@ fn group_name(name: &str) -> String {
     if plain { name } else { format!("_{name}") }
 }
 
-/// Rows that are in memory, over a dimension of their own.
+/// Plans a table held in memory, over a dimension of its own.
 fn table(
     plan: &mut Plan,
     group: Id,
@@ -161,7 +162,7 @@ fn responses(
     (!rows.is_empty()).then(|| table(plan, group, "response", &variables.of_response(), rows))
 }
 
-/// The group of a branch, and in it that of its special points.
+/// Plans the group of a branch and, inside it, the group of its special points.
 fn branch_groups(
     export: &Export,
     variables: &Variables,

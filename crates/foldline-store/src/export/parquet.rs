@@ -1,7 +1,7 @@
 //! Parquet files.
 //!
-//! **Idea.** A row group holds so many cells; then it is written and the next one begins. Numbers are stored as they are,
-//! texts with a dictionary, nothing compressed.
+//! **Idea.** A row group is written once it holds [`CELLS`] cells. Nothing is compressed; columns use the dictionary
+//! encoding of the library's defaults.
 
 use super::cells::Cell;
 use super::columns::{Class, Column};
@@ -17,7 +17,7 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Cells of a row group.
+/// Number of cells of a row group.
 const CELLS: usize = 1_000_000;
 
 struct Parquet {
@@ -27,7 +27,7 @@ struct Parquet {
     rows: usize,
 }
 
-/// A column of the row group that is growing: whether there is a value, and those that there are.
+/// Column of the current row group: definition levels (0 for an empty cell, 1 for a value) and the values present.
 struct Values {
     there: Vec<i16>,
     values: Typed,

@@ -1,4 +1,4 @@
-//! The tables of an export: `branches`, `points`, `special_points`, `profiles`, `special_profiles`, `responses`.
+//! Tables of an export: `branches`, `points`, `special_points`, `profiles`, `special_profiles`, `responses`.
 
 use super::cells::{Cell, branch_cells, point_cells, profile, response_cells, special_cells};
 use super::columns::{Class, Column, Variables, of_branch};
@@ -7,16 +7,16 @@ use foldline::diagram::Point;
 use foldline::model::Model;
 use std::path::{Path, PathBuf};
 
-/// A table that is being written, a row at a time.
+/// Table that is written row by row.
 pub(super) trait Rows {
     fn row(&mut self, cells: &[Cell]) -> Result<(), ExportError>;
     fn finish(self: Box<Self>) -> Result<PathBuf, ExportError>;
 }
 
-/// How the table of a name is begun in a folder.
+/// Function that begins a named table in a folder.
 pub(super) type Begin = dyn Fn(&Path, &str, &[Column]) -> Result<Box<dyn Rows>, ExportError>;
 
-/// Writes all tables that have rows, and `branches`, `points` and `special_points` in any case.
+/// Writes `branches`, `points` and `special_points`, and the other tables if they have rows.
 pub(super) fn write(export: &Export, folder: &Path, begin: &Begin) -> Result<Vec<PathBuf>, ExportError> {
     let variables = Variables::new(export.model());
     let mut done = vec![branches(export, folder, begin)?];
@@ -36,7 +36,7 @@ fn branches(export: &Export, folder: &Path, begin: &Begin) -> Result<PathBuf, Ex
     table.finish()
 }
 
-/// The tables of points and special points, and those of their profiles where there are any.
+/// Writes the tables of points and special points, and of their profiles if there are any.
 fn points(export: &Export, folder: &Path, begin: &Begin, variables: &Variables) -> Result<Vec<PathBuf>, ExportError> {
     let (model, branches) = (export.model(), &export.diagram.branches);
     let (mut width, mut cycles) = (0, [false; 2]);
@@ -109,7 +109,7 @@ fn spectrum_columns(width: usize) -> Vec<Column> {
     (1..=width).flat_map(|k| [part(k, "re"), part(k, "im")]).collect()
 }
 
-/// `index` says which of the points of a branch a profile belongs to.
+/// Columns of a table of profiles; `index` is the name of the column that identifies the point on its branch.
 fn profile_columns(name: &Column, variables: &Variables, index: &str) -> Vec<Column> {
     let own = |name: &str, class: Class, description: &str| Column {
         name: name.into(),

@@ -7,7 +7,7 @@ use std::ops::Range;
 use toml::de::DeTable;
 
 impl Reader<'_> {
-    /// `"hill(x, K, n)" = "x^n/(K^n + x^n)"`.
+    /// Reads a function such as `"hill(x, K, n)" = "x^n/(K^n + x^n)"`.
     pub(super) fn function(&mut self, head: &str, place: Range<usize>, value: &Value, source: &mut ModelSource) {
         let item = Item::Function(source.functions.len());
         let Some((name, arguments)) = Function::head(head) else {
@@ -18,7 +18,7 @@ impl Reader<'_> {
         source.functions.push(Function { name, arguments, expression });
     }
 
-    /// Points with a course between and beyond them.
+    /// Reads a table: points, the interpolation between them and the extrapolation beyond them.
     pub(super) fn table(&mut self, name: String, place: Range<usize>, value: &Value, source: &mut ModelSource) {
         let what = format!("the table `{name}`");
         let Some(table) = self.walk.table(value, &what) else { return };
@@ -37,7 +37,7 @@ impl Reader<'_> {
             }
         };
         let (y, x) = (column("y"), column("x"));
-        // Said already.
+        // Already reported.
         let (x, y) = if x.is_empty() || y.is_empty() { (vec![0.0, 1.0], vec![0.0, 1.0]) } else { (x, y) };
         let interpolation =
             self.choice(table, "interpolation", &[("linear", Interpolation::Linear), ("cubic", Interpolation::Cubic)]);
@@ -45,7 +45,7 @@ impl Reader<'_> {
         source.tables.push(Table { name, x, y, interpolation, outside });
     }
 
-    /// One of a few words, the first where the key is absent.
+    /// Reads one of two words; the first is the default.
     fn choice<T: Copy>(&mut self, table: &DeTable, key: &str, among: &[(&str, T); 2]) -> T {
         let Some(value) = table.get(key) else { return among[0].1 };
         let found = among.iter().find(|(word, _)| value.get_ref().as_str() == Some(word));

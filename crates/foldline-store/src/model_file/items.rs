@@ -8,7 +8,7 @@ use std::ops::Range;
 use toml::de::DeValue;
 
 impl Reader<'_> {
-    /// A number, or an expression of the constants before it.
+    /// Reads a number, or an expression in the preceding constants.
     pub(super) fn constant(&mut self, name: String, place: Range<usize>, value: &Value, source: &mut ModelSource) {
         let what = format!("the constant `{name}`");
         self.places.insert((Item::Constant(source.constants.len()), Field::Name), place);
@@ -27,12 +27,12 @@ impl Reader<'_> {
             },
             _ => self.walk.number(value, &what),
         };
-        // A constant may be a count.
+        // A constant may be a count, so errors that follow from it would be misleading.
         self.incomplete |= number.is_none();
         source.constants.push(Constant { name, unit, value: number.unwrap_or(1.0) });
     }
 
-    /// A number, a list of numbers, or an expression of other parameters, which is a definition.
+    /// Reads a number, a list of numbers, or an expression in other parameters, which becomes a definition.
     pub(super) fn parameter(&mut self, name: String, place: Range<usize>, value: &Value, source: &mut ModelSource) {
         let what = format!("the parameter `{name}`");
         let inner = value.get_ref().as_table().and_then(|table| table.get("value")).unwrap_or(value);
@@ -100,7 +100,7 @@ impl Reader<'_> {
         source.parameters.push(parameter);
     }
 
-    /// A value for each element.
+    /// Reads a value for each element.
     fn values(&mut self, item: Item, parameter: &mut Parameter, value: &Value) {
         let what = format!("the values of `{}`", parameter.name);
         self.places.insert((item, Field::Value), value.span());
@@ -110,12 +110,12 @@ impl Reader<'_> {
         }
     }
 
-    /// A list of numbers, empty where something is wrong.
+    /// Reads a list of numbers; returns an empty list after a mistake.
     pub(super) fn numbers(&mut self, value: &Value, what: &str) -> Vec<f64> {
         self.listed(value, what, |reader, own| reader.walk.number(own, what))
     }
 
-    /// A list of numbers that may have units.
+    /// Reads a list of numbers that may have units.
     fn measures(&mut self, item: Item, value: &Value, what: &str, unit: &mut String) -> Vec<f64> {
         self.listed(value, what, |reader, own| reader.measure(item, own, what, unit))
     }
@@ -135,7 +135,7 @@ impl Reader<'_> {
         if self.walk.found.len() > before { Vec::new() } else { numbers }
     }
 
-    /// An expression, or a table with it.
+    /// Reads an expression, or a table that contains it.
     pub(super) fn definition(&mut self, name: String, place: Range<usize>, value: &Value, source: &mut ModelSource) {
         let what = format!("the definition `{name}`");
         let item = Item::Definition(source.definitions.len());

@@ -1,4 +1,4 @@
-//! The masses that couple equations.
+//! Mass matrix.
 
 use super::Reader;
 use crate::nearest::suggest;
@@ -8,11 +8,12 @@ use std::collections::HashSet;
 use std::ops::Range;
 use toml::de::{DeTable, DeValue};
 
-/// An entry: row, column, place, value.
+/// Entry: row, column, position in the text, value.
 type Entry<'v, 't> = (String, String, Range<usize>, &'v Value<'t>);
 
 impl Reader<'_> {
-    /// The rows of the mass matrix, each a number or a table with an entry for each state that takes part.
+    /// Reads the rows of the mass matrix, each an expression (the diagonal entry) or a table with one entry per coupled
+    /// state.
     pub(super) fn mass(&mut self, root: &DeTable, source: &mut ModelSource) {
         let entries = self.mass_entries(root, source);
         let given: HashSet<(&str, &str)> =
@@ -28,7 +29,7 @@ impl Reader<'_> {
                 self.walk.report(place.clone(), message, hint);
             }
         }
-        // A row of a state with a velocity is that of its acceleration.
+        // For a state with a velocity, rows and columns refer to its acceleration.
         let names: HashSet<String> = source.states.iter().map(|state| state.name.clone()).collect();
         let rate = |name: String| {
             let velocity = format!("{name}'");
@@ -41,7 +42,7 @@ impl Reader<'_> {
         }
     }
 
-    /// The entries in the order of the file; none if a name among them is not that of a state.
+    /// Returns the entries in the order of the file; none if any of their names is not a state.
     fn mass_entries<'v, 't>(&mut self, root: &'v DeTable<'t>, source: &ModelSource) -> Vec<Entry<'v, 't>> {
         let mut entries: Vec<Entry> = Vec::new();
         let known: HashSet<&str> = source.states.iter().map(|state| state.name.as_str()).collect();

@@ -1,7 +1,7 @@
-//! A model file becomes a model.
+//! Reader of model files.
 //!
 //! **Idea.** The file is TOML; its expressions are compiled by [`foldline::model`]. A mistake inside an expression is
-//! carried back to its line and column in the file. The format is described in docs/book/model-files.md.
+//! reported with its line and column in the file. The format is described in docs/book/model-files.md.
 
 mod functions;
 mod items;
@@ -39,19 +39,19 @@ const ROOT_KEYS: [&str; 17] = [
     "whirl",
 ];
 
-/// Reads a model file: the model and the text, verbatim. Every mistake found is returned.
+/// Reads a model file. Returns the model and the verbatim text, or every mistake found.
 pub fn read_model(path: &Path) -> Result<(Model, String), Vec<Diagnostic>> {
     let file = path.display().to_string();
     let text = read_text(path).map_err(|error| vec![unreadable(&file, "the model file", &error)])?;
     Ok((parse_model(&text, &file)?, text))
 }
 
-/// Reads a model text; `file` is its name in messages. Every mistake found is returned.
+/// Reads a model text; `file` is its name in messages. On failure, returns every mistake found.
 pub fn parse_model(text: &str, file: &str) -> Result<Model, Vec<Diagnostic>> {
     parse(text, file, true)
 }
 
-/// Reads the model text of a run, whose units may be those of a program that did not check them.
+/// Reads the model text of a run. Inconsistent units are accepted, because earlier versions did not check them.
 pub(crate) fn parse_model_of_run(text: &str, file: &str) -> Result<Model, Vec<Diagnostic>> {
     parse(text, file, false)
 }
@@ -91,23 +91,23 @@ pub fn parse_source(text: &str, file: &str) -> Result<ModelSource, Vec<Diagnosti
     if reader.walk.found.is_empty() { Ok(source) } else { Err(reader.walk.found) }
 }
 
-/// Reads the tables and remembers where everything stands.
+/// Reader of the tables of a model, which records the position of every item.
 struct Reader<'t> {
     walk: Walk<'t>,
     text: &'t str,
     places: HashMap<(Item, Field), Range<usize>>,
     forcing_misspelt: bool,
-    /// A count or a state could not be read, which would be missed all over.
+    /// True if a count or a state could not be read; compiling would then report many consequential errors.
     incomplete: bool,
-    /// States whose accelerations stand under `[equations]`.
+    /// States whose accelerations are given under `[equations]`.
     accelerated: HashSet<String>,
-    /// Items that state a unit.
+    /// Items with an explicit unit.
     measured: HashSet<Item>,
-    /// True if units are labels that nothing is checked against.
+    /// True if units are labels that are not checked.
     labels_only: bool,
 }
 
-/// The entries of a table in the order of the file.
+/// Entries of a table in the order of the file.
 type Entries<'v, 't> = Vec<(String, Range<usize>, &'v Value<'t>)>;
 
 impl<'t> Reader<'t> {
@@ -177,7 +177,7 @@ impl Reader<'_> {
         entries
     }
 
-    /// A text that may be empty or absent.
+    /// Reads a text that may be empty or absent.
     fn prose(&mut self, table: &DeTable, key: &str) -> String {
         match table.get(key).map(|value| (value, value.get_ref().as_str())) {
             None => String::new(),
@@ -186,7 +186,7 @@ impl Reader<'_> {
         }
     }
 
-    /// `frequency` or `period`, one of the two.
+    /// Reads the forcing: exactly one of `frequency` and `period`.
     fn forcing(&mut self, value: &Value) -> Option<Forcing> {
         let several = |value: &Value| value.get_ref().as_array().is_some();
         let listed = several(value) || value.get_ref().as_table().is_some_and(|t| t.values().any(several));
@@ -198,7 +198,7 @@ impl Reader<'_> {
         let table = self.walk.table(value, "`forcing`")?;
         let before = self.walk.found.len();
         self.walk.only(table, &["frequency", "period"], "`forcing`");
-        // Nothing further is said of a period whose key is misspelt, nor of the time.
+        // After a misspelt key, neither a missing period nor the use of time is reported.
         self.forcing_misspelt = self.walk.found.len() > before;
         let (is_frequency, own) = match (table.get("frequency"), table.get("period")) {
             (Some(own), None) => (true, own),
@@ -218,7 +218,8 @@ impl Reader<'_> {
         Some(Forcing { is_frequency, expression })
     }
 
-    /// The text of an expression; one that is no text is reported, and replaced so as not to be reported again.
+    /// Reads the text of an expression. Any other type is reported and replaced by `0`, so that it is reported only
+    /// once.
     fn expression(&mut self, item: Item, name: Range<usize>, value: &Value, what: &str) -> String {
         self.places.insert((item, Field::Name), name);
         self.places.insert((item, Field::Expression), value.span());
@@ -260,7 +261,7 @@ impl Reader<'_> {
     }
 }
 
-/// The place in the file of a part of a string that stands at `string` in it; `None` where escapes shift the text.
+/// Position in the file of a part of the string literal at `string`; `None` if escapes shift the text.
 fn inside(text: &str, string: &Range<usize>, part: &Range<usize>) -> Option<Range<usize>> {
     let raw = text.get(string.clone())?;
     let quote = ["\"\"\"", "'''", "\"", "'"].into_iter().find(|quote| raw.starts_with(quote))?;

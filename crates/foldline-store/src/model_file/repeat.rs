@@ -5,11 +5,11 @@ use crate::toml_walk::Value;
 use foldline::model::{Constant, Ends, Field, Item, ModelError, Repeat, constant_value};
 use toml::de::{DeTable, DeValue};
 
-/// Counts beyond this are refused here; the model has stricter limits.
+/// Largest count accepted here; the model has stricter limits.
 const MOST: f64 = 1e9;
 
 impl Reader<'_> {
-    /// The repetition that a table states; `listed` is the number of values, where they are listed.
+    /// Reads the repetition of an item; `listed` is the number of values if they are listed.
     pub(super) fn repeat(
         &mut self,
         item: Item,
@@ -40,7 +40,7 @@ impl Reader<'_> {
         Some(repeat)
     }
 
-    /// A whole number, or an expression of constants that is one.
+    /// Reads a positive integer, or an expression in constants with such a value.
     fn count(&mut self, item: Item, value: &Value, what: &str, constants: &[Constant]) -> Option<usize> {
         self.places.insert((item, Field::Count), value.span());
         let number = match value.get_ref() {
@@ -69,7 +69,7 @@ impl Reader<'_> {
         whole.map(|number| number as usize)
     }
 
-    /// `periodic`, or `before` and `after`.
+    /// Reads `periodic`, or `before` and `after`.
     pub(super) fn ends(&mut self, item: Item, table: &DeTable, what: &str) -> Ends {
         let periodic = table.get("periodic").map(|value| (value.span(), value.get_ref().as_bool()));
         match periodic {
@@ -91,7 +91,7 @@ impl Reader<'_> {
         Ends::Given { before: side("before", Field::Before), after: side("after", Field::After) }
     }
 
-    /// One expression, or a list of them, nearest to the end first.
+    /// Reads one expression, or a list of them, nearest to the end first.
     fn beyond(&mut self, item: Item, value: &Value, key: &str, field: fn(usize) -> Field) -> Vec<String> {
         let list: Vec<&Value> = match value.get_ref() {
             DeValue::Array(list) => list.iter().collect(),
@@ -111,7 +111,7 @@ impl Reader<'_> {
         texts
     }
 
-    /// Reports a mistake in an expression of constants at its place in the file.
+    /// Reports a mistake in an expression in constants at its position in the file.
     pub(super) fn misread(&mut self, value: &Value, error: &ModelError) {
         let place = error.span.clone().and_then(|span| inside(self.text, &value.span(), &span)).unwrap_or(value.span());
         self.walk.report(place, error.message.clone(), error.hint.clone());

@@ -1,4 +1,4 @@
-//! States with their equations, of first and second order.
+//! States with their first-order or second-order equations.
 
 use super::Reader;
 use crate::toml_walk::Value;
@@ -10,7 +10,7 @@ const KEYS: [&str; 11] =
     ["equation", "unit", "description", "scale", "range", "period", "count", "index", "before", "after", "periodic"];
 
 impl Reader<'_> {
-    /// A state and its equation; `x''` stands for two: x, and its velocity `x'`.
+    /// Reads a state and its equation; `x''` declares two states, x and its velocity `x'`.
     pub(super) fn state(&mut self, name: String, place: Range<usize>, value: &Value, source: &mut ModelSource) {
         let base = name.strip_suffix("''").unwrap_or(&name);
         if base.ends_with('\'') {
@@ -69,7 +69,7 @@ impl Reader<'_> {
         source.states.extend(second.then_some(velocity));
     }
 
-    /// Unit, description, scale and range.
+    /// Reads unit, description, scale and range.
     fn sizes(&mut self, item: Item, state: &mut State, table: &DeTable) {
         (state.unit, state.description) = self.labels(item, table);
         if let Some(value) = table.get("scale") {
@@ -82,7 +82,7 @@ impl Reader<'_> {
         }
     }
 
-    /// The period of an angle: a number, or an expression of constants.
+    /// Reads the period of an angle: a number, or an expression in constants.
     fn period(&mut self, item: Item, name: &str, value: &Value, source: &ModelSource) -> Option<f64> {
         self.places.insert((item, Field::Period), value.span());
         match value.get_ref() {
@@ -97,7 +97,7 @@ impl Reader<'_> {
         }
     }
 
-    /// `[low, high]`.
+    /// Reads `[low, high]`.
     fn pair(&mut self, item: Item, value: &Value, what: &str, unit: &mut String) -> Option<[f64; 2]> {
         match value.get_ref().as_array().map(|list| (list.first(), list.get(1), list.len())) {
             Some((Some(low), Some(high), 2)) => {

@@ -8,7 +8,7 @@ use std::ops::Range;
 const KEYS: [&str; 5] = ["sum", "value", "instead-of", "unit", "description"];
 
 impl Reader<'_> {
-    /// A sum of states that keeps its value.
+    /// Reads a conserved sum of states.
     pub(super) fn total(&mut self, name: String, place: Range<usize>, value: &Value, source: &mut ModelSource) {
         let (item, what) = (Item::Total(source.totals.len()), format!("the total `{name}`"));
         self.places.insert((item, Field::Name), place.clone());

@@ -1,4 +1,4 @@
-//! Units of a model: where they are stated, values that carry one, and what their check has found.
+//! Units of a model: declarations, values with a unit, and the results of the unit check.
 
 use super::Reader;
 use crate::diagnostic::Diagnostic;
@@ -7,13 +7,13 @@ use foldline::model::{Field, Item, Model, ModelError, ModelSource, TAKEN_AS, Uni
 use foldline::units::{self, Unit};
 use toml::de::DeTable;
 
-/// Doubts that are told one by one.
+/// Number of doubtful units that are reported individually.
 const DOUBTS: usize = 3;
-/// Numbers with implied units that are listed.
+/// Number of quantities with implied units that are listed.
 const TOLD: usize = 12;
 
 impl Reader<'_> {
-    /// The unit of time at the top, and `units = "labels"`.
+    /// Reads the unit of time and the key `units`.
     pub(super) fn time(&mut self, root: &DeTable) -> String {
         if let Some(value) = root.get("units") {
             self.labels_only = value.get_ref().as_str() == Some("labels");
@@ -32,7 +32,7 @@ impl Reader<'_> {
         text
     }
 
-    /// The unit that a table states for an item, and the description.
+    /// Reads the unit and the description of an item.
     pub(super) fn labels(&mut self, item: Item, table: &DeTable) -> (String, String) {
         let unit = table.get("unit").and_then(|value| {
             self.places.insert((item, Field::Unit), value.span());
@@ -44,7 +44,8 @@ impl Reader<'_> {
         (unit.unwrap_or_else(|| "1".into()), self.prose(table, "description"))
     }
 
-    /// A number, or a number with a unit: converted to the unit of the item, or stating it where it has none.
+    /// Reads a number, or a number with a unit. It is converted to the unit of the item; if the item has none, its unit
+    /// becomes that of the number.
     pub(super) fn measure(&mut self, item: Item, value: &Value, what: &str, unit: &mut String) -> Option<f64> {
         let Some(written) = value.get_ref().as_str().and_then(units::quantity) else {
             return self.walk.number(value, what);
@@ -69,7 +70,7 @@ impl Reader<'_> {
         Some(written.value)
     }
 
-    /// The model with the unit of its time, or what is wrong with its units.
+    /// Returns the model with its unit of time, or the mistakes in its units.
     pub(super) fn with_units(
         mut self,
         model: Model,
@@ -91,7 +92,7 @@ impl Reader<'_> {
         Ok(model.with_time(&time, remarks))
     }
 
-    /// What is doubtful about the units.
+    /// Returns notes on doubtful units.
     fn remarks(&self, report: &UnitReport, file: &str) -> Vec<String> {
         let placed = |error: &ModelError, message: String, hint: String| {
             diagnose(file, self.text, self.place_of(error), message, hint).as_note()

@@ -3,7 +3,7 @@
 use num_complex::Complex64;
 
 pub(super) fn pack(values: &[f64]) -> Vec<u8> {
-    // Eight bytes at a time: one copy, where single ones would be put one after the other.
+    // Arrays of eight bytes are flattened in one copy, which is faster than appending single bytes.
     values.iter().map(|v| v.to_le_bytes()).collect::<Vec<[u8; 8]>>().into_flattened()
 }
 
@@ -15,7 +15,7 @@ pub(super) fn pack_pairs(values: &[[f64; 2]]) -> Vec<u8> {
     pack(values.as_flattened())
 }
 
-/// The numbers, or `None` if the length is no multiple of 8.
+/// Returns the numbers, or `None` if the length is not a multiple of 8.
 pub(super) fn unpack(bytes: &[u8]) -> Option<Vec<f64>> {
     let (numbers, rest) = bytes.as_chunks::<8>();
     rest.is_empty().then(|| numbers.iter().map(|b| f64::from_le_bytes(*b)).collect())
@@ -31,8 +31,8 @@ pub(super) fn unpack_complex(bytes: &[u8]) -> Option<Vec<Complex64>> {
     Some(unpack_pairs(bytes)?.into_iter().map(|[re, im]| Complex64::new(re, im)).collect())
 }
 
-/// A checksum of numbers and bytes: after each word h ← (h xor word) · 0x100000001b3, h ← h xor (h >> 32), from
-/// 0xcbf29ce484222325 on. Bytes are taken as little-endian words of 8, the last one filled up with zeros.
+/// Checksum of numbers and bytes. For each word, h ← (h xor word) · 0x100000001b3, then h ← h xor (h >> 32), starting
+/// from h = 0xcbf29ce484222325. Bytes are grouped into little-endian 8-byte words, the last one padded with zeros.
 #[derive(Clone, Copy)]
 pub(super) struct Checksum(u64);
 
@@ -56,13 +56,13 @@ impl Checksum {
         }
     }
 
-    /// As SQLite stores it.
+    /// Value as stored by SQLite, a signed integer.
     pub(super) fn value(self) -> i64 {
         self.0 as i64
     }
 }
 
-/// That of study and model, in hexadecimal digits.
+/// Checksum of study and model, in hexadecimal digits.
 pub(super) fn texts_checksum(study: &str, model: &str) -> String {
     let mut sum = Checksum::new();
     sum.bytes(study.as_bytes());

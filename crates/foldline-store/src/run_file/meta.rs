@@ -1,11 +1,11 @@
-//! What a run file says about the run as a whole, and about its variables.
+//! Metadata of a run file and descriptions of its variables.
 
 use super::bytes::texts_checksum;
 use crate::study_file::Study;
 use foldline::explore::state_scales;
 use std::collections::HashMap;
 
-/// What is written down about the run as a whole.
+/// Entries of the table `meta`: versions, settings, study and model.
 pub(super) fn description(study: &Study) -> Vec<(&'static str, String)> {
     let seeds: Vec<serde_json::Value> = study
         .plan

@@ -1,14 +1,14 @@
-//! The run file: everything a run has found, in one SQLite database that survives being killed.
+//! Run file: all results of a run, in one SQLite database that survives a kill of the process.
 //!
-//! **Idea.** `DIR/run.sqlite` holds the study and the model verbatim, the settings, and every accepted point, special point
-//! and ending at the moment it is accepted. Each is one statement, hence one transaction: after a kill at any instant the
-//! file holds a prefix of the run, and [`Recorder::resume`] goes on from it. Of several threads one writes at a time, and the
-//! others leave it their points (docs/decisions/0026-queued-writes.md).
+//! **Idea.** `DIR/run.sqlite` holds the study and the model verbatim, the settings, and every accepted point, special
+//! point and ending, written as soon as it is accepted. Each is one statement and therefore one transaction. If the
+//! process is killed at any moment, the file holds a prefix of the run, and [`Recorder::resume`] continues from it.
+//! Only one thread writes at a time; the others queue their points for it (docs/decisions/0026-queued-writes.md).
 //!
-//! * Write-ahead log, so that others can read while the run goes on; `synchronous = NORMAL`, which loses nothing when the
-//!   process is killed and at most the last points, never the consistency, when the power fails.
-//! * Each number stands there twice: as REAL in a column that Python, R or a shell can read, and as little-endian bytes in a
-//!   BLOB, from which the round trip is exact to the bit (REAL columns lose NaN and the sign of zero).
+//! * The write-ahead log lets other programs read during the run. With `synchronous = NORMAL` nothing is lost if the
+//!   process is killed; a power failure can lose the last points but cannot make the file inconsistent.
+//! * Each number is stored twice: as REAL in a column that Python, R or a shell can read, and as little-endian bytes in
+//!   a BLOB. Only the BLOB is exact to the bit: REAL columns lose NaN and the sign of zero.
 //! * The tables are described in docs/book/run-file.md. `PRAGMA user_version` is [`FORMAT_VERSION`].
 
 mod bytes;
@@ -28,49 +28,49 @@ pub use writer::Recorder;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-/// The version of the format written here. A file of a newer version is refused; a change that older readers would
-/// misunderstand raises it.
+/// Version of the format written here. Files of a newer version are rejected. The version is raised by any change that
+/// older readers would misunderstand.
 pub const FORMAT_VERSION: i64 = 10;
 
-/// Marks an SQLite file as a run file ("fold" in ASCII).
+/// Application id that marks an SQLite file as a run file ("fold" in ASCII).
 pub const APPLICATION_ID: i64 = 0x666f_6c64;
 
-/// The path of the run file in a folder.
+/// Returns the path of the run file in a folder.
 pub fn path_in(folder: &Path) -> PathBuf {
     folder.join("run.sqlite")
 }
 
-/// Why a run file could not be made, read or continued. The message says what to do about it.
+/// Reason why a run file could not be created, read or continued. The message includes the cure.
 #[derive(Debug)]
 pub enum RunFileError {
-    /// There is no run file in this folder.
+    /// No run file in this folder.
     Missing(PathBuf),
-    /// There is one already.
+    /// The run file already exists.
     Exists(PathBuf),
-    /// The folder cannot be made or written to.
+    /// The folder cannot be created or written to.
     Folder(PathBuf, std::io::Error),
-    /// The file is something else.
+    /// The file is not a run file.
     Foreign(PathBuf),
     /// The file was written by a newer version.
     Newer(PathBuf, i64),
     /// A run cannot be resumed because its study or model (named here) has changed.
     Changed(PathBuf, &'static str),
-    /// The run is complete and its profiles have been removed, from which it would go on.
+    /// The run is complete and cannot be resumed because part of its profiles were removed.
     Thinned(PathBuf),
-    /// The file contradicts itself; the sentence says where.
+    /// The file is inconsistent; the text says where.
     Damaged(PathBuf, String),
-    /// Another run is writing there.
+    /// Another run is writing to the file.
     Busy(PathBuf),
-    /// There is no space left, or a quota is used up.
+    /// The disk is full, or a quota is used up.
     Full(PathBuf),
     /// The file was deleted, moved or replaced while the run was writing to it.
     Vanished(PathBuf),
-    /// The database refused.
+    /// Any other error of the database.
     Database(PathBuf, rusqlite::Error),
 }
 
 impl RunFileError {
-    /// What SQLite answered about the file at `path`, in terms of what happened to it.
+    /// Converts an SQLite error for the file at `path`.
     pub(crate) fn from_sqlite(path: &Path, error: rusqlite::Error) -> RunFileError {
         use rusqlite::Error::{
             FromSqlConversionFailure, IntegralValueOutOfRange, InvalidColumnType, QueryReturnedNoRows, Utf8Error,

@@ -1,4 +1,4 @@
-//! Reading a run back.
+//! Reader of run files.
 
 use super::bytes::texts_checksum;
 use super::rows::{ending_in, held_in, kind_named, origin_in, point_in};
@@ -7,62 +7,62 @@ use foldline::diagram::{Branch, Diagram, Family, Point, Shortfall, SpecialPoint}
 use rusqlite::{Connection, OpenFlags, Row};
 use std::path::{Path, PathBuf};
 
-/// A run as its file has it.
+/// Contents of a run file.
 #[derive(Clone, Debug)]
 pub struct Recorded {
-    /// The file.
+    /// Path of the file.
     pub path: PathBuf,
     /// Name of the study file.
     pub study_file: String,
-    /// The study, verbatim.
+    /// Verbatim text of the study.
     pub study_text: String,
     /// Name of the model file.
     pub model_file: String,
-    /// The model, verbatim.
+    /// Verbatim text of the model.
     pub model_text: String,
-    /// Everything found, branches in the order in which they were begun.
+    /// Diagram, with branches in the order in which they were begun.
     pub diagram: Diagram,
-    /// Remarks: the branch they are about, and what was noticed.
+    /// Notes: name of the branch, and text.
     pub notes: Vec<(String, String)>,
 }
 
-/// How much of the branches of a run is read.
+/// Part of a run that is read.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Part {
     /// Everything.
     Everything,
-    /// Points and special points without states, profiles, meshes and tangents, which are left empty: what tables and
-    /// diagrams show.
+    /// Points and special points without states, profiles, meshes and tangents, which are left empty. Enough for tables
+    /// and diagrams.
     Numbers,
-    /// Likewise, and no points: branches have their special points and ends only.
+    /// Special points and ends of branches, without points; states, profiles, meshes and tangents are left empty.
     Special,
 }
 
-/// What every point has that is a few numbers; special points have [`OF_SPECIAL`] besides.
+/// Light columns of every point; special points also have [`OF_SPECIAL`].
 const NUMBERS: &str = "position, degree, unstable, newton, factorisations, rejected, parameter_bytes, spectrum_bytes, \
      range_bytes, scalar_bytes";
-/// Likewise, since format 3.
+/// Light columns since format 3.
 const LATER_NUMBERS: &str = ", evaluations, linearisations";
-/// Likewise, since format 4.
+/// Light columns since format 4.
 const CHECKED_NUMBERS: &str = ", numbers_checksum";
-/// Likewise, since format 6.
+/// Light columns since format 6.
 const FORCED_NUMBERS: &str = ", forcing_periods";
-/// Likewise, since format 9.
+/// Light columns since format 9.
 const SLOPES: &str = ", slope_error";
-/// Likewise, since format 7.
+/// Light columns since format 7.
 const AVERAGES: &str = ", average_bytes";
-/// Likewise, since format 10.
+/// Light columns since format 10.
 const GAINS: &str = ", gain_bytes";
 const OF_SPECIAL: &str = "kind, unstable_before, unstable_after";
 /// Columns of special points since format 8.
 const COEFFICIENT_ERRORS: &str = ", coefficient_count, normal_form_remark";
 
-/// Reads the run in `folder`, which may still be growing.
+/// Reads the run in `folder`, which may still be in progress.
 pub fn load(folder: &Path) -> Result<Recorded, RunFileError> {
     load_part(folder, Part::Everything)
 }
 
-/// Like [`load`], but only as much as is asked for.
+/// Reads the requested part of the run in `folder`. The database is checked only if everything is read.
 pub fn load_part(folder: &Path, part: Part) -> Result<Recorded, RunFileError> {
     let reading = Reading::open(folder)?;
     if part == Part::Everything {
@@ -71,7 +71,7 @@ pub fn load_part(folder: &Path, part: Part) -> Result<Recorded, RunFileError> {
     reading.recorded(part)
 }
 
-/// A run file as it is at one instant, though the run may go on.
+/// Snapshot of a run file, which may still be growing.
 pub struct Reading {
     pub(super) connection: Connection,
     pub(super) path: PathBuf,
@@ -81,7 +81,7 @@ impl Reading {
     /// Opens the run in `folder`.
     ///
     /// # Errors
-    /// If there is none, or it cannot be read.
+    /// If there is no run, or it cannot be read.
     pub fn open(folder: &Path) -> Result<Reading, RunFileError> {
         let path = path_in(folder);
         if !path.exists() {
@@ -91,22 +91,22 @@ impl Reading {
             Open::Run(connection) => connection,
             Open::Empty => return Err(RunFileError::Damaged(path, "it is empty".to_string())),
         };
-        // One transaction, so that a run that is still growing is seen at one instant.
+        // One read transaction, so that all reads see the same state of a growing file.
         connection.execute_batch("BEGIN").map_err(|e| RunFileError::from_sqlite(&path, e))?;
         Ok(Reading { connection, path })
     }
 
-    /// The run, or as much of it as is asked for.
+    /// Returns the requested part of the run.
     ///
     /// # Errors
-    /// If the file cannot be read, or contradicts itself.
+    /// If the file cannot be read or is inconsistent.
     pub fn recorded(&self, part: Part) -> Result<Recorded, RunFileError> {
         let Reading { connection, path } = self;
         let failed = |e| RunFileError::from_sqlite(path, e);
         let text = |key: &str| -> Result<String, RunFileError> {
             connection.query_row("SELECT value FROM meta WHERE key = ?", [key], |row| row.get(0)).map_err(failed)
         };
-        // Files of versions before 4 have none.
+        // Formats before 4 have no such entry.
         if let Ok(stated) = text("texts_checksum")
             && stated != texts_checksum(&text("study")?, &text("model")?)
         {
@@ -130,15 +130,15 @@ impl Reading {
     }
 }
 
-/// A file that was opened.
+/// Opened file.
 pub(super) enum Open {
-    /// It has nothing in it yet: the run was killed before its first transaction.
+    /// Empty database: the run was killed before its first transaction.
     Empty,
-    /// A run.
+    /// Run file.
     Run(Connection),
 }
 
-/// Opens a run file after making sure that it is one, of a version known here.
+/// Opens a file and checks that it is a run file of a known version.
 pub(super) fn open(path: &Path, write: bool) -> Result<Open, RunFileError> {
     let failed = |e| RunFileError::from_sqlite(path, e);
     let foreign = || RunFileError::Foreign(path.to_path_buf());
@@ -152,7 +152,7 @@ pub(super) fn open(path: &Path, write: bool) -> Result<Open, RunFileError> {
         Err(error) if error.sqlite_error_code() == Some(rusqlite::ErrorCode::DatabaseCorrupt) => {
             return Err(failed(error));
         }
-        // In a folder where nothing can be written the log cannot be opened; the file alone can.
+        // In a read-only folder the write-ahead log cannot be opened, but the file itself can.
         Err(error) if write => return Err(failed(error)),
         Err(error) => immutable(path).ok_or_else(|| failed(error))?,
     };
@@ -165,7 +165,7 @@ pub(super) fn open(path: &Path, write: bool) -> Result<Open, RunFileError> {
     }
 }
 
-/// Whether the database itself is in order: its pages, and that every row has its index.
+/// Checks the integrity of the database: its pages, and that every row has its index entries.
 pub(super) fn sound(connection: &Connection, path: &Path) -> Result<(), RunFileError> {
     let found: Result<String, _> = connection.query_row("PRAGMA integrity_check(1)", [], |row| row.get(0));
     match found.map_err(|error| RunFileError::from_sqlite(path, error))?.as_str() {
@@ -185,7 +185,7 @@ fn is_empty(connection: &Connection) -> rusqlite::Result<bool> {
     connection.query_row("SELECT count(*) = 0 FROM sqlite_master", [], |row| row.get(0))
 }
 
-/// All branches with their points, special points and endings.
+/// Loads the diagram: branches with the requested part of their points, responses, and shortfalls.
 pub(super) fn load_diagram(connection: &Connection, path: &Path, part: Part) -> Result<Diagram, RunFileError> {
     let (of_points, of_special) = match part {
         Part::Everything => ("*".to_string(), "*".to_string()),
@@ -224,7 +224,7 @@ pub(super) fn load_diagram(connection: &Connection, path: &Path, part: Part) -> 
                 return Err(RunFileError::Damaged(path.to_path_buf(), what));
             }
         }
-        // As they are in a branch: on the way backwards the first one met comes last.
+        // In the order of a branch: on the backward side, the special point found first comes last.
         let sql =
             of_branch(&of_special, "special_points", "position, CASE WHEN position < 0 THEN -rowid ELSE rowid END");
         branch.special = read(connection, path, &sql, &[number], special_in)?;
@@ -244,7 +244,7 @@ pub(super) fn load_diagram(connection: &Connection, path: &Path, part: Part) -> 
     Ok(diagram)
 }
 
-/// Requests that were not fulfilled; none in files of earlier programs.
+/// Loads the requests that were not fulfilled; files of earlier versions have none.
 fn shortfalls(connection: &Connection, path: &Path) -> Result<Vec<Shortfall>, RunFileError> {
     let sql = "SELECT name FROM sqlite_master WHERE type = 'table' AND name = 'shortfalls'";
     if read(connection, path, sql, &[], |_| Ok(()))?.is_empty() {
@@ -256,7 +256,7 @@ fn shortfalls(connection: &Connection, path: &Path) -> Result<Vec<Shortfall>, Ru
     })
 }
 
-/// One point, whole.
+/// Loads one complete point.
 pub(super) fn point_at(connection: &Connection, branch: i64, position: i64) -> Option<Point> {
     let mut statement = connection.prepare_cached("SELECT * FROM points WHERE branch = ?1 AND position = ?2").ok()?;
     statement.query_row([branch, position], |row| Ok(point_in(row).ok())).ok()?.map(|found| found.0)
@@ -271,7 +271,7 @@ fn branch_in(row: &Row) -> Result<Branch, String> {
     let name: String = row.get("name").map_err(|e| e.to_string())?;
     let free: i64 = row.get("free").map_err(|e| e.to_string())?;
     let free = usize::try_from(free).map_err(|e| e.to_string())?;
-    // Files of version 8 and earlier have none.
+    // Formats before 9 have no units.
     let units = ["held_unit", "unit"].map(|name| row.get(name).unwrap_or(1.0));
     Ok(Branch { held: held_in(row)?, units, ..Branch::new(name, family, free, origin_in(row)?) })
 }
@@ -284,7 +284,7 @@ pub(super) fn special_in(row: &Row) -> Result<SpecialPoint, String> {
             .and_then(|n| usize::try_from(n).ok())
             .ok_or_else(|| format!("{name} is not a count"))
     };
-    // Rows of formats before 8 have coefficients without errors.
+    // Formats before 8 have coefficients without errors.
     let later = |name: &str| match row.get::<_, Option<i64>>(name) {
         Err(rusqlite::Error::InvalidColumnName(_)) => Ok(None),
         other => other.map_err(|e| e.to_string()),

@@ -1,7 +1,7 @@
 //! Results of surveys and sweeps as rows.
 //!
-//! **Idea.** A set is written when it is complete, in one transaction. Files of earlier programs lack the tables or some columns;
-//! these are added when such a run is resumed, and a reader treats missing tables and columns as empty.
+//! **Idea.** A set is written in one transaction when it is complete. Files of earlier versions lack the tables or some
+//! columns. These are added when such a run is resumed; a reader treats missing tables and columns as empty.
 
 use super::RunFileError;
 use super::bytes::{pack, pack_pairs, unpack, unpack_pairs};
@@ -63,7 +63,7 @@ fn tables(model: &Model) -> String {
     )
 }
 
-/// The statement that inserts a response.
+/// Returns the statement that inserts a response.
 pub(super) fn insert(model: &Model) -> String {
     let columns = columns(model);
     let shown: Vec<String> = columns.names().map(|name| quoted(name)).collect();
@@ -92,7 +92,7 @@ pub(super) fn write(connection: &mut Connection, sql: &str, set: &Responses, sho
     transaction.commit()
 }
 
-/// `shown` is how many parameters and extremes have columns of their own; where the motion has none they stay empty.
+/// Values of a row. `shown` is the number of columns of parameters and extremes; missing extremes are NULL.
 fn values_of(response: &Response, shown: usize) -> Vec<Value> {
     let (first, second) = response.ratio.unzip();
     let integer = |value: Option<u32>| value.map_or(Value::Null, |v| Value::Integer(v.into()));
@@ -124,7 +124,7 @@ fn values_of(response: &Response, shown: usize) -> Vec<Value> {
     values
 }
 
-/// All sets, in the order in which they were completed.
+/// Loads all sets in the order in which they were completed.
 pub(super) fn load(connection: &Connection, path: &Path) -> Result<Vec<Responses>, RunFileError> {
     let failed = |e| RunFileError::from_sqlite(path, e);
     let damaged = |what: String| RunFileError::Damaged(path.to_path_buf(), what);
@@ -167,7 +167,7 @@ fn response_in(row: &Row) -> Result<Response, String> {
     let numbers =
         |name: &str| unpack(&blob(name)?).ok_or_else(|| format!("{name} has a length that is not a multiple of 8"));
     let count = |name: &str| row.get::<_, Option<u32>>(name).map_err(|e| e.to_string());
-    // Columns that came later may be missing.
+    // Columns added in later versions may be missing.
     let later = |name: &str| match row.get::<_, Option<i64>>(name) {
         Err(rusqlite::Error::InvalidColumnName(_)) => Ok(None),
         Err(error) => Err(error.to_string()),

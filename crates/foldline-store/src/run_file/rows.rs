@@ -1,11 +1,12 @@
-//! A point as a row, and back.
+//! Conversion between points and rows.
 
 use super::bytes::{Checksum, pack, pack_complex, pack_pairs, unpack, unpack_complex, unpack_pairs};
 use foldline::diagram::{Branch, Connection, Cost, Cycle, Ending, Kind, Origin, Point, Solution, SpecialPoint, Trust};
 use rusqlite::Row;
 use rusqlite::types::Value;
 
-/// The shown columns and the columns of a point, in the order of the insertion. `extra` numbers are kept with the scalars.
+/// Values of the named columns and the columns of a point, in the order of the insertion. `extra` numbers are stored
+/// with the scalars.
 pub(super) fn values_of(point: &Point, extra: &[f64]) -> Vec<Value> {
     let count = |n: usize| Value::Integer(i64::try_from(n).unwrap_or(i64::MAX));
     let (degree, profile) = match &point.solution {
@@ -106,11 +107,12 @@ pub(super) fn end_row(number: i64, side: usize, ending: &Ending) -> Vec<Value> {
     first.into_iter().chain(ending_values(ending)).collect()
 }
 
-/// Bytes of the parameter in a key; in files of earlier versions they are all of it.
+/// Number of bytes of the parameter in a key. Keys of earlier versions consist of the parameter alone.
 pub(super) const OF_PARAMETER: usize = 8;
 
-/// What tells special points of a branch apart: kind, position, and the bits of the parameter, since two of one kind can lie
-/// between the same two points; and the count of unstable eigenvalues, since they can lie at the same place.
+/// Returns the key of a special point within its branch: kind, position, and the bytes of the parameter and of the
+/// number of unstable eigenvalues. Two special points of one kind can lie between the same two points, and even at the
+/// same parameter.
 pub(super) fn key_of(branch: &Branch, special: &SpecialPoint) -> (&'static str, i64, Vec<u8>) {
     let parameter = special.point.parameters.get(branch.free).copied().unwrap_or(0.0);
     let count = special.unstable_before as u64;
@@ -130,7 +132,8 @@ fn checksum(parts: &[Vec<u8>]) -> i64 {
     sum.value()
 }
 
-/// That of everything about a point that is a few numbers; the second count is left out where it is 0.
+/// Checksum of the light columns of a point. The number of forcing periods is left out if it is 0, as in formats before
+/// 6.
 fn numbers_checksum(position: i64, [unstable, forcing_periods]: [usize; 2], light: &[Vec<u8>]) -> i64 {
     let mut sum = Checksum::new();
     sum.word(position as u64);
@@ -142,8 +145,8 @@ fn numbers_checksum(position: i64, [unstable, forcing_periods]: [usize; 2], ligh
     sum.value()
 }
 
-/// The point in a row, and the extra numbers kept with its scalars; the error is the column that makes no sense. Where
-/// the solution was not asked for, it and the tangent are left empty.
+/// Returns the point in a row and the extra numbers stored with its scalars. If the solution was not queried, it and
+/// the tangent are left empty. The error names the invalid column.
 pub(super) fn point_in(row: &Row) -> Result<(Point, Vec<f64>), String> {
     let whole = row.as_ref().column_index("solution_bytes").is_ok();
     let blob = |name: &str| row.get::<_, Vec<u8>>(name).map_err(|e| e.to_string());
@@ -155,18 +158,18 @@ pub(super) fn point_in(row: &Row) -> Result<(Point, Vec<f64>), String> {
             .and_then(|n| usize::try_from(n).ok())
             .ok_or_else(|| format!("{name} is not a count"))
     };
-    // Columns that version 2 had not.
+    // Columns added after format 2.
     let later = |name: &str| match row.get::<_, i64>(name) {
         Err(rusqlite::Error::InvalidColumnName(_)) => Ok(0),
         _ => count(name),
     };
     let position: i64 = row.get("position").map_err(|e| e.to_string())?;
-    // Averages since version 7, gains since version 10; without them their checksum is that of nothing.
+    // Averages exist since format 7, gains since format 10. Missing ones add nothing to the checksum.
     let newer_bytes = |name: &str| match row.get::<_, Option<Vec<u8>>>(name) {
         Err(rusqlite::Error::InvalidColumnName(_)) => Ok(Vec::new()),
         other => other.map(Option::unwrap_or_default).map_err(|e| e.to_string()),
     };
-    // Those of older versions have none.
+    // Formats before 4 have no checksums.
     let stated = |name: &str| match row.get::<_, Option<i64>>(name) {
         Err(rusqlite::Error::InvalidColumnName(_)) => Ok(None),
         other => other.map_err(|e| e.to_string()),
@@ -187,7 +190,7 @@ pub(super) fn point_in(row: &Row) -> Result<(Point, Vec<f64>), String> {
         }
     }
     let mut scalars = numbers("scalar_bytes")?;
-    // One more since version 4.
+    // The error of the spectrum exists since format 4.
     let spectrum_error = match of_numbers {
         Some(_) if scalars.len() > 6 => scalars.remove(6),
         _ => f64::NAN,
@@ -202,7 +205,7 @@ pub(super) fn point_in(row: &Row) -> Result<(Point, Vec<f64>), String> {
             let mesh = if whole { numbers("mesh_bytes")? } else { Vec::new() };
             let degree = count("degree")?;
             let nodes = mesh.len().saturating_sub(1) * (degree + 1);
-            // Both are empty where the profile has been removed.
+            // Both are empty if the profile has been removed.
             let removed = mesh.is_empty() && profile.is_empty();
             if whole && !removed && (nodes == 0 || profile.len() % nodes != 0) {
                 return Err("solution_bytes and mesh_bytes do not belong together".to_string());
@@ -241,14 +244,14 @@ pub(super) fn point_in(row: &Row) -> Result<(Point, Vec<f64>), String> {
     Ok((point, extra.to_vec()))
 }
 
-/// `detail, kind, count, value_bytes` of an ending; its code and sentence come from the ending itself.
+/// Values of `detail, kind, count, value_bytes` of an ending; its code and sentence come from the ending itself.
 pub(super) fn ending_values(ending: &Ending) -> [Value; 4] {
     let (detail, kind, count, value) = match ending {
         Ending::Bound(value) | Ending::PeriodUnbounded(value) | Ending::Asked(value) => {
             (None, None, None, Some(*value))
         }
         Ending::Joined { at, parameter } => (None, Some(*at), None, Some(*parameter)),
-        // The text of the period is exact to the last bit.
+        // `{:?}` writes the period exactly.
         Ending::Connecting { parameter, period, to, .. } => {
             (Some(format!("{period:?} {to}")), None, None, Some(*parameter))
         }
@@ -269,7 +272,7 @@ pub(super) fn ending_values(ending: &Ending) -> [Value; 4] {
     ]
 }
 
-/// The ending in a row of `ends`.
+/// Returns the ending in a row of `ends`.
 pub(super) fn ending_in(row: &Row) -> Result<Ending, String> {
     let text = |name: &str| row.get::<_, Option<String>>(name).map_err(|e| e.to_string());
     let detail = || Ok::<_, String>(text("detail")?.unwrap_or_default());
@@ -305,7 +308,7 @@ pub(super) fn ending_in(row: &Row) -> Result<Ending, String> {
     })
 }
 
-/// `origin, origin_name, origin_kind, origin_parameter, origin_bytes`.
+/// Values of `origin, origin_name, origin_kind, origin_parameter, origin_bytes`.
 pub(super) fn origin_values(origin: &Origin) -> [Value; 5] {
     let (code, name, kind, parameter) = match origin {
         Origin::Seed(name) => ("seed", name, None, None),
@@ -321,14 +324,16 @@ pub(super) fn origin_values(origin: &Origin) -> [Value; 5] {
     ]
 }
 
-/// `held, follows`: what is held along a curve in two parameters, and the number of the parameter that follows from it.
+/// Values of `held, follows`: the kind of bifurcation continued along a two-parameter curve, and the index of its
+/// second parameter.
 pub(super) fn held_values(held: Option<(Kind, usize)>) -> [Value; 2] {
     let kind = held.map(|(kind, _)| Value::Text(kind.name().to_string()));
     let follows = held.map(|(_, follows)| Value::Integer(i64::try_from(follows).unwrap_or(i64::MAX)));
     [kind.unwrap_or(Value::Null), follows.unwrap_or(Value::Null)]
 }
 
-/// What is held, in a row of `branches`. Version 1 had no such columns, nor anything held.
+/// Returns the kind of bifurcation continued and the second parameter, from a row of `branches`. Format 1 had no such
+/// columns and no curves in two parameters.
 pub(super) fn held_in(row: &Row) -> Result<Option<(Kind, usize)>, String> {
     let kind = match row.get::<_, Option<String>>("held") {
         Err(rusqlite::Error::InvalidColumnName(_)) | Ok(None) => return Ok(None),
@@ -339,7 +344,7 @@ pub(super) fn held_in(row: &Row) -> Result<Option<(Kind, usize)>, String> {
     Ok(Some((kind, usize::try_from(follows).map_err(|e| e.to_string())?)))
 }
 
-/// The origin in a row of `branches`.
+/// Returns the origin in a row of `branches`.
 pub(super) fn origin_in(row: &Row) -> Result<Origin, String> {
     let name: String = row.get("origin_name").map_err(|e| e.to_string())?;
     match row.get::<_, String>("origin").map_err(|e| e.to_string())?.as_str() {

@@ -1,12 +1,12 @@
-//! The tables.
+//! Tables of a run file.
 
 use foldline::model::Model;
 
-/// The columns of a model that the tables show by name.
+/// Columns of a table that are named after items of the model.
 pub(crate) struct Columns {
-    /// Every parameter.
+    /// One column per parameter.
     pub(crate) parameters: Vec<String>,
-    /// `NAME_min`, `NAME_max` of every state, then of every output.
+    /// Columns `NAME_min`, `NAME_max` of every state, then of every output.
     pub(crate) ranges: Vec<String>,
 }
 
@@ -16,7 +16,7 @@ impl Columns {
         Columns::beside(model, &own)
     }
 
-    /// The columns of a model in a table that has the columns `fixed` besides.
+    /// Columns of a model in a table that also has the columns `fixed`.
     pub(super) fn beside(model: &Model, fixed: &[&str]) -> Columns {
         let mut taken: Vec<String> = fixed.iter().map(|s| s.to_string()).collect();
         let mut unique = |name: String| free_name(name, &mut taken);
@@ -26,15 +26,15 @@ impl Columns {
         Columns { parameters, ranges }
     }
 
-    /// All of them, in the order of the tables.
+    /// Returns all column names in the order of the tables.
     pub(crate) fn names(&self) -> impl Iterator<Item = &String> {
         self.parameters.iter().chain(&self.ranges)
     }
 }
 
-/// The name, or where it is taken `NAME_2` or `NAME_3` and so on, which is then taken too.
+/// Returns the name, or `NAME_2`, `NAME_3` and so on if it is taken, and adds it to `taken`.
 ///
-/// SQLite does not tell capitals from small letters in column names: of K and k the later becomes k_2.
+/// Column names in SQLite are case-insensitive: if K is taken, k becomes k_2.
 pub(crate) fn free_name(name: String, taken: &mut Vec<String>) -> String {
     let mut candidate = name.clone();
     let mut count = 2;
@@ -46,7 +46,7 @@ pub(crate) fn free_name(name: String, taken: &mut Vec<String>) -> String {
     candidate
 }
 
-/// Names that the two tables of points have besides those of [`POINT_COLUMNS`], and one that SQLite has in every table.
+/// Further names in the two tables of points, and the `rowid` that SQLite adds to every table.
 const OTHERS: [&str; 11] = [
     "branch",
     "position",
@@ -61,7 +61,7 @@ const OTHERS: [&str; 11] = [
     "rowid",
 ];
 
-/// The columns that a point has in both tables of points, with their types: first those to read, then those to load.
+/// Columns of a point in both tables of points, with their types: first the readable ones, then the exact bytes.
 const POINT_COLUMNS: [(&str, &str); 26] = [
     ("period", "REAL"),
     ("unstable", "INTEGER NOT NULL"),
@@ -91,7 +91,7 @@ const POINT_COLUMNS: [(&str, &str); 26] = [
     ("solution_checksum", "INTEGER"),
 ];
 
-/// The statements that make all tables.
+/// Returns the statements that create all tables.
 pub(super) fn create(columns: &Columns) -> String {
     let shown: String = columns.names().map(|name| format!("{} REAL, ", quoted(name))).collect();
     let of_points = POINT_COLUMNS.map(|(name, kind)| format!("{name} {kind}")).join(", ");
@@ -116,12 +116,12 @@ pub(super) fn create(columns: &Columns) -> String {
     )
 }
 
-/// The statements that bring a file of an older version to the present one.
+/// Returns the statements that upgrade a file from `version` to the next one.
 ///
-/// Version 1 had no curves in two parameters, version 2 did not count evaluations, version 3 had neither checksums nor errors of
-/// multipliers, version 4 did not know that a solution can be without bound, version 5 had neither forced models nor
-/// normal forms, version 6 no averages, version 7 no errors of coefficients, version 8 neither units of
-/// parameters nor errors of slopes, version 9 no angles.
+/// Version 1 had no curves in two parameters, version 2 no counts of evaluations, version 3 neither checksums nor
+/// errors of multipliers, version 4 no ending for an unbounded solution, version 5 neither forced models nor normal
+/// forms, version 6 no averages, version 7 no errors of coefficients, version 8 neither units of parameters nor errors
+/// of slopes, version 9 no angles.
 pub(super) fn upgrade(version: i64) -> &'static str {
     match version {
         1 => "ALTER TABLE branches ADD COLUMN held TEXT; ALTER TABLE branches ADD COLUMN follows INTEGER;",
@@ -166,7 +166,7 @@ pub(super) fn upgrade(version: i64) -> &'static str {
     }
 }
 
-/// `INSERT OR REPLACE` with `first` before the shown columns and the columns of a point after them.
+/// Returns an `INSERT OR REPLACE` statement for the columns `first`, the named columns, and the columns of a point.
 pub(super) fn insertion(table: &str, first: &[&str], columns: &Columns) -> String {
     let names: Vec<String> = first
         .iter()

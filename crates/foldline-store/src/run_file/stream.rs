@@ -1,7 +1,7 @@
-//! The points of a branch one after the other.
+//! Points of a branch, read one after the other.
 //!
-//! **Idea.** A run of a hundred thousand points does not fit into memory with its profiles. How much of what there is tells
-//! [`Reading::extent`], without looking at any profile; then each point comes, and goes.
+//! **Idea.** A run of a hundred thousand points does not fit into memory with its profiles. [`Reading::extents`]
+//! returns the number and size of the points without reading any profile; the points are then passed on one at a time.
 
 use super::reader::{sound, special_in};
 use super::rows::point_in;
@@ -9,27 +9,27 @@ use super::{Reading, RunFileError};
 use foldline::diagram::{Point, SpecialPoint};
 use rusqlite::Row;
 
-/// How large the points of a branch are.
+/// Number and size of the points of a branch.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Extent {
-    /// How many there are.
+    /// Number of points.
     pub points: u64,
-    /// The largest number of states in a profile: Gauss points and left ends of all mesh intervals. 0 for equilibria.
+    /// Largest number of states in a profile: Gauss points and left ends of all mesh intervals. 0 for equilibria.
     pub nodes: u64,
-    /// The largest number of eigenvalues or multipliers.
+    /// Largest number of eigenvalues or multipliers.
     pub spectrum: u64,
 }
 
 impl Reading {
-    /// Has SQLite check the whole file.
+    /// Checks the integrity of the whole database.
     ///
     /// # Errors
-    /// If it is damaged; the sentence says where.
+    /// If it is damaged; the text says where.
     pub fn sound(&self) -> Result<(), RunFileError> {
         sound(&self.connection, &self.path)
     }
 
-    /// How large the points, and how large the special points of a branch are.
+    /// Returns the number and size of the points and of the special points of a branch.
     ///
     /// # Errors
     /// If the file cannot be read.
@@ -48,10 +48,10 @@ impl Reading {
         Ok([extent("points")?, extent("special_points")?])
     }
 
-    /// Every point of a branch, whole, by increasing position.
+    /// Passes every complete point of a branch to `take`, by increasing position.
     ///
     /// # Errors
-    /// Those of `take`, and where the file cannot be read or contradicts itself.
+    /// Errors of `take`, or if the file cannot be read or is inconsistent.
     pub fn each_point<E: From<RunFileError>>(
         &self,
         branch: &str,
@@ -70,10 +70,10 @@ impl Reading {
         self.each(sql, branch, |row| Ok(point_in(row)?.0), take)
     }
 
-    /// Every special point of a branch, whole, by increasing position.
+    /// Passes every complete special point of a branch to `take`, by increasing position.
     ///
     /// # Errors
-    /// Those of `take`, and where the file cannot be read or contradicts itself.
+    /// Errors of `take`, or if the file cannot be read or is inconsistent.
     pub fn each_special<E: From<RunFileError>>(
         &self,
         branch: &str,

@@ -1,4 +1,4 @@
-//! Writing a run as it happens.
+//! Writer of a run in progress.
 
 use super::meta::{description, variables};
 use super::reader::{Open, Part, load_diagram, open, point_at, sound};
@@ -16,69 +16,72 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{self, Mutex, MutexGuard, PoisonError};
 
-/// An observer that writes everything it sees to the run file.
+/// Observer that writes all events to the run file.
 ///
-/// Threads do not wait for each other: one that finds another writing leaves its points to it and goes on, unless sixteen of
-/// its branch, special points included, wait already or are being written. When no call of [`Observer::observe`] is under way, everything observed is in the file.
+/// Threads rarely wait for each other. A thread that finds another one writing leaves its points to it and continues,
+/// unless sixteen points and special points of its branch are already queued or being written. When no call of
+/// [`Observer::observe`] is in progress, everything observed is in the file.
 ///
-/// If writing fails (the disk is full, say) it asks every branch to stop; [`Recorder::finish`] then returns the reason.
+/// If writing fails, for example because the disk is full, every branch is asked to stop; [`Recorder::finish`] then
+/// returns the reason.
 pub struct Recorder {
     path: PathBuf,
-    /// Held as long as the run writes.
+    /// Lock file, held as long as the run writes.
     _lock: Option<File>,
     insert_point: String,
     insert_special: String,
     insert_response: String,
-    /// How many parameters and extremes the tables show by name.
+    /// Number of named columns: parameters and extremes.
     shown: usize,
     store: Store,
-    /// Of the branches that have begun.
+    /// Number in the table `branches` of each branch that has begun.
     numbers: Mutex<HashMap<String, i64>>,
-    /// Whether [`State::failure`] is there: to be told without waiting for who writes.
+    /// True if [`State::failure`] is set. Can be read without waiting for the writing thread.
     failed: AtomicBool,
-    /// Points and special points to be written by who writes next, in their order; the first may be in work. They are removed
-    /// by whoever has locked `state`. Locked after `state` or alone.
+    /// Queue of points and special points for the next writer, in order; the first may be in progress. Only the holder
+    /// of the lock on `state` removes entries. Lock order: after `state`, or alone.
     waiting: Mutex<VecDeque<Row>>,
     state: Mutex<State>,
 }
 
-/// A point or special point that waits to be written.
+/// Point or special point in the queue.
 struct Row {
     branch: i64,
     special: bool,
     values: Vec<Value>,
 }
 
-/// Rows of a branch that may wait or be in work when another is handed in: what is computed while the log is carried over,
-/// usually some milliseconds.
+/// Largest number of queued rows of a branch for which its thread does not wait: about as many points as are computed
+/// during a checkpoint of the log, usually a few milliseconds.
 const AHEAD: usize = 16;
 
 struct State {
     connection: Connection,
-    /// Which file the path led to in the beginning, and how many events have been recorded.
+    /// File at the path when the run began, and below it the number of events recorded.
     file: Option<Identity>,
     events: usize,
     failure: Option<RunFileError>,
 }
 
-/// A profile fills several pages of SQLite's usual size; of larger ones a transaction rewrites more that has not changed.
+/// Page size in bytes. A profile fills several pages of SQLite's default size; with larger pages, a transaction
+/// rewrites more unchanged data.
 const PAGE: i64 = 8192;
 
-/// Bytes of the log that are carried over at a time: as many as the processor's cache still has.
+/// Size of the log in bytes at which it is checkpointed; it still fits into the processor's cache.
 const LOG: i64 = 4 << 20;
 
-/// Events between two looks whether the file is still where it was.
+/// Number of events between two checks that the file is still in place.
 const LOOKS: usize = 16;
 
-/// The entry that says that profiles have been removed.
+/// Key in `meta` that records the removal of profiles.
 const THINNED: &str = "profiles removed";
 
-/// The table of requests that were not fulfilled. A resumed run determines them anew.
+/// Creates and empties the table of requests that were not fulfilled. A resumed run recomputes them.
 const SHORTFALLS: &str =
     "CREATE TABLE IF NOT EXISTS shortfalls (about TEXT NOT NULL, what TEXT NOT NULL, UNIQUE (about, what));
      DELETE FROM shortfalls;";
 
-/// Device and number of a file.
+/// Device and inode number of a file.
 type Identity = (u64, u64);
 
 #[cfg(unix)]
@@ -92,7 +95,8 @@ fn identity(path: &Path) -> Option<Identity> {
     path.exists().then_some((0, 0))
 }
 
-/// A file beside the run file that whoever writes there has locked. The lock ends with the process, however that ends.
+/// Locks a file next to the run file for as long as the run writes. The operating system releases the lock when the
+/// process ends for any reason.
 fn lock(folder: &Path) -> Result<Option<File>, RunFileError> {
     let path = folder.join("run.lock");
     let open = File::options().create(true).write(true).truncate(false).open(&path);
@@ -100,13 +104,13 @@ fn lock(folder: &Path) -> Result<Option<File>, RunFileError> {
     match file.try_lock() {
         Ok(()) => Ok(Some(file)),
         Err(TryLockError::WouldBlock) => Err(RunFileError::Busy(path_in(folder))),
-        // Some file systems have no locks.
+        // Some file systems do not support locks.
         Err(TryLockError::Error(_)) => Ok(None),
     }
 }
 
 impl Recorder {
-    /// Begins a run in `folder`, which is made if it is not there. A run file that exists already is an error.
+    /// Begins a run in `folder`, which is created if necessary. An existing run file is an error.
     pub fn create(folder: &Path, study: &Study) -> Result<Recorder, RunFileError> {
         let path = path_in(folder);
         if path.exists() {
@@ -114,7 +118,7 @@ impl Recorder {
         }
         std::fs::create_dir_all(folder).map_err(|e| RunFileError::Folder(folder.to_path_buf(), e))?;
         let lock = lock(folder)?;
-        // SQLite's own words for a folder without write permission name neither the folder nor the reason.
+        // SQLite's message for a folder without write permission names neither the folder nor the reason.
         File::create_new(&path).map_err(|e| match e.kind() {
             std::io::ErrorKind::AlreadyExists => RunFileError::Exists(path.clone()),
             _ => RunFileError::Folder(folder.to_path_buf(), e),
@@ -122,7 +126,7 @@ impl Recorder {
         Recorder::begin(path, lock, study)
     }
 
-    /// Removes the run in `folder`, if there is one; any other file of that name stays and is an error.
+    /// Removes the run in `folder`, if any. A file of that name that is not a run file is kept and is an error.
     pub fn discard(folder: &Path) -> Result<(), RunFileError> {
         let path = path_in(folder);
         if !path.exists() {
@@ -143,14 +147,14 @@ impl Recorder {
         Ok(())
     }
 
-    /// Goes on with the run in `folder`: the recorder, and what the run has found already. Sides that ended only because the
-    /// run was stopped are open again. Where there is no run yet, one begins.
+    /// Continues the run in `folder`, or begins one if there is none. Returns the recorder and the diagram found so
+    /// far. Sides that ended only because the run was stopped are open again.
     pub fn resume(folder: &Path, study: &Study) -> Result<(Recorder, Diagram), RunFileError> {
         let path = path_in(folder);
         if !path.exists() {
             return Ok((Recorder::create(folder, study)?, Diagram::default()));
         }
-        // Whether it is a run comes first: a file of something else is not locked.
+        // The check comes before the lock, so that no lock file is created next to a foreign file.
         let opened = open(&path, true)?;
         let lock = lock(folder)?;
         let mut connection = match opened {
@@ -202,7 +206,7 @@ impl Recorder {
                 )
                 .map_err(failed)?;
         }
-        // Written last in the same transaction: a file with a version is a complete one.
+        // Written in the same transaction as the tables, so a file with a version has all of them.
         transaction.pragma_update(None, "application_id", APPLICATION_ID).map_err(failed)?;
         transaction.pragma_update(None, "user_version", FORMAT_VERSION).map_err(failed)?;
         transaction.commit().map_err(failed)?;
@@ -217,7 +221,7 @@ impl Recorder {
     ) -> Result<Recorder, RunFileError> {
         let failed = |e| RunFileError::from_sqlite(&path, e);
         connection.pragma_update(None, "synchronous", "NORMAL").map_err(failed)?;
-        // A file of an older version keeps its pages.
+        // A file of an older version keeps its page size.
         let page: i64 = connection.pragma_query_value(None, "page_size", |row| row.get(0)).map_err(failed)?;
         connection.pragma_update(None, "wal_autocheckpoint", LOG / page.max(1)).map_err(failed)?;
         connection.busy_timeout(std::time::Duration::from_secs(10)).map_err(failed)?;
@@ -256,20 +260,25 @@ impl Recorder {
         })
     }
 
-    /// Closes the file of a run that has nothing left to do: profiles that its study does not want to keep are removed. The error is
-    /// the first one met while recording.
+    /// Closes the file of a complete run and removes the profiles that its study does not keep.
+    ///
+    /// # Errors
+    /// The first error met while recording, or a failure to close the file.
     pub fn complete(self) -> Result<(), RunFileError> {
         let store = self.store;
         self.closed(store)
     }
 
-    /// Closes the file of a run that can be resumed. The error is the first one met while recording.
+    /// Closes the file of a run that can be resumed.
+    ///
+    /// # Errors
+    /// The first error met while recording, or a failure to close the file.
     pub fn finish(self) -> Result<(), RunFileError> {
         self.closed(Store::All)
     }
 
     fn closed(self, store: Store) -> Result<(), RunFileError> {
-        // Nothing waits unless a thread was cut off.
+        // The queue is empty unless a thread was terminated.
         self.with_file(|_| ());
         let state = self.state.into_inner().unwrap_or_else(PoisonError::into_inner);
         if let Some(error) = state.failure {
@@ -279,7 +288,7 @@ impl Recorder {
             return Err(RunFileError::Vanished(self.path));
         }
         thin(&state.connection, store).map_err(|error| RunFileError::from_sqlite(&self.path, error))?;
-        // One file that needs no others, unless someone is reading it just now.
+        // Leaves a single file without a log, unless another program is reading it.
         let _ = state.connection.pragma_update(None, "journal_mode", "DELETE");
         state.connection.close().map_err(|(_, error)| RunFileError::from_sqlite(&self.path, error))?;
         if let Some(folder) = self.path.parent() {
@@ -288,7 +297,7 @@ impl Recorder {
         Ok(())
     }
 
-    /// Does something with the file when everything that waits has been written.
+    /// Writes the queue, then calls `work` with the file locked.
     fn with_file<T>(&self, work: impl FnOnce(&mut State) -> T) -> T {
         let done = {
             let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
@@ -313,8 +322,8 @@ impl Recorder {
         }
     }
 
-    /// Writes what waits, or leaves it to the thread that has the file. That one comes here when it has let go of it, so that
-    /// a row left in between is not left alone.
+    /// Writes the queue, or leaves it to the thread that holds the file. That thread calls this function after
+    /// releasing the file, so a row queued in between is written too.
     fn relieve(&self) {
         while !self.queue().is_empty() {
             match self.state.try_lock() {
@@ -325,7 +334,7 @@ impl Recorder {
         }
     }
 
-    /// Has a row written: here, or by the thread that is writing.
+    /// Queues a row, and writes it here or leaves it to the writing thread.
     fn hand_in(&self, row: Row) {
         let ahead = {
             let mut queue = self.queue();
@@ -336,12 +345,12 @@ impl Recorder {
         if ahead < AHEAD { self.relieve() } else { self.with_file(|_| ()) }
     }
 
-    /// The number of a branch that has begun.
+    /// Returns the number of a branch that has begun.
     fn number_of(&self, name: &str) -> Option<i64> {
         self.numbers.lock().unwrap_or_else(PoisonError::into_inner).get(name).copied()
     }
 
-    /// The number of a branch; one that was never begun begins here. None where that fails.
+    /// Returns the number of a branch, which is begun if necessary; `None` if that fails.
     fn number(&self, branch: &Branch) -> Option<i64> {
         self.number_of(&branch.name).or_else(|| {
             self.begin_branch(branch);
@@ -361,7 +370,7 @@ impl Recorder {
         self.with_file(|state| self.write_to(state, work));
     }
 
-    /// Does something with the file unless something has failed before. Now and then it looks whether the file is still there.
+    /// Calls `work` unless an earlier write has failed. Every [`LOOKS`] events, checks that the file is still in place.
     fn write_to(&self, state: &mut State, work: impl FnOnce(&mut State) -> rusqlite::Result<()>) {
         if state.failure.is_some() {
             return;
@@ -381,7 +390,7 @@ impl Recorder {
 
 impl Observer for Recorder {
     fn observe(&self, event: Event) -> Verdict {
-        // Rows are put together before the file is asked for.
+        // Rows are assembled before the file is locked.
         let stored = |branch: &Branch, special: bool, values: &dyn Fn(i64) -> Vec<Value>| {
             if let Some(number) = self.number(branch) {
                 self.hand_in(Row { branch: number, special, values: values(number) });
@@ -424,7 +433,7 @@ impl Observer for Recorder {
     }
 }
 
-/// Removes the profiles that a study does not want to keep.
+/// Removes the profiles that the study does not keep. The first and last point of a branch keep theirs.
 fn thin(connection: &Connection, store: Store) -> rusqlite::Result<()> {
     let every = match store {
         Store::All | Store::Every(1) => return Ok(()),
@@ -447,7 +456,7 @@ fn insert(connection: &Connection, sql: &str, values: Vec<Value>) -> rusqlite::R
 }
 
 impl State {
-    /// Returns the number of the branch.
+    /// Stores a new or resumed branch and returns its number.
     fn begin_branch(&mut self, branch: &Branch) -> rusqlite::Result<i64> {
         let first = [
             Value::Text(branch.name.clone()),
@@ -455,7 +464,7 @@ impl State {
             Value::Integer(branch.free as i64),
         ];
         let transaction = self.connection.transaction()?;
-        // A branch that is there already, from an earlier part of the run, keeps its number.
+        // A branch from an earlier part of the run keeps its number.
         transaction.execute(
             "INSERT INTO branches (name, family, free, origin, origin_name, origin_kind, origin_parameter, origin_bytes,
                  held, follows, held_unit, unit)
@@ -469,7 +478,7 @@ impl State {
         for (side, _) in branch.ends.iter().enumerate().filter(|(_, end)| end.is_none()) {
             transaction.execute("DELETE FROM ends WHERE branch = ? AND side = ?", params![number, side as i64])?;
         }
-        // What an earlier part of the run had stored and this one does not go on from will be found again.
+        // Points stored earlier from which this run does not continue are removed; they will be computed again.
         let reach = branch.points.first().zip(branch.points.last()).map_or((0, -1), |(a, b)| (a.position, b.position));
         transaction.execute(
             "DELETE FROM points WHERE branch = ? AND NOT position BETWEEN ? AND ?",
@@ -496,7 +505,7 @@ impl State {
     }
 }
 
-/// Brings a file of an older version to the present one, in one transaction.
+/// Upgrades a file of an older version in one transaction.
 fn modernise(connection: &mut Connection) -> rusqlite::Result<()> {
     let version: i64 = connection.pragma_query_value(None, "user_version", |row| row.get(0))?;
     let transaction = connection.transaction()?;

@@ -1,4 +1,4 @@
-//! `[[branch]]`: curves to follow.
+//! `[[branch]]`: branches to continue.
 
 use super::items::{Ground, Item, Known, max_points, origin};
 use super::unknown_parameter;
@@ -16,7 +16,7 @@ pub(super) const KEYS: [&str; 10] =
     ["name", "description", "from", "free", "range", "until", "switch", "mark", "stop", "max-points"];
 const SWITCHABLE: [Kind; 3] = [Kind::PeriodDoubling, Kind::BranchPoint, Kind::Hopf];
 
-/// A branch; its plan goes to the items read so far.
+/// Reads a branch and adds its plan to the items read so far.
 pub(super) fn read(
     walk: &mut Walk,
     item: &Item,
@@ -50,14 +50,14 @@ pub(super) fn read(
     Some(Known { name, start: Start::EndOf(index), beginning, end: Some(end), family })
 }
 
-/// The kind and the number in a name such as `period-doubling-2`, which a branch switched to there is given.
+/// Reads the kind and the number in a name such as `period-doubling-2`, the name of a branch that starts at that point.
 pub(super) fn switch_step(step: &str) -> Option<(Kind, usize)> {
     let (kind, number) = step.rsplit_once('-')?;
     let kind = Kind::from_name(kind).filter(|kind| SWITCHABLE.contains(kind))?;
     Some((kind, number.parse().ok().filter(|n| *n > 0)?))
 }
 
-/// The parameter that varies.
+/// Reads the free parameter.
 pub(super) fn free(walk: &mut Walk, item: &Item, model: &Model) -> Option<usize> {
     let Some(value) = item.table.get("free") else {
         let example = model.parameters.first().map_or("mu", |p| p.name.as_str());
@@ -76,7 +76,7 @@ pub(super) fn free(walk: &mut Walk, item: &Item, model: &Model) -> Option<usize>
     index
 }
 
-/// The range, and the target of a homotopy run. With a target alone the range is the way from the start to it.
+/// Reads `range` and the target `until`. With a target alone, the range extends from the start to the target.
 pub(super) fn bounds(
     walk: &mut Walk,
     item: &Item,
@@ -136,7 +136,7 @@ pub(super) fn contains_start(
     }
 }
 
-/// A pair of numbers in a unit, the smaller first.
+/// Reads a pair of numbers with a unit, the smaller first.
 pub(super) fn range(walk: &mut Walk, value: &Value, unit: &str) -> Option<[f64; 2]> {
     let Some(list) = value.get_ref().as_array().filter(|list| list.len() == 2) else {
         walk.report(value.span(), "the range is not a pair of numbers", "write `range = [smallest, largest]`");
@@ -166,7 +166,7 @@ pub(super) fn marks(walk: &mut Walk, table: &DeTable, model: &Model) -> Vec<Mark
     marks
 }
 
-/// Values of quantities: a number each, or a list.
+/// Reads values of quantities: one number or a list for each.
 fn values(walk: &mut Walk, value: Option<&Value>, what: &str, stop: bool, model: &Model) -> Vec<Mark> {
     let Some(table) = value.and_then(|value| walk.table(value, what)) else { return Vec::new() };
     let mut marks = Vec::new();
@@ -182,7 +182,7 @@ fn values(walk: &mut Walk, value: Option<&Value>, what: &str, stop: bool, model:
     marks
 }
 
-/// The unit of a quantity of a branch; empty where it has none of its own.
+/// Returns the unit of a quantity of a branch; empty if it has none of its own.
 fn unit_of(quantity: Quantity, model: &Model) -> &str {
     match quantity {
         Quantity::Parameter(k) => &model.parameters[k].unit,
@@ -192,7 +192,7 @@ fn unit_of(quantity: Quantity, model: &Model) -> &str {
     }
 }
 
-/// A quantity of a branch by its name.
+/// Returns the quantity of a branch with the given name.
 fn quantity(walk: &mut Walk, name: &str, span: Range<usize>, model: &Model) -> Option<Quantity> {
     let found = Quantity::named(name, model);
     if found.is_none() {

@@ -1,4 +1,4 @@
-//! `[[curve]]`: special points held along a curve in two parameters.
+//! `[[curve]]`: special points continued in two parameters.
 
 use super::branches::{bounds, free, marks, range, switch_step};
 use super::items::{Ground, Item, Known, max_points, noun, said_or_further_down, written};
@@ -25,18 +25,18 @@ pub(super) const KEYS: [&str; 12] = [
 ];
 const HELD: [Kind; 5] = [Kind::Fold, Kind::BranchPoint, Kind::Hopf, Kind::PeriodDoubling, Kind::Torus];
 
-/// The branch on which the special point lies.
+/// Branch on which the special point lies.
 pub(super) struct Base {
-    /// As the plan names it.
+    /// Name in the plan.
     name: String,
-    /// The branch of the plan: this one, or the one from which it is switched to.
+    /// Plan of this branch, or of the branch from which it is reached by branch switching.
     pub(super) plan: BranchPlan,
     pub(super) beginning: Vec<Option<f64>>,
-    /// Equilibria or cycles, if that is known.
+    /// Equilibria or cycles, if known.
     pub(super) family: Option<Family>,
 }
 
-/// A curve; its plan goes to the items read so far.
+/// Reads a curve and adds its plan to the items read so far.
 pub(super) fn read(
     walk: &mut Walk,
     item: &Item,
@@ -59,7 +59,8 @@ pub(super) fn read(
     let start = base.as_ref().zip(second).and_then(|(base, second)| base.beginning[second]);
     let own = second.map(|index| &ground.model.parameters[index]);
     let second_name = own.map(|own| own.name.as_str());
-    // Where the curve starts must be known for a target alone to make a range; of a branch with mistakes it never is.
+    // A target alone defines a range only if the start of the curve is known. It is never known after a mistake in the
+    // branch, which has been reported already.
     let placed = start.is_some() || base.is_none() || second.is_none();
     if let (true, None, false) = (table.get("until").is_some(), table.get("range"), placed) {
         let message = format!(
@@ -101,7 +102,7 @@ fn base(walk: &mut Walk, item: &Item, ground: &Ground, all: &[Item]) -> Option<B
         return None;
     };
     let name = walk.string(value, "`of`")?;
-    // A branch that is switched to has the name of the one it leaves, and a step for each special point.
+    // The name of a switched branch is that of its parent, followed by one step per special point.
     let ends = || std::iter::once(name.len()).chain(name.rmatch_indices('/').map(|(end, _)| end));
     if let Some((known, rest)) = ends().find_map(|end| Some((ground.known(&name[..end])?, &name[end..]))) {
         return match known.start {
@@ -133,7 +134,7 @@ pub(super) fn of_branch(ground: &Ground, known: &Known, index: usize) -> Base {
     Base { name: known.name.clone(), plan, beginning: known.beginning.clone(), family: known.family }
 }
 
-/// The branch itself, or one that is switched to from it, once for each of the steps `/kind-number`.
+/// Applies the branch switches `/kind-number` in `steps` to a branch; without steps, returns the branch itself.
 pub(super) fn switched(walk: &mut Walk, value: &Value, mut base: Base, known: &Known, steps: &str) -> Option<Base> {
     let (from, name) = (&known.name, format!("{}{steps}", known.name));
     let mut depth = [0; Kind::ALL.len()];
@@ -163,7 +164,7 @@ pub(super) fn switched(walk: &mut Walk, value: &Value, mut base: Base, known: &K
     Some(base)
 }
 
-/// What is held; it must be something that happens to solutions of that family.
+/// Reads the kind of special point that is continued; it must be one that solutions of the family can have.
 fn hold(walk: &mut Walk, item: &Item, family: Option<Family>) -> Option<Kind> {
     let Some(value) = item.table.get("hold") else {
         let names = HELD.map(|kind| format!("\"{kind}\""));
@@ -196,7 +197,7 @@ fn hold(walk: &mut Walk, item: &Item, family: Option<Family>) -> Option<Kind> {
     Some(kind)
 }
 
-/// The part of the branch's parameter in which the curve is followed.
+/// Reads the range of the branch's free parameter in which the curve is continued.
 fn branch_range(walk: &mut Walk, item: &Item, base: Option<&Base>, first: Option<&Parameter>) -> Option<[f64; 2]> {
     let whole = base.map(|base| base.plan.range);
     let Some(value) = item.table.get("branch-range") else { return whole };
@@ -217,7 +218,7 @@ fn branch_range(walk: &mut Walk, item: &Item, base: Option<&Base>, first: Option
     Some(narrow)
 }
 
-/// The value near which the special point lies; `None` inside if it was not said.
+/// Reads the value near which the special point lies; `Some(None)` if it is not given.
 fn near(walk: &mut Walk, item: &Item, range: Option<[f64; 2]>, first: Option<&Parameter>) -> Option<Option<f64>> {
     let Some(value) = item.table.get("near") else { return Some(None) };
     let near = walk.quantity(value, "`near`", first.map_or("", |own| &own.unit))?;
@@ -234,7 +235,7 @@ fn near(walk: &mut Walk, item: &Item, range: Option<[f64; 2]>, first: Option<&Pa
     Some(Some(near))
 }
 
-/// The second parameter, another one than that of the branch.
+/// Reads the second parameter, which must differ from that of the branch.
 fn second(walk: &mut Walk, item: &Item, ground: &Ground, base: Option<&Base>) -> Option<usize> {
     let second = free(walk, item, ground.model)?;
     if let Some((base, value)) = base.zip(item.table.get("free")).filter(|(base, _)| base.plan.free == second) {

@@ -1,4 +1,4 @@
-//! `[[explore]]`: diagrams to be found.
+//! `[[explore]]`: automatic bifurcation diagrams.
 
 use super::branches::{free, range, switching};
 use super::items::{Item, max_points};
@@ -96,7 +96,7 @@ fn own_range(walk: &mut Walk, table: &DeTable, span: &Range<usize>, unit: &str) 
     range(walk, value, unit)
 }
 
-/// What an exploration finds is named `NAME/…`.
+/// Rejects names that could clash with those of the branches an exploration finds, `NAME/…`.
 fn refuse_name_of_part(walk: &mut Walk, table: &DeTable, name: Option<&str>, taken: &[&str]) {
     let Some((name, value)) = name.zip(table.get("name")) else { return };
     let within = |a: &str, b: &str| a.strip_prefix(b).is_some_and(|rest| rest.starts_with('/'));
@@ -106,7 +106,7 @@ fn refuse_name_of_part(walk: &mut Walk, table: &DeTable, name: Option<&str>, tak
     }
 }
 
-/// The second parameter and its range: `{ kappa = [0, 1] }`.
+/// Reads the second parameter and its range: `{ kappa = [0, 1] }`.
 fn connect(
     walk: &mut Walk,
     value: &Value,

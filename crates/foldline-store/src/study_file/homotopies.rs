@@ -1,4 +1,4 @@
-//! `[[homotopy]]`: families brought from one set of parameter values to another.
+//! `[[homotopy]]`: solution families carried from one set of parameter values to another.
 
 use super::branches::{contains_start, range};
 use super::items::{Ground, Item, Known, max_points, origin};
@@ -9,7 +9,7 @@ use foldline::model::Model;
 
 pub(super) const KEYS: [&str; 7] = ["name", "description", "from", "to", "via", "range", "max-points"];
 
-/// A homotopy; its plan goes to the items read so far.
+/// Reads a homotopy and adds its plan to the items read so far.
 pub(super) fn read(
     walk: &mut Walk,
     item: &Item,
@@ -35,7 +35,7 @@ pub(super) fn read(
     Some(Known { name, start: Start::EndOfHomotopy(index), beginning, end: Some(end), family })
 }
 
-/// The parameters to be changed and their values at the goal, in the order of the model.
+/// Reads the parameters to be changed and their target values, in the order of the model.
 fn targets(walk: &mut Walk, item: &Item, model: &Model, start: Option<&[Option<f64>]>) -> Option<Vec<(usize, f64)>> {
     let example = model.parameters.first().map_or("mu", |p| p.name.as_str());
     let Some(value) = item.table.get("to") else {
@@ -70,7 +70,7 @@ fn targets(walk: &mut Walk, item: &Item, model: &Model, start: Option<&[Option<f
     Some(targets)
 }
 
-/// The parameter in which the family may be moved on the way; not one that has to arrive somewhere.
+/// Reads the parameter that may vary on the way; it must not have a target value.
 fn via(walk: &mut Walk, item: &Item, model: &Model, targets: Option<&[(usize, f64)]>) -> Option<usize> {
     let aimed = |index: usize| targets.is_some_and(|targets| targets.iter().any(|(target, _)| *target == index));
     let other = model.parameters.iter().enumerate().find(|(index, _)| !aimed(*index));

@@ -1,5 +1,5 @@
-//! `[[branch]]`, `[[curve]]` and `[[homotopy]]`: read together in the order of the text, since each starts from what stands
-//! above it.
+//! `[[branch]]`, `[[curve]]` and `[[homotopy]]`, read together in the order of the text, because each starts from
+//! something defined above it.
 
 use super::{branches, curves, homotopies, unique_name};
 use crate::nearest::suggest;
@@ -10,7 +10,7 @@ use foldline::model::Model;
 use std::ops::Range;
 use toml::de::DeTable;
 
-/// What a study asks for besides its seeds.
+/// Branches, curves and homotopies of a study.
 #[derive(Default)]
 pub(super) struct Items {
     pub(super) branches: Vec<BranchPlan>,
@@ -18,7 +18,7 @@ pub(super) struct Items {
     pub(super) homotopies: Vec<HomotopyPlan>,
 }
 
-/// One table of the text.
+/// Table of the text.
 pub(super) struct Item<'v, 't> {
     /// "branch", "curve" or "homotopy".
     pub(super) what: &'static str,
@@ -32,20 +32,20 @@ impl Item<'_, '_> {
     }
 }
 
-/// Something that others can start from, and what is known about it before anything is computed.
+/// Item from which others can start, with what is known about it before anything is computed.
 pub(super) struct Known {
     pub(super) name: String,
-    /// How a plan that starts from it says so.
+    /// Start of a plan that begins at this item.
     pub(super) start: Start,
-    /// Every parameter where it begins; `None` for a value that is not known beforehand.
+    /// Values of all parameters at its beginning; `None` for a value that is not known beforehand.
     pub(super) beginning: Vec<Option<f64>>,
-    /// Every parameter where one that starts from it begins; `None` as a whole if it has no one end.
+    /// Values of all parameters at its end, where a dependent item starts; `None` if its end is not unique.
     pub(super) end: Option<Vec<Option<f64>>>,
-    /// Equilibria or cycles, if that is known.
+    /// Equilibria or cycles, if known.
     pub(super) family: Option<Family>,
 }
 
-/// What has been read so far.
+/// Items read so far.
 pub(super) struct Ground<'g> {
     pub(super) model: &'g Model,
     pub(super) known: Vec<Known>,
@@ -53,13 +53,13 @@ pub(super) struct Ground<'g> {
 }
 
 impl Ground<'_> {
-    /// What of that name has been read.
+    /// Returns the item of the given name among those read so far.
     pub(super) fn known(&self, name: &str) -> Option<&Known> {
         self.known.iter().find(|known| known.name == name)
     }
 }
 
-/// Every branch, curve and homotopy of the study.
+/// Reads every branch, curve and homotopy of the study.
 pub(super) fn read(walk: &mut Walk, root: &DeTable, model: &Model, seeds: &[(Range<usize>, SeedPlan)]) -> Items {
     let mut all = Vec::new();
     for what in ["branch", "curve", "homotopy"] {
@@ -101,7 +101,7 @@ fn known_seed(index: usize, seed: &SeedPlan) -> Known {
     Known { name: seed.name.clone(), start: Start::Seed(index), beginning: at.clone(), end: Some(at), family }
 }
 
-/// What a plan is called that others start from.
+/// Returns the word for an item from which others start.
 pub(super) fn noun(start: &Start) -> &'static str {
     match start {
         Start::Seed(_) => "seed",
@@ -111,7 +111,7 @@ pub(super) fn noun(start: &Start) -> &'static str {
     }
 }
 
-/// Where an item starts: how its plan says so, every parameter there as far as it is known, and equilibria or cycles.
+/// Reads the start of an item. Returns the start, the known parameter values there, and the family if it is known.
 pub(super) fn origin(
     walk: &mut Walk,
     item: &Item,
@@ -136,7 +136,7 @@ pub(super) fn origin(
         said_or_further_down(walk, value.span(), item, other, &from);
         return None;
     }
-    // A branch that is switched to; where it ends is known but for the parameter in which it is followed.
+    // A switched branch. All parameter values at its end are known except that of its free parameter.
     let parent = from.match_indices('/').rev().find_map(|(end, _)| Some((ground.known(&from[..end])?, &from[end..])));
     if let Some((known, steps)) = parent
         && let Start::EndOf(index) = known.start
@@ -152,7 +152,8 @@ pub(super) fn origin(
     None
 }
 
-/// Reports a reference to an item that stands further down. Of one further up something is wrong, which has been said.
+/// Reports a reference to an item defined further down. An item further up is unknown only because of a mistake that
+/// has been reported already.
 pub(super) fn said_or_further_down(walk: &mut Walk, at: Range<usize>, item: &Item, other: &Item, name: &str) {
     if other.span.start >= item.span.start {
         let message = format!("the {} \"{name}\" is defined further down", other.what);
@@ -164,12 +165,12 @@ pub(super) fn said_or_further_down(walk: &mut Walk, at: Range<usize>, item: &Ite
     }
 }
 
-/// The item of that name, wherever it stands.
+/// Returns the item of the given name, wherever it is defined.
 pub(super) fn written<'a, 'v, 't>(all: &'a [Item<'v, 't>], name: &str) -> Option<&'a Item<'v, 't>> {
     all.iter().find(|other| other.written_name() == Some(name))
 }
 
-/// Names that the parts of another item will be given cannot be given to something else.
+/// Rejects names reserved for the parts of another item.
 fn refuse_names_of_others(walk: &mut Walk, all: &[Item]) {
     for item in all {
         let Some((name, value)) = item.written_name().zip(item.table.get("name")) else { continue };
@@ -190,7 +191,7 @@ fn refuse_names_of_others(walk: &mut Walk, all: &[Item]) {
     }
 }
 
-/// The limit on the number of points.
+/// Reads the limit on the number of points.
 pub(super) fn max_points(walk: &mut Walk, item: &Item) -> usize {
     const DEFAULT: usize = 10_000;
     let limit = item.table.get("max-points").and_then(|v| walk.integer(v, "`max-points`", 1..=100_000_000));

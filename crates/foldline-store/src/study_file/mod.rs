@@ -1,8 +1,10 @@
-//! A study file becomes a plan.
+//! Reader of study files.
 //!
-//! **Idea.** A study says in TOML what to compute with a model: parameter overrides, first solutions (`[[seed]]`), branches
-//! (`[[branch]]`), two-parameter curves (`[[curve]]`), homotopies (`[[homotopy]]`) and whole diagrams (`[[explore]]`). The whole text is read before anything is refused, so that all mistakes are said at once, each
-//! with its place, what is wrong, and what would be right. The format is described in docs/book/study-files.md.
+//! **Idea.** A study specifies in TOML what to compute with a model: parameter overrides, first solutions (`[[seed]]`),
+//! branches (`[[branch]]`), two-parameter curves (`[[curve]]`), homotopies (`[[homotopy]]`), whole diagrams
+//! (`[[explore]]`) and simulations (`[[survey]]`, `[[sweep]]`). The whole text is read before it is rejected, so that
+//! all mistakes are reported at once, each with position, cause and cure. The format is described in
+//! docs/book/study-files.md.
 
 mod branches;
 mod curves;
@@ -25,27 +27,27 @@ use items::Items;
 use std::path::{Path, PathBuf};
 use toml::de::DeTable;
 
-/// A study: what to compute, and the texts it was read from.
+/// Study: the computations requested, and the texts it was read from.
 #[derive(Clone, Debug)]
 pub struct Study {
-    /// The study file's name, as given.
+    /// Name of the study file, as given.
     pub file: String,
-    /// The study text, verbatim.
+    /// Verbatim text of the study.
     pub text: String,
-    /// The model file's name, as resolved from the study's place.
+    /// Name of the model file, resolved relative to the study.
     pub model_file: String,
-    /// The model text, verbatim.
+    /// Verbatim text of the model.
     pub model_text: String,
-    /// The model; its parameter values are those of the model file.
+    /// Model, with the parameter values of the model file.
     pub model: Model,
-    /// What to compute.
+    /// Computations requested.
     pub plan: Plan,
-    /// Which profiles stay in the run file.
+    /// Profiles kept in the run file.
     pub store: Store,
 }
 
-/// Of which points of cycles the profile stays in the run file when the run is complete. Special points and the ends of branches always
-/// keep theirs, and every point keeps its numbers.
+/// Points of cycles whose profiles are kept in the run file when the run is complete. Special points and the ends of
+/// branches always keep theirs, and every point keeps its numbers.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Store {
     /// Every point.
@@ -53,7 +55,7 @@ pub enum Store {
     All,
     /// Special points and ends of branches only.
     Special,
-    /// Every k-th point besides.
+    /// Special points, ends of branches, and every k-th point.
     Every(u64),
 }
 
@@ -77,14 +79,15 @@ const ROOT_KEYS: [&str; 17] = [
     "sweep",
 ];
 
-/// Reads a study file and the model that it names. Every mistake found is returned.
+/// Reads a study file and the model that it names. On failure, returns every mistake found.
 pub fn read_study(path: &Path) -> Result<Study, Vec<Diagnostic>> {
     let file = path.display().to_string();
     let text = read_text(path).map_err(|error| vec![unreadable(&file, "the study file", &error)])?;
     parse_study_in(&text, &file, path.parent().unwrap_or(Path::new("")))
 }
 
-/// Reads a study text and the model that it names by a path relative to `folder`. Every mistake found is returned.
+/// Reads a study text and the model that it names by a path relative to `folder`. On failure, returns every mistake
+/// found.
 pub fn parse_study_in(text: &str, file: &str, folder: &Path) -> Result<Study, Vec<Diagnostic>> {
     parse(text, file, |walk, root| {
         let value = model_key(walk, root)?;
@@ -108,7 +111,7 @@ pub fn parse_study_in(text: &str, file: &str, folder: &Path) -> Result<Study, Ve
     })
 }
 
-/// Reads a study text whose model text is given, whatever file the study names as its model.
+/// Reads a study text together with the given model text; the model file named in the study is not read.
 pub fn parse_study(text: &str, file: &str, model_text: &str, model_file: &str) -> Result<Study, Vec<Diagnostic>> {
     parse(text, file, |walk, root| {
         model_key(walk, root)?;
@@ -122,8 +125,8 @@ pub fn parse_study(text: &str, file: &str, model_text: &str, model_file: &str) -
     })
 }
 
-/// Reads the texts of a run: as [`parse_study`], but units that contradict each other are let through. A run of a program that
-/// did not check them is as readable as any other.
+/// Reads the texts of a run. Unlike [`parse_study`], accepts inconsistent units, because earlier versions did not check
+/// them.
 pub fn parse_study_of_run(
     text: &str,
     file: &str,
@@ -141,11 +144,11 @@ pub fn parse_study_of_run(
 }
 
 impl Study {
-    /// The study with other limits on trajectories, which become part of its text: a run tells how it was computed. A time is a
-    /// number, or a number with a unit.
+    /// Returns the study with other limits on trajectories. They become part of its text, so that the run records them.
+    /// `time` is a number, or a number with a unit.
     ///
     /// # Errors
-    /// What is wrong with them.
+    /// The mistakes in the limits.
     pub fn limited(self, steps: Option<u64>, time: Option<&str>) -> Result<Study, Vec<Diagnostic>> {
         let number = |text: &str| text.trim().parse::<f64>().ok().filter(|v| v.is_finite());
         let time = time.map(|text| number(text).map_or_else(|| format!("{text:?}"), |value| format!("{value:?}")));
@@ -159,7 +162,7 @@ impl Study {
     }
 }
 
-/// A study text with settings at its top, `(key, value)`, in place of those that it has.
+/// Returns a study text with the settings `(key, value)`. Existing values are replaced; new ones are added at the top.
 fn with_settings(text: &str, settings: &[(&str, String)]) -> String {
     let (root, _) = DeTable::parse_recoverable(text);
     let mut edits: Vec<(std::ops::Range<usize>, String)> = Vec::new();
@@ -176,8 +179,7 @@ fn with_settings(text: &str, settings: &[(&str, String)]) -> String {
     format!("{lines}{text}")
 }
 
-/// Whether a text says what to compute rather than how a system moves: it names a model, or
-/// something to compute.
+/// True if a text is a study rather than a model: it names a model or something to compute.
 pub fn is_study(text: &str) -> bool {
     let (root, _) = DeTable::parse_recoverable(text);
     let keys = ["model", "seed", "branch", "curve", "homotopy", "explore", "survey", "sweep"];
@@ -242,7 +244,7 @@ fn parse(
     Ok(Study { file: file.to_string(), text: text.to_string(), model_file, model_text, model, plan, store })
 }
 
-/// Reports a model file where a study was expected, with what can be done with it.
+/// Reports a model file where a study was expected, with the commands that accept it.
 fn a_model(walk: &mut Walk, root: &DeTable, file: &str) {
     let parameters = root.get("parameters").and_then(|value| value.get_ref().as_table());
     let first = parameters.and_then(|table| table.keys().min_by_key(|key| key.span().start));
@@ -255,7 +257,7 @@ fn a_model(walk: &mut Walk, root: &DeTable, file: &str) {
     walk.report(place, message, hint);
 }
 
-/// Reports sums of states that keep their values: no solution is isolated, and none can be continued.
+/// Reports conserved sums of states: with them no solution is isolated, and none can be continued.
 fn check_totals(walk: &mut Walk, root: &DeTable, model: &Model) {
     let names: Vec<String> = model.states.iter().map(|state| state.name.clone()).collect();
     let kept: Vec<String> = conserved(model).iter().map(|c| in_words(c, &names)).collect();
@@ -274,7 +276,7 @@ fn check_totals(walk: &mut Walk, root: &DeTable, model: &Model) {
     walk.report(root.get("model").map_or(0..0, |value| value.span()), message, hint);
 }
 
-/// Which profiles are stored: `"all"`, `"special"`, or a number k for every k-th point.
+/// Reads `store`: `"all"`, `"special"`, or a number k for every k-th point.
 fn store(walk: &mut Walk, value: &Value) -> Store {
     const HINT: &str = "\"all\", \"special\" for special points and ends only, or a number k for every k-th point";
     match value.get_ref().as_str() {
@@ -288,7 +290,7 @@ fn store(walk: &mut Walk, value: &Value) -> Store {
     }
 }
 
-/// Limits on trajectories in the search for first solutions, and in surveys and sweeps.
+/// Reads the limits on trajectories: in the search for first solutions, and in surveys and sweeps.
 fn limits(walk: &mut Walk, root: &DeTable, unit: &str) -> [Limits; 2] {
     let steps = root.get("max-steps").and_then(|v| walk.integer(v, "`max-steps`", 1..=10_000_000_000));
     let time = root.get("max-time").and_then(|v| {
@@ -311,7 +313,7 @@ fn model_key<'v, 't>(walk: &mut Walk, root: &'v DeTable<'t>) -> Option<&'v Value
     value
 }
 
-/// The one tolerance: relative, from 1e-10 to 1e-4, by default 1e-6.
+/// Reads the relative tolerance, from 1e-10 to 1e-4, by default 1e-6.
 fn tolerance(walk: &mut Walk, root: &DeTable) -> f64 {
     const DEFAULT: f64 = 1e-6;
     let Some(value) = root.get("tolerance") else { return DEFAULT };
@@ -323,7 +325,7 @@ fn tolerance(walk: &mut Walk, root: &DeTable) -> f64 {
     tolerance
 }
 
-/// Replaces the values that a table `{ name = number, … }` names.
+/// Replaces the parameter values given in a table `{ name = number, … }`.
 fn override_parameters(walk: &mut Walk, value: &Value, model: &Model, values: &mut [f64]) {
     let Some(table) = walk.table(value, "`parameters`") else { return };
     for (key, value) in table.iter() {
@@ -346,7 +348,7 @@ fn unknown_parameter(walk: &mut Walk, span: std::ops::Range<usize>, name: &str, 
     walk.report(span, format!("the model `{}` has no parameter `{name}`", model.name), suggest(name, &known));
 }
 
-/// The name of an item; an absent one is a mistake, and so is one used before.
+/// Reads the name of an item, which is required and must be unique.
 fn unique_name(
     walk: &mut Walk,
     item: &DeTable,
@@ -369,13 +371,13 @@ fn unique_name(
     Some(name)
 }
 
-/// The path without `x/..` in its middle, for messages.
+/// Removes `x/..` from a path, for messages.
 fn simplified(path: &Path) -> PathBuf {
     use std::path::Component::{Normal, ParentDir};
     let mut parts: Vec<std::path::Component> = Vec::new();
     for part in path.components() {
         match (part, parts.last()) {
-            // Only where the folder left is not a link does `x/..` mean the folder itself.
+            // If x is a symbolic link, `x/..` is not the folder that contains x.
             (ParentDir, Some(Normal(_))) if !parts.iter().collect::<PathBuf>().is_symlink() => {
                 parts.pop();
             }

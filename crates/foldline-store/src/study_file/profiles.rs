@@ -1,4 +1,4 @@
-//! `cycle` of a seed: a cycle that was computed or measured elsewhere.
+//! `cycle` of a seed: a cycle computed or measured elsewhere.
 
 use crate::nearest::suggest;
 use crate::toml_walk::{Value, Walk, with_article};
@@ -8,7 +8,7 @@ use foldline::model::Model;
 
 pub(super) const KEYS: [&str; 4] = ["period", "through", "times", "states"];
 
-/// The cycle, in polynomials of degree `degree`.
+/// Reads the cycle and represents it by polynomials of degree `degree`.
 pub(super) fn cycle(walk: &mut Walk, value: &Value, model: &Model, degree: usize) -> Option<Cycle> {
     if model.forced() {
         let hint = "use `attractor = \"cycle\"` or `state = { … }`: a given cycle has no phase relative to the forcing";
@@ -65,7 +65,7 @@ pub(super) fn cycle(walk: &mut Walk, value: &Value, model: &Model, degree: usize
     found
 }
 
-/// `[count][n]`.
+/// Reads the states, `[count][n]`.
 fn states(walk: &mut Walk, value: &Value, model: &Model, count: usize) -> Option<Vec<f64>> {
     let table = walk.table(value, "`states`")?;
     let known: Vec<&str> = model.states.iter().map(|s| s.name.as_str()).collect();

@@ -1,4 +1,4 @@
-//! `[[survey]]` and `[[sweep]]`: what is simulated.
+//! `[[survey]]` and `[[sweep]]`: simulations.
 
 use super::branches::free;
 use super::items::Item;
@@ -15,7 +15,7 @@ pub(super) const SURVEY_KEYS: [&str; 9] =
 pub(super) const SWEEP_KEYS: [&str; 7] = ["name", "description", "from", "free", "range", "count", "values"];
 const STARTS: usize = 64;
 const RANDOM: u64 = 1;
-/// More values than this are a mistake.
+/// Largest accepted number of values or starts.
 const MOST: u64 = 1_000_000;
 
 pub(super) fn surveys(
@@ -82,12 +82,13 @@ fn seed(walk: &mut Walk, table: &DeTable, span: &Range<usize>, seeds: &[(Range<u
     found
 }
 
-/// The unit of the free parameter.
+/// Returns the unit of the free parameter.
 fn unit_of(free: Option<usize>, model: &Model) -> &str {
     free.map_or("", |k| &model.parameters[k].unit)
 }
 
-/// The values of the free parameter: a list, or a range cut into equal parts; `rising` says that the range must not fall.
+/// Reads the values of the free parameter: a list, or equally spaced values in a range, which must be increasing if
+/// `rising` is true.
 fn values(
     walk: &mut Walk,
     table: &DeTable,
@@ -103,7 +104,7 @@ fn values(
             let ([from, to], count) = (ends?, count?);
             let last = count - 1;
             let between = |k: u64| (from * (last - k) as f64 + to * k as f64) / last as f64;
-            // Both ends exactly as they were written.
+            // Both ends are exactly the given numbers.
             let value = |k: u64| {
                 if k == 0 {
                     from

@@ -17,8 +17,8 @@ pub(super) const KEYS: [&str; 9] =
 const SAMPLES: usize = 128;
 const RANDOM: u64 = 1;
 
-/// Every seed with its place in the text. A seed in which something is wrong is kept as far as it goes, so that branches
-/// that start from it are not complained about a second time.
+/// Reads every seed, with its position in the text. A seed with mistakes is kept, so that branches that start from it
+/// are not reported too.
 pub(super) fn read(
     walk: &mut Walk,
     root: &DeTable,
@@ -79,7 +79,7 @@ fn source(walk: &mut Walk, table: &DeTable, span: &Range<usize>, model: &Model, 
     found.unwrap_or(fallback)
 }
 
-/// The same with `periods`, if they are stated: how many periods of the forcing the cycle lasts.
+/// Applies `periods`, the number of forcing periods per cycle, if it is given.
 fn lasting(walk: &mut Walk, table: &DeTable, source: SeedSource, model: &Model) -> SeedSource {
     let Some(value) = table.get("periods") else { return source };
     let periods = walk.integer(value, "`periods`", 1..=10_000);
@@ -93,7 +93,7 @@ fn lasting(walk: &mut Walk, table: &DeTable, source: SeedSource, model: &Model) 
     periods.map_or(source, |periods| SeedSource::Attractor(AttractorKey::Lasting(periods as u32)))
 }
 
-/// Totals at a state that gives the states that follow from them too; others keep their values.
+/// Computes each total whose dependent state is given in the initial state; other totals keep their values.
 fn totals_of(
     walk: &mut Walk,
     value: &Value,
@@ -172,7 +172,7 @@ fn attractor(walk: &mut Walk, value: &Value, model: &Model) -> Option<AttractorK
     }
 }
 
-/// A number for each state; the name of a repeated one stands for all its elements, with one number or a list.
+/// Reads a number for each state. The name of a repeated state stands for all its elements, with one number or a list.
 fn state(walk: &mut Walk, value: &Value, model: &Model) -> Option<Vec<f64>> {
     let table = walk.table(value, "`state`")?;
     let known: Vec<&str> = model.states.iter().map(|s| s.name.as_str()).collect();
@@ -183,7 +183,7 @@ fn state(walk: &mut Walk, value: &Value, model: &Model) -> Option<Vec<f64>> {
     for (key, own) in table {
         let name: &str = key.get_ref();
         let what = format!("the state `{name}`");
-        // What follows from a total is looked at with that.
+        // States that follow from a total are read together with it.
         if model.totals.iter().any(|total| total.instead_of == name) {
             continue;
         }
@@ -211,7 +211,7 @@ fn state(walk: &mut Walk, value: &Value, model: &Model) -> Option<Vec<f64>> {
             }
         }
     }
-    // An element given by itself counts more.
+    // A value given for a single element takes precedence.
     families.into_iter().for_each(|(i, number)| values[i] = values[i].or(number));
     if walk.found.len() > before {
         return None;

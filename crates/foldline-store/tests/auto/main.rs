@@ -1,4 +1,5 @@
-//! Files of AUTO-07p: what is in them is read, what is wrong with them is said, and what starts from them is the same as without them.
+//! Files of AUTO-07p: they are read, mistakes in them are reported, and imported starts give the same branches as our
+//! own.
 
 use foldline::explore::{SeedSource, mismatch};
 use foldline::model::Model;
@@ -20,7 +21,7 @@ fn typed(pairs: &[(usize, &str)]) -> Vec<(usize, String)> {
     pairs.iter().map(|(number, name)| (*number, name.to_string())).collect()
 }
 
-/// The study that starts from the first solution of a text.
+/// Returns the study that starts from the first solution of a text.
 fn imported(model: &Model, text: &str, names: &Names, pairs: [&[(usize, &str)]; 2]) -> Result<String, Complaint> {
     let solution = &solutions(text, "s.ab").unwrap()[0];
     let mapping = Mapping::new(model, names, &typed(pairs[0]), &typed(pairs[1]), solution.dim())?;
@@ -58,7 +59,7 @@ fn numbers_of_fortran_are_read() {
         assert!(found[0].message.contains(&format!("\"{wrong}\" is not a finite number")), "{wrong}: {}", found[0]);
         assert_eq!((found[0].line, found[0].column), (30, 26), "{wrong}: {}", found[0]);
     }
-    // Versions before 07p had no IPS, nor anything else behind the twelfth integer.
+    // Versions before 07p had neither IPS nor anything else after the twelfth integer.
     let old = EQUILIBRIA
         .replace("    11    0    2    1    0\n", "    11\n")
         .replace("   11    0    2    1    0\n", "   11\n");
@@ -68,7 +69,7 @@ fn numbers_of_fortran_are_read() {
 }
 
 #[test]
-fn spoilt_files_are_answered_with_a_place_and_a_cure() {
+fn corrupted_files_are_reported_with_position_and_cure() {
     let lines: Vec<&str> = CYCLES.lines().collect();
     let cut = lines[..60].join("\n");
     let row = lines[..40].iter().chain(&lines[41..]).copied().collect::<Vec<_>>().join("\n") + "\n\n";
@@ -110,17 +111,18 @@ fn a_cycle_becomes_a_seed_with_the_same_polynomials() {
     assert_eq!((cycle.intervals(), cycle.degree, cycle.period), (20, 4, 2.9999981419));
     let auto = &solutions(CYCLES, "s.ab").unwrap()[0];
     for (t, state) in auto.times.iter().zip(auto.states.chunks(2)) {
-        // At time 1 the next turn begins, and AUTO's digits end.
+        // Time 1 belongs to the next period, and AUTO's values have fewer digits.
         let found = cycle.state(*t);
         found.iter().zip(state).for_each(|(a, b)| assert!((a - b).abs() < 1e-9, "{t} {found:?} {state:?}"));
     }
     let (_, share) = mismatch(&model, &seed.parameters, &foldline::diagram::Solution::Cycle(cycle.clone())).unwrap();
-    // Both satisfy the same equations at the same Gauss points; the file has eleven digits, divided by steps of 1e-3.
+    // Both satisfy the same equations at the same Gauss points. The eleven digits of the file are divided by steps of
+    // 1e-3.
     assert!(share < 1e-7, "{share}");
 }
 
 #[test]
-fn what_does_not_fit_is_said() {
+fn mismatches_with_the_model_are_reported() {
     let own = model(MODEL);
     let (named, bare) = (Names::of(CONSTANTS), Names::default());
     let renamed = model(&MODEL.replace("p1", "Da").replace("u1", "c").replace("u2", "T"));
@@ -175,7 +177,7 @@ fn what_does_not_fit_is_said() {
 }
 
 #[test]
-fn mistakes_in_a_given_cycle_are_answered_with_place_and_cure() {
+fn mistakes_in_a_given_cycle_are_reported_with_position_and_cure() {
     let right = "model = \"m.toml\"\n[[seed]]\nname = \"s\"\ncycle = { period = 2, times = [0, 0.5, 1], states = { u1 = [0, 1, 0], u2 = [1, 2, 1] } }\n\
         [[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"p1\"\nrange = [0, 1]\n";
     assert!(parse_study(right, "s.toml", MODEL, "m.toml").is_ok());

@@ -1,6 +1,6 @@
-"""What xarray and pandas find in an export, against the bytes of the run file.
+"""Compares what xarray and pandas read from an export with the bytes of the run file.
 
-Called by tests/export/main.rs with a folder that holds run.sqlite, run.nc, csv and parquet.
+Called by tests/export/main.rs with a folder that contains run.sqlite, run.nc, csv and parquet.
 """
 
 import sqlite3
@@ -29,7 +29,7 @@ def same(a, b):
 
 
 def profile(row):
-    """Normalised times and states, as docs/book/run-file.md and docs/book/exports.md say that they lie."""
+    """Returns normalised times and states, laid out as docs/book/run-file.md and docs/book/exports.md state."""
     mesh, degree = numbers(row["mesh_bytes"]), row["degree"]
     gauss = numpy.concatenate([[0.0], (numpy.polynomial.legendre.leggauss(degree)[0] + 1) / 2])
     times = (mesh[:-1, None] + gauss[None, :] * numpy.diff(mesh)[:, None]).ravel()
@@ -94,7 +94,7 @@ attached = 0
 with h5py.File(run / "run.nc") as file:
 
     def check_dimensions(name, variable):
-        """Every dimension of a variable knows of it, and it of them."""
+        """Checks that a variable and its dimensions refer to each other."""
         global attached
         for place, scales in enumerate(variable.attrs.get("DIMENSION_LIST", [])):
             scale = file[scales[0]]

@@ -1,5 +1,5 @@
-//! A run with everything that could go wrong in another format: numbers that decimals lose, meshes of different sizes, names that
-//! are taken or not allowed, a branch without points, texts of any length.
+//! Run with everything that could go wrong in another format: numbers that short decimals do not preserve, meshes of
+//! different sizes, names that are taken or not allowed, a branch without points, texts of any length.
 
 use foldline::contract::{Event, Observer, Verdict};
 use foldline::diagram::{
@@ -11,19 +11,19 @@ use foldline_store::study_file::parse_study;
 use num_complex::Complex64;
 use std::path::Path;
 
-// K and k differ in a capital only; `step` and `node` are names of our own.
+// K and k differ only in case; `step` and `node` are reserved column names.
 const MODEL: &str = "name = \"made up\"\nunits = \"labels\"\n[parameters]\nK = { value = 1.0, unit = \"N/m\", description = \"gain, größer als 0\" }\n\
     k = 2.0\nstep = 0.5\n[states.x]\nequation = \"K*x - k*x^3\"\n[states.node]\nequation = \"-step*node\"\n\
     [outputs]\nr = \"abs(x)\"\n";
 const STUDY: &str = "model = \"made-up.toml\"\n[[seed]]\nname = \"start\"\nstate = { x = 0.1, node = 0 }\n\
     [[branch]]\nname = \"main\"\nfrom = \"start\"\nfree = \"K\"\nrange = [-1, 2]\n";
 
-/// Numbers that a decimal with too few digits or a column of another type would not keep.
+/// Numbers that a decimal with too few digits or a column of another type would not preserve.
 fn awkward(k: usize) -> f64 {
     [f64::NAN, -0.0, f64::INFINITY, f64::NEG_INFINITY, 5e-324, 1.0 / 3.0, -1.0e300, 0.1 + 0.2][k % 8]
 }
 
-/// A cycle of so many mesh intervals, or an equilibrium if there are none.
+/// Cycle with `intervals` mesh intervals, or an equilibrium if `intervals` is 0.
 fn point(position: i64, intervals: usize) -> Point {
     let list = |n: usize, from: usize| (0..n).map(|k| awkward(k + from)).collect::<Vec<f64>>();
     let ends: Vec<f64> = (0..=intervals).map(|j| (j as f64 / intervals as f64).powi(2)).collect();
@@ -76,7 +76,7 @@ fn special(kind: Kind, position: i64, intervals: usize, coefficients: &[f64]) ->
 
 /// Records the run in a folder.
 pub fn record(folder: &Path) {
-    // Longer than what an attribute holds within itself.
+    // Longer than a text stored within an attribute.
     let study = format!("{STUDY}# {}\n", "long ".repeat(20_000));
     let study = parse_study(&study, "study.toml", MODEL, "made-up.toml").expect("the study is right");
     let recorder = Recorder::create(folder, &study).unwrap();

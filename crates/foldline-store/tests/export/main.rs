@@ -1,4 +1,4 @@
-//! Exports: what is in the run file is in the other formats, to the bit, as programs find it that we did not write.
+//! Exports: other formats hold the contents of the run file to the bit, as read by independent programs.
 
 mod made_up;
 
@@ -12,7 +12,7 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// A recorded run, and what its file has.
+/// Returns the folder of a recorded run and the contents of its file.
 fn recorded() -> (tempfile::TempDir, Diagram) {
     let folder = tempfile::tempdir().unwrap();
     made_up::record(folder.path());
@@ -30,7 +30,7 @@ fn export(folder: &Path, format: Format, name: &str) -> PathBuf {
     out
 }
 
-/// What has to stand in the columns of a point that are one number each.
+/// Expected values of the scalar columns of a point.
 fn expected(point: &Point) -> Vec<(&'static str, Option<f64>)> {
     let range = |k: usize, end: usize| Some(point.ranges[k][end]);
     let mut out = vec![
@@ -59,7 +59,7 @@ fn expected(point: &Point) -> Vec<(&'static str, Option<f64>)> {
     out
 }
 
-/// Equal to the bit; NaN of any kind is NaN in text.
+/// Compares to the bit; all NaNs are equal, because text has only one.
 fn same(a: Option<f64>, b: Option<f64>) -> bool {
     match (a, b) {
         (Some(a), Some(b)) => a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan()),
@@ -68,7 +68,7 @@ fn same(a: Option<f64>, b: Option<f64>) -> bool {
     }
 }
 
-/// The rows of a CSV file without quotation marks, by column.
+/// Reads the rows of a CSV file without quotation marks, keyed by column.
 fn csv_rows(file: &Path) -> Vec<HashMap<String, String>> {
     let text = std::fs::read_to_string(file).unwrap();
     let mut lines = text.lines();
@@ -119,7 +119,7 @@ fn csv_has_every_digit() {
 
 /// Normalised time and state at every left end and Gauss point, and at the end.
 fn nodes(cycle: &Cycle) -> Vec<(f64, Vec<f64>)> {
-    // Of degree 2 the Gauss points lie at (1 -+ 1/sqrt 3) / 2.
+    // For degree 2 the Gauss points are (1 ∓ 1/√3)/2.
     let gauss = [0.0, 0.5 - 1.0 / 12f64.sqrt(), 0.5 + 1.0 / 12f64.sqrt()];
     assert_eq!(cycle.degree, 2);
     let times = cycle.mesh.windows(2).flat_map(|ends| gauss.map(|c| ends[0] + c * (ends[1] - ends[0])));
@@ -222,12 +222,12 @@ fn netcdf_has_a_group_for_each_branch() {
 }
 
 #[test]
-fn what_was_not_finished_is_not_there() {
+fn an_unfinished_export_leaves_no_file() {
     let (folder, _) = recorded();
     let run = folder.path().join("run.sqlite");
     let out = folder.path().join("out");
     let exporting = Export::open(folder.path()).unwrap();
-    // One bit of a profile, behind the back of the checks that were made when the file was opened.
+    // Overwrites a profile with zeros, which SQLite's integrity check does not notice.
     let damage = rusqlite::Connection::open(&run).unwrap();
     let spoilt = "UPDATE points SET solution_bytes = zeroblob(length(solution_bytes)) WHERE position = 2";
     drop(exporting);
@@ -241,8 +241,8 @@ fn what_was_not_finished_is_not_there() {
     }
 }
 
-/// What xarray and pandas find is compared with the bytes of the run file by tests/export/check.py, where `cargo xtask test` has
-/// made a Python that has them.
+/// tests/export/check.py compares what xarray and pandas read with the bytes of the run file, if `cargo xtask test` has
+/// set up a Python environment with both.
 #[test]
 fn python_reads_the_same_bits() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");

@@ -1,8 +1,9 @@
-//! Trajectories on a cylinder: angles as points of a circle.
+//! Trajectories on a cylinder: angles as points on a circle.
 //!
-//! **Idea.** A motion that goes round comes back to where it was, although its angle does not. Each angle is replaced by its cosine and
-//! sine, so that sections, returns and distances need to know nothing of angles. They exist here alone: solutions come out with the
-//! states of the model, those that go round with what their angles gain in a period.
+//! **Idea.** A rotating motion returns to where it was although its angle does not. Each angle is replaced by its
+//! cosine and sine, so that sections, returns and distances need no special treatment of angles. The circles exist only
+//! in this module: solutions are returned in the states of the model, and rotating ones carry the gain of their angles
+//! over a period.
 //!
 //! **Equations.** With an angle θ of period P, ω = 2π θ' / P and z = c + i s:
 //!
@@ -10,8 +11,8 @@
 //!   (1)  z' = i ω z + ½ |ω| (1 - |z|²) z,   θ = P arg z / 2π
 //! ```
 //!
-//! The second term keeps |z| at 1 against the errors of the integration, as fast as the angle turns: it sets no time scale of its own.
-//! f does not depend on |z|.
+//! The second term keeps |z| at 1 against integration errors at the rate at which the angle turns, so it adds no time
+//! scale. f does not depend on |z|.
 
 use super::census::Pace;
 use super::{Attractor, Candidate, Census, Enough, Exit, Lost, Polish, Report, Sampling, Trial};
@@ -19,11 +20,11 @@ use crate::contract::{Batch, VectorField};
 use crate::diagram::{Cycle, Point, Response, Solution};
 use std::f64::consts::TAU;
 
-/// (1): the cosine stands in the place of the angle, the sine behind the other states. Behind the outputs stand each angle from -P/2 to P/2
-/// and from 0 to P.
+/// The field (1). The cosine takes the place of the angle, and the sines follow the other states. The outputs are
+/// followed by each angle, once in -P/2 … P/2 and once in 0 … P.
 pub(super) struct Rolled<'a> {
     field: &'a dyn VectorField,
-    /// Places and periods of the angles.
+    /// Index and period of each angle.
     angles: Vec<(usize, f64)>,
 }
 
@@ -39,7 +40,7 @@ impl<'a> Rolled<'a> {
         self.field.dim()
     }
 
-    /// States `[n × lanes]` of the field.
+    /// Returns the states `[n × lanes]` of the field.
     fn states(&self, at: Batch) -> Vec<f64> {
         let (n, lanes) = (self.n(), at.lanes);
         let mut states = at.states[..n * lanes].to_vec();
@@ -65,7 +66,7 @@ impl<'a> Rolled<'a> {
         }
     }
 
-    /// A state `[n + k]` of (1).
+    /// Returns the state `[n + k]` of (1) for a state of the field.
     fn rolled(&self, x: &[f64]) -> Vec<f64> {
         let mut z = x.to_vec();
         for (c, period) in &self.angles {
@@ -76,7 +77,7 @@ impl<'a> Rolled<'a> {
         z
     }
 
-    /// The state `[n]` of one of (1), each angle in the copy next to that of `beside` `[n]`, or next to 0.
+    /// Returns the state `[n]` for one of (1), each angle in the turn closest to that of `beside` `[n]`, or to 0.
     fn unrolled(&self, z: &[f64], beside: Option<&[f64]>) -> Vec<f64> {
         let n = self.n();
         let mut x = z[..n].to_vec();
@@ -87,7 +88,7 @@ impl<'a> Rolled<'a> {
         x
     }
 
-    /// States `[count][n + k]` in the order of time as a continuous line, `[count][n]`.
+    /// Returns states `[count][n + k]` in order of time as a line `[count][n]` with continuous angles.
     fn line(&self, states: &[f64]) -> Vec<f64> {
         let n = self.n();
         let mut line: Vec<f64> = Vec::with_capacity(states.len());
@@ -107,7 +108,7 @@ impl<'a> Rolled<'a> {
         }
     }
 
-    /// The point with circles for angles. The ranges of the angles stay where they are.
+    /// Returns the point with circles in place of angles. The ranges of the angles are left unchanged.
     fn around(&self, mut point: Point) -> Point {
         let n = self.n();
         match &mut point.solution {
@@ -121,7 +122,7 @@ impl<'a> Rolled<'a> {
         point
     }
 
-    /// Takes the circles away again.
+    /// Replaces the circles of a point by angles.
     fn flat(&self, point: &mut Point) {
         let n = self.n();
         match &mut point.solution {
@@ -136,7 +137,7 @@ impl<'a> Rolled<'a> {
         }
     }
 
-    /// What the angles of a cycle, given as a line without its end, gain; nothing if none turns.
+    /// Returns the gain of the angles over a cycle given as a continuous line without its end; empty if none turns.
     fn gain(&self, cycle: &Cycle) -> Vec<f64> {
         let (first, last) = (&cycle.profile[..self.n()], cycle.profile.rchunks_exact(self.n()).next());
         gained(self.field.periods(), first, last.unwrap_or(first))
@@ -147,7 +148,7 @@ impl<'a> Rolled<'a> {
         Sampling { scales, ..sampling.clone() }
     }
 
-    /// Circles have the size 1.
+    /// Returns the scales with 1 for each component of a circle.
     fn around_scales(&self, scales: &[f64]) -> Vec<f64> {
         let mut scales = scales.to_vec();
         self.angles.iter().for_each(|(c, _)| scales[*c] = 1.0);
@@ -159,7 +160,7 @@ impl<'a> Rolled<'a> {
         exit.state = self.unrolled(&exit.state, None);
     }
 
-    /// Extents `[n]` from those of (1): of an angle the chord, or a whole turn.
+    /// Returns extents `[n]` from those of (1): for an angle the arc over the chord, at most half a turn.
     fn extents(&self, extent: &[f64]) -> Vec<f64> {
         let n = self.n();
         let mut plain = extent[..n].to_vec();
@@ -181,7 +182,7 @@ impl<'a> Rolled<'a> {
         plain.ranges.truncate(outputs);
         plain.ranges.drain(n..n + k);
         for (number, (c, period)) in self.angles.iter().enumerate() {
-            // A motion about half a turn is cut by one of the two.
+            // A motion around θ = P/2 is cut by one of the two intervals.
             let [own, other] = [0, 1].map(|way| found.ranges[outputs + 2 * number + way]);
             let narrow = if other[1] - other[0] < own[1] - own[0] { other } else { own };
             let turns =
@@ -192,12 +193,12 @@ impl<'a> Rolled<'a> {
     }
 }
 
-/// θ from -P/2 to P/2.
+/// Returns θ in -P/2 … P/2.
 fn angle(c: f64, s: f64, period: f64) -> f64 {
     period / TAU * s.atan2(c)
 }
 
-/// The whole periods `[n]` by which each angle is farther at the end of a line than at its start; empty where none is.
+/// Returns the whole periods `[n]` that each angle gains from the start of a line to its end; empty if none does.
 pub(crate) fn gained(periods: &[f64], start: &[f64], end: &[f64]) -> Vec<f64> {
     let whole = |((period, a), b): ((&f64, &f64), &f64)| match period.is_finite() {
         true => period * ((b - a) / period).round(),
@@ -233,7 +234,7 @@ impl VectorField for Rolled<'_> {
         fx.fill(0.0);
         fp.fill(0.0);
         for l in 0..lanes {
-            // Derivatives of each f_i by c and s instead of θ, then of z' instead of θ'.
+            // Derivatives of each f_i with respect to c and s instead of θ, then those of z' instead of θ'.
             let mut row = vec![0.0; all];
             for i in 0..n {
                 (0..n).for_each(|j| row[j] = own[(i * n + j) * lanes + l]);
@@ -257,7 +258,7 @@ impl VectorField for Rolled<'_> {
                                 fp[(line * q + j) * lanes + l] = across * unit * of_free[(i * q + j) * lanes + l];
                             }
                         }
-                        // On the circle.
+                        // Evaluated on the circle, |z| = 1.
                         let size = turning.abs();
                         let block = [[-size * c * c, -turning - size * c * s], [turning - size * c * s, -size * s * s]];
                         for (line, entries) in [i, n + k].into_iter().zip(block) {
@@ -319,12 +320,12 @@ impl VectorField for Rolled<'_> {
     }
 }
 
-/// The initial states of a survey: those of the model, on the circles.
+/// Returns the initial states of a survey, with circles in place of angles.
 fn starts(rolled: &Rolled, sampling: &Sampling) -> Vec<f64> {
     sampling.starts().chunks_exact(rolled.n()).flat_map(|x| rolled.rolled(x)).collect()
 }
 
-/// The census of a field with angles; see [`super::survey_until`].
+/// Samples the attractors of a field with angles; see [`super::survey_until`].
 pub(super) fn survey(
     rolled: &Rolled,
     parameters: &[f64],
@@ -343,7 +344,7 @@ pub(super) fn survey(
     census
 }
 
-/// Where the trajectory from `start` goes; see [`super::settle`].
+/// Returns the attractor of the trajectory from `start`; see [`super::settle`].
 pub(super) fn settle(
     rolled: &Rolled,
     parameters: &[f64],
@@ -372,7 +373,7 @@ pub(super) fn settle(
     }
 }
 
-/// Brute force with circles; see [`super::survey_by_simulation`].
+/// Brute-force survey with circles; see [`super::survey_by_simulation`].
 pub(super) fn survey_by_simulation(
     rolled: &Rolled,
     trial: &Trial,
@@ -386,7 +387,7 @@ pub(super) fn survey_by_simulation(
     })
 }
 
-/// A stepped sweep with circles; see [`super::stepped_sweep`].
+/// Stepped sweep with circles; see [`super::stepped_sweep`].
 pub(super) fn stepped_sweep(
     rolled: &Rolled,
     trial: &Trial,
@@ -402,7 +403,7 @@ pub(super) fn stepped_sweep(
     })
 }
 
-/// Calls with the trial that (1) is, and gives the responses without the circles.
+/// Calls with the trial for (1) and returns the responses without the circles.
 fn simulate(
     rolled: &Rolled,
     trial: &Trial,

@@ -1,8 +1,8 @@
-//! What simulation alone sees: brute force over starts and parameter values, and stepped sweeps.
+//! Brute force: simulation from many initial states at many parameter values, and stepped sweeps.
 //!
-//! **Idea.** A survey lets many starts settle at every value of a parameter and counts motions that agree as one. A stepped
-//! sweep lets one trajectory settle at the first value and starts at each next one from the last state before. Neither
-//! knows of branches: a motion is recorded as the trajectory shows it (`settling`, `measure`).
+//! **Idea.** A survey lets many initial states settle at every parameter value and counts motions that agree as one. A
+//! stepped sweep lets one trajectory settle at the first value and restarts at each following value from its last
+//! state. Neither uses branches: a motion is recorded as the trajectory shows it (`settling`, `measure`).
 
 use super::angles::{self, Rolled};
 use super::measure::response;
@@ -13,21 +13,24 @@ use crate::diagram::{Motion, Response, Share};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-/// Trajectories that are integrated together.
+/// Number of trajectories integrated together.
 const BLOCK: usize = 64;
-/// Motions that agree to this in their period, and in the ranges of their states relative to scale and size, are one.
+/// Tolerance within which motions are the same: in their period, and in the ranges of states relative to scale and
+/// size.
 const SAME: f64 = 1e-4;
 
 /// Receives the responses at one value as soon as they are known.
 pub type Report<'a> = &'a (dyn Fn(&[Response]) -> Verdict + Sync);
 
-/// Compares a motion of a sweep, at the parameter values `[k]`, with the one before: `Some(true)` if it is a different solution,
-/// `None` if that is not known, for example because the motion is neither at rest nor periodic and so has no candidate.
+/// Compares a motion of a sweep, at the parameter values `[k]`, with the one before: `Some(true)` if it is a different
+/// solution, `None` if that is not known, for example because the motion is neither at rest nor periodic and so has no
+/// candidate.
 pub type Compare<'a> = &'a mut dyn FnMut(&[f64], Option<&Candidate>) -> Option<bool>;
 
-/// The motions at every one of `values` of the parameter `free`, the others as in `parameters` `[k]`, from the starts of
-/// `sampling`. Values are reported in the order in which they are finished and returned in their own order; of one value the
-/// motion reached most often comes first. A report that says stop ends the survey after the values under way.
+/// Returns the motions at every one of `values` of the parameter `free`, with the other parameters from `parameters`
+/// `[k]` and initial states from `sampling`. Values are reported in the order in which they finish and returned in
+/// their own order. At each value the motion reached most often comes first. If `report` asks to stop, the values in
+/// progress are the last.
 pub fn survey_by_simulation(
     trial: &Trial,
     sampling: &Sampling,
@@ -82,7 +85,7 @@ pub fn survey_by_simulation(
     done.into_iter().flat_map(|(_, found)| found).collect()
 }
 
-/// One response for all that agree, by falling number of hits.
+/// Merges responses that agree into one, sorted by decreasing number of hits.
 fn grouped(trial: &Trial, all: Vec<Response>) -> Vec<Response> {
     let mut found: Vec<Response> = Vec::new();
     for response in all {
@@ -93,7 +96,7 @@ fn grouped(trial: &Trial, all: Vec<Response>) -> Vec<Response> {
                     known.hits += own.hits;
                 }
                 known.settled_after = known.settled_after.max(response.settled_after);
-                // Of a motion without a period each stretch sees a part.
+                // For a motion without a period, each record covers only part of it.
                 if known.motion == Motion::Other {
                     for (a, b) in known.ranges.iter_mut().zip(&response.ranges) {
                         *a = [a[0].min(b[0]), a[1].max(b[1])];
@@ -111,7 +114,7 @@ fn agree(trial: &Trial, a: &Response, b: &Response) -> bool {
     if a.motion != b.motion {
         return false;
     }
-    // Outputs follow from the states, and nothing is known about their scale.
+    // Outputs follow from the states, and their scale is unknown.
     let close = |tolerance: f64| {
         a.ranges.iter().zip(&b.ranges).zip(trial.scales).all(|((p, q), scale)| {
             let size = scale.max(p[0].abs()).max(p[1].abs());
@@ -120,16 +123,16 @@ fn agree(trial: &Trial, a: &Response, b: &Response) -> bool {
     };
     match (a.period, b.period) {
         (Some(p), Some(q)) => (p - q).abs() <= SAME * p && close(SAME),
-        // Stretches of chaos agree roughly.
+        // Records of chaotic motion agree only roughly.
         (None, None) if a.motion == Motion::Other => close(0.2),
         (None, None) => close(SAME),
         _ => false,
     }
 }
 
-/// A stepped sweep: the motion to which the trajectory from `start` `[n]` settles at the first of `values`, then at each next
-/// value the one to which it settles from its last state. The sweep ends early at a motion that escapes, or when `report` asks
-/// to stop. `compare` distinguishes jumps from steep slopes.
+/// Returns the responses of a stepped sweep: at the first of `values`, the motion to which the trajectory from `start`
+/// `[n]` settles; at each following value, the motion to which it settles from its last state. The sweep ends early at
+/// a motion that escapes, or when `report` asks to stop. `compare` distinguishes jumps from steep slopes.
 pub fn stepped_sweep(
     trial: &Trial,
     parameters: &[f64],

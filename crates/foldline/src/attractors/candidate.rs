@@ -1,7 +1,7 @@
 //! From a prediction to a solution.
 //!
-//! **Idea.** A predicted limit of the returns is integrated over one period. If it closes much better than the trajectory does,
-//! Newton's method starts from that loop.
+//! **Idea.** A predicted limit of the returns is integrated over one period. If that orbit closes much better than the
+//! trajectory does, Newton's method starts from it.
 
 use super::orbit::Orbit;
 use super::returns::{Prediction, Returns};
@@ -10,25 +10,25 @@ use super::{Candidate, Polish, Sampling};
 use crate::contract::{Batch, Parameters, VectorField, Verdict};
 use crate::simulation::{Integrator, Passage, Step, Tolerance};
 
-/// Steps after which a predicted limit is given up.
+/// Number of steps after which a predicted limit is abandoned.
 const FOLLOWED: usize = 20_000;
-/// How well a predicted limit must return to itself to be tried, relative to the extent of its motion …
+/// Largest closing error of a predicted limit worth trying, relative to the extent of its motion …
 const RECURRENT: f64 = 0.001;
-/// … and relative to the last returns of the trajectory.
+/// … and relative to the last difference of the returns of the trajectory.
 const BETTER: f64 = 0.1;
 
-/// Samples per step of a trajectory that is to be polished.
+/// Samples per step of a trajectory that becomes a candidate.
 const PARTS: usize = 4;
 
-/// What all trajectories of a survey share.
+/// Data shared by all trajectories of a survey.
 #[derive(Clone, Copy)]
 pub(super) struct Context<'a> {
     pub(super) field: &'a dyn VectorField,
     pub(super) parameters: &'a [f64],
     pub(super) sampling: &'a Sampling,
     pub(super) polish: Polish<'a>,
-    /// Accuracy of the integration, relative. It only decides where a trajectory goes; solutions are polished. Where samples next to
-    /// the edge of a basin go depends on it.
+    /// Relative accuracy of the integration. It only decides where a trajectory goes, which matters near basin
+    /// boundaries; solutions are computed by Newton's method.
     pub(super) accuracy: f64,
 }
 
@@ -38,7 +38,7 @@ impl Context<'_> {
         Tolerance { relative: self.accuracy, absolute }
     }
 
-    /// f at a state, `[n]`.
+    /// Returns f `[n]` at a state.
     pub(super) fn slope(&self, state: &[f64]) -> Vec<f64> {
         let mut f = vec![0.0; state.len()];
         let at = Batch { lanes: 1, states: state, parameters: Parameters::Shared(self.parameters), times: &[] };
@@ -46,14 +46,14 @@ impl Context<'_> {
         f
     }
 
-    /// A stable solution near the candidate, as an orbit.
+    /// Returns a stable solution near the candidate, as an orbit.
     pub(super) fn polished(&self, candidate: &Candidate) -> Option<Orbit> {
         let point = (self.polish)(candidate).filter(|point| point.unstable == 0)?;
         Some(Orbit::new(point, &self.sampling.scales, self.sampling.whirl))
     }
 
-    /// The trajectory from a state over that time: times and states `[time][n]` of its samples. `each` sees every step and
-    /// the state at its end.
+    /// Integrates from a state over the given time and returns times and states `[time][n]` of samples. `each` is
+    /// called with every step and the state at its end.
     fn sampled(
         &self,
         state: &[f64],
@@ -79,14 +79,14 @@ impl Context<'_> {
         (times, states)
     }
 
-    /// The trajectory from a state on a cycle over its period, as accurate as the one that settled there. (A state that is small along a slow
-    /// manifold and large in between decides how fast a relaxation oscillation gets on.)
+    /// Returns the trajectory from a state on a cycle over its period, as accurate as the one that settled there. (A
+    /// state that is tiny along the slow manifold and large elsewhere times a relaxation oscillation.)
     pub(super) fn turn(&self, state: &[f64], period: f64) -> Candidate {
         let (times, states) = self.sampled(state, period, (INTEGRATION[1], self.sampling.limits.steps), &mut |_, _| {});
         Candidate::Cycle { period, times, states }
     }
 
-    /// The trajectory from a predicted limit over one period, if it comes back.
+    /// Returns the trajectory from a predicted limit over one period, if it closes.
     pub(super) fn follow(&self, returns: &Returns, prediction: &Prediction, extent: &[f64]) -> Option<Candidate> {
         let n = extent.len();
         let mut plane = returns.again_from(&prediction.state);
@@ -117,7 +117,7 @@ impl Context<'_> {
     }
 }
 
-/// Largest minus smallest value of every component of `states` `[state][n]`.
+/// Returns the largest minus the smallest value of every component of `states` `[state][n]`.
 fn extents(states: &[f64], n: usize) -> Vec<f64> {
     let extent = |i: usize| {
         let component = states.iter().skip(i).step_by(n);

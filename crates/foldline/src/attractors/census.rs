@@ -1,7 +1,7 @@
 //! From samples to attractors.
 //!
-//! **Idea.** Samples are followed in blocks. What the first block finds is handed to the next ones, which recognise it
-//! instead of finding it anew; what a round of blocks finds is handed to the next round.
+//! **Idea.** Samples are integrated in blocks. Solutions found in the first block are passed to the next ones, which
+//! recognise them instead of finding them again; solutions found in a round of blocks are passed to the next round.
 
 use super::candidate::Context;
 use super::orbit::Orbit;
@@ -14,53 +14,53 @@ use crate::diagram::{Motion, Point, Response, Share};
 use crate::simulation::{Ensemble, Outcome};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// How samples are followed. Fixed for each kind of survey, so that the result does not depend on the number of threads.
+/// Sampling settings, fixed for each type of survey so that the result does not depend on the number of threads.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Pace {
-    /// Trajectories that are integrated together and share what they find.
+    /// Number of trajectories that are integrated together and share the solutions they find.
     pub(super) block: usize,
-    /// Accuracy of their integration, relative.
+    /// Relative accuracy of their integration.
     pub(super) accuracy: f64,
 }
 
 impl Pace {
-    /// Where all samples are wanted, and how many went to each attractor.
+    /// For a survey of all samples, with the number of hits of each attractor.
     pub(super) const THOROUGH: Pace = Pace { block: 32, accuracy: 1e-6 };
-    /// Where some attractors are wanted. Near the edge of a basin a trajectory may take the other side; there are more of them.
+    /// For a search for certain attractors. Near a basin boundary a trajectory may end on the wrong side.
     pub(super) const BRIEF: Pace = Pace { block: 16, accuracy: 1e-5 };
 }
 
-/// Blocks per round after the first, which is one block; fixed for the same reason.
+/// Blocks per round after the first, which is one block. Fixed for the same reason as [`Pace`].
 const ROUND: usize = 4;
-/// Steps after which a trajectory counts as unsettled unless a study says otherwise: some thousand periods.
+/// Default limit on the number of steps of a trajectory, beyond which it counts as unsettled: a few thousand periods.
 pub(super) const STEP_LIMIT: usize = 60_000;
 
 /// Outcome of one trajectory.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Fate {
-    /// It went to the solution of that index.
+    /// Settled on the solution of that index.
     Settled(usize),
     Unsettled,
     Escaped,
-    /// It left the region in which f is defined.
+    /// Left the region in which f is defined.
     Undefined,
-    /// Its steps became too small.
+    /// The step size became too small.
     Stuck,
     /// Abandoned early.
     Left,
 }
 
-/// A solution, and what is known about the samples that went there.
+/// A solution and its hits.
 struct Reached {
     orbit: Orbit,
     hits: usize,
     /// Number of uniformly distributed samples among them.
     uniform: usize,
-    /// Number of the first of them.
+    /// Index of the first of them.
     first: usize,
 }
 
-/// The attractors of an autonomous field; see [`super::survey_until`].
+/// Samples the attractors of an autonomous field; see [`super::survey_until`].
 pub(super) fn survey(
     field: &dyn VectorField,
     parameters: &[f64],
@@ -85,7 +85,7 @@ pub(super) fn survey(
         }
     }
     census.left += sampling.samples.saturating_sub(taken * block);
-    // A survey to its end names what samples go to; one that ended early also what needed no sample, unless one went to a rival.
+    // Solutions that no sample reached count only if the survey ended early and none of their type was reached.
     let kinds =
         [false, true].map(|cycle| reached.iter().any(|known| known.orbit.is_cycle() == cycle && known.hits > 0));
     reached.retain(|known| {
@@ -114,10 +114,10 @@ pub(super) fn survey(
     census
 }
 
-/// Adds what was seen of a block, whose samples are numbered from `first` on.
+/// Adds the outcome of a block whose samples are numbered from `first`.
 fn add(watched: Watched, first: usize, reached: &mut Vec<Reached>, census: &mut Census, tolerance: f64) {
     census.exits.extend(watched.exits);
-    // The same solution found in several blocks is one.
+    // A solution found in several blocks counts once.
     let place: Vec<usize> = watched
         .orbits
         .into_iter()
@@ -140,7 +140,7 @@ fn add(watched: Watched, first: usize, reached: &mut Vec<Reached>, census: &mut 
             }
             Fate::Unsettled => census.unsettled += 1,
             Fate::Escaped => census.escaped += 1,
-            // Counted in `exits`.
+            // Already counted in `exits`.
             Fate::Undefined => {}
             Fate::Stuck => census.stuck += 1,
             Fate::Left => census.left += 1,
@@ -171,7 +171,7 @@ pub enum Lost {
     Escaped,
     /// It left the region in which f is defined.
     Undefined(Exit),
-    /// Its steps became too small: f jumps, or is too stiff.
+    /// The step size became too small: f jumps, or is too stiff.
     Stuck,
 }
 
@@ -182,7 +182,7 @@ impl Lost {
     }
 }
 
-/// The attractor of an autonomous field; see [`super::settle`].
+/// Returns the attractor of an autonomous field for one initial state; see [`super::settle`].
 pub(super) fn settle(
     field: &dyn VectorField,
     parameters: &[f64],
@@ -202,8 +202,8 @@ pub(super) fn settle(
     }
 }
 
-/// The attractor by simulation alone, up to the last Newton steps. `known` are solutions met on the way, of which none was seen to attract this
-/// trajectory.
+/// Finds the attractor by simulation alone, except for the last Newton steps. `known` are solutions found on the way,
+/// none of which was observed to attract this trajectory.
 fn patiently(context: &Context, start: &[f64], known: Vec<Orbit>) -> Result<Point, Lost> {
     let Sampling { scales, whirl, limits, .. } = context.sampling;
     let limits = Limits { steps: limits.steps.max(PATIENT.steps), ..*limits };
@@ -233,7 +233,7 @@ fn patiently(context: &Context, start: &[f64], known: Vec<Orbit>) -> Result<Poin
     found.ok_or(Lost::Unconfirmed { period: settled.period, state: settled.state })
 }
 
-/// All blocks of a round, in their order, over the threads asked for; those behind one that ended the survey are left out.
+/// Returns the results of the blocks of a round in order, up to the first that ended the survey; uses several threads.
 fn watch_blocks(context: &Context, blocks: &[&[f64]], reached: &[Reached], enough: Enough) -> Vec<Watched> {
     let (next, last) = (AtomicUsize::new(0), AtomicUsize::new(usize::MAX));
     let work = || {
@@ -265,18 +265,18 @@ fn watch_blocks(context: &Context, blocks: &[&[f64]], reached: &[Reached], enoug
     done.into_iter().filter(|(block, _)| *block <= last).map(|(_, watched)| watched).collect()
 }
 
-/// What was seen of a block.
+/// Results of a block.
 struct Watched {
-    /// The solutions known before, then those found here.
+    /// Solutions known before, then those found in this block.
     orbits: Vec<Orbit>,
     fates: Vec<Fate>,
     /// Exits of the trajectories that left the region in which f is defined.
     exits: Vec<Exit>,
-    /// True if everything that was asked for has been found.
+    /// True if everything requested has been found.
     ended: bool,
 }
 
-/// Integrates trajectories together until each has settled, escaped or used up its steps, or enough is known.
+/// Integrates trajectories together until each has settled, escaped or used up its steps, or until enough is known.
 fn watch_block(context: &Context, starts: &[f64], reached: &[Reached], enough: Enough) -> Watched {
     let n = context.field.dim();
     let mut orbits: Vec<Orbit> = reached.iter().map(|known| known.orbit.clone()).collect();
@@ -325,17 +325,17 @@ fn watch_block(context: &Context, starts: &[f64], reached: &[Reached], enough: E
     Watched { orbits, fates, exits, ended }
 }
 
-/// What a solution is, as far as [`counted`] asks.
+/// Properties of a solution on which [`counted`] depends.
 #[derive(Clone, Copy, Debug)]
 struct Sort {
     cycle: bool,
-    /// Whether its spectrum leaves no doubt that it attracts.
+    /// True if its spectrum clearly shows that it attracts.
     attracts: bool,
 }
 
-/// Which of the solutions known count as reached: those that a trajectory was seen to go to, and, once half of the trajectories have settled
-/// somewhere, the only equilibrium and the only cycle known if they attract without doubt. With rivals, which of them a seed means depends
-/// on the samples.
+/// Returns for each known solution whether it counts as reached: if a trajectory was observed to settle on it or, once
+/// half of the trajectories have settled, if it clearly attracts and is the only known equilibrium or the only known
+/// cycle. With several of one type, the samples decide which of them a seed means.
 fn counted(sorts: &[Sort], hit: &[bool], half: bool) -> Vec<bool> {
     let alone = |sort: &Sort| sorts.iter().filter(|other| other.cycle == sort.cycle).count() == 1;
     sorts.iter().zip(hit).map(|(sort, hit)| *hit || half && sort.attracts && alone(sort)).collect()
@@ -346,7 +346,7 @@ mod tests {
     use super::{Sort, counted};
 
     #[test]
-    fn only_what_has_no_rival_counts_unseen() {
+    fn an_unreached_solution_counts_only_if_it_is_the_only_one_of_its_type() {
         let [rest, cycle] = [false, true].map(|cycle| Sort { cycle, attracts: true });
         let doubtful = Sort { attracts: false, ..rest };
         assert_eq!(counted(&[rest, cycle], &[false, false], true), [true, true]);

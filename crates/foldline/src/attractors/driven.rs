@@ -1,10 +1,10 @@
-//! Trajectories of a forced field, as those of an autonomous one.
+//! Trajectories of a forced field as trajectories of an autonomous one.
 //!
-//! **Idea.** Two states more, which run round the unit circle once per period of the forcing, tell the time; sections, returns and
-//! distances then need to know nothing of it. They exist here alone: solutions come out with the states of the model, beginning
-//! where the forcing does.
+//! **Idea.** Two additional states, which go round the unit circle once per forcing period, represent time, so that
+//! sections, returns and distances need no special treatment of forcing. They exist only in this module: solutions are
+//! returned in the states of the model, starting at the beginning of a forcing period.
 //!
-//! **Equations.** With z = c + i s and the time τ in periods of the forcing:
+//! **Equations.** With z = c + i s and the time τ in forcing periods:
 //!
 //! ```text
 //!   (1)  x' = f(x, p, τ),   z' = 2π i z + (1 - |z|²) z,   τ = arg z / 2π
@@ -17,10 +17,10 @@ use crate::diagram::{Cycle, Point, Response, Solution};
 use crate::simulation::bordered;
 use std::f64::consts::TAU;
 
-/// How far from a whole number of periods of the forcing a motion may last and still be one that repeats with it.
+/// Largest distance of a period from a whole number of forcing periods for a motion locked to the forcing.
 const WHOLE: f64 = 0.02;
 
-/// (1), for simulation: derivatives with respect to τ are left out, as 0.
+/// The field (1), for simulation only: derivatives with respect to τ are set to 0.
 pub(super) struct Driven<'a>(pub(super) &'a dyn VectorField);
 
 impl Driven<'_> {
@@ -28,14 +28,14 @@ impl Driven<'_> {
         self.0.dim()
     }
 
-    /// τ of every lane.
+    /// Returns τ for every lane.
     fn times(&self, at: Batch) -> Vec<f64> {
         let (n, lanes) = (self.n(), at.lanes);
         let (c, s) = at.states[n * lanes..].split_at(lanes);
         c.iter().zip(s).map(|(c, s)| s.atan2(*c) / TAU).collect()
     }
 
-    /// Calls with the batch that the forced field sees.
+    /// Calls with the batch as seen by the forced field.
     fn inner(&self, at: Batch, call: impl FnOnce(Batch)) {
         let times = self.times(at);
         call(Batch { states: &at.states[..self.n() * at.lanes], times: &times, ..at });
@@ -127,7 +127,7 @@ impl VectorField for Driven<'_> {
     }
 }
 
-/// The census of a forced field; see [`super::survey_until`].
+/// Samples the attractors of a forced field; see [`super::survey_until`].
 pub(super) fn survey(
     field: &dyn VectorField,
     parameters: &[f64],
@@ -147,7 +147,7 @@ pub(super) fn survey(
     census
 }
 
-/// Where the trajectory from `start` at the beginning of a period of the forcing goes; see [`super::settle`].
+/// Returns the attractor of the trajectory from `start` at the beginning of a forcing period; see [`super::settle`].
 pub(super) fn settle(
     field: &dyn VectorField,
     parameters: &[f64],
@@ -186,12 +186,12 @@ fn bare_exit(exit: &mut Exit, n: usize, unit: f64) {
     exit.state.truncate(n);
 }
 
-/// Scales with those of the circle.
+/// Returns the scales followed by those of the circle.
 pub(super) fn with_unit_scales(scales: &[f64]) -> Vec<f64> {
     [scales, &[1.0, 1.0]].concat()
 }
 
-/// Every sample begins with a period of the forcing, which is the unit of time.
+/// Returns a sampling in which each trajectory starts at the beginning of a forcing period, which is the unit of time.
 pub(super) fn with_clock(sampling: &Sampling, unit: f64) -> Sampling {
     let ranges = [&sampling.ranges[..], &[[1.0, 1.0], [0.0, 0.0]]].concat();
     let limits = Limits { time: sampling.limits.time / unit, ..sampling.limits };
@@ -201,7 +201,7 @@ pub(super) fn with_clock(sampling: &Sampling, unit: f64) -> Sampling {
     Sampling { ranges, scales: with_unit_scales(&sampling.scales), limits, given, ..sampling.clone() }
 }
 
-/// Calls with the trial that (1) is, and gives the responses without the circle.
+/// Calls with the trial for (1) and returns the responses without the circle.
 pub(super) fn simulate(
     trial: &Trial,
     report: Report,
@@ -219,7 +219,7 @@ fn without(response: &Response, field: &dyn VectorField) -> Response {
     let mut plain = response.clone();
     plain.state.truncate(n);
     without_ranges_of_circle(&mut plain.ranges, n);
-    // What repeats with the forcing does so after a whole number of its periods.
+    // A motion that repeats with the forcing does so after a whole number of forcing periods.
     let whole = |period: f64| if (period - period.round()).abs() < WHOLE { period.round() } else { period };
     plain.period = response.period.map(|period| whole(period) * unit);
     plain.settled_after *= unit;
@@ -234,7 +234,7 @@ pub(super) fn without_circle(candidate: &Candidate, n: usize) -> Option<Candidat
         return None;
     }
     let count = times.len() - 1;
-    // Time until the forcing begins anew.
+    // Time until the next forcing period begins.
     let first = &states[n..n + 2];
     let wait = (-first[1].atan2(first[0]) / TAU).rem_euclid(1.0);
     let state = |k: usize| &states[k % count * (n + 2)..][..n];
@@ -245,7 +245,7 @@ pub(super) fn without_circle(candidate: &Candidate, n: usize) -> Option<Candidat
     for step in 0..count {
         let at = k + step;
         let time = times[at % count] + if at >= count { *period } else { 0.0 } - wait;
-        // Samples that nearly fall together are of no use.
+        // Samples that nearly coincide are useless.
         if time > turned[turned.len() - 1] + 1e-9 && time < period - 1e-9 {
             turned.push(time);
             profile.extend_from_slice(state(at));
@@ -257,7 +257,7 @@ pub(super) fn without_circle(candidate: &Candidate, n: usize) -> Option<Candidat
     Some(Candidate::Cycle { period: whole, times, states: profile })
 }
 
-/// The cycle of a point with the circle; its period is counted in those of the forcing.
+/// Returns a cycle with the states of the circle added and its period counted in forcing periods.
 fn with_circle(mut point: Point, n: usize) -> Option<Point> {
     let Solution::Cycle(cycle) = &mut point.solution else { return None };
     let scheme = crate::problem::gauss::Scheme::new(cycle.degree);
@@ -276,7 +276,7 @@ fn with_circle(mut point: Point, n: usize) -> Option<Point> {
     Some(point)
 }
 
-/// Takes the circle away again; `unit` is the period of the forcing.
+/// Removes the circle from a point; `unit` is the forcing period.
 fn bare(point: &mut Point, n: usize, unit: f64) {
     if let Solution::Cycle(Cycle { profile, period, forcing_periods, .. }) = &mut point.solution {
         *profile = profile.chunks_exact(n + 2).flat_map(|x| &x[..n]).copied().collect();

@@ -1,8 +1,8 @@
-//! A settled motion, measured on one more stretch of its trajectory.
+//! Measurement of a settled motion over a further stretch of its trajectory.
 //!
-//! **Idea.** From a state of the motion the trajectory is integrated more accurately than before: a cycle over its period,
-//! which is where it returns to the plane across its start; anything else over a number of steps. The stretch is sampled
-//! uniformly in time; extremes are those of quartics through five samples.
+//! **Idea.** From a state of the motion the trajectory is integrated more accurately than before: a cycle over one
+//! period, until it returns to the plane across its start, and any other motion over a number of steps. The stretch is
+//! sampled uniformly in time; extrema are those of quartics through five samples.
 
 use super::Candidate;
 use super::settling::{Settled, Trial};
@@ -12,15 +12,15 @@ use crate::diagram::{Motion, Response};
 use crate::simulation::{Ensemble, Step, Tolerance};
 use num_complex::Complex64;
 
-/// Accuracy of the integration, relative.
+/// Relative accuracy of the integration.
 const INTEGRATION: f64 = 1e-10;
-/// Samples over one period: a parabola through three of them misses the maximum of the k-th harmonic by (2πk/SAMPLES)⁴/128.
+/// Samples per period: a parabola through three of them misses the maximum of the k-th harmonic by (2πk/SAMPLES)⁴/128.
 const SAMPLES: usize = 2048;
-/// Steps over which a motion that is neither at rest nor periodic is watched.
+/// Number of steps over which a motion that is neither at rest nor periodic is observed.
 const WATCHED: usize = 20_000;
 
-/// The response to which a trajectory settled at the parameter values `parameters`, with one hit, and a starting point for
-/// Newton's method if the motion is at rest or periodic.
+/// Returns the response to which a trajectory settled at the parameter values `parameters`, with one hit, and a
+/// starting point for Newton's method if the motion is at rest or periodic.
 pub(super) fn response(
     trial: &Trial,
     parameters: &[f64],
@@ -61,7 +61,7 @@ fn tolerance(trial: &Trial) -> Tolerance {
     Tolerance { relative: INTEGRATION, absolute: trial.scales.iter().map(|s| INTEGRATION * s).collect() }
 }
 
-/// One period, from the start to where the trajectory comes back through the plane across its velocity there.
+/// Integrates over one period, from the start to the return through the plane across its velocity there.
 fn cycle(trial: &Trial, parameters: &[f64], settled: &Settled, response: &mut Response) -> Option<Candidate> {
     let n = trial.field.dim();
     let start = &settled.state;
@@ -77,7 +77,7 @@ fn cycle(trial: &Trial, parameters: &[f64], settled: &Settled, response: &mut Re
         response.motion = Motion::Other;
         return None;
     }
-    // Long enough for the period to be a little larger than expected.
+    // Slightly longer than the expected period.
     let span = [0.0, 1.02 * settled.period];
     let run = Ensemble::new(trial.field, parameters, tolerance(trial), start, span);
     let arrivals = run.run(&mut |step| {
@@ -121,7 +121,7 @@ fn cycle(trial: &Trial, parameters: &[f64], settled: &Settled, response: &mut Re
     Some(Candidate::Cycle { period, times, states })
 }
 
-/// The fraction of the step at which `side` changes sign.
+/// Returns the fraction of the step at which `side` changes sign.
 fn crossing(step: &Step, side: &dyn Fn(&[f64]) -> f64, x: &mut [f64]) -> f64 {
     let (mut a, mut b) = (0.0, 1.0);
     for _ in 0..60 {
@@ -132,7 +132,7 @@ fn crossing(step: &Step, side: &dyn Fn(&[f64]) -> f64, x: &mut [f64]) -> f64 {
     0.5 * (a + b)
 }
 
-/// Appends the states at the multiples of `spacing` that lie in the step.
+/// Appends the states at the multiples of `spacing` within the step.
 fn sample(step: &Step, spacing: f64, states: &mut Vec<f64>, n: usize) {
     let mut x = vec![0.0; n];
     loop {
@@ -145,7 +145,7 @@ fn sample(step: &Step, spacing: f64, states: &mut Vec<f64>, n: usize) {
     }
 }
 
-/// Extremes of a motion that is neither at rest nor periodic, over a further integration; none if it escapes.
+/// Records the extrema of a motion that is neither at rest nor periodic by further integration, unless it escapes.
 fn other(trial: &Trial, parameters: &[f64], response: &mut Response) {
     const PARTS: usize = 4;
     let n = trial.field.dim();
@@ -166,7 +166,7 @@ fn other(trial: &Trial, parameters: &[f64], response: &mut Response) {
     }
 }
 
-/// Smallest and largest value of every state, then of every output, over `states` `[sample][n]`.
+/// Returns the smallest and largest value of every state, then of every output, over `states` `[sample][n]`.
 fn ranges(trial: &Trial, parameters: &[f64], states: &[f64]) -> Vec<[f64; 2]> {
     let n = trial.field.dim();
     let count = states.len() / n;
@@ -180,8 +180,8 @@ fn ranges(trial: &Trial, parameters: &[f64], states: &[f64]) -> Vec<[f64; 2]> {
     major.chunks_exact(count).chain(outputs.chunks_exact(count)).map(extremes).collect()
 }
 
-/// Smallest and largest value, between the samples too: where a sample is higher or lower than its neighbours, the quartic
-/// through it and two on either side.
+/// Returns the smallest and largest value, also between samples: a sample that is higher or lower than its neighbours
+/// counts as the extremum of the quartic through it and two samples on either side.
 fn extremes(values: &[f64]) -> [f64; 2] {
     let mut found = values.iter().fold([f64::MAX, f64::MIN], |[low, high], v| [low.min(*v), high.max(*v)]);
     for w in values.windows(5) {
@@ -189,7 +189,7 @@ fn extremes(values: &[f64]) -> [f64; 2] {
         if !extreme {
             continue;
         }
-        // Derivatives at the middle, in units of the spacing.
+        // Derivatives at the middle sample, in units of the spacing.
         let first = (w[0] - 8.0 * w[1] + 8.0 * w[3] - w[4]) / 12.0;
         let second = (-w[0] + 16.0 * w[1] - 30.0 * w[2] + 16.0 * w[3] - w[4]) / 12.0;
         let third = (-w[0] + 2.0 * w[1] - 2.0 * w[3] + w[4]) / 2.0;
@@ -201,7 +201,7 @@ fn extremes(values: &[f64]) -> [f64; 2] {
             t -= slope / bend;
         }
         let summit = w[2] + t * (first + t * (second / 2.0 + t * (third / 6.0 + t * fourth / 24.0)));
-        // Between the neighbours, and no farther off than they are.
+        // The extremum must lie between the neighbours and differ from the sample by no more than they do.
         let near = (w[2] - w[1]).abs().max((w[2] - w[3]).abs());
         if t.abs() < 1.0 && (summit - w[2]).abs() <= near {
             found = [found[0].min(summit), found[1].max(summit)];

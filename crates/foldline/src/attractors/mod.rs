@@ -1,26 +1,27 @@
-//! Where do first solutions come from? Attractors found by sampling initial states.
+//! First solutions: attractors found by sampling initial states.
 //!
-//! **Idea.** Initial states are drawn from a box and integrated together. Each trajectory is watched until one can say where
-//! it goes; what it goes to is then computed by Newton's method instead of by waiting, and the trajectory is counted once
-//! it has been seen to converge there.
+//! **Idea.** Initial states are drawn from a box and integrated together. Each trajectory is watched until its limit
+//! can be predicted. The limit is then computed by Newton's method instead of by waiting, and the trajectory is counted
+//! once it has been observed to converge there.
 //!
-//! 1. draw `samples` states, stratified in every component and the same for the same seed (`sampling`);
-//! 2. integrate them in blocks of fixed size, each trajectory with a step of its own (`census`, `crate::simulation`);
-//! 3. watch the extent of each trajectory: where it shrinks, an equilibrium is tried (`watch`);
-//! 4. watch its returns to a section: where they contract regularly, their limit is predicted and a cycle tried (`returns`, `candidate`);
-//! 5. `polish` turns a candidate into a solution with its stability; only stable ones are kept (`candidate`);
-//! 6. a trajectory has settled when its distance to a solution found so far falls steadily, or when the predicted limit of
+//! 1. draw `samples` states, stratified in every component and reproducible from the seed (`sampling`);
+//! 2. integrate them in blocks of fixed size, each trajectory with its own step size (`census`, `crate::simulation`);
+//! 3. watch the extent of each trajectory: if it shrinks, try an equilibrium (`watch`);
+//! 4. watch its returns to a section: if they contract regularly, predict their limit and try a cycle (`returns`,
+//!    `candidate`);
+//! 5. turn candidates into solutions with their stability by `polish`; keep the stable ones (`candidate`);
+//! 6. take a trajectory as settled when its distance to a known solution falls steadily, or when the predicted limit of
 //!    its returns lies on that solution (`orbit`, `watch`);
-//! 7. the same solution found in several blocks is one attractor, named by its spectral ratio (`census`, `spectrum`); where
-//!    only some types are wanted, no more blocks are followed than it takes to find them.
+//! 7. merge solutions found in several blocks into one attractor, named by its spectral ratio (`census`, `spectrum`);
+//!    if only certain types are requested, stop once they have been found.
 //!
-//! A forced field is sampled as an autonomous one with two states more (`driven`), an angle as a point of a circle (`angles`).
+//! A forced field is sampled as autonomous with two more states (`driven`), an angle as a point on a circle (`angles`).
 //!
-//! Beside this stands simulation that solves no equation for the motions it finds (`brute_force`, `settling`, `runner`, `measure`), to be
-//! compared with branches.
+//! A second set of modules simulates without solving any equation for the motions it finds (`brute_force`, `settling`,
+//! `runner`, `measure`), for comparison with branches.
 //!
-//! **Fails when** an attractor is neither an equilibrium nor a cycle (its trajectories count as unsettled), or attracts so
-//! slowly that the returns do not contract measurably within the limit on the number of steps.
+//! **Fails when** an attractor is neither an equilibrium nor a cycle (its trajectories count as unsettled), or attracts
+//! so slowly that the returns do not contract measurably within the step limit.
 
 mod angles;
 mod brute_force;
@@ -63,50 +64,50 @@ pub struct Limits {
 }
 
 impl Limits {
-    /// The usual limits of surveys and sweeps, which have no other way to a motion than to wait for it.
+    /// Default limits of surveys and sweeps, which can only wait for a motion to settle.
     pub fn patient() -> Limits {
         PATIENT
     }
 }
 
 impl Default for Limits {
-    /// Some thousand periods; any time.
+    /// A few thousand periods, without a limit on time.
     fn default() -> Limits {
         Limits { steps: STEP_LIMIT, time: f64::INFINITY }
     }
 }
 
-/// A stable equilibrium or cycle, and how often it was reached.
+/// A stable equilibrium or cycle, with the number of trajectories that reached it.
 #[derive(Clone, Debug)]
 pub struct Attractor {
-    /// The solution as polished.
+    /// The solution computed by Newton's method.
     pub point: Point,
-    /// Spectral ratio of a cycle such as 2:1, where a whirl plane was named; see [`spectral_ratio`].
+    /// Spectral ratio of a cycle such as 2:1, if the model has a whirl plane; see [`spectral_ratio`].
     pub ratio: Option<(u32, u32)>,
-    /// Number of trajectories that settled there; 0 if its spectrum shows that it attracts and the survey ended before any
-    /// trajectory reached it. Not a basin fraction: every fourth trajectory starts nearer to the origin.
+    /// Number of trajectories that settled there; 0 if its spectrum shows that it attracts and the survey ended before
+    /// any trajectory reached it. Not a basin fraction: every fourth trajectory starts nearer to the origin.
     pub hits: usize,
     /// Estimated basin fraction, from the uniformly distributed initial states; `None` if the survey ended before every
     /// trajectory had been integrated.
     pub share: Option<Share>,
-    /// `[n]` initial state of the first of them, or where there is none a state of its own.
+    /// `[n]` initial state of the first of these trajectories or, if there are none, a state of the attractor itself.
     pub example: Vec<f64>,
 }
 
-/// What became of all samples.
+/// Outcome of all samples.
 #[derive(Clone, Debug, Default)]
 pub struct Census {
-    /// Equilibria, then cycles, each by falling number of hits; ties by growing norm or period.
+    /// Equilibria, then cycles, each by decreasing number of hits; ties by increasing norm or period.
     pub attractors: Vec<Attractor>,
-    /// Trajectories about which nothing could be said within the limit on the number of steps.
+    /// Number of trajectories whose limit could not be determined within the step limit.
     pub unsettled: usize,
     /// Number of trajectories whose state grew without bound.
     pub escaped: usize,
     /// Exit points of the trajectories that left the region in which f is defined.
     pub exits: Vec<Exit>,
-    /// Trajectories whose steps became too small: f jumps, or is too stiff for the method.
+    /// Number of trajectories whose step size became too small: f jumps, or is too stiff for the method.
     pub stuck: usize,
-    /// Samples that were not followed to their end, or not at all, since enough was known; see [`survey_until`].
+    /// Number of samples not integrated to the end, or not at all, because enough was known; see [`survey_until`].
     pub left: usize,
 }
 
@@ -119,18 +120,18 @@ pub struct Exit {
     pub state: Vec<f64>,
 }
 
-/// An approximate solution, to be computed exactly.
+/// An approximate solution, as a start for Newton's method.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Candidate {
     /// Near an equilibrium: the state `[n]`.
     Equilibrium(Vec<f64>),
     /// Near a cycle.
     Cycle {
-        /// Its period, approximately.
+        /// Approximate period.
         period: f64,
-        /// From 0 to `period`, dense where the motion is fast.
+        /// Sample times from 0 to `period`, dense where the motion is fast.
         times: Vec<f64>,
-        /// `[time][n]`: the first is the start, the last the end, which nearly agrees with it.
+        /// `[time][n]` states; the last nearly agrees with the first.
         states: Vec<f64>,
     },
 }
@@ -138,22 +139,24 @@ pub enum Candidate {
 /// Solves for a candidate by Newton's method, a cycle over its minimal period; `None` if that does not converge.
 pub type Polish<'a> = &'a (dyn Fn(&Candidate) -> Option<Point> + Sync);
 
-/// Says whether the attractors that count as reached so far (see [`survey_until`]), each with its spectral ratio, are all that is wanted.
+/// True if the attractors reached so far (see [`survey_until`]), with their spectral ratios, are all that is needed.
 pub type Enough<'a> = &'a (dyn Fn(&[(&Point, Option<(u32, u32)>)]) -> bool + Sync);
 
-/// The attractors reached from `sampling.samples` initial states.
+/// Returns the attractors reached from `sampling.samples` initial states.
 ///
-/// `polish` computes a candidate by Newton's method; it is called from several threads. Periods of candidates are in the time of the
-/// field: for a forced one in periods of the forcing, with which they begin.
+/// `polish` computes a candidate by Newton's method and is called from several threads. Periods of candidates are in
+/// the time unit of the field: for a forced field in forcing periods, at the beginning of one of which the candidate
+/// starts.
 pub fn survey(field: &dyn VectorField, parameters: &[f64], sampling: &Sampling, polish: Polish) -> Census {
     survey_at(field, parameters, sampling, polish, (Pace::THOROUGH, &|_| false))
 }
 
-/// The same, but no further than needed: it ends with the first block of 16 samples in which half of them or more have settled
-/// and `enough` says so of the attractors that count as reached until then, each with its spectral ratio. What counts is what samples were
-/// seen to go to; and what Newton's method has found on the way, if it is the only equilibrium, or the only cycle, that is known and its
-/// spectrum leaves no doubt that it attracts. Which these are depends on the order of the samples, not on the number of threads. Trajectories
-/// are integrated to 1e-5, relative, instead of 1e-6.
+/// Samples attractors like [`survey`], but no further than needed: the survey ends in a block of 16 samples as soon as
+/// at least half of them have settled, or else at the end of the block, if `enough` accepts the attractors that count
+/// as reached. Those are the solutions on which samples were observed to settle and, once half of the block has
+/// settled, a solution that is the only known equilibrium, or the only known cycle, and clearly attracts by its
+/// spectrum. They depend on the order of the samples, not on the number of threads. Trajectories are integrated to a
+/// relative accuracy of 1e-5 instead of 1e-6.
 pub fn survey_until(
     field: &dyn VectorField,
     parameters: &[f64],
@@ -180,8 +183,8 @@ fn survey_at(
     }
 }
 
-/// The attractor to which the trajectory from `start` `[n]` goes, with a forced field from the beginning of a period on. Where the
-/// watch sees none, as with cycles of many turns, the trajectory is followed until it repeats itself.
+/// Returns the attractor to which the trajectory from `start` `[n]` goes; with forcing, from the beginning of a forcing
+/// period. If watching finds none, as for cycles of many turns, the trajectory is followed until it repeats itself.
 pub fn settle(
     field: &dyn VectorField,
     parameters: &[f64],

@@ -1,29 +1,31 @@
 //! A known attractor as a set of states, and the distance to it.
 //!
-//! **Equations.** With sᵢ = half the range of component i over a cycle, and the given scale of the state for an equilibrium:
+//! **Equations.** With sᵢ = half the range of component i over a cycle, and the given scale of the state for an
+//! equilibrium:
 //!
 //!   (1)  d(x) = min over the orbit of maxᵢ |xᵢ - pᵢ| / sᵢ
 //!
-//! the orbit of a cycle being the polygon through its samples.
+//! where the orbit of a cycle is the polygon through its samples.
 
 use super::spectral_ratio;
 use crate::diagram::{Cycle, Point, Solution};
 
-/// Samples of a cycle, doubled until the polygon through them misses it by SAG at most: N samples miss the k-th harmonic by
-/// (πk / N)² / 2 of its amplitude.
+/// Number of samples of a cycle, doubled until the polygon through them misses it by SAG at most: N samples miss the
+/// k-th harmonic by (πk / N)² / 2 of its amplitude.
 const SAMPLES: [usize; 2] = [256, 8192];
-/// In the measure of (1).
+/// Largest sag of the polygon, in the measure of (1).
 const SAG: f64 = 2e-3;
-/// The nearest sample is first sought among every STRIDE-th, so many at a time.
+/// The nearest sample is first sought among every STRIDE-th, in groups of COARSE.
 const STRIDE: usize = 4;
 const COARSE: usize = SAMPLES[0] / STRIDE;
-/// A component that hardly moves on a cycle is measured against this fraction of its scale.
+/// Fraction of its scale against which a component that hardly moves on a cycle is measured.
 const FLOOR: f64 = 1e-3;
 
-/// How far inside the edge of stability a spectrum must be to leave no doubt: relative to the largest eigenvalue, or to 1 for multipliers.
+/// Distance from the stability boundary beyond which a spectrum is conclusive, relative to the largest eigenvalue or,
+/// for multipliers, to 1.
 const EDGE: f64 = 1e-6;
 
-/// An attractor that distances can be measured to.
+/// An attractor with a distance function.
 #[derive(Clone, Debug)]
 pub(super) struct Orbit {
     pub(super) point: Point,
@@ -37,7 +39,7 @@ pub(super) struct Orbit {
     coarse: Vec<f64>,
 }
 
-/// s of (1) for the samples `[sample][n]` of a cycle.
+/// Returns s of (1) for the samples `[sample][n]` of a cycle.
 fn half_ranges(states: &[f64], scales: &[f64]) -> Vec<f64> {
     let half = |(i, scale): (usize, &f64)| {
         let component = states.iter().skip(i).step_by(scales.len());
@@ -47,8 +49,8 @@ fn half_ranges(states: &[f64], scales: &[f64]) -> Vec<f64> {
     scales.iter().enumerate().map(half).collect()
 }
 
-/// Samples `[sample][n]` at equal distances along the mesh of a cycle, which has resolved its jumps: as many per interval as the polynomials have
-/// nodes, and a multiple of the first of [`SAMPLES`].
+/// Returns samples `[sample][n]` at equal distances along the mesh of a cycle, which has resolved its jumps: as many
+/// per interval as the polynomials have nodes, rounded up in total to a multiple of the first of [`SAMPLES`].
 fn along_mesh(cycle: &Cycle) -> Vec<f64> {
     let intervals = cycle.mesh.len() - 1;
     let count = (cycle.degree * intervals).next_multiple_of(SAMPLES[0]);
@@ -76,7 +78,7 @@ impl Orbit {
                         break;
                     }
                     if doubled > SAMPLES[1] {
-                        // Jumps too fast for equal times.
+                        // The motion jumps too fast for samples at equal times.
                         let states = along_mesh(cycle);
                         let scale = half_ranges(&states, scales);
                         return Orbit::through(point, ratio, scale, states);
@@ -99,7 +101,7 @@ impl Orbit {
         Orbit { point, ratio, scale, states, coarse }
     }
 
-    /// (1); the samples between which the nearest point lies are searched around the nearest coarse sample only.
+    /// Returns the distance (1), searching only between the samples around the nearest coarse sample.
     pub(super) fn distance(&self, x: &[f64]) -> f64 {
         let n = self.scale.len();
         let count = self.states.len() / n.max(1);
@@ -139,7 +141,7 @@ impl Orbit {
         onto(neighbours[0]).min(onto(neighbours[1]))
     }
 
-    /// Distance from `x` to the point a fraction `s` of the way from one sample to another.
+    /// Returns the distance from `x` to the point a fraction `s` of the way from one sample to another.
     fn between(&self, x: &[f64], from: usize, to: usize, s: f64) -> f64 {
         let n = self.scale.len();
         (0..n).fold(0.0, |m: f64, i| {
@@ -148,8 +150,8 @@ impl Orbit {
         })
     }
 
-    /// Whether its spectrum leaves no doubt that it attracts. At the edge, as without damping, or with a spectrum that could not be computed,
-    /// only trajectories tell.
+    /// True if the spectrum clearly shows that the solution attracts. On the stability boundary, as without damping, or
+    /// if the spectrum could not be computed, only trajectories can tell.
     pub(super) fn attracts(&self) -> bool {
         let spectrum = self.point.free_spectrum();
         let largest = spectrum.iter().fold(f64::MIN_POSITIVE, |m: f64, z| m.max(z.norm()));
@@ -159,18 +161,18 @@ impl Orbit {
         })
     }
 
-    /// Whether it is one of a cycle.
+    /// True for the orbit of a cycle.
     pub(super) fn is_cycle(&self) -> bool {
         self.point.solution.period().is_some()
     }
 
-    /// Whether two orbits are the same solution, computed to `tolerance` relative.
+    /// True if two orbits are the same solution, each computed to the relative accuracy `tolerance`.
     pub(super) fn same(&self, other: &Orbit, tolerance: f64) -> bool {
         let n = self.scale.len();
         match (self.point.solution.period(), other.point.solution.period()) {
             (None, None) => self.distance(&other.states) <= 100.0 * tolerance,
             (Some(a), Some(b)) => {
-                // The period is known to the tolerance; the distance only to the sag of the polygon.
+                // The period is accurate to the tolerance, the distance only to the sag of the polygon.
                 (a - b).abs() <= 100.0 * tolerance * a
                     && other.states.chunks_exact(n).step_by(STRIDE).all(|x| self.distance(x) < 0.01)
                     && self.states.chunks_exact(n).step_by(STRIDE).all(|x| other.distance(x) < 0.01)
@@ -179,18 +181,18 @@ impl Orbit {
         }
     }
 
-    /// The first sample, `[n]`.
+    /// Returns the first sample `[n]`.
     pub(super) fn start(&self) -> &[f64] {
         &self.states[..self.scale.len()]
     }
 
-    /// Norm of the first sample, by which equilibria are ordered.
+    /// Returns the norm of the first sample, by which equilibria are ordered.
     pub(super) fn norm(&self) -> f64 {
         self.start().iter().map(|x| x * x).sum::<f64>().sqrt()
     }
 }
 
-/// Largest distance of every second sample `[sample][n]` from the middle between its neighbours, in units of `scale`.
+/// Largest distance of every second sample `[sample][n]` from the midpoint of its neighbours, in units of `scale`.
 fn sag(samples: &[f64], scale: &[f64]) -> f64 {
     let n = scale.len();
     let count = samples.len() / n;
@@ -209,7 +211,7 @@ mod tests {
             let step = std::f64::consts::TAU / count as f64;
             let samples: Vec<f64> =
                 (0..count).flat_map(|k| [3.0 * (k as f64 * step).cos(), (k as f64 * step).sin()]).collect();
-            // The farthest of the two components, over their scales: radius times 1 - cos of half the angle of two sides.
+            // The larger of the two scaled components: radius times 1 - cos of half the angle subtended by two sides.
             let expected = 1.0 - step.cos();
             let found = sag(&samples, &[3.0, 1.0]);
             assert!(found <= expected * (1.0 + 1e-12) && found > 0.9 * expected, "{found} {expected}");

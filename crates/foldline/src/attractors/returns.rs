@@ -1,49 +1,50 @@
 //! Returns to a section, and their predicted limit.
 //!
-//! **Idea.** A trajectory that approaches a cycle returns to a plane across it at points y₁, y₂, … that converge like a linear
-//! map. A cycle that crosses the plane q times per period is seen by comparing every q-th return. The limit of a linear
-//! map is computed from a few of its iterates, long before they get there.
+//! **Idea.** A trajectory that approaches a cycle returns to a plane across it at points y₁, y₂, … that converge like a
+//! linear map. A cycle that crosses the plane q times per period is detected by comparing every q-th return. The limit
+//! of a linear map follows from a few of its iterates, long before they reach it.
 //!
 //! **Equations.** With differences uⱼ = yⱼ₊₁ - yⱼ of every q-th return, j = 0 … m, scaled by the extent of the motion:
 //!
 //!   (1)  γ = arg min |Σ γⱼ uⱼ| subject to Σ γⱼ = 1
 //!   (2)  y* = Σ γⱼ yⱼ₊₁
 //!
-//! exact for an affine map whose minimal polynomial has degree m at most, which n - 1 is.
+//! exact for an affine map whose minimal polynomial has degree at most m; the degree is at most n - 1.
 //!
 //! **Source.** sidi2017, §1 (reduced rank extrapolation).
 //!
-//! **Fails when** the map is far from linear over the returns used. In few dimensions (1) has no remainder that would show it;
-//! the limit predicted one return earlier does, and following the prediction for a period.
+//! **Fails when** the map is far from linear over the returns used. In few dimensions (1) leaves no residual to show
+//! it; comparison with the limit predicted one return earlier does, and so does integrating from the limit over a
+//! period.
 
 use crate::simulation::Step;
 
-/// Largest number of crossings per period that is looked for. Empirical: cycles with up to [`MOST_REPEATED`] crossings are found by
-/// following the trajectory until it repeats itself.
+/// Largest number of crossings per period that is sought. Empirical: cycles with up to [`MOST_REPEATED`] crossings are
+/// found by following the trajectory until it repeats itself.
 const MOST_CROSSINGS: usize = 16;
 /// Largest number of crossings per period for a trajectory that is followed until it repeats itself.
 const MOST_REPEATED: usize = 40;
 /// Largest m of (1).
 const MOST_TERMS: usize = 8;
-/// Differences that these take, with one for the comparison.
+/// Number of differences for [`MOST_TERMS`] terms, with one more for the comparison.
 const MOST: usize = MOST_TERMS + 2;
-/// Returns that are kept.
+/// Number of returns kept.
 const KEPT: usize = MOST_REPEATED * 6 + 1;
 /// Largest last difference, relative to the extent, from which a limit is predicted.
 const NEAR: f64 = 0.5;
 /// Largest difference between the limits predicted from successive returns, relative to the last difference of returns.
 const STEADY: f64 = 0.3;
-/// Last difference below which, and doubt below which, a prediction is worth following for a period.
+/// Last difference and doubt below which a prediction is worth integrating over a period.
 const WORTHWHILE: [f64; 2] = [0.1, 5e-3];
 /// Largest distance of a predicted limit from the last return, relative to the extent.
 const REACH: f64 = 0.5;
-/// Difference, relative to the extent, below which successive turns are one motion: a spiral that turns by nearly half a
-/// revolution per turn comes much closer to where it was two turns ago.
+/// Difference, relative to the extent, below which successive turns are the same motion. A spiral that turns by nearly
+/// half a revolution per turn comes much closer to its position two turns earlier.
 const SAME: f64 = 1e-5;
 /// Decrease of a distance over the last returns that counts as an approach.
 const APPROACHED: f64 = 0.95;
 
-/// A plane, and where and when a trajectory came through it.
+/// A plane, with the points and times at which a trajectory crossed it.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Returns {
     /// `[n]` the plane passes through here …
@@ -56,7 +57,7 @@ pub(super) struct Returns {
     times: Vec<f64>,
     /// `[return][n]`.
     states: Vec<f64>,
-    /// Difference, relative to the extent, below which the errors of the integration dominate.
+    /// Difference, relative to the extent, below which integration errors dominate.
     noise: f64,
 }
 
@@ -65,23 +66,23 @@ pub(super) struct Returns {
 pub(super) struct Prediction {
     /// `[n]`.
     pub(super) state: Vec<f64>,
-    /// How many returns there are per period.
+    /// Number of returns per period.
     pub(super) crossings: usize,
     /// Time between the last returns that were compared.
     pub(super) period: f64,
     /// The last difference, relative to the extent.
     pub(super) size: f64,
-    /// How much the prediction changed with the last return, relative to the extent.
+    /// Change of the prediction with the last return, relative to the extent.
     pub(super) doubt: f64,
 }
 
 impl Prediction {
-    /// Whether following it for a period is likely enough to show a cycle; that costs more than waiting for a few returns.
+    /// True if integrating from it over a period is likely enough to show a cycle: that costs more than a few returns.
     pub(super) fn worthwhile(&self) -> bool {
         self.size <= WORTHWHILE[0] && self.doubt <= WORTHWHILE[1]
     }
 
-    /// Whether a later prediction is the same motion, to the doubt that is allowed.
+    /// True if a later prediction is the same motion, within the allowed doubt.
     pub(super) fn agrees(&self, later: &Prediction, extent: &[f64]) -> bool {
         let moved = (0..extent.len()).fold(0.0, |m: f64, i| m.max((self.state[i] - later.state[i]).abs() / extent[i]));
         moved <= WORTHWHILE[1] && (self.period - later.period).abs() <= 0.05 * later.period
@@ -89,7 +90,8 @@ impl Prediction {
 }
 
 impl Returns {
-    /// A plane through `anchor`, across the velocity there as measured in `scale`, for a trajectory whose relative errors are `noise`.
+    /// Returns the plane through `anchor` orthogonal to the velocity in the metric of `scale`; `noise` is the relative
+    /// error.
     pub(super) fn across(anchor: Vec<f64>, velocity: &[f64], scale: &[f64], noise: f64) -> Returns {
         let normal: Vec<f64> = velocity.iter().zip(scale).map(|(v, s)| v / (s * s)).collect();
         let length = normal.iter().map(|v| v * v).sum::<f64>().sqrt();
@@ -97,28 +99,28 @@ impl Returns {
         Returns { anchor, normal, side: 0.0, total: 0, times: Vec::new(), states: Vec::new(), noise }
     }
 
-    /// The equation of the plane.
+    /// Evaluates the equation of the plane.
     pub(super) fn value(&self, x: &[f64]) -> f64 {
         self.normal.iter().zip(x).zip(&self.anchor).map(|((c, x), a)| c * (x - a)).sum()
     }
 
-    /// How many returns there have been.
+    /// Number of returns so far.
     pub(super) fn total(&self) -> usize {
         self.total
     }
 
-    /// The last return: when, and where `[n]`.
+    /// Returns time and state `[n]` of the last return.
     pub(super) fn last(&self) -> Option<(f64, &[f64])> {
         Some((*self.times.last()?, self.states.rchunks_exact(self.anchor.len().max(1)).next()?))
     }
 
-    /// The same plane without returns, for a trajectory that starts on it.
+    /// Returns a parallel plane through `start`, without returns, for a trajectory that starts there.
     pub(super) fn again_from(&self, start: &[f64]) -> Returns {
         let (anchor, normal, noise) = (start.to_vec(), self.normal.clone(), self.noise);
         Returns { anchor, normal, noise, ..Returns::default() }
     }
 
-    /// Records a crossing in the direction of the normal within the step; says whether there was one.
+    /// Records a crossing in the direction of the normal within the step. Returns true if there was one.
     pub(super) fn follow(&mut self, step: &Step, end: &[f64]) -> bool {
         let value = self.value(end);
         let before = std::mem::replace(&mut self.side, value);
@@ -126,7 +128,7 @@ impl Returns {
             return false;
         }
         let along = step.along(&self.normal);
-        // Secants on the continuous solution, kept within the bracket (Illinois).
+        // Secant iteration on the continuous solution, kept within the bracket (Illinois method).
         let ([mut a, mut b], [mut ga, mut gb]) = ([0.0, 1.0], [before, self.side]);
         let mut theta = 1.0;
         for _ in 0..20 {
@@ -153,10 +155,10 @@ impl Returns {
         true
     }
 
-    /// The limit of every q-th return, 1 ≤ q ≤ [`MOST_REPEATED`], if the last of them are close together and the limit was the
-    /// same one return earlier.
+    /// Returns the limit of every q-th return, 1 ≤ q ≤ [`MOST_REPEATED`], if the last of them are close together and
+    /// the limit predicted one return earlier was the same.
     fn predict(&self, q: usize, extent: &[f64]) -> Option<Prediction> {
-        // Small matrices where that many terms do.
+        // Smaller matrices where fewer terms suffice.
         match MOST_TERMS.min(self.anchor.len().saturating_sub(1)) {
             ..=3 => self.predict_in::<5>(q, extent),
             _ => self.predict_in::<MOST>(q, extent),
@@ -167,7 +169,7 @@ impl Returns {
         let n = self.anchor.len();
         let newest = self.times.len().checked_sub(1)?;
         let terms = (M - 2).min(n.saturating_sub(1)).min(KEPT / q - 3);
-        // m + 1 differences, of one return more for the comparison.
+        // m + 1 differences, and one more return for the comparison.
         if newest < (terms + 2) * q {
             return None;
         }
@@ -201,8 +203,8 @@ impl Returns {
         })
     }
 
-    /// Whether any difference of every q-th return is small enough for its limit to be worth following; the prediction itself
-    /// costs much more.
+    /// True if any difference of every q-th return is small enough for its limit to be worth following. The prediction
+    /// itself costs much more.
     pub(super) fn comes_back(&self, extent: &[f64]) -> bool {
         let n = self.anchor.len();
         let Some((_, last)) = self.last() else { return false };
@@ -214,8 +216,8 @@ impl Returns {
         (1..=MOST_CROSSINGS).any(near)
     }
 
-    /// Whether the trajectory came closer and closer, as measured by `distance`: the largest value over each third of the
-    /// last returns, as many as are needed for several periods, is smaller than over the third before.
+    /// True if the trajectory comes steadily closer, as measured by `distance`: the largest value over each third of
+    /// the last returns, as many as several periods need, is smaller than over the third before.
     pub(super) fn approach(&self, distance: impl Fn(&[f64]) -> f64) -> bool {
         let third = (self.times.len() / 3).min(MOST_CROSSINGS);
         if third < 2 {
@@ -230,14 +232,14 @@ impl Returns {
         last < middle && middle < first && last <= APPROACHED * first
     }
 
-    /// The `count` predictions that deserve to be tried: those that changed least, the fewest crossings per period first.
+    /// Returns the `count` most promising predictions: those that changed least, the fewest crossings per period first.
     pub(super) fn predictions(&self, count: usize, extent: &[f64]) -> Vec<Prediction> {
-        // A cycle seen over several turns is predicted as well as over one.
+        // A cycle is predicted as well over several turns as over one.
         const AS_WELL: f64 = 1e-4;
         let mut found: Vec<Prediction> = Vec::new();
         for q in 1..=MOST_CROSSINGS {
             found.extend(self.predict(q, extent));
-            // Whatever comes after these, they stay and are the first.
+            // These remain and come first, whatever is found later.
             if found.len() >= count && found.iter().all(|p| p.doubt <= AS_WELL) {
                 break;
             }
@@ -248,8 +250,9 @@ impl Returns {
         found
     }
 
-    /// The prediction over that number of crossings per period after which the trajectory itself comes closest, the fewest
-    /// of several that do. (A mean over the crossings of a period is a steady prediction too, and no state of the motion.)
+    /// Returns the prediction over the number of crossings per period after which the trajectory itself comes closest,
+    /// the fewest if several do. (A mean over the crossings of a period is also a steady prediction, but not a state of
+    /// the motion.)
     pub(super) fn closest(&self, extent: &[f64]) -> Option<Prediction> {
         let mut found: Vec<Prediction> = (1..=MOST_REPEATED).filter_map(|q| self.predict(q, extent)).collect();
         let least = found.iter().fold(f64::INFINITY, |m, p| m.min(p.size));
@@ -258,7 +261,7 @@ impl Returns {
     }
 }
 
-/// (2) from m + 2 iterates, the newest first; differences are measured in `scale`.
+/// Returns (2) from m + 2 iterates, newest first; differences are measured in `scale`.
 pub(super) fn limit_of(y: &[&[f64]], scale: &[f64]) -> Option<Vec<f64>> {
     let count = y.len().checked_sub(1).filter(|count| *count <= MOST)?;
     let gamma = Gram::<MOST>::new(count, scale, |back| y[back]).weights(0, count)?;
@@ -269,7 +272,7 @@ pub(super) fn limit_of(y: &[&[f64]], scale: &[f64]) -> Option<Vec<f64>> {
 struct Gram<const M: usize>([[f64; M]; M]);
 
 impl<const M: usize> Gram<M> {
-    /// Of `count` differences, at most m + 2, of `count` + 1 iterates, y(0) being the newest.
+    /// Returns the products of `count` differences, at most m + 2, from `count` + 1 iterates, y(0) being the newest.
     fn new<'a>(count: usize, scale: &[f64], y: impl Fn(usize) -> &'a [f64]) -> Gram<M> {
         let mut gram = [[0.0; M]; M];
         let mut u = [0.0; M];
@@ -284,11 +287,11 @@ impl<const M: usize> Gram<M> {
         Gram(gram)
     }
 
-    /// γ of (1) for the m differences from number `from` on, from the normal equations G c = 1, γ = c / Σ c, slightly
-    /// regularised.
+    /// Returns γ of (1) for the m differences from number `from`, from the normal equations G c = 1, γ = c / Σ c,
+    /// slightly regularised.
     fn weights(&self, from: usize, m: usize) -> Option<[f64; M]> {
         let trace: f64 = (0..m).map(|i| self.0[from + i][from + i]).sum();
-        // G = L D Lᵀ; row k has L D until its pivot is known.
+        // G = L D Lᵀ; row k holds L D until its pivot is known.
         let mut l = [[0.0; M]; M];
         let (mut d, mut c) = ([0.0; M], [0.0; M]);
         for k in 0..m {
@@ -321,7 +324,8 @@ impl<const M: usize> Gram<M> {
 mod tests {
     use super::*;
 
-    /// Returns of a map with multipliers 0.9 e^{±i φ} and 0.5 to the fixed point (0.1, 0.2, 0.3, 0.4), which lies in the plane.
+    /// Returns of a map with multipliers 0.9 e^{±i φ} and 0.5 to the fixed point (0.1, 0.2, 0.3, 0.4), which lies in
+    /// the plane.
     fn returns(count: usize, angle: f64) -> Returns {
         let mut returns = Returns::across(vec![0.1, 0.2, 0.3, 0.4], &[0.0, 0.0, 0.0, 1.0], &[1.0; 4], 1e-6);
         for k in 0..count {

@@ -1,8 +1,9 @@
 //! One trajectory on its way to a settled motion.
 //!
-//! **Idea.** At every return to a plane the limit of the returns is predicted; at the end of every window of steps the extent
-//! of the motion is taken, and its limit predicted if it is shrinking. Each round has one of three ends: the motion repeats
-//! itself or rests, it has been seen to contract and goes on close to the predicted limit, or its steps are used up.
+//! **Idea.** At every return to a plane the limit of the returns is predicted. At the end of every window of steps the
+//! extent of the motion is measured, and its limit is predicted if it shrinks. Each round ends in one of three ways:
+//! the motion repeats itself or rests; it has been observed to contract, and continues close to the predicted limit; or
+//! its steps are used up.
 
 use super::Limits;
 use super::returns::{Prediction, Returns};
@@ -16,62 +17,62 @@ use crate::simulation::{Outcome, Step};
 const WINDOW: usize = 128;
 /// Last difference of returns, relative to the extent, at which a cycle has settled.
 const SETTLED: f64 = 1e-7;
-/// The same when no more steps are left.
+/// Last difference at which a cycle counts as settled when no steps are left.
 const NEARLY: f64 = 1e-4;
-/// Extent of a window, relative to scale and size, at which a trajectory rests.
+/// Extent of a window, relative to scale and size, at which a trajectory is at rest.
 const RESTS: f64 = 1e-6;
-/// Extent of a window, relative to scale and size, below which a motion that shrinks is likely to come to rest.
+/// Extent of a window, relative to scale and size, below which a shrinking motion is likely to come to rest.
 const SMALL: f64 = 0.1;
-/// Shrinking over the windows of a round after which the limit is predicted.
+/// Decrease of the extent over the windows of a round after which the limit is predicted.
 const SHRUNK: f64 = 0.8;
-/// Extent, relative to the scale, below which a motion is no cycle.
+/// Extent, relative to the scale, below which a motion is not a cycle.
 const MOVES: f64 = 1e-4;
-/// Windows over which the extent of a motion is taken.
+/// Number of windows over which the extent of a motion is measured.
 const WINDOWS: usize = 4;
-/// Steps for which the first plane is watched; each later one of a round is watched twice as long.
+/// Number of steps for which the first plane is used; each later one of a round is used twice as long.
 const PLANE: usize = 2048;
 /// Steps after which the first round ends in any case.
 const ROUGH: usize = 6144;
-/// Predicted limits that are tried; after those the trajectory is left to itself.
+/// Largest number of predicted limits tried; after those the trajectory is left to itself.
 pub(super) const JUMPS: usize = 8;
 /// Steps of all rounds after which a motion counts as neither at rest nor periodic.
 const STEPS: usize = 400_000;
-/// The usual limits.
+/// Default limits of surveys and sweeps.
 pub(super) const PATIENT: Limits = Limits { steps: STEPS, time: f64::INFINITY };
-/// Predictions from which contraction can be told.
+/// Number of predictions from which contraction can be detected.
 const SEEN: usize = 12;
-/// Contraction over the predictions of a round: for few of them, and for many.
+/// Contraction required over the predictions of a round: for few of them, and for many.
 const CONTRACTED: [f64; 2] = [0.9, 0.97];
 
-/// One trajectory.
+/// A trajectory and its record over several rounds.
 pub(super) struct Runner {
     first: First,
     pub(super) start: Vec<f64>,
     parameters: Vec<f64>,
     pub(super) found: Option<Settled>,
-    /// Most steps of all rounds, and those taken.
+    /// Largest number of steps over all rounds, and number taken.
     limit: usize,
     pub(super) steps: usize,
     pub(super) time: f64,
     pub(super) extent: Vec<f64>,
-    /// Whether that extent is more than what is left of a motion that comes to rest.
+    /// True if the motion is larger than the remainder of one that comes to rest.
     moves: bool,
-    /// How often a round began at a predicted limit.
+    /// Number of rounds that began at a predicted limit.
     jumps: usize,
-    /// Of this round.
+    /// Steps taken in this round.
     round_steps: usize,
-    /// When, in steps of this round, another plane is tried, and how long that lives.
+    /// Step of this round at which another plane is tried, and number of steps for which that one is used.
     plane_ends: usize,
     plane_life: usize,
     window: Window,
-    /// Smallest and largest state of each of the last windows.
+    /// Smallest and largest state in each of the last windows.
     boxes: Vec<[Vec<f64>; 2]>,
     returns: Option<Returns>,
-    /// The prediction of every return, as its period and last difference.
+    /// Period and last difference of the prediction at every return.
     seen: Vec<(f64, f64)>,
     /// Extent of every window of the round, relative to scale and size.
     sizes: Vec<f64>,
-    /// A cycle, if the window that is open confirms that there still is a motion.
+    /// A cycle, to be confirmed by the current window: there must still be a motion.
     repeats: Option<Settled>,
     next: Option<Vec<f64>>,
     x: Vec<f64>,
@@ -112,7 +113,7 @@ impl Runner {
         self.boxes.clear();
         self.sizes.clear();
         (self.next, self.repeats) = (None, None);
-        // The plane of the round before goes through the new start.
+        // The plane of the previous round is shifted to the new start.
         self.returns = self.returns.take().map(|returns| returns.again_from(&self.start));
         (self.plane_life, self.plane_ends) = (PLANE, if self.returns.is_some() { PLANE } else { 0 });
     }
@@ -130,7 +131,7 @@ impl Runner {
             self.close_window(step, &x, trial);
         }
         self.x = x;
-        // At its low accuracy the first round does not see small motions contract.
+        // At its low accuracy the first round does not resolve the contraction of small motions.
         let rough = self.is_rough() && self.steps >= ROUGH;
         let over = self.found.is_some() || self.next.is_some() || self.steps >= self.limit || rough;
         if over { Verdict::Stop } else { Verdict::Continue }
@@ -140,16 +141,16 @@ impl Runner {
         self.first == First::Rough && self.steps == self.round_steps
     }
 
-    /// What the returns so far say.
+    /// Evaluates the returns so far.
     fn at_return(&mut self, step: &Step) {
         let Some(returns) = &self.returns else { return };
-        // The longer a round lasts the less a single return says.
+        // The longer a round lasts, the less a single return adds.
         if returns.total() > 200 && !returns.total().is_multiple_of(returns.total() / 100) {
             return;
         }
         let Some(prediction) = returns.closest(&self.extent) else { return };
         let Prediction { state, period, size, doubt, .. } = prediction;
-        // Another number of crossings per period begins anew.
+        // A different number of crossings per period starts a new record.
         if self.seen.last().is_some_and(|(known, _)| (period - known).abs() > 0.02 * known) {
             self.seen.clear();
         }
@@ -157,7 +158,7 @@ impl Runner {
         let Some((_, last)) = returns.last() else { return };
         let latest = |count: usize| self.seen.iter().rev().take(count).fold(0.0, |m: f64, (_, size)| m.max(*size));
         let few = self.seen.len() < SEEN;
-        // What no longer comes down, close to the accuracy of the integration, has settled too.
+        // Differences that no longer decrease, close to the accuracy of the integration, count as settled too.
         let settled = (self.seen.len() >= 4 && latest(4) <= SETTLED)
             || (self.seen.len() >= 5 * SEEN && latest(2 * SEEN) <= 20.0 * SETTLED && !contracts(&self.seen));
         if settled && self.moves {
@@ -176,7 +177,7 @@ impl Runner {
         }
     }
 
-    /// What the last window says: whether the trajectory comes to rest, and how far its motion extends.
+    /// Evaluates the last window: detects rest, and measures the extent of the motion.
     fn close_window(&mut self, step: &Step, x: &[f64], trial: &Trial) {
         let window = std::mem::replace(&mut self.window, Window::new(x.len()));
         let extent: Vec<f64> = (0..x.len()).map(|i| window.high[i] - window.low[i]).collect();
@@ -184,9 +185,9 @@ impl Runner {
         if size <= RESTS {
             let time = self.time + step.end_time();
             let extent = trial.scales.to_vec();
-            // Half way between the extremes of what is left of the motion.
+            // Midpoint of the extrema of the remaining motion.
             let state = (0..x.len()).map(|i| 0.5 * (window.high[i] + window.low[i])).collect();
-            // Long steps can stand still beside the equilibrium, by as much as the integrator tolerates.
+            // With long steps the trajectory can stand still beside the equilibrium, within the integration tolerance.
             let error = size.max(INTEGRATION[usize::from(!self.is_rough())]);
             self.found = Some(Settled { motion: Motion::Equilibrium, state, period: 0.0, extent, time, error });
             return;
@@ -202,7 +203,7 @@ impl Runner {
             }
             return;
         }
-        // The first windows of the first round are the transient; a plane through it may be no plane across the motion.
+        // The first windows of the first round are transient; a plane through them may not intersect the motion.
         if self.round_steps >= self.plane_ends && self.steps >= 2 * WINDOW {
             let velocity: Vec<f64> = (0..x.len()).map(|i| step.end_slope(i)).collect();
             self.returns = Some(Returns::across(x.to_vec(), &velocity, &self.extent, INTEGRATION[0]));
@@ -212,7 +213,7 @@ impl Runner {
         }
     }
 
-    /// The extent over the last windows; a cycle may take longer than one.
+    /// Updates the extent over the last windows; a cycle may take longer than one.
     fn renew_extent(&mut self, window: &Window, trial: &Trial) {
         if self.boxes.len() == WINDOWS {
             self.boxes.remove(0);
@@ -223,13 +224,13 @@ impl Runner {
             self.boxes.iter().map(|[_, high]| high[i]).fold(f64::MIN, f64::max) - low
         };
         let extent: Vec<f64> = (0..window.low.len()).map(|i| span(i).max(1e-6 * trial.scales[i])).collect();
-        // The last window alone: what comes to rest fast was large a few windows ago.
+        // The last window alone: a motion that comes to rest quickly was large a few windows ago.
         let own = |i: usize| window.high[i] - window.low[i];
         self.moves = (0..extent.len()).any(|i| own(i) > (0.2 * extent[i]).max(MOVES * trial.scales[i]));
         self.extent = extent;
     }
 
-    /// The limit of the states of a window, where its motion has been shrinking and f is much smaller there.
+    /// Continues from the predicted limit of a window if the motion has been shrinking and f is much smaller there.
     fn try_rest(&mut self, window: &Window, x: &[f64], trial: &Trial) {
         let third = self.sizes.len() / 3;
         if third < 3 {
@@ -237,7 +238,7 @@ impl Runner {
         }
         let largest = |part: &[f64]| part.iter().copied().fold(0.0, f64::max);
         let [a, b, c] = [&self.sizes[..third], &self.sizes[third..2 * third], &self.sizes[2 * third..]].map(largest);
-        // A motion that shrinks to a cycle does so ever more slowly; to rest it shrinks by the same factor again and again.
+        // A motion shrinks to a cycle ever more slowly, but to rest by a constant factor.
         if !(c < SMALL && c <= SHRUNK * a && c * a <= 1.05 * b * b) {
             return;
         }
@@ -256,7 +257,7 @@ impl Runner {
         }
     }
 
-    /// A cycle that repeats itself less accurately than it should, when no more steps are left.
+    /// Returns a cycle that repeats itself less accurately than required, for use when no steps are left.
     fn nearly(&self) -> Option<Settled> {
         let (_, state) = self.returns.as_ref()?.last()?;
         let (period, _) = *self.seen.last()?;
@@ -266,7 +267,7 @@ impl Runner {
         repeats.then_some(Settled { motion: Motion::Cycle, state, period, extent, time, error })
     }
 
-    /// The round is over.
+    /// Ends the round.
     pub(super) fn end(&mut self, time: f64, state: Vec<f64>, outcome: Outcome) {
         self.time += time;
         let extent = self.extent.clone();
@@ -283,7 +284,7 @@ impl Runner {
     }
 }
 
-/// Whether the differences of the returns come down: the largest of each third is smaller than that of the third before.
+/// True if the differences of the returns decrease: the largest of each third is smaller than that of the third before.
 fn contracts(seen: &[(f64, f64)]) -> bool {
     let third = seen.len() / 3;
     let largest = |part: &[(f64, f64)]| part.iter().fold(0.0, |m: f64, (_, size)| m.max(*size));

@@ -1,35 +1,35 @@
 //! Initial states: stratified, reproducible, a quarter of them close to the origin.
 //!
-//! **Idea.** Every component's range is cut into as many strata as there are samples and every stratum is used once, in an
-//! order of its own for each component, so each range is covered evenly whatever the number of components. Every fourth
-//! sample is drawn towards the origin (or the point of the box nearest to it) by a random factor between 1 and 1/100, since
-//! small motions otherwise are rare in a high-dimensional box. The other three in four are distributed uniformly in the box;
-//! basin fractions are estimated from them alone.
+//! **Idea.** The range of every component is divided into as many strata as there are samples, and every stratum is
+//! used once, in an order specific to the component. Each range is covered evenly for any number of components. Every
+//! fourth sample is drawn towards the origin (or the point of the box nearest to it) by a random factor between 1 and
+//! 1/100, since small motions are otherwise rare in a high-dimensional box. The other three in four are distributed
+//! uniformly in the box; basin fractions are estimated from them alone.
 //!
 //! **Source.** mckay1979 (Latin hypercube); steele2014 (SplitMix64).
 
 use super::Limits;
 
-/// What to sample and how carefully.
+/// Initial states to sample, and limits and accuracy of their trajectories.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Sampling {
     /// `[n]` smallest and largest initial value of every state.
     pub ranges: Vec<[f64; 2]>,
-    /// `[n]` magnitude of each state that counts as ordinary: errors and distances are measured against it.
+    /// `[n]` characteristic size of each state, relative to which errors and distances are measured.
     pub scales: Vec<f64>,
     /// The two states that make up the whirl plane z = u + jv, by which cycles are named.
     pub whirl: Option<[usize; 2]>,
-    /// How many initial states.
+    /// Number of initial states.
     pub samples: usize,
     /// Seed of the random numbers.
     pub seed: u64,
-    /// Threads; the result does not depend on it.
+    /// Number of threads; the result does not depend on it.
     pub jobs: usize,
-    /// Accuracy, relative, to which `polish` computes: solutions that agree to it are the same.
+    /// Relative accuracy of `polish`: solutions that agree to it are the same.
     pub tolerance: f64,
-    /// Limits on every trajectory, in the time of the model.
+    /// Limits on every trajectory, in the time unit of the model.
     pub limits: Limits,
-    /// `[samples][n]` the initial states, where they are not drawn from the ranges.
+    /// `[samples][n]` initial states to use instead of drawing from the ranges.
     pub given: Option<Vec<f64>>,
 }
 
@@ -79,7 +79,7 @@ impl Sampling {
     }
 }
 
-/// A small generator of random numbers with a state of 64 bits.
+/// A random number generator with a state of 64 bits.
 struct SplitMix64(u64);
 
 impl SplitMix64 {
@@ -91,7 +91,7 @@ impl SplitMix64 {
         z ^ (z >> 31)
     }
 
-    /// Uniform in [0, 1).
+    /// Returns a number uniform in [0, 1).
     fn fraction(&mut self) -> f64 {
         (self.next() >> 11) as f64 * (-53f64).exp2()
     }

@@ -1,19 +1,21 @@
 //! From a start to a settled motion, by simulation alone.
 //!
-//! **Idea.** A trajectory runs in rounds. In each it is watched until it is seen to contract: its returns to a plane, or its
-//! speed, come down steadily. Their limit is then predicted, and the next round starts close to it: at a small part of the
-//! distance, in the direction from which the trajectory came, so that what does not attract shows in that round. The
-//! trajectory has settled when it repeats itself; no equation is solved for the motion.
+//! **Idea.** A trajectory runs in rounds. In each it is watched until it is observed to contract: its returns to a
+//! plane, or its speed, decrease steadily. Their limit is then predicted, and the next round starts close to it, at a
+//! small fraction of the distance in the direction from which the trajectory came, so that a limit that does not
+//! attract is exposed in that round. The trajectory has settled when it repeats itself; no equation is solved for the
+//! motion.
 //!
-//! **Equations.** With the limit y* of the returns y_j, (2) of `returns`, and d its doubt relative to the last difference:
+//! **Equations.** With the limit y* of the returns y_j, (2) of `returns`, and d its doubt relative to the last
+//! difference:
 //!
 //!   (1)  next start = y* + s (y_j - y*),   s = clamp(5 d, 1/1000, 1/10)
 //!
-//! An equilibrium is the limit of states at equal distances of time, in the same way.
+//! An equilibrium is predicted in the same way, as the limit of states at equal time intervals.
 //!
 //! **Source.** sidi2017, §1 (reduced rank extrapolation).
 //!
-//! **Fails when** a motion is neither at rest nor periodic, or contracts by less than a thirtieth over some thousand periods.
+//! **Fails when** a motion is neither at rest nor periodic, or contracts by less than 1/30 over a few thousand periods.
 
 use super::Limits;
 use super::runner::{JUMPS, Runner};
@@ -21,19 +23,19 @@ use crate::contract::VectorField;
 use crate::diagram::Motion;
 use crate::simulation::{Ensemble, Tolerance};
 
-/// Accuracy of the integration, relative, in a rough first round and in all others.
+/// Relative accuracy of the integration: in a rough first round, and in all others.
 pub(super) const INTEGRATION: [f64; 2] = [1e-6, 1e-9];
 
-/// How the first round is integrated.
+/// Accuracy of the first round.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum First {
-    /// Roughly: from afar a trajectory has a long way to go, and nothing is decided on it.
+    /// Rough: a distant start has a long way to go, and this round decides nothing.
     Rough,
-    /// Accurately: the start lies close to a motion whose basin may be narrow.
+    /// Accurate: the start lies close to a motion whose basin may be narrow.
     Accurate,
 }
 
-/// A vector field, and what its motions are measured by.
+/// A vector field, with scales and limits for its simulation.
 #[derive(Clone, Copy)]
 pub struct Trial<'a> {
     /// The vector field.
@@ -42,25 +44,25 @@ pub struct Trial<'a> {
     pub scales: &'a [f64],
     /// The two states that make up the whirl plane, by which cycles are named.
     pub whirl: Option<[usize; 2]>,
-    /// Threads; no result depends on it.
+    /// Number of threads; no result depends on it.
     pub jobs: usize,
     /// Limits on each trajectory of a survey or sweep.
     pub limits: Limits,
 }
 
 impl Trial<'_> {
-    /// Those limits in the time of the field at these parameters.
+    /// Returns the limits in the time unit of the field at these parameters.
     pub(super) fn limits_at(&self, parameters: &[f64]) -> Limits {
         Limits { time: self.limits.time / self.field.time_unit(parameters), ..self.limits }
     }
 }
 
-/// Where a trajectory got to.
+/// Final state of a trajectory.
 #[derive(Clone, Debug)]
 pub(super) struct Settled {
     pub(super) motion: Motion,
     pub(super) state: Vec<f64>,
-    /// 0 unless it is a cycle.
+    /// Period of a cycle; otherwise 0.
     pub(super) period: f64,
     /// `[n]` extent of the motion, with a floor.
     pub(super) extent: Vec<f64>,
@@ -68,7 +70,7 @@ pub(super) struct Settled {
     pub(super) error: f64,
 }
 
-/// Follows trajectories together, each at parameters of its own: `parameters` `[count][k]`, `starts` `[count][n]`.
+/// Integrates trajectories together, each at its own parameters: `parameters` `[count][k]`, `starts` `[count][n]`.
 pub(super) fn settle_together(
     trial: &Trial,
     parameters: &[f64],
@@ -91,7 +93,7 @@ pub(super) fn settle_together(
         let left = |r: usize| limits.steps.saturating_sub(runners[r].steps);
         let limit = open.iter().map(|&r| left(r)).max().unwrap_or(0).max(1);
         open.iter().for_each(|&r| runners[r].begin(parameters[r * k..(r + 1) * k].to_vec()));
-        // A trajectory that has used up its time does not begin another round.
+        // A trajectory that has used up its time does not start another round.
         let time = open.iter().map(|&r| limits.time - runners[r].time).fold(0.0, f64::max);
         if time <= 0.0 {
             break;

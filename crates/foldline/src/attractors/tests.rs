@@ -1,4 +1,4 @@
-//! Censuses with known answers.
+//! Sampling of systems with known attractors.
 
 use super::*;
 use crate::contract::{Batch, Parameters, VectorField, Verdict};
@@ -27,7 +27,7 @@ fn sampling(ranges: &[[f64; 2]], samples: usize, jobs: usize) -> Sampling {
     }
 }
 
-/// A box that holds every attractor of the overhung rotor at Ω = 5 (akay, reference constants).
+/// A box that contains every attractor of the overhung rotor at Ω = 5 (akay, reference constants).
 fn rotor_sampling(samples: usize, jobs: usize) -> Sampling {
     let ranges = [[-6.0, 6.0], [-6.0, 6.0], [-15.0, 15.0], [-15.0, 15.0]];
     Sampling { whirl: Some([0, 1]), ..sampling(&ranges, samples, jobs) }
@@ -59,8 +59,8 @@ fn the_cubic_rotor_goes_to_two_equilibria_a_single_or_a_double_loop() {
     rest.sort_by(f64::total_cmp);
     assert_eq!(rest.len(), 2);
     assert!((rest[0] - 0.38958073).abs() < 1e-8 && (rest[1] - 9.22606067).abs() < 1e-8, "{rest:?}");
-    // Single and double loop: period and radii of an independent continuation code, to the digits given there; radii are
-    // read off 4000 samples, which miss an extremum by 1e-6 of it.
+    // Single and double loop: period and radii of an independent continuation code, to the digits given there; radii
+    // are read off 4000 samples, which miss an extremum by 1e-6 of it.
     let loops = [((2, 1), 2.0147198658, [0.587895, 2.48233521]), ((3, 1), 2.6261014808, [0.904902, 5.121533])];
     for (ratio, period, expected) in loops {
         let found = &of_ratio(ratio).point.solution;
@@ -80,8 +80,8 @@ fn every_sample_of_the_contact_rotor_is_counted_where_a_long_integration_ends() 
     assert!((single.point.solution.period().unwrap() - 1.9910645451).abs() < 1e-9);
     let [low, high] = radii(&single.point.solution);
     assert!((low - 0.530563).abs() < 1e-5 && (high - 1.341756).abs() < 1e-5, "{low} {high}");
-    // e^(-ζ 1000) = 5e-5 of a small difference to the attractor is left. The same accuracy gives the same trajectories, which
-    // matters for those that start near a basin boundary.
+    // A small deviation from the attractor has decayed to e^(-ζ 1000) = 5e-5 of itself. Equal accuracy gives the same
+    // trajectories, which matters for those that start near a basin boundary.
     let tolerance = Tolerance::uniform(super::census::Pace::THOROUGH.accuracy, 4);
     let starts = sampling.starts();
     let mut largest = vec![0.0; 32];
@@ -94,7 +94,7 @@ fn every_sample_of_the_contact_rotor_is_counted_where_a_long_integration_ends() 
     });
     for attractor in &census.attractors {
         let r = radii(&attractor.point.solution)[1];
-        // The radii 0.39, 1.34 and 2.45 lie far enough apart for a wide net; the last to arrive are still 0.1 away.
+        // The radii 0.39, 1.34 and 2.45 lie far enough apart for a wide margin; the last to arrive are still 0.1 away.
         let there = largest.iter().filter(|l| (*l - r).abs() < 0.2).count();
         assert_eq!(there, attractor.hits, "{:?} of largest radius {r}, {largest:?}", attractor.ratio);
     }
@@ -102,8 +102,8 @@ fn every_sample_of_the_contact_rotor_is_counted_where_a_long_integration_ends() 
 }
 
 #[test]
-fn what_is_known_to_attract_is_not_waited_for() {
-    // The only equilibrium of the contact rotor attracts few samples, slowly; Newton's method finds it long before.
+fn a_survey_ends_without_reaching_an_equilibrium_that_clearly_attracts() {
+    // The only equilibrium of the contact rotor attracts few samples, and slowly; Newton's method finds it long before.
     let polish = |candidate: &Candidate| shooting::polish(&ROTOR, &[5.0, 1.0], candidate);
     let whole = survey_of(&ROTOR, &[5.0, 1.0], &rotor_sampling(32, 2));
     let mut unseen = 0;
@@ -164,7 +164,7 @@ fn every_start_but_the_origin_leads_to_the_van_der_pol_cycle() {
 }
 
 #[test]
-fn nodes_share_the_line_between_them() {
+fn hits_of_two_nodes_follow_the_signs_of_the_initial_states() {
     // x' = x - x³: every positive start goes to 1, every negative one to -1.
     let sampling = sampling(&[[-2.0, 3.0]], 60, 2);
     let census = survey_of(&BISTABLE, &[], &sampling);
@@ -189,8 +189,8 @@ fn nodes_share_the_line_between_them() {
 }
 
 #[test]
-fn trajectories_that_run_away_are_counted() {
-    // x'' + x'/5 + x - x³ = 0: starts outside of the saddles' basin boundary run to infinity in finite time.
+fn escaping_trajectories_are_counted() {
+    // x'' + x'/5 + x - x³ = 0: starts beyond the stable manifolds of the saddles escape in finite time.
     let census = survey_of(&ESCAPING, &[], &sampling(&[[-2.0, 2.0], [-2.0, 2.0]], 60, 1));
     assert_eq!(census.attractors.len(), 1);
     assert_eq!(census.unsettled, 0);
@@ -200,7 +200,7 @@ fn trajectories_that_run_away_are_counted() {
 }
 
 #[test]
-fn where_nothing_attracts_nothing_settles() {
+fn no_trajectory_settles_around_a_centre() {
     // A centre: every orbit is closed, none is isolated.
     let census = survey_of(&CENTRE, &[], &sampling(&[[0.5, 2.0], [0.5, 2.0]], 2, 1));
     assert_eq!((census.attractors.len(), census.unsettled, census.escaped), (0, 2, 0));

@@ -1,8 +1,8 @@
-//! Watching one trajectory until one can say where it goes.
+//! Observation of one trajectory until its limit is known.
 //!
-//! **Idea.** Three things are watched. The extent of the motion over a window of steps: where it shrinks, an equilibrium may be
-//! near. The returns to a section: their predicted limit may lie on a cycle. The distance to every solution found so far: where
-//! its largest value per window falls steadily, the trajectory has settled there.
+//! **Idea.** Three things are watched. The extent of the motion over a window of steps: if it shrinks, an equilibrium
+//! may be near. The returns to a section: their predicted limit may lie on a cycle. The distance to every known
+//! solution: if its largest value per window falls steadily, the trajectory has settled there.
 
 use super::Candidate;
 use super::candidate::Context;
@@ -16,30 +16,30 @@ use crate::simulation::Step;
 const WINDOW: usize = 128;
 /// Steps between measurements of the distance to known solutions.
 const PULSE: usize = 16;
-/// Steps after which a first section that saw no cycle is replaced; each later one lives twice as long.
+/// Steps after which a first section without a cycle is replaced; each later one lasts twice as long.
 const FIRST_SECTION: usize = 1024;
 
-/// Shrinking of the extent after which an equilibrium is tried again.
+/// Decrease of the extent after which an equilibrium is tried again.
 const SHRUNK: f64 = 0.7;
 /// Distance, relative to the size of the solution, below which a steady approach counts …
 const CLOSE: f64 = 0.05;
 /// … once the distance has fallen to this fraction of what it was when the approach began.
 const APPROACHED: f64 = 0.5;
-/// Distance at which a trajectory that stays that close is on the solution: the sag of the polygon that stands for it.
+/// Distance within which a trajectory that stays there is on the solution: the sag of the polygon that represents it.
 pub(super) const ARRIVED: f64 = 3e-3;
-/// A predicted limit settles a trajectory no farther away than this …
+/// A predicted limit settles a trajectory that is at most this far from the solution …
 const NEIGHBOURHOOD: f64 = 0.1;
-/// … if it is this much closer to the solution than the trajectory is.
+/// … if the limit is closer to the solution than the trajectory by this factor.
 const HIT: f64 = 0.1;
-/// Returns after which a predicted limit must still be the same to be followed.
+/// Number of returns after which a predicted limit must still hold to be followed.
 const PATIENCE: usize = 8;
-/// How far from the candidate a polished solution may lie.
+/// Largest distance of a polished solution from its candidate.
 const FAITHFUL: f64 = 0.1;
 
-/// The watch over one trajectory.
+/// Observation of one trajectory.
 #[derive(Clone, Debug)]
 pub(super) struct Watch {
-    /// Index of the solution to which the trajectory was seen to go.
+    /// Index of the solution on which the trajectory was observed to settle.
     pub(super) settled: Option<usize>,
     steps: usize,
     x: Vec<f64>,
@@ -52,7 +52,7 @@ pub(super) struct Watch {
     section_ends: usize,
     section_life: usize,
     next_attempt: usize,
-    /// A limit that is followed if it is still predicted at the next attempt.
+    /// A limit to be followed if it is still predicted at the next attempt.
     expected: Option<Prediction>,
     approach: Approach,
 }
@@ -75,7 +75,7 @@ impl Watch {
         }
     }
 
-    /// Takes note of a step; `known` holds the solutions found so far and grows by those found here.
+    /// Evaluates a step; `known` holds the solutions found so far and is extended by those found here.
     pub(super) fn observe(&mut self, step: &Step, known: &mut Vec<Orbit>, context: &Context) -> Verdict {
         let mut x = std::mem::take(&mut self.x);
         step.end_into(&mut x);
@@ -94,13 +94,13 @@ impl Watch {
         if self.settled.is_some() { Verdict::Stop } else { Verdict::Continue }
     }
 
-    /// Evaluates a window of steps: tries an equilibrium where the motion shrinks, and renews the section.
+    /// Evaluates a window of steps: tries an equilibrium if the motion shrinks, and renews the section.
     fn close_window(&mut self, step: &Step, x: &[f64], known: &mut Vec<Orbit>, context: &Context) {
         let scales = &context.sampling.scales;
         let window = std::mem::replace(&mut self.window, Window::new(x.len()));
         let extent: Vec<f64> = (0..x.len()).map(|i| window.high[i] - window.low[i]).collect();
         let size = (0..x.len()).fold(0.0, |m: f64, i| m.max(extent[i] / scales[i]));
-        // The first window is the transient.
+        // The first window is transient.
         if self.extent.is_none() {
             self.try_equilibrium_below = SHRUNK * size;
         } else if size <= self.try_equilibrium_below {
@@ -109,7 +109,7 @@ impl Watch {
             let candidate = self.closer_to_rest(mean, step, x, context);
             self.try_equilibrium(candidate, &extent, known, context);
         }
-        // A component that does not move is measured against a small part of its scale.
+        // A component that does not move is measured against a small fraction of its scale.
         self.extent = Some((0..x.len()).map(|i| extent[i].max(1e-6 * scales[i])).collect());
         if self.steps >= self.section_ends
             && let Some(extent) = &self.extent
@@ -122,7 +122,7 @@ impl Watch {
         }
     }
 
-    /// The mean of a window or its last state, whichever has the smaller f: a mean suits a spiral, the last state a node.
+    /// Returns the mean of a window (suits a spiral) or its last state (suits a node), whichever has the smaller f.
     fn closer_to_rest(&self, mean: Vec<f64>, step: &Step, x: &[f64], context: &Context) -> Vec<f64> {
         let f = context.slope(&mean);
         let speed = |component: &dyn Fn(usize) -> f64| {
@@ -133,7 +133,7 @@ impl Watch {
     }
 
     fn try_equilibrium(&mut self, x: Vec<f64>, extent: &[f64], known: &mut Vec<Orbit>, context: &Context) {
-        // An explicit method with steps as long as they can be may stand still at some errors of a step from the equilibrium.
+        // With steps at its stability limit, an explicit method may stand still a few step errors from the equilibrium.
         let own = context.tolerance();
         let room = |i: usize| 2.0 * extent[i] + 10.0 * (own.absolute[i] + own.relative * x[i].abs());
         let near = |rest: &[f64]| (0..x.len()).all(|i| (rest[i] - x[i]).abs() <= room(i));
@@ -147,13 +147,13 @@ impl Watch {
         }
     }
 
-    /// Looks for a limit of the returns, at every return at first and more and more rarely while none is found.
+    /// Looks for a limit of the returns: at every return at first, then less and less often while none is found.
     fn try_cycle(&mut self, known: &mut Vec<Orbit>, context: &Context) {
         if self.returns.total() < self.next_attempt {
             return;
         }
         let Some(extent) = self.extent.clone() else { return };
-        // Far from everything known, and not nearly back anywhere: nothing below could come of it.
+        // Far from every known solution and not nearly recurrent: nothing below can succeed.
         let near = |last: &[f64]| known.iter().any(|k| k.distance(last) <= NEIGHBOURHOOD);
         if !self.returns.comes_back(&extent) && !self.returns.last().is_some_and(|(_, last)| near(last)) {
             self.next_attempt = self.returns.total() + 2;
@@ -169,7 +169,7 @@ impl Watch {
                 self.next_attempt = self.returns.total() + 1;
                 return;
             }
-            // The fewest crossings per period come first: while their limit is in doubt, one over more of them is no better.
+            // The fewest crossings come first: while their limit is in doubt, one over more crossings is no better.
             if !prediction.worthwhile() {
                 self.next_attempt = self.returns.total() + 2;
                 return;
@@ -189,8 +189,8 @@ impl Watch {
         }
     }
 
-    /// Whether the limit is the one that was predicted some returns ago. Where a motion of several frequencies fades, the
-    /// limit of each few returns is steady and yet moves on; that is seen at no cost, unlike by following it.
+    /// True if the limit is the one predicted some returns ago. As a motion of several frequencies decays, the limit of
+    /// each few returns is steady and yet drifts, which this check detects without integrating from the limit.
     fn lasts(&mut self, prediction: &Prediction, extent: &[f64]) -> bool {
         let lasts = self.expected.take().is_some_and(|expected| expected.agrees(prediction, extent));
         if !lasts {
@@ -200,8 +200,8 @@ impl Watch {
         lasts
     }
 
-    /// The solution on which a predicted limit lies, and to which the trajectory has been coming closer. (The limit alone
-    /// does not tell: the mean over several turns that never become the same is a steady limit too.)
+    /// Returns the known solution on which a predicted limit lies and which the trajectory has been approaching. (The
+    /// limit alone does not suffice: the mean over several turns that never become equal is also a steady limit.)
     fn predicted(&self, limit: &[f64], known: &[Orbit]) -> Option<usize> {
         let (_, last) = self.returns.last()?;
         known.iter().position(|orbit| {
@@ -237,20 +237,20 @@ impl Window {
     }
 }
 
-/// The distance to the nearest known solution, as its largest value over windows of measurements.
+/// Distance to the nearest known solution, as its largest value over windows of measurements.
 #[derive(Clone, Debug, Default)]
 struct Approach {
     nearest: usize,
     measurements: usize,
     largest: f64,
-    /// Largest value of the first and of the last window of a steady approach, and how many windows it lasted.
+    /// Largest value in the first and in the last window of a steady approach, and number of windows.
     first: f64,
     last: f64,
     windows: usize,
 }
 
 impl Approach {
-    /// Adds a measurement; the index of the solution once the trajectory has settled there.
+    /// Adds a measurement. Returns the index of the solution once the trajectory has settled there.
     fn measure(&mut self, x: &[f64], known: &[Orbit]) -> Option<usize> {
         const MEASUREMENTS: usize = 8;
         const WINDOWS: usize = 3;

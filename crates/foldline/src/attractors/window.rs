@@ -1,9 +1,9 @@
-//! Some consecutive steps of a trajectory.
+//! A number of consecutive steps of a trajectory.
 
 use super::returns::limit_of;
 use crate::simulation::Step;
 
-/// Extent of the state over some steps, and some of the states at equal distances of time.
+/// Extent of the state over some steps, and those steps for interpolation in time.
 pub(super) struct Window {
     pub(super) low: Vec<f64>,
     pub(super) high: Vec<f64>,
@@ -24,19 +24,19 @@ impl Window {
         self.steps.push((step.end_time(), x.to_vec(), (0..x.len()).map(|i| step.end_slope(i)).collect()));
     }
 
-    /// The limit of states at equal distances of time.
+    /// Returns the predicted limit of states at equal time intervals.
     pub(super) fn limit(&self, scales: &[f64]) -> Option<Vec<f64>> {
         let n = scales.len();
         let (start, end) = (self.steps.first()?.0, self.steps.last()?.0);
         let terms = n.min(8);
-        // Over an odd part of the window, so that no motion has a period of this length.
+        // An odd fraction of the window, which is not the period of any motion.
         let spacing = 0.619 * (end - start) / (terms + 1) as f64;
         let states: Vec<Vec<f64>> = (0..terms + 2).map(|k| self.at(end - k as f64 * spacing)).collect();
         let states: Vec<&[f64]> = states.iter().map(Vec::as_slice).collect();
         limit_of(&states, scales)
     }
 
-    /// The state at a time, by the cubic through two steps and their slopes.
+    /// Returns the state at a time, from the cubic through two steps and their slopes.
     fn at(&self, time: f64) -> Vec<f64> {
         let k = self.steps.partition_point(|(t, ..)| *t < time).clamp(1, self.steps.len() - 1);
         let ((t0, a, f), (t1, b, g)) = (&self.steps[k - 1], &self.steps[k]);
@@ -48,7 +48,7 @@ impl Window {
         (0..a.len()).map(cubic).collect()
     }
 
-    /// Mean speed, scaled.
+    /// Returns the mean scaled speed.
     pub(super) fn speed(&self, scales: &[f64]) -> f64 {
         let way = |pair: &[(f64, Vec<f64>, Vec<f64>)]| {
             pair[0].1.iter().zip(&pair[1].1).zip(scales).fold(0.0, |m: f64, ((a, b), s)| m.max(((a - b) / s).abs()))

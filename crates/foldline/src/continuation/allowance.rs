@@ -1,30 +1,33 @@
 //! Limit on the work of one side of a branch.
 //!
-//! **Idea.** Factorisations on a mesh are charged to an allowance, and every accepted point restores part of it. A few hard points may
-//! use what easy points have left over; a branch on which every point is hard ends. The work of a side is therefore bounded by the
-//! allowance and the number of points.
+//! **Idea.** Factorisations on a mesh are charged to an allowance, and every accepted point restores part of it. A few
+//! hard points may use what easy points have left over; a branch on which every point is hard ends. The work of a side
+//! is therefore bounded by the allowance and the number of points.
 //!
-//! A side also ends after several consecutive points with unexplained changes of stability. If multipliers lie on the unit circle
-//! along the whole branch, rounding changes the number of unstable ones, and special points found there are meaningless.
+//! A side also ends after several consecutive points with unexplained changes of stability. If multipliers lie on the
+//! unit circle along the whole branch, rounding changes the number of unstable ones, and special points found there are
+//! meaningless.
 
 use crate::diagram::{Ending, Mesh, Shown};
 
-/// Factorisations available to one point if none were used before. It takes 28 halvings to get from the longest step, 0.2, to the
-/// shortest, 1e-9. A step that fails late takes 8 Newton iterations and then some 30 factorisations for its mesh: about 1100 in all.
-/// Special points take 60 to 200 each, and up to 14 cuts of the step to separate them: 14 · 200 more. The limit is twice the sum,
-/// rounded up. The hardest point of a completed branch in `cargo xtask outside` took some 4800.
+/// Factorisations available to one point if none were used before. It takes 28 halvings to get from the longest step,
+/// 0.2, to the shortest, 1e-9. A step that fails late takes 8 Newton iterations and then some 30 factorisations for its
+/// mesh: about 1100 in all. Special points take 60 to 200 each, and up to 14 cuts of the step to separate them:
+/// 14 · 200 more. The limit is twice the sum, rounded up. The hardest point of a completed branch in
+/// `cargo xtask outside` took some 4800.
 pub(super) const ALLOWANCE: usize = 10_000;
-/// Factorisations that an accepted point restores: the cost of one special point on its step. A point without one costs 5 to 7.
+/// Factorisations that an accepted point restores: the cost of one special point on its step. A point without one costs
+/// 5 to 7.
 const RENEWED: usize = 200;
-/// Consecutive accepted steps with an unexplained change of stability after which the side ends. A factor of safety: isolated
-/// unexplained changes must not end a branch.
+/// Consecutive accepted steps with an unexplained change of stability after which the side ends. A safety factor:
+/// isolated unexplained changes must not end a branch.
 const IN_A_ROW: usize = 10;
 
-/// Intervals per unit of work: a factorisation on a mesh of up to this size counts once, and its cost grows in proportion to the
-/// mesh. Most cycles need fewer intervals.
+/// Intervals per unit of work: a factorisation on a mesh of up to this size counts once, and its cost grows in
+/// proportion to the mesh. Most cycles need fewer intervals.
 const INTERVALS: usize = 1000;
 
-/// Work of a number of factorisations on a mesh. Equilibria have no mesh, and their factorisations count nothing.
+/// Work of a number of factorisations on a mesh. Equilibria have no mesh, and their factorisations are not counted.
 pub(super) fn work(factorisations: usize, mesh: &Mesh) -> usize {
     factorisations * mesh.len().div_ceil(INTERVALS)
 }
@@ -46,8 +49,8 @@ impl Allowance {
         work > self.left
     }
 
-    /// Records an accepted step to the parameter value `at`; returns the reason if the side ends there. `unexplained` is true if
-    /// stability changes on the step without explanation.
+    /// Records an accepted step to the parameter value `at`; returns the reason if the side ends there. `unexplained`
+    /// is true if stability changes on the step without explanation.
     pub(super) fn accepted(&mut self, unexplained: bool, work: usize, at: f64) -> Option<Ending> {
         self.unexplained = if unexplained { self.unexplained + 1 } else { 0 };
         if self.unexplained >= IN_A_ROW {
@@ -66,7 +69,7 @@ impl Allowance {
         None
     }
 
-    /// The end of a side whose allowance is used up near the parameter value `at`.
+    /// Ending of a side whose allowance is used up near the parameter value `at`.
     pub(super) fn ending(&self, at: f64, work: usize, last: &str) -> Ending {
         let before = ALLOWANCE - self.left;
         let also = if before > 0 {
@@ -89,7 +92,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_hard_point_may_use_up_what_easy_ones_renew() {
+    fn a_hard_point_may_use_what_easy_points_left_over() {
         let mut own = Allowance::new();
         assert!(!own.is_used_up(ALLOWANCE) && own.is_used_up(ALLOWANCE + 1));
         own.left -= ALLOWANCE - 1000;
@@ -101,7 +104,7 @@ mod tests {
     }
 
     #[test]
-    fn changes_without_explanation_end_a_side_only_one_after_the_other() {
+    fn only_consecutive_unexplained_changes_end_a_side() {
         let mut own = Allowance::new();
         for _ in 0..5 {
             assert!((1..IN_A_ROW).all(|_| own.accepted(true, 5, 0.5).is_none()));
@@ -124,7 +127,7 @@ mod tests {
     }
 
     #[test]
-    fn large_meshes_count_more_and_none_counts_nothing() {
+    fn work_grows_with_the_mesh_and_is_zero_without_one() {
         let mesh =
             |intervals: usize| Mesh::from((0..=intervals).map(|k| k as f64 / intervals as f64).collect::<Vec<f64>>());
         assert_eq!((work(7, &mesh(200)), work(7, &mesh(6900))), (7, 49));

@@ -1,4 +1,4 @@
-//! Newton's method in a hyperplane, and the tangent.
+//! Newton's method in a hyperplane, and the tangent vector.
 //!
 //! **Equations.** For a row c, a base point u₀ and a distance s:
 //!
@@ -9,44 +9,47 @@ use super::Settings;
 use crate::contract::ZeroProblem;
 use crate::diagram::{Cost, Mesh, Point};
 
-/// Why a correction failed.
+/// Reason for which a correction failed.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Failure {
     /// The matrix could not be factorised.
     Singular,
-    /// Something was not a number.
+    /// A value was not finite.
     NotFinite,
-    /// The iteration did not contract; sizes of the updates.
+    /// The iteration did not converge; sizes of the updates.
     NoConvergence(Vec<f64>),
-    /// The point that was found does not continue the branch: the tangent turns by `angle`, the prediction was off by the
-    /// share `miss` of the step.
+    /// The point does not continue the branch: the tangent turns by `angle`, or the prediction was off by the share
+    /// `miss` of the step.
     Elsewhere {
-        /// In radians.
+        /// Angle in radians.
         angle: f64,
-        /// Relative to the step.
+        /// Distance from the prediction, relative to the step.
         miss: f64,
     },
-    /// Midway the curve lies `miss` times as far as is allowed from the cubic between both ends, which is the share `allowed` of the step.
+    /// Midway, the curve lies too far from the cubic between both ends: `miss` times the permitted distance, which is
+    /// the share `allowed` of the step.
     Bent {
-        /// In what is allowed.
+        /// In units of the permitted distance.
         miss: f64,
         /// Relative to the step.
         allowed: f64,
     },
-    /// The same step backwards ends a share `miss` of it from where it began: another branch, or the other arm of a cusp, is close.
+    /// Taken backwards, the step misses its start by the share `miss` of the step: another branch, or the other
+    /// side of a cusp, is close.
     NotBack {
         /// Relative to the step.
         miss: f64,
     },
-    /// Stability changes on the way in a manner that nothing located explains: the step has probably ended on another branch.
+    /// Stability changes on the step without a located special point to explain it. The step has probably ended on
+    /// another branch.
     Unexplained,
     /// The eigenvalues or multipliers could not be computed.
     Spectrum,
-    /// The point needs this mesh, and the step is too short to end on another mesh than it began on.
+    /// The point needs this mesh, but the step is too short to end on a mesh other than the one on which it began.
     Remeshed(Mesh),
     /// No mesh of the permitted size meets the tolerance.
     Mesh(f64),
-    /// The point solves the equations only with what was added to them: branches do not cross there.
+    /// The point solves the unfolded equations but not the original ones: the branches do not cross there.
     Departed,
 }
 
@@ -91,7 +94,7 @@ impl std::fmt::Display for Failure {
     }
 }
 
-/// A converged point together with its vectors on its mesh.
+/// A converged point with its vectors on its mesh.
 #[derive(Clone, Debug)]
 pub struct Station {
     /// The point as it will be stored; its tangent points towards larger positions.
@@ -100,26 +103,27 @@ pub struct Station {
     pub u: Vec<f64>,
     /// Unit tangent in the direction of travel.
     pub tangent: Vec<f64>,
-    /// The mesh of all three.
+    /// The mesh of `point`, `u` and `tangent`.
     pub mesh: Mesh,
-    /// A mesh with room for the next step, where `mesh` has none left.
+    /// A finer mesh for the next step, if `mesh` leaves no room.
     pub roomier: Option<Mesh>,
-    /// Share of the tolerance that the mesh of the next point should be made for: less than 1 where the multipliers ask for
-    /// more than the profile.
+    /// Share of the tolerance to which the mesh of the next point is adapted: less than 1 if the multipliers need a
+    /// finer mesh than the profile.
     pub share: f64,
-    /// The parameter midway from the station before, against the cubic through both; 0 where it was not looked at.
+    /// Deviation of the parameter midway from the previous station from the cubic between them; 0 if not computed.
     pub midway: f64,
-    /// Where the way from the station before was looked at on its mesh: the distance along its tangent, and the unknowns there.
+    /// Intermediate solution between the previous station and this one, on the mesh of the former: distance along its
+    /// tangent, and unknowns.
     pub middle: Option<(f64, Vec<f64>)>,
 }
 
 impl Station {
-    /// A station at `u`, of which nothing else is known yet.
+    /// A station at `u` with all optional data unset.
     pub fn new(point: Point, u: Vec<f64>, tangent: Vec<f64>, mesh: Mesh) -> Station {
         Station { point, u, tangent, mesh, roomier: None, share: 1.0, midway: 0.0, middle: None }
     }
 
-    /// Turns the tangent, where need be, so that along it the parameter changes the way `slope` says.
+    /// Reverses the tangent if necessary, so that the parameter changes along it in the direction of `slope`.
     pub fn head(&mut self, slope: f64) {
         if self.slope() * slope < 0.0 {
             self.tangent.iter_mut().chain(&mut self.point.tangent).for_each(|t| *t = -*t);
@@ -148,8 +152,8 @@ pub struct Plane {
     pub distance: f64,
 }
 
-/// Solves (1) from `u`, so far that what is left of the error is about a tenth of the tolerance (0.001 of it where there is
-/// no mesh); [`station`] does the rest.
+/// Solves (1), starting from `u`, until the remaining error is about a tenth of the tolerance (0.001 of it without a
+/// mesh); [`station`] completes the convergence.
 ///
 /// # Errors
 /// See [`Failure`].
@@ -163,7 +167,7 @@ pub fn correct(
     correct_within(problem, settings, plane, f64::INFINITY, u, cost)
 }
 
-/// Like [`correct`], given up when the first update is longer than `reach`.
+/// Solves (1) like [`correct`], but gives up if the first update is longer than `reach`.
 ///
 /// # Errors
 /// See [`Failure`].
@@ -205,7 +209,7 @@ pub fn correct_within(
         sizes.push(length);
         u.iter_mut().zip(&du).for_each(|(a, b)| *a -= b);
         let ratio = if iteration > 0 { length / sizes[iteration - 1] } else { 1.0 };
-        // What is left after this update: with a new matrix its square, with one that was kept it shrinks as before.
+        // Error after this update: quadratic convergence with a new matrix, linear with an old one.
         let left = match iteration {
             0 => CURVED * length * length,
             _ if fresh => length * ratio.min(1.0).powi(2).max(CURVED * length),
@@ -214,11 +218,11 @@ pub fn correct_within(
         if left.min(length) < goal {
             return Ok(());
         }
-        // Next to a branch point the matrix is nearly singular, and rounding ends the descent a little earlier.
+        // Next to a branch point the matrix is nearly singular, and rounding stops the convergence a little earlier.
         if fresh && iteration > 1 && ratio > 0.3 && length < 0.1 * settings.tolerance {
             return Ok(());
         }
-        // A matrix that was kept may be at fault; with a new one there is no excuse.
+        // Slow convergence may be due to an old matrix, but not if the matrix is new.
         let worse = (iteration > 1 && ratio > 0.9) || (iteration > 0 && ratio > 4.0);
         if fresh && worse && length > settings.tolerance || length > 10.0 {
             return Err(Failure::NoConvergence(sizes));
@@ -229,16 +233,16 @@ pub fn correct_within(
     Err(Failure::NoConvergence(sizes))
 }
 
-/// Newton updates, relative, that rounding may leave next to a singular matrix …
+/// Relative Newton update that rounding may leave next to a singular matrix …
 const STALLED: f64 = 1e-9;
-/// … and larger ones where no more than this is left of the equations, relative: there it is rounding and no curvature.
+/// … and relative residual below which larger updates, too, are attributed to rounding.
 const ROUNDED: f64 = 1e-11;
 
-/// Error after the first Newton step, over the square of the error before, that is reckoned with.
+/// Assumed ratio of the error after a Newton step to the square of the error before it.
 const CURVED: f64 = 10.0;
 
-/// Ends Newton's method at `u` with a matrix that belongs to the result: the last update is no larger than `close`. Returns
-/// the tangent (2); `along` is a vector with which it shall make an acute angle.
+/// Completes Newton's method at `u` with a matrix evaluated close to the result: the last update is no larger than
+/// `close`. Returns the tangent (2), at an acute angle to `along`.
 ///
 /// # Errors
 /// See [`Failure`].
@@ -270,7 +274,7 @@ pub fn arrive(
         let rounding = length < STALLED || length < 100.0 * close && problem.relative_size(&r, u) < ROUNDED;
         sizes.push(length);
         u.iter_mut().zip(&du).for_each(|(a, b)| *a -= b);
-        // Next to a singular matrix rounding ends the descent earlier.
+        // Next to a singular matrix rounding stops the convergence earlier.
         if length < close || (stalls && rounding) {
             break;
         }
@@ -290,9 +294,9 @@ pub fn arrive(
     Ok(tangent)
 }
 
-/// A station next to `u`, which is nearly converged, in the hyperplane through it across `along`: tangent (2), stability,
-/// error estimates, from a matrix no farther than `close`. The tangent makes an acute angle with `along`; `direction` is +1 where travel is towards larger
-/// positions, else -1.
+/// Station next to the nearly converged `u`, in the hyperplane through it across `along`. Tangent (2), stability and
+/// error estimates come from a matrix evaluated no farther away than `close`. The tangent makes an acute angle with
+/// `along`; `direction` is +1 for travel towards larger positions, else -1.
 ///
 /// # Errors
 /// See [`Failure`].
@@ -308,7 +312,7 @@ pub fn station(
     Ok(examined(problem, u, tangent, direction))
 }
 
-/// The station at `u`, for which the problem was factorised last.
+/// Station at `u`, where the problem was factorised last.
 pub fn examined(problem: &mut dyn ZeroProblem, u: Vec<f64>, tangent: Vec<f64>, direction: f64) -> Station {
     let examination = problem.examine(&u);
     let stored: Vec<f64> = tangent.iter().map(|t| direction * t).collect();
@@ -316,27 +320,27 @@ pub fn examined(problem: &mut dyn ZeroProblem, u: Vec<f64>, tangent: Vec<f64>, d
     Station::new(point, u, tangent, problem.mesh())
 }
 
-/// Estimates the error of the spectrum of a station, at which the problem was factorised last.
+/// Estimates the error of the spectrum at a station where the problem was factorised last.
 pub fn doubted(problem: &mut dyn ZeroProblem, found: &mut Station) {
     found.point.trust.spectrum = problem.spectrum_error(&found.u, &found.point.spectrum);
 }
 
-/// A multiplier closer to the unit circle than this many defects might lie on its other side …
+/// A multiplier within this many defects of the unit circle could be on its other side …
 const CERTAIN: f64 = 20.0;
-/// … and is computed once more with the tolerance multiplied by this.
+/// … and is recomputed with the tolerance multiplied by this factor.
 const TIGHTER: f64 = 0.05;
 
-/// Defect, in tolerances, below which the next point may do with a mesh for four times the error.
+/// Defect, in tolerances, below which the mesh of the next point may have four times the error.
 const RELAXED: f64 = 0.5;
 
-/// How a point is to be [`refine`]d.
+/// Settings for [`refine`].
 #[derive(Clone, Copy, Debug)]
 pub struct Care {
-    /// Share of the tolerance to begin with, as [`Station::share`].
+    /// Initial share of the tolerance; see [`Station::share`].
     pub share: f64,
-    /// How far from the point its matrix may be taken; see [`Settings::closeness`].
+    /// Largest distance from the point at which its matrix may be evaluated; see [`Settings::closeness`].
     pub close: f64,
-    /// Whether the mesh will probably do: its errors are measured only once all is known of the point.
+    /// True if the mesh will probably suffice. Its errors are then measured only once the point is complete.
     pub trusted: bool,
 }
 
@@ -357,9 +361,8 @@ pub fn settle(
     refine(problem, settings, care, plane.row, u, direction, cost)
 }
 
-/// Adapts the mesh at `u`, which has been corrected, until the error estimate meets the tolerance, and both defects of the
-/// multipliers five times that. The problem is left on the mesh of the result
-/// and anchored there.
+/// Adapts the mesh at the corrected point `u` until the error estimate meets the tolerance and both multiplier defects
+/// meet five times the tolerance. The problem is left on the resulting mesh, with the result as its reference.
 ///
 /// # Errors
 /// See [`Failure`].
@@ -383,11 +386,11 @@ pub fn refine(
     let mut coarser = if known.is_some() { None } else { problem.coarser_mesh(&u, tolerance) };
     for round in 0..4 {
         for attempt in 0..if known.is_some() { 0 } else { 10 } {
-            // A layer that lies differently between the nodes of every new mesh needs some more of them than one expects.
+            // A layer that falls differently between the nodes of every new mesh needs a few more nodes than predicted.
             let wanted = tolerance * 0.7f64.powi((attempt - 2).max(0));
             let Some(better) = coarser.take().or_else(|| problem.better_mesh(&u, wanted)) else { break };
             let from = problem.mesh();
-            // The hyperplane through the point itself, so that remeshing does not move it along the curve.
+            // The hyperplane passes through the point itself, so that remeshing does not move it along the curve.
             u = problem.transfer(&u, &from, &better);
             row = problem.transfer(&row, &from, &better);
             problem.set_mesh(&better);
@@ -401,9 +404,10 @@ pub fn refine(
         };
         let trust = found.point.trust;
         let defect = found.point.multiplier_defect();
-        // Multipliers can need a finer mesh than the profile. Where they do not get better with it, the defects say so.
+        // Multipliers can need a finer mesh than the profile. If refinement does not improve them, the stated defects
+        // show it.
         let accurate = defect <= 5.0 * settings.tolerance || round == 3;
-        // Whether a multiplier lies inside or outside the unit circle must not be a matter of its error.
+        // The error of a multiplier must not decide on which side of the unit circle it lies.
         let again = settings.stability && !tightened && round < 3;
         if again && accurate {
             doubted(problem, &mut found);
@@ -412,7 +416,7 @@ pub fn refine(
         let close = |defect: f64| within(CERTAIN * defect);
         let certain = !(again && (close(defect) || within(found.point.trust.spectrum)));
         if accurate && certain {
-            // What is stated is four times the estimate.
+            // The stated error is four times the estimate.
             if trust.discretisation > 6.0 * settings.tolerance {
                 return Err(Failure::Mesh(trust.discretisation));
             }

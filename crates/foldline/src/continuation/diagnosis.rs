@@ -1,38 +1,39 @@
-//! What is said of a side that ends short: what was tried, what the likely cause is, what can be done.
+//! Diagnosis of a side that ends early: what was tried, the likely cause, and what to do.
 //!
-//! **Idea.** While steps from a point are given up, it is noted how many, how long, on which meshes and why. When the last
-//! one is given up, the signs are gone through from the surest to the least: f that is not finite a little farther on, a
-//! period that had grown, a parameter that had stood still, a right-hand side with kinks, a mesh that did not suffice.
+//! **Idea.** For the rejected steps from a point, their number, lengths, meshes and reasons are recorded. When no
+//! further step is tried, possible causes are checked in the order of their certainty: a vector field that is not
+//! finite a little farther on, a period that has grown, a parameter that has not moved, a non-smooth right-hand side, a
+//! mesh that did not suffice.
 
 use super::corrector::{Failure, Station};
 use super::follow::Follow;
 use crate::diagram::{Ending, STANDS, Shown};
 
-/// Steps that were given up in a row.
+/// Consecutive rejected steps from one point.
 #[derive(Debug)]
 pub(super) struct Tried {
     steps: usize,
     longest: f64,
     shortest: f64,
     intervals: [usize; 2],
-    /// How many were given up because the point found did not continue the branch, and because Newton's method failed.
+    /// Number of steps rejected because the point did not continue the branch; below, because Newton's method failed.
     elsewhere: usize,
     diverged: usize,
 }
 
-/// What is known of a side beside its last point.
+/// History of a side.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Past {
-    /// The period at the beginning.
+    /// Period at the start.
     pub first_period: Option<f64>,
-    /// Whether the parameter has ever moved.
+    /// True if the parameter has ever moved.
     pub moved: bool,
 }
 
-/// A cause, and what helps against it.
+/// A likely cause and its remedy.
 type Cause = (String, &'static str);
 
-/// f that is not defined everywhere.
+/// Cause and remedy if the vector field is not defined everywhere.
 const EDGE: (&str, &str) = (
     "the solution reaches the boundary of the region where the vector field is defined (division by zero, log or \
      root of a negative number)",
@@ -40,7 +41,7 @@ const EDGE: (&str, &str) = (
      defined, or end the range earlier",
 );
 
-/// Branches that cross for one value of a second parameter.
+/// Cause and remedy if branches cross only at one value of a second parameter.
 pub(crate) const UNCROSSED: (&str, &str) = (
     "the second parameter destroys what makes the branches cross: a symmetry, or a solution that exists for all \
      parameter values",
@@ -48,7 +49,7 @@ pub(crate) const UNCROSSED: (&str, &str) = (
      fold replaces the branch point, and continue that fold",
 );
 
-/// Growth of the period that makes an orbit of infinite period likely.
+/// Growth of the period above which an orbit of infinite period is likely.
 const GROWN: f64 = 2.0;
 
 impl Tried {
@@ -57,7 +58,7 @@ impl Tried {
         Tried { steps: 0, longest, shortest, intervals, elsewhere: 0, diverged: 0 }
     }
 
-    /// A step of that length was given up on a mesh of that many intervals.
+    /// Records a rejected step of this length on a mesh with this number of intervals.
     pub fn note(&mut self, step: f64, intervals: usize, why: &Failure) {
         self.steps += 1;
         (self.longest, self.shortest) = (self.longest.max(step), self.shortest.min(step));
@@ -88,13 +89,13 @@ impl Tried {
 }
 
 impl Follow<'_> {
-    /// The ending of a side at `left`, beyond which no step led.
+    /// Ending of a side at `left`, beyond which no step succeeded.
     pub(super) fn short_end(&mut self, left: &Station, tried: &Tried, why: &Failure, past: Past) -> Ending {
         let (cause, cure) = self.cause(left, tried, why, past);
         let said = format!("{}\nlikely cause: {cause}\nwhat to do: {cure}", tried.sentence(why, self.value(left)));
         match why {
             Failure::Mesh(_) => Ending::MeshTooLarge(said),
-            // Whatever the last of the steps failed for.
+            // This applies whatever the reason of the last rejection.
             _ if cause == EDGE.0 => Ending::NotFinite(said),
             _ => Ending::StepTooSmall(said),
         }
@@ -170,8 +171,8 @@ impl Follow<'_> {
         }
     }
 
-    /// Whether the vector field is not finite somewhere along the tangent, within the longest step that was tried, or a
-    /// little farther on in the parameter alone.
+    /// True if the vector field is not finite somewhere along the tangent, within the longest step tried, or slightly
+    /// farther on in the parameter alone.
     fn breaks_off(&mut self, left: &Station, longest: f64) -> bool {
         self.place(left);
         let mut r = vec![0.0; left.u.len()];
@@ -186,7 +187,7 @@ impl Follow<'_> {
         })
     }
 
-    /// The ending of a side of equilibria on which the parameter has come to a stand and the solution goes on changing.
+    /// Ending of a side of equilibria on which the parameter has converged while the solution keeps changing.
     pub(super) fn at_a_stand(&mut self, right: &Station) -> Ending {
         let edge = self.breaks_off(right, self.settings.first_step);
         let said = format!("the parameter converges to {} while the solution keeps changing", Shown(self.value(right)));
@@ -199,7 +200,7 @@ impl Follow<'_> {
         }
     }
 
-    /// The ending of a side along which the solution grows while the parameter comes to a stand, as at a vertical asymptote.
+    /// Ending of a side along which the solution grows while the parameter converges, as at a vertical asymptote.
     pub(super) fn unbounded(&self, left: &Station, right: &Station, past: Past) -> Option<Ending> {
         let home = self.home.map_or(&[][..], |home| &home.ranges);
         let size = |ranges: &[[f64; 2]], i: usize| ranges.get(i).map_or(0.0, |[low, high]| low.abs().max(high.abs()));
@@ -230,7 +231,7 @@ impl Follow<'_> {
     }
 }
 
-/// Growth of a state, against its scale and its size at the start, from which it may be unbounded.
+/// Growth of a state, relative to its scale and its size at the start, above which it may be unbounded.
 const FAR: f64 = 1e6;
-/// Change of the parameter, for a growth by e, below which it stands.
+/// Relative change of the parameter, per growth by a factor of e, below which it has converged.
 const STILL: f64 = 1e-5;

@@ -1,4 +1,4 @@
-//! Where a side ends: at a bound, where it closes, where it meets simpler solutions.
+//! Ends of a side: bounds, closure, and the meeting with simpler solutions.
 
 use super::corrector::{Failure, Station, doubted};
 use super::follow::Follow;
@@ -7,37 +7,38 @@ use super::locate::{Stretch, passing};
 use super::step::Step;
 use crate::diagram::{Cost, Ending, Kind, Mesh, Point, SpecialPoint};
 
-/// Share of the deviation from simpler solutions below which a step is not accepted: it may have landed on them, and it
-/// could not be told on which side of the meeting it is.
+/// Share of the deviation from simpler solutions below which a step is rejected: it may have landed on them, and its
+/// side of the meeting point is uncertain.
 const LITTLE: f64 = 0.25;
-/// Share below which a point close to the meeting counts as beyond it.
+/// Share of the deviation below which a point close to the meeting point counts as beyond it.
 const NOTHING: f64 = 0.05;
-/// Distance along the branch, in tolerances, up to which a point is the start again: next to a fold the parameter places it
-/// less well than it is computed.
+/// Distance along the branch, in tolerances, within which a point is identified with the start. Next to a fold the
+/// parameter fixes the position less accurately than the point is computed.
 const HOME: f64 = 30.0;
-/// Distance from the start, in tolerances, from which on a branch can come back to it.
+/// Distance from the start, in tolerances, beyond which a branch can return to it.
 const AWAY: f64 = 100.0;
-/// Step down to which one that cannot be looked into is tried in halves.
+/// Step above which a failed check for closure makes the step be retried with half its length.
 const DIVISIBLE: f64 = 1e-3;
 
-/// What a run knows of its way back to the start.
+/// Closure detector: state of a run with respect to its start.
 #[derive(Clone, Debug, Default)]
 pub struct Homecoming {
-    /// Whether it has left.
+    /// True once the run has left the start.
     away: bool,
-    /// For every reflection how far it has been from the start as that shows it, and whether it has come nearer to that since.
+    /// Largest distance from the start so far, for every reflection of it, and whether the distance has decreased
+    /// since.
     reached: Vec<(f64, bool)>,
 }
 
-/// The start in one phase and reflection.
+/// A copy of the start, shifted in phase and reflected.
 struct Image {
     u: Vec<f64>,
     tangent: Vec<f64>,
     mesh: Mesh,
 }
 
-/// By how much two points that are one solution may differ: the errors that they state, and as much as a point may miss its mesh's
-/// solution by.
+/// Largest difference between two computed copies of one solution: twice their stated errors, plus the tolerance for
+/// incomplete convergence on a mesh.
 fn doubt(point: &Point, home: &Point, tolerance: f64) -> f64 {
     2.0 * (point.trust.discretisation + home.trust.discretisation) + tolerance
 }
@@ -47,7 +48,7 @@ fn distance(a: &[f64], b: &[f64]) -> f64 {
 }
 
 impl Follow<'_> {
-    /// The bound of a further parameter that this step passes, and the point there.
+    /// Bound of a further parameter that this step passes, with the point there.
     pub(super) fn beyond(&mut self, left: &Station, right: &Station, cost: &mut Cost) -> Option<(f64, Station)> {
         let (index, value, width) = self.settings.bounds.iter().find_map(|(index, [low, high])| {
             let now = *right.point.parameters.get(*index)?;
@@ -88,8 +89,8 @@ impl Follow<'_> {
         passing(self.problem, self.settings, [left, right], value, self.direction, cost)
     }
 
-    /// What was found in the last step before a branch meets simpler solutions, without what cannot be told from the
-    /// meeting itself: there the parameter is stationary and a multiplier is 1 anyway.
+    /// Special points on the last step before a branch meets simpler solutions, without those that cannot be
+    /// distinguished from the meeting point, where the parameter is stationary and a multiplier is 1 in any case.
     pub(super) fn up_to(&self, meeting: f64, found: Vec<Found>, unstable: usize, right: &mut Station) -> Vec<Found> {
         let near = 20.0 * self.settings.tolerance * (self.problem.unit() + meeting.abs());
         let apart = |value: f64| (value - meeting).abs() > near;
@@ -115,7 +116,7 @@ impl Follow<'_> {
         kept
     }
 
-    /// What was found on a step up to an event at which the branch ends, which `right` becomes.
+    /// Truncates the results of a step at an event that ends the branch; `right` becomes that event.
     pub(super) fn up_to_end(
         &self,
         end: Option<Ending>,
@@ -137,10 +138,10 @@ impl Follow<'_> {
         (Some(ending), found)
     }
 
-    /// Ends the step shortly before the point at which the branch meets simpler solutions, if the step passes such a point.
-    /// The point itself is not solved for, because it is a branch point. Its parameter value comes from the simpler solutions if
-    /// they determine it; otherwise it is extrapolated from the deviation from them, which grows like the square root of the
-    /// distance in the parameter. That is accurate enough to recognise the point.
+    /// Ends the step shortly before the point at which the branch meets simpler solutions, if the step passes such a
+    /// point. The point itself is not solved for, because it is a branch point. Its parameter value comes from the
+    /// simpler solutions if they determine it; otherwise it is extrapolated from the deviation from them, which grows
+    /// like the square root of the distance in the parameter. That is accurate enough to recognise the point.
     pub(super) fn collapsed(
         &mut self,
         left: &Station,
@@ -149,7 +150,7 @@ impl Follow<'_> {
     ) -> Result<Option<Step>, Failure> {
         for monitor in self.collapses {
             let values = [monitor.value(&left.point, &left.point), monitor.value(&left.point, &right.point)];
-            // Next to nothing left of the deviation: the step has landed on the simpler solutions themselves.
+            // Almost no deviation is left: the step has landed on the simpler solutions themselves.
             if values[1].abs() < LITTLE * values[0] {
                 return Err(Failure::Singular);
             }
@@ -175,11 +176,13 @@ impl Follow<'_> {
                 }
             }
             let near = near.ok_or(Failure::Singular)?;
-            // A deviation that has turned instead of shrunk, as that of a narrow pulse that has moved, is none that vanishes.
+            // A deviation that has changed direction instead of shrinking, as that of a narrow pulse that has moved,
+            // does not vanish.
             if monitor.value(&near.point, &left.point) < 1.1 * values[0] {
                 continue;
             }
-            // A branch that only passes the simpler solutions closely is followed on, in steps that do not skip the passage.
+            // A branch that only passes close to the simpler solutions is followed further, in steps that do not skip
+            // the passage.
             if !monitor.confirms(&near.point) {
                 return Err(Failure::Singular);
             }
@@ -195,15 +198,15 @@ impl Follow<'_> {
         Ok(None)
     }
 
-    /// The point, ahead of a step that fails, at which the branch meets simpler solutions. It is accepted if the simpler solutions
+    /// Meeting point with simpler solutions ahead of a step that fails. It is accepted if the simpler solutions
     /// determine its parameter value and the deviation from them shrinks like the square root of the distance to it.
     pub(super) fn collapse_ahead(&mut self, before: &Station, here: &Station) -> Option<Ending> {
-        /// Relative deviation from the square-root law that is accepted. Empirical: the law holds to first order only, and two
-        /// neighbouring points near the end are compared.
+        /// Largest accepted relative deviation from the square-root law. Empirical: the law holds to first order only,
+        /// and two neighbouring points near the end are compared.
         const NEARLY: f64 = 0.3;
         self.collapses.iter().find_map(|monitor| {
             let parameter = monitor.meeting(&here.point)?;
-            // Ratio of the deviation at the point before to that here.
+            // Ratio of the deviation at the previous point to that here.
             let larger = monitor.value(&here.point, &before.point);
             let farther = (self.value(before) - parameter) / (self.value(here) - parameter);
             let fits = larger > 1.0 && (farther / (larger * larger) - 1.0).abs() < NEARLY;
@@ -211,8 +214,8 @@ impl Follow<'_> {
         })
     }
 
-    /// Takes note of how far the branch has gone from its start, to `here`: whether so far that it can come back. To be told of every
-    /// point in the order of travel.
+    /// Records the distance of `here` from the start, and whether it is large enough for the branch to return. To be
+    /// called for every point in the order of travel.
     pub fn leaves_home(&mut self, here: &Point) {
         let Some(home) = self.home else { return };
         let own = self.features(home, home, &[]);
@@ -230,13 +233,14 @@ impl Follow<'_> {
         self.homecoming.reached = reached;
     }
 
-    /// The start again, if this step passes it.
+    /// Returns the start if this step passes it.
     ///
-    /// The start is passed where the branch goes through the plane across its tangent there, no farther from it than the errors that
-    /// both state. Where special points lie closer to it than that, they decide where it is ([`super::side`]).
+    /// The start is passed where the branch crosses the hyperplane across its tangent there, no farther from it than
+    /// the stated errors of both. Special points closer to it than that decide its position ([`super::side`]).
     ///
     /// # Errors
-    /// Why the start could not be looked for, where a shorter step may find it: passed unseen, the branch would be followed again.
+    /// Reason for which the check failed, if a shorter step may succeed: if closure were missed, the branch would be
+    /// followed again.
     pub(super) fn closes(
         &mut self,
         left: &Station,
@@ -258,7 +262,7 @@ impl Follow<'_> {
         }
     }
 
-    /// The start where its value of the parameter is met again.
+    /// Closure where the branch reaches the parameter value of the start again.
     fn at_its_parameter(
         &mut self,
         left: &Station,
@@ -284,20 +288,21 @@ impl Follow<'_> {
         Ok(None)
     }
 
-    /// The start where the plane across it is passed: next to a fold two solutions share a value of the parameter, and a
-    /// step round the fold need not pass that value at all.
+    /// Closure where the branch crosses the hyperplane through the start. Next to a fold two solutions share a
+    /// parameter value, and a step round the fold need not reach that value at all.
     fn crosses(&mut self, left: &Station, right: &Station, home: &Point, cost: &mut Cost) -> Option<Station> {
         let tolerance = self.settings.tolerance;
         let own = self.features(home, home, &[]);
         for (k, reflection) in self.settings.reflections.clone().into_iter().enumerate() {
             let [from, to] = [left, right].map(|station| self.features(&station.point, home, &reflection));
-            // A branch that has only gone away from it so far, and does so in this step, turns back in a later one.
+            // A branch that has only moved away from this copy so far, and does so on this step, returns on a later
+            // one.
             let receding =
                 self.homecoming.reached.get(k).is_some_and(|(off, nearer)| !nearer && distance(&to, &own) > *off);
             if receding {
                 continue;
             }
-            // Most steps are elsewhere, which costs nothing to see.
+            // Most steps are elsewhere, which is cheap to detect.
             let near = 1.5 * distance(&from, &to) + HOME * tolerance;
             if distance(&from, &own).min(distance(&to, &own)) > near {
                 continue;
@@ -312,7 +317,7 @@ impl Follow<'_> {
         None
     }
 
-    /// The same for one reflection and one image of the start, as it is seen from `right`.
+    /// Closure for one reflection and one copy of the start, seen from `right`.
     fn crosses_at(
         &mut self,
         left: &Station,
@@ -323,10 +328,10 @@ impl Follow<'_> {
         cost: &mut Cost,
     ) -> Option<Station> {
         let tolerance = self.settings.tolerance;
-        // Where the step ends a little before the plane, the start may be met already.
+        // If the step ends slightly before the hyperplane, the start may already be met.
         let error = doubt(&right.point, home, tolerance);
         let [(from, _), (to, _)] = [left, right].map(|station| self.against(station, image));
-        // A run that was stopped there goes on from the start itself.
+        // (A run that was stopped at the start continues from there.)
         if !(from <= error && to > -error) {
             return None;
         }
@@ -352,7 +357,7 @@ impl Follow<'_> {
             }
         }
         let found = self.cut(left, &stretch, there, cost)?;
-        // In the phase that suits the end of the step the image is shifted in time a little, by more than is asked for here.
+        // In the phase of the end of the step the copy is slightly shifted in time, by more than is permitted here.
         let images = self.images_of_home(&found, home, reflection, 10.0 * HOME * tolerance);
         if !images.iter().any(|image| self.is_home(&found, home, image)) {
             return None;
@@ -368,19 +373,20 @@ impl Follow<'_> {
             Some(found)
         };
         let same = self.on_its_side(&wanted, there, error, &mut at);
-        // Where the plane is still ahead, so may be the special point between here and the start: a hairpin narrower than the errors.
+        // If the hyperplane is still ahead, so may be the special point between here and the start (a hairpin narrower
+        // than the errors).
         same.or((to > 0.0).then_some(found))
     }
 
-    /// The start as it can be seen no farther than `within` from a station.
+    /// Copies of the start no farther than `within` from a station.
     fn images_of_home(&mut self, from: &Station, home: &Point, reflection: &[bool], within: f64) -> Vec<Image> {
         self.place(from);
         let images = self.problem.images(&from.u, home, reflection, within);
         images.into_iter().map(|[u, tangent]| Image { u, tangent, mesh: from.mesh.clone() }).collect()
     }
 
-    /// How far ahead of an image of the start a station lies, along the tangent there in the direction of travel, and how far off across
-    /// it, relative.
+    /// Distance of a station ahead of a copy of the start, along the tangent there in the direction of travel, and
+    /// relative distance across it.
     fn against(&mut self, found: &Station, image: &Image) -> (f64, f64) {
         self.place(found);
         let [u, along] = [&image.u, &image.tangent].map(|v| self.problem.transfer(v, &image.mesh, &found.mesh));
@@ -391,14 +397,15 @@ impl Follow<'_> {
         (ahead, self.problem.relative_size(&off, &found.u))
     }
 
-    /// Whether a station is the start as far as the errors of both tell: no farther off across the branch.
+    /// True if a station is the start within the errors of both, along and across the branch.
     fn is_home(&mut self, found: &Station, home: &Point, image: &Image) -> bool {
         let tolerance = self.settings.tolerance;
         let (ahead, across) = self.against(found, image);
         ahead.abs() < HOME * tolerance && across < doubt(&found.point, home, tolerance)
     }
 
-    /// What has become of the count of unstable multipliers on the way to `right`, where the branch has come back to its start.
+    /// The change in the number of unstable multipliers between the end at `right` and the start, if a closed branch
+    /// has one.
     pub(super) fn changed_on_return(&mut self, right: &Station, position: i64) -> Option<SpecialPoint> {
         let home = self.home?;
         if !self.settings.stability || right.point.unstable == home.unstable {
@@ -411,8 +418,8 @@ impl Follow<'_> {
         Some(special)
     }
 
-    /// Parameter, period and extreme values of a point, each relative to its size at `home`; `seen` is the reflection in which
-    /// it is looked at.
+    /// Parameter, period and extreme values of a point, each relative to its size at `home`; `seen` is the reflection
+    /// applied to it.
     fn features(&self, point: &Point, home: &Point, seen: &[bool]) -> Vec<f64> {
         let value = |p: &Point| p.parameters.get(self.free).copied().unwrap_or(0.0);
         let mut all = vec![value(point) / (self.problem.unit() + value(home).abs())];

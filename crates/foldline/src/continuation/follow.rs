@@ -1,8 +1,8 @@
-//! From one accepted point to the next; why a side ends.
+//! Continuation of one side of a branch, from one accepted point to the next.
 //!
 //! **Idea.** One loop: predict with the tangent and its change, correct, judge the step by the angle between tangents,
-//! clip at the bounds, see whether the branch has come to an end, look for special points in between, emit, choose the
-//! next step.
+//! clip it at the bounds, check whether the branch ends, look for special points in between, emit, choose the next step
+//! size.
 
 use super::Settings;
 use super::allowance::{Allowance, work};
@@ -14,7 +14,7 @@ use super::step::Step;
 use crate::contract::{Monitor, Verdict, ZeroProblem};
 use crate::diagram::{Connection, Cost, Ending, Kind, Point, STANDS, SpecialPoint};
 
-/// What a run emits, in the order of travel.
+/// Output of a run, in the order of travel.
 pub enum Item {
     /// A special point; it lies between the last point and the next.
     Special(SpecialPoint),
@@ -26,62 +26,65 @@ pub enum Item {
 pub struct Follow<'w> {
     /// The curve.
     pub problem: &'w mut dyn ZeroProblem,
-    /// What governs the run.
+    /// Settings of the run.
     pub settings: &'w Settings,
-    /// What to look for.
+    /// Monitors of the special points to look for.
     pub monitors: &'w [Box<dyn Monitor + 'w>],
-    /// Requested values; they affect nothing but where the branch ends.
+    /// Requested values. They affect nothing but the end of the branch.
     pub marks: &'w [Box<dyn Monitor + 'w>],
-    /// Sign changes that end the branch: it has met the branch of simpler solutions that it comes from.
+    /// Monitors whose sign change ends the branch: it has met the branch of simpler solutions from which it bifurcates.
     pub collapses: &'w [Box<dyn Monitor + 'w>],
     /// Returns the orbit of infinite period that the branch approaches, if the cycle at a point shows one.
     pub limit: &'w dyn Fn(&Point) -> Option<Ending>,
-    /// True if the model has a continuous symmetry, so that solutions form families and a further multiplier is 1.
+    /// True if the model has a continuous symmetry, so that solutions form families and a second multiplier is 1.
     pub symmetric: bool,
     /// +1 towards larger positions, -1 towards smaller.
     pub direction: f64,
     /// Index of the continuation parameter among the parameters of a point.
     pub free: usize,
-    /// The point whose return ends the run as closed; `None` where the branch cannot close.
+    /// The point at which the run ends as closed when it returns there; `None` if the branch cannot close.
     pub home: Option<&'w Point>,
-    /// What is known of the way back there; nothing when a run begins.
+    /// Closure detector; empty when a run begins.
     pub homecoming: Homecoming,
-    /// Length of the step that is being inspected: what is significant along it is so on its parts.
+    /// Length of the step under inspection. What is significant along it is significant on its parts.
     pub inspected: f64,
 }
 
-/// Steps shorter than this many tolerances begin and end on the same mesh: two meshes agree to the tolerance only.
+/// Step, in tolerances, below which it begins and ends on the same mesh, because two meshes agree to the tolerance
+/// only.
 pub(super) const SHORT: f64 = 200.0;
 /// Share of the tolerance below which a mesh is not refined on account of short steps.
 const SHARPEST: f64 = 1e-3;
-/// Step down to which a change of stability without explanation is taken for a jump to another branch.
+/// Longest step on which an unexplained change of stability is recorded; on a longer one it is taken for a jump to
+/// another branch.
 const SURE: f64 = 1e-4;
-/// How often a mesh is halved for a change of stability without explanation in a short step …
+/// Number of times a mesh is halved for an unexplained change of stability on a short step …
 const SHARPENED: usize = 2;
-/// … and what that makes of its error, at least.
+/// … and the factor by which its error is then taken to shrink.
 const FINER: f64 = 1.0 / 32.0;
-/// Step down to which a branch point without a symmetry that makes it is taken for two branches that pass each other.
+/// Longest step on which a branch point without a symmetry behind it is accepted; on a longer one it is taken for two
+/// branches that pass each other closely.
 const CROSSING: f64 = 2e-3;
 
-/// Growth of a step over the one before, at most: the prediction is by the cubic through both ends of that.
+/// Largest ratio of a step to the previous one, because the predictor is the cubic through both ends of the latter.
 const GROWTH: f64 = 2.0;
-/// Growth of the period beyond which an orbit of infinite period is looked for. Empirical: it saves the search on ordinary branches and
-/// decides nothing, because the cycle itself must show the equilibria.
+/// Growth of the period beyond which an orbit of infinite period is looked for. Empirical: it saves the search on
+/// ordinary branches and decides nothing, because the cycle itself must show the equilibria.
 const LONG: f64 = 3.0;
-/// Further growth of the period after which the search is repeated. A period grows like the logarithm of the distance to a homoclinic
-/// orbit, so a tenth more is a marked approach; the search costs one pass over the cycle.
+/// Further growth of the period after which the search is repeated. A period grows like the logarithm of the distance
+/// to a homoclinic orbit, so a tenth more is a marked approach; the search costs one pass over the cycle.
 const AGAIN: f64 = 1.1;
-/// Change of the parameter, over so many equilibria, below which it has come to a stand.
+/// Relative change of the parameter over [`PATIENCE`] equilibria below which it has stalled.
 const REST: f64 = 1e-11;
 const PATIENCE: usize = 100;
-/// Share of what is allowed midway of a step that the next one is to reach at most: what is off there, as a share of the step, grows with
-/// its cube.
+/// Share of the permitted deviation from the cubic midway that the next step aims for at most. The deviation, as a
+/// share of the step, grows with the cube of the step.
 const BENT: f64 = 0.8;
-/// Steps given up in turn because no permitted mesh is fine enough, until the side ends for that.
+/// Number of steps from one point rejected because no permitted mesh is fine enough, after which the side ends.
 const COARSE: usize = 6;
 
-/// Follows one side from `start`, which has been emitted already, and of which `previous` is the predecessor on the same
-/// side if there is one. `emitted` counts the points of this side so far.
+/// Follows one side from `start`, which has already been emitted. `previous` is its predecessor on the same side, if
+/// any. `emitted` counts the points of this side so far.
 pub fn follow(
     walk: &mut Follow,
     start: Station,
@@ -130,7 +133,7 @@ pub fn follow(
                 Ok((_, found))
                     if is_unexplained(&found) && sharpened < SHARPENED && walk.is_short(&left.mesh, step) =>
                 {
-                    // What multipliers do closer together than this mesh is accurate it need not show as it is.
+                    // Multipliers that change within the error of this mesh need a finer one.
                     sharpened += 1;
                     cost.rejected += 1;
                     walk.place(&left);
@@ -159,7 +162,8 @@ pub fn follow(
                     let spent = work(cost.factorisations, &left.mesh);
                     let used_up = allowance.is_used_up(spent);
                     if step < walk.settings.min_step || coarse == COARSE || used_up {
-                        // The matrix may be singular at the bound itself: what is left of the way is less than the tolerance.
+                        // The matrix may be singular at the bound itself. The remaining distance is then less than the
+                        // tolerance.
                         let singular = matches!(why, Failure::Singular);
                         let met = walk.at_bound(&left, walk.settings.tolerance).filter(|_| singular);
                         let met = met.or_else(|| {
@@ -186,7 +190,7 @@ pub fn follow(
         let (end, found) = walk.up_to_end(end, found, &mut right);
         let between = between.unwrap_or_else(|| walk.between(&left, &right));
         let (angle, length) = (between.angle, between.along);
-        // A bend that has become sharper will go on so.
+        // A bend that has sharpened is assumed to sharpen further.
         let trend = trail.as_ref().map_or(1.0, |t| angle / (length * t.curvature).max(1e-12)).clamp(1.0, 2.0);
         let factor = walk.settings.target_angle / (trend * angle).max(1e-12);
         let factor = factor.min((BENT / between.bent).cbrt()).clamp(0.3, GROWTH);
@@ -244,7 +248,8 @@ pub fn follow(
         if let (Some(first), Some(now), Some(next)) = (first_period, right.point.solution.free_period(), long)
             && now > next
         {
-            // A saddle-node is solved for; any other orbit of infinite period lies where the parameter converges.
+            // A saddle-node connection is solved for. For any other orbit of infinite period the parameter must have
+            // converged.
             let placed = |limit: &Ending| {
                 matches!(limit, Ending::Connecting { connection: Connection::SaddleNode, .. })
                     || !walk.moves(&left, &right)
@@ -267,7 +272,7 @@ fn is_unexplained(found: &[Found]) -> bool {
 }
 
 impl Follow<'_> {
-    /// The longest step in which something of that kind is believed.
+    /// Longest step on which a special point of this kind is accepted.
     fn believed_at(&self, kind: Kind) -> f64 {
         match kind {
             Kind::Unexplained => SURE,
@@ -276,8 +281,8 @@ impl Follow<'_> {
         }
     }
 
-    /// Excludes a multiplier that is 1 by structure (a family, a symmetry) from the number of unstable ones: its computed side of 1
-    /// is rounding.
+    /// Excludes a multiplier that is 1 for structural reasons (a family, a symmetry) from the number of unstable ones,
+    /// because rounding decides on which side of 1 it is computed.
     pub(super) fn count(&self, station: &mut Station) {
         if self.settings.stability && (self.symmetric || station.point.is_one_of_family()) {
             station.point.unstable = station.point.unstable_besides_neutral();
@@ -289,7 +294,7 @@ impl Follow<'_> {
         self.problem.unit() * station.parameter()
     }
 
-    /// The range as one of the unknown λ.
+    /// The parameter range in terms of the unknown λ.
     pub(super) fn bounds(&self) -> [f64; 2] {
         self.settings.range.map(|bound| bound / self.problem.unit())
     }
@@ -299,7 +304,8 @@ impl Follow<'_> {
         self.problem.anchor(&station.u);
     }
 
-    /// The end at a bound of the range that lies ahead, no farther off than `within`, relative to the scale of the parameter + |bound|.
+    /// Ending at a bound of the range that lies ahead, if it is no farther than `within`, relative to the scale of the
+    /// parameter + |bound|.
     fn at_bound(&self, here: &Station, within: f64) -> Option<Ending> {
         let bound = self.settings.range[usize::from(here.slope() > 0.0)];
         let unit = self.problem.unit();
@@ -307,16 +313,17 @@ impl Follow<'_> {
         (near && bound.is_finite() && here.slope() != 0.0).then_some(Ending::Bound(bound))
     }
 
-    /// True if the parameter still changes with the period: dλ/d ln T, which tends to zero towards an orbit of infinite period,
-    /// exceeds a tenth of the tolerance.
+    /// True if the parameter still changes with the period: dλ/d ln T, which tends to zero towards an orbit of infinite
+    /// period, exceeds a tenth of the tolerance.
     fn moves(&self, left: &Station, right: &Station) -> bool {
         let period = |station: &Station| station.point.solution.free_period().unwrap_or(f64::NAN);
         let (change, here) = ((right.parameter() - left.parameter()).abs(), right.parameter().abs());
         change > 0.1 * self.settings.tolerance * (1.0 + here) * (period(right) / period(left)).ln().abs()
     }
 
-    /// Where steps are short, the curve is so curved that errors of a tolerance would show: the mesh is made for errors that are
-    /// as small a share of the step as they are of a step of usual length.
+    /// Refines the mesh where steps are short. The curve is then so strongly bent that errors of the size of the
+    /// tolerance would show, and the mesh is adapted to errors that are as small a share of the step as on a step of
+    /// ordinary length.
     fn sharpen(&mut self, left: &mut Station, step: f64, cost: &mut Cost) {
         let share = (step / (SHORT * self.settings.tolerance)).clamp(SHARPEST, 1.0);
         if left.mesh.is_empty() || share > 0.5 * left.share {
@@ -332,9 +339,10 @@ impl Follow<'_> {
         }
     }
 
-    /// Moves the working copy of a station to a mesh with room for the next step, where its own has none left. The stored
-    /// point stays as it is. If the step is so short that the change of mesh would show in it, the copy is a solution there, on
-    /// its own side of special points; false where there is none, and the copy stays on its mesh.
+    /// Moves the working copy of a station to a finer mesh if its own leaves no room for the next step. The stored
+    /// point does not change. If the step is so short that the change of mesh would show, the copy is solved for on the
+    /// new mesh, on the same side of special points. Returns false if there is no such solution, and the copy stays on
+    /// its mesh.
     fn refresh(&mut self, left: &mut Station, step: f64, cost: &mut Cost) -> bool {
         let Some(better) = left.roomier.take() else { return true };
         if self.is_short(&left.mesh, step) {
@@ -350,7 +358,7 @@ impl Follow<'_> {
         true
     }
 
-    /// How a point next to `left` is refined.
+    /// Settings for the refinement of a point next to `left`.
     pub(super) fn care(&self, left: &Station, step: f64) -> Care {
         Care { share: left.share, close: self.settings.closeness(&left.mesh, step), trusted: false }
     }

@@ -1,10 +1,10 @@
-//! What lies between two accepted points.
+//! Special points between two accepted points.
 //!
-//! **Idea.** Every monitor whose sign differs at the two ends is located. The step is cut in two, and each half looked at
-//! in turn, while more than one special point is found in it, while the number of unstable multipliers changes by something
-//! that the special point found does not explain, or while a monitor bends so much that it may have touched zero and come
-//! back. A change of stability that remains unexplained is recorded as such, never passed over. Marks take no part in this search:
-//! they are located last, on the resulting pieces ([`super::marks`]).
+//! **Idea.** Every monitor whose sign differs at the two ends is located. The step is halved recursively while it
+//! contains more than one special point, while the number of unstable multipliers changes by something that the special
+//! point does not explain, or while a monitor bends so much that it may have touched zero and returned. A change of
+//! stability that remains unexplained is recorded as such. Marks take no part in this search: they are located last, on
+//! the resulting pieces ([`super::marks`]).
 
 use super::allowance::{ALLOWANCE, work};
 use super::corrector::{Failure, Station, doubted, refine};
@@ -16,11 +16,11 @@ use crate::diagram::{Cost, Kind, Point, STANDS, SpecialPoint};
 use num_complex::Complex64;
 use std::f64::consts::PI;
 
-/// What was found on the way, in the order of travel.
+/// Result of the inspection of a step, in the order of travel.
 pub enum Found {
     /// A special point.
     Special(Box<SpecialPoint>),
-    /// A point that was inserted, with the step to what follows it.
+    /// An inserted point, with the step to the next point.
     Inserted(Box<Station>, f64),
 }
 
@@ -35,28 +35,28 @@ enum FoldTest {
     None,
 }
 
-/// Halvings of one step before what is left is recorded as it is.
+/// Maximum number of halvings of one step, after which the rest is recorded as unexplained.
 const DEEPEST: usize = 14;
 
-/// Distance below which two places of a curve on one mesh cannot be told apart for rounding.
+/// Distance on one mesh below which rounding prevents telling two points of a curve apart.
 const CLOSEST: f64 = 1e-11;
 
-/// Halvings after which the ends of a stretch show what lies between them.
+/// Number of halvings after which an event must show at the ends of an interval.
 const CLOSE: usize = 6;
 
-/// Share of a step within which a curve turns because of what lies there.
+/// Distance from a codimension-two point, as a share of the step, within which a turn of the curve is attributed to it.
 const TOGETHER: f64 = 1e-3;
 
-/// Asymmetry of a located pitchfork: the square root of the accuracy to which it is located.
+/// Largest asymmetry of a located pitchfork: the square root of the accuracy of its location.
 const SYMMETRIC: f64 = 3e-3;
 
-/// Share of a step within which a monitor that goes on as before must change sign to be looked for.
+/// Share of a step within which a linearly extrapolated monitor must change sign to be suspected of touching zero.
 const WELL: f64 = 0.75;
 
-/// Values of all monitors at the left end of a stretch and before it, for the test on bending.
+/// Values of all monitors at the point before an interval, for the test for tangency.
 #[derive(Clone, Debug)]
 pub struct History {
-    /// Distance back from the left end.
+    /// Distance of that point from the left end.
     pub distance: f64,
     /// Values there, one per monitor.
     pub values: Vec<f64>,
@@ -76,14 +76,15 @@ impl Follow<'_> {
 
     /// Selects the test for folds and branch points between two stations.
     ///
-    /// On a vertical branch (a family at a single parameter value) a second multiplier is 1 within its error, and neither its side of 1
-    /// nor the sign of the slope is significant; equilibria have an eigenvalue 0 there. Near an orbit of infinite period the matrix is
-    /// as ill-conditioned as the multipliers are far apart, so rounding reaches further: a change of the parameter below the error of
-    /// both points is not significant either, as long as no multiplier comes near 1. In a canard explosion the slope is lost in
-    /// errors and rounding while a multiplier passes 1. That is a fold, and the spectrum alone locates it.
+    /// On a vertical branch (a family at a single parameter value) a second multiplier is 1 within its error, and
+    /// neither its side of 1 nor the sign of the slope is significant; equilibria have an eigenvalue 0 there. Near an
+    /// orbit of infinite period the matrix is as ill-conditioned as the multipliers are far apart, so rounding reaches
+    /// further: a change of the parameter below the error of both points is not significant either, as long as no
+    /// multiplier comes near 1. In a canard explosion the slope is lost in errors and rounding while a multiplier
+    /// passes 1. That is a fold, and the spectrum alone locates it.
     ///
-    /// A step that enters or leaves a vertical branch, for instance at the amplitude at which a stop is first touched, has one end in
-    /// the family. `stands` is true if the preceding step lay in it.
+    /// A step that enters or leaves a vertical branch, for instance at the amplitude at which a stop is first touched,
+    /// has one end in the family. `stands` is true if the preceding step lay in it.
     fn fold_test(&self, [left, right]: [&Station; 2], length: f64, stands: bool) -> FoldTest {
         let far = |station: &Station| station.point.free_spectrum().iter().all(|z| z.norm().ln().abs() > CRITICAL);
         let certain = left.point.unstable == right.point.unstable && far(left) && far(right);
@@ -99,7 +100,7 @@ impl Follow<'_> {
         if slope < STANDS.max(unseen) { FoldTest::Spectrum } else { FoldTest::Slope }
     }
 
-    /// Everything special between two stations.
+    /// Finds all special points between two stations.
     pub fn inspect(
         &mut self,
         left: &Station,
@@ -108,7 +109,7 @@ impl Follow<'_> {
         depth: usize,
         cost: &mut Cost,
     ) -> Vec<Found> {
-        // What lies closer together than two meshes agree is told apart on one of them.
+        // Special points closer together than the agreement of two meshes are distinguished on one of them.
         let mut stretch = Stretch::new(self.problem, left, right, self.direction);
         let short = self.is_short(&left.mesh, stretch.length);
         let carried = if short && self.settings.stability && right.mesh != left.mesh {
@@ -138,7 +139,7 @@ impl Follow<'_> {
             let without = match kind {
                 Kind::Fold => standing,
                 Kind::BranchPoint => fold_test != FoldTest::Slope && !conservative,
-                // The product of a pair is 1 everywhere.
+                // Reciprocal pairs of multipliers have product 1 everywhere.
                 Kind::Torus => conservative,
                 _ => false,
             };
@@ -160,8 +161,8 @@ impl Follow<'_> {
             let singular = matches!(kind, Kind::Fold | Kind::BranchPoint) || kind.has_codimension_two();
             if found.is_err() && singular {
                 found = straddle(self.problem, self.settings, &stretch, monitor, values, cost);
-                // A singular matrix at which the parameter turns and stability stays is a pitchfork, or else the step has
-                // cut across to another branch.
+                // A singular matrix at which the parameter turns and stability does not change is a pitchfork;
+                // otherwise the step has cut across to another branch.
                 if kind == Kind::Fold
                     && left.point.unstable == right.point.unstable
                     && self.settings.reflections.len() < 2
@@ -174,13 +175,13 @@ impl Follow<'_> {
             {
                 head_along(self.problem, &stretch, found);
             }
-            // This branch is the one that leaves another at a pitchfork, and goes on as its own mirror image. (Where something is held,
-            // a symmetric solution may as well just turn.)
+            // This branch leaves another one at a pitchfork and continues as its own mirror image. (Along a curve of
+            // bifurcation points a symmetric solution may simply turn.)
             if kind == Kind::Fold
                 && self.settings.stability
                 && left.point.unstable == right.point.unstable
                 && found.as_ref().is_ok_and(|found| {
-                    // With reflections it is these that tell; a fold next to a branch point looks like a vertex from afar.
+                    // With reflections, symmetry decides; a fold next to a branch point looks like a vertex from afar.
                     self.is_mirrored([left, right], &found.station.point)
                         || self.settings.reflections.len() < 2 && self.is_vertex(&stretch, found.distance, cost)
                 })
@@ -193,20 +194,20 @@ impl Follow<'_> {
                     others.push(monitor.others_unstable(&located[located.len() - 1].2.station.point));
                 }
                 Ok(_) => {}
-                // So close by there would be something to see of an event of this kind; without it there is none, as where
-                // two real multipliers have the product 1.
+                // At this distance an event of this kind would show at the ends. If it does not, there is none, as when
+                // two real multipliers have product 1.
                 Err(_) if depth >= CLOSE && jump > 0 && !self.either_confirms(k, left, right) => {
                     leaps |= kind == Kind::PeriodDoubling
                 }
                 Err(_) => lost = true,
             }
         }
-        // Where both ∏(μ + 1) and ∏(μ - 1) change sign and neither vanishes, a large multiplier has changed its sign, which none does: the step
-        // has cut across to another branch, with as many unstable ones.
+        // If both ∏(μ + 1) and ∏(μ - 1) change sign and neither vanishes, a large multiplier has changed sign. That is
+        // impossible along a branch: the step has cut across to another one with as many unstable multipliers.
         let above = |point: &Point| point.free_spectrum().iter().filter(|z| z.im == 0.0 && z.re > 1.0).count();
         let turns = located.iter().any(|(kind, ..)| matches!(kind, Kind::Fold | Kind::BranchPoint));
         lost |= leaps && !turns && above(&left.point) % 2 != above(&right.point) % 2;
-        // At what takes two parameters to meet the curve may turn as well, which is no event of its own.
+        // The curve may also turn at a codimension-two point, which is not a separate event.
         let double: Vec<f64> =
             located.iter().filter(|(kind, ..)| kind.has_codimension_two()).map(|(.., found)| found.distance).collect();
         let apart = TOGETHER * stretch.length.abs();
@@ -216,7 +217,8 @@ impl Follow<'_> {
         located.sort_by(|a, b| a.2.distance.total_cmp(&b.2.distance));
         let jumps: Vec<usize> = located.iter().map(|(_, jump, _)| *jump).collect();
         let change = left.point.unstable.abs_diff(right.point.unstable);
-        // What is located alone must fit in with the rest of its own spectrum; else something lies on the way to it, or beyond.
+        // A single located event must agree with the rest of its spectrum; otherwise there is another event on one side
+        // of it.
         let counts = [left.point.unstable, right.point.unstable];
         let misfit = match (&located[..], &others[..]) {
             ([(_, jump, found)], [Some(others)]) if *jump > 0 && self.settings.stability => {
@@ -228,11 +230,11 @@ impl Follow<'_> {
         let accounted = !self.settings.stability
             || explains(&jumps, left.point.unstable as i64, right.point.unstable as i64)
             || (standing && jumps.is_empty() && change == 1);
-        // A change of sign that could not be located is not passed over either, not even next to one that could.
+        // A sign change that could not be located is not ignored either, not even next to one that could.
         let closer = jumps.is_empty() || depth < CLOSE;
         let explained = accounted && !(lost && closer && self.settings.stability);
-        // Along a curve monitors may jump as well. But where the count changes with one that could not be located, the two ends have
-        // meshes that do not agree about where: closer together they do.
+        // Along bifurcation curves monitors may jump as well. But if the count changes along with a monitor that could
+        // not be located, the meshes of the two ends disagree about the position; closer together they agree.
         let misplaced = !self.settings.stability && lost && jumps.is_empty() && change > 0;
         let touches = || {
             history.is_some_and(|h| {
@@ -240,7 +242,7 @@ impl Follow<'_> {
             })
         };
         let suspicious = depth < 3 && (touches() || (!standing && stretch.may_turn_twice()));
-        // Nothing is known of how monitors change on a first step; at equilibria it costs next to nothing to look.
+        // On a first step nothing is known about the rates of change of monitors; at equilibria an extra look is cheap.
         let mut seen = None;
         let unknown = history.is_none() || left.mesh.is_empty() || may_double_unseen(left, right, stretch.length);
         if depth == 0 && jumps.is_empty() && unknown {
@@ -256,10 +258,10 @@ impl Follow<'_> {
                 [a, .., b] => 0.5 * (a.2.distance + b.2.distance),
                 _ => misfit.or(seen).unwrap_or(0.5 * stretch.length),
             };
-            // Neighbouring special points that cannot be told apart any more stay together.
+            // Neighbouring special points that can no longer be told apart stay together.
             let together = if short { CLOSEST } else { 1e-7 * (1.0 + stretch.length) };
             let apart = located.len() < 2 || located[located.len() - 1].2.distance - located[0].2.distance > together;
-            // Exactly there Newton's method may fail.
+            // Newton's method may fail exactly at the cut.
             let places = [cut, 0.5 * cut, 0.5 * (cut + stretch.length)];
             let middle = places
                 .into_iter()
@@ -322,12 +324,12 @@ impl Follow<'_> {
         out
     }
 
-    /// True if the number of unstable eigenvalues or multipliers is the same on both sides of a turning point. A branch born at a
-    /// pitchfork turns there while an eigenvalue touches zero and returns, so the turning point is a branch point rather than a fold,
-    /// at which the number changes.
+    /// True if the number of unstable eigenvalues or multipliers is the same on both sides of a turning point. A branch
+    /// born at a pitchfork turns there while an eigenvalue touches zero and returns, so the turning point is a branch
+    /// point rather than a fold, at which the number changes.
     fn is_vertex(&mut self, stretch: &Stretch, there: f64, cost: &mut Cost) -> bool {
-        /// Distance of the comparison points, as a share of the step. Empirical: far enough for the eigenvalue to exceed its error,
-        /// near enough to exclude other events.
+        /// Distance of the comparison points, as a share of the step. Empirical: far enough for the eigenvalue to
+        /// exceed its error, near enough to exclude other events.
         const BESIDE: f64 = 0.05;
         let room = there.abs().min((stretch.length - there).abs());
         let beside = (BESIDE * stretch.length.abs()).min(0.5 * room);
@@ -335,9 +337,10 @@ impl Follow<'_> {
         count(there - beside).is_some_and(|before| count(there + beside) == Some(before))
     }
 
-    /// Simultaneous events, too close together to be separated, for instance in different parts of a symmetric or decoupled system.
-    /// Between two points that coincide within their errors, the eigenvalues or multipliers of each kind that have changed stability
-    /// are counted. A branch point counts once however many eigenvalues pass: their number is the dimension of the kernel.
+    /// Finds simultaneous events, too close together to be separated, for instance in different parts of a symmetric or
+    /// decoupled system. Between two points that coincide within their errors, the eigenvalues or multipliers of each
+    /// kind that have changed stability are counted. A branch point counts once however many eigenvalues pass: their
+    /// number is the dimension of the kernel.
     fn simultaneous(
         &mut self,
         stretch: &Stretch,
@@ -397,9 +400,9 @@ impl Follow<'_> {
         Some(out)
     }
 
-    /// A fold of symmetric solutions that leaves the count as it is has a pitchfork beside it, too close to be told apart: next to an orbit of
-    /// infinite period, the multiplier m² of the whole cycle follows from m of half of it, which passes 1 at the fold and -1 at the pitchfork, and
-    /// between them is small.
+    /// A fold of symmetric solutions that leaves the count unchanged, and the pitchfork beside it, too close to be
+    /// separated. Next to an orbit of infinite period the multiplier m² of the whole cycle follows from the multiplier
+    /// m of half of it. m passes 1 at the fold and -1 at the pitchfork, and is small in between.
     fn fold_with_pitchfork(&mut self, there: &Station, error: f64) -> Vec<Found> {
         let count = there.point.unstable as i64;
         let between = if count > 0 { count - 1 } else { 1 };
@@ -407,14 +410,14 @@ impl Follow<'_> {
         kinds.map(|(kind, a, b)| Found::Special(self.special(kind, there.clone(), a, b, error))).into()
     }
 
-    /// True if a reflection of the model maps the solution to itself, at another phase perhaps.
+    /// True if a reflection of the model maps the solution to itself, possibly with a phase shift.
     fn is_symmetric(&self, at: &Point) -> bool {
         let mut images = self.settings.reflections.iter().filter(|r| r.contains(&true));
         images.any(|r| at.difference(at, self.settings.measure(), r) < SYMMETRIC)
     }
 
-    /// Brackets the change in the number of unstable eigenvalues or multipliers on a stretch by bisection, as tightly as points can be
-    /// distinguished.
+    /// Brackets the change in the number of unstable eigenvalues or multipliers on an interval by bisection, as tightly
+    /// as points can be distinguished.
     fn narrowed(&mut self, stretch: &Stretch, right: &Station, cost: &mut Cost) -> [Station; 2] {
         let (mut ends, mut places) = ([stretch.left.clone(), right.clone()], [0.0, stretch.length]);
         let before = stretch.left.point.unstable;
@@ -427,8 +430,9 @@ impl Follow<'_> {
         ends
     }
 
-    /// True if a branch of asymmetric solutions passes through a symmetric one at `at` and continues as its own mirror image: the
-    /// ranges of `at` are symmetric and those of both ends are less so. Along a branch of symmetric solutions all three are symmetric.
+    /// True if a branch of asymmetric solutions passes through a symmetric one at `at` and continues as its own mirror
+    /// image: the ranges of `at` are symmetric and those of both ends are less so. Along a branch of symmetric
+    /// solutions all three are symmetric.
     fn is_mirrored(&self, ends: [&Station; 2], at: &Point) -> bool {
         let images = || self.settings.reflections.iter().filter(|r| r.contains(&true));
         let asymmetry = |point: &Point| {
@@ -443,15 +447,16 @@ impl Follow<'_> {
         self.monitors[monitor].confirms(&left.point) || self.monitors[monitor].confirms(&right.point)
     }
 
-    /// Relative change of parameter and states for one unit of length along the branch.
+    /// Relative change of parameter and states per unit length along the branch.
     fn rate_beside(&mut self, at: &Station) -> f64 {
         self.place(at);
         let rate = at.slope().abs() / (1.0 + at.parameter().abs());
         rate.max(self.problem.relative_size(&at.tangent, &at.u))
     }
 
-    /// Displacement along the branch of a special point on a cycle along which f_x jumps: the error of the critical multiplier over the rate at
-    /// which that passes the unit circle. On smooth fields two meshes tell, and folds are where the branch turns, whatever multipliers say.
+    /// Displacement along the branch of a special point on a cycle with discontinuous f_x: the error of the critical
+    /// multiplier over the rate at which it crosses the unit circle. On smooth fields the comparison of two meshes
+    /// provides it, and folds lie where the branch turns, whatever the multipliers.
     fn displacement(&self, stretch: &Stretch, right: &Station, special: &SpecialPoint) -> f64 {
         let critical = matches!(special.kind, Kind::PeriodDoubling | Kind::Torus | Kind::BranchPoint);
         if !critical {
@@ -486,7 +491,7 @@ impl Follow<'_> {
             }
         }
         self.count(&mut station);
-        // Without smoothness a parameter is no more accurate than the profile, and two meshes may agree by chance.
+        // On non-smooth fields a parameter is no more accurate than the profile, and two meshes may agree by chance.
         let least =
             if self.problem.is_switched() && kind != Kind::Mark { station.point.trust.discretisation } else { 0.0 };
         let error = error.max(least);
@@ -503,9 +508,10 @@ impl Follow<'_> {
         })
     }
 
-    /// A place in the stretch at which some monitor has not the sign that it has at the left end. `first` says that nothing is
-    /// known of the way before: there equilibria, where that costs nothing, are looked at more closely, towards both ends; with cycles the
-    /// middle says how monitors change, and that is enough where none may have touched zero.
+    /// Distance at which some monitor has a different sign than at the left end, if one is found. `first` is true if
+    /// nothing is known of the preceding step: equilibria, which are cheap, are then sampled more densely towards both
+    /// ends. For cycles the midpoint shows the rates of change of the monitors, which suffices if none may have touched
+    /// zero.
     fn seen_between(
         &mut self,
         stretch: &Stretch,
@@ -545,7 +551,7 @@ impl Follow<'_> {
         None
     }
 
-    /// A full station at distance s of the stretch.
+    /// Computes a full station at distance s of the interval.
     pub(super) fn cut(&mut self, left: &Station, stretch: &Stretch, s: f64, cost: &mut Cost) -> Option<Station> {
         let u = stretch.corrected(self.problem, self.settings, s, cost).ok()?;
         if self.settings.stability && self.is_short(&left.mesh, stretch.length) {
@@ -561,9 +567,9 @@ impl Follow<'_> {
         Some(found)
     }
 
-    /// True if the step may have gone over to another branch at a pitchfork: on the way there an unstable multiplier went towards 1 so fast that it
-    /// would be well beyond it at the end of the step, and there it is no closer. On the branch itself it touches 1 where the branch turns
-    /// back as its own image, on the one that it meets there it grows again.
+    /// True if the step may have jumped to another branch at a pitchfork: an unstable multiplier approached 1 so fast
+    /// that it would be well beyond it at the end of the step, yet it is no closer there. On the branch itself it
+    /// touches 1 where the branch turns into its own mirror image; on the other branch it grows again.
     pub(super) fn may_jump(&self, [left, right]: [&Station; 2], history: Option<&History>, length: f64) -> bool {
         let (Some(history), true) = (history, self.settings.stability) else { return false };
         let above = |spectrum: &[Complex64]| above_critical(spectrum, !left.mesh.is_empty());
@@ -572,8 +578,8 @@ impl Follow<'_> {
         now + WELL * length * (now - before) / history.distance < 0.0 && then > WELL * now
     }
 
-    /// Whether some monitor may have passed zero between the last two of three values and come back: the parabola through them comes
-    /// close, or the line through the first two goes on to the other side well before the last.
+    /// True if some monitor may have crossed zero and returned between the last two of three values: the parabola
+    /// through them comes close to zero, or the line through the first two changes sign well before the last.
     fn may_touch(&self, history: &History, left: &[f64], right: &[f64], length: f64) -> bool {
         (0..left.len()).any(|k| {
             let (a, b, c) = (history.values[k], left[k], right[k]);
@@ -595,15 +601,15 @@ impl Follow<'_> {
 
 /// Logarithm of the smallest real multiplier above 1 (the smallest real eigenvalue above 0).
 fn above_critical(spectrum: &[Complex64], cycle: bool) -> Option<f64> {
-    /// The trivial multiplier is closer.
+    /// Excludes the trivial multiplier, which is closer to 1.
     const LEAST: f64 = 1e-4;
     let real = spectrum.iter().filter(|z| z.im == 0.0).map(|z| z.re);
     let distances = real.filter(|x| *x > 0.0).map(|x| if cycle { x.ln() } else { x });
     distances.filter(|d| *d > if cycle { LEAST } else { 0.0 }).min_by(f64::total_cmp)
 }
 
-/// Whether a pair of multipliers may have met on the negative real axis, passed -1 there and come back: the pair is about as far
-/// from the axis before as after, and has moved fast enough to have been there.
+/// True if a pair of multipliers may have met on the negative real axis, passed -1 and returned: it is about as far
+/// from the axis after the step as before it, and has moved fast enough to have been there.
 fn may_double(history: &History, left: &Station, right: &Station, length: f64) -> bool {
     const FAST: f64 = 1.5;
     const RING: f64 = 1.0;
@@ -617,15 +623,16 @@ fn may_double(history: &History, left: &Station, right: &Station, length: f64) -
     }
 }
 
-/// Angle from the negative real axis of the pair of multipliers that is closest to it, among those with the logarithm of their modulus
-/// within `ring`: close enough to the unit circle to pass -1 once they are real.
+/// Angle from the negative real axis of the nearest pair of multipliers whose modulus has a logarithm within `ring`,
+/// and which could therefore pass -1 once they are real.
 fn from_negative_axis(spectrum: &[Complex64], ring: f64) -> Option<f64> {
     let pairs = spectrum.iter().filter(|z| z.im > 0.0 && z.norm().ln().abs() < ring);
     pairs.map(|z| PI - z.arg()).min_by(f64::total_cmp)
 }
 
-/// Whether a pair of multipliers stays so close to the negative real axis over a long step that it may have met there, passed -1 and
-/// come back. Its angle is the root of something smooth: what both ends show of that says little of the middle.
+/// True if a pair of multipliers stays so close to the negative real axis over a long step that it may have met there,
+/// passed -1 and returned. Its angle is the square root of a smooth function, so that the ends say little about the
+/// middle.
 fn may_double_unseen(left: &Station, right: &Station, length: f64) -> bool {
     !left.mesh.is_empty() && stays_near(&left.point.spectrum, &right.point.spectrum, length)
 }
@@ -638,10 +645,10 @@ fn stays_near(now: &[Complex64], then: &[Complex64], length: f64) -> bool {
     length.abs() > LONG && angles.is_some_and(|(now, then)| now + then < NEAR)
 }
 
-/// Change of the parameter along a step of length at most 1, in tolerances, that the errors of both ends can produce. Empirical: a share
-/// of the tolerance, which bounds the error of a point.
+/// Change of the parameter, in tolerances, along a step of length at most 1 that the errors of both ends can produce.
+/// Empirical: a share of the tolerance, which bounds the error of a point.
 const UNSEEN: f64 = 0.2;
-/// Modulus of the logarithm of a multiplier beyond which one step does not bring it to 1: a factor of e³ = 20, a factor of safety.
+/// Modulus of the logarithm of a multiplier beyond which one step does not bring it to 1: a safety factor of e³ = 20.
 const CRITICAL: f64 = 3.0;
 
 /// True if jumps of these sizes, each with either sign, lead from one count to the other.
@@ -672,7 +679,7 @@ mod tests {
         assert!(explains(&[1, 2], 0, 3) && !explains(&[1, 2], 0, 1) && explains(&[1, 1], 1, 1));
     }
     #[test]
-    fn a_pair_that_stays_next_to_minus_one_over_a_long_step_is_looked_into() {
+    fn a_pair_close_to_minus_one_over_a_long_step_is_examined() {
         let pair = |modulus: f64, angle: f64| {
             let one = Complex64::from_polar(modulus, PI - angle);
             vec![Complex64::new(1.0, 0.0), one, one.conj(), Complex64::new(0.3, 0.0)]

@@ -1,8 +1,8 @@
-//! Whether a step may be accepted.
+//! Step acceptance.
 //!
-//! **Idea.** A corrected point can lie on another branch. It does not continue this one if the tangents turn too far, if the
-//! prediction was far off, if the chord points elsewhere than both tangents, or, where branches crowd, if the same step
-//! backwards leads elsewhere.
+//! **Idea.** A corrected point can lie on another branch. It does not continue this one if the tangent turns too far,
+//! if the prediction was far off, if the chord deviates too much from both tangents, or, next to other branches, if the
+//! same step taken backwards does not return.
 
 use super::corrector::{Failure, Plane, Station, correct, correct_within, parameter_row};
 use super::follow::Follow;
@@ -10,33 +10,33 @@ use super::locate::Stretch;
 use super::step::{Aim, Between};
 use crate::diagram::Cost;
 
-/// Margin from a singular matrix below which a step must also lead back to where it came from.
+/// Distance to singularity below which a step must also lead back to its start.
 const CROWDED: f64 = 0.02;
-/// How many tolerances off a step may lead back; more is another branch.
+/// Largest miss, in tolerances, of a step that leads back; a larger one indicates another branch.
 const BACK: f64 = 100.0;
-/// Size of what tells the arms of a cusp apart below which it is rounding.
+/// Magnitude of the cusp test function below which its sign is rounding.
 const UNSIGNED: f64 = 1e-7;
-/// How far off a prediction may be, as a share of the step …
+/// Largest distance of the point from its prediction, as a share of the step …
 const MISS: f64 = 0.3;
-/// … and by the first Newton update, which is not the last word.
+/// … and largest first Newton update, which may be revised by later ones.
 const FAR: f64 = 0.6;
-/// How far off the cubic between both ends of a step the curve may be midway, as a share of the step.
+/// Largest distance of the curve midway from the cubic between both ends of a step, as a share of the step …
 const OFF: f64 = 0.01;
-/// … and how far by an estimate.
+/// … and the limit for an estimate of it.
 const NEARLY_OFF: f64 = 0.02;
-/// The same where branches crowd: the arms of a loop of the branch can lie that close to each other.
+/// Limit for the estimate next to other branches: the two sides of a loop of the branch can be that close.
 const NEARLY_OFF_CROWDED: f64 = 0.003;
-/// Newton update, relative, that says that a matrix is singular.
+/// Relative Newton update that indicates a singular matrix.
 const THROWN: f64 = 10.0;
-/// Angles of the chord with both tangents: their sum may exceed the angle between the tangents by this factor …
+/// Factor by which the angles of the chord with both tangents, added, may exceed the angle between the tangents …
 const CHORD_FACTOR: f64 = 1.5;
-/// … and this much. On an arc the two are equal; on a jump to another branch the chord points elsewhere.
+/// … and the slack on top. On an arc the two are equal; on a jump to another branch the chord has another direction.
 const CHORD_SLACK: f64 = 0.08;
 
 impl Follow<'_> {
-    /// Corrects `guess`, on the mesh of `left`, in what is aimed at, and gives up as soon as it is clear that the result does
-    /// not continue the branch; what [`Follow::continues`] asks is looked at here with a little slack, before mesh and
-    /// stability are seen to. Returns the row of the plane too.
+    /// Corrects `guess` towards `aim`, on the mesh of `left`, and gives up as soon as the result clearly does not
+    /// continue the branch. The criteria of [`Follow::continues`] are applied with a little slack, before mesh and
+    /// stability are computed. Also returns the row of the hyperplane.
     pub(super) fn corrected(
         &mut self,
         left: &Station,
@@ -63,8 +63,8 @@ impl Follow<'_> {
         Ok((u, plane.row))
     }
 
-    /// Whether `right`, predicted as `guess`, continues the branch at `left`, and neither turns too far nor lies on another
-    /// one.
+    /// Checks that `right`, predicted as `guess`, continues the branch at `left`: it neither turns too far nor lies on
+    /// another branch.
     pub(super) fn continues(&mut self, left: &Station, right: &Station, guess: &[f64]) -> Result<Between, Failure> {
         self.place(left);
         let landed = self.problem.transfer(&right.u, &right.mesh, &left.mesh);
@@ -76,7 +76,7 @@ impl Follow<'_> {
         let size = |v: &[f64]| self.problem.dot(v, v).sqrt();
         let against = |t: &[f64]| (self.problem.dot(t, &chord) / (size(t) * size(&chord))).clamp(-1.0, 1.0).acos();
         let (miss, bent) = (size(&miss), against(&left.tangent) + against(&tangent));
-        // A point far away need not be far off in proportion.
+        // The shorter of the two distances counts, so that a point far away does not pass for close in proportion.
         let ahead: Vec<f64> = guess.iter().zip(&left.u).map(|(a, b)| a - b).collect();
         let step = self.problem.dot(&left.tangent, &ahead).min(length).max(f64::MIN_POSITIVE);
         if angle > self.settings.max_angle || miss > MISS * step || bent > CHORD_FACTOR * angle + CHORD_SLACK {
@@ -85,9 +85,9 @@ impl Follow<'_> {
         Ok(between)
     }
 
-    /// Whether the curve keeps to the cubic between both ends of a step. A wiggle shorter than the step shows at neither end;
-    /// looking midway is cheap for equilibria, and where there is no step before that says how the curve bends. `right` takes note of what
-    /// is there.
+    /// Checks that the curve follows the cubic between both ends of a step. A wiggle shorter than the step shows at
+    /// neither end. The midpoint is cheap for equilibria, and needed where no previous step shows the bend of the
+    /// curve. It is stored in `right`.
     pub(super) fn is_smooth(&mut self, left: &Station, right: &mut Station, cost: &mut Cost) -> Result<(), Failure> {
         let stretch = Stretch::new(self.problem, left, right, self.direction);
         let mut looked = |share: f64| -> Result<f64, Failure> {
@@ -98,7 +98,7 @@ impl Follow<'_> {
             right.middle = Some((middle, u));
             Ok(self.problem.dot(&miss, &miss).sqrt() / stretch.length.abs())
         };
-        // A step that doubles or halves may have a branch point right in its middle, where Newton's method fails.
+        // On a step that is doubled or halved a branch point may lie exactly midway, where Newton's method fails.
         let thrown = |why: &Failure| match why {
             Failure::Singular => true,
             Failure::NoConvergence(sizes) => sizes.last().is_some_and(|size| *size > THROWN),
@@ -108,7 +108,7 @@ impl Follow<'_> {
             Err(why) if thrown(&why) => looked(0.43)?.max(looked(0.57)?),
             other => other?,
         };
-        // Meshes agree to the tolerance only.
+        // Two meshes agree to the tolerance only.
         let allowed = OFF + self.settings.tolerance / stretch.length.abs();
         if miss > allowed {
             return Err(Failure::Bent { miss: miss / allowed, allowed });
@@ -116,8 +116,9 @@ impl Follow<'_> {
         Ok(())
     }
 
-    /// The same for a tenth of the cost: one Newton step midway with the matrix of `right`, for which the problem was factorised last
-    /// and on whose mesh it is. Returns how far off the cubic the curve is, as a share of the step, and how far it may be.
+    /// Checks the deviation from the cubic at a tenth of the cost of [`Follow::is_smooth`], by one Newton step midway
+    /// with the matrix of `right`, where and on whose mesh the problem was factorised last. Returns the deviation as a
+    /// share of the step, and its limit.
     pub(super) fn is_nearly_smooth(&mut self, left: &Station, right: &Station) -> Result<[f64; 2], Failure> {
         let u = self.problem.transfer(&left.u, &left.mesh, &right.mesh);
         let tangent = self.problem.transfer(&left.tangent, &left.mesh, &right.mesh);
@@ -142,7 +143,7 @@ impl Follow<'_> {
         Ok([miss, allowed])
     }
 
-    /// How far the parameter midway is off the cubic, by Newton's method there.
+    /// Deviation of the parameter midway from the cubic, by Newton's method there.
     pub(super) fn midway(&mut self, left: &Station, right: &Station, cost: &mut Cost) -> Result<f64, Failure> {
         let stretch = Stretch::new(self.problem, left, right, self.direction);
         let middle = 0.5 * stretch.length;
@@ -151,9 +152,9 @@ impl Follow<'_> {
         Ok(u[u.len() - 1] - guess[u.len() - 1])
     }
 
-    /// Whether a step along a curve of folds ends on the arm of a cusp on which it began or, where it turned back in the plane of the
-    /// parameters, on the other. However close the arms are, on them the cycle or equilibrium turns to opposite sides. All is on the mesh
-    /// of `left`, where the problem is anchored.
+    /// True if a step along a curve of folds stays on its side of a cusp or, if its direction in the parameter plane
+    /// reverses, moves to the other side. However close the two sides are, the cusp test function has opposite signs on
+    /// them. All vectors are on the mesh of `left`, which is the reference of the problem.
     fn stays_on_arm(&mut self, left: &Station, u: &[f64], tangent: &[f64]) -> bool {
         let Some(before) = self.problem.arm(&left.u) else { return true };
         let Some(after) = self.problem.arm(u) else { return true };
@@ -163,15 +164,15 @@ impl Follow<'_> {
         before.abs().min(after.abs()) < UNSIGNED || (before * after > 0.0) == forth
     }
 
-    /// Where another branch may be close, or along a curve the other arm of a cusp: whether the same step backwards from `right` leads
-    /// to `left` again.
+    /// Checks that the same step backwards from `right` returns to `left`. Required along bifurcation curves, where the
+    /// other side of a cusp may be close, and elsewhere if another branch may be.
     pub(super) fn leads_back(&mut self, left: &Station, right: &Station, cost: &mut Cost) -> Result<(), Failure> {
         let held = !self.settings.stability;
         if !held && self.problem.margin(&left.point).min(self.problem.margin(&right.point)) > CROWDED {
             return Ok(());
         }
-        // Mesh and phase are those of the left end: on the mesh of the right one it need not be a solution, and in its phase
-        // it would be shifted in time.
+        // Mesh and phase are those of the left end: on the mesh of the right end it need not be a solution, and in its
+        // phase it would be shifted in time.
         self.place(left);
         let from = self.problem.transfer(&right.u, &right.mesh, &left.mesh);
         let tangent = self.problem.transfer(&right.tangent, &right.mesh, &left.mesh);

@@ -1,7 +1,7 @@
-//! The zero of a monitor along the curve.
+//! Location of a zero of a monitor along the curve.
 //!
-//! **Idea.** Between two accepted points the curve is parametrised by the distance s along the tangent of the first; a
-//! bracketing method finds the zero in s, each trial point being a full solution of the problem. The zero is then found
+//! **Idea.** Between two accepted points the curve is parametrised by the distance s along the tangent at the first. A
+//! bracketing method finds the zero in s; each trial point is a full solution of the problem. The zero is then located
 //! again on a finer mesh, and the difference is the stated error.
 //!
 //! **Source.** chandrupatla1997 (bracketing with inverse quadratic interpolation and bisection).
@@ -11,17 +11,18 @@ use super::{Failure, ROUNDING, Settings};
 use crate::contract::{Examination, Monitor, Sight, ZeroProblem};
 use crate::diagram::{Cost, Kind, Point};
 
-/// Share of the larger value at the ends that a monitor keeps at a change of sign if it jumps there instead of vanishing.
+/// Share of the larger end value that a monitor must retain at a sign change for it to count as a jump rather than a
+/// zero.
 const JUMP: f64 = 0.05;
 
-/// Share of the value of a monitor that a secant step leaves at most where its slope is right.
+/// Largest share of a monitor's value that a secant step with the right slope leaves.
 const LEADS: f64 = 0.2;
 
-/// Cosine of the angle by which a tangent may differ from the one expected next to where branches cross: two of them are reached there, or
-/// what rounding makes of both, a bend from one into the other.
+/// Cosine of the largest angle between a tangent and the one expected next to a crossing of branches. Newton's method
+/// reaches both branches there, or, through rounding, a bend from one into the other.
 const STRAIGHT: f64 = 0.95;
 
-/// Distance along the curve below which a zero is not looked for more closely, for rounding.
+/// Distance along the curve below which rounding prevents a closer location of a zero.
 const FINEST: f64 = 1e-12;
 
 /// A located zero.
@@ -29,31 +30,31 @@ const FINEST: f64 = 1e-12;
 pub struct Located {
     /// Distance from the left station along its tangent.
     pub distance: f64,
-    /// The point, on the finer mesh where there is one.
+    /// The point, on the finer mesh if there is one.
     pub station: Station,
     /// Bound on its error; see [`crate::diagram::SpecialPoint::error`].
     pub error: f64,
 }
 
-/// The stretch of curve between two stations, in the metric and on the mesh of the left one.
+/// The interval of the curve between two stations, in the metric and on the mesh of the left one.
 pub struct Stretch<'s> {
-    /// Where it begins.
+    /// Left end.
     pub left: &'s Station,
     /// Unknowns of the right station, carried to the mesh of the left.
     right: Vec<f64>,
     slope: Vec<f64>,
     /// Distance of the right station along the tangent of the left.
     pub length: f64,
-    /// As [`Station::midway`] of the right station.
+    /// [`Station::midway`] of the right station.
     midway: f64,
-    /// As [`Station::middle`] of the right station.
+    /// [`Station::middle`] of the right station.
     middle: Option<(f64, Vec<f64>)>,
     /// +1 towards larger positions, -1 towards smaller.
     pub(super) direction: f64,
 }
 
 impl<'s> Stretch<'s> {
-    /// The stretch from `left` to `right`; puts the problem on the mesh of `left`.
+    /// The interval from `left` to `right`; moves the problem to the mesh of `left`.
     pub fn new(problem: &mut dyn ZeroProblem, left: &'s Station, right: &Station, direction: f64) -> Stretch<'s> {
         problem.set_mesh(&left.mesh);
         problem.anchor(&left.u);
@@ -67,7 +68,7 @@ impl<'s> Stretch<'s> {
         Stretch { left, right: u, slope, length, midway, middle, direction }
     }
 
-    /// The point at distance s on the mesh of the left station.
+    /// Computes the point at distance s on the mesh of the left station.
     ///
     /// # Errors
     /// See [`Failure`].
@@ -81,7 +82,7 @@ impl<'s> Stretch<'s> {
         self.seen_at(Sight::Everything, problem, settings, s, cost)
     }
 
-    /// The same as far as it is looked at.
+    /// Computes the point at distance s to the given level of detail.
     ///
     /// # Errors
     /// See [`Failure`].
@@ -97,7 +98,7 @@ impl<'s> Stretch<'s> {
         Ok(seen(sight, problem, u, tangent, self.direction))
     }
 
-    /// Unknowns and tangent there.
+    /// Unknowns and tangent at distance s.
     fn arrived(
         &self,
         problem: &mut dyn ZeroProblem,
@@ -142,7 +143,7 @@ impl<'s> Stretch<'s> {
         u
     }
 
-    /// The distance at which the cubic between the two stations turns back in the continuation parameter.
+    /// Distance at which the cubic between the two stations turns in the continuation parameter.
     fn turning(&self) -> f64 {
         let last = self.left.u.len() - 1;
         let rise = |x: f64| {
@@ -157,7 +158,7 @@ impl<'s> Stretch<'s> {
         0.5 * (low + high)
     }
 
-    /// The distance at which the cubic between the two stations has that value of the continuation parameter.
+    /// Distance at which the cubic between the two stations reaches the given value of the continuation parameter.
     fn distance_to(&self, value: f64) -> f64 {
         let last = self.left.u.len() - 1;
         let (mut low, mut high) = (0.0, self.length);
@@ -173,15 +174,15 @@ impl<'s> Stretch<'s> {
         (0..self.right.len()).map(|i| self.hermite_component(s, i)).collect()
     }
 
-    /// Whether the curve between the two stations turns back in the continuation parameter and then turns once more, or
-    /// nearly does, as far as ends and middle show: where two folds lie close together on a long step, the ends show nothing of them.
+    /// True if the curve between the two stations turns twice in the continuation parameter, or nearly does, judging by
+    /// its ends and midpoint. Two close folds on a long step may not show at the ends alone.
     pub(super) fn may_turn_twice(&self) -> bool {
         let i = self.left.u.len() - 1;
         let rise = self.right[i] - self.left.u[i];
         turns_twice(rise, [self.length * self.left.tangent[i], self.length * self.slope[i]], self.midway)
     }
 
-    /// The direction of that cubic.
+    /// Derivative of the cubic between the stations.
     fn heading(&self, s: f64) -> Vec<f64> {
         let (l, x) = (self.length, s / self.length);
         let own = |i: usize| {
@@ -191,7 +192,7 @@ impl<'s> Stretch<'s> {
         (0..self.right.len()).map(own).collect()
     }
 
-    /// Cubic through both ends with both tangents.
+    /// Cubic Hermite interpolant of both ends.
     fn hermite_component(&self, s: f64, i: usize) -> f64 {
         let (l, x) = (self.length, s / self.length);
         let (a, b) = (self.left.u[i], self.right[i]);
@@ -201,21 +202,23 @@ impl<'s> Stretch<'s> {
     }
 }
 
-/// Whether the polynomial on [0, 1] that rises by `rise`, has these slopes at its ends, and lies by `off` beside the cubic in the
-/// middle, has, or nearly has, a maximum and a minimum inside.
+/// True if a polynomial on [0, 1] has, or nearly has, both a maximum and a minimum inside. It rises by `rise`, has the
+/// slopes `p` and `q` at its ends, and differs by `off` from the cubic at the midpoint.
 fn turns_twice(rise: f64, [p, q]: [f64; 2], off: f64) -> bool {
     const PLACES: usize = 64;
-    // Slope p + 2 b x + 3 c x² of the cubic, and that of 16 off x² (1 - x)²; the least in between is compared with the ends.
+    // Slope p + 2 b x + 3 c x² of the cubic plus that of 16 off x² (1 - x)²; its minimum is compared with the end
+    // values.
     let (b, c) = (3.0 * rise - 2.0 * p - q, p + q - 2.0 * rise);
     let slope = |x: f64| p + x * (2.0 * b + 3.0 * c * x) + 32.0 * off * x * (1.0 - x) * (1.0 - 2.0 * x);
     let places = (1..PLACES).map(|k| k as f64 / PLACES as f64);
     p * q > 0.0 && places.map(|x| slope(x) * p.signum()).fold(f64::INFINITY, f64::min) < 0.1 * p.abs().min(q.abs())
 }
 
-/// The point between two stations at which the continuation parameter has the given value, which lies between theirs.
+/// Computes the point between two stations at which the continuation parameter has the given value, which lies between
+/// theirs.
 ///
-/// Next to a fold fixing the parameter is a bad way to find a point. So points across the tangent of the left station come
-/// first, closer and closer to the value; only the last correction fixes the parameter.
+/// Fixing the parameter is ill-conditioned next to a fold. The search therefore uses hyperplanes across the tangent of
+/// the left station, closer and closer to the value; only the last correction fixes the parameter.
 ///
 /// # Errors
 /// See [`Failure`].
@@ -260,19 +263,19 @@ pub fn passing(
     u[last] = value;
     let plane = Plane { row: parameter_row(u.len()), base: u.clone(), distance: 0.0 };
     let mut found = settle(problem, settings, plane, u, direction, cost)?;
-    // Travel goes on the way it came, also where the parameter row has turned the tangent round.
+    // The direction of travel is kept even if the parameter row has reversed the tangent.
     found.head(slope);
     Ok(found)
 }
 
-/// Whether a tangent is that of another branch than the one that is followed.
+/// True if a tangent is not that of the branch being followed.
 fn turned(problem: &dyn ZeroProblem, tangent: &[f64], expected: &[f64]) -> bool {
     let [along, own, other] = [[tangent, expected], [tangent; 2], [expected; 2]].map(|[a, b]| problem.dot(a, b));
     along.abs() < STRAIGHT * (own * other).sqrt()
 }
 
-/// Gives a branch point the direction in which the stretch passes it. The matrix there is singular, so the tangent that it yields may be that of
-/// the branch that crosses, or any between the two.
+/// Sets the tangent at a branch point to the direction in which the interval passes it. The matrix is singular there,
+/// so the computed tangent may be that of the crossing branch, or anything in between.
 pub(super) fn head_along(problem: &mut dyn ZeroProblem, stretch: &Stretch, found: &mut Located) {
     let station = &mut found.station;
     let heading = problem.transfer(&stretch.heading(found.distance), &stretch.left.mesh, &station.mesh);
@@ -285,10 +288,11 @@ pub(super) fn head_along(problem: &mut dyn ZeroProblem, stretch: &Stretch, found
     }
 }
 
-/// Finds the zero of `monitor` in `stretch`, whose ends have values of opposite sign.
+/// Locates the zero of `monitor` in `stretch`, at whose ends its values have opposite signs.
 ///
 /// # Errors
-/// See [`Failure`]; next to a branch point also [`Failure::Singular`] where Newton's method leaves the branch for the one that crosses it.
+/// See [`Failure`]. Next to a branch point, also [`Failure::Singular`] if Newton's method leaves the branch for the one
+/// that crosses it.
 pub fn locate(
     problem: &mut dyn ZeroProblem,
     settings: &Settings,
@@ -300,7 +304,7 @@ pub fn locate(
     locate_within(problem, settings, stretch, [0.0, stretch.length], monitor, values, cost)
 }
 
-/// Locates a zero between two distances along the stretch at which the monitor has the given values; see [`locate`].
+/// Locates a zero between two distances in the interval, at which the monitor has the given values; see [`locate`].
 ///
 /// # Errors
 /// See [`locate`].
@@ -328,10 +332,10 @@ pub(super) fn locate_within(
         _ => values[0] / (values[0] - values[1]),
     };
     let (mut distance, mut coarse, rise) = chandrupatla(&mut evaluate, ends, values, first, [resolution, 0.5 * JUMP])?;
-    // A change of sign without a zero: the two ends lie on different branches.
+    // A sign change without a zero means that the two ends lie on different branches.
     let smallest = monitor.value(reference, &coarse.point).abs();
     let largest = values[0].abs().max(values[1].abs());
-    // (Only the sign of values that underflow is known.)
+    // (Of values that underflow only the sign is known.)
     if smallest > JUMP * largest && largest > f64::MIN_POSITIVE {
         return Err(Failure::Unexplained);
     }
@@ -345,14 +349,15 @@ pub(super) fn locate_within(
     if !monitor.possible(&coarse.point) {
         return Ok(Located { distance, station: coarse, error: floor });
     }
-    // First a mesh that resolves this place, then a finer one; if the two disagree by more than the tolerance, the finer one is the starting
-    // point for another round, with every interval halved.
+    // First a mesh that resolves this point, then a finer one. If the two disagree by more than the tolerance, another
+    // round starts from the finer one, with every interval halved.
     let mut known: Option<(Station, f64)> = None;
     let mut settled = false;
     for round in 0..4 {
         for _ in 0..4 {
             let better = coarse.better(problem, tolerance);
-            // The trials ended a little off the zero. Compared with the finer mesh, that would be taken for an error of this one.
+            // The bracketing stopped slightly off the zero. Compared with the finer mesh, that would count as an error
+            // of this one.
             if better.is_none() && (settled || coarse.mesh.is_empty()) {
                 break;
             }
@@ -371,7 +376,7 @@ pub(super) fn locate_within(
             }
         }
         problem.set_mesh(&coarse.mesh);
-        // Of multipliers that meet on a curve the root of the error is seen.
+        // If multipliers coalesce along a curve, the square root of the error is seen.
         let denser = round == 0 && !monitor.kind().has_codimension_two();
         let Some(finer) = (if denser { problem.denser_mesh() } else { problem.finer_mesh() }) else {
             let station = whole(problem, coarse, stretch.direction);
@@ -419,11 +424,11 @@ fn secant_zero(
     (distance, found): (f64, Station),
     cost: &mut Cost,
 ) -> (f64, Station) {
-    /// Most iterations. The secant method gains a factor of 1.6 in digits with each, so fewer than ten are needed; the rest is a
-    /// margin.
+    /// Maximum number of iterations. The secant method gains a factor of 1.6 in digits with each, so fewer than ten are
+    /// needed; the rest is a margin.
     const ROUNDS: usize = 12;
-    /// Distance of the first secant, as a share of the stretch: large enough for the difference of the values to exceed rounding
-    /// (1e-16), small enough for the slope to be that at the zero.
+    /// Distance of the first secant, as a share of the interval: large enough for the difference of the values to
+    /// exceed rounding (1e-16), small enough for the slope to be that at the zero.
     const APART: f64 = 1e-6;
     let near = found.point.clone();
     let own = vanishing(monitor, stretch, &near, &near);
@@ -437,7 +442,7 @@ fn secant_zero(
         if better {
             best = (b, value, there);
         }
-        // The first trial yields the slope; the values then decrease until they are rounding.
+        // The first trial yields the slope. The values then decrease until they reach rounding.
         let inside = (0.0..=1.0).contains(&(next / stretch.length));
         if !inside || (round > 0 && !better) {
             break;
@@ -447,9 +452,10 @@ fn secant_zero(
     (best.0, best.2)
 }
 
-/// Relative error of a converged solution by rounding: one more Newton update plus the machine precision, times a factor of safety.
+/// Relative rounding error of a converged solution: one more Newton update plus the machine precision, times a safety
+/// factor.
 fn solution_error(problem: &mut dyn ZeroProblem, found: &Station) -> Option<f64> {
-    /// A factor of safety: a single update samples the rounding error once.
+    /// Safety factor: a single update samples the rounding error once.
     const SAFE: f64 = 10.0;
     let (mut r, mut du) = (vec![0.0; found.u.len()], vec![0.0; found.u.len()]);
     problem.anchor(&found.u);
@@ -462,8 +468,8 @@ fn solution_error(problem: &mut dyn ZeroProblem, found: &Station) -> Option<f64>
     Some(SAFE * (problem.relative_size(&du, &found.u) + f64::EPSILON)).filter(|error| error.is_finite())
 }
 
-/// Relative error, in parameter and states, of the zero of a monitor by rounding. So close to the zero the vanishing factor is a
-/// parabola to rounding, and the residual of a fitted parabola measures the noise.
+/// Relative rounding error, in parameter and states, of the zero of a monitor. So close to the zero the vanishing
+/// factor is a parabola to rounding, and the residual of a fitted parabola measures the noise.
 fn noise(
     problem: &mut dyn ZeroProblem,
     settings: &Settings,
@@ -496,8 +502,9 @@ fn noise(
     if error.is_finite() { error } else { 0.0 }
 }
 
-/// Largest difference of the parameter and of the extremes of the states, relative to scale + |value|, of the period, relative to that,
-/// and of the extremes of outputs, relative to 1 + |value|. `gap` and `parameter` are the difference and the value of the unknown λ.
+/// Largest relative difference between two points: of the parameter and the extremes of the states, relative to scale +
+/// |value|, of the period, and of the extremes of outputs, relative to 1 + |value|. `gap` and `parameter` are the
+/// difference and the value of the unknown λ.
 pub(super) fn discrepancy(settings: &Settings, a: &Point, b: &Point, gap: f64, parameter: f64) -> f64 {
     let mut largest = gap.abs() / (1.0 + parameter.abs());
     if let (Some(x), Some(y)) = (a.solution.period(), b.solution.period()) {
@@ -511,19 +518,19 @@ pub(super) fn discrepancy(settings: &Settings, a: &Point, b: &Point, gap: f64, p
 }
 
 impl Station {
-    /// Whether it was examined.
+    /// True if the station was fully examined.
     fn is_whole(&self) -> bool {
         !self.point.ranges.is_empty()
     }
 
-    /// A mesh on which this point would meet the tolerance, if its own does not. Belongs right after the station was made,
-    /// while its factorisation is the last one.
+    /// A mesh on which this point would meet the tolerance, if its own does not. To be called right after the station
+    /// was computed, while its factorisation is the last one.
     fn better(&self, problem: &mut dyn ZeroProblem, tolerance: f64) -> Option<crate::diagram::Mesh> {
         problem.better_mesh(&self.u, tolerance)
     }
 }
 
-/// The station at `u`, for which the problem was factorised last, as far as it is looked at.
+/// Station at `u`, where the problem was factorised last, to the given level of detail.
 fn seen(sight: Sight, problem: &mut dyn ZeroProblem, u: Vec<f64>, tangent: Vec<f64>, direction: f64) -> Station {
     let examination = match sight {
         Sight::Everything => return examined(problem, u, tangent, direction),
@@ -535,12 +542,12 @@ fn seen(sight: Sight, problem: &mut dyn ZeroProblem, u: Vec<f64>, tangent: Vec<f
     Station::new(point, u, tangent, problem.mesh())
 }
 
-/// The whole station, where only a part of it was [`seen`]; the problem was factorised there last.
+/// Completes a station that was only partly examined; the problem must have been factorised there last.
 fn completed(problem: &mut dyn ZeroProblem, found: Station, direction: f64) -> Station {
     if found.is_whole() { found } else { examined(problem, found.u, found.tangent, direction) }
 }
 
-/// The same where the problem may have been factorised elsewhere since: the last trial need not have been the best one.
+/// Completes a station like [`completed`], but factorises again: the last trial need not have been the best one.
 fn whole(problem: &mut dyn ZeroProblem, found: Station, direction: f64) -> Station {
     if found.is_whole() {
         return found;
@@ -550,8 +557,8 @@ fn whole(problem: &mut dyn ZeroProblem, found: Station, direction: f64) -> Stati
     examined(problem, found.u, found.tangent, direction)
 }
 
-/// The zero again on a finer mesh, or on its own one more closely, by the secant method from the coarse one; `slope` is that of the
-/// monitor, if it is known already.
+/// Locates the zero again by the secant method, from the coarse one, on a finer mesh or more closely on its own.
+/// `slope` is that of the monitor, if known.
 fn relocate(
     problem: &mut dyn ZeroProblem,
     settings: &Settings,
@@ -574,12 +581,12 @@ fn relocate(
         let found = seen(monitor.reads(), problem, u, tangent, stretch.direction);
         Ok((value(&found), found))
     };
-    // Along the curve the zero may be as far off as two meshes agree, which can be more than the stretch.
+    // Two meshes may place the zero this far apart along the curve, which can be more than the interval.
     let reach = stretch.length.abs().max(settings.tolerance);
-    // So far below the tolerance that the error of the iteration does not show, and on a short stretch so little of it that
-    // the monitor has no doubt.
+    // So far below the tolerance that iteration errors are negligible, and on a short interval so small a share of it
+    // that the monitor is unambiguous.
     let mut enough = (1e-2 * settings.tolerance).min(1e-3 * stretch.length.abs());
-    // Of two values closer together than this the difference is noise.
+    // The difference of two values closer together than this is noise.
     let mut apart = (100.0 * settings.tolerance).min(1e-2 * stretch.length.abs());
     let (mut a, (mut ga, mut found)) = match finer {
         None => (0.0, (value(coarse), coarse.clone())),
@@ -592,17 +599,17 @@ fn relocate(
         Some(slope) if (ga / slope).abs() < reach => -ga / slope,
         _ => 1e-2 * reach,
     };
-    // The closest known place with the other sign: a monitor that bends sharply throws secant steps off, and past such a
-    // place they are replaced by halves.
+    // The closest known point with the other sign. If the monitor bends sharply, secant steps may overshoot this point
+    // and are replaced by bisection.
     let mut other: Option<f64> = None;
-    // Where multipliers change fast along the curve, this close is not close enough to see what they do.
+    // If multipliers change fast along the curve, this may not be close enough to classify them.
     let unclear = |found: &Station, enough: f64| {
         enough > FINEST && monitor.jump() > 0 && monitor.possible(&found.point) && !monitor.confirms(&found.point)
     };
     for round in 0..40 {
         if step.abs() < enough || !step.is_finite() {
             if !step.is_finite() || !unclear(&found, enough) {
-                // What was not even moved was not factorised here.
+                // A station that was never moved was not factorised here.
                 let done = if round == 0 && finer.is_none() { whole } else { completed };
                 return Ok((done(problem, found, stretch.direction), step.abs()));
             }
@@ -612,7 +619,7 @@ fn relocate(
         match other {
             Some(o) if (b - a) * (b - o) >= 0.0 => b = 0.5 * (a + o),
             None if b.abs() > reach || round > 7 => {
-                // Nothing found yet: outwards on both sides in turn, farther every time.
+                // No bracket yet: search outwards on both sides alternately, farther each time.
                 let sign = if round % 2 == 0 { 1.0 } else { -1.0 };
                 b = sign * 1e-3 * reach * f64::from(1 << (round / 2).min(9));
             }
@@ -620,7 +627,7 @@ fn relocate(
         }
         let from = found.u.iter().zip(&found.tangent).map(|(u, t)| u + (b - a) * t).collect();
         let (gb, next) = at(problem, from, settings.newton_tolerance().min(0.1 * enough).max(ROUNDING))?;
-        // A slope that does not lead on is not the slope here.
+        // A slope that does not reduce the value is not the slope here.
         let leads = gb.abs() < LEADS * ga.abs() || (b - a).abs() < 100.0 * settings.newton_tolerance();
         let rise = match *slope {
             Some(slope) if (b - a).abs() < apart && leads => slope,
@@ -642,9 +649,10 @@ fn relocate(
     Err(Failure::NoConvergence(vec![step.abs()]))
 }
 
-/// Bracketing root finder, with its first trial at the share `first` of the interval; returns the place, what was found
-/// there, and the slope of the function. It ends when the zero is closer than `resolution` of the interval by the secant
-/// and the value below `small` of the larger one at the ends, or when the bracket is a tenth of that.
+/// Bracketing root finder with its first trial at the share `first` of the interval. Returns the root, the result of
+/// the evaluation there, and the slope of the function. It ends when the zero is, by the secant, closer than the share
+/// `resolution` of the interval and the value is below the share `small` of the larger end value, or when the bracket
+/// is a tenth of that resolution.
 fn chandrupatla<T>(
     evaluate: &mut dyn FnMut(f64) -> Result<(f64, T), Failure>,
     [mut a, mut b]: [f64; 2],
@@ -688,7 +696,7 @@ fn chandrupatla<T>(
         };
         let margin = 0.1 * resolved * width / (b - a).abs();
         t = if t.is_finite() && margin < 0.5 { t.clamp(margin, 1.0 - margin) } else { 0.5 };
-        // The remaining value is rounding of the values at the ends.
+        // The remaining value is the rounding of the end values.
         if fx.abs() < 1e-14 * largest {
             break;
         }
@@ -701,15 +709,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_cubic_that_turns_back_and_on_again_is_seen_from_its_ends() {
-        // x³ - a x on [-1, 1]: slopes 3 - a at both ends, rise 2 - 2 a; extrema at ± (a / 3)^½. On an interval of length 2.
+    fn a_cubic_with_two_extrema_is_recognised_from_its_ends() {
+        // x³ - a x on [-1, 1] has slopes 3 - a at both ends, rise 2 - 2 a and extrema at ±(a / 3)^½; slopes double on
+        // [0, 1].
         let seen = |a: f64| turns_twice(2.0 - 2.0 * a, [2.0 * (3.0 - a); 2], 0.0);
         assert!(seen(0.5) && seen(0.01), "turns twice");
         assert!(seen(-0.1) && !seen(-1.0), "nearly does; does not");
-        // The other way round, and a cubic with a single turn between its ends.
+        // The mirror image, and a cubic with a single extremum between its ends.
         assert!(turns_twice(-1.0, [-5.0; 2], 0.0) && !turns_twice(1.0, [2.0, -1.0], 0.0));
         assert!(!turns_twice(1.0, [1.0; 2], 0.0));
-        // The middle shows what the ends do not: it lies a third of the rise off the straight line.
+        // The midpoint reveals what the ends do not: it lies a third of the rise off the straight line.
         assert!(turns_twice(1.0, [1.0; 2], 0.33) && !turns_twice(1.0, [1.0; 2], 0.01));
     }
 

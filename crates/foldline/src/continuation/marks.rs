@@ -1,11 +1,13 @@
 //! Marks: points at which a quantity has a requested value.
 //!
-//! **Idea.** A mark is a request for output and must not change what is found on the branch. Marks are therefore located on the
-//! pieces into which the search for special points has cut a step, and no step is cut for them. Special points divide a piece:
-//! between two of them the parameter is monotonic, and a sign change of quantity minus value is a mark. The parabola through the
-//! last three points reveals a quantity that reaches its value and returns within one piece.
+//! **Idea.** A mark is a request for output and must not change what is found on the branch. Marks are therefore
+//! located on the pieces into which the search for special points has cut a step, and no step is cut for them. Special
+//! points divide a piece: between two of them the parameter is monotonic, and a sign change of quantity minus value is
+//! a mark. The parabola through the last three points reveals a quantity that reaches its value and returns within one
+//! piece.
 //!
-//! **Fails when** a quantity passes its value twice within one piece and neither a special point nor the parabola reveals it.
+//! **Fails when** a quantity passes its value twice within one piece and neither a special point nor the parabola
+//! reveals it.
 
 use super::corrector::Station;
 use super::follow::Follow;
@@ -14,11 +16,12 @@ use super::locate::{Located, Stretch, discrepancy, locate_within};
 use crate::contract::{Monitor, Sight};
 use crate::diagram::{Cost, Point};
 
-/// Most bisections of a bracket in which Newton's method fails; 12 of them shorten it by a factor of 4000. Empirical: failures occur
-/// next to singular points, a small part of a step.
+/// Maximum number of bisections of a bracket in which Newton's method fails; 12 of them shorten it by a factor of 4000.
+/// Empirical: failures occur next to singular points, a small part of a step.
 const HALVINGS: usize = 12;
-/// Remaining value after all bisections, as a share of the larger value at the ends of the bracket, above which the quantity jumps across the
-/// requested value. A continuous quantity would be left with 2⁻¹², so the threshold is a factor of safety of 200.
+/// Remaining value after all bisections, as a share of the larger value at the ends of the bracket, above which the
+/// quantity jumps across the requested value. A continuous quantity would be left with 2⁻¹², so the threshold has a
+/// safety factor of 200.
 const JUMPS: f64 = 0.05;
 
 impl Follow<'_> {
@@ -27,8 +30,8 @@ impl Follow<'_> {
         self.marks.iter().map(|mark| mark.value(&station.point, &station.point)).collect()
     }
 
-    /// All marks on an accepted piece that ends at `right`, in the order of travel. `special` holds the special points on it with
-    /// their distances.
+    /// All marks on an accepted piece that ends at `right`, in the order of travel. `special` holds the special points
+    /// on it with their distances.
     pub(super) fn marks_on(
         &mut self,
         stretch: &Stretch,
@@ -67,8 +70,8 @@ impl Follow<'_> {
         found
     }
 
-    /// The mark between two distances with values of opposite sign; `None` if the quantity jumps across the requested value. The
-    /// bracket is bisected while Newton's method fails.
+    /// The mark between two distances with values of opposite sign; `None` if the quantity jumps across the requested
+    /// value. The bracket is bisected while Newton's method fails.
     fn mark_between(
         &mut self,
         stretch: &Stretch,
@@ -111,11 +114,12 @@ fn differ(a: f64, b: f64) -> bool {
     (a > 0.0) != (b > 0.0)
 }
 
-/// Distance at which a value with the same sign at both ends of a piece may have the other sign: the extremum of the parabola through
-/// the previous value and those at the ends, or the middle if there is no previous value. `None` if the parabola stays clear of zero.
+/// Distance at which a value with the same sign at both ends of a piece may have the other sign: the extremum of the
+/// parabola through the previous value and those at the ends, or the middle if there is no previous value. `None` if
+/// the parabola stays clear of zero.
 fn turning(before: Option<(f64, &[f64])>, k: usize, [first, last]: [f64; 2], length: f64) -> Option<f64> {
-    /// Extremum of the parabola, as a share of the value at the beginning, below which the piece is examined. A factor of safety for
-    /// the error of the parabola.
+    /// Extremum of the parabola, as a share of the value at the beginning, below which the piece is examined. A safety
+    /// factor for the error of the parabola.
     const NEAR: f64 = 0.1;
     if first * last <= 0.0 || !(first * last).is_finite() {
         return None;
@@ -135,7 +139,7 @@ mod tests {
 
     #[test]
     fn a_parabola_through_three_values_shows_where_a_quantity_turns() {
-        // (s - 0.6)² - c on [0, 1], known at -0.5 as well.
+        // (s - 0.6)² - c on [0, 1], also known at -0.5.
         let seen = |c: f64| {
             let value = |s: f64| (s - 0.6f64).powi(2) - c;
             turning(Some((0.5, &[value(-0.5)])), 0, [value(0.0), value(1.0)], 1.0)

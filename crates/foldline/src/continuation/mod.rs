@@ -1,21 +1,21 @@
-//! How a curve is walked.
+//! Pseudo-arclength continuation.
 //!
-//! **Idea.** Predict along the tangent, correct in the hyperplane across it, accept, look back at the step for special
-//! points, choose the next step. Nothing here knows what an equilibrium or a cycle is.
+//! **Idea.** Predict along the tangent, correct in the hyperplane across it, accept, search the step for special
+//! points, choose the next step size. Nothing here depends on whether the solutions are equilibria or cycles.
 //!
 //! | step | file |
 //! |---|---|
 //! | Newton's method in a hyperplane; tangent | [`corrector`] |
 //! | from one accepted point to the next | [`mod@follow`] |
-//! | one step: predicted, corrected, compared with what it comes from | `step` |
-//! | whether a step may be accepted | `judge` |
-//! | why a side ends | `ends` |
+//! | one step: prediction, correction, comparison with the previous point | `step` |
+//! | acceptance of a step | `judge` |
+//! | reasons for which a side ends | `ends` |
 //! | limit on the work of a side | `allowance` |
-//! | what lies between two accepted points | [`inspect`] |
+//! | special points between two accepted points | [`inspect`] |
 //! | requested values along the way | `marks` |
-//! | on which side of it a point is | `side` |
+//! | side of nearby special points on which a point lies | `side` |
 //! | zero of a monitor along the curve | [`locate`] |
-//! | the same where branches cross | [`straddle`] |
+//! | zero of a monitor where branches cross | [`straddle`] |
 //!
 //! **Source.** keller1977 (pseudo-arclength); allgower1990 (step length by angle and contraction).
 
@@ -38,50 +38,51 @@ pub(crate) use diagnosis::UNCROSSED;
 pub use ends::Homecoming;
 pub use follow::{Follow, Item, follow};
 
-/// Newton updates on a mesh, relative, that rounding may leave.
+/// Relative Newton update on a mesh that rounding may leave.
 const ROUNDING: f64 = 1e-12;
 
-/// Everything that governs a continuation run. The user states `tolerance`, the range and the limit on points; the rest
-/// follows from them and never needs touching.
+/// Settings of a continuation run. The user chooses the tolerance, the range and the limit on points; the rest follows
+/// from these and need not be changed.
 #[derive(Clone, Debug)]
 pub struct Settings {
     /// Relative accuracy of the points.
     pub tolerance: f64,
     /// Smallest and largest value of the continuation parameter.
     pub range: [f64; 2],
-    /// Bounds of further parameters, by their index; the side ends where one is reached.
+    /// Bounds of further parameters, with their indices. The side ends where one is reached.
     pub bounds: Vec<(usize, [f64; 2])>,
-    /// Whether changes of stability along the curve are accounted for. Not so where a special point is held: there some
-    /// multiplier lies on the unit circle all the way.
+    /// True if changes of stability along the curve must be explained by special points. False along curves of
+    /// bifurcation points, where some multiplier is on the unit circle throughout.
     pub stability: bool,
-    /// Limit on the points of one side.
+    /// Maximum number of points on one side.
     pub max_points: usize,
-    /// Largest angle between the tangents of neighbouring points; a larger one rejects the step.
+    /// Largest angle between the tangents at neighbouring points; a step with a larger one is rejected.
     pub max_angle: f64,
-    /// Angle for which the step length aims.
+    /// Angle at which the step size control aims.
     pub target_angle: f64,
     /// Largest step, in scaled arclength.
     pub max_step: f64,
-    /// First step.
+    /// Initial step.
     pub first_step: f64,
-    /// Step below which the side ends.
+    /// Step below which the side is ended.
     pub min_step: f64,
-    /// Growth of the period, against that at the start, at which the side ends as unbounded.
+    /// Growth of the period since the start at which the side ends with an unbounded period.
     pub period_growth: f64,
-    /// Newton iterations before a step counts as failed.
+    /// Maximum number of Newton iterations in a step.
     pub max_newton: usize,
-    /// Coordinate reflections under which the model is equivariant, the identity first; see [`crate::diagram::Point::difference`].
+    /// Coordinate reflections under which the model is equivariant, the identity first; see
+    /// [`crate::diagram::Point::difference`].
     pub reflections: Vec<Vec<bool>>,
     /// `[n]` characteristic sizes of the states.
     pub scales: Vec<f64>,
     /// `[n]` periods of the states that are angles; see [`crate::contract::VectorField::periods`].
     pub periods: Vec<f64>,
-    /// In how many places the right-hand side is not smooth; for the diagnosis of ends.
+    /// Number of non-smooth terms in the right-hand side; for the diagnosis of ends.
     pub kinks: usize,
 }
 
 impl Settings {
-    /// How solutions are compared.
+    /// The measure in which solutions are compared.
     pub(crate) fn measure(&self) -> Measure<'_> {
         Measure { scales: &self.scales, periods: &self.periods }
     }
@@ -108,20 +109,21 @@ impl Settings {
         }
     }
 
-    /// How far from a point the matrix may be taken that gives its tangent and its multipliers, relative. Next to errors of
-    /// discretisation a tenth of the tolerance does not show, nor does a thousandth of the step of that `length` in what
-    /// changes along it; where there is no mesh the iteration goes all the way.
+    /// Largest relative distance from a point at which the matrix for its tangent and multipliers may be evaluated. On
+    /// a mesh a tenth of the tolerance is hidden by discretisation errors, and a thousandth of the step `length` is
+    /// negligible for quantities that change along it. Without a mesh the iteration runs to
+    /// [`Settings::newton_tolerance`].
     pub fn closeness(&self, mesh: &crate::diagram::Mesh, length: f64) -> f64 {
         if mesh.is_empty() {
             return self.newton_tolerance();
         }
         let far = (0.1 * self.tolerance).min(1e-3 * length.abs());
-        // In a step so short that more would show, closer than elsewhere.
+        // On a very short step even the Newton tolerance may be too far.
         let near = if length == 0.0 { f64::INFINITY } else { 1e-5 * length.abs() };
         far.max(self.newton_tolerance().min(near)).max(ROUNDING)
     }
 
-    /// Size of the last Newton update, relative: far enough below the tolerance that iteration errors do not show.
+    /// Size of the last relative Newton update: so far below the tolerance that iteration errors are negligible.
     pub fn newton_tolerance(&self) -> f64 {
         (1e-3 * self.tolerance).max(1e-11)
     }

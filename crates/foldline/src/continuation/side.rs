@@ -1,44 +1,47 @@
-//! On which side of the special points close by a solution lies.
+//! Side of nearby special points on which a solution lies.
 //!
-//! **Idea.** Two meshes give the same curve up to its stated error, and special points can lie closer together than that. So a
-//! point that is carried to another mesh, or met again after a lap, may come to lie on the other side of one of them, which would
-//! then be passed twice or never. What is invariant is the order: a point belongs to the stretch between two
-//! special points in which number of unstable multipliers and signs of all monitors are its own. It is moved along the curve,
-//! within its error, until they are.
+//! **Idea.** Two meshes give the same curve up to its stated error, and special points can be closer together than
+//! that. A point that is transferred to another mesh, or met again after a lap, may therefore end up on the other side
+//! of one of them, which would then be passed twice or never. The order along the curve is invariant: a point lies in
+//! the interval between special points in which the number of unstable multipliers and the signs of all monitors agree
+//! with its own. It is moved along the curve, within its error, until they do.
 //!
-//! **Fails when** another mesh has special points in another order, or one pair of them more: then there is no such place.
+//! **Fails when** another mesh has the special points in another order, or an additional pair of them: then there is no
+//! such position.
 
 use super::corrector::{Failure, Plane, Station, correct, doubted, station};
 use super::follow::{Follow, SHORT};
 use crate::diagram::{Cost, Mesh, Point};
 
-/// What tells on which side of special points a point is.
+/// Number of unstable multipliers and signs of monitors, which identify the side of special points on which a point
+/// lies.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) struct Signature {
     unstable: usize,
     positive: Vec<bool>,
 }
 
-/// Shares of the reach at which a place is looked for first.
+/// Positions that are tried first, as shares of the reach.
 const SHARES: [f64; 9] = [0.0, 0.001, -0.001, 0.01, -0.01, 0.1, -0.1, 1.0, -1.0];
-/// Places that are looked at in between.
+/// Maximum number of further positions in between.
 const MOST: usize = 60;
-/// Distance along the curve below which two places are one, for rounding.
+/// Distance along the curve below which rounding makes two positions indistinguishable.
 const FINEST: f64 = 1e-12;
 
 impl Follow<'_> {
-    /// That of a point whose tangent points towards larger positions.
+    /// Signature of a point whose tangent points towards larger positions.
     pub(super) fn signature(&self, point: &Point) -> Signature {
         let telling = self.monitors.iter().filter(|m| m.jump() > 0 && m.kind() != crate::diagram::Kind::BranchPoint);
         Signature { unstable: point.unstable, positive: telling.map(|m| m.value(point, point) > 0.0).collect() }
     }
 
-    /// Whether what lies within so short a stretch is looked at on one mesh: two meshes agree to the tolerance only.
+    /// True if an interval is so short that it must be examined on one mesh, because two meshes agree to the tolerance
+    /// only.
     pub(super) fn is_short(&self, mesh: &Mesh, length: f64) -> bool {
         !mesh.is_empty() && length.abs() < SHORT * self.settings.tolerance
     }
 
-    /// The place nearest to `around` with that signature, no farther than `reach`, of those that `at` gives by their
+    /// Station near `around`, no farther than `reach`, that has the given signature. `at` computes the station at a
     /// distance along the curve.
     pub(super) fn on_its_side(
         &mut self,
@@ -57,7 +60,7 @@ impl Follow<'_> {
             }
             seen.push((s, own));
         }
-        // Whatever lies between two places that differ, the largest gap first.
+        // Positions between two that differ, in the largest gap first.
         for _ in 0..MOST {
             seen.sort_by(|a, b| a.0.total_cmp(&b.0));
             let gaps = seen.windows(2).filter(|w| w[0].1 != w[1].1 && w[1].0 - w[0].0 > FINEST);
@@ -73,7 +76,7 @@ impl Follow<'_> {
         None
     }
 
-    /// The station at `u`, which has been corrected on the mesh of `left`, on that mesh.
+    /// Station at `u`, which has been corrected on the mesh of `left`, without adapting that mesh.
     pub(super) fn unrefined(
         &mut self,
         left: &Station,
@@ -88,7 +91,8 @@ impl Follow<'_> {
         Ok(found)
     }
 
-    /// A station on another mesh, on the same side of special points; `None` where there is no such place within its error.
+    /// Moves a station to another mesh, on the same side of special points; `None` if there is no such position within
+    /// its error.
     pub(super) fn carried(&mut self, from: &Station, mesh: &Mesh, length: f64, cost: &mut Cost) -> Option<Station> {
         let base = self.problem.transfer(&from.u, &from.mesh, mesh);
         let tangent = self.problem.transfer(&from.tangent, &from.mesh, mesh);

@@ -1,57 +1,59 @@
-//! One step: predicted, corrected, judged, and ended where the branch ends.
+//! One step: prediction, correction, acceptance, and the end of the branch.
 //!
-//! **Idea.** The prediction lies on the cubic through the last two points with their tangents. Where it would pass a bound it is
-//! moved there. What Newton's method makes of it is refined, compared with where it began, and looked through for ends.
+//! **Idea.** The predictor is the cubic through the last two points with their tangents. A prediction that would pass a
+//! bound is moved to it. The corrected point is refined on its mesh, compared with the previous one, and checked for an
+//! end of the branch.
 
 use super::corrector::{Care, Failure, Station, refine};
 use super::follow::Follow;
 use super::inspect::History;
 use crate::diagram::{Cost, Ending, Mesh};
 
-/// An accepted step, perhaps the last one.
+/// An accepted step, which may be the last one.
 pub(super) struct Step {
     pub(super) right: Station,
     pub(super) end: Option<Ending>,
-    /// How its ends lie to each other, where that is known already.
+    /// Relative position of its ends, if already known.
     pub(super) between: Option<Between>,
 }
 
-/// How two neighbours lie to each other.
+/// Relative position of two neighbouring points.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Between {
-    /// Between the tangents.
+    /// Angle between the tangents.
     pub(super) angle: f64,
     /// Distance along the left tangent.
     pub(super) along: f64,
-    /// Distance.
+    /// Distance between the points.
     pub(super) chord: f64,
-    /// How far midway the curve lies beside the cubic between them, as a share of what is allowed; 0 where nobody looked.
+    /// Distance of the curve midway from the cubic between the points, as a share of the permitted distance; 0 if not
+    /// computed.
     pub(super) bent: f64,
 }
 
-/// What the point before the current one contributes: its tangent for the predictor, its monitors for the inspection.
+/// Data of the previous point: its tangent for the predictor, its monitor values for the inspection.
 pub(super) struct Trail {
     u: Vec<f64>,
     tangent: Vec<f64>,
     mesh: Mesh,
-    /// Arclength between the two points.
+    /// Arclength between the previous and the current point.
     pub(super) length: f64,
-    /// Angle between their tangents, per arclength.
+    /// Angle between their tangents per arclength.
     pub(super) curvature: f64,
     pub(super) history: History,
 }
 
-/// What a step aims at.
+/// The target of a step.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Aim {
-    /// The plane across the tangent at this distance.
+    /// The hyperplane across the tangent at this distance.
     Plane(f64),
-    /// The value of the parameter that the prediction has, about this far.
+    /// The parameter value of the prediction, about this far away.
     Value(f64),
 }
 
 impl Aim {
-    /// How far that is.
+    /// Distance of the target.
     pub(super) fn step(self) -> f64 {
         match self {
             Aim::Plane(step) | Aim::Value(step) => step,
@@ -59,17 +61,18 @@ impl Aim {
     }
 }
 
-/// Steps longer than this many of the one before are predicted from the tangents alone.
+/// Ratio of a step to the previous one above which it is predicted from the tangents alone.
 const FARTHEST: f64 = 2.5;
-/// By how much a step is longer if that takes it to a bound: what is left would be a step of its own.
+/// Factor by which a step may be lengthened to reach a bound, which saves a short final step.
 const STRETCHED: f64 = 1.2;
-/// How close to a bound a prediction must be, as a share of its way there, to be moved to it.
+/// Distance from a bound, as a share of the parameter change, within which a prediction is moved onto it.
 const NEAR_BOUND: f64 = 1e-4;
-/// Distance midway from the cubic through both ends, as a share of the step, from which on the parameter there is looked at.
+/// Distance midway from the cubic through both ends, as a share of the step, beyond which the parameter there is
+/// computed.
 const BENT: f64 = 2e-3;
 
 impl Follow<'_> {
-    /// What `before` contributes to the step from `now` on.
+    /// Data of `before` for the next step.
     pub(super) fn trail(&mut self, before: &Station, between: Between) -> Trail {
         let distance = between.along.abs().max(f64::MIN_POSITIVE);
         let (values, marks) = (self.monitored(before), self.marked(before));
@@ -80,7 +83,7 @@ impl Follow<'_> {
         Trail { u, tangent, mesh: before.mesh.clone(), length, curvature: between.angle / length, history }
     }
 
-    /// How two stations lie to each other, as the left one sees it.
+    /// Relative position of two stations, on the mesh and in the metric of the left one.
     pub(super) fn between(&mut self, left: &Station, right: &Station) -> Between {
         self.place(left);
         let tangent = self.problem.transfer(&right.tangent, &right.mesh, &left.mesh);
@@ -89,7 +92,8 @@ impl Follow<'_> {
         self.lie(left, &tangent, &chord)
     }
 
-    /// The same from the right tangent and from the chord, on the mesh of `left`, where the problem is anchored.
+    /// Relative position given the right tangent and the chord, both on the mesh of `left`, which is the reference of
+    /// the problem.
     pub(super) fn lie(&self, left: &Station, tangent: &[f64], chord: &[f64]) -> Between {
         let dot = |a: &[f64], b: &[f64]| self.problem.dot(a, b);
         let sizes = (dot(tangent, tangent) * dot(&left.tangent, &left.tangent)).sqrt();
@@ -98,14 +102,14 @@ impl Follow<'_> {
         Between { angle: cosine.clamp(-1.0, 1.0).acos(), along, chord, bent: 0.0 }
     }
 
-    /// Whether the mesh of `left` has served for a step already and has room left: what the tolerance leaves of what is stated, which is
-    /// several times the estimate.
+    /// True if the mesh of `left` has served for the previous step and has room left: the stated error, several times
+    /// the estimate, is below the error allowed for this mesh.
     fn trusts(&self, left: &Station, trail: Option<&Trail>) -> bool {
         let room = left.point.trust.discretisation < left.share * self.settings.tolerance;
         room && trail.is_some_and(|trail| trail.mesh == left.mesh)
     }
 
-    /// The point at distance `step`: on the cubic through the last two points with their tangents.
+    /// Predicts the point at distance `step`, on the cubic through the last two points with their tangents.
     fn predicted(&mut self, left: &Station, trail: Option<&Trail>, step: f64) -> Vec<f64> {
         self.place(left);
         let mut guess: Vec<f64> = left.u.iter().zip(&left.tangent).map(|(u, t)| u + step * t).collect();
@@ -137,7 +141,7 @@ impl Follow<'_> {
         cost: &mut Cost,
     ) -> Result<Step, Failure> {
         let guess = self.predicted(left, trail, step);
-        // A step that would pass a bound is aimed at it; where that fails, the bound is looked for after the step.
+        // A step that would pass a bound is aimed at it. If that fails, the bound is located after the step.
         if let Some((nearer, landing)) = self.landing(left, trail, &guess, step)
             && !self.is_short(&left.mesh, nearer)
             && let Ok(landed) = self.tried(left, trail, &landing, Aim::Value(nearer), rigid, cost)
@@ -148,8 +152,8 @@ impl Follow<'_> {
         self.tried(left, trail, &guess, Aim::Plane(step), rigid, cost)
     }
 
-    /// Where the prediction passes a bound, within the step or a little farther: at what step, and the prediction there, with the
-    /// parameter at the bound.
+    /// Step at which the prediction reaches a bound, if that is within the step or slightly beyond, and the prediction
+    /// there with the parameter equal to the bound.
     fn landing(&mut self, left: &Station, trail: Option<&Trail>, guess: &[f64], step: f64) -> Option<(f64, Vec<f64>)> {
         let last = guess.len() - 1;
         let (here, way) = (left.parameter(), guess[last] - left.parameter());
@@ -183,7 +187,8 @@ impl Follow<'_> {
         None
     }
 
-    /// The step to what was predicted, in the plane or at the value of the parameter that is aimed at.
+    /// Corrects a prediction, in the hyperplane or at the parameter value of `aim`, and decides whether to accept the
+    /// step.
     fn tried(
         &mut self,
         left: &Station,
@@ -205,7 +210,7 @@ impl Follow<'_> {
         };
         self.count(&mut right);
         if let Aim::Value(_) = aim {
-            // Where travel is towards smaller values the row has turned the tangent round.
+            // For travel towards smaller values the parameter row has reversed the tangent.
             right.head(left.slope());
         }
         if right.mesh != left.mesh && short {
@@ -243,7 +248,7 @@ impl Follow<'_> {
                 right = self.at_parameter(left, &right, bound, cost)?;
                 self.count(&mut right);
             }
-            // To the last bit, whatever rounding Newton's method left.
+            // The bound is stored exactly, without the rounding of Newton's method.
             let last = right.u.len() - 1;
             right.u[last] = [low, high][side];
             if let Some(own) = right.point.parameters.get_mut(self.free) {

@@ -1,8 +1,8 @@
-//! Places at which the Newton matrix is singular, located from both sides.
+//! Points with a singular Newton matrix, interpolated from both sides.
 //!
-//! **Idea.** Where two branches cross, Newton's method loses as many digits as the place is close. On a fine mesh nothing is
-//! left before the bracket is narrow enough. But the branch goes smoothly through the place, so solutions at four distances
-//! around it, none of them close, determine it: monitor and unknowns are interpolated.
+//! **Idea.** Where two branches cross, Newton's method loses the more digits the closer it comes. On a fine mesh no
+//! digits are left before the bracket is narrow enough. But the branch passes smoothly through the point, so monitor
+//! and unknowns can be interpolated from solutions at four distances around it, none of them close.
 //!
 //! **Equations.** With nodes s₁…s₄ and Lagrange polynomials ℓ_i:
 //!
@@ -14,20 +14,20 @@ use super::{Failure, Settings};
 use crate::contract::{Monitor, ZeroProblem};
 use crate::diagram::Cost;
 
-/// Distances between nodes, as shares of the stretch, in the order of trial; the last two as long as Newton's method still converges
-/// to the branch.
+/// Distances between nodes, as shares of the interval, in the order of trial; the last two are used only while Newton's
+/// method still converges to the branch.
 const SPACINGS: [f64; 5] = [0.25, 0.1, 0.04, 4e-3, 4e-4];
 /// Number of spacings that suffice on a mesh; at closer ones rounding dominates.
 const ON_A_MESH: usize = 3;
-/// Error of an interpolated zero as a share of its last change: the error of a cubic shrinks with the fourth power of the spacing, here
-/// by (0.04 / 0.1)⁴.
+/// Error of an interpolated zero as a share of its last change: the error of a cubic shrinks with the fourth power of
+/// the spacing, here by (0.04 / 0.1)⁴.
 const REST: f64 = 0.0256;
 
-/// Share of the values next to the zero that the cubic may add to the parabola: with more the branch does not go smoothly
-/// through the place.
+/// Largest share of the values next to the zero that the cubic may add to the parabola; with more the branch does not
+/// pass smoothly through the point.
 const SMOOTH: f64 = 0.05;
 
-/// Interpolates the zero of `monitor` in `stretch`, whose ends have values of opposite sign.
+/// Interpolates the zero of `monitor` in `stretch`, at whose ends its values have opposite signs.
 ///
 /// # Errors
 /// See [`Failure`].
@@ -45,7 +45,8 @@ pub fn straddle(
     let (mut nodes, mut stations) = ([0.0; 4], Vec::new());
     let mut moved = 0.0;
     for (k, spacing) in SPACINGS.iter().enumerate() {
-        // On a mesh rounding dominates at closer nodes, which are used only if the interpolation is not yet accurate enough.
+        // On a mesh, rounding dominates at closer nodes, which are used only if the interpolation is not yet accurate
+        // enough.
         if k == ON_A_MESH
             && !stretch.left.mesh.is_empty()
             && REST * moved * rate(settings, &nodes, &stations) < settings.tolerance
@@ -110,14 +111,14 @@ fn rate(settings: &Settings, nodes: &[f64; 4], stations: &[Station]) -> f64 {
         / (nodes[2] - nodes[1]).abs()
 }
 
-/// Values at `s` of the Lagrange polynomials of the nodes.
+/// Lagrange polynomials of the nodes, evaluated at `s`.
 fn weights(nodes: &[f64; 4], s: f64) -> [f64; 4] {
     std::array::from_fn(|i| (0..4).filter(|&k| k != i).map(|k| (s - nodes[k]) / (nodes[i] - nodes[k])).product())
 }
 
-/// By how much the interpolated value at `s` changes if the node farthest from it is left out.
+/// Change of the interpolated value at `s` if the node farthest from it is omitted.
 fn bend(nodes: &[f64; 4], values: &[f64], s: f64) -> f64 {
-    // The third difference, which the cubic adds times the product of the distances.
+    // The third divided difference; the cubic adds it times the product of the distances.
     let part = |i: usize| (0..4).filter(|&k| k != i).map(|k| nodes[i] - nodes[k]).product::<f64>();
     let third: f64 = (0..4).map(|i| values[i] / part(i)).sum();
     let distances = nodes.map(|node| (s - node).abs());
@@ -140,7 +141,7 @@ fn zero(nodes: &[f64; 4], values: &[f64]) -> Result<f64, Failure> {
     Ok(0.5 * (low + high))
 }
 
-/// The station at `s` between stations that share a mesh.
+/// Interpolates the station at `s` from stations that share a mesh.
 fn blend(
     problem: &mut dyn ZeroProblem,
     nodes: &[f64; 4],
@@ -160,7 +161,7 @@ fn blend(
     problem.anchor(&u);
     let norm = problem.dot(&tangent, &tangent).sqrt();
     tangent.iter_mut().for_each(|t| *t /= norm);
-    // The matrix may be singular here; the multipliers do not depend on that, but the error estimate does.
+    // The matrix may be singular here. The multipliers do not depend on that, but the error estimate does.
     let _ = problem.factorise(&u, &tangent);
     let mut examination = problem.examine(&u);
     examination.trust.discretisation = stations.iter().map(|own| own.point.trust.discretisation).fold(0.0, f64::max);
@@ -174,11 +175,11 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_bend_is_what_the_cubic_adds_to_the_parabola() {
+    fn the_bend_is_the_difference_between_cubic_and_parabola() {
         let nodes = [-1.5, -0.5, 0.5, 1.5];
         let line = nodes.map(|s| 2.0 * s - 1.0 + s * s);
         assert!(bend(&nodes, &line, 0.2) < 1e-14, "nothing for a parabola");
-        // x³ minus its parabola through the three nodes next to 0.2, which is without that at -1.5.
+        // x³ minus its parabola through the three nodes nearest to 0.2, which omits -1.5.
         let cubic = nodes.map(|s: f64| s.powi(3));
         assert!((bend(&nodes, &cubic, 0.2) - 0.7 * 0.3 * 1.3).abs() < 1e-14);
         assert!((zero(&nodes, &nodes.map(|s: f64| s.powi(3) - 0.001)).unwrap() - 0.1).abs() < 1e-12);

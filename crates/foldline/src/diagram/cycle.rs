@@ -5,14 +5,14 @@ use crate::problem::gauss::Scheme;
 
 /// A periodic orbit: polynomials of degree m on each of N mesh intervals, in normalised time t/T ∈ [0, 1].
 ///
-/// On interval j the polynomial is given by its values at the left end and at the m Gauss points, so the profile is laid
-/// out `[interval][node 0..=m][component]`; node 0 is the left end. The orbit closes: the right end of the last interval
-/// is the left end of the first, or where angles turn, that plus `gain`.
+/// On interval j the polynomial is given by its values at the left end and at the m Gauss points, so the profile is
+/// laid out `[interval][node 0..=m][component]`; node 0 is the left end. The orbit closes: the right end of the last
+/// interval is the left end of the first, plus `gain` if angles turn.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Cycle {
     /// T, in the time unit of the model.
     pub period: f64,
-    /// How many periods of the forcing it lasts; 0 where the model is autonomous.
+    /// Number of forcing periods in one period of the cycle; 0 for an autonomous model.
     pub forcing_periods: u32,
     /// `[N + 1]` interval boundaries from 0 to 1.
     pub mesh: Mesh,
@@ -20,16 +20,17 @@ pub struct Cycle {
     pub degree: usize,
     /// `[N · (m + 1) · n]` values.
     pub profile: Vec<f64>,
-    /// `[n]` x(T) - x(0), a whole number of turns of each state that is an angle and 0 for the others; empty where no angle turns.
+    /// `[n]` x(T) - x(0): a whole number of turns for each angle, 0 for other states; empty if no angle turns.
     pub gain: Vec<f64>,
 }
 
 impl Cycle {
-    /// The cycle through given states: `times` `[K]` in normalised time from 0 to 1, `states` `[K][n]`. `through` steps of time
-    /// make a mesh interval, on which the polynomial of that degree through its `through + 1` states is taken; of the last
-    /// state, at time 1, only the polynomial knows. Stored in polynomials of degree `degree`.
+    /// Returns the cycle through given states: `times` `[K]` in normalised time from 0 to 1, `states` `[K][n]`. Every
+    /// `through` time steps make a mesh interval, which carries the polynomial through its `through + 1` states; the
+    /// state at time 1 enters through the last polynomial only. The result has polynomials of degree `degree`.
     ///
-    /// `None` unless the times increase from 0 to 1, K - 1 is a multiple of `through`, and there is a state for each.
+    /// `None` unless the times increase from 0 to 1, K - 1 is a multiple of `through`, and there is a state for each
+    /// time.
     pub fn given(period: f64, times: &[f64], states: &[f64], through: usize, degree: usize) -> Option<Cycle> {
         let (&first, &last) = times.first().zip(times.last())?;
         let increase = times.windows(2).all(|pair| pair[0] < pair[1]);
@@ -53,29 +54,29 @@ impl Cycle {
         Some(Cycle { period, forcing_periods: 0, mesh: mesh.into(), degree: scheme.degree, profile, gain: Vec::new() })
     }
 
-    /// N.
+    /// Number of mesh intervals N.
     pub fn intervals(&self) -> usize {
         self.mesh.len().saturating_sub(1)
     }
 
-    /// n.
+    /// Number of states n.
     pub fn dim(&self) -> usize {
         self.profile.len() / (self.intervals() * (self.degree + 1)).max(1)
     }
 
-    /// True if an angle has turned after a period.
+    /// True if an angle turns over a period.
     pub fn turns(&self) -> bool {
         !self.gain.is_empty()
     }
 
-    /// The state `[n]` at normalised time `t`, also outside of [0, 1].
+    /// Returns the state `[n]` at normalised time `t`, which may lie outside [0, 1].
     pub fn state(&self, t: f64) -> Vec<f64> {
         let mut x = vec![0.0; self.dim()];
         self.state_into(Scheme::of(self.degree), t, &mut x);
         x
     }
 
-    /// `count` states at uniformly spaced times over one period, the end point excluded: `[count][n]`.
+    /// Returns `count` states `[count][n]` at uniformly spaced times over one period, the end point excluded.
     pub fn uniform(&self, count: usize) -> Vec<f64> {
         let (n, scheme) = (self.dim(), Scheme::of(self.degree));
         let mut out = vec![0.0; count * n];
@@ -90,14 +91,14 @@ impl Cycle {
         out
     }
 
-    /// The state `[n]` at the end of the period, by the last polynomial.
+    /// Returns the state `[n]` at the end of the period, from the last polynomial.
     pub(crate) fn end(&self) -> Vec<f64> {
         let mut x = vec![0.0; self.dim()];
         self.state_within(Scheme::of(self.degree), self.intervals() - 1, 1.0, &mut x);
         x
     }
 
-    /// Like [`Cycle::uniform`], without the turns of angles: what they gain is taken away in proportion to time.
+    /// Returns the states of [`Cycle::uniform`] with the gain of angles removed in proportion to time.
     pub(crate) fn level(&self, count: usize) -> Vec<f64> {
         let mut out = self.uniform(count);
         if self.turns() {
@@ -109,7 +110,7 @@ impl Cycle {
         out
     }
 
-    /// The state at time `t` in interval j.
+    /// Evaluates the state at time `t` in interval j.
     fn state_within(&self, scheme: &Scheme, j: usize, t: f64, x: &mut [f64]) {
         let s = (t - self.mesh[j]) / (self.mesh[j + 1] - self.mesh[j]);
         let block = (self.degree + 1) * x.len();
@@ -125,7 +126,7 @@ impl Cycle {
     }
 }
 
-/// The polynomials that are 1 at one of the nodes and 0 at the others, at `t`.
+/// Evaluates the Lagrange basis polynomials of the nodes at `t`.
 fn lagrange(nodes: &[f64], t: f64) -> Vec<f64> {
     let others = |k: usize| nodes.iter().enumerate().filter(move |(l, _)| *l != k);
     (0..nodes.len()).map(|k| others(k).map(|(_, other)| (t - other) / (nodes[k] - other)).product()).collect()

@@ -1,4 +1,4 @@
-//! What comes out: points, special points, branches, diagrams. Plain data.
+//! Results as plain data: points, special points, branches, diagrams.
 
 mod cycle;
 mod number;
@@ -28,7 +28,7 @@ pub enum Solution {
     Cycle(Cycle),
 }
 
-/// How solutions are compared.
+/// Scales and periods for the comparison of solutions.
 #[derive(Clone, Copy, Debug)]
 pub struct Measure<'a> {
     /// `[n]` characteristic sizes of the states.
@@ -38,7 +38,7 @@ pub struct Measure<'a> {
 }
 
 impl Solution {
-    /// False if only the numbers of a cycle were kept, and not its profile.
+    /// False for a cycle whose profile was not kept.
     pub fn is_stored(&self) -> bool {
         match self {
             Solution::Cycle(cycle) => !cycle.profile.is_empty(),
@@ -46,7 +46,7 @@ impl Solution {
         }
     }
 
-    /// What each state gains over a period, where angles turn; else nothing.
+    /// Gain of each state over a period; empty if no angle turns.
     pub fn gain(&self) -> &[f64] {
         match self {
             Solution::Cycle(cycle) => &cycle.gain,
@@ -54,12 +54,12 @@ impl Solution {
         }
     }
 
-    /// How often a state that is an angle of that period turns over a cycle, with its sign; 0 for an equilibrium.
+    /// Number of turns over a cycle, with sign, of a state that is an angle of that period; 0 for an equilibrium.
     pub fn turns(&self, state: usize, period: f64) -> i64 {
         self.gain().get(state).map_or(0, |gain| (gain / period).round() as i64)
     }
 
-    /// True if angles turn as often as those of another one of which some states are `mirrored`.
+    /// True if angles turn as often as those of `other`, some of whose states are `mirrored`.
     fn turns_like(&self, other: &Solution, mirrored: &dyn Fn(usize) -> bool) -> bool {
         let (own, theirs) = (self.gain(), other.gain());
         let of = |gain: &[f64], i: usize| gain.get(i).copied().unwrap_or(0.0);
@@ -69,7 +69,7 @@ impl Solution {
         })
     }
 
-    /// The period of a cycle.
+    /// Period of a cycle.
     pub fn period(&self) -> Option<f64> {
         match self {
             Solution::Equilibrium(_) => None,
@@ -77,7 +77,7 @@ impl Solution {
         }
     }
 
-    /// The mesh of a cycle; empty for an equilibrium.
+    /// Mesh of a cycle; empty for an equilibrium.
     pub fn mesh(&self) -> Mesh {
         match self {
             Solution::Equilibrium(_) => Mesh::default(),
@@ -85,12 +85,12 @@ impl Solution {
         }
     }
 
-    /// The period of a cycle that no forcing gives.
+    /// Period of a cycle, unless a forcing prescribes it.
     pub fn free_period(&self) -> Option<f64> {
         self.period().filter(|_| self.forcing_periods() == 0)
     }
 
-    /// How many periods of the forcing a cycle lasts; 0 where there is none.
+    /// Number of forcing periods in one period of a cycle; 0 without forcing.
     pub fn forcing_periods(&self) -> u32 {
         match self {
             Solution::Equilibrium(_) => 0,
@@ -99,7 +99,7 @@ impl Solution {
     }
 }
 
-/// How far a point can be trusted.
+/// Accuracy of a point.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Trust {
     /// Estimated discretisation error of the profile, relative to scale + max |component|; 0 for equilibria.
@@ -110,14 +110,14 @@ pub struct Trust {
     pub trivial_defect: f64,
     /// |log ∏μ - ∫ tr J dt|; 0 for equilibria.
     pub liouville_defect: f64,
-    /// Estimated error of the eigenvalues or multipliers, relative to the larger of 1 and their modulus; NaN where it was not
-    /// estimated.
+    /// Estimated error of the eigenvalues or multipliers, relative to the larger of 1 and their modulus; NaN if it was
+    /// not estimated.
     pub spectrum: f64,
-    /// Part of the slope dλ/ds that may be rounding, where more than [`STANDS`]: of a parameter that hardly enters f.
+    /// Possible rounding error of the slope dλ/ds if above [`STANDS`], as for a parameter that hardly enters f.
     pub slope: f64,
 }
 
-/// What a point cost.
+/// Work done for a point.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Cost {
     /// Newton iterations, rejected attempts included.
@@ -126,8 +126,8 @@ pub struct Cost {
     pub factorisations: usize,
     /// Steps tried and rejected before this point was accepted.
     pub rejected: usize,
-    /// Points (states with parameters) at which f was evaluated, those in which its derivatives were wanted too not counted:
-    /// a residual on N intervals of degree m takes N m of them.
+    /// Points (states with parameters) at which f was evaluated without its derivatives: a residual on N intervals of
+    /// degree m takes N m of them.
     pub evaluations: usize,
     /// Points at which derivatives of f were evaluated.
     pub linearisations: usize,
@@ -146,33 +146,34 @@ impl std::ops::AddAssign for Cost {
 /// A computed point of a branch.
 #[derive(Clone, Debug)]
 pub struct Point {
-    /// Place on the branch: 0 at the start, counting up forwards and down backwards.
+    /// Position on the branch: 0 at the start, increasing forwards and decreasing backwards.
     pub position: i64,
-    /// Every parameter of the model.
+    /// Value of every parameter of the model.
     pub parameters: Vec<f64>,
     /// The solution itself.
     pub solution: Solution,
-    /// Unit tangent of the branch (increasing position), in the layout of the unknowns; the last component is the change of the parameter over
-    /// its scale ([`Branch::units`]).
+    /// Unit tangent of the branch towards increasing position, in the layout of the unknowns; the last component is the
+    /// change of the parameter relative to its scale ([`Branch::units`]).
     pub tangent: Vec<f64>,
-    /// Arclength step with which the next point towards larger |position| will be tried.
+    /// Arclength step to be tried next towards larger |position|.
     pub step: f64,
-    /// Eigenvalues (equilibrium) or Floquet multipliers (cycle; the trivial one first where it is not forced).
+    /// Eigenvalues (equilibrium) or Floquet multipliers (cycle; the trivial one first unless it is forced).
     pub spectrum: Vec<Complex64>,
-    /// How many eigenvalues or multipliers are unstable.
+    /// Number of unstable eigenvalues or multipliers.
     pub unstable: usize,
     /// Smallest and largest value of every state, then of every output.
     pub ranges: Vec<[f64; 2]>,
-    /// Mean over the cycle, and mean of the square, of every state, then of every output; empty where a file has none.
+    /// Mean and mean square over the cycle of every state, then of every output; empty if the file has none.
     pub averages: Vec<[f64; 2]>,
-    /// Accuracy.
+    /// Accuracy of the point.
     pub trust: Trust,
     /// Work done since the previous point.
     pub cost: Cost,
 }
 
 impl Point {
-    /// The non-trivial part of the spectrum: all eigenvalues, all multipliers of a forced cycle, or those after the trivial one.
+    /// The non-trivial part of the spectrum: all eigenvalues, all multipliers of a forced cycle, or those after the
+    /// trivial one.
     pub fn free_spectrum(&self) -> &[Complex64] {
         match &self.solution {
             Solution::Cycle(cycle) if cycle.forcing_periods == 0 => self.spectrum.get(1..).unwrap_or(&[]),
@@ -180,18 +181,18 @@ impl Point {
         }
     }
 
-    /// How far the multipliers may be off, for what depends on them: the larger of the two defects. Liouville's is a relative
-    /// error of their product; where the smallest of them is so small that nothing depends on its digits, neither does
-    /// anything on those of the product.
+    /// Error of the multipliers as far as it matters: the larger of the two defects. Liouville's is a relative error of
+    /// their product; if the smallest multiplier is so small that its digits do not matter, neither do those of the
+    /// product.
     pub fn multiplier_defect(&self) -> f64 {
         const SMALL: f64 = 1e-3;
         let smallest = self.free_spectrum().iter().fold(SMALL, |m, z| m.min(z.norm()));
         self.trust.trivial_defect.max(self.trust.liouville_defect * smallest / SMALL)
     }
 
-    /// True for a cycle of a family at a single parameter value (a vertical branch), as in a conservative system or one that is linear
-    /// up to some amplitude: the parameter does not change along the branch, and a second multiplier is 1 within its error. The side
-    /// of 1 on which that multiplier is computed is not significant.
+    /// True for a cycle of a family at a single parameter value (a vertical branch), as in a conservative system or one
+    /// that is linear up to some amplitude: the parameter does not change along the branch, and a second multiplier is
+    /// 1 within its error. The side of 1 on which that multiplier is computed is not significant.
     pub fn is_one_of_family(&self) -> bool {
         let stands = self.parameter_slope().abs() < STANDS.max(self.trust.slope);
         self.solution.period().is_some() && stands && self.neutral_multiplier().is_some()
@@ -199,23 +200,26 @@ impl Point {
 
     /// Distance from 1 within which a multiplier may be exactly 1.
     fn neutral_error(&self) -> f64 {
-        /// Multiple of the stated error: a factor of safety, since a multiplier at a double eigenvalue 1 is less accurate than others.
+        /// Multiple of the stated error: a factor of safety, since a multiplier at a double eigenvalue 1 is less
+        /// accurate than others.
         const ERRORS: f64 = 10.0;
         let stated = if self.trust.spectrum.is_nan() { 0.0 } else { self.trust.spectrum };
         ERRORS * stated.max(self.trust.trivial_defect)
     }
 
-    /// The non-trivial multiplier closest to 1, if it is 1 within its error.
+    /// Returns the non-trivial multiplier closest to 1, if it is 1 within its error.
     pub(crate) fn neutral_multiplier(&self) -> Option<Complex64> {
         let distance = |z: &Complex64| (z - 1.0).norm();
         let closest = self.free_spectrum().iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
         (distance(closest) <= self.neutral_error()).then_some(*closest)
     }
 
-    /// Number of unstable multipliers, excluding one that is 1 within its error, and on a vertical branch all that are on the unit circle within
-    /// their errors: in a conservative system they stay there, and the side on which they are computed is not significant.
+    /// Number of unstable multipliers, without one that is 1 within its error and, on a vertical branch, without all
+    /// that are on the unit circle within their errors: in a conservative system they stay there, and the computed side
+    /// is meaningless.
     pub(crate) fn unstable_besides_neutral(&self) -> usize {
-        /// Error of multipliers above which it says nothing that they are within it of the unit circle, as next to an orbit of infinite period.
+        /// Error of the multipliers above which their distance from the unit circle means nothing, as near an infinite
+        /// period.
         const UNKNOWN: f64 = 1e-3;
         let error = self.neutral_error();
         let circle = if error < UNKNOWN && self.is_one_of_family() { error } else { 0.0 };
@@ -223,8 +227,8 @@ impl Point {
         self.free_spectrum().iter().filter(|z| z.norm() > 1.0 + circle).count() - own
     }
 
-    /// True if the multipliers come in reciprocal pairs, as in a conservative system: besides the one that is 1 there are two with the product 1,
-    /// within their errors.
+    /// True if the multipliers come in reciprocal pairs, as in a conservative system: besides the one that is 1, two
+    /// have the product 1 within their errors.
     pub(crate) fn is_conservative(&self) -> bool {
         let Some(neutral) = self.neutral_multiplier() else { return false };
         let mut rest = self.free_spectrum().to_vec();
@@ -236,10 +240,10 @@ impl Point {
         (0..rest.len()).any(|i| rest[i + 1..].iter().any(|other| reciprocal(&rest[i], other)))
     }
 
-    /// Largest difference of the period and the ranges of the states between two points, each relative to its scale plus size, the
-    /// period to its size. Outputs do not count: they follow from the states, and one that is a small difference (the force of a contact
-    /// that has just begun) is less accurate than they are. `reflection[i]` says that the other point is seen with state i negated.
-    /// Infinite if one is an equilibrium and the other a cycle.
+    /// Returns the largest difference between two points in their periods, relative to the period, and in the ranges of
+    /// their states, relative to scale plus size. Outputs do not count: they follow from the states, and one that is a
+    /// small difference (the force of a contact that has just begun) is less accurate than they are. `reflection[i]`
+    /// negates state i of the other point. Infinite between an equilibrium and a cycle, or if angles turn differently.
     pub fn difference(&self, other: &Point, measure: Measure, reflection: &[bool]) -> f64 {
         let Measure { scales, periods } = measure;
         let mirrored = |i: usize| reflection.get(i).copied().unwrap_or(false);
@@ -264,7 +268,7 @@ impl Point {
         largest
     }
 
-    /// Leaves out the profile and mesh of a cycle and the tangent, which make up nearly all of a point.
+    /// Drops the profile and mesh of a cycle and the tangent, which make up nearly all of a point.
     pub fn lighten(&mut self) {
         if let Solution::Cycle(cycle) = &mut self.solution {
             (cycle.mesh, cycle.profile) = (Vec::new().into(), Vec::new());
@@ -272,24 +276,24 @@ impl Point {
         }
     }
 
-    /// Whether profile and tangent were left out.
+    /// True if profile and tangent were dropped.
     pub fn is_light(&self) -> bool {
         matches!(&self.solution, Solution::Cycle(cycle) if cycle.profile.is_empty())
     }
 
-    /// Component of the tangent along the continuation parameter, relative to the scale of that.
+    /// Component of the tangent along the continuation parameter, relative to the scale of the parameter.
     pub fn parameter_slope(&self) -> f64 {
         self.tangent.last().copied().unwrap_or(0.0)
     }
 }
 
-/// Slope dλ/ds, λ relative to the scale of the parameter, below which the parameter is constant along a branch up to rounding. Order of
-/// magnitude: the machine precision times a condition number of 1e7.
+/// Slope dλ/ds, λ relative to the scale of the parameter, below which the parameter is constant along a branch up to
+/// rounding. Order of magnitude: the machine precision times a condition number of 1e7.
 pub(crate) const STANDS: f64 = 1e-9;
-/// Slope below which no branch point is told from a fold, and a branch may be one at a single parameter value.
+/// Slope below which branch points cannot be told from folds, and a branch may be vertical.
 pub(crate) const FLAT: f64 = 1e-6;
 
-/// What happens at a special point.
+/// Type of a special point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Kind {
     /// The branch turns back in its parameter (limit point, saddle-node).
@@ -332,7 +336,7 @@ pub enum Kind {
     FlipTorus,
     /// Two pairs of multipliers on the unit circle.
     DoubleTorus,
-    /// A place that was asked for: a quantity has a given value.
+    /// A quantity has a requested value.
     Mark,
     /// A stability change that no located special point explains.
     Unexplained,
@@ -365,14 +369,14 @@ impl Kind {
         Kind::Unexplained,
     ];
 
-    /// Whether it takes two parameters to meet it.
+    /// True for bifurcations of codimension two.
     pub fn has_codimension_two(self) -> bool {
         use Kind::{BranchPoint, Fold, Hopf, Mark, PeriodDoubling, Torus, Unexplained};
         !matches!(self, Fold | BranchPoint | Hopf | PeriodDoubling | Torus | Mark | Unexplained)
     }
 
-    /// The names of the coefficients of its normal form, as [`crate::special::normal_form`] and
-    /// [`crate::special::cycle_form`] define them; of a torus point the real part of d.
+    /// Names of the coefficients of the normal form, as defined in [`crate::special::normal_form`] and
+    /// [`crate::special::cycle_form`]; for a torus point the real part of d.
     pub fn coefficients(self) -> &'static [&'static str] {
         match self {
             Kind::Fold => &["a"],
@@ -417,7 +421,7 @@ impl Kind {
         }
     }
 
-    /// The name in a text: "Hopf", "period doubling".
+    /// The name in running text: "Hopf", "period doubling".
     pub fn title(self) -> &'static str {
         match self {
             Kind::BranchPoint => "branch point",
@@ -453,18 +457,18 @@ impl fmt::Display for Kind {
 /// A located special point.
 #[derive(Clone, Debug)]
 pub struct SpecialPoint {
-    /// What happens there.
+    /// Type of the point.
     pub kind: Kind,
     /// The point itself; its `position` is that of the accepted point just before it (towards smaller positions).
     pub point: Point,
-    /// Unstable multipliers (eigenvalues) on the side of smaller positions.
+    /// Number of unstable multipliers (eigenvalues) on the side of smaller positions.
     pub unstable_before: usize,
-    /// Unstable multipliers (eigenvalues) on the side of larger positions.
+    /// Number of unstable multipliers (eigenvalues) on the side of larger positions.
     pub unstable_after: usize,
-    /// Bound on the error of the parameter, relative to its scale ([`Branch::units`]) + |value|, of the ranges of states likewise, of the period,
-    /// relative to that, and of the ranges of outputs, relative to 1 + |value|.
+    /// Bound on the errors: of the parameter, relative to its scale ([`Branch::units`]) + |value|, and of the ranges of
+    /// states, likewise; of the period, relative to its value; and of the ranges of outputs, relative to 1 + |value|.
     pub error: f64,
-    /// Coefficients of the normal form, named by [`Kind::coefficients`]; none where they are not known.
+    /// Coefficients of the normal form, named by [`Kind::coefficients`]; empty if they are not known.
     pub coefficients: Vec<f64>,
     /// Bounds on the errors of the coefficients; empty in files of earlier versions.
     pub coefficient_errors: Vec<f64>,
@@ -473,7 +477,7 @@ pub struct SpecialPoint {
 }
 
 impl SpecialPoint {
-    /// The dimension of the kernel at a branch point: how many eigenvalues are 0 (multipliers 1) there.
+    /// Dimension of the null space at a branch point: the number of eigenvalues 0 (multipliers 1).
     pub fn kernel(&self) -> usize {
         self.unstable_before.abs_diff(self.unstable_after).max(1)
     }
@@ -484,8 +488,9 @@ impl SpecialPoint {
         self.coefficients.get(k).copied().filter(|value| value.abs() > error)
     }
 
-    /// True if the point is supercritical (in the critical directions the bifurcating solutions are stable), false if subcritical; `None`
-    /// if criticality does not apply to the kind or the deciding coefficient is zero within its error.
+    /// True if the point is supercritical (in the critical directions the bifurcating solutions are stable), false if
+    /// subcritical; `None` if criticality does not apply to the kind or the deciding coefficient is zero within its
+    /// error.
     fn is_supercritical(&self) -> Option<bool> {
         let decides = match (self.kind, self.coefficients.len()) {
             (Kind::Hopf | Kind::PeriodDoubling | Kind::Torus, 1) => 0,
@@ -495,8 +500,8 @@ impl SpecialPoint {
         self.certain(decides).map(|value| value < 0.0)
     }
 
-    /// `supercritical` or `subcritical` if that is known; `degenerate` if a required coefficient is zero within its error; `undetermined`
-    /// if that error is as large as the terms of the coefficient.
+    /// `supercritical` or `subcritical` if that is known; `degenerate` if a required coefficient is zero within its
+    /// error; `undetermined` if that error is as large as the terms of the coefficient.
     pub fn criticality(&self) -> Option<&'static str> {
         // Coefficients that must not vanish: a pitchfork has no quadratic term, and two oscillations may be uncoupled.
         let needed: &[usize] = match (self.kind, self.coefficients.len()) {
@@ -516,8 +521,8 @@ impl SpecialPoint {
         }
     }
 
-    /// Case of the normal form: a branch point is transcritical or a pitchfork; a double Hopf point is simple if p₁₁ and p₂₂ have the same
-    /// sign, otherwise difficult.
+    /// Case of the normal form: a branch point is transcritical or a pitchfork; a double Hopf point is simple if p₁₁
+    /// and p₂₂ have the same sign, otherwise difficult.
     pub fn case(&self) -> Option<&'static str> {
         match (self.kind, self.coefficients.len()) {
             (Kind::BranchPoint, 2) => Some("transcritical"),
@@ -528,8 +533,8 @@ impl SpecialPoint {
         }
     }
 
-    /// Text of the coefficients, case, criticality and remark, such as `l1 = -0.0123, supercritical`. An error is shown if it affects the
-    /// digits printed.
+    /// Text of the coefficients, case, criticality and remark, such as `l1 = -0.0123, supercritical`. An error is shown
+    /// if it affects the digits printed.
     pub fn normal_form(&self) -> String {
         let named = self.kind.coefficients().iter().zip(&self.coefficients).enumerate();
         let error = |k: usize| self.coefficient_errors.get(k).copied();
@@ -539,7 +544,7 @@ impl SpecialPoint {
     }
 }
 
-/// Five digits, and the error if the last digit is uncertain. A value that is zero within a small error prints as 0.
+/// Five digits, with the error if the last digit is uncertain. A value that is zero within a small error prints as 0.
 fn shortly(value: f64, error: Option<f64>) -> String {
     /// Error below which zero prints without it: half a unit in the last of five decimals.
     const SMALL: f64 = 5e-6;
@@ -551,7 +556,7 @@ fn shortly(value: f64, error: Option<f64>) -> String {
     if error > 0.5 * last { format!("{text} ± {error:.0e}") } else { text }
 }
 
-/// What kind of solution a branch is made of.
+/// Type of the solutions on a branch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Family {
     /// Equilibria.
@@ -594,29 +599,29 @@ impl Connection {
         }
     }
 
-    /// The connection of that name.
+    /// Returns the connection of that name.
     pub fn from_name(name: &str) -> Option<Connection> {
         Connection::ALL.into_iter().find(|connection| connection.name() == name)
     }
 }
 
-/// Why one side of a branch ended.
+/// Reason why one side of a branch ended.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Ending {
     /// The parameter reached this bound of its range, or the stated target.
     Bound(f64),
-    /// The branch came back to its start.
+    /// The branch returned to its start.
     Closed,
-    /// The branch met the one from which (or from whose kind) it branches: a cycle shrank to an equilibrium, or became a
-    /// cycle of half the period. The parameter value is given.
+    /// The branch met the one from which it (or a branch of its type) bifurcates: a cycle shrank to an equilibrium, or
+    /// became a cycle of half the period.
     Joined {
         /// `Hopf` (cycle became an equilibrium), `PeriodDoubling` (half the period) or `BranchPoint`.
         at: Kind,
         /// Value of the continuation parameter there.
         parameter: f64,
     },
-    /// The step length fell below its limit. Here and below, a text has three lines: what was tried, what the likely cause is,
-    /// what can be done.
+    /// The step size fell below its limit. Here and below, the text has three lines: what was tried, the likely cause,
+    /// and what can be done.
     StepTooSmall(String),
     /// The mesh would need more intervals than allowed.
     MeshTooLarge(String),
@@ -633,18 +638,18 @@ pub enum Ending {
         /// States of the equilibria on the orbit.
         to: String,
     },
-    /// A state grew beyond every measure while the parameter came to a stand; the sentence says which is the likely cause.
+    /// A state grew without bound while the parameter approached a limit; the text names the likely cause.
     SolutionUnbounded(String),
     /// The limit on the number of points was reached.
     PointLimit(usize),
     /// f is not finite at the start of the branch or beyond its last point.
     NotFinite(String),
-    /// The work limit was reached (one point or several in succession needed too many factorisations), or stability changed without
-    /// explanation at several consecutive points.
+    /// The work limit was reached (one point or several in succession needed too many factorisations), or stability
+    /// changed without explanation at several consecutive points.
     GivenUp(String),
-    /// The start did not converge.
+    /// The branch could not be started.
     NoStart(String),
-    /// A quantity has the value at which the study asks to stop.
+    /// A quantity reached the value at which the study asks to stop.
     Asked(f64),
     /// The observer asked to stop.
     Stopped,
@@ -671,13 +676,14 @@ impl Ending {
         }
     }
 
-    /// The first line of its text.
+    /// Returns the first line of the text.
     pub fn brief(&self) -> String {
         let text = self.to_string();
         text.lines().next().unwrap_or_default().to_string()
     }
 
-    /// True if the branch is complete: it ended at a bound or stop, closed, joined another branch, or approached an orbit of infinite period.
+    /// True if the branch is complete: it ended at a bound or stop, closed, joined another branch, or approached an
+    /// orbit of infinite period.
     pub fn complete(&self) -> bool {
         use Ending::{Asked, Bound, Closed, Connecting, Joined};
         matches!(self, Bound(_) | Closed | Joined { .. } | Asked(_) | Connecting { .. })
@@ -725,14 +731,14 @@ impl fmt::Display for Ending {
     }
 }
 
-/// Where a branch comes from.
+/// Origin of a branch.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Origin {
     /// A seed of the study, by name.
     Seed(String),
     /// The end of another branch.
     EndOf(String),
-    /// A special point of another branch: its name, the kind, and the value of the parameter there.
+    /// A special point of another branch.
     Switch {
         /// Name of the parent branch.
         parent: String,
@@ -743,37 +749,38 @@ pub enum Origin {
     },
 }
 
-/// A branch: one curve of solutions in one parameter, or in two with something held.
+/// A branch: a curve of solutions in one parameter, or a bifurcation curve in two.
 #[derive(Clone, Debug)]
 pub struct Branch {
-    /// Unique within a diagram.
+    /// Name, unique within a diagram.
     pub name: String,
     /// Equilibria or cycles.
     pub family: Family,
     /// Index of the continuation parameter among the model's parameters.
     pub free: usize,
-    /// For a curve in two parameters: what is held along it, and the index of the parameter that follows from it.
+    /// For a bifurcation curve: the bifurcation, and the index of the first parameter, which is solved for.
     pub held: Option<(Kind, usize)>,
-    /// Scale of each free parameter, that which follows first: the last components of the tangents are changes of the parameters over these.
+    /// Scales of the first parameter of a bifurcation curve (otherwise 1) and of the continuation parameter. The last
+    /// components of the tangents are changes of the parameters relative to these.
     pub units: [f64; 2],
-    /// Where it comes from.
+    /// Origin.
     pub origin: Origin,
     /// Points by increasing position.
     pub points: Vec<Point>,
     /// Special points by increasing position.
     pub special: Vec<SpecialPoint>,
-    /// Why the backward and the forward side ended; `None` while growing.
+    /// Reasons why the backward and the forward side ended; `None` until then.
     pub ends: [Option<Ending>; 2],
 }
 
 impl Branch {
-    /// A value of the continuation parameter as messages give it: 0 where less is left of it than any tolerance.
+    /// Returns a value of the continuation parameter as shown in messages: 0 if it is smaller than any tolerance.
     pub fn rounded(&self, value: f64) -> f64 {
         if value.abs() < 1e-9 * self.units[1] { 0.0 } else { value }
     }
 
-    /// The first or the last point, if it has these values of parameters, given by index, up to the rounding of a value at a bound: relative to
-    /// the largest that the parameter has on the branch.
+    /// Returns the first or the last point if its parameters, given by index, have these values, up to the rounding of
+    /// a value at a bound: relative to the largest that the parameter has on the branch.
     pub fn end_at(&self, targets: &[(usize, f64)]) -> Option<&Point> {
         const ROUNDING: f64 = 1e-9;
         let value = |point: &Point, index: usize| point.parameters.get(index).copied().unwrap_or(f64::NAN);
@@ -786,12 +793,12 @@ impl Branch {
         [self.points.first(), self.points.last()].into_iter().flatten().find(there)
     }
 
-    /// Size of a value of the continuation parameter: its scale + |value|. Errors are relative to it.
+    /// Returns the size of a value of the continuation parameter: its scale + |value|. Errors are relative to it.
     pub fn size(&self, value: f64) -> f64 {
         self.units[1] + value.abs()
     }
 
-    /// An empty branch.
+    /// Returns an empty branch.
     pub fn new(name: impl Into<String>, family: Family, free: usize, origin: Origin) -> Branch {
         Branch {
             name: name.into(),
@@ -806,7 +813,7 @@ impl Branch {
         }
     }
 
-    /// Both parameters of a curve in two parameters: that of the branch on which it begins, then the second. `None` for a
+    /// Both parameters of a bifurcation curve: that of the branch on which it begins, then the second. `None` for a
     /// branch in one parameter.
     pub fn plane(&self) -> Option<[usize; 2]> {
         self.held.map(|(_, first)| [first, self.free])
@@ -818,7 +825,7 @@ impl Branch {
         self.points.insert(at, point);
     }
 
-    /// Forgets all points but the start and the outermost two of each side, from which the branch can go on.
+    /// Drops all points but the start and the outermost two of each side, from which the branch can be continued.
     pub fn keep_ends(&mut self) {
         let (mut index, count) = (0, self.points.len());
         self.points.retain(|point| {
@@ -827,8 +834,8 @@ impl Branch {
         });
     }
 
-    /// Number of special points of the same kind found before this one at the very same place: pairs of eigenvalues that pass at
-    /// once.
+    /// Number of special points of the same kind found before this one at exactly the same point: pairs of eigenvalues
+    /// that cross simultaneously.
     pub fn earlier_there(&self, special: &SpecialPoint) -> usize {
         let same = |other: &&SpecialPoint| {
             other.kind == special.kind
@@ -836,7 +843,7 @@ impl Branch {
                 && !std::ptr::eq(*other, special)
         };
         let own = self.special.iter().position(|other| std::ptr::eq(other, special));
-        // Those of the backward side stand in reverse order.
+        // Those of the backward side are in reverse order.
         let (first, last) = self.special.split_at(own.unwrap_or(self.special.len()));
         let earlier = if own.is_some() && special.point.position < 0 { last } else { first };
         earlier.iter().filter(same).count()
@@ -844,13 +851,13 @@ impl Branch {
 
     /// Inserts a special point at its position.
     pub fn insert_special(&mut self, special: SpecialPoint) {
-        // On the way backwards the first one met comes last.
+        // On the backward side the first one found comes last.
         let own = special.point.position;
         let at = self.special.partition_point(|s| s.point.position < own || own >= 0 && s.point.position == own);
         self.special.insert(at, special);
     }
 
-    /// The total work.
+    /// Returns the total work.
     pub fn cost(&self) -> Cost {
         let mut total = Cost::default();
         self.points.iter().for_each(|p| total += p.cost);
@@ -872,19 +879,19 @@ pub struct Diagram {
 /// A request that was not fulfilled.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Shortfall {
-    /// The name of a branch, exploration or sweep.
+    /// Name of a branch, exploration or sweep.
     pub about: String,
-    /// What was not reached, and why.
+    /// Text that says what was not reached, and why.
     pub what: String,
 }
 
 impl Diagram {
-    /// The branch of that name.
+    /// Returns the branch of that name.
     pub fn branch(&self, name: &str) -> Option<&Branch> {
         self.branches.iter().find(|branch| branch.name == name)
     }
 
-    /// The responses of the survey or sweep of that name.
+    /// Returns the responses of the survey or sweep of that name.
     pub fn response_set(&self, name: &str) -> Option<&Responses> {
         self.responses.iter().find(|set| set.name == name)
     }

@@ -2,8 +2,8 @@
 
 use std::fmt;
 
-/// A value with as many digits as are significant, whatever its unit. With a precision, so many decimals, in powers of ten where these would
-/// show too little of it; without one, all digits but those that rounding leaves in the last places.
+/// A value printed with its significant digits, in any unit. With a precision, that number of decimals, or scientific
+/// notation if these would show too little; without one, all digits but those affected by rounding.
 #[derive(Clone, Copy, Debug)]
 pub struct Shown(pub f64);
 

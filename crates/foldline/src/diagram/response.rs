@@ -1,13 +1,13 @@
-//! What simulation saw: settled motions, without a branch to lie on.
+//! Results of simulation: settled motions that need not lie on a branch.
 
 use super::Share;
 
-/// What a trajectory settled to.
+/// Type of motion to which a trajectory settled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Motion {
-    /// It came to rest.
+    /// State of rest.
     Equilibrium,
-    /// It repeats itself.
+    /// Periodic motion.
     Cycle,
     /// Neither within the limit on the number of steps: chaos, a torus, or an approach too slow to tell.
     Other,
@@ -16,7 +16,7 @@ pub enum Motion {
 }
 
 impl Motion {
-    /// Every one.
+    /// All types of motion.
     pub const ALL: [Motion; 4] = [Motion::Equilibrium, Motion::Cycle, Motion::Other, Motion::Escaped];
 
     /// The name used in files and tables.
@@ -29,7 +29,7 @@ impl Motion {
         }
     }
 
-    /// The one of that name.
+    /// Returns the motion of that name.
     pub fn from_name(name: &str) -> Option<Motion> {
         Motion::ALL.into_iter().find(|motion| motion.name() == name)
     }
@@ -40,40 +40,41 @@ impl Motion {
 pub struct Response {
     /// Value of the parameter that varies.
     pub value: f64,
-    /// Every parameter of the model.
+    /// Value of every parameter of the model.
     pub parameters: Vec<f64>,
-    /// What it is.
+    /// Type of motion.
     pub motion: Motion,
-    /// Of a cycle, from the returns of the trajectory.
+    /// Period of a cycle, from the returns of the trajectory.
     pub period: Option<f64>,
-    /// Spectral ratio of a cycle, such as 2:1, where the model has a whirl plane.
+    /// Spectral ratio of a cycle, such as 2:1, if the model has a whirl plane.
     pub ratio: Option<(u32, u32)>,
     /// Number of periods of its strong lines after which a cycle closes: 2 after a period doubling; 1 if unknown.
     pub multiplicity: u32,
-    /// Smallest and largest value of every state, then of every output: over one period, or over the motion watched.
+    /// Smallest and largest value of every state, then of every output: over one period, or over the stretch observed.
     pub ranges: Vec<[f64; 2]>,
     /// Number of starts that settled there. Not a basin fraction: some starts are drawn towards the origin.
     pub hits: usize,
     /// In a survey, the fraction of uniformly drawn starts that settled there; `None` in a sweep.
     pub share: Option<Share>,
-    /// In a sweep, true if the motion is not the continuation of the one at the previous value; `None` at the first value, if
-    /// the two could not be compared, and in a survey.
+    /// In a sweep, true if the motion is not the continuation of the one at the previous value; `None` at the first
+    /// value, if the two could not be compared, and in a survey.
     pub jumped: Option<bool>,
-    /// `[n]` a state of the motion: the last one, from which a sweep goes on.
+    /// `[n]` last state, from which a sweep continues.
     pub state: Vec<f64>,
-    /// Time until it had settled, that saved by extrapolation not counted.
+    /// Time until the motion had settled, without the time saved by extrapolation.
     pub settled_after: f64,
-    /// Of a cycle, by how much it fails to repeat itself, relative to its extent. Of an equilibrium, what is left of the motion, and at least
+    /// For a cycle, its closing error relative to its extent. For an equilibrium, the remaining motion, but at least
     /// the tolerance of the integration, relative to scale plus size.
     pub error: f64,
 }
 
 impl Response {
-    /// Size of a state beyond which a trajectory counts as running to infinity. A factor of safety: bounded motions stay far below it, and
-    /// exponential growth reaches it soon.
+    /// Size of a state beyond which a trajectory counts as running to infinity. A factor of safety: bounded motions
+    /// stay far below it, and exponential growth reaches it soon.
     pub(crate) const UNBOUNDED: f64 = 1e12;
 
-    /// Outcome of a trajectory that escaped, in words: it ran to infinity, or could not be integrated beyond its last state.
+    /// Outcome of a trajectory that escaped, in words: it ran to infinity, or could not be integrated beyond its last
+    /// state.
     pub fn fate(&self) -> &'static str {
         match self.state.iter().all(|x| x.abs() < Response::UNBOUNDED) {
             true => "cannot be integrated past a state at which f jumps or is undefined",
@@ -82,12 +83,12 @@ impl Response {
     }
 }
 
-/// How responses were looked for.
+/// Type of simulation by which responses were found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Search {
-    /// From many starts at every value.
+    /// From many initial states at every value.
     Survey,
-    /// From value to value, each from the last state of the one before.
+    /// From value to value, each from the last state of the previous one.
     Sweep,
 }
 
@@ -100,7 +101,7 @@ impl Search {
         }
     }
 
-    /// The one of that name.
+    /// Returns the search of that name.
     pub fn from_name(name: &str) -> Option<Search> {
         [Search::Survey, Search::Sweep].into_iter().find(|search| search.name() == name)
     }
@@ -109,24 +110,24 @@ impl Search {
 /// The responses of a survey or of a sweep.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Responses {
-    /// Unique within a diagram.
+    /// Name, unique within a diagram.
     pub name: String,
-    /// How they were looked for.
+    /// Type of simulation.
     pub search: Search,
     /// Index of the parameter that varies.
     pub free: usize,
-    /// In the order in which the values were visited; of one value the most frequent first.
+    /// Responses in the order in which the values were visited; at each value the most frequent first.
     pub responses: Vec<Response>,
 }
 
 impl Responses {
-    /// Change of a range, relative to the median change of the sweep, that counts as a jump in files that do not say where a sweep
-    /// jumped. Order of magnitude: a smooth response changes by a few times the median.
+    /// Change of a range, relative to the median change of the sweep, that counts as a jump in files that do not say
+    /// where a sweep jumped. Order of magnitude: a smooth response changes by a few times the median.
     const STEEP: f64 = 10.0;
 
-    /// Indices of the responses of a sweep at which it jumped to a different solution. A response that could not be compared counts
-    /// if its kind of motion differs from the one before. A set without any comparison, as in an old file, falls back on
-    /// [`Responses::steep`].
+    /// Indices of the responses of a sweep at which it jumped to a different solution. A response that could not be
+    /// compared counts if its kind of motion differs from the one before. A set without any comparison, as in an old
+    /// file, falls back on [`Responses::steep`].
     pub fn jumps(&self) -> Vec<usize> {
         if self.responses.iter().all(|response| response.jumped.is_none()) {
             return self.steep(Responses::STEEP);
@@ -136,11 +137,11 @@ impl Responses {
         pairs.filter(|(_, pair)| jumped(pair)).map(|(k, _)| k + 1).collect()
     }
 
-    /// Indices of the responses of a sweep that differ strongly from the one before: a different kind of motion, ratio or
-    /// multiplicity, or a change of the largest range beyond `factor` times the median. On a steep resonance curve that need not
-    /// be a jump.
+    /// Indices of the responses of a sweep that differ strongly from the one before: a different kind of motion, ratio
+    /// or multiplicity, or a change of the largest range beyond `factor` times the median. On a steep resonance curve
+    /// that need not be a jump.
     pub fn steep(&self, factor: f64) -> Vec<usize> {
-        // Each quantity relative to its largest value in the sweep.
+        // Each quantity is taken relative to its largest value in the sweep.
         let count = self.responses.iter().map(|r| r.ranges.len()).max().unwrap_or(0);
         let largest = |k: usize| {
             let ranges = self.responses.iter().filter_map(|r| r.ranges.get(k));

@@ -3,8 +3,8 @@
 /// 97.5 % quantile of the normal distribution, for two-sided 95 % intervals.
 const QUANTILE: f64 = 1.959_963_984_540_054;
 
-/// Basin fraction: the fraction of initial states, drawn uniformly from the ranges of the states, that settle to one motion. It
-/// estimates the relative volume of the basin of attraction in that box.
+/// Basin fraction: the fraction of initial states, drawn uniformly from the ranges of the states, that settle to one
+/// motion. It estimates the relative volume of the basin of attraction in that box.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Share {
     /// Number of uniform initial states that settled there.
@@ -19,8 +19,8 @@ impl Share {
         self.hits as f64 / self.of as f64
     }
 
-    /// Standard error of the estimate, from the binomial distribution. It is 0 and meaningless if none or all settled there; see
-    /// [`Share::interval`].
+    /// Standard error of the estimate, from the binomial distribution. It is 0 and meaningless if none or all settled
+    /// there; see [`Share::interval`].
     pub fn error(&self) -> f64 {
         let value = self.value();
         (value * (1.0 - value) / self.of as f64).sqrt()
@@ -43,7 +43,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_interval_is_that_of_wilson() {
+    fn the_interval_agrees_with_published_wilson_intervals() {
         // newcombe1998, Table I, method 3: 81/263, 15/148, 0/20, 1/29.
         for (hits, of, expected) in [
             (81, 263, [0.2553, 0.3662]),
@@ -58,7 +58,7 @@ mod tests {
 
     #[test]
     fn the_interval_solves_its_equation() {
-        // Its ends are the shares from which the estimate is just the quantile of standard errors away.
+        // The estimate lies exactly QUANTILE standard errors away from each end.
         let share = Share { hits: 7, of: 24 };
         for end in share.interval() {
             let error = (end * (1.0 - end) / 24.0).sqrt();

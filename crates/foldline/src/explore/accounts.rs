@@ -1,15 +1,15 @@
-//! Messages about numbers of unstable eigenvalues or multipliers that do not fit the record of a branch.
+//! Messages about inconsistent numbers of unstable eigenvalues or multipliers along a branch.
 
 use super::growth::Growth;
 use crate::contract::Event;
 use crate::diagram::{Branch, Family, Misfit, Point, Shown, SpecialPoint};
 
-/// The cure where a number does not fit.
+/// Advice where a number is inconsistent.
 const CLOSER: &str =
     "what to do: use a smaller tolerance; `foldline verify` checks the points on both sides by another method";
 
 impl Growth<'_> {
-    /// Reports a special point that does not fit the record. Returns false if the observer wants to stop.
+    /// Reports a special point that is inconsistent with the record. Returns false if the observer wants to stop.
     pub(super) fn fits(&self, branch: &Branch, special: &SpecialPoint, misfit: &Misfit) -> bool {
         let SpecialPoint { kind, unstable_before: before, unstable_after: after, .. } = special;
         let (what, at) = (counted(branch), value(branch, &special.point));
@@ -29,8 +29,8 @@ impl Growth<'_> {
         self.tell(Event::Short(&branch.name, &format!("{said}\n{CLOSER}")))
     }
 
-    /// Reports a change in the number of unstable eigenvalues or multipliers that no special point explains. Returns false if the observer wants
-    /// to stop.
+    /// Reports a change in the number of unstable eigenvalues or multipliers that no special point explains. Returns
+    /// false if the observer wants to stop.
     pub(super) fn unexplained(&self, branch: &Branch, before: usize, point: &Point) -> bool {
         let (what, at, after) = (counted(branch), value(branch, point), point.unstable);
         let said = format!(

@@ -1,14 +1,15 @@
 //! Known branches that end at a special point of another branch.
 //!
-//! **Idea.** A branch switched to at one special point often ends at the next special point of the same kind on its parent. A branch
-//! of doubled cycles that began elsewhere ends at period doublings of a branch with which it was never compared; its last step
-//! leads there. If several special points lie close together, the branch has ended at the nearest.
+//! **Idea.** A branch switched to at one special point often ends at the next special point of the same kind on its
+//! parent. A branch of doubled cycles that began elsewhere ends at period doublings of a branch with which it was never
+//! compared; its last step leads there. If several special points lie close together, the branch has ended at the
+//! nearest.
 
 use super::{System, known};
 use crate::diagram::{Branch, Ending, Kind, Origin, Point, SpecialPoint};
 
-/// Name of the branch that has ended at this special point of `parent`: one switched to at another special point of the same
-/// kind, or one that began elsewhere.
+/// Name of the branch that has ended at this special point of `parent`: one switched to at another special point of the
+/// same kind, or one that began elsewhere.
 pub(super) fn at<'b>(
     system: &System,
     tolerance: f64,
@@ -30,7 +31,8 @@ pub(super) fn at<'b>(
     branches.iter().find(arrived).map(|branch| branch.name.as_str())
 }
 
-/// True if a branch that ended at the parameter value `value` met `parent` at this special point rather than at another.
+/// True if a branch that ended at the parameter value `value` met `parent` at this special point rather than at
+/// another.
 fn meets(tolerance: f64, parent: &Branch, special: &SpecialPoint, value: f64) -> bool {
     let off = |other: &SpecialPoint| (other.point.parameters[parent.free] - value).abs();
     let mut rivals = parent.special.iter().filter(|other| other.kind == special.kind);

@@ -1,26 +1,28 @@
 //! Cycles near a resonance of a lightly damped field, from averaged equations.
 //!
-//! **Idea.** Next to a resonance the motion is nearly the response x₀ plus a few modes with slowly changing amplitudes, and what is
-//! stationary for their averaged equations is nearly a cycle, stable or not, isolated or not. These are a few equations, so that zeros can
-//! be looked for from a whole grid of amplitudes and phases. They are starts for Newton's method on the cycle itself, no more.
+//! **Idea.** Near a resonance the motion is nearly the response x₀ plus a few modes with slowly varying amplitudes, and
+//! a stationary point of the averaged equations is nearly a cycle, stable or not, isolated or not. These are only a few
+//! equations, so zeros can be sought from a whole grid of amplitudes and phases. They serve as starts for Newton's
+//! method on the cycle.
 //!
-//! **Equations.** With A the mean of f_x along x₀, A q_j = μ_j q_j, p_jᴴ A = μ_j p_jᴴ, p_jᴴ q_j = 1, and ⟨·⟩ the mean over the period 2π/w,
+//! **Equations.** With A the mean of f_x along x₀, A q_j = μ_j q_j, p_jᴴ A = μ_j p_jᴴ, p_jᴴ q_j = 1, and ⟨·⟩ the mean
+//! over the period 2π/w,
 //!
 //!   (1)  x = x₀ + y,  y = Re Σ_j c_j q_j e^{i k_j w t}
 //!   (2)  E_j = i k_j w c_j - 2 p_jᴴ ⟨(f(x₀ + y) - f(x₀)) e^{-i k_j w t}⟩ = 0
 //!
-//! of one mode in a forced field, where w is that of the forcing over a whole number, and of two in an autonomous one, where w is
-//! unknown and c₁ is real: time may start anywhere.
+//! for one mode in a forced field, where w is the forcing frequency divided by a whole number, and for two modes in an
+//! autonomous field, where w is unknown and c₁ is real, since the origin of time is arbitrary.
 //!
-//! The mean contains μ_j c_j from A y. What is left of it, by the nonlinear force, must keep up the mode against its damping:
+//! The mean contains μ_j c_j from A y. The rest, due to nonlinear forces, must sustain the mode against its damping:
 //!
 //!   (3)  |2 p_jᴴ ⟨…⟩ - μ_j c_j| ≥ |Re μ_j| |c_j|
 //!
-//! Starts that bring less than half of that are not worth Newton's method.
+//! Starts that provide less than half of that are discarded.
 //!
-//! **Source.** nayfeh1979, chapters 4 and 6: averaging at external and internal resonances; the means by quadrature are ours.
+//! **Source.** nayfeh1979, chapters 4 and 6: averaging at external and internal resonances; quadrature is ours.
 //!
-//! **Fails when** the motion is far from a sum of the two modes, as far from the resonance with a hard contact.
+//! **Fails when** the motion is far from a sum of the two modes, such as far from the resonance with a hard contact.
 
 use crate::attractors::Candidate;
 use crate::contract::{Batch, Parameters, VectorField};
@@ -29,13 +31,13 @@ use crate::linalg::size_in_any_units;
 use num_complex::Complex64;
 use std::f64::consts::TAU;
 
-/// Nodes of the mean over a period.
+/// Number of nodes of the mean over a period.
 const NODES: usize = 128;
-/// Amplitudes of the grid of starts, each 1/√2 of the one before; the first fills the ranges of the states.
+/// Number of amplitudes in the grid of starts, each 1/√2 of the one before; the first fills the ranges of the states.
 const AMPLITUDES: i32 = 17;
-/// Shares of the second of two modes in it.
+/// Shares of the second of two modes in the amplitude.
 const SHARES: [f64; 4] = [0.2, 0.4, 0.6, 0.8];
-/// Phases of the grid.
+/// Number of phases in the grid.
 const PHASES: u32 = 6;
 /// Number of starts that are corrected, those with the smallest residual.
 const CORRECTED: usize = 48;
@@ -43,7 +45,7 @@ const CORRECTED: usize = 48;
 const KEPT: usize = 4;
 const ROUNDS: usize = 25;
 
-/// A mode of oscillation, its vector as large as half the ranges of the states.
+/// A mode of oscillation, scaled to half the ranges of the states.
 #[derive(Clone, Debug)]
 pub(super) struct Mode {
     /// μ.
@@ -53,7 +55,8 @@ pub(super) struct Mode {
 }
 
 impl Mode {
-    /// The mode of the eigenvalue next to `rate` of a matrix `[n × n]`; `halves` are half the ranges of the states.
+    /// Returns the mode of the eigenvalue of `matrix` `[n × n]` closest to `rate`; `halves` are half the ranges of the
+    /// states.
     pub(super) fn of(matrix: &[f64], rate: Complex64, halves: &[f64]) -> Option<Mode> {
         let n = halves.len();
         // (A - z) (a + ib) as a real system of twice the size; a shift of the size of rounding keeps it regular.
@@ -90,12 +93,12 @@ impl Mode {
     }
 }
 
-/// Modes that may swing together: each with its order k.
+/// Modes that may oscillate together, each with its order k.
 pub(super) struct Averaged<'a> {
     field: &'a dyn VectorField,
     parameters: &'a [f64],
     modes: Vec<(&'a Mode, u32)>,
-    /// Of a forced field, the periods of the forcing in one of the cycle.
+    /// For a forced field, the number of forcing periods in one period of the cycle.
     turns: Option<u32>,
     /// x₀ and f(x₀) at the nodes, `[n × nodes]`.
     states: Vec<f64>,
@@ -119,7 +122,7 @@ impl Swing {
 }
 
 impl<'a> Averaged<'a> {
-    /// `response` gives x₀ at a time, in periods of the forcing if there is one.
+    /// Evaluates the response at the nodes; `response` returns x₀ at a time, in forcing periods if there is a forcing.
     pub(super) fn new(
         field: &'a dyn VectorField,
         parameters: &'a [f64],
@@ -144,7 +147,7 @@ impl<'a> Averaged<'a> {
         Averaged { field, parameters, modes, turns, states, flow, times, carriers }
     }
 
-    /// Motions that solve (2), as starts for Newton's method on the cycle, and how many starts were corrected.
+    /// Returns motions that solve (2), as starts for Newton's method on the cycle, and the number of starts corrected.
     pub(super) fn motions(&self) -> (Vec<Candidate>, usize) {
         let mut starts: Vec<(f64, Swing)> = self.grid().into_iter().filter_map(|swing| self.rated(swing)).collect();
         starts.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -161,13 +164,13 @@ impl<'a> Averaged<'a> {
         (found.iter().map(|swing| self.motion(swing)).collect(), count)
     }
 
-    /// w next to which it is looked for.
+    /// Initial value of w.
     fn first_w(&self) -> f64 {
         let (mode, order) = self.modes[0];
         self.turns.map_or(mode.rate.im / f64::from(order), |turns| TAU / f64::from(turns))
     }
 
-    /// The power of a phase that does not depend on where time starts.
+    /// Power of a phase that does not depend on the origin of time.
     fn fold(&self) -> u32 {
         self.turns.unwrap_or(self.modes[0].1)
     }
@@ -191,7 +194,7 @@ impl<'a> Averaged<'a> {
         all
     }
 
-    /// A start with the w that suits it best, and its relative residual; `None` where (3) does not hold by far.
+    /// Returns a start with the w that suits it best, and its relative residual; `None` if (3) fails by more than half.
     fn rated(&self, mut swing: Swing) -> Option<(f64, Swing)> {
         let mut f = vec![0.0; self.states.len()];
         self.field.evaluate(self.batch(&self.place(&swing)), &mut f);
@@ -220,7 +223,7 @@ impl<'a> Averaged<'a> {
         Batch { lanes: NODES, states, parameters: Parameters::Shared(self.parameters), times: &self.times }
     }
 
-    /// y at the nodes.
+    /// Returns y at the nodes.
     fn deviation(&self, swing: &Swing) -> Vec<f64> {
         let n = self.field.dim();
         let mut y = vec![0.0; n * NODES];
@@ -233,12 +236,12 @@ impl<'a> Averaged<'a> {
         y
     }
 
-    /// x at the nodes.
+    /// Returns x at the nodes.
     fn place(&self, swing: &Swing) -> Vec<f64> {
         self.states.iter().zip(self.deviation(swing)).map(|(x, y)| x + y).collect()
     }
 
-    /// 2 p_jᴴ ⟨v e^{-i k_j w t}⟩ of each mode.
+    /// Returns 2 p_jᴴ ⟨v e^{-i k_j w t}⟩ for each mode.
     fn means(&self, v: &[f64]) -> Vec<Complex64> {
         let mean = |((mode, _), carrier): (&(&Mode, u32), &Vec<Complex64>)| -> Complex64 {
             let part = |row: &[f64]| row.iter().zip(carrier).map(|(v, e)| e.conj() * *v).sum::<Complex64>();
@@ -248,24 +251,24 @@ impl<'a> Averaged<'a> {
         self.modes.iter().zip(&self.carriers).map(mean).collect()
     }
 
-    /// The same of f(x) - f(x₀): how fast each amplitude changes.
+    /// Returns the means of f(x) - f(x₀), the rates of change of the amplitudes.
     fn rates(&self, f: &[f64]) -> Vec<Complex64> {
         let changed: Vec<f64> = f.iter().zip(&self.flow).map(|(a, b)| a - b).collect();
         self.means(&changed)
     }
 
-    /// (2).
+    /// Evaluates (2).
     fn residual(&self, swing: &Swing, rates: &[Complex64]) -> Vec<Complex64> {
         self.slopes(swing).iter().zip(rates).map(|(slope, rate)| slope * swing.w - rate).collect()
     }
 
-    /// Its derivative by w.
+    /// Derivative of (2) with respect to w.
     fn slopes(&self, swing: &Swing) -> Vec<Complex64> {
         let slope = |(c, (_, order)): (&Complex64, &(&Mode, u32))| Complex64::i() * f64::from(*order) * c;
         swing.amplitudes.iter().zip(&self.modes).map(slope).collect()
     }
 
-    /// Newton's method, no step larger than half the amplitudes; `None` unless it converges to a motion of all its modes.
+    /// Newton's method, with steps of at most half the amplitudes; `None` unless it converges to a motion of all modes.
     fn corrected(&self, mut swing: Swing) -> Option<Swing> {
         const CONVERGED: f64 = 1e-7;
         const LEAST: f64 = 1e-2;
@@ -287,14 +290,14 @@ impl<'a> Averaged<'a> {
         None
     }
 
-    /// Newton's step, to be subtracted.
+    /// Returns Newton's step, to be subtracted.
     fn step(&self, swing: &Swing) -> Option<Swing> {
         let m = self.modes.len();
         let x = self.place(swing);
         let mut f = vec![0.0; x.len()];
         self.field.evaluate(self.batch(&x), &mut f);
         let errors = self.residual(swing, &self.rates(&f));
-        // Real and imaginary part of each amplitude; where time may start anywhere, w in place of the imaginary part of the first.
+        // Real and imaginary part of each amplitude; in an autonomous field w replaces the imaginary part of the first.
         let columns = (0..2 * m).map(|c| match (c, self.turns) {
             (1, None) => self.slopes(swing),
             _ => self.column(&x, swing, c),
@@ -312,7 +315,7 @@ impl<'a> Averaged<'a> {
         Some(Swing { amplitudes: step.chunks_exact(2).map(|c| Complex64::new(c[0], c[1])).collect(), w })
     }
 
-    /// The derivative of (2) by a real or an imaginary part of an amplitude, at x.
+    /// Derivative of (2) at x with respect to the real or imaginary part of an amplitude.
     fn column(&self, x: &[f64], swing: &Swing, part: usize) -> Vec<Complex64> {
         let mut amplitudes = vec![Complex64::new(0.0, 0.0); self.modes.len()];
         amplitudes[part / 2] = if part.is_multiple_of(2) { 1.0.into() } else { Complex64::i() };
@@ -338,7 +341,7 @@ impl<'a> Averaged<'a> {
         sizes.sum::<f64>() < NEAR * a.size() && (phase(a) - phase(b)).norm() < NEAR
     }
 
-    /// (1) over one period.
+    /// Returns (1) over one period.
     fn motion(&self, swing: &Swing) -> Candidate {
         let n = self.field.dim();
         let y = self.deviation(swing);
@@ -385,7 +388,7 @@ mod tests {
         let parameters = [omega, force, zeta, alpha];
         let model = duffing(parameters);
         let period = TAU / omega;
-        // In time counted in periods.
+        // Time is counted in periods.
         let matrix = [0.0, period, -period, -2.0 * zeta * period];
         let rate = period * Complex64::new(-zeta, (1.0 - zeta * zeta).sqrt());
         let mode = Mode::of(&matrix, rate, &[8.0, 8.0]).unwrap();
@@ -407,7 +410,7 @@ mod tests {
         assert!(found.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 0.05 * b), "{found:?} {expected:?}");
     }
 
-    /// That of the part with a third of the frequency of the force.
+    /// Amplitude of the component at a third of the forcing frequency.
     fn amplitude(motion: &Candidate) -> f64 {
         let Candidate::Cycle { period, times, states } = motion else { return f64::NAN };
         let last = times.len() - 1;

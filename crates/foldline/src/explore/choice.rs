@@ -23,7 +23,7 @@ pub(super) struct Choice<'c> {
 }
 
 impl<'c> Choice<'c> {
-    /// Selects the attractors of a census that match a key; mirror images count once.
+    /// Selects the sampled attractors that match a key; mirror images count once.
     pub(super) fn of(system: &System, tolerance: f64, census: &'c Census, key: &AttractorKey) -> Choice<'c> {
         let size = |a: &Attractor| match &a.point.solution {
             Solution::Equilibrium(x) => system.norm(x),
@@ -31,7 +31,6 @@ impl<'c> Choice<'c> {
         };
         let mut fitting: Vec<&Attractor> =
             census.attractors.iter().filter(|a| is_meant(key, &a.point, a.ratio)).collect();
-        // Cycles by decreasing number of hits.
         match key {
             AttractorKey::Equilibrium => fitting.sort_by(|a, b| size(a).total_cmp(&size(b))),
             AttractorKey::Cycle | AttractorKey::Ratio(..) | AttractorKey::Lasting(_) => {
@@ -76,8 +75,8 @@ fn described(system: &System, attractor: &Attractor) -> String {
     format!("{} ({})", kind(system, attractor), attractor.hits)
 }
 
-/// Name of an attractor. The sense of whirl is stated for forced models only: in an autonomous one the whirl plane may turn with the
-/// shaft.
+/// Name of an attractor. The sense of whirl is stated for forced models only: in an autonomous one the whirl plane may
+/// turn with the shaft.
 fn kind(system: &System, attractor: &Attractor) -> String {
     match (&attractor.point.solution, attractor.ratio) {
         (Solution::Equilibrium(_), _) => "equilibrium".to_string(),
@@ -90,7 +89,7 @@ fn kind(system: &System, attractor: &Attractor) -> String {
     }
 }
 
-/// Summary of a census.
+/// Returns a summary of the outcome of all samples.
 pub(super) fn summary(system: &System, census: &Census) -> String {
     if let [found] = &census.attractors[..]
         && found.hits == 0

@@ -1,9 +1,9 @@
-//! A vector field that counts at how many points it is evaluated.
+//! A vector field that counts its evaluations.
 
 use crate::contract::{Batch, VectorField};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// A field and its counters. Each side of a branch has its own, so they do not depend on what runs beside it.
+/// A field and its counters. Each side of a branch has its own, so they do not depend on what runs concurrently.
 pub(super) struct Counted<'f> {
     field: &'f dyn VectorField,
     evaluations: AtomicUsize,
@@ -11,12 +11,12 @@ pub(super) struct Counted<'f> {
 }
 
 impl<'f> Counted<'f> {
-    /// Counters at zero.
+    /// Starts with both counters at zero.
     pub(super) fn new(field: &'f dyn VectorField) -> Counted<'f> {
         Counted { field, evaluations: AtomicUsize::new(0), linearisations: AtomicUsize::new(0) }
     }
 
-    /// Points at which f, and points at which derivatives were evaluated since the last call.
+    /// Returns the numbers of points at which f, and at which derivatives were evaluated since the last call.
     pub(super) fn take(&self) -> [usize; 2] {
         [&self.evaluations, &self.linearisations].map(|counter| counter.swap(0, Ordering::Relaxed))
     }

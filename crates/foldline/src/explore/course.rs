@@ -1,7 +1,7 @@
-//! One trajectory of a model, as it is shown.
+//! A single trajectory of a model, for output.
 //!
-//! **Idea.** The integrator chooses its steps; the trajectory is given at the ends of the steps, or at given times from their
-//! interpolants. Sizes of the states come from a first, rough trajectory.
+//! **Idea.** The integrator chooses its steps; the trajectory is recorded at the ends of the steps, or at requested
+//! times from their interpolants. The sizes of the states come from a rough preliminary trajectory.
 
 use super::scales_from;
 use crate::contract::{Batch, Parameters, VectorField, Verdict};
@@ -17,23 +17,23 @@ pub struct Course {
     pub states: Vec<f64>,
     /// `[time][outputs]` outputs.
     pub outputs: Vec<f64>,
-    /// Why it ended.
+    /// Reason why the trajectory ended.
     pub outcome: Outcome,
 }
 
 /// Limits and accuracy of a trajectory.
 #[derive(Clone, Copy)]
 pub struct Way<'w> {
-    /// Relative tolerance of the integrator; that of a state is relative to its size.
+    /// Relative tolerance of the integrator; the absolute tolerance of a state is this times its size.
     pub tolerance: f64,
-    /// Accepted and rejected steps after which the trajectory ends.
+    /// Largest number of accepted and rejected steps.
     pub steps: usize,
-    /// Asked after every step.
+    /// Called after every step; true ends the trajectory.
     pub stop: &'w dyn Fn() -> bool,
 }
 
-/// The trajectory from `start` `[n]` over a time span, which may run backwards, at these parameters. It is given at `wanted`
-/// times, which grow in the direction of the span, or where there are none at the ends of the steps.
+/// Integrates from `start` `[n]` over a time span, which may run backwards, at these parameters. The trajectory is
+/// recorded at the `wanted` times, in the direction of the span, or at the ends of the steps if there are none.
 pub fn course(
     model: &Model,
     start: &[f64],
@@ -81,7 +81,7 @@ impl Record {
         self.states.extend_from_slice(&state[..self.n]);
     }
 
-    /// The next wanted time, if it lies at or before `end`.
+    /// Returns the next requested time, if it lies at or before `end`.
     fn due(&self, end: f64) -> Option<f64> {
         let at = self.wanted.as_ref().and_then(|wanted| wanted.get(self.next)).copied();
         at.filter(|at| if self.forwards { *at <= end } else { *at >= end })
@@ -112,7 +112,7 @@ impl Record {
     }
 }
 
-/// The outputs of a model at states `[lanes][n]`, with times in periods of the forcing: `[lanes][outputs]`.
+/// Returns the outputs `[lanes][outputs]` of a model at states `[lanes][n]`, with times in forcing periods.
 pub fn outputs(model: &Model, states: &[f64], parameters: &[f64], times: &[f64]) -> Vec<f64> {
     let (n, m) = (model.dim(), model.output_count());
     let lanes = states.len() / n.max(1);

@@ -1,15 +1,15 @@
-//! Leaving a branch point with a kernel of several dimensions.
+//! Switching at a branch point with a null space of several dimensions.
 //!
-//! **Idea.** Where several eigenvalues are 0 (multipliers 1) at once, as by a symmetry or in parts of a model that do not know of each other,
-//! many branches leave. Newton's method in the hyperplane across a direction of the kernel finds one of them, and directions that cover the
-//! sphere evenly find all, each being approached from a part of it.
+//! **Idea.** If several eigenvalues are 0 (multipliers 1) at once, because of a symmetry or in uncoupled parts of a
+//! model, many branches cross. Newton's method in the hyperplane orthogonal to a direction in the null space finds one
+//! of them, and directions that cover the sphere evenly find all, each being reached from some part of it.
 //!
-//! **Equations.** On the kernel the branches are, to leading order, the solutions of d equations that are quadratic or cubic in the d
-//! amplitudes: by Bézout's theorem
+//! **Equations.** On the null space the branches are, to leading order, the solutions of d equations that are quadratic
+//! or cubic in the d amplitudes. By Bézout's theorem
 //!
-//!   (1)  no more than (3^d - 1)/2 lines leave, if they are isolated
+//!   (1)  at most (3^d - 1)/2 lines cross, if they are isolated
 //!
-//! **Fails when** two branches leave at an angle below 11 degrees: they are taken for one.
+//! **Fails when** two branches cross at an angle below 11 degrees: they are taken for one.
 
 use super::System;
 use super::growth::{Beginning, problem_of};
@@ -21,23 +21,23 @@ use crate::linalg::{axpy, dot};
 use crate::special::branch_point;
 use std::f64::consts::TAU;
 
-/// Branches that cross at a branch point with a kernel of several dimensions.
+/// Branches that cross at a branch point with a null space of several dimensions.
 pub struct Crossings {
-    /// Their beginnings.
+    /// Their first points.
     pub beginnings: Vec<Beginning>,
-    /// In how many directions they were looked for.
+    /// Number of directions tried.
     pub directions: usize,
-    /// More were found than isolated ones there can be: they form a family, as by a continuous symmetry, of which one is kept.
+    /// True if more were found than can be isolated: they form a family, as by a continuous symmetry. One is kept.
     pub continuous: bool,
 }
 
-/// Directions that are tried for each branch that there can be.
+/// Directions tried for each possible branch.
 const TRIES: usize = 8;
 
-/// All branches that cross at a branch point with a kernel of that dimension.
+/// Finds all branches that cross at a branch point with a null space of that dimension.
 ///
 /// # Errors
-/// A sentence that says why there is none.
+/// A sentence that says why none was found.
 pub fn crossings(
     system: &System,
     settings: &Settings,
@@ -46,7 +46,7 @@ pub fn crossings(
     at: &SpecialPoint,
     dimension: usize,
 ) -> Result<Crossings, String> {
-    // Lines of two branches with a smaller angle between them, cos 0.98 = 11 degrees, are one.
+    // Branches whose lines make a smaller angle than arccos 0.98 = 11 degrees are the same.
     const ALIKE: f64 = 0.98;
     let most = (3usize.pow(dimension as u32) - 1) / 2;
     let mut problem = problem_of(system, free, degree, &at.point, false);
@@ -81,7 +81,7 @@ pub fn crossings(
             if mesh.is_empty() { first.tangent.clone() } else { problem.transfer(&first.tangent, &first.mesh, &mesh) };
         problem.set_mesh(&mesh);
         problem.anchor(&u);
-        // The share along the parent grows with the distance at which the branch was reached, and tells no two apart.
+        // The component along the parent depends on the distance at which the branch was reached, and identifies none.
         let along = problem.dot(&tangent, &at.point.tangent).abs();
         let mut line: Vec<f64> = kernel.iter().map(|own| problem.dot(&tangent, own)).collect();
         normalise(&mut line);
@@ -98,10 +98,10 @@ pub fn crossings(
     if beginnings.is_empty() { Err(why) } else { Ok(Crossings { beginnings, directions, continuous: false }) }
 }
 
-/// Unit vectors in so many dimensions that cover the sphere evenly.
+/// Returns unit vectors in that many dimensions that cover the sphere evenly.
 fn directions_of(dimension: usize, count: usize) -> Vec<Vec<f64>> {
-    // The additive sequence of the root of x^(d+1) = x + 1 has low discrepancy in d dimensions; normal numbers made of pairs of it by the method
-    // of Box and Muller have directions without preference.
+    // The additive sequence of the root of x^(d+1) = x + 1 has low discrepancy in d dimensions. Normal numbers made of
+    // pairs of it by the method of Box and Muller have isotropic directions.
     let pairs = dimension.div_ceil(2);
     let power = 1.0 / (2.0 * pairs as f64 + 1.0);
     let root = (0..50).fold(1.5f64, |root, _| (1.0 + root).powf(power));
@@ -124,9 +124,9 @@ fn normalise(x: &mut [f64]) {
     x.iter_mut().for_each(|x| *x /= norm);
 }
 
-/// Distance along the tangent from `guess`, near the branch point `u`, at which the part of the residual in the kernel is smallest: there
-/// Newton's method is led to the branch that is closest in direction, rather than to the one that attracts it most. The almost singular matrix at
-/// the branch point magnifies just that part.
+/// Returns the distance along the tangent from `guess`, near the branch point `u`, at which the part of the residual in
+/// the null space is smallest. From there Newton's method is led to the branch closest in direction, rather than to the
+/// one that attracts it most. The almost singular matrix at the branch point magnifies just that part.
 fn shift_along(
     problem: &mut dyn ZeroProblem,
     u: &[f64],

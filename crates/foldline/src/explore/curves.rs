@@ -1,7 +1,7 @@
-//! A special point held along a curve in two parameters.
+//! Bifurcation curves: continuation of a special point in two parameters.
 //!
-//! **Idea.** The special point of a finished branch, corrected with the condition that holds it, is the first point of a
-//! curve in the branch's parameter and a second one. It is followed like any other branch.
+//! **Idea.** The special point of a finished branch, corrected with the defining system of its bifurcation, is the
+//! first point of a curve in the branch's parameter and a second one. It is followed like any other branch.
 
 use super::System;
 use super::growth::{self, Beginning, Growth, Line};
@@ -12,13 +12,13 @@ use crate::diagram::{Branch, Ending, Origin, Point, Shown, SpecialPoint};
 use crate::special::mark::Mark;
 use crate::special::unfolded::{Unfolded, sizes};
 
-/// A special point moves along the branch by more than the error of the solutions; against the tolerance of the plan.
+/// Factor on the plan's tolerance: the error of a special point along the branch exceeds that of the solutions.
 const SHARPER: f64 = 0.2;
 
-/// The special point of `branch` from which a curve of the plan starts.
+/// Returns the special point of `branch` from which a curve of the plan starts.
 ///
 /// # Errors
-/// A sentence that says which there are, if none fits.
+/// A sentence that lists the special points of the branch, if none fits.
 pub fn start<'b>(plan: &CurvePlan, branch: &'b Branch) -> Result<&'b SpecialPoint, String> {
     let value = |special: &SpecialPoint| special.point.parameters.get(branch.free).copied().unwrap_or(0.0);
     let fitting = branch.special.iter().filter(|special| special.kind == plan.hold);
@@ -33,7 +33,7 @@ pub fn start<'b>(plan: &CurvePlan, branch: &'b Branch) -> Result<&'b SpecialPoin
     })
 }
 
-/// What governs a curve, and which sides are followed.
+/// Settings of a curve, and the sides to follow.
 fn settings(system: &System, plan: &Plan, curve: &CurvePlan, first: usize, value: f64) -> (Settings, [bool; 2]) {
     let [own, second] = curve.ranges;
     let (range, sides) = match curve.until {
@@ -45,8 +45,8 @@ fn settings(system: &System, plan: &Plan, curve: &CurvePlan, first: usize, value
     (Settings { bounds: vec![(first, own)], stability: false, ..usual }, sides)
 }
 
-/// Follows a curve of the plan, or what is missing of it; `parent` is the branch that it starts from. Returns the curve and
-/// whether the observer wants to go on.
+/// Follows a curve of the plan, or the part of it that is missing; `parent` is the branch on which it starts. Returns
+/// the curve, and false if the observer wants to stop.
 pub fn follow(
     system: &System,
     plan: &Plan,
@@ -58,7 +58,7 @@ pub fn follow(
     follow_from(system, plan, curve, parent, start(curve, parent), &curve.marks, earlier, observer)
 }
 
-/// The same from a given special point, with values to mark on the way.
+/// Follows a curve of the plan like [`follow`], from a given special point and with values to mark.
 pub fn follow_from(
     system: &System,
     plan: &Plan,
@@ -108,7 +108,7 @@ pub fn follow_from(
         let line = Line { held: branch.held, ..Line::new(curve.free) };
         let mut problem = line.problem(system, plan.degree, &special.point);
         let station = growth::polished(&mut *problem, &settings, &special.point).map_err(|why| why.to_string())?;
-        // (The tangent tells how fast the equations would have to be added to.)
+        // (The tangent shows how fast the unfolding residual would grow.)
         if problem.departure(&station.u) > settings.newton_tolerance()
             || problem.departure(&station.tangent) > settings.tolerance
         {
@@ -130,10 +130,10 @@ pub fn follow_from(
     (branch, going)
 }
 
-/// The solution at the end of a curve as a start for a branch in the parent's parameter.
+/// Returns the solution at the end of a curve, as a start for a branch in the parent's parameter.
 ///
 /// # Errors
-/// Why there is none.
+/// A sentence that says why there is none.
 pub fn end_of(system: &System, plan: &Plan, curve: &CurvePlan, branch: &Branch) -> Result<Point, String> {
     let start = branch.points.iter().find(|p| p.position == 0).map(|p| p.parameters[curve.free]);
     let backward = matches!((curve.until, start), (Some(target), Some(value)) if target < value);
@@ -150,10 +150,10 @@ pub fn end_of(system: &System, plan: &Plan, curve: &CurvePlan, branch: &Branch) 
     }
 }
 
-/// A solution beside a point of a curve, from which the branch in the parent's parameter, of that index, can start.
+/// Returns a solution near a point of a curve, as a start for a branch in the parent's parameter, of index `first`.
 ///
 /// # Errors
-/// Why there is none.
+/// A sentence that says why there is none.
 pub fn leaving(system: &System, plan: &Plan, first: usize, point: &Point) -> Result<Point, String> {
     let settings = growth::settings(system, plan.tolerance, [f64::NEG_INFINITY, f64::INFINITY], 0);
     let mut problem = growth::problem_of(system, first, plan.degree, point, false);

@@ -1,7 +1,7 @@
 //! Diagnosis of a failed search for a first solution: the likely cause in the vector field, and a cure.
 //!
-//! **Idea.** Values of f at a few points of the sampling box reveal whether some combination of the states is conserved. Then no
-//! equilibrium or cycle is isolated, and Newton's method does not converge.
+//! **Idea.** Values of f at a few points of the sampling box reveal whether some combination of the states is
+//! conserved. Then no equilibrium or cycle is isolated, and Newton's method does not converge.
 
 use super::direct::{transient, turn};
 use super::{System, symmetry};
@@ -12,13 +12,13 @@ use crate::linalg::max_abs;
 use crate::model::{conserved_at, in_words, shifts};
 use crate::special::connection::in_first_turn;
 
-/// Size, relative to the largest, below which what is left of a column is rounding.
+/// Size, relative to the largest, below which the remainder of a column is rounding.
 const ROUNDING: f64 = 1e-10;
 
-/// What is known of trajectories that led nowhere.
+/// Observations of trajectories that led to no solution.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Seen<'a> {
-    /// The state that was given, if one was.
+    /// The given state, if any.
     pub state: Option<&'a [f64]>,
     /// True if some trajectories stopped because their steps became too small.
     pub stuck: bool,
@@ -30,7 +30,7 @@ pub(super) struct Seen<'a> {
     pub unsettled: bool,
 }
 
-/// Lines that say a likely cause and a cure, to be put after what happened.
+/// Returns lines with a likely cause and a cure, to be appended to a message about what happened.
 pub(super) fn of_no_start(system: &System, parameters: &[f64], seen: Seen) -> String {
     let stuck = seen.stuck;
     if let Some(why) = of_laws(system, parameters) {
@@ -83,9 +83,9 @@ pub(super) fn of_no_start(system: &System, parameters: &[f64], seen: Seen) -> St
     }
 }
 
-/// Names of the states in which f has the period 2π and on which it depends, seen at a few places of the sampling box.
+/// Names of the states on which f depends with the period 2π, judged at a few points of the sampling box.
 fn angles(system: &System, parameters: &[f64]) -> Vec<String> {
-    /// Places, and the share of the largest component of f that counts as no difference.
+    /// Number of points, and the share of the largest component of f that counts as no difference.
     const PLACES: usize = 8;
     const SAME: f64 = 1e-9;
     let n = system.field.dim();
@@ -134,7 +134,7 @@ fn of_exit(system: &System, exit: &Exit) -> String {
     )
 }
 
-/// The first few components of a state, as text.
+/// Returns the first few components of a state as text.
 pub(super) fn place(system: &System, state: &[f64]) -> String {
     /// Components that fit on one line.
     const TOLD: usize = 6;
@@ -169,8 +169,9 @@ fn of_family(system: &System, parameters: &[f64]) -> Option<String> {
     })
 }
 
-/// Cause and cure for a forced system so lightly damped that transients outlast every trajectory. The decay rate is that of the
-/// linearisation at the given state or, if none was given, at the state of the sampling box nearest to the origin.
+/// Cause and cure for a forced system so lightly damped that transients outlast every trajectory. The decay rate is
+/// that of the linearisation at the given state or, if none was given, at the state of the sampling box nearest to the
+/// origin.
 fn of_slow_decay(system: &System, parameters: &[f64], state: Option<&[f64]>) -> Option<String> {
     let n = system.field.dim();
     if !system.field.forced() {
@@ -238,11 +239,11 @@ pub(super) fn of_laws(system: &System, parameters: &[f64]) -> Option<String> {
     ))
 }
 
-/// Explains the end of a branch of forced cycles next to a bound of the range at which the forcing has no period, such as frequency
-/// zero; neither the mesh nor the field is at fault there. Returns any other end unchanged.
+/// Explains the end of a branch of forced cycles next to a bound of the range at which the forcing has no period, such
+/// as frequency zero; neither the mesh nor the field is at fault there. Returns any other end unchanged.
 pub(super) fn of_forcing(system: &System, free: usize, range: [f64; 2], last: &Point, ending: Ending) -> Ending {
-    /// Largest distance from the bound, in widths of the range. With a range of frequencies from 0 the period there is a hundred times
-    /// that at the other bound.
+    /// Largest distance from the bound, in widths of the range. With a range of frequencies from 0 the period there is
+    /// a hundred times that at the other bound.
     const NEAR: f64 = 0.01;
     let (Ending::MeshTooLarge(text) | Ending::StepTooSmall(text) | Ending::NotFinite(text)) = &ending else {
         return ending;

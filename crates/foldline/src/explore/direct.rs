@@ -1,17 +1,18 @@
 //! Cycles of lightly damped forced models, by Newton's method instead of simulation.
 //!
-//! **Idea.** A cycle that lasts one forcing period solves a boundary-value problem on a known interval. Newton's method starts from
-//! the given state held constant, for which its first step is the linear response, or from the trajectory over one period. The
-//! multipliers of the cycle determine the length of transients. The cycle replaces the limit of the trajectory only if transients last
-//! longer than trajectories are integrated; otherwise the trajectory decides, once all transients have decayed.
+//! **Idea.** A cycle that lasts one forcing period solves a boundary-value problem on a known interval. Newton's method
+//! starts from the given state held constant, for which its first step is the linear response, or from the trajectory
+//! over one period. The multipliers of the cycle determine the length of transients. The cycle replaces the limit of
+//! the trajectory only if transients last longer than trajectories are integrated; otherwise the trajectory decides,
+//! once all transients have decayed.
 //!
-//! **Equations.** With μ the multiplier of largest modulus and s integration steps per forcing period, a transient decays by the factor
-//! [`FALL`] in
+//! **Equations.** With μ the multiplier of largest modulus and s integration steps per forcing period, a transient
+//! decays by the factor [`FALL`] in
 //!
 //!   (1)  N = ln FALL / -ln |μ|   periods, or s N steps.
 //!
-//! **Fails when** Newton's method diverges from both starting points, as it may close to a resonance, where the linear response is far
-//! from the cycle.
+//! **Fails when** Newton's method diverges from both starting points, as it may close to a resonance, where the linear
+//! response is far from the cycle.
 
 use super::System;
 use super::profile::PARTS;
@@ -21,10 +22,11 @@ use crate::contract::Verdict;
 use crate::diagram::{Point, Solution};
 use crate::simulation::{Clocked, Integrator, Passage, Tolerance};
 
-/// Decay of a transient after which its limit can be recognised. Empirical: the limit is then known to a thousandth of the initial
-/// deviation, enough for Newton's method to start from.
+/// Decay of a transient after which its limit can be recognised. Empirical: the limit is then known to a thousandth of
+/// the initial deviation, enough for Newton's method to start from.
 const FALL: f64 = 1e3;
-/// Relative accuracy of the trajectory over one period. It is a starting point for Newton's method; the value is the default tolerance.
+/// Relative accuracy of the trajectory over one period. It is a starting point for Newton's method; the value is the
+/// default tolerance.
 const INTEGRATION: f64 = 1e-6;
 /// Number of periods beyond which slow decay cannot be distinguished from none: multipliers are accurate to about 1e-9.
 pub(super) const NEVER: f64 = 1e9;
@@ -42,7 +44,8 @@ pub(super) struct Direct {
     pub(super) slow: bool,
 }
 
-/// The cycle of one forcing period that Newton's method finds from `state`, if it is stable or passes through the state.
+/// The cycle of one forcing period that Newton's method finds from `state`, if it is stable or passes through the
+/// state.
 pub(super) fn direct(system: &System, parameters: &[f64], tolerance: f64, state: &[f64]) -> Option<Direct> {
     if !system.field.forced() {
         return None;
@@ -54,12 +57,14 @@ pub(super) fn direct(system: &System, parameters: &[f64], tolerance: f64, state:
 }
 
 impl Direct {
-    /// True if a trajectory that ended in `state` after `time`, in time units of the model, has settled on the cycle: transients have
-    /// decayed, and the state lies close to the cycle, relative to the extent of each component.
+    /// True if a trajectory that ended in `state` after `time`, in time units of the model, has settled on the cycle:
+    /// transients have decayed, and the state lies close to the cycle, relative to the extent of each component.
     pub(super) fn ends(&self, time: f64, state: &[f64], unit: f64) -> bool {
-        /// Points of the cycle that are compared. Of a sinusoidal motion they are π/2048 of the extent apart, well below `NEXT`.
+        /// Points of the cycle that are compared. Of a sinusoidal motion they are π/2048 of the extent apart, well
+        /// below `NEXT`.
         const PLACES: usize = 2048;
-        /// Largest distance, as a share of the extent: a factor of safety of ten over the remaining transient, 1 / [`FALL`].
+        /// Largest distance, as a share of the extent: a factor of safety of ten over the remaining transient, 1 /
+        /// [`FALL`].
         const NEXT: f64 = 0.01;
         let Solution::Cycle(cycle) = &self.point.solution else { return false };
         let off = |t: usize| {

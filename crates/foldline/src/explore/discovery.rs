@@ -1,24 +1,24 @@
-//! A diagram found without being told where anything is.
+//! Automatic exploration: a diagram without prescribed starting points.
 //!
-//! **Idea.** At values spread over the range of the parameter attractors are sampled, and equilibria, stable or not, are
-//! found by Newton's method from the same initial states. What lies on no branch yet begins a new one, which is followed over
-//! the whole range, with everything that is switched to from it. Folds are followed in a second parameter, if there is
-//! one: where their curve comes back to the value that it started with lies another fold, perhaps of a branch that nothing else
-//! leads to.
+//! **Idea.** At values spread over the range of the parameter attractors are sampled, and equilibria, stable or not,
+//! are found by Newton's method from the same initial states. Any solution not on a known branch starts a new one,
+//! which is followed over the whole range, with all branches that bifurcate from it. If there is a second parameter,
+//! folds are continued in it: where their curve returns to the initial value of that parameter there is another fold,
+//! perhaps on a branch that is not reached otherwise.
 //!
-//! 1. the values: halves, quarters, eighths of the range and so on, so that the largest gap is looked into first;
-//! 2. at each value (`lookout`): equilibria by growing size, then cycles by falling number of samples that went there;
+//! 1. the values: halves, quarters, eighths of the range and so on, so that the largest gap is explored first;
+//! 2. at each value (`lookout`): equilibria by increasing size, then cycles by decreasing number of hits;
 //! 3. each of these: on a known branch (`known`), or the start of a new one (`family`);
-//! 4. next to resonances of the linear response of a whirling or forced model (`resonances`), where isolas are that attract few samples:
-//!    cycles from averaged equations, likewise;
-//! 5. each fold of each branch, unless a curve has passed it: its curve (`curves`), and a new branch from each fold met there
-//!    that is not known; folds of these too, until there is no more.
+//! 4. near resonances of the linear response of a whirling or forced model (`resonances`), where isolas attract few
+//!    samples: cycles from averaged equations, treated as in step 3;
+//! 5. each fold of each branch, unless a curve has passed it: its curve (`curves`), and a new branch from each unknown
+//!    fold met there; then the folds of these branches, until there are no more.
 //!
-//! It ends when all of this is done, or when no new branch may be begun since the budget of points is used up; what was left
-//! undone then is said. The result depends on the number of threads in no way.
+//! The exploration ends when all of this is done, or when the budget of points is used up and no new branch may start;
+//! the remaining steps are then reported. The result does not depend on the number of threads.
 //!
-//! **Fails when** a branch has no stable part at any of the values, no equilibria, no bifurcation that leads to it, no resonance next to it
-//! and no fold connected with a known one: there is no proof that a diagram is complete.
+//! **Fails when** a branch has no stable part at any of the values, no equilibria, no bifurcation that leads to it, no
+//! resonance nearby and no fold connected with a known one: there is no proof that a diagram is complete.
 
 use super::family::Work;
 use super::growth::settings;
@@ -38,7 +38,7 @@ pub(super) fn explore(work: &mut Work, plan: &ExplorePlan, jobs: usize) -> bool 
     work.budget = plan.budget;
     let lookout = Lookout::new(work.system, plan, work.plan.tolerance);
     let mut discovery = Discovery { work, plan, named: Vec::new(), unsettled: 0 };
-    // While this thread follows what was found at one value, others look at the next ones.
+    // While this thread follows the solutions found at one value, others scan the next values.
     let sampled = std::thread::scope(|scope| {
         (1..jobs.min(plan.values)).for_each(|_| drop(scope.spawn(|| while lookout.look() {})));
         let going = (0..plan.values).all(|index| discovery.exhausted() || discovery.met(index, lookout.at(index)));
@@ -54,14 +54,14 @@ pub(super) fn explore(work: &mut Work, plan: &ExplorePlan, jobs: usize) -> bool 
 struct Discovery<'d, 'w> {
     work: &'d mut Work<'w>,
     plan: &'d ExplorePlan,
-    /// What roots were called, such as `cycle`, once for each of them.
+    /// Type names of the roots so far, such as `cycle`, one for each root.
     named: Vec<String>,
     /// Number of values at which some samples did not settle.
     unsettled: usize,
 }
 
 impl Discovery<'_, '_> {
-    /// Steps 2 and 3 at one of the values.
+    /// Carries out steps 2 and 3 at one of the values.
     fn met(&mut self, index: usize, sight: Sight) -> bool {
         let value = sight.value;
         if !self.work.tell(Event::Visited(&self.plan.name, value, index + 1, self.plan.values)) {
@@ -76,7 +76,7 @@ impl Discovery<'_, '_> {
         self.note(&said) && found.into_iter().all(|point| self.followed(point, origin.clone()))
     }
 
-    /// Step 3: a new branch from a solution, unless that lies on one that is known.
+    /// Step 3: follows a new branch from a solution, unless it lies on a known one.
     fn followed(&mut self, point: Point, origin: Origin) -> bool {
         if self.exhausted() {
             return true;
@@ -110,7 +110,7 @@ impl Discovery<'_, '_> {
         work.grown(&branch, origin, Ok(point))
     }
 
-    /// Step 4.
+    /// Carries out step 4.
     fn resonant(&mut self) -> bool {
         let (system, plan, tolerance) = (self.work.system, self.plan, self.work.plan.tolerance);
         if system.whirl.is_none() && !system.field.forced() || self.exhausted() {
@@ -149,7 +149,7 @@ impl Discovery<'_, '_> {
             ))
     }
 
-    /// Step 5.
+    /// Carries out step 5.
     fn connected(&mut self, second: usize, range: [f64; 2]) -> bool {
         let home = self.plan.parameters[second];
         // Folds that a curve has passed.
@@ -187,7 +187,7 @@ impl Discovery<'_, '_> {
         true
     }
 
-    /// The curve of a fold in both parameters, with marks where the second is what it is along the branches.
+    /// Follows the curve of a fold in both parameters, with a mark at the value that the second has along the branches.
     fn fold_curve(
         &self,
         parent: &Branch,
@@ -212,17 +212,17 @@ impl Discovery<'_, '_> {
         curves::follow_from(work.system, work.plan, &curve, parent, Ok(fold), &[home], earlier, work.observer)
     }
 
-    /// Whether it is a fold of a known branch.
+    /// True if a point is a fold of a known branch.
     fn known_fold(&self, at: &Point) -> bool {
         let branches = self.work.branches.iter().filter(|branch| branch.held.is_none());
         let mut folds = branches.flat_map(|branch| branch.special.iter().filter(|s| s.kind == Kind::Fold));
         folds.any(|fold| self.same_fold(&fold.point, at))
     }
 
-    /// Whether two folds at the same value of the second parameter are the same, or images of each other.
+    /// True if two folds at the same value of the second parameter are the same, or images of each other.
     fn same_fold(&self, a: &Point, b: &Point) -> bool {
-        // The solution at a fold moves along the branch with the root of the error of its place. Two folds that are taken for
-        // different ones though they are not lead to a branch that is known.
+        // An error ε of the fold value moves the solution along the branch by √ε. If one fold is taken for two, the
+        // second only leads to a known branch.
         const NEAR: f64 = 1e-4;
         let (system, free, [low, high]) = (self.work.system, self.plan.free, self.plan.range);
         let [p, q] = [a, b].map(|point| point.parameters[free]);
@@ -230,7 +230,7 @@ impl Discovery<'_, '_> {
             && system.reflections.iter().any(|r| a.difference(b, system.measure(), r) < NEAR.sqrt())
     }
 
-    /// A new branch from a fold that a curve has met.
+    /// Follows a new branch from a fold that a curve has met.
     fn left_from(&mut self, fold: &Point, home: f64, second: usize, curve: &str) -> bool {
         let mut fold = fold.clone();
         fold.parameters[second] = home;
@@ -257,7 +257,7 @@ impl Discovery<'_, '_> {
         self.work.tell(Event::Short(&self.plan.name, text))
     }
 
-    /// What came of it.
+    /// Reports the result of the exploration.
     fn told(&self) -> bool {
         let count = |held: bool| self.work.branches.iter().filter(|b| b.held.is_some() == held).count();
         let (branches, curves, points) = (count(false), count(true), self.work.points());

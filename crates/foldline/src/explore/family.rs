@@ -10,7 +10,7 @@ use crate::contract::{Event, Observer, Verdict};
 use crate::diagram::{Branch, Diagram, Ending, Family, Kind, Origin, Point, Shown, Solution, SpecialPoint};
 use std::ops::Range;
 
-/// What starts at a seed.
+/// A root: something that starts at a seed, or finds its own starts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Root {
     /// The branch of that index.
@@ -21,7 +21,7 @@ pub enum Root {
     Exploration(usize),
 }
 
-/// Everything that starts at a seed, or looks for starts itself.
+/// Returns everything that starts at a seed, or finds its own starts.
 pub fn roots(plan: &Plan) -> Vec<Root> {
     let seeded = |start: &Start| matches!(start, Start::Seed(_));
     let branches = (0..plan.branches.len()).filter(|&i| seeded(&plan.branches[i].start)).map(Root::Branch);
@@ -30,7 +30,7 @@ pub fn roots(plan: &Plan) -> Vec<Root> {
     branches.chain(homotopies).chain(explorations).collect()
 }
 
-/// How many branches may grow from there, roughly: those with most are best begun first.
+/// Estimated number of branches that grow from a root; the largest are best started first.
 pub fn weight(plan: &Plan, root: Root) -> usize {
     let following = |end: Start| {
         let branches = (0..plan.branches.len()).filter(|&i| plan.branches[i].start == end).map(Root::Branch);
@@ -57,7 +57,7 @@ pub fn weight(plan: &Plan, root: Root) -> usize {
     }
 }
 
-/// Everything that grows from there, in the order in which it was begun.
+/// Follows everything that grows from a root, in order.
 pub fn grow(
     system: &System,
     plan: &Plan,
@@ -89,7 +89,7 @@ pub fn grow(
     work.branches
 }
 
-/// What grows, and what it grows from.
+/// The branches grown so far, and what they grow from.
 pub(super) struct Work<'w> {
     pub(super) system: &'w System<'w>,
     pub(super) plan: &'w Plan,
@@ -100,13 +100,13 @@ pub(super) struct Work<'w> {
     pub(super) budget: usize,
 }
 
-/// A branch still to be switched from: its index, and how deep.
+/// A branch yet to be switched from: its index, and the depth.
 struct Pending {
     branch: usize,
     switching: Switching,
 }
 
-/// A special point that is left, and how.
+/// A special point at which to switch, with the settings for it.
 struct Leaving<'l> {
     plan: &'l BranchPlan,
     settings: &'l Settings,
@@ -118,7 +118,7 @@ struct Leaving<'l> {
 }
 
 impl Work<'_> {
-    /// Follows a branch of the plan, what is switched to from it, and the branches that start at its end.
+    /// Follows a branch of the plan, the branches switched to from it, and the branches that start at its end.
     fn planned(&mut self, index: usize, origin: Origin, start: Result<Point, String>) -> bool {
         let plan = &self.plan.branches[index];
         let first = self.branches.len();
@@ -152,7 +152,7 @@ impl Work<'_> {
         })
     }
 
-    /// Follows a branch and what is switched to from it. Returns false if the observer wants to stop.
+    /// Follows a branch and the branches switched to from it. Returns false if the observer wants to stop.
     pub(super) fn grown(&mut self, plan: &BranchPlan, origin: Origin, start: Result<Point, String>) -> bool {
         let Some((branch, going)) = self.root(plan, origin, start) else { return true };
         self.branches.push(branch);
@@ -170,12 +170,12 @@ impl Work<'_> {
         true
     }
 
-    /// How many points all branches have.
+    /// Number of points on all branches.
     pub(super) fn points(&self) -> usize {
         self.branches.iter().map(|branch| branch.points.len()).sum()
     }
 
-    /// The branches and homotopies that start there.
+    /// Follows the branches and homotopies that start there.
     fn after(&mut self, start: Start, name: &str, point: Result<Point, String>) -> bool {
         let plan = self.plan;
         let origin = || Origin::EndOf(name.to_string());
@@ -185,7 +185,7 @@ impl Work<'_> {
             && homotopies.into_iter().all(|i| self.brought(i, origin(), point.clone()))
     }
 
-    /// A homotopy, and what starts where it arrives.
+    /// Follows a homotopy, and everything that starts at its goal.
     fn brought(&mut self, index: usize, origin: Origin, start: Result<Point, String>) -> bool {
         let homotopy = &self.plan.homotopies[index];
         let route = homotopy::find(self.system, self.plan, homotopy, origin, start, self.earlier, self.observer);
@@ -193,7 +193,7 @@ impl Work<'_> {
         route.going && self.after(Start::EndOfHomotopy(index), &homotopy.name, route.arrived)
     }
 
-    /// The curves that start from those branches, and what starts at their ends.
+    /// Follows the curves that start on those branches, and everything that starts at their ends.
     fn curves(&mut self, parents: Range<usize>) -> bool {
         for (index, curve) in self.plan.curves.iter().enumerate() {
             let Some(parent) = self.branches[parents.clone()].iter().find(|b| b.name == curve.of).cloned() else {
@@ -220,7 +220,7 @@ impl Work<'_> {
         (growth::settings(self.system, self.plan.tolerance, range, plan.max_points), sides)
     }
 
-    /// A branch of the plan itself; resumed if an earlier run has it.
+    /// Follows a branch of the plan itself, or resumes it if an earlier run has it.
     fn root(&self, plan: &BranchPlan, origin: Origin, start: Result<Point, String>) -> Option<(Branch, bool)> {
         let known = self.earlier.branch(&plan.name).filter(|b| !b.points.is_empty());
         if let Some(earlier) = known {
@@ -276,7 +276,7 @@ impl Work<'_> {
             marks: &plan.marks,
             observer: self.observer,
             whole: false,
-            // Switching asks whether a branch is known already, and compares with the points of all.
+            // Branch switching checks whether a branch is known by comparison with the points of all.
             sparse: self.observer.stores()
                 && self.plan.explorations.is_empty()
                 && !self.plan.branches.iter().any(|b| b.switching.anywhere()),
@@ -334,7 +334,7 @@ impl Work<'_> {
             return going;
         }
         let parameter = special.point.parameters[parent.free];
-        // Where a branch that crosses another one started, the other one is its parent.
+        // At the branch point where a branch itself started, the other branch is its parent.
         if let Origin::Switch { parent: from, kind: Kind::BranchPoint, parameter: there } = &parent.origin
             && special.kind == Kind::BranchPoint
             && (there - parameter).abs() < 1e3 * self.plan.tolerance * parent.size(*there)
@@ -361,9 +361,10 @@ impl Work<'_> {
         }
     }
 
-    /// Follows all branches that leave a branch point with a kernel of several dimensions. Returns false if the observer wants to stop.
+    /// Follows all branches that cross at a branch point with a null space of several dimensions. Returns false if the
+    /// observer wants to stop.
     fn left_in_all_directions(&mut self, at: &Leaving, name: &str, dimension: usize, more: &mut Vec<Pending>) -> bool {
-        // The directions grow as 3^d.
+        // The number of directions grows as 3^d.
         const MOST: usize = 4;
         let Leaving { settings, parent, special, label, .. } = at;
         if let Origin::Switch { parent: from, kind: Kind::BranchPoint, parameter: there } = &parent.origin
@@ -409,16 +410,16 @@ impl Work<'_> {
             })
     }
 
-    /// Goes on with a branch of that name if an earlier run has it.
+    /// Resumes the branch of that name if an earlier run has it.
     fn resumed(&mut self, at: &Leaving, name: &str, more: &mut Vec<Pending>) -> Option<bool> {
-        // A doubled branch of which there is only the special point begins anew.
+        // A doubled branch that has only the special point starts again.
         let begun = |b: &&Branch| b.points.len() > usize::from(growth::is_doubled(b));
         let mut branch = self.earlier.branch(name).filter(begun)?.clone();
         let going = self.growth(at.plan, at.settings, [true, true], &at.parent.special).resume(&mut branch);
         Some(self.keep(at, branch, going, more))
     }
 
-    /// Follows a branch from its beginning, unless it is known.
+    /// Follows a branch from its first point, unless it is known.
     fn begun(
         &mut self,
         at: &Leaving,
@@ -431,7 +432,7 @@ impl Work<'_> {
         let (Beginning::Inside(station) | Beginning::Edge { first: station, .. }) = &beginning;
         let (free, degree, first) = (parent.free, self.plan.degree, &station.point);
         let known = known::branch_of(self.system, settings, free, degree, first, &self.branches, self.observer);
-        // Next to a kernel of several dimensions branches are closer to their parent than tells apart; that they leave it was seen by their direction.
+        // Branches are too close to a parent with a null space of several dimensions; their direction told them apart.
         let parted = special.kind == Kind::BranchPoint && special.kernel() > 1;
         if let Some(already) = known.filter(|known| !(parted && *known == parent.name)) {
             return self.tell(Event::Note(&parent.name, &format!("{label}: leads to {already}, already known")));
@@ -443,15 +444,15 @@ impl Work<'_> {
         self.keep(at, branch, going, more)
     }
 
-    /// Keeps a branch that was switched to, to be switched from itself.
+    /// Keeps a branch that was switched to, and queues it for switching.
     fn keep(&mut self, at: &Leaving, branch: Branch, going: bool, more: &mut Vec<Pending>) -> bool {
         self.branches.push(branch);
         more.push(Pending { branch: self.branches.len() - 1, switching: at.below.clone() });
         going
     }
 
-    /// The beginning of a branch with its cycle reduced to the minimal period. At a branch point, a cycle that bifurcated from
-    /// several turns of another meets that other cycle again.
+    /// Returns the start of a branch with its cycle reduced to the minimal period. A cycle that bifurcated from several
+    /// turns of another meets that other cycle again at a branch point.
     fn of_one_turn(&self, settings: &Settings, free: usize, at: Kind, beginning: Beginning) -> Beginning {
         let (Beginning::Inside(station) | Beginning::Edge { first: station, .. }) = &beginning;
         let once = (at == Kind::BranchPoint).then(|| reduced(self.system, settings, &station.point)).flatten();
@@ -463,7 +464,7 @@ impl Work<'_> {
     }
 }
 
-/// Reports a branch that could not begin. Returns false if the observer wants to stop.
+/// Reports a branch that could not start. Returns false if the observer wants to stop.
 pub(super) fn without_start(observer: &dyn Observer, branch: &mut Branch, why: String) -> bool {
     let tell = |event: Event| observer.observe(event) == Verdict::Continue;
     if observer.stopping() {
@@ -478,7 +479,7 @@ pub(super) fn without_start(observer: &dyn Observer, branch: &mut Branch, why: S
     going & tell(Event::End(branch))
 }
 
-/// The end of a switched branch at which another one starts: at a bound or requested stop, the forward end first.
+/// End of a switched branch at which another one starts: at a bound or requested stop, the forward end first.
 fn end_of_switched(branch: &Branch) -> Result<Point, String> {
     let ends = [(&branch.ends[1], branch.points.last()), (&branch.ends[0], branch.points.first())];
     let whole = |end: &Option<Ending>| matches!(end, Some(Ending::Bound(_) | Ending::Asked(_)));
@@ -489,13 +490,13 @@ fn end_of_switched(branch: &Branch) -> Result<Point, String> {
     })
 }
 
-/// The end at which a planned branch hands over: its target, or its forward bound.
+/// Returns the end of a planned branch at which another one starts: its target, or its forward bound.
 fn end_of(branch: &Branch, plan: &BranchPlan) -> Result<Point, String> {
     let start = branch.points.iter().find(|p| p.position == 0).map(|p| p.parameters[plan.free]);
     let backward = matches!((plan.until, start), (Some(target), Some(value)) if target < value);
     let side = if backward { 0 } else { 1 };
     let point = if backward { branch.points.first() } else { branch.points.last() };
-    // A branch that turned round may have left its range where it began.
+    // A branch that turned back may have left its range where it began.
     let arrived = |value: f64| plan.until.is_none_or(|target| (value - target).abs() <= 1e-9 * branch.size(target));
     match (&branch.ends[side], point) {
         (Some(Ending::Bound(value)), Some(point)) if arrived(*value) => Ok(point.clone()),

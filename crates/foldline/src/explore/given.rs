@@ -1,7 +1,7 @@
-//! Solutions that were computed elsewhere.
+//! Solutions computed elsewhere.
 //!
-//! **Idea.** A profile that another program has computed is close to a solution if the models are the same. By how much the
-//! equations are off where it is given tells whether they are, before anything is solved; Newton's method does the rest.
+//! **Idea.** A profile computed by another program is close to a solution if the models are the same. The residual of
+//! the equations shows whether they are before anything is solved; Newton's method does the rest.
 
 use super::System;
 use super::growth::{first, polished, problem_of, settings};
@@ -13,9 +13,9 @@ use crate::contract::{Batch, Parameters, VectorField};
 use crate::diagram::{Cycle, Point, Solution};
 use crate::problem::gauss::Scheme;
 
-/// By how much a solution fails to satisfy the model: the component where it is worst, and there the largest |f - ẋ| over the
-/// largest |f| of that component on the cycle; for an equilibrium |f| over the sum of what every state and parameter
-/// contributes to it, Σ |∂f/∂x x| + Σ |∂f/∂p p|. `None` where f is not finite.
+/// Relative residual of a solution in the model: the component where it is worst, and there the largest |f - ẋ| over
+/// the largest |f| of that component on the cycle; for an equilibrium |f| over the sum of the contributions of all
+/// states and parameters to it, Σ |∂f/∂x x| + Σ |∂f/∂p p|. `None` if f is not finite.
 ///
 /// `parameters` `[k]`. The numbers of states must agree.
 pub fn mismatch(field: &dyn VectorField, parameters: &[f64], solution: &Solution) -> Option<(usize, f64)> {
@@ -54,7 +54,7 @@ fn along(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle) -> Vec<[f64
             for (i, [off, size]) in sizes.iter_mut().enumerate() {
                 let slope: f64 = row.iter().zip(nodes.iter().skip(i).step_by(n)).map(|(d, x)| d * x).sum();
                 let now = (f[i] - slope / duration).abs();
-                // `max` would pass over what is not a number.
+                // `max` would ignore NaN.
                 *off = if now.is_nan() { now } else { off.max(now) };
                 *size = size.max(f[i].abs());
             }
@@ -63,7 +63,7 @@ fn along(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle) -> Vec<[f64
     sizes
 }
 
-/// The cycle next to a given one, over its minimal period.
+/// Returns the cycle closest to a given one, over its minimal period.
 ///
 /// # Errors
 /// The failure of Newton's method, and the residual of the given cycle.
@@ -79,8 +79,8 @@ pub(super) fn from_cycle(system: &System, seed: &SeedPlan, tolerance: f64, cycle
     });
     // A cycle of a family: try every parameter as the free one, since any may be the one that destroys the family.
     let found = found.or_else(|why| {
-        /// Relative residual of the given cycle below which the search is worth while. Empirical: a cycle further off is not one of the
-        /// model, and the search takes a factorisation for each parameter.
+        /// Relative residual of the given cycle below which the search is worth while. Empirical: a cycle further off
+        /// is not one of the model, and the search takes a factorisation for each parameter.
         const LIKELY: f64 = 0.5;
         let likely = mismatch(system.field, &seed.parameters, &given.solution).is_some_and(|(_, off)| off < LIKELY);
         let mut free = 0..if likely { system.field.parameter_count() } else { 0 };
@@ -137,7 +137,7 @@ mod tests {
         .unwrap()
     }
 
-    /// The circle of that radius and period through `count` states of each turn.
+    /// A circle of that radius and period; each interval interpolates `through` + 1 of the `count` states of a turn.
     fn given(radius: f64, period: f64, count: usize, through: usize) -> Cycle {
         let times: Vec<f64> = (0..=count).map(|k| k as f64 / count as f64).collect();
         let states: Vec<f64> =
@@ -147,7 +147,7 @@ mod tests {
 
     #[test]
     fn polynomials_through_given_states_are_the_same_on_another_mesh() {
-        // t⁴ is its own interpolant of degree 4, whatever the nodes.
+        // t⁴ is its own interpolant of degree 4 for any nodes.
         let times = [0.0, 0.1, 0.3, 0.35, 0.5, 0.6, 0.7, 0.9, 1.0];
         let states = times.map(|t: f64| t.powi(4));
         let cycle = Cycle::given(1.0, &times, &states, 4, 5).unwrap();
@@ -161,15 +161,15 @@ mod tests {
     }
 
     #[test]
-    fn a_mismatch_is_what_the_equations_are_off_by() {
+    fn the_mismatch_is_the_relative_residual_of_the_equations() {
         let model = circle();
         let off = |solution: &Solution, parameters: &[f64]| mismatch(&model, parameters, solution).unwrap().1;
-        // The error of polynomials of degree 4 on 40 intervals: (2π/40)⁵ over some hundreds.
+        // The error of polynomials of degree 4 on 40 intervals: (2π/40)⁵ divided by some hundreds.
         assert!(off(&Solution::Cycle(given(1.0, TAU / 2.0, 160, 4)), &[1.0, 2.0]) < 1e-6);
         // A period that is a tenth too long makes every slope an eleventh too small.
         let slow = off(&Solution::Cycle(given(1.0, 1.1 * TAU / 2.0, 160, 4)), &[1.0, 2.0]);
         assert!((slow - 0.1 / 1.1).abs() < 1e-6, "{slow}");
-        // At (0.3, 0) f is 0.3 - 0.027, and is made of ∂f/∂x x = (1 - 3 · 0.09) 0.3 and ∂f/∂μ μ = 0.3.
+        // At (0.3, 0), f is 0.3 - 0.027; its contributions are ∂f/∂x x = (1 - 3 · 0.09) 0.3 and ∂f/∂μ μ = 0.3.
         let (component, share) = mismatch(&model, &[1.0, 2.0], &Solution::Equilibrium(vec![0.3, 0.0])).unwrap();
         assert!(component == 0 && (share - 0.273 / 0.519).abs() < 1e-12, "{component} {share}");
         assert_eq!(off(&Solution::Equilibrium(vec![0.0, 0.0]), &[1.0, 2.0]), 0.0);
@@ -187,7 +187,7 @@ mod tests {
             samples: 1,
             random: 1,
         };
-        // Twelve straight lines, a tenth too wide, a fiftieth too slow.
+        // Twelve straight lines, a tenth too wide and a fiftieth too slow.
         let crude = given(1.1, 1.02 * TAU / 2.0, 12, 1);
         let found = from_cycle(&system, &seed(&crude), 1e-8, &crude).unwrap();
         assert!((found.solution.period().unwrap() - TAU / 2.0).abs() < 1e-7);

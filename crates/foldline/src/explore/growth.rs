@@ -1,4 +1,4 @@
-//! One branch, followed to both sides, from its start or from where an earlier run left it.
+//! Continuation of one branch to both sides, from its start or from the end of an earlier run.
 
 use super::System;
 use super::counted::Counted;
@@ -16,21 +16,21 @@ use crate::special::quantity::Quantity;
 use crate::special::unfolded::UnfoldedCycles;
 use crate::special::{self, collapse};
 
-/// Which curve through a point is meant.
+/// The curve through a point that is to be followed.
 #[derive(Clone, Debug, Default)]
 pub struct Line {
     /// Index of the continuation parameter.
     pub free: usize,
     /// Parameters that change with it.
     pub ties: Vec<Tie>,
-    /// What is held, and the index of the parameter that follows from it.
+    /// For a bifurcation curve: the bifurcation, and the index of the first parameter, which is solved for.
     pub held: Option<(Kind, usize)>,
-    /// Whether the branch was born by period doubling.
+    /// True if the branch was born by period doubling.
     pub doubled: bool,
 }
 
 impl Line {
-    /// The curve in one parameter.
+    /// Returns a curve in one parameter.
     pub fn new(free: usize) -> Line {
         Line { free, ..Line::default() }
     }
@@ -42,7 +42,7 @@ impl Line {
         }
     }
 
-    /// The problem of this curve, on the mesh of `point`, through which it goes.
+    /// Returns the problem of this curve through `point`, on the mesh of the point.
     pub fn problem<'a>(&self, system: &'a System, degree: usize, point: &Point) -> Box<dyn ZeroProblem + 'a> {
         let both: Vec<usize> = self.held.map(|(_, first)| first).into_iter().chain([self.free]).collect();
         let setting = Setting {
@@ -80,8 +80,8 @@ impl Line {
     }
 }
 
-/// The problem of the curve in one parameter through `point`, on the mesh of the point. `doubled` says that its branch was
-/// born by period doubling.
+/// Returns the problem of the curve in one parameter through `point`, on the mesh of the point; `doubled` if its branch
+/// was born by period doubling.
 pub fn problem_of<'a>(
     system: &'a System,
     free: usize,
@@ -92,7 +92,7 @@ pub fn problem_of<'a>(
     Line { doubled, ..Line::new(free) }.problem(system, degree, point)
 }
 
-/// The setting of a system at given parameters.
+/// Returns the setting of a system at given parameters.
 pub fn setting<'a>(system: &'a System, free: usize, parameters: &[f64]) -> Setting<'a> {
     Setting {
         field: system.field,
@@ -102,7 +102,7 @@ pub fn setting<'a>(system: &'a System, free: usize, parameters: &[f64]) -> Setti
     }
 }
 
-/// The settings of a branch.
+/// Returns the continuation settings of a branch.
 pub fn settings(system: &System, tolerance: f64, range: [f64; 2], max_points: usize) -> Settings {
     let usual = Settings::new(tolerance, range, &system.scales);
     let periods = system.field.periods().to_vec();
@@ -115,7 +115,7 @@ pub fn settings(system: &System, tolerance: f64, range: [f64; 2], max_points: us
     }
 }
 
-/// A solution made accurate at fixed parameters, as a station whose tangent points towards larger parameter values.
+/// Solves at fixed parameters from an approximate solution. The tangent points towards larger parameter values.
 ///
 /// # Errors
 /// See [`Failure`].
@@ -125,15 +125,15 @@ pub fn polished(problem: &mut dyn ZeroProblem, settings: &Settings, point: &Poin
     let (row, value) = (parameter_row(u.len()), u[u.len() - 1]);
     let plane = Plane { row, base: u.clone(), distance: 0.0 };
     let mut found = settle(problem, settings, plane, u, 1.0, &mut Cost::default())?;
-    // To the last bit, whatever rounding Newton's method left; a second parameter that was solved for stays as it was found.
+    // The exact value, without the rounding of Newton's method; a second parameter keeps the value solved for.
     let last = found.u.len() - 1;
     found.u[last] = value;
     found.point.parameters = problem.point(&found.u, &found.tangent, Examination::default()).parameters;
     Ok(found)
 }
 
-/// A first solution at the parameters of `point`: that of [`polished`] or, if solutions are not isolated, as with a conserved quantity,
-/// the nearest member of their family.
+/// A first solution at the parameters of `point`: that of [`polished`] or, if solutions are not isolated, as with a
+/// conserved quantity, the nearest member of their family.
 ///
 /// # Errors
 /// See [`polished`].
@@ -145,8 +145,8 @@ pub fn first(problem: &mut dyn ZeroProblem, settings: &Settings, point: &Point) 
     })
 }
 
-/// The solution nearest to `point` of a family at a single parameter value, in the hyperplane orthogonal to the family. `None` if the
-/// parameter changes on the way there, in which case there is no family.
+/// The solution nearest to `point` of a family at a single parameter value, in the hyperplane orthogonal to the family.
+/// `None` if the parameter changes on the way there, in which case there is no family.
 fn family_member(problem: &mut dyn ZeroProblem, settings: &Settings, point: &Point) -> Option<Station> {
     /// Change of the scaled parameter, in tolerances, that rounding and discretisation can produce: a factor of safety.
     const STAYS: f64 = 10.0;
@@ -156,7 +156,7 @@ fn family_member(problem: &mut dyn ZeroProblem, settings: &Settings, point: &Poi
     let row = direction(problem, &u).ok()?;
     let plane = Plane { row, base: u.clone(), distance: 0.0 };
     let mut found = settle(problem, settings, plane, u, 1.0, &mut Cost::default()).ok()?;
-    // On another mesh there are more unknowns, or fewer.
+    // On another mesh the number of unknowns differs.
     let last = found.u.len() - 1;
     if (found.u[last] - value).abs() > STAYS * settings.tolerance {
         return None;
@@ -166,9 +166,9 @@ fn family_member(problem: &mut dyn ZeroProblem, settings: &Settings, point: &Poi
     Some(found)
 }
 
-/// Tangent of the curve at `u`, a point close to it.
+/// Returns the tangent of the curve at `u`, a point close to it.
 fn direction(problem: &mut dyn ZeroProblem, u: &[f64]) -> Result<Vec<f64>, Failure> {
-    // Any row will do for the first tangent unless it is orthogonal to it.
+    // Any row serves for the first tangent unless it is orthogonal to it.
     let mut row: Vec<f64> = (0..u.len()).map(|k| 0.6 + (k as f64 * 0.0113).sin() + (k as f64 * 1.37).cos()).collect();
     let mut last = vec![0.0; u.len()];
     last[u.len() - 1] = 1.0;
@@ -182,17 +182,19 @@ fn direction(problem: &mut dyn ZeroProblem, u: &[f64]) -> Result<Vec<f64>, Failu
     Ok(row)
 }
 
-/// A solution on the curve at some distance from `point`, which may be a fold. A branch that started at or next to a fold could not
-/// recognise its start when it returns. Steps continue until the slope of the parameter is clearly non-zero.
+/// A solution on the curve at some distance from `point`, which may be a fold. A branch that started at or next to a
+/// fold could not recognise its start when it returns. Steps continue until the slope of the parameter is clearly
+/// non-zero.
 ///
 /// # Errors
 /// See [`Failure`].
 pub fn beside(problem: &mut dyn ZeroProblem, settings: &Settings, point: &Point) -> Result<Point, Failure> {
-    /// Step lengths in the order of trial: a quarter of the longest step of a branch, then shorter by factors of five. Empirical.
+    /// Step lengths in the order of trial: a quarter of the longest step of a branch, then shorter by factors of five.
+    /// Empirical.
     const DISTANCES: [f64; 4] = [0.05, 0.01, 2e-3, 4e-4];
     /// Slope of the parameter at which the solution is far enough from a fold. Empirical.
     const SLOPE: f64 = 0.15;
-    /// Most steps: a bound on the work on curves along which the parameter hardly changes.
+    /// Largest number of steps: a bound on the work on curves along which the parameter hardly changes.
     const FARTHEST: usize = 12;
     let u = problem.unknowns_of(point);
     problem.anchor(&u);
@@ -224,7 +226,7 @@ pub fn beside(problem: &mut dyn ZeroProblem, settings: &Settings, point: &Point)
     Ok(there.point)
 }
 
-/// A stored point as a station again.
+/// Restores a curve point from a stored point.
 pub(super) fn revived(
     problem: &mut dyn ZeroProblem,
     settings: &Settings,
@@ -245,7 +247,7 @@ pub(super) fn revived(
     Ok(found)
 }
 
-/// What a branch begins with.
+/// First points of a branch.
 pub enum Beginning {
     /// One point inside the branch; both sides are followed.
     Inside(Station),
@@ -255,36 +257,36 @@ pub enum Beginning {
         before: Vec<Point>,
         /// The first point off the special point.
         first: Station,
-        /// Where it starts.
+        /// Its start, as an ending.
         joined: Ending,
     },
 }
 
-/// Everything about a branch that does not change while it grows.
+/// Everything about a branch that does not change while it is followed.
 pub struct Growth<'g> {
     /// The system.
     pub system: &'g System<'g>,
-    /// What governs the run.
+    /// Continuation settings.
     pub settings: &'g Settings,
     /// Degree of collocation polynomials.
     pub degree: usize,
     /// Parameters that change with the continuation parameter.
     pub ties: Vec<Tie>,
-    /// Which sides to follow: backward, forward.
+    /// Sides to follow: backward, forward.
     pub sides: [bool; 2],
     /// Special points of the branch that this one was switched from; it may end at another of them.
     pub parents: &'g [SpecialPoint],
     /// Values to mark, or to stop at.
     pub marks: &'g [Mark],
-    /// Who watches.
+    /// The observer.
     pub observer: &'g dyn Observer,
-    /// Whether inner points stay in memory whole even where the observer could recall them.
+    /// True if inner points stay in memory whole even if the observer could recall them.
     pub whole: bool,
-    /// Whether only the start and the ends of the branch stay in memory.
+    /// True if only the start and the ends of the branch stay in memory.
     pub sparse: bool,
 }
 
-/// Points at either end of a branch that are always whole: what goes on from there needs them.
+/// Points at either end of a branch that always stay whole, since continuation needs them.
 const WHOLE: usize = 3;
 
 impl Growth<'_> {
@@ -315,7 +317,7 @@ impl Growth<'_> {
 
     /// Excludes a multiplier that is 1 by structure from the number of unstable ones at the start of a branch.
     fn count(&self, branch: &Branch, start: &mut Point) {
-        // At a small distance from a bifurcation the noise of the parameter is divided by it.
+        // Near a bifurcation the slope contains the rounding of the parameter divided by a small distance.
         let next_to = !starts_inside(branch) && start.parameter_slope().abs() < STANDS / super::switch::DISTANCES[0];
         let family = start.is_one_of_family() || (next_to && start.solution.period().is_some());
         if self.settings.stability && (family || self.is_symmetric(branch, start)) {
@@ -331,7 +333,8 @@ impl Growth<'_> {
             && rotation(self.system, &at.parameters).is_some_and(|pairs| !wave(pairs))
     }
 
-    /// Notes that a curve cannot be searched for points at which a coefficient vanishes, if that coefficient is not defined on it.
+    /// Notes that a curve cannot be searched for points at which a coefficient vanishes, if that coefficient is not
+    /// defined on it.
     fn note_undefined_coefficient(&self, branch: &Branch) -> bool {
         let sought = match branch.held {
             Some((Kind::PeriodDoubling, _)) => Kind::GeneralisedPeriodDoubling,
@@ -348,7 +351,7 @@ impl Growth<'_> {
         count == 0 || self.tell(Event::Note(&branch.name, &note))
     }
 
-    /// A mark at which the branch starts, unless it is there already: no step leads over it.
+    /// Adds a mark at the start of a branch, unless it is there already: no step passes over the start.
     fn mark_start(&self, branch: &mut Branch) -> bool {
         let Some(point) = branch.points.iter().find(|p| p.position == 0) else { return true };
         let known =
@@ -371,13 +374,13 @@ impl Growth<'_> {
         self.tell(Event::Special(branch, &special))
     }
 
-    /// Continues a branch of an earlier run. Returns false if the observer wants to stop.
+    /// Resumes a branch of an earlier run. Returns false if the observer wants to stop.
     pub fn resume(&self, branch: &mut Branch) -> bool {
         let (low, high) = match (branch.points.first(), branch.points.last()) {
             (Some(a), Some(b)) => (a.position, b.position),
             _ => return true,
         };
-        // A special point found in a step whose far end was not stored will be found again, unless the side has ended with it.
+        // A special point in a step whose far end was not stored is found again, unless the side has ended with it.
         let [backward, forward] = [0, 1].map(|side| branch.ends[side].is_some());
         branch.special.retain(|s| (backward || s.point.position >= low) && (forward || s.point.position < high));
         let mut going = self.tell(Event::Begin(branch));
@@ -389,7 +392,7 @@ impl Growth<'_> {
 
     fn finish(&self, branch: &mut Branch, mut going: bool) -> bool {
         for side in [1, 0] {
-            // Found by the other side, now or in an earlier part of the run.
+            // Closure was found from the other side, now or in an earlier run.
             if branch.ends[side].is_none() && branch.ends[1 - side] == Some(Ending::Closed) {
                 going &= self.end(branch, side, Ending::Closed);
             }
@@ -438,7 +441,7 @@ impl Growth<'_> {
         let system = System { field: &counted, unfolded: unfolded.as_ref(), ..self.system.clone() };
         let mut problem = self.line(branch).problem(&system, self.degree, &last);
         let revive = |problem: &mut dyn ZeroProblem, point: &Point| revived(problem, self.settings, point, direction);
-        // The special point at which a branch begins is no predecessor: the matrix is singular there.
+        // The special point at which a branch starts is no predecessor: the matrix is singular there.
         let before = before.filter(|p| p.position != 0 || starts_inside(branch));
         let previous = before.and_then(|p| revive(&mut *problem, &p).ok());
         let mut start = match revive(&mut *problem, &last) {
@@ -455,7 +458,7 @@ impl Growth<'_> {
             Some((kind, first)) => {
                 let monitors =
                     special::monitors_where_held(system.field, &system.scales, branch.family, kind, branch.free);
-                // The Hopf points there lie along the second parameter.
+                // Here the Hopf points lie along the second parameter.
                 let at = limit_of_small_cycles(branch, kind).filter(|_| !system.field.forced());
                 (monitors, at.map(|at| shrinks(&system, first, at)).into_iter().collect())
             }
@@ -485,7 +488,7 @@ impl Growth<'_> {
             homecoming: Homecoming::default(),
             inspected: 0.0,
         };
-        // A run that goes on may be on its way back already.
+        // A resumed run may already be on its way back to the start.
         let mut before: Vec<&Point> = branch.points.iter().filter(|p| p.position as f64 * direction > 0.0).collect();
         before.sort_by_key(|p| p.position.abs());
         before.into_iter().for_each(|p| walk.leaves_home(p));
@@ -498,7 +501,7 @@ impl Growth<'_> {
             }
             let going = match item {
                 Item::Special(mut special) => {
-                    // Where a curve only turns there is none.
+                    // A mere turning point of a curve has none.
                     if branch.held.is_none() || special.kind.has_codimension_two() {
                         let found = self.coefficients(&system, branch, side, &special);
                         (special.coefficients, special.coefficient_errors) = (found.values, found.errors);
@@ -517,11 +520,11 @@ impl Growth<'_> {
             };
             if going { Verdict::Continue } else { Verdict::Stop }
         });
-        // An interrupted run ends for reasons that are not those of the branch.
+        // An interrupted run ends for reasons that have nothing to do with the branch.
         if self.observer.stopping() { Ending::Stopped } else { ending }
     }
 
-    /// The curve of a branch.
+    /// Returns the curve of a branch.
     pub fn line(&self, branch: &Branch) -> Line {
         Line { free: branch.free, ties: self.ties.clone(), held: branch.held, doubled: is_doubled(branch) }
     }
@@ -546,7 +549,7 @@ impl Growth<'_> {
         going
     }
 
-    /// Puts a mark at a value of the parameter itself there to the last bit.
+    /// Moves a mark at a value of the parameter itself to exactly that value.
     fn place_exactly(&self, system: &System, branch: &Branch, special: &mut SpecialPoint) {
         const SAME: f64 = 1e-6;
         let own = self.marks.iter().filter(|mark| mark.quantity == Quantity::Parameter(branch.free));
@@ -560,14 +563,14 @@ impl Growth<'_> {
         if let Ok(found) = polished(&mut *problem, self.settings, &there) {
             let (position, tangent, step) = (there.position, there.tangent, there.step);
             special.point = Point { position, step, ..found.point };
-            // Which way is forward the solution alone does not say.
+            // The solution alone does not tell which direction is forward.
             if special.point.tangent.last().is_some_and(|t| tangent.last().is_some_and(|own| t * own < 0.0)) {
                 special.point.tangent.iter_mut().for_each(|t| *t = -*t);
             }
         }
     }
 
-    /// Coefficients of the normal form of a special point.
+    /// Returns the coefficients of the normal form of a special point.
     fn coefficients(&self, system: &System, branch: &Branch, side: usize, special: &SpecialPoint) -> Coefficients {
         let (line, own) = (self.line(branch), setting(system, branch.free, &special.point.parameters));
         let dimension = special.kernel();
@@ -583,7 +586,7 @@ impl Growth<'_> {
                 if special.kind == Kind::BranchPoint
                     && let Some(Solution::Equilibrium(x)) = before.map(|point| &point.solution)
                 {
-                    // The tangent there may be one between those of both branches.
+                    // The computed tangent may be a combination of those of both branches.
                     let change = |point: &Point| special.point.parameters[branch.free] - point.parameters[branch.free];
                     let gap = |point: &Point| change(point) / own.unit();
                     at.tangent = there.iter().zip(x).map(|(a, b)| a - b).chain(before.map(gap)).collect();
@@ -610,25 +613,25 @@ impl Growth<'_> {
     }
 }
 
-/// Whether a branch goes on to both sides of its start, which is then no special point of another one.
+/// True if a branch continues on both sides of its start, which is then not a special point of another one.
 fn starts_inside(branch: &Branch) -> bool {
     branch.held.is_some() || matches!(branch.origin, Origin::Seed(_) | Origin::EndOf(_))
 }
 
-/// Whether a branch was born by period doubling.
+/// True if a branch was born by period doubling.
 pub fn is_doubled(branch: &Branch) -> bool {
     branch.held.is_none() && matches!(branch.origin, Origin::Switch { kind: Kind::PeriodDoubling, .. })
 }
 
-/// What a branch can collapse to: every cycle to an equilibrium, a doubled one to its parent as well, and one that was born
-/// at a branch point to more symmetric solutions.
+/// Monitors for the ends of a branch on other solutions: every cycle may shrink to an equilibrium, a doubled one may
+/// also become its parent, and one born at a branch point may become a more symmetric solution.
 fn collapses<'a>(branch: &Branch, system: &'a System) -> Vec<Box<dyn Monitor + 'a>> {
     let mut all: Vec<Box<dyn Monitor + 'a>> = Vec::new();
     if matches!(branch.origin, Origin::Switch { kind: Kind::BranchPoint, .. }) {
         for reflection in system.reflections.iter().filter(|r| r.contains(&true)) {
             let forced = system.field.forced();
             for half in [false, true].into_iter().take(if branch.family == Family::Cycle { 2 } else { 1 }) {
-                // Half a period of an odd number of them is one at which the forcing is another.
+                // Half of an odd number of forcing periods shifts the forcing by half its period.
                 let odd = branch.points.first().is_some_and(|p| p.solution.forcing_periods() % 2 == 1);
                 if forced && !system.mirrors_after(reflection, half && odd) {
                     continue;
@@ -654,15 +657,15 @@ fn collapses<'a>(branch: &Branch, system: &'a System) -> Vec<Box<dyn Monitor + '
     all
 }
 
-/// True if the cycles of a forced model last an even number of forcing periods. Their phase is fixed, so the halves of two cycles can
-/// be compared however much the cycles differ.
+/// True if the cycles of a forced model last an even number of forcing periods. Their phase is fixed, so the halves of
+/// two cycles can be compared however much the cycles differ.
 fn lasts_even_periods(branch: &Branch) -> bool {
     let periods = branch.points.first().map_or(0, |point| point.solution.forcing_periods());
     periods > 0 && periods.is_multiple_of(2)
 }
 
-/// The point at which cycles on a curve shrink to an equilibrium: folds at a generalised Hopf point, torus points at a zero-Hopf point, or at a double
-/// Hopf point as [`Growth::at_double_hopf`] finds.
+/// Returns the point at which cycles on a bifurcation curve shrink to an equilibrium: folds at a generalised Hopf
+/// point, torus points at a zero-Hopf point or, as [`Growth::at_double_hopf`] finds out, at a double Hopf point.
 fn limit_of_small_cycles(branch: &Branch, held: Kind) -> Option<Kind> {
     match held {
         Kind::Fold if branch.family == Family::Cycle => Some(Kind::GeneralisedHopf),
@@ -671,7 +674,7 @@ fn limit_of_small_cycles(branch: &Branch, held: Kind) -> Option<Kind> {
     }
 }
 
-/// Where cycles shrink to an equilibrium.
+/// Returns a monitor for the point at which cycles shrink to an equilibrium.
 fn shrinks<'a>(system: &'a System, free: usize, at: Kind) -> Box<dyn Monitor + 'a> {
     Box::new(collapse::Shrinks { field: system.field, free, unit: system.unit(free), scales: &system.scales, at })
 }

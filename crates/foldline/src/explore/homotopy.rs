@@ -1,20 +1,20 @@
-//! A family brought from one set of parameter values to another.
+//! A solution family carried to new parameter values, along a path that is found and reported.
 //!
-//! **Idea.** The direct run may turn back at a fold. Then there are other ways, and they are tried in this order until one
-//! arrives:
+//! **Idea.** The direct run may turn back at a fold. Then the following ways are tried in this order until one arrives:
 //!
 //! 1. *direct*: all parameters change together, in proportion, at a fixed value of the parameter `via`;
-//! 2. *along the fold*: the fold that turned the run back is held and followed to the goal;
-//! 3. *moved*: the family is followed in `via`, and the direct run tried from places spread along it;
-//! 4. *along its folds*: every fold met in `via` is held and followed to the goal;
-//! 5. *halfway*: the same from the farthest place that a run has come to, as long as that gains ground;
+//! 2. *along the fold*: the fold that turned the run back is continued to the goal;
+//! 3. *moved*: the family is followed in `via`, and the direct run tried from points spread along it;
+//! 4. *along its folds*: every fold met in `via` is continued to the goal;
+//! 5. *halfway*: steps 1 to 4 again from the farthest point that a run has reached, as long as that gains ground;
 //! 6. *one by one*: the parameters change one after the other.
 //!
-//! Every run is a branch of the diagram, every decision a note. Where nothing arrives the note says how far each way came: if
-//! two folds of a closed family meet before the goal, it shrinks to a point there and is not connected to anything beyond.
+//! Every run is a branch of the diagram, every decision a note. If no way arrives, the note reports how far each came:
+//! if two folds of a closed family meet before the goal, it shrinks to a point there and is not connected to anything
+//! beyond.
 //!
-//! **Source.** The three flows (direct, with runs in the speed, along the fold) are those of akay2024; choosing among them is
-//! ours.
+//! **Source.** The three flows (direct, with runs in the speed, along the fold) are those of akay2024; choosing among
+//! them is ours.
 
 use super::growth::{self, Beginning, Growth, Line};
 use super::plan::{HomotopyPlan, Plan};
@@ -24,24 +24,24 @@ use crate::contract::{Event, Observer, Verdict};
 use crate::diagram::{Branch, Diagram, Ending, Family, Kind, Origin, Point, Shown, Solution, SpecialPoint};
 use crate::problem::Tie;
 
-/// Places along the family from which the direct run is tried.
+/// Number of points along the family from which the direct run is tried.
 const PLACES: usize = 6;
-/// Rounds of step 5.
+/// Number of rounds of step 5.
 const ROUNDS: usize = 3;
 /// Share of the way that a round must gain.
 const GAIN: f64 = 0.02;
 
-/// What a homotopy led to.
+/// Result of a homotopy.
 pub struct Route {
-    /// Its runs, in the order in which they were tried.
+    /// Runs, in the order in which they were tried.
     pub legs: Vec<Branch>,
-    /// The solution at the goal, or why there is none.
+    /// The solution at the goal, or the reason why there is none.
     pub arrived: Result<Point, String>,
-    /// Whether the observer wants to go on.
+    /// False if the observer wants to stop.
     pub going: bool,
 }
 
-/// Finds a way for the family of `start` to the goal of the homotopy.
+/// Finds a path for the family of `start` to the goal of the homotopy.
 pub fn find(
     system: &System,
     plan: &Plan,
@@ -64,7 +64,7 @@ pub fn find(
         shrinks: false,
         open: false,
     };
-    // The seed of a resumed run is not searched for again; the first leg has what it led to.
+    // The seed of a resumed run is not searched for again; the first run contains its solution.
     let first =
         earlier.branch(&format!("{}/1", homotopy.name)).and_then(|leg| leg.points.iter().find(|p| p.position == 0));
     let start = match first.cloned().map_or(start, Ok) {
@@ -100,11 +100,11 @@ struct Planner<'p> {
     legs: Vec<Branch>,
     going: bool,
     origin: Origin,
-    /// The point closest to the goal on any run, the share of the way that it has covered, and whether it is a fold.
+    /// The point closest to the goal on any run, the share of the way that it has covered, and true if it is a fold.
     farthest: Option<(f64, Point, bool)>,
-    /// Whether two folds of the family were seen to meet before the goal, so that it shrinks to a point there.
+    /// True if two folds of the family were observed to meet before the goal, so that it shrinks to a point there.
     shrinks: bool,
-    /// Whether some run left the range or ended otherwise, so that there may be more beyond.
+    /// True if some run left the range or ended otherwise, so that the family may extend further.
     open: bool,
 }
 
@@ -117,7 +117,7 @@ struct Course {
 }
 
 impl Course {
-    /// The course from a point to these values; `None` if it is there already.
+    /// Returns the path from a point to these values; `None` if the point has them already.
     fn new(start: &Point, targets: &[(usize, f64)]) -> Option<Course> {
         let moving: Vec<(usize, f64)> = targets.iter().copied().filter(|(i, v)| start.parameters[*i] != *v).collect();
         let &(free, to) = moving.first()?;
@@ -161,7 +161,7 @@ impl Planner<'_> {
         Ok(here)
     }
 
-    /// Steps 1 to 5.
+    /// Carries out steps 1 to 5.
     fn towards(&mut self, start: &Point, targets: &[(usize, f64)]) -> Result<Point, String> {
         let (mut here, mut covered) = (start.clone(), 0.0);
         let mut tried = Vec::new();
@@ -175,7 +175,7 @@ impl Planner<'_> {
             if !self.going {
                 return Err("stopped on request".into());
             }
-            // The share is one of what is left; the ground gained counts against the whole way.
+            // The share is one of the remaining way; gains count relative to the whole way.
             let Some((share, point, is_fold)) = self.farthest.take() else { break };
             let gained = share * (1.0 - covered);
             if gained < GAIN || round + 1 == ROUNDS {
@@ -192,7 +192,7 @@ impl Planner<'_> {
         Err(tried.join("; then "))
     }
 
-    /// A solution beside a fold of the family in `via`.
+    /// Returns a solution beside a fold of the family in `via`.
     fn beside(&self, fold: &Point) -> Result<Point, String> {
         let settings = growth::settings(self.system, self.plan.tolerance, [f64::NEG_INFINITY, f64::INFINITY], 0);
         let mut problem = growth::problem_of(self.system, self.homotopy.via, self.plan.degree, fold, false);
@@ -259,7 +259,7 @@ impl Planner<'_> {
         Err(tried.join(", "))
     }
 
-    /// Step 1.
+    /// Carries out step 1.
     fn direct(&mut self, start: &Point, course: &Course) -> Branch {
         let sides = [course.to < course.from, course.to > course.from];
         let settings = self.settings(course.range());
@@ -270,14 +270,14 @@ impl Planner<'_> {
         run
     }
 
-    /// Step 3: the family in `via` at the parameters of a point.
+    /// Step 3: follows the family in `via` at the parameters of a point.
     fn moved(&mut self, start: &Point) -> Branch {
         let settings = self.settings(self.homotopy.range);
         let origin = self.next_origin();
         self.leg(Line::new(self.homotopy.via), settings, [true, true], origin, start)
     }
 
-    /// Steps 2 and 4: a fold held on the way to the goal.
+    /// Steps 2 and 4: continues a fold towards the goal.
     fn along(
         &mut self,
         fold: &SpecialPoint,
@@ -326,7 +326,7 @@ impl Planner<'_> {
         end.filter(|point| course.arrives(point)).cloned()
     }
 
-    /// Remembers the point of a run that is closest to the goal.
+    /// Records the point of a run that is closest to the goal.
     fn measure(&mut self, run: &Branch, course: &Course) {
         let best = run.points.iter().max_by(|a, b| course.share(a).total_cmp(&course.share(b)));
         if let Some(point) = best {
@@ -360,7 +360,7 @@ impl Planner<'_> {
             parents: &[],
             marks: &[],
             observer: self.observer,
-            // Where a run does not arrive, others begin at points inside it.
+            // If a run does not arrive, others start from points inside it.
             whole: true,
             sparse: false,
         };
@@ -406,7 +406,7 @@ fn ending(run: &Branch) -> String {
     ends.join(", ")
 }
 
-/// Points spread along a family, the nearest first.
+/// Returns points spread along a family, the nearest first.
 fn places(family: &Branch, via: usize, from: f64) -> Vec<Point> {
     let count = family.points.len();
     let mut chosen: Vec<Point> =

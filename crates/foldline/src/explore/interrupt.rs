@@ -1,9 +1,10 @@
 //! Immediate interruption of a run.
 //!
-//! **Idea.** An observer can stop a branch after each point. A point, a census or a homotopy can take long, so there is a second
-//! way: once the observer is [stopping](Observer::stopping), the vector field returns NaN. Every Newton iteration, trajectory and
-//! test function fails at its next evaluation, and the run unwinds within milliseconds. Results computed meanwhile are wrong, so
-//! events are dropped from then on, and the run file holds what was accepted before.
+//! **Idea.** An observer can stop a branch after each point. A point, a sampling or a homotopy can take long, so there
+//! is a second way: once the observer is [stopping](Observer::stopping), the vector field returns NaN. Every Newton
+//! iteration, trajectory and test function fails at its next evaluation, and the run unwinds within milliseconds.
+//! Results computed meanwhile are wrong, so events are dropped from then on, and the run file holds what was accepted
+//! before.
 
 use crate::contract::{Batch, Event, Observer, VectorField, Verdict};
 use crate::diagram::{Branch, Point, Shortfall};

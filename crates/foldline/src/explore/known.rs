@@ -1,9 +1,10 @@
 //! Recognition of solutions that lie on a known branch.
 //!
-//! **Idea.** Two solutions at the same parameter values are the same if their periods and the ranges of all states and
-//! outputs agree, up to a reflection under which the model is equivariant. A cycle of a forced model and its copies shifted by
-//! forcing periods have the same ranges, and several turns of a shorter cycle count as that cycle (`minimal`). The solution of a
-//! known branch at the parameter value in question is interpolated first and, if that is close, computed by Newton's method.
+//! **Idea.** Two solutions at the same parameter values are the same if their periods and the ranges of all states
+//! agree, up to a reflection under which the model is equivariant. A cycle of a forced model and its copies shifted by
+//! forcing periods have the same ranges, and several turns of a shorter cycle count as that cycle (`minimal`). The
+//! solution of a known branch at the parameter value in question is interpolated first and, if that is close, computed
+//! by Newton's method.
 
 use super::System;
 use super::growth::{Line, polished, problem_of, revived};
@@ -13,8 +14,8 @@ use crate::continuation::locate::{Stretch, passing};
 use crate::contract::Observer;
 use crate::diagram::{Branch, Cost, Kind, Point, Solution};
 
-/// Every solution of a branch at a value of its parameter, by increasing position: one for each time that the branch
-/// passes it. Points that are light (see [`Point::is_light`]) are passed over.
+/// Returns every solution on a branch at a value of its parameter, by increasing position: one for each time that the
+/// branch passes it. Light points (see [`Point::is_light`]) are skipped.
 pub fn solutions_at(system: &System, settings: &Settings, branch: &Branch, value: f64) -> Vec<Point> {
     let track = track(branch);
     let passes = track.windows(2).filter(|pair| {
@@ -24,7 +25,7 @@ pub fn solutions_at(system: &System, settings: &Settings, branch: &Branch, value
     passes.filter_map(|pair| between(system, settings, branch, [pair[0], pair[1]], value)).collect()
 }
 
-/// The solution between two neighbouring points of a branch at a value of its parameter; `None` if one of them is light.
+/// Solution between two neighbouring points of a branch at a value of its parameter; `None` if one of them is light.
 fn between(system: &System, settings: &Settings, branch: &Branch, pair: [&Point; 2], value: f64) -> Option<Point> {
     if pair.iter().any(|point| point.is_light() || point.tangent.is_empty()) {
         return None;
@@ -36,8 +37,8 @@ fn between(system: &System, settings: &Settings, branch: &Branch, pair: [&Point;
     found.ok().map(|station| station.point)
 }
 
-/// The points of a branch, its folds, and the branch points at which it turns back, as at a pitchfork. Between two of them the
-/// parameter is monotonic.
+/// Returns the points of a branch, its folds, and the branch points at which it turns back, as at a pitchfork. Between
+/// two of them the parameter is monotonic.
 fn track(branch: &Branch) -> Vec<&Point> {
     let mut track: Vec<&Point> = branch.points.iter().collect();
     let value = |point: &Point| point.parameters.get(branch.free).copied().unwrap_or(f64::NAN);
@@ -54,8 +55,8 @@ fn track(branch: &Branch) -> Vec<&Point> {
     track
 }
 
-/// The solution on a branch at which a quantity is least, which lies between accepted points as a rule, and a bound on the
-/// error of the quantity there: what the discretisation allows, plus what is left of the search. `None` for a branch
+/// Returns the solution on a branch at which a quantity is least, usually between accepted points, and a bound on the
+/// error of the quantity there: the discretisation error plus the last difference of the search. `None` for a branch
 /// without points.
 pub fn least(
     system: &System,
@@ -80,7 +81,7 @@ pub fn least(
     Some((best, error))
 }
 
-/// Golden sections along the curve between two accepted points.
+/// Golden-section search along the curve between two accepted points.
 fn least_between(
     system: &System,
     settings: &Settings,
@@ -118,13 +119,14 @@ fn least_between(
 
 /// Ratio of the periods of two cycles if it is nearly a whole number, otherwise 1.
 fn turns(long: &Point, short: &Point) -> f64 {
-    /// Largest distance from a whole number. Empirical: it allows for the change of the period along a step of the branch.
+    /// Largest distance from a whole number. Empirical: it allows for the change of the period along a step of the
+    /// branch.
     const NEARLY: f64 = 0.05;
     let ratio = long.solution.period().zip(short.solution.period()).map_or(1.0, |(long, short)| long / short);
     if ratio > 1.5 && (ratio - ratio.round()).abs() < NEARLY { ratio.round() } else { 1.0 }
 }
 
-/// A copy of a point, without profile, with the period multiplied by `times`.
+/// Returns a copy of a point without profile, with its period multiplied by `times`.
 pub(super) fn lasting(point: &Point, times: f64) -> Point {
     let mut other = Point { tangent: Vec::new(), ..point.clone() };
     if let Solution::Cycle(cycle) = &mut other.solution {
@@ -134,7 +136,7 @@ pub(super) fn lasting(point: &Point, times: f64) -> Point {
     other
 }
 
-/// The name of the branch on which `point` lies; points that are light are recalled from the observer.
+/// Returns the name of the branch on which `point` lies; light points are recalled from the observer.
 pub fn branch_of<'b>(
     system: &System,
     settings: &Settings,
@@ -151,7 +153,7 @@ pub fn branch_of<'b>(
             if (a - value) * (b - value) > 0.0 {
                 return false;
             }
-            // From a turning point Newton's method may converge to either side.
+            // From a fold Newton's method may converge to either side.
             let fold = |point: &Point| branch.special.iter().any(|s| std::ptr::eq(&s.point, point));
             let first = fold(pair[1]) || !fold(pair[0]) && (a - value).abs() < (b - value).abs();
             let nearest = if first { pair[0] } else { pair[1] };
@@ -177,7 +179,7 @@ pub fn branch_of<'b>(
             if polished(&mut *problem, settings, &guess).is_ok_and(|found| same(&found.point)) {
                 return true;
             }
-            // Where branches cross Newton's method from there may have gone to the other one.
+            // Close to a crossing, Newton's method may have gone to the other branch.
             let [Some(left), Some(right)] = [whole(pair[0]), whole(pair[1])] else { return false };
             between(system, settings, branch, [&left, &right], value).is_some_and(|found| same(&found))
         })

@@ -1,4 +1,4 @@
-//! What there is at values of a parameter: attractors and equilibria, looked for on several threads.
+//! Parameter scan: attractors and equilibria at values of a parameter, sought on several threads.
 
 use super::System;
 use super::choice::summary;
@@ -10,16 +10,16 @@ use crate::problem::equilibrium::EquilibriumProblem;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Condvar, Mutex, PoisonError};
 
-/// What there is at a value of the parameter.
+/// Solutions found at a value of the parameter.
 pub(super) struct Sight {
     pub(super) value: f64,
     /// True if some samples did not settle.
     pub(super) unsettled: bool,
-    /// Solutions, none of which is another one under a symmetry, or why nothing can be followed from there.
+    /// Solutions, distinct up to symmetry, with a summary; or the reason why nothing can be followed from there.
     pub(super) found: Result<(Vec<Point>, String), String>,
 }
 
-/// Looks at the values, shared among threads.
+/// A parameter scan shared among threads.
 pub(super) struct Lookout<'l> {
     system: &'l System<'l>,
     plan: &'l ExplorePlan,
@@ -32,21 +32,21 @@ impl<'l> Lookout<'l> {
         Lookout { system, plan, tolerance, seen: Slots::new(plan.values) }
     }
 
-    /// Nobody looks at any more values.
+    /// Ends the scan: no more values are started.
     pub(super) fn close(&self) {
         self.seen.close();
     }
 
-    /// Looks at the next value that nobody has taken; false if there is none.
+    /// Scans the next value that no thread has taken. Returns false if there is none.
     pub(super) fn look(&self) -> bool {
         let Some(index) = self.seen.take() else { return false };
-        // Whoever waits for it must not wait for ever.
+        // A thread that waits for the result must get one even after a panic.
         let mut promise = Promise { slots: &self.seen, index, kept: None };
         promise.kept = Some(self.sight(index));
         true
     }
 
-    /// What there is at that value; helps until it is known.
+    /// Returns the result at that value; scans other values until it is known.
     pub(super) fn at(&self, index: usize) -> Sight {
         loop {
             if let Some(sight) = self.seen.ready(index) {
@@ -58,7 +58,7 @@ impl<'l> Lookout<'l> {
         }
     }
 
-    /// Step 2 without following anything.
+    /// Carries out step 2 without following anything.
     fn sight(&self, index: usize) -> Sight {
         let (system, plan) = (self.system, self.plan);
         let [low, high] = plan.range;
@@ -68,7 +68,7 @@ impl<'l> Lookout<'l> {
         if let Err(why) = system.repeats(&parameters, &[(plan.free, plan.range)]) {
             return Sight { value, unsettled: false, found: Err(why) };
         }
-        // Other values, other samples: together they say more.
+        // Different samples at different values give more information together.
         let random = plan.random.wrapping_add(index as u64);
         let census = attractors(system, &parameters, plan.samples, random, 1, self.tolerance);
         let mut found: Vec<Point> = Vec::new();
@@ -87,7 +87,7 @@ impl<'l> Lookout<'l> {
         Sight { value, unsettled: census.unsettled + census.stuck > 0, found: Ok((found, said)) }
     }
 
-    /// Equilibria in the ranges of the states, stable or not.
+    /// Returns the equilibria in the ranges of the states, stable or not.
     fn rests(&self, parameters: &[f64], random: u64) -> Vec<Point> {
         let system = self.system;
         if system.field.forced() {
@@ -109,7 +109,7 @@ impl<'l> Lookout<'l> {
         found
     }
 
-    /// Whether an equilibrium lies in the ranges of the states, or less than half their widths outside.
+    /// True if an equilibrium lies in the ranges of the states, or less than half their widths outside.
     fn inside(&self, point: &Point) -> bool {
         let Solution::Equilibrium(x) = &point.solution else { return false };
         x.iter().zip(&self.system.ranges).all(|(x, [low, high])| {
@@ -119,7 +119,7 @@ impl<'l> Lookout<'l> {
     }
 }
 
-/// A result that is put into its slot whatever happens.
+/// A result that is put into its slot when dropped, whatever happens.
 struct Promise<'s> {
     slots: &'s Slots<Sight>,
     index: usize,
@@ -146,13 +146,13 @@ impl<T> Slots<T> {
         Slots { slots, next: AtomicUsize::new(0), arrived: Condvar::new() }
     }
 
-    /// The next number that nobody has taken.
+    /// Returns the next number that no thread has taken.
     fn take(&self) -> Option<usize> {
         let count = self.slots.lock().unwrap_or_else(PoisonError::into_inner).len();
         Some(self.next.fetch_add(1, Ordering::Relaxed)).filter(|index| *index < count)
     }
 
-    /// Nothing more is to be taken.
+    /// Ends the numbering: nothing more is taken.
     fn close(&self) {
         self.next.store(usize::MAX / 2, Ordering::Relaxed);
     }
@@ -168,7 +168,7 @@ impl<T> Slots<T> {
         self.slots.lock().unwrap_or_else(PoisonError::into_inner).get_mut(index)?.take()
     }
 
-    /// The result of that number, which some thread has taken.
+    /// Waits for the result of that number, which some thread has taken.
     fn wait(&self, index: usize) -> T {
         let mut slots = self.slots.lock().unwrap_or_else(PoisonError::into_inner);
         loop {
@@ -180,13 +180,13 @@ impl<T> Slots<T> {
     }
 }
 
-/// Whether two solutions at the same parameter values are the same, or images of each other under a symmetry.
+/// True if two solutions at the same parameter values are the same, or images of each other under a symmetry.
 fn same(system: &System, tolerance: f64, a: &Point, b: &Point) -> bool {
     let close = 30.0 * tolerance;
     system.reflections.iter().any(|reflection| a.difference(b, system.measure(), reflection) < close)
 }
 
-/// The place of a value in the range, as a share: 1/2, 1/4, 3/4, 1/8, 5/8, 3/8, 7/8 and so on.
+/// Position of a value in the range, as a share: 1/2, 1/4, 3/4, 1/8, 5/8, 3/8, 7/8 and so on.
 fn share(index: usize) -> f64 {
     let (mut left, mut share, mut weight) = (index + 1, 0.0, 0.5);
     while left > 0 {

@@ -1,11 +1,13 @@
 //! Reduction of a cycle to its minimal period.
 //!
-//! **Idea.** k turns of a cycle solve the equations of a cycle of period kT, and any search for cycles may find them as such.
-//! Collocation on a mesh that repeats itself k times has the symmetry of the continuous problem, a shift by one turn: k turns of
-//! one cycle stay equal on it, to the accuracy of Newton's method, while the turns of a cycle that has bifurcated from it stay
-//! different, however close it is. A cycle whose turns look alike is therefore computed once more on such a mesh.
+//! **Idea.** k turns of a cycle solve the equations of a cycle of period kT, and any search for cycles may find them as
+//! such. Collocation on a mesh that repeats itself k times has the symmetry of the continuous problem, a shift by one
+//! turn: k turns of one cycle stay equal on it, to the accuracy of Newton's method, while the turns of a cycle that has
+//! bifurcated from it stay different, however close it is. A cycle whose turns look alike is therefore computed once
+//! more on such a mesh.
 //!
-//! **Equations.** With the scale sᵢ of component i, the accuracy ε of Newton's method and the non-trivial multipliers μ of the cycle:
+//! **Equations.** With the scale sᵢ of component i, the accuracy ε of Newton's method and the non-trivial multipliers μ
+//! of the cycle:
 //!
 //!   (1)  d = max over t and i of |xᵢ(t + T/k) - xᵢ(t)| / (sᵢ + max |xᵢ|)
 //!   (2)  k turns look alike if d ≤ e^(1/3), e being the error of the cycle: next to a pitchfork, at which one turn
@@ -22,14 +24,15 @@ use crate::continuation::corrector::{Plane, correct, parameter_row};
 use crate::contract::Examination;
 use crate::diagram::{Cost, Cycle, Mesh, Point, Solution};
 
-/// Numbers of turns that are tried; every other number up to 66 is a product of them. Empirical: sampling finds no cycle with more than
-/// 40 crossings of its section per period.
+/// Numbers of turns that are tried; every other number up to 66 is a product of them. Empirical: sampling finds no
+/// cycle with more than 40 crossings of its section per period.
 const PRIMES: [usize; 18] = [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37, 41, 43, 47, 53, 59, 61];
-/// Fewest mesh intervals that can resolve a turn. Empirical: quartics on four intervals resolve little more than a sinusoid.
+/// Fewest mesh intervals that can resolve a turn. Empirical: quartics on four intervals resolve little more than a
+/// sinusoid.
 const FEWEST: usize = 4;
 
-/// The cycle over its minimal period (in a forced model, the smallest number of forcing periods). `None` if its period is minimal
-/// already, or for an equilibrium.
+/// Returns the cycle over its minimal period (in a forced model, the smallest number of forcing periods). `None` if its
+/// period is minimal already, or for an equilibrium.
 pub(super) fn reduced(system: &System, settings: &Settings, point: &Point) -> Option<Point> {
     let mut found: Option<Point> = None;
     while let Some(shorter) = reduced_once(system, settings, found.as_ref().unwrap_or(point)) {
@@ -38,7 +41,7 @@ pub(super) fn reduced(system: &System, settings: &Settings, point: &Point) -> Op
     found
 }
 
-/// One turn of a cycle that consists of a prime number of equal turns.
+/// Returns one turn of a cycle that consists of a prime number of equal turns.
 fn reduced_once(system: &System, settings: &Settings, point: &Point) -> Option<Point> {
     let Solution::Cycle(cycle) = &point.solution else { return None };
     let of_angles = |turns: usize| turned_whole(system.field.periods(), &cycle.gain, turns);
@@ -49,7 +52,7 @@ fn reduced_once(system: &System, settings: &Settings, point: &Point) -> Option<P
     PRIMES.into_iter().filter(fits).find_map(|turns| one_turn(system, settings, point, cycle, turns))
 }
 
-/// One of `turns` equal turns of a cycle; `None` if the turns differ.
+/// Returns one of `turns` equal turns of a cycle; `None` if the turns differ.
 fn one_turn(system: &System, settings: &Settings, point: &Point, cycle: &Cycle, turns: usize) -> Option<Point> {
     let error = point.trust.discretisation.max(settings.tolerance);
     if !turns_agree(cycle, &system.scales, turns, error.cbrt()) {
@@ -90,10 +93,10 @@ fn turned_whole(periods: &[f64], gain: &[f64], share: usize) -> bool {
     })
 }
 
-/// The cycle solved by collocation on a mesh that is the same for every turn.
+/// Solves for the cycle by collocation on a mesh that is the same for every turn.
 fn on_equal_turns(system: &System, settings: &Settings, point: &Point, cycle: &Cycle, turns: usize) -> Option<Cycle> {
     let wide = turns as f64;
-    // Boundaries of the first turn, without one that all but coincides with its end.
+    // Boundaries of the first turn, without one that nearly coincides with its end.
     let close = 0.1 * wide / cycle.intervals() as f64;
     let mut turn: Vec<f64> = cycle.mesh.iter().map(|t| t * wide).take_while(|t| *t < 1.0 - close).collect();
     turn.push(1.0);

@@ -1,27 +1,27 @@
 //! From a plan to a diagram: follow → locate → switch → follow.
 //!
-//! **Idea.** A *family* is a branch of the plan with everything that grows from it: the branches that start at its end and
-//! those that are switched to at its special points. Families do not depend on each other, so they are followed in
-//! parallel, and the result is the same for any number of threads.
+//! **Idea.** A *family* is a branch of the plan with everything that grows from it: the branches that start at its end
+//! and those switched to at its special points. Families do not depend on each other, so they are followed in parallel,
+//! and the result is the same for any number of threads.
 //!
 //! | question | file |
 //! |---|---|
-//! | what is asked for? | [`plan`] |
+//! | what is requested? | [`plan`] |
 //! | which vector field, which scales, which symmetries? | [`system`] |
 //! | how large are the states? | `sizes` |
 //! | how often is the vector field evaluated? | `counted` |
-//! | how does a run end at once? | `interrupt` |
+//! | how is a run interrupted immediately? | `interrupt` |
 //! | where do first solutions come from? | [`seeds`] |
 //! | what is done first, by which thread? | `schedule` |
 //! | how is one branch followed to both sides, or resumed? | [`growth`] |
 //! | what follows from a finished branch? | [`family`] |
-//! | how is a diagram found without being told where anything is? | `discovery`, `lookout`, `resonances`, `averaged` |
-//! | how does one leave a special point on the other branch? | [`switch`] |
+//! | how is a diagram found without prescribed starts? | `discovery`, `lookout`, `resonances`, `averaged` |
+//! | how is the other branch found at a special point? | [`switch`] |
 //! | is this branch known already? | [`known`] |
-//! | where does a special point go when a second parameter changes? | [`curves`] |
-//! | how does a family get to other parameter values? | [`homotopy`] |
+//! | how does a special point move when a second parameter changes? | [`curves`] |
+//! | how is a family carried to other parameter values? | [`homotopy`] |
 //! | does a solution depend on a parameter that should not matter? | [`mod@persistence`] |
-//! | what does simulation see? | [`responses`] |
+//! | what does simulation find? | [`responses`] |
 
 mod accounts;
 mod arrival;
@@ -77,16 +77,16 @@ use schedule::{Schedule, Task};
 use seeds::Seeds;
 use std::sync::Mutex;
 
-/// Carries out a plan with that many threads. `earlier` is what an interrupted run of the same plan has already: finished
+/// Carries out a plan with `jobs` threads. `earlier` is the result of an interrupted run of the same plan: finished
 /// sides are kept, unfinished ones are continued from their last point.
 ///
-/// With an observer that [keeps the points](Observer::stores) branches come back with their start, ends and special
-/// points only, unless the plan switches at special points: memory does not grow with the number of points then.
+/// With an observer that [keeps the points](Observer::stores), branches are returned with their start, ends and special
+/// points only, unless the plan switches at special points. Memory then does not grow with the number of points.
 pub fn run(system: &System, plan: &Plan, jobs: usize, earlier: Diagram, observer: &dyn Observer) -> Diagram {
     run_from(system, plan, jobs, earlier, &[], observer)
 }
 
-/// Likewise, with solutions that are known already for some of the seeds, by index: these are not looked for.
+/// Carries out a plan like [`run`], with known solutions for some of the seeds, by index; these are not searched for.
 pub fn run_from(
     system: &System,
     plan: &Plan,

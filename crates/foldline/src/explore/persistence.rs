@@ -1,21 +1,22 @@
-//! Whether a solution survives when a parameter goes to another value.
+//! Persistence of a solution when a parameter is carried to another value.
 //!
-//! **Idea.** A parameter that stands for an idealisation, such as the sharpness of a smoothed contact, should not decide what
-//! exists. The solution is followed in that parameter alone, all others fixed: it reaches the value, or the curve turns
-//! back before, and then the solution exists only because the parameter is what it is. That the curve may turn once more
-//! and get to the value as another solution changes nothing.
+//! **Idea.** A parameter that stands for an idealisation, such as the sharpness of a smoothed contact, should not
+//! decide which solutions exist. The solution is followed in that parameter alone, all others fixed. Either it reaches
+//! the value, or the curve turns back before; then the solution exists only because of the value of the parameter. The
+//! curve may turn once more and reach the value as another solution, but that changes nothing.
 //!
-//! **Source.** akay2024, where branches that a small sharpness makes up are shown, and avoided by a larger one.
+//! **Source.** akay2024, where branches that owe their existence to a small sharpness are shown, and avoided by a
+//! larger one.
 //!
-//! **Fails when** the curve leaves through something other than a fold, as a cycle that shrinks to an equilibrium; the answer
-//! is then how it ended.
+//! **Fails when** the curve ends otherwise than at a fold, such as at a cycle that shrinks to an equilibrium; the
+//! result is then how it ended.
 
 use super::System;
 use super::growth::{Beginning, Growth, polished, problem_of, settings};
 use crate::contract::{Event, Observer, Verdict};
 use crate::diagram::{Branch, Ending, Family, Kind, Origin, Point, Solution};
 
-/// What becomes of a solution.
+/// Fate of a solution.
 #[derive(Clone, Debug)]
 pub enum Persistence {
     /// It reaches the value with as many unstable eigenvalues or multipliers as before.
@@ -24,23 +25,23 @@ pub enum Persistence {
     Changes(Box<Point>),
     /// The curve turns back at this value of the parameter, up to which the solution exists.
     Vanishes {
-        /// Where it turns back.
+        /// Parameter value at which it turns back.
         fold: f64,
     },
-    /// The curve ended in another way before it was decided.
+    /// The curve ended otherwise before the question was decided.
     Undecided(Ending),
 }
 
 impl Persistence {
-    /// Whether the solution, with its stability, owes itself to the parameter.
+    /// True if the solution, with its stability, owes its existence to the parameter.
     pub fn is_artefact(&self) -> bool {
         matches!(self, Persistence::Vanishes { .. } | Persistence::Changes(_))
     }
 }
 
-/// What becomes of the solution at `point` when the parameter of index `free` goes to `value`, all others fixed.
+/// Follows the solution at `point` while the parameter of index `free` goes to `value`, all others fixed.
 ///
-/// `tolerance` and `degree` as in a plan; `max_points` limits the points of the curve.
+/// `tolerance` and `degree` are as in a plan; `max_points` limits the points of the curve.
 pub fn persistence(
     system: &System,
     tolerance: f64,
@@ -88,7 +89,7 @@ pub fn persistence(
 fn decided(branch: &Branch, value: f64, forward: bool, unstable: usize) -> Persistence {
     let end = if forward { branch.points.last() } else { branch.points.first() };
     let ending = branch.ends[usize::from(forward)].clone().unwrap_or(Ending::Stopped);
-    // Beyond the first fold there is another solution, wherever that gets to.
+    // Beyond the first fold there is another solution, whatever value that reaches.
     let mut folds = branch.special.iter().filter(|s| s.kind == Kind::Fold);
     if let Some(fold) = if forward { folds.next() } else { folds.next_back() } {
         return Persistence::Vanishes { fold: fold.point.parameters[branch.free] };
@@ -103,7 +104,7 @@ fn decided(branch: &Branch, value: f64, forward: bool, unstable: usize) -> Persi
     }
 }
 
-/// Ends a curve where it turns back.
+/// An observer that ends a curve where it turns back.
 struct UntilFold;
 
 impl Observer for UntilFold {

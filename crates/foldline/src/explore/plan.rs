@@ -1,11 +1,11 @@
-//! What a study asks for, in terms of the model.
+//! Requests of a study, in terms of the model.
 
 use crate::attractors::Limits;
 use crate::diagram::{Cycle, Kind};
 use crate::special::mark::Mark;
 
-/// Which attractor a seed means, among those that count as reached until every type was found that the seeds with the same sample ask for
-/// ([`crate::attractors::survey_until`]).
+/// Attractor that a seed means, among those that count as reached when the search ended: once every type requested by
+/// the seeds with the same sample was found ([`crate::attractors::survey_until`]).
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum AttractorKey {
     /// The equilibrium of smallest norm.
@@ -14,18 +14,18 @@ pub enum AttractorKey {
     Cycle,
     /// The cycle with this spectral ratio, such as 2:1, that was reached most often.
     Ratio(u32, u32),
-    /// The cycle that lasts so many periods of the forcing and was reached most often.
+    /// The cycle of that many forcing periods that was reached most often.
     Lasting(u32),
 }
 
-/// Where a first solution comes from.
+/// Source of a first solution.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SeedSource {
     /// Found by sampling initial states.
     Attractor(AttractorKey),
-    /// Settled (or polished) from this state `[n]`.
+    /// Limit of the trajectory, or of Newton's method, from this state `[n]`.
     State(Vec<f64>),
-    /// Polished from this cycle.
+    /// Limit of Newton's method from this cycle.
     Cycle(Cycle),
 }
 
@@ -34,17 +34,17 @@ pub enum SeedSource {
 pub struct SeedPlan {
     /// Unique name.
     pub name: String,
-    /// Where it comes from.
+    /// Source of the solution.
     pub source: SeedSource,
     /// Every parameter value `[k]` at the seed.
     pub parameters: Vec<f64>,
-    /// How many initial states to sample at most.
+    /// Largest number of initial states to sample.
     pub samples: usize,
     /// Seed of the random numbers.
     pub random: u64,
 }
 
-/// Where a branch starts.
+/// Start of a branch.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Start {
     /// At the seed of that index.
@@ -55,18 +55,18 @@ pub enum Start {
     EndOfSwitched(usize, String),
     /// At the end of the curve of that index.
     EndOfCurve(usize),
-    /// Where the homotopy of that index arrived.
+    /// At the goal of the homotopy of that index.
     EndOfHomotopy(usize),
 }
 
-/// At which special points to branch off, and how deep.
+/// Special points at which to switch branches, and depth.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Switching {
     /// Depth for each kind; a kind that is not listed is not switched at. A depth of 2 at period doublings follows the
     /// period-doubled branches and the branches that double there again.
     pub depth: Vec<(Kind, usize)>,
-    /// Depth at single special points, of that kind and number counted from the side of smaller positions, which goes before that
-    /// of the kind; on the branch itself, not on what is switched to.
+    /// Depth at single special points, by kind and number counted from the side of smaller positions. It overrides the
+    /// depth of the kind, on the branch itself but not on branches switched to.
     pub only: Vec<(Kind, usize, usize)>,
 }
 
@@ -82,12 +82,12 @@ impl Switching {
         single.map_or_else(|| self.at(kind), |(.., depth)| *depth)
     }
 
-    /// Whether it switches at any kind.
+    /// True if branches are switched at any point.
     pub fn anywhere(&self) -> bool {
         self.depth.iter().any(|(_, depth)| *depth > 0) || self.only.iter().any(|(.., depth)| *depth > 0)
     }
 
-    /// What remains for a branch that was reached by switching at the point of that kind and number.
+    /// Returns the switching that remains for a branch reached by switching at the point of that kind and number.
     pub fn below(&self, kind: Kind, number: usize) -> Switching {
         let left = self.at_point(kind, number).saturating_sub(1);
         let others = self.depth.iter().copied().filter(|(k, _)| *k != kind);
@@ -100,7 +100,7 @@ impl Switching {
 pub struct BranchPlan {
     /// Unique name.
     pub name: String,
-    /// Where it starts.
+    /// Its start.
     pub start: Start,
     /// Index of the continuation parameter.
     pub free: usize,
@@ -108,15 +108,15 @@ pub struct BranchPlan {
     pub range: [f64; 2],
     /// Follow only towards this value and stop there (a homotopy run); it lies in `range`.
     pub until: Option<f64>,
-    /// Where to branch off.
+    /// Special points at which to switch branches.
     pub switching: Switching,
-    /// Values to mark, or to stop at, on it and on what is switched to from it.
+    /// Values to mark, or to stop at, on the branch and on those switched to from it.
     pub marks: Vec<Mark>,
     /// Limit on the number of points per side.
     pub max_points: usize,
 }
 
-/// A curve in two parameters along which a special point is held.
+/// A bifurcation curve in two parameters.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CurvePlan {
     /// Unique name.
@@ -125,7 +125,8 @@ pub struct CurvePlan {
     pub hold: Kind,
     /// Name of the branch on which the special point lies: one of the plan, or one switched to from it.
     pub of: String,
-    /// The special point is the one of that kind nearest to this value of the branch's parameter; the first one if `None`.
+    /// The special point is the one of that kind nearest to this value of the branch's parameter; the first one if
+    /// `None`.
     pub near: Option<f64>,
     /// Index of the second parameter; the first is that of the branch.
     pub free: usize,
@@ -139,16 +140,16 @@ pub struct CurvePlan {
     pub max_points: usize,
 }
 
-/// A family brought from one set of parameter values to another, by whatever route gets through.
+/// A solution family to be carried to other parameter values, by any path that succeeds.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HomotopyPlan {
     /// Unique name.
     pub name: String,
-    /// Where it starts.
+    /// Its start.
     pub start: Start,
     /// Parameters that change together, with their values at the goal.
     pub targets: Vec<(usize, f64)>,
-    /// Index of the parameter in which the family may be moved on the way, and its range.
+    /// Index of the parameter in which the family may be moved on the way.
     pub via: usize,
     /// Smallest and largest value of that parameter.
     pub range: [f64; 2],
@@ -156,56 +157,56 @@ pub struct HomotopyPlan {
     pub max_points: usize,
 }
 
-/// A diagram to be found without being told where anything is.
+/// A diagram to be found without prescribed starts.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ExplorePlan {
-    /// Unique name; what is found is named after it.
+    /// Unique name, after which the branches found are named.
     pub name: String,
-    /// Every parameter value `[k]`; that of the free parameter does not count.
+    /// Every parameter value `[k]`; that of the free parameter is ignored.
     pub parameters: Vec<f64>,
     /// Index of the continuation parameter.
     pub free: usize,
     /// Smallest and largest value of the parameter.
     pub range: [f64; 2],
-    /// At how many values of it attractors and equilibria are looked for.
+    /// Number of parameter values at which attractors and equilibria are sought.
     pub values: usize,
-    /// How many initial states are sampled at each.
+    /// Number of initial states sampled at each.
     pub samples: usize,
     /// Seed of the random numbers.
     pub random: u64,
-    /// Where to branch off.
+    /// Special points at which to switch branches.
     pub switching: Switching,
-    /// A second parameter, and its range, in which folds are followed to isolated branches.
+    /// A second parameter, and its range, in which folds are continued to find isolated branches.
     pub connect: Option<(usize, [f64; 2])>,
-    /// No branch is begun once this many points are accepted.
+    /// Number of accepted points beyond which no branch is started.
     pub budget: usize,
     /// Limit on the number of points per side of a branch.
     pub max_points: usize,
 }
 
-/// Simulation from many starts at many values of a parameter.
+/// Simulation from many initial states at many values of a parameter.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SurveyPlan {
     /// Unique name.
     pub name: String,
-    /// Every parameter value `[k]`; that of the free parameter does not count.
+    /// Every parameter value `[k]`; that of the free parameter is ignored.
     pub parameters: Vec<f64>,
     /// Index of the parameter that varies.
     pub free: usize,
     /// Its values.
     pub values: Vec<f64>,
-    /// How many starts at each value.
+    /// Number of initial states at each value.
     pub starts: usize,
     /// Seed of the random numbers.
     pub random: u64,
 }
 
-/// Simulation from value to value of a parameter, each from the last state of the one before.
+/// Simulation at one value of a parameter after the other, each from the last state at the previous value.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SweepPlan {
     /// Unique name.
     pub name: String,
-    /// Index of the seed it starts at.
+    /// Index of the seed at which it starts.
     pub seed: usize,
     /// Index of the parameter that varies.
     pub free: usize,
@@ -213,10 +214,10 @@ pub struct SweepPlan {
     pub values: Vec<f64>,
 }
 
-/// Everything a study asks for.
+/// All requests of a study.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
-    /// The one tolerance.
+    /// The tolerance.
     pub tolerance: f64,
     /// Degree of the collocation polynomials.
     pub degree: usize,
@@ -241,7 +242,7 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// A plan that asks for nothing.
+    /// Returns a plan without requests.
     pub fn empty(tolerance: f64, degree: usize) -> Plan {
         Plan {
             tolerance,

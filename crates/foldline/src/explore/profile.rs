@@ -10,15 +10,16 @@ pub(super) const PARTS: usize = 4;
 /// Quantity that a first mesh distributes equally over its intervals.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Spread {
-    /// The arclength. Layers get as many intervals as their extent is worth, and the end of a transient along a slow manifold few.
+    /// The arclength. Layers get intervals in proportion to their extent; the end of a transient on a slow manifold
+    /// gets few.
     Arclength,
     /// The steps of the integration, whose error control has resolved the ends of transients too.
     Steps,
 }
 
-/// A trajectory over one period as a profile.
+/// Returns a trajectory over one period as a profile.
 ///
-/// `gain` `[n]` is what angles gain over the period; empty where none does.
+/// `gain` `[n]` is the gain of the angles over the period; empty if none turns.
 pub(super) fn first_profile(
     scales: &[f64],
     gain: Vec<f64>,
@@ -27,11 +28,11 @@ pub(super) fn first_profile(
     states: &[f64],
     spread: Spread,
 ) -> Cycle {
-    /// Smallest motion of a state, as a share of its scale, that contributes to the arclength: below the accuracy of sampling, 1e-6,
-    /// by a factor of safety of a hundred.
+    /// Smallest motion of a state, as a share of its scale, that contributes to the arclength: below the accuracy of
+    /// sampling, 1e-6, by a factor of safety of a hundred.
     const LEAST: f64 = 1e-8;
     let n = scales.len();
-    // A cycle of many turns needs more of them.
+    // A cycle of many turns needs more intervals.
     let intervals = match spread {
         Spread::Arclength => (times.len() / 12).clamp(60, 1200),
         Spread::Steps => (times.len() / PARTS).clamp(60, LARGEST),
@@ -61,7 +62,7 @@ pub(super) fn first_profile(
             _ => (place(&length, times, total * j as f64 / intervals as f64) / period).clamp(0.0, 1.0),
         })
         .collect();
-    // The ends of a trajectory over one period do not quite agree: the gap is spread over the period.
+    // The ends of a trajectory over one period do not quite agree; the gap is distributed over the period.
     let count = times.len();
     let gained = |i: usize| gain.get(i).copied().unwrap_or(0.0);
     let gap: Vec<f64> = (0..n).map(|i| states[(count - 1) * n + i] - states[i] - gained(i)).collect();
@@ -83,7 +84,7 @@ pub(super) fn first_profile(
     Cycle { period, forcing_periods: 0, mesh: mesh.into(), degree: 4, profile, gain }
 }
 
-/// Cubic interpolation of component i through the four samples around interval k-1…k.
+/// Interpolates component i by the cubic through the four samples around interval k-1…k.
 fn cubic(times: &[f64], states: &[f64], n: usize, i: usize, k: usize, t: f64) -> f64 {
     let first = (k.max(2) - 2).min(times.len().saturating_sub(4));
     let nodes: Vec<usize> = (first..times.len().min(first + 4)).collect();
@@ -102,7 +103,7 @@ fn cubic(times: &[f64], states: &[f64], n: usize, i: usize, k: usize, t: f64) ->
         .sum()
 }
 
-/// The solution in polynomials of another degree, as a starting point for Newton's method.
+/// Returns the solution in polynomials of another degree, as a start for Newton's method.
 pub(super) fn with_degree(mut point: Point, degree: usize) -> Point {
     if let Solution::Cycle(cycle) = &mut point.solution
         && cycle.degree != degree

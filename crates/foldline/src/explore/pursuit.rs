@@ -1,11 +1,12 @@
 //! Distinction between a jump of a sweep and a steep response.
 //!
-//! **Idea.** The motion at one parameter value is solved for and continued as a branch to the next value. If the branch gets there
-//! without turning back and arrives at the motion to which the trajectory settled, the two are one solution. If it turns back
-//! on the way or arrives at another motion, the sweep has jumped. Size alone does not decide: at a sharp resonance
-//! responses at neighbouring values differ greatly on one branch.
+//! **Idea.** The motion at one parameter value is solved for and continued as a branch to the next value. If the branch
+//! gets there without turning back and arrives at the motion to which the trajectory settled, the two are one solution.
+//! If it turns back on the way or arrives at another motion, the sweep has jumped. Size alone does not decide: at a
+//! sharp resonance, responses at neighbouring values differ greatly on one branch.
 //!
-//! **Fails when** one of the two motions cannot be solved for or the branch ends on the way; the result is then unknown.
+//! **Fails when** one of the two motions cannot be solved for or the branch ends on the way; the result is then
+//! unknown.
 
 use super::System;
 use super::growth::{Beginning, Growth, polished, problem_of, settings};
@@ -40,8 +41,8 @@ impl<'p> Pursuit<'p> {
         Some(reached.is_none_or(|reached| reached.difference(to, self.system.measure(), &[]) > 30.0 * self.tolerance))
     }
 
-    /// The solution continued to a value of the parameter: `Some(None)` if it turns back or joins another branch on the way, `None` if
-    /// it cannot be continued.
+    /// The solution continued to a value of the parameter: `Some(None)` if it turns back or joins another branch on the
+    /// way, `None` if it cannot be continued.
     fn followed(&self, from: &Point, value: f64) -> Option<Option<Point>> {
         let start = from.parameters[self.free];
         let (range, side) = ([start.min(value), start.max(value)], usize::from(value > start));

@@ -6,11 +6,13 @@ use crate::diagram::{Branch, Ending, Family, Kind, Point, Solution, SpecialPoint
 use crate::problem::equilibrium::EquilibriumProblem;
 
 impl Growth<'_> {
-    /// Tells a double Hopf point, at which a curve of torus points shrinks to an equilibrium, from a zero-Hopf point: there the pair of multipliers
-    /// on the unit circle goes to 1, at a double Hopf point its angle goes to 2π ω₂/ω₁.
+    /// Distinguishes a double Hopf point, at which a curve of torus points shrinks to an equilibrium, from a zero-Hopf
+    /// point: there the pair of multipliers on the unit circle goes to 1, at a double Hopf point its angle goes to 2π
+    /// ω₂/ω₁.
     pub(super) fn at_double_hopf(&self, branch: &Branch, side: usize, ending: Ending) -> Ending {
-        /// Largest angle of the pair that goes to 1. It is proportional to the extent of the cycles, which has fallen by a factor of ten and
-        /// more when the end is recognised; frequencies in a ratio below 0.1/2π would be taken for a zero-Hopf point.
+        /// Largest angle of the pair that goes to 1. It is proportional to the extent of the cycles, which has fallen
+        /// by a factor of ten and more when the end is recognised; frequencies in a ratio below 0.1/2π would be taken
+        /// for a zero-Hopf point.
         const SMALL: f64 = 0.1;
         let Ending::Joined { at: Kind::ZeroHopf, parameter } = ending else { return ending };
         let last = if side == 1 { branch.points.last() } else { branch.points.first() };
@@ -22,19 +24,20 @@ impl Growth<'_> {
         Ending::Joined { at, parameter }
     }
 
-    /// Recognises the end of a curve of folds of cycles at a generalised Hopf point, where the first Lyapunov coefficient vanishes and
-    /// the cycles shrink to an equilibrium. Steps get shorter in proportion to the cycles there, so the curve ends without passing the
-    /// point, for the reason in `ending`. Along the curve both parameters vary linearly with the square of the extent of the cycles, and
-    /// are extrapolated to extent zero; the equilibrium there must have eigenvalues ±2πi/T.
+    /// Recognises the end of a curve of folds of cycles at a generalised Hopf point, where the first Lyapunov
+    /// coefficient vanishes and the cycles shrink to an equilibrium. Steps get shorter in proportion to the cycles
+    /// there, so the curve ends without passing the point, for the reason in `ending`. Along the curve both parameters
+    /// vary linearly with the square of the extent of the cycles, and are extrapolated to extent zero; the equilibrium
+    /// there must have eigenvalues ±2πi/T.
     pub(super) fn at_generalised_hopf(&self, branch: &Branch, side: usize, ending: Ending) -> Ending {
-        /// Largest extent of the last cycle, as a share of the largest on the curve. Parameters vary with its square, so the extrapolation
-        /// covers 0.25 % of their variation.
+        /// Largest extent of the last cycle, as a share of the largest on the curve. Parameters vary with its square,
+        /// so the extrapolation covers 0.25 % of their variation.
         const SMALL: f64 = 0.05;
-        /// Largest relative real part and error of the frequency of the eigenvalues. Both vary with the square of the extent, so [`SMALL`]
-        /// makes them 0.0025; the rest is a factor of safety.
+        /// Largest relative real part and error of the frequency of the eigenvalues. Both vary with the square of the
+        /// extent, so [`SMALL`] makes them 0.0025; the rest is a factor of safety.
         const NEAR: f64 = 1e-2;
-        /// Ratio to the extent of the last cycle of those from which parameters are extrapolated. Where steps end, the fold is lost in
-        /// rounding; its effect decreases with the square of the extent, by a factor of 100 here.
+        /// Ratio to the extent of the last cycle of those from which parameters are extrapolated. Where steps end, the
+        /// fold is lost in rounding; its effect decreases with the square of the extent, by a factor of 100 here.
         const CLEAR: f64 = 10.0;
         let given_up = matches!(ending, Ending::StepTooSmall(_) | Ending::GivenUp(_));
         let Some((Kind::Fold, first)) = branch.held.filter(|_| given_up && branch.family == Family::Cycle) else {
@@ -78,8 +81,8 @@ impl Growth<'_> {
         }
     }
 
-    /// How a side of a doubled branch ended that has its last point, the special point of the parent, but was interrupted before
-    /// that was said. The matrix is singular there, so nothing can go on from it.
+    /// Returns the ending of a side of a doubled branch that has its last point, the special point of the parent, but
+    /// was interrupted before its end was recorded. The matrix is singular there, so the side cannot be continued.
     pub(super) fn at_edge(&self, branch: &Branch, side: usize) -> Option<Ending> {
         let end = if side == 1 { branch.points.last() } else { branch.points.first() }?;
         if branch.points.len() < 2 || !is_doubled(branch) {
@@ -100,8 +103,8 @@ impl Growth<'_> {
         }
     }
 
-    /// An end at a special point of the parent gets the accurate parameter of that point; where the special point, as a
-    /// doubled cycle, is a point of this branch, it becomes the last one.
+    /// Gives an end at a special point of the parent the accurate parameter of that point. A special point that is a
+    /// point of this branch too, as a doubled cycle, becomes its last point.
     pub(super) fn recognised(&self, branch: &mut Branch, side: usize, ending: Ending) -> Ending {
         let Ending::Joined { at, parameter } = ending else { return ending };
         let free = branch.free;

@@ -1,22 +1,25 @@
-//! Starts that need no sampling: cycles next to resonances of a lightly damped linear response.
+//! Starts without sampling: cycles near resonances of a lightly damped linear response.
 //!
-//! **Idea.** Where damping is light, samples settle too slowly to be waited for, and isolas attract few of them. But families of cycles are
-//! rooted where frequencies of the linear response are in a simple ratio: two of its modes where the frame rotates (n:m bouncing cycles
-//! of a rotor), a mode and the forcing in a forced field. Next to such a root the motion is nearly linear however large it is until
-//! something nonlinear is reached, and a few averaged equations (`averaged`) tell where cycles are.
+//! **Idea.** With light damping, samples settle too slowly to wait for, and isolas attract few of them. But families of
+//! cycles have their roots where frequencies of the linear response are in a simple ratio: two of its modes in a
+//! rotating frame (n:m bouncing cycles of a rotor), a mode and the forcing in a forced field. Near such a root the
+//! motion is nearly linear at any amplitude until it reaches a nonlinearity, and a few averaged equations (`averaged`)
+//! locate the cycles.
 //!
-//! 1. along the parameter: the response, which Newton's method finds from the state next to the origin, and its lightly damped modes;
-//! 2. roots: values at which two frequencies are in a ratio of whole numbers up to [`ORDER`], those of the smallest numbers first;
+//! 1. along the parameter: the response, which Newton's method finds from the state closest to the origin, and its
+//!    lightly damped modes;
+//! 2. roots: values at which two frequencies are in a ratio of whole numbers up to [`ORDER`], smallest numbers first;
 //! 3. at values on both sides of each root: starts from averaged equations, made accurate by collocation.
 //!
-//! **Equations.** Frequencies ω of modes, those of a forced field per period of the forcing:
+//! **Equations.** With the frequencies ω of modes, per forcing period in a forced field:
 //!
-//!   (1)  l ω_i - k ω_j = 0 between two modes,  l ω_i - 2π k = 0 between one and the forcing
+//!   (1)  l ω_i - k ω_j = 0 between two modes,  l ω_i - 2π k = 0 between a mode and the forcing
 //!
-//! **Bounds.** [`ROOTS`] roots, [`STEPS`] values on each side of one, and at each at most four cycles to be corrected.
+//! **Bounds.** [`ROOTS`] roots, [`STEPS`] values on each side of a root, and at most four cycles to be corrected at
+//! each.
 //!
-//! **Fails when** the family is rooted outside the range, in a ratio of larger numbers or in no linear response, as where the response is
-//! itself strongly nonlinear.
+//! **Fails when** the root of the family lies outside the range, at a ratio of larger numbers, or on no linear
+//! response, for instance because the response is itself strongly nonlinear.
 
 use super::System;
 use super::averaged::{Averaged, Mode};
@@ -34,22 +37,22 @@ use std::f64::consts::TAU;
 
 /// Largest whole number in a ratio.
 const ORDER: u32 = 5;
-/// Largest |Re μ| / |Im μ| of a lightly damped mode: with it an oscillation falls to about half in each turn.
+/// Largest |Re μ| / |Im μ| of a lightly damped mode: at this value an oscillation decays to about half in each turn.
 const LIGHT: f64 = 0.1;
-/// Intervals of the range in which a root is looked for.
+/// Number of intervals of the range in which roots are sought.
 const INTERVALS: usize = 64;
-/// Most roots that are looked at.
+/// Largest number of roots examined.
 const ROOTS: usize = 24;
 /// Values on each side of a root: the farthest a tenth of the range away, each 1/√10 as far as the one before.
 const STEPS: i32 = 5;
 
-/// A value of the parameter at which frequencies are in a ratio.
+/// A value of the parameter at which two frequencies are in resonance.
 pub(super) struct Root {
     pub(super) value: f64,
     ratio: Ratio,
 }
 
-/// k and l of (1), and the numbers of the modes, by frequency; one in a forced field.
+/// k and l of (1), and the indices of the modes, by frequency; a single mode in a forced field.
 #[derive(Clone, Debug, PartialEq)]
 struct Ratio {
     modes: Vec<usize>,
@@ -57,20 +60,20 @@ struct Ratio {
     l: u32,
 }
 
-/// The underlying motion at a value of the parameter.
+/// Linear response at a value of the parameter.
 struct Response {
     solution: Solution,
-    /// The mean of f_x along it.
+    /// Mean of f_x along the solution.
     jacobian: Vec<f64>,
-    /// The eigenvalues μ of its lightly damped modes by frequency.
+    /// Eigenvalues μ of the lightly damped modes, by frequency.
     rates: Vec<Complex64>,
 }
 
-/// Cycles found next to a root at one value, with the work.
+/// Cycles found near a root at one value, and the work.
 #[derive(Default)]
 pub(super) struct Yield {
     pub(super) cycles: Vec<Point>,
-    /// How often the averaged equations were solved, and how often those of a cycle.
+    /// Number of solutions of the averaged equations, and number of cycles corrected.
     pub(super) averaged: usize,
     pub(super) corrected: usize,
 }
@@ -82,13 +85,13 @@ pub(super) struct Resonances<'r> {
 }
 
 impl Root {
-    /// n:m, the larger first between modes; that of the mode to the forcing else.
+    /// Returns n:m, with the larger first between modes, otherwise that of the mode to the forcing.
     pub(super) fn name(&self) -> String {
         let Ratio { modes, k, l } = &self.ratio;
         if modes.len() == 2 { format!("{l}:{k}") } else { format!("{k}:{l}") }
     }
 
-    /// Values on both sides of it, inside the range, the next first.
+    /// Returns the values on both sides of the root, inside the range, the closest first.
     pub(super) fn values(&self, [low, high]: [f64; 2]) -> Vec<f64> {
         let shares = (0..STEPS).rev().map(|step| 0.1 * 0.1f64.powf(0.5 * f64::from(step)));
         let both = shares.flat_map(|share| [1.0, -1.0].map(|sign| self.value + sign * share * (high - low)));
@@ -97,7 +100,7 @@ impl Root {
 }
 
 impl Ratio {
-    /// All of them between modes of that number.
+    /// Returns all ratios between `count` modes.
     fn all(count: usize, forced: bool) -> Vec<Ratio> {
         let pairs = (1..=ORDER).flat_map(|k| (1..=ORDER).map(move |l| (k, l))).filter(|(k, l)| coprime(*k, *l));
         let mut all: Vec<Ratio> = match forced {
@@ -114,7 +117,7 @@ impl Ratio {
         all
     }
 
-    /// (1), relative.
+    /// Evaluates (1), relative.
     fn mismatch(&self, response: &Response) -> Option<f64> {
         let frequency = |index: usize| response.rates.get(index).map(|rate| rate.im);
         let first = f64::from(self.l) * frequency(self.modes[0])?;
@@ -128,7 +131,7 @@ fn coprime(a: u32, b: u32) -> bool {
 }
 
 impl Resonances<'_> {
-    /// Step 2, and how many more are left.
+    /// Carries out step 2. Returns the roots, and the number of those beyond the limit.
     pub(super) fn roots(&self) -> (Vec<Root>, usize) {
         let [low, high] = self.plan.range;
         let value = |k: usize| low + (high - low) * k as f64 / INTERVALS as f64;
@@ -152,8 +155,8 @@ impl Resonances<'_> {
         (roots, left)
     }
 
-    /// The root between two values with a mismatch of either sign; `None` where it jumps, as where the response does. By false position,
-    /// where an end that stays counts half.
+    /// Finds the root between two values with mismatches of opposite sign by false position (Illinois method). `None`
+    /// if the mismatch jumps, as where the response does.
     fn root(&self, ratio: &Ratio, [mut a, mut b]: [(f64, f64); 2]) -> Option<f64> {
         const ROUNDS: usize = 20;
         const ZERO: f64 = 1e-6;
@@ -163,7 +166,7 @@ impl Resonances<'_> {
             if next.1.abs() < ZERO {
                 return Some(value);
             }
-            // The last value is b.
+            // The latest value is b.
             if (next.1 < 0.0) == (b.1 < 0.0) {
                 a.1 *= 0.5
             } else {
@@ -180,7 +183,7 @@ impl Resonances<'_> {
         parameters
     }
 
-    /// Step 1.
+    /// Carries out step 1.
     fn response(&self, value: f64) -> Option<Response> {
         const PLACES: usize = 32;
         let (system, parameters) = (self.system, self.parameters(value));
@@ -210,7 +213,7 @@ impl Resonances<'_> {
         Some(Response { solution: point.solution, jacobian, rates })
     }
 
-    /// Step 3 at one value.
+    /// Carries out step 3 at one value.
     pub(super) fn cycles(&self, root: &Root, value: f64) -> Yield {
         let (ratio, parameters) = (&root.ratio, self.parameters(value));
         let Some(response) = self.response(value) else { return Yield::default() };
@@ -228,7 +231,7 @@ impl Resonances<'_> {
         Yield { cycles: moving, averaged: solved, corrected: motions.len() }
     }
 
-    /// True unless Newton's method has found an equilibrium in place of a cycle.
+    /// True unless Newton's method has found an equilibrium instead of a cycle.
     fn moves(&self, cycle: &Point) -> bool {
         const LEAST: f64 = 1e-3;
         let spans = cycle.ranges.iter().zip(&self.system.scales).map(|([low, high], scale)| (high - low) / scale);
@@ -236,7 +239,7 @@ impl Resonances<'_> {
     }
 }
 
-/// The state at a time, in periods of the forcing.
+/// Returns the state at a time in forcing periods.
 fn state(solution: &Solution, time: f64) -> Vec<f64> {
     match solution {
         Solution::Equilibrium(x) => x.clone(),

@@ -1,8 +1,8 @@
 //! The surveys and sweeps of a plan.
 //!
-//! **Idea.** A survey shares its values among the threads; sweeps, in which each value waits for the one before, are shared
-//! as a whole. What an earlier run has completed is not repeated. Jumps of a sweep are detected by solving for its motions
-//! (`pursuit`).
+//! **Idea.** A survey shares its values among the threads; sweeps, in which each value waits for the previous one, are
+//! shared as a whole. Results completed by an earlier run are not computed again. Jumps of a sweep are detected by
+//! solving for its motions (`pursuit`).
 
 use super::System;
 use super::plan::{Plan, SurveyPlan, SweepPlan};
@@ -14,7 +14,7 @@ use crate::diagram::{Diagram, Motion, Response, Responses, Search, Solution};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// The responses of every survey and sweep of the plan that came to its end, in the order of the plan.
+/// Returns the responses of every completed survey and sweep of the plan, in the order of the plan.
 pub fn simulate(
     system: &System,
     plan: &Plan,
@@ -55,7 +55,7 @@ fn trial<'a>(system: &'a System, plan: &Plan, jobs: usize) -> Trial<'a> {
     Trial { field: system.field, scales: &system.scales, whirl: system.whirl, jobs, limits: plan.simulation }
 }
 
-/// Reports one value after the other as done.
+/// Reports values one after the other as done.
 struct Count<'o> {
     name: &'o str,
     of: usize,
@@ -94,14 +94,14 @@ fn one_survey(
     complete.then(|| finished(name, Search::Survey, *free, responses, observer))
 }
 
-/// Rounds a value to 12 digits, which removes the rounding of its computation.
+/// Rounds a value to 12 digits, which removes the rounding errors of its computation.
 fn rounded(value: f64) -> f64 {
     format!("{value:.11e}").parse().unwrap_or(value)
 }
 
-/// Note on the number of starts that escaped at each value, if any did.
+/// Returns a note on the number of starts that escaped at each value, if any did.
 fn escapes(responses: &[Response], starts: usize) -> Option<String> {
-    /// Values that are listed; more would not be read.
+    /// Number of values listed; more would not be read.
     const TOLD: usize = 8;
     let gone: Vec<&Response> = responses.iter().filter(|r| r.motion == Motion::Escaped).collect();
     let told = gone.iter().take(TOLD).map(|r| format!("{} at {}", r.hits, rounded(r.value)));

@@ -1,8 +1,9 @@
-//! What is done first.
+//! Order of the tasks of a plan.
 //!
-//! **Idea.** A family can begin as soon as the census is known from which its start is taken. Of what can begin the longest goes first,
-//! so that no thread is left alone with it in the end; a census counts for the longest family that waits for it. What a plan names
-//! later builds on what it names earlier and takes longer, if anything.
+//! **Idea.** A family can begin as soon as the sampling of initial states that provides its start is done. Of the tasks
+//! that can begin, the longest goes first, so that no thread is left alone with it at the end; a sampling counts as
+//! much as the longest family that waits for it. Items named later in a plan build on earlier ones and usually take
+//! longer.
 
 use super::family::{self, Root};
 use super::plan::{Plan, Start};
@@ -10,16 +11,16 @@ use super::seeds::Seeds;
 use std::cmp::Reverse;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 
-/// Something that one thread does.
+/// A task for one thread.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Task {
-    /// The census of that number.
+    /// The sampling of initial states of that number.
     Census(usize),
     /// The family of that index.
     Family(usize),
 }
 
-/// What is left to do, the longest first.
+/// Remaining tasks, the longest first.
 pub(super) struct Schedule {
     waiting: Mutex<Vec<Waiting>>,
     changed: Condvar,
@@ -28,12 +29,12 @@ pub(super) struct Schedule {
 #[derive(Clone, Copy, Debug)]
 struct Waiting {
     task: Task,
-    /// The census that must be finished before.
+    /// The sampling that must be finished before.
     after: Option<usize>,
 }
 
 impl Schedule {
-    /// Everything that starts at a seed, and the censuses for it.
+    /// Creates the tasks: everything that starts at a seed, and the samplings it needs.
     pub(super) fn new(plan: &Plan, families: &[Root], seeds: &Seeds) -> Schedule {
         let start = |root: &Root| match root {
             Root::Branch(index) => Some(&plan.branches[*index].start),
@@ -61,7 +62,8 @@ impl Schedule {
         }
     }
 
-    /// The next task, once there is one that can begin; `None` when none is left. What waits for it can begin once it is dropped.
+    /// Returns the next task once one can begin; `None` when none is left. Dropping it releases the tasks that wait for
+    /// it.
     pub(super) fn next(&self) -> Option<Claim<'_>> {
         let mut waiting = self.lock();
         loop {
@@ -75,7 +77,7 @@ impl Schedule {
         }
     }
 
-    /// Leaves out every census that has not begun, and what waits for one: nobody wants to wait for that any more.
+    /// Drops every sampling that has not begun, and what waits for one: the run is to end soon.
     pub(super) fn hurry(&self) {
         self.lock().retain(|own| own.after.is_none() && matches!(own.task, Task::Family(_)));
         self.changed.notify_all();
@@ -86,7 +88,7 @@ impl Schedule {
     }
 }
 
-/// A task that somebody is at.
+/// A task in progress.
 pub(super) struct Claim<'s> {
     schedule: &'s Schedule,
     pub(super) task: Task,
@@ -111,8 +113,8 @@ mod tests {
     use crate::diagram::{Diagram, Kind};
     use crate::model::{Definition, Model, ModelSource, Parameter, State};
 
-    /// A branch from each of three seeds: two share a census, the one of the other is needed by the longest branch, and a last branch
-    /// starts from a state.
+    /// A branch from each of three seeds, two of which share a sampling while that of the third is needed by the
+    /// longest branch; and a branch that starts from a state.
     fn plan() -> Plan {
         let sampled = SeedSource::Attractor(AttractorKey::Equilibrium);
         let sources =
@@ -164,7 +166,7 @@ mod tests {
             let long = schedule.next().unwrap();
             let short = schedule.next().unwrap();
             assert_eq!((long.task, short.task), (Task::Census(1), Task::Census(0)));
-            // Nothing else can begin but what starts from a state.
+            // Nothing else can begin except what starts from a state.
             assert_eq!(schedule.next().unwrap().task, Task::Family(3));
             drop(short);
             assert_eq!(schedule.next().unwrap().task, Task::Family(2));
@@ -182,7 +184,7 @@ mod tests {
             std::thread::scope(|scope| {
                 let others = scope.spawn(|| std::iter::from_fn(|| schedule.next().map(|claim| claim.task)).count());
                 drop(first);
-                // The rest, but for what this thread takes meanwhile.
+                // The rest, except for the tasks that this thread takes meanwhile.
                 let own = std::iter::from_fn(|| schedule.next().map(|claim| claim.task)).count();
                 assert_eq!(own + others.join().unwrap(), 5);
             });
@@ -190,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn in_a_hurry_no_census_begins_nor_what_waits_for_one() {
+    fn hurrying_drops_censuses_not_begun_and_the_families_that_wait_for_them() {
         scheduled(|schedule| {
             let census = schedule.next().unwrap();
             assert_eq!(census.task, Task::Census(1));

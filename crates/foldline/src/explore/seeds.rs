@@ -1,8 +1,8 @@
-//! Where first solutions come from.
+//! First solutions.
 //!
 //! **Idea.** Attractors are found by sampling initial states ([`crate::attractors`]) and made accurate by the same
-//! collocation that follows them later. Seeds with the same parameters share one census, which goes no further than it takes to
-//! find what they ask for.
+//! collocation that follows them later. Seeds with the same parameters share one sampling of initial states, which ends
+//! once it has found what they ask for.
 
 use super::System;
 use super::choice::{Choice, is_meant, missing, summary};
@@ -22,24 +22,24 @@ use crate::linalg::max_abs;
 use crate::problem::equilibrium::EquilibriumProblem;
 use std::sync::OnceLock;
 
-/// The first solutions of a plan, one per seed, or why there is none. Each is found when it is asked for.
+/// First solutions of a plan, one per seed, or the reason why there is none. Each is computed on first request.
 pub struct Seeds<'p> {
     system: &'p System<'p>,
     plan: &'p Plan,
-    /// Threads that one census, or one sample, may take.
+    /// Number of threads for one sampling or one sample.
     jobs: usize,
     given: &'p [(usize, Point)],
     observer: &'p dyn Observer,
-    /// `[seed]`: whether anything that is still to be done starts there.
+    /// `[seed]`: true if any remaining task starts there.
     needed: Vec<bool>,
-    /// The censuses that are needed, each with the index of the first seed it is for.
+    /// The samplings that are needed, each with the index of the first seed that it serves.
     censuses: Vec<(usize, OnceLock<Census>)>,
     points: Vec<OnceLock<Result<Point, String>>>,
 }
 
 impl<'p> Seeds<'p> {
-    /// Those that a branch without points in `earlier`, or a sweep that is not there, starts from, but for those that are `given`, by
-    /// index; `jobs` threads between them.
+    /// Selects the seeds from which a branch without points in `earlier`, or a sweep missing there, starts, except
+    /// those `given` by index. Samplings share `jobs` threads.
     pub fn new(
         system: &'p System<'p>,
         plan: &'p Plan,
@@ -70,19 +70,19 @@ impl<'p> Seeds<'p> {
         }
     }
 
-    /// How many censuses are needed.
+    /// Number of samplings needed.
     pub fn count(&self) -> usize {
         self.censuses.len()
     }
 
-    /// The census, of those, from which that seed is taken.
+    /// Returns the number of the sampling that provides a seed, if any.
     pub fn census_of(&self, seed: usize) -> Option<usize> {
         let own = &self.plan.seeds[seed];
         let sampled = self.needed[seed] && matches!(own.source, SeedSource::Attractor(_));
         self.censuses.iter().position(|(other, _)| sampled && share(&self.plan.seeds[*other], own))
     }
 
-    /// The attractors that were found at a seed's parameters.
+    /// Returns the attractors found by a sampling.
     pub fn census(&self, number: usize) -> &Census {
         let (index, census) = &self.censuses[number];
         census.get_or_init(|| {
@@ -92,7 +92,7 @@ impl<'p> Seeds<'p> {
         })
     }
 
-    /// The first solution of that seed.
+    /// Returns the first solution of a seed.
     ///
     /// # Errors
     /// A sentence that says why there is none.
@@ -148,7 +148,7 @@ impl<'p> Seeds<'p> {
     }
 }
 
-/// The first solution that a seed means, by itself.
+/// Finds the first solution for a single seed.
 ///
 /// # Errors
 /// A sentence that says why there is none.
@@ -162,12 +162,12 @@ pub fn first_solution(system: &System, seed: &SeedPlan, tolerance: f64, jobs: us
     Seeds::new(system, &plan, jobs, &Diagram::default(), &[], &Unobserved).point(0)
 }
 
-/// Whether two seeds share a census.
+/// True if two seeds share a sampling.
 fn share(a: &SeedPlan, b: &SeedPlan) -> bool {
     a.parameters == b.parameters && a.samples == b.samples && a.random == b.random
 }
 
-/// The seeds that a census is needed for, of those that share one the first.
+/// Returns the seeds that need a sampling; of those that share one, the first.
 fn sampled(system: &System, plan: &Plan, needed: &[bool]) -> Vec<usize> {
     let mut first: Vec<usize> = Vec::new();
     for (index, seed) in plan.seeds.iter().enumerate() {
@@ -180,15 +180,15 @@ fn sampled(system: &System, plan: &Plan, needed: &[bool]) -> Vec<usize> {
     first
 }
 
-/// Cause and cure, without a sample, where no equilibrium that a seed could mean is isolated. Cycles may be, where a symmetry only moves them
-/// along themselves.
+/// Returns cause and cure, without sampling, if no equilibrium that a seed could mean is isolated. Cycles may be, if a
+/// symmetry only moves them along themselves.
 fn in_families(system: &System, seed: &SeedPlan) -> Option<String> {
     let equilibrium = seed.source == SeedSource::Attractor(AttractorKey::Equilibrium);
     if equilibrium { of_laws(system, &seed.parameters) } else { None }
 }
 
-/// The census for a seed. It ends early once it has what all seeds of the plan ask for that share it, needed or not: what a seed means
-/// does not depend on earlier runs.
+/// Samples initial states for a seed. The sampling ends once it has found what all seeds that share it ask for, needed
+/// or not, so that a seed means the same solution in a resumed run.
 fn census_for(system: &System, plan: &Plan, index: usize, jobs: usize) -> Census {
     let seed = &plan.seeds[index];
     let keys = plan.seeds.iter().filter(|other| share(other, seed)).filter_map(|other| match &other.source {
@@ -216,8 +216,8 @@ fn census_for(system: &System, plan: &Plan, index: usize, jobs: usize) -> Census
     census
 }
 
-/// The stable cycle of one forcing period that Newton's method finds from the state nearest to the origin; and whether it attracts, but too
-/// slowly for any sample to settle on it within the step limit.
+/// Returns the stable cycle of one forcing period that Newton's method finds from the state nearest to the origin, and
+/// true if it attracts, but too slowly for any sample to settle on it within the step limit.
 fn newton_from_rest(system: &System, plan: &Plan, seed: &SeedPlan) -> Option<(Attractor, bool)> {
     let Direct { point, periods, slow, .. } =
         direct(system, &seed.parameters, plan.tolerance, &next_to_origin(system))?;
@@ -288,7 +288,7 @@ pub(super) fn polish(system: &System, parameters: &[f64], tolerance: f64, candid
     Some(reduced(system, &settings, &found).unwrap_or(found))
 }
 
-/// A solution near a candidate, coarsely and on its mesh as it is: a candidate that is not close to one is not worth a finer mesh.
+/// Solves near a candidate, coarsely and on its own mesh: a candidate far from a solution is not worth a finer mesh.
 pub(super) fn near(system: &System, degree: usize, settings: &Settings, mut guess: Point) -> Result<Point, Failure> {
     let mut problem = problem_of(system, 0, degree, &guess, false);
     let coarse = Settings { tolerance: 1e-2, max_newton: 6, ..settings.clone() };
@@ -300,7 +300,7 @@ pub(super) fn near(system: &System, degree: usize, settings: &Settings, mut gues
     Ok(guess)
 }
 
-/// A point about which nothing but the solution is known.
+/// Returns a point with only the parameters and the solution.
 pub(super) fn bare(parameters: &[f64], solution: Solution) -> Point {
     Point {
         position: 0,
@@ -317,8 +317,9 @@ pub(super) fn bare(parameters: &[f64], solution: Solution) -> Point {
     }
 }
 
-/// The solution for a given state: an equilibrium if Newton's method finds one close by; otherwise a cycle through the state, or one that
-/// attracts too slowly for simulation ([`direct`]); otherwise the limit of the trajectory from the state.
+/// Returns the solution for a given state: an equilibrium if Newton's method finds one close by; otherwise a cycle
+/// through the state, or one that attracts too slowly for simulation ([`direct`]); otherwise the limit of the
+/// trajectory from the state.
 fn from_state(
     system: &System,
     seed: &SeedPlan,
@@ -368,14 +369,14 @@ fn from_state(
     })
 }
 
-/// True if a trajectory has reached the cycle although it does not repeat itself to the required accuracy, as in a stiff model whose steps
-/// are limited by stability.
+/// True if a trajectory has reached the cycle although it does not repeat itself to the required accuracy, as in a
+/// stiff model whose steps are limited by stability.
 fn has_arrived(system: &System, seed: &SeedPlan, next: &Direct, lost: &Lost) -> bool {
     let unit = system.field.time_unit(&seed.parameters);
     matches!(lost, Lost::Unsettled { time, state, .. } if next.ends(*time, state, unit))
 }
 
-/// Message on a trajectory from a given state that led to no solution: its outcome, the cause and a cure.
+/// Message about a trajectory from a given state that led to no solution: its outcome, the cause and a cure.
 fn no_start(system: &System, seed: &SeedPlan, state: &[f64], lost: &Lost) -> String {
     /// States whose motion is listed; they fit on one line.
     const TOLD: usize = 4;

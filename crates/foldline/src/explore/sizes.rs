@@ -1,16 +1,18 @@
-//! How large are the states?
+//! Characteristic sizes of the states.
 //!
-//! **Idea.** Where a model says nothing about the size of a state, its solutions do: it is the largest magnitude, rounded, that the state has along
-//! trajectories from the given states, at parameter values between those that the plan reaches. The trajectories only have to show orders
-//! of magnitude; their errors are relative to the largest magnitude so far, so that nothing depends on a unit.
+//! **Idea.** If a model does not state the size of a state, its solutions show it: the largest magnitude, rounded, of
+//! the state along trajectories from the given states, at parameter values between those that the plan reaches. The
+//! trajectories need only show orders of magnitude; their errors are relative to the largest magnitude so far, so that
+//! nothing depends on units.
 //!
-//! **Equations.** With Xᵢ the largest |xᵢ| up to now and e the difference of the two solutions of an embedded pair, a step holds if
+//! **Equations.** With Xᵢ the largest |xᵢ| so far and e the difference of the two solutions of an embedded pair, a step
+//! is accepted if
 //!
 //!   (1)  maxᵢ |eᵢ| / Xᵢ ≤ [`ACCURACY`]
 //!
 //! **Source.** bogacki1989 (the pair of orders 3 and 2).
 //!
-//! **Fails when** a state is 0 along every trajectory, or grows to the end of each: it then counts as of size 1.
+//! **Fails when** a state is 0 along every trajectory, or grows to the end of each; its size is then taken as 1.
 
 use super::plan::{Plan, SeedSource};
 use crate::contract::{Batch, Parameters, VectorField};
@@ -23,44 +25,45 @@ pub(super) type Place = (Vec<f64>, Vec<f64>);
 
 /// Allowed error of a step, (1).
 const ACCURACY: f64 = 1e-2;
-/// Steps of a trajectory. From [`ASIDE`] to 1 it takes some 200, and as many to settle; an oscillation that grows by a third in each
-/// period has 100 periods.
+/// Number of steps of a trajectory. Growth from [`ASIDE`] to 1 takes some 200, and settling as many; an oscillation
+/// that grows by a third in each period has 100 periods.
 const STEPS: usize = 2000;
-/// Starts at least and at most, each of them once as it is and once aside.
+/// Smallest and largest number of starts, each used once as it is and once perturbed.
 const PLACES: [usize; 2] = [3, 12];
-/// States of all starts together, between these: five equations take 30 ms, a hundred 0.2 s.
+/// Number of states of all starts together, within these limits: five equations take 30 ms, a hundred 0.2 s.
 const STATES: usize = 240;
-/// Magnitude at which a trajectory runs to infinity.
+/// Magnitude beyond which a trajectory runs to infinity.
 const INFINITE: f64 = 1e100;
-/// Change of the extent from the third to the last quarter of a trajectory up to which it has settled.
+/// Largest change of the extent from the third to the last quarter of a trajectory that has settled.
 const STEADY: f64 = 2.0;
-/// Growth, as a logarithm, that the rate between these two quarters may make of the whole time: extents of irregular motions differ by a tenth.
+/// Log of the growth, extrapolated from these quarters to the whole time, that irregular extents may seem to have.
 const SLOW: f64 = 3.0;
-/// Where a state starts that is 0, so that it may leave a saddle.
+/// Initial value of a state that is 0, so that it can leave a saddle.
 const ASIDE: f64 = 1e-30;
-/// Magnitude up to which a state counts as 0: ten decades above [`ASIDE`] for growth that decays again.
+/// Magnitude below which a state counts as 0: ten decades above [`ASIDE`], for growth that decays again.
 const NOTHING: f64 = 1e-20;
-/// Change of the state over a step, relative, at which a trajectory is at rest.
+/// Relative change of the state over a step at which a trajectory is at rest.
 const REST: f64 = 1e-6;
 
-/// Characteristic size of every state `[n]`: what the model states, else the largest magnitude along the trajectory from that state `[n]` at
-/// these parameters `[k]`, if it stays bounded, else the magnitude there, and 1 for a state that is 0 all along.
+/// Characteristic size of every state `[n]`: as stated in the model, else the largest magnitude along the trajectory
+/// from `state` `[n]` at these parameters `[k]` if bounded, else the magnitude in `state`, and 1 for a state that is
+/// always 0.
 pub fn scales_from(model: &Model, state: &[f64], parameters: &[f64]) -> Vec<f64> {
     of_states(model, &[(state.to_vec(), parameters.to_vec())])
 }
 
-/// Characteristic size of every state `[n]` in a plan: what the model states, else the largest magnitude that is met from where the plan
-/// starts, else 1.
+/// Characteristic size of every state `[n]` in a plan: the size stated in the model, else the largest magnitude met
+/// from the starts of the plan, else 1.
 pub fn state_scales(model: &Model, plan: &Plan) -> Vec<f64> {
     of_states(model, &places(model, plan))
 }
 
-/// The origin at these parameters.
+/// Returns the origin at these parameters.
 pub(super) fn origin(model: &Model, parameters: &[f64]) -> Place {
     (vec![0.0; model.dim()], parameters.to_vec())
 }
 
-/// Where a plan starts, and the same states at other values of each of the parameters that it changes.
+/// Returns the starts of a plan, and the same states at other values of each parameter that the plan changes.
 pub(super) fn places(model: &Model, plan: &Plan) -> Vec<Place> {
     const SHARES: [f64; 4] = [0.5, 1.0, 0.0, 0.25];
     let mut starts: Vec<Place> = Vec::new();
@@ -97,7 +100,7 @@ pub(super) fn places(model: &Model, plan: &Plan) -> Vec<Place> {
     all.into_iter().take((STATES / model.dim().max(1)).clamp(PLACES[0], PLACES[1])).collect()
 }
 
-/// Characteristic size of every state `[n]`: what the model states, else the largest magnitude that is met from these places, else 1.
+/// Size of every state `[n]`: as stated in the model, else the largest magnitude met from `places`, else 1.
 pub(super) fn of_states(model: &Model, places: &[Place]) -> Vec<f64> {
     let mut sizes: Vec<Option<f64>> = model.states.iter().map(|state| state.stated_scale()).collect();
     if sizes.iter().any(Option::is_none) {
@@ -115,15 +118,15 @@ pub(super) fn of_states(model: &Model, places: &[Place]) -> Vec<f64> {
     sizes.into_iter().map(|size| size.unwrap_or(1.0)).collect()
 }
 
-/// The next smaller number with the first digit 1, 2 or 5: states that a symmetry exchanges have one size then.
+/// Rounds down to a number with the first digit 1, 2 or 5, so that states exchanged by a symmetry have the same size.
 fn rounded(size: f64) -> f64 {
     let power = 10f64.powi(size.log10().floor() as i32);
     let digits = [5.0, 2.0, 1.0].into_iter().find(|digit| digit * power <= size);
     digits.unwrap_or(1.0) * power
 }
 
-/// The largest magnitude of every state `[n]` along the trajectory from there, or, `aside` of it, in the end; `None` if it does not stay
-/// bounded. What grows from next to nothing on the way, and decays again, says nothing about sizes.
+/// Returns the largest magnitude of every state `[n]` along the trajectory or, if started `aside`, at its end; `None`
+/// if it does not stay bounded. A state that grows from almost nothing and decays again says nothing about sizes.
 fn largest(model: &Model, start: &[f64], parameters: &[f64], aside: bool) -> Option<Vec<f64>> {
     let (field, n) = (Clocked(model), model.dim());
     let slope = |x: &[f64]| {
@@ -173,7 +176,7 @@ fn largest(model: &Model, start: &[f64], parameters: &[f64], aside: bool) -> Opt
         h *= if error.is_finite() { (0.9 * error.powf(-1.0 / 3.0)).clamp(0.2, 5.0) } else { 0.2 };
     }
     let [before, last] = &quarters;
-    // What grows may do so in ever shorter steps: its rate counts then, over all the time that there was.
+    // Growth may need ever shorter steps, so its rate counts too, over the whole time.
     let share = 0.5 * (x[n] - halfway) / x[n];
     let grows = |(a, b): (&f64, &f64)| *b > NOTHING && (*b > STEADY * a || (b / a).ln() > SLOW * share);
     if max_abs(&x[..n]) > INFINITE || !rests && before.iter().zip(last).any(grows) {
@@ -185,7 +188,7 @@ fn largest(model: &Model, start: &[f64], parameters: &[f64], aside: bool) -> Opt
     }
     let steady = |i: usize| rests || before[i] <= STEADY * last[i];
     let here = |i: usize| if rests { x[i].abs() } else { last[i] };
-    // Of what is less, the accuracy says nothing.
+    // Anything smaller is below the accuracy.
     let lasts = |i: usize| here(i) > 10.0 * ACCURACY * sizes[i];
     Some((0..n).map(|i| if steady(i) && lasts(i) { here(i) } else { 0.0 }).collect())
 }
@@ -206,15 +209,15 @@ mod tests {
     }
 
     #[test]
-    fn a_load_moves_a_mass_by_micrometres_and_its_velocity_counts_although_it_comes_to_rest() {
-        // x → 2e-6, with an angular frequency of 1e4 and little damping: |v| up to nearly 2e-2.
+    fn a_small_displacement_and_a_transient_velocity_set_the_sizes() {
+        // x → 2e-6, with an angular frequency of 1e4 and little damping: |v| reaches nearly 2e-2.
         let spring = [("x", "v"), ("v", "1e8*(p - x) - 1e3*v")];
         let [x, v] = sizes(&spring, &[0.0, 0.0], 2e-6)[..] else { panic!() };
         assert!(x == 2e-6 && v == 1e-2, "{x:e} {v:e}");
     }
 
     #[test]
-    fn what_leaves_a_saddle_is_measured_where_it_settles() {
+    fn a_state_that_leaves_a_saddle_has_the_size_at_which_it_settles() {
         assert_eq!(sizes(&[("x", "p*x - x^3/1e36")], &[0.0], 4.0), [2e18]);
         let oscillator = [("x", "y"), ("y", "(1 - x^2)*y - x")];
         // Amplitudes of 2.01 and 2.67.
@@ -222,8 +225,8 @@ mod tests {
     }
 
     #[test]
-    fn what_grows_and_decays_again_or_without_end_counts_as_1() {
-        // y grows from next to nothing until x exceeds 0.5 on its way to 3, and decays then.
+    fn a_state_that_decays_again_or_grows_without_bound_has_size_1() {
+        // y grows from almost nothing until x exceeds 0.5 on its way to 3, and then decays.
         assert_eq!(sizes(&[("x", "x - x^3/9"), ("y", "(0.5 - x)*y")], &[0.0, 0.0], 0.0), [2.0, 1.0]);
         assert_eq!(sizes(&[("x", "x")], &[0.0], 0.0), [1.0]);
         assert_eq!(sizes(&[("x", "x^2 + 1")], &[0.0], 0.0), [1.0]);

@@ -1,8 +1,8 @@
-//! Leaving a special point on the other branch.
+//! Branch switching at a special point.
 //!
-//! **Idea.** At the special point the direction of the other branch is known: the period-doubling vector, the null vector
-//! across the tangent, the Hopf eigenvector. A first point is found by Newton's method in the hyperplane a small step along
-//! that direction, across which the branch one comes from cannot be.
+//! **Idea.** At the special point the direction of the other branch is known: the period-doubling vector, the null
+//! vector orthogonal to the tangent, the Hopf eigenvector. A first point is found by Newton's method in the hyperplane
+//! a small step along that direction, which the original branch does not reach to first order.
 
 use super::System;
 use super::growth::{Beginning, problem_of, setting};
@@ -14,12 +14,12 @@ use crate::problem::cycle::CycleProblem;
 use crate::problem::{gauss::Scheme, mesh};
 use crate::special::{branch_point, hopf, period_doubling};
 
-/// Distances along the direction that are tried, in scaled variables. The shorter ones are for branches on which something
-/// else happens next to their beginning, as with contact, where a branch keeps its first shape only until it grazes.
+/// Distances along the direction in the order of trial, in scaled variables. The shorter ones are for branches that
+/// change soon after their start, as with contact, where a branch keeps its initial shape only until it grazes.
 pub const DISTANCES: [f64; 7] = [2e-3, 5e-4, 1e-4, 2e-5, 5e-3, 1e-2, 5e-2];
 
-/// The beginning of the branch that leaves `at`, and its family; `None` for kinds at which no branch of equilibria or
-/// cycles leaves. Where several pairs of eigenvalues pass the imaginary axis at once, `pair` says from which one cycles are born.
+/// Returns the start of the branch that bifurcates at `at`, and its type; `None` for kinds at which no branch of
+/// equilibria or cycles does. If several pairs of eigenvalues cross the imaginary axis at once, `pair` selects one.
 ///
 /// # Errors
 /// A sentence that says why no point of the other branch was found.
@@ -51,7 +51,7 @@ fn joined(at: &SpecialPoint, free: usize) -> Ending {
     Ending::Joined { at: at.kind, parameter: at.point.parameters[free] }
 }
 
-/// The first point at one of the `distances` along `direction` (not normalised) from `base`.
+/// Returns the first point at one of the `distances` along `direction` (not normalised) from `base`.
 fn step_off(
     problem: &mut dyn ZeroProblem,
     settings: &Settings,
@@ -64,7 +64,7 @@ fn step_off(
     step_off_from(problem, settings, base, direction, sign, distances, expected, &|_, _| {})
 }
 
-/// Like [`step_off`], with the initial guess `improved`.
+/// Steps off like [`step_off`], with the initial guess `improved`.
 #[expect(clippy::too_many_arguments, reason = "those of `step_off` and one more")]
 fn step_off_from(
     problem: &mut dyn ZeroProblem,
@@ -83,7 +83,7 @@ fn step_off_from(
             problem.set_mesh(&mesh);
         }
         let along = |s: f64| -> Vec<f64> { base.iter().zip(direction).map(|(b, d)| b + s * d).collect() };
-        // The reference for the phase lies on the new branch: the base may have no phase at all (a Hopf point).
+        // The phase reference lies on the new branch: the base may have no phase at all (a Hopf point).
         problem.anchor(&along(1.0));
         let norm = problem.dot(direction, direction).sqrt();
         problem.anchor(&along(sign * distance / norm));
@@ -94,7 +94,7 @@ fn step_off_from(
         improved(problem, &mut guess);
         let plane = Plane { row: row.clone(), base: base.to_vec(), distance };
         let tried = first_point(problem, settings, plane, guess).map(|mut found| {
-            // The branch has turned on this way, and goes on turning as fast.
+            // The branch has turned by this angle so far, and is expected to keep turning at this rate.
             let begun = problem.transfer(&row, &mesh, &found.mesh);
             let length = problem.dot(&begun, &begun).sqrt() * problem.dot(&found.tangent, &found.tangent).sqrt();
             let angle = (problem.dot(&begun, &found.tangent) / length).clamp(-1.0, 1.0).acos();
@@ -110,8 +110,8 @@ fn step_off_from(
     second_best.ok_or(failure)
 }
 
-/// The solution in the plane, on the mesh of the special point where that serves: so close to the special point the change
-/// of mesh would otherwise be larger than the distance from it.
+/// Solves in the plane, on the mesh of the special point if that suffices: so close to it, a change of mesh would cause
+/// a larger change than the distance.
 fn first_point(
     problem: &mut dyn ZeroProblem,
     settings: &Settings,
@@ -132,8 +132,8 @@ fn first_point(
     settle(problem, settings, plane, guess, 1.0, &mut cost)
 }
 
-/// Exchange of stability: a branch born on the side where its parent has more unstable multipliers has the smaller number
-/// of them, one born on the other side has one more than that. True if `found` is like that.
+/// True if `found` obeys the exchange of stability: a branch born on the side where its parent has more unstable
+/// multipliers has the smaller number of them, and one born on the other side has one more than that.
 fn exchanges_stability(at: &SpecialPoint, free: usize, found: &Station) -> bool {
     let rising = at.point.parameter_slope() > 0.0;
     let (below, above) =
@@ -156,15 +156,15 @@ fn doubled(
         let expected = |_: &dyn ZeroProblem, found: &Station| exchanges_stability(at, free, found);
         step_off(&mut problem, settings, &base, &direction, 1.0, distances, &expected).map_err(|why| why.to_string())
     };
-    // The special point was located on a mesh twice as fine as points are computed on; every second node is enough for the
-    // first point of the branch, unless it is not found there or has the wrong stability.
+    // The special point was located on a mesh twice as fine as that of other points. Every second node is enough for
+    // the first point of the branch, unless none is found there or it has the wrong stability.
     let coarse = leave(&coarsened(cycle), &DISTANCES[..4]).ok().filter(|found| exchanges_stability(at, free, found));
     let first = coarse.map_or_else(|| leave(cycle, &DISTANCES), Ok)?;
     let before = doubled_edge(system, free, at, &first.point).into_iter().collect();
     Ok(Beginning::Edge { before, first, joined: joined(at, free) })
 }
 
-/// The cycle on a mesh of every second node, where that makes sense.
+/// Returns the cycle on a mesh of every second node, if that is possible.
 fn coarsened(cycle: &Cycle) -> Cycle {
     if !cycle.intervals().is_multiple_of(2) {
         return cycle.clone();
@@ -174,7 +174,7 @@ fn coarsened(cycle: &Cycle) -> Cycle {
     Cycle { mesh, profile, ..cycle.clone() }
 }
 
-/// The problem of doubled cycles at a period doubling, the cycle run through twice, and the direction of the new branch.
+/// Returns the problem of doubled cycles at a period doubling, the cycle over two turns, and the direction to leave.
 fn double<'a>(
     system: &'a System,
     free: usize,
@@ -193,8 +193,8 @@ fn double<'a>(
     Some((problem, base, direction))
 }
 
-/// A period doubling as a point of the doubled branch that begins or ends there; its stability is that of `next`, the
-/// point of the branch beside it. Everything else is that of the special point, run through twice.
+/// Returns a period doubling as a point of the doubled branch that starts or ends there. Its stability is that of
+/// `next`, the adjacent point of the branch; everything else is that of the special point over two turns.
 pub fn doubled_edge(system: &System, free: usize, at: &SpecialPoint, next: &Point) -> Option<Point> {
     let Solution::Cycle(cycle) = &at.point.solution else { return None };
     let (mut problem, base, direction) = double(system, free, at, cycle)?;
@@ -211,7 +211,7 @@ pub fn doubled_edge(system: &System, free: usize, at: &SpecialPoint, next: &Poin
         trust: Trust {
             trivial_defect: 2.0 * once.trust.trivial_defect,
             liouville_defect: 2.0 * once.trust.liouville_defect,
-            // Where the special point is interpolated it is no nearer to a solution than that.
+            // An interpolated special point is no more accurate than this.
             discretisation: once.trust.discretisation.max(at.error),
             residual: once.trust.residual,
             spectrum: 2.0 * once.trust.spectrum,
@@ -229,7 +229,7 @@ fn born(
     at: &SpecialPoint,
     pair: usize,
 ) -> Result<Beginning, String> {
-    // Frequencies closer than this, relative, have one eigenspace as far as inverse iteration can tell.
+    // Inverse iteration cannot separate the eigenspaces of frequencies that are closer than this, relative.
     const SAME: f64 = 1e-6;
     let all = hopf::frequencies(&at.point);
     let omega = *all.get(pair).ok_or("no eigenvector of an imaginary pair of eigenvalues was found")?;
@@ -269,7 +269,7 @@ fn crossing(
     across(system, settings, free, at, &mut *problem, &u, &vector, &|_, _| {})
 }
 
-/// The branch in the hyperplane across `vector`.
+/// Finds the branch in the hyperplane orthogonal to `vector`.
 #[expect(clippy::too_many_arguments, reason = "those of a branch point, and of the step off it")]
 pub(super) fn across(
     system: &System,
@@ -282,8 +282,8 @@ pub(super) fn across(
     improved: &dyn Fn(&mut dyn ZeroProblem, &mut [f64]),
 ) -> Result<Beginning, String> {
     let mesh = problem.mesh();
-    // Where the branch one comes from bends, it may meet the hyperplane too. The chord from the point then makes half the angle with the
-    // tangent at the point that the tangent there makes; on another branch, which goes through the point as well, it makes the same.
+    // A curved parent may meet the hyperplane too. The chord then makes half the angle with the parent's tangent that
+    // the tangent at its end makes; on another branch through the point the two angles are equal.
     let (own, own_mesh) = (&at.point.tangent, mesh.clone());
     let leaves = |problem: &dyn ZeroProblem, found: &Station| {
         let tangent = problem.transfer(&found.tangent, &found.mesh, &own_mesh);
@@ -308,7 +308,7 @@ pub(super) fn across(
                     .any(|r| one.point.difference(&other.point, system.measure(), r) < 30.0 * settings.tolerance)
         });
     if symmetric {
-        // The other arm is the mirror image of this one.
+        // The other half of the branch is the mirror image of this one.
         return Ok(Beginning::Edge { before: Vec::new(), first: one, joined: joined(at, free) });
     }
     Ok(Beginning::Inside(one))

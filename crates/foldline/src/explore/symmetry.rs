@@ -1,9 +1,9 @@
-//! Detection of continuous symmetries and conserved energies, because of which solutions form families.
+//! Detection of continuous symmetries and conserved energies, which make solutions form families.
 //!
-//! **Idea.** A matrix A with f_x(x) A x = A f(x) for all x generates a symmetry, exp(sA), that maps solutions to solutions. Solutions that
-//! it moves are not isolated, and Newton's method does not converge to them. The condition is linear in A and is imposed at a few
-//! points of the sampling box. An undamped mechanical system whose forces have a potential conserves its energy, so its cycles form a
-//! family too.
+//! **Idea.** A matrix A with f_x(x) A x = A f(x) for all x generates a symmetry, exp(sA), that maps solutions to
+//! solutions. Solutions that it moves are not isolated, and Newton's method does not converge to them. The condition is
+//! linear in A and is imposed at a few points of the sampling box. An undamped mechanical system whose forces have a
+//! potential conserves its energy, so its cycles form a family too.
 //!
 //! **Equations.** At points x of the box, and at times τ if the field is forced:
 //!
@@ -20,11 +20,11 @@ use crate::diagram::{Point, Solution};
 use crate::linalg::max_abs;
 use crate::model::null_space;
 
-/// Largest number of states n for which symmetries are looked for. (1) has n² unknowns, so elimination costs n⁶ operations: a million
-/// for ten.
+/// Largest number of states n for which symmetries are looked for. (1) has n² unknowns, so elimination costs n⁶
+/// operations: a million for ten.
 const MOST: usize = 10;
-/// Difference of derivatives, relative to the largest, that counts as rounding: a factor of safety of a million over the machine
-/// precision, for derivatives that are sums of large terms.
+/// Difference of derivatives, relative to the largest, that counts as rounding: a factor of safety of a million over
+/// the machine precision, for derivatives that are sums of large terms.
 const ROUNDING: f64 = 1e-10;
 
 /// Values of the field at one point of the box.
@@ -58,8 +58,8 @@ pub(super) fn rotation(system: &System, parameters: &[f64]) -> Option<Vec<[usize
     null_space(rows.concat(), n * n).iter().find_map(|generator| rotated_pairs(generator, n))
 }
 
-/// Whether a cycle is a rotating wave: it consists of what one of its states becomes under rotation of these pairs. Rotation leads along such a
-/// cycle, not to others.
+/// True if a cycle is a rotating wave: it consists of the images of one of its states under rotation of these pairs.
+/// Rotation then moves states along the cycle, not to other cycles.
 pub(super) fn is_rotating_wave(system: &System, pairs: &[[usize; 2]], at: &Point) -> bool {
     /// Share of f that may have another direction: above the error of a profile.
     const ASIDE: f64 = 1e-3;

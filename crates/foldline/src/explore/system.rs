@@ -1,4 +1,4 @@
-//! A vector field together with what exploring it needs to know.
+//! A vector field with the data needed to explore it.
 
 use super::plan::{ExplorePlan, Plan};
 use super::sizes;
@@ -11,7 +11,7 @@ use crate::model::forcing::unrepeated;
 use crate::special::quantity::Quantity;
 use crate::special::unfolded::Unfolded;
 
-/// A vector field, its scales, and where to look for attractors.
+/// A vector field with its scales, and a box in which to look for attractors.
 #[derive(Clone)]
 pub struct System<'a> {
     /// The vector field.
@@ -20,7 +20,7 @@ pub struct System<'a> {
     pub state_names: Vec<String>,
     /// `[n]` characteristic size of each state.
     pub scales: Vec<f64>,
-    /// `[k]` characteristic size of each parameter: a length along a branch counts changes of a parameter relative to it.
+    /// `[k]` characteristic size of each parameter, relative to which arclength counts changes of the parameter.
     pub parameter_scales: Vec<f64>,
     /// `[n]` box from which initial states are sampled.
     pub ranges: Vec<[f64; 2]>,
@@ -28,22 +28,22 @@ pub struct System<'a> {
     pub limits: Limits,
     /// The two states that form the complex whirl signal, if the model has one.
     pub whirl: Option<[usize; 2]>,
-    /// Coordinate reflections under which the field is equivariant, the identity first; those of a forced field too under which
-    /// it is so half a period of the forcing later.
+    /// Coordinate reflections under which the field is equivariant, the identity first; for a forced field also those
+    /// under which it is equivariant half a forcing period later.
     pub reflections: Vec<Vec<bool>>,
     /// The field with its unfolding amplitude, for curves of branch points of cycles.
     pub(super) unfolded: Option<&'a Unfolded<'a>>,
-    /// Of a forced field, for each of these: whether it is equivariant at the same time, and half a period later.
+    /// For a forced field and each of these: true if it is equivariant at the same time, and half a period later.
     pub(super) mirrors: Vec<[bool; 2]>,
 }
 
 impl<'a> System<'a> {
-    /// How its solutions are compared.
+    /// Returns the measure for the comparison of its solutions.
     pub fn measure(&self) -> Measure<'_> {
         Measure { scales: &self.scales, periods: self.field.periods() }
     }
 
-    /// A system whose scales are all 1 and whose initial states come from [-2, 2]ⁿ.
+    /// Returns a system whose scales are all 1 and whose initial states come from [-2, 2]ⁿ.
     pub fn new(field: &'a dyn VectorField) -> System<'a> {
         let n = field.dim();
         System {
@@ -60,15 +60,15 @@ impl<'a> System<'a> {
         }
     }
 
-    /// The system of a model at given parameters, with the scales and ranges of its states and the symmetries that it has
-    /// there.
+    /// Returns the system of a model at given parameters, with the scales and ranges of its states and the symmetries
+    /// that it has there.
     pub fn of(model: &'a Model, parameters: &[f64]) -> System<'a> {
         let mut system = System::measured(model, &Plan::empty(1.0, 1), &[sizes::origin(model, parameters)]);
         system.find_reflections(parameters);
         system
     }
 
-    /// The system without symmetries, states measured by what is met from these places.
+    /// Returns the system without symmetries; states are scaled by the magnitudes met from these places.
     fn measured(model: &'a Model, plan: &Plan, places: &[sizes::Place]) -> System<'a> {
         let scales = sizes::of_states(model, places);
         System {
@@ -82,9 +82,9 @@ impl<'a> System<'a> {
         }
     }
 
-    /// The system of a plan. Only a symmetry that holds wherever the plan goes counts: at every seed, and with the
-    /// parameters that branches, curves and homotopies change away from values, such as zero, at which a model may be more
-    /// symmetric than elsewhere.
+    /// Returns the system of a plan. A symmetry counts only if it holds wherever the plan goes: at every seed, and with
+    /// the parameters of branches, curves and homotopies moved away from values, such as zero, at which a model may be
+    /// more symmetric than elsewhere.
     pub fn of_plan(model: &'a Model, plan: &Plan) -> System<'a> {
         let mut places: Vec<Vec<f64>> = plan.seeds.iter().map(|seed| seed.parameters.clone()).collect();
         places.extend(plan.seeds.iter().map(|seed| away(plan, &seed.parameters)));
@@ -116,7 +116,8 @@ impl<'a> System<'a> {
         x.iter().zip(&self.scales).map(|(x, scale)| (x / scale).powi(2)).sum::<f64>().sqrt()
     }
 
-    /// Characteristic size of a quantity: that of its parameter or state, 1 for outputs and integrals, 0 for the period, which is itself one.
+    /// Characteristic size of a quantity: that of its parameter or state, 1 for outputs and integrals, and 0 for the
+    /// period, which is its own scale.
     pub(super) fn size_of(&self, quantity: Quantity) -> f64 {
         let state = |k: usize| self.scales.get(k).copied().unwrap_or(1.0);
         match quantity {
@@ -140,9 +141,9 @@ impl<'a> System<'a> {
         self
     }
 
-    /// The size of every parameter `[k]` in a plan: as declared, else |value|, but no less than a quarter of the range in which the plan
-    /// varies it, so that a branch need not take many more steps than the solution asks for, and no more than that range, which a step would
-    /// leave.
+    /// Size of every parameter `[k]` in a plan: as declared, else |value|, but at least a quarter of the range in which
+    /// the plan varies it, so that a branch takes no more steps than the solution requires, and at most that range,
+    /// which a step would leave.
     fn sized(model: &Model, plan: &Plan) -> Vec<f64> {
         const LEAST: f64 = 0.25;
         let widths = widths(model, plan);
@@ -155,10 +156,10 @@ impl<'a> System<'a> {
         model.parameters.iter().zip(&widths).map(size).collect()
     }
 
-    /// That a forced field repeats itself at these parameters `[k]` and at others, each of them anywhere in its range.
+    /// Checks that a forced field is periodic at these parameters `[k]` and with others moved within their ranges.
     ///
     /// # Errors
-    /// A sentence that says what does not.
+    /// A sentence that says what is not periodic.
     pub fn repeats(&self, parameters: &[f64], moving: &[(usize, [f64; 2])]) -> Result<(), String> {
         const SHARES: [f64; 3] = [0.0, 0.371, 0.829];
         for share in SHARES {
@@ -166,7 +167,7 @@ impl<'a> System<'a> {
             for (index, [low, high]) in moving.iter().filter(|_| share > 0.0) {
                 there[*index] = low + share * (high - low);
             }
-            // Where a range reaches beyond the periods that make sense the branch ends on its way there.
+            // A range may extend beyond meaningful periods; a branch ends on its way there.
             let senseless = share > 0.0 && self.field.time_unit(&there) <= 0.0;
             let wrong = unrepeated(self.field, &self.state_names, &self.ranges, &there).filter(|_| !senseless);
             if let Some([message, hint]) = wrong {
@@ -186,15 +187,15 @@ impl<'a> System<'a> {
         Ok(())
     }
 
-    /// Whether a forced field is equivariant under one of [`System::reflections`], half a period of the forcing later if `half`
-    /// says so.
+    /// True if a forced field is equivariant under one of [`System::reflections`]: at the same time, or half a forcing
+    /// period later if `half`.
     pub fn mirrors_after(&self, reflection: &[bool], half: bool) -> bool {
         let place = self.reflections.iter().position(|own| own == reflection);
         place.and_then(|place| self.mirrors.get(place)).is_some_and(|mirrors| mirrors[usize::from(half)])
     }
 
-    /// Finds the reflections R = diag(±1), n ≤ 10, with f(R x) = R f(x), by trial at a few points and the parameter values
-    /// `parameters`.
+    /// Finds the reflections R = diag(±1), n ≤ 10, with f(R x) = R f(x), by trial at a few points and the parameter
+    /// values `parameters`.
     pub fn find_reflections(&mut self, parameters: &[f64]) {
         let n = self.field.dim();
         self.reflections = vec![vec![false; n]];
@@ -238,7 +239,7 @@ impl<'a> System<'a> {
     }
 }
 
-/// By how much a plan varies each parameter `[k]`; 0 where it does not.
+/// Width of the range over which a plan varies each parameter `[k]`; 0 if it does not.
 fn widths(model: &Model, plan: &Plan) -> Vec<f64> {
     let mut ends: Vec<[f64; 2]> = vec![[f64::INFINITY, f64::NEG_INFINITY]; model.parameters.len()];
     let mut reaches = |index: usize, values: [f64; 2]| {
@@ -264,7 +265,7 @@ fn widths(model: &Model, plan: &Plan) -> Vec<f64> {
     ends.iter().map(|[low, high]| (high - low).max(0.0)).collect()
 }
 
-/// The parameters of an exploration, those that it changes replaced by values inside their ranges.
+/// Returns the parameters of an exploration, with those that it changes at values inside their ranges.
 fn inside(exploration: &ExplorePlan) -> Vec<f64> {
     let mut place = exploration.parameters.clone();
     place[exploration.free] = between(exploration.range);
@@ -279,12 +280,12 @@ fn between([low, high]: [f64; 2]) -> f64 {
     low + SHARE * (high - low)
 }
 
-/// The parameters of a seed, those that the plan changes replaced by values between those that they reach.
+/// Returns the parameters of a seed, with those that the plan changes at values between those that they reach.
 fn away(plan: &Plan, seed: &[f64]) -> Vec<f64> {
     let mut place = seed.to_vec();
     for homotopy in &plan.homotopies {
         place[homotopy.via] = between(homotopy.range);
-        // A later one that leads back to the value of the seed takes nothing back.
+        // A later homotopy that returns to the value of the seed does not undo this.
         let changed = homotopy.targets.iter().filter(|(target, goal)| seed[*target] != *goal);
         changed.for_each(|(target, goal)| place[*target] = between([seed[*target], *goal]));
     }

@@ -1,4 +1,4 @@
-//! What stays in memory, what is switched at, where branches start.
+//! Points kept in memory, branch switching, and starts of branches.
 
 use super::{
     AttractorKey, BranchPlan, Plan, SeedPlan, SeedSource, Start, Switching, System, first_solution, run, run_from,
@@ -10,7 +10,7 @@ use crate::special::mark::Mark;
 use crate::special::quantity::Quantity;
 use std::sync::Mutex;
 
-/// Remembers the points; says that it keeps them, or not.
+/// An observer that remembers the points, and claims to keep them if `keeps`.
 struct Archive {
     keeps: bool,
     points: Mutex<Vec<Point>>,
@@ -118,7 +118,7 @@ fn pitchfork_plan(switching: Switching) -> Plan {
 }
 
 #[test]
-fn only_the_special_point_that_is_named_is_switched_at() {
+fn branches_are_switched_only_at_the_selected_special_point() {
     let model = pitchforks();
     let only = vec![(Kind::BranchPoint, 2, 1)];
     let plan = pitchfork_plan(Switching { depth: Vec::new(), only });
@@ -130,10 +130,10 @@ fn only_the_special_point_that_is_named_is_switched_at() {
 }
 
 #[test]
-fn a_solution_that_is_given_is_not_looked_for() {
+fn a_given_solution_is_not_searched_for() {
     let model = pitchforks();
     let plan = pitchfork_plan(Switching::default());
-    // At 3 there is sqrt 3; the state of the seed would lead to 0, at 1.
+    // The given solution at p = 3 is √3; the state of the plan's own seed leads to 0 at p = 1.
     let seed = SeedPlan { source: SeedSource::State(vec![1.7]), parameters: vec![3.0], ..plan.seeds[0].clone() };
     let given = first_solution(&System::of(&model, &[3.0]), &seed, 1e-6, 1).unwrap();
     let system = System::of_plan(&model, &plan);
@@ -178,13 +178,13 @@ fn the_last_step_lands_on_the_bound() {
     assert!(values.is_sorted() && count > 8, "{values:?}");
     for point in [&branch.points[0], &branch.points[count - 1]] {
         assert!((point.ranges[0][1] - point.parameters[0].sqrt()).abs() < 1e-7);
-        // A step that is cut off at a bound afterwards solves there again: twice the work of a step.
+        // A step that is shortened to a bound only after acceptance is solved again there: twice the work of a step.
         assert!(point.cost.newton <= 6 && point.cost.rejected == 0, "{:?}", point.cost);
     }
 }
 
 #[test]
-fn what_a_side_ended_with_is_kept_when_the_branch_is_resumed() {
+fn special_points_and_endings_are_kept_when_a_branch_is_resumed() {
     let ring = Model::compile(ModelSource {
         name: "ring".into(),
         parameters: vec![Parameter::new("p", 0.0)],
@@ -203,7 +203,7 @@ fn what_a_side_ended_with_is_kept_when_the_branch_is_resumed() {
     let places =
         |branch: &Branch| -> Vec<(Kind, i64)> { branch.special.iter().map(|s| (s.kind, s.point.position)).collect() };
     assert_eq!(places(&whole).iter().map(|(kind, _)| *kind).collect::<Vec<_>>(), [Kind::Fold; 2]);
-    // A change of stability that the way back does not explain lies beyond the last point.
+    // A stability change that the other side does not explain lies beyond the last point.
     let mut earlier = whole.clone();
     let mut change = whole.special[0].clone();
     change.kind = Kind::Unexplained;
@@ -246,7 +246,7 @@ fn a_mark_at_the_start_is_there_once_wherever_the_run_was_interrupted() {
     }
 }
 
-/// Stops at the first point, and remembers for which seeds a census was made.
+/// An observer that stops at the first point and records the seeds for which initial states were sampled.
 struct Impatient(Mutex<Vec<String>>);
 
 impl Observer for Impatient {

@@ -1,4 +1,4 @@
-//! Which cycles are the same: turns run through several times, copies a period of the forcing later, neighbours in a sweep.
+//! Identity of cycles: several turns of one, copies shifted by forcing periods, neighbours in a sweep.
 
 use super::growth::{polished, problem_of, settings};
 use super::minimal::reduced;
@@ -24,8 +24,8 @@ fn compiled(parameters: &[(&str, f64)], frequency: Option<&str>, equations: &[(&
     .unwrap()
 }
 
-/// The parametrically pumped resonator of HarmonicBalance.jl, issues 62 and 249. Rest doubles its period at
-/// w = 0.98849257053 and 1.01140437084 (Floquet multipliers of an integration at 1e-13).
+/// Period doublings of the parametrically pumped resonator of HarmonicBalance.jl, issues 62 and 249: rest doubles its
+/// period at w = 0.98849257053 and 1.01140437084 (Floquet multipliers from an integration at 1e-13).
 const DOUBLINGS: [f64; 2] = [0.98849257053, 1.01140437084];
 
 fn parametron() -> Model {
@@ -55,7 +55,7 @@ fn followed(model: &Model, seed: SeedPlan, branch: BranchPlan) -> Vec<Branch> {
     run(&System::of_plan(model, &plan), &plan, 1, Diagram::default(), &Unobserved).branches
 }
 
-/// Both ends are those period doublings.
+/// Asserts that both ends are those period doublings.
 #[track_caller]
 fn ends_at_both_doublings(branch: &Branch) {
     let mut at: Vec<f64> = branch
@@ -111,8 +111,8 @@ fn a_branch_that_starts_with_two_forcing_periods_ends_where_its_halves_become_eq
 
 #[test]
 fn a_doubled_branch_ends_at_its_other_period_doubling_though_some_states_do_not_double() {
-    // An absorber tuned to half the frequency: where it moves, `a` repeats itself with the opposite sign after a period of the forcing and
-    // `b` exactly. What is left of the difference of `b` is error.
+    // An absorber tuned to half the frequency: when it moves, `a` has the opposite sign after a forcing period, and `b`
+    // repeats itself exactly, so that any difference of `b` is error.
     let model = compiled(
         &[("w", 1.7)],
         Some("w"),
@@ -128,7 +128,7 @@ fn a_doubled_branch_ends_at_its_other_period_doubling_though_some_states_do_not_
     assert_eq!(ends, [joined(at[0]), joined(at[1])]);
 }
 
-/// The same cycle over `turns` periods.
+/// Returns a cycle over `turns` periods.
 fn repeated(cycle: &Cycle, turns: usize) -> Cycle {
     let times = |k: usize| cycle.mesh[1..].iter().map(move |t| (k as f64 + t) / turns as f64);
     Cycle {
@@ -141,7 +141,7 @@ fn repeated(cycle: &Cycle, turns: usize) -> Cycle {
     }
 }
 
-/// A point of a branch over several turns, solved for on a mesh that need not be the same for each of them.
+/// Returns a point of a branch over several turns, solved for on a mesh that need not be the same for each of them.
 fn over(system: &System, point: &Point, turns: usize) -> Point {
     let Solution::Cycle(cycle) = &point.solution else { panic!("no cycle") };
     let settings = settings(system, 1e-6, [f64::NEG_INFINITY, f64::INFINITY], 0);
@@ -158,7 +158,7 @@ fn next_to_a_period_doubling_a_doubled_cycle_is_told_from_its_parent_run_twice()
     let settings = settings(&system, 1e-6, [f64::NEG_INFINITY, f64::INFINITY], 0);
     let doubled = &found[1];
     assert_eq!(doubled.name, "branch/period-doubling-1");
-    // The first point is the period doubling itself. Off it the amplitude begins with some thousandths.
+    // The first point is the period doubling itself. Beside it, the amplitude starts with some thousandths.
     assert!(reduced(&system, &settings, &doubled.points[0]).is_some());
     let smallest = doubled.points[1].ranges[0][1];
     assert!(smallest < 5e-3 && smallest > 0.0, "{smallest}");
@@ -225,12 +225,12 @@ fn swept(model: &Model, parameters: &[f64], values: Vec<f64>) -> (Vec<f64>, Vec<
 #[test]
 fn a_sharp_resonance_is_no_jump_and_a_fold_is() {
     let values = |low: f64, high: f64| -> Vec<f64> { (0..=20).map(|k| low + (high - low) * k as f64 / 20.0).collect() };
-    // Linear, with amplification 100: between two values the amplitude grows sixfold.
+    // Linear, with an amplification of 100: between two values the amplitude grows sixfold.
     let linear = compiled(&[("w", 0.8)], Some("w"), &[("x", "v"), ("v", "-0.01*v - x + 0.1*cos(w*t)")]);
     let (jumps, jumped) = swept(&linear, &[0.9], values(0.9, 1.1));
     assert_eq!(jumps, Vec::<f64>::new());
     assert!(jumped[0].is_none() && jumped[1..].iter().all(|j| *j == Some(false)), "{jumped:?}");
-    // Hardening: the upper part of the resonance curve ends at a fold, beyond which the sweep falls to the lower one.
+    // Hardening: the upper part of the resonance curve ends at a fold, beyond which the sweep falls to the lower part.
     let hardening = compiled(&[("w", 0.8)], Some("w"), &[("x", "v"), ("v", "-0.1*v - x - x^3 + 0.3*cos(w*t)")]);
     let start = seed(SeedSource::Attractor(AttractorKey::Cycle), &[0.8], 8);
     let curve = followed(&hardening, start, branch([0.8, 2.4], &[])).remove(0);
@@ -240,7 +240,7 @@ fn a_sharp_resonance_is_no_jump_and_a_fold_is() {
 }
 
 #[test]
-fn a_range_that_reaches_frequency_zero_is_said_to_be_the_cause() {
+fn a_range_that_reaches_frequency_zero_is_reported_as_the_cause() {
     let model = compiled(&[("w", 0.8)], Some("w"), &[("x", "v"), ("v", "-0.05*v - x + 0.1*cos(w*t)")]);
     let start = seed(SeedSource::State(vec![0.0, 0.0]), &[0.8], 1);
     let found = followed(&model, start, branch([0.0, 2.0], &[])).remove(0);

@@ -1,9 +1,10 @@
 //! LU factorisation of small dense matrices, one in each lane.
 //!
-//! **Idea.** Gaussian elimination with a diagonal pivot while it is at least a tenth of what stands below it, component by
-//! component, looking only at blocks that can differ from zero ([`Shape`]). Where a diagonal does not serve, the lanes that need
-//! it exchange rows by themselves, and from there on every entry is looked at; the matrices of collocation in Runge–Kutta form
-//! rarely need that. A large matrix of which few blocks vanish fills the vectors by itself and is eliminated in panels.
+//! **Idea.** Gaussian elimination, component by component, with a diagonal pivot while it is at least a tenth of the
+//! entries below it, on the blocks that can be nonzero ([`Shape`]). Where the diagonal is too small, the lanes
+//! concerned exchange rows individually, and every entry is processed from there on; the matrices of collocation in
+//! Runge–Kutta form rarely need that. A large matrix with few zero blocks fills the vectors by itself and is eliminated
+//! in panels.
 //!
 //! **Source.** Threshold pivoting: duff2017, §5.2.
 
@@ -12,33 +13,34 @@ use super::shape::{Shape, Step};
 use super::tile::{self, subtract_product};
 use crate::contract::Singular;
 
-/// Share of the largest candidate that the diagonal must have to serve as pivot.
+/// Smallest diagonal accepted as pivot, as a share of the largest candidate.
 const THRESHOLD: f64 = 0.1;
-/// Rows up to which a matrix is treated as a whole.
+/// Number of rows up to which a matrix is treated as a whole.
 const SMALL: usize = 32;
-/// Share of the products of a full matrix up to which blocks are faster than panels.
+/// Share of the operations of a full matrix up to which blocks are faster than panels.
 const SPARSE: f64 = 0.3;
-/// Columns of a panel of a larger one.
+/// Number of columns of a panel.
 const PANEL: usize = 16;
 
-/// Whether a matrix fills the vectors by itself, in panels.
+/// True if a matrix fills the vectors by itself and is eliminated in panels.
 #[inline(always)]
 fn in_panels<T: Lane>(n: usize) -> bool {
     T::COUNT == 1 && n > SMALL
 }
 
-/// The shape that suits: none where so much differs from zero that panels are faster. Arguments as those of [`Shape::new`].
+/// Elimination shape, without steps if so many blocks are nonzero that panels are faster. Arguments as for
+/// [`Shape::new`].
 pub fn shape<T: Lane>(pattern: &[bool], ends: &[bool], nodes: usize, columns: usize) -> Shape {
     let shape = Shape::new(pattern, ends, nodes, columns);
     let dense = in_panels::<T>(pattern.len().isqrt() * nodes) && shape.share(columns) > SPARSE;
     if dense { Shape::plain(pattern, nodes) } else { shape }
 }
 
-/// Factorises the row-major n×n matrices `a` in place (the diagonal holds the inverse pivots) and solves a x = b for the
-/// `columns` right-hand sides in `b`, row-major `[n × columns]`. `pivots` is `[n × lanes]`. What `shape` says to be zero must be;
-/// `nodes` are its nodes, once more so that a caller who knows them can make them a constant. `room` may hold anything.
+/// Factorises the row-major n×n matrices `a` in place (the diagonal holds the inverse pivots) and solves a x = b for
+/// the `columns` right-hand sides in `b`, row-major `[n × columns]`. `pivots` is `[n × lanes]`. Entries outside `shape`
+/// must be zero. `nodes` repeats its number of nodes, so that a caller can make it a constant. `room` is workspace.
 ///
-/// Returns whether any rows were exchanged.
+/// Returns true if any rows were exchanged.
 ///
 /// # Errors
 /// [`Singular`] if a pivot is zero, not finite, or below 1e-300.
@@ -53,7 +55,7 @@ pub fn factorise<T: Lane>(
     nodes: usize,
     room: &mut Vec<T>,
 ) -> Result<bool, Singular> {
-    // Lanes of numbers are never so.
+    // Never the case for several lanes.
     if T::COUNT == 1 && shape.is_plain() {
         return panels(a, n, pivots, b, columns, 0, room);
     }
@@ -79,7 +81,8 @@ pub fn factorise<T: Lane>(
     Ok(exchanged)
 }
 
-/// Eliminates component by component; returns the first column whose component needs another pivot than the diagonal, n if none does.
+/// Eliminates component by component. Returns the first column of a component whose diagonal is too small as a pivot, n
+/// if there is none.
 #[inline(always)]
 fn blocks<T: Lane>(
     a: &mut [T],
@@ -101,7 +104,7 @@ fn blocks<T: Lane>(
         let (done, rest) = b.split_at_mut((first + m) * columns);
         let (upper, done) = (&mut upper[first * n..], &mut done[first * columns..]);
         if step.own {
-            // The rows of the block to the right of it.
+            // Rows of the block to the right of it.
             for q in &step.right {
                 tile::forward(upper, n, q * m, room, m, m);
             }
@@ -125,7 +128,7 @@ fn blocks<T: Lane>(
     n
 }
 
-/// Whether the identity serves as pivots of a component: what stands below it are the factors.
+/// True if a component with an identity block can use it as pivots; the entries below are then the factors.
 #[inline(always)]
 fn identity<T: Lane>(a: &[T], n: usize, first: usize, m: usize, step: &Step) -> bool {
     let mut largest = T::default();
@@ -139,13 +142,13 @@ fn identity<T: Lane>(a: &[T], n: usize, first: usize, m: usize, step: &Step) -> 
     T::splat(1.0).all(largest, serves)
 }
 
-/// The larger one of a number and the size of another.
+/// Larger of a number and the modulus of another.
 #[inline(always)]
 fn larger<T: Lane>(most: T, x: T) -> T {
     most.zip(x.map(f64::abs), |most, x| if x > most { x } else { most })
 }
 
-/// Whether a diagonal serves, given the largest entry of its column.
+/// True if a diagonal is accepted as pivot, given the largest entry of its column.
 #[inline(always)]
 fn serves(diagonal: f64, largest: f64) -> bool {
     (diagonal >= THRESHOLD * largest) & (diagonal > 1e-300) & (diagonal < f64::INFINITY)
@@ -159,8 +162,8 @@ fn copy_block<T: Lane>(from: &[T], from_stride: usize, to: &mut [T], to_stride: 
     }
 }
 
-/// Eliminates the columns of a component from its own rows and those below, within these columns; false, and nothing changed, if a
-/// diagonal does not serve.
+/// Eliminates the columns of a component from its own rows and those below, within these columns. Returns false and
+/// changes nothing if a diagonal is too small.
 #[inline(always)]
 fn own_block<T: Lane>(a: &mut [T], n: usize, first: usize, m: usize, step: &Step, room: &mut [T]) -> bool {
     let size = m * m;
@@ -193,7 +196,7 @@ fn own_block<T: Lane>(a: &mut [T], n: usize, first: usize, m: usize, step: &Step
     true
 }
 
-/// The upper triangle after [`blocks`], for all columns of `b`.
+/// Back substitution after [`blocks`], for all columns of `b`.
 #[inline(always)]
 fn back_in_blocks<T: Lane>(a: &[T], n: usize, b: &mut [T], columns: usize, shape: &Shape, m: usize) {
     for (p, step) in shape.steps.iter().enumerate().rev() {
@@ -216,7 +219,7 @@ fn back_in_blocks<T: Lane>(a: &[T], n: usize, b: &mut [T], columns: usize, shape
     }
 }
 
-/// Eliminates from column `from` on with exchanges of rows where they are needed, then the upper triangle.
+/// Eliminates from column `from` on, with row exchanges where needed, and substitutes back.
 #[inline(never)]
 fn whole<T: Lane>(
     a: &mut [T],
@@ -250,7 +253,7 @@ fn whole<T: Lane>(
     Ok(())
 }
 
-/// The same for a large one, the bulk of whose work is products of panels; returns whether rows were exchanged.
+/// Eliminates a large matrix like [`whole`], mostly by products of panels; returns true if rows were exchanged.
 #[inline(always)]
 fn panels<T: Lane>(
     a: &mut [T],
@@ -270,7 +273,7 @@ fn panels<T: Lane>(
             let (upper, lower) = a.split_at_mut((k + 1) * n);
             let row_k = &upper[k * n + k + 1..k * n + end];
             for row in lower.chunks_exact_mut(n) {
-                // Many entries vanish: components that do not depend on each other.
+                // Many entries vanish, because components do not depend on each other.
                 if row[k].lanes().iter().all(|x| *x == 0.0) {
                     continue;
                 }
@@ -285,7 +288,7 @@ fn panels<T: Lane>(
     Ok(exchanged)
 }
 
-/// Chooses the pivot of column k in every lane and holds its inverse; returns whether rows were exchanged.
+/// Chooses the pivot of column k in every lane and stores its inverse; returns true if rows were exchanged.
 #[inline(always)]
 fn pivot<T: Lane>(
     a: &mut [T],
@@ -314,7 +317,7 @@ fn pivot<T: Lane>(
     Ok(wanting)
 }
 
-/// After a panel: its rows to the right of it, then everything below.
+/// Updates after a panel: its rows to the right of it, then everything below.
 #[inline(always)]
 fn update<T: Lane>(a: &mut [T], n: usize, b: &mut [T], columns: usize, [first, end]: [usize; 2], left: &mut Vec<T>) {
     let depth = end - first;
@@ -354,7 +357,7 @@ fn exchange<T: Lane>(a: &mut [T], n: usize, b: &mut [T], columns: usize, k: usiz
     Ok(p as u32)
 }
 
-/// The upper triangle, for all columns of `b`.
+/// Back substitution for all columns of `b`.
 #[inline(always)]
 fn back<T: Lane>(a: &[T], n: usize, b: &mut [T], columns: usize, left: &mut Vec<T>) {
     for first in (0..n).step_by(PANEL).rev() {
@@ -378,7 +381,7 @@ fn back<T: Lane>(a: &[T], n: usize, b: &mut [T], columns: usize, left: &mut Vec<
     }
 }
 
-/// Solves for one right-hand side `[n]` in place.
+/// Solves for a single right-hand side `[n]` in place.
 #[inline(always)]
 pub fn solve<T: Lane>(a: &[T], n: usize, pivots: &[u32], exchanged: bool, b: &mut [T], shape: &Shape) {
     if exchanged {
@@ -483,7 +486,7 @@ fn image(y: Eight, a: &[f64], x: &[Eight]) -> Eight {
     a.iter().zip(x).fold(y, |sum, (a, x)| sum - Eight::splat(*a) * *x)
 }
 
-/// Solves aᵀ x = b for one right-hand side `[n]` in place.
+/// Solves aᵀ x = b for a single right-hand side `[n]` in place.
 #[inline(always)]
 pub fn solve_transposed<T: Lane>(a: &[T], n: usize, pivots: &[u32], exchanged: bool, b: &mut [T], shape: &Shape) {
     if exchanged || shape.is_plain() {
@@ -552,7 +555,8 @@ fn swap_lanes<T: Lane>(b: &mut [T], k: usize, pivots: &[u32]) {
 mod tests {
     use super::*;
 
-    /// Eight matrices, every second of which has its large entries beside the diagonal, against the scalar factorisation.
+    /// Compares eight matrices, every second of which has its large entries off the diagonal, with the scalar
+    /// factorisation.
     #[test]
     fn every_lane_agrees_with_the_scalar_factorisation() {
         for (n, columns) in [(7, 3), (45, 11)] {

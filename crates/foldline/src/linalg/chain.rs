@@ -1,13 +1,13 @@
-//! A chain of linear relations between neighbours, reduced to one between its ends.
+//! A chain of linear relations between neighbours, reduced to one relation between its ends.
 //!
-//! **Idea.** Inner nodes are eliminated from left to right by orthogonal transformations, so that growing and decaying
-//! solutions are both safe. Several chains of the same length run side by side, one in each lane.
+//! **Idea.** Inner nodes are eliminated from left to right by orthogonal transformations, which is stable for growing
+//! and decaying solutions. Several chains of equal length run side by side, one in each lane.
 //!
 //! **Equations.** Nodes x_0 … x_L of n components, scalars σ (q):
 //!
 //! ```text
 //!   (1)  F_j x_j + E_j x_{j+1} + g_j σ = h_j            j = 0 … L-1, n rows each
-//!   (2)  Σ_j p_j x_j                                    q rows that stand outside, j = 0 … L-1
+//!   (2)  Σ_j p_j x_j                                    q border rows, j = 0 … L-1
 //! ```
 //!
 //! Eliminating x_1 … x_{L-1} by QR of the stacked 2n×n blocks
@@ -28,7 +28,7 @@ use super::lane::{Lane, add, dot, subtract};
 use super::reflect;
 use crate::contract::Singular;
 
-/// Chains side by side, and what their elimination leaves.
+/// Chains side by side, and the result of their elimination.
 #[derive(Clone, Debug, Default)]
 pub struct Chain<T> {
     n: usize,
@@ -36,29 +36,29 @@ pub struct Chain<T> {
     length: usize,
     /// `[L][n × 2n]`; j = 0 is not used.
     reflectors: Vec<T>,
-    /// `[L][n × (3n + q)]`: R, S, F', g'; j = 0 is not used. The diagonal of R is held inverted.
+    /// `[L][n × (3n + q)]`: R, S, F', g'; j = 0 is not used. The diagonal of R is stored inverted.
     upper: Vec<T>,
     /// `[L][q × n]`.
     multipliers: Vec<T>,
-    /// `[n × (3n + q)]`: the relation that is left, with columns x_{L-1} (zero), x_L, x_0, σ.
+    /// `[n × (3n + q)]`: the remaining relation, with columns x_{L-1} (zero), x_L, x_0, σ.
     pub relation: Vec<T>,
-    /// `[q × n]`: (2) on x_0.
+    /// `[q × n]`: coefficients of x_0 in (2).
     pub first: Vec<T>,
-    /// `[q × n]`: (2) on x_L.
+    /// `[q × n]`: coefficients of x_L in (2).
     pub last: Vec<T>,
-    /// `[q × q]`: what elimination adds to σ in (2).
+    /// `[q × q]`: coefficients of σ that elimination adds to (2).
     pub corner: Vec<T>,
     stack: Vec<T>,
 }
 
-/// Where the relations (1) come from.
+/// Source of the relations (1).
 pub trait Links<T> {
-    /// Writes F_j, E_j, g_j to columns 0, n and 3n of `rows`, `[n × (3n + q)]`, which is zero before.
+    /// Writes F_j, E_j, g_j to columns 0, n and 3n of `rows`, `[n × (3n + q)]`, which must be zero.
     fn write(&self, j: usize, rows: &mut [T]);
 }
 
 impl<T: Lane> Chain<T> {
-    /// Makes room for what is left of chains of `length` relations; the contents are then undefined.
+    /// Resizes the result for chains of `length` relations; its contents are then undefined.
     pub fn resize(&mut self, n: usize, q: usize, length: usize) {
         (self.n, self.q, self.length) = (n, q, length);
         let full = 3 * n + q;
@@ -69,7 +69,7 @@ impl<T: Lane> Chain<T> {
         self.stack.resize(2 * n * full, T::default());
     }
 
-    /// Eliminates the inner nodes; `border` is `[L][q × n]`, the p_j.
+    /// Eliminates the inner nodes; `border` `[L][q × n]` holds the p_j.
     ///
     /// # Errors
     /// [`Singular`] if R is.
@@ -79,7 +79,7 @@ impl<T: Lane> Chain<T> {
         self.reflectors.resize(length * n * 2 * n, T::default());
         self.upper.resize(length * n * (3 * n + q), T::default());
         self.multipliers.resize(length * q * n, T::default());
-        // The usual dimensions as constants.
+        // Common sizes as constants.
         match (self.n, self.q) {
             (4, 2) => self.eliminated(links, border, 4, 2),
             (n, q) => self.eliminated(links, border, n, q),
@@ -127,7 +127,7 @@ impl<T: Lane> Chain<T> {
         Ok(())
     }
 
-    /// Replaces x_j in (2) by means of the rows just made triangular.
+    /// Eliminates x_j from (2) with the rows just made triangular.
     #[inline(always)]
     fn carry_border(&mut self, j: usize, n: usize, q: usize) {
         let full = 3 * n + q;
@@ -149,8 +149,9 @@ impl<T: Lane> Chain<T> {
         }
     }
 
-    /// Carries right-hand sides h `[L × n]` through the elimination; afterwards the last n are those of the relation that is left.
-    /// `s` `[q]` receives what elimination takes from the right-hand sides of (2). The dimensions are given once more, so that a caller who
+    /// Applies the elimination to right-hand sides h `[L × n]`; the last n are then those of the remaining relation.
+    /// Subtracts the contribution to the right-hand sides of (2) from `s` `[q]`. The dimensions are passed again, so
+    /// that a caller can make them constants.
     /// knows them can make them constants.
     #[inline(always)]
     pub fn forward(&self, h: &mut [T], s: &mut [T], [n, q]: [usize; 2]) {
@@ -163,7 +164,8 @@ impl<T: Lane> Chain<T> {
         }
     }
 
-    /// The inner nodes from x_0, x_L and σ: h as [`Chain::forward`] left it, on return x_1 … x_{L-1} at 0 … L-2.
+    /// Computes the inner nodes from x_0, x_L and σ: h as left by [`Chain::forward`], replaced by x_1 … x_{L-1} at 0 …
+    /// L-2.
     #[inline(always)]
     pub fn backward(&self, h: &mut [T], first: &[T], last: &[T], sigma: &[T], [n, q]: [usize; 2]) {
         let full = 3 * n + q;
@@ -182,8 +184,9 @@ impl<T: Lane> Chain<T> {
         }
     }
 
-    /// The transposed upper triangle: `z` `[L × n]` holds the right-hand sides of x_1 … x_{L-1} at 1 … L-1, replaced by the solution;
-    /// takes from `first`, `last` `[n]` and `sigma` `[q]` what belongs to x_0, x_L and σ.
+    /// Solves with the transposed upper triangle: `z` `[L × n]` holds the right-hand sides of x_1 … x_{L-1} at 1 … L-1,
+    /// replaced by the solution. Subtracts the contributions to x_0, x_L and σ from `first`, `last` `[n]` and `sigma`
+    /// `[q]`.
     #[inline(always)]
     pub fn forward_transposed(&self, z: &mut [T], first: &mut [T], last: &mut [T], sigma: &mut [T]) {
         let (n, full) = (self.n, 3 * self.n + self.q);
@@ -204,12 +207,12 @@ impl<T: Lane> Chain<T> {
         }
     }
 
-    /// Multipliers of (1) from those of the triangular rows (`z` as [`Chain::forward_transposed`] left it), of the relation that
-    /// is left (`carry` `[n]`) and of (2) (`border` `[q]`): `z` `[L × n]` is replaced by them.
+    /// Computes the multipliers of (1), which replace `z` `[L × n]`, from those of the triangular rows (`z` as left by
+    /// [`Chain::forward_transposed`]), of the remaining relation (`carry` `[n]`) and of (2) (`border` `[q]`).
     #[inline(always)]
     pub fn backward_transposed(&self, z: &mut [T], carry: &[T], border: &[T]) {
         let (n, q) = (self.n, self.q);
-        // Row j of the triangular rows moves to place j - 1, so that each pair stands together.
+        // Row j of the triangular rows moves to place j - 1, next to its partner.
         z.copy_within(n.., 0);
         z[(self.length - 1) * n..].copy_from_slice(carry);
         for j in (1..self.length).rev() {

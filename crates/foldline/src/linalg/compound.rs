@@ -1,30 +1,31 @@
-//! A piece of a chain with every node expressed by its first one.
+//! Compactification: every node of a piece of a chain expressed by its first node.
 //!
-//! **Idea.** Links x_{j+1} = G_j x_j + g_j σ + h_j are multiplied together. That takes a quarter of the operations of [`super::chain`], and the
-//! nodes of a piece do not wait for each other when a system is solved. It is safe as long as errors made at one node do not grow on the
-//! way to another, which is measured while multiplying.
+//! **Idea.** The links x_{j+1} = G_j x_j + g_j σ + h_j are multiplied together. That takes a quarter of the operations
+//! of [`super::chain`], and the nodes of a piece are independent of each other when a system is solved. It is stable as
+//! long as errors at one node do not grow on the way to another, which is measured during the multiplication.
 //!
-//! **Equations.** From P_0 = 1, a_0 = 0 and b_0 = 0 on:
+//! **Equations.** Starting from P_0 = 1, a_0 = 0 and b_0 = 0:
 //!
 //! ```text
 //!   (1)  P_{j+1} = G_j P_j,   a_{j+1} = G_j a_j + g_j,   b_{j+1} = G_j b_j + h_j,     x_j = P_j x_0 + a_j σ + b_j
 //!   (2)  C_{j+1} = G_j C_j G_jᵀ + S²,  C_0 = S²
 //! ```
 //!
-//! (2) is the covariance of what independent errors at x_0 … x_j, as large as the scales S of the components, become at x_{j+1}: its diagonal bounds
-//! how much of them grows, from wherever to wherever, also where growth and decay follow each other and P shows neither. Of many components it
-//! costs more than the products do: random errors e_{j+1} = G_j e_j + S r, r = ±1, are carried along instead, and their mean squares are estimates
-//! of that diagonal.
+//! (2) is the covariance at x_{j+1} of independent errors at x_0 … x_j, each as large as the scales S of the
+//! components. Its diagonal bounds their growth between any two nodes, even if growth and decay follow each other so
+//! that P shows neither. For many components it costs more than the products themselves: random errors e_{j+1} = G_j
+//! e_j + S r, r = ±1, are propagated instead, and their mean squares estimate that diagonal.
 //!
 //! **Source.** Compactification, ascher1995, §7.2, which is unstable without a bound on the growth.
 //!
-//! **Fails when** that bound is passed; [`Compound::multiply`] says so, and the caller takes the chain.
+//! **Fails when** that bound is exceeded; [`Compound::multiply`] then returns false, and the caller uses the chain.
 
 use super::dense::{MANY, VECTORS, signs};
 use super::lane::{Lane, add, dot, subtract};
 use super::tile::piece;
 
-/// Diagonal of (2), in S², up to which a piece is multiplied together: errors grow some 30 times at most, of the 10¹⁶ that there are.
+/// Diagonal of (2), in S², up to which a piece is multiplied together: errors grow at most some 30 times, which costs
+/// 1.5 of 16 digits.
 const GROWTH: f64 = 1e3;
 
 /// Pieces side by side, one in each lane.
@@ -32,20 +33,21 @@ const GROWTH: f64 = 1e3;
 pub struct Compound<T> {
     /// `[L][n × (n + q)]`: (P_j, a_j) of (1), j = 1 … L.
     products: Vec<T>,
-    /// `[n × n]`: C of (2), and room for the next one.
+    /// `[n × n]`: C of (2); below, workspace for the next one.
     spread: Vec<T>,
     room: Vec<T>,
 }
 
 impl<T: Lane> Compound<T> {
-    /// Makes room for pieces of `length` links; the contents are then undefined.
+    /// Resizes for pieces of `length` links; the contents are then undefined.
     pub fn resize(&mut self, n: usize, q: usize, length: usize) {
         self.products.resize(length * n * (n + q), T::default());
         self.spread.resize(n * n, T::default());
         self.room.resize(n * n, T::default());
     }
 
-    /// (1) and (2) for the links `[L][n × (n + q)]`, (G_j, g_j), with the scales `[n]`; false where errors may grow too much.
+    /// Computes (1) and (2) for the links `[L][n × (n + q)]`, (G_j, g_j), with the scales `[n]`; false if errors may
+    /// grow too much.
     #[inline(always)]
     pub fn multiply(&mut self, links: &[T], scale: &[f64], n: usize, q: usize) -> bool {
         if T::COUNT == 1 && n >= MANY {
@@ -65,7 +67,7 @@ impl<T: Lane> Compound<T> {
                     add_combination(to, &row[..n], last, width);
                 }
             }
-            // The upper triangle of G C Gᵀ + S², and its mirror image.
+            // Upper triangle of G C Gᵀ + S², mirrored to the lower one.
             for (row, to) in link.chunks_exact(width).zip(room.chunks_exact_mut(n)) {
                 to.fill(T::default());
                 add_combination(to, &row[..n], spread, n);
@@ -77,7 +79,7 @@ impl<T: Lane> Compound<T> {
                 }
                 let square = T::splat(scale[i] * scale[i]);
                 spread[i * (n + 1)] = spread[i * (n + 1)] + square;
-                // Not a number is not small either.
+                // Rejects NaN as well.
                 if !spread[i * (n + 1)].all(square, |entry, square| entry <= GROWTH * square) {
                     return false;
                 }
@@ -86,7 +88,7 @@ impl<T: Lane> Compound<T> {
         true
     }
 
-    /// [`Compound::multiply`] where a matrix fills the vectors by itself.
+    /// [`Compound::multiply`] for matrices that fill the vectors by themselves.
     fn multiply_large(&mut self, links: &[T], scale: &[f64], n: usize, q: usize) -> bool {
         let (width, size) = (n + q, n * (n + q));
         if random_errors_grow(links, scale, n, q) {
@@ -113,7 +115,8 @@ impl<T: Lane> Compound<T> {
         &self.products[self.products.len() - n * (n + q)..]
     }
 
-    /// Rows Σ_j p_j x_j, `border` `[L][q × n]` with j = 0 … L-1, on x_0 (added to `first` `[q × n]`) and on σ (added to `corner` `[q × q]`).
+    /// Expresses the rows Σ_j p_j x_j by x_0 (added to `first` `[q × n]`) and σ (added to `corner` `[q × q]`); `border`
+    /// is `[L][q × n]` with j = 0 … L-1.
     #[inline(always)]
     pub fn carry_border(&self, border: &[T], first: &mut [T], corner: &mut [T], n: usize, q: usize) {
         let width = n + q;
@@ -130,7 +133,8 @@ impl<T: Lane> Compound<T> {
         }
     }
 
-    /// Right-hand sides h `[L × n]` become b_1 … b_L; takes from `s` `[q]` what the border `[L][q × n]` has on them.
+    /// Replaces right-hand sides h `[L × n]` by b_1 … b_L, and subtracts from `s` `[q]` the product of the border
+    /// `[L][q × n]` with them.
     #[inline(always)]
     pub fn forward(&self, links: &[T], border: &[T], h: &mut [T], s: &mut [T], [n, q]: [usize; 2]) {
         match (n, q) {
@@ -153,7 +157,7 @@ impl<T: Lane> Compound<T> {
         }
     }
 
-    /// x_1 … x_{L-1} at 0 … L-2 from x_0 and σ, h as [`Compound::forward`] left it.
+    /// Computes x_1 … x_{L-1}, at 0 … L-2, from x_0 and σ, with h as left by [`Compound::forward`].
     #[inline(always)]
     pub fn backward(&self, h: &mut [T], first: &[T], sigma: &[T], [n, q]: [usize; 2]) {
         match (n, q) {
@@ -173,7 +177,7 @@ impl<T: Lane> Compound<T> {
         }
     }
 
-    /// Adds to the columns of x_0 and σ what those of x_1 … x_{L-1}, in `z` `[L × n]` at 1 … L-1, leave there.
+    /// Adds to `first` and `sigma` the contributions of x_1 … x_{L-1}, in `z` `[L × n]` at 1 … L-1.
     #[inline(always)]
     pub fn forward_transposed(&self, z: &[T], first: &mut [T], sigma: &mut [T], n: usize, q: usize) {
         let (width, size) = (n + q, n * (n + q));
@@ -185,13 +189,14 @@ impl<T: Lane> Compound<T> {
         }
     }
 
-    /// Multipliers of the links in place of `z`, which is as before [`Compound::forward_transposed`], from those of the relation between the
-    /// ends (`carry` `[n]`) and of the border (`mu` `[q]`): y_{j-1} = G_jᵀ y_j + z_j - p_jᵀ μ.
+    /// Computes the multipliers of the links, y_{j-1} = G_jᵀ y_j + z_j - p_jᵀ μ, which replace `z` (as given to
+    /// [`Compound::forward_transposed`]), from those of the relation between the ends (`carry` `[n]`) and of the border
+    /// (`mu` `[q]`).
     #[inline(always)]
     pub fn backward_transposed(&self, links: &[T], border: &[T], z: &mut [T], carry: &[T], mu: &[T]) {
         let (n, q) = (carry.len(), mu.len());
         let (width, size) = (n + q, n * (n + q));
-        // z_j moves to place j - 1, where y_{j-1} will be.
+        // z_j moves to place j - 1, that of y_{j-1}.
         z.copy_within(n.., 0);
         let last = z.len() - n;
         z[last..].copy_from_slice(carry);
@@ -207,7 +212,7 @@ impl<T: Lane> Compound<T> {
     }
 }
 
-/// Whether the mean squares of random errors pass [`GROWTH`] at any node.
+/// True if the mean squares of random errors exceed [`GROWTH`] at any node.
 fn random_errors_grow<T: Lane>(links: &[T], scale: &[f64], n: usize, q: usize) -> bool {
     let width = n + q;
     let mut sign = signs();
@@ -220,19 +225,19 @@ fn random_errors_grow<T: Lane>(links: &[T], scale: &[f64], n: usize, q: usize) -
         errors.chunks_exact_mut(VECTORS).zip(scale).any(|(row, s)| {
             row.iter_mut().for_each(|e| *e = *e + drawn(s));
             let limit = T::splat(GROWTH * VECTORS as f64 * s * s);
-            // Not a number is not small either.
+            // Rejects NaN as well.
             !dot(row, row).all(limit, |sum, limit| sum <= limit)
         })
     })
 }
 
-/// to += row · matrix, all of whose columns `to` has.
+/// to += row · matrix, for matrices with as many columns as `to`.
 #[inline(always)]
 fn add_combination<T: Lane>(to: &mut [T], row: &[T], matrix: &[T], width: usize) {
     add_columns(to, row, matrix, width, 0);
 }
 
-/// The same with as many columns as `to` has, from `at` on.
+/// to += row · matrix, for as many columns of the matrix as `to` has, from `at` on.
 #[inline(always)]
 fn add_columns<T: Lane>(to: &mut [T], row: &[T], matrix: &[T], width: usize, at: usize) {
     let mut c = 0;
@@ -245,7 +250,7 @@ fn add_columns<T: Lane>(to: &mut [T], row: &[T], matrix: &[T], width: usize, at:
     }
 }
 
-/// The same for C columns, whose sums stay in registers; returns C.
+/// [`add_columns`] for C columns, whose sums stay in registers; returns C.
 #[inline(always)]
 fn columns<T: Lane, const C: usize>(to: &mut [T], row: &[T], matrix: &[T], width: usize, at: usize) -> usize {
     let mut sums: [T; C] = *piece(to, 0);
@@ -263,7 +268,7 @@ fn columns<T: Lane, const C: usize>(to: &mut [T], row: &[T], matrix: &[T], width
 mod tests {
     use super::*;
 
-    /// Links of one number: a factor each, one scalar.
+    /// Links of dimension one, each with a factor and one scalar.
     fn links(factors: &[f64]) -> Vec<f64> {
         factors.iter().enumerate().flat_map(|(j, g)| [*g, j as f64]).collect()
     }
@@ -292,7 +297,7 @@ mod tests {
 
     #[test]
     fn growth_does_not_depend_on_units() {
-        // A turn by 1 rad, the second component in thousandths, then in thousands: the same motion.
+        // A rotation by 1 rad with the second component in thousandths, then in thousands: the same motion.
         for unit in [1e-3, 1.0, 1e3] {
             let (sin, cos) = 1f64.sin_cos();
             let link = [cos, -sin / unit, 0.0, sin * unit, cos, 0.0];
@@ -304,7 +309,7 @@ mod tests {
     }
 
     #[test]
-    fn growth_is_seen_wherever_it_is() {
+    fn growth_is_detected_anywhere_in_a_piece() {
         assert!(compound(&[0.5; 40]).1 && compound(&[1.0; 900]).1, "decay, or neither");
         assert!(!compound(&[1.8; 20]).1, "growth");
         let down_and_up: Vec<f64> = (0..40).map(|j| if j < 20 { 0.5 } else { 2.0 }).collect();

@@ -1,9 +1,10 @@
-//! The linear system of collocation: condensed per interval, then eliminated block by block with the border outside.
+//! Linear system of collocation: condensed per interval, then eliminated block by block with a border.
 //!
-//! **Idea.** On every interval the m·n interior unknowns depend only on the left end x_j and on a few scalars σ that are
-//! common to all intervals (period, parameters). Condensing them leaves a recurrence between interval ends: a chain. The
-//! intervals are dealt to the lanes in contiguous pieces, so that both condensation and elimination run in all lanes at once;
-//! a last, short chain connects the pieces. A piece is multiplied together where errors do not grow in it, and else eliminated as a chain.
+//! **Idea.** On every interval the m·n interior unknowns depend only on the left end x_j and on a few scalars σ common
+//! to all intervals (period, parameters). Condensing them leaves a recurrence between interval ends: a chain. The
+//! intervals are distributed over the lanes in contiguous pieces, so that condensation and elimination run in all lanes
+//! at once; a last, short chain connects the pieces. A piece is compactified if errors do not grow in it, and otherwise
+//! eliminated as a chain.
 //!
 //! **Equations.** N intervals; unknowns x_j (n), X_j (m·n), σ (q):
 //!
@@ -14,11 +15,12 @@
 //!   (4)  Σ_j ⟨p_j, (x_j, X_j)⟩ + D σ = s                     border,     q rows
 //! ```
 //!
-//! Components of very different sizes would be rounded, and pivots chosen, as if all were of one size. With D = diag of a power of two near
-//! the size of each component, what is factorised are D⁻¹ A D, and likewise the other parts: that rounds nothing.
+//! Components of very different sizes would be rounded, and pivots chosen, as if all had the same size. With D a
+//! diagonal matrix of powers of two near the sizes of the components, D⁻¹ A D is factorised, and the other parts are
+//! scaled accordingly; no rounding is involved.
 //!
-//! Condensed: x_{j+1} = G_j x_j + g_j σ + h_j, the links of a [`Chain`]. With W lanes and L = ⌈N / W⌉, interval j is in lane
-//! ⌊j / L⌋ at place j mod L; intervals beyond N have length zero, so that their ends coincide.
+//! Condensed: x_{j+1} = G_j x_j + g_j σ + h_j, the links of a [`Chain`]. With W lanes and L = ⌈N / W⌉, interval j is in
+//! lane ⌊j / L⌋ at place j mod L; intervals beyond N have length zero, so that their ends coincide.
 //!
 //! **Source.** Condensation of parameters as in ascher1995, §7; division into pieces as in wright1992.
 //!
@@ -32,7 +34,7 @@ use super::shape::Shape;
 use super::{block, lu, tile};
 use crate::contract::Singular;
 
-/// The system, its factorisation and room for both.
+/// The system, its factorisation and workspace.
 #[derive(Clone, Debug, Default)]
 pub struct Condensed<T> {
     n: usize,
@@ -43,9 +45,9 @@ pub struct Condensed<T> {
     closure: f64,
     end: Vec<f64>,
     shape: Shape,
-    /// Whether `interior` is zero wherever the shape says so, but for places with exchanged rows.
+    /// True if `interior` is zero wherever the shape requires, except at places with exchanged rows.
     tidy: bool,
-    /// Where a left end and the slots of an interval stand in the layout of the unknowns, `[(m + 1) · n]`.
+    /// Positions of the left end and the slots of an interval in the layout of the unknowns, `[(m + 1) · n]`.
     order: Vec<usize>,
     /// `[L][m·n × m·n]`: A_j, factorised in place; rows and columns in slots.
     pub interior: Vec<T>,
@@ -57,20 +59,20 @@ pub struct Condensed<T> {
     pub corner: Vec<f64>,
     pivots: Vec<u32>,
     exchanged: Vec<bool>,
-    /// Room for the factorisation of a block.
+    /// Workspace for the factorisation of a block.
     tiles: Vec<T>,
-    /// `[(m + 1) · n]`: what stands in the lanes that have no interval.
+    /// `[(m + 1) · n]`: zeros for lanes without an interval.
     nothing: Vec<f64>,
     step: Vec<T>,
     condensed_border: Vec<T>,
     pieces: Chain<T>,
     /// `[n]`: sizes of the components over D, for the growth of errors.
     scale: Vec<f64>,
-    /// `[(m + 1) · n]`: D for the left end and the slots of an interval; empty where it is 1.
+    /// `[(m + 1) · n]`: D for the left end and the slots of an interval; empty if it is the identity.
     units: Vec<f64>,
     /// `[n]`: D.
     own_units: Vec<f64>,
-    /// The same where errors do not grow within a piece, and whether that is so.
+    /// Compactified pieces, used instead of `pieces` if errors do not grow within them; below, true if that is so.
     products: Compound<T>,
     gentle: bool,
     whole: Chain<f64>,
@@ -79,7 +81,7 @@ pub struct Condensed<T> {
 }
 
 impl<T: Lane> Condensed<T> {
-    /// A system for dimension n, interval weights `end` (m + 1 of them), q scalars.
+    /// System for dimension n, interval weights `end` (m + 1 of them), q scalars.
     pub fn new(n: usize, end: &[f64], q: usize) -> Condensed<T> {
         let m = end.len() - 1;
         let mut system = Condensed {
@@ -98,15 +100,15 @@ impl<T: Lane> Condensed<T> {
         system
     }
 
-    /// Says how large the components are: characteristic sizes `[n]`, which do not change between factorisations of interest, and the sizes
-    /// `[n]` at present.
+    /// Sets the sizes of the components: characteristic ones `[n]`, constant for a model, which determine D, and
+    /// `present` ones `[n]`.
     pub fn measure_in(&mut self, characteristic: &[f64], present: &[f64]) {
         self.own_units.iter_mut().zip(characteristic).for_each(|(unit, size)| *unit = size.log2().round().exp2());
         self.scale.iter_mut().zip(present.iter().zip(&self.own_units)).for_each(|(to, (size, unit))| *to = size / unit);
         self.lay_units();
     }
 
-    /// Puts D where it is needed.
+    /// Computes D for the layout of an interval.
     fn lay_units(&mut self) {
         self.units.clear();
         if self.own_units.iter().any(|unit| *unit != 1.0) {
@@ -114,8 +116,9 @@ impl<T: Lane> Condensed<T> {
         }
     }
 
-    /// Says which components the equations of each component contain, `[n × n]`: A is the identity except at (i, c), (k, d) with
-    /// `pattern[c n + d]`, and B is zero unless c = d. The slots may change. Without it every entry may be anything.
+    /// Sets the sparsity pattern: component c depends on component d if `pattern[c n + d]`. A is the identity except at
+    /// such (i, c), (k, d), and B is zero unless c = d. The slots may change. Without this call every entry may be
+    /// nonzero.
     pub fn couple(&mut self, pattern: &[bool]) {
         let n = self.n;
         if pattern != self.shape.pattern() {
@@ -135,8 +138,8 @@ impl<T: Lane> Condensed<T> {
         self.lay_units();
     }
 
-    /// Makes A zero at a place, except where [`Condensed::couple`] was told that it may differ from the identity: those entries
-    /// are left to be written.
+    /// Sets A to zero at a place, except for the entries that [`Condensed::couple`] allows to differ from the identity;
+    /// these must be written afterwards.
     #[inline(always)]
     pub fn clear(&mut self, t: usize) {
         let inner = self.m * self.n;
@@ -163,7 +166,7 @@ impl<T: Lane> Condensed<T> {
         self.shape.slot(i, c)
     }
 
-    /// Makes room for that many intervals; the contents are then undefined.
+    /// Resizes for a number of intervals; the contents are then undefined.
     pub fn resize(&mut self, intervals: usize) {
         let (n, q, inner) = (self.n, self.q, self.m * self.n);
         let length = intervals.div_ceil(T::COUNT);
@@ -188,12 +191,12 @@ impl<T: Lane> Condensed<T> {
         (self.n, self.q)
     }
 
-    /// L, the places of each lane.
+    /// L, the number of places per lane.
     pub fn length(&self) -> usize {
         self.length
     }
 
-    /// Writes G_j, `[n × n]`: how the right end of interval j follows from its left end.
+    /// Writes the transition matrix G_j, `[n × n]`, from the left to the right end of interval j.
     pub fn transition(&self, j: usize, to: &mut [f64]) {
         let (n, width) = (self.n, self.n + self.q);
         let (lane, place) = (j / self.length, j % self.length);
@@ -206,8 +209,8 @@ impl<T: Lane> Condensed<T> {
         }
     }
 
-    /// Writes how the inner nodes of some intervals follow from their left ends, `[m][n × n][stride]` with an interval for each of the
-    /// first entries of a line, once they are condensed.
+    /// Writes the dependence of the inner nodes on the left end for the intervals in `piece`, `[m][n × n][stride]` with
+    /// one interval per entry of a line. The intervals must be condensed.
     pub fn inner(&self, piece: std::ops::Range<usize>, stride: usize, to: &mut [f64]) {
         let (n, width, inner) = (self.n, self.n + self.q, self.m * self.n);
         for (k, line) in to.chunks_exact_mut(stride).enumerate() {
@@ -226,7 +229,7 @@ impl<T: Lane> Condensed<T> {
         }
     }
 
-    /// Condenses every interval: `interior`, `coupling` and `border` must be filled.
+    /// Condenses every interval. `interior`, `coupling` and `border` must be filled.
     ///
     /// # Errors
     /// [`Singular`] if an interior block is.
@@ -234,7 +237,7 @@ impl<T: Lane> Condensed<T> {
         T::dispatch(Condense(self))
     }
 
-    /// Eliminates the interval ends, once after each [`Condensed::condense`]; `closure` is κ of (3).
+    /// Eliminates the interval ends, once after each [`Condensed::condense`]. `closure` is κ of (3).
     ///
     /// # Errors
     /// [`Singular`] if the remaining matrix is.
@@ -243,19 +246,20 @@ impl<T: Lane> Condensed<T> {
         T::dispatch(Eliminate(self))
     }
 
-    /// Solves (1)–(4). `rhs` is, per interval, c_j (n) then r_j (m·n), and at the end s (q); the solution has the layout
-    /// x_j, X_j per interval, then σ.
+    /// Solves (1)–(4). `rhs` contains c_j (n) and r_j (m·n) for each interval, then s (q); the solution contains x_j
+    /// and X_j for each interval, then σ.
     pub fn solve(&self, rhs: &[f64], x: &mut [f64]) {
         T::dispatch(Solve { system: self, rhs, x });
     }
 
-    /// Solves the transposed system: `z` has the layout of the unknowns (x_j, X_j per interval, then σ), `y` that of the
-    /// equations (c_j, r_j per interval, then s).
+    /// Solves the transposed system. `z` has the layout of the unknowns (x_j, X_j per interval, then σ), `y` that of
+    /// the equations (c_j, r_j per interval, then s).
     pub fn solve_transposed(&self, z: &[f64], y: &mut [f64]) {
         T::dispatch(SolveTransposed { system: self, z, y });
     }
 
-    /// From per-interval layout `[N][block]`, block = (m + 1) · n, to lanes `[L][block]`, in slots; zero beyond N.
+    /// Converts the layout per interval, `[N][block]` with block = (m + 1) · n, to lanes, `[L][block]` in slots; zero
+    /// beyond N.
     #[inline(always)]
     fn deal(&self, from: &[f64], block: usize) -> Vec<T> {
         let mut out = vec![T::default(); self.length * block];
@@ -274,7 +278,7 @@ impl<T: Lane> Condensed<T> {
         out
     }
 
-    /// Multiplies what was dealt by D, or by its inverse.
+    /// Multiplies a vector in lanes by D, or by its inverse.
     #[inline(always)]
     fn convert(&self, dealt: &mut [T], inverse: bool) {
         if self.units.is_empty() {
@@ -287,7 +291,7 @@ impl<T: Lane> Condensed<T> {
         }
     }
 
-    /// The way back from [`Condensed::deal`].
+    /// Inverse of [`Condensed::deal`].
     #[inline(always)]
     fn collect(&self, from: &[T], to: &mut [f64], block: usize) {
         let order = &self.order[..block];
@@ -315,13 +319,13 @@ impl<T: Lane> Condensed<T> {
         &self.step[..self.length * self.n * (self.n + self.q)]
     }
 
-    /// `[L][q × n]`: the border on the interval ends alone.
+    /// `[L][q × n]`: the border in terms of the interval ends alone.
     #[inline(always)]
     fn ends(&self) -> &[T] {
         &self.condensed_border[..self.length * self.q * self.n]
     }
 
-    /// x = A_t⁻¹ x, or with the transpose.
+    /// x = A_t⁻¹ x, or x = A_t⁻ᵀ x.
     #[inline(always)]
     fn interior_solve(&self, t: usize, transposed: bool, x: &mut [T]) {
         let inner = self.m * self.n;
@@ -332,22 +336,23 @@ impl<T: Lane> Condensed<T> {
     }
 }
 
-/// At least that long; never shorter than it was, so that nothing is written twice when the mesh changes back and forth.
+/// Grows a vector to a length, but never shrinks it, so that meshes that alternate do not cause repeated
+/// initialisation.
 fn room<X: Copy + Default>(v: &mut Vec<X>, length: usize) {
     if v.len() < length {
-        // What was there is not needed: it goes first, and no more is taken than that.
+        // The old contents are not needed. They are freed first, and no excess capacity is allocated.
         *v = Vec::new();
         *v = vec![X::default(); length];
     }
 }
 
-/// Sum over the lanes, in their order.
+/// Sum over the lanes, in order.
 #[inline(always)]
 fn total<T: Lane>(x: T) -> f64 {
     x.lanes().iter().sum()
 }
 
-/// The lanes, one after the other, of vectors of n components.
+/// Splits vectors of n components into their lanes, one after the other.
 #[inline(always)]
 fn unzipped<T: Lane>(x: &[T]) -> Vec<f64> {
     let mut out = vec![0.0; T::COUNT * x.len()];
@@ -368,7 +373,7 @@ impl<T: Lane> pulp::NullaryFnOnce for Condense<'_, T> {
     #[inline(always)]
     fn call(self) -> Self::Output {
         let Condensed { n, m, q, length, .. } = *self.0;
-        // No closure: it would be compiled by itself, without the vector instructions.
+        // Without a closure, which would be compiled separately, without the vector instructions.
         for t in 0..length {
             self.0.condense_at(t, [n, m, q])?;
         }
@@ -377,8 +382,8 @@ impl<T: Lane> pulp::NullaryFnOnce for Condense<'_, T> {
 }
 
 impl<T: Lane> Condensed<T> {
-    /// Condenses the intervals at place t alone, from within [`Lane::dispatch`]: whoever fills them can do it while they are in the cache.
-    /// The dimensions n, m and q are given once more, so that a caller who knows them can make them constants.
+    /// Condenses the intervals at place t alone, from within [`Lane::dispatch`], so that a caller can do so while they
+    /// are in the cache. The dimensions n, m and q are passed again, so that a caller can make them constants.
     ///
     /// # Errors
     /// [`Singular`] if an interior block is.
@@ -392,7 +397,7 @@ impl<T: Lane> Condensed<T> {
         let a = &mut interior[t * inner * inner..(t + 1) * inner * inner];
         let w = &mut coupling[t * inner * width..(t + 1) * inner * width];
         let p = &mut pivots[t * inner * T::COUNT..(t + 1) * inner * T::COUNT];
-        // Should it fail, every entry may have changed.
+        // If the factorisation fails, every entry may have changed.
         exchanged[t] = true;
         exchanged[t] = block::factorise(a, inner, p, w, width, shape, m, tiles)?;
         let step = &mut step[t * n * width..(t + 1) * n * width];
@@ -410,7 +415,7 @@ impl<T: Lane> Condensed<T> {
 }
 
 impl<T: Lane> Condensed<T> {
-    /// D⁻¹ A D and D⁻¹ (B D, C) for the intervals at place t.
+    /// Computes D⁻¹ A D and D⁻¹ (B D, C) for the intervals at place t.
     fn convert_at(&mut self, t: usize, [n, m, q]: [usize; 3]) {
         let (inner, width) = (m * n, n + q);
         let Condensed { interior, coupling, units, shape, own_units, .. } = self;
@@ -432,7 +437,8 @@ impl<T: Lane> Condensed<T> {
 }
 
 impl Condensed<f64> {
-    /// Eight columns from `first` on of how the inner nodes of interval j follow from its left end, `[m][n]`, once it is condensed.
+    /// Eight columns, from `first` on, of the dependence of the inner nodes of interval j on its left end, `[m][n]`.
+    /// The interval must be condensed.
     #[inline(always)]
     pub fn inner_columns(&self, j: usize, first: usize, to: &mut [Eight]) {
         let (n, width, inner) = (self.n, self.n + self.q, self.m * self.n);
@@ -466,7 +472,7 @@ impl Condensed<f64> {
 
 struct Eliminate<'a, T>(&'a mut Condensed<T>);
 
-/// The condensed intervals as links, in every lane: E = 1.
+/// Condensed intervals as links, in every lane, with E = 1.
 struct Steps<'a, T> {
     step: &'a [T],
     n: usize,
@@ -494,7 +500,7 @@ impl<T: Lane> Links<T> for Steps<'_, T> {
     }
 }
 
-/// The pieces as links between their ends: x_L is one column block on, x_0 two.
+/// Pieces as links between their ends, with x_L in the second column block and x_0 in the third.
 struct Pieces<'a, T> {
     relation: &'a [T],
     n: usize,
@@ -533,7 +539,7 @@ impl<T: Lane> pulp::NullaryFnOnce for Eliminate<'_, T> {
         }
         let taken = self.0.condense_border();
         corner.iter_mut().zip(&taken).for_each(|(d, t)| *d += total(*t));
-        // One lane has the whole cycle in it. Few components are not worth multiplying that out.
+        // A single lane contains the whole cycle, and with few components compactification does not pay.
         if (T::COUNT > 1 || self.0.n >= MANY) && self.0.reduced(&corner, true).is_ok() && self.0.is_settled() {
             return Ok(());
         }
@@ -541,15 +547,15 @@ impl<T: Lane> pulp::NullaryFnOnce for Eliminate<'_, T> {
     }
 }
 
-/// Largest pivot of the last matrix over its smallest up to which pieces may be multiplied together: where it is nearly singular, next to
-/// branches that cross or nearly do, the digits that this costs are needed.
+/// Ratio of the largest to the smallest pivot of the last matrix up to which pieces may be compactified. Close to
+/// singularity, next to branches that cross or nearly do, the digits lost by this are needed.
 const REGULAR: f64 = 1e6;
 
 impl<T: Lane> Condensed<T> {
-    /// What is left once the inner ends are gone, in the one way or the other.
+    /// Reduces the system to the last matrix, by compactification if `together`, else by chains.
     ///
     /// # Errors
-    /// [`Singular`] if the matrix that is left is, or errors grow too much for pieces to be multiplied together.
+    /// [`Singular`] if the last matrix is, or if errors grow too much for compactification.
     #[inline(always)]
     fn reduced(&mut self, corner: &[f64], together: bool) -> Result<(), Singular> {
         let Condensed { n, q, closure, length, .. } = *self;
@@ -558,7 +564,7 @@ impl<T: Lane> Condensed<T> {
         let (step, condensed_border) = (&step[..length * n * width], &condensed_border[..length * q * n]);
         *gentle = together;
         if together {
-            // The usual dimensions as constants.
+            // Common sizes as constants.
             let safe = match (n, q) {
                 (4, 2) => compounded(products, step, condensed_border, pieces, scale, [4, 2]),
                 (n, q) => compounded(products, step, condensed_border, pieces, scale, [n, q]),
@@ -593,7 +599,7 @@ impl<T: Lane> Condensed<T> {
         lu::factorise_even(last, width, last_pivots)
     }
 
-    /// Whether the matrix that is left is far from singular.
+    /// True if the last matrix is far from singular.
     fn is_settled(&self) -> bool {
         let width = self.n + self.q;
         let pivots = self.last.iter().step_by(width + 1).take(width).map(|pivot| pivot.abs());
@@ -602,7 +608,7 @@ impl<T: Lane> Condensed<T> {
     }
 }
 
-/// Multiplies every piece together and writes what is left of it to where the elimination of a chain would; false where errors grow.
+/// Compactifies every piece and writes the result where the elimination of a chain would; false if errors grow.
 #[inline(always)]
 fn compounded<T: Lane>(
     products: &mut Compound<T>,
@@ -637,7 +643,7 @@ fn compounded<T: Lane>(
 }
 
 impl<T: Lane> Condensed<T> {
-    /// Border rows on the interval ends alone; returns `[q × q]`, what that adds to D.
+    /// Expresses the border rows by the interval ends alone; returns `[q × q]`, the contribution to D.
     #[inline(always)]
     fn condense_border(&mut self) -> Vec<T> {
         let Condensed { n, m, q, length, .. } = *self;
@@ -672,7 +678,7 @@ impl<T: Lane> pulp::NullaryFnOnce for Solve<'_, T> {
     #[inline(always)]
     fn call(self) {
         let Condensed { n, m, q, .. } = *self.system;
-        // Common dimensions as constants.
+        // Common sizes as constants.
         match (n, m, q) {
             (4, 4, 2) if T::COUNT > 1 => self.solved([4, 4, 2]),
             (n, m, q) => self.solved([n, m, q]),
@@ -681,21 +687,21 @@ impl<T: Lane> pulp::NullaryFnOnce for Solve<'_, T> {
 }
 
 impl<T: Lane> Solve<'_, T> {
-    /// The dimensions are given once more, so that they can be constants.
+    /// Solves; the dimensions are passed again, so that they can be constants.
     #[inline(always)]
     fn solved(self, [n, m, q]: [usize; 3]) {
         let Solve { system, rhs, x } = self;
         let Condensed { intervals, length, closure, .. } = *system;
         let (width, block) = (n + q, (m + 1) * n);
         let size = intervals * block;
-        // A tangent has nothing but its border on the right, and nothing to be carried through the intervals.
+        // For a tangent only the border has a nonzero right-hand side, and nothing is propagated through the intervals.
         let idle = rhs[..size].iter().all(|r| *r == 0.0);
         let mut z = match idle {
             true => vec![T::default(); length * block],
             false => system.deal(&rhs[..size], block),
         };
         system.convert(&mut z, true);
-        // Allocated at once.
+        // A single allocation.
         let mut room = vec![T::default(); length * n + 2 * n + 2 * q];
         let (h, rest) = room.split_at_mut(length * n);
         let (taken, rest) = rest.split_at_mut(q);
@@ -722,7 +728,7 @@ impl<T: Lane> Solve<'_, T> {
             false => system.pieces.forward(h, taken, [n, q]),
         }
         let mut ends = unzipped(&h[(length - 1) * n..]);
-        // The last system, then the ends of the pieces, from x_0 on and from the one after it on.
+        // The last system, then the ends of the pieces, starting at x_0 and at the one after it.
         let mut room = vec![0.0; width + (T::COUNT + 1) * n];
         let (tail, nodes) = room.split_at_mut(width);
         system.whole.forward(&mut ends, &mut tail[n..], [n, q]);
@@ -757,7 +763,7 @@ impl<T: Lane> Solve<'_, T> {
     }
 }
 
-/// Vectors, one after the other, into the lanes of one.
+/// Distributes vectors, one after the other, over the lanes.
 #[inline(always)]
 fn zip<T: Lane>(x: &[f64], out: &mut [T]) {
     for (l, part) in x.chunks_exact(out.len()).enumerate() {
@@ -785,7 +791,7 @@ impl<T: Lane> pulp::NullaryFnOnce for SolveTransposed<'_, T> {
         let size = intervals * block;
         let mut own = system.deal(&z[..size], block);
         system.convert(&mut own, false);
-        // Interior columns first: what they leave for the interval ends and the scalars.
+        // Interior columns first: their contributions to the interval ends and the scalars.
         let mut ends = vec![T::default(); length * n];
         let mut sigma = vec![T::default(); q];
         for t in 0..length {
@@ -890,7 +896,8 @@ mod tests {
         a
     }
 
-    /// Whether component c contains component d: a table for three of them, neighbours for more, everything with two scalars.
+    /// True if component c depends on component d: a table for three components, neighbours for more, everything with
+    /// two scalars.
     fn coupled(s: &Condensed<impl Lane>, c: usize, d: usize) -> bool {
         match (s.q, s.n) {
             (2, _) => true,
@@ -909,8 +916,8 @@ mod tests {
         s
     }
 
-    /// Entries between -1/2 and 1/2 with a strong diagonal; what lies beyond the last interval has length zero. Returns right-hand
-    /// sides.
+    /// Fills the system with entries between -1/2 and 1/2 and a strong diagonal; beyond the last interval the length is
+    /// zero. Returns right-hand sides.
     fn fill<T: Lane>(s: &mut Condensed<T>, strength: f64) -> Vec<f64> {
         let Condensed { n, q, intervals, .. } = *s;
         let mut seed = 0.3f64;
@@ -958,10 +965,10 @@ mod tests {
         (0..intervals * block + q).map(|_| next()).collect()
     }
 
-    /// Returns whether the pieces were multiplied together.
+    /// Compares all solutions with dense ones; returns true if the pieces were compactified.
     fn agrees<T: Lane>(n: usize, intervals: usize, q: usize, closure: f64, strength: f64) -> bool {
         let mut system = empty::<T>(n, intervals, q);
-        // What an earlier factorisation leaves does not matter, whether rows were exchanged or not.
+        // The remains of an earlier factorisation, with or without row exchanges, must not matter.
         for earlier in [3.0, 0.1] {
             fill(&mut system, earlier);
             system.condense().unwrap();
@@ -971,7 +978,7 @@ mod tests {
         let column = Mat::from_fn(rhs.len(), 1, |i, _| rhs[i]);
         system.condense().unwrap();
         system.eliminate(closure).unwrap();
-        // A right-hand side that is zero but for the scalars, too.
+        // A right-hand side that is zero except for the scalars.
         let border = |i: usize| if i < rhs.len() - q { 0.0 } else { rhs[i] };
         let alone: Vec<f64> = (0..rhs.len()).map(border).collect();
         let [mut x, mut y, mut z] = [(); 3].map(|()| vec![0.0; rhs.len()]);
@@ -993,7 +1000,7 @@ mod tests {
     }
 
     #[test]
-    fn many_components_are_multiplied_together_where_errors_do_not_grow() {
+    fn many_components_are_compactified_where_errors_do_not_grow() {
         for (intervals, q, closure) in [(1, 2, 1.0), (5, 1, -1.0), (9, 2, 1.0)] {
             for n in [MANY, MANY + 7] {
                 assert!(agrees::<f64>(n, intervals, q, closure, 30.0), "{n} components, {intervals} intervals");
@@ -1002,9 +1009,9 @@ mod tests {
         assert!(!agrees::<f64>(MANY, 9, 2, 1.0, 1.0), "weak diagonals: errors grow");
     }
 
-    /// A x = b for eight columns against A x = b for each of them.
+    /// Compares the solutions for eight columns with those for single ones.
     #[test]
-    fn columns_are_solved_as_they_are_alone() {
+    fn eight_columns_are_solved_like_single_ones() {
         for (strength, q) in [(3.0, 1), (0.1, 1), (3.0, 2)] {
             let mut s = empty::<f64>(20, 3, q);
             s.measure_in(&(0..20).map(|k| f64::from(1 << (k % 5))).collect::<Vec<_>>(), &[1.0; 20]);
@@ -1055,16 +1062,16 @@ mod tests {
             assert!(!agrees::<f64>(3, intervals, q, closure, 3.0), "one lane is the whole cycle");
             let gentle = agrees::<Eight>(3, intervals, q, closure, 3.0);
             assert_eq!(gentle, q > 0, "{intervals} intervals");
-            // Diagonals that rarely serve as pivots; errors grow from interval to interval.
+            // Diagonals are rarely accepted as pivots, and errors grow from interval to interval.
             chains += usize::from(!agrees::<Eight>(3, intervals, q, closure, 0.1));
         }
         assert!(chains > 1, "the longer ones among those are eliminated as chains");
-        // The dimensions that are constants.
+        // Sizes that are constants.
         assert!(agrees::<Eight>(4, 60, 2, 1.0, 3.0));
     }
 
     #[test]
-    fn large_blocks_agree_with_a_dense_solution_whether_much_of_them_vanishes_or_not() {
+    fn large_blocks_agree_with_a_dense_solution_whether_sparse_or_full() {
         for (intervals, q) in [(1, 1), (3, 2), (4, 3)] {
             for strength in [3.0, 0.1] {
                 let plain = empty::<f64>(24, intervals, q).shape.is_plain();

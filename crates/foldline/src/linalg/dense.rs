@@ -1,27 +1,28 @@
 //! Products of large dense matrices.
 //!
-//! The kernels of this module serve small blocks. From [`MANY`] components on a general library multiplies faster than they do.
+//! The kernels of this module serve small blocks. From [`MANY`] components on, a general library multiplies faster.
 
 use super::lane::{Eight, Lane};
 use foldline_general::{Mat, MatMut, MatRef};
 
-/// Components of a model from which on this is used. Measured on chains of oscillators: with 20 components kernels for small blocks are faster by a
-/// quarter, with 40 slower by a tenth.
+/// Number of components of a model from which on these products are used. Measured on chains of oscillators: with 20
+/// components kernels for small blocks are faster by a quarter, with 40 slower by a tenth.
 pub const MANY: usize = 32;
 
-/// Random vectors that stand for all.
+/// Number of random vectors.
 pub const VECTORS: usize = Eight::COUNT;
 
-/// C = A B for row-major matrices with strides of their own, `[rows × columns]`, `[rows × depth]` and `[depth × columns]`.
+/// C = A B for row-major matrices with individual strides, `[rows × columns]`, `[rows × depth]` and `[depth ×
+/// columns]`.
 pub fn multiply(c: (&mut [f64], usize), a: (&[f64], usize), b: (&[f64], usize), [rows, depth, columns]: [usize; 3]) {
-    // Row-major is the transpose in columns: Cᵀ = Bᵀ Aᵀ.
+    // Row-major storage is the column-major storage of the transpose: Cᵀ = Bᵀ Aᵀ.
     let to = MatMut::from_column_major_slice_with_stride_mut(c.0, columns, rows, c.1);
     let a = MatRef::from_column_major_slice_with_stride(a.0, depth, rows, a.1);
     let b = MatRef::from_column_major_slice_with_stride(b.0, columns, depth, b.1);
     foldline_general::multiply(to, b, a);
 }
 
-/// Random signs, always the same, by xorshift. Their covariance is the identity.
+/// Reproducible random signs, by xorshift. Their covariance is the identity.
 pub fn signs() -> impl FnMut() -> f64 {
     let mut state = 0x9e37_79b9_7f4a_7c15u64;
     move || {
@@ -32,7 +33,7 @@ pub fn signs() -> impl FnMut() -> f64 {
     }
 }
 
-/// [`VECTORS`] columns of random signs.
+/// Matrix with [`VECTORS`] columns of random signs.
 pub fn random(rows: usize) -> Mat<f64> {
     let mut sign = signs();
     Mat::from_fn(rows, VECTORS, |_, _| sign())
@@ -43,7 +44,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn products_of_blocks_within_wider_rows_are_the_plain_ones() {
+    fn products_of_strided_blocks_agree_with_plain_loops() {
         let [rows, depth, columns] = [5, 7, 9];
         let number = |k: usize| ((k * k) as f64 * 0.37).sin();
         let (a, b): (Vec<f64>, Vec<f64>) = ((0..5 * 8).map(number).collect(), (0..7 * 12).map(number).collect());

@@ -1,41 +1,41 @@
-//! Numbers and lanes of numbers under one name, so that one kernel serves both.
+//! A common interface to numbers and vectors of eight numbers, so that one kernel serves both.
 //!
-//! **Idea.** Many small systems of one shape are solved together, one in each lane: every operation of the algorithm becomes
-//! a vector instruction, however small the systems are. Systems that are large enough by themselves run one at a time
-//! through the same code. No fused multiply-add is used: a lane gives the same result on every machine.
+//! **Idea.** Many small systems of one shape are solved together, one in each lane: every operation of the algorithm
+//! becomes a vector instruction, however small the systems are. Systems that are large enough run one at a time through
+//! the same code. No fused multiply-add is used, so that a lane gives the same result on every machine.
 
 use std::ops::{Add, Mul, Sub};
 
 /// One number, or eight of them side by side.
 pub trait Lane: Copy + Default + Send + Sync + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
-    /// How many numbers.
+    /// Number of lanes.
     const COUNT: usize;
 
-    /// The same number in every lane.
+    /// One number in all lanes.
     fn splat(x: f64) -> Self;
 
     /// The first `COUNT` numbers of a slice.
     fn load(from: &[f64]) -> Self;
 
-    /// One number for every lane.
+    /// A number for every lane, from a function of the lane.
     fn each(f: impl FnMut(usize) -> f64) -> Self;
 
     /// The lanes as a slice.
     fn lanes(&self) -> &[f64];
 
-    /// The lanes as a slice.
+    /// The lanes as a mutable slice.
     fn lanes_mut(&mut self) -> &mut [f64];
 
-    /// A function applied lane by lane.
+    /// Applies a function lane by lane.
     fn map(self, f: impl Fn(f64) -> f64) -> Self;
 
-    /// A function of two numbers applied lane by lane.
+    /// Applies a function of two numbers lane by lane.
     fn zip(self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self;
 
-    /// Whether something holds for the numbers of every lane.
+    /// True if a condition holds in every lane.
     fn all(self, other: Self, holds: impl Fn(f64, f64) -> bool) -> bool;
 
-    /// C = A B for large matrices; arguments as those of [`super::dense::multiply`].
+    /// C = A B for large matrices; arguments as for [`super::dense::multiply`].
     fn multiply(c: (&mut [Self], usize), a: (&[Self], usize), b: (&[Self], usize), [rows, depth, columns]: [usize; 3]) {
         for i in 0..rows {
             let row = &mut c.0[i * c.1..][..columns];
@@ -119,7 +119,7 @@ impl Lane for Eight {
 
     #[inline(always)]
     fn each(mut f: impl FnMut(usize) -> f64) -> Eight {
-        // Written out: `from_fn` can become a function of its own, compiled without the vector instructions.
+        // Written out, because `from_fn` can become a separate function, compiled without the vector instructions.
         Eight([f(0), f(1), f(2), f(3), f(4), f(5), f(6), f(7)])
     }
 
@@ -142,7 +142,7 @@ impl Lane for Eight {
     #[inline(always)]
     fn zip(self, other: Eight, f: impl Fn(f64, f64) -> f64) -> Eight {
         let (x, y) = (self.0, other.0);
-        // Written out: a loop would be unrolled again at every use, which multiplies the time to compile.
+        // Written out, because a loop would be unrolled again at every use, which multiplies the compile time.
         Eight([
             f(x[0], y[0]),
             f(x[1], y[1]),
@@ -158,7 +158,7 @@ impl Lane for Eight {
     #[inline(always)]
     fn all(self, other: Eight, holds: impl Fn(f64, f64) -> bool) -> bool {
         let (x, y) = (self.0, other.0);
-        // Written out, without `&&`: one comparison of vectors and one test of the mask that it leaves.
+        // Written out, without `&&`: one vector comparison and one test of the resulting mask.
         holds(x[0], y[0])
             & holds(x[1], y[1])
             & holds(x[2], y[2])
@@ -197,8 +197,9 @@ impl Mul for Eight {
     }
 }
 
-/// To be called within a loop over eights. The compiler would else make vectors of single numbers out of several of them, gathered from
-/// memory and scattered into it, which takes several times as long. It makes no instruction by itself.
+/// Keeps the compiler from mixing lanes; to be called within loops over [`Eight`]. Otherwise it would form vectors
+/// across several of them, with gathers and scatters, which takes several times as long. Generates no instruction
+/// itself.
 #[inline(always)]
 pub fn intact<T: Lane>() {
     if T::COUNT > 1 {
@@ -224,7 +225,7 @@ pub fn add<T: Lane>(s: T, x: &[T], y: &mut [T]) {
     }
 }
 
-/// a · b in every lane: four sums, added at the end, so that few products wait for each other.
+/// a · b in every lane: four partial sums, added at the end, which shortens the chain of dependent additions.
 #[inline(always)]
 pub fn dot<T: Lane>(a: &[T], b: &[T]) -> T {
     let ((a4, a), (b4, b)) = (a.as_chunks::<4>(), b.as_chunks::<4>());
@@ -234,7 +235,7 @@ pub fn dot<T: Lane>(a: &[T], b: &[T]) -> T {
             sums[k] = sums[k] + a[k] * b[k];
         }
     }
-    // No loop: of single numbers it would become one with a mask.
+    // Without a loop, which would become a masked one for single numbers.
     if let ([a0, ..], [b0, ..]) = (a, b) {
         sums[0] = sums[0] + *a0 * *b0;
     }

@@ -1,10 +1,11 @@
 //! LU factorisation of a small dense matrix.
 //!
-//! **Idea.** Gaussian elimination with row pivoting in place. Which entry of a column is the largest depends on the units of the rows, which
-//! depend on those of the columns: what is compared are the entries of R A C, with R and C diagonal so that the largest entry of every row
-//! and of every column is of size 1. The matrix itself stays as it is, so that nothing is rounded.
+//! **Idea.** Gaussian elimination with row pivoting in place. Which entry of a column is the largest depends on the
+//! units of the rows, which depend on those of the columns. Therefore the entries of R A C are compared, with R and C
+//! diagonal such that the largest entry of every row and of every column has size 1. The matrix itself is not scaled,
+//! so nothing is rounded.
 //!
-//! **Equations.** From R = C = 1, with A' = R A C, repeatedly
+//! **Equations.** Starting from R = C = 1, with A' = R A C, repeatedly
 //!
 //! ```text
 //!   (1)  R_i ← R_i / √(max_j |A'_ij|),   C_j ← C_j / √(max_i |A'_ij|)
@@ -14,7 +15,7 @@
 
 use crate::contract::Singular;
 
-/// Factorises the row-major n×n matrix `a` in place; `pivots` is `[n]`. Rows and columns may be of any units.
+/// Factorises the row-major n×n matrix `a` in place; `pivots` is `[n]`. Rows and columns may have any units.
 ///
 /// # Errors
 /// [`Singular`] if a pivot is zero, not finite, or below 1e-300.
@@ -23,17 +24,17 @@ pub fn factorise(a: &mut [f64], n: usize, pivots: &mut [usize]) -> Result<(), Si
     pivoted(a, n, pivots, &mut rows)
 }
 
-/// The same where all rows and columns are of one unit.
+/// Factorises a matrix like [`factorise`], if all rows and all columns have one unit.
 ///
 /// # Errors
-/// As there.
+/// [`Singular`] if a pivot is zero, not finite, or below 1e-300.
 pub fn factorise_even(a: &mut [f64], n: usize, pivots: &mut [usize]) -> Result<(), Singular> {
     pivoted(a, n, pivots, &mut vec![1.0; n])
 }
 
-/// R of (1) `[n]`.
+/// R of (1), `[n]`.
 fn row_weights(a: &[f64], n: usize) -> Vec<f64> {
-    /// Each halves the logarithms of what is left.
+    /// Each round halves the remaining logarithms.
     const ROUNDS: usize = 6;
     let (mut rows, mut columns) = (vec![1.0; n], vec![1.0; n]);
     for _ in 0..ROUNDS {
@@ -55,7 +56,7 @@ fn row_weights(a: &[f64], n: usize) -> Vec<f64> {
     rows
 }
 
-/// Elimination with a weight `[n]` for every row that may become the pivot.
+/// Elimination with a weight `[n]` for every row in the choice of the pivot.
 fn pivoted(a: &mut [f64], n: usize, pivots: &mut [usize], weights: &mut [f64]) -> Result<(), Singular> {
     for k in 0..n {
         let mut p = k;
@@ -93,9 +94,9 @@ fn pivoted(a: &mut [f64], n: usize, pivots: &mut [usize], weights: &mut [f64]) -
     Ok(())
 }
 
-/// Solves for `columns` right-hand sides at once; `b` is row-major `[n × columns]`, overwritten by the solution.
+/// Solves for `columns` right-hand sides; `b`, row-major `[n × columns]`, is overwritten by the solution.
 pub fn solve(a: &[f64], n: usize, pivots: &[usize], b: &mut [f64], columns: usize) {
-    // Whole groups of columns are kept in registers; most calls have one column, or a few.
+    // Whole groups of columns stay in registers; most calls have one column, or a few.
     match columns {
         0 => {}
         1 => solve_group::<1>(a, n, pivots, b),
@@ -152,7 +153,7 @@ fn solve_group<const C: usize>(a: &[f64], n: usize, pivots: &[usize], b: &mut [f
     }
 }
 
-/// Solves aᵀ x = b for one right-hand side `[n]` in place.
+/// Solves aᵀ x = b for a single right-hand side `[n]` in place.
 pub fn solve_transposed(a: &[f64], n: usize, pivots: &[usize], b: &mut [f64]) {
     for k in 0..n {
         b[k] /= a[k * n + k];
@@ -212,7 +213,7 @@ mod tests {
         for i in 0..n {
             assert!((x[i] - transposed[(i, 1)]).abs() < 1e-11);
         }
-        // The same two columns among eleven.
+        // Two of eleven columns must have the same solution.
         let mut wide: Vec<f64> =
             (0..n * 11).map(|k| if k % 11 < 2 { ((k / 11 * 2 + k % 11) as f64).cos() } else { k as f64 }).collect();
         solve(&a, n, &pivots, &mut wide, 11);

@@ -1,7 +1,7 @@
-//! Small dense kernels, and the block solver of collocation.
+//! Small dense kernels, and the block solver for collocation.
 //!
-//! Matrices are row-major slices. The kernels serve blocks of up to about forty rows, where calling a general library
-//! costs more than the arithmetic.
+//! Matrices are row-major slices. The kernels serve blocks of up to about forty rows, for which calling a general
+//! library costs more than the arithmetic.
 
 pub mod block;
 pub mod chain;
@@ -17,15 +17,15 @@ pub mod shape;
 pub mod system;
 pub(crate) mod tile;
 
-/// The larger one; NaN if either is NaN.
+/// Larger of two numbers; NaN if either is NaN.
 pub fn larger(a: f64, b: f64) -> f64 {
-    // A selection, so that it is one in vectors too. Loops keep the larger one in a variable: one that stays in memory becomes a store
-    // under a mask nevertheless, which some processors take very long for.
+    // A selection also compiles to one in vector code. Loops must keep the maximum in a variable: if it stays in
+    // memory, it becomes a masked store, which is very slow on some processors.
     std::hint::select_unpredictable((b > a) | b.is_nan(), b, a)
 }
 
-/// A size of the n×n matrix `a` that does not depend on the units of the components that it maps: the largest of |a_ii| and √|a_ij a_ji|,
-/// or of all entries where these are zero.
+/// Size of the n×n matrix `a` that does not depend on the units of the components that it maps: the largest of |a_ii|
+/// and √|a_ij a_ji|, or of all entries if these are zero.
 pub fn size_in_any_units(a: &[f64], n: usize) -> f64 {
     let size = (0..n * n).map(|k| (a[k] * a[k % n * n + k / n]).abs().sqrt()).fold(0.0, larger);
     if size > 0.0 { size } else { max_abs(a) }
@@ -41,16 +41,17 @@ pub fn max_abs(v: &[f64]) -> f64 {
     most.into_iter().chain(rest.iter().map(|x| x.abs())).fold(0.0, larger)
 }
 
-/// Whether all are numbers, and none is infinite.
+/// True if all entries are finite.
 pub fn all_finite(v: &[f64]) -> bool {
-    // Zero times anything else is not zero.
+    // Zero times a non-finite number is not zero.
     let (blocks, rest) = v.as_chunks::<8>();
     let mut sums = [0.0; 8];
     blocks.iter().for_each(|block| (0..8).for_each(|l| sums[l] += 0.0 * block[l]));
     sums.into_iter().chain(rest.iter().map(|x| 0.0 * x)).all(|zero| zero == 0.0)
 }
 
-/// Whether all numbers are the same; an early end only every eight of them, whose comparison is one of vectors.
+/// True if all entries are equal. The loop exits early only after blocks of eight, each of which is a single vector
+/// comparison.
 pub fn same(a: &[f64], b: &[f64]) -> bool {
     let ((a8, a), (b8, b)) = (a.as_chunks::<8>(), b.as_chunks::<8>());
     let equal = |(x, y): (&[f64; 8], &[f64; 8])| (0..8).fold(true, |all, l| all & (x[l] == y[l]));
@@ -74,7 +75,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn one_number_that_is_none_is_seen_wherever_it_stands() {
+    fn a_non_finite_entry_is_detected_at_any_position() {
         for length in [1, 7, 8, 9, 24] {
             let mut v: Vec<f64> = (0..length).map(|k| 1e308 * (k as f64).sin()).collect();
             assert!(all_finite(&v));

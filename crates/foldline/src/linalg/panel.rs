@@ -1,9 +1,9 @@
-//! A small matrix times long rows.
+//! Product of a small matrix and long rows.
 //!
-//! **Idea.** A quantity at the nodes of every interval, laid out with the intervals as lanes, becomes one at other points of
-//! every interval by the same small matrix. Eight lanes at a time are one or two vector registers.
+//! **Idea.** Values at the nodes of every interval, stored with the intervals as lanes, are converted to values at
+//! other points of every interval by the same small matrix. Eight lanes fill one or two vector registers.
 
-/// Lanes taken together.
+/// Number of lanes processed together.
 const WIDTH: usize = 8;
 
 /// `out` `[rows × lanes]` = `matrix` `[rows × columns]` · `panel` `[columns × lanes]`, all row-major.
@@ -25,7 +25,7 @@ impl pulp::NullaryFnOnce for Multiply<'_, '_> {
 
     #[inline(always)]
     fn call(self) {
-        // The usual degree's as a constant.
+        // The usual degree as a constant.
         match self.panel.len() / self.lanes {
             5 => self.multiplied_by::<5>(),
             _ => self.multiplied(),
@@ -34,7 +34,7 @@ impl pulp::NullaryFnOnce for Multiply<'_, '_> {
 }
 
 impl Multiply<'_, '_> {
-    /// With so many columns: eight lanes of all of them are in registers for every row.
+    /// Product for C columns: eight lanes of all of them stay in registers for every row.
     #[inline(always)]
     fn multiplied_by<const C: usize>(self) {
         let Multiply { matrix, panel, lanes, out } = self;
@@ -42,7 +42,7 @@ impl Multiply<'_, '_> {
             return Multiply { matrix, panel, lanes, out }.multiplied();
         }
         for first in (0..lanes).step_by(WIDTH) {
-            // The last eight may have some again that are done already.
+            // The last eight may include lanes that were already processed.
             let first = first.min(lanes - WIDTH);
             let mut columns = [[0.0; WIDTH]; C];
             for k in 0..C {
@@ -81,7 +81,7 @@ impl Multiply<'_, '_> {
             if rest.is_empty() {
                 continue;
             }
-            // What is left belongs to the last eight, some of which are known already.
+            // The rest is part of the last eight lanes, some of which are already known.
             if let Some(first) = lanes.checked_sub(WIDTH) {
                 let own = eight(first);
                 rest.copy_from_slice(&own[WIDTH - rest.len()..]);
@@ -94,11 +94,11 @@ impl Multiply<'_, '_> {
     }
 }
 
-/// A profile `[interval][node][component]` with the intervals as lanes: `[component][node][interval]`.
+/// Rearranges a profile `[interval][node][component]` to `[component][node][interval]`, with the intervals as lanes.
 pub fn by_component(profile: &[f64], nodes: usize, n: usize, out: &mut [f64]) {
     let block = (nodes * n).max(1);
     let count = profile.len() / block;
-    // Eight intervals at a time, so that what is written stands together.
+    // Eight intervals at a time, so that stores are contiguous.
     let (eights, rest) = profile.split_at(profile.len() - profile.len() % (WIDTH * block));
     for (first, eight) in (0..).step_by(WIDTH).zip(eights.chunks_exact(WIDTH * block)) {
         let own: [&[f64]; WIDTH] = std::array::from_fn(|l| &eight[l * block..(l + 1) * block]);
@@ -121,7 +121,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_product_is_that_of_the_definition_whatever_the_number_of_lanes() {
+    fn the_product_agrees_with_its_definition_for_any_number_of_lanes() {
         let (rows, columns) = (3, 5);
         let matrix: Vec<f64> = (0..rows * columns).map(|k| (k as f64 * 0.7).sin()).collect();
         for lanes in [1, 7, 8, 9, 30] {
@@ -131,7 +131,7 @@ mod tests {
             for (at, value) in out.iter().enumerate() {
                 let (r, l) = (at / lanes, at % lanes);
                 let expected: f64 = (0..columns).map(|k| matrix[r * columns + k] * panel[k * lanes + l]).sum();
-                // The same sum in the same order.
+                // Bitwise: the sums have the same order.
                 assert_eq!(*value, expected, "{lanes} lanes, entry {at}");
             }
         }

@@ -1,9 +1,9 @@
 //! Eigenvalues of a product of matrices without forming the product.
 //!
 //! **Idea.** The complex periodic QR algorithm works on the factors: one is kept upper Hessenberg, the others upper
-//! triangular, and every rotation is passed round the cycle of factors. Each eigenvalue comes out as a product of diagonal
-//! entries, so it has a small *relative* error even when others are larger or smaller by many orders of magnitude. With
-//! one factor this is the ordinary QR algorithm, which serves the eigenvalues of equilibria.
+//! triangular, and every rotation is passed round the cycle of factors. Each eigenvalue results as a product of
+//! diagonal entries, so it has a small *relative* error even if others are larger or smaller by many orders of
+//! magnitude. With one factor this is the ordinary QR algorithm, which is used for the eigenvalues of equilibria.
 //!
 //! **Equations.**
 //!
@@ -23,7 +23,7 @@ use num_complex::Complex64;
 
 type C = Complex64;
 
-/// An eigenvalue as logarithm of its modulus and argument, so that neither overflow nor underflow can hide it.
+/// An eigenvalue as logarithm of its modulus and argument, which cannot overflow or underflow.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Eigenvalue {
     /// log |μ|; -∞ for zero.
@@ -33,7 +33,7 @@ pub struct Eigenvalue {
 }
 
 impl Eigenvalue {
-    /// The number itself (infinite or zero where it leaves the range of f64).
+    /// The eigenvalue as a complex number (infinite or zero outside the range of f64).
     pub fn value(self) -> C {
         if self.argument == 0.0 {
             C::new(self.log_modulus.exp(), 0.0)
@@ -45,7 +45,7 @@ impl Eigenvalue {
     }
 }
 
-/// Eigenvalues of F_K ⋯ F_1; `factors` holds the real p×p matrices F_1, F_2, … row-major one after the other.
+/// Eigenvalues of F_K ⋯ F_1; `factors` holds the real p×p matrices F_1, F_2, …, row-major, one after the other.
 ///
 /// Returns `None` if an entry is not finite or the iteration does not converge (40 sweeps per eigenvalue).
 pub fn eigenvalues(factors: &[f64], p: usize) -> Option<Vec<Eigenvalue>> {
@@ -62,18 +62,18 @@ pub fn eigenvalues(factors: &[f64], p: usize) -> Option<Vec<Eigenvalue>> {
     Some(conjugate_pairs(found))
 }
 
-/// Condition up to which neighbouring factors are multiplied together: it costs at most four digits of the smallest eigenvalue and
-/// none of the largest.
+/// Condition up to which neighbouring factors are multiplied: it costs at most four digits of the smallest eigenvalue
+/// and none of the largest.
 pub(crate) const CONDITION: f64 = 1e4;
 
-/// Multiplies neighbouring factors together while their product stays well conditioned.
+/// Multiplies neighbouring factors while their product stays well conditioned.
 ///
-/// With |F| the root of the mean square of the singular values σ of a p×p matrix, and κ the quotient of the largest and the smallest of
-/// them, what is bounded by [`CONDITION`] is (guggenheimer1995)
+/// With |F| the root mean square of the singular values σ of a p×p matrix, and κ the ratio of the largest to the
+/// smallest, the quantity bounded by [`CONDITION`] is (guggenheimer1995)
 ///
 ///   (4)  c(F) = |F|ᵖ / |det F|,   κ(F) ≤ 2 c(F),   c(F) ≤ κ(F)ᵖ⁻¹,   c(A B) ≤ κ(A)ᵖ⁻¹ c(B)
 ///
-/// so that most products need not be looked at.
+/// so that most products need not be examined.
 pub fn group(factors: &[f64], p: usize) -> Vec<f64> {
     // Small dimensions as constants.
     match p {
@@ -117,7 +117,7 @@ fn grouped(factors: &[f64], p: usize) -> Vec<f64> {
     out
 }
 
-/// c(F) of (4); the matrix is overwritten.
+/// c(F) of (4); overwrites the matrix.
 pub(crate) fn condition(matrix: &mut [f64], p: usize) -> f64 {
     let mean = (matrix.iter().map(|x| x * x).sum::<f64>() / p as f64).sqrt();
     let mut pivots = vec![0; p];
@@ -127,8 +127,8 @@ pub(crate) fn condition(matrix: &mut [f64], p: usize) -> f64 {
     }
 }
 
-/// A bound of κ in (4) to the power p - 1, 1 at least, from `delta2`, the square of δ: where |FᵀF - 1| ≤ δ in the Frobenius norm, σ² lies
-/// within 1 ± δ. Infinite where that says nothing.
+/// Bound of κᵖ⁻¹ of (4), at least 1, from `delta2`, the square of δ: if |FᵀF - 1| ≤ δ in the Frobenius norm, σ² is
+/// within 1 ± δ. Infinite if that gives no bound.
 #[inline(always)]
 pub(crate) fn spread(delta2: f64, p: usize) -> f64 {
     let delta = delta2.sqrt();
@@ -140,7 +140,7 @@ pub(crate) fn spread(delta2: f64, p: usize) -> f64 {
     if delta2 < 1.0 { power } else { f64::INFINITY }
 }
 
-/// The bound of κ to the power p - 1 of a factor.
+/// Bound of κᵖ⁻¹ of a factor.
 #[inline(always)]
 fn spread_of(factor: &[f64], p: usize) -> f64 {
     let factor = &factor[..p * p];
@@ -165,7 +165,7 @@ pub fn log_determinant(grouped: &[f64], p: usize) -> f64 {
     grouped.chunks_exact((p * p).max(1)).map(of).sum()
 }
 
-/// c = a b.
+/// Writes the product a b to c.
 #[inline(always)]
 fn multiply(a: &[f64], b: &[f64], p: usize, c: &mut [f64]) {
     let (a, b, c) = (&a[..p * p], &b[..p * p], &mut c[..p * p]);
@@ -191,7 +191,7 @@ struct Rotation {
 }
 
 impl Rotation {
-    /// The rotation that turns (x, y) into (r, 0).
+    /// Rotation of (x, y) to (r, 0).
     fn new(x: C, y: C) -> Rotation {
         let norm = x.norm().hypot(y.norm());
         if norm == 0.0 || y.norm() == 0.0 {
@@ -223,7 +223,7 @@ impl Rotation {
 }
 
 impl Cycle {
-    /// (1): factors to H R_{K-1} ⋯ R_1 with H full.
+    /// Reduces the factors to H R_{K-1} ⋯ R_1 as in (1), with H full.
     fn new(factors: &[f64], p: usize) -> Cycle {
         let count = factors.len() / (p * p);
         let mut triangular = Vec::with_capacity(count.saturating_sub(1));
@@ -244,7 +244,7 @@ impl Cycle {
         Cycle { p, hessenberg: next, triangular }
     }
 
-    /// Applies G from the left to the rows of H and carries G* round the cycle until it meets the columns of H.
+    /// Applies G from the left to the rows of H and passes G* round the cycle until it reaches the columns of H.
     fn rotate(&mut self, i: usize, g: Rotation, from: usize, rows_of_h: usize) {
         let p = self.p;
         g.rows(&mut self.hessenberg, p, i, from);
@@ -299,7 +299,7 @@ impl Cycle {
     fn sweep(&mut self, low: usize, high: usize, sweeps: usize) {
         let p = self.p;
         let h = &self.hessenberg;
-        // The first column of P - σ on the active block, divided by ∏ (R_k)_{low,low}.
+        // First column of P - σ on the active block, divided by ∏ (R_k)_{low,low}.
         let mut shift = self.relative_shift(low, high);
         if sweeps % 11 == 10 {
             shift = h[low * p + low] * C::new(0.7, 0.4) + h[(low + 1) * p + low];
@@ -317,8 +317,9 @@ impl Cycle {
         }
     }
 
-    /// The Wilkinson shift divided by the product of the leading diagonal entries; 0 if the quotient is so large that the matrix would
-    /// vanish beside it in rounding. In that case the large eigenvalues are at the wrong end, and an unshifted step moves them.
+    /// Wilkinson shift divided by the product of the leading diagonal entries; 0 if the quotient is so large that the
+    /// matrix would be lost in its rounding. In that case the large eigenvalues are at the wrong end, and an unshifted
+    /// step moves them.
     fn relative_shift(&self, low: usize, high: usize) -> C {
         let p = self.p;
         // Trailing 2×2 block of the product of the triangular factors, times e^log.
@@ -344,7 +345,7 @@ impl Cycle {
         let half = (p11 - p22) * 0.5;
         let root = (half * half + p12 * p21).sqrt();
         let (up, down) = (half + root, half - root);
-        // Of the two eigenvalues p22 + half ± root the one closer to p22, computed without cancellation.
+        // Of the two eigenvalues p22 + half ± root, the one closer to p22, computed without cancellation.
         let shift = if up.norm() > down.norm() {
             p22 - p12 * p21 / up
         } else if down.norm() > 0.0 {
@@ -368,14 +369,14 @@ impl Cycle {
     }
 }
 
-/// To (-π, π].
+/// Reduces an angle to (-π, π].
 fn wrap(angle: f64) -> f64 {
     let turns = (angle / std::f64::consts::TAU).round();
     angle - turns * std::f64::consts::TAU
 }
 
-/// The spectrum of a real product is closed under conjugation: each eigenvalue is averaged with the conjugate of its
-/// partner, or made real where it is its own partner. Sorted by decreasing modulus.
+/// Enforces the conjugate symmetry of the spectrum of a real product: each eigenvalue is averaged with the conjugate of
+/// its partner, or made real if it is its own partner. Sorts by decreasing modulus.
 fn conjugate_pairs(mut found: Vec<Eigenvalue>) -> Vec<Eigenvalue> {
     let distance =
         |a: Eigenvalue, b: Eigenvalue| (a.log_modulus - b.log_modulus).abs() + wrap(a.argument + b.argument).abs();
@@ -409,7 +410,8 @@ mod tests {
 
     #[test]
     fn eigenvalues_hundreds_of_orders_of_magnitude_apart_are_found_in_any_order() {
-        // F = Q diag(a, b) Qᵀ, the same Q in all: eigenvalues a^N and b^N. The large one at either end.
+        // F = Q diag(a, b) Qᵀ with the same Q in all factors: eigenvalues a^N and b^N, with the large one at either
+        // end.
         for (a, b) in [(1e-5, 0.9), (0.9, 1e-5), (1e-5, 1e-4), (2.0, 1e-9)] {
             let (c, s) = (0.6f64, 0.8f64);
             let factor = [c * c * a + s * s * b, c * s * (a - b), c * s * (a - b), s * s * a + c * c * b];
@@ -417,7 +419,7 @@ mod tests {
             let found = eigenvalues(&factor.repeat(count), 2).expect("converges");
             let logs = [a.max(b).ln(), a.min(b).ln()].map(|log: f64| count as f64 * log);
             for (one, expected) in found.iter().zip(logs) {
-                // Each factor has its smaller eigenvalue to the rounding of the larger one, and the logarithm its own rounding.
+                // The smaller eigenvalue of each factor has the rounding of the larger one, and the logarithm its own.
                 let factors = 4.0 * count as f64 * f64::EPSILON * (a.max(b) / a.min(b));
                 let error = factors + 4.0 * f64::EPSILON * expected.abs();
                 assert!((one.log_modulus - expected).abs() < error, "{a} {b}: {one:?} {expected}");
@@ -426,8 +428,8 @@ mod tests {
     }
 
     #[test]
-    fn a_product_of_which_the_small_eigenvalue_comes_first_converges() {
-        // Upper triangular factors with the small entry first, and a last one that mixes.
+    fn a_product_with_the_small_eigenvalue_first_converges() {
+        // Upper triangular factors with the small entry first, and a last one that mixes the components.
         let mut factors = [1e-5, 0.3, 0.0, 0.7].repeat(61);
         factors.extend([0.09828358, 0.05788514, -1.11157923, -0.53535464]);
         let found = eigenvalues(&factors, 2).expect("converges");
@@ -483,7 +485,8 @@ mod tests {
         }
     }
 
-    /// V_{k+1} diag(d) V_k⁻¹ with periodic V: the product has the eigenvalues dᴷ exactly, over hundreds of orders of magnitude.
+    /// Factors V_{k+1} diag(d) V_k⁻¹ with periodic V: the product has exactly the eigenvalues dᴷ, over hundreds of
+    /// orders of magnitude.
     #[test]
     fn eigenvalues_of_very_different_size_keep_their_digits() {
         let (p, count) = (3usize, 60usize);

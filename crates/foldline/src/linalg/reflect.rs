@@ -4,11 +4,12 @@ use super::lane::{Lane, dot, intact, subtract};
 use super::tile::{piece, piece_mut};
 
 /// Triangularises the first `columns` columns of the row-major `rows × width` matrix `a` in place by Householder
-/// reflections applied to every column; entries below the diagonal of those columns become zero. The reflectors are stored
-/// in `v` (`[columns × rows]`, one unit-scaled vector per column, H = 1 - v vᵀ).
+/// reflections applied to every column; entries below the diagonal of those columns become zero. The reflectors are
+/// stored in `v` (`[columns × rows]`, one unit-scaled vector per column, H = 1 - v vᵀ).
 #[inline(always)]
 pub fn triangularise<T: Lane>(a: &mut [T], rows: usize, width: usize, columns: usize, v: &mut [T]) {
-    // Columns in groups whose sums stay in registers; a group stays in the cache until all reflections are applied to it.
+    // Groups of columns whose sums stay in registers; a group stays in the cache until all reflections are applied to
+    // it.
     let mut c = 0;
     while c < width {
         c += match width - c {
@@ -21,12 +22,12 @@ pub fn triangularise<T: Lane>(a: &mut [T], rows: usize, width: usize, columns: u
     }
 }
 
-/// Applies to C columns from `c` on the reflections of the columns before them, then makes those reflections that are theirs;
+/// Applies the reflections of the preceding columns to C columns from `c` on, then computes and applies their own;
 /// returns C.
 #[inline(always)]
 fn group<T: Lane, const C: usize>(a: &mut [T], [rows, width, columns]: [usize; 3], c: usize, v: &mut [T]) -> usize {
     let columns = columns.min(rows);
-    // Two at a time where that many sums fit into registers.
+    // Two at a time if the sums fit into registers.
     let pairs = if T::COUNT == 1 { c.min(columns) / 2 } else { 0 };
     for (k, two) in v.chunks_exact(2 * rows).take(pairs).enumerate() {
         let (first, second) = two.split_at(rows);
@@ -47,7 +48,7 @@ fn group<T: Lane, const C: usize>(a: &mut [T], [rows, width, columns]: [usize; 3
     C
 }
 
-/// The reflection that leaves of column k only its first entry.
+/// Computes the reflection that annihilates column k below its first entry.
 #[inline(always)]
 fn reflection<T: Lane>(v: &mut [T], block: &[T], width: usize, k: usize) {
     let mut norm2 = T::default();
@@ -56,7 +57,7 @@ fn reflection<T: Lane>(v: &mut [T], block: &[T], width: usize, k: usize) {
         *v = x;
         norm2 = norm2 + x * x;
     }
-    // A column that vanishes, or is not finite, is left alone.
+    // A zero or non-finite column is left alone.
     let alpha = norm2.zip(v[0], |s, x| if x > 0.0 { -s.sqrt() } else { s.sqrt() });
     let beta = norm2 - alpha * v[0];
     v[0] = v[0] - alpha;
@@ -79,7 +80,7 @@ fn apply_group<T: Lane, const C: usize>(v: &[T], a: &mut [T], width: usize, c: u
     }
     for (i, v) in v.iter().enumerate() {
         let row: &mut [T; C] = piece_mut(a, i * width + c);
-        // All of it before anything is written, so that one number of many becomes a vector.
+        // Completely computed before the store, so that several scalars become a vector.
         let mut left = [T::default(); C];
         for k in 0..C {
             left[k] = row[k] - *v * sums[k];
@@ -121,7 +122,7 @@ pub fn apply<T: Lane>(v: &[T], columns: usize, b: &mut [T]) {
     }
 }
 
-/// Applies the stored reflections in the opposite order: the inverse, and the transpose, of [`apply`].
+/// Applies the stored reflections in reverse order: the inverse, and the transpose, of [`apply`].
 #[inline(always)]
 pub fn apply_reversed<T: Lane>(v: &[T], columns: usize, b: &mut [T]) {
     for (k, reflector) in v.chunks_exact(b.len()).take(columns).enumerate().rev() {

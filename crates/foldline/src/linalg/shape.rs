@@ -1,9 +1,9 @@
-//! Which blocks of the interior matrix of an interval can differ from zero, and in which order its unknowns are eliminated.
+//! Sparsity of the interior matrix of an interval, and the order of elimination.
 //!
-//! **Idea.** Component c of f depends on few components: a velocity is the rate of one position only. What does not depend
-//! on it costs nothing if it is not looked at. The nodes of a component stay together as one block; the components are
-//! ordered so that the product of the rows and columns that an elimination touches is smallest, and elimination is carried
-//! out once on the pattern alone.
+//! **Idea.** Component c of f depends on few components: a velocity, for instance, is the rate of only one position.
+//! Zero blocks that are skipped cost nothing. The nodes of a component stay together as one block. The components are
+//! ordered so that each elimination touches as few entries (rows times columns) as possible, and the elimination is
+//! carried out once on the pattern alone.
 //!
 //! **Equations.** Entry (i, c), (k, d) of A is δ_ik δ_cd - a_ik J_cd(k): zero if J_cd is, except on the diagonal.
 //!
@@ -11,41 +11,42 @@
 
 use std::ops::Range;
 
-/// The order of elimination and what each of its steps touches. Components are counted in that order from here on.
+/// Order of elimination, and the blocks that each step touches. Components are numbered in that order from here on.
 #[derive(Clone, Debug, Default)]
 pub struct Shape {
-    /// `[n × n]`, in the order of the model: whether component c depends on component d.
+    /// `[n × n]`, in the order of the model: true if component c depends on component d.
     pattern: Vec<bool>,
-    /// Place of each component in the order.
+    /// Position of each component in the order of elimination.
     rank: Vec<usize>,
-    /// Rows and columns of a component.
+    /// Number of rows and columns of a component.
     pub nodes: usize,
-    /// The steps.
+    /// Elimination steps.
     pub steps: Vec<Step>,
-    /// Blocks, row and column, that are zero before elimination and not afterwards, and the diagonal where it is the identity.
+    /// Blocks (row and column) that are zero before elimination but not afterwards, and diagonal blocks that are the
+    /// identity.
     pub fresh: Vec<[usize; 2]>,
 }
 
-/// What the elimination of a component touches.
+/// Blocks that the elimination of a component touches.
 #[derive(Clone, Debug, Default)]
 pub struct Step {
-    /// Whether its own block is more than the identity.
+    /// True if its own block is not just the identity.
     pub own: bool,
-    /// Components after it whose equations contain it.
+    /// Later components whose equations contain it.
     pub below: Vec<usize>,
-    /// Components before it that its equations contain.
+    /// Earlier components that its equations contain.
     pub left: Vec<usize>,
-    /// Components after it that its equations contain.
+    /// Later components that its equations contain.
     pub right: Vec<usize>,
-    /// Columns of the right-hand sides before back substitution.
+    /// Nonzero columns of the right-hand sides before back substitution.
     pub carried: Vec<Range<usize>>,
-    /// The same afterwards.
+    /// Nonzero columns of the right-hand sides after back substitution.
     pub solved: Vec<Range<usize>>,
 }
 
 impl Shape {
-    /// The shape for m nodes and `columns` right-hand sides: those of the n left ends, which may differ from zero where `ends`
-    /// `[n × n]` says so, then dense ones.
+    /// Shape for `nodes` nodes and `columns` right-hand sides: those of the n left ends, nonzero where `ends` `[n × n]`
+    /// is true, then dense ones.
     pub fn new(pattern: &[bool], ends: &[bool], nodes: usize, columns: usize) -> Shape {
         let n = pattern.len().isqrt();
         let rank = ranks(pattern, n);
@@ -94,37 +95,37 @@ impl Shape {
         Shape { pattern: pattern.to_vec(), rank, nodes, steps, fresh }
     }
 
-    /// Components in their own order, and no steps: for matrices that fill the vectors by themselves.
+    /// Shape with the components in their own order and no steps, for matrices that fill the vectors by themselves.
     pub fn plain(pattern: &[bool], nodes: usize) -> Shape {
         Shape { pattern: pattern.to_vec(), rank: (0..pattern.len().isqrt()).collect(), nodes, ..Shape::default() }
     }
 
-    /// Whether there are no steps, so that every entry is looked at.
+    /// True if there are no steps, so that every entry is processed.
     #[inline(always)]
     pub fn is_plain(&self) -> bool {
         self.steps.is_empty()
     }
 
-    /// Products of entries that the steps take, as a share of those that they take where nothing is zero.
+    /// Number of products of entries in all steps, as a share of that for a full matrix.
     pub fn share(&self, columns: usize) -> f64 {
         let products = |below: usize, right: usize| (below * right * self.nodes + (below + right) * columns) as f64;
         let taken: f64 = self.steps.iter().map(|step| products(step.below.len(), step.right.len())).sum();
         taken / (0..self.steps.len()).map(|rest| products(rest, rest)).sum::<f64>()
     }
 
-    /// The pattern that it was made for.
+    /// The pattern given to [`Shape::new`] or [`Shape::plain`].
     pub fn pattern(&self) -> &[bool] {
         &self.pattern
     }
 
-    /// Row and column of node i of component c of the model.
+    /// Row and column of node i of component c, in the order of the model.
     #[inline(always)]
     pub fn slot(&self, i: usize, c: usize) -> usize {
         self.rank[c] * self.nodes + i
     }
 }
 
-/// Place of each component in the order of elimination.
+/// Position of each component in the order of elimination.
 fn ranks(pattern: &[bool], n: usize) -> Vec<usize> {
     let mut coupled = pattern.to_vec();
     let mut rank = vec![usize::MAX; n];
@@ -135,7 +136,7 @@ fn ranks(pattern: &[bool], n: usize) -> Vec<usize> {
             let others = || rest.iter().filter(|d| *d != c);
             let rows = others().filter(|d| coupled[*d * n + c]).count();
             let columns = others().filter(|d| coupled[c * n + *d]).count();
-            // One more for the right-hand sides.
+            // The additional column stands for the right-hand sides.
             (rows + own) * (columns + own + 1)
         };
         let Some(next) = rest.iter().copied().min_by_key(cost) else { break };
@@ -149,7 +150,7 @@ fn ranks(pattern: &[bool], n: usize) -> Vec<usize> {
     rank
 }
 
-/// The indices that are set, those that follow each other taken together.
+/// Indices that are set, with consecutive ones combined.
 fn ranges(set: &[bool]) -> Vec<Range<usize>> {
     let mut out: Vec<Range<usize>> = Vec::new();
     for k in (0..set.len()).filter(|k| set[*k]) {
@@ -174,12 +175,12 @@ mod tests {
     }
 
     #[test]
-    fn positions_go_before_the_velocities_that_drive_them() {
-        // Velocities first: both accelerations depend on everything, u' = w, v' = z.
+    fn positions_are_eliminated_before_their_velocities() {
+        // Velocities come first: both accelerations depend on everything, u' = w, v' = z.
         let pattern = [1, 1, 1, 1, 1, 1, 1, 1, 1, 0, 0, 0, 0, 1, 0, 0].map(|x| x == 1);
         let shape = Shape::new(&pattern, &unit(4), 2, 6);
         assert_eq!((0..4).map(|c| shape.slot(1, c)).collect::<Vec<_>>(), [5, 7, 1, 3]);
-        // A position is eliminated from the accelerations, with its velocity, its left end and the scalars.
+        // A position is eliminated from the accelerations, along with its velocity, its left end and the scalars.
         let position = &shape.steps[1];
         assert!(!position.own);
         assert_eq!((&position.below[..], &position.left[..], &position.right[..]), (&[2, 3][..], &[][..], &[3][..]));

@@ -1,11 +1,11 @@
-//! The block system in as many lanes as suit its size.
+//! The block system with the number of lanes that suits its size.
 
 use super::condensed::Condensed;
 use super::lane::Eight;
 use crate::contract::Singular;
 
-/// Interior unknowns per interval up to which intervals share a vector; larger blocks fill vectors by themselves, and eight
-/// of them would leave the cache.
+/// Interior unknowns per interval up to which intervals share a vector. Larger blocks fill vectors by themselves, and
+/// eight of them would not fit into the cache.
 const SMALL: usize = 64;
 
 /// A condensed system in eight lanes or one.
@@ -17,7 +17,7 @@ pub enum System {
     One(Condensed<f64>),
 }
 
-/// The same expression for both.
+/// Evaluates an expression for either variant.
 macro_rules! either {
     ($system:expr, $inner:ident => $body:expr) => {
         match $system {
@@ -51,7 +51,7 @@ impl System {
         }
     }
 
-    /// L, the places of each lane: interval j is in lane ⌊j / L⌋ at place j mod L.
+    /// L, the number of places per lane: interval j is in lane ⌊j / L⌋ at place j mod L.
     pub fn length(&self) -> usize {
         either!(self, s => s.length())
     }
@@ -71,7 +71,7 @@ impl System {
         either!(self, s => s.transition(j, to));
     }
 
-    /// Condensation and elimination; `closure` is κ.
+    /// Condenses and eliminates; `closure` is κ.
     ///
     /// # Errors
     /// [`Singular`] if an interior block or the remaining matrix is.

@@ -33,8 +33,8 @@ macro_rules! in_columns {
     }};
 }
 
-/// Y -= A B for row-major Y `[rows × stride]` (columns `from..to` of it), A `[rows × depth]` and B `[depth × stride]` (the same
-/// columns).
+/// Y -= A B for row-major Y `[rows × stride]` (its columns `from..to`), A `[rows × depth]` and B `[depth × stride]`
+/// (the same columns).
 #[inline(always)]
 pub fn subtract_product<T: Lane>(y: &mut [T], a: &[T], b: &[T], stride: usize, depth: usize, [from, to]: [usize; 2]) {
     const R: usize = 4;
@@ -79,8 +79,8 @@ fn tile<T: Lane, const R: usize, const C: usize>(y: &mut [T], a: &[T], b: &[T], 
     }
 }
 
-/// Y -= A B for blocks of row-major matrices with strides of their own: rows, depth and columns in `size`, first columns of the
-/// blocks of Y, A and B in `at`.
+/// Y -= A B for blocks of row-major matrices with individual strides: rows, depth and columns in `size`, first columns
+/// of the blocks of Y, A and B in `at`.
 #[inline(always)]
 #[expect(clippy::too_many_arguments, reason = "three matrices with a stride each")]
 pub fn subtract<T: Lane>(
@@ -119,19 +119,19 @@ pub fn subtract<T: Lane>(
     }
 }
 
-/// C of them from `at` on.
+/// Array of C elements from `at` on.
 #[inline(always)]
 pub fn piece<T, const C: usize>(x: &[T], at: usize) -> &[T; C] {
     &x[at..at + C].as_chunks().0[0]
 }
 
-/// C of them from `at` on.
+/// Mutable array of C elements from `at` on.
 #[inline(always)]
 pub fn piece_mut<T, const C: usize>(x: &mut [T], at: usize) -> &mut [T; C] {
     &mut x[at..at + C].as_chunks_mut().0[0]
 }
 
-/// C columns, row by row.
+/// Subtracts the product for C columns, row by row.
 #[inline(always)]
 fn in_rows<T: Lane, const M: usize, const C: usize>(
     y: &mut [T],
@@ -145,7 +145,7 @@ fn in_rows<T: Lane, const M: usize, const C: usize>(
     b_at: usize,
     rows: usize,
 ) {
-    // No `from_fn`: it can become a function of its own, compiled without the vector instructions.
+    // Without `from_fn`, which can become a separate function, compiled without the vector instructions.
     let mut lines: [&[T; C]; M] = [piece(b, b_at); M];
     for k in 1..M {
         lines[k] = piece(b, k * b_stride + b_at);
@@ -163,7 +163,7 @@ fn in_rows<T: Lane, const M: usize, const C: usize>(
     }
 }
 
-/// y -= A b for M rows of A, with M columns from `at` on.
+/// y -= A b for the rows of A, given m of its columns from `at` on.
 #[inline(always)]
 pub fn subtract_image<T: Lane>(y: &mut [T], a: &[T], stride: usize, at: usize, b: &[T], m: usize) {
     for (k, y) in y.iter_mut().enumerate() {
@@ -193,7 +193,7 @@ pub fn subtract_combination<T: Lane>(y: &mut [T], factors: &[T], b: &[T], stride
     });
 }
 
-/// One tile; returns its columns.
+/// Subtracts the product for one tile; returns C, its number of columns.
 #[inline(always)]
 fn strided<T: Lane, const R: usize, const C: usize>(
     y: &mut [T],
@@ -249,8 +249,8 @@ fn forward_in<T: Lane, const C: usize>(y: &mut [T], stride: usize, at: usize, l:
     }
 }
 
-/// Y = U⁻¹ Y for columns `at..at + columns` of m rows of Y, U being the upper triangle of `u` from column `first` on, with its
-/// diagonal inverted.
+/// Y = U⁻¹ Y for columns `at..at + columns` of m rows of Y, U being the upper triangle of `u` from column `first` on,
+/// with its diagonal inverted.
 #[inline(always)]
 pub fn backward<T: Lane>(
     y: &mut [T],
@@ -297,14 +297,14 @@ mod tests {
     use super::super::lane::Eight;
     use super::*;
 
-    /// An entry from the rest of its column, its row, column and lane.
+    /// Expected entry, from the other entries of its column, its row, column and lane.
     type Expected<'e> = &'e dyn Fn(&dyn Fn(usize) -> f64, usize, usize, usize) -> f64;
 
     fn numbers<T: Lane>(count: usize, shift: f64) -> Vec<T> {
         (0..count).map(|k| T::each(|lane| ((k * T::COUNT + lane) as f64 + shift).sin())).collect()
     }
 
-    /// Every lane of row-major matrices is compared with plain loops; columns outside stay as they are.
+    /// Compares every lane of row-major matrices with plain loops; other columns must not change.
     fn blocks_agree<T: Lane>(m: usize, at: usize, columns: usize, stride: usize) {
         let what = format!("{m} rows, columns {at} to {} of {stride}, {} lanes", at + columns, T::COUNT);
         let (start, a, b) = (numbers::<T>(m * stride, 0.3), numbers::<T>(m * m, 0.7), numbers::<T>(m * stride, 0.9));
@@ -361,7 +361,7 @@ mod tests {
     }
 
     #[test]
-    fn a_product_in_tiles_is_the_plain_one() {
+    fn a_tiled_product_agrees_with_plain_loops() {
         for (rows, depth, stride, from, to) in [(9, 5, 21, 2, 21), (1, 1, 1, 0, 1), (4, 16, 8, 0, 8), (6, 3, 7, 3, 3)] {
             let number = |k: usize, s: f64| ((k as f64 + s) * 1.7).sin();
             let (a, b): (Vec<f64>, Vec<f64>) = (

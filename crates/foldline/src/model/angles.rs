@@ -1,17 +1,19 @@
-//! States that are declared to be angles.
+//! States declared as angles.
 //!
-//! **Idea.** A solution may be moved by a whole period of an angle only if f repeats itself there. That is seen at a few places: an
-//! analytic function that repeats itself at all of them repeats itself everywhere, but for coincidence.
+//! **Idea.** A solution may be shifted by a whole period of an angle only if f is periodic in that angle. Periodicity
+//! is tested at a few sample points: barring coincidence, an analytic function that repeats at all of them repeats
+//! everywhere.
 
 use super::error::{Field, Item, ModelError};
 use super::{Batch, Model, Parameters};
 use crate::contract::VectorField;
 
-/// Places at which f is compared, and the share of its size that counts as no difference: rounding of a sine at some turns.
+/// Number of sample points, and the relative difference attributed to rounding (a sine after several turns).
 const PLACES: usize = 12;
 const SAME: f64 = 1e-9;
 
-/// A state that is said to be an angle, over whose period f does not repeat itself. `items`: `[n]` which state of the source each is.
+/// Returns an error for the first declared angle in which f is not periodic. `items`: `[n]` position in the source of
+/// each state.
 pub(super) fn no_angle(model: &Model, items: &[usize]) -> Option<ModelError> {
     let n = model.dim();
     let f = |x: &[f64], parameters: &[f64], time: &[f64]| -> Vec<f64> {
@@ -21,12 +23,12 @@ pub(super) fn no_angle(model: &Model, items: &[usize]) -> Option<ModelError> {
         f
     };
     let ranges = model.ranges();
-    // Shares of the golden ratio, another one for each component.
+    // Multiples of the golden ratio, scaled differently for each component: quasi-random points.
     let share = |place: usize, i: usize| ((place + 1) as f64 * 0.618_033_988_749_895 * (1.0 + i as f64).sqrt()).fract();
     for (c, period) in model.periods().iter().copied().enumerate().filter(|(_, period)| period.is_finite()) {
         for place in 0..PLACES {
             let x: Vec<f64> = ranges.iter().enumerate().map(|(i, [a, b])| a + share(place, i) * (b - a)).collect();
-            // Parameters that are 0 or 1 may hide a term.
+            // A parameter equal to 0 or 1 may hide a term.
             let parameters: Vec<f64> = (model.parameters.iter().enumerate())
                 .map(|(i, p)| if place % 2 == 0 { p.value } else { p.value * (0.75 + 0.5 * share(place, n + i)) })
                 .collect();

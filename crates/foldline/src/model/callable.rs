@@ -1,10 +1,10 @@
-//! Functions that expressions can call, beyond the built-in ones.
+//! Functions and tables of the model, callable from expressions beside the built-in functions.
 
 use super::function::{FUNCTIONS, function};
 use super::source::ModelSource;
 use std::collections::HashMap;
 
-/// The name of a sum over an index.
+/// Name of the sum over an index.
 pub(super) const SUM: &str = "sum";
 
 /// Target of a call, by position in the source.
@@ -14,7 +14,7 @@ pub(super) enum Callee {
     Table(usize),
 }
 
-/// A function of the model.
+/// Function or table of the model.
 #[derive(Debug)]
 pub(super) struct Callable {
     pub callee: Callee,
@@ -22,14 +22,14 @@ pub(super) struct Callable {
     pub signature: String,
 }
 
-/// The functions and tables of a model by their names.
+/// Functions and tables of a model, by name.
 #[derive(Debug, Default)]
 pub(super) struct Callables {
     own: HashMap<String, Callable>,
 }
 
 impl Callables {
-    /// Those of `source`; of two with the same name, the first.
+    /// Collects the functions and tables of `source`; of two with the same name, the first.
     pub fn new(source: &ModelSource) -> Callables {
         let mut own: HashMap<String, Callable> = HashMap::new();
         for (i, f) in source.functions.iter().enumerate() {
@@ -45,7 +45,7 @@ impl Callables {
         Callables { own }
     }
 
-    /// The function of the model with that name.
+    /// Function or table of the model with the given name.
     pub fn get(&self, name: &str) -> Option<&Callable> {
         self.own.get(name)
     }
@@ -57,7 +57,7 @@ impl Callables {
         FUNCTIONS.iter().map(|f| f.name).chain([SUM]).chain(own).collect()
     }
 
-    /// Signature of the function of that name.
+    /// Signature of the function with the given name.
     pub fn signature(&self, name: &str) -> Option<&str> {
         match (function(name), self.own.get(name)) {
             (Some(function), _) => Some(function.signature),

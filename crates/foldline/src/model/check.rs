@@ -1,4 +1,4 @@
-//! Every mistake in the names and numbers of a model; those in its expressions are found in `words`.
+//! Checks of all names and numbers of a model; mistakes inside expressions are found in `words`.
 
 use super::callable::{Callables, SUM};
 use super::error::{Complaint, Field, Item, ModelError};
@@ -9,16 +9,16 @@ use super::scope::{Symbol, Symbols};
 use super::source::{ModelSource, Repeat, State};
 use std::collections::{HashMap, HashSet};
 
-/// Most states: the matrices of a cycle are dense in them, a Jacobian for each collocation point.
+/// Maximum number of states: cycle matrices are dense in the states, with one Jacobian for each collocation point.
 const MOST_STATES: usize = 1000;
-/// Most parameters, definitions and outputs, each. Equations beyond those of the states are reported one by one.
+/// Maximum number each of parameters, definitions and outputs. Surplus equations are reported one by one.
 const MOST: usize = 100_000;
-/// The name of the time.
+/// Name of the time variable.
 pub(super) const TIME: &str = "t";
-/// Further mistakes than these are not looked for.
+/// Maximum number of errors reported.
 pub(super) const MOST_ERRORS: usize = 100;
 
-/// A check of a source: names found so far, and mistakes.
+/// Check in progress: names found so far, and errors.
 pub(super) struct Check<'a> {
     pub source: &'a ModelSource,
     pub symbols: Symbols<'a>,
@@ -27,7 +27,7 @@ pub(super) struct Check<'a> {
 }
 
 impl<'a> Check<'a> {
-    /// Reports a mistake.
+    /// Reports an error.
     pub fn report(&mut self, item: Item, field: Field, message: impl Into<String>, hint: impl Into<String>) {
         if self.errors.len() == MOST_ERRORS {
             return;
@@ -36,7 +36,7 @@ impl<'a> Check<'a> {
         self.errors.push(ModelError { item, field, name, span: None, message: message.into(), hint: hint.into() });
     }
 
-    /// Reports what is wrong within an expression.
+    /// Reports an error inside an expression.
     pub fn complain(&mut self, item: Item, field: Field, complaint: Complaint) {
         if self.errors.len() == MOST_ERRORS {
             return;
@@ -55,7 +55,7 @@ impl<'a> Check<'a> {
         self.errors.push(ModelError { item, field, name, span: Some(span), message, hint });
     }
 
-    /// Refuses what no computer would get through.
+    /// Rejects models that are too large to compute.
     pub fn sizes(&mut self) {
         let source = self.source;
         let total = |counts: &mut dyn Iterator<Item = usize>| counts.fold(0, usize::saturating_add);
@@ -72,7 +72,7 @@ impl<'a> Check<'a> {
                 "states" => "use a coarser discretisation or fewer modes: foldline uses dense matrices",
                 _ => "remove those that are not needed",
             };
-            // At the count that alone is too large, if there is one.
+            // Point to the one count that is too large on its own, if there is one.
             let large = self.repeats().find(|(_, repeat)| repeat.count > most).map(|(item, _)| item);
             let (item, field) = large.map_or((Item::Model, Field::Name), |item| (item, Field::Count));
             self.report(item, field, message, hint);
@@ -83,7 +83,7 @@ impl<'a> Check<'a> {
         }
     }
 
-    /// Everything that is repeated.
+    /// Repetitions of all repeated items.
     pub fn repeats(&self) -> impl Iterator<Item = (Item, &'a Repeat)> + use<'a> {
         let source = self.source;
         let states = source.states.iter().enumerate().map(|(i, s)| (Item::State(i), &s.repeat));
@@ -94,7 +94,7 @@ impl<'a> Check<'a> {
         all.filter_map(|(item, repeat)| Some((item, repeat.as_ref()?)))
     }
 
-    /// Fills the table of names, whose positions are those of `layout`.
+    /// Fills the symbol table, with positions as in `layout`.
     pub fn names(&mut self, layout: &Layout) {
         let source = self.source;
         let families: HashMap<Item, usize> = layout.families.iter().enumerate().map(|(f, own)| (own.item, f)).collect();
@@ -178,7 +178,7 @@ impl<'a> Check<'a> {
         }
     }
 
-    /// The name of the index of a repeated item.
+    /// Name of the index of a repeated item.
     pub fn index(&self, item: Item) -> Option<&'a str> {
         let source = self.source;
         let repeat = match item {
@@ -191,7 +191,7 @@ impl<'a> Check<'a> {
         repeat.as_ref().map(|repeat| repeat.index.as_str())
     }
 
-    /// Names of functions, tables and arguments.
+    /// Checks names of functions, tables and arguments.
     fn functions(&mut self) {
         let source = self.source;
         let mut seen = HashSet::new();
@@ -225,7 +225,7 @@ impl<'a> Check<'a> {
         }
     }
 
-    /// Names of indices.
+    /// Checks names of indices.
     fn indices(&mut self) {
         for (item, repeat) in self.repeats().collect::<Vec<_>>() {
             let index = repeat.index.as_str();
@@ -239,12 +239,12 @@ impl<'a> Check<'a> {
     }
 
     fn identifier(&mut self, name: &str, item: Item) {
-        // A velocity has the name of its state with a prime.
+        // A velocity is named after its state, with a prime.
         let word = match item {
             Item::State(_) => name.strip_suffix('\'').unwrap_or(name),
             _ => name,
         };
-        // A sum is told by its bracket from a quantity of that name.
+        // The bracket distinguishes the function `sum` from a quantity of that name.
         let called = matches!(item, Item::Function(_) | Item::Table(_));
         let well_formed = word.starts_with(|c: char| c.is_alphabetic() || c == '_')
             && word.chars().all(|c| c.is_alphanumeric() || c == '_');
@@ -256,7 +256,7 @@ impl<'a> Check<'a> {
         }
     }
 
-    /// Values, scales and ranges.
+    /// Checks values, scales and ranges.
     pub fn numbers(&mut self) {
         for (i, parameter) in self.source.parameters.iter().enumerate() {
             let count = count(&parameter.repeat);
@@ -296,7 +296,7 @@ impl<'a> Check<'a> {
         }
     }
 
-    /// Which equation belongs to each state.
+    /// Position of the equation of each state.
     pub fn equations(&mut self) -> Vec<Option<usize>> {
         let source = self.source;
         let mut equation_of = vec![None; source.states.len()];
@@ -328,7 +328,7 @@ impl<'a> Check<'a> {
         equation_of
     }
 
-    /// Positions of the two states of the complex signal among all `states`.
+    /// Positions among all `states` of the two states that form the complex signal.
     pub fn whirl(&mut self, states: &[State]) -> Option<[usize; 2]> {
         let [u, v] = self.source.whirl.as_ref()?;
         let states: Vec<&str> = states.iter().map(|s| s.name.as_str()).collect();

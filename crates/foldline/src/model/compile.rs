@@ -1,4 +1,5 @@
-//! From a written model to a graph: names resolved, repetition written out, definitions put in order, every mistake reported.
+//! Compilation of a model source to a graph: resolves names, expands repetition, orders definitions and reports every
+//! error.
 
 use super::callable::Callables;
 use super::check::Check;
@@ -13,31 +14,31 @@ use super::source::{ModelSource, Output, Parameter, State};
 use std::cell::Cell;
 use std::collections::HashMap;
 
-/// Most states that are coupled by a mass matrix: elimination fills it in.
+/// Maximum number of states coupled by a mass matrix: elimination causes fill-in.
 const MOST_COUPLED: usize = 100;
 
-/// The expressions of a model as nodes.
+/// Expressions of a model as graph nodes.
 #[derive(Debug)]
 pub(super) struct Compiled {
     pub graph: Graph,
-    /// f, one node per state; per period of the forcing where there is one.
+    /// f, one node per state; per forcing period if the model is forced.
     pub field: Vec<Id>,
-    /// The period of the forcing.
+    /// Period of the forcing.
     pub period: Option<Id>,
     /// One node per output.
     pub outputs: Vec<Id>,
-    /// The states that form the complex signal.
+    /// States that form the complex signal.
     pub whirl: Option<[usize; 2]>,
 }
 
-/// The names of a compiled model, repetition written out.
+/// Named items of a compiled model, with repetition expanded.
 pub(super) struct Named {
     pub states: Vec<State>,
     pub parameters: Vec<Parameter>,
     pub outputs: Vec<Output>,
 }
 
-/// The expressions of a source, in its order.
+/// Parsed expressions of a source, in source order.
 struct Parsed {
     functions: Vec<Option<Expression>>,
     definitions: Vec<Option<Expression>>,
@@ -48,7 +49,7 @@ struct Parsed {
     mass: Vec<Option<Expression>>,
 }
 
-/// Compiles `source`, or returns what is wrong with it: everything, up to a hundred mistakes.
+/// Compiles `source`, or returns all errors, up to a hundred.
 pub(super) fn compile(source: &ModelSource) -> Result<(Compiled, Named), Vec<ModelError>> {
     let callables = Callables::new(source);
     let mut check = Check { source, symbols: HashMap::new(), callables: &callables, errors: Vec::new() };
@@ -90,7 +91,7 @@ pub(super) fn compile(source: &ModelSource) -> Result<(Compiled, Named), Vec<Mod
     let index = |item: Item| check.index(item);
     let mut lowering = Lowering::new(&scope, &source.tables, Layout::velocities(&states));
     if let (Some(own), true) = (&source.forcing, check.errors.is_empty()) {
-        // Definitions that the period needs come before those that need the time, in whatever order they are.
+        // Definitions needed for the period must precede those that use the time, whatever their order in the source.
         lowering.define(&order, &bodies, index);
         let given = lowering.expression(Item::Forcing, Field::Expression, parsed.forcing.as_ref(), &[]);
         lowering.period = Some(match own.is_frequency {
@@ -206,7 +207,7 @@ fn parse(check: &mut Check, layout: &Layout) -> Parsed {
     Parsed { functions, definitions, beyond, equations, outputs, forcing, mass }
 }
 
-/// Solves the equations for the rates where a mass matrix couples them.
+/// Solves the equations coupled by a mass matrix for the rates.
 fn couple(check: &mut Check, graph: &mut Graph, layout: &Layout, masses: &[Id], field: &mut [Id]) {
     let source = check.source;
     let single = source.states.iter().zip(&layout.states).filter(|(state, _)| state.repeat.is_none());

@@ -1,4 +1,4 @@
-//! Numbers written as expressions of constants.
+//! Numbers given as expressions of constants.
 
 use super::callable::Callables;
 use super::error::{Complaint, Field, Item, ModelError};
@@ -10,7 +10,7 @@ use super::scope::{Scope, Symbol, Symbols};
 use super::source::Constant;
 use std::cell::Cell;
 
-/// The value of an expression of numbers and `constants`, or what is wrong with it; the place is within the text.
+/// Evaluates an expression of numbers and `constants`; the span of an error refers to `text`.
 ///
 /// ```
 /// use foldline::model::{Constant, constant_value};

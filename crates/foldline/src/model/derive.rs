@@ -1,18 +1,19 @@
 //! Symbolic derivatives on the graph.
 //!
-//! **Idea.** One forward sweep over the nodes that the roots depend on gives the derivative along a given tangent of the
-//! leaves; the result is again a set of nodes, so sweeping twice gives second derivatives, and so on to any order.
+//! **Idea.** One forward sweep over the nodes that the roots depend on gives the derivative along a given tangent of
+//! the leaves. The result is again a set of nodes, so repeated sweeps give derivatives of any order.
 //!
-//! **Departures.** At points where a function has no derivative a finite value is taken so that it cannot spoil a whole
-//! Jacobian: `abs`, `sign`, `heaviside`, `floor` and comparisons contribute sign(x), 0, 0, 0 and 0; `hypot` contributes 0 at the origin,
-//! and `sqrt` and powers below 1 contribute 0 where their argument and its derivative both vanish. Squares of a radius are
-//! rewritten as sums of squares beforehand (see `identities`), so smooth functions of a radius are not affected.
-//! A choice (`if`, `min`, `max`) has the derivative of the branch that is taken, whatever the other one gives.
+//! **Departures.** Where a function has no derivative, a finite value is used so that one entry cannot make a whole
+//! Jacobian undefined: `abs`, `sign`, `heaviside`, `floor` and comparisons contribute sign(x), 0, 0, 0 and 0; `hypot`
+//! contributes 0 at the origin, and `sqrt` and powers below 1 contribute 0 where their argument and its derivative both
+//! vanish. Squares of a radius are rewritten as sums of squares beforehand (see `identities`), so smooth functions of a
+//! radius are not affected. A choice (`if`, `min`, `max`) has the derivative of the selected branch, whatever that of
+//! the other.
 
 use super::graph::{Binary, Graph, Id, Leaf, Node, Unary};
 
 impl Graph {
-    /// Which nodes the roots depend on, themselves included.
+    /// Marks the nodes that the roots depend on, including the roots.
     pub fn reachable(&self, roots: &[Id]) -> Vec<bool> {
         let mut reached = vec![false; self.len()];
         for root in roots {
@@ -28,7 +29,7 @@ impl Graph {
         reached
     }
 
-    /// The derivative of every root when the leaves move with the tangent given by `tangent` (`None`: at rest).
+    /// Derivatives of the roots along the tangent of the leaves given by `tangent` (`None`: zero).
     pub fn derivative(&mut self, roots: &[Id], tangent: impl Fn(&mut Graph, Leaf) -> Option<Id>) -> Vec<Id> {
         let reached = self.reachable(roots);
         let zero = self.constant(0.0);
@@ -83,7 +84,7 @@ impl Graph {
                 self.add(one, square)
             }
             Unary::Asin | Unary::Acos => {
-                // (1 - a)(1 + a): no cancellation near ±1.
+                // (1 - a)(1 + a) avoids cancellation near ±1.
                 let (p, q) = (self.subtract(one, a), self.add(one, a));
                 let product = self.multiply(p, q);
                 let root = self.unary(Unary::Sqrt, product);
@@ -183,7 +184,7 @@ impl Graph {
         }
     }
 
-    /// d aᵇ = b aᵇ⁻¹ da + aᵇ log a db; the second term is 0 at a = 0 where aᵇ is.
+    /// d aᵇ = b aᵇ⁻¹ da + aᵇ log a db; the second term is 0 at a = 0 if aᵇ is 0.
     fn power_derivative(&mut self, y: Id, [a, b]: [Id; 2], [da, db]: [Id; 2]) -> Id {
         let (zero, one) = (self.constant(0.0), self.constant(1.0));
         let mut total = zero;

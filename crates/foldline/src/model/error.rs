@@ -1,4 +1,4 @@
-//! What can be wrong with a model, said so that it can be put right.
+//! Errors in a model, with hints for correcting them.
 
 use super::callable::Callables;
 use super::function::known_elsewhere_as;
@@ -7,7 +7,7 @@ use super::unsupported::unsupported;
 use std::fmt;
 use std::ops::Range;
 
-/// Which part of a [`super::ModelSource`] is meant; numbers are positions in its lists.
+/// Part of a [`super::ModelSource`]; numbers are positions in its lists.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Item {
     /// The model as a whole.
@@ -38,47 +38,47 @@ pub enum Item {
     Total(usize),
 }
 
-/// Which field of an item is wrong.
+/// Field of an item.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Field {
-    /// Its name.
+    /// Name.
     Name,
-    /// Its expression.
+    /// Expression.
     Expression,
-    /// Its unit.
+    /// Unit.
     Unit,
-    /// The value of a parameter.
+    /// Value of a parameter.
     Value,
-    /// The characteristic size of a state.
+    /// Characteristic size of a state.
     Scale,
-    /// The sampling range of a state.
+    /// Sampling range of a state.
     Range,
-    /// The period of a state that is an angle.
+    /// Period of a state that is an angle.
     Period,
-    /// The number of elements.
+    /// Number of elements.
     Count,
-    /// The name of the index.
+    /// Name of the index.
     Index,
-    /// The value beyond the first element, by position in the list.
+    /// Value beyond the first element, by position in the list.
     Before(usize),
-    /// The value beyond the last element, by position in the list.
+    /// Value beyond the last element, by position in the list.
     After(usize),
 }
 
-/// Something wrong with a model.
+/// Error in a model.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ModelError {
-    /// The part.
+    /// Part of the model.
     pub item: Item,
-    /// The field of that part.
+    /// Field of that part.
     pub field: Field,
-    /// The name of the part, for messages without a file.
+    /// Name of the part, for messages without a file.
     pub name: String,
-    /// Bytes within the expression, where the mistake has a place there.
+    /// Byte range within the expression, if the error has a position there.
     pub span: Option<Range<usize>>,
-    /// What is wrong.
+    /// Description of the error.
     pub message: String,
-    /// What would be right.
+    /// Suggested correction.
     pub hint: String,
 }
 
@@ -112,13 +112,13 @@ impl fmt::Display for ModelError {
 
 impl std::error::Error for ModelError {}
 
-/// Something wrong within an expression.
+/// Error inside an expression.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Complaint {
     pub span: Range<usize>,
     pub message: String,
     pub hint: String,
-    /// The function name that is not known; the hint can be improved once all names are.
+    /// Unknown function name; the hint can be improved once all names are known.
     pub function: Option<String>,
 }
 

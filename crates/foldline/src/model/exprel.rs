@@ -1,7 +1,7 @@
 //! The relative exponential (eˣ - 1)/x and its derivatives.
 //!
-//! **Idea.** Rates of ion channels and Bose factors are quotients such as u/(1 - e⁻ᵘ), which are 0/0 at u = 0. Written with
-//! e₀(x) = (eˣ - 1)/x, which is smooth and positive everywhere, they are 1/e₀(-u).
+//! **Idea.** Ion-channel rates and Bose factors are quotients such as u/(1 - e⁻ᵘ), which are 0/0 at u = 0. They equal
+//! 1/e₀(-u) with e₀(x) = (eˣ - 1)/x, which is smooth and positive everywhere.
 //!
 //! **Equations.**
 //!
@@ -10,11 +10,11 @@
 //! 3. eₘ = Σⱼ xʲ/(j! (j + m + 1)) for 0 ≤ x ≤ m + 2
 //! 4. eₘ = eˣ Σⱼ |x|ʲ m!/(m + j + 1)! for -m - 2 ≤ x < 0
 //!
-//! All terms of 3 and 4 are positive, so that nothing cancels.
+//! All terms of 3 and 4 are positive, so there is no cancellation.
 
 use super::kernels::{exp, expm1};
 
-/// Most terms of a series; 60 are needed for the tenth derivative.
+/// Maximum number of series terms; the tenth derivative needs 60.
 const MOST_TERMS: u32 = 400;
 
 /// (eˣ - 1)/x.
@@ -24,7 +24,7 @@ pub(super) fn exprel(x: f64) -> f64 {
     if x == 0.0 { 1.0 } else { quotient }
 }
 
-/// The derivative of that order of [`exprel`].
+/// Derivative of [`exprel`] of the given order.
 pub(super) fn derivative(order: u8, x: f64) -> f64 {
     let m = f64::from(order);
     if order == 0 || x.is_nan() {
@@ -40,7 +40,7 @@ pub(super) fn derivative(order: u8, x: f64) -> f64 {
     }
 }
 
-/// Sum over j of `part(j, term)`, each term made from the one before it.
+/// Sum over j of `part(j, term)`, each term computed by `next` from its predecessor.
 fn series(next: impl Fn(f64, f64) -> f64, part: impl Fn(f64, f64) -> f64) -> f64 {
     let (mut term, mut sum) = (1.0, part(0.0, 1.0));
     for j in 1..MOST_TERMS {
@@ -58,7 +58,7 @@ fn series(next: impl Fn(f64, f64) -> f64, part: impl Fn(f64, f64) -> f64) -> f64
 mod tests {
     use super::*;
 
-    /// ∫₀¹ sᵐ eˢˣ ds by Gauss–Legendre quadrature with 5 points on 400 intervals, whose error is below rounding here.
+    /// ∫₀¹ sᵐ eˢˣ ds by 5-point Gauss–Legendre quadrature on 400 intervals, with an error below rounding.
     fn quadrature(order: u8, x: f64) -> f64 {
         let nodes = [0.0, 0.538_469_310_105_683_1, 0.906_179_845_938_664];
         let weights = [0.568_888_888_888_888_9, 0.478_628_670_499_366_47, 0.236_926_885_056_189_08];
@@ -86,7 +86,7 @@ mod tests {
     }
 
     #[test]
-    fn next_to_zero_no_digit_is_lost() {
+    fn full_accuracy_is_kept_near_zero() {
         for x in [1e-300, 1e-17, 1e-12, 1e-9, 1e-6, 1e-4] {
             for x in [x, -x] {
                 assert!((exprel(x) - (1.0 + x / 2.0 + x * x / 6.0)).abs() < 4e-16 + x.abs().powi(3), "{x}");

@@ -1,8 +1,8 @@
 //! Names of a model and the positions of their elements.
 //!
-//! **Idea.** A state, parameter, definition or output with a count stands for that many elements, named x[1], x[2], … Families of
-//! states with equal counts that follow each other are interleaved: x[1], v[1], x[2], v[2], …, which keeps the entries of
-//! the Jacobian near its diagonal. A definition is one *piece* for each element; so is the value beyond an end.
+//! **Idea.** A repeated state, parameter, definition or output stands for elements named x[1], x[2], … Consecutive
+//! families of states with equal counts are interleaved: x[1], v[1], x[2], v[2], …, which keeps the entries of the
+//! Jacobian near its diagonal. Each element of a definition is one *piece*; so is each value beyond an end.
 
 use super::error::{Field, Item};
 use super::source::{Ends, ModelSource, Output, Parameter, Repeat, State, element_name};
@@ -17,7 +17,7 @@ pub(super) struct Spread {
 }
 
 impl Spread {
-    /// The position of element k, from 1.
+    /// Position of element k, counted from 1.
     pub fn at(&self, k: usize) -> usize {
         self.first + (k - 1) * self.stride
     }
@@ -31,7 +31,7 @@ pub(super) enum Kind {
     Definition,
 }
 
-/// A name with an index.
+/// Repeated name.
 #[derive(Debug)]
 pub(super) struct Family<'a> {
     pub name: &'a str,
@@ -45,36 +45,36 @@ pub(super) struct Family<'a> {
     pub after: (usize, usize),
 }
 
-/// A node that is made once: an element of a definition, or a value beyond an end.
+/// Node created once: an element of a definition, or a value beyond an end.
 #[derive(Debug)]
 pub(super) struct Piece {
     pub item: Item,
     pub field: Field,
-    /// The index, for an element of a repeated definition.
+    /// Index, for an element of a repeated definition.
     pub element: Option<usize>,
-    /// The piece whose rate this one is.
+    /// Piece of which this one is the time derivative.
     pub rate_of: Option<usize>,
 }
 
-/// The names of a model laid out.
+/// Layout of the names of a model.
 #[derive(Debug, Default)]
 pub(super) struct Layout<'a> {
     pub families: Vec<Family<'a>>,
     pub pieces: Vec<Piece>,
-    /// Spreads of states, parameters, definitions and outputs, as they stand in the source.
+    /// Spreads of states, parameters, definitions and outputs, in source order.
     pub states: Vec<Spread>,
     pub parameters: Vec<Spread>,
     pub definitions: Vec<Spread>,
     pub outputs: Vec<Spread>,
 }
 
-/// Number of elements.
+/// Number of elements; 1 without repetition.
 pub(super) fn count(repeat: &Option<Repeat>) -> usize {
     repeat.as_ref().map_or(1, |repeat| repeat.count)
 }
 
 impl<'a> Layout<'a> {
-    /// The layout of a source whose counts were checked.
+    /// Lays out a source whose counts have been checked.
     pub fn new(source: &'a ModelSource) -> Layout<'a> {
         let mut layout = Layout {
             states: interleaved(&source.states.iter().map(|s| s.repeat.as_ref().map(|r| r.count)).collect::<Vec<_>>()),
@@ -125,7 +125,7 @@ impl<'a> Layout<'a> {
         (first, count)
     }
 
-    /// Pieces for the ends of families that are rates of others.
+    /// Adds pieces for the ends of families that are rates of others.
     fn rates(&mut self) {
         for f in 0..self.families.len() {
             let Ends::RateOf(position) = &self.families[f].repeat.ends else { continue };
@@ -142,7 +142,7 @@ impl<'a> Layout<'a> {
         }
     }
 
-    /// The states one by one.
+    /// Individual states, with repetition expanded.
     pub fn expanded_states(&self, source: &[State]) -> Vec<State> {
         let total = self.states.iter().map(|spread| spread.count).sum();
         let mut all = vec![State::new(""); total];
@@ -155,7 +155,7 @@ impl<'a> Layout<'a> {
         all
     }
 
-    /// The parameters one by one.
+    /// Individual parameters, with repetition expanded.
     pub fn expanded_parameters(&self, source: &[Parameter]) -> Vec<Parameter> {
         let element = |parameter: &Parameter, k: usize| {
             let name = own_name(&parameter.name, &parameter.repeat, k);
@@ -166,7 +166,7 @@ impl<'a> Layout<'a> {
         spreads.flat_map(|(own, spread)| (1..=spread.count).map(move |k| element(own, k))).collect()
     }
 
-    /// The outputs one by one.
+    /// Individual outputs, with repetition expanded.
     pub fn expanded_outputs(&self, source: &[Output]) -> Vec<Output> {
         let element = |output: &Output, k: usize| {
             let name = own_name(&output.name, &output.repeat, k);
@@ -176,7 +176,7 @@ impl<'a> Layout<'a> {
         spreads.flat_map(|(own, spread)| (1..=spread.count).map(move |k| element(own, k))).collect()
     }
 
-    /// The name of a piece, for messages.
+    /// Name of a piece, for messages.
     pub fn piece_name(&self, source: &ModelSource, piece: usize) -> String {
         let Piece { item, field, element, .. } = &self.pieces[piece];
         let (name, repeat) = match *item {
@@ -193,7 +193,7 @@ impl<'a> Layout<'a> {
         }
     }
 
-    /// The velocity of every state that has one: of `x` the state `x'`.
+    /// Position of the velocity of each state, if it has one: the state `x'` for `x`.
     pub fn velocities(states: &[State]) -> Vec<Option<usize>> {
         let place: HashMap<&str, usize> = states.iter().enumerate().map(|(i, s)| (s.name.as_str(), i)).collect();
         let rate = |name: &str| match name.split_once('[') {
@@ -218,7 +218,7 @@ fn consecutive(counts: impl Iterator<Item = usize>) -> Vec<Spread> {
     counts.map(&mut next).collect()
 }
 
-/// Runs of equal counts take turns.
+/// Spreads in which runs of equal counts are interleaved.
 fn interleaved(counts: &[Option<usize>]) -> Vec<Spread> {
     let mut first = 0;
     let mut spreads = Vec::with_capacity(counts.len());

@@ -1,10 +1,10 @@
-//! Whether a forced field repeats itself after the period that it states.
+//! Check that a forced field is periodic with its stated period.
 
 use crate::contract::{Batch, Parameters, VectorField};
 
-/// What does not, and what would be right: the period is no positive number at these parameters `[k]`, or some equation or output is not
-/// the same one period later. States are taken from `ranges` `[n]`; `names` are those of the states, then of the outputs, as far as known.
-/// `None` for a field that is not forced.
+/// Returns a message and a hint if the field is not periodic: if the period is not a positive number at these
+/// parameters `[k]`, or an equation or output differs one period later. States are sampled from `ranges` `[n]`; `names`
+/// lists state names, then output names, as far as known. `None` for an autonomous field.
 pub fn unrepeated(
     field: &dyn VectorField,
     names: &[String],
@@ -27,7 +27,7 @@ pub fn unrepeated(
         let batch = Batch { lanes: 1, states, parameters: Parameters::Shared(parameters), times: &[time] };
         field.evaluate(batch, &mut f);
         field.outputs(batch, &mut g);
-        // Per unit of time.
+        // Convert to rates per unit of time.
         f.iter_mut().for_each(|f| *f /= unit);
         [f, g].concat()
     };

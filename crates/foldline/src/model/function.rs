@@ -1,33 +1,33 @@
-//! The functions of the expression language.
+//! Functions of the expression language.
 
 use super::graph::{Binary, Graph, Id, Unary};
 
-/// What a function does with its arguments.
+/// Operation that a function performs on its arguments.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Meaning {
-    /// A function of one operand.
+    /// Function of one operand.
     One(Unary),
-    /// A function of two operands.
+    /// Function of two operands.
     Two(Binary),
-    /// A formula in one or two operands.
+    /// Formula in one or two operands.
     Made(usize, fn(&mut Graph, Id, Id) -> Id),
     /// `if(condition, a, b)`.
     If,
 }
 
-/// A function of the language.
+/// Function of the language.
 #[derive(Debug)]
 pub(super) struct Function {
-    /// Its name.
+    /// Name.
     pub name: &'static str,
-    /// How it is written.
+    /// Signature.
     pub signature: &'static str,
-    /// What it means.
+    /// Operation.
     pub meaning: Meaning,
 }
 
 impl Function {
-    /// How many arguments it takes.
+    /// Number of arguments.
     pub fn arity(&self) -> usize {
         match self.meaning {
             Meaning::One(_) => 1,
@@ -37,7 +37,7 @@ impl Function {
         }
     }
 
-    /// The node for this function of `arguments`, whose number was checked.
+    /// Adds the node for this function of `arguments`, whose number has been checked.
     pub fn apply(&self, graph: &mut Graph, arguments: [Id; 3]) -> Id {
         let [a, b, c] = arguments;
         match self.meaning {
@@ -57,7 +57,7 @@ const fn two(name: &'static str, signature: &'static str, op: Binary) -> Functio
     Function { name, signature, meaning: Meaning::Two(op) }
 }
 
-/// Every function.
+/// All built-in functions.
 pub(super) static FUNCTIONS: [Function; 33] = [
     one("sqrt", "sqrt(x)", Unary::Sqrt),
     one("exp", "exp(x)", Unary::Exp),
@@ -116,15 +116,15 @@ fn remainder(graph: &mut Graph, a: Id, b: Id) -> Id {
     graph.subtract(a, whole)
 }
 
-/// Named numbers.
+/// Named constants.
 pub(super) const CONSTANTS: [(&str, f64); 1] = [("pi", std::f64::consts::PI)];
 
-/// The function of that name.
+/// Built-in function with the given name.
 pub(super) fn function(name: &str) -> Option<&'static Function> {
     FUNCTIONS.iter().find(|function| function.name == name)
 }
 
-/// What other languages call a function of this one.
+/// Hint for a function name used by other languages.
 pub(super) fn known_elsewhere_as(name: &str) -> Option<&'static str> {
     Some(match name {
         "ln" => "write `log(x)`",

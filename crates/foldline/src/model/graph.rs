@@ -1,7 +1,7 @@
-//! Expressions as a graph in which equal subexpressions are one node.
+//! Expression graph in which equal subexpressions are one node.
 //!
-//! **Idea.** A node is looked up before it is made. An operand always has a smaller number than the node that uses it, so
-//! every pass is a loop, never a recursion. Nodes are made through the constructors of `identities`.
+//! **Idea.** A node is looked up before it is created. An operand always has a smaller number than the nodes that use
+//! it, so every pass is a loop, never a recursion. Nodes are created through the constructors of `identities`.
 
 use super::{exprel, kernels};
 use std::collections::HashMap;
@@ -11,13 +11,13 @@ use std::collections::HashMap;
 pub(super) struct Id(pub u32);
 
 impl Id {
-    /// As an index.
+    /// Node number as an index.
     pub fn at(self) -> usize {
         self.0 as usize
     }
 }
 
-/// What an expression depends on.
+/// Input of an expression.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum Leaf {
     /// State component.
@@ -26,7 +26,7 @@ pub(super) enum Leaf {
     Parameter(u32),
     /// Time in periods of the forcing.
     Time,
-    /// Component of a direction: which direction, which component (states first, then parameters).
+    /// Component of a direction: direction number, component (states first, then parameters).
     Direction(u32, u32),
 }
 
@@ -59,7 +59,7 @@ pub(super) enum Unary {
     Asinh,
     Acosh,
     Atanh,
-    /// Derivative of that order of (eˣ - 1)/x.
+    /// Derivative of (eˣ - 1)/x of the given order.
     Exprel(u8),
 }
 
@@ -82,7 +82,7 @@ pub(super) enum Binary {
 }
 
 impl Unary {
-    /// The value at `x`.
+    /// Value at `x`.
     #[inline(always)]
     pub fn of(self, x: f64) -> f64 {
         match self {
@@ -119,7 +119,7 @@ impl Unary {
 }
 
 impl Binary {
-    /// The value at `(a, b)`.
+    /// Value at `(a, b)`.
     #[inline(always)]
     pub fn of(self, a: f64, b: f64) -> f64 {
         let truth = |holds: bool| if holds { 1.0 } else { 0.0 };
@@ -141,7 +141,7 @@ impl Binary {
     }
 }
 
-/// A node. Constants are kept as bits so that nodes can be compared.
+/// Node. Constants are kept as bits so that nodes can be compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) enum Node {
     Constant(u64),
@@ -150,12 +150,12 @@ pub(super) enum Node {
     Binary(Binary, Id, Id),
     /// Integer power by repeated multiplication.
     Integer(Id, i32),
-    /// The second where the first is not zero, else the third.
+    /// The second operand if the first is not zero, else the third.
     Select(Id, Id, Id),
 }
 
 impl Node {
-    /// The operands.
+    /// Operands.
     pub fn operands(self) -> impl Iterator<Item = Id> {
         let list = match self {
             Node::Constant(_) | Node::Leaf(_) => [None; 3],
@@ -168,7 +168,7 @@ impl Node {
 }
 
 impl Node {
-    /// The same with its operands renamed.
+    /// Copy of the node with its operands renamed.
     pub fn renamed(self, name: impl Fn(Id) -> Id) -> Node {
         match self {
             Node::Constant(_) | Node::Leaf(_) => self,
@@ -179,7 +179,7 @@ impl Node {
         }
     }
 
-    /// The value, from those of the operands and of the parameters.
+    /// Value, from the values of the operands and the parameters.
     pub fn value(self, of: impl Fn(Id) -> f64, parameters: &[f64]) -> f64 {
         match self {
             Node::Constant(bits) => f64::from_bits(bits),
@@ -199,7 +199,7 @@ impl Node {
     }
 }
 
-/// The nodes made so far.
+/// Nodes created so far.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Graph {
     nodes: Vec<Node>,
@@ -207,17 +207,17 @@ pub(super) struct Graph {
 }
 
 impl Graph {
-    /// How many nodes there are.
+    /// Number of nodes.
     pub fn len(&self) -> usize {
         self.nodes.len()
     }
 
-    /// The node of that number.
+    /// Node with the given number.
     pub fn node(&self, id: Id) -> Node {
         self.nodes[id.at()]
     }
 
-    /// The number of a node, which is made if there is none like it yet.
+    /// Returns the number of a node, which is added if there is no equal node yet.
     pub fn intern(&mut self, node: Node) -> Id {
         if let Some(&id) = self.known.get(&node) {
             return id;
@@ -228,17 +228,17 @@ impl Graph {
         id
     }
 
-    /// A number; -0 is taken as 0.
+    /// Constant node; -0 becomes 0.
     pub fn constant(&mut self, value: f64) -> Id {
         self.intern(Node::Constant((value + 0.0).to_bits()))
     }
 
-    /// An input.
+    /// Input node.
     pub fn leaf(&mut self, leaf: Leaf) -> Id {
         self.intern(Node::Leaf(leaf))
     }
 
-    /// The value of a constant node.
+    /// Value of a constant node.
     pub fn value(&self, id: Id) -> Option<f64> {
         match self.node(id) {
             Node::Constant(bits) => Some(f64::from_bits(bits)),
@@ -246,7 +246,7 @@ impl Graph {
         }
     }
 
-    /// Whether the node is the constant `value`.
+    /// True if the node is the constant `value`.
     pub fn is(&self, id: Id, value: f64) -> bool {
         self.value(id) == Some(value)
     }

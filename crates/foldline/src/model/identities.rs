@@ -1,17 +1,17 @@
-//! Constructors of nodes: they fold constants and apply identities.
+//! Node constructors that fold constants and apply identities.
 //!
-//! **Idea.** What a derivative leaves behind (products with 0 and 1, negations of negations) never becomes a node. Identities
-//! keep values to the last bit, except where stated.
+//! **Idea.** By-products of differentiation (products with 0 and 1, double negations) never become nodes. Identities
+//! are exact to the last bit, except where stated.
 //!
-//! **Departures.** 0·x and 0/x become 0 and x - x becomes 0 even though an infinite or undefined x would give NaN: otherwise a
-//! derivative would carry every term that does not depend on its variable. The square of a radius becomes a sum of squares,
-//! which is smooth at the origin and equal to rounding.
+//! **Departures.** 0·x and 0/x become 0 and x - x becomes 0, although an infinite or undefined x would give NaN:
+//! otherwise a derivative would carry every term that does not depend on its variable. The square of a radius becomes a
+//! sum of squares, which is smooth at the origin and equal up to rounding.
 
 use super::graph::{Binary, Graph, Id, Node, Unary};
 use super::kernels;
 
 impl Graph {
-    /// The operand of a negation.
+    /// Operand of a negation.
     fn negated(&self, id: Id) -> Option<Id> {
         match self.node(id) {
             Node::Unary(Unary::Negate, a) => Some(a),
@@ -19,14 +19,14 @@ impl Graph {
         }
     }
 
-    /// Whether the value cannot be negative, by the form of the expression.
+    /// True if the form of the expression shows that its value cannot be negative.
     pub fn nonnegative(&self, id: Id) -> bool {
         match self.node(id) {
             Node::Constant(bits) => f64::from_bits(bits) >= 0.0,
             Node::Integer(_, n) => n % 2 == 0,
             Node::Unary(Unary::Abs | Unary::Exp | Unary::Sqrt | Unary::Heaviside | Unary::SechSquared, _) => true,
             Node::Binary(Binary::Hypot, ..) => true,
-            // One level only: sums of squares are what matters, and deep sums must not make this a recursion.
+            // One level only: sums of squares are the case that matters, and deep sums must not recurse.
             Node::Binary(Binary::Add, a, b) => [a, b].iter().all(|&x| match self.node(x) {
                 Node::Integer(_, n) => n % 2 == 0,
                 _ => self.value(x).is_some_and(|v| v >= 0.0),
@@ -35,7 +35,7 @@ impl Graph {
         }
     }
 
-    /// A function of one operand.
+    /// Applies a function of one operand.
     pub fn unary(&mut self, op: Unary, a: Id) -> Id {
         if let Some(x) = self.value(a) {
             return self.constant(op.of(x));
@@ -46,7 +46,7 @@ impl Graph {
             (Unary::Abs, Node::Unary(Unary::Negate, inner)) => self.unary(Unary::Abs, inner),
             (Unary::Abs, _) if self.nonnegative(a) => a,
             (Unary::Cos | Unary::Cosh | Unary::SechSquared, Node::Unary(Unary::Negate, inner)) => self.unary(op, inner),
-            // The square of a radius is then a sum of squares again, smooth at the origin.
+            // The square of a radius then becomes a sum of squares again, smooth at the origin.
             (Unary::Sqrt, Node::Binary(Binary::Add, p, q)) => match (self.node(p), self.node(q)) {
                 (Node::Integer(x, 2), Node::Integer(y, 2)) => self.binary(Binary::Hypot, x, y),
                 _ => self.intern(Node::Unary(op, a)),
@@ -80,7 +80,7 @@ impl Graph {
         self.binary(Binary::Divide, a, b)
     }
 
-    /// A function of two operands.
+    /// Applies a function of two operands.
     pub fn binary(&mut self, op: Binary, a: Id, b: Id) -> Id {
         if let (Some(x), Some(y)) = (self.value(a), self.value(b)) {
             return match op {
@@ -227,7 +227,7 @@ impl Graph {
         self.intern(Node::Integer(a, n))
     }
 
-    /// `a` where `condition` is not zero, else `b`.
+    /// `a` if `condition` is not zero, else `b`.
     pub fn select(&mut self, condition: Id, a: Id, b: Id) -> Id {
         match self.value(condition) {
             Some(c) if c != 0.0 => a,
@@ -283,7 +283,7 @@ mod tests {
         assert_eq!(g.multiply(r, r), square);
     }
 
-    /// 3 is not a power of two, so its reciprocal is rounded and the division must stay.
+    /// 3 is not a power of two: its reciprocal is rounded, so the division must stay.
     #[test]
     fn divisions_are_kept_where_the_reciprocal_is_not_exact() {
         let mut g = Graph::default();

@@ -1,8 +1,8 @@
-//! Scalar arithmetic of the tape, written so that loops over lanes vectorise; some of it for vector fields written in Rust, too.
+//! Scalar kernels of the tape, written so that loops over lanes vectorise; also for vector fields written in Rust.
 //!
-//! **Idea.** `exp`, `tanh`, `sech²` and `hypot` sit in the inner loop of contact laws; the standard library evaluates them one
-//! lane at a time. Here they are branch-free polynomials, so the compiler turns a loop over lanes into vector instructions.
-//! No fused multiply-add is used: the result of a lane is the same on every machine and in every batch.
+//! **Idea.** `exp`, `tanh`, `sech²` and `hypot` sit in the inner loop of contact laws; the standard library evaluates
+//! them one lane at a time. Here they are branch-free polynomials, so the compiler turns a loop over lanes into vector
+//! instructions. No fused multiply-add is used: a lane gives the same result on every machine and in every batch.
 //!
 //! **Equations.** With k = round(x / ln 2) and r = x - k ln 2, |r| ≤ ln 2 / 2:
 //!
@@ -16,9 +16,9 @@
 use crate::linalg::lane::{Eight, Lane};
 use std::ops::RangeInclusive;
 
-/// Adding it to |x| < 2⁵¹ rounds x to an integer, which then sits in the low bits of the sum.
+/// Adding this to |x| < 2⁵¹ rounds x to an integer, which then occupies the low bits of the sum.
 const ROUNDER: f64 = 6755399441055744.0; // 1.5 · 2⁵²
-/// Leading part of ln 2 with trailing zeros, so that k · LN2_HIGH is exact.
+/// Leading part of ln 2, with trailing zeros so that k · LN2_HIGH is exact.
 const LN2_HIGH: f64 = f64::from_bits(0x3fe6_2e42_fee0_0000);
 /// ln 2 - LN2_HIGH.
 const LN2_LOW: f64 = f64::from_bits(0x3dea_39ef_3579_3c76);
@@ -39,8 +39,8 @@ fn reduce(x: f64) -> (f64, f64, f64) {
     (k, r, (high - r) - low)
 }
 
-/// e(r) - r of equation 1, for |r| ≤ ln 2 / 2. The terms are paired rather than nested: a sum of twelve nested terms would
-/// have the processor wait for each.
+/// e(r) - r of equation 1, for |r| ≤ ln 2 / 2. The terms are paired rather than nested: in Horner's scheme each of the
+/// twelve operations would wait for the previous one.
 #[inline(always)]
 fn series(r: f64) -> f64 {
     let r2 = r * r;
@@ -67,7 +67,7 @@ fn limit(x: f64, low: f64, high: f64) -> f64 {
 pub fn exp(x: f64) -> f64 {
     let (k, r, error) = reduce(limit(x, -746.0, 710.0));
     let p = 1.0 + (r + (series(r) + error));
-    // In two halves, so that results below the normal range and overflow come out right.
+    // Scaled in two steps, so that subnormal results and overflow are correct.
     let half = (k * 0.5 + ROUNDER) - ROUNDER;
     p * power_of_two(half) * power_of_two(k - half)
 }
@@ -81,10 +81,10 @@ pub fn tanh(x: f64) -> f64 {
     (m / (m + 2.0)).copysign(x)
 }
 
-/// eˣ - 1, to full relative accuracy next to 0.
+/// eˣ - 1, to full relative accuracy near 0.
 #[inline(always)]
 pub fn expm1(x: f64) -> f64 {
-    // From here on the 1 is lost in rounding, and 2ᵏ may overflow.
+    // Beyond this the 1 is lost in rounding, and 2ᵏ may overflow.
     const LARGE: f64 = 40.0;
     let (k, r, error) = reduce(limit(x, -44.0, LARGE));
     let s = power_of_two(k);
@@ -92,10 +92,11 @@ pub fn expm1(x: f64) -> f64 {
     if x > LARGE { exp(x) } else { m }
 }
 
-/// From here on m + 2 of equation 3 is m in rounding, and tanh is ±1: there m > 2⁵⁵.
+/// Beyond this m > 2⁵⁵, so m + 2 of equation 3 rounds to m and tanh is ±1.
 const SATURATED: f64 = 19.5;
 
-/// [`tanh`] of eight numbers; nothing to compute where all of them are large, as a contact law is away from the edge of the contact.
+/// [`tanh`] of eight numbers; skips the computation if all of them are saturated, as in a contact law away from the
+/// contact edge.
 #[inline(always)]
 pub fn tanhs(x: Eight) -> Eight {
     match x.all(x, |x, _| x.abs() >= SATURATED) {
@@ -112,7 +113,7 @@ pub fn sech_squared(x: f64) -> f64 {
     4.0 * s / (d * d)
 }
 
-/// sqrt(a² + b²) without overflow or underflow on the way.
+/// sqrt(a² + b²) without intermediate overflow or underflow.
 #[inline(always)]
 pub fn hypot(a: f64, b: f64) -> f64 {
     const BIG: f64 = f64::from_bits((1023 + 600) << 52); // 2⁶⁰⁰
@@ -127,10 +128,10 @@ pub fn hypot(a: f64, b: f64) -> f64 {
     (p * p + q * q).sqrt() * back
 }
 
-/// Squares of lengths between these make [`hypot`] a plain square root.
+/// Range of a² + b² in which [`hypot`] is a plain square root.
 const PLAIN: RangeInclusive<f64> = 1e-279..=1e299;
 
-/// [`hypot`] of eight pairs, without the scaling where none of them needs it.
+/// [`hypot`] of eight pairs, without scaling if none of them needs it.
 #[inline(always)]
 pub fn hypots(a: Eight, b: Eight) -> Eight {
     let squares = a * a + b * b;
@@ -153,19 +154,19 @@ pub(super) fn heaviside(x: f64) -> f64 {
     0.5 * (sign(x) + 1.0)
 }
 
-/// The smaller one; NaN if either is NaN.
+/// Minimum; NaN if either operand is NaN.
 #[inline(always)]
 pub(super) fn min(a: f64, b: f64) -> f64 {
     if a < b || a.is_nan() { a } else { b }
 }
 
-/// The larger one; NaN if either is NaN.
+/// Maximum; NaN if either operand is NaN.
 #[inline(always)]
 pub(super) fn max(a: f64, b: f64) -> f64 {
     if a > b || a.is_nan() { a } else { b }
 }
 
-/// xⁿ by repeated multiplication, from the lowest bit of n upwards.
+/// xⁿ by repeated squaring, from the lowest bit of n upwards.
 #[inline(always)]
 pub(super) fn power(x: f64, n: i32) -> f64 {
     let mut bits = n.unsigned_abs();
@@ -187,13 +188,13 @@ pub(super) fn power(x: f64, n: i32) -> f64 {
 mod tests {
     use super::*;
 
-    /// Distance in units of the last place of `reference`.
+    /// Error in units in the last place of `reference`.
     fn ulps(value: f64, reference: f64) -> f64 {
         let next = f64::from_bits(reference.abs().to_bits() + 1);
         (value - reference).abs() / (next - reference.abs())
     }
 
-    /// Points that cover [-bound, bound] densely near zero and near the ends.
+    /// Points that cover [-bound, bound], densely near zero.
     fn sample(bound: f64) -> impl Iterator<Item = f64> {
         (-200_000..=200_000).map(move |i| {
             let s = f64::from(i) / 200_000.0;
@@ -201,7 +202,7 @@ mod tests {
         })
     }
 
-    /// The standard library is within one unit of the last place; ours may add one and a half.
+    /// The standard library is within one unit in the last place; ours may add one and a half.
     #[test]
     fn elementary_functions_agree_with_the_standard_library() {
         for x in sample(700.0) {
@@ -211,7 +212,7 @@ mod tests {
             assert!(ulps(tanh(x), x.tanh()) <= 3.0, "tanh {x}: {} {}", tanh(x), x.tanh());
             assert!(ulps(expm1(x), x.exp_m1()) <= 3.0, "expm1 {x}: {} {}", expm1(x), x.exp_m1());
             let reference = x.cosh().powi(-2);
-            // cosh⁻² of the standard library itself carries three roundings.
+            // cosh⁻² by the standard library itself carries three roundings.
             assert!(ulps(sech_squared(x), reference) <= 6.0, "sech² {x}: {} {reference}", sech_squared(x));
         }
         for x in sample(1e3) {
@@ -245,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn eight_tangents_are_those_of_each_to_the_bit() {
+    fn tanh_of_eight_numbers_equals_the_scalar_results_bitwise() {
         for base in [0.0, 1.0, 19.0, 19.4, 19.5, 19.6, 22.0, 300.0, f64::INFINITY] {
             let x: [f64; 8] = std::array::from_fn(|l| (base + 0.01 * l as f64) * if l % 3 == 0 { -1.0 } else { 1.0 });
             assert_eq!(tanhs(Eight(x)).0.map(f64::to_bits), x.map(|x| tanh(x).to_bits()), "{base}");
@@ -256,7 +257,7 @@ mod tests {
     }
 
     #[test]
-    fn eight_lengths_are_those_of_each_pair() {
+    fn hypot_of_eight_pairs_equals_the_scalar_results() {
         for scale in [1e-300, 2e-140, 1e-139, 1.0, 1e149, 1e200] {
             let (a, b) = ([0.3, -1.0, 0.0, 2.0, 1.0, 1e-9, 3.0, 5.5].map(|a| a * scale), [0.7; 8].map(|b| b * scale));
             assert_eq!(hypots(Eight(a), Eight(b)).0, std::array::from_fn(|l| hypot(a[l], b[l])), "{scale}");

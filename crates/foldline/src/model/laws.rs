@@ -1,7 +1,7 @@
 //! Linear conservation laws and shift symmetries of a vector field.
 //!
-//! **Idea.** A law holds whatever states and parameters are, so it is read off f at as many places as it takes, away from the sizes that a
-//! model has in use: states and parameters of order 1 hide no term behind another.
+//! **Idea.** A law holds for all states and parameters, so it can be read off f at sufficiently many sample points.
+//! These are of order 1 instead of the values in use in the model, so that no term hides behind another.
 //!
 //! **Equations.** With rows f(x_k, p_k)ᵀ in A and rows of f_x(x_k, p_k) in B:
 //!
@@ -10,31 +10,34 @@
 //!   (2)  B s = 0:  x + σ s is a solution with x, for every σ
 //! ```
 //!
-//! The null spaces are reduced to echelon form, whose entries are rational in models written by people, and tested again at other places, in
-//! twice the working precision where the field has it, near and far: a term may be zero as long as states are small, as a contact is.
+//! The null spaces are reduced to echelon form, whose entries are rational in hand-written models. Each law is then
+//! tested at further points, near and far because a term such as a contact may vanish while states are small, in twice
+//! the working precision if available.
 
 use crate::contract::{Batch, Parameters, VectorField};
 
-/// Places beyond the number of states.
+/// Sample points in excess of the number of states.
 const MORE: usize = 8;
-/// Places at which a law is tested again, and sizes of the states at these: what a model switches on within them is seen.
+/// Number of points at which a law is tested, and sizes of the states there, so that terms that switch on at large
+/// states are seen.
 const TESTED: usize = 32;
 const SIZES: [f64; 4] = [1.0, 10.0, 1e2, 1e3];
-/// Pivot, relative to the largest, that counts as zero; rounding leaves some 1e-13 of a few hundred rows.
+/// Pivot, relative to the largest, that counts as zero; with a few hundred rows, rounding leaves about 1e-13.
 const ZERO: f64 = 1e-9;
-/// What is left of a law at a place, relative to its terms: in working precision, and in twice that.
+/// Largest residual of a law, relative to its terms: in working precision, and in twice that.
 const LEFT: [f64; 2] = [1e-12, 1e-25];
-/// Most states for which laws are looked for: elimination takes n³ operations.
+/// Maximum number of states for which laws are sought: elimination costs n³ operations.
 const MOST: usize = 400;
 /// Largest denominator of a coefficient.
 const DENOMINATORS: i32 = 60;
 
-/// Laws (1) that hold for all parameters: coefficients `[n]` of each, with as few states in each as echelon form gives.
+/// Laws (1) that hold for all parameters: coefficients `[n]` of each, sparse as far as echelon form allows.
 pub fn conserved(field: &dyn VectorField) -> Vec<Vec<f64>> {
     laws(&Places { field, fixed: None })
 }
 
-/// Laws (1) at given parameters `[k]` but for some, which take values of their ranges; states are taken from `ranges` `[n]`.
+/// Laws (1) at given parameters `[k]`, except `moving` ones, which vary over their ranges; states are sampled from
+/// `ranges` `[n]`.
 pub fn conserved_at(
     field: &dyn VectorField,
     parameters: &[f64],
@@ -50,7 +53,7 @@ fn laws(places: &Places) -> Vec<Vec<f64>> {
         return Vec::new();
     }
     let rows: Vec<Vec<f64>> = (0..n + MORE).filter_map(|k| places.rate(k)).collect();
-    // Too few places say nothing.
+    // Too few points for a conclusion.
     if rows.len() < n + MORE / 2 {
         return Vec::new();
     }
@@ -58,12 +61,12 @@ fn laws(places: &Places) -> Vec<Vec<f64>> {
     null_space(rows.concat(), n).into_iter().filter(|c| holds(c)).collect()
 }
 
-/// True if c·x keeps its value.
+/// True if c·x is conserved.
 pub(super) fn keeps_its_value(field: &dyn VectorField, c: &[f64]) -> bool {
     Places { field, fixed: None }.keep(c)
 }
 
-/// Shifts (2): directions `[n]`.
+/// Shift symmetries (2): directions `[n]`.
 pub fn shifts(field: &dyn VectorField) -> Vec<Vec<f64>> {
     let n = field.dim();
     if n > MOST {
@@ -82,7 +85,7 @@ pub fn shifts(field: &dyn VectorField) -> Vec<Vec<f64>> {
     if rows.is_empty() { Vec::new() } else { null_space(rows, n).into_iter().filter(holds).collect() }
 }
 
-/// c·x in words, such as "X1 + 2*X2".
+/// c·x as text, such as "X1 + 2*X2".
 pub fn in_words(coefficients: &[f64], names: &[String]) -> String {
     let mut text = String::new();
     for (c, name) in coefficients.iter().zip(names).filter(|(c, _)| **c != 0.0) {
@@ -98,13 +101,13 @@ pub fn in_words(coefficients: &[f64], names: &[String]) -> String {
     text
 }
 
-/// Places at which f is looked at: states and parameters of order 1, all different, or those of a study.
+/// Sample points of f: states and parameters of order 1, all different, or those of a study.
 struct Places<'a> {
     field: &'a dyn VectorField,
     fixed: Option<Fixed<'a>>,
 }
 
-/// Parameters but for some that move, and ranges of the states.
+/// Fixed parameters, parameters that vary, and ranges of the states.
 struct Fixed<'a> {
     parameters: &'a [f64],
     moving: &'a [(usize, [f64; 2])],
@@ -112,7 +115,7 @@ struct Fixed<'a> {
 }
 
 impl Places<'_> {
-    /// A number between 0.4 and 1.6, another one for each place and entry.
+    /// Quasi-random number between 0.4 and 1.6 for each point and entry.
     fn number(k: usize, i: usize) -> f64 {
         0.4 + 1.2
             * ((k + 1) as f64 * 0.618_033_988_749_895 + ((i + 1) as f64).sqrt() * 1.324_717_957 * (k + 2) as f64)
@@ -133,7 +136,7 @@ impl Places<'_> {
         [x, parameters, if self.field.forced() { vec![Self::number(k, n + p)] } else { Vec::new() }]
     }
 
-    /// f, if it is defined there.
+    /// f, if it is defined at sample point k.
     fn rate(&self, k: usize) -> Option<Vec<f64>> {
         let [x, parameters, times] = self.at(k);
         self.rate_at(&x, &parameters, &times)
@@ -155,7 +158,7 @@ impl Places<'_> {
         fx.iter().all(|value| value.is_finite()).then_some(fx)
     }
 
-    /// True if c·f vanishes wherever f is defined, at places of every size and sign.
+    /// True if c·f vanishes wherever f is defined, at points of every size and sign.
     fn keep(&self, c: &[f64]) -> bool {
         let first = self.field.dim() + MORE;
         (first..first + TESTED).all(|k| {
@@ -170,7 +173,7 @@ impl Places<'_> {
         })
     }
 
-    /// True if c·f vanishes there, or f is undefined.
+    /// True if c·f vanishes at a point, or f is undefined there.
     fn keeps(&self, [x, parameters, times]: [Vec<f64>; 3], c: &[f64]) -> bool {
         let double = |v: &[f64]| -> Vec<[f64; 2]> { v.iter().map(|v| [*v, 0.0]).collect() };
         let precisely =
@@ -192,14 +195,14 @@ impl Places<'_> {
     }
 }
 
-/// A sum of two numbers, the larger first, and one more (Knuth's two-sum).
+/// Adds to a double-double number, larger part first (Knuth's two-sum).
 fn added(sum: [f64; 2], more: f64) -> [f64; 2] {
     let whole = sum[0] + more;
     let part = whole - sum[0];
     [whole, sum[1] + (sum[0] - (whole - part)) + (more - part)]
 }
 
-/// A basis of the null space of rows `[count][n]` in echelon form, each vector over its denominators.
+/// Basis of the null space of rows `[count][n]` in echelon form, each vector with cleared denominators.
 pub(crate) fn null_space(mut rows: Vec<f64>, n: usize) -> Vec<Vec<f64>> {
     if n == 0 {
         return Vec::new();
@@ -216,7 +219,7 @@ pub(crate) fn null_space(mut rows: Vec<f64>, n: usize) -> Vec<Vec<f64>> {
     while pivots.len() < count {
         let rank = pivots.len();
         let free = |j: &usize| !pivots.contains(j);
-        // Of pivots that are nearly as large the first, so that the last states are the ones that are left over.
+        // Among nearly equal pivots take the first, so that the last states become the free ones.
         let largest = (rank..count)
             .flat_map(|i| (0..n).filter(free).map(move |j| (i, j)))
             .max_by(|a, b| rows[a.0 * n + a.1].abs().total_cmp(&rows[b.0 * n + b.1].abs()));
@@ -241,7 +244,7 @@ pub(crate) fn null_space(mut rows: Vec<f64>, n: usize) -> Vec<Vec<f64>> {
     let vector = |j: usize| {
         let mut c = vec![0.0; n];
         c[j] = 1.0;
-        // What rounding leaves of an entry that is zero.
+        // Entries that are zero up to rounding.
         let entry = |i: usize| if rows[i * n + j].abs() < 1e-9 { 0.0 } else { -rows[i * n + j] };
         pivots.iter().enumerate().for_each(|(i, pivot)| c[*pivot] = entry(i));
         c.iter_mut().zip(&sizes).for_each(|(c, size)| *c /= size);
@@ -250,7 +253,8 @@ pub(crate) fn null_space(mut rows: Vec<f64>, n: usize) -> Vec<Vec<f64>> {
     simplest(free.map(vector).collect())
 }
 
-/// The same space by vectors with fewer entries, and fewer negative ones: each with another one taken away where that makes it simpler.
+/// Basis of the span with fewer nonzero and fewer negative entries: vectors are subtracted from each other where that
+/// simplifies.
 fn simplest(mut basis: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
     let cost = |c: &[f64]| {
         let count = |of: &dyn Fn(&f64) -> bool| c.iter().filter(|v| of(v)).count();
@@ -279,7 +283,7 @@ fn simplest(mut basis: Vec<Vec<f64>>) -> Vec<Vec<f64>> {
     basis
 }
 
-/// The vector times the smallest number that makes its entries whole, where they are rational; its first entry positive.
+/// Vector scaled by the smallest factor that makes rational entries integers, with a positive first entry.
 fn over_denominators(mut c: Vec<f64>) -> Vec<f64> {
     const NEAR: f64 = 1e-7;
     let smallest = c.iter().filter(|v| **v != 0.0).fold(f64::INFINITY, |m, v| m.min(v.abs()));
@@ -317,7 +321,7 @@ mod tests {
         told
     }
 
-    /// Michaelis-Menten: the enzyme and the material are kept.
+    /// Michaelis-Menten: total enzyme and total substrate are conserved.
     #[test]
     fn the_totals_of_a_reaction_are_found() {
         let m = model(
@@ -330,22 +334,22 @@ mod tests {
     }
 
     #[test]
-    fn a_law_that_holds_at_one_parameter_only_is_none() {
+    fn a_law_that_holds_at_one_parameter_value_only_is_rejected() {
         let m = model(&[("x", "-x + y"), ("y", "x - k*y")], &["k"]);
         assert!(conserved(&m).is_empty());
         let m = model(&[("x", "-x/2 + y^3"), ("y", "x/3 - 2*y^3/3")], &[]);
         assert_eq!(told(&m, conserved(&m)), ["2*x + 3*y"]);
     }
 
-    /// A term that is zero as long as states are of order 1.
+    /// A term that is zero while states are of order 1.
     #[test]
-    fn what_begins_far_away_is_seen() {
+    fn terms_that_switch_on_at_large_states_are_seen() {
         let m = model(&[("x", "k - x"), ("y", "max(0, x - 5) - max(0, y - 40)")], &["k"]);
         assert!(conserved(&m).is_empty());
     }
 
     #[test]
-    fn a_common_shift_is_found() {
+    fn a_shift_symmetry_is_found() {
         let m = model(&[("a", "u"), ("u", "-u - k*sin(a - b)"), ("b", "v"), ("v", "-v - k*sin(b - a)")], &["k"]);
         assert_eq!(told(&m, shifts(&m)), ["a + b"]);
         let pendulum = model(&[("a", "u"), ("u", "-u - k*sin(a)")], &["k"]);

@@ -1,9 +1,9 @@
-//! Words of an expression.
+//! Tokens of an expression.
 
 use super::error::Complaint;
 use std::ops::Range;
 
-/// A word.
+/// Token.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Token {
     Number(f64),
@@ -15,7 +15,7 @@ pub(super) enum Token {
 /// Longer symbols first.
 const SYMBOLS: [&str; 16] = ["<=", ">=", "==", "!=", "+", "-", "*", "/", "^", "(", ")", "[", "]", ",", "<", ">"];
 
-/// The words of `text` with their places (bytes).
+/// Splits `text` into tokens with their byte ranges.
 pub(super) fn words(text: &str) -> Result<Vec<(Token, Range<usize>)>, Complaint> {
     let mut words: Vec<(Token, Range<usize>)> = Vec::new();
     let mut at = 0;

@@ -1,4 +1,4 @@
-//! From terms to nodes.
+//! Lowering of terms to graph nodes.
 
 use super::error::{Complaint, Field, Item};
 use super::family::{Layout, Piece};
@@ -11,25 +11,25 @@ use std::cell::Cell;
 use std::collections::HashSet;
 use std::ops::Range;
 
-/// Turns terms into nodes. Names were checked; what depends on the value of an index is checked here.
+/// Lowers terms to nodes. Names have been checked; anything that depends on the value of an index is checked here.
 pub(super) struct Lowering<'a> {
     pub graph: Graph,
     pub scope: &'a Scope<'a>,
     pub tables: &'a [Table],
-    /// The nodes of the pieces, as far as they are known.
+    /// Nodes of the pieces, as far as they are known.
     pub pieces: Vec<Option<Id>>,
-    /// Of the forcing, once it is known.
+    /// Period of the forcing, once it is known.
     pub period: Option<Id>,
-    /// The velocity of every state that has one.
+    /// Velocity of each state that has one.
     pub velocities: Vec<Option<usize>>,
-    /// Mistakes with their places.
+    /// Errors with their positions.
     pub found: Vec<(Item, Field, Complaint)>,
     told: HashSet<(Item, Field, usize)>,
     place: (Item, Field),
 }
 
 impl<'a> Lowering<'a> {
-    /// Nothing made yet.
+    /// Starts with an empty graph.
     pub fn new(scope: &'a Scope<'a>, tables: &'a [Table], velocities: Vec<Option<usize>>) -> Lowering<'a> {
         Lowering {
             graph: Graph::default(),
@@ -44,7 +44,7 @@ impl<'a> Lowering<'a> {
         }
     }
 
-    /// The node of an expression that stands at `item`; 0 for one that is missing.
+    /// Node of an expression that belongs to `item`; 0 if it is missing.
     pub fn expression(&mut self, item: Item, field: Field, expression: Option<&Expression>, locals: &[Local]) -> Id {
         self.place = (item, field);
         match expression {
@@ -53,7 +53,7 @@ impl<'a> Lowering<'a> {
         }
     }
 
-    /// Gives the pieces their nodes, in an order in which each needs only earlier ones.
+    /// Assigns nodes to the pieces, in an order in which each uses only earlier ones.
     pub fn define(&mut self, order: &[usize], bodies: &[Option<&Expression>], index: impl Fn(Item) -> Option<&'a str>) {
         let layout: &Layout = self.scope.layout;
         for &i in order {
@@ -69,7 +69,7 @@ impl<'a> Lowering<'a> {
         }
     }
 
-    /// The time derivative of a value beyond an end.
+    /// Time derivative of a value beyond an end.
     fn rate(&mut self, of: usize, item: Item, field: Field) -> Id {
         let zero = self.graph.constant(0.0);
         let Some(value) = self.pieces[of] else { return zero };
@@ -104,7 +104,7 @@ impl<'a> Lowering<'a> {
 
     fn wrong(&mut self, complaint: Complaint) -> Id {
         let (item, field) = self.place;
-        // One element of many is enough.
+        // Report only one element of a repeated item.
         if self.told.insert((item, field, complaint.span.start)) {
             self.found.push((item, field, complaint));
         }
@@ -183,7 +183,7 @@ impl<'a> Lowering<'a> {
             Symbol::State(i) => self.graph.leaf(Leaf::State(i as u32)),
             Symbol::Parameter(k) => self.graph.leaf(Leaf::Parameter(k as u32)),
             Symbol::Definition(piece) => self.pieces[piece].unwrap_or_else(|| self.graph.constant(0.0)),
-            // Checked when the names were.
+            // Already reported by the check of names.
             Symbol::Family(_) => self.graph.constant(0.0),
             Symbol::Time => {
                 let time = self.graph.leaf(Leaf::Time);

@@ -1,16 +1,17 @@
-//! Equations that are coupled by a mass matrix.
+//! Equations coupled by a mass matrix.
 //!
-//! **Idea.** M(y) dy/dt = f(y) is solved for dy/dt once, on the graph: Gaussian elimination whose pivots are the diagonal in the order of the
-//! equations, entries that are identically zero left out. The result is an ordinary vector field with exact derivatives.
+//! **Idea.** M(y) dy/dt = f(y) is solved for dy/dt once, on the graph, by Gaussian elimination with diagonal pivots in
+//! the order of the equations; structurally zero entries are skipped. The result is an ordinary vector field with exact
+//! derivatives.
 //!
-//! **Fails when** a pivot becomes zero at some state: the field is not finite there, and the computation says so.
+//! **Fails when** a pivot becomes zero at some state: the field is not finite there, and the computation reports that.
 
 use super::graph::{Graph, Id};
 
-/// An entry: row, column, node.
+/// Entry: row, column, node.
 pub(super) type Entry = (usize, usize, Id);
 
-/// Replaces `field` by M⁻¹ `field`; rows without an entry are those of the unit matrix. Returns the row of a pivot that is
+/// Replaces `field` by M⁻¹ `field`; rows without entries are those of the identity. Returns the row of a pivot that is
 /// identically zero.
 pub(super) fn solve(graph: &mut Graph, entries: &[Entry], field: &mut [Id]) -> Result<(), usize> {
     let mut members: Vec<usize> = entries.iter().flat_map(|(row, column, _)| [*row, *column]).collect();

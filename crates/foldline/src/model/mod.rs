@@ -1,12 +1,12 @@
-//! How is a model written, evaluated, differentiated?
+//! Models: source text, compilation, evaluation and differentiation.
 //!
 //! **Idea.** A model is a set of expressions. They become a graph in which equal subexpressions are one node (`graph`),
-//! are differentiated on that graph to any order (`derive`), and become tapes (`tape`) that run over all lanes of a batch
-//! (`run`) about as fast as code written by hand, without a compiler.
+//! are differentiated on that graph to any order (`derive`), and become tapes (`tape`) that run over all lanes of a
+//! batch (`run`) about as fast as hand-written code, without a compiler.
 //!
-//! Text takes the way `lexer` → `parser` → `compile`: names are laid out (`family`) and checked (`check`, `words`), definitions put in
-//! order (`order`), expressions read with their index given (`scope`) and turned into nodes (`lower`). Units are checked apart from that (`dimensions`). Whatever is wrong comes back
-//! as a list of [`ModelError`], each with its place.
+//! Text passes through `lexer` → `parser` → `compile`: names are laid out (`family`) and checked (`check`, `words`),
+//! definitions ordered (`order`), expressions read for a given index (`scope`) and turned into nodes (`lower`). Units
+//! are checked separately (`dimensions`). All errors come back as a list of [`ModelError`] with positions.
 
 mod angles;
 mod callable;
@@ -66,7 +66,7 @@ use std::sync::{Arc, PoisonError, RwLock};
 use switches::Switches;
 use tape::Tape;
 
-/// A model: a vector field with names, units and outputs. Clones share everything.
+/// Model: a vector field with names, units and outputs. Clones share everything.
 ///
 /// ```
 /// use foldline::model::{Definition, Model, ModelSource, Parameter, State};
@@ -87,14 +87,14 @@ pub struct Model {
     inner: Arc<Inner>,
 }
 
-/// What a model is about; read through [`Model`].
+/// Description of a model: names, units and texts; accessed through [`Model`].
 #[derive(Clone, Debug)]
 pub struct About {
-    /// Its name.
+    /// Name.
     pub name: String,
-    /// What it describes.
+    /// Description.
     pub description: String,
-    /// Where it comes from.
+    /// Origin, such as a publication.
     pub source: String,
     /// States, numbered as in the vector field.
     pub states: Vec<State>,
@@ -106,9 +106,9 @@ pub struct About {
     pub outputs: Vec<Output>,
     /// The two states u, v that form the complex signal u + j v.
     pub whirl: Option<[usize; 2]>,
-    /// Unit of time, and so of periods; empty where it is not known.
+    /// Unit of time, and hence of periods; empty if not known.
     pub time: String,
-    /// What is doubtful about the units, in words.
+    /// Remarks on doubtful units.
     pub remarks: Vec<String>,
 }
 
@@ -117,7 +117,7 @@ struct Inner {
     compiled: Compiled,
     field: Tape,
     period: Option<Tape>,
-    /// `[n]` of the states, or nothing; see [`VectorField::periods`].
+    /// `[n]`, or empty if no state is an angle; see [`VectorField::periods`].
     periods: Vec<f64>,
     outputs: Tape,
     switches: Switches,
@@ -134,7 +134,7 @@ impl Deref for Model {
 }
 
 impl Model {
-    /// The model that `source` describes, or everything that is wrong with it.
+    /// Compiles `source`, or returns all its errors.
     pub fn compile(source: ModelSource) -> Result<Model, Vec<ModelError>> {
         let (source, totals) = if source.totals.is_empty() { (source, Vec::new()) } else { totals::reduced(source)? };
         let (compiled, Named { states, parameters, outputs: output_list }) = compile(&source)?;
@@ -162,7 +162,7 @@ impl Model {
         }
     }
 
-    /// A forcing that does not repeat itself after the period it is said to have.
+    /// Error if the forcing is not periodic with its stated period.
     fn wrong_period(&self) -> Option<ModelError> {
         let names: Vec<String> =
             self.states.iter().map(|s| &s.name).chain(self.outputs.iter().map(|o| &o.name)).cloned().collect();
@@ -171,14 +171,14 @@ impl Model {
         Some(ModelError { item, field, name: String::new(), span: None, message, hint })
     }
 
-    /// The same model with other labels: unit of time, and remarks.
+    /// Sets the unit of time and the remarks.
     pub fn with_time(mut self, time: &str, remarks: Vec<String>) -> Model {
         let about = Arc::make_mut(&mut self.about);
         (about.time, about.remarks) = (time.to_string(), remarks);
         self
     }
 
-    /// The same model with other units as labels, by name; `period` is the time. Its numbers stay as they are.
+    /// Copy with other unit labels, by name; the name `period` sets the unit of time. Values are unchanged.
     pub(crate) fn labelled(&self, units: &[(String, String)]) -> Model {
         let mut model = self.clone();
         let about = Arc::make_mut(&mut model.about);
@@ -193,27 +193,27 @@ impl Model {
         model
     }
 
-    /// Position of the parameter of that name.
+    /// Index of the parameter with the given name.
     pub fn parameter_index(&self, name: &str) -> Option<usize> {
         self.parameters.iter().position(|p| p.name == name)
     }
 
-    /// Position of the state of that name.
+    /// Index of the state with the given name.
     pub fn state_index(&self, name: &str) -> Option<usize> {
         self.states.iter().position(|s| s.name == name)
     }
 
-    /// Index and period of every state that is an angle.
+    /// Index and period of each state that is an angle.
     pub fn angles(&self) -> impl Iterator<Item = (usize, f64)> {
         self.states.iter().enumerate().filter_map(|(i, state)| Some((i, state.period?)))
     }
 
-    /// Position of the output of that name.
+    /// Index of the output with the given name.
     pub fn output_index(&self, name: &str) -> Option<usize> {
         self.outputs.iter().position(|o| o.name == name)
     }
 
-    /// The unit of a state or, behind the states, of an output; empty where there is neither.
+    /// Unit of a state or output, states first; empty if the index is out of range.
     pub fn channel_unit(&self, index: usize) -> &str {
         match index.checked_sub(self.states.len()) {
             None => self.states.get(index).map_or("", |own| &own.unit),
@@ -221,17 +221,17 @@ impl Model {
         }
     }
 
-    /// The value of every parameter.
+    /// Default values of all parameters.
     pub fn defaults(&self) -> Vec<f64> {
         self.parameters.iter().map(|p| p.value).collect()
     }
 
-    /// Characteristic size of every state as far as the model states it, else 1; [`crate::explore::System`] knows more.
+    /// Characteristic sizes of the states as stated by the model, else 1; [`crate::explore::System`] refines them.
     pub fn scales(&self) -> Vec<f64> {
         self.states.iter().map(|s| s.stated_scale().unwrap_or(1.0)).collect()
     }
 
-    /// Where initial values of every state are sampled, with [`Model::scales`].
+    /// Ranges from which initial values of the states are sampled, based on [`Model::scales`].
     pub fn ranges(&self) -> Vec<[f64; 2]> {
         self.states.iter().zip(self.scales()).map(|(state, scale)| state.range_at(scale)).collect()
     }
@@ -257,7 +257,7 @@ impl Model {
         })
     }
 
-    /// The multilinear derivative of that order; without parameter parts of the directions where these are all zero.
+    /// Multilinear derivative of the given order; without parameter parts if those of all directions are zero.
     fn directional_tape(&self, order: usize, with_parameters: bool) -> Arc<Tape> {
         let key = (order, with_parameters);
         let cached = self.inner.directional.read().unwrap_or_else(PoisonError::into_inner).get(&key).cloned();

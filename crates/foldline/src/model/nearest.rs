@@ -1,7 +1,7 @@
 //! "Did you mean …?"
 
-/// The candidate closest to `word` by edit distance, if it is close enough to be what was meant; among equals the one whose
-/// length differs least, so that swapped letters come before missing ones.
+/// Returns the candidate closest to `word` by edit distance, if close enough to be a likely misspelling. Ties go to the
+/// one closest in length, so that swapped letters rank before missing ones.
 pub fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let length = word.chars().count();
     if length > LONGEST {
@@ -18,13 +18,13 @@ pub fn nearest<'a>(word: &str, candidates: impl IntoIterator<Item = &'a str>) ->
         .map(|(_, candidate)| candidate)
 }
 
-/// Candidates that are listed where none is near.
+/// Maximum number of candidates listed if none is close.
 const LISTED: usize = 24;
 /// Longer words are not compared letter by letter.
 const LONGEST: usize = 64;
 
-/// A hint that names the nearest candidate, or lists the candidates where none is near. Letters that look alike and are not
-/// the same are given with their code points.
+/// Hint that names the nearest candidate, or lists the candidates if none is close. Different letters that look alike
+/// are given with their code points.
 pub fn suggest(word: &str, candidates: &[&str]) -> String {
     let Some(candidate) = nearest(word, candidates.iter().copied()) else {
         return match candidates.get(..LISTED) {
@@ -40,13 +40,13 @@ pub fn suggest(word: &str, candidates: &[&str]) -> String {
     }
 }
 
-/// In small letters, with the micro sign of keyboards as the Greek letter (the signs for ohm and ångström have small letters
-/// that are the letters').
+/// Lower case, with the micro sign of keyboards as the Greek letter (the signs for ohm and ångström already have the
+/// letters as their lower case).
 fn folded(word: &str) -> String {
     word.to_lowercase().replace('\u{b5}', "\u{3bc}")
 }
 
-/// Insertions, deletions, replacements and swaps of neighbours that turn one word into the other.
+/// Number of insertions, deletions, replacements and swaps of neighbours that turn one word into the other.
 fn distance(a: &str, b: &str) -> usize {
     let (a, b): (Vec<char>, Vec<char>) = (a.chars().collect(), b.chars().collect());
     let mut rows = vec![vec![0; b.len() + 1]; a.len() + 1];
@@ -72,7 +72,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn slips_of_the_pen_are_recognised_and_other_words_are_not() {
+    fn misspellings_are_recognised_and_other_words_are_not() {
         assert_eq!(nearest("Omgea", ["kappa", "Omega"]), Some("Omega"));
         assert_eq!(nearest("omega", ["kappa", "Omega"]), Some("Omega"));
         assert_eq!(nearest("tahn", ["tan", "tanh"]), Some("tanh"));
@@ -80,7 +80,7 @@ mod tests {
     }
 
     #[test]
-    fn letters_that_look_alike_are_told_apart() {
+    fn letters_that_look_alike_are_distinguished() {
         assert_eq!(
             suggest("\u{b5}", &["\u{3bc}", "x"]),
             "did you mean `\u{3bc}`? `\u{b5}` is U+00B5, `\u{3bc}` is U+03BC"

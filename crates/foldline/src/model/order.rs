@@ -8,15 +8,15 @@ use super::scope::{Local, Scope};
 use std::collections::HashMap;
 use std::ops::Range;
 
-/// Names of a circle that are listed.
+/// Maximum number of names listed of a circular definition.
 const LONGEST_CIRCLE: usize = 12;
-/// Deepest nesting of functions that call functions.
+/// Maximum nesting of functions that call functions.
 const DEEPEST_CALL: usize = 50;
 
-/// Uses of each item, with their places.
+/// Uses of each item, with their positions.
 type Uses = Vec<Vec<(usize, Range<usize>)>>;
 
-/// An order in which each uses only earlier ones, or the circle that prevents it: its members, and the last use.
+/// Order in which each item uses only earlier ones, or the cycle that prevents it: its members, and the last use.
 fn ordered(uses: &Uses) -> Result<Vec<usize>, (Vec<usize>, Range<usize>)> {
     let mut users: Vec<Vec<usize>> = vec![Vec::new(); uses.len()];
     uses.iter().enumerate().for_each(|(i, list)| list.iter().for_each(|(j, _)| users[*j].push(i)));
@@ -40,7 +40,7 @@ fn ordered(uses: &Uses) -> Result<Vec<usize>, (Vec<usize>, Range<usize>)> {
     }
 }
 
-/// The circle that is reached from `start` along what is not settled.
+/// Cycle reached from `start` through unsettled items.
 fn circle(start: usize, uses: &Uses, settled: &[bool]) -> Option<(Vec<usize>, Range<usize>)> {
     let mut path = vec![start];
     let mut place: HashMap<usize, usize> = HashMap::from([(start, 0)]);
@@ -64,7 +64,7 @@ fn chain(mut names: Vec<String>) -> String {
 }
 
 impl Check<'_> {
-    /// Refuses functions that call each other in a circle, or too deep.
+    /// Rejects functions that call each other circularly or too deeply.
     pub fn calls(&mut self, functions: &[Option<Expression>]) {
         let uses: Uses = functions
             .iter()
@@ -100,7 +100,7 @@ impl Check<'_> {
         }
     }
 
-    /// The pieces in an order in which each uses only earlier ones.
+    /// Orders the pieces so that each uses only earlier ones.
     pub fn order(&mut self, scope: &Scope, layout: &Layout, bodies: &[Option<&Expression>]) -> Vec<usize> {
         let mut uses: Uses = Vec::with_capacity(layout.pieces.len());
         let mut reported: Option<(Item, Field)> = None;
@@ -112,7 +112,7 @@ impl Check<'_> {
                 let index = self.index(piece.item).zip(piece.element).map(|(name, k)| Local::index(name, k as f64));
                 if let Err(complaint) = scope.uses(body, index.as_slice(), None, &mut own) {
                     self.complain(piece.item, piece.field, complaint);
-                    // The other elements of the same expression have the same mistake.
+                    // The other elements of this expression have the same error.
                     reported = Some(place);
                 }
             }

@@ -1,4 +1,4 @@
-//! From words to a list of terms.
+//! Parser from tokens to a list of terms.
 //!
 //! **Equations.** Grammar, loosest binding first:
 //!
@@ -9,7 +9,7 @@
 //! 5. power = atom [ ^ signed ], so -x^2 = -(x^2), x^y^z = x^(y^z), and 2^-1 is allowed
 //! 6. atom = number | name | name [ comparison ] | name ( comparison { , comparison } ) | ( comparison )
 //!
-//! `sum(j, first, last, term)` has a name, not a value, in its first place.
+//! The first argument of `sum(j, first, last, term)` is a name, not a value.
 
 use super::callable::{Callables, Callee, SUM};
 use super::error::Complaint;
@@ -18,28 +18,28 @@ use super::graph::{Binary, Unary};
 use super::lexer::{Token, words};
 use std::ops::Range;
 
-/// Deepest nesting of brackets, signs and powers.
+/// Maximum nesting of brackets, signs and powers.
 const DEEPEST: usize = 200;
 
-/// Deepest nesting of sums.
+/// Maximum nesting of sums.
 const DEEPEST_SUM: usize = 8;
 
-/// What a term is; operands are indices of earlier terms.
+/// Kind of a term; operands are indices of earlier terms.
 #[derive(Clone, Debug)]
 pub(super) enum Term {
     Number(f64),
     Name(String),
     Unary(Unary, usize),
     Binary(Binary, usize, usize),
-    /// Unused places repeat the first argument.
+    /// Unused positions repeat the first argument.
     Call(&'static Function, [usize; 3]),
-    /// The element of a repeated quantity with that index.
+    /// Element of a repeated quantity, with its index.
     Element(String, usize),
-    /// A function of the model.
+    /// Function of the model.
     Apply(usize, Vec<usize>),
-    /// A table.
+    /// Table.
     Lookup(usize, usize),
-    /// A sum over an index.
+    /// Sum over an index.
     Sum(Box<Sum>),
 }
 
@@ -53,7 +53,7 @@ pub(super) struct Sum {
     pub term: Expression,
 }
 
-/// A parsed expression: terms, operands before their users; the last one is the whole.
+/// Parsed expression: terms, operands before their users; the last term is the whole expression.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Expression {
     pub terms: Vec<Term>,
@@ -82,7 +82,7 @@ impl Expression {
         }
     }
 
-    /// All terms with their places, those inside sums included.
+    /// Visits all terms with their spans, including those inside sums.
     pub fn each(&self, visit: &mut dyn FnMut(&Term, &Range<usize>)) {
         for (term, span) in self.terms.iter().zip(&self.spans) {
             visit(term, span);
@@ -106,7 +106,7 @@ struct Parser<'a> {
 type Parsed = Result<usize, Complaint>;
 
 impl Parser<'_> {
-    /// The next word if it is one of these symbols; it is consumed.
+    /// Consumes and returns the next token if it is one of these symbols.
     fn take(&mut self, symbols: &[&str]) -> Option<(&'static str, Range<usize>)> {
         match self.words.get(self.at) {
             Some((Token::Symbol(symbol), span)) if symbols.contains(symbol) => {
@@ -272,7 +272,7 @@ impl Parser<'_> {
         Ok(self.push(Term::Call(function, [first, place(1), place(2)]), whole))
     }
 
-    /// The rest of `name[index]`.
+    /// Parses the rest of `name[index]`.
     fn element(&mut self, name: String, span: Range<usize>, open: Range<usize>) -> Parsed {
         let index = self.comparison()?;
         let Some((_, close)) = self.take(&["]"]) else {
@@ -282,7 +282,7 @@ impl Parser<'_> {
         Ok(self.push(Term::Element(name, index), span.start..close.end))
     }
 
-    /// The rest of `sum(index, first, last, term)`.
+    /// Parses the rest of `sum(index, first, last, term)`.
     fn series(&mut self, span: Range<usize>, open: Range<usize>) -> Parsed {
         let form = |span: Range<usize>| {
             let hint = "write the index, its first and last value, and the term: `sum(j, 1, n, x[j])`";
@@ -313,7 +313,7 @@ impl Parser<'_> {
         Ok(self.push(Term::Sum(Box::new(sum)), span.start..close.end))
     }
 
-    /// The bracket that closes the one at `open`.
+    /// Consumes the bracket that closes the one at `open`.
     fn close(&mut self, open: &Range<usize>) -> Result<Range<usize>, Complaint> {
         if let Some((_, close)) = self.take(&[")"]) {
             return Ok(close);
@@ -333,7 +333,7 @@ impl Parser<'_> {
         }
     }
 
-    /// A word that cannot stand where it stands.
+    /// Error for a misplaced token.
     fn unexpected(&self, token: Token, span: Range<usize>) -> Complaint {
         let after_value = self.at > 0
             && match &self.words[self.at - 1].0 {

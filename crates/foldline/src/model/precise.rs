@@ -1,15 +1,16 @@
-//! Expressions in twice the working precision.
+//! Evaluation of expressions in twice the working precision.
 //!
-//! **Idea.** The graph is evaluated node by node in numbers that are the sum of two. Slow, and free of what rounding does to
-//! a residual that should be zero: for checks.
+//! **Idea.** The graph is evaluated node by node in double-double arithmetic (a number is the unevaluated sum of two).
+//! This is slow, but free of the rounding that limits a residual that should be zero; it is meant for checks.
 //!
-//! **Departures.** Sums, products and roots are the library's. Its quotients and its `sin` are right to 1e-16 only, its `exp` of negative
-//! numbers to 1e-11; so these are made here, the functions as series, inverses by a Newton step from the value in working precision.
+//! **Departures.** Sums, products and roots are the library's. Its quotients and `sin` are accurate to 1e-16 only, its
+//! `exp` of negative numbers to 1e-11. These are implemented here: functions as series, inverses by a Newton step from
+//! working precision.
 
 use super::graph::{Binary, Graph, Id, Leaf, Node, Unary};
 use twofloat::TwoFloat;
 
-/// The values of `roots`, or `None` where one of them is not a number. States and parameters are sums of two numbers each.
+/// Values of `roots`, or `None` if one of them is not a number. States and parameters are double-double numbers.
 pub(super) fn evaluate(
     graph: &Graph,
     roots: &[Id],
@@ -70,7 +71,7 @@ fn unary(op: Unary, x: TwoFloat) -> TwoFloat {
         }
         Unary::Atan => atan2(x, 1.0.into()),
         Unary::Sinh => {
-            // Without cancellation next to zero.
+            // This form does not cancel near zero.
             let m = exp_m1(x.abs());
             let size = (m + divide(m, m + 1.0)) * 0.5;
             if x < zero { -size } else { size }
@@ -112,7 +113,7 @@ fn unary(op: Unary, x: TwoFloat) -> TwoFloat {
     }
 }
 
-/// What the quotient of the library leaves is divided once more.
+/// Quotient of the library, corrected once by dividing its remainder.
 fn divide(a: TwoFloat, b: TwoFloat) -> TwoFloat {
     let quotient = a / b;
     let rest = (a - quotient * b) / b;
@@ -133,16 +134,16 @@ fn exp(x: TwoFloat) -> TwoFloat {
     (expm1_small(x - twofloat::consts::LN_2 * k) + 1.0) * half.exp2() * (k - half).exp2()
 }
 
-/// By the series around the nearest multiple of a right angle.
+/// Sine and cosine by series about the nearest multiple of a right angle.
 fn sin_cos(x: TwoFloat) -> (TwoFloat, TwoFloat) {
     let quarters = (x.hi() / std::f64::consts::FRAC_PI_2).round();
-    // Beyond this the nearest multiple is not known.
+    // Beyond this the nearest multiple cannot be determined.
     if quarters.is_nan() || quarters.abs() > 1e15 {
         return (x.hi().sin().into(), x.hi().cos().into());
     }
     let r = x - twofloat::consts::FRAC_PI_2 * quarters;
     let square = r * r;
-    // 1 - r²/(k (k - 1)) (1 - r²/((k - 2) (k - 3)) (…)): what is left out is below (π/4)³⁰/30!.
+    // 1 - r²/(k (k - 1)) (1 - r²/((k - 2) (k - 3)) (…)): the truncation error is below (π/4)³⁰/30!.
     let one = TwoFloat::from(1.0);
     let series = |last: u32| {
         let factors = (2..=last).rev().step_by(2).map(|k| f64::from(k * (k - 1)));
@@ -157,7 +158,7 @@ fn sin_cos(x: TwoFloat) -> (TwoFloat, TwoFloat) {
     }
 }
 
-/// The angle in working precision, and by how much (a, b) points elsewhere.
+/// Angle in working precision, corrected by the deviation of (a, b) from it.
 fn atan2(a: TwoFloat, b: TwoFloat) -> TwoFloat {
     let y = a.hi().atan2(b.hi());
     let (sin, cos) = sin_cos(y.into());
@@ -179,7 +180,7 @@ fn expm1_small(x: TwoFloat) -> TwoFloat {
     m
 }
 
-/// log(1 + x), by the series next to 0.
+/// log(1 + x), by the series near 0.
 fn log1p(x: TwoFloat) -> TwoFloat {
     if x.hi().abs() > 1e-3 {
         return log(x + 1.0);
@@ -188,7 +189,7 @@ fn log1p(x: TwoFloat) -> TwoFloat {
     x - sum * x
 }
 
-/// The derivative of that order of (eˣ - 1)/x, as in [`super::exprel`].
+/// Derivative of (eˣ - 1)/x of the given order, as in [`super::exprel`].
 fn exprel(order: u8, x: TwoFloat) -> TwoFloat {
     let (m, size) = (f64::from(order), x.abs());
     if size.hi() > m + 2.0 || !size.hi().is_finite() {
@@ -208,7 +209,8 @@ fn exprel(order: u8, x: TwoFloat) -> TwoFloat {
     if positive { sum } else { sum * exp(x) }
 }
 
-/// From the logarithm y in working precision: x e^-y differs from 1 by rounding, of which the logarithm is a short series.
+/// Logarithm from its value y in working precision: x e^-y differs from 1 by rounding, so its logarithm is a short
+/// series.
 fn log(x: TwoFloat) -> TwoFloat {
     let y = x.hi().ln();
     if !y.is_finite() {
@@ -218,7 +220,7 @@ fn log(x: TwoFloat) -> TwoFloat {
     rest * (rest * -0.5 + 1.0) + y
 }
 
-/// aᵇ; for an integer b by multiplication.
+/// aᵇ; by multiplication for an integer b.
 fn power(a: TwoFloat, b: TwoFloat) -> TwoFloat {
     let whole = b.hi() as i32;
     if b == TwoFloat::from(f64::from(whole)) {
@@ -310,7 +312,7 @@ mod tests {
         }
     }
 
-    /// Identities, whose two sides go different ways: what is left is the error of the functions.
+    /// Identities whose two sides are computed differently: the difference is the error of the functions.
     #[test]
     fn functions_are_right_far_beyond_working_precision() {
         let identities = [
@@ -350,9 +352,9 @@ mod tests {
         }
     }
 
-    /// (x + a) - x - a is zero but for rounding, which is 1e-17 in one precision and 1e-33 in the other.
+    /// (x + a)² - x² - 2ax - a² is zero up to rounding: about 1e-17 in working precision and 1e-33 in twice that.
     #[test]
-    fn what_rounding_leaves_is_smaller_by_sixteen_orders() {
+    fn rounding_errors_are_sixteen_orders_smaller() {
         let model = model("(x + a)^2 - x^2 - 2*a*x - a^2");
         let x = 0.712_345_678_9;
         let precise = model.evaluate_precisely(&[[x, 1e-17]], &[[0.3, 0.0]]).unwrap();

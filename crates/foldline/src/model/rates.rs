@@ -1,19 +1,20 @@
-//! Quotients that are 0/0 at one point and smooth all the same.
+//! Quotients that are smooth although they are 0/0 at one point.
 //!
-//! **Idea.** Rates of ion channels are written u/(1 - exp(w)) with w proportional to u. At u = 0 such a formula has no value, though the
-//! function does. It is replaced by the relative exponential of `exprel`, which is the same function everywhere else.
+//! **Idea.** Ion-channel rates are written u/(1 - exp(w)) with w proportional to u. At u = 0 the formula is undefined
+//! although the function is not. It is replaced by the relative exponential of `exprel`, an identical function
+//! everywhere else.
 //!
 //! **Equations.** With e₀(w) = (eʷ - 1)/w:
 //!
-//! 1. u/(eʷ - 1) = (u/w)/e₀(w), where u/w is free of the factor that vanishes
+//! 1. u/(eʷ - 1) = (u/w)/e₀(w), where the vanishing factor of u/w has been cancelled
 //! 2. u/(1 - eʷ) = -(u/w)/e₀(w)
 //!
-//! **Departures.** Recognised where u and w have a factor in common that is a state, or one that is the same number times
-//! the other: 0.1 v + 4 and -(v + 40)/10.
+//! **Departures.** Recognised if u and w share a factor that is a state, or one up to a constant multiple: 0.1 v + 4
+//! and -(v + 40)/10.
 
 use super::graph::{Binary, Graph, Id, Node, Unary};
 
-/// Factors that are looked at; products with more are left as they are.
+/// Maximum number of factors examined; products with more are left unchanged.
 const MOST_FACTORS: usize = 16;
 
 /// A product of powers ±1 with a sign.
@@ -25,7 +26,7 @@ struct Factors {
 }
 
 impl Graph {
-    /// a / b, in the form of equation 1 or 2 where b is made of a difference that vanishes with a.
+    /// a / b, in the form of equation 1 or 2 if b contains a difference that vanishes with a.
     pub fn quotient_of_rates(&mut self, a: Id, b: Id) -> Id {
         match self.relative(a, b) {
             Some(quotient) => quotient,
@@ -40,7 +41,7 @@ impl Graph {
             Some((place, exponent, negative))
         })?;
         let (mut u, w) = (self.factors(a)?, self.factors(exponent)?);
-        // Factors of u that are numbers times factors of w go with them.
+        // Cancel factors of u that are constant multiples of factors of w.
         let (mut ratio, mut left) = (1.0, Vec::new());
         for q in &w.above {
             match u.above.iter().enumerate().find_map(|(i, p)| Some((i, self.ratio(*p, *q)?))) {
@@ -71,7 +72,7 @@ impl Graph {
         Some(self.divide(quotient, relative))
     }
 
-    /// w of eʷ - 1, and whether it is 1 - eʷ.
+    /// w of eʷ - 1, and true if the expression is 1 - eʷ.
     fn exponential_less_one(&self, id: Id) -> Option<(Id, bool)> {
         let exponent = |id: Id| match self.node(id) {
             Node::Unary(Unary::Exp, w) => Some(w),
@@ -87,7 +88,7 @@ impl Graph {
         }
     }
 
-    /// The factors of a product or quotient.
+    /// Factors of a product or quotient.
     fn factors(&self, id: Id) -> Option<Factors> {
         let mut factors = Factors::default();
         let mut wait = vec![(id, true)];
@@ -109,16 +110,16 @@ impl Graph {
         Some(factors)
     }
 
-    /// r with p = r q, where the form of the two shows it.
+    /// r with p = r q, if the form of the two shows it.
     fn ratio(&self, p: Id, q: Id) -> Option<f64> {
         let ([a, b], x) = self.straight(p)?;
         let ([c, d], y) = self.straight(q)?;
-        // Constants as decimals are rounded: 0.1 · 40 and 4 may differ in the last digit.
+        // Decimal constants are rounded: 0.1 · 40 and 4 may differ in the last digit.
         let (across, back) = (b * c, a * d);
         (x == y && (across - back).abs() <= 4.0 * f64::EPSILON * across.abs()).then_some(a / c)
     }
 
-    /// [a, b] and x with the node a x + b, for a node that varies; x is a node, or the difference of two.
+    /// [a, b] and x such that the node is a x + b, for a varying node; x is a node, or the difference of two.
     fn straight(&self, id: Id) -> Option<([f64; 2], [Id; 2])> {
         let (mut slope, mut shift, mut at) = (1.0, 0.0, id);
         for _ in 0..MOST_FACTORS {
@@ -195,7 +196,7 @@ mod tests {
     }
 
     #[test]
-    fn elsewhere_they_are_what_is_written() {
+    fn elsewhere_rates_equal_the_written_formula() {
         for v in [-80.0f64, -41.0, -39.9, 0.0, 60.0] {
             let expected = 0.1 * (v + 40.0) / (1.0 - (-(v + 40.0) / 10.0).exp());
             let found = value("0.1*(v + 40)/(1 - exp(-(v + 40)/10))", v)[0];
@@ -204,7 +205,7 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_vanish_together_stays() {
+    fn quotients_without_a_common_zero_are_unchanged() {
         assert!(value("(v + 39)/(1 - exp(-(v + 40)/10))", -40.0)[0].is_infinite());
         assert!(value("v/(2 - exp(v))", 2.0f64.ln())[0].abs() > 1e10);
     }

@@ -1,10 +1,10 @@
-//! Running a tape over the lanes of a batch.
+//! Execution of a tape over the lanes of a batch.
 //!
-//! **Idea.** Lanes are taken 64 or 32 at a time (16 or 8 for a short rest), so that one instruction is looked up once and then runs
-//! as a loop of fixed length, which the compiler turns into vector instructions; the widest set that the machine has is chosen
-//! when the program runs. What all lanes share is computed once, as plain numbers, and not again while one tape runs at the
-//! same parameters. Registers live in a per-thread store that grows to the largest tape and is then reused; they are cells, so
-//! an instruction may write where it reads.
+//! **Idea.** Lanes are taken 64 or 32 at a time (16 or 8 for a short remainder). Each instruction is decoded once and
+//! then runs as a loop of fixed length, which the compiler turns into vector instructions; the widest instruction set
+//! of the machine is chosen at run time. Values common to all lanes are computed once, as plain numbers, and reused
+//! while one tape runs at unchanged parameters. Registers live in a per-thread store that grows to the largest tape and
+//! is then reused; they are cells, so an instruction may write where it reads.
 
 use super::graph::{Binary, Leaf, Unary};
 use super::kernels;
@@ -13,22 +13,22 @@ use crate::contract::{Batch, Parameters};
 use crate::linalg::lane::{Eight, Lane as _};
 use std::cell::{Cell, RefCell};
 
-/// Eights of lanes that are taken at a time, …
+/// Groups of eight lanes taken at a time, …
 const FEW: usize = 4;
-/// … where the registers then fill no more than [`IN_CACHE`] eights, a good part of the fastest cache, …
+/// … if the registers then fill at most [`IN_CACHE`] f64x8, a good part of the first-level cache, …
 const MANY: usize = 8;
 const IN_CACHE: usize = 256;
-/// … and at most, but for a single one, where few are left.
+/// … or for a short remainder; a single group is the smallest.
 const PAIR: usize = 2;
 
-/// A value for the lanes that are taken together.
+/// Value for the lanes taken together.
 type Lanes<const W: usize> = [Cell<Eight>; W];
 
 #[derive(Default)]
 struct Store {
     registers: Vec<Eight>,
     scalars: Vec<f64>,
-    /// The code and the parameters to which the scalars belong.
+    /// Code and parameters to which the scalars belong.
     code: u64,
     parameters: Vec<f64>,
 }
@@ -39,15 +39,15 @@ thread_local! {
     };
 }
 
-/// What a tape reads.
+/// Inputs of a tape.
 #[derive(Clone, Copy)]
 struct Inputs<'a> {
     at: Batch<'a>,
     directions: &'a [&'a [f64]],
     scalars: &'a [f64],
-    /// First of the lanes that are taken together.
+    /// First of the lanes taken together.
     first: usize,
-    /// How many of them exist.
+    /// Number of those lanes that exist.
     live: usize,
 }
 
@@ -86,7 +86,7 @@ impl Tape {
     }
 }
 
-/// One run, handed to the dispatcher of instruction sets.
+/// One run, passed to the dispatcher of instruction sets.
 struct Run<'a, 'b, 'c> {
     code: &'a Code,
     inputs: Inputs<'a>,
@@ -104,7 +104,7 @@ impl pulp::NullaryFnOnce for Run<'_, '_, '_> {
         let most = if code.registers * MANY > IN_CACHE { FEW } else { MANY };
         while inputs.first < lanes {
             let left = lanes - inputs.first;
-            // Two narrow ones cost less than a wide one that is half empty.
+            // Two narrow passes cost less than one wide pass that is half empty.
             let eights = [most, FEW, PAIR].into_iter().find(|eights| left > 4 * eights).unwrap_or(1);
             inputs.live = left.min(8 * eights);
             for &(register, scalar) in &code.filled {
@@ -122,7 +122,7 @@ impl pulp::NullaryFnOnce for Run<'_, '_, '_> {
     }
 }
 
-/// The lanes of one component of a result.
+/// Lanes of one component of a result.
 #[inline(always)]
 fn component<'a>(arrays: &'a mut [&mut [f64]], place: Place, lanes: usize) -> &'a mut [f64] {
     let start = place.component as usize * lanes;
@@ -141,7 +141,7 @@ fn store<const W: usize>(value: &Lanes<W>, place: Place, inputs: Inputs, arrays:
     }
 }
 
-/// Copies the lanes; those that do not exist repeat the last one.
+/// Copies the lanes; missing lanes repeat the last one.
 #[inline(always)]
 fn load<const W: usize>(to: &Lanes<W>, source: &[f64], index: u32, inputs: Inputs) {
     let start = index as usize * inputs.at.lanes + inputs.first;
@@ -179,7 +179,7 @@ fn zip3<const W: usize>(to: &Lanes<W>, a: &Lanes<W>, b: &Lanes<W>, c: &Lanes<W>,
     }
 }
 
-/// Like [`zip`], for functions that are evaluated lane by lane anyway: only for lanes that exist.
+/// Like [`zip`], but only for existing lanes, for functions that are evaluated lane by lane anyway.
 #[inline(always)]
 fn zip_live<const W: usize>(to: &Lanes<W>, a: &Lanes<W>, b: &Lanes<W>, live: usize, f: impl Fn(f64, f64) -> f64) {
     for (w, ((to, a), b)) in to.iter().zip(a).zip(b).enumerate() {
@@ -189,7 +189,7 @@ fn zip_live<const W: usize>(to: &Lanes<W>, a: &Lanes<W>, b: &Lanes<W>, live: usi
     }
 }
 
-/// Runs instructions for W eights of lanes.
+/// Runs instructions for W groups of eight lanes.
 #[inline(always)]
 fn section<const W: usize>(code: &Code, registers: &[Cell<Eight>], inputs: Inputs, arrays: &mut [&mut [f64]]) {
     let registers: &[[Cell<Eight>; W]] = registers.as_chunks().0;
@@ -240,7 +240,7 @@ fn section<const W: usize>(code: &Code, registers: &[Cell<Eight>], inputs: Input
     }
 }
 
-/// Adds products to c, [`FEW`] eights of lanes at a time, whose sums stay in vector registers.
+/// Adds products to c, [`FEW`] groups of eight lanes at a time, so that the sums stay in vector registers.
 #[inline(always)]
 fn terms<const W: usize>(to: &Lanes<W>, c: &Lanes<W>, terms: &[Term], registers: &[[Cell<Eight>; W]], scalars: &[f64]) {
     let (whole, _) = c.as_chunks::<FEW>();
@@ -288,7 +288,8 @@ fn unary<const W: usize>(op: Unary, to: &Lanes<W>, a: &Lanes<W>, live: usize) {
         Unary::Negate => map(to, a, |x| Unary::Negate.of(x)),
         Unary::Sqrt => map(to, a, |x| Unary::Sqrt.of(x)),
         Unary::Exp => map(to, a, |x| Unary::Exp.of(x)),
-        // No `for_each`: with a closure of that size it is a function of its own, compiled without the vector instructions.
+        // No `for_each`: a closure of that size would be compiled as a separate function, without the vector
+        // instructions.
         Unary::Tanh => {
             for (to, a) in to.iter().zip(a) {
                 to.set(kernels::tanhs(a.get()));
@@ -342,7 +343,7 @@ fn right<const W: usize>(op: Binary, to: &Lanes<W>, a: &Lanes<W>, s: f64) {
     }
 }
 
-/// s op b, likewise.
+/// s op b, for the operations that [`super::tape::takes_scalars`] names.
 #[inline(always)]
 fn left<const W: usize>(op: Binary, to: &Lanes<W>, s: f64, b: &Lanes<W>) {
     match op {
@@ -362,7 +363,7 @@ mod tests {
     use crate::contract::{Batch, Parameters, VectorField};
     use crate::model::{Definition, Model, ModelSource, Parameter, State};
 
-    /// Sums of products of every sign and length, in batches of every width, are what the formula says to the bit.
+    /// Sums of products of every sign and length, in batches of every width, match the formula to the bit.
     #[test]
     fn sums_of_products_are_added_in_their_order() {
         let text = |f: &[(&str, &str)]| f.iter().map(|(name, text)| Definition::new(name, text)).collect();

@@ -1,7 +1,7 @@
-//! Reading an expression with its index given: which values are known, what is needed, which elements are meant.
+//! Reading of an expression for a given index: known values, needed terms, selected elements.
 //!
-//! **Idea.** With the index given, some terms are plain numbers: indices, bounds of sums, conditions on the index. A branch of
-//! `if` that such a condition rules out is not read, so that `if(i > 1, x[i-1], 0)` needs no x[0].
+//! **Idea.** For a given index some terms are plain numbers: indices, bounds of sums, conditions on the index. A branch
+//! of `if` that such a condition excludes is not read, so `if(i > 1, x[i-1], 0)` needs no x[0].
 
 use super::error::Complaint;
 use super::family::{Family, Kind, Layout};
@@ -18,16 +18,16 @@ use std::ops::Range;
 pub(super) enum Symbol {
     State(usize),
     Parameter(usize),
-    /// A piece.
+    /// Piece.
     Definition(usize),
-    /// A name with an index.
+    /// Repeated name.
     Family(usize),
     Number(f64),
     Time,
 }
 
 impl Symbol {
-    /// With its article, for messages.
+    /// Description with its article, for messages.
     pub fn article(self) -> &'static str {
         match self {
             Symbol::State(_) => "a state",
@@ -40,27 +40,27 @@ impl Symbol {
     }
 }
 
-/// The symbols of a model by name.
+/// Symbols of a model by name.
 pub(super) type Symbols<'a> = HashMap<&'a str, Symbol>;
 
-/// A name that has a meaning within one expression: an index or an argument.
+/// Name local to one expression: an index or an argument.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Local<'a> {
     pub name: &'a str,
-    /// Its value, if it is known before the model runs.
+    /// Value, if it is known before the model runs.
     pub value: Option<f64>,
-    /// Its node otherwise.
+    /// Node otherwise.
     pub id: Id,
 }
 
 impl<'a> Local<'a> {
-    /// An index.
+    /// Local for an index.
     pub fn index(name: &'a str, k: f64) -> Local<'a> {
         Local { name, value: Some(k), id: Id(0) }
     }
 }
 
-/// A single quantity.
+/// Single quantity.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Target {
     State(usize),
@@ -68,10 +68,10 @@ pub(super) enum Target {
     Piece(usize),
 }
 
-/// Most terms that repetition, sums and functions make.
+/// Maximum number of terms produced by repetition, sums and functions.
 const MOST_TERMS: usize = 4_000_000;
 
-/// All that expressions refer to.
+/// Everything that expressions can refer to.
 #[derive(Debug)]
 pub(super) struct Scope<'a> {
     pub symbols: &'a Symbols<'a>,
@@ -81,24 +81,24 @@ pub(super) struct Scope<'a> {
     pub spent: Cell<usize>,
 }
 
-/// The innermost local of that name.
+/// Innermost local with the given name.
 pub(super) fn local<'l, 'a>(locals: &'l [Local<'a>], name: &str) -> Option<&'l Local<'a>> {
     locals.iter().rev().find(|local| local.name == name)
 }
 
 impl<'a> Scope<'a> {
-    /// Counts terms that are read; false once there are too many.
+    /// Counts terms that have been read; false once there are too many.
     pub fn spend(&self, terms: usize) -> bool {
         self.spent.set(self.spent.get().saturating_add(terms));
         !self.exhausted()
     }
 
-    /// True if more terms were read than are allowed.
+    /// True if more terms were read than allowed.
     pub fn exhausted(&self) -> bool {
         self.spent.get() > MOST_TERMS
     }
 
-    /// The value of every term that is known before the model runs.
+    /// Value of each term, if it is known before the model runs.
     pub fn values(&self, expression: &Expression, locals: &[Local]) -> Vec<Option<f64>> {
         let mut values: Vec<Option<f64>> = Vec::with_capacity(expression.terms.len());
         for term in &expression.terms {
@@ -140,7 +140,7 @@ impl<'a> Scope<'a> {
         self.values(body, &locals).last().copied().flatten()
     }
 
-    /// Which terms are needed for the last one; those whose value is known need nothing.
+    /// Marks the terms needed for the last one; terms with known values need nothing.
     pub fn needed(expression: &Expression, values: &[Option<f64>]) -> Vec<bool> {
         let mut needed = vec![false; values.len()];
         needed.iter_mut().last().into_iter().for_each(|last| *last = true);
@@ -164,7 +164,7 @@ impl<'a> Scope<'a> {
         needed
     }
 
-    /// The values of the index of a sum.
+    /// Range of the index of a sum.
     pub fn steps(&self, sum: &Sum, values: &[Option<f64>]) -> Result<std::ops::RangeInclusive<i64>, Complaint> {
         let bound = |place: usize| values[place].filter(|v| v.fract() == 0.0 && v.abs() < 1e9);
         match bound(sum.first).zip(bound(sum.last)) {
@@ -176,7 +176,7 @@ impl<'a> Scope<'a> {
         }
     }
 
-    /// The element of `name` with that index.
+    /// Element of `name` with the given index.
     pub fn element(
         &self,
         name: &str,
@@ -185,7 +185,7 @@ impl<'a> Scope<'a> {
         locals: &[Local],
     ) -> Result<Target, Complaint> {
         let Some(Symbol::Family(family)) = self.symbols.get(name) else {
-            // Checked when the names were.
+            // Already reported by the check of names.
             return Err(Complaint::new(span.clone(), format!("`{name}` has no index"), "write the name alone"));
         };
         let family = &self.layout.families[*family];
@@ -202,7 +202,7 @@ impl<'a> Scope<'a> {
         self.place(family, index as i64).ok_or_else(|| outside(family, index as i64, span, locals))
     }
 
-    /// The element of a family with that index, if there is one.
+    /// Element of a family with the given index, if it exists.
     fn place(&self, family: &Family, index: i64) -> Option<Target> {
         let count = family.spread.count as i64;
         let inner = |k: i64| {
@@ -230,7 +230,7 @@ impl<'a> Scope<'a> {
         family.is_some_and(|family| family.repeat.ends == Ends::Periodic)
     }
 
-    /// The pieces that an expression needs, with the places that need them. `at` is the call, inside a function.
+    /// Pieces that an expression needs, with the positions of their uses. Inside a function, `at` is the call.
     pub fn uses(
         &self,
         expression: &Expression,
@@ -289,7 +289,7 @@ fn value_of(function: &Function, known: &[f64]) -> f64 {
     graph.value(id).unwrap_or(f64::NAN)
 }
 
-/// An element that does not exist.
+/// Error for an element that does not exist.
 fn outside(family: &Family, index: i64, span: &Range<usize>, locals: &[Local]) -> Complaint {
     let (name, count) = (family.name, family.spread.count);
     let wanted = element_name(name, index);

@@ -1,91 +1,92 @@
-//! A model as it is written: names, numbers and expressions in text.
+//! Model as written: names, numbers and expressions in text form.
 
 use super::table::Table;
 
-/// A parameter.
+/// Parameter.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Parameter {
-    /// Its name.
+    /// Name.
     pub name: String,
-    /// Its unit; `1` where it has none.
+    /// Unit; `1` if dimensionless.
     pub unit: String,
-    /// What it is.
+    /// Description.
     pub description: String,
-    /// Its value unless a study says otherwise.
+    /// Default value; a study may override it.
     pub value: f64,
-    /// Characteristic size, positive; where none is given it follows from the value and the ranges of a study.
+    /// Characteristic size, positive; otherwise derived from the value and the ranges of a study.
     pub scale: Option<f64>,
     /// Repetition over an index.
     pub repeat: Option<Repeat>,
-    /// Value of each element of a repeated parameter; all have `value` where the list is empty.
+    /// Value of each element of a repeated parameter; if empty, all elements have `value`.
     pub values: Vec<f64>,
 }
 
-/// A state component.
+/// State component.
 #[derive(Clone, Debug, PartialEq)]
 pub struct State {
-    /// Its name.
+    /// Name.
     pub name: String,
-    /// Its unit; `1` where it has none.
+    /// Unit; `1` if dimensionless.
     pub unit: String,
-    /// What it is.
+    /// Description.
     pub description: String,
-    /// Characteristic size, positive: errors and lengths of this component are measured in it. Where none is given it follows
-    /// from the range, else from the solutions.
+    /// Characteristic size, positive: errors and lengths of this component are measured in it. Otherwise derived from
+    /// the range, else from the solutions.
     pub scale: Option<f64>,
-    /// Smallest and largest initial value when initial states are sampled; where none is given, twice the scale to both sides of 0.
+    /// Smallest and largest initial value for sampling; by default twice the scale on either side of 0, for an angle a
+    /// full turn.
     pub range: Option<[f64; 2]>,
-    /// For an angle its period: states that differ by whole periods are one.
+    /// Period, for an angle: states that differ by whole periods are identified.
     pub period: Option<f64>,
     /// Repetition over an index.
     pub repeat: Option<Repeat>,
 }
 
-/// A scalar of the state.
+/// Scalar function of the state.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Output {
-    /// Its name.
+    /// Name.
     pub name: String,
-    /// Its unit; `1` where it has none.
+    /// Unit; `1` if dimensionless.
     pub unit: String,
-    /// What it is.
+    /// Description.
     pub description: String,
-    /// How it is computed.
+    /// Defining expression.
     pub expression: String,
     /// Repetition over an index.
     pub repeat: Option<Repeat>,
 }
 
-/// A name for an expression: an intermediate result, or the right-hand side of the equation of a state.
+/// Name for an expression: an intermediate result, or the right-hand side of the equation of a state.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Definition {
-    /// The name, or the state.
+    /// Name, or the state of an equation.
     pub name: String,
-    /// The expression.
+    /// Expression.
     pub expression: String,
-    /// Repetition over an index; an equation is repeated as its state is.
+    /// Repetition over an index; an equation is repeated with its state.
     pub repeat: Option<Repeat>,
 }
 
-/// A number that no study changes, usable wherever an expression is.
+/// Number that no study changes, usable anywhere in an expression.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Constant {
-    /// Its name.
+    /// Name.
     pub name: String,
-    /// Its unit; `1` where it has none.
+    /// Unit; `1` if dimensionless.
     pub unit: String,
-    /// Its value.
+    /// Value.
     pub value: f64,
 }
 
-/// A function defined by the model; calls are replaced by its expression.
+/// Function defined by the model; calls are replaced by its expression.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Function {
-    /// Its name.
+    /// Name.
     pub name: String,
-    /// Names of its arguments.
+    /// Names of the arguments.
     pub arguments: Vec<String>,
-    /// Its value.
+    /// Defining expression.
     pub expression: String,
 }
 
@@ -103,7 +104,8 @@ pub struct Repeat {
 /// Values of a repeated quantity beyond its first and its last element.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Ends {
-    /// Expressions for the elements 0, -1, … and for the elements n + 1, n + 2, …; elements without an expression do not exist.
+    /// Expressions for the elements 0, -1, … and for the elements n + 1, n + 2, …; elements without an expression do
+    /// not exist.
     Given {
         /// Before the first element, nearest first.
         before: Vec<String>,
@@ -112,42 +114,42 @@ pub enum Ends {
     },
     /// The first element follows the last.
     Periodic,
-    /// Time derivatives of the values beyond the ends of the family of that name.
+    /// Time derivatives of the values beyond the ends of the named family.
     RateOf(String),
 }
 
-/// An entry of the matrix M of M dy/dt = f.
+/// Entry of the matrix M of M dy/dt = f.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mass {
     /// State whose equation is the row.
     pub row: String,
-    /// State whose rate the entry multiplies.
+    /// State whose rate is multiplied by the entry.
     pub column: String,
-    /// The entry.
+    /// Entry.
     pub expression: String,
 }
 
-/// What `t` means in a model: how long a period of its forcing is.
+/// Forcing: defines the time `t` through its period.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Forcing {
-    /// Whether the expression is the angular frequency, 2π over the period.
+    /// True if the expression is the angular frequency, 2π over the period.
     pub is_frequency: bool,
-    /// The frequency or the period, in terms of parameters.
+    /// Frequency or period, in terms of parameters.
     pub expression: String,
 }
 
-/// A model as it is written.
+/// Model as written.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ModelSource {
-    /// Its name.
+    /// Name.
     pub name: String,
-    /// What it describes.
+    /// Description.
     pub description: String,
-    /// Where it comes from.
+    /// Origin, such as a publication.
     pub source: String,
-    /// Unit of time; empty where the model does not state it.
+    /// Unit of time; empty if the model does not state it.
     pub time: String,
-    /// Numbers with names.
+    /// Named constants.
     pub constants: Vec<Constant>,
     /// Functions of the model, in any order.
     pub functions: Vec<Function>,
@@ -155,7 +157,7 @@ pub struct ModelSource {
     pub tables: Vec<Table>,
     /// Parameters, in the order in which they are numbered.
     pub parameters: Vec<Parameter>,
-    /// The forcing, where expressions use the time `t`.
+    /// Forcing, if expressions use the time `t`.
     pub forcing: Option<Forcing>,
     /// Intermediate expressions, in any order.
     pub definitions: Vec<Definition>,
@@ -163,9 +165,9 @@ pub struct ModelSource {
     pub states: Vec<State>,
     /// One equation for each state, in any order.
     pub equations: Vec<Definition>,
-    /// Entries of the matrix that multiplies the rates; rows that are not mentioned are those of the unit matrix.
+    /// Entries of the matrix that multiplies the rates; rows without entries are those of the identity.
     pub mass: Vec<Mass>,
-    /// Sums of states that keep their values.
+    /// Conserved sums of states.
     pub totals: Vec<Total>,
     /// Outputs, in the order in which they are numbered.
     pub outputs: Vec<Output>,
@@ -173,25 +175,25 @@ pub struct ModelSource {
     pub whirl: Option<[String; 2]>,
 }
 
-/// A sum of states that keeps its value, which is a parameter.
+/// Conserved sum of states, whose value is a parameter.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Total {
-    /// Its name.
+    /// Name.
     pub name: String,
-    /// Its unit; `1` where it has none.
+    /// Unit; `1` if dimensionless.
     pub unit: String,
-    /// What it is.
+    /// Description.
     pub description: String,
-    /// Its value.
+    /// Value.
     pub value: f64,
-    /// The states times numbers.
+    /// Linear combination of states.
     pub sum: String,
-    /// The state that follows from it; where none is named, the largest of the sum.
+    /// State to eliminate; by default the one of the sum with the largest scale.
     pub instead_of: Option<String>,
 }
 
 impl Total {
-    /// A total without unit and description.
+    /// Total without unit and description.
     pub fn new(name: &str, sum: &str, value: f64) -> Total {
         Total {
             name: name.into(),
@@ -205,7 +207,7 @@ impl Total {
 }
 
 impl Parameter {
-    /// A parameter without unit and description.
+    /// Parameter without unit and description.
     pub fn new(name: &str, value: f64) -> Parameter {
         Parameter {
             name: name.into(),
@@ -220,7 +222,7 @@ impl Parameter {
 }
 
 impl State {
-    /// A state without unit, description, scale and range.
+    /// State without unit, description, scale and range.
     pub fn new(name: &str) -> State {
         State {
             name: name.into(),
@@ -233,13 +235,15 @@ impl State {
         }
     }
 
-    /// The characteristic size that the model states: the scale, else a radian of an angle, else a quarter of the width of the range.
+    /// Characteristic size stated by the model: the scale, else one radian of an angle, else a quarter of the width of
+    /// the range.
     pub fn stated_scale(&self) -> Option<f64> {
         let radian = self.period.map(|period| period / std::f64::consts::TAU);
         self.scale.or(radian).or(self.range.map(|[low, high]| 0.25 * (high - low)))
     }
 
-    /// Where initial values are sampled if the characteristic size is `scale`: in the range, else over a whole turn of an angle.
+    /// Sampling interval for initial values if the characteristic size is `scale`: the range, else a full turn of an
+    /// angle, else ±2 `scale`.
     pub fn range_at(&self, scale: f64) -> [f64; 2] {
         let half = self.period.map_or(2.0 * scale, |period| 0.5 * period);
         self.range.unwrap_or([-half, half])
@@ -247,7 +251,7 @@ impl State {
 }
 
 impl Output {
-    /// An output without unit and description.
+    /// Output without unit and description.
     pub fn new(name: &str, expression: &str) -> Output {
         Output {
             name: name.into(),
@@ -260,14 +264,14 @@ impl Output {
 }
 
 impl Definition {
-    /// `name` stands for `expression`.
+    /// Defines `name` as `expression`.
     pub fn new(name: &str, expression: &str) -> Definition {
         Definition { name: name.into(), expression: expression.into(), repeat: None }
     }
 }
 
 impl Function {
-    /// Name and arguments of a head such as `hill(x, K, n)`; `None` if `head` is not of that form.
+    /// Splits a head such as `hill(x, K, n)` into name and arguments; `None` if `head` is not of that form.
     pub fn head(head: &str) -> Option<(String, Vec<String>)> {
         let (name, rest) = head.split_once('(')?;
         let inner = rest.trim_end().strip_suffix(')')?;
@@ -292,7 +296,7 @@ impl Default for Ends {
 }
 
 impl Constant {
-    /// A constant without unit.
+    /// Constant without unit.
     pub fn new(name: &str, value: f64) -> Constant {
         Constant { name: name.into(), unit: "1".into(), value }
     }

@@ -1,19 +1,20 @@
-//! Where the expressions of a model are not smooth.
+//! Switching functions: nonsmooth points of the expressions of a model.
 //!
 //! **Idea.** A comparison, a minimum, an absolute value or a step changes its branch where one number, its *switch*,
-//! changes sign. With the signs of all switches given, instead of taken from the state, every branch is fixed and the
-//! expressions are smooth: they continue beyond the zero of a switch as if it had not been passed.
+//! changes sign. If the signs of all switches are prescribed instead of taken from the state, every branch is fixed and
+//! the expressions are smooth: they continue past the zero of a switch as if it had not been crossed.
 //!
 //! **Equations.** With σ the given sign (±1) of the switch s:
 //!
 //! 1. a < b, a ≤ b: s = a - b, true where σ < 0;   min(a, b), max(a, b): s = a - b, the operand that σ selects
 //! 2. |a|: s = a, σ a;   sign(a): s = a, σ;   heaviside(a): s = a, (1 + σ)/2
 //!
-//! 3. ⌊a⌋: s = sin πa, the integer that is even where σ > 0 and odd where σ < 0, of those nearest to a
+//! 3. ⌊a⌋: s = sin πa, the integer k, even where σ > 0 and odd where σ < 0, for which k + ½ is closest to a
 //!
-//! **Departures.** An expression that cannot change sign (a radius compared with 0) or depends on parameters only is not a
-//! switch. A comparison for equality holds at isolated instants and has no effect. A branch that is undefined beyond its switch,
-//! such as a root, is not continued; the branch that applies at the state is used instead ([`super::Model`]).
+//! **Departures.** An expression that cannot change sign (a radius compared with 0) or depends on parameters only is
+//! not a switch. A comparison for equality holds at isolated instants and has no effect. A branch that is undefined
+//! beyond its switch, such as a root, is not continued; the branch that applies at the state is used instead
+//! ([`super::Model`]).
 
 use super::graph::{Binary, Graph, Id, Leaf, Node, Unary};
 use super::tape::Tape;
@@ -21,16 +22,16 @@ use super::tape::Tape;
 /// The switches of a list of expressions.
 #[derive(Debug)]
 pub(super) struct Switches {
-    /// How many.
+    /// Number of switches.
     pub count: usize,
-    /// The switches themselves.
+    /// Values of the switches.
     pub values: Tape,
-    /// The expressions, with the signs of the switches in the components of the first direction.
+    /// Expressions with the signs of the switches given in the components of the first direction.
     pub given: Tape,
 }
 
 impl Switches {
-    /// The switches that `roots` depend on.
+    /// Switches that `roots` depend on.
     pub fn new(graph: &Graph, roots: &[Id]) -> Switches {
         let mut graph = graph.clone();
         let reached = graph.reachable(roots);
@@ -38,7 +39,7 @@ impl Switches {
         let (mut switches, mut own) = (Vec::new(), vec![None; reached.len()]);
         for i in (0..reached.len()).filter(|&i| reached[i]) {
             let switch = match graph.node(Id(i as u32)) {
-                // Of one sign between even and odd integers, of the other between odd and even ones.
+                // The sign of sin πa alternates between consecutive intervals of integers.
                 Node::Unary(Unary::Floor, a) if varying[a.at()] => {
                     let pi = graph.constant(std::f64::consts::PI);
                     let turns = graph.multiply(pi, a);
@@ -48,7 +49,7 @@ impl Switches {
                 Node::Binary(Binary::Less | Binary::LessOrEqual | Binary::Min | Binary::Max, a, b)
                     if varying[a.at()] || varying[b.at()] =>
                 {
-                    // a < b and b < a have one switch.
+                    // a < b and b < a share one switch.
                     let (difference, reverse) = (graph.subtract(a, b), graph.subtract(b, a));
                     Some(if switches.contains(&reverse) { (reverse, true) } else { (difference, false) })
                 }
@@ -68,7 +69,7 @@ impl Switches {
     }
 }
 
-/// Which nodes change along a trajectory.
+/// Marks the nodes that change along a trajectory.
 fn depends_on_state(graph: &Graph) -> Vec<bool> {
     let mut depends: Vec<bool> = Vec::with_capacity(graph.len());
     for i in 0..graph.len() {
@@ -79,7 +80,7 @@ fn depends_on_state(graph: &Graph) -> Vec<bool> {
     depends
 }
 
-/// Whether a switch can have both signs, as far as that can be seen.
+/// True if a switch may take both signs, judged by the form of its expression.
 fn changes_sign(graph: &Graph, id: Id) -> bool {
     let opposite = match graph.node(id) {
         Node::Unary(Unary::Negate, a) => Some(a),
@@ -88,7 +89,7 @@ fn changes_sign(graph: &Graph, id: Id) -> bool {
     !(graph.nonnegative(id) || opposite.is_some_and(|a| graph.nonnegative(a)))
 }
 
-/// The roots rebuilt with every switch in `own` decided by its given sign.
+/// Roots rebuilt with every switch in `own` decided by its given sign.
 fn with_given_signs(graph: &mut Graph, roots: &[Id], reached: &[bool], own: &[Option<(u32, bool)>]) -> Vec<Id> {
     let mut new: Vec<Id> = (0..reached.len()).map(|i| Id(i as u32)).collect();
     for i in (0..reached.len()).filter(|&i| reached[i]) {
@@ -125,7 +126,7 @@ fn with_given_signs(graph: &mut Graph, roots: &[Id], reached: &[bool], own: &[Op
     roots.iter().map(|root| new[root.at()]).collect()
 }
 
-/// The even or odd integer, by the sign, of which `a` is at most ½ below the beginning or beyond the end: 2⌊(a - p + ½)/2⌋ + p.
+/// Even (p = 0) or odd (p = 1) integer k, by the sign, for which k + ½ is closest to `a`: 2⌊(a - p + ½)/2⌋ + p.
 fn floor(graph: &mut Graph, a: Id, sign: Id) -> Id {
     let (half, one) = (graph.constant(0.5), graph.constant(1.0));
     let step = graph.unary(Unary::Heaviside, sign);
@@ -155,7 +156,7 @@ mod tests {
     }
 
     #[test]
-    fn what_cannot_switch_is_no_switch() {
+    fn expressions_that_cannot_change_sign_have_no_switch() {
         for smooth in ["x*y", "if(p > 0, x, y)", "if(hypot(x, y) > 0, x, y)", "abs(x^2) + sqrt(x)", "if(x == y, 1, y)"]
         {
             assert_eq!(model(smooth).switch_count(), 0, "{smooth}");
@@ -173,7 +174,7 @@ mod tests {
     }
 
     #[test]
-    fn a_branch_that_cannot_be_continued_gives_way_to_the_one_in_force() {
+    fn an_undefined_branch_is_replaced_by_the_branch_in_force() {
         // The comparison x > p has the switch p - x, the maximum x - p.
         for (text, sign, beyond, inside) in
             [("max(x - p, 0)^1.5", 1.0, 0.0, 1.0), ("if(x > p, log(x - p), 7)", -1.0, 7.0, 0.0)]
@@ -185,7 +186,7 @@ mod tests {
             model.evaluate_switched(at, &[sign; 2], &mut f);
             assert_eq!(f[..2], [beyond, inside], "{text}");
         }
-        // What is not defined on either side stays so.
+        // An expression that is undefined on both sides stays undefined.
         let model = model("if(x > p, sqrt(x - 0.9), 0)");
         let at = Batch { lanes: 1, states: &[0.7, 0.0], parameters: Parameters::Shared(&[0.5]), times: &[] };
         let mut f = [0.0; 2];
@@ -194,7 +195,7 @@ mod tests {
     }
 
     #[test]
-    fn given_signs_decide_and_the_actual_ones_change_nothing() {
+    fn prescribed_signs_select_the_branch_and_actual_signs_reproduce_the_field() {
         let cases = [
             "max(x - p, 0)",
             "min(x, y)",

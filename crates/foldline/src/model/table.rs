@@ -1,29 +1,29 @@
 //! Functions given by points.
 //!
-//! **Idea.** Between neighbouring points a table is a polynomial: a straight line, or a cubic whose slopes at the points keep it as
-//! monotone as the points are. The pieces become choices on the graph, so that a table has exact derivatives and its kinks
-//! are switches like those of `if`.
+//! **Idea.** Between neighbouring points a table is a polynomial: a straight line, or a cubic whose slopes at the
+//! points keep it as monotone as the points are. The pieces become choices on the graph, so a table has exact
+//! derivatives and its kinks are switches like those of `if`.
 //!
 //! **Source.** Slopes of monotone cubics: fritsch1980, sections 3 and 4.
 
 use super::graph::{Binary, Graph, Id};
 
-/// A function of one argument given by points.
+/// Function of one argument given by points.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Table {
-    /// Its name.
+    /// Name.
     pub name: String,
     /// Arguments, increasing.
     pub x: Vec<f64>,
     /// Values, one for each argument.
     pub y: Vec<f64>,
-    /// Course between the points.
+    /// Interpolation between the points.
     pub interpolation: Interpolation,
-    /// Course beyond the first and the last point.
+    /// Extrapolation beyond the first and the last point.
     pub outside: Outside,
 }
 
-/// Course of a table between its points.
+/// Interpolation of a table between its points.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Interpolation {
     /// Straight lines, with a kink at every point.
@@ -33,17 +33,17 @@ pub enum Interpolation {
     Cubic,
 }
 
-/// Course of a table beyond its points.
+/// Extrapolation of a table beyond its points.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Outside {
-    /// Straight on, with the slope at the last point.
+    /// Linear, with the slope at the last point.
     #[default]
     Linear,
-    /// The value at the last point.
+    /// Constant at the value of the last point.
     Constant,
 }
 
-/// Most points of a table: every point costs a few operations wherever the table is used.
+/// Maximum number of points: each costs a few operations wherever the table is used.
 const MOST_POINTS: usize = 200;
 
 /// c₀ + d (c₁ + d (c₂ + d c₃)), d = x - origin.
@@ -54,7 +54,7 @@ struct Piece {
 }
 
 impl Table {
-    /// Message and hint on a mistake in the points; `None` if they are right.
+    /// Message and hint for an error in the points; `None` if they are valid.
     pub(super) fn mistake(&self) -> Option<[String; 2]> {
         let Table { x, y, .. } = self;
         let turned = x.windows(2).position(|pair| pair[0] >= pair[1]);
@@ -75,13 +75,13 @@ impl Table {
         }
     }
 
-    /// The value at `a`.
+    /// Node for the value at `a`.
     pub(super) fn node(&self, graph: &mut Graph, a: Id) -> Id {
         let (pieces, starts) = self.pieces();
         choose(graph, a, &pieces, &starts)
     }
 
-    /// The pieces in order, and where each but the first begins.
+    /// Pieces in order, and start of each piece but the first.
     fn pieces(&self) -> (Vec<Piece>, Vec<f64>) {
         let Table { x, y, .. } = self;
         let last = x.len() - 1;
@@ -105,7 +105,7 @@ impl Table {
             let slope = if self.outside == Outside::Linear { slopes[k] } else { 0.0 };
             Piece { origin: x[k], coefficients: [y[k], slope, 0.0, 0.0] }
         };
-        // A straight line goes on by itself.
+        // A straight line continues by itself.
         if self.interpolation == Interpolation::Cubic || self.outside == Outside::Constant {
             pieces.insert(0, beyond(0));
             pieces.push(beyond(last));
@@ -145,7 +145,7 @@ impl Table {
     }
 }
 
-/// The piece to which `a` belongs, by halves.
+/// Selects the piece that contains `a` by bisection.
 fn choose(graph: &mut Graph, a: Id, pieces: &[Piece], starts: &[f64]) -> Id {
     let [piece] = pieces else {
         let middle = pieces.len() / 2;
@@ -184,7 +184,7 @@ mod tests {
     }
 
     #[test]
-    fn a_table_goes_through_its_points_and_on_as_stated() {
+    fn a_table_interpolates_its_points_and_extrapolates_as_stated() {
         for interpolation in [Interpolation::Linear, Interpolation::Cubic] {
             let own = table(interpolation, Outside::Linear);
             own.x.iter().zip(&own.y).for_each(|(x, y)| assert!((at(&own, *x) - y).abs() < 1e-14));

@@ -1,9 +1,9 @@
-//! From graph to tape: a straight list of instructions over registers.
+//! Translation of a graph to a tape: straight-line instructions over registers.
 //!
-//! **Idea.** The nodes that the results depend on are put in order, results first come first served, and each gets a
-//! register; a register is used again once its value is no longer needed. What depends on parameters alone is computed once per
-//! batch, as plain numbers, where all lanes share their parameters. A product that only one sum needs becomes one instruction
-//! with it, rounded twice as before. Running the tape is in `run`.
+//! **Idea.** The nodes that the results depend on are ordered depth first, in the order of the results, and each gets a
+//! register, which is reused once its value is no longer needed. If all lanes share their parameters, values that
+//! depend on parameters alone are computed once per batch, as plain numbers. A product used by only one sum is merged
+//! with it into one instruction, still rounded twice. The tape is executed in `run`.
 
 use super::graph::{Binary, Graph, Id, Leaf, Node, Unary};
 use std::collections::HashMap;
@@ -15,7 +15,7 @@ pub(super) type Register = u32;
 /// Number of a scalar, which all lanes share.
 pub(super) type Scalar = u32;
 
-/// One step.
+/// One instruction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Instruction {
     Load {
@@ -33,7 +33,7 @@ pub(super) enum Instruction {
         a: Register,
         b: Register,
     },
-    /// The second operand is a scalar; only where [`takes_scalars`] says so, as the next.
+    /// The second operand is a scalar; for operations that [`takes_scalars`] accepts, as in `Left`.
     Right {
         op: Binary,
         to: Register,
@@ -47,7 +47,7 @@ pub(super) enum Instruction {
         s: Scalar,
         b: Register,
     },
-    /// The product of a and b in a sum with c.
+    /// Product of a and b in a sum with c.
     Fused {
         sum: Sum,
         to: Register,
@@ -55,7 +55,7 @@ pub(super) enum Instruction {
         b: Register,
         c: Register,
     },
-    /// The product of a and a scalar in a sum with c.
+    /// Product of a and a scalar in a sum with c.
     Scaled {
         sum: Sum,
         to: Register,
@@ -63,7 +63,7 @@ pub(super) enum Instruction {
         s: Scalar,
         c: Register,
     },
-    /// Several products, one after the other, in sums that begin with c: `count` of [`Code::terms`] from `first` on.
+    /// Successive products in a sum that begins with c: `count` of [`Code::terms`] from `first` on.
     Terms {
         to: Register,
         c: Register,
@@ -87,16 +87,16 @@ pub(super) enum Instruction {
     },
 }
 
-/// A product in a sum.
+/// Product in a sum.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Term {
-    /// Of a and b.
+    /// Product of a and b.
     Product { sum: Sum, a: Register, b: Register },
-    /// Of a and a scalar.
+    /// Product of a and a scalar.
     Scaled { sum: Sum, a: Register, s: Scalar },
 }
 
-/// How a product p and another operand c make a sum.
+/// Way in which a product p and another operand c form a sum.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Sum {
     /// p + c
@@ -107,7 +107,7 @@ pub(super) enum Sum {
     From,
 }
 
-/// Where a result goes: which array, which component.
+/// Destination of a result: array and component.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Place {
     pub array: u32,
@@ -123,33 +123,33 @@ pub(super) struct Tape {
     pub own: Code,
 }
 
-/// Instructions for one of the two ways in which parameters come.
+/// Instructions for shared or for per-lane parameters.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Code {
-    /// No two that were made apart have the same; never 0.
+    /// Unique number of this code; never 0.
     pub number: u64,
-    /// How many registers are used.
+    /// Number of registers used.
     pub registers: usize,
-    /// The scalars in the order in which they are computed; an operand is the number of an earlier one.
+    /// Scalars in order of computation; an operand is the number of an earlier one.
     pub scalars: Vec<Node>,
-    /// Registers that hold a scalar, for instructions that take none.
+    /// Registers that hold a scalar, for instructions without scalar operands.
     pub filled: Vec<(Register, Scalar)>,
     /// Results that are scalars.
     pub uniform: Vec<(Scalar, Place)>,
-    /// What differs from lane to lane.
+    /// Instructions for values that differ between lanes.
     pub body: Vec<Instruction>,
-    /// The products of [`Instruction::Terms`].
+    /// Products of [`Instruction::Terms`].
     pub terms: Vec<Term>,
 }
 
-/// Whether an operation has the forms [`Instruction::Right`] and [`Instruction::Left`].
+/// True if an operation has the forms [`Instruction::Right`] and [`Instruction::Left`].
 pub(super) fn takes_scalars(op: Binary) -> bool {
     use Binary::{Add, Divide, Less, LessOrEqual, Max, Min, Multiply, Subtract};
     matches!(op, Add | Subtract | Multiply | Divide | Less | LessOrEqual | Min | Max)
 }
 
 impl Tape {
-    /// The tape for `results`: one list per array, components in order.
+    /// Tape for `results`: one list per array, components in order.
     pub fn new(graph: &Graph, results: &[&[Id]]) -> Tape {
         Tape { shared: Code::new(graph, results, true), own: Code::new(graph, results, false) }
     }
@@ -171,7 +171,7 @@ impl Code {
             registers: HashMap::new(),
             free: Vec::new(),
         };
-        // Each result is stored as soon as it is known.
+        // Store each result as soon as it is known.
         for (array, list) in results.iter().enumerate() {
             for (component, &id) in list.iter().enumerate() {
                 let place = Place { array: array as u32, component: component as u32 };
@@ -198,18 +198,18 @@ enum Step {
     Store(Id, Place),
 }
 
-/// Products in one sum at most: the sums of four eights of lanes fill half of sixteen vector registers, and every operand needs a
-/// register until the last of them is added.
+/// Maximum number of products in one sum: the sums for four groups of eight lanes fill half of sixteen vector
+/// registers, and every operand needs a register until the last product has been added.
 const MOST_TERMS: usize = 4;
 
-/// Sums one after the other with products that nothing else needs: each of its predecessor, the first of c.
+/// Chain of sums with products that nothing else uses: each adds to its predecessor, the first to c.
 #[derive(Clone)]
 struct Fusion {
     c: Id,
     terms: Vec<(Sum, [Id; 2])>,
 }
 
-/// Which nodes differ from lane to lane.
+/// Marks the nodes that differ between lanes.
 fn varying(graph: &Graph, shared: bool) -> Vec<bool> {
     let mut varying: Vec<bool> = Vec::with_capacity(graph.len());
     for i in 0..graph.len() {
@@ -223,7 +223,7 @@ fn varying(graph: &Graph, shared: bool) -> Vec<bool> {
     varying
 }
 
-/// The fusions, by the node of the sum.
+/// Fusions, keyed by the node of the sum.
 fn fusions(graph: &Graph, varying: &[bool], roots: &[Id]) -> HashMap<Id, Fusion> {
     let reached = graph.reachable(roots);
     let mut uses = vec![0; graph.len()];
@@ -252,7 +252,7 @@ fn fusions(graph: &Graph, varying: &[bool], roots: &[Id]) -> HashMap<Id, Fusion>
         }
     };
     let mut found: HashMap<Id, Fusion> = HashMap::new();
-    // Operands have smaller numbers than what is made of them.
+    // Operands have smaller numbers than the nodes that use them.
     for id in (0..graph.len() as u32).map(Id).filter(|id| reached[id.at()]) {
         let Some((c, term)) = fusion(id) else { continue };
         let before = if uses[c.at()] == 1 { found.remove(&c) } else { None };
@@ -271,7 +271,7 @@ fn fusions(graph: &Graph, varying: &[bool], roots: &[Id]) -> HashMap<Id, Fusion>
     found
 }
 
-/// The varying operands of a node, those of its fusion where it has one.
+/// Varying operands of a node; those of its fusion, if it has one.
 fn operands(graph: &Graph, varying: &[bool], fusions: &HashMap<Id, Fusion>, id: Id) -> impl Iterator<Item = Id> {
     let list: Vec<Id> = match fusions.get(&id) {
         Some(Fusion { c, terms }) => terms.iter().flat_map(|(_, factors)| *factors).chain([*c]).collect(),
@@ -290,7 +290,7 @@ struct Order<'a> {
 }
 
 impl Order<'_> {
-    /// Appends what `root` needs and `root` itself, as far as it varies and is not in the order yet.
+    /// Appends `root` and everything it needs, as far as it varies and is not in the order yet.
     fn visit(&mut self, root: Id) {
         let mut stack = vec![(root, false)];
         while let Some((id, ready)) = stack.pop() {
@@ -308,7 +308,7 @@ impl Order<'_> {
     }
 }
 
-/// Hands out registers and scalars.
+/// Allocates registers and scalars.
 struct Builder<'a> {
     graph: &'a Graph,
     varying: &'a [bool],
@@ -327,7 +327,7 @@ impl Builder<'_> {
         })
     }
 
-    /// The number of a value that all lanes share; what it needs is computed before it.
+    /// Number of a value that all lanes share; its operands are computed before it.
     fn scalar(&mut self, root: Id) -> Scalar {
         let mut stack = vec![(root, false)];
         while let Some((id, ready)) = stack.pop() {
@@ -346,7 +346,7 @@ impl Builder<'_> {
         self.scalars[&root]
     }
 
-    /// Puts scalars into registers where an instruction wants them there.
+    /// Loads scalars into registers for instructions that need them there.
     fn fill(&mut self, steps: &[Step]) {
         for step in steps {
             let Step::Compute(id) = *step else { continue };
@@ -374,7 +374,7 @@ impl Builder<'_> {
         list
     }
 
-    /// Instructions for the steps.
+    /// Emits instructions for the steps.
     fn body(&mut self, steps: &[Step]) {
         let mut last: HashMap<Id, usize> = HashMap::new();
         for (i, step) in steps.iter().enumerate() {
@@ -400,7 +400,7 @@ impl Builder<'_> {
         }
     }
 
-    /// The instruction for products in sums that begin with c.
+    /// Instruction for products in sums that begin with c.
     fn sum(&mut self, to: Register, c: Id, terms: &[(Sum, [Id; 2])]) -> Instruction {
         let c = self.registers[&c];
         let mut own = Vec::with_capacity(terms.len());

@@ -1,12 +1,13 @@
 //! Conserved totals as parameters.
 //!
-//! **Idea.** A sum of states that never changes makes every solution one of a family. Where its value is given, one of its states follows from
-//! the others; that state becomes a definition, the total a parameter, and what is left has isolated solutions.
+//! **Idea.** A conserved sum of states makes every solution one of a family. If its value is given, one of its states
+//! follows from the others: that state becomes a definition, the total becomes a parameter, and the remaining system
+//! has isolated solutions.
 //!
 //! **Equations.** For totals T_i = Σ c_ij x_j with c·f = 0, and one state e(i) of each:
 //!
 //! ```text
-//!   (1)  x_e = C_e⁻¹ (T - C_r x_r)      e the states that follow, r the others
+//!   (1)  x_e = C_e⁻¹ (T - C_r x_r)      e the eliminated states, r the others
 //! ```
 
 use super::error::{Field, Item, ModelError};
@@ -15,21 +16,21 @@ use super::{Batch, Model, Parameters, laws};
 use crate::contract::VectorField;
 use crate::linalg::lu;
 
-/// A total of a compiled model.
+/// Conserved total of a compiled model.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Kept {
     /// Index of its parameter.
     pub parameter: usize,
-    /// The state that follows from it, no longer one of the model.
+    /// Eliminated state, no longer one of the model.
     pub instead_of: String,
-    /// What is summed: names of states, that one among them, with their coefficients.
+    /// Terms of the sum: names of states, including the eliminated one, with their coefficients.
     pub terms: Vec<(String, f64)>,
 }
 
-/// Places at which a sum must be linear.
+/// Number of sample points at which linearity of a sum is tested.
 const PLACES: usize = 4;
 
-/// The model without the states that follow from its totals, and what these are.
+/// Model without the states eliminated by its totals, and the totals.
 pub(super) fn reduced(source: ModelSource) -> Result<(ModelSource, Vec<Kept>), Vec<ModelError>> {
     let whole = whole(&source)?;
     let rows = sums(&whole, &source)?;
@@ -55,7 +56,7 @@ fn complaint(source: &ModelSource, total: usize, field: Field, message: String, 
     ModelError { item: Item::Total(total), field, name, span: None, message, hint }
 }
 
-/// The model with all its states, each sum an output.
+/// Model with all its states, each sum as an output.
 fn whole(source: &ModelSource) -> Result<Model, Vec<ModelError>> {
     let mut plain = ModelSource { totals: Vec::new(), ..source.clone() };
     let first = plain.outputs.len();
@@ -69,7 +70,7 @@ fn whole(source: &ModelSource) -> Result<Model, Vec<ModelError>> {
     })
 }
 
-/// Coefficients `[total][n]`; every sum is linear and keeps its value.
+/// Coefficients `[total][n]`; errors if a sum is not linear or not conserved.
 fn sums(whole: &Model, source: &ModelSource) -> Result<Vec<Vec<f64>>, Vec<ModelError>> {
     let (n, first) = (whole.dim(), whole.outputs.len() - source.totals.len());
     let parameters = whole.defaults();
@@ -109,9 +110,9 @@ fn sums(whole: &Model, source: &ModelSource) -> Result<Vec<Vec<f64>>, Vec<ModelE
     if found.is_empty() { Ok(rows) } else { Err(found) }
 }
 
-/// The state that follows from each total: the one that is named, else the largest, or the last of them.
+/// State eliminated by each total: the one named, else the one with the largest stated scale, or the last of those.
 fn followers(source: &ModelSource, whole: &Model, rows: &[Vec<f64>]) -> Result<Vec<usize>, Vec<ModelError>> {
-    // A state of its own, whose equation can be left out.
+    // A state that is not repeated and whose equation can be dropped.
     let single = |j: &usize| {
         let name = &whole.states[*j].name;
         let rate = format!("{name}'");
@@ -143,7 +144,7 @@ fn followers(source: &ModelSource, whole: &Model, rows: &[Vec<f64>]) -> Result<V
     Ok(taken)
 }
 
-/// C_e⁻¹ and C_e⁻¹ C_r of (1), rows one after another: `[total][total]` and `[total][n]`.
+/// C_e⁻¹ and C_e⁻¹ C_r of (1), row-major: `[total][total]` and `[total][n]`.
 fn solved(rows: &[Vec<f64>], followers: &[usize]) -> Option<[Vec<f64>; 2]> {
     let (m, n) = (rows.len(), rows[0].len());
     let mut of_followers: Vec<f64> = rows.iter().flat_map(|row| followers.iter().map(|j| row[*j])).collect();
@@ -160,7 +161,7 @@ fn solved(rows: &[Vec<f64>], followers: &[usize]) -> Option<[Vec<f64>; 2]> {
     Some([inverse, others])
 }
 
-/// The source with (1).
+/// Source after elimination by (1).
 fn without(mut source: ModelSource, names: &[String], followers: &[usize], solved: &[Vec<f64>; 2]) -> ModelSource {
     let (m, n) = (followers.len(), names.len());
     let totals = std::mem::take(&mut source.totals);
@@ -215,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_left_moves_as_before() {
+    fn the_remaining_states_move_as_before() {
         let whole = Model::compile(source(&[])).unwrap();
         let x = [0.3, 0.5, 0.2, 0.4, 0.1];
         let f = rates(&whole, &x);
@@ -231,7 +232,7 @@ mod tests {
     }
 
     #[test]
-    fn what_changes_is_no_total() {
+    fn a_sum_that_is_not_conserved_is_rejected() {
         let found = Model::compile(source(&[("E", "e + 2*c", 1.0)])).err().unwrap();
         assert!(found[0].message.contains("is not conserved") && found[0].hint.contains("e + c"), "{found:?}");
         let found = Model::compile(source(&[("E", "e*c", 1.0)])).err().unwrap();

@@ -1,18 +1,18 @@
-//! Words for problems that are not solved here, and for settings of other programs that have no counterpart.
+//! Answers for problems that are not solved here, and for settings of other programs without a counterpart.
 //!
-//! **Idea.** A key, a value or a function with such a name is a question. The answer names the kind of problem and says what to
+//! **Idea.** An unknown key, value or function name may ask for a kind of problem. The answer names it and says what to
 //! do instead, here or with another program.
 
-/// Something that is not supported.
+/// Feature that is not supported.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Unsupported {
-    /// States that it is not supported, in words of the field.
+    /// Statement that it is not supported, in terms of the field.
     pub message: &'static str,
     /// Alternative.
     pub instead: &'static str,
 }
 
-/// A kind of problem: the words that ask for it, in small letters without `-`, `_` and a final `s`.
+/// Kind of problem: the words that ask for it, in lower case without `-`, `_` and a final `s`.
 type Kind = (&'static [&'static str], &'static str, &'static str);
 
 const KINDS: [Kind; 15] = [
@@ -115,7 +115,7 @@ const KINDS: [Kind; 15] = [
     ),
 ];
 
-/// The unsupported kind of problem that an unknown word asks for, if any.
+/// Unsupported kind of problem that an unknown word asks for, if any.
 pub fn unsupported(word: &str) -> Option<Unsupported> {
     let plain: String = word.to_lowercase().chars().filter(|c| !matches!(c, '-' | '_' | ' ')).collect();
     let stem = plain.strip_suffix('s').unwrap_or(&plain);
@@ -142,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn no_word_stands_for_two_things() {
+    fn no_word_is_listed_twice() {
         let words: Vec<&str> = KINDS.iter().flat_map(|(words, ..)| words.iter().copied()).collect();
         let distinct: std::collections::HashSet<&str> = words.iter().copied().collect();
         assert_eq!(words.len(), distinct.len());

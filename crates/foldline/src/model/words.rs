@@ -1,4 +1,4 @@
-//! Mistakes in the words of expressions: names without a meaning, indices where there are none, a forcing that depends on a state.
+//! Errors in the words of expressions: unknown names, misplaced indices, a forcing that depends on a state.
 
 use super::check::{Check, MOST_ERRORS, TIME};
 use super::error::{Complaint, Field, Item};
@@ -9,11 +9,11 @@ use super::scope::Symbol;
 use super::source::Ends;
 use std::ops::Range;
 
-/// An expression to be looked at: where it is used, and names that it hides.
+/// Expression waiting to be examined: position of its use, and names that it shadows.
 type Waiting<'e> = (&'e Expression, Option<Range<usize>>, &'e [String]);
 
 impl Check<'_> {
-    /// Parses an expression and checks its names; `locals` have a meaning in it alone.
+    /// Parses an expression and checks its names; `locals` are valid in it alone.
     pub fn parse(&mut self, item: Item, field: Field, text: &str, locals: &[&str]) -> Option<Expression> {
         let expression = match Expression::parse(text, self.callables) {
             Ok(expression) => expression,
@@ -28,7 +28,7 @@ impl Check<'_> {
         Some(expression)
     }
 
-    /// Names that mean nothing where they stand.
+    /// Collects names that have no meaning where they stand.
     fn misused(&self, expression: &Expression, locals: &[&str], found: &mut Vec<Complaint>) {
         for (term, span) in expression.terms.iter().zip(&expression.spans) {
             if found.len() == MOST_ERRORS {
@@ -123,7 +123,7 @@ impl Check<'_> {
         }
     }
 
-    /// Values beyond the ends, parsed: by piece, those of the definitions left out.
+    /// Parsed values beyond the ends, by piece, without those of definitions.
     pub fn beyond(&mut self, layout: &Layout) -> Vec<Option<Expression>> {
         let source = self.source;
         let given = |item: Item, field: Field| {
@@ -143,7 +143,7 @@ impl Check<'_> {
         texts.map(|(item, field, text)| text.and_then(|text| self.parse(item, field, text, &[]))).collect()
     }
 
-    /// The period of the forcing may depend on parameters only.
+    /// Checks that the period of the forcing depends on parameters only.
     pub fn forcing(
         &mut self,
         expression: &Expression,

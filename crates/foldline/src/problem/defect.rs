@@ -1,18 +1,20 @@
-//! How large the error of a collocation solution is.
+//! Error estimate of a collocation solution.
 //!
-//! **Idea.** The polynomial satisfies the differential equation at the Gauss points; how badly it does so in between is
-//! measured at one more point per interval, interlaced with them. The integral of this defect within an interval is the
-//! local error; its integral over whole intervals, put through the linearised equations, is what it does to the cycle as a
-//! whole. Unlike estimates from high derivatives this also sees a kink or a layer that the mesh has not resolved yet.
+//! **Idea.** The polynomial satisfies the differential equation at the Gauss points. Its defect in between is measured
+//! at one more point per interval, interlaced with them. The integral of the defect within an interval is the local
+//! error; its integral over whole intervals, propagated by the linearised equations, is its effect on the cycle as a
+//! whole. Unlike estimates from high derivatives, this also detects a kink or a layer that the mesh has not resolved
+//! yet.
 //!
 //! **Equations.** d(s) = U'(s) - h T f(U(s)) on an interval, s ∈ [0, 1]:
 //!
 //!   (1)  local error   w(s) = ∫₀ˢ d ds           (largest at the Gauss points, where d vanishes)
-//!   (2)  v' = h T J v + h T J w                  what w does to the cycle beyond itself, v continuous but for w(1)
+//!   (2)  v' = h T J v + h T J w                  error of the cycle beyond w, continuous except for jumps by w(1)
 //!
-//! d is integrated through its values at the m + 1 Gauss points of the next degree, exactly for its leading term. Within an
-//! interval w(1) and the source of (2) are of the same, higher order; the source, h T (f(U + w) - f(U)), is projected onto the
-//! polynomials that collocation at the Gauss points integrates, so that (2) has the matrix of the cycle itself.
+//! d is integrated through its values at the m + 1 Gauss points of the next degree, exactly for its leading term.
+//! Within an interval w(1) and the source of (2) are of the same, higher order. The source, h T (f(U + w) - f(U)), is
+//! projected onto the polynomials that collocation at the Gauss points integrates, so that (2) has the matrix of the
+//! cycle itself.
 //!
 //! **Source.** The role of the defect: enright2000.
 
@@ -25,20 +27,21 @@ use crate::diagram::Mesh;
 use crate::linalg::lane::{self, Eight, Lane, intact};
 use crate::linalg::{axpy, lu, panel, tile};
 
-/// Where the defect is sampled, and how it is integrated.
+/// Sample points of the defect, and weights for its integration.
 #[derive(Clone, Debug)]
 pub struct Sampling {
-    /// `[m + 1]` the sample points.
+    /// `[m + 1]` sample points.
     points: Vec<f64>,
     /// `[m + 1][m + 1]` values at the sample points from values at the nodes.
     values: Vec<f64>,
-    /// `[m + 1][m + 1]` derivatives likewise.
+    /// `[m + 1][m + 1]` derivatives at the sample points from values at the nodes.
     slopes: Vec<f64>,
     /// `[m + 1][m + 1]`: integral to each Gauss point, and to 1.
     integrals: Vec<f64>,
     /// `[m + 1][m + 1]`: integral to each sample point.
     partial: Vec<f64>,
-    /// `[m + 1][m + 1]`: right-hand sides of the collocation equations from a source at the sample points, then its integral.
+    /// `[m + 1][m + 1]`: right-hand sides of the collocation equations from a source at the sample points, then its
+    /// integral.
     sources: Vec<f64>,
     /// `[m + 1]`: value at the right end from values at the nodes.
     end: Vec<f64>,
@@ -51,7 +54,7 @@ impl Sampling {
         self.integrals[m * (m + 1) + point]
     }
 
-    /// For a scheme.
+    /// Sampling for a scheme.
     pub fn new(scheme: &Scheme) -> Sampling {
         let m = scheme.degree;
         let (points, weights) = gauss_legendre(m + 1);
@@ -90,8 +93,8 @@ impl Sampling {
 }
 
 impl Sampling {
-    /// `[m + 1][N]`: the times of the sample points in periods of the forcing, of which a cycle lasts so many; nothing where it has
-    /// none.
+    /// `[m + 1][N]` times of the sample points in forcing periods, of which a cycle lasts `forcing_periods`; empty
+    /// without forcing.
     pub fn times(&self, mesh: &[f64], forcing_periods: u32) -> Vec<f64> {
         let points = self.points.iter().take(if forcing_periods > 0 { usize::MAX } else { 0 });
         let of =
@@ -99,7 +102,7 @@ impl Sampling {
         points.flat_map(|&s| of(s)).collect()
     }
 
-    /// One component at the sample points, `[m + 1][N]`, from its values at the nodes, `[m + 1][N]`.
+    /// Evaluates one component at the sample points, `[m + 1][N]`, from its values at the nodes, `[m + 1][N]`.
     pub fn sampled(&self, nodes: &[f64], intervals: usize, out: &mut [f64]) {
         panel::multiply(&self.values, nodes, intervals, out);
     }
@@ -116,14 +119,14 @@ pub struct Defect {
     pub ends: Vec<f64>,
     /// `[N][m][n]`: right-hand sides of (2) at the Gauss points.
     pub sources: Vec<f64>,
-    /// `[N][n]`: w(1) with the integral of the source, by which the interval misses its right end.
+    /// `[N][n]`: w(1) plus the integral of the source, by which the interval misses its right end.
     pub misses: Vec<f64>,
 }
 
-/// Intervals that are looked at together: what that takes stays in the cache.
+/// Number of intervals processed together, so that the data fit into the cache.
 pub const TOGETHER: usize = 32;
 
-/// Room for the intervals that are looked at together.
+/// Workspace for intervals processed together.
 #[derive(Debug, Default)]
 pub struct Room {
     /// `[n][m + 1][count]` at the nodes, then f at the sample points.
@@ -137,7 +140,7 @@ pub struct Room {
 }
 
 impl Room {
-    /// For so many entries, m + 1 of every component of every interval.
+    /// Resizes for `lanes` entries (m + 1 per interval) of each component.
     fn resize(&mut self, n: usize, lanes: usize) {
         [&mut self.nodes, &mut self.states, &mut self.defect, &mut self.source]
             .into_iter()
@@ -146,7 +149,8 @@ impl Room {
     }
 }
 
-/// Measures the defect of a profile `[interval][node][component]`; a forced cycle lasts so many periods of the forcing.
+/// Measures the defect of a profile `[interval][node][component]`, which lasts `forcing_periods` (0 for an autonomous
+/// field).
 pub fn measure(
     field: &dyn VectorField,
     parameters: &[f64],
@@ -182,7 +186,7 @@ pub fn measure(
         for (d, f) in defect.chunks_exact_mut(count).zip(f.chunks_exact(count)) {
             d.iter_mut().zip(f).zip(&times).for_each(|((d, f), ht)| *d -= ht * f);
         }
-        // U + w, then f there.
+        // U + w, then f at that state.
         for (i, (states, defect)) in states.chunks_exact_mut(lanes).zip(defect.chunks_exact(lanes)).enumerate() {
             panel::multiply(&sampling.partial, defect, count, line);
             states.iter_mut().zip(&*line).for_each(|(x, w)| *x += w);
@@ -194,7 +198,7 @@ pub fn measure(
         for (own, f) in source.chunks_exact_mut(count).zip(f.chunks_exact(count)) {
             for ((g, f), ht) in own.iter_mut().zip(f).zip(&times) {
                 let change = ht * (*g - f);
-                // Next to where f ends its end is not the error's business.
+                // If U + w is outside the domain of f, that says nothing about the error.
                 *g = if change.is_finite() { change } else { 0.0 };
             }
         }
@@ -217,30 +221,30 @@ pub fn measure(
     Defect { local, within, ends, sources, misses }
 }
 
-/// A course of J along which solutions of the variational equations are made more accurate.
+/// Jacobians along a profile, for the correction of transition matrices.
 pub struct Course<'a> {
     /// `[n × n][m + 1][N]`: J at the sample points.
     pub jacobians: &'a [f64],
     /// `[N]`: h T.
     pub lengths: &'a [f64],
-    /// `[n × n][N]`: receives what the transitions V(1), what the polynomials give at the right ends, gain.
+    /// `[n × n][N]`: receives the corrections of the transitions V(1), the values of the polynomials at the right ends.
     pub gains: &'a mut [f64],
 }
 
-/// Solutions of the variational equations x' = h T J x on all intervals, made more accurate, for several courses of J.
+/// Improves the solutions of the variational equations x' = h T J x on all intervals, for several sets of Jacobians.
 ///
-/// `nodes` `[m][n × n][N]` are the values of the polynomials V at the inner nodes, which begin with the identity. With the sample points
-/// s_g, their weights w_g and D = V' - h T J V, the transitions lose the error that they have:
+/// `nodes` `[m][n × n][N]` are the values at the inner nodes of the polynomials V, which begin with the identity. With
+/// the sample points s_g, their weights w_g and D = V' - h T J V, the error that is subtracted from the transitions is
 ///
 ///   (3)  ∫₀¹ V(1) V(s)⁻¹ D(s) ds = V(1) Σ_g w_g V(s_g)⁻¹ D(s_g)
 ///
-/// Where V cannot be inverted they gain nothing.
+/// If V cannot be inverted, the correction is zero.
 pub fn correct(sampling: &Sampling, nodes: &[f64], courses: &mut [Course], n: usize) {
     let count = courses.first().map_or(0, |course| course.lengths.len());
     if count >= Eight::COUNT {
         Eight::dispatch(Correction { sampling, nodes, courses, n });
     } else if count > 0 {
-        // So few that the last one is repeated.
+        // Fewer than eight intervals: the last one is repeated.
         let filled = |lines: &[f64]| -> Vec<f64> {
             let line = |line: &[f64]| (0..Eight::COUNT).map(|j| line[j.min(count - 1)]).collect::<Vec<f64>>();
             lines.chunks_exact(count).flat_map(line).collect()
@@ -257,7 +261,7 @@ pub fn correct(sampling: &Sampling, nodes: &[f64], courses: &mut [Course], n: us
     }
 }
 
-/// For eight intervals or more.
+/// Correction of eight intervals or more.
 struct Correction<'a, 'b, 'c> {
     sampling: &'a Sampling,
     nodes: &'a [f64],
@@ -270,7 +274,7 @@ impl pulp::NullaryFnOnce for Correction<'_, '_, '_> {
 
     #[inline(always)]
     fn call(self) {
-        // The usual case with its sizes as constants.
+        // Common sizes as constants.
         match (self.n, self.sampling.points.len()) {
             (4, 5) => self.corrected(4, 5),
             (n, points) => self.corrected(n, points),
@@ -290,13 +294,13 @@ impl Correction<'_, '_, '_> {
         let (own, room) = room.split_at_mut(square * inner);
         let (matrix, room) = room.split_at_mut(square);
         let (right, growth) = room.split_at_mut(square);
-        // Σ_g of (3), `[course][n × n]`.
+        // Sums over g in (3), `[course][n × n]`.
         let mut sums = vec![Eight::default(); square * courses.len()];
         let negative = |weights: &[f64]| -> Vec<Eight> { weights.iter().map(|w| Eight::splat(-w)).collect() };
         let [to_values, to_slopes, to_end] = [&sampling.values, &sampling.slopes, &sampling.end].map(|w| negative(w));
         let weights = &sampling.sources[inner * points..][..points];
         for first in (0..count).step_by(Eight::COUNT) {
-            // The last eight may have intervals again that are done already.
+            // The last eight may include intervals that were already processed.
             let first = first.min(count - Eight::COUNT);
             for (k, v) in own.iter_mut().enumerate() {
                 intact::<Eight>();
@@ -336,7 +340,7 @@ impl Correction<'_, '_, '_> {
             for (course, sum) in courses.iter_mut().zip(sums.chunks_exact(square)) {
                 right.fill(Eight::default());
                 tile::subtract(right, n, matrix, n, sum, n, [n; 3], [0; 3]);
-                // Zero in lanes where all are finite.
+                // Zero in lanes in which all gains are finite.
                 let mut finite = Eight::default();
                 for gain in right.iter() {
                     intact::<Eight>();
@@ -352,7 +356,8 @@ impl Correction<'_, '_, '_> {
     }
 }
 
-/// What weights, whose negatives these are, make of the identity at the first node and of what stands at the others.
+/// Linear combination of the identity at the first node and `others` at the remaining nodes, given the negative
+/// weights.
 #[inline(always)]
 fn combined(negative: &[Eight], others: &[Eight], to: &mut [Eight], n: usize) {
     to.fill(Eight::default());
@@ -360,17 +365,17 @@ fn combined(negative: &[Eight], others: &[Eight], to: &mut [Eight], n: usize) {
     tile::subtract_combination(to, &negative[1..], others, n * n, 0);
 }
 
-/// How much rounding may grow, over all pivots.
+/// Largest growth factor of rounding errors, over all pivots, for which a factorisation without row exchanges is used.
 const GROWTH: f64 = 1e8;
 
-/// Factorises n×n matrices, in every lane without exchanging rows: L without its diagonal of ones below the diagonal, U on and above it,
-/// the inverse of its diagonal. `growth` receives for each of them by how much rounding may grow, no less than [`GROWTH`] where a pivot
-/// is too small. Contact makes velocities thousands of times as sensitive as positions, so that pivots are small; but of a correction
-/// a few digits are enough.
+/// Factorises n×n matrices in every lane without row exchanges: unit lower triangle L below the diagonal, U on and
+/// above it, with an inverted diagonal. `growth` receives the growth factor of rounding errors for each of them, at
+/// least [`GROWTH`] if a pivot is too small. Contact makes velocities thousands of times as sensitive as positions, so
+/// pivots can be small; but a few digits are enough for a correction.
 #[inline(always)]
 fn factorised(matrices: &mut [Eight], growth: &mut [Eight], n: usize) {
     growth.fill(Eight::splat(1.0));
-    // All of them pivot by pivot: none waits for its own quotients.
+    // All matrices advance pivot by pivot, so that divisions overlap.
     for k in 0..n {
         for (a, growth) in matrices.chunks_exact_mut(n * n).zip(&mut *growth) {
             let (upper, lower) = a.split_at_mut((k + 1) * n);
@@ -391,7 +396,7 @@ fn factorised(matrices: &mut [Eight], growth: &mut [Eight], n: usize) {
     }
 }
 
-/// Solves a x = b lane by lane, with exchanges, b in place of x; NaN where that does not help.
+/// Solves a x = b lane by lane with row exchanges, x replacing b; NaN if the matrix is singular.
 fn exchanging(a: &[Eight], x: &mut [Eight], n: usize) {
     let mut pivots = vec![0; n];
     for lane in 0..Eight::COUNT {
@@ -434,11 +439,11 @@ mod tests {
     }
 
     #[test]
-    fn intervals_are_corrected_alike_alone_and_among_others() {
+    fn the_correction_of_an_interval_does_not_depend_on_its_neighbours() {
         let (n, all) = (2, 19);
         let sampling = Sampling::new(&Scheme::new(4));
         let number = |k: usize, size: f64| size * ((k * k + 3 * k + 1) as f64).sin();
-        // Values next to the identity.
+        // Values close to the identity.
         let near = |k: usize| f64::from([1, 0, 0, 1][k / all % 4]) + number(k, 0.2);
         let mut nodes: Vec<f64> = (0..4 * n * n * all).map(near).collect();
         let jacobians: [Vec<f64>; 2] = [0.5, 0.9].map(|size| (0..5 * n * n * all).map(|k| number(k, size)).collect());
@@ -461,7 +466,7 @@ mod tests {
             assert_eq!(of(&nodes, piece.clone()), expected.collect::<Vec<f64>>(), "{piece:?}");
         }
         assert!(of(&nodes, 5..5).is_empty());
-        // Where the transition is none it gains nothing, and beside it as much as before.
+        // An interval without a transition has no correction, and its neighbours are not affected.
         nodes[5] = f64::NAN;
         for (line, before) in of(&nodes, 0..all).chunks_exact(all).zip(together.chunks_exact(all)) {
             for (j, (gain, before)) in line.iter().zip(before).enumerate() {
@@ -472,7 +477,7 @@ mod tests {
     }
 
     #[test]
-    fn a_small_pivot_serves_and_a_vanishing_one_is_exchanged_for_another() {
+    fn small_pivots_are_accepted_and_tiny_ones_need_row_exchanges() {
         let lanes = |x: [f64; 4]| x.map(Eight::splat);
         let right = lanes([3.0, 1.0, 4.0, 2.0]);
         for (a, serves) in
@@ -482,7 +487,7 @@ mod tests {
             factorised(&mut factors, &mut growth, 2);
             assert_eq!(growth[0].all(growth[0], |growth, _| growth < GROWTH), serves);
             exchanging(&lanes(a), &mut exchanged, 2);
-            // Back to the right-hand side.
+            // The product with the matrix must be the right-hand side.
             let apply = |x: &[Eight; 4]| {
                 [0, 1, 2, 3].map(|k| a[k / 2 * 2] * x[k % 2].0[7] + a[k / 2 * 2 + 1] * x[2 + k % 2].0[7])
             };

@@ -1,7 +1,7 @@
 //! Equilibria.
 //!
-//! **Equations.** u = (x, λ₁ … λ_k):  f(x, λ) = 0, n equations; k = 1 for a curve. Where branches cross, u = (x, b, λ₁ … λ_k) and
-//! f(x, λ) + b d = 0, with d as in `unfolding`.
+//! **Equations.** u = (x, λ₁ … λ_k):  f(x, λ) = 0, n equations; k = 1 for a curve. Where branches cross, u = (x, b, λ₁
+//! … λ_k) and f(x, λ) + b d = 0, with d as in `unfolding`.
 
 use super::Setting;
 use super::unfolding::Unfolding;
@@ -25,7 +25,7 @@ pub struct EquilibriumProblem<'a> {
 }
 
 impl<'a> EquilibriumProblem<'a> {
-    /// The problem in that setting.
+    /// Equilibria of the given field and free parameters.
     pub fn new(setting: Setting<'a>) -> EquilibriumProblem<'a> {
         let (n, k) = (setting.field.dim(), setting.freedom());
         EquilibriumProblem {
@@ -40,7 +40,7 @@ impl<'a> EquilibriumProblem<'a> {
         }
     }
 
-    /// The same where branches cross: the amplitude b counts as the first free parameter.
+    /// Unfolded problem for a crossing of branches, in which the amplitude b counts as the first free parameter.
     pub fn unfolded(setting: Setting<'a>) -> EquilibriumProblem<'a> {
         let (n, k) = (setting.field.dim(), setting.freedom() + 1);
         EquilibriumProblem {
@@ -55,7 +55,7 @@ impl<'a> EquilibriumProblem<'a> {
         self.scale.len()
     }
 
-    /// Where the free parameters of the setting begin.
+    /// Index of the first free parameter in u.
     fn first(&self) -> usize {
         self.n() + usize::from(self.unfolding.is_some())
     }
@@ -115,7 +115,7 @@ impl ZeroProblem for EquilibriumProblem<'_> {
             for i in 0..n {
                 line[i] = row[i] / (self.scale[i] * self.scale[i] * n as f64);
             }
-            // (b and λ are relative numbers.)
+            // (b and λ are relative quantities.)
             line[n..].copy_from_slice(&row[n..]);
         }
         lu::factorise(&mut self.matrix, size, &mut self.pivots)
@@ -162,7 +162,7 @@ impl ZeroProblem for EquilibriumProblem<'_> {
         self.linearise(u);
         let spectrum = eigenvalues(&self.fx, n, self.setting.scales);
         let unstable = spectrum.iter().filter(|z| z.re > 0.0).count();
-        // Next to where f_x vanishes f still changes with the parameters.
+        // f still changes with the parameters if f_x nearly vanishes.
         let free = self.setting.freedom();
         let by_free =
             (0..self.n() * free).fold(0.0, |most: f64, k| most.max((self.fp[k] / self.scale[k / free]).abs()));
@@ -175,7 +175,7 @@ impl ZeroProblem for EquilibriumProblem<'_> {
     }
 
     fn spectrum_error(&mut self, _u: &[f64], spectrum: &[Complex64]) -> f64 {
-        // Rounding moves two eigenvalues that meet by the root of its size.
+        // Rounding moves two coalescing eigenvalues by its square root.
         let size = spectrum.iter().fold(1.0f64, |most, z| most.max(z.norm()));
         4.0 * f64::EPSILON.sqrt() * size
     }

@@ -1,29 +1,29 @@
 //! Smallest and largest values of states and outputs.
 //!
-//! **Idea.** Sample densely, then refine by parabolas through three points of the polynomial profile. Between samples a peak may
-//! rise above a higher sample, so the best few peaks are refined, not only the best one.
+//! **Idea.** Sample densely, then refine by parabolas through three points of the polynomial profile. Between samples a
+//! peak may rise above a higher sample, so the best few peaks are refined, not only the best one.
 
 use super::gauss::Scheme;
 use crate::contract::{Batch, Parameters, VectorField};
 use crate::linalg::lane::{Eight, Lane};
 use crate::linalg::panel;
 
-/// Peaks of one channel that are refined.
+/// Number of peaks of one channel that are refined.
 const PEAKS: usize = 3;
-/// Distance from its neighbours, in samples, down to which a peak is refined.
+/// Distance between a peak and its neighbours, in samples, at which refinement stops.
 const CLOSE: f64 = 0.005;
-/// Refinements at most: four, and one for every sample or part of one that the peak moves aside.
+/// Maximum number of refinements: four, plus one for every shift of the peak by up to a sample.
 const ROUNDS: usize = 12;
 
-/// At one state: every range is a single value.
+/// Ranges at an equilibrium: every range is a single value.
 pub fn of_state(field: &dyn VectorField, parameters: &[f64], x: &[f64]) -> Vec<[f64; 2]> {
     let mut outputs = vec![0.0; field.output_count()];
     field.outputs(Batch { lanes: 1, states: x, parameters: Parameters::Shared(parameters), times: &[] }, &mut outputs);
     x.iter().chain(&outputs).map(|&v| [v, v]).collect()
 }
 
-/// Over a periodic profile `[interval][node][component]` on a mesh, which lasts so many periods of the forcing, none where the
-/// field is autonomous.
+/// Ranges over a periodic profile `[interval][node][component]` on a mesh, which lasts `forcing_periods` (0 for an
+/// autonomous field).
 pub fn of_profile(
     field: &dyn VectorField,
     parameters: &[f64],
@@ -35,7 +35,7 @@ pub fn of_profile(
     let channels = field.dim() + field.output_count();
     let lanes = orbit.lanes();
     let values = orbit.samples();
-    // For every channel and both signs the largest value times the sign, and the best few peaks.
+    // For every channel and sign, the largest value times the sign, and the best few peaks.
     let mut best = Vec::with_capacity(2 * channels);
     let mut peaks: Vec<Peak> = Vec::with_capacity(2 * PEAKS * channels);
     for line in values.chunks_exact(lanes) {
@@ -57,15 +57,15 @@ pub fn of_profile(
     best.chunks_exact(2).map(|pair| [-pair[0], pair[1]]).collect()
 }
 
-/// A place, in units of samples, near which a channel times a sign has a peak.
+/// A position, in samples, near which a channel times a sign has a peak.
 struct Peak {
-    /// Which channel and sign.
+    /// Index of channel and sign.
     of: usize,
     sign: f64,
     place: f64,
-    /// Distance of the neighbours that are looked at.
+    /// Distance of the neighbours that are evaluated.
     spacing: f64,
-    /// What it will not rise above: the top of its parabola, and twice what that falls to its neighbours on average.
+    /// Upper bound of the peak: the maximum of its parabola plus twice the mean drop to its neighbours.
     reach: f64,
 }
 
@@ -76,7 +76,7 @@ struct Orbit<'a> {
     mesh: &'a [f64],
     forcing_periods: u32,
     scheme: &'a Scheme,
-    /// N.
+    /// N, the number of intervals.
     count: usize,
 }
 
@@ -90,7 +90,7 @@ impl Orbit<'_> {
         self.count * self.density()
     }
 
-    /// All channels at all samples in the order of time, `[channel][sample]`.
+    /// All channels at all samples in order of time, `[channel][sample]`.
     fn samples(&self) -> Vec<f64> {
         let (n, nodes, density, count) = (self.field.dim(), self.scheme.degree + 1, self.density(), self.count);
         let weights: Vec<f64> =
@@ -110,7 +110,7 @@ impl Orbit<'_> {
         self.with_outputs(states, &self.times(places))
     }
 
-    /// The times of places in periods of the forcing; nothing where there is none.
+    /// Times at positions, in forcing periods; empty without forcing.
     fn times(&self, places: impl Iterator<Item = f64>) -> Vec<f64> {
         if self.forcing_periods == 0 {
             return Vec::new();
@@ -122,14 +122,14 @@ impl Orbit<'_> {
         places.map(time).collect()
     }
 
-    /// The interval of a place in units of samples, and where in it that is.
+    /// Interval that contains a position in samples, and the position within it.
     fn interval(&self, place: f64) -> (usize, f64) {
         let position = place.rem_euclid(self.lanes() as f64) / self.density() as f64;
         let j = (position.floor() as usize).min(self.count - 1);
         (j, position - j as f64)
     }
 
-    /// States `[n × lanes]` at these times with the outputs behind them.
+    /// States `[n × lanes]` at these times, followed by the outputs.
     fn with_outputs(&self, states: Vec<f64>, times: &[f64]) -> Vec<f64> {
         let n = self.field.dim();
         let lanes = states.len() / n;
@@ -141,8 +141,8 @@ impl Orbit<'_> {
         values
     }
 
-    /// Moves each peak to the top of the parabola through itself and its neighbours. They come closer where the top lies between
-    /// them; next to the end of an interval, where samples are not equally far apart in time, it may not.
+    /// Moves each peak to the maximum of the parabola through itself and its neighbours, and moves these closer if it
+    /// lies between them. Next to the end of an interval, where samples are not equidistant in time, it may not.
     fn refine(&self, peaks: &mut [Peak], best: &mut [f64]) {
         let (n, probes) = (self.field.dim(), 3 * peaks.len());
         if probes == 0 {
@@ -179,14 +179,14 @@ impl Orbit<'_> {
             } else if a > b || c > b {
                 peak.place += if a > c { -peak.spacing } else { peak.spacing };
             }
-            // A constant has its top everywhere.
+            // A constant has its maximum everywhere.
             if between {
                 peak.spacing *= 0.2;
             }
         }
     }
 
-    /// The state at a place in units of samples.
+    /// Evaluates the state at a position in samples.
     fn state_into(&self, place: f64, x: &mut [f64]) {
         let (j, s) = self.interval(place);
         let block = (self.scheme.degree + 1) * x.len();
@@ -194,14 +194,14 @@ impl Orbit<'_> {
     }
 }
 
-/// For either sign, -1 first, the largest value of sign · line, and the samples of its best few peaks, the best first.
+/// Largest value of sign · line for both signs, -1 first, and the samples of its best few peaks, best first.
 fn outermost(line: &[f64]) -> [(f64, Vec<usize>); 2] {
     let lanes = line.len();
     let mut found = [Summit::default(), Summit::default()];
     let mut look = |l: usize| {
         let triple =
             [line[if l > 0 { l - 1 } else { lanes - 1 }], line[l], line[if l + 1 < lanes { l + 1 } else { 0 }]];
-        // Between its neighbours it is no peak, and one of them is more extreme to either side.
+        // A sample between its neighbours is no peak, and one of them is more extreme for either sign.
         let [before, here, after] = triple;
         if (before < here && here < after) || (before > here && here > after) {
             return;
@@ -210,7 +210,7 @@ fn outermost(line: &[f64]) -> [(f64, Vec<usize>); 2] {
         low.look(l, triple.map(|v| -v));
         high.look(l, triple);
     };
-    // Where the line only rises or only falls, over a block and one sample to either side, no sample is a peak.
+    // If the line is monotonic over a block and one sample on either side, no sample in it is a peak.
     const BLOCK: usize = Eight::COUNT;
     let mut l = 0;
     while l < lanes {
@@ -224,7 +224,7 @@ fn outermost(line: &[f64]) -> [(f64, Vec<usize>); 2] {
     found.map(|summit| (summit.top, summit.peaks.into_iter().map(|peak| peak.1).collect()))
 }
 
-/// Whether ten numbers only rise or only fall.
+/// True if ten numbers are strictly monotonic.
 fn is_monotone(line: &[f64]) -> bool {
     let (before, here) = (Eight::load(line), Eight::load(&line[1..]));
     let [next, last] = [8, 9].map(|k| line[k]);
@@ -234,10 +234,10 @@ fn is_monotone(line: &[f64]) -> bool {
     }
 }
 
-/// The largest of the values looked at, and the best few peaks among them.
+/// The largest sample and the best few peaks.
 struct Summit {
     top: f64,
-    /// (How high the parabola through a peak and its neighbours rises, sample); the first of equals stays first.
+    /// (Maximum of the parabola through a peak and its neighbours, sample); the first of equal ones stays first.
     peaks: Vec<(f64, usize)>,
 }
 
@@ -248,7 +248,7 @@ impl Default for Summit {
 }
 
 impl Summit {
-    /// Takes note of sample l, which has these neighbours.
+    /// Considers sample l, given with its neighbours.
     #[inline(always)]
     fn look(&mut self, l: usize, [before, here, after]: [f64; 3]) {
         if here > self.top {

@@ -1,7 +1,7 @@
 //! Collocation at Gauss points on one interval.
 //!
-//! **Idea.** A polynomial of degree m on [0, 1] is held by its values at 0 and at the m Gauss–Legendre points c₁…c_m. Its
-//! derivative at the Gauss points and its value at 1 are fixed linear combinations of those values.
+//! **Idea.** A polynomial of degree m on [0, 1] is represented by its values at 0 and at the m Gauss–Legendre points
+//! c₁…c_m. Its derivative at the Gauss points and its value at 1 are fixed linear combinations of those values.
 //!
 //! **Equations.** With nodes c₀ = 0, c₁, …, c_m and Lagrange polynomials ℓ_k:
 //!
@@ -14,13 +14,13 @@
 
 use std::sync::OnceLock;
 
-/// The largest degree.
+/// Largest supported degree.
 pub const LARGEST: usize = 12;
 
 /// Nodes and weights for one degree.
 #[derive(Clone, Debug)]
 pub struct Scheme {
-    /// m.
+    /// m, the degree.
     pub degree: usize,
     /// `[m + 1]` nodes: 0, then the Gauss points.
     pub nodes: Vec<f64>,
@@ -36,7 +36,7 @@ pub struct Scheme {
 }
 
 impl Scheme {
-    /// The scheme of a degree, as [`Scheme::new`] makes it, made once.
+    /// The scheme of a degree, from a table that is built once by [`Scheme::new`].
     pub fn of(degree: usize) -> &'static Scheme {
         static KNOWN: [OnceLock<Scheme>; LARGEST] = [const { OnceLock::new() }; LARGEST];
         let m = degree.clamp(1, LARGEST);
@@ -80,7 +80,7 @@ impl Scheme {
         let weights = &mut weights[..=self.degree];
         self.weigh(s, weights);
         let n = x.len();
-        // Four components at a time are two or one vector instructions.
+        // Four components at a time fill one or two vector registers.
         let (fours, rest) = x.as_chunks_mut::<4>();
         for (g, four) in fours.iter_mut().enumerate() {
             *four = [0.0; 4];
@@ -96,7 +96,7 @@ impl Scheme {
         }
     }
 
-    /// ℓ_k(s): the product of what is left of node k and of what is right of it, and exactly 1 at the node.
+    /// ℓ_k(s): the product of the factors to the left and to the right of node k, exactly 1 at the node.
     pub fn weigh(&self, s: f64, weights: &mut [f64]) {
         let mut left = 1.0;
         for ((w, c), b) in weights.iter_mut().zip(&self.nodes).zip(&self.barycentric) {
@@ -111,7 +111,7 @@ impl Scheme {
     }
 }
 
-/// ∫ of the Lagrange polynomials on the Gauss points from 0 to each of them, by the quadrature of those points.
+/// Integrals of the Lagrange polynomials on the Gauss points from 0 to each of these points, by Gauss quadrature.
 fn integration(gauss: &[f64], weights: &[f64]) -> Vec<f64> {
     let m = gauss.len();
     let through = |k: usize, s: f64| -> f64 {

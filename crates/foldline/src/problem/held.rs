@@ -1,11 +1,11 @@
-//! A special point held along a curve in two parameters.
+//! Bifurcation points continued in two parameters.
 //!
-//! **Idea.** Solutions with two free parameters form a surface; the condition that holds the special point cuts a curve out
-//! of it. The surface keeps its own block solver: two solutions span its tangent plane, and what is left is a system of a
-//! few scalar equations.
+//! **Idea.** Solutions with two free parameters form a surface; the defining condition of the bifurcation selects a
+//! curve on it. The surface keeps its own block solver: two solutions span its tangent plane, and a system of a few
+//! scalar equations remains.
 //!
 //! **Equations.** u = (σ, w): extra unknowns σ `[e]` of the condition, then w of the surface with both parameters last;
-//! the second of them is that of the continuation.
+//! the second of them is the continuation parameter.
 //!
 //! ```text
 //!   (1)  F(w) = 0,   g(w, σ) = 0                                e + 1 equations more than the surface has
@@ -14,43 +14,47 @@
 //!        [ ⟨c, τ₁⟩  ⟨c, τ₂⟩  c_σ ] [ σ ]  =  [ r_c - ⟨c, w_p⟩ ]
 //! ```
 //!
-//! Where branches cross, the surface has an unknown more (`equilibrium`), three vectors τ span it, and there is an equation more.
+//! Where branches cross, the surface has one more unknown (`equilibrium`), three vectors τ span it, and there is one
+//! more equation.
 //!
 //! **Source.** govaerts2000, §4 (bordered extended systems); the elimination (2), (3) is ours.
 //!
-//! **Fails when** the surface itself is singular (two curves of special points cross).
+//! **Fails when** the surface itself is singular (two bifurcation curves cross).
 
 use crate::contract::{Condition, Examination, Singular, ZeroProblem};
 use crate::diagram::{Kind, Mesh, Point};
 use crate::linalg::{axpy, lu};
 use num_complex::Complex64;
 
-/// The eigenvalue next to the one that is held meets it where it is closer to it than so many times what that one is off by.
+/// An eigenvalue next to the critical one coalesces with it if it is closer than this many times the error of the
+/// latter.
 const MEETING: f64 = 10.0;
 
-/// A surface with a condition held.
+/// A surface of solutions together with the condition of a bifurcation.
 pub struct Held<'a> {
     surface: Box<dyn ZeroProblem + 'a>,
     condition: Box<dyn Condition + 'a>,
-    /// Rows that fix the place on the surface, and the tangents τ found with them, each `[freedom][surface unknowns]`.
+    /// Rows that fix the position on the surface, and the tangents τ found with them, each `[freedom][surface
+    /// unknowns]`.
     rows: Vec<f64>,
     tangents: Vec<f64>,
     /// Size of the extra unknowns.
     scale: Vec<f64>,
-    /// c of the last factorisation, and (3).
+    /// c of the last factorisation; below, the factors and pivots of (3).
     row: Vec<f64>,
     small: Vec<f64>,
     pivots: Vec<usize>,
-    /// Where g was evaluated last, and g; nothing where the borders have changed since.
+    /// Point of the last evaluation of g, and its value; `None` if the borders have changed since.
     known: Option<(Vec<f64>, Vec<f64>)>,
-    /// Where the null vectors and the tangents belong to; nothing where there are none.
+    /// Points to which the null vectors and the tangents belong; empty if there are none.
     nulls_at: Vec<f64>,
     tangents_at: Vec<f64>,
     adapted: bool,
 }
 
 impl<'a> Held<'a> {
-    /// `surface` has two free parameters; both are on the same mesh.
+    /// Curve of the bifurcations that `condition` defines on `surface`, which has two free parameters. Both must be on
+    /// the same mesh.
     pub fn new(surface: Box<dyn ZeroProblem + 'a>, condition: Box<dyn Condition + 'a>) -> Held<'a> {
         let freedom = condition.equations() + 1 - condition.extra();
         let (scale, rows) = (vec![1.0; condition.extra()], generic(freedom * surface.unknowns()));
@@ -70,8 +74,8 @@ impl<'a> Held<'a> {
         }
     }
 
-    /// Makes rows and borders fit the place: the first ones are arbitrary, and every round replaces them by the vectors they
-    /// should be.
+    /// Adapts rows and borders to the point. The initial ones are arbitrary, and every round replaces them by better
+    /// ones.
     fn adapt(&mut self, u: &[f64]) {
         const ROUNDS: usize = 4;
         if std::mem::replace(&mut self.adapted, true) {
@@ -88,7 +92,7 @@ impl<'a> Held<'a> {
         }
     }
 
-    /// The τ from the last factorisation of the surface, which is one at `u`.
+    /// Computes the τ from the last factorisation of the surface, which is one at `u`.
     fn span(&mut self, u: &[f64]) {
         let (size, k) = (self.surface.unknowns(), self.freedom());
         self.tangents = vec![0.0; k * size];
@@ -100,8 +104,8 @@ impl<'a> Held<'a> {
         self.tangents_at = u.to_vec();
     }
 
-    /// Whether vectors found at `place` will do as references at `u`. Those of an iterate that went astray would not: with such
-    /// borders g is so curved that the next step fails too.
+    /// True if vectors found at `place` can serve as references at `u`. Those of an iterate that has diverged cannot:
+    /// with such borders g is so strongly nonlinear that the next step fails too.
     fn serves(&self, place: &[f64], u: &[f64]) -> bool {
         const NEAR: f64 = 1e-5;
         place.len() == u.len() && {
@@ -110,7 +114,7 @@ impl<'a> Held<'a> {
         }
     }
 
-    /// g with the borders as they are.
+    /// Evaluates g with the current borders.
     fn evaluate(&mut self, u: &[f64], g: &mut [f64]) -> bool {
         let e = self.extra();
         let finite = self.condition.evaluate(&u[e..], &u[..e], g);
@@ -118,7 +122,7 @@ impl<'a> Held<'a> {
         finite
     }
 
-    /// g at `u`.
+    /// Evaluates g at `u`, unless it is known there.
     fn condition_at(&mut self, u: &[f64], g: &mut [f64]) -> bool {
         self.adapt(u);
         if let Some((at, value)) = &self.known
@@ -136,14 +140,14 @@ impl<'a> Held<'a> {
         self.condition.extra()
     }
 
-    /// How many directions the surface has.
+    /// Dimension of the surface.
     fn freedom(&self) -> usize {
         self.condition.equations() + 1 - self.extra()
     }
 
-    /// What is known of the surface, with what is held put where it belongs; `u` with the extra unknowns.
+    /// Examination of the surface with the critical eigenvalues at their exact values; `u` includes the extra unknowns.
     fn with_held(&self, u: &[f64], mut found: Examination) -> Examination {
-        // The eigenvalues that are held count as neither stable nor unstable.
+        // Critical eigenvalues count as neither stable nor unstable.
         let (first, is_cycle) = (found.trivial, !self.surface.mesh().is_empty());
         let mut others = found.spectrum.split_off(first.min(found.spectrum.len()));
         let held = self.condition.held(&u[..self.extra()]);
@@ -152,7 +156,8 @@ impl<'a> Held<'a> {
                 (0..others.len()).min_by(|a, b| (others[*a] - z).norm().total_cmp(&(others[*b] - z).norm()))
             };
             let off = closest(&others).map_or(Complex64::ZERO, |k| others.remove(k) - z);
-            // Of two that meet the sum is known better than either: where one is as meant, the other is what remains of the sum.
+            // The sum of two coalescing eigenvalues is more accurate than either: one takes its exact value, the other
+            // the rest of the sum.
             if let ([_], Some(next)) = (&held[..], closest(&others))
                 && (others[next] - z).norm() < MEETING * off.norm()
             {
@@ -161,12 +166,13 @@ impl<'a> Held<'a> {
         }
         others.sort_by(|a, b| self.condition.distance(*a).total_cmp(&self.condition.distance(*b)));
         found.unstable = others.iter().filter(|z| if is_cycle { z.norm() > 1.0 } else { z.re > 0.0 }).count();
-        // What is held comes first, as it is meant: computed, a double eigenvalue would be known to half the digits.
+        // Critical eigenvalues come first, at their exact values; a computed double eigenvalue has half the digits
+        // only.
         found.spectrum.extend(held.into_iter().chain(others));
         found
     }
 
-    /// Orthonormal vectors in place of the rows: those that span the tangent plane found last.
+    /// Replaces the rows by orthonormal vectors that span the last tangent plane.
     fn follow_plane(&mut self) {
         let (size, k) = (self.surface.unknowns(), self.freedom());
         if self.tangents.len() != k * size {
@@ -189,7 +195,7 @@ impl<'a> Held<'a> {
     }
 }
 
-/// Numbers without any structure, smooth along a profile.
+/// Numbers without any structure that vary smoothly along a profile.
 fn generic(count: usize) -> Vec<f64> {
     (0..count).map(|k| 0.6 + (k as f64 * 0.0113).sin() + 0.7 * (k as f64 * 1.37).cos()).collect()
 }
@@ -344,7 +350,7 @@ impl ZeroProblem for Held<'_> {
     }
 
     fn margin(&self, at: &Point) -> f64 {
-        // One multiplier may lie there all the way; what counts is a second one.
+        // One multiplier may be critical along the whole curve; only a second one counts.
         let held = if matches!(self.condition.kind(), Kind::Fold | Kind::BranchPoint) { 1 } else { 0 };
         let mut others = at.clone();
         let first = at.spectrum.len() - at.free_spectrum().len();
@@ -353,7 +359,7 @@ impl ZeroProblem for Held<'_> {
         self.surface.margin(&others)
     }
 
-    /// The change of g along the null vector: it vanishes at cusps.
+    /// Directional derivative of g along the null vector, which vanishes at cusps.
     fn arm(&mut self, u: &[f64]) -> Option<f64> {
         let mut g = vec![0.0; self.condition.equations()];
         let along = self.condition_at(u, &mut g).then(|| self.condition.null_direction())??;

@@ -1,7 +1,7 @@
 //! Meshes: redistribution and transfer.
 //!
-//! **Equations.** With e_j the estimated error on interval j (see [`super::defect`]), which behaves like h_j^{m+1} where
-//! the solution is smooth:
+//! **Equations.** With e_j the estimated error on interval j (see [`super::defect`]), which behaves like h_j^{m+1}
+//! where the solution is smooth:
 //!
 //!   (1)  N = Σ_j e_j^{1/(m+1)} / ε^{1/(m+1)}             intervals that make all e_j equal to ε
 //!
@@ -11,16 +11,16 @@ use super::gauss::Scheme;
 use crate::diagram::{Cycle, Mesh};
 use crate::linalg::lane::{Eight, Lane as _};
 
-/// The largest mesh that is tried.
+/// Largest permitted number of intervals.
 pub const LARGEST: usize = 4000;
 const SMALLEST: usize = 6;
 
-/// N equal intervals.
+/// Mesh of N equal intervals.
 pub fn uniform(intervals: usize) -> Mesh {
     (0..=intervals).map(|j| j as f64 / intervals as f64).collect()
 }
 
-/// Every interval cut into `parts`.
+/// Mesh with every interval divided into `parts`.
 pub fn divided(mesh: &Mesh, parts: usize) -> Mesh {
     let mut out = Vec::with_capacity(parts * mesh.len());
     for pair in mesh.windows(2) {
@@ -30,7 +30,8 @@ pub fn divided(mesh: &Mesh, parts: usize) -> Mesh {
     out.into()
 }
 
-/// Half as many intervals again, everywhere; the second half of a mesh that is a copy of the first stays one.
+/// Mesh with 1.5 times as many intervals everywhere. If the second half of `mesh` is a copy of the first, this remains
+/// so.
 pub fn denser(mesh: &Mesh) -> Mesh {
     let thicker = |nodes: &[f64]| -> Vec<f64> {
         let count = nodes.len() - 1;
@@ -51,15 +52,15 @@ pub fn denser(mesh: &Mesh) -> Mesh {
     first.into()
 }
 
-/// A mesh on which every interval would carry about `target`, nowhere with less than the share `kept` of the density that
-/// `mesh` has there, or `None` if more than [`LARGEST`] intervals were needed.
+/// Mesh on which every interval would have an error of about `target`, nowhere coarser than the share `kept` of the
+/// density of `mesh`. `None` if more than [`LARGEST`] intervals were needed.
 pub fn equidistributed(errors: &[f64], mesh: &Mesh, degree: usize, target: f64, kept: f64) -> Option<Mesh> {
     let count = errors.len();
     let power = 1.0 / (degree as f64 + 1.0);
     let raw: Vec<f64> = (0..count).map(|j| (errors[j] / target).powf(power) / (mesh[j + 1] - mesh[j])).collect();
     let mean: f64 = (0..count).map(|j| raw[j] * (mesh[j + 1] - mesh[j])).sum();
-    // A floor and a look at the neighbours keep the mesh from tearing where the estimate happens to vanish, and leave room
-    // for a layer to move. What was fine becomes coarse by and by only: a layer may come back.
+    // A lower bound and a glance at the neighbours keep the mesh from tearing where the estimate happens to vanish, and
+    // leave room for a layer to move. Fine parts are coarsened only gradually, because a layer may return.
     let beside = |j: usize, k: usize| raw[(j + k) % count].max(raw[(j + count - k) % count]);
     let density: Vec<f64> = (0..count)
         .map(|j| {
@@ -87,24 +88,24 @@ pub fn equidistributed(errors: &[f64], mesh: &Mesh, degree: usize, target: f64, 
     Some(out.into())
 }
 
-/// Like [`equidistributed`] for a mesh whose second half is a copy of the first; so is that of the result.
+/// Equidistributed mesh whose second half is a copy of the first, as in `mesh`; see [`equidistributed`].
 pub fn equidistributed_in_halves(errors: &[f64], mesh: &Mesh, degree: usize, target: f64, kept: f64) -> Option<Mesh> {
     let half = errors.len() / 2;
     let worse: Vec<f64> = (0..half).map(|j| errors[j].max(errors[j + half])).collect();
     let stretched: Mesh = mesh[..=half].iter().map(|t| 2.0 * t).collect();
-    // Lengths relative to the half are twice those relative to the whole; the errors know nothing of that.
+    // Lengths relative to the half are twice those relative to the whole; the errors do not change.
     let first = equidistributed(&worse, &stretched, degree, target, kept)?;
     Some(first.iter().map(|t| 0.5 * t).chain(first[1..].iter().map(|t| 0.5 + 0.5 * t)).collect())
 }
 
-/// Whether the second half of a mesh is a copy of the first.
+/// True if the second half of a mesh is a copy of the first.
 pub fn in_halves(mesh: &Mesh) -> bool {
     let half = (mesh.len() - 1) / 2;
     mesh.len() % 2 == 1 && (0..=half).all(|j| (mesh[j] + 0.5 - mesh[j + half]).abs() < 1e-14)
 }
 
-/// A mesh whose second half is a copy of the first, with every boundary of `mesh` in one half or the other, and the errors that its
-/// intervals have if those of `mesh` have `errors`.
+/// Mesh whose second half is a copy of the first, with every boundary of `mesh` in both halves, and the errors expected
+/// on its intervals if those of `mesh` have `errors`.
 pub fn halved(errors: &[f64], mesh: &Mesh, degree: usize) -> (Vec<f64>, Mesh) {
     let mut first: Vec<f64> = mesh.iter().map(|t| if *t < 0.5 { *t } else { t - 0.5 }).collect();
     first.push(0.5);
@@ -121,25 +122,25 @@ pub fn halved(errors: &[f64], mesh: &Mesh, degree: usize) -> (Vec<f64>, Mesh) {
     (whole.windows(2).map(error).collect(), whole)
 }
 
-/// Whether two meshes have the same boundaries.
+/// True if two meshes have the same boundaries.
 pub fn same(a: &Mesh, b: &Mesh) -> bool {
     std::sync::Arc::ptr_eq(a, b) || crate::linalg::same(a, b)
 }
 
-/// From one mesh to another.
+/// Interpolation from one mesh to another.
 #[derive(Clone, Debug)]
 pub struct Passage {
     from: Mesh,
     to: Mesh,
     degree: usize,
-    /// Of every node of the new mesh the old interval in which it lies.
+    /// Old interval that contains each node of the new mesh …
     within: Vec<usize>,
-    /// … and what the nodes there contribute, `[N (m + 1)][m + 1]`.
+    /// … and weights of the nodes of that interval, `[N (m + 1)][m + 1]`.
     weights: Vec<f64>,
 }
 
 impl Passage {
-    /// For polynomials of that scheme.
+    /// Interpolation of polynomials of the given scheme.
     pub fn new(scheme: &Scheme, from: &Mesh, to: &Mesh) -> Passage {
         let nodes = scheme.degree + 1;
         let count = (to.len() - 1) * nodes;
@@ -156,14 +157,14 @@ impl Passage {
         Passage { from: from.clone(), to: to.clone(), degree: scheme.degree, within, weights }
     }
 
-    /// Whether it leads from one of these meshes to the other.
+    /// True if this interpolates between these two meshes.
     pub fn is_between(&self, from: &Mesh, to: &Mesh) -> bool {
         same(&self.from, from) && same(&self.to, to)
     }
 
-    /// A profile of n components, `[interval][node][component]`, on the new mesh.
+    /// Interpolates a profile of n components, `[interval][node][component]`, to the new mesh.
     pub fn carried(&self, profile: &[f64], n: usize) -> Vec<f64> {
-        // With room for the scalars that follow a profile.
+        // Capacity for the scalars that follow a profile.
         let mut out = Vec::with_capacity(self.within.len() * n + 8);
         out.resize(self.within.len() * n, 0.0);
         Eight::dispatch(Carried { passage: self, profile, out: &mut out, n });
@@ -183,7 +184,7 @@ impl pulp::NullaryFnOnce for Carried<'_, '_> {
 
     #[inline(always)]
     fn call(self) {
-        // The usual numbers as constants.
+        // Common sizes as constants.
         match (self.n, self.passage.degree + 1) {
             (4, 5) => self.fill_in::<4, 5>(),
             (n, nodes) => self.fill(n, nodes),
@@ -192,7 +193,7 @@ impl pulp::NullaryFnOnce for Carried<'_, '_> {
 }
 
 impl Carried<'_, '_> {
-    /// The same for that many components and nodes, summed without going by way of memory.
+    /// [`Carried::fill`] for constant numbers of components and nodes, with the sums in registers.
     #[inline(always)]
     fn fill_in<const N: usize, const NODES: usize>(self) {
         let places = self.passage.within.iter().zip(self.passage.weights.as_chunks::<NODES>().0);
@@ -221,12 +222,12 @@ impl Carried<'_, '_> {
     }
 }
 
-/// A periodic profile carried to another mesh by evaluating its polynomials.
+/// Transfers a periodic profile to another mesh by evaluating its polynomials.
 pub fn transferred(profile: &[f64], n: usize, scheme: &Scheme, from: &Mesh, to: &Mesh) -> Vec<f64> {
     Passage::new(scheme, from, to).carried(profile, n)
 }
 
-/// The cycle, or where it has no mesh one like it of that degree on a uniform one, whose profile is not known.
+/// The cycle itself or, if it has no mesh, a cycle of this degree on a uniform mesh, with an unknown profile.
 pub fn at_least_some(cycle: &Cycle, degree: usize) -> Cycle {
     match cycle.intervals() {
         0 => Cycle { mesh: uniform(20), degree, profile: Vec::new(), ..cycle.clone() },
@@ -246,7 +247,7 @@ mod tests {
     }
 
     #[test]
-    fn a_mesh_in_halves_keeps_every_boundary() {
+    fn halving_a_mesh_keeps_every_boundary() {
         let mesh: Mesh = vec![0.0, 0.2, 0.3, 0.9, 1.0].into();
         assert!(!in_halves(&mesh));
         let (errors, whole) = halved(&[1.0, 2.0, 64.0, 4.0], &mesh, 4);
@@ -271,7 +272,7 @@ mod tests {
 
     #[test]
     fn equidistribution_meets_its_target_where_the_error_has_a_layer() {
-        // e_j = h^5 |density(t)|^5 with a sharp peak at t = 0.3.
+        // e_j = h⁵ density(t)⁵ with a sharp peak at t = 0.3.
         let density = |t: f64| 20.0 + 400.0 / (1.0 + (100.0 * (t - 0.3)).powi(2));
         let error = |mesh: &Mesh| -> Vec<f64> {
             mesh.windows(2).map(|p| ((p[1] - p[0]) * density(0.5 * (p[0] + p[1]))).powi(5)).collect()
@@ -296,7 +297,7 @@ mod tests {
     }
 
     #[test]
-    fn four_components_with_their_number_as_a_constant_are_carried_like_single_ones() {
+    fn transfer_with_constant_sizes_agrees_with_single_components() {
         let scheme = Scheme::new(4);
         let (a, b) = (uniform(11), divided(&uniform(7), 2));
         let parts = [1.0, 2.0, 3.0, 4.0].map(|k| sampled(&a, &scheme, |t| (k * TAU * t).cos()));

@@ -1,10 +1,10 @@
-//! What the curve is: equilibria and cycles as zero problems.
+//! Equilibria and cycles as zero problems.
 //!
 //! | curve | unknowns u | file |
 //! |---|---|---|
 //! | equilibria | x, λ | [`equilibrium`] |
 //! | cycles | profile at mesh nodes and Gauss points, T, λ | [`cycle`] |
-//! | special points in two parameters | either of these with both parameters, and what the condition adds | [`held`] |
+//! | bifurcation points | those of either problem with two parameters, and extra ones of the condition | [`held`] |
 
 pub mod averages;
 pub mod cycle;

@@ -1,12 +1,12 @@
-//! A vector field with everything fixed but the free parameters.
+//! A vector field with some parameters free and all others fixed.
 
 use crate::contract::{Batch, VectorField};
 use crate::diagram::Point;
 
-/// A free parameter p of a curve. Its unknown is λ = p / scale, so that nothing depends on the unit of p.
+/// A free parameter p of a curve. Its unknown is λ = p / scale, so that results do not depend on the unit of p.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Axis {
-    /// Index of the parameter; beyond the last one, p is a number on which nothing depends.
+    /// Index of the parameter; beyond the last one, p is a dummy that affects nothing.
     pub index: usize,
     /// Characteristic size.
     pub scale: f64,
@@ -15,16 +15,16 @@ pub struct Axis {
 }
 
 impl Axis {
-    /// One parameter by itself.
+    /// A single parameter without ties.
     pub fn new(index: usize, scale: f64) -> Axis {
         Axis { index, scale, ties: Vec::new() }
     }
 }
 
-/// A parameter q that follows a free one p: q = offset + slope p.
+/// A parameter q tied to a free one p: q = offset + slope p.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tie {
-    /// Index of the parameter that follows.
+    /// Index of the tied parameter.
     pub index: usize,
     /// Its value at p = 0.
     pub offset: f64,
@@ -32,26 +32,28 @@ pub struct Tie {
     pub slope: f64,
 }
 
-/// A vector field with everything fixed but the free parameters λ₁ … λ_k.
+/// A vector field with free parameters λ₁ … λ_k and all others fixed.
 #[derive(Clone)]
 pub struct Setting<'a> {
     /// The vector field.
     pub field: &'a dyn VectorField,
     /// `[n]` characteristic size of each state component, for relative errors.
     pub scales: &'a [f64],
-    /// Values of all parameters. Free ones have these values to the last bit at the unknowns that belong to them; elsewhere they are ignored.
+    /// Values of all parameters. At the corresponding unknowns, free ones take exactly these values; otherwise they are
+    /// ignored.
     pub parameters: Vec<f64>,
     /// The free parameters, in the order of the unknowns.
     pub axes: Vec<Axis>,
 }
 
 impl Setting<'_> {
-    /// The period of a state that is an angle.
+    /// Period of a state that is an angle, else `None`.
     pub fn period(&self, state: usize) -> Option<f64> {
         self.field.periods().get(state).copied().filter(|period| period.is_finite())
     }
 
-    /// Moves states `[count][n]` together by whole periods of the angles, so that the first is next to `beside` `[n]`.
+    /// Shifts all states `[count][n]` by the same whole periods of the angles, so that the first is closest to `beside`
+    /// `[n]`.
     pub fn nearest_copy(&self, states: &mut [f64], beside: &[f64]) {
         let n = beside.len();
         for (c, period) in self.field.periods().iter().enumerate().filter(|(_, period)| period.is_finite()) {
@@ -60,12 +62,12 @@ impl Setting<'_> {
         }
     }
 
-    /// How many parameters are free.
+    /// k, the number of free parameters.
     pub fn freedom(&self) -> usize {
         self.axes.len()
     }
 
-    /// Value of the last free parameter for which its unknown is 1; that of the continuation.
+    /// Value of the last free parameter, the continuation parameter, at which its unknown is 1.
     pub fn unit(&self) -> f64 {
         self.axes.last().map_or(1.0, |axis| axis.scale)
     }
@@ -90,13 +92,13 @@ impl Setting<'_> {
         all
     }
 
-    /// The unknowns `[k]` at a point.
+    /// Unknowns `[k]` of the free parameters at a point.
     pub fn unknowns_of(&self, point: &Point) -> Vec<f64> {
         let each = self.axes.iter().map(|axis| point.parameters.get(axis.index).copied().unwrap_or(0.0) / axis.scale);
         each.collect()
     }
 
-    /// A change `[k]` of the unknowns as one of all parameters.
+    /// Change of all parameters that corresponds to a change `[k]` of the unknowns.
     pub fn spread(&self, change: &[f64]) -> Vec<f64> {
         let mut all = vec![0.0; self.parameters.len()];
         for (axis, unknown) in self.axes.iter().zip(change) {
@@ -145,7 +147,7 @@ impl Setting<'_> {
         }
     }
 
-    /// Largest change of an unknown against its size, with 1 as the least size.
+    /// Largest relative change of an unknown, with sizes below 1 taken as 1.
     pub(super) fn relative_size(change: &[f64], unknowns: &[f64]) -> f64 {
         let each = change.iter().zip(unknowns).map(|(d, v)| (d / (1.0 + v.abs())).abs());
         each.fold(0.0, |m: f64, x| if x > m || x.is_nan() { x } else { m })

@@ -1,7 +1,8 @@
-//! The direction in which f is given up where branches cross.
+//! Unfolding of the crossing of two branches.
 //!
-//! **Idea.** Where f_x and the derivatives of f along the free parameters have a left null vector in common, solutions form no smooth surface:
-//! they do for f(x, λ) + b d = 0 with an amplitude b, wherever d is not in the range of f_x. Where b is 0, f itself vanishes.
+//! **Idea.** Where f_x and the derivatives of f with respect to the free parameters have a common left null vector, the
+//! solutions form no smooth surface. Those of f(x, λ) + b d = 0, with an amplitude b, do if d is not in the range of
+//! f_x. f itself vanishes where b = 0.
 //!
 //! **Equations.** With the matrix Ã = S⁻¹ f_x S of scaled states, S their scales:
 //!
@@ -9,7 +10,8 @@
 //!   (1)  d = r S p̃,   p̃ᵀ Ã ≈ 0, |p̃| = 1
 //! ```
 //!
-//! where r is the largest entry of Ã, or of what f_x becomes over the scales of states and parameters, so that b is a relative residual.
+//! where r is the largest entry of Ã, or of the change of f_x over the scales of states and parameters, so that b is a
+//! relative residual.
 //!
 //! **Source.** allgower1990, §8 (unfolding of branch points).
 
@@ -17,23 +19,23 @@ use super::Setting;
 use crate::contract::{Batch, Parameters};
 use crate::linalg::{dot, lu, max_abs};
 
-/// d, and the null vectors of Ã that it comes from.
+/// d and the null vectors of Ã from which it is computed.
 pub(super) struct Unfolding {
     /// d `[n]`.
     pub column: Vec<f64>,
     /// r.
     pub rate: f64,
-    /// q̃ and p̃, approximately; nothing yet.
+    /// q̃ and p̃, approximately; `None` before the first computation.
     vectors: Option<[Vec<f64>; 2]>,
 }
 
 impl Unfolding {
-    /// For n states.
+    /// Unfolding for n states.
     pub fn new(n: usize) -> Unfolding {
         Unfolding { column: vec![1.0; n], rate: 0.0, vectors: None }
     }
 
-    /// Makes d fit a place with the matrix `fx` `[n × n]`. What cannot be found stays as it was.
+    /// Adapts d to a point with the matrix `fx` `[n × n]`. If the null vectors cannot be computed, d does not change.
     pub fn anchor(&mut self, setting: &Setting, x: &[f64], parameters: &[f64], fx: &[f64]) {
         const ROUNDS: usize = 5;
         let n = x.len();
@@ -48,7 +50,7 @@ impl Unfolding {
         let batch = Batch { lanes: 1, states: x, parameters: Parameters::Shared(parameters), times: &[] };
         let along: Vec<f64> =
             q.iter().zip(scales).map(|(q, s)| q * s).chain(vec![0.0; setting.parameters.len()]).collect();
-        // How fast f_x q changes over the scales: all that there is of f_x where n is 1.
+        // Rate of change of f_x q over the scales. For n = 1, f_x itself vanishes and nothing else is left.
         let mut changes = vec![along.clone()];
         for a in 0..setting.freedom() {
             let unit: Vec<f64> = (0..setting.freedom()).map(|k| f64::from(u8::from(k == a))).collect();
@@ -65,7 +67,7 @@ impl Unfolding {
     }
 }
 
-/// Null vectors of `a` `[n × n]`, of unit length, from approximate ones with which it is bordered.
+/// Unit null vectors of `a` `[n × n]`, which is bordered with approximate ones.
 fn null_vectors(a: &[f64], q: &[f64], p: &[f64]) -> Option<[Vec<f64>; 2]> {
     let (n, size) = (q.len(), q.len() + 1);
     let mut matrix = vec![0.0; size * size];

@@ -1,15 +1,15 @@
-//! Numbers that begin where a cache line does.
+//! Arrays aligned to cache lines.
 //!
-//! **Idea.** A vector of eight numbers that lies in one line is read in one go, one across two lines in two. The allocator knows
-//! nothing of lines, so a few numbers more than needed are asked for and those before the first line are left out.
+//! **Idea.** A vector of eight numbers within one cache line takes one load, across two lines two. The allocator does
+//! not align to cache lines, so a few extra numbers are allocated and those before the first line boundary are skipped.
 
 use std::ops::{Deref, DerefMut};
 
-/// Bytes of a cache line, and the numbers in it.
+/// Bytes and numbers in a cache line.
 const LINE: usize = 64;
 const NUMBERS: usize = LINE / size_of::<f64>();
 
-/// An array of numbers that may become shorter. (A copy need not begin where a line does.)
+/// Array of numbers that can be shortened. (A clone is not necessarily aligned.)
 #[derive(Clone, Debug, Default)]
 pub(super) struct Aligned {
     numbers: Vec<f64>,
@@ -18,7 +18,7 @@ pub(super) struct Aligned {
 }
 
 impl Aligned {
-    /// So many zeros.
+    /// Array of `count` zeros.
     pub(super) fn zeros(count: usize) -> Aligned {
         let numbers = vec![0.0; count + NUMBERS];
         let first = numbers.as_ptr().align_offset(LINE).min(NUMBERS);

@@ -1,17 +1,17 @@
-//! A forced field with its time as a state.
+//! Forced fields with time as an additional state.
 //!
-//! **Idea.** Trajectories are those of autonomous fields. One state more, which grows by one per period of the forcing and which every
-//! method integrates exactly, tells a forced field the time: x' = f(x, p, τ), τ' = 1.
+//! **Idea.** The integrators take autonomous fields. A forced field gets its time from one additional state, which
+//! grows by one per forcing period and which every method integrates exactly: x' = f(x, p, τ), τ' = 1.
 
 use crate::contract::{Batch, VectorField};
 
-/// The field as an autonomous one, for simulation: derivatives with respect to the time are left out, as 0. An autonomous field gets a
-/// clock that it does not read.
+/// Autonomous form of a field, for simulation; derivatives with respect to time are set to 0. An autonomous field gets
+/// a clock that it ignores.
 #[derive(Clone, Copy)]
 pub struct Clocked<'a>(pub &'a dyn VectorField);
 
 impl Clocked<'_> {
-    /// What the field itself sees.
+    /// Batch as seen by the field itself.
     fn inner<'b>(&self, at: Batch<'b>) -> Batch<'b> {
         let (states, times) = at.states.split_at(self.0.dim() * at.lanes);
         Batch { states, times: if self.0.forced() { times } else { &[] }, ..at }
@@ -24,7 +24,7 @@ impl Clocked<'_> {
     }
 }
 
-/// A matrix `[n·n × lanes]` with `more` rows and columns of zeros besides, `[(n + more)² × lanes]`.
+/// Copies a matrix `[n·n × lanes]` and adds `more` rows and columns of zeros, `[(n + more)² × lanes]`.
 pub(crate) fn bordered(matrix: &[f64], n: usize, more: usize, lanes: usize, to: &mut [f64]) {
     to.fill(0.0);
     for i in 0..n {

@@ -1,29 +1,30 @@
-//! Many trajectories integrated together.
+//! Trajectories integrated together.
 //!
-//! **Idea.** Some of the trajectories are the lanes of one batch. In each sweep every lane tries one step of its own length;
-//! those whose error is too large try again with a shorter one in the next sweep. A lane that is finished takes over the next
-//! trajectory that waits; once none waits it rests, and lanes at rest are taken out of the batch eight at a time.
+//! **Idea.** Up to 64 trajectories are the lanes of one batch. In each sweep every lane tries one step of its own
+//! length; those whose error is too large retry with a shorter one in the next sweep. A finished lane takes over the
+//! next waiting trajectory. Once none is waiting it idles, and idle lanes are removed from the batch eight at a time.
 //!
-//! **Equations.** The pair of the tableau, and with err the root mean square of errorᵢ / (absoluteᵢ + relative max(|x₀|, |x₁|)ᵢ):
+//! **Equations.** The pair of the tableau, with err the root mean square of errorᵢ / (absoluteᵢ + relative max(|x₀|,
+//! |x₁|)ᵢ):
 //!
 //!   (1)  h_new = h · clamp( 0.9 err^-α err_prev^β, 1/5, 10 ),   β = 0.04, α = 1/5 - 3β/4
 //!
-//! where after a rejection h does not grow, and the longest step that was asked for is kept.
+//! where h does not grow after a rejection and never exceeds the longest step requested.
 //!
-//! | question | file |
+//! | topic | file |
 //! |---|---|
-//! | what is computed for all lanes at once? | `lanes` |
-//! | how long is the next step, and the first? | `pace` |
-//! | what happens where f or a derivative jumps? | `switching` |
-//! | which trajectories are stiff, and what becomes of them? | `stiff` |
+//! | all lanes at once: stages, errors, acceptance | `lanes` |
+//! | length of the first and of the next step | `pace` |
+//! | jumps of f or of a derivative | `switching` |
+//! | stiff trajectories | `stiff` |
 //!
 //! **Source.** hairer1993, §II.4 (step control and first step); hairer1996, §IV.2 (the second factor of (1)).
 //!
-//! **Departures.** A lane is computed from its own numbers only, so its result depends neither on the other lanes nor on
-//! how many there are, provided the vector field keeps its lanes apart too.
+//! **Departures.** A lane is computed from its own numbers only, so its result depends neither on the other lanes nor
+//! on their number, provided that the vector field also keeps its lanes independent.
 //!
-//! **Fails when** f or a derivative jumps where the field names no switch: the step shrinks there and the order is lost. A
-//! trajectory that slides along a switch ends there.
+//! **Fails when** f or a derivative jumps where the field declares no switch: the step shrinks there and the order is
+//! lost. A trajectory that slides along a switch ends there.
 
 mod lanes;
 mod pace;
@@ -38,32 +39,33 @@ use lanes::Lanes;
 pub(super) use pace::Limits;
 use stiff::Evidence;
 
-/// Trajectories that are integrated at a time: enough to keep vector instructions busy, few enough to stay in the cache.
+/// Number of trajectories integrated at a time: enough to keep vector instructions busy, few enough to stay in the
+/// cache.
 const WIDTH: usize = 64;
-/// Multiple of the largest size + |start|, in any component, beyond which a trajectory counts as running to infinity.
+/// Multiple of (largest size + |start|) that any component must exceed for a trajectory to count as unbounded.
 const BOUND: f64 = crate::diagram::Response::UNBOUNDED;
-/// At rest the step grows without end; beyond this length the arithmetic would overflow.
+/// At an equilibrium the step grows without limit; beyond this length the arithmetic would overflow.
 const LONGEST: f64 = 1e100;
 
-/// A batch of trajectories under way.
+/// Ensemble of trajectories being integrated.
 pub struct Ensemble<'a> {
     field: &'a dyn VectorField,
     parameters: &'a [f64],
-    /// `[count][k]` where every trajectory has parameters of its own, else empty.
+    /// `[count][k]` if every trajectory has its own parameters, else empty.
     own: Vec<f64>,
-    /// `[count][n]`, of which those before `waiting` are under way or done.
+    /// `[count][n]`; those before `waiting` are in progress or done.
     starts: Vec<f64>,
     waiting: usize,
     tolerance: Tolerance,
     begin: f64,
     limits: Limits,
     lanes: Lanes,
-    /// What each lane knows besides.
+    /// Further state of each lane.
     runs: Vec<Run>,
     arrivals: Vec<Option<Arrival>>,
 }
 
-/// A trajectory under way.
+/// Trajectory in progress.
 #[derive(Clone, Debug)]
 struct Run {
     trajectory: usize,
@@ -71,12 +73,13 @@ struct Run {
     stuck: usize,
     done: Option<Outcome>,
     stiff: Evidence,
-    /// Nothing runs in this lane any more.
+    /// True if the lane is idle.
     over: bool,
 }
 
 impl<'a> Ensemble<'a> {
-    /// Trajectories from `starts` `[count][n]`, all over the time span `span[0]` to `span[1]` (which may lie before it).
+    /// Trajectories from `starts` `[count][n]`, all over the time span from `span[0]` to `span[1]`, which may run
+    /// backwards.
     pub fn new(
         field: &'a dyn VectorField,
         parameters: &'a [f64],
@@ -104,7 +107,7 @@ impl<'a> Ensemble<'a> {
         }
     }
 
-    /// The same with parameters of its own for every trajectory: `parameters` `[count][k]`.
+    /// Creates an ensemble in which every trajectory has its own parameters: `parameters` `[count][k]`.
     pub fn with_own_parameters(
         field: &'a dyn VectorField,
         parameters: &[f64],
@@ -121,19 +124,19 @@ impl<'a> Ensemble<'a> {
         self
     }
 
-    /// No step is longer than this time, which is positive.
+    /// Limits the length of a step to `longest`, a positive time.
     pub fn with_longest_step(mut self, longest: f64) -> Ensemble<'a> {
         self.limits.longest = longest.min(LONGEST);
         self
     }
 
-    /// Integrates until every trajectory has ended; `observe` sees every accepted step and may stop its trajectory there.
-    /// Returns the arrivals in the order of the starts.
+    /// Integrates until every trajectory has ended; `observe` sees every accepted step and may stop its trajectory
+    /// there. Returns the arrivals in the order of the starts.
     pub fn run(self, observe: &mut dyn FnMut(&Step) -> Verdict) -> Vec<Arrival> {
         self.integrate(Some(observe))
     }
 
-    /// The same where only the arrivals are wanted: nobody is shown the steps.
+    /// Integrates without an observer and returns the arrivals in the order of the starts.
     pub fn arrive(self) -> Vec<Arrival> {
         self.integrate(None)
     }
@@ -172,7 +175,7 @@ impl<'a> Ensemble<'a> {
         self.arrivals.into_iter().flatten().collect()
     }
 
-    /// The step that lane `l` tries.
+    /// Step tried by lane `l`.
     fn step_of(&self, l: usize) -> Step<'_> {
         let lanes = &self.lanes;
         Step {
@@ -191,7 +194,8 @@ impl<'a> Ensemble<'a> {
         }
     }
 
-    /// Shows the steps that hold; returns the lanes that are to stop. A kink at the very start of a step leaves nothing to show.
+    /// Shows the accepted steps; returns the lanes to be stopped. A kink at the very start of a step leaves nothing to
+    /// show.
     fn show(&self, observe: &mut dyn FnMut(&Step) -> Verdict) -> Vec<usize> {
         let mut stopped = Vec::new();
         let mut step = self.step_of(0);
@@ -209,7 +213,7 @@ impl<'a> Ensemble<'a> {
         stopped
     }
 
-    /// Ends trajectories: those in `stopped`, and those of the lanes that are remarkable where there is a reason.
+    /// Ends the trajectories in `stopped`, and those that have reached an end for another reason.
     fn end_some(&mut self, stopped: &[usize]) {
         let lanes = &self.lanes;
         for (l, run) in self.runs.iter_mut().enumerate().filter(|(_, run)| !run.over) {
@@ -225,7 +229,7 @@ impl<'a> Ensemble<'a> {
             } else if lanes.time[l] == self.limits.end {
                 Some(Outcome::Reached)
             } else if lanes.h[l] == 0.0 {
-                // f is so large that the step has underflowed to 0, which has no error.
+                // f is so large that the step has underflowed to 0 and therefore has no error.
                 Some(Outcome::StepTooSmall)
             } else {
                 too_long
@@ -233,10 +237,10 @@ impl<'a> Ensemble<'a> {
         }
     }
 
-    /// Gives the lanes that are done to trajectories that wait, and takes out of the batch those for which none waits, eight at
-    /// a time while there are more than eight: so the rest remains a whole number of vectors.
+    /// Assigns finished lanes to waiting trajectories and removes lanes without one from the batch, eight at a time
+    /// while there are more than eight, so that a whole number of vectors remains.
     fn replace_finished(&mut self) {
-        // Some end where they begin.
+        // Some trajectories end at their start.
         while self.runs.iter().any(|run| run.done.is_some()) {
             let mut fresh = Vec::new();
             for l in 0..self.runs.len() {
@@ -274,20 +278,20 @@ impl<'a> Ensemble<'a> {
         }
     }
 
-    /// Puts the next trajectory that waits into lane `l`.
+    /// Puts the next waiting trajectory into lane `l`.
     fn next_run(&mut self, l: usize) -> Run {
         let (trajectory, n, k) = (self.waiting, self.field.dim(), self.field.parameter_count());
         self.waiting += 1;
         let start = &self.starts[trajectory * n..(trajectory + 1) * n];
         let own = self.own.get(trajectory * k..(trajectory + 1) * k).unwrap_or(&[]);
-        // What the tolerance says about sizes: absolute over relative.
+        // Component size implied by the tolerance: absolute over relative.
         let size = crate::linalg::max_abs(&self.tolerance.absolute) / self.tolerance.relative;
         let bound = BOUND * (size + crate::linalg::max_abs(start));
         self.lanes.set(l, start, own, self.begin, bound);
         Run { trajectory, stuck: 0, done: None, stiff: Evidence::default(), over: false }
     }
 
-    /// The first trajectories.
+    /// Starts the first trajectories.
     fn fill(&mut self) {
         for l in 0..self.lanes.count {
             let run = self.next_run(l);

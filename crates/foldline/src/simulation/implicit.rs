@@ -1,4 +1,4 @@
-//! One trajectory by the implicit method, with its kinks.
+//! One trajectory integrated by the implicit method, with its kinks.
 
 use super::aligned::Aligned;
 use super::ensemble::Limits;
@@ -10,7 +10,7 @@ use super::tableau::STAGES;
 use super::{Outcome, Step, Tolerance};
 use crate::contract::{Batch, Parameters, VectorField, Verdict};
 
-/// A trajectory under way.
+/// Trajectory in progress.
 pub(super) struct Implicit<'a> {
     field: &'a dyn VectorField,
     parameters: &'a [f64],
@@ -18,19 +18,19 @@ pub(super) struct Implicit<'a> {
     trajectory: usize,
     radau: Radau<'a>,
     again: Shortened<'a>,
-    /// `[switches]` values at the start of a step, 0 where one has just changed sign, and at each of [`PLACES`].
+    /// `[switches]` values at the start of a step, 0 if the switch has just changed sign, and at each of [`PLACES`].
     pub(super) switches: Vec<f64>,
     ahead: [Vec<f64>; PLACES.len()],
     /// Slopes at both ends of a step; the others are not known.
     slopes: [Aligned; STAGES],
     pub(super) time: f64,
-    /// Length of the step to try.
+    /// Length of the next step to try.
     pub(super) h: f64,
     /// Successive sign changes of a switch without progress.
     pub(super) stuck: usize,
 }
 
-/// Where a trajectory is taken over.
+/// State in which a trajectory is taken over.
 pub(super) struct From<'a> {
     pub(super) trajectory: usize,
     pub(super) time: f64,
@@ -42,9 +42,9 @@ pub(super) struct From<'a> {
 
 /// Result of a step.
 pub(super) enum Advance {
-    /// It was accepted. `stops` is the observer's answer, `largest` the largest component at its end.
+    /// The step was accepted. `stops` is the observer's answer, `largest` the largest component at its end.
     Accepted { stops: bool, largest: f64 },
-    /// A shorter one is tried next; the outcome where that is too short to get on.
+    /// The step was rejected and a shorter one is tried next; the outcome applies if that is too short to progress.
     Rejected(Outcome),
 }
 
@@ -74,7 +74,7 @@ impl<'a> Implicit<'a> {
         }
     }
 
-    /// The state `[n]`, the slope there and the signs of the switches.
+    /// State `[n]`, slope there and signs of the switches.
     pub(super) fn here(&mut self) -> (Vec<f64>, Vec<f64>, Vec<f64>) {
         let slope = self.radau.slope().to_vec();
         (self.radau.x.clone(), slope, self.radau.signs.clone())
@@ -110,7 +110,7 @@ impl<'a> Implicit<'a> {
         let stops = length != 0.0 && self.show(length, end, &next, &courses, observe);
         match kink {
             Some(kink) => {
-                // The next step is as long as this one was meant to be.
+                // The kink does not reduce the length of the next step.
                 self.stuck = if kink.theta < 1e-8 { self.stuck + 1 } else { 0 };
                 self.radau.pass(&next, kink.switch);
                 let at = Batch { lanes: 1, states: &next, parameters: Parameters::Shared(self.parameters), times: &[] };
@@ -128,7 +128,7 @@ impl<'a> Implicit<'a> {
         Advance::Accepted { stops, largest: crate::linalg::max_abs(&next) }
     }
 
-    /// One point of the trajectory.
+    /// Batch of one point of the trajectory.
     fn at<'b>(&'b self, states: &'b [f64]) -> Batch<'b> {
         Batch { lanes: 1, states, parameters: Parameters::Shared(self.parameters), times: &[] }
     }
@@ -151,7 +151,7 @@ impl<'a> Implicit<'a> {
         }
     }
 
-    /// Where the first switch changes sign within the step.
+    /// First sign change of a switch within the step.
     fn first_kink(&mut self, length: f64, end: f64) -> Option<Kink> {
         if self.switches.is_empty() {
             return None;
@@ -172,7 +172,7 @@ impl<'a> Implicit<'a> {
         kink
     }
 
-    /// Shows a step that ends in `next`; true if the observer says stop.
+    /// Shows a step that ends in `next`; true if the observer stops.
     fn show(
         &mut self,
         length: f64,

@@ -1,8 +1,8 @@
-//! Where the first switch of a piecewise-smooth field changes sign within a step.
+//! Location of the first sign change of a switch of a piecewise-smooth field within a step.
 //!
 //! **Idea.** A step is computed with the signs that the switches have at its start, so f is smooth along all of it. The
-//! switches are sampled on the continuous solution; where one leaves its sign, or an extremum between two samples does,
-//! the zero is located on the trajectory itself, and the step is taken anew to end there.
+//! switches are sampled on the continuous solution. If a sample, or an extremum between two samples, has left the sign,
+//! the zero is located on the trajectory itself and the step is repeated to end there.
 //!
 //! **Source.** hairer1993, §II.6 (discontinuities located on the dense output).
 //!
@@ -13,18 +13,18 @@ use super::root::{lowest, root};
 use super::section::insert_extrema;
 use super::shortened::Shortened;
 
-/// Places within a step at which the switches are looked at, besides its start.
+/// Fractions of a step at which the switches are sampled, besides its start.
 pub(super) const PLACES: [f64; 4] = [0.25, 0.5, 0.75, 1.0];
 
-/// The first zero: which switch, and the fraction of the step at which.
+/// First zero: index of the switch, and fraction of the step.
 #[derive(Clone, Copy)]
 pub(super) struct Kink {
     pub(super) switch: usize,
     pub(super) theta: f64,
 }
 
-/// The first zero of a switch along `step`. `samples(switch)` holds its values at the start, 0 where it has just changed
-/// sign, and at [`PLACES`], each times the sign that it has in this step.
+/// First zero of a switch along `step`. `samples(switch)` returns its values at the start, 0 if it has just changed
+/// sign, and at [`PLACES`], each times its sign in this step.
 pub(super) fn first(step: &Step, again: &mut Shortened, samples: impl Fn(usize) -> [f64; 5]) -> Option<Kink> {
     let count = step.signs.len() / step.lanes;
     let mut found: Option<Kink> = None;
@@ -50,7 +50,7 @@ pub(super) fn samples(sign: f64, value: impl Fn(usize) -> f64) -> [f64; PLACES.l
     std::array::from_fn(|k| if k == 0 { values[0].max(0.0) } else { values[k] })
 }
 
-/// Whether a parabola through values like these cannot come near zero.
+/// True if a parabola through values like these stays away from zero.
 fn clear(values: &[f64; 5]) -> bool {
     let [low, high] = values.iter().fold([f64::MAX, 0.0], |[low, high]: [f64; 2], v| [low.min(*v), high.max(*v)]);
     low > 0.5 * high
@@ -78,7 +78,8 @@ fn zero(step: &Step, again: &mut Shortened, switch: usize, sign: f64, values: [f
             continue;
         }
         if ga <= 0.0 {
-            // It has just got its sign: the zero wanted is the next one, behind the summit between, if there is one.
+            // The switch has just acquired its sign: the zero sought is the next one, behind the maximum in between, if
+            // any.
             let (summit, depth) = lowest(|theta| -value(theta, false), [a, b]);
             if depth >= 0.0 {
                 return Some(a);
@@ -86,7 +87,7 @@ fn zero(step: &Step, again: &mut Shortened, switch: usize, sign: f64, values: [f
             a = summit;
         }
         let ends = [if a == 0.0 { ga } else { value(a, true) }, value(b, true)];
-        // Where the interpolant leaves the sign and the trajectory does not, by less than the tolerance, nothing happens.
+        // Ignore a sign change of the interpolant that the trajectory does not share: it is below the tolerance.
         if ends[1] >= 0.0 {
             continue;
         }

@@ -1,17 +1,17 @@
-//! How does a trajectory run? Integration of one trajectory or of many together, and the crossings on the way.
+//! Simulation: integration of one or many trajectories, with their section crossings.
 //!
-//! **Idea.** Trajectories are integrated as a batch: in every sweep each of them advances by one step of its own length, and
-//! the vector field is evaluated once per stage for all. A single trajectory is a batch of one. Where the field names
-//! switches ([`crate::contract::VectorField::switches`]), every step ends at the first of them that changes sign. A trajectory whose steps
-//! stability keeps short goes on with an implicit method.
+//! **Idea.** Trajectories are integrated as a batch: in every sweep each of them advances by one step of its own
+//! length, and the vector field is evaluated once per stage for all. A single trajectory is a batch of one. If the
+//! field declares switches ([`crate::contract::VectorField::switches`]), every step ends at the first one that changes
+//! sign. A trajectory whose steps are limited by stability continues with an implicit method.
 //!
-//! | question | file |
+//! | topic | item |
 //! |---|---|
-//! | one trajectory, with its crossings? | [`Integrator`] |
-//! | many trajectories? | [`Ensemble`] |
-//! | what is known between the ends of a step? | [`Step`] |
-//! | where does a function of the state change sign? | [`Section`] |
-//! | a forced field? | [`Clocked`]: those above take autonomous ones |
+//! | one trajectory, with its crossings | [`Integrator`] |
+//! | many trajectories | [`Ensemble`] |
+//! | the solution between the ends of a step | [`Step`] |
+//! | sign changes of a function of the state | [`Section`] |
+//! | forced fields | [`Clocked`]: the others take autonomous ones |
 
 mod aligned;
 mod clocked;
@@ -39,36 +39,36 @@ pub use section::{Crossing, Direction, Section};
 pub use step::Step;
 pub use trajectory::{Integrator, Passage};
 
-/// How accurate every step must be: |errorᵢ| ≤ absoluteᵢ + relative |xᵢ|, in the root mean square over the components.
+/// Accuracy of each step: |errorᵢ| ≤ absoluteᵢ + relative |xᵢ|, in the root mean square over the components.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tolerance {
     /// Error relative to the component.
     pub relative: f64,
-    /// `[n]` error that is accepted even where the component vanishes, in its unit.
+    /// `[n]` error accepted even where the component vanishes, in its unit.
     pub absolute: Vec<f64>,
 }
 
 impl Tolerance {
-    /// The same tolerance for `n` components that are of order one.
+    /// Equal tolerances for `n` components of order one.
     pub fn uniform(tolerance: f64, n: usize) -> Tolerance {
         Tolerance { relative: tolerance, absolute: vec![tolerance; n] }
     }
 }
 
-/// Why a trajectory ended.
+/// Reason why a trajectory ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
     /// The end of the time span was reached.
     Reached,
-    /// The observer said stop.
+    /// The observer stopped the trajectory.
     Stopped,
     /// The state grew without bound.
     Escaped,
-    /// The trajectory left the region in which f is defined: f is not finite at the start, or at some stage of every step from the
-    /// last state, however short.
+    /// The trajectory left the region in which f is defined: f is not finite at the start, or at some stage of every
+    /// step from the last state, however short.
     Undefined,
-    /// The step fell below the resolution of the time: f jumps where the field names no switch, the trajectory slides along
-    /// a switch, or the problem is too stiff here.
+    /// The step fell below the resolution of time: f jumps where the field declares no switch, the trajectory slides
+    /// along a switch, or the problem is too stiff.
     StepTooSmall,
     /// The limit on the number of steps was reached.
     StepLimit,
@@ -81,17 +81,17 @@ impl Outcome {
     }
 }
 
-/// Where a trajectory ended, and what it cost.
+/// End of a trajectory, with its cost.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Arrival {
     /// Time reached.
     pub time: f64,
     /// `[n]` state there.
     pub state: Vec<f64>,
-    /// Why there.
+    /// Reason for ending.
     pub outcome: Outcome,
-    /// Steps accepted.
+    /// Number of accepted steps.
     pub steps: usize,
-    /// Steps tried and rejected.
+    /// Number of rejected steps.
     pub rejected: usize,
 }

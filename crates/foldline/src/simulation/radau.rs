@@ -1,8 +1,8 @@
 //! Steps of the implicit method: Radau IIA of order 5.
 //!
-//! **Idea.** Collocation at the three Radau points. A fast decaying mode does not limit the step, since the method damps it however fast
-//! it is. The nonlinear system of a step is solved by a simplified Newton iteration with the Jacobian at the start of the step, in variables
-//! in which it falls into a real system of size n and a complex one.
+//! **Idea.** Collocation at the three Radau points. Fast decaying modes do not limit the step, since the method damps
+//! them at any rate. The nonlinear system of a step is solved by a simplified Newton iteration with the Jacobian at the
+//! start of the step, in variables in which it splits into a real system of size n and a complex one.
 //!
 //! **Equations.** With the stages x₀ + zᵢ at x₀ + cᵢ h, A the matrix of the method, and T⁻¹A⁻¹T = diag(γ, [α -β; β α]):
 //!
@@ -11,17 +11,17 @@
 //!   (2)  w = (T⁻¹ ⊗ I) z:   (γ/h - J) Δw₁ = r₁,   ((α + iβ)/h - J)(Δw₂ + iΔw₃) = r₂ + i r₃
 //!        r = (T⁻¹ ⊗ I) f(x₀ + z) - diag(γ, [α -β; β α]) w / h
 //!   (3)  error of x₁ ≈ (γ/h - J)⁻¹ ( f(x₀) + Σ dᵢ zᵢ / h ),   order 3
-//!   (4)  h_new = h min( 5, max( 1/8, s err^-1/4 ) ),   s = 0.9 (2K + 1) / (2K + iterations),   K the most iterations
+//!   (4)  h_new = h min( 5, max( 1/8, s err^-1/4 ) ),   s = 0.9 (2K + 1) / (2K + iterations),   K the maximum number of iterations
 //! ```
 //!
 //! Between the ends the solution is the collocation polynomial, whose error is of the order of (3).
 //!
 //! **Source.** hairer1996, §IV.8.
 //!
-//! **Departures.** The Jacobian is evaluated at every step. What it lacks (the dependence of a forced field on its clock) costs
-//! iterations only: the clock does not depend on the state, so the part that is missing is nilpotent.
+//! **Departures.** The Jacobian is evaluated at every step. It lacks the dependence of a forced field on its clock,
+//! which only costs iterations: the clock does not depend on the state, so the missing part is nilpotent.
 //!
-//! **Fails when** f jumps where the field names no switch, as the explicit pair does.
+//! **Fails when** f jumps where the field declares no switch, like the explicit pair.
 
 use super::Tolerance;
 use super::step::Course;
@@ -50,10 +50,10 @@ const T_INVERSE: [[f64; 3]; 3] = [
 ];
 /// d of (3).
 const ERROR: [f64; STAGES] = [-(13.0 + 7.0 * SQRT_6) / 3.0, (-13.0 + 7.0 * SQRT_6) / 3.0, -1.0 / 3.0];
-/// Most Newton iterations of a step, K of (4).
+/// Maximum number of Newton iterations per step, K of (4).
 const ITERATIONS: usize = 7;
-/// Share of the accuracy of the iteration below which an update needs no second one: with a rate of contraction below 0.99, which is asked
-/// for, a hundredth of it is left.
+/// Fraction of the accuracy of the iteration below which one update suffices: with the required contraction rate below
+/// 0.99 at most a hundredth of the accuracy remains.
 const ROUNDING: f64 = 1e-4;
 /// Limits of the factor in (4).
 const LEAST: f64 = 0.125;
@@ -64,7 +64,7 @@ const MOST: f64 = 5.0;
 pub(super) enum Attempt {
     /// The error meets the tolerance. The length is proposed for the next step.
     Accepted(f64),
-    /// It does not, or Newton's method did not converge. The length is proposed for another attempt.
+    /// The error is too large, or Newton's method did not converge. The length is proposed for another attempt.
     Rejected(f64),
     /// f is not finite at a stage, or its Jacobian at the start. The length is proposed for another attempt.
     Undefined(f64),
@@ -84,11 +84,11 @@ pub(super) struct Radau<'a> {
     pub(super) next: Vec<f64>,
     pub(super) courses: Vec<Course>,
     jacobian: Vec<f64>,
-    /// True where the slope and the Jacobian belong to `x`.
+    /// True if the slope and the Jacobian belong to `x`.
     current: bool,
     /// Length of the last step, if it ended at `x` and the solution is smooth there.
     last: Option<f64>,
-    /// Length of the step that was accepted last.
+    /// Length of the last accepted step.
     length: f64,
     rejected: bool,
     real: Vec<f64>,
@@ -165,13 +165,13 @@ impl<'a> Radau<'a> {
         Attempt::Accepted(h * factor.min(longest))
     }
 
-    /// Goes on from the end of the step.
+    /// Continues from the end of the step.
     pub(super) fn go_on(&mut self) {
         self.x.copy_from_slice(&self.next);
         (self.current, self.last) = (false, Some(self.length));
     }
 
-    /// Goes on from a state on the step, where f or a derivative jumps, with the other sign of a switch.
+    /// Continues from a state on the step at which f or a derivative jumps, with the opposite sign of a switch.
     pub(super) fn pass(&mut self, from: &[f64], switch: usize) {
         self.x.copy_from_slice(from);
         self.signs[switch] = -self.signs[switch];
@@ -184,7 +184,7 @@ impl<'a> Radau<'a> {
         &self.slope
     }
 
-    /// f and its Jacobian at the start of the step; false where they are not finite.
+    /// Evaluates f and its Jacobian at the start of the step; false if they are not finite.
     fn linearise(&mut self) -> bool {
         if !self.current {
             let at = Batch { lanes: 1, states: &self.x, parameters: Parameters::Shared(self.parameters), times: &[] };
@@ -197,8 +197,8 @@ impl<'a> Radau<'a> {
         self.slope.iter().chain(&self.jacobian).all(|v| v.is_finite())
     }
 
-    /// The matrices of (2) for states in units of their absolute tolerances, in which pivots can be compared; the complex one as a real
-    /// matrix of twice the size.
+    /// Factorises the matrices of (2) for states in units of their absolute tolerances, so that pivots are comparable;
+    /// the complex one as a real matrix of twice the size.
     fn factorise(&mut self, h: f64) -> bool {
         let n = self.x.len();
         let (gamma, alpha, beta) = (GAMMA / h, ALPHA / h, BETA / h);
@@ -219,7 +219,7 @@ impl<'a> Radau<'a> {
             && lu::factorise_even(&mut self.complex, 2 * n, complex).is_ok()
     }
 
-    /// Solves (1) by (2); the number of iterations.
+    /// Solves (1) by (2); returns the number of iterations.
     fn iterate(&mut self, h: f64) -> Result<usize, Attempt> {
         let n = self.x.len();
         let converged = (10.0 * f64::EPSILON / self.tolerance.relative).max(self.tolerance.relative.sqrt().min(0.03));
@@ -254,7 +254,7 @@ impl<'a> Radau<'a> {
             if !size.is_finite() {
                 return Err(Attempt::Rejected(0.5 * h));
             }
-            // Whatever the rate: next to an equilibrium all that is left is rounding, which does not contract.
+            // Accepted at any contraction rate: near an equilibrium only rounding remains, which does not contract.
             if size <= ROUNDING * converged {
                 return Ok(iteration);
             }
@@ -280,7 +280,7 @@ impl<'a> Radau<'a> {
         Err(Attempt::Rejected(0.5 * h))
     }
 
-    /// First stages: the polynomial of the last step, continued, or the state at rest.
+    /// Initial stages: the polynomial of the last step extrapolated, or the constant state.
     fn guess(&mut self, h: f64) {
         for (i, (z, w)) in self.z.iter_mut().zip(&mut self.w).enumerate() {
             *z = match self.last {
@@ -294,7 +294,7 @@ impl<'a> Radau<'a> {
         }
     }
 
-    /// f at the stages; false where it is not finite.
+    /// Evaluates f at the stages; false if it is not finite.
     fn evaluate_stages(&mut self) -> bool {
         for (i, (x, z)) in self.x.iter().zip(&self.z).enumerate() {
             (0..STAGES).for_each(|s| self.stages[3 * i + s] = x + z[s]);
@@ -317,7 +317,7 @@ impl<'a> Radau<'a> {
         self.filter(&mut error);
         let mut size = self.size(&error);
         if size >= 1.0 && (self.last.is_none() || self.rejected) {
-            // Filtered once more, so that it stays bounded for a fast mode away from its slow manifold.
+            // A second filtering keeps the estimate bounded for a fast mode away from its slow manifold.
             let moved: Vec<f64> = self.x.iter().zip(&error).map(|(x, error)| x + error).collect();
             let at = Batch { lanes: 1, states: &moved, parameters: Parameters::Shared(self.parameters), times: &[] };
             match self.signs.is_empty() {
@@ -343,7 +343,7 @@ impl<'a> Radau<'a> {
         (sum / error.len() as f64).sqrt()
     }
 
-    /// One over the tolerance of component `i` between the start and a state that differs by `z`.
+    /// Reciprocal of the tolerance of component `i` between the start and a state that differs by `z`.
     fn weight(&self, i: usize, z: f64) -> f64 {
         let size = self.x[i].abs().max((self.x[i] + z).abs());
         1.0 / (self.tolerance.absolute[i] + self.tolerance.relative * size)
@@ -354,7 +354,7 @@ fn transformed(matrix: &[[f64; 3]; 3], v: &[f64; 3]) -> [f64; 3] {
     matrix.map(|row| row[0] * v[0] + row[1] * v[1] + row[2] * v[2])
 }
 
-/// The collocation polynomial of one component: 0 at the start of the step, z at the nodes.
+/// Collocation polynomial of one component: 0 at the start of the step, z at the nodes.
 fn polynomial(z: &[f64; 3]) -> Course {
     let quotient = |s: usize| (z[s] / NODES[s] - z[2]) / (1.0 - NODES[s]);
     let c = (quotient(1) - quotient(0)) / (NODES[1] - NODES[0]);

@@ -1,8 +1,9 @@
-//! Roots and smallest values of a scalar function on a bracket.
+//! Roots and minima of a scalar function on a bracket.
 //!
 //! **Source.** oliveira2021 (interpolate, truncate, project: never slower than bisection); kiefer1953 (golden section).
 
-/// The root of `g` between `a` and `b`, where its values `ga` and `gb` have different signs, to about `width` in the argument.
+/// Root of `g` between `a` and `b`, at which its values `ga` and `gb` have opposite signs, to about `width` in the
+/// argument.
 pub(super) fn root(mut g: impl FnMut(f64) -> f64, [a, b]: [f64; 2], [ga, gb]: [f64; 2], width: f64) -> f64 {
     let (mut a, mut b, mut ga, mut gb) = (a, b, ga, gb);
     if ga == 0.0 {
@@ -22,7 +23,7 @@ pub(super) fn root(mut g: impl FnMut(f64) -> f64, [a, b]: [f64; 2], [ga, gb]: [f
         let towards = (middle - secant).signum();
         let estimate = if truncated <= (middle - secant).abs() { secant + towards * truncated } else { middle };
         let x = if (estimate - middle).abs() <= projection { estimate } else { middle - towards * projection };
-        // An estimate that rounding puts on an end is moved inside, so that the next bracket is narrow.
+        // An estimate that rounding places on an end is moved inside, so that the next bracket is narrow.
         let x = if x.is_nan() { middle } else { x.max(a + width).min(b - width) };
         if x <= a || x >= b {
             break;
@@ -45,13 +46,13 @@ pub(super) fn root(mut g: impl FnMut(f64) -> f64, [a, b]: [f64; 2], [ga, gb]: [f
     ((gb * a - ga * b) / (gb - ga)).max(a).min(b)
 }
 
-/// Where `g` is smallest between `a` and `b`, and its value there; stops early where it is below zero.
+/// Minimiser of `g` between `a` and `b`, and the value there; stops early once the value is below zero.
 pub(super) fn lowest(mut g: impl FnMut(f64) -> f64, [a, b]: [f64; 2]) -> (f64, f64) {
     const GOLDEN: f64 = 0.618_033_988_749_894_9;
     let (mut a, mut b) = (a, b);
     let (mut c, mut d) = (b - GOLDEN * (b - a), a + GOLDEN * (b - a));
     let (mut gc, mut gd) = (g(c), g(d));
-    // The value is quadratic around the minimum: beyond √ε in the argument nothing is gained.
+    // The function is quadratic near the minimum: an argument more accurate than √ε gains nothing.
     while b - a > 1e-8 && gc >= 0.0 && gd >= 0.0 {
         if gc < gd {
             (b, d, gd) = (d, c, gc);

@@ -1,16 +1,16 @@
-//! Where a function of the state changes sign along a step.
+//! Sign changes of a function of the state along a step.
 //!
-//! **Idea.** The function is sampled on the continuous solution of the step; a change of sign between two samples, or between
-//! a sample and an extremum that lies beyond zero, brackets a crossing. Within the bracket the crossing is located on the
-//! trajectory itself: the state is recomputed by a step of the full order from the start of the accepted one, so a crossing is
-//! as accurate as the integration and not only as the interpolant.
+//! **Idea.** The function is sampled on the continuous solution of the step. A sign change between two samples, or
+//! between a sample and an extremum beyond zero, brackets a crossing. Within the bracket the crossing is located on the
+//! trajectory itself: the state is recomputed by a full-order step from the start of the accepted one, so a crossing is
+//! as accurate as the integration rather than the interpolant.
 //!
 //! **Fails when** the function oscillates several times within an eighth of a step.
 
 use super::Step;
 use super::root::{lowest, root};
 
-/// Which changes of sign count.
+/// Sign changes that count as crossings.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Direction {
     /// From negative to positive.
@@ -22,35 +22,35 @@ pub enum Direction {
     Either,
 }
 
-/// A scalar function of time and state `[n]` whose zeros along a trajectory are wanted.
+/// Scalar function of time and state `[n]` whose zeros along a trajectory are sought.
 #[derive(Clone, Copy)]
 pub struct Section<'a> {
-    /// The function.
+    /// Function.
     pub value: &'a dyn Fn(f64, &[f64]) -> f64,
-    /// Which of its zeros.
+    /// Direction of the zeros sought.
     pub direction: Direction,
 }
 
-/// A zero of a section function.
+/// Zero of a section function.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Crossing {
     /// Index of the section.
     pub section: usize,
-    /// When.
+    /// Time.
     pub time: f64,
-    /// `[n]` where.
+    /// `[n]` state.
     pub state: Vec<f64>,
-    /// Whether the function rises there.
+    /// True if the function increases there.
     pub rising: bool,
 }
 
-/// Samples per step.
+/// Number of samples per step.
 const SAMPLES: usize = 8;
-/// An extremum is worth refining if a parabola puts it below this fraction of the largest sample.
+/// An extremum is refined if a parabola puts it below this fraction of the largest sample.
 const WORTH: f64 = 0.02;
 
-/// All crossings along a step by increasing time in the direction of integration; `exact` writes the state a fraction θ into
-/// the step to the accuracy of the integration.
+/// All crossings along a step, in the order of integration; `exact` writes the state at a fraction θ of the step to the
+/// accuracy of the integration.
 pub(super) fn crossings(step: &Step, sections: &[Section], mut exact: impl FnMut(f64, &mut [f64])) -> Vec<Crossing> {
     let mut found: Vec<(f64, Crossing)> = Vec::new();
     let mut x = vec![0.0; step.dim()];
@@ -85,7 +85,7 @@ pub(super) fn crossings(step: &Step, sections: &[Section], mut exact: impl FnMut
                 continue;
             }
             let ends = [value(a, true, &mut x), value(b, true, &mut x)];
-            // Where the interpolant and the trajectory disagree about the sign at a sample, the sample is the crossing.
+            // If the interpolant and the trajectory disagree about the sign at a sample, the sample is the crossing.
             let theta = if ends[0] * ends[1] < 0.0 {
                 root(|theta| value(theta, true, &mut x), [a, b], ends, 1e-15)
             } else if ends[0].abs() < ends[1].abs() {
@@ -113,7 +113,7 @@ pub(super) fn insert_extrema(samples: &mut Vec<[f64; 2]>, mut value: impl FnMut(
         if !(low(c) > 0.0 && low(left) >= low(c) && low(right) >= low(c)) {
             continue;
         }
-        // At an end of the step the parabola runs through the two samples next to it.
+        // At an end of the step the parabola passes through the two nearest samples.
         let (p, q, r) = match c {
             0 => (low(0), low(1), low(2)),
             _ if right == c => (low(c), low(c - 1), low(c - 2)),

@@ -1,4 +1,4 @@
-//! A part of an accepted step, with the full order.
+//! Part of an accepted step, at the full order.
 
 use super::Step;
 use super::step::Course;
@@ -8,14 +8,14 @@ use crate::contract::{Batch, Parameters, VectorField};
 /// Recomputes a step of one trajectory from its start, up to a fraction of its length.
 pub(super) struct Shortened<'a> {
     field: &'a dyn VectorField,
-    /// `[STAGES][n]` of the last step that was computed.
+    /// `[STAGES][n]` of the last step computed.
     pub(super) slopes: [Vec<f64>; STAGES],
     start: Vec<f64>,
     parameters: Vec<f64>,
     signs: Vec<f64>,
     /// Length of the step.
     length: f64,
-    /// Its solution where an implicit method took it: that is as accurate as its end.
+    /// Solution of a step taken by an implicit method; it is as accurate as the end of the step.
     courses: Vec<Course>,
 }
 
@@ -55,7 +55,8 @@ impl<'a> Shortened<'a> {
         }
     }
 
-    /// Writes the state a time `h` after the start, by a step of that length; its slopes stay in `slopes` but for the last.
+    /// Writes the state a time `h` after the start, by a step of that length; all its slopes but the last stay in
+    /// `slopes`.
     pub(super) fn state_into(&mut self, h: f64, x: &mut [f64]) {
         if !self.courses.is_empty() {
             for (i, x) in x.iter_mut().enumerate() {
@@ -74,7 +75,7 @@ impl<'a> Shortened<'a> {
         }
     }
 
-    /// f at `x`, as slope number `k`.
+    /// Evaluates f at `x` into slope number `k`.
     pub(super) fn slope_at(&mut self, x: &[f64], k: usize) {
         let at = Batch { lanes: 1, states: x, parameters: Parameters::Shared(&self.parameters), times: &[] };
         match self.signs.is_empty() {
@@ -83,13 +84,13 @@ impl<'a> Shortened<'a> {
         }
     }
 
-    /// The values of all switches at `x`.
+    /// Writes the values of all switches at `x`.
     pub(super) fn switches_into(&self, x: &[f64], values: &mut [f64]) {
         let at = Batch { lanes: 1, states: x, parameters: Parameters::Shared(&self.parameters), times: &[] };
         self.field.switches(at, values);
     }
 
-    /// From now on with the other sign of a switch.
+    /// Reverses the sign of a switch from now on.
     pub(super) fn flip(&mut self, switch: usize) {
         self.signs[switch] = -self.signs[switch];
     }

@@ -1,14 +1,14 @@
-//! One accepted step, and the state anywhere on it.
+//! An accepted step and the state anywhere on it.
 
 use super::aligned::Aligned;
 use super::tableau::{DENSE, STAGES};
 use crate::contract::Parameters;
 
-/// An accepted step of one trajectory, with a continuous solution of order 4 between its ends.
+/// Accepted step of one trajectory, with a continuous solution of order 4 between its ends.
 #[derive(Clone, Copy, Debug)]
 pub struct Step<'a> {
     pub(super) trajectory: usize,
-    /// Column of the batch in which the trajectory lies, and the number of columns.
+    /// Column of the trajectory in the batch, and the number of columns.
     pub(super) column: usize,
     pub(super) lanes: usize,
     pub(super) time: f64,
@@ -19,7 +19,8 @@ pub struct Step<'a> {
     pub(super) to: &'a [f64],
     /// `[STAGES][n × lanes]`.
     pub(super) slopes: &'a [Aligned; STAGES],
-    /// `[n]` the solution between the ends where an implicit method took the step, whose `slopes` are those of the ends alone; else empty.
+    /// `[n]` solution between the ends if an implicit method took the step, in which case `slopes` holds only those at
+    /// the ends; else empty.
     pub(super) courses: &'a [Course],
     pub(super) parameters: Parameters<'a>,
     /// `[switches × lanes]` signs of the switches along the step.
@@ -32,7 +33,7 @@ impl Step<'_> {
         self.trajectory
     }
 
-    /// n.
+    /// Number of states n.
     pub fn dim(&self) -> usize {
         self.from.len() / self.lanes
     }
@@ -47,7 +48,7 @@ impl Step<'_> {
         self.end_time
     }
 
-    /// The time a fraction `theta` into the step.
+    /// Time at a fraction `theta` of the step.
     pub fn time_at(&self, theta: f64) -> f64 {
         if theta == 1.0 { self.end_time } else { self.time + theta * self.length }
     }
@@ -77,7 +78,7 @@ impl Step<'_> {
         (0..x.len()).for_each(|i| x[i] = self.end(i));
     }
 
-    /// Writes the state `[n]` a fraction `theta` ∈ [0, 1] into the step, (3) of the tableau.
+    /// Writes the state `[n]` at a fraction `theta` ∈ [0, 1] of the step, (3) of the tableau.
     pub fn state_into(&self, theta: f64, x: &mut [f64]) {
         if theta == 1.0 {
             return self.end_into(x);
@@ -87,7 +88,7 @@ impl Step<'_> {
         }
     }
 
-    /// How Σ wᵢ xᵢ changes along the step, `weights` `[n]`.
+    /// Course of Σ wᵢ xᵢ along the step, `weights` `[n]`.
     pub(crate) fn along(&self, weights: &[f64]) -> Course {
         let mut along = Course::default();
         for (i, weight) in weights.iter().enumerate() {
@@ -119,14 +120,14 @@ impl Course {
         Course(coefficients)
     }
 
-    /// Up to a fraction `theta` of the step, where the polynomial is a cubic one (D = 0).
+    /// Restriction to a fraction `theta` of the step, for a cubic polynomial (D = 0).
     pub(super) fn shortened(self, theta: f64) -> Course {
         let [change, b, c, _] = self.0;
         let end = self.change(theta);
         Course([end, theta * (change + b) - end, theta.powi(3) * c, 0.0])
     }
 
-    /// The change from the start to a fraction `theta` ∈ [0, 1] of the step.
+    /// Change from the start to a fraction `theta` ∈ [0, 1] of the step.
     pub(crate) fn change(&self, theta: f64) -> f64 {
         let [change, b, c, d] = self.0;
         let rest = 1.0 - theta;

@@ -4,7 +4,7 @@ use super::*;
 use crate::contract::{Batch, Parameters, VectorField, Verdict};
 use std::f64::consts::PI;
 
-/// A vector field written as a function of one point; only f is needed here.
+/// Vector field given as a function of one point; only f is needed here.
 pub(crate) struct Native {
     pub(crate) dim: usize,
     pub(crate) f: fn(&[f64], &[f64], &mut [f64]),
@@ -29,7 +29,7 @@ impl VectorField for Native {
         }
     }
 
-    // Without derivatives the explicit pair follows every trajectory.
+    // Without derivatives the explicit pair integrates every trajectory.
     fn linearise(&self, _: Batch, _: &[usize], _: &mut [f64], fx: &mut [f64], _: &mut [f64]) {
         fx.fill(f64::NAN);
     }
@@ -80,7 +80,7 @@ fn the_error_falls_with_the_fifth_power_of_the_step() {
     };
     let (mut cost, mut errors) = (vec![], vec![]);
     for longest in [PI / 100.0, PI / 800.0] {
-        // So loose a tolerance that the longest step decides.
+        // The tolerance is so loose that the longest step is decisive.
         let (steps, error) = run(Integrator::new(&kepler, &[], Tolerance::uniform(1.0, 4)).with_longest_step(longest));
         cost.push(steps);
         errors.push(error);
@@ -88,7 +88,7 @@ fn the_error_falls_with_the_fifth_power_of_the_step() {
     let order = order(&cost, &errors);
     // The term of order six still contributes a few per cent of the error at the longer step.
     assert!((order - 5.0).abs() < 0.2, "order {order}, steps {cost:?}, errors {errors:?}");
-    // The step control keeps the error of each step below the tolerance; they add up over some dozens of steps.
+    // Step control keeps the error of each step below the tolerance; errors add up over some dozens of steps.
     for tolerance in [1e-4, 1e-7, 1e-10] {
         let (_, error) = run(Integrator::new(&kepler, &[], Tolerance::uniform(tolerance, 4)));
         assert!(error < 30.0 * tolerance, "{error} at {tolerance}");
@@ -188,12 +188,12 @@ fn a_trajectory_stops_at_a_crossing_and_runs_backwards() {
 }
 
 #[test]
-fn what_cannot_go_on_says_why() {
+fn trajectories_that_cannot_continue_report_the_reason() {
     let run = |field: &Native, start: f64, limit: usize| {
         let integrator = Integrator::new(field, &[], Tolerance::uniform(1e-8, 1)).with_step_limit(limit);
         integrator.trajectory(&[start], [0.0, 1e4], &[], &mut |_| Verdict::Continue)
     };
-    // x = 1 / (1 - t) leaves every bound at t = 1.
+    // x = 1 / (1 - t) is unbounded at t = 1.
     let blow_up = run(&Native { dim: 1, f: |x, _, f| f[0] = x[0] * x[0] }, 1.0, 100_000);
     assert_eq!(blow_up.outcome, Outcome::Escaped);
     assert!((blow_up.time - 1.0).abs() < 1e-6);
@@ -203,21 +203,21 @@ fn what_cannot_go_on_says_why() {
     assert!((undefined.state[0] - 1.0).abs() < 1e-6);
     assert_eq!(run(&Native { dim: 1, f: |_, _, f| f[0] = f64::NAN }, 0.0, 100).outcome, Outcome::Undefined);
     assert_eq!(run(&Native { dim: 1, f: |x, _, f| f[0] = -x[0] }, 1.0, 10).outcome, Outcome::StepLimit);
-    // A step of the right length would be shorter than numbers go.
+    // A step of the right length would underflow.
     assert_eq!(run(&Native { dim: 1, f: |x, _, f| f[0] = 1e305 * x[0] }, 1.0, 1000).outcome, Outcome::StepTooSmall);
-    // Constant solutions are integrated in few steps and not for ever.
+    // Constant solutions take few steps.
     let rest = run(&Native { dim: 1, f: |_, _, f| f[0] = 0.0 }, 1.0, 100_000);
     assert_eq!((rest.outcome, rest.state[0]), (Outcome::Reached, 1.0));
     assert!(rest.steps < 20);
 }
 
 #[test]
-fn a_trajectory_does_not_depend_on_its_company() {
+fn a_trajectory_does_not_depend_on_the_other_lanes() {
     let starts: Vec<f64> = (0..14).map(|k| ((k * 37 + 11) % 17) as f64 * 0.4 - 3.0).collect();
     let tolerance = Tolerance::uniform(1e-7, 2);
     let run = |starts: &[f64]| {
         Ensemble::new(&VAN_DER_POL, &[], tolerance.clone(), starts, [0.0, 20.0]).run(&mut |step| {
-            // Some lanes leave early, so the batch shrinks while others run.
+            // Some lanes end early, so the batch shrinks while others run.
             let leaves = step.end(0) > 2.0 && step.end_time() > 15.0;
             if leaves { Verdict::Stop } else { Verdict::Continue }
         })
@@ -232,9 +232,9 @@ fn a_trajectory_does_not_depend_on_its_company() {
     );
 }
 
-/// x' = cos 2πτ with τ in periods, of which the solution from 0 is sin(2πτ)/2π.
+/// x' = cos 2πτ with τ in periods; the solution from 0 is sin(2πτ)/2π.
 #[test]
-fn a_clock_tells_a_forced_field_the_time() {
+fn a_clock_state_gives_a_forced_field_its_time() {
     use crate::model::{Definition, Forcing, Model, ModelSource, State};
     let model = Model::compile(ModelSource {
         name: "forced".into(),

@@ -13,7 +13,7 @@ fn model(equations: &[(&str, &str)]) -> Model {
     Model::compile(source).unwrap()
 }
 
-/// The same field without its switches being known.
+/// A model whose switches are hidden.
 struct Plain<'a>(&'a Model);
 
 impl VectorField for Plain<'_> {
@@ -38,8 +38,9 @@ impl VectorField for Plain<'_> {
     }
 }
 
-/// x'' + x + 9 max(x - a, 0) = 0 as two harmonic motions: the state after `time`, from x = 0, x' = 1. Contact lasts from
-/// a sin-arc of radius 1 to the mirror of its entry, with frequency ω = √10 around the centre 0.9 a.
+/// x'' + x + 9 max(x - a, 0) = 0 as two harmonic motions: the state after `time`, from x = 0, x' = 1. Outside contact
+/// the motion is an arc of radius 1; contact lasts from entry to its mirror image, with frequency ω = √10 about the
+/// centre 0.9 a.
 fn bouncer(a: f64, time: f64) -> [f64; 2] {
     let (mut t, mut x, mut v, mut outside): (f64, f64, f64, bool) = (0.0, 0.0, 1.0, true);
     loop {
@@ -72,7 +73,7 @@ fn a_kink_costs_neither_accuracy_nor_many_steps() {
     for tolerance in [1e-5, 1e-7, 1e-9, 1e-11] {
         let (located, steps) = error(&bouncing, 0.6, tolerance);
         let (plain, plain_steps) = error(&Plain(&bouncing), 0.6, tolerance);
-        // The errors of a few hundred steps add up, and so do the phases they leave behind over seven periods.
+        // Errors of a few hundred steps add up, as do the resulting phase errors over seven periods.
         assert!(located < 300.0 * tolerance, "{located} at {tolerance}");
         assert!(plain_steps > steps, "{plain_steps} against {steps} steps");
         // The error of a step across a kink is of second order in its length only.
@@ -82,7 +83,7 @@ fn a_kink_costs_neither_accuracy_nor_many_steps() {
 
 #[test]
 fn grazing_is_neither_missed_nor_invented() {
-    // The first arc has amplitude 1: contact a little below it lasts 2 acos(a), a small part of a step.
+    // The first arc has amplitude 1: contact slightly below it lasts 2 acos(a), a small part of a step.
     for depth in [1e-3, 1e-5, 1e-7, -1e-7] {
         let a = 1.0 - depth;
         let grazing = model(&[("x", "v"), ("v", &format!("-x - 9*max(x - {a}, 0)"))]);
@@ -90,26 +91,26 @@ fn grazing_is_neither_missed_nor_invented() {
         for tolerance in [1e-8, 1e-10] {
             worst = worst.max(error(&grazing, a, tolerance).0 / tolerance);
         }
-        // Near tangency an error e of the state changes the time of contact, 2 √(2 depth), by e / √(2 depth); the impulse, which
-        // goes with depth^1.5, changes by 9 · 2 √(2 depth) e only.
+        // Near tangency an error e of the state changes the duration of contact, 2 √(2 depth), by e / √(2 depth). The
+        // impulse is proportional to depth^1.5 and changes only by 9 · 2 √(2 depth) e.
         assert!(worst < 100.0, "{worst} at depth {depth}");
     }
 }
 
 #[test]
-fn f_may_jump() {
+fn a_discontinuous_field_is_integrated_to_rounding() {
     // x'' = -sign(x): arcs x = v τ - τ²/2 of duration 2 v; the motion from x = 0, v = 1 has the period 4.
     let jumping = model(&[("x", "v"), ("v", "-sign(x)")]);
     let integrator = Integrator::new(&jumping, &[], Tolerance::uniform(1e-8, 2));
     let arrival = integrator.trajectory(&[0.0, 1.0], [0.0, 401.0], &[], &mut |_| Verdict::Continue);
     assert_eq!(arrival.outcome, Outcome::Reached);
-    // The arcs are polynomials of degree two, which the method follows exactly; what is left is rounding.
+    // The arcs are polynomials of degree two, which the method integrates exactly up to rounding.
     assert!((arrival.state[0] - 0.5).abs() < 1e-10 && arrival.state[1].abs() < 1e-10, "{:?}", arrival.state);
     assert!(arrival.steps < 2000, "{}", arrival.steps);
 }
 
 #[test]
-fn sliding_is_answered() {
+fn sliding_along_a_switch_is_reported() {
     let sliding = model(&[("x", "-sign(x)"), ("y", "1")]);
     let integrator = Integrator::new(&sliding, &[], Tolerance::uniform(1e-8, 2));
     let arrival = integrator.trajectory(&[1.0, 0.0], [0.0, 10.0], &[], &mut |_| Verdict::Continue);
@@ -138,10 +139,10 @@ fn every_lane_has_its_own_parameters_and_kinks() {
     }
 }
 
-/// x'' + x + F(x - 0.5) = 0 with a contact force F that is a root of the penetration δ: the energy x'²/2 + x²/2 + ∫ F dδ stays as it is.
-/// Without contact the motion would have the amplitude 1.
+/// x'' + x + F(x - 0.5) = 0 with a contact force F that is a root of the penetration δ: the energy x'²/2 + x²/2 + ∫ F
+/// dδ is conserved. Without contact the amplitude would be 1.
 #[test]
-fn a_contact_force_that_is_defined_on_one_side_only_keeps_the_energy() {
+fn a_contact_force_defined_on_one_side_only_conserves_energy() {
     for (force, exponent) in [
         ("max(x - 0.5, 0)^1.5", 1.5),
         ("if(x > 0.5, (x - 0.5)^1.5, 0)", 1.5),
@@ -165,14 +166,14 @@ fn a_contact_force_that_is_defined_on_one_side_only_keeps_the_energy() {
         assert!(arrivals.iter().all(|arrival| *arrival == alone), "{force}: lanes differ");
         assert_eq!(alone.outcome, Outcome::Reached, "{force}");
         assert!(deepest > 0.3, "{force}: no contact");
-        // The errors of some hundred steps add up; at a root below 1 those next to contact are of a lower order.
+        // Errors of some hundred steps add up; for a power below 1 the steps next to contact have a lower order.
         assert!(off < 1e-6 && steps < 5000, "{force}: {off} after {steps} steps, {} rejected", alone.rejected);
     }
 }
 
-/// x'' = -√x passes x = 0 with speed: there f ceases to be defined, whether a switch far from there is written around it or not.
+/// x'' = -√x passes x = 0 at nonzero speed: there f ceases to be defined, with or without a distant switch around it.
 #[test]
-fn a_trajectory_that_leaves_the_region_of_definition_says_so() {
+fn a_trajectory_that_leaves_the_domain_of_the_field_is_reported() {
     for force in ["sqrt(x)", "if(x > -1, sqrt(x), 0)"] {
         let falling = model(&[("x", "v"), ("v", &format!("-{force}"))]);
         let integrator = Integrator::new(&falling, &[], Tolerance::uniform(1e-9, 2));

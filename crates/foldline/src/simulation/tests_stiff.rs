@@ -17,7 +17,7 @@ fn model(states: &[(&str, &str)], parameters: &[(&str, f64)]) -> Model {
     .unwrap()
 }
 
-/// Where trajectories from `start` arrive, with the number of steps.
+/// End of the trajectory from `start`, with the number of steps.
 fn arrive(model: &Model, start: &[f64], span: [f64; 2], limit: usize) -> Arrival {
     let n = start.len();
     let tolerance = Tolerance::uniform(ACCURACY, n);
@@ -41,7 +41,7 @@ fn arrive(model: &Model, start: &[f64], span: [f64; 2], limit: usize) -> Arrival
 
 #[test]
 fn a_slaved_fast_state_costs_no_more_steps_however_fast_it_is() {
-    // x = cos t, and z follows it by 1 / rate: z = (rate² cos t + rate sin t) / (rate² + 1).
+    // x = cos t, and z lags it by 1 / rate: z = (rate² cos t + rate sin t) / (rate² + 1).
     for rate in [1e4, 1e6, 1e9] {
         let slaved = model(&[("x", "y"), ("y", "-x"), ("z", "rate*(x - z)")], &[("rate", rate)]);
         let arrival = arrive(&slaved, &[1.0, 0.0, 1.0], [0.0, 40.0], 4000);

@@ -5,7 +5,7 @@ use super::shortened::Shortened;
 use super::{Arrival, Ensemble, Outcome, Step, Tolerance};
 use crate::contract::{VectorField, Verdict};
 
-/// Integrates single trajectories of one vector field at fixed parameters.
+/// Integrator of single trajectories of one vector field at fixed parameters.
 #[derive(Clone)]
 pub struct Integrator<'a> {
     field: &'a dyn VectorField,
@@ -15,7 +15,7 @@ pub struct Integrator<'a> {
     longest: f64,
 }
 
-/// What an observer of a trajectory sees, in the order in which it happens.
+/// Event shown to the observer of a trajectory, in order of time.
 #[derive(Clone, Copy, Debug)]
 pub enum Passage<'a> {
     /// A section was crossed.
@@ -25,7 +25,7 @@ pub enum Passage<'a> {
 }
 
 impl<'a> Integrator<'a> {
-    /// An integrator without a limit on the number of steps.
+    /// Integrator without a limit on the number of steps.
     pub fn new(field: &'a dyn VectorField, parameters: &'a [f64], tolerance: Tolerance) -> Integrator<'a> {
         Integrator { field, parameters, tolerance, step_limit: usize::MAX, longest: f64::INFINITY }
     }
@@ -36,13 +36,13 @@ impl<'a> Integrator<'a> {
         self
     }
 
-    /// No step is longer than this time, which is positive.
+    /// Limits the length of a step to `longest`, a positive time.
     pub fn with_longest_step(mut self, longest: f64) -> Integrator<'a> {
         self.longest = longest;
         self
     }
 
-    /// The trajectory from `start` `[n]` over the time span, which may run backwards. `observe` may stop it, at a crossing or
+    /// Integrates from `start` `[n]` over the time span, which may run backwards. `observe` may stop at a crossing or
     /// at the end of a step. A start on a section is not a crossing.
     pub fn trajectory(
         &self,
@@ -81,7 +81,7 @@ impl<'a> Integrator<'a> {
         arrival
     }
 
-    /// The state at the end of the time span, or `None` if the trajectory does not get there.
+    /// State at the end of the time span, or `None` if the trajectory does not get there.
     pub fn state_after(&self, start: &[f64], span: [f64; 2]) -> Option<Vec<f64>> {
         let arrival = self.trajectory(start, span, &[], &mut |_| Verdict::Continue);
         (arrival.outcome == Outcome::Reached).then_some(arrival.state)

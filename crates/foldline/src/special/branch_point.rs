@@ -1,22 +1,23 @@
-//! Branch points: another branch of the same type crosses.
+//! Branch points: intersections with another branch of the same type.
 //!
-//! **Equations.** With τ the parameter component of the tangent and z the eigenvalues (z = λ) or multipliers (z = μ - 1):
+//! **Equations.** With τ the parameter component of the tangent and z the eigenvalues (z = λ) or multipliers (z = μ -
+//! 1):
 //!
-//!   (1)  ∏ z / τ = 0, the determinant of F_u with the tangent for a last row but for a factor that is not 0
-//!   (2)  F_u φ = 0, φ ⊥ tangent:  direction into the plane that both branches span
+//!   (1)  ∏ z / τ = 0, the determinant of F_u bordered by the tangent, up to a nonzero factor
+//!   (2)  F_u φ = 0, φ ⊥ tangent:  direction in the plane spanned by the tangents of both branches
 
 use crate::contract::{Monitor, ZeroProblem};
 use crate::diagram::{FLAT, Kind, Point, Solution};
 use num_complex::Complex64;
 
-/// An eigenvalue 0 (a multiplier 1) without a fold.
+/// Zero eigenvalue (multiplier 1) without a fold.
 pub struct BranchPoint {
-    /// True if a multiplier is 1 because of a continuous symmetry and therefore does not indicate branch points.
+    /// True if a continuous symmetry fixes a multiplier at 1, which therefore does not indicate branch points.
     pub symmetric: bool,
 }
 
 impl BranchPoint {
-    /// The spectrum without a multiplier that is 1 because of a continuous symmetry.
+    /// Spectrum without a multiplier that a continuous symmetry fixes at 1.
     fn spectrum_without_symmetry(&self, at: &Point) -> Vec<Complex64> {
         let neutral = at.neutral_multiplier().filter(|_| self.symmetric);
         let mut spectrum = at.free_spectrum().to_vec();
@@ -34,14 +35,15 @@ impl Monitor for BranchPoint {
 
     fn value(&self, _reference: &Point, at: &Point) -> f64 {
         let centre = if matches!(at.solution, Solution::Cycle(_)) { 1.0 } else { 0.0 };
-        // At a fold both vanish, not quite at the same place, and the product would change sign twice.
+        // At a fold both factors vanish, at slightly different points numerically, and their product would change sign
+        // twice.
         let slope = at.parameter_slope();
         super::distance_product(&self.spectrum_without_symmetry(at), centre)
             / slope.abs().max(f64::MIN_POSITIVE).copysign(slope)
     }
 
     fn confirms(&self, at: &Point) -> bool {
-        // At a fold, too, the product vanishes; there the tangent has no parameter component.
+        // The product also vanishes at a fold; there the tangent has no parameter component.
         let centre = if matches!(at.solution, Solution::Cycle(_)) { 1.0 } else { 0.0 };
         let largest = at.spectrum.iter().map(|z| z.norm()).fold(1e-300, f64::max).min(1.0);
         let closest =
@@ -69,8 +71,8 @@ impl Monitor for BranchPoint {
     }
 }
 
-/// A pair of multipliers of a conservative system that meets at 1 and leaves the unit circle: another family leaves that one. A further multiplier
-/// is 1 all along the family, and the parameter stands still.
+/// Collision at 1 of a pair of multipliers of a conservative system that then leaves the unit circle: another family
+/// branches off. Along the family a further multiplier stays 1 and the parameter is constant.
 struct OfFamily;
 
 impl Monitor for OfFamily {
@@ -83,8 +85,8 @@ impl Monitor for OfFamily {
     }
 
     fn confirms(&self, at: &Point) -> bool {
-        /// Largest distance of the pair from 1: the root of that of a single multiplier at other branch points, since a pair that meets is as
-        /// sensitive as that.
+        /// Largest distance of the pair from 1: the square root of the bound for a single multiplier at other branch
+        /// points, since a colliding pair depends on the parameter like a square root.
         const NEAR: f64 = 0.1;
         BranchPoint { symmetric: true }.spectrum_without_symmetry(at).iter().any(|z| (z - 1.0).norm() < NEAR)
     }
@@ -94,17 +96,17 @@ impl Monitor for OfFamily {
     }
 }
 
-/// The null vector of F_u orthogonal to the tangent at a branch point, of unit length; the problem must be on the mesh of
-/// `u` and anchored there. `None` if there is none.
+/// Null vector of F_u orthogonal to the tangent at a branch point, of unit length. The problem must be on the mesh of
+/// `u`, with its reference there. `None` if there is none.
 pub fn direction(problem: &mut dyn ZeroProblem, u: &[f64], tangent: &[f64]) -> Option<Vec<f64>> {
     kernel(problem, u, tangent, 1)?.pop()
 }
 
-/// Orthonormal null vectors of F_u orthogonal to the tangent, as many as `dimension` says, by inverse iteration of a subspace.
-/// Conditions as for [`direction`].
+/// Returns `dimension` orthonormal null vectors of F_u orthogonal to the tangent, by subspace inverse iteration.
+/// Preconditions as for [`direction`].
 pub fn kernel(problem: &mut dyn ZeroProblem, u: &[f64], tangent: &[f64], dimension: usize) -> Option<Vec<Vec<f64>>> {
     let size = problem.unknowns();
-    // Exactly at the point there may be nothing to factorise; a little beside it the null vectors are nearly the same.
+    // At the point itself the matrix may be exactly singular; slightly off it the null vectors are nearly the same.
     if problem.factorise(u, tangent).is_err() {
         let beside: Vec<f64> = u.iter().zip(tangent).map(|(x, t)| x + 1e-8 * t).collect();
         problem.factorise(&beside, tangent).ok()?;
@@ -136,7 +138,8 @@ pub fn kernel(problem: &mut dyn ZeroProblem, u: &[f64], tangent: &[f64], dimensi
     Some(vectors)
 }
 
-/// Makes a vector orthogonal to some that are orthonormal, and of unit length. False if it was not longer than `least` then.
+/// Makes a vector orthogonal to some orthonormal ones and normalises it. False if its remaining length is at most
+/// `least`.
 fn orthonormalised(problem: &dyn ZeroProblem, vector: &mut [f64], others: &[Vec<f64>], least: f64) -> bool {
     for other in others {
         let along = problem.dot(vector, other);

@@ -1,24 +1,24 @@
-//! Points that it takes two parameters to meet, on curves along which something is held.
+//! Codimension-two points on bifurcation curves in two parameters.
 //!
 //! | on a curve of | kind | test function |
 //! |---|---|---|
 //! | folds | cusp | ⟨p, B(q, q)⟩; for cycles the slope in the first parameter, where it vanishes with that in the second |
-//! | branch points of equilibria | cusp | ⟨p, B(q, q)⟩ where they are not pitchforks throughout |
+//! | branch points of equilibria | cusp | ⟨p, B(q, q)⟩, unless they are pitchforks throughout |
 //! | folds, branch points of equilibria | Bogdanov–Takens | ⟨p, q⟩ |
 //! | folds, branch points of equilibria | zero-Hopf | sums of two of the other eigenvalues |
-//! | Hopf points | Bogdanov–Takens | the product of the two held: ω², negative where they are real |
+//! | Hopf points | Bogdanov–Takens | the product of the critical pair: ω², negative where it is real |
 //! | Hopf points | generalised Hopf | the first Lyapunov coefficient |
 //! | Hopf points | zero-Hopf | the product of the other eigenvalues |
 //! | Hopf points | double Hopf | sums of two of the others |
 //! | period doublings | generalised period doubling | c of the normal form |
 //! | torus points | Chenciner | Re d of the normal form |
-//! | torus points | 1:1, 1:2 resonance | sin θ, which changes its sign where e^{iθ} is 1 or -1 |
+//! | torus points | 1:1, 1:2 resonance | sin θ, which changes sign where e^{iθ} is 1 or -1 |
 //! | torus points | 1:3, 1:4 resonance | cos θ + ½, cos θ |
 //! | folds, torus points | 1:1 resonance, fold–torus | the product of the others minus 1 |
 //! | period doublings, folds, torus points | fold–flip, 1:2 resonance, flip–torus | the product of the others minus 1, plus 1 |
-//! | all of cycles | fold–torus, flip–torus, double torus | products of two of the others minus 1 |
+//! | all curves of cycles | fold–torus, flip–torus, double torus | products of two of the others minus 1 |
 //!
-//! p and q are of unit length, and point the way that they did where the step began.
+//! p and q have unit length and keep their orientation from the beginning of the step.
 //!
 //! **Source.** kuznetsov2004, §10.3 (equilibria), §9 (cycles).
 
@@ -30,13 +30,14 @@ use crate::linalg::dot;
 use crate::problem::Setting;
 use num_complex::Complex64;
 
-/// Share of the cubic term, over the scales of the states, below which a quadratic one is rounding.
+/// Ratio of the quadratic to the cubic term, at states of their characteristic size, below which the quadratic one is
+/// rounding.
 const VANISHING: f64 = 1e-9;
 
-/// ⟨p, q⟩ of unit vectors below which an eigenvalue 0 is double, as far as located points tell.
+/// |⟨p, q⟩| of unit vectors below which an eigenvalue 0 counts as double, given the accuracy of located points.
 const DOUBLE: f64 = 1e-6;
 
-/// One line of the table.
+/// Test function in one line of the table.
 pub struct CodimensionTwo<'a> {
     field: &'a dyn VectorField,
     scales: &'a [f64],
@@ -44,7 +45,7 @@ pub struct CodimensionTwo<'a> {
     kind: Kind,
 }
 
-/// What to look for along a curve on which a special point of that kind is held; `scales` `[n]` are those of the states.
+/// Monitors for a curve of bifurcation points of kind `held`; `scales` `[n]` are those of the states.
 pub fn monitors<'a>(
     field: &'a dyn VectorField,
     scales: &'a [f64],
@@ -71,20 +72,20 @@ pub fn monitors<'a>(
 }
 
 impl CodimensionTwo<'_> {
-    /// Null vectors at a point that point the way that those at `reference` do.
+    /// Null vectors at a point, oriented like those at `reference`.
     fn oriented(&self, reference: &Point, at: &Point) -> Option<[Vec<f64>; 2]> {
         let before = Local::new(self.field, reference)?.null_vectors()?;
         Local::new(self.field, at)?.null_vectors_near(&before)
     }
 
-    /// Of the spectrum, what is held, then the rest.
+    /// Critical part of the spectrum, then the rest.
     fn parts<'p>(&self, at: &'p Point) -> (&'p [Complex64], &'p [Complex64]) {
         let all = at.free_spectrum();
         let held = if matches!(self.held, Kind::Hopf | Kind::Torus) { 2 } else { 1 };
         all.split_at(held.min(all.len()))
     }
 
-    /// The coefficient of the normal form of what is held on cycles.
+    /// Normal-form coefficient of the bifurcation of cycles that is continued.
     fn coefficient(&self, at: &Point) -> Option<f64> {
         let (field, scales, parameters) = (self.field, self.scales, at.parameters.clone());
         cycle_form::coefficient(self.held, Setting { field, scales, parameters, axes: Vec::new() }, at)
@@ -98,7 +99,7 @@ impl CodimensionTwo<'_> {
         Some(match self.kind {
             Kind::Cusp if of_cycle => fold::first_slope(at),
             Kind::Cusp => {
-                // By symmetry it vanishes everywhere, but for rounding.
+                // By symmetry the coefficient vanishes everywhere, up to rounding.
                 if self.held == Kind::BranchPoint
                     && Local::new(self.field, reference)?.is_pitchfork(self.scales, VANISHING)?
                 {
@@ -116,7 +117,7 @@ impl CodimensionTwo<'_> {
             Kind::GeneralisedPeriodDoubling | Kind::Chenciner => self.coefficient(at)?,
             Kind::Resonance11 | Kind::Resonance12 if self.held == Kind::Torus => {
                 let z = held.first()?;
-                // The other end of the circle is the business of the other.
+                // The opposite end of the unit circle belongs to the other resonance.
                 if (z.re > 0.0) != (self.kind == Kind::Resonance11) {
                     return None;
                 }
@@ -155,13 +156,13 @@ impl Monitor for CodimensionTwo<'_> {
         let on_axis = |z: &Complex64| z.im != 0.0 && z.re.abs() < 1e-3 * z.im.abs();
         let on_circle = |z: &Complex64| z.im != 0.0 && z.norm().ln().abs() < 1e-3;
         match self.kind {
-            // Two real eigenvalues with the sum 0 are none of these.
+            // Two real eigenvalues with zero sum are not on the axis.
             Kind::ZeroHopf if self.held != Kind::Hopf => rest.iter().any(on_axis),
             Kind::ZeroHopf | Kind::GeneralisedHopf => held.iter().all(on_axis),
-            // Where a fold and a branch point meet at a double eigenvalue 0, ⟨p, B(q, q)⟩ vanishes with ⟨p, q⟩.
+            // ⟨p, B(q, q)⟩ also vanishes, with ⟨p, q⟩, where a fold and a branch point meet at a double eigenvalue 0.
             Kind::Cusp if at.solution.period().is_none() => {
                 let vectors = Local::new(self.field, at).and_then(|local| local.null_vectors());
-                // Of unit length in units of the scales.
+                // Norm in scaled components.
                 let norm = |v: &[f64], power: i32| {
                     v.iter().zip(self.scales).map(|(v, s)| (v * s.powi(power)).powi(2)).sum::<f64>().sqrt()
                 };

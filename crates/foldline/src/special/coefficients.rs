@@ -1,4 +1,4 @@
-//! Coefficients of a normal form with their errors, or the reason why they are missing.
+//! Normal-form coefficients with their errors, or the reason why they are missing.
 
 /// Coefficients of a normal form.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -1,8 +1,8 @@
-//! Where a branch meets the simpler solutions it comes from.
+//! Points at which a branch meets the simpler solutions from which it bifurcates.
 //!
-//! **Idea.** A cycle that shrinks to an equilibrium passes through zero amplitude and comes back shifted by half a period;
-//! a doubled cycle does the same when its two halves become equal. The deviation from the simpler solution, multiplied with
-//! that at a reference point, changes sign there.
+//! **Idea.** A cycle that shrinks to an equilibrium passes through zero amplitude and returns shifted by half a period;
+//! a doubled cycle does so when its two halves become equal. There, the inner product of the deviation from the simpler
+//! solution with that at a reference point changes sign.
 
 use super::hopf;
 use crate::contract::{Monitor, VectorField};
@@ -13,23 +13,23 @@ use std::f64::consts::TAU;
 
 const SAMPLES: usize = 128;
 
-/// Amplitude of a cycle: vanishes where it becomes an equilibrium. With little damping a branch also passes an equilibrium
-/// closely and goes on; only where there is a Hopf point does it end.
+/// Amplitude of a cycle: vanishes where it becomes an equilibrium. With little damping a branch may also pass an
+/// equilibrium closely and continue; it ends only at a Hopf point.
 pub struct Shrinks<'a> {
-    /// The vector field.
+    /// Vector field.
     pub field: &'a dyn VectorField,
-    /// Index of the parameter along which the Hopf point is looked for.
+    /// Index of the parameter in which the Hopf point is sought.
     pub free: usize,
     /// Scale of that parameter.
     pub unit: f64,
     /// `[n]` characteristic sizes of the states.
     pub scales: &'a [f64],
-    /// What lies there: a Hopf point, or, on a curve of folds, a generalised one.
+    /// Kind of the end point: a Hopf point, or a generalised Hopf point on a curve of folds.
     pub at: Kind,
 }
 
 impl Shrinks<'_> {
-    /// The value of parameter `free` at which the equilibrium inside a cycle has a Hopf point.
+    /// Value of parameter `free` at which the equilibrium inside a cycle has a Hopf point.
     fn hopf_point(&self, at: &Point) -> Option<f64> {
         let Solution::Cycle(cycle) = &at.solution else { return None };
         let mean = Shrinks::mean(&cycle.level(SAMPLES), cycle.dim());
@@ -47,11 +47,12 @@ impl Shrinks<'_> {
 pub struct Halves<'a> {
     /// `[n]` characteristic sizes of the states.
     pub scales: &'a [f64],
-    /// Whether the branch is known to have begun by period doubling. On any other one halves that differ much are not compared.
+    /// True if the branch is known to have begun at a period doubling. On other branches, halves that differ much are
+    /// not compared.
     pub born: bool,
 }
 
-/// Difference between the halves of a cycle, as a share of its extent, up to which they are nearly the same.
+/// Largest difference between nearly equal halves of a cycle, relative to its extent.
 pub const NEARLY: f64 = 0.3;
 
 impl Halves<'_> {
@@ -63,7 +64,7 @@ impl Halves<'_> {
         let n = cycle.dim();
         let [mut one, mut other] = [vec![0.0; n], vec![0.0; n]];
         let scheme = Scheme::of(cycle.degree);
-        // Most cycles differ at the first place that is looked at.
+        // Most cycles already differ at the first sample.
         at.ranges.len() >= n
             && (0..SAMPLES / 2).all(|k| {
                 let t = k as f64 / SAMPLES as f64;
@@ -99,7 +100,7 @@ impl Monitor for Shrinks<'_> {
     }
 
     fn meeting(&self, at: &Point) -> Option<f64> {
-        // Along a curve in two parameters a generalised Hopf point is not where nearby Hopf points in one parameter are.
+        // Along a curve in two parameters a generalised Hopf point differs from nearby Hopf points in one parameter.
         self.hopf_point(at).filter(|_| self.at == Kind::Hopf)
     }
 
@@ -108,24 +109,24 @@ impl Monitor for Shrinks<'_> {
     }
 }
 
-/// Difference between a solution and its mirror image, seen half a period later if it is a cycle and `half` says so: vanishes
-/// where it becomes symmetric.
+/// Difference between a solution and its mirror image, for a cycle shifted by half a period if `half` is set: vanishes
+/// where the solution becomes symmetric.
 pub struct Mirrors {
-    /// Which components change sign.
+    /// Components that change sign under the reflection.
     pub reflection: Vec<bool>,
     /// `[n]` characteristic sizes of the states.
     pub scales: Vec<f64>,
     /// `[n]` periods of the states that are angles; see [`crate::contract::VectorField::periods`].
     pub periods: Vec<f64>,
-    /// Whether the symmetric cycle goes over into itself after half a period.
+    /// True if half a period maps the symmetric cycle to its mirror image.
     pub half: bool,
 }
 
-/// Asymmetry, relative to the size of the solution, that is taken for none.
+/// Asymmetry, relative to the size of the solution, below which it counts as symmetric.
 const SYMMETRIC: f64 = 1e-5;
 
 impl Mirrors {
-    /// Samples of a solution, and of what is left of it after subtracting its mirror image.
+    /// Samples of a solution, and its difference from its mirror image.
     fn parts(&self, point: &Point) -> (Vec<f64>, Vec<f64>) {
         let (x, n) = match &point.solution {
             Solution::Equilibrium(x) => (x.clone(), x.len()),
@@ -135,7 +136,7 @@ impl Mirrors {
         let mean = |c: usize| x.iter().skip(c).step_by(n).sum::<f64>() * n as f64 / x.len() as f64;
         let mut twice: Vec<f64> = vec![0.0; n];
         for (c, period) in self.periods.iter().enumerate().filter(|(_, period)| period.is_finite()) {
-            // An angle is as far from half a turn as its image, in the next copy.
+            // An angle and its mirror image lie symmetrically about a multiple of half a turn.
             twice[c] = period * (2.0 * mean(c) / period).round();
         }
         let image = |k: usize| if self.reflection[k % n] { twice[k % n] - x[k] } else { x[k] };
@@ -199,11 +200,11 @@ impl Monitor for Halves<'_> {
     }
 }
 
-/// The result of [`compare`] for deviations from the means, by Gauss quadrature.
+/// Result of [`compare`] for deviations from the means, by Gauss quadrature.
 fn on_one_mesh(a: &Cycle, b: &Cycle, extents: &[f64]) -> f64 {
     let (scheme, n) = (Scheme::of(a.degree), a.dim());
     let block = (a.degree + 1) * n;
-    // Means of a and b, of a² and a b.
+    // Means of a, b, a² and a b.
     let mut sums = vec![[0.0; 4]; n];
     let intervals = a.profile.chunks_exact(block).zip(b.profile.chunks_exact(block));
     for ((x, y), ends) in intervals.zip(a.mesh.windows(2)) {
@@ -220,12 +221,14 @@ fn on_one_mesh(a: &Cycle, b: &Cycle, extents: &[f64]) -> f64 {
     mean_share(&own, extents)
 }
 
-/// Relative deviation of a component, compared with the largest one, below which it is noise. Empirical: next to the simpler solution
-/// deviations of symmetric components are errors of the solution, while those that break the symmetry are much larger.
+/// Relative deviation of a component, compared with the largest one, below which it is noise. Empirical: near the
+/// simpler solution, deviations of symmetric components are errors of the solution, and those that break the symmetry
+/// are much larger.
 const NOISE: f64 = 1e-3;
 
-/// Mean over the components of the inner product of two deviations, relative to the square of the first; `own` holds square and product
-/// for each component. A component that hardly deviates is left out, since its quotient would be one of rounding errors.
+/// Mean over the components of the inner product of two deviations, relative to the square of the first; `own` holds
+/// square and product for each component. Components that hardly deviate are omitted, since their quotients would be
+/// rounding errors.
 fn mean_share(own: &[[f64; 2]], extents: &[f64]) -> f64 {
     let size = |c: usize| own[c][0] / extents[c].powi(2);
     let largest = (0..own.len()).map(size).fold(f64::MIN_POSITIVE, f64::max);
@@ -237,12 +240,12 @@ fn mean_share(own: &[[f64; 2]], extents: &[f64]) -> f64 {
     total / f64::from(count.max(1))
 }
 
-/// Share of its scale that Newton's method may leave of a state that is zero: ten times its tolerance of 1e-3 of the error that is asked for, 1e-6
-/// unless a study says otherwise.
+/// Residual that Newton's method may leave in a zero state, relative to its scale: ten times its tolerance, which is
+/// 1e-3 of the requested error (1e-6 by default).
 const LEFT: f64 = 1e-8;
 
-/// Extents of the states of a cycle, the units of their deviations. A state that is zero all along, as on an invariant plane, has that of its
-/// errors.
+/// Extents of the states of a cycle, the units of their deviations. A state that is identically zero, as on an
+/// invariant plane, has the extent of its errors.
 fn extents(at: &Point, scales: &[f64]) -> Vec<f64> {
     let of = |c: usize| at.ranges.get(c).map_or(1.0, |[low, high]| (high - low).max(low.abs()).max(high.abs()));
     scales.iter().enumerate().map(|(c, scale)| of(c).max(LEFT * scale)).collect()
@@ -255,7 +258,7 @@ fn compare(reference: &Point, at: &Point, scales: &[f64], deviation: impl Fn(&[f
     let da = deviation(&a.level(SAMPLES), n);
     let other = if std::ptr::eq(a, b) { None } else { Some(deviation(&b.level(SAMPLES), n)) };
     let db = other.as_ref().unwrap_or(&da);
-    // Components of very different unit must not drown each other.
+    // Normalise each component, so that units do not matter.
     let mut sums = vec![[0.0; 2]; n];
     for (k, (x, y)) in da.iter().zip(db).enumerate() {
         let sum = &mut sums[k % n];

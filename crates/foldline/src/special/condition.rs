@@ -1,4 +1,4 @@
-//! Which condition holds which special point.
+//! Defining system for each kind of bifurcation point.
 
 use super::on_branch_points::OnBranchPoints;
 use super::on_cycles::OnCycles;
@@ -7,8 +7,8 @@ use crate::contract::Condition;
 use crate::diagram::{Kind, Solution};
 use crate::problem::{Setting, mesh};
 
-/// The condition that holds a special point of that kind along solutions like `at`, on the mesh of that; `None` for a kind
-/// that cannot be held there. The setting has two free parameters.
+/// Returns the defining system of a bifurcation point of the given kind for solutions like `at`, on its mesh; `None` if
+/// that kind cannot be continued there. The setting has two free parameters.
 pub fn condition<'a>(
     kind: Kind,
     setting: Setting<'a>,

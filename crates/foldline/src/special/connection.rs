@@ -1,12 +1,13 @@
 //! Orbits of infinite period that a branch of cycles approaches.
 //!
-//! **Idea.** A cycle close to a homoclinic or heteroclinic orbit spends most of its period near equilibria. The slowest points of the
-//! cycle are therefore compared with nearby equilibria: each must be a saddle, the cycle must pass close to it, and the passage time
-//! must be the one that the eigenvalues predict for that distance. A canard is slow as well, but not near a saddle. If there is no
-//! equilibrium at all, two may just have vanished in a saddle-node; the period then follows from its normal form.
+//! **Idea.** A cycle close to a homoclinic or heteroclinic orbit spends most of its period near equilibria. The slowest
+//! points of the cycle are therefore compared with nearby equilibria: each must be a saddle, the cycle must pass close
+//! to it, and the passage time must be the one that the eigenvalues predict for that distance. A canard is slow as
+//! well, but not near a saddle. If there is no equilibrium at all, two may just have vanished in a saddle-node; the
+//! period then follows from its normal form.
 //!
-//! **Equations.** With d the least distance from a saddle with leading eigenvalues λ_s < 0 < λ_u, R the radius of a ball around it, and
-//! null vectors v, w, ⟨w, v⟩ = 1, of f_x and its transpose at a saddle-node:
+//! **Equations.** With d the least distance from a saddle with leading eigenvalues λ_s < 0 < λ_u, R the radius of a
+//! ball around it, and null vectors v, w, ⟨w, v⟩ = 1, of f_x and its transpose at a saddle-node:
 //!
 //! ```text
 //!   (1)  time in the ball = (1/λ_u + 1/|λ_s|) ln(R/d)
@@ -23,25 +24,27 @@ use crate::problem::gauss::Scheme;
 use crate::stability::eigenvalues;
 use std::f64::consts::PI;
 
-/// Radius of the ball around an equilibrium in which the flow is nearly linear, in units of the extents of the cycle. Order of magnitude:
-/// quadratic terms are then a tenth of the linear ones.
+/// Radius of the ball around an equilibrium in which the flow is nearly linear, in units of the extents of the cycle.
+/// Order of magnitude: quadratic terms are then a tenth of the linear ones.
 const BALL: f64 = 0.1;
-/// Largest distance, in the same units, of closest approach to a saddle: e⁻² of the ball. The logarithm in (1) is then at least 2 and
-/// exceeds the neglected terms of order 1.
+/// Largest distance, in the same units, of closest approach to a saddle: e⁻² of the ball. The logarithm in (1) is then
+/// at least 2 and exceeds the neglected terms of order 1.
 const CLOSE: f64 = 0.135 * BALL;
-/// Largest ratio between the measured time and (1) or (3). Empirical: the ball is not small, and the constants beside the logarithm are
-/// neglected.
+/// Largest ratio between the measured time and (1) or (3). Empirical: the ball is not small, and the constants beside
+/// the logarithm are neglected.
 const FACTOR: f64 = 3.0;
-/// Smallest share of the period spent near equilibria. It tends to 1 at the limit; half is a factor of safety.
+/// Smallest share of the period spent near equilibria. It tends to 1 at the limit; one half is a factor of safety.
 const MOST: f64 = 0.5;
-/// Largest number of saddles on one heteroclinic cycle. A bound on the work: with more, each takes an eighth of the period or less.
+/// Largest number of saddles on one heteroclinic cycle. A bound on the work: with more, each takes an eighth of the
+/// period or less.
 const PLACES: usize = 8;
-/// Most Newton iterations. Convergence to 1e-10 from a tenth of the extent takes about six; the rest is a margin.
+/// Maximum number of Newton iterations. Convergence to 1e-10 from a tenth of the extent takes about six; the rest is a
+/// margin.
 const ITERATIONS: usize = 20;
 
 /// Search for equilibria next to a cycle, with distances in units of its extents.
 pub struct Limits<'a> {
-    /// The vector field, which is autonomous.
+    /// Vector field, which is autonomous.
     pub field: &'a dyn VectorField,
     /// Index of the continuation parameter.
     pub free: usize,
@@ -53,14 +56,14 @@ pub struct Limits<'a> {
     pub tolerance: f64,
 }
 
-/// A node of a cycle: its state, its share of the period (quadrature weight), and its speed.
+/// Node of a cycle: its state, its share of the period (quadrature weight), and its speed.
 struct Node {
     x: Vec<f64>,
     share: f64,
     speed: f64,
 }
 
-/// The copy of a state in which angles are between minus and plus half their period.
+/// Copy of a state with angles between minus and plus half their period.
 pub(crate) fn in_first_turn(periods: &[f64], x: &[f64]) -> Vec<f64> {
     let mut x = x.to_vec();
     for (x, period) in x.iter_mut().zip(periods).filter(|(_, period)| period.is_finite()) {
@@ -70,7 +73,7 @@ pub(crate) fn in_first_turn(periods: &[f64], x: &[f64]) -> Vec<f64> {
 }
 
 impl Limits<'_> {
-    /// The orbit of infinite period that a cycle of long period approaches, if any.
+    /// Orbit of infinite period that a cycle of long period approaches, if any.
     pub fn approached(&self, at: &Point) -> Option<Ending> {
         let Solution::Cycle(cycle) = &at.solution else { return None };
         let n = cycle.dim();
@@ -127,7 +130,7 @@ impl Limits<'_> {
         (spent > MOST).then(|| (kind, met.iter().map(|x| self.place(x)).collect::<Vec<_>>().join(", ")))
     }
 
-    /// The equilibrium to which Newton's method converges from a state.
+    /// Equilibrium to which Newton's method converges from a state.
     fn equilibrium(&self, beside: &[f64], parameters: &[f64]) -> Option<Vec<f64>> {
         let n = beside.len();
         let (mut x, mut pivots) = (beside.to_vec(), vec![0; n]);
@@ -144,7 +147,7 @@ impl Limits<'_> {
         None
     }
 
-    /// The time (1) of one passage at distance `least`; `None` if the equilibrium is not a saddle.
+    /// Time (1) of one passage at distance `least`; `None` if the equilibrium is not a saddle.
     fn passage(&self, saddle: &[f64], parameters: &[f64], least: f64) -> Option<f64> {
         let (_, fx) = self.linearised(saddle, parameters);
         let rates = eigenvalues(&fx, saddle.len(), self.scales).into_iter().map(|z| z.re);
@@ -155,7 +158,8 @@ impl Limits<'_> {
         saddle.then(|| (1.0 / unstable + 1.0 / stable) * (BALL / least).ln())
     }
 
-    /// The saddle-node (2) next to the slowest point, if its parameter value agrees within the tolerance and its period with (3).
+    /// Saddle-node (2) next to the slowest point, if its parameter value agrees within the tolerance and its period
+    /// with (3).
     fn saddle_node(
         &self,
         period: f64,
@@ -216,7 +220,7 @@ impl Limits<'_> {
         (time.is_finite() && fits(period, time)).then(|| (Connection::SaddleNode, there, self.place(&x)))
     }
 
-    /// The distance of two states, of angles between their nearest copies.
+    /// Distance of two states, with angles taken between their nearest copies.
     fn apart(&self, a: &[f64], b: &[f64], extents: &[f64]) -> f64 {
         let mut near = a.to_vec();
         for (c, period) in self.field.periods().iter().enumerate().filter(|(_, period)| period.is_finite()) {
@@ -225,17 +229,17 @@ impl Limits<'_> {
         distance(&near, b, extents)
     }
 
-    /// A state in words.
+    /// State as text.
     fn place(&self, x: &[f64]) -> String {
         let x = &in_first_turn(self.field.periods(), x);
-        // Of what is zero only rounding is left.
+        // Components that should be zero contain only rounding.
         let rounded = |(x, scale): (&f64, &f64)| if x.abs() < 1e-9 * scale { 0.0 } else { *x };
         let all = x.iter().zip(self.scales).map(|pair| format!("{:.6}", Shown(rounded(pair))));
         format!("({})", all.collect::<Vec<_>>().join(", "))
     }
 
-    /// The null vector of f_x, or of its transpose (`left`), by inverse iteration; of unit length in scaled states, the left one in the
-    /// reciprocal scaling.
+    /// Null vector of f_x, or of its transpose (`left`), by inverse iteration; of unit length in scaled states, the
+    /// left one in the reciprocal scaling.
     fn null_vector(&self, x: &[f64], parameters: &[f64], left: bool) -> Option<Vec<f64>> {
         let n = x.len();
         let (_, mut fx) = self.linearised(x, parameters);
@@ -316,7 +320,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_time_fits_within_its_factor_only() {
+    fn passage_times_must_agree_within_the_factor() {
         assert!(fits(1.0, 2.9) && fits(2.9, 1.0) && !fits(1.0, 3.1) && !fits(3.1, 1.0) && !fits(1.0, f64::NAN));
     }
 }

@@ -1,8 +1,9 @@
-//! Coefficients of normal forms of cycles with their errors.
+//! Normal-form coefficients of cycles with their errors.
 //!
-//! **Idea.** A coefficient is computed twice: at the point as it was located, on a mesh that resolves the second derivatives of f; and on
-//! a mesh with half as many intervals again, after solving for cycle and special point together. The two differ by the errors of the
-//! location, of the profile and of the integrals. The second value is returned, with an error derived from the difference.
+//! **Idea.** A coefficient is computed twice: at the point as it was located, on a mesh that resolves the second
+//! derivatives of f; and on a mesh with half as many intervals again, after solving for cycle and special point
+//! together. The two differ by the errors of the location, of the profile and of the integrals. The second value is
+//! returned, with an error derived from the difference.
 //!
 //! **Equations.** With x_j and x_{j+1} the states at the ends of interval j, d = x_{j+1} - x_j, and w a direction:
 //!
@@ -12,11 +13,12 @@
 //!   (2)  F(u) = 0, g(u, σ) = 0:   F_u δ = F, F_u τ = 0;   g_u τ α + g_σ Δσ = g_u δ - g,   Δu = α τ - δ
 //! ```
 //!
-//! (1) vanishes up to the error of the quadrature. If f_x changes within less than an interval, as at contact with little smoothing, all
-//! Gauss points may miss the change on both meshes; (1) detects it, and the interval is bisected until (1) is small.
+//! (1) vanishes up to the error of the quadrature. If f_x changes within less than an interval, as at contact with
+//! little smoothing, all Gauss points may miss the change on both meshes; (1) detects it, and the interval is bisected
+//! until (1) is small.
 //!
-//! If the error of a coefficient is of order q in the length of the intervals, that of the second value is 1 / (1.5^q - 1) times the
-//! difference: twice the difference for q = 1, the lowest order expected; smooth fields have q = 8.
+//! If the error of a coefficient is of order q in the length of the intervals, that of the second value is the
+//! difference divided by 1.5^q - 1: twice the difference for q = 1, the lowest order expected; smooth fields have q = 8.
 //!
 //! **Source.** govaerts2000, §3 (bordered systems); the test (1) is ours.
 
@@ -31,14 +33,14 @@ use crate::problem::gauss::Scheme;
 use crate::problem::{Setting, mesh};
 use num_complex::Complex64;
 
-/// Error of the second value over the difference of both: 1 / (1.5 - 1) for q = 1.
+/// Error of the second value divided by the difference of the two: 1 / (1.5 - 1) for q = 1.
 const SAFE: f64 = 2.0;
 
-/// Error of a coefficient that is zero within it, as a share of its terms, above which the coefficient is undetermined rather than
-/// degenerate. Empirical: terms that cancel to less than a hundredth are taken for a true zero.
+/// Error of a coefficient that is zero within it, as a share of its terms, above which the coefficient is undetermined
+/// rather than degenerate. Empirical: terms that cancel to less than a hundredth are taken for a true zero.
 const UNKNOWN: f64 = 1e-2;
 
-/// The coefficients of a cycle at a special point of that kind. The setting has one free parameter.
+/// Returns the coefficients of a cycle at a bifurcation point of the given kind. The setting has one free parameter.
 pub fn coefficients(kind: Kind, setting: &Setting, at: &Point) -> Coefficients {
     if !matches!(kind, Kind::Fold | Kind::PeriodDoubling | Kind::Torus) {
         return Coefficients::default();
@@ -70,7 +72,7 @@ fn found(kind: Kind, setting: &Setting, at: &Point) -> Result<Coefficients, Stri
     Ok(compared(one, two, noise))
 }
 
-/// The second of two values, with its error; `noise` is the relative rounding error of the terms.
+/// Second of two values, with its error; `noise` is the relative rounding error of the terms.
 fn compared(one: Value, two: Value, noise: f64) -> Coefficients {
     let error = SAFE * (two.value - one.value).abs() + noise * two.terms;
     let unknown = two.value.abs() <= error && error > UNKNOWN * two.terms;
@@ -78,17 +80,17 @@ fn compared(one: Value, two: Value, noise: f64) -> Coefficients {
     Coefficients { values: vec![two.value], errors: vec![error], remark: remark.into() }
 }
 
-/// A part of the period, with the states at its ends.
+/// Part of the period, with the states at its ends.
 struct Part {
     ends: [f64; 2],
     states: [Vec<f64>; 2],
 }
 
-/// A refinement of the mesh of the cycle on which (1) is small everywhere; `None` if that needs more than the permitted number of
-/// intervals.
+/// Refinement of the mesh of the cycle on which (1) is small everywhere; `None` if that needs more than the permitted
+/// number of intervals.
 fn resolved(setting: &Setting, at: &Point, cycle: &Cycle) -> Option<Mesh> {
-    /// Largest (1), as a share of the change of f_x over the period. One further bisection reduces it to almost nothing, by the order of the
-    /// quadrature.
+    /// Largest (1), as a share of the change of f_x over the period. One further bisection reduces it to almost
+    /// nothing, by the order of the quadrature.
     const SHARE: f64 = 1e-6;
     /// Shortest interval, in periods: four digits above the rounding of a mesh boundary.
     const SHORTEST: f64 = 1e-12;
@@ -146,7 +148,7 @@ fn missed(setting: &Setting, at: &Point, cycle: &Cycle, scheme: &Scheme, parts: 
     };
     let difference = spread(&|part, c| part.states[1][c] - part.states[0][c], n + known);
     let mut out = Missed { missed: vec![0.0; lanes], changes: vec![0.0; lanes], largest: 0.0 };
-    // Two directions in which no component is missing.
+    // Two directions in which no component is zero.
     for way in [1.0, -1.0] {
         let w = spread(&|_, c| setting.scales[c] * if c % 2 == 0 { 1.0 } else { way }, n + known);
         let derivative = |share: f64, along: &[&[f64]]| {
@@ -173,16 +175,18 @@ fn missed(setting: &Setting, at: &Point, cycle: &Cycle, scheme: &Scheme, parts: 
     out
 }
 
-/// The special point on another mesh by (2), starting from `first`, which is `at` on its refined mesh.
+/// Special point on another mesh by (2), starting from `first`, which is `at` on its refined mesh.
 fn solved(kind: Kind, setting: &Setting, first: &Point, at: &Point, mesh: &Mesh) -> Option<Point> {
-    /// Most iterations. Convergence is quadratic from an error of the tolerance, so three suffice; the rest is a margin.
+    /// Maximum number of iterations. Convergence is quadratic from an error of the tolerance, so three suffice; the
+    /// rest is a margin.
     const ROUNDS: usize = 6;
-    /// Largest relative update. A factor of safety: the starting point is accurate to the tolerance, and a larger update leads to
-    /// another point.
+    /// Largest relative update. A factor of safety: the starting point is accurate to the tolerance, and a larger
+    /// update leads to another point.
     const FAR: f64 = 1e-2;
     /// Relative error after which iteration ends: the smallest tolerance of Newton's method.
     const DONE: f64 = 1e-11;
-    /// Error after a Newton step over the square of the error before. A factor of safety: in scaled unknowns the ratio is of order 1.
+    /// Error after a Newton step over the square of the error before. A factor of safety: in scaled unknowns the ratio
+    /// is of order 1.
     const CURVED: f64 = 10.0;
     let start = on_mesh(first, mesh)?;
     let (Solution::Cycle(cycle), Solution::Cycle(own)) = (&start.solution, &at.solution) else { return None };
@@ -256,7 +260,7 @@ fn bordered_update(condition: &mut OnCycles, delta: &[f64], tau: &[f64], g: &[f6
     Some(right)
 }
 
-/// The point with the unknowns `u`, whose spectrum contains the critical multipliers.
+/// Point with the unknowns `u`, whose spectrum contains the critical multipliers.
 fn as_point(
     problem: &CycleProblem,
     u: &[f64],
@@ -267,7 +271,7 @@ fn as_point(
 ) -> Point {
     let mut point = problem.point(u, tangent, Examination::default());
     point.spectrum.clone_from(&at.spectrum);
-    // The angle of a pair on the unit circle has changed.
+    // Update the angle of the critical pair on the unit circle.
     let angle = extra.first().copied().unwrap_or(0.0);
     let pairs = point.spectrum.iter_mut().filter(|z| z.im != 0.0);
     let nearest: Vec<&mut Complex64> = pairs.filter(|z| condition.distance(**z) < 1e-2).collect();
@@ -284,7 +288,7 @@ mod tests {
     use crate::problem::Axis;
     use std::f64::consts::TAU;
 
-    /// The mesh on which f is resolved along the unit circle, from one of 24 intervals.
+    /// Mesh that resolves f along the unit circle, starting from 24 intervals.
     fn along_the_circle(bend: &str) -> Option<Mesh> {
         let equations = [("x", format!("-y + {bend}")), ("y", "x".to_string())];
         let model = Model::compile(ModelSource {
@@ -320,7 +324,7 @@ mod tests {
     }
 
     #[test]
-    fn intervals_are_cut_where_second_derivatives_are_sharper_than_them() {
+    fn intervals_that_do_not_resolve_second_derivatives_are_bisected() {
         let smooth = along_the_circle("x*y^2").unwrap();
         assert_eq!(smooth, mesh::uniform(24), "a cubic is integrated exactly");
         // |x - 0.3| smoothed over 1e-7, which passes between the Gauss points.
@@ -331,12 +335,12 @@ mod tests {
             assert!(sharp[j] - sharp[j - 1] < 1e-6, "{:e}", sharp[j] - sharp[j - 1]);
         }
         assert!(sharp.windows(2).filter(|pair| pair[1] - pair[0] > 0.04).count() >= 20, "elsewhere they stay");
-        // With a kink there is no end to it.
+        // At a kink bisection never ends.
         assert!(along_the_circle("abs(x - 0.3)").is_none());
     }
 
     #[test]
-    fn an_error_comes_from_two_meshes_and_says_where_nothing_is_known() {
+    fn errors_follow_from_two_meshes_and_undetermined_coefficients_are_reported() {
         let value = |value: f64| Value { value, terms: 5.0, divisor: 1.0 };
         let good = compared(value(-0.5), value(-0.4996), 0.0);
         assert!(good.values == [-0.4996] && (good.errors[0] - 8e-4).abs() < 1e-12 && good.remark.is_empty());

@@ -1,7 +1,8 @@
 //! Normal forms of cycles at folds, period doublings and torus points.
 //!
-//! **Equations.** In the time of the model, T the period, A = f_x, B and C the second and third derivatives of f along the cycle, τ the place
-//! on it, φ the functional that vanishes where the variational equation with the closure of v and a right-hand side has a solution:
+//! **Equations.** In model time, with T the period, A = f_x, B and C the second and third derivatives of f along the
+//! cycle, and φ the solvability functional: the variational equation with the boundary condition of v and a right-hand
+//! side is solvable if φ of that side is 0:
 //!
 //! ```text
 //!   fold             (1)  v' - A v = f:                       ξ' = … + a ξ²,     a = φ(½ B(v,v) + A v) / φ(v)
@@ -11,13 +12,15 @@
 //!                         h₁₁' - A h₁₁ = B(v,v̄) - α f,  h₂₀' - A h₂₀ + 2iθ/T h₂₀ = B(v,v)         both periodic
 //! ```
 //!
-//! with ∫ |v|² dt = 1 over a period in (2) and (3). Negative c and Re d mean that the doubled cycle, or the torus, is born stable. A forced
-//! cycle has no freedom in time: α = 0, and (1) is v' - A v = 0, ∫ |v|² dt = 1, a = ½ φ(B(v,v)) / φ(v), v pointing towards larger motion.
+//! with ∫ |v|² dt = 1 over a period in (2) and (3). Negative c and Re d mean that the bifurcating doubled cycle or
+//! torus is stable. A forced cycle has no phase freedom: α = 0, and (1) becomes v' - A v = 0, ∫ |v|² dt = 1, a = ½
+//! φ(B(v,v)) / φ(v), with v oriented towards larger motion.
 //!
-//! **Source.** kuznetsov2005; in the form of bordered equations, govaerts2000, §7.
+//! **Source.** kuznetsov2005; formulated as bordered equations, govaerts2000, §7.
 //!
-//! **Fails when** the period of free cycles does not change at their fold: (1) has no solution, and the fold has no coefficient. It also
-//! fails if a cycle passes a switch of a piecewise field, where the second derivative contains impulses that B and C lack.
+//! **Fails when** the period of free cycles does not change at their fold: (1) has no solution, and the fold has no
+//! coefficient. It also fails if a cycle passes a switch of a piecewise field, where the second derivative contains
+//! impulses that B and C lack.
 
 use super::normal_form::without_rounding;
 use super::on_cycles::OnCycles;
@@ -30,19 +33,21 @@ use crate::problem::{Setting, mesh};
 /// Share of the null vector of a fold below which a change of the period is the error of collocation.
 pub(super) const NOTHING: f64 = 1e-8;
 
-/// A coefficient computed on the mesh of the point.
+/// Coefficient computed on the mesh of the point.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Value {
-    /// The coefficient.
+    /// Coefficient.
     pub(super) value: f64,
     /// Sum of the moduli of its terms.
     pub(super) terms: f64,
-    /// For a fold of free cycles, the component of the null vector along the period, by which v of (1) is divided; otherwise 1.
+    /// For a fold of free cycles, the component of the null vector along the period, by which v of (1) is divided;
+    /// otherwise 1.
     pub(super) divisor: f64,
 }
 
-/// The coefficient of a cycle at a special point of that kind, without an error, for uses that need its sign only. `None` for kinds without
-/// a coefficient, and if it is not defined or cannot be computed. The setting may have any free parameters.
+/// Returns the coefficient of a cycle at a bifurcation point of the given kind, without an error, for uses that need
+/// its sign only. `None` for kinds without a coefficient, and if it is undefined or cannot be computed. The setting may
+/// have any free parameters.
 pub fn coefficient(kind: Kind, setting: Setting, at: &Point) -> Option<f64> {
     let Solution::Cycle(cycle) = &at.solution else { return None };
     if cycle.intervals() == 0 || switches_passed(&setting, at) > 0 {
@@ -64,7 +69,7 @@ pub(super) fn valued(kind: Kind, setting: Setting, at: &Point) -> Option<Value> 
     let (mut v, scalar) = condition.null();
     let free_fold = kind == Kind::Fold && cycle.forcing_periods == 0;
     let length = (cycle.period * condition.square(&v)).sqrt();
-    // v_s - T A v = T₁ f, of which T f is wanted.
+    // v_s - T A v = T₁ f, whereas T f is required.
     let size = match kind {
         Kind::Fold if free_fold => scalar / own,
         Kind::Fold if condition.growth(&v) < 0.0 => -length,
@@ -88,7 +93,8 @@ pub(super) fn on_mesh(at: &Point, mesh: &Mesh) -> Option<Point> {
     Some(Point { solution, ..at.clone() })
 }
 
-/// Number of times that a cycle passes a switch of the field. There the second derivative is an impulse, which no mesh resolves.
+/// Number of times that a cycle passes a switch of the field. There the second derivative is an impulse, which no mesh
+/// resolves.
 pub(crate) fn switches_passed(setting: &Setting, at: &Point) -> usize {
     let (field, Solution::Cycle(cycle)) = (setting.field, &at.solution) else { return 0 };
     let (n, count) = (cycle.dim(), field.switch_count());
@@ -108,7 +114,7 @@ pub(crate) fn switches_passed(setting: &Setting, at: &Point) -> usize {
     values.chunks_exact(lanes).map(changes).sum()
 }
 
-/// The condition of that kind with its null vector, the unknowns, and the extra ones.
+/// Defining system of the given kind with its null vector, the unknowns, and the extra unknowns.
 fn evaluated<'a>(kind: Kind, setting: Setting<'a>, at: &Point) -> Option<(OnCycles<'a>, Vec<f64>, Vec<f64>)> {
     let Solution::Cycle(cycle) = &at.solution else { return None };
     if cycle.intervals() == 0 || !matches!(kind, Kind::Fold | Kind::PeriodDoubling | Kind::Torus) {
@@ -121,7 +127,7 @@ fn evaluated<'a>(kind: Kind, setting: Setting<'a>, at: &Point) -> Option<(OnCycl
     let mut condition = OnCycles::new(kind, setting, cycle)?;
     let extra = condition.guess(at);
     let mut g = vec![0.0; 1 + extra.len()];
-    // Where the operator is singular any borders give its null vectors, and those make better ones.
+    // If the operator is singular, any borders give its null vectors, which are better borders for a second evaluation.
     if !Condition::evaluate(&mut condition, &u, &extra, &mut g) {
         return None;
     }
@@ -133,7 +139,7 @@ fn evaluated<'a>(kind: Kind, setting: Setting<'a>, at: &Point) -> Option<(OnCycl
     Condition::evaluate(&mut condition, &u, &extra, &mut g).then_some((condition, u, extra))
 }
 
-/// A cycle with what is known about its critical eigenfunction. All right-hand sides are those in normalised time.
+/// Cycle with its critical eigenfunction. All right-hand sides are in normalised time.
 struct Form<'a, 'b> {
     setting: Setting<'a>,
     cycle: &'b Cycle,
@@ -144,7 +150,7 @@ struct Form<'a, 'b> {
 }
 
 impl Form<'_, '_> {
-    /// The periodic solution of y' - A y + α f = r, and α.
+    /// Returns the periodic solution of y' - A y + α f = r, and α.
     fn periodic(&self, r: &[f64], spare: Option<System>) -> Option<(Vec<f64>, f64)> {
         let mut operator = OnCycles::operator(self.setting.clone(), self.cycle, false, spare)?;
         operator.prepare(self.u, 0.0)?;
@@ -232,7 +238,7 @@ mod tests {
         .unwrap_or_else(|errors| panic!("{}", errors[0]))
     }
 
-    /// The coefficient on the cycle `state`, a function of normalised time, of a given period.
+    /// Coefficient on the cycle `state`, a function of normalised time, with the given period.
     fn of(model: &Model, kind: Kind, period: f64, spectrum: &[Complex64], state: impl Fn(f64) -> Vec<f64>) -> f64 {
         found(model, kind, period, spectrum, state).unwrap()
     }
@@ -284,8 +290,9 @@ mod tests {
         [&[cos, sin], rest].concat()
     }
 
-    /// ρ' = ρ (p - 1 + 2 ρ² - ρ⁴), φ' = 1 + k (ρ² - 1): a fold of cycles at ρ = 1, where ρ - 1 changes by -4 (ρ - 1)² and the period by
-    /// -2 k (ρ - 1). With a period that changes by +1 per unit, a is 2 / k. Without a change there is none.
+    /// ρ' = ρ (p - 1 + 2 ρ² - ρ⁴), φ' = 1 + k (ρ² - 1): a fold of cycles at ρ = 1, where (ρ - 1)' = -4 (ρ - 1)² and the
+    /// period changes by -2 k (ρ - 1). In a coordinate in which the period changes at unit rate, a is 2 / k. If the
+    /// period does not change there is no coefficient.
     #[test]
     fn a_fold_of_cycles() {
         for k in [0.5, -1.25] {
@@ -303,7 +310,8 @@ mod tests {
         assert_eq!(found(&model, Kind::Fold, TAU, &[], |t| circle(t, &[])), None);
     }
 
-    /// r' = p + c (r - 1)² with the angle held by the forcing: along v the radius grows, whatever the sign of c. r - 1 = ξ/√T.
+    /// r' = p + c (r - 1)² with the angle fixed by the forcing: along v the radius grows, whatever the sign of c. r - 1
+    /// = ξ/√T.
     #[test]
     fn a_fold_of_a_forced_cycle() {
         for c in [0.7, -0.4] {
@@ -320,10 +328,11 @@ mod tests {
         }
     }
 
-    /// In a frame that turns by half a revolution per period of the forcing, a' = p a + c a³ + g a h and b' = -b; h' = -k h + a² follows.
+    /// In a frame that turns by half a revolution per forcing period, a' = p a + c a³ + g a h and b' = -b; h' = -k h +
+    /// a² is slaved.
     #[test]
     fn a_period_doubling_of_a_forced_cycle() {
-        // With w = p + i q: a² and e^{it/2} a are functions of w with the period of the forcing.
+        // With w = p + i q: a² and e^{it/2} a are functions of w with the forcing period.
         let (c, g, k, period) = (-0.7, 0.4, 1.3, 3.0);
         let definitions = [
             ("cos1", "cos(2*pi*t/3)".to_string()),
@@ -347,7 +356,8 @@ mod tests {
         near(of(&model, Kind::PeriodDoubling, period, &[], |_| vec![0.0; 3]), (c + g / k) / period);
     }
 
-    /// The same around an oscillator of its own, whose radius and speed the doubled motion changes: with u + iv its position, the angle is that.
+    /// Period doubling around an autonomous oscillator, whose radius and speed the doubled motion changes; u + iv is
+    /// its position, which gives the angle.
     #[test]
     fn a_period_doubling_of_a_free_cycle() {
         let (c, g, k, m) = (-0.3, 0.5, 0.8, 0.9);
@@ -377,8 +387,8 @@ mod tests {
         near(of(&model, Kind::PeriodDoubling, TAU, &[], |t| circle(t, &[0.0, 0.0])), (c + g / k) / TAU);
     }
 
-    /// A Hopf point in a plane beside an oscillator whose radius and speed it changes: z' = (p + iω) z + c z |z|² + g z (ρ² - 1),
-    /// ρ' = ρ (k (1 - ρ²) + |z|²).
+    /// Hopf point in a plane coupled to an oscillator whose radius and speed it changes: z' = (p + iω) z + c z |z|² + g
+    /// z (ρ² - 1), ρ' = ρ (k (1 - ρ²) + |z|²).
     #[test]
     fn a_torus_point() {
         let (c, g, k, m, omega) = (0.2, 0.6, 0.75, 0.4, 0.31);

@@ -1,10 +1,10 @@
-//! Folds (limit points, saddle-nodes): the branch turns back in its parameter. Curves in two parameters turn back in one of them, or
-//! at a cusp in both.
+//! Folds (limit points, saddle-nodes): the branch turns back in its parameter. Curves in two parameters turn back in
+//! one of them, or in both at a cusp.
 
 use crate::contract::{Monitor, Sight};
 use crate::diagram::{Kind, Point, Solution};
 
-/// The parameter component of the tangent.
+/// Parameter component of the tangent.
 pub struct Fold;
 
 impl Monitor for Fold {
@@ -37,7 +37,7 @@ impl Monitor for Fold {
     }
 }
 
-/// A multiplier that passes 1 (an eigenvalue that passes 0): the fold of a branch whose parameter slope is lost in rounding, as in a
+/// Multiplier passing 1 (eigenvalue passing 0): the fold of a branch whose parameter slope is lost in rounding, as in a
 /// canard explosion.
 struct Passage;
 
@@ -51,7 +51,7 @@ impl Monitor for Passage {
     }
 
     fn confirms(&self, at: &Point) -> bool {
-        /// Largest distance of the critical multiplier from 1 (eigenvalue from 0). Empirical, and the same as at branch points.
+        /// Largest distance of the critical multiplier from 1 (eigenvalue from 0). Empirical, as at branch points.
         const NEAR: f64 = 1e-2;
         at.free_spectrum().iter().any(|z| (z - critical(at)).norm() < NEAR)
     }
@@ -70,16 +70,17 @@ fn critical(at: &Point) -> f64 {
     if matches!(at.solution, Solution::Cycle(_)) { 1.0 } else { 0.0 }
 }
 
-/// The same where something is held along a curve in two parameters, and one of them is to turn alone.
+/// Turning point of a bifurcation curve in two parameters with respect to one of them only.
 pub struct Turn {
     /// Index of the parameter that turns.
     pub free: usize,
 }
 
 impl Turn {
-    /// True if the parameter is the same at all three points as far as can be told. Where the equations of the curve are degenerate, as at
-    /// transcritical points, which are no folds but solve the equations of folds, the square of its error is rounding: the root of that
-    /// relative to its size, times a factor of safety.
+    /// True if the parameter is equal at all three points within its error. The equations of the curve may be
+    /// degenerate: transcritical points are not folds but solve the equations of folds. The square of the error is then
+    /// of the order of rounding, so the error is the square root of the relative machine precision, times a factor of
+    /// safety.
     fn stands(&self, ends: [&Point; 2], at: &Point) -> bool {
         const SAFE: f64 = 10.0;
         let value = |point: &Point| point.parameters.get(self.free).copied().unwrap_or(f64::NAN);
@@ -114,8 +115,8 @@ impl Monitor for Turn {
     }
 }
 
-/// Whether neither of the last two components of the tangent, those along the parameters of a curve in two of them, is left of what
-/// both are at `ends`: the curve has a cusp in the plane of the parameters.
+/// True if both parameter components of the tangent nearly vanish compared with their values at `ends`: the curve has a
+/// cusp in the parameter plane.
 pub(super) fn parameters_rest(ends: [&Point; 2], at: &Point) -> bool {
     const LEFT: f64 = 0.02;
     [1, 2].into_iter().all(|back| {
@@ -124,7 +125,7 @@ pub(super) fn parameters_rest(ends: [&Point; 2], at: &Point) -> bool {
     })
 }
 
-/// The component along the first parameter of a curve in two.
+/// Tangent component along the first of the two parameters of a curve.
 pub(super) fn first_slope(at: &Point) -> f64 {
     at_end(&at.tangent, 2)
 }

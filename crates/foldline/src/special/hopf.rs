@@ -1,4 +1,4 @@
-//! Hopf points: a pair of eigenvalues crosses the imaginary axis and a cycle is born.
+//! Hopf points: a pair of eigenvalues crosses the imaginary axis and a branch of cycles begins.
 //!
 //! **Equations.**
 //!
@@ -58,12 +58,12 @@ fn pairs(z: &[Complex64]) -> impl Iterator<Item = (Complex64, Complex64)> + '_ {
     (0..z.len()).flat_map(move |i| (i + 1..z.len()).map(move |j| (z[i], z[j])))
 }
 
-/// The sum of two eigenvalues over the sum of their moduli.
+/// Sum of two eigenvalues divided by the sum of their moduli.
 fn balance((a, b): (Complex64, Complex64)) -> Complex64 {
     (a + b) / (f64::MIN_POSITIVE + a.norm() + b.norm())
 }
 
-/// ω of the pairs on the imaginary axis, the closest one first.
+/// Frequencies ω of the pairs on the imaginary axis, closest pair first.
 pub fn frequencies(at: &Point) -> Vec<f64> {
     let off = |z: &Complex64| (z.re / z.im).abs();
     let mut there: Vec<Complex64> = at.spectrum.iter().copied().filter(|z| z.im > 0.0 && off(z) < 1e-4).collect();
@@ -71,21 +71,23 @@ pub fn frequencies(at: &Point) -> Vec<f64> {
     there.iter().map(|z| z.im).collect()
 }
 
-/// Relative Newton update after which an equilibrium is converged: its square, the error left by quadratic convergence, is rounding.
+/// Relative Newton update after which an equilibrium is converged: its square, the error left by quadratic convergence,
+/// is rounding.
 const CONVERGED: f64 = 1e-8;
 
-/// First step of the search for a Hopf point, as a share of its reach. With [`REACH`] it is 1e-8, the square root of the machine precision,
-/// below which the difference of two growth rates is noise.
+/// First step of the search for a Hopf point, relative to its reach. With [`REACH`] it is 1e-8, the square root of the
+/// machine precision, below which the difference of two growth rates is noise.
 const NEXT: f64 = 1e-6;
-/// Most halvings of one step of the search. Empirical: a step is halved where the equilibrium does not exist, beyond a fold; 2⁻⁸ of it lies
-/// well before the fold.
+/// Maximum number of halvings of one step of the search. Empirical: a step is halved if there is no equilibrium, beyond
+/// a fold; 2⁻⁸ of it ends well before the fold.
 const SHORTER: i32 = 8;
 
 /// Largest distance of a Hopf point from a small cycle, relative to the scale of the parameter + |parameter|.
 const REACH: f64 = 1e-2;
 
-/// Parameter value of the Hopf point of the equilibrium next to `state`: the value of parameter `free` at which the growth rate of the pair
-/// with a frequency close to `omega` vanishes. `None` if there is none near these parameter values.
+/// Parameter value of the Hopf point of the equilibrium next to `state`: the value of parameter `free` at which the
+/// growth rate of the pair with frequency close to `omega` vanishes. `None` if there is none near these parameter
+/// values.
 pub fn lies_near(
     field: &dyn VectorField,
     parameters: &[f64],
@@ -105,7 +107,7 @@ pub fn lies_near(
         x = beside;
         Some(rate)
     };
-    // Secant steps along the parameter: the rate is smooth, and all that counts is whether its zero is close.
+    // Secant steps in the parameter: the rate is smooth, and it only matters whether its zero is close.
     let reach = REACH * (unit + value.abs());
     let (mut a, mut b) = (value, value + NEXT * reach);
     let (mut at_a, mut at_b) = (growth(a)?, growth(b)?);
@@ -125,7 +127,7 @@ pub fn lies_near(
     ((b - value).abs() < reach && (b - a).abs() < 1e-3 * reach).then_some(b)
 }
 
-/// Real part of the eigenvalue of frequency closest to `omega` at the equilibrium next to `x`, which is moved there.
+/// Real part of the eigenvalue with frequency closest to `omega` at the equilibrium next to `x`; moves `x` there.
 fn growth_rate(field: &dyn VectorField, parameters: &[f64], scales: &[f64], x: &mut [f64], omega: f64) -> Option<f64> {
     let n = x.len();
     let (mut f, mut fx, mut pivots) = (vec![0.0; n], vec![0.0; n * n], vec![0; n]);
@@ -151,8 +153,8 @@ fn growth_rate(field: &dyn VectorField, parameters: &[f64], scales: &[f64], x: &
     None
 }
 
-/// Direction of the cycles born at a Hopf point with the frequency ω: the profile `[N(m+1)n]` of Re(q e^{2πit}) with max |q_i|/s_i = 1, and
-/// the period 2π/ω. `None` if there is no such.
+/// Direction of the cycles that bifurcate at a Hopf point with frequency ω: the profile `[N(m+1)n]` of Re(q e^{2πit})
+/// with max |q_i|/s_i = 1, and the period 2π/ω. `None` if there is no such eigenvector.
 pub fn direction(
     field: &dyn VectorField,
     at: &Point,

@@ -1,28 +1,28 @@
-//! Marks: places of a branch at which a quantity has a given value.
+//! Marks: points of a branch at which a quantity has a given value.
 
 use super::quantity::Quantity;
 use crate::contract::{Monitor, Sight};
 use crate::diagram::{Ending, Kind, Point};
 
-/// A value of a quantity that is marked where a branch passes it.
+/// Value of a quantity that is marked where a branch passes it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mark {
-    /// The quantity.
+    /// Quantity.
     pub quantity: Quantity,
-    /// Its value.
+    /// Value.
     pub value: f64,
-    /// Whether the branch ends there.
+    /// True if the branch ends there.
     pub stop: bool,
 }
 
 impl Mark {
-    /// The monitor of this mark; `size` is the characteristic size of its quantity.
+    /// Monitor of this mark; `size` is the characteristic size of its quantity.
     pub fn of_size(self, size: f64) -> Sought {
         Sought { mark: self, size }
     }
 }
 
-/// A mark that is looked for.
+/// Monitor of a mark.
 pub struct Sought {
     mark: Mark,
     size: f64,

@@ -1,4 +1,4 @@
-//! What happened there: one file per bifurcation, with its test function and how to leave it on the other branch.
+//! Bifurcations, one file each: the test function, and the direction of the bifurcating branch.
 //!
 //! | kind | on | test function vanishes when | file |
 //! |---|---|---|---|
@@ -8,8 +8,8 @@
 //! | period doubling | cycles | a multiplier is -1 | [`period_doubling`] |
 //! | torus | cycles | the product of two multipliers is 1 | [`torus`] |
 //!
-//! Test functions are products over the whole spectrum, so it does not matter which eigenvalue was close before: a
-//! complex pair that meets on the negative real axis and sends one multiplier through -1 is seen like any other.
+//! Test functions are products over the whole spectrum, so no eigenvalue needs to be tracked: a complex pair that meets
+//! on the negative real axis and sends one multiplier through -1 is detected like any other.
 //!
 //! **Source.** kuznetsov2004, §10.
 
@@ -38,7 +38,7 @@ use crate::contract::{Monitor, VectorField};
 use crate::diagram::{Family, Kind, Point, Solution};
 use num_complex::Complex64;
 
-/// Monitors for branches of a family. `symmetric` is true if the model has a continuous symmetry.
+/// Monitors for branches of a solution family. `symmetric` is true if the model has a continuous symmetry.
 pub fn monitors(family: Family, symmetric: bool) -> Vec<Box<dyn Monitor>> {
     let both: [Box<dyn Monitor>; 2] = [Box::new(fold::Fold), Box::new(branch_point::BranchPoint { symmetric })];
     match family {
@@ -50,8 +50,8 @@ pub fn monitors(family: Family, symmetric: bool) -> Vec<Box<dyn Monitor>> {
     }
 }
 
-/// What to look for where a special point of that kind is held along the curve: what takes two parameters to meet, and where the curve
-/// turns back in the second of them, which has the index `free`.
+/// Monitors along a curve of bifurcation points of kind `held`: codimension-two points, and turning points in the
+/// second parameter of the curve, which has the index `free`.
 pub fn monitors_where_held<'a>(
     field: &'a dyn VectorField,
     scales: &'a [f64],
@@ -64,13 +64,13 @@ pub fn monitors_where_held<'a>(
     all
 }
 
-/// Product over all of (z - at) / (1 + |z|): real for a spectrum closed under conjugation and a real `at`.
+/// Product of (z - at) / (1 + |z|) over the spectrum: real for a spectrum closed under conjugation and a real `at`.
 fn distance_product(spectrum: &[Complex64], at: f64) -> f64 {
     product(|| spectrum.iter().map(|z| (z - at) / (1.0 + z.norm())))
 }
 
-/// Product of factors among which complex ones occur in conjugate pairs. Its sign is correct even if the many factors of a large system
-/// underflow.
+/// Product of factors of which complex ones occur in conjugate pairs. Its sign is correct even if the product of many
+/// factors underflows in a large system.
 fn product<I: Iterator<Item = Complex64>>(factors: impl Fn() -> I) -> f64 {
     let product = factors().product::<Complex64>().re;
     if product.abs() >= f64::MIN_POSITIVE || product.is_nan() {
@@ -80,8 +80,8 @@ fn product<I: Iterator<Item = Complex64>>(factors: impl Fn() -> I) -> f64 {
     if real().any(|factor| factor == 0.0) { 0.0 } else { f64::MIN_POSITIVE * real().map(f64::signum).product::<f64>() }
 }
 
-/// How many of the free eigenvalues or multipliers are unstable, those `passing` ones left out that are closest by `distance` to where
-/// the event has them; `None` where another is within its error, or a little more, of neutral.
+/// Number of unstable free eigenvalues or multipliers, without the `passing` ones closest by `distance` to their
+/// critical values; `None` if another one is neutral within its error and a small margin.
 fn others_unstable(at: &Point, passing: usize, distance: impl Fn(Complex64) -> f64) -> Option<usize> {
     const CLEAR: f64 = 1e-3;
     let is_cycle = matches!(at.solution, Solution::Cycle(_));

@@ -1,7 +1,7 @@
-//! A branch point of equilibria is held.
+//! Defining system of branch points of equilibria in two parameters.
 //!
-//! **Idea.** Where branches over λ cross, the matrix of f_x and f_λ has two null vectors and a left one. It is bordered by approximate ones, which
-//! makes it regular, and what the borders have to add is held at zero.
+//! **Idea.** Where branches over λ cross, the matrix of f_x and f_λ has two right null vectors and a left one. Bordered
+//! by approximations of these it is regular, and its border components vanish exactly at a branch point.
 //!
 //! **Equations.** With B = [f_x f_λ] `[n × (n + 1)]`, a column d, and two rows C:
 //!
@@ -13,14 +13,15 @@
 //!                                     [ C  0 ] [  ·  ]     [ e_k ]
 //! ```
 //!
-//! λ is a direction in the plane of the two parameters: across the curve, at first that of the branch. That (1) holds along a curve is not
-//! generic: something in the model must make branches cross, a symmetry or a solution that is always there. So it is asked of f(x, λ) + b d, of
-//! which there always is such a curve, as in `equilibrium`; where the amplitude b stays 0, it is one of branch points of f, whichever way λ points.
+//! λ is a direction in the plane of the two parameters: across the curve, initially that of the branch. A curve along
+//! which branches cross is not generic; the model must force it by a symmetry or an invariant solution. The system is
+//! therefore posed for f(x, λ) + b d, which always has such a curve, as in `equilibrium`; while the amplitude b stays 0
+//! it is a curve of branch points of f, whatever the direction of λ.
 //!
 //! **Source.** govaerts2000, §3 (bordered matrices) and §6 (branch points); allgower1990, §8.
 //!
-//! **Departures.** One of the null vectors of f_x alone with ⟨w, f_λ⟩ would do but for double eigenvalues 0, where a curve of folds begins that
-//! has the former too. d, C and λ are taken anew at every accepted point.
+//! **Departures.** One null vector of f_x alone with ⟨w, f_λ⟩ would suffice except at double eigenvalues 0, where a
+//! curve of folds that shares the null vector begins. d, C and λ are updated at every accepted point.
 
 use crate::contract::{Batch, Condition, Parameters};
 use crate::diagram::{Kind, Mesh, Point};
@@ -28,11 +29,11 @@ use crate::linalg::{axpy, dot, lu, max_abs};
 use crate::problem::Setting;
 use num_complex::Complex64;
 
-/// A branch point held on equilibria.
+/// Branch-point condition for equilibria.
 pub struct OnBranchPoints<'a> {
     setting: Setting<'a>,
     n: usize,
-    /// The direction of λ in the two parameters.
+    /// Direction of λ in the two parameters.
     across: [f64; 2],
     /// d `[n]` and C `[2][n + 1]`.
     left: Vec<f64>,
@@ -45,7 +46,7 @@ pub struct OnBranchPoints<'a> {
 }
 
 impl<'a> OnBranchPoints<'a> {
-    /// In a setting with two free parameters.
+    /// Creates the condition in a setting with two free parameters.
     pub fn new(setting: Setting<'a>) -> OnBranchPoints<'a> {
         let (n, scales) = (setting.field.dim(), setting.scales);
         let scale = |i: usize| scales.get(i).copied().unwrap_or(1.0);
@@ -66,7 +67,7 @@ impl<'a> OnBranchPoints<'a> {
         Batch { lanes: 1, states: &self.state, parameters: Parameters::Shared(&self.parameters), times: &[] }
     }
 
-    /// A vector `[n + 1]` as a direction in states and parameters.
+    /// Converts a vector `[n + 1]` to a direction in states and parameters.
     fn spread(&self, v: &[f64]) -> Vec<f64> {
         let change = self.across.map(|a| v[self.n] * a);
         [&v[..self.n], &self.setting.spread(&change)].concat()
@@ -129,7 +130,7 @@ impl Condition for OnBranchPoints<'_> {
         let [a, b] = [along[self.n + 1], along[self.n + 2]];
         let length = a.hypot(b);
         if length > 0.0 {
-            // The null vectors belong to another λ.
+            // The null vectors belong to the previous λ.
             self.across = [-b / length, a / length];
         }
     }
@@ -153,7 +154,7 @@ impl Condition for OnBranchPoints<'_> {
         if max_abs(&rows).is_finite() && max_abs(&left).is_finite() {
             let width = self.n + 1;
             self.right = rows.iter().enumerate().map(|(k, x)| x / scale(k % width)).collect();
-            // As f maps scaled states: its range is measured like them.
+            // The range of f is scaled like the states.
             self.left = left.iter().enumerate().map(|(i, w)| w * scale(i) * scale(i)).collect();
         }
     }

@@ -1,8 +1,8 @@
 //! Defining system of branch points of cycles in two parameters.
 //!
-//! **Idea.** As for equilibria ([`super::on_branch_points`]): where branches over λ cross, the variational equation with a column for λ has
-//! two right null vectors and a left one. Bordered by approximations of these it is regular, and its border components vanish exactly at a
-//! branch point.
+//! **Idea.** As for equilibria ([`super::on_branch_points`]): where branches over λ cross, the variational equation
+//! with a column for λ has two right null vectors and a left one. Bordered by approximations of these it is regular,
+//! and its border components vanish exactly at a branch point.
 //!
 //! **Equations.** In normalised time, f_x along the cycle, λ a direction in the plane of the two parameters:
 //!
@@ -16,8 +16,9 @@
 //!   (3)  dg_k = -w* (dL) v_k
 //! ```
 //!
-//! For forced cycles the period is prescribed, and T₁ and the integral are omitted. A curve along which branches cross is not generic, so the
-//! system is posed for f + b d(x), which always has such a curve ([`super::unfolded`]); as long as b stays 0 it is a curve of f.
+//! For forced cycles the period is prescribed, and T₁ and the integral are omitted. A curve along which branches cross
+//! is not generic, so the system is posed for f + b d(x), which always has such a curve ([`super::unfolded`]); as long
+//! as b stays 0 it is a curve of f.
 //!
 //! **Source.** doedel2003 (cycles); govaerts2000, §3 (bordered matrices) and §6 (branch points).
 //!
@@ -41,9 +42,10 @@ pub struct OnCycleBranchPoints<'a> {
     n: usize,
     forcing_periods: u32,
     times: Vec<f64>,
-    /// The direction of λ in the last two free parameters.
+    /// Direction of λ in the last two free parameters.
     across: [f64; 2],
-    /// Bordered system. Scalars: T₁ if the cycle is free, ℓ, the coefficient of d. Rows: the integral, then both rows of C.
+    /// Bordered system. Scalars: T₁ if the cycle is free, ℓ, the coefficient of d. Rows: the integral, then both rows
+    /// of C.
     system: System,
     /// ⟨f, ·⟩ of the integral in (1), at the Gauss points.
     phase: Vec<f64>,
@@ -52,7 +54,7 @@ pub struct OnCycleBranchPoints<'a> {
     left_phase: f64,
     /// C: two rows, each a profile, T₁, ℓ.
     right: [Vec<f64>; 2],
-    /// The last solutions: v_k with their scalars; w.
+    /// Last solutions: v_k with their scalars; w.
     null: [Vec<f64>; 2],
     adjoint: Vec<f64>,
     period: f64,
@@ -64,7 +66,7 @@ pub struct OnCycleBranchPoints<'a> {
     along: Vec<f64>,
 }
 
-/// The operator (2), filled with the widest instruction set of the machine.
+/// Operator (2), filled with the widest instruction set of the machine.
 struct Fill<'a, 'b, T> {
     own: &'a OnCycleBranchPoints<'b>,
     system: Condensed<T>,
@@ -80,7 +82,7 @@ impl<T: Lane> pulp::NullaryFnOnce for Fill<'_, '_, T> {
 }
 
 impl<'a> OnCycleBranchPoints<'a> {
-    /// The condition on the mesh of `cycle`; the last two free parameters of the setting span the plane.
+    /// Creates the condition on the mesh of `cycle`; the last two free parameters of the setting span the plane.
     pub fn new(setting: Setting<'a>, cycle: &Cycle) -> OnCycleBranchPoints<'a> {
         let (scheme, n) = (Scheme::new(cycle.degree), setting.field.dim());
         let scalars = 2 + usize::from(cycle.forcing_periods == 0);
@@ -158,7 +160,8 @@ impl<'a> OnCycleBranchPoints<'a> {
         Batch { lanes: self.lanes(), states: &self.states, parameters, times: &self.times }
     }
 
-    /// Calls `call` for every Gauss point with its number, the index of its node in a profile, the length of its interval, and its weight.
+    /// Calls `call` for every Gauss point with its number, the index of its node in a profile, the length of its
+    /// interval, and its weight.
     fn each(&self, mut call: impl FnMut(usize, usize, f64, f64)) {
         let m = self.scheme.degree;
         for lane in 0..self.lanes() {
@@ -167,7 +170,7 @@ impl<'a> OnCycleBranchPoints<'a> {
         }
     }
 
-    /// A direction at the Gauss points, `[(n + k) × lanes]`: a profile, then a change of all parameters.
+    /// Direction at the Gauss points, `[(n + k) × lanes]`: a profile, then a change of all parameters.
     fn direction(&self, profile: &[f64], parameters: &[f64]) -> Vec<f64> {
         let lanes = self.lanes();
         let mut out = vec![0.0; self.n * lanes];
@@ -176,7 +179,7 @@ impl<'a> OnCycleBranchPoints<'a> {
         out
     }
 
-    /// The change of all parameters for a change of λ.
+    /// Change of all parameters for a change of λ.
     fn spread(&self, change: f64) -> Vec<f64> {
         let k = self.setting.freedom();
         let mut all = vec![0.0; k];
@@ -353,7 +356,7 @@ impl Condition for OnCycleBranchPoints<'_> {
         let [a, b] = [along[along.len() - 2], along[along.len() - 1]];
         let length = a.hypot(b);
         if length > 0.0 {
-            // The null vectors belong to another λ.
+            // The null vectors belong to the previous λ.
             self.across = [-b / length, a / length];
         }
     }
@@ -408,7 +411,7 @@ impl Condition for OnCycleBranchPoints<'_> {
             [&carried(&row[..size])[..], &row[size..]].concat()
         });
         (self.left, self.right) = (carried(&self.left), right);
-        // Null vectors of another mesh.
+        // These null vectors belong to another mesh.
         self.adjoint.clear();
     }
 

@@ -1,8 +1,8 @@
-//! Conditions on cycles: a fold, a period doubling or a torus point is held.
+//! Defining systems of folds, period doublings and torus points of cycles.
 //!
-//! **Idea.** At each of these points a linear operator L, the variational equation with a closure that fits, has a null
-//! vector. L is bordered by approximate null vectors, which makes it regular, and the size g of what the border has to add
-//! is the scalar (or complex number) that is held at zero. Its derivative needs one solution with the transposed operator.
+//! **Idea.** At each of these points a linear operator L, the variational equation with a suitable boundary condition,
+//! has a null vector. Bordered by approximate null vectors L is regular, and the border component g of the solution is
+//! the scalar (or complex number) that must vanish. Its derivative needs one solution with the transposed operator.
 //!
 //! **Equations.** In normalised time, v the null vector, f_x along the cycle:
 //!
@@ -17,8 +17,8 @@
 //!
 //! **Source.** govaerts2000, §3 and §7 (bordered test functions); doedel2003 (cycles).
 //!
-//! **Departures.** b and c are taken anew from w and v at every accepted point, so that no fixed choice can become
-//! orthogonal to the null vectors on the way.
+//! **Departures.** b and c are updated from w and v at every accepted point, since a fixed choice could become
+//! orthogonal to the null vectors along the curve.
 
 use crate::contract::{Batch, Condition, Parameters};
 use crate::diagram::{Cycle, Kind, Mesh, Point};
@@ -30,18 +30,18 @@ use crate::problem::gauss::Scheme;
 use crate::problem::{Setting, mesh};
 use num_complex::Complex64;
 
-/// A fold, period doubling or torus point held on cycles.
+/// Condition for a fold, period doubling or torus point of cycles.
 pub struct OnCycles<'a> {
     setting: Setting<'a>,
     scheme: Scheme,
     kind: Kind,
     mesh: Mesh,
     n: usize,
-    /// Components of v: n, or 2n where it is complex (real parts, then imaginary ones).
+    /// Components of v: n, or 2n if it is complex (real parts, then imaginary parts).
     parts: usize,
-    /// Whether b and c are there: without them L stands by itself.
+    /// True if b and c are included; otherwise the system is L alone.
     bordered: bool,
-    /// Scalars of the bordered system: T₁ where there is one, then the parts of g.
+    /// Bordered system. Scalars: T₁ for a fold of free cycles, then the parts of g.
     system: System,
     /// ⟨f, ·⟩ of the phase condition in (1), at the Gauss points.
     phase: Vec<f64>,
@@ -50,21 +50,21 @@ pub struct OnCycles<'a> {
     left_phase: f64,
     right: Vec<f64>,
     right_period: f64,
-    /// The last solutions: v with its scalars, w for each part of g.
+    /// Last solutions: v with its scalars, w for each part of g.
     null: Vec<f64>,
     adjoint: Vec<Vec<f64>>,
-    /// What was evaluated last: T, the parameters, f_x v at the Gauss points.
+    /// State of the last evaluation: T, the parameters, and states, f and f_x at the Gauss points.
     period: f64,
     parameters: Vec<f64>,
     states: Vec<f64>,
     f: Vec<f64>,
     fx: Vec<f64>,
-    /// As in the cycle.
+    /// Number of forcing periods of the cycle.
     forcing_periods: u32,
     times: Vec<f64>,
 }
 
-/// The operator (4), filled with the widest instruction set of the machine.
+/// Operator (4), filled with the widest instruction set of the machine.
 struct Fill<'a, 'b, T> {
     own: &'a OnCycles<'b>,
     system: Condensed<T>,
@@ -81,7 +81,8 @@ impl<T: Lane> pulp::NullaryFnOnce for Fill<'_, '_, T> {
 }
 
 impl<'a> OnCycles<'a> {
-    /// The condition of that kind for cycles on `mesh`; `None` for a kind that cycles do not have.
+    /// Creates the condition of the given kind for cycles on the mesh of `cycle`; `None` for kinds that cycles do not
+    /// have.
     pub fn new(kind: Kind, setting: Setting<'a>, cycle: &Cycle) -> Option<OnCycles<'a>> {
         let mut condition = OnCycles::empty(kind, setting, cycle, true)?;
         condition.system = System::new(condition.parts, &condition.scheme.end, condition.scalars());
@@ -98,7 +99,7 @@ impl<'a> OnCycles<'a> {
         Some(condition)
     }
 
-    /// Without room for a system and without borders.
+    /// Creates a condition without a system and without initialised borders.
     fn empty(kind: Kind, setting: Setting<'a>, cycle: &Cycle, bordered: bool) -> Option<OnCycles<'a>> {
         let Cycle { degree, forcing_periods, ref mesh, .. } = *cycle;
         let (scheme, n) = (Scheme::new(degree), setting.field.dim());
@@ -133,8 +134,8 @@ impl<'a> OnCycles<'a> {
         })
     }
 
-    /// L of (1), or of (3) where `complex` says so, by itself, which is regular where it has no null vector; in a system that is given
-    /// where that has the shape.
+    /// L of (1), or of (3) if `complex`, without borders; it is regular if it has no null vector. Reuses the storage of
+    /// `spare` if that has the right shape.
     pub(super) fn operator(
         setting: Setting<'a>,
         cycle: &Cycle,
@@ -150,7 +151,7 @@ impl<'a> OnCycles<'a> {
         Some(own)
     }
 
-    /// Takes the system away; what was found with it stays.
+    /// Takes the system out; its last solutions stay.
     pub(super) fn take_system(&mut self) -> System {
         std::mem::replace(&mut self.system, nothing())
     }
@@ -162,7 +163,8 @@ impl<'a> OnCycles<'a> {
         self.system.factorise(self.closure()).ok()
     }
 
-    /// Solves L y = r, r at the Gauss points `[parts × lanes]`: y there, and T₁ where it has one.
+    /// Solves L y = r, with r at the Gauss points `[parts × lanes]`. Returns y there, and T₁ if it is an unknown, else
+    /// 0.
     pub(super) fn solved(&self, r: &[f64]) -> (Vec<f64>, f64) {
         let (size, lanes) = (self.profile_size(), self.lanes());
         let mut right = vec![0.0; size + self.scalars()];
@@ -175,7 +177,8 @@ impl<'a> OnCycles<'a> {
         (self.at_points(&y[..size]), period)
     }
 
-    /// Every Gauss point: its number, the place of its node in a profile, the length of its interval, its weight.
+    /// Calls `call` for every Gauss point with its number, the index of its node in a profile, the length of its
+    /// interval, and its weight.
     fn each(&self, mut call: impl FnMut(usize, usize, f64, f64)) {
         let m = self.scheme.degree;
         for lane in 0..self.lanes() {
@@ -184,7 +187,7 @@ impl<'a> OnCycles<'a> {
         }
     }
 
-    /// The values of a profile at the Gauss points, `[parts × lanes]`.
+    /// Values of a profile at the Gauss points, `[parts × lanes]`.
     fn at_points(&self, profile: &[f64]) -> Vec<f64> {
         let lanes = self.lanes();
         let mut out = vec![0.0; self.parts * lanes];
@@ -192,13 +195,13 @@ impl<'a> OnCycles<'a> {
         out
     }
 
-    /// The null vector that was found last, `[parts × lanes]`, and T₁ where it has one.
+    /// Last null vector, `[parts × lanes]`, and T₁ if it is an unknown, else 0.
     pub(super) fn null(&self) -> (Vec<f64>, f64) {
         let size = self.profile_size();
         (self.at_points(&self.null[..size]), if self.is_fold() { self.null[size] } else { 0.0 })
     }
 
-    /// What has to vanish for L y = r to have a solution, r at the Gauss points: a number, complex where v is.
+    /// Solvability functional: L y = r, r at the Gauss points, has a solution if this is 0. Complex if v is.
     pub(super) fn solvability(&self, r: &[f64]) -> Complex64 {
         let lanes = self.lanes();
         let mut parts = [0.0; 2];
@@ -220,8 +223,8 @@ impl<'a> OnCycles<'a> {
         total
     }
 
-    /// By which share the motion becomes larger along v: Σ_i ∫ (x_i - x̄_i) v_i / ∫ x_i², x̄ being the mean. What hardly moves about its mean
-    /// hardly counts.
+    /// Relative growth of the motion along v: Σ_i ∫ (x_i - x̄_i) v_i / ∫ x_i², with x̄ the mean. Components that hardly
+    /// move about their mean contribute little.
     pub(super) fn growth(&self, v: &[f64]) -> f64 {
         let lanes = self.lanes();
         let share = |c: usize| {
@@ -238,7 +241,7 @@ impl<'a> OnCycles<'a> {
         (0..self.n).map(share).sum()
     }
 
-    /// f_x v there, `[n × lanes]`.
+    /// f_x v at the Gauss points, `[n × lanes]`.
     pub(super) fn along(&self, v: &[f64]) -> Vec<f64> {
         let (n, lanes) = (self.n, self.lanes());
         let mut out = vec![0.0; n * lanes];
@@ -252,7 +255,7 @@ impl<'a> OnCycles<'a> {
         out
     }
 
-    /// A derivative of f in the states there, along directions `[n × lanes]`.
+    /// Derivative of f in the states at the Gauss points, along directions `[n × lanes]`.
     pub(super) fn bent(&self, along: &[&[f64]]) -> Vec<f64> {
         let (lanes, known) = (self.lanes(), self.setting.parameters.len());
         let full: Vec<Vec<f64>> = along
@@ -271,7 +274,7 @@ impl<'a> OnCycles<'a> {
         out
     }
 
-    /// Scalars of the system.
+    /// Number of scalars of the system.
     fn scalars(&self) -> usize {
         usize::from(self.is_fold()) + if self.bordered { self.width() } else { 0 }
     }
@@ -288,13 +291,13 @@ impl<'a> OnCycles<'a> {
         self.intervals() * self.scheme.degree
     }
 
-    /// Parts of g: one, or two where it is complex.
+    /// Number of parts of g: two if it is complex, otherwise one.
     fn width(&self) -> usize {
         self.parts / self.n
     }
 
-    /// Whether (1) is held as it stands, with its period; a forced cycle has a given period, and (1) is the first of its equations
-    /// alone.
+    /// True if (1) applies with T₁. The period of a forced cycle is prescribed, so its fold uses only the first
+    /// equation of (1).
     fn is_fold(&self) -> bool {
         self.kind == Kind::Fold && self.forcing_periods == 0
     }
@@ -314,7 +317,8 @@ impl<'a> OnCycles<'a> {
         self.phase.clear();
     }
 
-    /// The Gauss points of a profile with `parts` components, of which `n` from `first` on, component-major.
+    /// Values at the Gauss points of `n` components from `first` on of a profile with `parts` components,
+    /// component-major.
     fn gather(&self, profile: &[f64], parts: usize, first: usize) -> Vec<f64> {
         let (n, m, lanes) = (self.n, self.scheme.degree, self.lanes());
         let mut out = vec![0.0; n * lanes];
@@ -374,7 +378,7 @@ impl<'a> OnCycles<'a> {
         system.measure_in(&sizes, &sizes);
         let slots: Vec<usize> = (0..m * parts).map(|k| system.slot(k / parts, k % parts)).collect();
         for place in 0..length {
-            // Beyond the last interval the solver has intervals of length zero.
+            // The solver pads the mesh with intervals of length zero.
             let h = |j: usize| if j < count { self.mesh[j + 1] - self.mesh[j] } else { 0.0 };
             let h = T::each(|lane| h(lane * length + place));
             for i in 0..m {
@@ -390,7 +394,8 @@ impl<'a> OnCycles<'a> {
         system
     }
 
-    /// Equation c at Gauss point i of the intervals at a place, whose lengths are h, and its part of the border.
+    /// Writes equation c at Gauss point i of the intervals at one position, whose lengths are h, and its part of the
+    /// border.
     #[inline(always)]
     fn fill_line<T: Lane>(
         &self,
@@ -405,7 +410,7 @@ impl<'a> OnCycles<'a> {
         let (inner, scalars, last) = (m * parts, self.scalars(), self.intervals() - 1);
         let (width, block, length) = (parts + scalars, (m + 1) * parts, system.length());
         let first = usize::from(self.is_fold());
-        // Numbers at the Gauss point in every interval: of the points one after the other, and of profiles.
+        // Values at the Gauss point in every interval: from consecutive points, and from profiles.
         let interval = |lane: usize| (lane * length + place).min(last);
         let at_point = |x: &[f64], stride: usize| T::each(|lane| x[(interval(lane) * m + i) * stride]);
         let at_node = |x: &[f64], c: usize| T::each(|lane| x[interval(lane) * block + (i + 1) * parts + c]);
@@ -419,7 +424,7 @@ impl<'a> OnCycles<'a> {
             let entry = &mut line[slots[i * parts + half + d]];
             *entry = *entry - ht * at_point(&self.fx[(own * n + d) * lanes..], 1);
         }
-        // + iθ v: the real part loses θ times the imaginary one.
+        // + iθ v: the real part is reduced by θ times the imaginary part.
         let (other, sign) = if c < n { (c + n, -1.0) } else { (c - n, 1.0) };
         let signed = T::splat(sign) * h;
         if parts > n {
@@ -448,15 +453,15 @@ impl<'a> OnCycles<'a> {
         }
     }
 
-    /// Makes the null vectors that were evaluated last what (4) gives with borders made of them, from the matrix as it is. Where v is real:
-    /// with b', c' the new borders and g, v, w from the old ones,
+    /// Replaces the null vectors of the last evaluation by the result of (4) with borders made of them, using the
+    /// existing factorisation. For real v, with b', c' the new borders and g, v, w from the old ones,
     ///
     /// ```text
     ///   (5)  [ L   b ] [ z ]   [ b' ]
     ///        [ c*  0 ] [ s ] = [ 0  ],      v' = v - g/s z,   L v' = -g/s b'
     /// ```
     ///
-    /// and likewise for w.
+    /// and correspondingly for w.
     pub(super) fn sharpen(&mut self) -> Option<()> {
         let (size, first) = (self.profile_size(), usize::from(self.is_fold()));
         let (total, g) = (size + first + 1, *self.null.last()?);
@@ -528,12 +533,12 @@ impl<'a> OnCycles<'a> {
     }
 }
 
-/// A system without intervals.
+/// System without intervals.
 fn nothing() -> System {
     System::new(1, &[1.0, 0.0], 0)
 }
 
-/// So many values of a wave around a mean, which advances by an angle from one to the next, from its sine and cosine.
+/// Samples of a sine wave about a mean, with phase increment `angle` and the initial sine and cosine given.
 fn wave(size: usize, mean: f64, angle: f64, [mut sin, mut cos]: [f64; 2]) -> Vec<f64> {
     let (s, c) = angle.sin_cos();
     let mut next = || {
@@ -597,7 +602,7 @@ impl Condition for OnCycles<'_> {
         self.resize();
         self.left = mesh::transferred(&self.left, self.parts, &self.scheme, &from, mesh);
         self.right = mesh::transferred(&self.right, self.parts, &self.scheme, &from, mesh);
-        // Null vectors of another mesh.
+        // These null vectors belong to another mesh.
         self.null.clear();
     }
 

@@ -1,8 +1,8 @@
-//! Conditions on equilibria: a fold or a Hopf point is held.
+//! Defining systems of folds and Hopf points of equilibria.
 //!
-//! **Idea.** At each of these points an operator L has a null space: of dimension one at a fold, two at a Hopf point, where L is real and
-//! does not know whether the pair of eigenvalues is ±iω or has become a pair ±λ of real ones. L is bordered by approximate null
-//! vectors, which makes it regular, and what the borders have to add is held at zero.
+//! **Idea.** At each of these points an operator L has a null space, of dimension one at a fold and two at a Hopf
+//! point. There L is real and does not distinguish a pair ±iω of eigenvalues from a real pair ±λ. Bordered by
+//! approximate null vectors L is regular, and the border components must vanish.
 //!
 //! **Equations.** With A = f_x, null vector v, borders b and c of one or two columns:
 //!
@@ -16,7 +16,7 @@
 //!
 //! **Source.** govaerts2000, §3 and §4 (folds), §5.2 (Hopf points).
 //!
-//! **Departures.** b and c are taken anew from w and v at every accepted point.
+//! **Departures.** b and c are updated from w and v at every accepted point.
 
 use crate::contract::{Batch, Condition, Parameters};
 use crate::diagram::{Kind, Mesh, Point};
@@ -24,7 +24,7 @@ use crate::linalg::{axpy, dot, lu, max_abs};
 use crate::problem::Setting;
 use num_complex::Complex64;
 
-/// A fold or Hopf point held on equilibria.
+/// Condition for a fold or Hopf point of equilibria.
 pub struct OnEquilibria<'a> {
     setting: Setting<'a>,
     kind: Kind,
@@ -34,7 +34,7 @@ pub struct OnEquilibria<'a> {
     /// `[width][n]` b and c.
     left: Vec<f64>,
     right: Vec<f64>,
-    /// `[width][n + width]` solutions of (3) for every unit vector, and of the transposed.
+    /// `[width][n + width]` solutions of (3) and of its transpose for every unit vector.
     null: Vec<f64>,
     adjoint: Vec<f64>,
     state: Vec<f64>,
@@ -44,7 +44,7 @@ pub struct OnEquilibria<'a> {
 }
 
 impl<'a> OnEquilibria<'a> {
-    /// The condition of that kind; `None` for a kind that equilibria do not have.
+    /// Creates the condition of the given kind; `None` for kinds that equilibria do not have.
     pub fn new(kind: Kind, setting: Setting<'a>) -> Option<OnEquilibria<'a>> {
         let width = match kind {
             Kind::Fold => 1,
@@ -131,7 +131,7 @@ impl Condition for OnEquilibria<'_> {
         self.width - 1
     }
 
-    /// The square of the largest rate of change, since κ is the product of two eigenvalues.
+    /// Square of the largest rate of change, since κ is the product of two eigenvalues.
     fn extra_scale(&self) -> f64 {
         let (n, scales) = (self.n, self.setting.scales);
         let rates = self.jacobian.iter().enumerate().map(|(k, a)| (a * scales[k % n] / scales[k / n]).abs());
@@ -139,7 +139,7 @@ impl Condition for OnEquilibria<'_> {
     }
 
     fn guess(&self, point: &Point) -> Vec<f64> {
-        // Of the two eigenvalues whose sum is least against their size κ is the product.
+        // κ is the product of the two eigenvalues whose sum is smallest relative to their size.
         let z = &point.spectrum;
         let pairs = (0..z.len()).flat_map(|j| (0..j).map(move |i| (z[i], z[j])));
         let balance = |(a, b): &(Complex64, Complex64)| (a + b).norm() / (1e-300 + a.norm() + b.norm());
@@ -153,7 +153,7 @@ impl Condition for OnEquilibria<'_> {
         }
         let (n, total) = (self.n, self.n + self.width);
         let scale = |i: usize| self.setting.scales[i];
-        // Orthonormal in scaled components, one after the other.
+        // Gram–Schmidt in scaled components.
         let (mut left, mut right): (Vec<Vec<f64>>, Vec<Vec<f64>>) = (Vec::new(), Vec::new());
         for (v, w) in self.null.chunks_exact(total).zip(self.adjoint.chunks_exact(total)) {
             let mut v: Vec<f64> = (0..n).map(|i| v[i] / scale(i)).collect();
@@ -170,7 +170,7 @@ impl Condition for OnEquilibria<'_> {
         if max_abs(&left).is_finite() && max_abs(&right).is_finite() {
             self.right = right.iter().enumerate().map(|(k, x)| x / scale(k % n)).collect();
             self.left = left.iter().enumerate().map(|(k, x)| x / scale(k % n)).collect();
-            // As L maps scaled components: its range is measured like the states.
+            // The range of L is scaled like the states.
             self.left.iter_mut().enumerate().for_each(|(k, x)| *x *= scale(k % n) * scale(k % n));
         }
     }

@@ -1,4 +1,4 @@
-//! Period doublings: a multiplier passes -1, and a cycle of twice the period is born.
+//! Period doublings: a multiplier passes -1, and a branch of cycles of twice the period begins.
 //!
 //! **Equations.**
 //!
@@ -8,7 +8,7 @@
 use crate::contract::Monitor;
 use crate::diagram::{Cycle, Kind, Mesh, Point};
 
-/// A multiplier of -1.
+/// Multiplier -1.
 pub struct PeriodDoubling;
 
 impl Monitor for PeriodDoubling {
@@ -21,7 +21,7 @@ impl Monitor for PeriodDoubling {
     }
 
     fn confirms(&self, at: &Point) -> bool {
-        // Where a pair has just met at -1, each is off by the square root of what their product is.
+        // If a pair has just met at -1, the distance of each from -1 is the square root of their product.
         let mut off: Vec<f64> = at.free_spectrum().iter().map(|z| (z + 1.0).norm() / (1.0 + z.norm())).collect();
         off.sort_by(f64::total_cmp);
         off.iter().take(2).product::<f64>() < 2.5e-3 || off.first().is_some_and(|least| *least < 5e-3)
@@ -40,7 +40,7 @@ impl Monitor for PeriodDoubling {
     }
 }
 
-/// The cycle run through twice, and a perturbation on one period continued antiperiodically to two.
+/// The cycle traversed twice, and a perturbation on one period extended antiperiodically to two.
 pub fn doubled(cycle: &Cycle, direction: &[f64]) -> (Cycle, Vec<f64>) {
     let half: Vec<f64> = cycle.mesh.iter().map(|t| 0.5 * t).collect();
     let mesh: Mesh = half.iter().copied().chain(half[1..].iter().map(|t| 0.5 + t)).collect();

@@ -1,26 +1,26 @@
-//! Scalars that every point of a branch has, by name.
+//! Named scalar quantities of the points of a branch.
 
 use crate::diagram::Point;
 use crate::model::Model;
 
-/// A quantity of a point. States and outputs are numbered together, outputs after the states.
+/// Quantity of a point. States and outputs are numbered together, outputs after the states.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
-    /// The parameter of that index.
+    /// Parameter with the given index.
     Parameter(usize),
-    /// The period of a cycle; equilibria have none.
+    /// Period of a cycle; undefined for equilibria.
     Period,
-    /// The smallest value of a state or output over the solution.
+    /// Smallest value of a state or output over the solution.
     Smallest(usize),
-    /// The largest one.
+    /// Largest value of a state or output over the solution.
     Largest(usize),
-    /// The mean over the solution, (1/T) ∫ g dt.
+    /// Mean over the solution, (1/T) ∫ g dt.
     Mean(usize),
-    /// The root mean square, ((1/T) ∫ g² dt)^½.
+    /// Root mean square, ((1/T) ∫ g² dt)^½.
     Rms(usize),
-    /// The integral over one period, ∫ g dt; equilibria have none.
+    /// Integral over one period, ∫ g dt; undefined for equilibria.
     Integral(usize),
-    /// The root mean square of the vector of states, ((1/T) ∫ Σ x_i² dt)^½, of which there are so many.
+    /// Root mean square of the state vector, ((1/T) ∫ Σ x_i² dt)^½, for the given number of states.
     Norm(usize),
 }
 
@@ -34,7 +34,7 @@ const ENDINGS: [(&str, Made); 5] = [
 ];
 
 impl Quantity {
-    /// Its value at a point, if that has it.
+    /// Value at a point, if it is defined there.
     pub fn of(self, point: &Point) -> Option<f64> {
         let average = |k: usize, power: usize| point.averages.get(k).map(|average| average[power]);
         match self {
@@ -52,8 +52,8 @@ impl Quantity {
         }
     }
 
-    /// The quantity of that name: a parameter, `period`, `norm`, or NAME_max, NAME_min, NAME_mean, NAME_rms or NAME_integral of a state
-    /// or output.
+    /// Returns the quantity with the given name: a parameter, `period`, `norm`, or NAME_max, NAME_min, NAME_mean,
+    /// NAME_rms or NAME_integral of a state or output.
     pub fn named(name: &str, model: &Model) -> Option<Quantity> {
         if let Some(index) = model.parameter_index(name) {
             return Some(Quantity::Parameter(index));
@@ -69,7 +69,7 @@ impl Quantity {
         }
     }
 
-    /// Every name that [`Quantity::named`] knows.
+    /// All names that [`Quantity::named`] accepts.
     pub fn names(model: &Model) -> Vec<String> {
         let channels = model.states.iter().map(|s| &s.name).chain(model.outputs.iter().map(|o| &o.name));
         let ended = channels.flat_map(|name| ENDINGS.map(|(ending, _)| format!("{name}{ending}")));

@@ -23,7 +23,7 @@ impl Monitor for Torus {
 
     fn possible(&self, at: &Point) -> bool {
         let z = at.free_spectrum();
-        // A real pair may still become a complex one on the way if it is about to meet.
+        // A real pair that is about to meet may still become complex within the step.
         let meets = |a: usize| z[a + 1..].iter().any(|b| b.im == 0.0 && (z[a] - b).norm() < 0.05);
         (0..z.len()).any(|a| if z[a].im == 0.0 { meets(a) } else { z[a].norm().ln().abs() < 0.1 })
     }

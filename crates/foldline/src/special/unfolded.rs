@@ -1,8 +1,8 @@
 //! Unfolding of a vector field by an additional amplitude, for curves of branch points of cycles.
 //!
-//! **Idea.** Where branches cross, the cycles of f with two free parameters do not form a smooth surface. Those of f(x, λ) + b d(x) with an
-//! unfolding amplitude b do, provided that d along the cycle is not in the range of the variational equation. Any d without symmetry or
-//! structure serves; where b = 0 the cycle is one of f.
+//! **Idea.** Where branches cross, the cycles of f with two free parameters do not form a smooth surface. Those of
+//! f(x, λ) + b d(x) with an unfolding amplitude b do, provided that d along the cycle is not in the range of the
+//! variational equation. Any d without symmetry or structure serves; where b = 0 the cycle is one of f.
 //!
 //! **Equations.** With sizes s of the states and fixed numbers m, φ:
 //!
@@ -19,7 +19,7 @@ use crate::problem::{Axis, Setting};
 use num_complex::Complex64;
 use std::f64::consts::FRAC_PI_2;
 
-/// The vector field f + b d, with b as an additional parameter.
+/// Vector field f + b d, with b as an additional parameter.
 #[derive(Clone)]
 pub struct Unfolded<'f> {
     field: &'f dyn VectorField,
@@ -32,7 +32,7 @@ impl<'f> Unfolded<'f> {
         Unfolded { field, sizes: sizes.to_vec() }
     }
 
-    /// The unfolding of another field with the same states.
+    /// Unfolding of another field with the same states.
     pub fn over<'g>(&self, field: &'g dyn VectorField) -> Unfolded<'g> {
         Unfolded { field, sizes: self.sizes.clone() }
     }
@@ -57,8 +57,8 @@ impl<'f> Unfolded<'f> {
         (0.6 + number(1.3, 1.9), 2.0 * number(2.3, 0.7))
     }
 
-    /// The derivative of d_i in a lane along the directions (d_i itself without directions). Only the states, the first `[n × lanes]` of each
-    /// direction, count.
+    /// Derivative of d_i in a lane along the directions (d_i itself without directions). Only the states, the first
+    /// `[n × lanes]` of each direction, count.
     fn bent(&self, i: usize, lane: usize, at: &Batch, directions: &[&[f64]]) -> f64 {
         let turn = FRAC_PI_2 * directions.len() as f64;
         let term = |j: usize| {
@@ -182,7 +182,7 @@ impl VectorField for Unfolded<'_> {
     }
 }
 
-/// The cycle problem of f + b d with unknowns u = (profile, T, b, λ₁, λ₂); its points do not contain b.
+/// Cycle problem of f + b d with unknowns u = (profile, T, b, λ₁, λ₂); its points do not contain b.
 pub struct UnfoldedCycles<'a> {
     cycles: CycleProblem<'a>,
     parameters: usize,
@@ -204,7 +204,7 @@ impl<'a> UnfoldedCycles<'a> {
         }
     }
 
-    /// The problem of f + b d from its cycle problem; `parameters` is the number of parameters of f.
+    /// Creates the problem of f + b d from its cycle problem; `parameters` is the number of parameters of f.
     pub fn new(cycles: CycleProblem<'a>, parameters: usize) -> UnfoldedCycles<'a> {
         UnfoldedCycles { cycles, parameters, period: 1.0 }
     }
@@ -288,8 +288,9 @@ impl ZeroProblem for UnfoldedCycles<'_> {
         self.cycles.margin(at)
     }
 
-    /// The effect of b over a period, relative to the sizes of the states. A mesh breaks symmetries, so b is known only to the error of
-    /// discretisation, a thousand times that of Newton's method ([`crate::continuation::Settings::newton_tolerance`]).
+    /// Effect of b over a period, relative to the sizes of the states. A mesh breaks symmetries, so b is known only to
+    /// the discretisation error, a thousand times that of Newton's method
+    /// ([`crate::continuation::Settings::newton_tolerance`]).
     fn departure(&self, u: &[f64]) -> f64 {
         1e-3 * (u[u.len() - 3] * self.period).abs()
     }
@@ -335,7 +336,7 @@ mod tests {
         .unwrap()
     }
 
-    /// f + b d at one place.
+    /// f + b d at one state.
     fn value(field: &Unfolded, x: [f64; 2], p: [f64; 3]) -> [f64; 2] {
         let mut f = [0.0; 2];
         field.evaluate(Batch { lanes: 1, states: &x, parameters: Parameters::Shared(&p), times: &[] }, &mut f);
@@ -343,14 +344,14 @@ mod tests {
     }
 
     #[test]
-    fn derivatives_are_those_of_differences() {
+    fn derivatives_agree_with_finite_differences() {
         const STEP: f64 = 1e-5;
         let model = model();
         let field = Unfolded::new(&model, &[0.8, 2.0]);
         let (x, p) = ([0.3, -0.6], [0.4, 0.7, 0.25]);
         let at = Batch { lanes: 1, states: &x, parameters: Parameters::Shared(&p), times: &[] };
         let (mut f, mut fx, mut fp) = ([0.0; 2], [0.0; 4], [0.0; 4]);
-        // b first, then q: the columns come in the order asked for.
+        // b first, then q: the columns come in the order requested.
         field.linearise(at, &[2, 1], &mut f, &mut fx, &mut fp);
         f.iter().zip(value(&field, x, p)).for_each(|(a, b)| assert!((a - b).abs() < 1e-15, "{a} {b}"));
         let directions = [

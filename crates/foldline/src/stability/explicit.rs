@@ -1,12 +1,14 @@
 //! Multipliers of cycles with many components.
 //!
-//! **Idea.** The periodic QR algorithm passes every rotation through all N factors: its cost grows as N n³ with a large constant, and
-//! so does that of keeping the factors apart. Where neither a product of neighbours nor what follows it grows, the product of all
-//! transitions may be formed: its eigenvalues of modulus near 1 lose nothing. Random vectors, carried through the factors from both
-//! ends, tell so beforehand at the cost of a few products with vectors.
+//! **Idea.** The periodic QR algorithm passes every rotation through all N factors, so its cost grows as N n³ with a
+//! large constant, as does that of keeping the factors separate. If neither the products of the first factors nor those
+//! of the remaining ones grow, the product of all transitions may be formed: its eigenvalues of modulus near 1 lose no
+//! accuracy. Random vectors, propagated through the factors from both ends, show this beforehand at the cost of a few
+//! matrix-vector products.
 //!
-//! **Equations.** With F_j as in (1) of [`super::floquet`], P_j = F_j ⋯ F_1, S_j = F_N ⋯ F_{j+1}, |·| the root mean square of the singular values,
-//! ε the unit roundoff, and a_j a bound of the norm of F_j with the moduli of its entries:
+//! **Equations.** With F_j as in (1) of [`super::floquet`], P_j = F_j ⋯ F_1, S_j = F_N ⋯ F_{j+1}, |·| the root mean
+//! square of the singular values, ε the unit roundoff, and a_j a bound of the norm of F_j with the moduli of its
+//! entries:
 //!
 //! ```text
 //!   (1)  δP_N ≈ Σ_j S_j δ_j,   |δ_j| ≈ ε a_j |P_{j-1}|           rounding of P_j = F_j P_{j-1}
@@ -15,8 +17,9 @@
 //!   (4)  |A|² ≈ mean over random w of |A w|² / n                  Frobenius norm by random vectors
 //! ```
 //!
-//! The error ε · growth is absolute. A multiplier that is smaller is known to be small, and no more. Where the growth is too large the factors stay apart, except for
-//! neighbours whose product is well conditioned, and the periodic QR algorithm keeps the digits of all multipliers.
+//! The error ε · growth is absolute: of a smaller multiplier it is only known that it is small. If the growth is too
+//! large the factors stay separate, except for neighbours whose product is well conditioned, and the periodic QR
+//! algorithm preserves the accuracy of all multipliers.
 //!
 //! **Source.** higham2002, §3.5 (products) and §2.8 (independent rounding errors); hutchinson1990 (4).
 
@@ -26,10 +29,11 @@ use crate::linalg::periodic_schur::{self, CONDITION};
 use foldline_general::{Factored, Mat, MatRef, multiply};
 use num_complex::Complex64;
 
-/// Rounding error up to which the product is formed: a tenth of what is stated for rounding.
+/// Rounding error up to which the product is formed: a tenth of the error stated for rounding.
 const ERROR: f64 = 0.1 * super::floquet::ROUNDING;
 
-/// Multipliers of one course; `scale` `[n]` as in [`super::floquet::several`]. The logarithm of their product is NaN unless it is asked for.
+/// Multipliers of one course; `scale` `[n]` as in [`super::floquet::several`]. The logarithm of their product is NaN
+/// unless `product` is set.
 pub(super) fn multipliers(course: Course, scale: &[f64], product: bool) -> Floquet {
     let split = Split::new(course, scale);
     let log_product = if product { split.log + split.log_determinant() } else { f64::NAN };
@@ -48,7 +52,7 @@ struct Split {
     p: usize,
     /// `[N]` F_j, row-major p×p.
     factors: Vec<f64>,
-    /// The trivial multiplier: its sign and the logarithm of its modulus; 1 and 0 without frames.
+    /// Trivial multiplier: its sign and the logarithm of its modulus; 1 and 0 without frames.
     sign: f64,
     log: f64,
 }
@@ -128,7 +132,7 @@ impl Split {
         product
     }
 
-    /// Products of neighbours while |A| |A⁻¹| stays below [`CONDITION`], row-major.
+    /// Products of neighbours, row-major, formed while |A| |A⁻¹| stays below [`CONDITION`].
     fn grouped(&self) -> Vec<f64> {
         let p = self.p;
         let (mut out, mut product, mut next) = (Vec::new(), Mat::identity(p, p), Mat::zeros(p, p));
@@ -143,7 +147,7 @@ impl Split {
             };
             let condition = |(image, inverse): &(Mat<f64>, Mat<f64>)| size(image) * size(inverse);
             let mut own = carried(&image, &inverse);
-            // What is not a number is no small one.
+            // NaN does not count as small.
             let small = condition(&own) < CONDITION;
             if j > 0 && !small {
                 out.extend(rows(product.as_ref()));
@@ -175,19 +179,19 @@ fn moduli(f: &[f64], p: usize) -> f64 {
     (row_sum * columns.iter().fold(0.0, |most: f64, sum| most.max(*sum))).sqrt()
 }
 
-/// (4): the root of the mean square of the entries of A w, for w of [`random`] vectors.
+/// (4): root mean square of the entries of A w, for w of [`random`] vectors.
 fn size(image: &Mat<f64>) -> f64 {
     foldline_general::norm(image) / ((image.nrows() * image.ncols()) as f64).sqrt()
 }
 
-/// Eigenvalues of one matrix by decreasing modulus, those of a pair together.
+/// Eigenvalues of one matrix by decreasing modulus, conjugate pairs together.
 fn eigenvalues(a: MatRef<f64>) -> Option<Vec<Complex64>> {
     let mut found = foldline_general::eigenvalues(a)?;
     found.sort_by(|a, b| b.norm().total_cmp(&a.norm()));
     Some(found)
 }
 
-/// Q_{j+1}ᵀ g Q_j with reflections 1 - v vᵀ; `sums` is room for n.
+/// Q_{j+1}ᵀ g Q_j with reflections 1 - v vᵀ; `sums` is workspace for n numbers.
 fn reflect(g: &mut [f64], left: &[f64], right: &[f64], sums: &mut [f64]) {
     let n = left.len();
     sums.fill(0.0);
@@ -205,21 +209,21 @@ fn reflect(g: &mut [f64], left: &[f64], right: &[f64], sums: &mut [f64]) {
 mod tests {
     use super::*;
 
-    /// Random numbers between -1 and 1.
+    /// Pseudo-random numbers between -1 and 1.
     fn numbers(count: usize, seed: f64) -> Vec<f64> {
         (0..count)
             .map(|k| 2.0 * ((k * k) as f64 * 0.618 + seed * (1.0 + 0.37 * k as f64)).sin().abs().fract() - 1.0)
             .collect()
     }
 
-    /// An orthogonal p×p matrix.
+    /// Orthogonal p×p matrix.
     fn orthogonal(p: usize, seed: f64) -> Mat<f64> {
         let entries = numbers(p * p, seed);
         Mat::from_fn(p, p, |i, k| entries[i * p + k]).qr().compute_Q()
     }
 
-    /// V_{j+1} B_j V_j⁻¹ with orthogonal V_{j+N} = V_j: the multipliers are those of B_N ⋯ B_1, which are blocks of a rate and an angle each,
-    /// e^(r ± i φ) over the whole course.
+    /// V_{j+1} B_j V_j⁻¹ with orthogonal V_{j+N} = V_j: the multipliers are those of B_N ⋯ B_1, which consists of
+    /// blocks with a rate and an angle each, e^(r ± i φ) over the whole course.
     fn course(p: usize, count: usize, logs: &[(f64, f64)]) -> Vec<f64> {
         let frames: Vec<Mat<f64>> = (0..count).map(|j| orthogonal(p, 0.3 + j as f64)).collect();
         let mut own = Mat::zeros(p, p);
@@ -237,7 +241,8 @@ mod tests {
             .collect()
     }
 
-    /// Largest distance of the expected multipliers from the nearest one that was found, relative to the larger of 1 and their modulus.
+    /// Largest distance of an expected multiplier from the nearest computed one, relative to the larger of 1 and its
+    /// modulus.
     fn farthest(found: &[Complex64], logs: &[(f64, f64)]) -> f64 {
         let expected = logs.iter().flat_map(|(r, a)| [*a, -a].map(|a| Complex64::from_polar(r.exp(), a)));
         let distance =
@@ -250,9 +255,10 @@ mod tests {
     }
 
     #[test]
-    fn known_multipliers_are_found_whatever_else_there_is() {
+    fn known_multipliers_are_found_beside_much_larger_or_smaller_ones() {
         let (p, count) = (24, 60);
-        // Lightly damped; strongly damped, by hundreds of orders of magnitude; one pair that grows by ten, and by sixty of them.
+        // Lightly damped; strongly damped, by hundreds of orders of magnitude; with one pair that grows by ten orders, and
+        // by sixty.
         let light: Vec<_> = (0..12).map(|k| (-0.05 - 0.01 * k as f64, 0.2 + 0.23 * k as f64)).collect();
         let strong: Vec<_> = (0..12).map(|k| (-(k as f64).powi(3), 0.2 + 0.23 * k as f64)).collect();
         let with = |first: f64, rest: &[(f64, f64)]| [&[(first, 0.7)], &rest[..11]].concat();
@@ -269,7 +275,7 @@ mod tests {
             let found = split.eigenvalues().unwrap();
             assert_eq!(found.len(), p);
             assert!(found.windows(2).all(|pair| pair[0].norm() >= pair[1].norm() * (1.0 - 1e-12)));
-            // Normal in frames that turn: what rounding does to the factors reaches each multiplier once.
+            // Normal in rotating frames: rounding of the factors affects each multiplier only once.
             let tolerance = if explicit { 10.0 * f64::EPSILON * growth } else { 1e-11 };
             let error = farthest(&found, &logs);
             assert!(error < tolerance, "{error:e} with growth {growth:e}, {logs:?}");
@@ -283,7 +289,7 @@ mod tests {
     }
 
     #[test]
-    fn both_routes_find_the_same() {
+    fn explicit_products_and_periodic_qr_give_the_same_multipliers() {
         for (p, count, size) in [(16, 9, 0.1), (23, 30, 0.05), (40, 12, 0.08)] {
             let off = numbers(p * p * count, 0.45);
             let factors: Vec<f64> =
@@ -294,17 +300,17 @@ mod tests {
             let other = periodic_schur::eigenvalues(&factors, p).unwrap();
             for z in other.iter().map(|e| e.value()) {
                 let apart = own.iter().map(|w| (w - z).norm()).fold(f64::INFINITY, f64::min);
-                // Eigenvalues of a random matrix are some p times as sensitive as those of a normal one.
+                // Eigenvalues of a random matrix are about p times as sensitive as those of a normal one.
                 assert!(apart < p as f64 * f64::EPSILON * growth, "{p}: {z} is {apart:e} away, growth {growth:e}");
             }
-            // Where the product must not be formed: neighbours alone.
+            // If the product must not be formed, only neighbours are multiplied.
             let grouped = split.grouped();
             assert!(grouped.len() < factors.len() && grouped.len().is_multiple_of(p * p));
         }
     }
 
     #[test]
-    fn the_estimate_of_growth_sees_it_wherever_it_is() {
+    fn growth_is_detected_wherever_it_occurs() {
         let (p, count) = (18, 40);
         let scaled = |factor: &dyn Fn(usize) -> f64| -> Vec<f64> {
             let identity = course(p, count, &[(0.0, 0.3); 9]);
@@ -315,7 +321,7 @@ mod tests {
         let still = growth(&|_| 1.0);
         assert!(still < (count as f64 * p as f64).sqrt(), "{still}");
         assert!(growth(&|_| 0.5) < 1e-6 * still, "decay");
-        // Down and up again: what is small in between loses its digits only where something else is not.
+        // Down and up again: small products lose digits only relative to a larger one.
         assert!(growth(&|j| if j < 20 { 2.0 } else { 0.5 }) < 2.0 * still, "up and down");
         assert!(growth(&|_| 2.0) > 1e11, "growth");
         let allowed = f64::EPSILON * growth(&|j| if j == 7 { f64::NAN } else { 1.0 }) < ERROR;

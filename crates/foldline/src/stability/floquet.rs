@@ -1,9 +1,11 @@
 //! Floquet multipliers of a cycle.
 //!
-//! **Idea.** The flow direction is carried round the cycle exactly, so it is split off: what remains are (n-1)×(n-1)
-//! blocks whose product has the non-trivial multipliers. The product is never formed.
+//! **Idea.** The flow direction is mapped to itself around the cycle exactly, so it is split off. This leaves
+//! (n-1)×(n-1) blocks whose product has the non-trivial multipliers. The product is never formed, except for large n
+//! (`explicit`).
 //!
-//! **Equations.** With G_j the transition over interval j and Q_j orthogonal, its first column along x'(t_j) or against it:
+//! **Equations.** With G_j the transition over interval j and Q_j orthogonal, its first column along x'(t_j) or against
+//! it:
 //!
 //! ```text
 //!   (1)  Q_{j+1}ᵀ G_j Q_j = [ g_j  *  ]        ∏ g_j = 1 up to the discretisation: the trivial multiplier
@@ -18,31 +20,31 @@ use super::reduction::{self, Reduced};
 use crate::linalg::{dense::MANY, periodic_schur};
 use num_complex::Complex64;
 
-/// Error of multipliers that is stated for rounding, relative to the larger of 1 and their modulus.
+/// Error of multipliers stated for rounding, relative to the larger of 1 and their modulus.
 pub const ROUNDING: f64 = 1e-9;
 
-/// Multipliers and how far they can be trusted.
+/// Floquet multipliers of a cycle.
 #[derive(Clone, Debug, Default)]
 pub struct Floquet {
-    /// The trivial multiplier first where there is one, then the others by decreasing modulus.
+    /// The trivial multiplier first, if there is one, then the others by decreasing modulus.
     pub multipliers: Vec<Complex64>,
-    /// How many of the others, the free ones, lie outside the unit circle.
+    /// Number of non-trivial multipliers outside the unit circle.
     pub unstable: usize,
-    /// log of the product of all moduli; NaN where it was not computed: of several courses of many components at once.
+    /// log of the product of all moduli; NaN if it was not computed, for several courses with many components.
     pub log_product: f64,
 }
 
-/// What multipliers are made from.
+/// Data from which the multipliers of one cycle are computed.
 #[derive(Clone, Copy)]
 pub struct Course<'a> {
-    /// `[N]` G_j row-major n×n, those of the even j and those of the odd ones: each is read from its own list.
+    /// `[N]` G_j row-major n×n; those with even j and those with odd j are each read from their own list.
     pub transitions: [&'a [f64]; 2],
-    /// Along the flow; a forced cycle has none, and no trivial multiplier.
+    /// Frames along the flow; `None` for a forced cycle, which has no trivial multiplier.
     pub frames: Option<&'a Frames>,
 }
 
-/// Multipliers of an autonomous cycle. `transitions`: `[N]` G_j row-major n×n, in the components of the flow that the frames were made
-/// from.
+/// Multipliers of an autonomous cycle. `transitions`: `[N]` G_j row-major n×n, in the components of the flow from which
+/// the frames were built.
 pub fn multipliers(transitions: &[f64], frames: &Frames, n: usize) -> Floquet {
     one(Course { transitions: [transitions; 2], frames: Some(frames) }, &vec![1.0; n])
 }
@@ -52,15 +54,16 @@ pub fn forced(transitions: &[f64], n: usize) -> Floquet {
     one(Course { transitions: [transitions; 2], frames: None }, &vec![1.0; n])
 }
 
-/// Multipliers of one course, as those of [`several`]; not numbers where those are nothing.
+/// Multipliers of one course, as computed by [`several`]; NaN if that returns `None`.
 pub fn one(course: Course, scale: &[f64]) -> Floquet {
     let unknown =
         || Floquet { multipliers: vec![Complex64::new(f64::NAN, f64::NAN); scale.len()], ..Floquet::default() };
     several([course], scale).map_or_else(unknown, |[found]| found)
 }
 
-/// Multipliers of up to eight courses with as many intervals each, all with frames or all without. `scale` `[n]` are the sizes of the components: the
-/// frames are along the flow measured in them. Nothing where there are more courses, or transitions are missing.
+/// Multipliers of up to eight courses with equally many intervals, all with frames or all without. `scale` `[n]` are
+/// the sizes of the components, in which the flow direction of the frames is measured. `None` if there are more courses
+/// or transitions are missing.
 pub fn several<const K: usize>(courses: [Course; K], scale: &[f64]) -> Option<[Floquet; K]> {
     let n = scale.len();
     if n >= MANY {
@@ -84,8 +87,8 @@ pub fn several<const K: usize>(courses: [Course; K], scale: &[f64]) -> Option<[F
     }))
 }
 
-/// The Q_j of (1): reflections 1 - v vᵀ, whose first columns lie along the flow or against it. Which of the two is of no account: each is
-/// met twice on the way round.
+/// Q_j of (1): reflections 1 - v vᵀ whose first columns are parallel or antiparallel to the flow. The sign does not
+/// matter, since each occurs twice around the cycle.
 #[derive(Clone, Debug)]
 pub struct Frames {
     /// `[N][n]`.
@@ -93,10 +96,10 @@ pub struct Frames {
 }
 
 impl Frames {
-    /// Along `flow`, `[N][n]` x' at the left ends.
+    /// Frames along `flow`, `[N][n]` x' at the left ends.
     pub fn along(flow: &[f64], n: usize) -> Frames {
         let mut frames = Frames { v: flow.to_vec() };
-        // Small dimensions as constants.
+        // Small dimensions as compile-time constants.
         match n {
             2 => frames.turn(2),
             3 => frames.turn(3),
@@ -106,7 +109,7 @@ impl Frames {
         frames
     }
 
-    /// Replaces directions by the reflections whose first columns lie along them.
+    /// Replaces directions by the reflections whose first columns are along them.
     #[inline(always)]
     fn turn(&mut self, n: usize) {
         for v in self.v.chunks_exact_mut(n) {
@@ -114,7 +117,7 @@ impl Frames {
             for i in 0..n {
                 v[i] = if norm > 0.0 { v[i] / norm } else { 0.0 };
             }
-            // The reflection takes e_1 to ∓ the direction: the one that avoids cancellation.
+            // The reflection takes e_1 to ∓ the direction, with the sign that avoids cancellation.
             v[0] += if v[0] > 0.0 { 1.0 } else { -1.0 };
             let size = product(v, v, n);
             let scale = if size > 0.0 { (2.0 / size).sqrt() } else { 0.0 };
@@ -122,7 +125,7 @@ impl Frames {
         }
     }
 
-    /// How many there are, of dimension n.
+    /// Number of frames, of dimension n.
     pub(super) fn count(&self, n: usize) -> usize {
         self.v.len() / n.max(1)
     }
@@ -133,7 +136,7 @@ impl Frames {
     }
 }
 
-/// a · b, with the length where the compiler can see it.
+/// a · b, with a length visible to the compiler.
 #[inline(always)]
 fn product(a: &[f64], b: &[f64], n: usize) -> f64 {
     let (a, b) = (&a[..n], &b[..n]);
@@ -145,14 +148,14 @@ mod tests {
     use super::*;
     use foldline_general::{Mat, product};
 
-    /// Numbers between -1 and 1.
+    /// Pseudo-random numbers between -1 and 1.
     fn numbers(count: usize, seed: f64) -> Vec<f64> {
         (0..count)
             .map(|k| 2.0 * ((k * k) as f64 * 0.618 + seed * (1.0 + 0.37 * k as f64)).sin().abs().fract() - 1.0)
             .collect()
     }
 
-    /// Transitions that carry a flow round, `[N]` n×n, and the flow `[N][n]`.
+    /// Transitions that map a flow around the cycle, `[N]` n×n, and the flow `[N][n]`.
     fn carried(count: usize, n: usize, seed: f64) -> (Vec<f64>, Vec<f64>) {
         let flow = numbers(count * n, 0.3);
         let mut transitions = numbers(count * n * n, seed);
@@ -168,14 +171,14 @@ mod tests {
         (transitions, flow)
     }
 
-    /// Eigenvalues of the product of the transitions, even ones from one list and odd ones from another.
+    /// Eigenvalues of the product of the transitions, even ones from one list and odd ones from the other.
     fn reference(transitions: [&[f64]; 2], count: usize, n: usize) -> Vec<Complex64> {
         let of = |j: usize| Mat::from_fn(n, n, |i, k| transitions[j % 2][(j * n + i) * n + k]);
         let all = (1..count).fold(of(0), |before, j| product(&of(j), &before));
         foldline_general::eigenvalues(all.as_ref()).unwrap()
     }
 
-    /// Each of one list is one of the other, the largest first.
+    /// Asserts that both lists contain the same eigenvalues, up to order.
     fn assert_same(found: &[Complex64], expected: &[Complex64], what: &str) {
         assert_eq!(found.len(), expected.len());
         let largest = expected.iter().fold(1.0f64, |m, z| m.max(z.norm()));
@@ -184,13 +187,13 @@ mod tests {
             let distance = |w: &Complex64| (w - z).norm();
             let nearest = (0..left.len()).min_by(|a, b| distance(&left[*a]).total_cmp(&distance(&left[*b]))).unwrap();
             let apart = distance(&left.remove(nearest));
-            // What is multiplied out has the errors of the largest.
+            // Products formed explicitly have the errors of their largest eigenvalue.
             assert!(apart < 1e-11 * largest, "{what}: {z} is {apart} from {found:?}");
         }
     }
 
     #[test]
-    fn several_spectra_agree_with_products_that_are_multiplied_out() {
+    fn several_spectra_agree_with_explicit_products() {
         for (n, count) in [(1, 3), (2, 1), (2, 9), (3, 4), (4, 1), (4, 7), (4, 8), (4, 19), (5, 11), (33, 2), (36, 3)] {
             let ((own, flow), (other, _)) = (carried(count, n, 0.45), carried(count, n, 1.9));
             let frames = Frames::along(&flow, n);
@@ -203,19 +206,19 @@ mod tests {
                 assert_eq!(found.unstable, found.multipliers[1..].iter().filter(|z| z.norm() > 1.0).count(), "{what}");
                 assert_same(&found.multipliers, &reference(course.transitions, count, n), &what);
             }
-            // One in eight pieces, and without the direction of the flow.
+            // One spectrum in eight pieces, and one without the flow direction.
             assert_same(&one(b, &vec![1.0; n]).multipliers, &reference(b.transitions, count, n), &what);
             assert_same(&forced(&own, n).multipliers, &reference(a.transitions, count, n), &what);
         }
     }
 
     #[test]
-    fn one_spectrum_that_is_none_leaves_the_others_alone() {
+    fn a_failed_spectrum_does_not_affect_the_others() {
         let (n, count) = (4, 12);
         let (own, flow) = carried(count, n, 0.45);
         let (mut broken, mut singular) = (own.clone(), own.clone());
         broken[5 * n * n + 7] = f64::NAN;
-        // A transition that is zero: so are all multipliers, or they could not be computed.
+        // With a zero transition all multipliers are zero, or could not be computed.
         singular[6 * n * n..7 * n * n].fill(0.0);
         let frames = Frames::along(&flow, n);
         let courses =
@@ -228,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn scales_change_what_the_frames_are_along_and_no_multiplier() {
+    fn multipliers_do_not_depend_on_the_scales() {
         let (n, count) = (3, 10);
         let (transitions, flow) = carried(count, n, 0.45);
         let scale = [2.0, 0.1, 30.0];
@@ -241,14 +244,14 @@ mod tests {
 
     #[test]
     fn products_far_beyond_the_range_of_numbers_keep_their_logarithm() {
-        // Along the flow every transition is the identity; across it 10^40 and 10^-45, forty times.
+        // Along the flow every transition is the identity; transversally it is 10^40 and 10^-45, forty times.
         let (n, count) = (3, 40);
         let transitions: Vec<f64> = (0..count).flat_map(|_| [1.0, 0.0, 0.0, 0.0, 1e40, 0.0, 0.0, 0.0, 1e-45]).collect();
         let flow: Vec<f64> = (0..count).flat_map(|_| [1.0, 0.0, 0.0]).collect();
         let found = multipliers(&transitions, &Frames::along(&flow, n), n);
         assert_eq!(found.unstable, 1);
         assert!((found.log_product / std::f64::consts::LN_10 + 200.0).abs() < 1e-6, "{}", found.log_product);
-        // Where the flow itself is stretched, the trivial product leaves the range on the way and comes back.
+        // If the flow itself is stretched, the trivial product temporarily leaves the range of numbers.
         let stretched: Vec<f64> = (0..count).flat_map(|j| [if j < 20 { 1e60 } else { 1e-60 }, 0.0, 0.0, 2.0]).collect();
         let flow: Vec<f64> = (0..count).flat_map(|_| [1.0, 0.0]).collect();
         let found = multipliers(&stretched, &Frames::along(&flow, 2), 2);

@@ -1,4 +1,4 @@
-//! Is it stable? Eigenvalues of equilibria, Floquet multipliers of cycles.
+//! Stability: eigenvalues of equilibria, Floquet multipliers of cycles.
 
 mod explicit;
 pub mod floquet;
@@ -7,8 +7,8 @@ mod reduction;
 use crate::linalg::periodic_schur;
 use num_complex::Complex64;
 
-/// Eigenvalues of the row-major n×n Jacobian `fx`, by decreasing modulus. `scales` `[n]` balances components of different
-/// unit. Returns NaN for every eigenvalue if the matrix is not finite.
+/// Eigenvalues of the row-major n×n Jacobian `fx`, by decreasing modulus. `scales` `[n]` balances components of
+/// different units. Returns NaN for every eigenvalue if the matrix is not finite.
 pub fn eigenvalues(fx: &[f64], n: usize, scales: &[f64]) -> Vec<Complex64> {
     let balanced: Vec<f64> = (0..n * n).map(|k| fx[k] * scales[k % n] / scales[k / n]).collect();
     match periodic_schur::eigenvalues(&balanced, n) {

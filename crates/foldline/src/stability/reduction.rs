@@ -1,8 +1,8 @@
-//! Transitions of a cycle reduced to a few factors that have its multipliers.
+//! Reduction of the transitions of a cycle to a few factors with the same multipliers.
 //!
-//! **Idea.** The flow direction is split off every transition ((1) of [`super::floquet`]), and neighbours are multiplied together while
-//! their product stays well conditioned ((4) of [`crate::linalg::periodic_schur`]). One product waits for the other; so several cycles,
-//! and several pieces of each, run side by side in lanes.
+//! **Idea.** The flow direction is split off every transition ((1) of [`super::floquet`]), and neighbours are
+//! multiplied while their product stays well conditioned ((4) of [`crate::linalg::periodic_schur`]). Each product
+//! depends on the previous one, so several cycles, and several pieces of each, run side by side in lanes.
 //!
 //! **Source.** lust2001; guggenheimer1995.
 
@@ -10,21 +10,22 @@ use super::floquet::Course;
 use crate::linalg::lane::{self, Eight, Lane};
 use crate::linalg::periodic_schur::{CONDITION, condition, spread};
 
-/// The modulus of a product beyond which, or below the inverse of which, its logarithm is taken.
+/// Modulus of a product beyond which, or below the inverse of which, its logarithm is taken.
 const FAR: f64 = 1e100;
 
-/// What is left of the transitions of a cycle.
+/// Reduced transitions of a cycle.
 #[derive(Clone, Debug, Default)]
 pub struct Reduced {
-    /// Row-major p×p one after the other, p = n - 1 with frames and n without: their product has the multipliers.
+    /// Factors, row-major p×p, p = n - 1 with frames and n without; their product has the multipliers.
     pub factors: Vec<f64>,
-    /// The trivial multiplier: its sign …
+    /// Trivial multiplier: its sign …
     pub sign: f64,
     /// … and the logarithm of its modulus. 1 and 0 without frames.
     pub log: f64,
 }
 
-/// Number of intervals of courses that can be treated together, if they can: up to eight, as many transitions in each, frames in all or none.
+/// Number of intervals of courses that can be treated together: at most eight, with equally many transitions, all with
+/// frames or all without.
 pub(super) fn intervals(courses: &[Course], n: usize) -> Option<usize> {
     let first = courses.first()?;
     let count = first.transitions[0].len().checked_div(n * n)?;
@@ -54,9 +55,9 @@ pub fn reduced(courses: &[Course], scale: &[f64]) -> Option<Vec<Reduced>> {
 struct Reduction<'a, 'b> {
     courses: &'a [Course<'a>],
     scale: &'a [f64],
-    /// Pieces of a course, in neighbouring lanes.
+    /// Number of pieces of a course, in neighbouring lanes.
     pieces: usize,
-    /// Intervals of a course.
+    /// Number of intervals of a course.
     count: usize,
     framed: bool,
     lanes: &'b mut [Reduced; 8],
@@ -67,7 +68,7 @@ impl pulp::NullaryFnOnce for Reduction<'_, '_> {
 
     #[inline(always)]
     fn call(self) {
-        // The usual dimension as a constant.
+        // The usual dimension as a compile-time constant.
         match (self.scale.len(), self.framed) {
             (4, true) => self.carried_out(4, true),
             (n, framed) => self.carried_out(n, framed),
@@ -92,7 +93,7 @@ impl Reduction<'_, '_> {
         for k in 0..square {
             units[k] = Eight::splat(scale[k % n] / scale[k / n]);
         }
-        // In lanes beyond the last course or interval: the identity, and no reflection.
+        // Lanes beyond the last course or interval contain the identity, without a reflection.
         let neutral: Vec<f64> = (0..square).map(|k| f64::from(u8::from(k % (n + 1) == 0))).collect();
         let still = vec![0.0; n];
         let course_of = |lane: usize| courses.get(lane / pieces);
@@ -140,7 +141,7 @@ impl Reduction<'_, '_> {
                     factor[i * p + k] = g[(i + first) * n + k + first];
                 }
             }
-            // In few dimensions the condition itself costs no more.
+            // In few dimensions the condition number itself costs no more than a bound.
             let spread = if p > 3 { spread_of(factor, p) } else { one };
             if t > 0 {
                 multiply(factor, product, candidate, p);
@@ -160,7 +161,8 @@ impl Reduction<'_, '_> {
     }
 }
 
-/// (1) of [`super::floquet`]: Q_{j+1}ᵀ g Q_j, but for its first row and column, of which only the corner is right. `sums` is room for n.
+/// (1) of [`super::floquet`]: Q_{j+1}ᵀ g Q_j, except that only the corner of the first row and column is correct.
+/// `sums` is workspace for n numbers.
 #[inline(always)]
 fn reflect(g: &mut [Eight], left: &[Eight], right: &[Eight], sums: &mut [Eight], n: usize) {
     for row in g.chunks_exact_mut(n) {
@@ -183,8 +185,9 @@ fn reflect(g: &mut [Eight], left: &[Eight], right: &[Eight], sums: &mut [Eight],
     }
 }
 
-/// Whether a product may stand for its factors in every lane. In more than three dimensions `bound` is one of its condition, from those of
-/// the product before and of the new factor, `spread`; it is left as that of the product if that may stand.
+/// True if a product may replace its factors in every lane. In more than three dimensions `bound` is a bound of its
+/// condition from those of the previous product and of the new factor, `spread`; it is updated to that of the product
+/// if the product is accepted.
 #[inline(always)]
 fn joins(product: &[Eight], spread: Eight, bound: &mut Eight, p: usize) -> bool {
     let below = |condition: Eight| condition.all(condition, |x, _| x < CONDITION);
@@ -196,7 +199,7 @@ fn joins(product: &[Eight], spread: Eight, bound: &mut Eight, p: usize) -> bool 
         *bound = together;
         return below(together);
     }
-    // c(F)² of (4) against the square of its bound, without a quotient; beyond the range of numbers the answer is no.
+    // c(F)² of (4) against the square of its bound, without division; out of range the answer is no.
     let f = product;
     let determinant = match p {
         0 => return true,
@@ -233,7 +236,7 @@ fn multiply(a: &[Eight], b: &[Eight], c: &mut [Eight], p: usize) {
     }
 }
 
-/// A bound of κ to the power p - 1 in (4) of [`crate::linalg::periodic_schur`].
+/// Bound of κ^(p - 1) in (4) of [`crate::linalg::periodic_schur`].
 #[inline(always)]
 fn spread_of(factor: &[Eight], p: usize) -> Eight {
     let mut delta2 = Eight::default();
@@ -251,7 +254,7 @@ fn spread_of(factor: &[Eight], p: usize) -> Eight {
     delta2.map(|delta2| spread(delta2, p))
 }
 
-/// c(F) of (4) in every lane. Rarely asked for.
+/// c(F) of (4) in every lane. Rarely needed.
 #[inline(never)]
 fn conditions_of(matrices: &[Eight], p: usize) -> Eight {
     let mut own = vec![0.0; p * p];
@@ -261,7 +264,7 @@ fn conditions_of(matrices: &[Eight], p: usize) -> Eight {
     })
 }
 
-/// A factor more in every lane.
+/// Appends a factor in every lane.
 #[inline(never)]
 fn put(factor: &[Eight], lanes: &mut [Reduced; 8]) {
     for (k, lane) in lanes.iter_mut().enumerate() {

@@ -1,7 +1,8 @@
 //! Units of measurement: names, dimensions, conversion.
 //!
-//! **Idea.** A unit is a factor times a product of powers of base units: the seven of the SI, and every name that is not known, which
-//! is a base unit of its own. A *turn* is kept apart from the radian, so that Hz and rpm (turns per time) are told from rad/s.
+//! **Idea.** A unit is a factor times a product of powers of base units: the seven of the SI, and every unknown name,
+//! which becomes a base unit. A *turn* is distinct from the radian, so that Hz and rpm (turns per time) are
+//! distinguished from rad/s.
 //!
 //! **Equations.**
 //!
@@ -10,8 +11,9 @@
 //!
 //! **Source.** bipm2019.
 //!
-//! **Departures.** Factors are kept as fractions, as 1 mm = (1/1000) m, so that decimal values convert without rounding wherever
-//! the result is a decimal of 15 digits. Degrees Celsius are kelvins in differences; values are not converted between the two.
+//! **Departures.** Factors are kept as fractions, such as 1 mm = (1/1000) m, so decimal values convert without rounding
+//! if the result is a decimal of 15 digits. Degrees Celsius are kelvins in differences; values are not converted
+//! between the two.
 
 mod names;
 mod quantity;
@@ -22,14 +24,14 @@ pub use quantity::{Written, quantity};
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::TAU;
 
-/// The radian, a base unit without dimension.
+/// Radian, a base unit without dimension.
 pub(crate) const RADIAN: &str = "rad";
-/// The turn, 2π radians.
+/// Turn, 2π radians.
 pub(crate) const TURN: &str = "turn";
-/// Exponents closer than this are equal: they are fractions of small numbers.
+/// Exponents closer than this are equal: they are fractions of small integers.
 pub(crate) const SAME_POWER: f64 = 1e-9;
 
-/// A unit of measurement.
+/// Unit of measurement.
 ///
 /// ```
 /// use foldline::units::Unit;
@@ -41,16 +43,16 @@ pub(crate) const SAME_POWER: f64 = 1e-9;
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Unit {
-    /// Exponents of base units, none of them 0.
+    /// Exponents of base units, all nonzero.
     pub(crate) powers: BTreeMap<String, f64>,
     /// Factor to the coherent unit: `above/below`.
     above: f64,
     below: f64,
     /// True for scales whose zero is not that of the quantity.
     shifted: bool,
-    /// Names of units of time written out in it: `ms` in `mV/ms`.
+    /// Names of units of time that occur in it, such as `ms` in `mV/ms`.
     pub(crate) times: BTreeSet<String>,
-    /// Names that are not known.
+    /// Unknown names.
     foreign: BTreeSet<String>,
 }
 
@@ -61,7 +63,7 @@ pub enum Mismatch {
     Dimension,
     /// Turns per time on one side and plain 1/time on the other: a factor of 2π or none.
     Turns,
-    /// The zeros of the scales differ, as those of °C and K.
+    /// The zeros of the scales differ, as for °C and K.
     Zero,
 }
 
@@ -78,18 +80,18 @@ impl std::fmt::Display for Mismatch {
 impl std::error::Error for Mismatch {}
 
 impl Unit {
-    /// The unit of a pure number.
+    /// Unit of a dimensionless number.
     pub fn one() -> Unit {
         let (powers, times, foreign) = Default::default();
         Unit { powers, above: 1.0, below: 1.0, shifted: false, times, foreign }
     }
 
-    /// The unit that `text` writes, such as `kg m/s^2`; a text that is no unit is a base unit of its own.
+    /// Parses a unit such as `kg m/s^2`; text that is not a unit becomes a base unit.
     pub fn read(text: &str) -> Unit {
         read::unit(text).unwrap_or_else(|| Unit::base(text.trim(), true))
     }
 
-    /// The same, `None` if the text has not the form of a unit.
+    /// Parses a unit, or returns `None` if the text does not have the form of a unit.
     pub fn well_formed(text: &str) -> Option<Unit> {
         read::unit(text)
     }
@@ -99,7 +101,7 @@ impl Unit {
         Unit { powers: BTreeMap::from([(name.to_string(), 1.0)]), foreign, ..Unit::one() }
     }
 
-    /// Names in it that are not known.
+    /// Unknown names in the unit.
     pub fn foreign(&self) -> impl Iterator<Item = &str> {
         self.foreign.iter().map(String::as_str)
     }
@@ -109,7 +111,7 @@ impl Unit {
         (self.above / self.below).ln()
     }
 
-    /// True without base units other than angles.
+    /// True if there are no base units other than angles.
     pub fn is_number(&self) -> bool {
         self.powers.keys().all(|name| is_angle(name))
     }
@@ -118,10 +120,10 @@ impl Unit {
         self.powers.get(base).copied().unwrap_or(0.0)
     }
 
-    /// `value` in this unit, expressed in `to`.
+    /// Converts `value` from this unit to `to`.
     ///
     /// # Errors
-    /// The reason why there is no such value.
+    /// The reason why the conversion is impossible.
     pub fn convert(&self, value: f64, to: &Unit) -> Result<f64, Mismatch> {
         let [above, below] = self.fraction_to(to)?;
         let converted = value * above / below;
@@ -157,7 +159,7 @@ impl Unit {
         Ok([above, below])
     }
 
-    /// The product with `other` to the power `exponent`.
+    /// Product with `other` raised to `exponent`.
     pub(crate) fn times(mut self, other: &Unit, exponent: f64) -> Unit {
         for (name, power) in &other.powers {
             *self.powers.entry(name.clone()).or_insert(0.0) += exponent * power;

@@ -4,10 +4,10 @@ use super::{RADIAN, TURN, Unit};
 use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::PI;
 
-/// A unit by its names.
+/// Unit with its names.
 struct Known {
     names: &'static [&'static str],
-    /// True if prefixes such as k and m go with it.
+    /// True if it takes prefixes such as k and m.
     prefixed: bool,
     above: f64,
     below: f64,
@@ -50,7 +50,7 @@ const SPEED: &[(&str, f64)] = &[(TURN, 1.0), ("s", -1.0)];
 const CONCENTRATION: &[(&str, f64)] = &[("mol", 1.0), ("m", -3.0)];
 const KELVIN: &[(&str, f64)] = &[("K", 1.0)];
 
-/// Every unit. Values that are not exact by definition have the digits of bipm2019.
+/// All known units. Values that are not exact by definition have the digits of bipm2019.
 static KNOWN: &[Known] = &[
     unit(&["m", "metre", "meter"], LENGTH),
     scaled(&["g", "gram"], [1.0, 1000.0], MASS),
@@ -125,7 +125,7 @@ static KNOWN: &[Known] = &[
     fixed(&["degC", "°C", "℃"], [1.0, 1.0], KELVIN),
 ];
 
-/// Scales that do not begin at the zero of the temperature.
+/// Temperature scales whose zero is not absolute zero.
 const SHIFTED: [&str; 3] = ["degC", "°C", "℃"];
 
 /// Prefixes as fractions of whole powers of ten, which are exact.
@@ -155,7 +155,7 @@ const PREFIXES: [(&str, [f64; 2]); 23] = [
     ("micro", [1.0, 1e6]),
 ];
 
-/// The unit of that name, with or without a prefix; `None` if there is none.
+/// Unit with the given name, with or without a prefix; `None` if there is none.
 pub(super) fn named(name: &str) -> Option<Unit> {
     let bare = || KNOWN.iter().find(|known| known.names.contains(&name)).map(|known| (known, [1.0, 1.0]));
     let prefixed = || {
@@ -167,7 +167,7 @@ pub(super) fn named(name: &str) -> Option<Unit> {
     };
     let (known, [up, down]) = bare().or_else(prefixed)?;
     let powers: BTreeMap<String, f64> = known.powers.iter().map(|(base, power)| (base.to_string(), *power)).collect();
-    // A prefix cancels against the factor of the unit where it can: kg is exactly 1.
+    // A prefix cancels the factor of the unit if possible: kg is exactly 1.
     let (above, below) = match (known.above * up, known.below * down) {
         (above, below) if above == below => (1.0, 1.0),
         other => other,

@@ -2,16 +2,17 @@
 
 use super::Unit;
 
-/// A number with a unit as it is written.
+/// Number with a unit, as written.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Written {
-    /// The number.
+    /// Number.
     pub value: f64,
-    /// The unit, as text.
+    /// Unit, as text.
     pub unit: String,
 }
 
-/// The number and the unit of a text such as `0.3 mm`; `None` if it is something else, such as a plain number or an expression.
+/// Splits a text such as `0.3 mm` into number and unit; `None` if it is something else, such as a plain number or an
+/// expression.
 ///
 /// A unit follows its number without an operator, which no expression allows: `15*beta` and `2 *x` are expressions.
 pub fn quantity(text: &str) -> Option<Written> {
@@ -25,7 +26,7 @@ pub fn quantity(text: &str) -> Option<Written> {
     (begins && plain && Unit::well_formed(unit).is_some()).then(|| Written { value, unit: unit.to_string() })
 }
 
-/// Bytes of the number at the beginning: sign, digits, decimals, and an exponent if it has digits.
+/// Length in bytes of the number at the beginning: sign, digits, decimals, and an exponent if it has digits.
 fn number_length(text: &str) -> usize {
     let digits = |from: usize| text[from..].bytes().take_while(|b| b.is_ascii_digit() || *b == b'_').count();
     let sign = usize::from(text.starts_with(['-', '+']));

@@ -1,16 +1,16 @@
-//! Units as they are written: `N s/m`, `kg*m^2`, `1/(mol s)`, `m s-1`, `µA/cm²`.
+//! Parsing of units: `N s/m`, `kg*m^2`, `1/(mol s)`, `m s-1`, `µA/cm²`.
 
 use super::Unit;
 use super::names::named;
 
-/// Deepest nesting of brackets.
+/// Maximum nesting of brackets.
 const DEEPEST: usize = 8;
-/// Longest text, in bytes.
+/// Maximum length of the text, in bytes.
 const LONGEST: usize = 200;
-/// Largest exponent: the sixth power of a quantity is the highest in use; beyond this a factor overflows.
+/// Largest exponent: the sixth power is the highest in practical use; beyond this limit a factor overflows.
 const LARGEST: f64 = 12.0;
 
-/// The unit that a text writes; `None` if it has not that form. What a second factor behind a stroke belongs to is not guessed.
+/// Unit given by a text; `None` if it does not have that form. A second factor after a slash is ambiguous and rejected.
 pub(super) fn unit(text: &str) -> Option<Unit> {
     let text = text.trim();
     if matches!(text, "" | "1" | "-") {
@@ -60,7 +60,7 @@ impl<'t> Reader<'t> {
                 // N/m s may be (N/m) s or N/(m s).
                 return None;
             }
-            // `**` is a power and was taken with its factor.
+            // `**` is a power and was consumed with its factor.
             self.take(&["*", "·", "⋅", "×"]);
             self.skip();
             let factor = self.factor()?;
@@ -86,7 +86,7 @@ impl<'t> Reader<'t> {
         };
         let power = self.power()?.unwrap_or(stuck);
         let lone = power == 1.0;
-        // Alone a scale keeps its zero; in a product it counts differences.
+        // A scale on its own keeps its zero; in a product it counts differences.
         Some(if lone { unit } else { Unit::one().times(&unit, power) })
     }
 
@@ -99,7 +99,7 @@ impl<'t> Reader<'t> {
         Some(Unit { above: value, ..Unit::one() })
     }
 
-    /// A name with the exponent that is stuck to it, as in `m2` and `s-1`.
+    /// A name with an attached exponent, as in `m2` and `s-1`.
     fn name(&mut self) -> Option<(Unit, f64)> {
         let letter = |c: char| c.is_alphabetic() || matches!(c, '_' | '%' | '‰' | '°' | '$' | '€' | '\'' | '"' | '#');
         let end = self.rest.find(|c: char| !(letter(c) || c.is_ascii_digit() || c == '.')).unwrap_or(self.rest.len());
@@ -109,7 +109,7 @@ impl<'t> Reader<'t> {
         }
         self.rest = rest;
         if let Some(unit) = named(word) {
-            // The minus of `s-1`; without digits it is no part of a unit.
+            // The minus of `s-1`; without digits it is not part of a unit.
             let digits = rest.strip_prefix('-').map_or(0, |r| r.bytes().take_while(u8::is_ascii_digit).count());
             if digits == 0 {
                 return Some((unit, 1.0));
@@ -129,7 +129,7 @@ impl<'t> Reader<'t> {
         }
     }
 
-    /// `^2`, `^-1`, `^(1/2)`, `**2`, `²`, `⁻¹`; `None` if it is begun and not right.
+    /// `^2`, `^-1`, `^(1/2)`, `**2`, `²`, `⁻¹`; `None` if malformed.
     fn power(&mut self) -> Option<Option<f64>> {
         if self.take(&["^", "**"]) {
             self.skip();

@@ -53,7 +53,7 @@ fn decimal_values_convert_exactly() {
     ];
     for (value, from, to, expected) in cases {
         assert_eq!(convert(value, from, to), Ok(expected), "{from} {to}");
-        // Back, to a last digit: 0.07 is not exactly seven hundredths.
+        // And back, to the last digit: 0.07 is not exactly seven hundredths.
         assert!((convert(expected, to, from).unwrap() / value - 1.0).abs() <= f64::EPSILON, "{to} {from}");
     }
 }
@@ -68,24 +68,24 @@ fn a_turn_is_two_pi_radians() {
     assert!(close(convert(turn, "rad/s", "rpm"), 60.0));
     assert!(close(convert(180.0, "deg", "rad"), turn / 2.0));
     assert_eq!(convert(2.0, "rad/s", "1/s"), Ok(2.0));
-    // A frequency may be meant either way.
+    // A frequency is ambiguous.
     assert_eq!(convert(1.0, "Hz", "1/s"), Err(Mismatch::Turns));
 }
 
 #[test]
-fn names_that_are_not_known_are_units_of_their_own() {
+fn unknown_names_are_base_units() {
     assert_eq!(convert(3.0, "cells/ml", "cells/l"), Ok(3000.0));
     assert_eq!(convert(1.0, "a.u.", "a.u."), Ok(1.0));
     assert_eq!(convert(1.0, "a.u.", "m"), Err(Mismatch::Dimension));
     assert_eq!(Unit::read("cells/ml").foreign().collect::<Vec<_>>(), ["cells"]);
     assert_eq!(Unit::read("m/s").foreign().count(), 0);
-    // What belongs below the stroke is not guessed.
+    // A second factor after a slash is ambiguous.
     assert!(Unit::well_formed("W/m^2 K").is_none());
     assert_eq!(convert(1.0, "degC", "K"), Err(Mismatch::Zero));
 }
 
 #[test]
-fn a_number_with_a_unit_is_told_from_an_expression() {
+fn a_number_with_a_unit_is_distinguished_from_an_expression() {
     let found = |text: &str| quantity(text).map(|q| (q.value, q.unit));
     let read = |value: f64, unit: &str| Some((value, unit.to_string()));
     assert_eq!(found("0.3 mm"), read(0.3, "mm"));

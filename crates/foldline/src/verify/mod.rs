@@ -1,20 +1,20 @@
-//! Is a diagram right? Its numbers against the same numbers computed in another way.
+//! Verification: the numbers of a diagram compared with independent computations.
 //!
-//! **Idea.** A cycle that came from collocation is computed again by multiple shooting: integration of the equations of motion and
-//! of their variational equations, which has nothing in common with the polynomials but the vector field. The nearest solution
-//! by shooting says how far off profile, period, extreme values and multipliers are, and that is held against the error that
-//! the point states itself. Special points are located again from solutions around them. That stability changes only where
-//! something is located needs no computation.
+//! **Idea.** A cycle computed by collocation is recomputed by multiple shooting: integration of the equations of motion
+//! and of their variational equations, which shares only the vector field with collocation. The differences from the
+//! nearest solution by shooting, in profile, period, extreme values and multipliers, are compared with the error that
+//! the point states. Special points are located again from solutions around them. That stability changes only at
+//! located points is checked without further computation.
 //!
-//! | question | file |
+//! | topic | file |
 //! |---|---|
-//! | the nearest solution by shooting? | `shooting`, `variational` |
-//! | is a point what it says? | `points` |
-//! | is a special point where it says? | `special` |
-//! | is every change of stability explained? | `record` |
+//! | nearest solution by shooting | `shooting`, `variational` |
+//! | single points | `points` |
+//! | positions of special points | `special` |
+//! | changes of stability | `record` |
 //!
-//! **Fails when** the integration is not accurate enough itself: stiff equations, or a right-hand side that jumps. What could not be
-//! decided is counted and said, not passed.
+//! **Fails when** the integration itself is not accurate enough: stiff equations, or a discontinuous right-hand side.
+//! Undecided cases are counted and reported as such, not as passed.
 
 mod points;
 mod record;
@@ -28,27 +28,28 @@ use crate::diagram::{Branch, Diagram, Kind, Solution};
 use crate::explore::System;
 use crate::problem::{Axis, Setting, Tie};
 
-/// What is compared.
+/// Quantity that is compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Quantity {
-    /// The state along a cycle, or that of an equilibrium, relative to its scale.
+    /// State along a cycle, or that of an equilibrium, relative to its scale.
     Profile,
-    /// The period, relative.
+    /// Period, relative.
     Period,
     /// Smallest and largest values of states and outputs, relative to their scale.
     Range,
     /// Multipliers, relative to the larger of 1 and their size; for an equilibrium the power sums of its eigenvalues.
     Spectrum,
-    /// A multiplier on the wrong side of the unit circle, or an eigenvalue of the imaginary axis: its distance to it.
+    /// Distance from the stability boundary of a multiplier on the wrong side of the unit circle, or an eigenvalue on
+    /// the wrong side of the imaginary axis.
     Stability,
-    /// The parameter at a special point, relative to 1 + its size.
+    /// Parameter at a special point, relative to 1 + its size.
     Place,
-    /// The number of unstable multipliers from one point to the next: by how many it is off.
+    /// Discrepancy in the number of unstable multipliers from one point to the next.
     Record,
 }
 
 impl Quantity {
-    /// Every quantity.
+    /// All quantities.
     pub const ALL: [Quantity; 7] = [
         Quantity::Profile,
         Quantity::Period,
@@ -59,7 +60,7 @@ impl Quantity {
         Quantity::Record,
     ];
 
-    /// The name used in tables.
+    /// Name used in tables.
     pub fn name(self) -> &'static str {
         match self {
             Quantity::Profile => "profile",
@@ -73,28 +74,28 @@ impl Quantity {
     }
 }
 
-/// A number of the diagram against the same number computed in another way.
+/// Comparison of a number of the diagram with its recomputed value.
 #[derive(Clone, Debug)]
 pub struct Check {
-    /// Which branch.
+    /// Branch.
     pub branch: String,
-    /// Which point; for a special point that just before it.
+    /// Position of the point; for a special point, of the point just before it.
     pub position: i64,
-    /// Which kind of special point, if it is one.
+    /// Kind of special point, if it is one.
     pub special: Option<Kind>,
     /// Value of the continuation parameter.
     pub parameter: f64,
-    /// What is compared.
+    /// Quantity that is compared.
     pub quantity: Quantity,
-    /// The error that the diagram states, and what the comparison itself may be off by; `None` where it states none, as runs of
+    /// Error stated by the diagram plus that of the comparison itself; `None` if the diagram states none, as runs of
     /// earlier versions for multipliers.
     pub stated: Option<f64>,
-    /// The difference that was found.
+    /// Difference found.
     pub found: f64,
 }
 
 impl Check {
-    /// The difference over the stated error; above 1 the diagram is wrong. `None` where no error is stated.
+    /// Difference over the stated error; above 1 the diagram is wrong. `None` if no error is stated.
     pub fn ratio(&self) -> Option<f64> {
         let stated = self.stated?;
         Some(if self.found == 0.0 { 0.0 } else { self.found / stated })
@@ -105,31 +106,31 @@ impl Check {
     }
 }
 
-/// What could not be decided, and why.
+/// Undecided check, with the reason.
 #[derive(Clone, Debug)]
 pub struct Undecided {
-    /// Which branch.
+    /// Branch.
     pub branch: String,
-    /// Which point.
+    /// Position of the point.
     pub position: i64,
-    /// Which kind of special point, if it is one.
+    /// Kind of special point, if it is one.
     pub special: Option<Kind>,
-    /// Why.
+    /// Reason.
     pub why: &'static str,
 }
 
-/// The result.
+/// Result of a verification.
 #[derive(Clone, Debug, Default)]
 pub struct Verified {
-    /// Every comparison, the worst first.
+    /// All comparisons, worst first.
     pub checks: Vec<Check>,
-    /// What was left undecided.
+    /// Undecided checks.
     pub undecided: Vec<Undecided>,
-    /// How many points were computed again.
+    /// Number of points recomputed.
     pub points: usize,
-    /// How many special points were located again.
+    /// Number of special points located again.
     pub special: usize,
-    /// Number of points without a stored profile, which were not computed again.
+    /// Number of points without a stored profile, which were not recomputed.
     pub removed: usize,
 }
 
@@ -142,14 +143,14 @@ impl Verified {
         self.removed += other.removed;
     }
 
-    /// Comparisons that show something wrong.
+    /// Comparisons that exceed the stated error.
     pub fn wrong(&self) -> impl Iterator<Item = &Check> {
         self.checks.iter().filter(|check| check.ratio().is_some_and(|ratio| ratio.is_nan() || ratio > 1.0))
     }
 }
 
-/// Verifies the branches of a diagram that was computed with that tolerance. `sample` is the largest number of points that are computed
-/// again, spread evenly over those branches; special points always are.
+/// Verifies the branches of a diagram computed with the given tolerance. `sample` is the maximum number of points
+/// recomputed, spread evenly over the branches; special points are always verified.
 pub fn verify(
     system: &System,
     diagram: &Diagram,
@@ -159,7 +160,7 @@ pub fn verify(
 ) -> Verified {
     let system = &system.clone().in_units_of(diagram);
     let branches: Vec<&Branch> = diagram.branches.iter().filter(|branch| kept(branch)).collect();
-    // Points whose profile has been removed cannot be computed again.
+    // Points without a stored profile cannot be recomputed.
     let stored = |branch: &Branch| -> Vec<usize> {
         (0..branch.points.len()).filter(|i| branch.points[*i].solution.is_stored()).collect()
     };
@@ -177,7 +178,7 @@ pub fn verify(
         let setting = setting(system, branch);
         out.add(points::verify(system, &setting, branch, &chosen, tolerance));
         out.add(special::verify(&setting, branch, tolerance));
-        // Along a curve in two parameters stability changes where two conditions meet, which are not located.
+        // Along a curve in two parameters stability also changes at codimension-two points that are not located.
         if branch.held.is_none() {
             out.add(record::verify(branch));
         }
@@ -186,14 +187,14 @@ pub fn verify(
     out
 }
 
-/// The accuracy of the integration for a diagram of that tolerance, and one that is coarser: what the two differ by is the error of
-/// the comparison itself. Next to no damping it is amplified as much as all other errors.
+/// Accuracy of the integration for a diagram of the given tolerance, and a coarser one: their difference is the error
+/// of the comparison itself, which weak damping amplifies as much as all other errors.
 fn accuracies(tolerance: f64) -> [f64; 2] {
     let fine = (1e-6 * tolerance).clamp(1e-13, 1e-9);
     [fine, 10.0 * fine]
 }
 
-/// What is free along a branch. The legs of a homotopy change several parameters in proportion.
+/// Setting with the free parameters of a branch. Homotopy runs change several parameters in proportion.
 fn setting<'a>(system: &'a System, branch: &Branch) -> Setting<'a> {
     let parameters = branch.points.first().map(|point| point.parameters.clone()).unwrap_or_default();
     let axis = |index: usize| Axis::new(index, system.unit(index));
@@ -214,10 +215,10 @@ fn setting<'a>(system: &'a System, branch: &Branch) -> Setting<'a> {
     Setting { field: system.field, scales: &system.scales, parameters, axes }
 }
 
-/// A parameter and by how much it changes.
+/// Parameter and its change.
 type Change = (usize, f64);
 
-/// What changes between two sets of parameters: that which changes most, and all of them.
+/// Largest change between two sets of parameters, and all changes.
 fn change(from: &[f64], to: &[f64]) -> Option<(Change, Vec<Change>)> {
     let all: Vec<Change> =
         from.iter().zip(to).map(|(a, b)| b - a).enumerate().filter(|(_, by)| by.abs() > 1e-13).collect();
@@ -230,7 +231,7 @@ fn larger(a: &Option<(Change, Vec<Change>)>, b: &Option<(Change, Vec<Change>)>) 
     size(a).total_cmp(&size(b))
 }
 
-/// Whether a branch is a curve of cycles (its points are).
+/// True if a branch is a curve of cycles (its points are).
 fn of_cycles(branch: &Branch) -> bool {
     branch.points.iter().any(|point| matches!(point.solution, Solution::Cycle(_)))
 }

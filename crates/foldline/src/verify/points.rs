@@ -1,4 +1,4 @@
-//! Is a point what it says?
+//! Verification of single points.
 //!
 //! **Equations.** For eigenvalues λ of an equilibrium with Jacobian J, k = 1 … n, which together determine them:
 //!
@@ -15,25 +15,26 @@ use crate::problem::gauss::Scheme;
 use crate::special::normal_form::Local;
 use num_complex::Complex64;
 
-/// Distance, relative, from which on what is found is not taken for the same solution: along a branch, and along a curve in two
-/// parameters, where there is a surface of solutions to go astray on.
+/// Relative distance beyond which a solution found counts as another one: along a branch, and along a curve in two
+/// parameters, near which there is a surface of solutions.
 const ELSEWHERE: [f64; 2] = [0.1, 1e-3];
-/// What rounding does to a comparison, relative.
+/// Relative rounding error of a comparison.
 const ROUNDING: f64 = 1e-11;
-/// Newton steps in twice the working precision: the matrix stays that of the point, and each gains several digits.
+/// Number of Newton steps in twice the working precision: the matrix is that of the point, and each step gains several
+/// digits.
 const STEPS: usize = 4;
-/// Places per step at which a trajectory is looked at for its extreme values.
+/// Number of points per step at which a trajectory is sampled for its extreme values.
 const PLACES: usize = 4;
-/// Places between two of these around a peak.
+/// Number of points between two samples around a peak.
 const FINER: usize = 20;
-/// Peaks that are looked at.
+/// Number of peaks examined.
 const PEAKS: usize = 3;
-/// Distance from the unit circle within which a multiplier is what a curve holds there.
+/// Distance from the unit circle within which a multiplier is the critical one of a bifurcation curve.
 const HELD: f64 = 1e-6;
-/// Cycles integrated at a time.
+/// Number of cycles integrated at a time.
 const BLOCK: usize = 16;
 
-/// Verifies the points with these indices.
+/// Verifies the points with the given indices.
 pub(super) fn verify(
     system: &System,
     setting: &Setting,
@@ -94,7 +95,7 @@ impl Part<'_> {
         let mut seen = Seen::new(self.setting.field.dim(), kept.len());
         let again: Vec<&Orbit> = kept.iter().map(|solved| &solved.orbit).collect();
         shooting.flows(&again, &mut |index, step| {
-            // The state comes first, then its derivatives, which are not looked at.
+            // The state comes first, followed by its derivatives, which are not needed.
             let mut x = vec![0.0; seen.n];
             for k in 0..PLACES {
                 let theta = k as f64 / PLACES as f64;
@@ -132,8 +133,8 @@ impl Part<'_> {
         }
     }
 
-    /// Of the state or output whose range is off by most of what is stated: that, and by how much it is off, relative to its size. Outputs
-    /// may be off by what the error of the states, passed on to them, makes of it too.
+    /// Stated error and actual difference of the range, relative to its size, of the state or output for which their
+    /// ratio is worst. Outputs are also allowed the effect of the error of the states.
     fn range_difference(&self, point: &Point, ranges: &[[f64; 2]], stated: f64, passed_on: &[f64]) -> (f64, f64) {
         let n = self.system.scales.len();
         // An angle that turns takes all values.
@@ -157,7 +158,7 @@ impl Part<'_> {
         let apart = pairs.iter().fold(0.0, |m, (a, b)| larger(m, (a - b).norm() / a.norm().max(1.0)));
         let stated = Some(point.trust.spectrum + noise).filter(|stated| stated.is_finite());
         out.checks.push(self.check(point, Quantity::Spectrum, stated, apart));
-        // What a curve holds at the unit circle is on neither side of it.
+        // The critical multiplier of a bifurcation curve is on neither side of the unit circle.
         let aside = if self.branch.held.is_some() { HELD } else { 0.0 };
         let wrong =
             pairs.iter().filter(|(a, b)| (a.norm() > 1.0) != (b.norm() > 1.0) && (b.norm() - 1.0).abs() >= aside);
@@ -165,7 +166,7 @@ impl Part<'_> {
         out.checks.push(self.check(point, Quantity::Stability, Some(noise), side));
     }
 
-    /// Whether this point is where the branch ends on another: doubled branches have a point there.
+    /// True if the branch ends at this point on another one: branches of doubled cycles have a point there.
     fn joins(&self, point: &Point) -> bool {
         let ends = [self.branch.points.first(), self.branch.points.last()];
         ends.iter().zip(&self.branch.ends).any(|(end, why)| {
@@ -174,8 +175,9 @@ impl Part<'_> {
         })
     }
 
-    /// How far the solution is, by Newton's method in twice the working precision with the matrix of the stored point: `step` gives the
-    /// relative changes of state and free parameters for a residual. `None` where the field cannot be evaluated so.
+    /// Distance of the solution, by Newton's method in twice the working precision with the matrix of the stored point:
+    /// `step` returns the relative changes of state and free parameters for a residual. `None` if the field cannot be
+    /// evaluated in that precision.
     fn precisely(
         &self,
         point: &Point,
@@ -206,7 +208,8 @@ impl Part<'_> {
         Some(max_abs(&whole))
     }
 
-    /// How fast f changes with the states, or, where it hardly does, how fast that changes over the scales along the null vector q.
+    /// Rate of change of f with the states or, where that vanishes, of this rate over the scales along the null vector
+    /// q.
     fn rate(&self, batch: Batch, fx: &[f64], q: &[f64]) -> f64 {
         let (n, scales) = (q.len(), self.setting.scales);
         let size = q.iter().zip(scales).fold(f64::MIN_POSITIVE, |most, (q, s)| most.max((q / s).abs()));
@@ -231,7 +234,7 @@ impl Part<'_> {
         self.setting.linearise(batch, &mut f, &mut fx, &mut fp);
         out.points += 1;
         let scales: Vec<f64> = x.iter().zip(self.setting.scales).map(|(x, s)| x.abs() + s).collect();
-        // Of the unknowns λ: relative to 1 + |λ|.
+        // Sizes of the unknowns λ: relative to 1 + |λ|.
         let sizes: Vec<f64> = self.setting.unknowns_of(point).iter().map(|own| 1.0 + own.abs()).collect();
         let held = self.branch.held.map(|(kind, _)| kind);
         let null = match held {
@@ -240,11 +243,11 @@ impl Part<'_> {
             }
             _ => None,
         };
-        // Of a single state nothing is left of the Jacobian.
+        // With a single state the Jacobian vanishes entirely.
         let rate = null.as_ref().map_or(0.0, |[q, _]| self.rate(batch, &fx, q));
-        // Where branches cross all along, only what the Jacobian reaches of the residual can be made up for.
+        // Along curves of branch points only the part of the residual in the range of the Jacobian can be corrected.
         let beyond = null.filter(|_| held == Some(Kind::BranchPoint));
-        // The shortest way to a solution in state and parameters.
+        // Minimum-norm step to a solution in state and parameters.
         let mut line: Vec<f64> = Vec::with_capacity(n * (n + k));
         for i in 0..n {
             line.extend((0..n).map(|j| fx[i * n + j] * scales[j]));
@@ -267,12 +270,12 @@ impl Part<'_> {
             update.truncate(n + k);
             update
         };
-        // Where branches come close to each other, or cross, rounding of f moves a solution by more than a digit of its own.
+        // Near other branches or a crossing, rounding of f moves a solution by more than its own last digit.
         let moved = |i: usize| {
             let size: f64 = (0..n).map(|j| (fx[i * n + j] * scales[j]).abs()).sum();
             max_abs(&step((0..n).map(|other| if other == i { f64::EPSILON * size } else { 0.0 }).collect()))
         };
-        // The parameter is rounded once more where its unknown is multiplied by its scale.
+        // The parameter is rounded once more when its unknown is multiplied by its scale.
         let moved = (0..n).map(moved).fold(f64::EPSILON, larger) + 0.5 * f64::EPSILON;
         let (off, rounding) = match self.precisely(point, x, [&scales, &sizes], &step) {
             Some(off) => (off, moved),
@@ -300,7 +303,7 @@ impl Part<'_> {
     }
 }
 
-/// Each of `a` with one of `b`: always the closest pair that is left, relative to its size.
+/// Pairs each of `a` with one of `b`, always taking the closest remaining pair, relative to its size.
 fn matched(a: &[Complex64], b: &[Complex64]) -> Vec<(Complex64, Complex64)> {
     let mut rest: Vec<Complex64> = b.to_vec();
     let mut out: Vec<Option<Complex64>> = vec![None; a.len()];
@@ -313,10 +316,10 @@ fn matched(a: &[Complex64], b: &[Complex64]) -> Vec<(Complex64, Complex64)> {
     a.iter().zip(out).map(|(a, b)| (*a, b.unwrap_or(Complex64::new(f64::NAN, 0.0)))).collect()
 }
 
-/// States along some cycles, collected while they are integrated.
+/// States along cycles, collected during integration.
 struct Seen {
     n: usize,
-    /// For each cycle its samples: segment, time in it, state.
+    /// Samples of each cycle: segment, time within it, state.
     samples: Vec<Vec<(usize, f64, Vec<f64>)>>,
 }
 
@@ -329,7 +332,7 @@ impl Seen {
         self.samples[cycle].push((segment, time, x.to_vec()));
     }
 
-    /// The path of a cycle over one period.
+    /// Path of a cycle over one period.
     fn path(&self, cycle: usize, orbit: &Orbit) -> Path {
         let mut samples: Vec<&(usize, f64, Vec<f64>)> = self.samples[cycle].iter().collect();
         samples.sort_by(|a, b| (a.0, a.1).partial_cmp(&(b.0, b.1)).unwrap_or(std::cmp::Ordering::Equal));
@@ -343,15 +346,15 @@ impl Seen {
     }
 }
 
-/// An integrated cycle.
+/// Integrated cycle.
 struct Path {
-    /// Normalised, from 0 on.
+    /// Normalised, starting at 0.
     times: Vec<f64>,
     /// `[n × times]`.
     states: Vec<f64>,
 }
 
-/// The flow in which a path lies.
+/// Flow to which a path belongs.
 #[derive(Clone, Copy)]
 struct Along<'a> {
     field: &'a dyn VectorField,
@@ -360,12 +363,12 @@ struct Along<'a> {
 }
 
 impl Along<'_> {
-    /// Normalised times as those of the field.
+    /// Converts normalised times to those of the field.
     fn times(&self, times: &[f64]) -> Vec<f64> {
         times.iter().take(if self.orbit.forced { usize::MAX } else { 0 }).map(|t| t * self.orbit.period).collect()
     }
 
-    /// The outputs `[output × times]` at states `[n × times]`.
+    /// Outputs `[output × times]` at states `[n × times]`.
     fn outputs(&self, states: &[f64], times: &[f64]) -> Vec<f64> {
         let mut outputs = vec![0.0; self.field.output_count() * times.len()];
         let (parameters, lanes) = (Parameters::Shared(self.parameters), times.len());
@@ -375,7 +378,7 @@ impl Along<'_> {
 }
 
 impl Path {
-    /// By how much every output changes at most where all states change by `error`, relative to their scales.
+    /// Largest change of each output if all states change by `error`, relative to their scales.
     fn passed_on(&self, along: Along, error: f64) -> Vec<f64> {
         let (lanes, outputs) = (self.times.len(), along.outputs(&self.states, &self.times));
         let mut total = vec![0.0; outputs.len()];
@@ -388,7 +391,7 @@ impl Path {
         total.chunks_exact(lanes).map(max_abs).collect()
     }
 
-    /// The largest distance of a profile from it, relative to `scales`.
+    /// Largest distance of a profile from the path, relative to `scales`.
     fn off(&self, cycle: &Cycle, scales: &[f64]) -> f64 {
         let (scheme, count) = (Scheme::new(cycle.degree), self.times.len());
         let mut x = vec![0.0; scales.len()];
@@ -401,7 +404,7 @@ impl Path {
         most
     }
 
-    /// Smallest and largest values of states and outputs of the cycle.
+    /// Smallest and largest values of states and outputs over the cycle.
     fn ranges(&self, along: Along) -> Vec<[f64; 2]> {
         let (n, lanes, parameters) = (along.field.dim(), self.times.len(), Parameters::Shared(along.parameters));
         let at = |states: &[f64], times: &[f64]| [states.to_vec(), along.outputs(states, times)].concat();
@@ -424,7 +427,8 @@ impl Path {
             .collect()
     }
 
-    /// Times, and states `[n × times]`, at equal distances between the samples next to a sample, on the cubics with the given slopes.
+    /// Times and states `[n × times]` at equidistant points between the neighbours of a sample, on the cubics with the
+    /// given slopes.
     fn between(&self, slopes: &[f64], place: usize) -> (Vec<f64>, Vec<f64>) {
         let lanes = self.times.len();
         let intervals = [(place + lanes - 1) % lanes, place];
@@ -447,7 +451,7 @@ impl Path {
     }
 }
 
-/// The best few samples at which `sign` times a periodic function has a peak.
+/// The few highest samples at which `sign` times a periodic function has a peak.
 fn peaks(values: &[f64], sign: f64) -> Vec<usize> {
     let count = values.len();
     let value = |k: usize| sign * values[k % count];
@@ -458,7 +462,7 @@ fn peaks(values: &[f64], sign: f64) -> Vec<usize> {
     places
 }
 
-/// Largest value of `sign` times a function at equal distances: at the top of the parabola through three samples.
+/// Largest value of `sign` times an equidistantly sampled function: at the top of the parabola through three samples.
 fn top(values: &[f64], sign: f64) -> f64 {
     let largest = values.iter().fold(f64::NEG_INFINITY, |m, v| m.max(sign * v));
     let tops = values.windows(3).map(|three| {

@@ -1,9 +1,10 @@
-//! Is every change of stability explained?
+//! Verification of changes of stability.
 
 use super::{Check, Quantity, Verified};
 use crate::diagram::{Branch, Kind, Record};
 
-/// Along the branch the number of unstable multipliers may change at special points only, by as much as their kind allows.
+/// Checks that the number of unstable multipliers changes along the branch only at special points, by as much as their
+/// kind allows.
 pub(super) fn verify(branch: &Branch) -> Verified {
     let mut out = Verified::default();
     let mut check = |position: i64, special: Option<Kind>, parameter: f64, found: usize| {

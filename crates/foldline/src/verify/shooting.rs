@@ -1,21 +1,21 @@
 //! Cycles by multiple shooting.
 //!
-//! **Idea.** A cycle is cut into segments at some of its mesh points. Each is integrated with the variational equations; that
-//! the end of each is the start of the next is solved by Newton's method. Segments keep what grows along the cycle from
-//! drowning everything else.
+//! **Idea.** A cycle is cut into segments at some of its mesh points. Each is integrated with the variational
+//! equations, and Newton's method makes the end of each segment the start of the next. Segments keep growing directions
+//! from dominating all others.
 //!
-//! **Equations.** Nodes x_i, i = 0 … K-1, x_K = x_0; φ the flow; s_i the share of the period between x_i and x_{i+1}; k free
-//! parameters λ:
+//! **Equations.** Nodes x_i, i = 0 … K-1, x_K = x_0; φ the flow; s_i the share of the period between x_i and x_{i+1}; k
+//! free parameters λ:
 //!
 //! ```text
 //!   (1)  φ(x_i; s_i T, λ) - x_{i+1} = 0
-//!   (2)  Σ_i ⟨f(x̃_i), x_i - x̃_i⟩ = 0                    phase, x̃ the nodes at the beginning
+//!   (2)  Σ_i ⟨f(x̃_i), x_i - x̃_i⟩ = 0                    phase, x̃ the initial nodes
 //!   (3)  ⟨c_r, (x, T, λ) - (x, T, λ)~⟩ = d_r             r = 1 … k
 //! ```
 //!
-//! A forced cycle has a given T, which takes the place of (2).
+//! The period T of a forced cycle is prescribed, which replaces (2).
 //!
-//! Without rows c the shortest update is taken: that towards the nearest solution.
+//! Without rows c the shortest update is taken, towards the nearest solution.
 //!
 //! **Source.** ascher1995, §4.
 
@@ -28,17 +28,17 @@ use crate::simulation::{Ensemble, Outcome, Step, Tolerance};
 use crate::stability::floquet::{self, Frames};
 use num_complex::Complex64;
 
-/// Segments of a cycle.
+/// Number of segments of a cycle.
 const SEGMENTS: usize = 16;
-/// Updates relative to the size of the cycle after which Newton's method has arrived …
+/// Updates relative to the size of the cycle at which Newton's method has converged …
 const ARRIVED: f64 = 1e-9;
-/// … and below which it may end because they do not become smaller: what is left is the error of the integration.
+/// … and below which it may end once they stop decreasing: only the error of the integration remains.
 const STALLED: f64 = 1e-5;
 const ITERATIONS: usize = 6;
-/// Steps after which an integration is given up.
+/// Maximum number of steps of an integration.
 const STEPS: usize = 2_000_000;
 
-/// A cycle as its nodes.
+/// Cycle represented by its nodes.
 #[derive(Clone, Debug)]
 pub(super) struct Orbit {
     /// `[K][n]`.
@@ -47,20 +47,20 @@ pub(super) struct Orbit {
     pub(super) shares: Vec<f64>,
     /// T, in the time of the field.
     pub(super) period: f64,
-    /// Whether T is given.
+    /// True if T is prescribed.
     pub(super) forced: bool,
     /// `[k]`.
     pub(super) free: Vec<f64>,
-    /// `[n]`: scale of the model and largest value of each component.
+    /// `[n]` scale of the model plus largest value of each component.
     pub(super) scales: Vec<f64>,
-    /// `[n]` what angles gain over the cycle; empty where none turns.
+    /// `[n]` increments of angles over the cycle; empty if none turns.
     pub(super) gain: Vec<f64>,
     /// Mesh interval at which each segment begins, `[K]`.
     pub(super) intervals: Vec<usize>,
 }
 
 impl Orbit {
-    /// The orbit of a point, in the free parameters of a setting; `None` if it is no cycle or has no profile.
+    /// Orbit of a point, in the free parameters of a setting; `None` if it is not a cycle or has no profile.
     pub(super) fn of(setting: &Setting, point: &Point) -> Option<Orbit> {
         let Solution::Cycle(cycle) = &point.solution else { return None };
         let (n, count) = (setting.field.dim(), cycle.intervals());
@@ -88,19 +88,19 @@ impl Orbit {
         self.scales.len()
     }
 
-    /// `[K + 1]` the times of the nodes and of the end, in the time of the field.
+    /// `[K + 1]` times of the nodes and of the end, in the time of the field.
     pub(super) fn times(&self) -> Vec<f64> {
         let mut times = vec![0.0];
         self.shares.iter().for_each(|share| times.push(times[times.len() - 1] + share * self.period));
         times
     }
 
-    /// Unknowns of (1) to (3): K n + 1 + k.
+    /// Number of unknowns of (1) to (3): K n + 1 + k.
     pub(super) fn unknowns(&self) -> usize {
         self.nodes.len() + 1 + self.free.len()
     }
 
-    /// The same moved by a scaled update.
+    /// Orbit moved by a scaled update.
     pub(super) fn moved(&self, update: &[f64]) -> Orbit {
         let n = self.dim();
         let mut out = self.clone();
@@ -116,12 +116,12 @@ fn largest(cycle: &Cycle, n: usize, c: usize) -> f64 {
     cycle.profile.iter().skip(c).step_by(n).fold(0.0, |m: f64, x| m.max(x.abs()))
 }
 
-/// The values of a profile `[interval][node][n]` at the left ends of some intervals.
+/// Values of a profile `[interval][node][n]` at the left ends of some intervals.
 pub(super) fn at_left_ends(profile: &[f64], intervals: &[usize], degree: usize, n: usize) -> Vec<f64> {
     intervals.iter().flat_map(|j| &profile[j * (degree + 1) * n..][..n]).copied().collect()
 }
 
-/// What integrating the segments of an orbit yields.
+/// Result of integrating the segments of an orbit.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Flow {
     /// `[K][n]`.
@@ -130,13 +130,13 @@ pub(super) struct Flow {
     pub(super) transitions: Vec<f64>,
     /// `[K][n × k]`.
     by_free: Vec<f64>,
-    /// `[K][n]`: f at the starts and ends of the segments.
+    /// `[K][n]` f at the starts and ends of the segments.
     begins: Vec<f64>,
     finishes: Vec<f64>,
 }
 
 impl Flow {
-    /// The multipliers without the trivial one.
+    /// Multipliers without the trivial one.
     pub(super) fn free_multipliers(&self, orbit: &Orbit) -> Vec<Complex64> {
         if orbit.forced {
             return floquet::forced(&self.transitions, orbit.dim()).multipliers;
@@ -144,7 +144,7 @@ impl Flow {
         self.multipliers(orbit).split_off(1)
     }
 
-    /// The multipliers of a cycle that is not forced, the trivial one first.
+    /// Multipliers of an autonomous cycle, the trivial one first.
     pub(super) fn multipliers(&self, orbit: &Orbit) -> Vec<Complex64> {
         let n = orbit.dim();
         let flow: Vec<f64> = self.begins.iter().enumerate().map(|(at, f)| f / orbit.scales[at % n]).collect();
@@ -152,28 +152,28 @@ impl Flow {
     }
 }
 
-/// A row of (3): scaled coefficients, and the distance.
+/// Row of (3): scaled coefficients, and the right-hand side.
 pub(super) type Row = (Vec<f64>, f64);
 
-/// A solution of (1).
+/// Solution of (1).
 #[derive(Clone, Debug)]
 pub(super) struct Solved {
     pub(super) orbit: Orbit,
     pub(super) flow: Flow,
-    /// `[k][unknowns]` in scaled unknowns: directions in which (1) and (2) stay satisfied, orthonormal; with one row, that which
-    /// makes an acute angle with it.
+    /// `[k][unknowns]` in scaled unknowns: orthonormal directions in which (1) and (2) stay satisfied; with one row,
+    /// oriented at an acute angle to it.
     pub(super) kernel: Vec<Vec<f64>>,
 }
 
 /// Integration of orbits in a setting.
 pub(super) struct Shooting<'a> {
     pub(super) setting: &'a Setting<'a>,
-    /// Accuracy of the integration, relative.
+    /// Relative accuracy of the integration.
     pub(super) accuracy: f64,
 }
 
 impl Shooting<'_> {
-    /// The flow along each orbit; `None` where the integration fails. `sample` sees every step of every orbit.
+    /// Flow along each orbit; `None` if the integration fails. `sample` sees every step of every orbit.
     pub(super) fn flows(&self, orbits: &[&Orbit], sample: &mut dyn FnMut(usize, &Step)) -> Vec<Option<Flow>> {
         let (n, k) = (self.setting.field.dim(), self.setting.freedom());
         let field = Variational { setting: self.setting };
@@ -240,7 +240,7 @@ impl Shooting<'_> {
         f
     }
 
-    /// Solutions next to the orbits, each with its rows (k of them) or none.
+    /// Solutions near the orbits, each with its rows (k of them) or none.
     pub(super) fn solve(&self, orbits: &[Orbit], rows: &[Vec<Row>]) -> Vec<Option<Solved>> {
         let mut found: Vec<Option<Solved>> = vec![None; orbits.len()];
         let mut current: Vec<Option<Orbit>> = orbits.iter().cloned().map(Some).collect();
@@ -273,7 +273,7 @@ impl Shooting<'_> {
         found
     }
 
-    /// A Newton step for (1) to (3), scaled, and the kernel.
+    /// Scaled Newton step for (1) to (3), and the kernel.
     fn update(&self, origin: &Orbit, orbit: &Orbit, flow: &Flow, rows: &[Row]) -> Option<(Vec<f64>, Vec<Vec<f64>>)> {
         let (n, k, size) = (orbit.dim(), orbit.free.len(), orbit.unknowns());
         let (count, scales) = (orbit.shares.len(), &orbit.scales);
@@ -338,7 +338,7 @@ impl Shooting<'_> {
         update.iter().all(|x| x.is_finite()).then_some((update, kernel))
     }
 
-    /// From one orbit to another, scaled as the first.
+    /// Difference from one orbit to another, scaled like the first.
     pub(super) fn between(&self, from: &Orbit, to: &Orbit) -> Vec<f64> {
         let n = from.dim();
         let nodes = from.nodes.iter().zip(&to.nodes).enumerate().map(|(at, (a, b))| (b - a) / from.scales[at % n]);

@@ -1,8 +1,8 @@
-//! Is a special point where it says?
+//! Verification of the positions of special points.
 //!
-//! **Idea.** Solutions at four distances around it, found by shooting, do not come close to what is singular there. A cubic through
-//! the test function at the four has its zero where the special point is, and gives the parameter there. If the cubic does not go
-//! smoothly, the distances are made smaller.
+//! **Idea.** Solutions at four distances around the point, found by shooting, avoid the singularity there. The zero of
+//! a cubic through the four values of the test function gives the parameter at the special point. If the cubic is not
+//! smooth enough, the distances are reduced.
 //!
 //! **Equations.** Test functions along the branch, with μ the multiplier and λ' the component of the unit tangent:
 //!
@@ -14,7 +14,7 @@
 //!   Hopf              (5)  Re of the complex pair of eigenvalues closest to the imaginary axis
 //! ```
 //!
-//! and μ - 1 is replaced by the eigenvalue closest to 0 for equilibria.
+//! For equilibria, μ - 1 is replaced by the eigenvalue closest to 0.
 
 use super::shooting::{Orbit, Row, Shooting, at_left_ends};
 use super::{Check, Quantity, Undecided, Verified, accuracies};
@@ -26,10 +26,10 @@ use num_complex::Complex64;
 
 /// Distances between neighbouring solutions, in scaled unknowns, in the order in which they are tried.
 const DISTANCES: [f64; 10] = [1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6, 3e-7];
-/// Share of the values next to the zero that the cubic may add to the parabola.
+/// Largest contribution of the cubic beyond the parabola, relative to the values next to the zero.
 const SMOOTH: f64 = 0.05;
 
-/// Share of the stated error that two distances may disagree by.
+/// Fraction of the stated error by which two distances may disagree.
 const AGREEING: f64 = 0.2;
 
 /// Verifies the special points of a branch.
@@ -74,7 +74,8 @@ struct Place<'a> {
     accuracy: f64,
 }
 
-/// A solution next to a special point: the parameter, λ', and the multipliers without the trivial one, or the eigenvalues.
+/// Solution next to a special point: the parameter, λ', and the multipliers without the trivial one, or the
+/// eigenvalues.
 struct Nearby {
     parameter: f64,
     slope: f64,
@@ -82,7 +83,8 @@ struct Nearby {
 }
 
 impl Place<'_> {
-    /// The parameter at the zero of the test function, of which two distances in succession agree; `None` if it has no zero here.
+    /// Parameter at the zero of the test function on which two successive distances agree; `None` if there is no zero
+    /// here.
     fn found(&self) -> Result<Option<f64>, &'static str> {
         let mut why = "the solutions around it could not be computed";
         let (mut tried, mut crossed) = (false, false);
@@ -108,7 +110,7 @@ impl Place<'_> {
             }
             let parameters: Vec<f64> = around.iter().map(|nearby| nearby.parameter).collect();
             let there = dot(&weights(&nodes, root), &parameters);
-            // The distances must agree better than is stated, or than the place is off.
+            // The distances must agree better than the stated error, or than the deviation of the point.
             let off = self.off(there);
             let close = (AGREEING * self.special.error).max(0.1 * off) + 100.0 * self.accuracy;
             if before.is_some_and(|before| (there - before).abs() < close * (1.0 + there.abs())) {
@@ -119,12 +121,12 @@ impl Place<'_> {
         if tried && !crossed { Ok(None) } else { Err(why) }
     }
 
-    /// Distance of λ = `there` from that, relative to 1 + |λ|.
+    /// Distance of λ = `there` from the stated value, relative to 1 + |λ|.
     fn off(&self, there: f64) -> f64 {
         (there - self.stated()).abs() / (1.0 + there.abs())
     }
 
-    /// The unknown λ where the special point says to be.
+    /// Stated value of the unknown λ at the special point.
     fn stated(&self) -> f64 {
         self.setting.unknowns_of(&self.special.point)[0]
     }
@@ -153,7 +155,7 @@ impl Place<'_> {
         }
     }
 
-    /// Solutions at these distances along the branch.
+    /// Solutions at the given distances along the branch.
     fn solutions(&self, nodes: &[f64; 4]) -> Result<Option<Vec<Nearby>>, &'static str> {
         match &self.special.point.solution {
             Solution::Equilibrium(x) => Ok(self.equilibria(x, nodes)),
@@ -167,14 +169,14 @@ impl Place<'_> {
                 }
                 let mut along: Vec<f64> = at_left_ends(&tangent[..size], &base.intervals, cycle.degree, n);
                 along.iter_mut().enumerate().for_each(|(at, t)| *t /= base.scales[at % n]);
-                // Of a forced cycle the tangent says nothing about the period, which is given.
+                // The period of a forced cycle is prescribed, so the tangent has no component along it.
                 along.push(if base.forced { 0.0 } else { tangent[size] / base.period });
                 along.push(tangent[size + 1]);
                 normalise(&mut along);
                 let shooting = Shooting { setting: self.setting, accuracy: self.accuracy };
                 let moved = |s: &f64| base.moved(&along.iter().map(|t| s * t).collect::<Vec<_>>());
                 let orbits: Vec<Orbit> = nodes.iter().map(moved).collect();
-                // In the planes through where the iteration begins.
+                // Each solution is sought in the plane through its initial guess.
                 let rows: Vec<Vec<Row>> = vec![vec![(along.clone(), 0.0)]; nodes.len()];
                 let solved = shooting.solve(&orbits, &rows);
                 let nearby = solved.into_iter().map(|solved| {
@@ -227,7 +229,7 @@ impl Place<'_> {
             if length.is_nan() {
                 return None;
             }
-            // Until rounding is all that is left.
+            // Iterate until only rounding remains.
             if length < 1e-14 || (length < 1e-9 && length > 0.5 * last) {
                 let mut kernel: Vec<f64> = right.iter().skip(1).step_by(2).copied().collect();
                 normalise(&mut kernel);
@@ -257,7 +259,7 @@ fn weights(nodes: &[f64; 4], s: f64) -> [f64; 4] {
     std::array::from_fn(|i| (0..4).filter(|&k| k != i).map(|k| (s - nodes[k]) / (nodes[i] - nodes[k])).product())
 }
 
-/// What the cubic through the nodes adds at `s` to the parabola through the three nearest ones.
+/// Difference at `s` between the cubic through all nodes and the parabola through the three nearest ones.
 fn bend(nodes: &[f64; 4], values: &[f64; 4], s: f64) -> f64 {
     let farthest = if s - nodes[0] > nodes[3] - s { 0 } else { 3 };
     let three = |i: usize| -> f64 {
@@ -267,7 +269,7 @@ fn bend(nodes: &[f64; 4], values: &[f64; 4], s: f64) -> f64 {
     (dot(&weights(nodes, s), values) - parabola).abs()
 }
 
-/// The zero of the cubic between nodes of which the outer ones have values of opposite sign.
+/// Zero of the cubic between nodes whose outer values have opposite signs.
 fn zero(nodes: &[f64; 4], values: &[f64; 4]) -> f64 {
     let (mut low, mut high) = (nodes[0], nodes[3]);
     for _ in 0..80 {

@@ -1,4 +1,4 @@
-//! The shooting by itself, and that what is wrong is found.
+//! Tests of the shooting itself, and of the detection of wrong diagrams.
 
 use super::shooting::{Orbit, Shooting};
 use super::{Quantity, verify};
@@ -77,7 +77,7 @@ fn shooting_gives_the_multipliers_of_the_closed_form() {
 }
 
 #[test]
-fn a_right_diagram_is_found_right_and_what_is_changed_in_it_is_found() {
+fn a_correct_diagram_passes_and_changes_in_it_are_detected() {
     let model = model();
     let right = computed(&model);
     let system = System::of(&model, &[-0.5, 2.0]);
@@ -87,7 +87,7 @@ fn a_right_diagram_is_found_right_and_what_is_changed_in_it_is_found() {
     assert!(found.undecided.is_empty() && found.special == 1, "{:?}", found.undecided);
     assert_eq!(found.points, right.branches.iter().map(|b| b.points.len()).sum::<usize>());
 
-    // One thing at a time.
+    // One change at a time.
     let worst = |change: &dyn Fn(&mut Diagram)| {
         let mut diagram = right.clone();
         change(&mut diagram);

@@ -1,4 +1,4 @@
-//! The variational equations as a vector field of their own.
+//! Variational equations as a vector field.
 //!
 //! **Equations.** In the time of one segment of a cycle, which lasts S:
 //!
@@ -6,16 +6,17 @@
 //!   (1)  x' = S f(x, p),   X' = S f_x X,   Y' = S (f_x Y + f_λ)          X(0) = I,  Y(0) = 0
 //! ```
 //!
-//! with the time τ' = S as the last state where the field is forced,
+//! If the field is forced, its time is the last state, with τ' = S.
 //!
-//! so that X and Y are the derivatives of the end with respect to the start and the free parameters λ.
+//! X and Y are the derivatives of the end with respect to the start and the free parameters λ.
 
 use crate::contract::{Batch, Parameters, VectorField};
 use crate::problem::Setting;
 
-/// (1): states x `[n]`, X `[n × n]`, Y `[n × k]`, row-major, and τ if any; parameters are those of the model and S.
+/// Field (1): states x `[n]`, X `[n × n]`, Y `[n × k]`, row-major, and τ if forced; the parameters are those of the
+/// model and S.
 pub(super) struct Variational<'a> {
-    /// The vector field with its k free parameters.
+    /// Vector field with its k free parameters.
     pub(super) setting: &'a Setting<'a>,
 }
 
@@ -79,12 +80,12 @@ impl VectorField for Variational<'_> {
         }
     }
 
-    /// Not known: nothing that integrates asks for it.
+    /// Not implemented: integration does not need it.
     fn linearise(&self, _at: Batch, _free: &[usize], f: &mut [f64], fx: &mut [f64], fp: &mut [f64]) {
         [f, fx, fp].into_iter().for_each(|all| all.fill(f64::NAN));
     }
 
-    /// Not known either.
+    /// Not implemented: integration does not need it.
     fn directional(&self, _at: Batch, _directions: &[&[f64]], out: &mut [f64]) {
         out.fill(f64::NAN);
     }

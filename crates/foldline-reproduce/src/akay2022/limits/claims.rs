@@ -1,4 +1,4 @@
-//! What the numbers say about the limit.
+//! Claims on the limit.
 
 use super::{Family, rooted, turning};
 use crate::akay2022::rotor::{max_r, speeds};
@@ -8,15 +8,15 @@ use foldline_rotor::{BackbonePoint, ContactLaw, Ratio, undamped_modes};
 
 const FIGURE: &str = "limits";
 
-/// How far the forced cycles at [`Family::compared`] are from the backbone.
+/// Distance of the forced cycles at [`Family::compared`] from the backbone.
 pub struct Distance {
     /// ε.
     pub epsilon: f64,
-    /// Of the largest radius and of the period, over their values on the backbone; the larger one of all sheets.
+    /// Differences of the largest radius and of the period, relative to the backbone; the largest over all sheets.
     pub relative: [f64; 2],
 }
 
-/// Every claim.
+/// Returns every claim.
 pub fn all(families: &[Family]) -> Vec<Claim> {
     let mut claims: Vec<Claim> = families.iter().map(root).collect();
     claims.extend(families.iter().filter(|f| f.has_contact()).map(interval));
@@ -26,12 +26,12 @@ pub fn all(families: &[Family]) -> Vec<Claim> {
     claims
 }
 
-/// Where a backbone begins, from its points of smallest radius, against the crossing of the Campbell diagram.
+/// Claim that a backbone, from its points of smallest radius, begins at the crossing of the Campbell diagram.
 fn root(family: &Family) -> Claim {
     let finding = || {
         let closed = family.ratio.speed(family.constants.polar, 1.0).ok_or("there is no crossing")?;
         let [a, b, ..] = &family.backbone.points[..] else { return Err("the backbone has no points".to_string()) };
-        // Below contact the speed does not depend on the radius; with the cubic spring it grows with its square.
+        // Below contact the speed does not depend on the radius; with the cubic spring it grows with the square.
         let share = if family.has_contact() { 0.0 } else { a.r_max.powi(2) / (b.r_max.powi(2) - a.r_max.powi(2)) };
         let computed = a.speed - share * (b.speed - a.speed);
         let found = Finding::vanishing((computed - closed).abs(), 1e-8);
@@ -43,7 +43,7 @@ fn root(family: &Family) -> Claim {
     Claim::check(FIGURE, statement, closed, finding())
 }
 
-/// Between which speeds a backbone with contact lies, with the piecewise-linear law and with the tanh law.
+/// Claim on the speeds between which a backbone with contact lies, for the piecewise-linear law and for the tanh law.
 fn interval(family: &Family) -> Claim {
     let ends = |law: ContactLaw| {
         let backbone = rooted(&family.constants, law, family.ratio)?;
@@ -54,7 +54,7 @@ fn interval(family: &Family) -> Claim {
     let finding = || {
         let [low, high] = bounds.ok_or("there is no crossing")?;
         let ([a, b], [soft, _]) = (ends(ContactLaw::Piecewise)?, ends(ContactLaw::Tanh)?);
-        // Below contact the backbone stands at the lower end.
+        // Below contact the backbone is at the lower end.
         let error = 1e-8;
         let holds = a > low - error && b < high;
         let note = format!("piecewise-linear law; the pull of the tanh law leads {:.1e} below it", low - soft);
@@ -69,7 +69,7 @@ fn interval(family: &Family) -> Claim {
     )
 }
 
-/// Largest radius and period of the backbone at a speed, on the polynomials through its six nearest points.
+/// Largest radius and period of the backbone at a speed, interpolated by polynomials through its six nearest points.
 fn at(points: &[BackbonePoint], speed: f64) -> Option<[f64; 2]> {
     let k = points.windows(2).position(|w| (w[0].speed - speed) * (w[1].speed - speed) <= 0.0)?;
     let count = points.len().min(6);
@@ -82,7 +82,7 @@ fn at(points: &[BackbonePoint], speed: f64) -> Option<[f64; 2]> {
     Some([value(|p| p.r_max), value(|p| p.period)])
 }
 
-/// Distances by falling ε.
+/// Distances by decreasing ε.
 pub fn distances(family: &Family) -> Result<Vec<Distance>, String> {
     let speed = family.compared;
     let backbone = at(&family.backbone.points, speed);
@@ -99,13 +99,13 @@ pub fn distances(family: &Family) -> Result<Vec<Distance>, String> {
     Ok(found)
 }
 
-/// The powers of ε with which distances fall, from the two smallest ε.
+/// Powers of ε with which the distances fall, from the two smallest ε.
 pub fn order(found: &[Distance]) -> Option<[f64; 2]> {
     let [.., a, b] = found else { return None };
     Some([0, 1].map(|k| (a.relative[k] / b.relative[k]).ln() / (a.epsilon / b.epsilon).ln()))
 }
 
-/// Whether the forced cycles come closer, and with which powers of ε.
+/// Claim that the forced cycles approach the backbone with the expected powers of ε.
 fn approach(family: &Family) -> Claim {
     // DL is symmetric under half a turn, under which ε changes its sign: its period is even in ε.
     let expected = if family.name == "SL" { [1.0, 1.0] } else { [1.0, 2.0] };
@@ -113,7 +113,7 @@ fn approach(family: &Family) -> Claim {
         let found = distances(family)?;
         let falls = found.windows(2).all(|w| (0..2).all(|k| w[1].relative[k] < w[0].relative[k]));
         let order = order(&found).ok_or("there are too few branches")?;
-        // The next power of ε is still felt at the smallest ε.
+        // The next power of ε still has an effect at the smallest ε.
         let holds = falls && (0..2).all(|k| (order[k] - expected[k]).abs() < 0.1);
         let all: Vec<String> = found.iter().map(|d| format!("{:.1e}, {:.1e}", d.relative[0], d.relative[1])).collect();
         let note = format!("relative distances at Ω = {} by falling ε: {}", family.compared, all.join("; "));
@@ -124,10 +124,10 @@ fn approach(family: &Family) -> Claim {
     Claim::check(FIGURE, statement, format!("{}, {}", expected[0], expected[1]), finding())
 }
 
-/// Up to which J_p the crossing exists: where it goes off to infinite speed.
+/// Claim on the J_p up to which the crossing exists; there it goes to infinite speed.
 fn exists(name: &str, ratio: Ratio) -> Claim {
     let n = f64::from(ratio.backward);
-    // From the critical speed on the ratio of the frequencies falls with Ω; the crossing exists where it gets below n.
+    // Beyond the critical speed the frequency ratio falls with Ω; the crossing exists if the ratio drops below n.
     const FAR: f64 = 1e5;
     let crosses = |polar: f64| {
         let [slow, fast] = undamped_modes(FAR, polar, 1.0).rotating;
@@ -145,7 +145,7 @@ fn exists(name: &str, ratio: Ratio) -> Claim {
         .noting("the frequencies at a high speed, against the closed form")
 }
 
-/// Where SL turns back: the damping limit of the backbone against the folds of the forced branches.
+/// Claim on the turning points of SL: the damping limit of the backbone against the folds of the forced branches.
 fn turns(family: &Family) -> Claim {
     let finding = || {
         let (mut lines, mut off, mut error) = (Vec::new(), vec![Vec::new(); 2], 0.0_f64);

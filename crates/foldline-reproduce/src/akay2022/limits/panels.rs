@@ -1,4 +1,4 @@
-//! The panels: Campbell diagrams, forced branches with their backbones, distances, and the limit of damping.
+//! Panels: Campbell diagrams, forced branches with their backbones, distances, and the damping limit.
 
 use super::claims::{distances, order};
 use super::{Family, Level};
@@ -7,10 +7,10 @@ use foldline_plot::palette::{BLACK, BLUE, GREY, ORANGE, PALE, PURPLE, SKY, VERMI
 use foldline_plot::{Axis, Layer, LegendPlace, Marker, Panel, branch_curve};
 use foldline_rotor::{Ratio, undamped_modes};
 
-/// By falling unbalance.
+/// Colours by decreasing unbalance.
 const LEVELS: [&str; 4] = [ORANGE, SKY, BLUE, BLACK];
 
-/// Every panel, in a grid of six columns.
+/// Returns every panel, in a grid of six columns.
 pub fn all(families: &[Family]) -> Result<Vec<Panel>, String> {
     let reference = &families[0].constants;
     let mut panels = vec![rotating(reference.polar, reference.beta), inertial(reference.polar, reference.beta)];
@@ -28,7 +28,7 @@ pub fn all(families: &[Family]) -> Result<Vec<Panel>, String> {
 
 const SPEEDS: [f64; 2] = [0.0, 12.0];
 
-/// Something of both modes at many speeds.
+/// A quantity of both modes over many speeds.
 fn over_speeds(polar: f64, stiffness: f64, of: impl Fn([f64; 2], [f64; 2]) -> f64) -> Vec<[f64; 2]> {
     const STEPS: usize = 240;
     let speed = |k: usize| SPEEDS[0] + (SPEEDS[1] - SPEEDS[0]) * k as f64 / STEPS as f64;
@@ -36,7 +36,7 @@ fn over_speeds(polar: f64, stiffness: f64, of: impl Fn([f64; 2], [f64; 2]) -> f6
     (0..=STEPS).map(|k| [speed(k), of(at(speed(k)).rotating, at(speed(k)).inertial)]).collect()
 }
 
-/// Stiffness, what it means, and its colour.
+/// Stiffness, its description, and its colour.
 fn springs(beta: f64) -> [(f64, &'static str, &'static str); 2] {
     [(1.0, "ring never touched", BLACK), (1.0 + beta, "ring always touched", PURPLE)]
 }
@@ -108,7 +108,7 @@ fn branches(family: &Family, label: &str, [x0, x1, y0, y1]: [f64; 4]) -> Panel {
     panel
 }
 
-/// `ε = 0.1765, ζ = 0.0025`
+/// Legend entry such as `ε = 0.1765, ζ = 0.0025`.
 fn named(level: &Level) -> String {
     let short = |x: f64| {
         let decimals = (3 - x.log10().floor() as i32).clamp(0, 9) as usize;
@@ -117,7 +117,7 @@ fn named(level: &Level) -> String {
     format!("ε = {}, ζ = {}", short(level.epsilon), short(level.zeta))
 }
 
-/// Distances from the backbone over ε.
+/// Panel of the distances from the backbone over ε.
 fn nearness(families: &[Family], law: &str, label: &str) -> Result<Panel, String> {
     let axes = (Axis::new("ε").from(0.03, 1.0).log(), Axis::new("relative distance").from(1e-7, 1.0).log());
     let members: Vec<&Family> = families.iter().filter(|f| f.law == law).collect();
@@ -139,7 +139,7 @@ fn nearness(families: &[Family], law: &str, label: &str) -> Result<Panel, String
     Ok(panel)
 }
 
-/// The damping limit of first order along the backbones of SL, and the folds of the forced branches.
+/// Panel of the first-order damping limit along the backbones of SL, with the folds of the forced branches.
 fn damping(families: &[Family]) -> Panel {
     let axes = (Axis::new("Ω").from(3.0, 11.5), Axis::new("ζ/ε").from(1e-3, 2.0).log());
     let mut panel = Panel::new("(i)", "SL turns back", axes.0, axes.1);

@@ -1,7 +1,8 @@
-//! Where a backbone loses its forced cycles.
+//! Speeds at which a backbone loses its forced cycles.
 //!
-//! **Idea.** Between two neighbouring points of a backbone the damping limit passes ζ/ε. The radius is halved in between, and the
-//! orbit of each radius corrected: next to the root the pull of the tanh law bends the backbone too sharply to interpolate.
+//! **Idea.** The damping limit passes ζ/ε between two neighbouring points of a backbone. The interval is bisected in
+//! the radius, and the orbit of each radius corrected, because near the root the pull of the tanh law bends the
+//! backbone too sharply for interpolation.
 
 use super::Family;
 use foldline::continuation::Settings;
@@ -12,8 +13,8 @@ use foldline_rotor::{BackbonePoint, BackboneProblem, OverhungRotor, Spectrum};
 
 const TOLERANCE: f64 = 1e-9;
 
-/// Speeds at which the damping limit of the backbone of SL passes `ratio` = ζ/ε, by growing distance from the root; each with
-/// half the width of its bracket and the tolerance of the orbits as error.
+/// Speeds at which the damping limit of the backbone of SL passes `ratio` = ζ/ε, by increasing distance from the root.
+/// The error of each is half the width of its bracket plus an allowance for the tolerance of the orbits.
 pub fn speeds(family: &Family, ratio: f64) -> Result<Vec<[f64; 2]>, String> {
     let above = |p: &BackbonePoint| p.damping_limit().is_some_and(|limit| limit > ratio);
     let passes = family.backbone.points.windows(2).filter(|pair| above(&pair[0]) != above(&pair[1]));
@@ -32,7 +33,7 @@ fn halved(family: &Family, pair: &[BackbonePoint], ratio: f64) -> Result<[f64; 2
         }
         let middle: Vec<f64> = a.iter().zip(&b).map(|(x, y)| 0.5 * (x + y)).collect();
         problem.anchor(&middle);
-        // The radius at the start is kept.
+        // Keeps the radius at the start fixed.
         let plane = Plane { row: vec![1.0, 0.0, 0.0, 0.0], base: middle.clone(), distance: 0.0 };
         let found = settle(&mut problem, &settings, plane, middle, 1.0, &mut Cost::default());
         let found = found.map_err(|why| format!("between two points of a backbone: {why}"))?;

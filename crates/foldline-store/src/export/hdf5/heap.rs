@@ -1,15 +1,15 @@
-//! Texts and lists of references: what has no fixed length lies in heaps, and is pointed at.
+//! Global heaps, which store texts and lists of references; these have no fixed length and are referred to by pointers.
 //!
 //! **Source.** hdfgroup2024, section III.E (global heap).
 
 use super::Id;
 
-/// How many objects a heap takes, at most; their numbers have 16 bits.
+/// Largest number of objects in a heap; their indices have 16 bits.
 const MOST: usize = 4096;
 const LEAST_SIZE: u64 = 4096;
 const HEAD: u64 = 16;
 
-/// What lies in a heap.
+/// Object in a heap.
 pub(super) enum Lying {
     Text(Vec<u8>),
     Reference(Id),
@@ -24,7 +24,7 @@ impl Lying {
     }
 }
 
-/// Where something lies: which heap, which number in it, how long it is. `None` for an empty text.
+/// Position of an object: heap, and index within the heap, from 1. `None` for an empty text.
 pub(super) type Place = Option<(usize, u32)>;
 
 #[derive(Default)]
@@ -49,14 +49,14 @@ impl Heaps {
         self.heaps.len()
     }
 
-    /// Bytes of a heap.
+    /// Size of a heap in bytes.
     pub(super) fn size(&self, heap: usize) -> u64 {
         let objects: u64 = self.heaps[heap].iter().map(|what| HEAD + padded(what.size())).sum();
-        // The free space at its end is an object too, with a head.
+        // The free space at its end is an object too, with a header.
         (2 * HEAD + objects).max(LEAST_SIZE)
     }
 
-    /// The length and place of something as an element of a list.
+    /// Returns the pointer to an object: its length in units of `unit` bytes, the address of its heap, and its index.
     pub(super) fn pointer(&self, place: Place, unit: usize, addresses: &[u64]) -> [u8; 16] {
         let mut out = [0; 16];
         if let Some((heap, number)) = place {
@@ -68,7 +68,7 @@ impl Heaps {
         out
     }
 
-    /// The bytes of a heap, given where objects of the file lie.
+    /// Returns the bytes of a heap, given the addresses of the objects of the file.
     pub(super) fn bytes(&self, heap: usize, address_of: &dyn Fn(Id) -> u64) -> Vec<u8> {
         let size = self.size(heap);
         let mut out = b"GCOL\x01\0\0\0".to_vec();

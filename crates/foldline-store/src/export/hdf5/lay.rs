@@ -1,14 +1,14 @@
-//! From a plan to a file.
+//! Layout of a planned file.
 
 use super::messages::{Message, NOWHERE};
 use super::{Element, Id, Kind, Object, Place, Plan, ROOT, Value, messages};
 use std::fs::File;
 use std::io::{Error, Result, Seek, SeekFrom, Write};
 
-/// The size of a message has 16 bits.
+/// Largest message in bytes; the format stores the size in 16 bits.
 const LARGEST_MESSAGE: usize = u16::MAX as usize;
 
-/// A file whose objects have their places.
+/// File with a fixed layout, to which numbers can be written.
 pub struct Laid {
     file: File,
     data: Vec<u64>,
@@ -16,10 +16,11 @@ pub struct Laid {
 }
 
 impl Plan {
-    /// Writes everything but the numbers, which are 0 until they are [`Laid::put`].
+    /// Writes everything but the numbers, which are 0 until they are written by [`Laid::put`].
     ///
     /// # Errors
-    /// Of the file; and where one name or the list of users of one dimension is longer than the format takes.
+    /// If the file cannot be written, or if a name or the list of variables of a dimension exceeds the limit of the
+    /// format.
     pub fn lay(self, mut file: File) -> Result<Laid> {
         let mut places = Places {
             objects: vec![NOWHERE; self.objects.len()],
@@ -78,7 +79,7 @@ impl Plan {
         dimensions.iter().map(length).collect()
     }
 
-    /// Bytes that are stored of the elements.
+    /// Number of bytes that the elements of an object occupy.
     fn size(&self, object: &Object) -> u64 {
         match &object.kind {
             Kind::Group { .. } => 0,
@@ -147,7 +148,7 @@ impl Plan {
     }
 }
 
-/// Where things lie.
+/// Addresses in the file.
 struct Places {
     objects: Vec<u64>,
     data: Vec<u64>,
@@ -155,10 +156,10 @@ struct Places {
 }
 
 impl Laid {
-    /// Writes the elements of a variable from the one numbered `first` on, little-endian.
+    /// Writes elements of a variable, little-endian, starting at the element with index `first`.
     ///
     /// # Errors
-    /// Of the file.
+    /// If the bytes exceed the planned size of the variable, or if the file cannot be written.
     pub fn put(&mut self, id: Id, first: u64, bytes: &[u8]) -> Result<()> {
         let at = 8 * first;
         if at + bytes.len() as u64 > self.sizes[id] {

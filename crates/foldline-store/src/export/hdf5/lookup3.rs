@@ -1,8 +1,8 @@
-//! The checksum of HDF5 metadata.
+//! Checksum of HDF5 metadata.
 //!
-//! **Source.** jenkins2006 (the hash of a string of bytes, started at 0); hdfgroup2024, section VIII.
+//! **Source.** jenkins2006 (hash of a byte string with initial value 0); hdfgroup2024, section VIII.
 
-/// The checksum of `bytes`.
+/// Returns the checksum of `bytes`.
 pub(super) fn lookup3(bytes: &[u8]) -> u32 {
     let start = 0xdead_beef_u32.wrapping_add(bytes.len() as u32);
     let mut state = [start; 3];
@@ -46,7 +46,7 @@ fn finish(state: &mut [u32; 3]) {
 mod tests {
     use super::lookup3;
 
-    /// The values that the author of the hash gives for these bytes.
+    /// Values published by the author of the hash.
     #[test]
     fn known_values() {
         assert_eq!(lookup3(b""), 0xdead_beef);

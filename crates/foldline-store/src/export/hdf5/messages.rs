@@ -1,12 +1,12 @@
-//! The messages of which object headers are made.
+//! Messages of the object headers.
 //!
-//! **Source.** hdfgroup2024, section IV.A.2: dataspace version 2, datatype version 1 and 3, fill value version 3, data layout
-//! version 3, attribute version 3, link version 1, link info and group info version 0.
+//! **Source.** hdfgroup2024, section IV.A.2: dataspace version 2, datatype versions 1 and 3, fill value version 3, data
+//! layout version 3, attribute version 3, link version 1, link info and group info version 0.
 
-/// An address that means "nowhere".
+/// Undefined address.
 pub(super) const NOWHERE: u64 = u64::MAX;
 
-/// A message: its type and its bytes.
+/// Message: type and contents.
 pub(super) struct Message {
     pub(super) code: u8,
     pub(super) bytes: Vec<u8>,
@@ -16,19 +16,19 @@ fn message(code: u8, parts: &[&[u8]]) -> Message {
     Message { code, bytes: parts.concat() }
 }
 
-/// What an element is.
+/// Type of an element.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Element {
-    /// A double-precision number.
+    /// Double-precision number.
     Real,
-    /// A signed integer of 64 bits.
+    /// Signed 64-bit integer.
     Integer,
-    /// A text of any length.
+    /// Text of any length.
     Text,
 }
 
 impl Element {
-    /// Bytes of an element in the file; of a text those that point to it.
+    /// Size of an element in bytes; for a text, the size of the pointer to it.
     pub(super) fn size(self) -> u64 {
         if self == Element::Text { 16 } else { 8 }
     }
@@ -37,7 +37,7 @@ impl Element {
         match self {
             Element::Real => real(8, [0x20, 0x3f], [52, 11, 0, 52], 1023),
             Element::Integer => integer(8),
-            // A list of bytes, marked as a text in UTF-8 that ends at its end.
+            // A variable-length list of bytes, marked as unterminated UTF-8 text.
             Element::Text => [&[0x19, 0x01, 0x01, 0, 16, 0, 0, 0][..], &unsigned_byte()].concat(),
         }
     }
@@ -56,7 +56,7 @@ fn unsigned_byte() -> Vec<u8> {
     vec![0x10, 0, 0, 0, 1, 0, 0, 0, 0, 0, 8, 0]
 }
 
-/// A text of a fixed number of bytes, in UTF-8.
+/// Datatype of a UTF-8 text with a fixed number of bytes.
 pub(super) fn fixed_text(size: usize) -> Vec<u8> {
     [&[0x13, 0x10, 0, 0][..], &(size as u32).to_le_bytes()].concat()
 }
@@ -65,23 +65,24 @@ fn reference() -> Vec<u8> {
     vec![0x17, 0, 0, 0, 8, 0, 0, 0]
 }
 
-/// A list of references to objects.
+/// Datatype of a variable-length list of object references.
 pub(super) fn references() -> Vec<u8> {
     [&[0x19, 0, 0, 0, 16, 0, 0, 0][..], &reference()].concat()
 }
 
-/// What a dimension knows of a variable: a reference to it, and which of its dimensions it is. 12 bytes.
+/// Datatype of an entry in the REFERENCE_LIST of a dimension: a reference to a variable, and the position of the
+/// dimension in that variable. 12 bytes.
 pub(super) fn user_of_dimension() -> Vec<u8> {
     let head = [0x36, 2, 0, 0, 12, 0, 0, 0];
     [&head[..], b"dataset\0\0", &reference(), b"dimension\0\x08", &integer(4)].concat()
 }
 
-/// Of a dimension that has no values of its own, four bytes each, of which none are stored.
+/// Datatype of a dimension without values: four-byte numbers, none of which is stored.
 pub(super) fn no_values() -> Vec<u8> {
     real(4, [0x20, 0x1f], [23, 8, 0, 23], 127)
 }
 
-/// `None` is a single element.
+/// Dataspace of the given shape; `None` is a scalar.
 pub(super) fn dataspace(shape: Option<&[u64]>) -> Vec<u8> {
     let shape_bytes: Vec<u8> = shape.unwrap_or(&[]).iter().flat_map(|n| n.to_le_bytes()).collect();
     let rank = shape.map_or(0, <[u64]>::len) as u8;
@@ -94,20 +95,20 @@ pub(super) fn attribute(name: &str, datatype: &[u8], dataspace: &[u8], value: &[
     message(0x0c, &[&[3, 0], sizes.as_flattened(), &[1], &name, datatype, dataspace, value])
 }
 
-/// A name in a group, the so-many-th, for the object at `address`.
+/// Link in a group: the name of the object at `address`, and its number in creation order.
 pub(super) fn link(name: &str, number: u64, address: u64) -> Message {
-    // Two bytes for the length of the name, its place in the order, its encoding.
+    // Flags 0x15: the length of the name has two bytes, and the creation order and the encoding of the name are given.
     let length = (name.len() as u16).to_le_bytes();
     message(0x06, &[&[1, 0x15], &number.to_le_bytes(), &[1], &length, name.as_bytes(), &address.to_le_bytes()])
 }
 
-/// What every group has: the order of its `count` members is kept, and their names stand in its header.
+/// Messages of every group: the creation order of its `count` members is tracked, and the links are in its header.
 pub(super) fn group(count: u64) -> [Message; 2] {
     let nowhere = NOWHERE.to_le_bytes();
     [message(0x02, &[&[0, 0x03], &count.to_le_bytes(), &nowhere, &nowhere, &nowhere]), message(0x0a, &[&[0, 0]])]
 }
 
-/// What every dataset has; its elements lie in one piece.
+/// Messages of every dataset; its elements are stored contiguously.
 pub(super) fn dataset(datatype: &[u8], shape: &[u64], address: u64, size: u64) -> [Message; 4] {
     [
         message(0x01, &[&dataspace(Some(shape))]),
@@ -117,7 +118,7 @@ pub(super) fn dataset(datatype: &[u8], shape: &[u64], address: u64, size: u64) -
     ]
 }
 
-/// An object header: the order of attributes is kept.
+/// Object header; the creation order of the attributes is tracked.
 pub(super) fn header(messages: &[Message]) -> Vec<u8> {
     let mut body = Vec::new();
     let mut attributes = 0u16;
@@ -137,7 +138,7 @@ pub(super) fn header(messages: &[Message]) -> Vec<u8> {
     out
 }
 
-/// The first bytes of the file, version 2.
+/// Superblock, version 2: the first bytes of the file.
 pub(super) fn superblock(end: u64, root: u64) -> Vec<u8> {
     let mut out = b"\x89HDF\r\n\x1a\n\x02\x08\x08\0".to_vec();
     for address in [0, NOWHERE, end, root] {

@@ -1,14 +1,14 @@
-//! Files of the HDF5 format, as much of it as NetCDF-4 needs.
+//! Writer of the subset of HDF5 that NetCDF-4 needs.
 //!
-//! **Idea.** A [`Plan`] says first what the file will hold: groups, dimensions, variables with their shapes, attributes, texts.
-//! From that follows where everything lies, so that the numbers can then be written in any order and in pieces of any size
-//! ([`Laid::put`]), and never need to be in memory together.
+//! **Idea.** A [`Plan`] first lists the contents of the file: groups, dimensions, variables with their shapes,
+//! attributes and texts. The layout follows from it. The numbers can then be written in any order and in pieces of any
+//! size ([`Laid::put`]) and need not be in memory together.
 //!
-//! **Source.** hdfgroup2024 (HDF5 file format, version 3: superblock 2, object headers 2, contiguous datasets, global heaps);
-//! the attributes that make a dataset a dimension: vicente2005; how NetCDF-4 uses them: unidata2024.
+//! **Source.** hdfgroup2024 (HDF5 file format, version 3: superblock 2, object headers 2, contiguous datasets, global
+//! heaps); vicente2005 for the attributes that make a dataset a dimension; unidata2024 for their use in NetCDF-4.
 //!
-//! **Departures.** Nothing is compressed. Links and attributes stand in the object headers, however many there are: a reader
-//! does not mind.
+//! **Departures.** Nothing is compressed. Links and attributes are stored in the object headers regardless of their
+//! number; readers accept this.
 
 mod heap;
 mod lay;
@@ -20,13 +20,13 @@ pub use messages::Element;
 
 use heap::{Heaps, Lying, Place};
 
-/// An object of a plan; 0 is the root group.
+/// Index of an object of a plan; 0 is the root group.
 pub type Id = usize;
 
-/// The root group.
+/// Root group.
 pub const ROOT: Id = 0;
 
-/// The longest text that is stored within an attribute; longer ones lie in a heap.
+/// Longest text in bytes that is stored within an attribute; longer texts are stored in a heap.
 const LONGEST_WITHIN: usize = 4096;
 
 enum Kind {
@@ -38,7 +38,7 @@ enum Kind {
         dimensions: Vec<Id>,
         texts: Vec<Place>,
     },
-    /// Has the values of a dataset of its own name, or none.
+    /// Dimension, with the values of a variable of the same name or without values.
     Dimension {
         length: u64,
         values: Option<Element>,
@@ -53,7 +53,7 @@ struct Object {
 }
 
 enum Value {
-    /// With a zero at its end, as the library insists where it looks for dimensions.
+    /// Null-terminated, as the HDF5 library requires of the attributes of dimensions.
     Ended(String),
     Short(String),
     Long(Place),
@@ -61,7 +61,7 @@ enum Value {
     Integer(i64),
 }
 
-/// What a file will hold.
+/// Planned contents of a file.
 pub struct Plan {
     objects: Vec<Object>,
     heaps: Heaps,
@@ -76,12 +76,12 @@ impl Default for Plan {
 }
 
 impl Plan {
-    /// A group in the group `parent`.
+    /// Adds a group to the group `parent`.
     pub fn group(&mut self, parent: Id, name: &str) -> Id {
         self.add(parent, name, Kind::Group { members: Vec::new() })
     }
 
-    /// A dimension of a length that is not 0; it has values where `values` says of which kind.
+    /// Adds a dimension of nonzero length. If it has values, `values` is their type.
     pub fn dimension(&mut self, parent: Id, name: &str, length: u64, values: Option<Element>) -> Id {
         let id = self.add(parent, name, Kind::Dimension { length, values, users: Vec::new() });
         let own = match values {
@@ -94,7 +94,7 @@ impl Plan {
         id
     }
 
-    /// A variable over dimensions, the slowest first.
+    /// Adds a variable over the given dimensions, the slowest first.
     pub fn variable(&mut self, parent: Id, name: &str, element: Element, dimensions: &[Id]) -> Id {
         let id = self.add(parent, name, Kind::Dataset { element, dimensions: dimensions.to_vec(), texts: Vec::new() });
         for (k, dimension) in dimensions.iter().enumerate() {
@@ -107,7 +107,7 @@ impl Plan {
         id
     }
 
-    /// A variable of texts, with all of them.
+    /// Adds a variable of texts, with its values.
     pub fn texts(&mut self, parent: Id, name: &str, dimension: Id, values: impl Iterator<Item = String>) -> Id {
         let id = self.variable(parent, name, Element::Text, &[dimension]);
         let places: Vec<Place> = values.map(|text| self.heaps.lay(Lying::Text(text.into_bytes()))).collect();
@@ -117,7 +117,7 @@ impl Plan {
         id
     }
 
-    /// An attribute that is a text.
+    /// Adds a text attribute.
     pub fn text(&mut self, id: Id, name: &str, value: &str) {
         let value = match value.len() <= LONGEST_WITHIN && !value.is_empty() {
             true => Value::Short(value.to_string()),
@@ -126,12 +126,12 @@ impl Plan {
         self.objects[id].attributes.push((name.to_string(), value));
     }
 
-    /// An attribute that is a number.
+    /// Adds a floating-point attribute.
     pub fn real(&mut self, id: Id, name: &str, value: f64) {
         self.objects[id].attributes.push((name.to_string(), Value::Real(value)));
     }
 
-    /// An attribute that is an integer.
+    /// Adds an integer attribute.
     pub fn integer(&mut self, id: Id, name: &str, value: i64) {
         self.objects[id].attributes.push((name.to_string(), Value::Integer(value)));
     }

@@ -1,4 +1,4 @@
-//! Vector fields written by hand; only f is needed.
+//! Hand-written vector fields; only f is needed.
 
 use super::*;
 
@@ -34,7 +34,7 @@ impl VectorField for Field {
         }
     }
 
-    // Without derivatives the explicit pair follows every trajectory.
+    // Without derivatives the explicit pair integrates every trajectory.
     fn linearise(&self, _: Batch, _: &[usize], _: &mut [f64], fx: &mut [f64], _: &mut [f64]) {
         fx.fill(f64::NAN);
     }
@@ -54,8 +54,8 @@ pub const VAN_DER_POL: Field = Field {
     },
 };
 
-/// The overhung rotor of akay, equations of motion in the rotating frame; parameters Ω and κ, the others at their reference
-/// values.
+/// The overhung rotor of akay, equations of motion in the rotating frame; parameters Ω and κ, the others at their
+/// reference values.
 pub const ROTOR: Field = Field {
     dim: 4,
     parameters: 2,

@@ -1,4 +1,4 @@
-//! Newton's method by shooting with difference quotients: slow and simple, to polish candidates independently of collocation.
+//! Newton's method by shooting with finite differences: slow and simple, independent of collocation.
 
 use super::*;
 use foldline_general::{Factored, Mat, eigenvalues};
@@ -14,7 +14,7 @@ pub fn polish(field: &Field, parameters: &[f64], candidate: &Candidate) -> Optio
     }
 }
 
-/// One turn of a cycle, if it is another one run through that many times.
+/// Returns one turn of a cycle if it consists of that many equal turns.
 fn once(field: &Field, parameters: &[f64], found: &Point, turns: u32) -> Option<Point> {
     let Solution::Cycle(whole) = &found.solution else { return None };
     let (start, period) = (whole.state(0.0), whole.period / f64::from(turns));
@@ -30,7 +30,7 @@ fn slope(field: &Field, parameters: &[f64], x: &[f64]) -> Vec<f64> {
     f
 }
 
-/// The matrix of central difference quotients of `g`.
+/// Returns the matrix of central differences of `g`.
 fn jacobian(x: &[f64], g: impl Fn(&[f64]) -> Option<Vec<f64>>) -> Option<Mat<f64>> {
     let n = x.len();
     let mut columns = Vec::new();

@@ -3,17 +3,17 @@
 use crate::units::{RADIAN, SAME_POWER, TURN, Unit, is_angle};
 use std::collections::BTreeMap;
 
-/// Marks the unit of time, without dimension.
+/// Marker for the dimensionless unit of time.
 pub(super) const CLOCK: &str = "\u{0}time";
 
-/// What a unit is made of.
+/// Factor of a unit.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(super) enum Key {
-    /// A base unit.
+    /// Base unit.
     Base(String),
-    /// The unit of a quantity that declares none.
+    /// Unit of a quantity that declares none.
     Quantity(usize),
-    /// The unit of a number.
+    /// Unit of a number.
     Number(usize),
 }
 
@@ -44,7 +44,7 @@ impl Form {
         Form::key(Key::Base(RADIAN.into()))
     }
 
-    /// Times the other one to a power.
+    /// Product with a power of another unit.
     pub fn plus(&self, other: &Form, power: f64) -> Form {
         let mut sum = Form { any: self.any || other.any, ..self.clone() };
         for (key, own) in &other.powers {
@@ -55,7 +55,7 @@ impl Form {
         sum
     }
 
-    /// To a power.
+    /// Power of the unit.
     pub fn raised(&self, power: f64) -> Form {
         Form { any: self.any && power > 0.0, ..Form::default() }.plus(&Form { any: false, ..self.clone() }, power)
     }
@@ -76,7 +76,7 @@ impl Form {
         self.base(CLOCK)
     }
 
-    /// Base units with a dimension, and their powers.
+    /// Dimensional base units and their powers.
     pub fn dimension(&self) -> impl Iterator<Item = (&str, f64)> {
         self.powers.iter().filter_map(|(key, power)| match key {
             Key::Base(name) if !is_angle(name) && name != CLOCK => Some((name.as_str(), *power)),
@@ -92,17 +92,17 @@ impl Form {
         })
     }
 
-    /// A quantity whose unit is not known, and its power.
+    /// Quantity whose unit is not known, and its power.
     pub fn unknown(&self) -> Option<(Key, f64)> {
         let mut unknown = self.powers.iter().filter(|(key, _)| matches!(key, Key::Quantity(_)));
         unknown.next_back().map(|(key, power)| (key.clone(), *power))
     }
 
-    /// As text in base units, those of `known` first.
+    /// Text in base units, those of `known` first.
     pub fn shown<'k>(&self, known: impl IntoIterator<Item = (&'k str, Form)>) -> String {
         let close = |a: f64, b: f64| (a - b).abs() < 1e-9;
         let mut own = Form { any: false, ..self.clone() };
-        // In a force or an acceleration the radian says nothing.
+        // In a force or an acceleration the radian carries no information.
         if own.dimension().any(|(name, _)| name != "s") {
             own.powers.remove(&Key::Base(RADIAN.into()));
         }
@@ -136,7 +136,7 @@ impl Form {
     }
 }
 
-/// A factor with at most six digits.
+/// Factor with at most six digits.
 pub(super) fn short(value: f64) -> String {
     let rounded: f64 = format!("{value:.5e}").parse().unwrap_or(value);
     if (1e-4..1e6).contains(&rounded.abs()) { format!("{rounded}") } else { format!("{rounded:e}") }

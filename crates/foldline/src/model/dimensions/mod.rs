@@ -1,8 +1,9 @@
-//! Units checked through the equations of a model.
+//! Check of units through the equations of a model.
 //!
-//! **Idea.** Every quantity has a unit: the one declared, or an unknown that the equations determine where they can. A sum, a
-//! comparison, an equation each say that two units are equal. These are linear equations in the exponents of the base units and in the logarithm
-//! of the factor, solved one after the other by elimination; one that cannot hold is a mistake.
+//! **Idea.** Every quantity has a unit: the declared one, or an unknown that the equations determine if they can. Each
+//! sum, comparison and equation states that two units are equal. These are linear equations in the exponents of the
+//! base units and in the logarithm of the factor, solved one after the other by elimination; one that cannot hold is an
+//! error.
 //!
 //! **Equations.** For units of the form e^s Π bᵢ^aᵢ, with base units bᵢ and unknown units among them:
 //!
@@ -11,12 +12,13 @@
 //!
 //! **Source.** kennedy1997 for the exponents.
 //!
-//! **Departures.** A number written in a formula is pure where that makes the equations consistent. Otherwise it may be a conversion
-//! factor: in `x' = 1000*v` the number explains that x is in mm and v in m/s, and in `2*pi*n/60` the numbers turn rpm into rad/s. If the dimensions
-//! differ and a number of the formula could carry the difference, as 40 in `v + 40`, it is taken to do so, and the report names it. The exponent of a
-//! power may be a parameter; its value is that of the model. The unit of time is the one of the declared units with which fewest mistakes
-//! remain, seconds first. A contradiction is an error where declared units alone make it; where the unit of some quantity was inferred, it is
-//! a doubt: a mass of 1 that is not written, as in `v' = -k*x`, is no mistake in a model that states only some of its units.
+//! **Departures.** A number written in a formula is dimensionless if that makes the equations consistent. Otherwise it
+//! may be a conversion factor: in `x' = 1000*v` the number implies that x is in mm and v in m/s, and in `2*pi*n/60` the
+//! numbers turn rpm into rad/s. If the dimensions differ and a number of the formula could carry the difference, as 40
+//! in `v + 40`, it is assumed to, and the report names it. The exponent of a power may be a parameter; its value is
+//! that of the model. The unit of time is the declared unit of time that leaves the fewest errors, seconds first. A
+//! contradiction is an error if it follows from declared units alone. If the unit of some quantity was inferred, it is
+//! a doubt: a mass of 1 left out, as in `v' = -k*x`, is not an error in a model that states only some of its units.
 //!
 //! **Fails when** two wrong factors compensate, or a number happens to explain a missing factor.
 
@@ -43,25 +45,25 @@ pub use system::TAKEN_AS;
 use system::{Finding, Severity, System};
 use walk::Walk;
 
-/// Units of time that are tried where the declared units name none.
+/// Units of time tried if the declared units name none.
 const TIMES: [&str; 6] = ["s", "ms", "us", "min", "h", "d"];
 
-/// What a check of units has found.
+/// Result of a check of units.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct UnitReport {
     /// Contradictions.
     pub errors: Vec<ModelError>,
-    /// Places where a number may or may not be the missing factor.
+    /// Positions at which a number may or may not be the missing factor.
     pub doubts: Vec<ModelError>,
-    /// Numbers in formulas that stand for quantities with a unit: the place, and in `message` number and unit.
+    /// Numbers in formulas that stand for quantities with a unit: the position, and in `message` the number and unit.
     pub numbers: Vec<ModelError>,
-    /// Names of units that are not known, each a base unit of its own.
+    /// Unknown unit names, each treated as a base unit.
     pub foreign: Vec<String>,
-    /// Unit of time, where the equations or the model determine it.
+    /// Unit of time, if the equations or the model determine it.
     pub time: Option<String>,
 }
 
-/// Checks the units of a model that compiles; `declared` says which items state a unit.
+/// Checks the units of a model that compiles; `declared` is true for items that state a unit.
 ///
 /// ```
 /// use foldline::model::{Definition, Item, ModelSource, State, check_units};
@@ -92,7 +94,7 @@ pub fn check_units(source: &ModelSource, declared: &dyn Fn(Item) -> bool) -> Uni
     UnitReport { foreign, ..best.unwrap_or_default() }
 }
 
-/// The declared units of a model.
+/// Declared units of a model.
 struct Units {
     declared: Vec<(Item, String, Unit)>,
 }
@@ -117,14 +119,14 @@ impl Units {
         names.into_iter().collect()
     }
 
-    /// Units of time to be tried.
+    /// Candidate units of time.
     fn times(&self, source: &ModelSource) -> Vec<String> {
         if !source.time.is_empty() {
             return vec![source.time.clone()];
         }
         let mut times: Vec<String> = Vec::new();
         if self.declared.iter().all(|(.., unit)| unit.is_number()) {
-            // A model in pure numbers, as far as it says: its time is a number too.
+            // If all declared units are dimensionless, time may be dimensionless too.
             times.push("1".into());
         }
         times.push("s".into());
@@ -138,7 +140,7 @@ impl Units {
 }
 
 fn parse(text: &str, callables: &Callables) -> Expression {
-    // The model compiles, so every expression can be read.
+    // The model compiles, so every expression can be parsed.
     Expression::parse(text, callables).unwrap_or_default()
 }
 
@@ -166,7 +168,7 @@ fn checked(source: &ModelSource, units: &Units, time: &str) -> UnitReport {
     report(source, system, time)
 }
 
-/// Every expression of the model, and what its value is equal to.
+/// Adds every expression of the model, and the quantity it must equal.
 fn equations(walk: &mut Walk, callables: &Callables, units: &Units) {
     let source = walk.source;
     for (i, own) in source.definitions.iter().enumerate() {
@@ -231,7 +233,7 @@ fn equations(walk: &mut Walk, callables: &Callables, units: &Units) {
     }
 }
 
-/// The values beyond the ends of a repeated quantity have its unit.
+/// Requires values beyond the ends of a repeated quantity to have its unit.
 fn ends(walk: &mut Walk, item: Item, name: &str, repeat: &Option<super::source::Repeat>, callables: &Callables) {
     let Some(Ends::Given { before, after }) = repeat.as_ref().map(|repeat| &repeat.ends) else { return };
     let before = before.iter().enumerate().map(|(k, text)| (Field::Before(k), text));

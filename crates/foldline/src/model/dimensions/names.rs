@@ -8,7 +8,7 @@ use crate::model::source::ModelSource;
 use crate::units::Unit;
 use std::collections::HashMap;
 
-/// The unit of every name.
+/// Units of all names.
 pub(super) struct Names<'a> {
     forms: HashMap<&'a str, Form>,
     time: Form,
@@ -42,12 +42,12 @@ impl<'a> Names<'a> {
         Names { forms, time, tables }
     }
 
-    /// The unit of a name; that of a pure number where it is not one of the model.
+    /// Unit of a name; dimensionless if the name is not one of the model.
     pub fn of(&self, name: &str) -> Form {
         self.forms.get(name).cloned().unwrap_or_default()
     }
 
-    /// The unit of time.
+    /// Unit of time.
     pub fn time(&self) -> Form {
         self.time.clone()
     }

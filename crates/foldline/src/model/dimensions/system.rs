@@ -8,20 +8,20 @@ use std::collections::HashMap;
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 
-/// Factors closer than this (in the logarithm) are equal: they are products of decimals and π.
+/// Factors whose logarithms are closer than this are equal: they are products of decimals and π.
 const SAME_FACTOR: f64 = 1e-9;
-/// Numbers of one equation among which conversion factors are searched: their sets are counted through.
+/// Maximum number of numbers in one equation searched for conversion factors: all subsets are tried.
 const MOST_NUMBERS: usize = 12;
-/// Units that contradictions are told in, where no declared one fits.
+/// Units used to report contradictions if no declared one fits.
 const TOLD: [&str; 26] = [
     "m", "kg", "s", "m/s", "m/s^2", "N", "N m", "N/m", "N s/m", "kg m^2", "J", "W", "Pa", "V", "A", "C", "F", "Ohm",
     "S", "H", "1/s", "rad/s", "mol/l", "ms", "mV", "1/ms",
 ];
 
-/// Stands between a number and the quantity for which it is taken.
+/// Text between a number and the quantity it is taken for.
 pub const TAKEN_AS: &str = " is taken as ";
 
-/// How bad a finding is.
+/// Severity of a finding.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Severity {
     Error,
@@ -39,7 +39,7 @@ pub(super) struct Finding {
     pub hint: String,
 }
 
-/// A place in the model.
+/// Position in the model.
 #[derive(Clone, Debug)]
 pub(super) struct Place {
     pub item: Item,
@@ -47,28 +47,28 @@ pub(super) struct Place {
     pub span: Range<usize>,
 }
 
-/// A quantity that declares no unit.
+/// Quantity that declares no unit.
 struct Quantity {
     name: String,
-    /// True for a definition that is made of declared units only.
+    /// True for a definition made of declared units only.
     firm: bool,
-    /// Where its unit follows from.
+    /// Origin of its inferred unit.
     from: String,
 }
 
-/// A number written in a formula.
+/// Number written in a formula.
 struct Number {
     value: f64,
     text: String,
     place: Option<Place>,
 }
 
-/// How an equation between units came out.
+/// Outcome of an equation between units.
 pub(super) enum Outcome {
     Holds,
     /// The dimensions differ.
     Dimension,
-    /// The factors differ; true if a number of the formula may have to do with it.
+    /// The factors differ; true if a number of the formula may be involved.
     Factor(bool),
 }
 
@@ -78,7 +78,7 @@ pub(super) struct System {
     numbers: Vec<Number>,
     known: Vec<(String, Form)>,
     pub findings: Vec<Finding>,
-    /// True if some equation between known units involves the time.
+    /// True if some equation between known units involves time.
     pub uses_time: bool,
 }
 
@@ -87,7 +87,7 @@ impl System {
         let mut known: Vec<(String, Form)> =
             units.declared.iter().map(|(_, text, unit)| (text.clone(), Form::of(unit))).collect();
         known.retain(|(text, _)| !matches!(text.as_str(), "1" | "-" | ""));
-        // mV/ms before its value in base units, m/s^2 before m/s/s.
+        // Prefer mV/ms to its value in base units, and m/s^2 to m/s/s.
         let rates = known.iter().map(|(text, _)| format!("{text}/{time}"));
         let (long, rates): (Vec<String>, Vec<String>) = rates.partition(|text| text.matches('/').count() > 1);
         known.extend(rates.into_iter().chain(TOLD.map(String::from)).chain(long).map(|text| {
@@ -98,18 +98,18 @@ impl System {
         System { solved, quantities, numbers, known, findings, uses_time: false }
     }
 
-    /// A quantity without a unit.
+    /// Adds a quantity without a unit.
     pub fn quantity(&mut self, name: &str) -> Form {
         self.quantities.push(Quantity { name: name.into(), firm: false, from: String::new() });
         Form::key(Key::Quantity(self.quantities.len() - 1))
     }
 
-    /// A number with a name.
+    /// Adds a named number.
     pub fn number(&mut self, value: f64, text: &str) -> Form {
         self.written(value, text, None)
     }
 
-    /// A number as it stands in a formula.
+    /// Adds a number written in a formula.
     pub fn written(&mut self, value: f64, text: &str, place: Option<Place>) -> Form {
         if value == 0.0 || !value.is_finite() {
             return Form::any();
@@ -118,7 +118,7 @@ impl System {
         Form::key(Key::Number(self.numbers.len() - 1))
     }
 
-    /// With everything replaced that is solved for.
+    /// Form with all solved unknowns substituted.
     pub fn resolved(&self, form: &Form) -> Form {
         let mut form = form.clone();
         while let Some((key, power)) =
@@ -130,7 +130,7 @@ impl System {
         form
     }
 
-    /// Demands that `residual` is the unit of a pure number. `strict`: a turn counts as 2π, not as 1.
+    /// Requires `residual` to be dimensionless. `strict`: a turn counts as 2π, not as 1.
     pub fn settle(&mut self, residual: &Form, strict: bool, place: &Place, from: &str) -> Outcome {
         if residual.any {
             return Outcome::Holds;
@@ -167,7 +167,7 @@ impl System {
         Outcome::Factor(numbers.iter().any(|(k, _)| !self.is_plain(*k)))
     }
 
-    /// Solves for the unit of a definition, if it does not follow from something else already.
+    /// Solves for the unit of a definition, unless it follows from something else already.
     pub fn define(&mut self, goal: &Form, form: &Form, from: &str) -> bool {
         let Some((key @ Key::Quantity(k), _)) = goal.unknown() else { return false };
         if self.solved.contains_key(&key) || form.any || self.resolved(form).powers.contains_key(&key) {
@@ -178,18 +178,19 @@ impl System {
         true
     }
 
-    /// True if a unit follows from declared ones alone: what contradicts it is wrong, however the rest of the model is meant.
+    /// True if a unit follows from declared ones alone: a contradiction with it is an error regardless of the rest of
+    /// the model.
     pub fn is_firm(&self, form: &Form) -> bool {
         form.powers.keys().all(|key| match key {
             Key::Quantity(k) => self.quantities[*k].firm,
-            // A number that is taken for a quantity may be meant otherwise.
+            // A number taken for a quantity may have been meant otherwise.
             Key::Number(_) => self.solved.get(key).is_none_or(|own| own.dimension().next().is_none()),
             Key::Base(_) => true,
         })
     }
 
-    /// Numbers whose units cancel: one alone is pure. Of several the last follows from the others, which may still turn out to carry
-    /// a unit.
+    /// Handles numbers whose units must cancel: one alone is dimensionless. The last of several follows from the
+    /// others, which may still turn out to carry a unit.
     fn tie(&mut self, numbers: &[(usize, f64)]) {
         let (plain, mut others): (Vec<_>, Vec<_>) = numbers.iter().partition(|(k, _)| self.is_mathematical(*k));
         for (k, _) in plain {
@@ -209,7 +210,7 @@ impl System {
         self.solved.insert(key, rest.raised(-1.0 / power));
     }
 
-    /// Dimensions differ: a number of the formula may carry the difference.
+    /// Handles different dimensions: a number of the formula may carry the difference.
     fn carried(&mut self, residual: Form, place: &Place) -> Outcome {
         let carrier = residual.numbers().filter(|(k, _)| !self.is_mathematical(*k)).last();
         let Some((k, power)) = carrier else { return Outcome::Dimension };
@@ -223,17 +224,17 @@ impl System {
         Outcome::Holds
     }
 
-    /// Numbers that come with formulas, as in mv²/2 and 2πf, and never carry a unit.
+    /// True for numbers that are part of formulas, as in mv²/2 and 2πf, and never carry a unit.
     fn is_mathematical(&self, k: usize) -> bool {
         matches!(self.numbers[k].value.abs(), 2.0 | 0.5 | PI)
     }
 
-    /// Numbers that are no conversion factors: those and 1.
+    /// True for numbers that are not conversion factors: the mathematical ones and 1.
     fn is_plain(&self, k: usize) -> bool {
         self.numbers[k].value.abs() == 1.0 || self.is_mathematical(k)
     }
 
-    /// The fewest numbers that, as conversion factors, explain a factor e^scale; `None` if none do.
+    /// Smallest set of numbers that, as conversion factors, explain a factor e^scale; `None` if there is none.
     fn conversions(&self, scale: f64, numbers: &[(usize, f64)]) -> Option<Vec<usize>> {
         let able: Vec<(usize, f64)> = numbers
             .iter()
@@ -250,7 +251,7 @@ impl System {
         Some(able.iter().enumerate().filter(|(b, _)| best >> b & 1 == 1).map(|(_, (k, _))| *k).collect())
     }
 
-    /// A unit as text.
+    /// Unit as text.
     pub fn shown(&self, form: &Form) -> String {
         let mut form = self.resolved(form);
         // The unknown unit of x is written [x].
@@ -269,7 +270,7 @@ impl System {
         form.shown(self.known.iter().map(|(text, form)| (text.as_str(), form.clone())))
     }
 
-    /// Units of the quantities of a form that follow from the equations, as a sentence.
+    /// Sentence on the inferred units of the quantities of a form.
     pub fn inferred(&self, names: &[(&str, Form)]) -> String {
         let mut told: Vec<String> = Vec::new();
         for (name, form) in names {
@@ -287,12 +288,12 @@ impl System {
         if told.is_empty() { String::new() } else { format!("; with {}", told.join(", ")) }
     }
 
-    /// True if two units differ in the unit of time at most.
+    /// True if two units differ at most in the unit of time.
     pub fn differs_in_time(&self, residual: &Form) -> bool {
         self.resolved(residual).dimension().all(|(name, _)| name == "s")
     }
 
-    /// How far two units of equal dimension are apart, as text.
+    /// Ratio of two units of equal dimension, as text.
     pub fn apart(&self, residual: &Form) -> String {
         let residual = self.resolved(residual);
         let turned = residual.scale + residual.turns() * TAU.ln();

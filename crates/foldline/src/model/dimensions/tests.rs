@@ -1,8 +1,8 @@
 use super::{UnitReport, check_units};
 use crate::model::{Constant, Definition, Forcing, Function, Item, ModelSource, Output, Parameter, State};
 
-/// A model from lines `p k N/m`, `s x m = v`, `d F = k*x`, `o E J = …`, `f omega`, `c n 3`, `t ms`, `h hill(x, K, n) = …`; a unit `?` is
-/// none.
+/// Checks a model given by lines `p k N/m`, `s x m = v`, `d F = k*x`, `o E J = …`, `f omega`, `c n 3`, `t ms`,
+/// `h hill(x, K, n) = …`; a unit `?` declares none.
 fn report(text: &str) -> UnitReport {
     let mut source = ModelSource::default();
     let mut declared = std::collections::HashSet::new();
@@ -42,7 +42,7 @@ fn report(text: &str) -> UnitReport {
             _ => panic!("{line}"),
         }
     }
-    // A frequency in the wrong unit is a wrong frequency too, which is not what is looked at here.
+    // A frequency in the wrong unit also has the wrong value, which is not tested here.
     let other = |error: &crate::model::ModelError| error.item != Item::Forcing;
     if let Err(errors) = crate::model::Model::compile(source.clone()) {
         assert!(!errors.iter().any(other), "{errors:?}");
@@ -57,7 +57,7 @@ fn consistent(text: &str) -> UnitReport {
     report
 }
 
-/// The message of the one contradiction, with the two units in it.
+/// Checks that there is exactly one contradiction and that its message contains the two units.
 #[track_caller]
 fn refused(text: &str, units: [&str; 2]) {
     let report = report(text);
@@ -76,7 +76,7 @@ fn a_velocity_in_kilograms_is_refused() {
 #[test]
 fn an_undeclared_damping_constant_takes_the_unit_that_fits() {
     consistent(&format!("{SPRING}p c\ns x m = v\ns v m/s = (-k*x - c*v)/m"));
-    // Used twice it has to fit twice.
+    // If it occurs twice, it must fit twice.
     let twice = format!("{SPRING}p c\ns x m = v\ns v m/s = (-k*x - c*v - c*x)/m");
     let report = report(&twice);
     assert!(report.errors.is_empty() && report.doubts[0].message.contains("kg m/s"), "{report:#?}");
@@ -88,13 +88,13 @@ fn contradictions_with_units_that_are_not_stated_are_doubts() {
     let text = format!("{SPRING}p c\ns x = v\ns v = (-k*x - c*v)/m\ns y = w\ns w = -k*y - c*w");
     let UnitReport { errors, doubts, .. } = report(&text);
     assert!(errors.is_empty() && doubts.len() == 1 && doubts[0].message.contains("[y]"), "{errors:?} {doubts:?}");
-    // Definitions state what they are made of.
+    // Definitions have firm units if they are made of declared ones.
     let text = format!("{SPRING}d force = -k*x\ns x m = v\ns v m/s = force");
     refused(&text, ["m/s^2", "N"]);
 }
 
 #[test]
-fn a_force_is_no_acceleration() {
+fn a_force_is_not_an_acceleration() {
     refused(&format!("{SPRING}s x m = v\ns v m/s = -k*x"), ["m/s^2", "N"]);
 }
 
@@ -134,7 +134,7 @@ fn conversion_factors_in_formulas_are_recognised() {
 }
 
 #[test]
-fn a_frequency_in_hertz_is_no_angular_frequency() {
+fn a_frequency_in_hertz_is_not_an_angular_frequency() {
     refused("p f Hz\np a m/s\nf = f\ns x m = a*cos(2*pi*f*t)", ["rad/s", "Hz"]);
     refused("p f Hz\np a m/s\nf = 2*pi*f\ns x m = a*cos(f*t)", ["cos", "angle"]);
     // As a rate it is 1/s.
@@ -189,7 +189,7 @@ fn outputs_have_the_unit_they_state() {
 }
 
 #[test]
-fn units_that_are_not_known_are_units_of_their_own() {
+fn unknown_units_are_base_units() {
     let report = consistent("p k 1/h\np K cells/ml\ns n cells/ml = k*n*(1 - n/K)");
     assert_eq!((report.foreign, report.time.as_deref()), (vec!["cells".to_string()], Some("h")));
     refused("p k 1/h\ns n cells/ml = k*n\ns m g/ml = k*(m + n)", ["g/ml", "cells/ml"]);

@@ -13,20 +13,20 @@ use crate::model::scope::{Local, Scope};
 use crate::model::source::ModelSource;
 use std::ops::Range;
 
-/// Terms after which no more expressions are looked at: functions that call functions multiply.
+/// Maximum number of terms examined: nested function calls multiply.
 const MOST_TERMS: usize = 500_000;
 
-/// A name that has a meaning within one expression: an index, or an argument with its unit.
+/// Name local to one expression: an index, or an argument with its unit.
 #[derive(Clone)]
 struct Bound<'e> {
     name: &'e str,
     form: Form,
-    /// Its value, if it is made of numbers only, and if parameters have the values of the model.
+    /// Value if made of numbers only, and value if parameters take the values of the model.
     value: Option<f64>,
     default: Option<f64>,
 }
 
-/// An expression with its place.
+/// Expression with its position.
 #[derive(Clone, Copy)]
 struct Body<'e> {
     item: Item,
@@ -34,7 +34,7 @@ struct Body<'e> {
     text: &'e str,
     expression: &'e Expression,
     locals: &'e [Bound<'e>],
-    /// The part of the model whose unit is being looked at, for messages.
+    /// Part of the model whose unit is being determined, for messages.
     from: &'e str,
 }
 
@@ -45,13 +45,13 @@ pub(super) struct Walk<'a> {
     pub functions: &'a [Option<Expression>],
     /// Values of numbers and of constants without a unit.
     pub numbers: Scope<'a>,
-    /// Those of parameters and all constants too.
+    /// Values of parameters and all constants as well.
     pub defaults: Scope<'a>,
     pub spent: usize,
 }
 
 impl<'a> Walk<'a> {
-    /// The unit of an expression of the model.
+    /// Unit of an expression of the model.
     pub fn form(&mut self, item: Item, field: Field, text: &str, callables: &Callables) -> Form {
         let expression = super::parse(text, callables);
         let from = self.described(item);
@@ -71,7 +71,7 @@ impl<'a> Walk<'a> {
         self.expression(body)
     }
 
-    /// A part of the model in words.
+    /// Description of a part of the model.
     fn described(&self, item: Item) -> String {
         let name = crate::model::check::name_of(self.source, item);
         match item {
@@ -84,7 +84,7 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// Demands that an expression, the whole text, has the unit `goal`, which is that of `what`.
+    /// Requires the whole expression `text` to have the unit `goal` of `what`.
     pub fn equal(&mut self, item: Item, field: Field, text: &str, form: Form, goal: Form, what: &str) {
         let from = self.described(item);
         let span = 0..text.len();
@@ -107,7 +107,7 @@ impl<'a> Walk<'a> {
         self.tell(outcome, &residual, Place { item, field, span }, message, &format!("{time}{inferred}"));
     }
 
-    /// The names in a text with their units.
+    /// Names in a text with their units.
     fn mentioned<'t>(&self, text: &'t str) -> Vec<(&'t str, Form)> {
         let words = text.split(|c: char| !(c.is_alphanumeric() || c == '_' || c == '\''));
         words.filter(|word| !word.is_empty()).map(|word| (word, self.names.of(word))).collect()
@@ -223,7 +223,7 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// Two terms of equal unit; that unit.
+    /// Requires two terms to have equal units; returns that unit.
     fn alike(&mut self, body: Body, [a, b]: [usize; 2], forms: &[Form], done: &str) -> Form {
         let [own, other] = [&forms[a], &forms[b]];
         if own.any || other.any {
@@ -241,14 +241,14 @@ impl<'a> Walk<'a> {
             let both = format!("{} {}", text(a), text(b));
             let inferred = self.system.inferred(&self.mentioned(&both));
             self.tell(outcome, &residual, place, message, &inferred);
-            // Said once; what follows from it is not looked at.
+            // Report once; do not follow up consequences.
             return Form::any();
         }
-        // The one that says more: a number has the unit of what it is added to.
+        // Return the more informative one: a number has the unit of the term it is added to.
         if self.system.resolved(own).dimension().next().is_some() { own.clone() } else { other.clone() }
     }
 
-    /// A term that has to be a pure number; an `angle` counts turns as 2π.
+    /// Requires a term to be dimensionless; with `angle`, a turn counts as 2π.
     fn pure(&mut self, body: Body, term: usize, form: &Form, angle: bool, what: &str) {
         let place = Place { item: body.item, field: body.field, span: body.expression.spans[term].clone() };
         let outcome = self.system.settle(form, angle, &place, body.from);
@@ -262,7 +262,7 @@ impl<'a> Walk<'a> {
         self.tell(outcome, form, place, message, &inferred);
     }
 
-    /// Demands that two units are the same.
+    /// Requires two units to be equal.
     fn same(&mut self, body: Body, [own, other]: [&Form; 2], span: Range<usize>, what: &str) {
         let place = Place { item: body.item, field: body.field, span };
         let residual = own.plus(other, -1.0);
@@ -274,7 +274,7 @@ impl<'a> Walk<'a> {
         }
     }
 
-    /// A function of the model, with the units of its arguments.
+    /// Unit of a call of a model function, with the units of its arguments.
     fn apply(
         &mut self,
         body: Body,
@@ -310,12 +310,12 @@ impl<'a> Walk<'a> {
     }
 }
 
-/// An index, a pure number.
+/// Index, a dimensionless number.
 fn index(name: &str) -> Bound<'_> {
     Bound { name, form: Form::default(), value: None, default: None }
 }
 
-/// True for products of numbers, whose factors may be conversion factors one by one.
+/// True for products of numbers, whose factors may be conversion factors individually.
 fn taken_apart(term: &Term) -> bool {
     match term {
         Term::Binary(op, ..) => matches!(op, Binary::Multiply | Binary::Divide | Binary::Power),
@@ -325,7 +325,7 @@ fn taken_apart(term: &Term) -> bool {
     }
 }
 
-/// Which terms have a unit that matters: no indices, exponents with a value, and branches that are never taken.
+/// Marks terms whose unit matters: not indices, exponents with a value, or branches that are never taken.
 fn needed(expression: &Expression, values: &[Option<f64>]) -> Vec<bool> {
     let mut needed = vec![false; expression.terms.len()];
     needed.iter_mut().last().into_iter().for_each(|last| *last = true);

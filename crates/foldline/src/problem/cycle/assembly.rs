@@ -1,4 +1,4 @@
-//! The matrix of a cycle: equations (1) to (3) of [`super`] linearised, and its antiperiodic relative.
+//! The matrix of a cycle, equations (1) to (3) of [`super`] linearised, and its antiperiodic variant.
 
 use super::CycleProblem;
 use crate::contract::{Batch, Parameters, Singular};
@@ -9,13 +9,13 @@ use crate::linalg::system::{System, either};
 use crate::problem::gauss::Scheme;
 
 impl CycleProblem<'_> {
-    /// Profile of an antiperiodic null vector of the variational equation at `u` (it changes sign after one period), if
-    /// there is one: the direction of period doubling. Layout of the profile.
+    /// Profile of an antiperiodic null vector of the variational equation at `u` (it changes sign after one period),
+    /// which is the direction of period doubling; `None` if the computation fails. The layout is that of the profile.
     pub fn antiperiodic_direction(&mut self, u: &[f64]) -> Option<Vec<f64>> {
         let row = vec![0.0; self.setting.freedom() * u.len()];
         self.fill(u, &row).ok()?;
         let q = 1 + self.setting.freedom();
-        // The scalars are frozen by a unit corner, so only the profile moves.
+        // A unit corner block freezes the scalars, so that only the profile varies.
         either!(&mut self.system, s => {
             s.border.fill(Default::default());
             (0..q * q).for_each(|k| s.corner[k] = if k % (q + 1) == 0 { 1.0 } else { 0.0 });
@@ -37,8 +37,8 @@ impl CycleProblem<'_> {
         Some(v)
     }
 
-    /// Gathers left ends and Gauss points, component-major, those of the intervals that the solver treats together side by side:
-    /// point i of place t in a lane is number (t m + i) W + lane. What the solver has beyond the last interval repeats it.
+    /// Gathers left ends and Gauss points, component-major, with the intervals that the solver treats together side by
+    /// side: point i of place t in a lane is number (t m + i) W + lane. Lanes beyond the last interval repeat it.
     pub(super) fn gather(&mut self, u: &[f64]) {
         match self.width {
             1 => self.gather_lanes::<f64>(u),
@@ -66,11 +66,11 @@ impl CycleProblem<'_> {
         }
     }
 
-    /// Linearises at `u`, fills the blocks and condenses them, each while it is in the cache; the `rows` act through
+    /// Linearises at `u`, fills the blocks and condenses them, each while it is in the cache. The `rows` act through
     /// [`crate::contract::ZeroProblem::dot`].
     ///
     /// # Errors
-    /// [`Singular`] if a block of an interval is.
+    /// [`Singular`] if the block of an interval is.
     pub(super) fn fill(&mut self, u: &[f64], rows: &[f64]) -> Result<(), Singular> {
         let (lanes, size) = (self.lanes(), self.profile_size());
         self.lay_phase();
@@ -80,7 +80,7 @@ impl CycleProblem<'_> {
         let batch = Batch { lanes, states: &self.states, parameters, times: &self.times };
         self.setting.linearise(batch, &mut self.f, &mut self.fx, &mut self.fp);
         for (coupled, entry) in self.coupled.iter_mut().zip(self.fx.chunks_exact(lanes)) {
-            // What was coupled once remains so: the order of elimination rarely changes.
+            // Couplings are never removed, so that the order of elimination rarely changes.
             *coupled |= !vanishes(entry);
         }
         either!(&mut self.system, s => s.couple(&self.coupled));
@@ -113,7 +113,7 @@ impl CycleProblem<'_> {
         Ok(())
     }
 
-    /// A border row that acts on the profile through the inner product.
+    /// Writes a border row that acts on the profile through the inner product.
     fn fill_row(&mut self, r: usize, row: &[f64]) {
         let (n, m) = (self.n, self.scheme.degree);
         let weights: Vec<f64> = (0..m * n)
@@ -129,11 +129,11 @@ impl CycleProblem<'_> {
     }
 }
 
-/// A border row, ready to be dealt to the lanes.
+/// A border row, to be distributed over the lanes.
 struct Row<'a, 'b, T> {
     /// `[N][(m + 1) n]`.
     row: &'a [f64],
-    /// `[m n]`, and where each goes.
+    /// `[m n]`: weights, and the slot of each.
     weights: &'a [f64],
     slots: &'a [usize],
     /// `[L][W]`, zero beyond the last interval.
@@ -172,7 +172,7 @@ impl<T: Lane> pulp::NullaryFnOnce for Row<'_, '_, T> {
     }
 }
 
-/// A linearised cycle, ready to be written into the blocks.
+/// A linearised cycle, to be written to the blocks.
 struct Linear<'a> {
     n: usize,
     free: usize,
@@ -184,11 +184,11 @@ struct Linear<'a> {
     fx: &'a [f64],
     fp: &'a [f64],
     phase: &'a [f64],
-    /// `[n × n]`: which entries of f_x are not zero everywhere.
+    /// `[n × n]`: true for entries of f_x that are not zero everywhere.
     coupled: &'a [bool],
 }
 
-/// Writes equation (1) and the phase row, and condenses; returns ∫ tr f_x dt over the period.
+/// Writes equation (1) and the phase row, and condenses. Returns ∫ tr f_x dt over the period.
 fn write<T: Lane>(linear: Linear, system: &mut Condensed<T>) -> Result<f64, Singular> {
     T::dispatch(Write { linear, system })
 }
@@ -203,8 +203,8 @@ impl<T: Lane> pulp::NullaryFnOnce for Write<'_, '_, T> {
 
     #[inline(always)]
     fn call(self) -> Self::Output {
-        // Common dimensions as constants, and every block condensed while it is in the cache. That is a copy of the whole factorisation,
-        // so that it is not made for all of them.
+        // For common sizes the dimensions are constants, and every block is condensed while it is in the cache. This
+        // compiles the whole factorisation once more, so it is not done for all sizes.
         match (self.linear.n, self.linear.scheme.degree, self.linear.free) {
             (4, 4, 1) if T::COUNT > 1 => self.written::<true>(4, 4, 1),
             (n, m, free) => self.written::<false>(n, m, free),
@@ -282,16 +282,16 @@ impl<T: Lane> Write<'_, '_, T> {
     }
 }
 
-/// Whether all are zero.
+/// True if all entries are zero.
 fn vanishes(entries: &[f64]) -> bool {
     let (blocks, rest) = entries.as_chunks::<8>();
-    // No early end within a block, so that it is one comparison of vectors.
+    // No early exit within a block, so that it is a single vector comparison.
     let nothing = |block: &[f64; 8]| block.iter().fold(true, |all, x| all & (*x == 0.0));
     blocks.iter().all(nothing) && rest.iter().all(|x| *x == 0.0)
 }
 
 impl System {
-    /// The places of all intervals, those beyond the last one included.
+    /// Number of places of all lanes, including those beyond the last interval.
     pub(crate) fn places(&self) -> usize {
         self.lanes() * self.length()
     }

@@ -1,12 +1,14 @@
-//! Transitions of the intervals in which the orbit crosses a switch of the right-hand side.
+//! Transition matrices of intervals on which the orbit crosses a switching surface.
 //!
-//! **Idea.** Collocation evaluates f_x at Gauss points. Where f_x jumps between two of them the transition of the interval is wrong by the
-//! jump times the distance of the switch from the nearest Gauss point, which no other sample of the same interval shows reliably. The
-//! interval is therefore cut where the switch vanishes along the profile, and each part is integrated by itself: the difference is the
-//! error of the transition. It is not used to improve multipliers, which would then no longer be those of the discrete equations: folds
-//! would not be where a multiplier is 1.
+//! **Idea.** Collocation evaluates f_x at Gauss points. If f_x jumps between two of them, the transition of the
+//! interval is wrong by the jump times the distance of the switching point from the nearest Gauss point, which no other
+//! sample of the interval shows reliably. The interval is therefore divided where the switching function vanishes along
+//! the profile, and each part is integrated separately; the difference is the error of the transition. It does not
+//! improve the multipliers, which would then no longer be those of the discrete equations: at folds, no multiplier
+//! would be exactly 1.
 //!
-//! **Equations.** With the interval [t_j, t_j + h], σ the switch, f⁻ and f⁺ the right-hand sides before and after it:
+//! **Equations.** With the interval [t_j, t_j + h], the switching function σ, and the right-hand sides f⁻ and f⁺ before
+//! and after it:
 //!
 //! ```text
 //!   (1)  V' = T f_x(x(τ)) V on each part, V = I at its left end                      by collocation at the Gauss points of the part
@@ -16,29 +18,30 @@
 //!
 //! **Source.** leine2004 (saltation matrix).
 //!
-//! **Fails when** the orbit crosses a switch twice between two of the places that are examined, or grazes it: it is then treated as smooth.
+//! **Fails when** the orbit grazes a switching surface, or crosses it twice between two of the points examined: it is
+//! then treated as smooth.
 
 use super::CycleProblem;
 use crate::contract::{Batch, Parameters};
 use crate::linalg::{axpy, dot, lu, panel};
 
-/// Parts of an interval between whose ends switches are compared: eight for each Gauss point of a polynomial of degree 4.
+/// Number of parts of an interval at whose ends switching functions are compared: eight per Gauss point for degree 4.
 const PLACES: usize = 32;
-/// Bisections of a crossing, to the rounding of the interval.
+/// Number of bisections of a crossing, down to rounding.
 const HALVINGS: usize = 50;
 /// Jump of f, relative to the larger side, below which it is rounding: f is continuous and (2) is the identity.
 const CONTINUOUS: f64 = 1e-9;
-/// Step of the central difference of a switch, in scales: the cube root of rounding.
+/// Step of the central difference of a switching function, in scales: the cube root of the machine precision.
 const STEP: f64 = 6e-6;
 
-/// An interval in which the orbit crosses switches.
+/// An interval on which the orbit crosses switching surfaces.
 pub(super) struct Crossed {
     pub interval: usize,
     /// `[n × n]`.
     pub transition: Vec<f64>,
 }
 
-/// Puts the transitions of intervals that are crossed in the places of those of collocation, `[N][n × n]`.
+/// Replaces the collocation transitions, `[N][n × n]`, of intervals with crossings.
 pub(super) fn replace(transitions: &mut [f64], crossed: &[Crossed]) {
     for own in crossed {
         let square = own.transition.len();
@@ -46,30 +49,30 @@ pub(super) fn replace(transitions: &mut [f64], crossed: &[Crossed]) {
     }
 }
 
-/// Where a switch vanishes within an interval, as a place in [0, 1], and which.
+/// Zero of a switching function within an interval: position in [0, 1], and index of the function.
 struct Cut {
     at: f64,
     switch: usize,
 }
 
-/// An interval with the polynomial on it.
+/// An interval and the polynomial on it.
 struct Piece<'p> {
     problem: &'p CycleProblem<'p>,
     parameters: &'p [f64],
     /// `[m + 1][n]`.
     nodes: &'p [f64],
-    /// Its ends, in normalised time, and the period in the time of the field.
+    /// Ends in normalised time; below, the period in the time of the field.
     ends: [f64; 2],
     period: f64,
 }
 
 impl CycleProblem<'_> {
-    /// The intervals in which the orbit `u` crosses switches, with their transitions.
+    /// Intervals on which the orbit `u` crosses switching surfaces, with their transitions.
     pub(super) fn crossed(&self, u: &[f64]) -> Vec<Crossed> {
         self.at_crossings(u, |interval, piece, cuts| Some(Crossed { interval, transition: piece.transition(cuts)? }))
     }
 
-    /// (3) for the intervals in which the orbit `u` crosses switches, with their numbers.
+    /// Indices of the intervals on which the orbit `u` crosses switching surfaces, with (3) for each.
     pub(super) fn defects_at_crossings(&self, u: &[f64]) -> Vec<(usize, Vec<f64>)> {
         self.at_crossings(u, |interval, piece, cuts| Some((interval, piece.defect(cuts))))
     }
@@ -89,7 +92,7 @@ impl CycleProblem<'_> {
         found.collect()
     }
 
-    /// The intervals in which a switch could vanish: it changes by as much as its smallest value at the nodes.
+    /// Intervals on which a switching function may vanish: it varies by more than its smallest value at the nodes.
     fn suspects(&self, u: &[f64], parameters: &[f64]) -> Vec<usize> {
         let (n, intervals, nodes) = (self.n, self.intervals(), self.scheme.degree + 1);
         let (lanes, count) = (intervals * nodes, self.setting.field.switch_count());
@@ -105,7 +108,7 @@ impl CycleProblem<'_> {
         let batch = Batch { lanes, states: &states, parameters: Parameters::Shared(parameters), times: &times };
         self.setting.field.switches(batch, &mut values);
         let could = |own: &[f64], j: usize| {
-            // With the left end of the next interval.
+            // Including the left end of the next interval.
             let next = own[(j + 1) % intervals];
             let there = (0..nodes).map(|g| own[g * intervals + j]).chain([next]);
             let [low, high] = there.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| [l.min(v), h.max(v)]);
@@ -126,7 +129,7 @@ impl Piece<'_> {
         x
     }
 
-    /// The time at a place in [0, 1]; nothing where the field is autonomous.
+    /// Time at a position in [0, 1]; empty for an autonomous field.
     fn time(&self, s: f64) -> Vec<f64> {
         let [begin, end] = self.ends;
         let own = f64::from(self.problem.forcing_periods) * (begin + s * (end - begin));
@@ -141,7 +144,7 @@ impl Piece<'_> {
         values
     }
 
-    /// Where switches vanish, in order, and which.
+    /// Zeros of the switching functions, in order.
     fn cuts(&self) -> Vec<Cut> {
         let at = |s: f64| self.switches(&self.state(s), &self.time(s));
         let mut cuts = Vec::new();
@@ -163,7 +166,7 @@ impl Piece<'_> {
         cuts
     }
 
-    /// The transition over the whole interval.
+    /// Transition over the whole interval.
     fn transition(&self, cuts: &[Cut]) -> Option<Vec<f64>> {
         let n = self.n();
         let mut transition: Vec<f64> = (0..n * n).map(|k| f64::from(u8::from(k % (n + 1) == 0))).collect();
@@ -173,7 +176,8 @@ impl Piece<'_> {
                 transition = product(&self.part([begin, end])?, &transition, n);
             }
             if let Some(Cut { at, switch }) = cuts.get(index) {
-                // Signs in the middle of the part before: another switch may vanish at its end.
+                // Signs are taken in the middle of the preceding part, because another switching function may vanish at
+                // its end.
                 transition = product(&self.saltation(*at, *switch, 0.5 * (begin + at)), &transition, n);
             }
             begin = end;
@@ -181,12 +185,12 @@ impl Piece<'_> {
         transition.iter().all(|x| x.is_finite()).then_some(transition)
     }
 
-    /// (3).
+    /// Defect (3).
     fn defect(&self, cuts: &[Cut]) -> Vec<f64> {
         let (n, scheme, field) = (self.n(), &self.problem.scheme, self.problem.setting.field);
         let length = (self.ends[1] - self.ends[0]) * self.period;
         let slope = |s: f64| {
-            // Through the derivatives at the Gauss points, a polynomial of degree m - 1.
+            // The polynomial of degree m - 1 through the derivatives at the Gauss points.
             let gauss = &scheme.nodes[1..];
             let through = |i: usize| -> f64 {
                 (0..gauss.len()).filter(|l| *l != i).map(|l| (s - gauss[l]) / (gauss[i] - gauss[l])).product()
@@ -215,7 +219,7 @@ impl Piece<'_> {
         total
     }
 
-    /// (1) on a part of the interval.
+    /// Transition (1) over a part of the interval.
     fn part(&self, [begin, end]: [f64; 2]) -> Option<Vec<f64>> {
         let (n, scheme, field) = (self.n(), &self.problem.scheme, self.problem.setting.field);
         let m = scheme.degree;
@@ -253,7 +257,7 @@ impl Piece<'_> {
         Some(transition)
     }
 
-    /// (2) where a switch vanishes; `before` is a place in the part before.
+    /// Saltation matrix (2) at a zero of a switching function; `before` is a position in the preceding part.
     fn saltation(&self, at: f64, switch: usize, before: f64) -> Vec<f64> {
         let (n, field) = (self.n(), self.problem.setting.field);
         let (x, time) = (self.state(at), self.time(at));
@@ -300,7 +304,7 @@ impl Piece<'_> {
     }
 }
 
-/// a b, row-major.
+/// Product a b, row-major.
 fn product(a: &[f64], b: &[f64], n: usize) -> Vec<f64> {
     let entry = |i: usize, k: usize| (0..n).map(|j| a[i * n + j] * b[j * n + k]).sum::<f64>();
     (0..n * n).map(|k| entry(k / n, k % n)).collect()

@@ -1,4 +1,4 @@
-//! How accurate a cycle is, from its defect and the last factorisation.
+//! Error estimates of a cycle, from its defect and the last factorisation.
 
 use super::CycleProblem;
 use super::crossings::{self, Crossed};
@@ -13,11 +13,11 @@ use crate::stability::floquet;
 use num_complex::Complex64;
 use std::ops::Range;
 
-/// Stated error of multipliers over the estimated one.
+/// Ratio of the stated to the estimated error of multipliers.
 const SPECTRUM_SAFE: f64 = 4.0;
 
-/// Each multiplier against the nearest of the other list that is left, the largest first: the largest difference, relative to
-/// the larger of 1 and the modulus.
+/// Largest difference between two spectra, relative to the larger of 1 and the modulus. Each multiplier, the largest
+/// first, is compared with the nearest of the other list that has not been used yet.
 fn spectrum_difference(spectrum: &[Complex64], other: &[Complex64]) -> f64 {
     let mut own: Vec<Complex64> = spectrum.to_vec();
     own.sort_by(|a, b| b.norm().total_cmp(&a.norm()));
@@ -32,20 +32,21 @@ fn spectrum_difference(spectrum: &[Complex64], other: &[Complex64]) -> f64 {
     most
 }
 
-/// Intervals of many components that are looked at together: Jacobians of more would take more room than the system itself.
+/// Number of intervals with many components that are processed together; the Jacobians of more would need more memory
+/// than the system itself.
 const FEW: usize = 8;
 
-/// Error of an interval that rounding alone may leave, relative. Those of all intervals add up.
+/// Relative rounding error of a single interval. Those of all intervals add up.
 const ROUNDING: f64 = 0.5 * f64::EPSILON;
 
-/// A profile along which Jacobians are taken.
+/// A profile along which Jacobians are evaluated.
 struct Profile<'a> {
     u: &'a [f64],
-    /// What is subtracted within intervals, as [`Measured::within`].
+    /// Error subtracted within intervals, as [`Measured::within`].
     without: Option<&'a [f64]>,
 }
 
-/// Room for some intervals.
+/// Workspace for a number of intervals.
 #[derive(Default)]
 pub(super) struct Room {
     measure: defect::Room,
@@ -54,7 +55,7 @@ pub(super) struct Room {
     /// `[n][m + 1][count]`, at the sample points.
     states: Vec<f64>,
     f: Vec<f64>,
-    /// As [`defect::correct`] takes them.
+    /// Arguments of [`defect::correct`].
     nodes: Vec<f64>,
     jacobians: [Vec<f64>; 2],
     gains: [Vec<f64>; 2],
@@ -71,21 +72,21 @@ impl Room {
     }
 }
 
-/// Errors and the unknowns they belong to.
+/// Error estimates and the unknowns to which they belong.
 pub(super) struct Measured {
     at: Vec<f64>,
     errors: Vec<f64>,
-    /// What rounding alone may make of them.
+    /// Part of the errors that rounding alone may cause.
     rounding: f64,
-    /// The part of the error that goes on from interval to interval, in the layout of the unknowns.
+    /// Part of the error that propagates between intervals, in the layout of the unknowns.
     shift: Vec<f64>,
-    /// The part within intervals, `[n][m + 1][N]` at the sample points.
+    /// Part of the error within intervals, `[n][m + 1][N]` at the sample points.
     within: Vec<f64>,
 }
 
 impl CycleProblem<'_> {
-    /// Estimated error on every interval, relative. A point that was just measured is not measured again: the last
-    /// factorisation, which must belong to the current mesh, was close enough to it then.
+    /// Estimated relative error on every interval. The estimate for the last point is reused: its factorisation, which
+    /// must belong to the current mesh, was close enough to the point then.
     pub(super) fn errors(&self, u: &[f64]) -> Vec<f64> {
         if let Some(known) = self.measured.borrow().as_ref().filter(|known| same(&known.at, u)) {
             return known.errors.clone();
@@ -96,14 +97,14 @@ impl CycleProblem<'_> {
         errors
     }
 
-    /// Error at `u` that finer meshes do not make smaller: next to a singular matrix the rounding of single intervals many times over.
+    /// Error at `u` that finer meshes do not reduce: rounding of single intervals, amplified next to a singular matrix.
     pub(super) fn rounding(&self, u: &[f64]) -> f64 {
         self.errors(u);
         self.measured.borrow().as_ref().map_or(0.0, |known| known.rounding)
     }
 
-    /// Part of dλ/ds that may be rounding: [`STANDS`] if f_λ is as large as f, and more by as much as it is smaller. Where f does not depend on
-    /// λ at all, a branch leads along it.
+    /// Part of dλ/ds that may be rounding: [`STANDS`] if f_λ is as large as f, and inversely proportional to f_λ if it
+    /// is smaller. If f does not depend on λ at all, the branch runs along λ.
     pub(super) fn slope_error(&self) -> f64 {
         let (n, k) = (self.n, self.setting.freedom());
         let lanes = self.f.len() / n;
@@ -116,16 +117,17 @@ impl CycleProblem<'_> {
         (STANDS * f / by_parameter).clamp(STANDS, FLAT)
     }
 
-    /// Estimated error of the multipliers `spectrum` at `u`: they change by it where the transitions of all intervals are made more
-    /// accurate, and again where the Jacobian is taken not along the profile but along the profile without its estimated error.
-    /// The two can cancel, and so can the errors of neighbouring intervals: every second interval is changed first, then the others, and the
-    /// sizes of all changes are added. Identities between multipliers see little of this error, which is large where the
-    /// Jacobian changes sharply.
+    /// Estimated error of the multipliers `spectrum` at `u`: their change if the transitions of all intervals are
+    /// improved, and again if the Jacobian is evaluated along the profile without its estimated error. The two changes
+    /// can cancel, and so can the errors of neighbouring intervals. Every second interval is therefore changed first,
+    /// then the others, and the sizes of all changes are added. Identities between multipliers reveal little of this
+    /// error, which is large where the Jacobian changes sharply.
     pub(super) fn multiplier_error(&self, u: &[f64], spectrum: &[Complex64]) -> f64 {
         self.errors(u);
         let crossed = self.crossed(u);
         if self.is_planar() && crossed.is_empty() {
-            // The error of exp(∫ tr f_x), relative to the larger of 1 and its value, plus that of the trivial multiplier, if any.
+            // Error of exp(∫ tr f_x), relative to the larger of 1 and its value, plus that of the trivial multiplier,
+            // if any.
             let (own, off) = (self.trace.exp(), self.divergence_error(u));
             let trivial = spectrum[..spectrum.len() - 1].iter().fold(0.0, |most: f64, z| most.max((z - 1.0).norm()));
             return SPECTRUM_SAFE * (off.exp_m1() * own / own.max(1.0) + trivial) + floquet::ROUNDING;
@@ -136,8 +138,8 @@ impl CycleProblem<'_> {
         SPECTRUM_SAFE * apart + floquet::ROUNDING
     }
 
-    /// Error of ∫ tr f_x: its difference from the integral over other points of the intervals, along the profile corrected by its
-    /// estimated error.
+    /// Error of ∫ tr f_x: its difference from the integral over other points of the intervals, along the profile
+    /// corrected by its estimated error.
     fn divergence_error(&self, u: &[f64]) -> f64 {
         let known = self.measured.borrow();
         let Some(known) = known.as_ref() else { return f64::NAN };
@@ -161,8 +163,8 @@ impl CycleProblem<'_> {
         (better[size] * total - self.trace).abs()
     }
 
-    /// The multipliers from more accurate transitions, with the Jacobian along the profile, and along the profile without its error; before
-    /// either of them those where every second interval is so.
+    /// Multipliers from improved transitions, with the Jacobian along the profile and along the profile without its
+    /// error; each preceded by those with only every second interval changed.
     fn corrected_multipliers(&self, u: &[f64], crossed: &[Crossed]) -> Option<[Vec<Complex64>; 4]> {
         let known = self.measured.borrow();
         let known = known.as_ref()?;
@@ -173,7 +175,7 @@ impl CycleProblem<'_> {
         let room = &mut *self.room.borrow_mut();
         let mut first = 0;
         while first < self.intervals() {
-            // No short piece at the end.
+            // Avoids a short piece at the end.
             let left = self.intervals() - first;
             let together = if self.in_columns().is_some() { FEW } else { TOGETHER };
             let count = if left < 3 * together / 2 { left } else { together };
@@ -184,7 +186,7 @@ impl CycleProblem<'_> {
         crossings::replace(&mut own, crossed);
         crossings::replace(&mut other, &self.crossed(&better));
         let [frames, others] = [u, &better].map(|u| self.frames(u));
-        // Those of the even intervals and those of the odd ones, and the frames.
+        // Transitions of the even and of the odd intervals, and frames.
         let courses =
             [(&own, &plain, &frames), (&own, &own, &frames), (&other, &own, &frames), (&other, &other, &others)];
         let courses =
@@ -193,7 +195,7 @@ impl CycleProblem<'_> {
         found.iter().flatten().all(|z| z.re.is_finite() && z.im.is_finite()).then_some(found)
     }
 
-    /// Makes the transitions of some intervals more accurate, with the Jacobian along each of the profiles.
+    /// Improves the transitions of a range of intervals, with the Jacobian along each of the profiles.
     fn correct(&self, piece: Range<usize>, profiles: &[Profile; 2], transitions: &mut [Vec<f64>; 2], room: &mut Room) {
         let (n, m, block, count) = (self.n, self.scheme.degree, self.block(), piece.len());
         let (square, lanes, size) = (n * n, count * (m + 1), self.profile_size());
@@ -237,7 +239,7 @@ impl CycleProblem<'_> {
         }
     }
 
-    /// The system where intervals are so large that each is corrected column by column.
+    /// The system, if intervals are so large that each is corrected column by column.
     fn in_columns(&self) -> Option<&Condensed<f64>> {
         match &self.system {
             System::One(system) if self.n >= MANY => Some(system),
@@ -261,7 +263,7 @@ impl CycleProblem<'_> {
             &scale,
             &mut self.room.borrow_mut().measure,
         );
-        // Where f has a kink the points at which the defect was sampled may all lie on one side of it.
+        // If f has a kink, the sample points of the defect may all lie on one side of it.
         for (j, defect) in self.defects_at_crossings(u) {
             for (i, own) in defect.into_iter().enumerate() {
                 local[j] = local[j].max((own / scale[i]).abs());

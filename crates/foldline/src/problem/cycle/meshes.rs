@@ -1,18 +1,19 @@
-//! Meshes of a cycle: room on them, profiles carried between them, and which one a tolerance asks for.
+//! Meshes of a cycle: workspace, transfer of profiles, and adaptation to a tolerance.
 
 use super::CycleProblem;
 use crate::diagram::Mesh;
 use crate::problem::mesh::{self, Passage};
 use crate::special::collapse;
 
-/// Error of every interval of a new mesh, in tolerances: so much less than 1 that the mesh serves for the next points too.
+/// Error of each interval of a new mesh, in tolerances: so small that the mesh serves for the next points too.
 const TARGET: f64 = 0.1;
 
-/// Pairs of meshes that are remembered: one step goes to and fro between those of its ends and of the point before.
+/// Number of mesh pairs that are remembered: one step transfers back and forth between those of its ends and of the
+/// previous point.
 const PASSAGES: usize = 4;
 
 impl CycleProblem<'_> {
-    /// Makes room for everything on the current mesh.
+    /// Resizes the workspace for the current mesh.
     pub(super) fn arrange(&mut self) {
         self.measured.replace(None);
         self.anchored.clear();
@@ -37,7 +38,7 @@ impl CycleProblem<'_> {
         self.fp.resize(lanes * n * self.setting.freedom(), 0.0);
     }
 
-    /// A profile on another mesh.
+    /// Transfers a profile to another mesh.
     pub(super) fn passed(&self, profile: &[f64], from: &Mesh, to: &Mesh) -> Vec<f64> {
         let mut known = self.passages.borrow_mut();
         let at = known.iter().position(|passage| passage.is_between(from, to));
@@ -51,7 +52,7 @@ impl CycleProblem<'_> {
         known[at].carried(profile, self.n)
     }
 
-    /// A mesh for that tolerance at `u`, from the errors on the current one.
+    /// Mesh for a tolerance at `u`, from the errors on the current one.
     pub(super) fn equidistributed(&self, u: &[f64], errors: &[f64], tolerance: f64, kept: f64) -> Option<Mesh> {
         let (degree, target) = (self.scheme.degree, TARGET * tolerance);
         if self.halves {
@@ -64,7 +65,7 @@ impl CycleProblem<'_> {
         }
     }
 
-    /// Whether the halves of the cycle differ little: it may be about to become a cycle of half the period.
+    /// True if the halves of the cycle differ little, so that it may be about to become a cycle of half the period.
     pub(super) fn nearly_doubled(&self, u: &[f64]) -> bool {
         const PLACES: usize = 16;
         let state = |t: f64, x: &mut [f64]| {

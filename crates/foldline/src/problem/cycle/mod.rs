@@ -1,10 +1,11 @@
 //! Cycles by orthogonal collocation.
 //!
-//! **Idea.** In normalised time the profile is a polynomial of degree m on each mesh interval, held by its values at the
-//! left end and at the Gauss points, where it satisfies the differential equation. An integral phase condition fixes the
-//! shift in time.
+//! **Idea.** In normalised time the profile is a polynomial of degree m on each mesh interval, represented by its
+//! values at the left end and at the Gauss points, where it satisfies the differential equation. An integral phase
+//! condition fixes the time shift.
 //!
-//! **Equations.** u = (profile, T, λ₁ … λ_k), N(m+1)n + 1 + k unknowns, k = 1 for a curve; A, e, b from [`Scheme`]; h_j interval lengths:
+//! **Equations.** u = (profile, T, λ₁ … λ_k), N(m+1)n + 1 + k unknowns, k = 1 for a curve; A, e, b from [`Scheme`]; h_j
+//! interval lengths:
 //!
 //! ```text
 //!   (1)  X_{j,i} - x_j - h_j T Σ_k a_ik f(X_{j,k}, λ) = 0               i = 1…m, j = 0…N-1
@@ -12,15 +13,16 @@
 //!   (3)  Σ_j h_j Σ_i b_i ⟨X_{j,i} - X̃_{j,i}, X̃'_{j,i}⟩ = 0              phase, with reference X̃
 //! ```
 //!
-//! with g = 0, or whole periods of those states that are angles and turn.
+//! with g = 0, or whole periods for those states that are angles and rotate.
 //!
-//! A forced field has f(X, λ, τ) with its time τ in periods of the forcing. A cycle lasts a given number q of them, and instead of (3)
+//! A forced field is f(X, λ, τ) with the time τ in forcing periods. A cycle lasts a prescribed number q of them, and
+//! (3) is replaced by
 //!
 //! ```text
 //!   (4)  T - q = 0,   τ_{j,i} = q t_{j,i}
 //! ```
 //!
-//! (1) is the Runge–Kutta form of collocation: its matrix is close to the identity where intervals are short.
+//! (1) is the Runge–Kutta form of collocation: its matrix is close to the identity on short intervals.
 //!
 //! Inner products of states divide component c by s_c = (model scale) + max |X̃_c|.
 //!
@@ -50,12 +52,13 @@ use errors::{Measured, Room};
 use num_complex::Complex64;
 use std::cell::RefCell;
 
-/// Share of the density of a mesh that the next one has at least.
+/// Smallest density of the next mesh, as a share of that of the current one.
 const KEPT: f64 = 0.6;
 
-/// Stated error over the estimated one. On the reference study `foldline verify` finds true errors of up to 2.2 estimates.
+/// Ratio of the stated to the estimated error. On the reference study `foldline verify` finds true errors of up to 2.2
+/// estimates.
 pub(crate) const SAFE: f64 = 4.0;
-/// What rounding adds: some 1e-11 on thousands of intervals, or where errors are carried far.
+/// Allowance for rounding: some 1e-11 on thousands of intervals, or where errors are strongly amplified.
 const ROUNDING: f64 = 5e-11;
 
 /// Cycles in one free parameter (a curve) or several.
@@ -66,25 +69,25 @@ pub struct CycleProblem<'a> {
     mesh: Mesh,
     n: usize,
     halves: bool,
-    /// q of (4); 0 where the field is autonomous.
+    /// q of (4); 0 for an autonomous field.
     forcing_periods: u32,
-    /// `[n]` x_N - x_0 where angles turn; see [`Cycle::gain`].
+    /// `[n]`: x_N - x_0 where angles rotate; see [`Cycle::gain`].
     gain: Vec<f64>,
-    /// `[L][m][W]`: τ_{j,i}, nothing where the field is autonomous.
+    /// `[L][m][W]`: τ_{j,i}; empty for an autonomous field.
     times: Vec<f64>,
     /// X̃' / s² at the Gauss points, `[L][m][n][W]`, normalised to unit length, and ⟨X̃, X̃'⟩ in that weight.
     phase: Vec<f64>,
     phase_offset: f64,
-    /// X̃ with its scalars; empty where there is none on this mesh. Whether `phase` is still to be made from it.
+    /// X̃ with its scalars; empty if there is none on this mesh. Below, true if `phase` must still be computed from it.
     anchored: Vec<f64>,
     unphased: bool,
     scale: Vec<f64>,
     period_scale: f64,
     system: System,
-    /// Places and lanes of the solver; see [`System`].
+    /// Number of places and lanes of the solver; see [`System`].
     length: usize,
     width: usize,
-    /// `[L][W]`: h_j where the solver has interval j, zero beyond the last one.
+    /// `[L][W]`: h_j for interval j of the solver, zero beyond the last one.
     lengths: Vec<f64>,
     /// `[n][L][m][W]`: X_{j,i}.
     states: Vec<f64>,
@@ -93,18 +96,18 @@ pub struct CycleProblem<'a> {
     f: Vec<f64>,
     fx: Vec<f64>,
     fp: Vec<f64>,
-    /// `[n × n]`: which entries of f_x were ever met different from zero.
+    /// `[n × n]`: true for entries of f_x that have ever been nonzero.
     coupled: Vec<bool>,
     trace: f64,
-    /// What was measured last. Mesh and errors belong together only for the point they were measured at.
+    /// The last error estimate. Mesh and errors belong together only at the point where they were computed.
     measured: RefCell<Option<Measured>>,
     room: RefCell<Room>,
-    /// How the last pairs of meshes are passed between.
+    /// Interpolations between the most recently used pairs of meshes.
     passages: RefCell<Vec<Passage>>,
 }
 
 impl<'a> CycleProblem<'a> {
-    /// Polynomials of degree `degree` on `mesh`.
+    /// Cycles represented by polynomials of degree `degree` on `mesh`.
     pub fn new(setting: Setting<'a>, degree: usize, mesh: &Mesh) -> CycleProblem<'a> {
         let scheme = Scheme::new(degree);
         let n = setting.field.dim();
@@ -143,7 +146,7 @@ impl<'a> CycleProblem<'a> {
         problem
     }
 
-    /// Cycles like that one: with polynomials of its degree, on its mesh, over as many periods of the forcing and turns of angles.
+    /// Cycles with the degree, the mesh, the number of forcing periods and the rotations of `cycle`.
     pub fn like(setting: Setting<'a>, cycle: &Cycle) -> CycleProblem<'a> {
         let mut problem = CycleProblem::new(setting, cycle.degree, &cycle.mesh);
         problem.forcing_periods = cycle.forcing_periods;
@@ -152,7 +155,7 @@ impl<'a> CycleProblem<'a> {
         problem
     }
 
-    /// Whether (4) takes the place of (3).
+    /// True if (4) replaces (3).
     fn is_forced(&self) -> bool {
         self.forcing_periods > 0
     }
@@ -162,14 +165,15 @@ impl<'a> CycleProblem<'a> {
         self.n == if self.is_forced() { 1 } else { 2 }
     }
 
-    /// Keeps the second half of every new mesh a copy of the first. A doubled cycle meets its parent at a pitchfork that is
-    /// perfect only if the discretisation does not tell the two halves apart; the mesh must have this form already.
+    /// Keeps the second half of every new mesh a copy of the first. A period-doubled cycle meets its parent at a
+    /// pitchfork that is perfect only if the discretisation does not distinguish the two halves. The current mesh must
+    /// already have this form.
     pub fn with_equal_halves(mut self) -> Self {
         self.halves = true;
         self
     }
 
-    /// The scheme of the polynomials.
+    /// The collocation scheme.
     pub fn scheme(&self) -> &Scheme {
         &self.scheme
     }
@@ -178,7 +182,7 @@ impl<'a> CycleProblem<'a> {
         self.mesh.len() - 1
     }
 
-    /// Points of a batch.
+    /// Number of points in a batch.
     fn lanes(&self) -> usize {
         self.length * self.width * self.scheme.degree
     }
@@ -199,21 +203,21 @@ impl<'a> CycleProblem<'a> {
         self.mesh[j + 1] - self.mesh[j]
     }
 
-    /// Multipliers from the last factorisation, which belongs to `u`.
+    /// Multipliers from the last factorisation, which must be one at `u`.
     fn floquet(&self, u: &[f64]) -> Floquet {
         let (frames, transitions) = (self.frames(u), self.transitions());
         let course = Course { transitions: [&transitions; 2], frames: frames.as_ref() };
         floquet::one(course, &self.scale)
     }
 
-    /// `[N][n × n]`: how the right end of each interval follows from its left end.
+    /// `[N][n × n]`: transition matrices from the left to the right end of each interval.
     fn transitions(&self) -> Vec<f64> {
         let mut transitions = vec![0.0; self.intervals() * self.n * self.n];
         transitions.chunks_exact_mut(self.n * self.n).enumerate().for_each(|(j, own)| self.system.transition(j, own));
         transitions
     }
 
-    /// What splits the trivial multiplier off, where there is one.
+    /// Frames that split off the trivial multiplier; `None` for a forced field.
     fn frames(&self, u: &[f64]) -> Option<Frames> {
         (!self.is_forced()).then(|| Frames::along(&self.flow_at_nodes(u), self.n))
     }
@@ -222,9 +226,9 @@ impl<'a> CycleProblem<'a> {
         (self.scheme.degree + 1) * self.n
     }
 
-    /// Largest |component| over the profile; NaN where one is.
+    /// Largest absolute value of each component over the profile; NaN if one is.
     fn sizes(&self, u: &[f64]) -> Vec<f64> {
-        // All components of all nodes of an interval at once, so that the loop is one over lanes.
+        // All components of all nodes of an interval are treated at once, so that the loop runs over lanes.
         let mut largest = vec![0.0f64; (self.scheme.degree + 1) * self.n];
         Eight::dispatch(Largest { profile: &u[..self.profile_size()], largest: &mut largest });
         for k in self.n..largest.len() {
@@ -236,7 +240,7 @@ impl<'a> CycleProblem<'a> {
 
     fn relative_scale(&self, u: &[f64]) -> Vec<f64> {
         let mut sizes = self.sizes(u);
-        // Angles have one size, whatever their copy.
+        // The size of an angle does not depend on its copy.
         let angles = sizes.iter_mut().zip(self.setting.field.periods()).filter(|(_, period)| period.is_finite());
         angles.for_each(|(size, period)| *size = 0.5 * period);
         sizes.iter_mut().zip(self.setting.scales).for_each(|(size, scale)| *size += scale);
@@ -244,7 +248,7 @@ impl<'a> CycleProblem<'a> {
     }
 }
 
-/// The largest absolute value of every entry of an interval.
+/// Largest absolute value of every entry of an interval.
 struct Largest<'a, 'b> {
     profile: &'a [f64],
     largest: &'b mut [f64],
@@ -267,7 +271,8 @@ impl pulp::NullaryFnOnce for Largest<'_, '_> {
     }
 }
 
-/// The same for C entries from `at` on; returns C. What is compared stays in registers, in four rows that do not wait for each other.
+/// Largest absolute values of C entries from `at` on; returns C. The comparisons stay in registers, in four independent
+/// rows.
 #[inline(always)]
 fn largest_of<const C: usize>(profile: &[f64], size: usize, at: usize, largest: &mut [f64]) -> usize {
     let mut own = [[0.0f64; C]; 4];
@@ -310,7 +315,7 @@ impl pulp::NullaryFnOnce for Products<'_, '_> {
         let block = skipped + sums.len();
         let intervals = || a.chunks_exact(block).zip(b.chunks_exact(block)).zip(mesh.windows(2));
         let (blocks, rest) = sums.as_chunks_mut::<8>();
-        // Sums stay in registers.
+        // The sums stay in registers.
         for (k, sums) in blocks.iter_mut().enumerate() {
             let at = skipped + 8 * k;
             let mut sum = Eight::load(sums);
@@ -381,7 +386,7 @@ impl ZeroProblem for CycleProblem<'_> {
 
     fn dot(&self, a: &[f64], b: &[f64]) -> f64 {
         let (n, block, size) = (self.n, (self.scheme.degree + 1) * self.n, self.profile_size());
-        // For every Gauss point and component the sum over the intervals first.
+        // The sum over the intervals first, for every Gauss point and component.
         let mut sums = vec![0.0; block - n];
         Eight::dispatch(Products { a: &a[..size], b: &b[..size], mesh: &self.mesh, skipped: n, sums: &mut sums });
         let mut total = 0.0;
@@ -432,7 +437,7 @@ impl ZeroProblem for CycleProblem<'_> {
     fn coarser_mesh(&self, u: &[f64], tolerance: f64) -> Option<Mesh> {
         let errors = self.errors(u);
         let enough = self.equidistributed(u, &errors, tolerance, 0.0)?;
-        // Not all at once: where errors of the ends dominate they grow with a higher power than reckoned with.
+        // Coarsened gradually: if the errors at interval ends dominate, they grow with a higher power than assumed.
         (2 * enough.len() < self.mesh.len()).then(|| self.equidistributed(u, &errors, tolerance, KEPT)).flatten()
     }
 
@@ -444,9 +449,9 @@ impl ZeroProblem for CycleProblem<'_> {
         Some(mesh::denser(&self.mesh))
     }
 
-    // A single non-trivial multiplier is exp(∫ tr f_x), by Liouville's formula. The integral is as accurate as the profile; transition
-    // matrices of intervals are not. A canard is smooth along a repelling slow manifold, so its intervals there are long, however fast
-    // neighbouring solutions depart.
+    // A single non-trivial multiplier is exp(∫ tr f_x), by Liouville's formula. The integral is as accurate as the
+    // profile; transition matrices of intervals are not. A canard is smooth along a repelling slow manifold, so its
+    // intervals there are long, however fast neighbouring solutions depart.
     fn stability(&mut self, u: &[f64]) -> Examination {
         let mut found = self.floquet(u);
         let trivial = usize::from(!self.is_forced());
@@ -478,7 +483,7 @@ impl ZeroProblem for CycleProblem<'_> {
         found.ranges = extremes::of_profile(self.setting.field, &parameters, cycle, self.forcing_periods, &self.scheme);
         found.averages =
             averages::of_profile(self.setting.field, &parameters, cycle, self.forcing_periods, &self.scheme);
-        // An angle that turns takes all values, and has no mean.
+        // A rotating angle takes all values and has no mean.
         for (c, gain) in self.gain.iter().enumerate().filter(|(_, gain)| **gain != 0.0) {
             let half = 0.5 * self.setting.field.periods().get(c).copied().unwrap_or(*gain).abs();
             (found.ranges[c], found.averages[c]) = ([-half, half], [f64::NAN; 2]);

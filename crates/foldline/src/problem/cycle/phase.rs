@@ -1,9 +1,9 @@
-//! A cycle in the phases in which it is close to another one.
+//! Phase shifts that bring a cycle close to another one.
 //!
-//! **Idea.** A branch that comes back to a cycle comes back to it in any phase. Shifts θ are sought at which the distance of both
-//! profiles is smallest: at equal distances first, then as zeros of the phase condition (1), whose slope is next to that
-//! of two equal profiles. There can be several: where a cycle of three turns is nearly one turn run through three times, it is close to
-//! itself a third of its period later.
+//! **Idea.** A branch may return to a cycle in any phase. Shifts θ that minimise the distance between two profiles are
+//! sought: first among equally spaced ones, then as zeros of the phase condition (1), whose slope is close to that of
+//! two equal profiles. There can be several: a cycle of three nearly equal turns is close to itself a third of its
+//! period later.
 //!
 //! **Equations.** With weights w at the Gauss points t of the mesh of x:
 //!
@@ -13,15 +13,15 @@ use super::CycleProblem;
 use crate::contract::ZeroProblem;
 use crate::diagram::{Cycle, Point, Solution};
 
-/// Equal distances at which two profiles are compared.
+/// Number of equally spaced shifts at which two profiles are compared.
 const PLACES: usize = 480;
-/// Newton steps, or halvings, for (1).
+/// Maximum number of Newton steps or bisections for (1).
 const ROUNDS: usize = 60;
-/// Shift below which none is seen.
+/// Shift that counts as none.
 const FINEST: f64 = 1e-14;
 
 impl CycleProblem<'_> {
-    /// See [`crate::contract::ZeroProblem::images`].
+    /// Phase-shifted copies of a point; see [`crate::contract::ZeroProblem::images`].
     pub(super) fn in_phase(
         &self,
         beside: &[f64],
@@ -53,7 +53,7 @@ impl CycleProblem<'_> {
             let off: Vec<f64> = u.iter().zip(beside).map(|(a, b)| a - b).collect();
             self.dot(&off, &off) <= within * within
         };
-        // The scalars are as far off in every phase.
+        // The distance of the scalars is the same in every phase.
         let apart = [&vec![0.0; size][..], &scalars].concat();
         let there = [&vec![0.0; size][..], &beside[size..]].concat();
         let off: Vec<f64> = apart.iter().zip(&there).map(|(a, b)| a - b).collect();
@@ -72,8 +72,8 @@ impl CycleProblem<'_> {
         images.filter(|[u, _]| close(u)).collect()
     }
 
-    /// What the square of the distance of two profiles, of which the first is on the mesh of this problem, is at least, whatever
-    /// their phases: by how much their means differ, and their distances from them.
+    /// Lower bound of the squared distance of two profiles in any phase, from the differences of their means and of
+    /// their standard deviations. The first profile is on the mesh of this problem.
     fn apart_in_any_phase(&self, x: &[f64], y: &Cycle) -> f64 {
         let moments = |profile: &[f64], mesh: &[f64]| -> Vec<[f64; 2]> {
             let mut sums = vec![[0.0; 2]; self.n];
@@ -89,13 +89,13 @@ impl CycleProblem<'_> {
         };
         let pairs = moments(x, &self.mesh).into_iter().zip(moments(&y.profile, &y.mesh));
         let off = |(a, b): ([f64; 2], [f64; 2])| (a[0] - b[0]).powi(2) + (a[1] - b[1]).powi(2);
-        // Means of angles depend on their copy.
+        // Means of angles depend on the copy.
         let angle = |c: usize| self.setting.period(c).is_some();
         let off = |(c, (pair, scale)): (usize, (_, &f64))| if angle(c) { 0.0 } else { off(pair) / (scale * scale) };
         pairs.zip(&self.scale).enumerate().map(off).sum::<f64>() / self.n as f64
     }
 
-    /// The profile of `y` on the mesh of this problem, later by θ.
+    /// The profile of `y`, shifted by θ, on the mesh of this problem.
     fn moved(&self, y: &Cycle, shift: f64) -> Vec<f64> {
         let mut out = vec![0.0; self.profile_size()];
         for (j, block) in out.chunks_exact_mut(self.block()).enumerate() {
@@ -106,12 +106,12 @@ impl CycleProblem<'_> {
         out
     }
 
-    /// Every θ at which the distance is smaller than close by, and may be as small as `within`.
+    /// All shifts θ at which the distance has a local minimum that may be as small as `within`.
     fn shifts(&self, x: &[f64], y: &Cycle, within: f64) -> Vec<f64> {
         let n = self.n;
         let periods = self.forcing_periods as usize;
         let here = Cycle { mesh: self.mesh.clone(), profile: x.to_vec(), ..y.clone() };
-        // A forced cycle is a solution only where it is moved by whole periods of the forcing.
+        // A shifted forced cycle is a solution only if the shift is a whole number of forcing periods.
         let places = if self.is_forced() { (PLACES / periods).max(8) * periods } else { PLACES };
         let stride = if self.is_forced() { places / periods } else { 1 };
         let scaled = |cycle: &Cycle| -> Vec<f64> {
@@ -129,7 +129,7 @@ impl CycleProblem<'_> {
             let (before, after) = a.split_at((places - k) * n);
             between(before, &b[k * n..]) + between(after, &b[..k * n])
         };
-        // Moved by one place the distance changes by no more than this.
+        // Largest change of the distance over one shift.
         let moves = (between(&b[n..], &b[..(places - 1) * n]) + between(&b[..n], &b[(places - 1) * n..])).sqrt();
         let limit = 1.1 * within * ((places * n) as f64).sqrt() + if self.is_forced() { 0.0 } else { moves };
         let count = places / stride;
@@ -137,7 +137,7 @@ impl CycleProblem<'_> {
         let mut k = 0;
         while k < count {
             all[k] = apart(k * stride).sqrt();
-            // What cannot be within the limit need not be looked at; a distance more than enough away stands for those that follow.
+            // Shifts that cannot be within the limit are skipped: a distance far above it covers those that follow.
             let clear = if self.is_forced() { 0.0 } else { (all[k] - limit) / moves.max(f64::MIN_POSITIVE) };
             k += (clear as usize).max(1);
         }
@@ -155,7 +155,7 @@ impl CycleProblem<'_> {
         let mut before: Option<(f64, f64)> = None;
         for _ in 0..ROUNDS {
             let (g, mut slope) = self.out_of_phase(x, y, shift);
-            // The slope is that of equal profiles; two values know better.
+            // The slope is that of equal profiles; a secant is more accurate.
             let secant = before.map_or(f64::NAN, |(there, value)| (g - value) / (shift - there));
             if secant > 0.2 * slope && secant < 5.0 * slope {
                 slope = secant;
@@ -198,7 +198,7 @@ impl CycleProblem<'_> {
     }
 }
 
-/// A difference of angles between their nearest copies.
+/// Difference of two angles, reduced to the nearest copies.
 fn nearest(off: f64, period: f64) -> f64 {
     if period.is_finite() { off - period * (off / period).round() } else { off }
 }
@@ -232,8 +232,8 @@ mod tests {
     }
 
     #[test]
-    fn a_cycle_that_is_nearly_a_shorter_one_is_seen_once_for_each_turn() {
-        // Three turns, which differ by a thousandth.
+    fn a_cycle_of_nearly_equal_turns_has_one_image_per_turn() {
+        // Three turns that differ by a thousandth.
         let field = field();
         let scales = [1.0, 1.0];
         let setting = Setting { field: &field, scales: &scales, parameters: vec![1.0], axes: vec![Axis::new(0, 1.0)] };
@@ -251,7 +251,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cycle_is_seen_in_the_phase_and_the_reflection_of_another() {
+    fn images_have_the_phase_and_the_reflection_of_the_other_cycle() {
         let model = field();
         let scales = [1.0, 1.0];
         let setting = Setting { field: &model, scales: &scales, parameters: vec![1.0], axes: vec![Axis::new(0, 1.0)] };
@@ -259,7 +259,7 @@ mod tests {
         let mut problem = CycleProblem::like(setting, &here);
         let beside: Vec<f64> = here.profile.iter().copied().chain([2.0, 1.0]).collect();
         problem.anchor(&beside);
-        // The tangent is the profile itself, so that it shows where that went.
+        // The profile itself serves as tangent, so that its shift can be checked.
         let tangent: Vec<f64> = there.profile.iter().copied().chain([0.5, 0.25]).collect();
         let mut point = problem.point(&beside, &tangent, Default::default());
         for reflected in [false, true] {
@@ -270,7 +270,7 @@ mod tests {
             let [[u, along]] = &images[..] else { panic!("{} images", images.len()) };
             assert_eq!((u.len(), &along[along.len() - 2..]), (beside.len(), &[0.5, 0.25][..]));
             let off = u.iter().zip(&beside).fold(0.0f64, |most, (a, b)| most.max((a - b).abs()));
-            // What polynomials of degree 4 on 60 intervals leave of sin 3τ.
+            // Interpolation error of sin 3τ with polynomials of degree 4 on 60 intervals.
             assert!(off < 1e-5, "{off:e}");
             let off =
                 along.iter().zip(&beside[..here.profile.len()]).fold(0.0f64, |m, (a, b)| m.max((a - sign * b).abs()));

@@ -6,7 +6,7 @@ use crate::problem::gauss::Scheme;
 use std::marker::PhantomData;
 
 impl CycleProblem<'_> {
-    /// What (3) takes from the point where the problem was anchored last, unless that is there already.
+    /// Computes the reference of (3) from the last anchor, unless this has been done.
     pub(super) fn lay_phase(&mut self) {
         if !std::mem::take(&mut self.unphased) {
             return;
@@ -27,15 +27,15 @@ impl CycleProblem<'_> {
         self.phase_offset = offset / norm;
     }
 
-    /// X̃' of the states gathered last, as (3) takes it; returns its square norm and its product with those states.
+    /// Computes X̃' for (3) from the gathered states. Returns its square norm and its product with those states.
     fn laid_phase<T: Lane>(&mut self) -> [f64; 2] {
         let (n, length, lanes) = (self.n, self.length, self.lanes());
         let CycleProblem { scheme, lengths, scale, ends, states, phase, .. } = self;
         T::dispatch(Phase::<T> { n, length, lanes, scheme, lengths, scale, ends, states, phase, lane: PhantomData })
     }
 
-    /// Residuals of (1) and (2) at `u` into `r`, with the states gathered and f evaluated there; returns the sum of (3) without
-    /// what belongs to the reference alone.
+    /// Writes the residuals of (1) and (2) at `u` to `r`, from the gathered states and f at them. Returns the sum of
+    /// (3) without the term that depends on the reference alone.
     pub(super) fn defects<T: Lane>(&self, u: &[f64], r: &mut [f64]) -> f64 {
         T::dispatch(Defects::<T> { problem: self, u, r, lane: PhantomData })
     }
@@ -76,7 +76,7 @@ impl<T: Lane> pulp::NullaryFnOnce for Phase<'_, '_, T> {
                     for k in 0..m {
                         rise = rise + T::splat(row[k + 1]) * T::load(&own[k * w..]);
                     }
-                    // With X̃' = rise / h.
+                    // X̃' = rise / h.
                     let rise = there * rise;
                     let slope = share * rise * inverse;
                     let weight = T::splat(scheme.weights[i]);
@@ -102,7 +102,7 @@ impl<T: Lane> pulp::NullaryFnOnce for Defects<'_, '_, T> {
 
     #[inline(always)]
     fn call(self) -> f64 {
-        // Common dimensions as constants.
+        // Common sizes as constants.
         match (self.problem.n, self.problem.scheme.degree) {
             (4, 4) if T::COUNT > 1 => self.taken(4, 4),
             (n, m) => self.taken(n, m),
@@ -145,7 +145,8 @@ impl<T: Lane> Defects<'_, '_, T> {
     }
 }
 
-/// One component at one place of every lane: its rows of (1), that of (2) without x_{j+1}, and its part of (3) over h.
+/// One component at one place of every lane: writes its rows of (1) and that of (2) without x_{j+1}; returns its part
+/// of (3) over h.
 #[inline(always)]
 fn of_component<T: Lane>(problem: &CycleProblem, [t, c]: [usize; 2], ht: T, rows: &mut [T], [n, m]: [usize; 2]) -> T {
     let (scheme, lanes) = (&problem.scheme, problem.lanes());

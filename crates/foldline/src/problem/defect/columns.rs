@@ -1,8 +1,9 @@
-//! Transitions of many components made more accurate.
+//! Correction of transition matrices with many components.
 //!
-//! **Idea.** Variation of constants, (3) of [`super::correct`], takes several factorisations of a dense matrix for every interval. The error of a column
-//! of V is itself a solution of the linearised equations, and the interval's own factorised matrix, which is sparse where the field is,
-//! solves them: the estimate of the error of a cycle, (1) and (2) of [`super`], column by column. Eight columns run side by side.
+//! **Idea.** Variation of constants, (3) of [`super::correct`], requires several factorisations of a dense matrix per
+//! interval. The error of a column of V itself solves the linearised equations, and the factorised matrix of the
+//! interval, which is sparse if the field is, solves them: the error estimate of a cycle, (1) and (2) of [`super`],
+//! column by column. Eight columns run side by side.
 //!
 //! **Equations.** With D = V' - h T J V on an interval:
 //!
@@ -16,7 +17,8 @@ use crate::linalg::condensed::Condensed;
 use crate::linalg::lane::{Eight, Lane, intact};
 use std::ops::Range;
 
-/// As [`super::correct`], for the intervals `piece` of a condensed system, each of which is a place.
+/// Corrects transitions like [`super::correct`], for the intervals `piece` of a condensed system, each of which has its
+/// own place.
 pub fn correct_in_columns(
     sampling: &Sampling,
     system: &Condensed<f64>,
@@ -29,9 +31,9 @@ pub fn correct_in_columns(
     Eight::dispatch(Columns { sampling, system, piece, courses, jacobians: &jacobians, n });
 }
 
-/// Entries of J that do not vanish at all sample points of all intervals.
+/// Entries of J that are nonzero at some sample point of some interval.
 struct Sparse {
-    /// Row and column of each.
+    /// Row and column of each entry.
     places: Vec<[usize; 2]>,
     /// `[N][m + 1][entries]`: h T times the entry.
     values: Vec<f64>,
@@ -121,7 +123,7 @@ impl pulp::NullaryFnOnce for Columns<'_, '_, '_> {
     }
 }
 
-/// An interval whose transition cannot be made more accurate gains nothing.
+/// Sets the correction of an interval to zero if it is not finite.
 fn keep_finite(gains: &mut [f64], count: usize, place: usize) {
     let own = || (place..gains.len()).step_by(count);
     if !own().all(|k| gains[k].is_finite()) {
@@ -129,7 +131,8 @@ fn keep_finite(gains: &mut [f64], count: usize, place: usize) {
     }
 }
 
-/// Columns from `first` on of what weights make of the identity at the first node and of `others` `[m][n]` at the rest.
+/// Columns from `first` on of the linear combination of the identity at the first node and `others` `[m][n]` at the
+/// remaining nodes.
 #[inline(always)]
 fn from_identity(weights: &[f64], others: &[Eight], first: usize, to: &mut [Eight]) {
     let last = to.len().min(first + Eight::COUNT);
@@ -138,7 +141,7 @@ fn from_identity(weights: &[f64], others: &[Eight], first: usize, to: &mut [Eigh
     combined_onto(&weights[1..], others, to);
 }
 
-/// Combinations of parts of n numbers, one for each row of weights.
+/// Linear combinations of parts of n numbers, one for each row of weights.
 #[inline(always)]
 fn combined(weights: &[f64], parts: &[Eight], to: &mut [Eight], n: usize) {
     for (row, to) in weights.chunks_exact(parts.len() / n).zip(to.chunks_exact_mut(n)) {
@@ -147,7 +150,7 @@ fn combined(weights: &[f64], parts: &[Eight], to: &mut [Eight], n: usize) {
     }
 }
 
-/// Adds a combination of equally long parts.
+/// Adds a linear combination of equally long parts.
 #[inline(always)]
 fn combined_onto(weights: &[f64], parts: &[Eight], to: &mut [Eight]) {
     for (weight, part) in weights.iter().zip(parts.chunks_exact(to.len())) {
@@ -165,7 +168,7 @@ mod tests {
     use crate::problem::gauss::Scheme;
     use foldline_general::{Mat, product};
 
-    /// exp(A), by its series.
+    /// exp(A), from its power series.
     fn exponential(a: &Mat<f64>) -> Mat<f64> {
         let n = a.nrows();
         let mut term = Mat::<f64>::identity(n, n);
@@ -180,7 +183,7 @@ mod tests {
 
     #[test]
     fn many_columns_are_corrected_as_well_as_by_variation_of_constants() {
-        // Not a whole number of eights, and neighbours coupled.
+        // A number of columns that is not a multiple of eight, with coupled neighbours.
         let (n, h) = (MANY + 3, 0.7);
         let scheme = Scheme::new(4);
         let (m, sampling) = (scheme.degree, Sampling::new(&scheme));

@@ -1,7 +1,8 @@
-//! What is computed for all lanes of a batch at once.
+//! Operations on all lanes of a batch at once.
 //!
-//! **Idea.** Every quantity is an array over the lanes, one for each component. The stages, the error, whether a step holds and
-//! how long the next one is are loops over such arrays, compiled for the widest vector instructions that the machine has.
+//! **Idea.** Every quantity is an array over the lanes, one for each component. The stages, the error, the acceptance
+//! of a step and the length of the next one are loops over such arrays, compiled for the widest vector instructions of
+//! the machine.
 
 use super::super::Tolerance;
 use super::super::aligned::Aligned;
@@ -12,7 +13,7 @@ use super::shared_or_own;
 use super::stiff;
 use crate::contract::{Batch, Parameters, VectorField};
 
-/// The arrays.
+/// Arrays over the lanes.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Lanes {
     pub(super) count: usize,
@@ -20,49 +21,49 @@ pub(super) struct Lanes {
     /// `[n × lanes]`.
     pub(super) x: Aligned,
     pub(super) next: Aligned,
-    /// State at the stage that is evaluated; after a sweep, that of the last but one.
+    /// State at the stage being evaluated; after a sweep, that of the last stage but one.
     pub(super) stage: Aligned,
-    /// States at which switches are looked at; empty where there are none.
+    /// States at which switches are sampled; empty without switches.
     pub(super) sampled: Aligned,
     pub(super) slopes: [Aligned; STAGES],
-    /// `[k × lanes]` where every trajectory has parameters of its own, else empty.
+    /// `[k × lanes]` if every trajectory has its own parameters, else empty.
     own: Aligned,
-    /// `[switches × lanes]`: the sign of each, and its value at the start of the step, 0 where it has just changed sign.
+    /// `[switches × lanes]` sign of each, and its value at the start of the step, 0 if it has just changed sign.
     pub(super) signs: Aligned,
     pub(super) switches: Aligned,
     /// `[switches × lanes]` values at each of [`PLACES`].
     pub(super) ahead: [Aligned; PLACES.len()],
-    /// `[lanes]` time reached, and that at the end of the step that was tried.
+    /// `[lanes]` time reached, and time at the end of the step tried.
     pub(super) time: Aligned,
     pub(super) end: Aligned,
     /// `[lanes]` signed length of the step to try, and of the one after it.
     pub(super) h: Aligned,
     pub(super) planned: Aligned,
-    /// `[lanes]` the factor by which it may be longer, at most.
+    /// `[lanes]` largest factor by which the next step may be longer.
     pub(super) most: Aligned,
-    /// `[lanes]` error of the step that was tried, in units of the tolerance; NaN if anything is not finite.
+    /// `[lanes]` error of the step tried, in units of the tolerance; NaN if anything is not finite.
     pub(super) error: Aligned,
-    /// `[lanes]` 1 where that error is small enough, else 0.
+    /// `[lanes]` 1 if that error is small enough, else 0.
     pub(super) accepted: Aligned,
     /// `[lanes]` binary logarithm of the second power in (1) of the ensemble.
     pub(super) second: Aligned,
-    /// `[lanes]` largest component at the ends of the step, and beyond which magnitude a trajectory runs to infinity: 0 in a
-    /// lane without one.
+    /// `[lanes]` largest component at the ends of the step, and the magnitude beyond which a trajectory is unbounded: 0
+    /// in an idle lane.
     pub(super) largest: Aligned,
     pub(super) bound: Aligned,
-    /// `[lanes]` length of the step that was tried last.
+    /// `[lanes]` length of the last step tried.
     pub(super) taken: Aligned,
-    /// `[lanes]` number of steps tried after which stiffness is looked for.
+    /// `[lanes]` number of steps tried after which stiffness is next checked.
     pub(super) look: Aligned,
-    /// `[lanes]` steps tried, and those accepted.
+    /// `[lanes]` steps tried, and steps accepted.
     pub(super) tried: Aligned,
     pub(super) steps: Aligned,
-    /// `[lanes]` 1 where a trajectory may have ended, else 0.
+    /// `[lanes]` 1 if a trajectory may have ended, else 0.
     pub(super) remarkable: Aligned,
 }
 
 impl Lanes {
-    /// Room for `count` trajectories with `own` parameters each.
+    /// Arrays for `count` trajectories with `own` parameters each.
     pub(super) fn new(field: &dyn VectorField, count: usize, own: usize) -> Lanes {
         let n = field.dim();
         let of = |components: usize| Aligned::zeros(components * count);
@@ -97,17 +98,17 @@ impl Lanes {
         }
     }
 
-    /// The parameters of all lanes, given those that are shared.
+    /// Parameters of all lanes, given the shared ones.
     pub(super) fn parameters<'p>(&'p self, shared: &'p [f64]) -> Parameters<'p> {
         shared_or_own(shared, &self.own)
     }
 
-    /// The state of lane `l`.
+    /// State of lane `l`.
     pub(super) fn state(&self, l: usize) -> Vec<f64> {
         self.x.iter().skip(l).step_by(self.count).copied().collect()
     }
 
-    /// Lane `l` takes over a trajectory, which begins at that time and runs to infinity beyond that bound.
+    /// Assigns a trajectory to lane `l`, which begins at `time` and counts as unbounded beyond `bound`.
     pub(super) fn set(&mut self, l: usize, start: &[f64], own: &[f64], time: f64, bound: f64) {
         start.iter().enumerate().for_each(|(i, x)| self.x[i * self.count + l] = *x);
         own.iter().enumerate().for_each(|(k, p)| self.own[k * self.count + l] = *p);
@@ -116,12 +117,12 @@ impl Lanes {
         (self.most[l], self.second[l]) = (pace::MOST, pace::second(0.0));
     }
 
-    /// Lane `l` is left without a trajectory: its state stays where it is.
+    /// Leaves lane `l` without a trajectory; its state is kept.
     pub(super) fn clear(&mut self, l: usize) {
         (self.h[l], self.bound[l]) = (0.0, 0.0);
     }
 
-    /// Tries a step in every lane: stages 2 to 7, error, whether the step holds, and how long the next one is.
+    /// Tries a step in every lane: stages 2 to 7, error, acceptance, and length of the next step.
     pub(super) fn advance(
         &mut self,
         field: &dyn VectorField,
@@ -148,7 +149,7 @@ impl Lanes {
         self.evaluate(field, shared, 6);
     }
 
-    /// The states of a stage from N slopes, with row `row` of the tableau.
+    /// Computes the states of a stage from N slopes, with row `row` of the tableau.
     #[inline(always)]
     fn stage<const N: usize>(&mut self, row: usize) {
         let count = self.count;
@@ -164,7 +165,7 @@ impl Lanes {
         }
     }
 
-    /// f at stage k + 1, into slope k.
+    /// Evaluates f at stage k + 1 into slope k.
     #[inline(always)]
     fn evaluate(&mut self, field: &dyn VectorField, shared: &[f64], k: usize) {
         let states = if k + 1 == STAGES { &self.next } else { &self.stage };
@@ -194,14 +195,15 @@ impl Lanes {
         self.error.iter_mut().for_each(|error| *error = (*error * mean).sqrt());
     }
 
-    /// The lanes whose step holds go to its end, the others stay. Returns whether any is remarkable.
+    /// Moves the lanes with accepted steps to the ends of these; the others stay. Returns true if any trajectory may
+    /// have ended.
     pub(super) fn take_over(&mut self, limits: &Limits) -> bool {
         std::mem::swap(&mut self.x, &mut self.next);
         let [first, .., last] = &mut self.slopes;
         std::mem::swap(first, last);
         std::mem::swap(&mut self.switches, &mut self.ahead[PLACES.len() - 1]);
         for first in (0..self.count).step_by(8) {
-            // Mostly all of eight go on.
+            // Usually all eight continue.
             if self.accepted[first..].first_chunk().is_some_and(|eight| *eight == [1.0; 8]) {
                 continue;
             }
@@ -215,11 +217,11 @@ impl Lanes {
             }
         }
         pulp::Arch::new().dispatch(GoOn { lanes: self, limits });
-        // 1 or 0: as bits, since those have no order in which they must be put together.
+        // 1 or 0: combined as bits, which, unlike a floating-point sum, may be reordered.
         self.remarkable.iter().fold(0, |any, remarkable| any | remarkable.to_bits()) != 0
     }
 
-    /// Only these lanes stay.
+    /// Removes all lanes but `kept`.
     pub(super) fn keep(&mut self, kept: &[usize]) {
         let scalars = [&mut self.time, &mut self.h, &mut self.most, &mut self.second, &mut self.bound];
         let scalars = scalars.into_iter().chain([&mut self.look, &mut self.tried, &mut self.steps]);
@@ -244,7 +246,7 @@ impl Lanes {
     }
 }
 
-/// x + h Σ a k. (A function of its own, so that the compiler knows that `to` is none of the others.)
+/// x + h Σ a k. (A separate function, so that the compiler knows that `to` does not alias.)
 #[inline(always)]
 fn combine<const N: usize>(to: &mut [f64], x: &[f64], h: &[f64], a: [f64; N], mut k: [&[f64]; N]) {
     let count = to.len();
@@ -259,7 +261,8 @@ fn combine<const N: usize>(to: &mut [f64], x: &[f64], h: &[f64], a: [f64; N], mu
     }
 }
 
-/// Adds the square of the error of one component, between these ends, in units of its tolerance (absolute, relative).
+/// Adds the square of the error of one component between its values at both ends, in units of its tolerance (absolute,
+/// relative).
 #[inline(always)]
 fn add_errors(
     error: &mut [f64],
@@ -280,12 +283,12 @@ fn add_errors(
         let size = ends[0][l].abs().max(ends[1][l].abs());
         let scaled = h[l] * e / (tolerance[0] + tolerance[1] * size);
         error[l] += scaled * scaled;
-        // No `if`: one that leaves a number where it stands becomes a store under a mask, which some processors take very long for.
+        // No `if`: conditionally keeping a number becomes a masked store, which is very slow on some processors.
         largest[l] = largest[l].max(size);
     }
 }
 
-/// One sweep, handed to the dispatcher of instruction sets.
+/// One sweep, passed to the dispatcher of instruction sets.
 struct Advance<'a, 'b> {
     lanes: &'a mut Lanes,
     field: &'b dyn VectorField,
@@ -307,7 +310,7 @@ impl pulp::NullaryFnOnce for Advance<'_, '_> {
     }
 }
 
-/// The end of a sweep, likewise.
+/// End of a sweep, passed to the dispatcher of instruction sets.
 struct GoOn<'a, 'b> {
     lanes: &'a mut Lanes,
     limits: &'b Limits,

@@ -1,8 +1,9 @@
-//! Which steps hold, and how long they are: the first one, and by which factor the next one differs.
+//! Acceptance of steps and their lengths: the first step, and the factor to the next one.
 //!
-//! **Source.** hairer1993, §II.4 (step control and first step); hairer1996, §IV.2 (the second factor of (1) of the ensemble).
+//! **Source.** hairer1993, §II.4 (step control and first step); hairer1996, §IV.2 (the second factor of (1) of the
+//! ensemble).
 //!
-//! **Departures.** The powers of (1) are computed to five digits, which a length needs less than: in that way they are a few
+//! **Departures.** The powers of (1) are computed to five digits, more than a step length needs, which takes only a few
 //! vector instructions.
 
 use super::{Ensemble, Outcome, shared_or_own};
@@ -15,22 +16,22 @@ const ALPHA: f64 = 0.2 - 0.75 * BETA;
 /// Limits of the factor.
 pub(super) const LEAST: f64 = 0.2;
 pub(super) const MOST: f64 = 10.0;
-/// What counts as the previous error at least, and at the first step.
+/// Smallest value used for the previous error, also before the first step.
 const SMALLEST_BEFORE: f64 = 1e-4;
 
-/// What ends steps and trajectories, the same for all lanes.
+/// Limits on steps and trajectories, common to all lanes.
 pub(in crate::simulation) struct Limits {
-    /// End of the time span, and the sign of the direction in which it lies.
+    /// End of the time span, and the sign of its direction.
     pub(in crate::simulation) end: f64,
     pub(in crate::simulation) sign: f64,
     /// Longest step.
     pub(in crate::simulation) longest: f64,
-    /// Most steps, accepted and rejected.
+    /// Maximum number of steps, accepted and rejected.
     pub(in crate::simulation) steps: f64,
 }
 
 impl Limits {
-    /// Where a step of that length from that time ends.
+    /// End of a step of length `h` from `time`.
     #[inline(always)]
     pub(super) fn end_of(&self, time: f64, h: f64) -> f64 {
         if (self.end - time - h) * self.sign <= 0.0 { self.end } else { time + h }
@@ -40,7 +41,7 @@ impl Limits {
 /// Binary logarithm of the first power in (1) of the ensemble.
 #[inline(always)]
 fn first(error: f64) -> f64 {
-    // Between these the factor goes from beyond the one limit to beyond the other.
+    // Between these bounds the factor passes from one limit to the other.
     let error = if error > 1e-10 { error } else { 1e-10 };
     let error = if error < 1e10 { error } else { 1e10 };
     -ALPHA * log2(error)
@@ -52,8 +53,8 @@ pub(super) fn second(error: f64) -> f64 {
     BETA * log2(if error > SMALLEST_BEFORE { error } else { SMALLEST_BEFORE })
 }
 
-/// Whether the steps that were tried hold, where they end, and how long the next ones are. (What is written comes as arguments
-/// here and below, so that the compiler knows that all are different.)
+/// Accepts or rejects the steps tried, and sets their ends and the lengths of the next ones. (Outputs are passed as
+/// arguments here and below, so that the compiler knows that they do not alias.)
 #[inline(always)]
 pub(super) fn judge(
     limits: &Limits,
@@ -73,22 +74,22 @@ pub(super) fn judge(
         let factor = SAFETY * exp2(first(error[l]) + if holds { before[l] } else { 0.0 });
         let limit = if holds { most[l] } else { 1.0 };
         let factor = if factor < limit { factor } else { limit };
-        // A NaN makes the step as short as it may become.
+        // A NaN makes the step as short as permitted.
         let factor = if (factor > LEAST) & !error[l].is_nan() { factor } else { LEAST };
         let next = h[l] * factor;
         let next = if next < limits.longest { next } else { limits.longest };
         planned[l] = if next > -limits.longest { next } else { -limits.longest };
         accepted[l] = if holds { 1.0 } else { 0.0 };
         end[l] = limits.end_of(time[l], h[l]);
-        // A sum, since leaving the one that stands there would be a store under a mask, as with the largest state of `add_errors`.
+        // A sum, since keeping a value would be a masked store, as with the largest state in `add_errors`.
         let (fresh, kept) = (second(error[l]), before[l]);
         before[l] = select_unpredictable(holds, fresh, 0.0) + select_unpredictable(holds, 0.0, kept);
         most[l] = if holds { MOST } else { 1.0 };
     }
 }
 
-/// Counts the steps, goes to the ends of those that hold, and on to the next length; says which trajectories may have ended,
-/// or are to be looked at.
+/// Counts the steps, moves to the ends of accepted ones, and sets the next lengths; marks trajectories that may have
+/// ended or are due for a stiffness check.
 #[inline(always)]
 pub(super) fn go_on(
     limits: &Limits,
@@ -108,11 +109,11 @@ pub(super) fn go_on(
         let holds = accepted[l] != 0.0;
         tried[l] += 1.0;
         steps[l] += accepted[l];
-        // Both are read: of a number that is read in one case only, the compiler makes an address, and no vector.
+        // Both are read unconditionally: otherwise the compiler selects an address and does not vectorise.
         let (there, here) = (end[l], time[l]);
         let now = select_unpredictable(holds, there, here);
         let remaining = limits.end - now;
-        // A last step a little longer than planned saves a tiny one.
+        // A last step slightly longer than planned avoids a tiny one.
         let last = holds & (planned[l].abs() * 1.01 >= remaining.abs());
         let next = if last { remaining } else { planned[l] };
         let ended = (remaining == 0.0)
@@ -125,23 +126,23 @@ pub(super) fn go_on(
     }
 }
 
-/// Whether a trajectory runs to infinity, or is there.
+/// True if a trajectory is unbounded.
 #[inline(always)]
 pub(super) fn escaped(largest: f64, bound: f64) -> bool {
     (largest > bound) | largest.is_nan()
 }
 
-/// Whether a step is too short to get on.
+/// True if a step is too short to progress.
 #[inline(always)]
 pub(super) fn too_small(h: f64, time: f64) -> bool {
     (h.abs() <= 4.0 * f64::EPSILON * time.abs()) | (h.abs() < 1e-300)
 }
 
-/// Binary logarithm of a positive normal number to 2e-5: that of a mantissa m is 2/ln 2 · artanh((m - 1)/(m + 1)).
+/// Binary logarithm of a positive normal number to 2e-5; for a mantissa m it is 2/ln 2 · artanh((m - 1)/(m + 1)).
 #[inline(always)]
 fn log2(x: f64) -> f64 {
     const MANTISSA: u64 = (1 << 52) - 1;
-    // An integer below 2⁵² as the last bits of 2⁵², which is then taken away.
+    // An integer below 2⁵² placed in the low bits of 2⁵², which is then subtracted.
     let exponent = f64::from_bits((x.to_bits() >> 52) | 0x4330_0000_0000_0000) - (4_503_599_627_370_496.0 + 1023.0);
     let mantissa = f64::from_bits((x.to_bits() & MANTISSA) | 0x3ff0_0000_0000_0000);
     let s = (mantissa - 1.0) / (mantissa + 1.0);
@@ -150,11 +151,11 @@ fn log2(x: f64) -> f64 {
     exponent + 2.0 * std::f64::consts::LOG2_E * artanh
 }
 
-/// 2ˣ for |x| < 1000 to 3e-6, relative.
+/// 2ˣ for |x| < 1000 to a relative accuracy of 3e-6.
 #[inline(always)]
 fn exp2(x: f64) -> f64 {
     const ROUND: f64 = 6_755_399_441_055_744.0;
-    // The nearest integer as the last bits of 1.5 · 2⁵² + x.
+    // The nearest integer, in the low bits of 1.5 · 2⁵² + x.
     let shifted = x + ROUND;
     let y = (x - (shifted - ROUND)) * std::f64::consts::LN_2;
     let power = 1.0 + y * (1.0 + y * (0.5 + y * (1.0 / 6.0 + y * (1.0 / 24.0 + y * (1.0 / 120.0)))));
@@ -162,7 +163,7 @@ fn exp2(x: f64) -> f64 {
 }
 
 impl Ensemble<'_> {
-    /// First slopes and first step lengths of some lanes.
+    /// Computes the first slopes and step lengths of some lanes.
     pub(super) fn begin(&mut self, columns: &[usize]) {
         let (n, lanes, m) = (self.lanes.n, self.lanes.count, columns.len());
         if m == 0 {
@@ -204,7 +205,7 @@ impl Ensemble<'_> {
             let slope: f64 = size(c, &|at| f[at]);
             let largest = (curvature.sqrt() / h[c].max(1e-300)).max(slope.sqrt()) / (n as f64).sqrt();
             let second = if largest > 1e-15 { (0.01 / largest).powf(0.2) } else { (h[c] * 1e-3).max(1e-6) };
-            // f may be undefined at the trial point although it is not at the start.
+            // f may be undefined at the trial point even if it is defined at the start.
             let step = if second.is_finite() { second.min(100.0 * h[c]) } else { 1e-3 * h[c] };
             self.limits.sign * step.min(span).min(self.limits.longest)
         };

@@ -1,15 +1,17 @@
-//! Trajectories that stability, not accuracy, makes slow: found, and handed to the implicit method.
+//! Detection of stiff trajectories, limited by stability rather than accuracy, and their transfer to the implicit
+//! method.
 //!
-//! **Idea.** Where the steps of the explicit pair stay at the edge of its region of stability, the implicit method takes some steps of the
-//! trajectory. If they are much longer it keeps the trajectory to its end; else the pair goes on where they ended. No step is lost.
+//! **Idea.** If the steps of the explicit pair stay at the edge of its stability region, the implicit method tries some
+//! steps of the trajectory. If they are much longer it keeps the trajectory to its end; otherwise the pair continues
+//! where they ended. No step is lost.
 //!
-//! **Equations.** With the last two stages g₆ and x₁ of a step, which have the same time,
+//! **Equations.** With the last two stages g₆ and x₁ of a step, which belong to the same time,
 //!
 //! ```text
 //!   (1)  |hλ| ≈ h |f(x₁) - f(g₆)| / |x₁ - g₆|
 //! ```
 //!
-//! for the eigenvalue λ of f_x that dominates; the region of stability ends at 3.3 on the negative real axis.
+//! for the dominant eigenvalue λ of f_x; the stability region ends at 3.3 on the negative real axis.
 //!
 //! **Source.** hairer1996, §IV.2 ((1), [`AT_EDGE`], [`OFF_EDGE`] and [`FIRST_LOOK`]).
 
@@ -20,17 +22,19 @@ use super::switching::STUCK;
 use super::{Ensemble, pace};
 use crate::contract::{Parameters, Verdict};
 
-/// (1) from which a step counts as one at the edge: 0.9 times where stability ends, that being the safety factor of the step control. (The
-/// control is smooth: on the reaction of the tests it keeps (1) at 3.24.)
+/// Value of (1) from which a step counts as one at the edge: 0.9 times the stability limit, 0.9 being the safety factor
+/// of the step control. (The control is smooth: for the reaction in the tests it keeps (1) at 3.24.)
 const EDGE: f64 = 3.0;
-/// Steps at the edge after which a trajectory counts as stiff, and those off it after which the count begins anew.
+/// Number of steps at the edge after which a trajectory counts as stiff, and of steps off it after which the count
+/// restarts.
 const AT_EDGE: u32 = 15;
 const OFF_EDGE: u32 = 6;
-/// Steps after which a trajectory is looked at for the first time.
+/// Number of steps after which a trajectory is first checked.
 pub(super) const FIRST_LOOK: f64 = 1000.0;
-/// Steps between two looks while nothing points to stiffness.
+/// Number of steps between two checks without evidence of stiffness.
 const BETWEEN: f64 = 16.0;
-/// Steps that the implicit method tries. They grow by up to a factor of five each, so that the second half shows their length.
+/// Number of steps that the implicit method tries. They grow by up to a factor of five each, so the second half shows
+/// their length.
 const TRIED: usize = 24;
 
 /// Evidence of stiffness along one trajectory.
@@ -38,12 +42,12 @@ const TRIED: usize = 24;
 pub(super) struct Evidence {
     at_edge: u32,
     off_edge: u32,
-    /// Trials in vain.
+    /// Number of unsuccessful trials.
     trials: i32,
 }
 
 impl Evidence {
-    /// Takes note of a step; true once the trajectory counts as stiff.
+    /// Records a step; true once the trajectory counts as stiff.
     fn adds_up(&mut self, h_lambda: f64) -> bool {
         if h_lambda > EDGE {
             (self.at_edge, self.off_edge) = (self.at_edge + 1, 0);
@@ -57,14 +61,15 @@ impl Evidence {
     }
 }
 
-/// Ratio of step lengths from which the implicit method takes less time than the explicit pair, for `n` states. Measured on chains of Duffing oscillators: it takes
-/// 39, 60, 102 and 160 times as long as one of the pair in a full batch for 2, 10, 40 and 80 states.
+/// Ratio of step lengths from which the implicit method takes less time than the explicit pair, for `n` states.
+/// Measured on chains of Duffing oscillators: a step takes 39, 60, 102 and 160 times as long as one of the pair in a
+/// full batch for 2, 10, 40 and 80 states.
 fn worth(n: usize) -> f64 {
     37.0 + 1.6 * n as f64
 }
 
 impl Ensemble<'_> {
-    /// Looks at the trajectories that have taken steps enough, after a sweep; those that are stiff go to the implicit method.
+    /// Checks the trajectories that are due after a sweep; stiff ones are handed to the implicit method.
     pub(super) fn look_for_stiffness(&mut self, observe: &mut Option<&mut dyn FnMut(&Step) -> Verdict>) {
         for l in 0..self.lanes.count {
             let due = self.lanes.tried[l] >= self.lanes.look[l] && self.lanes.accepted[l] != 0.0;
@@ -81,7 +86,7 @@ impl Ensemble<'_> {
         }
     }
 
-    /// (1) for the last step of lane `l`, whose end has been taken over.
+    /// (1) for the last step of lane `l`, whose end is already the current state.
     fn h_lambda(&self, l: usize) -> f64 {
         let lanes = &self.lanes;
         let (mut slopes, mut states) = (0.0, 0.0);
@@ -94,7 +99,7 @@ impl Ensemble<'_> {
         if states > 0.0 { lanes.taken[l].abs() * (slopes / states).sqrt() } else { 0.0 }
     }
 
-    /// The implicit method takes over lane `l`, for some steps or to the end of the trajectory.
+    /// Hands lane `l` to the implicit method, for some steps or to the end of the trajectory.
     fn hand_over(&mut self, l: usize, observe: &mut Option<&mut dyn FnMut(&Step) -> Verdict>) {
         let (n, count) = (self.lanes.n, self.lanes.count);
         let of_lane = |values: &[f64]| -> Vec<f64> { values.iter().skip(l).step_by(count).copied().collect() };

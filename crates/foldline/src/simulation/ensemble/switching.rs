@@ -1,4 +1,4 @@
-//! Trajectories of piecewise-smooth fields: the signs of the switches, and what happens where one changes.
+//! Trajectories of piecewise-smooth fields: signs of the switches, and their changes.
 
 use super::super::Outcome;
 use super::super::kink::{self, Kink, PLACES};
@@ -7,12 +7,12 @@ use super::super::tableau::STAGES;
 use super::Ensemble;
 use crate::contract::Batch;
 
-/// Changes of sign without getting on after which a trajectory is taken to slide along a switch.
+/// Number of sign changes without progress after which a trajectory is considered to slide along a switch.
 pub(super) const STUCK: usize = 50;
 
 impl Ensemble<'_> {
-    /// The first signs of the switches, those at the start or a little later where a trajectory starts on a zero, and their
-    /// values at the start.
+    /// Initial signs of the switches, taken slightly later for a trajectory that starts on a zero, and their values at
+    /// the start.
     pub(super) fn first_signs(&self, at: Batch) -> (Vec<f64>, Vec<f64>) {
         let count = self.field.switch_count() * at.lanes;
         let (mut here, mut later) = (vec![0.0; count], vec![0.0; count]);
@@ -28,7 +28,7 @@ impl Ensemble<'_> {
         (here.iter().zip(&later).map(sign).collect(), here)
     }
 
-    /// The switches at several places of the step that every lane tries.
+    /// Samples the switches at several points of the step that every lane tries.
     pub(super) fn look_ahead(&mut self) {
         if self.lanes.signs.is_empty() {
             return;
@@ -47,8 +47,8 @@ impl Ensemble<'_> {
         }
     }
 
-    /// Ends the step that lane `l` tries where the first switch changes sign; the kink there, if there is one. A kink at the
-    /// very start leaves no step.
+    /// Ends the step tried by lane `l` at the first sign change of a switch; returns the kink there, if any. A kink at
+    /// the very start leaves no step.
     pub(super) fn shortened(&mut self, l: usize, again: &mut Shortened) -> Option<Kink> {
         let (n, lanes) = (self.lanes.n, self.lanes.count);
         let step = self.step_of(l);
@@ -71,7 +71,8 @@ impl Ensemble<'_> {
         Some(kink)
     }
 
-    /// Goes on beyond a kink, at which lane `l` is now: with the other sign of the switch, and f as it is there.
+    /// Continues beyond the kink that lane `l` has reached: with the opposite sign of the switch, and the corresponding
+    /// f.
     pub(super) fn pass(&mut self, l: usize, kink: &Kink, again: &mut Shortened) {
         let (n, lanes) = (self.lanes.n, self.lanes.count);
         let x = self.lanes.state(l);

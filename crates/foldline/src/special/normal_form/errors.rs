@@ -1,11 +1,12 @@
-//! Errors of coefficients at equilibria.
+//! Errors of normal-form coefficients at equilibria.
 //!
-//! **Idea.** The error of a coefficient has two sources: the error of the point and rounding. Both are sampled. The coefficient is recomputed
-//! at points displaced by the error bound, with derivatives perturbed by their rounding error, all with random signs; the resulting changes
-//! give its error. Displacements that would themselves vanish in rounding are enlarged, and their effect is reduced by the same factor.
+//! **Idea.** The error of a coefficient has two sources: the error of the point and rounding. Both are sampled. The
+//! coefficient is recomputed at points displaced by the error bound, with derivatives perturbed by their rounding
+//! error, all with random signs; the resulting changes give its error. Displacements that would themselves vanish in
+//! rounding are enlarged, and their effect is reduced by the same factor.
 //!
-//! Rounding is relative to f at states of their characteristic sizes. A nonlinearity too small to affect f there yields no significant
-//! coefficient, so the coefficient of a linear system is zero within its error.
+//! Rounding is relative to f at states of their characteristic sizes. A nonlinearity too small to affect f there yields
+//! no significant coefficient, so the coefficient of a linear system is zero within its error.
 //!
 //! **Source.** vignes1993 (errors of either sign at random); higham2002, §9 (backward error of linear systems).
 
@@ -19,14 +20,15 @@ use num_complex::Complex64;
 /// Number of recomputations of a coefficient: with [`SAFE`] enough for the probability stated there.
 const SAMPLES: u64 = 4;
 
-/// Stated error over the largest observed change. The changes are sums of terms with random signs. The probability that all four are below
-/// a third of their root mean square is 0.5 %.
+/// Stated error over the largest observed change. The changes are sums of terms with random signs. The probability that
+/// all four are below a third of their root mean square is 0.5 %.
 const SAFE: f64 = 3.0;
 
-/// Relative size of displacements, of which rounding leaves eight digits: the square root of the machine precision.
+/// Relative size of displacements, chosen so that rounding leaves eight digits: the square root of the machine
+/// precision.
 const VISIBLE: f64 = 1e-8;
 
-/// A point with its error bound.
+/// Point with its error bound.
 pub(super) struct Uncertain<'s, 'f> {
     pub(super) setting: &'s Setting<'f>,
     pub(super) at: &'s Point,
@@ -72,7 +74,7 @@ impl<'s, 'f> Uncertain<'s, 'f> {
         let moved: Vec<f64> = free.iter().map(|own| own + size * (1.0 + own.abs()) * signs.next()).collect();
         point.parameters = Setting { parameters: self.at.parameters.clone(), ..self.setting.clone() }.at(&moved);
         for z in &mut point.spectrum {
-            // Displace both of a pair alike.
+            // Displace both members of a pair alike.
             *z = Complex64::new(z.re, z.im * (1.0 + if seed.is_multiple_of(2) { size } else { -size }));
         }
         point
@@ -92,7 +94,7 @@ impl<'s, 'f> Uncertain<'s, 'f> {
         self.others.iter().any(|other| signs(other) != own)
     }
 
-    /// The values of a formula with their errors; `None` if it has no value at the point.
+    /// Values of a formula with their errors; `None` if the formula has no value at the point.
     pub(super) fn measured(&self, formula: &dyn Fn(&Sample) -> Option<Vec<f64>>) -> Option<Coefficients> {
         let field = self.setting.field;
         let values = formula(&Sample { local: Local::new(field, self.at)?, point: self.at })?;

@@ -1,4 +1,4 @@
-//! An equilibrium, the derivatives of f there, and its critical eigenvectors.
+//! Equilibrium with the derivatives of f and its critical eigenvectors.
 
 use crate::contract::{Batch, Parameters, VectorField};
 use crate::diagram::{Point, Solution};
@@ -6,7 +6,7 @@ use crate::linalg::{dot, lu, max_abs};
 use num_complex::Complex64;
 use std::cell::RefCell;
 
-/// An equilibrium and the derivatives of f there.
+/// Equilibrium and the derivatives of f there.
 pub struct Local<'a> {
     field: &'a dyn VectorField,
     state: &'a [f64],
@@ -29,7 +29,7 @@ struct Noise {
     signs: RefCell<Signs>,
 }
 
-/// A pseudo-random sequence of signs, reproducible from its seed.
+/// Pseudo-random sequence of signs, reproducible from its seed.
 #[derive(Clone)]
 pub(super) struct Signs(u64);
 
@@ -48,7 +48,7 @@ impl Signs {
 }
 
 impl<'a> Local<'a> {
-    /// At a point; `None` where it is a cycle.
+    /// Evaluates at a point; `None` if it is a cycle.
     pub fn new(field: &'a dyn VectorField, at: &'a Point) -> Option<Local<'a>> {
         let Solution::Equilibrium(state) = &at.solution else { return None };
         let n = state.len();
@@ -58,8 +58,8 @@ impl<'a> Local<'a> {
         Some(Local { field, state, parameters: &at.parameters, n, jacobian, noise: None })
     }
 
-    /// Perturbs the Jacobian and all higher derivatives with random signs. `size` is relative to the largest term of the same component of f
-    /// at states of the sizes `scales` `[n]`, which is the rounding error of f there.
+    /// Perturbs the Jacobian and all higher derivatives with random signs. `size` is relative to the largest term of
+    /// the same component of f at states of the sizes `scales` `[n]`, which is the rounding error of f there.
     pub(super) fn shaken(mut self, size: f64, scales: &[f64], seed: u64) -> Local<'a> {
         let (n, mut signs) = (self.n, Signs::new(seed));
         let largest = |row: &[f64]| row.iter().zip(scales).fold(0.0f64, |most, (a, s)| most.max((a * s).abs()));
@@ -69,14 +69,14 @@ impl<'a> Local<'a> {
         self
     }
 
-    /// The same with the transposed Jacobian, for left vectors.
+    /// Copy with the transposed Jacobian, for left eigenvectors.
     pub(super) fn transposed(&self) -> Local<'a> {
         let n = self.n;
         let jacobian = (0..n * n).map(|k| self.jacobian[k % n * n + k / n]).collect();
         Local { jacobian, noise: self.noise.clone(), ..*self }
     }
 
-    /// A derivative of f along some directions in the states `[n]`, or in states and parameters `[n + k]`.
+    /// Derivative of f along directions in the states `[n]`, or in states and parameters `[n + k]`.
     pub(super) fn derivative(&self, along: &[&[f64]]) -> Vec<f64> {
         let size = self.n + self.parameters.len();
         let full: Vec<Vec<f64>> =
@@ -96,7 +96,8 @@ impl<'a> Local<'a> {
         out
     }
 
-    /// A derivative of f along complex directions `[n]`: the sum over all choices of a real or an imaginary part for each.
+    /// Derivative of f along complex directions `[n]`: the sum over all choices of a real or an imaginary part for
+    /// each.
     pub(super) fn multilinear(&self, along: &[&[Complex64]]) -> Vec<Complex64> {
         let parts: Vec<[Vec<f64>; 2]> =
             along.iter().map(|d| [d.iter().map(|z| z.re).collect(), d.iter().map(|z| z.im).collect()]).collect();
@@ -113,7 +114,8 @@ impl<'a> Local<'a> {
         out
     }
 
-    /// The factors of A - z with the columns `right` and the rows `left` (conjugated), as a real system of twice the size.
+    /// Factors of A - z bordered by the columns `right` and the rows `left` (conjugated), as a real system of twice the
+    /// size.
     pub(super) fn shifted(&self, z: Complex64, right: &[&[Complex64]], left: &[&[Complex64]]) -> Option<Shifted> {
         let (n, half) = (self.n, self.n + right.len());
         let size = 2 * half;
@@ -135,9 +137,9 @@ impl<'a> Local<'a> {
         Some(Shifted { matrix, pivots, n })
     }
 
-    /// Right and left eigenvectors of the eigenvalue closest to z, q of unit length and ⟨p, q⟩ = 1: A q = z q, pᴴ A = z pᴴ.
+    /// Right and left eigenvectors of the eigenvalue closest to z, with |q| = 1 and ⟨p, q⟩ = 1: A q = z q, pᴴ A = z pᴴ.
     pub(super) fn eigenvectors(&self, z: Complex64) -> Option<[Vec<Complex64>; 2]> {
-        // A shift of the size of rounding keeps the matrix regular at an eigenvalue.
+        // A shift of the order of rounding keeps the matrix regular at an eigenvalue.
         let shift = 1e-14 * crate::linalg::size_in_any_units(&self.jacobian, self.n).max(z.norm());
         let factors = self.shifted(z + shift, &[], &[])?;
         let mut out = [const { Vec::new() }; 2];
@@ -168,7 +170,7 @@ impl<'a> Local<'a> {
         (0..ROUNDS).try_fold([generic(1.3), generic(1.9)], |vectors, _| self.null_vectors_near(&vectors))
     }
 
-    /// The factors of A with the column p and the row q.
+    /// Factors of A bordered by the column p and the row q.
     fn with_borders(&self, q: &[f64], p: &[f64]) -> Option<(Vec<f64>, Vec<usize>)> {
         let (n, size) = (self.n, self.n + 1);
         let mut matrix = vec![0.0; size * size];
@@ -181,8 +183,8 @@ impl<'a> Local<'a> {
         Some((matrix, pivots))
     }
 
-    /// The same from approximate ones, by a system that is regular where an eigenvalue 0 is double too: they change smoothly with the place
-    /// and keep their direction.
+    /// Null vectors computed from approximate ones by a bordered system that is regular even at a double eigenvalue 0.
+    /// They depend smoothly on the point and keep their orientation.
     pub fn null_vectors_near(&self, [q, p]: &[Vec<f64>; 2]) -> Option<[Vec<f64>; 2]> {
         let (n, size) = (self.n, self.n + 1);
         let (matrix, pivots) = self.with_borders(q, p)?;
@@ -199,7 +201,7 @@ impl<'a> Local<'a> {
         Some([unit(v), unit(w)])
     }
 
-    /// Solves A y = r with ⟨p, y⟩ = 0 where that has a solution, for q and p as [`Local::null_vectors`] gives them.
+    /// Solves A y = r with ⟨q, y⟩ = 0 if that is solvable, for q and p from [`Local::null_vectors`].
     pub(super) fn bordered(&self, [q, p]: &[Vec<f64>; 2], r: &[f64]) -> Option<Vec<f64>> {
         let (n, size) = (self.n, self.n + 1);
         let (matrix, pivots) = self.with_borders(q, p)?;
@@ -209,13 +211,13 @@ impl<'a> Local<'a> {
         Some(y)
     }
 
-    /// ⟨p, B(q, q)⟩ of vectors of unit length, each of which points the way that the others do.
+    /// ⟨p, B(q, q)⟩ of unit vectors with consistent orientation.
     pub fn quadratic(&self, [q, p]: &[Vec<f64>; 2]) -> f64 {
         dot(p, &self.derivative(&[q, q]))
     }
 }
 
-/// A factorised A - z, perhaps with borders.
+/// Factorised A - z, possibly bordered.
 pub(super) struct Shifted {
     matrix: Vec<f64>,
     pivots: Vec<usize>,
@@ -223,7 +225,7 @@ pub(super) struct Shifted {
 }
 
 impl Shifted {
-    /// The x `[n]` for a right-hand side `[n]` that is continued by zeros.
+    /// Solution x `[n]` for a right-hand side `[n]` extended by zeros.
     pub(super) fn solve(&self, r: &[Complex64]) -> Vec<Complex64> {
         let half = self.pivots.len() / 2;
         let mut both = vec![0.0; 2 * half];
@@ -235,7 +237,7 @@ impl Shifted {
     }
 }
 
-/// The vector whose real parts come first.
+/// Complex vector from real parts followed by imaginary parts.
 fn complex(both: &[f64]) -> Vec<Complex64> {
     let (re, im) = both.split_at(both.len() / 2);
     re.iter().zip(im).map(|(re, im)| Complex64::new(*re, *im)).collect()

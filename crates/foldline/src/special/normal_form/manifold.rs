@@ -1,10 +1,12 @@
-//! The motion on a centre manifold, order by order.
+//! Centre manifolds and the motion on them, order by order.
 //!
-//! **Idea.** Where z are coordinates along the critical eigenvectors, solutions near the equilibrium move on x = H(z) like z' = G(z). That
-//! the manifold is invariant determines H and G monomial by monomial, and G keeps only what no choice of H can remove.
+//! **Idea.** With z the coordinates along the critical eigenvectors, solutions near the equilibrium move on x = H(z) as
+//! z' = G(z). Invariance of the manifold determines H and G monomial by monomial; G keeps only terms that no choice of
+//! H can remove.
 //!
-//! **Equations.** A monomial is the list m of its coordinates, as 0 0 1 for z₀² z₁; h_m `[n]` and g_m `[coordinates]` are derivatives of H and
-//! G, so that the coefficient of z₀² z₁ is h₀₀₁ / 2!. With λ_i, q_i, p_i of coordinate i, h_i = q_i, and Λ_m the sum of the λ over m:
+//! **Equations.** A monomial is the list m of its coordinates, for example 0 0 1 for z₀² z₁; h_m `[n]` and g_m
+//! `[coordinates]` are derivatives of H and G, so the coefficient of z₀² z₁ is h₀₀₁ / 2!. With λ_i, q_i, p_i of
+//! coordinate i, h_i = q_i, and Λ_m the sum of the λ over m:
 //!
 //! ```text
 //!   (1)  f(H(z)) = H_z(z) G(z)
@@ -13,36 +15,36 @@
 //!   (4)  g_m,i = ⟨p_i, r_m⟩, ⟨p_i, h_m⟩ = 0   where m and i turn alike;   g_m,i = 0   elsewhere
 //! ```
 //!
-//! The lists keep equal coordinates apart, which gives every term of (2) its factor.
+//! The lists distinguish equal coordinates, which gives every term of (2) its factor.
 //!
 //! **Source.** kuznetsov1999, §2 (the homological equation); the lists are ours.
 //!
-//! **Fails when** a combination of the frequencies of the order asked for is another frequency (a strong resonance), or another eigenvalue lies
-//! where (3) is solved.
+//! **Fails when** a combination of frequencies of the order requested equals another frequency (a strong resonance), or
+//! another eigenvalue makes (3) singular.
 
 use super::local::{Local, hermitian};
 use num_complex::Complex64;
 use std::collections::BTreeMap;
 
-/// A coordinate on the manifold.
+/// Coordinate on the manifold.
 pub(super) struct Coordinate {
     eigenvalue: Complex64,
     right: Vec<Complex64>,
     left: Vec<Complex64>,
-    /// Which pair it belongs to, and whether it is the first or the second of that: how it turns.
+    /// Pair it belongs to, and sense of rotation: 1 or -1 for the first or second of the pair.
     turns: Option<(usize, i32)>,
-    /// Index of the one that is conjugate to it.
+    /// Index of the conjugate coordinate.
     conjugate: usize,
 }
 
-/// A coefficient, and the sum of the moduli of the terms that it is made of.
+/// Coefficient, and the sum of the moduli of its terms.
 #[derive(Clone, Copy)]
 pub(super) struct Sized {
     pub(super) value: Complex64,
     pub(super) size: f64,
 }
 
-/// A centre manifold, as far as it was asked for.
+/// Centre manifold, computed as far as needed.
 pub(super) struct Manifold<'a> {
     local: &'a Local<'a>,
     coordinates: Vec<Coordinate>,
@@ -50,12 +52,12 @@ pub(super) struct Manifold<'a> {
     rests: BTreeMap<Vec<usize>, (Vec<Complex64>, Vec<f64>)>,
 }
 
-/// Distance of two frequencies, relative to the larger, within which they are the same.
+/// Relative difference below which two frequencies are equal.
 const SAME: f64 = 1e-6;
 
 impl<'a> Manifold<'a> {
-    /// With a coordinate for an eigenvalue 0, if there is one, then two for each of the frequencies; `None` where the eigenvectors are not
-    /// found.
+    /// Creates a coordinate for an eigenvalue 0 if `zero`, then two for each frequency; `None` if the eigenvectors are
+    /// not found.
     pub(super) fn new(local: &'a Local<'a>, zero: bool, frequencies: &[f64]) -> Option<Manifold<'a>> {
         let mut coordinates = Vec::new();
         if zero {
@@ -82,7 +84,7 @@ impl<'a> Manifold<'a> {
         Some(Manifold { local, coordinates, shapes: BTreeMap::new(), rests: BTreeMap::new() })
     }
 
-    /// g_m,i of (4) for the list `m`, in ascending order; `None` where a resonance is in the way.
+    /// g_m,i of (4) for the list `m`, in ascending order; `None` at a resonance.
     pub(super) fn motion(&mut self, i: usize, m: &[usize]) -> Option<Sized> {
         if !self.turns_alike(i, m) {
             return Some(Sized { value: 0.0.into(), size: 0.0 });
@@ -131,7 +133,7 @@ impl<'a> Manifold<'a> {
         Some(found)
     }
 
-    /// r_m, and for each component the sum of the moduli of its terms.
+    /// r_m, and the sum of the moduli of the terms of each component.
     fn rest(&mut self, m: &[usize]) -> Option<(Vec<Complex64>, Vec<f64>)> {
         if let Some(known) = self.rests.get(m) {
             return Some(known.clone());
@@ -172,7 +174,7 @@ impl<'a> Manifold<'a> {
         m.iter().map(|i| self.coordinates[*i].eigenvalue).sum()
     }
 
-    /// Whether every pair turns as often in m as in coordinate i.
+    /// True if every pair rotates equally often in m and in coordinate i.
     fn turns_alike(&self, i: usize, m: &[usize]) -> bool {
         let mut balance: BTreeMap<usize, i32> = BTreeMap::new();
         let all = m.iter().map(|k| (*k, 1)).chain([(i, -1)]);
@@ -183,7 +185,7 @@ impl<'a> Manifold<'a> {
     }
 }
 
-/// Every partition of a list into lists, equal entries being told apart.
+/// All partitions of a list into lists; equal entries are distinguished.
 fn partitions(list: &[usize]) -> Vec<Vec<Vec<usize>>> {
     let Some((first, others)) = list.split_first() else { return vec![Vec::new()] };
     let mut all = Vec::new();
@@ -201,7 +203,7 @@ fn partitions(list: &[usize]) -> Vec<Vec<Vec<usize>>> {
     all
 }
 
-/// Every part of a list, and what it leaves.
+/// All sublists of a list with their complements.
 fn parts(list: &[usize]) -> Vec<(Vec<usize>, Vec<usize>)> {
     let taken = |choice: usize, own: usize| {
         let chosen = list.iter().enumerate().filter(move |(k, _)| choice >> k & 1 == own);
@@ -210,7 +212,7 @@ fn parts(list: &[usize]) -> Vec<(Vec<usize>, Vec<usize>)> {
     (0..1 << list.len()).map(|choice| (taken(choice, 1), taken(choice, 0))).collect()
 }
 
-/// What there is, and how often.
+/// Distinct elements with their multiplicities.
 fn counted<T: Ord>(all: Vec<T>) -> BTreeMap<T, f64> {
     let mut counts = BTreeMap::new();
     all.into_iter().for_each(|one| *counts.entry(one).or_insert(0.0) += 1.0);

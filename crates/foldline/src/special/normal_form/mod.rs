@@ -1,17 +1,17 @@
-//! Normal forms at equilibria: what a bifurcation does to the solutions around it.
+//! Normal forms at equilibria: the local dynamics at a bifurcation.
 //!
-//! **Equations.** With A = f_x, B, C, D and E the second to fifth derivatives of f in the states, ⟨q, q⟩ = 1 and ⟨p, q⟩ = 1 unless said
-//! otherwise, on the critical eigenspace:
+//! **Equations.** With A = f_x, B, C, D and E the second to fifth derivatives of f in the states, ⟨q, q⟩ = 1 and ⟨p, q⟩
+//! = 1 unless said otherwise, on the critical eigenspace:
 //!
 //! ```text
 //!   fold              (1)  A q = 0, pᵀ A = 0:            ξ' = β + a ξ²,         a = ½ ⟨p, B(q,q)⟩
 //!   cusp              (2)  A h = -B(q,q), ⟨p, h⟩ = 0:    ξ' = … + c ξ³,         c = ⅙ ⟨p, C(q,q,q) + 3 B(q,h)⟩
-//!   branch point      (3)  x = x(μ) + ξ q + …, x(μ) the branch, μ its parameter counted from there:
+//!   branch point      (3)  x = x(μ) + ξ q + …, x(μ) the branch, μ its parameter measured from there:
 //!        ξ' = b μ ξ + a ξ² + c ξ³,   b = ⟨p, f_xμ q + B(q, x_μ)⟩,  a and c of (1) and (2)
 //!   Hopf              (4)  A q = iω q, pᴴ A = iω pᴴ:     z' = iω z + … l₁ ω z |z|²
 //!        l₁ = 1/(2ω) Re ⟨p, C(q,q,q̄) - 2 B(q, A⁻¹ B(q,q̄)) + B(q̄, (2iω - A)⁻¹ B(q,q))⟩
 //!   generalised Hopf  (5)  z' = iω z + ic z |z|² + (l₂ ω + …) z |z|⁴,   l₂ = 1/(12ω) Re g₃₂
-//!   zero-Hopf         (6)  ξ' = b ξ² + c |z|² + …,  z' = iω z + d ξ z + …,  which a change of coordinates and of time bring to
+//!   zero-Hopf         (6)  ξ' = b ξ² + c |z|² + …,  z' = iω z + d ξ z + …,  transformed by changes of coordinates and of time to
 //!        ξ' = b ξ² + c |z|²,  z' = iω z + (d + i…) ξ z + E ξ² z         up to terms of fourth order
 //!        s = sign(b c),  θ = Re d / b
 //!        E = ½ Re [ g₂₁₀ + g₁₁₀ (Re g₀₂₁ / c - g₃₀₀ / 2b + g₁₁₁ / c) - g₀₂₁ b / c ]
@@ -21,14 +21,16 @@
 //!        θ = p₁₂ / p₂₂,  δ = p₂₁ / p₁₁
 //! ```
 //!
-//! The g in (5) and (6) are derivatives of the motion on the centre manifold, by the powers of (z, z̄) and of (ξ, z, z̄); with those of third and
-//! higher order in (4) to (8) they come from one recursion, see `manifold`.
+//! The g in (5) and (6) are derivatives of the motion on the centre manifold, by the powers of (z, z̄) and of (ξ, z,
+//! z̄). The terms of third and higher order in (4) to (8) come from the same recursion, see `manifold`.
 //!
-//! All are in the units of the model. The signs of a (fold, branch point) and of a and b together (Bogdanov–Takens) change with that of q; those
-//! of b (branch point), c, l₁, l₂, E and the p do not, and s, θ and δ do not depend on the length of q either. A branch point is a pitchfork if a
-//! is zero within its error, usually by symmetry, otherwise transcritical.
+//! All coefficients are in the units of the model. The signs of a (fold, branch point) and of a and b together
+//! (Bogdanov–Takens) change with that of q. Those of b (branch point), c, l₁, l₂, E and the p do not, and s, θ and δ
+//! are also independent of the length of q. A branch point is a pitchfork if a is zero within its error, usually by
+//! symmetry, otherwise transcritical.
 //!
-//! Every coefficient has an error; see `errors`. A quotient whose divisor is zero within its error is undefined and omitted.
+//! Every coefficient has an error; see `errors`. A quotient whose divisor is zero within its error is undefined and
+//! omitted.
 //!
 //! | what | file |
 //! |---|---|
@@ -38,7 +40,8 @@
 //! | (4), (5), (8) | `oscillating` |
 //! | errors of all of them | `errors` |
 //!
-//! **Source.** kuznetsov2004, §5.4 (fold, Hopf), §8.7 (the others) and §8.5 (what θ and E decide); govaerts2000, §6 (branch points).
+//! **Source.** kuznetsov2004, §5.4 (fold, Hopf), §8.7 (the others) and §8.5 (what θ and E decide); govaerts2000, §6
+//! (branch points).
 //!
 //! **Departures.** l₂ has the factor 1/ω that l₁ has; MATCONT and BifurcationKit leave it out.
 
@@ -57,29 +60,31 @@ use crate::diagram::{Kind, Point, Solution};
 use crate::problem::Setting;
 use errors::{Sample, Uncertain};
 
-/// Relative to the terms of a coefficient, what is left of them is no more than rounding.
+/// Sum relative to its terms below which it is rounding.
 const ROUNDING: f64 = 1e-12;
 
-/// The sum of some terms; exactly zero where it is less than that share of their sizes.
+/// Sum of terms; exactly zero if it is at most `share` of the total of `sizes`.
 pub(super) fn without_rounding(terms: &[f64], sizes: &[f64], share: f64) -> f64 {
     let (total, size) = (terms.iter().sum::<f64>(), sizes.iter().sum::<f64>());
     if total.abs() <= share * size { 0.0 } else { total }
 }
 
-/// The frequencies of the pairs of eigenvalues, those closest to the imaginary axis first.
+/// Frequencies of the pairs of eigenvalues, those closest to the imaginary axis first.
 fn frequencies(at: &Point) -> Vec<f64> {
     let mut pairs: Vec<_> = at.spectrum.iter().filter(|z| z.im > 0.0).collect();
     pairs.sort_by(|a, b| (a.re / a.im).abs().total_cmp(&(b.re / b.im).abs()));
     pairs.into_iter().map(|z| z.im).collect()
 }
 
-/// Amplitude, as a share of the scales of the states, beyond which the cubic term outweighs the quadratic one at a branch point that counts as a
-/// pitchfork. Empirical: ten times the default tolerance, since a quadratic term smaller than that cannot be seen on the branches.
+/// Amplitude, relative to the scales of the states, beyond which the cubic term must outweigh the quadratic one for a
+/// branch point to count as a pitchfork. Empirical: ten times the default tolerance, since a smaller quadratic term
+/// cannot be seen on the branches.
 const PITCHFORK: f64 = 1e-5;
 
-/// The coefficients of the normal form of a special point of that kind, in the order of [`Kind::coefficients`]. `error` is the bound on the
-/// error of the point. Of the setting, the field, the scales of the states and the free parameters count, the last of which is that of the branch.
-/// Where several pairs of eigenvalues are on the imaginary axis at once, those of a Hopf point are those of pair number `pair`.
+/// Returns the normal-form coefficients of a bifurcation point of the given kind, in the order of
+/// [`Kind::coefficients`]. `error` is the bound on the error of the point. Only the field, the scales of the states and
+/// the free parameters of the setting matter; the last free parameter is that of the branch. If several pairs of
+/// eigenvalues are on the imaginary axis, the coefficients of a Hopf point are those of pair number `pair`.
 pub fn coefficients(setting: &Setting, kind: Kind, at: &Point, error: f64, pair: usize) -> Coefficients {
     if kind.coefficients().is_empty() || !matches!(at.solution, Solution::Equilibrium(_)) {
         return Coefficients::default();
@@ -98,7 +103,7 @@ pub fn coefficients(setting: &Setting, kind: Kind, at: &Point, error: f64, pair:
 /// Computes the coefficients, or returns the reason why they are undefined.
 fn found(uncertain: &Uncertain, kind: Kind, pair: usize) -> Result<Coefficients, String> {
     const RESONANCE: &str = "the eigenvalues are resonant or lack independent eigenvectors";
-    // Next to each other on the axis, pairs change places from sample to sample.
+    // Pairs that are close on the axis change their order from sample to sample.
     let own = frequencies(uncertain.at).get(pair).copied();
     let first = |sample: &Sample| {
         let off = |omega: &f64| own.map_or(0.0, |own| (omega - own).abs());
@@ -164,22 +169,23 @@ fn crossing(uncertain: &Uncertain) -> Result<Coefficients, String> {
     let setting = uncertain.setting;
     let along = tangent(setting, uncertain.at).ok_or("the branch itself turns back there")?;
     let quadratic = uncertain.measured(&|sample| Some(vec![sample.local.fold()?])).ok_or(NONE)?;
-    // On the branch that turns back, where the parameter is off by ε the state is off by √ε, and a by as many times c.
+    // On the branch that turns back, an error ε of the parameter is an error √ε of the state, which changes a by about
+    // c √ε.
     let share = PITCHFORK.max(uncertain.error.sqrt());
     let nearly = Local::new(setting.field, uncertain.at).and_then(|local| local.is_pitchfork(setting.scales, share));
     let pitchfork = nearly == Some(true) || quadratic.values[0].abs() <= quadratic.errors[0];
     let mut found = uncertain.measured(&|sample| sample.local.crossing(&along, pitchfork)).ok_or(NONE)?;
     if pitchfork {
-        // By symmetry it is 0, or no more than was seen.
+        // By symmetry it is 0, or at most the observed value.
         found.errors[0] = quadratic.errors[0] + quadratic.values[0].abs();
     }
     Ok(found)
 }
 
-/// The tangent of a branch in states and parameters `[n + k]` for one unit of its parameter.
+/// Tangent of a branch in states and parameters `[n + k]` per unit of its parameter.
 fn tangent(setting: &Setting, at: &Point) -> Option<Vec<f64>> {
     let Solution::Equilibrium(x) = &at.solution else { return None };
-    // A branch that itself turns there has another one as its line of reference.
+    // A branch that turns back itself cannot serve as the reference branch.
     const STEEP: f64 = 1e-3;
     let (slope, states) = (at.parameter_slope(), at.tangent.get(..x.len())?);
     let sideways = states.iter().zip(setting.scales).fold(0.0f64, |most, (t, s)| most.max((t / s).abs()));

@@ -1,4 +1,4 @@
-//! Normal forms of pairs on the imaginary axis: Hopf, generalised Hopf and double Hopf points.
+//! Normal forms of imaginary pairs: Hopf, generalised Hopf and double Hopf points.
 
 use super::ROUNDING;
 use super::local::Local;

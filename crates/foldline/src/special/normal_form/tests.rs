@@ -39,9 +39,9 @@ fn near(a: f64, b: f64) {
 }
 
 #[test]
-fn a_normal_form_has_its_own_coefficients() {
+fn systems_in_normal_form_have_the_coefficients_they_are_written_with() {
     with(&[("x", "3*x^2"), ("y", "-y")], 0.0, |at| near(at.fold().unwrap().abs(), 3.0));
-    // A change of coordinates that mixes: y is a slave, y = x², and adds 2 x y = 2 x³.
+    // A nonlinear change of coordinates: y is slaved, y = x², and adds 2 x y = 2 x³.
     with(&[("x", "-5*x^3 + 2*x*y"), ("y", "-y + x^2")], 0.0, |at| near(at.cusp().unwrap(), -3.0));
     // z' = iω z + (c₁ + i) z |z|² in Cartesian coordinates, where ⟨q, q⟩ = 1 makes |z|² half of x² + y²: l₁ = 2 c₁ / ω.
     let hopf = [("x", "-2*y - 0.3*x*(x^2 + y^2) - y*(x^2 + y^2)"), ("y", "2*x - 0.3*y*(x^2 + y^2) + x*(x^2 + y^2)")];
@@ -56,9 +56,11 @@ fn a_normal_form_has_its_own_coefficients() {
 
 #[test]
 fn quadratic_terms_enter_the_first_lyapunov_coefficient() {
-    // kuznetsov2004, §3.5: for u' = -v + …, ω = 1, l₁ from all second and third derivatives; here u' = -v + p u² + u v, v' = u + v².
+    // kuznetsov2004, §3.5: for u' = -v + …, ω = 1, l₁ from all second and third derivatives; here u' = -v + p u² + u v,
+    // v' = u + v².
     let formula = |p: f64| {
-        // (1/16)(f_uuu + …) + (1/16 ω)(f_uv (f_uu + f_vv) - g_uv (g_uu + g_vv) - f_uu g_uu + f_vv g_vv), which is a for r' = a r³.
+        // (1/16)(f_uuu + …) + (1/16 ω)(f_uv (f_uu + f_vv) - g_uv (g_uu + g_vv) - f_uu g_uu + f_vv g_vv), which is a for
+        // r' = a r³.
         let (fuu, fuv, fvv, guu, guv, gvv) = (2.0 * p, 1.0, 0.0, 0.0, 0.0, 2.0);
         (fuv * (fuu + fvv) - guv * (guu + gvv) - fuu * guu + fvv * gvv) / 16.0
     };
@@ -68,8 +70,9 @@ fn quadratic_terms_enter_the_first_lyapunov_coefficient() {
     }
 }
 
-/// A system y' = g(y, p) in other coordinates: x_i = y_i + κ x_j x_k for every (i, j, k, κ), one after the other, then turned in every plane
-/// (i, j, angle), and moved in proportion to p. None of that changes a normal form, and turning leaves vectors as long as they are.
+/// System y' = g(y, p) in other coordinates: x_i = y_i + κ x_j x_k for every (i, j, k, κ) successively, then rotated in
+/// every plane (i, j, angle), and shifted in proportion to p. None of these changes a normal form, and rotations
+/// preserve lengths.
 fn disguised(g: &[&str], shears: &[(usize, usize, usize, f64)], turns: &[(usize, usize, f64)], drift: &[f64]) -> Model {
     let (n, top) = (g.len(), shears.len());
     let mut turned: Vec<Vec<f64>> = (0..n).map(|i| (0..n).map(|j| f64::from(i == j)).collect()).collect();
@@ -121,7 +124,7 @@ fn coordinates_do_not_change_a_hopf_point() {
         let second = format!("1.3*y0 + ({c})*y1*(y0^2 + y1^2) + 2*y0*(y0^2 + y1^2)");
         let plane = disguised(&[&first, &second], &PLANE, &[(0, 1, 0.9)], &[]);
         near(Local::new(&plane, &origin(&plane)).unwrap().hopf(1.3).unwrap(), 2.0 * c / 1.3);
-        // With a third state that is damped, and mixes in.
+        // With a third, damped state mixed in.
         let space = disguised(&[&first, &second, "-0.8*y2"], &SPACE, &[(0, 2, 0.7), (1, 2, -0.4)], &[]);
         near(Local::new(&space, &origin(&space)).unwrap().hopf(1.3).unwrap(), 2.0 * c / 1.3);
     }
@@ -192,7 +195,7 @@ fn coordinates_do_not_change_a_double_hopf_point() {
         assert_eq!(found.len(), expected.len());
         found.iter().zip(expected).for_each(|(own, known)| near(*own, known));
     }
-    // At a strong resonance z̄₁ z₂² and the like cannot be removed, and there is no such form.
+    // At a strong resonance terms such as z̄₁ z₂² cannot be removed, and this form does not exist.
     let texts = form([-0.5, 0.7, -0.3, -0.9]).map(|text| text.replace("0.83", "1.1"));
     let texts: Vec<&str> = texts.iter().map(String::as_str).collect();
     let model = disguised(&texts, &shears, &turns, &[]);
@@ -204,7 +207,8 @@ fn coordinates_do_not_change_a_branch_point() {
     let drift = [0.4, -0.3, 0.9];
     let turns = [(0, 1, 0.5), (1, 2, 1.1), (0, 2, -0.8)];
     let along = [drift.as_slice(), &[1.0]].concat();
-    // ξ' = 0.8 μ ξ + a ξ², along the branch ξ = 0 and along the other, ξ = -0.8 μ / a, where the eigenvalue passes the other way.
+    // ξ' = 0.8 μ ξ + a ξ², along the branch ξ = 0 and along the other, ξ = -0.8 μ / a, where the eigenvalue crosses in
+    // the opposite direction.
     let a = -1.7;
     let model = disguised(&["0.8*p*y0 + (-1.7)*y0^2 + 2*y0^3", "-y1", "-2*y2"], &SPACE, &turns, &drift);
     let at = origin(&model);
@@ -217,12 +221,12 @@ fn coordinates_do_not_change_a_branch_point() {
     let [same, back] = local.crossing(&other, false).unwrap()[..] else { panic!("it is transcritical") };
     near(same, quadratic);
     near(back, -0.8);
-    // So next to the point that a tangent may be anything between both, the one that is closer counts.
+    // Near the point a computed tangent may lie anywhere between the two, so the closer one counts.
     for (share, expected) in [(0.4, 0.8), (0.6, -0.8)] {
         let between: Vec<f64> = along.iter().zip(&other).map(|(a, b)| a + share * (b - a)).collect();
         near(local.crossing(&between, false).unwrap()[1], expected);
     }
-    // ξ' = 0.8 μ ξ + c ξ³ with a slave that adds to c: y₁ = y₀² and 2 y₀ y₁.
+    // ξ' = 0.8 μ ξ + c ξ³ with slaved states that add to c: y₁ = y₀² and 2 y₀ y₁.
     for (cubic, whole) in [("-5", -3.0), ("1.5", 3.5)] {
         let first = format!("0.8*p*y0 + ({cubic})*y0^3 + 2*y0*y1");
         let model = disguised(&[&first, "-y1 + y0^2", "-2*y2"], &[(2, 0, 0, 0.8), (2, 1, 1, 0.4)], &turns, &drift);

@@ -1,4 +1,4 @@
-//! Normal forms of an eigenvalue 0: folds, cusps, branch points, Bogdanov–Takens points.
+//! Normal forms of a zero eigenvalue: folds, cusps, branch points, Bogdanov–Takens points.
 
 use super::ROUNDING;
 use super::local::Local;
@@ -17,11 +17,11 @@ impl Local<'_> {
         Some(Manifold::new(self, true, &[])?.motion(0, &[0, 0, 0])?.value.re / 6.0)
     }
 
-    /// a and b of (3), or 0, b and c at a pitchfork. `along` `[n + k]`, in states and parameters, is a direction closer to the
-    /// branch than to the one that crosses it, per unit of its parameter. `None` if no branches cross.
+    /// a and b of (3), or 0, b and c at a pitchfork. `along` `[n + k]`, in states and parameters, is a direction closer
+    /// to the branch than to the one that crosses it, per unit of its parameter. `None` if no branches cross.
     pub fn crossing(&self, along: &[f64], pitchfork: bool) -> Option<Vec<f64>> {
         let vectors = self.null_vectors()?;
-        // A tangent that was interpolated solves the linear equations only nearly.
+        // An interpolated tangent satisfies the linear equations only approximately.
         let off = self.bordered(&vectors, &self.derivative(&[along]))?;
         let along: Vec<f64> = along.iter().enumerate().map(|(i, x)| x - off.get(i).copied().unwrap_or(0.0)).collect();
         let (along, [q, p]) = (&along[..], vectors);
@@ -30,8 +30,9 @@ impl Local<'_> {
         if pitchfork {
             return Some(vec![0.0, b, self.cusp()?]);
         }
-        // Next to the point both tangents and all between solve the linear equations. Those of the branches, along + t q, are the roots of
-        // a t² + b t + ½ ⟨p, f(along, along)⟩, and at the nearer one b is half its derivative there.
+        // Near the point both tangents and all vectors between them satisfy the linear equations. The tangents of the
+        // branches, along + t q, are the roots of a t² + b t + ½ ⟨p, f(along, along)⟩, and b is half its derivative at
+        // the nearer root.
         let a = self.fold()?;
         let rest = 0.5 * dot(&p, &self.derivative(&[along, along])) / size;
         let square = b * b - 4.0 * a * rest;
@@ -50,13 +51,13 @@ impl Local<'_> {
         Some(self.fold()?.abs() <= share * reach * self.cusp()?.abs())
     }
 
-    /// a and b of (7); `None` where both vanish, by a symmetry.
+    /// a and b of (7); `None` if both vanish, by a symmetry.
     pub fn takens(&self) -> Option<[f64; 2]> {
         let vectors = self.null_vectors()?;
         let [q0, p1] = &vectors;
         let q1 = self.bordered(&vectors, q0)?;
         let p0 = self.transposed().bordered(&[p1.clone(), q0.clone()], p1)?;
-        // ⟨p₁, q₁⟩ = ⟨p₀, q₀⟩ is a number that p₀ and p₁ are divided by; what q₁ has along q₀ is chosen so that ⟨p₀, q₁⟩ = 0.
+        // p₀ and p₁ are divided by ⟨p₁, q₁⟩ = ⟨p₀, q₀⟩; the component of q₁ along q₀ is chosen so that ⟨p₀, q₁⟩ = 0.
         let size = dot(p1, &q1);
         let along = dot(&p0, &q1) / size;
         let q1: Vec<f64> = q1.iter().zip(q0).map(|(q1, q0)| q1 - along * q0).collect();
