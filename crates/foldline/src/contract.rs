@@ -98,6 +98,11 @@ pub trait VectorField: Send + Sync {
         None
     }
 
+    /// Name of a switch, for messages.
+    fn switch_name(&self, switch: usize) -> String {
+        format!("switch {}", switch + 1)
+    }
+
     /// The switching functions: writes `[switch_count × lanes]`.
     fn switches(&self, _at: Batch, _out: &mut [f64]) {}
 
@@ -292,6 +297,11 @@ pub trait Monitor: Send + Sync {
     /// True if the zero may still be confirmed, judging by the nearby point `at`.
     fn possible(&self, _at: &Point) -> bool {
         true
+    }
+
+    /// Two events of one kind with the same label at one place are one event.
+    fn label(&self) -> usize {
+        0
     }
 
     /// The factor of the value that vanishes next to `near`, evaluated at `at`. It has the same zero as the value but

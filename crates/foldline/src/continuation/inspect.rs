@@ -284,8 +284,8 @@ impl Follow<'_> {
         if !explained && let Some(together) = self.simultaneous(&stretch, right, fold_test, cost) {
             let count = left.point.unstable as i64;
             let mut out: Vec<Found> = Vec::new();
-            for mark in marks {
-                out.push(Found::Special(self.special(Kind::Mark, mark.station, count, count, mark.error)));
+            for (kind, mark) in marks {
+                out.push(Found::Special(self.special(kind, mark.station, count, count, mark.error)));
             }
             return out.into_iter().chain(together).collect();
         }
@@ -293,8 +293,8 @@ impl Follow<'_> {
         let mut out = Vec::new();
         let total = located.len();
         for (index, (kind, _, found)) in located.into_iter().enumerate() {
-            while let Some(mark) = marks.next_if(|mark| mark.distance < found.distance) {
-                out.push(Found::Special(self.special(Kind::Mark, mark.station, count, count, mark.error)));
+            while let Some((kind, mark)) = marks.next_if(|(_, mark)| mark.distance < found.distance) {
+                out.push(Found::Special(self.special(kind, mark.station, count, count, mark.error)));
             }
             let target = right.point.unstable as i64;
             let next = if index + 1 == total && explained { target } else { step_towards(count, target, jumps[index]) };
@@ -306,8 +306,8 @@ impl Follow<'_> {
             out.push(Found::Special(special));
             count = next;
         }
-        for mark in marks {
-            out.push(Found::Special(self.special(Kind::Mark, mark.station, count, count, mark.error)));
+        for (kind, mark) in marks {
+            out.push(Found::Special(self.special(kind, mark.station, count, count, mark.error)));
         }
         if !explained {
             let width = (left.parameter() - right.parameter()).abs() / (1.0 + right.parameter().abs());
@@ -493,7 +493,7 @@ impl Follow<'_> {
         self.count(&mut station);
         // On non-smooth fields a parameter is no more accurate than the profile, and two meshes may agree by chance.
         let least =
-            if self.problem.is_switched() && kind != Kind::Mark { station.point.trust.discretisation } else { 0.0 };
+            if self.problem.is_switched() && !matches!(kind, Kind::Mark | Kind::Grazing) { station.point.trust.discretisation } else { 0.0 };
         let error = error.max(least);
         let (before, after) = if self.direction > 0.0 { (before, after) } else { (after, before) };
         Box::new(SpecialPoint {

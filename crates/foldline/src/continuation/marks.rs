@@ -14,7 +14,7 @@ use super::follow::Follow;
 use super::inspect::History;
 use super::locate::{Located, Stretch, discrepancy, locate_within};
 use crate::contract::{Monitor, Sight};
-use crate::diagram::{Cost, Point};
+use crate::diagram::{Cost, Kind, Point};
 
 /// Maximum number of bisections of a bracket in which Newton's method fails; 12 of them shorten it by a factor of 4000.
 /// Empirical: failures occur next to singular points, a small part of a step.
@@ -23,6 +23,8 @@ const HALVINGS: usize = 12;
 /// quantity jumps across the requested value. A continuous quantity would be left with 2⁻¹², so the threshold has a
 /// safety factor of 200.
 const JUMPS: f64 = 0.05;
+/// Share of a piece within which two functions of one event have their zeros.
+const SAME: f64 = 1e-6;
 
 impl Follow<'_> {
     /// Quantity minus value at a station, for every mark.
@@ -39,9 +41,9 @@ impl Follow<'_> {
         history: Option<&History>,
         special: &[(f64, Point)],
         cost: &mut Cost,
-    ) -> Vec<Located> {
+    ) -> Vec<(Kind, Located)> {
         let marks = self.marks;
-        let mut found: Vec<Located> = Vec::new();
+        let mut found: Vec<(usize, Located)> = Vec::new();
         for (k, mark) in marks.iter().enumerate() {
             let value = |point: &Point| mark.value(&stretch.left.point, point);
             let (first, last) = (value(&stretch.left.point), value(&right.point));
@@ -49,9 +51,9 @@ impl Follow<'_> {
             let mut known: Vec<(f64, f64)> = [(0.0, first)].into_iter().chain(within).collect();
             known.retain(|(distance, value)| value.is_finite() && (0.0..stretch.length).contains(distance));
             // A value met exactly at the end of a piece, as at a bound, counts; at the beginning it was counted before.
-            if last == 0.0 && first != 0.0 && !found.iter().any(|other| other.distance == stretch.length) {
+            if last == 0.0 && first != 0.0 && !found.iter().any(|(_, other)| other.distance == stretch.length) {
                 let error = 10.0 * self.settings.newton_tolerance();
-                found.push(Located { distance: stretch.length, station: right.clone(), error });
+                found.push((k, Located { distance: stretch.length, station: right.clone(), error }));
             } else if last.is_finite() && last != 0.0 {
                 known.push((stretch.length, last));
             }
@@ -63,11 +65,16 @@ impl Follow<'_> {
             }
             known.sort_by(|a, b| a.0.total_cmp(&b.0));
             for pair in known.windows(2).filter(|pair| pair[0].1 != 0.0 && differ(pair[0].1, pair[1].1)) {
-                found.extend(self.mark_between(stretch, &**mark, [pair[0], pair[1]], cost));
+                found.extend(self.mark_between(stretch, &**mark, [pair[0], pair[1]], cost).map(|found| (k, found)));
             }
         }
-        found.sort_by(|a, b| a.distance.total_cmp(&b.distance));
-        found
+        found.sort_by(|a, b| a.1.distance.total_cmp(&b.1.distance));
+        let together = SAME * stretch.length;
+        found.dedup_by(|(next, b), (k, a)| {
+            let [own, other] = [&marks[*k], &marks[*next]];
+            b.distance - a.distance <= together && own.label() > 0 && own.label() == other.label()
+        });
+        found.into_iter().map(|(k, found)| (marks[k].kind(), found)).collect()
     }
 
     /// The mark between two distances with values of opposite sign; `None` if the quantity jumps across the requested

@@ -336,6 +336,8 @@ pub enum Kind {
     FlipTorus,
     /// Two pairs of multipliers on the unit circle.
     DoubleTorus,
+    /// A cycle touches a switching surface of the vector field, or an equilibrium lies on one.
+    Grazing,
     /// A quantity has a requested value.
     Mark,
     /// A stability change that no located special point explains.
@@ -344,7 +346,7 @@ pub enum Kind {
 
 impl Kind {
     /// Every kind, in the order in which tables list them.
-    pub const ALL: [Kind; 22] = [
+    pub const ALL: [Kind; 23] = [
         Kind::Fold,
         Kind::BranchPoint,
         Kind::Hopf,
@@ -365,14 +367,15 @@ impl Kind {
         Kind::FoldTorus,
         Kind::FlipTorus,
         Kind::DoubleTorus,
+        Kind::Grazing,
         Kind::Mark,
         Kind::Unexplained,
     ];
 
     /// True for bifurcations of codimension two.
     pub fn has_codimension_two(self) -> bool {
-        use Kind::{BranchPoint, Fold, Hopf, Mark, PeriodDoubling, Torus, Unexplained};
-        !matches!(self, Fold | BranchPoint | Hopf | PeriodDoubling | Torus | Mark | Unexplained)
+        use Kind::{BranchPoint, Fold, Grazing, Hopf, Mark, PeriodDoubling, Torus, Unexplained};
+        !matches!(self, Fold | BranchPoint | Hopf | PeriodDoubling | Torus | Grazing | Mark | Unexplained)
     }
 
     /// Names of the coefficients of the normal form, as defined in [`crate::special::normal_form`] and
@@ -416,6 +419,7 @@ impl Kind {
             Kind::FoldTorus => "fold-torus",
             Kind::FlipTorus => "flip-torus",
             Kind::DoubleTorus => "double-torus",
+            Kind::Grazing => "grazing",
             Kind::Mark => "mark",
             Kind::Unexplained => "unexplained",
         }

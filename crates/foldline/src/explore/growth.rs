@@ -14,7 +14,7 @@ use crate::special::mark::Mark;
 use crate::special::on_cycle_branch_points::OnCycleBranchPoints;
 use crate::special::quantity::Quantity;
 use crate::special::unfolded::UnfoldedCycles;
-use crate::special::{self, collapse};
+use crate::special::{self, collapse, grazing};
 
 /// The curve through a point that is to be followed.
 #[derive(Clone, Debug, Default)]
@@ -463,8 +463,9 @@ impl Growth<'_> {
                 (monitors, at.map(|at| shrinks(&system, first, at)).into_iter().collect())
             }
         };
-        let marks: Vec<Box<dyn Monitor>> =
+        let mut marks: Vec<Box<dyn Monitor>> =
             self.marks.iter().map(|mark| Box::new(mark.of_size(system.size_of(mark.quantity))) as _).collect();
+        marks.extend(grazing::monitors(system.field, branch.family == Family::Cycle));
         let home = branch.points.iter().find(|p| p.position == 0).filter(|_| branch.ends[0].is_none()).cloned();
         let limits = Limits {
             field: system.field,
@@ -573,6 +574,10 @@ impl Growth<'_> {
     /// Returns the coefficients of the normal form of a special point.
     fn coefficients(&self, system: &System, branch: &Branch, side: usize, special: &SpecialPoint) -> Coefficients {
         let (line, own) = (self.line(branch), setting(system, branch.free, &special.point.parameters));
+        if special.kind == Kind::Grazing {
+            let remark = grazing::described(system.field, &special.point);
+            return Coefficients { remark, ..Coefficients::default() };
+        }
         let dimension = special.kernel();
         if special.kind == Kind::BranchPoint && dimension > 1 {
             return Coefficients::none(format!("the null space has dimension {dimension}"));

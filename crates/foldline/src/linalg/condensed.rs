@@ -237,6 +237,42 @@ impl<T: Lane> Condensed<T> {
         T::dispatch(Condense(self))
     }
 
+    /// Makes the equations of the inner nodes of interval j those of the nodes alone, X_j = …, before it is condensed: A = 1, and B and the
+    /// first `scalars` columns of C are zero. [`Condensed::replace`] says what they depend on.
+    pub fn isolate(&mut self, j: usize, scalars: usize) {
+        let (inner, width) = (self.m * self.n, self.n + self.q);
+        let (lane, t) = (j / self.length, j % self.length);
+        for row in 0..inner {
+            let a = &mut self.interior[(t * inner + row) * inner..(t * inner + row + 1) * inner];
+            a.iter_mut().enumerate().for_each(|(k, x)| x.lanes_mut()[lane] = if k == row { 1.0 } else { 0.0 });
+            let b = &mut self.coupling[(t * inner + row) * width..][..self.n + scalars];
+            b.iter_mut().for_each(|x| x.lanes_mut()[lane] = 0.0);
+        }
+    }
+
+    /// Says how the inner nodes of an isolated interval j follow from its left end and the first scalars, once it is condensed: `by` is
+    /// `[m][n][n + scalars]`.
+    pub fn replace(&mut self, j: usize, by: &[f64]) {
+        let (n, m, width) = (self.n, self.m, self.n + self.q);
+        let (lane, t) = (j / self.length, j % self.length);
+        let columns = by.len() / (m * n);
+        let unit = |c: usize| if self.units.is_empty() { 1.0 } else { self.own_units[c] };
+        for (k, row) in by.chunks_exact(columns).enumerate() {
+            let own = &mut self.coupling[(t * m * n + self.shape.slot(k / n, k % n)) * width..][..columns];
+            for (c, (x, value)) in own.iter_mut().zip(row).enumerate() {
+                x.lanes_mut()[lane] = -value * if c < n { unit(c) } else { 1.0 } / unit(k % n);
+            }
+        }
+        for i in 0..n {
+            for c in 0..width {
+                let own = |k: usize| self.coupling[(t * m * n + self.shape.slot(k, i)) * width + c].lanes()[lane];
+                let inner: f64 = (0..m).map(|k| self.end[k + 1] * own(k)).sum();
+                let step = if c == i { self.end[0] } else { 0.0 } - inner;
+                self.step[(t * n + i) * width + c].lanes_mut()[lane] = step;
+            }
+        }
+    }
+
     /// Eliminates the interval ends, once after each [`Condensed::condense`]. `closure` is κ of (3).
     ///
     /// # Errors

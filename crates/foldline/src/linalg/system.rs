@@ -99,4 +99,22 @@ impl System {
     pub fn solve_transposed(&self, z: &[f64], y: &mut [f64]) {
         either!(self, s => s.solve_transposed(z, y));
     }
+
+    /// See [`Condensed::isolate`].
+    pub fn isolate(&mut self, j: usize, scalars: usize) {
+        either!(self, s => s.isolate(j, scalars));
+    }
+
+    /// See [`Condensed::replace`].
+    pub fn replace(&mut self, j: usize, by: &[f64]) {
+        either!(self, s => s.replace(j, by));
+    }
+
+    /// See [`Condensed::condense`].
+    ///
+    /// # Errors
+    /// [`Singular`] if an interior block is.
+    pub fn condense(&mut self) -> Result<(), Singular> {
+        either!(self, s => s.condense())
+    }
 }

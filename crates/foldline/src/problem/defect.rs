@@ -23,7 +23,7 @@ pub use columns::correct_in_columns;
 
 use super::gauss::{Scheme, gauss_legendre};
 use crate::contract::{Batch, Parameters, VectorField};
-use crate::diagram::Mesh;
+
 use crate::linalg::lane::{self, Eight, Lane, intact};
 use crate::linalg::{axpy, lu, panel, tile};
 
@@ -157,7 +157,7 @@ pub fn measure(
     profile: &[f64],
     period: f64,
     forcing_periods: u32,
-    mesh: &Mesh,
+    mesh: &[f64],
     scheme: &Scheme,
     sampling: &Sampling,
     scale: &[f64],

@@ -14,6 +14,7 @@ pub mod extremes;
 pub mod gauss;
 pub mod held;
 pub mod mesh;
+pub(crate) mod piecewise;
 pub mod setting;
 mod unfolding;
 

@@ -7,6 +7,7 @@
 //! | Hopf | equilibria | two eigenvalues add up to 0 | [`hopf`] |
 //! | period doubling | cycles | a multiplier is -1 | [`period_doubling`] |
 //! | torus | cycles | the product of two multipliers is 1 | [`torus`] |
+//! | grazing | both | a switch of the field, or an extremum of one along a cycle, is 0 | [`grazing`] |
 //!
 //! Test functions are products over the whole spectrum, so no eigenvalue needs to be tracked: a complex pair that meets
 //! on the negative real axis and sends one multiplier through -1 is detected like any other.
@@ -22,6 +23,7 @@ pub mod connection;
 pub mod cycle_coefficients;
 pub mod cycle_form;
 pub mod fold;
+pub mod grazing;
 pub mod hopf;
 pub mod mark;
 pub mod normal_form;

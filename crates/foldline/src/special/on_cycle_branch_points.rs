@@ -31,6 +31,7 @@ use crate::linalg::lane::{Eight, Lane};
 use crate::linalg::system::System;
 use crate::linalg::{axpy, dot, max_abs};
 use crate::problem::gauss::Scheme;
+use crate::problem::piecewise::{self, PiecewiseFlow, Switched};
 use crate::problem::{Setting, mesh};
 use num_complex::Complex64;
 
@@ -64,6 +65,9 @@ pub struct OnCycleBranchPoints<'a> {
     fx: Vec<f64>,
     /// f_λ at the Gauss points.
     along: Vec<f64>,
+    /// (T, λ …), and the intervals in which the orbit switches with their left ends.
+    scalars: Vec<f64>,
+    switched: Vec<(Vec<f64>, Switched)>,
 }
 
 /// Operator (2), filled with the widest instruction set of the machine.
@@ -107,6 +111,8 @@ impl<'a> OnCycleBranchPoints<'a> {
             f: Vec::new(),
             fx: Vec::new(),
             along: Vec::new(),
+            scalars: Vec::new(),
+            switched: Vec::new(),
         };
         own.resize();
         // Any borders will do for the first evaluation unless they are orthogonal to the null vectors.
@@ -198,6 +204,11 @@ impl<'a> OnCycleBranchPoints<'a> {
         let lambda = self.direction(&vec![0.0; size], &self.spread(1.0));
         self.setting.field.directional(self.batch(), &[&lambda], &mut along);
         (self.f, self.fx, self.along) = (f, fx, along);
+        self.scalars = u[size..].to_vec();
+        let flow = PiecewiseFlow::new(&self.setting, &self.scheme, &self.scalars, self.forcing_periods);
+        let block = (self.scheme.degree + 1) * self.n;
+        let switched = flow.intervals(&u[..size], &self.mesh).into_iter();
+        self.switched = switched.map(|found| (u[found.interval * block..][..self.n].to_vec(), found)).collect();
         if self.phase.is_empty() && self.first() == 1 {
             let (mut phase, mut norm) = (vec![0.0; lanes * self.n], 0.0);
             self.each(|lane, _, h, weight| {
@@ -261,6 +272,9 @@ impl<'a> OnCycleBranchPoints<'a> {
                 }
             }
         }
+        for (_, found) in &self.switched {
+            system.isolate(found.interval, first + 1);
+        }
         if first == 1 {
             system.corner[first + 1] = self.left_phase;
         }
@@ -272,6 +286,27 @@ impl<'a> OnCycleBranchPoints<'a> {
         system
     }
 
+    /// Ends of interval j in normalised time.
+    fn interval(&self, j: usize) -> [f64; 2] {
+        [self.mesh[j], self.mesh[j + 1]]
+    }
+
+    /// Derivatives of the flow of an interval at its Gauss points and its right end, `[m + 1][n × (n + 1 + k)]`, as those of v at the inner
+    /// nodes in v at the left end, T₁ and ℓ, `[m][n][n + scalars]`.
+    fn transition(&self, by: &[f64], left: f64) -> Vec<f64> {
+        let (n, first, m, k) = (self.n, self.first(), self.scheme.degree, self.setting.freedom());
+        let (from, width) = (n + 1 + k, n + first + 1);
+        let mut out = Vec::with_capacity((m + 1) * n * width);
+        for row in by.chunks_exact(from) {
+            out.extend_from_slice(&row[..n + first]);
+            out.push(self.across.iter().zip(&row[from - 2..]).map(|(a, v)| a * v).sum());
+        }
+        let end = out.split_off(m * n * width);
+        let left: Vec<f64> = (0..n * width).map(|k| if k % width == k / width { left } else { 0.0 }).collect();
+        piecewise::fit(&self.scheme, &left, &mut out, &end);
+        out
+    }
+
     fn evaluated(&mut self, u: &[f64], g: &mut [f64]) -> Option<()> {
         self.linearise(u);
         let system = std::mem::replace(&mut self.system, System::new(1, &[1.0, 0.0], 0));
@@ -279,7 +314,13 @@ impl<'a> OnCycleBranchPoints<'a> {
             System::Eight(system) => System::Eight(Eight::dispatch(Fill { own: self, system })),
             System::One(system) => System::One(f64::dispatch(Fill { own: self, system })),
         };
-        self.system.factorise(1.0).ok()?;
+        self.system.condense().ok()?;
+        for (_, found) in &self.switched {
+            let ends = self.interval(found.interval);
+            let own = self.transition(&found.derivatives(&self.scheme, ends), 1.0);
+            self.system.replace(found.interval, &own);
+        }
+        self.system.eliminate(1.0).ok()?;
         let (size, first) = (self.profile_size(), self.first());
         let total = size + first + 2;
         let unit = |k: usize| {
@@ -428,6 +469,7 @@ impl Condition for OnCycleBranchPoints<'_> {
         let way = self.direction(&du[..size], &self.setting.spread(&du[size + 1..]));
         let [mut bent, mut moved] = [(); 2].map(|()| vec![0.0; n * lanes]);
         self.setting.field.directional(self.batch(), &[&way], &mut moved);
+        dg.fill(0.0);
         for (k, value) in dg.iter_mut().enumerate() {
             let (v, period, lambda) = self.parts(k);
             let own = self.direction(v, &self.spread(lambda));
@@ -442,7 +484,24 @@ impl Condition for OnCycleBranchPoints<'_> {
                     change[node + c] = -h * rate;
                 }
             });
-            *value = -dot(&self.adjoint[..size], &change);
+            let flow = PiecewiseFlow::new(&self.setting, &self.scheme, &self.scalars, self.forcing_periods);
+            let block = (self.scheme.degree + 1) * n;
+            for (x, found) in &self.switched {
+                let (j, ends) = (found.interval, self.interval(found.interval));
+                let dx = &du[j * block..j * block + n];
+                let Some(by) = flow.varied(found, x, ends, dx, &du[size..]) else {
+                    *value = f64::NAN;
+                    continue;
+                };
+                let varied = self.transition(&by, 0.0);
+                let width = n + self.first() + 1;
+                let own = &mut change[j * block + n..(j + 1) * block];
+                for (row, to) in varied.chunks_exact(width).zip(own) {
+                    let by_period = if self.first() == 1 { row[n] * period } else { 0.0 };
+                    *to = -(dot(&row[..n], &v[j * block..j * block + n]) + by_period + row[width - 1] * lambda);
+                }
+            }
+            *value += -dot(&self.adjoint[..size], &change);
         }
     }
 

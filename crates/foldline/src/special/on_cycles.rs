@@ -25,8 +25,9 @@ use crate::diagram::{Cycle, Kind, Mesh, Point};
 use crate::linalg::condensed::Condensed;
 use crate::linalg::lane::{Eight, Lane};
 use crate::linalg::system::System;
-use crate::linalg::{dot, max_abs};
+use crate::linalg::{axpy, dot, max_abs};
 use crate::problem::gauss::Scheme;
+use crate::problem::piecewise::{self, PiecewiseFlow, Switched};
 use crate::problem::{Setting, mesh};
 use num_complex::Complex64;
 
@@ -62,6 +63,11 @@ pub struct OnCycles<'a> {
     /// Number of forcing periods of the cycle.
     forcing_periods: u32,
     times: Vec<f64>,
+    /// (T, λ …), and the intervals in which the orbit switches with their left ends.
+    scalars: Vec<f64>,
+    /// θ of the last factorisation.
+    angle: f64,
+    switched: Vec<(Vec<f64>, Switched)>,
 }
 
 /// Operator (4), filled with the widest instruction set of the machine.
@@ -131,6 +137,9 @@ impl<'a> OnCycles<'a> {
             fx: Vec::new(),
             forcing_periods,
             times: Vec::new(),
+            scalars: Vec::new(),
+            angle: 0.0,
+            switched: Vec::new(),
         })
     }
 
@@ -160,7 +169,58 @@ impl<'a> OnCycles<'a> {
     pub(super) fn prepare(&mut self, u: &[f64], angle: f64) -> Option<()> {
         self.linearise(u);
         self.fill(angle);
-        self.system.factorise(self.closure()).ok()
+        self.factorise(angle)
+    }
+
+    /// Factorises what was filled, with the transitions of the piecewise flow where the orbit switches.
+    fn factorise(&mut self, angle: f64) -> Option<()> {
+        self.angle = angle;
+        self.system.condense().ok()?;
+        for (_, found) in &self.switched {
+            self.system.replace(found.interval, &self.transition(found, angle));
+        }
+        self.system.eliminate(self.closure()).ok()
+    }
+
+    /// How v at the inner nodes of an interval follows from its left end, and T₁ where it has one: `[m][parts][parts + scalars]`.
+    fn transition(&self, found: &Switched, angle: f64) -> Vec<f64> {
+        let ends = self.interval(found.interval);
+        let width = self.parts + usize::from(self.is_fold());
+        let left: Vec<f64> = (0..self.parts * width).map(|k| f64::from(u8::from(k % width == k / width))).collect();
+        self.turned(&found.derivatives(&self.scheme, ends), &left, ends, |h| Complex64::cis(-angle * h))
+    }
+
+    /// Derivatives of the flow of an interval at its Gauss points and its right end, `[m + 1][n × (n + 1 + k)]`, as those of v at the inner
+    /// nodes, `[m][parts][parts + scalars]`, where v is complex times `factor` of the time from the left end: (3) turns v back by θ over the
+    /// period. `left` is their value at the left end.
+    fn turned(&self, by: &[f64], left: &[f64], ends: [f64; 2], factor: impl Fn(f64) -> Complex64) -> Vec<f64> {
+        let (n, parts, m) = (self.n, self.parts, self.scheme.degree);
+        let (from, width) = (n + self.scalars.len(), parts + usize::from(self.is_fold()));
+        let mut out = vec![0.0; (m + 1) * parts * width];
+        let places = self.scheme.nodes[1..].iter().copied().chain([1.0]);
+        for ((node, own), place) in out.chunks_exact_mut(parts * width).zip(by.chunks_exact(n * from)).zip(places) {
+            let Complex64 { re: cos, im: sin } = factor(place * (ends[1] - ends[0]));
+            for (i, k) in (0..n).flat_map(|i| (0..n).map(move |k| (i, k))) {
+                let value = own[i * from + k];
+                if parts == n {
+                    node[i * width + k] = value;
+                } else {
+                    (node[i * width + k], node[i * width + n + k]) = (cos * value, -sin * value);
+                    (node[(n + i) * width + k], node[(n + i) * width + n + k]) = (sin * value, cos * value);
+                }
+            }
+            if width > parts {
+                (0..n).for_each(|i| node[i * width + parts] = own[i * from + n]);
+            }
+        }
+        let end = out.split_off(m * parts * width);
+        piecewise::fit(&self.scheme, left, &mut out, &end);
+        out
+    }
+
+    /// Ends of interval j in normalised time.
+    fn interval(&self, j: usize) -> [f64; 2] {
+        [self.mesh[j], self.mesh[j + 1]]
     }
 
     /// Solves L y = r, with r at the Gauss points `[parts × lanes]`. Returns y there, and T₁ if it is an unknown, else
@@ -341,6 +401,12 @@ impl<'a> OnCycles<'a> {
             times: &self.times,
         };
         self.setting.field.linearise(batch, &[], &mut self.f, &mut self.fx, &mut []);
+        self.scalars = u[size..].to_vec();
+        let flow = PiecewiseFlow::new(&self.setting, &self.scheme, &self.scalars, self.forcing_periods);
+        let block = (self.scheme.degree + 1) * self.n;
+        let switched = flow.intervals(&u[..size], &self.mesh).into_iter();
+        self.switched =
+            switched.map(|found| (u[found.interval * block..][..self.n].to_vec(), found)).collect();
         if self.phase.is_empty() {
             let (m, lanes) = (self.scheme.degree, self.lanes());
             let mut norm = 0.0;
@@ -386,6 +452,9 @@ impl<'a> OnCycles<'a> {
                     self.fill_line(&mut system, &slots, place, [i, c], h, angle);
                 }
             }
+        }
+        for (_, found) in &self.switched {
+            system.isolate(found.interval, usize::from(is_fold));
         }
         if is_fold && self.bordered {
             system.corner[1] = self.left_phase;
@@ -512,8 +581,9 @@ impl<'a> OnCycles<'a> {
 
     fn evaluated(&mut self, u: &[f64], extra: &[f64], g: &mut [f64]) -> Option<()> {
         self.linearise(u);
-        self.fill(extra.first().copied().unwrap_or(0.0));
-        self.system.factorise(self.closure()).ok()?;
+        let angle = extra.first().copied().unwrap_or(0.0);
+        self.fill(angle);
+        self.factorise(angle)?;
         let (size, first) = (self.profile_size(), usize::from(self.is_fold()));
         let total = size + first + self.width();
         let mut one = vec![0.0; total];
@@ -647,6 +717,30 @@ impl Condition for OnCycles<'_> {
                         change[node + part * n + c] -= sign * h * turn * self.null[node + other];
                     }
                 }
+            }
+        }
+        let flow = PiecewiseFlow::new(&self.setting, &self.scheme, &self.scalars, self.forcing_periods);
+        let (block, blocks) = ((m + 1) * n, (m + 1) * parts);
+        for (x, found) in &self.switched {
+            let j = found.interval;
+            let ends = self.interval(j);
+            let dx = &du[j * block..j * block + n];
+            let Some(by) = flow.varied(found, x, ends, dx, &du[states..]) else {
+                dg.fill(f64::NAN);
+                return;
+            };
+            let width = parts + usize::from(self.is_fold());
+            let (none, angle) = (vec![0.0; parts * width], self.angle);
+            let mut varied = self.turned(&by, &none, ends, |h| Complex64::cis(-angle * h));
+            if parts > n {
+                let by = found.derivatives(&self.scheme, ends);
+                let by_angle = self.turned(&by, &none, ends, |h| Complex64::new(0.0, -h) * Complex64::cis(-angle * h));
+                axpy(turn, &by_angle, &mut varied);
+            }
+            let own = &mut change[j * blocks + parts..(j + 1) * blocks];
+            for (row, to) in varied.chunks_exact(width).zip(own) {
+                let left = dot(&row[..parts], &self.null[j * blocks..j * blocks + parts]);
+                *to = -(left + if width > parts { row[parts] * self.null[size] } else { 0.0 });
             }
         }
         for (value, w) in dg.iter_mut().zip(&self.adjoint) {

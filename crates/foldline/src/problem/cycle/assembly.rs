@@ -7,6 +7,7 @@ use crate::linalg::lane::{Eight, Lane};
 use crate::linalg::max_abs;
 use crate::linalg::system::{System, either};
 use crate::problem::gauss::Scheme;
+use crate::problem::piecewise::{self, Switched};
 
 impl CycleProblem<'_> {
     /// Profile of an antiperiodic null vector of the variational equation at `u` (it changes sign after one period),
@@ -83,6 +84,8 @@ impl CycleProblem<'_> {
             // Couplings are never removed, so that the order of elimination rarely changes.
             *coupled |= !vanishes(entry);
         }
+        let switched = self.switched(u);
+        switched.iter().for_each(|found| self.freeze(found.interval));
         either!(&mut self.system, s => s.couple(&self.coupled));
         either!(&mut self.system, s => s.measure_in(self.setting.scales, &self.scale));
         let linear = Linear {
@@ -98,7 +101,7 @@ impl CycleProblem<'_> {
             coupled: &self.coupled,
         };
         let (trace, corner) = either!(&mut self.system, s => (write(linear, s)?, &mut s.corner));
-        self.trace = trace;
+        self.trace = trace + switched.iter().map(Switched::trace).sum::<f64>();
         let q = 1 + self.setting.freedom();
         corner[..q].fill(0.0);
         corner[0] = f64::from(u8::from(self.forcing_periods > 0));
@@ -110,7 +113,26 @@ impl CycleProblem<'_> {
         for (r, row) in rows.chunks_exact(u.len()).enumerate() {
             self.fill_row(1 + r, &row[..size]);
         }
+        for found in switched.iter() {
+            let mut by = found.derivatives(&self.scheme, self.interval(found.interval));
+            let width = self.n + q;
+            let end = by.split_off(by.len() - self.n * width);
+            let left: Vec<f64> = (0..self.n * width).map(|k| f64::from(u8::from(k % width == k / width))).collect();
+            piecewise::fit(&self.scheme, &left, &mut by, &end);
+            self.system.replace(found.interval, &by);
+        }
         Ok(())
+    }
+
+    /// Makes f constant in an interval whose equations are those of the piecewise flow.
+    fn freeze(&mut self, j: usize) {
+        let (m, lanes) = (self.scheme.degree, self.lanes());
+        let first = j % self.length * m * self.width + j / self.length;
+        for values in [&mut self.f, &mut self.fx, &mut self.fp] {
+            for own in values.chunks_exact_mut(lanes) {
+                (0..m).for_each(|i| own[first + i * self.width] = 0.0);
+            }
+        }
     }
 
     /// Writes a border row that acts on the profile through the inner product.

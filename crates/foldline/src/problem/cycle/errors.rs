@@ -1,7 +1,6 @@
 //! Error estimates of a cycle, from its defect and the last factorisation.
 
 use super::CycleProblem;
-use super::crossings::{self, Crossed};
 use crate::contract::{Batch, Parameters, ZeroProblem};
 use crate::diagram::{FLAT, STANDS};
 use crate::linalg::condensed::Condensed;
@@ -9,6 +8,7 @@ use crate::linalg::dense::MANY;
 use crate::linalg::system::System;
 use crate::linalg::{larger, panel, same};
 use crate::problem::defect::{self, Course, Defect, TOGETHER};
+use crate::problem::piecewise::Switched;
 use crate::stability::floquet;
 use num_complex::Complex64;
 use std::ops::Range;
@@ -124,15 +124,14 @@ impl CycleProblem<'_> {
     /// error, which is large where the Jacobian changes sharply.
     pub(super) fn multiplier_error(&self, u: &[f64], spectrum: &[Complex64]) -> f64 {
         self.errors(u);
-        let crossed = self.crossed(u);
-        if self.is_planar() && crossed.is_empty() {
-            // Error of exp(∫ tr f_x), relative to the larger of 1 and its value, plus that of the trivial multiplier,
-            // if any.
+        let switched = self.switched(u);
+        if self.is_planar() && switched.is_empty() {
+            // The error of exp(∫ tr f_x), relative to the larger of 1 and its value, plus that of the trivial multiplier, if any.
             let (own, off) = (self.trace.exp(), self.divergence_error(u));
             let trivial = spectrum[..spectrum.len() - 1].iter().fold(0.0, |most: f64, z| most.max((z - 1.0).norm()));
             return SPECTRUM_SAFE * (off.exp_m1() * own / own.max(1.0) + trivial) + floquet::ROUNDING;
         }
-        let Some(spectra) = self.corrected_multipliers(u, &crossed) else { return f64::NAN };
+        let Some(spectra) = self.corrected_multipliers(u, &switched) else { return f64::NAN };
         let before = std::iter::once(spectrum).chain(spectra.iter().map(Vec::as_slice));
         let apart: f64 = before.zip(&spectra).map(|(one, next)| spectrum_difference(one, next)).sum();
         SPECTRUM_SAFE * apart + floquet::ROUNDING
@@ -163,9 +162,9 @@ impl CycleProblem<'_> {
         (better[size] * total - self.trace).abs()
     }
 
-    /// Multipliers from improved transitions, with the Jacobian along the profile and along the profile without its
-    /// error; each preceded by those with only every second interval changed.
-    fn corrected_multipliers(&self, u: &[f64], crossed: &[Crossed]) -> Option<[Vec<Complex64>; 4]> {
+    /// The multipliers from more accurate transitions, with the Jacobian along the profile, and along the profile without its error; before
+    /// either of them those where every second interval is so.
+    fn corrected_multipliers(&self, u: &[f64], switched: &[Switched]) -> Option<[Vec<Complex64>; 4]> {
         let known = self.measured.borrow();
         let known = known.as_ref()?;
         let better: Vec<f64> = u.iter().zip(&known.shift).map(|(u, e)| u - e).collect();
@@ -183,8 +182,15 @@ impl CycleProblem<'_> {
             first += count;
         }
         let [mut own, mut other] = transitions;
-        crossings::replace(&mut own, crossed);
-        crossings::replace(&mut other, &self.crossed(&better));
+        let (square, block) = (self.n * self.n, self.block());
+        for (transitions, orbit) in [(&mut own, u), (&mut other, &better)] {
+            let flow = self.flow(orbit);
+            for j in switched.iter().map(|found| found.interval) {
+                let nodes = &orbit[j * block..(j + 1) * block];
+                let refined = flow.refined(j, &nodes[..self.n], self.interval(j), nodes)?;
+                transitions[j * square..(j + 1) * square].copy_from_slice(&refined);
+            }
+        }
         let [frames, others] = [u, &better].map(|u| self.frames(u));
         // Transitions of the even and of the odd intervals, and frames.
         let courses =
@@ -251,29 +257,39 @@ impl CycleProblem<'_> {
         let size = self.profile_size();
         let scale = self.relative_scale(u);
         let parameters = self.setting.at(&u[size + 1..]);
-        let Defect { mut local, within, mut ends, sources, mut misses } = defect::measure(
-            self.setting.field,
-            &parameters,
-            &u[..size],
-            u[size],
-            self.forcing_periods,
-            &self.mesh,
-            &self.scheme,
-            &self.sampling,
-            &scale,
-            &mut self.room.borrow_mut().measure,
-        );
-        // If f has a kink, the sample points of the defect may all lie on one side of it.
-        for (j, defect) in self.defects_at_crossings(u) {
-            for (i, own) in defect.into_iter().enumerate() {
-                local[j] = local[j].max((own / scale[i]).abs());
-                misses[j * self.n + i] += own - ends[j * self.n + i];
-                ends[j * self.n + i] = own;
+        let measure = |profile: &[f64], mesh: &[f64]| {
+            defect::measure(
+                self.setting.field,
+                &parameters,
+                profile,
+                u[size],
+                self.forcing_periods,
+                mesh,
+                &self.scheme,
+                &self.sampling,
+                &scale,
+                &mut self.room.borrow_mut().measure,
+            )
+        };
+        let Defect { mut local, mut within, mut ends, mut sources, mut misses } = measure(&u[..size], &self.mesh);
+        // An interval in which the orbit switches has the defects of its parts.
+        let (n, inner, count) = (self.n, self.scheme.degree * self.n, self.intervals());
+        for found in self.switched(u).iter() {
+            let j = found.interval;
+            let profile: Vec<f64> = found.parts.iter().flat_map(|part| part.nodes.iter().copied()).collect();
+            let first = found.parts[0].ends[0];
+            let mesh: Vec<f64> = [first].into_iter().chain(found.parts.iter().map(|part| part.ends[1])).collect();
+            let own = measure(&profile, &mesh);
+            local[j] = own.local.iter().fold(0.0, |most: f64, e| most.max(*e));
+            within.iter_mut().skip(j).step_by(count).for_each(|w| *w = 0.0);
+            sources[j * inner..(j + 1) * inner].fill(0.0);
+            for c in 0..n {
+                let missed: f64 = own.misses.iter().skip(c).step_by(n).sum();
+                (ends[j * n + c], misses[j * n + c]) = (missed, missed);
             }
         }
         let block = (self.scheme.degree + 1) * self.n;
         let mut rhs = vec![0.0; u.len()];
-        let inner = self.scheme.degree * self.n;
         for (own, (end, source)) in
             rhs.chunks_exact_mut(block).zip(ends.chunks_exact(self.n).zip(sources.chunks_exact(inner)))
         {

@@ -32,7 +32,6 @@
 //! without bound; the continuation recognises both.
 
 mod assembly;
-mod crossings;
 mod errors;
 mod meshes;
 mod phase;
@@ -41,6 +40,7 @@ mod residual;
 use super::defect;
 use super::gauss::Scheme;
 use super::mesh::Passage;
+use super::piecewise::{PiecewiseFlow, Switched};
 use super::{Setting, averages, extremes, mesh};
 use crate::contract::{Batch, Examination, Parameters, Singular, ZeroProblem};
 use crate::diagram::{Cycle, Mesh, Point, Solution, Trust};
@@ -51,6 +51,7 @@ use crate::stability::floquet::{self, Course, Floquet, Frames};
 use errors::{Measured, Room};
 use num_complex::Complex64;
 use std::cell::RefCell;
+use std::sync::Arc;
 
 /// Smallest density of the next mesh, as a share of that of the current one.
 const KEPT: f64 = 0.6;
@@ -102,6 +103,8 @@ pub struct CycleProblem<'a> {
     /// The last error estimate. Mesh and errors belong together only at the point where they were computed.
     measured: RefCell<Option<Measured>>,
     room: RefCell<Room>,
+    /// The intervals in which the orbit switches, and the unknowns they belong to.
+    switched: RefCell<(Vec<f64>, Arc<Vec<Switched>>)>,
     /// Interpolations between the most recently used pairs of meshes.
     passages: RefCell<Vec<Passage>>,
 }
@@ -140,6 +143,7 @@ impl<'a> CycleProblem<'a> {
             trace: 0.0,
             measured: RefCell::new(None),
             room: RefCell::default(),
+            switched: RefCell::default(),
             passages: RefCell::default(),
         };
         problem.arrange();
@@ -153,6 +157,76 @@ impl<'a> CycleProblem<'a> {
         problem.gain = cycle.gain.clone();
         problem.arrange();
         problem
+    }
+
+    /// The intervals in which the orbit `u` switches.
+    fn switched(&self, u: &[f64]) -> Arc<Vec<Switched>> {
+        if self.setting.field.switch_count() == 0 {
+            return Arc::default();
+        }
+        if !same(&self.switched.borrow().0, u) {
+            let found = self.flow(u).intervals(&u[..self.profile_size()], &self.mesh);
+            self.switched.replace((u.to_vec(), Arc::new(found)));
+        }
+        self.switched.borrow().1.clone()
+    }
+
+    /// The piecewise flow with the scalars of `u`.
+    fn flow(&self, u: &[f64]) -> PiecewiseFlow<'_> {
+        PiecewiseFlow::new(&self.setting, &self.scheme, &u[self.profile_size()..], self.forcing_periods)
+    }
+
+    /// Gives the inner nodes of intervals in which the orbit switches the values that the flow requires: there no polynomial follows it.
+    fn settle(&self, u: &mut [f64]) {
+        let block = self.block();
+        for found in self.switched(u).iter() {
+            let own = found.interval * block + self.n..(found.interval + 1) * block;
+            u[own].copy_from_slice(&found.inner(&self.scheme, self.interval(found.interval)));
+        }
+    }
+
+    /// Ends of interval j in normalised time.
+    fn interval(&self, j: usize) -> [f64; 2] {
+        [self.mesh[j], self.mesh[j + 1]]
+    }
+
+    /// The orbit with a mesh interval for each part between switchings: mesh and profile, and likewise a tangent `[unknowns]`.
+    fn cut(&self, u: &[f64], tangent: &[f64]) -> (Mesh, Vec<f64>, Vec<f64>) {
+        let size = self.profile_size();
+        let switched = self.switched(u);
+        if switched.is_empty() {
+            return (self.mesh.clone(), u[..size].to_vec(), tangent.to_vec());
+        }
+        let (n, block) = (self.n, self.block());
+        // A condition has unknowns before these; a point by itself has no tangent.
+        let Some(extra) = tangent.len().checked_sub(u.len()) else {
+            let (mesh, profile, _) = self.cut(u, u);
+            return (mesh, profile, tangent.to_vec());
+        };
+        let along = &tangent[extra..];
+        let (mut mesh, mut profile, mut moved) = (vec![0.0], Vec::new(), tangent[..extra].to_vec());
+        let mut next = switched.iter().peekable();
+        for j in 0..self.intervals() {
+            let own = &u[j * block..(j + 1) * block];
+            let Some(found) = next.next_if(|found| found.interval == j) else {
+                profile.extend_from_slice(own);
+                moved.extend_from_slice(&along[j * block..(j + 1) * block]);
+                mesh.push(self.mesh[j + 1]);
+                continue;
+            };
+            let direction: Vec<f64> = along[j * block..j * block + n].iter().chain(&along[size..]).copied().collect();
+            for part in &found.parts {
+                profile.extend_from_slice(&part.nodes);
+                moved.extend(part.by.chunks_exact(direction.len()).map(|row| dot(row, &direction)));
+                mesh.push(part.ends[1]);
+            }
+            // The last boundary to the last bit.
+            if let Some(last) = mesh.last_mut() {
+                *last = self.mesh[j + 1];
+            }
+        }
+        moved.extend_from_slice(&along[size..]);
+        (mesh.into(), profile, moved)
     }
 
     /// True if (4) replaces (3).
@@ -367,6 +441,12 @@ impl ZeroProblem for CycleProblem<'_> {
             1 => self.defects::<f64>(u, r),
             _ => self.defects::<Eight>(u, r),
         };
+        let block = self.block();
+        for found in self.switched(u).iter() {
+            let own = found.interval * block + self.n..(found.interval + 1) * block;
+            let required = found.inner(&self.scheme, self.interval(found.interval));
+            r[own.clone()].iter_mut().zip(&u[own]).zip(&required).for_each(|((r, x), flow)| *r = x - flow);
+        }
         r[size] = match self.is_forced() {
             true => u[size] - f64::from(self.forcing_periods),
             false => phase - self.phase_offset,
@@ -479,7 +559,8 @@ impl ZeroProblem for CycleProblem<'_> {
         self.residual(u, &mut r);
         let residual = self.sizes(&r).iter().zip(&scale).map(|(v, s)| v / s).fold(r[size].abs(), f64::max);
         let parameters = self.setting.at(&u[size + 1..]);
-        let cycle = [&u[..size], &self.mesh[..]];
+        let (mesh, profile, _) = self.cut(u, u);
+        let cycle = [&profile[..], &mesh[..]];
         found.ranges = extremes::of_profile(self.setting.field, &parameters, cycle, self.forcing_periods, &self.scheme);
         found.averages =
             averages::of_profile(self.setting.field, &parameters, cycle, self.forcing_periods, &self.scheme);
@@ -509,18 +590,19 @@ impl ZeroProblem for CycleProblem<'_> {
     fn point(&self, u: &[f64], tangent: &[f64], examination: Examination) -> Point {
         let size = self.profile_size();
         let parameters = self.setting.at(&u[size + 1..]);
+        let (mesh, profile, tangent) = self.cut(u, tangent);
         Point {
             position: 0,
             solution: Solution::Cycle(Cycle {
                 period: u[size] * self.setting.field.time_unit(&parameters),
                 forcing_periods: self.forcing_periods,
-                mesh: self.mesh.clone(),
+                mesh,
                 degree: self.scheme.degree,
-                profile: u[..size].to_vec(),
+                profile,
                 gain: self.gain.clone(),
             }),
             parameters,
-            tangent: tangent.to_vec(),
+            tangent,
             step: 0.0,
             spectrum: examination.spectrum,
             unstable: examination.unstable,

@@ -67,6 +67,7 @@ impl CycleProblem<'_> {
         let images = self.shifts(&beside[..size], &states, room.sqrt()).into_iter().map(|shift| {
             let mut u = [&self.moved(&states, shift)[..], &scalars].concat();
             self.setting.nearest_copy(&mut u[..size], &beside[..n]);
+            self.settle(&mut u);
             [u, [&self.moved(&tangent, shift)[..], &point.tangent[whole..]].concat()]
         });
         images.filter(|[u, _]| close(u)).collect()

@@ -1,0 +1,209 @@
+//! Grazing: an orbit touches a switching surface of the vector field without crossing it. Boundary equilibria: an equilibrium lies on one.
+//!
+//! **Idea.** A switch h has local extrema along a cycle. Where one of them passes zero the sequence of switchings changes: a new contact
+//! begins, or the gap between two contacts closes. The number of excursions of h above zero changes by one there, or by two where a
+//! symmetry repeats the event within the period; the extremum next to zero says how far it is to the event.
+//!
+//! **Equations.** With extrema e_i of h over the period, N the number of excursions h > 0:
+//!
+//! ```text
+//!   (1)  (-1)^N min |e_i| = 0,    (-1)^⌊N/2⌋ min |e_i| = 0        cycles
+//!   (2)  h(x) = 0                                                equilibria
+//! ```
+//!
+//! **Source.** dibernardo2008, §2.5 and §7.
+//!
+//! **Fails when** h is zero along a part of the orbit: there is no extremum next to zero then.
+
+use crate::contract::{Batch, Monitor, Parameters, Sight, VectorField};
+use crate::diagram::{Cycle, Kind, Point, Solution};
+use crate::problem::gauss::Scheme;
+
+/// Sections of a mesh interval at whose ends a switch is compared with its neighbours; extrema are then found by parabolas.
+const SECTIONS: usize = 8;
+/// Rounds of parabolas, each on an eighth of the section before. An extremum is known to the square of its place.
+const ROUNDS: usize = 5;
+/// Extrema smaller than this, relative to the largest value, are rounding. Where there are several, h is zero along a part of the orbit.
+const ZERO: f64 = 1e-11;
+
+/// Monitor of grazings of one switch.
+pub struct Grazing<'a> {
+    field: &'a dyn VectorField,
+    switch: usize,
+    /// 1 or 2, for the two functions (1).
+    stride: usize,
+}
+
+/// A local extremum of a switch along a cycle.
+#[derive(Clone, Copy, Debug)]
+pub struct Extremum {
+    /// Normalised time.
+    pub time: f64,
+    /// Value of the switch.
+    pub value: f64,
+    /// True for a maximum.
+    pub maximum: bool,
+}
+
+/// Monitors of all switches of a field, for equilibria or for cycles.
+pub fn monitors(field: &dyn VectorField, cycles: bool) -> Vec<Box<dyn Monitor + '_>> {
+    let strides: &[usize] = if cycles { &[1, 2] } else { &[1] };
+    let each = (0..field.switch_count()).flat_map(|switch| strides.iter().map(move |stride| (switch, *stride)));
+    each.map(|(switch, stride)| Box::new(Grazing { field, switch, stride }) as Box<dyn Monitor + '_>).collect()
+}
+
+impl Monitor for Grazing<'_> {
+    fn kind(&self) -> Kind {
+        Kind::Grazing
+    }
+
+    fn value(&self, _reference: &Point, at: &Point) -> f64 {
+        let cycle = match &at.solution {
+            Solution::Equilibrium(x) => return value(self.field, &at.parameters, x, &[], self.switch)[0],
+            Solution::Cycle(cycle) => cycle,
+        };
+        let (extrema, size) = extrema(self.field, &at.parameters, cycle, self.switch);
+        let least = extrema.iter().map(|e| e.value.abs()).fold(f64::INFINITY, f64::min);
+        let zeros = extrema.iter().filter(|e| e.value.abs() < ZERO * size).count();
+        if zeros > 1 || size == 0.0 {
+            return f64::NAN;
+        }
+        if least.is_infinite() {
+            return size;
+        }
+        if (excursions(&extrema) / self.stride as i64).rem_euclid(2) == 0 { least } else { -least }
+    }
+
+    fn confirms(&self, _at: &Point) -> bool {
+        true
+    }
+
+    fn reads(&self) -> Sight {
+        Sight::Everything
+    }
+
+    fn jump(&self) -> usize {
+        0
+    }
+
+    fn label(&self) -> usize {
+        self.switch + 1
+    }
+}
+
+/// Excursions above zero during the period.
+fn excursions(extrema: &[Extremum]) -> i64 {
+    extrema.iter().filter(|e| e.value > 0.0).map(|e| if e.maximum { 1 } else { -1 }).sum()
+}
+
+/// One switch at states `[n × lanes]`.
+fn value(field: &dyn VectorField, parameters: &[f64], states: &[f64], times: &[f64], switch: usize) -> Vec<f64> {
+    let lanes = states.len() / field.dim().max(1);
+    let mut values = vec![0.0; field.switch_count() * lanes];
+    field.switches(Batch { lanes, states, parameters: Parameters::Shared(parameters), times }, &mut values);
+    values[switch * lanes..(switch + 1) * lanes].to_vec()
+}
+
+/// The local extrema of a switch along a cycle, and its largest absolute value.
+pub fn extrema(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle, switch: usize) -> (Vec<Extremum>, f64) {
+    let (n, intervals, scheme) = (cycle.dim(), cycle.intervals(), Scheme::of(cycle.degree));
+    if n == 0 || intervals == 0 {
+        return (Vec::new(), 0.0);
+    }
+    let forced = f64::from(cycle.forcing_periods);
+    let time = |t: f64| if forced > 0.0 { Some(forced * t) } else { None };
+    let places: Vec<f64> = cycle
+        .mesh
+        .windows(2)
+        .flat_map(|pair| (0..SECTIONS).map(move |k| pair[0] + (pair[1] - pair[0]) * k as f64 / SECTIONS as f64))
+        .collect();
+    let (lanes, block) = (places.len(), (cycle.degree + 1) * n);
+    let (mut states, mut x) = (vec![0.0; n * lanes], vec![0.0; n]);
+    for k in 0..lanes {
+        let nodes = &cycle.profile[k / SECTIONS * block..(k / SECTIONS + 1) * block];
+        scheme.value_into((k % SECTIONS) as f64 / SECTIONS as f64, nodes, &mut x);
+        (0..n).for_each(|c| states[c * lanes + k] = x[c]);
+    }
+    let times: Vec<f64> = places.iter().filter_map(|t| time(*t)).collect();
+    let values = value(field, parameters, &states, &times, switch);
+    let size = values.iter().fold(0.0, |most: f64, v| most.max(v.abs()));
+    let at = |t: f64| value(field, parameters, &cycle.state(t), time(t).as_slice(), switch)[0];
+    let mut found = Vec::new();
+    for k in 0..lanes {
+        let (before, after) = ((k + lanes - 1) % lanes, (k + 1) % lanes);
+        let (low, high) = (values[k] - values[before], values[after] - values[k]);
+        // Of equal neighbours the first counts.
+        let maximum = low > 0.0 && high <= 0.0;
+        if !maximum && !(low < 0.0 && high >= 0.0) {
+            continue;
+        }
+        let back = if k == 0 { places[before] - 1.0 } else { places[before] };
+        let on = if after == 0 { 1.0 } else { places[after] };
+        let (time, value) = refined([back, places[k], on], [values[before], values[k], values[after]], &at);
+        found.push(Extremum { time, value, maximum });
+    }
+    (found, size)
+}
+
+/// Place and value of the extremum between three places.
+fn refined(mut t: [f64; 3], mut v: [f64; 3], at: &dyn Fn(f64) -> f64) -> (f64, f64) {
+    let bounds = [t[0], t[2]];
+    let mut found = (t[1], v[1]);
+    for _ in 0..ROUNDS {
+        let (a, b) = ((v[1] - v[0]) / (t[1] - t[0]), (v[2] - v[1]) / (t[2] - t[1]));
+        let bend = (b - a) / (t[2] - t[0]);
+        let place = 0.5 * (t[0] + t[1]) - 0.5 * a / bend;
+        if !(place > bounds[0] && place < bounds[1]) {
+            break;
+        }
+        found = (place, at(place));
+        let step = (0.0625 * (t[2] - t[0])).min(place - bounds[0]).min(bounds[1] - place);
+        if step < 1e-9 {
+            break;
+        }
+        t = [place - step, place, place + step];
+        v = [at(t[0]), found.1, at(t[2])];
+    }
+    found
+}
+
+/// Words for what changes at a grazing, in the order of growing positions.
+pub fn described(field: &dyn VectorField, at: &Point) -> String {
+    let Solution::Cycle(cycle) = &at.solution else { return String::new() };
+    let nearest = (0..field.switch_count())
+        .filter_map(|switch| {
+            let (all, size) = extrema(field, &at.parameters, cycle, switch);
+            let own = all.iter().copied().min_by(|a, b| a.value.abs().total_cmp(&b.value.abs()))?;
+            Some((own.value.abs() / size.max(f64::MIN_POSITIVE), switch, own, excursions(&all)))
+        })
+        .min_by(|a, b| a.0.total_cmp(&b.0));
+    let Some((_, switch, own, count)) = nearest else { return String::new() };
+    // Excursions with the extremum below and above zero.
+    let above = count + i64::from(own.value <= 0.0) * if own.maximum { 1 } else { -1 };
+    let below = if own.maximum { above - 1 } else { above + 1 };
+    let rises = rises(field, at, cycle, switch, own.time);
+    let [before, after] = if rises { [below, above] } else { [above, below] };
+    let name = field.switch_name(switch);
+    match own.maximum {
+        true => format!("{name} touches 0 from below: {before} → {after} contacts"),
+        false => format!("{name} touches 0 from above: {before} → {after} contacts"),
+    }
+}
+
+/// True if the switch grows along the branch, at a time of the cycle.
+fn rises(field: &dyn VectorField, at: &Point, cycle: &Cycle, switch: usize, t: f64) -> bool {
+    let size = cycle.profile.len();
+    // A condition has unknowns before these.
+    let Some(extra) = at.tangent.len().checked_sub(size + 2) else { return true };
+    let along = Cycle { profile: at.tangent[extra..extra + size].to_vec(), gain: Vec::new(), ..cycle.clone() };
+    let (x, v) = (cycle.state(t), along.state(t));
+    let forced = f64::from(cycle.forcing_periods);
+    let time = (forced > 0.0).then_some(forced * t);
+    let largest = |of: &[f64]| of.iter().fold(f64::MIN_POSITIVE, |most: f64, v| most.max(v.abs()));
+    let step = 1e-6 * largest(&x) / largest(&v);
+    let moved = |by: f64| {
+        let y: Vec<f64> = x.iter().zip(&v).map(|(x, v)| x + by * v).collect();
+        value(field, &at.parameters, &y, time.as_slice(), switch)[0]
+    };
+    moved(step) > moved(-step)
+}
