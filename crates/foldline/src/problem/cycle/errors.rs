@@ -126,7 +126,8 @@ impl CycleProblem<'_> {
         self.errors(u);
         let switched = self.switched(u);
         if self.is_planar() && switched.is_empty() {
-            // The error of exp(∫ tr f_x), relative to the larger of 1 and its value, plus that of the trivial multiplier, if any.
+            // Error of exp(∫ tr f_x), relative to the larger of 1 and its value, plus that of the trivial multiplier,
+            // if any.
             let (own, off) = (self.trace.exp(), self.divergence_error(u));
             let trivial = spectrum[..spectrum.len() - 1].iter().fold(0.0, |most: f64, z| most.max((z - 1.0).norm()));
             return SPECTRUM_SAFE * (off.exp_m1() * own / own.max(1.0) + trivial) + floquet::ROUNDING;
