@@ -58,7 +58,7 @@ pub fn tape(u: &mut Unstructured) -> Result<Seen> {
         places.push(coordinate(u)?);
     }
     let (states, parameters) = places.split_at(STATES * LANES);
-    let own = Batch { lanes: LANES, states, parameters: Parameters::PerLane(parameters), times: &[] };
+    let own = Batch { lanes: LANES, states, parameters: Parameters::PerLane(parameters), times: &[], signs: &[] };
     let free: Vec<usize> = (0..PARAMETERS).collect();
     let mut f = vec![0.0; STATES * LANES];
     let mut again = f.clone();
@@ -72,8 +72,13 @@ pub fn tape(u: &mut Unstructured) -> Result<Seen> {
     for lane in 0..LANES {
         let at = |list: &[f64], i: usize| list[i * LANES + lane];
         let place: Vec<f64> = (0..leaves).map(|i| at(&places, i)).collect();
-        let one =
-            Batch { lanes: 1, states: &place[..STATES], parameters: Parameters::Shared(&place[STATES..]), times: &[] };
+        let one = Batch {
+            lanes: 1,
+            states: &place[..STATES],
+            parameters: Parameters::Shared(&place[STATES..]),
+            times: &[],
+            signs: &[],
+        };
         let mut alone = vec![0.0; STATES];
         model.evaluate(one, &mut alone);
         for component in 0..STATES {

@@ -41,7 +41,7 @@ pub fn model(text: &str) -> bool {
     let states: Vec<f64> = model.ranges().iter().map(|[low, high]| 0.3 * low + 0.7 * high).collect();
     let parameters = model.defaults();
     let free: Vec<usize> = (0..q).collect();
-    let at = Batch { lanes: 1, states: &states, parameters: Parameters::Shared(&parameters), times: &[] };
+    let at = Batch { lanes: 1, states: &states, parameters: Parameters::Shared(&parameters), times: &[], signs: &[] };
     let (mut f, mut fx, mut fp) = (vec![0.0; n], vec![0.0; n * n], vec![0.0; n * q]);
     model.linearise(at, &free, &mut f, &mut fx, &mut fp);
     let mut outputs = vec![0.0; model.output_count()];
@@ -122,7 +122,7 @@ pub fn expression(text: &str) {
     };
     match Model::compile(source) {
         Ok(model) => {
-            let at = Batch { lanes: 1, states: &[0.7], parameters: Parameters::Shared(&[0.5]), times: &[] };
+            let at = Batch { lanes: 1, states: &[0.7], parameters: Parameters::Shared(&[0.5]), times: &[], signs: &[] };
             let (mut f, mut fx, mut fp) = ([0.0], [0.0], [0.0]);
             model.linearise(at, &[0], &mut f, &mut fx, &mut fp);
         }

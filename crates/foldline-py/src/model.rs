@@ -173,6 +173,9 @@ fn batched(
     let lanes = states.len() / n.max(1);
     let by_component: Vec<f64> = (0..n * lanes).map(|k| states[(k % lanes) * n + k / lanes]).collect();
     let mut out = vec![0.0; m * lanes];
-    evaluate(Batch { lanes, states: &by_component, parameters: Parameters::Shared(parameters), times }, &mut out);
+    evaluate(
+        Batch { lanes, states: &by_component, parameters: Parameters::Shared(parameters), times, signs: &[] },
+        &mut out,
+    );
     (0..m * lanes).map(|k| out[(k % m) * lanes + k / m]).collect()
 }

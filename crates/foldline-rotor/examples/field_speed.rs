@@ -26,7 +26,7 @@ fn nanoseconds(lanes: usize, mut run: impl FnMut()) -> f64 {
 /// Times of f, of f with its Jacobian in states and Ω, of outputs, and of a second derivative.
 fn speeds(field: &dyn VectorField, states: &[f64], parameters: &[f64]) -> [f64; 4] {
     let lanes = states.len() / 4;
-    let at = Batch { lanes, states, parameters: Parameters::Shared(parameters), times: &[] };
+    let at = Batch { lanes, states, parameters: Parameters::Shared(parameters), times: &[], signs: &[] };
     let (mut f, mut fx, mut fp) = (vec![0.0; 4 * lanes], vec![0.0; 16 * lanes], vec![0.0; 4 * lanes]);
     let direction: Vec<f64> = (0..13 * lanes).map(|i| if i < 4 * lanes { (i as f64).cos() } else { 0.0 }).collect();
     let mut r = vec![0.0; lanes];

@@ -115,7 +115,7 @@ impl ContactLaw {
     }
 
     /// Evaluates h for jets.
-    pub(crate) fn jet(self, r: &Jet, beta: &Jet, k: &Jet) -> Jet {
+    pub(crate) fn jet(self, r: &Jet, beta: &Jet, k: &Jet, touching: bool) -> Jet {
         let gap = r.plus(-1.0);
         let force = match self {
             ContactLaw::Tanh => (k * &gap).tanh().plus(1.0).times(0.5) * gap,
@@ -123,7 +123,7 @@ impl ContactLaw {
                 let twice = k.times(2.0);
                 (&twice * &gap).softplus() * twice.reciprocal()
             }
-            ContactLaw::Piecewise if gap.value() > 0.0 => gap,
+            ContactLaw::Piecewise if touching => gap,
             ContactLaw::Piecewise => gap.times(0.0),
         };
         &(force * r.reciprocal()) * beta

@@ -46,10 +46,14 @@ impl OverhungRotor {
 
     /// ∂fᵢ/∂xⱼ at one point.
     pub fn state_jacobian(&self, x: [f64; 4], p: &Nondimensional) -> [[f64; 4]; 4] {
+        self.jacobian_touching(x, p, x[0].hypot(x[1]) > 1.0)
+    }
+
+    fn jacobian_touching(&self, x: [f64; 4], p: &Nondimensional, touching: bool) -> [[f64; 4]; 4] {
         let [u, v, ..] = x;
         let r = u.hypot(v);
-        let s = self.stiffness(u, v, p, r > 1.0);
-        let contact = self.law.stiffness(r, p.beta, p.sharpness).by_radius;
+        let s = self.stiffness(u, v, p, touching);
+        let contact = self.law.stiffness_touching(r, p.beta, p.sharpness, touching).by_radius;
         // (∂s/∂r)/r, so that ∂s/∂u = curl u and ∂s/∂v = curl v.
         let curl = 2.0 * (1.0 - p.kappa) * p.gamma + if r > 0.0 { p.kappa * contact / r } else { 0.0 };
         let gyroscopic = (2.0 - p.polar) * p.omega;
@@ -64,9 +68,13 @@ impl OverhungRotor {
 
     /// ∂f/∂p_k of the two accelerations at one point.
     pub fn parameter_slope(&self, x: [f64; 4], p: &Nondimensional, k: usize) -> [f64; 2] {
+        self.slope_touching(x, p, k, x[0] * x[0] + x[1] * x[1] > 1.0)
+    }
+
+    fn slope_touching(&self, x: [f64; 4], p: &Nondimensional, k: usize, touching: bool) -> [f64; 2] {
         let [u, v, du, dv] = x;
         let square = u * u + v * v;
-        let contact = self.law.stiffness(square.sqrt(), p.beta, p.sharpness);
+        let contact = self.law.stiffness_touching(square.sqrt(), p.beta, p.sharpness, touching);
         let along = |slope: f64| [-slope * u, -slope * v];
         match k {
             0 => {
@@ -90,12 +98,12 @@ impl OverhungRotor {
     }
 
     /// Evaluates f for jets.
-    fn jets(&self, x: [Jet; 4], p: [Jet; 9]) -> [Jet; 4] {
+    fn jets(&self, x: [Jet; 4], p: [Jet; 9], touching: bool) -> [Jet; 4] {
         let [u, v, du, dv] = x;
         let [omega, kappa, zeta, epsilon, gamma, beta, sharpness, polar, mass] = p;
         let square = &u * &u + &v * &v;
         let contact = match square.value() > 0.0 {
-            true => self.law.jet(&square.sqrt(), &beta, &sharpness),
+            true => self.law.jet(&square.sqrt(), &beta, &sharpness, touching),
             false => square.times(0.0),
         };
         let speed = &omega * &omega;
@@ -120,6 +128,14 @@ fn lane(at: &Batch, l: usize) -> ([f64; 4], [f64; 9]) {
     (x, p)
 }
 
+/// True if the ring is touched at one lane: as the batch says, or as the state is.
+fn touching(at: &Batch, l: usize) -> bool {
+    match at.signs.get(l) {
+        Some(sign) => *sign > 0.0,
+        None => at.states[l] * at.states[l] + at.states[at.lanes + l] * at.states[at.lanes + l] > 1.0,
+    }
+}
+
 impl VectorField for OverhungRotor {
     fn dim(&self) -> usize {
         STATES
@@ -136,7 +152,7 @@ impl VectorField for OverhungRotor {
         }
         for l in 0..at.lanes {
             let (x, p) = lane(&at, l);
-            let value = self.field(x, &Nondimensional::from_parameters(p));
+            let value = self.field_touching(x, &Nondimensional::from_parameters(p), touching(&at, l));
             (0..STATES).for_each(|i| f[i * at.lanes + l] = value[i]);
         }
     }
@@ -147,12 +163,12 @@ impl VectorField for OverhungRotor {
         for l in 0..at.lanes {
             let (x, p) = lane(&at, l);
             let p = Nondimensional::from_parameters(p);
-            let jacobian = self.state_jacobian(x, &p);
+            let jacobian = self.jacobian_touching(x, &p, touching(&at, l));
             for i in 0..STATES {
                 (0..STATES).for_each(|j| fx[(i * STATES + j) * at.lanes + l] = jacobian[i][j]);
             }
             for (c, &k) in free.iter().enumerate() {
-                let slope = self.parameter_slope(x, &p, k);
+                let slope = self.slope_touching(x, &p, k, touching(&at, l));
                 fp[(2 * free.len() + c) * at.lanes + l] = slope[0];
                 fp[(3 * free.len() + c) * at.lanes + l] = slope[1];
             }
@@ -165,7 +181,7 @@ impl VectorField for OverhungRotor {
             let slopes = |component: usize| directions.iter().map(move |d| d[component * at.lanes + l]);
             let x = std::array::from_fn(|i| Jet::new(x[i], slopes(i)));
             let p = std::array::from_fn(|k| Jet::new(p[k], slopes(STATES + k)));
-            for (i, jet) in self.jets(x, p).iter().enumerate() {
+            for (i, jet) in self.jets(x, p, touching(&at, l)).iter().enumerate() {
                 out[i * at.lanes + l] = jet.highest();
             }
         }
@@ -193,12 +209,27 @@ impl VectorField for OverhungRotor {
         }
     }
 
-    fn evaluate_switched(&self, at: Batch, signs: &[f64], f: &mut [f64]) {
-        for l in 0..at.lanes {
-            let (x, p) = lane(&at, l);
-            let touching = signs.get(l).is_some_and(|sign| *sign > 0.0);
-            let value = self.field_touching(x, &Nondimensional::from_parameters(p), touching);
-            (0..STATES).for_each(|i| f[i * at.lanes + l] = value[i]);
+    fn linearise_switches(
+        &self,
+        at: Batch,
+        _free: &[usize],
+        h: &mut [f64],
+        hx: &mut [f64],
+        hp: &mut [f64],
+        ht: &mut [f64],
+    ) {
+        self.switches(at, h);
+        hx.fill(0.0);
+        hp.fill(0.0);
+        ht.fill(0.0);
+        for l in 0..at.lanes * self.switch_count() {
+            let ([u, v, ..], _) = lane(&at, l);
+            let r = (u * u + v * v).sqrt();
+            (hx[l], hx[at.lanes + l]) = (u / r, v / r);
         }
+    }
+
+    fn switch_name(&self, _switch: usize) -> String {
+        "r - 1".into()
     }
 }

@@ -123,7 +123,13 @@ mod tests {
                 let mut states = vec![0.0; 4 * lanes];
                 (0..4 * lanes).for_each(|k| states[k] = state(k % lanes)[k / lanes]);
                 let mut f = vec![0.0; 4 * lanes];
-                let at = Batch { lanes, states: &states, parameters: Parameters::Shared(&parameters), times: &[] };
+                let at = Batch {
+                    lanes,
+                    states: &states,
+                    parameters: Parameters::Shared(&parameters),
+                    times: &[],
+                    signs: &[],
+                };
                 rotor.evaluate(at, &mut f);
                 f
             };

@@ -72,7 +72,7 @@ fn text_and_hand_written_model_agree_in_values_and_derivatives() {
     let free: Vec<usize> = (0..9).collect();
     for kappa in [0.0, 0.4, 1.0] {
         let p = Nondimensional { kappa, zeta: 0.03, ..Nondimensional::REFERENCE }.parameters();
-        let at = Batch { lanes: LANES, states: &x, parameters: Parameters::Shared(&p), times: &[] };
+        let at = Batch { lanes: LANES, states: &x, parameters: Parameters::Shared(&p), times: &[], signs: &[] };
         let arrays = || (vec![0.0; 4 * LANES], vec![0.0; 16 * LANES], vec![0.0; 36 * LANES], vec![0.0; LANES]);
         let (mut f, mut fx, mut fp, mut r) = arrays();
         model.linearise(at, &free, &mut f, &mut fx, &mut fp);
@@ -108,7 +108,7 @@ fn contact_laws_as_text_agree_with_those_by_hand() {
         assert_eq!(model.defaults(), Nondimensional::REFERENCE.parameters(), "{law:?}");
         for (kappa, sharpness) in [(1.0, 150.0), (0.6, 2000.0)] {
             let p = Nondimensional { kappa, sharpness, ..Nondimensional::REFERENCE }.parameters();
-            let at = Batch { lanes: LANES, states: &x, parameters: Parameters::Shared(&p), times: &[] };
+            let at = Batch { lanes: LANES, states: &x, parameters: Parameters::Shared(&p), times: &[], signs: &[] };
             let arrays = || (vec![0.0; 4 * LANES], vec![0.0; 16 * LANES], vec![0.0; 36 * LANES]);
             let ((mut f, mut fx, mut fp), (mut f_native, mut fx_native, mut fp_native)) = (arrays(), arrays());
             model.linearise(at, &free, &mut f, &mut fx, &mut fp);
@@ -137,7 +137,7 @@ fn jacobian_and_jets_agree_for_every_law() {
     const LANES: usize = 53;
     let x = states(LANES);
     let p = Nondimensional { kappa: 0.7, ..Nondimensional::REFERENCE }.parameters();
-    let at = Batch { lanes: LANES, states: &x, parameters: Parameters::Shared(&p), times: &[] };
+    let at = Batch { lanes: LANES, states: &x, parameters: Parameters::Shared(&p), times: &[], signs: &[] };
     let free: Vec<usize> = (0..9).collect();
     for law in [ContactLaw::Tanh, ContactLaw::Softplus, ContactLaw::Piecewise] {
         let native = OverhungRotor { law };
@@ -183,11 +183,11 @@ fn the_si_model_is_equivalent_to_the_nondimensional_model() {
         let (p, q) = (constants.parameters(), Nondimensional::from(&constants).parameters());
         let (mut found, mut expected) = (vec![0.0; 4 * LANES], vec![0.0; 4 * LANES]);
         si.evaluate(
-            Batch { lanes: LANES, states: &dimensional, parameters: Parameters::Shared(&p), times: &[] },
+            Batch { lanes: LANES, states: &dimensional, parameters: Parameters::Shared(&p), times: &[], signs: &[] },
             &mut found,
         );
         nondimensional.evaluate(
-            Batch { lanes: LANES, states: &x, parameters: Parameters::Shared(&q), times: &[] },
+            Batch { lanes: LANES, states: &x, parameters: Parameters::Shared(&q), times: &[], signs: &[] },
             &mut expected,
         );
         let found: Vec<f64> = (0..4 * LANES).map(|i| found[i] / (units[i / LANES] * frequency)).collect();
@@ -211,7 +211,7 @@ fn values_and_derivatives_are_finite_at_the_centre() {
         for value in [0.0, 1.0] {
             p[kappa] = value;
             let free: Vec<usize> = (0..p.len()).collect();
-            let at = Batch { lanes: 1, states: &[0.0; 4], parameters: Parameters::Shared(&p), times: &[] };
+            let at = Batch { lanes: 1, states: &[0.0; 4], parameters: Parameters::Shared(&p), times: &[], signs: &[] };
             let (mut f, mut fx, mut fp) = ([0.0; 4], [0.0; 16], vec![0.0; 4 * p.len()]);
             model.linearise(at, &free, &mut f, &mut fx, &mut fp);
             assert!(f.iter().chain(&fx).chain(&fp).all(|x| x.is_finite()), "{name}: {f:?} {fx:?} {fp:?}");
@@ -238,7 +238,10 @@ fn the_synchronous_response_matches_its_closed_form() {
         let state = [forcing * stiffness / below, -forcing * circulatory / below, 0.0, 0.0];
         let mut f = [0.0; 4];
         let q = p.parameters();
-        model.evaluate(Batch { lanes: 1, states: &state, parameters: Parameters::Shared(&q), times: &[] }, &mut f);
+        model.evaluate(
+            Batch { lanes: 1, states: &state, parameters: Parameters::Shared(&q), times: &[], signs: &[] },
+            &mut f,
+        );
         assert!((state[0].hypot(state[1]) - r).abs() < 1e-5, "{r}: {state:?}");
         assert!(f.iter().all(|x| x.abs() < 1e-3), "{r}: {f:?}");
     }
@@ -252,7 +255,10 @@ fn known_cycles_return_to_their_start() {
     let (model, p) = (text("overhung-rotor.toml"), Nondimensional::REFERENCE.parameters());
     let field = |x: [f64; 4]| {
         let mut f = [0.0; 4];
-        model.evaluate(Batch { lanes: 1, states: &x, parameters: Parameters::Shared(&p), times: &[] }, &mut f);
+        model.evaluate(
+            Batch { lanes: 1, states: &x, parameters: Parameters::Shared(&p), times: &[], signs: &[] },
+            &mut f,
+        );
         f
     };
     let along = |x: [f64; 4], h: f64, k: [f64; 4]| std::array::from_fn(|i| x[i] + h * k[i]);

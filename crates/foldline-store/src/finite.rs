@@ -74,7 +74,10 @@ fn at_equation(model: &Model, component: usize, message: String, model_text: &st
 /// Returns the first component of f that is not finite at a state.
 fn not_finite(model: &Model, state: &[f64], parameters: &[f64]) -> Option<usize> {
     let mut f = vec![0.0; model.dim()];
-    model.evaluate(Batch { lanes: 1, states: state, parameters: Parameters::Shared(parameters), times: &[] }, &mut f);
+    model.evaluate(
+        Batch { lanes: 1, states: state, parameters: Parameters::Shared(parameters), times: &[], signs: &[] },
+        &mut f,
+    );
     f.iter().position(|v| !v.is_finite())
 }
 

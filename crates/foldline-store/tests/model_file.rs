@@ -36,7 +36,7 @@ fn every_published_model_compiles_and_is_finite() {
         // Both ends and the middle of the sampling ranges.
         for share in [0.0, 0.5, 1.0] {
             let x: Vec<f64> = model.ranges().iter().map(|[low, high]| low + share * (high - low)).collect();
-            let at = Batch { lanes: 1, states: &x, parameters: Parameters::Shared(&p), times: &[] };
+            let at = Batch { lanes: 1, states: &x, parameters: Parameters::Shared(&p), times: &[], signs: &[] };
             let (mut f, mut outputs) = (vec![0.0; model.dim()], vec![0.0; model.output_count()]);
             model.evaluate(at, &mut f);
             model.outputs(at, &mut outputs);
@@ -91,7 +91,10 @@ fn short_forms() {
     let model = parse_model(text, "some/folder/pendulum.toml").unwrap_or_else(|found| panic!("{}", found[0]));
     assert_eq!(model.name, "pendulum");
     let mut f = [0.0; 2];
-    model.evaluate(Batch { lanes: 1, states: &[1.0, 2.0], parameters: Parameters::Shared(&[]), times: &[] }, &mut f);
+    model.evaluate(
+        Batch { lanes: 1, states: &[1.0, 2.0], parameters: Parameters::Shared(&[]), times: &[], signs: &[] },
+        &mut f,
+    );
     assert_eq!(f, [2.0, -3.0]);
 
     let text = "[states.x]\nrange = [0, 1]\n[equations]\nx = -1\n";
@@ -174,7 +177,7 @@ fn the_first_model_of_the_book_is_right() {
     assert!(text.lines().count() <= 21, "twenty lines are promised");
     let model = parse_model(text, "first.toml").unwrap_or_else(|found| panic!("{}", found[0]));
     let (mut f, p) = ([0.0; 2], model.defaults());
-    let at = Batch { lanes: 1, states: &[0.5, 0.25], parameters: Parameters::Shared(&p), times: &[0.3] };
+    let at = Batch { lanes: 1, states: &[0.5, 0.25], parameters: Parameters::Shared(&p), times: &[0.3], signs: &[] };
     model.evaluate(at, &mut f);
     let period = std::f64::consts::TAU / 1.2;
     assert!(model.forced() && (model.time_unit(&p) - period).abs() < 1e-15);

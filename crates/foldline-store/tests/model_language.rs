@@ -18,7 +18,10 @@ fn field(model: &Model) -> Vec<f64> {
     let states: Vec<f64> = (0..n).map(|i| (1.3 * i as f64 + 0.4).sin()).collect();
     let p = model.defaults();
     let mut f = vec![0.0; n];
-    model.evaluate(Batch { lanes: 1, states: &states, parameters: Parameters::Shared(&p), times: &[0.3] }, &mut f);
+    model.evaluate(
+        Batch { lanes: 1, states: &states, parameters: Parameters::Shared(&p), times: &[0.3], signs: &[] },
+        &mut f,
+    );
     f
 }
 

@@ -26,6 +26,10 @@ pub struct Batch<'a> {
     pub parameters: Parameters<'a>,
     /// `[lanes]` for a forced field: the time of each point in forcing periods. Empty for an autonomous field.
     pub times: &'a [f64],
+    /// `[switch_count × lanes]`: ±1 selects the branch of f and of its derivatives, continued smoothly beyond the zeros of
+    /// the switching functions. Empty: the branch in force at each point. A branch that is undefined at a point, such
+    /// as a root whose argument is positive on one side only, is replaced by the one in force.
+    pub signs: &'a [f64],
 }
 
 /// A vector field x' = f(x, p), x ∈ ℝⁿ, p ∈ ℝᵏ, with exact derivatives, evaluated for a batch of points at once.
@@ -106,11 +110,18 @@ pub trait VectorField: Send + Sync {
     /// The switching functions: writes `[switch_count × lanes]`.
     fn switches(&self, _at: Batch, _out: &mut [f64]) {}
 
-    /// Evaluates the branch of f selected by the given signs of the switching functions (±1, `[switch_count × lanes]`),
-    /// continued smoothly beyond their zeros; writes `[n × lanes]`. Where that branch is undefined, such as a root
-    /// whose argument is positive on one side only, the actual value of f is used.
-    fn evaluate_switched(&self, at: Batch, _signs: &[f64], f: &mut [f64]) {
-        self.evaluate(at, f);
+    /// The switching functions h with their derivatives: `h` is `[switch_count × lanes]`; `hx` is `[switch_count·n × lanes]`
+    /// (entry ∂hₛ/∂xⱼ is component `s * n + j`), `hp` likewise with q = `free.len()`, and `ht` is `[switch_count × lanes]`,
+    /// the derivative in τ. A field with switches must override it.
+    fn linearise_switches(
+        &self,
+        _at: Batch,
+        _free: &[usize],
+        _h: &mut [f64],
+        _hx: &mut [f64],
+        _hp: &mut [f64],
+        _ht: &mut [f64],
+    ) {
     }
 }
 

@@ -312,12 +312,6 @@ impl VectorField for Rolled<'_> {
         let states = self.states(at);
         self.field.switches(Batch { states: &states, ..at }, out);
     }
-
-    fn evaluate_switched(&self, at: Batch, signs: &[f64], f: &mut [f64]) {
-        let states = self.states(at);
-        self.field.evaluate_switched(Batch { states: &states, ..at }, signs, &mut f[..self.n() * at.lanes]);
-        self.circles(at, f);
-    }
 }
 
 /// Returns the initial states of a survey, with circles in place of angles.

@@ -41,7 +41,8 @@ impl Context<'_> {
     /// Returns f `[n]` at a state.
     pub(super) fn slope(&self, state: &[f64]) -> Vec<f64> {
         let mut f = vec![0.0; state.len()];
-        let at = Batch { lanes: 1, states: state, parameters: Parameters::Shared(self.parameters), times: &[] };
+        let at =
+            Batch { lanes: 1, states: state, parameters: Parameters::Shared(self.parameters), times: &[], signs: &[] };
         self.field.evaluate(at, &mut f);
         f
     }

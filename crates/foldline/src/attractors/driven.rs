@@ -120,11 +120,6 @@ impl VectorField for Driven<'_> {
     fn switches(&self, at: Batch, out: &mut [f64]) {
         self.inner(at, |inner| self.0.switches(inner, out));
     }
-
-    fn evaluate_switched(&self, at: Batch, signs: &[f64], f: &mut [f64]) {
-        self.inner(at, |inner| self.0.evaluate_switched(inner, signs, &mut f[..self.n() * at.lanes]));
-        self.circle(at, f);
-    }
 }
 
 /// Samples the attractors of a forced field; see [`super::survey_until`].

@@ -66,7 +66,7 @@ fn cycle(trial: &Trial, parameters: &[f64], settled: &Settled, response: &mut Re
     let n = trial.field.dim();
     let start = &settled.state;
     let mut normal = vec![0.0; n];
-    let at = Batch { lanes: 1, states: start, parameters: Parameters::Shared(parameters), times: &[] };
+    let at = Batch { lanes: 1, states: start, parameters: Parameters::Shared(parameters), times: &[], signs: &[] };
     trial.field.evaluate(at, &mut normal);
     normal.iter_mut().zip(&settled.extent).for_each(|(f, e)| *f /= e * e);
     let side = |x: &[f64]| -> f64 { (0..n).map(|i| normal[i] * (x[i] - start[i])).sum() };
@@ -175,7 +175,7 @@ fn ranges(trial: &Trial, parameters: &[f64], states: &[f64]) -> Vec<[f64; 2]> {
     }
     let major: Vec<f64> = (0..n).flat_map(|i| (0..count).map(move |s| states[s * n + i])).collect();
     let mut outputs = vec![0.0; trial.field.output_count() * count];
-    let at = Batch { lanes: count, states: &major, parameters: Parameters::Shared(parameters), times: &[] };
+    let at = Batch { lanes: count, states: &major, parameters: Parameters::Shared(parameters), times: &[], signs: &[] };
     trial.field.outputs(at, &mut outputs);
     major.chunks_exact(count).chain(outputs.chunks_exact(count)).map(extremes).collect()
 }

@@ -245,7 +245,8 @@ impl Runner {
         let Some(limit) = window.limit(trial.scales) else { return };
         let speed = |x: &[f64]| {
             let mut f = vec![0.0; x.len()];
-            let at = Batch { lanes: 1, states: x, parameters: Parameters::Shared(&self.parameters), times: &[] };
+            let at =
+                Batch { lanes: 1, states: x, parameters: Parameters::Shared(&self.parameters), times: &[], signs: &[] };
             trial.field.evaluate(at, &mut f);
             f.iter().zip(trial.scales).fold(0.0, |m: f64, (f, s)| m.max((f / s).abs()))
         };

@@ -138,7 +138,10 @@ impl<'a> Averaged<'a> {
         }
         let times = if turns.is_some() { (0..NODES).map(time).collect() } else { Vec::new() };
         let parameters_of = Parameters::Shared(parameters);
-        field.evaluate(Batch { lanes: NODES, states: &states, parameters: parameters_of, times: &times }, &mut flow);
+        field.evaluate(
+            Batch { lanes: NODES, states: &states, parameters: parameters_of, times: &times, signs: &[] },
+            &mut flow,
+        );
         let carrier = |order: u32| {
             let angle = |node: usize| TAU * f64::from(order) * node as f64 / NODES as f64;
             (0..NODES).map(|node| Complex64::cis(angle(node))).collect::<Vec<_>>()
@@ -220,7 +223,7 @@ impl<'a> Averaged<'a> {
     }
 
     fn batch<'b>(&'b self, states: &'b [f64]) -> Batch<'b> {
-        Batch { lanes: NODES, states, parameters: Parameters::Shared(self.parameters), times: &self.times }
+        Batch { lanes: NODES, states, parameters: Parameters::Shared(self.parameters), times: &self.times, signs: &[] }
     }
 
     /// Returns y at the nodes.

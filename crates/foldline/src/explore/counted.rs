@@ -78,8 +78,15 @@ impl VectorField for Counted<'_> {
         self.field.switches(at, out);
     }
 
-    fn evaluate_switched(&self, at: Batch, signs: &[f64], f: &mut [f64]) {
-        self.evaluations.fetch_add(at.lanes, Ordering::Relaxed);
-        self.field.evaluate_switched(at, signs, f);
+    fn linearise_switches(
+        &self,
+        at: Batch,
+        free: &[usize],
+        h: &mut [f64],
+        hx: &mut [f64],
+        hp: &mut [f64],
+        ht: &mut [f64],
+    ) {
+        self.field.linearise_switches(at, free, h, hx, hp, ht);
     }
 }

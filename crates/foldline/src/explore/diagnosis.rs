@@ -91,7 +91,7 @@ fn angles(system: &System, parameters: &[f64]) -> Vec<String> {
     let n = system.field.dim();
     let f = |x: &[f64], time: f64| -> Vec<f64> {
         let mut f = vec![0.0; n];
-        let at = Batch { lanes: 1, states: x, parameters: Parameters::Shared(parameters), times: &[time] };
+        let at = Batch { lanes: 1, states: x, parameters: Parameters::Shared(parameters), times: &[time], signs: &[] };
         let at = if system.field.forced() { at } else { Batch { times: &[], ..at } };
         system.field.evaluate(at, &mut f);
         f
@@ -180,7 +180,7 @@ fn of_slow_decay(system: &System, parameters: &[f64], state: Option<&[f64]>) -> 
     let central = next_to_origin(system);
     let state = state.unwrap_or(&central);
     let (mut f, mut fx) = (vec![0.0; n], vec![0.0; n * n]);
-    let at = Batch { lanes: 1, states: state, parameters: Parameters::Shared(parameters), times: &[0.0] };
+    let at = Batch { lanes: 1, states: state, parameters: Parameters::Shared(parameters), times: &[0.0], signs: &[] };
     system.field.linearise(at, &[], &mut f, &mut fx, &mut []);
     let rates = crate::stability::eigenvalues(&fx, n, &system.scales);
     let slowest = rates.iter().fold(f64::NEG_INFINITY, |m: f64, z| m.max(z.re));
@@ -213,9 +213,10 @@ pub(super) fn next_to_origin(system: &System) -> Vec<f64> {
 /// True if f vanishes at a state.
 fn is_equilibrium(system: &System, parameters: &[f64], state: &[f64]) -> bool {
     let mut f = vec![0.0; state.len()];
-    system
-        .field
-        .evaluate(Batch { lanes: 1, states: state, parameters: Parameters::Shared(parameters), times: &[] }, &mut f);
+    system.field.evaluate(
+        Batch { lanes: 1, states: state, parameters: Parameters::Shared(parameters), times: &[], signs: &[] },
+        &mut f,
+    );
     f.iter().zip(&system.scales).all(|(v, scale)| v.abs() <= ROUNDING * scale)
 }
 

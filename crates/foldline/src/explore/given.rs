@@ -32,7 +32,7 @@ fn at_rest(field: &dyn VectorField, parameters: &[f64], state: &[f64]) -> Vec<[f
     let (n, k) = (state.len(), parameters.len());
     let free: Vec<usize> = (0..k).collect();
     let (mut f, mut fx, mut fp) = (vec![0.0; n], vec![0.0; n * n], vec![0.0; n * k]);
-    let at = Batch { lanes: 1, states: state, parameters: Parameters::Shared(parameters), times: &[] };
+    let at = Batch { lanes: 1, states: state, parameters: Parameters::Shared(parameters), times: &[], signs: &[] };
     field.linearise(at, &free, &mut f, &mut fx, &mut fp);
     let size = |i: usize| {
         let of_states: f64 = (0..n).map(|j| (fx[i * n + j] * state[j]).abs()).sum();
@@ -49,7 +49,8 @@ fn along(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle) -> Vec<[f64
     for (ends, nodes) in cycle.mesh.windows(2).zip(cycle.profile.chunks_exact((m + 1) * n)) {
         let duration = (ends[1] - ends[0]) * cycle.period;
         for (state, row) in nodes.chunks_exact(n).skip(1).zip(scheme.derivative.chunks_exact(m + 1)) {
-            let at = Batch { lanes: 1, states: state, parameters: Parameters::Shared(parameters), times: &[] };
+            let at =
+                Batch { lanes: 1, states: state, parameters: Parameters::Shared(parameters), times: &[], signs: &[] };
             field.evaluate(at, &mut f);
             for (i, [off, size]) in sizes.iter_mut().enumerate() {
                 let slope: f64 = row.iter().zip(nodes.iter().skip(i).step_by(n)).map(|(d, x)| d * x).sum();

@@ -203,7 +203,13 @@ impl Resonances<'_> {
             let (state, times) =
                 (state(&point.solution, time), if system.field.forced() { vec![time] } else { vec![] });
             let (mut f, mut fx) = (vec![0.0; n], vec![0.0; n * n]);
-            let at = Batch { lanes: 1, states: &state, parameters: Parameters::Shared(&parameters), times: &times };
+            let at = Batch {
+                lanes: 1,
+                states: &state,
+                parameters: Parameters::Shared(&parameters),
+                times: &times,
+                signs: &[],
+            };
             system.field.linearise(at, &[], &mut f, &mut fx, &mut []);
             jacobian.iter_mut().zip(&fx).for_each(|(mean, own)| *mean += own / places as f64);
         }

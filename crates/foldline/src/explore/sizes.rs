@@ -132,7 +132,7 @@ fn largest(model: &Model, start: &[f64], parameters: &[f64], aside: bool) -> Opt
     let slope = |x: &[f64]| {
         let mut f = vec![0.0; n + 1];
         let parameters = Parameters::Shared(parameters);
-        field.evaluate(Batch { lanes: 1, states: x, parameters, times: &[] }, &mut f);
+        field.evaluate(Batch { lanes: 1, states: x, parameters, times: &[], signs: &[] }, &mut f);
         f
     };
     let beside = |(i, x): (usize, &f64)| if aside && *x == 0.0 { ASIDE * (1.0 + 0.1 * i as f64) } else { *x };

@@ -72,7 +72,7 @@ pub(super) fn is_rotating_wave(system: &System, pairs: &[[usize; 2]], at: &Point
     let mut sums = [0.0; 3];
     for x in cycle.profile.chunks_exact(n) {
         let (mut f, mut turned) = (vec![0.0; n], vec![0.0; n]);
-        system.field.evaluate(Batch { lanes: 1, states: x, parameters, times: &[] }, &mut f);
+        system.field.evaluate(Batch { lanes: 1, states: x, parameters, times: &[], signs: &[] }, &mut f);
         pairs.iter().for_each(|&[i, j]| (turned[i], turned[j]) = (-x[j], x[i]));
         for ((f, t), scale) in f.iter().zip(&turned).zip(&system.scales) {
             let (f, t) = (f / scale, t / scale);
@@ -152,7 +152,8 @@ fn places(system: &System, parameters: &[f64], count: usize) -> Vec<Place> {
         let state: Vec<f64> = system.ranges.iter().enumerate().map(|(i, [a, b])| a + share(i) * (b - a)).collect();
         let times = if system.field.forced() { vec![share(n)] } else { Vec::new() };
         let (mut f, mut fx) = (vec![0.0; n], vec![0.0; n * n]);
-        let batch = Batch { lanes: 1, states: &state, parameters: Parameters::Shared(parameters), times: &times };
+        let batch =
+            Batch { lanes: 1, states: &state, parameters: Parameters::Shared(parameters), times: &times, signs: &[] };
         system.field.linearise(batch, &[], &mut f, &mut fx, &mut []);
         let finite = f.iter().chain(&fx).all(|value| value.is_finite());
         finite.then_some(Place { state, f, fx })

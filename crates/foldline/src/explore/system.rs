@@ -211,7 +211,7 @@ impl<'a> System<'a> {
         let value = |x: &[f64], time: f64| {
             let (times, mut f) = ([time], vec![0.0; n]);
             let (parameters, times) = (Parameters::Shared(parameters), if forced { &times[..] } else { &[] });
-            self.field.evaluate(Batch { lanes: 1, states: x, parameters, times }, &mut f);
+            self.field.evaluate(Batch { lanes: 1, states: x, parameters, times, signs: &[] }, &mut f);
             f
         };
         let equivariant = |reflection: &[bool], later: f64| {

@@ -19,7 +19,10 @@ pub(super) fn no_angle(model: &Model, items: &[usize]) -> Option<ModelError> {
     let f = |x: &[f64], parameters: &[f64], time: &[f64]| -> Vec<f64> {
         let mut f = vec![0.0; n];
         let times = if model.forced() { time } else { &[] };
-        model.evaluate(Batch { lanes: 1, states: x, parameters: Parameters::Shared(parameters), times }, &mut f);
+        model.evaluate(
+            Batch { lanes: 1, states: x, parameters: Parameters::Shared(parameters), times, signs: &[] },
+            &mut f,
+        );
         f
     };
     let ranges = model.ranges();

@@ -24,7 +24,7 @@ pub fn unrepeated(
     }
     let at = |time: f64, states: &[f64]| {
         let (mut f, mut g) = (vec![0.0; n], vec![0.0; outputs]);
-        let batch = Batch { lanes: 1, states, parameters: Parameters::Shared(parameters), times: &[time] };
+        let batch = Batch { lanes: 1, states, parameters: Parameters::Shared(parameters), times: &[time], signs: &[] };
         field.evaluate(batch, &mut f);
         field.outputs(batch, &mut g);
         // Convert to rates per unit of time.

@@ -144,7 +144,7 @@ impl Places<'_> {
 
     fn rate_at(&self, x: &[f64], parameters: &[f64], times: &[f64]) -> Option<Vec<f64>> {
         let mut f = vec![0.0; x.len()];
-        let at = Batch { lanes: 1, states: x, parameters: Parameters::Shared(parameters), times };
+        let at = Batch { lanes: 1, states: x, parameters: Parameters::Shared(parameters), times, signs: &[] };
         self.field.evaluate(at, &mut f);
         f.iter().all(|value| value.is_finite()).then_some(f)
     }
@@ -153,7 +153,7 @@ impl Places<'_> {
         let [x, parameters, times] = self.at(k);
         let (n, mut f) = (x.len(), vec![0.0; x.len()]);
         let mut fx = vec![0.0; n * n];
-        let at = Batch { lanes: 1, states: &x, parameters: Parameters::Shared(&parameters), times: &times };
+        let at = Batch { lanes: 1, states: &x, parameters: Parameters::Shared(&parameters), times: &times, signs: &[] };
         self.field.linearise(at, &[], &mut f, &mut fx, &mut []);
         fx.iter().all(|value| value.is_finite()).then_some(fx)
     }

@@ -121,8 +121,11 @@ struct Inner {
     periods: Vec<f64>,
     outputs: Tape,
     switches: Switches,
-    linear: RwLock<HashMap<Vec<usize>, Arc<Tape>>>,
-    directional: RwLock<HashMap<(usize, bool), Arc<Tape>>>,
+    /// f with given signs of the switches.
+    given: Tape,
+    linear: RwLock<HashMap<(Vec<usize>, bool), Arc<Tape>>>,
+    directional: RwLock<HashMap<(usize, bool, bool), Arc<Tape>>>,
+    switch_derivatives: RwLock<HashMap<Vec<usize>, Arc<Tape>>>,
 }
 
 impl Deref for Model {
@@ -149,12 +152,25 @@ impl Model {
         let outputs_of = output_list;
         let about =
             About { name, description, source, states, parameters, totals, outputs: outputs_of, whirl, time, remarks };
-        let (linear, directional) = (RwLock::default(), RwLock::default());
+        let (linear, directional, switch_derivatives) = (RwLock::default(), RwLock::default(), RwLock::default());
+        let (given_graph, given) = switches.given(0);
+        let given = Tape::new(&given_graph, &[&given]);
         let periods = match about.states.iter().any(|state| state.period.is_some()) {
             true => about.states.iter().map(|state| state.period.unwrap_or(f64::INFINITY)).collect(),
             false => Vec::new(),
         };
-        let inner = Inner { compiled, field, period, periods, outputs, switches, linear, directional };
+        let inner = Inner {
+            compiled,
+            field,
+            period,
+            periods,
+            outputs,
+            switches,
+            given,
+            linear,
+            directional,
+            switch_derivatives,
+        };
         let model = Model { about: Arc::new(about), inner: Arc::new(inner) };
         match model.wrong_period().or_else(|| angles::no_angle(&model, &items)) {
             Some(error) => Err(vec![error]),
@@ -236,36 +252,48 @@ impl Model {
         self.states.iter().zip(self.scales()).map(|(state, scale)| state.range_at(scale)).collect()
     }
 
+    /// Graph and nodes of f: the branch in force, or that of given signs, which are components of the direction with the
+    /// given number.
+    fn branch(&self, given: bool, direction: u32) -> (graph::Graph, Vec<graph::Id>) {
+        let Compiled { graph, field, .. } = &self.inner.compiled;
+        if given { self.inner.switches.given(direction) } else { (graph.clone(), field.clone()) }
+    }
+
     /// f, then fx row by row, then fp row by row, as [`VectorField::linearise`] orders them.
-    fn linear_tape(&self, free: &[usize]) -> Arc<Tape> {
-        let cached = self.inner.linear.read().unwrap_or_else(PoisonError::into_inner).get(free).cloned();
-        cached.unwrap_or_else(|| {
-            let Compiled { graph, field, .. } = &self.inner.compiled;
-            let mut graph = graph.clone();
-            let states = (0..self.states.len()).map(|j| Leaf::State(j as u32));
-            let parameters = free.iter().map(|&k| Leaf::Parameter(k as u32));
-            let mut column =
-                |moving: Leaf| graph.derivative(field, |graph, leaf| (leaf == moving).then(|| graph.constant(1.0)));
-            let fx: Vec<Vec<graph::Id>> = states.map(&mut column).collect();
-            let fp: Vec<Vec<graph::Id>> = parameters.map(&mut column).collect();
-            let rows = |columns: &[Vec<graph::Id>]| -> Vec<graph::Id> {
-                (0..field.len()).flat_map(|i| columns.iter().map(move |column| column[i])).collect()
-            };
-            let tape = Arc::new(Tape::new(&graph, &[field, &rows(&fx), &rows(&fp)]));
-            let mut cache = self.inner.linear.write().unwrap_or_else(PoisonError::into_inner);
-            cache.entry(free.to_vec()).or_insert(tape).clone()
+    fn linear_tape(&self, free: &[usize], given: bool) -> Arc<Tape> {
+        cached(&self.inner.linear, (free.to_vec(), given), || {
+            let (mut graph, field) = self.branch(given, 0);
+            let moving = self.leaves(free);
+            let columns: Vec<Vec<graph::Id>> = moving.map(|leaf| column(&mut graph, &field, leaf)).collect();
+            let (fx, fp) = columns.split_at(self.states.len());
+            Tape::new(&graph, &[&field, &rows(fx, field.len()), &rows(fp, field.len())])
         })
     }
 
-    /// Multilinear derivative of the given order; without parameter parts if those of all directions are zero.
-    fn directional_tape(&self, order: usize, with_parameters: bool) -> Arc<Tape> {
-        let key = (order, with_parameters);
-        let cached = self.inner.directional.read().unwrap_or_else(PoisonError::into_inner).get(&key).cloned();
-        cached.unwrap_or_else(|| {
-            let Compiled { graph, field, .. } = &self.inner.compiled;
+    /// The switches and their derivatives, as [`VectorField::linearise_switches`] orders them.
+    fn switch_tape(&self, free: &[usize]) -> Arc<Tape> {
+        cached(&self.inner.switch_derivatives, free.to_vec(), || {
+            let Switches { graph, switches, count, .. } = &self.inner.switches;
             let mut graph = graph.clone();
+            let moving = self.leaves(free);
+            let columns: Vec<Vec<graph::Id>> = moving.map(|leaf| column(&mut graph, switches, leaf)).collect();
+            let in_time = column(&mut graph, switches, Leaf::Time);
+            let (hx, hp) = columns.split_at(self.states.len());
+            Tape::new(&graph, &[switches, &rows(hx, *count), &rows(hp, *count), &in_time])
+        })
+    }
+
+    /// The states, then some parameters.
+    fn leaves(&self, free: &[usize]) -> impl Iterator<Item = Leaf> {
+        let states = (0..self.states.len()).map(|j| Leaf::State(j as u32));
+        states.chain(free.iter().map(|&k| Leaf::Parameter(k as u32)))
+    }
+
+    /// Multilinear derivative of the given order; without parameter parts if those of all directions are zero.
+    fn directional_tape(&self, order: usize, with_parameters: bool, given: bool) -> Arc<Tape> {
+        cached(&self.inner.directional, (order, with_parameters, given), || {
+            let (mut graph, mut derivative) = self.branch(given, order as u32);
             let states = self.states.len() as u32;
-            let mut derivative = field.clone();
             for d in 0..order as u32 {
                 derivative = graph.derivative(&derivative, |graph, leaf| match leaf {
                     Leaf::State(j) => Some(graph.leaf(Leaf::Direction(d, j))),
@@ -273,11 +301,43 @@ impl Model {
                     _ => None,
                 });
             }
-            let tape = Arc::new(Tape::new(&graph, &[&derivative]));
-            let mut cache = self.inner.directional.write().unwrap_or_else(PoisonError::into_inner);
-            cache.entry(key).or_insert(tape).clone()
+            Tape::new(&graph, &[&derivative])
         })
     }
+}
+
+/// Derivative of the roots in one leaf.
+fn column(graph: &mut graph::Graph, roots: &[graph::Id], moving: Leaf) -> Vec<graph::Id> {
+    graph.derivative(roots, |graph, leaf| (leaf == moving).then(|| graph.constant(1.0)))
+}
+
+/// Entries of columns, row by row.
+fn rows(columns: &[Vec<graph::Id>], count: usize) -> Vec<graph::Id> {
+    (0..count).flat_map(|i| columns.iter().map(move |column| column[i])).collect()
+}
+
+/// The tape of a key, built at its first use.
+fn cached<K: std::hash::Hash + Eq>(
+    known: &RwLock<HashMap<K, Arc<Tape>>>,
+    key: K,
+    build: impl FnOnce() -> Tape,
+) -> Arc<Tape> {
+    let found = known.read().unwrap_or_else(PoisonError::into_inner).get(&key).cloned();
+    found.unwrap_or_else(|| {
+        let tape = Arc::new(build());
+        known.write().unwrap_or_else(PoisonError::into_inner).entry(key).or_insert(tape).clone()
+    })
+}
+
+/// Replaces values that are not finite by those of the branch in force: a branch may be undefined beyond its switch, for
+/// example (x - d)^1.5 before contact at d.
+fn complete(values: &mut [f64], actual: impl FnOnce(&mut [f64])) {
+    if values.iter().all(|value| value.is_finite()) {
+        return;
+    }
+    let mut others = vec![0.0; values.len()];
+    actual(&mut others);
+    values.iter_mut().zip(others).filter(|(value, _)| !value.is_finite()).for_each(|(value, own)| *value = own);
 }
 
 impl VectorField for Model {
@@ -296,7 +356,8 @@ impl VectorField for Model {
     fn time_unit(&self, parameters: &[f64]) -> f64 {
         let mut unit = [1.0];
         if let Some(period) = &self.inner.period {
-            let at = Batch { lanes: 1, states: &[], parameters: Parameters::Shared(parameters), times: &[] };
+            let at =
+                Batch { lanes: 1, states: &[], parameters: Parameters::Shared(parameters), times: &[], signs: &[] };
             period.run(at, &[], &mut [&mut unit]);
         }
         unit[0]
@@ -307,17 +368,40 @@ impl VectorField for Model {
     }
 
     fn evaluate(&self, at: Batch, f: &mut [f64]) {
-        self.inner.field.run(at, &[], &mut [f]);
+        if at.signs.is_empty() {
+            return self.inner.field.run(at, &[], &mut [f]);
+        }
+        self.inner.given.run(at, &[at.signs], &mut [f]);
+        complete(f, |actual| self.inner.field.run(at, &[], &mut [actual]));
     }
 
     fn linearise(&self, at: Batch, free: &[usize], f: &mut [f64], fx: &mut [f64], fp: &mut [f64]) {
-        self.linear_tape(free).run(at, &[], &mut [f, fx, fp]);
+        if at.signs.is_empty() {
+            return self.linear_tape(free, false).run(at, &[], &mut [f, fx, fp]);
+        }
+        self.linear_tape(free, true).run(at, &[at.signs], &mut [&mut *f, &mut *fx, &mut *fp]);
+        let sizes = [f.len(), fx.len(), fp.len()];
+        let actual = || {
+            let [mut f, mut fx, mut fp] = sizes.map(|size| vec![0.0; size]);
+            self.linear_tape(free, false).run(at, &[], &mut [&mut f, &mut fx, &mut fp]);
+            [f, fx, fp]
+        };
+        for (k, values) in [f, fx, fp].into_iter().enumerate() {
+            complete(values, |to| to.copy_from_slice(&actual()[k]));
+        }
     }
 
     fn directional(&self, at: Batch, directions: &[&[f64]], out: &mut [f64]) {
         let states = self.dim() * at.lanes;
         let with_parameters = directions.iter().any(|d| d[states..].iter().any(|&x| x != 0.0));
-        self.directional_tape(directions.len(), with_parameters).run(at, directions, &mut [out]);
+        if at.signs.is_empty() {
+            return self.directional_tape(directions.len(), with_parameters, false).run(at, directions, &mut [out]);
+        }
+        let with_signs: Vec<&[f64]> = directions.iter().copied().chain([at.signs]).collect();
+        self.directional_tape(directions.len(), with_parameters, true).run(at, &with_signs, &mut [out]);
+        complete(out, |to| {
+            self.directional_tape(directions.len(), with_parameters, false).run(at, directions, &mut [to]);
+        });
     }
 
     fn output_count(&self) -> usize {
@@ -340,13 +424,15 @@ impl VectorField for Model {
         precise::evaluate(graph, field, states, parameters)
     }
 
-    fn evaluate_switched(&self, at: Batch, signs: &[f64], f: &mut [f64]) {
-        self.inner.switches.given.run(at, &[signs], &mut [f]);
-        // A branch may be undefined beyond its switch, for example (x - d)^1.5 before contact at d.
-        if f.iter().any(|value| !value.is_finite()) {
-            let mut actual = vec![0.0; f.len()];
-            self.evaluate(at, &mut actual);
-            f.iter_mut().zip(actual).filter(|(value, _)| !value.is_finite()).for_each(|(value, own)| *value = own);
-        }
+    fn linearise_switches(
+        &self,
+        at: Batch,
+        free: &[usize],
+        h: &mut [f64],
+        hx: &mut [f64],
+        hp: &mut [f64],
+        ht: &mut [f64],
+    ) {
+        self.switch_tape(free).run(at, &[], &mut [h, hx, hp, ht]);
     }
 }

@@ -305,8 +305,10 @@ mod tests {
             let model = model(formula);
             let x = 0.712_345_678_9;
             let mut f = [0.0];
-            model
-                .evaluate(Batch { lanes: 1, states: &[x], parameters: Parameters::Shared(&[0.3]), times: &[] }, &mut f);
+            model.evaluate(
+                Batch { lanes: 1, states: &[x], parameters: Parameters::Shared(&[0.3]), times: &[], signs: &[] },
+                &mut f,
+            );
             let precise = model.evaluate_precisely(&[[x, 0.0]], &[[0.3, 0.0]]).unwrap();
             assert!((precise[0][0] - f[0]).abs() < 1e-14 * (1.0 + f[0].abs()), "{formula}: {precise:?} {f:?}");
         }

@@ -166,7 +166,7 @@ mod tests {
         })
         .unwrap();
         let (mut f, mut fx) = ([0.0], [0.0]);
-        let at = Batch { lanes: 1, states: &[v], parameters: Parameters::Shared(&[0.5, 20.0]), times: &[] };
+        let at = Batch { lanes: 1, states: &[v], parameters: Parameters::Shared(&[0.5, 20.0]), times: &[], signs: &[] };
         model.linearise(at, &[], &mut f, &mut fx, &mut []);
         [f[0], fx[0]]
     }

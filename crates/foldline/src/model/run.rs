@@ -386,7 +386,7 @@ mod tests {
                 let all = vec![p; lanes];
                 let parameters = if own { Parameters::PerLane(&all) } else { Parameters::Shared(&all[..1]) };
                 let mut f = vec![f64::NAN; 3 * lanes];
-                model.evaluate(Batch { lanes, states: &states, parameters, times: &[] }, &mut f);
+                model.evaluate(Batch { lanes, states: &states, parameters, times: &[], signs: &[] }, &mut f);
                 for l in 0..lanes {
                     let [x, y, z] = [states[l], states[lanes + l], states[2 * lanes + l]];
                     let expected = [

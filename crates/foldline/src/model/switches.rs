@@ -26,8 +26,12 @@ pub(super) struct Switches {
     pub count: usize,
     /// Values of the switches.
     pub values: Tape,
-    /// Expressions with the signs of the switches given in the components of the first direction.
-    pub given: Tape,
+    /// Graph and nodes of the switches.
+    pub graph: Graph,
+    pub switches: Vec<Id>,
+    roots: Vec<Id>,
+    reached: Vec<bool>,
+    own: Vec<Option<(u32, bool)>>,
 }
 
 impl Switches {
@@ -64,8 +68,15 @@ impl Switches {
                 own[i] = Some((place as u32, reversed));
             }
         }
-        let given = with_given_signs(&mut graph, roots, &reached, &own);
-        Switches { count: switches.len(), values: Tape::new(&graph, &[&switches]), given: Tape::new(&graph, &[&given]) }
+        let values = Tape::new(&graph, &[&switches]);
+        Switches { count: switches.len(), values, graph, switches, roots: roots.to_vec(), reached, own }
+    }
+
+    /// The expressions with the signs of the switches in the components of direction `direction`, and their graph.
+    pub fn given(&self, direction: u32) -> (Graph, Vec<Id>) {
+        let mut graph = self.graph.clone();
+        let given = with_given_signs(&mut graph, &self.roots, &self.reached, &self.own, direction);
+        (graph, given)
     }
 }
 
@@ -90,7 +101,13 @@ fn changes_sign(graph: &Graph, id: Id) -> bool {
 }
 
 /// Roots rebuilt with every switch in `own` decided by its given sign.
-fn with_given_signs(graph: &mut Graph, roots: &[Id], reached: &[bool], own: &[Option<(u32, bool)>]) -> Vec<Id> {
+fn with_given_signs(
+    graph: &mut Graph,
+    roots: &[Id],
+    reached: &[bool],
+    own: &[Option<(u32, bool)>],
+    direction: u32,
+) -> Vec<Id> {
     let mut new: Vec<Id> = (0..reached.len()).map(|i| Id(i as u32)).collect();
     for i in (0..reached.len()).filter(|&i| reached[i]) {
         let at = |id: Id| new[id.at()];
@@ -98,7 +115,7 @@ fn with_given_signs(graph: &mut Graph, roots: &[Id], reached: &[bool], own: &[Op
         let rebuilt = match (node, own[i]) {
             (Node::Constant(_) | Node::Leaf(_), _) => Id(i as u32),
             (Node::Unary(op, a), Some((switch, _))) => {
-                let sign = graph.leaf(Leaf::Direction(0, switch));
+                let sign = graph.leaf(Leaf::Direction(direction, switch));
                 match op {
                     Unary::Abs => graph.multiply(sign, at(a)),
                     Unary::Heaviside => graph.unary(op, sign),
@@ -107,7 +124,7 @@ fn with_given_signs(graph: &mut Graph, roots: &[Id], reached: &[bool], own: &[Op
                 }
             }
             (Node::Binary(op, a, b), Some((switch, reversed))) => {
-                let (sign, zero) = (graph.leaf(Leaf::Direction(0, switch)), graph.constant(0.0));
+                let (sign, zero) = (graph.leaf(Leaf::Direction(direction, switch)), graph.constant(0.0));
                 let (low, high) = if reversed { (zero, sign) } else { (sign, zero) };
                 let first_is_less = graph.binary(Binary::Less, low, high);
                 match op {
@@ -181,16 +198,18 @@ mod tests {
         {
             let model = model(text);
             let states = [0.2, 1.5, 0.0, 0.0];
-            let at = Batch { lanes: 2, states: &states, parameters: Parameters::Shared(&[0.5]), times: &[] };
+            let at =
+                Batch { lanes: 2, states: &states, parameters: Parameters::Shared(&[0.5]), times: &[], signs: &[] };
             let mut f = [0.0; 4];
-            model.evaluate_switched(at, &[sign; 2], &mut f);
+            model.evaluate(Batch { signs: &[sign; 2], ..at }, &mut f);
             assert_eq!(f[..2], [beyond, inside], "{text}");
         }
         // An expression that is undefined on both sides stays undefined.
         let model = model("if(x > p, sqrt(x - 0.9), 0)");
-        let at = Batch { lanes: 1, states: &[0.7, 0.0], parameters: Parameters::Shared(&[0.5]), times: &[] };
+        let at =
+            Batch { lanes: 1, states: &[0.7, 0.0], parameters: Parameters::Shared(&[0.5]), times: &[], signs: &[] };
         let mut f = [0.0; 2];
-        model.evaluate_switched(at, &[-1.0], &mut f);
+        model.evaluate(Batch { signs: &[-1.0], ..at }, &mut f);
         assert!(f[0].is_nan());
     }
 
@@ -208,17 +227,17 @@ mod tests {
         for text in cases {
             let model = model(text);
             let value = |x: [f64; 2], signs: Option<&[f64]>| {
-                let at = Batch { lanes: 1, states: &x, parameters: Parameters::Shared(&[0.5]), times: &[] };
+                let at = Batch { lanes: 1, states: &x, parameters: Parameters::Shared(&[0.5]), times: &[], signs: &[] };
                 let mut f = [0.0; 2];
                 match signs {
                     None => model.evaluate(at, &mut f),
-                    Some(signs) => model.evaluate_switched(at, signs, &mut f),
+                    Some(signs) => model.evaluate(Batch { signs, ..at }, &mut f),
                 }
                 f[0]
             };
             for x in [[0.7, 0.2], [-0.3, 0.1], [-0.4, -0.9]] {
                 let mut switches = vec![0.0; model.switch_count()];
-                let at = Batch { lanes: 1, states: &x, parameters: Parameters::Shared(&[0.5]), times: &[] };
+                let at = Batch { lanes: 1, states: &x, parameters: Parameters::Shared(&[0.5]), times: &[], signs: &[] };
                 model.switches(at, &mut switches);
                 let actual: Vec<f64> = switches.iter().map(|s| s.signum()).collect();
                 assert_eq!(value(x, Some(&actual)), value(x, None), "{text} at {x:?}");

@@ -77,7 +77,10 @@ fn sums(whole: &Model, source: &ModelSource) -> Result<Vec<Vec<f64>>, Vec<ModelE
     let of = |x: &[f64], total: usize| {
         let mut out = vec![0.0; whole.outputs.len()];
         let times: &[f64] = if whole.forced() { &[0.3] } else { &[] };
-        whole.outputs(Batch { lanes: 1, states: x, parameters: Parameters::Shared(&parameters), times }, &mut out);
+        whole.outputs(
+            Batch { lanes: 1, states: x, parameters: Parameters::Shared(&parameters), times, signs: &[] },
+            &mut out,
+        );
         out[first + total]
     };
     let mut rows = Vec::new();
@@ -211,7 +214,10 @@ mod tests {
 
     fn rates(model: &Model, x: &[f64]) -> Vec<f64> {
         let (mut f, p) = (vec![0.0; x.len()], model.defaults());
-        model.evaluate(Batch { lanes: 1, states: x, parameters: Parameters::Shared(&p), times: &[] }, &mut f);
+        model.evaluate(
+            Batch { lanes: 1, states: x, parameters: Parameters::Shared(&p), times: &[], signs: &[] },
+            &mut f,
+        );
         f
     }
 

@@ -16,7 +16,10 @@ use crate::contract::{Batch, Parameters, VectorField};
 /// Averages at an equilibrium: value and square of every state and output.
 pub fn of_state(field: &dyn VectorField, parameters: &[f64], x: &[f64]) -> Vec<[f64; 2]> {
     let mut outputs = vec![0.0; field.output_count()];
-    field.outputs(Batch { lanes: 1, states: x, parameters: Parameters::Shared(parameters), times: &[] }, &mut outputs);
+    field.outputs(
+        Batch { lanes: 1, states: x, parameters: Parameters::Shared(parameters), times: &[], signs: &[] },
+        &mut outputs,
+    );
     x.iter().chain(&outputs).map(|&v| [v, v * v]).collect()
 }
 
@@ -46,7 +49,7 @@ pub fn of_profile(
             }
         }
     }
-    let batch = Batch { lanes, states, parameters: Parameters::Shared(parameters), times: &times };
+    let batch = Batch { lanes, states, parameters: Parameters::Shared(parameters), times: &times, signs: &[] };
     field.outputs(batch, outputs);
     let means = |line: &[f64]| {
         line.iter().zip(&weights).fold([0.0; 2], |[once, squared], (v, b)| [once + b * v, squared + b * (v * v)])

@@ -181,7 +181,7 @@ pub fn measure(
             panel::multiply(&sampling.slopes, own, count, defect);
         }
         let (places, f) = (sampling.times(mesh, forcing_periods), nodes);
-        field.evaluate(Batch { lanes, states, parameters, times: &places }, f);
+        field.evaluate(Batch { lanes, states, parameters, times: &places, signs: &[] }, f);
         let times: Vec<f64> = mesh.windows(2).map(|pair| (pair[1] - pair[0]) * period).collect();
         for (d, f) in defect.chunks_exact_mut(count).zip(f.chunks_exact(count)) {
             d.iter_mut().zip(f).zip(&times).for_each(|((d, f), ht)| *d -= ht * f);
@@ -194,7 +194,7 @@ pub fn measure(
                 within[(i * (m + 1) + g) * all + first..][..count].copy_from_slice(w);
             }
         }
-        field.evaluate(Batch { lanes, states, parameters, times: &places }, source);
+        field.evaluate(Batch { lanes, states, parameters, times: &places, signs: &[] }, source);
         for (own, f) in source.chunks_exact_mut(count).zip(f.chunks_exact(count)) {
             for ((g, f), ht) in own.iter_mut().zip(f).zip(&times) {
                 let change = ht * (*g - f);
@@ -413,6 +413,7 @@ fn exchanging(a: &[Eight], x: &mut [Eight], n: usize) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::diagram::Mesh;
 
     #[test]
     fn transitions_are_corrected_by_several_digits() {

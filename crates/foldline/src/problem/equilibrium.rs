@@ -63,7 +63,8 @@ impl<'a> EquilibriumProblem<'a> {
     fn linearise(&mut self, u: &[f64]) {
         let n = self.n();
         let parameters = self.setting.at(&u[self.first()..]);
-        let batch = Batch { lanes: 1, states: &u[..n], parameters: Parameters::Shared(&parameters), times: &[] };
+        let batch =
+            Batch { lanes: 1, states: &u[..n], parameters: Parameters::Shared(&parameters), times: &[], signs: &[] };
         self.setting.linearise(batch, &mut self.f, &mut self.fx, &mut self.fp);
     }
 }
@@ -92,7 +93,8 @@ impl ZeroProblem for EquilibriumProblem<'_> {
     fn residual(&mut self, u: &[f64], r: &mut [f64]) -> bool {
         let n = self.n();
         let parameters = self.setting.at(&u[self.first()..]);
-        let batch = Batch { lanes: 1, states: &u[..n], parameters: Parameters::Shared(&parameters), times: &[] };
+        let batch =
+            Batch { lanes: 1, states: &u[..n], parameters: Parameters::Shared(&parameters), times: &[], signs: &[] };
         self.setting.field.evaluate(batch, &mut r[..n]);
         if let Some(unfolding) = &self.unfolding {
             axpy(u[n], &unfolding.column, &mut r[..n]);

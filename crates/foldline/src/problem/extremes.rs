@@ -18,7 +18,10 @@ const ROUNDS: usize = 12;
 /// Ranges at an equilibrium: every range is a single value.
 pub fn of_state(field: &dyn VectorField, parameters: &[f64], x: &[f64]) -> Vec<[f64; 2]> {
     let mut outputs = vec![0.0; field.output_count()];
-    field.outputs(Batch { lanes: 1, states: x, parameters: Parameters::Shared(parameters), times: &[] }, &mut outputs);
+    field.outputs(
+        Batch { lanes: 1, states: x, parameters: Parameters::Shared(parameters), times: &[], signs: &[] },
+        &mut outputs,
+    );
     x.iter().chain(&outputs).map(|&v| [v, v]).collect()
 }
 
@@ -134,7 +137,8 @@ impl Orbit<'_> {
         let n = self.field.dim();
         let lanes = states.len() / n;
         let mut outputs = vec![0.0; self.field.output_count() * lanes];
-        let batch = Batch { lanes, states: &states, parameters: Parameters::Shared(self.parameters), times };
+        let batch =
+            Batch { lanes, states: &states, parameters: Parameters::Shared(self.parameters), times, signs: &[] };
         self.field.outputs(batch, &mut outputs);
         let mut values = states;
         values.append(&mut outputs);

@@ -61,8 +61,6 @@ pub(crate) struct Part {
     pub nodes: Vec<f64>,
     /// `[m + 1][n × (n + 1 + k)]`: derivatives in the left end of the interval and in T, λ₁ … λ_k.
     pub by: Vec<f64>,
-    /// The switch that changes sign at the right end.
-    pub switch: Option<usize>,
     /// ∫ tr f_x dt, with the logarithm of the determinant of (4).
     trace: f64,
 }
@@ -121,7 +119,10 @@ impl<'a> PiecewiseFlow<'a> {
     fn switches(&self, states: &[f64], times: &[f64]) -> Vec<f64> {
         let (field, lanes) = (self.setting.field, states.len() / self.n());
         let mut values = vec![0.0; field.switch_count() * lanes];
-        field.switches(Batch { lanes, states, parameters: Parameters::Shared(&self.parameters), times }, &mut values);
+        field.switches(
+            Batch { lanes, states, parameters: Parameters::Shared(&self.parameters), times, signs: &[] },
+            &mut values,
+        );
         values
     }
 
@@ -182,7 +183,7 @@ impl<'a> PiecewiseFlow<'a> {
             let trial = Trial { nodes: &nodes, ends: [begin, ends[1]], signs: &signs, passed };
             let (at, switch) = match self.first(&trial, sizes) {
                 Met::Nothing => {
-                    self.close(&mut found, [begin, ends[1]], nodes, None)?;
+                    self.close(&mut found, [begin, ends[1]], nodes, &signs)?;
                     return Some(found);
                 }
                 Met::Back => {
@@ -203,7 +204,7 @@ impl<'a> PiecewiseFlow<'a> {
             let part = self.until(&found.end, begin, ends[1], at, switch, &signs, &nodes)?;
             let (end, nodes) = part;
             if end - begin > f64::EPSILON * length {
-                self.close(&mut found, [begin, end], nodes, Some(switch))?;
+                self.close(&mut found, [begin, end], nodes, &signs)?;
                 if !self.pass(&mut found, end, &signs, switch)? {
                     return None;
                 }
@@ -294,17 +295,15 @@ impl<'a> PiecewiseFlow<'a> {
         let (n, m, field) = (self.n(), self.scheme.degree, self.setting.field);
         let (length, times) = self.course(ends);
         let signs: Vec<f64> = signs.iter().flat_map(|sign| std::iter::repeat_n(*sign, m)).collect();
-        let [mut f, mut other] = [(); 2].map(|()| vec![0.0; n * m]);
-        let mut fx = vec![0.0; n * n * m];
+        let [mut f, mut fx] = [n, n * n].map(|size| vec![0.0; size * m]);
         let mut pivots = vec![0; n * m];
         let scale = |c: usize| self.setting.scales[c].max(x[c].abs());
         let mut before = f64::INFINITY;
         for _ in 0..ROUNDS {
             let states = self.lanes(&inner);
             let parameters = Parameters::Shared(&self.parameters);
-            let batch = Batch { lanes: m, states: &states, parameters, times: &times };
-            field.evaluate_switched(batch, &signs, &mut f);
-            field.linearise(batch, &[], &mut other, &mut fx, &mut []);
+            let batch = Batch { lanes: m, states: &states, parameters, times: &times, signs: &signs };
+            field.linearise(batch, &[], &mut f, &mut fx, &mut []);
             let mut matrix = self.matrix(length, &fx);
             let mut change = vec![0.0; n * m];
             for (i, row) in change.chunks_exact_mut(n).enumerate() {
@@ -330,13 +329,14 @@ impl<'a> PiecewiseFlow<'a> {
     }
 
     /// Appends a part with its derivatives (3), and moves the end there.
-    fn close(&self, found: &mut Switched, ends: [f64; 2], nodes: Vec<f64>, switch: Option<usize>) -> Option<()> {
+    fn close(&self, found: &mut Switched, ends: [f64; 2], nodes: Vec<f64>, signs: &[f64]) -> Option<()> {
         let (n, m, width, k) = (self.n(), self.scheme.degree, self.width(), self.scalars.len() - 1);
         let (length, times) = self.course(ends);
         let states = self.lanes(&nodes[n..]);
         let [mut f, mut fx, mut fp] = [n, n * n, n * k].map(|size| vec![0.0; size * m]);
+        let signs: Vec<f64> = signs.iter().flat_map(|sign| std::iter::repeat_n(*sign, m)).collect();
         let parameters = Parameters::Shared(&self.parameters);
-        let batch = Batch { lanes: m, states: &states, parameters, times: &times };
+        let batch = Batch { lanes: m, states: &states, parameters, times: &times, signs: &signs };
         self.setting.linearise(batch, &mut f, &mut fx, &mut fp);
         let mut inner = vec![0.0; m * n * width];
         for i in 0..m {
@@ -367,7 +367,7 @@ impl<'a> PiecewiseFlow<'a> {
         found.end_by = combined(&by, n * width);
         let trace: f64 =
             (0..n).map(|c| dot(&self.scheme.weights, &fx[(c * n + c) * m..(c * n + c + 1) * m])).sum::<f64>() * length;
-        found.parts.push(Part { ends, nodes, by, switch, trace });
+        found.parts.push(Part { ends, nodes, by, trace });
         found.end.iter().chain(&found.end_by).all(|x| x.is_finite()).then_some(())
     }
 
@@ -378,8 +378,8 @@ impl<'a> PiecewiseFlow<'a> {
         [(); 2].map(|()| {
             let mut f = vec![0.0; self.n()];
             let parameters = Parameters::Shared(&self.parameters);
-            let batch = Batch { lanes: 1, states: x, parameters, times: time.as_slice() };
-            self.setting.field.evaluate_switched(batch, &signs, &mut f);
+            let batch = Batch { lanes: 1, states: x, parameters, times: time.as_slice(), signs: &signs };
+            self.setting.field.evaluate(batch, &mut f);
             signs[switch] = -signs[switch];
             f
         })
@@ -406,37 +406,13 @@ impl<'a> PiecewiseFlow<'a> {
         if self.same(&before, &after) {
             return Some(true);
         }
-        let (n, width, scales) = (self.n(), self.width(), self.setting.scales);
-        let time = self.time(t);
-        let gradient: Vec<f64> = (0..n)
-            .map(|c| {
-                let step = STEP * scales[c].max(x[c].abs());
-                let moved = |by: f64| {
-                    let mut y = x.clone();
-                    y[c] += by;
-                    self.switches(&y, time.as_slice())[switch]
-                };
-                (moved(step) - moved(-step)) / (2.0 * step)
-            })
-            .collect();
-        let in_time = time.map_or(0.0, |time| {
-            let moved = |by: f64| self.switches(&x, &[time + by])[switch];
-            (moved(STEP) - moved(-STEP)) / (2.0 * STEP)
-        });
-        // In λ, of which only the parameters of the model depend.
-        let in_scalar: Vec<f64> = (1..self.scalars.len())
-            .map(|k| {
-                let step = STEP * self.scalars[k].abs().max(1.0);
-                let moved = |by: f64| {
-                    let mut scalars = self.scalars.clone();
-                    scalars[k] += by;
-                    let other = PiecewiseFlow::new(self.setting, self.scheme, &scalars, self.forcing_periods);
-                    other.switches(&x, time.as_slice())[switch]
-                };
-                (moved(step) - moved(-step)) / (2.0 * step)
-            })
-            .collect();
-        let [speed, speed_after] = [&before, &after].map(|f| dot(&gradient, f) + in_time);
+        let (n, width, time) = (self.n(), self.width(), self.time(t));
+        let parameters = Parameters::Shared(&self.parameters);
+        let batch = Batch { lanes: 1, states: &x, parameters, times: time.as_slice(), signs: &[] };
+        let [_, hx, hp, ht] = self.setting.linearise_switches(batch);
+        let (gradient, in_time, k) = (&hx[switch * n..(switch + 1) * n], ht[switch], width - n - 1);
+        let in_scalar = &hp[switch * k..(switch + 1) * k];
+        let [speed, speed_after] = [&before, &after].map(|f| dot(gradient, f) + in_time);
         if speed * speed_after <= 0.0 || !speed.is_finite() {
             return Some(false);
         }

@@ -115,8 +115,8 @@ impl Setting<'_> {
         all
     }
 
-    /// f, f_x and the derivatives with respect to the unknowns: `fp` is `[n·k × lanes]`, entry (i, axis) at i·k + axis.
-    pub fn linearise(&self, batch: Batch, f: &mut [f64], fx: &mut [f64], fp: &mut [f64]) {
+    /// True if every unknown is one parameter of the field, and the columns of all derivatives: axis, index of the parameter, factor.
+    fn columns(&self) -> (bool, Vec<(usize, usize, f64)>) {
         let known = self.parameters.len();
         let plain = self.axes.iter().all(|axis| axis.ties.is_empty() && axis.index < known);
         let mut columns: Vec<(usize, usize, f64)> = Vec::new();
@@ -125,6 +125,29 @@ impl Setting<'_> {
             let tied = axis.ties.iter().map(|tie| (a, tie.index, tie.slope * axis.scale));
             columns.extend(own.chain(tied).filter(|(_, index, _)| *index < known));
         }
+        (plain, columns)
+    }
+
+    /// The switches at one point and their derivatives with respect to the states, the unknowns λ and time: `h` and `ht` are
+    /// `[switches]`, `hx` is `[switches × n]`, `hp` is `[switches × k]`.
+    pub fn linearise_switches(&self, batch: Batch) -> [Vec<f64>; 4] {
+        let (count, n, k) = (self.field.switch_count(), self.field.dim(), self.axes.len());
+        let (_, columns) = self.columns();
+        let free: Vec<usize> = columns.iter().map(|(_, index, _)| *index).collect();
+        let [mut h, mut hx, mut each, mut ht] = [1, n, free.len(), 1].map(|size| vec![0.0; count * size]);
+        self.field.linearise_switches(batch, &free, &mut h, &mut hx, &mut each, &mut ht);
+        let mut hp = vec![0.0; count * k];
+        for s in 0..count {
+            for (c, (axis, _, slope)) in columns.iter().enumerate() {
+                hp[s * k + axis] += slope * each[s * free.len() + c];
+            }
+        }
+        [h, hx, hp, ht]
+    }
+
+    /// f, f_x and the derivatives with respect to the unknowns: `fp` is `[n·k × lanes]`, entry (i, axis) at i·k + axis.
+    pub fn linearise(&self, batch: Batch, f: &mut [f64], fx: &mut [f64], fp: &mut [f64]) {
+        let (plain, columns) = self.columns();
         let free: Vec<usize> = columns.iter().map(|(_, index, _)| *index).collect();
         if plain {
             self.field.linearise(batch, &free, f, fx, fp);

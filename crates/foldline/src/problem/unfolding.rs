@@ -47,7 +47,7 @@ impl Unfolding {
             None => (ROUNDS, [generic(1.3), generic(1.9)]),
         };
         let Some([q, p]) = (0..rounds).try_fold(begin, |[q, p], _| null_vectors(&scaled, &q, &p)) else { return };
-        let batch = Batch { lanes: 1, states: x, parameters: Parameters::Shared(parameters), times: &[] };
+        let batch = Batch { lanes: 1, states: x, parameters: Parameters::Shared(parameters), times: &[], signs: &[] };
         let along: Vec<f64> =
             q.iter().zip(scales).map(|(q, s)| q * s).chain(vec![0.0; setting.parameters.len()]).collect();
         // Rate of change of f_x q over the scales. For n = 1, f_x itself vanishes and nothing else is left.

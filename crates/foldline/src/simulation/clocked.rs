@@ -75,8 +75,4 @@ impl VectorField for Clocked<'_> {
     fn switches(&self, at: Batch, out: &mut [f64]) {
         self.0.switches(self.inner(at), out);
     }
-
-    fn evaluate_switched(&self, at: Batch, signs: &[f64], f: &mut [f64]) {
-        self.with_clock(at, f, |inner, own| self.0.evaluate_switched(inner, signs, own));
-    }
 }

@@ -113,7 +113,13 @@ impl<'a> Implicit<'a> {
                 // The kink does not reduce the length of the next step.
                 self.stuck = if kink.theta < 1e-8 { self.stuck + 1 } else { 0 };
                 self.radau.pass(&next, kink.switch);
-                let at = Batch { lanes: 1, states: &next, parameters: Parameters::Shared(self.parameters), times: &[] };
+                let at = Batch {
+                    lanes: 1,
+                    states: &next,
+                    parameters: Parameters::Shared(self.parameters),
+                    times: &[],
+                    signs: &[],
+                };
                 self.field.switches(at, &mut self.switches);
                 self.switches[kink.switch] = 0.0;
             }
@@ -130,7 +136,7 @@ impl<'a> Implicit<'a> {
 
     /// Batch of one point of the trajectory.
     fn at<'b>(&'b self, states: &'b [f64]) -> Batch<'b> {
-        Batch { lanes: 1, states, parameters: Parameters::Shared(self.parameters), times: &[] }
+        Batch { lanes: 1, states, parameters: Parameters::Shared(self.parameters), times: &[], signs: &[] }
     }
 
     /// The step that was accepted last.
@@ -185,7 +191,7 @@ impl<'a> Implicit<'a> {
         let mut slope = std::mem::take(&mut self.slopes[STAGES - 1]);
         match self.radau.signs.is_empty() {
             true => self.field.evaluate(self.at(next), &mut slope),
-            false => self.field.evaluate_switched(self.at(next), &self.radau.signs, &mut slope),
+            false => self.field.evaluate(Batch { signs: &self.radau.signs, ..self.at(next) }, &mut slope),
         }
         self.slopes[STAGES - 1] = slope;
         observe(&Step { to: next, courses, ..self.step(length, end) }) == Verdict::Stop

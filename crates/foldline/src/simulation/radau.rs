@@ -187,10 +187,16 @@ impl<'a> Radau<'a> {
     /// Evaluates f and its Jacobian at the start of the step; false if they are not finite.
     fn linearise(&mut self) -> bool {
         if !self.current {
-            let at = Batch { lanes: 1, states: &self.x, parameters: Parameters::Shared(self.parameters), times: &[] };
+            let at = Batch {
+                lanes: 1,
+                states: &self.x,
+                parameters: Parameters::Shared(self.parameters),
+                times: &[],
+                signs: &[],
+            };
             self.field.linearise(at, &[], &mut self.slope, &mut self.jacobian, &mut []);
             if !self.signs.is_empty() {
-                self.field.evaluate_switched(at, &self.signs, &mut self.slope);
+                self.field.evaluate(Batch { signs: &self.signs, ..at }, &mut self.slope);
             }
             self.current = true;
         }
@@ -300,12 +306,12 @@ impl<'a> Radau<'a> {
             (0..STAGES).for_each(|s| self.stages[3 * i + s] = x + z[s]);
         }
         let parameters = Parameters::Shared(self.parameters);
-        let at = Batch { lanes: STAGES, states: &self.stages, parameters, times: &[] };
+        let at = Batch { lanes: STAGES, states: &self.stages, parameters, times: &[], signs: &[] };
         if self.signs.is_empty() {
             self.field.evaluate(at, &mut self.slopes);
         } else {
             let signs: Vec<f64> = self.signs.iter().flat_map(|sign| [*sign; STAGES]).collect();
-            self.field.evaluate_switched(at, &signs, &mut self.slopes);
+            self.field.evaluate(Batch { signs: &signs, ..at }, &mut self.slopes);
         }
         self.slopes.iter().all(|f| f.is_finite())
     }
@@ -319,10 +325,16 @@ impl<'a> Radau<'a> {
         if size >= 1.0 && (self.last.is_none() || self.rejected) {
             // A second filtering keeps the estimate bounded for a fast mode away from its slow manifold.
             let moved: Vec<f64> = self.x.iter().zip(&error).map(|(x, error)| x + error).collect();
-            let at = Batch { lanes: 1, states: &moved, parameters: Parameters::Shared(self.parameters), times: &[] };
+            let at = Batch {
+                lanes: 1,
+                states: &moved,
+                parameters: Parameters::Shared(self.parameters),
+                times: &[],
+                signs: &[],
+            };
             match self.signs.is_empty() {
                 true => self.field.evaluate(at, &mut error),
-                false => self.field.evaluate_switched(at, &self.signs, &mut error),
+                false => self.field.evaluate(Batch { signs: &self.signs, ..at }, &mut error),
             }
             error.iter_mut().zip(&part).for_each(|(error, part)| *error += part);
             self.filter(&mut error);

@@ -77,16 +77,18 @@ impl<'a> Shortened<'a> {
 
     /// Evaluates f at `x` into slope number `k`.
     pub(super) fn slope_at(&mut self, x: &[f64], k: usize) {
-        let at = Batch { lanes: 1, states: x, parameters: Parameters::Shared(&self.parameters), times: &[] };
+        let at =
+            Batch { lanes: 1, states: x, parameters: Parameters::Shared(&self.parameters), times: &[], signs: &[] };
         match self.signs.is_empty() {
             true => self.field.evaluate(at, &mut self.slopes[k]),
-            false => self.field.evaluate_switched(at, &self.signs, &mut self.slopes[k]),
+            false => self.field.evaluate(Batch { signs: &self.signs, ..at }, &mut self.slopes[k]),
         }
     }
 
     /// Writes the values of all switches at `x`.
     pub(super) fn switches_into(&self, x: &[f64], values: &mut [f64]) {
-        let at = Batch { lanes: 1, states: x, parameters: Parameters::Shared(&self.parameters), times: &[] };
+        let at =
+            Batch { lanes: 1, states: x, parameters: Parameters::Shared(&self.parameters), times: &[], signs: &[] };
         self.field.switches(at, values);
     }
 

@@ -277,7 +277,7 @@ impl Limits<'_> {
     }
 
     fn batch<'b>(&self, x: &'b [f64], parameters: &'b [f64]) -> Batch<'b> {
-        Batch { lanes: 1, states: x, parameters: Parameters::Shared(parameters), times: &[] }
+        Batch { lanes: 1, states: x, parameters: Parameters::Shared(parameters), times: &[], signs: &[] }
     }
 
     fn along_state(&self, n: usize, j: usize) -> Vec<f64> {

@@ -153,7 +153,13 @@ fn missed(setting: &Setting, at: &Point, cycle: &Cycle, scheme: &Scheme, parts: 
         let w = spread(&|_, c| setting.scales[c] * if c % 2 == 0 { 1.0 } else { way }, n + known);
         let derivative = |share: f64, along: &[&[f64]]| {
             let states = spread(&|part, c| part.states[0][c] + share * (part.states[1][c] - part.states[0][c]), n);
-            let batch = Batch { lanes, states: &states, parameters: Parameters::Shared(&at.parameters), times: &times };
+            let batch = Batch {
+                lanes,
+                states: &states,
+                parameters: Parameters::Shared(&at.parameters),
+                times: &times,
+                signs: &[],
+            };
             let mut value = vec![0.0; n * lanes];
             field.directional(batch, along, &mut value);
             value

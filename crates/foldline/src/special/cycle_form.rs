@@ -108,8 +108,10 @@ pub(crate) fn switches_passed(setting: &Setting, at: &Point) -> usize {
     let times: Vec<f64> = places.map(|t| f64::from(cycle.forcing_periods) * t).collect();
     let times = if cycle.forcing_periods > 0 { &times[..] } else { &[] };
     let mut values = vec![0.0; count * lanes];
-    field
-        .switches(Batch { lanes, states: &states, parameters: Parameters::Shared(&at.parameters), times }, &mut values);
+    field.switches(
+        Batch { lanes, states: &states, parameters: Parameters::Shared(&at.parameters), times, signs: &[] },
+        &mut values,
+    );
     let changes = |own: &[f64]| (0..lanes).filter(|k| (own[*k] > 0.0) != (own[(k + 1) % lanes] > 0.0)).count();
     values.chunks_exact(lanes).map(changes).sum()
 }

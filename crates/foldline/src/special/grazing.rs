@@ -100,7 +100,7 @@ fn excursions(extrema: &[Extremum]) -> i64 {
 fn value(field: &dyn VectorField, parameters: &[f64], states: &[f64], times: &[f64], switch: usize) -> Vec<f64> {
     let lanes = states.len() / field.dim().max(1);
     let mut values = vec![0.0; field.switch_count() * lanes];
-    field.switches(Batch { lanes, states, parameters: Parameters::Shared(parameters), times }, &mut values);
+    field.switches(Batch { lanes, states, parameters: Parameters::Shared(parameters), times, signs: &[] }, &mut values);
     values[switch * lanes..(switch + 1) * lanes].to_vec()
 }
 

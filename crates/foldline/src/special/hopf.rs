@@ -133,7 +133,7 @@ fn growth_rate(field: &dyn VectorField, parameters: &[f64], scales: &[f64], x: &
     let (mut f, mut fx, mut pivots) = (vec![0.0; n], vec![0.0; n * n], vec![0; n]);
     let mut converged = false;
     for _ in 0..20 {
-        let batch = Batch { lanes: 1, states: x, parameters: Parameters::Shared(parameters), times: &[] };
+        let batch = Batch { lanes: 1, states: x, parameters: Parameters::Shared(parameters), times: &[], signs: &[] };
         field.linearise(batch, &[], &mut f, &mut fx, &mut []);
         if converged {
             let spectrum = eigenvalues(&fx, n, scales);
@@ -167,7 +167,7 @@ pub fn direction(
     let n = x.len();
     let (mut f, mut fx) = (vec![0.0; n], vec![0.0; n * n]);
     field.linearise(
-        Batch { lanes: 1, states: x, parameters: Parameters::Shared(&at.parameters), times: &[] },
+        Batch { lanes: 1, states: x, parameters: Parameters::Shared(&at.parameters), times: &[], signs: &[] },
         &[],
         &mut f,
         &mut fx,

@@ -64,7 +64,13 @@ impl<'a> OnBranchPoints<'a> {
     }
 
     fn batch(&self) -> Batch<'_> {
-        Batch { lanes: 1, states: &self.state, parameters: Parameters::Shared(&self.parameters), times: &[] }
+        Batch {
+            lanes: 1,
+            states: &self.state,
+            parameters: Parameters::Shared(&self.parameters),
+            times: &[],
+            signs: &[],
+        }
     }
 
     /// Converts a vector `[n + 1]` to a direction in states and parameters.

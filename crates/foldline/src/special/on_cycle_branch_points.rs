@@ -163,7 +163,7 @@ impl<'a> OnCycleBranchPoints<'a> {
 
     fn batch(&self) -> Batch<'_> {
         let parameters = Parameters::Shared(&self.parameters);
-        Batch { lanes: self.lanes(), states: &self.states, parameters, times: &self.times }
+        Batch { lanes: self.lanes(), states: &self.states, parameters, times: &self.times, signs: &[] }
     }
 
     /// Calls `call` for every Gauss point with its number, the index of its node in a profile, the length of its

@@ -329,7 +329,7 @@ impl<'a> OnCycles<'a> {
         let full: Vec<&[f64]> = full.iter().map(Vec::as_slice).collect();
         let parameters = Parameters::Shared(&self.parameters);
         let mut out = vec![0.0; self.n * lanes];
-        let batch = Batch { lanes, states: &self.states, parameters, times: &self.times };
+        let batch = Batch { lanes, states: &self.states, parameters, times: &self.times, signs: &[] };
         self.setting.field.directional(batch, &full, &mut out);
         out
     }
@@ -399,6 +399,7 @@ impl<'a> OnCycles<'a> {
             states: &self.states,
             parameters: Parameters::Shared(&self.parameters),
             times: &self.times,
+            signs: &[],
         };
         self.setting.field.linearise(batch, &[], &mut self.f, &mut self.fx, &mut []);
         self.scalars = u[size..].to_vec();
@@ -687,8 +688,13 @@ impl Condition for OnCycles<'_> {
         let (n, m, parts, lanes) = (self.n, self.scheme.degree, self.parts, self.lanes());
         let (size, states) = (self.profile_size(), self.intervals() * (m + 1) * n);
         let known = self.setting.parameters.len();
-        let batch =
-            Batch { lanes, states: &self.states, parameters: Parameters::Shared(&self.parameters), times: &self.times };
+        let batch = Batch {
+            lanes,
+            states: &self.states,
+            parameters: Parameters::Shared(&self.parameters),
+            times: &self.times,
+            signs: &[],
+        };
         let mut direction = self.gather(&du[..states], n, 0);
         direction.extend(self.setting.spread(&du[states + 1..]).iter().flat_map(|p| std::iter::repeat_n(*p, lanes)));
         let turn = extra.first().copied().unwrap_or(0.0);

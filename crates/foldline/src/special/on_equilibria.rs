@@ -70,7 +70,7 @@ impl<'a> OnEquilibria<'a> {
 
     fn batch(&self) -> Batch<'_> {
         let parameters = Parameters::Shared(&self.parameters);
-        Batch { lanes: 1, states: &self.state, parameters, times: &[] }
+        Batch { lanes: 1, states: &self.state, parameters, times: &[], signs: &[] }
     }
 
     /// A x.

@@ -175,10 +175,28 @@ impl VectorField for Unfolded<'_> {
         self.field.switches(self.parts(at).0, out);
     }
 
-    fn evaluate_switched(&self, at: Batch, signs: &[f64], f: &mut [f64]) {
-        let (own, amplitude) = self.parts(at);
-        self.field.evaluate_switched(own, signs, f);
-        self.add(&at, amplitude, f);
+    fn linearise_switches(
+        &self,
+        at: Batch,
+        free: &[usize],
+        h: &mut [f64],
+        hx: &mut [f64],
+        hp: &mut [f64],
+        ht: &mut [f64],
+    ) {
+        // The switching functions do not depend on b.
+        let (k, lanes) = (self.field.parameter_count(), at.lanes);
+        let own: Vec<usize> = free.iter().copied().filter(|index| *index < k).collect();
+        let mut of_own = vec![0.0; self.switch_count() * own.len() * lanes];
+        self.field.linearise_switches(self.parts(at).0, &own, h, hx, &mut of_own, ht);
+        hp.fill(0.0);
+        for s in 0..self.switch_count() {
+            for (to, _) in free.iter().enumerate().filter(|(_, index)| **index < k) {
+                let from = free[..to].iter().filter(|index| **index < k).count();
+                let values = &of_own[(s * own.len() + from) * lanes..][..lanes];
+                hp[(s * free.len() + to) * lanes..][..lanes].copy_from_slice(values);
+            }
+        }
     }
 }
 
@@ -339,7 +357,10 @@ mod tests {
     /// f + b d at one state.
     fn value(field: &Unfolded, x: [f64; 2], p: [f64; 3]) -> [f64; 2] {
         let mut f = [0.0; 2];
-        field.evaluate(Batch { lanes: 1, states: &x, parameters: Parameters::Shared(&p), times: &[] }, &mut f);
+        field.evaluate(
+            Batch { lanes: 1, states: &x, parameters: Parameters::Shared(&p), times: &[], signs: &[] },
+            &mut f,
+        );
         f
     }
 
@@ -349,7 +370,7 @@ mod tests {
         let model = model();
         let field = Unfolded::new(&model, &[0.8, 2.0]);
         let (x, p) = ([0.3, -0.6], [0.4, 0.7, 0.25]);
-        let at = Batch { lanes: 1, states: &x, parameters: Parameters::Shared(&p), times: &[] };
+        let at = Batch { lanes: 1, states: &x, parameters: Parameters::Shared(&p), times: &[], signs: &[] };
         let (mut f, mut fx, mut fp) = ([0.0; 2], [0.0; 4], [0.0; 4]);
         // b first, then q: the columns come in the order requested.
         field.linearise(at, &[2, 1], &mut f, &mut fx, &mut fp);
@@ -380,7 +401,7 @@ mod tests {
         for (sign, out) in [(1.0, &mut up), (-1.0, &mut down)] {
             let s = sign * STEP;
             let (x, p) = ([x[0] + s * w[0], x[1] + s * w[1]], [p[0] + s * w[2], p[1] + s * w[3], p[2] + s * w[4]]);
-            let at = Batch { lanes: 1, states: &x, parameters: Parameters::Shared(&p), times: &[] };
+            let at = Batch { lanes: 1, states: &x, parameters: Parameters::Shared(&p), times: &[], signs: &[] };
             field.directional(at, &[&v[..]], out);
         }
         (0..2).for_each(|i| assert!(((up[i] - down[i]) / (2.0 * STEP) - twice[i]).abs() < 1e-8));

@@ -230,7 +230,8 @@ impl Part<'_> {
         let Solution::Equilibrium(x) = &point.solution else { return };
         let (n, k) = (x.len(), self.setting.freedom());
         let (mut f, mut fx, mut fp) = (vec![0.0; n], vec![0.0; n * n], vec![0.0; n * k]);
-        let batch = Batch { lanes: 1, states: x, parameters: Parameters::Shared(&point.parameters), times: &[] };
+        let batch =
+            Batch { lanes: 1, states: x, parameters: Parameters::Shared(&point.parameters), times: &[], signs: &[] };
         self.setting.linearise(batch, &mut f, &mut fx, &mut fp);
         out.points += 1;
         let scales: Vec<f64> = x.iter().zip(self.setting.scales).map(|(x, s)| x.abs() + s).collect();
@@ -372,7 +373,7 @@ impl Along<'_> {
     fn outputs(&self, states: &[f64], times: &[f64]) -> Vec<f64> {
         let mut outputs = vec![0.0; self.field.output_count() * times.len()];
         let (parameters, lanes) = (Parameters::Shared(self.parameters), times.len());
-        self.field.outputs(Batch { lanes, states, parameters, times: &self.times(times) }, &mut outputs);
+        self.field.outputs(Batch { lanes, states, parameters, times: &self.times(times), signs: &[] }, &mut outputs);
         outputs
     }
 }
@@ -409,7 +410,7 @@ impl Path {
         let (n, lanes, parameters) = (along.field.dim(), self.times.len(), Parameters::Shared(along.parameters));
         let at = |states: &[f64], times: &[f64]| [states.to_vec(), along.outputs(states, times)].concat();
         let (mut slopes, times) = (vec![0.0; n * lanes], along.times(&self.times));
-        along.field.evaluate(Batch { lanes, states: &self.states, parameters, times: &times }, &mut slopes);
+        along.field.evaluate(Batch { lanes, states: &self.states, parameters, times: &times, signs: &[] }, &mut slopes);
         slopes.iter_mut().for_each(|f| *f *= along.orbit.period);
         let largest = |c: usize, line: &[f64], sign: f64| {
             let tops = peaks(line, sign).into_iter().map(|place| {

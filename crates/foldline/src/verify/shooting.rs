@@ -234,7 +234,7 @@ impl Shooting<'_> {
         let mut f = vec![0.0; states.len()];
         for ((x, time), f) in states.chunks_exact(n).zip(times.chunks_exact(1)).zip(f.chunks_exact_mut(n)) {
             let times = if orbit.forced { time } else { &[] };
-            let at = Batch { lanes: 1, states: x, parameters: Parameters::Shared(&parameters), times };
+            let at = Batch { lanes: 1, states: x, parameters: Parameters::Shared(&parameters), times, signs: &[] };
             self.setting.field.evaluate(at, f);
         }
         f

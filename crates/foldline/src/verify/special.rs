@@ -212,7 +212,8 @@ impl Place<'_> {
         for _ in 0..20 {
             let (mut f, mut fx, mut fp) = (vec![0.0; n], vec![0.0; n * n], vec![0.0; n]);
             let parameters = self.setting.at(&[value]);
-            let batch = Batch { lanes: 1, states: &state, parameters: Parameters::Shared(&parameters), times: &[] };
+            let batch =
+                Batch { lanes: 1, states: &state, parameters: Parameters::Shared(&parameters), times: &[], signs: &[] };
             self.setting.linearise(batch, &mut f, &mut fx, &mut fp);
             let mut a = Vec::with_capacity(size * size);
             for i in 0..n {

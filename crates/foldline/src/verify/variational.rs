@@ -49,8 +49,13 @@ impl VectorField for Variational<'_> {
                 (Parameters::Shared(&all[..count]), &shared)
             }
         };
-        let inner =
-            Batch { lanes, states: &at.states[..n * lanes], parameters, times: &at.states[n * (1 + n + k) * lanes..] };
+        let inner = Batch {
+            lanes,
+            states: &at.states[..n * lanes],
+            parameters,
+            times: &at.states[n * (1 + n + k) * lanes..],
+            signs: at.signs,
+        };
         let (mut fx, mut fp) = (vec![0.0; n * n * lanes], vec![0.0; n * k * lanes]);
         let (f, rest) = out.split_at_mut(n * lanes);
         self.setting.linearise(inner, f, &mut fx, &mut fp);

@@ -26,7 +26,10 @@ fn once(field: &Field, parameters: &[f64], found: &Point, turns: u32) -> Option<
 
 fn slope(field: &Field, parameters: &[f64], x: &[f64]) -> Vec<f64> {
     let mut f = vec![0.0; x.len()];
-    field.evaluate(Batch { lanes: 1, states: x, parameters: Parameters::Shared(parameters), times: &[] }, &mut f);
+    field.evaluate(
+        Batch { lanes: 1, states: x, parameters: Parameters::Shared(parameters), times: &[], signs: &[] },
+        &mut f,
+    );
     f
 }
 

@@ -78,7 +78,7 @@ impl CycleProblem<'_> {
         self.gather(u);
         let parameters = self.setting.at(&u[size + 1..]);
         let parameters = Parameters::Shared(&parameters);
-        let batch = Batch { lanes, states: &self.states, parameters, times: &self.times };
+        let batch = Batch { lanes, states: &self.states, parameters, times: &self.times, signs: &[] };
         self.setting.linearise(batch, &mut self.f, &mut self.fx, &mut self.fp);
         for (coupled, entry) in self.coupled.iter_mut().zip(self.fx.chunks_exact(lanes)) {
             // Couplings are never removed, so that the order of elimination rarely changes.

@@ -154,7 +154,8 @@ impl CycleProblem<'_> {
         states.iter_mut().zip(&known.within).for_each(|(x, w)| *x -= w);
         let (parameters, times) =
             (self.setting.at(&better[size + 1..]), self.sampling.times(&self.mesh, self.forcing_periods));
-        let batch = Batch { lanes, states: &states, parameters: Parameters::Shared(&parameters), times: &times };
+        let batch =
+            Batch { lanes, states: &states, parameters: Parameters::Shared(&parameters), times: &times, signs: &[] };
         let (mut f, mut fx) = (vec![0.0; n * lanes], vec![0.0; n * n * lanes]);
         self.setting.field.linearise(batch, &[], &mut f, &mut fx, &mut []);
         let trace = |lane: usize| (0..n).map(|i| fx[(i * n + i) * lanes + lane]).sum::<f64>();
@@ -220,7 +221,7 @@ impl CycleProblem<'_> {
                 }
             }
             let parameters = self.setting.at(&u[size + 1..]);
-            let batch = Batch { lanes, states, parameters: Parameters::Shared(&parameters), times: &times };
+            let batch = Batch { lanes, states, parameters: Parameters::Shared(&parameters), times: &times, signs: &[] };
             self.setting.field.linearise(batch, &[], f, fx, &mut []);
         }
         let lengths = profiles
@@ -321,7 +322,13 @@ impl CycleProblem<'_> {
         }
         let mut f = vec![0.0; n * count];
         let parameters = self.setting.at(&u[self.profile_size() + 1..]);
-        let batch = Batch { lanes: count, states: &states, parameters: Parameters::Shared(&parameters), times: &[] };
+        let batch = Batch {
+            lanes: count,
+            states: &states,
+            parameters: Parameters::Shared(&parameters),
+            times: &[],
+            signs: &[],
+        };
         self.setting.field.evaluate(batch, &mut f);
         let mut flow = vec![0.0; n * count];
         for j in 0..count {

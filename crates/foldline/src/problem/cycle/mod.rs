@@ -435,7 +435,7 @@ impl ZeroProblem for CycleProblem<'_> {
         let parameters = self.setting.at(&u[size + 1..]);
         let all = parameters;
         let (lanes, parameters) = (self.lanes(), Parameters::Shared(&all));
-        let batch = Batch { lanes, states: &self.states, parameters, times: &self.times };
+        let batch = Batch { lanes, states: &self.states, parameters, times: &self.times, signs: &[] };
         self.setting.field.evaluate(batch, &mut self.f);
         let phase = match self.width {
             1 => self.defects::<f64>(u, r),

@@ -169,10 +169,11 @@ impl Lanes {
     #[inline(always)]
     fn evaluate(&mut self, field: &dyn VectorField, shared: &[f64], k: usize) {
         let states = if k + 1 == STAGES { &self.next } else { &self.stage };
-        let at = Batch { lanes: self.count, states, parameters: shared_or_own(shared, &self.own), times: &[] };
+        let at =
+            Batch { lanes: self.count, states, parameters: shared_or_own(shared, &self.own), times: &[], signs: &[] };
         match self.signs.is_empty() {
             true => field.evaluate(at, &mut self.slopes[k]),
-            false => field.evaluate_switched(at, &self.signs, &mut self.slopes[k]),
+            false => field.evaluate(Batch { signs: &self.signs, ..at }, &mut self.slopes[k]),
         }
     }
 

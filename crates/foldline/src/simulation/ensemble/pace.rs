@@ -178,13 +178,13 @@ impl Ensemble<'_> {
             Parameters::Shared(_) => Vec::new(),
         };
         let parameters = shared_or_own(self.parameters, &own);
-        let (signs, switches) = self.first_signs(Batch { lanes: m, states: &x, parameters, times: &[] });
+        let (signs, switches) = self.first_signs(Batch { lanes: m, states: &x, parameters, times: &[], signs: &[] });
         let evaluate = |states: &[f64]| {
             let mut f = vec![0.0; n * m];
-            let at = Batch { lanes: m, states, parameters, times: &[] };
+            let at = Batch { lanes: m, states, parameters, times: &[], signs: &[] };
             match signs.is_empty() {
                 true => self.field.evaluate(at, &mut f),
-                false => self.field.evaluate_switched(at, &signs, &mut f),
+                false => self.field.evaluate(Batch { signs: &signs, ..at }, &mut f),
             }
             f
         };

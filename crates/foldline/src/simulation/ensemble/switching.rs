@@ -42,7 +42,8 @@ impl Ensemble<'_> {
             }
             let mut ahead = std::mem::take(&mut self.lanes.ahead[place]);
             let parameters = self.lanes.parameters(self.parameters);
-            self.field.switches(Batch { lanes, states: &self.lanes.sampled, parameters, times: &[] }, &mut ahead);
+            self.field
+                .switches(Batch { lanes, states: &self.lanes.sampled, parameters, times: &[], signs: &[] }, &mut ahead);
             self.lanes.ahead[place] = ahead;
         }
     }

@@ -87,7 +87,7 @@ impl<'s, 'f> Uncertain<'s, 'f> {
             let Solution::Equilibrium(x) = &point.solution else { return Vec::new() };
             let parameters = Parameters::Shared(&point.parameters);
             let mut values = vec![0.0; field.switch_count()];
-            field.switches(Batch { lanes: 1, states: x, parameters, times: &[] }, &mut values);
+            field.switches(Batch { lanes: 1, states: x, parameters, times: &[], signs: &[] }, &mut values);
             values.iter().map(|value| *value > 0.0).collect()
         };
         let own = if field.switch_count() == 0 { return false } else { signs(self.at) };

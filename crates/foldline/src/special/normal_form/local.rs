@@ -53,7 +53,8 @@ impl<'a> Local<'a> {
         let Solution::Equilibrium(state) = &at.solution else { return None };
         let n = state.len();
         let (mut f, mut jacobian) = (vec![0.0; n], vec![0.0; n * n]);
-        let batch = Batch { lanes: 1, states: state, parameters: Parameters::Shared(&at.parameters), times: &[] };
+        let batch =
+            Batch { lanes: 1, states: state, parameters: Parameters::Shared(&at.parameters), times: &[], signs: &[] };
         field.linearise(batch, &[], &mut f, &mut jacobian, &mut []);
         Some(Local { field, state, parameters: &at.parameters, n, jacobian, noise: None })
     }
@@ -82,7 +83,13 @@ impl<'a> Local<'a> {
         let full: Vec<Vec<f64>> =
             along.iter().map(|d| d.iter().copied().chain(std::iter::repeat(0.0)).take(size).collect()).collect();
         let full: Vec<&[f64]> = full.iter().map(Vec::as_slice).collect();
-        let at = Batch { lanes: 1, states: self.state, parameters: Parameters::Shared(self.parameters), times: &[] };
+        let at = Batch {
+            lanes: 1,
+            states: self.state,
+            parameters: Parameters::Shared(self.parameters),
+            times: &[],
+            signs: &[],
+        };
         let mut out = vec![0.0; self.n];
         self.field.directional(at, &full, &mut out);
         if let Some(noise) = &self.noise {
