@@ -268,7 +268,7 @@ impl Marker {
             Kind::GeneralisedHopf | Kind::GeneralisedPeriodDoubling | Kind::Chenciner => Marker::Diamond,
             Kind::DoubleHopf | Kind::DoubleTorus | Kind::Resonance14 => Marker::Square,
             Kind::FoldFlip | Kind::FlipTorus | Kind::Resonance12 => Marker::Cross,
-            Kind::Grazing => Marker::Nabla,
+            Kind::Grazing | Kind::BoundaryEquilibrium => Marker::Nabla,
             Kind::Mark => Marker::Dot,
             Kind::Unexplained => Marker::Star,
         }

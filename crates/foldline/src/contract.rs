@@ -244,6 +244,18 @@ pub trait ZeroProblem {
         None
     }
 
+    /// Holds the branch of a switched field that is in force at `u`, or on a switching surface the one that `along` leads
+    /// to, until [`ZeroProblem::cross`]. False if the problem does not do that.
+    fn hold_branch(&mut self, _u: &[f64], _along: &[f64]) -> bool {
+        false
+    }
+
+    /// At a solution on a switching surface: takes the branch of f on its other side, and returns the unit tangent there
+    /// that leads away from the surface. `None`, without any change, if the problem holds no branch or f jumps.
+    fn cross(&mut self, _u: &[f64], _along: &[f64], _switch: usize) -> Option<Vec<f64>> {
+        None
+    }
+
     /// `u` as plain data.
     fn point(&self, u: &[f64], tangent: &[f64], examination: Examination) -> Point;
 

@@ -1,10 +1,11 @@
 //! Ends of a side: bounds, closure, and the meeting with simpler solutions.
 
-use super::corrector::{Failure, Station, doubted};
+use super::corrector::{Failure, Station, doubted, examined};
 use super::follow::Follow;
 use super::inspect::Found;
 use super::locate::{Stretch, passing};
 use super::step::Step;
+use crate::contract::Monitor;
 use crate::diagram::{Cost, Ending, Kind, Mesh, Point, SpecialPoint};
 
 /// Share of the deviation from simpler solutions below which a step is rejected: it may have landed on them, and its
@@ -136,6 +137,48 @@ impl Follow<'_> {
         found.truncate(k + 1);
         right.point = point;
         (Some(ending), found)
+    }
+
+    /// Truncates the results of a step at the first switching surface that an equilibrium passes. `right` becomes the point
+    /// there, on the branch beyond the surface. Also returns whether there is one.
+    pub(super) fn up_to_surface(
+        &mut self,
+        end: Option<Ending>,
+        mut found: Vec<Found>,
+        right: &mut Station,
+        cost: &mut Cost,
+    ) -> (bool, Option<Ending>, Vec<Found>) {
+        let surface =
+            |item: &Found| matches!(item, Found::Special(special) if special.kind == Kind::BoundaryEquilibrium);
+        let Some(at) = found.iter().position(surface).filter(|_| self.holds) else { return (false, end, found) };
+        found.truncate(at + 1);
+        let Some(Found::Special(special)) = found.last_mut() else { return (false, end, found) };
+        let u = self.problem.unknowns_of(&special.point);
+        let along: Vec<f64> = special.point.tangent.iter().map(|t| self.direction * t).collect();
+        let on = |monitor: &&Box<dyn Monitor + '_>| monitor.kind() == Kind::BoundaryEquilibrium;
+        let value = |monitor: &dyn Monitor| monitor.value(&special.point, &special.point).abs();
+        let nearest = self.marks.iter().filter(on).min_by(|a, b| value(&***a).total_cmp(&value(&***b)));
+        let switch = nearest.map_or(0, |monitor| monitor.label().saturating_sub(1));
+        self.problem.anchor(&u);
+        let Some(tangent) = self.problem.cross(&u, &along, switch) else {
+            (right.u, right.tangent, right.point) = (u, along, special.point.clone());
+            let why = "the equilibrium reaches a switching surface at which the right-hand side jumps\nlikely cause: beyond \
+                       the surface there is no equilibrium of this kind; it may stay on the surface (a sliding or sticking \
+                       state)\nwhat to do: smooth the jump, such as tanh(s*x) for sign(x), and continue in s";
+            return (false, Some(Ending::StepTooSmall(why.into())), found);
+        };
+        cost.factorisations += 1;
+        let [before, after] = [&along, &tangent].map(|t| t[t.len() - 1]);
+        special.remark = match before * after > 0.0 {
+            true => "persistence".into(),
+            false => "non-smooth fold".into(),
+        };
+        let mut there = examined(self.problem, u, tangent, self.direction);
+        self.count(&mut there);
+        let own = if self.direction > 0.0 { &mut special.unstable_after } else { &mut special.unstable_before };
+        *own = there.point.unstable;
+        *right = there;
+        (true, None, found)
     }
 
     /// Ends the step shortly before the point at which the branch meets simpler solutions, if the step passes such a

@@ -36,6 +36,8 @@ pub struct Follow<'w> {
     pub collapses: &'w [Box<dyn Monitor + 'w>],
     /// Returns the orbit of infinite period that the branch approaches, if the cycle at a point shows one.
     pub limit: &'w dyn Fn(&Point) -> Option<Ending>,
+    /// True if the problem holds a branch of a switched field, so that equilibria are followed through its surfaces.
+    pub holds: bool,
     /// True if the model has a continuous symmetry, so that solutions form families and a second multiplier is 1.
     pub symmetric: bool,
     /// +1 towards larger positions, -1 towards smaller.
@@ -188,6 +190,8 @@ pub fn follow(
             _ => found,
         };
         let (end, found) = walk.up_to_end(end, found, &mut right);
+        let (crossing, end, found) = walk.up_to_surface(end, found, &mut right, &mut cost);
+        let between = between.filter(|_| !crossing);
         let between = between.unwrap_or_else(|| walk.between(&left, &right));
         let (angle, length) = (between.angle, between.along);
         // A bend that has sharpened is assumed to sharpen further.
@@ -261,6 +265,11 @@ pub fn follow(
                 return Ending::PeriodUnbounded(now);
             }
             long = Some(AGAIN * now);
+        }
+        if crossing {
+            // On the other side the branch has another direction.
+            (trail, before, left, step) = (None, None, right, walk.settings.first_step);
+            continue;
         }
         trail = Some(walk.trail(&left, between));
         before = Some(std::mem::replace(&mut left, right));

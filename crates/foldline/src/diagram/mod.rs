@@ -336,8 +336,10 @@ pub enum Kind {
     FlipTorus,
     /// Two pairs of multipliers on the unit circle.
     DoubleTorus,
-    /// A cycle touches a switching surface of the vector field, or an equilibrium lies on one.
+    /// A cycle touches a switching surface of the vector field.
     Grazing,
+    /// An equilibrium lies on a switching surface of the vector field.
+    BoundaryEquilibrium,
     /// A quantity has a requested value.
     Mark,
     /// A stability change that no located special point explains.
@@ -346,7 +348,7 @@ pub enum Kind {
 
 impl Kind {
     /// Every kind, in the order in which tables list them.
-    pub const ALL: [Kind; 23] = [
+    pub const ALL: [Kind; 24] = [
         Kind::Fold,
         Kind::BranchPoint,
         Kind::Hopf,
@@ -368,14 +370,18 @@ impl Kind {
         Kind::FlipTorus,
         Kind::DoubleTorus,
         Kind::Grazing,
+        Kind::BoundaryEquilibrium,
         Kind::Mark,
         Kind::Unexplained,
     ];
 
     /// True for bifurcations of codimension two.
     pub fn has_codimension_two(self) -> bool {
-        use Kind::{BranchPoint, Fold, Grazing, Hopf, Mark, PeriodDoubling, Torus, Unexplained};
-        !matches!(self, Fold | BranchPoint | Hopf | PeriodDoubling | Torus | Grazing | Mark | Unexplained)
+        use Kind::{BoundaryEquilibrium, BranchPoint, Fold, Grazing, Hopf, Mark, PeriodDoubling, Torus, Unexplained};
+        !matches!(
+            self,
+            Fold | BranchPoint | Hopf | PeriodDoubling | Torus | Grazing | BoundaryEquilibrium | Mark | Unexplained
+        )
     }
 
     /// Names of the coefficients of the normal form, as defined in [`crate::special::normal_form`] and
@@ -420,6 +426,7 @@ impl Kind {
             Kind::FlipTorus => "flip-torus",
             Kind::DoubleTorus => "double-torus",
             Kind::Grazing => "grazing",
+            Kind::BoundaryEquilibrium => "boundary-equilibrium",
             Kind::Mark => "mark",
             Kind::Unexplained => "unexplained",
         }
@@ -442,6 +449,7 @@ impl Kind {
             Kind::Resonance13 => "1:3 resonance",
             Kind::Resonance14 => "1:4 resonance",
             Kind::DoubleTorus => "double torus",
+            Kind::BoundaryEquilibrium => "boundary equilibrium",
             other => other.name(),
         }
     }

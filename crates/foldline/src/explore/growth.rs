@@ -440,9 +440,21 @@ impl Growth<'_> {
         let unfolded = self.system.unfolded.map(|own| own.over(&counted));
         let system = System { field: &counted, unfolded: unfolded.as_ref(), ..self.system.clone() };
         let mut problem = self.line(branch).problem(&system, self.degree, &last);
+        let holds = branch.held.is_none() && {
+            let (u, along) = (problem.unknowns_of(&last), &last.tangent);
+            let along: Vec<f64> = along.iter().map(|t| direction * t).collect();
+            u.len() == along.len() && problem.hold_branch(&u, &along)
+        };
         let revive = |problem: &mut dyn ZeroProblem, point: &Point| revived(problem, self.settings, point, direction);
         // The special point at which a branch starts is no predecessor: the matrix is singular there.
         let before = before.filter(|p| p.position != 0 || starts_inside(branch));
+        // Beyond a switching surface the branch has another direction.
+        let on_surface = |s: &SpecialPoint| {
+            s.kind == Kind::BoundaryEquilibrium
+                && s.point.solution == last.solution
+                && s.point.parameters == last.parameters
+        };
+        let before = before.filter(|_| !branch.special.iter().any(on_surface));
         let previous = before.and_then(|p| revive(&mut *problem, &p).ok());
         let mut start = match revive(&mut *problem, &last) {
             Ok(start) => start,
@@ -484,6 +496,7 @@ impl Growth<'_> {
             limit: &|at| limits.approached(at).filter(|_| free_cycles),
             direction,
             symmetric,
+            holds,
             free: branch.free,
             home: home.as_ref(),
             homecoming: Homecoming::default(),
@@ -574,8 +587,11 @@ impl Growth<'_> {
     /// Returns the coefficients of the normal form of a special point.
     fn coefficients(&self, system: &System, branch: &Branch, side: usize, special: &SpecialPoint) -> Coefficients {
         let (line, own) = (self.line(branch), setting(system, branch.free, &special.point.parameters));
-        if special.kind == Kind::Grazing {
-            let remark = grazing::described(system.field, &special.point);
+        if matches!(special.kind, Kind::Grazing | Kind::BoundaryEquilibrium) {
+            let remark = match special.kind {
+                Kind::Grazing => grazing::described(system.field, &special.point),
+                _ => special.remark.clone(),
+            };
             return Coefficients { remark, ..Coefficients::default() };
         }
         let dimension = special.kernel();

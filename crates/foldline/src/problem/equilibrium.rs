@@ -16,6 +16,8 @@ use num_complex::Complex64;
 pub struct EquilibriumProblem<'a> {
     setting: Setting<'a>,
     unfolding: Option<Unfolding>,
+    /// Branch of a switched field; empty for the one in force.
+    signs: Vec<f64>,
     scale: Vec<f64>,
     f: Vec<f64>,
     fx: Vec<f64>,
@@ -37,6 +39,7 @@ impl<'a> EquilibriumProblem<'a> {
             pivots: vec![0; n + k],
             setting,
             unfolding: None,
+            signs: Vec::new(),
         }
     }
 
@@ -63,8 +66,13 @@ impl<'a> EquilibriumProblem<'a> {
     fn linearise(&mut self, u: &[f64]) {
         let n = self.n();
         let parameters = self.setting.at(&u[self.first()..]);
-        let batch =
-            Batch { lanes: 1, states: &u[..n], parameters: Parameters::Shared(&parameters), times: &[], signs: &[] };
+        let batch = Batch {
+            lanes: 1,
+            states: &u[..n],
+            parameters: Parameters::Shared(&parameters),
+            times: &[],
+            signs: &self.signs,
+        };
         self.setting.linearise(batch, &mut self.f, &mut self.fx, &mut self.fp);
     }
 }
@@ -93,8 +101,13 @@ impl ZeroProblem for EquilibriumProblem<'_> {
     fn residual(&mut self, u: &[f64], r: &mut [f64]) -> bool {
         let n = self.n();
         let parameters = self.setting.at(&u[self.first()..]);
-        let batch =
-            Batch { lanes: 1, states: &u[..n], parameters: Parameters::Shared(&parameters), times: &[], signs: &[] };
+        let batch = Batch {
+            lanes: 1,
+            states: &u[..n],
+            parameters: Parameters::Shared(&parameters),
+            times: &[],
+            signs: &self.signs,
+        };
         self.setting.field.evaluate(batch, &mut r[..n]);
         if let Some(unfolding) = &self.unfolding {
             axpy(u[n], &unfolding.column, &mut r[..n]);
@@ -230,5 +243,95 @@ impl ZeroProblem for EquilibriumProblem<'_> {
 
     fn departure(&self, u: &[f64]) -> f64 {
         max_abs(&u[self.n()..self.first()])
+    }
+
+    fn hold_branch(&mut self, u: &[f64], along: &[f64]) -> bool {
+        if self.setting.field.switch_count() == 0 || self.unfolding.is_some() {
+            return false;
+        }
+        let [h, rates] = self.switches(u, along);
+        let here = |k: usize| h[k].abs() > ON_SURFACE * self.switch_size(k, u);
+        let side = |k: usize| if here(k) { h[k] } else { rates[k] };
+        // An equilibrium that stays on a surface is on neither side of it.
+        if (0..h.len()).any(|k| side(k).abs() <= ON_SURFACE * self.switch_size(k, u)) {
+            return false;
+        }
+        self.signs = (0..h.len()).map(|k| side(k).signum()).collect();
+        true
+    }
+
+    fn cross(&mut self, u: &[f64], along: &[f64], switch: usize) -> Option<Vec<f64>> {
+        let sign = self.signs.get_mut(switch)?;
+        *sign = -*sign;
+        let wanted = *sign;
+        let found = self.tangent_across(u, along, switch, wanted);
+        if found.is_none() {
+            self.signs[switch] = -wanted;
+        }
+        found
+    }
+}
+
+/// Value of a switch, relative to its size, below which an equilibrium lies on the surface.
+const ON_SURFACE: f64 = 1e-9;
+/// Residual on the other side of a surface, relative, from which on f jumps there.
+const JUMP: f64 = 1e-6;
+
+impl EquilibriumProblem<'_> {
+    /// Switches and their rates along a direction.
+    fn switches(&self, u: &[f64], along: &[f64]) -> [Vec<f64>; 2] {
+        let (n, k) = (self.n(), self.setting.freedom());
+        let parameters = self.setting.at(&u[n..]);
+        let batch =
+            Batch { lanes: 1, states: &u[..n], parameters: Parameters::Shared(&parameters), times: &[], signs: &[] };
+        let [h, hx, hp, _] = self.setting.linearise_switches(batch);
+        let rate = |s: usize| dot(&hx[s * n..(s + 1) * n], &along[..n]) + dot(&hp[s * k..(s + 1) * k], &along[n..]);
+        let rates = (0..h.len()).map(rate).collect();
+        [h, rates]
+    }
+
+    /// Size of a switch: its change over the sizes of the states.
+    fn switch_size(&self, switch: usize, u: &[f64]) -> f64 {
+        let n = self.n();
+        let parameters = self.setting.at(&u[n..]);
+        let batch =
+            Batch { lanes: 1, states: &u[..n], parameters: Parameters::Shared(&parameters), times: &[], signs: &[] };
+        let [_, hx, ..] = self.setting.linearise_switches(batch);
+        let row = &hx[switch * n..(switch + 1) * n];
+        row.iter().zip(&self.scale).map(|(h, scale)| (h * scale).abs()).fold(f64::MIN_POSITIVE, f64::max)
+    }
+
+    /// Unit tangent of the branch on the side of a surface that is set, at a point on it, leading away from the surface.
+    fn tangent_across(&mut self, u: &[f64], along: &[f64], switch: usize, wanted: f64) -> Option<Vec<f64>> {
+        let size = self.unknowns();
+        let mut r = vec![0.0; size];
+        if !self.residual(u, &mut r) {
+            return None;
+        }
+        let mut by_parameter = vec![0.0; size];
+        by_parameter[size - 1] = 1.0;
+        for row in [along, &by_parameter] {
+            if self.factorise(u, row).is_err() {
+                continue;
+            }
+            let mut last = vec![0.0; size];
+            let mut change = r.clone();
+            change[size - 1] = 0.0;
+            last[size - 1] = 1.0;
+            let (mut off, mut tangent) = (vec![0.0; size], vec![0.0; size]);
+            self.solve(&change, &mut off);
+            if !(self.relative_size(&off, u) < JUMP) {
+                return None;
+            }
+            self.solve(&last, &mut tangent);
+            let length = self.dot(&tangent, &tangent).sqrt();
+            let [_, rates] = self.switches(u, &tangent);
+            let sign = (rates[switch] * wanted).signum() / length;
+            tangent.iter_mut().for_each(|t| *t *= sign);
+            if tangent.iter().all(|t| t.is_finite()) {
+                return Some(tangent);
+            }
+        }
+        None
     }
 }

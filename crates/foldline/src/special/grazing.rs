@@ -30,6 +30,7 @@ const ZERO: f64 = 1e-11;
 pub struct Grazing<'a> {
     field: &'a dyn VectorField,
     switch: usize,
+    cycles: bool,
     /// 1 or 2, for the two functions (1).
     stride: usize,
 }
@@ -49,12 +50,12 @@ pub struct Extremum {
 pub fn monitors(field: &dyn VectorField, cycles: bool) -> Vec<Box<dyn Monitor + '_>> {
     let strides: &[usize] = if cycles { &[1, 2] } else { &[1] };
     let each = (0..field.switch_count()).flat_map(|switch| strides.iter().map(move |stride| (switch, *stride)));
-    each.map(|(switch, stride)| Box::new(Grazing { field, switch, stride }) as Box<dyn Monitor + '_>).collect()
+    each.map(|(switch, stride)| Box::new(Grazing { field, switch, cycles, stride }) as Box<dyn Monitor + '_>).collect()
 }
 
 impl Monitor for Grazing<'_> {
     fn kind(&self) -> Kind {
-        Kind::Grazing
+        if self.cycles { Kind::Grazing } else { Kind::BoundaryEquilibrium }
     }
 
     fn value(&self, _reference: &Point, at: &Point) -> f64 {
