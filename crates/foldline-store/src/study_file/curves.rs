@@ -23,7 +23,15 @@ pub(super) const KEYS: [&str; 12] = [
     "stop",
     "max-points",
 ];
-const HELD: [Kind; 5] = [Kind::Fold, Kind::BranchPoint, Kind::Hopf, Kind::PeriodDoubling, Kind::Torus];
+const HELD: [Kind; 7] = [
+    Kind::Fold,
+    Kind::BranchPoint,
+    Kind::Hopf,
+    Kind::PeriodDoubling,
+    Kind::Torus,
+    Kind::Grazing,
+    Kind::BoundaryEquilibrium,
+];
 
 /// Branch on which the special point lies.
 pub(super) struct Base {
@@ -88,7 +96,8 @@ pub(super) fn read(
     });
     let family = match hold {
         Kind::Hopf => Some(Family::Equilibrium),
-        Kind::PeriodDoubling | Kind::Torus => Some(Family::Cycle),
+        Kind::PeriodDoubling | Kind::Torus | Kind::Grazing => Some(Family::Cycle),
+        Kind::BoundaryEquilibrium => Some(Family::Equilibrium),
         _ => base.family,
     };
     let end = until.map(|_| end);
@@ -183,12 +192,18 @@ fn hold(walk: &mut Walk, item: &Item, family: Option<Family>) -> Option<Kind> {
     };
     let wrong = match (kind, family) {
         (Kind::Hopf, Some(Family::Cycle)) => {
-            Some(("cycles have no Hopf points", "fold, branch-point, period-doubling or torus"))
+            Some(("cycles have no Hopf points", "fold, branch-point, period-doubling, torus or grazing"))
         }
         (Kind::PeriodDoubling | Kind::Torus, Some(Family::Equilibrium)) => Some((
             "equilibria have only folds, branch points and Hopf points",
             "fold, branch-point or hopf, or a branch of cycles",
         )),
+        (Kind::BoundaryEquilibrium, Some(Family::Cycle)) => {
+            Some(("cycles touch a switching surface in grazings", "grazing"))
+        }
+        (Kind::Grazing, Some(Family::Equilibrium)) => {
+            Some(("equilibria meet a switching surface in boundary equilibria", "boundary-equilibrium"))
+        }
         _ => None,
     };
     if let Some((message, right)) = wrong {

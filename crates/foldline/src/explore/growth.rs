@@ -477,7 +477,9 @@ impl Growth<'_> {
         };
         let mut marks: Vec<Box<dyn Monitor>> =
             self.marks.iter().map(|mark| Box::new(mark.of_size(system.size_of(mark.quantity))) as _).collect();
-        marks.extend(grazing::monitors(system.field, branch.family == Family::Cycle));
+        if !branch.held.is_some_and(|(kind, _)| matches!(kind, Kind::Grazing | Kind::BoundaryEquilibrium)) {
+            marks.extend(grazing::monitors(system.field, branch.family == Family::Cycle));
+        }
         let home = branch.points.iter().find(|p| p.position == 0).filter(|_| branch.ends[0].is_none()).cloned();
         let limits = Limits {
             field: system.field,

@@ -26,6 +26,7 @@
 use super::Setting;
 use super::gauss::Scheme;
 use crate::contract::{Batch, Parameters};
+use crate::diagram::Mesh;
 use crate::linalg::{dot, lu, max_abs, panel};
 
 /// Sections of a part at whose ends switches are compared; extrema between them are found from parabolas.
@@ -565,6 +566,45 @@ impl Switched {
         out.extend_from_slice(&self.end_by);
         out
     }
+}
+
+/// Mesh and profile of an orbit with an interval for each part between switchings; `block` is the size of an interval.
+pub(crate) fn cut(profile: &[f64], mesh: &Mesh, switched: &[Switched], block: usize) -> (Mesh, Vec<f64>) {
+    if switched.is_empty() {
+        return (mesh.clone(), profile.to_vec());
+    }
+    let (mut nodes, mut out) = (vec![0.0], Vec::with_capacity(profile.len() + 4 * switched.len() * block));
+    let mut next = switched.iter().peekable();
+    for (j, own) in profile.chunks_exact(block).enumerate() {
+        match next.next_if(|found| found.interval == j) {
+            Some(found) => {
+                out.extend(found.parts.iter().flat_map(|part| &part.nodes));
+                let inner = &found.parts[..found.parts.len() - 1];
+                nodes.extend(inner.iter().map(|part| part.ends[1]));
+            }
+            None => out.extend_from_slice(own),
+        }
+        nodes.push(mesh[j + 1]);
+    }
+    (nodes.into(), out)
+}
+
+/// A direction (profile, T, λ …) at that orbit, on the mesh with an interval for each part.
+pub(crate) fn cut_direction(along: &[f64], intervals: usize, switched: &[Switched], block: usize) -> Vec<f64> {
+    let (profile, scalars) = along.split_at(intervals * block);
+    let mut out = Vec::with_capacity(along.len() + 4 * switched.len() * block);
+    let mut next = switched.iter().peekable();
+    for (j, own) in profile.chunks_exact(block).enumerate() {
+        let Some(found) = next.next_if(|found| found.interval == j) else {
+            out.extend_from_slice(own);
+            continue;
+        };
+        let direction: Vec<f64> = own[..found.end.len()].iter().chain(scalars).copied().collect();
+        let rows = found.parts.iter().flat_map(|part| part.by.chunks_exact(direction.len()));
+        out.extend(rows.map(|row| dot(row, &direction)));
+    }
+    out.extend_from_slice(scalars);
+    out
 }
 
 /// Replaces the value at the last node, so that the polynomial from `left` through the nodes `[m][size]` ends at `end`.

@@ -3,6 +3,7 @@
 use super::on_branch_points::OnBranchPoints;
 use super::on_cycles::OnCycles;
 use super::on_equilibria::OnEquilibria;
+use super::on_surfaces::OnSurfaces;
 use crate::contract::Condition;
 use crate::diagram::{Kind, Solution};
 use crate::problem::{Setting, mesh};
@@ -16,6 +17,13 @@ pub fn condition<'a>(
     at: &Solution,
 ) -> Option<Box<dyn Condition + 'a>> {
     match at {
+        _ if matches!(kind, Kind::Grazing | Kind::BoundaryEquilibrium) => {
+            let whole = match at {
+                Solution::Cycle(cycle) => Solution::Cycle(mesh::at_least_some(cycle, degree)),
+                Solution::Equilibrium(_) => at.clone(),
+            };
+            Some(Box::new(OnSurfaces::new(kind, setting, &whole)?))
+        }
         Solution::Equilibrium(_) if kind == Kind::BranchPoint => Some(Box::new(OnBranchPoints::new(setting))),
         Solution::Equilibrium(_) => Some(Box::new(OnEquilibria::new(kind, setting)?)),
         Solution::Cycle(cycle) => Some(Box::new(OnCycles::new(kind, setting, &mesh::at_least_some(cycle, degree))?)),

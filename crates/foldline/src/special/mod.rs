@@ -31,6 +31,7 @@ pub mod on_branch_points;
 pub mod on_cycle_branch_points;
 pub mod on_cycles;
 pub mod on_equilibria;
+pub mod on_surfaces;
 pub mod period_doubling;
 pub mod quantity;
 pub mod torus;

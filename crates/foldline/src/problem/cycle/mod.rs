@@ -40,7 +40,7 @@ mod residual;
 use super::defect;
 use super::gauss::Scheme;
 use super::mesh::Passage;
-use super::piecewise::{PiecewiseFlow, Switched};
+use super::piecewise::{self, PiecewiseFlow, Switched};
 use super::{Setting, averages, extremes, mesh};
 use crate::contract::{Batch, Examination, Parameters, Singular, ZeroProblem};
 use crate::diagram::{Cycle, Mesh, Point, Solution, Trust};
@@ -197,36 +197,11 @@ impl<'a> CycleProblem<'a> {
         if switched.is_empty() {
             return (self.mesh.clone(), u[..size].to_vec(), tangent.to_vec());
         }
-        let (n, block) = (self.n, self.block());
+        let (mesh, profile) = piecewise::cut(&u[..size], &self.mesh, &switched, self.block());
         // A condition has unknowns before these; a point by itself has no tangent.
-        let Some(extra) = tangent.len().checked_sub(u.len()) else {
-            let (mesh, profile, _) = self.cut(u, u);
-            return (mesh, profile, tangent.to_vec());
-        };
-        let along = &tangent[extra..];
-        let (mut mesh, mut profile, mut moved) = (vec![0.0], Vec::new(), tangent[..extra].to_vec());
-        let mut next = switched.iter().peekable();
-        for j in 0..self.intervals() {
-            let own = &u[j * block..(j + 1) * block];
-            let Some(found) = next.next_if(|found| found.interval == j) else {
-                profile.extend_from_slice(own);
-                moved.extend_from_slice(&along[j * block..(j + 1) * block]);
-                mesh.push(self.mesh[j + 1]);
-                continue;
-            };
-            let direction: Vec<f64> = along[j * block..j * block + n].iter().chain(&along[size..]).copied().collect();
-            for part in &found.parts {
-                profile.extend_from_slice(&part.nodes);
-                moved.extend(part.by.chunks_exact(direction.len()).map(|row| dot(row, &direction)));
-                mesh.push(part.ends[1]);
-            }
-            // The last boundary to the last bit.
-            if let Some(last) = mesh.last_mut() {
-                *last = self.mesh[j + 1];
-            }
-        }
-        moved.extend_from_slice(&along[size..]);
-        (mesh.into(), profile, moved)
+        let Some(extra) = tangent.len().checked_sub(u.len()) else { return (mesh, profile, tangent.to_vec()) };
+        let along = piecewise::cut_direction(&tangent[extra..], self.intervals(), &switched, self.block());
+        (mesh, profile, [&tangent[..extra], &along].concat())
     }
 
     /// True if (4) replaces (3).

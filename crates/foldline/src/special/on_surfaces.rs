@@ -1,0 +1,196 @@
+//! Defining systems of grazings and boundary equilibria in two parameters.
+//!
+//! **Equations.** h is a switch of the field, τ the time at which it has the extremum next to zero:
+//!
+//! ```text
+//!   cycles       (1)  g = h(x(τ), λ),   ∂h/∂τ = 0,      dg = ∇h·δx(τ) + h_λ δλ
+//!   equilibria   (2)  g = h(x, λ),                      dg = ∇h·δx + h_λ δλ
+//! ```
+//!
+//! To first order the shift of τ does not matter in (1), because h has an extremum there.
+//!
+//! **Source.** dibernardo2008, §7.
+
+use super::grazing::{self, Extremum};
+use crate::contract::{Batch, Condition, Parameters};
+use crate::diagram::{Cycle, Kind, Mesh, Point, Solution};
+use crate::linalg::dot;
+use crate::problem::Setting;
+use crate::problem::gauss::Scheme;
+use crate::problem::piecewise::{self, PiecewiseFlow, Switched};
+use num_complex::Complex64;
+
+/// Defining system of a grazing of cycles, or of a boundary equilibrium.
+pub struct OnSurfaces<'a> {
+    setting: Setting<'a>,
+    kind: Kind,
+    switch: usize,
+    /// Scheme, mesh and forcing periods of a cycle; a cycle has its extremum at a time near `time`.
+    scheme: Scheme,
+    mesh: Mesh,
+    forcing_periods: u32,
+    time: Option<f64>,
+    /// State and parameters at the last evaluation, and the time, in normalised time, of a cycle.
+    state: Vec<f64>,
+    parameters: Vec<f64>,
+    found: f64,
+    switched: Vec<Switched>,
+}
+
+impl<'a> OnSurfaces<'a> {
+    /// Defining system for the switch that is next to zero at `at`, with the parameters of the setting; `None` if the field
+    /// has none, or `kind` does not fit.
+    pub fn new(kind: Kind, setting: Setting<'a>, at: &Solution) -> Option<OnSurfaces<'a>> {
+        let (field, count) = (setting.field, setting.field.switch_count());
+        let least = |switch: usize| -> Option<f64> {
+            match at {
+                Solution::Equilibrium(x) => {
+                    let batch = Batch {
+                        lanes: 1,
+                        states: x,
+                        parameters: Parameters::Shared(&setting.parameters),
+                        times: &[],
+                        signs: &[],
+                    };
+                    let mut values = vec![0.0; count];
+                    field.switches(batch, &mut values);
+                    Some(values[switch].abs())
+                }
+                Solution::Cycle(cycle) => {
+                    let (all, size) = grazing::extrema(field, &setting.parameters, cycle, switch);
+                    let nearest = all.iter().map(|e| e.value.abs()).fold(f64::INFINITY, f64::min);
+                    (size > 0.0).then_some(nearest / size)
+                }
+            }
+        };
+        let fits = match at {
+            Solution::Equilibrium(_) => kind == Kind::BoundaryEquilibrium,
+            Solution::Cycle(_) => kind == Kind::Grazing,
+        };
+        let switch = (0..count).filter(|_| fits).min_by(|a, b| {
+            let value = |switch: &usize| least(*switch).unwrap_or(f64::INFINITY);
+            value(a).total_cmp(&value(b))
+        })?;
+        let (degree, mesh, forcing_periods) = match at {
+            Solution::Equilibrium(_) => (1, Mesh::from([]), 0),
+            Solution::Cycle(cycle) => (cycle.degree, cycle.mesh.clone(), cycle.forcing_periods),
+        };
+        Some(OnSurfaces {
+            setting,
+            kind,
+            switch,
+            scheme: Scheme::new(degree),
+            mesh,
+            forcing_periods,
+            time: None,
+            state: Vec::new(),
+            parameters: Vec::new(),
+            found: 0.0,
+            switched: Vec::new(),
+        })
+    }
+
+    fn n(&self) -> usize {
+        self.setting.field.dim()
+    }
+
+    fn block(&self) -> usize {
+        (self.scheme.degree + 1) * self.n()
+    }
+
+    fn profile_size(&self) -> usize {
+        self.mesh.len().saturating_sub(1) * self.block()
+    }
+
+    /// A profile on the mesh with an interval for each part between switchings.
+    fn cycle(&self, mesh: Mesh, profile: Vec<f64>) -> Cycle {
+        Cycle {
+            period: 1.0,
+            forcing_periods: self.forcing_periods,
+            mesh,
+            degree: self.scheme.degree,
+            profile,
+            gain: Vec::new(),
+        }
+    }
+
+    /// The switch with its derivatives in the states and the unknowns λ, at the last evaluation.
+    fn derivatives(&self) -> (f64, Vec<f64>, Vec<f64>) {
+        let time = (self.forcing_periods > 0).then_some(f64::from(self.forcing_periods) * self.found);
+        let parameters = Parameters::Shared(&self.parameters);
+        let batch = Batch { lanes: 1, states: &self.state, parameters, times: time.as_slice(), signs: &[] };
+        let [h, hx, hp, _] = self.setting.linearise_switches(batch);
+        let (n, k, own) = (self.n(), self.setting.freedom(), self.switch);
+        (h[own], hx[own * n..(own + 1) * n].to_vec(), hp[own * k..(own + 1) * k].to_vec())
+    }
+}
+
+impl Condition for OnSurfaces<'_> {
+    fn kind(&self) -> Kind {
+        self.kind
+    }
+
+    fn extra(&self) -> usize {
+        0
+    }
+
+    fn guess(&self, _point: &Point) -> Vec<f64> {
+        Vec::new()
+    }
+
+    fn anchor(&mut self) {
+        self.time = Some(self.found);
+    }
+
+    fn set_mesh(&mut self, mesh: &Mesh) {
+        self.mesh = mesh.clone();
+    }
+
+    fn evaluate(&mut self, u: &[f64], _extra: &[f64], g: &mut [f64]) -> bool {
+        if self.kind == Kind::BoundaryEquilibrium {
+            let n = self.n();
+            (self.state, self.parameters) = (u[..n].to_vec(), self.setting.at(&u[n..]));
+        } else {
+            let size = self.profile_size();
+            self.parameters = self.setting.at(&u[size + 1..]);
+            let flow = PiecewiseFlow::new(&self.setting, &self.scheme, &u[size..], self.forcing_periods);
+            self.switched = flow.intervals(&u[..size], &self.mesh);
+            let (mesh, profile) = piecewise::cut(&u[..size], &self.mesh, &self.switched, self.block());
+            let cycle = self.cycle(mesh, profile);
+            let (extrema, _) = grazing::extrema(self.setting.field, &self.parameters, &cycle, self.switch);
+            let apart = |e: &Extremum| match self.time {
+                None => e.value.abs(),
+                Some(time) => (e.time - time - (e.time - time).round()).abs(),
+            };
+            let Some(nearest) = extrema.iter().min_by(|a, b| apart(a).total_cmp(&apart(b))) else { return false };
+            self.found = nearest.time;
+            self.state = cycle.state(nearest.time);
+        }
+        let (value, ..) = self.derivatives();
+        g[0] = value;
+        value.is_finite()
+    }
+
+    fn derivative(&mut self, du: &[f64], _extra: &[f64], dg: &mut [f64]) {
+        let (_, by_state, by_parameter) = self.derivatives();
+        let (moved, free) = match self.kind {
+            Kind::BoundaryEquilibrium => (du[..self.n()].to_vec(), &du[self.n()..]),
+            _ => {
+                let (size, intervals) = (self.profile_size(), self.mesh.len() - 1);
+                let along = piecewise::cut_direction(du, intervals, &self.switched, self.block());
+                let (mesh, _) = piecewise::cut(&du[..size], &self.mesh, &self.switched, self.block());
+                let profile = along[..along.len() - (du.len() - size)].to_vec();
+                (self.cycle(mesh, profile).state(self.found), &du[size + 1..])
+            }
+        };
+        dg[0] = dot(&by_state, &moved) + dot(&by_parameter, free);
+    }
+
+    fn held(&self, _extra: &[f64]) -> Vec<Complex64> {
+        Vec::new()
+    }
+
+    fn distance(&self, _z: Complex64) -> f64 {
+        f64::INFINITY
+    }
+}
