@@ -38,6 +38,8 @@ const ZERO: f64 = 1e-13;
 /// Place in a part, from its left end, at which it is seen on which side of the surface just passed the flow continues. A contact that
 /// is shorter is no deeper than the square of this.
 const AFTER: f64 = 1e-6;
+/// Length of a part, relative to its interval, below which it is left out.
+const SHORTEST: f64 = 1e-12;
 /// Jump of f, relative to the larger side, below which it is rounding.
 const CONTINUOUS: f64 = 1e-9;
 /// Step of central differences, in scales: the cube root of rounding.
@@ -204,14 +206,17 @@ impl<'a> PiecewiseFlow<'a> {
             }
             let part = self.until(&found.end, begin, ends[1], at, switch, &signs, &nodes)?;
             let (end, nodes) = part;
-            if end - begin > f64::EPSILON * length {
+            let passes = end - begin > SHORTEST * length;
+            if passes {
                 self.close(&mut found, [begin, end], nodes, &signs)?;
                 if !self.pass(&mut found, end, &signs, switch)? {
                     return None;
                 }
             }
             signs[switch] = -signs[switch];
-            (begin, passed) = (end, Some(switch));
+            // What is shorter has no part of its own: the next one begins where it does.
+            begin = if passes { end } else { begin };
+            passed = Some(switch);
             if begin >= ends[1] {
                 return Some(found);
             }
