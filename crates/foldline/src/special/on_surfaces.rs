@@ -194,3 +194,61 @@ impl Condition for OnSurfaces<'_> {
         f64::INFINITY
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::{Definition, Model, ModelSource, Parameter, State};
+    use crate::problem::{Axis, mesh};
+
+    /// x'' = -x - 5 max(x - d, 0) has the free solution x = A cos t, which touches d where A = d.
+    fn model() -> Model {
+        Model::compile(ModelSource {
+            name: "stop".into(),
+            parameters: vec![Parameter::new("d", 1.0), Parameter::new("k", 5.0)],
+            states: vec![State::new("x"), State::new("v")],
+            equations: vec![Definition::new("x", "v"), Definition::new("v", "-x - k*max(x - d, 0)")],
+            ..ModelSource::default()
+        })
+        .unwrap()
+    }
+
+    #[test]
+    fn the_derivative_of_a_grazing_is_that_of_the_extremum() {
+        let (model, scales) = (model(), [1.0, 1.0]);
+        let axes = vec![Axis::new(1, 1.0), Axis::new(0, 1.0)];
+        let setting = Setting { field: &model, scales: &scales, parameters: vec![1.0, 5.0], axes };
+        let (scheme, mesh) = (Scheme::new(4), mesh::uniform(20));
+        let profile = |size: f64| -> Vec<f64> {
+            let times = mesh.windows(2).flat_map(|p| scheme.nodes.iter().map(move |c| p[0] + c * (p[1] - p[0])));
+            times.flat_map(|t| [size * (6.2831853 * t + 0.3).cos(), -size * (6.2831853 * t + 0.3).sin()]).collect()
+        };
+        let cycle = Cycle {
+            period: 6.2831853,
+            forcing_periods: 0,
+            mesh: mesh.clone(),
+            degree: 4,
+            profile: profile(1.001),
+            gain: Vec::new(),
+        };
+        let mut own = OnSurfaces::new(Kind::Grazing, setting, &Solution::Cycle(cycle)).unwrap();
+        let at = |size: f64, d: f64| [&profile(size)[..], &[6.2831853, 5.0, d]].concat();
+        let mut g = [0.0];
+        let mut value = |own: &mut OnSurfaces, u: &[f64]| {
+            assert!(own.evaluate(u, &[], &mut g));
+            g[0]
+        };
+        for size in [0.999, 1.001] {
+            let u = at(size, 1.0);
+            let there = value(&mut own, &u);
+            assert!((there - (size - 1.0)).abs() < 1e-4, "{size}: {there}");
+            let du: Vec<f64> = at(1.0, 0.25).iter().zip(&at(0.0, 0.0)).map(|(a, b)| a - b).collect();
+            let mut dg = [0.0];
+            own.derivative(&du, &[], &mut dg);
+            let step = 1e-5;
+            let moved = |by: f64| -> Vec<f64> { u.iter().zip(&du).map(|(u, d)| u + by * d).collect() };
+            let difference = (value(&mut own, &moved(step)) - value(&mut own, &moved(-step))) / (2.0 * step);
+            assert!((dg[0] - difference).abs() < 1e-5, "{size}: {} {difference}", dg[0]);
+        }
+    }
+}
