@@ -78,6 +78,10 @@ impl VectorField for Counted<'_> {
         self.field.switches(at, out);
     }
 
+    fn switch_name(&self, switch: usize) -> String {
+        self.field.switch_name(switch)
+    }
+
     fn linearise_switches(
         &self,
         at: Batch,

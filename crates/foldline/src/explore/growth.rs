@@ -592,7 +592,7 @@ impl Growth<'_> {
         if matches!(special.kind, Kind::Grazing | Kind::BoundaryEquilibrium) {
             let remark = match special.kind {
                 Kind::Grazing => grazing::described(system.field, &special.point),
-                _ => special.remark.clone(),
+                _ => grazing::on_surface(system.field, &special.point, &special.remark),
             };
             return Coefficients { remark, ..Coefficients::default() };
         }

@@ -150,6 +150,10 @@ impl VectorField for Interruptible<'_> {
         self.field.switches(at, out);
     }
 
+    fn switch_name(&self, switch: usize) -> String {
+        self.field.switch_name(switch)
+    }
+
     fn linearise_switches(
         &self,
         at: Batch,

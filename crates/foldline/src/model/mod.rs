@@ -34,6 +34,7 @@ mod precise;
 mod rates;
 mod run;
 mod scope;
+mod show;
 mod source;
 mod switches;
 mod table;
@@ -422,6 +423,14 @@ impl VectorField for Model {
     fn evaluate_precisely(&self, states: &[[f64; 2]], parameters: &[[f64; 2]]) -> Option<Vec<[f64; 2]>> {
         let Compiled { graph, field, .. } = &self.inner.compiled;
         precise::evaluate(graph, field, states, parameters)
+    }
+
+    fn switch_name(&self, switch: usize) -> String {
+        let Switches { graph, switches, .. } = &self.inner.switches;
+        let states: Vec<&str> = self.states.iter().map(|own| own.name.as_str()).collect();
+        let parameters: Vec<&str> = self.parameters.iter().map(|own| own.name.as_str()).collect();
+        let text = switches.get(switch).and_then(|id| show::text(graph, *id, &states, &parameters));
+        text.unwrap_or_else(|| format!("switch {}", switch + 1))
     }
 
     fn linearise_switches(

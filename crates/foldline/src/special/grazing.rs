@@ -185,10 +185,16 @@ pub fn described(field: &dyn VectorField, at: &Point) -> String {
     let rises = rises(field, at, cycle, switch, own.time);
     let [before, after] = if rises { [below, above] } else { [above, below] };
     let name = field.switch_name(switch);
-    match own.maximum {
-        true => format!("{name} touches 0 from below: {before} → {after} contacts"),
-        false => format!("{name} touches 0 from above: {before} → {after} contacts"),
-    }
+    format!("contacts {before} → {after} at {name} = 0")
+}
+
+/// Words for a boundary equilibrium: the surface, and what becomes of the branch there.
+pub fn on_surface(field: &dyn VectorField, at: &Point, becomes: &str) -> String {
+    let Solution::Equilibrium(x) = &at.solution else { return becomes.into() };
+    let size = |switch: usize| value(field, &at.parameters, x, &[], switch)[0].abs();
+    let nearest = (0..field.switch_count()).min_by(|a, b| size(*a).total_cmp(&size(*b)));
+    let name = nearest.map_or_else(String::new, |switch| format!("{} = 0", field.switch_name(switch)));
+    if becomes.is_empty() { name } else { format!("{becomes} at {name}") }
 }
 
 /// True if the switch grows along the branch, at a time of the cycle.

@@ -33,7 +33,7 @@ pub struct OnSurfaces<'a> {
     /// State and parameters at the last evaluation, and the time, in normalised time, of a cycle.
     state: Vec<f64>,
     parameters: Vec<f64>,
-    found: f64,
+    found: Option<f64>,
     switched: Vec<Switched>,
 }
 
@@ -85,7 +85,7 @@ impl<'a> OnSurfaces<'a> {
             time: None,
             state: Vec::new(),
             parameters: Vec::new(),
-            found: 0.0,
+            found: None,
             switched: Vec::new(),
         })
     }
@@ -116,7 +116,7 @@ impl<'a> OnSurfaces<'a> {
 
     /// The switch with its derivatives in the states and the unknowns λ, at the last evaluation.
     fn derivatives(&self) -> (f64, Vec<f64>, Vec<f64>) {
-        let time = (self.forcing_periods > 0).then_some(f64::from(self.forcing_periods) * self.found);
+        let time = (self.forcing_periods > 0).then_some(f64::from(self.forcing_periods) * self.found.unwrap_or(0.0));
         let parameters = Parameters::Shared(&self.parameters);
         let batch = Batch { lanes: 1, states: &self.state, parameters, times: time.as_slice(), signs: &[] };
         let [h, hx, hp, _] = self.setting.linearise_switches(batch);
@@ -139,7 +139,7 @@ impl Condition for OnSurfaces<'_> {
     }
 
     fn anchor(&mut self) {
-        self.time = Some(self.found);
+        self.time = self.found.or(self.time);
     }
 
     fn set_mesh(&mut self, mesh: &Mesh) {
@@ -163,7 +163,7 @@ impl Condition for OnSurfaces<'_> {
                 Some(time) => (e.time - time - (e.time - time).round()).abs(),
             };
             let Some(nearest) = extrema.iter().min_by(|a, b| apart(a).total_cmp(&apart(b))) else { return false };
-            self.found = nearest.time;
+            self.found = Some(nearest.time);
             self.state = cycle.state(nearest.time);
         }
         let (value, ..) = self.derivatives();
@@ -180,7 +180,7 @@ impl Condition for OnSurfaces<'_> {
                 let along = piecewise::cut_direction(du, intervals, &self.switched, self.block());
                 let (mesh, _) = piecewise::cut(&du[..size], &self.mesh, &self.switched, self.block());
                 let profile = along[..along.len() - (du.len() - size)].to_vec();
-                (self.cycle(mesh, profile).state(self.found), &du[size + 1..])
+                (self.cycle(mesh, profile).state(self.found.unwrap_or(0.0)), &du[size + 1..])
             }
         };
         dg[0] = dot(&by_state, &moved) + dot(&by_parameter, free);

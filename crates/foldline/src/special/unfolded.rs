@@ -175,6 +175,10 @@ impl VectorField for Unfolded<'_> {
         self.field.switches(self.parts(at).0, out);
     }
 
+    fn switch_name(&self, switch: usize) -> String {
+        self.field.switch_name(switch)
+    }
+
     fn linearise_switches(
         &self,
         at: Batch,
