@@ -28,7 +28,10 @@ fn written(graph: &Graph, id: Id, leaf: &dyn Fn(Leaf) -> String) -> Option<(Stri
         Some((format!("{name}({})", texts?.join(", ")), 3))
     };
     let (text, strength) = match graph.node(id) {
-        Node::Constant(value) => (format!("{value}"), if value < 0.0 { 0 } else { 3 }),
+        Node::Constant(bits) => {
+            let value = f64::from_bits(bits);
+            (format!("{value}"), if value < 0.0 { 0 } else { 3 })
+        }
         Node::Leaf(own) => (leaf(own), 3),
         Node::Unary(Unary::Negate, a) => (format!("-{}", bound(a, 2)?), 1),
         Node::Unary(op, a) => call(&format!("{op:?}").to_lowercase(), &[a])?,
