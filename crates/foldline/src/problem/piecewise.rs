@@ -64,6 +64,11 @@ pub(crate) struct Part {
     pub nodes: Vec<f64>,
     /// `[m + 1][n × (n + 1 + k)]`: derivatives in the left end of the interval and in T, λ₁ … λ_k.
     pub by: Vec<f64>,
+    /// Signs of the switches.
+    signs: Vec<f64>,
+    /// The switch that changes sign at the right end, and true if f jumps there.
+    switch: Option<usize>,
+    jumps: bool,
     /// ∫ tr f_x dt, with the logarithm of the determinant of (4).
     trace: f64,
 }
@@ -335,12 +340,12 @@ impl<'a> PiecewiseFlow<'a> {
     }
 
     /// Appends a part with its derivatives (3), and moves the end there.
-    fn close(&self, found: &mut Switched, ends: [f64; 2], nodes: Vec<f64>, signs: &[f64]) -> Option<()> {
+    fn close(&self, found: &mut Switched, ends: [f64; 2], nodes: Vec<f64>, own_signs: &[f64]) -> Option<()> {
         let (n, m, width, k) = (self.n(), self.scheme.degree, self.width(), self.scalars.len() - 1);
         let (length, times) = self.course(ends);
         let states = self.lanes(&nodes[n..]);
         let [mut f, mut fx, mut fp] = [n, n * n, n * k].map(|size| vec![0.0; size * m]);
-        let signs: Vec<f64> = signs.iter().flat_map(|sign| std::iter::repeat_n(*sign, m)).collect();
+        let signs: Vec<f64> = own_signs.iter().flat_map(|sign| std::iter::repeat_n(*sign, m)).collect();
         let parameters = Parameters::Shared(&self.parameters);
         let batch = Batch { lanes: m, states: &states, parameters, times: &times, signs: &signs };
         self.setting.linearise(batch, &mut f, &mut fx, &mut fp);
@@ -373,7 +378,8 @@ impl<'a> PiecewiseFlow<'a> {
         found.end_by = combined(&by, n * width);
         let trace: f64 =
             (0..n).map(|c| dot(&self.scheme.weights, &fx[(c * n + c) * m..(c * n + c + 1) * m])).sum::<f64>() * length;
-        found.parts.push(Part { ends, nodes, by, trace });
+        let (signs, switch, jumps) = (own_signs.to_vec(), None, false);
+        found.parts.push(Part { ends, nodes, by, signs, switch, jumps, trace });
         found.end.iter().chain(&found.end_by).all(|x| x.is_finite()).then_some(())
     }
 
@@ -409,7 +415,10 @@ impl<'a> PiecewiseFlow<'a> {
     fn pass(&self, found: &mut Switched, t: f64, signs: &[f64], switch: usize) -> Option<bool> {
         let x = found.end.clone();
         let [before, after] = self.sides(&x, t, signs, switch);
-        if self.same(&before, &after) {
+        let jumps = !self.same(&before, &after);
+        let last = found.parts.last_mut()?;
+        (last.switch, last.jumps) = (Some(switch), jumps);
+        if !jumps {
             return Some(true);
         }
         let (n, width, time) = (self.n(), self.width(), self.time(t));
@@ -474,9 +483,113 @@ impl<'a> PiecewiseFlow<'a> {
         met
     }
 
-    /// The derivatives of an interval along a direction of its left end and the scalars: how `[m + 1][n × (n + 1 + k)]` of the Gauss points
-    /// and the right end change, by central differences of the flow.
+    /// The derivatives of an interval, `[m + 1][n × (n + 1 + k)]` at the Gauss points and at the right end, differentiated along a
+    /// direction of its left end and the scalars:
+    ///
+    /// ```text
+    ///   (5)  W_i = W + Σ_k a_ik (δℓ (f_x V_k + f_σ) + ℓ (D²f[V_k, δY_k] + f_x W_k)),   W ← W⁺ + (f_x⁻ V + f_σ⁻ - f_x⁺ V - f_σ⁺) δt
+    /// ```
+    ///
+    /// where the second relation, at a switching, has δt of (4). Where f jumps, by central differences of the flow.
     pub fn varied(&self, own: &Switched, x: &[f64], ends: [f64; 2], dx: &[f64], scalars: &[f64]) -> Option<Vec<f64>> {
+        if own.parts.iter().any(|part| part.jumps) {
+            return self.differences(own, x, ends, dx, scalars);
+        }
+        let (n, m, width, k) = (self.n(), self.scheme.degree, self.width(), self.scalars.len() - 1);
+        let direction = [dx, scalars].concat();
+        let free_change = self.setting.spread(&scalars[1..]);
+        let free_units: Vec<Vec<f64>> = (0..k)
+            .map(|p| self.setting.spread(&(0..k).map(|q| f64::from(u8::from(p == q))).collect::<Vec<f64>>()))
+            .collect();
+        let nothing = vec![0.0; free_change.len()];
+        let combined = |values: &[f64], size: usize| -> Vec<f64> {
+            let mut out = vec![0.0; size];
+            for (e, own) in self.scheme.end.iter().zip(values.chunks_exact(size)) {
+                out.iter_mut().zip(own).for_each(|(o, v)| *o += e * v);
+            }
+            out
+        };
+        let lanes = |columns: &dyn Fn(usize, usize) -> f64, parameters: &[f64]| -> Vec<f64> {
+            let states = (0..n).flat_map(|c| (0..m).map(move |i| (c, i))).map(|(c, i)| columns(c, i));
+            states.chain(parameters.iter().flat_map(|p| std::iter::repeat_n(*p, m))).collect()
+        };
+        let mut start = vec![0.0; n * width];
+        let mut all: Vec<Vec<f64>> = Vec::with_capacity(own.parts.len());
+        for part in &own.parts {
+            let (length, times) = self.course(part.ends);
+            let stretched = (part.ends[1] - part.ends[0]) * scalars[0];
+            let states = self.lanes(&part.nodes[n..]);
+            let signs: Vec<f64> = part.signs.iter().flat_map(|sign| std::iter::repeat_n(*sign, m)).collect();
+            let parameters = Parameters::Shared(&self.parameters);
+            let batch = Batch { lanes: m, states: &states, parameters, times: &times, signs: &signs };
+            let [mut f, mut fx, mut fp] = [n, n * n, n * k].map(|size| vec![0.0; size * m]);
+            self.setting.linearise(batch, &mut f, &mut fx, &mut fp);
+            // V at Gauss point i.
+            let by = |c: usize, i: usize, column: usize| part.by[((i + 1) * n + c) * width + column];
+            let change = |c: usize, i: usize| -> f64 {
+                dot(&part.by[((i + 1) * n + c) * width..((i + 1) * n + c + 1) * width], &direction)
+            };
+            let along = lanes(&change, &free_change);
+            let mut first = vec![0.0; n * m];
+            self.setting.field.directional(batch, &[&along], &mut first);
+            let mut rows = vec![0.0; m * n * width];
+            for column in 0..width {
+                let own_parameters = column.checked_sub(n + 1).map_or(&nothing, |p| &free_units[p]);
+                let own = lanes(&|c, i| by(c, i, column), own_parameters);
+                let mut second = vec![0.0; n * m];
+                self.setting.field.directional(batch, &[&own, &along], &mut second);
+                for c in 0..n {
+                    let rate = |at: usize| -> f64 {
+                        let moved: f64 = (0..n).map(|d| fx[(c * n + d) * m + at] * by(d, at, column)).sum();
+                        let forced = column.checked_sub(n + 1).map_or(0.0, |p| fp[(c * k + p) * m + at]);
+                        let by_period = if column == n { first[c * m + at] / self.scalars[0] } else { 0.0 };
+                        stretched * (moved + forced) + length * (second[c * m + at] + by_period)
+                    };
+                    let rates: Vec<f64> = (0..m).map(rate).collect();
+                    for i in 0..m {
+                        let share = dot(&self.scheme.integration[i * m..(i + 1) * m], &rates);
+                        rows[(i * n + c) * width + column] = start[c * width + column] + share;
+                    }
+                }
+            }
+            let mut matrix = self.matrix(length, &fx);
+            let mut pivots = vec![0; n * m];
+            lu::factorise(&mut matrix, n * m, &mut pivots).ok()?;
+            lu::solve(&matrix, n * m, &pivots, &mut rows, width);
+            let nodes = [&start[..], &rows].concat();
+            start = combined(&nodes, n * width);
+            all.push(nodes);
+            let Some(switch) = part.switch else { continue };
+            let (x, by) = (combined(&part.nodes, n), combined(&part.by, n * width));
+            let time = self.time(part.ends[1]);
+            let batch = Batch { lanes: 1, states: &x, parameters, times: time.as_slice(), signs: &[] };
+            let [_, hx, hp, ht] = self.setting.linearise_switches(batch);
+            let mut signs = part.signs.clone();
+            let sides = [(); 2].map(|()| {
+                let [mut f, mut fx, mut fp] = [n, n * n, n * k].map(|size| vec![0.0; size]);
+                self.setting.linearise(Batch { signs: &signs, ..batch }, &mut f, &mut fx, &mut fp);
+                signs[switch] = -signs[switch];
+                (f, fx, fp)
+            });
+            let gradient = &hx[switch * n..(switch + 1) * n];
+            let speed = dot(gradient, &sides[0].0) + ht[switch];
+            let moved: f64 = (0..n).map(|c| gradient[c] * dot(&by[c * width..(c + 1) * width], &direction)).sum();
+            let shift = -(moved + dot(&hp[switch * k..(switch + 1) * k], &scalars[1..])) / speed;
+            let rate = |(_, fx, fp): &(Vec<f64>, Vec<f64>, Vec<f64>), c: usize, column: usize| -> f64 {
+                let moved: f64 = (0..n).map(|d| fx[c * n + d] * by[d * width + column]).sum();
+                moved + column.checked_sub(n + 1).map_or(0.0, |p| fp[c * k + p])
+            };
+            for (c, column) in (0..n).flat_map(|c| (0..width).map(move |column| (c, column))) {
+                start[c * width + column] += (rate(&sides[0], c, column) - rate(&sides[1], c, column)) * shift;
+            }
+        }
+        let mut out = own.at_nodes(self.scheme, ends, &all, n * width);
+        out.extend(combined(all.last()?, n * width));
+        out.iter().all(|value| value.is_finite()).then_some(out)
+    }
+
+    /// [`PiecewiseFlow::varied`] by central differences.
+    fn differences(&self, own: &Switched, x: &[f64], ends: [f64; 2], dx: &[f64], scalars: &[f64]) -> Option<Vec<f64>> {
         let (n, scales) = (self.n(), self.setting.scales);
         let relative = (0..n).map(|c| (dx[c] / scales[c].max(x[c].abs())).abs());
         let others = scalars.iter().zip(&self.scalars).map(|(d, v)| (d / v.abs().max(1e-3)).abs());
@@ -532,11 +645,11 @@ impl Switched {
     }
 
     /// The part and the place in it of a place in the interval.
-    fn part(&self, t: f64) -> (&Part, f64) {
+    fn part(&self, t: f64) -> (usize, f64) {
         let last = self.parts.len() - 1;
         let own = self.parts.iter().position(|part| t <= part.ends[1]).unwrap_or(last);
         let part = &self.parts[own];
-        (part, ((t - part.ends[0]) / (part.ends[1] - part.ends[0])).clamp(0.0, 1.0))
+        (own, ((t - part.ends[0]) / (part.ends[1] - part.ends[0])).clamp(0.0, 1.0))
     }
 
     /// The flow at the Gauss points of the interval, `[m][n]`.
@@ -545,7 +658,7 @@ impl Switched {
         let mut out = vec![0.0; scheme.degree * n];
         for (x, c) in out.chunks_exact_mut(n).zip(&scheme.nodes[1..]) {
             let (part, s) = self.part(ends[0] + c * (ends[1] - ends[0]));
-            scheme.value_into(s, &part.nodes, x);
+            scheme.value_into(s, &self.parts[part].nodes, x);
         }
         out
     }
@@ -560,15 +673,21 @@ impl Switched {
 
     /// Derivatives of the flow at the Gauss points and at the right end, `[m + 1][n × (n + 1 + k)]`.
     pub fn derivatives(&self, scheme: &Scheme, ends: [f64; 2]) -> Vec<f64> {
-        let size = self.end_by.len();
+        let of_parts: Vec<&[f64]> = self.parts.iter().map(|part| &part.by[..]).collect();
+        let mut out = self.at_nodes(scheme, ends, &of_parts, self.end_by.len());
+        out.extend_from_slice(&self.end_by);
+        out
+    }
+
+    /// Polynomials `[m + 1][size]` on the parts, at the Gauss points of the interval.
+    fn at_nodes(&self, scheme: &Scheme, ends: [f64; 2], of_parts: &[impl AsRef<[f64]>], size: usize) -> Vec<f64> {
         let mut out = vec![0.0; scheme.degree * size];
         for (to, c) in out.chunks_exact_mut(size).zip(&scheme.nodes[1..]) {
             let (part, s) = self.part(ends[0] + c * (ends[1] - ends[0]));
-            for (weight, own) in scheme.interpolation(s).iter().zip(part.by.chunks_exact(size)) {
+            for (weight, own) in scheme.interpolation(s).iter().zip(of_parts[part].as_ref().chunks_exact(size)) {
                 to.iter_mut().zip(own).for_each(|(o, v)| *o += weight * v);
             }
         }
-        out.extend_from_slice(&self.end_by);
         out
     }
 }
@@ -699,4 +818,96 @@ fn root(at: &dyn Fn(f64) -> f64, mut left: f64, mut right: f64) -> f64 {
         }
     }
     0.5 * (left + right)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::{Definition, Model, ModelSource, Parameter, State};
+    use crate::problem::Axis;
+
+    /// A forced oscillator with the given force of its contact; parameters p and k.
+    fn model(force: &str) -> Model {
+        Model::compile(ModelSource {
+            name: "contact".into(),
+            parameters: vec![Parameter::new("p", 0.4), Parameter::new("k", 3.0)],
+            states: vec![State::new("x"), State::new("v")],
+            equations: vec![Definition::new("x", "v"), Definition::new("v", &format!("-x - 0.1*v - {force}"))],
+            ..ModelSource::default()
+        })
+        .unwrap()
+    }
+
+    fn flow<'a>(setting: &'a Setting<'a>, scalars: &[f64], x: &[f64], ends: [f64; 2]) -> Option<Switched> {
+        let scheme = Scheme::of(4);
+        let flow = PiecewiseFlow::new(setting, scheme, scalars, 0);
+        let sizes = vec![1.0; setting.field.switch_count()];
+        flow.along(0, x, ends, &x.repeat(5), &sizes)
+    }
+
+    /// Derivatives of the end, and of the derivatives, against differences; the orbit enters and leaves a contact in one interval.
+    #[test]
+    fn derivatives_through_switchings_are_those_of_the_flow() {
+        for (force, start) in [
+            ("k*max(x - p, 0)", [0.3, 0.9]),
+            ("if(x > p, k*(x - p)^2 + x - p, 0)", [0.3, 0.9]),
+            ("k*sign(v - p)", [0.3, 0.9]),
+        ] {
+            let (model, scales) = (model(force), [1.0, 1.0]);
+            let axes = vec![Axis::new(0, 1.0), Axis::new(1, 1.0)];
+            let setting = Setting { field: &model, scales: &scales, parameters: vec![0.4, 3.0], axes };
+            let (scalars, ends, n, width) = ([2.0, 0.4, 3.0], [0.1, 0.7], 2, 5);
+            let own = flow(&setting, &scalars, &start, ends).unwrap();
+            assert!(own.parts.len() > 1, "{force}");
+            let direction = [0.3, -0.2, 0.1, 0.25, 0.4];
+            let moved = |by: f64| {
+                let at = |k: usize| if k < n { start[k] } else { scalars[k - n] };
+                let all: Vec<f64> = (0..width).map(|k| at(k) + by * direction[k]).collect();
+                flow(&setting, &all[n..], &all[..n], ends).unwrap()
+            };
+            let step = 1e-5;
+            let (more, less) = (moved(step), moved(-step));
+            for c in 0..n {
+                let exact = dot(&own.end_by[c * width..(c + 1) * width], &direction);
+                let difference = (more.end[c] - less.end[c]) / (2.0 * step);
+                assert!((exact - difference).abs() < 1e-8, "{force}: {exact} {difference}");
+            }
+            let flow = PiecewiseFlow::new(&setting, Scheme::of(4), &scalars, 0);
+            let exact = flow.varied(&own, &start, ends, &direction[..n], &direction[n..]).unwrap();
+            let [more, less] = [more, less].map(|own| own.derivatives(Scheme::of(4), ends));
+            for (k, exact) in exact.iter().enumerate() {
+                let difference = (more[k] - less[k]) / (2.0 * step);
+                assert!((exact - difference).abs() < 1e-6, "{force} {k}: {exact} {difference}");
+            }
+        }
+    }
+
+    /// Free flight and contact of x'' = -x - 3 max(x, 0), integrated exactly: half periods π and π/2.
+    #[test]
+    fn an_orbit_through_a_contact_has_the_times_of_both_springs() {
+        let model = Model::compile(ModelSource {
+            states: vec![State::new("x"), State::new("v")],
+            equations: vec![Definition::new("x", "v"), Definition::new("v", "-x - 3*max(x, 0)")],
+            ..ModelSource::default()
+        })
+        .unwrap();
+        let setting = Setting { field: &model, scales: &[1.0, 1.0], parameters: vec![], axes: vec![] };
+        // From x = 0 with v = 1 in contact for π/2, then free.
+        let own = flow(&setting, &[1.0], &[0.0, 1.0], [0.0, 1.7]).unwrap();
+        assert_eq!(own.parts.len(), 2);
+        let leaves = own.parts[0].ends[1];
+        assert!((leaves - std::f64::consts::FRAC_PI_2).abs() < 1e-6, "{leaves}");
+    }
+
+    #[test]
+    fn an_extremum_between_sections_is_found() {
+        for depth in [1e-2, 1e-4, 1e-8, 1e-11] {
+            let at = |s: f64| (s - 0.51234f64).powi(2) - depth;
+            let places: Vec<f64> = (0..=SECTIONS).map(|k| k as f64 / SECTIONS as f64).collect();
+            let margins: Vec<f64> = places.iter().map(|s| at(*s)).collect();
+            let [left, right] = violated(&places, &margins, 0.0, &at).unwrap_or_else(|| panic!("{depth}"));
+            let place = root(&at, left, right);
+            assert!((place - (0.51234 - depth.sqrt())).abs() < 1e-9, "{depth}: {place}");
+        }
+    }
 }
