@@ -851,7 +851,7 @@ mod tests {
         for (force, start) in [
             ("k*max(x - p, 0)", [0.35, 0.9]),
             ("if(x > p, k*(x - p)^2 + x - p, 0)", [0.35, 0.9]),
-            ("k*sign(v - p)", [0.3, 0.55]),
+            ("k*heaviside(v - p)", [0.3, 0.55]),
         ] {
             let (model, scales) = (model(force), [1.0, 1.0]);
             let axes = vec![Axis::new(0, 1.0), Axis::new(1, 1.0)];
