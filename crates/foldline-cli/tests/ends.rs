@@ -130,13 +130,37 @@ fn a_branch_of_cycles_ends_at_its_hopf_point() {
     assert!(said.contains("shrank to an equilibrium at 0.000000") || said.contains("at -0.000000"), "{said}");
 }
 
+/// x = mu and x = -mu meet at a corner.
 #[test]
-fn a_branch_ends_at_a_corner() {
+fn a_branch_of_equilibria_turns_at_a_corner() {
     let states = [("x", "mu - abs(x)")];
-    Case { parameters: MU, states: &states, seed: "state = { x = 1 }", range: [-1.0, 2.0], more: "" }.ends(&[
-        "step size too small",
-        "the right-hand side has a non-smooth term",
-        "with a sharpness",
+    let case = Case {
+        parameters: MU,
+        states: &states,
+        seed: "state = { x = 1 }\nparameters = { mu = 1 }",
+        range: [-1.0, 2.0],
+        more: "",
+    };
+    let (code, said) = case.run();
+    assert_eq!(code, Some(0), "{said}");
+    assert!(said.contains("non-smooth fold at x = 0") && said.contains("1 special: reached 2; reached 2"), "{said}");
+}
+
+/// The equilibrium reaches a surface where f jumps over zero.
+#[test]
+fn a_branch_of_equilibria_ends_at_a_jump() {
+    let states = [("x", "mu - x - 2*heaviside(-x)")];
+    Case {
+        parameters: MU,
+        states: &states,
+        seed: "state = { x = 1 }\nparameters = { mu = 1 }",
+        range: [-1.0, 2.0],
+        more: "",
+    }
+    .ends(&[
+        "reaches a switching surface at which the right-hand side jumps",
+        "stay on the surface",
+        "smooth the jump",
     ]);
 }
 

@@ -188,6 +188,11 @@ pub trait ZeroProblem {
     /// Carries a vector from one mesh to another.
     fn transfer(&self, v: &[f64], from: &Mesh, to: &Mesh) -> Vec<f64>;
 
+    /// A solution on another mesh: like [`ZeroProblem::transfer`], but as accurate where the solution is not smooth.
+    fn carry(&self, u: &[f64], from: &Mesh, to: &Mesh) -> Vec<f64> {
+        self.transfer(u, from, to)
+    }
+
     /// A mesh on which `u` would meet `tolerance`, or `None` if it does on the current one. The last factorisation must
     /// be one near `u` on the current mesh.
     fn better_mesh(&self, u: &[f64], tolerance: f64) -> Option<Mesh>;

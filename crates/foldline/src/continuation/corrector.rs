@@ -391,7 +391,7 @@ pub fn refine(
             let Some(better) = coarser.take().or_else(|| problem.better_mesh(&u, wanted)) else { break };
             let from = problem.mesh();
             // The hyperplane passes through the point itself, so that remeshing does not move it along the curve.
-            u = problem.transfer(&u, &from, &better);
+            u = problem.carry(&u, &from, &better);
             row = problem.transfer(&row, &from, &better);
             problem.set_mesh(&better);
             problem.anchor(&u);

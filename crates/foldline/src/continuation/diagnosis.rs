@@ -134,10 +134,10 @@ impl Follow<'_> {
                 return (
                     format!(
                         "the right-hand side has {places} (abs, sign, heaviside, min, max, if, comparisons), and the \
-                         solution reaches a switching point here"
+                         solution slides along a switching surface, or several switchings coincide here"
                     ),
-                    "use a smooth function with a sharpness parameter, such as tanh(s*x) for sign(x) or sqrt(x^2 + \
-                     1/s^2) for abs(x), and continue the solution in s to the sharpness needed",
+                    "where a term jumps, as sign(x) does, use a smooth function with a sharpness parameter, such as \
+                     tanh(s*x), and continue the solution in s to the sharpness needed; otherwise try another tolerance",
                 );
             }
         }

@@ -143,6 +143,7 @@ impl Follow<'_> {
     /// there, on the branch beyond the surface. Also returns whether there is one.
     pub(super) fn up_to_surface(
         &mut self,
+        left: &Station,
         end: Option<Ending>,
         mut found: Vec<Found>,
         right: &mut Station,
@@ -150,6 +151,18 @@ impl Follow<'_> {
     ) -> (bool, Option<Ending>, Vec<Found>) {
         let surface =
             |item: &Found| matches!(item, Found::Special(special) if special.kind == Kind::BoundaryEquilibrium);
+        // The surface from which the step leaves, seen again for rounding.
+        let begins = |walk: &mut Self, item: &Found| match item {
+            Found::Special(special) if surface(item) => {
+                let u = walk.problem.unknowns_of(&special.point);
+                let off: Vec<f64> = u.iter().zip(&left.u).map(|(a, b)| a - b).collect();
+                walk.problem.relative_size(&off, &left.u) < walk.settings.newton_tolerance()
+            }
+            _ => false,
+        };
+        if self.holds {
+            found.retain(|item| !begins(self, item));
+        }
         let Some(at) = found.iter().position(surface).filter(|_| self.holds) else { return (false, end, found) };
         found.truncate(at + 1);
         let Some(Found::Special(special)) = found.last_mut() else { return (false, end, found) };
@@ -432,7 +445,8 @@ impl Follow<'_> {
     /// relative distance across it.
     fn against(&mut self, found: &Station, image: &Image) -> (f64, f64) {
         self.place(found);
-        let [u, along] = [&image.u, &image.tangent].map(|v| self.problem.transfer(v, &image.mesh, &found.mesh));
+        let u = self.problem.carry(&image.u, &image.mesh, &found.mesh);
+        let along = self.problem.transfer(&image.tangent, &image.mesh, &found.mesh);
         let size = self.direction * self.problem.dot(&along, &along).sqrt();
         let mut off: Vec<f64> = found.u.iter().zip(&u).map(|(a, b)| a - b).collect();
         let ahead = self.problem.dot(&along, &off) / size;

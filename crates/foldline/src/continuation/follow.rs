@@ -190,7 +190,7 @@ pub fn follow(
             _ => found,
         };
         let (end, found) = walk.up_to_end(end, found, &mut right);
-        let (crossing, end, found) = walk.up_to_surface(end, found, &mut right, &mut cost);
+        let (crossing, end, found) = walk.up_to_surface(&left, end, found, &mut right, &mut cost);
         let between = between.filter(|_| !crossing);
         let between = between.unwrap_or_else(|| walk.between(&left, &right));
         let (angle, length) = (between.angle, between.along);
@@ -361,7 +361,7 @@ impl Follow<'_> {
             }
             return true;
         }
-        left.u = self.problem.transfer(&left.u, &left.mesh, &better);
+        left.u = self.problem.carry(&left.u, &left.mesh, &better);
         left.tangent = self.problem.transfer(&left.tangent, &left.mesh, &better);
         left.mesh = better;
         true

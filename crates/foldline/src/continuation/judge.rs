@@ -67,7 +67,7 @@ impl Follow<'_> {
     /// another branch.
     pub(super) fn continues(&mut self, left: &Station, right: &Station, guess: &[f64]) -> Result<Between, Failure> {
         self.place(left);
-        let landed = self.problem.transfer(&right.u, &right.mesh, &left.mesh);
+        let landed = self.problem.carry(&right.u, &right.mesh, &left.mesh);
         let tangent = self.problem.transfer(&right.tangent, &right.mesh, &left.mesh);
         let miss: Vec<f64> = landed.iter().zip(guess).map(|(a, b)| a - b).collect();
         let chord: Vec<f64> = landed.iter().zip(&left.u).map(|(a, b)| a - b).collect();
@@ -120,7 +120,7 @@ impl Follow<'_> {
     /// with the matrix of `right`, where and on whose mesh the problem was factorised last. Returns the deviation as a
     /// share of the step, and its limit.
     pub(super) fn is_nearly_smooth(&mut self, left: &Station, right: &Station) -> Result<[f64; 2], Failure> {
-        let u = self.problem.transfer(&left.u, &left.mesh, &right.mesh);
+        let u = self.problem.carry(&left.u, &left.mesh, &right.mesh);
         let tangent = self.problem.transfer(&left.tangent, &left.mesh, &right.mesh);
         let gap: Vec<f64> = right.u.iter().zip(&u).map(|(a, b)| a - b).collect();
         let (length, forward) = (self.problem.dot(&tangent, &gap), self.problem.dot(&tangent, &right.tangent));
@@ -174,7 +174,7 @@ impl Follow<'_> {
         // Mesh and phase are those of the left end: on the mesh of the right end it need not be a solution, and in its
         // phase it would be shifted in time.
         self.place(left);
-        let from = self.problem.transfer(&right.u, &right.mesh, &left.mesh);
+        let from = self.problem.carry(&right.u, &right.mesh, &left.mesh);
         let tangent = self.problem.transfer(&right.tangent, &right.mesh, &left.mesh);
         let gap: Vec<f64> = left.u.iter().zip(&from).map(|(a, b)| a - b).collect();
         let distance = self.problem.dot(&tangent, &gap);

@@ -58,7 +58,7 @@ impl<'s> Stretch<'s> {
     pub fn new(problem: &mut dyn ZeroProblem, left: &'s Station, right: &Station, direction: f64) -> Stretch<'s> {
         problem.set_mesh(&left.mesh);
         problem.anchor(&left.u);
-        let u = problem.transfer(&right.u, &right.mesh, &left.mesh);
+        let u = problem.carry(&right.u, &right.mesh, &left.mesh);
         let mut slope = problem.transfer(&right.tangent, &right.mesh, &left.mesh);
         let gap: Vec<f64> = u.iter().zip(&left.u).map(|(a, b)| a - b).collect();
         let length = problem.dot(&left.tangent, &gap);
@@ -591,7 +591,7 @@ fn relocate(
     let (mut a, (mut ga, mut found)) = match finer {
         None => (0.0, (value(coarse), coarse.clone())),
         Some(_) => {
-            let base = problem.transfer(&coarse.u, &coarse.mesh, mesh);
+            let base = problem.carry(&coarse.u, &coarse.mesh, mesh);
             (0.0, at(problem, base, settings.closeness(mesh, stretch.length))?)
         }
     };

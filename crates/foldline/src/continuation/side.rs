@@ -94,7 +94,7 @@ impl Follow<'_> {
     /// Moves a station to another mesh, on the same side of special points; `None` if there is no such position within
     /// its error.
     pub(super) fn carried(&mut self, from: &Station, mesh: &Mesh, length: f64, cost: &mut Cost) -> Option<Station> {
-        let base = self.problem.transfer(&from.u, &from.mesh, mesh);
+        let base = self.problem.carry(&from.u, &from.mesh, mesh);
         let tangent = self.problem.transfer(&from.tangent, &from.mesh, mesh);
         let close = self.settings.closeness(mesh, length);
         let mut at = |walk: &mut Self, s: f64| {

@@ -87,7 +87,7 @@ impl Follow<'_> {
     pub(super) fn between(&mut self, left: &Station, right: &Station) -> Between {
         self.place(left);
         let tangent = self.problem.transfer(&right.tangent, &right.mesh, &left.mesh);
-        let mut chord = self.problem.transfer(&right.u, &right.mesh, &left.mesh);
+        let mut chord = self.problem.carry(&right.u, &right.mesh, &left.mesh);
         chord.iter_mut().zip(&left.u).for_each(|(a, b)| *a -= b);
         self.lie(left, &tangent, &chord)
     }
@@ -120,7 +120,7 @@ impl Follow<'_> {
             let bend = 0.5 * step * step / d.max(0.2 * step);
             (0..guess.len()).for_each(|i| guess[i] += bend * (left.tangent[i] - then[i]));
         } else {
-            let before = self.problem.transfer(&trail.u, &trail.mesh, &left.mesh);
+            let before = self.problem.carry(&trail.u, &trail.mesh, &left.mesh);
             for i in 0..guess.len() {
                 let (chord, turn) = (before[i] - left.u[i] + d * left.tangent[i], d * (then[i] - left.tangent[i]));
                 guess[i] += x * x * ((3.0 * chord + turn) + x * (2.0 * chord + turn));

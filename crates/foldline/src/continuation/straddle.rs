@@ -84,7 +84,7 @@ pub fn straddle(
         let mut refined = Vec::with_capacity(stations.len());
         for from in &stations {
             problem.set_mesh(&finer);
-            let mut u = problem.transfer(&from.u, &from.mesh, &finer);
+            let mut u = problem.carry(&from.u, &from.mesh, &finer);
             let row = problem.transfer(&stretch.left.tangent, &stretch.left.mesh, &finer);
             problem.anchor(&u);
             let plane = Plane { row: row.clone(), base: u.clone(), distance: 0.0 };

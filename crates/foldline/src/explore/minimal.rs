@@ -105,7 +105,7 @@ fn on_equal_turns(system: &System, settings: &Settings, point: &Point, cycle: &C
     let mut problem = problem_of(system, 0, cycle.degree, point, false);
     let u = problem.unknowns_of(point);
     problem.anchor(&u);
-    let mut u = problem.transfer(&u, &cycle.mesh, &equal);
+    let mut u = problem.carry(&u, &cycle.mesh, &equal);
     problem.set_mesh(&equal);
     problem.anchor(&u);
     let plane = Plane { row: parameter_row(u.len()), base: u.clone(), distance: 0.0 };

@@ -287,7 +287,7 @@ pub(super) fn across(
     let (own, own_mesh) = (&at.point.tangent, mesh.clone());
     let leaves = |problem: &dyn ZeroProblem, found: &Station| {
         let tangent = problem.transfer(&found.tangent, &found.mesh, &own_mesh);
-        let mut chord = problem.transfer(&found.u, &found.mesh, &own_mesh);
+        let mut chord = problem.carry(&found.u, &found.mesh, &own_mesh);
         chord.iter_mut().zip(u).for_each(|(a, b)| *a -= b);
         let angle = |a: &[f64]| {
             let lengths = (problem.dot(a, a) * problem.dot(own, own)).sqrt();

@@ -319,6 +319,11 @@ impl ZeroProblem for Held<'_> {
         [&v[..e], &self.surface.transfer(&v[e..], from, to)].concat()
     }
 
+    fn carry(&self, u: &[f64], from: &Mesh, to: &Mesh) -> Vec<f64> {
+        let e = self.extra();
+        [&u[..e], &self.surface.carry(&u[e..], from, to)].concat()
+    }
+
     fn better_mesh(&self, u: &[f64], tolerance: f64) -> Option<Mesh> {
         self.surface.better_mesh(&u[self.extra()..], tolerance)
     }

@@ -14,9 +14,9 @@ use crate::linalg::lane::{Eight, Lane as _};
 /// Largest permitted number of intervals.
 pub const LARGEST: usize = 4000;
 const SMALLEST: usize = 6;
-/// Ratio of the lengths of two intervals below which the density of the shorter one does not spread to the other: much less
-/// than a mesh made by [`equidistributed`] has.
-const SLIVER: f64 = 1e-6;
+/// Ratio of the lengths of neighbouring intervals below which the shorter one is a sliver: in a mesh made by
+/// [`equidistributed`] the ratio is at least 0.1.
+const SLIVER: f64 = 1e-3;
 
 /// Mesh of N equal intervals.
 pub fn uniform(intervals: usize) -> Mesh {
@@ -64,9 +64,13 @@ pub fn equidistributed(errors: &[f64], mesh: &Mesh, degree: usize, target: f64, 
     let mean: f64 = (0..count).map(|j| raw[j] * (mesh[j + 1] - mesh[j])).sum();
     // A lower bound and a glance at the neighbours keep the mesh from tearing where the estimate happens to vanish, and
     // leave room for a layer to move. Fine parts are coarsened only gradually, because a layer may return.
-    // An interval that is so much shorter than this one, as between two switchings, says nothing of it.
+    // The density of a sliver, as between two switchings, is mostly rounding over its length. It takes no more intervals
+    // next to it than it has itself, and one for it to move there.
     let length = |j: usize| mesh[j + 1] - mesh[j];
-    let there = |j: usize, other: usize| if length(other) < SLIVER * length(j) { 0.0 } else { raw[other] };
+    let there = |j: usize, other: usize| match length(other) < SLIVER * length(j) {
+        true => (raw[other] * length(other) + 1.0) / length(j),
+        false => raw[other],
+    };
     let beside = |j: usize, k: usize| there(j, (j + k) % count).max(there(j, (j + count - k) % count));
     let density: Vec<f64> = (0..count)
         .map(|j| {

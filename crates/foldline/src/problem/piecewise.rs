@@ -80,6 +80,12 @@ pub(crate) struct Switched {
     pub interval: usize,
     /// The parts, in order.
     pub parts: Vec<Part>,
+    /// True if f jumps at a switching.
+    pub jumps: bool,
+    /// Largest value of every switch along the orbit.
+    sizes: Vec<f64>,
+    /// Logarithm of the determinants of (4) at the left end.
+    trace: f64,
     /// `[n]` and `[n × (n + 1 + k)]`: the right end and its derivatives.
     pub end: Vec<f64>,
     pub end_by: Vec<f64>,
@@ -144,7 +150,7 @@ impl<'a> PiecewiseFlow<'a> {
         let each = suspects.into_iter().filter_map(|j| {
             let nodes = &profile[j * block..(j + 1) * block];
             let found = self.along(j, &nodes[..self.n()], [mesh[j], mesh[j + 1]], nodes, &sizes)?;
-            (found.parts.len() > 1).then_some(found)
+            (found.parts.len() > 1 || found.jumps).then_some(found)
         });
         each.collect()
     }
@@ -175,12 +181,16 @@ impl<'a> PiecewiseFlow<'a> {
     /// The flow from `x` over an interval; `guess` `[m + 1][n]` is a polynomial next to it. `None` if it cannot be had.
     fn along(&self, interval: usize, x: &[f64], ends: [f64; 2], guess: &[f64], sizes: &[f64]) -> Option<Switched> {
         let (n, width) = (self.n(), self.width());
-        let mut signs: Vec<f64> = self
-            .switches(x, self.time(ends[0]).as_slice())
-            .iter()
-            .map(|value| if *value > 0.0 { 1.0 } else { -1.0 })
-            .collect();
-        let mut found = Switched { interval, parts: Vec::new(), end: x.to_vec(), end_by: vec![0.0; n * width] };
+        let mut signs = self.signs_before(x, ends[0], sizes);
+        let mut found = Switched {
+            interval,
+            parts: Vec::new(),
+            jumps: false,
+            sizes: sizes.to_vec(),
+            trace: 0.0,
+            end: x.to_vec(),
+            end_by: vec![0.0; n * width],
+        };
         (0..n).for_each(|c| found.end_by[c * width + c] = 1.0);
         let (mut begin, mut passed, mut back) = (ends[0], None, 0);
         let length = ends[1] - ends[0];
@@ -214,9 +224,9 @@ impl<'a> PiecewiseFlow<'a> {
             let passes = end - begin > SHORTEST * length;
             if passes {
                 self.close(&mut found, [begin, end], nodes, &signs)?;
-                if !self.pass(&mut found, end, &signs, switch)? {
-                    return None;
-                }
+            }
+            if !self.pass(&mut found, end, &signs, switch, passes)? {
+                return None;
             }
             signs[switch] = -signs[switch];
             // What is shorter has no part of its own: the next one begins where it does.
@@ -226,6 +236,26 @@ impl<'a> PiecewiseFlow<'a> {
                 return Some(found);
             }
         }
+    }
+
+    /// Signs of the switches just before `x`, at normalised time `t`: a switching at the left end of an interval belongs to it.
+    fn signs_before(&self, x: &[f64], t: f64, sizes: &[f64]) -> Vec<f64> {
+        let time = self.time(t);
+        let values = self.switches(x, time.as_slice());
+        let mut signs: Vec<f64> = values.iter().map(|value| if *value > 0.0 { 1.0 } else { -1.0 }).collect();
+        if (0..signs.len()).all(|k| values[k].abs() > ZERO * sizes[k]) {
+            return signs;
+        }
+        let parameters = Parameters::Shared(&self.parameters);
+        let batch = Batch { lanes: 1, states: x, parameters, times: time.as_slice(), signs: &[] };
+        let [_, hx, _, ht] = self.setting.linearise_switches(batch);
+        let (n, mut f) = (self.n(), vec![0.0; self.n()]);
+        self.setting.field.evaluate(batch, &mut f);
+        for k in (0..signs.len()).filter(|k| values[*k].abs() <= ZERO * sizes[*k]) {
+            let speed = dot(&hx[k * n..(k + 1) * n], &f) + ht[k];
+            signs[k] = if speed == 0.0 { signs[k] } else { -speed.signum() };
+        }
+        signs
     }
 
     /// The part from `begin` to where the switch vanishes, near the place `at` of a trial to `last`: its right end and its nodes.
@@ -412,12 +442,14 @@ impl<'a> PiecewiseFlow<'a> {
 
     /// (4) at the end of the last part, which is at time `t`; `signs` are those of that part. False if the flow does not leave the surface
     /// on the other side.
-    fn pass(&self, found: &mut Switched, t: f64, signs: &[f64], switch: usize) -> Option<bool> {
+    fn pass(&self, found: &mut Switched, t: f64, signs: &[f64], switch: usize, ends: bool) -> Option<bool> {
         let x = found.end.clone();
         let [before, after] = self.sides(&x, t, signs, switch);
         let jumps = !self.same(&before, &after);
-        let last = found.parts.last_mut()?;
-        (last.switch, last.jumps) = (Some(switch), jumps);
+        if let Some(last) = found.parts.last_mut().filter(|_| ends) {
+            (last.switch, last.jumps) = (Some(switch), jumps);
+        }
+        found.jumps |= jumps;
         if !jumps {
             return Some(true);
         }
@@ -437,7 +469,10 @@ impl<'a> PiecewiseFlow<'a> {
             let shift = -(own + direct) / speed;
             (0..n).for_each(|c| found.end_by[c * width + column] += (before[c] - after[c]) * shift);
         }
-        found.parts.last_mut()?.trace += (speed_after / speed).ln();
+        match found.parts.last_mut() {
+            Some(last) => last.trace += (speed_after / speed).ln(),
+            None => found.trace += (speed_after / speed).ln(),
+        }
         Some(true)
     }
 
@@ -492,7 +527,7 @@ impl<'a> PiecewiseFlow<'a> {
     ///
     /// where the second relation, at a switching, has δt of (4). Where f jumps, by central differences of the flow.
     pub fn varied(&self, own: &Switched, x: &[f64], ends: [f64; 2], dx: &[f64], scalars: &[f64]) -> Option<Vec<f64>> {
-        if own.parts.iter().any(|part| part.jumps) {
+        if own.jumps {
             return self.differences(own, x, ends, dx, scalars);
         }
         let (n, m, width, k) = (self.n(), self.scheme.degree, self.width(), self.scalars.len() - 1);
@@ -598,13 +633,12 @@ impl<'a> PiecewiseFlow<'a> {
             return Some(vec![0.0; (self.scheme.degree + 1) * n * self.width()]);
         }
         let step = STEP / size;
-        let sizes = vec![0.0; self.setting.field.switch_count()];
         let guess = self.guess(own);
         let at = |by: f64| {
             let moved: Vec<f64> = x.iter().zip(dx).map(|(x, d)| x + by * d).collect();
             let there: Vec<f64> = self.scalars.iter().zip(scalars).map(|(v, d)| v + by * d).collect();
             let flow = PiecewiseFlow::new(self.setting, self.scheme, &there, self.forcing_periods);
-            Some(flow.along(own.interval, &moved, ends, &guess, &sizes)?.derivatives(self.scheme, ends))
+            Some(flow.along(own.interval, &moved, ends, &guess, &own.sizes)?.derivatives(self.scheme, ends))
         };
         let (more, less) = (at(step)?, at(-step)?);
         Some(more.iter().zip(&less).map(|(a, b)| (a - b) / (2.0 * step)).collect())
@@ -620,17 +654,16 @@ impl<'a> PiecewiseFlow<'a> {
     }
 
     /// The transition of an interval from parts of half the length, `[n × n]`: more accurate than its own.
-    pub fn refined(&self, interval: usize, x: &[f64], [begin, end]: [f64; 2], nodes: &[f64]) -> Option<Vec<f64>> {
-        let (n, width) = (self.n(), self.width());
-        let sizes = vec![0.0; self.setting.field.switch_count()];
+    pub fn refined(&self, own: &Switched, x: &[f64], [begin, end]: [f64; 2], nodes: &[f64]) -> Option<Vec<f64>> {
+        let (n, width, interval, sizes) = (self.n(), self.width(), own.interval, &own.sizes);
         let middle = 0.5 * (begin + end);
         let half = |from: [f64; 2]| -> Vec<f64> {
             let mut x = vec![0.0; n];
             self.scheme.value_into(from[0], nodes, &mut x);
             [x, self.restricted(nodes, from)].concat()
         };
-        let first = self.along(interval, x, [begin, middle], &half([0.0, 0.5]), &sizes)?;
-        let second = self.along(interval, &first.end, [middle, end], &half([0.5, 1.0]), &sizes)?;
+        let first = self.along(interval, x, [begin, middle], &half([0.0, 0.5]), sizes)?;
+        let second = self.along(interval, &first.end, [middle, end], &half([0.5, 1.0]), sizes)?;
         let entry = |i: usize, k: usize| {
             (0..n).map(|j| second.end_by[i * width + j] * first.end_by[j * width + k]).sum::<f64>()
         };
@@ -641,7 +674,7 @@ impl<'a> PiecewiseFlow<'a> {
 impl Switched {
     /// ∫ tr f_x dt over the interval.
     pub fn trace(&self) -> f64 {
-        self.parts.iter().map(|part| part.trace).sum()
+        self.trace + self.parts.iter().map(|part| part.trace).sum::<f64>()
     }
 
     /// The part and the place in it of a place in the interval.

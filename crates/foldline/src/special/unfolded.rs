@@ -278,6 +278,10 @@ impl ZeroProblem for UnfoldedCycles<'_> {
         self.cycles.transfer(v, from, to)
     }
 
+    fn carry(&self, u: &[f64], from: &Mesh, to: &Mesh) -> Vec<f64> {
+        self.cycles.carry(u, from, to)
+    }
+
     fn better_mesh(&self, u: &[f64], tolerance: f64) -> Option<Mesh> {
         self.cycles.better_mesh(u, tolerance)
     }

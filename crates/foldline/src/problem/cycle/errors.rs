@@ -187,9 +187,10 @@ impl CycleProblem<'_> {
         let (square, block) = (self.n * self.n, self.block());
         for (transitions, orbit) in [(&mut own, u), (&mut other, &better)] {
             let flow = self.flow(orbit);
-            for j in switched.iter().map(|found| found.interval) {
+            for found in switched {
+                let j = found.interval;
                 let nodes = &orbit[j * block..(j + 1) * block];
-                let refined = flow.refined(j, &nodes[..self.n], self.interval(j), nodes)?;
+                let refined = flow.refined(found, &nodes[..self.n], self.interval(j), nodes)?;
                 transitions[j * square..(j + 1) * square].copy_from_slice(&refined);
             }
         }

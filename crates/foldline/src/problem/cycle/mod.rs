@@ -481,6 +481,23 @@ impl ZeroProblem for CycleProblem<'_> {
         out
     }
 
+    fn carry(&self, u: &[f64], from: &Mesh, to: &Mesh) -> Vec<f64> {
+        if self.setting.field.switch_count() == 0 || mesh::same(from, to) {
+            return self.transfer(u, from, to);
+        }
+        let (size, block) = (u.len() - 1 - self.setting.freedom(), self.block());
+        let flow = PiecewiseFlow::new(&self.setting, &self.scheme, &u[size..], self.forcing_periods);
+        let (mesh, profile) = piecewise::cut(&u[..size], from, &flow.intervals(&u[..size], from), block);
+        let mut out = mesh::transferred(&profile, self.n, &self.scheme, &mesh, to);
+        for found in flow.intervals(&out, to) {
+            let j = found.interval;
+            let inner = found.inner(&self.scheme, [to[j], to[j + 1]]);
+            out[j * block + self.n..(j + 1) * block].copy_from_slice(&inner);
+        }
+        out.extend_from_slice(&u[size..]);
+        out
+    }
+
     fn better_mesh(&self, u: &[f64], tolerance: f64) -> Option<Mesh> {
         let errors = self.errors(u);
         let tolerance = tolerance.max(self.rounding(u));

@@ -1,0 +1,233 @@
+//! Piecewise-smooth models, continued without smoothing: against closed forms, and against cycles computed by multiple
+//! shooting with event location.
+
+use foldline::contract::{Observer, Unobserved};
+use foldline::diagram::{Branch, Diagram, Ending, Kind, SpecialPoint};
+use foldline::explore::{self, System};
+use foldline_store::study_file::parse_study;
+
+const ROTOR: &str = include_str!("../../../models/overhung-rotor-piecewise.toml");
+const REFERENCE: &str = include_str!("reference/exact_contact.csv");
+
+/// x'' + c x' + x + k max(x - d, 0) = A cos(w t).
+fn oscillator(d: f64, k: f64, a: f64) -> String {
+    format!(
+        "name = \"spring\"\n[parameters]\nw = 1\nc = 0.05\nA = {a}\nd = {d}\nk = {k}\n[forcing]\nfrequency = \"w\"\n\
+         [states.x]\nequation = \"v\"\nrange = [-2, 2]\n[states.v]\n\
+         equation = \"A*cos(w*t) - c*v - x - k*max(x - d, 0)\"\nrange = [-2, 2]\n"
+    )
+}
+
+#[track_caller]
+fn run(model: &str, study: &str) -> Diagram {
+    observed(model, study, Diagram::default(), &Unobserved)
+}
+
+#[track_caller]
+fn observed(model: &str, study: &str, earlier: Diagram, observer: &dyn Observer) -> Diagram {
+    let text = format!("model = \"m\"\n{study}");
+    let study = parse_study(&text, "study", model, "model").unwrap_or_else(|found| panic!("{found:?}"));
+    explore::run(&System::of_plan(&study.model, &study.plan), &study.plan, 1, earlier, observer)
+}
+
+#[track_caller]
+fn branch<'d>(diagram: &'d Diagram, name: &str) -> &'d Branch {
+    let found = diagram.branch(name).unwrap_or_else(|| panic!("{name}"));
+    assert!(found.ends.iter().all(|end| end.as_ref().is_some_and(Ending::complete)), "{name}: {:?}", found.ends);
+    assert!(found.special.iter().all(|special| special.kind != Kind::Unexplained), "{name}");
+    found
+}
+
+/// Asserts that a branch has these special points and no others, within `error`, which must not exceed what is stated by
+/// more than a factor of 2 either way than needed: the stated errors bound the actual ones.
+#[track_caller]
+fn has(branch: &Branch, expected: &[(Kind, f64)], error: f64) {
+    let value = |special: &SpecialPoint| special.point.parameters[branch.free];
+    let mut found: Vec<(Kind, f64, f64)> = branch.special.iter().map(|s| (s.kind, value(s), s.error)).collect();
+    found.retain(|(kind, ..)| *kind != Kind::Mark);
+    let mut expected = expected.to_vec();
+    found.sort_by(|a, b| a.1.total_cmp(&b.1));
+    expected.sort_by(|a, b| a.1.total_cmp(&b.1));
+    assert_eq!(found.len(), expected.len(), "{}: {found:?}", branch.name);
+    for ((kind, own, stated), (wanted, known)) in found.iter().zip(&expected) {
+        let off = (own - known).abs() / (1.0 + known.abs());
+        assert!(kind == wanted && off < error && off < *stated, "{}: {kind} {own}, {wanted} {known}", branch.name);
+    }
+}
+
+/// Folds and grazings of the response of an oscillator that touches a spring.
+#[test]
+fn a_response_passes_the_grazings_of_its_stop() {
+    let study = "tolerance = 1e-8\n[[seed]]\nname = \"s\"\nattractor = \"cycle\"\nparameters = { w = 0.6 }\nsamples = 8\n\
+        [[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"w\"\nrange = [0.5, 1.6]\n\
+        [[curve]]\nname = \"graze\"\nhold = \"grazing\"\nof = \"b\"\nnear = 1.13\nfree = \"A\"\nrange = [0.1, 1]\n";
+    let diagram = run(&oscillator(1.0, 5.0, 0.3), study);
+    // The grazings are those of the linear oscillator: A² = (1 - w²)² + (c w)². Folds: multiple shooting.
+    let known = [
+        (Kind::Grazing, 0.838417181211),
+        (Kind::Fold, 1.335112494893),
+        (Kind::Fold, 1.137578740375),
+        (Kind::Grazing, 1.137785845513),
+    ];
+    has(branch(&diagram, "b"), &known, 1e-9);
+    let contacts: Vec<&str> =
+        branch(&diagram, "b").special.iter().filter(|s| s.kind == Kind::Grazing).map(|s| s.remark.as_str()).collect();
+    assert_eq!(contacts, ["contacts 0 → 1 at x - d = 0", "contacts 1 → 0 at x - d = 0"]);
+    let curve = branch(&diagram, "graze");
+    assert!(curve.points.len() > 10);
+    for point in &curve.points {
+        let [w, c, a] = [0, 1, 2].map(|k| point.parameters[k]);
+        let linear = (1.0 - w * w).hypot(c * w);
+        assert!((a - linear).abs() < 1e-8, "w = {w}: {a} {linear}");
+    }
+}
+
+/// The cascade of an oscillator that rests on its spring, down to four contacts in a period.
+#[test]
+fn a_cascade_of_contacts_is_followed_in_one_run() {
+    let study = "tolerance = 1e-8\n[[seed]]\nname = \"s\"\nattractor = \"cycle\"\nparameters = { w = 5 }\nsamples = 8\n\
+        [[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"w\"\nrange = [0.25, 5]\n";
+    let diagram = run(&oscillator(0.0, 3.0, 1.0), study);
+    let found = branch(&diagram, "b");
+    for known in [0.908106906274, 2.229866860488, 3.465709945235] {
+        let near = |s: &&SpecialPoint| s.kind == Kind::PeriodDoubling && (s.point.parameters[0] - known).abs() < 1e-9;
+        assert_eq!(found.special.iter().filter(near).count(), 1, "{known}");
+    }
+    let most = found.special.iter().filter(|s| s.remark.contains(" 4 ")).count();
+    assert!(most >= 2, "four contacts begin and end");
+}
+
+/// Cycles, folds, doublings and grazings of the rotor, from nothing, in both directions; two pairs of points are 2.6e-8 and
+/// 1.3e-6 apart.
+#[test]
+fn the_rotor_agrees_with_multiple_shooting() {
+    let marks = |values: &str| format!("mark = {{ Omega = [{values}] }}\n");
+    let seed = |name: &str, ratio: &str| {
+        format!(
+            "[[seed]]\nname = \"{name} seed\"\nattractor = \"{ratio}\"\nsamples = 48\n\
+             parameters = {{ Omega = 5, kappa = 1 }}\n[[branch]]\nname = \"{name}\"\nfrom = \"{name} seed\"\n\
+             free = \"Omega\"\nrange = [0.5, 12]\n"
+        )
+    };
+    let study = format!(
+        "tolerance = 1e-9\n{}{}{}{}",
+        seed("SL", "2:1"),
+        marks("5, 6, 8, 10, 4, 3.5"),
+        seed("DL", "3:1"),
+        marks("5, 5.5, 4.5, 3")
+    );
+    let diagram = run(ROTOR, &study);
+    for name in ["SL", "DL"] {
+        let own = branch(&diagram, name);
+        assert!(own.ends.iter().all(|end| *end == Some(Ending::Closed)), "{name}");
+        let r_max = |s: &SpecialPoint| s.point.ranges[4][1];
+        let period = |s: &SpecialPoint| s.point.solution.period().unwrap_or(f64::NAN);
+        let rows = REFERENCE.lines().filter(|line| line.starts_with(name));
+        let mut count = 0;
+        for row in rows {
+            let fields: Vec<&str> = row.split(',').collect();
+            let number = |k: usize| fields[k].parse::<f64>().unwrap();
+            let kind = if fields[1] == "cycle" { "mark" } else { fields[1] };
+            let off = |s: &SpecialPoint| {
+                (s.point.parameters[0] - number(2))
+                    .abs()
+                    .max((period(s) - number(3)).abs())
+                    .max((r_max(s) - number(4)).abs())
+            };
+            let nearest = own.special.iter().filter(|s| s.kind.name() == kind).min_by(|a, b| off(a).total_cmp(&off(b)));
+            let nearest = nearest.unwrap_or_else(|| panic!("{row}"));
+            assert!(off(nearest) < 2e-9, "{row}: {:e}", off(nearest));
+            count += 1;
+        }
+        assert!(count >= 9, "{name}: {count} rows");
+        // No others.
+        let count = |kind: Kind| own.special.iter().filter(|s| s.kind == kind).count();
+        let known = if name == "SL" { [2, 2, 2] } else { [4, 2, 2] };
+        assert_eq!([Kind::Grazing, Kind::Fold, Kind::PeriodDoubling].map(count), known, "{name}");
+    }
+    // The lower fold of SL comes after its grazing: it has the second contact.
+    let sl = branch(&diagram, "SL");
+    let at = |kind: Kind, near: f64| {
+        sl.special.iter().position(|s| s.kind == kind && (s.point.parameters[0] - near).abs() < 1e-6).unwrap()
+    };
+    assert_eq!(at(Kind::Grazing, 3.3544041).abs_diff(at(Kind::Fold, 3.3544041)), 1);
+}
+
+/// Liouville's formula: the multipliers of the rotor have the product exp(-4 ζ T), contacts or not.
+#[test]
+fn multipliers_through_contacts_have_the_product_that_damping_gives() {
+    let study = "[[seed]]\nname = \"s\"\nattractor = \"2:1\"\nsamples = 48\nparameters = { Omega = 5, kappa = 1 }\n\
+        [[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"Omega\"\nrange = [4, 6]\n";
+    let diagram = run(ROTOR, study);
+    for point in &branch(&diagram, "b").points {
+        let logarithms: f64 = point.spectrum.iter().map(|z| z.norm().ln()).sum();
+        let known = -4.0 * 0.01 * point.solution.period().unwrap();
+        assert!((logarithms - known).abs() < 1e-7, "{:?}: {logarithms} {known}", point.parameters);
+    }
+}
+
+/// The synchronous response meets the ring twice. In closed form: free, r = m ε Ω² / |K_free|, so that the speeds are roots of
+/// |K_free| = m ε Ω².
+#[test]
+fn an_equilibrium_is_followed_through_the_ring() {
+    let study = "tolerance = 1e-8\n[[seed]]\nname = \"s\"\nstate = { u = 0.05, v = 0, du = 0, dv = 0 }\n\
+        parameters = { Omega = 0.5, kappa = 1 }\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"Omega\"\nrange = [0.3, 12]\n\
+        [[curve]]\nname = \"surface\"\nhold = \"boundary-equilibrium\"\nof = \"b\"\nnear = 0.9\nfree = \"zeta\"\nrange = [0.001, 0.2]\n";
+    let diagram = run(ROTOR, study);
+    let own = branch(&diagram, "b");
+    let known = [
+        (Kind::BoundaryEquilibrium, 0.92293970847182867969),
+        (Kind::BoundaryEquilibrium, 1.3612815990752943097),
+        // Without friction the forward rub turns back there.
+        (Kind::Fold, 3.556165897505),
+    ];
+    has(own, &known, 1e-11);
+    let becomes: Vec<&str> = own.special.iter().map(|s| s.remark.split(" at ").next().unwrap_or_default()).collect();
+    assert!(becomes.contains(&"persistence") && becomes.contains(&"non-smooth fold"), "{becomes:?}");
+    for point in &branch(&diagram, "surface").points {
+        let [omega, zeta] = [point.parameters[0], point.parameters[2]];
+        let square = (1.0 - (1.0 - 0.143) * omega * omega).powi(2) + (2.0 * zeta * omega).powi(2);
+        assert!((square.sqrt() - 0.9 * 0.353 * omega * omega).abs() < 1e-8, "{omega} {zeta}");
+    }
+}
+
+/// Motion in the plane with a vertical switching line: r' = r (1 - r), θ' = 1 on the left, r' = α r (β - r), θ' = γ + β - r
+/// on the right, in Cartesian coordinates. f jumps; the half turns are integrated in closed form.
+#[test]
+fn a_cycle_of_two_fields_has_the_period_of_its_closed_form() {
+    let model = "name = \"piecewise\"\n[parameters]\nal = 1\nbe = 2\nga = 1.5\n[definitions]\nr = \"hypot(x, y)\"\n\
+        grow = \"if(x < 0, 1 - r, al*(be - r))\"\nturn = \"if(x < 0, 1, ga + be - r)\"\n[states]\n\
+        x = { equation = \"grow*x - turn*y\", range = [-2, 2] }\ny = { equation = \"grow*y + turn*x\", range = [-2, 2] }\n";
+    let study = "tolerance = 1e-8\n[[seed]]\nname = \"s\"\nattractor = \"cycle\"\nsamples = 8\n[[branch]]\nname = \"b\"\n\
+        from = \"s\"\nfree = \"be\"\nrange = [1, 3]\nmark = { be = [1.5, 3, 1] }\n";
+    let diagram = run(model, study);
+    let own = branch(&diagram, "b");
+    let known = [
+        (1.0, 5.2359877559830, 0.0053215654788),
+        (1.5, 4.9943371055140, 0.00345328163693),
+        (3.0, 4.5416534430396, 0.00141989121684),
+    ];
+    for (be, period, multiplier) in known {
+        let mark = own.special.iter().find(|s| s.kind == Kind::Mark && (s.point.parameters[1] - be).abs() < 1e-12);
+        let point = &mark.unwrap_or_else(|| panic!("{be}")).point;
+        let own = point.solution.period().unwrap();
+        assert!((own - period).abs() < 1e-8, "{be}: {own}");
+        let free = point.free_spectrum()[0].re;
+        assert!((free - multiplier).abs() < 1e-7, "{be}: {free}");
+    }
+}
+
+/// A grazing lies on a curve of period doublings in two parameters, and is named there.
+#[test]
+fn curves_of_bifurcations_name_the_grazings_on_them() {
+    let study = "tolerance = 1e-7\n[[seed]]\nname = \"s\"\nattractor = \"2:1\"\nsamples = 48\n\
+        parameters = { Omega = 5, kappa = 1 }\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"Omega\"\nrange = [3, 12]\n\
+        [[curve]]\nname = \"doublings\"\nhold = \"period-doubling\"\nof = \"b\"\nnear = 4.86\nfree = \"beta\"\nrange = [8, 30]\n\
+        mark = { Omega = 8 }\n";
+    let diagram = run(ROTOR, study);
+    let curve = branch(&diagram, "doublings");
+    assert_eq!(curve.special.iter().filter(|s| s.kind == Kind::Grazing).count(), 1);
+    // Another run, over beta at Omega = 8, finds it by multiple shooting.
+    let mark = curve.special.iter().find(|s| s.kind == Kind::Mark).unwrap();
+    assert!((mark.point.parameters[5] - 27.486939840396).abs() < 1e-6, "{:?}", mark.point.parameters);
+}
