@@ -176,8 +176,8 @@ fn an_equilibrium_is_followed_through_the_ring() {
     let diagram = run(ROTOR, study);
     let own = branch(&diagram, "b");
     let known = [
-        (Kind::BoundaryEquilibrium, 0.92293970847182867969),
-        (Kind::BoundaryEquilibrium, 1.3612815990752943097),
+        (Kind::BoundaryEquilibrium, 0.922_939_708_471_828_7),
+        (Kind::BoundaryEquilibrium, 1.361_281_599_075_294_3),
         // Without friction the forward rub turns back there.
         (Kind::Fold, 3.556165897505),
     ];

@@ -168,9 +168,9 @@ impl Follow<'_> {
         let Some(Found::Special(special)) = found.last_mut() else { return (false, end, found) };
         let u = self.problem.unknowns_of(&special.point);
         let along: Vec<f64> = special.point.tangent.iter().map(|t| self.direction * t).collect();
-        let on = |monitor: &&Box<dyn Monitor + '_>| monitor.kind() == Kind::BoundaryEquilibrium;
         let value = |monitor: &dyn Monitor| monitor.value(&special.point, &special.point).abs();
-        let nearest = self.marks.iter().filter(on).min_by(|a, b| value(&***a).total_cmp(&value(&***b)));
+        let surfaces = self.marks.iter().filter(|monitor| monitor.kind() == Kind::BoundaryEquilibrium);
+        let nearest = surfaces.min_by(|a, b| value(&***a).total_cmp(&value(&***b)));
         let switch = nearest.map_or(0, |monitor| monitor.label().saturating_sub(1));
         self.problem.anchor(&u);
         let Some(tangent) = self.problem.cross(&u, &along, switch) else {

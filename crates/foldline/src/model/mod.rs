@@ -113,6 +113,9 @@ pub struct About {
     pub remarks: Vec<String>,
 }
 
+/// Tapes that are built at their first use.
+type Tapes<K> = RwLock<HashMap<K, Arc<Tape>>>;
+
 #[derive(Debug)]
 struct Inner {
     compiled: Compiled,
@@ -124,9 +127,9 @@ struct Inner {
     switches: Switches,
     /// f with given signs of the switches.
     given: Tape,
-    linear: RwLock<HashMap<(Vec<usize>, bool), Arc<Tape>>>,
-    directional: RwLock<HashMap<(usize, bool, bool), Arc<Tape>>>,
-    switch_derivatives: RwLock<HashMap<Vec<usize>, Arc<Tape>>>,
+    linear: Tapes<(Vec<usize>, bool)>,
+    directional: Tapes<(usize, bool, bool)>,
+    switch_derivatives: Tapes<Vec<usize>>,
 }
 
 impl Deref for Model {
@@ -318,11 +321,7 @@ fn rows(columns: &[Vec<graph::Id>], count: usize) -> Vec<graph::Id> {
 }
 
 /// The tape of a key, built at its first use.
-fn cached<K: std::hash::Hash + Eq>(
-    known: &RwLock<HashMap<K, Arc<Tape>>>,
-    key: K,
-    build: impl FnOnce() -> Tape,
-) -> Arc<Tape> {
+fn cached<K: std::hash::Hash + Eq>(known: &Tapes<K>, key: K, build: impl FnOnce() -> Tape) -> Arc<Tape> {
     let found = known.read().unwrap_or_else(PoisonError::into_inner).get(&key).cloned();
     found.unwrap_or_else(|| {
         let tape = Arc::new(build());

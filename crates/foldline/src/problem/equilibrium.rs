@@ -320,7 +320,8 @@ impl EquilibriumProblem<'_> {
             last[size - 1] = 1.0;
             let (mut off, mut tangent) = (vec![0.0; size], vec![0.0; size]);
             self.solve(&change, &mut off);
-            if !(self.relative_size(&off, u) < JUMP) {
+            let off = self.relative_size(&off, u);
+            if off.is_nan() || off >= JUMP {
                 return None;
             }
             self.solve(&last, &mut tangent);

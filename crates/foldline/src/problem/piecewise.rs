@@ -91,7 +91,7 @@ pub(crate) struct Switched {
     pub end_by: Vec<f64>,
 }
 
-/// What a trial polynomial meets first.
+/// First switching on a trial polynomial.
 enum Met {
     Nothing,
     /// The switch just passed is passed back at once.
@@ -696,7 +696,7 @@ impl Switched {
         out
     }
 
-    /// What the flow requires of the inner nodes, `[m][n]`: its values there, but at the last node what gives its right end.
+    /// Values that the flow requires at the inner nodes, `[m][n]`: its values there, but at the last node what gives its right end.
     pub fn inner(&self, scheme: &Scheme, ends: [f64; 2]) -> Vec<f64> {
         let n = self.end.len();
         let mut out = self.values(scheme, ends);
@@ -846,7 +846,7 @@ fn root(at: &dyn Fn(f64) -> f64, mut left: f64, mut right: f64) -> f64 {
             a *= if stayed == -1 { 0.5 } else { 1.0 };
             stayed = -1;
         }
-        if right - left < f64::EPSILON {
+        if (right - left).abs() < f64::EPSILON {
             break;
         }
     }

@@ -135,7 +135,8 @@ pub fn extrema(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle, switc
         let (low, high) = (values[k] - values[before], values[after] - values[k]);
         // Of equal neighbours the first counts.
         let maximum = low > 0.0 && high <= 0.0;
-        if !maximum && !(low < 0.0 && high >= 0.0) {
+        let minimum = low < 0.0 && high >= 0.0;
+        if !(maximum || minimum) {
             continue;
         }
         let back = if k == 0 { places[before] - 1.0 } else { places[before] };

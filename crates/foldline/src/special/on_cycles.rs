@@ -182,7 +182,7 @@ impl<'a> OnCycles<'a> {
         self.system.eliminate(self.closure()).ok()
     }
 
-    /// How v at the inner nodes of an interval follows from its left end, and T₁ where it has one: `[m][parts][parts + scalars]`.
+    /// Derivatives of v at the inner nodes of an interval in its left end, and T₁ where it has one: `[m][parts][parts + scalars]`.
     fn transition(&self, found: &Switched, angle: f64) -> Vec<f64> {
         let ends = self.interval(found.interval);
         let width = self.parts + usize::from(self.is_fold());

@@ -200,6 +200,7 @@ mod tests {
     use super::*;
     use crate::model::{Definition, Model, ModelSource, Parameter, State};
     use crate::problem::{Axis, mesh};
+    use std::f64::consts::TAU;
 
     /// x'' = -x - 5 max(x - d, 0) has the free solution x = A cos t, which touches d where A = d.
     fn model() -> Model {
@@ -221,10 +222,10 @@ mod tests {
         let (scheme, mesh) = (Scheme::new(4), mesh::uniform(20));
         let profile = |size: f64| -> Vec<f64> {
             let times = mesh.windows(2).flat_map(|p| scheme.nodes.iter().map(move |c| p[0] + c * (p[1] - p[0])));
-            times.flat_map(|t| [size * (6.2831853 * t + 0.3).cos(), -size * (6.2831853 * t + 0.3).sin()]).collect()
+            times.flat_map(|t| [size * (TAU * t + 0.3).cos(), -size * (TAU * t + 0.3).sin()]).collect()
         };
         let cycle = Cycle {
-            period: 6.2831853,
+            period: TAU,
             forcing_periods: 0,
             mesh: mesh.clone(),
             degree: 4,
@@ -232,7 +233,7 @@ mod tests {
             gain: Vec::new(),
         };
         let mut own = OnSurfaces::new(Kind::Grazing, setting, &Solution::Cycle(cycle)).unwrap();
-        let at = |size: f64, d: f64| [&profile(size)[..], &[6.2831853, 5.0, d]].concat();
+        let at = |size: f64, d: f64| [&profile(size)[..], &[TAU, 5.0, d]].concat();
         let mut g = [0.0];
         let mut value = |own: &mut OnSurfaces, u: &[f64]| {
             assert!(own.evaluate(u, &[], &mut g));
