@@ -167,6 +167,11 @@ pub trait ZeroProblem {
     /// there.
     fn residual(&mut self, u: &[f64], r: &mut [f64]) -> bool;
 
+    /// Why [`ZeroProblem::residual`] has no value at `u`, where it is not that f is not finite.
+    fn obstacle(&self, _u: &[f64]) -> Option<&'static str> {
+        None
+    }
+
     /// Factorises the matrix [F_u(u); rows]. `rows` is `[k][n + k]`; each row acts through [`ZeroProblem::dot`].
     fn factorise(&mut self, u: &[f64], rows: &[f64]) -> Result<(), Singular>;
 

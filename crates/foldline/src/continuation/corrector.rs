@@ -16,6 +16,8 @@ pub enum Failure {
     Singular,
     /// A value was not finite.
     NotFinite,
+    /// The equations have no value there, for another reason.
+    Blocked(&'static str),
     /// The iteration did not converge; sizes of the updates.
     NoConvergence(Vec<f64>),
     /// The point does not continue the branch: the tangent turns by `angle`, or the prediction was off by the share
@@ -58,6 +60,7 @@ impl std::fmt::Display for Failure {
         match self {
             Failure::Singular => write!(f, "the Newton matrix is singular"),
             Failure::NotFinite => write!(f, "the vector field is not finite there"),
+            Failure::Blocked(why) => f.write_str(why),
             Failure::NoConvergence(sizes) => {
                 write!(f, "Newton's method did not converge (relative updates")?;
                 sizes.iter().try_for_each(|s| write!(f, " {s:.1e}"))?;
@@ -186,7 +189,7 @@ pub fn correct_within(
     let mut fresh = true;
     for iteration in 0..settings.max_newton {
         if !problem.residual(u, &mut r) {
-            return Err(Failure::NotFinite);
+            return Err(problem.obstacle(u).map_or(Failure::NotFinite, Failure::Blocked));
         }
         du.iter_mut().zip(u.iter().zip(&plane.base)).for_each(|(gap, (a, b))| *gap = a - b);
         r[size - 1] = problem.dot(&plane.row, &du) - plane.distance;
@@ -259,7 +262,7 @@ pub fn arrive(
     let mut sizes: Vec<f64> = Vec::new();
     loop {
         if !problem.residual(u, &mut r) {
-            return Err(Failure::NotFinite);
+            return Err(problem.obstacle(u).map_or(Failure::NotFinite, Failure::Blocked));
         }
         r[size - 1] = 0.0;
         problem.factorise(u, along).map_err(|_| Failure::Singular)?;

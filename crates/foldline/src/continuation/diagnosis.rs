@@ -107,6 +107,13 @@ impl Follow<'_> {
         if *why == Failure::NotFinite || self.breaks_off(left, tried.longest) {
             return (EDGE.0.into(), EDGE.1);
         }
+        if let Failure::Blocked(obstacle) = why {
+            return (
+                obstacle.to_string(),
+                "sliding, sticking and chatter are not followed: use a smooth function with a sharpness parameter, such as \
+                 tanh(s*x) for sign(x), and continue the solution in s to the sharpness needed",
+            );
+        }
         if *why == Failure::Departed {
             return (UNCROSSED.0.into(), UNCROSSED.1);
         }

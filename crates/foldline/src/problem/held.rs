@@ -234,6 +234,10 @@ impl ZeroProblem for Held<'_> {
         self.surface.residual(&u[e..], &mut r[..size]) && self.condition_at(u, &mut r[size - k..size + e - 1])
     }
 
+    fn obstacle(&self, u: &[f64]) -> Option<&'static str> {
+        self.surface.obstacle(&u[self.extra()..])
+    }
+
     fn factorise(&mut self, u: &[f64], row: &[f64]) -> Result<(), Singular> {
         let (e, size, k) = (self.extra(), self.surface.unknowns(), self.freedom());
         let width = e + k;

@@ -20,8 +20,7 @@
 //!
 //! **Source.** leine2004 (saltation matrix). The extremum test: shampine2000.
 //!
-//! **Fails when** the orbit slides along a surface or passes too many surfaces within one interval. The interval is then treated
-//! as smooth.
+//! **Fails when** the orbit slides along a surface, or passes too many surfaces within one interval ([`Obstacle`]).
 
 use super::Setting;
 use super::gauss::Scheme;
@@ -44,6 +43,28 @@ const SHORTEST: f64 = 1e-12;
 const CONTINUOUS: f64 = 1e-9;
 /// Step of central differences, in scales: the cube root of rounding.
 const STEP: f64 = 6e-6;
+
+/// Reason why an orbit cannot be computed on an interval.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Obstacle {
+    /// It stays on a switching surface.
+    Slides,
+    /// It passes switching surfaces more often than is computed on one interval.
+    Chatters,
+    /// Newton's method does not converge on a part.
+    Lost,
+}
+
+impl Obstacle {
+    /// In words.
+    pub fn name(self) -> &'static str {
+        match self {
+            Obstacle::Slides => "the orbit slides along a switching surface at which the right-hand side jumps",
+            Obstacle::Chatters => "the orbit crosses switching surfaces dozens of times within one mesh interval",
+            Obstacle::Lost => "the motion between two switchings could not be computed",
+        }
+    }
+}
 
 /// The flow of a vector field along a piecewise smooth orbit.
 pub(crate) struct PiecewiseFlow<'a> {
@@ -84,6 +105,8 @@ pub(crate) struct Switched {
     pub jumps: bool,
     /// Largest value of every switch along the orbit.
     sizes: Vec<f64>,
+    /// Switchings at the left end, which have no part: signs before each, and the switch.
+    at_start: Vec<(Vec<f64>, usize)>,
     /// Logarithm of the determinants of (4) at the left end.
     trace: f64,
     /// `[n]` and `[n × (n + 1 + k)]`: the right end and its derivatives.
@@ -141,18 +164,24 @@ impl<'a> PiecewiseFlow<'a> {
     }
 
     /// The intervals of a profile in which the orbit switches.
-    pub fn intervals(&self, profile: &[f64], mesh: &[f64]) -> Vec<Switched> {
+    ///
+    /// # Errors
+    /// See [`Obstacle`].
+    pub fn intervals(&self, profile: &[f64], mesh: &[f64]) -> Result<Vec<Switched>, Obstacle> {
         if self.setting.field.switch_count() == 0 {
-            return Vec::new();
+            return Ok(Vec::new());
         }
         let block = (self.scheme.degree + 1) * self.n();
         let (suspects, sizes) = self.suspects(profile, mesh);
-        let each = suspects.into_iter().filter_map(|j| {
+        let mut all = Vec::new();
+        for j in suspects {
             let nodes = &profile[j * block..(j + 1) * block];
             let found = self.along(j, &nodes[..self.n()], [mesh[j], mesh[j + 1]], nodes, &sizes)?;
-            (found.parts.len() > 1 || found.jumps).then_some(found)
-        });
-        each.collect()
+            if found.parts.len() > 1 || !found.at_start.is_empty() {
+                all.push(found);
+            }
+        }
+        Ok(all)
     }
 
     /// The intervals in which a switch could vanish, because it changes by as much as its smallest value at the nodes, and the largest
@@ -179,7 +208,14 @@ impl<'a> PiecewiseFlow<'a> {
     }
 
     /// The flow from `x` over an interval; `guess` `[m + 1][n]` is a polynomial next to it. `None` if it cannot be had.
-    fn along(&self, interval: usize, x: &[f64], ends: [f64; 2], guess: &[f64], sizes: &[f64]) -> Option<Switched> {
+    fn along(
+        &self,
+        interval: usize,
+        x: &[f64],
+        ends: [f64; 2],
+        guess: &[f64],
+        sizes: &[f64],
+    ) -> Result<Switched, Obstacle> {
         let (n, width) = (self.n(), self.width());
         let mut signs = self.signs_before(x, ends[0], sizes);
         let mut found = Switched {
@@ -187,6 +223,7 @@ impl<'a> PiecewiseFlow<'a> {
             parts: Vec::new(),
             jumps: false,
             sizes: sizes.to_vec(),
+            at_start: Vec::new(),
             trace: 0.0,
             end: x.to_vec(),
             end_by: vec![0.0; n * width],
@@ -197,19 +234,22 @@ impl<'a> PiecewiseFlow<'a> {
         loop {
             let within = |t: f64| (t - ends[0]) / length;
             let from = self.restricted(guess, [within(begin), 1.0]);
-            let nodes = self.solved(&found.end, [begin, ends[1]], &signs, from)?;
+            let nodes = self.solved(&found.end, [begin, ends[1]], &signs, from).ok_or(Obstacle::Lost)?;
             let trial = Trial { nodes: &nodes, ends: [begin, ends[1]], signs: &signs, passed };
             let (at, switch) = match self.first(&trial, sizes) {
                 Met::Nothing => {
-                    self.close(&mut found, [begin, ends[1]], nodes, &signs)?;
-                    return Some(found);
+                    self.close(&mut found, [begin, ends[1]], nodes, &signs).ok_or(Obstacle::Lost)?;
+                    return Ok(found);
                 }
                 Met::Back => {
                     // A tangency to rounding where f is continuous; where f jumps the orbit slides.
-                    let switch = passed?;
+                    let switch = passed.ok_or(Obstacle::Lost)?;
                     back += 1;
-                    if back > 4 || !self.is_continuous(&found.end, begin, &signs, switch) {
-                        return None;
+                    if !self.is_continuous(&found.end, begin, &signs, switch) {
+                        return Err(Obstacle::Slides);
+                    }
+                    if back > 4 {
+                        return Err(Obstacle::Chatters);
                     }
                     signs[switch] = -signs[switch];
                     continue;
@@ -217,23 +257,26 @@ impl<'a> PiecewiseFlow<'a> {
                 Met::At(at, switch) => (at, switch),
             };
             if found.parts.len() == MOST_PARTS {
-                return None;
+                return Err(Obstacle::Chatters);
             }
-            let part = self.until(&found.end, begin, ends[1], at, switch, &signs, &nodes)?;
+            let part = self.until(&found.end, begin, ends[1], at, switch, &signs, &nodes).ok_or(Obstacle::Lost)?;
             let (end, nodes) = part;
             let passes = end - begin > SHORTEST * length;
             if passes {
-                self.close(&mut found, [begin, end], nodes, &signs)?;
+                self.close(&mut found, [begin, end], nodes, &signs).ok_or(Obstacle::Lost)?;
             }
-            if !self.pass(&mut found, end, &signs, switch, passes)? {
-                return None;
+            if found.parts.is_empty() {
+                found.at_start.push((signs.clone(), switch));
+            }
+            if !self.pass(&mut found, end, &signs, switch, passes).ok_or(Obstacle::Lost)? {
+                return Err(Obstacle::Slides);
             }
             signs[switch] = -signs[switch];
             // What is shorter has no part of its own: the next one begins where it does.
             begin = if passes { end } else { begin };
             passed = Some(switch);
             if begin >= ends[1] {
-                return Some(found);
+                return Ok(found);
             }
         }
     }
@@ -549,6 +592,11 @@ impl<'a> PiecewiseFlow<'a> {
             states.chain(parameters.iter().flat_map(|p| std::iter::repeat_n(*p, m))).collect()
         };
         let mut start = vec![0.0; n * width];
+        let left: Vec<f64> = (0..n * width).map(|at| f64::from(u8::from(at % width == at / width))).collect();
+        for (signs, switch) in &own.at_start {
+            let moved = self.shifted(x, &left, ends[0], signs, *switch, &direction);
+            start.iter_mut().zip(&moved).for_each(|(w, m)| *w += m);
+        }
         let mut all: Vec<Vec<f64>> = Vec::with_capacity(own.parts.len());
         for part in &own.parts {
             let (length, times) = self.course(part.ends);
@@ -594,33 +642,41 @@ impl<'a> PiecewiseFlow<'a> {
             let nodes = [&start[..], &rows].concat();
             start = combined(&nodes, n * width);
             all.push(nodes);
-            let Some(switch) = part.switch else { continue };
-            let (x, by) = (combined(&part.nodes, n), combined(&part.by, n * width));
-            let time = self.time(part.ends[1]);
-            let batch = Batch { lanes: 1, states: &x, parameters, times: time.as_slice(), signs: &[] };
-            let [_, hx, hp, ht] = self.setting.linearise_switches(batch);
-            let mut signs = part.signs.clone();
-            let sides = [(); 2].map(|()| {
-                let [mut f, mut fx, mut fp] = [n, n * n, n * k].map(|size| vec![0.0; size]);
-                self.setting.linearise(Batch { signs: &signs, ..batch }, &mut f, &mut fx, &mut fp);
-                signs[switch] = -signs[switch];
-                (f, fx, fp)
-            });
-            let gradient = &hx[switch * n..(switch + 1) * n];
-            let speed = dot(gradient, &sides[0].0) + ht[switch];
-            let moved: f64 = (0..n).map(|c| gradient[c] * dot(&by[c * width..(c + 1) * width], &direction)).sum();
-            let shift = -(moved + dot(&hp[switch * k..(switch + 1) * k], &scalars[1..])) / speed;
-            let rate = |(_, fx, fp): &(Vec<f64>, Vec<f64>, Vec<f64>), c: usize, column: usize| -> f64 {
-                let moved: f64 = (0..n).map(|d| fx[c * n + d] * by[d * width + column]).sum();
-                moved + column.checked_sub(n + 1).map_or(0.0, |p| fp[c * k + p])
-            };
-            for (c, column) in (0..n).flat_map(|c| (0..width).map(move |column| (c, column))) {
-                start[c * width + column] += (rate(&sides[0], c, column) - rate(&sides[1], c, column)) * shift;
+            if let Some(switch) = part.switch {
+                let (x, by) = (combined(&part.nodes, n), combined(&part.by, n * width));
+                let moved = self.shifted(&x, &by, part.ends[1], &part.signs, switch, &direction);
+                start.iter_mut().zip(&moved).for_each(|(w, m)| *w += m);
             }
         }
         let mut out = own.at_nodes(self.scheme, ends, &all, n * width);
         out.extend(combined(all.last()?, n * width));
         out.iter().all(|value| value.is_finite()).then_some(out)
+    }
+
+    /// The second relation of (5), without W⁺: at `x`, with the derivatives `by` `[n × (n + 1 + k)]` there, where the switch
+    /// changes sign at normalised time `t`.
+    fn shifted(&self, x: &[f64], by: &[f64], t: f64, signs: &[f64], switch: usize, direction: &[f64]) -> Vec<f64> {
+        let (n, width, k) = (self.n(), self.width(), self.scalars.len() - 1);
+        let (time, parameters) = (self.time(t), Parameters::Shared(&self.parameters));
+        let batch = Batch { lanes: 1, states: x, parameters, times: time.as_slice(), signs: &[] };
+        let [_, hx, hp, ht] = self.setting.linearise_switches(batch);
+        let mut signs = signs.to_vec();
+        let sides = [(); 2].map(|()| {
+            let [mut f, mut fx, mut fp] = [n, n * n, n * k].map(|size| vec![0.0; size]);
+            self.setting.linearise(Batch { signs: &signs, ..batch }, &mut f, &mut fx, &mut fp);
+            signs[switch] = -signs[switch];
+            (f, fx, fp)
+        });
+        let gradient = &hx[switch * n..(switch + 1) * n];
+        let speed = dot(gradient, &sides[0].0) + ht[switch];
+        let moved: f64 = (0..n).map(|c| gradient[c] * dot(&by[c * width..(c + 1) * width], direction)).sum();
+        let shift = -(moved + dot(&hp[switch * k..(switch + 1) * k], &direction[n + 1..])) / speed;
+        let rate = |(_, fx, fp): &(Vec<f64>, Vec<f64>, Vec<f64>), c: usize, column: usize| -> f64 {
+            let moved: f64 = (0..n).map(|d| fx[c * n + d] * by[d * width + column]).sum();
+            moved + column.checked_sub(n + 1).map_or(0.0, |p| fp[c * k + p])
+        };
+        let entries = (0..n).flat_map(|c| (0..width).map(move |column| (c, column)));
+        entries.map(|(c, column)| (rate(&sides[0], c, column) - rate(&sides[1], c, column)) * shift).collect()
     }
 
     /// [`PiecewiseFlow::varied`] by central differences.
@@ -638,7 +694,7 @@ impl<'a> PiecewiseFlow<'a> {
             let moved: Vec<f64> = x.iter().zip(dx).map(|(x, d)| x + by * d).collect();
             let there: Vec<f64> = self.scalars.iter().zip(scalars).map(|(v, d)| v + by * d).collect();
             let flow = PiecewiseFlow::new(self.setting, self.scheme, &there, self.forcing_periods);
-            Some(flow.along(own.interval, &moved, ends, &guess, &own.sizes)?.derivatives(self.scheme, ends))
+            Some(flow.along(own.interval, &moved, ends, &guess, &own.sizes).ok()?.derivatives(self.scheme, ends))
         };
         let (more, less) = (at(step)?, at(-step)?);
         Some(more.iter().zip(&less).map(|(a, b)| (a - b) / (2.0 * step)).collect())
@@ -662,8 +718,8 @@ impl<'a> PiecewiseFlow<'a> {
             self.scheme.value_into(from[0], nodes, &mut x);
             [x, self.restricted(nodes, from)].concat()
         };
-        let first = self.along(interval, x, [begin, middle], &half([0.0, 0.5]), sizes)?;
-        let second = self.along(interval, &first.end, [middle, end], &half([0.5, 1.0]), sizes)?;
+        let first = self.along(interval, x, [begin, middle], &half([0.0, 0.5]), sizes).ok()?;
+        let second = self.along(interval, &first.end, [middle, end], &half([0.5, 1.0]), sizes).ok()?;
         let entry = |i: usize, k: usize| {
             (0..n).map(|j| second.end_by[i * width + j] * first.end_by[j * width + k]).sum::<f64>()
         };
@@ -875,7 +931,7 @@ mod tests {
         let scheme = Scheme::of(4);
         let flow = PiecewiseFlow::new(setting, scheme, scalars, 0);
         let sizes = vec![1.0; setting.field.switch_count()];
-        flow.along(0, x, ends, &x.repeat(5), &sizes)
+        flow.along(0, x, ends, &x.repeat(5), &sizes).ok()
     }
 
     /// Derivatives of the end, and of the derivatives, against differences.

@@ -207,7 +207,7 @@ impl<'a> OnCycleBranchPoints<'a> {
         self.scalars = u[size..].to_vec();
         let flow = PiecewiseFlow::new(&self.setting, &self.scheme, &self.scalars, self.forcing_periods);
         let block = (self.scheme.degree + 1) * self.n;
-        let switched = flow.intervals(&u[..size], &self.mesh).into_iter();
+        let switched = flow.intervals(&u[..size], &self.mesh).unwrap_or_default().into_iter();
         self.switched = switched.map(|found| (u[found.interval * block..][..self.n].to_vec(), found)).collect();
         if self.phase.is_empty() && self.first() == 1 {
             let (mut phase, mut norm) = (vec![0.0; lanes * self.n], 0.0);

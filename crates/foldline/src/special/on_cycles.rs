@@ -405,7 +405,7 @@ impl<'a> OnCycles<'a> {
         self.scalars = u[size..].to_vec();
         let flow = PiecewiseFlow::new(&self.setting, &self.scheme, &self.scalars, self.forcing_periods);
         let block = (self.scheme.degree + 1) * self.n;
-        let switched = flow.intervals(&u[..size], &self.mesh).into_iter();
+        let switched = flow.intervals(&u[..size], &self.mesh).unwrap_or_default().into_iter();
         self.switched = switched.map(|found| (u[found.interval * block..][..self.n].to_vec(), found)).collect();
         if self.phase.is_empty() {
             let (m, lanes) = (self.scheme.degree, self.lanes());

@@ -154,7 +154,8 @@ impl Condition for OnSurfaces<'_> {
             let size = self.profile_size();
             self.parameters = self.setting.at(&u[size + 1..]);
             let flow = PiecewiseFlow::new(&self.setting, &self.scheme, &u[size..], self.forcing_periods);
-            self.switched = flow.intervals(&u[..size], &self.mesh);
+            let Ok(switched) = flow.intervals(&u[..size], &self.mesh) else { return false };
+            self.switched = switched;
             let (mesh, profile) = piecewise::cut(&u[..size], &self.mesh, &self.switched, self.block());
             let cycle = self.cycle(mesh, profile);
             let (extrema, _) = grazing::extrema(self.setting.field, &self.parameters, &cycle, self.switch);

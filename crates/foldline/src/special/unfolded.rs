@@ -250,6 +250,10 @@ impl ZeroProblem for UnfoldedCycles<'_> {
         self.cycles.residual(u, r)
     }
 
+    fn obstacle(&self, u: &[f64]) -> Option<&'static str> {
+        self.cycles.obstacle(u)
+    }
+
     fn factorise(&mut self, u: &[f64], rows: &[f64]) -> Result<(), Singular> {
         self.cycles.factorise(u, rows)
     }

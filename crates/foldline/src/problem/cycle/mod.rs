@@ -40,7 +40,7 @@ mod residual;
 use super::defect;
 use super::gauss::Scheme;
 use super::mesh::Passage;
-use super::piecewise::{self, PiecewiseFlow, Switched};
+use super::piecewise::{self, Obstacle, PiecewiseFlow, Switched};
 use super::{Setting, averages, extremes, mesh};
 use crate::contract::{Batch, Examination, Parameters, Singular, ZeroProblem};
 use crate::diagram::{Cycle, Mesh, Point, Solution, Trust};
@@ -104,7 +104,7 @@ pub struct CycleProblem<'a> {
     measured: RefCell<Option<Measured>>,
     room: RefCell<Room>,
     /// The intervals in which the orbit switches, and the unknowns they belong to.
-    switched: RefCell<(Vec<f64>, Arc<Vec<Switched>>)>,
+    switched: RefCell<(Vec<f64>, Arc<Vec<Switched>>, Option<Obstacle>)>,
     /// Interpolations between the most recently used pairs of meshes.
     passages: RefCell<Vec<Passage>>,
 }
@@ -165,8 +165,11 @@ impl<'a> CycleProblem<'a> {
             return Arc::default();
         }
         if !same(&self.switched.borrow().0, u) {
-            let found = self.flow(u).intervals(&u[..self.profile_size()], &self.mesh);
-            self.switched.replace((u.to_vec(), Arc::new(found)));
+            let (found, obstacle) = match self.flow(u).intervals(&u[..self.profile_size()], &self.mesh) {
+                Ok(found) => (found, None),
+                Err(obstacle) => (Vec::new(), Some(obstacle)),
+            };
+            self.switched.replace((u.to_vec(), Arc::new(found), obstacle));
         }
         self.switched.borrow().1.clone()
     }
@@ -427,7 +430,12 @@ impl ZeroProblem for CycleProblem<'_> {
             false => phase - self.phase_offset,
         };
         let unit = if self.is_forced() { self.setting.field.time_unit(&all) } else { 1.0 };
-        all_finite(&r[..=size]) && u[size] > 0.0 && unit > 0.0 && unit.is_finite()
+        self.obstacle(u).is_none() && all_finite(&r[..=size]) && u[size] > 0.0 && unit > 0.0 && unit.is_finite()
+    }
+
+    fn obstacle(&self, u: &[f64]) -> Option<&'static str> {
+        self.switched(u);
+        self.switched.borrow().2.map(Obstacle::name)
     }
 
     fn factorise(&mut self, u: &[f64], rows: &[f64]) -> Result<(), Singular> {
@@ -487,9 +495,10 @@ impl ZeroProblem for CycleProblem<'_> {
         }
         let (size, block) = (u.len() - 1 - self.setting.freedom(), self.block());
         let flow = PiecewiseFlow::new(&self.setting, &self.scheme, &u[size..], self.forcing_periods);
-        let (mesh, profile) = piecewise::cut(&u[..size], from, &flow.intervals(&u[..size], from), block);
+        let (mesh, profile) =
+            piecewise::cut(&u[..size], from, &flow.intervals(&u[..size], from).unwrap_or_default(), block);
         let mut out = mesh::transferred(&profile, self.n, &self.scheme, &mesh, to);
-        for found in flow.intervals(&out, to) {
+        for found in flow.intervals(&out, to).unwrap_or_default() {
             let j = found.interval;
             let inner = found.inner(&self.scheme, [to[j], to[j + 1]]);
             out[j * block + self.n..(j + 1) * block].copy_from_slice(&inner);
