@@ -284,7 +284,9 @@ pub(super) fn head_along(problem: &mut dyn ZeroProblem, stretch: &Stretch, found
     let norm = stretch.length.signum() * problem.dot(&heading, &heading).sqrt();
     if norm.is_finite() && norm != 0.0 {
         station.tangent = heading.iter().map(|t| t / norm).collect();
-        station.point.tangent = station.tangent.iter().map(|t| stretch.direction * t).collect();
+        // Points and curve points may be on different meshes.
+        let stored: Vec<f64> = station.tangent.iter().map(|t| stretch.direction * t).collect();
+        station.point.tangent = problem.point(&station.u, &stored, Examination::default()).tangent;
     }
 }
 
