@@ -541,7 +541,8 @@ impl<'a> PiecewiseFlow<'a> {
         let mut met = Met::Nothing;
         for (k, own) in values.chunks_exact(places.len()).enumerate() {
             let (sign, passed) = (trial.signs[k], trial.passed == Some(k));
-            let of = |s: f64, value: f64| sign * if passed { value / s } else { value };
+            // (There it is zero but for rounding.)
+            let of = |s: f64, value: f64| sign * if passed { (value - own[0]) / s } else { value };
             let at = |s: f64| of(s, self.switch(trial.nodes, trial.ends, s, k));
             let mut margins: Vec<f64> = places.iter().zip(own).map(|(s, value)| of(*s, *value)).collect();
             let mut knots = places.clone();
