@@ -34,6 +34,8 @@ const SECTIONS: usize = 32;
 const MOST_PARTS: usize = 64;
 /// Value of a switch, relative to its largest along the orbit, that counts as zero: rounding of the state.
 const ZERO: f64 = 1e-13;
+/// Value of a switch, relative to its largest, below which the flow does not leave the surface that it has just passed.
+const NEAR: f64 = 1e-11;
 /// Place in a part, from its left end, at which it is seen on which side of the surface just passed the flow continues. A contact that
 /// is shorter is no deeper than the square of this.
 const AFTER: f64 = 1e-6;
@@ -547,9 +549,16 @@ impl<'a> PiecewiseFlow<'a> {
             let mut margins: Vec<f64> = places.iter().zip(own).map(|(s, value)| of(*s, *value)).collect();
             let mut knots = places.clone();
             if passed {
+                // So close to the surface all the way that rounding decides on which side.
+                if own.iter().all(|value| value.abs() <= NEAR * sizes[k]) {
+                    continue;
+                }
                 (knots[0], margins[0]) = (AFTER, at(AFTER));
-                if margins[0] <= 0.0 {
+                if margins[0] <= 0.0 && margins[1] <= 0.0 {
                     return Met::Back;
+                }
+                if margins[0] <= 0.0 {
+                    margins[0] = margins[1];
                 }
             }
             let zero = ZERO * sizes[k];
