@@ -104,15 +104,15 @@ impl Follow<'_> {
     fn cause(&mut self, left: &Station, tried: &Tried, why: &Failure, past: Past) -> Cause {
         let period = left.point.solution.free_period();
         let grown = period.zip(past.first_period).map_or(1.0, |(now, first)| now / first);
-        if *why == Failure::NotFinite || self.breaks_off(left, tried.longest) {
-            return (EDGE.0.into(), EDGE.1);
-        }
         if let Failure::Blocked(obstacle) = why {
             return (
                 obstacle.to_string(),
                 "sliding, sticking and chatter are not followed: use a smooth function with a sharpness parameter, such as \
                  tanh(s*x) for sign(x), and continue the solution in s to the sharpness needed",
             );
+        }
+        if *why == Failure::NotFinite || self.breaks_off(left, tried.longest) {
+            return (EDGE.0.into(), EDGE.1);
         }
         if *why == Failure::Departed {
             return (UNCROSSED.0.into(), UNCROSSED.1);
