@@ -175,9 +175,10 @@ impl Follow<'_> {
         self.problem.anchor(&u);
         let Some(tangent) = self.problem.cross(&u, &along, switch) else {
             (right.u, right.tangent, right.point) = (u, along, special.point.clone());
-            let why = "the equilibrium reaches a switching surface at which the right-hand side jumps\nlikely cause: beyond \
-                       the surface there is no equilibrium of this kind; it may stay on the surface (a sliding or sticking \
-                       state)\nwhat to do: smooth the jump, such as tanh(s*x) for sign(x), and continue in s";
+            let why = "the equilibrium reaches a switching surface at which the right-hand side jumps, or a corner of several \
+                       surfaces\nlikely cause: beyond it there is no equilibrium of this kind, or more than one; where the \
+                       right-hand side jumps it may stay on the surface (a sliding or sticking state)\nwhat to do: smooth \
+                       the switches, such as tanh(s*x) for sign(x), and continue in s";
             return (false, Some(Ending::StepTooSmall(why.into())), found);
         };
         cost.factorisations += 1;

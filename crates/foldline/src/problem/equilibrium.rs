@@ -261,14 +261,28 @@ impl ZeroProblem for EquilibriumProblem<'_> {
     }
 
     fn cross(&mut self, u: &[f64], along: &[f64], switch: usize) -> Option<Vec<f64>> {
-        let sign = self.signs.get_mut(switch)?;
-        *sign = -*sign;
-        let wanted = *sign;
-        let found = self.tangent_across(u, along, switch, wanted);
-        if found.is_none() {
-            self.signs[switch] = -wanted;
+        /// Surfaces that may meet at one point.
+        const MOST: usize = 6;
+        let own = self.signs.clone();
+        let [h, _] = self.switches(u, along);
+        let on = |k: usize| k == switch || h[k].abs() <= ON_SURFACE * self.switch_size(k, u);
+        let surfaces: Vec<usize> = (0..own.len()).filter(|k| on(*k)).collect();
+        if own.is_empty() || surfaces.len() > MOST {
+            return None;
         }
-        found
+        // Each branch of f that an equilibrium leads into; where several surfaces meet, that need not be one.
+        let mut found: Vec<(Vec<f64>, Vec<f64>)> = Vec::new();
+        for chosen in 1..1usize << surfaces.len() {
+            let flipped = surfaces.iter().enumerate().filter(|(bit, _)| chosen >> bit & 1 == 1);
+            self.signs.clone_from(&own);
+            flipped.for_each(|(_, k)| self.signs[*k] = -own[*k]);
+            let signs = self.signs.clone();
+            found.extend(self.tangent_into(u, along, &surfaces).map(|tangent| (signs, tangent)));
+        }
+        self.signs = own;
+        let (signs, tangent) = found.pop().filter(|_| found.is_empty())?;
+        self.signs = signs;
+        Some(tangent)
     }
 }
 
@@ -301,8 +315,9 @@ impl EquilibriumProblem<'_> {
         row.iter().zip(&self.scale).map(|(h, scale)| (h * scale).abs()).fold(f64::MIN_POSITIVE, f64::max)
     }
 
-    /// Unit tangent of the branch on the side of a surface that is set, at a point on it, leading away from the surface.
-    fn tangent_across(&mut self, u: &[f64], along: &[f64], switch: usize, wanted: f64) -> Option<Vec<f64>> {
+    /// Unit tangent of the branch for the signs that are set, at a point on some surfaces, if it leads to the sides of all of them that
+    /// these signs mean.
+    fn tangent_into(&mut self, u: &[f64], along: &[f64], surfaces: &[usize]) -> Option<Vec<f64>> {
         let size = self.unknowns();
         let mut r = vec![0.0; size];
         if !self.residual(u, &mut r) {
@@ -327,8 +342,12 @@ impl EquilibriumProblem<'_> {
             self.solve(&last, &mut tangent);
             let length = self.dot(&tangent, &tangent).sqrt();
             let [_, rates] = self.switches(u, &tangent);
-            let sign = (rates[switch] * wanted).signum() / length;
-            tangent.iter_mut().for_each(|t| *t *= sign);
+            let side = |k: &usize| rates[*k] * self.signs[*k];
+            let sign = surfaces.first().map_or(1.0, |k| side(k).signum());
+            if surfaces.iter().any(|k| side(k) * sign <= 0.0) {
+                return None;
+            }
+            tangent.iter_mut().for_each(|t| *t *= sign / length);
             if tangent.iter().all(|t| t.is_finite()) {
                 return Some(tangent);
             }
