@@ -160,7 +160,7 @@ fn a_branch_of_equilibria_ends_at_a_jump() {
     .ends(&[
         "reaches a switching surface at which the right-hand side jumps",
         "stay on the surface",
-        "smooth the jump",
+        "smooth the switches",
     ]);
 }
 

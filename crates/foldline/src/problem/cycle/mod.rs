@@ -62,6 +62,16 @@ pub(crate) const SAFE: f64 = 4.0;
 /// Allowance for rounding: some 1e-11 on thousands of intervals, or where errors are strongly amplified.
 const ROUNDING: f64 = 5e-11;
 
+/// The intervals in which an orbit switches.
+#[derive(Default)]
+struct Switchings {
+    /// The unknowns they belong to.
+    at: Vec<f64>,
+    intervals: Arc<Vec<Switched>>,
+    /// Reason why they are not known.
+    obstacle: Option<Obstacle>,
+}
+
 /// Cycles in one free parameter (a curve) or several.
 pub struct CycleProblem<'a> {
     setting: Setting<'a>,
@@ -103,8 +113,8 @@ pub struct CycleProblem<'a> {
     /// The last error estimate. Mesh and errors belong together only at the point where they were computed.
     measured: RefCell<Option<Measured>>,
     room: RefCell<Room>,
-    /// The intervals in which the orbit switches, and the unknowns they belong to.
-    switched: RefCell<(Vec<f64>, Arc<Vec<Switched>>, Option<Obstacle>)>,
+    /// Those found last.
+    switched: RefCell<Switchings>,
     /// Interpolations between the most recently used pairs of meshes.
     passages: RefCell<Vec<Passage>>,
 }
@@ -164,14 +174,14 @@ impl<'a> CycleProblem<'a> {
         if self.setting.field.switch_count() == 0 {
             return Arc::default();
         }
-        if !same(&self.switched.borrow().0, u) {
+        if !same(&self.switched.borrow().at, u) {
             let (found, obstacle) = match self.flow(u).intervals(&u[..self.profile_size()], &self.mesh) {
                 Ok(found) => (found, None),
                 Err(obstacle) => (Vec::new(), Some(obstacle)),
             };
-            self.switched.replace((u.to_vec(), Arc::new(found), obstacle));
+            self.switched.replace(Switchings { at: u.to_vec(), intervals: Arc::new(found), obstacle });
         }
-        self.switched.borrow().1.clone()
+        self.switched.borrow().intervals.clone()
     }
 
     /// The piecewise flow with the scalars of `u`.
@@ -435,7 +445,7 @@ impl ZeroProblem for CycleProblem<'_> {
 
     fn obstacle(&self, u: &[f64]) -> Option<&'static str> {
         self.switched(u);
-        self.switched.borrow().2.map(Obstacle::name)
+        self.switched.borrow().obstacle.map(Obstacle::name)
     }
 
     fn factorise(&mut self, u: &[f64], rows: &[f64]) -> Result<(), Singular> {
