@@ -1,7 +1,7 @@
 //! Piecewise-smooth models, continued without smoothing: against closed forms, and against cycles computed by multiple
 //! shooting with event location.
 
-use foldline::contract::{Observer, Unobserved};
+use foldline::contract::Unobserved;
 use foldline::diagram::{Branch, Diagram, Ending, Kind, SpecialPoint};
 use foldline::explore::{self, System};
 use foldline_store::study_file::parse_study;
@@ -20,16 +20,12 @@ fn oscillator(d: f64, k: f64, a: f64) -> String {
 
 #[track_caller]
 fn run(model: &str, study: &str) -> Diagram {
-    observed(model, study, Diagram::default(), &Unobserved)
-}
-
-#[track_caller]
-fn observed(model: &str, study: &str, earlier: Diagram, observer: &dyn Observer) -> Diagram {
     let text = format!("model = \"m\"\n{study}");
     let study = parse_study(&text, "study", model, "model").unwrap_or_else(|found| panic!("{found:?}"));
-    explore::run(&System::of_plan(&study.model, &study.plan), &study.plan, 1, earlier, observer)
+    explore::run(&System::of_plan(&study.model, &study.plan), &study.plan, 1, Diagram::default(), &Unobserved)
 }
 
+/// Returns a branch that is complete and has no unexplained change of stability.
 #[track_caller]
 fn branch<'d>(diagram: &'d Diagram, name: &str) -> &'d Branch {
     let found = diagram.branch(name).unwrap_or_else(|| panic!("{name}"));
@@ -38,8 +34,7 @@ fn branch<'d>(diagram: &'d Diagram, name: &str) -> &'d Branch {
     found
 }
 
-/// Asserts that a branch has these special points and no others, within `error`, which must not exceed what is stated by
-/// more than a factor of 2 either way than needed: the stated errors bound the actual ones.
+/// Asserts that a branch has these special points and no others, each within `error` and within its stated error.
 #[track_caller]
 fn has(branch: &Branch, expected: &[(Kind, f64)], error: f64) {
     let value = |special: &SpecialPoint| special.point.parameters[branch.free];
@@ -97,7 +92,7 @@ fn a_cascade_of_contacts_is_followed_in_one_run() {
     assert!(most >= 2, "four contacts begin and end");
 }
 
-/// Cycles, folds, doublings and grazings of the rotor, from nothing, in both directions; two pairs of points are 2.6e-8 and
+/// Cycles, folds, doublings and grazings of the rotor, with no starting solution given. Two pairs of points are 2.6e-8 and
 /// 1.3e-6 apart.
 #[test]
 fn the_rotor_agrees_with_multiple_shooting() {
@@ -166,8 +161,8 @@ fn multipliers_through_contacts_have_the_product_that_damping_gives() {
     }
 }
 
-/// The synchronous response meets the ring twice. In closed form: free, r = m ε Ω² / |K_free|, so that the speeds are roots of
-/// |K_free| = m ε Ω².
+/// The synchronous response meets the ring twice: without contact r = m ε Ω² / |K|, with the complex stiffness K of the
+/// free rotor, so that the speeds are roots of |K| = m ε Ω².
 #[test]
 fn an_equilibrium_is_followed_through_the_ring() {
     let study = "tolerance = 1e-8\n[[seed]]\nname = \"s\"\nstate = { u = 0.05, v = 0, du = 0, dv = 0 }\n\
@@ -178,7 +173,7 @@ fn an_equilibrium_is_followed_through_the_ring() {
     let known = [
         (Kind::BoundaryEquilibrium, 0.922_939_708_471_828_7),
         (Kind::BoundaryEquilibrium, 1.361_281_599_075_294_3),
-        // Without friction the forward rub turns back there.
+        // Fold of the synchronous rub, in closed form.
         (Kind::Fold, 3.556165897505),
     ];
     has(own, &known, 1e-11);
@@ -227,12 +222,12 @@ fn curves_of_bifurcations_name_the_grazings_on_them() {
     let diagram = run(ROTOR, study);
     let curve = branch(&diagram, "doublings");
     assert_eq!(curve.special.iter().filter(|s| s.kind == Kind::Grazing).count(), 1);
-    // Another run, over beta at Omega = 8, finds it by multiple shooting.
+    // Multiple shooting at Omega = 8.
     let mark = curve.special.iter().find(|s| s.kind == Kind::Mark).unwrap();
     assert!((mark.point.parameters[5] - 27.486939840396).abs() < 1e-6, "{:?}", mark.point.parameters);
 }
 
-/// Symmetric cycles of a preloaded spring, on which f jumps, lose their symmetry.
+/// Symmetric cycles of a preloaded spring, where f jumps, lose their symmetry.
 #[test]
 fn branches_that_cross_on_piecewise_cycles_are_switched_to() {
     let model = "name = \"preload\"\n[parameters]\np = 0.2\nw = 1.5\n[forcing]\nfrequency = \"w\"\n[states.x]\n\
@@ -244,7 +239,7 @@ fn branches_that_cross_on_piecewise_cycles_are_switched_to() {
     assert!(branch(&diagram, "b/branch-point-1").points.len() > 5);
 }
 
-/// x = 0.392 mu, y = 0.353 mu beyond the point at which three surfaces meet.
+/// At mu = 0 three surfaces meet. Beyond, 3.1875 x = 1.25 mu and y = mu/2 - 0.375 x.
 #[test]
 fn an_equilibrium_passes_a_corner_of_three_surfaces() {
     let model = "name = \"corner\"\n[parameters]\nmu = -1\n[states]\n\
@@ -258,8 +253,8 @@ fn an_equilibrium_passes_a_corner_of_three_surfaces() {
     assert!((x - 2.0 * 1.25 / 3.1875).abs() < 1e-6 && (y - (1.0 - 0.375 * x)).abs() < 1e-6, "{x} {y}");
 }
 
-/// Dry friction without sticking. The first point of a branch, whose mesh begins at a reversal, has the multipliers of the
-/// others: by event-located integration -0.3374 ± 0.6106 i.
+/// Dry friction without sticking. At the first point of the branch a reversal lies on a mesh node. Multipliers from
+/// event-located integration: -0.3374 ± 0.6106 i.
 #[test]
 fn a_jump_at_a_mesh_node_counts_for_the_multipliers() {
     let model = "name = \"friction\"\n[parameters]\nmu = 0.1\n[forcing]\nfrequency = \"0.6\"\n[states]\n\
@@ -271,4 +266,30 @@ fn a_jump_at_a_mesh_node_counts_for_the_multipliers() {
     assert!(own.special.is_empty() && own.points.iter().all(|point| point.unstable == 0));
     let first = &own.points.iter().find(|point| point.position == 0).unwrap().spectrum;
     assert!(first.iter().all(|z| (z.re + 0.3374).abs() < 1e-4 && (z.im.abs() - 0.6106).abs() < 1e-4), "{first:?}");
+}
+
+/// x = mu and x = -mu meet in a corner at mu = 0, beyond which there is no equilibrium.
+#[test]
+fn a_branch_of_equilibria_turns_back_at_a_non_smooth_fold() {
+    let study = "[[seed]]\nname = \"s\"\nstate = { x = 1 }\n[[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"mu\"\nrange = [-1, 2]\n";
+    let diagram = run("name = \"corner\"\n[parameters]\nmu = 1\n[states]\nx = \"mu - abs(x)\"\n", study);
+    let own = branch(&diagram, "b");
+    has(own, &[(Kind::BoundaryEquilibrium, 0.0)], 1e-12);
+    assert_eq!(own.special[0].remark, "non-smooth fold at x = 0");
+    let mut ends = [own.points.first(), own.points.last()].map(|point| point.unwrap().ranges[0][0]);
+    ends.sort_by(f64::total_cmp);
+    assert!((ends[0] + 2.0).abs() < 1e-12 && (ends[1] - 2.0).abs() < 1e-12, "{ends:?}");
+}
+
+/// Two stops at one place: the orbit crosses both surfaces at the same instant. Together they are one stop of stiffness 5.
+#[test]
+fn surfaces_that_are_crossed_at_one_instant_act_like_one() {
+    let study = "tolerance = 1e-8\n[[seed]]\nname = \"s\"\nattractor = \"cycle\"\nparameters = { w = 0.6 }\nsamples = 8\n\
+        [[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"w\"\nrange = [0.5, 1.6]\n";
+    let two = oscillator(1.0, 5.0, 0.3).replace("k*max(x - d, 0)", "(2*max(x - d, 0) + 3*max(2*x - 2*d, 0)/2)");
+    let diagram = run(&two, study);
+    let folds: Vec<f64> =
+        branch(&diagram, "b").special.iter().filter(|s| s.kind == Kind::Fold).map(|s| s.point.parameters[0]).collect();
+    let [upper, lower] = folds[..] else { panic!("{folds:?}") };
+    assert!((upper - 1.335112494893).abs() < 1e-8 && (lower - 1.137578740375).abs() < 1e-8, "{folds:?}");
 }

@@ -130,22 +130,6 @@ fn a_branch_of_cycles_ends_at_its_hopf_point() {
     assert!(said.contains("shrank to an equilibrium at 0.000000") || said.contains("at -0.000000"), "{said}");
 }
 
-/// x = mu and x = -mu meet at a corner.
-#[test]
-fn a_branch_of_equilibria_turns_at_a_corner() {
-    let states = [("x", "mu - abs(x)")];
-    let case = Case {
-        parameters: MU,
-        states: &states,
-        seed: "state = { x = 1 }\nparameters = { mu = 1 }",
-        range: [-1.0, 2.0],
-        more: "",
-    };
-    let (code, said) = case.run();
-    assert_eq!(code, Some(0), "{said}");
-    assert!(said.contains("1 special: reached 2"), "{said}");
-}
-
 /// The equilibrium reaches a surface where f jumps over zero.
 #[test]
 fn a_branch_of_equilibria_ends_at_a_jump() {

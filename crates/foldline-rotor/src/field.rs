@@ -209,15 +209,7 @@ impl VectorField for OverhungRotor {
         }
     }
 
-    fn linearise_switches(
-        &self,
-        at: Batch,
-        _free: &[usize],
-        h: &mut [f64],
-        hx: &mut [f64],
-        hp: &mut [f64],
-        ht: &mut [f64],
-    ) {
+    fn linearise_switches(&self, at: Batch, _free: &[usize], [h, hx, hp, ht]: [&mut [f64]; 4]) {
         self.switches(at, h);
         hx.fill(0.0);
         hp.fill(0.0);

@@ -26,9 +26,9 @@ pub struct Batch<'a> {
     pub parameters: Parameters<'a>,
     /// `[lanes]` for a forced field: the time of each point in forcing periods. Empty for an autonomous field.
     pub times: &'a [f64],
-    /// `[switch_count × lanes]`: ±1 selects the branch of f and of its derivatives, continued smoothly beyond the zeros of
-    /// the switching functions. Empty: the branch in force at each point. A branch that is undefined at a point, such
-    /// as a root whose argument is positive on one side only, is replaced by the one in force.
+    /// `[switch_count × lanes]`: ±1 selects the branch of f and of its derivatives, continued smoothly beyond the zeros
+    /// of the switching functions. Empty: the branch in force at each point. A branch that is undefined at a point,
+    /// such as a root whose argument is positive on one side only, is replaced by the one in force.
     pub signs: &'a [f64],
 }
 
@@ -110,19 +110,10 @@ pub trait VectorField: Send + Sync {
     /// The switching functions: writes `[switch_count × lanes]`.
     fn switches(&self, _at: Batch, _out: &mut [f64]) {}
 
-    /// The switching functions h with their derivatives: `h` is `[switch_count × lanes]`; `hx` is `[switch_count·n × lanes]`
-    /// (entry ∂hₛ/∂xⱼ is component `s * n + j`), `hp` likewise with q = `free.len()`, and `ht` is `[switch_count × lanes]`,
-    /// the derivative in τ. A field with switches must override it.
-    fn linearise_switches(
-        &self,
-        _at: Batch,
-        _free: &[usize],
-        _h: &mut [f64],
-        _hx: &mut [f64],
-        _hp: &mut [f64],
-        _ht: &mut [f64],
-    ) {
-    }
+    /// The switching functions h with their derivatives, into `[h, hx, hp, ht]`: `h` is `[switch_count × lanes]`; `hx`
+    /// is `[switch_count·n × lanes]` (entry ∂hₛ/∂xⱼ is component `s * n + j`), `hp` likewise with q = `free.len()`, and
+    /// `ht` is `[switch_count × lanes]`, the derivative in τ. A field with switches must override it.
+    fn linearise_switches(&self, _at: Batch, _free: &[usize], _to: [&mut [f64]; 4]) {}
 }
 
 /// The matrix of a Newton step could not be factorised.
@@ -254,14 +245,14 @@ pub trait ZeroProblem {
         None
     }
 
-    /// Holds the branch of a switched field that is in force at `u`, or on a switching surface the one that `along` leads
-    /// to, until [`ZeroProblem::cross`]. False if the problem does not do that.
+    /// Holds the branch of a switched field that is in force at `u`, or on a switching surface the one that `along`
+    /// leads to, until [`ZeroProblem::cross`]. False if the problem does not do that.
     fn hold_branch(&mut self, _u: &[f64], _along: &[f64]) -> bool {
         false
     }
 
-    /// At a solution on a switching surface: takes the branch of f on its other side, and returns the unit tangent there
-    /// that leads away from the surface. `None`, without any change, if the problem holds no branch or f jumps.
+    /// At a solution on a switching surface: takes the branch of f on its other side, and returns the unit tangent
+    /// there that leads away from the surface. `None`, without any change, if the problem holds no branch or f jumps.
     fn cross(&mut self, _u: &[f64], _along: &[f64], _switch: usize) -> Option<Vec<f64>> {
         None
     }

@@ -139,8 +139,8 @@ impl Follow<'_> {
         (Some(ending), found)
     }
 
-    /// Truncates the results of a step at the first switching surface that an equilibrium passes. `right` becomes the point
-    /// there, on the branch beyond the surface. Also returns whether there is one.
+    /// Truncates the results of a step at the first switching surface that an equilibrium passes. `right` becomes the
+    /// point there, on the branch beyond the surface. Also returns whether there is one.
     pub(super) fn up_to_surface(
         &mut self,
         left: &Station,

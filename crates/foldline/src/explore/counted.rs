@@ -82,15 +82,7 @@ impl VectorField for Counted<'_> {
         self.field.switch_name(switch)
     }
 
-    fn linearise_switches(
-        &self,
-        at: Batch,
-        free: &[usize],
-        h: &mut [f64],
-        hx: &mut [f64],
-        hp: &mut [f64],
-        ht: &mut [f64],
-    ) {
-        self.field.linearise_switches(at, free, h, hx, hp, ht);
+    fn linearise_switches(&self, at: Batch, free: &[usize], to: [&mut [f64]; 4]) {
+        self.field.linearise_switches(at, free, to);
     }
 }

@@ -237,8 +237,8 @@ impl<T: Lane> Condensed<T> {
         T::dispatch(Condense(self))
     }
 
-    /// Makes the equations of the inner nodes of interval j those of the nodes alone, X_j = …, before it is condensed: A = 1, and B and the
-    /// first `scalars` columns of C are zero. [`Condensed::replace`] says what they depend on.
+    /// Makes the equations of the inner nodes of interval j those of the nodes alone, X_j = …, before it is condensed:
+    /// A = 1, and B and the first `scalars` columns of C are zero. [`Condensed::replace`] says what they depend on.
     pub fn isolate(&mut self, j: usize, scalars: usize) {
         let (inner, width) = (self.m * self.n, self.n + self.q);
         let (lane, t) = (j / self.length, j % self.length);
@@ -250,8 +250,8 @@ impl<T: Lane> Condensed<T> {
         }
     }
 
-    /// Says how the inner nodes of an isolated interval j follow from its left end and the first scalars, once it is condensed: `by` is
-    /// `[m][n][n + scalars]`.
+    /// Says how the inner nodes of an isolated interval j follow from its left end and the first scalars, once it is
+    /// condensed: `by` is `[m][n][n + scalars]`.
     pub fn replace(&mut self, j: usize, by: &[f64]) {
         let (n, m, width) = (self.n, self.m, self.n + self.q);
         let (lane, t) = (j / self.length, j % self.length);

@@ -256,8 +256,8 @@ impl Model {
         self.states.iter().zip(self.scales()).map(|(state, scale)| state.range_at(scale)).collect()
     }
 
-    /// Graph and nodes of f: the branch in force, or that of given signs, which are components of the direction with the
-    /// given number.
+    /// Graph and nodes of f: the branch in force, or that of given signs, which are components of the direction with
+    /// the given number.
     fn branch(&self, given: bool, direction: u32) -> (graph::Graph, Vec<graph::Id>) {
         let Compiled { graph, field, .. } = &self.inner.compiled;
         if given { self.inner.switches.given(direction) } else { (graph.clone(), field.clone()) }
@@ -329,8 +329,8 @@ fn cached<K: std::hash::Hash + Eq>(known: &Tapes<K>, key: K, build: impl FnOnce(
     })
 }
 
-/// Replaces values that are not finite by those of the branch in force: a branch may be undefined beyond its switch, for
-/// example (x - d)^1.5 before contact at d.
+/// Replaces values that are not finite by those of the branch in force: a branch may be undefined beyond its switch,
+/// for example (x - d)^1.5 before contact at d.
 fn complete(values: &mut [f64], actual: impl FnOnce(&mut [f64])) {
     if values.iter().all(|value| value.is_finite()) {
         return;
@@ -432,15 +432,7 @@ impl VectorField for Model {
         text.unwrap_or_else(|| format!("switch {}", switch + 1))
     }
 
-    fn linearise_switches(
-        &self,
-        at: Batch,
-        free: &[usize],
-        h: &mut [f64],
-        hx: &mut [f64],
-        hp: &mut [f64],
-        ht: &mut [f64],
-    ) {
-        self.switch_tape(free).run(at, &[], &mut [h, hx, hp, ht]);
+    fn linearise_switches(&self, at: Batch, free: &[usize], mut to: [&mut [f64]; 4]) {
+        self.switch_tape(free).run(at, &[], &mut to);
     }
 }

@@ -250,10 +250,9 @@ impl ZeroProblem for EquilibriumProblem<'_> {
             return false;
         }
         let [h, rates] = self.switches(u, along);
-        let here = |k: usize| h[k].abs() > ON_SURFACE * self.switch_size(k, u);
-        let side = |k: usize| if here(k) { h[k] } else { rates[k] };
+        let side = |k: usize| if h[k].abs() > ON_SURFACE { h[k] } else { rates[k] };
         // An equilibrium that stays on a surface is on neither side of it.
-        if (0..h.len()).any(|k| side(k).abs() <= ON_SURFACE * self.switch_size(k, u)) {
+        if (0..h.len()).any(|k| side(k).abs() <= ON_SURFACE) {
             return false;
         }
         self.signs = (0..h.len()).map(|k| side(k).signum()).collect();
@@ -265,7 +264,7 @@ impl ZeroProblem for EquilibriumProblem<'_> {
         const MOST: usize = 6;
         let own = self.signs.clone();
         let [h, _] = self.switches(u, along);
-        let on = |k: usize| k == switch || h[k].abs() <= ON_SURFACE * self.switch_size(k, u);
+        let on = |k: usize| k == switch || h[k].abs() <= ON_SURFACE;
         let surfaces: Vec<usize> = (0..own.len()).filter(|k| on(*k)).collect();
         if own.is_empty() || surfaces.len() > MOST {
             return None;
@@ -292,31 +291,27 @@ const ON_SURFACE: f64 = 1e-9;
 const JUMP: f64 = 1e-6;
 
 impl EquilibriumProblem<'_> {
-    /// Switches and their rates along a direction.
+    /// Switches at `u`: values and rates along a direction, both relative to the change of the switch over the sizes of
+    /// the states.
     fn switches(&self, u: &[f64], along: &[f64]) -> [Vec<f64>; 2] {
         let (n, k) = (self.n(), self.setting.freedom());
         let parameters = self.setting.at(&u[n..]);
-        let batch =
-            Batch { lanes: 1, states: &u[..n], parameters: Parameters::Shared(&parameters), times: &[], signs: &[] };
+        let parameters = Parameters::Shared(&parameters);
+        let batch = Batch { lanes: 1, states: &u[..n], parameters, times: &[], signs: &[] };
         let [h, hx, hp, _] = self.setting.linearise_switches(batch);
-        let rate = |s: usize| dot(&hx[s * n..(s + 1) * n], &along[..n]) + dot(&hp[s * k..(s + 1) * k], &along[n..]);
-        let rates = (0..h.len()).map(rate).collect();
-        [h, rates]
+        let (mut values, mut rates) = (Vec::new(), Vec::new());
+        for (s, h) in h.iter().enumerate() {
+            let (by_state, by_parameter) = (&hx[s * n..(s + 1) * n], &hp[s * k..(s + 1) * k]);
+            let changes = by_state.iter().zip(&self.scale).map(|(h, scale)| (h * scale).abs());
+            let size = changes.fold(f64::MIN_POSITIVE, f64::max);
+            values.push(h / size);
+            rates.push((dot(by_state, &along[..n]) + dot(by_parameter, &along[n..])) / size);
+        }
+        [values, rates]
     }
 
-    /// Size of a switch: its change over the sizes of the states.
-    fn switch_size(&self, switch: usize, u: &[f64]) -> f64 {
-        let n = self.n();
-        let parameters = self.setting.at(&u[n..]);
-        let batch =
-            Batch { lanes: 1, states: &u[..n], parameters: Parameters::Shared(&parameters), times: &[], signs: &[] };
-        let [_, hx, ..] = self.setting.linearise_switches(batch);
-        let row = &hx[switch * n..(switch + 1) * n];
-        row.iter().zip(&self.scale).map(|(h, scale)| (h * scale).abs()).fold(f64::MIN_POSITIVE, f64::max)
-    }
-
-    /// Unit tangent of the branch for the signs that are set, at a point on some surfaces, if it leads to the sides of all of them that
-    /// these signs mean.
+    /// Unit tangent of the branch for the signs that are set, at a point on some surfaces, if it leads to the sides of
+    /// all of them that these signs mean.
     fn tangent_into(&mut self, u: &[f64], along: &[f64], surfaces: &[usize]) -> Option<Vec<f64>> {
         let size = self.unknowns();
         let mut r = vec![0.0; size];

@@ -14,8 +14,8 @@ use crate::linalg::lane::{Eight, Lane as _};
 /// Largest permitted number of intervals.
 pub const LARGEST: usize = 4000;
 const SMALLEST: usize = 6;
-/// Ratio of the lengths of neighbouring intervals below which the shorter one is a sliver: in a mesh made by
-/// [`equidistributed`] the ratio is at least 0.1.
+/// Ratio of the lengths of neighbouring intervals below which the shorter one is a sliver. Empirical: far below the
+/// grading of meshes that resolve a layer, so that they stay as they are.
 const SLIVER: f64 = 1e-3;
 
 /// Mesh of N equal intervals.

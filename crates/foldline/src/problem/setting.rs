@@ -115,7 +115,8 @@ impl Setting<'_> {
         all
     }
 
-    /// True if every unknown is one parameter of the field, and the columns of all derivatives: axis, index of the parameter, factor.
+    /// True if every unknown is one parameter of the field, and the columns of all derivatives: axis, index of the
+    /// parameter, factor.
     fn columns(&self) -> (bool, Vec<(usize, usize, f64)>) {
         let known = self.parameters.len();
         let plain = self.axes.iter().all(|axis| axis.ties.is_empty() && axis.index < known);
@@ -128,14 +129,14 @@ impl Setting<'_> {
         (plain, columns)
     }
 
-    /// The switches at one point and their derivatives with respect to the states, the unknowns λ and time: `h` and `ht` are
-    /// `[switches]`, `hx` is `[switches × n]`, `hp` is `[switches × k]`.
+    /// The switches at one point and their derivatives with respect to the states, the unknowns λ and time: `h` and
+    /// `ht` are `[switches]`, `hx` is `[switches × n]`, `hp` is `[switches × k]`.
     pub fn linearise_switches(&self, batch: Batch) -> [Vec<f64>; 4] {
         let (count, n, k) = (self.field.switch_count(), self.field.dim(), self.axes.len());
         let (_, columns) = self.columns();
         let free: Vec<usize> = columns.iter().map(|(_, index, _)| *index).collect();
         let [mut h, mut hx, mut each, mut ht] = [1, n, free.len(), 1].map(|size| vec![0.0; count * size]);
-        self.field.linearise_switches(batch, &free, &mut h, &mut hx, &mut each, &mut ht);
+        self.field.linearise_switches(batch, &free, [&mut h, &mut hx, &mut each, &mut ht]);
         let mut hp = vec![0.0; count * k];
         for s in 0..count {
             for (c, (axis, _, slope)) in columns.iter().enumerate() {

@@ -1,8 +1,10 @@
-//! Grazing: an orbit touches a switching surface of the vector field without crossing it. Boundary equilibria: an equilibrium lies on one.
+//! Grazing: an orbit touches a switching surface of the vector field without crossing it. Boundary equilibria: an
+//! equilibrium lies on one.
 //!
-//! **Idea.** A switch h has local extrema along a cycle. Where one of them passes zero the sequence of switchings changes: a new contact
-//! begins, or the gap between two contacts closes. The number of excursions of h above zero changes by one there, or by two where a
-//! symmetry repeats the event within the period; the extremum next to zero says how far it is to the event.
+//! **Idea.** A switch h has local extrema along a cycle. Where one of them passes zero the sequence of switchings
+//! changes: a new contact begins, or the gap between two contacts closes. The number of excursions of h above zero
+//! changes by one there, or by two where a symmetry repeats the event within the period; the extremum next to zero says
+//! how far it is to the event.
 //!
 //! **Equations.** With extrema e_i of h over the period, N the number of excursions h > 0:
 //!
@@ -19,11 +21,13 @@ use crate::contract::{Batch, Monitor, Parameters, Sight, VectorField};
 use crate::diagram::{Cycle, Kind, Point, Solution};
 use crate::problem::gauss::Scheme;
 
-/// Sections of a mesh interval at whose ends a switch is compared with its neighbours; extrema are then found by parabolas.
+/// Sections of a mesh interval at whose ends a switch is compared with its neighbours; extrema are then found by
+/// parabolas.
 const SECTIONS: usize = 8;
 /// Rounds of parabolas, each on an eighth of the section before. An extremum is known to the square of its place.
 const ROUNDS: usize = 5;
-/// Extrema smaller than this, relative to the largest value, are rounding. Where there are several, h is zero along a part of the orbit.
+/// Extrema smaller than this, relative to the largest value, are rounding. Where there are several, h is zero along a
+/// part of the orbit.
 const ZERO: f64 = 1e-11;
 
 /// Monitor of grazings of one switch.

@@ -291,8 +291,8 @@ impl<'a> OnCycleBranchPoints<'a> {
         [self.mesh[j], self.mesh[j + 1]]
     }
 
-    /// Derivatives of the flow of an interval at its Gauss points and its right end, `[m + 1][n × (n + 1 + k)]`, as those of v at the inner
-    /// nodes in v at the left end, T₁ and ℓ, `[m][n][n + scalars]`.
+    /// Derivatives of the flow of an interval at its Gauss points and its right end, `[m + 1][n × (n + 1 + k)]`, as
+    /// those of v at the inner nodes in v at the left end, T₁ and ℓ, `[m][n][n + scalars]`.
     fn transition(&self, by: &[f64], left: f64) -> Vec<f64> {
         let (n, first, m, k) = (self.n, self.first(), self.scheme.degree, self.setting.freedom());
         let (from, width) = (n + 1 + k, n + first + 1);
@@ -302,7 +302,7 @@ impl<'a> OnCycleBranchPoints<'a> {
             out.push(self.across.iter().zip(&row[from - 2..]).map(|(a, v)| a * v).sum());
         }
         let end = out.split_off(m * n * width);
-        let left: Vec<f64> = (0..n * width).map(|k| if k % width == k / width { left } else { 0.0 }).collect();
+        let left: Vec<f64> = piecewise::identity(n, width).iter().map(|entry| left * entry).collect();
         piecewise::fit(&self.scheme, &left, &mut out, &end);
         out
     }

@@ -182,17 +182,18 @@ impl<'a> OnCycles<'a> {
         self.system.eliminate(self.closure()).ok()
     }
 
-    /// Derivatives of v at the inner nodes of an interval in its left end, and T₁ where it has one: `[m][parts][parts + scalars]`.
+    /// Derivatives of v at the inner nodes of an interval in its left end, and T₁ where it has one: `[m][parts][parts +
+    /// scalars]`.
     fn transition(&self, found: &Switched, angle: f64) -> Vec<f64> {
         let ends = self.interval(found.interval);
         let width = self.parts + usize::from(self.is_fold());
-        let left: Vec<f64> = (0..self.parts * width).map(|k| f64::from(u8::from(k % width == k / width))).collect();
+        let left: Vec<f64> = piecewise::identity(self.parts, width);
         self.turned(&found.derivatives(&self.scheme, ends), &left, ends, |h| Complex64::cis(-angle * h))
     }
 
-    /// Derivatives of the flow of an interval at its Gauss points and its right end, `[m + 1][n × (n + 1 + k)]`, as those of v at the inner
-    /// nodes, `[m][parts][parts + scalars]`, where v is complex times `factor` of the time from the left end: (3) turns v back by θ over the
-    /// period. `left` is their value at the left end.
+    /// Derivatives of the flow of an interval at its Gauss points and its right end, `[m + 1][n × (n + 1 + k)]`, as
+    /// those of v at the inner nodes, `[m][parts][parts + scalars]`, where v is complex times `factor` of the time from
+    /// the left end: (3) turns v back by θ over the period. `left` is their value at the left end.
     fn turned(&self, by: &[f64], left: &[f64], ends: [f64; 2], factor: impl Fn(f64) -> Complex64) -> Vec<f64> {
         let (n, parts, m) = (self.n, self.parts, self.scheme.degree);
         let (from, width) = (n + self.scalars.len(), parts + usize::from(self.is_fold()));

@@ -38,8 +38,8 @@ pub struct OnSurfaces<'a> {
 }
 
 impl<'a> OnSurfaces<'a> {
-    /// Defining system for the switch that is next to zero at `at`, with the parameters of the setting; `None` if the field
-    /// has none, or `kind` does not fit.
+    /// Defining system for the switch that is next to zero at `at`, with the parameters of the setting; `None` if the
+    /// field has none, or `kind` does not fit.
     pub fn new(kind: Kind, setting: Setting<'a>, at: &Solution) -> Option<OnSurfaces<'a>> {
         let (field, count) = (setting.field, setting.field.switch_count());
         let least = |switch: usize| -> Option<f64> {

@@ -179,20 +179,12 @@ impl VectorField for Unfolded<'_> {
         self.field.switch_name(switch)
     }
 
-    fn linearise_switches(
-        &self,
-        at: Batch,
-        free: &[usize],
-        h: &mut [f64],
-        hx: &mut [f64],
-        hp: &mut [f64],
-        ht: &mut [f64],
-    ) {
+    fn linearise_switches(&self, at: Batch, free: &[usize], [h, hx, hp, ht]: [&mut [f64]; 4]) {
         // The switching functions do not depend on b.
         let (k, lanes) = (self.field.parameter_count(), at.lanes);
         let own: Vec<usize> = free.iter().copied().filter(|index| *index < k).collect();
         let mut of_own = vec![0.0; self.switch_count() * own.len() * lanes];
-        self.field.linearise_switches(self.parts(at).0, &own, h, hx, &mut of_own, ht);
+        self.field.linearise_switches(self.parts(at).0, &own, [h, hx, &mut of_own, ht]);
         hp.fill(0.0);
         for s in 0..self.switch_count() {
             for (to, _) in free.iter().enumerate().filter(|(_, index)| **index < k) {

@@ -36,15 +36,17 @@ const AGREEING: f64 = 0.2;
 pub(super) fn verify(setting: &Setting, branch: &Branch, tolerance: f64) -> Verified {
     let mut out = Verified::default();
     let [accuracy, _] = accuracies(tolerance);
-    for special in branch.special.iter().filter(|special| {
-        !matches!(special.kind, Kind::Unexplained | Kind::Mark | Kind::Grazing | Kind::BoundaryEquilibrium)
-    }) {
+    for special in branch.special.iter().filter(|special| !matches!(special.kind, Kind::Unexplained | Kind::Mark)) {
         let undecided = |why| Undecided {
             branch: branch.name.clone(),
             position: special.point.position,
             special: Some(special.kind),
             why,
         };
+        if matches!(special.kind, Kind::Grazing | Kind::BoundaryEquilibrium) {
+            out.undecided.push(undecided("grazings and boundary equilibria are not recomputed"));
+            continue;
+        }
         let parameter = special.point.parameters.get(branch.free).copied().unwrap_or(f64::NAN);
         if branch.held.is_some() || setting.axes.len() != 1 || setting.axes[0].index != branch.free {
             out.undecided.push(undecided("it lies on a curve in several parameters"));

@@ -117,7 +117,7 @@ impl CycleProblem<'_> {
             let mut by = found.derivatives(&self.scheme, self.interval(found.interval));
             let width = self.n + q;
             let end = by.split_off(by.len() - self.n * width);
-            let left: Vec<f64> = (0..self.n * width).map(|k| f64::from(u8::from(k % width == k / width))).collect();
+            let left: Vec<f64> = piecewise::identity(self.n, width);
             piecewise::fit(&self.scheme, &left, &mut by, &end);
             self.system.replace(found.interval, &by);
         }

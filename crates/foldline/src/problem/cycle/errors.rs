@@ -164,8 +164,8 @@ impl CycleProblem<'_> {
         (better[size] * total - self.trace).abs()
     }
 
-    /// The multipliers from more accurate transitions, with the Jacobian along the profile, and along the profile without its error; before
-    /// either of them those where every second interval is so.
+    /// The multipliers from more accurate transitions, with the Jacobian along the profile, and along the profile
+    /// without its error; before either of them those where every second interval is so.
     fn corrected_multipliers(&self, u: &[f64], switched: &[Switched]) -> Option<[Vec<Complex64>; 4]> {
         let known = self.measured.borrow();
         let known = known.as_ref()?;

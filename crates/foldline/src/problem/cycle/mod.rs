@@ -189,7 +189,8 @@ impl<'a> CycleProblem<'a> {
         PiecewiseFlow::new(&self.setting, &self.scheme, &u[self.profile_size()..], self.forcing_periods)
     }
 
-    /// Gives the inner nodes of intervals in which the orbit switches the values that the flow requires: there no polynomial follows it.
+    /// Moves the inner nodes of intervals in which the orbit switches to the values that the flow requires, because no
+    /// single polynomial represents the orbit there.
     fn settle(&self, u: &mut [f64]) {
         let block = self.block();
         for found in self.switched(u).iter() {
@@ -203,7 +204,8 @@ impl<'a> CycleProblem<'a> {
         [self.mesh[j], self.mesh[j + 1]]
     }
 
-    /// The orbit with a mesh interval for each part between switchings: mesh and profile, and likewise a tangent `[unknowns]`.
+    /// The orbit with a mesh interval for each part between switchings: mesh and profile, and likewise a tangent
+    /// `[unknowns]`.
     fn cut(&self, u: &[f64], tangent: &[f64]) -> (Mesh, Vec<f64>, Vec<f64>) {
         let size = self.profile_size();
         let switched = self.switched(u);

@@ -1,0 +1,573 @@
+//! Intervals in which an orbit passes a switch of the vector field.
+//!
+//! **Idea.** A single collocation polynomial is accurate only where f is smooth. An interval in which the orbit crosses
+//! a switching surface is cut at the crossings; each part has its own polynomial and its own branch of f. The equations
+//! of the interval require its inner nodes and its right end to lie on this piecewise flow. The unknowns of the orbit
+//! do not change, and the sequence of crossings need not be known: every Newton step reads it off the flow. A branch
+//! therefore passes a grazing like any other point.
+//!
+//! **Equations.** On an interval of length ℓ (in the time of the field), with parts [t_p, t_{p+1}] of the branch σ_p of
+//! f:
+//!
+//! ```text
+//!   (1)  Y_i = y + ℓ_p Σ_k a_ik f_{σ_p}(Y_k),   y⁺ = Σ_k e_k Y_k             collocation on a part, from its left end y
+//!   (2)  h_s(y⁺) = 0                                                       its right end, where the switch s changes sign
+//!   (3)  V_i = V + ℓ_p Σ_k a_ik (f_x V_k + f_σ),   V⁺ = Σ_k e_k V_k          derivatives in the left end and the scalars
+//!   (4)  V ← V⁺ + (f⁻ - f⁺) δt,   δt = -(∇h·V⁺ + h_σ) / (∇h·f⁻ + h_t)      at a switching at which f jumps
+//! ```
+//!
+//! If f is continuous at the surface, (4) leaves V unchanged, because to first order the crossing times do not matter.
+//! The flow is then continuously differentiable, also where the orbit grazes the surface.
+//!
+//! **Source.** leine2004 (saltation matrix). The extremum test: shampine2000.
+//!
+//! **Fails when** the orbit slides along a surface, or passes too many surfaces within one interval ([`Obstacle`]).
+
+mod parts;
+mod search;
+mod second;
+
+use super::Setting;
+use super::gauss::Scheme;
+use crate::contract::{Batch, Parameters};
+use crate::linalg::{dot, lu, max_abs, panel};
+pub(crate) use parts::{Part, Switched, cut, cut_direction, fit, identity};
+use search::{Met, Trial};
+
+/// Switchings in an interval. More within one interval of a mesh that is made for the tolerance is chatter.
+const MOST: usize = 64;
+/// Value of a switch, relative to its largest along the orbit, that counts as zero: rounding of the state.
+const ZERO: f64 = 1e-13;
+/// Length of a part, relative to its interval, below which it is left out: what f changes on it is then rounding.
+const SHORTEST: f64 = 1e-12;
+/// Jump of f, relative to the larger side, below which f is continuous: a switching is located to rounding, so that f
+/// on both sides of a kink differs by rounding times the ratio of the stiffnesses, up to 1e6.
+const CONTINUOUS: f64 = 1e-9;
+/// Reason why an orbit cannot be computed on an interval.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Obstacle {
+    /// It stays on a switching surface.
+    Slides,
+    /// It passes switching surfaces more often than is computed on one interval.
+    Chatters,
+    /// Newton's method does not converge on a part.
+    Lost,
+}
+
+impl Obstacle {
+    /// Sentence for messages.
+    pub fn name(self) -> &'static str {
+        match self {
+            Obstacle::Slides => "the orbit slides along a switching surface at which the right-hand side jumps",
+            Obstacle::Chatters => "the orbit crosses switching surfaces dozens of times within one mesh interval",
+            Obstacle::Lost => "the motion between two switchings could not be computed",
+        }
+    }
+}
+
+/// The flow of a vector field along a piecewise smooth orbit.
+pub(crate) struct PiecewiseFlow<'a> {
+    setting: &'a Setting<'a>,
+    scheme: &'a Scheme,
+    parameters: Vec<f64>,
+    /// T, λ₁ … λ_k.
+    scalars: Vec<f64>,
+    forcing_periods: u32,
+}
+
+impl<'a> PiecewiseFlow<'a> {
+    /// Flow for the scalars (T, λ₁ … λ_k) of an orbit.
+    pub fn new(setting: &'a Setting<'a>, scheme: &'a Scheme, scalars: &[f64], forcing_periods: u32) -> Self {
+        let parameters = setting.at(&scalars[1..]);
+        PiecewiseFlow { setting, scheme, parameters, scalars: scalars.to_vec(), forcing_periods }
+    }
+
+    fn n(&self) -> usize {
+        self.setting.field.dim()
+    }
+
+    /// Columns of derivatives: n + 1 + k.
+    fn width(&self) -> usize {
+        self.n() + self.scalars.len()
+    }
+
+    /// Time of the field at normalised time t; `None` if the field is autonomous.
+    fn time(&self, t: f64) -> Option<f64> {
+        (self.forcing_periods > 0).then(|| f64::from(self.forcing_periods) * t)
+    }
+
+    fn switches(&self, states: &[f64], times: &[f64]) -> Vec<f64> {
+        let (field, lanes) = (self.setting.field, states.len() / self.n());
+        let mut values = vec![0.0; field.switch_count() * lanes];
+        field.switches(
+            Batch { lanes, states, parameters: Parameters::Shared(&self.parameters), times, signs: &[] },
+            &mut values,
+        );
+        values
+    }
+
+    /// The intervals of a profile in which the orbit switches.
+    ///
+    /// # Errors
+    /// See [`Obstacle`].
+    pub fn intervals(&self, profile: &[f64], mesh: &[f64]) -> Result<Vec<Switched>, Obstacle> {
+        if self.setting.field.switch_count() == 0 {
+            return Ok(Vec::new());
+        }
+        let block = (self.scheme.degree + 1) * self.n();
+        let (suspects, sizes) = self.suspects(profile, mesh);
+        let mut all = Vec::new();
+        for j in suspects {
+            let nodes = &profile[j * block..(j + 1) * block];
+            let found = self.along(j, &nodes[..self.n()], [mesh[j], mesh[j + 1]], nodes, &sizes)?;
+            if found.parts.len() > 1 || !found.at_start.is_empty() {
+                all.push(found);
+            }
+        }
+        Ok(all)
+    }
+
+    /// The intervals in which a switch could vanish, because it changes by as much as its smallest value at the nodes,
+    /// and the largest value of every switch.
+    fn suspects(&self, profile: &[f64], mesh: &[f64]) -> (Vec<usize>, Vec<f64>) {
+        let (n, intervals, nodes) = (self.n(), mesh.len() - 1, self.scheme.degree + 1);
+        let lanes = intervals * nodes;
+        let mut states = vec![0.0; n * lanes];
+        panel::by_component(profile, nodes, n, &mut states);
+        let place = |g: usize, j: usize| mesh[j] + self.scheme.nodes[g] * (mesh[j + 1] - mesh[j]);
+        let places = (0..nodes).flat_map(|g| (0..intervals).map(move |j| (g, j)));
+        let times: Vec<f64> = places.filter_map(|(g, j)| self.time(place(g, j))).collect();
+        let values = self.switches(&states, &times);
+        let sizes: Vec<f64> = values.chunks_exact(lanes).map(max_abs).collect();
+        let could = |own: &[f64], j: usize| {
+            // With the left end of the next interval.
+            let next = own[(j + 1) % intervals];
+            let there = (0..nodes).map(|g| own[g * intervals + j]).chain([next]);
+            let [low, high] = there.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| [l.min(v), h.max(v)]);
+            low <= 0.0 && high >= 0.0 || low.abs().min(high.abs()) < high - low
+        };
+        let suspects = (0..intervals).filter(|j| values.chunks_exact(lanes).any(|own| could(own, *j))).collect();
+        (suspects, sizes)
+    }
+
+    /// Flow from `x` over an interval; `guess` `[m + 1][n]` is a polynomial close to it.
+    ///
+    /// # Errors
+    /// See [`Obstacle`].
+    fn along(
+        &self,
+        interval: usize,
+        x: &[f64],
+        ends: [f64; 2],
+        guess: &[f64],
+        sizes: &[f64],
+    ) -> Result<Switched, Obstacle> {
+        let (n, width) = (self.n(), self.width());
+        let mut signs = self.signs_before(x, ends[0], sizes);
+        let mut found = Switched {
+            interval,
+            parts: Vec::new(),
+            jumps: false,
+            sizes: sizes.to_vec(),
+            at_start: Vec::new(),
+            trace: 0.0,
+            end: x.to_vec(),
+            end_by: identity(n, width),
+        };
+        let (mut begin, mut passed, mut count) = (ends[0], Vec::new(), 0);
+        let length = ends[1] - ends[0];
+        loop {
+            let within = |t: f64| (t - ends[0]) / length;
+            let from = self.restricted(guess, [within(begin), 1.0]);
+            let nodes = self.solved(&found.end, [begin, ends[1]], &signs, from).ok_or(Obstacle::Lost)?;
+            let trial = Trial { nodes: &nodes, ends: [begin, ends[1]], signs: &signs, passed: &passed };
+            count += 1;
+            let (at, switch) = match self.first(&trial, sizes) {
+                Met::Nothing => {
+                    self.close(&mut found, [begin, ends[1]], nodes, &signs).ok_or(Obstacle::Lost)?;
+                    return Ok(found);
+                }
+                // A tangency to rounding where f is continuous; where f jumps the orbit slides.
+                Met::Back(switch) if count <= MOST && self.is_continuous(&found.end, begin, &signs, switch) => {
+                    signs[switch] = -signs[switch];
+                    continue;
+                }
+                Met::Back(_) if count <= MOST => return Err(Obstacle::Slides),
+                Met::Back(_) => return Err(Obstacle::Chatters),
+                Met::At(at, switch) => (at, switch),
+            };
+            if count > MOST {
+                return Err(Obstacle::Chatters);
+            }
+            let part = self.until(&found.end, begin, ends[1], at, switch, &signs, &nodes).ok_or(Obstacle::Lost)?;
+            let (end, nodes) = part;
+            let passes = end - begin > SHORTEST * length;
+            if passes {
+                self.close(&mut found, [begin, end], nodes, &signs).ok_or(Obstacle::Lost)?;
+            }
+            if found.parts.is_empty() {
+                found.at_start.push((signs.clone(), switch));
+            }
+            if !self.pass(&mut found, end, &signs, switch, passes).ok_or(Obstacle::Lost)? {
+                return Err(Obstacle::Slides);
+            }
+            signs[switch] = -signs[switch];
+            // A shorter part is left out, and the next one begins in its place.
+            if passes {
+                begin = end;
+                passed.clear();
+            }
+            passed.push(switch);
+            if begin >= ends[1] {
+                return Ok(found);
+            }
+        }
+    }
+
+    /// Signs of the switches just before `x`, at normalised time `t`: a switching at the left end of an interval
+    /// belongs to it.
+    fn signs_before(&self, x: &[f64], t: f64, sizes: &[f64]) -> Vec<f64> {
+        let time = self.time(t);
+        let values = self.switches(x, time.as_slice());
+        let mut signs: Vec<f64> = values.iter().map(|value| if *value > 0.0 { 1.0 } else { -1.0 }).collect();
+        if (0..signs.len()).all(|k| values[k].abs() > ZERO * sizes[k]) {
+            return signs;
+        }
+        let parameters = Parameters::Shared(&self.parameters);
+        let batch = Batch { lanes: 1, states: x, parameters, times: time.as_slice(), signs: &[] };
+        let [_, hx, _, ht] = self.setting.linearise_switches(batch);
+        let (n, mut f) = (self.n(), vec![0.0; self.n()]);
+        self.setting.field.evaluate(batch, &mut f);
+        for k in (0..signs.len()).filter(|k| values[*k].abs() <= ZERO * sizes[*k]) {
+            let speed = dot(&hx[k * n..(k + 1) * n], &f) + ht[k];
+            signs[k] = if speed == 0.0 { signs[k] } else { -speed.signum() };
+        }
+        signs
+    }
+
+    /// The part from `begin` to where the switch vanishes, near the place `at` of a trial to `last`: its right end and
+    /// its nodes.
+    fn until(
+        &self,
+        x: &[f64],
+        begin: f64,
+        last: f64,
+        at: f64,
+        switch: usize,
+        signs: &[f64],
+        trial: &[f64],
+    ) -> Option<(f64, Vec<f64>)> {
+        let mut end = begin + at * (last - begin);
+        let mut nodes = self.solved(x, [begin, end], signs, self.restricted(trial, [0.0, at]))?;
+        // From the root of the trial to that of the part, which is more accurate at its end.
+        for _ in 0..4 {
+            let value = |s: f64| self.switch(&nodes, [begin, end], s, switch);
+            let off = value(1.0) / (value(1.0) - value(1.0 - 1e-4)) * 1e-4;
+            let moved = (end - off * (end - begin)).min(last);
+            // At a grazing the crossing time is poorly determined, and matters little.
+            if !off.is_finite() || off.abs() > 0.1 || (moved - end).abs() < 1e-15 {
+                break;
+            }
+            let share = (moved - begin) / (end - begin);
+            let from = self.restricted(&nodes, [0.0, share]);
+            end = moved;
+            nodes = self.solved(x, [begin, end], signs, from)?;
+        }
+        Some((end, nodes))
+    }
+
+    /// A polynomial at the Gauss points of the part between two places of it, `[m][n]`.
+    fn restricted(&self, nodes: &[f64], [from, to]: [f64; 2]) -> Vec<f64> {
+        let n = self.n();
+        let mut out = vec![0.0; self.scheme.degree * n];
+        for (x, c) in out.chunks_exact_mut(n).zip(&self.scheme.nodes[1..]) {
+            self.scheme.value_into(from + c * (to - from), nodes, x);
+        }
+        out
+    }
+
+    /// States `[m][n]` component-major, `[n × m]`.
+    fn lanes(&self, states: &[f64]) -> Vec<f64> {
+        let n = self.n();
+        (0..n).flat_map(|c| states.iter().skip(c).step_by(n).copied()).collect()
+    }
+
+    /// Length of a part in the time of the field, and the times of its Gauss points.
+    fn course(&self, [begin, end]: [f64; 2]) -> (f64, Vec<f64>) {
+        let times = self.scheme.nodes[1..].iter().filter_map(|c| self.time(begin + c * (end - begin))).collect();
+        ((end - begin) * self.scalars[0], times)
+    }
+
+    /// A polynomial at the right end of its part, from its values at the nodes `[m + 1][size]`.
+    fn at_end(&self, values: &[f64], size: usize) -> Vec<f64> {
+        let mut out = vec![0.0; size];
+        for (e, own) in self.scheme.end.iter().zip(values.chunks_exact(size)) {
+            out.iter_mut().zip(own).for_each(|(o, v)| *o += e * v);
+        }
+        out
+    }
+
+    /// 1 - ℓ a f_x as rows `[m n × m n]`, from f_x `[n·n × m]`.
+    fn matrix(&self, length: f64, fx: &[f64]) -> Vec<f64> {
+        let (n, m) = (self.n(), self.scheme.degree);
+        let size = m * n;
+        let mut matrix = vec![0.0; size * size];
+        for i in 0..m {
+            for c in 0..n {
+                let row = &mut matrix[(i * n + c) * size..(i * n + c + 1) * size];
+                for k in 0..m {
+                    let share = length * self.scheme.integration[i * m + k];
+                    (0..n).for_each(|d| row[k * n + d] = -share * fx[(c * n + d) * m + k]);
+                }
+                row[i * n + c] += 1.0;
+            }
+        }
+        matrix
+    }
+
+    /// (1): the nodes `[m + 1][n]` of a part from `x`, by Newton's method from its Gauss points `[m][n]`.
+    fn solved(&self, x: &[f64], ends: [f64; 2], signs: &[f64], mut inner: Vec<f64>) -> Option<Vec<f64>> {
+        /// Updates, relative, that rounding may leave, and what is accepted where it leaves more.
+        const ROUNDED: [f64; 2] = [1e-14, 1e-9];
+        const ROUNDS: usize = 12;
+        let (n, m, field) = (self.n(), self.scheme.degree, self.setting.field);
+        let (length, times) = self.course(ends);
+        let signs: Vec<f64> = signs.iter().flat_map(|sign| std::iter::repeat_n(*sign, m)).collect();
+        let [mut f, mut fx] = [n, n * n].map(|size| vec![0.0; size * m]);
+        let mut pivots = vec![0; n * m];
+        let scale = |c: usize| self.setting.scales[c].max(x[c].abs());
+        let mut before = f64::INFINITY;
+        for _ in 0..ROUNDS {
+            let states = self.lanes(&inner);
+            let parameters = Parameters::Shared(&self.parameters);
+            let batch = Batch { lanes: m, states: &states, parameters, times: &times, signs: &signs };
+            field.linearise(batch, &[], &mut f, &mut fx, &mut []);
+            let mut matrix = self.matrix(length, &fx);
+            let mut change = vec![0.0; n * m];
+            for (i, row) in change.chunks_exact_mut(n).enumerate() {
+                for c in 0..n {
+                    let rates = &f[c * m..(c + 1) * m];
+                    let rise = dot(&self.scheme.integration[i * m..(i + 1) * m], rates);
+                    row[c] = inner[i * n + c] - x[c] - length * rise;
+                }
+            }
+            lu::factorise(&mut matrix, n * m, &mut pivots).ok()?;
+            lu::solve(&matrix, n * m, &pivots, &mut change, 1);
+            inner.iter_mut().zip(&change).for_each(|(x, d)| *x -= d);
+            let off = change.iter().enumerate().map(|(k, d)| (d / scale(k % n)).abs()).fold(0.0, f64::max);
+            if !off.is_finite() {
+                return None;
+            }
+            if off < ROUNDED[0] || off < ROUNDED[1] && off > 0.3 * before {
+                return Some([x, &inner].concat());
+            }
+            before = off;
+        }
+        (before < ROUNDED[1]).then(|| [x, &inner].concat())
+    }
+
+    /// Appends a part with its derivatives (3), and moves the end there.
+    fn close(&self, found: &mut Switched, ends: [f64; 2], nodes: Vec<f64>, own_signs: &[f64]) -> Option<()> {
+        let (n, m, width, k) = (self.n(), self.scheme.degree, self.width(), self.scalars.len() - 1);
+        let (length, times) = self.course(ends);
+        let states = self.lanes(&nodes[n..]);
+        let [mut f, mut fx, mut fp] = [n, n * n, n * k].map(|size| vec![0.0; size * m]);
+        let signs: Vec<f64> = own_signs.iter().flat_map(|sign| std::iter::repeat_n(*sign, m)).collect();
+        let parameters = Parameters::Shared(&self.parameters);
+        let batch = Batch { lanes: m, states: &states, parameters, times: &times, signs: &signs };
+        self.setting.linearise(batch, &mut f, &mut fx, &mut fp);
+        let mut inner = vec![0.0; m * n * width];
+        for i in 0..m {
+            let shares = &self.scheme.integration[i * m..(i + 1) * m];
+            for c in 0..n {
+                let row = &mut inner[(i * n + c) * width..(i * n + c + 1) * width];
+                row.copy_from_slice(&found.end_by[c * width..(c + 1) * width]);
+                // The period stretches the part.
+                row[n] += length / self.scalars[0] * dot(shares, &f[c * m..(c + 1) * m]);
+                for p in 0..k {
+                    row[n + 1 + p] += length * dot(shares, &fp[(c * k + p) * m..(c * k + p + 1) * m]);
+                }
+            }
+        }
+        let mut matrix = self.matrix(length, &fx);
+        let mut pivots = vec![0; n * m];
+        lu::factorise(&mut matrix, n * m, &mut pivots).ok()?;
+        lu::solve(&matrix, n * m, &pivots, &mut inner, width);
+        let by = [&found.end_by[..], &inner].concat();
+        found.end = self.at_end(&nodes, n);
+        found.end_by = self.at_end(&by, n * width);
+        let trace: f64 =
+            (0..n).map(|c| dot(&self.scheme.weights, &fx[(c * n + c) * m..(c * n + c + 1) * m])).sum::<f64>() * length;
+        let (signs, switch, jumps) = (own_signs.to_vec(), None, false);
+        found.parts.push(Part { ends, nodes, by, signs, switch, jumps, trace });
+        found.end.iter().chain(&found.end_by).all(|x| x.is_finite()).then_some(())
+    }
+
+    /// f on both sides of a switch that vanishes at `x`.
+    fn sides(&self, x: &[f64], t: f64, signs: &[f64], switch: usize) -> [Vec<f64>; 2] {
+        let time = self.time(t);
+        let mut signs = signs.to_vec();
+        [(); 2].map(|()| {
+            let mut f = vec![0.0; self.n()];
+            let parameters = Parameters::Shared(&self.parameters);
+            let batch = Batch { lanes: 1, states: x, parameters, times: time.as_slice(), signs: &signs };
+            self.setting.field.evaluate(batch, &mut f);
+            signs[switch] = -signs[switch];
+            f
+        })
+    }
+
+    fn is_continuous(&self, x: &[f64], t: f64, signs: &[f64], switch: usize) -> bool {
+        let [before, after] = self.sides(x, t, signs, switch);
+        self.same(&before, &after)
+    }
+
+    fn same(&self, before: &[f64], after: &[f64]) -> bool {
+        let size = |of: &dyn Fn(usize) -> f64| {
+            (0..self.n()).map(|c| (of(c) / self.setting.scales[c]).abs()).fold(0.0, f64::max)
+        };
+        let jump = size(&|c| after[c] - before[c]);
+        jump <= CONTINUOUS * size(&|c| before[c]).max(size(&|c| after[c]))
+    }
+
+    /// (4) at the end of the last part, which is at time `t`; `signs` are those of that part. False if the flow does
+    /// not leave the surface on the other side.
+    fn pass(&self, found: &mut Switched, t: f64, signs: &[f64], switch: usize, ends: bool) -> Option<bool> {
+        let x = found.end.clone();
+        let [before, after] = self.sides(&x, t, signs, switch);
+        let jumps = !self.same(&before, &after);
+        if let Some(last) = found.parts.last_mut().filter(|_| ends) {
+            (last.switch, last.jumps) = (Some(switch), jumps);
+        }
+        found.jumps |= jumps;
+        if !jumps {
+            return Some(true);
+        }
+        let (n, width, time) = (self.n(), self.width(), self.time(t));
+        let parameters = Parameters::Shared(&self.parameters);
+        let batch = Batch { lanes: 1, states: &x, parameters, times: time.as_slice(), signs: &[] };
+        let [_, hx, hp, ht] = self.setting.linearise_switches(batch);
+        let (gradient, in_time, k) = (&hx[switch * n..(switch + 1) * n], ht[switch], width - n - 1);
+        let in_scalar = &hp[switch * k..(switch + 1) * k];
+        let [speed, speed_after] = [&before, &after].map(|f| dot(gradient, f) + in_time);
+        if speed * speed_after <= 0.0 || !speed.is_finite() {
+            return Some(false);
+        }
+        for column in 0..width {
+            let own = (0..n).map(|c| gradient[c] * found.end_by[c * width + column]).sum::<f64>();
+            let direct = column.checked_sub(n + 1).map_or(0.0, |k| in_scalar[k]);
+            let shift = -(own + direct) / speed;
+            (0..n).for_each(|c| found.end_by[c * width + column] += (before[c] - after[c]) * shift);
+        }
+        match found.parts.last_mut() {
+            Some(last) => last.trace += (speed_after / speed).ln(),
+            None => found.trace += (speed_after / speed).ln(),
+        }
+        Some(true)
+    }
+
+    /// One switch at a place of a polynomial.
+    fn switch(&self, nodes: &[f64], [begin, end]: [f64; 2], s: f64, switch: usize) -> f64 {
+        let mut x = vec![0.0; self.n()];
+        self.scheme.value_into(s, nodes, &mut x);
+        self.switches(&x, self.time(begin + s * (end - begin)).as_slice())[switch]
+    }
+
+    /// The transition of an interval from parts of half the length, `[n × n]`: more accurate than its own.
+    pub fn refined(&self, own: &Switched, x: &[f64], [begin, end]: [f64; 2], nodes: &[f64]) -> Option<Vec<f64>> {
+        let (n, width, interval, sizes) = (self.n(), self.width(), own.interval, &own.sizes);
+        let middle = 0.5 * (begin + end);
+        let half = |from: [f64; 2]| -> Vec<f64> {
+            let mut x = vec![0.0; n];
+            self.scheme.value_into(from[0], nodes, &mut x);
+            [x, self.restricted(nodes, from)].concat()
+        };
+        let first = self.along(interval, x, [begin, middle], &half([0.0, 0.5]), sizes).ok()?;
+        let second = self.along(interval, &first.end, [middle, end], &half([0.5, 1.0]), sizes).ok()?;
+        let entry = |i: usize, k: usize| {
+            (0..n).map(|j| second.end_by[i * width + j] * first.end_by[j * width + k]).sum::<f64>()
+        };
+        Some((0..n * n).map(|k| entry(k / n, k % n)).collect())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::{Definition, Model, ModelSource, Parameter, State};
+    use crate::problem::Axis;
+
+    /// A forced oscillator with the given force of its contact; parameters p and k.
+    fn model(force: &str) -> Model {
+        Model::compile(ModelSource {
+            name: "contact".into(),
+            parameters: vec![Parameter::new("p", 0.4), Parameter::new("k", 3.0)],
+            states: vec![State::new("x"), State::new("v")],
+            equations: vec![Definition::new("x", "v"), Definition::new("v", &format!("-x - 0.1*v - {force}"))],
+            ..ModelSource::default()
+        })
+        .unwrap()
+    }
+
+    fn flow<'a>(setting: &'a Setting<'a>, scalars: &[f64], x: &[f64], ends: [f64; 2]) -> Option<Switched> {
+        let scheme = Scheme::of(4);
+        let flow = PiecewiseFlow::new(setting, scheme, scalars, 0);
+        let sizes = vec![1.0; setting.field.switch_count()];
+        flow.along(0, x, ends, &x.repeat(5), &sizes).ok()
+    }
+
+    /// Derivatives of the end, and of the derivatives, against differences.
+    #[test]
+    fn derivatives_through_switchings_are_those_of_the_flow() {
+        for (force, start) in [
+            ("k*max(x - p, 0)", [0.35, 0.9]),
+            ("if(x > p, k*(x - p)^2 + x - p, 0)", [0.35, 0.9]),
+            ("k*heaviside(v - p)", [0.3, 0.55]),
+        ] {
+            let (model, scales) = (model(force), [1.0, 1.0]);
+            let axes = vec![Axis::new(0, 1.0), Axis::new(1, 1.0)];
+            let setting = Setting { field: &model, scales: &scales, parameters: vec![0.4, 3.0], axes };
+            let (scalars, ends, n, width) = ([0.2, 0.4, 3.0], [0.1, 0.7], 2, 5);
+            let own = flow(&setting, &scalars, &start, ends).unwrap();
+            assert!(own.parts.len() > 1, "{force}");
+            let direction = [0.3, -0.2, 0.02, 0.25, 0.4];
+            let moved = |by: f64| {
+                let at = |k: usize| if k < n { start[k] } else { scalars[k - n] };
+                let all: Vec<f64> = (0..width).map(|k| at(k) + by * direction[k]).collect();
+                flow(&setting, &all[n..], &all[..n], ends).unwrap()
+            };
+            let step = 1e-5;
+            let (more, less) = (moved(step), moved(-step));
+            for c in 0..n {
+                let exact = dot(&own.end_by[c * width..(c + 1) * width], &direction);
+                let difference = (more.end[c] - less.end[c]) / (2.0 * step);
+                assert!((exact - difference).abs() < 1e-8, "{force}: {exact} {difference}");
+            }
+            let flow = PiecewiseFlow::new(&setting, Scheme::of(4), &scalars, 0);
+            let exact = flow.varied(&own, &start, ends, &direction[..n], &direction[n..]).unwrap();
+            let [more, less] = [more, less].map(|own| own.derivatives(Scheme::of(4), ends));
+            for (k, exact) in exact.iter().enumerate() {
+                let difference = (more[k] - less[k]) / (2.0 * step);
+                assert!((exact - difference).abs() < 1e-6, "{force} {k}: {exact} {difference}");
+            }
+        }
+    }
+
+    /// Contact with x'' = -4 x lasts π/2.
+    #[test]
+    fn a_contact_ends_when_its_spring_has_relaxed() {
+        let model = Model::compile(ModelSource {
+            states: vec![State::new("x"), State::new("v")],
+            equations: vec![Definition::new("x", "v"), Definition::new("v", "-x - 3*max(x, 0)")],
+            ..ModelSource::default()
+        })
+        .unwrap();
+        let setting = Setting { field: &model, scales: &[1.0, 1.0], parameters: vec![], axes: vec![] };
+        // Late in the contact: 0.1 before its end, x = sin(2 t)/2.
+        let (x, v) = (0.5 * 0.2f64.sin(), -(0.2f64.cos()));
+        let own = flow(&setting, &[1.0], &[x, v], [0.0, 0.15]).unwrap();
+        assert_eq!(own.parts.len(), 2);
+        let leaves = own.parts[0].ends[1];
+        assert!((leaves - 0.1).abs() < 1e-11, "{leaves}");
+    }
+}
