@@ -149,16 +149,13 @@ fn a_branch_of_equilibria_ends_at_a_jump() {
 }
 
 #[test]
-fn sliding_trajectories_are_explained() {
-    let parameters = [("c", 0.05)];
-    let states = [("x", "v"), ("v", "-x - c*v + 0.3*sign(0.5 - v)*(1 + 0.5*exp(-abs(v - 0.5)))")];
-    Case { parameters: &parameters, states: &states, seed: "attractor = \"cycle\"", range: [0.0, 1.0], more: "" }.ends(
-        &[
-            "stopped because the step size became too small",
-            "slide along the discontinuity",
-            "replace the jump by a smooth step",
-        ],
-    );
+fn trajectories_that_slide_along_two_surfaces_are_explained() {
+    let states = [("x", "-2*sign(x) + mu*y"), ("y", "-2*sign(y) - x")];
+    Case { parameters: MU, states: &states, seed: "attractor = \"cycle\"", range: [0.0, 1.0], more: "" }.ends(&[
+        "stopped because the step size became too small",
+        "slide along two discontinuities at once",
+        "replace the jumps by smooth steps",
+    ]);
 }
 
 #[test]

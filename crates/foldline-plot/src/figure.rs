@@ -269,6 +269,7 @@ impl Marker {
             Kind::DoubleHopf | Kind::DoubleTorus | Kind::Resonance14 => Marker::Square,
             Kind::FoldFlip | Kind::FlipTorus | Kind::Resonance12 => Marker::Cross,
             Kind::Grazing | Kind::BoundaryEquilibrium => Marker::Nabla,
+            Kind::Sliding => Marker::Plus,
             Kind::Mark => Marker::Dot,
             Kind::Unexplained => Marker::Star,
         }

@@ -27,8 +27,9 @@ pub struct Batch<'a> {
     /// `[lanes]` for a forced field: the time of each point in forcing periods. Empty for an autonomous field.
     pub times: &'a [f64],
     /// `[switch_count × lanes]`: ±1 selects the branch of f and of its derivatives, continued smoothly beyond the zeros
-    /// of the switching functions. Empty: the branch in force at each point. A branch that is undefined at a point,
-    /// such as a root whose argument is positive on one side only, is replaced by the one in force.
+    /// of the switching functions; 0, for at most one switch of a point, motion along the surface on which it vanishes
+    /// (Filippov's combination of both branches). Empty: the branch in force at each point. A branch that is undefined
+    /// at a point, such as a root whose argument is positive on one side only, is replaced by the one in force.
     pub signs: &'a [f64],
 }
 
@@ -114,6 +115,22 @@ pub trait VectorField: Send + Sync {
     /// is `[switch_count·n × lanes]` (entry ∂hₛ/∂xⱼ is component `s * n + j`), `hp` likewise with q = `free.len()`, and
     /// `ht` is `[switch_count × lanes]`, the derivative in τ. A field with switches must override it.
     fn linearise_switches(&self, _at: Batch, _free: &[usize], _to: [&mut [f64]; 4]) {}
+
+    /// Rates of change of a switching function under the branches of f on its negative and on its positive side,
+    /// ∇h·f + h_t: `[lanes]` each. `at.signs` selects the branch of the other switches.
+    fn normal_speeds(&self, at: Batch, switch: usize) -> [Vec<f64>; 2] {
+        let (n, count, lanes) = (self.dim(), self.switch_count(), at.lanes);
+        let [mut h, mut hx, mut ht] = [count, count * n, count].map(|size| vec![0.0; size * lanes]);
+        self.linearise_switches(Batch { signs: &[], ..at }, &[], [&mut h, &mut hx, &mut [], &mut ht]);
+        let mut signs = at.signs.to_vec();
+        [-1.0, 1.0].map(|side| {
+            signs[switch * lanes..(switch + 1) * lanes].fill(side);
+            let mut f = vec![0.0; n * lanes];
+            self.evaluate(Batch { signs: &signs, ..at }, &mut f);
+            let moved = |l: usize| (0..n).map(|c| hx[(switch * n + c) * lanes + l] * f[c * lanes + l]).sum::<f64>();
+            (0..lanes).map(|l| moved(l) + ht[switch * lanes + l]).collect()
+        })
+    }
 }
 
 /// The matrix of a Newton step could not be factorised.

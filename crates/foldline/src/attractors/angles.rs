@@ -312,6 +312,11 @@ impl VectorField for Rolled<'_> {
         let states = self.states(at);
         self.field.switches(Batch { states: &states, ..at }, out);
     }
+
+    fn normal_speeds(&self, at: Batch, switch: usize) -> [Vec<f64>; 2] {
+        let states = self.states(at);
+        self.field.normal_speeds(Batch { states: &states, ..at }, switch)
+    }
 }
 
 /// Returns the initial states of a survey, with circles in place of angles.

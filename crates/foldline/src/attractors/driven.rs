@@ -120,6 +120,12 @@ impl VectorField for Driven<'_> {
     fn switches(&self, at: Batch, out: &mut [f64]) {
         self.inner(at, |inner| self.0.switches(inner, out));
     }
+
+    fn normal_speeds(&self, at: Batch, switch: usize) -> [Vec<f64>; 2] {
+        let mut speeds = [Vec::new(), Vec::new()];
+        self.inner(at, |inner| speeds = self.0.normal_speeds(inner, switch));
+        speeds
+    }
 }
 
 /// Samples the attractors of a forced field; see [`super::survey_until`].

@@ -141,10 +141,11 @@ impl Follow<'_> {
                 return (
                     format!(
                         "the right-hand side has {places} (abs, sign, heaviside, min, max, if, comparisons), and the \
-                         solution slides along a switching surface, or several switchings coincide here"
+                         solution begins or ceases to slide along a switching surface here, slides along two at once, \
+                         or passes several in one instant"
                     ),
-                    "where a term jumps, as sign(x) does, use a smooth function with a sharpness parameter, such as \
-                     tanh(s*x), and continue the solution in s to the sharpness needed; otherwise try another tolerance",
+                    "try another tolerance; where a term jumps, as sign(x) does, a smooth function with a sharpness \
+                     parameter, such as tanh(s*x), can be continued in s to the sharpness needed",
                 );
             }
         }

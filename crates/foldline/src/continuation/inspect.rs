@@ -492,12 +492,13 @@ impl Follow<'_> {
         }
         self.count(&mut station);
         // On non-smooth fields a parameter is no more accurate than the profile, and two meshes may agree by chance.
-        let least =
-            if self.problem.is_switched() && !matches!(kind, Kind::Mark | Kind::Grazing | Kind::BoundaryEquilibrium) {
-                station.point.trust.discretisation
-            } else {
-                0.0
-            };
+        let least = if self.problem.is_switched()
+            && !matches!(kind, Kind::Mark | Kind::Grazing | Kind::Sliding | Kind::BoundaryEquilibrium)
+        {
+            station.point.trust.discretisation
+        } else {
+            0.0
+        };
         let error = error.max(least);
         let (before, after) = if self.direction > 0.0 { (before, after) } else { (after, before) };
         Box::new(SpecialPoint {

@@ -338,6 +338,8 @@ pub enum Kind {
     DoubleTorus,
     /// A cycle touches a switching surface of the vector field.
     Grazing,
+    /// A cycle begins or ceases to slide along a switching surface of the vector field.
+    Sliding,
     /// An equilibrium lies on a switching surface of the vector field.
     BoundaryEquilibrium,
     /// A quantity has a requested value.
@@ -348,7 +350,7 @@ pub enum Kind {
 
 impl Kind {
     /// Every kind, in the order in which tables list them.
-    pub const ALL: [Kind; 24] = [
+    pub const ALL: [Kind; 25] = [
         Kind::Fold,
         Kind::BranchPoint,
         Kind::Hopf,
@@ -370,6 +372,7 @@ impl Kind {
         Kind::FlipTorus,
         Kind::DoubleTorus,
         Kind::Grazing,
+        Kind::Sliding,
         Kind::BoundaryEquilibrium,
         Kind::Mark,
         Kind::Unexplained,
@@ -378,10 +381,8 @@ impl Kind {
     /// True for bifurcations of codimension two.
     pub fn has_codimension_two(self) -> bool {
         use Kind::{BoundaryEquilibrium, BranchPoint, Fold, Grazing, Hopf, Mark, PeriodDoubling, Torus, Unexplained};
-        !matches!(
-            self,
-            Fold | BranchPoint | Hopf | PeriodDoubling | Torus | Grazing | BoundaryEquilibrium | Mark | Unexplained
-        )
+        !matches!(self, Fold | BranchPoint | Hopf | PeriodDoubling | Torus | Mark | Unexplained)
+            && !matches!(self, Grazing | BoundaryEquilibrium | Kind::Sliding)
     }
 
     /// Names of the coefficients of the normal form, as defined in [`crate::special::normal_form`] and
@@ -426,6 +427,7 @@ impl Kind {
             Kind::FlipTorus => "flip-torus",
             Kind::DoubleTorus => "double-torus",
             Kind::Grazing => "grazing",
+            Kind::Sliding => "sliding",
             Kind::BoundaryEquilibrium => "boundary-equilibrium",
             Kind::Mark => "mark",
             Kind::Unexplained => "unexplained",

@@ -57,9 +57,9 @@ pub(super) fn of_no_start(system: &System, parameters: &[f64], seen: Seen) -> St
                        there"
             .into(),
         n if stuck && n > 0 => "\nlikely cause: f is discontinuous (sign, heaviside, if, comparisons), and \
-                                trajectories slide along the discontinuity, as with dry friction\nwhat to do: \
-                                replace the jump by a smooth step such as tanh(s*x), and continue the solution in s \
-                                to the sharpness needed"
+                                trajectories slide along two discontinuities at once, as where two bodies stick\n\
+                                what to do: replace the jumps by smooth steps such as tanh(s*x), and continue the \
+                                solution in s to the sharpness needed"
             .into(),
         _ if seen.all_escaped => "\nlikely cause: at these parameter values no attractor can be reached from the \
                                   ranges of the states\nwhat to do: change the parameters or the ranges of the \

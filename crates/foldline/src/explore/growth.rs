@@ -14,7 +14,7 @@ use crate::special::mark::Mark;
 use crate::special::on_cycle_branch_points::OnCycleBranchPoints;
 use crate::special::quantity::Quantity;
 use crate::special::unfolded::UnfoldedCycles;
-use crate::special::{self, collapse, grazing};
+use crate::special::{self, collapse, grazing, sliding};
 
 /// The curve through a point that is to be followed.
 #[derive(Clone, Debug, Default)]
@@ -479,6 +479,9 @@ impl Growth<'_> {
             self.marks.iter().map(|mark| Box::new(mark.of_size(system.size_of(mark.quantity))) as _).collect();
         if !branch.held.is_some_and(|(kind, _)| matches!(kind, Kind::Grazing | Kind::BoundaryEquilibrium)) {
             marks.extend(grazing::monitors(system.field, branch.family == Family::Cycle));
+            if branch.family == Family::Cycle {
+                marks.extend(sliding::monitors(system.field));
+            }
         }
         let home = branch.points.iter().find(|p| p.position == 0).filter(|_| branch.ends[0].is_none()).cloned();
         let limits = Limits {
@@ -537,7 +540,14 @@ impl Growth<'_> {
             if going { Verdict::Continue } else { Verdict::Stop }
         });
         // An interrupted run ends for reasons that have nothing to do with the branch.
-        if self.observer.stopping() { Ending::Stopped } else { ending }
+        if self.observer.stopping() {
+            return Ending::Stopped;
+        }
+        let last = if side == 1 { branch.points.last() } else { branch.points.first() };
+        match ending {
+            Ending::StepTooSmall(why) => Ending::StepTooSmall(sliding::at_corner(system.field, last, why)),
+            other => other,
+        }
     }
 
     /// Returns the curve of a branch.
@@ -589,9 +599,10 @@ impl Growth<'_> {
     /// Returns the coefficients of the normal form of a special point.
     fn coefficients(&self, system: &System, branch: &Branch, side: usize, special: &SpecialPoint) -> Coefficients {
         let (line, own) = (self.line(branch), setting(system, branch.free, &special.point.parameters));
-        if matches!(special.kind, Kind::Grazing | Kind::BoundaryEquilibrium) {
+        if matches!(special.kind, Kind::Grazing | Kind::Sliding | Kind::BoundaryEquilibrium) {
             let remark = match special.kind {
                 Kind::Grazing => grazing::described(system.field, &special.point),
+                Kind::Sliding => sliding::described(system.field, &special.point),
                 _ => grazing::on_surface(system.field, &special.point, &special.remark),
             };
             return Coefficients { remark, ..Coefficients::default() };

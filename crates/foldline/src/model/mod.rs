@@ -35,6 +35,7 @@ mod rates;
 mod run;
 mod scope;
 mod show;
+mod sliding;
 mod source;
 mod switches;
 mod table;
@@ -127,9 +128,21 @@ struct Inner {
     switches: Switches,
     /// f with given signs of the switches.
     given: Tape,
-    linear: Tapes<(Vec<usize>, bool)>,
-    directional: Tapes<(usize, bool, bool)>,
+    sliding: Tapes<u32>,
+    linear: Tapes<(Vec<usize>, Branch)>,
+    directional: Tapes<(usize, bool, Branch)>,
     switch_derivatives: Tapes<Vec<usize>>,
+}
+
+/// Branch of f.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+enum Branch {
+    /// The one in force at the state.
+    InForce,
+    /// That of given signs of the switches.
+    Given,
+    /// Motion along the surface of a switch, with given signs of the others.
+    Sliding(u32),
 }
 
 impl Deref for Model {
@@ -156,7 +169,6 @@ impl Model {
         let outputs_of = output_list;
         let about =
             About { name, description, source, states, parameters, totals, outputs: outputs_of, whirl, time, remarks };
-        let (linear, directional, switch_derivatives) = (RwLock::default(), RwLock::default(), RwLock::default());
         let (given_graph, given) = switches.given(0);
         let given = Tape::new(&given_graph, &[&given]);
         let periods = match about.states.iter().any(|state| state.period.is_some()) {
@@ -171,9 +183,10 @@ impl Model {
             outputs,
             switches,
             given,
-            linear,
-            directional,
-            switch_derivatives,
+            sliding: RwLock::default(),
+            linear: RwLock::default(),
+            directional: RwLock::default(),
+            switch_derivatives: RwLock::default(),
         };
         let model = Model { about: Arc::new(about), inner: Arc::new(inner) };
         match model.wrong_period().or_else(|| angles::no_angle(&model, &items)) {
@@ -256,17 +269,28 @@ impl Model {
         self.states.iter().zip(self.scales()).map(|(state, scale)| state.range_at(scale)).collect()
     }
 
-    /// Graph and nodes of f: the branch in force, or that of given signs, which are components of the direction with
-    /// the given number.
-    fn branch(&self, given: bool, direction: u32) -> (graph::Graph, Vec<graph::Id>) {
+    /// Graph and nodes of a branch of f. Given signs are components of the direction with the given number.
+    fn branch(&self, branch: Branch, direction: u32) -> (graph::Graph, Vec<graph::Id>) {
         let Compiled { graph, field, .. } = &self.inner.compiled;
-        if given { self.inner.switches.given(direction) } else { (graph.clone(), field.clone()) }
+        match branch {
+            Branch::InForce => (graph.clone(), field.clone()),
+            Branch::Given => self.inner.switches.given(direction),
+            Branch::Sliding(switch) => self.inner.switches.sliding(direction, switch as usize),
+        }
+    }
+
+    /// f along the surface of a switch.
+    fn sliding_tape(&self, switch: u32) -> Arc<Tape> {
+        cached(&self.inner.sliding, switch, || {
+            let (graph, field) = self.branch(Branch::Sliding(switch), 0);
+            Tape::new(&graph, &[&field])
+        })
     }
 
     /// f, then fx row by row, then fp row by row, as [`VectorField::linearise`] orders them.
-    fn linear_tape(&self, free: &[usize], given: bool) -> Arc<Tape> {
-        cached(&self.inner.linear, (free.to_vec(), given), || {
-            let (mut graph, field) = self.branch(given, 0);
+    fn linear_tape(&self, free: &[usize], branch: Branch) -> Arc<Tape> {
+        cached(&self.inner.linear, (free.to_vec(), branch), || {
+            let (mut graph, field) = self.branch(branch, 0);
             let moving = self.leaves(free);
             let columns: Vec<Vec<graph::Id>> = moving.map(|leaf| column(&mut graph, &field, leaf)).collect();
             let (fx, fp) = columns.split_at(self.states.len());
@@ -294,9 +318,9 @@ impl Model {
     }
 
     /// Multilinear derivative of the given order; without parameter parts if those of all directions are zero.
-    fn directional_tape(&self, order: usize, with_parameters: bool, given: bool) -> Arc<Tape> {
-        cached(&self.inner.directional, (order, with_parameters, given), || {
-            let (mut graph, mut derivative) = self.branch(given, order as u32);
+    fn directional_tape(&self, order: usize, with_parameters: bool, branch: Branch) -> Arc<Tape> {
+        cached(&self.inner.directional, (order, with_parameters, branch), || {
+            let (mut graph, mut derivative) = self.branch(branch, order as u32);
             let states = self.states.len() as u32;
             for d in 0..order as u32 {
                 derivative = graph.derivative(&derivative, |graph, leaf| match leaf {
@@ -371,19 +395,32 @@ impl VectorField for Model {
         if at.signs.is_empty() {
             return self.inner.field.run(at, &[], &mut [f]);
         }
+        if sliding::occurs(&at) {
+            return sliding::each(at, &[], &mut [f], |at, _, along, to| match along {
+                None => self.evaluate(at, to[0]),
+                Some(switch) => self.sliding_tape(switch).run(at, &[at.signs], to),
+            });
+        }
         self.inner.given.run(at, &[at.signs], &mut [f]);
         complete(f, |actual| self.inner.field.run(at, &[], &mut [actual]));
     }
 
     fn linearise(&self, at: Batch, free: &[usize], f: &mut [f64], fx: &mut [f64], fp: &mut [f64]) {
         if at.signs.is_empty() {
-            return self.linear_tape(free, false).run(at, &[], &mut [f, fx, fp]);
+            return self.linear_tape(free, Branch::InForce).run(at, &[], &mut [f, fx, fp]);
         }
-        self.linear_tape(free, true).run(at, &[at.signs], &mut [&mut *f, &mut *fx, &mut *fp]);
+        if sliding::occurs(&at) {
+            return sliding::each(at, &[], &mut [f, fx, fp], |at, _, along, to| match (along, to) {
+                (None, [f, fx, fp]) => self.linearise(at, free, f, fx, fp),
+                (Some(switch), to) => self.linear_tape(free, Branch::Sliding(switch)).run(at, &[at.signs], to),
+                _ => {}
+            });
+        }
+        self.linear_tape(free, Branch::Given).run(at, &[at.signs], &mut [&mut *f, &mut *fx, &mut *fp]);
         let sizes = [f.len(), fx.len(), fp.len()];
         let actual = || {
             let [mut f, mut fx, mut fp] = sizes.map(|size| vec![0.0; size]);
-            self.linear_tape(free, false).run(at, &[], &mut [&mut f, &mut fx, &mut fp]);
+            self.linear_tape(free, Branch::InForce).run(at, &[], &mut [&mut f, &mut fx, &mut fp]);
             [f, fx, fp]
         };
         for (k, values) in [f, fx, fp].into_iter().enumerate() {
@@ -394,14 +431,22 @@ impl VectorField for Model {
     fn directional(&self, at: Batch, directions: &[&[f64]], out: &mut [f64]) {
         let states = self.dim() * at.lanes;
         let with_parameters = directions.iter().any(|d| d[states..].iter().any(|&x| x != 0.0));
+        let tape = |branch: Branch| self.directional_tape(directions.len(), with_parameters, branch);
         if at.signs.is_empty() {
-            return self.directional_tape(directions.len(), with_parameters, false).run(at, directions, &mut [out]);
+            return tape(Branch::InForce).run(at, directions, &mut [out]);
+        }
+        if sliding::occurs(&at) {
+            return sliding::each(at, directions, &mut [out], |at, directions, along, to| match along {
+                None => self.directional(at, directions, to[0]),
+                Some(switch) => {
+                    let with_signs: Vec<&[f64]> = directions.iter().copied().chain([at.signs]).collect();
+                    tape(Branch::Sliding(switch)).run(at, &with_signs, to);
+                }
+            });
         }
         let with_signs: Vec<&[f64]> = directions.iter().copied().chain([at.signs]).collect();
-        self.directional_tape(directions.len(), with_parameters, true).run(at, &with_signs, &mut [out]);
-        complete(out, |to| {
-            self.directional_tape(directions.len(), with_parameters, false).run(at, directions, &mut [to]);
-        });
+        tape(Branch::Given).run(at, &with_signs, &mut [out]);
+        complete(out, |to| tape(Branch::InForce).run(at, directions, &mut [to]));
     }
 
     fn output_count(&self) -> usize {

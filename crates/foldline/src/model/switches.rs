@@ -11,6 +11,12 @@
 //!
 //! 3. ⌊a⌋: s = sin πa, the integer k, even where σ > 0 and odd where σ < 0, for which k + ½ is closest to a
 //!
+//! Where both branches f⁻, f⁺ of σ = ∓1 lead towards the surface s = 0, the motion continues along it (Filippov) with
+//!
+//! 4. f = f⁻ + a/(a - b) (f⁺ - f⁻),   a = ∇s·f⁻ + s_t > 0,   b = ∇s·f⁺ + s_t < 0
+//!
+//! **Source.** filippov1988, §4.
+//!
 //! **Departures.** An expression that cannot change sign (a radius compared with 0) or depends on parameters only is
 //! not a switch. A comparison for equality holds at isolated instants and has no effect. A branch that is undefined
 //! beyond its switch, such as a root, is not continued; the branch that applies at the state is used instead
@@ -75,8 +81,42 @@ impl Switches {
     /// The expressions with the signs of the switches in the components of direction `direction`, and their graph.
     pub fn given(&self, direction: u32) -> (Graph, Vec<Id>) {
         let mut graph = self.graph.clone();
-        let given = with_given_signs(&mut graph, &self.roots, &self.reached, &self.own, direction);
+        let given = self.with_signs(&mut graph, &|graph, switch| graph.leaf(Leaf::Direction(direction, switch)));
         (graph, given)
+    }
+
+    /// Right-hand sides of motion along the surface of a switch, (4), with the signs of the others as in
+    /// [`Switches::given`].
+    pub fn sliding(&self, direction: u32, along: usize) -> (Graph, Vec<Id>) {
+        let mut graph = self.graph.clone();
+        let [below, above] = [-1.0, 1.0].map(|side| {
+            self.with_signs(&mut graph, &|graph, switch| match switch as usize == along {
+                true => graph.constant(side),
+                false => graph.leaf(Leaf::Direction(direction, switch)),
+            })
+        });
+        let surface = self.switches[along];
+        let [speed_below, speed_above] = [&below, &above].map(|field| {
+            let rate = |graph: &mut Graph, leaf: Leaf| match leaf {
+                Leaf::State(j) => Some(field[j as usize]),
+                Leaf::Time => Some(graph.constant(1.0)),
+                _ => None,
+            };
+            graph.derivative(&[surface], rate)[0]
+        });
+        let apart = graph.subtract(speed_below, speed_above);
+        let share = graph.divide(speed_below, apart);
+        let slides = below.iter().zip(&above).map(|(below, above)| {
+            let jump = graph.subtract(*above, *below);
+            let shift = graph.multiply(share, jump);
+            graph.add(*below, shift)
+        });
+        let slides = slides.collect();
+        (graph, slides)
+    }
+
+    fn with_signs(&self, graph: &mut Graph, sign: &dyn Fn(&mut Graph, u32) -> Id) -> Vec<Id> {
+        with_given_signs(graph, &self.roots, &self.reached, &self.own, sign)
     }
 }
 
@@ -106,7 +146,7 @@ fn with_given_signs(
     roots: &[Id],
     reached: &[bool],
     own: &[Option<(u32, bool)>],
-    direction: u32,
+    sign_of: &dyn Fn(&mut Graph, u32) -> Id,
 ) -> Vec<Id> {
     let mut new: Vec<Id> = (0..reached.len()).map(|i| Id(i as u32)).collect();
     for i in (0..reached.len()).filter(|&i| reached[i]) {
@@ -115,7 +155,7 @@ fn with_given_signs(
         let rebuilt = match (node, own[i]) {
             (Node::Constant(_) | Node::Leaf(_), _) => Id(i as u32),
             (Node::Unary(op, a), Some((switch, _))) => {
-                let sign = graph.leaf(Leaf::Direction(direction, switch));
+                let sign = sign_of(graph, switch);
                 match op {
                     Unary::Abs => graph.multiply(sign, at(a)),
                     Unary::Heaviside => graph.unary(op, sign),
@@ -124,7 +164,7 @@ fn with_given_signs(
                 }
             }
             (Node::Binary(op, a, b), Some((switch, reversed))) => {
-                let (sign, zero) = (graph.leaf(Leaf::Direction(direction, switch)), graph.constant(0.0));
+                let (sign, zero) = (sign_of(graph, switch), graph.constant(0.0));
                 let (low, high) = if reversed { (zero, sign) } else { (sign, zero) };
                 let first_is_less = graph.binary(Binary::Less, low, high);
                 match op {

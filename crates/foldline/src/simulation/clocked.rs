@@ -75,4 +75,8 @@ impl VectorField for Clocked<'_> {
     fn switches(&self, at: Batch, out: &mut [f64]) {
         self.0.switches(self.inner(at), out);
     }
+
+    fn normal_speeds(&self, at: Batch, switch: usize) -> [Vec<f64>; 2] {
+        self.0.normal_speeds(self.inner(at), switch)
+    }
 }

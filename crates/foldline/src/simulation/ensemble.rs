@@ -24,7 +24,7 @@
 //! on their number, provided that the vector field also keeps its lanes independent.
 //!
 //! **Fails when** f or a derivative jumps where the field declares no switch: the step shrinks there and the order is
-//! lost. A trajectory that slides along a switch ends there.
+//! lost. A trajectory that slides along two surfaces at once ends there.
 
 mod lanes;
 mod pace;
@@ -154,6 +154,7 @@ impl<'a> Ensemble<'a> {
                 for l in 0..self.lanes.count {
                     if self.lanes.accepted[l] != 0.0 {
                         kinks.extend(self.shortened(l, &mut again).map(|kink| (l, kink)));
+                        self.project(l, &mut again);
                     }
                 }
             }

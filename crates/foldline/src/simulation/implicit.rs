@@ -107,12 +107,19 @@ impl<'a> Implicit<'a> {
             end = self.step(length, end).time_at(theta);
             length *= theta;
         }
+        if self.radau.signs.contains(&0.0) {
+            let mut again = std::mem::replace(&mut self.again, Shortened::new(self.field));
+            again.of(&self.step(length, end));
+            again.project(&mut next);
+            self.again = again;
+        }
         let stops = length != 0.0 && self.show(length, end, &next, &courses, observe);
         match kink {
             Some(kink) => {
                 // The kink does not reduce the length of the next step.
                 self.stuck = if kink.theta < 1e-8 { self.stuck + 1 } else { 0 };
-                self.radau.pass(&next, kink.switch);
+                let sign = self.again.sign_beyond(&next, &kink, self.stuck, self.limits.sign);
+                self.radau.pass(&next, kink.switch, sign);
                 let at = Batch {
                     lanes: 1,
                     states: &next,
@@ -125,6 +132,7 @@ impl<'a> Implicit<'a> {
             }
             None => {
                 self.stuck = 0;
+                self.radau.next.copy_from_slice(&next);
                 self.radau.go_on();
                 self.switches.copy_from_slice(&self.ahead[PLACES.len() - 1]);
                 self.h = planned.clamp(-self.limits.longest, self.limits.longest);

@@ -171,10 +171,10 @@ impl<'a> Radau<'a> {
         (self.current, self.last) = (false, Some(self.length));
     }
 
-    /// Continues from a state on the step at which f or a derivative jumps, with the opposite sign of a switch.
-    pub(super) fn pass(&mut self, from: &[f64], switch: usize) {
+    /// Continues from a state on the step at which f or a derivative jumps, with the new sign of a switch.
+    pub(super) fn pass(&mut self, from: &[f64], switch: usize, sign: f64) {
         self.x.copy_from_slice(from);
-        self.signs[switch] = -self.signs[switch];
+        self.signs[switch] = sign;
         (self.current, self.last) = (false, None);
     }
 
@@ -192,12 +192,9 @@ impl<'a> Radau<'a> {
                 states: &self.x,
                 parameters: Parameters::Shared(self.parameters),
                 times: &[],
-                signs: &[],
+                signs: &self.signs,
             };
             self.field.linearise(at, &[], &mut self.slope, &mut self.jacobian, &mut []);
-            if !self.signs.is_empty() {
-                self.field.evaluate(Batch { signs: &self.signs, ..at }, &mut self.slope);
-            }
             self.current = true;
         }
         self.slope.iter().chain(&self.jacobian).all(|v| v.is_finite())

@@ -1,6 +1,7 @@
 //! Part of an accepted step, at the full order.
 
 use super::Step;
+use super::kink::Kink;
 use super::step::Course;
 use super::tableau::{A, STAGES};
 use crate::contract::{Batch, Parameters, VectorField};
@@ -92,8 +93,60 @@ impl<'a> Shortened<'a> {
         self.field.switches(at, values);
     }
 
-    /// Reverses the sign of a switch from now on.
-    pub(super) fn flip(&mut self, switch: usize) {
-        self.signs[switch] = -self.signs[switch];
+    /// Rate of change of a switch at `x` under the branch of f on one side of its surface.
+    pub(super) fn normal_speed(&self, x: &[f64], switch: usize, side: f64) -> f64 {
+        let [below, above] = self.field.normal_speeds(self.at(x), switch);
+        if side < 0.0 { below[0] } else { above[0] }
+    }
+
+    /// True if both branches of f push towards the surface of a switch at `x` on it, in the direction of integration
+    /// `forwards` = ±1, and the trajectory does not slide along another one.
+    fn slides(&self, x: &[f64], switch: usize, forwards: f64) -> bool {
+        if self.signs.contains(&0.0) {
+            return false;
+        }
+        let [below, above] = self.field.normal_speeds(self.at(x), switch);
+        forwards * below[0] > 0.0 && forwards * above[0] < 0.0
+    }
+
+    /// Moves `x` to the surface along which it slides, along the difference of both branches of f.
+    pub(super) fn project(&self, x: &mut [f64]) {
+        for switch in (0..self.signs.len()).filter(|s| self.signs[*s] == 0.0) {
+            let mut values = vec![0.0; self.signs.len()];
+            self.switches_into(x, &mut values);
+            let [below, above] = self.field.normal_speeds(self.at(x), switch);
+            let mut signs = self.signs.clone();
+            let [f, g] = [-1.0, 1.0].map(|side| {
+                signs[switch] = side;
+                let mut f = vec![0.0; x.len()];
+                self.field.evaluate(Batch { signs: &signs, ..self.at(x) }, &mut f);
+                f
+            });
+            let share = values[switch] / (above[0] - below[0]);
+            if share.is_finite() {
+                x.iter_mut().zip(f.iter().zip(&g)).for_each(|(x, (f, g))| *x -= share * (g - f));
+            }
+        }
+    }
+
+    fn at<'b>(&'b self, x: &'b [f64]) -> Batch<'b> {
+        Batch { lanes: 1, states: x, parameters: Parameters::Shared(&self.parameters), times: &[], signs: &self.signs }
+    }
+
+    /// Sets the sign of a switch from now on.
+    pub(super) fn set(&mut self, switch: usize, sign: f64) {
+        self.signs[switch] = sign;
+    }
+
+    /// Sign of a switch beyond a kink at `x`, which follows `stuck` others without progress: 0 if the trajectory slides
+    /// from there on.
+    pub(super) fn sign_beyond(&self, x: &[f64], kink: &Kink, stuck: usize, forwards: f64) -> f64 {
+        if kink.leaves != 0.0 {
+            kink.leaves
+        } else if stuck > 0 && self.slides(x, kink.switch, forwards) {
+            0.0
+        } else {
+            -self.signs[kink.switch]
+        }
     }
 }

@@ -15,8 +15,10 @@
 //!
 //! **Source.** dibernardo2008, §2.5 and §7.
 //!
-//! **Fails when** h is zero along a part of the orbit: there is no extremum next to zero then.
+//! Where the orbit slides along the surface, h is zero; see [`super::sliding::touches`] for what takes the place of the
+//! extremum.
 
+use super::sliding;
 use crate::contract::{Batch, Monitor, Parameters, Sight, VectorField};
 use crate::diagram::{Cycle, Kind, Point, Solution};
 use crate::problem::gauss::Scheme;
@@ -132,10 +134,14 @@ pub fn extrema(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle, switc
     let times: Vec<f64> = places.iter().filter_map(|t| time(*t)).collect();
     let values = value(field, parameters, &states, &times, switch);
     let size = values.iter().fold(0.0, |most: f64, v| most.max(v.abs()));
+    let flat = on_surface_throughout(&values, size);
     let at = |t: f64| value(field, parameters, &cycle.state(t), time(t).as_slice(), switch)[0];
-    let mut found = Vec::new();
+    let mut found = if flat.contains(&true) { sliding::touches(field, parameters, cycle, switch) } else { Vec::new() };
     for k in 0..lanes {
         let (before, after) = ((k + lanes - 1) % lanes, (k + 1) % lanes);
+        if flat[k] || flat[after] {
+            continue;
+        }
         let (low, high) = (values[k] - values[before], values[after] - values[k]);
         // Of equal neighbours the first counts.
         let maximum = low > 0.0 && high <= 0.0;
@@ -149,6 +155,20 @@ pub fn extrema(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle, switc
         found.push(Extremum { time, value, maximum });
     }
     (found, size)
+}
+
+/// Marks the places of a slide along the surface, which has no extrema: runs of values that are rounding.
+fn on_surface_throughout(values: &[f64], size: f64) -> Vec<bool> {
+    /// Consecutive sections: the part of an orbit that slides has intervals of its own.
+    const RUN: usize = SECTIONS / 2;
+    /// Relative to the largest value.
+    const ROUNDING: f64 = 1e-9;
+    let small = |k: usize| values[k % values.len()].abs() <= ROUNDING * size;
+    let mut flat = vec![false; values.len()];
+    for k in (0..values.len()).filter(|k| (0..RUN).all(|j| small(k + j))) {
+        (k..k + RUN).for_each(|j| flat[j % values.len()] = true);
+    }
+    flat
 }
 
 /// Place and value of the extremum between three places.

@@ -7,6 +7,7 @@
 //! | Hopf | equilibria | two eigenvalues add up to 0 | [`hopf`] |
 //! | period doubling | cycles | a multiplier is -1 | [`period_doubling`] |
 //! | torus | cycles | the product of two multipliers is 1 | [`torus`] |
+//! | sliding | cycles | the speed on the far side of a surface is 0 where the orbit arrives | [`sliding`] |
 //! | grazing | both | a switch of the field, or an extremum of one along a cycle, is 0 | [`grazing`] |
 //!
 //! Test functions are products over the whole spectrum, so no eigenvalue needs to be tracked: a complex pair that meets
@@ -34,6 +35,7 @@ pub mod on_equilibria;
 pub mod on_surfaces;
 pub mod period_doubling;
 pub mod quantity;
+pub mod sliding;
 pub mod torus;
 pub mod unfolded;
 

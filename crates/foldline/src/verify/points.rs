@@ -13,6 +13,7 @@ use crate::linalg::{axpy, dot, larger, lu, max_abs};
 use crate::problem::Setting;
 use crate::problem::gauss::Scheme;
 use crate::special::normal_form::Local;
+use crate::special::sliding;
 use num_complex::Complex64;
 
 /// Relative distance beyond which a solution found counts as another one: along a branch, and along a curve in two
@@ -53,6 +54,9 @@ pub(super) fn verify(
     out
 }
 
+/// Reason why cycles with jumps are not recomputed.
+pub(super) const JUMPS: &str = "f jumps along it, and the variational equations are not integrated across jumps";
+
 struct Part<'a> {
     system: &'a System<'a>,
     setting: &'a Setting<'a>,
@@ -74,6 +78,12 @@ impl Part<'_> {
         let [shooting, coarse] = [accuracy, coarser].map(|accuracy| Shooting { setting: self.setting, accuracy });
         let (mut own, mut orbits) = (Vec::new(), Vec::new());
         for point in points {
+            if let Solution::Cycle(cycle) = &point.solution
+                && sliding::meets_jump(self.setting.field, &point.parameters, cycle)
+            {
+                out.undecided.push(self.undecided(point, JUMPS));
+                continue;
+            }
             if self.joins(point) {
                 out.undecided.push(self.undecided(point, "two branches meet there, and shooting is singular"));
                 continue;

@@ -22,6 +22,7 @@ use crate::contract::{Batch, Parameters};
 use crate::diagram::{Branch, Kind, Solution, SpecialPoint};
 use crate::linalg::{dot, lu, max_abs, periodic_schur};
 use crate::problem::Setting;
+use crate::special::sliding;
 use num_complex::Complex64;
 
 /// Distances between neighbouring solutions, in scaled unknowns, in the order in which they are tried.
@@ -43,8 +44,14 @@ pub(super) fn verify(setting: &Setting, branch: &Branch, tolerance: f64) -> Veri
             special: Some(special.kind),
             why,
         };
-        if matches!(special.kind, Kind::Grazing | Kind::BoundaryEquilibrium) {
-            out.undecided.push(undecided("grazings and boundary equilibria are not recomputed"));
+        if matches!(special.kind, Kind::Grazing | Kind::Sliding | Kind::BoundaryEquilibrium) {
+            out.undecided.push(undecided("grazings, sliding bifurcations and boundary equilibria are not recomputed"));
+            continue;
+        }
+        if let Solution::Cycle(cycle) = &special.point.solution
+            && sliding::meets_jump(setting.field, &special.point.parameters, cycle)
+        {
+            out.undecided.push(undecided(super::points::JUMPS));
             continue;
         }
         let parameter = special.point.parameters.get(branch.free).copied().unwrap_or(f64::NAN);

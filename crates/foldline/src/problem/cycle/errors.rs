@@ -1,14 +1,14 @@
 //! Error estimates of a cycle, from its defect and the last factorisation.
 
 use super::CycleProblem;
-use crate::contract::{Batch, Parameters, ZeroProblem};
+use crate::contract::{Batch, Parameters, VectorField, ZeroProblem};
 use crate::diagram::{FLAT, STANDS};
 use crate::linalg::condensed::Condensed;
 use crate::linalg::dense::MANY;
 use crate::linalg::system::System;
 use crate::linalg::{larger, panel, same};
 use crate::problem::defect::{self, Course, Defect, TOGETHER};
-use crate::problem::piecewise::Switched;
+use crate::problem::piecewise::{OneBranch, Switched};
 use crate::stability::floquet;
 use num_complex::Complex64;
 use std::ops::Range;
@@ -260,9 +260,9 @@ impl CycleProblem<'_> {
         let size = self.profile_size();
         let scale = self.relative_scale(u);
         let parameters = self.setting.at(&u[size + 1..]);
-        let measure = |profile: &[f64], mesh: &[f64]| {
+        let measure = |field: &dyn VectorField, profile: &[f64], mesh: &[f64]| {
             defect::measure(
-                self.setting.field,
+                field,
                 &parameters,
                 profile,
                 u[size],
@@ -274,22 +274,24 @@ impl CycleProblem<'_> {
                 &mut self.room.borrow_mut().measure,
             )
         };
-        let Defect { mut local, mut within, mut ends, mut sources, mut misses } = measure(&u[..size], &self.mesh);
+        let Defect { mut local, mut within, mut ends, mut sources, mut misses } =
+            measure(self.setting.field, &u[..size], &self.mesh);
         // An interval in which the orbit switches has the defects of its parts.
         let (n, inner, count) = (self.n, self.scheme.degree * self.n, self.intervals());
         for found in self.switched(u).iter() {
             let j = found.interval;
-            let profile: Vec<f64> = found.parts.iter().flat_map(|part| part.nodes.iter().copied()).collect();
-            let first = found.parts[0].ends[0];
-            let mesh: Vec<f64> = [first].into_iter().chain(found.parts.iter().map(|part| part.ends[1])).collect();
-            let own = measure(&profile, &mesh);
-            local[j] = own.local.iter().fold(0.0, |most: f64, e| most.max(*e));
             within.iter_mut().skip(j).step_by(count).for_each(|w| *w = 0.0);
             sources[j * inner..(j + 1) * inner].fill(0.0);
-            for c in 0..n {
-                let missed: f64 = own.misses.iter().skip(c).step_by(n).sum();
-                (ends[j * n + c], misses[j * n + c]) = (missed, missed);
+            local[j] = 0.0;
+            let mut missed = vec![0.0; n];
+            for part in &found.parts {
+                let field = OneBranch { field: self.setting.field, signs: &part.signs };
+                let own = measure(&field, &part.nodes, &part.ends);
+                local[j] = own.local.iter().fold(local[j], |most: f64, e| most.max(*e));
+                missed.iter_mut().zip(&own.misses).for_each(|(all, own)| *all += own);
             }
+            ends[j * n..(j + 1) * n].copy_from_slice(&missed);
+            misses[j * n..(j + 1) * n].copy_from_slice(&missed);
         }
         let block = (self.scheme.degree + 1) * self.n;
         let mut rhs = vec![0.0; u.len()];
@@ -331,6 +333,13 @@ impl CycleProblem<'_> {
             signs: &[],
         };
         self.setting.field.evaluate(batch, &mut f);
+        for found in self.switched(u).iter() {
+            let j = found.interval;
+            let batch = Batch { lanes: 1, states: &u[j * block..j * block + n], signs: found.signs_at_left(), ..batch };
+            let mut own = vec![0.0; n];
+            self.setting.field.evaluate(batch, &mut own);
+            own.iter().enumerate().for_each(|(i, own)| f[i * count + j] = *own);
+        }
         let mut flow = vec![0.0; n * count];
         for j in 0..count {
             for i in 0..n {

@@ -312,6 +312,11 @@ impl<'a> CycleProblem<'a> {
     }
 }
 
+/// The multiplier of smallest modulus.
+fn smallest(multipliers: &mut [Complex64]) -> Option<&mut Complex64> {
+    multipliers.iter_mut().min_by(|a, b| a.norm().total_cmp(&b.norm()))
+}
+
 /// Largest absolute value of every entry of an interval.
 struct Largest<'a, 'b> {
     profile: &'a [f64],
@@ -548,14 +553,19 @@ impl ZeroProblem for CycleProblem<'_> {
     fn stability(&mut self, u: &[f64]) -> Examination {
         let mut found = self.floquet(u);
         let trivial = usize::from(!self.is_forced());
-        if self.is_planar() && self.trace.is_finite() {
+        // A cycle that slides along a surface has lost a direction.
+        let slides = self.trace == f64::NEG_INFINITY;
+        if slides && let Some(least) = smallest(&mut found.multipliers[trivial..]) {
+            *least = Complex64::ZERO;
+        }
+        if self.is_planar() && (self.trace.is_finite() || slides) {
             found.multipliers[trivial] = Complex64::new(self.trace.exp(), 0.0);
             found.unstable = usize::from(self.trace > 0.0);
             found.log_product = self.trace + found.multipliers[..trivial].iter().map(|z| z.norm().ln()).sum::<f64>();
         }
         let trust = Trust {
             trivial_defect: if self.is_forced() { 0.0 } else { (found.multipliers[0].re - 1.0).abs() },
-            liouville_defect: (found.log_product - self.trace).abs(),
+            liouville_defect: if slides { 0.0 } else { (found.log_product - self.trace).abs() },
             spectrum: f64::NAN,
             ..Trust::default()
         };

@@ -16,16 +16,22 @@
 //!   (4)  V ← V⁺ + (f⁻ - f⁺) δt,   δt = -(∇h·V⁺ + h_σ) / (∇h·f⁻ + h_t)      at a switching at which f jumps
 //! ```
 //!
+//! Where f on both sides leads to the surface, f⁺ in (4) is the motion along it (sign 0), which ends where f on one side
+//! no longer does. V⁺ is then tangent to the surface: one direction is lost. Starting beside the surface, on either
+//! side, gives the same derivatives in the limit, so that it need not be known whether an interval begins on it.
+//!
 //! If f is continuous at the surface, (4) leaves V unchanged, because to first order the crossing times do not matter.
 //! The flow is then continuously differentiable, also where the orbit grazes the surface.
 //!
-//! **Source.** leine2004 (saltation matrix). The extremum test: shampine2000.
+//! **Source.** leine2004 (saltation matrix); filippov1988, §4 (sliding). The extremum test: shampine2000.
 //!
-//! **Fails when** the orbit slides along a surface, or passes too many surfaces within one interval ([`Obstacle`]).
+//! **Fails when** the orbit slides along two surfaces at once, or passes too many surfaces within one interval
+//! ([`Obstacle`]).
 
 mod parts;
 mod search;
 mod second;
+mod sliding;
 
 use super::Setting;
 use super::gauss::Scheme;
@@ -33,9 +39,18 @@ use crate::contract::{Batch, Parameters};
 use crate::linalg::{dot, lu, max_abs, panel};
 pub(crate) use parts::{Part, Switched, cut, cut_direction, fit, identity};
 use search::{Met, Trial};
+pub(crate) use sliding::OneBranch;
 
 /// Switchings in an interval. More within one interval of a mesh that is made for the tolerance is chatter.
 const MOST: usize = 64;
+/// Value of a switch, relative to its largest, at which its zero has been located: at a grazing the time of the zero is
+/// poorly determined, and matters little.
+const NEARLY: f64 = 1e-9;
+/// Number of times that a part is halved where Newton's method does not converge on it.
+const HALVINGS: i32 = 10;
+/// Value of a switch, relative to its largest along the orbit, below which an interval on which it hardly changes may be
+/// a slide: an iterate of Newton's method that is farther off is useless.
+const CLOSE: f64 = 0.01;
 /// Value of a switch, relative to its largest along the orbit, that counts as zero: rounding of the state.
 const ZERO: f64 = 1e-13;
 /// Length of a part, relative to its interval, below which it is left out: what f changes on it is then rounding.
@@ -46,7 +61,7 @@ const CONTINUOUS: f64 = 1e-9;
 /// Reason why an orbit cannot be computed on an interval.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Obstacle {
-    /// It stays on a switching surface.
+    /// It slides along several switching surfaces at once.
     Slides,
     /// It passes switching surfaces more often than is computed on one interval.
     Chatters,
@@ -58,7 +73,7 @@ impl Obstacle {
     /// Sentence for messages.
     pub fn name(self) -> &'static str {
         match self {
-            Obstacle::Slides => "the orbit slides along a switching surface at which the right-hand side jumps",
+            Obstacle::Slides => "the orbit slides along two switching surfaces at once",
             Obstacle::Chatters => "the orbit crosses switching surfaces dozens of times within one mesh interval",
             Obstacle::Lost => "the motion between two switchings could not be computed",
         }
@@ -127,8 +142,9 @@ impl<'a> PiecewiseFlow<'a> {
         Ok(all)
     }
 
-    /// The intervals in which a switch could vanish, because it changes by as much as its smallest value at the nodes,
-    /// and the largest value of every switch.
+    /// The intervals in which a switch could vanish, and the largest value of every switch: it changes by as much as its
+    /// smallest value at the nodes, or f leads to its zero in the time of the interval, which the nodes of an orbit that
+    /// slides do not show.
     fn suspects(&self, profile: &[f64], mesh: &[f64]) -> (Vec<usize>, Vec<f64>) {
         let (n, intervals, nodes) = (self.n(), mesh.len() - 1, self.scheme.degree + 1);
         let lanes = intervals * nodes;
@@ -139,14 +155,23 @@ impl<'a> PiecewiseFlow<'a> {
         let times: Vec<f64> = places.filter_map(|(g, j)| self.time(place(g, j))).collect();
         let values = self.switches(&states, &times);
         let sizes: Vec<f64> = values.chunks_exact(lanes).map(max_abs).collect();
-        let could = |own: &[f64], j: usize| {
+        let could = |switch: usize, j: usize| {
+            let own = &values[switch * lanes..(switch + 1) * lanes];
             // With the left end of the next interval.
             let next = own[(j + 1) % intervals];
             let there = (0..nodes).map(|g| own[g * intervals + j]).chain([next]);
             let [low, high] = there.fold([f64::INFINITY, f64::NEG_INFINITY], |[l, h], v| [l.min(v), h.max(v)]);
-            low <= 0.0 && high >= 0.0 || low.abs().min(high.abs()) < high - low
+            let near = low.abs().min(high.abs());
+            let leads_there = || {
+                let x = &profile[j * nodes * n..(j * nodes + 1) * n];
+                let signs: Vec<f64> = values.iter().skip(j).step_by(lanes).map(|v| v.signum()).collect();
+                let speed = self.normal_speed(x, mesh[j], &signs, switch);
+                // Twice the distance that f covers, since it varies.
+                own[j] * speed < 0.0 && near < 2.0 * speed.abs() * self.scalars[0] * (mesh[j + 1] - mesh[j])
+            };
+            low <= 0.0 && high >= 0.0 || near < high - low || near < CLOSE * sizes[switch] && leads_there()
         };
-        let suspects = (0..intervals).filter(|j| values.chunks_exact(lanes).any(|own| could(own, *j))).collect();
+        let suspects = (0..intervals).filter(|j| (0..sizes.len()).any(|switch| could(switch, *j))).collect();
         (suspects, sizes)
     }
 
@@ -174,33 +199,57 @@ impl<'a> PiecewiseFlow<'a> {
             end: x.to_vec(),
             end_by: identity(n, width),
         };
-        let (mut begin, mut passed, mut count) = (ends[0], Vec::new(), 0);
+        let (mut begin, mut passed, mut count, mut halvings) = (ends[0], Vec::new(), 0, 0);
         let length = ends[1] - ends[0];
         loop {
             let within = |t: f64| (t - ends[0]) / length;
-            let from = self.restricted(guess, [within(begin), 1.0]);
-            let nodes = self.solved(&found.end, [begin, ends[1]], &signs, from).ok_or(Obstacle::Lost)?;
-            let trial = Trial { nodes: &nodes, ends: [begin, ends[1]], signs: &signs, passed: &passed };
+            // A branch of f need not be defined far beyond its surface.
+            let shorter = (halvings..=HALVINGS).map(|k| match k {
+                0 => ends[1],
+                _ => begin + (ends[1] - begin) * 0.5f64.powi(k),
+            });
+            let trials = shorter.map(|last| {
+                let from = self.restricted(guess, [within(begin), within(last)]);
+                Some((last, self.solved(&found.end, [begin, last], &signs, from)?))
+            });
+            let (last, nodes) = trials.flatten().next().ok_or(Obstacle::Lost)?;
+            let trial = Trial { nodes: &nodes, ends: [begin, last], signs: &signs, passed: &passed };
             count += 1;
-            let (at, switch) = match self.first(&trial, sizes) {
+            let (at, switch, side) = match self.first(&trial, sizes) {
                 Met::Nothing => {
-                    self.close(&mut found, [begin, ends[1]], nodes, &signs).ok_or(Obstacle::Lost)?;
-                    return Ok(found);
+                    self.close(&mut found, [begin, last], nodes, &signs).ok_or(Obstacle::Lost)?;
+                    if last == ends[1] {
+                        return Ok(found);
+                    }
+                    (begin, halvings) = (last, 0);
+                    passed.clear();
+                    continue;
                 }
                 // A tangency to rounding where f is continuous; where f jumps the orbit slides.
                 Met::Back(switch) if count <= MOST && self.is_continuous(&found.end, begin, &signs, switch) => {
                     signs[switch] = -signs[switch];
                     continue;
                 }
-                Met::Back(_) if count <= MOST => return Err(Obstacle::Slides),
-                Met::Back(_) => return Err(Obstacle::Chatters),
-                Met::At(at, switch) => (at, switch),
+                Met::Back(switch) => (0.0, switch, 0.0),
+                Met::At(at, switch) => (at, switch, 0.0),
+                Met::Leaves(at, switch, side) => (at, switch, side),
             };
             if count > MOST {
                 return Err(Obstacle::Chatters);
             }
-            let part = self.until(&found.end, begin, ends[1], at, switch, &signs, &nodes).ok_or(Obstacle::Lost)?;
+            let value = |nodes: &[f64], ends: [f64; 2], s: f64| match side {
+                0.0 => self.switch(nodes, ends, s, switch),
+                _ => self.push(nodes, ends, s, &signs, switch, side),
+            };
+            let part = self.until(&found.end, [begin, last], at, &signs, &nodes, &value).ok_or(Obstacle::Lost)?;
             let (end, nodes) = part;
+            // A trial that is far off the part does not show where it ends.
+            let size = if side == 0.0 { sizes[switch] } else { value(&nodes, [begin, end], 0.0).abs() };
+            if halvings < HALVINGS && value(&nodes, [begin, end], 1.0).abs() > NEARLY * size {
+                halvings += 1;
+                continue;
+            }
+            halvings = 0;
             let passes = end - begin > SHORTEST * length;
             if passes {
                 self.close(&mut found, [begin, end], nodes, &signs).ok_or(Obstacle::Lost)?;
@@ -208,10 +257,11 @@ impl<'a> PiecewiseFlow<'a> {
             if found.parts.is_empty() {
                 found.at_start.push((signs.clone(), switch));
             }
-            if !self.pass(&mut found, end, &signs, switch, passes).ok_or(Obstacle::Lost)? {
-                return Err(Obstacle::Slides);
-            }
-            signs[switch] = -signs[switch];
+            signs[switch] = match side {
+                0.0 => self.pass(&mut found, end, &signs, switch, passes)?,
+                // f is continuous where a slide ends.
+                _ => side,
+            };
             // A shorter part is left out, and the next one begins in its place.
             if passes {
                 begin = end;
@@ -245,24 +295,23 @@ impl<'a> PiecewiseFlow<'a> {
         signs
     }
 
-    /// The part from `begin` to where the switch vanishes, near the place `at` of a trial to `last`: its right end and
-    /// its nodes.
+    /// The part from `begin` to where a function of its nodes, ends and a place in it vanishes, near the place `at` of a
+    /// trial to `last`: its right end and its nodes.
     fn until(
         &self,
         x: &[f64],
-        begin: f64,
-        last: f64,
+        [begin, last]: [f64; 2],
         at: f64,
-        switch: usize,
         signs: &[f64],
         trial: &[f64],
+        value: &dyn Fn(&[f64], [f64; 2], f64) -> f64,
     ) -> Option<(f64, Vec<f64>)> {
         let mut end = begin + at * (last - begin);
         let mut nodes = self.solved(x, [begin, end], signs, self.restricted(trial, [0.0, at]))?;
         // From the root of the trial to that of the part, which is more accurate at its end.
         for _ in 0..4 {
-            let value = |s: f64| self.switch(&nodes, [begin, end], s, switch);
-            let off = value(1.0) / (value(1.0) - value(1.0 - 1e-4)) * 1e-4;
+            let [last_but_one, own] = [1.0 - 1e-4, 1.0].map(|s| value(&nodes, [begin, end], s));
+            let off = own / (own - last_but_one) * 1e-4;
             let moved = (end - off * (end - begin)).min(last);
             // At a grazing the crossing time is poorly determined, and matters little.
             if !off.is_finite() || off.abs() > 0.1 || (moved - end).abs() < 1e-15 {
@@ -430,18 +479,18 @@ impl<'a> PiecewiseFlow<'a> {
         jump <= CONTINUOUS * size(&|c| before[c]).max(size(&|c| after[c]))
     }
 
-    /// (4) at the end of the last part, which is at time `t`; `signs` are those of that part. False if the flow does
-    /// not leave the surface on the other side.
-    fn pass(&self, found: &mut Switched, t: f64, signs: &[f64], switch: usize, ends: bool) -> Option<bool> {
+    /// (4) at the end of the last part, which is at time `t`; `signs` are those of that part. Returns the sign of the
+    /// switch from there on, 0 if the flow slides along its surface.
+    fn pass(&self, found: &mut Switched, t: f64, signs: &[f64], switch: usize, ends: bool) -> Result<f64, Obstacle> {
         let x = found.end.clone();
-        let [before, after] = self.sides(&x, t, signs, switch);
+        let [before, mut after] = self.sides(&x, t, signs, switch);
         let jumps = !self.same(&before, &after);
         if let Some(last) = found.parts.last_mut().filter(|_| ends) {
             (last.switch, last.jumps) = (Some(switch), jumps);
         }
         found.jumps |= jumps;
         if !jumps {
-            return Some(true);
+            return Ok(-signs[switch]);
         }
         let (n, width, time) = (self.n(), self.width(), self.time(t));
         let parameters = Parameters::Shared(&self.parameters);
@@ -450,8 +499,15 @@ impl<'a> PiecewiseFlow<'a> {
         let (gradient, in_time, k) = (&hx[switch * n..(switch + 1) * n], ht[switch], width - n - 1);
         let in_scalar = &hp[switch * k..(switch + 1) * k];
         let [speed, speed_after] = [&before, &after].map(|f| dot(gradient, f) + in_time);
-        if speed * speed_after <= 0.0 || !speed.is_finite() {
-            return Some(false);
+        if speed == 0.0 || !speed.is_finite() || !speed_after.is_finite() {
+            return Err(Obstacle::Lost);
+        }
+        let crosses = speed * speed_after > 0.0;
+        if !crosses {
+            if signs.contains(&0.0) {
+                return Err(Obstacle::Slides);
+            }
+            after = self.along_surface(&x, t, signs, switch);
         }
         for column in 0..width {
             let own = (0..n).map(|c| gradient[c] * found.end_by[c * width + column]).sum::<f64>();
@@ -459,11 +515,13 @@ impl<'a> PiecewiseFlow<'a> {
             let shift = -(own + direct) / speed;
             (0..n).for_each(|c| found.end_by[c * width + column] += (before[c] - after[c]) * shift);
         }
+        // A direction that is lost has determinant 0.
+        let trace = if crosses { (speed_after / speed).ln() } else { f64::NEG_INFINITY };
         match found.parts.last_mut() {
-            Some(last) => last.trace += (speed_after / speed).ln(),
-            None => found.trace += (speed_after / speed).ln(),
+            Some(last) => last.trace += trace,
+            None => found.trace += trace,
         }
-        Some(true)
+        Ok(if crosses { -signs[switch] } else { 0.0 })
     }
 
     /// One switch at a place of a polynomial.

@@ -14,7 +14,7 @@ pub(crate) struct Part {
     /// `[m + 1][n × (n + 1 + k)]`: derivatives in the left end of the interval and in T, λ₁ … λ_k.
     pub by: Vec<f64>,
     /// Signs of the switches.
-    pub(super) signs: Vec<f64>,
+    pub signs: Vec<f64>,
     /// The switch that changes sign at the right end, and true if f jumps there.
     pub(super) switch: Option<usize>,
     pub(super) jumps: bool,
@@ -46,6 +46,15 @@ impl Switched {
     /// ∫ tr f_x dt over the interval.
     pub fn trace(&self) -> f64 {
         self.trace + self.parts.iter().map(|part| part.trace).sum::<f64>()
+    }
+
+    /// Signs of the switches at the left end that give the flow there: those before its switchings, or, of an orbit that
+    /// slides, those with which it does.
+    pub fn signs_at_left(&self) -> &[f64] {
+        match self.at_start.first() {
+            Some((before, _)) if !self.parts[0].signs.contains(&0.0) => before,
+            _ => &self.parts[0].signs,
+        }
     }
 
     /// The part and the place in it of a place in the interval.

@@ -17,6 +17,14 @@ pub(super) enum Met {
     Back(usize),
     /// At this place in (0, 1], this switch.
     At(f64, usize),
+    /// At this place a slide along the surface of this switch ends, on this side.
+    Leaves(f64, usize, f64),
+}
+
+impl Met {
+    fn is_before(&self, place: f64) -> bool {
+        matches!(self, Met::At(earlier, _) | Met::Leaves(earlier, ..) if *earlier <= place)
+    }
 }
 
 /// A trial: nodes of a polynomial from one normalised time to another.
@@ -45,6 +53,13 @@ impl PiecewiseFlow<'_> {
         let mut met = Met::Nothing;
         for (k, own) in values.chunks_exact(places.len()).enumerate() {
             let (sign, passed) = (trial.signs[k], trial.passed.contains(&k));
+            if sign == 0.0 {
+                match self.leaving(trial, k, &places, &states, &times) {
+                    Some((place, side)) if !met.is_before(place) => met = Met::Leaves(place, k, side),
+                    _ => {}
+                }
+                continue;
+            }
             // At the start of the part it is zero up to rounding.
             let of = |s: f64, value: f64| sign * if passed { (value - own[0]) / s } else { value };
             let at = |s: f64| of(s, self.switch(trial.nodes, trial.ends, s, k));
@@ -66,7 +81,7 @@ impl PiecewiseFlow<'_> {
             let zero = ZERO * sizes[k];
             let Some([left, right]) = violated(&knots, &margins, zero, &at) else { continue };
             let place = root(&at, left, right);
-            if !matches!(met, Met::At(earlier, _) if earlier <= place) {
+            if !met.is_before(place) {
                 met = Met::At(place, k);
             }
         }
@@ -75,7 +90,7 @@ impl PiecewiseFlow<'_> {
 }
 
 /// First stretch on which the margins become less than -`zero`, also at an extremum between two places.
-fn violated(places: &[f64], margins: &[f64], zero: f64, at: &dyn Fn(f64) -> f64) -> Option<[f64; 2]> {
+pub(super) fn violated(places: &[f64], margins: &[f64], zero: f64, at: &dyn Fn(f64) -> f64) -> Option<[f64; 2]> {
     let last = places.len() - 1;
     let first = (1..=last).find(|k| margins[*k] < -zero);
     let until = first.unwrap_or(last);
@@ -119,7 +134,7 @@ fn lowest(mut s: [f64; 3], mut v: [f64; 3], at: &dyn Fn(f64) -> f64) -> Option<f
 }
 
 /// A zero between `left`, where the function is not negative, and `right`, where it is.
-fn root(at: &dyn Fn(f64) -> f64, mut left: f64, mut right: f64) -> f64 {
+pub(super) fn root(at: &dyn Fn(f64) -> f64, mut left: f64, mut right: f64) -> f64 {
     const ROUNDS: usize = 60;
     let (mut a, mut b) = (at(left), at(right));
     if a <= 0.0 {

@@ -7,7 +7,8 @@ use super::super::tableau::STAGES;
 use super::Ensemble;
 use crate::contract::Batch;
 
-/// Number of sign changes without progress after which a trajectory is considered to slide along a switch.
+/// Number of sign changes without progress after which a trajectory ends: it slides along several surfaces, or the
+/// switches change sign ever faster.
 pub(super) const STUCK: usize = 50;
 
 impl Ensemble<'_> {
@@ -72,8 +73,8 @@ impl Ensemble<'_> {
         Some(kink)
     }
 
-    /// Continues beyond the kink that lane `l` has reached: with the opposite sign of the switch, and the corresponding
-    /// f.
+    /// Continues beyond the kink that lane `l` has reached: with the opposite sign of the switch, or along its surface,
+    /// and the corresponding f.
     pub(super) fn pass(&mut self, l: usize, kink: &Kink, again: &mut Shortened) {
         let (n, lanes) = (self.lanes.n, self.lanes.count);
         let x = self.lanes.state(l);
@@ -81,16 +82,31 @@ impl Ensemble<'_> {
         again.of(&self.step_of(l));
         again.switches_into(&x, &mut values);
         values.iter().enumerate().for_each(|(s, value)| self.lanes.switches[s * lanes + l] = *value);
-        again.flip(kink.switch);
-        again.slope_at(&x, 0);
-        (0..n).for_each(|i| self.lanes.slopes[0][i * lanes + l] = again.slopes[0][i]);
-        let at = kink.switch * lanes + l;
-        self.lanes.signs[at] = -self.lanes.signs[at];
-        self.lanes.switches[at] = 0.0;
         let run = &mut self.runs[l];
         run.stuck = if kink.theta < 1e-8 { run.stuck + 1 } else { 0 };
         if run.stuck > STUCK {
             run.done = Some(Outcome::StepTooSmall);
         }
+        let sign = again.sign_beyond(&x, kink, run.stuck, self.limits.sign);
+        again.set(kink.switch, sign);
+        again.slope_at(&x, 0);
+        (0..n).for_each(|i| self.lanes.slopes[0][i * lanes + l] = again.slopes[0][i]);
+        let at = kink.switch * lanes + l;
+        self.lanes.signs[at] = sign;
+        self.lanes.switches[at] = 0.0;
+    }
+
+    /// Moves the end of the step tried by lane `l` to the surface along which it slides, if it does.
+    pub(super) fn project(&mut self, l: usize, again: &mut Shortened) {
+        let (n, lanes) = (self.lanes.n, self.lanes.count);
+        if !self.lanes.signs.iter().skip(l).step_by(lanes).any(|sign| *sign == 0.0) {
+            return;
+        }
+        let step = self.step_of(l);
+        again.of(&step);
+        let mut x = vec![0.0; n];
+        step.end_into(&mut x);
+        again.project(&mut x);
+        (0..n).for_each(|i| self.lanes.next[i * lanes + l] = x[i]);
     }
 }

@@ -1,0 +1,98 @@
+//! Cycles that stick and slide: against closed forms and multiple shooting.
+
+use foldline::contract::Unobserved;
+use foldline::diagram::{Branch, Diagram, Ending, Kind, Point};
+use foldline::explore::{self, System};
+use foldline_store::study_file::parse_study;
+
+/// x'' + c x' + x = f cos(w t) - sign(x').
+fn coulomb(c: f64) -> String {
+    format!(
+        "name = \"dry friction\"\n[parameters]\nw = 2\nc = {c}\nf = 1.5\n[forcing]\nfrequency = \"w\"\n\
+         [states.x]\nequation = \"v\"\n[states.v]\nequation = \"f*cos(w*t) - c*v - x - sign(v)\"\n"
+    )
+}
+
+/// A block on a belt of speed p, x'' + c x' + x = F(p - x'), F(s) = sign(s)/(1 + 3|s|).
+fn belt(c: f64) -> String {
+    format!(
+        "name = \"belt\"\n[parameters]\np = 0.5\nc = {c}\n[states.x]\nequation = \"v\"\n[states.v]\n\
+         equation = \"-c*v - x + sign(p - v)/(1 + 3*abs(p - v))\"\n"
+    )
+}
+
+#[track_caller]
+fn run(model: &str, study: &str) -> Diagram {
+    let text = format!("model = \"m\"\n{study}");
+    let study = parse_study(&text, "study", model, "model").unwrap_or_else(|found| panic!("{found:?}"));
+    explore::run(&System::of_plan(&study.model, &study.plan), &study.plan, 1, Diagram::default(), &Unobserved)
+}
+
+/// The point of a mark.
+#[track_caller]
+fn mark(branch: &Branch, value: f64) -> &Point {
+    let at = |point: &&Point| (point.parameters[branch.free] - value).abs() < 1e-12;
+    branch
+        .special
+        .iter()
+        .filter(|s| s.kind == Kind::Mark)
+        .map(|s| &s.point)
+        .find(at)
+        .unwrap_or_else(|| panic!("{value}"))
+}
+
+/// Sticking begins where w = 1.2357… and ends where w = 0.7226…: at w = 0.8 the mass slips throughout.
+#[test]
+fn a_response_with_dry_friction_sticks_twice_in_a_period_away_from_resonance() {
+    let study = |range: &str, marks: &str| {
+        format!(
+            "tolerance = 1e-9\n[[seed]]\nname = \"s\"\nattractor = \"cycle\"\nsamples = 8\n[[branch]]\nname = \"b\"\n\
+             from = \"s\"\nfree = \"w\"\nrange = {range}\nmark = {{ w = [{marks}] }}\n"
+        )
+    };
+    let diagram = run(&coulomb(0.1), &study("[0.45, 2.1]", "0.5, 0.8, 2"));
+    let branch = diagram.branch("b").unwrap();
+    assert!(branch.ends.iter().all(|end| end.as_ref().is_some_and(Ending::complete)), "{:?}", branch.ends);
+    let known = [
+        (0.5, 1.590652096503, [0.0108858292, 0.0]),
+        (0.8, 2.145852589884, [0.250256805, 0.0365532704]),
+        (2.0, 0.125412463390, [0.062408434, 0.0]),
+    ];
+    for (w, largest, multipliers) in known {
+        let point = mark(branch, w);
+        let off = (point.ranges[0][1] - largest).abs();
+        assert!(off < 1e-10 && off < 10.0 * point.trust.discretisation, "w = {w}: {:?}", point.ranges);
+        for (own, known) in point.spectrum.iter().zip(multipliers) {
+            assert!((own.re - known).abs() < 2e-9 && own.im == 0.0, "w = {w}: {:?}", point.spectrum);
+        }
+        // A direction is lost where the mass sticks.
+        assert_eq!(point.spectrum[1].norm() == 0.0, w != 0.8, "w = {w}: {:?}", point.spectrum);
+    }
+    // Without viscous damping: Den Hartog's closed form.
+    let diagram = run(&coulomb(0.0), &study("[0.75, 2.1]", "0.8"));
+    let off = mark(diagram.branch("b").unwrap(), 0.8).ranges[0][1] - 2.873011264978818;
+    assert!(off.abs() < 1e-9, "{off}");
+}
+
+#[test]
+fn a_block_sticks_to_its_belt() {
+    let study = "tolerance = 1e-9\n[[seed]]\nname = \"s\"\nattractor = \"cycle\"\nsamples = 8\n[[branch]]\nname = \"b\"\n\
+        from = \"s\"\nfree = \"p\"\nrange = [0.2, 0.6]\nmark = { p = [0.5] }\n";
+    for (c, known) in [(0.0, [(0.2, 12.001031294831), (0.5, 8.282743522678)]), (0.1, [(0.5, 7.772137860833); 2])] {
+        let diagram = run(&belt(c), study);
+        let branch = diagram.branch("b").unwrap();
+        assert!(branch.ends.iter().all(|end| end.as_ref().is_some_and(Ending::complete)), "{:?}", branch.ends);
+        for (p, period) in known {
+            let near = |a: &&Point, b: &&Point| (a.parameters[0] - p).abs().total_cmp(&(b.parameters[0] - p).abs());
+            let all = branch.points.iter().chain(branch.special.iter().map(|s| &s.point));
+            let point = all.min_by(near).unwrap();
+            let own = match &point.solution {
+                foldline::diagram::Solution::Cycle(cycle) => cycle.period,
+                foldline::diagram::Solution::Equilibrium(_) => f64::NAN,
+            };
+            assert!((own - period).abs() < 1e-8, "c = {c}, p = {p}: {own} at {}", point.parameters[0]);
+            assert!((point.ranges[1][1] - p).abs() < 1e-9, "the block never overtakes the belt");
+            assert_eq!(point.spectrum[1].norm(), 0.0);
+        }
+    }
+}
