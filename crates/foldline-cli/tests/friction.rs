@@ -68,6 +68,13 @@ fn a_response_with_dry_friction_sticks_twice_in_a_period_away_from_resonance() {
         // A direction is lost where the mass sticks.
         assert_eq!(point.spectrum[1].norm() == 0.0, w != 0.8, "w = {w}: {:?}", point.spectrum);
     }
+    let sliding: Vec<f64> =
+        branch.special.iter().filter(|s| s.kind == Kind::Sliding).map(|s| s.point.parameters[0]).collect();
+    assert_eq!(sliding.len(), 2, "{sliding:?}");
+    for (own, known) in sliding.iter().zip([0.722679194438143, 1.235747152322398]) {
+        assert!((own - known).abs() < 1e-9, "{own} {known}");
+    }
+    assert!(branch.special.iter().all(|s| s.kind != Kind::Sliding || s.remark == "crossing-sliding at v = 0"));
     // Without viscous damping: Den Hartog's closed form.
     let diagram = run(&coulomb(0.0), &study("[0.75, 2.1]", "0.8"));
     let off = mark(diagram.branch("b").unwrap(), 0.8).ranges[0][1] - 2.873011264978818;
@@ -94,5 +101,28 @@ fn a_block_sticks_to_its_belt() {
             assert!((point.ranges[1][1] - p).abs() < 1e-9, "the block never overtakes the belt");
             assert_eq!(point.spectrum[1].norm(), 0.0);
         }
+    }
+}
+
+/// The stick-slip cycle meets the cycle that slips throughout, which shrinks to the equilibrium at its Hopf point: one
+/// branch, from either end.
+#[test]
+fn a_branch_turns_back_where_sticking_ends() {
+    let study = "tolerance = 1e-8\n[[seed]]\nname = \"s\"\nattractor = \"cycle\"\nsamples = 8\n\
+        parameters = { p = 2.5 }\n\
+        [[branch]]\nname = \"b\"\nfrom = \"s\"\nfree = \"p\"\nrange = [2.4, 4]\n\
+        [[seed]]\nname = \"e\"\nattractor = \"equilibrium\"\nparameters = { p = 4 }\n\
+        [[branch]]\nname = \"e\"\nfrom = \"e\"\nfree = \"p\"\nrange = [1.4, 4]\nswitch = { hopf = 1 }\n";
+    let diagram = run(&belt(0.1), study);
+    for name in ["b", "e/hopf-1"] {
+        let branch = diagram.branch(name).unwrap();
+        let complete = |end: &Option<Ending>| end.as_ref().is_some_and(Ending::complete);
+        assert!(branch.ends.iter().all(complete), "{name}: {:?}", branch.ends);
+        let grazing: Vec<_> = branch.special.iter().filter(|s| s.kind == Kind::Grazing).collect();
+        let [corner] = &grazing[..] else { panic!("{name}: {}", grazing.len()) };
+        let off = (corner.point.parameters[0] - 2.892345819430).abs();
+        assert!(off < corner.error && off < 1e-8, "{name}: off {off}, stated {}", corner.error);
+        assert_eq!(corner.remark, "grazing-sliding: non-smooth fold at p - v = 0", "{name}");
+        assert!(branch.special.iter().all(|s| s.kind == Kind::Grazing), "{name}");
     }
 }

@@ -176,6 +176,7 @@ pub fn backbone(constants: &Nondimensional, law: ContactLaw, ratio: Ratio, reach
         marks: &[],
         collapses: &[],
         limit: &|_| None,
+        corner: &|_| None,
         holds: false,
         symmetric: false,
         direction: 1.0,

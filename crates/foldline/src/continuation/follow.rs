@@ -36,6 +36,8 @@ pub struct Follow<'w> {
     pub collapses: &'w [Box<dyn Monitor + 'w>],
     /// Returns the orbit of infinite period that the branch approaches, if the cycle at a point shows one.
     pub limit: &'w dyn Fn(&Point) -> Option<Ending>,
+    /// The end of the branch at a point where its direction jumps, if a point is next to one.
+    pub corner: &'w dyn Fn(&Point) -> Option<Ending>,
     /// True if the problem holds a branch of a switched field, so that equilibria are followed through its surfaces.
     pub holds: bool,
     /// True if the model has a continuous symmetry, so that solutions form families and a second multiplier is 1.
@@ -237,6 +239,9 @@ pub fn follow(
                 return Ending::Stopped;
             }
             return ending;
+        }
+        if let Some(corner) = (walk.corner)(&right.point) {
+            return corner;
         }
         walk.leaves_home(&right.point);
         stirred |= right.slope().abs() > STANDS;

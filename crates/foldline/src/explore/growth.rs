@@ -1,8 +1,8 @@
 //! Continuation of one branch to both sides, from its start or from the end of an earlier run.
 
-use super::System;
 use super::counted::Counted;
 use super::symmetry::{is_rotating_wave, rotation};
+use super::{System, corner};
 use crate::continuation::corrector::{Plane, parameter_row, settle, station};
 use crate::continuation::{Failure, Follow, Homecoming, Item, Settings, Station, follow};
 use crate::contract::{Event, Examination, Monitor, Observer, Verdict, ZeroProblem};
@@ -15,6 +15,7 @@ use crate::special::on_cycle_branch_points::OnCycleBranchPoints;
 use crate::special::quantity::Quantity;
 use crate::special::unfolded::UnfoldedCycles;
 use crate::special::{self, collapse, grazing, sliding};
+use std::cell::RefCell;
 
 /// The curve through a point that is to be followed.
 #[derive(Clone, Debug, Default)]
@@ -286,6 +287,8 @@ pub struct Growth<'g> {
     pub sparse: bool,
 }
 
+/// Number of corners on one side of a branch, after which something is wrong.
+const CORNERS: usize = 32;
 /// Points at either end of a branch that always stay whole, since continuation needs them.
 const WHOLE: usize = 3;
 
@@ -491,6 +494,7 @@ impl Growth<'_> {
             unit: system.unit(branch.free),
             tolerance: self.settings.tolerance,
         };
+        let (free, corners) = (branch.free, branch.held.is_none() && system.field.switch_count() > 0);
         let free_cycles = branch.held.is_none() && !system.field.forced();
         let mut walk = Follow {
             problem: &mut *problem,
@@ -499,6 +503,7 @@ impl Growth<'_> {
             marks: &marks,
             collapses: &collapses,
             limit: &|at| limits.approached(at).filter(|_| free_cycles),
+            corner: &|at| corner::limit(system.field, at, free).filter(|_| corners),
             direction,
             symmetric,
             holds,
@@ -513,7 +518,8 @@ impl Growth<'_> {
         before.into_iter().for_each(|p| walk.leaves_home(p));
         let mut record = Record::at(&last, side == 1);
         let recorded = self.settings.stability && branch.held.is_none();
-        let ending = follow(&mut walk, start, previous, emitted, &mut |item| {
+        let latest = RefCell::new(last);
+        let mut sink = |item: Item| {
             // Discard items found after the field stopped returning values.
             if self.observer.stopping() {
                 return Verdict::Stop;
@@ -532,20 +538,43 @@ impl Growth<'_> {
                     self.tell(Event::Special(branch, &special)) && (!recorded || self.fits(branch, &special, &misfit))
                 }
                 Item::Point(mut point) => {
+                    latest.replace(point.clone());
                     [point.cost.evaluations, point.cost.linearisations] = counted.take();
                     let before = record.point(&point).filter(|_| recorded);
                     before.is_none_or(|before| self.unexplained(branch, before, &point)) && self.accept(branch, point)
                 }
             };
             if going { Verdict::Continue } else { Verdict::Stop }
-        });
+        };
+        let mut ending = follow(&mut walk, start, previous, emitted, &mut sink);
+        for _ in 0..CORNERS {
+            if !matches!(ending, Ending::Joined { at: Kind::Grazing, .. }) {
+                break;
+            }
+            let there = latest.borrow().clone();
+            let left = revived(walk.problem, self.settings, &there, direction).ok();
+            let found =
+                left.and_then(|left| corner::beyond(walk.problem, self.settings, system.field, &left, direction));
+            let Some((special, mut right)) = found else { break };
+            let position = there.position + if side == 1 { 1 } else { -1 };
+            (right.point.position, walk.homecoming) = (position, Homecoming::default());
+            let stops = sink(Item::Special(special)) == Verdict::Stop
+                || sink(Item::Point(right.point.clone())) == Verdict::Stop;
+            ending = match stops {
+                true => Ending::Stopped,
+                false => follow(&mut walk, right, None, position.unsigned_abs() as usize, &mut sink),
+            };
+        }
+        if let Ending::Joined { at: Kind::Grazing, parameter } = ending {
+            ending =
+                Ending::StepTooSmall(format!("no direction was found in which the branch continues at {parameter}"));
+        }
         // An interrupted run ends for reasons that have nothing to do with the branch.
         if self.observer.stopping() {
             return Ending::Stopped;
         }
-        let last = if side == 1 { branch.points.last() } else { branch.points.first() };
         match ending {
-            Ending::StepTooSmall(why) => Ending::StepTooSmall(sliding::at_corner(system.field, last, why)),
+            Ending::StepTooSmall(why) => Ending::StepTooSmall(sliding::at_corner(system.field, &latest.borrow(), why)),
             other => other,
         }
     }
@@ -601,6 +630,7 @@ impl Growth<'_> {
         let (line, own) = (self.line(branch), setting(system, branch.free, &special.point.parameters));
         if matches!(special.kind, Kind::Grazing | Kind::Sliding | Kind::BoundaryEquilibrium) {
             let remark = match special.kind {
+                Kind::Grazing if special.remark.starts_with(corner::SLIDING) => special.remark.clone(),
                 Kind::Grazing => grazing::described(system.field, &special.point),
                 Kind::Sliding => sliding::described(system.field, &special.point),
                 _ => grazing::on_surface(system.field, &special.point, &special.remark),

@@ -27,6 +27,7 @@ mod accounts;
 mod arrival;
 mod averaged;
 mod choice;
+mod corner;
 mod counted;
 pub mod course;
 mod crossings;

@@ -71,7 +71,13 @@ pub fn monitors(field: &dyn VectorField) -> Vec<Box<dyn Monitor + '_>> {
 impl Sliding<'_> {
     fn arrivals(&self, at: &Point) -> Vec<Arrival> {
         match &at.solution {
-            Solution::Cycle(cycle) => arrivals(self.field, &at.parameters, cycle, self.switch),
+            Solution::Cycle(cycle) => {
+                let mut all = arrivals(self.field, &at.parameters, cycle, self.switch);
+                all.retain(|own| {
+                    jumps(self.field, &at.parameters, &own.state, own.time, &own.signs, self.switch)
+                });
+                all
+            }
             Solution::Equilibrium(_) => Vec::new(),
         }
     }
@@ -102,7 +108,8 @@ impl Monitor for Sliding<'_> {
     }
 
     fn label(&self) -> usize {
-        self.switch + 1
+        // Not one of a grazing.
+        self.field.switch_count() + self.switch + 1
     }
 }
 
@@ -258,23 +265,27 @@ fn jumps(
     below.iter().zip(&above).any(|(a, b)| (a - b).abs() > ROUNDING * a.abs().max(b.abs()))
 }
 
+/// True if the field jumps at the surface of a switch that a cycle touches at a normalised time.
+pub fn jumps_at(field: &dyn VectorField, point: &Point, cycle: &Cycle, t: f64, switch: usize) -> bool {
+    let (state, forced) = (cycle.state(t), cycle.forcing_periods);
+    let time = (forced > 0).then_some(f64::from(forced) * t);
+    let mut values = vec![0.0; field.switch_count()];
+    let parameters = Parameters::Shared(&point.parameters);
+    let at = Batch { lanes: 1, states: &state, parameters, times: time.as_slice(), signs: &[] };
+    field.switches(at, &mut values);
+    let signs: Vec<f64> = values.iter().map(|value| if *value < 0.0 { -1.0 } else { 1.0 }).collect();
+    jumps(field, &point.parameters, &state, time, &signs, switch)
+}
+
 /// The reason why a branch ends, with a better cause if its last cycle touches a surface at which f jumps.
-pub fn at_corner(field: &dyn VectorField, last: Option<&Point>, why: String) -> String {
+pub fn at_corner(field: &dyn VectorField, point: &Point, why: String) -> String {
     /// Extremum, relative to the largest value of the switch along the cycle.
     const CLOSE: f64 = 1e-4;
-    let Some((point, Solution::Cycle(cycle))) = last.map(|point| (point, &point.solution)) else { return why };
+    let Solution::Cycle(cycle) = &point.solution else { return why };
     let touched = (0..field.switch_count()).find(|switch| {
         let (extrema, size) = super::grazing::extrema(field, &point.parameters, cycle, *switch);
-        extrema.iter().filter(|own| own.value.abs() < CLOSE * size).any(|own| {
-            let (state, time) = (cycle.state(own.time), cycle.forcing_periods);
-            let time = (time > 0).then_some(f64::from(time) * own.time);
-            let mut values = vec![0.0; field.switch_count()];
-            let parameters = Parameters::Shared(&point.parameters);
-            let at = Batch { lanes: 1, states: &state, parameters, times: time.as_slice(), signs: &[] };
-            field.switches(at, &mut values);
-            let signs: Vec<f64> = values.iter().map(|value| if *value < 0.0 { -1.0 } else { 1.0 }).collect();
-            jumps(field, &point.parameters, &state, time, &signs, *switch)
-        })
+        let close = |own: &&Extremum| own.value.abs() < CLOSE * size;
+        extrema.iter().filter(close).any(|own| jumps_at(field, point, cycle, own.time, *switch))
     });
     let Some(switch) = touched else { return why };
     let first = why.split('\n').next().unwrap_or_default();
