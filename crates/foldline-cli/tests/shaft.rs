@@ -84,11 +84,10 @@ fn friction_makes_the_full_annular_rub_whirl_backward() {
     let known = reference();
     for (speed, hopf) in [(880, "HM880"), (1500, "HM1500")] {
         let study = format!(
-            "model = \"m\"\ntolerance = 1e-8\nparameters = {{ Omega = \"{speed} rpm\" }}\n\
+            "model = \"m\"\ntolerance = 1e-8\n\
              [[seed]]\nname = \"slow\"\nattractor = \"equilibrium\"\nparameters = {{ Omega = \"500 rpm\" }}\nsamples = 4\n\
-             [[branch]]\nname = \"response\"\nfrom = \"slow\"\nfree = \"Omega\"\nrange = [\"400 rpm\", \"3500 rpm\"]\n\
-             mark = {{ Omega = \"{speed} rpm\" }}\n\
-             [[branch]]\nname = \"friction\"\nfrom = \"response\"\nat = {{ kind = \"mark\", stable = true, largest = \"r_6\" }}\n\
+             [[branch]]\nname = \"up\"\nfrom = \"slow\"\nfree = \"Omega\"\nuntil = \"{speed} rpm\"\n\
+             [[branch]]\nname = \"friction\"\nfrom = \"up\"\n\
              free = \"mu\"\nrange = [0, 0.05]\n"
         );
         let diagram = run(&study);
