@@ -128,13 +128,15 @@ fn the_commands_for_rotors_print_numbers_and_draw_pictures() {
     let model = "models/overhung-shaft.toml";
     // Undamped critical speeds do not depend on the dampers: those of the rotor without them.
     let critical = table(&["critical-speeds", model, "--ratio", "2:1"]);
-    let forward: Vec<f64> = critical.iter().filter(|row| row["whirl"] == "forward").map(|row| row["undamped"].parse().unwrap()).collect();
+    let forward: Vec<f64> =
+        critical.iter().filter(|row| row["whirl"] == "forward").map(|row| row["undamped"].parse().unwrap()).collect();
     near(forward[0], 890.77130165, 1e-7);
     near(forward[1], 6063.31298425, 1e-7);
     assert!(critical.iter().any(|row| row["kind"] == "2:1"), "{critical:?}");
     let campbell = table(&["campbell", model, "--speeds", "0:4000 rpm", "--count", "5", "--modes", "4"]);
     assert_eq!(campbell.len(), 20);
-    let rotating = table(&["campbell", model, "--speeds", "0:4000 rpm", "--count", "5", "--modes", "4", "--frame", "rotating"]);
+    let rotating =
+        table(&["campbell", model, "--speeds", "0:4000 rpm", "--count", "5", "--modes", "4", "--frame", "rotating"]);
     for (fixed, rotating) in campbell.iter().zip(&rotating) {
         let number = |row: &HashMap<String, String>, name: &str| row[name].parse::<f64>().unwrap();
         let sign = if fixed["whirl"] == "backward" { -1.0 } else { 1.0 };
@@ -142,7 +144,18 @@ fn the_commands_for_rotors_print_numbers_and_draw_pictures() {
         assert!((number(rotating, "frequency") - expected).abs() < 1e-9, "{fixed:?} {rotating:?}");
     }
     // The response at one speed is the equilibrium of the model below contact.
-    let response = table(&["unbalance-response", model, "--speeds", "500:700", "--count", "2", "--probe", "6:90deg", "--amplitude", "m"]);
+    let response = table(&[
+        "unbalance-response",
+        model,
+        "--speeds",
+        "500:700",
+        "--count",
+        "2",
+        "--probe",
+        "6:90deg",
+        "--amplitude",
+        "m",
+    ]);
     assert_eq!(response[0]["probe"], response[0]["y"]);
     let shapes = table(&["campbell", model, "--shapes", "--modes", "2"]);
     assert_eq!(shapes.len(), 14);

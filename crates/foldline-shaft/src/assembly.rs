@@ -199,9 +199,8 @@ impl Assembly {
         let root = Mat::from_fn(n, n, |i, j| {
             (0..n).map(|k| vectors[(i, k)] * vectors[(j, k)] / values[k].sqrt()).sum::<f64>()
         });
-        let stiffness = Mat::from_fn(n, n, |i, j| {
-            0.5 * (self.stiffness[(i, j)] + self.stiffness[(j, i)]) / (scale[i] * scale[j])
-        });
+        let stiffness =
+            Mat::from_fn(n, n, |i, j| 0.5 * (self.stiffness[(i, j)] + self.stiffness[(j, i)]) / (scale[i] * scale[j]));
         let (mut half, mut whole) = (Mat::zeros(n, n), Mat::zeros(n, n));
         multiply(half.as_mut(), root.as_ref(), stiffness.as_ref());
         multiply(whole.as_mut(), half.as_ref(), root.as_ref());

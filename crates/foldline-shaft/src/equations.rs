@@ -370,7 +370,14 @@ impl Assembled {
             list.extend(0..rotor.stations.len());
         }
         let mut seen = Vec::new();
-        list.into_iter().filter(|s| !seen.contains(s) && { seen.push(*s); true }).collect()
+        list.into_iter()
+            .filter(|s| {
+                !seen.contains(s) && {
+                    seen.push(*s);
+                    true
+                }
+            })
+            .collect()
     }
 
     /// Power of the unbalance forces and of friction at the circumference.
@@ -403,7 +410,8 @@ fn centre_on_sag(rotor: &mut Rotor, assembly: &Assembly) -> Result<(), Refusal> 
     let variable = rotor.gravity.text.is_some() || assembly.terms.iter().any(|term| term.of == Of::Stiffness);
     if variable {
         let message = "a ring is centred on the sagged shaft, but the sag depends on expressions".to_string();
-        let cure = "give gravity and stiffnesses as numbers or [constants], or the centre as `centre = [\"0 mm\", \"-1 mm\"]`";
+        let cure =
+            "give gravity and stiffnesses as numbers or [constants], or the centre as `centre = [\"0 mm\", \"-1 mm\"]`";
         return Err([message, cure.into()]);
     }
     let sag = sag(&assembly.stiffness, &assembly.mass, rotor, rotor.gravity.factor);

@@ -64,13 +64,15 @@ impl Rotor {
 /// True if every 2 × 2 block has the form [[a, -b], [b, a]].
 pub(crate) fn commutes(a: &Mat<f64>) -> bool {
     let n = a.nrows();
-    // Entries are compared with the diagonal of their row and column, which have the same units.
-    let size = |i: usize, j: usize| (a[(i, i)] * a[(j, j)]).abs().sqrt();
-    let largest = (0..n).flat_map(|i| (0..n).map(move |j| (i, j))).fold(0.0, |m: f64, at| m.max(a[at].abs()));
+    // Entries are compared with the largest of their row and column, which have the same units: entries that cancel where
+    // two elements meet are rounding errors of these.
+    let row = |i: usize| (0..n).fold(0.0, |m: f64, j| m.max(a[(i, j)].abs()));
+    let rows: Vec<f64> = (0..n).map(row).collect();
+    let unit = |i: usize, j: usize| (rows[i] * rows[j]).sqrt().max(rows[i + 1].min(rows[j + 1]));
     (0..n / 2).all(|i| {
         (0..n / 2).all(|j| {
             let (i, j) = (2 * i, 2 * j);
-            let unit = size(i, j).max(a[(i, j)].abs()).max(a[(i, j + 1)].abs()).max(1e-12 * largest);
+            let unit = unit(i, j);
             (a[(i, j)] - a[(i + 1, j + 1)]).abs() <= SAME * unit && (a[(i, j + 1)] + a[(i + 1, j)]).abs() <= SAME * unit
         })
     })

@@ -82,9 +82,11 @@ impl Machine {
         let mut all = source.definitions.clone();
         all.push(Definition::new(SPEED, &rotor.speed.shown()));
         small.definitions = needed(&texts, &all);
-        let bodies: Vec<String> = small.definitions.iter().map(|own| own.expression.clone()).chain(texts.clone()).collect();
+        let bodies: Vec<String> =
+            small.definitions.iter().map(|own| own.expression.clone()).chain(texts.clone()).collect();
         small.functions.retain(|own| bodies.iter().any(|text| words(text).any(|word| word == own.name)));
-        small.outputs = texts.iter().enumerate().map(|(k, text)| Output::new(&format!("rotor_value_{k}"), text)).collect();
+        small.outputs =
+            texts.iter().enumerate().map(|(k, text)| Output::new(&format!("rotor_value_{k}"), text)).collect();
         Ok(Machine { values: Model::compile(small)?, assembled, texts })
     }
 

@@ -10,8 +10,9 @@
 //! 2. [[-ω₀ S⁻¹D, -ω₀² S⁻¹M], [1, 0]] y = (ω₀/λ) y
 //! 3. resonance n:m in the rotating frame: n (ω_f - Ω) = m (ω_b - Ω), backward frequencies negative
 //!
-//! **Fails when** S is singular (a rotor without supports): the eigenvalue problem is then solved for λ/ω₀, and the
-//! lowest modes are less accurate.
+//! **Fails when** modes lie far above the lowest one: an eigenvalue r times the lowest loses a factor r² of accuracy. If
+//! S is singular (a rotor without supports), the eigenvalue problem is solved for λ/ω₀, and the lowest modes are less
+//! accurate.
 
 use crate::machine::Linear;
 use foldline_general::{Mat, complex_eigenvalues, complex_eigenvectors, complex_solution, eigenvectors};
@@ -181,7 +182,8 @@ fn companion(m: &Mat<Complex64>, d: &Mat<Complex64>, s: &Mat<Complex64>) -> (Mat
     let scaled_right = Mat::from_fn(n, 2 * n, |i, j| scale[i] * right[(i, j)]);
     let found = complex_solution(scaled.as_ref(), &scaled_right);
     let solved = Mat::from_fn(n, 2 * n, |i, j| scale[i] * found[(i, j)]);
-    let size = |a: &Mat<Complex64>| (0..n).map(|i| (0..n).map(|j| a[(i, j)].norm_sqr()).sum::<f64>()).sum::<f64>().sqrt();
+    let size =
+        |a: &Mat<Complex64>| (0..n).map(|i| (0..n).map(|j| a[(i, j)].norm_sqr()).sum::<f64>()).sum::<f64>().sqrt();
     let flexibility = Mat::from_fn(n, n, |i, j| solved[(i, n + j)]);
     let trace: f64 = (0..n).map(|i| flexibility[(i, i)].norm()).sum();
     let unit = 1.0 / trace.sqrt();

@@ -208,10 +208,7 @@ mod tests {
         let kappa = 6.0 * (1.0 + nu) / (7.0 + 6.0 * nu);
         let phi = 12.0 * ei / (kappa * 81.2e9 * area * l * l);
         let unit = ei / (l.powi(3) * (1.0 + phi));
-        let expected = [
-            [12.0, 6.0 * l, -12.0, 6.0 * l],
-            [6.0 * l, (4.0 + phi) * l * l, -6.0 * l, (2.0 - phi) * l * l],
-        ];
+        let expected = [[12.0, 6.0 * l, -12.0, 6.0 * l], [6.0 * l, (4.0 + phi) * l * l, -6.0 * l, (2.0 - phi) * l * l]];
         for i in 0..2 {
             for j in 0..4 {
                 assert!((k[i][j] - unit * expected[i][j]).abs() < 1e-12 * 12.0 * unit, "{i} {j}");
@@ -224,7 +221,8 @@ mod tests {
     fn rigid_motions_of_a_cone_have_the_energy_of_a_rigid_body() {
         let cone = steel(0.4, [0.06, 0.09], [0.02, 0.03]);
         let Matrices { mass, stiffness, .. } = cone.matrices();
-        let energy = |a: &Plane, v: [f64; 4]| (0..4).map(|i| (0..4).map(|j| v[i] * a[i][j] * v[j]).sum::<f64>()).sum::<f64>();
+        let energy =
+            |a: &Plane, v: [f64; 4]| (0..4).map(|i| (0..4).map(|j| v[i] * a[i][j] * v[j]).sum::<f64>()).sum::<f64>();
         let total: f64 = cone.mass();
         // Frustum minus frustum.
         let frustum = |a: f64, b: f64| PI / 12.0 * 0.4 * (a * a + a * b + b * b);

@@ -100,12 +100,16 @@ fn figure(typed: &Typed, rotor: &Loaded, rows: &Rows, unit: f64) -> String {
         }
     }
     let synchronous = |speed: f64| if typed.frame == Frame::Fixed { unit * speed } else { 0.0 };
-    let highest = rows.iter().flat_map(|(speed, modes)| modes.iter().map(|own| unit * frequency(typed.frame, own, *speed)));
+    let highest =
+        rows.iter().flat_map(|(speed, modes)| modes.iter().map(|own| unit * frequency(typed.frame, own, *speed)));
     let highest = highest.fold(0.0, f64::max);
     let line: Vec<[f64; 2]> = rows.iter().map(|(speed, _)| [rotor.shown_speed(*speed), synchronous(*speed)]).collect();
     let line: Vec<[f64; 2]> = line.into_iter().filter(|at| at[1] <= 1.05 * highest || at[1] == 0.0).collect();
     layers.push(Layer::curve(&line, palette::GREY).dashed().named("synchronous"));
-    let y = Axis::new(label(if typed.frame == Frame::Fixed { "frequency" } else { "frequency in the rotating frame" }, &typed.frequency));
+    let y = Axis::new(label(
+        if typed.frame == Frame::Fixed { "frequency" } else { "frequency in the rotating frame" },
+        &typed.frequency,
+    ));
     let panel = Panel {
         legend: LegendPlace::Beside,
         height: 460.0,

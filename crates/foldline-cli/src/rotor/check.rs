@@ -56,7 +56,9 @@ fn sag(machine: &Machine, parameters: &[f64]) -> Vec<String> {
         let offset = (sag[first] - centre[0]).hypot(sag[first + 1] - centre[1]);
         let ratio = offset / clearance;
         let said = match (rotor.gravity.is_zero(), ratio > 1.0) {
-            (true, true) => "; with gravity the shaft would rest on the ring: give `gravity`, or take the ring as centred on the sagged shaft",
+            (true, true) => {
+                "; with gravity the shaft would rest on the ring: give `gravity`, or take the ring as centred on the sagged shaft"
+            }
             (false, true) => "; the shaft rests on the ring",
             _ => "",
         };

@@ -28,13 +28,17 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
     let mut rows: Vec<Vec<Cell>> = Vec::new();
     for own in &found {
         let (damped, decrement) = match own.damped {
-            Some((speed, value)) => {
-                (Cell::Number(rotor.shown_speed(speed)), Cell::Number(-TAU * value.re / value.im))
-            }
+            Some((speed, value)) => (Cell::Number(rotor.shown_speed(speed)), Cell::Number(-TAU * value.re / value.im)),
             None => (Cell::Empty, Cell::Empty),
         };
         let undamped = Cell::Number(rotor.shown_speed(own.undamped));
-        rows.push(vec![Cell::Word("critical".into()), Cell::Word(own.whirl.name().into()), undamped, damped, decrement]);
+        rows.push(vec![
+            Cell::Word("critical".into()),
+            Cell::Word(own.whirl.name().into()),
+            undamped,
+            damped,
+            decrement,
+        ]);
     }
     let highest = found.iter().map(|own| own.undamped).fold(0.0, f64::max);
     let mut short = Vec::new();
@@ -53,7 +57,9 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
     out.flush()?;
     for own in found.iter().filter(|own| !own.settled) {
         let speed = rotor.shown_speed(own.undamped);
-        short.push(format!("the critical speed near {speed} {unit} did not settle: coefficients change too much with the speed"));
+        short.push(format!(
+            "the critical speed near {speed} {unit} did not settle: coefficients change too much with the speed"
+        ));
     }
     short.iter().try_for_each(|line| writeln!(std::io::stderr(), "incomplete: {line}"))?;
     Ok(if short.is_empty() { Outcome::Done } else { Outcome::Short })

@@ -109,5 +109,7 @@ pub fn scale(option: &str, unit: &str, from: &str) -> Result<f64, Failure> {
 
 /// Reason why a result is missing.
 pub fn uncomputed(what: &str) -> Failure {
-    Failure::Outside(format!("{what} could not be computed: an eigenvalue problem did not converge, or a coefficient is not finite"))
+    Failure::Outside(format!(
+        "{what} could not be computed: an eigenvalue problem did not converge, or a coefficient is not finite"
+    ))
 }

@@ -56,7 +56,10 @@ fn probes(typed: &Typed, rotor: &Loaded) -> Result<Vec<Probe>, Failure> {
         let station = parts.stations.iter().position(|own| own.name == name.trim());
         let station = station.ok_or_else(|| {
             let names: Vec<&str> = parts.stations.iter().map(|own| own.name.as_str()).collect();
-            Failure::typed(format!("--probe {text}: there is no node {name}"), format!("the nodes are {}", names.join(", ")))
+            Failure::typed(
+                format!("--probe {text}: there is no node {name}"),
+                format!("the nodes are {}", names.join(", ")),
+            )
         })?;
         let angle = match angle {
             None => None,
@@ -98,7 +101,8 @@ fn table(typed: &Typed, rotor: &Loaded, probes: &[Probe], speeds: &[f64], found:
 
 fn figure(typed: &Typed, rotor: &Loaded, probes: &[Probe], speeds: &[f64], found: &[Vec<Orbit>], unit: f64) -> String {
     let (name, speed_unit) = rotor.speed_label();
-    let size = |k: usize, orbit: &Orbit| unit * probes[k].angle.map_or(orbit.major(), |angle| orbit.along(angle).norm());
+    let size =
+        |k: usize, orbit: &Orbit| unit * probes[k].angle.map_or(orbit.major(), |angle| orbit.along(angle).norm());
     let layer = |k: usize| {
         let at = |(speed, orbits): (&f64, &Vec<Orbit>)| [rotor.shown_speed(*speed), size(k, &orbits[k])];
         let points: Vec<[f64; 2]> = speeds.iter().zip(found).map(at).collect();

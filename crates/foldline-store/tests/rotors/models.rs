@@ -38,7 +38,9 @@ k = "1e7 N/m"
 /// Model text of one of the rotors.
 pub fn rotor(name: &str) -> String {
     let simple = R599.split("[[disc]]").next().unwrap();
-    let disc = |node: u32, outer: &str| format!("[[disc]]\nnode = {node}\nouter = \"{outer}\"\ninner = \"50 mm\"\nwidth = \"70 mm\"\n\n");
+    let disc = |node: u32, outer: &str| {
+        format!("[[disc]]\nnode = {node}\nouter = \"{outer}\"\ninner = \"50 mm\"\nwidth = \"70 mm\"\n\n")
+    };
     let bearings = |own: &str| format!("[[bearing]]\nnode = 0\n{own}\n\n[[bearing]]\nnode = 6\n{own}\n");
     let supported = |own: &str| format!("{simple}{}{}{}", disc(2, "280 mm"), disc(4, "350 mm"), bearings(own));
     match name {

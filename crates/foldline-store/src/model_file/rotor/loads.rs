@@ -8,7 +8,13 @@ use std::ops::Range;
 use toml::de::DeTable;
 
 impl Reader<'_> {
-    pub(super) fn unbalances(&mut self, root: &DeTable, source: &mut ModelSource, draft: &mut Draft, rotor: &mut Rotor) {
+    pub(super) fn unbalances(
+        &mut self,
+        root: &DeTable,
+        source: &mut ModelSource,
+        draft: &mut Draft,
+        rotor: &mut Rotor,
+    ) {
         for (k, (span, table)) in self.walk.tables(root, "unbalance").into_iter().enumerate() {
             let whose = format!("unbalance {k}");
             self.walk.only(table, &["node", "at", "amount", "phase"], &whose);
@@ -23,7 +29,17 @@ impl Reader<'_> {
 
     pub(super) fn contacts(&mut self, root: &DeTable, source: &mut ModelSource, draft: &mut Draft, rotor: &mut Rotor) {
         const KEYS: [&str; 11] = [
-            "name", "node", "at", "clearance", "stiffness", "friction", "radius", "slip-velocity", "law", "width", "centre",
+            "name",
+            "node",
+            "at",
+            "clearance",
+            "stiffness",
+            "friction",
+            "radius",
+            "slip-velocity",
+            "law",
+            "width",
+            "centre",
         ];
         for (k, (span, table)) in self.walk.tables(root, "contact").into_iter().enumerate() {
             let name = match table.get("name") {
@@ -46,13 +62,24 @@ impl Reader<'_> {
             let radius = self.optional(table, "radius", [&whose, "m"], source, draft);
             let reversal = self.optional(table, "slip-velocity", [&whose, "m/s"], source, draft);
             if let (Some(own), None) = (table.get("slip-velocity"), &radius) {
-                let hint = "give the radius at which the surfaces slip, as in `radius = \"25 mm\"`, or remove `slip-velocity`";
+                let hint =
+                    "give the radius at which the surfaces slip, as in `radius = \"25 mm\"`, or remove `slip-velocity`";
                 self.walk.report(own.span(), format!("{whose} has a slip velocity but no radius"), hint);
             }
             let law = self.law(&span, table, &whose, source, draft);
             let centre = self.centre(table, &whose, source, draft);
             if let (Some(at), Some(clearance), Some(stiffness), Some(law)) = (at, clearance, stiffness, law) {
-                rotor.contacts.push(Contact { name, at, clearance, stiffness, friction, radius, reversal, law, centre });
+                rotor.contacts.push(Contact {
+                    name,
+                    at,
+                    clearance,
+                    stiffness,
+                    friction,
+                    radius,
+                    reversal,
+                    law,
+                    centre,
+                });
             }
         }
     }
@@ -95,11 +122,13 @@ impl Reader<'_> {
             (Some("sagged"), _) => Centre::Sagged,
             (_, Some(list)) => {
                 let what = format!("the centre of {whose}");
-                let mut one = |k: usize| self.coefficient(&list[k], &what, "m", source, draft).unwrap_or(Coefficient::ZERO);
+                let mut one =
+                    |k: usize| self.coefficient(&list[k], &what, "m", source, draft).unwrap_or(Coefficient::ZERO);
                 Centre::At([one(0), one(1)])
             }
             _ => {
-                let hint = "write `centre = \"line\"`, `centre = \"sagged\"`, or a position `centre = [\"0 mm\", \"-1 mm\"]`";
+                let hint =
+                    "write `centre = \"line\"`, `centre = \"sagged\"`, or a position `centre = [\"0 mm\", \"-1 mm\"]`";
                 self.walk.report(value.span(), format!("the centre of {whose} is not understood"), hint);
                 Centre::Line
             }
@@ -149,7 +178,12 @@ impl Reader<'_> {
                         Some(reason) if *rotating => format!(" ({reason})"),
                         _ => String::new(),
                     };
-                    (message, format!("the equations are in the {frame} frame{reason}: write the force as `{u}` and `{v}`, or choose the other `frame`"))
+                    (
+                        message,
+                        format!(
+                            "the equations are in the {frame} frame{reason}: write the force as `{u}` and `{v}`, or choose the other `frame`"
+                        ),
+                    )
                 }
                 _ => continue,
             };

@@ -27,7 +27,9 @@ impl Reader<'_> {
         let n = mass.len();
         if n % 4 != 0 || n == 0 || n > MOST {
             let message = format!("the matrices have {n} rows");
-            let hint = format!("give x, y and the rotations about x and y of each node in this order: 4 rows a node, at most {MOST}");
+            let hint = format!(
+                "give x, y and the rotations about x and y of each node in this order: 4 rows a node, at most {MOST}"
+            );
             return self.walk.report(value.span(), message, hint);
         }
         if table.get("K").is_none() {
@@ -64,7 +66,11 @@ impl Reader<'_> {
     /// Reads a square matrix, row by row.
     fn matrix(&mut self, value: &Value, key: &str, size: Option<usize>) -> Option<Vec<Vec<f64>>> {
         let Some(list) = value.get_ref().as_array() else {
-            self.walk.report(value.span(), format!("the matrix `{key}` is not a list of rows"), "write `[[1, 0], [0, 1]]`");
+            self.walk.report(
+                value.span(),
+                format!("the matrix `{key}` is not a list of rows"),
+                "write `[[1, 0], [0, 1]]`",
+            );
             return None;
         };
         let n = size.unwrap_or(list.len());
@@ -98,8 +104,15 @@ impl Reader<'_> {
         });
         if let (Some((i, j)), Some(value)) = (off, table.get(key)) {
             let property = if sign > 0.0 { "symmetric" } else { "skew-symmetric" };
-            let message = format!("the matrix `{key}` is not {property}: entries ({i}, {j}) and ({j}, {i}) are {} and {}", a[i][j], a[j][i]);
-            self.walk.report(value.span(), message, "check the order of the degrees of freedom: x, y, then rotations about x and y");
+            let message = format!(
+                "the matrix `{key}` is not {property}: entries ({i}, {j}) and ({j}, {i}) are {} and {}",
+                a[i][j], a[j][i]
+            );
+            self.walk.report(
+                value.span(),
+                message,
+                "check the order of the degrees of freedom: x, y, then rotations about x and y",
+            );
         }
     }
 }

@@ -179,7 +179,9 @@ impl Reader<'_> {
         match value.get_ref().as_str() {
             Some("off") => Coefficient::ZERO,
             Some("on") => Coefficient::number(9.80665),
-            _ => self.coefficient(value, "the gravity of the rotor", "m/s^2", source, draft).unwrap_or(Coefficient::ZERO),
+            _ => {
+                self.coefficient(value, "the gravity of the rotor", "m/s^2", source, draft).unwrap_or(Coefficient::ZERO)
+            }
         }
     }
 
@@ -202,7 +204,8 @@ impl Reader<'_> {
                     vec![value]
                 }
             };
-            damping.modal = list.into_iter().filter_map(|own| self.fixed(own, "a damping ratio", "1", source)).collect();
+            damping.modal =
+                list.into_iter().filter_map(|own| self.fixed(own, "a damping ratio", "1", source)).collect();
         }
         let negative = damping.modal.iter().chain([&damping.mass, &damping.stiffness]).any(|own| *own < 0.0);
         if negative {

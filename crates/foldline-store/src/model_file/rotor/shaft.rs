@@ -63,7 +63,11 @@ impl Reader<'_> {
         let names: Vec<&str> = draft.materials.iter().map(|own| own.name.as_str()).collect();
         let Some(value) = table.get("material") else {
             if names.len() != 1 {
-                let hint = if names.is_empty() { "add `[[material]]` with E, G and density" } else { "write `material = \"…\"`" };
+                let hint = if names.is_empty() {
+                    "add `[[material]]` with E, G and density"
+                } else {
+                    "write `material = \"…\"`"
+                };
                 self.walk.report(span.clone(), format!("{whose} has no material"), hint);
             }
             return (names.len() == 1).then_some(0);
@@ -80,8 +84,18 @@ impl Reader<'_> {
     /// Reads the sections of the shaft, from left to right.
     pub(super) fn shafts(&mut self, root: &DeTable, source: &ModelSource, draft: &mut Draft, rotor: &mut Rotor) {
         const KEYS: [&str; 12] = [
-            "length", "elements", "positions", "diameter", "right", "inner", "inner-right", "material", "axial-force",
-            "shear", "rotary-inertia", "gyroscopic",
+            "length",
+            "elements",
+            "positions",
+            "diameter",
+            "right",
+            "inner",
+            "inner-right",
+            "material",
+            "axial-force",
+            "shear",
+            "rotary-inertia",
+            "gyroscopic",
         ];
         for (k, (span, table)) in self.walk.tables(root, "shaft").into_iter().enumerate() {
             let whose = format!("section {k} of the shaft");
@@ -150,7 +164,11 @@ impl Reader<'_> {
                 let list = value.get_ref().as_array().filter(|list| list.len() >= 2);
                 let Some(list) = list else {
                     let hint = "write the positions of its nodes: `positions = [\"0 m\", \"0.25 m\", \"0.5 m\"]`";
-                    self.walk.report(value.span(), format!("`positions` of {whose} is not a list of two or more"), hint);
+                    self.walk.report(
+                        value.span(),
+                        format!("`positions` of {whose} is not a list of two or more"),
+                        hint,
+                    );
                     return None;
                 };
                 let what = format!("a position of {whose}");
@@ -161,9 +179,15 @@ impl Reader<'_> {
                     self.walk.report(value.span(), message, "list the nodes from left to right");
                     return None;
                 }
-                if let Some(start) = start.filter(|start| (start - places[0]).abs() > 1e-9 * places[places.len() - 1].abs()) {
+                if let Some(start) =
+                    start.filter(|start| (start - places[0]).abs() > 1e-9 * places[places.len() - 1].abs())
+                {
                     let message = format!("{whose} begins at {} m, but the shaft so far ends at {start} m", places[0]);
-                    self.walk.report(value.span(), message, "begin with the position at which the previous section ends");
+                    self.walk.report(
+                        value.span(),
+                        message,
+                        "begin with the position at which the previous section ends",
+                    );
                     return None;
                 }
                 places
@@ -171,7 +195,9 @@ impl Reader<'_> {
             None => {
                 let length = self.needed((span, table), "length", [whose, "m", "\"0.5 m\""], source)?;
                 let count = match table.get("elements") {
-                    Some(own) => self.walk.integer(own, &format!("the number of elements of {whose}"), 1..=MOST_NODES as u64)?,
+                    Some(own) => {
+                        self.walk.integer(own, &format!("the number of elements of {whose}"), 1..=MOST_NODES as u64)?
+                    }
                     None => 1,
                 };
                 let from = start.unwrap_or(0.0);
@@ -180,7 +206,11 @@ impl Reader<'_> {
         };
         if rotor.nodes + places.len() > MOST_NODES {
             let message = format!("the shaft has more than {MOST_NODES} nodes");
-            self.walk.report(span.clone(), message, "reduce the number of elements; six to ten between supports are enough");
+            self.walk.report(
+                span.clone(),
+                message,
+                "reduce the number of elements; six to ten between supports are enough",
+            );
             return None;
         }
         if start.is_none() {

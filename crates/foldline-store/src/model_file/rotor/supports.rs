@@ -35,9 +35,13 @@ impl Reader<'_> {
                 };
                 let both = one(key);
                 let across = one(cross);
-                let entries = ENTRIES.map(|names| one(names[which]).or_else(|| over_speed[which].get(names[which]).cloned()));
+                let entries =
+                    ENTRIES.map(|names| one(names[which]).or_else(|| over_speed[which].get(names[which]).cloned()));
                 let [xx, xy, yx, yy] = entries;
-                for (name, twice) in [(key, both.is_some() && (xx.is_some() || yy.is_some())), (cross, across.is_some() && (xy.is_some() || yx.is_some()))] {
+                for (name, twice) in [
+                    (key, both.is_some() && (xx.is_some() || yy.is_some())),
+                    (cross, across.is_some() && (xy.is_some() || yx.is_some())),
+                ] {
                     if twice {
                         let message = format!("{whose} has `{name}` as well as the entries it stands for");
                         self.walk.report(span.clone(), message, "keep one of them");
@@ -76,14 +80,21 @@ impl Reader<'_> {
         self.walk.only(table, &known, &format!("the table of {whose}"));
         let Some(speeds) = table.get("speed") else {
             let hint = "write `table = { speed = [0, 3000], unit = \"rpm\", kxx = [1e7, 2e7], kyy = [1e7, 2e7] }`";
-            return { self.walk.report(value.span(), format!("the table of {whose} has no `speed`"), hint); to };
+            return {
+                self.walk.report(value.span(), format!("the table of {whose} has no `speed`"), hint);
+                to
+            };
         };
         let unit = table.get("unit").and_then(|own| self.walk.string(own, "`unit`")).unwrap_or_else(|| "rad/s".into());
         let factor = match Unit::read(&unit).convert(1.0, &Unit::read("rad/s")) {
             Ok(factor) => factor,
             Err(_) => {
                 let message = format!("the speeds of {whose} are in {unit}, which is not a unit of speed");
-                self.walk.report(table.get("unit").map_or(value.span(), |own| own.span()), message, "write \"rpm\" or \"rad/s\"");
+                self.walk.report(
+                    table.get("unit").map_or(value.span(), |own| own.span()),
+                    message,
+                    "write \"rpm\" or \"rad/s\"",
+                );
                 return to;
             }
         };

@@ -64,8 +64,13 @@ impl Reader<'_> {
         match Unit::read(own).convert(1.0, &Unit::read(unit)) {
             Ok(factor) => Some(factor),
             Err(why) => {
-                let message = format!("{what} is `{name}`, which is in {own}; that cannot be converted to {unit}: {why}");
-                self.walk.report(value.span(), message, format!("give `{name}` in {unit} or in a unit of the same dimension"));
+                let message =
+                    format!("{what} is `{name}`, which is in {own}; that cannot be converted to {unit}: {why}");
+                self.walk.report(
+                    value.span(),
+                    message,
+                    format!("give `{name}` in {unit} or in a unit of the same dimension"),
+                );
                 None
             }
         }
@@ -99,7 +104,9 @@ impl Reader<'_> {
         });
         if let Some((_, own)) = scaled {
             let message = format!("{what} is computed from `{}`, which is in {}", own.name, own.unit);
-            let hint = format!("use constants without a unit, or in {unit}, in such an expression; its value is taken in {unit}");
+            let hint = format!(
+                "use constants without a unit, or in {unit}, in such an expression; its value is taken in {unit}"
+            );
             self.walk.report(value.span(), message, hint);
             return None;
         }
@@ -142,7 +149,11 @@ impl Reader<'_> {
     pub(super) fn truth(&mut self, table: &DeTable, key: &str, otherwise: bool) -> bool {
         let Some(value) = table.get(key) else { return otherwise };
         value.get_ref().as_bool().unwrap_or_else(|| {
-            self.walk.report(value.span(), format!("`{key}` is neither true nor false"), format!("write `{key} = false`"));
+            self.walk.report(
+                value.span(),
+                format!("`{key}` is neither true nor false"),
+                format!("write `{key} = false`"),
+            );
             otherwise
         })
     }
@@ -160,7 +171,11 @@ impl Reader<'_> {
             (Some(value), None) => self.station_of(value, whose, rotor),
             (None, Some(value)) => {
                 let position = self.fixed(value, &format!("the position of {whose}"), "m", source)?;
-                let near = rotor.stations.iter().enumerate().filter_map(|(k, own)| Some((k, (own.position? - position).abs())));
+                let near = rotor
+                    .stations
+                    .iter()
+                    .enumerate()
+                    .filter_map(|(k, own)| Some((k, (own.position? - position).abs())));
                 let nearest = near.min_by(|a, b| a.1.total_cmp(&b.1));
                 match nearest {
                     Some((k, distance)) if distance <= 1e-6 * rotor.length() => Some(k),
@@ -168,7 +183,10 @@ impl Reader<'_> {
                         let places: Vec<String> =
                             rotor.stations.iter().filter_map(|own| Some(format!("{}", own.position?))).collect();
                         let message = format!("{whose} is at {position} m, where the shaft has no node");
-                        let hint = format!("the nodes are at {} m; give `positions` to the shaft to add one", places.join(", "));
+                        let hint = format!(
+                            "the nodes are at {} m; give `positions` to the shaft to add one",
+                            places.join(", ")
+                        );
                         self.walk.report(value.span(), message, hint);
                         None
                     }
@@ -199,7 +217,8 @@ impl Reader<'_> {
         let found = rotor.stations.iter().position(|own| own.name == name);
         if found.is_none() {
             let supports: Vec<&str> = rotor.stations[rotor.nodes..].iter().map(|own| own.name.as_str()).collect();
-            let others = if supports.is_empty() { String::new() } else { format!("; the supports are {}", supports.join(", ")) };
+            let others =
+                if supports.is_empty() { String::new() } else { format!("; the supports are {}", supports.join(", ")) };
             let message = format!("{whose}: there is no node {name}");
             self.walk.report(value.span(), message, format!("the nodes are 0 to {}{others}", rotor.nodes - 1));
         }
