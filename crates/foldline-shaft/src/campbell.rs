@@ -45,6 +45,9 @@ impl Machine {
 
     /// The `count` lowest modes at each of the speeds in rad/s. `None` where eigenvalues could not be computed.
     pub fn campbell(&self, parameters: &[f64], speeds: &[f64], count: usize) -> Vec<Option<Vec<Mode>>> {
+        if self.constant() {
+            return self.linear(parameters).modes_over(speeds, count);
+        }
         let modes = |speed: &f64| self.linear(&self.at_speed(parameters, *speed)).modes(count, false);
         speeds.iter().map(modes).collect()
     }

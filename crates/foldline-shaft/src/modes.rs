@@ -18,8 +18,8 @@ use crate::machine::Linear;
 use foldline_general::{Mat, complex_eigenvalues, complex_eigenvectors, complex_solution, eigenvectors};
 use num_complex::Complex64;
 
-/// Relative residual above which a matrix counts as singular.
-const SINGULAR: f64 = 1e-6;
+/// Relative rounding error of the lowest squared frequency, ε ‖S‖ ‖S⁻¹M‖/‖M‖, above which S counts as singular.
+const SINGULAR: f64 = 1e-4;
 
 /// Direction of whirl relative to the rotation of the shaft.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -81,11 +81,31 @@ impl Linear {
     /// The `count` lowest oscillating modes at this speed, by damped frequency; with shapes if `shapes` is true. `None`
     /// if the eigenvalues could not be computed.
     pub fn modes(&self, count: usize, shapes: bool) -> Option<Vec<Mode>> {
-        let mut modes = if self.isotropic { self.circular(shapes)? } else { self.elliptic()? };
-        modes.retain(|mode| mode.value.im > 1e-9 * mode.value.norm());
-        modes.sort_by(|a, b| a.value.im.total_cmp(&b.value.im));
-        modes.truncate(count);
-        Some(modes)
+        Some(lowest(if self.isotropic { self.circular(shapes)? } else { self.elliptic()? }, count))
+    }
+
+    /// The `count` lowest modes at each of several speeds, for matrices that do not depend on the speed. Products with
+    /// the inverse of K are computed once. `None` where eigenvalues could not be computed.
+    pub(crate) fn modes_over(&self, speeds: &[f64], count: usize) -> Vec<Option<Vec<Mode>>> {
+        let n = self.mass.nrows();
+        let each = |speed: &f64| Linear { speed: *speed, ..self.clone() };
+        let rotates = (0..n).any(|i| (0..n).any(|j| self.internal[(i, j)] != 0.0));
+        if rotates || !self.isotropic {
+            return speeds.iter().map(|speed| each(speed).modes(count, false)).collect();
+        }
+        let [m, c, g, k] = [&self.mass, &self.damping, &self.gyroscopic, &self.stiffness].map(folded);
+        let ([flexible, damped], [_, turned]) = (flexibility(&m, &c, &k), flexibility(&m, &g, &k));
+        let Some(unit) = unit(&flexible, &m, &k) else {
+            return speeds.iter().map(|speed| each(speed).modes(count, false)).collect();
+        };
+        let half = n / 2;
+        let mut own = self.clone();
+        let modes = |speed: &f64| {
+            own.speed = *speed;
+            let solved = Mat::from_fn(half, half, |i, j| damped[(i, j)] + *speed * turned[(i, j)]);
+            Some(lowest(own.circular_of((inverse_companion(&flexible, &solved, unit), unit, true), false)?, count))
+        };
+        speeds.iter().map(modes).collect()
     }
 
     /// Modes of an isotropic rotor.
@@ -96,7 +116,12 @@ impl Linear {
             [&self.mass, &self.damping, &self.gyroscopic, &self.stiffness, &self.internal].map(folded);
         let d = Mat::from_fn(n, n, |r, c| damping[(r, c)] + self.speed * gyroscopic[(r, c)]);
         let s = Mat::from_fn(n, n, |r, c| stiffness[(r, c)] - i * self.speed * internal[(r, c)]);
-        let (a, unit, inverted) = companion(&mass, &d, &s);
+        self.circular_of(companion(&mass, &d, &s), shapes)
+    }
+
+    /// Modes from the matrix of equation 2.
+    fn circular_of(&self, (a, unit, inverted): (Mat<Complex64>, f64, bool), shapes: bool) -> Option<Vec<Mode>> {
+        let (n, i) = (self.mass.nrows() / 2, Complex64::I);
         let (values, vectors) = match shapes {
             true => complex_eigenvectors(a.as_ref()).map(|(values, vectors)| (values, Some(vectors)))?,
             false => (complex_eigenvalues(a.as_ref())?, None),
@@ -173,31 +198,55 @@ pub(crate) fn folded(a: &Mat<f64>) -> Mat<Complex64> {
     Mat::from_fn(a.nrows() / 2, a.ncols() / 2, |i, j| Complex64::new(a[(2 * i, 2 * j)], a[(2 * i + 1, 2 * j)]))
 }
 
+/// The lowest oscillating modes, by damped frequency.
+fn lowest(mut modes: Vec<Mode>, count: usize) -> Vec<Mode> {
+    modes.retain(|mode| mode.value.im > 1e-9 * mode.value.norm());
+    modes.sort_by(|a, b| a.value.im.total_cmp(&b.value.im));
+    modes.truncate(count);
+    modes
+}
+
+/// S⁻¹M and S⁻¹D.
+fn flexibility(m: &Mat<Complex64>, d: &Mat<Complex64>, s: &Mat<Complex64>) -> [Mat<Complex64>; 2] {
+    let n = m.nrows();
+    let scale: Vec<f64> = (0..n).map(|i| 1.0 / s[(i, i)].norm().sqrt().max(f64::MIN_POSITIVE)).collect();
+    let scaled = Mat::from_fn(n, n, |i, j| scale[i] * s[(i, j)] * scale[j]);
+    let right = Mat::from_fn(n, 2 * n, |i, j| scale[i] * if j < n { m[(i, j)] } else { d[(i, j - n)] });
+    let found = complex_solution(scaled.as_ref(), &right);
+    [0, n].map(|from| Mat::from_fn(n, n, |i, j| scale[i] * found[(i, from + j)]))
+}
+
+/// Frobenius norm.
+fn size(a: &Mat<Complex64>) -> f64 {
+    let (rows, columns) = (a.nrows(), a.ncols());
+    (0..rows).map(|i| (0..columns).map(|j| a[(i, j)].norm_sqr()).sum::<f64>()).sum::<f64>().sqrt()
+}
+
+/// ω₀, about the lowest frequency, from S⁻¹M; `None` if S is singular: its lowest frequency would be rounding error.
+fn unit(flexible: &Mat<Complex64>, m: &Mat<Complex64>, s: &Mat<Complex64>) -> Option<f64> {
+    let trace: f64 = (0..m.nrows()).map(|i| flexible[(i, i)].norm()).sum();
+    let usable = trace.is_finite() && trace > 0.0 && f64::EPSILON * size(s) * trace < SINGULAR * size(m);
+    usable.then(|| 1.0 / trace.sqrt())
+}
+
+/// Matrix of equation 2 from S⁻¹M and S⁻¹D.
+fn inverse_companion(flexible: &Mat<Complex64>, damped: &Mat<Complex64>, unit: f64) -> Mat<Complex64> {
+    let n = flexible.nrows();
+    Mat::from_fn(2 * n, 2 * n, |i, j| match (i < n, j < n) {
+        (true, true) => -unit * damped[(i, j)],
+        (true, false) => -unit * unit * flexible[(i, j - n)],
+        (false, _) => Complex64::from(if i - n == j { 1.0 } else { 0.0 }),
+    })
+}
+
 /// Matrix of equation 2, ω₀, and false if the stiffness matrix is singular and the eigenvalues are λ/ω₀ instead.
 fn companion(m: &Mat<Complex64>, d: &Mat<Complex64>, s: &Mat<Complex64>) -> (Mat<Complex64>, f64, bool) {
     let n = m.nrows();
-    let right = Mat::from_fn(n, 2 * n, |i, j| if j < n { d[(i, j)] } else { m[(i, j - n)] });
-    let scale: Vec<f64> = (0..n).map(|i| 1.0 / s[(i, i)].norm().sqrt().max(f64::MIN_POSITIVE)).collect();
-    let scaled = Mat::from_fn(n, n, |i, j| scale[i] * s[(i, j)] * scale[j]);
-    let scaled_right = Mat::from_fn(n, 2 * n, |i, j| scale[i] * right[(i, j)]);
-    let found = complex_solution(scaled.as_ref(), &scaled_right);
-    let solved = Mat::from_fn(n, 2 * n, |i, j| scale[i] * found[(i, j)]);
-    let size =
-        |a: &Mat<Complex64>| (0..n).map(|i| (0..n).map(|j| a[(i, j)].norm_sqr()).sum::<f64>()).sum::<f64>().sqrt();
-    let flexibility = Mat::from_fn(n, n, |i, j| solved[(i, n + j)]);
-    let trace: f64 = (0..n).map(|i| flexibility[(i, i)].norm()).sum();
-    let unit = 1.0 / trace.sqrt();
-    // A singular stiffness matrix leaves a large flexibility: its lowest frequency would be rounding error.
-    let stiffest = size(s) / size(m);
-    let usable = trace.is_finite() && trace > 0.0 && 1.0 / trace > SINGULAR * f64::EPSILON * stiffest;
-    if usable {
-        let a = Mat::from_fn(2 * n, 2 * n, |i, j| match (i < n, j < n) {
-            (true, true) => -unit * solved[(i, j)],
-            (true, false) => -unit * unit * solved[(i, j)],
-            (false, _) => Complex64::from(if i - n == j { 1.0 } else { 0.0 }),
-        });
-        return (a, unit, true);
+    let [flexible, damped] = flexibility(m, d, s);
+    if let Some(unit) = unit(&flexible, m, s) {
+        return (inverse_companion(&flexible, &damped, unit), unit, true);
     }
+    let stiffest = size(s) / size(m);
     let unit = stiffest.sqrt().max(f64::MIN_POSITIVE);
     let right = Mat::from_fn(n, 2 * n, |i, j| if j < n { s[(i, j)] } else { d[(i, j - n)] });
     let solved = complex_solution(m.as_ref(), &right);

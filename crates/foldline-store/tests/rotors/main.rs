@@ -254,3 +254,16 @@ fn the_units_of_expressions_are_checked() {
     let found = parse_model(&force("-k3*(u^2 + v^2)*vu"), "rotor.toml").unwrap_err();
     assert!(found[0].message.contains("N"), "{found:#?}");
 }
+
+/// A free shaft has rigid motions at zero frequency; its first bending frequency is that of a slender free beam,
+/// 22.3733 sqrt(EI/ρA)/l²; at a slenderness of 150, shear and rotary inertia and six elements change it by less than 1e-3.
+#[test]
+fn a_free_shaft_has_the_frequencies_of_a_free_beam() {
+    let free = R599.split("[[disc]]").next().unwrap().replace("diameter = \"50 mm\"", "diameter = \"10 mm\"");
+    let (_, machine) = machine(&free);
+    let modes = machine.linear(&[0.0]).modes(8, false).unwrap();
+    let slender = 22.3732854 * (211e9 / 7810.0f64).sqrt() * 0.01 / 4.0 / 1.5f64.powi(2);
+    let bending = modes.iter().map(|mode| mode.value.im).find(|w| *w > 0.1 * slender).unwrap();
+    assert!((bending / slender - 1.0).abs() < 1e-3, "{bending} {slender}");
+    assert!(machine.sag(&[0.0]).is_none());
+}
