@@ -218,7 +218,7 @@ fn mistakes_in_a_rotor_have_place_cause_and_cure() {
     let cases = [
         ("length = \"1.5 m\"", "length = \"1.5 kg\"", "cannot be converted to m"),
         ("length = \"1.5 m\"", "length = \"Omega\"", "move `Omega` to [constants]"),
-        ("width = \"70 mm\"", "widht = \"70 mm\"", "unknown key `widht`"),
+        ("width = \"70 mm\"", "brdth = \"70 mm\"", "unknown key `brdth`"),
         ("node = 6", "node = 9", "there is no node 9"),
         ("node = 6", "at = \"1.4 m\"", "the shaft has no node"),
         ("material = \"steel\"", "material = \"steal\"", "`steal`, which is not a material"),

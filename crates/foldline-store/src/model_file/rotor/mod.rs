@@ -32,7 +32,7 @@ pub(super) struct Read {
     pub checked: ModelSource,
 }
 
-/// What is collected while the sections are read.
+/// Parts of the sections that are needed after they were read.
 #[derive(Default)]
 pub(super) struct Draft {
     /// Material names and properties.
