@@ -84,8 +84,8 @@ fn friction_makes_the_full_annular_rub_whirl_backward() {
     let known = reference();
     for (speed, hopf) in [(880, "HM880"), (1500, "HM1500")] {
         let study = format!(
-            "model = \"m\"\ntolerance = 1e-8\nmax-steps = 500\n\
-             [[seed]]\nname = \"slow\"\nstate = \"zero\"\nparameters = {{ Omega = \"500 rpm\" }}\n\
+            "model = \"m\"\ntolerance = 1e-8\n\
+             [[seed]]\nname = \"slow\"\nstate = \"zero\"\nparameters = {{ Omega = \"100 rpm\" }}\n\
              [[branch]]\nname = \"up\"\nfrom = \"slow\"\nfree = \"Omega\"\nuntil = \"{speed} rpm\"\n\
              [[branch]]\nname = \"friction\"\nfrom = \"up\"\n\
              free = \"mu\"\nrange = [0, 0.05]\n"

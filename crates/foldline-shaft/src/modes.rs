@@ -180,7 +180,7 @@ impl Linear {
 
     /// True if a pair of coordinates is a displacement, false if it is a rotation.
     fn is_displacement(&self, pair: usize) -> bool {
-        pair >= 2 * self.nodes || pair % 2 == 0
+        pair >= 2 * self.nodes || pair.is_multiple_of(2)
     }
 
     fn normalised(&self, mut shape: Vec<Complex64>) -> Vec<Complex64> {
