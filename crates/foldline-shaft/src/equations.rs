@@ -444,7 +444,8 @@ pub(crate) fn sag(stiffness: &Mat<f64>, mass: &Mat<f64>, rotor: &Rotor, gravity:
         (sum - right[(i, 0)]).abs()
     });
     let largest = (0..n).map(|j| found[(j, 0)].abs()).fold(0.0, f64::max);
-    let solved = residual.fold(0.0, f64::max) <= 1e-9 * size * largest && largest < 1e3;
+    let finite = (0..n).all(|j| found[(j, 0)].is_finite());
+    let solved = finite && residual.fold(0.0, f64::max) <= 1e-9 * size * largest && largest < 1e3;
     (solved || gravity == 0.0).then(|| (0..n).map(|i| if gravity == 0.0 { 0.0 } else { found[(i, 0)] }).collect())
 }
 

@@ -4,7 +4,7 @@
 //! with a rotation of the pairs of coordinates and no force has a fixed direction.
 
 use crate::assembly::Assembly;
-use crate::parts::{Centre, Coefficient, Frame, Rotor};
+use crate::parts::{Centre, Frame, Rotor};
 use foldline_general::Mat;
 
 /// Relative difference below which two entries of a matrix are equal. Given matrices may be rounded to ten digits.
@@ -18,11 +18,11 @@ impl Rotor {
             let place = self.called(own.at);
             for (block, letter) in [(&own.stiffness, 'k'), (&own.damping, 'c')] {
                 if block[0][0] != block[1][1] {
-                    let [a, b] = [&block[0][0], &block[1][1]].map(Coefficient::shown);
+                    let [a, b] = [&block[0][0], &block[1][1]];
                     found.push(format!("the bearing at {place} has {letter}xx = {a} and {letter}yy = {b}"));
                 }
                 if block[0][1] != block[1][0].negated() {
-                    let [a, b] = [&block[0][1], &block[1][0]].map(Coefficient::shown);
+                    let [a, b] = [&block[0][1], &block[1][0]];
                     found.push(format!(
                         "the bearing at {place} has {letter}xy = {a} and {letter}yx = {b}, which is not -{letter}xy"
                     ));

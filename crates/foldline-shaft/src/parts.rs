@@ -41,6 +41,17 @@ impl Coefficient {
     }
 }
 
+impl std::fmt::Display for Coefficient {
+    /// Formats the coefficient for a message: `1e7`, `k_b`.
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        match &self.text {
+            None => write!(f, "{:e}", self.factor),
+            Some(text) if self.factor == 1.0 => f.write_str(text),
+            Some(text) => write!(f, "{:e} {text}", self.factor),
+        }
+    }
+}
+
 /// A number as text that reads back exactly; negative numbers in parentheses.
 pub(crate) fn number(value: f64) -> String {
     if value < 0.0 { format!("({value:?})") } else { format!("{value:?}") }

@@ -133,7 +133,7 @@ fn an_anisotropic_rotor_has_no_rotating_frame() {
     let found = parse_model(&text, "rotor.toml").unwrap_err();
     assert_eq!(found.len(), 1, "{found:#?}");
     let message = found[0].to_string();
-    assert!(message.contains("kxx = 1000000.0 and kyy = 800000.0"), "{message}");
+    assert!(message.contains("kxx = 1e6 and kyy = 8e5"), "{message}");
     assert!(message.contains("frame = \"fixed\""), "{message}");
     let (_, machine) = machine(&rotor("R592"));
     assert_eq!(machine.frame(), Frame::Fixed);
