@@ -107,6 +107,14 @@ impl Assembly {
             }
         }
         to.bearings(rotor);
+        let matrices = [&to.mass, &to.damping, &to.internal, &to.gyroscopic, &to.stiffness];
+        if matrices.into_iter().any(|own| !finite(own)) {
+            let message = "the matrices of the rotor are not finite".to_string();
+            return Err([
+                message,
+                "check lengths, diameters and material: a value is far too large or too small".into(),
+            ]);
+        }
         to.positive_mass(rotor)?;
         if !rotor.damping.modal.is_empty() {
             to.modal_damping(rotor)?;
@@ -232,6 +240,11 @@ impl Assembly {
         }
         Ok(())
     }
+}
+
+/// True if all entries are finite.
+pub(crate) fn finite(a: &Mat<f64>) -> bool {
+    (0..a.ncols()).all(|j| (0..a.nrows()).all(|i| a[(i, j)].is_finite()))
 }
 
 /// A J: columns (2k, 2k + 1) become (column 2k + 1, -column 2k).

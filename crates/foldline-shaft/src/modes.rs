@@ -122,6 +122,9 @@ impl Linear {
     /// Modes from the matrix of equation 2.
     fn circular_of(&self, (a, unit, inverted): (Mat<Complex64>, f64, bool), shapes: bool) -> Option<Vec<Mode>> {
         let (n, i) = (self.mass.nrows() / 2, Complex64::I);
+        if !finite(&a) {
+            return None;
+        }
         let (values, vectors) = match shapes {
             true => complex_eigenvectors(a.as_ref()).map(|(values, vectors)| (values, Some(vectors)))?,
             false => (complex_eigenvalues(a.as_ref())?, None),
@@ -153,6 +156,9 @@ impl Linear {
         let d = Mat::from_fn(n, n, |r, c| self.damping[(r, c)] + self.speed * self.gyroscopic[(r, c)]);
         let s = Mat::from_fn(n, n, |r, c| self.stiffness[(r, c)] - self.speed * turned[(r, c)]);
         let (a, unit, inverted) = real_companion(&self.mass, &d, &s);
+        if !crate::assembly::finite(&a) {
+            return None;
+        }
         let (values, vectors) = eigenvectors(a.as_ref())?;
         let back = |mu: Complex64| if inverted { unit / mu } else { unit * mu };
         let upper = values.iter().enumerate().map(|(k, mu)| (k, back(*mu))).filter(|(_, value)| value.im > 0.0);
@@ -214,6 +220,11 @@ fn flexibility(m: &Mat<Complex64>, d: &Mat<Complex64>, s: &Mat<Complex64>) -> [M
     let right = Mat::from_fn(n, 2 * n, |i, j| scale[i] * if j < n { m[(i, j)] } else { d[(i, j - n)] });
     let found = complex_solution(scaled.as_ref(), &right);
     [0, n].map(|from| Mat::from_fn(n, n, |i, j| scale[i] * found[(i, from + j)]))
+}
+
+/// True if all entries are finite.
+fn finite(a: &Mat<Complex64>) -> bool {
+    (0..a.ncols()).all(|j| (0..a.nrows()).all(|i| a[(i, j)].is_finite()))
 }
 
 /// Frobenius norm.
@@ -280,14 +291,16 @@ pub(crate) fn synchronous(at: &Linear) -> Option<Vec<(Whirl, f64)>> {
         let k = Mat::from_fn(n, n, |i, j| 0.5 * (k[(i, j)] + k[(j, i)].conj()));
         for (whirl, sign) in [(Whirl::Forward, -1.0), (Whirl::Backward, 1.0)] {
             let right = Mat::from_fn(n, n, |i, j| m[(i, j)] + sign * Complex64::I * g[(i, j)]);
-            keep(whirl, complex_eigenvalues(complex_solution(k.as_ref(), &right).as_ref())?);
+            let solved = complex_solution(k.as_ref(), &right);
+            keep(whirl, finite(&solved).then(|| complex_eigenvalues(solved.as_ref())).flatten()?);
         }
     } else {
         let n = at.mass.nrows();
         let complex = |f: &dyn Fn(usize, usize) -> Complex64| Mat::from_fn(n, n, f);
         let k = complex(&|i, j| Complex64::from(0.5 * (at.stiffness[(i, j)] + at.stiffness[(j, i)])));
         let right = complex(&|i, j| Complex64::new(at.mass[(i, j)], -at.gyroscopic[(i, j)]));
-        let (values, vectors) = complex_eigenvectors(complex_solution(k.as_ref(), &right).as_ref())?;
+        let solved = complex_solution(k.as_ref(), &right);
+        let (values, vectors) = finite(&solved).then(|| complex_eigenvectors(solved.as_ref())).flatten()?;
         for (c, mu) in values.into_iter().enumerate() {
             let shape: Vec<Complex64> = (0..n).map(|r| vectors[(r, c)]).collect();
             keep(at.whirl(&shape), vec![mu]);

@@ -227,6 +227,8 @@ fn mistakes_in_a_rotor_have_place_cause_and_cure() {
         ("k = \"1e7 N/m\"", "k = \"2*Omege\"", "Omege"),
         ("speed = \"Omega\"", "speed = \"Omega\"\nframe = \"corotating\"", "neither \"rotating\" nor \"fixed\""),
         ("[rotor]\nspeed = \"Omega\"", "", "there is no section `[rotor]`"),
+        ("E = \"211 GPa\"", "E = 1e300", "Poisson's ratio"),
+        ("width = \"70 mm\"", "width = 1e300", "not finite"),
         ("inner = \"50 mm\"", "inner = \"500 mm\"", "not smaller than its outer diameter"),
     ];
     for (from, to, expected) in cases {
