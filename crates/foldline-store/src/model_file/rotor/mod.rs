@@ -22,6 +22,9 @@ pub(super) const SECTIONS: [&str; 9] =
     ["rotor", "material", "shaft", "disc", "bearing", "point-mass", "unbalance", "contact", "force"];
 const KEYS: [&str; 8] = ["speed", "frame", "gravity", "damping", "modal-damping", "scale", "probes", "matrices"];
 
+/// Maximum number of degrees of freedom: a model can have up to 1000 states.
+const MOST_DOFS: usize = 500;
+
 /// Rotor that was read, and what later steps need.
 pub(super) struct Read {
     /// Rotor with its matrices.
@@ -73,6 +76,12 @@ impl Reader<'_> {
                 return None;
             }
         };
+        if rotor.dofs() > MOST_DOFS {
+            let message = format!("the rotor has {} degrees of freedom; the limit is {MOST_DOFS}", rotor.dofs());
+            self.walk.report(span, message, "reduce the number of elements and supports");
+            self.incomplete = true;
+            return None;
+        }
         let frame_span = value.get_ref().as_table().and_then(|table| table.get("frame")).map(|own| own.span());
         let assembled = match Assembled::new(rotor) {
             Ok(assembled) => assembled,
