@@ -21,6 +21,9 @@ use num_complex::Complex64;
 /// Relative rounding error of the lowest squared frequency, ε ‖S‖ ‖S⁻¹M‖/‖M‖, above which S counts as singular.
 const SINGULAR: f64 = 1e-4;
 
+/// Area of an orbit over the square of its size below which the motion is planar: far above rounding errors of shapes.
+const PLANAR: f64 = 1e-9;
+
 /// Direction of whirl relative to the rotation of the shaft.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Whirl {
@@ -28,7 +31,7 @@ pub enum Whirl {
     Forward,
     /// Against the shaft at every station.
     Backward,
-    /// With the shaft at some stations and against it at others.
+    /// With the shaft at some stations and against it at others, or in a plane.
     Mixed,
 }
 
@@ -175,6 +178,10 @@ impl Linear {
         // x = cos ωt, y = sin ωt is x = 1, y = -i.
         let areas: Vec<f64> = (0..shape.len() / 2).filter(|k| self.is_displacement(*k)).map(|k| -turn(k)).collect();
         let largest = areas.iter().fold(0.0, |m: f64, a| m.max(a.abs()));
+        let sizes = shape.iter().map(|z| z.norm_sqr()).fold(0.0, f64::max);
+        if largest <= PLANAR * sizes {
+            return Whirl::Mixed;
+        }
         let forward = if self.speed < 0.0 { -1.0 } else { 1.0 };
         let counted = || areas.iter().filter(|a| a.abs() > 1e-6 * largest);
         match (counted().all(|a| a * forward > 0.0), counted().all(|a| a * forward < 0.0)) {
