@@ -108,7 +108,7 @@ fn both_frames_have_the_same_eigenvalues() {
         let at = Batch { lanes: 1, states: &states, parameters: Parameters::Shared(&[omega]), times: &[], signs: &[] };
         model.linearise(at, &[], &mut f, &mut fx, &mut []);
         // Velocities in units of 1e5/s, so that both blocks have the size of the highest frequency.
-        let scale = |i: usize| if i % 2 == 0 { 1.0 } else { 1e5 };
+        let scale = |i: usize| if i.is_multiple_of(2) { 1.0 } else { 1e5 };
         let a = foldline_general::Mat::from_fn(n, n, |i, j| fx[i * n + j] * scale(j) / scale(i));
         foldline_general::eigenvalues(a.as_ref()).unwrap()
     };
