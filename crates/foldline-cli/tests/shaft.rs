@@ -5,6 +5,7 @@ use foldline::diagram::{Branch, Diagram, Ending, Kind};
 use foldline::explore::{self, System};
 use foldline_store::study_file::parse_study;
 use std::collections::HashMap;
+use std::f64::consts::TAU;
 use std::process::Command;
 
 const MODEL: &str = include_str!("../../../models/overhung-shaft.toml");
@@ -95,7 +96,24 @@ fn friction_makes_the_full_annular_rub_whirl_backward() {
         let found = own.special.iter().find(|s| s.kind == Kind::Hopf).expect("a Hopf point");
         let mu = found.point.parameters[own.free];
         assert!((mu - known[hopf]).abs() < 1e-6, "{mu} {}", known[hopf]);
+        if speed == 880 {
+            // The whirl turns backward: in the fixed frame at Ω minus its frequency in the rotating frame.
+            let oscillating = found.point.spectrum.iter().filter(|z| z.im > 1.0);
+            let critical = oscillating.min_by(|a, b| a.re.abs().total_cmp(&b.re.abs())).unwrap();
+            near(880.0 * TAU / 60.0 - critical.im, known["HMw880"], 1e-5);
+        }
     }
+}
+
+#[test]
+fn friction_moves_the_fold_of_the_rub() {
+    let study = STUDY.replace("tolerance = 1e-8", "tolerance = 1e-8\nparameters = { mu = 0.1 }");
+    let diagram = run(&study);
+    let response = branch(&diagram, "response");
+    let folds: Vec<f64> =
+        response.special.iter().filter(|s| s.kind == Kind::Fold).map(|s| s.point.parameters[response.free]).collect();
+    assert_eq!(folds.len(), 1, "{folds:?}");
+    near(folds[0], reference()["FM0.1"], 1e-6);
 }
 
 fn foldline(arguments: &[&str]) -> (String, String, i32) {
