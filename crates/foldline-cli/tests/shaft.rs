@@ -64,7 +64,7 @@ fn the_synchronous_response_in_contact_is_the_closed_form() {
     let radii = |speed: f64, unstable: bool| -> Vec<f64> {
         let marks = response.special.iter().filter(|s| s.kind == Kind::Mark);
         let own = marks.filter(|s| (s.point.parameters[response.free] - speed).abs() < 1e-6 * speed);
-        let own = own.filter(|s| (s.point.unstable > 0) == unstable).map(|s| s.point.ranges[RADIUS][1] / CLEARANCE);
+        let own = own.filter(|s| (s.unstable_before > 0) == unstable).map(|s| s.point.ranges[RADIUS][1] / CLEARANCE);
         own.filter(|r| *r > 1.0).collect()
     };
     for (speed, saddle, stable) in [(1200.0, "S1200u", "S1200s"), (2000.0, "S2000u", "S2000s")] {
@@ -74,7 +74,7 @@ fn the_synchronous_response_in_contact_is_the_closed_form() {
         near(found, known[stable], 1e-7);
     }
     let saddle = response.special.iter().find(|s| {
-        s.kind == Kind::Mark && (s.point.parameters[response.free] - 2000.0).abs() < 1e-3 && s.point.unstable > 0
+        s.kind == Kind::Mark && (s.point.parameters[response.free] - 2000.0).abs() < 1e-3 && s.unstable_before > 0
     });
     let largest = saddle.unwrap().point.spectrum.iter().map(|z| z.re).fold(f64::NEG_INFINITY, f64::max);
     near(largest, known["E2000u"], 1e-5);
