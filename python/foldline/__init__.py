@@ -18,6 +18,7 @@ from ._diagram import Diagram, Homotopy
 from ._errors import ArgumentError, EndedShort, Error, InputError, Interrupted, NoSolution, RunFileError, TraceError
 from ._model import Model, model
 from ._responses import Responses, Survey, Sweep
+from ._rotor import rotor
 from ._simulation import Trajectory
 from ._solution import Attractor, Attractors, Solution
 from ._strobe import Strobe, strobe
@@ -59,6 +60,7 @@ __all__ = [
     "model",
     "open",
     "rescued",
+    "rotor",
     "run",
     "strobe",
     "survey",

@@ -64,9 +64,111 @@ pub enum Command {
     Attractors(Attractors),
     /// Check a model or study file for errors
     Check(Check),
+    /// Natural frequencies and damping of a rotor over its speed
+    Campbell(Campbell),
+    /// Critical speeds of a rotor, undamped and damped
+    CriticalSpeeds(CriticalSpeeds),
+    /// Amplitudes of a rotor under its unbalance over the speed, without rings and other nonlinear forces
+    UnbalanceResponse(UnbalanceResponse),
     /// Recompute the figures and claims of a publication
     #[command(after_help = EXIT_CODES)]
     Reproduce(Reproduce),
+}
+
+/// Range of the speed of a rotor.
+#[derive(Clone, Debug, Args)]
+pub struct Speeds {
+    /// Lowest and highest speed, in the unit of the speed or with a unit, as in "0:6000 rpm" [default: from 0 to twice the
+    /// speed of the model]
+    #[arg(long, value_name = "LOW:HIGH", allow_hyphen_values = true)]
+    pub speeds: Option<String>,
+    /// Number of speeds [default: 11 in a text table, otherwise 101]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(2..=100_000))]
+    pub count: Option<u32>,
+}
+
+#[derive(Debug, Args)]
+pub struct Campbell {
+    /// Model file with a rotor
+    #[arg(value_name = "MODEL.toml")]
+    pub model: PathBuf,
+    /// Set a parameter; can be repeated
+    #[arg(long = "set", value_name = "NAME=VALUE")]
+    pub set: Vec<String>,
+    #[command(flatten)]
+    pub speeds: Speeds,
+    /// Number of modes
+    #[arg(long, value_name = "N", default_value_t = 6, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub modes: u32,
+    /// Frame in which frequencies are counted; in the rotating frame backward whirl is negative
+    #[arg(long, value_enum, default_value_t = Frame::Fixed)]
+    pub frame: Frame,
+    /// Unit of frequencies, such as Hz, rad/s or rpm
+    #[arg(long, value_name = "UNIT", default_value = "Hz")]
+    pub frequency: String,
+    /// Print the shapes of the modes at the speed of the model instead
+    #[arg(long, conflicts_with_all = ["output", "speeds", "count"])]
+    pub shapes: bool,
+    /// Format of the table
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    pub format: Format,
+    /// Draw a picture instead; the file extension sets the format
+    #[arg(short, long = "output", value_name = "FILE.svg|png|pdf")]
+    pub output: Option<PathBuf>,
+}
+
+/// Frame of frequencies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Frame {
+    /// As a fixed probe measures them
+    Fixed,
+    /// As the shaft sees them
+    Rotating,
+}
+
+#[derive(Debug, Args)]
+pub struct CriticalSpeeds {
+    /// Model file with a rotor
+    #[arg(value_name = "MODEL.toml")]
+    pub model: PathBuf,
+    /// Set a parameter; can be repeated
+    #[arg(long = "set", value_name = "NAME=VALUE")]
+    pub set: Vec<String>,
+    /// Number of critical speeds in each direction of whirl
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    pub count: u32,
+    /// Also list the speeds up to the highest critical one at which the lowest whirls close after n to m turns in the
+    /// rotating frame, as in 2:1; can be repeated
+    #[arg(long, value_name = "N:M")]
+    pub ratio: Vec<String>,
+    /// Format of the table
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    pub format: Format,
+}
+
+#[derive(Debug, Args)]
+pub struct UnbalanceResponse {
+    /// Model file with a rotor
+    #[arg(value_name = "MODEL.toml")]
+    pub model: PathBuf,
+    /// Set a parameter; can be repeated
+    #[arg(long = "set", value_name = "NAME=VALUE")]
+    pub set: Vec<String>,
+    #[command(flatten)]
+    pub speeds: Speeds,
+    /// Node, or support, at which to measure, with the direction of a probe if given, as in 6 or 6:45deg; can be repeated
+    /// [default: nodes with discs]
+    #[arg(long, value_name = "NODE[:ANGLE]")]
+    pub probe: Vec<String>,
+    /// Unit of amplitudes
+    #[arg(long, value_name = "UNIT", default_value = "um")]
+    pub amplitude: String,
+    /// Format of the table
+    #[arg(long, value_enum, default_value_t = Format::Text)]
+    pub format: Format,
+    /// Draw a picture instead; the file extension sets the format
+    #[arg(short, long = "output", value_name = "FILE.svg|png|pdf")]
+    pub output: Option<PathBuf>,
 }
 
 #[derive(Debug, Args)]

@@ -5,7 +5,7 @@ use crate::failure::{Failure, Outcome};
 use foldline::model::Model;
 use foldline::units::Unit;
 use foldline_store::finite::never_finite;
-use foldline_store::model_file::read_model;
+use foldline_store::model_file::{read_model, read_rotor};
 use foldline_store::study_file::{is_study, read_study};
 use std::collections::BTreeSet;
 use std::io::{Write, stdout};
@@ -15,6 +15,7 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
     let file = &typed.file;
     // If the file cannot be read, the model reader reports why.
     let text = std::fs::read_to_string(file).unwrap_or_default();
+    let mut rotor = Vec::new();
     let verdict = if is_study(&text) {
         let study = read_study(file)?;
         remarks(&study.model)?;
@@ -35,9 +36,13 @@ pub fn print(typed: &Typed) -> Result<Outcome, Failure> {
             return Err(vec![found].into());
         }
         remarks(&model)?;
+        let (_, machine) = read_rotor(file)?;
+        rotor = machine.map(|machine| crate::rotor::check::lines(&machine, &parameters)).unwrap_or_default();
         described(&model)
     };
-    writeln!(stdout(), "{} is valid: {verdict}", file.display())?;
+    let mut out = stdout();
+    writeln!(out, "{} is valid: {verdict}", file.display())?;
+    rotor.iter().try_for_each(|line| writeln!(out, "  {line}"))?;
     Ok(Outcome::Done)
 }
 

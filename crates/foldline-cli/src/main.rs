@@ -11,6 +11,7 @@ mod new;
 mod plot;
 mod progress;
 mod reproduce;
+mod rotor;
 mod run;
 mod simulate;
 mod table;
@@ -50,6 +51,9 @@ fn answer(arguments: Arguments) -> Result<Outcome, Failure> {
         Some(Command::ImportAuto(typed)) => import_auto::answer(&typed),
         Some(Command::Attractors(typed)) => attractors::print(&typed),
         Some(Command::Check(typed)) => check::print(&typed),
+        Some(Command::Campbell(typed)) => rotor::campbell::print(&typed),
+        Some(Command::CriticalSpeeds(typed)) => rotor::critical::print(&typed),
+        Some(Command::UnbalanceResponse(typed)) => rotor::unbalance::print(&typed),
         Some(Command::Reproduce(typed)) => reproduce::publication(&typed),
     }
 }

@@ -65,3 +65,36 @@ pub fn norm(a: &Mat<f64>) -> f64 {
 pub fn fourier(samples: &mut [Complex64]) {
     FftPlanner::new().plan_fft_forward(samples.len()).process(samples);
 }
+
+/// Eigenvalues and eigenvectors (columns) of a real square matrix, unordered; `None` if they could not be computed.
+pub fn eigenvectors(a: MatRef<f64>) -> Option<(Vec<Complex64>, Mat<Complex64>)> {
+    let found = a.eigen().ok()?;
+    pairs(found.S().column_vector().iter().copied().collect(), found.U())
+}
+
+/// Eigenvalues of a complex square matrix, unordered; `None` if they could not be computed.
+pub fn complex_eigenvalues(a: MatRef<Complex64>) -> Option<Vec<Complex64>> {
+    a.eigenvalues().ok().filter(|found| found.iter().all(|z| z.is_finite()))
+}
+
+/// Eigenvalues and eigenvectors of a complex square matrix, as [`eigenvectors`].
+pub fn complex_eigenvectors(a: MatRef<Complex64>) -> Option<(Vec<Complex64>, Mat<Complex64>)> {
+    let found = a.eigen().ok()?;
+    pairs(found.S().column_vector().iter().copied().collect(), found.U())
+}
+
+/// Eigenvalues, increasing, and orthonormal eigenvectors of a symmetric matrix; `None` if they could not be computed.
+pub fn symmetric_eigenvectors(a: MatRef<f64>) -> Option<(Vec<f64>, Mat<f64>)> {
+    let found = a.self_adjoint_eigen(faer::Side::Lower).ok()?;
+    let values: Vec<f64> = found.S().column_vector().iter().copied().collect();
+    values.iter().all(|v| v.is_finite()).then(|| (values, found.U().to_owned()))
+}
+
+fn pairs(values: Vec<Complex64>, vectors: MatRef<Complex64>) -> Option<(Vec<Complex64>, Mat<Complex64>)> {
+    values.iter().all(|z| z.is_finite()).then(|| (values, vectors.to_owned()))
+}
+
+/// The solution of `a x = b` with complex numbers, by elimination with partial pivoting.
+pub fn complex_solution(a: MatRef<Complex64>, b: &Mat<Complex64>) -> Mat<Complex64> {
+    a.partial_piv_lu().solve(b)
+}

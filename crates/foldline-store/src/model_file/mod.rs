@@ -7,19 +7,21 @@ mod functions;
 mod items;
 mod mass;
 mod repeat;
+mod rotor;
 mod states;
 mod totals;
 mod units;
 
 use crate::diagnostic::Diagnostic;
-use crate::toml_walk::{Value, Walk, read_text, unreadable};
+use crate::toml_walk::{Value, Walk, diagnose, read_text, unreadable};
 use foldline::model::{Definition, Field, Forcing, Item, Model, ModelError, ModelSource, unsupported};
+use foldline_shaft::Machine;
 use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 use std::path::Path;
 use toml::de::{DeTable, DeValue};
 
-const ROOT_KEYS: [&str; 17] = [
+const ROOT_KEYS: [&str; 26] = [
     "name",
     "description",
     "source",
@@ -37,6 +39,15 @@ const ROOT_KEYS: [&str; 17] = [
     "totals",
     "outputs",
     "whirl",
+    "rotor",
+    "material",
+    "shaft",
+    "disc",
+    "bearing",
+    "point-mass",
+    "unbalance",
+    "contact",
+    "force",
 ];
 
 /// Reads a model file. Returns the model and the verbatim text, or every mistake found.
@@ -48,15 +59,41 @@ pub fn read_model(path: &Path) -> Result<(Model, String), Vec<Diagnostic>> {
 
 /// Reads a model text; `file` is its name in messages. On failure, returns every mistake found.
 pub fn parse_model(text: &str, file: &str) -> Result<Model, Vec<Diagnostic>> {
-    parse(text, file, true)
+    parse(text, file, true).map(|(model, _)| model)
+}
+
+/// Reads a model file and, if the model is described as a rotor, the rotor.
+///
+/// # Errors
+/// Every mistake found.
+pub fn read_rotor(path: &Path) -> Result<(Model, Option<Machine>), Vec<Diagnostic>> {
+    let file = path.display().to_string();
+    let text = read_text(path).map_err(|error| vec![unreadable(&file, "the model file", &error)])?;
+    parse_rotor(&text, &file)
+}
+
+/// Reads a model text as [`read_rotor`]; `file` is its name in messages.
+pub fn parse_rotor(text: &str, file: &str) -> Result<(Model, Option<Machine>), Vec<Diagnostic>> {
+    let (model, read) = parse(text, file, true)?;
+    let Some(read) = read else { return Ok((model, None)) };
+    match rotor::machine(read) {
+        Ok(machine) => Ok((model, Some(machine))),
+        Err(errors) => {
+            let told = |error: ModelError| {
+                let message = format!("a linear analysis needs coefficients without states: {}", error.message);
+                diagnose(file, text, 0..0, message, error.hint)
+            };
+            Err(errors.into_iter().map(told).collect())
+        }
+    }
 }
 
 /// Reads the model text of a run. Inconsistent units are accepted, because earlier versions did not check them.
 pub(crate) fn parse_model_of_run(text: &str, file: &str) -> Result<Model, Vec<Diagnostic>> {
-    parse(text, file, false)
+    parse(text, file, false).map(|(model, _)| model)
 }
 
-fn parse(text: &str, file: &str, refuse_units: bool) -> Result<Model, Vec<Diagnostic>> {
+fn parse(text: &str, file: &str, refuse_units: bool) -> Result<(Model, Option<rotor::Read>), Vec<Diagnostic>> {
     let (mut walk, root) = Walk::parse(text, file)?;
     if let Some(named) = root.get("model") {
         let message = "this file is a study, not a model";
@@ -65,12 +102,16 @@ fn parse(text: &str, file: &str, refuse_units: bool) -> Result<Model, Vec<Diagno
         return Err(walk.found);
     }
     let mut reader = Reader::new(walk, text);
-    let source = reader.source(&root, file);
+    let mut source = reader.source(&root, file);
+    let rotor = reader.rotor(&root, &mut source);
     if reader.incomplete {
         return Err(reader.walk.found);
     }
     match Model::compile(source.clone()) {
-        Ok(model) if reader.walk.found.is_empty() => reader.with_units(model, &source, file, refuse_units),
+        Ok(model) if reader.walk.found.is_empty() => {
+            let checked = rotor.as_ref().map_or(&source, |own| &own.checked);
+            reader.with_units(model, checked, file, refuse_units).map(|model| (model, rotor))
+        }
         Ok(_) => Err(reader.walk.found),
         Err(errors) => {
             let told = |error: &ModelError| !(reader.forcing_misspelt && error.item == Item::Forcing);
@@ -87,7 +128,8 @@ fn parse(text: &str, file: &str, refuse_units: bool) -> Result<Model, Vec<Diagno
 pub fn parse_source(text: &str, file: &str) -> Result<ModelSource, Vec<Diagnostic>> {
     let (walk, root) = Walk::parse(text, file)?;
     let mut reader = Reader::new(walk, text);
-    let source = reader.source(&root, file);
+    let mut source = reader.source(&root, file);
+    reader.rotor(&root, &mut source);
     if reader.walk.found.is_empty() { Ok(source) } else { Err(reader.walk.found) }
 }
 

@@ -73,9 +73,7 @@ impl Sliding<'_> {
         match &at.solution {
             Solution::Cycle(cycle) => {
                 let mut all = arrivals(self.field, &at.parameters, cycle, self.switch);
-                all.retain(|own| {
-                    jumps(self.field, &at.parameters, &own.state, own.time, &own.signs, self.switch)
-                });
+                all.retain(|own| jumps(self.field, &at.parameters, &own.state, own.time, &own.signs, self.switch));
                 all
             }
             Solution::Equilibrium(_) => Vec::new(),
@@ -267,13 +265,18 @@ fn jumps(
 
 /// True if the field jumps at the surface of a switch that a cycle touches at a normalised time.
 pub fn jumps_at(field: &dyn VectorField, point: &Point, cycle: &Cycle, t: f64, switch: usize) -> bool {
-    let (state, forced) = (cycle.state(t), cycle.forcing_periods);
+    let (mut state, forced) = (cycle.state(t), cycle.forcing_periods);
+    let (n, count) = (state.len(), field.switch_count());
     let time = (forced > 0).then_some(f64::from(forced) * t);
-    let mut values = vec![0.0; field.switch_count()];
+    let [mut values, mut gradients, mut rates] = [count, count * n, count].map(|size| vec![0.0; size]);
     let parameters = Parameters::Shared(&point.parameters);
     let at = Batch { lanes: 1, states: &state, parameters, times: time.as_slice(), signs: &[] };
-    field.switches(at, &mut values);
+    field.linearise_switches(at, &[], [&mut values, &mut gradients, &mut [], &mut rates]);
     let signs: Vec<f64> = values.iter().map(|value| if *value < 0.0 { -1.0 } else { 1.0 }).collect();
+    // On the surface itself: beside it, the branches of f on both sides of a kink differ.
+    let gradient = &gradients[switch * n..(switch + 1) * n];
+    let share = values[switch] / gradient.iter().map(|h| h * h).sum::<f64>();
+    state.iter_mut().zip(gradient).for_each(|(x, h)| *x -= share * h);
     jumps(field, &point.parameters, &state, time, &signs, switch)
 }
 
