@@ -134,7 +134,10 @@ pub fn extrema(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle, switc
     let times: Vec<f64> = places.iter().filter_map(|t| time(*t)).collect();
     let values = value(field, parameters, &states, &times, switch);
     let size = values.iter().fold(0.0, |most: f64, v| most.max(v.abs()));
-    let flat = on_surface_throughout(&values, size);
+    let flat = on_surface_throughout(&values, size, |k| {
+        let x = cycle.state(places[k]);
+        sliding::pushes(field, parameters, &x, time(places[k]), switch)
+    });
     let at = |t: f64| value(field, parameters, &cycle.state(t), time(t).as_slice(), switch)[0];
     let mut found = if flat.contains(&true) { sliding::touches(field, parameters, cycle, switch) } else { Vec::new() };
     for k in 0..lanes {
@@ -157,16 +160,20 @@ pub fn extrema(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle, switc
     (found, size)
 }
 
-/// Marks the places of a slide along the surface, which has no extrema: runs of values that are rounding.
-fn on_surface_throughout(values: &[f64], size: f64) -> Vec<bool> {
+/// Marks the places of a slide along the surface, which has no extrema: runs of small values at which f on both sides
+/// leads to the surface. `slides(k)` tells the latter.
+fn on_surface_throughout(values: &[f64], size: f64, slides: impl Fn(usize) -> bool) -> Vec<bool> {
     /// Consecutive sections: the part of an orbit that slides has intervals of its own.
     const RUN: usize = SECTIONS / 2;
     /// Relative to the largest value.
-    const ROUNDING: f64 = 1e-9;
-    let small = |k: usize| values[k % values.len()].abs() <= ROUNDING * size;
+    const SMALL: f64 = 1e-9;
+    let small: Vec<bool> = values.iter().map(|value| value.abs() <= SMALL * size).collect();
     let mut flat = vec![false; values.len()];
-    for k in (0..values.len()).filter(|k| (0..RUN).all(|j| small(k + j))) {
-        (k..k + RUN).for_each(|j| flat[j % values.len()] = true);
+    for k in 0..values.len() {
+        let run = || (k..k + RUN).map(|j| j % values.len());
+        if run().all(|j| small[j]) && slides((k + RUN / 2) % values.len()) {
+            run().for_each(|j| flat[j] = true);
+        }
     }
     flat
 }

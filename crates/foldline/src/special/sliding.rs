@@ -241,6 +241,23 @@ pub fn meets_jump(field: &dyn VectorField, parameters: &[f64], cycle: &Cycle) ->
     })
 }
 
+/// True if f on both sides of the surface of a switch leads to it, at a state on it.
+pub(super) fn pushes(
+    field: &dyn VectorField,
+    parameters: &[f64],
+    state: &[f64],
+    time: Option<f64>,
+    switch: usize,
+) -> bool {
+    let mut values = vec![0.0; field.switch_count()];
+    let parameters = Parameters::Shared(parameters);
+    let at = Batch { lanes: 1, states: state, parameters, times: time.as_slice(), signs: &[] };
+    field.switches(at, &mut values);
+    let signs: Vec<f64> = values.iter().map(|value| if *value < 0.0 { -1.0 } else { 1.0 }).collect();
+    let [below, above] = field.normal_speeds(Batch { signs: &signs, ..at }, switch);
+    below[0] > 0.0 && above[0] < 0.0
+}
+
 /// True if the branches of f on both sides of a surface differ at a state on it by more than rounding.
 fn jumps(
     field: &dyn VectorField,
