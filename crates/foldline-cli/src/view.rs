@@ -60,7 +60,10 @@ fn started(study: &Study, folder: &Path, typed: &Typed) -> Result<Option<Child>,
         let stored = reading.recorded(Part::Special)?;
         if stored.study_text != study.text || stored.model_text != study.model_text {
             let message = format!("the study or its model has changed since the run in {} began", folder.display());
-            let cure = format!("start a new run with --out DIR, or show the old one with `foldline view {}`", folder.display());
+            let cure = format!(
+                "start a new run with --out DIR, or show the old one with `foldline view {}`",
+                folder.display()
+            );
             return Err(Failure::typed(message, cure));
         }
         if reading.is_thinned()? {
@@ -93,7 +96,8 @@ fn opened(folder: &Path, child: &mut Child) -> Result<Watch, Failure> {
 
 /// Serves until Ctrl-C.
 fn served(watch: Watch, child: Option<Child>, folder: &Path, typed: &Typed) -> Result<Outcome, Failure> {
-    let server = Server::new(watch.clone()).map_err(|error| Failure::Outside(format!("no server can be started: {error}")))?;
+    let server =
+        Server::new(watch.clone()).map_err(|error| Failure::Outside(format!("no server can be started: {error}")))?;
     let address = server.address();
     writeln!(stdout(), "{address}")?;
     stdout().flush()?;

@@ -78,7 +78,7 @@ export class Chart {
     const plain = this.options.plain?.() ?? false;
     this.box = plain
       ? { left: 4, top: 4, right: this.width - 4, bottom: this.height - 4 }
-      : { left: small ? 46 : 62, top: small ? 6 : 10, right: this.width - (small ? 10 : 16), bottom: this.height - (small ? 32 : 40) };
+      : { left: small ? 52 : 62, top: small ? 6 : 10, right: this.width - (small ? 10 : 16), bottom: this.height - (small ? 32 : 40) };
     [this.x.from, this.x.to] = [this.box.left, this.box.right];
     [this.y.from, this.y.to] = [this.box.bottom, this.box.top];
   }
@@ -277,7 +277,7 @@ export class Chart {
     if (this.options.plain?.()) return;
     const { left, top, right, bottom } = this.box;
     const small = this.options.small;
-    const xs = this.x.ticks((right - left) / (small ? 52 : 90));
+    const xs = this.x.ticks((right - left) / (small ? 42 : 90));
     const ys = this.y.ticks((bottom - top) / (small ? 30 : 50));
     const line = (x0, y0, x1, y1, stroke, width = 1) => surface.line([x0, x1], [y0, y1], 2, { stroke, width });
     const px = (tick) => Math.round(this.x.pixelOfEven(tick.at)) + 0.5;
@@ -302,7 +302,7 @@ export class Chart {
     });
     const label = { size: size + 1, colour: theme.fg, align: "center" };
     surface.text(this.labels.x, (left + right) / 2, bottom + (small ? 24 : 29), label);
-    surface.text(this.labels.y, small ? 9 : 13, (top + bottom) / 2, { ...label, turn: -90 });
+    surface.text(this.labels.y, small ? 8 : 13, (top + bottom) / 2, { ...label, turn: -90 });
   }
 
   /** The chart as SVG text. */

@@ -89,7 +89,8 @@ export class SpecialTable {
     if (now === this.shown) return;
     this.shown = now;
     const about = run.about.quantities;
-    const heads = [["kind", "kind"], ["branch", "branch"], ...free.map((k) => [k, greek(about[k].name)])];
+    const quantities = free.map((k) => [k, greek(about[k].name)]);
+    const heads = [["kind", "kind"], ...quantities.slice(0, 1), ["branch", "branch"], ...quantities.slice(1)];
     const focused = this.host.contains(document.activeElement) ? document.activeElement.getAttribute("data-key") : null;
     const head = heads.map(([key, text]) => {
       const sorted = this.order === key ? (this.down ? "descending" : "ascending") : "none";
@@ -145,7 +146,7 @@ export class SpecialTable {
     const cells = free.map((k) => make("td", { class: "number", text: shown(own.values[k], 7), title: shown(own.values[k]), "data-value": exact(own.values[k]), "data-quantity": this.run.about.quantities[k].name }));
     return make("tr", { class: "pick", tabindex: 0, "aria-selected": String(id === chosen), "data-key": id, "data-kind": own.kind, onclick: go, onkeydown: key, title: own.form || title },
       make("td", {}, make("span", { class: "kind" }, kindIcon(own.kind), title)),
-      make("td", { text: this.name(own) }), ...cells);
+      ...cells.slice(0, 1), make("td", { text: this.name(own) }), ...cells.slice(1));
   }
 }
 
@@ -159,8 +160,8 @@ export function showPoint(host, run, branch, place, header) {
   const special = branch.special[place.special];
   const text = [];
   const rows = [];
-  const add = (name, value, title) => {
-    rows.push(make("tr", {}, make("td", { text: name, title }), make("td", { class: "number", text: value })));
+  const add = (name, value, title, kind = "number") => {
+    rows.push(make("tr", {}, make("td", { text: name, title }), make("td", { class: kind, text: value })));
     text.push(`${name} = ${value}`);
   };
   const head = (name) => rows.push(make("tr", {}, make("th", { colspan: 2, scope: "colgroup", text: name })));
@@ -169,8 +170,8 @@ export function showPoint(host, run, branch, place, header) {
     if (classes.includes(own.class) && !Number.isNaN(value(k))) add(labelled(greek(own.name), own.unit), shown(value(k)), own.description);
   });
   if (special) {
-    add("kind", run.about.kinds.find((kind) => kind.name === special.kind)?.title ?? special.kind);
-    if (special.form) add("normal form", special.form);
+    add("kind", run.about.kinds.find((kind) => kind.name === special.kind)?.title ?? special.kind, "", "word");
+    if (special.form) add("normal form", special.form, "", "word");
     add("error", magnitude(special.error), "bound on the error of parameter and solution");
     add("unstable", `${special.before} → ${special.after}`);
   } else if (header) {

@@ -209,7 +209,7 @@ class App {
     if (planes.size === 0) return [];
     const defaults = this.run.defaults();
     const name = (k) => greek(this.run.about.quantities[k].name);
-    const all = [["Branches", defaults.x, defaults.y], ...[...planes.values()].map(([x, y]) => [`${name(x)}–${name(y)} curves`, x, y])];
+    const all = [["Branches", defaults.x, defaults.y], ...[...planes.values()].map(([x, y]) => [`${name(x)}–${name(y)}`, x, y])];
     const { qx, qy } = this.diagram;
     return [make("span", { class: "buttons", role: "group", "aria-label": "Ready-made axes" }, ...all.map(([text, x, y]) => button(text, `Show ${text}`, () => {
       this.log = [false, false];

@@ -49,7 +49,7 @@ export class OrbitPanel {
     this.changedChannels = changed;
     this.mode = "phase";
     this.chosen = [0, 0, 0];
-    this.turn = { azimuth: 0.7, height: 0.45 };
+    this.turn = { azimuth: -0.5, height: 0.4 };
     this.time = 0;
     this.playing = false;
     this.frames = 0;

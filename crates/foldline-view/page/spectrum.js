@@ -135,7 +135,7 @@ export class MultipliersPanel {
     const values = this.header?.spectrum ?? [];
     if (this.isCycle) {
       // A large multiplier would make the circle a dot; the tooltip and the table name it.
-      const far = Math.max(1.15, Math.min(4, ...[Math.max(0, ...values.map(([re, im]) => Math.max(Math.abs(re), Math.abs(im)) * 1.1))]));
+      const far = Math.max(1.15, Math.min(2, Math.max(0, ...values.map(([re, im]) => 1.1 * Math.max(Math.abs(re), Math.abs(im))))));
       return { x: [-far, far], y: [-far, far] };
     }
     if (values.length === 0) return null;
@@ -170,8 +170,9 @@ export class MultipliersPanel {
     const py = y.pixelOfEven(0);
     surface.line([x.from, x.to], [py, py], 2, { ...axis, alpha: 0.5 });
     const trivial = this.header?.trivial ?? 0;
-    for (const { k, re, im, px: a, py: b } of this.shownValues(this.chart.x, this.chart.y)) {
-      const [px, own] = [x === this.chart.x ? a : x.pixelOfEven(Math.max(this.chart.x.low, Math.min(this.chart.x.high, re))), y === this.chart.y ? b : y.pixelOfEven(Math.max(this.chart.y.low, Math.min(this.chart.y.high, im)))];
+    const within = (axis, value) => Math.max(axis.low, Math.min(axis.high, value));
+    for (const { k, re, im } of this.shownValues(this.chart.x, this.chart.y)) {
+      const [px, own] = [x.pixelOfEven(within(this.chart.x, re)), y.pixelOfEven(within(this.chart.y, im))];
       const unstable = this.isCycle ? Math.hypot(re, im) > 1 : re > 0;
       const colour = k < trivial ? theme.faint : unstable ? "#d55e00" : theme.accent;
       const style = k < trivial ? { stroke: colour, width: 1.6 } : { fill: colour, stroke: theme.panel, width: 1 };

@@ -24,7 +24,8 @@ pub(crate) fn described(study: &Study, quantities: &[Quantity], folder: &Path) -
     let channels = model.states.iter().map(|s| (&s.name, &s.unit, &s.description, "state"));
     let outputs = model.outputs.iter().map(|o| (&o.name, &o.unit, &o.description, "output"));
     let channels = channels.chain(outputs);
-    let channels = channels.map(|(name, unit, text, class)| json!({ "name": name, "unit": unit, "description": text, "class": class }));
+    let channels = channels
+        .map(|(name, unit, text, class)| json!({ "name": name, "unit": unit, "description": text, "class": class }));
     json!({
         "schema": SCHEMA,
         "foldline": env!("CARGO_PKG_VERSION"),
@@ -74,9 +75,13 @@ pub(crate) fn state(run: Recorded, spans: &[Span], study: &Study, quantities: &[
         let (origin, parent) = match &branch.origin {
             Origin::Seed(name) => (format!("seed {name}"), None),
             Origin::EndOf(name) => (format!("end of {name}"), Some(name)),
-            Origin::Switch { parent, kind, parameter } => (format!("{} of {parent} at {parameter}", kind.title()), Some(parent)),
+            Origin::Switch { parent, kind, parameter } => {
+                (format!("{} of {parent} at {parameter}", kind.title()), Some(parent))
+            }
         };
-        let end = |k: usize| branch.ends[k].as_ref().map(|end| json!({ "text": end.to_string(), "complete": end.complete() }));
+        let end = |k: usize| {
+            branch.ends[k].as_ref().map(|end| json!({ "text": end.to_string(), "complete": end.complete() }))
+        };
         branches.push(json!({
             "id": number, "name": branch.name, "family": branch.family.name(), "free": branch.free,
             "follows": branch.held.map(|(_, follows)| follows), "held": branch.held.map(|(kind, _)| kind.name()),

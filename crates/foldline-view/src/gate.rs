@@ -75,7 +75,9 @@ impl Gate {
             return Err(StatusCode::MISDIRECTED_REQUEST);
         }
         let mut origins = headers.get_all(ORIGIN).iter();
-        if !origins.all(|origin| self.hosts().iter().any(|host| origin.as_bytes() == format!("http://{host}").as_bytes())) {
+        if !origins
+            .all(|origin| self.hosts().iter().any(|host| origin.as_bytes() == format!("http://{host}").as_bytes()))
+        {
             return Err(StatusCode::FORBIDDEN);
         }
         let mut sites = headers.get_all("sec-fetch-site").iter();

@@ -104,7 +104,8 @@ fn solutions(watch: &Watch, state: &Value, data: &mut Vec<String>) -> Result<usi
     let room = (SPACE.saturating_sub(size) / mean).max(1);
     let every = (points.max(1) as usize).div_ceil(room).max(1);
     for (branch, [first, last]) in reaches {
-        let positions = (first + 1..=last).filter(|position| (position - first) % every as i64 == 0 || *position == last);
+        let positions =
+            (first + 1..=last).filter(|position| (position - first) % every as i64 == 0 || *position == last);
         for position in positions {
             add(branch, Place::Position(position), &mut size)?;
         }

@@ -44,9 +44,7 @@ pub(crate) fn solution(model: &Model, quantities: &[Quantity], point: &Point) ->
         "newton": point.cost.newton,
     });
     let (times, harmonics, columns) = match &point.solution {
-        Solution::Equilibrium(state) => {
-            (vec![0.0], 0, channels(model, &point.parameters, state.clone(), &[0.0]))
-        }
+        Solution::Equilibrium(state) => (vec![0.0], 0, channels(model, &point.parameters, state.clone(), &[0.0])),
         Solution::Cycle(cycle) if point.solution.is_stored() && cycle.intervals() > 0 => {
             header["period"] = cycle.period.into();
             header["mesh"] = cycle.mesh.to_vec().into();
@@ -141,7 +139,10 @@ mod tests {
                 5 => [0.0, 0.125],
                 _ => [0.0, 0.0],
             };
-            assert!((real[k] - expected[0]).abs() < 1e-13 && (imaginary[k] - expected[1]).abs() < 1e-13, "harmonic {k}");
+            assert!(
+                (real[k] - expected[0]).abs() < 1e-13 && (imaginary[k] - expected[1]).abs() < 1e-13,
+                "harmonic {k}"
+            );
         }
     }
 }

@@ -320,7 +320,8 @@ fn stamp(folder: &Path) -> Stamp {
     let path = path_in(folder);
     let mut log = path.clone().into_os_string();
     log.push("-wal");
-    [path, log.into()].map(|path| std::fs::metadata(path).ok().and_then(|data| Some((data.modified().ok()?, data.len()))))
+    [path, log.into()]
+        .map(|path| std::fs::metadata(path).ok().and_then(|data| Some((data.modified().ok()?, data.len()))))
 }
 
 #[cfg(test)]
