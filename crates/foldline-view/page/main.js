@@ -27,6 +27,7 @@ class App {
     this.pointText = [];
     this.walking = false;
     this.connected = true;
+    this.ready = false;
     this.log = [false, false];
   }
 
@@ -69,6 +70,7 @@ class App {
     this.log = [asked.get("logx") === "1", asked.get("logy") === "1"];
     await this.axes(named("x", defaults.x), named("y", defaults.y));
     this.recall(asked);
+    this.ready = true;
     this.run.source.listen((notice) => this.grew(notice), (lost) => this.lost(lost));
   }
 
@@ -140,6 +142,7 @@ class App {
 
   /** Shows everything that depends on the data. */
   show() {
+    if (this.presets().length > 0 && !byId("axes").querySelector(".buttons")) this.controls();
     this.diagram.chart.changed();
     this.lists();
     this.progress();
