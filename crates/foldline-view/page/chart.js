@@ -61,11 +61,12 @@ export class Chart {
   resized() {
     const { width, height } = this.host.getBoundingClientRect();
     if (width < 20 || height < 20) return;
-    this.width = width;
-    this.height = height;
+    // Whole pixels, so that the bitmap is moved onto the screen without being blurred.
+    [this.width, this.height] = [Math.floor(width), Math.floor(height)];
+    [this.canvas.style.width, this.canvas.style.height] = [`${this.width}px`, `${this.height}px`];
     this.ratio = Math.min(3, window.devicePixelRatio || 1);
-    this.canvas.width = Math.round(width * this.ratio);
-    this.canvas.height = Math.round(height * this.ratio);
+    this.canvas.width = Math.round(this.width * this.ratio);
+    this.canvas.height = Math.round(this.height * this.ratio);
     this.place();
     if (this.fitted) this.fit(false);
     else if (this.options.equal?.()) this.even();
@@ -236,18 +237,18 @@ export class Chart {
     const start = performance.now();
     const { left, top, right, bottom } = this.box;
     const [w, h] = [right - left, bottom - top];
-    const [ox, oy] = [BEYOND * w, BEYOND * h];
+    const [ox, oy] = [Math.round(BEYOND * w), Math.round(BEYOND * h)];
     this.bitmap.width = Math.ceil((w + 2 * ox) * this.ratio);
     this.bitmap.height = Math.ceil((h + 2 * oy) * this.ratio);
     const context = this.bitmap.getContext("2d");
     context.setTransform(this.ratio, 0, 0, this.ratio, 0, 0);
-    const wide = (axis, from, to) => {
+    const wide = (axis, from, to, part) => {
       const copy = axis.copy();
-      const extra = BEYOND * (axis.high - axis.low);
+      const extra = part * (axis.high - axis.low);
       [copy.low, copy.high, copy.from, copy.to] = [axis.low - extra, axis.high + extra, from, to];
       return copy;
     };
-    const [x, y] = [wide(this.x, 0, w + 2 * ox), wide(this.y, h + 2 * oy, 0)];
+    const [x, y] = [wide(this.x, 0, w + 2 * ox, ox / w), wide(this.y, h + 2 * oy, 0, oy / h)];
     this.options.draw(new CanvasSurface(context, theme.font), x, y, theme);
     this.drawn = { x, y };
     this.cost.redraw = performance.now() - start;

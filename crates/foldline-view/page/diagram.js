@@ -218,7 +218,9 @@ export class Diagram {
     let [special, ofSpecial] = [null, NEAR_SPECIAL * NEAR_SPECIAL];
     const { x, y } = this.chart;
     for (const branch of this.shownBranches()) {
-      const { xs, ys, places } = this.path(branch);
+      const { xs, ys, places, box } = this.path(branch);
+      const away = (axis, pixel, low, high) => Math.max(0, Math.min(axis.pixelOfEven(low), axis.pixelOfEven(high)) - pixel, pixel - Math.max(axis.pixelOfEven(low), axis.pixelOfEven(high)));
+      if (away(x, px, box[0], box[1]) > NEAR || away(y, py, box[2], box[3]) > NEAR) continue;
       for (let k = 0; k < xs.length; k += 1) {
         const [dx, dy] = [x.pixelOfEven(xs[k]) - px, y.pixelOfEven(ys[k]) - py];
         const d = dx * dx + dy * dy;

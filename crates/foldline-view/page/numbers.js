@@ -52,7 +52,7 @@ export function ticks(low, high, count) {
   if (!(high > low) || !Number.isFinite(high - low)) return [];
   const raw = (high - low) / Math.max(1, count);
   const power = 10 ** Math.floor(Math.log10(raw));
-  const step = power * ([1, 2, 5].find((m) => m * power >= raw) ?? 10);
+  const step = power * (raw < 1.5 * power ? 1 : raw < 3.3 * power ? 2 : raw < 7.5 * power ? 5 : 10);
   const first = Math.ceil(low / step - 1e-9);
   const last = Math.floor(high / step + 1e-9);
   const decimals = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));

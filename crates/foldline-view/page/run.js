@@ -130,7 +130,8 @@ export class Run {
       const { epoch, state } = await this.source.state();
       if (epoch !== this.epoch) this.restart(epoch);
       this.take(state);
-      await this.fetchPoints([...this.loaded]);
+      // Before the axes are known no column is wanted.
+      if (this.loaded.size > 0) await this.fetchPoints([...this.loaded]);
     });
   }
 
@@ -210,8 +211,10 @@ export class Run {
       branch.colour = k;
       branch.depth = depth(own);
       const list = special.get(own.id) ?? [];
-      if (list.length !== branch.special.length || list.some((s, i) => s.position !== branch.special[i].position)) branch.touch();
-      branch.special = list;
+      if (list.length !== branch.special.length || list.some((s, i) => s.position !== branch.special[i].position)) {
+        branch.special = list;
+        branch.touch();
+      }
     });
   }
 
