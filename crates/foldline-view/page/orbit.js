@@ -249,7 +249,7 @@ export class OrbitPanel {
       surface.text(greek(this.about.channels[this.chosen[axis]].name), px, py, { size: 11, colour: theme.fg, align: "center" });
       const { low, high } = project.boxes[axis];
       [[-0.8, low], [0.8, high]].forEach(([side, value]) => {
-        const place = [-1, -1, -1].map((own, k) => (k === axis ? side : own - (k === (axis + 1) % 3 ? 0.22 : 0)));
+        const place = [-1, -1, -1].map((own, k) => (k === axis ? side : own - (k === [1, 0, 0][axis] ? 0.28 : 0)));
         const [tx, ty] = pixel(corner(...place));
         surface.text(shown(value, 3), tx, ty, { size: 9, colour: theme.faint, align: "center" });
       });
